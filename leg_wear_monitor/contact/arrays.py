@@ -1,0 +1,94 @@
+"""Clearance joints as arrays for the kernels."""
+
+from collections.abc import Sequence
+from typing import Any, NamedTuple
+
+import attrs
+import numpy as np
+
+from leg_wear_monitor.contact.friction import FRICTION_CODES
+from leg_wear_monitor.contact.geometry import contact_modulus
+from leg_wear_monitor.contact.normal import HYSTERESIS
+from leg_wear_monitor.errors import ConfigError
+from leg_wear_monitor.mechanism.arrays import Floats, Ints
+from leg_wear_monitor.mechanism.spec import Clearance, Mechanism
+
+
+class ContactArrays(NamedTuple):
+    """Settings of k loose joints, SI.
+
+    ``joint`` (k,) index in the mechanism; ``bushing_radius``, ``clearance``, ``width`` (k,);
+    ``modulus`` (k,) [Pa]; ``stiffness`` (k,) [N/m^1.5] where given, 0 where it follows from the modulus
+    and the local radii; ``hysteresis``, ``speed_floor`` (k,); ``friction_law`` (k,), ``friction`` (k, 3) as
+    coefficient, v0, v1; ``wear_coefficient`` (k, 2) of bushing and journal [1/Pa].
+    """
+
+    joint: Ints
+    bushing_radius: Floats
+    clearance: Floats
+    width: Floats
+    modulus: Floats
+    stiffness: Floats
+    hysteresis: Floats
+    speed_floor: Floats
+    friction_law: Ints
+    friction: Floats
+    wear_coefficient: Floats
+
+
+def clearance_settings(
+    mechanism: Mechanism,
+    joints: Sequence[str],
+    clearance_m: float | None = None,
+    normal_law: str | None = None,
+) -> list[Clearance]:
+    """Settings of the joints that shall be loose, with a clearance and a normal law for all if given.
+
+    Raises
+    ------
+    ConfigError
+        Naming the joint that has no settings, or the setting that cannot be.
+    """
+    settings = []
+    for name in joints:
+        if name not in mechanism.clearances:
+            raise ConfigError(
+                mechanism.source,
+                f"clearances.joints.{name}",
+                "no such revolute joint with clearance settings, "
+                f"expected some of {', '.join(mechanism.clearances)}",
+            )
+        changes: dict[str, Any] = {}
+        if clearance_m is not None:
+            changes["radial_clearance"] = clearance_m
+        if normal_law is not None:
+            changes["normal_law"] = normal_law
+        try:
+            settings.append(attrs.evolve(mechanism.clearances[name], **changes))
+        except ValueError as error:
+            raise ConfigError(mechanism.source, f"clearances.joints.{name}", str(error)) from error
+    return settings
+
+
+def compile_contacts(
+    mechanism: Mechanism, joints: Sequence[str], settings: Sequence[Clearance]
+) -> ContactArrays:
+    """Arrays of the loose joints with their settings, in the given order."""
+    order = list(mechanism.joints)
+    moduli = [
+        contact_modulus(c.youngs_modulus[0], c.poissons_ratio[0], c.youngs_modulus[1], c.poissons_ratio[1])
+        for c in settings
+    ]
+    return ContactArrays(
+        joint=np.array([order.index(name) for name in joints], dtype=np.int64),
+        bushing_radius=np.array([c.bushing_radius for c in settings]),
+        clearance=np.array([c.radial_clearance for c in settings]),
+        width=np.array([c.width for c in settings]),
+        modulus=np.array(moduli),
+        stiffness=np.array([c.stiffness or 0.0 for c in settings]),
+        hysteresis=np.array([HYSTERESIS[c.normal_law](c.restitution) for c in settings]),
+        speed_floor=np.array([c.approach_speed_floor for c in settings]),
+        friction_law=np.array([FRICTION_CODES[c.friction.law] for c in settings], dtype=np.int64),
+        friction=np.array([[c.friction.coefficient, *c.friction.ramp] for c in settings]).reshape(-1, 3),
+        wear_coefficient=np.array([c.wear_coefficient for c in settings]).reshape(-1, 2),
+    )

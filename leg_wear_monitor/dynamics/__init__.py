@@ -1,0 +1,1 @@
+"""How the leg moves when its joints have clearance."""

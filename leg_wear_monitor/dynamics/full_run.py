@@ -1,0 +1,112 @@
+"""The full-coordinate formulation as a run."""
+
+import numpy as np
+
+from leg_wear_monitor.dynamics.drive import steady_drive
+from leg_wear_monitor.dynamics.full import full_model
+from leg_wear_monitor.dynamics.full_advance import FullState, advance_full, full_state, full_work, slope_here
+from leg_wear_monitor.dynamics.joint_contact import contact_energy
+from leg_wear_monitor.dynamics.response import NO_TOE, Toe, ideal_toe, toe_position
+from leg_wear_monitor.dynamics.run import DONE, Sample, Setup, stop
+from leg_wear_monitor.dynamics.tally import FORCE, TORQUE, Tally
+from leg_wear_monitor.mechanism.arrays import Floats
+from leg_wear_monitor.mechanism.forces import stored_energy
+from leg_wear_monitor.mechanism.ideal import ideal_motion
+from leg_wear_monitor.mechanism.position import assemble
+from leg_wear_monitor.mechanism.spec import SpeedDrive
+
+TOLERANCE_M = (
+    1.0e-9  # local error of a step in every coordinate [m, rad]: a thousandth of a usual penetration
+)
+TOLERANCE_RATE = 1.0e4  # 1/s: the same for velocities, over the time a contact takes
+
+
+class FullRun:
+    """Motion in full coordinates from the ideal start, journals centred (physics.md section 2).
+
+    Parameters
+    ----------
+    setup : Setup
+    tolerance_m : float
+        Local error allowed in a step [m or rad]; that of velocities is 1e4 times it per second.
+
+    Attributes
+    ----------
+    state : FullState
+        All that a continuation needs, the surfaces aside.
+    """
+
+    def __init__(self, setup: Setup, tolerance_m: float = TOLERANCE_M) -> None:
+        linkage = setup.linkage
+        driven = isinstance(linkage.mechanism.drive, SpeedDrive)
+        self._setup = setup
+        self.model = full_model(linkage.arrays, setup.contacts, driven)
+        self.state = _start(setup, driven)
+        self.toe: Toe = ideal_toe(linkage, setup.speed) if driven else NO_TOE
+        self.polynomial = steady_drive(0.0, setup.speed)
+        sectors = setup.surfaces.depth.shape[2]
+        self._work = full_work(self.model, tolerance_m, tolerance_m * TOLERANCE_RATE, sectors)
+        slope_here(self.model, setup.surfaces, self.state, self.polynomial, self._work)
+
+    @property
+    def time(self) -> float:
+        """Time reached [s]."""
+        return float(self.state.clock[0])
+
+    @property
+    def q(self) -> Floats:
+        """Coordinates (n, 3): centre of mass [m] and angle [rad] of every body, ground first."""
+        return self.state.y[: len(self.state.y) // 2].reshape(-1, 3)
+
+    @property
+    def v(self) -> Floats:
+        """Velocities (n, 3)."""
+        return self.state.y[len(self.state.y) // 2 :].reshape(-1, 3)
+
+    @property
+    def lam(self) -> Floats:
+        """Multipliers (m,) of the ideal joints' rows and the drive's, in the order of ``model.rows``."""
+        return self._work.scratch.lam
+
+    @property
+    def stored_energy(self) -> float:
+        """Kinetic and potential energy, that of gravity, springs and contacts [J]."""
+        model, surfaces = self.model, self._setup.surfaces
+        energy = stored_energy(model.arrays, self.q, self.v, self._work.scratch.cs)
+        for k, joint in enumerate(model.contacts.joint):
+            b, j = model.arrays.joint_body[joint]
+            ex, ey = self._work.start[k, :2]
+            energy += contact_energy(model.contacts, surfaces, k, ex, ey, self.q[b, 2], self.q[j, 2])
+        return float(energy)
+
+    def advance(self, t_end: float, tally: Tally) -> None:
+        """Go on to a time [s] and add to a tally.
+
+        Raises
+        ------
+        SimulationError
+            Naming the joint, the time and what to try.
+        """
+        status, k = advance_full(
+            self.model, self._setup.surfaces, self.state, self.polynomial, t_end, self.toe, tally, self._work
+        )
+        if status != DONE:
+            raise stop(self._setup, status, k, self.time)
+
+    def sample(self) -> Sample:
+        """The leg as it is now."""
+        crank_angle = float(self.q[self.model.arrays.drive_body, 2])
+        toe = None if self.toe.body < 0 else np.array(toe_position(self.toe, self._work.scratch.cs, self.q))
+        force = self._work.rates[0, :, FORCE].copy()
+        return Sample(crank_angle, toe, float(self._work.drive_rates[0, TORQUE]), force)
+
+
+def _start(setup: Setup, driven: bool) -> FullState:
+    """The ideal motion at crank angle 0; for a drive by torque, at the assembly's angle."""
+    linkage = setup.linkage
+    if driven:
+        motion = ideal_motion(linkage, [0.0], setup.speed)
+        return full_state(motion.q[0], motion.v[0], len(setup.loose))
+    angle = linkage.mechanism.assembly.crank_angle
+    velocity = ideal_motion(linkage, [angle], setup.speed).v[0]
+    return full_state(assemble(linkage), velocity, len(setup.loose))

@@ -1,0 +1,65 @@
+"""The ideal linkage's cycle as a simulation result."""
+
+import numpy as np
+
+from leg_wear_monitor.dynamics.result import JsonObject, SimulationResult, toe_errors
+from leg_wear_monitor.dynamics.run import Setup
+from leg_wear_monitor.dynamics.tally import new_tally
+from leg_wear_monitor.mechanism.ideal import TURN, IdealMotion, one_cycle, point_motion
+
+_POINTS = 1440
+
+
+def ideal_result(setup: Setup, cycles: float, trace: int) -> SimulationResult:
+    """Figures of one cycle of the ideal motion, which is each cycle."""
+    mechanism = setup.linkage.mechanism
+    motion = one_cycle(setup.linkage, _POINTS, setup.speed)
+    torque = motion.drive_torque
+    force = np.linalg.norm(motion.joint_force, axis=2)
+    toe = None
+    if mechanism.toe is not None:
+        toe = toe_errors(new_tally(0))
+    return SimulationResult(
+        mechanism=mechanism.name,
+        model="ideal",
+        speed_rpm=setup.speed * 60.0 / TURN,
+        cycles=cycles,
+        simulated_s=cycles * TURN / abs(setup.speed),
+        drive_torque_nm={
+            "mean": float(torque.mean()),
+            "rms": float(np.sqrt(np.mean(torque**2))),
+            "min": float(torque.min()),
+            "max": float(torque.max()),
+            "p99": float(np.percentile(torque, 99.0)),
+            "max_error": 0.0,
+        },
+        energy_j=None,
+        toe=toe,
+        joints={
+            name: {
+                "mean_force_n": float(force[:, i].mean()),
+                "rms_force_n": float(np.sqrt(np.mean(force[:, i] ** 2))),
+                "p99_force_n": float(np.percentile(force[:, i], 99.0)),
+                "max_force_n": float(force[:, i].max()),
+            }
+            for i, name in enumerate(mechanism.joints)
+        },
+        impacts={},
+        trace=_trace(setup, one_cycle(setup.linkage, trace, setup.speed), cycles) if trace else None,
+    )
+
+
+def _trace(setup: Setup, motion: IdealMotion, cycles: float) -> JsonObject:
+    """The samples of the cycle, repeated for all cycles, in the crank's direction of turning."""
+    mechanism = setup.linkage.mechanism
+    points = len(motion.crank_angle)
+    turns = np.arange(round(cycles * points))
+    pick = (turns if setup.speed > 0.0 else -turns) % points
+    force = np.linalg.norm(motion.joint_force, axis=2)[pick]
+    trace: JsonObject = {"crank_angle_rad": (np.sign(setup.speed) * turns * (TURN / points)).tolist()}
+    if mechanism.toe is not None:
+        toe = point_motion(motion, setup.linkage, *mechanism.toe)[0][pick]
+        trace |= {"toe_x_m": toe[:, 0].tolist(), "toe_y_m": toe[:, 1].tolist()}
+    trace["drive_torque_nm"] = motion.drive_torque[pick].tolist()
+    trace["force_n"] = {name: force[:, i].tolist() for i, name in enumerate(mechanism.joints)}
+    return trace

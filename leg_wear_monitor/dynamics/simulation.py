@@ -1,0 +1,213 @@
+"""The leg offline: from a mechanism to what its clearances do."""
+
+import math
+from collections.abc import Callable, Sequence
+
+from leg_wear_monitor.contact.arrays import clearance_settings, compile_contacts
+from leg_wear_monitor.dynamics.full_run import FullRun
+from leg_wear_monitor.dynamics.ideal_result import ideal_result
+from leg_wear_monitor.dynamics.result import (
+    SimulationResult,
+    drive_torque,
+    energy_balance,
+    impact_lists,
+    joint_figures,
+    toe_errors,
+    trace_columns,
+)
+from leg_wear_monitor.dynamics.run import Run, Setup
+from leg_wear_monitor.dynamics.tally import new_tally
+from leg_wear_monitor.errors import ConfigError
+from leg_wear_monitor.mechanism.ideal import TURN, check_cycle
+from leg_wear_monitor.mechanism.position import build_linkage
+from leg_wear_monitor.mechanism.spec import Mechanism, SpeedDrive
+from leg_wear_monitor.wear.surfaces import SECTORS, fresh_surfaces
+
+MODELS: dict[str, Callable[[Setup], Run]] = {"full": FullRun}
+
+_REPORTS_A_CYCLE = 20
+
+
+def prepare(
+    mechanism: Mechanism,
+    *,
+    clearances: Sequence[str] | None = None,
+    clearance_m: float | None = None,
+    speed_rpm: float | None = None,
+    wear: bool = False,
+    normal_law: str | None = None,
+    sectors: int = SECTORS,
+) -> Setup:
+    """Check a mechanism as a moving thing and make it ready to run; parameters as in `simulate`.
+
+    Raises
+    ------
+    ConfigError, AssemblyError
+    """
+    loose = mechanism.loose if clearances is None else tuple(clearances)
+    if len(set(loose)) < len(loose):
+        raise ConfigError("clearances", "", f"{','.join(loose)!r} names a joint twice")
+    linkage = build_linkage(mechanism)
+    check_cycle(linkage)
+    settings = clearance_settings(mechanism, loose, clearance_m, normal_law)
+    contacts = compile_contacts(mechanism, loose, settings)
+    return Setup(
+        linkage, loose, contacts, fresh_surfaces(contacts, wear, sectors), _speed(mechanism, speed_rpm)
+    )
+
+
+def simulate(
+    mechanism: Mechanism,
+    *,
+    clearances: Sequence[str] | None = None,
+    clearance_m: float | None = None,
+    speed_rpm: float | None = None,
+    cycles: float = 5.0,
+    duration_s: float | None = None,
+    skip_cycles: float | None = None,
+    model: str = "full",
+    wear: bool = False,
+    normal_law: str | None = None,
+    trace: int = 0,
+    progress: Callable[[float], None] | None = None,
+) -> SimulationResult:
+    """Move the leg and say what its clearances do.
+
+    Parameters
+    ----------
+    mechanism : Mechanism
+    clearances : sequence of str, optional
+        Names of the loose joints; empty for the ideal leg; the mechanism's own if not given.
+    clearance_m : float, optional
+        Radial clearance of all loose joints [m] instead of the mechanism's own.
+    speed_rpm : float, optional
+        Crank speed instead of the mechanism's own, negative for clockwise.
+    cycles, duration_s : float
+        How long to count, as gait cycles or as time [s].
+    skip_cycles : float, optional
+        Gait cycles simulated before counting starts; 1, or 0 with ``duration_s``.
+    model : str
+        A key of `MODELS`.
+    wear : bool
+        Whether wear opens the clearance as it goes; it is counted either way.
+    normal_law : str, optional
+        Normal contact law of all loose joints.
+    trace : int
+        Samples a cycle to keep, the first at crank angle 0; 0 for none.
+    progress : callable, optional
+        Called with the share of the run that is done.
+
+    Raises
+    ------
+    ConfigError
+        For values that cannot be.
+    AssemblyError
+        For a linkage that does not close or cannot turn.
+    SimulationError
+        Where the motion diverges, naming joint, time and what to try.
+    """
+    setup = prepare(
+        mechanism,
+        clearances=clearances,
+        clearance_m=clearance_m,
+        speed_rpm=speed_rpm,
+        wear=wear,
+        normal_law=normal_law,
+    )
+    if model not in MODELS:
+        raise ConfigError("model", "", f"{model!r} is not one of {', '.join(MODELS)}")
+    skipped, counted = _spans(setup, cycles, duration_s, skip_cycles, trace)
+    if not setup.loose and isinstance(mechanism.drive, SpeedDrive):
+        return ideal_result(setup, counted * abs(setup.speed) / TURN, trace)
+    return _run(setup, MODELS[model](setup), model, skipped, counted, trace, progress)
+
+
+def _speed(mechanism: Mechanism, speed_rpm: float | None) -> float:
+    """Crank speed at the start [rad/s]."""
+    if not isinstance(mechanism.drive, SpeedDrive):
+        if speed_rpm is not None:
+            raise ConfigError("speed-rpm", "", f"{speed_rpm:g} rpm: {mechanism.source} is driven by a torque")
+        return mechanism.drive.initial_speed
+    if speed_rpm is None:
+        return mechanism.drive.speed
+    if not math.isfinite(speed_rpm) or speed_rpm == 0.0:
+        raise ConfigError(
+            "speed-rpm", "", f"{speed_rpm} rpm does not turn the crank; expected a speed other than 0 rpm"
+        )
+    return speed_rpm * TURN / 60.0
+
+
+def _spans(
+    setup: Setup, cycles: float, duration_s: float | None, skip_cycles: float | None, trace: int
+) -> tuple[float, float]:
+    """Time skipped and time counted [s]."""
+    if trace < 0:
+        raise ConfigError("trace", "", f"{trace} is below 0 points a cycle")
+    skip = skip_cycles if skip_cycles is not None else (1.0 if duration_s is None else 0.0)
+    if not (math.isfinite(skip) and skip >= 0.0):
+        raise ConfigError("skip-cycles", "", f"{skip:g} is below 0 cycles")
+    even = isinstance(setup.linkage.mechanism.drive, SpeedDrive)
+    if not even and (duration_s is None or skip > 0.0 or trace):
+        raise ConfigError(
+            setup.linkage.mechanism.source,
+            "drive.torque",
+            "has no even cycles; expected --duration, and neither --skip-cycles nor --trace",
+        )
+    period = TURN / abs(setup.speed) if setup.speed else math.inf
+    counted = cycles * period if duration_s is None else duration_s
+    if not (math.isfinite(counted) and counted > 0.0):
+        name, value, unit = ("cycles", cycles, "") if duration_s is None else ("duration", duration_s, " s")
+        raise ConfigError(name, "", f"{value:g}{unit} is not above 0{unit}")
+    return (skip * period if skip else 0.0), counted
+
+
+def _run(
+    setup: Setup,
+    run: Run,
+    model: str,
+    skipped: float,
+    counted: float,
+    trace: int,
+    progress: Callable[[float], None] | None,
+) -> SimulationResult:
+    mechanism = setup.linkage.mechanism
+    joints = len(mechanism.joints)
+    period = TURN / abs(setup.speed) if setup.speed else counted
+    report = progress or (lambda _share: None)
+    for t in _instants(0.0, skipped, period / _REPORTS_A_CYCLE):
+        run.advance(t, new_tally(joints))
+        report(t / (skipped + counted))
+    tally, samples = new_tally(joints), [run.sample()]
+    stored, depth = run.stored_energy, setup.surfaces.depth.copy()
+    for t in _instants(skipped, skipped + counted, period / (trace or _REPORTS_A_CYCLE)):
+        run.advance(t, tally)
+        report(t / (skipped + counted))
+        if trace:
+            samples.append(run.sample())
+    turned = counted / period if isinstance(mechanism.drive, SpeedDrive) else _turns(run, mechanism)
+    return SimulationResult(
+        mechanism=mechanism.name,
+        model=model,
+        speed_rpm=60.0 * turned / counted * math.copysign(1.0, setup.speed),
+        cycles=turned,
+        simulated_s=skipped + counted,
+        drive_torque_nm=drive_torque(tally),
+        energy_j=energy_balance(tally, stored, run.stored_energy),
+        toe=toe_errors(tally) if mechanism.toe and isinstance(mechanism.drive, SpeedDrive) else None,
+        joints=joint_figures(setup, tally, setup.surfaces.depth - depth, turned),
+        impacts=impact_lists(setup, tally),
+        trace=trace_columns(setup, samples[:-1]) if trace else None,
+        loose=setup.loose,
+        surfaces=setup.surfaces,
+    )
+
+
+def _turns(run: Run, mechanism: Mechanism) -> float:
+    """Turns of a crank that a torque drives, since the start."""
+    return abs(run.sample().crank_angle - mechanism.assembly.crank_angle) / TURN
+
+
+def _instants(start: float, end: float, step: float) -> list[float]:
+    """Times from start (excluded) to end (included) at equal steps; the last step may be shorter."""
+    count = max(1, math.ceil((end - start) / step - 1.0e-9)) if end > start else 0
+    return [min(end, start + (i + 1) * step) if i + 1 < count else end for i in range(count)]

@@ -1,0 +1,31 @@
+"""The one root of everything this package raises on purpose."""
+
+
+class LegWearError(Exception):
+    """Something a user can mend; the command line prints it as one line and returns 2."""
+
+
+class ConfigError(LegWearError):
+    """A file or an option holds something that cannot be used.
+
+    Parameters
+    ----------
+    source : str
+        File or command-line option the value came from.
+    key : str
+        Dotted path of the key, empty where the fault is the file's own.
+    fault : str
+        What was found and what was expected, with its unit.
+    """
+
+    def __init__(self, source: str, key: str, fault: str) -> None:
+        self.source, self.key, self.fault = source, key, fault
+        super().__init__(": ".join(part for part in (source, key, fault) if part))
+
+
+class AssemblyError(LegWearError):
+    """The linkage cannot be put together, or its crank cannot pass a dead point."""
+
+
+class SimulationError(LegWearError):
+    """A run that had to stop: says where, when and what to try."""

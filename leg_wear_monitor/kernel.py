@@ -1,0 +1,67 @@
+"""The one way to compile: ``@kernel`` is ``numba.njit`` with a cache that is writable and never stale."""
+
+import hashlib
+import os
+import tempfile
+from collections.abc import Callable
+from functools import cache
+from pathlib import Path
+from typing import TypeVar
+
+import numba
+
+_Function = TypeVar("_Function", bound=Callable[..., object])
+
+
+def _writable(directory: Path) -> bool:
+    try:
+        directory.mkdir(parents=True, exist_ok=True)
+    except OSError:
+        return False
+    return os.access(directory, os.W_OK | os.X_OK)
+
+
+@cache
+def cache_directory() -> Path:
+    """Directory of the compiled code, named after the sources it was compiled from.
+
+    numba looks only at the file of the function it caches: a kernel that calls a kernel of another
+    file would go on running its old body. A digest over the sources of all kernels closes that hole,
+    and a home of its own makes the cache work where the package directory is read-only.
+
+    Returns
+    -------
+    pathlib.Path
+        ``$NUMBA_CACHE_DIR`` if set, else below ``$XDG_CACHE_HOME`` or ``~/.cache``, else below the
+        temporary directory.
+    """
+    digest = hashlib.sha256(numba.__version__.encode())
+    for source in sorted(Path(__file__).parent.rglob("*.py")):
+        text = source.read_bytes()
+        if b"@kernel" in text or b"NamedTuple" in text:
+            digest.update(text)
+    leaf = f"leg_wear_monitor/{digest.hexdigest()[:16]}"
+    homes = [
+        os.environ.get("NUMBA_CACHE_DIR"),
+        os.environ.get("XDG_CACHE_HOME"),
+        os.path.expanduser("~/.cache"),
+    ]
+    for home in homes:
+        if home and _writable(Path(home) / leaf):
+            return Path(home) / leaf
+    return Path(tempfile.gettempdir()) / f"leg_wear_monitor-{os.getuid()}" / leaf
+
+
+def is_compiled() -> bool:
+    """Whether an earlier process has left compiled code for exactly these sources."""
+    return numba.config.DISABLE_JIT or any(cache_directory().rglob("*.nbi"))
+
+
+def kernel(function: _Function) -> _Function:
+    """Compile a formula: numbers and arrays in, numbers out; division by zero gives inf, as in numpy."""
+    previous = numba.config.CACHE_DIR
+    numba.config.CACHE_DIR = str(cache_directory())
+    try:
+        return numba.njit(cache=True, error_model="numpy")(function)  # type: ignore[no-any-return]
+    finally:
+        numba.config.CACHE_DIR = previous

@@ -1,0 +1,1 @@
+"""What the leg is: its description, its compiled arrays, its ideal motion."""

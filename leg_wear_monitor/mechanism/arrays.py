@@ -1,0 +1,150 @@
+"""A mechanism as arrays for the kernels; body 0 is the ground, of infinite mass."""
+
+from typing import NamedTuple
+
+import numpy as np
+from numpy.typing import NDArray
+
+from leg_wear_monitor.mechanism.spec import GROUND, Mechanism, PhaseLoad, PrismaticJoint, TorqueDrive, Vector
+
+Floats = NDArray[np.float64]
+Ints = NDArray[np.int64]
+
+REVOLUTE, PRISMATIC = 0, 1
+
+
+class MechanismArrays(NamedTuple):
+    """SI throughout; points are relative to the centre of mass, in the body's frame.
+
+    Shapes, with n bodies (ground included), j joints, s springs, l loads and p phases:
+    ``mass`` and ``inverse_mass`` (n, 3), the diagonal of M; ``gravity`` (2,);
+    ``joint_kind`` (j,), ``joint_body`` (j, 2), ``joint_point`` (j, 2, 2), ``joint_normal`` (j, 2),
+    ``joint_angle`` (j,); ``spring_body`` (s, 2), ``spring_point`` (s, 2, 2), ``spring_law`` (s, 3) as
+    stiffness, free length, damping; ``load_body`` (l,), ``load_point`` (l, 2), ``load_phase`` (l, p),
+    ``load_force`` (l, p, 2); ``drive_body`` the crank, ``drive_torque`` 0 for a drive by speed.
+    """
+
+    mass: Floats
+    inverse_mass: Floats
+    gravity: Floats
+    joint_kind: Ints
+    joint_body: Ints
+    joint_point: Floats
+    joint_normal: Floats
+    joint_angle: Floats
+    spring_body: Ints
+    spring_point: Floats
+    spring_law: Floats
+    load_body: Ints
+    load_point: Floats
+    load_phase: Floats
+    load_force: Floats
+    drive_body: int
+    drive_torque: float
+
+
+def body_names(mechanism: Mechanism) -> list[str]:
+    """Names in the order of the arrays, the ground first."""
+    return [GROUND, *mechanism.bodies]
+
+
+def point_from_com(mechanism: Mechanism, body: str, point: str) -> Vector:
+    """A point relative to its body's centre of mass, in the body's frame [m]."""
+    x, y = mechanism.points_of(body)[point]
+    if body == GROUND:
+        return x, y
+    com = mechanism.bodies[body].com
+    return x - com[0], y - com[1]
+
+
+def compile_arrays(mechanism: Mechanism) -> MechanismArrays:
+    """Arrays of a mechanism, in the order of its file."""
+    index = {name: i for i, name in enumerate(body_names(mechanism))}
+    mass = np.zeros((len(index), 3))
+    for name, body in mechanism.bodies.items():
+        mass[index[name]] = body.mass, body.mass, body.inertia
+    inverse_mass = np.divide(1.0, mass, out=np.zeros_like(mass), where=mass > 0.0)
+
+    sides = [mechanism.sides(name) for name in mechanism.joints]
+    kind, normal, angle = _joint_shapes(mechanism)
+    drive = mechanism.drive
+    return MechanismArrays(
+        mass=mass,
+        inverse_mass=inverse_mass,
+        gravity=np.array(mechanism.gravity),
+        joint_kind=kind,
+        joint_body=np.array([[index[b] for b in pair] for pair in sides], dtype=np.int64).reshape(-1, 2),
+        joint_point=np.array(
+            [
+                [point_from_com(mechanism, body, joint) for body in pair]
+                for joint, pair in zip(mechanism.joints, sides, strict=True)
+            ]
+        ).reshape(-1, 2, 2),
+        joint_normal=normal,
+        joint_angle=angle,
+        **_springs(mechanism, index),
+        **_loads(mechanism, index),
+        drive_body=index[drive.body],
+        drive_torque=drive.torque if isinstance(drive, TorqueDrive) else 0.0,
+    )
+
+
+def _joint_shapes(mechanism: Mechanism) -> tuple[Ints, Floats, Floats]:
+    """Kind of each joint, and for a prismatic one the guide's unit normal and the angle it holds."""
+    kind = np.zeros(len(mechanism.joints), dtype=np.int64)
+    normal = np.zeros((len(mechanism.joints), 2))
+    angle = np.zeros(len(mechanism.joints))
+    poses = {GROUND: (0.0, 0.0, 0.0), **mechanism.assembly.poses}
+    for i, joint in enumerate(mechanism.joints.values()):
+        if isinstance(joint, PrismaticJoint):
+            kind[i] = PRISMATIC
+            normal[i] = np.array([-joint.axis[1], joint.axis[0]]) / np.hypot(*joint.axis)
+            angle[i] = poses[joint.slider][2] - poses[joint.guide][2]
+    return kind, normal, angle
+
+
+def _springs(mechanism: Mechanism, index: dict[str, int]) -> dict[str, np.ndarray]:
+    springs = mechanism.springs.values()
+    return {
+        "spring_body": np.array([[index[b] for b in s.bodies] for s in springs], dtype=np.int64).reshape(
+            -1, 2
+        ),
+        "spring_point": np.array(
+            [
+                [point_from_com(mechanism, b, p) for b, p in zip(s.bodies, s.points, strict=True)]
+                for s in springs
+            ]
+        ).reshape(-1, 2, 2),
+        "spring_law": np.array([[s.stiffness, s.free_length, s.damping] for s in springs]).reshape(-1, 3),
+    }
+
+
+def _loads(mechanism: Mechanism, index: dict[str, int]) -> dict[str, np.ndarray]:
+    """Tables over the phase, closed periodically and padded to one length by repeating the last entry."""
+    loads = list(mechanism.loads.values())
+    length = 2 + max((len(load.phase) if isinstance(load, PhaseLoad) else 1 for load in loads), default=0)
+    phases, forces = np.zeros((len(loads), length)), np.zeros((len(loads), length, 2))
+    for i, load in enumerate(loads):
+        phase = np.array(load.phase if isinstance(load, PhaseLoad) else [0.0])
+        force = np.array(load.force if isinstance(load, PhaseLoad) else [load.force])
+        phases[i] = phase[0] + 1.0
+        phases[i, : len(phase) + 1] = phase[-1] - 1.0, *phase
+        forces[i] = force[0]
+        forces[i, : len(phase) + 1] = force[-1], *force
+    points = [point_from_com(mechanism, load.body, load.point) for load in loads]
+    return {
+        "load_body": np.array([index[load.body] for load in loads], dtype=np.int64),
+        "load_point": np.array(points).reshape(-1, 2),
+        "load_phase": phases,
+        "load_force": forces,
+    }
+
+
+def com_poses(mechanism: Mechanism) -> Floats:
+    """Coordinates q (n, 3) of the assembly: centre of mass [m] and angle [rad] of each body, ground 0."""
+    q = np.zeros((len(mechanism.bodies) + 1, 3))
+    for i, (name, body) in enumerate(mechanism.bodies.items(), start=1):
+        x, y, angle = mechanism.assembly.poses[name]
+        c, s = np.cos(angle), np.sin(angle)
+        q[i] = x + c * body.com[0] - s * body.com[1], y + s * body.com[0] + c * body.com[1], angle
+    return q

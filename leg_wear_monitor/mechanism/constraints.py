@@ -1,0 +1,159 @@
+"""Closures of joints and drive: residual, Jacobian and right-hand side (physics.md sections 1 and 2).
+
+Each row touches two bodies, so a row of the Jacobian is kept as two blocks of three, for the bushing's
+(or guide's) and the journal's (or slider's) body. Formulas: Haug, Computer Aided Kinematics and Dynamics
+of Mechanical Systems, chapter 3; Nikravesh, Planar Multibody Dynamics.
+"""
+
+from collections.abc import Iterable
+from typing import NamedTuple
+
+import numpy as np
+
+from leg_wear_monitor.kernel import kernel
+from leg_wear_monitor.mechanism.arrays import PRISMATIC, Ints, MechanismArrays
+
+DRIVE = -1
+
+
+class Rows(NamedTuple):
+    """Which closures are enforced, two rows a joint and one for a driven crank.
+
+    ``closure`` (c,) joint of each closure or ``DRIVE``; ``row`` (c,) its first row; ``body`` (m, 2) the
+    bodies of each row; ``overlap`` (p, 5) the pairs of rows that share a moving body, as row, earlier or
+    equal row, their slots and the body; ``first`` (m,) the first column of each row inside the envelope
+    of Phi_q M^-1 Phi_q^T; ``drive_row`` the row of the drive, -1 without.
+    """
+
+    closure: Ints
+    row: Ints
+    body: Ints
+    overlap: Ints
+    first: Ints
+    drive_row: int
+
+
+def select_rows(arrays: MechanismArrays, joints: Iterable[int], driven: bool) -> Rows:
+    """Rows of the given joints, and of the drive if ``driven``, in an order with a small envelope."""
+    sides = {joint: tuple(arrays.joint_body[joint]) for joint in joints}
+    if driven:
+        sides[DRIVE] = (0, arrays.drive_body)
+    order = _narrow(sides)
+    starts: list[int] = []
+    body: list[tuple[int, ...]] = []
+    for closure in order:
+        starts.append(len(body))
+        body += [sides[closure]] * (1 if closure == DRIVE else 2)
+    overlap = [
+        (r, s, i, j, body[r][i])
+        for r in range(len(body))
+        for s in range(r + 1)
+        for i in range(2)
+        for j in range(2)
+        if body[r][i] == body[s][j] != 0
+    ]
+    first = [min([s for r2, s, *_ in overlap if r2 == r], default=r) for r in range(len(body))]
+    return Rows(
+        closure=np.array(order, dtype=np.int64),
+        row=np.array(starts, dtype=np.int64),
+        body=np.array(body, dtype=np.int64).reshape(-1, 2),
+        overlap=np.array(overlap, dtype=np.int64).reshape(-1, 5),
+        first=np.array(first, dtype=np.int64),
+        drive_row=starts[order.index(DRIVE)] if driven else -1,
+    )
+
+
+def _narrow(sides: dict[int, tuple[int, ...]]) -> list[int]:
+    """Cuthill-McKee: closures that share a body stand near each other, so the envelope stays small."""
+
+    def neighbours(closure: int) -> set[int]:
+        moving = set(sides[closure]) - {0}
+        return {other for other, bodies in sides.items() if other != closure and moving & set(bodies)}
+
+    order: list[int] = []
+    left = sorted(sides, key=lambda closure: (len(neighbours(closure)), closure))
+    while left:
+        queue = [left[0]]
+        while queue:
+            closure = queue.pop(0)
+            if closure in left:
+                left.remove(closure)
+                order.append(closure)
+                queue += sorted(
+                    neighbours(closure) & set(left), key=lambda other: (len(neighbours(other)), other)
+                )
+    return order
+
+
+@kernel
+def rotations(q, out_cs):
+    """Cosine and sine of every body's angle; q (n, 3), out_cs (n, 2)."""
+    for i in range(q.shape[0]):
+        out_cs[i, 0] = np.cos(q[i, 2])
+        out_cs[i, 1] = np.sin(q[i, 2])
+
+
+@kernel
+def arm(cs, body, point):
+    """A point of a body relative to its centre of mass, in the ground's frame [m]."""
+    c, s = cs[body, 0], cs[body, 1]
+    return c * point[0] - s * point[1], s * point[0] + c * point[1]
+
+
+@kernel
+def closures(arrays, rows, q, v, cs, drive, out_phi, out_jac, out_gamma):
+    """Residual (m,), Jacobian blocks (m, 2, 3) and gamma (m,) of every row.
+
+    ``drive`` (3,) is the angle, speed and acceleration of the crank.
+    """
+    for k in range(rows.closure.shape[0]):
+        joint, r = rows.closure[k], rows.row[k]
+        if joint == DRIVE:
+            out_phi[r] = q[arrays.drive_body, 2] - drive[0]
+            out_jac[r, :, :] = 0.0
+            out_jac[r, 1, 2] = 1.0
+            out_gamma[r] = drive[2]
+        elif arrays.joint_kind[joint] == PRISMATIC:
+            _prismatic(arrays, joint, r, q, v, cs, out_phi, out_jac, out_gamma)
+        else:
+            _revolute(arrays, joint, r, q, v, cs, out_phi, out_jac, out_gamma)
+
+
+@kernel
+def _revolute(arrays, joint, r, q, v, cs, out_phi, out_jac, out_gamma):
+    """The two points coincide: phi = P_journal - P_bushing."""
+    b, j = arrays.joint_body[joint, 0], arrays.joint_body[joint, 1]
+    sbx, sby = arm(cs, b, arrays.joint_point[joint, 0])
+    sjx, sjy = arm(cs, j, arrays.joint_point[joint, 1])
+    wb2, wj2 = v[b, 2] * v[b, 2], v[j, 2] * v[j, 2]
+    out_phi[r] = q[j, 0] + sjx - q[b, 0] - sbx
+    out_phi[r + 1] = q[j, 1] + sjy - q[b, 1] - sby
+    out_jac[r, 0, 0], out_jac[r, 0, 1], out_jac[r, 0, 2] = -1.0, 0.0, sby
+    out_jac[r, 1, 0], out_jac[r, 1, 1], out_jac[r, 1, 2] = 1.0, 0.0, -sjy
+    out_jac[r + 1, 0, 0], out_jac[r + 1, 0, 1], out_jac[r + 1, 0, 2] = 0.0, -1.0, -sbx
+    out_jac[r + 1, 1, 0], out_jac[r + 1, 1, 1], out_jac[r + 1, 1, 2] = 0.0, 1.0, sjx
+    out_gamma[r] = wj2 * sjx - wb2 * sbx
+    out_gamma[r + 1] = wj2 * sjy - wb2 * sby
+
+
+@kernel
+def _prismatic(arrays, joint, r, q, v, cs, out_phi, out_jac, out_gamma):
+    """The slider's point stays on the guide's line and its angle to the guide is held."""
+    b, j = arrays.joint_body[joint, 0], arrays.joint_body[joint, 1]
+    sbx, sby = arm(cs, b, arrays.joint_point[joint, 0])
+    sjx, sjy = arm(cs, j, arrays.joint_point[joint, 1])
+    nx, ny = arm(cs, b, arrays.joint_normal[joint])
+    dx, dy = q[j, 0] + sjx - q[b, 0] - sbx, q[j, 1] + sjy - q[b, 1] - sby
+    wb, wj = v[b, 2], v[j, 2]
+    dvx = v[j, 0] - wj * sjy - v[b, 0] + wb * sby
+    dvy = v[j, 1] + wj * sjx - v[b, 1] - wb * sbx
+    out_phi[r] = nx * dx + ny * dy
+    out_phi[r + 1] = q[j, 2] - q[b, 2] - arrays.joint_angle[joint]
+    out_jac[r, 0, 0], out_jac[r, 0, 1] = -nx, -ny
+    out_jac[r, 0, 2] = (nx * dy - ny * dx) - (ny * sbx - nx * sby)
+    out_jac[r, 1, 0], out_jac[r, 1, 1], out_jac[r, 1, 2] = nx, ny, ny * sjx - nx * sjy
+    out_jac[r + 1, 0, 0], out_jac[r + 1, 0, 1], out_jac[r + 1, 0, 2] = 0.0, 0.0, -1.0
+    out_jac[r + 1, 1, 0], out_jac[r + 1, 1, 1], out_jac[r + 1, 1, 2] = 0.0, 0.0, 1.0
+    centripetal = nx * (wj * wj * sjx - wb * wb * sbx) + ny * (wj * wj * sjy - wb * wb * sby)
+    out_gamma[r] = wb * wb * (nx * dx + ny * dy) - 2.0 * wb * (nx * dvy - ny * dvx) + centripetal
+    out_gamma[r + 1] = 0.0

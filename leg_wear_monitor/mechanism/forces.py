@@ -1,0 +1,104 @@
+"""Applied forces: gravity, springs, loads over the gait phase, drive torque; and the energy they store."""
+
+import math
+
+from leg_wear_monitor.kernel import kernel
+from leg_wear_monitor.mechanism.constraints import arm
+
+
+@kernel
+def add_force(body, sx, sy, fx, fy, out_force):
+    """Force (fx, fy) [N] on a body at (sx, sy) from its centre of mass."""
+    out_force[body, 0] += fx
+    out_force[body, 1] += fy
+    out_force[body, 2] += sx * fy - sy * fx
+
+
+@kernel
+def applied_forces(arrays, q, v, cs, out_force):
+    """Generalised forces (n, 3) of all but contacts and constraints."""
+    for i in range(q.shape[0]):
+        out_force[i, 0] = arrays.mass[i, 0] * arrays.gravity[0]
+        out_force[i, 1] = arrays.mass[i, 1] * arrays.gravity[1]
+        out_force[i, 2] = 0.0
+    out_force[arrays.drive_body, 2] += arrays.drive_torque
+    for k in range(arrays.spring_body.shape[0]):
+        _add_spring(arrays, k, q, v, cs, out_force)
+    for k in range(arrays.load_body.shape[0]):
+        body = arrays.load_body[k]
+        fx, fy = load_force(arrays, k, q[arrays.drive_body, 2])
+        sx, sy = arm(cs, body, arrays.load_point[k])
+        add_force(body, sx, sy, fx, fy, out_force)
+
+
+@kernel
+def load_force(arrays, k, crank_angle):
+    """Force of load k [N] at a crank angle, linear between the entries of its table."""
+    table = arrays.load_phase[k]
+    phase = crank_angle / (2.0 * math.pi)
+    phase -= math.floor(phase)
+    i = 1
+    while i < table.shape[0] - 1 and table[i] < phase:
+        i += 1
+    width = table[i] - table[i - 1]
+    w = (phase - table[i - 1]) / width if width > 0.0 else 0.0
+    before, after = arrays.load_force[k, i - 1], arrays.load_force[k, i]
+    return before[0] + w * (after[0] - before[0]), before[1] + w * (after[1] - before[1])
+
+
+@kernel
+def _spring_line(arrays, k, q, cs):
+    """Bodies, arms and the vector from the first point to the second of spring k."""
+    a, b = arrays.spring_body[k, 0], arrays.spring_body[k, 1]
+    sax, say = arm(cs, a, arrays.spring_point[k, 0])
+    sbx, sby = arm(cs, b, arrays.spring_point[k, 1])
+    return a, b, sax, say, sbx, sby, q[b, 0] + sbx - q[a, 0] - sax, q[b, 1] + sby - q[a, 1] - say
+
+
+@kernel
+def _add_spring(arrays, k, q, v, cs, out_force):
+    a, b, sax, say, sbx, sby, dx, dy = _spring_line(arrays, k, q, cs)
+    length = math.hypot(dx, dy)
+    if length == 0.0:
+        return
+    dvx = v[b, 0] - v[b, 2] * sby - v[a, 0] + v[a, 2] * say
+    dvy = v[b, 1] + v[b, 2] * sbx - v[a, 1] - v[a, 2] * sax
+    stiffness, free_length, damping = arrays.spring_law[k]
+    pull = stiffness * (length - free_length) + damping * (dvx * dx + dvy * dy) / length
+    fx, fy = pull * dx / length, pull * dy / length
+    add_force(a, sax, say, fx, fy, out_force)
+    add_force(b, sbx, sby, -fx, -fy, out_force)
+
+
+@kernel
+def stored_energy(arrays, q, v, cs):
+    """Kinetic energy, and that of gravity and springs [J]."""
+    energy = 0.0
+    for i in range(q.shape[0]):
+        for d in range(3):
+            energy += 0.5 * arrays.mass[i, d] * v[i, d] * v[i, d]
+        energy -= arrays.mass[i, 0] * (arrays.gravity[0] * q[i, 0] + arrays.gravity[1] * q[i, 1])
+    for k in range(arrays.spring_body.shape[0]):
+        dx, dy = _spring_line(arrays, k, q, cs)[6:]
+        stiffness, free_length, _ = arrays.spring_law[k]
+        energy += 0.5 * stiffness * (math.hypot(dx, dy) - free_length) ** 2
+    return energy
+
+
+@kernel
+def external_power(arrays, q, v, cs):
+    """Power of loads, of a torque drive and of spring dampers [W]."""
+    power = arrays.drive_torque * v[arrays.drive_body, 2]
+    for k in range(arrays.load_body.shape[0]):
+        body = arrays.load_body[k]
+        fx, fy = load_force(arrays, k, q[arrays.drive_body, 2])
+        sx, sy = arm(cs, body, arrays.load_point[k])
+        power += fx * (v[body, 0] - v[body, 2] * sy) + fy * (v[body, 1] + v[body, 2] * sx)
+    for k in range(arrays.spring_body.shape[0]):
+        a, b, sax, say, sbx, sby, dx, dy = _spring_line(arrays, k, q, cs)
+        length = math.hypot(dx, dy)
+        if length > 0.0:
+            rate = (v[b, 0] - v[b, 2] * sby - v[a, 0] + v[a, 2] * say) * dx
+            rate += (v[b, 1] + v[b, 2] * sbx - v[a, 1] - v[a, 2] * sax) * dy
+            power -= arrays.spring_law[k, 2] * (rate / length) ** 2
+    return power

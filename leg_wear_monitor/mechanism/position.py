@@ -1,0 +1,196 @@
+"""Position analysis: the linkage put together, and carried along with its crank."""
+
+from typing import NamedTuple
+
+import numpy as np
+
+from leg_wear_monitor.errors import AssemblyError
+from leg_wear_monitor.mechanism.arrays import Floats, MechanismArrays, com_poses, compile_arrays
+from leg_wear_monitor.mechanism.constraints import DRIVE, Rows, closures, rotations, select_rows
+from leg_wear_monitor.mechanism.spec import Mechanism
+
+_TOLERANCE = 1.0e-12  # residual of a closed joint [m, rad], near rounding for links of a metre
+_LONGEST_STEP = np.deg2rad(2.0)  # of the crank, for the continuation to stay on its branch
+_SHORTEST_STEP = np.deg2rad(1.0e-4)  # below it, the crank stands before a dead point
+_FAR = 0.5  # rad or link lengths: an assembly further from the given start is another one
+
+
+class Linkage(NamedTuple):
+    """A mechanism made ready for the kernels, all joints ideal.
+
+    ``rows`` holds every closure and the drive, so that their Jacobian is square.
+    """
+
+    mechanism: Mechanism
+    arrays: MechanismArrays
+    rows: Rows
+
+
+class Closures(NamedTuple):
+    """Residual (m,), dense Jacobian (m, 3 bodies) of the moving bodies, and gamma (m,)."""
+
+    phi: Floats
+    jacobian: Floats
+    gamma: Floats
+
+
+def mobility(mechanism: Mechanism) -> int:
+    """Degrees of freedom by Gruebler's count, the drive not locked."""
+    return 3 * len(mechanism.bodies) - 2 * len(mechanism.joints)
+
+
+def build_linkage(mechanism: Mechanism) -> Linkage:
+    """Compile a mechanism; see `check_linkage` for what is checked.
+
+    Raises
+    ------
+    AssemblyError
+        When the linkage has not one degree of freedom.
+    """
+    freedom = mobility(mechanism)
+    if freedom != 1:
+        bodies, joints = len(mechanism.bodies), len(mechanism.joints)
+        raise AssemblyError(
+            f"{mechanism.source}: joints: mobility is {freedom} "
+            f"(3 x {bodies} bodies - 2 x {joints} joints), expected 1"
+        )
+    arrays = compile_arrays(mechanism)
+    return Linkage(mechanism, arrays, select_rows(arrays, range(len(mechanism.joints)), driven=True))
+
+
+def evaluate(linkage: Linkage, q: Floats, v: Floats, drive: tuple[float, float, float]) -> Closures:
+    """All closures at coordinates q (n, 3), velocities v (n, 3) and drive (angle, speed, acceleration)."""
+    m = len(linkage.rows.body)
+    cs, phi, blocks, gamma = np.empty((len(q), 2)), np.empty(m), np.zeros((m, 2, 3)), np.empty(m)
+    rotations(q, cs)
+    closures(linkage.arrays, linkage.rows, q, v, cs, np.array(drive), phi, blocks, gamma)
+    return Closures(phi, dense_jacobian(linkage.rows, blocks, len(q)), gamma)
+
+
+def dense_jacobian(rows: Rows, blocks: Floats, bodies: int) -> Floats:
+    """Jacobian (m, 3 (n - 1)) of the moving bodies from its blocks (m, 2, 3)."""
+    full = np.zeros((len(blocks), bodies, 3))
+    for slot in range(2):
+        full[np.arange(len(blocks)), rows.body[:, slot]] += blocks[:, slot]
+    return full[:, 1:].reshape(len(blocks), -1)
+
+
+def assemble(linkage: Linkage) -> Floats:
+    """Coordinates (n, 3) closed to rounding at the assembly's crank angle, near the given start.
+
+    Raises
+    ------
+    AssemblyError
+        Naming the joint that stays open, and by how much; or a start that is nearer to no assembly.
+    """
+    mechanism = linkage.mechanism
+    start = com_poses(mechanism)
+    angle = mechanism.assembly.crank_angle
+    q = _newton(linkage, start, angle)
+    where = f"{mechanism.source}: assembly"
+    if q is None:
+        raise AssemblyError(
+            f"{where}: no assembly near the given start: {_widest_gap(linkage, start, angle)}"
+        )
+    moved = np.abs(q - start) / [_size(mechanism), _size(mechanism), 1.0]
+    if moved.max() > _FAR:
+        body = list(mechanism.bodies)[np.unravel_index(moved.argmax(), moved.shape)[0] - 1]
+        raise AssemblyError(
+            f"{where}.{body}: no assembly near the given start: the one found moves this body "
+            f"by {moved.max():.2g} (rad or link lengths), expected at most {_FAR}"
+        )
+    return q
+
+
+def follow(linkage: Linkage, q: Floats, angle: float, target: float) -> Floats:
+    """Carry an assembly from one crank angle to another without leaving its branch.
+
+    Raises
+    ------
+    AssemblyError
+        Naming the crank angle of the dead point that stands between.
+    """
+    while angle != target:
+        step = np.clip(target - angle, -_LONGEST_STEP, _LONGEST_STEP)
+        while True:
+            near = _step(linkage, q, angle, step)
+            if near is not None:
+                break
+            step *= 0.5
+            if abs(step) < _SHORTEST_STEP:
+                raise AssemblyError(
+                    f"{linkage.mechanism.source}: drive.body: "
+                    f"dead point at crank angle {np.rad2deg(angle) % 360.0:.2f} deg: "
+                    "the crank cannot turn through a full cycle"
+                )
+        q, angle = near, target if step == target - angle else angle + step
+    return q
+
+
+def _step(linkage: Linkage, q: Floats, angle: float, step: float) -> Floats | None:
+    """One continuation step along the tangent; None if it fails or passes a singular position."""
+    here = evaluate(linkage, q, np.zeros_like(q), (angle, 0.0, 0.0)).jacobian
+    sign = np.linalg.slogdet(here)[0]
+    if sign == 0.0:
+        return None
+    guess = q.copy()
+    guess[1:] += (np.linalg.solve(here, drive_column(linkage)) * step).reshape(-1, 3)
+    near = _newton(linkage, guess, angle + step)
+    if near is None or np.abs(near - guess).max() > abs(step):
+        return None
+    there = evaluate(linkage, near, np.zeros_like(q), (angle + step, 0.0, 0.0)).jacobian
+    return near if np.linalg.slogdet(there)[0] == sign else None
+
+
+def drive_column(linkage: Linkage) -> Floats:
+    """Right-hand side that selects the drive's row (m,)."""
+    column = np.zeros(len(linkage.rows.body))
+    column[linkage.rows.drive_row] = 1.0
+    return column
+
+
+def _newton(linkage: Linkage, start: Floats, angle: float) -> Floats | None:
+    """Newton's method from a start; None if it does not close."""
+    q = start.copy()
+    for _ in range(30):
+        system = evaluate(linkage, q, np.zeros_like(q), (angle, 0.0, 0.0))
+        if np.abs(system.phi).max() < _TOLERANCE:
+            return q
+        try:
+            step = np.linalg.solve(system.jacobian, -system.phi)
+        except np.linalg.LinAlgError:
+            return None
+        if not np.isfinite(step).all() or np.abs(step).max() > 1.0e3:
+            return None
+        q[1:] += step.reshape(-1, 3)
+    return None
+
+
+def _widest_gap(linkage: Linkage, start: Floats, angle: float) -> str:
+    """The joint that stays open longest when the closures are met as well as they can be."""
+    q = start.copy()
+    for _ in range(200):
+        system = evaluate(linkage, q, np.zeros_like(q), (angle, 0.0, 0.0))
+        jacobian = system.jacobian
+        damped = jacobian.T @ jacobian + 1.0e-4 * np.eye(jacobian.shape[1])
+        q[1:] += np.linalg.solve(damped, -jacobian.T @ system.phi).reshape(-1, 3)
+    phi = evaluate(linkage, q, np.zeros_like(q), (angle, 0.0, 0.0)).phi
+    names = list(linkage.mechanism.joints)
+    gaps = {
+        names[closure]: float(np.hypot(*phi[row : row + 2]))
+        for closure, row in zip(linkage.rows.closure, linkage.rows.row, strict=True)
+        if closure != DRIVE
+    }
+    joint = max(gaps, key=lambda name: gaps[name])
+    return f"joint {joint} stays open by {1e3 * gaps[joint]:.3g} mm"
+
+
+def _size(mechanism: Mechanism) -> float:
+    """Longest distance between two points of one body [m]."""
+    spans = [
+        np.hypot(a[0] - b[0], a[1] - b[1])
+        for body in mechanism.bodies.values()
+        for a in body.points.values()
+        for b in body.points.values()
+    ]
+    return float(max(spans, default=0.0)) or 1.0

@@ -1,0 +1,1 @@
+"""What contact takes away: Archard's law on worn surfaces."""

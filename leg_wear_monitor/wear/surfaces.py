@@ -1,0 +1,140 @@
+"""Worn surfaces: depth over angular sectors of bushing and journal (physics.md sections 5 and 6).
+
+Sector i spans the angles [i, i + 1] x 2 pi / N of its own body's frame. A contact wears the sectors in
+which the two circles overlap, each in proportion to its overlap. On fresh surfaces that is the arc
+cos psi = (R_b^2 + e^2 - R_j^2) / (2 R_b e); on worn ones it is where the journal meets the worn profile,
+so that a journal pressed one way wears its own shape into the bushing, as the closed form wants.
+"""
+
+import math
+from typing import NamedTuple
+
+import numpy as np
+
+from leg_wear_monitor.contact.arrays import ContactArrays
+from leg_wear_monitor.kernel import kernel
+from leg_wear_monitor.mechanism.arrays import Floats
+
+SECTORS = 720
+
+BUSHING, JOURNAL = 0, 1
+
+
+class Surfaces(NamedTuple):
+    """Wear depth (k, 2, N) [m] of bushing and journal; ``feeds_back`` 1 if it opens the clearances."""
+
+    depth: Floats
+    feeds_back: int
+
+
+def fresh_surfaces(contacts: ContactArrays, feeds_back: bool, sectors: int = SECTORS) -> Surfaces:
+    """Surfaces without wear."""
+    return Surfaces(np.zeros((len(contacts.joint), 2, sectors)), int(feeds_back))
+
+
+@kernel
+def depth_at(profile, angle):
+    """Depth [m] at an angle of the surface's own frame [rad], linear between sector centres."""
+    n = profile.shape[0]
+    u = angle * (n / (2.0 * math.pi)) - 0.5
+    floor = math.floor(u)
+    i = int(floor) % n
+    w = u - floor
+    return profile[i] + w * (profile[(i + 1) % n] - profile[i])
+
+
+@kernel
+def local_radii(contacts, surfaces, k, direction, angle_b, angle_j):
+    """Radii of bushing and journal [m] where the normal points in a direction [rad] of the ground's frame."""
+    bushing = contacts.bushing_radius[k]
+    journal = bushing - contacts.clearance[k]
+    if surfaces.feeds_back:
+        bushing += depth_at(surfaces.depth[k, BUSHING], direction - angle_b)
+        journal -= depth_at(surfaces.depth[k, JOURNAL], direction - angle_j)
+    return bushing, journal
+
+
+@kernel
+def _weigh_arc(contacts, surfaces, k, ex, ey, angle_b, angle_j, centre, side, out_weight):
+    """Overlap [m] of the sectors from the centre to one side; returns its sum and how many there are.
+
+    The cosine is stepped from sector to sector by rotation.
+    """
+    n = surfaces.depth.shape[2]
+    width = 2.0 * math.pi / n
+    along = angle_b + (centre + 0.5) * width
+    cos_step, sin_step = math.cos(width), side * math.sin(width)
+    c, s = math.cos(along), math.sin(along)
+    total, count = 0.0, 0
+    for step in range(n // 2):
+        if step > 0:
+            c, s = c * cos_step - s * sin_step, s * cos_step + c * sin_step
+        if step > 0 or side > 0:
+            overlap = ex * c + ey * s - contacts.clearance[k]
+            if surfaces.feeds_back:
+                overlap -= surfaces.depth[k, BUSHING, (centre + side * step) % n]
+                overlap -= depth_at(surfaces.depth[k, JOURNAL], along + side * step * width - angle_j)
+            if overlap <= 0.0:
+                break
+            out_weight[(centre + side * step) % n] = overlap
+            total += overlap
+        count += 1
+    return total, count
+
+
+@kernel
+def deposit_wear(contacts, surfaces, k, ex, ey, angle_b, angle_j, integral, out_weight):
+    """Wear both surfaces of joint k by the increment ``integral`` of F_N |v_t| dt [J].
+
+    The removed volumes are k_b and k_j times the integral: the sum over sectors of depth x R_b x sector x
+    width. Both surfaces have the contact's own area, so equal coefficients wear equally deep.
+    """
+    n = surfaces.depth.shape[2]
+    sector = 2.0 * math.pi / n
+    centre = math.floor((math.atan2(ey, ex) - angle_b) / sector) % n
+    right, count_right = _weigh_arc(contacts, surfaces, k, ex, ey, angle_b, angle_j, centre, 1, out_weight)
+    left, count_left = _weigh_arc(contacts, surfaces, k, ex, ey, angle_b, angle_j, centre, -1, out_weight)
+    if right + left <= 0.0:  # touch narrower than a sector
+        out_weight[centre] = 1.0
+        right, count_right, count_left = 1.0, 1, 1
+    depth = integral / ((right + left) * contacts.bushing_radius[k] * sector * contacts.width[k])
+    shift = (angle_b - angle_j) / sector
+    floor = math.floor(shift)
+    w = shift - floor
+    first = centre - count_left + 1
+    for i in range(first, centre + count_right):
+        share = depth * out_weight[i % n]
+        surfaces.depth[k, BUSHING, i % n] += contacts.wear_coefficient[k, BUSHING] * share
+        worn = contacts.wear_coefficient[k, JOURNAL] * share
+        surfaces.depth[k, JOURNAL, (i + int(floor)) % n] += (1.0 - w) * worn
+        surfaces.depth[k, JOURNAL, (i + int(floor) + 1) % n] += w * worn
+
+
+def worn_volume(contacts: ContactArrays, surfaces: Surfaces) -> Floats:
+    """Volume (k, 2) [m^3] gone from bushing and journal."""
+    sector = 2.0 * math.pi / surfaces.depth.shape[2]
+    area = contacts.bushing_radius * contacts.width * sector
+    return np.asarray(surfaces.depth.sum(axis=2) * area[:, None])
+
+
+def wear_zone(depth: Floats, share: float = 0.9) -> tuple[float, float] | None:
+    """Narrowest zone [deg] of the surface's frame that holds a share of the wear; None without wear.
+
+    Parameters
+    ----------
+    depth : (N,) array, m
+    share : float
+
+    Returns
+    -------
+    (from, to) : tuple of float
+        ``from`` in [0, 360), ``to`` up to a turn further.
+    """
+    n, total = len(depth), depth.sum()
+    if not total > 0.0:
+        return None
+    sums = np.concatenate([[0.0], np.cumsum(np.concatenate([depth, depth]))])
+    # the first end that holds the share, for every start
+    ends = np.searchsorted(sums, sums[:n] + share * total * (1.0 - 1.0e-12))
+    start = int(np.argmin(ends - np.arange(n)))
+    return 360.0 * start / n, 360.0 * int(ends[start]) / n

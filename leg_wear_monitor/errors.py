@@ -29,3 +29,7 @@ class AssemblyError(LegWearError):
 
 class SimulationError(LegWearError):
     """A run that had to stop: says where, when and what to try."""
+
+
+class ConfigWarning(UserWarning):
+    """Something that can be used but may not do what was meant; the command line prints it as one line."""

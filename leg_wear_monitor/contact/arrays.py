@@ -1,5 +1,6 @@
 """Clearance joints as arrays for the kernels."""
 
+import warnings
 from collections.abc import Sequence
 from typing import Any, NamedTuple
 
@@ -8,10 +9,14 @@ import numpy as np
 
 from leg_wear_monitor.contact.friction import FRICTION_CODES
 from leg_wear_monitor.contact.geometry import contact_modulus
-from leg_wear_monitor.contact.normal import HYSTERESIS
-from leg_wear_monitor.errors import ConfigError
+from leg_wear_monitor.contact.normal import HYSTERESIS, delivered_restitution
+from leg_wear_monitor.errors import ConfigError, ConfigWarning
 from leg_wear_monitor.mechanism.arrays import Floats, Ints
-from leg_wear_monitor.mechanism.spec import Clearance, Mechanism
+from leg_wear_monitor.mechanism.clearance import Clearance
+from leg_wear_monitor.mechanism.quantity import FieldError
+from leg_wear_monitor.mechanism.spec import Mechanism
+
+NEARLY_ELASTIC, LEAST_RESTITUTION = ("hunt-crossley", "lankarani-nikravesh"), 0.7
 
 
 class ContactArrays(NamedTuple):
@@ -49,25 +54,43 @@ def clearance_settings(
     ConfigError
         Naming the joint that has no settings, or the setting that cannot be.
     """
-    settings = []
+    changes: dict[str, Any] = {}
+    if clearance_m is not None:
+        changes["radial_clearance"] = clearance_m
+    if normal_law is not None:
+        changes["normal_law"] = normal_law
+    settings = {}
     for name in joints:
         if name not in mechanism.clearances:
+            ready = ", ".join(mechanism.clearances) or "none"
             raise ConfigError(
-                mechanism.source,
-                f"clearances.joints.{name}",
-                "no such revolute joint with clearance settings, "
-                f"expected some of {', '.join(mechanism.clearances)}",
+                "clearances",
+                "",
+                f"{mechanism.source} has no joint {name!r} with clearance settings, those are: {ready}",
             )
-        changes: dict[str, Any] = {}
-        if clearance_m is not None:
-            changes["radial_clearance"] = clearance_m
-        if normal_law is not None:
-            changes["normal_law"] = normal_law
         try:
-            settings.append(attrs.evolve(mechanism.clearances[name], **changes))
-        except ValueError as error:
-            raise ConfigError(mechanism.source, f"clearances.joints.{name}", str(error)) from error
-    return settings
+            settings[name] = attrs.evolve(mechanism.clearances[name], **changes)
+        except FieldError as error:
+            option = {"radial_clearance": "clearance-m", "normal_law": "normal-law"}[error.key]
+            raise ConfigError(option, "", f"{error.fault} (joint {name})") from error
+    _warn_of_restitution(mechanism.source, settings)
+    return list(settings.values())
+
+
+def _warn_of_restitution(source: str, settings: dict[str, Clearance]) -> None:
+    """Two laws hold for a restitution near 1 only: far from it they return more than they are asked for."""
+    asked: dict[tuple[str, float], list[str]] = {}
+    for name, c in settings.items():
+        if c.normal_law in NEARLY_ELASTIC and c.restitution < LEAST_RESTITUTION:
+            asked.setdefault((c.normal_law, c.restitution), []).append(name)
+    for (law, restitution), names in asked.items():
+        returned = delivered_restitution(HYSTERESIS[law](restitution))
+        warnings.warn(
+            f"{source}: joint {', '.join(names)}: {law} asked for a restitution of {restitution:g} returns "
+            f"{returned:.3g}, it holds from {LEAST_RESTITUTION:g} on; try flores or hu-guo",
+            ConfigWarning,
+            stacklevel=3,
+        )
 
 
 def compile_contacts(

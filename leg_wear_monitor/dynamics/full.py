@@ -26,6 +26,7 @@ from leg_wear_monitor.dynamics.tally import (
     TORQUE,
     TORQUE_SQUARED,
 )
+from leg_wear_monitor.dynamics.touch import DELTA, DELTA_DOT, EX, EY, F_N, SAMPLE, VX, VY
 from leg_wear_monitor.kernel import kernel
 from leg_wear_monitor.mechanism.arrays import Floats, MechanismArrays
 from leg_wear_monitor.mechanism.constraints import DRIVE, Rows, arm, closures, rotations, select_rows
@@ -50,7 +51,7 @@ class FullModel(NamedTuple):
 class FullScratch(NamedTuple):
     """Room for one evaluation, so that the step allocates nothing.
 
-    After it: ``lam`` (m,) multipliers, ``contact`` (k, 6) as eccentricity and its rate, F_N and penetration.
+    After it: ``lam`` (m,) multipliers, ``contact`` (k, SAMPLE) the loose joints as `touch` wants them.
     """
 
     cs: Floats
@@ -84,7 +85,7 @@ def full_scratch(model: FullModel) -> FullScratch:
         schur=np.zeros((m, m)),
         lam=np.zeros(m),
         drive=np.zeros(3),
-        contact=np.zeros((k, 6)),
+        contact=np.zeros((k, SAMPLE)),
     )
 
 
@@ -103,31 +104,29 @@ def eccentricity(model, k, q, v, cs):
 
 @kernel
 def add_contacts(model, surfaces, approach, q, v, scratch, out_rate):
-    """Add the contact forces of the loose joints and note the rates of their integrals."""
-    contacts, cs = model.contacts, scratch.cs
+    """Add the contact forces of the loose joints; sample them and note the rates of their integrals."""
+    contacts = model.contacts
     for k in range(contacts.joint.shape[0]):
-        ex, ey, vx, vy, b, j, sbx, sby = eccentricity(model, k, q, v, cs)
-        scratch.contact[k, 0], scratch.contact[k, 1] = ex, ey
-        scratch.contact[k, 2], scratch.contact[k, 3] = vx, vy
-        f_n = 0.0
+        ex, ey, vx, vy, b, j, sbx, sby = eccentricity(model, k, q, v, scratch.cs)
+        f_n, f_t, delta, delta_dot, slip, nx, ny, stiffness = joint_force(
+            contacts, surfaces, k, ex, ey, vx, vy, q[b, 2], q[j, 2], v[b, 2], v[j, 2], approach[k]
+        )
+        sample = scratch.contact[k]
+        sample[EX], sample[EY], sample[VX], sample[VY] = ex, ey, vx, vy
+        sample[F_N], sample[DELTA], sample[DELTA_DOT] = f_n, delta, delta_dot
         rate = out_rate[contacts.joint[k]]
         rate[:] = 0.0
-        if approach[k] > 0.0:
-            f_n, f_t, delta, delta_dot, slip, nx, ny, stiffness = joint_force(
-                contacts, surfaces, k, ex, ey, vx, vy, q[b, 2], q[j, 2], v[b, 2], v[j, 2], approach[k]
-            )
+        if f_n > 0.0:
             fx, fy = -f_n * nx - f_t * ny, -f_n * ny + f_t * nx
             px, py = sbx + contacts.bushing_radius[k] * nx, sby + contacts.bushing_radius[k] * ny
             add_force(b, px, py, -fx, -fy, scratch.force)
             add_force(j, q[b, 0] + px - q[j, 0], q[b, 1] + py - q[j, 1], fx, fy, scratch.force)
             rate[FORCE_SQUARED] = f_n * f_n + f_t * f_t
             rate[FORCE] = np.sqrt(rate[FORCE_SQUARED])
-            rate[CONTACT] = 1.0 if f_n > 0.0 else 0.0
+            rate[CONTACT] = 1.0
             rate[FRICTION] = -f_t * slip
-            rate[DISSIPATION] = (f_n - elastic_force(stiffness, delta)) * delta_dot
             rate[ARCHARD] = f_n * abs(slip)
-            scratch.contact[k, 5] = delta
-        scratch.contact[k, 4] = f_n
+        rate[DISSIPATION] = (f_n - elastic_force(stiffness, delta)) * delta_dot
 
 
 @kernel

@@ -22,7 +22,7 @@ from leg_wear_monitor.dynamics.full import FullModel, FullScratch, accelerate, f
 from leg_wear_monitor.dynamics.response import compare_toe
 from leg_wear_monitor.dynamics.run import DONE, PUSHED_THROUGH, SINGULAR, STEP_TOO_SMALL
 from leg_wear_monitor.dynamics.tally import ARCHARD, DRIVE_RATES, JOINT_RATES, TORQUE, add_step
-from leg_wear_monitor.dynamics.touch import NEVER, first_touch, update_contacts
+from leg_wear_monitor.dynamics.touch import DELTA, EX, EY, NEVER, SAMPLE, first_touch, update_contacts
 from leg_wear_monitor.kernel import kernel
 from leg_wear_monitor.mechanism.arrays import Floats
 from leg_wear_monitor.wear.surfaces import deposit_wear
@@ -73,7 +73,7 @@ def full_work(model: FullModel, tolerance_m: float, tolerance_mps: float, sector
         trial=np.zeros(6 * n),
         rates=np.zeros((STAGES, joints, JOINT_RATES)),
         drive_rates=np.zeros((STAGES, DRIVE_RATES)),
-        start=np.zeros((k, 6)),
+        start=np.zeros((k, SAMPLE)),
         scale=np.concatenate([np.full(3 * n, tolerance_m), np.full(3 * n, tolerance_mps)]),
         weight=np.zeros(sectors),
         scratch=full_scratch(model),
@@ -130,12 +130,11 @@ def _accept(model, surfaces, state, h, toe, tally, work):
             for s in range(STAGES):
                 integral += h * WEIGHTS[s] * work.rates[s, joint, ARCHARD]
             b, j = arrays.joint_body[joint, 0], arrays.joint_body[joint, 1]
-            ex, ey = scratch.contact[k, 0], scratch.contact[k, 1]
+            ex, ey = scratch.contact[k, EX], scratch.contact[k, EY]
             deposit_wear(contacts, surfaces, k, ex, ey, q[b, 2], q[j, 2], integral, work.weight)
     changed = update_contacts(
-        contacts, surfaces, arrays.joint_body, state.clock[0], h, q, work.start, scratch.contact,
-        state.approach, state.recent, tally,
-    )  # fmt: skip
+        contacts, state.clock[0], h, work.start, scratch.contact, state.approach, state.recent, tally
+    )
     state.y[:] = work.trial
     state.clock[0] += h
     work.slope[0] = work.slope[last]
@@ -149,7 +148,7 @@ def _accept(model, surfaces, state, h, toe, tally, work):
 def _pushed_through(model, scratch):
     """First loose joint whose journal is pushed further than a tenth of the bushing's radius, else -1."""
     for k in range(model.contacts.joint.shape[0]):
-        if not scratch.contact[k, 5] < 0.1 * model.contacts.bushing_radius[k]:
+        if not scratch.contact[k, DELTA] < 0.1 * model.contacts.bushing_radius[k]:
             return k
     return -1
 
@@ -164,8 +163,7 @@ def advance_full(model, surfaces, state, polynomial, t_end, toe, tally, work):
         DONE, or why it stopped and the loose joint concerned (-1 if none). The state is then the last
         accepted one.
     """
-    arrays, contacts, scratch = model.arrays, model.contacts, work.scratch
-    half = state.y.shape[0] // 2
+    scratch = work.scratch
     if not slope_here(model, surfaces, state, polynomial, work):
         return SINGULAR, -1
     cut = NEVER  # share of the last trial after which a joint touched
@@ -184,10 +182,7 @@ def advance_full(model, surfaces, state, polynomial, t_end, toe, tally, work):
             if state.clock[1] < _SHORTEST_STEP:
                 return STEP_TOO_SMALL, _pushed_through(model, scratch)
             continue
-        q = work.trial[:half].reshape(-1, 3)
-        share = first_touch(
-            contacts, surfaces, state.approach, arrays.joint_body, h, q, work.start, scratch.contact
-        )
+        share = first_touch(state.approach, h, work.start, scratch.contact)
         if share < 1.0 and share * h > _SHORTEST_STEP:
             cut = share * h / state.clock[1]
             continue

@@ -33,7 +33,7 @@ def stiffness_at(contacts, k, bushing, journal):
 
 @kernel
 def joint_force(contacts, surfaces, k, ex, ey, vx, vy, angle_b, angle_j, speed_b, speed_j, approach_speed):
-    """Forces in loose joint k that is in contact.
+    """Forces in loose joint k; none while its ``approach_speed`` is 0, which marks it as open.
 
     Eccentricity (ex, ey) [m] and its rate [m/s]; angles [rad] and speeds [rad/s] of the bushing's and the
     journal's body. Both forces act at the bushing's surface point P_b + R_b n, so action equals reaction
@@ -49,7 +49,7 @@ def joint_force(contacts, surfaces, k, ex, ey, vx, vy, angle_b, angle_j, speed_b
     delta_dot = nx * vx + ny * vy
     radius = contacts.bushing_radius[k]
     slip = nx * vy - ny * vx + speed_j * (radius - math.hypot(ex, ey)) - speed_b * radius
-    if delta <= 0.0:
+    if delta <= 0.0 or approach_speed == 0.0:
         return 0.0, 0.0, delta, delta_dot, slip, nx, ny, 0.0
     stiffness = stiffness_at(contacts, k, bushing, journal)
     f_n = normal_force(stiffness, contacts.hysteresis[k], delta, delta_dot, approach_speed)

@@ -11,7 +11,7 @@ from leg_wear_monitor.mechanism.arrays import Floats
 from leg_wear_monitor.mechanism.position import Linkage
 from leg_wear_monitor.wear.surfaces import Surfaces
 
-DONE, STEP_TOO_SMALL, SINGULAR, PUSHED_THROUGH = 0, 1, 2, 3
+DONE, STEP_TOO_SMALL, SINGULAR, PUSHED_THROUGH, INVALID_DRIVE = 0, 1, 2, 3, 4
 
 _REASONS = {
     STEP_TOO_SMALL: (
@@ -23,6 +23,7 @@ _REASONS = {
         "the journal was pushed through a tenth of the bushing's radius; "
         "try a lower speed, a smaller clearance or a higher stiffness"
     ),
+    INVALID_DRIVE: "the crank's motion is not finite or far too fast; look at its speed and acceleration",
 }
 
 

@@ -1,0 +1,76 @@
+"""What makes a revolute joint loose: geometry, material, contact laws and wear of its pin and hole."""
+
+from typing import Annotated, Any
+
+import attrs
+
+from leg_wear_monitor.mechanism.quantity import FieldError, choice, described, quantity
+
+Pair = Annotated[tuple[float, float], "bushing, journal"]  # in a file, one number stands for both
+
+NORMAL_LAWS = ("hertz", "hunt-crossley", "lankarani-nikravesh", "gonthier", "flores", "hu-guo")
+FRICTION_LAWS = ("ambrosio", "threlfall", "none")
+
+
+def _rises(ramp: tuple[float, float]) -> str | None:
+    if ramp[0] <= ramp[1] and ramp[1] > 0.0:
+        return None
+    return f"{list(ramp)} m/s does not rise to above 0 m/s"
+
+
+@attrs.frozen(kw_only=True)
+class Friction:
+    """Coulomb friction with a ramp around zero slip speed."""
+
+    law: str = choice(FRICTION_LAWS, "shape of the ramp", default="ambrosio")
+    coefficient: float = quantity("", "friction coefficient", at_least=0.0, at_most=2.0, default=0.0)
+    ramp: tuple[float, float] = quantity(
+        "m/s",
+        "slip speeds where friction begins and is full",
+        at_least=0.0,
+        default=(0.001, 0.01),
+        check=_rises,
+    )
+
+
+@attrs.frozen(kw_only=True)
+class Clearance:
+    """Everything that makes a revolute joint loose; pairs are (bushing, journal)."""
+
+    bushing_radius: float = quantity("m", "radius of the bushing", above=0.0, at_most=1.0)
+    width: float = quantity("m", "axial contact width", above=0.0, at_most=1.0)
+    radial_clearance: float = quantity("m", "bushing radius less journal radius", above=0.0)
+    youngs_modulus: Pair = quantity("Pa", "Young's modulus", above=0.0)
+    poissons_ratio: Pair = quantity("", "Poisson's ratio", at_least=0.0, at_most=0.5)
+    normal_law: str = choice(NORMAL_LAWS, "law of the normal force", default="lankarani-nikravesh")
+    restitution: float = quantity("", "coefficient of restitution", above=0.0, at_most=1.0, default=0.9)
+    friction: Friction = described("friction, a mapping of the keys below", default=Friction())
+    wear_coefficient: Pair = quantity("1/Pa", "K/H of Archard's law", at_least=0.0, default=(0.0, 0.0))
+    stiffness: float | None = quantity(
+        "N/m^1.5", "contact stiffness instead of Hertz's", above=0.0, default=None
+    )
+    approach_speed_floor: float = quantity(
+        "m/s", "least approach speed in the damping of the normal law", above=0.0, default=1.0e-3
+    )
+
+    def __attrs_post_init__(self) -> None:
+        if not self.radial_clearance < self.bushing_radius:
+            raise FieldError(
+                "radial_clearance",
+                f"{self.radial_clearance!r} is not below the bushing_radius of {self.bushing_radius!r} m",
+            )
+
+    @property
+    def journal_radius(self) -> float:
+        """Radius of the journal [m]."""
+        return self.bushing_radius - self.radial_clearance
+
+
+@attrs.frozen(kw_only=True)
+class ClearanceSection:
+    """The part of a mechanism file that says which joints are loose."""
+
+    defaults: dict[str, Any] = described("settings of all joints, a mapping of the keys below", factory=dict)
+    joints: tuple[str, ...] | dict[str, Any] = described(
+        "the loose joints: a list of names, or a mapping from each name to its own settings", default=()
+    )

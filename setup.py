@@ -1,0 +1,30 @@
+"""What setup.cfg cannot say: the version, which package.xml holds, and the files below share/."""
+
+from pathlib import Path
+from xml.etree import ElementTree
+
+from setuptools import setup
+
+SHARE = "share/leg_wear_monitor"
+
+
+def share_files() -> list[tuple[str, list[str]]]:
+    """Every file below the top-level data directories, with the directory it is installed to."""
+    found: dict[str, list[str]] = {}
+    for top in ("bags", "config", "launch"):
+        for path in sorted(Path(top).rglob("*")):
+            if path.is_file() and "__pycache__" not in path.parts:
+                found.setdefault(f"{SHARE}/{path.parent.as_posix()}", []).append(path.as_posix())
+    return list(found.items())
+
+
+setup(
+    version=ElementTree.parse("package.xml").findtext("version"),
+    # In setup.cfg this would become an object that colcon, which reads the repr of all this, cannot read.
+    python_requires=">=3.11",
+    data_files=[
+        ("share/ament_index/resource_index/packages", ["resource/leg_wear_monitor"]),
+        (SHARE, ["package.xml"]),
+        *share_files(),
+    ],
+)

@@ -58,10 +58,22 @@ def is_compiled() -> bool:
 
 
 def kernel(function: _Function) -> _Function:
-    """Compile a formula: numbers and arrays in, numbers out; division by zero gives inf, as in numpy."""
+    """Compile a formula: numbers and arrays in, numbers out; division by zero gives inf, as in numpy.
+
+    A kernel cannot allocate: without numba's runtime it counts no references either, which would cost more
+    than the physics where many small arrays are passed around.
+    """
     previous = numba.config.CACHE_DIR
     numba.config.CACHE_DIR = str(cache_directory())
     try:
-        return numba.njit(cache=True, error_model="numpy")(function)  # type: ignore[no-any-return]
+        return numba.njit(cache=True, error_model="numpy", _nrt=False)(function)  # type: ignore[no-any-return]
     finally:
         numba.config.CACHE_DIR = previous
+
+
+@kernel
+def copy_array(source, out):  # type: ignore[no-untyped-def]
+    """Copy an array of one to three dimensions; numba's own slice assignment would allocate for it."""
+    a, b = source.reshape(-1), out.reshape(-1)
+    for i in range(b.shape[0]):
+        b[i] = a[i]

@@ -8,36 +8,50 @@ into calls, and a call costs at most its intervals times a bounded number of ste
 import math
 
 from leg_wear_monitor.dynamics.clearance import ANGLE, crank_between, take_tables
-from leg_wear_monitor.dynamics.clearance_contact import F_T, TO_X, accelerate_clearances, follow_clearance, look_around
-from leg_wear_monitor.dynamics.clearance_step import (
+from leg_wear_monitor.dynamics.clearance_contact import (
     A0,
-    A1,
-    DRIFT,
-    E1,
-    V1,
-    add_drive,
+    E0,
+    F_T,
+    NX,
+    NY,
+    TO_X,
+    V0,
+    accelerate_clearances,
+    has_turned,
+    look_around,
+)
+from leg_wear_monitor.dynamics.clearance_step import (
     add_joints,
     drift,
     drive_torque,
-    external_power_now,
     gather_wear,
-    reaction,
+    outside_power,
+    reactions,
+    shift_start,
     toe_deviation,
     try_step,
     wear_off,
 )
 from leg_wear_monitor.dynamics.drive import drive_at
 from leg_wear_monitor.dynamics.run import DONE, INVALID_DRIVE, PUSHED_THROUGH, STEP_TOO_SMALL
-from leg_wear_monitor.dynamics.tally import FORCE, FORCE_SQUARED, bin_of
+from leg_wear_monitor.dynamics.tally import (
+    FORCE,
+    FORCE_SQUARED,
+    POWER,
+    TORQUE,
+    TORQUE_ERROR,
+    TORQUE_SQUARED,
+    bin_of,
+)
 from leg_wear_monitor.dynamics.touch import DELTA, F_N, NEVER, first_touch, update_contacts
-from leg_wear_monitor.kernel import kernel
+from leg_wear_monitor.kernel import copy_array, kernel
 from leg_wear_monitor.wear.surfaces import Surfaces
 
 MOST_TRIALS = 20000  # steps tried in an interval before it is given up
 
 _SHORTEST_STEP = 1.0e-13  # s
 _RENEWAL = 4  # intervals between two looks at the surfaces and at the reactions of the ideal joints
-_FASTEST = 1.0e4  # rad/s and, over an interval, rad/s^2: a drive beyond is not a leg's
+_FASTEST = 1.0e4  # rad/s, and its change over an interval: a crank beyond is not a leg's
 
 
 @kernel
@@ -54,142 +68,147 @@ def advance_clearances(model, feeds_back, state, polynomial, t_end, tally, work)
     """
     surfaces = Surfaces(state.depth, feeds_back)
     while (state.index[0] + 1.0) * model.interval <= t_end * (1.0 + 1.0e-12) + 1.0e-15:
-        copy_motion(state, work.backup)
+        copy_array(state.motion, work.backup)
         status, k = _interval(model, surfaces, state, polynomial, tally, work)
         if status != DONE:
-            copy_motion(work.backup, state)
+            copy_array(work.backup, state.motion)
             return status, k
     return DONE, -1
 
 
 @kernel
-def copy_motion(source, out_state):
-    """Copy all of a state but its surfaces, which only a finished interval changes."""
-    out_state.index[:] = source.index
-    out_state.e[:] = source.e
-    out_state.v[:] = source.v
-    out_state.drive[:] = source.drive
-    out_state.step[:] = source.step
-    out_state.approach[:] = source.approach
-    out_state.recent[:] = source.recent
-    out_state.local[:] = source.local
-    out_state.pending[:] = source.pending
-
-
-@kernel
 def _interval(model, surfaces, state, polynomial, tally, work):
     """One interval, from whole instant to whole instant."""
-    x, now, contacts, interval = work.vectors, work.now, model.contacts, model.interval
-    began = state.index[0] * interval
-    before = work.backup.drive
+    interval = model.interval
+    copy_array(state.drive, work.crank)
     drive_at(polynomial, (state.index[0] + 1.0) * interval, state.drive)
-    angle, speed, acceleration = crank_between(before, state.drive, interval)
+    angle, speed, acceleration = crank_between(work.crank, state.drive, interval)
     if not (abs(speed) < _FASTEST and abs(acceleration) * interval < _FASTEST):
         return INVALID_DRIVE, -1
-    take_tables(model.tables, angle, speed, acceleration, now)
+    take_tables(model.tables, angle, speed, acceleration, work.now)
     _begin(model, surfaces, state, work)
-    tally.time[0] += interval
-    done, trials, cut = 0.0, 0, NEVER
-    torque = drive_torque(now, speed, acceleration, x[A0], state.v, work.start)
-    while done < interval:
-        h = min(state.step[0], interval - done)
-        if h < interval - done < 2.0 * h and cut == NEVER:
-            h = 0.5 * (interval - done)
-        if cut < 1.0:
-            h = cut
-        ends = h >= (interval - done) * (1.0 - 1.0e-9)
-        error = try_step(model, state, h, work)
-        trials += 1
-        if not error <= 1.0:
-            state.step[0] = h * max(0.2, 0.9 * error ** (-1.0 / 3.0)) if error < 1.0e9 else 0.1 * h
-            cut = NEVER
-            if state.step[0] < _SHORTEST_STEP or trials > MOST_TRIALS:
-                return STEP_TOO_SMALL, _deepest(contacts, work.end)
-            continue
-        share = first_touch(state.approach, h, work.start, work.end)
-        if share < 1.0 and share * h > _SHORTEST_STEP and trials <= MOST_TRIALS:
-            cut = share * h
-            continue
-        if cut == NEVER:
-            state.step[0] = h * min(3.0, 0.9 * max(error, 1.0e-6) ** (-1.0 / 3.0))
-        cut = NEVER
-        deepest = _deepest(contacts, work.end)
-        if deepest >= 0:
-            return PUSHED_THROUGH, deepest
-        torque = _take(model, surfaces, state, began + done, h, speed, acceleration, torque, tally, work)
-        done = interval if ends else done + h
+    status, k = _steps(model, surfaces, state, tally, work)
+    if status != DONE:
+        return status, k
     state.index[0] += 1.0
-    _finish(model, surfaces, state, speed, acceleration, tally, work)
+    for i in range(state.e.shape[0]):
+        state.e[i], state.v[i] = work.x[E0, i], work.x[V0, i]
+    _finish(model, surfaces, state, tally, work)
     return DONE, -1
 
 
 @kernel
 def _begin(model, surfaces, state, work):
-    """Sample the joints under the tables now, the first stage of the first step."""
-    contacts, now, x = model.contacts, work.now, work.vectors
+    """Sample the joints under the tables now: what the first step starts from."""
+    x, now = work.x, work.now
     for k in range(state.approach.shape[0]):
-        unknown = math.isnan(state.local[k, TO_X])
-        if unknown or (surfaces.feeds_back and (int(state.index[0]) + k) % _RENEWAL == 0):
+        turn = (int(state.index[0]) + k) % _RENEWAL == 0
+        if math.isnan(state.local[k, TO_X]) or (surfaces.feeds_back and turn):
             ex, ey = state.e[2 * k], state.e[2 * k + 1]
             length = math.hypot(ex, ey)
             nx, ny = (ex / length, ey / length) if length > 0.0 else (1.0, 0.0)
-            look_around(contacts, surfaces, k, nx, ny, now.angle[k, 0], now.angle[k, 1], state.local[k])
-    drift(now, state.v, x[DRIFT])
-    accelerate_clearances(
-        contacts, state.local, state.approach, state.e, state.v, now, x[DRIFT], work.start, x[A0]
-    )
+            look_around(model.contacts, surfaces, k, nx, ny, now.angle[k, 0], now.angle[k, 1], state.local)
+    for i in range(state.e.shape[0]):
+        x[E0, i], x[V0, i] = state.e[i], state.v[i]
+    drift(now, x, V0)
+    accelerate_clearances(model.law, state.local, state.approach, now, x, E0, V0, A0, work.start)
 
 
 @kernel
-def _deepest(contacts, sample):
+def _steps(model, surfaces, state, tally, work):
+    """All steps of an interval."""
+    x, now, start, end, approach = work.x, work.now, work.start, work.end, state.approach
+    contacts, interval, began = model.contacts, model.interval, state.index[0] * model.interval
+    add_drive(now, x, start, 0.0, tally.drive_integral, tally.drive_range, tally.response)
+    done, trials, cut = 0.0, 0, NEVER
+    while done < interval:
+        left = interval - done
+        h = min(state.step[0], left)
+        if h < left < 2.0 * h:
+            h = 0.5 * left
+        if cut < NEVER:
+            h = cut
+        error = try_step(model.law, model.tolerance, state.local, approach, h, now, work.system, x, start, end)
+        trials += 1
+        if not error <= 1.0:
+            state.step[0] = h * max(0.2, 0.9 * error ** (-1.0 / 3.0)) if error < 1.0e9 else 0.1 * h
+            cut = NEVER
+            if state.step[0] < _SHORTEST_STEP or trials > MOST_TRIALS:
+                return STEP_TOO_SMALL, _pushed_through(contacts.bushing_radius, end)
+            continue
+        share = first_touch(approach, h, start, end)
+        if share < 1.0 and share * h > _SHORTEST_STEP and trials <= MOST_TRIALS:
+            cut = share * h
+            continue
+        pushed = _pushed_through(contacts.bushing_radius, end)
+        if pushed >= 0:
+            return PUSHED_THROUGH, pushed
+        if cut == NEVER:
+            state.step[0] = h * min(3.0, 0.9 * max(error, 1.0e-6) ** (-1.0 / 3.0))
+        cut = NEVER
+        add_joints(contacts.joint, start, 0.5 * h, tally.integral)
+        add_joints(contacts.joint, end, 0.5 * h, tally.integral)
+        gather_wear(h, start, end, state.pending)
+        torque_weight = 0.5 * h
+        add_drive(now, x, start, torque_weight, tally.drive_integral, tally.drive_range, tally.response)
+        update_contacts(
+            contacts.joint, contacts.speed_floor, began + done, h, start, end,
+            approach, state.recent, tally.peak, tally.impact, tally.impacts,
+        )  # fmt: skip
+        shift_start(now, x)
+        copy_array(end, start)
+        if surfaces.feeds_back:
+            _follow(contacts, surfaces, start, now.angle, state.local)
+        add_drive(now, x, start, torque_weight, tally.drive_integral, tally.drive_range, tally.response)
+        toe_deviation(now, x, tally.response)
+        done = interval if h >= left * (1.0 - 1.0e-9) else done + h
+    return DONE, -1
+
+
+@kernel
+def add_drive(now, x, sample, weight, integral, extremes, response):
+    """Add drive torque and power at one end of a step, by half its length [s]; raise their extremes."""
+    torque, ideal = drive_torque(now, x, sample)
+    integral[TORQUE] += weight * torque
+    integral[TORQUE_SQUARED] += weight * torque * torque
+    integral[POWER] += weight * (torque * now.speed[0] + outside_power(now, x))
+    extremes[0], extremes[1] = min(extremes[0], torque), max(extremes[1], torque)
+    response[TORQUE_ERROR] = max(response[TORQUE_ERROR], abs(torque - ideal))
+
+
+@kernel
+def _follow(contacts, surfaces, sample, angle, local):
+    """Look up the clearance of the joints whose normal has turned away from where it was known."""
+    for k in range(sample.shape[0]):
+        if has_turned(k, sample[k, NX], sample[k, NY], local):
+            look_around(contacts, surfaces, k, sample[k, NX], sample[k, NY], angle[k, 0], angle[k, 1], local)
+
+
+@kernel
+def _pushed_through(bushing_radius, sample):
     """First loose joint whose journal is pushed further than a tenth of the bushing's radius, else -1."""
     for k in range(sample.shape[0]):
-        if not sample[k, DELTA] < 0.1 * contacts.bushing_radius[k]:
+        if not sample[k, DELTA] < 0.1 * bushing_radius[k]:
             return k
     return -1
 
 
 @kernel
-def _take(model, surfaces, state, t, h, speed, acceleration, torque, tally, work):
-    """Take the trial step: sums, contacts, wear. Returns the drive torque at its end."""
-    x, now, contacts = work.vectors, work.now, model.contacts
-    power = external_power_now(model.tables, now, speed, state.v)
-    add_joints(contacts, work.start, 0.5 * h, tally)
-    add_drive(torque, speed, power, 0.5 * h, tally)
-    update_contacts(contacts, t, h, work.start, work.end, state.approach, state.recent, tally)
-    gather_wear(h, work.start, work.end, state.pending)
-    state.e[:] = x[E1]
-    state.v[:] = x[V1]
-    for i in range(state.v.shape[0]):
-        x[A0, i] = x[A1, i] - x[DRIFT, i]
-    drift(now, state.v, x[DRIFT])
-    for i in range(state.v.shape[0]):
-        x[A0, i] += x[DRIFT, i]
-    work.start[:] = work.end
-    follow_clearance(contacts, surfaces, work.start, now.angle, state.local)
-    torque = drive_torque(now, speed, acceleration, x[A0], state.v, work.start)
-    power = external_power_now(model.tables, now, speed, state.v)
-    add_joints(contacts, work.start, 0.5 * h, tally)
-    add_drive(torque, speed, power, 0.5 * h, tally)
-    toe_deviation(now, speed, acceleration, state.e, state.v, x[A0], torque, tally.response)
-    return torque
-
-
-@kernel
-def _finish(model, surfaces, state, speed, acceleration, tally, work):
+def _finish(model, surfaces, state, tally, work):
     """At the end of an interval: wear, distributions, and the reactions of the ideal joints."""
-    contacts, now, x = model.contacts, work.now, work.vectors
+    joint, now, sample, interval = model.contacts.joint, work.now, work.start, model.interval
     renew = int(state.index[0]) % _RENEWAL == 0
+    tally.time[0] += interval
     for k in range(state.approach.shape[0]):
         if renew or state.approach[k] == 0.0:
-            wear_off(contacts, surfaces, k, now.angle[k], state.pending[k], work.weight)
-        force = math.hypot(work.start[k, F_N], work.start[k, F_T])
-        tally.force_time[contacts.joint[k], bin_of(force)] += model.interval
-    torque = drive_torque(now, speed, acceleration, x[A0], state.v, work.start)
-    tally.torque_time[1 if torque > 0.0 else 0, bin_of(abs(torque))] += model.interval
+            wear_off(model.contacts, surfaces, k, now.angle, state.pending, work.weight)
+        force = math.sqrt(sample[k, F_N] ** 2 + sample[k, F_T] ** 2)
+        tally.force_time[joint[k], bin_of(force)] += interval
+    torque = drive_torque(now, work.x, sample)[0]
+    tally.torque_time[1 if torque > 0.0 else 0, bin_of(abs(torque))] += interval
     if renew:
-        reaction(model.tables, state.drive[ANGLE], speed, acceleration, x[A0], state.v, work.start, work.reaction)
-        _add_reactions(model.tables.reaction_joint, work.reaction, _RENEWAL * model.interval, tally)
+        reactions(model.tables, state.drive[ANGLE], now, work.x, sample, work.reaction)
+        _add_reactions(model.tables.reaction_joint, work.reaction, _RENEWAL * interval, tally)
 
 
 @kernel
@@ -198,13 +217,10 @@ def _add_reactions(joints, reaction, weight, tally):
     row = 1
     while row < joints.shape[0]:
         joint = joints[row]
-        squared = reaction[row] ** 2
-        row += 1
-        if row < joints.shape[0] and joints[row] == joint:
-            squared += reaction[row] ** 2
-            row += 1
+        squared = reaction[row] ** 2 + reaction[row + 1] ** 2
         force = math.sqrt(squared)
         tally.integral[joint, FORCE] += weight * force
         tally.integral[joint, FORCE_SQUARED] += weight * squared
         tally.peak[joint] = max(tally.peak[joint], force)
         tally.force_time[joint, bin_of(force)] += weight
+        row += 2

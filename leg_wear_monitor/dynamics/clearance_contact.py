@@ -1,94 +1,104 @@
-"""Contact forces in the loose joints, and the acceleration they make, in clearance coordinates."""
+"""Contact forces in the loose joints, and the acceleration they make, in clearance coordinates.
+
+The hot path: plain arrays indexed in place, since views and calls per joint would cost more than the laws.
+"""
 
 import math
 
+import numpy as np
+
+from leg_wear_monitor.contact.arrays import ContactArrays
 from leg_wear_monitor.contact.friction import friction_force
 from leg_wear_monitor.contact.normal import elastic_force, normal_force
 from leg_wear_monitor.dynamics.joint_contact import stiffness_at
 from leg_wear_monitor.dynamics.touch import DELTA, DELTA_DOT, EX, EY, F_N, SAMPLE, VX, VY
 from leg_wear_monitor.kernel import kernel
+from leg_wear_monitor.mechanism.arrays import Floats
 from leg_wear_monitor.wear.surfaces import local_radii
 
 # a sample of a loose joint goes on with: unit normal, friction force [N], slip speed [m/s], derivatives of
 # the normal force by penetration [N/m] and by its rate [N s/m], and its elastic part [N]
-NX, NY, F_T, SLIP, STIFFNESS, DAMPING, ELASTIC = SAMPLE, SAMPLE + 1, 8 + 1, 10, 11, 12, 13
-COLUMNS = 14
+NX, NY, F_T, SLIP, STIFFNESS, DAMPING, ELASTIC = range(SAMPLE, SAMPLE + 7)
+COLUMNS = SAMPLE + 7
 
 # the clearance around a direction: its value [m] and derivative by the angle [m] there, the direction, and
 # the contact stiffness [N/m^1.5]
-CLEARANCE, SLOPE, TO_X, TO_Y, LOCAL_STIFFNESS = 0, 1, 2, 3, 4
+CLEARANCE, SLOPE, TO_X, TO_Y, LOCAL_STIFFNESS = range(5)
 LOCAL = 5
+
+# the laws of a joint: hysteresis factor, friction coefficient, ramp, code of the friction law
+HYSTERESIS_FACTOR, FRICTION_COEFFICIENT, RAMP_0, RAMP_1, FRICTION_LAW = range(5)
+
+# rows of the step's vectors (d,): eccentricities, rates and accelerations at its start (0), between its
+# stages (M) and at its end (1); the acceleration that is not contact; the stages' slopes; right-hand sides
+E0, V0, A0, EM, VM, E1, V1, A1, DRIFT, K1E, K1V, K2E, K2V, RE, RV = range(15)
+VECTORS = 15
 
 _TURNED = 0.02  # rad from that direction at which it is looked up again
 
 
+def contact_laws(contacts: ContactArrays) -> Floats:
+    """Laws of the loose joints (k, 5) in one array."""
+    return np.column_stack([contacts.hysteresis, contacts.friction, contacts.friction_law])
+
+
 @kernel
-def look_around(contacts, surfaces, k, nx, ny, angle_b, angle_j, out_local):
-    """Clearance of joint k around the direction (nx, ny); row (LOCAL,)."""
+def look_around(contacts, surfaces, k, nx, ny, angle_b, angle_j, local):
+    """Clearance of joint k around the direction (nx, ny); fills its row of local (k, LOCAL)."""
     direction = math.atan2(ny, nx)
     half = math.pi / surfaces.depth.shape[2]
     bushing, journal = local_radii(contacts, surfaces, k, direction, angle_b, angle_j)
-    out_local[CLEARANCE], out_local[SLOPE] = bushing - journal, 0.0
+    local[k, CLEARANCE], local[k, SLOPE] = bushing - journal, 0.0
     if surfaces.feeds_back:
         ahead, inside = local_radii(contacts, surfaces, k, direction + half, angle_b, angle_j)
         behind, within = local_radii(contacts, surfaces, k, direction - half, angle_b, angle_j)
-        out_local[SLOPE] = ((ahead - inside) - (behind - within)) / (2.0 * half)
-    out_local[TO_X], out_local[TO_Y] = nx, ny
-    out_local[LOCAL_STIFFNESS] = stiffness_at(contacts, k, bushing, journal)
+        local[k, SLOPE] = ((ahead - inside) - (behind - within)) / (2.0 * half)
+    local[k, TO_X], local[k, TO_Y] = nx, ny
+    local[k, LOCAL_STIFFNESS] = stiffness_at(contacts, k, bushing, journal)
 
 
 @kernel
-def follow_clearance(contacts, surfaces, sample, angle, local):
-    """Look up the clearance of the joints whose normal has turned away from where it was known."""
-    if surfaces.feeds_back:
-        for k in range(sample.shape[0]):
-            nx, ny = sample[k, NX], sample[k, NY]
-            along = local[k, TO_X] * nx + local[k, TO_Y] * ny
-            if not (abs(local[k, TO_X] * ny - local[k, TO_Y] * nx) < _TURNED and along > 0.0):
-                look_around(contacts, surfaces, k, nx, ny, angle[k, 0], angle[k, 1], local[k])
+def has_turned(k, nx, ny, local):
+    """Whether the normal of joint k has turned away from where its clearance is known."""
+    along = local[k, TO_X] * nx + local[k, TO_Y] * ny
+    return not (abs(local[k, TO_X] * ny - local[k, TO_Y] * nx) < _TURNED and along > 0.0)
 
 
 @kernel
-def sample_joint(contacts, local, k, e, v, lever, lever_drive, approach, out_sample):
-    """Sample loose joint k at eccentricities e and rates v (d,); row (COLUMNS,)."""
-    ex, ey, vx, vy = e[2 * k], e[2 * k + 1], v[2 * k], v[2 * k + 1]
-    length = math.sqrt(ex * ex + ey * ey)
-    nx, ny = (ex / length, ey / length) if length > 0.0 else (1.0, 0.0)
-    delta = length - local[CLEARANCE] - local[SLOPE] * (local[TO_X] * ny - local[TO_Y] * nx)
-    delta_dot = nx * vx + ny * vy
-    f_n, f_t, slip, elastic, stiffness, damping = 0.0, 0.0, 0.0, 0.0, 0.0, 0.0
-    if delta > 0.0 and approach > 0.0:
-        f_n = normal_force(local[LOCAL_STIFFNESS], contacts.hysteresis[k], delta, delta_dot, approach)
-    if f_n > 0.0:
-        elastic = elastic_force(local[LOCAL_STIFFNESS], delta)
-        stiffness = 1.5 * f_n / delta
-        damping = elastic * contacts.hysteresis[k] / approach
-        slip = nx * vy - ny * vx + lever_drive
-        for i in range(v.shape[0]):
-            slip += lever[i] * v[i]
-        mu, v0, v1 = contacts.friction[k, 0], contacts.friction[k, 1], contacts.friction[k, 2]
-        f_t = friction_force(contacts.friction_law[k], mu, v0, v1, f_n, slip)
-    out_sample[EX], out_sample[EY], out_sample[VX], out_sample[VY] = ex, ey, vx, vy
-    out_sample[F_N], out_sample[DELTA], out_sample[DELTA_DOT] = f_n, delta, delta_dot
-    out_sample[NX], out_sample[NY], out_sample[F_T], out_sample[SLIP] = nx, ny, f_t, slip
-    out_sample[STIFFNESS], out_sample[DAMPING], out_sample[ELASTIC] = stiffness, damping, elastic
+def accelerate_clearances(law, local, approach, now, x, at_e, at_v, out_a, out_sample):
+    """Accelerations of the eccentricities with all contact forces; samples the joints.
 
-
-@kernel
-def accelerate_clearances(contacts, local, approach, e, v, now, drift, out_sample, out_a):
-    """Accelerations (d,) of the eccentricities: what is there without contact (d,), and the contacts' share.
-
-    ``now`` holds the tables at the present crank angle.
+    law (k, 5), local (k, LOCAL), approach (k,); ``now`` the tables at the present crank angle; x
+    (VECTORS, d) with eccentricities and rates in rows at_e and at_v, the result in row out_a;
+    out_sample (k, COLUMNS).
     """
-    d = e.shape[0]
+    d = x.shape[1]
+    inverse_mass, lever, response = now.inverse_mass, now.lever, now.lever_response
     for i in range(d):
-        out_a[i] = drift[i]
+        x[out_a, i] = x[DRIFT, i]
     for k in range(approach.shape[0]):
-        sample_joint(contacts, local[k], k, e, v, now.lever[k], now.lever_drive[k], approach[k], out_sample[k])
-        f_n = out_sample[k, F_N]
-        if f_n > 0.0:
-            f_t, nx, ny = out_sample[k, F_T], out_sample[k, NX], out_sample[k, NY]
-            fx, fy = -f_n * nx - f_t * ny, -f_n * ny + f_t * nx
-            x_row, y_row, t_row = now.inverse_mass[2 * k], now.inverse_mass[2 * k + 1], now.lever_response[k]
-            for i in range(d):
-                out_a[i] += x_row[i] * fx + y_row[i] * fy + t_row[i] * f_t
+        ex, ey, vx, vy = x[at_e, 2 * k], x[at_e, 2 * k + 1], x[at_v, 2 * k], x[at_v, 2 * k + 1]
+        length = math.sqrt(ex * ex + ey * ey)
+        nx, ny = (ex / length, ey / length) if length > 0.0 else (1.0, 0.0)
+        delta = length - local[k, CLEARANCE] - local[k, SLOPE] * (local[k, TO_X] * ny - local[k, TO_Y] * nx)
+        delta_dot = nx * vx + ny * vy
+        f_n, f_t, slip, elastic, stiffness, damping = 0.0, 0.0, 0.0, 0.0, 0.0, 0.0
+        if delta > 0.0 and approach[k] > 0.0:
+            hysteresis = law[k, HYSTERESIS_FACTOR]
+            f_n = normal_force(local[k, LOCAL_STIFFNESS], hysteresis, delta, delta_dot, approach[k])
+            if f_n > 0.0:
+                elastic = elastic_force(local[k, LOCAL_STIFFNESS], delta)
+                stiffness = 1.5 * f_n / delta
+                damping = elastic * hysteresis / approach[k]
+                slip = nx * vy - ny * vx + now.lever_drive[k] * now.speed[0]
+                for i in range(d):
+                    slip += lever[k, i] * x[at_v, i]
+                mu, code = law[k, FRICTION_COEFFICIENT], law[k, FRICTION_LAW]
+                f_t = friction_force(code, mu, law[k, RAMP_0], law[k, RAMP_1], f_n, slip)
+                fx, fy = -f_n * nx - f_t * ny, -f_n * ny + f_t * nx
+                for i in range(d):
+                    x[out_a, i] += inverse_mass[2 * k, i] * fx + inverse_mass[2 * k + 1, i] * fy + response[k, i] * f_t
+        out_sample[k, EX], out_sample[k, EY], out_sample[k, VX], out_sample[k, VY] = ex, ey, vx, vy
+        out_sample[k, F_N], out_sample[k, DELTA], out_sample[k, DELTA_DOT] = f_n, delta, delta_dot
+        out_sample[k, NX], out_sample[k, NY], out_sample[k, F_T], out_sample[k, SLIP] = nx, ny, f_t, slip
+        out_sample[k, STIFFNESS], out_sample[k, DAMPING], out_sample[k, ELASTIC] = stiffness, damping, elastic

@@ -2,74 +2,78 @@
 
 import math
 
-from leg_wear_monitor.dynamics.clearance import at, blend
+from leg_wear_monitor.dynamics.clearance import blend
 from leg_wear_monitor.dynamics.clearance_contact import (
+    A0,
+    A1,
+    DRIFT,
+    E0,
+    E1,
     ELASTIC,
+    EM,
     F_T,
+    K1E,
+    K1V,
+    K2E,
+    K2V,
+    RE,
+    RV,
     SLIP,
+    V0,
+    V1,
+    VM,
     accelerate_clearances,
 )
-from leg_wear_monitor.dynamics.rosenbrock import GAMMA, factorise_contacts, solve_contacts
-from leg_wear_monitor.dynamics.tally import (
-    ARCHARD,
-    CONTACT,
-    DISSIPATION,
-    FORCE,
-    FORCE_SQUARED,
-    FRICTION,
-    POWER,
-    TORQUE,
-    TORQUE_SQUARED,
-)
+from leg_wear_monitor.dynamics.rosenbrock import factorise_contacts, solve_contacts
+from leg_wear_monitor.dynamics.tally import ARCHARD, CONTACT, DISSIPATION, FORCE, FORCE_SQUARED, FRICTION
 from leg_wear_monitor.dynamics.touch import DELTA_DOT, EX, EY, F_N
 from leg_wear_monitor.kernel import kernel
 from leg_wear_monitor.wear.surfaces import deposit_wear
 
-# rows of the work vectors: acceleration at the step's start and end, the part of it that is not contact,
-# the two stages' slopes, states between, the end of the step
-A0, A1, DRIFT, K1E, K1V, K2E, K2V, E, V, E1, V1, RE, RV = range(13)
+
+@kernel
+def drift(now, x, at_v):
+    """Acceleration that is not contact: gravity, the crank's motion, Coriolis, dampers; fills the row DRIFT."""
+    coriolis, viscous, speed, d = now.coriolis, now.viscous, now.speed[0], x.shape[1]
+    for i in range(d):
+        total = 0.0
+        for j in range(d):
+            total += coriolis[i, j] * x[at_v, j]
+        x[DRIFT, i] = now.bare[i] + speed * total
+    for i in range(viscous.shape[0]):
+        for j in range(d):
+            x[DRIFT, i] += viscous[i, j] * x[at_v, j]
 
 
 @kernel
-def drift(now, v, out_drift):
-    """Acceleration (d,) that is not contact: gravity, the crank's motion, Coriolis, dampers."""
-    for i in range(v.shape[0]):
-        total = now.free[i]
-        for j in range(v.shape[0]):
-            total += now.damping[i, j] * v[j]
-        out_drift[i] = total
-
-
-@kernel
-def try_step(model, state, h, work):
-    """Step of length h [s] from the state, left in E1, V1, A1 and the samples ``end``; error over tolerance.
+def try_step(law, tolerance, local, approach, h, now, system, x, start, end):
+    """Step of length h [s] from rows E0, V0, A0 of x to E1, V1, A1 and sample ``end``; error over tolerance.
 
     The error is that of the second-order step against the cubic through the accelerations at both ends,
-    filtered like a stage so that stiff contacts do not exaggerate it (Shampine's habit).
+    filtered like a stage so that stiff contacts do not exaggerate it (as Shampine does).
     """
-    x, now, contacts, system = work.vectors, work.now, model.contacts, work.system
-    d = state.e.shape[0]
-    m = factorise_contacts(h, now.inverse_mass, work.start, system)
-    solve_contacts(h, system, m, state.v, x[A0], x[K1E], x[K1V])
+    d = x.shape[1]
+    m = factorise_contacts(h, now.inverse_mass, start, system)
+    solve_contacts(h, system, m, x, V0, A0, K1E, K1V)
     for i in range(d):
-        x[E, i] = state.e[i] + h * x[K1E, i]
-        x[V, i] = state.v[i] + h * x[K1V, i]
-    accelerate_clearances(contacts, state.local, state.approach, x[E], x[V], now, x[DRIFT], work.end, x[RV])
+        x[EM, i] = x[E0, i] + h * x[K1E, i]
+        x[VM, i] = x[V0, i] + h * x[K1V, i]
+    accelerate_clearances(law, local, approach, now, x, EM, VM, RV, end)
     for i in range(d):
-        x[RE, i] = x[V, i] - 2.0 * x[K1E, i]
+        x[RE, i] = x[VM, i] - 2.0 * x[K1E, i]
         x[RV, i] -= 2.0 * x[K1V, i]
-    solve_contacts(h, system, m, x[RE], x[RV], x[K2E], x[K2V])
+    solve_contacts(h, system, m, x, RE, RV, K2E, K2V)
     for i in range(d):
-        x[E1, i] = state.e[i] + h * (1.5 * x[K1E, i] + 0.5 * x[K2E, i])
-        x[V1, i] = state.v[i] + h * (1.5 * x[K1V, i] + 0.5 * x[K2V, i])
-    accelerate_clearances(contacts, state.local, state.approach, x[E1], x[V1], now, x[DRIFT], work.end, x[A1])
+        x[E1, i] = x[E0, i] + h * (1.5 * x[K1E, i] + 0.5 * x[K2E, i])
+        x[V1, i] = x[V0, i] + h * (1.5 * x[K1V, i] + 0.5 * x[K2V, i])
+    accelerate_clearances(law, local, approach, now, x, E1, V1, A1, end)
     for i in range(d):
-        x[RE, i] = x[E1, i] - state.e[i] - h * state.v[i] - h * h / 6.0 * (2.0 * x[A0, i] + x[A1, i])
-        x[RV, i] = x[V1, i] - state.v[i] - 0.5 * h * (x[A0, i] + x[A1, i])
-    solve_contacts(h, system, m, x[RE], x[RV], x[RE], x[RV])
+        x[RE, i] = x[E1, i] - x[E0, i] - h * x[V0, i] - h * h / 6.0 * (2.0 * x[A0, i] + x[A1, i])
+        x[RV, i] = x[V1, i] - x[V0, i] - 0.5 * h * (x[A0, i] + x[A1, i])
+    solve_contacts(h, system, m, x, RE, RV, RE, RV)
     worst = 0.0
     for i in range(d):
-        ratio = max(abs(x[RE, i]) / model.tolerance[0], abs(x[RV, i]) / model.tolerance[1])
+        ratio = max(abs(x[RE, i]) * tolerance[0], abs(x[RV, i]) * tolerance[1])
         if not math.isfinite(ratio):
             return math.inf
         worst = max(worst, ratio)
@@ -77,96 +81,94 @@ def try_step(model, state, h, work):
 
 
 @kernel
-def drive_torque(now, speed, acceleration, a, v, sample):
-    """Torque of the drive [N m] at accelerations a and rates v (d,) of the eccentricities."""
-    d, row = v.shape[0], now.torque
-    torque = row[0] + acceleration * row[1] + speed * speed * row[2] + speed * row[3]
+def shift_start(now, x):
+    """Make the end of the step the start of the next one; its acceleration gets the drift of its own rates."""
+    for i in range(x.shape[1]):
+        x[E0, i], x[V0, i] = x[E1, i], x[V1, i]
+        x[A0, i] = x[A1, i] - x[DRIFT, i]
+    drift(now, x, V0)
+    for i in range(x.shape[1]):
+        x[A0, i] += x[DRIFT, i]
+
+
+@kernel
+def drive_torque(now, x, sample):
+    """Torque of the drive [N m] at rows A0 and V0, and its value in the ideal linkage."""
+    row, speed, d = now.torque, now.speed[0], x.shape[1]
+    ideal = row[0] + now.speed[1] * row[1] + speed * speed * row[2] + speed * row[3]
+    torque = ideal
     for i in range(d):
-        torque += row[4 + i] * a[i] + (speed * row[4 + d + i] + row[4 + 2 * d + i]) * v[i]
+        torque += row[4 + i] * x[A0, i] + (speed * row[4 + d + i] + row[4 + 2 * d + i]) * x[V0, i]
     for k in range(sample.shape[0]):
         torque += row[4 + 3 * d + k] * sample[k, F_T]
-    return torque
+    return torque, ideal
 
 
 @kernel
-def add_joints(contacts, sample, weight, tally):
-    """Add the rates of the loose joints' integrals at one end of a step, by half its length [s]."""
-    for k in range(sample.shape[0]):
-        f_n = sample[k, F_N]
-        if f_n > 0.0:
-            f_t, slip = sample[k, F_T], sample[k, SLIP]
-            squared = f_n * f_n + f_t * f_t
-            total = tally.integral[contacts.joint[k]]
-            total[FORCE] += weight * math.sqrt(squared)
-            total[FORCE_SQUARED] += weight * squared
-            total[CONTACT] += weight
-            total[FRICTION] -= weight * f_t * slip
-            total[DISSIPATION] += weight * (f_n - sample[k, ELASTIC]) * sample[k, DELTA_DOT]
-            total[ARCHARD] += weight * f_n * abs(slip)
+def reactions(tables, angle, now, x, sample, out_reaction):
+    """Drive torque and reactions (r,) of the ideal joints at a crank angle; rows as in the tables."""
+    table, speed, d = tables.reaction, now.speed[0], x.shape[1]
+    i, w = blend(table.shape[0] - 1, angle)
+    for r in range(out_reaction.shape[0]):
+        out_reaction[r] = 0.0
+        for side in range(2):
+            j, share = i + side, w if side else 1.0 - w
+            total = table[j, r, 0] + now.speed[1] * table[j, r, 1] + speed * (speed * table[j, r, 2] + table[j, r, 3])
+            for c in range(d):
+                total += table[j, r, 4 + c] * x[A0, c]
+                total += (speed * table[j, r, 4 + d + c] + table[j, r, 4 + 2 * d + c]) * x[V0, c]
+            for k in range(sample.shape[0]):
+                total += table[j, r, 4 + 3 * d + k] * sample[k, F_T]
+            out_reaction[r] += share * total
 
 
 @kernel
-def add_drive(torque, speed, load, weight, tally):
-    """Add drive torque [N m] and power at one end of a step, ``load`` being the power of loads [W]."""
-    tally.drive_integral[TORQUE] += weight * torque
-    tally.drive_integral[TORQUE_SQUARED] += weight * torque * torque
-    tally.drive_integral[POWER] += weight * (torque * speed + load)
-    tally.drive_range[0] = min(tally.drive_range[0], torque)
-    tally.drive_range[1] = max(tally.drive_range[1], torque)
-
-
-@kernel
-def external_power_now(tables, now, speed, v):
-    """Power of loads and of the springs' dampers [W]."""
-    d = v.shape[0]
+def outside_power(now, x):
+    """Power of loads and of the springs' dampers [W] at row V0."""
+    d, speed, damper = x.shape[1], now.speed[0], now.damper
     power = now.load_power[d] * speed
     for i in range(d):
-        power += now.load_power[i] * v[i]
-    if tables.damper.shape[0] > 0:
-        for i in range(d + 1):
-            rate = v[i] if i < d else speed
-            for j in range(d + 1):
-                power -= rate * now.damper[i, j] * (v[j] if j < d else speed)
+        power += now.load_power[i] * x[V0, i]
+    for i in range(damper.shape[0]):
+        rate = x[V0, i] if i < d else speed
+        for j in range(d + 1):
+            power -= rate * damper[i, j] * (x[V0, j] if j < d else speed)
     return power
 
 
 @kernel
-def reaction(tables, angle, speed, acceleration, a, v, sample, out_reaction):
-    """Drive torque and reactions (r,) of the ideal joints at a crank angle; rows as in the tables."""
-    d = v.shape[0]
-    i, w = blend(tables.reaction, angle)
-    for r in range(out_reaction.shape[0]):
-        before, after = tables.reaction[i, r], tables.reaction[i + 1, r]
-        total = at(before, after, 0, w) + speed * at(before, after, 3, w)
-        total += acceleration * at(before, after, 1, w) + speed * speed * at(before, after, 2, w)
-        for l in range(d):
-            by_rate = speed * at(before, after, 4 + d + l, w) + at(before, after, 4 + 2 * d + l, w)
-            total += at(before, after, 4 + l, w) * a[l] + by_rate * v[l]
-        for k in range(sample.shape[0]):
-            total += at(before, after, 4 + 3 * d + k, w) * sample[k, F_T]
-        out_reaction[r] = total
+def add_joints(joint, sample, weight, integral):
+    """Add the rates of the loose joints' integrals at one end of a step, by half its length [s]."""
+    for k in range(sample.shape[0]):
+        f_n = sample[k, F_N]
+        if f_n > 0.0:
+            f_t, slip, j = sample[k, F_T], sample[k, SLIP], joint[k]
+            squared = f_n * f_n + f_t * f_t
+            integral[j, FORCE] += weight * math.sqrt(squared)
+            integral[j, FORCE_SQUARED] += weight * squared
+            integral[j, CONTACT] += weight
+            integral[j, FRICTION] -= weight * f_t * slip
+            integral[j, DISSIPATION] += weight * (f_n - sample[k, ELASTIC]) * sample[k, DELTA_DOT]
+            integral[j, ARCHARD] += weight * f_n * abs(slip)
 
 
 @kernel
-def toe_deviation(now, speed, acceleration, e, v, a, torque, out_response):
-    """Raise the largest deviations of toe and drive torque from the ideal linkage."""
-    d = e.shape[0]
+def toe_deviation(now, x, out_response):
+    """Raise the largest deviations (position, velocity, acceleration) of the toe from the ideal linkage."""
+    d, speed, toe = x.shape[1], now.speed[0], now.toe
     px, py, vx, vy, ax, ay = 0.0, 0.0, 0.0, 0.0, 0.0, 0.0
     for i in range(d):
-        sx, sy = now.toe[0, 1 + i], now.toe[1, 1 + i]
-        tx, ty = speed * now.toe[0, 1 + d + i], speed * now.toe[1, 1 + d + i]
-        px += sx * e[i]
-        py += sy * e[i]
-        vx += sx * v[i] + tx * e[i]
-        vy += sy * v[i] + ty * e[i]
-        ax += sx * a[i] + 2.0 * tx * v[i]
-        ay += sy * a[i] + 2.0 * ty * v[i]
+        sx, sy = toe[0, 1 + i], toe[1, 1 + i]
+        tx, ty = speed * toe[0, 1 + d + i], speed * toe[1, 1 + d + i]
+        px += sx * x[E0, i]
+        py += sy * x[E0, i]
+        vx += sx * x[V0, i] + tx * x[E0, i]
+        vy += sy * x[V0, i] + ty * x[E0, i]
+        ax += sx * x[A0, i] + 2.0 * tx * x[V0, i]
+        ay += sy * x[A0, i] + 2.0 * ty * x[V0, i]
     out_response[0] = max(out_response[0], math.hypot(px, py))
     out_response[1] = max(out_response[1], math.hypot(vx, vy))
     out_response[2] = max(out_response[2], math.hypot(ax, ay))
-    row = now.torque
-    ideal = row[0] + acceleration * row[1] + speed * speed * row[2] + speed * row[3]
-    out_response[3] = max(out_response[3], abs(torque - ideal))
 
 
 @kernel
@@ -183,8 +185,8 @@ def gather_wear(h, start, end, pending):
 @kernel
 def wear_off(contacts, surfaces, k, angle, pending, out_weight):
     """Wear the surfaces of joint k by what is pending, around its mean eccentricity."""
-    integral = pending[0]
+    integral = pending[k, 0]
     if integral > 0.0:
-        ex, ey = pending[1] / integral, pending[2] / integral
-        deposit_wear(contacts, surfaces, k, ex, ey, angle[0], angle[1], integral, out_weight)
-        pending[:] = 0.0
+        ex, ey = pending[k, 1] / integral, pending[k, 2] / integral
+        deposit_wear(contacts, surfaces, k, ex, ey, angle[k, 0], angle[k, 1], integral, out_weight)
+        pending[k, 0], pending[k, 1], pending[k, 2] = 0.0, 0.0, 0.0

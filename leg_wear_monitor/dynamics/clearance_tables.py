@@ -10,6 +10,7 @@ drive torque (row of s) and the reactions of the ideal joints (all other rows). 
 the order of the eccentricity over the link lengths.
 """
 
+import math
 from typing import NamedTuple
 
 import numpy as np
@@ -18,7 +19,7 @@ from leg_wear_monitor.contact.arrays import ContactArrays
 from leg_wear_monitor.mechanism.arrays import Floats, Ints, MechanismArrays, body_names, point_from_com
 from leg_wear_monitor.mechanism.constraints import DRIVE, rotations
 from leg_wear_monitor.mechanism.forces import applied_forces, stored_energy
-from leg_wear_monitor.mechanism.ideal import IdealMotion, one_cycle
+from leg_wear_monitor.mechanism.ideal import TURN, IdealMotion, one_cycle
 from leg_wear_monitor.mechanism.position import Linkage, evaluate
 
 POINTS = 1024  # of a turn; tables are linear between them
@@ -27,35 +28,60 @@ POINTS = 1024  # of a turn; tables are linear between them
 class ClearanceTables(NamedTuple):
     """Tables at N equal steps of the crank, the first repeated at the end; k loose joints, d = 2 k.
 
-    ``inverse_mass`` (N + 1, d, d) is (S^T M S)^-1, ``coriolis`` (N + 1, d, d) and ``viscous`` (N + 1 or 0,
-    d, d + 1) give accelerations from w e' and from (e', w); ``damper`` (N + 1 or 0, d + 1, d + 1) the power
-    that dampers take as a quadratic form of (e', w); ``free`` (N + 1, 3, d) is the acceleration of
-    the eccentricities without contact by 1, w' and w^2; ``lever`` (N + 1, k, d) and ``lever_drive``
-    (N + 1, k) the slip of each joint by e' and w beyond t . e'; ``lever_response`` (N + 1, k, d) the
-    acceleration by its friction force; ``reaction`` (N + 1, r, 4 + 3 d + k) the drive torque and the
-    reactions of the ideal joints by (1, w', w^2, w, e'', w e', e', F_t), ``reaction_joint`` (r,) the joint
-    of each row, ``DRIVE`` first; ``angle`` (N + 1, k, 2) the angles of bushing's and journal's bodies;
-    ``toe`` (N + 1, 2, 1 + 2 d) the toe by (1, e) and its derivative by the crank angle by e;
-    ``energy`` (N + 1, d + 2, d + 2) the quadratic form of (e', w, 1) that is the kinetic energy, with the
-    potential energy at centred journals in its corner, and ``push`` (N + 1, d) minus its gradient by e;
-    ``load_power`` (N + 1, d + 1) the power of loads by (e', w).
+    ``motion`` (N + 1, w) the rows that `motion_shapes` names; ``reaction`` (N + 1, r, 4 + 3 d + k) the
+    drive torque and the reactions of the ideal joints by (1, w', w^2, w, e'', w e', e', F_t), and
+    ``reaction_joint`` (r,) the joint of each, ``DRIVE`` first; ``energy`` (N + 1, d + 2, d + 2) the
+    quadratic form of (e', w, 1) that is the kinetic energy, with the potential energy at centred journals
+    in its corner, and ``push`` (N + 1, d) minus its gradient by e.
     """
 
-    inverse_mass: Floats
-    coriolis: Floats
-    viscous: Floats
-    damper: Floats
-    free: Floats
-    lever: Floats
-    lever_drive: Floats
-    lever_response: Floats
+    motion: Floats
     reaction: Floats
     reaction_joint: Ints
-    angle: Floats
-    toe: Floats
     energy: Floats
     push: Floats
-    load_power: Floats
+
+
+def motion_shapes(k: int, damped: bool) -> dict[str, tuple[int, ...]]:
+    """Parts of a row of ``motion`` and their shapes, for k loose joints, d = 2 k.
+
+    ``inverse_mass`` (S^T M S)^-1; ``coriolis`` accelerations by w e'; ``free`` accelerations without
+    contact by 1, w' and w^2; ``lever`` and ``lever_drive`` the slip of each joint by e' and by w beyond
+    t . e'; ``lever_response`` accelerations by its friction force; ``torque`` the first row of
+    ``reaction``; ``angle`` of the bushing's and the journal's bodies; ``toe`` its position, by 1 and e,
+    and the derivative of its dependence on e; ``load_power`` the power of loads by (e', w); with dampers,
+    ``viscous`` accelerations and ``damper`` the power taken as a quadratic form, both by (e', w).
+    """
+    d = 2 * k
+    return {
+        "inverse_mass": (d, d),
+        "coriolis": (d, d),
+        "free": (3, d),
+        "lever": (k, d),
+        "lever_drive": (k,),
+        "lever_response": (k, d),
+        "torque": (4 + 3 * d + k,),
+        "angle": (k, 2),
+        "toe": (2, 1 + 2 * d),
+        "load_power": (d + 1,),
+        "viscous": (d, d + 1) if damped else (0, 0),
+        "damper": (d + 1, d + 1) if damped else (0, 0),
+    }
+
+
+def views(flat: Floats, shapes: dict[str, tuple[int, ...]]) -> dict[str, Floats]:
+    """Named views of consecutive parts of a flat array."""
+    parts, start = {}, 0
+    for name, shape in shapes.items():
+        size = math.prod(shape)
+        parts[name] = flat[start : start + size].reshape(shape)
+        start += size
+    return parts
+
+
+def is_damped(arrays: MechanismArrays) -> bool:
+    """Whether a spring has a damper."""
+    return bool((arrays.spring_law[:, 2] > 0.0).any())
 
 
 def build_tables(linkage: Linkage, contacts: ContactArrays, points: int = POINTS) -> ClearanceTables:
@@ -74,64 +100,67 @@ def build_tables(linkage: Linkage, contacts: ContactArrays, points: int = POINTS
         If the crank cannot turn.
     """
     motion = one_cycle(linkage, points, 1.0)
-    x = _inverse_jacobians(linkage, motion)
-    loose = _rows(linkage, contacts.joint)
-    drive = linkage.rows.drive_row
-    ideal = [row for row in range(x.shape[2]) if row not in loose and row != drive]
-    mass = linkage.arrays.mass[1:].ravel()
-
-    s = x[:, :, loose]
-    s_t, s_drive, s_drive_t = _derivative(s), x[:, :, drive], motion.a[:, 1:].reshape(points, -1)
-    inverse_mass = np.linalg.inv(_project(s, mass[:, None] * s))
-    force, load, damping = _forces(linkage, motion)
-    friction = _friction_levers(linkage.arrays, contacts)
+    basis = _Basis(linkage, contacts, motion)
+    force, load = _applied(linkage, motion)
+    reaction, joints = _reactions(linkage, basis, force)
+    inverse_mass = np.linalg.inv(basis.project(basis.s, basis.mass[:, None] * basis.s))
 
     def respond(generalised: Floats) -> Floats:
-        """Acceleration of the eccentricities by forces (N, 3 b, m) -> (N, d, m)."""
-        return inverse_mass @ _project(s, generalised)
+        """Accelerations (N, d, m) of the eccentricities by forces (N, 3 b, m)."""
+        return np.asarray(inverse_mass @ basis.project(basis.s, generalised))
 
-    column = {"motion": np.concatenate([s, s_drive[:, :, None]], axis=2)}
-    drag = damping @ column["motion"] if damping.size else np.zeros((0, len(mass), len(loose) + 1))
-    free = np.stack([force, -mass * s_drive, -mass * s_drive_t], axis=2)
-    selected = x[:, :, [drive, *ideal]]
-    by = [-force[:, :, None], (mass * s_drive)[:, :, None], (mass * s_drive_t)[:, :, None]]
-    by += [drag[:, :, -1:], mass[:, None] * s, 2.0 * mass[:, None] * s_t, drag[:, :, :-1]] if drag.size else [
-        np.zeros_like(by[0]), mass[:, None] * s, 2.0 * mass[:, None] * s_t, np.zeros_like(s)
-    ]  # fmt: skip
-    by.append(np.broadcast_to(-friction, (points, *friction.shape)))
-    joint_of = {row: closure for closure, start in zip(linkage.rows.closure, linkage.rows.row, strict=True)
-                for row in range(start, start + (1 if closure == DRIVE else 2))}  # fmt: skip
-    tables = ClearanceTables(
-        inverse_mass=inverse_mass,
-        coriolis=-2.0 * respond(mass[:, None] * s_t),
-        viscous=-inverse_mass @ _project(s, drag) if drag.size else np.zeros((0, len(loose), len(loose) + 1)),
-        damper=_project(column["motion"], drag) if drag.size else np.zeros((0, len(loose) + 1, len(loose) + 1)),
-        free=respond(free).transpose(0, 2, 1),
-        lever=_project(s, np.broadcast_to(friction, (points, *friction.shape))).transpose(0, 2, 1),
-        lever_drive=s_drive @ friction,
-        lever_response=respond(np.broadcast_to(friction, (points, *friction.shape))).transpose(0, 2, 1),
-        reaction=_project(selected, np.concatenate(by, axis=2)),
-        reaction_joint=np.array([joint_of[row] for row in [drive, *ideal]], dtype=np.int64),
-        angle=motion.q[:, linkage.arrays.joint_body[contacts.joint], 2],
-        toe=_toe(linkage, motion, s, s_t),
-        energy=_energy(linkage, motion, column["motion"], mass),
-        push=_project(s, (force - load)[:, :, None])[:, :, 0],
-        load_power=_project(column["motion"], load[:, :, None])[:, :, 0],
+    free = np.stack([force, -basis.mass * basis.drive, -basis.mass * basis.drive_t], axis=2)
+    parts = {
+        "inverse_mass": inverse_mass,
+        "coriolis": -2.0 * respond(basis.mass[:, None] * basis.s_t),
+        "free": respond(free).transpose(0, 2, 1),
+        "lever": basis.project(basis.s, basis.friction).transpose(0, 2, 1),
+        "lever_drive": basis.project(basis.friction, basis.drive[:, :, None]),
+        "lever_response": respond(basis.friction).transpose(0, 2, 1),
+        "torque": reaction[:, 0],
+        "angle": motion.q[:, linkage.arrays.joint_body[contacts.joint], 2],
+        "toe": _toe(linkage, motion, basis),
+        "load_power": basis.project(basis.all, load[:, :, None]),
+        "viscous": -respond(basis.drag) if basis.drag.any() else np.zeros((points, 0)),
+        "damper": basis.project(basis.all, basis.drag) if basis.drag.any() else np.zeros((points, 0)),
+    }
+    rows = np.concatenate([parts[name].reshape(points, -1) for name in parts], axis=1)
+    closing = rows[:1].copy()
+    row = views(closing[0], motion_shapes(len(contacts.joint), bool(basis.drag.any())))
+    row["angle"][:] += TURN * np.round(motion.v[:, linkage.arrays.joint_body[contacts.joint], 2].mean(axis=0))
+    return ClearanceTables(
+        motion=np.concatenate([rows, closing]),
+        reaction=np.concatenate([reaction, reaction[:1]]),
+        reaction_joint=joints,
+        energy=_closed(_energy(linkage, motion, basis)),
+        push=_closed(basis.project(basis.s, (force - load)[:, :, None])[:, :, 0]),
     )
-    return _closed(tables, motion)
 
 
-def _project(basis: Floats, forces: Floats) -> Floats:
-    """Transpose of a basis (N, 3 b, m) times forces (N, 3 b, p)."""
-    return np.ascontiguousarray(basis.transpose(0, 2, 1) @ forces)
+class _Basis:
+    """S, s, their derivatives, friction's and dampers' generalised forces at every crank angle."""
 
+    def __init__(self, linkage: Linkage, contacts: ContactArrays, motion: IdealMotion) -> None:
+        jacobians = [
+            evaluate(linkage, q, np.zeros_like(q), (angle, 0.0, 0.0)).jacobian
+            for q, angle in zip(motion.q, motion.crank_angle, strict=True)
+        ]
+        self.x = np.linalg.inv(np.array(jacobians))
+        self.mass = linkage.arrays.mass[1:].ravel()
+        self.rows = _rows(linkage, contacts.joint)
+        self.s = self.x[:, :, self.rows]
+        self.s_t = _derivative(self.s)
+        self.drive = self.x[:, :, linkage.rows.drive_row]
+        self.drive_t = motion.a[:, 1:].reshape(len(self.x), -1)
+        self.all = np.concatenate([self.s, self.drive[:, :, None]], axis=2)
+        levers = _friction_levers(linkage.arrays, contacts)
+        self.friction = np.broadcast_to(levers, (len(self.x), *levers.shape))
+        self.drag = _damping(linkage, motion) @ self.all
 
-def _inverse_jacobians(linkage: Linkage, motion: IdealMotion) -> Floats:
-    jacobians = [
-        evaluate(linkage, q, np.zeros_like(q), (angle, 0.0, 0.0)).jacobian
-        for q, angle in zip(motion.q, motion.crank_angle, strict=True)
-    ]
-    return np.asarray(np.linalg.inv(np.array(jacobians)))
+    @staticmethod
+    def project(basis: Floats, forces: Floats) -> Floats:
+        """Transpose of a basis (N, 3 b, m) times forces (N, 3 b, p)."""
+        return np.ascontiguousarray(basis.transpose(0, 2, 1) @ forces)
 
 
 def _rows(linkage: Linkage, joints: Ints) -> list[int]:
@@ -146,30 +175,55 @@ def _derivative(table: Floats) -> Floats:
     return np.asarray(np.fft.irfft(1j * order * np.fft.rfft(table, axis=0), len(table), axis=0))
 
 
-def _forces(linkage: Linkage, motion: IdealMotion) -> tuple[Floats, Floats, Floats]:
-    """Applied forces (N, 3 b), the share of loads in them, and damping (N, 3 b, 3 b), empty without dampers."""
+def _closed(table: Floats) -> Floats:
+    return np.concatenate([table, table[:1]])
+
+
+def _reactions(linkage: Linkage, basis: _Basis, force: Floats) -> tuple[Floats, Ints]:
+    """Table ``reaction`` without its closing row, and the joint of each of its rows."""
+    rows, joints = [linkage.rows.drive_row], [DRIVE]
+    for closure, start in zip(linkage.rows.closure.tolist(), linkage.rows.row.tolist(), strict=True):
+        if closure != DRIVE and start not in basis.rows:
+            rows += [start, start + 1]
+            joints += [closure, closure]
+    mass = basis.mass[:, None]
+    by = [-force[:, :, None], mass * basis.drive[:, :, None], mass * basis.drive_t[:, :, None]]
+    by += [basis.drag[:, :, -1:], mass * basis.s, 2.0 * mass * basis.s_t, basis.drag[:, :, :-1], -basis.friction]
+    reaction = basis.project(basis.x[:, :, rows], np.concatenate(by, axis=2))
+    return reaction, np.array(joints, dtype=np.int64)
+
+
+def _applied(linkage: Linkage, motion: IdealMotion) -> tuple[Floats, Floats]:
+    """Applied forces at rest (N, 3 b), and the share of loads in them."""
     arrays = linkage.arrays
     unloaded = arrays._replace(load_body=arrays.load_body[:0])
-    shape = (len(motion.q), motion.q.shape[1] - 1, 3)
-    force, bare = np.zeros((2, *shape))
-    damped = bool((arrays.spring_law[:, 2] > 0.0).any())
-    damping = np.zeros((len(motion.q), shape[1] * 3, shape[1] * 3) if damped else (0, 0, 0))
-    for i, q in enumerate(motion.q):
-        force[i] = _force_at(arrays, q, np.zeros_like(q))
-        bare[i] = _force_at(unloaded, q, np.zeros_like(q)) if len(arrays.load_body) else force[i]
-        for j in range(shape[1] * 3 if damped else 0):
-            v = np.zeros(q.size)
-            v[3 + j] = 1.0
-            damping[i, :, j] = (force[i] - _force_at(arrays, q, v.reshape(q.shape))).ravel()
-    flat = (len(motion.q), -1)
-    return force.reshape(flat), (force - bare).reshape(flat), damping
+    force = np.array([_force_at(arrays, q, np.zeros_like(q)) for q in motion.q])
+    bare = force
+    if len(arrays.load_body):
+        bare = np.array([_force_at(unloaded, q, np.zeros_like(q)) for q in motion.q])
+    return force, force - bare
+
+
+def _damping(linkage: Linkage, motion: IdealMotion) -> Floats:
+    """Damping matrix (N, 3 b, 3 b) of the springs' dampers."""
+    n, size = len(motion.q), 3 * (motion.q.shape[1] - 1)
+    damping = np.zeros((n, size, size))
+    if is_damped(linkage.arrays):
+        for i, q in enumerate(motion.q):
+            at_rest = _force_at(linkage.arrays, q, np.zeros_like(q))
+            for j in range(size):
+                v = np.zeros(q.size)
+                v[3 + j] = 1.0
+                damping[i, :, j] = at_rest - _force_at(linkage.arrays, q, v.reshape(q.shape))
+    return damping
 
 
 def _force_at(arrays: MechanismArrays, q: Floats, v: Floats) -> Floats:
+    """Applied forces (3 b,) on the moving bodies."""
     cs, force = np.empty((len(q), 2)), np.empty_like(q)
     rotations(q, cs)
     applied_forces(arrays, q, v, cs, force)
-    return force[1:]
+    return force[1:].ravel()
 
 
 def _friction_levers(arrays: MechanismArrays, contacts: ContactArrays) -> Floats:
@@ -182,8 +236,8 @@ def _friction_levers(arrays: MechanismArrays, contacts: ContactArrays) -> Floats
     return levers[3:]
 
 
-def _toe(linkage: Linkage, motion: IdealMotion, s: Floats, s_t: Floats) -> Floats:
-    n, d = len(motion.q), s.shape[2]
+def _toe(linkage: Linkage, motion: IdealMotion, basis: _Basis) -> Floats:
+    n, d = len(motion.q), basis.s.shape[2]
     toe = np.zeros((n, 2, 1 + 2 * d))
     if linkage.mechanism.toe is None:
         return toe
@@ -193,34 +247,20 @@ def _toe(linkage: Linkage, motion: IdealMotion, s: Floats, s_t: Floats) -> Float
     cos, sin = np.cos(motion.q[:, i, 2]), np.sin(motion.q[:, i, 2])
     lever = np.stack([cos * px - sin * py, sin * px + cos * py], axis=1)
     across = np.stack([-lever[:, 1], lever[:, 0]], axis=1)[:, :, None]
-    row, turn = 3 * (i - 1), motion.v[:, i, 2, None, None]
+    here, turn = slice(3 * (i - 1), 3 * i - 1), basis.s[:, 3 * i - 1, None]
     toe[:, :, 0] = motion.q[:, i, :2] + lever
-    toe[:, :, 1 : 1 + d] = s[:, row : row + 2] + across * s[:, row + 2, None]
-    toe[:, :, 1 + d :] = (
-        s_t[:, row : row + 2] + across * s_t[:, row + 2, None] - turn * lever[:, :, None] * s[:, row + 2, None]
-    )
+    toe[:, :, 1 : 1 + d] = basis.s[:, here] + across * turn
+    swing = motion.v[:, i, 2, None, None] * lever[:, :, None]
+    toe[:, :, 1 + d :] = basis.s_t[:, here] + across * basis.s_t[:, 3 * i - 1, None] - swing * turn
     return toe
 
 
-def _energy(linkage: Linkage, motion: IdealMotion, basis: Floats, mass: Floats) -> Floats:
-    n, m = len(motion.q), basis.shape[2]
+def _energy(linkage: Linkage, motion: IdealMotion, basis: _Basis) -> Floats:
+    n, m = len(motion.q), basis.all.shape[2]
     energy = np.zeros((n, m + 1, m + 1))
-    energy[:, :m, :m] = 0.5 * _project(basis, mass[:, None] * basis)
+    energy[:, :m, :m] = 0.5 * basis.project(basis.all, basis.mass[:, None] * basis.all)
     for i, q in enumerate(motion.q):
         cs = np.empty((len(q), 2))
         rotations(q, cs)
         energy[i, m, m] = stored_energy(linkage.arrays, q, np.zeros_like(q), cs)
     return energy
-
-
-def _closed(tables: ClearanceTables, motion: IdealMotion) -> ClearanceTables:
-    """Repeat the first row at the end; angles go on to the next turn."""
-    closed = {
-        name: np.ascontiguousarray(np.concatenate([table, table[:1]]) if len(table) == len(motion.q) else table)
-        for name, table in tables._asdict().items()
-        if name != "reaction_joint"
-    }
-    step = closed["angle"][-2] - closed["angle"][-3]
-    turn = 2.0 * np.pi * np.round((closed["angle"][-2] + step - closed["angle"][0]) / (2.0 * np.pi))
-    closed["angle"][-1] += turn
-    return tables._replace(**closed)

@@ -23,7 +23,7 @@ from leg_wear_monitor.dynamics.response import compare_toe
 from leg_wear_monitor.dynamics.run import DONE, PUSHED_THROUGH, SINGULAR, STEP_TOO_SMALL
 from leg_wear_monitor.dynamics.tally import ARCHARD, DRIVE_RATES, JOINT_RATES, TORQUE, add_step
 from leg_wear_monitor.dynamics.touch import DELTA, EX, EY, NEVER, SAMPLE, first_touch, update_contacts
-from leg_wear_monitor.kernel import kernel
+from leg_wear_monitor.kernel import copy_array, kernel
 from leg_wear_monitor.mechanism.arrays import Floats
 from leg_wear_monitor.wear.surfaces import deposit_wear
 
@@ -108,7 +108,7 @@ def _try_step(model, surfaces, state, polynomial, h, work):
 def slope_here(model, surfaces, state, polynomial, work):
     """Slope and rates where the state stands, computed afresh: the first stage of the next step."""
     good = _slope(model, surfaces, state.approach, polynomial, state.clock[0], state.y, 0, work)
-    work.start[:] = work.scratch.contact
+    copy_array(work.scratch.contact, work.start)
     return good
 
 
@@ -133,14 +133,15 @@ def _accept(model, surfaces, state, h, toe, tally, work):
             ex, ey = scratch.contact[k, EX], scratch.contact[k, EY]
             deposit_wear(contacts, surfaces, k, ex, ey, q[b, 2], q[j, 2], integral, work.weight)
     changed = update_contacts(
-        contacts, state.clock[0], h, work.start, scratch.contact, state.approach, state.recent, tally
-    )
-    state.y[:] = work.trial
+        contacts.joint, contacts.speed_floor, state.clock[0], h, work.start, scratch.contact,
+        state.approach, state.recent, tally.peak, tally.impact, tally.impacts,
+    )  # fmt: skip
+    copy_array(work.trial, state.y)
     state.clock[0] += h
-    work.slope[0] = work.slope[last]
-    work.rates[0] = work.rates[last]
-    work.drive_rates[0] = work.drive_rates[last]
-    work.start[:] = scratch.contact
+    copy_array(work.slope[last], work.slope[0])
+    copy_array(work.rates[last], work.rates[0])
+    copy_array(work.drive_rates[last], work.drive_rates[0])
+    copy_array(scratch.contact, work.start)
     return changed
 
 

@@ -5,6 +5,7 @@ from typing import NamedTuple
 
 import numpy as np
 
+from leg_wear_monitor.dynamics.tally import TORQUE_ERROR
 from leg_wear_monitor.kernel import kernel
 from leg_wear_monitor.mechanism.arrays import Floats, body_names, point_from_com
 from leg_wear_monitor.mechanism.constraints import arm
@@ -12,7 +13,6 @@ from leg_wear_monitor.mechanism.ideal import TURN, one_cycle, point_motion
 from leg_wear_monitor.mechanism.position import Linkage
 
 POINTS = 1440  # of a cycle: cubic interpolation between them errs by 1e-9 of the curve's range
-POSITION, VELOCITY, ACCELERATION, TORQUE_ERROR = 0, 1, 2, 3
 
 
 class Toe(NamedTuple):

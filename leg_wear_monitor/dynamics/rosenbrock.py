@@ -51,7 +51,7 @@ def contact_system(k: int) -> ContactSystem:
 
 @kernel
 def factorise_contacts(h, inverse_mass, sample, out_system):
-    """Prepare the system for a step of length h [s] from a sample (k, COLUMNS); returns the number of contacts."""
+    """Prepare the system for a step of length h [s] from a sample (k, COLUMNS); returns how many touch."""
     m, g = 0, GAMMA * h
     response, factor = out_system.response, out_system.factor
     for k in range(sample.shape[0]):
@@ -70,33 +70,34 @@ def factorise_contacts(h, inverse_mass, sample, out_system):
             m += 1
     for i in range(m):
         for j in range(i):
-            for l in range(j):
-                factor[i, j] -= factor[i, l] * factor[j, l]
-        for l in range(i):
-            scaled = factor[i, l] * factor[l, l]
-            factor[i, i] -= scaled * factor[i, l]
-            factor[i, l] = scaled
+            for c in range(j):
+                factor[i, j] -= factor[i, c] * factor[j, c]
+        for c in range(i):
+            scaled = factor[i, c] * factor[c, c]
+            factor[i, i] -= scaled * factor[i, c]
+            factor[i, c] = scaled
         factor[i, i] = 1.0 / factor[i, i]
     return m
 
 
 @kernel
-def solve_contacts(h, system, m, r_e, r_v, out_e, out_v):
-    """Solve (I - gamma h A) x = r for x = (out_e, out_v), all (d,); out may be r."""
-    g, p, factor = GAMMA * h, system.p, system.factor
+def solve_contacts(h, system, m, x, r_e, r_v, out_e, out_v):
+    """Solve (I - gamma h A) y = r, all rows of x (rows, d): right-hand side r_e, r_v, solution out_e, out_v."""
+    g, p, factor, response = GAMMA * h, system.p, system.factor, system.response
     for a in range(m):
         k, nx, ny = system.active[a], system.normal[a, 0], system.normal[a, 1]
-        p[a] = nx * r_v[2 * k] + ny * r_v[2 * k + 1]
-        p[a] += system.ratio[a] * (nx * r_e[2 * k] + ny * r_e[2 * k + 1])
+        p[a] = nx * x[r_v, 2 * k] + ny * x[r_v, 2 * k + 1]
+        p[a] += system.ratio[a] * (nx * x[r_e, 2 * k] + ny * x[r_e, 2 * k + 1])
         for b in range(a):
             p[a] -= factor[a, b] * p[b]
     for a in range(m - 1, -1, -1):
         p[a] *= factor[a, a]
         for b in range(a + 1, m):
             p[a] -= factor[b, a] * p[b]
-    for i in range(r_v.shape[0]):
-        total = r_v[i]
-        for a in range(m):
-            total -= system.response[a, i] * p[a]
-        out_v[i] = total
-        out_e[i] = r_e[i] + g * total
+    for i in range(x.shape[1]):
+        x[out_v, i] = x[r_v, i]
+    for a in range(m):
+        for i in range(x.shape[1]):
+            x[out_v, i] -= response[a, i] * p[a]
+    for i in range(x.shape[1]):
+        x[out_e, i] = x[r_e, i] + g * x[out_v, i]

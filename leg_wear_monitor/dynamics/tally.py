@@ -1,7 +1,6 @@
 """What a run adds up: integrals, extremes, distributions and impacts of every joint and of the drive.
 
-Memory does not grow with the run: a distribution is a histogram over time with bins of equal ratio, and
-impacts are counted beyond the first thousand.
+Memory does not grow with the run: a distribution is a histogram over time, and impacts are counted beyond the first thousand.
 """
 
 import math
@@ -22,8 +21,12 @@ DRIVE_RATES = 3
 # impacts: time it begins [s], approach speed [m/s], time it ends [s], peak normal force [N]
 BEGIN, SPEED, END, PEAK = 0, 1, 2, 3
 IMPACTS = 1000
+# largest deviations from the ideal linkage: toe [m, m/s, m/s^2], drive torque [N m]
+POSITION, VELOCITY, ACCELERATION, TORQUE_ERROR = 0, 1, 2, 3
 
-_LEAST, _MOST, _BINS = 1.0e-6, 1.0e9, 4096  # of a distribution: bins 0.8 % wide
+# of a distribution: 128 bins an octave, at most 0.8 % wide, from 2^-20 to 2^30
+_FIRST_OCTAVE, _OCTAVES, _IN_OCTAVE = -20, 50, 128
+_BINS = _OCTAVES * _IN_OCTAVE
 
 
 class Tally(NamedTuple):
@@ -66,14 +69,22 @@ def new_tally(joints: int) -> Tally:
 
 @kernel
 def bin_of(magnitude):
-    """Bin of a magnitude; bins have equal ratio."""
-    if not magnitude > _LEAST:
+    """Bin of a magnitude, by its binary exponent and mantissa."""
+    if not magnitude > 2.0**_FIRST_OCTAVE:
         return 0
-    return min(_BINS - 1, int(math.log(magnitude / _LEAST) * (_BINS / math.log(_MOST / _LEAST))))
+    mantissa, exponent = math.frexp(magnitude)
+    i = (exponent - 1 - _FIRST_OCTAVE) * _IN_OCTAVE + int((2.0 * mantissa - 1.0) * _IN_OCTAVE)
+    return min(i, _BINS - 1)
+
+
+def bin_edge(i: float) -> float:
+    """Magnitude at the lower edge of bin i; within a bin, at its share."""
+    octave, inside = divmod(i, _IN_OCTAVE)
+    return float(2.0 ** (octave + _FIRST_OCTAVE) * (1.0 + inside / _IN_OCTAVE))
 
 
 def percentile(seconds: Floats, share: float) -> float:
-    """Magnitude below which a share of the time was spent, to the width of a bin (0.8 %).
+    """Magnitude below which a share of the time was spent, to the width of a bin (at most 0.8 %).
 
     Parameters
     ----------
@@ -87,8 +98,7 @@ def percentile(seconds: Floats, share: float) -> float:
     i = int(np.searchsorted(reached, share * reached[-1]))
     if i == 0:
         return 0.0
-    inside = (share * reached[-1] - reached[i - 1]) / seconds[i]
-    return float(_LEAST * (_MOST / _LEAST) ** ((i + inside) / len(seconds)))
+    return bin_edge(i + (share * reached[-1] - reached[i - 1]) / seconds[i])
 
 
 def signed_percentile(seconds: Floats, share: float) -> float:
@@ -128,30 +138,30 @@ def add_step(tally, h, weights, rates, drive_rates):
 
 
 @kernel
-def begin_impact(tally, joint, t, speed):
+def begin_impact(impact, impacts, joint, t, speed):
     """Note that contact began in a joint at time t [s] with an approach speed [m/s]."""
-    i = tally.impacts[joint]
-    tally.impacts[joint] += 1
+    i = impacts[joint]
+    impacts[joint] += 1
     if i < IMPACTS:
-        tally.impact[joint, i, BEGIN], tally.impact[joint, i, SPEED] = t, speed
-        tally.impact[joint, i, END], tally.impact[joint, i, PEAK] = math.nan, 0.0
+        impact[joint, i, BEGIN], impact[joint, i, SPEED] = t, speed
+        impact[joint, i, END], impact[joint, i, PEAK] = math.nan, 0.0
 
 
 @kernel
-def raise_peak(tally, joint, force):
+def raise_peak(peak, impact, impacts, joint, force):
     """The normal force of the contact that goes on in a joint has reached a value [N]."""
-    i = tally.impacts[joint] - 1
-    tally.peak[joint] = max(tally.peak[joint], force)
-    if 0 <= i < IMPACTS and math.isnan(tally.impact[joint, i, END]):
-        tally.impact[joint, i, PEAK] = max(tally.impact[joint, i, PEAK], force)
+    i = impacts[joint] - 1
+    peak[joint] = max(peak[joint], force)
+    if 0 <= i < IMPACTS and math.isnan(impact[joint, i, END]):
+        impact[joint, i, PEAK] = max(impact[joint, i, PEAK], force)
 
 
 @kernel
-def end_impact(tally, joint, t):
+def end_impact(impact, impacts, joint, t):
     """Note that the contact in a joint ended at time t [s]."""
-    i = tally.impacts[joint] - 1
-    if 0 <= i < IMPACTS and math.isnan(tally.impact[joint, i, END]):
-        tally.impact[joint, i, END] = t
+    i = impacts[joint] - 1
+    if 0 <= i < IMPACTS and math.isnan(impact[joint, i, END]):
+        impact[joint, i, END] = t
 
 
 @kernel

@@ -1,4 +1,4 @@
-"""The one way to compile: ``@kernel`` is ``numba.njit`` with a cache that is writable and never stale."""
+"""The two ways to compile: ``@kernel`` a formula, ``@entry`` what Python calls, cached and never stale."""
 
 import hashlib
 import os
@@ -61,8 +61,14 @@ def kernel(function: _Function) -> _Function:
     """Compile a formula: numbers and arrays in, numbers out; division by zero gives inf, as in numpy.
 
     A kernel cannot allocate: without numba's runtime it counts no references either, which would cost more
-    than the physics where many small arrays are passed around.
+    than the physics where many small arrays are passed around. It is compiled into the entry that calls
+    it and not cached by itself: what comes out of a cache cannot be inlined.
     """
+    return numba.njit(error_model="numpy", _nrt=False, forceinline=True)(function)  # type: ignore[no-any-return]
+
+
+def entry(function: _Function) -> _Function:
+    """Compile what Python calls: a kernel with a cache of its own."""
     previous = numba.config.CACHE_DIR
     numba.config.CACHE_DIR = str(cache_directory())
     try:

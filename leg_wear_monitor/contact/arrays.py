@@ -66,7 +66,7 @@ def clearance_settings(
             raise ConfigError(
                 "clearances",
                 "",
-                f"{mechanism.source} has no joint {name!r} with clearance settings, those are: {ready}",
+                f"{name!r} has no clearance settings in {mechanism.source}, expected some of: {ready}",
             )
         try:
             settings[name] = attrs.evolve(mechanism.clearances[name], **changes)

@@ -26,8 +26,7 @@ def contact_half_angle(eccentricity, bushing_radius, journal_radius):
     return math.acos(max(-1.0, min(1.0, cosine)))
 
 
-@kernel
-def contact_modulus(youngs_b, poisson_b, youngs_j, poisson_j):
+def contact_modulus(youngs_b: float, poisson_b: float, youngs_j: float, poisson_j: float) -> float:
     """4 / (3 (sigma_b + sigma_j)) [Pa] with sigma = (1 - nu^2) / E; Lankarani and Nikravesh 1990."""
     sigma = (1.0 - poisson_b * poisson_b) / youngs_b + (1.0 - poisson_j * poisson_j) / youngs_j
     return 4.0 / (3.0 * sigma)

@@ -56,12 +56,18 @@ def elastic_force(stiffness, delta):
 
 
 @kernel
+def damped_force(elastic, loss, delta_dot):
+    """Force [N] that pushes the surfaces apart, never negative: elastic part [N], loss chi / approach speed [s/m]."""
+    return max(0.0, elastic * (1.0 + loss * delta_dot))
+
+
+@kernel
 def normal_force(stiffness, hysteresis, delta, delta_dot, approach_speed):
     """Force [N] that pushes the surfaces apart, never negative.
 
     stiffness [N/m^1.5], hysteresis chi [-], delta [m], delta_dot and approach_speed [m/s].
     """
-    return max(0.0, elastic_force(stiffness, delta) * (1.0 + hysteresis * delta_dot / approach_speed))
+    return damped_force(elastic_force(stiffness, delta), hysteresis / approach_speed, delta_dot)
 
 
 @kernel

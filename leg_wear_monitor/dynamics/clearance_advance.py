@@ -44,7 +44,7 @@ from leg_wear_monitor.dynamics.tally import (
     bin_of,
 )
 from leg_wear_monitor.dynamics.touch import DELTA, F_N, NEVER, first_touch, update_contacts
-from leg_wear_monitor.kernel import copy_array, kernel
+from leg_wear_monitor.kernel import copy_array, entry, kernel
 from leg_wear_monitor.wear.surfaces import Surfaces
 
 MOST_TRIALS = 20000  # steps tried in an interval before it is given up
@@ -54,7 +54,7 @@ _RENEWAL = 4  # intervals between two looks at the surfaces and at the reactions
 _FASTEST = 1.0e4  # rad/s, and its change over an interval: a crank beyond is not a leg's
 
 
-@kernel
+@entry
 def advance_clearances(model, feeds_back, state, polynomial, t_end, tally, work):
     """Advance the state by all whole intervals up to t_end [s] and add to the tally.
 
@@ -130,6 +130,7 @@ def _steps(model, surfaces, state, tally, work):
             h = cut
         error = try_step(model.law, model.tolerance, state.local, approach, h, now, work.system, x, start, end)
         trials += 1
+        tally.steps[0] += 1
         if not error <= 1.0:
             state.step[0] = h * max(0.2, 0.9 * error ** (-1.0 / 3.0)) if error < 1.0e9 else 0.1 * h
             cut = NEVER
@@ -146,6 +147,7 @@ def _steps(model, surfaces, state, tally, work):
         if cut == NEVER:
             state.step[0] = h * min(3.0, 0.9 * max(error, 1.0e-6) ** (-1.0 / 3.0))
         cut = NEVER
+        tally.steps[1] += 1
         add_joints(contacts.joint, start, 0.5 * h, tally.integral)
         add_joints(contacts.joint, end, 0.5 * h, tally.integral)
         gather_wear(h, start, end, state.pending)

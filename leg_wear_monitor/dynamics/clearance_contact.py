@@ -9,7 +9,7 @@ import numpy as np
 
 from leg_wear_monitor.contact.arrays import ContactArrays
 from leg_wear_monitor.contact.friction import friction_force
-from leg_wear_monitor.contact.normal import elastic_force, normal_force
+from leg_wear_monitor.contact.normal import damped_force, elastic_force
 from leg_wear_monitor.dynamics.joint_contact import stiffness_at
 from leg_wear_monitor.dynamics.touch import DELTA, DELTA_DOT, EX, EY, F_N, SAMPLE, VX, VY
 from leg_wear_monitor.kernel import kernel
@@ -79,17 +79,18 @@ def accelerate_clearances(law, local, approach, now, x, at_e, at_v, out_a, out_s
     for k in range(approach.shape[0]):
         ex, ey, vx, vy = x[at_e, 2 * k], x[at_e, 2 * k + 1], x[at_v, 2 * k], x[at_v, 2 * k + 1]
         length = math.sqrt(ex * ex + ey * ey)
-        nx, ny = (ex / length, ey / length) if length > 0.0 else (1.0, 0.0)
+        inverse = 1.0 / length if length > 0.0 else 0.0
+        nx, ny = ex * inverse, ey * inverse
         delta = length - local[k, CLEARANCE] - local[k, SLOPE] * (local[k, TO_X] * ny - local[k, TO_Y] * nx)
         delta_dot = nx * vx + ny * vy
         f_n, f_t, slip, elastic, stiffness, damping = 0.0, 0.0, 0.0, 0.0, 0.0, 0.0
         if delta > 0.0 and approach[k] > 0.0:
-            hysteresis = law[k, HYSTERESIS_FACTOR]
-            f_n = normal_force(local[k, LOCAL_STIFFNESS], hysteresis, delta, delta_dot, approach[k])
+            elastic = elastic_force(local[k, LOCAL_STIFFNESS], delta)
+            loss = law[k, HYSTERESIS_FACTOR] / approach[k]
+            f_n = damped_force(elastic, loss, delta_dot)
             if f_n > 0.0:
-                elastic = elastic_force(local[k, LOCAL_STIFFNESS], delta)
                 stiffness = 1.5 * f_n / delta
-                damping = elastic * hysteresis / approach[k]
+                damping = elastic * loss
                 slip = nx * vy - ny * vx + now.lever_drive[k] * now.speed[0]
                 for i in range(d):
                     slip += lever[k, i] * x[at_v, i]

@@ -17,9 +17,9 @@ import numpy as np
 
 from leg_wear_monitor.contact.arrays import ContactArrays
 from leg_wear_monitor.mechanism.arrays import Floats, Ints, MechanismArrays, body_names, point_from_com
-from leg_wear_monitor.mechanism.constraints import DRIVE, rotations
-from leg_wear_monitor.mechanism.forces import applied_forces, stored_energy
-from leg_wear_monitor.mechanism.ideal import TURN, IdealMotion, one_cycle
+from leg_wear_monitor.mechanism.constraints import DRIVE
+from leg_wear_monitor.mechanism.forces import applied_forces_at, stored_energy_at
+from leg_wear_monitor.mechanism.ideal import TURN, IdealMotion, one_cycle, turned
 from leg_wear_monitor.mechanism.position import Linkage, evaluate
 
 POINTS = 1024  # of a turn; tables are linear between them
@@ -221,8 +221,7 @@ def _damping(linkage: Linkage, motion: IdealMotion) -> Floats:
 def _force_at(arrays: MechanismArrays, q: Floats, v: Floats) -> Floats:
     """Applied forces (3 b,) on the moving bodies."""
     cs, force = np.empty((len(q), 2)), np.empty_like(q)
-    rotations(q, cs)
-    applied_forces(arrays, q, v, cs, force)
+    applied_forces_at(arrays, q, v, cs, force)
     return force[1:].ravel()
 
 
@@ -243,9 +242,7 @@ def _toe(linkage: Linkage, motion: IdealMotion, basis: _Basis) -> Floats:
         return toe
     body, point = linkage.mechanism.toe
     i = body_names(linkage.mechanism).index(body)
-    px, py = point_from_com(linkage.mechanism, body, point)
-    cos, sin = np.cos(motion.q[:, i, 2]), np.sin(motion.q[:, i, 2])
-    lever = np.stack([cos * px - sin * py, sin * px + cos * py], axis=1)
+    lever = turned(point_from_com(linkage.mechanism, body, point), motion.q[:, i, 2])
     across = np.stack([-lever[:, 1], lever[:, 0]], axis=1)[:, :, None]
     here, turn = slice(3 * (i - 1), 3 * i - 1), basis.s[:, 3 * i - 1, None]
     toe[:, :, 0] = motion.q[:, i, :2] + lever
@@ -260,7 +257,5 @@ def _energy(linkage: Linkage, motion: IdealMotion, basis: _Basis) -> Floats:
     energy = np.zeros((n, m + 1, m + 1))
     energy[:, :m, :m] = 0.5 * basis.project(basis.all, basis.mass[:, None] * basis.all)
     for i, q in enumerate(motion.q):
-        cs = np.empty((len(q), 2))
-        rotations(q, cs)
-        energy[i, m, m] = stored_energy(linkage.arrays, q, np.zeros_like(q), cs)
+        energy[i, m, m] = stored_energy_at(linkage.arrays, q, np.zeros_like(q), np.empty((len(q), 2)))
     return energy

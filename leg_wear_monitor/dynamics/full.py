@@ -14,7 +14,7 @@ from leg_wear_monitor.contact.arrays import ContactArrays
 from leg_wear_monitor.contact.normal import elastic_force
 from leg_wear_monitor.dynamics.cholesky import factorise, substitute
 from leg_wear_monitor.dynamics.drive import drive_at
-from leg_wear_monitor.dynamics.joint_contact import joint_force
+from leg_wear_monitor.dynamics.joint_contact import contact_energy, joint_force
 from leg_wear_monitor.dynamics.tally import (
     ARCHARD,
     CONTACT,
@@ -27,10 +27,10 @@ from leg_wear_monitor.dynamics.tally import (
     TORQUE_SQUARED,
 )
 from leg_wear_monitor.dynamics.touch import DELTA, DELTA_DOT, EX, EY, F_N, SAMPLE, VX, VY
-from leg_wear_monitor.kernel import kernel
+from leg_wear_monitor.kernel import entry, kernel
 from leg_wear_monitor.mechanism.arrays import Floats, MechanismArrays
 from leg_wear_monitor.mechanism.constraints import DRIVE, Rows, arm, closures, rotations, select_rows
-from leg_wear_monitor.mechanism.forces import add_force, applied_forces, external_power
+from leg_wear_monitor.mechanism.forces import add_force, applied_forces, external_power, stored_energy
 
 BAUMGARTE = 200.0  # alpha = beta [1/s]: drift decays within 5 ms, far slower than any step resolves
 
@@ -216,3 +216,14 @@ def _ideal_rates(model, q, v, scratch, out_rate, out_drive_rate):
     out_drive_rate[POWER] = external_power(model.arrays, q, v, scratch.cs)
     if model.rows.drive_row >= 0:
         out_drive_rate[POWER] += torque * v[model.arrays.drive_body, 2]
+
+
+@entry
+def total_energy(model, surfaces, q, v, scratch):
+    """Kinetic and potential energy, that of gravity, springs and contacts [J]."""
+    rotations(q, scratch.cs)
+    energy = stored_energy(model.arrays, q, v, scratch.cs)
+    for k in range(model.contacts.joint.shape[0]):
+        ex, ey, _, _, b, j, _, _ = eccentricity(model, k, q, v, scratch.cs)
+        energy += contact_energy(model.contacts, surfaces, k, ex, ey, q[b, 2], q[j, 2])
+    return energy

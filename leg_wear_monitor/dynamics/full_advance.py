@@ -23,7 +23,7 @@ from leg_wear_monitor.dynamics.response import compare_toe
 from leg_wear_monitor.dynamics.run import DONE, PUSHED_THROUGH, SINGULAR, STEP_TOO_SMALL
 from leg_wear_monitor.dynamics.tally import ARCHARD, DRIVE_RATES, JOINT_RATES, TORQUE, add_step
 from leg_wear_monitor.dynamics.touch import DELTA, EX, EY, NEVER, SAMPLE, first_touch, update_contacts
-from leg_wear_monitor.kernel import copy_array, kernel
+from leg_wear_monitor.kernel import copy_array, entry, kernel
 from leg_wear_monitor.mechanism.arrays import Floats
 from leg_wear_monitor.wear.surfaces import deposit_wear
 
@@ -119,6 +119,7 @@ def _accept(model, surfaces, state, h, toe, tally, work):
     half = state.y.shape[0] // 2
     q, v = work.trial[:half].reshape(-1, 3), work.trial[half:].reshape(-1, 3)
     last = STAGES - 1
+    tally.steps[1] += 1
     add_step(tally, h, WEIGHTS, work.rates, work.drive_rates)
     a = work.slope[last, half:].reshape(-1, 3)
     torque = work.drive_rates[last, TORQUE]
@@ -154,7 +155,7 @@ def _pushed_through(model, scratch):
     return -1
 
 
-@kernel
+@entry
 def advance_full(model, surfaces, state, polynomial, t_end, toe, tally, work):
     """Advance the state to t_end [s] and add to the tally.
 
@@ -176,6 +177,7 @@ def advance_full(model, surfaces, state, polynomial, t_end, toe, tally, work):
         ends = h >= left * (1.0 - 1.0e-12)
         if ends:
             h = left
+        tally.steps[0] += 1
         error = _try_step(model, surfaces, state, polynomial, h, work)
         if not error <= 1.0:
             state.clock[1] = next_step(h, error, 1.0)

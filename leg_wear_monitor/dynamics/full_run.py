@@ -3,15 +3,13 @@
 import numpy as np
 
 from leg_wear_monitor.dynamics.drive import steady_drive
-from leg_wear_monitor.dynamics.full import full_model
-from leg_wear_monitor.dynamics.full_advance import FullState, advance_full, full_state, full_work, slope_here
-from leg_wear_monitor.dynamics.joint_contact import contact_energy
-from leg_wear_monitor.dynamics.response import NO_TOE, Toe, ideal_toe, toe_position
+from leg_wear_monitor.dynamics.full import full_model, total_energy
+from leg_wear_monitor.dynamics.full_advance import FullState, advance_full, full_state, full_work
+from leg_wear_monitor.dynamics.response import NO_TOE, Toe, ideal_toe
 from leg_wear_monitor.dynamics.run import DONE, Sample, Setup, stop
-from leg_wear_monitor.dynamics.tally import FORCE, TORQUE, Tally
+from leg_wear_monitor.dynamics.tally import FORCE, TORQUE, Tally, new_tally
 from leg_wear_monitor.mechanism.arrays import Floats
-from leg_wear_monitor.mechanism.forces import stored_energy
-from leg_wear_monitor.mechanism.ideal import ideal_motion
+from leg_wear_monitor.mechanism.ideal import ideal_motion, turned
 from leg_wear_monitor.mechanism.position import assemble
 from leg_wear_monitor.mechanism.spec import SpeedDrive
 
@@ -46,7 +44,7 @@ class FullRun:
         self.polynomial = steady_drive(0.0, setup.speed)
         sectors = setup.surfaces.depth.shape[2]
         self._work = full_work(self.model, tolerance_m, tolerance_m * TOLERANCE_RATE, sectors)
-        slope_here(self.model, setup.surfaces, self.state, self.polynomial, self._work)
+        self.advance(0.0, new_tally(0))  # evaluates the start, so that it can be sampled
 
     @property
     def time(self) -> float:
@@ -71,12 +69,7 @@ class FullRun:
     @property
     def stored_energy(self) -> float:
         """Kinetic and potential energy, that of gravity, springs and contacts [J]."""
-        model, surfaces = self.model, self._setup.surfaces
-        energy = stored_energy(model.arrays, self.q, self.v, self._work.scratch.cs)
-        for k, joint in enumerate(model.contacts.joint):
-            b, j = model.arrays.joint_body[joint]
-            ex, ey = self._work.start[k, :2]
-            energy += contact_energy(model.contacts, surfaces, k, ex, ey, self.q[b, 2], self.q[j, 2])
+        energy = total_energy(self.model, self._setup.surfaces, self.q, self.v, self._work.scratch)
         return float(energy)
 
     def advance(self, t_end: float, tally: Tally) -> None:
@@ -96,7 +89,10 @@ class FullRun:
     def sample(self) -> Sample:
         """The leg as it is now."""
         crank_angle = float(self.q[self.model.arrays.drive_body, 2])
-        toe = None if self.toe.body < 0 else np.array(toe_position(self.toe, self._work.scratch.cs, self.q))
+        toe = None
+        if self.toe.body >= 0:
+            x, y, angle = self.q[self.toe.body]
+            toe = turned(self.toe.point, angle) + [x, y]
         force = self._work.rates[0, :, FORCE].copy()
         return Sample(crank_angle, toe, float(self._work.drive_rates[0, TORQUE]), force)
 

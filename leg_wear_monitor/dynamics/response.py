@@ -55,13 +55,6 @@ def interpolate(table, column, crank_angle):
 
 
 @kernel
-def toe_position(toe, cs, q):
-    """Position (2,) of the toe [m]."""
-    sx, sy = arm(cs, toe.body, toe.point)
-    return q[toe.body, 0] + sx, q[toe.body, 1] + sy
-
-
-@kernel
 def toe_motion(toe, cs, q, v, a):
     """Position, velocity and acceleration of the toe."""
     i = toe.body

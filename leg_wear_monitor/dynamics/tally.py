@@ -1,6 +1,7 @@
 """What a run adds up: integrals, extremes, distributions and impacts of every joint and of the drive.
 
-Memory does not grow with the run: a distribution is a histogram over time, and impacts are counted beyond the first thousand.
+Memory does not grow with the run: a distribution is a histogram over time, and impacts beyond the first
+thousand are only counted.
 """
 
 import math
@@ -36,7 +37,7 @@ class Tally(NamedTuple):
     ``drive_range`` (2,) least and largest torque; ``force_time`` (j, bins) and ``torque_time`` (2, bins)
     seconds spent at each magnitude, the torque's by sign; ``impact`` (j, 1000, 4); ``impacts`` (j,) their
     number; ``response`` (4,) largest deviation of the toe's position, velocity and acceleration and of the
-    drive torque from the ideal linkage.
+    drive torque from the ideal linkage; ``steps`` (2,) tried and taken.
     """
 
     time: Floats
@@ -49,6 +50,7 @@ class Tally(NamedTuple):
     impact: Floats
     impacts: Ints
     response: Floats
+    steps: Ints
 
 
 def new_tally(joints: int) -> Tally:
@@ -64,6 +66,7 @@ def new_tally(joints: int) -> Tally:
         impact=np.zeros((joints, IMPACTS, 4)),
         impacts=np.zeros(joints, dtype=np.int64),
         response=np.zeros(4),
+        steps=np.zeros(2, dtype=np.int64),
     )
 
 

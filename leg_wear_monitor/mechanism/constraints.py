@@ -10,7 +10,7 @@ from typing import NamedTuple
 
 import numpy as np
 
-from leg_wear_monitor.kernel import kernel
+from leg_wear_monitor.kernel import entry, kernel
 from leg_wear_monitor.mechanism.arrays import PRISMATIC, Ints, MechanismArrays
 
 DRIVE = -1
@@ -117,6 +117,13 @@ def closures(arrays, rows, q, v, cs, drive, out_phi, out_jac, out_gamma):
             _prismatic(arrays, joint, r, q, v, cs, out_phi, out_jac, out_gamma)
         else:
             _revolute(arrays, joint, r, q, v, cs, out_phi, out_jac, out_gamma)
+
+
+@entry
+def closures_at(arrays, rows, q, v, drive, cs, out_phi, out_jac, out_gamma):
+    """`closures` from Python; fills cs (n, 2) too."""
+    rotations(q, cs)
+    closures(arrays, rows, q, v, cs, drive, out_phi, out_jac, out_gamma)
 
 
 @kernel

@@ -2,8 +2,8 @@
 
 import math
 
-from leg_wear_monitor.kernel import kernel
-from leg_wear_monitor.mechanism.constraints import arm
+from leg_wear_monitor.kernel import entry, kernel
+from leg_wear_monitor.mechanism.constraints import arm, rotations
 
 
 @kernel
@@ -102,3 +102,17 @@ def external_power(arrays, q, v, cs):
             rate += (v[b, 1] + v[b, 2] * sbx - v[a, 1] - v[a, 2] * sax) * dy
             power -= arrays.spring_law[k, 2] * (rate / length) ** 2
     return power
+
+
+@entry
+def applied_forces_at(arrays, q, v, cs, out_force):
+    """`applied_forces` from Python; fills cs (n, 2) too."""
+    rotations(q, cs)
+    applied_forces(arrays, q, v, cs, out_force)
+
+
+@entry
+def stored_energy_at(arrays, q, v, cs):
+    """`stored_energy` from Python; fills cs (n, 2) too."""
+    rotations(q, cs)
+    return stored_energy(arrays, q, v, cs)

@@ -5,10 +5,11 @@ from collections.abc import Iterable
 
 import attrs
 import numpy as np
+from numpy.typing import ArrayLike
 
 from leg_wear_monitor.mechanism.arrays import Floats, body_names, point_from_com
-from leg_wear_monitor.mechanism.constraints import DRIVE, arm, rotations
-from leg_wear_monitor.mechanism.forces import applied_forces
+from leg_wear_monitor.mechanism.constraints import DRIVE
+from leg_wear_monitor.mechanism.forces import applied_forces_at
 from leg_wear_monitor.mechanism.position import Linkage, assemble, drive_column, evaluate, follow
 
 TURN = 2.0 * math.pi
@@ -90,15 +91,14 @@ def _state(
     v[1:] = np.linalg.solve(jacobian, drive_column(linkage) * drive[1]).reshape(-1, 3)
     a[1:] = np.linalg.solve(jacobian, evaluate(linkage, q, v, drive).gamma).reshape(-1, 3)
     cs, force = np.empty((len(q), 2)), np.empty_like(q)
-    rotations(q, cs)
-    applied_forces(linkage.arrays, q, v, cs, force)
+    applied_forces_at(linkage.arrays, q, v, cs, force)
     # M a + phi_q^T lambda = Q; the force that a row exerts is -phi_q^T lambda
     inertial: Floats = force - linkage.arrays.mass * a
     lam: Floats = np.asarray(np.linalg.solve(jacobian.T, inertial[1:].ravel()), dtype=np.float64)
-    return q, v, a, reactions(linkage, cs, lam), float(-lam[linkage.rows.drive_row])
+    return q, v, a, reactions(linkage, q, lam), float(-lam[linkage.rows.drive_row])
 
 
-def reactions(linkage: Linkage, cs: Floats, lam: Floats) -> Floats:
+def reactions(linkage: Linkage, q: Floats, lam: Floats) -> Floats:
     """Force on the journal's or slider's body in every joint (j, 2) [N] from the multipliers."""
     arrays, force = linkage.arrays, np.zeros((len(linkage.mechanism.joints), 2))
     for closure, row in zip(linkage.rows.closure, linkage.rows.row, strict=True):
@@ -107,9 +107,8 @@ def reactions(linkage: Linkage, cs: Floats, lam: Floats) -> Floats:
         if arrays.joint_kind[closure] == 0:
             force[closure] = -lam[row : row + 2]
         else:
-            force[closure] = -lam[row] * np.array(
-                arm(cs, arrays.joint_body[closure, 0], arrays.joint_normal[closure])
-            )
+            angle = q[arrays.joint_body[closure, 0], 2]
+            force[closure] = -lam[row] * turned(arrays.joint_normal[closure], angle)
     return force
 
 
@@ -118,10 +117,15 @@ def point_motion(
 ) -> tuple[Floats, Floats, Floats]:
     """Position, velocity and acceleration (N, 2) of a point of a body."""
     i = body_names(linkage.mechanism).index(body)
-    px, py = point_from_com(linkage.mechanism, body, point)
     q, v, a = motion.q[:, i], motion.v[:, i], motion.a[:, i]
-    c, s = np.cos(q[:, 2]), np.sin(q[:, 2])
-    lever = np.stack([c * px - s * py, s * px + c * py], axis=1)
+    lever = turned(point_from_com(linkage.mechanism, body, point), q[:, 2])
     across = np.stack([-lever[:, 1], lever[:, 0]], axis=1)
     w, alpha = v[:, 2:], a[:, 2:]
     return q[:, :2] + lever, v[:, :2] + w * across, a[:, :2] + alpha * across - w * w * lever
+
+
+def turned(vector: ArrayLike, angle: ArrayLike) -> Floats:
+    """A vector (2,) turned by an angle [rad], or by N angles (N, 2)."""
+    x, y = np.asarray(vector, dtype=float)
+    c, s = np.cos(angle), np.sin(angle)
+    return np.stack([c * x - s * y, s * x + c * y], axis=-1)

@@ -6,7 +6,7 @@ import numpy as np
 
 from leg_wear_monitor.errors import AssemblyError
 from leg_wear_monitor.mechanism.arrays import Floats, MechanismArrays, com_poses, compile_arrays
-from leg_wear_monitor.mechanism.constraints import DRIVE, Rows, closures, rotations, select_rows
+from leg_wear_monitor.mechanism.constraints import DRIVE, Rows, closures_at, select_rows
 from leg_wear_monitor.mechanism.spec import Mechanism
 
 _TOLERANCE = 1.0e-12  # residual of a closed joint [m, rad], near rounding for links of a metre
@@ -62,8 +62,7 @@ def evaluate(linkage: Linkage, q: Floats, v: Floats, drive: tuple[float, float, 
     """All closures at coordinates q (n, 3), velocities v (n, 3) and drive (angle, speed, acceleration)."""
     m = len(linkage.rows.body)
     cs, phi, blocks, gamma = np.empty((len(q), 2)), np.empty(m), np.zeros((m, 2, 3)), np.empty(m)
-    rotations(q, cs)
-    closures(linkage.arrays, linkage.rows, q, v, cs, np.array(drive), phi, blocks, gamma)
+    closures_at(linkage.arrays, linkage.rows, q, v, np.array(drive), cs, phi, blocks, gamma)
     return Closures(phi, dense_jacobian(linkage.rows, blocks, len(q)), gamma)
 
 

@@ -84,8 +84,8 @@ class ClearanceWork(NamedTuple):
     """Room for an interval.
 
     The tables ``now``; samples of the joints at a step's ``start`` and ``end`` (k, COLUMNS); ``x``
-    (VECTORS, d) the vectors of a step, ``weight`` (N,) of the wear on an arc, ``reaction`` (r,), ``backup`` the
-    motion that a failed interval falls back to, ``crank`` (3,) the drive at the interval's start.
+    (VECTORS, d) the vectors of a step, ``weight`` (N,) of the wear on an arc, ``reaction`` (r,) and
+    ``toe`` (2,) as observed, ``backup`` the motion that a failed interval falls back to, ``crank`` (3,) the drive at the interval's start.
     """
 
     now: Now
@@ -95,6 +95,7 @@ class ClearanceWork(NamedTuple):
     x: Floats
     weight: Floats
     reaction: Floats
+    toe: Floats
     backup: Floats
     crank: Floats
 
@@ -127,6 +128,7 @@ def clearance_work(model: ClearanceModel, state: ClearanceState) -> ClearanceWor
         x=np.zeros((VECTORS, d)),
         weight=np.zeros(state.depth.shape[2]),
         reaction=np.zeros(len(model.tables.reaction_joint)),
+        toe=np.zeros(2),
         backup=np.zeros_like(state.motion),
         crank=np.zeros(3),
     )

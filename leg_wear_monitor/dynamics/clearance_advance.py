@@ -7,7 +7,7 @@ into calls, and a call costs at most its intervals times a bounded number of ste
 
 import math
 
-from leg_wear_monitor.dynamics.clearance import ANGLE, crank_between, take_tables
+from leg_wear_monitor.dynamics.clearance import ACCELERATION, ANGLE, SPEED, crank_between, take_tables
 from leg_wear_monitor.dynamics.clearance_contact import (
     A0,
     E0,
@@ -28,11 +28,13 @@ from leg_wear_monitor.dynamics.clearance_step import (
     outside_power,
     reactions,
     shift_start,
+    stored_energy_now,
     toe_deviation,
     try_step,
     wear_off,
 )
 from leg_wear_monitor.dynamics.drive import drive_at
+from leg_wear_monitor.dynamics.joint_contact import contact_energy
 from leg_wear_monitor.dynamics.run import DONE, INVALID_DRIVE, PUSHED_THROUGH, STEP_TOO_SMALL
 from leg_wear_monitor.dynamics.tally import (
     FORCE,
@@ -50,7 +52,7 @@ from leg_wear_monitor.wear.surfaces import Surfaces
 MOST_TRIALS = 20000  # steps tried in an interval before it is given up
 
 _SHORTEST_STEP = 1.0e-13  # s
-_RENEWAL = 4  # intervals between two looks at the surfaces and at the reactions of the ideal joints
+_RENEWAL = 2  # intervals between two looks at the surfaces and at the reactions of the ideal joints
 _FASTEST = 1.0e4  # rad/s, and its change over an interval: a crank beyond is not a leg's
 
 
@@ -226,3 +228,28 @@ def _add_reactions(joints, reaction, weight, tally):
         tally.peak[joint] = max(tally.peak[joint], force)
         tally.force_time[joint, bin_of(force)] += weight
         row += 2
+
+
+@entry
+def observe(model, feeds_back, state, work):
+    """Look at the leg where the state stands, and leave the state as it is.
+
+    Fills the samples ``start``, ``reaction`` and ``toe`` of the work arrays; returns the stored energy [J].
+    """
+    surfaces, now, x = Surfaces(state.depth, feeds_back), work.now, work.x
+    copy_array(state.motion, work.backup)
+    angle, speed = state.drive[ANGLE], state.drive[SPEED]
+    take_tables(model.tables, angle, speed, state.drive[ACCELERATION], now)
+    _begin(model, surfaces, state, work)
+    copy_array(work.backup, state.motion)
+    reactions(model.tables, angle, now, x, work.start, work.reaction)
+    d = x.shape[1]
+    for i in range(2):
+        work.toe[i] = now.toe[i, 0]
+        for j in range(d):
+            work.toe[i] += now.toe[i, 1 + j] * x[E0, j]
+    energy = stored_energy_now(model.tables, angle, speed, x)
+    for k in range(state.approach.shape[0]):
+        ex, ey = state.e[2 * k], state.e[2 * k + 1]
+        energy += contact_energy(model.contacts, surfaces, k, ex, ey, now.angle[k, 0], now.angle[k, 1])
+    return energy

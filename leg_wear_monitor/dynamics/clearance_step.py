@@ -137,6 +137,22 @@ def outside_power(now, x):
 
 
 @kernel
+def stored_energy_now(tables, angle, speed, x):
+    """Kinetic energy, and that of gravity and springs [J], at rows E0 and V0."""
+    d, energy = x.shape[1], 0.0
+    i, w = blend(tables.energy.shape[0] - 1, angle)
+    for side in range(2):
+        j, share = i + side, w if side else 1.0 - w
+        form = tables.energy[j]
+        energy += share * (form[d, d] * speed * speed + form[d + 1, d + 1])
+        for a in range(d):
+            energy += share * (2.0 * form[a, d] * speed * x[V0, a] - tables.push[j, a] * x[E0, a])
+            for b in range(d):
+                energy += share * form[a, b] * x[V0, a] * x[V0, b]
+    return energy
+
+
+@kernel
 def add_joints(joint, sample, weight, integral):
     """Add the rates of the loose joints' integrals at one end of a step, by half its length [s]."""
     for k in range(sample.shape[0]):

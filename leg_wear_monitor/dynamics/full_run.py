@@ -25,6 +25,8 @@ class FullRun:
     Parameters
     ----------
     setup : Setup
+    samples : int
+        Samples a turn, which this formulation can take anywhere.
     tolerance_m : float
         Local error allowed in a step [m or rad]; that of velocities is 1e4 times it per second.
 
@@ -34,7 +36,7 @@ class FullRun:
         All that a continuation needs, the surfaces aside.
     """
 
-    def __init__(self, setup: Setup, tolerance_m: float = TOLERANCE_M) -> None:
+    def __init__(self, setup: Setup, samples: int = 0, tolerance_m: float = TOLERANCE_M) -> None:
         linkage = setup.linkage
         driven = isinstance(linkage.mechanism.drive, SpeedDrive)
         self._setup = setup

@@ -4,6 +4,7 @@ import math
 from collections.abc import Callable, Sequence
 
 from leg_wear_monitor.contact.arrays import clearance_settings, compile_contacts
+from leg_wear_monitor.dynamics.clearance_run import ClearanceRun
 from leg_wear_monitor.dynamics.full_run import FullRun
 from leg_wear_monitor.dynamics.ideal_result import ideal_result
 from leg_wear_monitor.dynamics.result import (
@@ -23,7 +24,7 @@ from leg_wear_monitor.mechanism.position import build_linkage
 from leg_wear_monitor.mechanism.spec import Mechanism, SpeedDrive
 from leg_wear_monitor.wear.surfaces import SECTORS, fresh_surfaces
 
-MODELS: dict[str, Callable[[Setup], Run]] = {"full": FullRun}
+MODELS: dict[str, Callable[[Setup, int], Run]] = {"clearance": ClearanceRun, "full": FullRun}
 
 _REPORTS_A_CYCLE = 20
 
@@ -65,7 +66,7 @@ def simulate(
     cycles: float = 5.0,
     duration_s: float | None = None,
     skip_cycles: float | None = None,
-    model: str = "full",
+    model: str = "clearance",
     wear: bool = False,
     normal_law: str | None = None,
     trace: int = 0,
@@ -119,7 +120,7 @@ def simulate(
     skipped, counted = _spans(setup, cycles, duration_s, skip_cycles, trace)
     if not setup.loose and isinstance(mechanism.drive, SpeedDrive):
         return ideal_result(setup, counted * abs(setup.speed) / TURN, trace)
-    return _run(setup, MODELS[model](setup), model, skipped, counted, trace, progress)
+    return _run(setup, MODELS[model](setup, trace), model, skipped, counted, trace, progress)
 
 
 def _speed(mechanism: Mechanism, speed_rpm: float | None) -> float:

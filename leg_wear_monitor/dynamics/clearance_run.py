@@ -1,0 +1,177 @@
+"""The real-time formulation: a stepper that a twin can drive, and a run that a simulation can ask."""
+
+import math
+from typing import NamedTuple
+
+import numpy as np
+
+from leg_wear_monitor.dynamics.clearance import (
+    ANGLE,
+    ClearanceModel,
+    ClearanceState,
+    clearance_state,
+    clearance_work,
+)
+from leg_wear_monitor.dynamics.clearance_advance import advance_clearances, observe
+from leg_wear_monitor.dynamics.clearance_contact import F_T, contact_laws
+from leg_wear_monitor.dynamics.clearance_tables import ClearanceTables, build_tables, is_damped
+from leg_wear_monitor.dynamics.drive import steady_drive
+from leg_wear_monitor.dynamics.run import DONE, Sample, Setup, stop
+from leg_wear_monitor.dynamics.tally import Tally
+from leg_wear_monitor.dynamics.touch import F_N
+from leg_wear_monitor.errors import ConfigError
+from leg_wear_monitor.mechanism.arrays import Floats
+from leg_wear_monitor.mechanism.ideal import TURN
+from leg_wear_monitor.mechanism.spec import SpeedDrive
+
+INTERVALS = 2048  # of a turn at the setup's speed
+TOLERANCE_M = 1.0e-8  # local error of a step in the eccentricities [m]
+TOLERANCE_RATE = 1.0e4  # 1/s: the same for their rates, over the time a contact takes
+
+
+class Snapshot(NamedTuple):
+    """All of a stepper's state; a stepper restored from it goes on bit for bit."""
+
+    motion: Floats
+    depth: Floats
+
+
+class ClearanceStepper:
+    """The leg in clearance coordinates, advanced over an arbitrary smooth motion of its crank.
+
+    Parameters
+    ----------
+    setup : Setup
+        Its surfaces are worn as the stepper goes.
+    interval_s : float, optional
+        Time between the instants at which the state exists; `INTERVALS` a turn at the setup's speed if not
+        given.
+    tolerance_m : float
+        Local error allowed in a step; that of the rates is 1e4 times it per second.
+    tables : ClearanceTables, optional
+        Tables of this setup, if they are there already.
+
+    Raises
+    ------
+    ConfigError
+        For a mechanism that a torque drives: these coordinates need the crank's motion.
+    """
+
+    def __init__(
+        self,
+        setup: Setup,
+        interval_s: float | None = None,
+        tolerance_m: float = TOLERANCE_M,
+        tables: ClearanceTables | None = None,
+    ) -> None:
+        mechanism = setup.linkage.mechanism
+        if not isinstance(mechanism.drive, SpeedDrive):
+            raise ConfigError(
+                mechanism.source, "drive.torque", "the clearance model needs drive.speed; try --model full"
+            )
+        self._setup = setup
+        self.model = ClearanceModel(
+            contacts=setup.contacts,
+            tables=tables or build_tables(setup.linkage, setup.contacts),
+            interval=interval_s or TURN / abs(setup.speed) / INTERVALS,
+            tolerance=np.array([1.0, 1.0 / TOLERANCE_RATE]) / tolerance_m,
+            law=contact_laws(setup.contacts),
+            damped=int(is_damped(setup.linkage.arrays)),
+        )
+        self.state: ClearanceState = clearance_state(setup.surfaces.depth, 0.0, setup.speed)
+        self.work = clearance_work(self.model, self.state)
+
+    @property
+    def time(self) -> float:
+        """Time of the last whole interval [s]."""
+        return float(self.state.index[0] * self.model.interval)
+
+    def init(self, crank_angle: float, speed: float) -> None:
+        """Start afresh at a crank angle [rad] and speed [rad/s], time 0, journals centred; wear stays."""
+        start = clearance_state(self.state.depth, crank_angle, speed)
+        self.state.motion[:] = start.motion
+
+    def advance(self, polynomial: Floats, t_end: float, tally: Tally) -> tuple[int, int]:
+        """Advance by all whole intervals up to a time, and add to a tally.
+
+        Parameters
+        ----------
+        polynomial : (7,) array
+            Crank angle [rad]: reference time [s], then six coefficients; it holds since the last call.
+        t_end : float, s
+        tally : Tally
+
+        Returns
+        -------
+        status, k : int
+            `DONE`, or why it stopped and the loose joint concerned (-1 if none); the state is then that of
+            the last whole interval.
+        """
+        status, k = advance_clearances(
+            self.model, self._setup.surfaces.feeds_back, self.state, polynomial, t_end, tally, self.work
+        )
+        return int(status), int(k)
+
+    def snapshot(self) -> Snapshot:
+        """A copy of the whole state."""
+        return Snapshot(self.state.motion.copy(), self.state.depth.copy())
+
+    def restore(self, snapshot: Snapshot) -> None:
+        """Go back to a snapshot of a stepper of the same setup."""
+        self.state.motion[:] = snapshot.motion
+        self.state.depth[:] = snapshot.depth
+
+
+class ClearanceRun:
+    """The stepper under a steady crank, as `simulate` wants it.
+
+    Parameters
+    ----------
+    setup : Setup
+    samples : int
+        Samples a turn that must fall on whole intervals; 0 for none.
+    """
+
+    def __init__(self, setup: Setup, samples: int = 0) -> None:
+        intervals = max(samples, 1) * math.ceil(INTERVALS / max(samples, 1))
+        self.stepper = ClearanceStepper(setup, TURN / abs(setup.speed) / intervals)
+        self._setup = setup
+        self._polynomial = steady_drive(0.0, setup.speed)
+
+    @property
+    def time(self) -> float:
+        """Time reached [s]."""
+        return self.stepper.time
+
+    @property
+    def stored_energy(self) -> float:
+        """Kinetic and potential energy, that of gravity, springs and contacts [J], to the order of e / L."""
+        return self._observe()
+
+    def advance(self, t_end: float, tally: Tally) -> None:
+        """Go on to the last whole interval before a time [s] and add to a tally.
+
+        Raises
+        ------
+        SimulationError
+            Naming the joint, the time and what to try.
+        """
+        status, k = self.stepper.advance(self._polynomial, t_end, tally)
+        if status != DONE:
+            raise stop(self._setup, status, k, self.time)
+
+    def sample(self) -> Sample:
+        """The leg as it is now."""
+        self._observe()
+        work, tables, contacts = self.stepper.work, self.stepper.model.tables, self._setup.contacts
+        force = np.zeros(len(self._setup.linkage.mechanism.joints))
+        force[contacts.joint] = np.hypot(work.start[:, F_N], work.start[:, F_T])
+        np.add.at(force, tables.reaction_joint[1:], work.reaction[1:] ** 2)
+        ideal = tables.reaction_joint[1::2]
+        force[ideal] = np.sqrt(force[ideal])
+        toe = work.toe.copy() if self._setup.linkage.mechanism.toe else None
+        return Sample(float(self.stepper.state.drive[ANGLE]), toe, float(work.reaction[0]), force)
+
+    def _observe(self) -> float:
+        stepper = self.stepper
+        return float(observe(stepper.model, self._setup.surfaces.feeds_back, stepper.state, stepper.work))

@@ -7,8 +7,10 @@ import numpy as np
 
 from leg_wear_monitor.contact.arrays import ContactArrays
 from leg_wear_monitor.dynamics.clearance_contact import COLUMNS, LOCAL, TO_X, VECTORS
-from leg_wear_monitor.dynamics.clearance_tables import ClearanceTables, motion_shapes, views
+from leg_wear_monitor.dynamics.clearance_layout import motion_shapes, views
+from leg_wear_monitor.dynamics.clearance_tables import ClearanceTables
 from leg_wear_monitor.dynamics.rosenbrock import ContactSystem, contact_system
+from leg_wear_monitor.dynamics.tally import JOINT_RATES
 from leg_wear_monitor.kernel import kernel
 from leg_wear_monitor.mechanism.arrays import Floats
 
@@ -57,22 +59,31 @@ class ClearanceState(NamedTuple):
 
 
 class Now(NamedTuple):
-    """Tables at the present crank angle: ``row`` (w,) of the table ``motion`` and named views of it.
+    """Tables at the present crank angle: ``row`` (w,) of the table ``motion`` and its parts, `motion_shapes`.
 
-    ``speed`` (2,) and acceleration of the crank; ``bare`` (d,) accelerations without contact at them and at
-    resting eccentricities. The rest is as in `motion_shapes`.
+    ``speed`` (2,) and acceleration of the crank; ``bare`` (d,) accelerations without contact at them, and
+    ``bare_e`` (d, d) the same times e.
     """
 
     row: Floats
     speed: Floats
     bare: Floats
+    bare_e: Floats
     inverse_mass: Floats
     coriolis: Floats
     free: Floats
+    free_e: Floats
     lever: Floats
     lever_drive: Floats
     lever_response: Floats
     torque: Floats
+    torque_a: Floats
+    torque_v: Floats
+    torque_t: Floats
+    torque_e: Floats
+    torque_ae: Floats
+    torque_vv: Floats
+    torque_ve: Floats
     angle: Floats
     toe: Floats
     load_power: Floats
@@ -85,7 +96,8 @@ class ClearanceWork(NamedTuple):
 
     The tables ``now``; samples of the joints at a step's ``start`` and ``end`` (k, COLUMNS); ``x``
     (VECTORS, d) the vectors of a step, ``weight`` (N,) of the wear on an arc, ``reaction`` (r,) and
-    ``toe`` (2,) as observed, ``backup`` the motion that a failed interval falls back to, ``crank`` (3,) the drive at the interval's start.
+    ``toe`` (2,) as observed, ``added`` (k, JOINT_RATES) to the joints' integrals in a step, ``drive_start``
+    and ``drive_end`` (3,) the torque at its ends, ``backup`` the motion that a failed interval falls back to, ``crank`` (3,) the drive at the interval's start.
     """
 
     now: Now
@@ -96,6 +108,9 @@ class ClearanceWork(NamedTuple):
     weight: Floats
     reaction: Floats
     toe: Floats
+    added: Floats
+    drive_start: Floats
+    drive_end: Floats
     backup: Floats
     crank: Floats
 
@@ -121,7 +136,7 @@ def clearance_work(model: ClearanceModel, state: ClearanceState) -> ClearanceWor
     row = np.zeros(model.tables.motion.shape[1])
     parts = views(row, motion_shapes(loose, model.damped > 0))
     return ClearanceWork(
-        now=Now(row=row, speed=np.zeros(2), bare=np.zeros(d), **parts),
+        now=Now(row=row, speed=np.zeros(2), bare=np.zeros(d), bare_e=np.zeros((d, d)), **parts),
         system=contact_system(loose),
         start=np.zeros((loose, COLUMNS)),
         end=np.zeros((loose, COLUMNS)),
@@ -129,6 +144,9 @@ def clearance_work(model: ClearanceModel, state: ClearanceState) -> ClearanceWor
         weight=np.zeros(state.depth.shape[2]),
         reaction=np.zeros(len(model.tables.reaction_joint)),
         toe=np.zeros(2),
+        added=np.zeros((loose, JOINT_RATES)),
+        drive_start=np.zeros(3),
+        drive_end=np.zeros(3),
         backup=np.zeros_like(state.motion),
         crank=np.zeros(3),
     )
@@ -136,7 +154,7 @@ def clearance_work(model: ClearanceModel, state: ClearanceState) -> ClearanceWor
 
 @kernel
 def blend(points, angle):
-    """Row of a table with so many points a turn before a crank angle, and the share of the way to the next."""
+    """Row of a table (points a turn) before a crank angle, and the share of the way to the next."""
     u = angle * (points / (2.0 * math.pi))
     u -= points * math.floor(u / points)
     i = min(points - 1, int(u))
@@ -147,12 +165,15 @@ def blend(points, angle):
 def take_tables(tables, angle, speed, acceleration, out_now):
     """Tables at a crank angle [rad], speed [rad/s] and acceleration [rad/s^2]."""
     motion, row, bare, free = tables.motion, out_now.row, out_now.bare, out_now.free
+    bare_e, free_e, square = out_now.bare_e, out_now.free_e, speed * speed
     i, w = blend(motion.shape[0] - 1, angle)
     for j in range(row.shape[0]):
         row[j] = motion[i, j] + w * (motion[i + 1, j] - motion[i, j])
     out_now.speed[0], out_now.speed[1] = speed, acceleration
     for j in range(bare.shape[0]):
-        bare[j] = free[0, j] + acceleration * free[1, j] + speed * speed * free[2, j]
+        bare[j] = free[0, j] + acceleration * free[1, j] + square * free[2, j]
+        for c in range(bare.shape[0]):
+            bare_e[j, c] = free_e[0, j, c] + acceleration * free_e[1, j, c] + square * free_e[2, j, c]
     if out_now.viscous.shape[0] > 0:
         for j in range(bare.shape[0]):
             bare[j] += speed * out_now.viscous[j, bare.shape[0]]
@@ -160,7 +181,7 @@ def take_tables(tables, angle, speed, acceleration, out_now):
 
 @kernel
 def crank_between(start, end, interval):
-    """Angle, speed and acceleration of the crank in the middle of an interval, from those at its ends (3,)."""
+    """Angle, speed and acceleration of the crank amid an interval, from those at its ends (3,)."""
     speed = 1.5 * (end[ANGLE] - start[ANGLE]) / interval - 0.25 * (start[SPEED] + end[SPEED])
     angle = 0.5 * (start[ANGLE] + end[ANGLE]) + 0.125 * interval * (start[SPEED] - end[SPEED])
     return angle, speed, (end[SPEED] - start[SPEED]) / interval

@@ -21,14 +21,14 @@ from leg_wear_monitor.dynamics.clearance_contact import (
     look_around,
 )
 from leg_wear_monitor.dynamics.clearance_step import (
-    add_joints,
     drift,
     drive_torque,
     gather_wear,
+    half_impulse,
+    integrate_joints,
     outside_power,
     reactions,
     shift_start,
-    stored_energy_now,
     toe_deviation,
     try_step,
     wear_off,
@@ -39,6 +39,7 @@ from leg_wear_monitor.dynamics.run import DONE, INVALID_DRIVE, PUSHED_THROUGH, S
 from leg_wear_monitor.dynamics.tally import (
     FORCE,
     FORCE_SQUARED,
+    JOINT_RATES,
     POWER,
     TORQUE,
     TORQUE_ERROR,
@@ -53,6 +54,9 @@ MOST_TRIALS = 20000  # steps tried in an interval before it is given up
 
 _SHORTEST_STEP = 1.0e-13  # s
 _RENEWAL = 2  # intervals between two looks at the surfaces and at the reactions of the ideal joints
+# of the drive at one end of a step: torque [N m], its part without e'', power of loads [W]
+WHOLE, SMOOTH, OUTSIDE = 0, 1, 2
+
 _FASTEST = 1.0e4  # rad/s, and its change over an interval: a crank beyond is not a leg's
 
 
@@ -112,7 +116,7 @@ def _begin(model, surfaces, state, work):
             look_around(model.contacts, surfaces, k, nx, ny, now.angle[k, 0], now.angle[k, 1], state.local)
     for i in range(state.e.shape[0]):
         x[E0, i], x[V0, i] = state.e[i], state.v[i]
-    drift(now, x, V0)
+    drift(now, x)
     accelerate_clearances(model.law, state.local, state.approach, now, x, E0, V0, A0, work.start)
 
 
@@ -120,9 +124,9 @@ def _begin(model, surfaces, state, work):
 def _steps(model, surfaces, state, tally, work):
     """All steps of an interval."""
     x, now, start, end, approach = work.x, work.now, work.start, work.end, state.approach
-    contacts, interval, began = model.contacts, model.interval, state.index[0] * model.interval
-    add_drive(now, x, start, 0.0, tally.drive_integral, tally.drive_range, tally.response)
+    contacts, interval = model.contacts, model.interval
     done, trials, cut = 0.0, 0, NEVER
+    _look_at_drive(now, x, start, work.drive_start, tally)
     while done < interval:
         left = interval - done
         h = min(state.step[0], left)
@@ -130,7 +134,9 @@ def _steps(model, surfaces, state, tally, work):
             h = 0.5 * left
         if cut < NEVER:
             h = cut
-        error = try_step(model.law, model.tolerance, state.local, approach, h, now, work.system, x, start, end)
+        error = try_step(
+            model.law, model.tolerance, state.local, approach, h, now, work.system, x, start, end
+        )
         trials += 1
         tally.steps[0] += 1
         if not error <= 1.0:
@@ -149,35 +155,49 @@ def _steps(model, surfaces, state, tally, work):
         if cut == NEVER:
             state.step[0] = h * min(3.0, 0.9 * max(error, 1.0e-6) ** (-1.0 / 3.0))
         cut = NEVER
-        tally.steps[1] += 1
-        add_joints(contacts.joint, start, 0.5 * h, tally.integral)
-        add_joints(contacts.joint, end, 0.5 * h, tally.integral)
-        gather_wear(h, start, end, state.pending)
-        torque_weight = 0.5 * h
-        add_drive(now, x, start, torque_weight, tally.drive_integral, tally.drive_range, tally.response)
-        update_contacts(
-            contacts.joint, contacts.speed_floor, began + done, h, start, end,
-            approach, state.recent, tally.peak, tally.impact, tally.impacts,
-        )  # fmt: skip
-        shift_start(now, x)
-        copy_array(end, start)
-        if surfaces.feeds_back:
-            _follow(contacts, surfaces, start, now.angle, state.local)
-        add_drive(now, x, start, torque_weight, tally.drive_integral, tally.drive_range, tally.response)
-        toe_deviation(now, x, tally.response)
+        _take(model, surfaces, state, state.index[0] * interval + done, h, tally, work)
         done = interval if h >= left * (1.0 - 1.0e-9) else done + h
     return DONE, -1
 
 
 @kernel
-def add_drive(now, x, sample, weight, integral, extremes, response):
-    """Add drive torque and power at one end of a step, by half its length [s]; raise their extremes."""
-    torque, ideal = drive_torque(now, x, sample)
-    integral[TORQUE] += weight * torque
-    integral[TORQUE_SQUARED] += weight * torque * torque
-    integral[POWER] += weight * (torque * now.speed[0] + outside_power(now, x))
-    extremes[0], extremes[1] = min(extremes[0], torque), max(extremes[1], torque)
-    response[TORQUE_ERROR] = max(response[TORQUE_ERROR], abs(torque - ideal))
+def _take(model, surfaces, state, t, h, tally, work):
+    """Take the trial step of length h [s] from time t: sums, wear, contacts; make its end the next start."""
+    x, now, start, end, contacts = work.x, work.now, work.start, work.end, model.contacts
+    tally.steps[1] += 1
+    integrate_joints(model.law, state.local, state.approach, h, start, end, work.added)
+    gather_wear(work.added, start, end, state.pending)
+    for k in range(work.added.shape[0]):
+        for r in range(JOINT_RATES):
+            tally.integral[contacts.joint[k], r] += work.added[k, r]
+    update_contacts(
+        contacts.joint, contacts.speed_floor, t, h, start, end,
+        state.approach, state.recent, tally.peak, tally.impact, tally.impacts,
+    )  # fmt: skip
+    shift_start(now, x)
+    sudden = half_impulse(x)
+    copy_array(end, start)
+    if surfaces.feeds_back:
+        _follow(contacts, surfaces, start, now.angle, state.local)
+    _look_at_drive(now, x, start, work.drive_end, tally)
+    sudden += half_impulse(x)
+    toe_deviation(now, x, tally.response)
+    first, last = work.drive_start, work.drive_end
+    impulse = 0.5 * h * (first[SMOOTH] + last[SMOOTH]) + sudden
+    tally.drive_integral[TORQUE] += impulse
+    tally.drive_integral[TORQUE_SQUARED] += 0.5 * h * (first[WHOLE] ** 2 + last[WHOLE] ** 2)
+    tally.drive_integral[POWER] += impulse * now.speed[0] + 0.5 * h * (first[OUTSIDE] + last[OUTSIDE])
+    copy_array(last, first)
+
+
+@kernel
+def _look_at_drive(now, x, sample, out_drive, tally):
+    """Drive torque, its part without the eccentricities' accelerations, and the power of loads, (3,)."""
+    torque, sudden, ideal = drive_torque(now, x, sample)
+    out_drive[WHOLE], out_drive[SMOOTH], out_drive[OUTSIDE] = torque, torque - sudden, outside_power(now, x)
+    tally.drive_range[0] = min(tally.drive_range[0], torque)
+    tally.drive_range[1] = max(tally.drive_range[1], torque)
+    tally.response[TORQUE_ERROR] = max(tally.response[TORQUE_ERROR], abs(torque - ideal))
 
 
 @kernel
@@ -208,7 +228,7 @@ def _finish(model, surfaces, state, tally, work):
             wear_off(model.contacts, surfaces, k, now.angle, state.pending, work.weight)
         force = math.sqrt(sample[k, F_N] ** 2 + sample[k, F_T] ** 2)
         tally.force_time[joint[k], bin_of(force)] += interval
-    torque = drive_torque(now, work.x, sample)[0]
+    torque = work.drive_start[WHOLE]
     tally.torque_time[1 if torque > 0.0 else 0, bin_of(abs(torque))] += interval
     if renew:
         reactions(model.tables, state.drive[ANGLE], now, work.x, sample, work.reaction)
@@ -234,7 +254,8 @@ def _add_reactions(joints, reaction, weight, tally):
 def observe(model, feeds_back, state, work):
     """Look at the leg where the state stands, and leave the state as it is.
 
-    Fills the samples ``start``, ``reaction`` and ``toe`` of the work arrays; returns the stored energy [J].
+    Fills the samples ``start``, ``reaction`` and ``toe`` of the work arrays; returns the elastic energy of
+    the contacts [J].
     """
     surfaces, now, x = Surfaces(state.depth, feeds_back), work.now, work.x
     copy_array(state.motion, work.backup)
@@ -243,12 +264,13 @@ def observe(model, feeds_back, state, work):
     _begin(model, surfaces, state, work)
     copy_array(work.backup, state.motion)
     reactions(model.tables, angle, now, x, work.start, work.reaction)
+    work.reaction[0] = drive_torque(now, x, work.start)[0]
     d = x.shape[1]
     for i in range(2):
         work.toe[i] = now.toe[i, 0]
         for j in range(d):
             work.toe[i] += now.toe[i, 1 + j] * x[E0, j]
-    energy = stored_energy_now(model.tables, angle, speed, x)
+    energy = 0.0
     for k in range(state.approach.shape[0]):
         ex, ey = state.e[2 * k], state.e[2 * k + 1]
         energy += contact_energy(model.contacts, surfaces, k, ex, ey, now.angle[k, 0], now.angle[k, 1])

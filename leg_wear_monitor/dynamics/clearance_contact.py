@@ -30,9 +30,10 @@ LOCAL = 5
 HYSTERESIS_FACTOR, FRICTION_COEFFICIENT, RAMP_0, RAMP_1, FRICTION_LAW = range(5)
 
 # rows of the step's vectors (d,): eccentricities, rates and accelerations at its start (0), between its
-# stages (M) and at its end (1); the acceleration that is not contact; the stages' slopes; right-hand sides
-E0, V0, A0, EM, VM, E1, V1, A1, DRIFT, K1E, K1V, K2E, K2V, RE, RV = range(15)
-VECTORS = 15
+# stages (M) and at its end (1); the acceleration that is not contact; the stages' slopes; right-hand sides;
+# the change of the rates in the last step; the drive torque by accelerations and by rates
+E0, V0, A0, EM, VM, E1, V1, A1, DRIFT, K1E, K1V, K2E, K2V, RE, RV, DV, TA, TV = range(18)
+VECTORS = 18
 
 _TURNED = 0.02  # rad from that direction at which it is looked up again
 

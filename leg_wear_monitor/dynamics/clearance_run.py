@@ -13,8 +13,10 @@ from leg_wear_monitor.dynamics.clearance import (
     clearance_work,
 )
 from leg_wear_monitor.dynamics.clearance_advance import advance_clearances, observe
+from leg_wear_monitor.dynamics.clearance_basis import is_damped
 from leg_wear_monitor.dynamics.clearance_contact import F_T, contact_laws
-from leg_wear_monitor.dynamics.clearance_tables import ClearanceTables, build_tables, is_damped
+from leg_wear_monitor.dynamics.clearance_layout import stored_shapes, views
+from leg_wear_monitor.dynamics.clearance_tables import ClearanceTables, build_tables
 from leg_wear_monitor.dynamics.drive import steady_drive
 from leg_wear_monitor.dynamics.run import DONE, Sample, Setup, stop
 from leg_wear_monitor.dynamics.tally import Tally
@@ -146,7 +148,16 @@ class ClearanceRun:
     @property
     def stored_energy(self) -> float:
         """Kinetic and potential energy, that of gravity, springs and contacts [J], to the order of e / L."""
-        return self._observe()
+        state, tables = self.stepper.state, self.stepper.model.tables
+        angle, speed, _ = state.drive
+        u = angle / TURN % 1.0 * (len(tables.stored) - 1)
+        i = min(int(u), len(tables.stored) - 2)
+        row = tables.stored[i] + (u - i) * (tables.stored[i + 1] - tables.stored[i])
+        at, e, v = views(row, stored_shapes(len(state.approach))), state.e, state.v
+        moving = 0.5 * v @ at["a"] @ v + speed * v @ (at["b"] + at["b_e"] @ e)
+        moving += 0.5 * speed**2 * (at["c"][0] + at["c_e"] @ e + 0.5 * e @ at["c_ee"] @ e)
+        resting = at["potential"][0] - at["push"] @ e - 0.5 * e @ at["push_e"] @ e
+        return float(moving + resting) + self._observe()
 
     def advance(self, t_end: float, tally: Tally) -> None:
         """Go on to the last whole interval before a time [s] and add to a tally.

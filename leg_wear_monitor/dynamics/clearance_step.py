@@ -2,47 +2,59 @@
 
 import math
 
+from leg_wear_monitor.contact.friction import friction_force
+from leg_wear_monitor.contact.normal import damped_force, elastic_force
 from leg_wear_monitor.dynamics.clearance import blend
 from leg_wear_monitor.dynamics.clearance_contact import (
     A0,
     A1,
     DRIFT,
+    DV,
     E0,
     E1,
     ELASTIC,
     EM,
     F_T,
+    FRICTION_COEFFICIENT,
+    FRICTION_LAW,
+    HYSTERESIS_FACTOR,
     K1E,
     K1V,
     K2E,
     K2V,
+    LOCAL_STIFFNESS,
+    RAMP_0,
+    RAMP_1,
     RE,
     RV,
     SLIP,
+    TA,
+    TV,
     V0,
     V1,
     VM,
     accelerate_clearances,
 )
+from leg_wear_monitor.dynamics.dormand_prince import hermite
 from leg_wear_monitor.dynamics.rosenbrock import factorise_contacts, solve_contacts
-from leg_wear_monitor.dynamics.tally import ARCHARD, CONTACT, DISSIPATION, FORCE, FORCE_SQUARED, FRICTION
-from leg_wear_monitor.dynamics.touch import DELTA_DOT, EX, EY, F_N
+from leg_wear_monitor.dynamics.tally import ARCHARD, CONTACT, DISSIPATION, FORCE, FORCE_SQUARED, FRICTION, JOINT_RATES
+from leg_wear_monitor.dynamics.touch import DELTA, DELTA_DOT, EX, EY, F_N
 from leg_wear_monitor.kernel import kernel
 from leg_wear_monitor.wear.surfaces import deposit_wear
 
 
 @kernel
-def drift(now, x, at_v):
-    """Acceleration that is not contact: gravity, the crank's motion, Coriolis, dampers; fills the row DRIFT."""
-    coriolis, viscous, speed, d = now.coriolis, now.viscous, now.speed[0], x.shape[1]
+def drift(now, x):
+    """Acceleration that is not contact, at rows E0 and V0: gravity, crank, Coriolis, dampers; row DRIFT."""
+    coriolis, bare_e, viscous, speed, d = now.coriolis, now.bare_e, now.viscous, now.speed[0], x.shape[1]
     for i in range(d):
-        total = 0.0
-        for j in range(d):
-            total += coriolis[i, j] * x[at_v, j]
-        x[DRIFT, i] = now.bare[i] + speed * total
+        x[DRIFT, i] = now.bare[i]
+    for j in range(d):
+        for i in range(d):
+            x[DRIFT, i] += coriolis[j, i] * (speed * x[V0, j]) + bare_e[j, i] * x[E0, j]
     for i in range(viscous.shape[0]):
         for j in range(d):
-            x[DRIFT, i] += viscous[i, j] * x[at_v, j]
+            x[DRIFT, i] += viscous[i, j] * x[V0, j]
 
 
 @kernel
@@ -82,26 +94,52 @@ def try_step(law, tolerance, local, approach, h, now, system, x, start, end):
 
 @kernel
 def shift_start(now, x):
-    """Make the end of the step the start of the next one; its acceleration gets the drift of its own rates."""
+    """Make the end of the step the start of the next one, with the drift of its own rates; row DV."""
     for i in range(x.shape[1]):
+        x[DV, i] = x[V1, i] - x[V0, i]
         x[E0, i], x[V0, i] = x[E1, i], x[V1, i]
         x[A0, i] = x[A1, i] - x[DRIFT, i]
-    drift(now, x, V0)
+    drift(now, x)
     for i in range(x.shape[1]):
         x[A0, i] += x[DRIFT, i]
 
 
 @kernel
 def drive_torque(now, x, sample):
-    """Torque of the drive [N m] at rows A0 and V0, and its value in the ideal linkage."""
-    row, speed, d = now.torque, now.speed[0], x.shape[1]
-    ideal = row[0] + now.speed[1] * row[1] + speed * speed * row[2] + speed * row[3]
-    torque = ideal
+    """Torque of the drive [N m] at rows E0, V0 and A0; the part by e'' alone; its value in the ideal linkage.
+
+    Leaves the torque by each of e'' in row TA.
+    """
+    speed, acceleration, d = now.speed[0], now.speed[1], x.shape[1]
+    by, by_e, ae, vv, ve = now.torque, now.torque_e, now.torque_ae, now.torque_vv, now.torque_ve
+    ideal = by[0] + acceleration * by[1] + speed * (speed * by[2] + by[3])
     for i in range(d):
-        torque += row[4 + i] * x[A0, i] + (speed * row[4 + d + i] + row[4 + 2 * d + i]) * x[V0, i]
+        x[TA, i] = now.torque_a[i]
+        x[TV, i] = speed * now.torque_v[0, i] + now.torque_v[1, i]
+    for j in range(d):
+        for i in range(d):
+            x[TA, i] += ae[j, i] * x[E0, j]
+            x[TV, i] += vv[j, i] * x[V0, j] + ve[j, i] * (speed * x[E0, j])
+    sudden, torque = 0.0, ideal
+    for i in range(d):
+        sudden += x[TA, i] * x[A0, i]
+        torque += x[TV, i] * x[V0, i]
+        torque += (by_e[0, i] + acceleration * by_e[1, i] + speed * speed * by_e[2, i]) * x[E0, i]
     for k in range(sample.shape[0]):
-        torque += row[4 + 3 * d + k] * sample[k, F_T]
-    return torque, ideal
+        torque += now.torque_t[k] * sample[k, F_T]
+    return torque + sudden, sudden, ideal
+
+
+@kernel
+def half_impulse(x):
+    """Half the integral over a step [N m s] of the drive torque's part by e'', with row TA of one of its ends.
+
+    By the change of the rates, row DV: exact where impacts make the torque spiky.
+    """
+    total = 0.0
+    for i in range(x.shape[1]):
+        total += 0.5 * x[TA, i] * x[DV, i]
+    return total
 
 
 @kernel
@@ -137,35 +175,45 @@ def outside_power(now, x):
 
 
 @kernel
-def stored_energy_now(tables, angle, speed, x):
-    """Kinetic energy, and that of gravity and springs [J], at rows E0 and V0."""
-    d, energy = x.shape[1], 0.0
-    i, w = blend(tables.energy.shape[0] - 1, angle)
-    for side in range(2):
-        j, share = i + side, w if side else 1.0 - w
-        form = tables.energy[j]
-        energy += share * (form[d, d] * speed * speed + form[d + 1, d + 1])
-        for a in range(d):
-            energy += share * (2.0 * form[a, d] * speed * x[V0, a] - tables.push[j, a] * x[E0, a])
-            for b in range(d):
-                energy += share * form[a, b] * x[V0, a] * x[V0, b]
-    return energy
+def integrate_joints(law, local, approach, h, start, end, out_added):
+    """Integrals of the loose joints over a step of length h [s]; (k, JOINT_RATES).
+
+    Simpson's rule where a force changes much, with the contact law at the middle of the penetration's
+    cubic: an impact takes few steps. The trapezium elsewhere.
+    """
+    for k in range(start.shape[0]):
+        for r in range(JOINT_RATES):
+            out_added[k, r] = 0.0
+        before, after, weight = start[k, F_N], end[k, F_N], 0.5 * h
+        if before + after > 0.0:
+            if abs(after - before) > 0.1 * (after + before):
+                weight = h / 6.0
+                delta, rate = hermite(
+                    0.5, h, start[k, DELTA], start[k, DELTA_DOT], end[k, DELTA], end[k, DELTA_DOT]
+                )
+                slip = 0.5 * (start[k, SLIP] + end[k, SLIP])
+                elastic = elastic_force(local[k, LOCAL_STIFFNESS], delta)
+                f_n = damped_force(elastic, law[k, HYSTERESIS_FACTOR] / approach[k], rate)
+                mu, code = law[k, FRICTION_COEFFICIENT], law[k, FRICTION_LAW]
+                f_t = friction_force(code, mu, law[k, RAMP_0], law[k, RAMP_1], f_n, slip)
+                _add_rates(k, 4.0 * weight, f_n, f_t, elastic, rate, slip, out_added)
+            _add_rates(
+                k, weight, before, start[k, F_T], start[k, ELASTIC], start[k, DELTA_DOT], start[k, SLIP], out_added
+            )
+            _add_rates(k, weight, after, end[k, F_T], end[k, ELASTIC], end[k, DELTA_DOT], end[k, SLIP], out_added)
 
 
 @kernel
-def add_joints(joint, sample, weight, integral):
-    """Add the rates of the loose joints' integrals at one end of a step, by half its length [s]."""
-    for k in range(sample.shape[0]):
-        f_n = sample[k, F_N]
-        if f_n > 0.0:
-            f_t, slip, j = sample[k, F_T], sample[k, SLIP], joint[k]
-            squared = f_n * f_n + f_t * f_t
-            integral[j, FORCE] += weight * math.sqrt(squared)
-            integral[j, FORCE_SQUARED] += weight * squared
-            integral[j, CONTACT] += weight
-            integral[j, FRICTION] -= weight * f_t * slip
-            integral[j, DISSIPATION] += weight * (f_n - sample[k, ELASTIC]) * sample[k, DELTA_DOT]
-            integral[j, ARCHARD] += weight * f_n * abs(slip)
+def _add_rates(k, weight, f_n, f_t, elastic, delta_dot, slip, out_added):
+    """Add the rates of joint k's integrals at one instant, by a weight [s]."""
+    if f_n > 0.0:
+        squared = f_n * f_n + f_t * f_t
+        out_added[k, FORCE] += weight * math.sqrt(squared)
+        out_added[k, FORCE_SQUARED] += weight * squared
+        out_added[k, CONTACT] += weight
+        out_added[k, FRICTION] -= weight * f_t * slip
+        out_added[k, ARCHARD] += weight * f_n * abs(slip)
+    out_added[k, DISSIPATION] += weight * (f_n - elastic) * delta_dot
 
 
 @kernel
@@ -188,14 +236,15 @@ def toe_deviation(now, x, out_response):
 
 
 @kernel
-def gather_wear(h, start, end, pending):
-    """Gather the Archard integral of a step, and where it acted; pending (k, 3) as in ClearanceState."""
+def gather_wear(added, start, end, pending):
+    """Gather what a step added to the Archard integrals, and where it acted; pending as in ClearanceState."""
     for k in range(pending.shape[0]):
-        before = 0.5 * h * start[k, F_N] * abs(start[k, SLIP])
-        after = 0.5 * h * end[k, F_N] * abs(end[k, SLIP])
-        pending[k, 0] += before + after
-        pending[k, 1] += before * start[k, EX] + after * end[k, EX]
-        pending[k, 2] += before * start[k, EY] + after * end[k, EY]
+        integral = added[k, ARCHARD]
+        if integral > 0.0:
+            share = end[k, F_N] / (start[k, F_N] + end[k, F_N])
+            pending[k, 0] += integral
+            pending[k, 1] += integral * (start[k, EX] + share * (end[k, EX] - start[k, EX]))
+            pending[k, 2] += integral * (start[k, EY] + share * (end[k, EY] - start[k, EY]))
 
 
 @kernel

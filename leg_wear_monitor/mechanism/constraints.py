@@ -126,6 +126,14 @@ def closures_at(arrays, rows, q, v, drive, cs, out_phi, out_jac, out_gamma):
     closures(arrays, rows, q, v, cs, drive, out_phi, out_jac, out_gamma)
 
 
+@entry
+def jacobians_at(arrays, rows, q, v, drive, cs, phi, gamma, out_jac):
+    """Jacobian blocks (p, m, 2, 3) at p positions q (p, n, 3); v, drive, cs, phi and gamma are room."""
+    for p in range(q.shape[0]):
+        rotations(q[p], cs)
+        closures(arrays, rows, q[p], v, cs, drive, phi, out_jac[p], gamma)
+
+
 @kernel
 def _revolute(arrays, joint, r, q, v, cs, out_phi, out_jac, out_gamma):
     """The two points coincide: phi = P_journal - P_bushing."""

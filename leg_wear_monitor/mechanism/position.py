@@ -6,7 +6,7 @@ import numpy as np
 
 from leg_wear_monitor.errors import AssemblyError
 from leg_wear_monitor.mechanism.arrays import Floats, MechanismArrays, com_poses, compile_arrays
-from leg_wear_monitor.mechanism.constraints import DRIVE, Rows, closures_at, select_rows
+from leg_wear_monitor.mechanism.constraints import DRIVE, Rows, closures_at, jacobians_at, select_rows
 from leg_wear_monitor.mechanism.spec import Mechanism
 
 _TOLERANCE = 1.0e-12  # residual of a closed joint [m, rad], near rounding for links of a metre
@@ -66,12 +66,22 @@ def evaluate(linkage: Linkage, q: Floats, v: Floats, drive: tuple[float, float, 
     return Closures(phi, dense_jacobian(linkage.rows, blocks, len(q)), gamma)
 
 
+def jacobians(linkage: Linkage, q: Floats) -> Floats:
+    """Jacobians (p, m, 3 (n - 1)) of all closures and the drive at p positions q (p, n, 3)."""
+    m, n = len(linkage.rows.body), q.shape[1]
+    blocks = np.zeros((len(q), m, 2, 3))
+    room = np.zeros((n, 3)), np.zeros(3), np.zeros((n, 2)), np.zeros(m), np.zeros(m)
+    jacobians_at(linkage.arrays, linkage.rows, np.ascontiguousarray(q), *room, blocks)
+    return dense_jacobian(linkage.rows, blocks, n)
+
+
 def dense_jacobian(rows: Rows, blocks: Floats, bodies: int) -> Floats:
-    """Jacobian (m, 3 (n - 1)) of the moving bodies from its blocks (m, 2, 3)."""
-    full = np.zeros((len(blocks), bodies, 3))
+    """Jacobian (..., m, 3 (n - 1)) of the moving bodies from its blocks (..., m, 2, 3)."""
+    m = len(rows.body)
+    full = np.zeros((*blocks.shape[:-3], m, bodies, 3))
     for slot in range(2):
-        full[np.arange(len(blocks)), rows.body[:, slot]] += blocks[:, slot]
-    return full[:, 1:].reshape(len(blocks), -1)
+        full[..., np.arange(m), rows.body[:, slot], :] += blocks[..., slot, :]
+    return full[..., 1:, :].reshape(*blocks.shape[:-3], m, -1)
 
 
 def assemble(linkage: Linkage) -> Floats:

@@ -1,0 +1,148 @@
+"""The linkage around its ideal motion: how its bodies follow the eccentricities, and the forces on them."""
+
+import numpy as np
+
+from leg_wear_monitor.contact.arrays import ContactArrays
+from leg_wear_monitor.mechanism.arrays import Floats, Ints, MechanismArrays
+from leg_wear_monitor.mechanism.forces import applied_forces_at, stored_energy_at
+from leg_wear_monitor.mechanism.ideal import IdealMotion
+from leg_wear_monitor.mechanism.position import Linkage, jacobians
+
+_NUDGE = 1.0e-5  # m or rad, of central differences of smooth functions of the coordinates
+
+
+class Basis:
+    """Quantities at N crank angles of the ideal motion; b moving bodies, d = 2 k eccentricities.
+
+    Attributes
+    ----------
+    x : (N, 3 b, 3 b) array
+        Inverse Jacobian of all closures and the drive.
+    rows : list of int
+        Rows of the loose joints.
+    mass : (3 b,) array
+    s, s_t : (N, 3 b, d) arrays
+        S and its derivative by the crank angle.
+    drive, drive_t : (N, 3 b) arrays
+        s and its derivative.
+    all : (N, 3 b, d + 1) array
+        S and s side by side.
+    b_e, c_ee : (N, d, d) arrays
+        B_e and c_ee of the Lagrangian.
+    c_e : (N, d) array
+    force, load : (N, 3 b) arrays
+        Applied forces at rest, and the loads among them.
+    force_e, load_e : (N, d, d) arrays
+        Derivatives by e of their generalised forces on e.
+    drive_force_e : (N, d) array
+        Derivative by e of the applied forces' generalised force on the crank.
+    potential : (N,) array
+    friction : (N, 3 b, k) array
+        Generalised force of a unit friction force in each joint, beyond its force on e.
+    drag : (N, 3 b, d + 1) array
+        Force of dampers against each column of ``all``.
+    """
+
+    def __init__(self, linkage: Linkage, contacts: ContactArrays, motion: IdealMotion) -> None:
+        n = len(motion.q)
+        self.x = np.linalg.inv(jacobians(linkage, motion.q))
+        self.mass = linkage.arrays.mass[1:].ravel()
+        self.rows = _rows(linkage, contacts.joint)
+        self.s = self.x[:, :, self.rows]
+        self.s_t = derivative(self.s)
+        self.drive = self.x[:, :, linkage.rows.drive_row]
+        self.drive_t = motion.a[:, 1:].reshape(n, -1)
+        self.all = np.concatenate([self.s, self.drive[:, :, None]], axis=2)
+        self.force, self.load, self.potential = _forces(linkage, motion.q)
+        levers = _friction_levers(linkage.arrays, contacts)
+        self.friction = np.broadcast_to(levers, (n, *levers.shape))
+        self.drag = _drag(linkage.arrays, motion.q, self.all)
+        self._curve(linkage, motion.q)
+
+    def _curve(self, linkage: Linkage, q: Floats) -> None:
+        """Quantities of the first order in e."""
+        d = len(self.rows)
+        mass = self.mass[:, None]
+        curvature = np.empty((*self.s.shape, d))
+        force_s, load_s = np.zeros((2, *self.s.shape))
+        for j in range(d):
+            step = _NUDGE * self.s[:, :, j].reshape(len(q), -1, 3)
+            ahead, behind = q.copy(), q.copy()
+            ahead[:, 1:] += step
+            behind[:, 1:] -= step
+            slope = (jacobians(linkage, ahead) - jacobians(linkage, behind)) / (2.0 * _NUDGE)
+            curvature[..., j] = -self.x @ (slope @ self.s)
+            if len(linkage.arrays.load_body) or len(linkage.arrays.spring_body):
+                after, before = _forces(linkage, ahead), _forces(linkage, behind)
+                force_s[:, :, j] = (after[0] - before[0]) / (2.0 * _NUDGE)
+                load_s[:, :, j] = (after[1] - before[1]) / (2.0 * _NUDGE)
+        momentum = self.mass * self.drive
+        self.b_e = np.einsum("nr,nrij->nij", momentum, curvature) + project(self.s, mass * self.s_t)
+        self.c_e = 2.0 * np.einsum("nr,nri->ni", momentum, self.s_t)
+        swing = np.einsum("nr,nrij->nij", momentum, derivative(curvature))
+        self.c_ee = 2.0 * (project(self.s_t, mass * self.s_t) + swing)
+        self.force_e = np.einsum("nr,nrij->nij", self.force, curvature) + project(self.s, force_s)
+        self.load_e = np.einsum("nr,nrij->nij", self.load, curvature) + project(self.s, load_s)
+        along = np.einsum("nr,nri->ni", self.force, self.s_t)
+        self.drive_force_e = along + np.einsum("nr,nri->ni", self.drive, force_s)
+
+
+def project(basis: Floats, forces: Floats) -> Floats:
+    """Transpose of a basis (N, 3 b, m) times forces (N, 3 b, p)."""
+    return np.ascontiguousarray(basis.transpose(0, 2, 1) @ forces)
+
+
+def derivative(table: Floats) -> Floats:
+    """Derivative by the crank angle of a smooth periodic table (N, ...), by its Fourier series."""
+    order = np.fft.rfftfreq(len(table), 1.0 / len(table)).reshape(-1, *([1] * (table.ndim - 1)))
+    return np.asarray(np.fft.irfft(1j * order * np.fft.rfft(table, axis=0), len(table), axis=0))
+
+
+def is_damped(arrays: MechanismArrays) -> bool:
+    """Whether a spring has a damper."""
+    return bool((arrays.spring_law[:, 2] > 0.0).any())
+
+
+def _rows(linkage: Linkage, joints: Ints) -> list[int]:
+    """Rows of the given joints in the Jacobian, x before y, in the given order."""
+    start = dict(zip(linkage.rows.closure.tolist(), linkage.rows.row.tolist(), strict=True))
+    return [start[int(joint)] + i for joint in joints for i in range(2)]
+
+
+def _forces(linkage: Linkage, q: Floats) -> tuple[Floats, Floats, Floats]:
+    """Applied forces at rest (N, 3 b), the loads among them, and the potential energy (N,)."""
+    arrays = linkage.arrays
+    unloaded = arrays._replace(load_body=arrays.load_body[:0])
+    rest, cs = np.zeros_like(q[0]), np.empty((q.shape[1], 2))
+    force = np.array([_force_at(arrays, one, rest) for one in q])
+    bare = np.array([_force_at(unloaded, one, rest) for one in q]) if len(arrays.load_body) else force
+    return force, force - bare, np.array([stored_energy_at(arrays, one, rest, cs) for one in q])
+
+
+def _drag(arrays: MechanismArrays, q: Floats, columns: Floats) -> Floats:
+    """Force (N, 3 b, m) of the springs' dampers against velocities (N, 3 b, m)."""
+    drag = np.zeros_like(columns)
+    if is_damped(arrays):
+        for i, one in enumerate(q):
+            at_rest = _force_at(arrays, one, np.zeros_like(one))
+            for j in range(columns.shape[2]):
+                v = np.concatenate([np.zeros(3), columns[i, :, j]]).reshape(one.shape)
+                drag[i, :, j] = at_rest - _force_at(arrays, one, v)
+    return drag
+
+
+def _force_at(arrays: MechanismArrays, q: Floats, v: Floats) -> Floats:
+    """Applied forces (3 b,) on the moving bodies."""
+    cs, force = np.empty((len(q), 2)), np.empty_like(q)
+    applied_forces_at(arrays, q, v, cs, force)
+    return force[1:].ravel()
+
+
+def _friction_levers(arrays: MechanismArrays, contacts: ContactArrays) -> Floats:
+    """Generalised forces (3 b, k) of a unit friction force in each joint, beyond its force on e."""
+    levers = np.zeros((arrays.mass.size, len(contacts.joint)))
+    for k, joint in enumerate(contacts.joint):
+        b, j = arrays.joint_body[joint]
+        levers[3 * b + 2, k] -= contacts.bushing_radius[k]
+        levers[3 * j + 2, k] += contacts.bushing_radius[k] - contacts.clearance[k]
+    return levers[3:]

@@ -68,11 +68,11 @@ def kernel(function: _Function) -> _Function:
 
 
 def entry(function: _Function) -> _Function:
-    """Compile what Python calls: a kernel with a cache of its own."""
+    """Compile what Python calls: a kernel with a cache of its own, that lets other threads run meanwhile."""
     previous = numba.config.CACHE_DIR
     numba.config.CACHE_DIR = str(cache_directory())
     try:
-        return numba.njit(cache=True, error_model="numpy", _nrt=False)(function)  # type: ignore[no-any-return]
+        return numba.njit(cache=True, error_model="numpy", _nrt=False, nogil=True)(function)  # type: ignore[no-any-return]
     finally:
         numba.config.CACHE_DIR = previous
 

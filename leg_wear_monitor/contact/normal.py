@@ -57,7 +57,7 @@ def elastic_force(stiffness, delta):
 
 @kernel
 def damped_force(elastic, loss, delta_dot):
-    """Force [N] that pushes the surfaces apart, never negative: elastic part [N], loss chi / approach speed [s/m]."""
+    """Force [N] that pushes apart, never negative: elastic part [N], loss chi / approach speed [s/m]."""
     return max(0.0, elastic * (1.0 + loss * delta_dot))
 
 

@@ -36,8 +36,8 @@ class ClearanceModel(NamedTuple):
 class ClearanceState(NamedTuple):
     """All that a continuation needs; snapshot and restore are copies of ``motion`` and ``depth``.
 
-    ``motion`` (s,) holds all but the surfaces, the rest are named views of it: ``index`` (1,) intervals
-    done since time 0; ``e`` and ``v`` (d,) eccentricities [m] and rates; ``drive`` (3,) angle, speed and
+    ``motion`` (s,) holds all but the surfaces, the rest are named views of it: ``intervals`` (1,) done
+    since time 0; ``e`` and ``v`` (d,) eccentricities [m] and rates; ``drive`` (3,) angle, speed and
     acceleration of the crank; ``step`` (1,) next step to try [s]; ``approach`` (k,) approach speed of each
     joint in contact, 0 for the others; ``recent`` (k, 4) its last two samples of time and normal force;
     ``local`` (k, LOCAL) the clearance around a direction; ``pending`` (k, 3) the Archard integral not yet
@@ -47,7 +47,7 @@ class ClearanceState(NamedTuple):
 
     depth: Floats
     motion: Floats
-    index: Floats
+    intervals: Floats
     e: Floats
     v: Floats
     drive: Floats
@@ -95,9 +95,10 @@ class ClearanceWork(NamedTuple):
     """Room for an interval.
 
     The tables ``now``; samples of the joints at a step's ``start`` and ``end`` (k, COLUMNS); ``x``
-    (VECTORS, d) the vectors of a step, ``weight`` (N,) of the wear on an arc, ``reaction`` (r,) and
-    ``toe`` (2,) as observed, ``added`` (k, JOINT_RATES) to the joints' integrals in a step, ``drive_start``
-    and ``drive_end`` (3,) the torque at its ends, ``backup`` the motion that a failed interval falls back to, ``crank`` (3,) the drive at the interval's start.
+    (VECTORS, d) the vectors of a step; ``weight`` (N,) of the wear on an arc; ``reaction`` (r,) and ``toe``
+    (2,) as observed; ``added`` (k, JOINT_RATES) to the joints' integrals in a step; ``drive_start`` and
+    ``drive_end`` (3,) the torque at its ends; ``backup`` the motion that a failed interval falls back to;
+    ``crank`` (3,) the drive at the interval's start.
     """
 
     now: Now
@@ -119,7 +120,7 @@ def clearance_state(depth: Floats, angle: float, speed: float) -> ClearanceState
     """Ideal start at time 0: journals centred and at rest in their bushings; depth (k, 2, N) of wear."""
     k = len(depth)
     shapes = {
-        "index": (1,), "e": (2 * k,), "v": (2 * k,), "drive": (3,), "step": (1,),
+        "intervals": (1,), "e": (2 * k,), "v": (2 * k,), "drive": (3,), "step": (1,),
         "approach": (k,), "recent": (k, 4), "local": (k, LOCAL), "pending": (k, 3),
     }  # fmt: skip
     motion = np.zeros(sum(math.prod(shape) for shape in shapes.values()))

@@ -20,16 +20,18 @@ from leg_wear_monitor.dynamics.clearance_contact import (
     has_turned,
     look_around,
 )
-from leg_wear_monitor.dynamics.clearance_step import (
-    drift,
+from leg_wear_monitor.dynamics.clearance_outputs import (
     drive_torque,
-    gather_wear,
     half_impulse,
-    integrate_joints,
     outside_power,
     reactions,
-    shift_start,
     toe_deviation,
+)
+from leg_wear_monitor.dynamics.clearance_step import (
+    drift,
+    gather_wear,
+    integrate_joints,
+    shift_start,
     try_step,
     wear_off,
 )
@@ -73,7 +75,7 @@ def advance_clearances(model, feeds_back, state, polynomial, t_end, tally, work)
         last whole interval, finite and good to go on from.
     """
     surfaces = Surfaces(state.depth, feeds_back)
-    while (state.index[0] + 1.0) * model.interval <= t_end * (1.0 + 1.0e-12) + 1.0e-15:
+    while (state.intervals[0] + 1.0) * model.interval <= t_end * (1.0 + 1.0e-12) + 1.0e-15:
         copy_array(state.motion, work.backup)
         status, k = _interval(model, surfaces, state, polynomial, tally, work)
         if status != DONE:
@@ -87,7 +89,7 @@ def _interval(model, surfaces, state, polynomial, tally, work):
     """One interval, from whole instant to whole instant."""
     interval = model.interval
     copy_array(state.drive, work.crank)
-    drive_at(polynomial, (state.index[0] + 1.0) * interval, state.drive)
+    drive_at(polynomial, (state.intervals[0] + 1.0) * interval, state.drive)
     angle, speed, acceleration = crank_between(work.crank, state.drive, interval)
     if not (abs(speed) < _FASTEST and abs(acceleration) * interval < _FASTEST):
         return INVALID_DRIVE, -1
@@ -96,7 +98,7 @@ def _interval(model, surfaces, state, polynomial, tally, work):
     status, k = _steps(model, surfaces, state, tally, work)
     if status != DONE:
         return status, k
-    state.index[0] += 1.0
+    state.intervals[0] += 1.0
     for i in range(state.e.shape[0]):
         state.e[i], state.v[i] = work.x[E0, i], work.x[V0, i]
     _finish(model, surfaces, state, tally, work)
@@ -108,7 +110,7 @@ def _begin(model, surfaces, state, work):
     """Sample the joints under the tables now: what the first step starts from."""
     x, now = work.x, work.now
     for k in range(state.approach.shape[0]):
-        turn = (int(state.index[0]) + k) % _RENEWAL == 0
+        turn = (int(state.intervals[0]) + k) % _RENEWAL == 0
         if math.isnan(state.local[k, TO_X]) or (surfaces.feeds_back and turn):
             ex, ey = state.e[2 * k], state.e[2 * k + 1]
             length = math.hypot(ex, ey)
@@ -155,7 +157,7 @@ def _steps(model, surfaces, state, tally, work):
         if cut == NEVER:
             state.step[0] = h * min(3.0, 0.9 * max(error, 1.0e-6) ** (-1.0 / 3.0))
         cut = NEVER
-        _take(model, surfaces, state, state.index[0] * interval + done, h, tally, work)
+        _take(model, surfaces, state, state.intervals[0] * interval + done, h, tally, work)
         done = interval if h >= left * (1.0 - 1.0e-9) else done + h
     return DONE, -1
 
@@ -221,7 +223,7 @@ def _pushed_through(bushing_radius, sample):
 def _finish(model, surfaces, state, tally, work):
     """At the end of an interval: wear, distributions, and the reactions of the ideal joints."""
     joint, now, sample, interval = model.contacts.joint, work.now, work.start, model.interval
-    renew = int(state.index[0]) % _RENEWAL == 0
+    renew = int(state.intervals[0]) % _RENEWAL == 0
     tally.time[0] += interval
     for k in range(state.approach.shape[0]):
         if renew or state.approach[k] == 0.0:

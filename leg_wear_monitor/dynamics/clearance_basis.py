@@ -45,7 +45,7 @@ class Basis:
 
     def __init__(self, linkage: Linkage, contacts: ContactArrays, motion: IdealMotion) -> None:
         n = len(motion.q)
-        self.x = np.linalg.inv(jacobians(linkage, motion.q))
+        self.x: Floats = np.asarray(np.linalg.inv(jacobians(linkage, motion.q)), dtype=np.float64)
         self.mass = linkage.arrays.mass[1:].ravel()
         self.rows = _rows(linkage, contacts.joint)
         self.s = self.x[:, :, self.rows]

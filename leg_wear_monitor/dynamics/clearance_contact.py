@@ -98,8 +98,10 @@ def accelerate_clearances(law, local, approach, now, x, at_e, at_v, out_a, out_s
                 mu, code = law[k, FRICTION_COEFFICIENT], law[k, FRICTION_LAW]
                 f_t = friction_force(code, mu, law[k, RAMP_0], law[k, RAMP_1], f_n, slip)
                 fx, fy = -f_n * nx - f_t * ny, -f_n * ny + f_t * nx
+                row = 2 * k
                 for i in range(d):
-                    x[out_a, i] += inverse_mass[2 * k, i] * fx + inverse_mass[2 * k + 1, i] * fy + response[k, i] * f_t
+                    pushed = inverse_mass[row, i] * fx + inverse_mass[row + 1, i] * fy
+                    x[out_a, i] += pushed + response[k, i] * f_t
         out_sample[k, EX], out_sample[k, EY], out_sample[k, VX], out_sample[k, VY] = ex, ey, vx, vy
         out_sample[k, F_N], out_sample[k, DELTA], out_sample[k, DELTA_DOT] = f_n, delta, delta_dot
         out_sample[k, NX], out_sample[k, NY], out_sample[k, F_T], out_sample[k, SLIP] = nx, ny, f_t, slip

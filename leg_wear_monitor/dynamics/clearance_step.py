@@ -4,7 +4,6 @@ import math
 
 from leg_wear_monitor.contact.friction import friction_force
 from leg_wear_monitor.contact.normal import damped_force, elastic_force
-from leg_wear_monitor.dynamics.clearance import blend
 from leg_wear_monitor.dynamics.clearance_contact import (
     A0,
     A1,
@@ -28,8 +27,6 @@ from leg_wear_monitor.dynamics.clearance_contact import (
     RE,
     RV,
     SLIP,
-    TA,
-    TV,
     V0,
     V1,
     VM,
@@ -37,7 +34,15 @@ from leg_wear_monitor.dynamics.clearance_contact import (
 )
 from leg_wear_monitor.dynamics.dormand_prince import hermite
 from leg_wear_monitor.dynamics.rosenbrock import factorise_contacts, solve_contacts
-from leg_wear_monitor.dynamics.tally import ARCHARD, CONTACT, DISSIPATION, FORCE, FORCE_SQUARED, FRICTION, JOINT_RATES
+from leg_wear_monitor.dynamics.tally import (
+    ARCHARD,
+    CONTACT,
+    DISSIPATION,
+    FORCE,
+    FORCE_SQUARED,
+    FRICTION,
+    JOINT_RATES,
+)
 from leg_wear_monitor.dynamics.touch import DELTA, DELTA_DOT, EX, EY, F_N
 from leg_wear_monitor.kernel import kernel
 from leg_wear_monitor.wear.surfaces import deposit_wear
@@ -105,76 +110,6 @@ def shift_start(now, x):
 
 
 @kernel
-def drive_torque(now, x, sample):
-    """Torque of the drive [N m] at rows E0, V0 and A0; the part by e'' alone; its value in the ideal linkage.
-
-    Leaves the torque by each of e'' in row TA.
-    """
-    speed, acceleration, d = now.speed[0], now.speed[1], x.shape[1]
-    by, by_e, ae, vv, ve = now.torque, now.torque_e, now.torque_ae, now.torque_vv, now.torque_ve
-    ideal = by[0] + acceleration * by[1] + speed * (speed * by[2] + by[3])
-    for i in range(d):
-        x[TA, i] = now.torque_a[i]
-        x[TV, i] = speed * now.torque_v[0, i] + now.torque_v[1, i]
-    for j in range(d):
-        for i in range(d):
-            x[TA, i] += ae[j, i] * x[E0, j]
-            x[TV, i] += vv[j, i] * x[V0, j] + ve[j, i] * (speed * x[E0, j])
-    sudden, torque = 0.0, ideal
-    for i in range(d):
-        sudden += x[TA, i] * x[A0, i]
-        torque += x[TV, i] * x[V0, i]
-        torque += (by_e[0, i] + acceleration * by_e[1, i] + speed * speed * by_e[2, i]) * x[E0, i]
-    for k in range(sample.shape[0]):
-        torque += now.torque_t[k] * sample[k, F_T]
-    return torque + sudden, sudden, ideal
-
-
-@kernel
-def half_impulse(x):
-    """Half the integral over a step [N m s] of the drive torque's part by e'', with row TA of one of its ends.
-
-    By the change of the rates, row DV: exact where impacts make the torque spiky.
-    """
-    total = 0.0
-    for i in range(x.shape[1]):
-        total += 0.5 * x[TA, i] * x[DV, i]
-    return total
-
-
-@kernel
-def reactions(tables, angle, now, x, sample, out_reaction):
-    """Drive torque and reactions (r,) of the ideal joints at a crank angle; rows as in the tables."""
-    table, speed, d = tables.reaction, now.speed[0], x.shape[1]
-    i, w = blend(table.shape[0] - 1, angle)
-    for r in range(out_reaction.shape[0]):
-        out_reaction[r] = 0.0
-        for side in range(2):
-            j, share = i + side, w if side else 1.0 - w
-            total = table[j, r, 0] + now.speed[1] * table[j, r, 1] + speed * (speed * table[j, r, 2] + table[j, r, 3])
-            for c in range(d):
-                total += table[j, r, 4 + c] * x[A0, c]
-                total += (speed * table[j, r, 4 + d + c] + table[j, r, 4 + 2 * d + c]) * x[V0, c]
-            for k in range(sample.shape[0]):
-                total += table[j, r, 4 + 3 * d + k] * sample[k, F_T]
-            out_reaction[r] += share * total
-
-
-@kernel
-def outside_power(now, x):
-    """Power of loads and of the springs' dampers [W] at row V0."""
-    d, speed, damper = x.shape[1], now.speed[0], now.damper
-    power = now.load_power[d] * speed
-    for i in range(d):
-        power += now.load_power[i] * x[V0, i]
-    for i in range(damper.shape[0]):
-        rate = x[V0, i] if i < d else speed
-        for j in range(d + 1):
-            power -= rate * damper[i, j] * (x[V0, j] if j < d else speed)
-    return power
-
-
-@kernel
 def integrate_joints(law, local, approach, h, start, end, out_added):
     """Integrals of the loose joints over a step of length h [s]; (k, JOINT_RATES).
 
@@ -198,9 +133,18 @@ def integrate_joints(law, local, approach, h, start, end, out_added):
                 f_t = friction_force(code, mu, law[k, RAMP_0], law[k, RAMP_1], f_n, slip)
                 _add_rates(k, 4.0 * weight, f_n, f_t, elastic, rate, slip, out_added)
             _add_rates(
-                k, weight, before, start[k, F_T], start[k, ELASTIC], start[k, DELTA_DOT], start[k, SLIP], out_added
+                k,
+                weight,
+                before,
+                start[k, F_T],
+                start[k, ELASTIC],
+                start[k, DELTA_DOT],
+                start[k, SLIP],
+                out_added,
             )
-            _add_rates(k, weight, after, end[k, F_T], end[k, ELASTIC], end[k, DELTA_DOT], end[k, SLIP], out_added)
+            _add_rates(
+                k, weight, after, end[k, F_T], end[k, ELASTIC], end[k, DELTA_DOT], end[k, SLIP], out_added
+            )
 
 
 @kernel
@@ -214,25 +158,6 @@ def _add_rates(k, weight, f_n, f_t, elastic, delta_dot, slip, out_added):
         out_added[k, FRICTION] -= weight * f_t * slip
         out_added[k, ARCHARD] += weight * f_n * abs(slip)
     out_added[k, DISSIPATION] += weight * (f_n - elastic) * delta_dot
-
-
-@kernel
-def toe_deviation(now, x, out_response):
-    """Raise the largest deviations (position, velocity, acceleration) of the toe from the ideal linkage."""
-    d, speed, toe = x.shape[1], now.speed[0], now.toe
-    px, py, vx, vy, ax, ay = 0.0, 0.0, 0.0, 0.0, 0.0, 0.0
-    for i in range(d):
-        sx, sy = toe[0, 1 + i], toe[1, 1 + i]
-        tx, ty = speed * toe[0, 1 + d + i], speed * toe[1, 1 + d + i]
-        px += sx * x[E0, i]
-        py += sy * x[E0, i]
-        vx += sx * x[V0, i] + tx * x[E0, i]
-        vy += sy * x[V0, i] + ty * x[E0, i]
-        ax += sx * x[A0, i] + 2.0 * tx * x[V0, i]
-        ay += sy * x[A0, i] + 2.0 * ty * x[V0, i]
-    out_response[0] = max(out_response[0], math.hypot(px, py))
-    out_response[1] = max(out_response[1], math.hypot(vx, vy))
-    out_response[2] = max(out_response[2], math.hypot(ax, ay))
 
 
 @kernel

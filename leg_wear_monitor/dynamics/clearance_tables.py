@@ -90,7 +90,7 @@ def build_tables(linkage: Linkage, contacts: ContactArrays, points: int = POINTS
 def _accelerations(basis: Basis) -> dict[str, Floats]:
     """Parts that give the accelerations of the eccentricities."""
     mass = basis.mass[:, None]
-    inverse_mass = np.linalg.inv(project(basis.s, mass * basis.s))
+    inverse_mass: Floats = np.asarray(np.linalg.inv(project(basis.s, mass * basis.s)), dtype=np.float64)
 
     def respond(generalised: Floats) -> Floats:
         """Accelerations (N, d, m) by forces (N, 3 b, m)."""

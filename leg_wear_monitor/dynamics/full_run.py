@@ -94,7 +94,7 @@ class FullRun:
         toe = None
         if self.toe.body >= 0:
             x, y, angle = self.q[self.toe.body]
-            toe = turned(self.toe.point, angle) + [x, y]
+            toe = turned(self.toe.point, angle) + np.array([x, y])
         force = self._work.rates[0, :, FORCE].copy()
         return Sample(crank_angle, toe, float(self._work.drive_rates[0, TORQUE]), force)
 

@@ -82,7 +82,7 @@ def factorise_contacts(h, inverse_mass, sample, out_system):
 
 @kernel
 def solve_contacts(h, system, m, x, r_e, r_v, out_e, out_v):
-    """Solve (I - gamma h A) y = r, all rows of x (rows, d): right-hand side r_e, r_v, solution out_e, out_v."""
+    """Solve (I - gamma h A) y = r: rows r_e, r_v of x (rows, d) are r, rows out_e, out_v become y."""
     g, p, factor, response = GAMMA * h, system.p, system.factor, system.response
     for a in range(m):
         k, nx, ny = system.active[a], system.normal[a, 0], system.normal[a, 1]

@@ -15,7 +15,7 @@ _REQUIRED = {field.name for field in attrs.fields(Clearance) if field.default is
 
 
 def loose_joints(
-    section: Any, joints: Mapping[str, RevoluteJoint | PrismaticJoint], source: str
+    section: ClearanceSection, joints: Mapping[str, RevoluteJoint | PrismaticJoint], source: str
 ) -> tuple[dict[str, Clearance], tuple[str, ...]]:
     """Settings of every revolute joint that has a full set, and the names of those that are loose.
 
@@ -24,8 +24,7 @@ def loose_joints(
     ConfigError
         Naming the key, among the joint's own settings or the defaults, whichever holds the fault.
     """
-    parts: ClearanceSection = structure(section, ClearanceSection, source, "clearances")
-    own = parts.joints if isinstance(parts.joints, dict) else {name: {} for name in parts.joints}
+    own = section.joints if isinstance(section.joints, dict) else {name: {} for name in section.joints}
     revolute = [name for name, joint in joints.items() if isinstance(joint, RevoluteJoint)]
     for name in own:
         if name not in revolute:
@@ -36,9 +35,11 @@ def loose_joints(
                 f"{what}, only a revolute one can be loose: {', '.join(revolute)}",
             )
     # Defaults that are complete serve a joint that is named only on the command line.
-    named = revolute if set(parts.defaults) >= _REQUIRED or (parts.defaults and not own) else own
+    named = revolute if set(section.defaults) >= _REQUIRED or (section.defaults and not own) else own
     settings = {
-        name: _settings(parts.defaults, own.get(name, {}), source, name) for name in revolute if name in named
+        name: _settings(section.defaults, own.get(name, {}), source, name)
+        for name in revolute
+        if name in named
     }
     return settings, tuple(own)
 

@@ -1,8 +1,67 @@
-"""A number with its unit, bounds and meaning, declared once."""
+"""A key of a file with its unit, bounds and meaning, declared once: for checks and documentation alike."""
 
+from collections.abc import Callable, Mapping
 from typing import Any
 
 import attrs
+
+
+class FieldError(ValueError):
+    """A value that its key cannot take.
+
+    Parameters
+    ----------
+    key : str
+        Dotted path of the key.
+    fault : str
+        What was found and what was expected.
+    """
+
+    def __init__(self, key: str, fault: str) -> None:
+        self.key, self.fault = key, fault
+        super().__init__(f"{key}: {fault}" if key else fault)
+
+
+def described(
+    doc: str,
+    *,
+    unit: str = "",
+    default: Any = attrs.NOTHING,
+    factory: Callable[[], Any] | None = None,
+    check: Callable[[Any], str | None] | None = None,
+    metadata: Mapping[str, Any] | None = None,
+) -> Any:
+    """Attrs field that says what it is.
+
+    Parameters
+    ----------
+    doc : str
+        What it is, in one line.
+    unit : str
+        SI unit, ``""`` where there is none.
+    default, factory : optional
+        Value when the key is absent; without either the key is required.
+    check : callable, optional
+        Gives what is wrong with a value, None if nothing.
+    metadata : mapping, optional
+        Kept beside unit and doc.
+
+    Raises
+    ------
+    FieldError
+        When an instance is made, naming the key.
+    """
+
+    def validate(_instance: object, attribute: "attrs.Attribute[Any]", value: Any) -> None:
+        fault = check(value) if check and value is not None else None
+        if fault:
+            raise FieldError(attribute.name, fault)
+
+    return attrs.field(
+        default=default if factory is None else attrs.Factory(factory),
+        validator=validate,
+        metadata={"doc": doc, "unit": unit, **(metadata or {})},
+    )
 
 
 def quantity(
@@ -13,6 +72,7 @@ def quantity(
     at_least: float | None = None,
     at_most: float | None = None,
     default: Any = attrs.NOTHING,
+    check: Callable[[Any], str | None] | None = None,
 ) -> Any:
     """Attrs field for a number, or a tuple of numbers, that checks its bounds.
 
@@ -26,23 +86,33 @@ def quantity(
         Bounds, the first exclusive.
     default : optional
         Value when the key is absent; without it the key is required.
+    check : callable, optional
+        Gives what else is wrong with a value that is within its bounds, None if nothing.
 
     Raises
     ------
-    ValueError
-        On structuring, with a text such as ``-4.0 is not above 0 kg``.
+    FieldError
+        When an instance is made, with a text such as ``mass: -4.0 is not above 0 kg``.
     """
 
-    def check(_instance: object, _attribute: "attrs.Attribute[Any]", value: Any) -> None:
-        if value is None:
-            return
+    def fault(value: Any) -> str | None:
         for number in value if isinstance(value, tuple) else (value,):
             if above is not None and not number > above:
-                raise ValueError(f"{number!r} is not above {above:g} {unit}".rstrip())
+                return f"{number!r} is not above {above:g} {unit}".rstrip()
             if at_least is not None and not number >= at_least:
-                raise ValueError(f"{number!r} is below {at_least:g} {unit}".rstrip())
+                return f"{number!r} is not at least {at_least:g} {unit}".rstrip()
             if at_most is not None and not number <= at_most:
-                raise ValueError(f"{number!r} is above {at_most:g} {unit}".rstrip())
+                return f"{number!r} is not at most {at_most:g} {unit}".rstrip()
+        return check(value) if check else None
 
-    metadata = {"unit": unit, "doc": doc, "above": above, "at_least": at_least, "at_most": at_most}
-    return attrs.field(default=default, validator=check, metadata=metadata)
+    bounds = {"above": above, "at_least": at_least, "at_most": at_most}
+    return described(doc, unit=unit, default=default, check=fault, metadata=bounds)
+
+
+def choice(names: tuple[str, ...], doc: str, *, default: str) -> Any:
+    """Attrs field for one of several names."""
+
+    def fault(value: str) -> str | None:
+        return None if value in names else f"{value!r} is not one of {', '.join(names)}"
+
+    return described(doc, default=default, check=fault, metadata={"names": names})

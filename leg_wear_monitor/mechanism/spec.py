@@ -1,194 +1,137 @@
 """A mechanism file as types: every key, its unit, its bounds and its meaning."""
 
+from itertools import pairwise
 from typing import Literal
 
 import attrs
 
-from leg_wear_monitor.mechanism.quantity import quantity
+from leg_wear_monitor.mechanism.clearance import Clearance
+from leg_wear_monitor.mechanism.quantity import FieldError, described, quantity
 
 Vector = tuple[float, float]
 Pose = tuple[float, float, float]
-Pair = tuple[float, float]
-
-NORMAL_LAWS = ("hertz", "hunt-crossley", "lankarani-nikravesh", "gonthier", "flores", "hu-guo")
-FRICTION_LAWS = ("ambrosio", "threlfall", "none")
 
 GROUND = "ground"
 
 
-def _ordered(instance: object, attribute: "attrs.Attribute[Vector]", value: Vector) -> None:
-    if not value[0] <= value[1]:
-        raise ValueError(f"{list(value)} is not an increasing pair {attribute.metadata['unit']}".rstrip())
-
-
-def _one_of(names: tuple[str, ...]) -> "attrs._ValidatorType[str]":
-    def check(_instance: object, _attribute: "attrs.Attribute[str]", value: str) -> None:
-        if value not in names:
-            raise ValueError(f"{value!r} is not one of {', '.join(names)}")
-
-    return check
-
-
-@attrs.frozen
+@attrs.frozen(kw_only=True)
 class Ground:
     """The fixed frame and the points it carries."""
 
-    points: dict[str, Vector] = attrs.field(factory=dict)
+    points: dict[str, Vector] = described("points by name, [x, y]", unit="m", factory=dict)
 
 
-@attrs.frozen
+@attrs.frozen(kw_only=True)
 class Body:
     """A rigid body; its points and centre of mass are written in its own frame."""
 
     mass: float = quantity("kg", "mass", above=0.0)
     inertia: float = quantity("kg m^2", "moment of inertia about the centre of mass", above=0.0)
-    com: Vector = quantity("m", "centre of mass")
-    points: dict[str, Vector] = attrs.field()
+    com: Vector = quantity("m", "centre of mass, [x, y]")
+    points: dict[str, Vector] = described("points by name, [x, y]", unit="m")
 
 
-@attrs.frozen
+@attrs.frozen(kw_only=True)
 class RevoluteJoint:
-    """A pin in a hole: the bushing's body and the journal's body."""
+    """A pin in a hole, at the point of its own name on both bodies."""
 
-    bushing: str
-    journal: str
-    kind: Literal["revolute"] = "revolute"
+    bushing: str = described("body that carries the bushing")
+    journal: str = described("body that carries the pin")
+    kind: Literal["revolute"] = described("revolute, or prismatic", default="revolute")
 
 
-@attrs.frozen
+@attrs.frozen(kw_only=True)
 class PrismaticJoint:
-    """A slider on a straight guide; ``axis`` is written in the guide's frame."""
+    """A slider on a straight guide, through the point of its own name on both bodies."""
 
-    guide: str
-    slider: str
-    axis: Vector = quantity("", "direction of sliding in the guide's frame")
-    kind: Literal["prismatic"] = "prismatic"
+    guide: str = described("body that carries the guide")
+    slider: str = described("body that slides")
+    axis: Vector = quantity(
+        "",
+        "direction of sliding in the guide's frame, [x, y]",
+        check=lambda axis: None if any(axis) else f"{list(axis)} has no direction",
+    )
+    kind: Literal["prismatic"] = described("prismatic")
 
-    @axis.validator  # type: ignore[attr-defined, untyped-decorator, unused-ignore]
-    def _axis_has_length(self, _attribute: "attrs.Attribute[Vector]", value: Vector) -> None:
-        if value == (0.0, 0.0):
-            raise ValueError("[0.0, 0.0] has no direction")
 
-
-@attrs.frozen
+@attrs.frozen(kw_only=True)
 class SpeedDrive:
     """The crank turns at a constant speed."""
 
-    body: str
-    speed: float = quantity("rad/s", "crank speed, counter-clockwise positive")
+    body: str = described("the crank")
+    speed: float = quantity(
+        "rad/s",
+        "crank speed, counter-clockwise positive, not 0",
+        check=lambda speed: None if speed else "0.0 rad/s does not turn the crank, expected another speed",
+    )
 
-    @speed.validator  # type: ignore[attr-defined, untyped-decorator, unused-ignore]
-    def _speed_turns(self, _attribute: "attrs.Attribute[float]", value: float) -> None:
-        if value == 0.0:
-            raise ValueError("0.0 rad/s does not turn the crank; expected a speed other than 0 rad/s")
 
-
-@attrs.frozen
+@attrs.frozen(kw_only=True)
 class TorqueDrive:
     """A constant torque acts on the crank, which starts at ``initial_speed``."""
 
-    body: str
+    body: str = described("the crank")
     torque: float = quantity("N m", "torque on the crank, counter-clockwise positive")
     initial_speed: float = quantity("rad/s", "crank speed at the start", default=0.0)
 
 
-@attrs.frozen
+@attrs.frozen(kw_only=True)
 class Spring:
     """A linear spring and damper between a point on each of two bodies."""
 
-    bodies: tuple[str, str]
-    points: tuple[str, str]
+    bodies: tuple[str, str] = described("the two bodies, one may be the ground")
+    points: tuple[str, str] = described("its point on each of them")
     stiffness: float = quantity("N/m", "stiffness", at_least=0.0)
     free_length: float = quantity("m", "length without force", at_least=0.0)
     damping: float = quantity("N s/m", "viscous damping", at_least=0.0, default=0.0)
 
 
-@attrs.frozen
+@attrs.frozen(kw_only=True)
 class ConstantLoad:
-    """A force on a point of a body, fixed in the ground's frame."""
+    """A constant force on a point of a body."""
 
-    body: str
-    point: str
-    force: Vector = quantity("N", "force in the ground's frame")
+    body: str = described("body that is pushed")
+    point: str = described("its point")
+    force: Vector = quantity("N", "force in the ground's frame, [x, y]")
 
 
-@attrs.frozen
+def _rises_below_one(phase: tuple[float, ...]) -> str | None:
+    if phase and all(a < b for a, b in pairwise(phase)) and phase[-1] < 1.0:
+        return None
+    return f"{list(phase)} does not increase from 0 to below 1"
+
+
+@attrs.frozen(kw_only=True)
 class PhaseLoad:
     """A force on a point of a body as a table over the gait phase, linear between its entries, periodic."""
 
-    body: str
-    point: str
-    phase: tuple[float, ...] = quantity("", "share of the gait cycle, 0 at crank angle 0", at_least=0.0)
-    force: tuple[Vector, ...] = attrs.field()
-
-    @phase.validator  # type: ignore[attr-defined, untyped-decorator, unused-ignore]
-    def _phase_increases(self, _attribute: "attrs.Attribute[object]", value: tuple[float, ...]) -> None:
-        rising = all(a < b for a, b in zip(value, value[1:], strict=False))
-        if not value or not rising or value[-1] >= 1.0:
-            raise ValueError(f"{list(value)} does not increase from 0 to below 1")
-
-    @force.validator  # type: ignore[attr-defined, untyped-decorator, unused-ignore]
-    def _one_force_a_phase(self, _attribute: "attrs.Attribute[object]", value: tuple[Vector, ...]) -> None:
-        if len(value) != len(self.phase):
-            raise ValueError(f"{len(value)} forces for {len(self.phase)} phases; expected one each")
-
-
-@attrs.frozen
-class Friction:
-    """Coulomb friction with a ramp around zero slip speed."""
-
-    law: str = attrs.field(default="ambrosio", validator=_one_of(FRICTION_LAWS))
-    coefficient: float = quantity("", "friction coefficient", at_least=0.0, at_most=2.0, default=0.0)
-    ramp: Pair = attrs.field(default=(0.001, 0.01), metadata={"unit": "m/s"}, validator=_ordered)
+    body: str = described("body that is pushed")
+    point: str = described("its point")
+    phase: tuple[float, ...] = quantity(
+        "", "shares of the gait cycle, 0 at crank angle 0", at_least=0.0, check=_rises_below_one
+    )
+    force: tuple[Vector, ...] = quantity("N", "a force [x, y] for each of them, in the ground's frame")
 
     def __attrs_post_init__(self) -> None:
-        if self.ramp[0] < 0.0 or self.ramp[1] <= 0.0:
-            raise ValueError(f"ramp {list(self.ramp)} is not above 0 m/s")
-
-
-@attrs.frozen
-class Clearance:
-    """Everything that makes a revolute joint loose; pairs are (bushing, journal)."""
-
-    bushing_radius: float = quantity("m", "radius of the bushing", above=0.0, at_most=1.0)
-    width: float = quantity("m", "axial contact width", above=0.0, at_most=1.0)
-    radial_clearance: float = quantity("m", "bushing radius less journal radius", above=0.0)
-    youngs_modulus: Pair = quantity("Pa", "Young's modulus", above=0.0)
-    poissons_ratio: Pair = quantity("", "Poisson's ratio", at_least=0.0, at_most=0.5)
-    normal_law: str = attrs.field(default="lankarani-nikravesh", validator=_one_of(NORMAL_LAWS))
-    restitution: float = quantity("", "coefficient of restitution", above=0.0, at_most=1.0, default=0.9)
-    friction: Friction = Friction()
-    wear_coefficient: Pair = quantity("1/Pa", "K/H of Archard's law", at_least=0.0, default=(0.0, 0.0))
-    stiffness: float | None = quantity(
-        "N/m^1.5", "contact stiffness instead of Hertz's", above=0.0, default=None
-    )
-    approach_speed_floor: float = quantity(
-        "m/s", "least approach speed in the damping of the normal law", above=0.0, default=1.0e-3
-    )
-
-    def __attrs_post_init__(self) -> None:
-        if not self.radial_clearance < self.bushing_radius:
-            raise ValueError(
-                f"radial_clearance {self.radial_clearance!r} m is not below bushing_radius {self.bushing_radius!r} m"
+        if len(self.force) != len(self.phase):
+            raise FieldError(
+                "force", f"has {len(self.force)} forces for {len(self.phase)} phases, expected one each"
             )
 
-    @property
-    def journal_radius(self) -> float:
-        """Radius of the journal [m]."""
-        return self.bushing_radius - self.radial_clearance
 
-
-@attrs.frozen
+@attrs.frozen(kw_only=True)
 class Assembly:
     """Where to start looking: the crank angle and each body's origin and angle."""
 
     crank_angle: float = quantity("rad", "crank angle of this assembly")
-    poses: dict[str, Pose] = attrs.field()
+    poses: dict[str, Pose] = described(
+        "each body's origin and angle, [x, y, angle]", unit="m, m, rad", metadata={"flat": True}
+    )
 
 
-@attrs.frozen
+@attrs.frozen(kw_only=True)
 class Mechanism:
-    """A planar linkage with one drive.
+    """A planar linkage with one drive; fields that say what they are, are keys of the file.
 
     Attributes
     ----------
@@ -200,17 +143,19 @@ class Mechanism:
         Where it was read from, for messages.
     """
 
-    name: str
-    gravity: Vector
-    ground: Ground
-    bodies: dict[str, Body]
-    joints: dict[str, RevoluteJoint | PrismaticJoint]
-    drive: SpeedDrive | TorqueDrive
-    assembly: Assembly
-    springs: dict[str, Spring]
-    loads: dict[str, ConstantLoad | PhaseLoad]
-    clearances: dict[str, Clearance]
-    loose: tuple[str, ...]
+    name: str = described("what it is called in results")
+    gravity: Vector = quantity("m/s^2", "acceleration of free fall, [x, y]")
+    ground: Ground = described("the fixed frame")
+    bodies: dict[str, Body] = described("moving bodies by name")
+    joints: dict[str, RevoluteJoint | PrismaticJoint] = described(
+        "joints by name, which is also the name of their point on both bodies"
+    )
+    drive: SpeedDrive | TorqueDrive = described("what turns the crank")
+    assembly: Assembly = described("where to start looking: crank angle and each body's pose")
+    springs: dict[str, Spring] = described("springs by name", factory=dict)
+    loads: dict[str, ConstantLoad | PhaseLoad] = described("forces on points by name", factory=dict)
+    clearances: dict[str, Clearance] = described("which joints are loose, and how", factory=dict)
+    loose: tuple[str, ...] = ()
     source: str
 
     def sides(self, joint: str) -> tuple[str, str]:

@@ -1,0 +1,90 @@
+"""``leg-wear-monitor check``: what is wrong with a configuration or an installation."""
+
+import platform
+from collections.abc import Callable
+from functools import partial
+from importlib import metadata
+
+import click
+
+from leg_wear_monitor.cli.main import version
+from leg_wear_monitor.cli.output import check_directory
+from leg_wear_monitor.cli.simulate import DEFAULT_MODEL
+from leg_wear_monitor.cli.waiting import compilation, is_compiled
+from leg_wear_monitor.errors import LegWearError
+from leg_wear_monitor.share import share_directory
+
+_LIBRARIES = ("attrs", "cattrs", "click", "matplotlib", "numba", "numpy", "rich", "ruamel.yaml")
+
+
+@click.command(short_help="Say what is wrong with a configuration or an installation.")
+@click.argument("configs", nargs=-1, metavar="[CONFIG]...")
+def check(configs: tuple[str, ...]) -> int:
+    """Check mechanism files, or, without any, the installation and the mechanisms that come with it.
+
+    Prints a line for each that is in order, and one on stderr for each that is not.
+    """
+    return 0 if (_all_well(_mechanisms(configs)) if configs else _installation()) else 2
+
+
+def _installation() -> bool:
+    click.echo(f"{'version':<13} {version()}")
+    libraries = {name: _library(name) for name in _LIBRARIES}
+    if not _all_well({"python": platform.python_version, **libraries}):
+        return False  # the rest needs them
+    if not _all_well({"kernels": _kernels, "share": lambda: str(share_directory())}):
+        return False
+    from leg_wear_monitor.mechanism.loader import shipped_mechanisms
+
+    return _all_well(_mechanisms(tuple(shipped_mechanisms())))
+
+
+def _all_well(parts: dict[str, Callable[[], str]]) -> bool:
+    """Print what each part says of itself, on stderr what is wrong with it."""
+    well = True
+    for name, part in parts.items():
+        try:
+            click.echo(f"{name:<13} {part()}")
+        except LegWearError as error:
+            click.echo(f"error: {error}", err=True)
+            well = False
+    return well
+
+
+def _library(name: str) -> Callable[[], str]:
+    def find() -> str:
+        try:
+            return metadata.version(name)
+        except metadata.PackageNotFoundError as error:
+            raise LegWearError(f"{name}: is not installed, expected by leg_wear_monitor") from error
+
+    return find
+
+
+def _kernels() -> str:
+    from leg_wear_monitor.kernel import cache_directory
+
+    place = cache_directory()
+    check_directory("NUMBA_CACHE_DIR", place)
+    state = "compiled" if is_compiled(DEFAULT_MODEL) else "to be compiled by the first simulation"
+    return f"{state}, in {place}"
+
+
+def _mechanisms(names: tuple[str, ...]) -> dict[str, Callable[[], str]]:
+    return {name: partial(_mechanism, name) for name in names}
+
+
+def _mechanism(name: str) -> str:
+    """Load, assemble and turn a mechanism, and say what it is."""
+    from leg_wear_monitor.mechanism.loader import load_mechanism
+
+    leg = load_mechanism(name)
+    with compilation("mechanism", "a few seconds"):
+        from leg_wear_monitor.dynamics.simulation import prepare
+
+        prepare(leg)
+    loose = f"{', '.join(leg.loose)} loose" if leg.loose else "none loose"
+    return (
+        f"{len(leg.bodies)} moving bodies, {len(leg.joints)} joints ({loose}), mobility 1, "
+        "closes, and the crank turns through"
+    )

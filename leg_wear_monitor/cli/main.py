@@ -1,0 +1,127 @@
+"""The command line: verbs that are imported when they are called, errors that are one line each."""
+
+import sys
+import warnings
+from collections.abc import Iterator
+from contextlib import contextmanager
+from importlib import import_module
+from typing import Any, TextIO
+from xml.etree import ElementTree
+
+import click
+
+from leg_wear_monitor.errors import ConfigWarning, LegWearError
+from leg_wear_monitor.share import share_directory
+
+COULD_NOT, INTERRUPTED = 2, 130
+
+_VERBS = ("check", "simulate")
+
+
+class Verbs(click.Group):
+    """A group whose verbs stand in one module each, and whose faults end in one line and an exit code."""
+
+    def list_commands(self, ctx: click.Context) -> list[str]:
+        """Names of the verbs."""
+        return list(_VERBS)
+
+    def get_command(self, ctx: click.Context, cmd_name: str) -> click.Command | None:
+        """Import a verb's module and give its command."""
+        if cmd_name not in _VERBS:
+            raise click.UsageError(f"{cmd_name!r} is no verb, expected one of {', '.join(_VERBS)}", ctx)
+        verb: click.Command = getattr(import_module(f"leg_wear_monitor.cli.{cmd_name}"), cmd_name)
+        return verb
+
+    def invoke(self, ctx: click.Context) -> Any:
+        """Call a verb; ^C ends it without the empty line that click prints into a pipe, too."""
+        try:
+            return super().invoke(ctx)
+        except KeyboardInterrupt as error:
+            raise click.Abort from error
+
+    def main(self, *args: Any, **extra: Any) -> Any:
+        """Run and end the process; programming errors keep their traceback."""
+        try:
+            with _warnings_as_lines():
+                code = super().main(*args, **{**extra, "standalone_mode": False})
+        except click.UsageError as error:
+            path = error.ctx.command_path if error.ctx else self.name
+            _say_error(f"{error.format_message()} (see {path} --help)")
+            code = COULD_NOT
+        except click.ClickException as error:
+            _say_error(error.format_message())
+            code = COULD_NOT
+        except LegWearError as error:
+            _say_error(str(error))
+            code = COULD_NOT
+        except click.Abort:
+            if sys.stderr.isatty():
+                click.echo(err=True)  # below the terminal's own ^C
+            _say_error("interrupted")
+            code = INTERRUPTED
+        sys.exit(code)
+
+
+def _say_error(text: str) -> None:
+    click.echo(f"error: {' '.join(text.split())}", err=True)
+
+
+@contextmanager
+def _warnings_as_lines() -> Iterator[None]:
+    """Print a ConfigWarning as one line; others as Python does."""
+    usual = warnings.showwarning
+
+    def show(
+        message: Warning | str,
+        category: type[Warning],
+        filename: str,
+        lineno: int,
+        file: TextIO | None = None,
+        line: str | None = None,
+    ) -> None:
+        if issubclass(category, ConfigWarning):
+            click.echo(f"warning: {message}", err=True)
+        else:
+            usual(message, category, filename, lineno, file, line)
+
+    with warnings.catch_warnings():
+        warnings.simplefilter("default", ConfigWarning)
+        warnings.showwarning = show
+        yield
+
+
+def version() -> str:
+    """Version of this package, as package.xml has it."""
+    return ElementTree.parse(share_directory() / "package.xml").findtext("version") or "unknown"
+
+
+def _print_version(ctx: click.Context, _param: click.Parameter, wanted: bool) -> None:
+    if wanted:
+        click.echo(f"leg-wear-monitor {version()}")
+        ctx.exit()
+
+
+@click.group(
+    name="leg-wear-monitor",
+    cls=Verbs,
+    invoke_without_command=True,
+    context_settings={"help_option_names": ["-h", "--help"]},
+)
+@click.option(
+    "--version",
+    is_flag=True,
+    expose_value=False,
+    is_eager=True,
+    callback=_print_version,
+    help="Show the version and exit.",
+)
+@click.pass_context
+def cli(ctx: click.Context) -> None:
+    """Joint wear of a crank-driven leg: what clearances in its joints do, and what they wear away."""
+    if ctx.invoked_subcommand is None:
+        raise click.UsageError(f"no verb, expected one of {', '.join(_VERBS)}", ctx)
+
+
+def main() -> None:
+    """Entry point of ``leg-wear-monitor``."""
+    cli()

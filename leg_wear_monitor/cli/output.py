@@ -1,0 +1,104 @@
+"""Files written whole or not at all, to places that are known to take them before the work begins."""
+
+import os
+from collections.abc import Mapping
+from pathlib import Path
+
+from leg_wear_monitor.errors import ConfigError
+
+
+def check_file(option: str, path: Path) -> None:
+    """Make sure that a file can be written.
+
+    Raises
+    ------
+    ConfigError
+        Naming the option, the path and why not.
+    """
+    if path.is_dir():
+        raise ConfigError(option, str(path), "is a directory, expected a file to write")
+    if _is_stream(path):
+        return
+    if not path.parent.is_dir():
+        raise ConfigError(option, str(path), f"there is no directory {path.parent}")
+    _try(option, path, path.resolve().parent)
+
+
+def check_directory(option: str, path: Path) -> None:
+    """Make sure that a directory can be written to, or made.
+
+    Raises
+    ------
+    ConfigError
+        Naming the option, the path and why not.
+    """
+    if path.exists() and not path.is_dir():
+        raise ConfigError(option, str(path), "is a file, expected a directory to write to")
+    above = path.resolve()
+    while not above.exists():
+        above = above.parent
+    if not above.is_dir():
+        raise ConfigError(option, str(path), f"{above} is a file, expected a directory")
+    _try(option, path, above)
+
+
+def write_file(path: Path, content: bytes) -> None:
+    """Write a file such that no one ever sees a part of it: beside it first, then in its place.
+
+    Raises
+    ------
+    ConfigError
+        When the disk does not take it.
+    """
+    if _is_stream(path):
+        path.write_bytes(content)
+        return
+    target = path.resolve()
+    part = _beside(target)
+    try:
+        part.write_bytes(content)
+        os.replace(part, target)
+    except OSError as error:
+        raise ConfigError(str(path), "", f"cannot be written: {error.strerror}") from error
+    finally:
+        part.unlink(missing_ok=True)
+
+
+def write_directory(path: Path, files: Mapping[str, bytes | None]) -> list[Path]:
+    """Write files into a directory, each whole; None removes what an earlier run left.
+
+    Returns
+    -------
+    list of pathlib.Path
+        The files written, in the order given.
+    """
+    try:
+        path.mkdir(parents=True, exist_ok=True)
+    except OSError as error:
+        raise ConfigError(str(path), "", f"cannot be made: {error.strerror}") from error
+    for name, content in files.items():
+        if content is None:
+            (path / name).unlink(missing_ok=True)
+        else:
+            write_file(path / name, content)
+    return [path / name for name, content in files.items() if content is not None]
+
+
+def _beside(target: Path) -> Path:
+    return target.with_name(f".{target.name}.{os.getpid()}.part")
+
+
+def _is_stream(path: Path) -> bool:
+    """A device or a pipe, which must not be replaced by a file."""
+    return path.exists() and not path.is_file()
+
+
+def _try(option: str, path: Path, directory: Path) -> None:
+    """Only writing tells: rights, a read-only file system, and an administrator whom rights do not stop."""
+    probe = _beside(directory / path.name)
+    try:
+        probe.write_bytes(b"")
+    except OSError as error:
+        raise ConfigError(option, str(path), f"cannot be written: {error.strerror}") from error
+    finally:
+        probe.unlink(missing_ok=True)

@@ -1,0 +1,47 @@
+"""What a user sees while something takes long, on stderr."""
+
+import sys
+from collections.abc import Callable, Iterator
+from contextlib import contextmanager
+from pathlib import Path
+
+import click
+
+
+def _mark(kernels: str) -> Path:
+    from leg_wear_monitor.kernel import cache_directory
+
+    return cache_directory() / f"{kernels}.compiled"
+
+
+def is_compiled(kernels: str) -> bool:
+    """Whether a set of kernels has once been compiled to its end, for exactly these sources."""
+    import numba
+
+    return bool(numba.config.DISABLE_JIT) or _mark(kernels).exists()
+
+
+@contextmanager
+def compilation(kernels: str, how_long: str = "about half a minute") -> Iterator[None]:
+    """Say so before the work inside compiles a set of kernels for the first time; note when it is done."""
+    if is_compiled(kernels):
+        yield
+        return
+    click.echo(f"compiling for this machine, once: {how_long}", err=True)
+    yield
+    _mark(kernels).touch()
+
+
+@contextmanager
+def progress_bar(what: str) -> Iterator[Callable[[float], None]]:
+    """Give a function that takes the share done: it shows a bar on a terminal, and nothing in a pipe."""
+    if not sys.stderr.isatty():
+        yield lambda _share: None
+        return
+    from rich.console import Console
+    from rich.progress import BarColumn, Progress, TaskProgressColumn, TextColumn, TimeRemainingColumn
+
+    columns = (TextColumn(what), BarColumn(), TaskProgressColumn(), TimeRemainingColumn())
+    with Progress(*columns, console=Console(stderr=True), transient=True) as bar:
+        task = bar.add_task(what, total=1.0)
+        yield lambda share: bar.update(task, completed=share)

@@ -1,0 +1,162 @@
+"""What `simulate` prints and writes, and that it writes it whole or not at all."""
+
+import json
+import os
+
+import pytest
+
+import leg_wear_monitor as lw
+from leg_wear_monitor.dynamics import simulation
+
+# interfaces.md, and two additions: the energy balance and the torque's greatest deviation from the ideal
+TOP = [
+    "mechanism", "model", "speed_rpm", "cycles", "wall_s", "simulated_s", "real_time_factor",
+    "drive_torque_nm", "energy_j", "toe", "joints", "impacts", "trace",
+]  # fmt: skip
+TORQUE = {"mean", "rms", "min", "max", "p99", "max_error"}
+TOE = {"max_position_error_m", "max_velocity_error_mps", "max_acceleration_error_mps2"}
+ANY_JOINT = {"mean_force_n", "rms_force_n", "p99_force_n", "max_force_n"}
+LOOSE_JOINT = ANY_JOINT | {
+    "contact_fraction", "friction_work_j_per_cycle", "archard_integral_j_per_cycle", "wear_depth_m_per_cycle",
+    "wear_zone_deg", "clearance_m",
+}  # fmt: skip
+DEPTH = {"bushing_max", "bushing_mean", "journal_max", "journal_mean"}
+IMPACT = {"begin_s", "speed_mps", "end_s", "peak_n"}
+TRACE = {"crank_angle_rad", "toe_x_m", "toe_y_m", "drive_torque_nm", "force_n"}
+CLOCK = ("wall_s", "real_time_factor")
+
+SHORT = ("simulate", "--mechanism", "four_bar", "--cycles", "0.25", "--skip-cycles", "0")
+
+
+@pytest.fixture
+def never(monkeypatch):
+    """Replace the simulation by an exception."""
+
+    def install(exception):
+        def fail(*_arguments, **_keywords):
+            raise exception
+
+        monkeypatch.setattr(simulation, "simulate", fail)
+
+    return install
+
+
+def test_json_has_the_keys_of_the_contract_and_the_library_s_numbers(run):
+    result = run(*SHORT, "--trace", "8", "--json", "-")
+    assert (result.exit_code, result.stderr.count("\n") <= 1) == (0, True)
+    record = json.loads(result.stdout)
+    assert list(record) == TOP
+    assert record["mechanism"] == "four_bar"
+    assert set(record["drive_torque_nm"]) == TORQUE
+    assert set(record["toe"]) == TOE
+    assert {name: set(joint) for name, joint in record["joints"].items()} == {
+        "A": ANY_JOINT, "B": LOOSE_JOINT, "C": LOOSE_JOINT, "D": ANY_JOINT
+    }  # fmt: skip
+    assert set(record["joints"]["B"]["wear_depth_m_per_cycle"]) == DEPTH
+    assert set(record["joints"]["B"]["clearance_m"]) == {"mean", "max"}
+    assert set(record["impacts"]) == {"B", "C"}
+    assert {frozenset(impact) for impact in record["impacts"]["B"]} == {frozenset(IMPACT)}
+    assert set(record["trace"]) == TRACE
+    assert set(record["trace"]["force_n"]) == {"A", "B", "C", "D"}
+    assert record["trace"]["crank_angle_rad"][0] == 0.0
+    assert record["real_time_factor"] == pytest.approx(record["simulated_s"] / record["wall_s"])
+
+    same = lw.simulate(lw.load_mechanism("four_bar"), cycles=0.25, skip_cycles=0, trace=8).to_dict()
+    assert {key: value for key, value in record.items() if key not in CLOCK} == json.loads(json.dumps(same))
+
+
+@pytest.mark.plain
+def test_an_ideal_run_has_no_contact_figures_and_no_picture_of_wear(run, tmp_path):
+    (tmp_path / "out").mkdir()
+    (tmp_path / "out" / "wear.png").write_bytes(b"of an earlier run")
+    result = run(*SHORT, "--clearances", "none", "--out", "out", "--json", "figures.json")
+    assert result.exit_code == 0
+    assert sorted(path.name for path in (tmp_path / "out").iterdir()) == ["leg.png", "result.json"]
+    record = json.loads((tmp_path / "figures.json").read_text())
+    assert record == json.loads((tmp_path / "out" / "result.json").read_text())
+    assert record["model"] == "ideal"
+    assert all(set(joint) == ANY_JOINT for joint in record["joints"].values())
+
+
+def test_out_holds_result_and_pictures(run, tmp_path):
+    result = run(*SHORT, "--trace", "90", "--out", "deep/out")
+    assert result.exit_code == 0
+    files = {path.name: path.read_bytes() for path in (tmp_path / "deep" / "out").iterdir()}
+    assert sorted(files) == ["forces.png", "leg.png", "result.json", "wear.png"]
+    for name in ("forces.png", "leg.png", "wear.png"):
+        assert files[name].startswith(b"\x89PNG\r\n\x1a\n")
+    for name in files:
+        assert f"written: deep/out/{name}" in result.stdout
+
+
+def test_the_table_has_every_joint_and_fits_80_columns(run):
+    result = run(*SHORT, "--wear", "on")
+    lines = result.stdout.splitlines()
+    assert max(len(line) for line in lines) <= 80
+    first_words = [line.split()[0] for line in lines if line.strip()]
+    for word in ("A", "B", "C", "D", "drive", "energy", "opened", "speed"):
+        assert word in first_words
+    assert "\x1b" not in result.stdout
+
+
+@pytest.mark.plain
+@pytest.mark.parametrize(
+    ("line", "joint", "advice"),
+    [
+        ("--mechanism slider_crank --speed-rpm 1e7 --cycles 1 --model full", "joint B", "try a lower speed"),
+        ("--mechanism soft.yaml --cycles 1 --model full", "joint B", "higher stiffness"),
+        ("--mechanism soft.yaml --cycles 1 --model clearance", "joint B", "higher stiffness"),
+    ],
+)
+def test_a_run_that_diverges_says_where_and_leaves_nothing(
+    run, complaints, shipped, tmp_path, line, joint, advice
+):
+    (tmp_path / "soft.yaml").write_text(shipped("slider_crank").replace("6.6102e10", "1.0e-3"))
+    result = run("simulate", *line.split(), "--json", "result.json", "--out", "out")
+    assert result.exit_code == 2
+    assert result.stdout == ""
+    (complaint,) = complaints(result)
+    for part in (joint, " at t = ", " s: ", advice):
+        assert part in complaint
+    assert [path.name for path in tmp_path.iterdir()] == ["soft.yaml"]
+
+
+@pytest.mark.plain
+def test_an_interrupted_run_leaves_nothing(run, complaints, tmp_path, never):
+    never(KeyboardInterrupt())
+    result = run("simulate", "--json", "result.json", "--out", "out")
+    assert result.exit_code == 130
+    assert complaints(result) == ["error: interrupted"]
+    assert list(tmp_path.iterdir()) == []
+
+
+@pytest.mark.plain
+def test_a_file_is_replaced_whole_or_stays(run, complaints, tmp_path, monkeypatch):
+    def full(*_arguments):
+        raise OSError(28, "No space left on device")
+
+    (tmp_path / "result.json").write_text("as it was")
+    monkeypatch.setattr(os, "replace", full)
+    result = run(*SHORT, "--clearances", "none", "--json", "result.json")
+    assert result.exit_code == 2
+    assert complaints(result) == ["error: result.json: cannot be written: No space left on device"]
+    assert [(path.name, path.read_text()) for path in tmp_path.iterdir()] == [("result.json", "as it was")]
+
+
+@pytest.mark.plain
+def test_a_bug_keeps_its_traceback(run, never):
+    never(ZeroDivisionError("a bug"))
+    with pytest.raises(ZeroDivisionError, match="a bug"):
+        run("simulate")
+
+
+@pytest.mark.plain
+def test_a_restitution_that_the_law_does_not_give_is_warned_of_once(run, complaints, shipped, tmp_path):
+    (tmp_path / "soft.yaml").write_text(shipped("four_bar").replace("restitution: 0.9", "restitution: 0.5"))
+    result = run("simulate", "--mechanism", "soft.yaml", "--duration", "0.001")
+    assert result.exit_code == 0
+    (line,) = complaints(result)
+    for part in ("warning: soft.yaml: joint B, C: ", "lankarani-nikravesh", "0.5", "0.725", "0.7"):
+        assert part in line
+    result = run("simulate", "--mechanism", "soft.yaml", "--duration", "0.001", "--normal-law", "flores")
+    assert (result.exit_code, complaints(result)) == (0, [])

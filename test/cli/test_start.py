@@ -1,0 +1,69 @@
+"""How the command line starts: light, from three places, with names that are the library's."""
+
+import inspect
+import subprocess
+import sys
+
+import pytest
+
+from leg_wear_monitor.cli import simulate as verb
+from leg_wear_monitor.dynamics.simulation import MODELS, simulate
+from leg_wear_monitor.mechanism.clearance import NORMAL_LAWS
+
+HEAVY = {"numba", "numpy", "matplotlib", "rich", "cattrs", "ruamel.yaml"}
+
+
+@pytest.mark.plain
+@pytest.mark.parametrize(
+    "arguments", [["--help"], ["--version"], ["simulate", "--help"], ["check", "--help"]]
+)
+def test_help_loads_nothing_heavy(arguments):
+    code = (
+        "import sys\n"
+        "from leg_wear_monitor.cli.main import cli\n"
+        "try:\n"
+        f"    cli({arguments})\n"
+        "finally:\n"
+        f"    print(sorted({HEAVY} & set(sys.modules)), file=sys.stderr)\n"
+    )
+    done = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, check=True)
+    assert done.stderr == "[]\n"
+    assert done.stdout
+
+
+@pytest.mark.plain
+def test_module_and_script_are_the_same(run):
+    done = subprocess.run(
+        [sys.executable, "-m", "leg_wear_monitor", "--version"], capture_output=True, text=True, check=True
+    )
+    assert done.stdout == run("--version").stdout
+    assert done.stdout.startswith("leg-wear-monitor ")
+
+
+@pytest.mark.plain
+def test_an_error_leaves_one_line_on_the_real_stderr():
+    line = [sys.executable, "-m", "leg_wear_monitor", "check", "no_such_leg.yaml"]
+    done = subprocess.run(line, capture_output=True, text=True, check=False)
+    assert (done.returncode, done.stdout) == (2, "")
+    assert done.stderr == "error: no_such_leg.yaml: cannot be read: No such file or directory\n"
+
+
+@pytest.mark.plain
+def test_names_that_help_shows_are_the_library_s():
+    assert verb.NORMAL_LAWS == NORMAL_LAWS
+    assert set(MODELS) <= set(verb.MODELS)
+    assert inspect.signature(simulate).parameters["model"].default == verb.DEFAULT_MODEL
+
+
+@pytest.mark.plain
+def test_help_lists_the_verbs_that_are_there(run):
+    listed = run("--help").stdout.split("Commands:\n")[1]
+    assert [line.split()[0] for line in listed.splitlines()] == ["check", "simulate"]
+
+
+def test_check_finds_this_installation_in_order(run, complaints):
+    result = run("check")
+    assert (result.exit_code, complaints(result)) == (0, [])
+    found = {line.split()[0]: line for line in result.stdout.splitlines()}
+    assert {"python", "numba", "kernels", "share", "bionic_leg", "jansen_leg", "andrews"} <= set(found)
+    assert "turns through" in found["bionic_leg"]

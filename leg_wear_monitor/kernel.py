@@ -38,7 +38,7 @@ def cache_directory() -> Path:
     digest = hashlib.sha256(numba.__version__.encode())
     for source in sorted(Path(__file__).parent.rglob("*.py")):
         text = source.read_bytes()
-        if b"@kernel" in text or b"NamedTuple" in text:
+        if b"leg_wear_monitor.kernel" in text or b"NamedTuple" in text:
             digest.update(text)
     leaf = f"leg_wear_monitor/{digest.hexdigest()[:16]}"
     homes = [
@@ -50,11 +50,6 @@ def cache_directory() -> Path:
         if home and _writable(Path(home) / leaf):
             return Path(home) / leaf
     return Path(tempfile.gettempdir()) / f"leg_wear_monitor-{os.getuid()}" / leaf
-
-
-def is_compiled() -> bool:
-    """Whether an earlier process has left compiled code for exactly these sources."""
-    return numba.config.DISABLE_JIT or any(cache_directory().rglob("*.nbi"))
 
 
 def kernel(function: _Function) -> _Function:

@@ -40,9 +40,9 @@ class ClearanceState(NamedTuple):
     since time 0; ``e`` and ``v`` (d,) eccentricities [m] and rates; ``drive`` (3,) angle, speed and
     acceleration of the crank; ``step`` (1,) next step to try [s]; ``approach`` (k,) approach speed of each
     joint in contact, 0 for the others; ``recent`` (k, 4) its last two samples of time and normal force;
-    ``local`` (k, LOCAL) the clearance around a direction; ``pending`` (k, 3) the Archard integral not yet
-    worn off [J], and the same times the eccentricity it acted at. ``depth`` (k, 2, N) is the wear of
-    bushing and journal [m].
+    ``local`` (k, LOCAL) the clearance around a direction; ``pending`` (k, 4) the Archard integral not yet
+    worn off [J], and the same times the normal and the eccentricity it acted at. ``depth`` (k, 2, N) is
+    the wear of bushing and journal [m].
     """
 
     depth: Floats
@@ -121,7 +121,7 @@ def clearance_state(depth: Floats, angle: float, speed: float) -> ClearanceState
     k = len(depth)
     shapes = {
         "intervals": (1,), "e": (2 * k,), "v": (2 * k,), "drive": (3,), "step": (1,),
-        "approach": (k,), "recent": (k, 4), "local": (k, LOCAL), "pending": (k, 3),
+        "approach": (k,), "recent": (k, 4), "local": (k, LOCAL), "pending": (k, 4),
     }  # fmt: skip
     motion = np.zeros(sum(math.prod(shape) for shape in shapes.values()))
     state = ClearanceState(depth, motion, **views(motion, shapes))

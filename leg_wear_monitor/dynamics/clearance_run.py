@@ -24,7 +24,7 @@ from leg_wear_monitor.dynamics.touch import F_N
 from leg_wear_monitor.errors import ConfigError
 from leg_wear_monitor.mechanism.arrays import Floats
 from leg_wear_monitor.mechanism.ideal import TURN
-from leg_wear_monitor.mechanism.spec import SpeedDrive
+from leg_wear_monitor.mechanism.spec import Mechanism, SpeedDrive
 
 INTERVALS = 2048  # of a turn at the setup's speed
 TOLERANCE_M = 3.0e-9  # local error of a step in the eccentricities [m]: energy adds up to 5e-4 of the losses
@@ -68,9 +68,7 @@ class ClearanceStepper:
     ) -> None:
         mechanism = setup.linkage.mechanism
         if not isinstance(mechanism.drive, SpeedDrive):
-            raise ConfigError(
-                mechanism.source, "drive.torque", "the clearance model needs drive.speed; try --model full"
-            )
+            raise needs_speed(mechanism)
         self._setup = setup
         self.model = ClearanceModel(
             contacts=setup.contacts,
@@ -124,6 +122,13 @@ class ClearanceStepper:
         self.state.depth[:] = snapshot.depth
 
 
+def needs_speed(mechanism: Mechanism) -> ConfigError:
+    """Error for a mechanism that a torque drives."""
+    return ConfigError(
+        mechanism.source, "drive.torque", "the clearance model needs drive.speed; try --model full"
+    )
+
+
 class ClearanceRun:
     """The stepper under a steady crank, as `simulate` wants it.
 
@@ -135,6 +140,8 @@ class ClearanceRun:
     """
 
     def __init__(self, setup: Setup, samples: int = 0) -> None:
+        if not isinstance(setup.linkage.mechanism.drive, SpeedDrive):
+            raise needs_speed(setup.linkage.mechanism)
         intervals = max(samples, 1) * math.ceil(INTERVALS / max(samples, 1))
         self.stepper = ClearanceStepper(setup, TURN / abs(setup.speed) / intervals)
         self._setup = setup

@@ -166,17 +166,23 @@ def gather_wear(added, start, end, pending):
     for k in range(pending.shape[0]):
         integral = added[k, ARCHARD]
         if integral > 0.0:
-            share = end[k, F_N] / (start[k, F_N] + end[k, F_N])
+            w = end[k, F_N] / (start[k, F_N] + end[k, F_N])
+            ex = start[k, EX] + w * (end[k, EX] - start[k, EX])
+            ey = start[k, EY] + w * (end[k, EY] - start[k, EY])
+            length = math.hypot(ex, ey)
             pending[k, 0] += integral
-            pending[k, 1] += integral * (start[k, EX] + share * (end[k, EX] - start[k, EX]))
-            pending[k, 2] += integral * (start[k, EY] + share * (end[k, EY] - start[k, EY]))
+            pending[k, 1] += integral * ex / length
+            pending[k, 2] += integral * ey / length
+            pending[k, 3] += integral * length
 
 
 @kernel
 def wear_off(contacts, surfaces, k, angle, pending, out_weight):
-    """Wear the surfaces of joint k by what is pending, around its mean eccentricity."""
+    """Wear the surfaces of joint k by what is pending, at its mean normal and eccentricity."""
     integral = pending[k, 0]
     if integral > 0.0:
-        ex, ey = pending[k, 1] / integral, pending[k, 2] / integral
+        scale = pending[k, 3] / integral / math.hypot(pending[k, 1], pending[k, 2])
+        ex, ey = scale * pending[k, 1], scale * pending[k, 2]
         deposit_wear(contacts, surfaces, k, ex, ey, angle[k, 0], angle[k, 1], integral, out_weight)
-        pending[k, 0], pending[k, 1], pending[k, 2] = 0.0, 0.0, 0.0
+        for i in range(pending.shape[1]):
+            pending[k, i] = 0.0

@@ -22,6 +22,7 @@ from leg_wear_monitor.dynamics.tally import (
     signed_percentile,
 )
 from leg_wear_monitor.mechanism.arrays import Floats
+from leg_wear_monitor.mechanism.ideal import TURN
 from leg_wear_monitor.wear.surfaces import BUSHING, JOURNAL, Surfaces, wear_zone
 
 JsonObject = dict[str, Any]
@@ -169,10 +170,11 @@ def impact_lists(setup: Setup, tally: Tally) -> dict[str, list[dict[str, float |
 
 
 def trace_columns(setup: Setup, samples: list[Sample]) -> JsonObject:
-    """Samples as lists; the crank angle counts on from 0."""
+    """Samples as lists; the crank angle counts on from its value in the first turn."""
     angles = np.array([sample.crank_angle for sample in samples])
     forces = np.array([sample.force for sample in samples])
-    trace: JsonObject = {"crank_angle_rad": (angles - angles[0]).tolist()}
+    turns = TURN * np.floor(angles[0] / TURN + 1.0e-9)
+    trace: JsonObject = {"crank_angle_rad": (angles - turns).tolist()}
     if samples[0].toe is not None:
         toe = np.array([sample.toe for sample in samples])
         trace |= {"toe_x_m": toe[:, 0].tolist(), "toe_y_m": toe[:, 1].tolist()}

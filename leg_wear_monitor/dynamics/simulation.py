@@ -1,7 +1,7 @@
 """The leg offline: from a mechanism to what its clearances do."""
 
 import math
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Iterator, Sequence
 
 from leg_wear_monitor.contact.arrays import clearance_settings, compile_contacts
 from leg_wear_monitor.dynamics.clearance_run import ClearanceRun
@@ -66,7 +66,7 @@ def simulate(
     cycles: float = 5.0,
     duration_s: float | None = None,
     skip_cycles: float | None = None,
-    model: str = "clearance",
+    model: str | None = None,
     wear: bool = False,
     normal_law: str | None = None,
     trace: int = 0,
@@ -87,8 +87,8 @@ def simulate(
         How long to count, as gait cycles or as time [s].
     skip_cycles : float, optional
         Gait cycles simulated before counting starts; 1, or 0 with ``duration_s``.
-    model : str
-        A key of `MODELS`.
+    model : str, optional
+        A key of `MODELS`: ``clearance``, the default, or ``full``, the default for a drive by torque.
     wear : bool
         Whether wear opens the clearance as it goes; it is counted either way.
     normal_law : str, optional
@@ -115,6 +115,8 @@ def simulate(
         wear=wear,
         normal_law=normal_law,
     )
+    if model is None:
+        model = "clearance" if isinstance(mechanism.drive, SpeedDrive) else "full"
     if model not in MODELS:
         raise ConfigError("model", "", f"{model!r} is not one of {', '.join(MODELS)}")
     skipped, counted = _spans(setup, cycles, duration_s, skip_cycles, trace)
@@ -146,7 +148,7 @@ def _spans(
         raise ConfigError("trace", "", f"{trace} is below 0 points a cycle")
     skip = skip_cycles if skip_cycles is not None else (1.0 if duration_s is None else 0.0)
     if not (math.isfinite(skip) and skip >= 0.0):
-        raise ConfigError("skip-cycles", "", f"{skip:g} is below 0 cycles")
+        raise ConfigError("skip-cycles", "", f"{skip:g} is not a finite number of cycles from 0 up")
     even = isinstance(setup.linkage.mechanism.drive, SpeedDrive)
     if not even and (duration_s is None or skip > 0.0 or trace):
         raise ConfigError(
@@ -158,7 +160,7 @@ def _spans(
     counted = cycles * period if duration_s is None else duration_s
     if not (math.isfinite(counted) and counted > 0.0):
         name, value, unit = ("cycles", cycles, "") if duration_s is None else ("duration", duration_s, " s")
-        raise ConfigError(name, "", f"{value:g}{unit} is not above 0{unit}")
+        raise ConfigError(name, "", f"{value:g}{unit} is not a finite number above 0{unit}")
     return (skip * period if skip else 0.0), counted
 
 
@@ -185,6 +187,10 @@ def _run(
         report(t / (skipped + counted))
         if trace:
             samples.append(run.sample())
+    if not tally.time[0] > 0.0:
+        raise ConfigError(
+            "duration", "", f"{counted:g} s is too short for this model; expected more, or model full"
+        )
     turned = counted / period if isinstance(mechanism.drive, SpeedDrive) else _turns(run, mechanism)
     return SimulationResult(
         mechanism=mechanism.name,
@@ -208,7 +214,7 @@ def _turns(run: Run, mechanism: Mechanism) -> float:
     return abs(run.sample().crank_angle - mechanism.assembly.crank_angle) / TURN
 
 
-def _instants(start: float, end: float, step: float) -> list[float]:
+def _instants(start: float, end: float, step: float) -> Iterator[float]:
     """Times from start (excluded) to end (included) at equal steps; the last step may be shorter."""
     count = max(1, math.ceil((end - start) / step - 1.0e-9)) if end > start else 0
-    return [min(end, start + (i + 1) * step) if i + 1 < count else end for i in range(count)]
+    return (min(end, start + (i + 1) * step) if i + 1 < count else end for i in range(count))

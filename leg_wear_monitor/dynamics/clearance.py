@@ -97,8 +97,8 @@ class ClearanceWork(NamedTuple):
     The tables ``now``; samples of the joints at a step's ``start`` and ``end`` (k, COLUMNS); ``x``
     (VECTORS, d) the vectors of a step; ``weight`` (N,) of the wear on an arc; ``reaction`` (r,) and ``toe``
     (2,) as observed; ``added`` (k, JOINT_RATES) to the joints' integrals in a step; ``drive_start`` and
-    ``drive_end`` (3,) the torque at its ends; ``backup`` the motion that a failed interval falls back to;
-    ``crank`` (3,) the drive at the interval's start.
+    ``drive_end`` (3,) the torque at its ends; ``backup`` the motion that a failed interval falls back to,
+    but for what it leaves ``pending``; ``crank`` (3,) the drive at the interval's start.
     """
 
     now: Now
@@ -113,6 +113,7 @@ class ClearanceWork(NamedTuple):
     drive_start: Floats
     drive_end: Floats
     backup: Floats
+    pending: Floats
     crank: Floats
 
 
@@ -149,6 +150,7 @@ def clearance_work(model: ClearanceModel, state: ClearanceState) -> ClearanceWor
         drive_start=np.zeros(3),
         drive_end=np.zeros(3),
         backup=np.zeros_like(state.motion),
+        pending=np.zeros_like(state.pending),
         crank=np.zeros(3),
     )
 

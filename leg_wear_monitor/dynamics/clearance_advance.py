@@ -34,6 +34,7 @@ from leg_wear_monitor.dynamics.clearance_step import (
     shift_start,
     try_step,
     wear_off,
+    wear_what_turned,
 )
 from leg_wear_monitor.dynamics.drive import drive_at
 from leg_wear_monitor.dynamics.joint_contact import contact_energy
@@ -79,7 +80,9 @@ def advance_clearances(model, feeds_back, state, polynomial, t_end, tally, work)
         copy_array(state.motion, work.backup)
         status, k = _interval(model, surfaces, state, polynomial, tally, work)
         if status != DONE:
+            copy_array(state.pending, work.pending)  # what has worn off already must not be pending again
             copy_array(work.backup, state.motion)
+            copy_array(work.pending, state.pending)
             return status, k
     return DONE, -1
 
@@ -179,6 +182,7 @@ def _take(model, surfaces, state, t, h, tally, work):
     shift_start(now, x)
     sudden = half_impulse(x)
     copy_array(end, start)
+    wear_what_turned(contacts, surfaces, state.approach, start, now.angle, state.pending, work.weight)
     if surfaces.feeds_back:
         _follow(contacts, surfaces, start, now.angle, state.local)
     _look_at_drive(now, x, start, work.drive_end, tally)
@@ -226,7 +230,7 @@ def _finish(model, surfaces, state, tally, work):
     renew = int(state.intervals[0]) % _RENEWAL == 0
     tally.time[0] += interval
     for k in range(state.approach.shape[0]):
-        if renew or state.approach[k] == 0.0:
+        if renew:
             wear_off(model.contacts, surfaces, k, now.angle, state.pending, work.weight)
         force = math.sqrt(sample[k, F_N] ** 2 + sample[k, F_T] ** 2)
         tally.force_time[joint[k], bin_of(force)] += interval

@@ -22,6 +22,8 @@ from leg_wear_monitor.dynamics.clearance_contact import (
     K2E,
     K2V,
     LOCAL_STIFFNESS,
+    NX,
+    NY,
     RAMP_0,
     RAMP_1,
     RE,
@@ -186,3 +188,13 @@ def wear_off(contacts, surfaces, k, angle, pending, out_weight):
         deposit_wear(contacts, surfaces, k, ex, ey, angle[k, 0], angle[k, 1], integral, out_weight)
         for i in range(pending.shape[1]):
             pending[k, i] = 0.0
+
+
+@kernel
+def wear_what_turned(contacts, surfaces, approach, start, angle, pending, out_weight):
+    """Wear off what is pending where contact has ended or its normal has turned by a sector."""
+    sector = 2.0 * math.pi / surfaces.depth.shape[2]
+    for k in range(pending.shape[0]):
+        turned = abs(pending[k, 1] * start[k, NY] - pending[k, 2] * start[k, NX])
+        if approach[k] == 0.0 or turned > sector * pending[k, 0]:
+            wear_off(contacts, surfaces, k, angle, pending, out_weight)

@@ -49,7 +49,15 @@ from leg_wear_monitor.dynamics.tally import (
     TORQUE_SQUARED,
     bin_of,
 )
-from leg_wear_monitor.dynamics.touch import DELTA, F_N, NEVER, first_touch, update_contacts
+from leg_wear_monitor.dynamics.touch import (
+    DELTA,
+    DELTA_DOT,
+    F_N,
+    NEVER,
+    begin_contact,
+    first_touch,
+    update_contacts,
+)
 from leg_wear_monitor.kernel import copy_array, entry, kernel
 from leg_wear_monitor.wear.surfaces import Surfaces
 
@@ -98,6 +106,7 @@ def _interval(model, surfaces, state, polynomial, tally, work):
         return INVALID_DRIVE, -1
     take_tables(model.tables, angle, speed, acceleration, work.now)
     _begin(model, surfaces, state, work)
+    _sample(model, state, state.intervals[0] * interval, tally, work)
     status, k = _steps(model, surfaces, state, tally, work)
     if status != DONE:
         return status, k
@@ -110,7 +119,7 @@ def _interval(model, surfaces, state, polynomial, tally, work):
 
 @kernel
 def _begin(model, surfaces, state, work):
-    """Sample the joints under the tables now: what the first step starts from."""
+    """Load the state, and the clearances and the drift that go with it under the tables now."""
     x, now = work.x, work.now
     for k in range(state.approach.shape[0]):
         turn = (int(state.intervals[0]) + k) % _RENEWAL == 0
@@ -122,7 +131,23 @@ def _begin(model, surfaces, state, work):
     for i in range(state.e.shape[0]):
         x[E0, i], x[V0, i] = state.e[i], state.v[i]
     drift(now, x)
-    accelerate_clearances(model.law, state.local, state.approach, now, x, E0, V0, A0, work.start)
+
+
+@kernel
+def _sample(model, state, t, tally, work):
+    """Sample the joints where a step starts; contact begins where a clearance newly looked up is closed."""
+    x, start, contacts = work.x, work.start, model.contacts
+    accelerate_clearances(model.law, state.local, state.approach, work.now, x, E0, V0, A0, start)
+    closed = False
+    for k in range(state.approach.shape[0]):
+        if state.approach[k] == 0.0 and start[k, DELTA] > 0.0 and start[k, DELTA_DOT] > 0.0:
+            begin_contact(
+                k, contacts.joint, contacts.speed_floor, t, start[k, DELTA_DOT],
+                state.approach, state.recent, tally.impact, tally.impacts,
+            )  # fmt: skip
+            closed = True
+    if closed:
+        accelerate_clearances(model.law, state.local, state.approach, work.now, x, E0, V0, A0, start)
 
 
 @kernel
@@ -183,8 +208,8 @@ def _take(model, surfaces, state, t, h, tally, work):
     sudden = half_impulse(x)
     copy_array(end, start)
     wear_what_turned(contacts, surfaces, state.approach, start, now.angle, state.pending, work.weight)
-    if surfaces.feeds_back:
-        _follow(contacts, surfaces, start, now.angle, state.local)
+    if surfaces.feeds_back and _follow(contacts, surfaces, start, now.angle, state.local):
+        _sample(model, state, t + h, tally, work)
     _look_at_drive(now, x, start, work.drive_end, tally)
     sudden += half_impulse(x)
     toe_deviation(now, x, tally.response)
@@ -208,10 +233,13 @@ def _look_at_drive(now, x, sample, out_drive, tally):
 
 @kernel
 def _follow(contacts, surfaces, sample, angle, local):
-    """Look up the clearance of the joints whose normal has turned away from where it was known."""
+    """Look up the clearance of the joints whose normal has turned away from where it was known, if any."""
+    found = False
     for k in range(sample.shape[0]):
         if has_turned(k, sample[k, NX], sample[k, NY], local):
             look_around(contacts, surfaces, k, sample[k, NX], sample[k, NY], angle[k, 0], angle[k, 1], local)
+            found = True
+    return found
 
 
 @kernel
@@ -268,6 +296,7 @@ def observe(model, feeds_back, state, work):
     angle, speed = state.drive[ANGLE], state.drive[SPEED]
     take_tables(model.tables, angle, speed, state.drive[ACCELERATION], now)
     _begin(model, surfaces, state, work)
+    accelerate_clearances(model.law, state.local, state.approach, now, x, E0, V0, A0, work.start)
     copy_array(work.backup, state.motion)
     reactions(model.tables, angle, now, x, work.start, work.reaction)
     work.reaction[0] = drive_torque(now, x, work.start)[0]

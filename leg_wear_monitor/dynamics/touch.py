@@ -42,12 +42,20 @@ def first_touch(approach, h, start, end):
     """
     earliest = NEVER
     for k in range(approach.shape[0]):
-        if approach[k] == 0.0:
+        if approach[k] == 0.0 and start[k, DELTA] <= TOUCH:
             if start[k, DELTA_DOT] > 0.0 and _delta_at(0.5, h, k, start, end) > TOUCH:
                 earliest = min(earliest, _crossing(0.0, 0.5, True, h, k, start, end))
             elif end[k, DELTA] > TOUCH:
                 earliest = min(earliest, _crossing(0.5, 1.0, True, h, k, start, end))
     return earliest
+
+
+@kernel
+def begin_contact(k, joint, speed_floor, t, rate, approach, recent, impact, impacts):
+    """Contact begins in loose joint k at time t [s] with the penetration growing at a rate [m/s]."""
+    approach[k] = max(rate, speed_floor[k])
+    begin_impact(impact, impacts, joint[k], t, rate)
+    recent[k, 0], recent[k, 1], recent[k, 2], recent[k, 3] = t, 0.0, t, 0.0
 
 
 @kernel
@@ -61,10 +69,10 @@ def update_contacts(joint, speed_floor, t, h, start, end, approach, recent, peak
     for k in range(approach.shape[0]):
         rate, force = end[k, DELTA_DOT], end[k, F_N]
         if approach[k] == 0.0:
-            if end[k, DELTA] >= -TOUCH and rate > 0.0:
-                approach[k] = max(rate, speed_floor[k])
-                begin_impact(impact, impacts, joint[k], t + h, rate)
-                recent[k, 0], recent[k, 1], recent[k, 2], recent[k, 3] = t + h, 0.0, t + h, 0.0
+            # a worn profile can close in on a journal that does not move towards it
+            nearer = rate > 0.0 or end[k, DELTA] > start[k, DELTA]
+            if end[k, DELTA] >= -TOUCH and nearer:
+                begin_contact(k, joint, speed_floor, t + h, rate, approach, recent, impact, impacts)
                 changed = True
             continue
         top = force

@@ -23,7 +23,7 @@ def _writable(directory: Path) -> bool:
 
 @cache
 def cache_directory() -> Path:
-    """Directory of the compiled code, named after the sources it was compiled from.
+    """Directory of the compiled code, named after its sources: what they say and where they lie.
 
     numba looks only at the file of the function it caches: a kernel that calls a kernel of another
     file would go on running its old body. A digest over the sources of all kernels closes that hole,
@@ -40,6 +40,8 @@ def cache_directory() -> Path:
         text = source.read_bytes()
         if b"leg_wear_monitor.kernel" in text or b"NamedTuple" in text:
             digest.update(text)
+            # numba compiles again for a file that lies elsewhere or is newer
+            digest.update(f"{source} {source.stat().st_mtime_ns}".encode())
     leaf = f"leg_wear_monitor/{digest.hexdigest()[:16]}"
     homes = [
         os.environ.get("NUMBA_CACHE_DIR"),

@@ -14,7 +14,7 @@ from leg_wear_monitor.mechanism.position import assemble
 from leg_wear_monitor.mechanism.spec import SpeedDrive
 
 TOLERANCE_M = (
-    1.0e-9  # local error of a step in every coordinate [m, rad]: a thousandth of a usual penetration
+    1.0e-10  # local error of a step in every coordinate [m, rad]; energy adds up to 1e-3 of the losses
 )
 TOLERANCE_RATE = 1.0e4  # 1/s: the same for velocities, over the time a contact takes
 

@@ -96,11 +96,11 @@ def assemble(linkage: Linkage) -> Floats:
     start = com_poses(mechanism)
     angle = mechanism.assembly.crank_angle
     q = _newton(linkage, start, angle)
+    if q is None:
+        q = _newton(linkage, _nearest(linkage, start, angle, np.ones(len(linkage.rows.body))), angle)
     where = f"{mechanism.source}: assembly"
     if q is None:
-        raise AssemblyError(
-            f"{where}: no assembly near the given start: {_widest_gap(linkage, start, angle)}"
-        )
+        raise AssemblyError(f"{where}: no assembly near the given start: {_gap(linkage, start, angle)}")
     moved = np.abs(q - start) / [_size(mechanism), _size(mechanism), 1.0]
     if moved.max() > _FAR:
         body = list(mechanism.bodies)[np.unravel_index(moved.argmax(), moved.shape)[0] - 1]
@@ -175,23 +175,46 @@ def _newton(linkage: Linkage, start: Floats, angle: float) -> Floats | None:
     return None
 
 
-def _widest_gap(linkage: Linkage, start: Floats, angle: float) -> str:
-    """The joint that stays open longest when the closures are met as well as they can be."""
-    q = start.copy()
-    for _ in range(200):
+def _nearest(linkage: Linkage, start: Floats, angle: float, weight: Floats) -> Floats:
+    """Coordinates near a start at which the weighted closures (m,) are least open (Levenberg-Marquardt)."""
+
+    def weighted(q: Floats) -> tuple[Floats, Floats]:
         system = evaluate(linkage, q, np.zeros_like(q), (angle, 0.0, 0.0))
-        jacobian = system.jacobian
-        damped = jacobian.T @ jacobian + 1.0e-4 * np.eye(jacobian.shape[1])
-        q[1:] += np.linalg.solve(damped, -jacobian.T @ system.phi).reshape(-1, 3)
-    phi = evaluate(linkage, q, np.zeros_like(q), (angle, 0.0, 0.0)).phi
-    names = list(linkage.mechanism.joints)
-    gaps = {
-        names[closure]: float(np.hypot(*phi[row : row + 2]))
-        for closure, row in zip(linkage.rows.closure, linkage.rows.row, strict=True)
-        if closure != DRIVE
-    }
-    joint = max(gaps, key=lambda name: gaps[name])
-    return f"joint {joint} stays open by {1e3 * gaps[joint]:.3g} mm"
+        return weight * system.phi, weight[:, None] * system.jacobian
+
+    q, damping = start.copy(), 1.0e-3
+    phi, jacobian = weighted(q)
+    for _ in range(200):
+        normal = jacobian.T @ jacobian
+        trial = q.copy()
+        step = np.linalg.solve(normal + damping * np.diag(np.diag(normal)), -jacobian.T @ phi)
+        trial[1:] += step.reshape(-1, 3)
+        residual, slope = weighted(trial)
+        if residual @ residual < phi @ phi:
+            q, phi, jacobian, damping = trial, residual, slope, 0.2 * damping
+        else:
+            damping *= 4.0
+        if damping > 1.0e9:
+            break
+    return q
+
+
+def _gap(linkage: Linkage, start: Floats, angle: float) -> str:
+    """The joint that stays open least when it alone may, all others being closed."""
+    rows, names = linkage.rows, list(linkage.mechanism.joints)
+    gaps: dict[str, tuple[bool, float]] = {}
+    for closure, row in zip(rows.closure, rows.row, strict=True):
+        if closure == DRIVE:
+            continue
+        weight = np.full(len(rows.body), 100.0)
+        weight[row : row + 2] = 1.0
+        q = _nearest(linkage, start, angle, weight)
+        phi = evaluate(linkage, q, np.zeros_like(q), (angle, 0.0, 0.0)).phi
+        gap = float(np.hypot(*phi[row : row + 2]))
+        others_open = np.abs(np.delete(phi, [row, row + 1])).max() > 0.01 * gap
+        gaps[names[closure]] = bool(others_open), gap
+    joint = min(gaps, key=lambda name: gaps[name])
+    return f"joint {joint} stays open by {1e3 * gaps[joint][1]:.3g} mm"
 
 
 def _size(mechanism: Mechanism) -> float:

@@ -1,0 +1,64 @@
+"""Work of the drive = change of stored energy + losses."""
+
+import numpy as np
+import pytest
+
+from leg_wear_monitor.dynamics.full_run import FullRun
+from leg_wear_monitor.dynamics.simulation import prepare
+from leg_wear_monitor.dynamics.tally import DISSIPATION, FRICTION, POWER, new_tally
+from leg_wear_monitor.mechanism.ideal import TURN, one_cycle
+from leg_wear_monitor.mechanism.loader import parse_mechanism
+
+
+@pytest.mark.parametrize("loose", ["G", "AB", "IJ", "ABGIJ"])
+def test_energy_with_clearances(leg_cycles, loose):
+    """Every cycle, to a thousandth of what is lost in it: friction and contact together."""
+    for cycle in leg_cycles(loose, 20).cycles:
+        energy = cycle.energy
+        assert energy["friction_loss"] > 0.0
+        assert energy["contact_loss"] > 0.0
+        assert abs(energy["residual"]) < 1.0e-3 * (energy["friction_loss"] + energy["contact_loss"])
+
+
+def test_energy_of_the_ideal_leg(leg):
+    """Over a cycle nothing is lost; 1e-9 of the work that goes in and out again at the drive."""
+    setup = prepare(leg, clearances=())
+    run, tally = FullRun(setup, tolerance_m=1.0e-11), new_tally(len(leg.joints))
+    start = run.stored_energy
+    run.advance(1.0, tally)
+    turned_over = TURN * np.abs(one_cycle(setup.linkage, 360, TURN).drive_torque).mean()
+    assert abs(tally.drive_integral[POWER] - (run.stored_energy - start)) < 1.0e-9 * turned_over
+
+
+@pytest.mark.parametrize("clearances", [(), ("B",)])
+def test_energy_of_a_torque_from_rest(document, clearances):
+    """With springs, a damper and a load, so that every kind of work is in it."""
+    four_bar = document("four_bar")
+    four_bar["drive"] = {"body": "crank", "torque": 2.0}
+    spring = {"bodies": ["ground", "rocker"], "points": ["A", "C"], "stiffness": 200.0, "free_length": 0.1}
+    four_bar["springs"] = {"back": spring | {"damping": 3.0}}
+    four_bar["loads"] = {
+        "tip": {"body": "coupler", "point": "toe", "phase": [0.0, 0.5], "force": [[0, 4], [2, -6]]}
+    }
+    setup = prepare(parse_mechanism(four_bar, "four_bar"), clearances=clearances)
+    run, tally = FullRun(setup, tolerance_m=1.0e-10), new_tally(4)
+    start = run.stored_energy
+    run.advance(0.5, tally)
+    assert run.q[1, 2] > TURN  # it has turned
+    stored, lost = run.stored_energy - start, tally.integral[:, [FRICTION, DISSIPATION]].sum()
+    assert tally.drive_integral[POWER] == pytest.approx(
+        stored + lost, rel=1.0e-9 if not clearances else 1.0e-4
+    )
+
+
+def test_a_torque_speeds_up_a_crank_by_its_work(document):
+    """From rest and without gravity, kinetic energy is the torque times the angle turned."""
+    four_bar = document("four_bar")
+    four_bar["gravity"] = [0.0, 0.0]
+    four_bar["drive"] = {"body": "crank", "torque": -0.4}
+    run = FullRun(prepare(parse_mechanism(four_bar, "four_bar"), clearances=()), tolerance_m=1.0e-11)
+    assert not run.v.any()
+    assert run.stored_energy == 0.0
+    run.advance(0.6, new_tally(4))
+    assert run.q[1, 2] < -TURN
+    assert run.stored_energy == pytest.approx(-0.4 * run.q[1, 2], rel=1.0e-9)

@@ -1,0 +1,125 @@
+"""The cache of compiled code: it works wherever the package lies, and is never stale."""
+
+import os
+import shutil
+import subprocess
+import sys
+from pathlib import Path
+
+import numpy as np
+import pytest
+from numba.core.errors import NumbaError
+
+import leg_wear_monitor.kernel
+from leg_wear_monitor.kernel import kernel
+
+LEAF = "from leg_wear_monitor.kernel import kernel\n@kernel\ndef slope(x):\n    return {factor} * x\n"
+ROOT = (
+    "from leg_wear_monitor.kernel import entry\nfrom leg_wear_monitor.leaf import slope\n"
+    "@entry\ndef line(x):\n    return slope(x) + 1.0\n"
+)
+SCRIPT = """
+from leg_wear_monitor.kernel import cache_directory
+from leg_wear_monitor.root import line
+print(line(2.0), len(line.stats.cache_hits), cache_directory())
+"""
+
+
+class Package:
+    """A package with our kernel.py, a kernel, and an entry that calls it."""
+
+    def __init__(self, directory: Path) -> None:
+        self.directory = directory / "leg_wear_monitor"
+        self.directory.mkdir()
+        (self.directory / "__init__.py").write_text("")
+        shutil.copy(leg_wear_monitor.kernel.__file__, self.directory)
+        (self.directory / "root.py").write_text(ROOT)
+        self.write(2.0)
+
+    def write(self, factor: float) -> None:
+        (self.directory / "leaf.py").write_text(LEAF.format(factor=factor))
+
+    def run(self, **environment: str) -> list[str]:
+        """In a fresh process: the value, 1 if its code came from the cache or 0, the cache directory."""
+        unset = ("NUMBA_", "XDG_", "COV_", "PYTHONPATH")
+        kept = {key: value for key, value in os.environ.items() if not key.startswith(unset)}
+        kept |= {"PYTHONPATH": str(self.directory.parent), "PYTHONDONTWRITEBYTECODE": "1", **environment}
+        command, where = [sys.executable, "-c", SCRIPT], self.directory.parent
+        return subprocess.run(
+            command, env=kept, cwd=where, text=True, capture_output=True, check=True
+        ).stdout.split()
+
+
+@pytest.fixture
+def package(tmp_path):
+    return Package(tmp_path)
+
+
+@pytest.fixture
+def home(tmp_path):
+    return {"HOME": str(tmp_path / "home")}
+
+
+@pytest.fixture
+def nowhere(tmp_path):
+    """A home that nobody can write to, root neither: it is a file."""
+    (tmp_path / "file").write_text("")
+    return str(tmp_path / "file")
+
+
+def test_a_second_process_does_not_compile(package, home, tmp_path):
+    assert package.run(**home)[:2] == ["5.0", "0"]
+    value, hits, where = package.run(**home)
+    assert (value, hits) == ("5.0", "1")
+    assert Path(where).is_relative_to(tmp_path / "home" / ".cache" / "leg_wear_monitor")
+
+
+def test_the_package_directory_is_not_written_to(package, home):
+    before = sorted(package.directory.rglob("*"))
+    package.directory.chmod(0o555)
+    try:
+        assert package.run(**home)[0] == "5.0"
+    finally:
+        package.directory.chmod(0o755)
+    assert sorted(package.directory.rglob("*")) == before
+
+
+def test_without_a_writable_home_the_temporary_directory_does(package, tmp_path, nowhere):
+    (tmp_path / "tmp").mkdir()
+    for cached in ("0", "1"):
+        value, hits, where = package.run(HOME=nowhere, XDG_CACHE_HOME=nowhere, TMPDIR=str(tmp_path / "tmp"))
+        assert (value, hits) == ("5.0", cached)
+        assert Path(where).is_relative_to(tmp_path / "tmp")
+
+
+@pytest.mark.parametrize("variable", ["NUMBA_CACHE_DIR", "XDG_CACHE_HOME"])
+def test_a_directory_that_is_asked_for_is_used(package, tmp_path, nowhere, variable):
+    where = package.run(**{"HOME": nowhere, variable: str(tmp_path / "asked")})[2]
+    assert Path(where).is_relative_to(tmp_path / "asked")
+
+
+def test_an_entry_follows_a_change_in_the_kernel_it_calls(package, home):
+    """Numba by itself looks at the file of the caller only, and would go on with the old one."""
+    assert package.run(**home)[0] == "5.0"
+    package.write(3.0)
+    assert package.run(**home)[:2] == ["7.0", "0"]
+
+
+def test_another_copy_compiles_for_itself_in_a_directory_of_its_own(package, home, tmp_path):
+    """So a note in the cache directory that all is compiled is true of the copy that left it only."""
+    (tmp_path / "copy").mkdir()
+    _, _, here = package.run(**home)
+    _, hits, there = Package(tmp_path / "copy").run(**home)
+    assert hits == "0"
+    assert here != there
+
+
+def test_a_kernel_that_allocates_is_refused():
+    """It would count references in every step, too."""
+
+    @kernel
+    def greedy(n):
+        return np.zeros(n).sum()
+
+    with pytest.raises(NumbaError):
+        greedy(3)

@@ -1,0 +1,135 @@
+"""Worn surfaces: volume, frames, and what they do to the clearance."""
+
+import math
+
+import numpy as np
+import pytest
+from hypothesis import assume, given
+from hypothesis import strategies as st
+
+from leg_wear_monitor.contact.geometry import contact_half_angle
+from leg_wear_monitor.wear.surfaces import (
+    BUSHING,
+    JOURNAL,
+    SECTORS,
+    Surfaces,
+    deposit_wear,
+    depth_at,
+    fresh_surfaces,
+    local_radii,
+    worn_volume,
+)
+
+pytestmark = pytest.mark.plain
+
+TURN = 2.0 * math.pi
+RADIUS, CLEARANCE = 0.010, 3.0e-4
+WEAR = (2.0e-13, 0.5e-13)  # 1/Pa, bushing and journal
+
+angles = st.floats(-20.0, 20.0)
+touches = st.floats(1.0e-8, 1.0e-5)  # penetration, m
+
+
+@pytest.fixture(scope="module")
+def joint(bushing):
+    """One loose joint whose bushing wears four times as fast as its journal."""
+    return bushing(WEAR)
+
+
+def _worn(seed, feeds_back=1):
+    """Surfaces with a smooth random wear of some micrometres."""
+    rng = np.random.default_rng(seed)
+    centres = (np.arange(SECTORS) + 0.5) * TURN / SECTORS
+    depth = [1.0e-6 * (1.0 + rng.uniform() * np.cos(centres - rng.uniform(0.0, TURN))) for _ in range(2)]
+    return Surfaces(np.array([depth]), feeds_back)
+
+
+def _rub(joint, surfaces, direction, delta, angle_b, angle_j, integral=1.0e6):
+    """Wear a joint whose journal is pressed in a direction by some penetration."""
+    bushing, journal = local_radii(joint, surfaces, 0, direction, angle_b, angle_j)
+    e = bushing - journal + delta
+    ex, ey = e * math.cos(direction), e * math.sin(direction)
+    deposit_wear(joint, surfaces, 0, ex, ey, angle_b, angle_j, integral, np.zeros(surfaces.depth.shape[2]))
+
+
+contacts = st.lists(st.tuples(angles, touches, angles, angles, st.floats(0.0, 1.0e6)), min_size=1, max_size=8)
+
+
+@given(contacts=contacts, feeds_back=st.sampled_from([0, 1]), seed=st.integers(0, 9))
+def test_volume_is_archards_to_rounding(joint, contacts, feeds_back, seed):
+    """On each surface by itself: V = k x integral of F_N |v_t| dt, wherever and however it wore."""
+    surfaces = _worn(seed, feeds_back)
+    before = worn_volume(joint, surfaces)
+    for direction, delta, angle_b, angle_j, integral in contacts:
+        _rub(joint, surfaces, direction, delta, angle_b, angle_j, integral)
+    total = sum(contact[-1] for contact in contacts)
+    worn = worn_volume(joint, surfaces) - before
+    np.testing.assert_allclose(worn[0], np.array(WEAR) * total, rtol=1.0e-9, atol=1.0e-12 * before[0].max())
+
+
+@given(direction=angles, delta=touches, angle_b=angles, angle_j=angles)
+def test_a_fresh_contact_wears_the_arc_of_the_two_circles(joint, direction, delta, angle_b, angle_j):
+    surfaces = fresh_surfaces(joint, True)
+    _rub(joint, surfaces, direction, delta, angle_b, angle_j)
+    psi = contact_half_angle(CLEARANCE + delta, RADIUS, RADIUS - CLEARANCE)
+    sector = TURN / SECTORS
+    for side, body in ((BUSHING, angle_b), (JOURNAL, angle_j)):
+        profile = surfaces.depth[0, side]
+        off = (np.arange(SECTORS) + 0.5) * sector + body - direction
+        off = np.abs((off + math.pi) % TURN - math.pi)
+        # the journal's sectors lie across the bushing's: one more may be touched at either end
+        assert (profile[off > psi + 1.5 * sector] == 0.0).all()
+        assert (profile[off < psi - 1.5 * sector] > 0.0).all()
+        assert profile.min() >= 0.0
+
+
+@given(direction=angles, delta=touches, angle_b=angles, angle_j=angles, turn=angles, seed=st.integers(0, 9))
+def test_where_the_ground_lies_does_not_matter(joint, direction, delta, angle_b, angle_j, turn, seed):
+    """Turn the whole joint: the profiles, which ride on the bodies, wear the same."""
+    u = (direction - angle_b) * SECTORS / TURN
+    assume(0.01 < u - math.floor(u) < 0.99)  # at a border rounding picks the sector
+    here, there = _worn(seed), _worn(seed)
+    _rub(joint, here, direction, delta, angle_b, angle_j)
+    _rub(joint, there, direction + turn, delta, angle_b + turn, angle_j + turn)
+    np.testing.assert_allclose(there.depth, here.depth, atol=1.0e-5 * here.depth.max())
+
+
+@given(sectors=st.integers(-SECTORS, SECTORS), delta=touches, side=st.sampled_from([BUSHING, JOURNAL]))
+def test_a_turned_body_wears_the_same_shape_elsewhere(joint, sectors, delta, side):
+    turn = [0.0, 0.0]
+    turn[side] = sectors * TURN / SECTORS
+    still, turned = fresh_surfaces(joint, True), fresh_surfaces(joint, True)
+    direction = 100.3 * TURN / SECTORS
+    _rub(joint, still, direction, delta, 0.0, 0.0)
+    _rub(joint, turned, direction, delta, *turn)
+    expected = np.roll(still.depth[0, side], -sectors)
+    np.testing.assert_allclose(turned.depth[0, side], expected, atol=1.0e-9 * expected.max())
+
+
+@given(direction=angles, angle_b=angles, angle_j=angles, turn=angles, seed=st.integers(0, 9))
+def test_local_radii_ride_on_the_bodies(joint, direction, angle_b, angle_j, turn, seed):
+    surfaces = _worn(seed)
+    here = local_radii(joint, surfaces, 0, direction, angle_b, angle_j)
+    there = local_radii(joint, surfaces, 0, direction + turn, angle_b + turn, angle_j + turn)
+    assert there == pytest.approx(here, abs=1.0e-17 * SECTORS)
+    assert here[0] - RADIUS == pytest.approx(depth_at(surfaces.depth[0, BUSHING], direction - angle_b))
+    assert RADIUS - CLEARANCE - here[1] == pytest.approx(
+        depth_at(surfaces.depth[0, JOURNAL], direction - angle_j)
+    )
+
+
+@given(direction=angles, seed=st.integers(0, 9))
+def test_wear_that_does_not_feed_back_leaves_the_radii(joint, direction, seed):
+    assert local_radii(joint, _worn(seed, 0), 0, direction, 0.3, -0.7) == (RADIUS, RADIUS - CLEARANCE)
+
+
+@given(angle=angles, seed=st.integers(0, 9))
+def test_depth_is_periodic_between_its_neighbours_and_exact_at_the_centres(angle, seed):
+    profile = _worn(seed).depth[0, 0]
+    i = math.floor(angle * SECTORS / TURN)
+    centre = (i + 0.5) * TURN / SECTORS
+    near = profile[[(i - 1) % SECTORS, i % SECTORS, (i + 1) % SECTORS]]
+    assert near.min() <= depth_at(profile, angle) * (1.0 + 1.0e-12)
+    assert depth_at(profile, angle) <= near.max() * (1.0 + 1.0e-12)
+    assert depth_at(profile, centre) == pytest.approx(profile[i % SECTORS], rel=1.0e-9)
+    assert depth_at(profile, angle + TURN) == pytest.approx(depth_at(profile, angle), rel=1.0e-6)

@@ -15,6 +15,19 @@ def journal_contact(ex, ey, clearance):
 
 
 @kernel
+def worn_contact(ex, ey, clearance, slope):
+    """Penetration [m] and unit normal where the clearance changes with direction by a slope [m/rad].
+
+    The normal is that of the worn wall, the gradient of |e| - c, and the penetration is measured along it:
+    so the normal force has a potential.
+    """
+    delta, rx, ry = journal_contact(ex, ey, clearance)
+    tilt = slope / max(delta + clearance, 1.0e-12)
+    scale = 1.0 / math.sqrt(1.0 + tilt * tilt)
+    return delta * scale, (rx + tilt * ry) * scale, (ry - tilt * rx) * scale, scale
+
+
+@kernel
 def contact_half_angle(eccentricity, bushing_radius, journal_radius):
     """Half angle of the arc [rad] in which two circles with centres this far apart overlap.
 

@@ -85,6 +85,7 @@ class Now(NamedTuple):
     torque_vv: Floats
     torque_ve: Floats
     angle: Floats
+    turn: Floats
     toe: Floats
     load_power: Floats
     viscous: Floats

@@ -12,13 +12,12 @@ from leg_wear_monitor.dynamics.clearance_contact import (
     A0,
     E0,
     F_T,
-    NX,
-    NY,
     TO_X,
     V0,
     accelerate_clearances,
     has_turned,
     look_around,
+    turn_surfaces,
 )
 from leg_wear_monitor.dynamics.clearance_outputs import (
     drive_torque,
@@ -52,6 +51,8 @@ from leg_wear_monitor.dynamics.tally import (
 from leg_wear_monitor.dynamics.touch import (
     DELTA,
     DELTA_DOT,
+    EX,
+    EY,
     F_N,
     NEVER,
     begin_contact,
@@ -127,7 +128,7 @@ def _begin(model, surfaces, state, work):
             ex, ey = state.e[2 * k], state.e[2 * k + 1]
             length = math.hypot(ex, ey)
             nx, ny = (ex / length, ey / length) if length > 0.0 else (1.0, 0.0)
-            look_around(model.contacts, surfaces, k, nx, ny, now.angle[k, 0], now.angle[k, 1], state.local)
+            look_around(model.contacts, surfaces, k, nx, ny, now.angle, now.turn, state.local)
     for i in range(state.e.shape[0]):
         x[E0, i], x[V0, i] = state.e[i], state.v[i]
     drift(now, x)
@@ -137,7 +138,7 @@ def _begin(model, surfaces, state, work):
 def _sample(model, state, t, tally, work):
     """Sample the joints where a step starts; contact begins where a clearance newly looked up is closed."""
     x, start, contacts = work.x, work.start, model.contacts
-    accelerate_clearances(model.law, state.local, state.approach, work.now, x, E0, V0, A0, start)
+    accelerate_clearances(model.law, state.local, state.approach, work.now, 0.0, x, E0, V0, A0, start)
     closed = False
     for k in range(state.approach.shape[0]):
         if state.approach[k] == 0.0 and start[k, DELTA] > 0.0 and start[k, DELTA_DOT] > 0.0:
@@ -147,7 +148,7 @@ def _sample(model, state, t, tally, work):
             )  # fmt: skip
             closed = True
     if closed:
-        accelerate_clearances(model.law, state.local, state.approach, work.now, x, E0, V0, A0, start)
+        accelerate_clearances(model.law, state.local, state.approach, work.now, 0.0, x, E0, V0, A0, start)
 
 
 @kernel
@@ -208,8 +209,10 @@ def _take(model, surfaces, state, t, h, tally, work):
     sudden = half_impulse(x)
     copy_array(end, start)
     wear_what_turned(contacts, surfaces, state.approach, start, now.angle, state.pending, work.weight)
-    if surfaces.feeds_back and _follow(contacts, surfaces, start, now.angle, state.local):
-        _sample(model, state, t + h, tally, work)
+    if surfaces.feeds_back:
+        turn_surfaces(now.speed[0], h, state.local)
+        if _follow(contacts, surfaces, start, now, state.local):
+            _sample(model, state, t + h, tally, work)
     _look_at_drive(now, x, start, work.drive_end, tally)
     sudden += half_impulse(x)
     toe_deviation(now, x, tally.response)
@@ -232,12 +235,14 @@ def _look_at_drive(now, x, sample, out_drive, tally):
 
 
 @kernel
-def _follow(contacts, surfaces, sample, angle, local):
-    """Look up the clearance of the joints whose normal has turned away from where it was known, if any."""
+def _follow(contacts, surfaces, sample, now, local):
+    """Look up the clearance of the joints that have turned away from where it was known, if any."""
     found = False
     for k in range(sample.shape[0]):
-        if has_turned(k, sample[k, NX], sample[k, NY], local):
-            look_around(contacts, surfaces, k, sample[k, NX], sample[k, NY], angle[k, 0], angle[k, 1], local)
+        ex, ey = sample[k, EX], sample[k, EY]
+        length = math.hypot(ex, ey)
+        if length > 0.0 and has_turned(k, ex / length, ey / length, local):
+            look_around(contacts, surfaces, k, ex / length, ey / length, now.angle, now.turn, local)
             found = True
     return found
 
@@ -296,7 +301,7 @@ def observe(model, feeds_back, state, work):
     angle, speed = state.drive[ANGLE], state.drive[SPEED]
     take_tables(model.tables, angle, speed, state.drive[ACCELERATION], now)
     _begin(model, surfaces, state, work)
-    accelerate_clearances(model.law, state.local, state.approach, now, x, E0, V0, A0, work.start)
+    accelerate_clearances(model.law, state.local, state.approach, now, 0.0, x, E0, V0, A0, work.start)
     copy_array(work.backup, state.motion)
     reactions(model.tables, angle, now, x, work.start, work.reaction)
     work.reaction[0] = drive_torque(now, x, work.start)[0]

@@ -14,17 +14,19 @@ from leg_wear_monitor.dynamics.joint_contact import stiffness_at
 from leg_wear_monitor.dynamics.touch import DELTA, DELTA_DOT, EX, EY, F_N, SAMPLE, VX, VY
 from leg_wear_monitor.kernel import kernel
 from leg_wear_monitor.mechanism.arrays import Floats
-from leg_wear_monitor.wear.surfaces import local_radii
+from leg_wear_monitor.wear.surfaces import local_radii, local_slopes
 
 # a sample of a loose joint goes on with: unit normal, friction force [N], slip speed [m/s], derivatives of
-# the normal force by penetration [N/m] and by its rate [N s/m], and its elastic part [N]
-NX, NY, F_T, SLIP, STIFFNESS, DAMPING, ELASTIC = range(SAMPLE, SAMPLE + 7)
-COLUMNS = SAMPLE + 7
+# the normal force by penetration [N/m] and by its rate [N s/m], its elastic part [N], the share of the
+# penetration's rate that the bodies' turning makes, by the crank's speed [m/rad], and the torque on the
+# crank by that [N m]
+NX, NY, F_T, SLIP, STIFFNESS, DAMPING, ELASTIC, CAM, CAM_TORQUE = range(SAMPLE, SAMPLE + 9)
+COLUMNS = SAMPLE + 9
 
-# the clearance around a direction: its value [m] and derivative by the angle [m] there, the direction, and
-# the contact stiffness [N/m^1.5]
-CLEARANCE, SLOPE, TO_X, TO_Y, LOCAL_STIFFNESS = range(5)
-LOCAL = 5
+# the clearance around a direction: its value [m], first and second derivative by the angle, how fast it
+# closes as the crank turns the worn surfaces [m/rad], the direction, and the contact stiffness [N/m^1.5]
+CLEARANCE, SLOPE, CURVATURE, TURNING, TO_X, TO_Y, LOCAL_STIFFNESS = range(7)
+LOCAL = 7
 
 # the laws of a joint: hysteresis factor, friction coefficient, ramp, code of the friction law
 HYSTERESIS_FACTOR, FRICTION_COEFFICIENT, RAMP_0, RAMP_1, FRICTION_LAW = range(5)
@@ -44,16 +46,21 @@ def contact_laws(contacts: ContactArrays) -> Floats:
 
 
 @kernel
-def look_around(contacts, surfaces, k, nx, ny, angle_b, angle_j, local):
-    """Clearance of joint k around the direction (nx, ny); fills its row of local (k, LOCAL)."""
-    direction = math.atan2(ny, nx)
-    half = math.pi / surfaces.depth.shape[2]
+def look_around(contacts, surfaces, k, nx, ny, angle, turn, local):
+    """Clearance of joint k around the direction (nx, ny); fills its row of local (k, LOCAL).
+
+    ``angle`` and ``turn`` (k, 2) are the angles of the bushing's and the journal's bodies, and their
+    derivatives by the crank angle.
+    """
+    direction, angle_b, angle_j = math.atan2(ny, nx), angle[k, 0], angle[k, 1]
     bushing, journal = local_radii(contacts, surfaces, k, direction, angle_b, angle_j)
-    local[k, CLEARANCE], local[k, SLOPE] = bushing - journal, 0.0
+    slope_b, slope_j = local_slopes(surfaces, k, direction, angle_b, angle_j)
+    local[k, CLEARANCE], local[k, SLOPE], local[k, CURVATURE] = bushing - journal, slope_b + slope_j, 0.0
+    local[k, TURNING] = slope_b * turn[k, 0] + slope_j * turn[k, 1]
     if surfaces.feeds_back:
-        ahead, inside = local_radii(contacts, surfaces, k, direction + half, angle_b, angle_j)
-        behind, within = local_radii(contacts, surfaces, k, direction - half, angle_b, angle_j)
-        local[k, SLOPE] = ((ahead - inside) - (behind - within)) / (2.0 * half)
+        ahead_b, ahead_j = local_slopes(surfaces, k, direction + _TURNED, angle_b, angle_j)
+        behind_b, behind_j = local_slopes(surfaces, k, direction - _TURNED, angle_b, angle_j)
+        local[k, CURVATURE] = (ahead_b + ahead_j - behind_b - behind_j) / (2.0 * _TURNED)
     local[k, TO_X], local[k, TO_Y] = nx, ny
     local[k, LOCAL_STIFFNESS] = stiffness_at(contacts, k, bushing, journal)
 
@@ -66,14 +73,14 @@ def has_turned(k, nx, ny, local):
 
 
 @kernel
-def accelerate_clearances(law, local, approach, now, x, at_e, at_v, out_a, out_sample):
+def accelerate_clearances(law, local, approach, now, ahead, x, at_e, at_v, out_a, out_sample):
     """Accelerations of the eccentricities with all contact forces; samples the joints.
 
-    law (k, 5), local (k, LOCAL), approach (k,); ``now`` the tables at the present crank angle; x
-    (VECTORS, d) with eccentricities and rates in rows at_e and at_v, the result in row out_a;
-    out_sample (k, COLUMNS).
+    law (k, 5), local (k, LOCAL), approach (k,); ``now`` the tables at the present crank angle; ``ahead``
+    [s] how long the worn surfaces have turned since ``local`` was right; x (VECTORS, d) with
+    eccentricities and rates in rows at_e and at_v, the result in row out_a; out_sample (k, COLUMNS).
     """
-    d = x.shape[1]
+    d, speed = x.shape[1], now.speed[0]
     inverse_mass, lever, response = now.inverse_mass, now.lever, now.lever_response
     for i in range(d):
         x[out_a, i] = x[DRIFT, i]
@@ -82,8 +89,16 @@ def accelerate_clearances(law, local, approach, now, x, at_e, at_v, out_a, out_s
         length = math.sqrt(ex * ex + ey * ey)
         inverse = 1.0 / length if length > 0.0 else 0.0
         nx, ny = ex * inverse, ey * inverse
-        delta = length - local[k, CLEARANCE] - local[k, SLOPE] * (local[k, TO_X] * ny - local[k, TO_Y] * nx)
-        delta_dot = nx * vx + ny * vy
+        delta, cam = length - local[k, CLEARANCE], 0.0
+        if local[k, SLOPE] != 0.0:  # worn: as contact.geometry.worn_contact, with the wall's own turning
+            across, slope = local[k, TO_X] * ny - local[k, TO_Y] * nx, local[k, SLOPE]
+            delta -= across * (slope + 0.5 * local[k, CURVATURE] * across) - local[k, TURNING] * speed * ahead
+            tilt = (slope + local[k, CURVATURE] * across) * inverse
+            scale = 1.0 / math.sqrt(1.0 + tilt * tilt)
+            delta *= scale
+            cam = local[k, TURNING] * scale
+            nx, ny = (nx + tilt * ny) * scale, (ny - tilt * nx) * scale
+        delta_dot = nx * vx + ny * vy + cam * speed
         f_n, f_t, slip, elastic, stiffness, damping = 0.0, 0.0, 0.0, 0.0, 0.0, 0.0
         if delta > 0.0 and approach[k] > 0.0:
             elastic = elastic_force(local[k, LOCAL_STIFFNESS], delta)
@@ -92,7 +107,7 @@ def accelerate_clearances(law, local, approach, now, x, at_e, at_v, out_a, out_s
             if f_n > 0.0:
                 stiffness = 1.5 * f_n / delta
                 damping = elastic * loss
-                slip = nx * vy - ny * vx + now.lever_drive[k] * now.speed[0]
+                slip = nx * vy - ny * vx + now.lever_drive[k] * speed
                 for i in range(d):
                     slip += lever[k, i] * x[at_v, i]
                 mu, code = law[k, FRICTION_COEFFICIENT], law[k, FRICTION_LAW]
@@ -106,3 +121,11 @@ def accelerate_clearances(law, local, approach, now, x, at_e, at_v, out_a, out_s
         out_sample[k, F_N], out_sample[k, DELTA], out_sample[k, DELTA_DOT] = f_n, delta, delta_dot
         out_sample[k, NX], out_sample[k, NY], out_sample[k, F_T], out_sample[k, SLIP] = nx, ny, f_t, slip
         out_sample[k, STIFFNESS], out_sample[k, DAMPING], out_sample[k, ELASTIC] = stiffness, damping, elastic
+        out_sample[k, CAM], out_sample[k, CAM_TORQUE] = cam, f_n * cam
+
+
+@kernel
+def turn_surfaces(speed, h, local):
+    """Let the worn surfaces turn with the crank for a time h [s]: their clearances close or open."""
+    for k in range(local.shape[0]):
+        local[k, CLEARANCE] -= local[k, TURNING] * speed * h

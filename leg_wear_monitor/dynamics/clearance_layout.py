@@ -19,10 +19,10 @@ def motion_shapes(k: int, damped: bool) -> Shapes:
     ``torque_a`` by e'', ``torque_v`` by w e' and e', ``torque_t`` by the friction forces, ``torque_e`` by e
     times (1, w', w^2), and the forms ``torque_ae`` of (e'', e), ``torque_vv`` of (e', e'), ``torque_ve`` of
     (w e', e). In all square parts the second index is the one that results (of the torque's forms the first
-    vector's), so that loops run along rows. ``angle`` of the bushing's and the journal's bodies; ``toe`` its
-    position, by 1 and e, and the derivative of the latter by the crank angle; ``load_power`` the power of
-    loads by (e', w). With dampers, ``viscous`` accelerations and ``damper`` the power taken as a quadratic
-    form, both by (e', w).
+    vector's), so that loops run along rows. ``angle`` of the bushing's and the journal's bodies, ``turn`` its
+    derivative; ``toe`` its position, by 1 and e, and the derivative of the latter by the crank angle;
+    ``load_power`` the power of loads by (e', w). With dampers, ``viscous`` accelerations and ``damper`` the
+    power taken as a quadratic form, both by (e', w).
     """
     d = 2 * k
     return {
@@ -42,6 +42,7 @@ def motion_shapes(k: int, damped: bool) -> Shapes:
         "torque_vv": (d, d),
         "torque_ve": (d, d),
         "angle": (k, 2),
+        "turn": (k, 2),
         "toe": (2, 1 + 2 * d),
         "load_power": (d + 1,),
         "viscous": (d, d + 1) if damped else (0, 0),

@@ -3,7 +3,7 @@
 import math
 
 from leg_wear_monitor.dynamics.clearance import blend
-from leg_wear_monitor.dynamics.clearance_contact import A0, DV, E0, F_T, TA, TV, V0
+from leg_wear_monitor.dynamics.clearance_contact import A0, CAM_TORQUE, DV, E0, F_T, TA, TV, V0
 from leg_wear_monitor.kernel import kernel
 
 
@@ -29,7 +29,7 @@ def drive_torque(now, x, sample):
         torque += x[TV, i] * x[V0, i]
         torque += (by_e[0, i] + acceleration * by_e[1, i] + speed * speed * by_e[2, i]) * x[E0, i]
     for k in range(sample.shape[0]):
-        torque += now.torque_t[k] * sample[k, F_T]
+        torque += now.torque_t[k] * sample[k, F_T] + sample[k, CAM_TORQUE]
     return torque + sudden, sudden, ideal
 
 

@@ -22,8 +22,6 @@ from leg_wear_monitor.dynamics.clearance_contact import (
     K2E,
     K2V,
     LOCAL_STIFFNESS,
-    NX,
-    NY,
     RAMP_0,
     RAMP_1,
     RE,
@@ -72,24 +70,24 @@ def try_step(law, tolerance, local, approach, h, now, system, x, start, end):
     filtered like a stage so that stiff contacts do not exaggerate it (as Shampine does).
     """
     d = x.shape[1]
-    m = factorise_contacts(h, now.inverse_mass, start, system)
-    solve_contacts(h, system, m, x, V0, A0, K1E, K1V)
+    m = factorise_contacts(h, now.inverse_mass, now.speed[0], start, system)
+    solve_contacts(h, system, m, 1.0, x, V0, A0, K1E, K1V)
     for i in range(d):
         x[EM, i] = x[E0, i] + h * x[K1E, i]
         x[VM, i] = x[V0, i] + h * x[K1V, i]
-    accelerate_clearances(law, local, approach, now, x, EM, VM, RV, end)
+    accelerate_clearances(law, local, approach, now, h, x, EM, VM, RV, end)
     for i in range(d):
         x[RE, i] = x[VM, i] - 2.0 * x[K1E, i]
         x[RV, i] -= 2.0 * x[K1V, i]
-    solve_contacts(h, system, m, x, RE, RV, K2E, K2V)
+    solve_contacts(h, system, m, -1.0, x, RE, RV, K2E, K2V)
     for i in range(d):
         x[E1, i] = x[E0, i] + h * (1.5 * x[K1E, i] + 0.5 * x[K2E, i])
         x[V1, i] = x[V0, i] + h * (1.5 * x[K1V, i] + 0.5 * x[K2V, i])
-    accelerate_clearances(law, local, approach, now, x, E1, V1, A1, end)
+    accelerate_clearances(law, local, approach, now, h, x, E1, V1, A1, end)
     for i in range(d):
         x[RE, i] = x[E1, i] - x[E0, i] - h * x[V0, i] - h * h / 6.0 * (2.0 * x[A0, i] + x[A1, i])
         x[RV, i] = x[V1, i] - x[V0, i] - 0.5 * h * (x[A0, i] + x[A1, i])
-    solve_contacts(h, system, m, x, RE, RV, RE, RV)
+    solve_contacts(h, system, m, 0.0, x, RE, RV, RE, RV)
     worst = 0.0
     for i in range(d):
         ratio = max(abs(x[RE, i]) * tolerance[0], abs(x[RV, i]) * tolerance[1])
@@ -195,6 +193,6 @@ def wear_what_turned(contacts, surfaces, approach, start, angle, pending, out_we
     """Wear off what is pending where contact has ended or its normal has turned by a sector."""
     sector = 2.0 * math.pi / surfaces.depth.shape[2]
     for k in range(pending.shape[0]):
-        turned = abs(pending[k, 1] * start[k, NY] - pending[k, 2] * start[k, NX])
-        if approach[k] == 0.0 or turned > sector * pending[k, 0]:
+        turned = abs(pending[k, 1] * start[k, EY] - pending[k, 2] * start[k, EX])
+        if approach[k] == 0.0 or turned > sector * pending[k, 3]:
             wear_off(contacts, surfaces, k, angle, pending, out_weight)

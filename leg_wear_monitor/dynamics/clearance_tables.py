@@ -68,6 +68,7 @@ def build_tables(linkage: Linkage, contacts: ContactArrays, points: int = POINTS
         "lever": project(basis.s, basis.friction).transpose(0, 2, 1),
         "lever_drive": project(basis.friction, basis.drive[:, :, None]),
         "angle": motion.q[:, linkage.arrays.joint_body[contacts.joint], 2],
+        "turn": motion.v[:, linkage.arrays.joint_body[contacts.joint], 2],
         "toe": _toe(linkage, motion, basis),
         "load_power": project(basis.all, basis.load[:, :, None]),
         "damper": project(basis.all, basis.drag),

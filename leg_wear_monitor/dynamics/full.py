@@ -108,7 +108,7 @@ def add_contacts(model, surfaces, approach, q, v, scratch, out_rate):
     contacts = model.contacts
     for k in range(contacts.joint.shape[0]):
         ex, ey, vx, vy, b, j, sbx, sby = eccentricity(model, k, q, v, scratch.cs)
-        f_n, f_t, delta, delta_dot, slip, nx, ny, stiffness = joint_force(
+        f_n, f_t, delta, delta_dot, slip, nx, ny, stiffness, moment = joint_force(
             contacts, surfaces, k, ex, ey, vx, vy, q[b, 2], q[j, 2], v[b, 2], v[j, 2], approach[k]
         )
         sample = scratch.contact[k]
@@ -121,6 +121,8 @@ def add_contacts(model, surfaces, approach, q, v, scratch, out_rate):
             px, py = sbx + contacts.bushing_radius[k] * nx, sby + contacts.bushing_radius[k] * ny
             add_force(b, px, py, -fx, -fy, scratch.force)
             add_force(j, q[b, 0] + px - q[j, 0], q[b, 1] + py - q[j, 1], fx, fy, scratch.force)
+            scratch.force[b, 2] -= moment
+            scratch.force[j, 2] += moment
             rate[FORCE_SQUARED] = f_n * f_n + f_t * f_t
             rate[FORCE] = np.sqrt(rate[FORCE_SQUARED])
             rate[CONTACT] = 1.0

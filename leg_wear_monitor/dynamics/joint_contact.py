@@ -6,21 +6,24 @@ physics.md sections 3 to 6.
 import math
 
 from leg_wear_monitor.contact.friction import friction_force
-from leg_wear_monitor.contact.geometry import contact_stiffness, journal_contact
+from leg_wear_monitor.contact.geometry import contact_stiffness, journal_contact, worn_contact
 from leg_wear_monitor.contact.normal import elastic_energy, normal_force
 from leg_wear_monitor.kernel import kernel
-from leg_wear_monitor.wear.surfaces import local_radii
+from leg_wear_monitor.wear.surfaces import local_radii, local_slopes
 
 
 @kernel
 def penetration(contacts, surfaces, k, ex, ey, angle_b, angle_j):
     """Penetration [m], unit normal and local radii of bushing and journal [m] of loose joint k."""
     if surfaces.feeds_back:
-        bushing, journal = local_radii(contacts, surfaces, k, math.atan2(ey, ex), angle_b, angle_j)
-        delta, nx, ny = journal_contact(ex, ey, bushing - journal)
-        return delta, nx, ny, bushing, journal
+        direction = math.atan2(ey, ex)
+        bushing, journal = local_radii(contacts, surfaces, k, direction, angle_b, angle_j)
+        slope_b, slope_j = local_slopes(surfaces, k, direction, angle_b, angle_j)
+        delta, nx, ny, scale = worn_contact(ex, ey, bushing - journal, slope_b + slope_j)
+        return delta, nx, ny, bushing, journal, slope_b * scale, slope_j * scale
     delta, nx, ny = journal_contact(ex, ey, contacts.clearance[k])
-    return delta, nx, ny, contacts.bushing_radius[k], contacts.bushing_radius[k] - contacts.clearance[k]
+    bushing = contacts.bushing_radius[k]
+    return delta, nx, ny, bushing, bushing - contacts.clearance[k], 0.0, 0.0
 
 
 @kernel
@@ -37,29 +40,32 @@ def joint_force(contacts, surfaces, k, ex, ey, vx, vy, angle_b, angle_j, speed_b
 
     Eccentricity (ex, ey) [m] and its rate [m/s]; angles [rad] and speeds [rad/s] of the bushing's and the
     journal's body. Both forces act at the bushing's surface point P_b + R_b n, so action equals reaction
-    in moments too; the slip is that of the two bodies there, and the work of the forces is F_N delta_dot
-    and F_t v_t exactly.
+    in moments too; the slip is that of the two bodies there. A worn bushing that turns lifts the journal
+    like a cam, by the couple ``moment`` between the bodies. The work of all is F_N delta_dot and F_t v_t
+    exactly.
 
     Returns
     -------
-    f_n, f_t, delta, delta_dot, slip, nx, ny, stiffness
-        The force on the journal is -f_n n + f_t t with t = (-n_y, n_x).
+    f_n, f_t, delta, delta_dot, slip, nx, ny, stiffness, moment
+        The force on the journal is -f_n n + f_t t with t = (-n_y, n_x), the couple on it ``moment`` [N m].
     """
-    delta, nx, ny, bushing, journal = penetration(contacts, surfaces, k, ex, ey, angle_b, angle_j)
-    delta_dot = nx * vx + ny * vy
+    delta, nx, ny, bushing, journal, slope_b, slope_j = penetration(
+        contacts, surfaces, k, ex, ey, angle_b, angle_j
+    )
+    delta_dot = nx * vx + ny * vy + slope_b * speed_b + slope_j * speed_j
     radius = contacts.bushing_radius[k]
-    slip = nx * vy - ny * vx + speed_j * (radius - math.hypot(ex, ey)) - speed_b * radius
+    slip = nx * vy - ny * vx + speed_j * (radius - ex * nx - ey * ny) - speed_b * radius
     if delta <= 0.0 or approach_speed == 0.0:
-        return 0.0, 0.0, delta, delta_dot, slip, nx, ny, 0.0
+        return 0.0, 0.0, delta, delta_dot, slip, nx, ny, 0.0, 0.0
     stiffness = stiffness_at(contacts, k, bushing, journal)
     f_n = normal_force(stiffness, contacts.hysteresis[k], delta, delta_dot, approach_speed)
     mu, v0, v1 = contacts.friction[k, 0], contacts.friction[k, 1], contacts.friction[k, 2]
     f_t = friction_force(contacts.friction_law[k], mu, v0, v1, f_n, slip)
-    return f_n, f_t, delta, delta_dot, slip, nx, ny, stiffness
+    return f_n, f_t, delta, delta_dot, slip, nx, ny, stiffness, f_n * slope_b
 
 
 @kernel
 def contact_energy(contacts, surfaces, k, ex, ey, angle_b, angle_j):
     """Elastic energy [J] in loose joint k."""
-    delta, _, _, bushing, journal = penetration(contacts, surfaces, k, ex, ey, angle_b, angle_j)
+    delta, _, _, bushing, journal, _, _ = penetration(contacts, surfaces, k, ex, ey, angle_b, angle_j)
     return elastic_energy(stiffness_at(contacts, k, bushing, journal), delta)

@@ -15,7 +15,7 @@ from typing import NamedTuple
 
 import numpy as np
 
-from leg_wear_monitor.dynamics.clearance_contact import DAMPING, NX, NY, STIFFNESS
+from leg_wear_monitor.dynamics.clearance_contact import CAM, DAMPING, NX, NY, STIFFNESS
 from leg_wear_monitor.kernel import kernel
 from leg_wear_monitor.mechanism.arrays import Floats, Ints
 
@@ -26,7 +26,8 @@ class ContactSystem(NamedTuple):
     """The factored system of m contacts among k loose joints.
 
     ``active`` (k,) their joints, ``normal`` (k, 2), ``response`` B^T (k, d), ``factor`` (k, k) L with 1 / D
-    of L D L^T on its diagonal, ``ratio`` (k,) gamma h K / D, ``p`` (k,).
+    of L D L^T on its diagonal, ``ratio`` (k,) gamma h K / D, ``cam`` (k,) the share of the
+    penetration's rate that does not come from e', ``p`` (k,).
     """
 
     active: Ints
@@ -34,6 +35,7 @@ class ContactSystem(NamedTuple):
     response: Floats
     factor: Floats
     ratio: Floats
+    cam: Floats
     p: Floats
 
 
@@ -45,12 +47,13 @@ def contact_system(k: int) -> ContactSystem:
         response=np.zeros((k, 2 * k)),
         factor=np.zeros((k, k)),
         ratio=np.zeros(k),
+        cam=np.zeros(k),
         p=np.zeros(k),
     )
 
 
 @kernel
-def factorise_contacts(h, inverse_mass, sample, out_system):
+def factorise_contacts(h, inverse_mass, speed, sample, out_system):
     """Prepare the system for a step of length h [s] from a sample (k, COLUMNS); returns how many touch."""
     m, g = 0, GAMMA * h
     response, factor = out_system.response, out_system.factor
@@ -63,6 +66,7 @@ def factorise_contacts(h, inverse_mass, sample, out_system):
             compliance = 1.0 / (g * (sample[k, DAMPING] + g * stiffness))
             out_system.ratio[m] = g * stiffness * compliance
             out_system.active[m] = k
+            out_system.cam[m] = sample[k, CAM] * speed
             out_system.normal[m, 0], out_system.normal[m, 1] = nx, ny
             for a in range(m + 1):
                 factor[m, a] = nx * response[a, 2 * k] + ny * response[a, 2 * k + 1]
@@ -81,13 +85,16 @@ def factorise_contacts(h, inverse_mass, sample, out_system):
 
 
 @kernel
-def solve_contacts(h, system, m, x, r_e, r_v, out_e, out_v):
-    """Solve (I - gamma h A) y = r: rows r_e, r_v of x (rows, d) are r, rows out_e, out_v become y."""
+def solve_contacts(h, system, m, stage, x, r_e, r_v, out_e, out_v):
+    """Solve (I - gamma h A) y = r: rows r_e, r_v of x (rows, d) are r, rows out_e, out_v become y.
+
+    ``stage`` is 1 in the first stage, -1 in the second (1 less twice the slope of time), 0 for an error.
+    """
     g, p, factor, response = GAMMA * h, system.p, system.factor, system.response
     for a in range(m):
         k, nx, ny = system.active[a], system.normal[a, 0], system.normal[a, 1]
         p[a] = nx * x[r_v, 2 * k] + ny * x[r_v, 2 * k + 1]
-        p[a] += system.ratio[a] * (nx * x[r_e, 2 * k] + ny * x[r_e, 2 * k + 1])
+        p[a] += system.ratio[a] * (nx * x[r_e, 2 * k] + ny * x[r_e, 2 * k + 1] + stage * system.cam[a])
         for b in range(a):
             p[a] -= factor[a, b] * p[b]
     for a in range(m - 1, -1, -1):

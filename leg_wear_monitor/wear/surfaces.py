@@ -34,13 +34,24 @@ def fresh_surfaces(contacts: ContactArrays, feeds_back: bool, sectors: int = SEC
 
 @kernel
 def depth_at(profile, angle):
-    """Depth [m] at an angle of the surface's own frame [rad], linear between sector centres."""
+    """Depth [m] at an angle of the surface's own frame [rad]: the quadratic spline over the sectors."""
     n = profile.shape[0]
-    u = angle * (n / (2.0 * math.pi)) - 0.5
-    floor = math.floor(u)
-    i = int(floor) % n
-    w = u - floor
-    return profile[i] + w * (profile[(i + 1) % n] - profile[i])
+    u = angle * (n / (2.0 * math.pi))
+    i = math.floor(u)
+    w = u - i
+    before, here, after = profile[(i - 1) % n], profile[i % n], profile[(i + 1) % n]
+    return 0.5 * ((1.0 - w) ** 2 * before + (1.0 + 2.0 * w * (1.0 - w)) * here + w * w * after)
+
+
+@kernel
+def slope_at(profile, angle):
+    """Derivative of `depth_at` by the angle [m/rad]."""
+    n = profile.shape[0]
+    u = angle * (n / (2.0 * math.pi))
+    i = math.floor(u)
+    w = u - i
+    before, here, after = profile[(i - 1) % n], profile[i % n], profile[(i + 1) % n]
+    return ((1.0 - w) * (here - before) + w * (after - here)) * (n / (2.0 * math.pi))
 
 
 @kernel
@@ -52,6 +63,15 @@ def local_radii(contacts, surfaces, k, direction, angle_b, angle_j):
         bushing += depth_at(surfaces.depth[k, BUSHING], direction - angle_b)
         journal -= depth_at(surfaces.depth[k, JOURNAL], direction - angle_j)
     return bushing, journal
+
+
+@kernel
+def local_slopes(surfaces, k, direction, angle_b, angle_j):
+    """Derivatives by the direction [m/rad] of the depths of bushing and journal, 0 unless wear feeds back."""
+    if not surfaces.feeds_back:
+        return 0.0, 0.0
+    bushing = slope_at(surfaces.depth[k, BUSHING], direction - angle_b)
+    return bushing, slope_at(surfaces.depth[k, JOURNAL], direction - angle_j)
 
 
 @kernel

@@ -17,6 +17,7 @@ from leg_wear_monitor.wear.surfaces import (
     depth_at,
     fresh_surfaces,
     local_radii,
+    slope_at,
     worn_volume,
 )
 
@@ -124,12 +125,17 @@ def test_wear_that_does_not_feed_back_leaves_the_radii(joint, direction, seed):
 
 
 @given(angle=angles, seed=st.integers(0, 9))
-def test_depth_is_periodic_between_its_neighbours_and_exact_at_the_centres(angle, seed):
+def test_depth_is_periodic_between_its_neighbours_and_smooth(angle, seed):
+    """A quadratic spline: inside its three sectors, its slope the derivative, exact where depth is linear."""
     profile = _worn(seed).depth[0, 0]
     i = math.floor(angle * SECTORS / TURN)
-    centre = (i + 0.5) * TURN / SECTORS
     near = profile[[(i - 1) % SECTORS, i % SECTORS, (i + 1) % SECTORS]]
     assert near.min() <= depth_at(profile, angle) * (1.0 + 1.0e-12)
     assert depth_at(profile, angle) <= near.max() * (1.0 + 1.0e-12)
-    assert depth_at(profile, centre) == pytest.approx(profile[i % SECTORS], rel=1.0e-9)
     assert depth_at(profile, angle + TURN) == pytest.approx(depth_at(profile, angle), rel=1.0e-6)
+    step = 1.0e-6
+    rise = (depth_at(profile, angle + step) - depth_at(profile, angle - step)) / (2.0 * step)
+    assert slope_at(profile, angle) == pytest.approx(rise, abs=1.0e-9)
+    ramp = np.arange(SECTORS) * 1.0e-9
+    middle = math.pi + (angle % 1.0)
+    assert depth_at(ramp, middle) == pytest.approx((middle * SECTORS / TURN - 0.5) * 1.0e-9, rel=1.0e-9)

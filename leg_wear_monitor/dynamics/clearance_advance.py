@@ -128,7 +128,8 @@ def _begin(model, surfaces, state, work):
             ex, ey = state.e[2 * k], state.e[2 * k + 1]
             length = math.hypot(ex, ey)
             nx, ny = (ex / length, ey / length) if length > 0.0 else (1.0, 0.0)
-            look_around(model.contacts, surfaces, k, nx, ny, now.angle, now.turn, state.local)
+            beyond = -0.5 * now.speed[0] * model.interval  # the tables are those of the interval's middle
+            look_around(model.contacts, surfaces, k, nx, ny, now, beyond, state.local)
     for i in range(state.e.shape[0]):
         x[E0, i], x[V0, i] = state.e[i], state.v[i]
     drift(now, x)
@@ -210,8 +211,9 @@ def _take(model, surfaces, state, t, h, tally, work):
     copy_array(end, start)
     wear_what_turned(contacts, surfaces, state.approach, start, now.angle, state.pending, work.weight)
     if surfaces.feeds_back:
-        turn_surfaces(now.speed[0], h, state.local)
-        if _follow(contacts, surfaces, start, now, state.local):
+        turn_surfaces(now.speed[0] * h, state.local)
+        beyond = now.speed[0] * (t + h - (state.intervals[0] + 0.5) * model.interval)
+        if _follow(contacts, surfaces, start, now, beyond, state.local):
             _sample(model, state, t + h, tally, work)
     _look_at_drive(now, x, start, work.drive_end, tally)
     sudden += half_impulse(x)
@@ -235,14 +237,14 @@ def _look_at_drive(now, x, sample, out_drive, tally):
 
 
 @kernel
-def _follow(contacts, surfaces, sample, now, local):
+def _follow(contacts, surfaces, sample, now, beyond, local):
     """Look up the clearance of the joints that have turned away from where it was known, if any."""
     found = False
     for k in range(sample.shape[0]):
         ex, ey = sample[k, EX], sample[k, EY]
         length = math.hypot(ex, ey)
         if length > 0.0 and has_turned(k, ex / length, ey / length, local):
-            look_around(contacts, surfaces, k, ex / length, ey / length, now.angle, now.turn, local)
+            look_around(contacts, surfaces, k, ex / length, ey / length, now, beyond, local)
             found = True
     return found
 

@@ -23,10 +23,12 @@ from leg_wear_monitor.wear.surfaces import local_radii, local_slopes
 NX, NY, F_T, SLIP, STIFFNESS, DAMPING, ELASTIC, CAM, CAM_TORQUE = range(SAMPLE, SAMPLE + 9)
 COLUMNS = SAMPLE + 9
 
-# the clearance around a direction: its value [m], first and second derivative by the angle, how fast it
-# closes as the crank turns the worn surfaces [m/rad], the direction, and the contact stiffness [N/m^1.5]
-CLEARANCE, SLOPE, CURVATURE, TURNING, TO_X, TO_Y, LOCAL_STIFFNESS = range(7)
-LOCAL = 7
+# the clearance around a direction, to the second order in the angle from it and in how far the crank has
+# turned the worn surfaces since: its value [m]; first and second derivative by the angle; how fast it
+# closes by the crank angle, and the second derivatives by angle and crank, and by crank; the direction; and
+# the contact stiffness [N/m^1.5]
+CLEARANCE, SLOPE, CURVATURE, TURNING, SLOPE_TURNING, TURNING_TURNING, TO_X, TO_Y, LOCAL_STIFFNESS = range(9)
+LOCAL = 9
 
 # the laws of a joint: hysteresis factor, friction coefficient, ramp, code of the friction law
 HYSTERESIS_FACTOR, FRICTION_COEFFICIENT, RAMP_0, RAMP_1, FRICTION_LAW = range(5)
@@ -46,13 +48,13 @@ def contact_laws(contacts: ContactArrays) -> Floats:
 
 
 @kernel
-def look_around(contacts, surfaces, k, nx, ny, angle, turn, local):
+def look_around(contacts, surfaces, k, nx, ny, now, beyond, local):
     """Clearance of joint k around the direction (nx, ny); fills its row of local (k, LOCAL).
 
-    ``angle`` and ``turn`` (k, 2) are the angles of the bushing's and the journal's bodies, and their
-    derivatives by the crank angle.
+    ``beyond`` [rad] is how far the crank has turned since the angle of the tables ``now``.
     """
-    direction, angle_b, angle_j = math.atan2(ny, nx), angle[k, 0], angle[k, 1]
+    direction, turn = math.atan2(ny, nx), now.turn
+    angle_b, angle_j = now.angle[k, 0] + turn[k, 0] * beyond, now.angle[k, 1] + turn[k, 1] * beyond
     bushing, journal = local_radii(contacts, surfaces, k, direction, angle_b, angle_j)
     slope_b, slope_j = local_slopes(surfaces, k, direction, angle_b, angle_j)
     local[k, CLEARANCE], local[k, SLOPE], local[k, CURVATURE] = bushing - journal, slope_b + slope_j, 0.0
@@ -60,7 +62,10 @@ def look_around(contacts, surfaces, k, nx, ny, angle, turn, local):
     if surfaces.feeds_back:
         ahead_b, ahead_j = local_slopes(surfaces, k, direction + _TURNED, angle_b, angle_j)
         behind_b, behind_j = local_slopes(surfaces, k, direction - _TURNED, angle_b, angle_j)
-        local[k, CURVATURE] = (ahead_b + ahead_j - behind_b - behind_j) / (2.0 * _TURNED)
+        bend_b, bend_j = (ahead_b - behind_b) / (2.0 * _TURNED), (ahead_j - behind_j) / (2.0 * _TURNED)
+        local[k, CURVATURE] = bend_b + bend_j
+        local[k, SLOPE_TURNING] = bend_b * turn[k, 0] + bend_j * turn[k, 1]
+        local[k, TURNING_TURNING] = bend_b * turn[k, 0] ** 2 + bend_j * turn[k, 1] ** 2
     local[k, TO_X], local[k, TO_Y] = nx, ny
     local[k, LOCAL_STIFFNESS] = stiffness_at(contacts, k, bushing, journal)
 
@@ -125,7 +130,9 @@ def accelerate_clearances(law, local, approach, now, ahead, x, at_e, at_v, out_a
 
 
 @kernel
-def turn_surfaces(speed, h, local):
-    """Let the worn surfaces turn with the crank for a time h [s]: their clearances close or open."""
+def turn_surfaces(angle, local):
+    """Let the crank turn the worn surfaces by an angle [rad]: their clearances close or open."""
     for k in range(local.shape[0]):
-        local[k, CLEARANCE] -= local[k, TURNING] * speed * h
+        local[k, CLEARANCE] -= angle * (local[k, TURNING] - 0.5 * angle * local[k, TURNING_TURNING])
+        local[k, SLOPE] -= angle * local[k, SLOPE_TURNING]
+        local[k, TURNING] -= angle * local[k, TURNING_TURNING]

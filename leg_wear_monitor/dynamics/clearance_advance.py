@@ -12,11 +12,8 @@ from leg_wear_monitor.dynamics.clearance_contact import (
     A0,
     E0,
     F_T,
-    TO_X,
     V0,
     accelerate_clearances,
-    has_turned,
-    look_around,
     turn_surfaces,
 )
 from leg_wear_monitor.dynamics.clearance_outputs import (
@@ -26,8 +23,8 @@ from leg_wear_monitor.dynamics.clearance_outputs import (
     reactions,
     toe_deviation,
 )
+from leg_wear_monitor.dynamics.clearance_start import RENEWAL, follow_clearances, load_state, sample_start
 from leg_wear_monitor.dynamics.clearance_step import (
-    drift,
     gather_wear,
     integrate_joints,
     shift_start,
@@ -50,12 +47,8 @@ from leg_wear_monitor.dynamics.tally import (
 )
 from leg_wear_monitor.dynamics.touch import (
     DELTA,
-    DELTA_DOT,
-    EX,
-    EY,
     F_N,
     NEVER,
-    begin_contact,
     first_touch,
     update_contacts,
 )
@@ -65,7 +58,6 @@ from leg_wear_monitor.wear.surfaces import Surfaces
 MOST_TRIALS = 20000  # steps tried in an interval before it is given up
 
 _SHORTEST_STEP = 1.0e-13  # s
-_RENEWAL = 2  # intervals between two looks at the surfaces and at the reactions of the ideal joints
 # of the drive at one end of a step: torque [N m], its part without e'', power of loads [W]
 WHOLE, SMOOTH, OUTSIDE = 0, 1, 2
 
@@ -106,8 +98,8 @@ def _interval(model, surfaces, state, polynomial, tally, work):
     if not (abs(speed) < _FASTEST and abs(acceleration) * interval < _FASTEST):
         return INVALID_DRIVE, -1
     take_tables(model.tables, angle, speed, acceleration, work.now)
-    _begin(model, surfaces, state, work)
-    _sample(model, state, state.intervals[0] * interval, tally, work)
+    load_state(model, surfaces, state, work)
+    sample_start(model, state, state.intervals[0] * interval, tally, work)
     status, k = _steps(model, surfaces, state, tally, work)
     if status != DONE:
         return status, k
@@ -116,40 +108,6 @@ def _interval(model, surfaces, state, polynomial, tally, work):
         state.e[i], state.v[i] = work.x[E0, i], work.x[V0, i]
     _finish(model, surfaces, state, tally, work)
     return DONE, -1
-
-
-@kernel
-def _begin(model, surfaces, state, work):
-    """Load the state, and the clearances and the drift that go with it under the tables now."""
-    x, now = work.x, work.now
-    for k in range(state.approach.shape[0]):
-        turn = (int(state.intervals[0]) + k) % _RENEWAL == 0
-        if math.isnan(state.local[k, TO_X]) or (surfaces.feeds_back and turn):
-            ex, ey = state.e[2 * k], state.e[2 * k + 1]
-            length = math.hypot(ex, ey)
-            nx, ny = (ex / length, ey / length) if length > 0.0 else (1.0, 0.0)
-            beyond = -0.5 * now.speed[0] * model.interval  # the tables are those of the interval's middle
-            look_around(model.contacts, surfaces, k, nx, ny, now, beyond, state.local)
-    for i in range(state.e.shape[0]):
-        x[E0, i], x[V0, i] = state.e[i], state.v[i]
-    drift(now, x)
-
-
-@kernel
-def _sample(model, state, t, tally, work):
-    """Sample the joints where a step starts; contact begins where a clearance newly looked up is closed."""
-    x, start, contacts = work.x, work.start, model.contacts
-    accelerate_clearances(model.law, state.local, state.approach, work.now, 0.0, x, E0, V0, A0, start)
-    closed = False
-    for k in range(state.approach.shape[0]):
-        if state.approach[k] == 0.0 and start[k, DELTA] > 0.0 and start[k, DELTA_DOT] > 0.0:
-            begin_contact(
-                k, contacts.joint, contacts.speed_floor, t, start[k, DELTA_DOT],
-                state.approach, state.recent, tally.impact, tally.impacts,
-            )  # fmt: skip
-            closed = True
-    if closed:
-        accelerate_clearances(model.law, state.local, state.approach, work.now, 0.0, x, E0, V0, A0, start)
 
 
 @kernel
@@ -213,8 +171,8 @@ def _take(model, surfaces, state, t, h, tally, work):
     if surfaces.feeds_back:
         turn_surfaces(now.speed[0] * h, state.local)
         beyond = now.speed[0] * (t + h - (state.intervals[0] + 0.5) * model.interval)
-        if _follow(contacts, surfaces, start, now, beyond, state.local):
-            _sample(model, state, t + h, tally, work)
+        if follow_clearances(contacts, surfaces, start, now, beyond, state.local):
+            sample_start(model, state, t + h, tally, work)
     _look_at_drive(now, x, start, work.drive_end, tally)
     sudden += half_impulse(x)
     toe_deviation(now, x, tally.response)
@@ -237,19 +195,6 @@ def _look_at_drive(now, x, sample, out_drive, tally):
 
 
 @kernel
-def _follow(contacts, surfaces, sample, now, beyond, local):
-    """Look up the clearance of the joints that have turned away from where it was known, if any."""
-    found = False
-    for k in range(sample.shape[0]):
-        ex, ey = sample[k, EX], sample[k, EY]
-        length = math.hypot(ex, ey)
-        if length > 0.0 and has_turned(k, ex / length, ey / length, local):
-            look_around(contacts, surfaces, k, ex / length, ey / length, now, beyond, local)
-            found = True
-    return found
-
-
-@kernel
 def _pushed_through(bushing_radius, sample):
     """First loose joint whose journal is pushed further than a tenth of the bushing's radius, else -1."""
     for k in range(sample.shape[0]):
@@ -262,7 +207,7 @@ def _pushed_through(bushing_radius, sample):
 def _finish(model, surfaces, state, tally, work):
     """At the end of an interval: wear, distributions, and the reactions of the ideal joints."""
     joint, now, sample, interval = model.contacts.joint, work.now, work.start, model.interval
-    renew = int(state.intervals[0]) % _RENEWAL == 0
+    renew = int(state.intervals[0]) % RENEWAL == 0
     tally.time[0] += interval
     for k in range(state.approach.shape[0]):
         if renew:
@@ -273,7 +218,7 @@ def _finish(model, surfaces, state, tally, work):
     tally.torque_time[1 if torque > 0.0 else 0, bin_of(abs(torque))] += interval
     if renew:
         reactions(model.tables, state.drive[ANGLE], now, work.x, sample, work.reaction)
-        _add_reactions(model.tables.reaction_joint, work.reaction, _RENEWAL * interval, tally)
+        _add_reactions(model.tables.reaction_joint, work.reaction, RENEWAL * interval, tally)
 
 
 @kernel
@@ -302,7 +247,7 @@ def observe(model, feeds_back, state, work):
     copy_array(state.motion, work.backup)
     angle, speed = state.drive[ANGLE], state.drive[SPEED]
     take_tables(model.tables, angle, speed, state.drive[ACCELERATION], now)
-    _begin(model, surfaces, state, work)
+    load_state(model, surfaces, state, work)
     accelerate_clearances(model.law, state.local, state.approach, now, 0.0, x, E0, V0, A0, work.start)
     copy_array(work.backup, state.motion)
     reactions(model.tables, angle, now, x, work.start, work.reaction)

@@ -141,7 +141,7 @@ def _keywords(clearances: str | None, wear: str, duration: float | None, **optio
 
 def _run(leg: "Mechanism", keywords: dict[str, Any]) -> tuple["SimulationResult", float]:
     """The result, and the time [s] it took once all was compiled."""
-    from leg_wear_monitor.dynamics.simulation import simulate
+    from leg_wear_monitor.dynamics.simulation import default_model, simulate
     from leg_wear_monitor.mechanism.spec import SpeedDrive
 
     span = ("cycles", "duration_s", "skip_cycles", "trace")
@@ -151,7 +151,7 @@ def _run(leg: "Mechanism", keywords: dict[str, Any]) -> tuple["SimulationResult"
     else:
         short["duration_s"] = _WARM_UP_S
     loose = keywords.get("clearances", leg.loose)
-    with compilation(keywords.get("model", DEFAULT_MODEL) if loose else "ideal"):
+    with compilation(keywords.get("model") or default_model(leg) if loose else "ideal"):
         simulate(leg, **short)
     with progress_bar("simulating") as progress:
         began = time.perf_counter()

@@ -29,6 +29,11 @@ MODELS: dict[str, Callable[[Setup, int], Run]] = {"clearance": ClearanceRun, "fu
 _REPORTS_A_CYCLE = 20
 
 
+def default_model(mechanism: Mechanism) -> str:
+    """Formulation for a mechanism: only the full one can let a torque drive the crank."""
+    return "clearance" if isinstance(mechanism.drive, SpeedDrive) else "full"
+
+
 def prepare(
     mechanism: Mechanism,
     *,
@@ -115,8 +120,7 @@ def simulate(
         wear=wear,
         normal_law=normal_law,
     )
-    if model is None:
-        model = "clearance" if isinstance(mechanism.drive, SpeedDrive) else "full"
+    model = model or default_model(mechanism)
     if model not in MODELS:
         raise ConfigError("model", "", f"{model!r} is not one of {', '.join(MODELS)}")
     skipped, counted = _spans(setup, cycles, duration_s, skip_cycles, trace)

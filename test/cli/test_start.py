@@ -1,13 +1,13 @@
 """How the command line starts: light, from three places, with names that are the library's."""
 
-import inspect
 import subprocess
 import sys
 
 import pytest
 
+from leg_wear_monitor import load_mechanism
 from leg_wear_monitor.cli import simulate as verb
-from leg_wear_monitor.dynamics.simulation import MODELS, simulate
+from leg_wear_monitor.dynamics.simulation import MODELS, default_model
 from leg_wear_monitor.mechanism.clearance import NORMAL_LAWS
 
 HEAVY = {"numba", "numpy", "matplotlib", "rich", "cattrs", "ruamel.yaml"}
@@ -52,7 +52,8 @@ def test_an_error_leaves_one_line_on_the_real_stderr():
 def test_names_that_help_shows_are_the_library_s():
     assert verb.NORMAL_LAWS == NORMAL_LAWS
     assert set(MODELS) <= set(verb.MODELS)
-    assert inspect.signature(simulate).parameters["model"].default == verb.DEFAULT_MODEL
+    assert default_model(load_mechanism("bionic_leg")) == verb.DEFAULT_MODEL
+    assert default_model(load_mechanism("andrews")) == "full"
 
 
 @pytest.mark.plain

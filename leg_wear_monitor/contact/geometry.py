@@ -22,8 +22,7 @@ def worn_contact(ex, ey, clearance, slope):
     so the normal force has a potential.
     """
     delta, rx, ry = journal_contact(ex, ey, clearance)
-    e = math.hypot(ex, ey)
-    tilt = slope / e if e > 0.0 else 0.0
+    tilt = slope / max(math.hypot(ex, ey), clearance)  # a journal that touches is at least that far out
     scale = 1.0 / math.sqrt(1.0 + tilt * tilt)
     return delta * scale, (rx + tilt * ry) * scale, (ry - tilt * rx) * scale, scale
 

@@ -98,7 +98,7 @@ def accelerate_clearances(law, local, approach, now, ahead, x, at_e, at_v, out_a
         if local[k, SLOPE] != 0.0:  # worn: as contact.geometry.worn_contact, with the wall's own turning
             across, slope = local[k, TO_X] * ny - local[k, TO_Y] * nx, local[k, SLOPE]
             delta -= across * (slope + 0.5 * local[k, CURVATURE] * across) - local[k, TURNING] * speed * ahead
-            tilt = (slope + local[k, CURVATURE] * across) * inverse
+            tilt = (slope + local[k, CURVATURE] * across) / max(length, local[k, CLEARANCE])
             scale = 1.0 / math.sqrt(1.0 + tilt * tilt)
             delta *= scale
             cam = local[k, TURNING] * scale

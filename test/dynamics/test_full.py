@@ -1,5 +1,7 @@
 """Equations of motion: structure against dense algebra, and what contact forces may and may not do."""
 
+import math
+
 import numpy as np
 import pytest
 from hypothesis import given
@@ -123,7 +125,8 @@ def test_slip_is_that_of_the_two_bodies_where_they_touch(model, worn, cycle, pha
         ex, ey = eccentricity(model, k, q, v, cs)[:2]
         slope_b = penetration(model.contacts, worn, k, ex, ey, q[b, 2], q[j, 2])[5]
         cam = slope_b * (v[b, 2] - v[j, 2])  # a worn bushing that turns closes in on the journal
-        assert relative @ n + cam == pytest.approx(delta_dot, abs=1.0e-12)
+        touches = math.hypot(ex, ey) > model.contacts.clearance[k]  # else there is no wall's normal
+        assert relative @ n + cam == pytest.approx(delta_dot, abs=1.0e-12) or not touches
         assert relative @ [-n[1], n[0]] == pytest.approx(slip, abs=1.0e-12)
 
 

@@ -1,6 +1,7 @@
 """Ten thousand cycles with five loose joints and accelerated wear, until clearances have doubled.
 
-Says how well energy adds up and whether the worn volume is what the contacts took: `python benchmarks/stress.py`.
+Says how well energy adds up, and whether the worn volume is what the contacts took:
+`python benchmarks/stress.py`.
 """
 
 import argparse
@@ -21,7 +22,7 @@ JOINTS = ("A", "B", "G", "I", "J")
 
 
 def hastened(leg: Mechanism, cycles: int) -> Mechanism:
-    """The leg with wear coefficients under which the clearance of each joint would double in so many cycles."""
+    """The leg with wear coefficients that would double the clearance of each joint in so many cycles."""
     setup = prepare(leg, clearances=JOINTS)
     run, tally = ClearanceRun(setup), new_tally(len(leg.joints))
     run.advance(20.0, tally)

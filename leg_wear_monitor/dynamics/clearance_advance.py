@@ -23,7 +23,13 @@ from leg_wear_monitor.dynamics.clearance_outputs import (
     reactions,
     toe_deviation,
 )
-from leg_wear_monitor.dynamics.clearance_start import RENEWAL, follow_clearances, load_state, sample_start
+from leg_wear_monitor.dynamics.clearance_start import (
+    RENEWAL,
+    follow_clearances,
+    load_state,
+    sample_start,
+    strays,
+)
 from leg_wear_monitor.dynamics.clearance_step import (
     gather_wear,
     integrate_joints,
@@ -134,6 +140,9 @@ def _steps(model, surfaces, state, tally, work):
             cut = NEVER
             if state.step[0] < _SHORTEST_STEP or trials > MOST_TRIALS:
                 return STEP_TOO_SMALL, _pushed_through(contacts.bushing_radius, end)
+            continue
+        if surfaces.feeds_back and strays(end, state.local) and h > _SHORTEST_STEP:
+            cut = 0.5 * h
             continue
         share = first_touch(approach, h, start, end)
         if share < 1.0 and share * h > _SHORTEST_STEP and trials <= MOST_TRIALS:

@@ -4,8 +4,10 @@ import math
 
 from leg_wear_monitor.dynamics.clearance_contact import (
     A0,
+    CLEARANCE,
     E0,
     TO_X,
+    TO_Y,
     V0,
     accelerate_clearances,
     has_turned,
@@ -16,6 +18,9 @@ from leg_wear_monitor.dynamics.touch import DELTA, DELTA_DOT, EX, EY, begin_cont
 from leg_wear_monitor.kernel import kernel
 
 RENEWAL = 2  # intervals between two looks at the surfaces and at the reactions of the ideal joints
+
+_NEAR = 0.3  # of the clearance: how near a worn wall must be to matter, when it is taken on trust
+_FAR = 0.05  # rad around where the wall was looked up in which its curvature may be trusted
 
 
 @kernel
@@ -63,3 +68,15 @@ def follow_clearances(contacts, surfaces, sample, now, beyond, local):
             look_around(contacts, surfaces, k, ex / length, ey / length, now, beyond, local)
             found = True
     return found
+
+
+@kernel
+def strays(sample, local):
+    """Whether a joint comes near its wall so far from where that is known that it might be elsewhere."""
+    for k in range(sample.shape[0]):
+        if sample[k, DELTA] > -_NEAR * local[k, CLEARANCE]:
+            ex, ey = sample[k, EX], sample[k, EY]
+            across = local[k, TO_X] * ey - local[k, TO_Y] * ex
+            if abs(across) > _FAR * math.hypot(ex, ey):
+                return True
+    return False

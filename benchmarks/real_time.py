@@ -1,0 +1,196 @@
+"""How many seconds of the leg's motion a second of wall clock gives, beside what one would use instead.
+
+    pip install .[bench]
+    python benchmarks/real_time.py
+
+One core, one thread, everything in one run; contestants take turns, and medians over the turns are printed.
+With one (G), two (A, B) and five (A, B, G, I, J) loose joints at 60 rpm:
+
+- the clearance model and full coordinates, with their defaults;
+- Exudyn with ideal joints, and with stiff springs for them (`exudyn_leg.py` says how it is set up);
+- SciPy's solve_ivp on the compiled right-hand side of the full coordinates (`scipy_leg.py`).
+
+Mean forces come first, and how loosely the others may integrate to keep them (`mean_forces.py`). Exudyn
+halves its step by itself where its iterations do not converge, so its accuracy hangs on the tolerance of its
+discontinuous iterations more than on the step it is given.
+
+Last, where the clearance model's time goes, and the floor: five contact laws and one 10 x 10 product.
+About eight minutes. Exudyn prints a line or two of its own.
+"""
+
+import argparse
+import platform
+import statistics
+import time
+from collections.abc import Callable, Sequence
+from importlib.metadata import version
+
+import one_core  # before numpy
+
+# isort: split
+import clearance_cost
+from exudyn_leg import ExudynLeg, Scheme
+from mean_forces import (
+    Forces,
+    exudyn_forces,
+    own_forces,
+    print_forces,
+    print_heading,
+    scipy_forces,
+    sweep_exudyn,
+    sweep_scipy,
+)
+from scipy_leg import ScipyLeg, impact_speeds
+
+from leg_wear_monitor import load_mechanism
+from leg_wear_monitor.dynamics.clearance_run import ClearanceRun
+from leg_wear_monitor.dynamics.full_run import FullRun
+from leg_wear_monitor.dynamics.run import Setup
+from leg_wear_monitor.dynamics.simulation import prepare
+from leg_wear_monitor.dynamics.tally import Tally, new_tally
+
+LEG = load_mechanism("bionic_leg")
+FIVE = ("A", "B", "G", "I", "J")
+SETS = (("G",), ("A", "B"), FIVE)
+
+Contestant = Callable[[], float]
+
+
+def compare_own(setup: Setup, cycles: int) -> tuple[Forces, FullRun, Tally]:
+    """Forces of the package's two models; the reference, and the run and the tally it comes from."""
+    full, clearance = FullRun(setup), ClearanceRun(setup)
+    since = time.perf_counter()
+    reference, tally = own_forces(full, setup, 3 * cycles)
+    print_heading("Mean contact forces of five loose joints, off full coordinates by", setup.loose)
+    factor = 3 * cycles / (time.perf_counter() - since)
+    print_forces("full coordinates", factor, 3 * cycles, reference, reference)
+    print(f"  {'  their standard error':57} " + "".join(f"{e:9.2f}{'':9}" for e in reference.error))
+    since = time.perf_counter()
+    forces, _ = own_forces(clearance, setup, 10 * cycles)
+    factor = 10 * cycles / (time.perf_counter() - since)
+    print_forces("clearance model", factor, 10 * cycles, forces, reference)
+    return reference, full, tally
+
+
+def check_others(
+    loose: Sequence[str], schemes: Sequence[Scheme], method: str, tolerance: float, cycles: int
+) -> None:
+    """Forces of the others with fewer loose joints, as they were found best with five."""
+    setup = prepare(LEG, clearances=loose)
+    full = FullRun(setup)
+    reference, tally = own_forces(full, setup, 3 * cycles)
+    print_heading(f"The same settings with {','.join(loose)} loose", loose)
+    for scheme in schemes:
+        forces, factor = exudyn_forces(setup, scheme, cycles)
+        print_forces(f"Exudyn, {scheme.name}", factor, cycles, forces, reference)
+    leg = ScipyLeg(setup, full, impact_speeds(setup, tally))
+    forces, factor, _ = scipy_forces(leg, method, tolerance, cycles)
+    print_forces(f"SciPy, {method}", factor, cycles, forces, reference)
+
+
+def own_contestant(run: ClearanceRun | FullRun, cycles: float, tally: Tally) -> Contestant:
+    """A model of the package, after its first cycle."""
+
+    def turn() -> float:
+        since = time.perf_counter()
+        run.advance(run.time + cycles, tally)
+        return cycles / (time.perf_counter() - since)
+
+    run.advance(1.0, tally)
+    return turn
+
+
+def contestants(
+    setup: Setup, schemes: Sequence[Scheme], method: str, tolerance: float
+) -> dict[str, Contestant]:
+    """Those who take turns: each call moves the leg on and returns the real-time factor."""
+
+    def exudyn(scheme: Scheme) -> Contestant:
+        return lambda: 2.0 / ExudynLeg(setup, scheme.penalty).solve(scheme, 2.0)
+
+    tally, full = new_tally(len(LEG.joints)), FullRun(setup)
+    entries = {
+        "clearance model": own_contestant(ClearanceRun(setup), 10.0, new_tally(len(LEG.joints))),
+        "full coordinates": own_contestant(full, 3.0, tally),
+    }
+    entries["full coordinates"]()
+    entries |= {f"Exudyn, {scheme.name}": exudyn(scheme) for scheme in schemes}
+    leg = ScipyLeg(setup, full, impact_speeds(setup, tally))
+    return entries | {f"SciPy, {method}": lambda: 1.0 / leg.advance(method, tolerance, 1.0)[0]}
+
+
+def race(schemes: Sequence[Scheme], method: str, tolerance: float, repeats: int) -> None:
+    """Let them take turns with every set of loose joints, and print the medians."""
+    medians, share = [], []
+    for loose in SETS:
+        entries = contestants(prepare(LEG, clearances=loose), schemes, method, tolerance)
+        turns: dict[str, list[float]] = {name: [] for name in entries}
+        since = time.perf_counter(), time.process_time()
+        for _ in range(repeats):
+            for name, turn in entries.items():
+                turns[name].append(turn())
+        share.append((time.process_time() - since[1]) / (time.perf_counter() - since[0]))
+        medians.append({name: statistics.median(factors) for name, factors in turns.items()})
+    print(f"\nReal-time factor, medians of {repeats} turns (times slower than the clearance model)")
+    print(f"  {'loose joints':42}" + "".join(f"{','.join(loose):>20}" for loose in SETS))
+    for name in medians[0]:
+        cells = (f"{m[name]:10.2f} ({m['clearance model'] / m[name]:6.1f})" for m in medians)
+        print(f"  {name:42}" + "".join(f"{cell:>20}" for cell in cells))
+    print(f"  {'share of its core that the process had':42}" + "".join(f"{100.0 * s:18.0f} %" for s in share))
+
+
+def where_time_goes(repeats: int) -> None:
+    """Print the cost of the clearance model's steps and intervals, of its parts, and the floor."""
+    setup = prepare(LEG, clearances=FIVE)
+    rows, trial, interval = clearance_cost.regression(setup, repeats)
+    print("\nThe clearance model with five loose joints, over the number of its intervals in a cycle")
+    print(f"  {'intervals':>10} {'trials':>8} {'taken':>8} {'ms/cycle':>10} {'factor':>8}")
+    for row in rows:
+        cost = f"{1e3 * row.seconds:10.3f} {1.0 / row.seconds:8.1f}"
+        print(f"  {row.intervals:10d} {row.trials:8.0f} {row.taken:8.0f} {cost}")
+    print(f"  by regression: {1e9 * trial:.0f} ns a trial step, {1e9 * interval:.0f} ns an interval")
+    print_parts(clearance_cost.parts(setup), rows[1])
+    least, now = clearance_cost.floor(setup), rows[1]
+    bound = 2.0 * now.trials * least
+    print(f"\nThe floor: five contact laws and one 10 x 10 product take {1e9 * least:.0f} ns")
+    print(f"  {now.trials:.0f} trials a cycle, two evaluations each: {1.0 / bound:.0f} times real time")
+    print(f"  the whole model takes {now.seconds / bound:.1f} times as long")
+
+
+def print_parts(parts: Sequence[clearance_cost.Part], now: clearance_cost.Fineness) -> None:
+    """Print what each part costs alone, and in a cycle."""
+    print("\nIts parts alone, all five joints in contact")
+    print(f"  {'':34}{'ns':>8} {'times':>6} {'':9}{'ms/cycle':>9} {'share':>7}")
+    counts, explained = {"trial": now.trials, "taken": now.taken, "interval": now.intervals, "": 0.0}, 0.0
+    for part in parts:
+        spent = part.seconds * part.times * counts[part.per]
+        explained += spent
+        cost = f"{1e3 * spent:9.3f} {100.0 * spent / now.seconds:5.0f} %" if part.per else ""
+        print(f"  {part.name:34}{1e9 * part.seconds:8.0f} {part.times:6.1f} {part.per:9}{cost}")
+    rest = now.seconds - explained
+    print(f"  {'all else':34}{'':25}{1e3 * rest:9.3f} {100.0 * rest / now.seconds:5.0f} %")
+
+
+def main() -> None:
+    parser = argparse.ArgumentParser(
+        description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter
+    )
+    parser.add_argument("--repeats", type=int, default=7, help="turns of each contestant")
+    parser.add_argument("--cycles", type=int, default=20, help="cycles for the mean forces of the others")
+    options = parser.parse_args()
+    names = ("numpy", "numba", "scipy", "exudyn")
+    print(f"Python {platform.python_version()}, " + ", ".join(f"{name} {version(name)}" for name in names))
+    print(f"{platform.system()} {platform.machine()}, one of {len(one_core.CORES) or '?'} cores")
+    setup = prepare(LEG, clearances=FIVE)
+    reference, full, tally = compare_own(setup, options.cycles)
+    schemes = sweep_exudyn(setup, reference, options.cycles)
+    leg = ScipyLeg(setup, full, impact_speeds(setup, tally))
+    method, tolerance = sweep_scipy(leg, setup, reference, options.cycles)
+    for loose in SETS[:2]:
+        check_others(loose, schemes, method, tolerance, options.cycles)
+    race(schemes, method, tolerance, options.repeats)
+    where_time_goes(options.repeats)
+
+
+if __name__ == "__main__":
+    main()

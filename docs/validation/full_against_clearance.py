@@ -1,0 +1,193 @@
+"""Print the tables of docs/validation_clearance.md on means: clearance against full coordinates.
+
+Twenty-four cases, ten independent runs of ten cycles in each model: about five minutes on two cores.
+"""
+
+import argparse
+import math
+from collections.abc import Iterator
+from concurrent.futures import ThreadPoolExecutor
+from itertools import product
+from typing import NamedTuple
+
+import attrs
+import numpy as np
+
+from leg_wear_monitor import Mechanism, SimulationResult, load_mechanism, simulate
+from leg_wear_monitor.dynamics.batch import simulate_batch
+from leg_wear_monitor.dynamics.batch_leg import Leg
+
+LEGS = ("bionic_leg", "jansen_leg")
+SPEEDS_RPM = (30.0, 60.0, 90.0)
+SETS = ("AB", "G", "IJ", "ABGIJ")
+SKIPPED = 2.0  # cycles of each run before counting begins
+WORKERS = 2
+APART = 1.0e-9  # m: what the clearances of two runs differ by, enough to make them two samples of the chaos
+SHARE, ERRORS = 0.02, 3.0  # what is wanted: within 2 %, or within three standard errors
+FIGURES = {
+    "mean_force_n": "mean force [N]",
+    "rms_force_n": "RMS force [N]",
+    "p99_force_n": "99 % below [N]",
+    "contact_fraction": "in contact",
+    "archard_integral_j_per_cycle": "Archard [J/cycle]",
+}
+ZONE = "90 % of the wear, from and to [deg]"
+
+
+class Samples(NamedTuple):
+    """Of n runs: ``joints`` (n, k, 5) `FIGURES`, ``zone`` (n, k, 2) of wear [deg], ``torque`` (n,) RMS."""
+
+    joints: np.ndarray
+    zone: np.ndarray
+    torque: np.ndarray
+
+
+class Comparison(NamedTuple):
+    """A figure in full coordinates, and the other model's difference as a share and in standard errors."""
+
+    value: float
+    share: float
+    errors: float
+
+    @property
+    def beyond(self) -> bool:
+        return abs(self.share) > SHARE and abs(self.errors) > ERRORS
+
+
+class Case(NamedTuple):
+    """A leg with some joints loose at a speed."""
+
+    mechanism: Mechanism
+    loose: str
+    rpm: float
+    clearance_m: float = 3.0e-4
+
+    def full(self, runs: int, cycles: int) -> Samples:
+        """Runs whose clearances are APART."""
+
+        def run(i: int) -> SimulationResult:
+            return simulate(
+                self.mechanism,
+                clearances=self.loose,
+                clearance_m=self.clearance_m + i * APART,
+                speed_rpm=self.rpm,
+                cycles=cycles,
+                skip_cycles=SKIPPED,
+                model="full",
+            )
+
+        with ThreadPoolExecutor(WORKERS) as pool:
+            return self._samples(list(pool.map(run, range(runs))))
+
+    def clearance(self, runs: int, cycles: int) -> Samples:
+        """Runs whose journals start elsewhere by up to a micrometre."""
+        leg = Leg(
+            mechanism=self.mechanism,
+            clearances=self.loose,
+            clearance_m=self.clearance_m,
+            speed_rpm=self.rpm,
+            perturb_m=1.0e-6,
+        )
+        legs = [attrs.evolve(leg, seed=i) for i in range(runs)]
+        return self._samples(simulate_batch(legs, cycles=cycles, skip_cycles=SKIPPED, workers=WORKERS))
+
+    def _samples(self, results: list[SimulationResult]) -> Samples:
+        joints = [
+            [[result.joints[name][key] for key in FIGURES] for name in self.loose] for result in results
+        ]
+        zones = [[result.joints[name]["wear_zone_deg"] for name in self.loose] for result in results]
+        return Samples(
+            np.array(joints), np.array(zones), np.array([r.drive_torque_nm["rms"] for r in results])
+        )
+
+
+def row(*cells: str) -> None:
+    print(f"| {' | '.join(cells)} |", flush=True)
+
+
+def table(*columns: str) -> None:
+    """Head of a Markdown table."""
+    row(*columns)
+    row(*("---" for _ in columns))
+
+
+def compare(full: np.ndarray, other: np.ndarray, whole: float | None = None) -> Comparison:
+    """Samples (n,) of both models; the difference as a share of the value, or of ``whole``."""
+    difference = other.mean() - full.mean()
+    error = math.hypot(*(one.std(ddof=1) / math.sqrt(len(one)) for one in (full, other)))
+    errors = difference / error if error else math.copysign(math.inf, difference) if difference else 0.0
+    return Comparison(full.mean(), difference / (whole or full.mean()), errors)
+
+
+def compare_ends(full: np.ndarray, other: np.ndarray) -> list[Comparison]:
+    """Ends (n, 2) of wear zones [deg], each on the turn on which it is nearest to the first run's."""
+    near = [full[0] + (ends - full[0] + 180.0) % 360.0 - 180.0 for ends in (full, other)]
+    return [compare(near[0][:, i], near[1][:, i], 360.0) for i in range(2)]
+
+
+def in_errors(one: Comparison) -> str:
+    return f"{min(abs(one.errors), 99.0):.1f}"
+
+
+def cell(one: Comparison, digits: int) -> str:
+    text = f"{one.value:.{digits}f} {100.0 * one.share:+.1f} % ({in_errors(one)})"
+    return f"**{text}**" if one.beyond else text
+
+
+def zone_cell(ends: list[Comparison]) -> str:
+    zone = " to ".join(f"{end.value:.0f}" for end in ends)
+    text = f"{zone}; {', '.join(f'{360.0 * end.share:+.1f} ({in_errors(end)})' for end in ends)}"
+    return f"**{text}**" if any(end.beyond for end in ends) else text
+
+
+def sets_of(name: str, runs: int, cycles: int) -> Iterator[Comparison]:
+    """Tables of one leg; yields every comparison."""
+    mechanism, torques = load_mechanism(name), {}
+    print(f"\n### {mechanism.name}\n")
+    table("loose", "rpm", "joint", *FIGURES.values(), ZONE)
+    for loose, rpm in product(SETS, SPEEDS_RPM):
+        case = Case(mechanism, loose, rpm)
+        full, other = case.full(runs, cycles), case.clearance(runs, cycles)
+        torques[loose, rpm] = compare(full.torque, other.torque)
+        for k, joint in enumerate(loose):
+            figures = [compare(full.joints[:, k, i], other.joints[:, k, i]) for i in range(len(FIGURES))]
+            ends = compare_ends(full.zone[:, k], other.zone[:, k])
+            cells = map(cell, figures, (2, 2, 0, 3, 4))
+            row(", ".join(loose), f"{rpm:.0f}", joint, *cells, zone_cell(ends))
+            yield from [*figures, *ends]
+    print(f"\nRMS of the drive torque [N m], {mechanism.name}:\n")
+    table("loose", *(f"{rpm:.0f} rpm" for rpm in SPEEDS_RPM))
+    for loose in SETS:
+        row(", ".join(loose), *(cell(torques[loose, rpm], 3) for rpm in SPEEDS_RPM))
+    yield from torques.values()
+
+
+def summary(comparisons: list[Comparison]) -> None:
+    share, errors = np.abs([one.share for one in comparisons]), np.abs([one.errors for one in comparisons])
+    beyond = sum(one.beyond for one in comparisons)
+    print("\n### All comparisons\n")
+    table("comparisons", "beyond 2 %", "beyond 3 standard errors", "beyond both", "median difference",
+          "median in standard errors")  # fmt: skip
+    row(str(len(comparisons)), str((share > SHARE).sum()), str((errors > ERRORS).sum()), str(beyond),
+        f"{100.0 * np.median(share):.2f} %", f"{np.median(errors):.2f}")  # fmt: skip
+
+
+def by_clearance(runs: int, cycles: int) -> None:
+    """The case that differs most, as its clearance shrinks."""
+    print("\n### By clearance: jansen_leg, I and J loose, 30 rpm\n")
+    table("clearance [mm]", "joint", *FIGURES.values())
+    for clearance_m in (1.0e-4, 2.0e-4, 2.9e-4, 3.0e-4, 3.1e-4, 4.0e-4):
+        case = Case(load_mechanism("jansen_leg"), "IJ", 30.0, clearance_m)
+        full, other = case.full(runs, cycles), case.clearance(runs, cycles)
+        for k, joint in enumerate("IJ"):
+            figures = [compare(full.joints[:, k, i], other.joints[:, k, i]) for i in range(len(FIGURES))]
+            row(f"{1e3 * clearance_m:g}", joint, *map(cell, figures, (2, 2, 0, 3, 4)))
+
+
+if __name__ == "__main__":
+    parser = argparse.ArgumentParser(description=__doc__)
+    parser.add_argument("--runs", type=int, default=10, help="independent runs of each case")
+    parser.add_argument("--cycles", type=int, default=10, help="counted cycles of each run")
+    options = parser.parse_args()
+    summary([one for name in LEGS for one in sets_of(name, options.runs, options.cycles)])
+    by_clearance(options.runs, options.cycles)

@@ -14,10 +14,10 @@ without effect on anything but the drive torque. The compiled module without ran
 """
 
 import sys
-import time
 
 import attrs
 import numpy as np
+from watch import Watch
 
 from leg_wear_monitor.dynamics.run import Setup
 from leg_wear_monitor.mechanism.arrays import Floats
@@ -90,15 +90,15 @@ class ExudynLeg:
         self._sensors = [self._watch(objects[joint]) for joint in loose]
         self._system.Assemble()
 
-    def solve(self, scheme: Scheme, seconds: float) -> float:
-        """Move from the start for so long; returns the seconds of wall clock that took."""
+    def solve(self, scheme: Scheme, seconds: float) -> tuple[float, float]:
+        """Move from the start for so long; returns what that took, as a watch reads it."""
         sampling = (2.0 * scheme.step if self._penalty else 1.0e-9) if self._sensors else 1.0e9
         settings = scheme.settings(seconds, sampling)
         kinds = exudyn.DynamicSolverType
         kind = kinds.VelocityVerlet if self._penalty else kinds.GeneralizedAlpha
-        since = time.perf_counter()
+        watch = Watch()
         self._system.SolveDynamic(settings, solverType=kind, showHints=False)
-        return time.perf_counter() - since
+        return watch.read()
 
     def mean_forces(self, skipped: int, cycles: int) -> Floats:
         """Mean contact forces (cycles, k) [N] of each second after the first ones."""

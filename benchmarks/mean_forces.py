@@ -1,7 +1,8 @@
 """Mean contact forces of chaotic motion with their scatter: what contestants must agree on before they race.
 
 Exudyn's step and SciPy's tolerance are as loose as these forces allow: within 2 % of full coordinates, or
-within three standard errors where the scatter over the cycles is more.
+within three standard errors where the scatter over the cycles is more. Real-time factors here are by the
+processor's time.
 """
 
 from collections.abc import Sequence
@@ -57,7 +58,7 @@ def own_forces(run: ClearanceRun | FullRun, setup: Setup, cycles: int) -> tuple[
 def exudyn_forces(setup: Setup, scheme: Scheme, cycles: int) -> tuple[Forces, float]:
     """Forces after the first cycle, and the real-time factor."""
     leg = ExudynLeg(setup, scheme.penalty, watched=True)
-    spent = leg.solve(scheme, 1.0 + cycles)
+    _, spent = leg.solve(scheme, 1.0 + cycles)
     return Forces(leg.mean_forces(1, cycles)), (1.0 + cycles) / spent
 
 
@@ -67,7 +68,7 @@ def scipy_forces(leg: ScipyLeg, method: str, tolerance: float, cycles: int) -> t
     turns = [leg.advance(method, tolerance, 1.0) for _ in range(cycles)]
     evaluations = sum(turn[2] for turn in turns) / cycles
     forces = Forces(np.array([turn[1] for turn in turns]))
-    return forces, cycles / sum(turn[0] for turn in turns), evaluations
+    return forces, cycles / sum(turn[0][1] for turn in turns), evaluations
 
 
 def print_heading(what: str, loose: Sequence[str]) -> None:

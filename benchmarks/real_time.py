@@ -3,7 +3,8 @@
     pip install .[bench]
     python benchmarks/real_time.py
 
-One core, one thread, everything in one run; contestants take turns, and medians over the turns are printed.
+One core, one thread, everything in one run; contestants take turns, and medians over the turns are printed,
+by the wall clock and by the processor's time: where they differ, others used the core too.
 With one (G), two (A, B) and five (A, B, G, I, J) loose joints at 60 rpm:
 
 - the clearance model and full coordinates, with their defaults;
@@ -20,10 +21,9 @@ About eight minutes. Exudyn prints a line or two of its own.
 
 import argparse
 import platform
-import statistics
-import time
 from collections.abc import Callable, Sequence
 from importlib.metadata import version
+from statistics import median
 
 import one_core  # before numpy
 
@@ -41,6 +41,7 @@ from mean_forces import (
     sweep_scipy,
 )
 from scipy_leg import ScipyLeg, impact_speeds
+from watch import Watch
 
 from leg_wear_monitor import load_mechanism
 from leg_wear_monitor.dynamics.clearance_run import ClearanceRun
@@ -53,22 +54,21 @@ LEG = load_mechanism("bionic_leg")
 FIVE = ("A", "B", "G", "I", "J")
 SETS = (("G",), ("A", "B"), FIVE)
 
-Contestant = Callable[[], float]
+Factors = tuple[float, float]
+Contestant = Callable[[], Factors]
 
 
 def compare_own(setup: Setup, cycles: int) -> tuple[Forces, FullRun, Tally]:
     """Forces of the package's two models; the reference, and the run and the tally it comes from."""
-    full, clearance = FullRun(setup), ClearanceRun(setup)
-    since = time.perf_counter()
+    full, clearance, watch = FullRun(setup), ClearanceRun(setup), Watch()
     reference, tally = own_forces(full, setup, 3 * cycles)
+    factor = 3 * cycles / watch.processor
     print_heading("Mean contact forces of five loose joints, off full coordinates by", setup.loose)
-    factor = 3 * cycles / (time.perf_counter() - since)
     print_forces("full coordinates", factor, 3 * cycles, reference, reference)
     print(f"  {'  their standard error':57} " + "".join(f"{e:9.2f}{'':9}" for e in reference.error))
-    since = time.perf_counter()
+    watch = Watch()
     forces, _ = own_forces(clearance, setup, 10 * cycles)
-    factor = 10 * cycles / (time.perf_counter() - since)
-    print_forces("clearance model", factor, 10 * cycles, forces, reference)
+    print_forces("clearance model", 10 * cycles / watch.processor, 10 * cycles, forces, reference)
     return reference, full, tally
 
 
@@ -91,22 +91,27 @@ def check_others(
 def own_contestant(run: ClearanceRun | FullRun, cycles: float, tally: Tally) -> Contestant:
     """A model of the package, after its first cycle."""
 
-    def turn() -> float:
-        since = time.perf_counter()
+    def turn() -> Factors:
+        watch = Watch()
         run.advance(run.time + cycles, tally)
-        return cycles / (time.perf_counter() - since)
+        return factors(cycles, watch.read())
 
     run.advance(1.0, tally)
     return turn
 
 
+def factors(seconds: float, spent: tuple[float, float]) -> Factors:
+    """Real-time factors of so much motion by the wall clock and by the processor's time."""
+    return seconds / spent[0], seconds / spent[1]
+
+
 def contestants(
     setup: Setup, schemes: Sequence[Scheme], method: str, tolerance: float
 ) -> dict[str, Contestant]:
-    """Those who take turns: each call moves the leg on and returns the real-time factor."""
+    """Those who take turns: each call moves the leg on and returns the real-time factors."""
 
     def exudyn(scheme: Scheme) -> Contestant:
-        return lambda: 2.0 / ExudynLeg(setup, scheme.penalty).solve(scheme, 2.0)
+        return lambda: factors(2.0, ExudynLeg(setup, scheme.penalty).solve(scheme, 2.0))
 
     tally, full = new_tally(len(LEG.joints)), FullRun(setup)
     entries = {
@@ -116,27 +121,29 @@ def contestants(
     entries["full coordinates"]()
     entries |= {f"Exudyn, {scheme.name}": exudyn(scheme) for scheme in schemes}
     leg = ScipyLeg(setup, full, impact_speeds(setup, tally))
-    return entries | {f"SciPy, {method}": lambda: 1.0 / leg.advance(method, tolerance, 1.0)[0]}
+    return entries | {f"SciPy, {method}": lambda: factors(1.0, leg.advance(method, tolerance, 1.0)[0])}
 
 
 def race(schemes: Sequence[Scheme], method: str, tolerance: float, repeats: int) -> None:
     """Let them take turns with every set of loose joints, and print the medians."""
-    medians, share = [], []
+    medians: list[dict[str, Factors]] = []
     for loose in SETS:
         entries = contestants(prepare(LEG, clearances=loose), schemes, method, tolerance)
-        turns: dict[str, list[float]] = {name: [] for name in entries}
-        since = time.perf_counter(), time.process_time()
+        turns: dict[str, list[Factors]] = {name: [] for name in entries}
         for _ in range(repeats):
             for name, turn in entries.items():
                 turns[name].append(turn())
-        share.append((time.process_time() - since[1]) / (time.perf_counter() - since[0]))
-        medians.append({name: statistics.median(factors) for name, factors in turns.items()})
-    print(f"\nReal-time factor, medians of {repeats} turns (times slower than the clearance model)")
-    print(f"  {'loose joints':42}" + "".join(f"{','.join(loose):>20}" for loose in SETS))
-    for name in medians[0]:
-        cells = (f"{m[name]:10.2f} ({m['clearance model'] / m[name]:6.1f})" for m in medians)
-        print(f"  {name:42}" + "".join(f"{cell:>20}" for cell in cells))
-    print(f"  {'share of its core that the process had':42}" + "".join(f"{100.0 * s:18.0f} %" for s in share))
+        medians.append(
+            {name: (median(wall for wall, _ in of), median(p for _, p in of)) for name, of in turns.items()}
+        )
+    for by, clock in enumerate(("wall clock", "processor's time")):
+        print(f"\nReal-time factor by the {clock}, medians of {repeats} turns (over the clearance model's)")
+        print(f"  {'loose joints':42}" + "".join(f"{','.join(loose):>20}" for loose in SETS))
+        for name in medians[0]:
+            cells = (
+                f"{m[name][by]:10.2f} (1/{m['clearance model'][by] / m[name][by]:5.1f})" for m in medians
+            )
+            print(f"  {name:42}" + "".join(f"{cell:>20}" for cell in cells))
 
 
 def where_time_goes(repeats: int) -> None:

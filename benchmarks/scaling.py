@@ -2,20 +2,22 @@
 
     python benchmarks/scaling.py
 
-The default leg at 60 rpm. Contestants take turns on one core and medians are printed; batches use one core
-and two. Memory is the process's resident set over a long run (Linux). About five minutes.
+The default leg at 60 rpm. Contestants take turns on one core; medians are printed, by the processor's time.
+Batches use one core and two, and the wall clock. Memory is the resident set over a long run (Linux).
+About five minutes.
 """
 
 import argparse
 import os
 import statistics
-import time
 from collections.abc import Sequence
 from pathlib import Path
 
 import one_core  # before numpy
 
 # isort: split
+from watch import Watch
+
 from leg_wear_monitor import load_mechanism
 from leg_wear_monitor.dynamics.batch import Leg, simulate_batch
 from leg_wear_monitor.dynamics.clearance_run import ClearanceRun
@@ -37,9 +39,9 @@ def take_turns(runs: Sequence[ClearanceRun], repeats: int) -> tuple[list[float],
         run.advance(1.0, new_tally(len(JOINTS)))
     for turn in range(repeats):
         for run, tally, seconds in zip(runs, tallies, spent, strict=True):
-            since = time.perf_counter()
+            watch = Watch()
             run.advance(1.0 + (turn + 1) * TURN, tally)
-            seconds.append((time.perf_counter() - since) / TURN)
+            seconds.append(watch.processor / TURN)
     trials = [float(tally.steps[0]) / (repeats * TURN) for tally in tallies]
     return [statistics.median(seconds) for seconds in spent], trials
 
@@ -95,9 +97,9 @@ def batch_factor(size: int, cores: int) -> float:
     """Cycles a second of a batch on so many cores; warm, so that nothing is compiled."""
     legs = [Leg(mechanism=LEG, clearances=FIVE, perturb_m=1.0e-4, seed=i) for i in range(size)]
     one_core.use_cores(cores)
-    since = time.perf_counter()
+    watch = Watch()
     simulate_batch(legs, cycles=1.0, skip_cycles=1.0, workers=cores)
-    spent = time.perf_counter() - since
+    spent, _ = watch.read()
     one_core.use_cores(1)
     return 2.0 * size / spent
 
@@ -107,12 +109,12 @@ def memory(cycles: int) -> None:
     run, tally = ClearanceRun(prepare(LEG, clearances=FIVE, wear=True)), new_tally(len(JOINTS))
     print(f"\nMemory over {cycles} cycles with five loose joints, wear fed back")
     print(f"  {'cycle':>8} {'resident MB':>12} {'factor':>8}")
-    sizes, since = [], time.perf_counter()
+    sizes, watch = [], Watch()
     for tenth in range(1, 11):
         done = tenth * cycles / 10.0
         run.advance(done, tally)
         sizes.append(resident_bytes())
-        factor = done / (time.perf_counter() - since)
+        factor = done / watch.processor
         print(f"  {done:8.0f} {1.0e-6 * sizes[-1]:12.2f} {factor:8.1f}", flush=True)
     print(f"  from the first tenth to the last: {1.0e-3 * (sizes[-1] - sizes[0]):+.0f} kB")
 

@@ -7,12 +7,12 @@ square over the impacts of the package's own run, which gives the same mean forc
 as it likes, which favours SciPy.
 """
 
-import time
 from collections.abc import Callable
 
 import numba
 import numpy as np
 from scipy.integrate import solve_ivp
+from watch import Watch
 
 from leg_wear_monitor.dynamics.full import FullScratch, accelerate, full_scratch
 from leg_wear_monitor.dynamics.full_run import TOLERANCE_RATE, FullRun
@@ -84,27 +84,29 @@ class ScipyLeg:
 
     def evaluation_time(self, evaluations: int = 20_000) -> float:
         """Seconds of one right-hand side, called from Python."""
-        since = time.perf_counter()
+        watch = Watch()
         for _ in range(evaluations):
             self._derivative(self.time, self._y)
-        return (time.perf_counter() - since) / evaluations
+        return watch.processor / evaluations
 
-    def advance(self, method: str, tolerance_m: float, seconds: float) -> tuple[float, Floats, int]:
+    def advance(
+        self, method: str, tolerance_m: float, seconds: float
+    ) -> tuple[tuple[float, float], Floats, int]:
         """Go on for so long [s] with a local error as the package defines it.
 
-        Returns the seconds of wall clock that took, the mean forces (k,) [N], and the evaluations.
+        Returns what that took, as a watch reads it, the mean forces (k,) [N], and the evaluations.
         """
         half = (len(self._y) - self._loose) // 2
         at_most = np.concatenate([np.full(half, tolerance_m), np.full(half, tolerance_m * TOLERANCE_RATE)])
         at_most = np.append(at_most, np.full(self._loose, 1.0e9))  # the integrals do not choose the step
         self._y[2 * half :] = 0.0
-        end, since = self.time + seconds, time.perf_counter()
+        end, watch = self.time + seconds, Watch()
         with np.errstate(all="ignore"):  # a trial step may go too far, and is then taken back
             found = solve_ivp(
                 self._derivative, (self.time, end), self._y,
                 method=method, rtol=1.0e-12, atol=at_most, max_step=1.0e-3, t_eval=[end],
             )  # fmt: skip
-        spent = time.perf_counter() - since
+        spent = watch.read()
         if not found.success:
             raise RuntimeError(f"{method} at {tolerance_m:g} m: {found.message}")
         self._y, self.time = found.y[:, -1], end

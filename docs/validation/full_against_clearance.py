@@ -1,6 +1,6 @@
 """Print the tables of docs/validation_clearance.md on means: clearance against full coordinates.
 
-Twenty-four cases, ten independent runs of ten cycles in each model: about five minutes on two cores.
+Twenty-four cases, ten independent runs of twenty cycles in each model: about ten minutes on two cores.
 """
 
 import argparse
@@ -187,7 +187,7 @@ def by_clearance(runs: int, cycles: int) -> None:
 if __name__ == "__main__":
     parser = argparse.ArgumentParser(description=__doc__)
     parser.add_argument("--runs", type=int, default=10, help="independent runs of each case")
-    parser.add_argument("--cycles", type=int, default=10, help="counted cycles of each run")
+    parser.add_argument("--cycles", type=int, default=20, help="counted cycles of each run")
     options = parser.parse_args()
     summary([one for name in LEGS for one in sets_of(name, options.runs, options.cycles)])
     by_clearance(options.runs, options.cycles)

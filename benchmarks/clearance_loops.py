@@ -1,0 +1,149 @@
+"""Parts of the clearance model, each many times over in a compiled loop.
+
+Every call waits for the result of the one before, as it does in a step: calls that may overlap look cheaper.
+The chain is 0, which the compiler does not know.
+"""
+
+import math
+
+from leg_wear_monitor.contact.friction import friction_force
+from leg_wear_monitor.contact.normal import damped_force, elastic_force
+from leg_wear_monitor.dynamics.clearance import take_tables
+from leg_wear_monitor.dynamics.clearance_contact import (
+    A0,
+    CLEARANCE,
+    E0,
+    FRICTION_COEFFICIENT,
+    FRICTION_LAW,
+    HYSTERESIS_FACTOR,
+    K1E,
+    K1V,
+    LOCAL_STIFFNESS,
+    RAMP_0,
+    RAMP_1,
+    V0,
+    accelerate_clearances,
+)
+from leg_wear_monitor.dynamics.clearance_outputs import drive_torque, reactions, toe_deviation
+from leg_wear_monitor.dynamics.clearance_step import integrate_joints, shift_start, try_step
+from leg_wear_monitor.dynamics.rosenbrock import factorise_contacts, solve_contacts
+from leg_wear_monitor.dynamics.touch import DELTA, first_touch, update_contacts
+from leg_wear_monitor.kernel import entry
+from leg_wear_monitor.wear.surfaces import deposit_wear
+
+STEP = 1.0e-5  # s
+
+
+@entry
+def floors(count, chain, law, local, e, v, inverse_mass, force, out_a):
+    for _ in range(count):
+        e[0] += chain * out_a[0]
+        for i in range(e.shape[0]):
+            out_a[i] = 0.0
+        for k in range(local.shape[0]):
+            ex, ey, vx, vy = e[2 * k], e[2 * k + 1], v[2 * k], v[2 * k + 1]
+            length = math.sqrt(ex * ex + ey * ey)
+            nx, ny = ex / length, ey / length
+            elastic = elastic_force(local[k, LOCAL_STIFFNESS], length - local[k, CLEARANCE])
+            f_n = damped_force(elastic, law[k, HYSTERESIS_FACTOR], nx * vx + ny * vy)
+            mu, code, slip = law[k, FRICTION_COEFFICIENT], law[k, FRICTION_LAW], nx * vy - ny * vx
+            f_t = friction_force(code, mu, law[k, RAMP_0], law[k, RAMP_1], f_n, slip)
+            force[2 * k], force[2 * k + 1] = -f_n * nx - f_t * ny, -f_n * ny + f_t * nx
+        for j in range(e.shape[0]):
+            for i in range(e.shape[0]):
+                out_a[i] += inverse_mass[j, i] * force[j]
+
+
+@entry
+def trials(count, chain, model, state, work):
+    x, law, now, system = work.x, model.law, work.now, work.system
+    for _ in range(count):
+        error = try_step(
+            law, model.tolerance, state.local, state.approach, STEP, now, system, x, work.start, work.end
+        )
+        x[E0, 0] += chain * min(error, 1.0)
+
+
+@entry
+def evaluations(count, chain, model, state, work):
+    x = work.x
+    for _ in range(count):
+        accelerate_clearances(
+            model.law, state.local, state.approach, work.now, 0.0, x, E0, V0, A0, work.start
+        )
+        x[E0, 0] += chain * x[A0, 0]
+
+
+@entry
+def factorisations(count, chain, model, state, work):
+    m, now = state.approach.shape[0], work.now
+    for _ in range(count):
+        h = STEP + chain * work.system.factor[m - 1, m - 1]
+        factorise_contacts(h, now.inverse_mass, now.speed[0], work.start, work.system)
+
+
+@entry
+def solutions(count, chain, model, state, work):
+    m, x = state.approach.shape[0], work.x
+    for _ in range(count):
+        solve_contacts(STEP, work.system, m, 1.0, x, V0, A0, K1E, K1V)
+        x[A0, 0] += chain * x[K1E, 0]
+
+
+@entry
+def integrals(count, chain, model, state, work, added):
+    for _ in range(count):
+        h = STEP + chain * added[0, 0]
+        integrate_joints(model.law, state.local, state.approach, h, work.start, work.end, added)
+
+
+@entry
+def touches(count, chain, model, state, work, contacts, tally):
+    for _ in range(count):
+        share = first_touch(state.approach, STEP, work.start, work.end)
+        update_contacts(
+            contacts.joint, contacts.speed_floor, 0.0, STEP + chain * share, work.start, work.end,
+            state.approach, state.recent, tally.peak, tally.impact, tally.impacts,
+        )  # fmt: skip
+        work.end[0, DELTA] += chain * tally.peak[0]
+
+
+@entry
+def shifts(count, chain, model, state, work):
+    for _ in range(count):
+        shift_start(work.now, work.x)
+        work.x[V0, 0] += chain * work.x[A0, 0]
+
+
+@entry
+def torques(count, chain, model, state, work):
+    for _ in range(count):
+        work.x[A0, 0] += chain * drive_torque(work.now, work.x, work.start)[0]
+
+
+@entry
+def toes(count, chain, model, state, work, tally):
+    for _ in range(count):
+        toe_deviation(work.now, work.x, tally.response)
+        work.x[A0, 0] += chain * tally.response[2]
+
+
+@entry
+def tables(count, chain, model, state, work):
+    for i in range(count):
+        angle = 0.003 * i + chain * work.now.row[0]
+        take_tables(model.tables, angle, work.now.speed[0], 0.0, work.now)
+
+
+@entry
+def ideal_reactions(count, chain, model, state, work):
+    for i in range(count):
+        angle = 0.003 * i + chain * work.reaction[0]
+        reactions(model.tables, angle, work.now, work.x, work.start, work.reaction)
+
+
+@entry
+def wear(count, chain, surfaces, model, state, work):
+    for _ in range(count):
+        ex, ey = state.e[0] + chain * surfaces.depth[0, 0, 0], state.e[1]
+        deposit_wear(model.contacts, surfaces, 0, ex, ey, 0.0, 0.0, 1.0e-9, work.weight)

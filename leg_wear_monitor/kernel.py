@@ -2,8 +2,9 @@
 
 import hashlib
 import os
+import re
 import tempfile
-from collections.abc import Callable
+from collections.abc import Callable, Iterable
 from functools import cache
 from pathlib import Path
 from typing import TypeVar
@@ -11,6 +12,8 @@ from typing import TypeVar
 import numba
 
 _Function = TypeVar("_Function", bound=Callable[..., object])
+
+_IMPORT = re.compile(r"^\s*(?:from|import)\s+(leg_wear_monitor(?:\.\w+)+)", re.MULTILINE)
 
 
 def _writable(directory: Path) -> bool:
@@ -22,27 +25,57 @@ def _writable(directory: Path) -> bool:
 
 
 @cache
-def cache_directory() -> Path:
-    """Directory of the compiled code, named after its sources: what they say and where they lie.
+def _imported(source: Path) -> frozenset[Path]:
+    """Files of this package that a file of it imports; all of a room, where that is what it names."""
+    home = Path(__file__).parent
+    found: set[Path] = set()
+    for name in _IMPORT.findall(source.read_text()):
+        place = home.joinpath(*name.split(".")[1:])
+        found.update(place.rglob("*.py") if place.is_dir() else [place.with_suffix(".py")])
+    return frozenset(found)
 
-    numba looks only at the file of the function it caches: a kernel that calls a kernel of another
-    file would go on running its old body. A digest over the sources of all kernels closes that hole,
-    and a home of its own makes the cache work where the package directory is read-only.
 
-    Returns
-    -------
-    pathlib.Path
-        ``$NUMBA_CACHE_DIR`` if set, else below ``$XDG_CACHE_HOME`` or ``~/.cache``, else below the
-        temporary directory.
-    """
+def _sources(root: Path) -> set[Path]:
+    """A file and all of this package that it imports, directly or not."""
+    known, new = set(), {root}
+    while new:
+        known |= new
+        new = {source for known_one in new for source in _imported(known_one)} - known
+    return known
+
+
+def _digest(sources: Iterable[Path]) -> str:
+    """What all sources with kernels say, and where they lie."""
     digest = hashlib.sha256(numba.__version__.encode())
-    for source in sorted(Path(__file__).parent.rglob("*.py")):
+    for source in sorted(sources):
         text = source.read_bytes()
         if b"leg_wear_monitor.kernel" in text or b"NamedTuple" in text:
             digest.update(text)
             # numba compiles again for a file that lies elsewhere or is newer
             digest.update(f"{source} {source.stat().st_mtime_ns}".encode())
-    leaf = f"leg_wear_monitor/{digest.hexdigest()[:16]}"
+    return digest.hexdigest()[:16]
+
+
+@cache
+def cache_directory(root: Path | None = None) -> Path:
+    """Directory of the compiled code of a file, named after its sources: what they say and where they lie.
+
+    numba looks only at the file of the function it caches: a kernel that calls a kernel of another
+    file would go on running its old body. A digest over the file and all that it imports closes that hole,
+    and a home of its own makes the cache work where the package directory is read-only.
+
+    Parameters
+    ----------
+    root : pathlib.Path, optional
+        File of this package; all of the package's kernels if not given.
+
+    Returns
+    -------
+    pathlib.Path
+        Below ``$NUMBA_CACHE_DIR`` if set, else ``$XDG_CACHE_HOME`` or ``~/.cache``, else the temporary
+        directory.
+    """
+    leaf = f"leg_wear_monitor/{_digest(_sources(root) if root else Path(__file__).parent.rglob('*.py'))}"
     homes = [
         os.environ.get("NUMBA_CACHE_DIR"),
         os.environ.get("XDG_CACHE_HOME"),
@@ -67,7 +100,7 @@ def kernel(function: _Function) -> _Function:
 def entry(function: _Function) -> _Function:
     """Compile what Python calls: a kernel with a cache of its own, that lets other threads run meanwhile."""
     previous = numba.config.CACHE_DIR
-    numba.config.CACHE_DIR = str(cache_directory())
+    numba.config.CACHE_DIR = str(cache_directory(Path(function.__code__.co_filename)))
     try:
         return numba.njit(cache=True, error_model="numpy", _nrt=False, nogil=True)(function)  # type: ignore[no-any-return]
     finally:

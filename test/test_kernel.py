@@ -105,6 +105,13 @@ def test_an_entry_follows_a_change_in_the_kernel_it_calls(package, home):
     assert package.run(**home)[:2] == ["7.0", "0"]
 
 
+def test_an_entry_does_not_follow_what_it_does_not_import(package, home):
+    """Compiling takes a minute: only what a change can reach is compiled again."""
+    package.run(**home)
+    (package.directory / "island.py").write_text(LEAF.format(factor=5.0))
+    assert package.run(**home)[:2] == ["5.0", "1"]
+
+
 def test_another_copy_compiles_for_itself_in_a_directory_of_its_own(package, home, tmp_path):
     """So a note in the cache directory that all is compiled is true of the copy that left it only."""
     (tmp_path / "copy").mkdir()

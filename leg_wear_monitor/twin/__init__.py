@@ -1,0 +1,1 @@
+"""The leg, in step with its gait: samples, crank tracker, digital twin, load from drive torque."""

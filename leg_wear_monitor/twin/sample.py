@@ -1,0 +1,94 @@
+"""What comes in across the seam: records of one measurement each, live or from a recording."""
+
+from typing import Any
+
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+
+from leg_wear_monitor.errors import LegWearError
+
+Samples = NDArray[Any]
+"""Records of `GAIT_SAMPLE`, shape (n,), in order of arrival."""
+
+GAIT_SAMPLE = np.dtype(
+    [
+        ("stamp_ns", "i8"),
+        ("kind", "u1"),
+        ("fault", "u1"),
+        ("crank_angle_rad", "f8"),
+        ("crank_velocity_radps", "f8"),
+        ("torque_nm", "f8"),
+    ]
+)
+"""One sample: the header's stamp, its kind, what is wrong with it, and the values, NaN where absent.
+
+The angle is that of the mechanism's crank: sign, offset and gear ratio are applied above the seam. It may
+be wrapped to a turn or count on. A crank sample may bring a torque too (``effort``).
+"""
+
+CRANK, TORQUE = 0, 1
+KINDS = {CRANK: "crank", TORQUE: "torque"}
+
+# What the conversion found wrong with a message. Such a sample is counted and never used.
+NO_FAULT, EMPTY, WRONG_LENGTH, MISSING_JOINT, NOT_FINITE, ZERO_STAMP, UNDECODABLE, WRONG_TYPE = range(8)
+# What the tracker itself finds in samples that came without a fault.
+OUT_OF_RANGE = 8
+FAULTS = {
+    NO_FAULT: "none",
+    EMPTY: "empty",
+    WRONG_LENGTH: "wrong_length",
+    MISSING_JOINT: "missing_joint",
+    NOT_FINITE: "not_finite",
+    ZERO_STAMP: "zero_stamp",
+    UNDECODABLE: "undecodable",
+    WRONG_TYPE: "wrong_type",
+    OUT_OF_RANGE: "out_of_range",
+}
+"""Names of the faults, fit for keys of diagnostics."""
+
+
+def gait_samples(
+    stamp_ns: ArrayLike,
+    kind: ArrayLike = CRANK,
+    *,
+    crank_angle_rad: ArrayLike = np.nan,
+    crank_velocity_radps: ArrayLike = np.nan,
+    torque_nm: ArrayLike = np.nan,
+    fault: ArrayLike = NO_FAULT,
+) -> Samples:
+    """A block of samples.
+
+    Parameters
+    ----------
+    stamp_ns : (n,) array of int
+        Times of the headers [ns].
+    kind : (n,) array or int
+        `CRANK` or `TORQUE`.
+    crank_angle_rad, crank_velocity_radps, torque_nm : (n,) array or float
+        NaN where absent.
+    fault : (n,) array or int
+        A key of `FAULTS`.
+
+    Returns
+    -------
+    (n,) array of GAIT_SAMPLE
+
+    Raises
+    ------
+    LegWearError
+        For a kind or a fault that is none, or for stamps that are no integers.
+    """
+    stamps = np.atleast_1d(np.asarray(stamp_ns))
+    if stamps.dtype.kind not in "iu":
+        raise LegWearError(f"stamp_ns: {stamps.dtype} is no integer type, expected nanoseconds as int64")
+    block = np.empty(len(stamps), GAIT_SAMPLE)
+    for name, value, known in (("kind", kind, KINDS), ("fault", fault, FAULTS)):
+        codes = np.asarray(value)
+        if not np.isin(codes, list(known)).all():
+            raise LegWearError(f"{name}: {codes[~np.isin(codes, list(known))].flat[0]} is none of {known}")
+        block[name] = codes
+    block["stamp_ns"] = stamps
+    block["crank_angle_rad"] = crank_angle_rad
+    block["crank_velocity_radps"] = crank_velocity_radps
+    block["torque_nm"] = torque_nm
+    return block

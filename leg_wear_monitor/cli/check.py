@@ -1,9 +1,10 @@
 """``leg-wear-monitor check``: what is wrong with a configuration or an installation."""
 
 import platform
-from collections.abc import Callable
+from collections.abc import Callable, Mapping
 from functools import partial
 from importlib import metadata
+from pathlib import Path
 
 import click
 
@@ -20,11 +21,11 @@ _LIBRARIES = ("attrs", "cattrs", "click", "matplotlib", "numba", "numpy", "rich"
 @click.command(short_help="Say what is wrong with a configuration or an installation.")
 @click.argument("configs", nargs=-1, metavar="[CONFIG]...")
 def check(configs: tuple[str, ...]) -> int:
-    """Check mechanism files, or, without any, the installation and the mechanisms that come with it.
+    """Check files of mechanisms and of parameters, or, without any, the installation and its own files.
 
     Prints a line for each that is in order, and one on stderr for each that is not.
     """
-    return 0 if (_all_well(_mechanisms(configs)) if configs else _installation()) else 2
+    return 0 if (_all_well(_files(configs)) if configs else _installation()) else 2
 
 
 def _installation() -> bool:
@@ -35,11 +36,13 @@ def _installation() -> bool:
     if not _all_well({"kernels": _kernels, "share": lambda: str(share_directory())}):
         return False
     from leg_wear_monitor.mechanism.loader import shipped_mechanisms
+    from leg_wear_monitor.monitor.parameter_file import shipped_config
 
-    return _all_well(_mechanisms(tuple(shipped_mechanisms())))
+    shipped = {"monitor.yaml": partial(_parameters, str(shipped_config()))}
+    return _all_well({name: partial(_mechanism, name) for name in shipped_mechanisms()} | shipped)
 
 
-def _all_well(parts: dict[str, Callable[[], str]]) -> bool:
+def _all_well(parts: Mapping[str, Callable[[], str]]) -> bool:
     """Print what each part says of itself, on stderr what is wrong with it."""
     well = True
     for name, part in parts.items():
@@ -70,8 +73,32 @@ def _kernels() -> str:
     return f"{state}, in {place}"
 
 
-def _mechanisms(names: tuple[str, ...]) -> dict[str, Callable[[], str]]:
-    return {name: partial(_mechanism, name) for name in names}
+def _files(names: tuple[str, ...]) -> Mapping[str, Callable[[], str]]:
+    return {name: partial(_file, name) for name in names}
+
+
+def _file(name: str) -> str:
+    """Check a file as what it is."""
+    from leg_wear_monitor.mechanism.loader import is_file_name, read_yaml
+    from leg_wear_monitor.monitor.parameter_file import is_parameter_file
+
+    if is_file_name(name) and is_parameter_file(read_yaml(Path(name), name)):
+        return _parameters(name)
+    return _mechanism(name)
+
+
+def _parameters(path: str) -> str:
+    """Read the monitor's parameters, and say what they are set to."""
+    from leg_wear_monitor.mechanism.loader import load_mechanism
+    from leg_wear_monitor.monitor.fitting import fitted
+    from leg_wear_monitor.monitor.parameter_file import load_config
+
+    config = load_config(path)
+    leg = fitted(load_mechanism(config.mechanism), config, path)
+    return (
+        f"parameters of the monitor: {config.mechanism}, {', '.join(leg.loose)} loose, "
+        f"{config.cadence.commanded_rpm:g} rpm, hardware {config.hardware_id}"
+    )
 
 
 def _mechanism(name: str) -> str:

@@ -39,6 +39,12 @@ def shipped_mechanisms() -> dict[str, Path]:
     return {path.stem: path for path in sorted((share_directory() / "config" / "mechanisms").glob("*.yaml"))}
 
 
+def is_file_name(name_or_path: str | Path) -> bool:
+    """Whether it is a path, and not the name of a mechanism that comes with the package."""
+    path = Path(name_or_path)
+    return bool(path.suffix) or path.parent != Path()
+
+
 def load_mechanism(name_or_path: str | Path = "bionic_leg") -> spec.Mechanism:
     """Read a mechanism from YAML and check all that can be checked without moving it.
 
@@ -54,8 +60,8 @@ def load_mechanism(name_or_path: str | Path = "bionic_leg") -> spec.Mechanism:
         Naming file, key, value and what was expected.
     """
     path = Path(name_or_path)
-    if path.suffix or path.parent != Path():
-        return parse_mechanism(_read_yaml(path, str(path)), str(path))
+    if is_file_name(path):
+        return parse_mechanism(read_yaml(path, str(path)), str(path))
     shipped = shipped_mechanisms()
     if path.name not in shipped:
         raise ConfigError(
@@ -64,7 +70,7 @@ def load_mechanism(name_or_path: str | Path = "bionic_leg") -> spec.Mechanism:
             f"no mechanism of this name, expected a file such as ./leg.yaml or one of {', '.join(shipped)}",
         )
     path = shipped[path.name]
-    return parse_mechanism(_read_yaml(path, path.name), path.name)
+    return parse_mechanism(read_yaml(path, path.name), path.name)
 
 
 def parse_mechanism(document: Any, source: str) -> spec.Mechanism:
@@ -77,7 +83,8 @@ def parse_mechanism(document: Any, source: str) -> spec.Mechanism:
     return mechanism
 
 
-def _read_yaml(path: Path, source: str) -> Any:
+def read_yaml(path: Path, source: str) -> Any:
+    """What a YAML 1.2 file holds, as plain values; raises ConfigError naming the line at fault."""
     try:
         return YAML(typ="safe", pure=True).load(path.read_text(encoding="utf-8"))
     except OSError as error:

@@ -73,6 +73,7 @@ def quantity(
     at_most: float | None = None,
     default: Any = attrs.NOTHING,
     check: Callable[[Any], str | None] | None = None,
+    metadata: Mapping[str, Any] | None = None,
 ) -> Any:
     """Attrs field for a number, or a tuple of numbers, that checks its bounds.
 
@@ -88,6 +89,8 @@ def quantity(
         Value when the key is absent; without it the key is required.
     check : callable, optional
         Gives what else is wrong with a value that is within its bounds, None if nothing.
+    metadata : mapping, optional
+        Kept beside unit, doc and bounds.
 
     Raises
     ------
@@ -106,7 +109,7 @@ def quantity(
         return check(value) if check else None
 
     bounds = {"above": above, "at_least": at_least, "at_most": at_most}
-    return described(doc, unit=unit, default=default, check=fault, metadata=bounds)
+    return described(doc, unit=unit, default=default, check=fault, metadata={**bounds, **(metadata or {})})
 
 
 def choice(names: tuple[str, ...], doc: str, *, default: str) -> Any:

@@ -112,6 +112,18 @@ def _number(value: Any, _kind: Any) -> float:
     return number
 
 
+def _integer(value: Any, _kind: Any) -> int:
+    if isinstance(value, bool) or not isinstance(value, int):
+        raise FieldError("", f"{shown(value)} is not a whole number")
+    return value
+
+
+def _flag(value: Any, _kind: Any) -> bool:
+    if not isinstance(value, bool):
+        raise FieldError("", f"{shown(value)} is not true or false")
+    return value
+
+
 def _text(value: Any, _kind: Any) -> str:
     if not isinstance(value, str) or not value.isprintable():
         raise FieldError("", f"{shown(value)} is not a text on one line")
@@ -161,6 +173,8 @@ def _generic(origin: Any) -> Callable[[Any], bool]:
 
 _converter = cattrs.Converter(forbid_extra_keys=True, detailed_validation=True)
 _converter.register_structure_hook(float, _number)
+_converter.register_structure_hook(int, _integer)
+_converter.register_structure_hook(bool, _flag)
 _converter.register_structure_hook(str, _text)
 _converter.register_structure_hook(float | None, _optional_number)
 _converter.register_structure_hook_factory(attrs.has, _strict_class)

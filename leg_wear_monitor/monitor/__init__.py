@@ -1,0 +1,1 @@
+"""What it means: growth, alarms, and the ledger that keeps the wear of months."""

@@ -1,0 +1,106 @@
+"""The mechanism as the parameters want it: which joints are loose, how far, and how fast they wear."""
+
+import math
+from collections.abc import Sequence
+from typing import Any
+
+import attrs
+
+from leg_wear_monitor.errors import ConfigError
+from leg_wear_monitor.mechanism.clearance import Clearance
+from leg_wear_monitor.mechanism.quantity import FieldError
+from leg_wear_monitor.mechanism.spec import Mechanism, SpeedDrive
+from leg_wear_monitor.monitor.config import MonitorConfig
+
+_KEYS = {"radial_clearance": "clearances_m", "wear_coefficient": "wear_coefficients_per_pa"}
+
+
+def fitted(mechanism: Mechanism, config: MonitorConfig, source: str = "parameters") -> Mechanism:
+    """Mechanism with the loose joints, clearances, wear and speed of a configuration.
+
+    Parameters
+    ----------
+    mechanism : Mechanism
+    config : MonitorConfig
+    source : str
+        Where the configuration comes from, for messages.
+
+    Raises
+    ------
+    ConfigError
+        For joints that the mechanism does not have, lists of a wrong length, a clearance that does not fit,
+        or a mechanism that a torque drives.
+    """
+    if not isinstance(mechanism.drive, SpeedDrive):
+        raise ConfigError(
+            source, "mechanism", f"{config.mechanism!r} is driven by a torque, expected one with drive.speed"
+        )
+    loose = config.loose_joints or mechanism.loose
+    _check_joints(loose, mechanism, source)
+    speed = config.cadence.commanded_rpm * 2.0 * math.pi / 60.0
+    settings = {name: _settings(mechanism, config, loose, k, source) for k, name in enumerate(loose)}
+    for limits in ("joint_impact_force_n", "joint_clearance_m"):
+        given = getattr(config.limits, limits)
+        if given and len(given) != len(loose):
+            raise _wrong_length(source, f"limits.{limits}", given, loose, "")
+    return attrs.evolve(
+        mechanism,
+        loose=loose,
+        clearances=mechanism.clearances | settings,
+        drive=attrs.evolve(mechanism.drive, speed=speed),
+    )
+
+
+def _check_joints(loose: Sequence[str], mechanism: Mechanism, source: str) -> None:
+    if not loose:
+        raise ConfigError(
+            source,
+            "loose_joints",
+            f"none, and {mechanism.source} has none either; expected some of: {_ready(mechanism)}",
+        )
+    for name in loose:
+        if name not in mechanism.clearances:
+            raise ConfigError(
+                source,
+                "loose_joints",
+                f"{name!r} has no clearance settings in {mechanism.source}, expected some of: "
+                f"{_ready(mechanism)}",
+            )
+    if len(set(loose)) < len(loose):
+        raise ConfigError(source, "loose_joints", f"{list(loose)} names a joint twice")
+
+
+def _ready(mechanism: Mechanism) -> str:
+    return ", ".join(mechanism.clearances) or "none"
+
+
+def _settings(
+    mechanism: Mechanism, config: MonitorConfig, loose: Sequence[str], k: int, source: str
+) -> Clearance:
+    settings = mechanism.clearances[loose[k]]
+    changes: dict[str, Any] = {}
+    wear = _own(config.wear_coefficients_per_pa, loose, k, source, _KEYS["wear_coefficient"])
+    if wear is not None:
+        changes["wear_coefficient"] = (wear, wear)
+    clearance = _own(config.clearances_m, loose, k, source, _KEYS["radial_clearance"])
+    if clearance is not None:
+        changes["radial_clearance"] = clearance
+    try:
+        return attrs.evolve(settings, **changes)
+    except FieldError as error:
+        raise ConfigError(source, _KEYS[error.key], f"joint {loose[k]}: {error.fault}") from error
+
+
+def _own(given: Sequence[float], loose: Sequence[str], k: int, source: str, key: str) -> float | None:
+    """A joint's own value of a list that has one for all or one each, None of an empty one."""
+    if len(given) not in (0, 1, len(loose)):
+        raise _wrong_length(source, key, given, loose, "one for all or ")
+    return given[k if len(given) > 1 else 0] if given else None
+
+
+def _wrong_length(
+    source: str, key: str, given: Sequence[float], loose: Sequence[str], other: str
+) -> ConfigError:
+    return ConfigError(
+        source, key, f"{list(given)} has {len(given)} values, expected {other}one each for {', '.join(loose)}"
+    )

@@ -1,0 +1,112 @@
+"""Parameters of what comes in: the crank's joint, the drive torque, the commanded gait, the tracker."""
+
+from typing import Any
+
+import attrs
+
+from leg_wear_monitor.mechanism.quantity import choice, described, quantity
+
+LIVE = {"live": True}  # may change while the monitor runs
+
+TORQUE_SOURCES = ("wrench", "float64", "effort")
+
+
+def _not_zero(speed: float) -> str | None:
+    return None if speed else f"{speed!r} rpm does not turn the crank, expected another speed"
+
+
+def _one_way_or_other(number: float) -> str | None:
+    return None if number in (-1, 1) else f"{number!r} is not one of 1, -1"
+
+
+def _sign(doc: str) -> Any:
+    return described(doc, default=1, check=_one_way_or_other)
+
+
+@attrs.frozen(kw_only=True)
+class Crank:
+    """From a joint's position to the mechanism's crank angle: sign * position / gear_ratio + offset."""
+
+    sign: int = _sign("1 if the joint counts as the mechanism's crank does, -1 if it counts the other way")
+    offset_rad: float = quantity(
+        "rad", "angle of the crank where the joint stands at 0", at_least=-100.0, at_most=100.0, default=0.0
+    )
+    gear_ratio: float = quantity(
+        "",
+        "turns of the joint for one of the crank; other than 1, its position must count on and not wrap",
+        above=0.0,
+        at_most=1.0e4,
+        default=1.0,
+    )
+
+
+@attrs.frozen(kw_only=True)
+class DriveTorque:
+    """From a torque message to the torque on the crank: sign * scale * gear_ratio * value."""
+
+    source: str = choice(
+        TORQUE_SOURCES,
+        "WrenchStamped or Float64 on drive_torque, or the crank's effort in joint_states",
+        default="wrench",
+    )
+    axis: str = choice(("x", "y", "z"), "axis of the wrench that the drive turns about", default="z")
+    sign: int = _sign("1 if the torque drives the crank the way its angle counts, -1 if against")
+    scale: float = quantity(
+        "",
+        "factor on the torque, its unit's and the gear's efficiency",
+        above=0.0,
+        at_most=1.0e6,
+        default=1.0,
+    )
+    gear_ratio: float = quantity(
+        "", "turns of the shaft with the sensor for one of the crank", above=0.0, at_most=1.0e4, default=1.0
+    )
+    saturation_nm: float = quantity(
+        "N m",
+        "torque on the crank from which on the sensor is saturated; 0 if not known",
+        at_least=0.0,
+        at_most=1.0e6,
+        default=0.0,
+        metadata=LIVE,
+    )
+
+
+@attrs.frozen(kw_only=True)
+class Cadence:
+    """The gait as commanded."""
+
+    commanded_rpm: float = quantity(
+        "rpm",
+        "commanded crank speed, negative for clockwise, not 0",
+        at_least=-1200.0,
+        at_most=1200.0,
+        default=60.0,
+        check=_not_zero,
+    )
+    tolerance_rpm: float = quantity(
+        "rpm",
+        "departure from it up to which predictions are valid",
+        above=0.0,
+        at_most=1200.0,
+        default=6.0,
+        metadata=LIVE,
+    )
+
+
+@attrs.frozen(kw_only=True)
+class Tracker:
+    """How the crank's motion is taken from its samples."""
+
+    bandwidth_hz: float = quantity(
+        "Hz", "bandwidth of the crank's tracker", at_least=0.1, at_most=200.0, default=8.0
+    )
+    reorder_window_s: float = quantity(
+        "s", "how long a sample waits for earlier ones", at_least=0.0, at_most=1.0, default=0.02
+    )
+    gap_limit_s: float = quantity(
+        "s",
+        "longest gap that is bridged at the tracked speed; what is longer is not monitored",
+        above=0.0,
+        at_most=10.0,
+        default=0.5,
+    )

@@ -1,0 +1,1 @@
+"""A made-up leg to be monitored: its motion in full coordinates, and the sensors on it."""

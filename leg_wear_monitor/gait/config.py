@@ -1,0 +1,127 @@
+"""Every parameter of the synthetic leg: default, unit, bounds and meaning, declared once."""
+
+from itertools import pairwise
+
+import attrs
+
+from leg_wear_monitor.mechanism.quantity import FieldError, described, quantity
+
+
+def _share(doc: str) -> float:
+    share: float = quantity("", doc, at_least=0.0, at_most=1.0, default=0.0)
+    return share
+
+
+def _rises_from_zero(times: tuple[float, ...]) -> str | None:
+    if times and times[0] == 0.0 and all(a < b for a, b in pairwise(times)):
+        return None
+    return f"{list(times)} does not increase from 0 s"
+
+
+@attrs.frozen(kw_only=True)
+class PaceConfig:
+    """How the crank turns: speeds that follow one another, with a ripple."""
+
+    times_s: tuple[float, ...] = quantity(
+        "s", "when each speed is set, the first at 0", default=(0.0,), check=_rises_from_zero
+    )
+    speeds_rpm: tuple[float, ...] = quantity(
+        "rpm", "the speeds, one for each time; 0 stands still, below 0 turns clockwise", default=(60.0,)
+    )
+    ramp_s: float = quantity("s", "time that a change of speed takes", above=0.0, default=0.5)
+    ripple: float = quantity(
+        "", "speed ripple, as a share of the speed", at_least=0.0, at_most=0.9, default=0.0
+    )
+    ripple_per_turn: float = quantity("", "waves of the ripple in a turn", above=0.0, default=2.0)
+
+    def __attrs_post_init__(self) -> None:
+        if len(self.speeds_rpm) != len(self.times_s):
+            fault = f"has {len(self.speeds_rpm)} speeds for {len(self.times_s)} times, expected one each"
+            raise FieldError("speeds_rpm", fault)
+        if any(b - a < self.ramp_s for a, b in pairwise(self.times_s)):
+            raise FieldError("ramp_s", f"{self.ramp_s!r} is longer than the time between two speeds s")
+
+
+@attrs.frozen(kw_only=True)
+class EncoderConfig:
+    """The crank's encoder."""
+
+    rate_hz: float = quantity("Hz", "messages a second", above=0.0, at_most=10000.0, default=200.0)
+    noise_rad: float = quantity("rad", "noise of the angle, standard deviation", at_least=0.0, default=1.0e-3)
+    velocity_noise_radps: float = quantity(
+        "rad/s", "noise of the velocity, standard deviation", at_least=0.0, default=0.05
+    )
+    counts_per_turn: float = quantity(
+        "", "steps of the angle in a turn, 0 for none", at_least=0.0, default=16384.0
+    )
+    offset_rad: float = quantity("rad", "what it reads at crank angle 0", default=0.0)
+    wrapped: bool = described("angle wrapped to a turn; else it counts on", default=False)
+
+
+@attrs.frozen(kw_only=True)
+class TorqueSensorConfig:
+    """The drive's torque sensor, which gives means over the time since its last reading."""
+
+    rate_hz: float = quantity("Hz", "messages a second", above=0.0, at_most=10000.0, default=200.0)
+    noise_nm: float = quantity("N m", "noise, standard deviation", at_least=0.0, default=0.05)
+    resolution_nm: float = quantity("N m", "step of the reading, 0 for none", at_least=0.0, default=0.01)
+    offset_nm: float = quantity("N m", "what it reads without torque", default=0.0)
+
+
+@attrs.frozen(kw_only=True)
+class TransportConfig:
+    """What happens to a reading on its way."""
+
+    jitter_s: float = quantity(
+        "s", "when it is taken, about its turn: standard deviation", at_least=0.0, default=1.0e-4
+    )
+    drop_share: float = _share("share that is lost")
+    duplicate_share: float = _share("share that arrives twice")
+    late_share: float = _share("share that arrives late, overtaken by others")
+    late_s: float = quantity("s", "how late", at_least=0.0, default=0.02)
+    fault_share: float = _share("share of messages that are malformed, every way in turn")
+    gaps_s: tuple[float, ...] = quantity("s", "when nothing is heard for a while", at_least=0.0, default=())
+    gap_s: float = quantity("s", "how long that lasts", at_least=0.0, default=0.5)
+
+
+@attrs.frozen(kw_only=True)
+class LoadConfig:
+    """What the leg carries that a monitor cannot know of."""
+
+    toe_force_n: float = quantity(
+        "N", "upward force of the ground on the toe while it moves backwards", at_least=0.0, default=0.0
+    )
+    friction_nm: float = quantity(
+        "N m", "friction of the drive, against its motion", at_least=0.0, default=0.0
+    )
+
+
+@attrs.frozen(kw_only=True)
+class KnockConfig:
+    """A bushing that breaks out at once."""
+
+    joint: str = described("the loose joint, none if empty", default="")
+    at_s: float = quantity("s", "when", at_least=0.0, default=5.0)
+    clearance_m: float = quantity("m", "its radial clearance from then on", above=0.0, default=1.0e-3)
+
+
+@attrs.frozen(kw_only=True)
+class GaitConfig:
+    """The synthetic leg."""
+
+    mechanism: str = described(
+        "mechanism file, or the name of one that comes with the package", default="bionic_leg"
+    )
+    seed: int = quantity("", "of all noise; equal seeds, equal data", at_least=0, default=0)
+    duration_s: float = quantity("s", "time to walk, 0 without end", at_least=0.0, default=0.0)
+    loose: tuple[str, ...] = described("loose joints; the mechanism's own if empty", default=())
+    clearances_m: tuple[float, ...] = quantity(
+        "m", "radial clearances of the loose joints; the mechanism's own if empty", above=0.0, default=()
+    )
+    wear_factor: float = quantity("", "wear coefficients, times this", at_least=0.0, default=1.0)
+    pace: PaceConfig = described("how the crank turns", factory=PaceConfig)
+    encoder: EncoderConfig = described("the crank's encoder", factory=EncoderConfig)
+    torque_sensor: TorqueSensorConfig = described("the drive's torque sensor", factory=TorqueSensorConfig)
+    transport: TransportConfig = described("what happens to a reading on its way", factory=TransportConfig)
+    load: LoadConfig = described("what a monitor cannot know of", factory=LoadConfig)
+    knock: KnockConfig = described("a bushing that breaks out", factory=KnockConfig)

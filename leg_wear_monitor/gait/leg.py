@@ -1,0 +1,157 @@
+"""The leg itself: full coordinates, clearances and wear of its own, all of it known."""
+
+import math
+from typing import Any, NamedTuple
+
+import attrs
+import numpy as np
+
+from leg_wear_monitor.dynamics.full_run import FullRun
+from leg_wear_monitor.dynamics.run import Setup
+from leg_wear_monitor.dynamics.simulation import prepare
+from leg_wear_monitor.dynamics.tally import TORQUE, Tally, new_tally
+from leg_wear_monitor.errors import ConfigError
+from leg_wear_monitor.gait.config import GaitConfig, KnockConfig
+from leg_wear_monitor.gait.pace import CrankMotion, Pace, quintic
+from leg_wear_monitor.mechanism.arrays import Floats
+from leg_wear_monitor.mechanism.ideal import TURN, one_cycle, point_motion
+from leg_wear_monitor.mechanism.loader import load_mechanism
+from leg_wear_monitor.mechanism.position import build_linkage
+from leg_wear_monitor.mechanism.spec import Mechanism, PhaseLoad, SpeedDrive
+
+_LONGEST_PIECE_S = 2.0e-3  # of the drive's polynomial: it then follows a ripple of 50 Hz to 1e-9 rad
+_LOAD_PHASES = 72
+_FRICTION_RAMP_RADPS = 0.05
+
+
+class Instant(NamedTuple):
+    """The crank at a time, and the integral of the drive torque over all time before [N m s]."""
+
+    crank: CrankMotion
+    torque_impulse: float
+
+
+class SyntheticLeg:
+    """A leg that walks at a given pace.
+
+    Parameters
+    ----------
+    config : GaitConfig
+
+    Attributes
+    ----------
+    loose : tuple of str
+        Names of the loose joints.
+
+    Raises
+    ------
+    ConfigError, AssemblyError
+    """
+
+    def __init__(self, config: GaitConfig) -> None:
+        mechanism = load_mechanism(config.mechanism)
+        if not isinstance(mechanism.drive, SpeedDrive):
+            raise ConfigError(mechanism.source, "drive", "is a torque; a gait needs a crank driven by speed")
+        self._pace = Pace(config.pace)
+        setup = _setup(mechanism, config, self._pace.at(0.0).speed)
+        self.loose = setup.loose
+        self._setup, self._run = setup, FullRun(setup)
+        self._knock, self._friction = _checked(config.knock, setup), config.load.friction_nm
+        self._tally: Tally = new_tally(len(mechanism.joints))
+        self._friction_impulse = 0.0
+        self._cycles: list[tuple[float, Floats]] = [(0.0, self.clearance_m())]
+
+    @property
+    def time(self) -> float:
+        """Time walked [s]."""
+        return self._run.time
+
+    def clearance_m(self) -> Floats:
+        """Mean radial clearance (k,) of each loose joint [m]."""
+        opened = self._setup.surfaces.depth.sum(axis=1).mean(axis=1)
+        return np.asarray(self._setup.contacts.clearance + opened)
+
+    def advance(self, t: float) -> Instant:
+        """Walk on to a time [s].
+
+        Raises
+        ------
+        SimulationError
+        """
+        pieces = max(1, math.ceil((t - self.time) / _LONGEST_PIECE_S))
+        for piece in range(pieces, 0, -1):
+            self._step(t if piece == 1 else self.time + (t - self.time) / piece)
+        impulse = float(self._tally.drive_integral[TORQUE]) + self._friction_impulse
+        return Instant(self._pace.at(t), impulse)
+
+    def truth(self) -> dict[str, Any]:
+        """What is known of the leg: each joint's clearance at the start, after each cycle, and now [m]."""
+        columns = zip(*(clearance.tolist() for _, clearance in self._cycles), strict=True)
+        return {
+            "mechanism": self._setup.linkage.mechanism.name,
+            "walked_s": self.time,
+            "cycle_end_s": [time for time, _ in self._cycles],
+            "clearance_m": {
+                name: [*column, now]
+                for name, column, now in zip(self.loose, columns, self.clearance_m().tolist(), strict=True)
+            },
+        }
+
+    def _step(self, t: float) -> None:
+        before = self.time
+        if self._knock and before <= self._knock.at_s < t:
+            k = self.loose.index(self._knock.joint)
+            self._setup.contacts.clearance[k] = self._knock.clearance_m
+        if t <= before:
+            return
+        start, end = self._pace.at(before), self._pace.at(t)
+        self._run.polynomial[:] = quintic(before, start, t - before, end)
+        self._run.advance(t, self._tally)
+        self._friction_impulse += self._friction * math.tanh(end.speed / _FRICTION_RAMP_RADPS) * (t - before)
+        if math.floor(start.angle / TURN) != math.floor(end.angle / TURN):
+            self._cycles.append((t, self.clearance_m()))
+
+
+def _setup(mechanism: Mechanism, config: GaitConfig, speed: float) -> Setup:
+    """The leg ready to run: its own joints, clearances, wear and load."""
+    leg = _loaded(mechanism, config.load.toe_force_n)
+    setup = prepare(leg, clearances=config.loose or None, wear=True)
+    contacts = setup.contacts
+    clearance = np.array(config.clearances_m) if config.clearances_m else contacts.clearance
+    if len(clearance) != len(setup.loose):
+        fault = (
+            f"has {len(clearance)} values for the loose joints {', '.join(setup.loose)}, expected one each"
+        )
+        raise ConfigError("gait", "clearances_m", fault)
+    wear = contacts.wear_coefficient * config.wear_factor
+    return attrs.evolve(
+        setup, contacts=contacts._replace(clearance=clearance, wear_coefficient=wear), speed=speed
+    )
+
+
+def _loaded(mechanism: Mechanism, force_n: float) -> Mechanism:
+    """The mechanism with the ground's push on its toe, in proportion to its depth below its mean height."""
+    if force_n == 0.0:
+        return mechanism
+    if mechanism.toe is None:
+        raise ConfigError("gait", "load.toe_force_n", f"{mechanism.source} has no point called toe to push")
+    body, point = mechanism.toe
+    linkage = build_linkage(mechanism)
+    position, _, _ = point_motion(one_cycle(linkage, _LOAD_PHASES, TURN), linkage, body, point)
+    depth = np.maximum(0.0, position[:, 1].mean() - position[:, 1])
+    push = force_n * depth / depth.max()
+    ground = PhaseLoad(
+        body=body,
+        point=point,
+        phase=tuple((np.arange(_LOAD_PHASES) / _LOAD_PHASES).tolist()),
+        force=tuple((0.0, float(f)) for f in push),
+    )
+    return attrs.evolve(mechanism, loads={**mechanism.loads, "ground": ground})
+
+
+def _checked(knock: KnockConfig, setup: Setup) -> KnockConfig | None:
+    if not knock.joint:
+        return None
+    if knock.joint not in setup.loose:
+        raise ConfigError("gait", "knock.joint", f"{knock.joint!r} is none of {', '.join(setup.loose)}")
+    return knock

@@ -1,0 +1,85 @@
+"""How the crank turns: speeds that follow one another over smooth ramps, with a ripple by phase."""
+
+import math
+from itertools import pairwise
+from typing import NamedTuple
+
+import numpy as np
+
+from leg_wear_monitor.gait.config import PaceConfig
+from leg_wear_monitor.mechanism.arrays import Floats
+from leg_wear_monitor.mechanism.ideal import TURN
+
+
+class CrankMotion(NamedTuple):
+    """Angle [rad], speed [rad/s] and acceleration [rad/s^2] of the crank."""
+
+    angle: float
+    speed: float
+    acceleration: float
+
+
+class _Stretch(NamedTuple):
+    """From a time [s] and an even angle [rad] on, from one speed to another [rad/s]."""
+
+    since: float
+    angle: float
+    before: float
+    after: float
+
+
+class Pace:
+    """Motion of the crank over time, from angle 0.
+
+    The even motion phi is what the ramps give; the ripple is added by phase, theta = phi + r / h sin(h phi),
+    so that it is r of the speed at any speed and stops with the crank.
+    """
+
+    def __init__(self, config: PaceConfig) -> None:
+        self._ramp = config.ramp_s
+        self._ripple, self._waves = config.ripple, config.ripple_per_turn
+        speeds = [rpm * TURN / 60.0 for rpm in config.speeds_rpm]
+        self._stretches = [_Stretch(0.0, 0.0, speeds[0], speeds[0])]
+        for (_, end), (before, after) in zip(pairwise(config.times_s), pairwise(speeds), strict=True):
+            self._stretches.append(_Stretch(end, self._even(end).angle, before, after))
+
+    def at(self, t: float) -> CrankMotion:
+        """The crank at a time [s]."""
+        angle, speed, acceleration = self._even(t)
+        r, h = self._ripple, self._waves
+        sine, factor = math.sin(h * angle), 1.0 + r * math.cos(h * angle)
+        return CrankMotion(
+            angle + r / h * sine, speed * factor, acceleration * factor - speed * speed * r * h * sine
+        )
+
+    def _even(self, t: float) -> CrankMotion:
+        """The motion without ripple: a smooth step of the speed, 10 u^3 - 15 u^4 + 6 u^5, then none."""
+        last = next(last for last in reversed(self._stretches) if last.since <= t)
+        tau, step = t - last.since, last.after - last.before
+        if tau >= self._ramp:
+            angle = (
+                last.angle + 0.5 * (last.before + last.after) * self._ramp + last.after * (tau - self._ramp)
+            )
+            return CrankMotion(angle, last.after, 0.0)
+        u = tau / self._ramp
+        risen = u * u * u * (10.0 + u * (6.0 * u - 15.0))
+        area = u**4 * (2.5 + u * (u - 3.0)) * self._ramp
+        slope = 30.0 * u * u * (1.0 + u * (u - 2.0)) / self._ramp
+        return CrankMotion(
+            last.angle + last.before * tau + step * area, last.before + step * risen, step * slope
+        )
+
+
+def quintic(since: float, start: CrankMotion, span: float, end: CrankMotion) -> Floats:
+    """Drive polynomial (7,) through two states of the crank, ``span`` seconds apart.
+
+    Pieces of it join with continuous acceleration.
+    """
+    a0, v0, w0 = start.angle, start.speed, start.acceleration
+    gap = end.angle - a0 - span * (v0 + 0.5 * span * w0)
+    slope = (end.speed - v0 - span * w0) * span
+    bend = (end.acceleration - w0) * span * span
+    cubic = 10.0 * gap - 4.0 * slope + 0.5 * bend
+    quartic = -15.0 * gap + 7.0 * slope - bend
+    fifth = 6.0 * gap - 3.0 * slope + 0.5 * bend
+    return np.array([since, a0, v0, 0.5 * w0, cubic / span**3, quartic / span**4, fifth / span**5])

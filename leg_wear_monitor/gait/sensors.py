@@ -1,0 +1,138 @@
+"""What the sensors on the leg say of it, and what of that arrives."""
+
+import heapq
+import itertools
+import math
+from collections.abc import Iterable, Iterator
+from typing import NamedTuple
+
+import numpy as np
+
+from leg_wear_monitor.gait.config import EncoderConfig, GaitConfig, TorqueSensorConfig, TransportConfig
+from leg_wear_monitor.gait.leg import SyntheticLeg
+from leg_wear_monitor.gait.pace import CrankMotion
+from leg_wear_monitor.mechanism.ideal import TURN
+from leg_wear_monitor.twin.sample import CRANK, FAULTS, GAIT_SAMPLE, NO_FAULT, OUT_OF_RANGE, TORQUE, Samples
+
+# what a message can be made to suffer from; the rest needs another type, or is no message's fault
+_MADE = tuple(fault for fault in FAULTS if fault not in (NO_FAULT, OUT_OF_RANGE))
+
+
+class Reading(NamedTuple):
+    """A message of a sensor: when it arrives and was taken [s since the start], and what it says."""
+
+    arrival_s: float
+    taken_s: float
+    kind: int
+    fault: int
+    crank_angle_rad: float
+    crank_velocity_radps: float
+    torque_nm: float
+
+
+class Noise:
+    """Normal and uniform numbers, one after the other; drawn in blocks, for that is ten times as fast."""
+
+    def __init__(self, seed: list[int]) -> None:
+        self._rng = np.random.default_rng(seed)
+        self._normal: Iterator[float] = iter(())
+        self._uniform: Iterator[float] = iter(())
+
+    def normal(self) -> float:
+        """Next number of standard deviation 1."""
+        for value in self._normal:
+            return value
+        self._normal = iter(self._rng.standard_normal(1024).tolist())
+        return next(self._normal)
+
+    def uniform(self) -> float:
+        """Next number in [0, 1)."""
+        for value in self._uniform:
+            return value
+        self._uniform = iter(self._rng.random(1024).tolist())
+        return next(self._uniform)
+
+
+def readings(leg: SyntheticLeg, config: GaitConfig) -> Iterator[Reading]:
+    """Readings of the leg in order of arrival, without end unless the configuration has one."""
+    return _arriving(_taken(leg, config), config.transport, Noise([config.seed, 3]))
+
+
+def samples(block: Iterable[Reading], start_ns: int) -> Samples:
+    """Readings as samples that a monitor takes, (n,) of GAIT_SAMPLE; time 0 is ``start_ns``."""
+    rows = [(stamp_ns(reading, start_ns), reading.kind, reading.fault, *reading[4:]) for reading in block]
+    return np.array(rows, dtype=GAIT_SAMPLE)
+
+
+def stamp_ns(reading: Reading, start_ns: int) -> int:
+    """Stamp of a reading [ns]."""
+    return start_ns + round(reading.taken_s * 1.0e9)
+
+
+def _taken(leg: SyntheticLeg, config: GaitConfig) -> Iterator[Reading]:
+    """Readings in the order in which they are taken."""
+    jitter = config.transport.jitter_s
+    encoder, torque = Noise([config.seed, 1]), Noise([config.seed, 2])
+    crank_times = _times(config.encoder.rate_hz, jitter, encoder, CRANK)
+    torque_times = _times(config.torque_sensor.rate_hz, jitter, torque, TORQUE)
+    since, impulse = 0.0, 0.0
+    for t, kind in heapq.merge(crank_times, torque_times):
+        if config.duration_s and t >= config.duration_s:
+            return
+        instant = leg.advance(t)
+        if kind == CRANK:
+            angle, velocity = _encoder(config.encoder, instant.crank, encoder)
+            yield Reading(t, t, kind, NO_FAULT, angle, velocity, math.nan)
+        else:
+            mean = (instant.torque_impulse - impulse) / (t - since)
+            since, impulse = t, instant.torque_impulse
+            yield Reading(
+                t, t, kind, NO_FAULT, math.nan, math.nan, _torque(config.torque_sensor, mean, torque)
+            )
+
+
+def _times(rate_hz: float, jitter_s: float, noise: Noise, kind: int) -> Iterator[tuple[float, int]]:
+    """When a sensor's readings are taken [s]: even, but for the jitter, which never swaps two."""
+    most = 0.45 / rate_hz
+    for i in itertools.count(1):
+        yield i / rate_hz + min(most, max(-most, jitter_s * noise.normal())), kind
+
+
+def _encoder(config: EncoderConfig, crank: CrankMotion, noise: Noise) -> tuple[float, float]:
+    angle = crank.angle + config.offset_rad + config.noise_rad * noise.normal()
+    velocity = crank.speed + config.velocity_noise_radps * noise.normal()
+    if config.counts_per_turn:
+        step = TURN / config.counts_per_turn
+        angle = round(angle / step) * step
+    return angle % TURN if config.wrapped else angle, velocity
+
+
+def _torque(config: TorqueSensorConfig, torque_nm: float, noise: Noise) -> float:
+    reading = torque_nm + config.offset_nm + config.noise_nm * noise.normal()
+    if config.resolution_nm:
+        reading = round(reading / config.resolution_nm) * config.resolution_nm
+    return reading
+
+
+def _arriving(taken: Iterable[Reading], config: TransportConfig, noise: Noise) -> Iterator[Reading]:
+    """What of the readings arrives, in the order in which it does."""
+    order = itertools.count()
+    faults = itertools.cycle(_MADE)
+    under_way: list[tuple[float, int, Reading]] = []
+    for reading in taken:
+        while under_way and under_way[0][0] <= reading.taken_s:
+            yield heapq.heappop(under_way)[2]
+        chance = [noise.uniform() for _ in range(4)]
+        if chance[0] < config.drop_share or _in_gap(reading.taken_s, config):
+            continue
+        late = config.late_s if chance[1] < config.late_share else 0.0
+        fault = next(faults) if chance[2] < config.fault_share else reading.fault
+        sent = reading._replace(arrival_s=reading.taken_s + late, fault=fault)
+        for _ in range(2 if chance[3] < config.duplicate_share else 1):
+            heapq.heappush(under_way, (sent.arrival_s, next(order), sent))
+    while under_way:
+        yield heapq.heappop(under_way)[2]
+
+
+def _in_gap(t: float, config: TransportConfig) -> bool:
+    return any(start <= t < start + config.gap_s for start in config.gaps_s)

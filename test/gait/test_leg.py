@@ -1,0 +1,94 @@
+"""The synthetic leg: it moves as the full-coordinate simulation does, and knows its own wear."""
+
+import numpy as np
+import pytest
+
+from leg_wear_monitor import ConfigError, load_mechanism, simulate
+from leg_wear_monitor.gait.config import GaitConfig, KnockConfig, LoadConfig, PaceConfig
+from leg_wear_monitor.gait.leg import SyntheticLeg
+
+STOP = PaceConfig(times_s=(0.0, 0.3), speeds_rpm=(60.0, 0.0), ramp_s=0.3)
+
+
+def test_one_loose_joint_wears_as_in_the_simulation() -> None:
+    leg = SyntheticLeg(GaitConfig(loose=("A",), wear_factor=1.0e4))
+    leg.advance(2.0)
+    figures = simulate(load_mechanism("bionic_leg"), clearances=["A"], model="full", skip_cycles=0, cycles=2)
+    depth = figures.joints["A"]["wear_depth_m_per_cycle"]
+    expected = 2.0 * 1.0e4 * (depth["bushing_mean"] + depth["journal_mean"])
+    # wear, ten thousand times as fast here, has opened the joint by a thousandth: impacts differ a little
+    assert leg.clearance_m()[0] - 3.0e-4 == pytest.approx(expected, rel=0.03)
+
+
+def test_a_cycle_of_the_drive_pays_for_friction_and_impacts_only() -> None:
+    """Once around, gravity and inertia give back what they took."""
+    leg = SyntheticLeg(GaitConfig())
+    first, last = leg.advance(1.0).torque_impulse, leg.advance(2.0).torque_impulse
+    assert 0.0 < last - first < 2.0
+
+
+def test_friction_of_the_drive_adds_to_its_torque() -> None:
+    plain, braked = (
+        SyntheticLeg(GaitConfig(load=LoadConfig(friction_nm=friction))).advance(0.5).torque_impulse
+        for friction in (0.0, 3.0)
+    )
+    assert braked - plain == pytest.approx(1.5, rel=1e-9)
+
+
+def test_a_push_of_the_ground_changes_the_torque() -> None:
+    """By its work over the way of the toe: a tenth of a turn moves it some centimetres up or down."""
+    plain, pushed = (SyntheticLeg(GaitConfig(load=LoadConfig(toe_force_n=force))) for force in (0.0, 100.0))
+    changes = [
+        pushed.advance(t).torque_impulse - plain.advance(t).torque_impulse for t in (0.1, 0.2, 0.3, 0.4, 0.5)
+    ]
+    assert np.ptp(changes) > 0.1
+
+
+def test_the_truth_has_an_entry_a_cycle() -> None:
+    leg = SyntheticLeg(GaitConfig(wear_factor=1.0e4))
+    leg.advance(2.5)
+    truth = leg.truth()
+    assert truth["cycle_end_s"] == pytest.approx([0.0, 1.0, 2.0], abs=0.01)
+    for name in leg.loose:
+        column = truth["clearance_m"][name]
+        assert len(column) == 4
+        assert (np.diff(column) > 0.0).all()
+
+
+def test_a_leg_that_stands_hardly_wears() -> None:
+    """Friction with a ramp lets journals creep where they hang; that is all that is left."""
+    leg = SyntheticLeg(GaitConfig(pace=STOP, wear_factor=1.0e4))
+    start = leg.clearance_m()
+    leg.advance(1.0)
+    walked = leg.clearance_m() - start
+    leg.advance(2.0)
+    assert (leg.clearance_m() - start - walked < 0.05 * walked).all()
+
+
+def test_a_leg_can_start_from_standing() -> None:
+    pace = PaceConfig(times_s=(0.0, 0.4), speeds_rpm=(0.0, -60.0), ramp_s=0.3)
+    leg = SyntheticLeg(GaitConfig(pace=pace))
+    assert leg.advance(1.0).crank.speed == pytest.approx(-2.0 * np.pi)
+
+
+def test_a_knock_opens_one_joint_at_its_time() -> None:
+    leg = SyntheticLeg(GaitConfig(knock=KnockConfig(joint="G", at_s=0.25, clearance_m=1.0e-3)))
+    leg.advance(0.24)
+    assert leg.clearance_m() == pytest.approx(3.0e-4, rel=1e-3)
+    leg.advance(0.26)
+    assert leg.clearance_m()[leg.loose.index("G")] == pytest.approx(1.0e-3, rel=1e-3)
+
+
+@pytest.mark.parametrize(
+    ("changes", "line"),
+    [
+        ({"clearances_m": (1e-4,)}, "gait: clearances_m: has 1 values for the loose joints A, B, G, I, J"),
+        ({"knock": KnockConfig(joint="C")}, "gait: knock.joint: 'C' is none of A, B, G, I, J"),
+        ({"mechanism": "no_leg"}, "no_leg: no mechanism of this name"),
+        ({"mechanism": "slider_crank", "load": LoadConfig(toe_force_n=1.0)}, "gait: load.toe_force_n: slid"),
+    ],
+)
+def test_what_the_leg_cannot_be_is_refused_in_a_line(changes: dict[str, object], line: str) -> None:
+    with pytest.raises(ConfigError) as refused:
+        SyntheticLeg(GaitConfig(**changes))
+    assert str(refused.value).startswith(line)

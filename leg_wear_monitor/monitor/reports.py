@@ -1,0 +1,213 @@
+"""What the monitor says: at each sample, of each gait cycle, when an alarm changes, and of its own state."""
+
+import attrs
+import numpy as np
+
+from leg_wear_monitor.mechanism.arrays import Floats, Ints
+from leg_wear_monitor.monitor.alarms import Alarm, Level
+
+
+@attrs.frozen(eq=False)
+class SampleReports:
+    """The leg at each of n samples that were passed now; NaN while the leg is not followed.
+
+    Attributes
+    ----------
+    stamp_ns : (n,) array of int
+        Of the samples; never goes back within a time base.
+    kind : (n,) array of int
+        `CRANK` or `TORQUE`.
+    crank_angle_rad : (n,) array
+        In [0, 2 pi).
+    predicted_torque_nm : (n,) array
+        Mean since the sample before.
+    contact_force_n : (n, loose) array
+        At the sample, in the order of `WearMonitor.loose`.
+    """
+
+    stamp_ns: Ints
+    kind: Ints
+    crank_angle_rad: Floats
+    predicted_torque_nm: Floats
+    contact_force_n: Floats
+
+    def __len__(self) -> int:
+        return len(self.stamp_ns)
+
+
+@attrs.frozen(kw_only=True)
+class Remaining:
+    """How long a joint lasts if its clearance goes on growing as it does.
+
+    Attributes
+    ----------
+    cycles, hours : float
+        Gait cycles and hours of walking until the mean clearance reaches its limit; 0 if it has.
+    """
+
+    cycles: float
+    hours: float
+
+
+@attrs.frozen(kw_only=True)
+class JointReport:
+    """A loose joint over a gait cycle.
+
+    Attributes
+    ----------
+    joint : str
+    clearance_m, clearance_max_m : float
+        Mean and largest radial clearance around the bushing at the cycle's end.
+    growth_m_per_cycle, growth_mps : float or None
+        Of the mean clearance, averaged over gait cycles, a cycle and a second of walking; None while there
+        is not enough data.
+    growth_error_m_per_cycle : float or None
+        Standard error of that average.
+    remaining : Remaining or None
+        None while there is not enough data, or nothing grows.
+    peak_force_n, p99_force_n, mean_force_n : float
+        Of the contact force in this cycle; the peak is a sample of a heavy tail.
+    impacts : int
+    """
+
+    joint: str
+    clearance_m: float
+    clearance_max_m: float
+    growth_m_per_cycle: float | None
+    growth_mps: float | None
+    growth_error_m_per_cycle: float | None
+    remaining: Remaining | None
+    peak_force_n: float
+    p99_force_n: float
+    mean_force_n: float
+    impacts: int
+
+
+@attrs.frozen(kw_only=True)
+class CycleReport:
+    """One whole gait cycle.
+
+    Attributes
+    ----------
+    cycle : int
+        Counted over the whole life in the ledger.
+    begin_ns, stamp_ns : int
+        Its begin and end.
+    cadence_rpm : float
+        Mean crank speed while moving, negative for clockwise.
+    moving_s, bridged_s : float
+        Time in motion, and of it the time bridged in gaps.
+    joints : tuple of JointReport
+        In the order of `WearMonitor.loose`.
+    torque_samples : int
+        The torque figures are NaN without any.
+    measured_torque_rms_nm, predicted_torque_rms_nm, residual_torque_rms_nm : float
+    torque_mismatch : float
+        RMS of what neither foot load nor friction explains of the residual, as a share of the predicted RMS.
+    load_n, friction_nm : float
+        Foot load and drive friction that the measured torque shows.
+    """
+
+    cycle: int
+    begin_ns: int
+    stamp_ns: int
+    cadence_rpm: float
+    moving_s: float
+    bridged_s: float
+    joints: tuple[JointReport, ...]
+    torque_samples: int
+    measured_torque_rms_nm: float
+    predicted_torque_rms_nm: float
+    residual_torque_rms_nm: float
+    torque_mismatch: float
+    load_n: float
+    friction_nm: float
+
+
+@attrs.frozen
+class AlarmList:
+    """All alarms as they stand after a change.
+
+    Attributes
+    ----------
+    stamp_ns : int
+        When it changed.
+    alarms : tuple of Alarm
+        Always the same ones in the same order.
+    """
+
+    stamp_ns: int
+    alarms: tuple[Alarm, ...]
+
+    @property
+    def level(self) -> Level:
+        """The highest level shown."""
+        return max((alarm.level for alarm in self.alarms), default=Level.OK)
+
+
+@attrs.frozen(kw_only=True)
+class Lost:
+    """What was not integrated, since the monitor was made; figures only grow.
+
+    Attributes
+    ----------
+    unmonitored_s : float
+        Time in which the leg was not followed.
+    already_counted : int
+        Samples of a time whose wear is in the ledger from an earlier run.
+    faulty : dict of str to int
+        Samples that came with a fault, by its name.
+    duplicates, late, stray_stamps, outliers : int
+        Samples dropped: seen before, later than the window, a stamp far off, a value far off.
+    gaps_bridged, gaps_lost, backward_jumps, failures : int
+        Gaps bridged and not; new time bases; motions that the model could not resolve.
+    """
+
+    unmonitored_s: float
+    already_counted: int
+    faulty: dict[str, int]
+    duplicates: int
+    late: int
+    stray_stamps: int
+    outliers: int
+    gaps_bridged: int
+    gaps_lost: int
+    backward_jumps: int
+    failures: int
+
+
+@attrs.frozen(eq=False)
+class Reports:
+    """What an update brought.
+
+    Attributes
+    ----------
+    samples : SampleReports
+        Samples passed now; they lie some time back, see `WearMonitor.update`.
+    cycles : tuple of CycleReport
+        Gait cycles finished now.
+    alarms : tuple of AlarmList
+        One for each time that an alarm changed.
+    lost : Lost
+    """
+
+    samples: SampleReports
+    cycles: tuple[CycleReport, ...]
+    alarms: tuple[AlarmList, ...]
+    lost: Lost
+
+
+@attrs.frozen
+class Status:
+    """A line of /diagnostics: ``name`` stable, numbers only in ``values``, by keys that end in their unit."""
+
+    name: str
+    level: Level
+    message: str
+    values: dict[str, float]
+
+
+def no_samples(loose: int) -> SampleReports:
+    """Reports of no sample."""
+    stamps = np.zeros(0, dtype=np.int64)
+    return SampleReports(stamps, stamps, np.zeros(0), np.zeros(0), np.zeros((0, loose)))

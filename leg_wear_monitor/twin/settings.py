@@ -28,7 +28,7 @@ class TrackerSettings:
         How much later than younger samples a sample may arrive.
     lag_s : float
         How far the leg follows behind the newest sample, so that samples on both sides say how the crank
-        moved; 0 means what the bandwidth asks for (0.4 / bandwidth_hz).
+        moved; 0 means what the bandwidth asks for (0.8 / bandwidth_hz).
     bridge_limit_s : float
         Gaps up to this are bridged, from `mark_gap_s` on counted; the crank is lost in longer ones.
     mark_gap_s : float
@@ -74,7 +74,7 @@ class TrackerSettings:
     @property
     def lag(self) -> float:
         """The lag in use [s]."""
-        return self.lag_s or 0.4 / self.bandwidth_hz
+        return self.lag_s or 0.8 / self.bandwidth_hz
 
 
 @attrs.frozen(kw_only=True)

@@ -1,0 +1,70 @@
+"""Where the leg is on its way along the tracker's steps, and what was compared with the measured torque."""
+
+from typing import NamedTuple
+
+import numpy as np
+
+from leg_wear_monitor.mechanism.arrays import Floats, Ints
+
+# stamps and counts: stamp of the stepper's time 0; 1 where the leg runs, 1 where it must start afresh; the
+# piece's begin and end; turns before the leg's angle; 1 where a cycle's begin was passed, and its turn; stamp
+# at which the present one ends, 0 if it does not in this piece, the turn it ends at, and 1 if forward;
+# when it began; time bridged in it; samples looked at in this call; how full the torque filters are;
+# number of cycles and of failures; when it last failed; time lost by that; time in motion
+(
+    BASE, RUNNING, AFRESH, PIECE_BEGIN, PIECE_END, TURNS_BEFORE, ANCHORED, ANCHOR, CUT, CUT_TURN, CUT_RISES,
+    CYCLE_BEGIN, CYCLE_BRIDGED, LOOKS, FILTERING, CYCLES, FAILURES, FAILED_AT, FAILED_NS, MOVING_NS,
+) = range(20)  # fmt: skip
+MARKS = 20
+
+# values: drive torque's impulse and time since the last sample, and since the last torque; mean torque before
+# the last sample; last measured torque and load signature
+IMPULSE, TIME, TORQUE_IMPULSE, TORQUE_TIME, MEAN_TORQUE, LAST_MEASURED, LAST_SIGNATURE = range(7)
+VALUES = 7
+
+# what goes through the low-pass: torque measured, predicted, of a unit foot load, and of unit friction
+MEASURED, PREDICTED, BY_LOAD, BY_FRICTION = range(4)
+
+# sums over a cycle: number; of the residual and its square; squares of measured and predicted; products of
+# the torques by load and friction with each other and with the residual
+(
+    NUMBER, RESIDUAL, RESIDUAL_2, MEASURED_2, PREDICTED_2, LOAD_2, LOAD_FRICTION, FRICTION_2, LOAD_RESIDUAL,
+    FRICTION_RESIDUAL,
+) = range(10)  # fmt: skip
+SUMS = 10
+
+
+class LegState(NamedTuple):
+    """``mark`` and ``value`` as above.
+
+    ``polynomial`` (7,) the piece; ``low_pass`` (2, 4) two stages of what is filtered; ``sums`` (SUMS,);
+    ``force`` (k,) contact forces [N] at the last look.
+    """
+
+    mark: Ints
+    value: Floats
+    polynomial: Floats
+    low_pass: Floats
+    sums: Floats
+    force: Floats
+
+
+class Looks(NamedTuple):
+    """What was seen at m samples: stamp and kind (m, 2), angle and torque (m, 2), forces (m, k)."""
+
+    stamp: Ints
+    figure: Floats
+    force: Floats
+
+
+def leg_state(loose: int) -> LegState:
+    """State before the first step."""
+    return LegState(
+        np.zeros(MARKS, dtype=np.int64), np.zeros(VALUES), np.zeros(7), np.zeros((2, 4)), np.zeros(SUMS),
+        np.zeros(loose),
+    )  # fmt: skip
+
+
+def room_for_looks(m: int, loose: int) -> Looks:
+    """Room for m samples."""
+    return Looks(np.zeros((m, 2), dtype=np.int64), np.zeros((m, 2)), np.zeros((m, loose)))

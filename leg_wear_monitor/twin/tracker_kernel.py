@@ -1,0 +1,312 @@
+"""Samples as they arrive: put in order, checked, filtered, and made into steps for the leg."""
+
+import math
+
+from leg_wear_monitor.kernel import entry, kernel
+from leg_wear_monitor.twin.crank_filter import begin_filter, update
+from leg_wear_monitor.twin.knots import lose, reach_knots
+from leg_wear_monitor.twin.sample import (
+    CRANK,
+    NO_FAULT,
+    NOT_FINITE,
+    OUT_OF_RANGE,
+    TORQUE,
+    WRONG_TYPE,
+    ZERO_STAMP,
+)
+from leg_wear_monitor.twin.steps import (
+    LOOK,
+    LOST_BY_JUMP,
+    LOST_BY_OUTLIERS,
+    LOST_BY_OVERFLOW,
+    LOST_IN_GAP,
+    add_step,
+)
+from leg_wear_monitor.twin.tracker_state import (
+    ACQUIRE,
+    ACQUIRING,
+    ARRIVALS,
+    BRIDGE,
+    BRIDGED,
+    BY_ANGLE,
+    BY_VELOCITY,
+    CANDIDATE,
+    CANDIDATE_KIND,
+    CRANKS,
+    DUPLICATES,
+    FAULTY,
+    FILTER_TIME,
+    GAPS,
+    HEAD,
+    JUMP,
+    JUMPS,
+    LAST_CRANK,
+    LATE,
+    MARK,
+    NEWEST,
+    OUT_SINCE,
+    OUTLIERS,
+    QUEUE,
+    RECEIVED,
+    REFUSED,
+    RELEASED,
+    RELEASED_KINDS,
+    STEP,
+    STRAY,
+    TAIL,
+    TORQUE_VALUE,
+    TORQUES,
+    VELOCITY_OUTLIERS,
+    WAITING,
+    WINDOW,
+    P,
+    X,
+)
+
+_LARGEST_ANGLE, _LARGEST_RATE, _LARGEST_TORQUE = 1.0e6, 1.0e3, 1.0e6  # rad, rad/s, N m: beyond is no leg's
+_AT_LEAST_REFUSED = 5  # samples in a row, before the crank is held to be elsewhere
+
+
+@kernel
+def _fault(stamp, kind, fault, angle, torque):
+    """What is wrong with a sample, if it is not said already."""
+    if fault != NO_FAULT:
+        return min(fault, OUT_OF_RANGE)
+    if not CRANK <= kind <= TORQUE:
+        return WRONG_TYPE
+    if stamp <= 0:
+        return ZERO_STAMP
+    value, largest = (angle, _LARGEST_ANGLE) if kind == CRANK else (torque, _LARGEST_TORQUE)
+    if not math.isfinite(value):
+        return NOT_FINITE
+    return OUT_OF_RANGE if abs(value) > largest else NO_FAULT
+
+
+@kernel
+def _make_room(state, steps, n):
+    """Room for one more sample in the queue: moved down, or all lost where it is full of waiting ones."""
+    clock = state.clock
+    if clock[TAIL] == QUEUE:
+        head, tail = clock[HEAD], clock[TAIL]
+        if head < QUEUE // 4:
+            return lose(state, state.queue_stamp[tail - 1], LOST_BY_OVERFLOW, steps, n)
+        for j in range(head, tail):
+            state.queue_stamp[j - head], state.queue_kind[j - head] = (
+                state.queue_stamp[j],
+                state.queue_kind[j],
+            )
+            for c in range(state.queue.shape[1]):
+                state.queue[j - head, c] = state.queue[j, c]
+        clock[HEAD], clock[TAIL] = 0, tail - head
+    return n
+
+
+@kernel
+def _begin(model, state, stamp, angle, row):
+    """First crank sample of an acquisition."""
+    clock = state.clock
+    begin_filter(model.real, angle, state.filtered)
+    clock[ACQUIRING] = stamp
+    if clock[OUT_SINCE] == 0:
+        clock[OUT_SINCE] = stamp
+    row[STEP], row[BY_ANGLE], row[BY_VELOCITY], row[BRIDGED] = 0.0, 0.0, 0.0, 0.0
+    for i in range(3):
+        row[X + i] = state.filtered[i]
+    for i in range(6):
+        row[P + i] = state.filtered[3 + i]
+
+
+@kernel
+def _filter(model, state, stamp, angle, velocity, row):
+    """Take a crank sample into the filter; whether it passed the gate."""
+    clock, count = state.clock, state.counts
+    gap = stamp - clock[LAST_CRANK]
+    h, step = 1.0e-9 * (stamp - clock[FILTER_TIME]), 1.0e-9 * gap
+    used, velocity_refused = update(model.real, h, step, angle, velocity, state.filtered, row)
+    clock[FILTER_TIME] = stamp
+    if not used:
+        count[OUTLIERS] += 1
+        clock[REFUSED] += 1
+        return False
+    if velocity_refused:
+        count[VELOCITY_OUTLIERS] += 1
+    row[BRIDGED] = 0.0
+    if gap > model.ns[MARK]:
+        row[BRIDGED] = 1.0
+        count[GAPS] += 1
+    return True
+
+
+@kernel
+def _follow(model, state, stamp, kind, values, out_target, steps, n):
+    """Take in a sample whose turn it is, and go on as far as can be."""
+    clock, count, ns = state.clock, state.counts, model.ns
+    n = _make_room(state, steps, n)
+    since = stamp - clock[LAST_CRANK]
+    reason = -1
+    if clock[LAST_CRANK] != 0 and since > ns[BRIDGE]:
+        reason = LOST_IN_GAP
+    elif kind == CRANK and clock[REFUSED] >= _AT_LEAST_REFUSED and since > ns[ACQUIRE]:
+        reason = LOST_BY_OUTLIERS
+    if reason >= 0:
+        n = lose(state, stamp, reason, steps, n)
+    row = state.queue[clock[TAIL]]
+    row[TORQUE_VALUE] = values[2] if abs(values[2]) <= _LARGEST_TORQUE else math.nan
+    if kind == TORQUE:
+        count[TORQUES] += 1
+        if clock[LAST_CRANK] == 0:  # nothing to compare it with
+            return add_step(steps, n, LOOK, stamp, stamp, kind)
+    else:
+        if clock[LAST_CRANK] == 0:
+            _begin(model, state, stamp, values[0], row)
+        elif not _filter(model, state, stamp, values[0], values[1], row):
+            return n
+        count[CRANKS] += 1
+        clock[LAST_CRANK], clock[FILTER_TIME], clock[REFUSED] = stamp, stamp, 0
+    state.queue_stamp[clock[TAIL]], state.queue_kind[clock[TAIL]] = stamp, kind
+    clock[TAIL] += 1
+    if kind == CRANK:
+        n = reach_knots(model, state, out_target, steps, n)
+    return n
+
+
+@kernel
+def _insert(state, stamp, kind, values):
+    """Put a sample where it belongs among those that wait; False for one that waits already."""
+    clock, stamps, kinds = state.clock, state.arrival_stamp, state.arrival_kind
+    i = clock[WAITING]
+    while i > 0 and (stamps[i - 1] > stamp or (stamps[i - 1] == stamp and kinds[i - 1] > kind)):
+        i -= 1
+    if i > 0 and stamps[i - 1] == stamp and kinds[i - 1] == kind:
+        return False
+    for j in range(clock[WAITING], i, -1):
+        stamps[j], kinds[j] = stamps[j - 1], kinds[j - 1]
+        for c in range(3):
+            state.arrival[j, c] = state.arrival[j - 1, c]
+    stamps[i], kinds[i] = stamp, kind
+    for c in range(3):
+        state.arrival[i, c] = values[c]
+    clock[WAITING] += 1
+    return True
+
+
+@kernel
+def _release(model, state, horizon, out_values, out_target, steps, n):
+    """Follow all waiting samples up to a stamp, and more where too many wait."""
+    clock, done = state.clock, 0
+    while done < clock[WAITING] and (
+        state.arrival_stamp[done] <= horizon or clock[WAITING] - done >= ARRIVALS - 1
+    ):
+        stamp, kind = state.arrival_stamp[done], state.arrival_kind[done]
+        for c in range(3):
+            out_values[c] = state.arrival[done, c]
+        kinds = clock[RELEASED_KINDS] if stamp == clock[RELEASED] else 0
+        clock[RELEASED], clock[RELEASED_KINDS] = stamp, kinds | (1 << kind)
+        n = _follow(model, state, stamp, kind, out_values, out_target, steps, n)
+        done += 1
+    if done > 0:
+        for j in range(done, clock[WAITING]):
+            i = j - done
+            state.arrival_stamp[i], state.arrival_kind[i] = state.arrival_stamp[j], state.arrival_kind[j]
+            for c in range(3):
+                state.arrival[i, c] = state.arrival[j, c]
+        clock[WAITING] -= done
+    return n
+
+
+@kernel
+def _was_released(state, stamp, kind):
+    """Whether a sample that comes too late is one that has been here before."""
+    clock, j = state.clock, state.clock[TAIL] - 1
+    if stamp == clock[RELEASED]:
+        return (clock[RELEASED_KINDS] >> kind) & 1 == 1
+    while j >= 0 and state.queue_stamp[j] >= stamp:
+        if state.queue_stamp[j] == stamp and state.queue_kind[j] == kind:
+            return True
+        j -= 1
+    return False
+
+
+# what to do with an arrival: nothing, or put it in order, or that after a jump of the stamps
+_DROP, _KEEP, _JUMP = range(3)
+
+
+@kernel
+def _arrive(model, state, stamp, kind, values):
+    """What to do with a sample, by its stamp and those before it.
+
+    A stamp far from the others is believed only if another follows it: one bad clock reading must not cost
+    the track.
+    """
+    clock, count, ns = state.clock, state.counts, model.ns
+    ahead, candidate = stamp - clock[NEWEST], clock[CANDIDATE]
+    if clock[NEWEST] != 0 and (ahead > ns[BRIDGE] or ahead < -ns[JUMP]):
+        after = stamp - candidate
+        if candidate != 0 and -ns[WINDOW] <= after <= ns[BRIDGE]:
+            if after == 0 and kind == clock[CANDIDATE_KIND]:
+                count[DUPLICATES] += 1
+                return _DROP
+            return _JUMP
+        if candidate != 0:
+            count[STRAY] += 1
+        clock[CANDIDATE], clock[CANDIDATE_KIND] = stamp, kind
+        for c in range(3):
+            state.candidate[c] = values[c]
+        return _DROP
+    if candidate != 0:
+        count[STRAY] += 1
+        clock[CANDIDATE] = 0
+    if stamp < clock[RELEASED] or (stamp == clock[RELEASED] and _was_released(state, stamp, kind)):
+        count[DUPLICATES if _was_released(state, stamp, kind) else LATE] += 1
+        return _DROP
+    return _KEEP
+
+
+@kernel
+def _take_new_time_base(state, steps, n):
+    """After a jump of the stamps, once all that waited has gone: start from the sample that began it."""
+    clock, stamp = state.clock, state.clock[CANDIDATE]
+    if stamp < clock[NEWEST]:
+        state.counts[JUMPS] += 1
+        n = lose(state, stamp, LOST_BY_JUMP, steps, n)
+        clock[RELEASED], clock[RELEASED_KINDS], clock[OUT_SINCE] = 0, 0, 0
+    clock[NEWEST], clock[CANDIDATE] = stamp, 0
+    _insert(state, stamp, clock[CANDIDATE_KIND], state.candidate)
+    return n
+
+
+@entry
+def track(model, state, stamp, kind, fault, angle, velocity, torque, work, steps):
+    """Take in samples (n,) in order of arrival; ``work`` (3, 3).
+
+    Returns
+    -------
+    n : int
+        Number of steps for the leg.
+    """
+    clock, count, n = state.clock, state.counts, 0
+    values, released, target = work[0], work[1], work[2]
+    for i in range(stamp.shape[0]):
+        count[RECEIVED] += 1
+        found = _fault(stamp[i], kind[i], fault[i], angle[i], torque[i])
+        if found != NO_FAULT:
+            count[FAULTY + found] += 1
+            continue
+        values[0], values[1], values[2] = angle[i], velocity[i], torque[i]
+        if not abs(values[1]) <= _LARGEST_RATE:
+            values[1] = math.nan
+        decision = _arrive(model, state, stamp[i], kind[i], values)
+        while decision != _DROP:
+            horizon = clock[NEWEST]  # after a jump all that waits goes first
+            if decision == _KEEP:
+                if not _insert(state, stamp[i], kind[i], values):
+                    count[DUPLICATES] += 1
+                    break
+                clock[NEWEST] = max(clock[NEWEST], stamp[i])
+                horizon = clock[NEWEST] - model.ns[WINDOW]
+            n = _release(model, state, horizon, released, target, steps, n)
+            if decision == _KEEP:
+                break
+            n = _take_new_time_base(state, steps, n)
+            decision = _KEEP
+    return n

@@ -1,0 +1,109 @@
+"""What the ledger keeps: the wear and all that belongs to it at one instant, and what happened on the way."""
+
+import hashlib
+import struct
+
+import attrs
+import numpy as np
+
+from leg_wear_monitor.mechanism.arrays import Floats
+from leg_wear_monitor.monitor.alarms import Alarm
+
+
+@attrs.frozen(eq=False)
+class JointWear:
+    """A joint's worn surfaces and what they have seen since the part was new.
+
+    Attributes
+    ----------
+    name : str
+    depth : (2, N) array, m
+        Of bushing and journal.
+    cycles : int
+    moving_s : float
+    replaced_ns : int
+        When the part was replaced, 0 if it never was.
+    """
+
+    name: str
+    depth: Floats
+    cycles: int = 0
+    moving_s: float = 0.0
+    replaced_ns: int = 0
+
+
+@attrs.frozen(eq=False)
+class Entry:
+    """The state of the wear at one instant.
+
+    Attributes
+    ----------
+    stamp_ns : int
+        Up to where it is counted.
+    joints : tuple of JointWear
+    totals : dict of str to float
+        Counters over all runs, by names that end in their unit.
+    alarms : tuple of Alarm
+        Those that are not OK.
+    spans : tuple of (int, int)
+        Begin and end [ns] of the stretches of this run that are counted.
+    """
+
+    stamp_ns: int
+    joints: tuple[JointWear, ...]
+    totals: dict[str, float]
+    alarms: tuple[Alarm, ...] = ()
+    spans: tuple[tuple[int, int], ...] = ()
+
+    def digest(self) -> bytes:
+        """Checksum of everything: SQLite has none over its pages."""
+        sum_ = hashlib.sha256(struct.pack("<q", self.stamp_ns))
+        for joint in sorted(self.joints, key=lambda joint: joint.name):
+            sum_.update(repr((joint.name, joint.cycles, joint.moving_s, joint.replaced_ns)).encode())
+            sum_.update(np.ascontiguousarray(joint.depth, dtype="<f8").tobytes())
+        alarms = [
+            (a.kind, a.subject, int(a.level), int(a.present), a.acknowledged, a.raised_ns)
+            for a in self.alarms
+        ]
+        sum_.update(repr((sorted(self.totals.items()), sorted(alarms), self.spans)).encode())
+        return sum_.digest()
+
+
+@attrs.frozen(eq=False)
+class Audit:
+    """Somebody did something to the wear.
+
+    Attributes
+    ----------
+    stamp_ns : int
+    who, what : str
+    joint : JointWear or None
+        As it was before.
+    """
+
+    stamp_ns: int
+    who: str
+    what: str
+    joint: JointWear | None = None
+
+
+@attrs.frozen
+class AlarmEvent:
+    """An alarm's shown level or acknowledgement changed at a stamp."""
+
+    stamp_ns: int
+    alarm: Alarm
+
+
+@attrs.frozen
+class ClearancePoint:
+    """A joint's clearance [m] after so many gait cycles."""
+
+    stamp_ns: int
+    cycle: int
+    joint: str
+    clearance_m: float
+    clearance_max_m: float
+
+
+Event = Audit | AlarmEvent | ClearancePoint

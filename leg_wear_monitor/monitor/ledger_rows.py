@@ -1,0 +1,111 @@
+"""Entries and events as rows of the ledger's tables, and back."""
+
+import sqlite3
+
+import numpy as np
+
+from leg_wear_monitor.mechanism.arrays import Ints
+from leg_wear_monitor.monitor.alarms import Alarm, Level
+from leg_wear_monitor.monitor.ledger_entry import AlarmEvent, Audit, ClearancePoint, Entry, Event, JointWear
+
+
+def write_entry(db: sqlite3.Connection, run: int, entry: Entry) -> None:
+    """Replace the entry in force; to be called within a transaction."""
+    db.execute("INSERT OR REPLACE INTO entry VALUES (1, ?, ?, ?)", (run, entry.stamp_ns, entry.digest()))
+    db.executemany(
+        "INSERT OR REPLACE INTO joint VALUES (?, ?, ?, ?, ?)",
+        [(j.name, _depth_bytes(j), j.cycles, j.moving_s, j.replaced_ns) for j in entry.joints],
+    )
+    db.executemany("INSERT OR REPLACE INTO total VALUES (?, ?)", entry.totals.items())
+    db.execute("DELETE FROM alarm")
+    db.executemany(
+        "INSERT INTO alarm VALUES (?, ?, ?, ?, ?, ?)",
+        [
+            (a.kind, a.subject, int(a.level), int(a.present), int(a.acknowledged), a.raised_ns)
+            for a in entry.alarms
+        ],
+    )
+    db.executemany(
+        "INSERT OR REPLACE INTO span VALUES (?, ?, ?, ?)",
+        [(run, part, *span) for part, span in enumerate(entry.spans)],
+    )
+
+
+def write_event(db: sqlite3.Connection, event: Event) -> None:
+    """Append an event; to be called within a transaction."""
+    match event:
+        case AlarmEvent(stamp_ns, a):
+            db.execute(
+                "INSERT INTO alarm_history "
+                "(stamp_ns, kind, subject, level, acknowledged, value, limit_value) "
+                "VALUES (?, ?, ?, ?, ?, ?, ?)",
+                (stamp_ns, a.kind, a.subject, int(a.level), int(a.acknowledged), a.value, a.limit),
+            )
+        case ClearancePoint(stamp_ns, cycle, joint, clearance_m, clearance_max_m):
+            db.execute(
+                "INSERT INTO history (stamp_ns, cycle, joint, clearance_m, clearance_max_m) "
+                "VALUES (?, ?, ?, ?, ?)",
+                (stamp_ns, cycle, joint, clearance_m, clearance_max_m),
+            )
+        case Audit(stamp_ns, who, what, was):
+            before = (was.name, was.cycles, _depth_bytes(was)) if was else (None, None, None)
+            db.execute(
+                "INSERT INTO audit (stamp_ns, who, what, joint, cycles, depth) VALUES (?, ?, ?, ?, ?, ?)",
+                (stamp_ns, who, what, *before),
+            )
+
+
+def read_entry(db: sqlite3.Connection) -> Entry | None:
+    """The entry in force, None in a new ledger.
+
+    Raises
+    ------
+    ValueError
+        If its checksum is not that of what the tables hold.
+    """
+    found = db.execute("SELECT run, stamp_ns, digest FROM entry").fetchone()
+    if found is None:
+        return None
+    run, stamp_ns, digest = found
+    spans = db.execute("SELECT begin_ns, end_ns FROM span WHERE run = ? ORDER BY part", (run,))
+    entry = Entry(
+        stamp_ns=stamp_ns,
+        joints=tuple(_joint(*row) for row in db.execute("SELECT * FROM joint ORDER BY name")),
+        totals=dict(db.execute("SELECT name, value FROM total")),
+        alarms=tuple(_alarm(*row) for row in db.execute("SELECT * FROM alarm")),
+        spans=tuple(spans.fetchall()),
+    )
+    if entry.digest() != digest:
+        raise ValueError("its checksum is not that of its content")
+    return entry
+
+
+def read_spans(db: sqlite3.Connection) -> Ints:
+    """Begin and end (n, 2) [ns] of all time whose wear is counted, in order of time."""
+    spans = db.execute("SELECT begin_ns, end_ns FROM span ORDER BY begin_ns").fetchall()
+    return np.array(spans, dtype=np.int64).reshape(-1, 2)
+
+
+def read_last_run(db: sqlite3.Connection) -> tuple[int, bool, float]:
+    """Number of the last run (0 if there was none), whether it was closed, its longest interval [s]."""
+    last = db.execute("SELECT id, closed, interval_s FROM run ORDER BY id DESC LIMIT 1").fetchone()
+    return (0, True, 0.0) if last is None else (int(last[0]), bool(last[1]), float(last[2]))
+
+
+def _depth_bytes(joint: JointWear) -> bytes:
+    return np.ascontiguousarray(joint.depth, dtype="<f8").tobytes()
+
+
+def _joint(name: str, depth: bytes, cycles: int, moving_s: float, replaced_ns: int) -> JointWear:
+    return JointWear(name, np.frombuffer(depth, "<f8").reshape(2, -1).copy(), cycles, moving_s, replaced_ns)
+
+
+def _alarm(kind: str, subject: str, level: int, present: int, acknowledged: int, raised_ns: int) -> Alarm:
+    return Alarm(
+        kind=kind,
+        subject=subject,
+        level=Level(level),
+        present=Level(present),
+        acknowledged=bool(acknowledged),
+        raised_ns=raised_ns,
+    )

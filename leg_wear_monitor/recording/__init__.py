@@ -1,0 +1,1 @@
+"""Bags: read whole or damaged ones as gait samples, write MCAP, replay."""

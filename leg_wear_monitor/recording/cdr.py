@@ -1,0 +1,242 @@
+"""Messages as they lie in a bag: CDR (XCDR1, either byte order) of the three input types, read in place.
+
+A message is four bytes of encapsulation and a body; members are aligned relative to the start of the body
+(OMG DDS-XTypes 1.3, section 7.4.3). Positions are indices into one array of bytes that holds many messages;
+-1 is the position behind what cannot be read.
+"""
+
+import math
+
+import numpy as np
+
+from leg_wear_monitor.kernel import entry, kernel
+from leg_wear_monitor.twin.sample import (
+    CRANK,
+    EMPTY,
+    MISSING_JOINT,
+    NO_FAULT,
+    NOT_FINITE,
+    TORQUE,
+    UNDECODABLE,
+    WRONG_LENGTH,
+)
+
+JOINT_STATE, WRENCH_STAMPED, FLOAT64 = 1, 2, 3
+TYPES = {
+    "sensor_msgs/msg/JointState": JOINT_STATE,
+    "geometry_msgs/msg/WrenchStamped": WRENCH_STAMPED,
+    "std_msgs/msg/Float64": FLOAT64,
+}
+"""Types that can be read, and their codes."""
+
+MESSAGE = np.dtype(
+    [
+        ("begin", "i8"),
+        ("end", "i8"),
+        ("log_time_ns", "i8"),
+        ("publish_time_ns", "i8"),
+        ("type", "i8"),
+    ]
+)
+"""One message among bytes: from where to where, when it was recorded and sent, and a code of `TYPES`."""
+
+ENCAPSULATION = 4
+_MOST_PADDING = 3  # bytes that a middleware may add to come to a multiple of four
+
+
+@kernel
+def uint32(data, at, big):
+    """Integer of four bytes."""
+    if big:
+        low, high = at + 3, -1
+    else:
+        low, high = at, 1
+    value = np.int64(0)
+    for i in range(4):
+        value |= np.int64(data[low + high * i]) << (8 * i)
+    return value
+
+
+@kernel
+def float64(data, at, big):
+    """Number of eight bytes."""
+    if big:
+        low, high = at + 7, -1
+    else:
+        low, high = at, 1
+    bits = np.uint64(0)
+    for i in range(8):
+        bits |= np.uint64(data[low + high * i]) << np.uint64(8 * i)
+    return np.uint64(bits).view(np.float64)
+
+
+@kernel
+def aligned(at, size, origin):
+    """Next position that is a multiple of a size, seen from the start of the body."""
+    return at + (origin - at) % size
+
+
+@kernel
+def counted(data, at, end, origin, big):
+    """Length that stands before a text or a sequence, and the position behind it."""
+    if at < 0:
+        return np.int64(0), np.int64(-1)
+    at = aligned(at, 4, origin)
+    if at + 4 > end:
+        return np.int64(0), np.int64(-1)
+    return uint32(data, at, big), np.int64(at + 4)
+
+
+@kernel
+def text(data, at, end, origin, big):
+    """Length of a text without its closing zero, its first byte, and the position behind it."""
+    size, at = counted(data, at, end, origin, big)
+    if at < 0 or size > end - at:
+        return np.int64(0), np.int64(-1), np.int64(-1)
+    return max(size - 1, np.int64(0)), at, at + size
+
+
+@kernel
+def numbers(data, at, end, origin, big):
+    """Length of a sequence of float64, its first byte, and the position behind it."""
+    count, at = counted(data, at, end, origin, big)
+    if at < 0 or count == 0:
+        return np.int64(0), at, at
+    at = aligned(at, 8, origin)
+    if count > (end - at) // 8:
+        return np.int64(0), np.int64(-1), np.int64(-1)
+    return count, at, at + 8 * count
+
+
+@kernel
+def header(data, origin, end, big):
+    """Stamp of a std_msgs/Header [ns], and the position behind the header."""
+    if origin + 8 > end:
+        return np.int64(0), np.int64(-1)
+    seconds = uint32(data, origin, big)
+    if seconds >= 2**31:
+        seconds -= 2**32
+    stamp = seconds * 1_000_000_000 + uint32(data, origin + 4, big)
+    _, _, at = text(data, origin + 8, end, origin, big)
+    return stamp, at
+
+
+@kernel
+def names(data, at, end, origin, big, wanted):
+    """Length of a sequence of texts, where in it the wanted one is (-1: nowhere), the position behind it."""
+    count, at = counted(data, at, end, origin, big)
+    if at < 0 or count > (end - at) // 4:
+        return np.int64(0), np.int64(-1), np.int64(-1)
+    found = np.int64(-1)
+    for i in range(count):
+        size, first, at = text(data, at, end, origin, big)
+        if at < 0:
+            return np.int64(0), np.int64(-1), np.int64(-1)
+        if found < 0 and size == wanted.shape[0]:
+            same = True
+            for k in range(size):
+                same &= data[first + k] == wanted[k]
+            if same:
+                found = np.int64(i)
+    return count, found, at
+
+
+@kernel
+def ends(at, end):
+    """Whether a message ends where its data do."""
+    return at >= 0 and end - at <= _MOST_PADDING
+
+
+@kernel
+def value(data, count, first, index, big):
+    """Number of a sequence, NaN where the sequence is empty."""
+    return float64(data, first + 8 * index, big) if count else math.nan
+
+
+@kernel
+def joint_state(data, begin, end, big, crank):
+    """Read sensor_msgs/JointState: fault, stamp [ns], the crank's position, velocity and effort.
+
+    NaN is what a driver gives for a velocity or an effort that it does not measure: absent, and no fault.
+    """
+    origin = begin + ENCAPSULATION
+    stamp, at = header(data, origin, end, big)
+    count, index, at = names(data, at, end, origin, big, crank)
+    n_q, q, at = numbers(data, at, end, origin, big)
+    n_v, v, at = numbers(data, at, end, origin, big)
+    n_e, e, at = numbers(data, at, end, origin, big)
+    if not ends(at, end):
+        return UNDECODABLE, np.int64(0), math.nan, math.nan, math.nan
+    if count == 0 or n_q == 0:
+        return EMPTY, stamp, math.nan, math.nan, math.nan
+    if n_q != count or (n_v != 0 and n_v != count) or (n_e != 0 and n_e != count):
+        return WRONG_LENGTH, stamp, math.nan, math.nan, math.nan
+    if index < 0:
+        return MISSING_JOINT, stamp, math.nan, math.nan, math.nan
+    position = value(data, n_q, q, index, big)
+    velocity, effort = value(data, n_v, v, index, big), value(data, n_e, e, index, big)
+    finite = math.isfinite(position) and not math.isinf(velocity) and not math.isinf(effort)
+    return NO_FAULT if finite else NOT_FINITE, stamp, position, velocity, effort
+
+
+@kernel
+def wrench_stamped(data, begin, end, big, axis):
+    """Read geometry_msgs/WrenchStamped: fault, stamp [ns], torque about an axis (0, 1, 2 for x, y, z)."""
+    origin = begin + ENCAPSULATION
+    stamp, at = header(data, origin, end, big)
+    if at >= 0:
+        at = aligned(at, 8, origin)
+    if at < 0 or at + 48 > end or not ends(at + 48, end):
+        return UNDECODABLE, np.int64(0), math.nan
+    torque = float64(data, at + 24 + 8 * axis, big)
+    return NO_FAULT if math.isfinite(torque) else NOT_FINITE, stamp, torque
+
+
+@kernel
+def float64_message(data, begin, end, big):
+    """Read std_msgs/Float64: fault and number."""
+    at = begin + ENCAPSULATION
+    if at + 8 > end or not ends(at + 8, end):
+        return UNDECODABLE, math.nan
+    number = float64(data, at, big)
+    return NO_FAULT if math.isfinite(number) else NOT_FINITE, number
+
+
+@entry
+def decode(data, messages, crank, axis, use_effort, out):
+    """Read messages into samples as they are: no sign, no scale, no offset.
+
+    Parameters
+    ----------
+    data : (bytes,) array of uint8
+    messages : (n,) array of MESSAGE
+    crank : (characters,) array of uint8
+        Name of the crank's joint, UTF-8.
+    axis : int
+        Axis of a wrench's torque: 0, 1, 2 for x, y, z.
+    use_effort : bool
+        Whether the crank's effort is its torque.
+    out : (n,) array of GAIT_SAMPLE
+        The stamp is the header's; the log time where a type has no header; 0 where it cannot be read.
+    """
+    for i in range(messages.shape[0]):
+        begin, end = messages[i]["begin"], messages[i]["end"]
+        kind = messages[i]["type"]
+        fault, stamp = UNDECODABLE, np.int64(0)
+        position, velocity, torque = math.nan, math.nan, math.nan
+        # XCDR1, big or little endian; parameter lists and XCDR2 lay out otherwise
+        if end - begin >= ENCAPSULATION and data[begin] == 0 and data[begin + 1] <= 1:
+            big = data[begin + 1] == 0
+            if kind == JOINT_STATE:
+                fault, stamp, position, velocity, torque = joint_state(data, begin, end, big, crank)
+            elif kind == WRENCH_STAMPED:
+                fault, stamp, torque = wrench_stamped(data, begin, end, big, axis)
+            else:
+                fault, torque = float64_message(data, begin, end, big)
+                stamp = messages[i]["log_time_ns"]
+        out[i]["stamp_ns"] = stamp
+        out[i]["kind"] = CRANK if kind == JOINT_STATE else TORQUE
+        out[i]["fault"] = fault
+        out[i]["crank_angle_rad"] = position
+        out[i]["crank_velocity_radps"] = velocity
+        out[i]["torque_nm"] = torque if kind != JOINT_STATE or use_effort else math.nan

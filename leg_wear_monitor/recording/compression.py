@@ -1,6 +1,5 @@
 """Decompression that trusts no length and no checksum before it has seen it hold."""
 
-import tempfile
 import zlib
 from pathlib import Path
 from typing import IO
@@ -48,7 +47,8 @@ def expand_part(data: bytes, compression: str, size: int) -> bytes:
         if compression == "zstd":
             return zstandard.ZstdDecompressor().decompressobj().decompress(data)[:size]
         if compression == "lz4":
-            return lz4.frame.LZ4FrameDecompressor().decompress(data, size)
+            part: bytes = lz4.frame.LZ4FrameDecompressor().decompress(data, size)
+            return part
     except (zstandard.ZstdError, RuntimeError):
         return b""
     return b""
@@ -77,10 +77,10 @@ def expand_message(data: bytes) -> bytes:
         return b""
 
 
-def expand_file(path: Path) -> IO[bytes]:
-    """Content of a file that was compressed as a whole, in a temporary file.
+def expand_file(source: Path, target: IO[bytes]) -> None:
+    """Write the content of a file that was compressed as a whole.
 
-    A file that is cut short gives as much as it holds.
+    A file that is cut short, or damaged, gives what comes before.
 
     Raises
     ------
@@ -89,19 +89,17 @@ def expand_file(path: Path) -> IO[bytes]:
     """
     import zstandard
 
-    content = tempfile.TemporaryFile()
-    with path.open("rb") as file:
+    with source.open("rb") as file:
         if file.read(4) != ZSTD_MAGIC:
-            raise RecordingError(str(path), "", "is no zstd file, expected one by its name")
+            raise RecordingError(str(source), "", "is no zstd file, as its name says")
         file.seek(0)
         expander = zstandard.ZstdDecompressor().decompressobj()
-        try:
-            while not expander.eof and (part := file.read(2**18)):
-                content.write(expander.decompress(part))
-        except zstandard.ZstdError:
-            content.flush()  # what came before the damage is read as a truncated file is
-    content.seek(0)
-    return content
+        while not expander.eof and (part := file.read(2**18)):
+            try:
+                target.write(expander.decompress(part))
+            except zstandard.ZstdError:
+                break  # the reader finds that its file ends early
+    target.flush()
 
 
 def _zstd(data: bytes, size: int) -> bytes:
@@ -120,6 +118,7 @@ def _lz4(data: bytes, size: int) -> bytes:
     import lz4.frame
 
     try:
-        return lz4.frame.LZ4FrameDecompressor().decompress(data, size + 1)
+        content: bytes = lz4.frame.LZ4FrameDecompressor().decompress(data, size + 1)
     except (RuntimeError, EOFError) as error:
         raise DamageError(f"cannot be decompressed: {error}") from error
+    return content

@@ -46,7 +46,7 @@ def walk(data, roles, out_messages, out_definitions, out_tally):
     ----------
     data : (bytes,) array of uint8
     roles : (65536,) array of uint8
-        What to do with the messages of a channel, by its number: `UNKNOWN`, `IGNORED` or a code of `cdr.TYPES`.
+        What a channel's messages are, by its number: `UNKNOWN`, `IGNORED` or a code of `cdr.TYPES`.
     out_messages : (any,) array of MESSAGE
         Messages asked for, as many as fit; empty to count them only.
     out_definitions : (any,) array of int64
@@ -59,7 +59,7 @@ def walk(data, roles, out_messages, out_definitions, out_tally):
     while at + RECORD_HEAD <= end:
         opcode, length = data[at], unsigned(data, at + 1, 8)
         body = at + RECORD_HEAD
-        if length > end - body or opcode == CHUNK or opcode == DATA_END:
+        if length > end - body or opcode in (CHUNK, DATA_END):
             break
         if opcode == MESSAGE_RECORD and length >= _MESSAGE_HEAD:
             log_time = unsigned(data, body + 6, 8)
@@ -75,7 +75,7 @@ def walk(data, roles, out_messages, out_definitions, out_tally):
                     out_messages[wanted]["publish_time_ns"] = unsigned(data, body + 14, 8)
                     out_messages[wanted]["type"] = role
                 wanted += 1
-        elif opcode == SCHEMA or opcode == CHANNEL:
+        elif opcode in (SCHEMA, CHANNEL):
             if definitions < out_definitions.shape[0]:
                 out_definitions[definitions] = at
             definitions += 1

@@ -9,8 +9,10 @@ import pytest
 from hypothesis import example, given
 from hypothesis import strategies as st
 
+from leg_wear_monitor.monitor.config import MonitorConfig
+from leg_wear_monitor.monitor.input_config import Crank, DriveTorque
 from leg_wear_monitor.recording.cdr import FLOAT64, JOINT_STATE, MESSAGE, TYPES, WRENCH_STAMPED
-from leg_wear_monitor.recording.decoder import AXES, Conversion, Decoder
+from leg_wear_monitor.recording.decoder import Decoder
 from leg_wear_monitor.twin.sample import (
     CRANK,
     EMPTY,
@@ -27,12 +29,13 @@ from leg_wear_monitor.twin.sample import (
 pytestmark = pytest.mark.plain
 
 NAME = {code: name for name, code in TYPES.items()}
-PRECEDENCE = "ζ_crank"
+CRANK_NAME = "ζ_crank"
+BY_EFFORT = MonitorConfig(crank_joint=CRANK_NAME, drive_torque=DriveTorque(source="effort"))
 
 numbers = st.floats(width=64)
 stamps = st.integers(0, 2**31 * 10**9 - 1)
 frames = st.text(st.characters(exclude_characters="\0", exclude_categories=["Cs"]), max_size=9)
-joints = st.lists(st.sampled_from(["hip", "knee", "a", "", PRECEDENCE, "crank"]), max_size=8)
+joints = st.lists(st.sampled_from(["hip", "knee", "a", "", CRANK_NAME, "crank"]), max_size=8)
 
 
 def same(mine: float, theirs: float) -> bool:
@@ -83,11 +86,9 @@ def test_a_joint_state_is_read_as_the_libraries_read_it(
 ) -> None:
     raw = bytes(store.serialize_cdr(joint_state(**parts), NAME[JOINT_STATE], little_endian=little))
     assert raw[1] == little
-    ours = Decoder(Conversion(crank_joint=PRECEDENCE, torque_source="effort")).one(
-        raw + bytes(padding), JOINT_STATE
-    )[0]
+    ours = Decoder(BY_EFFORT).one(raw + bytes(padding), JOINT_STATE)[0]
     for message in (store.deserialize_cdr(raw, NAME[JOINT_STATE]), foreign(NAME[JOINT_STATE], raw)):
-        fault, position, velocity, effort = expected_crank(message, PRECEDENCE)
+        fault, position, velocity, effort = expected_crank(message, CRANK_NAME)
         stamp = message.header.stamp
         assert ours["stamp_ns"] == stamp.sec * 10**9 + stamp.nanosec == parts["stamp_ns"]
         assert ours["kind"] == CRANK
@@ -103,21 +104,21 @@ def test_a_joint_state_is_read_as_the_libraries_read_it(
     torque=st.tuples(numbers, numbers, numbers),
     stamp_ns=stamps.filter(bool),
     frame=frames,
-    axis=st.integers(0, 2),
+    axis=st.sampled_from("xyz"),
     little=st.booleans(),
 )
 def test_a_wrench_is_read_as_the_libraries_read_it(
     store: Any,
     wrench: Callable[..., Any],
     foreign: Callable[[str, bytes], Any],
-    axis: int,
+    axis: str,
     little: bool,
     **parts: Any,
 ) -> None:
     raw = bytes(store.serialize_cdr(wrench(**parts), NAME[WRENCH_STAMPED], little_endian=little))
-    ours = Decoder(Conversion(torque_axis=AXES[axis])).one(raw, WRENCH_STAMPED)[0]
+    ours = Decoder(MonitorConfig(drive_torque=DriveTorque(axis=axis))).one(raw, WRENCH_STAMPED)[0]
     for message in (store.deserialize_cdr(raw, NAME[WRENCH_STAMPED]), foreign(NAME[WRENCH_STAMPED], raw)):
-        stamp, about = message.header.stamp, getattr(message.wrench.torque, AXES[axis])
+        stamp, about = message.header.stamp, getattr(message.wrench.torque, axis)
         assert ours["stamp_ns"] == stamp.sec * 10**9 + stamp.nanosec
         assert ours["kind"] == TORQUE
         assert same(ours["torque_nm"], about)
@@ -129,7 +130,9 @@ def test_a_wrench_is_read_as_the_libraries_read_it(
 def test_a_float64_is_read_and_stamped_with_its_log_time(store: Any, number: float, little: bool) -> None:
     message = store.types[NAME[FLOAT64]](number)
     raw = bytes(store.serialize_cdr(message, NAME[FLOAT64], little_endian=little))
-    ours = Decoder(Conversion(torque_source="float64")).one(raw, FLOAT64, log_time_ns=17)[0]
+    ours = Decoder(MonitorConfig(drive_torque=DriveTorque(source="float64"))).one(
+        raw, FLOAT64, log_time_ns=17
+    )[0]
     assert ours["stamp_ns"] == 17
     assert same(ours["torque_nm"], number)
     assert ours["fault"] == (NO_FAULT if math.isfinite(number) else NOT_FINITE)
@@ -141,40 +144,47 @@ def test_a_message_cut_short_is_undecodable(
 ) -> None:
     raw = bytes(store.serialize_cdr(joint_state(**parts), NAME[JOINT_STATE]))
     cut = data.draw(st.integers(0, len(raw) - 1))
-    sample = Decoder(Conversion()).one(raw[:cut], JOINT_STATE)[0]
+    sample = Decoder(MonitorConfig()).one(raw[:cut], JOINT_STATE)[0]
     assert sample["fault"] == UNDECODABLE
     assert math.isnan(sample["crank_angle_rad"])
 
 
-@given(raw=st.binary(max_size=200), kind=st.sampled_from(list(NAME)), start=st.sampled_from([b"", b"\0\1\0\0"]))
+@given(
+    raw=st.binary(max_size=200), kind=st.sampled_from(list(NAME)), start=st.sampled_from([b"", b"\0\1\0\0"])
+)
 def test_any_bytes_give_one_sample_and_no_crash(raw: bytes, kind: int, start: bytes) -> None:
-    sample = Decoder(Conversion()).one(start + raw, kind)
+    sample = Decoder(MonitorConfig()).one(start + raw, kind)
     assert sample.shape == (1,)
     assert sample["fault"][0] in FAULTS
 
 
 @pytest.mark.parametrize("kind", [2, 3, 6, 7, 8, 9, 10, 11, 0x0101])
-def test_other_encapsulations_are_not_guessed_at(store: Any, joint_state: Callable[..., Any], kind: int) -> None:
+def test_other_encapsulations_are_not_guessed_at(
+    store: Any, joint_state: Callable[..., Any], kind: int
+) -> None:
     raw = bytes(store.serialize_cdr(joint_state(["crank"], [1.0]), NAME[JOINT_STATE]))
     other = kind.to_bytes(2, "big") + raw[2:]
-    assert Decoder(Conversion()).one(other, JOINT_STATE)["fault"][0] == UNDECODABLE
+    assert Decoder(MonitorConfig()).one(other, JOINT_STATE)["fault"][0] == UNDECODABLE
 
 
-def test_a_message_of_another_type_does_not_pass(store: Any, joint_state: Callable[..., Any], wrench: Any) -> None:
+def test_a_message_of_another_type_does_not_pass(
+    store: Any, joint_state: Callable[..., Any], wrench: Any
+) -> None:
     joints_raw = bytes(store.serialize_cdr(joint_state(["crank"], [1.0], stamp_ns=9), NAME[JOINT_STATE]))
     wrench_raw = bytes(store.serialize_cdr(wrench((1, 2, 3), (4, 5, 6), 9), NAME[WRENCH_STAMPED]))
-    decoder = Decoder(Conversion())
+    decoder = Decoder(MonitorConfig())
     assert decoder.one(wrench_raw, JOINT_STATE)["fault"][0] == UNDECODABLE
     assert decoder.one(joints_raw, WRENCH_STAMPED)["fault"][0] == UNDECODABLE
     assert decoder.one(joints_raw, FLOAT64)["fault"][0] == UNDECODABLE
 
 
 def test_sign_scale_and_offset_are_applied(store: Any, joint_state: Callable[..., Any]) -> None:
-    conversion = Conversion(
-        crank_scale=-0.5, crank_offset_rad=0.25, torque_source="effort", torque_scale=-20.0
+    config = MonitorConfig(
+        crank=Crank(sign=-1, gear_ratio=2.0, offset_rad=0.25),
+        drive_torque=DriveTorque(source="effort", sign=-1, scale=0.5, gear_ratio=40.0),
     )
     raw = bytes(store.serialize_cdr(joint_state(["crank"], [3.0], [4.0], [0.125]), NAME[JOINT_STATE]))
-    sample = Decoder(conversion).one(raw, JOINT_STATE)[0]
+    sample = Decoder(config).one(raw, JOINT_STATE)[0]
     assert sample["crank_angle_rad"] == -1.25
     assert sample["crank_velocity_radps"] == -2.0
     assert sample["torque_nm"] == -2.5
@@ -191,7 +201,7 @@ def test_many_at_once_are_as_one_by_one(
         data += b"\xff" * gap
         messages[i] = (len(data), len(data) + len(raw), 5, 5, JOINT_STATE)
         data += raw
-    decoder = Decoder(Conversion())
+    decoder = Decoder(MonitorConfig())
     together = decoder.many(np.frombuffer(data, np.uint8), messages)
     alone = np.concatenate([decoder.one(raw, JOINT_STATE, 5) for raw in raws])
     assert together.tobytes() == alone.tobytes()

@@ -1,0 +1,160 @@
+"""Messages as CDR, many at once where all have one layout: little endian, XCDR1."""
+
+import struct
+from collections.abc import Iterable, Mapping, Sequence
+from typing import Any
+
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+
+from leg_wear_monitor.recording.definitions import types
+
+JOINT_STATE = "sensor_msgs/msg/JointState"
+WRENCH_STAMPED = "geometry_msgs/msg/WrenchStamped"
+DIAGNOSTIC_ARRAY = "diagnostic_msgs/msg/DiagnosticArray"
+
+_LITTLE = b"\0\1\0\0"
+_SECOND = 1_000_000_000
+
+
+class _Layout:
+    """A message that is written part by part; columns of numbers are noted and filled later."""
+
+    def __init__(self) -> None:
+        self.body = bytearray()
+        self.columns: list[tuple[int, NDArray[Any]]] = []
+
+    def align(self, size: int) -> None:
+        self.body += bytes(-len(self.body) % size)
+
+    def count(self, number: int) -> None:
+        self.align(4)
+        self.body += struct.pack("<I", number)
+
+    def text(self, text: str) -> None:
+        content = text.encode() + b"\0"
+        self.count(len(content))
+        self.body += content
+
+    def column(self, values: NDArray[Any]) -> None:
+        """Numbers that differ from message to message, shape (n, any)."""
+        self.align(values.dtype.itemsize)
+        self.columns.append((len(self.body), values))
+        self.body += bytes(values.dtype.itemsize * values.shape[1])
+
+    def header(self, stamp_ns: NDArray[np.int64], frame_id: str) -> None:
+        seconds, rest = np.divmod(stamp_ns, _SECOND)
+        self.column(seconds.astype("<i4")[:, None])
+        self.column(rest.astype("<u4")[:, None])
+        self.text(frame_id)
+
+    def messages(self, n: int) -> NDArray[np.uint8]:
+        """All messages, one a row."""
+        rows = np.empty((n, len(_LITTLE) + len(self.body)), np.uint8)
+        rows[:] = np.frombuffer(_LITTLE + bytes(self.body), np.uint8)
+        for at, values in self.columns:
+            raw = np.ascontiguousarray(values).view(np.uint8).reshape(n, -1)
+            rows[:, len(_LITTLE) + at : len(_LITTLE) + at + raw.shape[1]] = raw
+        return rows
+
+
+def joint_states(
+    stamp_ns: ArrayLike,
+    names: Sequence[str],
+    *,
+    position: ArrayLike | None = None,
+    velocity: ArrayLike | None = None,
+    effort: ArrayLike | None = None,
+    frame_id: str = "",
+) -> NDArray[np.uint8]:
+    """Messages of sensor_msgs/JointState.
+
+    Parameters
+    ----------
+    stamp_ns : (n,) array of int
+        Stamps of the headers [ns].
+    names : sequence of str
+        Joints, the same in all messages.
+    position, velocity, effort : (n, joints) array, optional
+        Left empty in the messages if not given.
+    frame_id : str
+
+    Returns
+    -------
+    (n, bytes) array of uint8
+        A message a row.
+    """
+    stamps = np.atleast_1d(np.asarray(stamp_ns, np.int64))
+    layout = _Layout()
+    layout.header(stamps, frame_id)
+    layout.count(len(names))
+    for name in names:
+        layout.text(name)
+    for values in (position, velocity, effort):
+        layout.count(0 if values is None else len(names))
+        if values is not None and names:
+            layout.column(np.asarray(values, "<f8").reshape(len(stamps), len(names)))
+    return layout.messages(len(stamps))
+
+
+def wrenches(
+    stamp_ns: ArrayLike,
+    *,
+    force: ArrayLike | None = None,
+    torque: ArrayLike | None = None,
+    frame_id: str = "",
+) -> NDArray[np.uint8]:
+    """Messages of geometry_msgs/WrenchStamped.
+
+    Parameters
+    ----------
+    stamp_ns : (n,) array of int
+        Stamps of the headers [ns].
+    force, torque : (n, 3) array, optional
+        Zero if not given [N, N m].
+    frame_id : str
+
+    Returns
+    -------
+    (n, bytes) array of uint8
+        A message a row.
+    """
+    stamps = np.atleast_1d(np.asarray(stamp_ns, np.int64))
+    layout = _Layout()
+    layout.header(stamps, frame_id)
+    for values in (force, torque):
+        column = np.zeros((len(stamps), 3)) if values is None else np.asarray(values, float)
+        layout.column(column.astype("<f8").reshape(len(stamps), 3))
+    return layout.messages(len(stamps))
+
+
+def diagnostic_array(
+    stamp_ns: int, statuses: Iterable[tuple[str, int, str, str, Mapping[str, str]]], frame_id: str = ""
+) -> bytes:
+    """One message of diagnostic_msgs/DiagnosticArray.
+
+    Parameters
+    ----------
+    stamp_ns : int
+        Stamp of the header [ns].
+    statuses : iterable of tuples
+        Name, level (0 OK, 1 WARN, 2 ERROR, 3 STALE), message, hardware id, values by their keys.
+    frame_id : str
+    """
+    make = types().types
+    seconds, rest = divmod(stamp_ns, _SECOND)
+    stamp = make["builtin_interfaces/msg/Time"](sec=seconds, nanosec=rest)
+    key_value = make["diagnostic_msgs/msg/KeyValue"]
+    status = [
+        make["diagnostic_msgs/msg/DiagnosticStatus"](
+            level=level,
+            name=name,
+            message=message,
+            hardware_id=hardware_id,
+            values=[key_value(key=key, value=value) for key, value in values.items()],
+        )
+        for name, level, message, hardware_id, values in statuses
+    ]
+    header = make["std_msgs/msg/Header"](stamp=stamp, frame_id=frame_id)
+    array = make[DIAGNOSTIC_ARRAY](header=header, status=status)
+    return bytes(types().serialize_cdr(array, DIAGNOSTIC_ARRAY))

@@ -132,6 +132,8 @@ def _expanded_file(bag_file: BagFile, stack: ExitStack) -> Path:
     path = Path(stack.enter_context(tempfile.TemporaryDirectory())) / f"content{bag_file.storage}"
     with path.open("wb") as content:
         expand_file(bag_file.path, content)
+    if not path.stat().st_size:
+        raise RecordingError(str(bag_file.path), "", "holds nothing that can be decompressed")
     return path
 
 

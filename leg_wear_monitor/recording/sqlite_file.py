@@ -47,9 +47,7 @@ class SqliteFile:
         try:
             self._reader.open()
         except _UNREADABLE as error:
-            raise RecordingError(
-                str(path), "", f"cannot be read as a .db3 file: {_one_line(error)}"
-            ) from error
+            raise RecordingError(str(path), "", f"is no readable .db3 file: {_one_line(error)}") from error
         stack.callback(self._reader.close)
         self._connections = {connection.id: connection for connection in self._reader.connections}
         self.channels = {number: _channel(each) for number, each in self._connections.items()}

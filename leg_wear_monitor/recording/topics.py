@@ -70,7 +70,7 @@ def find_topic(role: Role, topics: Iterable[str], where: str) -> str | None:
     if role.topic is not None:
         topic = "/" + role.topic.lstrip("/")
         if topic not in there:
-            raise RecordingError(where, topic, f"is no topic of it, it has {listed(there)}")
+            raise RecordingError(where, topic, f"is no topic of the recording, it has {listed(there)}")
         return topic
     if f"/{role.name}" in there:
         return f"/{role.name}"

@@ -15,7 +15,7 @@ from leg_wear_monitor.share import share_directory
 
 COULD_NOT, INTERRUPTED = 2, 130
 
-_VERBS = ("check", "simulate")
+_VERBS = ("check", "gait-publisher", "simulate")
 
 
 class Verbs(click.Group):
@@ -29,7 +29,8 @@ class Verbs(click.Group):
         """Import a verb's module and give its command."""
         if cmd_name not in _VERBS:
             raise click.UsageError(f"{cmd_name!r} is no verb, expected one of {', '.join(_VERBS)}", ctx)
-        verb: click.Command = getattr(import_module(f"leg_wear_monitor.cli.{cmd_name}"), cmd_name)
+        name = cmd_name.replace("-", "_")
+        verb: click.Command = getattr(import_module(f"leg_wear_monitor.cli.{name}"), name)
         return verb
 
     def invoke(self, ctx: click.Context) -> Any:

@@ -4,7 +4,9 @@ from itertools import pairwise
 
 import attrs
 
-from leg_wear_monitor.mechanism.quantity import FieldError, described, quantity
+from leg_wear_monitor.mechanism.quantity import FieldError, choice, described, quantity
+
+WRENCH, EFFORT, FLOAT64 = TORQUE_SOURCES = ("wrench", "effort", "float64")
 
 
 def _share(doc: str) -> float:
@@ -62,6 +64,11 @@ class EncoderConfig:
 class TorqueSensorConfig:
     """The drive's torque sensor, which gives means over the time since its last reading."""
 
+    source: str = choice(
+        TORQUE_SOURCES,
+        "message with the torque: WrenchStamped, Float64, or the effort of the crank in joint_states",
+        default="wrench",
+    )
     rate_hz: float = quantity("Hz", "messages a second", above=0.0, at_most=10000.0, default=200.0)
     noise_nm: float = quantity("N m", "noise, standard deviation", at_least=0.0, default=0.05)
     resolution_nm: float = quantity("N m", "step of the reading, 0 for none", at_least=0.0, default=0.01)
@@ -114,11 +121,11 @@ class GaitConfig:
     )
     seed: int = quantity("", "of all noise; equal seeds, equal data", at_least=0, default=0)
     duration_s: float = quantity("s", "time to walk, 0 without end", at_least=0.0, default=0.0)
-    loose: tuple[str, ...] = described("loose joints; the mechanism's own if empty", default=())
+    loose_joints: tuple[str, ...] = described("loose joints; the mechanism's own if empty", default=())
     clearances_m: tuple[float, ...] = quantity(
         "m", "radial clearances of the loose joints; the mechanism's own if empty", above=0.0, default=()
     )
-    wear_factor: float = quantity("", "wear coefficients, times this", at_least=0.0, default=1.0)
+    wear_acceleration: float = quantity("", "wear coefficients, times this", at_least=0.0, default=1.0)
     pace: PaceConfig = described("how the crank turns", factory=PaceConfig)
     encoder: EncoderConfig = described("the crank's encoder", factory=EncoderConfig)
     torque_sensor: TorqueSensorConfig = described("the drive's torque sensor", factory=TorqueSensorConfig)

@@ -115,7 +115,7 @@ class SyntheticLeg:
 def _setup(mechanism: Mechanism, config: GaitConfig, speed: float) -> Setup:
     """The leg ready to run: its own joints, clearances, wear and load."""
     leg = _loaded(mechanism, config.load.toe_force_n)
-    setup = prepare(leg, clearances=config.loose or None, wear=True)
+    setup = prepare(leg, clearances=config.loose_joints or None, wear=True)
     contacts = setup.contacts
     clearance = np.array(config.clearances_m) if config.clearances_m else contacts.clearance
     if len(clearance) != len(setup.loose):
@@ -123,7 +123,7 @@ def _setup(mechanism: Mechanism, config: GaitConfig, speed: float) -> Setup:
             f"has {len(clearance)} values for the loose joints {', '.join(setup.loose)}, expected one each"
         )
         raise ConfigError("gait", "clearances_m", fault)
-    wear = contacts.wear_coefficient * config.wear_factor
+    wear = contacts.wear_coefficient * config.wear_acceleration
     return attrs.evolve(
         setup, contacts=contacts._replace(clearance=clearance, wear_coefficient=wear), speed=speed
     )

@@ -8,7 +8,13 @@ from typing import NamedTuple
 
 import numpy as np
 
-from leg_wear_monitor.gait.config import EncoderConfig, GaitConfig, TorqueSensorConfig, TransportConfig
+from leg_wear_monitor.gait.config import (
+    EFFORT,
+    EncoderConfig,
+    GaitConfig,
+    TorqueSensorConfig,
+    TransportConfig,
+)
 from leg_wear_monitor.gait.leg import SyntheticLeg
 from leg_wear_monitor.gait.pace import CrankMotion
 from leg_wear_monitor.mechanism.ideal import TURN
@@ -73,22 +79,22 @@ def _taken(leg: SyntheticLeg, config: GaitConfig) -> Iterator[Reading]:
     """Readings in the order in which they are taken."""
     jitter = config.transport.jitter_s
     encoder, torque = Noise([config.seed, 1]), Noise([config.seed, 2])
+    by_effort = config.torque_sensor.source == EFFORT
     crank_times = _times(config.encoder.rate_hz, jitter, encoder, CRANK)
-    torque_times = _times(config.torque_sensor.rate_hz, jitter, torque, TORQUE)
+    torque_times = iter(()) if by_effort else _times(config.torque_sensor.rate_hz, jitter, torque, TORQUE)
     since, impulse = 0.0, 0.0
     for t, kind in heapq.merge(crank_times, torque_times):
         if config.duration_s and t >= config.duration_s:
             return
         instant = leg.advance(t)
+        angle, velocity, torque_nm = math.nan, math.nan, math.nan
         if kind == CRANK:
             angle, velocity = _encoder(config.encoder, instant.crank, encoder)
-            yield Reading(t, t, kind, NO_FAULT, angle, velocity, math.nan)
-        else:
+        if kind == TORQUE or by_effort:
             mean = (instant.torque_impulse - impulse) / (t - since)
             since, impulse = t, instant.torque_impulse
-            yield Reading(
-                t, t, kind, NO_FAULT, math.nan, math.nan, _torque(config.torque_sensor, mean, torque)
-            )
+            torque_nm = _torque(config.torque_sensor, mean, torque)
+        yield Reading(t, t, kind, NO_FAULT, angle, velocity, torque_nm)
 
 
 def _times(rate_hz: float, jitter_s: float, noise: Noise, kind: int) -> Iterator[tuple[float, int]]:

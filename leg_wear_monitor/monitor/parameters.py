@@ -1,15 +1,17 @@
-"""The monitor's parameters as a flat list of dotted names: for ROS, for files, for documentation."""
+"""Parameters of a node as a flat list of dotted names: for ROS, for files, for documentation."""
 
 import difflib
 from collections.abc import Iterator, Mapping
 from types import MappingProxyType
-from typing import Any
+from typing import Any, TypeVar
 
 import attrs
 
 from leg_wear_monitor.errors import ConfigError
 from leg_wear_monitor.mechanism.strict import shown, structure
 from leg_wear_monitor.monitor.config import MonitorConfig
+
+_Config = TypeVar("_Config")
 
 # as ROS calls them (rcl_interfaces/ParameterType)
 _TYPES = {
@@ -83,17 +85,27 @@ def _walk(kind: type, prefix: str) -> Iterator[Parameter]:
         )
 
 
-PARAMETERS: Mapping[str, Parameter] = MappingProxyType(
-    {parameter.name: parameter for parameter in _walk(MonitorConfig, "")}
-)
-"""All parameters by name, in the order of their declaration."""
+def parameters_of(kind: type) -> Mapping[str, Parameter]:
+    """All parameters that a class of sections declares, by name, in the order of their declaration."""
+    return MappingProxyType({parameter.name: parameter for parameter in _walk(kind, "")})
+
+
+PARAMETERS: Mapping[str, Parameter] = parameters_of(MonitorConfig)
+"""Those of the monitor."""
 
 
 def config_from(values: Mapping[str, Any], source: str = "parameters") -> MonitorConfig:
+    """Configuration of the monitor; see `structured`."""
+    return structured(MonitorConfig, values, source)
+
+
+def structured(kind: type[_Config], values: Mapping[str, Any], source: str) -> _Config:
     """Configuration from values by dotted name; what is not given has its default.
 
     Parameters
     ----------
+    kind : type
+        A class of sections, such as `MonitorConfig`.
     values : mapping of str to bool, int, float, str or sequence
     source : str
         File or node they come from, for messages.
@@ -104,25 +116,26 @@ def config_from(values: Mapping[str, Any], source: str = "parameters") -> Monito
         Naming source, parameter, value, unit and bounds of what cannot be used.
     """
     nested: dict[str, Any] = {}
+    known = parameters_of(kind)
     for name, value in values.items():
-        _check_known(name, source)
-        _check_type(name, value, source)
+        _check_known(name, known, source)
+        _check_type(known[name], value, source)
         *sections, last = name.split(".")
         place = nested
         for section in sections:
             place = place.setdefault(section, {})
         place[last] = list(value) if isinstance(value, tuple) else value
     try:
-        config: MonitorConfig = structure(nested, MonitorConfig, source, "")
+        config: _Config = structure(nested, kind, source, "")
     except ConfigError as error:
-        raise ConfigError(source, error.key, _with_bounds(error)) from error
+        raise ConfigError(source, error.key, _with_bounds(error, known)) from error
     return config
 
 
-def values_of(config: MonitorConfig) -> dict[str, Any]:
-    """Value of every parameter by dotted name, arrays as tuples."""
+def values_of(config: Any) -> dict[str, Any]:
+    """Value of every parameter of a configuration by dotted name, arrays as tuples."""
     values = {}
-    for name in PARAMETERS:
+    for name in parameters_of(type(config)):
         value: Any = config
         for step in name.split("."):
             value = getattr(value, step)
@@ -130,7 +143,7 @@ def values_of(config: MonitorConfig) -> dict[str, Any]:
     return values
 
 
-def changed(config: MonitorConfig, changes: Mapping[str, Any], source: str = "parameters") -> MonitorConfig:
+def changed(config: _Config, changes: Mapping[str, Any], source: str = "parameters") -> _Config:
     """Configuration with other values of parameters that may change while the monitor runs.
 
     Raises
@@ -139,40 +152,46 @@ def changed(config: MonitorConfig, changes: Mapping[str, Any], source: str = "pa
         If a value cannot be used, or another parameter is to change.
     """
     values = values_of(config)
-    wanted = config_from(values | dict(changes), source)
+    wanted = structured(type(config), values | dict(changes), source)
     after = values_of(wanted)
     for name in changes:
-        if PARAMETERS[name].read_only and after[name] != values[name]:
+        if parameters_of(type(config))[name].read_only and after[name] != values[name]:
             raise ConfigError(
                 source, name, f"{shown(changes[name])} comes too late, it is read at the start and then kept"
             )
     return wanted
 
 
-def _check_known(name: str, source: str) -> None:
-    if name in PARAMETERS:
+def _check_known(name: str, known: Mapping[str, Parameter], source: str) -> None:
+    if name in known:
         return
-    near = difflib.get_close_matches(name, PARAMETERS, n=1)
+    near = difflib.get_close_matches(name, known, n=1)
     expected = f"did you mean {near[0]}?" if near else "docs/parameters.md lists all there are"
     raise ConfigError(source, name, f"unknown parameter, {expected}")
 
 
-def _check_type(name: str, value: Any, source: str) -> None:
+def _check_type(parameter: Parameter, value: Any, source: str) -> None:
     """ROS tells 60 from 60.0; so do we, or the same file would work here and not there."""
-    parameter = PARAMETERS[name]
     if parameter.type not in ("double", "double_array"):
         return
     for entry in value if isinstance(value, list | tuple) else (value,):
         if isinstance(entry, int) and not isinstance(entry, bool):
             unit = f" [{parameter.unit}]" if parameter.unit else ""
             raise ConfigError(
-                source, name, f"{shown(value)} is a whole number to ROS, expected {float(entry)!r}{unit}"
+                source,
+                parameter.name,
+                f"{shown(value)} is a whole number to ROS, expected {float(entry)!r}{unit}",
             )
 
 
-def _with_bounds(error: ConfigError) -> str:
+def _with_bounds(error: ConfigError, known: Mapping[str, Parameter]) -> str:
     """The fault, and the bounds, unless it speaks of them."""
-    parameter = PARAMETERS[error.key]
-    if not parameter.bounds or "expected" in error.fault or parameter.bounds in error.fault:
+    parameter = known.get(error.key)
+    if (
+        parameter is None
+        or not parameter.bounds
+        or "expected" in error.fault
+        or parameter.bounds in error.fault
+    ):
         return error.fault
     return f"{error.fault}, expected {parameter.bounds}"

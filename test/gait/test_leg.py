@@ -11,7 +11,7 @@ STOP = PaceConfig(times_s=(0.0, 0.3), speeds_rpm=(60.0, 0.0), ramp_s=0.3)
 
 
 def test_one_loose_joint_wears_as_in_the_simulation() -> None:
-    leg = SyntheticLeg(GaitConfig(loose=("A",), wear_factor=1.0e4))
+    leg = SyntheticLeg(GaitConfig(loose_joints=("A",), wear_acceleration=1.0e4))
     leg.advance(2.0)
     figures = simulate(load_mechanism("bionic_leg"), clearances=["A"], model="full", skip_cycles=0, cycles=2)
     depth = figures.joints["A"]["wear_depth_m_per_cycle"]
@@ -45,7 +45,7 @@ def test_a_push_of_the_ground_changes_the_torque() -> None:
 
 
 def test_the_truth_has_an_entry_a_cycle() -> None:
-    leg = SyntheticLeg(GaitConfig(wear_factor=1.0e4))
+    leg = SyntheticLeg(GaitConfig(wear_acceleration=1.0e4))
     leg.advance(2.5)
     truth = leg.truth()
     assert truth["cycle_end_s"] == pytest.approx([0.0, 1.0, 2.0], abs=0.01)
@@ -57,7 +57,7 @@ def test_the_truth_has_an_entry_a_cycle() -> None:
 
 def test_a_leg_that_stands_hardly_wears() -> None:
     """Friction with a ramp lets journals creep where they hang; that is all that is left."""
-    leg = SyntheticLeg(GaitConfig(pace=STOP, wear_factor=1.0e4))
+    leg = SyntheticLeg(GaitConfig(pace=STOP, wear_acceleration=1.0e4))
     start = leg.clearance_m()
     leg.advance(1.0)
     walked = leg.clearance_m() - start

@@ -54,6 +54,12 @@ def test_clean_sensors_tell_the_truth() -> None:
     assert all(reading.fault == NO_FAULT and reading.arrival_s == reading.taken_s for reading in got)
 
 
+def test_the_crank_can_bring_the_torque() -> None:
+    got = heard(attrs.evolve(CLEAN, torque_sensor=attrs.evolve(CLEAN.torque_sensor, source="effort")))
+    assert {reading.kind for reading in got} == {CRANK}
+    assert [r.torque_nm for r in got] == pytest.approx([4.0 + r.taken_s - 0.0025 for r in got])
+
+
 def test_noise_has_the_deviation_asked_for() -> None:
     torque_sensor = TorqueSensorConfig(noise_nm=0.2)
     noisy = attrs.evolve(CLEAN, encoder=EncoderConfig(noise_rad=0.01), torque_sensor=torque_sensor)

@@ -1,0 +1,53 @@
+"""A node as a verb: its arguments are those of ROS, and without ROS there is one line."""
+
+import sys
+from collections.abc import Callable, Sequence
+from importlib import import_module
+
+import click
+
+from leg_wear_monitor.errors import LegWearError
+
+_Main = Callable[[Sequence[str] | None], int]
+
+
+def node_main(module: str) -> _Main:
+    """Entry point of a node.
+
+    Raises
+    ------
+    LegWearError
+        Where ROS is not installed, or not found.
+    """
+    try:
+        import_module("rclpy")
+    except ImportError as error:
+        raise LegWearError(
+            f"rclpy: {error}; source a ROS 2 installation, or pip install 'leg_wear_monitor[ros]'"
+        ) from error
+    main: _Main = import_module(f"leg_wear_monitor.ros.{module}").main
+    return main
+
+
+def node_verb(name: str, module: str, summary: str, text: str) -> click.Command:
+    """Command that runs a node."""
+
+    @click.command(
+        name=name,
+        short_help=summary,
+        help=text,
+        context_settings={"ignore_unknown_options": True},
+        options_metavar="[--ros-args ...]",
+    )
+    @click.argument("arguments", nargs=-1, type=click.UNPROCESSED, metavar="")
+    def verb(arguments: tuple[str, ...]) -> int:
+        return node_main(module)([name, *arguments])
+
+    return verb
+
+
+def node_script(verb: click.Command) -> None:
+    """Run a verb as what ``ros2 run`` starts, errors as lines."""
+    from leg_wear_monitor.cli.main import cli
+
+    cli([verb.name or "", *sys.argv[1:]])

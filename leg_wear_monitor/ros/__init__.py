@@ -1,0 +1,1 @@
+"""The nodes; ROS is spoken here and nowhere else."""

@@ -1,0 +1,101 @@
+"""A node's parameters from the class that declares them: read, refused, described, changed."""
+
+from collections.abc import Callable
+from typing import Any, Generic, TypeVar
+
+from rcl_interfaces.msg import ParameterDescriptor, SetParametersResult
+from rclpy.node import Node
+from rclpy.parameter import Parameter as RosParameter
+
+from leg_wear_monitor.errors import ConfigError
+from leg_wear_monitor.monitor.parameters import Parameter, changed, parameters_of, structured, values_of
+
+Config = TypeVar("Config")
+
+# what every node has, and rclpy itself looks after
+_OF_ROS = ("use_sim_time", "start_type_description_service", "qos_overrides.")
+
+
+class Parameters(Generic[Config]):
+    """Parameters of a node.
+
+    The node must have been made with ``automatically_declare_parameters_from_overrides=True``: that shows
+    what it was given, unknown names too, which rclpy would ignore.
+
+    Parameters
+    ----------
+    node : rclpy.node.Node
+    kind : type
+        Class of sections, such as ``MonitorConfig``.
+
+    Attributes
+    ----------
+    config
+        An instance of ``kind``, as it stands now.
+
+    Raises
+    ------
+    ConfigError
+        Naming node, parameter, value, unit and what was expected.
+    """
+
+    def __init__(self, node: Node, kind: type[Config]) -> None:
+        self._source = node.get_fully_qualified_name()
+        given = _given(node)
+        self.config: Config = structured(kind, given, self._source)
+        for name, value in values_of(self.config).items():
+            _declare(node, parameters_of(kind)[name], value)
+
+    def follow(self, node: Node, changed_to: Callable[[Config], None]) -> None:
+        """Let parameters change while the node runs, and tell of each change that was accepted."""
+
+        def check(parameters: list[RosParameter]) -> SetParametersResult:
+            try:
+                self._with(parameters)
+            except ConfigError as error:
+                return SetParametersResult(successful=False, reason=str(error))
+            return SetParametersResult(successful=True)
+
+        def take(parameters: list[RosParameter]) -> None:
+            self.config = self._with(parameters)
+            changed_to(self.config)
+
+        node.add_on_set_parameters_callback(check)
+        node.add_post_set_parameters_callback(take)
+
+    def _with(self, parameters: list[RosParameter]) -> Config:
+        known = values_of(self.config)
+        changes = {one.name: _plain(one) for one in parameters if one.name in known}
+        return changed(self.config, changes, self._source)
+
+
+def _given(node: Node) -> dict[str, Any]:
+    """What the node was given, which then is free to be declared as it should be."""
+    given = {}
+    for name in node.get_parameters_by_prefix(""):
+        if not name.startswith(_OF_ROS):
+            given[name] = _plain(node.get_parameter(name))
+            node.undeclare_parameter(name)
+    return given
+
+
+def _plain(parameter: RosParameter) -> Any:
+    """Value as a file would hold it; ROS gives arrays of several kinds."""
+    value = parameter.value
+    return value if isinstance(value, bool | int | float | str) or value is None else list(value)
+
+
+def _declare(node: Node, parameter: Parameter, value: Any) -> None:
+    unit = f" [{parameter.unit}]" if parameter.unit else ""
+    descriptor = ParameterDescriptor(
+        description=f"{parameter.description}{unit}",
+        additional_constraints=parameter.bounds,
+        read_only=parameter.read_only,
+    )
+    if isinstance(value, tuple) and not value:
+        # rclpy takes an empty array for one of bytes, so it stays unset, but of its type
+        node.declare_parameter(parameter.name, RosParameter.Type[parameter.type.upper()], descriptor)
+        return
+    node.declare_parameter(
+        parameter.name, list(value) if isinstance(value, tuple) else value, descriptor, ignore_override=True
+    )

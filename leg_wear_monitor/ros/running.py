@@ -1,0 +1,93 @@
+"""From a shell to a running node and back: arguments, signals, executor, exit code."""
+
+import sys
+from collections.abc import Callable, Sequence
+from typing import TypeVar
+
+import rclpy
+from rclpy.executors import ExternalShutdownException
+from rclpy.experimental.events_executor import EventsExecutor
+from rclpy.impl.implementation_singleton import rclpy_implementation as _rclpy
+from rclpy.logging import get_logger
+from rclpy.node import Node
+from rclpy.utilities import remove_ros_args, try_shutdown
+
+from leg_wear_monitor.errors import ConfigError, LegWearError
+
+DONE, COULD_NOT = 0, 2
+
+# An executor of events took a sixth of the default one's time (docs/decisions/0008-live-node.md). Its spin()
+# without a timeout hangs at full load in the Jazzy wheels, so it is called with one, again and again.
+WAKE_S = 0.2
+
+
+class ClosingNode(Node):
+    """A node that has something to put in order before it goes."""
+
+    def close(self) -> None:
+        """Save what there is to save; the context may be down already."""
+
+
+_Node = TypeVar("_Node", bound=ClosingNode)
+
+
+def spin(node: Node, wanted: Callable[[], bool] = lambda: True) -> None:
+    """Serve a node until its context goes down, or it is not wanted any more."""
+    executor = EventsExecutor(context=node.context)
+    executor.add_node(node)
+    try:
+        while node.context.ok() and wanted():
+            executor.spin_once(timeout_sec=WAKE_S)
+    except ExternalShutdownException:
+        return  # the context went down while it waited
+    finally:
+        executor.shutdown()
+
+
+def _init(argv: list[str]) -> None:
+    """Start ROS with the arguments; refuse what it would not look at."""
+    try:
+        stray = remove_ros_args(argv)[1:]
+        if not stray:
+            rclpy.init(args=argv)
+    except (RuntimeError, _rclpy.RCLInvalidROSArgsError) as error:
+        raise ConfigError(argv[0], "", str(error).split(", at /")[0]) from error
+    if stray:
+        raise ConfigError(argv[0], "", f"unknown argument {stray[0]!r}, expected --ros-args ...")
+
+
+def run(make: Callable[[], _Node], serve: Callable[[_Node], None], argv: Sequence[str] | None) -> int:
+    """Make a node, serve it until a signal or its own end, and take it down.
+
+    Parameters
+    ----------
+    make : callable
+        Gives the node.
+    serve : callable
+        Returns when the node is done or its context is down.
+    argv : sequence of str, optional
+        As of ``sys.argv``, ROS arguments included.
+
+    Returns
+    -------
+    int
+        Exit code: 0 done, 2 could not, with one line on stderr.
+    """
+    node: _Node | None = None
+    try:
+        _init(list(sys.argv if argv is None else argv))
+        node = make()
+        try:
+            serve(node)
+        finally:
+            node.close()
+    except (KeyboardInterrupt, ExternalShutdownException):
+        get_logger("leg_wear_monitor").info("asked to stop")
+    except LegWearError as error:
+        print(f"error: {' '.join(str(error).split())}", file=sys.stderr, flush=True)
+        return COULD_NOT
+    finally:
+        if node is not None:
+            node.destroy_node()
+        try_shutdown()
+    return DONE

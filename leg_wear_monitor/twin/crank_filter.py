@@ -86,16 +86,17 @@ def _correct(i, variance, innovation, filtered, row, at):
 
 
 @kernel
-def update(real, h, step, angle, velocity, filtered, row):
+def update(real, h, step, angle, velocity, trusted, filtered, row):
     """Take in a crank sample; fills its row of the queue.
 
-    It is h [s] after the filter's time and ``step`` [s] after the last sample used.
+    It is h [s] after the filter's time and ``step`` [s] after the last sample used. Its velocity is used
+    where it is ``trusted``.
 
     Returns
     -------
-    used, velocity_refused
-        Whether the sample passed its gate (the filter is that of the prediction otherwise), and whether its
-        velocity did not.
+    used, verdict
+        Whether the sample passed its gate (the filter is that of the prediction otherwise); 1 for a velocity
+        that agrees with the angles, -1 for one that does not, 0 for none.
     """
     predict(real, h, filtered)
     row[STEP] = step
@@ -107,16 +108,17 @@ def update(real, h, step, angle, velocity, filtered, row):
     innovation = angle - filtered[0]
     innovation -= _TURN * math.floor(innovation / _TURN + 0.5)
     if not abs(innovation) < min(_WIDEST_GATE, real[GATE] + _SIGMAS * math.sqrt(filtered[3])):
-        return False, False
+        return False, 0
     spread = min(max(step, 1.0e-6), real[LONGEST])
     _correct(0, real[ANGLE_NOISE] / spread, innovation, filtered, row, BY_ANGLE)
     if not math.isfinite(velocity):
-        return True, False
+        return True, 0
     innovation = velocity - filtered[1]
     if not abs(innovation) < real[VELOCITY_GATE] + _SIGMAS * math.sqrt(filtered[6]):
-        return True, True
-    _correct(1, real[VELOCITY_NOISE] / spread, innovation, filtered, row, BY_VELOCITY)
-    return True, False
+        return True, -1
+    if trusted:
+        _correct(1, real[VELOCITY_NOISE] / spread, innovation, filtered, row, BY_VELOCITY)
+    return True, 1
 
 
 @kernel

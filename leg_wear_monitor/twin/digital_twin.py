@@ -58,6 +58,7 @@ from leg_wear_monitor.twin.leg_state import (
     PIECE_END,
     RUNNING,
     TURNS_BEFORE,
+    WHOLE,
     LegState,
     Looks,
     leg_state,
@@ -275,9 +276,9 @@ class DigitalTwin:
         return Event(stamp, Happening.ACQUIRED)
 
     def _end_cycle(self, stamp: int, cycles: list[CycleFigures]) -> None:
-        """Report the gait cycle that ends at a stamp, unless it began in the middle; begin the next."""
+        """Report the gait cycle that ends at a stamp, if it is a whole one; begin the next."""
         mark, sums, depth = self._leg.mark, self._leg.sums, self._setup.surfaces.depth
-        if mark[CYCLE_BEGIN]:
+        if mark[WHOLE]:
             mark[CYCLES] += 1
             found = estimate_load(sums)
             load = self.load_n

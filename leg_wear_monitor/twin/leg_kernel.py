@@ -48,6 +48,7 @@ from leg_wear_monitor.twin.leg_state import (
     TORQUE_IMPULSE,
     TORQUE_TIME,
     TURNS_BEFORE,
+    WHOLE,
 )
 from leg_wear_monitor.twin.steps import (
     BEGIN,
@@ -82,16 +83,13 @@ def _angle_at(polynomial, tau):
 
 @kernel
 def _find_cut(leg, begin):
-    """Where in its piece, from a stamp on, the crank ends a gait cycle: passes the next 0 either way."""
+    """Where in its piece, from a stamp on, the crank passes the next 0, either way: a gait cycle may end."""
     mark, polynomial = leg.mark, leg.polynomial
     mark[CUT] = 0
     origin = mark[PIECE_BEGIN]
     low, high = 1.0e-9 * (begin - origin), 1.0e-9 * (mark[PIECE_END] - origin)
     first, last = _angle_at(polynomial, low) / _TURN, _angle_at(polynomial, high) / _TURN
     up, down = math.floor(first) + 1.0, math.ceil(first) - 1.0
-    if mark[ANCHORED] != 0:
-        anchor = float(mark[ANCHOR] - mark[TURNS_BEFORE])
-        up, down = anchor + 1.0, anchor - 1.0
     rising = first < up <= last
     if not (rising or last <= down < first):
         return
@@ -239,6 +237,8 @@ def follow(model, feeds_back, stepper, tally, work, cutoff, signature, leg, step
                 mark[FAILED_AT] = mark[BASE] + round(1.0e9 * stepper.intervals[0] * model.interval)
                 return status, i, k
             if cuts:
+                # back at the 0 where it began, a cycle is none
+                mark[WHOLE] = 1 if mark[ANCHORED] != 0 and mark[ANCHOR] != mark[CUT_TURN] else 0
                 mark[ANCHORED], mark[ANCHOR] = 1, mark[CUT_TURN]
                 _find_cut(leg, until)
                 return CYCLE, i, until

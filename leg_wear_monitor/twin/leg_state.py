@@ -8,14 +8,15 @@ from leg_wear_monitor.mechanism.arrays import Floats, Ints
 
 # stamps and counts: stamp of the stepper's time 0; 1 where the leg runs, 1 where it must start afresh; the
 # piece's begin and end; turns before the leg's angle; 1 where a cycle's begin was passed, and its turn; stamp
-# at which the present one ends, 0 if it does not in this piece, the turn it ends at, and 1 if forward;
+# at which the next is passed, 0 if not in this piece, its turn, and 1 if forward;
 # when it began; time bridged in it; samples looked at in this call; how full the torque filters are;
-# number of cycles and of failures; when it last failed; time lost by that; time in motion
+# number of cycles and of failures; when it last failed; time lost by that; time in motion; 1 where the
+# cycle that has ended is a whole one
 (
     BASE, RUNNING, AFRESH, PIECE_BEGIN, PIECE_END, TURNS_BEFORE, ANCHORED, ANCHOR, CUT, CUT_TURN, CUT_RISES,
-    CYCLE_BEGIN, CYCLE_BRIDGED, LOOKS, FILTERING, CYCLES, FAILURES, FAILED_AT, FAILED_NS, MOVING_NS,
-) = range(20)  # fmt: skip
-MARKS = 20
+    CYCLE_BEGIN, CYCLE_BRIDGED, LOOKS, FILTERING, CYCLES, FAILURES, FAILED_AT, FAILED_NS, MOVING_NS, WHOLE,
+) = range(21)  # fmt: skip
+MARKS = 21
 
 # values: drive torque's impulse and time since the last sample, and since the last torque; mean torque before
 # the last sample; last measured torque and load signature

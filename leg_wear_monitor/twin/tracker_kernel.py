@@ -33,6 +33,7 @@ from leg_wear_monitor.twin.tracker_state import (
     CANDIDATE,
     CANDIDATE_KIND,
     CRANKS,
+    CREDIT,
     DUPLICATES,
     FAULTY,
     FILTER_TIME,
@@ -51,6 +52,7 @@ from leg_wear_monitor.twin.tracker_state import (
     REFUSED,
     RELEASED,
     RELEASED_KINDS,
+    SLOWEST,
     STEP,
     STRAY,
     TAIL,
@@ -64,6 +66,9 @@ from leg_wear_monitor.twin.tracker_state import (
 )
 
 _LARGEST_ANGLE, _LARGEST_RATE, _LARGEST_TORQUE = 1.0e6, 1.0e3, 1.0e6  # rad, rad/s, N m: beyond is no leg's
+# velocities in a row that must agree with the angles of a moving crank before any is used: many drivers
+# send zeros, which are right at rest only
+_ENOUGH_CREDIT = 20
 _AT_LEAST_REFUSED = 5  # samples in a row, before the crank is held to be elsewhere
 
 
@@ -122,14 +127,18 @@ def _filter(model, state, stamp, angle, velocity, row):
     clock, count = state.clock, state.counts
     gap = stamp - clock[LAST_CRANK]
     h, step = 1.0e-9 * (stamp - clock[FILTER_TIME]), 1.0e-9 * gap
-    used, velocity_refused = update(model.real, h, step, angle, velocity, state.filtered, row)
+    trusted = clock[CREDIT] >= _ENOUGH_CREDIT
+    used, verdict = update(model.real, h, step, angle, velocity, trusted, state.filtered, row)
     clock[FILTER_TIME] = stamp
     if not used:
         count[OUTLIERS] += 1
         clock[REFUSED] += 1
         return False
-    if velocity_refused:
+    if verdict < 0:
         count[VELOCITY_OUTLIERS] += 1
+        clock[CREDIT] = 0
+    elif verdict > 0 and abs(state.filtered[1]) > 0.5 * model.real[SLOWEST]:
+        clock[CREDIT] = min(clock[CREDIT] + 1, _ENOUGH_CREDIT)
     row[BRIDGED] = 0.0
     if gap > model.ns[MARK]:
         row[BRIDGED] = 1.0

@@ -32,13 +32,13 @@ COUNTS = FAULTY + len(FAULTS)
 # of this acquisition; last knot;
 # since when the leg is not followed; 1 where it is followed, 1 at rest; how long that rest is told; since
 # when it is slow; tracking state, since when the speed is within tolerance or out of it, and which of both;
-# direction; turns
+# direction; turns; how many velocities in a row agreed with the angles
 (
     NEWEST, RELEASED, RELEASED_KINDS, CANDIDATE, CANDIDATE_KIND, WAITING, HEAD, TAIL, LAST_CRANK, REFUSED,
     FILTER_TIME, ACQUIRING, LAST_KNOT, OUT_SINCE, FOLLOWED, RESTS, RESTED, SLOW_SINCE, TRACKING, SINCE,
-    WITHIN, DIRECTION, TURN_COUNT,
-) = range(23)  # fmt: skip
-CLOCKS = 23
+    WITHIN, DIRECTION, TURN_COUNT, CREDIT,
+) = range(24)  # fmt: skip
+CLOCKS = 24
 
 # columns of a queued sample: torque; for a crank sample the time since the one before [s], whether that was
 # a bridged gap, prediction (3) and its covariance (6: 00 01 02 11 12 22), and for angle and velocity each:

@@ -1,18 +1,136 @@
 """The twin: in step with a gait it wears as the simulation does, however the samples come in."""
 
-from collections.abc import Callable
-
+import attrs
 import numpy as np
+import pytest
+from hypothesis import given, settings
+from hypothesis import strategies as st
 
 import leg_wear_monitor as lw
+from leg_wear_monitor.errors import ConfigError, LegWearError
+from leg_wear_monitor.mechanism.ideal import TURN
 from leg_wear_monitor.twin.digital_twin import DigitalTwin
-from leg_wear_monitor.twin.figures import Happening, Tracking
-from leg_wear_monitor.twin.sample import Samples
+from leg_wear_monitor.twin.figures import CycleFigures, Happening, SampleFigures, Tracking, TwinUpdate
+from leg_wear_monitor.twin.sample import TORQUE, Samples, gait_samples
+from leg_wear_monitor.twin.settings import TrackerSettings, TwinSettings
+
+S = 1_000_000_000
 
 
-def test_a_steady_gait_wears_as_a_steady_simulation(
-    leg: lw.Mechanism, twin: DigitalTwin, gait: Callable[..., Samples]
-) -> None:
+def start_stop_reverse(t: np.ndarray) -> np.ndarray:
+    """Angle [rad] of a crank that runs for 2 s, rests, runs backwards from 3 s to 5.5 s, and rests."""
+    speed = np.interp(
+        t, [0.0, 0.2, 1.8, 2.0, 3.0, 3.2, 5.3, 5.5], TURN * np.array([0, 1, 1, 0, 0, -1, -1, 0])
+    )
+    return np.concatenate([[0.0], np.cumsum(0.5 * (speed[1:] + speed[:-1]) * np.diff(t))])
+
+
+@pytest.fixture(scope="module")
+def eventful(gait) -> Samples:
+    """A gait with stop, reversal, torque, a gap, an outlier and a backward jump."""
+    one, two = gait(6.0, angle=start_stop_reverse), gait(3.0, seed=1, start_ns=1_600_000_000 * S)
+    one["torque_nm"] = 2.0 * np.sin(np.arange(len(one)))  # brought along by the crank's samples
+    one["crank_angle_rad"][700] += 2.0
+    torque = gait_samples(two["stamp_ns"] + 777, TORQUE, torque_nm=5.0)
+    rest = np.concatenate([two, torque])
+    rest = rest[np.argsort(rest["stamp_ns"], kind="stable")]
+    return np.concatenate([one[:800], one[850:], rest[:400], rest[700:]])
+
+
+def run(twin: DigitalTwin, blocks: list[Samples]) -> TwinUpdate:
+    """All that the blocks brought."""
+    updates = [twin.update(block) for block in blocks]
+    names = [field.name for field in attrs.fields(SampleFigures)]
+    samples = [np.concatenate([getattr(update.samples, name) for update in updates]) for name in names]
+    cycles = [cycle for update in updates for cycle in update.cycles]
+    return TwinUpdate(
+        SampleFigures(*samples), tuple(cycles), tuple(e for update in updates for e in update.events)
+    )
+
+
+def assert_same(one: TwinUpdate, other: TwinUpdate) -> None:
+    """Bit for bit."""
+    for field in attrs.fields(SampleFigures):
+        np.testing.assert_array_equal(getattr(one.samples, field.name), getattr(other.samples, field.name))
+    assert len(one.cycles) == len(other.cycles)
+    for cycle, expected in zip(one.cycles, other.cycles, strict=True):
+        for field in attrs.fields(CycleFigures):
+            mine, wanted = getattr(cycle, field.name), getattr(expected, field.name)
+            if field.name == "torque":
+                mine, wanted = attrs.astuple(mine), attrs.astuple(wanted)
+            np.testing.assert_array_equal(mine, wanted, err_msg=field.name)
+    assert one.events == other.events
+
+
+@pytest.fixture(scope="module")
+def in_one_go(_made, eventful) -> tuple[TwinUpdate, np.ndarray]:
+    twin, new = _made
+    twin.restore(new)
+    update = run(twin, [eventful])
+    return update, twin.depth
+
+
+@settings(max_examples=5)
+@given(cuts=st.lists(st.integers(0, 2000), max_size=100))
+def test_any_split_into_blocks_gives_the_same(_made, eventful, in_one_go, cuts):
+    twin, new = _made
+    twin.restore(new)
+    blocks = [block for block in np.split(eventful, sorted(cuts)) if len(block)]
+    assert_same(run(twin, blocks), in_one_go[0])
+    np.testing.assert_array_equal(twin.depth, in_one_go[1])
+
+
+def test_blocks_of_one_give_the_same(twin, eventful, in_one_go):
+    assert_same(run(twin, np.split(eventful, len(eventful))), in_one_go[0])
+    np.testing.assert_array_equal(twin.depth, in_one_go[1])
+
+
+@settings(max_examples=8)
+@given(where=st.integers(1, 1990))
+def test_restored_it_goes_on_bit_for_bit(_made, gait, eventful, in_one_go, where):
+    twin, new = _made
+    twin.restore(new)
+    before = run(twin, [eventful[:where]])
+    snapshot = twin.snapshot()
+    run(twin, [gait(0.5, seed=3)])  # astray
+    twin.set_depth(twin.depth + 1.0e-6)
+    twin.restore(snapshot)
+    after = run(twin, [eventful[where:]])
+    parts = [
+        np.concatenate([getattr(before.samples, field.name), getattr(after.samples, field.name)])
+        for field in attrs.fields(SampleFigures)
+    ]
+    whole = TwinUpdate(SampleFigures(*parts), before.cycles + after.cycles, before.events + after.events)
+    assert_same(whole, in_one_go[0])
+    np.testing.assert_array_equal(twin.depth, in_one_go[1])
+
+
+def test_what_happens_is_told(in_one_go):
+    what = Happening
+    assert [event.what for event in in_one_go[0].events] == [
+        what.ACQUIRED, what.STOPPED, what.MOVING, what.REVERSED, what.STOPPED,
+        what.BACKWARD_JUMP, what.ACQUIRED, what.LOST_IN_GAP, what.ACQUIRED,
+    ]  # fmt: skip
+    # forward it does not come from one 0 to the next, and a way there and back is no cycle
+    assert [cycle.direction for cycle in in_one_go[0].cycles] == [-1]
+    assert in_one_go[0].cycles[0].duration_s == pytest.approx(1.0, abs=1.0e-3)
+
+
+def test_every_sample_used_is_looked_at_once_and_in_order(in_one_go):
+    samples = in_one_go[0].samples
+    jump = np.flatnonzero(np.diff(samples.stamp_ns) < 0)
+    assert len(jump) == 1
+    for part in np.split(np.arange(len(samples)), jump + 1):
+        pairs = list(zip(samples.stamp_ns[part], samples.kind[part], strict=True))
+        assert pairs == sorted(set(pairs))
+    followed = ~np.isnan(samples.crank_angle_rad)
+    assert np.isfinite(samples.predicted_torque_nm[followed]).all()
+    assert np.isfinite(samples.contact_force_n[followed]).all()
+    assert np.isnan(samples.contact_force_n[~followed]).all()
+    assert followed.mean() > 0.7
+
+
+def test_a_steady_gait_wears_as_a_steady_simulation(leg, twin, gait):
     """Encoder noise and all; the first joint carries the drive and varies least."""
     update = twin.update(gait(12.0))
     archard = np.array([cycle.archard_j for cycle in update.cycles])
@@ -21,4 +139,126 @@ def test_a_steady_gait_wears_as_a_steady_simulation(
     wrong = np.abs(archard.mean(axis=0) / wanted - 1.0)
     assert (wrong < [0.02, 0.06, 0.06, 0.08, 0.15]).all(), wrong
     assert twin.tracking is Tracking.IN_STEP
+    assert twin.speed_radps == pytest.approx(TURN, rel=0.01)
     assert [event.what for event in update.events] == [Happening.ACQUIRED]
+    for cycle in update.cycles:
+        assert cycle.duration_s == pytest.approx(1.0, abs=1.0e-3)
+        assert cycle.moving_s == pytest.approx(cycle.duration_s, abs=2.0e-4)
+
+
+def test_growth_adds_up_to_the_clearance(twin, gait):
+    fresh = twin.clearance_mean_m
+    update = twin.update(gait(6.0))
+    assert all(cycle.growth_mean_m.min() > 0.0 for cycle in update.cycles)
+    first, last = update.cycles[0], update.cycles[-1]
+    grown = sum(cycle.growth_mean_m for cycle in update.cycles[1:])
+    np.testing.assert_allclose(last.clearance_mean_m - first.clearance_mean_m, grown, rtol=1.0e-9)
+    assert (twin.clearance_mean_m >= last.clearance_mean_m).all()
+    assert (first.clearance_mean_m - first.growth_mean_m >= fresh).all()
+    np.testing.assert_allclose(twin.clearance_max_m, 3.0e-4 + twin.depth.sum(axis=1).max(axis=1))
+
+
+@pytest.mark.parametrize("noise_rad, rate_hz", [(1.0e-3, 200.0), (1.0e-3, 50.0), (3.0e-3, 200.0)])
+def test_noise_of_the_encoder_is_no_wear(twin, gait, noise_rad, rate_hz):
+    """Against the same gait without noise, by the joint that varies least."""
+    new, wear = twin.snapshot(), []
+    for noise in (0.0, noise_rad):
+        twin.restore(new)
+        update = twin.update(gait(8.0, rate_hz, noise_rad=noise))
+        wear.append(np.mean([cycle.archard_j for cycle in update.cycles], axis=0))
+    assert wear[1][0] == pytest.approx(wear[0][0], rel=0.02)
+    assert wear[1][1:].sum() == pytest.approx(wear[0][1:].sum(), rel=0.06)
+
+
+def test_a_leg_at_rest_does_not_wear(twin, gait):
+    """Nothing wears from the stop on, whatever the encoder's noise does."""
+    run(twin, [gait(3.0, angle=start_stop_reverse)])
+    assert twin.tracking is Tracking.STOPPED
+    depth = twin.depth
+    assert depth.any()
+    standing = gait(
+        60.0, angle=lambda t: np.full_like(t, start_stop_reverse(np.linspace(0, 3, 601))[-1]), seed=5
+    )
+    standing["stamp_ns"] += 3 * S
+    update = run(twin, [standing])
+    np.testing.assert_array_equal(twin.depth, depth)
+    assert not update.cycles
+    assert not update.events
+    assert twin.intake.standing_s > 59.0
+    assert np.isfinite(update.samples.contact_force_n).all()
+
+
+def test_a_gap_costs_its_time_and_keeps_the_wear(twin, gait):
+    samples = gait(6.0)
+    twin.update(samples[:500])
+    depth = twin.depth
+    update = twin.update(samples[700:])
+    assert [event.what for event in update.events] == [Happening.LOST_IN_GAP, Happening.ACQUIRED]
+    assert (twin.depth >= depth).all()
+    intake = twin.intake
+    assert intake.lost == 1
+    assert intake.unmonitored_s + intake.moving_s == pytest.approx(
+        1.0e-9 * (intake.followed_stamp_ns - samples["stamp_ns"][0])
+    )
+
+
+def test_wear_goes_faster_by_its_acceleration(twin, gait):
+    new, grown = twin.snapshot(), []
+    for factor in (1.0, 50.0, 0.0):
+        twin.restore(new)
+        twin.wear_acceleration = factor
+        twin.update(gait(2.5))
+        grown.append(twin.clearance_mean_m - 3.0e-4)
+    assert grown[1][0] == pytest.approx(50.0 * grown[0][0], rel=0.02)  # others are chaotic
+    assert grown[1][1:].sum() == pytest.approx(50.0 * grown[0][1:].sum(), rel=0.2)
+    assert not grown[2].any()
+    with pytest.raises(LegWearError, match="wear_acceleration: -1"):
+        twin.wear_acceleration = -1.0
+
+
+def test_a_new_part_has_fresh_surfaces(twin, gait):
+    twin.update(gait(2.0))
+    before = twin.depth
+    twin.reset_wear("G")
+    k = twin.loose.index("G")
+    assert not twin.depth[k].any()
+    np.testing.assert_array_equal(np.delete(twin.depth, k, axis=0), np.delete(before, k, axis=0))
+    with pytest.raises(LegWearError, match="X: no loose joint, expected one of A, B, G, I, J"):
+        twin.reset_wear("X")
+    with pytest.raises(LegWearError, match="depth: expected finite depths from 0 m up"):
+        twin.set_depth(-before)
+
+
+def test_a_leg_that_cannot_be_resolved_is_told_and_goes_on(leg, gait):
+    """Bushings like jelly: journals go through them; the wear stays, the time counts as unmonitored."""
+    soft = {name: attrs.evolve(c, stiffness=10.0) for name, c in leg.clearances.items()}
+    twin = DigitalTwin(attrs.evolve(leg, clearances=soft), TwinSettings(loose=("A", "G")))
+    update = twin.update(gait(1.0))
+    failed = [event for event in update.events if event.what is Happening.PUSHED_THROUGH]
+    assert failed
+    assert failed[0].joint in ("A", "G")
+    intake = twin.intake
+    assert intake.failures == len(failed)
+    assert intake.unmonitored_s > 0.1
+    assert np.isfinite(twin.depth).all()
+
+
+def test_a_leg_without_loose_joints_is_refused(leg):
+    with pytest.raises(ConfigError, match="no joint is loose"):
+        DigitalTwin(leg, TwinSettings(loose=()))
+
+
+def test_it_can_walk_backwards_as_commanded(leg, gait):
+    twin = DigitalTwin(leg, TwinSettings(tracker=TrackerSettings(commanded_speed_radps=-TURN), loose=("A",)))
+    update = twin.update(gait(5.0, angle=lambda t: 1.0 - TURN * t))
+    assert {cycle.direction for cycle in update.cycles} == {-1}
+    assert len(update.cycles) in (3, 4)
+    assert twin.tracking is Tracking.IN_STEP
+    assert twin.intake.reversals == 0
+
+
+@pytest.mark.parametrize(
+    "name, value", [("wear_acceleration", np.nan), ("torque_bandwidth_hz", 0.0), ("load_gain", 1.5)]
+)
+def test_senseless_settings_are_refused(name, value, refused):
+    refused(TwinSettings, name, value)

@@ -1,13 +1,11 @@
 """Messages as CDR, many at once where all have one layout: little endian, XCDR1."""
 
 import struct
-from collections.abc import Iterable, Mapping, Sequence
+from collections.abc import Mapping, Sequence
 from typing import Any
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
-
-from leg_wear_monitor.recording.definitions import types
 
 JOINT_STATE = "sensor_msgs/msg/JointState"
 WRENCH_STAMPED = "geometry_msgs/msg/WrenchStamped"
@@ -129,7 +127,7 @@ def wrenches(
 
 
 def diagnostic_array(
-    stamp_ns: int, statuses: Iterable[tuple[str, int, str, str, Mapping[str, str]]], frame_id: str = ""
+    stamp_ns: int, statuses: Sequence[tuple[str, int, str, str, Mapping[str, str]]], frame_id: str = ""
 ) -> bytes:
     """One message of diagnostic_msgs/DiagnosticArray.
 
@@ -137,24 +135,20 @@ def diagnostic_array(
     ----------
     stamp_ns : int
         Stamp of the header [ns].
-    statuses : iterable of tuples
+    statuses : sequence of tuples
         Name, level (0 OK, 1 WARN, 2 ERROR, 3 STALE), message, hardware id, values by their keys.
     frame_id : str
     """
-    make = types().types
-    seconds, rest = divmod(stamp_ns, _SECOND)
-    stamp = make["builtin_interfaces/msg/Time"](sec=seconds, nanosec=rest)
-    key_value = make["diagnostic_msgs/msg/KeyValue"]
-    status = [
-        make["diagnostic_msgs/msg/DiagnosticStatus"](
-            level=level,
-            name=name,
-            message=message,
-            hardware_id=hardware_id,
-            values=[key_value(key=key, value=value) for key, value in values.items()],
-        )
-        for name, level, message, hardware_id, values in statuses
-    ]
-    header = make["std_msgs/msg/Header"](stamp=stamp, frame_id=frame_id)
-    array = make[DIAGNOSTIC_ARRAY](header=header, status=status)
-    return bytes(types().serialize_cdr(array, DIAGNOSTIC_ARRAY))
+    layout = _Layout()
+    layout.header(np.array([stamp_ns], np.int64), frame_id)
+    layout.count(len(statuses))
+    for name, level, message, hardware_id, values in statuses:
+        layout.body.append(level)
+        for text in (name, message, hardware_id):
+            layout.text(text)
+        layout.count(len(values))
+        for key, value in values.items():
+            layout.text(key)
+            layout.text(value)
+    raw: bytes = layout.messages(1)[0].tobytes()
+    return raw

@@ -51,13 +51,28 @@ def test_wrenches_are_as_rosbags_writes_them(
     assert rows[0].tobytes() == bytes(expected)
 
 
-def test_a_diagnostic_array_comes_back(store: Any) -> None:
-    raw = encode.diagnostic_array(5_000_000_007, [("leg: A", 1, "knocks", "leg", {"force_n": "12.5"})])
-    message = store.deserialize_cdr(raw, encode.DIAGNOSTIC_ARRAY)
-    (status,) = message.status
-    assert (message.header.stamp.sec, message.header.stamp.nanosec) == (5, 7)
-    assert (status.name, status.level, status.message, status.hardware_id) == ("leg: A", 1, "knocks", "leg")
-    assert [(pair.key, pair.value) for pair in status.values] == [("force_n", "12.5")]
+texts = st.text(st.characters(exclude_characters="\0", exclude_categories=["Cs"]), max_size=9)
+statuses = st.tuples(texts, st.integers(0, 3), texts, texts, st.dictionaries(texts, texts, max_size=3))
+
+
+@given(stamp_ns=stamps, told=st.lists(statuses, max_size=3), frame=texts)
+def test_diagnostics_are_as_rosbags_writes_them(store: Any, stamp_ns: int, told: Any, frame: str) -> None:
+    make = store.types
+    pair = make["diagnostic_msgs/msg/KeyValue"]
+    status = [
+        make["diagnostic_msgs/msg/DiagnosticStatus"](
+            level=level,
+            name=name,
+            message=message,
+            hardware_id=hardware,
+            values=[pair(*each) for each in values.items()],
+        )
+        for name, level, message, hardware, values in told
+    ]
+    stamp = make["builtin_interfaces/msg/Time"](*divmod(stamp_ns, 10**9))
+    array = make[encode.DIAGNOSTIC_ARRAY](make["std_msgs/msg/Header"](stamp, frame), status)
+    expected = bytes(store.serialize_cdr(array, encode.DIAGNOSTIC_ARRAY))
+    assert encode.diagnostic_array(stamp_ns, told, frame) == expected
 
 
 @pytest.fixture

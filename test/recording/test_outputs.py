@@ -1,0 +1,147 @@
+"""What the monitor's topics carry: read back by rosbags, it is what was reported."""
+
+import math
+from collections.abc import Callable
+from typing import Any
+
+import attrs
+import numpy as np
+import pytest
+
+from leg_wear_monitor.monitor.alarms import Alarm, Level
+from leg_wear_monitor.monitor.config import MonitorConfig
+from leg_wear_monitor.monitor.input_config import DriveTorque
+from leg_wear_monitor.monitor.reports import (
+    AlarmList,
+    CycleReport,
+    JointReport,
+    Lost,
+    Remaining,
+    Reports,
+    SampleReports,
+    Status,
+)
+from leg_wear_monitor.recording.outputs import (
+    ALARMS,
+    CLEARANCES,
+    DIAGNOSTICS,
+    FORECAST,
+    IMPACTS,
+    TORQUE,
+    Messages,
+    plain,
+    topic_of,
+)
+from leg_wear_monitor.twin.sample import CRANK
+from leg_wear_monitor.twin.sample import TORQUE as TORQUE_SAMPLE
+
+pytestmark = pytest.mark.plain
+
+LOOSE = ("A", "G")
+
+
+@pytest.fixture(scope="module")
+def reports() -> Reports:
+    nan = math.nan
+    samples = SampleReports(
+        stamp_ns=np.array([10, 20, 30, 40], np.int64),
+        kind=np.array([CRANK, TORQUE_SAMPLE, CRANK, CRANK]),
+        crank_angle_rad=np.array([nan, 0.1, 0.2, 0.3]),
+        predicted_torque_nm=np.array([nan, 1.5, 2.5, 3.5]),
+        contact_force_n=np.array([[nan, nan], [1.0, 2.0], [3.0, 4.0], [5.0, 6.0]]),
+    )
+    blank = {field.name: 0 for field in attrs.fields(JointReport)}
+    known = {**blank, "clearance_m": 3e-4, "growth_mps": 1e-15, "peak_force_n": 50.0}
+    joints = (
+        JointReport(**{**known, "joint": "A", "remaining": Remaining(cycles=1e6, hours=277.5)}),
+        JointReport(**{**known, "joint": "G", "growth_mps": None, "remaining": None}),
+    )
+    blank = {field.name: 0 for field in attrs.fields(CycleReport)}
+    cycle = CycleReport(**{**blank, "stamp_ns": 35, "joints": joints})
+    alarm = Alarm(
+        kind="clearance", subject="A", unit="m", level=Level.ERROR, present=Level.OK, value=6e-4, limit=5e-4,
+        raised_ns=1_700_000_000_123_456_789,
+    )  # fmt: skip
+    lost = Lost(**{**{field.name: 0 for field in attrs.fields(Lost)}, "faulty": {}})
+    return Reports(samples, (cycle,), (AlarmList(36, (alarm,)),), lost)
+
+
+@pytest.fixture(scope="module")
+def sent(store: Any, reports: Reports) -> dict[str, list[Any]]:
+    """Messages by the name of their topic, as rosbags reads them."""
+    messages: dict[str, list[Any]] = {}
+    for outgoing in Messages(MonitorConfig(), LOOSE).of(reports):
+        assert len(outgoing.stamp_ns) == len(outgoing.messages)
+        for stamp, row in zip(outgoing.stamp_ns.tolist(), outgoing.messages, strict=True):
+            message = store.deserialize_cdr(row.tobytes(), outgoing.output.type)
+            assert message.header.stamp.sec * 10**9 + message.header.stamp.nanosec == stamp
+            messages.setdefault(outgoing.output.name, []).append(message)
+    return messages
+
+
+def test_forces_are_of_the_crank_samples_that_were_followed(sent: dict[str, list[Any]]) -> None:
+    forces = sent[IMPACTS.name]
+    assert [list(message.name) for message in forces] == [["A_impact", "G_impact"]] * 2
+    assert [message.effort.tolist() for message in forces] == [[3.0, 4.0], [5.0, 6.0]]
+    assert all(message.header.frame_id == "pelvis" for message in forces)
+
+
+def test_torque_is_of_all_samples_that_were_followed(sent: dict[str, list[Any]]) -> None:
+    assert [message.wrench.torque.z for message in sent[TORQUE.name]] == [1.5, 2.5, 3.5]
+    assert [message.wrench.torque.x for message in sent[TORQUE.name]] == [0.0] * 3
+
+
+def test_torque_is_about_the_axis_of_the_parameters(store: Any, reports: Reports) -> None:
+    config = MonitorConfig(drive_torque=DriveTorque(axis="x"), publish_impact_forces=False)
+    (outgoing,) = Messages(config, LOOSE).of_samples(reports.samples)
+    message = store.deserialize_cdr(outgoing.messages[0].tobytes(), outgoing.output.type)
+    assert (message.wrench.torque.x, message.wrench.torque.z) == (1.5, 0.0)
+
+
+def test_clearances_are_those_of_the_gait_cycle(sent: dict[str, list[Any]]) -> None:
+    (message,) = sent[CLEARANCES.name]
+    assert list(message.name) == ["A_clearance", "G_clearance"]
+    assert message.position.tolist() == [3e-4, 3e-4]
+    assert message.velocity[0] == 1e-15 and math.isnan(message.velocity[1])
+    assert message.effort.tolist() == [50.0, 50.0]
+
+
+def test_an_alarm_keeps_its_name_and_gives_plain_numbers(sent: dict[str, list[Any]]) -> None:
+    ((status,),) = (message.status for message in sent[ALARMS.name])
+    assert status.name == "leg_wear_monitor: clearance A"
+    assert (status.level, status.message, status.hardware_id) == (2, "latched", "leg")
+    values = {pair.key: pair.value for pair in status.values}
+    assert values["value_m"] == "0.0006"
+    assert values["limit_m"] == "0.0005"
+    assert float(values["raised_s"]) == pytest.approx(1_700_000_000.123456, abs=1e-5)
+
+
+def test_a_forecast_says_what_is_known(store: Any, reports: Reports) -> None:
+    raw = Messages(MonitorConfig(), LOOSE).forecast(reports.cycles[0])
+    known, unknown = store.deserialize_cdr(raw, FORECAST.type).status
+    assert {pair.key: pair.value for pair in known.values} == {
+        "remaining_cycles": "1000000",
+        "remaining_hours": "277.5",
+    }
+    assert not unknown.values
+
+
+def test_diagnostics_are_the_monitors_status(store: Any) -> None:
+    told = (Status("input", Level.WARN, "look at: input_gaps", {"crank_rate_hz": 199.5}),)
+    raw = Messages(MonitorConfig(hardware_id="left"), LOOSE, node="monitor").diagnostics(7, told)
+    (status,) = store.deserialize_cdr(raw, DIAGNOSTICS.type).status
+    assert (status.name, status.level, status.hardware_id) == ("monitor: input", 1, "left")
+    assert [(pair.key, pair.value) for pair in status.values] == [("crank_rate_hz", "199.5")]
+
+
+@pytest.mark.parametrize(
+    ("value", "text"),
+    [(0.0003, "0.0003"), (0.1 + 0.2, "0.3"), (1e6, "1000000"), (math.nan, "nan"), (math.inf, "inf")],
+)
+def test_numbers_are_plain(value: float, text: str) -> None:
+    assert plain(value) == text
+
+
+def test_topics_are_of_the_node(store: Callable[..., Any]) -> None:
+    assert topic_of(ALARMS, "/robot/leg_wear_monitor") == "/robot/leg_wear_monitor/alarms"
+    assert topic_of(DIAGNOSTICS, "/robot/leg_wear_monitor") == "/diagnostics"

@@ -13,11 +13,19 @@ if TYPE_CHECKING:
     from leg_wear_monitor.dynamics.simulation import simulate
     from leg_wear_monitor.mechanism.loader import load_mechanism
     from leg_wear_monitor.mechanism.spec import Mechanism
+    from leg_wear_monitor.monitor.book import open_ledger
+    from leg_wear_monitor.monitor.config import MonitorConfig
+    from leg_wear_monitor.monitor.parameter_file import load_config
+    from leg_wear_monitor.monitor.wear_monitor import WearMonitor
 
 _HOME = {
     "Mechanism": "mechanism.spec",
+    "MonitorConfig": "monitor.config",
     "SimulationResult": "dynamics.result",
+    "WearMonitor": "monitor.wear_monitor",
+    "load_config": "monitor.parameter_file",
     "load_mechanism": "mechanism.loader",
+    "open_ledger": "monitor.book",
     "simulate": "dynamics.simulation",
 }
 
@@ -26,9 +34,13 @@ __all__ = [
     "ConfigError",
     "LegWearError",
     "Mechanism",
+    "MonitorConfig",
     "SimulationError",
     "SimulationResult",
+    "WearMonitor",
+    "load_config",
     "load_mechanism",
+    "open_ledger",
     "simulate",
 ]
 

@@ -31,7 +31,7 @@ class Limits:
         "impact force in a joint, peak of a gait cycle",
         above=0.0,
         at_most=1.0e7,
-        default=2000.0,
+        default=10000.0,
         metadata=LIVE,
     )
     joint_impact_force_n: tuple[float, ...] = quantity(
@@ -59,6 +59,14 @@ class Limits:
     )
     bad_sample_share: float = quantity(
         "", "share of samples that cannot be used", above=0.0, at_most=1.0, default=0.05, metadata=LIVE
+    )
+    stuck_torque_share: float = quantity(
+        "",
+        "share of torque samples that are saturated, or repeat the largest or the smallest",
+        above=0.0,
+        at_most=1.0,
+        default=0.3,
+        metadata=LIVE,
     )
     lost_time_share: float = quantity(
         "", "share of the time that was not monitored", above=0.0, at_most=1.0, default=0.05, metadata=LIVE

@@ -11,6 +11,7 @@ from leg_wear_monitor.mechanism.clearance import Clearance
 from leg_wear_monitor.mechanism.quantity import FieldError
 from leg_wear_monitor.mechanism.spec import Mechanism, SpeedDrive
 from leg_wear_monitor.monitor.config import MonitorConfig
+from leg_wear_monitor.twin.settings import TrackerSettings, TwinSettings
 
 _KEYS = {"radial_clearance": "clearances_m", "wear_coefficient": "wear_coefficients_per_pa"}
 
@@ -37,7 +38,7 @@ def fitted(mechanism: Mechanism, config: MonitorConfig, source: str = "parameter
         )
     loose = config.loose_joints or mechanism.loose
     _check_joints(loose, mechanism, source)
-    speed = config.cadence.commanded_rpm * 2.0 * math.pi / 60.0
+    speed = 2.0 * math.pi * (config.cadence.commanded_rpm / 60.0)
     settings = {name: _settings(mechanism, config, loose, k, source) for k, name in enumerate(loose)}
     for limits in ("joint_impact_force_n", "joint_clearance_m"):
         given = getattr(config.limits, limits)
@@ -48,6 +49,33 @@ def fitted(mechanism: Mechanism, config: MonitorConfig, source: str = "parameter
         loose=loose,
         clearances=mechanism.clearances | settings,
         drive=attrs.evolve(mechanism.drive, speed=speed),
+    )
+
+
+def twin_settings(config: MonitorConfig, source: str = "parameters") -> TwinSettings:
+    """Settings of the twin as a configuration has them.
+
+    Raises
+    ------
+    ConfigError
+        For a reorder window that is not shorter than the gaps that are bridged.
+    """
+    tracker, cadence = config.tracker, config.cadence
+    if not tracker.reorder_window_s < tracker.gap_limit_s:
+        raise ConfigError(
+            source,
+            "tracker.reorder_window_s",
+            f"{tracker.reorder_window_s!r} s is not below tracker.gap_limit_s, {tracker.gap_limit_s!r} s",
+        )
+    return TwinSettings(
+        tracker=TrackerSettings(
+            commanded_speed_radps=2.0 * math.pi * (cadence.commanded_rpm / 60.0),
+            bandwidth_hz=tracker.bandwidth_hz,
+            reorder_window_s=tracker.reorder_window_s,
+            bridge_limit_s=tracker.gap_limit_s,
+            speed_tolerance=cadence.tolerance_rpm / abs(cadence.commanded_rpm),
+        ),
+        wear_acceleration=config.wear_acceleration,
     )
 
 

@@ -101,7 +101,7 @@ class Tracker:
         "Hz", "bandwidth of the crank's tracker", at_least=0.1, at_most=200.0, default=8.0
     )
     reorder_window_s: float = quantity(
-        "s", "how long a sample waits for earlier ones", at_least=0.0, at_most=1.0, default=0.02
+        "s", "how long a sample waits for earlier ones", at_least=0.0, at_most=0.5, default=0.02
     )
     gap_limit_s: float = quantity(
         "s",

@@ -40,7 +40,7 @@ class Ledger:
     counted_ns : (n, 2) array of int
         Begin and end of the time whose wear is in it, of earlier runs.
     cut_off_s : float or None
-        If the last run was cut off: the longest time whose wear was lost with it.
+        If the last run was cut off: the longest time of walking whose wear was lost with it.
     kept_ns : int
         Stamp of the last entry on the disk, 0 before.
     fault : str
@@ -71,6 +71,7 @@ class Ledger:
             raise LedgerError(f"{self.path}: is damaged: {error}; {MOVE}") from error
         self.cut_off_s = None if closed else last_interval_s
         self.kept_ns = self.entry.stamp_ns if self.entry else 0
+        self._kept_moving_s = self.entry.totals.get("moving_s", 0.0) if self.entry else 0.0
         self._run = last + 1
         self._write(None, closed=False)
 
@@ -87,8 +88,8 @@ class Ledger:
         closed : bool
             Whether the run ends here in order.
         """
-        if entry.spans and entry.spans[-1][0] <= self.kept_ns:
-            self._interval_s = max(self._interval_s, (entry.stamp_ns - self.kept_ns) * 1.0e-9)
+        moving_s = entry.totals.get("moving_s", 0.0)
+        self._interval_s = max(self._interval_s, moving_s - self._kept_moving_s)
         return self._write(entry, closed)
 
     def close(self) -> None:
@@ -113,7 +114,9 @@ class Ledger:
             return False
         self.fault = ""
         self._events.clear()
-        self.kept_ns = entry.stamp_ns if entry else self.kept_ns
+        if entry is not None:
+            self.kept_ns = entry.stamp_ns
+            self._kept_moving_s = entry.totals.get("moving_s", 0.0)
         return True
 
     def _connection(self) -> sqlite3.Connection:

@@ -1,38 +1,12 @@
 """What the monitor says: at each sample, of each gait cycle, when an alarm changes, and of its own state."""
 
 import attrs
-import numpy as np
 
-from leg_wear_monitor.mechanism.arrays import Floats, Ints
 from leg_wear_monitor.monitor.alarms import Alarm, Level
+from leg_wear_monitor.twin.figures import Intake, SampleFigures
 
-
-@attrs.frozen(eq=False)
-class SampleReports:
-    """The leg at each of n samples that were passed now; NaN while the leg is not followed.
-
-    Attributes
-    ----------
-    stamp_ns : (n,) array of int
-        Of the samples; never goes back within a time base.
-    kind : (n,) array of int
-        `CRANK` or `TORQUE`.
-    crank_angle_rad : (n,) array
-        In [0, 2 pi).
-    predicted_torque_nm : (n,) array
-        Mean since the sample before.
-    contact_force_n : (n, loose) array
-        At the sample, in the order of `WearMonitor.loose`.
-    """
-
-    stamp_ns: Ints
-    kind: Ints
-    crank_angle_rad: Floats
-    predicted_torque_nm: Floats
-    contact_force_n: Floats
-
-    def __len__(self) -> int:
-        return len(self.stamp_ns)
+SampleReports = SampleFigures
+"""The leg at each sample that was passed now; NaN while it is not followed."""
 
 
 @attrs.frozen(kw_only=True)
@@ -176,6 +150,23 @@ class Lost:
     failures: int
 
 
+def lost(intake: Intake, already_counted: int) -> Lost:
+    """What was not integrated, from a twin's counts."""
+    return Lost(
+        unmonitored_s=intake.unmonitored_s,
+        already_counted=already_counted,
+        faulty=intake.faulty,
+        duplicates=intake.duplicates,
+        late=intake.late,
+        stray_stamps=intake.stray_stamps,
+        outliers=intake.outliers,
+        gaps_bridged=intake.gaps_bridged,
+        gaps_lost=intake.lost,
+        backward_jumps=intake.backward_jumps,
+        failures=intake.failures,
+    )
+
+
 @attrs.frozen(eq=False)
 class Reports:
     """What an update brought.
@@ -205,9 +196,3 @@ class Status:
     level: Level
     message: str
     values: dict[str, float]
-
-
-def no_samples(loose: int) -> SampleReports:
-    """Reports of no sample."""
-    stamps = np.zeros(0, dtype=np.int64)
-    return SampleReports(stamps, stamps, np.zeros(0), np.zeros(0), np.zeros((0, loose)))

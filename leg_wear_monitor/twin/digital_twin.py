@@ -170,6 +170,11 @@ class DigitalTwin:
         return np.asarray(clearances(self._setup.contacts, self._setup.surfaces.depth)[1])
 
     @property
+    def peak_force_n(self) -> Floats:
+        """Largest contact force (loose,) [N] since the gait cycle began."""
+        return np.asarray(self._tally.peak[self._setup.contacts.joint])
+
+    @property
     def tracking(self) -> Tracking:
         """How the crank is followed."""
         return Tracking(int(self._tracker.state.clock[TRACKING]))

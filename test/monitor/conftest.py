@@ -1,15 +1,20 @@
 """Wear to be kept, without a leg that made it."""
 
-from collections.abc import Callable, Iterator
+from collections.abc import Callable, Iterator, Mapping
 from pathlib import Path
+from types import MappingProxyType
+from typing import Any
 
 import numpy as np
 import pytest
 
+from leg_wear_monitor import Mechanism, WearMonitor
 from leg_wear_monitor.monitor.alarms import Alarm, Level
 from leg_wear_monitor.monitor.binding import Binding
 from leg_wear_monitor.monitor.ledger import Ledger
 from leg_wear_monitor.monitor.ledger_entry import Entry, JointWear
+from leg_wear_monitor.monitor.parameters import config_from
+from leg_wear_monitor.twin.sample import Samples, gait_samples
 
 SECOND = 10**9
 
@@ -52,3 +57,50 @@ def open_ledger(tmp_path: Path, binding: Binding) -> Iterator[Callable[..., Ledg
     yield open_
     for ledger in opened:
         ledger.close()
+
+
+# --- a monitor on a steady gait ---
+
+START_NS = 1_700_000_000_123_456_789
+
+
+def _gait(
+    duration_s: float,
+    rate_hz: float = 200.0,
+    rpm: float = 60.0,
+    noise_rad: float = 1.0e-3,
+    begin_s: float = 0.0,
+) -> Samples:
+    """Crank samples of a steady gait that began at `START_NS`, with encoder noise."""
+    n = np.arange(round(begin_s * rate_hz), round((begin_s + duration_s) * rate_hz))
+    random = np.random.default_rng(int(n[0]))
+    angle = 2.0 * np.pi * rpm / 60.0 * n / rate_hz + noise_rad * random.standard_normal(len(n))
+    return gait_samples(
+        START_NS + np.round(1.0e9 * n / rate_hz).astype(np.int64), crank_angle_rad=angle % (2.0 * np.pi)
+    )
+
+
+@pytest.fixture(scope="session")
+def gait() -> Callable[..., Samples]:
+    """Makes crank samples: `_gait`."""
+    return _gait
+
+
+@pytest.fixture(scope="session")
+def new_monitor(leg: Mechanism) -> Callable[..., WearMonitor]:
+    """Makes a monitor of the default leg as new, without a ledger; always the same one: tables take time."""
+    one = WearMonitor(leg)
+    new = one.snapshot()
+
+    def again(values: Mapping[str, Any] = MappingProxyType({})) -> WearMonitor:
+        one.restore(new)
+        one.configure(config_from(values))
+        return one
+
+    return again
+
+
+@pytest.fixture
+def monitor(new_monitor: Callable[..., WearMonitor]) -> WearMonitor:
+    """A monitor of the default leg as new."""
+    return new_monitor()

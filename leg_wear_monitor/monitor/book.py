@@ -1,0 +1,199 @@
+"""The books: counters over all runs of the monitor, what time is counted, and the entries of the ledger."""
+
+from collections.abc import Iterable, Mapping
+
+import attrs
+import numpy as np
+from numpy.typing import NDArray
+
+from leg_wear_monitor.errors import LegWearError
+from leg_wear_monitor.mechanism.arrays import Floats, Ints
+from leg_wear_monitor.mechanism.spec import Mechanism
+from leg_wear_monitor.monitor.alarms import Alarm, Level
+from leg_wear_monitor.monitor.binding import binding_of
+from leg_wear_monitor.monitor.config import MonitorConfig
+from leg_wear_monitor.monitor.fitting import fitted
+from leg_wear_monitor.monitor.ledger import Ledger
+from leg_wear_monitor.monitor.ledger_entry import AlarmEvent, ClearancePoint, Entry, Event, JointWear
+from leg_wear_monitor.monitor.reports import AlarmList, CycleReport
+from leg_wear_monitor.monitor.spans import NEIGHBOURS_NS, Spans, with_span
+from leg_wear_monitor.twin.digital_twin import DigitalTwin
+from leg_wear_monitor.twin.figures import SampleFigures
+
+POINT_S = 600.0  # of walking, between two points of the clearances' history
+
+_SUMS = ("moving_s", "standing_s", "bridged_s", "unmonitored_s")
+
+
+def open_ledger(mechanism: Mechanism, config: MonitorConfig) -> Ledger | None:
+    """The ledger that a configuration names, None if it names none.
+
+    Raises
+    ------
+    ConfigError
+        For parameters that do not fit the mechanism.
+    LedgerError
+        If it must not be continued.
+    """
+    if not config.ledger.path:
+        return None
+    binding = binding_of(fitted(mechanism, config), config)
+    return Ledger(config.ledger.path, binding, config.ledger.checkpoint_s)
+
+
+@attrs.frozen
+class PartLife:
+    """When a joint's part was new: gait cycles and time in motion of the leg then, and the stamp."""
+
+    cycles: int = 0
+    moving_s: float = 0.0
+    replaced_ns: int = 0
+
+
+@attrs.define
+class BookState:
+    """What changes; every value is immutable, so a shallow copy is a snapshot."""
+
+    cycles: int
+    parts: tuple[PartLife, ...]
+    spans: Spans = ()
+    point_due_s: float = 0.0
+    shown: Mapping[str, tuple[Level, bool]] = attrs.field(factory=dict)
+
+
+def _is_apart(step_ns: Ints) -> NDArray[np.bool_]:
+    return np.asarray((step_ns < 0) | (step_ns > NEIGHBOURS_NS))
+
+
+class Book:
+    """Counts for the ledger, and writes to it when it is time.
+
+    Parameters
+    ----------
+    twin : DigitalTwin
+        Its wear is set to that of the ledger.
+    ledger : Ledger or None
+    checkpoint_s : float
+        Time between two entries.
+    """
+
+    def __init__(self, twin: DigitalTwin, ledger: Ledger | None, checkpoint_s: float) -> None:
+        self.ledger = ledger
+        self._twin = twin
+        self._checkpoint_ns = int(checkpoint_s * 1.0e9)
+        self._tried_ns = 0
+        entry = ledger.entry if ledger else None
+        self._before = entry.totals if entry else {}
+        self._kept_s = self._before.get("moving_s", 0.0)
+        self.state = BookState(int(self._before.get("cycles", 0)), (PartLife(),) * len(twin.loose))
+        if entry:
+            self.state.shown = {a.name: (a.level, a.acknowledged) for a in entry.alarms}
+            self._take_over({joint.name: joint for joint in entry.joints})
+
+    def _take_over(self, joints: dict[str, JointWear]) -> None:
+        own = [joints[name] for name in self._twin.loose]
+        self._twin.set_depth(np.stack([joint.depth for joint in own]))
+        self.state.parts = tuple(
+            PartLife(
+                self.state.cycles - joint.cycles,
+                self._before["moving_s"] - joint.moving_s,
+                joint.replaced_ns,
+            )
+            for joint in own
+        )
+
+    @property
+    def totals(self) -> dict[str, float]:
+        """Counters over all runs."""
+        intake = self._twin.intake
+        sums = {name: self._before.get(name, 0.0) + getattr(intake, name) for name in _SUMS}
+        return {"cycles": float(self.state.cycles), **sums}
+
+    @property
+    def not_kept_s(self) -> float:
+        """Time in motion since the last entry, which a kill would lose."""
+        return self.totals["moving_s"] - self._kept_s
+
+    def joint_wear(self, k: int, depth: Floats) -> JointWear:
+        """Wear of joint k as it is now; depth (loose, 2, N) of the twin."""
+        part, totals = self.state.parts[k], self.totals
+        return JointWear(
+            self._twin.loose[k],
+            depth[k],
+            self.state.cycles - part.cycles,
+            totals["moving_s"] - part.moving_s,
+            part.replaced_ns,
+        )
+
+    def replace(self, joint: str, stamp_ns: int) -> JointWear:
+        """Fresh surfaces for a joint; its wear as it was."""
+        if joint not in self._twin.loose:
+            raise LegWearError(f"{joint}: no loose joint, expected one of {', '.join(self._twin.loose)}")
+        k = self._twin.loose.index(joint)
+        was = self.joint_wear(k, self._twin.depth)
+        self._twin.reset_wear(joint)
+        new = PartLife(self.state.cycles, self.totals["moving_s"], stamp_ns)
+        self.state.parts = (*self.state.parts[:k], new, *self.state.parts[k + 1 :])
+        return was
+
+    def followed(self, samples: SampleFigures) -> None:
+        """Take down the time in which the leg was followed."""
+        stamp = samples.stamp_ns[np.isfinite(samples.crank_angle_rad)]
+        if len(stamp):
+            for part in np.split(stamp, np.flatnonzero(_is_apart(np.diff(stamp))) + 1):
+                self.state.spans = with_span(self.state.spans, int(part[0]), int(part[-1]))
+
+    def note(self, event: Event) -> None:
+        """Take an event down for the ledger."""
+        if self.ledger:
+            self.ledger.note(event)
+
+    def note_alarms(self, change: AlarmList) -> None:
+        """Take down which alarms are shown otherwise than they were."""
+        shown = {alarm.name: (alarm.level, alarm.acknowledged) for alarm in change.alarms}
+        for alarm in change.alarms:
+            if shown[alarm.name] != self.state.shown.get(alarm.name, (Level.OK, False)):
+                self.note(AlarmEvent(change.stamp_ns, alarm))
+        self.state.shown = shown
+
+    def note_clearances(self, report: CycleReport) -> None:
+        """Take the clearances down, now and then."""
+        moving_s = self.totals["moving_s"]
+        if moving_s < self.state.point_due_s:
+            return
+        self.state.point_due_s = moving_s + POINT_S
+        for joint in report.joints:
+            self.note(
+                ClearancePoint(
+                    report.stamp_ns, report.cycle, joint.joint, joint.clearance_m, joint.clearance_max_m
+                )
+            )
+
+    def keep_if_due(self, alarms: Iterable[Alarm]) -> None:
+        """Write an entry if the last is old enough."""
+        if self.ledger is None:
+            return
+        now = self._twin.intake.followed_stamp_ns
+        if now and not 0 <= now - self._tried_ns < self._checkpoint_ns:
+            self.keep(alarms)
+
+    def keep(self, alarms: Iterable[Alarm], closed: bool = False) -> bool:
+        """Write an entry; False without a ledger, or if it could not be written."""
+        if self.ledger is None:
+            return False
+        entry = self._entry(alarms)
+        self._tried_ns = self._twin.intake.followed_stamp_ns
+        kept = self.ledger.keep(entry, closed)
+        if kept:
+            self._kept_s = entry.totals["moving_s"]
+        return kept
+
+    def _entry(self, alarms: Iterable[Alarm]) -> Entry:
+        depth = self._twin.depth
+        return Entry(
+            stamp_ns=self._twin.intake.followed_stamp_ns or (self.ledger.kept_ns if self.ledger else 0),
+            joints=tuple(self.joint_wear(k, depth) for k in range(len(self._twin.loose))),
+            totals=self.totals,
+            alarms=tuple(alarm for alarm in alarms if alarm.level is not Level.OK),
+            spans=self.state.spans,
+        )

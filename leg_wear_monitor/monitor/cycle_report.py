@@ -1,0 +1,76 @@
+"""A gait cycle's figures from the twin, as a report with growth and remaining life."""
+
+import math
+from collections.abc import Sequence
+
+from leg_wear_monitor.monitor.growth import GrowthWindow, growth_rate, remaining
+from leg_wear_monitor.monitor.reports import CycleReport, JointReport
+from leg_wear_monitor.twin.figures import CycleFigures, TorqueFigures
+
+
+def cycle_report(
+    figures: CycleFigures,
+    cycle: int,
+    loose: Sequence[str],
+    growth: Sequence[GrowthWindow],
+    limits_m: Sequence[float],
+) -> CycleReport:
+    """Report of a gait cycle.
+
+    Parameters
+    ----------
+    figures : CycleFigures
+    cycle : int
+        Its number over all runs.
+    loose : sequence of str
+        Names of the loose joints.
+    growth : sequence of GrowthWindow
+        Of each of them, this cycle included.
+    limits_m : sequence of float
+        Limit of each one's clearance.
+    """
+    torque = figures.torque
+    return CycleReport(
+        cycle=cycle,
+        begin_ns=figures.begin_ns,
+        stamp_ns=figures.stamp_ns,
+        cadence_rpm=60.0 * figures.direction / figures.moving_s,
+        moving_s=figures.moving_s,
+        bridged_s=figures.bridged_s,
+        joints=tuple(
+            _joint_report(figures, k, joint, growth[k], limits_m[k]) for k, joint in enumerate(loose)
+        ),
+        torque_samples=torque.samples,
+        measured_torque_rms_nm=torque.measured_rms_nm,
+        predicted_torque_rms_nm=torque.predicted_rms_nm,
+        residual_torque_rms_nm=torque.residual_rms_nm,
+        torque_mismatch=_mismatch(torque),
+        load_n=torque.load_n,
+        friction_nm=torque.friction_nm,
+    )
+
+
+def _mismatch(torque: TorqueFigures) -> float:
+    """What neither foot load nor friction explains, as a share of what was predicted; NaN if not known."""
+    left = torque.residual_rms_nm if math.isnan(torque.unexplained_rms_nm) else torque.unexplained_rms_nm
+    return left / torque.predicted_rms_nm if torque.predicted_rms_nm > 0.0 else math.nan
+
+
+def _joint_report(
+    figures: CycleFigures, k: int, joint: str, window: GrowthWindow, limit_m: float
+) -> JointReport:
+    rate = growth_rate(window)
+    clearance_m = float(figures.clearance_mean_m[k])
+    return JointReport(
+        joint=joint,
+        clearance_m=clearance_m,
+        clearance_max_m=float(figures.clearance_max_m[k]),
+        growth_m_per_cycle=rate.per_cycle_m if rate else None,
+        growth_mps=rate.per_second_m if rate else None,
+        growth_error_m_per_cycle=rate.error_m if rate else None,
+        remaining=remaining(rate, clearance_m, limit_m),
+        peak_force_n=float(figures.peak_force_n[k]),
+        p99_force_n=float(figures.p99_force_n[k]),
+        mean_force_n=float(figures.mean_force_n[k]),
+        impacts=int(figures.impacts[k]),
+    )

@@ -1,0 +1,110 @@
+"""What gait cycles and input are judged by, and when."""
+
+import math
+
+import attrs
+
+from leg_wear_monitor.monitor import alarm_board as names
+from leg_wear_monitor.monitor.alarm_board import AlarmBoard
+from leg_wear_monitor.monitor.beats import A_CYCLE
+from leg_wear_monitor.monitor.config import MonitorConfig
+from leg_wear_monitor.monitor.input_health import InputHealth, TorqueRange, input_health, with_torques
+from leg_wear_monitor.monitor.reports import AlarmList, CycleReport
+from leg_wear_monitor.twin.digital_twin import DigitalTwin
+from leg_wear_monitor.twin.figures import Intake, Tracking
+from leg_wear_monitor.twin.sample import Samples
+
+
+@attrs.define
+class JudgeState:
+    """What changes; every value is immutable, so a shallow copy is a snapshot.
+
+    Attributes
+    ----------
+    before : Intake
+        Counts when the input was last judged.
+    torque : TorqueRange
+        Torques since then.
+    beats, cycles : int
+        Beats and whole gait cycles since then.
+    health : InputHealth or None
+        As last judged.
+    """
+
+    before: Intake
+    torque: TorqueRange = TorqueRange()
+    beats: int = 0
+    cycles: int = 0
+    health: InputHealth | None = None
+
+
+class Judge:
+    """Judges a twin's gait cycles and its input.
+
+    Parameters
+    ----------
+    twin : DigitalTwin
+    config : MonitorConfig
+    cycle_ns : int
+        A gait cycle as commanded.
+    """
+
+    def __init__(self, twin: DigitalTwin, config: MonitorConfig, cycle_ns: int) -> None:
+        self._twin = twin
+        self._cycle_ns = cycle_ns
+        self.config = config
+        self.board = AlarmBoard(config, twin.loose)
+        self.state = JudgeState(twin.intake)
+
+    def configure(self, config: MonitorConfig) -> None:
+        """Judge by other limits from now on."""
+        self.config = config
+        self.board.configure(config)
+
+    def see(self, piece: Samples) -> None:
+        """Take down samples that came."""
+        saturation_nm = self.config.drive_torque.saturation_nm
+        self.state.torque = with_torques(self.state.torque, piece, saturation_nm)
+
+    def end_cycle(self, report: CycleReport) -> tuple[AlarmList, ...]:
+        """Judge a whole gait cycle; all alarms, if one has changed."""
+        self.state.cycles += 1
+        values = {
+            names.MISMATCH: report.torque_mismatch,
+            names.CADENCE: abs(report.cadence_rpm - self.config.cadence.commanded_rpm),
+        }
+        for joint in report.joints:
+            per_hour = math.nan if joint.growth_mps is None else 3600.0 * joint.growth_mps
+            values[f"{names.IMPACT} {joint.joint}"] = joint.peak_force_n
+            values[f"{names.CLEARANCE} {joint.joint}"] = joint.clearance_m
+            values[f"{names.GROWTH} {joint.joint}"] = per_hour
+        return self.board.judge(values, report.stamp_ns)
+
+    def end_beat(self) -> tuple[AlarmList, ...]:
+        """Judge impacts of the gait cycle that runs, and once in a cycle's time the input."""
+        peaks = {
+            f"{names.IMPACT} {joint}": float(peak)
+            for joint, peak in zip(self._twin.loose, self._twin.peak_force_n, strict=True)
+        }
+        early = self.board.judge_early(peaks, self._twin.intake.followed_stamp_ns)
+        self.state.beats += 1
+        if self.state.beats < A_CYCLE:
+            return early
+        return early + self._judge_input()
+
+    def _judge_input(self) -> tuple[AlarmList, ...]:
+        state, intake, config = self.state, self._twin.intake, self.config
+        health = input_health(state.before, intake, state.torque)
+        values = {
+            names.CRANK_RATE: health.crank_rate_hz,
+            names.TORQUE_RATE: health.torque_rate_hz,
+            names.BAD_SAMPLES: health.bad_share,
+            names.LOST_TIME: health.lost_share,
+            names.STUCK_TORQUE: health.stuck_torque_share,
+        }
+        if state.cycles == 0 and self._twin.tracking is Tracking.OUT_OF_STEP:
+            speed_rpm = self._twin.speed_radps * 30.0 / math.pi
+            values[names.CADENCE] = abs(speed_rpm - config.cadence.commanded_rpm)
+        self.state = JudgeState(intake, health=health)
+        cycles = 1 if math.isnan(health.duration_s) else round(1.0e9 * health.duration_s / self._cycle_ns)
+        return self.board.judge(values, intake.newest_stamp_ns, max(1, cycles))

@@ -1,0 +1,142 @@
+"""The monitor's own state, as /diagnostics shows it: stable names, numbers only as values."""
+
+import math
+from collections.abc import Sequence
+
+import attrs
+
+from leg_wear_monitor.monitor import alarm_board as names
+from leg_wear_monitor.monitor.alarms import Level
+from leg_wear_monitor.monitor.book import Book
+from leg_wear_monitor.monitor.judge import Judge
+from leg_wear_monitor.monitor.reports import CycleReport, JointReport, Status
+from leg_wear_monitor.twin.digital_twin import DigitalTwin
+from leg_wear_monitor.twin.figures import Event, Tracking
+
+ADVICE = "the monitor advises; no alarm is no proof of health"
+
+_INPUT = (names.CRANK_RATE, names.TORQUE_RATE, names.BAD_SAMPLES, names.LOST_TIME, names.STUCK_TORQUE)
+
+
+def statuses(
+    twin: DigitalTwin,
+    judge: Judge,
+    book: Book,
+    last: CycleReport | None,
+    happened: Sequence[Event],
+) -> tuple[Status, ...]:
+    """All of it: gait, input, torque, each joint, alarms, ledger."""
+    joints = [_joint(k, name, twin, judge, last) for k, name in enumerate(twin.loose)]
+    return (
+        _gait(twin, judge, book, last, happened),
+        _input(twin, judge),
+        _torque(judge, last),
+        *joints,
+        _alarms(judge),
+        _ledger(book),
+    )
+
+
+def _gait(
+    twin: DigitalTwin, judge: Judge, book: Book, last: CycleReport | None, happened: Sequence[Event]
+) -> Status:
+    tracking = twin.tracking
+    message = tracking.name.lower().replace("_", " ")
+    if happened and tracking in (Tracking.STARTING, Tracking.OUT_OF_STEP):
+        message += f", last {happened[-1].what.value.replace('_', ' ')}"
+    values = {
+        "cadence_rpm": twin.speed_radps * 30.0 / math.pi,
+        "commanded_rpm": judge.config.cadence.commanded_rpm,
+        "wear_acceleration": judge.config.wear_acceleration,
+        **book.totals,
+        "cycle_moving_s": last.moving_s if last else math.nan,
+    }
+    return Status("gait", judge.board.level(names.CADENCE), message, values)
+
+
+def _input(twin: DigitalTwin, judge: Judge) -> Status:
+    counts = attrs.asdict(twin.intake)
+    faulty = counts.pop("faulty")
+    for stamp in ("newest_stamp_ns", "followed_stamp_ns"):
+        counts.pop(stamp)
+    health = attrs.asdict(judge.state.health) if judge.state.health else {}
+    values = {**health, **counts, **{f"faulty_{name}": count for name, count in faulty.items()}}
+    level = judge.board.level(*_INPUT)
+    bad = [name for name in _INPUT if judge.board.alarms[name].level is not Level.OK]
+    message = f"look at: {', '.join(bad)}" if bad else "in order"
+    return Status("input", level, message, {name: float(value) for name, value in values.items()})
+
+
+def _torque(judge: Judge, last: CycleReport | None) -> Status:
+    level = judge.board.level(names.MISMATCH)
+    if last is None or not last.torque_samples:
+        return Status("torque", level, "not compared: no drive torque in the last gait cycle", {})
+    values = {
+        "measured_rms_nm": last.measured_torque_rms_nm,
+        "predicted_rms_nm": last.predicted_torque_rms_nm,
+        "residual_rms_nm": last.residual_torque_rms_nm,
+        "mismatch": last.torque_mismatch,
+        "load_n": last.load_n,
+        "friction_nm": last.friction_nm,
+        "samples": float(last.torque_samples),
+    }
+    message = "measured as predicted" if level is Level.OK else "measured is not what was predicted"
+    return Status("torque", level, message, values)
+
+
+def _joint(k: int, name: str, twin: DigitalTwin, judge: Judge, last: CycleReport | None) -> Status:
+    kinds = (names.IMPACT, names.CLEARANCE, names.GROWTH)
+    level = judge.board.level(*(f"{kind} {name}" for kind in kinds))
+    values = {
+        "clearance_m": float(twin.clearance_mean_m[k]),
+        "clearance_max_m": float(twin.clearance_max_m[k]),
+        "clearance_limit_m": judge.board.clearance_limits_m[k],
+    }
+    report = last.joints[k] if last else None
+    if report is None:
+        return Status(f"joint {name}", level, "no whole gait cycle yet", values)
+    values |= {
+        "growth_m_per_cycle": _or_nan(report.growth_m_per_cycle),
+        "growth_mps": _or_nan(report.growth_mps),
+        "remaining_cycles": report.remaining.cycles if report.remaining else math.nan,
+        "remaining_hours": report.remaining.hours if report.remaining else math.nan,
+        "peak_force_n": report.peak_force_n,
+        "p99_force_n": report.p99_force_n,
+        "mean_force_n": report.mean_force_n,
+        "impacts": float(report.impacts),
+    }
+    return Status(f"joint {name}", level, _growth_message(report), values)
+
+
+def _growth_message(report: JointReport) -> str:
+    if report.growth_m_per_cycle is None:
+        return "not enough data for a growth rate yet"
+    if report.remaining is None:
+        return "clearance does not grow"
+    return "at its limit" if report.remaining.cycles == 0.0 else "clearance grows"
+
+
+def _or_nan(value: float | None) -> float:
+    return math.nan if value is None else value
+
+
+def _alarms(judge: Judge) -> Status:
+    raised = [alarm for alarm in judge.board.alarms.values() if alarm.level is not Level.OK]
+    waiting = sum(not alarm.acknowledged for alarm in raised)
+    level = max((alarm.level for alarm in raised), default=Level.OK)
+    message = f"raised: {', '.join(alarm.name for alarm in raised)}" if raised else f"none; {ADVICE}"
+    return Status("alarms", level, message, {"raised": float(len(raised)), "unacknowledged": float(waiting)})
+
+
+def _ledger(book: Book) -> Status:
+    ledger = book.ledger
+    if ledger is None:
+        return Status("ledger", Level.OK, "none is kept, wear is lost at the end", {})
+    values = {"not_kept_s": book.not_kept_s}
+    if ledger.fault:
+        return Status("ledger", Level.ERROR, f"not written: {ledger.fault}; trying again", values)
+    if ledger.cut_off_s is not None:
+        values["cut_off_s"] = ledger.cut_off_s
+        message = "the run before was cut off, the wear of its last seconds is lost"
+        return Status("ledger", Level.WARN, message, values)
+    return Status("ledger", Level.OK, "kept", values)

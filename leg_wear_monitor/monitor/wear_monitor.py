@@ -1,0 +1,268 @@
+"""The monitor: samples in, reports out. The same below the live node and below replay."""
+
+import attrs
+import numpy as np
+
+from leg_wear_monitor.errors import LegWearError
+from leg_wear_monitor.mechanism.arrays import Ints
+from leg_wear_monitor.mechanism.spec import Mechanism
+from leg_wear_monitor.monitor.alarms import Alarm
+from leg_wear_monitor.monitor.beats import A_CYCLE, Beats
+from leg_wear_monitor.monitor.book import Book, BookState
+from leg_wear_monitor.monitor.config import MonitorConfig
+from leg_wear_monitor.monitor.cycle_report import cycle_report
+from leg_wear_monitor.monitor.fitting import fitted, twin_settings
+from leg_wear_monitor.monitor.growth import GrowthWindow, extended
+from leg_wear_monitor.monitor.judge import Judge, JudgeState
+from leg_wear_monitor.monitor.ledger import Ledger
+from leg_wear_monitor.monitor.ledger_entry import AlarmEvent, Audit
+from leg_wear_monitor.monitor.reports import (
+    AlarmList,
+    CycleReport,
+    Lost,
+    Reports,
+    SampleReports,
+    Status,
+    lost,
+)
+from leg_wear_monitor.monitor.spans import is_within
+from leg_wear_monitor.monitor.status import statuses
+from leg_wear_monitor.twin.digital_twin import DigitalTwin, TwinSnapshot
+from leg_wear_monitor.twin.figures import CycleFigures, Event, no_samples
+from leg_wear_monitor.twin.sample import GAIT_SAMPLE, Samples
+
+_KEPT_EVENTS = 1
+
+
+@attrs.define
+class MonitorState:
+    """What changes, beside twin, alarms and books; every value is immutable."""
+
+    growth: tuple[GrowthWindow, ...]
+    already_counted: int = 0
+    last: CycleReport | None = None
+    happened: tuple[Event, ...] = ()
+
+
+@attrs.frozen(eq=False)
+class MonitorSnapshot:
+    """All of a monitor but its ledger."""
+
+    twin: TwinSnapshot
+    state: MonitorState
+    book: BookState
+    judge: JudgeState
+    alarms: dict[str, Alarm]
+    beats: Ints
+
+
+class WearMonitor:
+    """Watches a leg's joints wear, by its crank's motion and its drive torque.
+
+    It advises: no alarm is no proof of health.
+
+    Parameters
+    ----------
+    mechanism : Mechanism
+        As its file has it; the configuration says what is loose.
+    config : MonitorConfig, optional
+    ledger : Ledger, optional
+        See `open_ledger`; its wear is continued. Without one, wear begins at 0 and ends with the monitor.
+
+    Attributes
+    ----------
+    mechanism : Mechanism
+        As the configuration wants it.
+    config : MonitorConfig
+    loose : tuple of str
+        The loose joints, in the order of all figures.
+
+    Raises
+    ------
+    ConfigError, AssemblyError
+        For a mechanism or parameters that cannot be.
+    """
+
+    def __init__(
+        self, mechanism: Mechanism, config: MonitorConfig | None = None, ledger: Ledger | None = None
+    ) -> None:
+        self.config = config or MonitorConfig()
+        self.mechanism = fitted(mechanism, self.config)
+        self.loose = self.mechanism.loose
+        self._twin = DigitalTwin(self.mechanism, twin_settings(self.config))
+        self._book = Book(self._twin, ledger, self.config.ledger.checkpoint_s)
+        cycle_ns = round(60.0e9 / abs(self.config.cadence.commanded_rpm))
+        self._judge = Judge(self._twin, self.config, cycle_ns)
+        if ledger and ledger.entry:
+            self._judge.board.restore(ledger.entry.alarms)
+        self._beats = Beats(cycle_ns // A_CYCLE)
+        self._state = MonitorState(tuple(GrowthWindow() for _ in self.loose))
+
+    def warm_up(self) -> None:
+        """Compile all that `update` needs, before the first sample; takes about a minute once."""
+        self._twin.warm_up()
+        Beats(1).pieces(np.zeros(1, GAIT_SAMPLE))
+
+    def update(self, samples: Samples) -> Reports:
+        """Take in a block of samples.
+
+        Parameters
+        ----------
+        samples : (n,) array of GAIT_SAMPLE
+            In order of arrival. However a stream is cut into blocks, the reports are the same, one after the
+            other.
+
+        Returns
+        -------
+        Reports
+            The leg follows some way behind the newest sample, by the tracker's lag: that is where they end.
+        """
+        looks: list[SampleReports] = []
+        cycles: list[CycleReport] = []
+        changes: list[AlarmList] = []
+        for piece, ends_beat in self._beats.pieces(self._not_counted(samples)):
+            seen, ended = self._take(piece, changes)
+            looks.append(seen)
+            cycles += ended
+            if ends_beat:
+                self._tell(self._judge.end_beat(), changes)
+            self._book.keep_if_due(self._judge.board.alarms.values())
+        return Reports(_joined(looks, len(self.loose)), tuple(cycles), tuple(changes), self.lost)
+
+    @property
+    def alarms(self) -> AlarmList:
+        """All alarms as they stand."""
+        return AlarmList(self._twin.intake.followed_stamp_ns, tuple(self._judge.board.alarms.values()))
+
+    @property
+    def lost(self) -> Lost:
+        """What was not integrated so far."""
+        return lost(self._twin.intake, self._state.already_counted)
+
+    def status(self) -> tuple[Status, ...]:
+        """What /diagnostics shows; names and their order stay the same."""
+        return statuses(self._twin, self._judge, self._book, self._state.last, self._state.happened)
+
+    def configure(self, config: MonitorConfig) -> None:
+        """Take over parameters that may change while it runs; see `parameters.changed`."""
+        self.config = config
+        self._judge.configure(config)
+
+    def acknowledge(self, stamp_ns: int) -> tuple[tuple[Alarm, ...], tuple[Alarm, ...]]:
+        """Acknowledge all alarms.
+
+        Returns
+        -------
+        cleared, kept : tuple of Alarm
+            Those that had returned to normal, and those that stay until they do.
+        """
+        cleared, kept = self._judge.board.acknowledge()
+        for alarm in (*cleared, *kept):
+            self._book.note(AlarmEvent(stamp_ns, alarm))
+        if cleared or kept:
+            self._keep()
+        return cleared, kept
+
+    def reset_wear(self, joint: str, stamp_ns: int, who: str) -> None:
+        """A part was replaced: fresh surfaces for a joint; its history stays in the ledger.
+
+        Raises
+        ------
+        LegWearError
+            For a joint that is not loose.
+        """
+        was = self._book.replace(joint, stamp_ns)
+        k = self.loose.index(joint)
+        growth = self._state.growth
+        self._state.growth = (*growth[:k], GrowthWindow(), *growth[k + 1 :])
+        self._book.note(Audit(stamp_ns, who, "reset_wear", was))
+        self._keep()
+
+    def save(self) -> None:
+        """Write an entry into the ledger now.
+
+        Raises
+        ------
+        LegWearError
+            If there is none, or it could not be written.
+        """
+        ledger = self._book.ledger
+        if ledger is None:
+            raise LegWearError("no ledger is kept; set ledger.path")
+        if not self._keep():
+            raise LegWearError(ledger.fault)
+
+    def close(self) -> None:
+        """End in order: write the last entry and let go of the ledger."""
+        self._keep(closed=True)
+        if self._book.ledger:
+            self._book.ledger.close()
+
+    def snapshot(self) -> MonitorSnapshot:
+        """A copy of the whole state but the ledger's."""
+        return MonitorSnapshot(
+            self._twin.snapshot(),
+            attrs.evolve(self._state),
+            attrs.evolve(self._book.state),
+            attrs.evolve(self._judge.state),
+            self._judge.board.alarms,
+            self._beats.state.copy(),
+        )
+
+    def restore(self, snapshot: MonitorSnapshot) -> None:
+        """Go back to a snapshot of a monitor of the same mechanism and parameters; it goes on bit for bit."""
+        self._twin.restore(snapshot.twin)
+        self._state = attrs.evolve(snapshot.state)
+        self._book.state = attrs.evolve(snapshot.book)
+        self._judge.state = attrs.evolve(snapshot.judge)
+        self._judge.board.alarms = snapshot.alarms
+        self._beats.state[:] = snapshot.beats
+
+    def _keep(self, closed: bool = False) -> bool:
+        return self._book.keep(self._judge.board.alarms.values(), closed)
+
+    def _not_counted(self, samples: Samples) -> Samples:
+        """Samples but those of a time whose wear is in the ledger already."""
+        ledger = self._book.ledger
+        if ledger is None or not len(ledger.counted_ns) or not self.config.ledger.skip_counted:
+            return samples
+        known = is_within(samples["stamp_ns"], ledger.counted_ns)
+        self._state.already_counted += int(np.count_nonzero(known))
+        return samples[~known]
+
+    def _take(self, piece: Samples, changes: list[AlarmList]) -> tuple[SampleReports, list[CycleReport]]:
+        """Follow a piece of a beat, and judge the gait cycles that it ends."""
+        update = self._twin.update(piece)
+        self._judge.see(piece)
+        self._book.followed(update.samples)
+        self._state.happened = (*self._state.happened, *update.events)[-_KEPT_EVENTS:]
+        cycles = [self._report(figures) for figures in update.cycles]
+        for report in cycles:
+            self._tell(self._judge.end_cycle(report), changes)
+        return update.samples, cycles
+
+    def _report(self, figures: CycleFigures) -> CycleReport:
+        """Report a gait cycle."""
+        state, book = self._state, self._book
+        book.state.cycles += 1
+        state.growth = tuple(
+            extended(window, float(growth), figures.moving_s, self.config.growth.window_cycles)
+            for window, growth in zip(state.growth, figures.growth_mean_m, strict=True)
+        )
+        limits = self._judge.board.clearance_limits_m
+        state.last = cycle_report(figures, book.state.cycles, self.loose, state.growth, limits)
+        book.note_clearances(state.last)
+        return state.last
+
+    def _tell(self, changed: tuple[AlarmList, ...], changes: list[AlarmList]) -> None:
+        for change in changed:
+            changes.append(change)
+            self._book.note_alarms(change)
+
+
+def _joined(parts: list[SampleReports], loose: int) -> SampleReports:
+    """Reports of one piece after the other."""
+    if len(parts) < 2:
+        return parts[0] if parts else no_samples(loose)
+    fields = [field.name for field in attrs.fields(SampleReports)]
+    return SampleReports(*(np.concatenate([getattr(part, name) for part in parts]) for name in fields))

@@ -1,0 +1,248 @@
+"""The monitor as a whole: the same reports however the stream is cut, alarms in time, statuses that stay."""
+
+import math
+
+import attrs
+import numpy as np
+import pytest
+from hypothesis import given, settings
+from hypothesis import strategies as st
+
+from leg_wear_monitor.errors import ConfigError, LegWearError
+from leg_wear_monitor.monitor.alarms import Level
+from leg_wear_monitor.monitor.config import MonitorConfig
+from leg_wear_monitor.monitor.fitting import twin_settings
+from leg_wear_monitor.monitor.parameters import changed, config_from
+from leg_wear_monitor.twin.sample import EMPTY, TORQUE, gait_samples
+from leg_wear_monitor.twin.settings import TwinSettings
+
+SECOND = 10**9
+
+
+def said(reports):
+    """All that reports say, comparable: a NaN has its repr."""
+    looks = [
+        np.concatenate([getattr(report.samples, field.name) for report in reports])
+        for field in attrs.fields(type(reports[0].samples))
+    ]
+    cycles = [cycle for report in reports for cycle in report.cycles]
+    alarms = [change for report in reports for change in report.alarms]
+    return [look.tobytes() for look in looks], repr(cycles), repr(alarms), repr(reports[-1].lost)
+
+
+def messy(gait):
+    """Four seconds with torque, repeats, late and faulty samples, a gap, a stray stamp and a step back."""
+    samples = gait(4.0)
+    torque = gait_samples(samples["stamp_ns"] + 1000, TORQUE, torque_nm=np.sin(samples["crank_angle_rad"]))
+    stream = np.stack([samples, torque], axis=1).ravel()
+    stream = np.concatenate([stream[:600], stream[590:600], stream[800:900], stream[1200:]])
+    stream["fault"][100:140:7] = EMPTY
+    stream[[200, 203]] = stream[[203, 200]]
+    stream["stamp_ns"][450] += 10**15
+    stream["stamp_ns"][700:] -= 5 * SECOND
+    stream["crank_angle_rad"][300:310] = np.nan
+    return stream
+
+
+@settings(max_examples=8)
+@given(cuts=st.lists(st.integers(0, 1200), max_size=12))
+def test_reports_do_not_depend_on_blocks(new_monitor, gait, cuts):
+    stream = messy(gait)
+    limits = {"limits.impact_force_n": 3000.0, "limits.min_rate_hz": 150.0}
+    whole = said([new_monitor(limits).update(stream)])
+    assert len(whole[2]) > 100  # alarms there were
+    monitor = new_monitor(limits)
+    blocks = np.split(stream, sorted(min(cut, len(stream)) for cut in cuts))
+    assert said([monitor.update(block) for block in blocks if len(block)]) == whole
+
+
+def test_a_restored_monitor_goes_on_bit_for_bit(monitor, gait):
+    stream = messy(gait)
+    monitor.update(stream[:500])
+    middle = monitor.snapshot()
+    first = said([monitor.update(stream[500:])])
+    monitor.restore(middle)
+    assert said([monitor.update(stream[500:])]) == first
+
+
+def test_a_gait_cycle_is_reported_as_the_twin_saw_it(monitor, gait):
+    reports = monitor.update(gait(14.5))
+    assert [cycle.cycle for cycle in reports.cycles] == list(range(1, 14))
+    last = reports.cycles[-1]
+    assert last.cadence_rpm == pytest.approx(60.0, abs=0.1)
+    assert [joint.joint for joint in last.joints] == list(monitor.loose) == ["A", "B", "G", "I", "J"]
+    for joint in last.joints:
+        assert joint.clearance_m > 3.0e-4
+        assert joint.growth_m_per_cycle > 0.0
+        assert joint.growth_mps == pytest.approx(joint.growth_m_per_cycle, rel=1e-3)
+        room = 6.0e-4 - joint.clearance_m
+        assert joint.remaining.cycles == pytest.approx(room / joint.growth_m_per_cycle)
+        assert joint.remaining.hours == pytest.approx(joint.remaining.cycles / 3600.0, rel=1e-3)
+    assert reports.cycles[3].joints[0].growth_m_per_cycle is None
+    assert math.isnan(last.torque_mismatch)
+
+
+def test_a_steady_gait_alarms_only_of_what_is_missing(monitor, gait):
+    reports = monitor.update(gait(10.0))
+    raised = {
+        alarm.name for change in reports.alarms for alarm in change.alarms if alarm.level is not Level.OK
+    }
+    assert raised == {"input_rate torque"}
+
+
+def with_torque(samples, torque_nm):
+    torque = gait_samples(samples["stamp_ns"] + 1000, TORQUE, torque_nm=torque_nm)
+    return np.stack([samples, torque], axis=1).ravel()
+
+
+def test_a_knock_raises_its_alarm_within_a_gait_cycle_and_not_before(monitor, gait):
+    before, after = gait(6.0), gait(3.0, begin_s=6.0)
+    monitor.configure(config_from({"limits.impact_force_n": 7000.0}))
+    # the crank jumps on by 0.3 rad within 40 ms: journals are thrown across their clearances
+    t = (after["stamp_ns"] - after["stamp_ns"][0]) * 1.0e-9
+    after["crank_angle_rad"] += 0.3 * np.clip(t / 0.04, 0.0, 1.0)
+    knock_ns = int(after["stamp_ns"][0])
+    stream = np.concatenate([before, after])
+    arrived = []
+    for block in np.split(stream, len(stream)):
+        reports = monitor.update(block)
+        for change in reports.alarms:
+            loud = [a for a in change.alarms if a.kind == "impact_force" and a.level is Level.ERROR]
+            arrived += [(int(block["stamp_ns"][0]), change.stamp_ns, alarm) for alarm in loud]
+    now_ns, stamp_ns, alarm = arrived[0]
+    assert alarm.value > 7000.0
+    assert knock_ns - SECOND // 10 <= stamp_ns <= knock_ns + SECOND
+    assert knock_ns <= now_ns <= knock_ns + SECOND
+
+
+def test_alarms_are_acknowledged(monitor, gait):
+    monitor.configure(
+        config_from({"limits.impact_force_n": 1000.0, "limits.joint_clearance_m": [2.9e-4] * 5})
+    )
+    reports = monitor.update(gait(6.0))
+    assert reports.alarms[-1].level is Level.ERROR
+    assert [a.level for a in monitor.alarms.alarms] == [a.level for a in reports.alarms[-1].alarms]
+    monitor.configure(config_from({"limits.joint_clearance_m": [2.9e-4] * 5}))
+    monitor.update(gait(3.0, begin_s=6.0))
+    cleared, kept = monitor.acknowledge(0)
+    assert {alarm.kind for alarm in cleared} == {"impact_force"}
+    assert {alarm.kind for alarm in kept} == {"clearance", "input_rate"}
+    assert all(alarm.acknowledged for alarm in kept)
+    assert {alarm.name for alarm in monitor.alarms.alarms if alarm.level is not Level.OK} == {
+        alarm.name for alarm in kept
+    }
+
+
+def test_a_reset_gives_fresh_surfaces_to_one_joint(monitor, gait):
+    monitor.update(gait(12.0))
+    before = {status.name: status.values for status in monitor.status()}
+    monitor.reset_wear("G", START, "ann")
+    after = {status.name: status.values for status in monitor.status()}
+    assert after["joint G"]["clearance_m"] == 3.0e-4 < before["joint G"]["clearance_m"]
+    assert after["joint A"]["clearance_m"] == before["joint A"]["clearance_m"]
+    (cycle,) = monitor.update(gait(1.0, begin_s=12.0)).cycles
+    growth = {joint.joint: joint.growth_m_per_cycle for joint in cycle.joints}
+    assert growth["G"] is None  # of the new part there is not enough data
+    assert growth["A"] is not None
+    with pytest.raises(LegWearError, match=r"C: no loose joint, expected one of A, B, G, I, J"):
+        monitor.reset_wear("C", START, "ann")
+
+
+START = 1_700_000_000_000_000_000
+
+
+def test_statuses_keep_their_names_and_hold_plain_numbers(monitor, gait):
+    names = [status.name for status in monitor.status()]
+    for block in (gait(1.0), gait(3.0, begin_s=5.0), gait_samples([0] * 300, fault=EMPTY)):
+        monitor.update(block)
+        now = monitor.status()
+        assert [status.name for status in now] == names
+        for status in now:
+            assert all(type(value) is float for value in status.values.values()), status
+            assert not any(letter.isdigit() for letter in status.name)
+    assert len(set(names)) == len(names)
+
+
+def test_without_a_ledger_saving_is_refused(monitor):
+    with pytest.raises(LegWearError, match=r"set ledger.path"):
+        monitor.save()
+
+
+def test_limits_change_while_it_runs(monitor, gait):
+    monitor.update(gait(3.0))
+    monitor.configure(changed(monitor.config, {"limits.clearance_m": 2.0e-4, "alarms.on_delay_cycles": 1}))
+    reports = monitor.update(gait(2.0, begin_s=3.0))
+    assert {
+        alarm.subject for alarm in reports.alarms[-1].alarms if alarm.kind == "clearance" and alarm.level
+    } == {*monitor.loose}
+
+
+@pytest.mark.parametrize(
+    ("values", "rpm", "raised"),
+    [
+        ({}, 45.0, True),
+        ({}, 63.0, False),
+        ({}, -60.0, True),
+        ({"cadence.tolerance_rpm": 20.0}, 45.0, False),
+        ({}, 5.0, True),  # no gait cycle is ever finished
+    ],
+)
+def test_another_cadence_than_commanded_is_said(monitor, gait, values, rpm, raised):
+    monitor.configure(config_from(values))
+    monitor.update(gait(12.0, rpm=rpm))
+    alarms = {alarm.name: alarm for alarm in monitor.alarms.alarms}
+    assert (alarms["cadence"].level is Level.ERROR) == raised
+
+
+def test_a_standing_leg_is_no_alarm(monitor, gait):
+    samples = gait(8.0, rpm=0.0)
+    monitor.update(with_torque(samples, 0.1 * np.sin(np.arange(len(samples)))))
+    assert monitor.alarms.level is Level.OK
+
+
+INPUTS = [
+    ("input_rate crank", lambda s: s[::16]),
+    ("input_rate torque", lambda s: s[::2]),
+    ("input_samples", lambda s: np.repeat(s, 2)),
+    ("input_gaps", lambda s: s[(s["stamp_ns"] - s["stamp_ns"][0]) % (2 * SECOND) < SECOND]),
+    ("input_torque", lambda s: changed_torque(s, np.zeros_like)),
+    ("input_torque", lambda s: changed_torque(s, lambda torque: np.clip(torque, -0.5, 0.5))),
+]
+
+
+def changed_torque(samples, change):
+    samples = samples.copy()
+    samples["torque_nm"] = change(samples["torque_nm"])
+    return samples
+
+
+@pytest.mark.parametrize(("name", "spoil"), INPUTS, ids=range(len(INPUTS)))
+def test_what_is_wrong_with_the_input_is_named(monitor, gait, name, spoil):
+    samples = gait(10.0)
+    good = with_torque(samples, np.sin(samples["crank_angle_rad"]))
+    monitor.configure(config_from({"limits.torque_mismatch": 100.0}))
+    new = monitor.snapshot()
+    monitor.update(good)
+    assert monitor.alarms.level is Level.OK
+    monitor.restore(new)
+    monitor.update(spoil(good))
+    assert name in {alarm.name for alarm in monitor.alarms.alarms if alarm.level is Level.ERROR}
+
+
+def test_a_known_saturation_is_seen(monitor, gait):
+    samples = gait(6.0)
+    stream = with_torque(samples, 5.0 + np.sin(np.arange(len(samples))))
+    monitor.configure(config_from({"drive_torque.saturation_nm": 4.5, "limits.torque_mismatch": 100.0}))
+    monitor.update(stream)
+    assert "input_torque" in {alarm.name for alarm in monitor.alarms.alarms if alarm.level is Level.ERROR}
+
+
+def test_the_trackers_defaults_are_the_twins_own():
+    ours, its = twin_settings(MonitorConfig()), TwinSettings()
+    tracker = attrs.evolve(its.tracker, speed_tolerance=ours.tracker.speed_tolerance)
+    assert ours == attrs.evolve(its, tracker=tracker)
+
+
+def test_a_reorder_window_longer_than_a_bridged_gap_is_refused():
+    with pytest.raises(ConfigError, match=r"reorder_window_s: 0.2 s is not below tracker.gap_limit_s, 0.1 s"):
+        twin_settings(config_from({"tracker.reorder_window_s": 0.2, "tracker.gap_limit_s": 0.1}))

@@ -35,7 +35,7 @@ clean:
 	rm -rf .venv .venv-oldest build dist *.egg-info .coverage .hypothesis .import_linter_cache .*_cache
 
 .venv/installed: setup.cfg setup.py package.xml constraints.txt
-	$(call install,python3.13 python3.12 python3.11 python3,constraints.txt,ros$(comma)bags$(comma)test$(comma)lint)
+	$(call install,python3.13 python3.12 python3.11 python3,constraints.txt,ros$(comma)bags$(comma)test$(comma)lint$(comma)dask)
 
 .venv-oldest/installed: setup.cfg setup.py package.xml constraints-oldest.txt
 	$(call install,python3.12 python3.11 python3,constraints-oldest.txt,bags$(comma)test)

@@ -6,17 +6,13 @@ policy forbids the rest. It prints, it fits a phone, and every picture has a tex
 
 import base64
 import re
-from collections.abc import Iterable, Iterator, Mapping
+from collections.abc import Iterator, Mapping, Sequence
 from typing import Any
 
 import attrs
 import jinja2
 
 _SPACES = re.compile(r"[^a-z0-9]+")
-
-
-def _rows(rows: Iterable[Iterable[str]]) -> tuple[tuple[str, ...], ...]:
-    return tuple(tuple(row) for row in rows)
 
 
 @attrs.frozen(kw_only=True)
@@ -52,7 +48,7 @@ class Picture:
 class Gallery:
     """Pictures of one kind side by side, as many in a row as there is room for; one caption for all."""
 
-    pictures: tuple[Picture, ...] = attrs.field(converter=tuple)
+    pictures: Sequence[Picture]
     caption: str = ""
     kind: str = attrs.field(default="gallery", init=False)
 
@@ -64,16 +60,16 @@ class Table:
     Attributes
     ----------
     caption : str
-    head : tuple of str
+    head : sequence of str
         One text a column, with the unit.
-    rows : tuple of tuples of str
+    rows : sequence of sequences of str
     note : str
         Below it; none if empty.
     """
 
     caption: str
-    head: tuple[str, ...] = attrs.field(converter=tuple)
-    rows: tuple[tuple[str, ...], ...] = attrs.field(converter=_rows)
+    head: Sequence[str]
+    rows: Sequence[Sequence[str]]
     note: str = ""
     kind: str = attrs.field(default="table", init=False)
 
@@ -94,7 +90,7 @@ class Text:
 class Findings:
     """What to conclude, or another list of sentences."""
 
-    sentences: tuple[str, ...] = attrs.field(converter=tuple)
+    sentences: Sequence[str]
     kind: str = attrs.field(default="findings", init=False)
 
 
@@ -133,7 +129,7 @@ class Section:
     """A part of a page under a title of its own."""
 
     title: str
-    parts: tuple[Part, ...] = attrs.field(converter=tuple)
+    parts: Sequence[Part]
 
     @property
     def anchor(self) -> str:
@@ -149,7 +145,7 @@ class Page:
     ----------
     title, summary : str
         What it is, and what was asked, in a sentence or two.
-    sections : tuple of Section
+    sections : sequence of Section
     configuration : str
         The settings that it was made with, as text; none if empty.
     versions : mapping of str to str
@@ -158,7 +154,7 @@ class Page:
 
     title: str
     summary: str
-    sections: tuple[Section, ...] = attrs.field(converter=tuple)
+    sections: Sequence[Section]
     configuration: str = ""
     versions: Mapping[str, str] = attrs.field(factory=dict)
 

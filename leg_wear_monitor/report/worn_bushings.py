@@ -35,11 +35,11 @@ def worn_bushings(
     """
     figure = new_figure(max(2, len(names)) * _COLUMN_IN, 4.9)
     grid = figure.add_gridspec(3, len(names), height_ratios=(3.0, 2.0, 0.3))
-    scale, unit = _unit(float(surfaces.depth.max()))
+    scale, unit = unit_of(float(surfaces.depth.max()))
     for k, name in enumerate(names):
         depth, zone = surfaces.depth[k], wear_zone(surfaces.depth[k, BUSHING])
         section = figure.add_subplot(grid[0, k], projection="polar")
-        factor = _draw_section(section, depth, zone, radius_m[k])
+        factor = draw_section(section, depth, zone, radius_m[k])
         section.set_title(
             f"{name}\n" + (f"depth × {factor}" if factor else "no wear"), fontsize=USUAL, color=INK
         )
@@ -63,12 +63,12 @@ def _draw_key(axes: Axes) -> None:
     axes.legend(list(entries.values()), list(entries), ncols=3, fontsize=SMALL, frameon=False, loc="center")
 
 
-def _unit(greatest: float) -> tuple[float, str]:
+def unit_of(greatest: float) -> tuple[float, str]:
     """Factor and name of the unit in which a depth [m] is below a thousand."""
     return next(((scale, unit) for scale, unit in _UNITS if scale * greatest < 1000.0), _UNITS[-1])
 
 
-def _draw_section(axes: Axes, depth: Floats, zone: tuple[float, float] | None, radius: float) -> str:
+def draw_section(axes: Axes, depth: Floats, zone: tuple[float, float] | None, radius: float) -> str:
     """Bushing and journal with their wear, and by what factor its depth is drawn too large."""
     n, greatest = depth.shape[1], float(depth.max())
     angle = (np.arange(n + 1) + 0.5) * (2.0 * math.pi / n)

@@ -15,7 +15,8 @@ HEAVY = {"numba", "numpy", "matplotlib", "rich", "cattrs", "ruamel.yaml"}
 
 @pytest.mark.plain
 @pytest.mark.parametrize(
-    "arguments", [["--help"], ["--version"], ["simulate", "--help"], ["check", "--help"]]
+    "arguments",
+    [["--help"], ["--version"], ["simulate", "--help"], ["study", "--help"], ["report", "--help"]],
 )
 def test_help_loads_nothing_heavy(arguments):
     code = (

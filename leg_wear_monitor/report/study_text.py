@@ -1,0 +1,160 @@
+"""Numbers of a study as texts, and its tables."""
+
+import math
+from collections.abc import Sequence
+from typing import NamedTuple
+
+from leg_wear_monitor.report.page import Table
+from leg_wear_monitor.studies.point import Arrays
+from leg_wear_monitor.studies.summary import (
+    Spread,
+    depth_per_cycle,
+    joint_force,
+    largest_error,
+    loose_of,
+    of_loose,
+    peak_force,
+    share_of_range,
+    worst_zone,
+)
+
+Labelled = Sequence[tuple[str, Arrays]]
+
+
+class Quantity(NamedTuple):
+    """A largest error: its name in the data and for people, unit, and factor from SI."""
+
+    name: str
+    title: str
+    unit: str
+    factor: float
+
+
+QUANTITIES = (
+    Quantity("toe_position_m", "toe displacement", "mm", 1.0e3),
+    Quantity("toe_velocity_mps", "toe velocity", "m/s", 1.0),
+    Quantity("toe_acceleration_mps2", "toe acceleration", "m/s²", 1.0),
+    Quantity("drive_torque_nm", "drive torque", "N m", 1.0),
+)
+PICO = 1.0e12
+
+
+def number(value: float) -> str:
+    """Three significant digits, without exponent as far as that is readable."""
+    if not math.isfinite(value):
+        return "–"
+    if value == 0.0:
+        return "0"
+    if not 1.0e-3 <= abs(value) < 1.0e6:
+        return f"{value:.2e}"
+    return f"{value:.{max(0, 2 - math.floor(math.log10(abs(value))))}f}"
+
+
+def with_spread(value: Spread, factor: float = 1.0) -> str:
+    """Mean and standard deviation, both to the digit that the deviation has two of."""
+    mean, deviation = factor * value.mean, factor * value.deviation
+    if not deviation > 0.0:
+        return number(mean)
+    digits = max(0, min(6, 1 - math.floor(math.log10(deviation))))
+    return f"{mean:.{digits}f} ± {deviation:.{digits}f}"
+
+
+def percent(share: float) -> str:
+    """A share for people."""
+    return f"{number(100.0 * share)} %"
+
+
+def zone_text(zone: tuple[float, float] | None) -> str:
+    """A zone of angles and its width."""
+    if zone is None:
+        return "–"
+    return f"{zone[0] % 360.0:.0f}° to {zone[1] % 360.0:.0f}° ({zone[1] - zone[0]:.0f}° wide)"
+
+
+def joined(names: Sequence[str]) -> str:
+    """Names in a sentence."""
+    return names[0] if len(names) == 1 else f"{', '.join(names[:-1])} and {names[-1]}"
+
+
+def error_table(labelled: Labelled, head: str) -> Table:
+    """Largest errors of the toe and the drive in a cycle, a row a point."""
+    known = [quantity for quantity in QUANTITIES if _has(labelled, quantity)]
+    rows = [
+        [label]
+        + [with_spread(largest_error(arrays, each.name), each.factor) for each in known]
+        + [percent(share_of_range(arrays, each.name)) for each in known]
+        for label, arrays in labelled
+    ]
+    return Table(
+        caption="Largest error against the ideal leg in one cycle",
+        head=[
+            head,
+            *(f"{each.title} [{each.unit}]" for each in known),
+            *(f"{each.title}, of its range" for each in known),
+        ],
+        rows=rows,
+        note="Mean and standard deviation over the cycles of all runs. The range is that of the ideal curve, "
+        "the larger one of x and y.",
+    )
+
+
+def _has(labelled: Labelled, quantity: Quantity) -> bool:
+    return all(f"ideal_{quantity.name}" in arrays for _, arrays in labelled)
+
+
+def joint_table(labelled: Labelled, head: str) -> Table:
+    """Forces, impacts and contact of every loose joint of every point."""
+    rows = [
+        [
+            f"{label}: {joint}" if len(loose_of(arrays)) > 1 else label,
+            with_spread(peak_force(arrays, joint)),
+            with_spread(joint_force(arrays, "p99_force_n", joint)),
+            with_spread(joint_force(arrays, "mean_force_n", joint)),
+            with_spread(of_loose(arrays, "impacts", joint)),
+            with_spread(of_loose(arrays, "impact_speed_mps", joint), 1.0e3),
+            with_spread(of_loose(arrays, "contact_fraction", joint), 100.0),
+        ]
+        for label, arrays in labelled
+        for joint in loose_of(arrays)
+    ]
+    return Table(
+        caption="Contact forces and impacts of the loose joints",
+        head=[
+            f"{head}, joint",
+            "largest force in a cycle [N]",
+            "99 % of the time below [N]",
+            "mean force [N]",
+            "impacts a cycle",
+            "mean approach [mm/s]",
+            "in contact [%]",
+        ],
+        rows=rows,
+        note="Largest forces and impacts: mean and standard deviation over the cycles of all runs; "
+        "the others: over runs. A single largest force is a sample of a heavy tail; compare the 99 %.",
+    )
+
+
+def wear_table(labelled: Labelled, head: str) -> Table:
+    """Wear of every loose joint of every point."""
+    rows = [
+        [
+            f"{label}: {joint}" if len(loose_of(arrays)) > 1 else label,
+            with_spread(depth_per_cycle(arrays, joint), PICO),
+            with_spread(of_loose(arrays, "archard_integral_j_per_cycle", joint)),
+            zone_text(worst_zone(arrays, joint)),
+        ]
+        for label, arrays in labelled
+        for joint in loose_of(arrays)
+    ]
+    return Table(
+        caption="Wear of the bushings",
+        head=[
+            f"{head}, joint",
+            "greatest depth [pm a cycle]",
+            "∫ F |v| dt [J a cycle]",
+            "zone with 90 % of the wear",
+        ],
+        rows=rows,
+        note="1 pm a cycle is 1 µm in a million cycles. Mean and standard deviation over runs; "
+        "angles in the frame of the body that carries the bushing. Depths scale with the wear coefficient.",
+    )

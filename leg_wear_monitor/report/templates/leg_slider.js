@@ -1,0 +1,154 @@
+"use strict";
+(function () {
+  const root = document.getElementById("leg-slider");
+  if (!root) return;
+  const data = JSON.parse(root.querySelector(".data").textContent);
+  const INK = "#222222", VERMILION = "#d55e00", BLUE = "#0072b2", PALE = "#d9d9d9";
+  const BUSHING = 46, GAP = 0.3 * BUSHING;  // as drawn
+  const svg = root.querySelector(".leg"), pins = root.querySelector(".pins");
+  const slider = root.querySelector("input"), angle = root.querySelector(".angle");
+  const play = root.querySelector(".play"), choice = root.querySelector(".run");
+  const unit = data.box[3] / 100;  // a hundredth of the picture's height
+
+  function add(parent, name, attributes, text) {
+    const element = document.createElementNS("http://www.w3.org/2000/svg", name);
+    for (const key in attributes) element.setAttribute(key, attributes[key]);
+    if (text !== undefined) element.textContent = text;
+    parent.appendChild(element);
+    return element;
+  }
+  function line(points, closed) {
+    return "M" + points.map((p) => p[0] + " " + p[1]).join("L") + (closed ? "Z" : "");
+  }
+
+  if (data.toe.length) {
+    add(svg, "path", { d: line(data.toe, true), fill: "none", stroke: INK, "stroke-width": 0.5 * unit, "stroke-dasharray": 1.5 * unit });
+  }
+  const bodies = data.bodies.map((body) => {
+    const group = add(svg, "g", {});
+    const path = line(body.outline, body.outline.length > 2), joins = { "stroke-linejoin": "round", "stroke-linecap": "round" };
+    add(group, "path", { d: path, fill: body.colour, stroke: body.colour, "stroke-width": 3 * unit, ...joins });
+    add(group, "path", { d: path, fill: "#ffffff", stroke: "#ffffff", "stroke-width": 2.2 * unit, opacity: 0.62, ...joins });
+    return { poses: body.poses, group: group };
+  });
+  const joints = {};
+  data.joints.forEach((joint, i) => {
+    const twin = data.joints.slice(0, i).some((o) => Math.hypot(o.path[0][0] - joint.path[0][0], o.path[0][1] - joint.path[0][1]) < 1);
+    const group = add(svg, "g", {});
+    const mark = add(group, "circle", { r: 1.1 * unit, fill: "#ffffff", stroke: INK, "stroke-width": 0.4 * unit });
+    const letter = add(group, "text", {
+      "text-anchor": "middle", "font-size": 4 * unit, "font-weight": 700, fill: INK,
+      stroke: "#ffffff", "stroke-width": 0.9 * unit, "paint-order": "stroke", "font-family": "sans-serif"
+    }, joint.name);
+    joints[joint.name] = { path: joint.path, group: group, mark: mark, letter: letter, twin: twin };
+  });
+  // A letter stands on the side of its joint that is away from the joints near it.
+  function placeLetter(joint, index) {
+    const here = joint.path[index];
+    let dx = 0.001, dy = -0.3;
+    for (const name in joints) {
+      const there = joints[name].path[index], x = here[0] - there[0], y = here[1] - there[1], far = Math.hypot(x, y);
+      if (far > 1 && far < 25 * unit) {
+        dx += (x / far) * (1 - far / (25 * unit));
+        dy += (y / far) * (1 - far / (25 * unit));
+      }
+    }
+    const size = Math.hypot(dx, dy);
+    joint.letter.setAttribute("x", (3.6 * dx / size + (joint.twin ? 3 : 0)) * unit);
+    joint.letter.setAttribute("y", (3.6 * dy / size + 1.4) * unit);
+  }
+  const arrows = add(svg, "g", {});
+
+  let run, parts, frame = 0, playing = false, last = 0;
+
+  function arrow(group, x, y, fx, fy, length, width) {
+    while (group.firstChild) group.removeChild(group.firstChild);
+    const size = Math.hypot(fx, fy);
+    if (size < 0.05) return;
+    const ux = fx / size, uy = fy / size, ex = x + ux * length, ey = y + uy * length, head = 3.2 * width;
+    add(group, "line", { x1: x, y1: y, x2: ex, y2: ey, stroke: VERMILION, "stroke-width": width });
+    add(group, "path", {
+      d: line([[ex + ux * head, ey + uy * head], [ex - uy * head * 0.6, ey + ux * head * 0.6], [ex + uy * head * 0.6, ey - ux * head * 0.6]], true),
+      fill: VERMILION
+    });
+  }
+
+  function choose(index) {
+    run = data.runs[index];
+    while (pins.firstChild) pins.removeChild(pins.firstChild);
+    while (arrows.firstChild) arrows.removeChild(arrows.firstChild);
+    for (const name in joints) {
+      const loose = name in run.pins;
+      joints[name].mark.setAttribute("stroke", loose ? VERMILION : INK);
+      joints[name].mark.setAttribute("stroke-width", (loose ? 0.8 : 0.4) * unit);
+      joints[name].letter.setAttribute("fill", loose ? VERMILION : INK);
+    }
+    parts = Object.keys(run.pins).map((name) => {
+      const pin = run.pins[name], box = document.createElement("div");
+      pins.appendChild(box);
+      const picture = add(box, "svg", { viewBox: "-70 -70 140 140", role: "img", "aria-label": "Pin " + name + " in its bushing" });
+      add(picture, "path", { d: "M-66-66H66V66H-66Z M" + BUSHING + " 0A" + BUSHING + " " + BUSHING + " 0 1 0 " + -BUSHING + " 0A" + BUSHING + " " + BUSHING + " 0 1 0 " + BUSHING + " 0Z", fill: PALE, "fill-rule": "evenodd" });
+      add(picture, "circle", { r: BUSHING, fill: "none", stroke: INK, "stroke-width": 1.2 });
+      add(picture, "circle", { r: GAP, fill: "none", stroke: INK, "stroke-width": 0.6, "stroke-dasharray": "2 2" });
+      const disc = add(picture, "circle", { r: BUSHING - GAP, fill: "#56b4e9", "fill-opacity": 0.45, stroke: BLUE, "stroke-width": 1.2 });
+      add(picture, "path", { d: line(pin.e.map((e) => [GAP * e[0], GAP * e[1]]), true), fill: "none", stroke: BLUE, "stroke-width": 0.5, opacity: 0.6 });
+      const centre = add(picture, "circle", { r: 2, fill: INK });
+      const push = add(picture, "g", {});
+      add(picture, "text", { x: -62, y: -50, "font-size": 16, "font-weight": 700, fill: VERMILION, "font-family": "sans-serif" }, name);
+      const text = document.createElement("p");
+      box.appendChild(text);
+      return { name: name, pin: pin, disc: disc, centre: centre, push: push, text: text, force: add(arrows, "g", {}) };
+    });
+    show(frame);
+  }
+
+  function show(index) {
+    frame = index;
+    slider.value = index;
+    const degrees = Math.round(360 * index / data.frames);
+    angle.textContent = degrees + "°";
+    slider.setAttribute("aria-valuetext", degrees + " degrees");
+    bodies.forEach((body) => {
+      const pose = body.poses[index];
+      body.group.setAttribute("transform", "translate(" + pose[0] + " " + pose[1] + ") rotate(" + pose[2] + ")");
+    });
+    for (const name in joints) {
+      const place = joints[name].path[index];
+      joints[name].group.setAttribute("transform", "translate(" + place[0] + " " + place[1] + ")");
+      placeLetter(joints[name], index);
+    }
+    parts.forEach((part) => {
+      const e = part.pin.e[index], f = part.pin.f[index], size = Math.hypot(f[0], f[1]), share = Math.sqrt(size / data.longest_n);
+      for (const circle of [part.disc, part.centre]) {
+        circle.setAttribute("cx", GAP * e[0]);
+        circle.setAttribute("cy", GAP * e[1]);
+      }
+      const place = joints[part.name].path[index];
+      arrow(part.force, place[0], place[1], f[0], f[1], share * data.arrow_mm, 0.9 * unit);
+      arrow(part.push, GAP * e[0], GAP * e[1], f[0], f[1], share * 34, 2);
+      part.text.textContent = part.name + ": " + (size < 0.05 ? "free" : size.toFixed(0) + " N");
+    });
+    root.dataset.frame = index;
+  }
+
+  function tick(now) {
+    if (!playing) return;
+    const step = Math.floor((now - last) / 1000 * data.frames / 12);  // a cycle in twelve seconds
+    if (step > 0) {
+      last = now;
+      show((frame + step) % data.frames);
+    }
+    requestAnimationFrame(tick);
+  }
+
+  slider.addEventListener("input", () => show(Number(slider.value)));
+  if (choice) choice.addEventListener("change", () => choose(Number(choice.value)));
+  play.addEventListener("click", () => {
+    playing = !playing;
+    play.textContent = playing ? "Pause" : "Play";
+    play.setAttribute("aria-pressed", String(playing));
+    last = performance.now();
+    if (playing) requestAnimationFrame(tick);
+  });
+  choose(0);
+})();

@@ -1,0 +1,266 @@
+"""A study's description as types: every key of config/studies/*.yaml, its unit, bounds and meaning."""
+
+from collections.abc import Callable
+from itertools import pairwise
+from pathlib import Path
+from typing import Any
+
+import attrs
+
+from leg_wear_monitor.errors import ConfigError
+from leg_wear_monitor.mechanism.clearance import FRICTION_LAWS, NORMAL_LAWS
+from leg_wear_monitor.mechanism.loader import read_yaml
+from leg_wear_monitor.mechanism.quantity import FieldError, described, quantity
+from leg_wear_monitor.mechanism.strict import structure
+from leg_wear_monitor.share import share_directory
+
+Names = tuple[str, ...]
+MOST = 1_000_000
+
+
+def _rising(values: tuple[float, ...]) -> str | None:
+    if values and all(a < b for a, b in pairwise(values)):
+        return None
+    return f"{list(values)} does not rise from value to value"
+
+
+def _joints(names: Names) -> str | None:
+    if names and len(set(names)) == len(names):
+        return None
+    return f"{list(names)} is not a list of at least one joint, each once"
+
+
+def _sets(sets: tuple[Names, ...]) -> str | None:
+    if not sets:
+        return "is empty, expected at least one list of joints"
+    return next((fault for fault in map(_joints, sets) if fault), None)
+
+
+def _some_of(known: Names) -> Callable[[Names], str | None]:
+    def check(names: Names) -> str | None:
+        strange = [name for name in names if name not in known]
+        return f"{strange[0]!r} is not one of {', '.join(known)}" if strange else _joints(names)
+
+    return check
+
+
+def _count(doc: str, least: int, default: int) -> Any:
+    return quantity("", doc, at_least=least, at_most=MOST, default=default)
+
+
+def _clearance() -> Any:
+    return quantity("m", "radial clearance of the loose joints", above=0.0, at_most=0.1, default=3.0e-4)
+
+
+def _clearances() -> Any:
+    return quantity("m", "radial clearances of the loose joints", above=0.0, at_most=0.1, check=_rising)
+
+
+def _speed() -> Any:
+    return quantity("rpm", "speed of the crank", above=0.0, at_most=10_000.0, default=60.0)
+
+
+def _speeds() -> Any:
+    return quantity("rpm", "speeds of the crank", above=0.0, at_most=10_000.0, check=_rising)
+
+
+def _loose() -> Any:
+    return described("joints that are loose", check=_joints)
+
+
+@attrs.frozen(kw_only=True)
+class Ensemble:
+    """The runs behind each number: motion with clearance is chaotic, so one run says little."""
+
+    runs: int = _count("runs that differ in where they start", 2, 12)
+    cycles: int = _count("gait cycles counted in each run", 2, 20)
+    skip_cycles: int = _count("gait cycles before them", 0, 3)
+    traced_cycles: int = _count("counted cycles of each run whose curves are kept", 1, 5)
+    perturb_share: float = quantity(
+        "",
+        "journals start up to this share of the clearance from the centre",
+        at_least=0.0,
+        at_most=1.0,
+        default=0.3,
+    )
+    seed: int = _count("of where the runs start", 0, 1)
+
+    def __attrs_post_init__(self) -> None:
+        if self.traced_cycles > self.cycles:
+            raise FieldError(
+                "traced_cycles", f"{self.traced_cycles} is more than the {self.cycles} cycles counted"
+            )
+
+
+@attrs.frozen(kw_only=True)
+class Study:
+    """What every study's description has."""
+
+    mechanism: str = described("a mechanism that comes with the package, or a file", default="bionic_leg")
+    ensemble: Ensemble = described("the runs behind each number", factory=Ensemble)
+
+
+@attrs.frozen(kw_only=True)
+class Size(Study):
+    """Clearance size at chosen joints."""
+
+    joints: Names = _loose()
+    clearances_m: tuple[float, ...] = _clearances()
+    speed_rpm: float = _speed()
+
+
+@attrs.frozen(kw_only=True)
+class Speed(Study):
+    """Crank speed with clearance at chosen joints."""
+
+    joints: Names = _loose()
+    speeds_rpm: tuple[float, ...] = _speeds()
+    clearance_m: float = _clearance()
+
+
+@attrs.frozen(kw_only=True)
+class Location(Study):
+    """Clearance in one place or another."""
+
+    sets: tuple[Names, ...] = described("joints that are loose together, a list of lists", check=_sets)
+    clearance_m: float = _clearance()
+    speed_rpm: float = _speed()
+
+
+@attrs.frozen(kw_only=True)
+class Multi(Location):
+    """Clearance in all those places at once, against each place alone."""
+
+
+@attrs.frozen(kw_only=True)
+class Life:
+    """How far wear is followed: by jumps between which some cycles are simulated."""
+
+    opens_m: float = quantity(
+        "m",
+        "opening of the mean clearance of the joint that wears fastest",
+        above=0.0,
+        default=1.0e-4,
+    )
+    jumps: int = _count("jumps until then, of equal opening", 1, 12)
+    cycles: int = _count("gait cycles simulated before each jump", 1, 12)
+    runs: int = _count("lives that differ in where they start", 2, 4)
+
+
+@attrs.frozen(kw_only=True)
+class Wear(Location):
+    """Where bushings and journals wear, fresh and after wear has fed back over a life."""
+
+    life: Life = described("how far wear is followed", factory=Life)
+
+
+@attrs.frozen(kw_only=True)
+class Exponent:
+    """How the largest Lyapunov exponent is measured."""
+
+    runs: int = _count("pairs of neighbours that differ in where they start", 2, 4)
+    cycles: int = _count("gait cycles over which neighbours are followed", 10, 100)
+    renewals: int = _count("times in a cycle that the neighbour is brought back", 1, 64)
+    distance: float = quantity(
+        "", "distance it is brought back to, in clearances", above=0.0, at_most=1.0e-3, default=1.0e-8
+    )
+    tolerance_m: float = quantity(
+        "m",
+        "local error allowed in a step: errors of the usual size add to the growth",
+        above=0.0,
+        default=1.0e-10,
+    )
+
+
+@attrs.frozen(kw_only=True)
+class Bifurcation:
+    """Poincaré sections over a parameter."""
+
+    clearances_m: tuple[float, ...] = _clearances()
+    speeds_rpm: tuple[float, ...] = _speeds()
+    cycles: int = _count("gait cycles drawn at each value", 1, 60)
+    skip_cycles: int = _count("gait cycles before them", 0, 20)
+
+
+@attrs.frozen(kw_only=True)
+class Chaos(Study):
+    """How far the motion can be foretold."""
+
+    joints: Names = _loose()
+    others: tuple[Names, ...] = described("other sets whose exponents are compared", default=())
+    clearance_m: float = _clearance()
+    speed_rpm: float = _speed()
+    section_cycles: int = _count("points of a Poincaré map, one a cycle", 2, 1000)
+    section_crank_angle_deg: float = quantity(
+        "deg", "crank angle of the map", at_least=0.0, at_most=360.0, default=0.0
+    )
+    exponent: Exponent = described("how the Lyapunov exponent is measured", factory=Exponent)
+    bifurcation: Bifurcation = described("parameters of the diagrams")
+
+
+@attrs.frozen(kw_only=True)
+class Laws(Study):
+    """The normal force and friction laws against each other."""
+
+    joints: Names = _loose()
+    clearance_m: float = _clearance()
+    speed_rpm: float = _speed()
+    normal_laws: Names = described(
+        "laws of the normal force", default=NORMAL_LAWS, check=_some_of(NORMAL_LAWS)
+    )
+    friction_laws: Names = described(
+        "ramps of friction, each with the mechanism's own normal law",
+        default=FRICTION_LAWS,
+        check=_some_of(FRICTION_LAWS),
+    )
+    friction_coefficients: tuple[float, ...] = quantity(
+        "",
+        "friction coefficients, each with the mechanism's own laws",
+        at_least=0.0,
+        at_most=2.0,
+        default=(0.02, 0.05, 0.1),
+    )
+
+
+STUDIES: dict[str, type[Study]] = {
+    "size": Size,
+    "speed": Speed,
+    "location": Location,
+    "wear": Wear,
+    "multi": Multi,
+    "chaos": Chaos,
+    "laws": Laws,
+}
+
+
+def shipped_study(name: str) -> Path:
+    """Description of a study that comes with the package."""
+    return share_directory() / "config" / "studies" / f"{name}.yaml"
+
+
+def load_settings(name: str, path: str | Path | None = None) -> Study:
+    """Read the description of a study.
+
+    Parameters
+    ----------
+    name : str
+        A key of `STUDIES`.
+    path : str or pathlib.Path, optional
+        The one that comes with the package if not given.
+
+    Raises
+    ------
+    ConfigError
+        Naming file, key, value, unit and what was expected.
+    """
+    if name not in STUDIES:
+        raise ConfigError("study", "", f"{name!r} is not one of {', '.join(STUDIES)}")
+    place = shipped_study(name) if path is None else Path(path)
+    source = place.name if path is None else str(path)
+    return parse_settings(name, read_yaml(place, source), source)
+
+
+def parse_settings(name: str, document: Any, source: str) -> Study:
+    """Types from the plain mapping that a study's file holds; see `load_settings`."""
+    settings: Study = structure(document, STUDIES[name], source, "")
+    return settings

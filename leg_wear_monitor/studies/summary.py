@@ -1,0 +1,91 @@
+"""What an ensemble says in numbers: means with their spread, and how sets of joints compare."""
+
+import math
+from typing import NamedTuple
+
+import numpy as np
+from numpy.typing import ArrayLike
+
+from leg_wear_monitor.mechanism.arrays import Floats
+from leg_wear_monitor.studies.point import Arrays
+from leg_wear_monitor.wear.surfaces import BUSHING, wear_zone
+
+RANGES = {  # largest errors, and the ideal curve whose range they are held against
+    "toe_position_m": "ideal_toe_position_m",
+    "toe_velocity_mps": "ideal_toe_velocity_mps",
+    "toe_acceleration_mps2": "ideal_toe_acceleration_mps2",
+    "drive_torque_nm": "ideal_drive_torque_nm",
+}
+
+
+class Spread(NamedTuple):
+    """Mean and standard deviation of an ensemble, and its 10th and 90th percentile."""
+
+    mean: float
+    deviation: float
+    low: float
+    high: float
+
+
+def spread(values: ArrayLike) -> Spread:
+    """Spread over all values."""
+    array = np.asarray(values, dtype=float)
+    low, high = np.quantile(array, (0.1, 0.9))
+    return Spread(float(array.mean()), float(array.std()), float(low), float(high))
+
+
+def largest_error(arrays: Arrays, name: str) -> Spread:
+    """Largest error in a cycle, over the cycles of all runs; a name of `RANGES`."""
+    return spread(arrays[f"error_{name}"])
+
+
+def share_of_range(arrays: Arrays, name: str) -> float:
+    """Mean largest error in a cycle over the range of the ideal curve, the larger one of x and y."""
+    ideal = arrays[RANGES[name]]
+    return largest_error(arrays, name).mean / float(np.ptp(ideal, axis=0).max())
+
+
+def loose_of(arrays: Arrays) -> list[str]:
+    """Names of the loose joints."""
+    return [str(name) for name in arrays["loose"]]
+
+
+def peak_force(arrays: Arrays, joint: str) -> Spread:
+    """Largest force of a joint in a cycle, over the cycles of all runs."""
+    return spread(arrays["peak_force_n"][..., [str(name) for name in arrays["joints"]].index(joint)])
+
+
+def joint_force(arrays: Arrays, name: str, joint: str) -> Spread:
+    """``mean_force_n``, ``rms_force_n`` or ``p99_force_n`` of a joint, over runs."""
+    return spread(arrays[name][:, [str(other) for other in arrays["joints"]].index(joint)])
+
+
+def of_loose(arrays: Arrays, name: str, joint: str) -> Spread:
+    """An array whose last axis are the loose joints, for one of them, over the rest."""
+    return spread(arrays[name][..., loose_of(arrays).index(joint)])
+
+
+def depth_per_cycle(arrays: Arrays, joint: str) -> Spread:
+    """Greatest depth that a cycle wears off the bushing [m], over runs."""
+    return spread(arrays["wear_depth_m_per_cycle"][:, loose_of(arrays).index(joint), BUSHING].max(axis=1))
+
+
+def mean_profile(arrays: Arrays, joint: str, surface: int = BUSHING) -> Floats:
+    """Mean wear of a cycle (N,) [m] of a joint's bushing or journal."""
+    return np.asarray(
+        arrays["wear_depth_m_per_cycle"][:, loose_of(arrays).index(joint), surface].mean(axis=0)
+    )
+
+
+def worst_zone(arrays: Arrays, joint: str) -> tuple[float, float] | None:
+    """Narrowest zone [deg] with 90 % of the bushing's mean wear; None without wear."""
+    return wear_zone(mean_profile(arrays, joint))
+
+
+def power_law(values: ArrayLike, errors: ArrayLike) -> tuple[float, float]:
+    """Exponent p of errors ~ values^p by least squares of the logarithms, and its standard error."""
+    x, y = np.log(np.asarray(values, dtype=float)), np.log(np.asarray(errors, dtype=float))
+    if len(x) < 4:
+        return float(np.polyfit(x, y, 1)[0]), math.nan
+    slope, covariance = np.polyfit(x, y, 1, cov=True)
+    return float(slope[0]), float(np.sqrt(covariance[0, 0]))

@@ -1,0 +1,91 @@
+"""The verbs study and report: data and a page from one command, and the page again from the data."""
+
+import json
+
+import pytest
+
+from leg_wear_monitor.report.page import page_html
+from leg_wear_monitor.studies.store import load_results
+
+TINY = """\
+joints: [G]
+clearances_m: [0.0001, 0.0003]
+ensemble: {runs: 2, cycles: 2, skip_cycles: 1, traced_cycles: 1}
+"""
+
+
+@pytest.fixture
+def done(run, tmp_path):
+    (tmp_path / "tiny.yaml").write_text(TINY)
+    return run("study", "size", "--config", "tiny.yaml", "--out", "out", "--workers", "1")
+
+
+def test_a_study_leaves_data_and_a_page_and_goes_on_where_it_was(run, done, tmp_path, complaints):
+    assert (done.exit_code, complaints(done)) == (0, [])
+    assert done.stdout == "points: 2, 2 computed now\nwritten: out/report.html\n"
+    assert sorted(path.name for path in (tmp_path / "out").iterdir()) == [
+        "mechanism.yaml", "points", "report.html", "study.json",
+    ]  # fmt: skip
+    again = run("study", "size", "--config", "tiny.yaml", "--out", "out")
+    assert again.stdout == "points: 2, 0 computed now\nwritten: out/report.html\n"
+
+
+def test_the_page_is_drawn_again_from_the_data_alone(run, done, tmp_path):
+    page = tmp_path / "out" / "report.html"
+    first = page.read_bytes()
+    page.unlink()
+    result = run("report", "out")
+    assert (result.exit_code, result.stdout) == (0, "written: out/report.html\n")
+    assert page.read_bytes() == first
+
+
+def test_another_leg_is_an_option(run, tmp_path):
+    (tmp_path / "tiny.yaml").write_text(TINY.replace("0.0001, ", ""))
+    result = run("study", "size", "--config", "tiny.yaml", "--mechanism", "jansen_leg", "--out", "out")
+    assert result.exit_code == 0
+    assert json.loads((tmp_path / "out" / "study.json").read_text())["settings"]["mechanism"] == "jansen_leg"
+
+
+def test_points_that_are_missing_are_told_and_the_rest_is_shown(run, done, tmp_path):
+    first = json.loads((tmp_path / "out" / "study.json").read_text())["points"][0]["key"]
+    (tmp_path / "out" / "points" / f"{first}.npz").unlink()
+    result = run("report", "out")
+    assert result.exit_code == 1
+    assert result.stderr == "warning: point 0.1 mm: is not computed yet\n"
+    assert "Not computed yet: 0.1 mm." in (tmp_path / "out" / "report.html").read_text()
+
+
+@pytest.mark.plain
+@pytest.mark.parametrize(
+    ("line", "fault"),
+    [
+        (["study", "sizes", "--out", "o"], "'sizes' is not one of 'size', 'speed'"),
+        (["study", "size"], "Missing option '--out'"),
+        (["study", "size", "--config", "no.yaml", "--out", "o"], "no.yaml: cannot be read: No such file"),
+        (["study", "size", "--mechanism", "frog", "--out", "o"], "frog: no mechanism of this name"),
+        (["report", "nowhere"], "nowhere: holds no study.json, expected the --out of a study"),
+    ],
+)
+def test_what_cannot_be_is_one_line(run, line, fault):
+    result = run(*line)
+    assert result.exit_code == 2
+    assert result.stdout == ""
+    assert fault in result.stderr
+    assert len(result.stderr.splitlines()) == 1
+
+
+def test_a_scheduler_that_does_not_answer_is_told(run, tmp_path):
+    pytest.importorskip("distributed", reason="the extra 'dask' is not installed")
+    (tmp_path / "tiny.yaml").write_text(TINY)
+    line = ("study", "size", "--config", "tiny.yaml", "--out", "o", "--scheduler", "frog://nowhere")
+    result = run(*line)
+    assert result.exit_code == 2
+    assert result.stderr.splitlines()[-1] == "error: --scheduler: frog://nowhere: no scheduler answers there"
+
+
+def test_the_page_holds_what_was_computed(done, tmp_path):
+    from leg_wear_monitor.report.study_page import study_page
+
+    results = load_results(tmp_path / "out")
+    page = study_page(results)
+    assert page_html(page).encode() == (tmp_path / "out" / "report.html").read_bytes()

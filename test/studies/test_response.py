@@ -1,0 +1,122 @@
+"""What an ensemble's numbers are held against: the ideal leg, full coordinates, and laws of their own."""
+
+import numpy as np
+import pytest
+
+from leg_wear_monitor import load_mechanism
+from leg_wear_monitor.dynamics.full_run import FullRun
+from leg_wear_monitor.dynamics.simulation import prepare
+from leg_wear_monitor.dynamics.tally import new_tally
+from leg_wear_monitor.mechanism.ideal import TURN
+from leg_wear_monitor.studies.ensemble import ensemble, start_angles, watch
+from leg_wear_monitor.studies.response import ERRORS, respond
+from leg_wear_monitor.studies.summary import RANGES, share_of_range
+from leg_wear_monitor.studies.watch import SAMPLES
+from leg_wear_monitor.wear.surfaces import BUSHING
+
+PLACE = {"loose": ["G"], "clearance_m": 3.0e-4, "speed_rpm": 60.0, "perturb_share": 0.3, "seed": 1}
+SHORT = {"runs": 3, "cycles": 3, "skip_cycles": 1, "traced_cycles": 2}
+
+
+@pytest.fixture(scope="module")
+def response():
+    return respond(load_mechanism(), PLACE | SHORT)
+
+
+def test_without_clearance_the_curves_are_the_ideal_ones():
+    """Every error falls with the clearance, down to a ten-thousandth of a millimetre and the step's error."""
+    errors, forces = [], []
+    for clearance in (1.0e-5, 1.0e-6, 1.0e-7):
+        arrays = respond(load_mechanism(), PLACE | SHORT | {"clearance_m": clearance})
+        errors.append([share_of_range(arrays, name) for name in RANGES])
+        force = np.linalg.norm(arrays["example_contact_force_n"][:, 0], axis=1)
+        ideal = arrays["ideal_joint_force_n"][:, 6]
+        forces.append(np.sqrt(np.mean((force - ideal) ** 2) / np.mean(ideal**2)))
+        assert arrays["mean_force_n"][:, 6].mean() == pytest.approx(ideal.mean(), rel=0.03)
+    assert np.all(np.diff(errors, axis=0) < 0.0)
+    assert np.all(np.diff(forces) < 0.0)
+    position, velocity, acceleration, torque = errors[-1]
+    assert position < 1.0e-6
+    assert velocity < 1.0e-4
+    assert acceleration < 0.2
+    assert max(torque, forces[-1]) < 0.04
+
+
+def test_curves_stay_within_the_largest_errors(response):
+    for name in ERRORS[:3]:
+        example = np.linalg.norm(response[f"example_{name}"], axis=-1).max()
+        assert example <= response[f"error_{name}"][0, 0] * (1.0 + 1.0e-9)
+    torque = np.abs(response["example_drive_torque_nm"] - response["ideal_drive_torque_nm"]).max()
+    assert 0.3 * response["error_drive_torque_nm"][0, 0] < torque
+    assert torque <= response["error_drive_torque_nm"][0, 0] * (1.0 + 1.0e-3)
+
+
+def test_toe_moves_as_its_deviations_say(response):
+    """Velocity is the derivative of the displacement, up to what an impact changes between two samples."""
+    step = 1.0 / SAMPLES
+    apart, rate = response["example_toe_position_m"], response["example_toe_velocity_mps"]
+    slope = (apart[2:] - apart[:-2]) / (2.0 * step)
+    assert np.quantile(np.abs(slope - rate[1:-1]), 0.8) < 0.05 * np.abs(rate).max()
+
+
+def test_a_contact_force_pushes_the_pin_towards_the_middle(response):
+    force, e = response["example_contact_force_n"][:, 0], response["example_eccentricity_m"][:, 0]
+    touching = np.linalg.norm(force, axis=1) > 1.0
+    inwards = -(force * e).sum(axis=1)[touching]
+    assert touching.any()
+    assert (inwards > 0.0).all()
+    assert np.linalg.norm(e[touching], axis=1).min() > 2.9e-4
+    assert np.linalg.norm(e[~touching], axis=1).max() < 3.1e-4
+
+
+def test_bands_hold_the_middle_of_the_cycles(response):
+    for name in ("toe_position_m", "drive_torque_nm", "contact_force_n"):
+        low, middle, high = response[f"band_{name}"]
+        assert (low <= middle).all()
+        assert (middle <= high).all()
+        assert (low < high).any()
+    assert ((response["repeats_contact_force"] > 0.0) & (response["repeats_contact_force"] < 1.0)).all()
+
+
+def test_wear_is_what_the_archard_integral_wears_off(response):
+    """Depth x radius x width x sector over both faces of one law (physics.md section 5)."""
+    clearance = load_mechanism().clearances["G"]
+    depth = response["wear_depth_m_per_cycle"][:, 0, BUSHING]
+    volume = depth.sum(axis=1) * clearance.bushing_radius * clearance.width * TURN / depth.shape[1]
+    expected = clearance.wear_coefficient[0] * response["archard_integral_j_per_cycle"][:, 0]
+    assert volume == pytest.approx(expected, rel=0.01)
+
+
+def test_errors_are_those_of_the_full_coordinates():
+    """One set, both models, many cycles: means of the largest errors in a cycle within their scatter."""
+    runs = {"runs": 4, "cycles": 8, "skip_cycles": 2, "traced_cycles": 1}
+    ours = respond(load_mechanism(), PLACE | runs)
+    setup = prepare(load_mechanism(), clearances=["G"], clearance_m=3.0e-4, speed_rpm=60.0)
+    full, tally, errors, peaks = FullRun(setup, 0), new_tally(10), [], []
+    for cycle in range(10):
+        full.advance(cycle + 1.0, tally)
+        errors.append(tally.response.copy())
+        peaks.append(tally.peak[6])
+        tally.response[:], tally.peak[:] = 0.0, 0.0
+    errors, peaks = np.array(errors[2:]), np.array(peaks[2:])
+    for i, name in enumerate(ERRORS):
+        mine = ours[f"error_{name}"]
+        scatter = np.hypot(mine.std() / np.sqrt(mine.size), errors[:, i].std() / np.sqrt(len(errors)))
+        assert abs(mine.mean() - errors[:, i].mean()) < 4.0 * scatter + 0.02 * errors[:, i].mean(), name
+    mine = ours["peak_force_n"][..., 6]
+    scatter = np.hypot(mine.std() / np.sqrt(mine.size), peaks.std() / np.sqrt(len(peaks)))
+    assert abs(mine.mean() - peaks.mean()) < 4.0 * scatter + 0.02 * peaks.mean()
+
+
+def test_runs_start_on_the_grid_one_in_each_part_of_a_turn():
+    angles = np.array(start_angles(8, 3)) / TURN
+    assert np.allclose(angles * SAMPLES, np.round(angles * SAMPLES))
+    assert list(np.floor(angles * 8)) == list(range(8))
+
+
+def test_friction_and_laws_reach_the_joints():
+    settings = PLACE | {"runs": 2, "friction": {"coefficient": 0.0}, "normal_law": "hertz"}
+    (leg, other) = watch(ensemble(load_mechanism(), settings))
+    assert leg.setup.contacts.friction[0, 0] == 0.0
+    assert leg.setup.contacts.hysteresis[0] == 0.0
+    assert leg.stepper.state.drive[0] != other.stepper.state.drive[0]

@@ -1,0 +1,193 @@
+"""A study's points are computed once, kept whole, and the same however and wherever they are computed."""
+
+import json
+import os
+import signal
+import subprocess
+import sys
+import time
+
+import attrs
+import numpy as np
+import pytest
+
+from leg_wear_monitor.errors import ConfigError, LegWearError
+from leg_wear_monitor.studies import processes, tasks
+from leg_wear_monitor.studies.run import run_study
+from leg_wear_monitor.studies.store import StudyDirectory, load_results
+
+
+def files(directory):
+    """Contents of all results of a study, by name."""
+    return {path.name: path.read_bytes() for path in sorted((directory / "points").iterdir())}
+
+
+@pytest.fixture
+def sweep(tiny):
+    """Four points that take a moment."""
+    return tiny("size", joints=["G"], clearances_m=[1.0e-4, 2.0e-4, 3.0e-4, 4.0e-4])
+
+
+@pytest.fixture(scope="module")
+def uninterrupted(tiny, tmp_path_factory):
+    out = tmp_path_factory.mktemp("uninterrupted")
+    settings = tiny("size", joints=["G"], clearances_m=[1.0e-4, 2.0e-4, 3.0e-4, 4.0e-4])
+    assert run_study("size", settings, out) == 4
+    return out
+
+
+def test_finished_points_are_kept_and_others_computed(sweep, uninterrupted, tmp_path, monkeypatch):
+    computed = []
+    compute = tasks.compute
+
+    def counted(task, mechanism, settings, code):
+        computed.append(settings["clearance_m"])
+        if len(computed) == 3:
+            raise KeyboardInterrupt
+        return compute(task, mechanism, settings, code)
+
+    monkeypatch.setattr(processes, "compute", counted)
+    with pytest.raises(KeyboardInterrupt):
+        run_study("size", sweep, tmp_path)
+    assert load_results(tmp_path).missing == ["0.3 mm", "0.4 mm"]
+    assert run_study("size", sweep, tmp_path) == 2
+    assert computed == [1.0e-4, 2.0e-4, 3.0e-4, 3.0e-4, 4.0e-4]
+    assert run_study("size", sweep, tmp_path) == 0
+    assert files(tmp_path) == files(uninterrupted)
+
+
+def test_processes_give_the_same_results_to_the_bit(sweep, uninterrupted, tmp_path):
+    shares = []
+    assert run_study("size", sweep, tmp_path, workers=2, progress=shares.append) == 4
+    assert files(tmp_path) == files(uninterrupted)
+    assert shares == sorted(shares)
+    assert (shares[0], shares[-1]) == (0.0, pytest.approx(1.0))
+
+
+def test_another_leg_or_setting_is_another_point(sweep, uninterrupted, tmp_path):
+    run_study("size", attrs.evolve(sweep, clearances_m=(1.0e-4,)), tmp_path)
+    assert run_study("size", attrs.evolve(sweep, clearances_m=(1.0e-4, 5.0e-4)), tmp_path) == 1
+    assert (
+        run_study("size", attrs.evolve(sweep, clearances_m=(1.0e-4,), mechanism="jansen_leg"), tmp_path) == 1
+    )
+    assert len(files(tmp_path)) == 3  # none is lost, the page shows those that were asked for last
+    assert [point.label for point in load_results(tmp_path).points] == ["0.1 mm"]
+
+
+def test_a_result_says_what_it_came_from(uninterrupted):
+    entry = json.loads((uninterrupted / "study.json").read_text())["points"][0]
+    with np.load(uninterrupted / "points" / f"{entry['key']}.npz") as file:
+        about = json.loads(str(file["about"]))
+    assert about["settings"] == entry["settings"]
+    assert about["settings"]["seed"] == 1
+    assert {"leg_wear_monitor", "code", "numpy", "numba"} <= set(about["versions"])
+    results = load_results(uninterrupted)
+    assert (results.missing, results.faults) == ([], [])
+    assert results.mechanism.name == "bionic_leg"
+    assert [point.label for point, _ in results.of("response")] == ["0.1 mm", "0.2 mm", "0.3 mm", "0.4 mm"]
+
+
+@pytest.mark.plain
+def test_a_directory_of_another_study_or_a_damaged_one_is_told(tiny, tmp_path):
+    StudyDirectory(tmp_path).open({"study": "speed"}, "")
+    with pytest.raises(ConfigError, match="holds the study speed, expected size"):
+        run_study("size", tiny("size", joints=["G"], clearances_m=[1.0e-4]), tmp_path)
+    (tmp_path / "points" / "k.npz").write_bytes(b"PK")
+    with pytest.raises(ConfigError, match=r"k\.npz: cannot be read"):
+        StudyDirectory(tmp_path).read("k")
+    (tmp_path / "study.json").write_text("{}")
+    with pytest.raises(ConfigError, match="is no study of format"):
+        load_results(tmp_path)
+    (tmp_path / "study.json").write_text("{")
+    with pytest.raises(ConfigError, match="is not JSON"):
+        load_results(tmp_path)
+    with pytest.raises(ConfigError, match="cannot be read: No such file"):
+        load_results(tmp_path / "nowhere")
+
+
+@pytest.mark.plain
+def test_a_motion_that_diverges_is_a_result_with_its_fault(tiny, tmp_path, monkeypatch):
+    from leg_wear_monitor.errors import SimulationError
+    from leg_wear_monitor.studies import response
+
+    def diverge(mechanism, settings):
+        raise SimulationError("joint G at t = 1 s: pushed through")
+
+    monkeypatch.setattr(response, "respond", diverge)
+    settings = tiny("size", joints=["G"], clearances_m=[1.0e-4])
+    assert run_study("size", settings, tmp_path) == 1
+    assert load_results(tmp_path).faults == [("0.1 mm", "joint G at t = 1 s: pushed through")]
+    assert run_study("size", settings, tmp_path) == 0
+
+
+@pytest.mark.plain
+def test_a_worker_with_other_code_is_refused():
+    with pytest.raises(RuntimeError, match="another version"):
+        tasks.compute("response", None, {}, "other code")
+
+
+def test_a_point_that_is_asked_for_twice_is_computed_once(tiny, tmp_path):
+    """A single place is also all places at once."""
+    assert run_study("multi", tiny("multi", sets=[["G"]]), tmp_path) == 1
+    assert [point.label for point, _ in load_results(tmp_path).of("response")] == ["G", "G"]
+
+
+def test_a_worker_that_dies_costs_only_time(sweep, uninterrupted, tmp_path, monkeypatch):
+    """The pool is broken once, as by a lack of memory; what was done by then stays done."""
+    began = []
+    whole = processes.run_in_processes
+
+    class Breaking(processes.ProcessPoolExecutor):
+        def submit(self, *arguments):
+            future = super().submit(*arguments)
+            if not began:
+                began.append(True)
+                while not self._processes:
+                    time.sleep(0.01)
+                os.kill(next(iter(self._processes)), signal.SIGKILL)
+            return future
+
+    monkeypatch.setattr(processes, "ProcessPoolExecutor", Breaking)
+    assert whole is processes.run_in_processes
+    assert run_study("size", sweep, tmp_path, workers=2) == 4
+    assert files(tmp_path) == files(uninterrupted)
+
+
+@pytest.mark.plain
+def test_workers_that_keep_dying_end_the_study(monkeypatch):
+    class Broken:
+        def __init__(self, *_, **__):
+            pass
+
+        def submit(self, *_):
+            raise processes.BrokenProcessPool
+
+        def shutdown(self, **_):
+            pass
+
+    monkeypatch.setattr(processes, "ProcessPoolExecutor", Broken)
+    job = processes.Job("k", "response", None, {}, "", 1.0)
+    with pytest.raises(LegWearError, match="worker processes died 3 times; finished points are kept"):
+        processes.run_in_processes([job], 2, lambda *_: None)
+
+
+def test_killed_at_some_moment_and_started_again_gives_the_uninterrupted_results(
+    sweep, uninterrupted, tmp_path
+):
+    """The whole program is killed, which can clean up nothing."""
+    (tmp_path / "size.yaml").write_text(
+        "joints: [G]\nclearances_m: [0.0001, 0.0002, 0.0003, 0.0004]\n"
+        "ensemble: {runs: 2, cycles: 2, skip_cycles: 1, traced_cycles: 1}\n"
+    )
+    out = tmp_path / "out"
+    line = [sys.executable, "-m", "leg_wear_monitor", "study", "size", "--out", str(out)]
+    line += ["--config", str(tmp_path / "size.yaml"), "--workers", "2"]
+    program = subprocess.Popen(line, stdout=subprocess.DEVNULL, stderr=subprocess.DEVNULL)
+    while program.poll() is None and not (out.is_dir() and list(out.glob("points/*.npz"))):
+        time.sleep(0.01)
+    program.kill()
+    program.wait()
+    assert 1 <= len(list(out.glob("points/*.npz"))) <= 4
+    run_study("size", sweep, out)
+    whole = {name: content for name, content in files(out).items() if name.endswith(".npz")}
+    assert whole == files(uninterrupted)

@@ -1,0 +1,77 @@
+"""Poincaré sections: one point a cycle, at the crank angle that was asked for; periods are found."""
+
+import numpy as np
+import pytest
+from hypothesis import given
+from hypothesis import strategies as st
+
+from leg_wear_monitor import load_mechanism
+from leg_wear_monitor.studies.section import intersect, period_of
+from leg_wear_monitor.studies.watch import SAMPLES
+
+SETTINGS = {
+    "loose": ["G"], "clearance_m": 3.0e-4, "perturb_share": 0.3, "seed": 1, "skip_cycles": 4,
+    "runs": 1, "cycles": 6, "portrait_cycles": 1, "crank_angle_deg": 90.0,
+}  # fmt: skip
+
+
+def test_a_motion_that_repeats_itself_has_one_point():
+    """At 20 rpm the knee stays in contact, so that each cycle is like the last."""
+    arrays = intersect(load_mechanism(), SETTINGS | {"speed_rpm": 20.0})
+    section = np.concatenate([arrays["section_eccentricity_m"] / 3.0e-4], axis=1)
+    assert section.shape == (6, 1, 2)
+    assert period_of(section[:, 0], 3, 1.0e-3) == 1
+    portrait = arrays["portrait_eccentricity_m"][:, 0] / 3.0e-4
+    assert portrait.shape == (SAMPLES, 2)
+    # the portrait begins at the section's angle
+    assert portrait[0] == pytest.approx(section[0, 0], abs=1.0e-3)
+    assert np.ptp(portrait, axis=0).max() > 0.1
+
+
+def test_a_section_at_another_angle_is_another_one():
+    one = intersect(load_mechanism(), SETTINGS | {"speed_rpm": 20.0})["section_eccentricity_m"]
+    place = SETTINGS | {"speed_rpm": 20.0, "crank_angle_deg": 0.0}
+    other = intersect(load_mechanism(), place)["section_eccentricity_m"]
+    assert np.abs(one[-1] - other[-1]).max() > 1.0e-6
+
+
+def test_a_bouncing_joint_has_no_period():
+    arrays = intersect(load_mechanism(), SETTINGS | {"loose": ["A", "B"], "speed_rpm": 60.0, "cycles": 12})
+    for k in range(2):
+        assert period_of(arrays["section_rate_mps"][:, k], 4, 1.0e-6) is None
+
+
+@pytest.mark.plain
+@pytest.mark.parametrize(("r", "period"), [(2.9, 1), (3.2, 2), (3.5, 4), (3.83, 3), (3.9, None)])
+def test_periods_of_the_logistic_map(r, period):
+    """Feigenbaum's cascade, and the window of period three."""
+    x, points = 0.3, []
+    for step in range(3000):
+        x = r * x * (1.0 - x)
+        if step >= 2900:
+            points.append([x])
+    assert period_of(np.array(points), 16, 1.0e-6) == period
+
+
+@pytest.mark.plain
+def test_the_section_of_a_driven_oscillator_is_its_steady_state():
+    """x'' + 2 d x' + x = cos(w t): at t = 0 of each turn x is Re(1 / (1 - w^2 + 2 i d w))."""
+    d, w = 0.1, 1.3
+    response = 1.0 / (1.0 - w**2 + 2j * d * w)
+    frequency = np.sqrt(1.0 - d**2)
+    turns = 2.0 * np.pi / w * np.arange(60)
+    free = np.exp(-d * turns) * np.cos(frequency * turns)
+    points = np.stack([response.real + free, (1j * w * response).real + free], axis=1)
+    assert period_of(points[50:], 3, 1.0e-9) == 1
+    assert period_of(points[:10], 3, 1.0e-9) is None
+
+
+@pytest.mark.plain
+@given(
+    period=st.integers(1, 6),
+    turns=st.integers(3, 5),
+    seed=st.integers(0, 1000),
+)
+def test_the_shortest_period_is_found(period, turns, seed):
+    once = np.random.default_rng(seed).random((period, 2))
+    assert period_of(np.tile(once, (turns, 1)), 8, 1.0e-12) == period

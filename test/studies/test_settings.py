@@ -1,0 +1,103 @@
+"""Descriptions of studies: what comes with the package is whole, what cannot be is told in one line."""
+
+import attrs
+import pytest
+
+from leg_wear_monitor import load_mechanism
+from leg_wear_monitor.cli.study import NAMES
+from leg_wear_monitor.errors import ConfigError
+from leg_wear_monitor.studies.ensemble import check_points
+from leg_wear_monitor.studies.plan import points_of
+from leg_wear_monitor.studies.settings import STUDIES, load_settings, parse_settings
+from leg_wear_monitor.studies.tasks import TASKS
+
+pytestmark = pytest.mark.plain
+
+
+def test_the_names_that_help_shows_are_the_library_s():
+    assert tuple(STUDIES) == NAMES
+
+
+@pytest.mark.parametrize("name", NAMES)
+def test_every_study_that_comes_with_the_package_has_points_that_can_be(name):
+    settings = load_settings(name)
+    points, leg = points_of(settings), load_mechanism(settings.mechanism)
+    check_points(leg, [point.settings for point in points])
+    keys = {point.key(leg) for point in points}
+    assert len({point.label for point in points}) >= 3
+    assert len(keys) >= len({point.label for point in points})
+    assert {point.task for point in points} <= set(TASKS)
+    assert all(point.cost > 0.0 for point in points)
+
+
+def test_studies_cover_what_was_asked():
+    size, speed, chaos = (load_settings(name) for name in ("size", "speed", "chaos"))
+    assert (size.clearances_m[0], size.clearances_m[-1]) == (1.0e-4, 5.0e-4)
+    assert (speed.speeds_rpm[0], speed.speeds_rpm[-1]) == (30.0, 120.0)
+    assert chaos.joints == ("A", "B", "G", "I", "J")
+    assert chaos.section_cycles >= 500
+    for name in ("location", "multi"):
+        assert load_settings(name).sets == (("A", "B"), ("G",), ("I", "J"))
+    assert points_of(load_settings("multi"))[-1].settings["loose"] == ["A", "B", "G", "I", "J"]
+
+
+@pytest.mark.parametrize(
+    ("study", "keys", "fault"),
+    [
+        ("size", {"clearances_m": [0.1]}, "size.yaml: joints: is missing, expected: joints that are loose"),
+        (
+            "size",
+            {"joints": ["G"], "clearances_m": []},
+            "[] does not rise from value to value",
+        ),
+        ("size", {"joints": ["G"], "clearances_m": [0.02, 0.01]}, "does not rise from value to value"),
+        (
+            "size",
+            {"joints": ["G", "G"], "clearances_m": [0.1]},
+            "['G', 'G'] is not a list of at",
+        ),
+        (
+            "size",
+            {"joints": ["G"], "clearance_m": [0.1]},
+            "unknown key, did you mean clearances_m?",
+        ),
+        ("location", {"sets": [["A"], []]}, "sets: [] is not a list of at least one joint"),
+        ("location", {"sets": [["A"]], "speed_rpm": -60}, "speed_rpm: -60.0 is not above 0 rpm"),
+        ("location", {"sets": [["A"]], "ensemble": {"runs": 1}}, "ensemble.runs: 1 is not at least 2"),
+        (
+            "location",
+            {"sets": [["A"]], "ensemble": {"runs": 2.5}},
+            "runs: 2.5 is not a whole number",
+        ),
+        (
+            "location",
+            {"sets": [["A"]], "ensemble": {"cycles": 2, "traced_cycles": 3}},
+            "ensemble.traced_cycles: 3 is more than the 2 cycles counted",
+        ),
+        ("laws", {"joints": ["A"], "normal_laws": ["hooke"]}, "normal_laws: 'hooke' is not one of hertz,"),
+    ],
+)
+def test_what_cannot_be_is_told_with_its_key(study, keys, fault):
+    with pytest.raises(ConfigError) as error:
+        parse_settings(study, keys, f"{study}.yaml")
+    assert fault in str(error.value)
+    assert str(error.value).startswith(f"{study}.yaml: ")
+    assert "\n" not in str(error.value)
+
+
+def test_joints_that_the_leg_does_not_have_are_told_before_anything_runs(tiny):
+    settings = tiny("size", joints=["Q"], clearances_m=[1.0e-4])
+    with pytest.raises(ConfigError, match="'Q' has no clearance settings in bionic_leg"):
+        check_points(load_mechanism(), [point.settings for point in points_of(settings)])
+
+
+def test_a_key_depends_on_all_that_the_result_depends_on_and_nothing_else(tiny):
+    leg, other = load_mechanism("bionic_leg"), load_mechanism("jansen_leg")
+    (point,) = points_of(tiny("location", sets=[["G"]]))
+    key = point.key(leg)
+    assert attrs.evolve(point, label="another", cost=7.0).key(leg) == key
+    assert point.key(attrs.evolve(leg, source="elsewhere.yaml")) == key
+    assert point.key(other) != key
+    assert attrs.evolve(point, task="section").key(leg) != key
+    for name in point.settings:
+        assert attrs.evolve(point, settings={**point.settings, name: 99}).key(leg) != key

@@ -8,7 +8,6 @@ import rclpy
 from rclpy.executors import ExternalShutdownException
 from rclpy.experimental.events_executor import EventsExecutor
 from rclpy.impl.implementation_singleton import rclpy_implementation as _rclpy
-from rclpy.logging import get_logger
 from rclpy.node import Node
 from rclpy.utilities import remove_ros_args, try_shutdown
 
@@ -82,7 +81,7 @@ def run(make: Callable[[], _Node], serve: Callable[[_Node], None], argv: Sequenc
         finally:
             node.close()
     except (KeyboardInterrupt, ExternalShutdownException):
-        get_logger("leg_wear_monitor").info("asked to stop")
+        return DONE  # asked to stop; no logging any more, the context is down
     except LegWearError as error:
         print(f"error: {' '.join(str(error).split())}", file=sys.stderr, flush=True)
         return COULD_NOT

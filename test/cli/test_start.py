@@ -61,7 +61,7 @@ def test_names_that_help_shows_are_the_library_s():
 def test_help_lists_the_verbs_that_are_there(run):
     listed = run("--help").stdout.split("Commands:\n")[1]
     verbs = [line.split()[0] for line in listed.splitlines()]
-    assert {"check", "gait-publisher", "simulate"} <= set(verbs)
+    assert {"check", "gait-publisher", "monitor", "simulate"} <= set(verbs)
     assert [run(verb, "--help").exit_code for verb in verbs] == [0] * len(verbs)
 
 

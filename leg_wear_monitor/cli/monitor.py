@@ -1,0 +1,19 @@
+"""``leg-wear-monitor monitor``: the node that follows a real leg."""
+
+from leg_wear_monitor.cli.node import node_script, node_verb
+
+monitor = node_verb(
+    "monitor",
+    "monitor_node",
+    "The monitor as a ROS 2 node.",
+    """Follow a leg by joint_states and drive_torque, and say how its joints wear.
+
+    It monitors as soon as it runs. Parameters: --ros-args --params-file FILE, or -p NAME:=VALUE;
+    docs/parameters.md lists them. What `ros2 run leg_wear_monitor monitor` starts.
+    """,
+)
+
+
+def main() -> None:
+    """Entry point of ``ros2 run leg_wear_monitor monitor``."""
+    node_script(monitor)

@@ -1,0 +1,181 @@
+"""Node ``leg_wear_monitor``: samples from topics to the monitor, its reports to topics."""
+
+from collections.abc import Callable, Sequence
+from functools import partial
+from typing import Any
+
+from std_srvs.srv import Trigger
+
+from leg_wear_monitor.errors import LegWearError
+from leg_wear_monitor.mechanism.loader import load_mechanism
+from leg_wear_monitor.monitor.alarms import Alarm
+from leg_wear_monitor.monitor.book import open_ledger
+from leg_wear_monitor.monitor.config import MonitorConfig
+from leg_wear_monitor.monitor.reports import AlarmList, Reports
+from leg_wear_monitor.monitor.wear_monitor import WearMonitor
+from leg_wear_monitor.recording import outputs
+from leg_wear_monitor.recording.cdr import TYPES
+from leg_wear_monitor.recording.decoder import Decoder
+from leg_wear_monitor.recording.outputs import Messages
+from leg_wear_monitor.recording.qos import SENSOR_DATA
+from leg_wear_monitor.ros.black_box import BlackBox
+from leg_wear_monitor.ros.inbox import Inbox
+from leg_wear_monitor.ros.inputs import InputTopic, subscribe
+from leg_wear_monitor.ros.node_health import Load, load_status, recording_status, topics_status
+from leg_wear_monitor.ros.outlets import Outlets
+from leg_wear_monitor.ros.parameters import Parameters
+from leg_wear_monitor.ros.running import ClosingNode, run, spin
+
+ADVICE = (
+    "this monitor advises: it commands nothing, no alarm is no proof of health, keep it out of safety paths"
+)
+
+_WORK_S = 0.01  # the monitor takes what has come, this often
+_AT_ONCE = 500  # messages, so that services and parameters get their turn, too
+_HELD = 20_000  # messages, ten seconds at 1 kHz on both topics
+_FORECAST_NS = 60_000_000_000
+_A_SAMPLE = (outputs.TORQUE, outputs.IMPACTS)
+
+
+class MonitorNode(ClosingNode):
+    """The monitor, live."""
+
+    def __init__(self, **options: Any) -> None:
+        super().__init__("leg_wear_monitor", automatically_declare_parameters_from_overrides=True, **options)
+        self.get_logger().info(ADVICE)
+        parameters = Parameters(self, MonitorConfig)
+        config = parameters.config
+        mechanism = load_mechanism(config.mechanism)
+        self._monitor = WearMonitor(mechanism, config, open_ledger(mechanism, config))
+        decoder = Decoder(config)
+        self._inbox = Inbox(decoder, _HELD)
+        self._load = Load()
+        self._messages = Messages(config, self._monitor.loose, self.get_name())
+        self._black_box = BlackBox(config.record.path)
+        self._outlets = Outlets(self, outputs.OUTPUTS, self._black_box)
+        self._forecast_ns = 0
+        self._compile(decoder)
+        parameters.follow(self, self._configure)
+        self._serve()
+        self._send_alarms(self._monitor.alarms)
+        self._inputs = subscribe(self, config, self._receive)
+        for topic, _ in self._inputs:
+            self._black_box.add_topic(topic.name, topic.type, SENSOR_DATA)
+        self.create_timer(_WORK_S, self._work)
+        self.create_timer(config.diagnostics.period_s, self._diagnose)
+        self.get_logger().info(f"monitoring joints {', '.join(self._monitor.loose)} of {mechanism.name}")
+
+    @property
+    def monitor(self) -> WearMonitor:
+        """What it all goes to."""
+        return self._monitor
+
+    def close(self) -> None:
+        """Take what has come, save the ledger, end the recording."""
+        while len(self._inbox):
+            self._work()
+        self._monitor.close()
+        self._black_box.close()
+
+    def _compile(self, decoder: Decoder) -> None:
+        """Pay for compilation before the first sample."""
+        self.get_logger().info("getting ready; the first time this compiles for a minute")
+        self._monitor.warm_up()
+        for kind in TYPES.values():
+            decoder.one(b"", kind)
+
+    # --- in ---
+
+    def _now_ns(self) -> int:
+        return self.get_clock().now().nanoseconds
+
+    def _receive(self, topic: InputTopic, raw: bytes) -> None:
+        self._inbox.add(topic.kind, raw, self._now_ns())
+
+    def _work(self) -> None:
+        """Pass on what has come, a bounded part at a time."""
+        if not len(self._inbox):
+            return
+        coarse = self._load.note(self._inbox.delay_s(self._now_ns()))
+        arrivals = self._inbox.take(_AT_ONCE)
+        if self._black_box.on:
+            names = {topic.kind: topic.name for topic, _ in self._inputs}
+            for arrival in arrivals:
+                self._black_box.write(names[arrival.kind], arrival.log_time_ns, arrival.raw)
+        self._publish(self._monitor.update(self._inbox.decoded(arrivals)), coarse)
+
+    # --- out ---
+
+    def _publish(self, reports: Reports, coarse: bool) -> None:
+        now_ns = self._now_ns()
+        for outgoing in self._messages.of(reports):
+            if coarse and outgoing.output in _A_SAMPLE and not self._black_box.on:
+                self._load.unpublished += len(outgoing.stamp_ns)
+            elif self._outlets.wanted(outgoing.output):
+                self._outlets.send_many(outgoing.output, now_ns, outgoing.messages)
+        for cycle in reports.cycles:
+            if reports.alarms or cycle.stamp_ns - self._forecast_ns >= _FORECAST_NS:
+                self._forecast_ns = cycle.stamp_ns
+                self._outlets.send(outputs.FORECAST, now_ns, self._messages.forecast(cycle))
+
+    def _send_alarms(self, alarms: AlarmList) -> None:
+        self._outlets.send(outputs.ALARMS, self._now_ns(), self._messages.alarms(alarms))
+
+    def _diagnose(self) -> None:
+        now_ns = self._now_ns()
+        publishers = [(topic, self.count_publishers(topic.name)) for topic, _ in self._inputs]
+        status = (
+            *self._monitor.status(),
+            load_status(self._load, self._inbox),
+            topics_status(publishers),
+            recording_status(self._black_box),
+        )
+        self._outlets.send(outputs.DIAGNOSTICS, now_ns, self._messages.diagnostics(now_ns, status))
+        self._black_box.flush()
+
+    # --- people ---
+
+    def _configure(self, config: MonitorConfig) -> None:
+        self._monitor.configure(config)
+        self._messages.config = config
+
+    def _serve(self) -> None:
+        self._offer("~/acknowledge_alarms", self._acknowledge)
+        self._offer("~/save_state", self._save)
+        for joint in self._monitor.loose:
+            self._offer(f"~/reset_wear/{joint}", partial(self._reset_wear, joint))
+
+    def _offer(self, name: str, act: Callable[[], str]) -> None:
+        """A service that acts and says in a line what it did, or why it could not."""
+
+        def answer(_request: Trigger.Request, response: Trigger.Response) -> Trigger.Response:
+            try:
+                response.success, response.message = True, act()
+            except LegWearError as error:
+                response.success, response.message = False, str(error)
+            self.get_logger().info(f"{name}: {response.message}")
+            return response
+
+        self.create_service(Trigger, name, answer)
+
+    def _acknowledge(self) -> str:
+        cleared, kept = self._monitor.acknowledge(self._now_ns())
+        self._send_alarms(self._monitor.alarms)
+        return f"cleared: {_listed(cleared)}; still present: {_listed(kept)}"
+
+    def _save(self) -> str:
+        self._monitor.save()
+        return f"saved in {self._monitor.config.ledger.path}"
+
+    def _reset_wear(self, joint: str) -> str:
+        self._monitor.reset_wear(joint, self._now_ns(), "service ~/reset_wear")
+        return f"joint {joint}: fresh surfaces, history kept"
+
+
+def _listed(alarms: Sequence[Alarm]) -> str:
+    return ", ".join(alarm.name for alarm in alarms) or "none"
+
+
+def main(argv: Sequence[str] | None = None) -> int:
+    """Entry point of ``ros2 run leg_wear_monitor monitor``; returns the exit code."""
+    return run(MonitorNode, spin, argv)

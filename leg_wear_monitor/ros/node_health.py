@@ -1,0 +1,82 @@
+"""How the node itself does, for /diagnostics: can it keep up, what got lost on the way, is it recording."""
+
+from collections.abc import Iterable
+
+import attrs
+
+from leg_wear_monitor.monitor.alarms import Level
+from leg_wear_monitor.monitor.reports import Status
+from leg_wear_monitor.ros.black_box import BlackBox
+from leg_wear_monitor.ros.inbox import Inbox
+from leg_wear_monitor.ros.inputs import InputTopic
+
+# From here on, the topics that have a message a sample are left out, so that the monitor can catch up.
+COARSE_FROM_S = 0.25
+
+
+@attrs.define
+class Load:
+    """How the node keeps up.
+
+    Attributes
+    ----------
+    delay_s, worst_delay_s : float
+        For how long the oldest message has waited, now and at worst since it was last told.
+    unpublished : int
+        Samples whose torque and forces were left out to catch up.
+    shed_told : int
+        Messages shed until it was last told.
+    """
+
+    delay_s: float = 0.0
+    worst_delay_s: float = 0.0
+    unpublished: int = 0
+    shed_told: int = 0
+
+    def note(self, delay_s: float) -> bool:
+        """Note a delay; whether it is too long to publish every sample."""
+        self.delay_s, self.worst_delay_s = delay_s, max(self.worst_delay_s, delay_s)
+        return delay_s > COARSE_FROM_S
+
+
+def load_status(load: Load, inbox: Inbox) -> Status:
+    """How the node keeps up, and begin anew."""
+    shed = inbox.shed - load.shed_told
+    level, message = Level.OK, "keeps up"
+    if shed:
+        level, message = Level.ERROR, "cannot keep up: samples were shed and their wear is not counted"
+    elif load.worst_delay_s > COARSE_FROM_S:
+        level, message = Level.WARN, "falls behind: forces and torques of samples are left out to catch up"
+    values = {
+        "received": float(inbox.received),
+        "waiting": float(len(inbox)),
+        "worst_delay_s": load.worst_delay_s,
+        "unpublished_samples": float(load.unpublished),
+        "shed_messages": float(inbox.shed),
+    }
+    load.worst_delay_s, load.shed_told = load.delay_s, inbox.shed
+    return Status("load", level, message, values)
+
+
+def topics_status(topics: Iterable[tuple[InputTopic, int]]) -> Status:
+    """The input topics, each with the number of its publishers."""
+    messages, values, level = [], {}, Level.OK
+    for topic, publishers in topics:
+        short = topic.name.rsplit("/", 1)[-1]
+        values[f"{short}_publishers"] = float(publishers)
+        values[f"{short}_lost_messages"] = float(topic.lost)
+        if topic.incompatible:
+            messages.append(f"{topic.name}: {topic.incompatible}")
+            level = Level.ERROR
+        elif not publishers:
+            messages.append(f"{topic.name}: nobody publishes it")
+            level = max(level, Level.WARN)
+    return Status("topics", level, "; ".join(messages) or "connected", values)
+
+
+def recording_status(black_box: BlackBox) -> Status:
+    """Whether it is recorded."""
+    values = {"recorded_messages": float(black_box.recorded)}
+    if black_box.fault:
+        return Status("recording", Level.ERROR, f"stopped: {black_box.fault}", values)
+    return Status("recording", Level.OK, "on" if black_box.on else "off", values)

@@ -5,6 +5,7 @@ import numpy as np
 from leg_wear_monitor.contact.arrays import ContactArrays
 from leg_wear_monitor.dynamics.tally import ARCHARD, CONTACT, FORCE, Tally, percentile
 from leg_wear_monitor.mechanism.arrays import Floats
+from leg_wear_monitor.twin.estimate import LOAD, Finding, LoadEstimate
 from leg_wear_monitor.twin.figures import CycleFigures, TorqueFigures
 from leg_wear_monitor.twin.leg_state import (
     CUT_RISES,
@@ -18,7 +19,6 @@ from leg_wear_monitor.twin.leg_state import (
     RESIDUAL_2,
     LegState,
 )
-from leg_wear_monitor.twin.load import Estimate
 
 
 def clear_tally(tally: Tally) -> None:
@@ -34,27 +34,27 @@ def clearances(contacts: ContactArrays, depth: Floats) -> Floats:
     return np.stack([contacts.clearance + opened.mean(axis=1), contacts.clearance + opened.max(axis=1)])
 
 
-def torque_figures(sums: Floats, estimate: Estimate | None, load: float, friction: float) -> TorqueFigures:
-    """Of the sums (SUMS,) of a cycle; load [N] and friction [N m] as they are now."""
+def torque_figures(sums: Floats, found: Finding | None, settled: LoadEstimate) -> TorqueFigures:
+    """Of the sums (SUMS,) of a cycle, what it alone says, and what has settled."""
     n = int(sums[NUMBER])
-    compared = n > 0
-    rms = {
-        i: float(np.sqrt(sums[i] / n)) if compared else np.nan for i in (MEASURED_2, PREDICTED_2, RESIDUAL_2)
-    }
-    none = Estimate(np.nan, np.nan, np.nan, np.nan)
-    found = estimate or none
+
+    def rms(i: int) -> float:
+        return float(np.sqrt(sums[i] / n)) if n else np.nan
+
+    load, friction, lag = settled.values.tolist()
     return TorqueFigures(
         samples=n,
-        measured_rms_nm=rms[MEASURED_2],
-        predicted_rms_nm=rms[PREDICTED_2],
-        residual_mean_nm=float(sums[RESIDUAL] / n) if compared else np.nan,
-        residual_rms_nm=rms[RESIDUAL_2],
-        unexplained_rms_nm=found.left,
-        load_step_n=found.load,
-        friction_step_nm=found.friction,
-        condition=found.condition,
+        measured_rms_nm=rms(MEASURED_2),
+        predicted_rms_nm=rms(PREDICTED_2),
+        residual_mean_nm=float(sums[RESIDUAL] / n) if n else np.nan,
+        residual_rms_nm=rms(RESIDUAL_2),
+        unexplained_rms_nm=found.left if found else np.nan,
+        condition=found.condition if found else np.nan,
         load_n=load,
+        load_sigma_n=float(settled.sigma[LOAD]),
+        load_acting_n=settled.acting,
         friction_nm=friction,
+        torque_lag_s=lag,
     )
 
 

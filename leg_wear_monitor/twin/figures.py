@@ -77,18 +77,20 @@ class TorqueFigures:
     Attributes
     ----------
     samples : int
-        Torque samples compared; all figures but the last two are NaN without any.
+        Torque samples compared; without any, all up to ``condition`` are NaN.
     measured_rms_nm, predicted_rms_nm, residual_mean_nm, residual_rms_nm : float
     unexplained_rms_nm : float
-        Of the residual once foot load and friction are taken out: the mismatch of the model.
-    load_step_n, friction_step_nm : float
-        What this cycle's residual asks to be added to the two.
+        Of the residual once foot load, friction and lag are taken out: the mismatch of the model.
     condition : float
-        Condition number of that estimate, 1 at best.
-    load_n : float
-        Vertical foot load at work in the model, up positive.
+        Condition number of this cycle's estimate of the three below, 1 at best.
+    load_n, load_sigma_n : float
+        Vertical foot load, up positive, and its standard deviation.
+    load_acting_n : float
+        The load at work in the model from now on: that above where it is believed and asked for, else 0.
     friction_nm : float
         Torque of friction in the drive, against the motion; no force in the joints comes of it.
+    torque_lag_s : float
+        By how much the measured torque comes late.
     """
 
     samples: int
@@ -97,11 +99,12 @@ class TorqueFigures:
     residual_mean_nm: float
     residual_rms_nm: float
     unexplained_rms_nm: float
-    load_step_n: float
-    friction_step_nm: float
     condition: float
     load_n: float
+    load_sigma_n: float
+    load_acting_n: float
     friction_nm: float
+    torque_lag_s: float
 
 
 @attrs.frozen(eq=False)

@@ -9,13 +9,12 @@ from leg_wear_monitor.dynamics.run import DONE
 from leg_wear_monitor.dynamics.tally import TORQUE
 from leg_wear_monitor.dynamics.touch import F_N
 from leg_wear_monitor.kernel import entry, kernel
+from leg_wear_monitor.twin.estimate import FRICTION, LAG, LOAD
 from leg_wear_monitor.twin.leg_state import (
     AFRESH,
     ANCHOR,
     ANCHORED,
     BASE,
-    BY_FRICTION,
-    BY_LOAD,
     CUT,
     CUT_RISES,
     CUT_TURN,
@@ -23,20 +22,17 @@ from leg_wear_monitor.twin.leg_state import (
     FAILED_AT,
     FAILURES,
     FILTERING,
-    FRICTION_2,
-    FRICTION_RESIDUAL,
     IMPULSE,
-    LAST_MEASURED,
+    LAST_PREDICTED,
     LAST_SIGNATURE,
-    LOAD_2,
-    LOAD_FRICTION,
-    LOAD_RESIDUAL,
     LOOKS,
     MEAN_TORQUE,
     MEASURED,
     MEASURED_2,
     MOVING_NS,
     NUMBER,
+    OF_FRICTION,
+    OF_LOAD,
     PIECE_BEGIN,
     PIECE_END,
     PREDICTED,
@@ -143,38 +139,38 @@ def _pass_low(share, fresh, low_pass, i, value):
 
 @kernel
 def _compare(cutoff, signature, leg, stepper, measured):
-    """Compare a measured torque [N m] with the predicted one, both as means since the torque sample before.
+    """Compare a measured torque [N m] with the mean of the predicted one since the torque sample before.
 
-    The trapezium makes the measured one such a mean. ``cutoff`` [rad/s] of the low-pass; ``signature``
-    (N + 1,) drive torque by a unit foot load [N m/N].
+    ``cutoff`` [rad/s] of the low-pass; ``signature`` (N + 1,) drive torque by a unit foot load [N m/N].
     """
-    mark, value, sums, low_pass = leg.mark, leg.value, leg.sums, leg.low_pass
+    mark, value, sums, low_pass, by = leg.mark, leg.value, leg.sums, leg.low_pass, leg.regressor
     i, w = blend(signature.shape[0] - 1, stepper.drive[ANGLE])
     lever = signature[i] + w * (signature[i + 1] - signature[i])
     speed, dt = stepper.drive[SPEED], value[TORQUE_TIME]
     if mark[FILTERING] > 0 and dt > 0.0:
         fresh = mark[FILTERING] == 1
         share = 1.0 - math.exp(-cutoff * dt)
-        m = _pass_low(share, fresh, low_pass, MEASURED, 0.5 * (value[LAST_MEASURED] + measured))
+        m = _pass_low(share, fresh, low_pass, MEASURED, measured)
         p = _pass_low(share, fresh, low_pass, PREDICTED, value[TORQUE_IMPULSE] / dt)
-        g = _pass_low(share, fresh, low_pass, BY_LOAD, 0.5 * (value[LAST_SIGNATURE] + lever))
+        by[LOAD] = _pass_low(share, fresh, low_pass, OF_LOAD, 0.5 * (value[LAST_SIGNATURE] + lever))
         direction = 1.0 if speed > 0.0 else (-1.0 if speed < 0.0 else 0.0)
-        f = _pass_low(share, fresh, low_pass, BY_FRICTION, direction)
+        by[FRICTION] = _pass_low(share, fresh, low_pass, OF_FRICTION, direction)
+        by[LAG] = 0.0 if fresh else (value[LAST_PREDICTED] - p) / dt
+        value[LAST_PREDICTED] = p
         r = m - p
         sums[NUMBER] += 1.0
         sums[RESIDUAL] += r
         sums[RESIDUAL_2] += r * r
         sums[MEASURED_2] += m * m
         sums[PREDICTED_2] += p * p
-        sums[LOAD_2] += g * g
-        sums[LOAD_FRICTION] += g * f
-        sums[FRICTION_2] += f * f
-        sums[LOAD_RESIDUAL] += g * r
-        sums[FRICTION_RESIDUAL] += f * r
+        for a in range(3):
+            leg.along[a] += by[a] * r
+            for b in range(3):
+                leg.gram[a, b] += by[a] * by[b]
         mark[FILTERING] = 2
     elif mark[FILTERING] == 0:
         mark[FILTERING] = 1
-    value[LAST_MEASURED], value[LAST_SIGNATURE] = measured, lever
+    value[LAST_SIGNATURE] = lever
     value[TORQUE_IMPULSE], value[TORQUE_TIME] = 0.0, 0.0
 
 

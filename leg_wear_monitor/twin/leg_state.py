@@ -19,27 +19,24 @@ from leg_wear_monitor.mechanism.arrays import Floats, Ints
 MARKS = 21
 
 # values: drive torque's impulse and time since the last sample, and since the last torque; mean torque before
-# the last sample; last measured torque and load signature
-IMPULSE, TIME, TORQUE_IMPULSE, TORQUE_TIME, MEAN_TORQUE, LAST_MEASURED, LAST_SIGNATURE = range(7)
+# the last sample; last load signature; predicted torque after the low-pass, as it was last
+IMPULSE, TIME, TORQUE_IMPULSE, TORQUE_TIME, MEAN_TORQUE, LAST_SIGNATURE, LAST_PREDICTED = range(7)
 VALUES = 7
 
 # what goes through the low-pass: torque measured, predicted, of a unit foot load, and of unit friction
-MEASURED, PREDICTED, BY_LOAD, BY_FRICTION = range(4)
+MEASURED, PREDICTED, OF_LOAD, OF_FRICTION = range(4)
 
-# sums over a cycle: number; of the residual and its square; squares of measured and predicted; products of
-# the torques by load and friction with each other and with the residual
-(
-    NUMBER, RESIDUAL, RESIDUAL_2, MEASURED_2, PREDICTED_2, LOAD_2, LOAD_FRICTION, FRICTION_2, LOAD_RESIDUAL,
-    FRICTION_RESIDUAL,
-) = range(10)  # fmt: skip
-SUMS = 10
+# sums over a cycle: number; of the residual and its square; squares of measured and predicted
+NUMBER, RESIDUAL, RESIDUAL_2, MEASURED_2, PREDICTED_2 = range(5)
+SUMS = 5
 
 
 class LegState(NamedTuple):
     """``mark`` and ``value`` as above.
 
-    ``polynomial`` (7,) the piece; ``low_pass`` (2, 4) two stages of what is filtered; ``sums`` (SUMS,);
-    ``force`` (k,) contact forces [N] at the last look.
+    ``polynomial`` (7,) the piece; ``low_pass`` (2, 4) two stages of what is filtered; ``sums`` (SUMS,), and
+    ``gram`` (3, 3) and ``along`` (3,) of the products of the torques by load, friction and lag, ``regressor``
+    (3,), with each other and with the residual; ``force`` (k,) contact forces [N] at the last look.
     """
 
     mark: Ints
@@ -47,6 +44,9 @@ class LegState(NamedTuple):
     polynomial: Floats
     low_pass: Floats
     sums: Floats
+    gram: Floats
+    along: Floats
+    regressor: Floats
     force: Floats
 
 
@@ -62,8 +62,14 @@ def leg_state(loose: int) -> LegState:
     """State before the first step."""
     return LegState(
         np.zeros(MARKS, dtype=np.int64), np.zeros(VALUES), np.zeros(7), np.zeros((2, 4)), np.zeros(SUMS),
-        np.zeros(loose),
+        np.zeros((3, 3)), np.zeros(3), np.zeros(3), np.zeros(loose),
     )  # fmt: skip
+
+
+def clear_sums(leg: LegState) -> None:
+    """Start to compare torques afresh."""
+    for part in (leg.sums, leg.gram, leg.along):
+        part[...] = 0.0
 
 
 def room_for_looks(m: int, loose: int) -> Looks:

@@ -1,9 +1,6 @@
-"""A vertical load at the foot that may change from cycle to cycle, and how it is seen in the drive torque.
+"""A load at the foot that may change with every cycle: what it asks of the drive, its place in the tables.
 
-By virtual work a force F up at the toe asks the drive for -F dy/dtheta. Over a whole turn that has no mean,
-and a constant friction torque is nothing but mean: the two cannot be taken for each other, so both follow
-from one torque by least squares. Friction in the drive makes no force in the joints; the load does, and all
-tables are linear in it, so it is taken into them by a sum of two.
+All tables are linear in a load, so a load is a sum of two tables over the few columns that it changes.
 """
 
 from typing import Any
@@ -17,29 +14,22 @@ from leg_wear_monitor.dynamics.clearance_tables import POINTS, ClearanceTables, 
 from leg_wear_monitor.mechanism.arrays import Floats
 from leg_wear_monitor.mechanism.ideal import one_cycle, point_motion
 from leg_wear_monitor.mechanism.position import Linkage, build_linkage
-from leg_wear_monitor.mechanism.spec import ConstantLoad, Mechanism
-from leg_wear_monitor.twin.leg_state import (
-    FRICTION_2,
-    FRICTION_RESIDUAL,
-    LOAD_2,
-    LOAD_FRICTION,
-    LOAD_RESIDUAL,
-    NUMBER,
-    RESIDUAL_2,
-)
+from leg_wear_monitor.mechanism.spec import Mechanism, PhaseLoad
+from leg_wear_monitor.twin.settings import STANCE
 
 _TRIAL_N = 100.0
-_LEAST_SAMPLES = 8
-_SINGULAR = 1.0e-9
+_PHASES = 128  # of a load's table, a divisor of the points of the leg's tables
 
 
 class FootLoad:
-    """The leg's tables under a load at the toe.
+    """The leg's tables under a vertical load at the toe.
 
     Parameters
     ----------
     linkage : Linkage
     contacts : ContactArrays
+    shape : str
+        How the load goes over the gait cycle, one of `settings.LOAD_SHAPES`.
 
     Attributes
     ----------
@@ -49,17 +39,21 @@ class FootLoad:
         Drive torque by a unit load up [N m/N], zeros for a mechanism without a toe.
     """
 
-    def __init__(self, linkage: Linkage, contacts: ContactArrays) -> None:
+    def __init__(self, linkage: Linkage, contacts: ContactArrays, shape: str = STANCE) -> None:
         self.tables = build_tables(linkage, contacts)
         self.signature = np.zeros(POINTS + 1)
         self._parts: list[tuple[NDArray[Any], ...]] = []
         mechanism = linkage.mechanism
-        if mechanism.toe is not None and contacts.joint.size:
+        if mechanism.toe is not None:
             up = _up(mechanism)
-            velocity = point_motion(one_cycle(linkage, POINTS, 1.0), linkage, *mechanism.toe)[1]
-            self.signature[:-1] = -(velocity @ up)
+            position, velocity, _ = point_motion(one_cycle(linkage, POINTS, 1.0), linkage, *mechanism.toe)
+            share = _share(position @ up, shape)
+            phases = np.arange(POINTS + 1) / POINTS * _PHASES
+            along = np.interp(phases, np.arange(_PHASES + 1), np.append(share, share[0]))
+            self.signature[:-1] = -along[:-1] * (velocity @ up)
             self.signature[-1] = self.signature[0]
-            self._find_parts(build_tables(build_linkage(_loaded(mechanism, _TRIAL_N * up)), contacts))
+            loaded = build_linkage(_loaded(mechanism, _TRIAL_N * share[:, None] * up))
+            self._find_parts(build_tables(loaded, contacts))
 
     def _find_parts(self, loaded: ClearanceTables) -> None:
         """The columns that a load changes, their values without it, and by how much a newton changes them."""
@@ -83,43 +77,21 @@ def _up(mechanism: Mechanism) -> Floats:
     return -gravity / size if size > 0.0 else np.array([0.0, 1.0])
 
 
+def _share(height: Floats, shape: str) -> Floats:
+    """Share of the full load at `_PHASES` equal steps of the crank, by the toe's height (POINTS,) [m]."""
+    if shape != STANCE:
+        return np.ones(_PHASES)
+    depth = np.maximum(0.0, height.mean() - height)[:: POINTS // _PHASES]
+    return np.asarray(depth / (depth.max() or 1.0))
+
+
 def _loaded(mechanism: Mechanism, force: Floats) -> Mechanism:
-    """The mechanism with a further constant force at its toe."""
+    """The mechanism with a further force (_PHASES, 2) [N] at its toe."""
     if mechanism.toe is None:
         return mechanism
     body, point = mechanism.toe
-    load = ConstantLoad(body=body, point=point, force=(float(force[0]), float(force[1])))
+    phases = tuple((np.arange(len(force)) / len(force)).tolist())
+    load = PhaseLoad(
+        body=body, point=point, phase=phases, force=tuple((float(x), float(y)) for x, y in force)
+    )
     return attrs.evolve(mechanism, loads={**mechanism.loads, "the twin's foot load": load})
-
-
-@attrs.frozen
-class Estimate:
-    """What a cycle's residual says: load [N], friction [N m], condition number; RMS of what is left [N m]."""
-
-    load: float
-    friction: float
-    condition: float
-    left: float
-
-
-def estimate_load(sums: Floats) -> Estimate | None:
-    """Load and friction by least squares from the sums (SUMS,) of a cycle; None without enough samples.
-
-    The condition number is that of the two torques scaled to one size: 1 where neither looks like the other.
-    Without a load's signature (no toe) only friction is estimated.
-    """
-    if sums[NUMBER] < _LEAST_SAMPLES or not sums[FRICTION_2] > 0.0:
-        return None
-    load_2, friction_2, both = sums[LOAD_2], sums[FRICTION_2], sums[LOAD_FRICTION]
-    by_load, by_friction = sums[LOAD_RESIDUAL], sums[FRICTION_RESIDUAL]
-    likeness = abs(both) / np.sqrt(load_2 * friction_2) if load_2 > 0.0 else 0.0
-    if load_2 > 0.0 and likeness < 1.0 - _SINGULAR:
-        determinant = load_2 * friction_2 - both * both
-        load = (friction_2 * by_load - both * by_friction) / determinant
-        friction = (load_2 * by_friction - both * by_load) / determinant
-    else:
-        load, friction = 0.0, by_friction / friction_2
-    left = sums[RESIDUAL_2] - load * by_load - friction * by_friction
-    condition = np.sqrt((1.0 + likeness) / max(1.0 - likeness, _SINGULAR))
-    rms = np.sqrt(max(left, 0.0) / sums[NUMBER])
-    return Estimate(float(load), float(friction), float(condition), float(rms))

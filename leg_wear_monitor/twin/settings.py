@@ -8,6 +8,8 @@ from leg_wear_monitor.errors import LegWearError
 
 FOREVER = 1.0e9
 
+LOAD_SHAPES = STANCE, CONSTANT = "stance", "constant"
+
 
 @attrs.frozen(kw_only=True)
 class TrackerSettings:
@@ -68,6 +70,8 @@ class TrackerSettings:
                 raise LegWearError(f"{name}: {value} is not a finite number above 0")
         if self.lag_s < 0.0 or self.reorder_window_s < 0.0 or self.commanded_speed_radps == 0.0:
             raise LegWearError("lag_s, reorder_window_s: expected at least 0; commanded_speed_radps: not 0")
+        if not 1.0 <= self.bandwidth_hz <= 100.0:
+            raise LegWearError(f"bandwidth_hz: {self.bandwidth_hz} is not from 1 to 100 Hz")
         if not self.reorder_window_s < min(self.backward_jump_s, self.bridge_limit_s):
             raise LegWearError("reorder_window_s: expected below backward_jump_s and bridge_limit_s")
 
@@ -92,8 +96,9 @@ class TwinSettings:
         Of the low-pass that measured and predicted torque both go through before they are compared.
     estimate_load : bool
         Whether the foot load that measured torque shows acts on the leg; it is estimated in any case.
-    load_gain : float
-        Share of a cycle's estimate that is taken over, in (0, 1].
+    load_shape : str
+        ``stance``: the ground's push, in proportion to the toe's depth below its mean height; ``constant``: a
+        weight that it carries.
     load_limit_n : float
         Largest foot load believed [N].
     """
@@ -103,13 +108,13 @@ class TwinSettings:
     wear_acceleration: float = 1.0
     torque_bandwidth_hz: float = 10.0
     estimate_load: bool = True
-    load_gain: float = 0.5
+    load_shape: str = STANCE
     load_limit_n: float = 1000.0
 
     def __attrs_post_init__(self) -> None:
-        for name in ("wear_acceleration", "torque_bandwidth_hz", "load_gain", "load_limit_n"):
+        for name in ("wear_acceleration", "torque_bandwidth_hz", "load_limit_n"):
             value = getattr(self, name)
             if not (math.isfinite(value) and (value > 0.0 or (name == "wear_acceleration" and value == 0.0))):
                 raise LegWearError(f"{name}: {value} is not a finite number above 0")
-        if self.load_gain > 1.0:
-            raise LegWearError(f"load_gain: {self.load_gain} is above 1")
+        if self.load_shape not in LOAD_SHAPES:
+            raise LegWearError(f"load_shape: {self.load_shape!r} is not one of {', '.join(LOAD_SHAPES)}")

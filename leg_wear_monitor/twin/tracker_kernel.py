@@ -3,16 +3,21 @@
 import math
 
 from leg_wear_monitor.kernel import entry, kernel
+from leg_wear_monitor.twin.arrival import (
+    DROP_IT,
+    KEEP_IT,
+    LARGEST_RATE,
+    LARGEST_TORQUE,
+    arrive,
+    find_fault,
+    insert,
+)
 from leg_wear_monitor.twin.crank_filter import begin_filter, update
 from leg_wear_monitor.twin.knots import lose, reach_knots
 from leg_wear_monitor.twin.sample import (
     CRANK,
     NO_FAULT,
-    NOT_FINITE,
-    OUT_OF_RANGE,
     TORQUE,
-    WRONG_TYPE,
-    ZERO_STAMP,
 )
 from leg_wear_monitor.twin.steps import (
     LOOK,
@@ -39,10 +44,8 @@ from leg_wear_monitor.twin.tracker_state import (
     FILTER_TIME,
     GAPS,
     HEAD,
-    JUMP,
     JUMPS,
     LAST_CRANK,
-    LATE,
     MARK,
     NEWEST,
     OUT_SINCE,
@@ -54,7 +57,6 @@ from leg_wear_monitor.twin.tracker_state import (
     RELEASED_KINDS,
     SLOWEST,
     STEP,
-    STRAY,
     TAIL,
     TORQUE_VALUE,
     TORQUES,
@@ -65,26 +67,10 @@ from leg_wear_monitor.twin.tracker_state import (
     X,
 )
 
-_LARGEST_ANGLE, _LARGEST_RATE, _LARGEST_TORQUE = 1.0e6, 1.0e3, 1.0e6  # rad, rad/s, N m: beyond is no leg's
 # velocities in a row that must agree with the angles of a moving crank before any is used: many drivers
 # send zeros, which are right at rest only
 _ENOUGH_CREDIT = 20
 _AT_LEAST_REFUSED = 5  # samples in a row, before the crank is held to be elsewhere
-
-
-@kernel
-def _fault(stamp, kind, fault, angle, torque):
-    """What is wrong with a sample, if it is not said already."""
-    if fault != NO_FAULT:
-        return min(fault, OUT_OF_RANGE)
-    if not CRANK <= kind <= TORQUE:
-        return WRONG_TYPE
-    if stamp <= 0:
-        return ZERO_STAMP
-    value, largest = (angle, _LARGEST_ANGLE) if kind == CRANK else (torque, _LARGEST_TORQUE)
-    if not math.isfinite(value):
-        return NOT_FINITE
-    return OUT_OF_RANGE if abs(value) > largest else NO_FAULT
 
 
 @kernel
@@ -160,7 +146,7 @@ def _follow(model, state, stamp, kind, values, out_target, steps, n):
     if reason >= 0:
         n = lose(state, stamp, reason, steps, n)
     row = state.queue[clock[TAIL]]
-    row[TORQUE_VALUE] = values[2] if abs(values[2]) <= _LARGEST_TORQUE else math.nan
+    row[TORQUE_VALUE] = values[2] if abs(values[2]) <= LARGEST_TORQUE else math.nan
     if kind == TORQUE:
         count[TORQUES] += 1
         if clock[LAST_CRANK] == 0:  # nothing to compare it with
@@ -177,26 +163,6 @@ def _follow(model, state, stamp, kind, values, out_target, steps, n):
     if kind == CRANK:
         n = reach_knots(model, state, out_target, steps, n)
     return n
-
-
-@kernel
-def _insert(state, stamp, kind, values):
-    """Put a sample where it belongs among those that wait; False for one that waits already."""
-    clock, stamps, kinds = state.clock, state.arrival_stamp, state.arrival_kind
-    i = clock[WAITING]
-    while i > 0 and (stamps[i - 1] > stamp or (stamps[i - 1] == stamp and kinds[i - 1] > kind)):
-        i -= 1
-    if i > 0 and stamps[i - 1] == stamp and kinds[i - 1] == kind:
-        return False
-    for j in range(clock[WAITING], i, -1):
-        stamps[j], kinds[j] = stamps[j - 1], kinds[j - 1]
-        for c in range(3):
-            state.arrival[j, c] = state.arrival[j - 1, c]
-    stamps[i], kinds[i] = stamp, kind
-    for c in range(3):
-        state.arrival[i, c] = values[c]
-    clock[WAITING] += 1
-    return True
 
 
 @kernel
@@ -224,54 +190,6 @@ def _release(model, state, horizon, out_values, out_target, steps, n):
 
 
 @kernel
-def _was_released(state, stamp, kind):
-    """Whether a sample that comes too late is one that has been here before."""
-    clock, j = state.clock, state.clock[TAIL] - 1
-    if stamp == clock[RELEASED]:
-        return (clock[RELEASED_KINDS] >> kind) & 1 == 1
-    while j >= 0 and state.queue_stamp[j] >= stamp:
-        if state.queue_stamp[j] == stamp and state.queue_kind[j] == kind:
-            return True
-        j -= 1
-    return False
-
-
-# what to do with an arrival: nothing, or put it in order, or that after a jump of the stamps
-_DROP, _KEEP, _JUMP = range(3)
-
-
-@kernel
-def _arrive(model, state, stamp, kind, values):
-    """What to do with a sample, by its stamp and those before it.
-
-    A stamp far from the others is believed only if another follows it: one bad clock reading must not cost
-    the track.
-    """
-    clock, count, ns = state.clock, state.counts, model.ns
-    ahead, candidate = stamp - clock[NEWEST], clock[CANDIDATE]
-    if clock[NEWEST] != 0 and (ahead > ns[BRIDGE] or ahead < -ns[JUMP]):
-        after = stamp - candidate
-        if candidate != 0 and -ns[WINDOW] <= after <= ns[BRIDGE]:
-            if after == 0 and kind == clock[CANDIDATE_KIND]:
-                count[DUPLICATES] += 1
-                return _DROP
-            return _JUMP
-        if candidate != 0:
-            count[STRAY] += 1
-        clock[CANDIDATE], clock[CANDIDATE_KIND] = stamp, kind
-        for c in range(3):
-            state.candidate[c] = values[c]
-        return _DROP
-    if candidate != 0:
-        count[STRAY] += 1
-        clock[CANDIDATE] = 0
-    if stamp < clock[RELEASED] or (stamp == clock[RELEASED] and _was_released(state, stamp, kind)):
-        count[DUPLICATES if _was_released(state, stamp, kind) else LATE] += 1
-        return _DROP
-    return _KEEP
-
-
-@kernel
 def _take_new_time_base(state, steps, n):
     """After a jump of the stamps, once all that waited has gone: start from the sample that began it."""
     clock, stamp = state.clock, state.clock[CANDIDATE]
@@ -280,7 +198,7 @@ def _take_new_time_base(state, steps, n):
         n = lose(state, stamp, LOST_BY_JUMP, steps, n)
         clock[RELEASED], clock[RELEASED_KINDS], clock[OUT_SINCE] = 0, 0, 0
     clock[NEWEST], clock[CANDIDATE] = stamp, 0
-    _insert(state, stamp, clock[CANDIDATE_KIND], state.candidate)
+    insert(state, stamp, clock[CANDIDATE_KIND], state.candidate)
     return n
 
 
@@ -297,25 +215,25 @@ def track(model, state, stamp, kind, fault, angle, velocity, torque, work, steps
     values, released, target = work[0], work[1], work[2]
     for i in range(stamp.shape[0]):
         count[RECEIVED] += 1
-        found = _fault(stamp[i], kind[i], fault[i], angle[i], torque[i])
+        found = find_fault(stamp[i], kind[i], fault[i], angle[i], torque[i])
         if found != NO_FAULT:
             count[FAULTY + found] += 1
             continue
         values[0], values[1], values[2] = angle[i], velocity[i], torque[i]
-        if not abs(values[1]) <= _LARGEST_RATE:
+        if not abs(values[1]) <= LARGEST_RATE:
             values[1] = math.nan
-        decision = _arrive(model, state, stamp[i], kind[i], values)
-        while decision != _DROP:
+        decision = arrive(model, state, stamp[i], kind[i], values)
+        while decision != DROP_IT:
             horizon = clock[NEWEST]  # after a jump all that waits goes first
-            if decision == _KEEP:
-                if not _insert(state, stamp[i], kind[i], values):
+            if decision == KEEP_IT:
+                if not insert(state, stamp[i], kind[i], values):
                     count[DUPLICATES] += 1
                     break
                 clock[NEWEST] = max(clock[NEWEST], stamp[i])
                 horizon = clock[NEWEST] - model.ns[WINDOW]
             n = _release(model, state, horizon, released, target, steps, n)
-            if decision == _KEEP:
+            if decision == KEEP_IT:
                 break
             n = _take_new_time_base(state, steps, n)
-            decision = _KEEP
+            decision = KEEP_IT
     return n

@@ -258,7 +258,7 @@ def test_it_can_walk_backwards_as_commanded(leg, gait):
 
 
 @pytest.mark.parametrize(
-    "name, value", [("wear_acceleration", np.nan), ("torque_bandwidth_hz", 0.0), ("load_gain", 1.5)]
+    "name, value", [("wear_acceleration", np.nan), ("torque_bandwidth_hz", 0.0), ("load_shape", "round")]
 )
 def test_senseless_settings_are_refused(name, value, refused):
     refused(TwinSettings, name, value)

@@ -1,0 +1,200 @@
+"""The leg that follows the tracker's steps, and what is to be done where its kernel stops."""
+
+from typing import NamedTuple
+
+import numpy as np
+
+from leg_wear_monitor.dynamics.clearance_run import ClearanceStepper, usual_intervals
+from leg_wear_monitor.dynamics.clearance_run import Snapshot as StepperSnapshot
+from leg_wear_monitor.dynamics.run import DONE, INVALID_DRIVE, PUSHED_THROUGH, STEP_TOO_SMALL, Setup
+from leg_wear_monitor.dynamics.tally import new_tally
+from leg_wear_monitor.mechanism.arrays import Floats
+from leg_wear_monitor.mechanism.ideal import TURN
+from leg_wear_monitor.twin import steps as told
+from leg_wear_monitor.twin.cycle import clear_tally, clearances, cycle_figures, torque_figures
+from leg_wear_monitor.twin.estimate import LoadEstimate, find
+from leg_wear_monitor.twin.figures import CycleFigures, Event, Happening, SampleFigures
+from leg_wear_monitor.twin.leg_kernel import CYCLE, LEFT, NEEDS_START, TOLD, follow
+from leg_wear_monitor.twin.leg_state import (
+    AFRESH,
+    ANCHORED,
+    BASE,
+    CUT,
+    CYCLE_BEGIN,
+    CYCLE_BRIDGED,
+    CYCLES,
+    FAILED_AT,
+    FAILED_NS,
+    FILTERING,
+    LOOKS,
+    NUMBER,
+    PIECE_BEGIN,
+    PIECE_END,
+    RUNNING,
+    TURNS_BEFORE,
+    WHOLE,
+    LegState,
+    clear_sums,
+    leg_state,
+    room_for_looks,
+)
+from leg_wear_monitor.twin.load import FootLoad
+from leg_wear_monitor.twin.settings import TwinSettings
+from leg_wear_monitor.twin.steps import BEGIN, CODE, EXTRA, MOVE, TURNS, Steps
+
+_HAPPENINGS = {
+    told.LOST_IN_GAP: Happening.LOST_IN_GAP,
+    told.LOST_BY_OUTLIERS: Happening.LOST_BY_OUTLIERS,
+    told.LOST_BY_OVERFLOW: Happening.LOST_BY_OVERFLOW,
+    told.LOST_BY_JUMP: Happening.BACKWARD_JUMP,
+    told.STOPPED: Happening.STOPPED,
+    told.MOVING: Happening.MOVING,
+    told.REVERSED: Happening.REVERSED,
+}
+_FAILURES = {
+    STEP_TOO_SMALL: Happening.STEP_TOO_SMALL,
+    PUSHED_THROUGH: Happening.PUSHED_THROUGH,
+    INVALID_DRIVE: Happening.INVALID_DRIVE,
+}
+
+
+class FollowerSnapshot(NamedTuple):
+    """All of a follower; plain arrays."""
+
+    stepper: StepperSnapshot
+    leg: tuple[np.ndarray, ...]
+    tally: tuple[np.ndarray, ...]
+    before: Floats
+    estimate: Floats
+
+
+class LegFollower:
+    """A leg with clearances that goes where the tracker's steps say.
+
+    Parameters
+    ----------
+    setup : Setup
+        Its surfaces are worn on the way.
+    settings : TwinSettings
+
+    Attributes
+    ----------
+    state : LegState
+    tally : Tally
+        Of the present gait cycle.
+    estimate : LoadEstimate
+    """
+
+    def __init__(self, setup: Setup, settings: TwinSettings) -> None:
+        self._setup, self._acts = setup, settings.estimate_load
+        self._load = FootLoad(setup.linkage, setup.contacts, settings.load_shape)
+        # a whole number of nanoseconds, so that stamps and the stepper's time cannot drift apart
+        interval = round(1.0e9 * TURN / abs(setup.speed) / usual_intervals(setup)) * 1.0e-9
+        self._stepper = ClearanceStepper(setup, interval, tables=self._load.tables)
+        self.state: LegState = leg_state(len(setup.loose))
+        self.tally = new_tally(len(setup.linkage.mechanism.joints))
+        self.estimate = LoadEstimate(settings.load_limit_n)
+        self._cutoff = TURN * settings.torque_bandwidth_hz
+        self._before = self.clearances
+
+    @property
+    def clearances(self) -> Floats:
+        """Mean and largest radial clearance (2, loose) [m]."""
+        return clearances(self._setup.contacts, self._setup.surfaces.depth)
+
+    def take_surfaces(self, depth: Floats) -> None:
+        """Take over wear depths (loose, 2, N) [m]; growth counts from there for the joints that change."""
+        own, state = self._setup.surfaces.depth, self._stepper.state
+        changed = (own != depth).any(axis=(1, 2))
+        own[:] = depth
+        state.pending[changed] = 0.0
+        state.local[changed] = np.nan  # clearances are looked up anew
+        self._before[:, changed] = self.clearances[:, changed]
+
+    def follow(self, steps: Steps, n: int, cycles: list[CycleFigures], events: list[Event]) -> SampleFigures:
+        """Follow n steps; adds gait cycles that end and what happens, returns the samples passed."""
+        mark, i = self.state.mark, 0
+        seen = room_for_looks(n, len(self._setup.loose))
+        mark[LOOKS] = 0
+        while i < n:
+            reason, i, k = follow(
+                self._stepper.model, self._setup.surfaces.feeds_back, self._stepper.state, self.tally,
+                self._stepper.work, self._cutoff, self._load.signature, self.state, steps, i, n, seen,
+            )  # fmt: skip
+            if reason == CYCLE:
+                self._end_cycle(k, cycles)
+            elif reason == NEEDS_START:
+                events.append(self._start(steps, i))
+                i += int(steps.what[i, CODE] != MOVE)
+            elif reason in (LEFT, TOLD):
+                if reason == LEFT:
+                    mark[RUNNING], mark[AFRESH] = 0, 0
+                events.append(Event(int(steps.what[i, BEGIN]), _HAPPENINGS[int(steps.what[i, EXTRA])]))
+                i += 1
+            elif reason != DONE:
+                joint = self._setup.loose[k] if k >= 0 else None
+                events.append(Event(int(mark[FAILED_AT]), _FAILURES[reason], joint))
+        m = int(mark[LOOKS])
+        stamp, kind, (angle, torque) = seen.stamp[:m, 0], seen.stamp[:m, 1], seen.figure[:m].T
+        return SampleFigures(stamp, kind, angle, torque, seen.force[:m])
+
+    def _start(self, steps: Steps, i: int) -> Event:
+        """Set the leg in motion where step i begins: journals centred, wear as it was."""
+        mark, stamp = self.state.mark, int(steps.what[i, BEGIN])
+        angle, speed = steps.motion[i, :2]
+        self._stepper.init(float(angle), float(speed))
+        if mark[AFRESH]:
+            mark[FAILED_NS] += stamp - mark[FAILED_AT]
+        for where in (BASE, PIECE_BEGIN, PIECE_END):
+            mark[where] = stamp
+        for where in (AFRESH, ANCHORED, CUT, FILTERING, CYCLE_BEGIN, CYCLE_BRIDGED):
+            mark[where] = 0
+        mark[RUNNING], mark[TURNS_BEFORE] = 1, steps.what[i, TURNS]
+        self.state.polynomial[:] = 0.0, angle, speed, 0.0, 0.0, 0.0, 0.0
+        self.state.value[:], self.state.force[:] = 0.0, 0.0
+        clear_sums(self.state)
+        clear_tally(self.tally)
+        return Event(stamp, Happening.ACQUIRED)
+
+    def _end_cycle(self, stamp: int, cycles: list[CycleFigures]) -> None:
+        """Report the gait cycle that ends at a stamp, if it is a whole one; begin the next."""
+        mark, depth = self.state.mark, self._setup.surfaces.depth
+        if mark[WHOLE]:
+            mark[CYCLES] += 1
+            # two like stages of a low-pass leave noise of so many independent samples
+            independent = max(0.25 * self._cutoff * self.tally.time[0], 1.0)
+            sums = self.state.sums
+            found = find(sums, self.state.gram, self.state.along, sums[NUMBER] / independent)
+            if found is not None:
+                self.estimate.take(found, self._acts)
+                self._load.set(self.estimate.acting)
+            torque = torque_figures(sums, found, self.estimate)
+            cycles.append(
+                cycle_figures(
+                    self.state, stamp, self._setup.contacts, depth, self._before, self.tally, torque
+                )
+            )
+        mark[CYCLE_BEGIN], mark[CYCLE_BRIDGED] = stamp, 0
+        clear_sums(self.state)
+        clear_tally(self.tally)
+        self._before = self.clearances
+
+    def snapshot(self) -> FollowerSnapshot:
+        """A copy of the whole state, surfaces included."""
+        return FollowerSnapshot(
+            self._stepper.snapshot(),
+            tuple(part.copy() for part in self.state),
+            tuple(part.copy() for part in self.tally),
+            self._before.copy(),
+            self.estimate.state.copy(),
+        )
+
+    def restore(self, snapshot: FollowerSnapshot) -> None:
+        """Go back to a snapshot of a follower of the same setup and settings."""
+        self._stepper.restore(snapshot.stepper)
+        for own, saved in ((self.state, snapshot.leg), (self.tally, snapshot.tally)):
+            for part, values in zip(own, saved, strict=True):
+                part[...] = values
+        self._before = snapshot.before.copy()
+        self.estimate.state[:] = snapshot.estimate
+        self._load.set(self.estimate.acting)

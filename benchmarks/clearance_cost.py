@@ -68,11 +68,12 @@ def parts(setup: Setup) -> list[Part]:
     while not (stepper.state.approach > 0.0).all():
         stepper.advance(polynomial, stepper.time + stepper.model.interval, tally)
     all_of_it = (stepper.model, stepper.state, stepper.work)
-    loops.evaluations(1, 0.0, *all_of_it)
+    contact = (stepper.model, setup.surfaces, stepper.state, stepper.work)
+    loops.evaluations(1, 0.0, *contact)
     added = np.zeros((len(setup.loose), tally.integral.shape[1]))
     return [
-        Part("trial step", 1.0, "trial", _least(loops.trials, *all_of_it)),
-        Part("  contact forces and their product", 2.0, "", _least(loops.evaluations, *all_of_it)),
+        Part("trial step", 1.0, "trial", _least(loops.trials, *contact)),
+        Part("  contact forces and their product", 2.0, "", _least(loops.evaluations, *contact)),
         Part("  factorise", 1.0, "", _least(loops.factorisations, *all_of_it)),
         Part("  solve", 3.0, "", _least(loops.solutions, *all_of_it)),
         Part("integrals of the joints", 1.0, "taken", _least(loops.integrals, *all_of_it, added)),
@@ -86,7 +87,7 @@ def parts(setup: Setup) -> list[Part]:
             "wear of a joint",
             0.5 * len(setup.loose),
             "interval",
-            _least(loops.wear, setup.surfaces, *all_of_it),
+            _least(loops.wear, *contact),
         ),
     ]
 
@@ -97,9 +98,8 @@ def floor(setup: Setup) -> float:
     stepper.advance(steady_drive(0.0, setup.speed), TURN / abs(setup.speed), tally)
     d = 2 * len(setup.loose)
     e, v = math.sqrt(0.5) * (np.repeat(setup.contacts.clearance, 2) + 1.0e-6), np.full(d, 0.03)
-    return _least(
-        loops.floors, stepper.model.law, stepper.state.local, e, v, np.ones((d, d)), np.zeros(d), np.zeros(d)
-    )
+    law, clearance = stepper.model.law, setup.contacts.clearance
+    return _least(loops.floors, law, clearance, e, v, np.ones((d, d)), np.zeros(d), np.zeros(d))
 
 
 def _least(loop: Callable[..., None], *arguments: object) -> float:

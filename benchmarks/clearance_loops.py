@@ -8,17 +8,16 @@ import math
 
 from leg_wear_monitor.contact.friction import friction_force
 from leg_wear_monitor.contact.normal import damped_force, elastic_force
-from leg_wear_monitor.dynamics.clearance import take_tables
+from leg_wear_monitor.dynamics.clearance import hold_eccentricities, take_tables
 from leg_wear_monitor.dynamics.clearance_contact import (
     A0,
-    CLEARANCE,
     E0,
+    FRESH_STIFFNESS,
     FRICTION_COEFFICIENT,
     FRICTION_LAW,
     HYSTERESIS_FACTOR,
     K1E,
     K1V,
-    LOCAL_STIFFNESS,
     RAMP_0,
     RAMP_1,
     V0,
@@ -35,16 +34,16 @@ STEP = 1.0e-5  # s
 
 
 @entry
-def floors(count, chain, law, local, e, v, inverse_mass, force, out_a):
+def floors(count, chain, law, clearance, e, v, inverse_mass, force, out_a):
     for _ in range(count):
         e[0] += chain * out_a[0]
         for i in range(e.shape[0]):
             out_a[i] = 0.0
-        for k in range(local.shape[0]):
+        for k in range(clearance.shape[0]):
             ex, ey, vx, vy = e[2 * k], e[2 * k + 1], v[2 * k], v[2 * k + 1]
             length = math.sqrt(ex * ex + ey * ey)
             nx, ny = ex / length, ey / length
-            elastic = elastic_force(local[k, LOCAL_STIFFNESS], length - local[k, CLEARANCE])
+            elastic = elastic_force(law[k, FRESH_STIFFNESS], length - clearance[k])
             f_n = damped_force(elastic, law[k, HYSTERESIS_FACTOR], nx * vx + ny * vy)
             mu, code, slip = law[k, FRICTION_COEFFICIENT], law[k, FRICTION_LAW], nx * vy - ny * vx
             f_t = friction_force(code, mu, law[k, RAMP_0], law[k, RAMP_1], f_n, slip)
@@ -55,22 +54,18 @@ def floors(count, chain, law, local, e, v, inverse_mass, force, out_a):
 
 
 @entry
-def trials(count, chain, model, state, work):
-    x, law, now, system = work.x, model.law, work.now, work.system
+def trials(count, chain, model, surfaces, state, work):
+    x, now, system = work.x, work.now, work.system
     for _ in range(count):
-        error = try_step(
-            law, model.tolerance, state.local, state.approach, STEP, now, system, x, work.start, work.end
-        )
+        error = try_step(model, surfaces, state.approach, STEP, 0.0, now, system, x, work.start, work.end)
         x[E0, 0] += chain * min(error, 1.0)
 
 
 @entry
-def evaluations(count, chain, model, state, work):
+def evaluations(count, chain, model, surfaces, state, work):
     x = work.x
     for _ in range(count):
-        accelerate_clearances(
-            model.law, state.local, state.approach, work.now, 0.0, x, E0, V0, A0, work.start
-        )
+        accelerate_clearances(model, surfaces, state.approach, work.now, 0.0, x, E0, V0, A0, work.start)
         x[E0, 0] += chain * x[A0, 0]
 
 
@@ -94,7 +89,7 @@ def solutions(count, chain, model, state, work):
 def integrals(count, chain, model, state, work, added):
     for _ in range(count):
         h = STEP + chain * added[0, 0]
-        integrate_joints(model.law, state.local, state.approach, h, work.start, work.end, added)
+        integrate_joints(model.law, state.approach, h, work.start, work.end, added)
 
 
 @entry
@@ -133,6 +128,7 @@ def tables(count, chain, model, state, work):
     for i in range(count):
         angle = 0.003 * i + chain * work.now.row[0]
         take_tables(model.tables, angle, work.now.speed[0], 0.0, work.now)
+        hold_eccentricities(state.e, state.v, 0.0, work.now)
 
 
 @entry
@@ -143,7 +139,7 @@ def ideal_reactions(count, chain, model, state, work):
 
 
 @entry
-def wear(count, chain, surfaces, model, state, work):
+def wear(count, chain, model, surfaces, state, work):
     for _ in range(count):
         ex, ey = state.e[0] + chain * surfaces.depth[0, 0, 0], state.e[1]
         deposit_wear(model.contacts, surfaces, 0, ex, ey, 0.0, 0.0, 1.0e-9, work.weight)

@@ -8,7 +8,7 @@ from leg_wear_monitor.kernel import kernel
 @kernel
 def journal_contact(ex, ey, clearance):
     """Penetration [m] and unit normal of a journal at eccentricity (ex, ey) [m]; negative when apart."""
-    e = math.hypot(ex, ey)
+    e = math.sqrt(ex * ex + ey * ey)
     if e == 0.0:
         return -clearance, 1.0, 0.0
     return e - clearance, ex / e, ey / e
@@ -22,7 +22,7 @@ def worn_contact(ex, ey, clearance, slope):
     so the normal force has a potential.
     """
     delta, rx, ry = journal_contact(ex, ey, clearance)
-    tilt = slope / max(math.hypot(ex, ey), clearance)  # a journal that touches is at least that far out
+    tilt = slope / (clearance + max(delta, 0.0))  # a journal that touches is at least that far out
     scale = 1.0 / math.sqrt(1.0 + tilt * tilt)
     return delta * scale, (rx + tilt * ry) * scale, (ry - tilt * rx) * scale, scale
 

@@ -6,7 +6,7 @@ from typing import NamedTuple
 import numpy as np
 
 from leg_wear_monitor.contact.arrays import ContactArrays
-from leg_wear_monitor.dynamics.clearance_contact import COLUMNS, LOCAL, TO_X, VECTORS
+from leg_wear_monitor.dynamics.clearance_contact import COLUMNS, TO_ANGLE, VECTORS
 from leg_wear_monitor.dynamics.clearance_layout import motion_shapes, views
 from leg_wear_monitor.dynamics.clearance_tables import ClearanceTables
 from leg_wear_monitor.dynamics.rosenbrock import ContactSystem, contact_system
@@ -22,7 +22,7 @@ class ClearanceModel(NamedTuple):
 
     ``interval`` [s] between the instants at which the tables are taken and the drive is asked: the state
     exists at whole numbers of them. ``tolerance`` (2,) local error allowed in a step, of eccentricities
-    [m] and of their rates [m/s]; ``law`` (k, 5) as `contact_laws` gives them; ``damped`` 1 with dampers.
+    [m] and of their rates [m/s]; ``law`` (k, 6) as `contact_laws` gives them; ``damped`` 1 with dampers.
     """
 
     contacts: ContactArrays
@@ -40,7 +40,7 @@ class ClearanceState(NamedTuple):
     since time 0; ``e`` and ``v`` (d,) eccentricities [m] and rates; ``drive`` (3,) angle, speed and
     acceleration of the crank; ``step`` (1,) next step to try [s]; ``approach`` (k,) approach speed of each
     joint in contact, 0 for the others; ``recent`` (k, 4) its last two samples of time and normal force;
-    ``local`` (k, LOCAL) the clearance around a direction; ``pending`` (k, 4) the Archard integral not yet
+    ``pending`` (k, 4) the Archard integral not yet
     worn off [J], and the same times the normal and the eccentricity it acted at. ``depth`` (k, 2, N) is
     the wear of bushing and journal [m].
     """
@@ -54,21 +54,26 @@ class ClearanceState(NamedTuple):
     step: Floats
     approach: Floats
     recent: Floats
-    local: Floats
     pending: Floats
 
 
 class Now(NamedTuple):
     """Tables at the present crank angle: ``row`` (w,) of the table ``motion`` and its parts, `motion_shapes`.
 
-    ``speed`` (2,) and acceleration of the crank; ``bare`` (d,) accelerations without contact at them, and
-    ``bare_e`` (d, d) the same times e.
+    ``speed`` (2,) and acceleration of the crank. At them and at the eccentricities in the middle of the
+    interval: ``bare`` (d,) accelerations without contact at rest; the drive torque at rest is ``torque_0``
+    (1,), its part by e'' is ``torque_by_a`` (d,), that by e' is ``torque_by_v`` (d,), that by e
+    ``torque_by_e`` (d,). ``toward`` (k, 3) the directions of the eccentricities at the interval's start.
     """
 
     row: Floats
     speed: Floats
     bare: Floats
-    bare_e: Floats
+    torque_0: Floats
+    torque_by_a: Floats
+    torque_by_v: Floats
+    torque_by_e: Floats
+    toward: Floats
     inverse_mass: Floats
     coriolis: Floats
     free: Floats
@@ -123,13 +128,12 @@ def clearance_state(depth: Floats, angle: float, speed: float) -> ClearanceState
     k = len(depth)
     shapes = {
         "intervals": (1,), "e": (2 * k,), "v": (2 * k,), "drive": (3,), "step": (1,),
-        "approach": (k,), "recent": (k, 4), "local": (k, LOCAL), "pending": (k, 4),
+        "approach": (k,), "recent": (k, 4), "pending": (k, 4),
     }  # fmt: skip
     motion = np.zeros(sum(math.prod(shape) for shape in shapes.values()))
     state = ClearanceState(depth, motion, **views(motion, shapes))
     state.drive[:] = angle, speed, 0.0
     state.step[0] = 1.0e-6
-    state.local[:, TO_X] = np.nan  # nowhere looked up yet
     return state
 
 
@@ -138,8 +142,19 @@ def clearance_work(model: ClearanceModel, state: ClearanceState) -> ClearanceWor
     loose, d = len(state.approach), len(state.e)
     row = np.zeros(model.tables.motion.shape[1])
     parts = views(row, motion_shapes(loose, model.damped > 0))
+    now = Now(
+        row=row,
+        speed=np.zeros(2),
+        bare=np.zeros(d),
+        torque_0=np.zeros(1),
+        torque_by_a=np.zeros(d),
+        torque_by_v=np.zeros(d),
+        torque_by_e=np.zeros(d),
+        toward=np.zeros((loose, TO_ANGLE + 1)),
+        **parts,
+    )
     return ClearanceWork(
-        now=Now(row=row, speed=np.zeros(2), bare=np.zeros(d), bare_e=np.zeros((d, d)), **parts),
+        now=now,
         system=contact_system(loose),
         start=np.zeros((loose, COLUMNS)),
         end=np.zeros((loose, COLUMNS)),
@@ -168,19 +183,38 @@ def blend(points, angle):
 @kernel
 def take_tables(tables, angle, speed, acceleration, out_now):
     """Tables at a crank angle [rad], speed [rad/s] and acceleration [rad/s^2]."""
-    motion, row, bare, free = tables.motion, out_now.row, out_now.bare, out_now.free
-    bare_e, free_e, square = out_now.bare_e, out_now.free_e, speed * speed
+    motion, row = tables.motion, out_now.row
     i, w = blend(motion.shape[0] - 1, angle)
     for j in range(row.shape[0]):
         row[j] = motion[i, j] + w * (motion[i + 1, j] - motion[i, j])
     out_now.speed[0], out_now.speed[1] = speed, acceleration
-    for j in range(bare.shape[0]):
-        bare[j] = free[0, j] + acceleration * free[1, j] + square * free[2, j]
-        for c in range(bare.shape[0]):
-            bare_e[j, c] = free_e[0, j, c] + acceleration * free_e[1, j, c] + square * free_e[2, j, c]
-    if out_now.viscous.shape[0] > 0:
-        for j in range(bare.shape[0]):
-            bare[j] += speed * out_now.viscous[j, bare.shape[0]]
+
+
+@kernel
+def hold_eccentricities(e, v, ahead, now):
+    """Put what depends on the eccentricities little in the tables, as if they were e + ahead v all the time.
+
+    Inside an interval it changes by a thousandth of e / L.
+    """
+    free, free_e, by, by_e, d = now.free, now.free_e, now.torque, now.torque_e, e.shape[0]
+    speed, acceleration = now.speed[0], now.speed[1]
+    square = speed * speed
+    now.torque_0[0] = by[0] + acceleration * by[1] + speed * (speed * by[2] + by[3])
+    for i in range(d):
+        now.bare[i] = free[0, i] + acceleration * free[1, i] + square * free[2, i]
+        now.torque_by_a[i] = now.torque_a[i]
+        now.torque_by_v[i] = speed * now.torque_v[0, i] + now.torque_v[1, i]
+        now.torque_by_e[i] = by_e[0, i] + acceleration * by_e[1, i] + square * by_e[2, i]
+    for j in range(d):
+        middle = e[j] + ahead * v[j]
+        for i in range(d):
+            turned = free_e[0, j, i] + acceleration * free_e[1, j, i] + square * free_e[2, j, i]
+            now.bare[i] += turned * middle
+            now.torque_by_a[i] += now.torque_ae[j, i] * middle
+            now.torque_by_v[i] += now.torque_ve[j, i] * (speed * middle)
+    if now.viscous.shape[0] > 0:
+        for i in range(d):
+            now.bare[i] += speed * now.viscous[i, d]
 
 
 @kernel

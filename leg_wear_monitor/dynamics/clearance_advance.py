@@ -7,29 +7,16 @@ into calls, and a call costs at most its intervals times a bounded number of ste
 
 import math
 
-from leg_wear_monitor.dynamics.clearance import ACCELERATION, ANGLE, SPEED, crank_between, take_tables
-from leg_wear_monitor.dynamics.clearance_contact import (
-    A0,
-    E0,
-    F_T,
-    V0,
-    accelerate_clearances,
-    turn_surfaces,
-)
+from leg_wear_monitor.dynamics.clearance import ACCELERATION, ANGLE, SPEED, crank_between
+from leg_wear_monitor.dynamics.clearance_contact import A0, E0, F_T, V0, accelerate_clearances
 from leg_wear_monitor.dynamics.clearance_outputs import (
     drive_torque,
-    half_impulse,
     outside_power,
     reactions,
+    sudden_impulse,
     toe_deviation,
 )
-from leg_wear_monitor.dynamics.clearance_start import (
-    RENEWAL,
-    follow_clearances,
-    load_state,
-    sample_start,
-    strays,
-)
+from leg_wear_monitor.dynamics.clearance_start import load_state, sample_start
 from leg_wear_monitor.dynamics.clearance_step import (
     gather_wear,
     integrate_joints,
@@ -60,6 +47,8 @@ from leg_wear_monitor.dynamics.touch import (
 )
 from leg_wear_monitor.kernel import copy_array, entry, kernel
 from leg_wear_monitor.wear.surfaces import Surfaces
+
+RENEWAL = 2  # intervals between two looks at the reactions of the ideal joints, and at the wear
 
 MOST_TRIALS = 20000  # steps tried in an interval before it is given up
 
@@ -103,9 +92,9 @@ def _interval(model, surfaces, state, polynomial, tally, work):
     angle, speed, acceleration = crank_between(work.crank, state.drive, interval)
     if not (abs(speed) < _FASTEST and abs(acceleration) * interval < _FASTEST):
         return INVALID_DRIVE, -1
-    take_tables(model.tables, angle, speed, acceleration, work.now)
-    load_state(model, surfaces, state, work)
-    sample_start(model, state, state.intervals[0] * interval, tally, work)
+    load_state(model, surfaces, state, angle, speed, acceleration, 0.5 * interval, work)
+    turned = -0.5 * interval * speed  # the tables are those of the interval's middle
+    sample_start(model, surfaces, state, turned, state.intervals[0] * interval, tally, work)
     status, k = _steps(model, surfaces, state, tally, work)
     if status != DONE:
         return status, k
@@ -122,6 +111,7 @@ def _steps(model, surfaces, state, tally, work):
     x, now, start, end, approach = work.x, work.now, work.start, work.end, state.approach
     contacts, interval = model.contacts, model.interval
     done, trials, cut = 0.0, 0, NEVER
+    speed = now.speed[0]
     _look_at_drive(now, x, start, work.drive_start, tally)
     while done < interval:
         left = interval - done
@@ -130,9 +120,8 @@ def _steps(model, surfaces, state, tally, work):
             h = 0.5 * left
         if cut < NEVER:
             h = cut
-        error = try_step(
-            model.law, model.tolerance, state.local, approach, h, now, work.system, x, start, end
-        )
+        turned = speed * (done + h - 0.5 * interval)
+        error = try_step(model, surfaces, approach, h, turned, now, work.system, x, start, end)
         trials += 1
         tally.steps[0] += 1
         if not error <= 1.0:
@@ -140,9 +129,6 @@ def _steps(model, surfaces, state, tally, work):
             cut = NEVER
             if state.step[0] < _SHORTEST_STEP or trials > MOST_TRIALS:
                 return STEP_TOO_SMALL, _pushed_through(contacts.bushing_radius, end)
-            continue
-        if surfaces.feeds_back and strays(end, state.local) and h > _SHORTEST_STEP:
-            cut = 0.5 * h
             continue
         share = first_touch(approach, h, start, end)
         if share < 1.0 and share * h > _SHORTEST_STEP and trials <= MOST_TRIALS:
@@ -164,7 +150,7 @@ def _take(model, surfaces, state, t, h, tally, work):
     """Take the trial step of length h [s] from time t: sums, wear, contacts; make its end the next start."""
     x, now, start, end, contacts = work.x, work.now, work.start, work.end, model.contacts
     tally.steps[1] += 1
-    integrate_joints(model.law, state.local, state.approach, h, start, end, work.added)
+    integrate_joints(model.law, state.approach, h, start, end, work.added)
     gather_wear(work.added, start, end, state.pending)
     for k in range(work.added.shape[0]):
         for r in range(JOINT_RATES):
@@ -174,19 +160,12 @@ def _take(model, surfaces, state, t, h, tally, work):
         state.approach, state.recent, tally.peak, tally.impact, tally.impacts,
     )  # fmt: skip
     shift_start(now, x)
-    sudden = half_impulse(x)
     copy_array(end, start)
     wear_what_turned(contacts, surfaces, state.approach, start, now.angle, state.pending, work.weight)
-    if surfaces.feeds_back:
-        turn_surfaces(now.speed[0] * h, state.local)
-        beyond = now.speed[0] * (t + h - (state.intervals[0] + 0.5) * model.interval)
-        if follow_clearances(contacts, surfaces, start, now, beyond, state.local):
-            sample_start(model, state, t + h, tally, work)
     _look_at_drive(now, x, start, work.drive_end, tally)
-    sudden += half_impulse(x)
     toe_deviation(now, x, tally.response)
     first, last = work.drive_start, work.drive_end
-    impulse = 0.5 * h * (first[SMOOTH] + last[SMOOTH]) + sudden
+    impulse = 0.5 * h * (first[SMOOTH] + last[SMOOTH]) + sudden_impulse(now, x)
     tally.drive_integral[TORQUE] += impulse
     tally.drive_integral[TORQUE_SQUARED] += 0.5 * h * (first[WHOLE] ** 2 + last[WHOLE] ** 2)
     tally.drive_integral[POWER] += impulse * now.speed[0] + 0.5 * h * (first[OUTSIDE] + last[OUTSIDE])
@@ -196,11 +175,11 @@ def _take(model, surfaces, state, t, h, tally, work):
 @kernel
 def _look_at_drive(now, x, sample, out_drive, tally):
     """Drive torque, its part without the eccentricities' accelerations, and the power of loads, (3,)."""
-    torque, sudden, ideal = drive_torque(now, x, sample)
+    torque, sudden = drive_torque(now, x, sample)
     out_drive[WHOLE], out_drive[SMOOTH], out_drive[OUTSIDE] = torque, torque - sudden, outside_power(now, x)
     tally.drive_range[0] = min(tally.drive_range[0], torque)
     tally.drive_range[1] = max(tally.drive_range[1], torque)
-    tally.response[TORQUE_ERROR] = max(tally.response[TORQUE_ERROR], abs(torque - ideal))
+    tally.response[TORQUE_ERROR] = max(tally.response[TORQUE_ERROR], abs(torque - now.torque_0[0]))
 
 
 @kernel
@@ -255,9 +234,8 @@ def observe(model, feeds_back, state, work):
     surfaces, now, x = Surfaces(state.depth, feeds_back), work.now, work.x
     copy_array(state.motion, work.backup)
     angle, speed = state.drive[ANGLE], state.drive[SPEED]
-    take_tables(model.tables, angle, speed, state.drive[ACCELERATION], now)
-    load_state(model, surfaces, state, work)
-    accelerate_clearances(model.law, state.local, state.approach, now, 0.0, x, E0, V0, A0, work.start)
+    load_state(model, surfaces, state, angle, speed, state.drive[ACCELERATION], 0.0, work)
+    accelerate_clearances(model, surfaces, state.approach, now, 0.0, x, E0, V0, A0, work.start)
     copy_array(work.backup, state.motion)
     reactions(model.tables, angle, now, x, work.start, work.reaction)
     work.reaction[0] = drive_torque(now, x, work.start)[0]

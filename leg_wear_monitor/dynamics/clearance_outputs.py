@@ -3,45 +3,36 @@
 import math
 
 from leg_wear_monitor.dynamics.clearance import blend
-from leg_wear_monitor.dynamics.clearance_contact import A0, CAM_TORQUE, DV, E0, F_T, TA, TV, V0
+from leg_wear_monitor.dynamics.clearance_contact import A0, CAM, DV, E0, F_T, V0
+from leg_wear_monitor.dynamics.touch import F_N
 from leg_wear_monitor.kernel import kernel
 
 
 @kernel
 def drive_torque(now, x, sample):
-    """Torque of the drive [N m] at rows E0, V0 and A0; the part by e'' alone; its value in the ideal linkage.
-
-    Leaves the torque by each of e'' in row TA.
-    """
-    speed, acceleration, d = now.speed[0], now.speed[1], x.shape[1]
-    by, by_e, ae, vv, ve = now.torque, now.torque_e, now.torque_ae, now.torque_vv, now.torque_ve
-    ideal = by[0] + acceleration * by[1] + speed * (speed * by[2] + by[3])
+    """Torque of the drive [N m] at rows E0, V0 and A0, and the part of it by e'' alone."""
+    d, vv = x.shape[1], now.torque_vv
+    sudden, torque = 0.0, now.torque_0[0]
     for i in range(d):
-        x[TA, i] = now.torque_a[i]
-        x[TV, i] = speed * now.torque_v[0, i] + now.torque_v[1, i]
-    for j in range(d):
-        for i in range(d):
-            x[TA, i] += ae[j, i] * x[E0, j]
-            x[TV, i] += vv[j, i] * x[V0, j] + ve[j, i] * (speed * x[E0, j])
-    sudden, torque = 0.0, ideal
-    for i in range(d):
-        sudden += x[TA, i] * x[A0, i]
-        torque += x[TV, i] * x[V0, i]
-        torque += (by_e[0, i] + acceleration * by_e[1, i] + speed * speed * by_e[2, i]) * x[E0, i]
+        by_v = now.torque_by_v[i]
+        for j in range(d):
+            by_v += vv[i, j] * x[V0, j]
+        torque += by_v * x[V0, i] + now.torque_by_e[i] * x[E0, i]
+        sudden += now.torque_by_a[i] * x[A0, i]
     for k in range(sample.shape[0]):
-        torque += now.torque_t[k] * sample[k, F_T] + sample[k, CAM_TORQUE]
-    return torque + sudden, sudden, ideal
+        torque += now.torque_t[k] * sample[k, F_T] + sample[k, F_N] * sample[k, CAM]
+    return torque + sudden, sudden
 
 
 @kernel
-def half_impulse(x):
-    """Half the integral over a step [N m s] of the drive torque's part by e'', by row TA at one end.
+def sudden_impulse(now, x):
+    """Integral over a step [N m s] of the drive torque's part by e''.
 
     By the change of the rates, row DV: exact where impacts make the torque spiky.
     """
     total = 0.0
     for i in range(x.shape[1]):
-        total += 0.5 * x[TA, i] * x[DV, i]
+        total += now.torque_by_a[i] * x[DV, i]
     return total
 
 

@@ -27,7 +27,6 @@ from leg_wear_monitor.mechanism.ideal import TURN
 from leg_wear_monitor.mechanism.spec import Mechanism, SpeedDrive
 
 INTERVALS = 2048  # of a turn at the setup's speed
-INTERVALS_WORN = 8192  # the same where wear feeds back: worn flanks turn past the contacts
 TOLERANCE_M = 3.0e-9  # local error of a step in the eccentricities [m]: energy adds up to 5e-4 of the losses
 TOLERANCE_RATE = 1.0e4  # 1/s: the same for their rates, over the time a contact takes
 
@@ -47,8 +46,8 @@ class ClearanceStepper:
     setup : Setup
         Its surfaces are worn as the stepper goes.
     interval_s : float, optional
-        Time between the instants at which the state exists; `usual_intervals` a turn at the setup's speed if
-        not given.
+        Time between the instants at which the state exists; `INTERVALS` a turn at the setup's speed if not
+        given.
     tolerance_m : float
         Local error allowed in a step; that of the rates is 1e4 times it per second.
     tables : ClearanceTables, optional
@@ -74,7 +73,7 @@ class ClearanceStepper:
         self.model = ClearanceModel(
             contacts=setup.contacts,
             tables=tables or build_tables(setup.linkage, setup.contacts),
-            interval=interval_s or TURN / abs(setup.speed) / usual_intervals(setup),
+            interval=interval_s or TURN / abs(setup.speed) / INTERVALS,
             tolerance=np.array([1.0, 1.0 / TOLERANCE_RATE]) / tolerance_m,
             law=contact_laws(setup.contacts),
             damped=int(is_damped(setup.linkage.arrays)),
@@ -123,11 +122,6 @@ class ClearanceStepper:
         self.state.depth[:] = snapshot.depth
 
 
-def usual_intervals(setup: Setup) -> int:
-    """Intervals of a turn that keep the energy's balance, with worn surfaces or without."""
-    return INTERVALS_WORN if setup.surfaces.feeds_back else INTERVALS
-
-
 def needs_speed(mechanism: Mechanism) -> ConfigError:
     """Error for a mechanism that a torque drives."""
     return ConfigError(
@@ -148,7 +142,7 @@ class ClearanceRun:
     def __init__(self, setup: Setup, samples: int = 0) -> None:
         if not isinstance(setup.linkage.mechanism.drive, SpeedDrive):
             raise needs_speed(setup.linkage.mechanism)
-        intervals = max(samples, 1) * math.ceil(usual_intervals(setup) / max(samples, 1))
+        intervals = max(samples, 1) * math.ceil(INTERVALS / max(samples, 1))
         self.stepper = ClearanceStepper(setup, TURN / abs(setup.speed) / intervals)
         self._setup = setup
         self._polynomial = steady_drive(0.0, setup.speed)

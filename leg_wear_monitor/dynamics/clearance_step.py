@@ -16,12 +16,12 @@ from leg_wear_monitor.dynamics.clearance_contact import (
     F_T,
     FRICTION_COEFFICIENT,
     FRICTION_LAW,
+    HERTZ,
     HYSTERESIS_FACTOR,
     K1E,
     K1V,
     K2E,
     K2V,
-    LOCAL_STIFFNESS,
     RAMP_0,
     RAMP_1,
     RE,
@@ -50,32 +50,34 @@ from leg_wear_monitor.wear.surfaces import deposit_wear
 
 @kernel
 def drift(now, x):
-    """Acceleration that is not contact, at rows E0 and V0: gravity, crank, Coriolis, dampers; row DRIFT."""
-    coriolis, bare_e, viscous, speed, d = now.coriolis, now.bare_e, now.viscous, now.speed[0], x.shape[1]
+    """Acceleration that is not contact, at row V0: gravity, crank, Coriolis, dampers; row DRIFT."""
+    coriolis, viscous, d = now.coriolis, now.viscous, x.shape[1]
     for i in range(d):
         x[DRIFT, i] = now.bare[i]
     for j in range(d):
+        rate = now.speed[0] * x[V0, j]
         for i in range(d):
-            x[DRIFT, i] += coriolis[j, i] * (speed * x[V0, j]) + bare_e[j, i] * x[E0, j]
+            x[DRIFT, i] += coriolis[j, i] * rate
     for i in range(viscous.shape[0]):
         for j in range(d):
             x[DRIFT, i] += viscous[i, j] * x[V0, j]
 
 
 @kernel
-def try_step(law, tolerance, local, approach, h, now, system, x, start, end):
+def try_step(model, surfaces, approach, h, turned, now, system, x, start, end):
     """Step of length h [s] from rows E0, V0, A0 of x to E1, V1, A1 and sample ``end``; error over tolerance.
 
+    ``turned`` [rad] is by how much the crank is beyond the angle of the tables at the step's end.
     The error is that of the second-order step against the cubic through the accelerations at both ends,
     filtered like a stage so that stiff contacts do not exaggerate it (as Shampine does).
     """
-    d = x.shape[1]
+    d, tolerance = x.shape[1], model.tolerance
     m = factorise_contacts(h, now.inverse_mass, now.speed[0], start, system)
     solve_contacts(h, system, m, 1.0, x, V0, A0, K1E, K1V)
     for i in range(d):
         x[EM, i] = x[E0, i] + h * x[K1E, i]
         x[VM, i] = x[V0, i] + h * x[K1V, i]
-    accelerate_clearances(law, local, approach, now, h, x, EM, VM, RV, end)
+    accelerate_clearances(model, surfaces, approach, now, turned, x, EM, VM, RV, end)
     for i in range(d):
         x[RE, i] = x[VM, i] - 2.0 * x[K1E, i]
         x[RV, i] -= 2.0 * x[K1V, i]
@@ -83,7 +85,7 @@ def try_step(law, tolerance, local, approach, h, now, system, x, start, end):
     for i in range(d):
         x[E1, i] = x[E0, i] + h * (1.5 * x[K1E, i] + 0.5 * x[K2E, i])
         x[V1, i] = x[V0, i] + h * (1.5 * x[K1V, i] + 0.5 * x[K2V, i])
-    accelerate_clearances(law, local, approach, now, h, x, E1, V1, A1, end)
+    accelerate_clearances(model, surfaces, approach, now, turned, x, E1, V1, A1, end)
     for i in range(d):
         x[RE, i] = x[E1, i] - x[E0, i] - h * x[V0, i] - h * h / 6.0 * (2.0 * x[A0, i] + x[A1, i])
         x[RV, i] = x[V1, i] - x[V0, i] - 0.5 * h * (x[A0, i] + x[A1, i])
@@ -110,7 +112,7 @@ def shift_start(now, x):
 
 
 @kernel
-def integrate_joints(law, local, approach, h, start, end, out_added):
+def integrate_joints(law, approach, h, start, end, out_added):
     """Integrals of the loose joints over a step of length h [s]; (k, JOINT_RATES).
 
     Simpson's rule where a force changes much, with the contact law at the middle of the penetration's
@@ -127,7 +129,7 @@ def integrate_joints(law, local, approach, h, start, end, out_added):
                     0.5, h, start[k, DELTA], start[k, DELTA_DOT], end[k, DELTA], end[k, DELTA_DOT]
                 )
                 slip = 0.5 * (start[k, SLIP] + end[k, SLIP])
-                elastic = elastic_force(local[k, LOCAL_STIFFNESS], delta)
+                elastic = elastic_force(0.5 * (start[k, HERTZ] + end[k, HERTZ]), delta)
                 f_n = damped_force(elastic, law[k, HYSTERESIS_FACTOR] / approach[k], rate)
                 mu, code = law[k, FRICTION_COEFFICIENT], law[k, FRICTION_LAW]
                 f_t = friction_force(code, mu, law[k, RAMP_0], law[k, RAMP_1], f_n, slip)

@@ -9,21 +9,22 @@ from leg_wear_monitor.contact.friction import friction_force
 from leg_wear_monitor.contact.geometry import contact_stiffness, journal_contact, worn_contact
 from leg_wear_monitor.contact.normal import elastic_energy, normal_force
 from leg_wear_monitor.kernel import kernel
-from leg_wear_monitor.wear.surfaces import local_radii, local_slopes
+from leg_wear_monitor.wear.surfaces import local_surfaces
 
 
 @kernel
-def penetration(contacts, surfaces, k, ex, ey, angle_b, angle_j):
-    """Penetration [m], unit normal and local radii of bushing and journal [m] of loose joint k."""
+def penetration(contacts, surfaces, k, ex, ey, direction, angle_b, angle_j):
+    """Penetration [m], unit normal and local radii of bushing and journal [m] of loose joint k.
+
+    ``direction`` [rad] is that of the eccentricity, and only asked for where wear feeds back. Then come the
+    shares of the penetration's rate that the turning of bushing and journal make, by their speeds [m/rad].
+    """
+    bushing, journal, slope_b, slope_j = local_surfaces(contacts, surfaces, k, direction, angle_b, angle_j)
     if surfaces.feeds_back:
-        direction = math.atan2(ey, ex)
-        bushing, journal = local_radii(contacts, surfaces, k, direction, angle_b, angle_j)
-        slope_b, slope_j = local_slopes(surfaces, k, direction, angle_b, angle_j)
         delta, nx, ny, scale = worn_contact(ex, ey, bushing - journal, slope_b + slope_j)
         return delta, nx, ny, bushing, journal, slope_b * scale, slope_j * scale
     delta, nx, ny = journal_contact(ex, ey, contacts.clearance[k])
-    bushing = contacts.bushing_radius[k]
-    return delta, nx, ny, bushing, bushing - contacts.clearance[k], 0.0, 0.0
+    return delta, nx, ny, bushing, journal, 0.0, 0.0
 
 
 @kernel
@@ -49,8 +50,9 @@ def joint_force(contacts, surfaces, k, ex, ey, vx, vy, angle_b, angle_j, speed_b
     f_n, f_t, delta, delta_dot, slip, nx, ny, stiffness, moment
         The force on the journal is -f_n n + f_t t with t = (-n_y, n_x), the couple on it ``moment`` [N m].
     """
+    direction = math.atan2(ey, ex) if surfaces.feeds_back else 0.0
     delta, nx, ny, bushing, journal, slope_b, slope_j = penetration(
-        contacts, surfaces, k, ex, ey, angle_b, angle_j
+        contacts, surfaces, k, ex, ey, direction, angle_b, angle_j
     )
     delta_dot = nx * vx + ny * vy + slope_b * speed_b + slope_j * speed_j
     radius = contacts.bushing_radius[k]
@@ -67,5 +69,8 @@ def joint_force(contacts, surfaces, k, ex, ey, vx, vy, angle_b, angle_j, speed_b
 @kernel
 def contact_energy(contacts, surfaces, k, ex, ey, angle_b, angle_j):
     """Elastic energy [J] in loose joint k."""
-    delta, _, _, bushing, journal, _, _ = penetration(contacts, surfaces, k, ex, ey, angle_b, angle_j)
+    direction = math.atan2(ey, ex) if surfaces.feeds_back else 0.0
+    delta, _, _, bushing, journal, _, _ = penetration(
+        contacts, surfaces, k, ex, ey, direction, angle_b, angle_j
+    )
     return elastic_energy(stiffness_at(contacts, k, bushing, journal), delta)

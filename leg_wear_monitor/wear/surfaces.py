@@ -33,45 +33,34 @@ def fresh_surfaces(contacts: ContactArrays, feeds_back: bool, sectors: int = SEC
 
 
 @kernel
-def depth_at(profile, angle):
-    """Depth [m] at an angle of the surface's own frame [rad]: the quadratic spline over the sectors."""
+def profile_at(profile, angle):
+    """Depth [m] at an angle of the surface's own frame [rad], and its derivative by the angle [m/rad].
+
+    That of the quadratic spline over the sectors: the slope has no jumps.
+    """
     n = profile.shape[0]
     u = angle * (n / (2.0 * math.pi))
-    i = math.floor(u)
+    u -= n * math.floor(u / n)
+    i = min(int(u), n - 1)
     w = u - i
-    before, here, after = profile[(i - 1) % n], profile[i % n], profile[(i + 1) % n]
-    return 0.5 * ((1.0 - w) ** 2 * before + (1.0 + 2.0 * w * (1.0 - w)) * here + w * w * after)
+    before, here, after = profile[i - 1 if i > 0 else n - 1], profile[i], profile[i + 1 if i < n - 1 else 0]
+    depth = 0.5 * ((1.0 - w) ** 2 * before + (1.0 + 2.0 * w * (1.0 - w)) * here + w * w * after)
+    return depth, ((1.0 - w) * (here - before) + w * (after - here)) * (n / (2.0 * math.pi))
 
 
 @kernel
-def slope_at(profile, angle):
-    """Derivative of `depth_at` by the angle [m/rad]."""
-    n = profile.shape[0]
-    u = angle * (n / (2.0 * math.pi))
-    i = math.floor(u)
-    w = u - i
-    before, here, after = profile[(i - 1) % n], profile[i % n], profile[(i + 1) % n]
-    return ((1.0 - w) * (here - before) + w * (after - here)) * (n / (2.0 * math.pi))
+def local_surfaces(contacts, surfaces, k, direction, angle_b, angle_j):
+    """Radii [m] of bushing and journal in a direction [rad] of the ground's frame, and their depths' slopes.
 
-
-@kernel
-def local_radii(contacts, surfaces, k, direction, angle_b, angle_j):
-    """Radii of bushing and journal [m] where the normal points in a direction [rad] of the ground's frame."""
+    The slopes are derivatives by the direction [m/rad], 0 unless wear feeds back.
+    """
     bushing = contacts.bushing_radius[k]
     journal = bushing - contacts.clearance[k]
-    if surfaces.feeds_back:
-        bushing += depth_at(surfaces.depth[k, BUSHING], direction - angle_b)
-        journal -= depth_at(surfaces.depth[k, JOURNAL], direction - angle_j)
-    return bushing, journal
-
-
-@kernel
-def local_slopes(surfaces, k, direction, angle_b, angle_j):
-    """Derivatives by the direction [m/rad] of the depths of bushing and journal, 0 unless wear feeds back."""
     if not surfaces.feeds_back:
-        return 0.0, 0.0
-    bushing = slope_at(surfaces.depth[k, BUSHING], direction - angle_b)
-    return bushing, slope_at(surfaces.depth[k, JOURNAL], direction - angle_j)
+        return bushing, journal, 0.0, 0.0
+    depth_b, slope_b = profile_at(surfaces.depth[k, BUSHING], direction - angle_b)
+    depth_j, slope_j = profile_at(surfaces.depth[k, JOURNAL], direction - angle_j)
+    return bushing + depth_b, journal - depth_j, slope_b, slope_j
 
 
 @kernel
@@ -93,7 +82,7 @@ def _weigh_arc(contacts, surfaces, k, ex, ey, angle_b, angle_j, centre, side, ou
             overlap = ex * c + ey * s - contacts.clearance[k]
             if surfaces.feeds_back:
                 overlap -= surfaces.depth[k, BUSHING, (centre + side * step) % n]
-                overlap -= depth_at(surfaces.depth[k, JOURNAL], along + side * step * width - angle_j)
+                overlap -= profile_at(surfaces.depth[k, JOURNAL], along + side * step * width - angle_j)[0]
             if overlap <= 0.0:
                 break
             out_weight[(centre + side * step) % n] = overlap

@@ -123,7 +123,8 @@ def test_slip_is_that_of_the_two_bodies_where_they_touch(model, worn, cycle, pha
         at = [v[i, :2] + v[i, 2] * np.array([q[i, 1] - point[1], point[0] - q[i, 0]]) for i in (b, j)]
         relative = at[1] - at[0]
         ex, ey = eccentricity(model, k, q, v, cs)[:2]
-        slope_b = penetration(model.contacts, worn, k, ex, ey, q[b, 2], q[j, 2])[5]
+        direction = math.atan2(ey, ex)
+        slope_b = penetration(model.contacts, worn, k, ex, ey, direction, q[b, 2], q[j, 2])[5]
         cam = slope_b * (v[b, 2] - v[j, 2])  # a worn bushing that turns closes in on the journal
         touches = math.hypot(ex, ey) > model.contacts.clearance[k]  # else there is no wall's normal
         assert relative @ n + cam == pytest.approx(delta_dot, abs=1.0e-12) or not touches

@@ -9,7 +9,7 @@ from hypothesis import strategies as st
 
 from leg_wear_monitor.contact.arrays import ContactArrays, clearance_settings, compile_contacts
 from leg_wear_monitor.dynamics.joint_contact import contact_energy, joint_force
-from leg_wear_monitor.wear.surfaces import SECTORS, Surfaces, local_radii
+from leg_wear_monitor.wear.surfaces import SECTORS, Surfaces, local_surfaces
 
 pytestmark = pytest.mark.plain
 
@@ -42,7 +42,7 @@ def test_the_normal_force_is_the_gradient_of_the_contact_energy(
 ):
     """By the eccentricity, and by the angles of both bodies: a worn bushing that turns lifts like a cam."""
     surfaces = _grooved(seed)
-    bushing, journal = local_radii(elastic, surfaces, 0, direction, angle_b, angle_j)
+    bushing, journal, _, _ = local_surfaces(elastic, surfaces, 0, direction, angle_b, angle_j)
     e = bushing - journal + delta
     at = np.array([e * math.cos(direction), e * math.sin(direction), angle_b, angle_j])
     f_n, _, depth, _, _, nx, ny, _, moment = joint_force(

@@ -10,7 +10,7 @@ import numpy as np
 import pytest
 from scipy.optimize import brentq
 
-from leg_wear_monitor.wear.surfaces import BUSHING, JOURNAL, SECTORS, deposit_wear, depth_at, fresh_surfaces
+from leg_wear_monitor.wear.surfaces import BUSHING, JOURNAL, SECTORS, deposit_wear, fresh_surfaces, profile_at
 
 pytestmark = pytest.mark.plain
 
@@ -51,7 +51,7 @@ def slid(contacts, distance, direction):
     surfaces, weight = fresh_surfaces(contacts, True), np.zeros(SECTORS)
     left = FORCE * distance
     while left > 0.0:
-        e = CLEARANCE + depth_at(surfaces.depth[0, BUSHING], direction) + PRESSED
+        e = CLEARANCE + profile_at(surfaces.depth[0, BUSHING], direction)[0] + PRESSED
         arc = max(math.acos(CLEARANCE / e), SECTOR)
         # as much as wears the arc about as deep as it is pressed
         bite = min(left, PRESSED * 2.0 * RADIUS * math.sin(arc) * WIDTH / WEAR)

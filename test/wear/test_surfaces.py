@@ -14,10 +14,9 @@ from leg_wear_monitor.wear.surfaces import (
     SECTORS,
     Surfaces,
     deposit_wear,
-    depth_at,
     fresh_surfaces,
-    local_radii,
-    slope_at,
+    local_surfaces,
+    profile_at,
     worn_volume,
 )
 
@@ -47,7 +46,7 @@ def _worn(seed, feeds_back=1):
 
 def _rub(joint, surfaces, direction, delta, angle_b, angle_j, integral=1.0e6):
     """Wear a joint whose journal is pressed in a direction by some penetration."""
-    bushing, journal = local_radii(joint, surfaces, 0, direction, angle_b, angle_j)
+    bushing, journal, _, _ = local_surfaces(joint, surfaces, 0, direction, angle_b, angle_j)
     e = bushing - journal + delta
     ex, ey = e * math.cos(direction), e * math.sin(direction)
     deposit_wear(joint, surfaces, 0, ex, ey, angle_b, angle_j, integral, np.zeros(surfaces.depth.shape[2]))
@@ -108,20 +107,22 @@ def test_a_turned_body_wears_the_same_shape_elsewhere(joint, sectors, delta, sid
 
 
 @given(direction=angles, angle_b=angles, angle_j=angles, turn=angles, seed=st.integers(0, 9))
-def test_local_radii_ride_on_the_bodies(joint, direction, angle_b, angle_j, turn, seed):
+def test_local_surfaces_ride_on_the_bodies(joint, direction, angle_b, angle_j, turn, seed):
     surfaces = _worn(seed)
-    here = local_radii(joint, surfaces, 0, direction, angle_b, angle_j)
-    there = local_radii(joint, surfaces, 0, direction + turn, angle_b + turn, angle_j + turn)
-    assert there == pytest.approx(here, abs=1.0e-17 * SECTORS)
-    assert here[0] - RADIUS == pytest.approx(depth_at(surfaces.depth[0, BUSHING], direction - angle_b))
+    here = local_surfaces(joint, surfaces, 0, direction, angle_b, angle_j)
+    there = local_surfaces(joint, surfaces, 0, direction + turn, angle_b + turn, angle_j + turn)
+    assert there[:2] == pytest.approx(here[:2], abs=1.0e-17 * SECTORS)
+    assert there[2:] == pytest.approx(here[2:], abs=1.0e-17 * SECTORS**2)
+    assert here[0] - RADIUS == pytest.approx(profile_at(surfaces.depth[0, BUSHING], direction - angle_b)[0])
     assert RADIUS - CLEARANCE - here[1] == pytest.approx(
-        depth_at(surfaces.depth[0, JOURNAL], direction - angle_j)
+        profile_at(surfaces.depth[0, JOURNAL], direction - angle_j)[0]
     )
 
 
 @given(direction=angles, seed=st.integers(0, 9))
 def test_wear_that_does_not_feed_back_leaves_the_radii(joint, direction, seed):
-    assert local_radii(joint, _worn(seed, 0), 0, direction, 0.3, -0.7) == (RADIUS, RADIUS - CLEARANCE)
+    expected = (RADIUS, RADIUS - CLEARANCE, 0.0, 0.0)
+    assert local_surfaces(joint, _worn(seed, 0), 0, direction, 0.3, -0.7) == expected
 
 
 @given(angle=angles, seed=st.integers(0, 9))
@@ -130,12 +131,12 @@ def test_depth_is_periodic_between_its_neighbours_and_smooth(angle, seed):
     profile = _worn(seed).depth[0, 0]
     i = math.floor(angle * SECTORS / TURN)
     near = profile[[(i - 1) % SECTORS, i % SECTORS, (i + 1) % SECTORS]]
-    assert near.min() <= depth_at(profile, angle) * (1.0 + 1.0e-12)
-    assert depth_at(profile, angle) <= near.max() * (1.0 + 1.0e-12)
-    assert depth_at(profile, angle + TURN) == pytest.approx(depth_at(profile, angle), rel=1.0e-6)
+    assert near.min() <= profile_at(profile, angle)[0] * (1.0 + 1.0e-12)
+    assert profile_at(profile, angle)[0] <= near.max() * (1.0 + 1.0e-12)
+    assert profile_at(profile, angle + TURN)[0] == pytest.approx(profile_at(profile, angle)[0], rel=1.0e-6)
     step = 1.0e-6
-    rise = (depth_at(profile, angle + step) - depth_at(profile, angle - step)) / (2.0 * step)
-    assert slope_at(profile, angle) == pytest.approx(rise, abs=1.0e-9)
+    rise = (profile_at(profile, angle + step)[0] - profile_at(profile, angle - step)[0]) / (2.0 * step)
+    assert profile_at(profile, angle)[1] == pytest.approx(rise, abs=1.0e-9)
     ramp = np.arange(SECTORS) * 1.0e-9
     middle = math.pi + (angle % 1.0)
-    assert depth_at(ramp, middle) == pytest.approx((middle * SECTORS / TURN - 0.5) * 1.0e-9, rel=1.0e-9)
+    assert profile_at(ramp, middle)[0] == pytest.approx((middle * SECTORS / TURN - 0.5) * 1.0e-9, rel=1.0e-9)

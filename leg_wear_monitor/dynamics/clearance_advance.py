@@ -48,7 +48,8 @@ from leg_wear_monitor.dynamics.touch import (
 from leg_wear_monitor.kernel import copy_array, entry, kernel
 from leg_wear_monitor.wear.surfaces import Surfaces
 
-RENEWAL = 2  # intervals between two looks at the reactions of the ideal joints, and at the wear
+RENEWAL = 2  # intervals between two looks at the reactions of the ideal joints
+WEARING = 8  # intervals after which wear is taken off that has not been yet
 
 MOST_TRIALS = 20000  # steps tried in an interval before it is given up
 
@@ -161,7 +162,7 @@ def _take(model, surfaces, state, t, h, tally, work):
     )  # fmt: skip
     shift_start(now, x)
     copy_array(end, start)
-    wear_what_turned(contacts, surfaces, state.approach, start, now.angle, state.pending, work.weight)
+    wear_what_turned(contacts, surfaces, state.approach, start, now, state.pending, work.weight)
     _look_at_drive(now, x, start, work.drive_end, tally)
     toe_deviation(now, x, tally.response)
     first, last = work.drive_start, work.drive_end
@@ -195,16 +196,17 @@ def _pushed_through(bushing_radius, sample):
 def _finish(model, surfaces, state, tally, work):
     """At the end of an interval: wear, distributions, and the reactions of the ideal joints."""
     joint, now, sample, interval = model.contacts.joint, work.now, work.start, model.interval
-    renew = int(state.intervals[0]) % RENEWAL == 0
+    count = int(state.intervals[0])
+    amid = 0.5 * (1 - WEARING) * interval * now.speed[0]
     tally.time[0] += interval
     for k in range(state.approach.shape[0]):
-        if renew:
-            wear_off(model.contacts, surfaces, k, now.angle, state.pending, work.weight)
+        if (count + k) % WEARING == 0:
+            wear_off(model.contacts, surfaces, k, now, amid, state.pending, work.weight)
         force = math.sqrt(sample[k, F_N] ** 2 + sample[k, F_T] ** 2)
         tally.force_time[joint[k], bin_of(force)] += interval
     torque = work.drive_start[WHOLE]
     tally.torque_time[1 if torque > 0.0 else 0, bin_of(abs(torque))] += interval
-    if renew:
+    if count % RENEWAL == 0:
         reactions(model.tables, state.drive[ANGLE], now, work.x, sample, work.reaction)
         _add_reactions(model.tables.reaction_joint, work.reaction, RENEWAL * interval, tally)
 

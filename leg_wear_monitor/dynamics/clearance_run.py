@@ -27,7 +27,7 @@ from leg_wear_monitor.mechanism.ideal import TURN
 from leg_wear_monitor.mechanism.spec import Mechanism, SpeedDrive
 
 INTERVALS = 2048  # of a turn at the setup's speed
-TOLERANCE_M = 3.0e-9  # local error of a step in the eccentricities [m]: energy adds up to 5e-4 of the losses
+TOLERANCE_M = 5.0e-9  # local error of a step in the eccentricities [m]: finer, the means stay as they are
 TOLERANCE_RATE = 1.0e4  # 1/s: the same for their rates, over the time a contact takes
 
 

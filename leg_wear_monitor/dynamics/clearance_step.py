@@ -179,22 +179,27 @@ def gather_wear(added, start, end, pending):
 
 
 @kernel
-def wear_off(contacts, surfaces, k, angle, pending, out_weight):
-    """Wear the surfaces of joint k by what is pending, at its mean normal and eccentricity."""
+def wear_off(contacts, surfaces, k, now, turned, pending, out_weight):
+    """Wear the surfaces of joint k by what is pending, at its mean normal and eccentricity.
+
+    ``turned`` [rad] is by how much the crank was beyond the angle of the tables when it acted.
+    """
     integral = pending[k, 0]
     if integral > 0.0:
         scale = pending[k, 3] / integral / math.hypot(pending[k, 1], pending[k, 2])
         ex, ey = scale * pending[k, 1], scale * pending[k, 2]
-        deposit_wear(contacts, surfaces, k, ex, ey, angle[k, 0], angle[k, 1], integral, out_weight)
+        angle_b = now.angle[k, 0] + now.turn[k, 0] * turned
+        angle_j = now.angle[k, 1] + now.turn[k, 1] * turned
+        deposit_wear(contacts, surfaces, k, ex, ey, angle_b, angle_j, integral, out_weight)
         for i in range(pending.shape[1]):
             pending[k, i] = 0.0
 
 
 @kernel
-def wear_what_turned(contacts, surfaces, approach, start, angle, pending, out_weight):
-    """Wear off what is pending where contact has ended or its normal has turned by a sector."""
-    sector = 2.0 * math.pi / surfaces.depth.shape[2]
+def wear_what_turned(contacts, surfaces, approach, start, now, pending, out_weight):
+    """Wear off what is pending where contact has ended or its normal has turned by two sectors."""
+    limit = 4.0 * math.pi / surfaces.depth.shape[2]
     for k in range(pending.shape[0]):
         turned = abs(pending[k, 1] * start[k, EY] - pending[k, 2] * start[k, EX])
-        if approach[k] == 0.0 or turned > sector * pending[k, 3]:
-            wear_off(contacts, surfaces, k, angle, pending, out_weight)
+        if approach[k] == 0.0 or turned > limit * pending[k, 3]:
+            wear_off(contacts, surfaces, k, now, 0.0, pending, out_weight)

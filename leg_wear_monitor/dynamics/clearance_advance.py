@@ -1,13 +1,13 @@
 """The real-time motion: interval by interval, sub-stepped inside, each impact met where it begins.
 
-The state exists at whole intervals of time. Inside one the tables are held at its middle, and steps
-adapt to a local error (Rosenbrock, order 2); so the state does not depend on how the time axis was cut
+The state exists at whole intervals of time. Inside one, or each of its parts where the linkage moves fast,
+the tables are held at its middle, and steps adapt to a local error (Rosenbrock, order 2); so the state does not depend on how the time axis was cut
 into calls, and a call costs at most its intervals times a bounded number of steps.
 """
 
 import math
 
-from leg_wear_monitor.dynamics.clearance import ACCELERATION, ANGLE, SPEED, crank_between
+from leg_wear_monitor.dynamics.clearance import ACCELERATION, ANGLE, SPEED, blend, crank_between
 from leg_wear_monitor.dynamics.clearance_contact import A0, E0, F_T, V0, accelerate_clearances
 from leg_wear_monitor.dynamics.clearance_outputs import (
     drive_torque,
@@ -86,42 +86,56 @@ def advance_clearances(model, feeds_back, state, polynomial, t_end, tally, work)
 
 @kernel
 def _interval(model, surfaces, state, polynomial, tally, work):
-    """One interval, from whole instant to whole instant."""
-    interval = model.interval
-    copy_array(state.drive, work.crank)
-    drive_at(polynomial, (state.intervals[0] + 1.0) * interval, state.drive)
-    angle, speed, acceleration = crank_between(work.crank, state.drive, interval)
-    if not (abs(speed) < _FASTEST and abs(acceleration) * interval < _FASTEST):
-        return INVALID_DRIVE, -1
-    load_state(model, surfaces, state, angle, speed, acceleration, 0.5 * interval, work)
-    turned = -0.5 * interval * speed  # the tables are those of the interval's middle
-    sample_start(model, surfaces, state, turned, state.intervals[0] * interval, tally, work)
-    status, k = _steps(model, surfaces, state, tally, work)
-    if status != DONE:
-        return status, k
+    """One interval, from whole instant to whole instant; in parts where the linkage moves fast."""
+    i, _ = blend(model.tables.parts.shape[0], state.drive[ANGLE])
+    parts = model.tables.parts[i]
+    for part in range(parts):
+        begin, end = state.intervals[0] + part / parts, state.intervals[0] + (part + 1.0) / parts
+        status, k = _part(
+            model, surfaces, state, polynomial, begin * model.interval, end * model.interval, tally, work
+        )
+        if status != DONE:
+            return status, k
     state.intervals[0] += 1.0
-    for i in range(state.e.shape[0]):
-        state.e[i], state.v[i] = work.x[E0, i], work.x[V0, i]
     _finish(model, surfaces, state, tally, work)
     return DONE, -1
 
 
 @kernel
-def _steps(model, surfaces, state, tally, work):
-    """All steps of an interval."""
+def _part(model, surfaces, state, polynomial, begin, end, tally, work):
+    """A part of an interval [s] under tables that are held."""
+    length = end - begin
+    copy_array(state.drive, work.crank)
+    drive_at(polynomial, end, state.drive)
+    angle, speed, acceleration = crank_between(work.crank, state.drive, length)
+    if not (abs(speed) < _FASTEST and abs(acceleration) * length < _FASTEST):
+        return INVALID_DRIVE, -1
+    load_state(model, surfaces, state, angle, speed, acceleration, 0.5 * length, work)
+    turned = -0.5 * length * speed  # the tables are those of the middle
+    sample_start(model, surfaces, state, turned, begin, tally, work)
+    status, k = _steps(model, surfaces, state, begin, length, tally, work)
+    if status == DONE:
+        for i in range(state.e.shape[0]):
+            state.e[i], state.v[i] = work.x[E0, i], work.x[V0, i]
+    return status, k
+
+
+@kernel
+def _steps(model, surfaces, state, begin, length, tally, work):
+    """All steps of a part."""
     x, now, start, end, approach = work.x, work.now, work.start, work.end, state.approach
-    contacts, interval = model.contacts, model.interval
+    contacts = model.contacts
     done, trials, cut = 0.0, 0, NEVER
     speed = now.speed[0]
     _look_at_drive(now, x, start, work.drive_start, tally)
-    while done < interval:
-        left = interval - done
+    while done < length:
+        left = length - done
         h = min(state.step[0], left)
         if h < left < 2.0 * h:
             h = 0.5 * left
         if cut < NEVER:
             h = cut
-        turned = speed * (done + h - 0.5 * interval)
+        turned = speed * (done + h - 0.5 * length)
         error = try_step(model, surfaces, approach, h, turned, now, work.system, x, start, end)
         trials += 1
         tally.steps[0] += 1
@@ -141,8 +155,8 @@ def _steps(model, surfaces, state, tally, work):
         if cut == NEVER:
             state.step[0] = h * min(3.0, 0.9 * max(error, 1.0e-6) ** (-1.0 / 3.0))
         cut = NEVER
-        _take(model, surfaces, state, state.intervals[0] * interval + done, h, tally, work)
-        done = interval if h >= left * (1.0 - 1.0e-9) else done + h
+        _take(model, surfaces, state, begin + done, h, tally, work)
+        done = length if h >= left * (1.0 - 1.0e-9) else done + h
     return DONE, -1
 
 

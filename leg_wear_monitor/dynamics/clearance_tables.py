@@ -28,6 +28,9 @@ from leg_wear_monitor.mechanism.position import Linkage
 
 POINTS = 1024  # of a turn; tables are linear between them
 
+_BENT = 10.0  # 1/rad^2: bend of the Coriolis terms over their root mean square that one interval follows
+_MOST_PARTS = 8
+
 
 class ClearanceTables(NamedTuple):
     """Tables at N equal steps of the crank, the first repeated at the end; k loose joints, d = 2 k.
@@ -35,13 +38,15 @@ class ClearanceTables(NamedTuple):
     ``motion`` (N + 1, w) the rows that `motion_shapes` names; ``reaction`` (N + 1, r, 4 + 3 d + k) the
     drive torque and the reactions of the ideal joints by (1, w', w^2, w, e'', w e', e', F_t), and
     ``reaction_joint`` (r,) the joint of each, ``DRIVE`` first; ``stored`` (N + 1, u) the parts of the
-    stored energy that `stored_shapes` names.
+    stored energy that `stored_shapes` names; ``parts`` (N,) into how many an interval is to be cut for the
+    tables to be held in each.
     """
 
     motion: Floats
     reaction: Floats
     reaction_joint: Ints
     stored: Floats
+    parts: Ints
 
 
 def build_tables(linkage: Linkage, contacts: ContactArrays, points: int = POINTS) -> ClearanceTables:
@@ -85,7 +90,19 @@ def build_tables(linkage: Linkage, contacts: ContactArrays, points: int = POINTS
         reaction=np.concatenate([reaction, reaction[:1]]),
         reaction_joint=joints,
         stored=_stored(basis),
+        parts=_parts(parts["coriolis"]),
     )
+
+
+def _parts(table: Floats) -> Ints:
+    """How finely an interval is to be cut at each point, by the bend of a table (N, d, d) over the crank."""
+    step = TURN / len(table)
+    bend = np.roll(table, -1, axis=0) - 2.0 * table + np.roll(table, 1, axis=0)
+    size = np.sqrt((table**2).mean(axis=0)).max()
+    if size == 0.0:
+        return np.ones(len(table), dtype=np.int64)
+    roughness = np.abs(bend).max(axis=(1, 2)) / (step**2 * size * _BENT)
+    return np.clip(np.ceil(np.sqrt(roughness)), 1, _MOST_PARTS).astype(np.int64)
 
 
 def _accelerations(basis: Basis) -> dict[str, Floats]:

@@ -1,8 +1,9 @@
 """The real-time motion: interval by interval, sub-stepped inside, each impact met where it begins.
 
 The state exists at whole intervals of time. Inside one, or each of its parts where the linkage moves fast,
-the tables are held at its middle, and steps adapt to a local error (Rosenbrock, order 2); so the state does not depend on how the time axis was cut
-into calls, and a call costs at most its intervals times a bounded number of steps.
+the tables are held at its middle, and steps adapt to a local error (Rosenbrock, order 2); so the state does
+not depend on how the time axis was cut into calls, and a call costs at most its intervals times a bounded
+number of steps.
 """
 
 import math

@@ -102,7 +102,7 @@ def _parts(table: Floats) -> Ints:
     if size == 0.0:
         return np.ones(len(table), dtype=np.int64)
     roughness = np.abs(bend).max(axis=(1, 2)) / (step**2 * size * _BENT)
-    return np.clip(np.ceil(np.sqrt(roughness)), 1, _MOST_PARTS).astype(np.int64)
+    return np.asarray(np.clip(np.ceil(np.sqrt(roughness)), 1, _MOST_PARTS), dtype=np.int64)
 
 
 def _accelerations(basis: Basis) -> dict[str, Floats]:

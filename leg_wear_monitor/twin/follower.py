@@ -4,7 +4,7 @@ from typing import NamedTuple
 
 import numpy as np
 
-from leg_wear_monitor.dynamics.clearance_run import ClearanceStepper, usual_intervals
+from leg_wear_monitor.dynamics.clearance_run import INTERVALS, ClearanceStepper
 from leg_wear_monitor.dynamics.clearance_run import Snapshot as StepperSnapshot
 from leg_wear_monitor.dynamics.run import DONE, INVALID_DRIVE, PUSHED_THROUGH, STEP_TOO_SMALL, Setup
 from leg_wear_monitor.dynamics.tally import new_tally
@@ -89,7 +89,7 @@ class LegFollower:
         self._setup, self._acts = setup, settings.estimate_load
         self._load = FootLoad(setup.linkage, setup.contacts, settings.load_shape)
         # a whole number of nanoseconds, so that stamps and the stepper's time cannot drift apart
-        interval = round(1.0e9 * TURN / abs(setup.speed) / usual_intervals(setup)) * 1.0e-9
+        interval = round(1.0e9 * TURN / abs(setup.speed) / INTERVALS) * 1.0e-9
         self._stepper = ClearanceStepper(setup, interval, tables=self._load.tables)
         self.state: LegState = leg_state(len(setup.loose))
         self.tally = new_tally(len(setup.linkage.mechanism.joints))
@@ -108,7 +108,6 @@ class LegFollower:
         changed = (own != depth).any(axis=(1, 2))
         own[:] = depth
         state.pending[changed] = 0.0
-        state.local[changed] = np.nan  # clearances are looked up anew
         self._before[:, changed] = self.clearances[:, changed]
 
     def follow(self, steps: Steps, n: int, cycles: list[CycleFigures], events: list[Event]) -> SampleFigures:

@@ -15,7 +15,7 @@ from leg_wear_monitor.mechanism.arrays import Ints
 from leg_wear_monitor.twin.sample import Samples
 
 A_CYCLE = 4
-IDLE_LIMIT, LIMIT = 200, 50_000  # samples without time, samples in all
+IDLE_LIMIT, LIMIT = 50, 50_000  # samples without time, samples in all
 
 BEGIN, NEWEST, IDLE, OUTSIDE, COUNT = range(5)
 

@@ -41,19 +41,19 @@ def cycle_report(
             _joint_report(figures, k, joint, growth[k], limits_m[k]) for k, joint in enumerate(loose)
         ),
         torque_samples=torque.samples,
-        measured_torque_rms_nm=torque.measured_rms_nm,
-        predicted_torque_rms_nm=torque.predicted_rms_nm,
-        residual_torque_rms_nm=torque.residual_rms_nm,
+        measured_torque_rms_nm=float(torque.measured_rms_nm),
+        predicted_torque_rms_nm=float(torque.predicted_rms_nm),
+        residual_torque_rms_nm=float(torque.residual_rms_nm),
         torque_mismatch=_mismatch(torque),
-        load_n=torque.load_n,
-        friction_nm=torque.friction_nm,
+        load_n=float(torque.load_n),
+        friction_nm=float(torque.friction_nm),
     )
 
 
 def _mismatch(torque: TorqueFigures) -> float:
     """What neither foot load nor friction explains, as a share of what was predicted; NaN if not known."""
     left = torque.residual_rms_nm if math.isnan(torque.unexplained_rms_nm) else torque.unexplained_rms_nm
-    return left / torque.predicted_rms_nm if torque.predicted_rms_nm > 0.0 else math.nan
+    return float(left / torque.predicted_rms_nm) if torque.predicted_rms_nm > 0.0 else math.nan
 
 
 def _joint_report(

@@ -54,7 +54,7 @@ def kept(path):
 
 
 def check(said, before, after):
-    """Hold what a walker said to what its ledger held before and holds after; time lost [s], if any was new."""
+    """Hold what a walker said to what its ledger held and holds; time lost [s], if any was new."""
     stamps = {word: [int(line[1]) for line in said if line[0] == word] for word in ("begin", "end")}
     reached, begun = max(stamps["end"], default=0), max(stamps["begin"], default=0)
     stamp_ns, totals, spans = after
@@ -72,7 +72,7 @@ def check(said, before, after):
 
 
 def kill_often(path, kills, seed):
-    """Kill a walker again and again, while it opens and while it walks; times lost [s], None without new gait."""
+    """Kill a walker again and again, opening or walking; times lost [s], None without new gait."""
     choose = random.Random(seed)
     lost_s = []
     for _ in range(kills):
@@ -109,9 +109,8 @@ def main(kills):
         Run(calm, 0.0, 60.0).finish()
         rates = [worn_m(each) / kept(each)[1]["moving_s"] for each in (path, calm)]
     print(f"{kills} kills, {len(lost_s)} of them after new gait was followed; no ledger damaged")
-    print(
-        f"an entry each {CHECKPOINT_S} s; lost: median {lost_s[len(lost_s) // 2]:.3f} s, most {lost_s[-1]:.3f} s"
-    )
+    median = lost_s[len(lost_s) // 2]
+    print(f"an entry each {CHECKPOINT_S} s; lost: median {median:.3f} s, most {lost_s[-1]:.3f} s")
     print(f"ledger: {totals['cycles']:.0f} gait cycles, {totals['moving_s']:.2f} s in {len(spans)} spans")
     print(f"wear of A {rates[0]:.3g} m/s, {rates[1]:.3g} m/s without kills")
 

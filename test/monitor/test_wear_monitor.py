@@ -83,7 +83,7 @@ def test_a_gait_cycle_is_reported_as_the_twin_saw_it(monitor, gait):
 
 
 def test_a_steady_gait_alarms_only_of_what_is_missing(monitor, gait):
-    reports = monitor.update(gait(10.0))
+    reports = monitor.update(gait(6.0))
     raised = {
         alarm.name for change in reports.alarms for alarm in change.alarms if alarm.level is not Level.OK
     }
@@ -218,7 +218,7 @@ def changed_torque(samples, change):
 
 @pytest.mark.parametrize(("name", "spoil"), INPUTS, ids=range(len(INPUTS)))
 def test_what_is_wrong_with_the_input_is_named(monitor, gait, name, spoil):
-    samples = gait(10.0)
+    samples = gait(6.5)
     good = with_torque(samples, np.sin(samples["crank_angle_rad"]))
     monitor.configure(config_from({"limits.torque_mismatch": 100.0}))
     new = monitor.snapshot()

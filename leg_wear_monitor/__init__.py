@@ -17,15 +17,18 @@ if TYPE_CHECKING:
     from leg_wear_monitor.monitor.config import MonitorConfig
     from leg_wear_monitor.monitor.parameter_file import load_config
     from leg_wear_monitor.monitor.wear_monitor import WearMonitor
+    from leg_wear_monitor.recording.replay import ReplayResult, replay
 
 _HOME = {
     "Mechanism": "mechanism.spec",
     "MonitorConfig": "monitor.config",
+    "ReplayResult": "recording.replay",
     "SimulationResult": "dynamics.result",
     "WearMonitor": "monitor.wear_monitor",
     "load_config": "monitor.parameter_file",
     "load_mechanism": "mechanism.loader",
     "open_ledger": "monitor.book",
+    "replay": "recording.replay",
     "simulate": "dynamics.simulation",
 }
 
@@ -35,12 +38,14 @@ __all__ = [
     "LegWearError",
     "Mechanism",
     "MonitorConfig",
+    "ReplayResult",
     "SimulationError",
     "SimulationResult",
     "WearMonitor",
     "load_config",
     "load_mechanism",
     "open_ledger",
+    "replay",
     "simulate",
 ]
 

@@ -4,7 +4,7 @@ import attrs
 import numpy as np
 
 from leg_wear_monitor.errors import LegWearError
-from leg_wear_monitor.mechanism.arrays import Ints
+from leg_wear_monitor.mechanism.arrays import Floats, Ints
 from leg_wear_monitor.mechanism.spec import Mechanism
 from leg_wear_monitor.monitor.alarms import Alarm
 from leg_wear_monitor.monitor.beats import A_CYCLE, Beats
@@ -138,6 +138,11 @@ class WearMonitor:
     def lost(self) -> Lost:
         """What was not integrated so far."""
         return lost(self._twin.intake, self._state.already_counted)
+
+    @property
+    def wear_depth_m(self) -> Floats:
+        """Wear depth (loose, 2, sectors) of bushings and journals; a copy."""
+        return self._twin.depth
 
     def status(self) -> tuple[Status, ...]:
         """What /diagnostics shows; names and their order stay the same."""

@@ -13,11 +13,12 @@ from rosbags.rosbag2 import Reader
 from rosbags.rosbag2.errors import ReaderError
 
 from leg_wear_monitor.recording.cdr import MESSAGE
-from leg_wear_monitor.recording.findings import Finding, RecordingError
+from leg_wear_monitor.recording.findings import Finding, RecordingError, Weight
 from leg_wear_monitor.recording.layout import Channel
 from leg_wear_monitor.recording.mcap_file import Piece
 
 _TOGETHER = 4096
+_NO_CHECKSUMS = "has no checksums, as no .db3 has: a damaged number would not be seen"
 _UNREADABLE = (ReaderError, apsw.Error, sqlite3.Error, UnicodeDecodeError, ValueError, KeyError, TypeError)
 
 
@@ -73,6 +74,7 @@ class SqliteFile:
                 break
             found += len(together)
             yield _piece(together, types, self.size * len(together) // max(expected, 1))
+        self.findings.append(Finding(self.path, _NO_CHECKSUMS, Weight.NOTE))
         if found != expected:
             text = f"{found} messages could be read of the {expected} that it counts"
             self.findings.append(Finding(self.path, text))

@@ -1,0 +1,164 @@
+"""A recording through the monitor: the reports that it would have given live."""
+
+from collections.abc import Callable, Iterable, Iterator
+from contextlib import ExitStack
+from pathlib import Path
+
+import attrs
+import numpy as np
+
+from leg_wear_monitor.mechanism.loader import load_mechanism
+from leg_wear_monitor.monitor.book import open_ledger
+from leg_wear_monitor.monitor.config import MonitorConfig
+from leg_wear_monitor.monitor.parameter_file import load_config
+from leg_wear_monitor.monitor.wear_monitor import WearMonitor
+from leg_wear_monitor.recording.findings import Finding, RecordingError
+from leg_wear_monitor.recording.history import History
+from leg_wear_monitor.recording.reader import Block, Recording
+from leg_wear_monitor.recording.sink import Sink
+from leg_wear_monitor.twin.sample import CRANK, Samples
+
+REPORTS_FILE = "reports.mcap"
+
+
+@attrs.define(eq=False)
+class ReplayResult:
+    """What a replay found.
+
+    Attributes
+    ----------
+    monitor : WearMonitor
+        As it stands at the end; its ledger is closed.
+    history : History
+    files : list of pathlib.Path
+    topics : dict
+        Topics that were read, by what they are in the node.
+    time : str
+        Which time stamped the samples.
+    findings : list of Finding
+        What is wrong with the recording.
+    is_partial : bool
+        Whether something that was recorded is lost, or may be wrong.
+    crank_samples, torque_samples : int
+    begin_ns, end_ns : int
+        First and last stamp of sound samples; 0 without any.
+    """
+
+    monitor: WearMonitor
+    history: History
+    files: list[Path]
+    topics: dict[str, str]
+    time: str
+    findings: list[Finding] = attrs.Factory(list)
+    is_partial: bool = False
+    crank_samples: int = 0
+    torque_samples: int = 0
+    begin_ns: int = 0
+    end_ns: int = 0
+
+    @property
+    def duration_s(self) -> float:
+        """Time between the first and the last stamp [s]."""
+        return (self.end_ns - self.begin_ns) / 1e9
+
+    def count(self, samples: Samples) -> None:
+        """Take account of samples that go to the monitor."""
+        cranks = int(np.count_nonzero(samples["kind"] == CRANK))
+        self.crank_samples += cranks
+        self.torque_samples += len(samples) - cranks
+        stamps = samples["stamp_ns"][samples["fault"] == 0]
+        if len(stamps):
+            self.begin_ns = self.begin_ns or int(stamps[0])
+            self.end_ns = int(stamps[-1])
+
+
+def replay(
+    paths: str | Path | Iterable[str | Path],
+    config: MonitorConfig | str | Path | None = None,
+    *,
+    out: str | Path | None = None,
+    ledger: str | Path | None = None,
+    time: str = "header",
+    joint_states: str | None = None,
+    drive_torque: str | None = None,
+    ready: Callable[[WearMonitor], None] | None = None,
+    progress: Callable[[float], None] | None = None,
+) -> ReplayResult:
+    """Put a recording through the monitor.
+
+    Parameters
+    ----------
+    paths : path, or iterable of paths
+        MCAP and .db3 files, bag directories; several are one recording.
+    config : MonitorConfig or path, optional
+        Parameters, or the parameter file of the node; the one that comes with the package if not given.
+    out : path, optional
+        Directory for ``reports.mcap``, the messages that the node would have published.
+    ledger : path, optional
+        Ledger to continue; one that the parameters name is left alone.
+    time : str
+        Which time stamps the samples: ``header``, ``log`` or ``publish``.
+    joint_states, drive_torque : str, optional
+        Topics; found by their relative names if not given.
+    ready : callable, optional
+        Given the monitor before the first sample.
+    progress : callable, optional
+        Told the share of the recording that is done, 0 to 1.
+
+    Returns
+    -------
+    ReplayResult
+
+    Raises
+    ------
+    RecordingError
+        If nothing in the recording can be used, or the disk does not take the reports.
+    ConfigError, LedgerError
+        For parameters or a ledger that cannot be used.
+    """
+    config = config if isinstance(config, MonitorConfig) else load_config(config)
+    kept = attrs.evolve(config.ledger, path="" if ledger is None else str(ledger))
+    config = attrs.evolve(config, ledger=kept)
+    named = [paths] if isinstance(paths, str | Path) else list(paths)
+    topics = {"joint_states": joint_states, "drive_torque": drive_torque}
+    with Recording(named, config, time=time, **topics) as recording, ExitStack() as stack:
+        mechanism = load_mechanism(config.mechanism)
+        monitor = WearMonitor(mechanism, config, open_ledger(mechanism, config))
+        stack.callback(monitor.close)
+        result = ReplayResult(monitor, History(monitor.loose), recording.files, recording.topics, time)
+        sink = None if out is None else stack.enter_context(_sink(Path(out), monitor))
+        if ready:
+            ready(monitor)
+        for block in recording.blocks():
+            for samples in _beats(block, config):
+                result.count(samples)
+                _take(result, samples, sink)
+            if progress:
+                progress(block.share)
+        result.findings, result.is_partial = recording.findings, recording.is_partial
+    return result
+
+
+def _take(result: ReplayResult, samples: Samples, sink: Sink | None) -> None:
+    """Put samples through the monitor, and keep what comes out."""
+    reports = result.monitor.update(samples)
+    for cycle in reports.cycles:
+        result.history.add_cycle(cycle)
+    for alarms in reports.alarms:
+        result.history.add_alarms(alarms)
+    if sink:
+        sink.take(reports, result.end_ns)
+
+
+def _sink(directory: Path, monitor: WearMonitor) -> Sink:
+    try:
+        directory.mkdir(parents=True, exist_ok=True)
+    except OSError as error:
+        raise RecordingError(str(directory), "", f"cannot be made: {error.strerror}") from error
+    return Sink(directory / REPORTS_FILE, monitor)
+
+
+def _beats(block: Block, config: MonitorConfig) -> Iterator[Samples]:
+    """Samples of a block, cut where diagnostics are due."""
+    period_ns = round(config.diagnostics.period_s * 1e9)
+    yield from np.split(block.samples, np.flatnonzero(np.diff(block.log_time_ns // period_ns)) + 1)

@@ -1,0 +1,142 @@
+"""The verb `replay`: what it writes, what it says, and its exit codes."""
+
+import json
+from types import SimpleNamespace
+
+import numpy as np
+import pytest
+
+from leg_wear_monitor.cli import replay as verb
+from leg_wear_monitor.monitor.alarm_board import limits_of
+from leg_wear_monitor.monitor.alarms import Level
+from leg_wear_monitor.monitor.config import MonitorConfig
+
+pytest.importorskip("mcap")
+pytest.importorskip("rosbags")
+
+from leg_wear_monitor.recording import encode
+from leg_wear_monitor.recording.reader import TIMES
+from leg_wear_monitor.recording.writer import McapWriter
+
+SECONDS, RATE_HZ = 4, 200
+
+
+@pytest.fixture(scope="module")
+def bag(tmp_path_factory):
+    """A steady gait without a drive torque, in chunks of a quarter of a second."""
+    n = SECONDS * RATE_HZ
+    stamps = 1_700_000_000 * 10**9 + np.arange(n, dtype=np.int64) * (10**9 // RATE_HZ)
+    angle = 2.0 * np.pi * np.arange(n)[:, None] / RATE_HZ
+    rows = encode.joint_states(stamps, ["crank"], position=angle)
+    path = tmp_path_factory.mktemp("bag") / "walk.mcap"
+    with McapWriter(path) as writer:
+        joints = writer.channel("/joint_states", encode.JOINT_STATE)
+        writer.channel("/drive_torque", encode.WRENCH_STAMPED)
+        for begin in range(0, n, 50):
+            writer.write_many(joints, stamps[begin : begin + 50], rows[begin : begin + 50])
+            writer.flush()
+    return path
+
+
+@pytest.fixture
+def cut(bag, tmp_path):
+    """The same, cut short."""
+    whole = bag.read_bytes()
+    path = tmp_path / "cut.mcap"
+    path.write_bytes(whole[: len(whole) * 2 // 3])
+    return path
+
+
+def test_the_lists_of_the_verb_are_the_librarys():
+    assert verb.TIMES == TIMES
+    kinds = {name.split()[0] for name in limits_of(MonitorConfig(), ("A",))}
+    assert all(kind.startswith(verb.ALARM_KINDS) for kind in kinds)
+    assert all(any(kind.startswith(known) for kind in kinds) for known in verb.ALARM_KINDS)
+
+
+def test_a_whole_recording(run, bag, complaints, tmp_path):
+    result = run("replay", str(bag), "--out", "out")
+    assert result.exit_code == 0
+    assert complaints(result) == []
+    files = ("reports.mcap", "summary.json", "report.html")
+    assert [f"written: out/{name}" in result.stdout for name in files] == [True] * 3
+    assert "no proof of health" in result.stdout
+    record = json.loads((tmp_path / "out" / "summary.json").read_text())
+    assert record["recording"]["crank_samples"] == SECONDS * RATE_HZ
+    page = (tmp_path / "out" / "report.html").read_text()
+    (tmp_path / "out" / "report.html").unlink()
+    assert run("report", "out").exit_code == 0
+    assert (tmp_path / "out" / "report.html").read_text() == page
+
+
+def test_json_on_stdout_is_all_that_is_there(run, bag):
+    record = json.loads(run("replay", str(bag), "--json", "-").stdout)
+    assert record["cycles"] >= 1
+    assert record["monitor"]["loose"]
+
+
+def test_a_partial_recording_is_said_and_fails_unless_allowed(run, cut, complaints):
+    result = run("replay", str(cut))
+    assert result.exit_code == 1
+    (line,) = complaints(result)
+    assert line.startswith(f"warning: {cut}: ends at byte ")
+    assert run("replay", str(cut), "--allow-partial").exit_code == 0
+
+
+def test_an_alarm_asked_for_fails(run, bag, tmp_path):
+    strict = tmp_path / "strict.yaml"
+    strict.write_text("/**: {ros__parameters: {limits: {impact_force_n: 0.1}}}")
+    asked = ("replay", str(bag), "--config", str(strict))
+    assert run(*asked).exit_code == 0
+    assert run(*asked, "--fail-on", "clearance", "--fail-on", "impact_force").exit_code == 1
+
+
+@pytest.mark.parametrize(
+    ("worst", "asked", "raised"),
+    [
+        ({}, ("alarm", "warning", "clearance"), False),
+        ({"clearance": Level.WARN}, ("alarm", "clearance"), False),
+        ({"clearance": Level.WARN}, ("warning",), True),
+        ({"clearance": Level.ERROR}, ("alarm",), True),
+        ({"clearance": Level.ERROR}, ("growth", "clearance"), True),
+        ({"clearance": Level.ERROR}, ("growth",), False),
+        ({"clearance": Level.ERROR}, (), False),
+        ({"input_gaps": Level.ERROR}, ("input",), True),
+    ],
+)
+def test_what_counts_as_an_alarm_asked_for(worst, asked, raised):
+    result = SimpleNamespace(history=SimpleNamespace(worst=worst))
+    assert verb.is_raised(result, asked) == raised
+
+
+@pytest.mark.parametrize(
+    ("arguments", "line"),
+    [
+        (["nowhere.mcap"], "error: nowhere.mcap: is not there, expected a bag directory"),
+        ([], "error: Missing argument 'BAG...'. (see leg-wear-monitor replay --help)"),
+        (["{bag}", "--joint-states", "/x"], "error: {bag}: /x: is no topic of the recording, it has"),
+        (["{bag}", "--config", "nowhere.yaml"], "error: nowhere.yaml: "),
+        (["{bag}", "--time", "wall"], "error: Invalid value for '--time'"),
+        (["{bag}", "--fail-on", "wear"], "error: Invalid value for '--fail-on'"),
+        (["{bag}", "--out", "{bag}"], "error: --out: {bag}: is a file, expected a directory"),
+    ],
+)
+def test_what_cannot_be_is_said_in_a_line(run, bag, complaints, arguments, line):
+    result = run("replay", *(text.format(bag=bag) for text in arguments))
+    assert result.exit_code == 2
+    assert result.stdout == ""
+    (said,) = complaints(result)
+    assert said.startswith(line.format(bag=bag))
+
+
+def test_nothing_in_it(run, complaints, tmp_path):
+    (tmp_path / "empty.mcap").write_bytes(b"")
+    result = run("replay", "empty.mcap", "--out", "out")
+    assert result.exit_code == 2
+    assert complaints(result) == ["error: empty.mcap: is empty, expected an MCAP file"]
+    assert not (tmp_path / "out").exists()
+
+
+def test_another_crank_by_option(run, bag):
+    record = json.loads(run("replay", str(bag), "--crank-joint", "wheel", "--json", "-").stdout)
+    assert record["lost"]["faulty"]["missing_joint"] == SECONDS * RATE_HZ

@@ -1,0 +1,194 @@
+"""A replay is the live run: the same samples, the same reports, however they were cut and stored."""
+
+import json
+from pathlib import Path
+from typing import Any
+
+import attrs
+import numpy as np
+import pytest
+
+import leg_wear_monitor as lw
+from leg_wear_monitor.monitor.config import LedgerFile
+from leg_wear_monitor.recording import encode
+from leg_wear_monitor.recording.cdr import JOINT_STATE, WRENCH_STAMPED
+from leg_wear_monitor.recording.decoder import Decoder
+from leg_wear_monitor.recording.outputs import Messages, topic_of
+from leg_wear_monitor.recording.summary import summary
+from leg_wear_monitor.recording.writer import McapWriter
+
+SECONDS, RATE_HZ = 8, 200
+CYCLES = SECONDS - 2  # the first and the last are not whole
+
+Messages_ = list[tuple[int, int, bytes]]
+
+
+@pytest.fixture(scope="module")
+def walk(leg: lw.Mechanism) -> Messages_:
+    """A steady gait as messages in order of arrival: type, log time, bytes."""
+    n = SECONDS * RATE_HZ
+    ideal = lw.simulate(leg, clearances=[], cycles=1, trace=360).trace
+    angle = 2.0 * np.pi * np.arange(n) / RATE_HZ
+    angle += np.random.default_rng(1).normal(0.0, 2.0e-4, n)
+    order = np.argsort(ideal["crank_angle_rad"])
+    torque = np.interp(
+        angle % (2.0 * np.pi),
+        np.asarray(ideal["crank_angle_rad"])[order],
+        np.asarray(ideal["drive_torque_nm"])[order],
+        period=2.0 * np.pi,
+    )
+    stamps = 1_700_000_000 * 10**9 + np.arange(n, dtype=np.int64) * (10**9 // RATE_HZ)
+    still = np.zeros(n)
+    joints = encode.joint_states(stamps, ["hip", "crank"], position=np.stack([still, angle], axis=1))
+    wrench = encode.wrenches(stamps, torque=np.stack([still, still, torque], axis=1), frame_id="pelvis")
+    messages = []
+    for i, stamp in enumerate(stamps.tolist()):
+        messages.append((JOINT_STATE, stamp + 100_000, bytes(joints[i])))
+        messages.append((WRENCH_STAMPED, stamp + 100_001, bytes(wrench[i])))
+    return messages
+
+
+@pytest.fixture(scope="module")
+def bag(walk: Messages_, tmp_path_factory: pytest.TempPathFactory) -> Path:
+    path = tmp_path_factory.mktemp("bag") / "walk.mcap"
+    with McapWriter(path, chunk_bytes=20_000) as writer:
+        channels = {
+            JOINT_STATE: writer.channel("/joint_states", encode.JOINT_STATE),
+            WRENCH_STAMPED: writer.channel("/drive_torque", encode.WRENCH_STAMPED),
+        }
+        for kind, log_time_ns, raw in walk:
+            writer.write(channels[kind], log_time_ns, raw)
+    return path
+
+
+@pytest.fixture(scope="module")
+def out(bag: Path, tmp_path_factory: pytest.TempPathFactory) -> tuple[Path, Any]:
+    """Directory and result of a replay."""
+    directory = tmp_path_factory.mktemp("out")
+    return directory, lw.replay(bag, lw.MonitorConfig(), out=directory)
+
+
+def reported(path: Path) -> dict[str, list[bytes]]:
+    """Messages of a file by topic, with all checksums looked at."""
+    reader = pytest.importorskip("mcap.reader")
+    messages: dict[str, list[bytes]] = {}
+    with path.open("rb") as file:
+        for _, channel, message in reader.make_reader(file, validate_crcs=True).iter_messages(
+            log_time_order=False
+        ):
+            messages.setdefault(channel.topic, []).append(message.data)
+    return messages
+
+
+def test_a_replay_reports_bit_for_bit_what_the_monitor_reported_live(
+    leg: lw.Mechanism, walk: Messages_, out: tuple[Path, Any]
+) -> None:
+    config = lw.MonitorConfig()
+    monitor, decoder = lw.WearMonitor(leg, config), Decoder(config)
+    messages = Messages(config, monitor.loose)
+    live: dict[str, list[bytes]] = {}
+    begin, sizes = 0, np.random.default_rng(3)
+    while begin < len(walk):
+        end = begin + int(sizes.integers(1, 60))
+        samples = [decoder.one(raw, kind, time) for kind, time, raw in walk[begin:end]]
+        for outgoing in messages.of(monitor.update(np.concatenate(samples))):
+            topic = topic_of(outgoing.output, "/leg_wear_monitor")
+            live.setdefault(topic, []).extend(row.tobytes() for row in outgoing.messages)
+        begin = end
+    replayed = reported(out[0] / "reports.mcap")
+    assert len(live["/leg_wear_monitor/impact_forces"]) > 0.9 * SECONDS * RATE_HZ
+    assert len(live["/leg_wear_monitor/clearance_states"]) >= CYCLES
+    for topic, rows in live.items():
+        assert replayed[topic] == rows
+    assert set(replayed) - set(live) <= {"/diagnostics", "/leg_wear_monitor/forecast"}
+    assert len(replayed["/diagnostics"]) >= SECONDS - 1
+    assert monitor.wear_depth_m.tobytes() == out[1].monitor.wear_depth_m.tobytes()
+
+
+def test_what_a_replay_gives_does_not_depend_on_how_it_was_stored(
+    walk: Messages_, bag: Path, out: tuple[Path, Any], tmp_path: Path
+) -> None:
+    half = len(walk) // 2 // 2 * 2
+    for i, part in enumerate((walk[:half], walk[half:])):
+        with McapWriter(tmp_path / f"walk_{i}.mcap", chunk_bytes=500_000) as writer:
+            torque = writer.channel("/leg/drive_torque", encode.WRENCH_STAMPED)
+            joints = writer.channel("/leg/joint_states", encode.JOINT_STATE)
+            for kind, log_time_ns, raw in part:
+                writer.write(joints if kind == JOINT_STATE else torque, log_time_ns, raw)
+    other = lw.replay(tmp_path, lw.MonitorConfig())
+    assert np.array_equal(
+        other.history.joint_column("clearance_m"), out[1].history.joint_column("clearance_m")
+    )
+    assert other.monitor.wear_depth_m.tobytes() == out[1].monitor.wear_depth_m.tobytes()
+
+
+def test_the_summary_is_plain_json_and_tells_of_every_joint(out: tuple[Path, Any]) -> None:
+    result = out[1]
+    record = json.loads(json.dumps(summary(result, 2.0), allow_nan=False))
+    assert record["real_time_factor"] == pytest.approx(result.duration_s / 2.0)
+    assert record["cycles"] == len(result.history) >= CYCLES
+    assert record["recording"]["crank_samples"] == record["recording"]["torque_samples"] == SECONDS * RATE_HZ
+    assert not record["recording"]["is_partial"] and not record["recording"]["findings"]
+    assert set(record["joints"]) == set(result.monitor.loose) == set(record["wear_depth_m"])
+    for name, joint in record["joints"].items():
+        opened = joint["clearance_m"]["last"] - joint["clearance_m"]["first"]
+        assert 0.0 < opened < 1.0e-6
+        depth = record["wear_depth_m"][name]
+        assert np.mean(depth["bushing"]) + np.mean(depth["journal"]) >= opened
+        assert joint["peak_force_n"] > joint["mean_force_n"] > 0.0
+    assert record["lost"]["faulty"].keys() and not any(record["lost"]["faulty"].values())
+    assert "no proof" in record["advice"]
+
+
+def test_the_page_is_whole_and_of_one_file(out: tuple[Path, Any]) -> None:
+    pytest.importorskip("jinja2")
+    from leg_wear_monitor.report.page import page_html
+    from leg_wear_monitor.report.replay_page import replay_page
+
+    record = {**summary(out[1], 2.0), "made_with": {"leg_wear_monitor": "1"}}
+    html = page_html(replay_page(record))
+    for title in (
+        "Clearance over time",
+        "Impact forces",
+        "Wear around each bushing",
+        "Alarms",
+        "Input health",
+    ):
+        assert f"{title}</h2>" in html
+    assert "http://" not in html and "https://" not in html
+    assert html.count("<img") >= 4
+    assert page_html(replay_page(json.loads(json.dumps(record)))) == html
+
+
+def test_the_ledger_of_the_parameters_is_left_alone_and_one_that_is_asked_for_is_continued(
+    bag: Path, tmp_path: Path
+) -> None:
+    live, own = tmp_path / "live.db", tmp_path / "own.db"
+    config = attrs.evolve(lw.MonitorConfig(), ledger=LedgerFile(path=str(live)))
+    first = lw.replay(bag, config, ledger=own)
+    assert own.exists() and not live.exists()
+    again = lw.replay(bag, config, ledger=own)
+    assert again.monitor.lost.already_counted > 0.95 * 2 * SECONDS * RATE_HZ
+    assert len(again.history) == 0
+    np.testing.assert_allclose(again.monitor.wear_depth_m, first.monitor.wear_depth_m, rtol=1e-12)
+
+
+def test_progress_goes_from_little_to_all(bag: Path) -> None:
+    shares: list[float] = []
+    lw.replay(bag, lw.MonitorConfig(), progress=shares.append)
+    assert shares == sorted(shares) and shares[-1] == 1.0
+
+
+def test_a_recording_of_another_crank_gives_a_result_of_nothing(bag: Path, tmp_path: Path) -> None:
+    """Nothing is followed, nothing is made up, and the reason is counted."""
+    pytest.importorskip("jinja2")
+    from leg_wear_monitor.report.page import page_html
+    from leg_wear_monitor.report.replay_page import replay_page
+
+    result = lw.replay(bag, lw.MonitorConfig(crank_joint="wheel"), out=tmp_path / "out")
+    record = {**summary(result, 1.0), "made_with": {}}
+    assert record["cycles"] == 0 and record["joints"] == {}
+    assert record["lost"]["faulty"]["missing_joint"] == SECONDS * RATE_HZ
+    assert np.all(result.monitor.wear_depth_m == 0.0)
+    assert "nothing to say about wear" in page_html(replay_page(record))
+    assert reported(tmp_path / "out" / "reports.mcap").keys() <= {"/diagnostics", "/leg_wear_monitor/alarms"}

@@ -18,10 +18,19 @@ from leg_wear_monitor.gait.config import (
 from leg_wear_monitor.gait.leg import SyntheticLeg
 from leg_wear_monitor.gait.pace import CrankMotion
 from leg_wear_monitor.mechanism.ideal import TURN
-from leg_wear_monitor.twin.sample import CRANK, FAULTS, GAIT_SAMPLE, NO_FAULT, OUT_OF_RANGE, TORQUE, Samples
+from leg_wear_monitor.twin.sample import (
+    CRANK,
+    FAULTS,
+    GAIT_SAMPLE,
+    NO_FAULT,
+    OUT_OF_RANGE,
+    TORQUE,
+    WRONG_TYPE,
+    Samples,
+)
 
-# what a message can be made to suffer from; the rest needs another type, or is no message's fault
-_MADE = tuple(fault for fault in FAULTS if fault not in (NO_FAULT, OUT_OF_RANGE))
+# what a message can be made to suffer from
+_MADE = tuple(fault for fault in FAULTS if fault not in (NO_FAULT, WRONG_TYPE, OUT_OF_RANGE))
 
 
 class Reading(NamedTuple):

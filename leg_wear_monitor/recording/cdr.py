@@ -41,7 +41,9 @@ MESSAGE = np.dtype(
 """One message among bytes: from where to where, when it was recorded and sent, and a code of `TYPES`."""
 
 ENCAPSULATION = 4
-_MOST_PADDING = 3  # bytes that a middleware may add to come to a multiple of four
+# Bytes that may follow a message: up to 3 where a middleware fills up to a multiple of four, and 4 more for
+# each empty sequence of numbers: rclpy's serialize_message reserves room to align what is not there.
+_MOST_PADDING = 15
 
 
 @kernel

@@ -1,5 +1,6 @@
 """What the node receives and publishes, as bytes, in an MCAP file: a replay of it is the live run."""
 
+from contextlib import suppress
 from typing import TYPE_CHECKING
 
 import numpy as np
@@ -88,7 +89,10 @@ class BlackBox:
 
     def _fail(self, error: LegWearError) -> None:
         """Go on without: what is on the disk stays readable, and the monitor must not end with the disk."""
-        self.fault, self._writer = str(error), None
+        self.fault, writer, self._writer = str(error), self._writer, None
+        if writer is not None:
+            with suppress(LegWearError):  # said already
+                writer.close()
 
 
 def _writer(path: str) -> "McapWriter":

@@ -74,7 +74,7 @@ def joint_states(draw: st.DrawFn) -> dict[str, Any]:
     return {"name": name, "stamp_ns": draw(stamps), "frame": draw(frames), **values}
 
 
-@given(parts=joint_states(), little=st.booleans(), padding=st.integers(0, 3))
+@given(parts=joint_states(), little=st.booleans(), padding=st.integers(0, 15))
 @example(parts={"name": [], "stamp_ns": 0, "frame": ""}, little=True, padding=0)
 def test_a_joint_state_is_read_as_the_libraries_read_it(
     store: Any,

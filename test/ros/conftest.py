@@ -1,0 +1,200 @@
+"""A stage of real DDS: monitors, legs that play to them, and somebody who listens.
+
+Nothing waits for time to pass: a leg starts when its topics are matched, goes on when what it sent was
+taken in, and a test ends when what it waits for is there.
+"""
+
+import itertools
+import os
+import threading
+import time
+from collections.abc import Callable, Iterator
+from pathlib import Path
+from typing import Any
+
+import pytest
+
+pytest.importorskip("rclpy")
+
+os.environ["FASTRTPS_DEFAULT_PROFILES_FILE"] = str(Path(__file__).parent / "fast_discovery.xml")
+os.environ["ROS_AUTOMATIC_DISCOVERY_RANGE"] = "LOCALHOST"
+
+import rclpy
+from geometry_msgs.msg import WrenchStamped
+from rclpy.context import Context
+from rclpy.node import Node
+from rclpy.parameter import Parameter
+from rclpy.qos import DurabilityPolicy, QoSProfile, ReliabilityPolicy
+from rclpy.utilities import try_shutdown
+from sensor_msgs.msg import JointState
+
+from leg_wear_monitor.gait.leg import SyntheticLeg
+from leg_wear_monitor.gait.sensors import readings
+from leg_wear_monitor.ros.monitor_node import MonitorNode
+from leg_wear_monitor.ros.publisher_config import PublisherConfig
+from leg_wear_monitor.ros.running import spin
+from leg_wear_monitor.ros.sensor_messages import sensor_message
+from leg_wear_monitor.twin.sample import CRANK, TORQUE
+
+START_NS = 1_700_000_000_000_000_000
+PATIENCE_S = 60.0  # before a test that waits in vain is given up
+
+_domains = itertools.count(os.getpid() % 60)
+
+
+def wait_for(there: Callable[[], bool], what: str) -> None:
+    """Come back when something is there."""
+    given_up = time.monotonic() + PATIENCE_S
+    while not there():
+        assert time.monotonic() < given_up, f"waited in vain for {what}"
+        time.sleep(0.005)
+
+
+class Walk:
+    """A walk of the synthetic leg: its configuration, its readings, and what was true of it."""
+
+    def __init__(self, config: PublisherConfig) -> None:
+        leg = SyntheticLeg(config)
+        self.config = config
+        self.readings = list(readings(leg, config))
+        self.truth = leg.truth()
+
+
+class Legs:
+    """Publishers of a leg's two topics, in a namespace."""
+
+    def __init__(self, node: Node, namespace: str, reliable: bool) -> None:
+        self._node = node
+        reliability = ReliabilityPolicy.RELIABLE if reliable else ReliabilityPolicy.BEST_EFFORT
+        qos = QoSProfile(depth=200, reliability=reliability)
+        self._publishers = {
+            CRANK: node.create_publisher(JointState, f"{namespace}/joint_states", qos),
+            TORQUE: node.create_publisher(WrenchStamped, f"{namespace}/drive_torque", qos),
+        }
+
+    def listeners(self) -> int:
+        """How many listen to the topic that fewest listen to."""
+        return min(one.get_subscription_count() for one in self._publishers.values())
+
+    def play(
+        self, walk: Walk, monitor: "Monitor | None" = None, begin_s: float = 0.0, end_s: float = 1e9
+    ) -> None:
+        """Publish a part of a walk, no faster than it is taken in."""
+        if monitor:
+            wait_for(lambda: self.listeners() > 0, "the monitor's subscriptions")
+        part = [one for one in walk.readings if begin_s <= one.arrival_s < end_s]
+        for block in (part[i : i + 50] for i in range(0, len(part), 50)):
+            before = monitor.received if monitor else 0
+            for reading in block:
+                self._publishers[reading.kind].publish(sensor_message(reading, START_NS, walk.config))
+            if monitor:
+                sent = before + len(block)
+                wait_for(lambda sent=sent: monitor.received >= sent, "a message on its way")
+        if monitor:
+            wait_for(lambda: monitor.waiting == 0, "the monitor to take what it got")
+
+    def leave(self) -> None:
+        """Take the publishers down."""
+        for publisher in self._publishers.values():
+            self._node.destroy_publisher(publisher)
+
+
+class Monitor:
+    """The monitor's node, served by a thread."""
+
+    def __init__(self, domain: int, namespace: str, parameters: dict[str, Any]) -> None:
+        self._context = Context()
+        rclpy.init(args=["--ros-args", "--log-level", "error"], context=self._context, domain_id=domain)
+        overrides = [Parameter(name, value=value) for name, value in parameters.items()]
+        self.node = MonitorNode(context=self._context, namespace=namespace, parameter_overrides=overrides)
+        self._running = threading.Event()
+        self._running.set()
+        self._thread = threading.Thread(target=spin, args=(self.node, self._running.is_set))
+        self._thread.start()
+
+    @property
+    def received(self) -> int:
+        return self.node._inbox.received
+
+    @property
+    def waiting(self) -> int:
+        return len(self.node._inbox)
+
+    def stop(self) -> None:
+        """End as after a signal: the context goes down, the node puts its house in order."""
+        if self._thread.is_alive():
+            try_shutdown(context=self._context)
+            self._running.clear()
+            self._thread.join()
+            self.node.close()
+            self.node.destroy_node()
+
+
+class Stage:
+    """A domain of its own, with monitors, legs and listeners."""
+
+    def __init__(self) -> None:
+        self.domain = next(_domains) % 100
+        self._context = Context()
+        rclpy.init(args=[], context=self._context, domain_id=self.domain)
+        self.node = Node("stage", context=self._context)
+        self._monitors: list[Monitor] = []
+        self._thread = threading.Thread(target=spin, args=(self.node,))
+        self._thread.start()
+
+    wait_for = staticmethod(wait_for)
+    walk = Walk
+
+    def monitor(self, namespace: str = "", **parameters: Any) -> Monitor:
+        """A monitor with parameters, dots written as double underscores."""
+        named = {name.replace("__", "."): value for name, value in parameters.items()}
+        monitor = Monitor(self.domain, namespace, named)
+        self._monitors.append(monitor)
+        return monitor
+
+    def legs(self, namespace: str = "", reliable: bool = False) -> Legs:
+        return Legs(self.node, namespace, reliable)
+
+    def listen(self, topic: str, kind: type, latched: bool = False, matched: bool = True) -> list[Any]:
+        """Messages of a topic as they come, once somebody publishes it."""
+        heard: list[Any] = []
+        durability = DurabilityPolicy.TRANSIENT_LOCAL if latched else DurabilityPolicy.VOLATILE
+        qos = QoSProfile(depth=5000, reliability=ReliabilityPolicy.BEST_EFFORT, durability=durability)
+        if latched:
+            qos.reliability = ReliabilityPolicy.RELIABLE
+        subscription = self.node.create_subscription(kind, topic, heard.append, qos)
+        if matched:
+            wait_for(lambda: subscription.get_publisher_count() > 0, f"a publisher of {topic}")
+        return heard
+
+    def call(self, kind: type, name: str, request: Any) -> Any:
+        """Answer of a service."""
+        client = self.node.create_client(kind, name)
+        wait_for(client.service_is_ready, name)
+        future = client.call_async(request)
+        wait_for(future.done, f"an answer of {name}")
+        return future.result()
+
+    def close(self) -> None:
+        for monitor in self._monitors:
+            monitor.stop()
+        try_shutdown(context=self._context)
+        self._thread.join()
+        self.node.destroy_node()
+
+
+def _stage() -> Iterator[Stage]:
+    stage = Stage()
+    yield stage
+    stage.close()
+
+
+# for one test, and for all tests of a module
+stage = pytest.fixture(_stage, name="stage")
+shared_stage = pytest.fixture(_stage, name="shared_stage", scope="module")
+
+
+@pytest.fixture(scope="session")
+def walk() -> Walk:
+    """Six seconds at an even pace, wearing a hundred thousand times as fast as steel."""
+    return Walk(PublisherConfig(duration_s=6.0, wear_acceleration=1.0e5))

@@ -1,0 +1,221 @@
+"""The monitor over real DDS: what it publishes of an even gait, and through what it goes on."""
+
+import itertools
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+pytest.importorskip("rclpy")
+
+from diagnostic_msgs.msg import DiagnosticArray
+from geometry_msgs.msg import WrenchStamped
+from mcap.reader import make_reader
+from sensor_msgs.msg import JointState
+
+from leg_wear_monitor import load_mechanism
+from leg_wear_monitor.gait.config import KnockConfig, PaceConfig, TransportConfig
+from leg_wear_monitor.monitor.config import MonitorConfig
+from leg_wear_monitor.monitor.parameters import config_from
+from leg_wear_monitor.monitor.wear_monitor import WearMonitor
+from leg_wear_monitor.recording.outputs import Messages
+from leg_wear_monitor.recording.reader import Recording
+from leg_wear_monitor.ros.publisher_config import PublisherConfig
+
+ME = "/leg_wear_monitor"
+FAST = {"wear_acceleration": 1.0e5}
+
+
+def seconds(message) -> float:
+    """Stamp of a message since the start of the walk."""
+    stamp = message.header.stamp
+    return stamp.sec - 1_700_000_000 + 1e-9 * stamp.nanosec
+
+
+def levels(message: DiagnosticArray) -> dict[str, int]:
+    """Level of each line by its name, without the node's."""
+    return {status.name.split(": ", 1)[1]: status.level[0] for status in message.status}
+
+
+def raised(messages: list[DiagnosticArray]) -> list[tuple[float, str]]:
+    """When each alarm was raised; its own word for it, for a list may be overtaken by the next."""
+    found = {}
+    for message in messages:
+        for status in message.status:
+            if status.level[0]:
+                at = next(float(one.value) for one in status.values if one.key == "raised_s")
+                found[status.name.split(": ", 1)[1]] = at - 1_700_000_000
+    return sorted((at, name) for name, at in found.items())
+
+
+def test_an_even_gait_is_followed_told_recorded_and_replayed(stage, walk, tmp_path: Path) -> None:
+    recording = tmp_path / "live.mcap"
+    monitor = stage.monitor(record__path=str(recording), diagnostics__period_s=0.2, **FAST)
+    clearances = stage.listen(f"{ME}/clearance_states", JointState)
+    forces = stage.listen(f"{ME}/impact_forces", JointState)
+    torques = stage.listen(f"{ME}/predicted_torque", WrenchStamped)
+    diagnostics = stage.listen("/diagnostics", DiagnosticArray)
+    stage.legs().play(walk, monitor)
+    stage.wait_for(lambda: len(clearances) >= 4 and len(diagnostics) > 2, "gait cycles and diagnostics")
+    monitor.stop()
+    tells_the_wear(clearances, walk)
+    assert list(forces[-1].name) == [f"{joint}_impact" for joint in "ABGIJ"]
+    assert len(forces[-1].effort) == 5
+    assert np.ptp([message.wrench.torque.z for message in torques]) > 50.0
+    are_one_number_a_value(diagnostics)
+    is_what_a_replay_gives(recording, config_from(FAST))
+
+
+def tells_the_wear(clearances: list[JointState], walk) -> None:
+    last = clearances[-1]
+    assert list(last.name) == [f"{joint}_clearance" for joint in "ABGIJ"]
+    assert np.diff([seconds(message) for message in clearances]) == pytest.approx(1.0, abs=0.01)
+    for joint, k in (("A", 0), ("B", 1), ("G", 2)):
+        true = np.interp(seconds(last), walk.truth["cycle_end_s"], walk.truth["clearance_m"][joint][:-1])
+        assert last.position[k] - 3.0e-4 == pytest.approx(true - 3.0e-4, rel=0.1)
+
+
+def are_one_number_a_value(diagnostics: list[DiagnosticArray]) -> None:
+    assert {tuple(levels(message)) for message in diagnostics} == {tuple(levels(diagnostics[0]))}
+    lines = diagnostics[-1].status
+    expected = {"gait", "input", "torque", "joint A", "ledger", "load", "topics", "recording"}
+    assert expected <= set(levels(diagnostics[-1]))
+    assert all(line.level in (b"\0", b"\1", b"\2") for line in lines)
+    assert all(line.hardware_id == "leg" for line in lines)
+    values = [value for line in lines for value in line.values]
+    assert len(values) > 40
+    for value in values:
+        float(value.value)
+
+
+def is_what_a_replay_gives(recording: Path, config: MonitorConfig) -> None:
+    lived, replayed = published(recording), replayed_from(recording, config)
+    assert len(replayed["~/clearance_states"]) >= 4
+    assert len(replayed["~/predicted_torque"]) > 1900
+    for topic, messages in replayed.items():
+        begin = len(lived[topic]) - len(messages)  # the alarms as they stood at the start come first
+        assert begin == (topic == "~/alarms")
+        assert lived[topic][begin:] == messages
+
+
+def test_a_monitor_that_starts_late_follows_from_there(stage, walk) -> None:
+    legs = stage.legs()
+    legs.play(walk, end_s=2.0)
+    monitor = stage.monitor(**FAST)
+    clearances = stage.listen(f"{ME}/clearance_states", JointState)
+    legs.play(walk, monitor, begin_s=2.0)
+    stage.wait_for(lambda: len(clearances) >= 2, "gait cycles")
+    assert monitor.received == sum(one.arrival_s >= 2.0 for one in walk.readings)
+    assert seconds(clearances[0]) == pytest.approx(4.0, abs=0.01)
+
+
+def test_a_publisher_may_die_and_return(stage, walk) -> None:
+    monitor = stage.monitor(**FAST)
+    clearances = stage.listen(f"{ME}/clearance_states", JointState)
+    first = stage.legs()
+    first.play(walk, monitor, end_s=2.5)
+    first.leave()
+    # from 2.5 to 4 s nobody publishes
+    stage.legs(reliable=True).play(walk, monitor, begin_s=4.0)
+    lost = monitor.node.monitor.lost
+    assert lost.unmonitored_s == pytest.approx(1.6, abs=0.3)
+    assert lost.gaps_lost == 1
+    assert monitor.node.monitor.status()[0].message in ("in step", "starting")
+    stage.wait_for(lambda: bool(clearances), "a gait cycle")
+
+
+def test_reliable_and_best_effort_publishers_are_both_heard(stage, walk) -> None:
+    monitor = stage.monitor()
+    for reliable, begin_s in ((False, 0.0), (True, 0.5)):
+        legs = stage.legs(reliable=reliable)
+        legs.play(walk, monitor, begin_s=begin_s, end_s=begin_s + 0.5)
+        legs.leave()
+    assert monitor.received == sum(one.arrival_s < 1.0 for one in walk.readings)
+
+
+def test_a_publisher_that_does_not_fit_is_told_of(stage, walk) -> None:
+    override = "qos_overrides./joint_states.subscription.reliability"
+    monitor = stage.monitor(**{override: "reliable", "diagnostics.period_s": 0.1})
+    heard = stage.listen("/diagnostics", DiagnosticArray)
+    stage.legs(reliable=False)
+
+    def told() -> bool:
+        return any("reliability" in line.message for message in heard for line in message.status)
+
+    stage.wait_for(told, "a line about reliability")
+    assert levels(heard[-1])["topics"] == 2
+    assert monitor.received == 0
+
+
+def test_a_knock_raises_its_alarm_within_a_gait_cycle_and_not_before(stage) -> None:
+    knock = KnockConfig(joint="G", at_s=3.5, clearance_m=2.0e-3)
+    walk = stage.walk(PublisherConfig(duration_s=6.5, knock=knock))
+    monitor = stage.monitor(
+        limits__torque_mismatch=0.15, alarms__on_delay_cycles=1, limits__impact_force_n=1.0e6
+    )
+    alarms = stage.listen(f"{ME}/alarms", DiagnosticArray, latched=True)
+    stage.legs().play(walk, monitor)
+    stage.wait_for(lambda: bool(raised(alarms)), "an alarm")
+    at, name = raised(alarms)[0]
+    assert name == "torque_mismatch"
+    assert 3.5 < at <= 4.5 + 0.02
+
+
+def test_an_impact_beyond_the_limit_raises_its_alarm_within_a_gait_cycle(stage) -> None:
+    pace = PaceConfig(times_s=(0.0, 3.0), speeds_rpm=(60.0, 80.0))
+    walk = stage.walk(PublisherConfig(duration_s=5.5, pace=pace))
+    limit = 7000.0
+    monitor = stage.monitor(limits__impact_force_n=limit, limits__warn_share=1.0, cadence__tolerance_rpm=50.0)
+    alarms = stage.listen(f"{ME}/alarms", DiagnosticArray, latched=True)
+    peaks = stage.listen(f"{ME}/clearance_states", JointState)
+    stage.legs().play(walk, monitor)
+    stage.wait_for(lambda: bool(raised(alarms)), "an alarm")
+    at, name = raised(alarms)[0]
+    cycle = next(one for one in peaks if max(one.effort) >= limit)
+    assert name.startswith("impact_force")
+    # not before the first gait cycle with such an impact began, and not after it ended
+    assert seconds(cycle) - 1.0 < at <= seconds(cycle) + 0.01
+    assert seconds(cycle) - 1.0 > 2.5
+
+
+def test_several_legs_in_namespaces_do_not_hear_each_other(stage, walk) -> None:
+    slow = stage.walk(PublisherConfig(duration_s=3.0, pace=PaceConfig(speeds_rpm=(50.0,))))
+    left, right = stage.monitor("left"), stage.monitor("right", cadence__commanded_rpm=50.0)
+    stage.legs("/left").play(walk, left, end_s=3.0)
+    stage.legs("/right").play(slow, right)
+    speeds = [one.node.monitor.status()[0].values["cadence_rpm"] for one in (left, right)]
+    assert speeds == pytest.approx([60.0, 50.0], abs=1.0)
+    topics = {name for name, _ in stage.node.get_topic_names_and_types()}
+    assert {"/left/leg_wear_monitor/alarms", "/right/leg_wear_monitor/alarms"} <= topics
+
+
+def test_malformed_messages_are_counted_and_harm_nothing(stage) -> None:
+    walk = stage.walk(PublisherConfig(duration_s=3.0, transport=TransportConfig(fault_share=0.2)))
+    monitor = stage.monitor(alarms__on_delay_cycles=1)
+    stage.legs().play(walk, monitor)
+    lost = monitor.node.monitor.lost
+    assert sum(lost.faulty.values()) == sum(one.fault != 0 for one in walk.readings)
+    assert {"empty", "wrong_length", "missing_joint", "not_finite", "zero_stamp"} <= {
+        name for name, count in lost.faulty.items() if count
+    }
+    status = {one.name: one for one in monitor.node.monitor.status()}
+    assert "input_samples" in status["input"].message
+
+
+def published(path: Path) -> dict[str, list[bytes]]:
+    found: dict[str, list[bytes]] = {}
+    with path.open("rb") as stream:
+        for _, channel, message in make_reader(stream).iter_messages(log_time_order=False):
+            found.setdefault(channel.topic.replace(f"{ME}/", "~/"), []).append(message.data)
+    return found
+
+
+def replayed_from(path: Path, config: MonitorConfig) -> dict[str, list[bytes]]:
+    monitor = WearMonitor(load_mechanism(config.mechanism), config)
+    messages = Messages(config, monitor.loose)
+    found: dict[str, list[bytes]] = {}
+    with Recording([path], config) as recording:
+        blocks = (block.samples for block in recording.blocks())
+        for out in itertools.chain.from_iterable(messages.of(monitor.update(block)) for block in blocks):
+            found.setdefault(out.output.name, []).extend(row.tobytes() for row in out.messages)
+    return found

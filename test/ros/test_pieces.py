@@ -1,0 +1,163 @@
+"""Parts of the nodes by themselves: the inbox, the black box, how load is told, malformed messages."""
+
+from pathlib import Path
+
+import numpy as np
+import pytest
+from hypothesis import given
+from hypothesis import strategies as st
+
+pytest.importorskip("rclpy")
+
+from mcap.reader import make_reader
+from rclpy.serialization import serialize_message
+
+from leg_wear_monitor.gait.sensors import Reading, samples
+from leg_wear_monitor.monitor.alarms import Level
+from leg_wear_monitor.monitor.config import MonitorConfig
+from leg_wear_monitor.recording import cdr
+from leg_wear_monitor.recording.decoder import Decoder
+from leg_wear_monitor.recording.qos import SENSOR_DATA
+from leg_wear_monitor.ros.black_box import BlackBox
+from leg_wear_monitor.ros.inbox import Inbox
+from leg_wear_monitor.ros.inputs import InputTopic
+from leg_wear_monitor.ros.node_health import Load, load_status, recording_status, topics_status
+from leg_wear_monitor.ros.publisher_config import PublisherConfig
+from leg_wear_monitor.ros.sensor_messages import sensor_message
+from leg_wear_monitor.twin.sample import CRANK, FAULTS, NO_FAULT, OUT_OF_RANGE, TORQUE, WRONG_TYPE
+
+START_NS = 1_700_000_000_000_000_000
+CODES = {CRANK: cdr.JOINT_STATE, TORQUE: cdr.WRENCH_STAMPED}
+CRANK_FAULTS = [fault for fault in FAULTS if fault not in (NO_FAULT, OUT_OF_RANGE, WRONG_TYPE)]
+
+
+def raw_of(reading: Reading, config: PublisherConfig | None = None) -> bytes:
+    message = sensor_message(reading, START_NS, config or PublisherConfig())
+    return message if isinstance(message, bytes) else serialize_message(message)
+
+
+def crank(taken_s: float, fault: int = NO_FAULT) -> Reading:
+    return Reading(taken_s, taken_s, CRANK, fault, 6.0 * taken_s, 6.0, float("nan"))
+
+
+def inbox(limit: int = 100) -> Inbox:
+    return Inbox(Decoder(MonitorConfig()), limit)
+
+
+def test_readings_come_out_of_the_inbox_as_the_samples_they_were() -> None:
+    further = PublisherConfig(further_joints=("hip", "knee"))
+    torque = Reading(0.015, 0.015, TORQUE, NO_FAULT, float("nan"), float("nan"), -7.25)
+    sent, box = [crank(0.01), torque, crank(0.02)], inbox()
+    for number, reading in enumerate(sent):
+        box.add(CODES[reading.kind], raw_of(reading, further), number)
+    got, expected = box.decoded(box.take(100)), samples(sent, START_NS)
+    for name in got.dtype.names:
+        assert np.array_equal(got[name], expected[name], equal_nan=got.dtype[name].kind == "f")
+
+
+@pytest.mark.parametrize("fault", CRANK_FAULTS)
+def test_a_malformed_crank_message_is_found_to_be_what_it_is(fault: int) -> None:
+    box = inbox()
+    box.add(cdr.JOINT_STATE, raw_of(crank(0.5, fault)), 1)
+    assert FAULTS[int(box.decoded(box.take(1))["fault"][0])] == FAULTS[fault]
+
+
+@pytest.mark.parametrize("fault", CRANK_FAULTS)
+def test_a_malformed_torque_is_a_fault_of_some_kind(fault: int) -> None:
+    box = inbox()
+    reading = Reading(0.5, 0.5, TORQUE, fault, float("nan"), float("nan"), 1.0)
+    box.add(cdr.WRENCH_STAMPED, raw_of(reading), 1)
+    assert box.decoded(box.take(1))["fault"][0] != NO_FAULT
+
+
+@given(st.lists(st.integers(0, 50), min_size=1, max_size=60))
+def test_log_times_rise_whatever_the_clock_does(clock: list[int]) -> None:
+    box = inbox()
+    for now in clock:
+        box.add(cdr.JOINT_STATE, b"", now)
+    times = [arrival.log_time_ns for arrival in box.take(100)]
+    assert (np.diff(times) > 0).all()
+    assert all(time >= now for time, now in zip(times, clock, strict=True))
+
+
+@given(st.integers(2, 40), st.integers(0, 200))
+def test_an_inbox_holds_its_limit_and_loses_nothing_unsaid(limit: int, sent: int) -> None:
+    box = inbox(limit)
+    for number in range(sent):
+        box.add(cdr.JOINT_STATE, str(number).encode(), number)
+        assert len(box) <= limit
+    left = [int(arrival.raw) for arrival in box.take(1000)]
+    assert box.received == sent == box.shed + len(left)
+    # what is left is the youngest, in one piece
+    assert left == list(range(sent - len(left), sent))
+
+
+def test_a_bounded_part_is_taken_oldest_first() -> None:
+    box = inbox()
+    for number in range(5):
+        box.add(cdr.JOINT_STATE, str(number).encode(), 1_000_000_000 + number)
+    assert box.delay_s(2_000_000_000) == 1.0
+    assert [int(one.raw) for one in box.take(3)] == [0, 1, 2]
+    assert [int(one.raw) for one in box.take(3)] == [3, 4]
+    assert box.delay_s(2_000_000_000) == 0.0
+
+
+def test_falling_behind_is_told_and_then_over() -> None:
+    box, load = inbox(4), Load()
+    assert not load.note(0.01)
+    assert load_status(load, box).level is Level.OK
+    assert load.note(1.0)
+    load.note(0.0)
+    assert load_status(load, box).level is Level.WARN
+    for number in range(5):
+        box.add(cdr.JOINT_STATE, b"", number)
+    told = load_status(load, box)
+    assert (told.level, told.values["shed_messages"]) == (Level.ERROR, 2.0)
+    assert load_status(load, box).level is Level.OK
+
+
+def test_topics_without_publishers_are_a_warning_and_misfits_an_error() -> None:
+    topic = InputTopic("/left/joint_states", "sensor_msgs/msg/JointState", cdr.JOINT_STATE)
+    assert topics_status([(topic, 1)]).level is Level.OK
+    assert topics_status([(topic, 0)]).level is Level.WARN
+    topic.incompatible = "its reliability is less"
+    assert topics_status([(topic, 1)]).level is Level.ERROR
+
+
+def test_the_black_box_keeps_bytes_in_their_order(tmp_path: Path) -> None:
+    path = tmp_path / "run.mcap"
+    box = BlackBox(str(path))
+    for topic in ("/a", "/b"):
+        box.add_topic(topic, "sensor_msgs/msg/JointState", SENSOR_DATA)
+    box.write("/a", 1, b"one")
+    box.write_many("/b", 2, np.frombuffer(b"twotri", np.uint8).reshape(2, 3))
+    box.flush()
+    box.write("/a", 3, b"four")
+    box.close()
+    with path.open("rb") as stream:
+        found = [(c.topic, m.data) for _, c, m in make_reader(stream).iter_messages()]
+    assert found == [("/a", b"one"), ("/b", b"two"), ("/b", b"tri"), ("/a", b"four")]
+    assert recording_status(box).values["recorded_messages"] == 4.0
+
+
+def test_a_full_disk_ends_the_recording_and_not_the_node(tmp_path: Path) -> None:
+    box = BlackBox(str(tmp_path / "run.mcap"))
+    box.add_topic("/a", "sensor_msgs/msg/JointState", SENSOR_DATA)
+    box._writer._file.close()
+    box._writer._file = open("/dev/full", "wb", buffering=0)  # noqa: SIM115
+    box.write("/a", 1, b"one")
+    box.flush()
+    assert recording_status(box).level is Level.ERROR
+    assert "No space left" in recording_status(box).message
+    box.write("/a", 2, b"two")
+    box.close()
+    assert not box.on
+
+
+def test_no_path_no_recording() -> None:
+    box = BlackBox("")
+    box.add_topic("/a", "sensor_msgs/msg/JointState", SENSOR_DATA)
+    box.write("/a", 1, b"one")
+    box.flush()
+    box.close()
+    assert (box.on, box.recorded, recording_status(box).message) == (False, 0, "off")

@@ -34,9 +34,9 @@ def find_beat(stamp, first, length, state):  # type: ignore[no-untyped-def]
         if at > 0:
             if state[BEGIN] == 0:
                 state[BEGIN], state[NEWEST] = at, at
-            if at > state[NEWEST]:
-                state[NEWEST], state[IDLE] = at, 0
             outside = at >= state[BEGIN] + length or at < state[BEGIN] - length
+            if at > state[NEWEST] and not outside:
+                state[NEWEST], state[IDLE] = at, 0
             if outside and state[OUTSIDE] > 0:
                 state[BEGIN], state[NEWEST] = at, at
                 state[IDLE], state[OUTSIDE], state[COUNT] = 0, 0, 0

@@ -46,12 +46,15 @@ def cycle_report(
         residual_torque_rms_nm=float(torque.residual_rms_nm),
         torque_mismatch=_mismatch(torque),
         load_n=float(torque.load_n),
+        load_sigma_n=float(torque.load_sigma_n),
+        load_acting_n=float(torque.load_acting_n),
         friction_nm=float(torque.friction_nm),
+        torque_lag_s=float(torque.torque_lag_s),
     )
 
 
 def _mismatch(torque: TorqueFigures) -> float:
-    """What neither foot load nor friction explains, as a share of what was predicted; NaN if not known."""
+    """What load, friction and lag do not explain, as a share of what was predicted; NaN if not known."""
     left = torque.residual_rms_nm if math.isnan(torque.unexplained_rms_nm) else torque.unexplained_rms_nm
     return float(left / torque.predicted_rms_nm) if torque.predicted_rms_nm > 0.0 else math.nan
 

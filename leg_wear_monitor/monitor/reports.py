@@ -77,9 +77,13 @@ class CycleReport:
         The torque figures are NaN without any.
     measured_torque_rms_nm, predicted_torque_rms_nm, residual_torque_rms_nm : float
     torque_mismatch : float
-        RMS of what neither foot load nor friction explains of the residual, as a share of the predicted RMS.
-    load_n, friction_nm : float
-        Foot load and drive friction that the measured torque shows.
+        RMS of what foot load, friction and lag do not explain, as a share of the predicted RMS.
+    load_n, load_sigma_n : float
+        Foot load, up positive, that the measured torque shows, and its standard deviation.
+    load_acting_n : float
+        Foot load at work in the model: that above where it is believed, else 0.
+    friction_nm, torque_lag_s : float
+        Friction in the drive, and by how much the measured torque comes late.
     """
 
     cycle: int
@@ -95,7 +99,10 @@ class CycleReport:
     residual_torque_rms_nm: float
     torque_mismatch: float
     load_n: float
+    load_sigma_n: float
+    load_acting_n: float
     friction_nm: float
+    torque_lag_s: float
 
 
 @attrs.frozen

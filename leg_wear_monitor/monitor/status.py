@@ -77,7 +77,10 @@ def _torque(judge: Judge, last: CycleReport | None) -> Status:
         "residual_rms_nm": last.residual_torque_rms_nm,
         "mismatch": last.torque_mismatch,
         "load_n": last.load_n,
+        "load_sigma_n": last.load_sigma_n,
+        "load_acting_n": last.load_acting_n,
         "friction_nm": last.friction_nm,
+        "torque_lag_s": last.torque_lag_s,
         "samples": float(last.torque_samples),
     }
     message = "measured as predicted" if level is Level.OK else "measured is not what was predicted"

@@ -94,7 +94,7 @@ def kill_often(path, kills, seed):
 
 def test_kills_lose_at_most_the_interval_and_count_nothing_twice(tmp_path):
     path = tmp_path / "wear.ledger"
-    kill_often(path, 4, seed=5)
+    kill_often(path, 3, seed=5)
     end_s = max(0.0, (kept(path)[0] - START_NS) * 1e-9) + 4.0
     assert Run(path, max(0.0, end_s - 5.0), end_s).finish() == 0
     whole = kept(path)

@@ -1,0 +1,142 @@
+"""``leg-wear-monitor life``: a leg from new until a clearance reaches its limit, by cycle jumps."""
+
+import json
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+import click
+
+from leg_wear_monitor.cli.number import bounded
+from leg_wear_monitor.cli.output import check_directory, check_file, write_directory, write_file
+from leg_wear_monitor.cli.waiting import compilation, progress_bar
+
+if TYPE_CHECKING:
+    from leg_wear_monitor.dynamics.life_result import Life
+
+_ROWS = 12  # of the table
+
+
+@click.command(short_help="A leg's wear over its life, by cycle jumps.")
+@click.option("--mechanism", metavar="FILE", default="bionic_leg", show_default=True, help="The leg.")
+@click.option("--clearances", metavar="A,B", help="The loose joints.  [default: the mechanism's own]")
+@click.option(
+    "--speed-rpm", type=float, callback=bounded("rpm"), metavar="RPM", help="Crank speed.  [default: its own]"
+)
+@click.option(
+    "--limit-m",
+    type=float,
+    default=6.0e-4,
+    show_default=True,
+    callback=bounded("m", above=0.0),
+    metavar="M",
+    help="Mean radial clearance at which a joint's life ends.",
+)
+@click.option(
+    "--horizon-cycles",
+    type=float,
+    default=1.0e9,
+    show_default=True,
+    callback=bounded(above=0.0),
+    metavar="N",
+    help="Gait cycles at most.",
+)
+@click.option(
+    "--wear-factor",
+    type=float,
+    default=1.0,
+    show_default=True,
+    callback=bounded(above=0.0),
+    metavar="X",
+    help="On all wear coefficients.",
+)
+@click.option(
+    "--opens-m",
+    type=float,
+    callback=bounded("m", above=0.0),
+    metavar="M",
+    help="Deepest change of a surface in a jump.  [default: 3e-05]",
+)
+@click.option("--legs", type=click.IntRange(min=1), metavar="N", help="Legs averaged.  [default: 2]")
+@click.option(
+    "--cycles", type=click.IntRange(min=2), metavar="N", help="Cycles of each averaged.  [default: 4]"
+)
+@click.option(
+    "--json",
+    "json_file",
+    type=click.Path(path_type=Path),
+    metavar="FILE",
+    help="Write the life as JSON.",
+)
+@click.option("--out", type=click.Path(path_type=Path), metavar="DIR", help="Write life.json and life.png.")
+def life(mechanism: str, json_file: Path | None, out: Path | None, **options: Any) -> None:
+    """Let a leg wear from new until a clearance reaches its limit.
+
+    A few gait cycles are simulated, and their mean wear is applied over many; single cycles are chaotic, so
+    the figures have scatter, which is told.
+    """
+    from leg_wear_monitor.mechanism.loader import load_mechanism
+
+    leg = load_mechanism(mechanism)
+    if json_file is not None:
+        check_file("--json", json_file)
+    if out is not None:
+        check_directory("--out", out)
+    result = _run(leg, **options)
+    for line in lines(result, options["limit_m"]):
+        click.echo(line)
+    text = (json.dumps(result.to_dict(), indent=1, allow_nan=False) + "\n").encode()
+    if json_file is not None:
+        write_file(json_file, text)
+        click.echo(f"written: {json_file}")
+    if out is not None:
+        from leg_wear_monitor.report.life_picture import life_picture
+
+        for path in write_directory(out, {"life.json": text, "life.png": life_picture(result)}):
+            click.echo(f"written: {path}")
+
+
+def _run(leg: Any, **options: Any) -> "Life":
+    import attrs
+
+    from leg_wear_monitor.dynamics.life import LifeRun, LifeSettings, simulate_life
+    from leg_wear_monitor.wear.cycle_jump import JumpControl
+
+    given = {name: options[name] for name in ("legs", "cycles") if options[name] is not None}
+    settings = LifeSettings(**given)
+    if options["opens_m"] is not None:
+        control = JumpControl(opens_m=options["opens_m"], tolerance_m=0.1 * options["opens_m"])
+        settings = attrs.evolve(settings, jump=control)
+    names = options["clearances"]
+    with compilation("clearance"):
+        run = LifeRun(
+            leg,
+            settings,
+            clearances=[name.strip() for name in names.split(",")] if names else None,
+            speed_rpm=options["speed_rpm"],
+            wear_factor=options["wear_factor"],
+        )
+    with progress_bar("life") as progress:
+        return simulate_life(
+            run, limit_m=options["limit_m"], horizon_cycles=options["horizon_cycles"], progress=progress
+        )
+
+
+def lines(result: "Life", limit_m: float) -> list[str]:
+    """The life as a table, and when each joint reaches the limit."""
+    points = len(result.cycles)
+    shown = sorted({round(i * (points - 1) / max(1, _ROWS - 1)) for i in range(min(_ROWS, points))})
+    head = "".join(f"{joint:>22}" for joint in result.loose)
+    table = [f"{'cycles':>10}{head}", f"{'':10}" + f"{'mean µm  deg  peak N':>22}" * len(result.loose)]
+    for i in shown:
+        cells = "".join(
+            f"{1e6 * result.clearance_m[i, k]:11.1f}{result.worst_sector_deg[i, k]:5.0f}"
+            f"{result.peak_force_n[i, k]:6.0f}"
+            for k in range(len(result.loose))
+        )
+        table.append(f"{result.cycles[i]:10.3g}{cells}")
+    table.append(f"jumps: {points - 1}; greatest error seen in one: {1e6 * result.error_m.max():.2g} µm")
+    for k, joint in enumerate(result.loose):
+        cycles = result.cycles_to(k, limit_m)
+        held = "" if cycles <= result.cycles[-1] else ", if it goes on at its last rate"
+        table.append(f"{joint} reaches {1e6 * limit_m:g} µm after {cycles:.3g} gait cycles{held}")
+    return table

@@ -1,0 +1,250 @@
+"""A leg's life: a few gait cycles of a few legs are simulated, their mean wear jumps over many.
+
+::
+
+    run = LifeRun(mechanism, LifeSettings())
+    run.jump()                                  # as often as wanted: one jump, a fraction of a second
+    life = simulate_life(mechanism, limit_m=6.0e-4, horizon_cycles=1.0e8)
+
+A life under wear coefficients that are all larger by one factor is the same life, run through that much
+faster: wear enters by coefficient times cycles only. See `monitor.forecast` for coefficients that differ.
+"""
+
+from collections.abc import Callable, Sequence
+
+import attrs
+import numpy as np
+from numpy.typing import ArrayLike
+
+from leg_wear_monitor.dynamics.batch import advance_batch
+from leg_wear_monitor.dynamics.batch_leg import Leg, prepare_legs
+from leg_wear_monitor.dynamics.clearance_run import ClearanceStepper
+from leg_wear_monitor.dynamics.clearance_tables import build_tables
+from leg_wear_monitor.dynamics.drive import steady_drive
+from leg_wear_monitor.dynamics.life_result import Life, LifePoint, life_of
+from leg_wear_monitor.dynamics.run import DONE, Setup, stop
+from leg_wear_monitor.dynamics.tally import ARCHARD, Tally, new_tally
+from leg_wear_monitor.errors import ConfigError
+from leg_wear_monitor.mechanism.arrays import Floats
+from leg_wear_monitor.mechanism.ideal import TURN
+from leg_wear_monitor.mechanism.quantity import described, quantity
+from leg_wear_monitor.mechanism.spec import Mechanism
+from leg_wear_monitor.wear.cycle_jump import (
+    JumpControl,
+    WearRate,
+    jump_error,
+    longest_jump,
+    next_jump,
+    wear_rate,
+)
+
+_PERTURB = 0.5  # of the smallest clearance: how far from the centre journals may start
+_TRIALS = 4  # of a jump whose error is too large, before it is taken all the same, and says so
+
+
+@attrs.frozen(kw_only=True)
+class LifeSettings:
+    """How a life is simulated."""
+
+    legs: int = quantity("", "legs whose wear is averaged, alike but for their start", at_least=1, default=2)
+    cycles: int = quantity("", "gait cycles of each that are averaged, before a jump", at_least=2, default=4)
+    settle_cycles: int = quantity(
+        "", "gait cycles before those, since the surfaces have changed", at_least=0, default=1
+    )
+    jump: JumpControl = described("how far a jump may go", factory=JumpControl)
+    seed: int = quantity("", "of where legs start", at_least=0, default=0)
+
+
+class LifeRun:
+    """A leg somewhere in its life, that goes on jump by jump.
+
+    Parameters
+    ----------
+    mechanism : Mechanism
+    settings : LifeSettings, optional
+    clearances : sequence of str, optional
+        Names of the loose joints; the mechanism's own if not given.
+    speed_rpm : float, optional
+    wear_factor : float or (k,) array
+        On the wear coefficients of the loose joints.
+    depth : (k, 2, N) array, optional
+        Wear to begin with [m]; none if not given.
+    workers : int
+        Threads.
+
+    Attributes
+    ----------
+    loose : tuple of str
+    fresh_m : (k,) array
+        Radial clearances without wear.
+    points : list of LifePoint
+        The life so far; the first is where it began.
+
+    Raises
+    ------
+    ConfigError, AssemblyError
+    """
+
+    def __init__(
+        self,
+        mechanism: Mechanism,
+        settings: LifeSettings | None = None,
+        *,
+        clearances: Sequence[str] | None = None,
+        speed_rpm: float | None = None,
+        wear_factor: ArrayLike = 1.0,
+        depth: Floats | None = None,
+        workers: int = 1,
+    ) -> None:
+        self._settings = settings or LifeSettings()
+        self._workers = workers
+        self._setups = _setups(mechanism, self._settings, clearances, speed_rpm, wear_factor)
+        first = self._setups[0]
+        if not first.loose:
+            raise ConfigError(mechanism.source, "clearances.joints", "no joint is loose, nothing can wear")
+        self.loose, self.fresh_m = first.loose, first.contacts.clearance
+        tables = build_tables(first.linkage, first.contacts)
+        self._steppers = [ClearanceStepper(setup, tables=tables) for setup in self._setups]
+        self._polynomials = []
+        for i, stepper in enumerate(self._steppers):
+            leg = _leg(mechanism, self._settings, clearances, speed_rpm, i, float(self.fresh_m.min()))
+            leg.start(stepper)
+            self._polynomials.append(steady_drive(leg.crank_angle_rad, first.speed))
+        start = np.zeros_like(first.surfaces.depth) if depth is None else depth.copy()
+        self._rate, archard, peak = self._probe(start)
+        self._archard = archard
+        self._wish = longest_jump(self._rate, self._settings.jump)
+        self.points = [LifePoint(0.0, start, self._rate, peak, np.zeros_like(archard), 0.0)]
+
+    def jump(self, most_cycles: float = np.inf) -> LifePoint:
+        """Go on by one jump, of at most so many gait cycles.
+
+        Raises
+        ------
+        SimulationError
+            Where the motion diverges.
+        """
+        control, last = self._settings.jump, self.points[-1]
+        cycles = min(self._wish, longest_jump(self._rate, control), most_cycles)
+        for trial in range(_TRIALS):
+            rate, archard, peak = self._probe(last.depth + cycles * self._rate.depth)
+            error = float(jump_error(self._rate, rate, cycles).max())
+            wish = next_jump(cycles, error, control)
+            if error <= control.tolerance_m or trial == _TRIALS - 1:
+                break
+            cycles = wish
+        depth = last.depth + 0.5 * cycles * (self._rate.depth + rate.depth)
+        worked = last.archard_j + 0.5 * cycles * (self._archard + archard)
+        self._rate, self._archard, self._wish = rate, archard, wish
+        self.points.append(LifePoint(last.cycles + cycles, depth, rate, peak, worked, error))
+        return self.points[-1]
+
+    @property
+    def life(self) -> Life:
+        """The life so far."""
+        return life_of(self.loose, self.fresh_m, self.points)
+
+    def _probe(self, depth: Floats) -> tuple[WearRate, Floats, Floats]:
+        """Mean wear, Archard integral (k,) [J] and peak force (k,) [N] of a cycle; surfaces (k, 2, N) [m]."""
+        for setup in self._setups:
+            setup.surfaces.depth[:] = depth
+        self._advance(self._settings.settle_cycles)
+        worn, archard, peak = [], [], []
+        for _ in range(self._settings.cycles):
+            before = [setup.surfaces.depth.copy() for setup in self._setups]
+            tallies = self._advance(1)
+            joints = self._setups[0].contacts.joint
+            worn += [setup.surfaces.depth - was for setup, was in zip(self._setups, before, strict=True)]
+            archard += [tally.integral[joints, ARCHARD] for tally in tallies]
+            peak += [tally.peak[joints] for tally in tallies]
+        rate = wear_rate(np.array(worn), self._settings.jump.smooth_deg)
+        return rate, np.mean(archard, axis=0), np.mean(peak, axis=0)
+
+    def _advance(self, cycles: int) -> list[Tally]:
+        joints = len(self._setups[0].linkage.mechanism.joints)
+        tallies = [new_tally(joints) for _ in self._steppers]
+        period = TURN / abs(self._setups[0].speed)
+        ends = [(round(stepper.time / period) + cycles) * period for stepper in self._steppers]
+        outcomes = advance_batch(self._steppers, self._polynomials, ends, tallies, self._workers)
+        for (status, k), setup, stepper in zip(outcomes, self._setups, self._steppers, strict=True):
+            if status != DONE:
+                raise stop(setup, status, k, stepper.time)
+        return tallies
+
+
+def simulate_life(
+    run: LifeRun,
+    *,
+    limit_m: ArrayLike,
+    horizon_cycles: float,
+    progress: Callable[[float], None] | None = None,
+) -> Life:
+    """Go on until a mean clearance reaches its limit, or to a horizon.
+
+    Parameters
+    ----------
+    run : LifeRun
+        Goes on from where it is.
+    limit_m : float or (k,) array
+        Of the mean radial clearance of each loose joint.
+    horizon_cycles : float
+        Gait cycles at most, since the run began.
+    progress : callable, optional
+        Called with the share that is done.
+
+    Raises
+    ------
+    ConfigError
+        If a limit is reached from the start.
+    SimulationError
+    """
+    limits = np.broadcast_to(np.asarray(limit_m, dtype=float), len(run.loose))
+    while run.points[-1].cycles < horizon_cycles:
+        opened = run.points[-1].opened_m
+        shares = opened / (limits - run.fresh_m)
+        if (shares >= 1.0).any():
+            break
+        if not run.points[-1].rate.clearance.max() > 0.0:
+            break
+        run.jump(horizon_cycles - run.points[-1].cycles)
+        if progress:
+            progress(float(min(1.0, max(shares.max(), run.points[-1].cycles / horizon_cycles))))
+    return run.life
+
+
+def _leg(
+    mechanism: Mechanism,
+    settings: LifeSettings,
+    clearances: Sequence[str] | None,
+    speed_rpm: float | None,
+    member: int,
+    smallest_m: float = 0.0,
+) -> Leg:
+    return Leg(
+        mechanism=mechanism,
+        clearances=clearances,
+        speed_rpm=speed_rpm,
+        wear=True,
+        crank_angle_rad=TURN * (member + 0.5) / settings.legs,
+        perturb_m=_PERTURB * smallest_m,
+        seed=settings.seed + member,
+    )
+
+
+def _setups(
+    mechanism: Mechanism,
+    settings: LifeSettings,
+    clearances: Sequence[str] | None,
+    speed_rpm: float | None,
+    wear_factor: ArrayLike,
+) -> list[Setup]:
+    setups = []
+    for setup in prepare_legs(
+        [_leg(mechanism, settings, clearances, speed_rpm, i) for i in range(settings.legs)]
+    ):
+        if not isinstance(setup, Setup):
+            raise setup
+        factor = np.broadcast_to(np.asarray(wear_factor, dtype=float), len(setup.loose))
+        coefficient = setup.contacts.wear_coefficient * factor[:, None]
+        setups.append(attrs.evolve(setup, contacts=setup.contacts._replace(wear_coefficient=coefficient)))
+    return setups

@@ -1,0 +1,118 @@
+"""What a life is made of: states of wear over gait cycles, and when a clearance reaches its limit."""
+
+from collections.abc import Sequence
+from typing import Any
+
+import attrs
+import numpy as np
+
+from leg_wear_monitor.mechanism.arrays import Floats
+from leg_wear_monitor.wear.cycle_jump import WearRate
+
+
+@attrs.frozen(eq=False)
+class LifePoint:
+    """A leg at one time of its life; k loose joints.
+
+    Attributes
+    ----------
+    cycles : float
+        Gait cycles since the life began.
+    depth : (k, 2, N) array, m
+        Wear of bushing and journal.
+    rate : WearRate
+        Mean wear of a cycle about then.
+    peak_force_n : (k,) array
+        Largest contact force of a cycle, mean of those simulated.
+    archard_j : (k,) array
+        Integral of F_N |v_t| dt since the life began.
+    error_m : float
+        Error of the mean clearance that could be seen in the jump to here.
+    """
+
+    cycles: float
+    depth: Floats
+    rate: WearRate
+    peak_force_n: Floats
+    archard_j: Floats
+    error_m: float
+
+    @property
+    def opened_m(self) -> Floats:
+        """By how much the mean clearances (k,) have grown since new."""
+        return np.asarray(self.depth.mean(axis=2).sum(axis=1))
+
+
+@attrs.frozen(eq=False)
+class Life:
+    """A life as arrays over p points and k loose joints.
+
+    Attributes
+    ----------
+    loose : tuple of str
+    cycles : (p,) array
+    clearance_m, clearance_max_m : (p, k) arrays
+        Mean around the bushing; largest, both surfaces' profiles one upon the other.
+    worst_sector_deg : (p, k) array
+        Where the bushing is deepest, in its own frame; NaN without wear.
+    peak_force_n, growth_m_per_cycle, growth_error_m_per_cycle : (p, k) arrays
+    error_m : (p,) array
+        Seen in the jump to each point.
+    depth : (p, k, 2, N) array, m
+    """
+
+    loose: tuple[str, ...]
+    cycles: Floats
+    clearance_m: Floats
+    clearance_max_m: Floats
+    worst_sector_deg: Floats
+    peak_force_n: Floats
+    growth_m_per_cycle: Floats
+    growth_error_m_per_cycle: Floats
+    error_m: Floats
+    depth: Floats
+
+    def cycles_to(self, k: int, clearance_m: float) -> float:
+        """Gait cycles at which joint k's mean clearance reaches a value; beyond the end at its last rate.
+
+        Infinite if it does not grow, 0 if it was there from the start.
+        """
+        seen = self.clearance_m[:, k]
+        if clearance_m <= seen[0]:
+            return 0.0
+        if clearance_m <= seen[-1]:
+            return float(np.interp(clearance_m, seen, self.cycles))
+        rate = self.growth_m_per_cycle[-1, k]
+        return float(self.cycles[-1] + (clearance_m - seen[-1]) / rate) if rate > 0.0 else np.inf
+
+    def to_dict(self) -> dict[str, Any]:
+        """Plain object for JSON, joints by name."""
+        names = ("clearance_m", "clearance_max_m", "worst_sector_deg", "peak_force_n", "growth_m_per_cycle")
+        joints = {
+            joint: {name: [_plain(v) for v in getattr(self, name)[:, k].tolist()] for name in names}
+            for k, joint in enumerate(self.loose)
+        }
+        return {"cycles": self.cycles.tolist(), "error_m": self.error_m.tolist(), "joints": joints}
+
+
+def _plain(value: float) -> float | None:
+    return None if np.isnan(value) else value
+
+
+def life_of(loose: tuple[str, ...], fresh_m: Floats, points: Sequence[LifePoint]) -> Life:
+    """The life that points make."""
+    depth = np.array([point.depth for point in points])
+    both, sectors = depth.sum(axis=2), depth.shape[-1]
+    deepest = (depth[:, :, 0].argmax(axis=2) + 0.5) * (360.0 / sectors)
+    return Life(
+        loose=loose,
+        cycles=np.array([point.cycles for point in points]),
+        clearance_m=fresh_m + both.mean(axis=2),
+        clearance_max_m=fresh_m + both.max(axis=2),
+        worst_sector_deg=np.where(depth[:, :, 0].max(axis=2) > 0.0, deepest, np.nan),
+        peak_force_n=np.array([point.peak_force_n for point in points]),
+        growth_m_per_cycle=np.array([point.rate.clearance for point in points]),
+        growth_error_m_per_cycle=np.array([point.rate.scatter for point in points]),
+        error_m=np.array([point.error_m for point in points]),
+        depth=depth,
+    )

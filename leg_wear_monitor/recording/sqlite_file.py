@@ -17,6 +17,8 @@ from leg_wear_monitor.recording.findings import Finding, RecordingError, Weight
 from leg_wear_monitor.recording.layout import Channel
 from leg_wear_monitor.recording.mcap_file import Piece
 
+_Row = tuple[Any, int, bytes]
+
 _TOGETHER = 4096
 _NO_CHECKSUMS = "has no checksums, as no .db3 has: a damaged number would not be seen"
 _UNREADABLE = (ReaderError, apsw.Error, sqlite3.Error, UnicodeDecodeError, ValueError, KeyError, TypeError)
@@ -64,23 +66,33 @@ class SqliteFile:
         wanted = [self._connections[number] for number in types]
         expected, found = sum(connection.msgcount for connection in wanted), 0
         messages = self._reader.messages(wanted)
-        while found < expected:
-            try:
-                together = list(islice(messages, _TOGETHER))
-            except _UNREADABLE as error:
-                self.findings.append(Finding(self.path, f"breaks off: {_one_line(error)}"))
-                break
-            if not together:
-                break
-            found += len(together)
-            yield _piece(together, types, self.size * len(together) // max(expected, 1))
+        while together := self._next(messages):
+            sound = [row for row in together if _is_message(row[1], row[2])]
+            found += len(sound)
+            if sound:
+                yield _piece(sound, types, self.size * len(together) // max(expected, 1))
         self.findings.append(Finding(self.path, _NO_CHECKSUMS, Weight.NOTE))
         if found != expected:
             text = f"{found} messages could be read of the {expected} that it counts"
             self.findings.append(Finding(self.path, text))
 
+    def _next(self, messages: Iterator[_Row]) -> list[_Row]:
+        """The next rows, as far as they can be read."""
+        rows: list[_Row] = []
+        try:
+            for row in islice(messages, _TOGETHER):
+                rows.append(row)  # what came before an error is kept
+        except _UNREADABLE as error:
+            self.findings.append(Finding(self.path, f"breaks off: {_one_line(error)}"))
+        return rows
 
-def _piece(together: list[tuple[Any, int, bytes]], types: dict[int, int], stored: int) -> Piece:
+
+def _is_message(time: object, raw: object) -> bool:
+    """Whether a row holds what it should: SQLite lets a damaged one hold anything."""
+    return isinstance(time, int) and isinstance(raw, bytes) and abs(time) < 2**63
+
+
+def _piece(together: list[_Row], types: dict[int, int], stored: int) -> Piece:
     ends = np.cumsum([len(raw) for _, _, raw in together])
     messages = np.zeros(len(together), MESSAGE)
     messages["end"] = ends

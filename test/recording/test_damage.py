@@ -1,6 +1,8 @@
 """A damaged recording gives what is sound in it and says that something is not: no hang, no wrong number."""
 
+import sqlite3
 from collections.abc import Callable
+from contextlib import closing
 from pathlib import Path
 from typing import Any
 
@@ -149,9 +151,10 @@ def test_a_part_that_cannot_be_opened_is_a_loss(
     assert losses == [f"{tmp_path / 'a_1.mcap'}: is empty, expected an MCAP file: it is lost"]
 
 
-def test_a_database_cut_short(tmp_path: Path, sent: Any, store: Any, expected: Any, read: Any) -> None:
+def write_database(directory: Path, sent: Any, store: Any) -> Path:
+    """A .db3 bag, written by rosbags."""
     rosbag2 = pytest.importorskip("rosbags.rosbag2")
-    with rosbag2.Writer(tmp_path / "bag", version=9, storage_plugin=rosbag2.StoragePlugin.SQLITE3) as writer:
+    with rosbag2.Writer(directory, version=9, storage_plugin=rosbag2.StoragePlugin.SQLITE3) as writer:
         ours = [each for each in sent if each.type in store.types]
         connections = {
             topic: writer.add_connection(topic, kind, typestore=store)
@@ -159,11 +162,40 @@ def test_a_database_cut_short(tmp_path: Path, sent: Any, store: Any, expected: A
         }
         for each in ours:
             writer.write(connections[each.topic], each.log_time_ns, each.raw)
-    (path,) = (tmp_path / "bag").glob("*.db3")
+    (path,) = directory.glob("*.db3")
+    return path
+
+
+def test_a_damaged_database(tmp_path: Path, sent: Any, store: Any, expected: Any, read: Any) -> None:
+    """Cut short it gives what was sent or nothing; a flipped bit may pass, but not unsaid."""
+    path = write_database(tmp_path / "bag", sent, store)
     whole, true = path.read_bytes(), expected(sent)
     for cut in np.random.default_rng(4).integers(0, len(whole), TRUNCATIONS).tolist():
         path.write_bytes(whole[:cut])
         assert_sound(*outcome(read, path), true)
+    rng = np.random.default_rng(5)
+    for _ in range(FLIPS):
+        content = bytearray(whole)
+        content[rng.integers(len(content))] ^= 1 << int(rng.integers(8))
+        path.write_bytes(content)
+        samples, recording = outcome(read, path)
+        assert samples is None or any("no checksums" in str(finding) for finding in recording.findings)
+
+
+def test_rows_of_another_kind_are_lost_and_counted(
+    tmp_path: Path, sent: Any, store: Any, expected: Any, read: Any
+) -> None:
+    """SQLite takes anything for a time; only what can be one is taken from it."""
+    path = write_database(tmp_path / "bag", sent, store)
+    with closing(sqlite3.connect(path)) as database, database:
+        database.execute("UPDATE messages SET timestamp = x'17' WHERE id = 5")
+        database.execute("UPDATE messages SET data = 'text' WHERE id = 7")
+    samples, recording = read(path)
+    assert len(samples) == len(expected(sent)) - 2
+    losses = [str(each) for each in recording.findings if each.weight is Weight.LOSS]
+    assert losses == [
+        f"{path}: {len(samples)} messages could be read of the {len(samples) + 2} that it counts"
+    ]
 
 
 def test_claims_of_great_size_do_not_fill_the_memory(

@@ -51,12 +51,15 @@ def number(value: float) -> str:
 
 
 def with_spread(value: Spread, factor: float = 1.0) -> str:
-    """Mean and standard deviation, both to the digit that the deviation has two of."""
+    """Mean and standard deviation, to two digits of the latter and at most four of the former."""
     mean, deviation = factor * value.mean, factor * value.deviation
-    if not deviation > 0.0:
+    if not deviation > 0.0 or mean == 0.0:
         return number(mean)
-    digits = max(0, min(6, 1 - math.floor(math.log10(deviation))))
-    return f"{mean:.{digits}f} ± {deviation:.{digits}f}"
+    most = max(0, 3 - math.floor(math.log10(abs(mean))))
+    digits = max(0, min(most, 1 - math.floor(math.log10(deviation))))
+    least = 10.0**-digits
+    around = f"{deviation:.{digits}f}" if deviation >= 0.5 * least else f"<{least:.{digits}f}"
+    return f"{mean:.{digits}f} ± {around}"
 
 
 def percent(share: float) -> str:

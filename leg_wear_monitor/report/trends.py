@@ -93,9 +93,7 @@ def trend_gallery(values: Sequence[float], axis: str, arrays: Sequence[Arrays]) 
         axes.set_xlabel(axis, fontsize=SMALL)
         _finish(axes, panel)
         pictures.append(Picture(image=png(figure), alt=f"{panel.title} over {axis}: {_as_text(panel)}"))
-    return Gallery(
-        pictures=pictures, caption=_CAPTION + "all runs' cycles, or of runs for the 99 % and wear."
-    )
+    return Gallery(pictures=pictures, caption=_CAPTION)
 
 
 def compare_gallery(labelled: Labelled) -> Gallery:
@@ -118,9 +116,7 @@ def compare_gallery(labelled: Labelled) -> Gallery:
         axes.set_xlim(left=0.0)
         _finish(axes, panel)
         pictures.append(Picture(image=png(figure), alt=f"{panel.title}: {_as_text(panel, labels)}"))
-    return Gallery(
-        pictures=pictures, caption=_CAPTION + "all runs' cycles, or of runs for the 99 % and wear."
-    )
+    return Gallery(pictures=pictures, caption=_CAPTION)
 
 
 def _bars(spreads: Sequence[Spread], factor: float) -> tuple[list[float], list[list[float]]]:

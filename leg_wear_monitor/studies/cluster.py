@@ -36,7 +36,7 @@ def run_on_cluster(jobs: Sequence[Job], address: str, done: Done) -> None:
         client = Client(address, timeout=PATIENCE_S, set_as_default=False)
     except (OSError, ValueError) as error:
         raise ConfigError("--scheduler", address, "no scheduler answers there") from error
-    with client:
+    with client, client.as_current():
         futures = {}
         for job in sorted(jobs, key=lambda job: -job.cost):
             call = (compute, job.task, job.mechanism, job.settings, job.code)

@@ -142,8 +142,8 @@ class Life:
         above=0.0,
         default=1.0e-4,
     )
-    jumps: int = _count("jumps until then, of equal opening", 1, 12)
-    cycles: int = _count("gait cycles simulated before each jump", 1, 12)
+    jumps: int = _count("jumps until then, of equal opening", 1, 40)
+    cycles: int = _count("gait cycles simulated before each jump", 1, 6)
     runs: int = _count("lives that differ in where they start", 2, 4)
 
 

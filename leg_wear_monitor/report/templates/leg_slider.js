@@ -31,6 +31,7 @@
     add(group, "path", { d: path, fill: "#ffffff", stroke: "#ffffff", "stroke-width": 2.2 * unit, opacity: 0.62, ...joins });
     return { poses: body.poses, group: group };
   });
+  const arrows = add(svg, "g", {});
   const joints = {};
   data.joints.forEach((joint, i) => {
     const twin = data.joints.slice(0, i).some((o) => Math.hypot(o.path[0][0] - joint.path[0][0], o.path[0][1] - joint.path[0][1]) < 1);
@@ -57,9 +58,8 @@
     joint.letter.setAttribute("x", (3.6 * dx / size + (joint.twin ? 3 : 0)) * unit);
     joint.letter.setAttribute("y", (3.6 * dy / size + 1.4) * unit);
   }
-  const arrows = add(svg, "g", {});
 
-  let run, parts, frame = 0, playing = false, last = 0;
+  let run, parts, frame = 0, timer = null;
 
   function arrow(group, x, y, fx, fy, length, width) {
     while (group.firstChild) group.removeChild(group.firstChild);
@@ -131,24 +131,17 @@
     root.dataset.frame = index;
   }
 
-  function tick(now) {
-    if (!playing) return;
-    const step = Math.floor((now - last) / 1000 * data.frames / 12);  // a cycle in twelve seconds
-    if (step > 0) {
-      last = now;
-      show((frame + step) % data.frames);
-    }
-    requestAnimationFrame(tick);
-  }
-
   slider.addEventListener("input", () => show(Number(slider.value)));
   if (choice) choice.addEventListener("change", () => choose(Number(choice.value)));
   play.addEventListener("click", () => {
-    playing = !playing;
-    play.textContent = playing ? "Pause" : "Play";
-    play.setAttribute("aria-pressed", String(playing));
-    last = performance.now();
-    if (playing) requestAnimationFrame(tick);
+    if (timer === null) {
+      timer = setInterval(() => show((frame + 2) % data.frames), 45);
+    } else {
+      clearInterval(timer);
+      timer = null;
+    }
+    play.textContent = timer === null ? "Play" : "Pause";
+    play.setAttribute("aria-pressed", String(timer !== null));
   });
   choose(0);
 })();

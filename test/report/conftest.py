@@ -1,0 +1,53 @@
+"""Pages of studies small enough for tests."""
+
+from pathlib import Path
+
+import pytest
+
+from leg_wear_monitor.report.page import Page, page_html
+from leg_wear_monitor.report.study_page import study_page
+from leg_wear_monitor.studies.run import run_study
+from leg_wear_monitor.studies.settings import parse_settings
+from leg_wear_monitor.studies.store import StudyResults, load_results
+
+ENSEMBLE = {"runs": 2, "cycles": 2, "skip_cycles": 1, "traced_cycles": 1}
+DIAGRAM = {"clearances_m": [2.0e-4, 3.0e-4], "speeds_rpm": [20, 60], "cycles": 4, "skip_cycles": 1}
+
+TINY = {
+    "size": {"joints": ["G"], "clearances_m": [1.0e-4, 2.0e-4, 3.0e-4, 4.0e-4]},
+    "speed": {"joints": ["G"], "speeds_rpm": [45, 60]},
+    "location": {"sets": [["A", "B"], ["G"]]},
+    "multi": {"sets": [["G"], ["I", "J"]]},
+    "laws": {
+        "joints": ["G"], "normal_laws": ["hertz", "flores"], "friction_laws": ["none"],
+        "friction_coefficients": [0.1],
+    },
+    "wear": {"sets": [["I", "J"]], "life": {"opens_m": 5.0e-6, "jumps": 2, "cycles": 1, "runs": 2}},
+    "chaos": {
+        "joints": ["A", "B"], "others": [["G"]], "section_cycles": 6,
+        "exponent": {"runs": 2, "cycles": 10, "renewals": 16}, "bifurcation": DIAGRAM,
+    },
+}  # fmt: skip
+
+
+@pytest.fixture(scope="session")
+def studies(tmp_path_factory) -> dict[str, StudyResults]:
+    """Results of a tiny study of each name."""
+    found = {}
+    for name, keys in TINY.items():
+        out: Path = tmp_path_factory.mktemp(name)
+        run_study(name, parse_settings(name, {"ensemble": ENSEMBLE, **keys}, name), out)
+        found[name] = load_results(out)
+    return found
+
+
+@pytest.fixture(scope="session")
+def drawn(studies) -> dict[str, Page]:
+    """Their pages."""
+    return {name: study_page(results) for name, results in studies.items()}
+
+
+@pytest.fixture(scope="session")
+def pages(drawn) -> dict[str, str]:
+    """Their pages as HTML."""
+    return {name: page_html(page) for name, page in drawn.items()}

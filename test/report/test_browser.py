@@ -1,0 +1,135 @@
+"""Every page in a browser, as on a desk and as on a phone: nothing is missing, too wide, broken or dead.
+
+Headless Chromium lays out all pages in frames of two widths, a script tries them and leaves what it found.
+"""
+
+import html
+import json
+import re
+import shutil
+import subprocess
+
+import pytest
+
+CHROMIUM = next(filter(None, map(shutil.which, ("chromium", "chromium-browser", "google-chrome"))), None)
+
+pytestmark = pytest.mark.skipif(
+    CHROMIUM is None, reason="no chromium here: apt install chromium runs these tests"
+)
+
+WIDTHS = (1200, 390)
+
+TRY = """
+function look(frame) {
+  const page = frame.contentDocument, root = page.documentElement;
+  const images = Array.from(page.images), slider = page.querySelector("#leg-slider input[type=range]");
+  const found = {
+    overflow: root.scrollWidth - root.clientWidth,
+    broken: images.filter((image) => !image.complete || image.naturalWidth === 0).length,
+    tiny: images.filter((image) => image.getBoundingClientRect().width < 200).length,
+    images: images.length,
+    unnamed: images.filter((image) => !image.alt).length,
+    tables: page.querySelectorAll("table").length,
+    findings: page.querySelectorAll(".findings li").length,
+    small: Array.from(page.querySelectorAll("button, select"))
+      .filter((part) => part.getBoundingClientRect().height < 24).length,
+    slider: null
+  };
+  if (slider) {
+    const leg = page.getElementById("leg-slider"), bodies = leg.querySelectorAll(".leg g[transform]");
+    const state = () => Array.from(bodies).map((body) => body.getAttribute("transform")).join();
+    const before = state();
+    slider.value = 200;
+    slider.dispatchEvent(new frame.contentWindow.Event("input"));
+    found.slider = {
+      moved: state() !== before, frame: leg.dataset.frame, angle: leg.querySelector(".angle").textContent,
+      letters: Array.from(leg.querySelectorAll(".leg text")).map((text) => text.textContent).join(""),
+      pins: leg.querySelectorAll(".pins svg").length, arrows: leg.querySelectorAll(".leg line").length,
+      said: Array.from(leg.querySelectorAll(".pins p")).map((said) => said.textContent)
+    };
+    const choice = leg.querySelector("select");
+    if (choice) {
+      choice.value = choice.options.length - 1;
+      choice.dispatchEvent(new frame.contentWindow.Event("change"));
+      found.slider.last = leg.querySelectorAll(".pins svg").length;
+    }
+    leg.querySelector(".play").click();
+    found.slider.playing = leg.querySelector(".play").getAttribute("aria-pressed");
+  }
+  return found;
+}
+window.addEventListener("load", () => setTimeout(() => {
+  const frames = Array.from(document.querySelectorAll("iframe")), found = frames.map(look);
+  setTimeout(() => {
+    frames.forEach((frame, i) => {
+      const leg = frame.contentDocument.getElementById("leg-slider");
+      if (leg) found[i].slider.played = leg.dataset.frame;
+    });
+    document.getElementById("found").textContent = JSON.stringify(found);
+  }, 1500);
+}, 500));
+"""
+
+
+def browse(pages, directory):
+    """What the script finds in each page at each width, and the lines on the browser's console."""
+    frames = "".join(
+        f'<iframe style="width:{width}px;height:900px;border:0" srcdoc="{html.escape(page)}"></iframe>'
+        for page in pages
+        for width in WIDTHS
+    )
+    wrapper = directory / "wrapper.html"
+    text = f'<!doctype html><meta charset="utf-8"><script>{TRY}</script>{frames}<pre id="found"></pre>'
+    wrapper.write_text(text)
+    line = [CHROMIUM, "--headless", "--no-sandbox", "--disable-gpu", "--disable-dev-shm-usage"]
+    line += [f"--user-data-dir={directory / 'profile'}", "--enable-logging=stderr", "--window-size=1300,1000"]
+    line += ["--virtual-time-budget=10000", "--dump-dom", wrapper.as_uri()]
+    done = subprocess.run(line, capture_output=True, text=True, timeout=240, check=True)
+    found = re.search(r'<pre id="found">(.*?)</pre>', done.stdout, re.DOTALL).group(1)
+    console = [said for said in done.stderr.splitlines() if "CONSOLE" in said]
+    return json.loads(html.unescape(found)), console
+
+
+@pytest.fixture(scope="module")
+def seen(pages, tmp_path_factory):
+    found, console = browse(pages.values(), tmp_path_factory.mktemp("browser"))
+    assert console == []
+    names = [(name, width) for name in pages for width in WIDTHS]
+    return dict(zip(names, found, strict=True))
+
+
+def test_every_page_was_looked_at_at_every_width(seen, pages):
+    assert len(seen) == len(pages) * len(WIDTHS) == 14
+
+
+def test_figures_and_tables_are_there_and_fit(seen):
+    for at, found in seen.items():
+        assert found["images"] >= 5, at
+        assert found["tables"] >= 1, at
+        assert found["findings"] >= 2, at
+        assert (found["broken"], found["unnamed"], found["tiny"], found["small"]) == (0, 0, 0, 0), at
+        assert found["overflow"] <= 0, at
+
+
+def test_the_slider_moves_the_leg(seen, studies):
+    for (name, width), found in seen.items():
+        slider, joints = found["slider"], list(studies[name].mechanism.joints)
+        assert slider["moved"], (name, width)
+        assert (slider["frame"], slider["angle"]) == ("200", "141°")
+        assert sorted(slider["letters"]) == sorted(joints)
+        assert slider["pins"] >= 1
+        assert all(re.fullmatch(r"[A-Z]: (free|\d+ N)", said) for said in slider["said"])
+        assert slider["arrows"] == sum("free" not in said for said in slider["said"])
+        assert slider["playing"] == "true"
+        assert slider["played"] != "200", (name, width)
+    assert seen["location", 1200]["slider"]["pins"] == 2
+    assert seen["location", 1200]["slider"]["last"] == 1
+
+
+def test_what_is_wrong_would_be_seen(tmp_path):
+    """A page that is too wide, lacks its picture and its script."""
+    page = '<div style="width:2000px">wide</div><img src="data:image/png;base64,AAAA">'
+    (found, narrow), console = browse([page + "<script>nothing()</script>"], tmp_path)
+    assert found["overflow"] > 500 < narrow["overflow"]
+    assert (found["broken"], found["unnamed"], found["images"]) == (1, 1, 1)
+    assert any("nothing is not defined" in said for said in console)

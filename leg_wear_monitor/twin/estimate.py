@@ -64,7 +64,7 @@ def find(sums: Floats, gram: Floats, along: Floats, correlated: float) -> Findin
     values[seen] = inverse @ along[seen]
     left = max(float(sums[RESIDUAL_2] - values @ along), 0.0) / sums[NUMBER]
     sigma[seen] = np.sqrt(left * max(correlated, 1.0) * np.diag(inverse))
-    return Finding(values, sigma, condition, left**0.5)
+    return Finding(values, sigma, condition, float(left**0.5))
 
 
 class LoadEstimate:

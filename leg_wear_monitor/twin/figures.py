@@ -193,6 +193,8 @@ class Intake:
         Monitored time, bridged time is a part of moving time.
     unmonitored_s : float
         Time in which the leg was not followed, up to its last new start.
+    out_s : float
+        Since when it is not followed at present, 0 where it is; no count.
     newest_stamp_ns, followed_stamp_ns : int
         The youngest stamp taken in, and up to where the leg has followed; 0 before.
     """
@@ -215,6 +217,7 @@ class Intake:
     moving_s: float
     standing_s: float
     unmonitored_s: float
+    out_s: float
     newest_stamp_ns: int
     followed_stamp_ns: int
 

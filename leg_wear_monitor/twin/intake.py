@@ -9,6 +9,7 @@ from leg_wear_monitor.twin.sample import FAULTS, NO_FAULT
 def intake(tracker: t.TrackerState, leg: LegState) -> Intake:
     """Counts of a tracker and of the leg that follows it."""
     count, clock, mark = tracker.counts, tracker.clock, leg.mark
+    out = bool(clock[t.OUT_SINCE]) and not clock[t.FOLLOWED]
     return Intake(
         received=int(count[t.RECEIVED]),
         faulty={name: int(count[t.FAULTY + fault]) for fault, name in FAULTS.items() if fault != NO_FAULT},
@@ -28,6 +29,7 @@ def intake(tracker: t.TrackerState, leg: LegState) -> Intake:
         moving_s=float(mark[MOVING_NS]) * 1.0e-9,
         standing_s=float(count[t.STANDING_NS]) * 1.0e-9,
         unmonitored_s=float(count[t.UNMONITORED_NS] + mark[FAILED_NS]) * 1.0e-9,
+        out_s=float(clock[t.RELEASED] - clock[t.OUT_SINCE]) * 1.0e-9 if out else 0.0,
         newest_stamp_ns=int(clock[t.NEWEST]),
         followed_stamp_ns=int(clock[t.LAST_KNOT]),
     )

@@ -13,6 +13,7 @@ from leg_wear_monitor.twin.steps import (
     BRIDGE_NS,
     LEAVE,
     LOOK,
+    LOST_BY_OUTLIERS,
     MOVE,
     MOVING,
     REST,
@@ -35,6 +36,7 @@ from leg_wear_monitor.twin.tracker_state import (
     HEAD,
     KNOT,
     LAG,
+    LARGEST_SPEED,
     LAST_CRANK,
     LAST_KNOT,
     LOST_TIMES,
@@ -217,6 +219,9 @@ def reach_knots(model, state, out_target, steps, n):
             return n
         stamp = state.queue_stamp[knot]
         smooth(state.queue_kind, state.queue, knot, clock[TAIL], out_target)
+        largest = model.real[LARGEST_SPEED]
+        if not (abs(out_target[1]) <= largest and abs(out_target[2]) <= largest**2):
+            return lose(state, stamp, LOST_BY_OUTLIERS, steps, n)
         _drop_turns(state, out_target)
         if clock[FOLLOWED] == 0:
             n = look_up_to(state, knot, steps, n)

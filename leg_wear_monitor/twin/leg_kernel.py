@@ -2,14 +2,14 @@
 
 import math
 
-from leg_wear_monitor.dynamics.clearance import ANGLE, SPEED, blend
+from leg_wear_monitor.dynamics.clearance import ANGLE
 from leg_wear_monitor.dynamics.clearance_advance import advance_clearances
 from leg_wear_monitor.dynamics.clearance_contact import F_T
 from leg_wear_monitor.dynamics.run import DONE
 from leg_wear_monitor.dynamics.tally import TORQUE
 from leg_wear_monitor.dynamics.touch import F_N
 from leg_wear_monitor.kernel import entry, kernel
-from leg_wear_monitor.twin.estimate import FRICTION, LAG, LOAD
+from leg_wear_monitor.twin.compare import compare
 from leg_wear_monitor.twin.leg_state import (
     AFRESH,
     ANCHOR,
@@ -23,22 +23,11 @@ from leg_wear_monitor.twin.leg_state import (
     FAILURES,
     FILTERING,
     IMPULSE,
-    LAST_PREDICTED,
-    LAST_SIGNATURE,
     LOOKS,
     MEAN_TORQUE,
-    MEASURED,
-    MEASURED_2,
     MOVING_NS,
-    NUMBER,
-    OF_FRICTION,
-    OF_LOAD,
     PIECE_BEGIN,
     PIECE_END,
-    PREDICTED,
-    PREDICTED_2,
-    RESIDUAL,
-    RESIDUAL_2,
     RUNNING,
     TIME,
     TORQUE_IMPULSE,
@@ -127,54 +116,6 @@ def _load_piece(model, stepper, leg, what, motion):
 
 
 @kernel
-def _pass_low(share, fresh, low_pass, i, value):
-    """Value of channel i after the two stages of the low-pass; a fresh filter starts at its first value."""
-    for stage in range(2):
-        if fresh:
-            low_pass[stage, i] = value
-        low_pass[stage, i] += share * (value - low_pass[stage, i])
-        value = low_pass[stage, i]
-    return value
-
-
-@kernel
-def _compare(cutoff, signature, leg, stepper, measured):
-    """Compare a measured torque [N m] with the mean of the predicted one since the torque sample before.
-
-    ``cutoff`` [rad/s] of the low-pass; ``signature`` (N + 1,) drive torque by a unit foot load [N m/N].
-    """
-    mark, value, sums, low_pass, by = leg.mark, leg.value, leg.sums, leg.low_pass, leg.regressor
-    i, w = blend(signature.shape[0] - 1, stepper.drive[ANGLE])
-    lever = signature[i] + w * (signature[i + 1] - signature[i])
-    speed, dt = stepper.drive[SPEED], value[TORQUE_TIME]
-    if mark[FILTERING] > 0 and dt > 0.0:
-        fresh = mark[FILTERING] == 1
-        share = 1.0 - math.exp(-cutoff * dt)
-        m = _pass_low(share, fresh, low_pass, MEASURED, measured)
-        p = _pass_low(share, fresh, low_pass, PREDICTED, value[TORQUE_IMPULSE] / dt)
-        by[LOAD] = _pass_low(share, fresh, low_pass, OF_LOAD, 0.5 * (value[LAST_SIGNATURE] + lever))
-        direction = 1.0 if speed > 0.0 else (-1.0 if speed < 0.0 else 0.0)
-        by[FRICTION] = _pass_low(share, fresh, low_pass, OF_FRICTION, direction)
-        by[LAG] = 0.0 if fresh else (value[LAST_PREDICTED] - p) / dt
-        value[LAST_PREDICTED] = p
-        r = m - p
-        sums[NUMBER] += 1.0
-        sums[RESIDUAL] += r
-        sums[RESIDUAL_2] += r * r
-        sums[MEASURED_2] += m * m
-        sums[PREDICTED_2] += p * p
-        for a in range(3):
-            leg.along[a] += by[a] * r
-            for b in range(3):
-                leg.gram[a, b] += by[a] * by[b]
-        mark[FILTERING] = 2
-    elif mark[FILTERING] == 0:
-        mark[FILTERING] = 1
-    value[LAST_SIGNATURE] = lever
-    value[TORQUE_IMPULSE], value[TORQUE_TIME] = 0.0, 0.0
-
-
-@kernel
 def _look(cutoff, signature, leg, stepper, what, measured, looks):
     """Note the leg at a sample, NaN where it does not run."""
     mark, value, m = leg.mark, leg.value, leg.mark[LOOKS]
@@ -194,7 +135,7 @@ def _look(cutoff, signature, leg, stepper, what, measured, looks):
     for k in range(leg.force.shape[0]):
         looks.force[m, k] = leg.force[k] if running else math.nan
     if running and mark[PIECE_BEGIN] <= what[END] <= mark[PIECE_END] and math.isfinite(measured):
-        _compare(cutoff, signature, leg, stepper, measured)
+        compare(cutoff, signature, leg, stepper, measured)
 
 
 @entry

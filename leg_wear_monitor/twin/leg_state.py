@@ -19,9 +19,13 @@ from leg_wear_monitor.mechanism.arrays import Floats, Ints
 MARKS = 21
 
 # values: drive torque's impulse and time since the last sample, and since the last torque; mean torque before
-# the last sample; last load signature; predicted torque after the low-pass, as it was last
-IMPULSE, TIME, TORQUE_IMPULSE, TORQUE_TIME, MEAN_TORQUE, LAST_SIGNATURE, LAST_PREDICTED = range(7)
-VALUES = 7
+# the last sample; last load signature; predicted torque after the low-pass, as it was last; period of the
+# torque sensor; time since what was last filtered
+(
+    IMPULSE, TIME, TORQUE_IMPULSE, TORQUE_TIME, MEAN_TORQUE, LAST_SIGNATURE, LAST_PREDICTED, PERIOD,
+    UNFILTERED,
+) = range(9)  # fmt: skip
+VALUES = 9
 
 # what goes through the low-pass: torque measured, predicted, of a unit foot load, and of unit friction
 MEASURED, PREDICTED, OF_LOAD, OF_FRICTION = range(4)

@@ -8,6 +8,8 @@ from leg_wear_monitor.errors import LegWearError
 
 FOREVER = 1.0e9
 
+_FROM_ZERO = ("lag_s", "reorder_window_s", "largest_speed_radps")
+
 LOAD_SHAPES = STANCE, CONSTANT = "stance", "constant"
 
 
@@ -38,6 +40,9 @@ class TrackerSettings:
         Stamps that go back by more than this start a new time base.
     acquire_s : float
         How long samples must agree before the leg is set in motion.
+    largest_speed_radps : float
+        No leg's crank is faster; a crank that seems so, or to change as fast as that, is lost. 0 means three
+        times the commanded speed.
     stop_speed_radps, stop_hold_s : float
         A crank slower than this for so long has stopped.
     speed_tolerance : float
@@ -58,6 +63,7 @@ class TrackerSettings:
     mark_gap_s: float = 0.05
     backward_jump_s: float = 1.0
     acquire_s: float = 0.1
+    largest_speed_radps: float = 0.0
     stop_speed_radps: float = 0.1
     stop_hold_s: float = 0.3
     speed_tolerance: float = 0.2
@@ -65,15 +71,22 @@ class TrackerSettings:
 
     def __attrs_post_init__(self) -> None:
         for name, value in attrs.asdict(self).items():
-            free = name in ("commanded_speed_radps", "lag_s", "reorder_window_s")
+            free = name in _FROM_ZERO or name == "commanded_speed_radps"
             if not (math.isfinite(value) and abs(value) < FOREVER and (free or value > 0.0)):
                 raise LegWearError(f"{name}: {value} is not a finite number above 0")
-        if self.lag_s < 0.0 or self.reorder_window_s < 0.0 or self.commanded_speed_radps == 0.0:
-            raise LegWearError("lag_s, reorder_window_s: expected at least 0; commanded_speed_radps: not 0")
+            if name in _FROM_ZERO and value < 0.0:
+                raise LegWearError(f"{name}: {value} is below 0")
+        if self.commanded_speed_radps == 0.0:
+            raise LegWearError("commanded_speed_radps: 0.0 does not turn the crank")
         if not 1.0 <= self.bandwidth_hz <= 100.0:
             raise LegWearError(f"bandwidth_hz: {self.bandwidth_hz} is not from 1 to 100 Hz")
         if not self.reorder_window_s < min(self.backward_jump_s, self.bridge_limit_s):
             raise LegWearError("reorder_window_s: expected below backward_jump_s and bridge_limit_s")
+
+    @property
+    def largest_speed(self) -> float:
+        """The largest speed believed [rad/s]."""
+        return self.largest_speed_radps or 3.0 * abs(self.commanded_speed_radps)
 
     @property
     def lag(self) -> float:

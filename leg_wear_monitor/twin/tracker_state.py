@@ -14,10 +14,11 @@ ARRIVALS, QUEUE = 1024, 4096  # samples that may wait for their order, and for t
 WINDOW, LAG, BRIDGE, MARK, JUMP, ACQUIRE, STOP_HOLD, SETTLE, KNOT, RUN_UP = range(10)
 # other settings: power of the jerk [rad^2/s^5], noise of angle [rad^2 s] and of velocity [rad^2/s], longest
 # time a sample's noise is spread over [s], gates [rad, rad/s], least speed of a moving crank [rad/s], speeds
-# between which a gait is in step [rad/s], commanded speed [rad/s]
-JERK, ANGLE_NOISE, VELOCITY_NOISE, LONGEST, GATE, VELOCITY_GATE, STOP_SPEED, SLOWEST, FASTEST, COMMANDED = (
-    range(10)
-)
+# between which a gait is in step [rad/s], commanded speed and largest speed believed [rad/s]
+(
+    JERK, ANGLE_NOISE, VELOCITY_NOISE, LONGEST, GATE, VELOCITY_GATE, STOP_SPEED, SLOWEST, FASTEST, COMMANDED,
+    LARGEST_SPEED,
+) = range(11)  # fmt: skip
 
 # counts; those of faults come last
 (
@@ -84,7 +85,7 @@ def tracker_model(settings: TrackerSettings) -> TrackerModel:
     speed = abs(s.commanded_speed_radps)
     real = [noise * w**6, noise, s.velocity_noise_radps**2 * reference, 1.0 / w, s.gate_rad]
     real += [s.velocity_gate_radps, s.stop_speed_radps, speed * (1.0 - s.speed_tolerance)]
-    real += [speed * (1.0 + s.speed_tolerance), s.commanded_speed_radps]
+    real += [speed * (1.0 + s.speed_tolerance), s.commanded_speed_radps, s.largest_speed]
     return TrackerModel(np.array([round(1.0e9 * t) for t in times], dtype=np.int64), np.array(real))
 
 

@@ -203,6 +203,31 @@ def test_a_gap_costs_its_time_and_keeps_the_wear(twin, gait):
     assert intake.unmonitored_s + intake.moving_s == pytest.approx(
         1.0e-9 * (intake.followed_stamp_ns - samples["stamp_ns"][0])
     )
+    assert intake.out_s == 0.0
+
+
+def test_a_leg_that_is_lost_is_told_to_be_out(twin, gait):
+    samples = gait(6.0)
+    samples["crank_angle_rad"][600:] = TURN * np.random.default_rng(0).random(600)
+    twin.update(samples)
+    assert twin.tracking is Tracking.STARTING
+    assert twin.intake.out_s == pytest.approx(3.1, abs=0.2)
+
+
+@pytest.mark.plain
+def test_a_moment_of_a_leg_with_one_loose_joint(leg, gait):
+    """From a little before crank angle 0 to a little after, with a torque that is compared."""
+    twin = DigitalTwin(leg, TwinSettings(loose=("A",)))
+    samples = gait(0.38, angle=lambda t: TURN * (t + 0.82), noise_rad=0.0)
+    samples["torque_nm"] = 1.0
+    update = twin.update(samples)
+    followed = ~np.isnan(update.samples.crank_angle_rad)
+    since = 1.0e-9 * (update.samples.stamp_ns[followed] - samples["stamp_ns"][0])
+    off = update.samples.crank_angle_rad[followed] - TURN * (since + 0.82)
+    np.testing.assert_allclose(off, TURN * np.round(off / TURN), atol=1.0e-3)
+    assert since[-1] > 0.2
+    assert (update.samples.contact_force_n[followed] > 50.0).any()
+    assert not update.cycles
 
 
 def test_wear_goes_faster_by_its_acceleration(twin, gait):

@@ -85,6 +85,7 @@ def test_any_split_into_blocks_gives_the_same(gait, cuts):
     assert_same(track(cut(samples, cuts)), track([samples]))
 
 
+@pytest.mark.plain
 def test_blocks_of_one_give_the_same(gait):
     samples = with_torque(gait(3.0))
     assert_same(track(cut(samples, range(len(samples)))), track([samples]))
@@ -167,6 +168,7 @@ def test_speed_ripple_is_followed(gait, times):
     assert np.abs(off[steady]).std() < 0.1 * ripple * w
 
 
+@pytest.mark.plain
 def test_a_crank_at_rest_stays_put(gait):
     """It rests from its stop to its next start, and no noise moves it meanwhile."""
     tracker = CrankTracker(TrackerSettings())
@@ -212,6 +214,7 @@ def test_longer_gaps_are_not_made_up(gait):
     assert unmonitored == pytest.approx(2.3 * S, abs=0.1 * S)
 
 
+@pytest.mark.plain
 def test_a_gap_of_the_crank_alone_is_one_too(gait):
     """Torque samples go on meanwhile: they are looked at without a leg."""
     samples = with_torque(gait(6.0))
@@ -224,6 +227,7 @@ def test_a_gap_of_the_crank_alone_is_one_too(gait):
     assert ((looked[:, BEGIN] > START_NS + 2.6 * S) & (looked[:, BEGIN] < START_NS + 3.9 * S)).sum() > 200
 
 
+@pytest.mark.plain
 def test_stamps_that_jump_back_start_a_new_time_base(gait):
     tracker = CrankTracker(TrackerSettings())
     steps = track([gait(3.0), gait(3.0, start_ns=START_NS - 1000 * S)], tracker)
@@ -247,6 +251,7 @@ def test_single_stray_stamps_change_nothing(gait, where, stamp):
     assert tracker.state.counts[at.STRAY] + tracker.state.counts[at.DUPLICATES] == len(where)
 
 
+@pytest.mark.plain
 def test_outliers_change_little_and_a_crank_that_is_elsewhere_is_found_again(gait):
     samples = gait(6.0)
     jumped = samples.copy()
@@ -276,6 +281,34 @@ def test_velocity_helps_where_it_is_right_and_is_dropped_where_it_is_not(gait):
     assert scatter[1] < 0.8 * scatter[0]
     assert scatter[2] == pytest.approx(scatter[0], rel=1.0e-9)
     assert tracker.state.counts[at.VELOCITY_OUTLIERS] > 990
+
+
+@pytest.mark.parametrize("what", ["random", "coarse noise", "ten times too fast", "steps"])
+def test_what_is_no_gait_moves_no_leg(gait, what):
+    """Rather lost than made up."""
+    samples, chance = gait(5.0), np.random.default_rng(0)
+    t = 1.0e-9 * (samples["stamp_ns"] - START_NS)
+    samples["crank_angle_rad"] = {
+        "random": TURN * chance.random(len(t)),
+        "coarse noise": TURN * t + 0.1 * chance.standard_normal(len(t)),
+        "ten times too fast": 10.0 * TURN * t,
+        "steps": TURN * np.floor(10.0 * t) / 10.0,
+    }[what]
+    steps = track([samples])
+    moves = steps.of(MOVE)
+    assert (moves[:, END] - moves[:, BEGIN]).sum() < 0.1 * S
+
+
+def test_a_fifth_of_the_samples_may_be_nonsense(gait):
+    """What passes the gate by chance bends the motion a little."""
+    samples, chance = gait(20.0), np.random.default_rng(0)
+    glitch = chance.random(len(samples)) < 0.2
+    samples["crank_angle_rad"][glitch] = TURN * chance.random(glitch.sum())
+    time, angle, speed, _ = track([samples]).motion_at()
+    assert np.ptp(time) > 19.0
+    off = angle - TURN * time - 0.5
+    assert np.abs(off - TURN * np.round(off / TURN)).max() < 0.15
+    assert np.abs(speed / TURN - 1.0).max() < 0.5
 
 
 _WEIRD = st.sampled_from([0.0, 1.0, -7.0, np.nan, np.inf, -np.inf, 1.0e300, -1.0e300, 1.0e6, 5.0e-324])
@@ -316,7 +349,7 @@ def test_no_sequence_of_samples_breaks_it(rows):
 @pytest.mark.parametrize(
     "name, value",
     [("bandwidth_hz", 0.0), ("gate_rad", np.nan), ("lag_s", -1.0), ("commanded_speed_radps", 0.0),
-     ("reorder_window_s", 2.0)],
+     ("reorder_window_s", 2.0), ("bandwidth_hz", 0.1), ("largest_speed_radps", -1.0)],
 )  # fmt: skip
 def test_senseless_settings_are_refused(name: str, value: float, refused: Callable[..., None]) -> None:
     refused(TrackerSettings, name, value)

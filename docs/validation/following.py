@@ -1,0 +1,72 @@
+"""How the twin's wear errs with noise, rate and losses of its samples: a table of docs/physics.md.
+
+A leg in full coordinates walks for 40 gait cycles at 60 rpm, and wears; the twin sees its crank and torque.
+Three minutes, most of them for that leg.
+"""
+
+import numpy as np
+
+from leg_wear_monitor import load_mechanism
+from leg_wear_monitor.gait.config import GaitConfig
+from leg_wear_monitor.gait.leg import SyntheticLeg
+from leg_wear_monitor.mechanism.arrays import Floats
+from leg_wear_monitor.mechanism.ideal import TURN
+from leg_wear_monitor.twin.digital_twin import DigitalTwin
+from leg_wear_monitor.twin.sample import Samples, gait_samples
+from leg_wear_monitor.twin.settings import TwinSettings
+
+START_NS, CYCLES, RATE_HZ = 1_700_000_000_000_000_000, 40, 1000
+# noise of the encoder [rad], rate [Hz], share of samples lost
+CASES = (
+    (0.0, 1000, 0.0), (1.0e-3, 200, 0.0), (3.0e-3, 200, 0.0), (1.0e-2, 200, 0.0), (1.0e-3, 50, 0.0),
+    (1.0e-3, 100, 0.0), (1.0e-3, 1000, 0.0), (1.0e-3, 200, 0.1), (1.0e-3, 200, 0.3), (1.0e-3, 200, 0.6),
+)  # fmt: skip
+
+
+def walk() -> tuple[Floats, Floats, Floats]:
+    """Angle (n,), torque impulse (n,) every millisecond, and growth (CYCLES - 1, k) of the clearances [m]."""
+    leg = SyntheticLeg(GaitConfig())
+    instants = [leg.advance(i / RATE_HZ) for i in range((CYCLES + 1) * RATE_HZ)]
+    clearance = np.array([leg.truth()["clearance_m"][name] for name in leg.loose])
+    angle, impulse = (
+        np.array([i.crank.angle for i in instants]),
+        np.array([i.torque_impulse for i in instants]),
+    )
+    return angle, impulse, np.diff(clearance, axis=1)[:, 1:-1].T
+
+
+def seen(angle: Floats, impulse: Floats, noise: float, rate: int, lost: float) -> Samples:
+    """What encoder and torque sensor say of it, and what of that arrives."""
+    chance, every = np.random.default_rng(1), RATE_HZ // rate
+    angles, impulses = angle[every::every], impulse[::every]
+    stamps = START_NS + np.arange(every, len(angle), every) * (10**9 // RATE_HZ)
+    samples = gait_samples(
+        stamps,
+        crank_angle_rad=(angles + noise * chance.standard_normal(len(angles))) % TURN,
+        torque_nm=np.diff(impulses) * rate + 0.05 * chance.standard_normal(len(angles)),
+    )
+    return samples[chance.random(len(samples)) >= lost]
+
+
+def main() -> None:
+    """Print the table."""
+    angle, impulse, growth = walk()
+    scatter = growth.std(axis=0) / growth.mean(axis=0) * np.sqrt(2.0 / len(growth))
+    mechanism = load_mechanism("bionic_leg")
+    print(f"joints {mechanism.loose}; scatter of each difference [%]: {(100.0 * scatter).round(1)}")
+    for noise, rate, lost in CASES:
+        twin = DigitalTwin(mechanism, TwinSettings())
+        update = twin.update(seen(angle, impulse, noise, rate, lost))
+        grown = np.mean([cycle.growth_mean_m for cycle in update.cycles], axis=0)
+        error = 100.0 * (grown / growth.mean(axis=0) - 1.0)
+        unexplained = np.mean([cycle.torque.unexplained_rms_nm for cycle in update.cycles])
+        print(
+            f"{noise:6.4f} rad {rate:5d} Hz {lost:4.0%} lost: "
+            + " ".join(f"{name} {value:+5.1f}" for name, value in zip(twin.loose, error, strict=True))
+            + f" %; torque unexplained {unexplained:.2f} N m; {len(update.cycles)} cycles",
+            flush=True,
+        )
+
+
+if __name__ == "__main__":
+    main()

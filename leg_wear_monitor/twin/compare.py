@@ -1,0 +1,91 @@
+"""Measured against predicted drive torque, through one low-pass, and what may explain their difference."""
+
+import math
+
+from leg_wear_monitor.dynamics.clearance import ANGLE, SPEED, blend
+from leg_wear_monitor.kernel import kernel
+from leg_wear_monitor.twin.estimate import FRICTION, LAG, LOAD
+from leg_wear_monitor.twin.leg_state import (
+    FILTERING,
+    LAST_PREDICTED,
+    LAST_SIGNATURE,
+    MEASURED,
+    MEASURED_2,
+    NUMBER,
+    OF_FRICTION,
+    OF_LOAD,
+    PERIOD,
+    PREDICTED,
+    PREDICTED_2,
+    RESIDUAL,
+    RESIDUAL_2,
+    TORQUE_IMPULSE,
+    TORQUE_TIME,
+    UNFILTERED,
+)
+
+# the sensor's period is the shortest time between its samples lately, which may grow by so much with each; a
+# time longer than so many periods has lost samples in it
+_LONGER, _LONGEST_PERIOD = 1.05, 1.5
+
+
+@kernel
+def _pass_low(share, fresh, low_pass, i, value):
+    """Value of channel i after the two stages of the low-pass; a fresh filter starts at its first value."""
+    for stage in range(2):
+        if fresh:
+            low_pass[stage, i] = value
+        low_pass[stage, i] += share * (value - low_pass[stage, i])
+        value = low_pass[stage, i]
+    return value
+
+
+@kernel
+def compare(cutoff, signature, leg, stepper, measured):
+    """Compare a measured torque [N m] with the mean of the predicted one since the torque sample before.
+
+    ``cutoff`` [rad/s] of the low-pass; ``signature`` (N + 1,) drive torque by a unit foot load [N m/N]. Where
+    samples were lost, that mean is over more than the sensor saw, and the sample is left out.
+    """
+    mark, value, by, low_pass = leg.mark, leg.value, leg.regressor, leg.low_pass
+    i, w = blend(signature.shape[0] - 1, stepper.drive[ANGLE])
+    lever = signature[i] + w * (signature[i + 1] - signature[i])
+    mean, seen = value[TORQUE_IMPULSE], value[TORQUE_TIME]
+    value[TORQUE_IMPULSE], value[TORQUE_TIME] = 0.0, 0.0
+    before, value[LAST_SIGNATURE] = value[LAST_SIGNATURE], lever
+    if mark[FILTERING] == 0 or not seen > 0.0:  # the first since the leg moves
+        mark[FILTERING] = max(mark[FILTERING], 1)
+        value[UNFILTERED] = 0.0
+        return
+    dt = value[UNFILTERED] + seen
+    value[UNFILTERED] = dt
+    longest = value[PERIOD] * _LONGEST_PERIOD
+    value[PERIOD] = min(seen, value[PERIOD] * _LONGER) if value[PERIOD] > 0.0 else seen
+    if 0.0 < longest < seen:
+        return
+    value[UNFILTERED] = 0.0
+    fresh, share = mark[FILTERING] == 1, 1.0 - math.exp(-cutoff * dt)
+    mark[FILTERING] = 2
+    direction = 1.0 if stepper.drive[SPEED] > 0.0 else -1.0
+    m = _pass_low(share, fresh, low_pass, MEASURED, measured)
+    p = _pass_low(share, fresh, low_pass, PREDICTED, mean / seen)
+    by[LOAD] = _pass_low(share, fresh, low_pass, OF_LOAD, 0.5 * (before + lever))
+    by[FRICTION] = _pass_low(share, fresh, low_pass, OF_FRICTION, direction)
+    by[LAG] = 0.0 if fresh else (value[LAST_PREDICTED] - p) / dt
+    value[LAST_PREDICTED] = p
+    _add_up(m, p, by, leg.sums, leg.gram, leg.along)
+
+
+@kernel
+def _add_up(m, p, by, sums, gram, along):
+    """Add measured and predicted torque, and what may explain their difference, to a cycle's sums."""
+    r = m - p
+    sums[NUMBER] += 1.0
+    sums[RESIDUAL] += r
+    sums[RESIDUAL_2] += r * r
+    sums[MEASURED_2] += m * m
+    sums[PREDICTED_2] += p * p
+    for a in range(3):
+        along[a] += by[a] * r
+        for b in range(3):
+            gram[a, b] += by[a] * by[b]

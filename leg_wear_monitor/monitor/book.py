@@ -58,6 +58,7 @@ class BookState:
     parts: tuple[PartLife, ...]
     spans: Spans = ()
     point_due_s: float = 0.0
+    cut_off_s: float | None = None
     shown: Mapping[str, tuple[Level, bool]] = attrs.field(factory=dict)
 
 
@@ -85,7 +86,11 @@ class Book:
         entry = ledger.entry if ledger else None
         self._before = entry.totals if entry else {}
         self._kept_s = self._before.get("moving_s", 0.0)
-        self.state = BookState(int(self._before.get("cycles", 0)), (PartLife(),) * len(twin.loose))
+        self.state = BookState(
+            int(self._before.get("cycles", 0)),
+            (PartLife(),) * len(twin.loose),
+            cut_off_s=ledger.cut_off_s if ledger else None,
+        )
         if entry:
             self.state.shown = {a.name: (a.level, a.acknowledged) for a in entry.alarms}
             self._take_over({joint.name: joint for joint in entry.joints})
@@ -170,11 +175,12 @@ class Book:
             )
 
     def keep_if_due(self, alarms: Iterable[Alarm]) -> None:
-        """Write an entry if the last is old enough."""
+        """Write an entry if the last is old enough, and there is something new to write."""
         if self.ledger is None:
             return
         now = self._twin.intake.followed_stamp_ns
-        if now and not 0 <= now - self._tried_ns < self._checkpoint_ns:
+        is_due = now and not 0 <= now - self._tried_ns < self._checkpoint_ns
+        if is_due and (self.not_kept_s > 0.0 or self.ledger.waiting or self.ledger.fault):
             self.keep(alarms)
 
     def keep(self, alarms: Iterable[Alarm], closed: bool = False) -> bool:

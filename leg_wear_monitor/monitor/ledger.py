@@ -75,6 +75,11 @@ class Ledger:
         self._run = last + 1
         self._write(None, closed=False)
 
+    @property
+    def waiting(self) -> int:
+        """Events that are not written yet."""
+        return len(self._events)
+
     def note(self, event: Event) -> None:
         """Take an event down; it is written with the next entry."""
         self._events.append(event)

@@ -138,8 +138,8 @@ def _ledger(book: Book) -> Status:
     values = {"not_kept_s": book.not_kept_s}
     if ledger.fault:
         return Status("ledger", Level.ERROR, f"not written: {ledger.fault}; trying again", values)
-    if ledger.cut_off_s is not None:
-        values["cut_off_s"] = ledger.cut_off_s
+    if book.state.cut_off_s is not None:
+        values["cut_off_s"] = book.state.cut_off_s
         message = "the run before was cut off, the wear of its last seconds is lost"
         return Status("ledger", Level.WARN, message, values)
     return Status("ledger", Level.OK, "kept", values)

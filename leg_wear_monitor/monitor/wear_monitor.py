@@ -154,7 +154,7 @@ class WearMonitor:
         self._judge.configure(config)
 
     def acknowledge(self, stamp_ns: int) -> tuple[tuple[Alarm, ...], tuple[Alarm, ...]]:
-        """Acknowledge all alarms.
+        """Acknowledge all alarms, and that the run before was cut off.
 
         Returns
         -------
@@ -162,6 +162,7 @@ class WearMonitor:
             Those that had returned to normal, and those that stay until they do.
         """
         cleared, kept = self._judge.board.acknowledge()
+        self._book.state.cut_off_s = None
         for alarm in (*cleared, *kept):
             self._book.note(AlarmEvent(stamp_ns, alarm))
         if cleared or kept:

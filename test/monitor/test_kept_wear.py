@@ -114,6 +114,18 @@ def test_the_next_start_says_that_wear_was_lost(begin, gait):
     assert status.level is Level.WARN
     assert "cut off" in status.message
     assert status.values["cut_off_s"] == 5.0
+    second.acknowledge(0)
+    assert wear_status(second).level is Level.OK
+
+
+def test_a_standing_leg_writes_nothing(begin, gait):
+    monitor, ledger = begin({"ledger.checkpoint_s": 1.0})
+    monitor.update(gait(3.0))
+    still = gait(6.0, rpm=0.0, begin_s=3.0)
+    monitor.update(still[:800])
+    kept_ns = ledger.kept_ns
+    monitor.update(still[800:])
+    assert ledger.kept_ns == kept_ns
 
 
 def test_alarms_stay_latched_over_a_new_start_and_have_a_history(begin, gait, tmp_path):

@@ -28,7 +28,7 @@ from leg_wear_monitor.monitor.reports import (
 from leg_wear_monitor.monitor.spans import is_within
 from leg_wear_monitor.monitor.status import statuses
 from leg_wear_monitor.twin.digital_twin import DigitalTwin, TwinSnapshot
-from leg_wear_monitor.twin.figures import CycleFigures, Event, no_samples
+from leg_wear_monitor.twin.figures import CycleFigures, Event, joined
 from leg_wear_monitor.twin.sample import GAIT_SAMPLE, Samples
 
 _KEPT_EVENTS = 1
@@ -101,7 +101,7 @@ class WearMonitor:
     def warm_up(self) -> None:
         """Compile all that `update` needs, before the first sample; takes about a minute once."""
         self._twin.warm_up()
-        Beats(1).pieces(np.zeros(1, GAIT_SAMPLE))
+        list(Beats(1).pieces(np.zeros(1, GAIT_SAMPLE)))
 
     def update(self, samples: Samples) -> Reports:
         """Take in a block of samples.
@@ -127,7 +127,7 @@ class WearMonitor:
             if ends_beat:
                 self._tell(self._judge.end_beat(), changes)
             self._book.keep_if_due(self._judge.board.alarms.values())
-        return Reports(_joined(looks, len(self.loose)), tuple(cycles), tuple(changes), self.lost)
+        return Reports(joined(looks, len(self.loose)), tuple(cycles), tuple(changes), self.lost)
 
     @property
     def alarms(self) -> AlarmList:
@@ -264,11 +264,3 @@ class WearMonitor:
         for change in changed:
             changes.append(change)
             self._book.note_alarms(change)
-
-
-def _joined(parts: list[SampleReports], loose: int) -> SampleReports:
-    """Reports of one piece after the other."""
-    if len(parts) < 2:
-        return parts[0] if parts else no_samples(loose)
-    fields = [field.name for field in attrs.fields(SampleReports)]
-    return SampleReports(*(np.concatenate([getattr(part, name) for part in parts]) for name in fields))

@@ -17,7 +17,6 @@ newest sample by `TrackerSettings.lag` and a little more: it waits for samples o
 
 from typing import NamedTuple
 
-import attrs
 import numpy as np
 
 from leg_wear_monitor.dynamics.simulation import prepare
@@ -32,7 +31,7 @@ from leg_wear_monitor.twin.figures import (
     SampleFigures,
     Tracking,
     TwinUpdate,
-    no_samples,
+    joined,
 )
 from leg_wear_monitor.twin.follower import FollowerSnapshot, LegFollower
 from leg_wear_monitor.twin.intake import intake
@@ -175,7 +174,7 @@ class DigitalTwin:
         for steps, n in self._tracker.update(samples):
             if n:
                 looks.append(self._follower.follow(steps, n, cycles, events))
-        return TwinUpdate(_join(looks, len(self.loose)), tuple(cycles), tuple(events))
+        return TwinUpdate(joined(looks, len(self.loose)), tuple(cycles), tuple(events))
 
     def snapshot(self) -> TwinSnapshot:
         """A copy of the whole state."""
@@ -186,11 +185,3 @@ class DigitalTwin:
         self._tracker.restore(snapshot.tracker)
         self._follower.restore(snapshot.follower)
         self.wear_acceleration = snapshot.wear_acceleration
-
-
-def _join(parts: list[SampleFigures], loose: int) -> SampleFigures:
-    """Figures of one chunk after the other."""
-    if len(parts) < 2:
-        return parts[0] if parts else no_samples(loose)
-    names = [field.name for field in attrs.fields(SampleFigures)]
-    return SampleFigures(*(np.concatenate([getattr(part, name) for part in parts]) for name in names))

@@ -1,5 +1,6 @@
 """What the twin says: at each sample, of each gait cycle, and when something happens."""
 
+from collections.abc import Sequence
 from enum import Enum
 
 import attrs
@@ -220,6 +221,14 @@ class Intake:
     out_s: float
     newest_stamp_ns: int
     followed_stamp_ns: int
+
+
+def joined(parts: Sequence[SampleFigures], loose: int) -> SampleFigures:
+    """Figures of one stretch after the other."""
+    if len(parts) < 2:
+        return parts[0] if parts else no_samples(loose)
+    names = [field.name for field in attrs.fields(SampleFigures)]
+    return SampleFigures(*(np.concatenate([getattr(part, name) for part in parts]) for name in names))
 
 
 def no_samples(loose: int) -> SampleFigures:

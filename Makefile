@@ -25,7 +25,7 @@ test: .venv/installed
 	NUMBA_DISABLE_JIT=1 .venv/bin/python -m pytest -m plain --cov --cov-append --cov-fail-under=$(COVERAGE_MIN)
 
 demo: .venv/installed
-	.venv/bin/leg-wear-monitor simulate --clearances A,B,G,I,J --cycles 5 --out build/demo
+	.venv/bin/leg-wear-monitor demo --out build/demo
 
 # The oldest libraries we support, without ROS; their deprecations are not ours to mend.
 test-oldest: .venv-oldest/installed

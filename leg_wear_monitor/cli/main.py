@@ -15,7 +15,7 @@ from leg_wear_monitor.share import share_directory
 
 COULD_NOT, INTERRUPTED = 2, 130
 
-_VERBS = ("check", "gait-publisher", "life", "monitor", "replay", "report", "simulate", "study")
+_VERBS = ("check", "demo", "gait-publisher", "life", "monitor", "replay", "report", "simulate", "study")
 
 
 class Verbs(click.Group):

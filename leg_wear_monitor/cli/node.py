@@ -12,21 +12,20 @@ _Main = Callable[[Sequence[str] | None], int]
 
 
 def node_main(module: str) -> _Main:
-    """Entry point of a node.
+    """Entry point of a node; raises LegWearError without ROS."""
+    need_rclpy()
+    main: _Main = import_module(f"leg_wear_monitor.ros.{module}").main
+    return main
 
-    Raises
-    ------
-    LegWearError
-        Where ROS is not installed, or not found.
-    """
+
+def need_rclpy() -> None:
+    """Raise LegWearError where ROS is not installed, or not found."""
     try:
         import_module("rclpy")
     except ImportError as error:
         raise LegWearError(
             f"rclpy: {error}; source a ROS 2 installation, or pip install 'leg_wear_monitor[ros]'"
         ) from error
-    main: _Main = import_module(f"leg_wear_monitor.ros.{module}").main
-    return main
 
 
 def node_verb(name: str, module: str, summary: str, text: str) -> click.Command:

@@ -51,14 +51,14 @@ class GaitPublisher(ClosingNode):
         if self.config.torque_sensor.source != EFFORT:
             kind = DRIVE_TORQUE_TYPES[self.config.torque_sensor.source]
             self._by_kind[TORQUE] = self._publisher(kind, "drive_torque", qos)
-        self.published = 0
+        self.published, self._start_ns = 0, 0
 
     def walk(self) -> None:
         """Publish in step with the clock until the walk ends or the context goes down."""
         blocks = self._blocks if self.config.precompute else self._computed_ahead()
         while self.context.ok() and not self._heard():
             time.sleep(0.02)
-        start_ns, began = self.get_clock().now().nanoseconds, time.monotonic()
+        self._start_ns, began = self.get_clock().now().nanoseconds, time.monotonic()
         self.get_logger().info("walking")
         for reading in itertools.chain.from_iterable(blocks):
             due = began + reading.arrival_s / self.config.time_scale
@@ -66,7 +66,7 @@ class GaitPublisher(ClosingNode):
                 time.sleep(min(wait, WAKE_S))
             if not self.context.ok():
                 return
-            message = sensor_message(reading, start_ns, self.config)
+            message = sensor_message(reading, self._start_ns, self.config)
             self._by_kind[reading.kind].publish(message)
             self.published += 1
 
@@ -76,7 +76,8 @@ class GaitPublisher(ClosingNode):
         if not path:
             return
         try:
-            Path(path).write_text(json.dumps(self._leg.truth(), indent=1) + "\n")
+            truth = {"start_ns": self._start_ns, **self._leg.truth()}
+            Path(path).write_text(json.dumps(truth, indent=1) + "\n")
         except OSError as error:
             raise LegWearError(f"truth.path: {path}: cannot be written: {error.strerror}") from error
 

@@ -71,3 +71,13 @@ def test_check_finds_this_installation_in_order(run, complaints):
     found = {line.split()[0]: line for line in result.stdout.splitlines()}
     assert {"python", "numba", "kernels", "share", "bionic_leg", "jansen_leg", "andrews"} <= set(found)
     assert "turns through" in found["bionic_leg"]
+
+
+@pytest.mark.plain
+@pytest.mark.parametrize("verb", ["monitor", "gait-publisher", "demo"])
+def test_without_ros_a_node_says_so_in_a_line(run, complaints, monkeypatch, verb):
+    monkeypatch.setitem(sys.modules, "rclpy", None)
+    result = run(verb)
+    assert result.exit_code == 2
+    assert len(complaints(result)) == 1
+    assert "leg_wear_monitor[ros]" in result.stderr

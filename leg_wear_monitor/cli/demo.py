@@ -1,0 +1,170 @@
+"""``leg-wear-monitor demo``: node and synthetic leg as two processes, recorded, replayed, reported."""
+
+import json
+import os
+import signal
+import subprocess
+import sys
+from collections import defaultdict
+from collections.abc import Iterator
+from contextlib import contextmanager
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+import click
+
+from leg_wear_monitor.cli.node import need_rclpy
+from leg_wear_monitor.cli.output import check_directory
+from leg_wear_monitor.cli.waiting import compilation, is_compiled
+from leg_wear_monitor.errors import LegWearError
+from leg_wear_monitor.share import share_directory
+
+if TYPE_CHECKING:
+    from leg_wear_monitor.ros.witness import Witness
+
+DONE, WITH_FINDINGS = 0, 1
+_NAMESPACE = "/demo"
+_PATIENCE_S = 60.0
+# topics that nobody's acknowledgement changes
+_COMPARED = ("clearance_states", "impact_forces", "predicted_torque")
+
+
+@click.command(short_help="The whole story, on this machine, in about half a minute.")
+@click.option(
+    "--out",
+    type=click.Path(path_type=Path),
+    default="leg_wear_demo",
+    show_default=True,
+    metavar="DIR",
+    help="Where recording, report and logs go.",
+)
+def demo(out: Path) -> int:
+    """Run the monitor and a synthetic leg as two ROS processes; record, replay and report what they did.
+
+    The leg and its twin wear a thousand times as fast as steel. The leg walks faster for a while, until
+    impacts raise an alarm, which is acknowledged. Then the recording goes through the same monitor again.
+    """
+    need_rclpy()
+    check_directory("--out", out)
+    out.mkdir(parents=True, exist_ok=True)
+    _compile()
+    witness = _live(out)
+    same = _replay(out)
+    _compare_with_truth(out, witness)
+    click.echo(f"report: {(out / 'report.html').resolve()}")
+    if not same or not any(name.startswith("impact_force") for name in witness.acknowledged):
+        click.echo("error: the demo did not go as it should; see the logs beside the report", err=True)
+        return WITH_FINDINGS
+    return DONE
+
+
+def _compile() -> None:
+    """Compile in one process what both nodes need, or both would."""
+    if is_compiled("monitor") and is_compiled("gait"):
+        return
+    from leg_wear_monitor.gait.config import GaitConfig
+    from leg_wear_monitor.gait.leg import SyntheticLeg
+    from leg_wear_monitor.mechanism.loader import load_mechanism
+    from leg_wear_monitor.monitor.wear_monitor import WearMonitor
+
+    with compilation("monitor", "about two minutes"), compilation("gait", "another half a minute"):
+        WearMonitor(load_mechanism()).warm_up()
+        SyntheticLeg(GaitConfig()).advance(1.0e-3)
+
+
+def _live(out: Path) -> "Witness":
+    """The two nodes, and what could be heard of them."""
+    from leg_wear_monitor.ros.witness import Witness
+
+    domain = int(os.environ.get("ROS_DOMAIN_ID") or 5 + os.getpid() % 90)
+    first: list[int] = []
+
+    def say(stamp_ns: int, line: str) -> None:
+        first.append(stamp_ns)
+        click.echo(f"{(stamp_ns - first[0]) / 1e9:6.2f} s  {line}")
+
+    paths = {"record": out / "live.mcap", "ledger": out / "wear.db", "truth": out / "truth.json"}
+    for path in paths.values():
+        path.unlink(missing_ok=True)
+    click.echo(f"starting the monitor and the leg in ROS domain {domain}")
+    witness = Witness(_NAMESPACE, domain, say)
+    try:
+        with (
+            _process("monitor", out, domain, record=paths["record"], ledger=paths["ledger"]) as monitor,
+            _process("gait-publisher", out, domain, truth=paths["truth"]) as leg,
+        ):
+            witness.attend(lambda: leg.poll() is None and monitor.poll() is None)
+            _check_ended(leg, out / "gait-publisher.log")
+    finally:
+        witness.leave()
+    _check_ended(monitor, out / "monitor.log")
+    return witness
+
+
+@contextmanager
+def _process(verb: str, out: Path, domain: int, **paths: Path) -> "Iterator[subprocess.Popen[bytes]]":
+    """A node as a process of its own, ended as from a terminal."""
+    command = [sys.executable, "-m", "leg_wear_monitor", verb, "--ros-args", "-r", f"__ns:={_NAMESPACE}"]
+    command += ["--params-file", str(share_directory() / "config" / "demo.yaml")]
+    for name, path in paths.items():
+        command += ["-p", f"{name}.path:={path.resolve()}"]
+    environment = {**os.environ, "ROS_DOMAIN_ID": str(domain), "ROS_AUTOMATIC_DISCOVERY_RANGE": "LOCALHOST"}
+    with (out / f"{verb}.log").open("wb") as log:
+        process = subprocess.Popen(command, env=environment, stdout=log, stderr=subprocess.STDOUT)
+        try:
+            yield process
+        finally:
+            if process.poll() is None:
+                process.send_signal(signal.SIGINT)
+            try:
+                process.wait(_PATIENCE_S)
+            except subprocess.TimeoutExpired:
+                process.kill()
+
+
+def _check_ended(process: "subprocess.Popen[bytes]", log: Path) -> None:
+    """Raise with the last line of the log if a node did not end in order."""
+    if process.returncode not in (None, 0):
+        lines = log.read_text(errors="replace").strip().splitlines() or ["nothing"]
+        raise LegWearError(f"{log}: the node ended with {process.returncode}: {lines[-1]}")
+
+
+def _replay(out: Path) -> bool:
+    """The recording through the same monitor; whether it gives the same messages."""
+    command = [sys.executable, "-m", "leg_wear_monitor", "replay", str(out / "live.mcap"), "--out", str(out)]
+    command += ["--config", str(share_directory() / "config" / "demo.yaml")]
+    click.echo(f"leg-wear-monitor {' '.join(command[3:])}")
+    done = subprocess.run(command, check=False)
+    if done.returncode != DONE:
+        raise LegWearError(f"{out / 'live.mcap'}: its replay ended with {done.returncode}")
+    live, again = _messages(out / "live.mcap"), _messages(out / "reports.mcap")
+    count = sum(map(len, again.values()))
+    same = live == again and count > 0
+    what = "the same, byte for byte" if same else "not the same"
+    click.echo(f"live and replayed: {count} messages on {len(again)} topics, {what}")
+    return same
+
+
+def _messages(path: Path) -> dict[str, list[bytes]]:
+    """Messages of the compared topics, in their order."""
+    from mcap.reader import make_reader
+
+    found: dict[str, list[bytes]] = defaultdict(list)
+    with path.open("rb") as stream:
+        for _, channel, message in make_reader(stream).iter_messages(log_time_order=False):
+            name = channel.topic.rsplit("/", 1)[-1]
+            if name in _COMPARED:
+                found[name].append(message.data)
+    return dict(found)
+
+
+def _compare_with_truth(out: Path, witness: "Witness") -> None:
+    """What the leg really lost, beside what the monitor found from crank and torque."""
+    import numpy as np
+
+    truth: dict[str, Any] = json.loads((out / "truth.json").read_text())
+    at_s = (witness.stamp_ns - truth["start_ns"]) / 1e9
+    for joint, column in truth["clearance_m"].items():
+        grown = float(np.interp(at_s, truth["cycle_end_s"], column[:-1])) - column[0]
+        found = witness.clearances_m[joint] - column[0]
+        click.echo(f"joint {joint}: worn {1e9 * grown:.0f} nm, monitor says {1e9 * found:.0f} nm")

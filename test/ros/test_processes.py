@@ -1,0 +1,57 @@
+"""The nodes as processes: the whole demo, and an end by SIGTERM."""
+
+import json
+import os
+import signal
+import sqlite3
+import subprocess
+import sys
+from pathlib import Path
+
+import pytest
+
+pytest.importorskip("rclpy")
+
+
+def started(verb: str, log: Path, *arguments: str) -> "subprocess.Popen[bytes]":
+    command = [sys.executable, "-m", "leg_wear_monitor", verb, "--ros-args", *arguments]
+    with log.open("wb") as stream:
+        return subprocess.Popen(command, stdout=stream, stderr=subprocess.STDOUT)
+
+
+def test_sigterm_ends_both_nodes_in_order(stage, tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setenv("ROS_DOMAIN_ID", str(stage.domain))
+    ledger, truth = tmp_path / "wear.db", tmp_path / "truth.json"
+    logs = {"monitor": tmp_path / "monitor.log", "gait-publisher": tmp_path / "leg.log"}
+    nodes = [
+        started("monitor", logs["monitor"], "-p", f"ledger.path:={ledger}"),
+        started("gait-publisher", logs["gait-publisher"], "-p", f"truth.path:={truth}"),
+    ]
+    try:
+        for log, word in zip(logs.values(), (b"monitoring joints", b"walking"), strict=True):
+            stage.wait_for(lambda log=log, word=word: word in log.read_bytes(), f"{word} in {log}")
+        for node in nodes:
+            node.send_signal(signal.SIGTERM)
+        assert [node.wait(60) for node in nodes] == [0, 0]
+    finally:
+        for node in nodes:
+            node.kill()
+            node.wait()
+    assert json.loads(truth.read_text())["walked_s"] > 0.0
+    with sqlite3.connect(ledger) as db:
+        assert db.execute("SELECT closed FROM run").fetchall() == [(1,)]
+    db.close()
+    assert all(b"Traceback" not in log.read_bytes() for log in logs.values())
+
+
+def test_the_demo_tells_its_story(stage, tmp_path: Path) -> None:
+    environment = {**os.environ, "ROS_DOMAIN_ID": str(stage.domain)}
+    command = [sys.executable, "-m", "leg_wear_monitor", "demo", "--out", str(tmp_path / "demo")]
+    done = subprocess.run(command, env=environment, capture_output=True, text=True, check=False)
+    assert done.returncode == 0, done.stdout + done.stderr
+    alarm = done.stdout.index("ALARM impact_force")
+    assert done.stdout.index("alarms acknowledged: cleared: impact_force", alarm) > alarm
+    assert "the same, byte for byte" in done.stdout
+    page = Path(done.stdout.rsplit("report: ", 1)[1].strip())
+    assert "<html" in page.read_text()[:1000].lower()
+    assert (tmp_path / "demo" / "live.mcap").stat().st_size > 100_000

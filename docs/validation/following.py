@@ -7,10 +7,11 @@ Three minutes, most of them for that leg.
 import numpy as np
 
 from leg_wear_monitor import load_mechanism
-from leg_wear_monitor.gait.config import GaitConfig
+from leg_wear_monitor.gait.config import GaitConfig, LoadConfig
 from leg_wear_monitor.gait.leg import SyntheticLeg
 from leg_wear_monitor.mechanism.arrays import Floats
 from leg_wear_monitor.mechanism.ideal import TURN
+from leg_wear_monitor.mechanism.spec import Mechanism
 from leg_wear_monitor.twin.digital_twin import DigitalTwin
 from leg_wear_monitor.twin.sample import Samples, gait_samples
 from leg_wear_monitor.twin.settings import TwinSettings
@@ -23,10 +24,10 @@ CASES = (
 )  # fmt: skip
 
 
-def walk() -> tuple[Floats, Floats, Floats]:
-    """Angle (n,), torque impulse (n,) every millisecond, and growth (CYCLES - 1, k) of the clearances [m]."""
-    leg = SyntheticLeg(GaitConfig())
-    instants = [leg.advance(i / RATE_HZ) for i in range((CYCLES + 1) * RATE_HZ)]
+def walk(cycles: int, load: LoadConfig) -> tuple[Floats, Floats, Floats]:
+    """Angle (n,), torque impulse (n,) every millisecond, and growth (cycles - 1, k) of the clearances [m]."""
+    leg = SyntheticLeg(GaitConfig(load=load))
+    instants = [leg.advance(i / RATE_HZ) for i in range((cycles + 1) * RATE_HZ)]
     clearance = np.array([leg.truth()["clearance_m"][name] for name in leg.loose])
     angle, impulse = (
         np.array([i.crank.angle for i in instants]),
@@ -50,7 +51,7 @@ def seen(angle: Floats, impulse: Floats, noise: float, rate: int, lost: float) -
 
 def main() -> None:
     """Print the table."""
-    angle, impulse, growth = walk()
+    angle, impulse, growth = walk(CYCLES, LoadConfig())
     scatter = growth.std(axis=0) / growth.mean(axis=0) * np.sqrt(2.0 / len(growth))
     mechanism = load_mechanism("bionic_leg")
     print(f"joints {mechanism.loose}; scatter of each difference [%]: {(100.0 * scatter).round(1)}")
@@ -66,6 +67,23 @@ def main() -> None:
             + f" %; torque unexplained {unexplained:.2f} N m; {len(update.cycles)} cycles",
             flush=True,
         )
+    loaded(mechanism)
+
+
+def loaded(mechanism: Mechanism) -> None:
+    """Print what a load at the toe does, with and without its estimate at work."""
+    angle, impulse, growth = walk(13, LoadConfig(toe_force_n=60.0, friction_nm=1.0))
+    for acts in (True, False):
+        twin = DigitalTwin(mechanism, TwinSettings(estimate_load=acts))
+        cycles = twin.update(seen(angle, impulse, 1.0e-3, 200, 0.0)).cycles
+        grown = np.mean([cycle.growth_mean_m for cycle in cycles[2:]], axis=0)
+        print(100.0 * (grown / growth[2:].mean(axis=0) - 1.0))
+        for cycle in (cycles[0], cycles[-1]):
+            torque = cycle.torque
+            print(
+                f"{torque.load_n:.1f} +- {torque.load_sigma_n:.1f} N, {torque.friction_nm:.3f} N m,", end=" "
+            )
+            print(f"{1e3 * torque.torque_lag_s:.2f} ms")
 
 
 if __name__ == "__main__":

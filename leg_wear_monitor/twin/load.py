@@ -42,6 +42,7 @@ class FootLoad:
     def __init__(self, linkage: Linkage, contacts: ContactArrays, shape: str = STANCE) -> None:
         self.tables = build_tables(linkage, contacts)
         self.signature = np.zeros(POINTS + 1)
+        self._load = 0.0
         self._parts: list[tuple[NDArray[Any], ...]] = []
         mechanism = linkage.mechanism
         if mechanism.toe is not None:
@@ -66,6 +67,9 @@ class FootLoad:
 
     def set(self, load: float) -> None:
         """Put a load [N], up positive, into the tables."""
+        if load == self._load:
+            return
+        self._load = load
         for flat, columns, bare, slope in self._parts:
             flat[:, columns] = bare + load * slope
 

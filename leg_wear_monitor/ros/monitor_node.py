@@ -21,6 +21,7 @@ from leg_wear_monitor.recording.qos import SENSOR_DATA
 from leg_wear_monitor.ros.black_box import BlackBox
 from leg_wear_monitor.ros.inbox import Inbox
 from leg_wear_monitor.ros.inputs import InputTopic, subscribe
+from leg_wear_monitor.ros.markers import MarkerTopic
 from leg_wear_monitor.ros.node_health import Load, load_status, recording_status, topics_status
 from leg_wear_monitor.ros.outlets import Outlets
 from leg_wear_monitor.ros.parameters import Parameters
@@ -57,6 +58,7 @@ class MonitorNode(ClosingNode):
         self._compile(decoder)
         parameters.follow(self, self._configure)
         self._serve()
+        self._markers = MarkerTopic(self, self._monitor)
         self._send_alarms(self._monitor.alarms)
         self._inputs = subscribe(self, config, self._receive)
         for topic, _ in self._inputs:
@@ -108,6 +110,7 @@ class MonitorNode(ClosingNode):
 
     def _publish(self, reports: Reports, coarse: bool) -> None:
         now_ns = self._now_ns()
+        self._markers.note(reports.samples)
         for outgoing in self._messages.of(reports):
             if coarse and outgoing.output in _A_SAMPLE and not self._black_box.on:
                 self._load.unpublished += len(outgoing.stamp_ns)

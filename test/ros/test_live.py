@@ -12,6 +12,7 @@ from diagnostic_msgs.msg import DiagnosticArray
 from geometry_msgs.msg import WrenchStamped
 from mcap.reader import make_reader
 from sensor_msgs.msg import JointState
+from visualization_msgs.msg import MarkerArray
 
 from leg_wear_monitor import load_mechanism
 from leg_wear_monitor.gait.config import KnockConfig, PaceConfig, TransportConfig
@@ -50,19 +51,23 @@ def raised(messages: list[DiagnosticArray]) -> list[tuple[float, str]]:
 
 def test_an_even_gait_is_followed_told_recorded_and_replayed(stage, walk, tmp_path: Path) -> None:
     recording = tmp_path / "live.mcap"
-    monitor = stage.monitor(record__path=str(recording), diagnostics__period_s=0.2, **FAST)
+    monitor = stage.monitor(
+        record__path=str(recording), diagnostics__period_s=0.2, publish_markers=True, **FAST
+    )
     clearances = stage.listen(f"{ME}/clearance_states", JointState)
     forces = stage.listen(f"{ME}/impact_forces", JointState)
     torques = stage.listen(f"{ME}/predicted_torque", WrenchStamped)
     diagnostics = stage.listen("/diagnostics", DiagnosticArray)
+    markers = stage.listen(f"{ME}/markers", MarkerArray)
     stage.legs().play(walk, monitor)
-    stage.wait_for(lambda: len(clearances) >= 4 and len(diagnostics) > 2, "gait cycles and diagnostics")
+    stage.wait_for(lambda: len(clearances) >= 4 and len(diagnostics) > 2 and markers, "all topics")
     monitor.stop()
     tells_the_wear(clearances, walk)
     assert list(forces[-1].name) == [f"{joint}_impact" for joint in "ABGIJ"]
     assert len(forces[-1].effort) == 5
     assert np.ptp([message.wrench.torque.z for message in torques]) > 50.0
     are_one_number_a_value(diagnostics)
+    draws_the_leg(markers[-1])
     is_what_a_replay_gives(recording, config_from(FAST))
 
 
@@ -86,6 +91,16 @@ def are_one_number_a_value(diagnostics: list[DiagnosticArray]) -> None:
     assert len(values) > 40
     for value in values:
         float(value.value)
+
+
+def draws_the_leg(drawn: MarkerArray) -> None:
+    """Seven bodies and five loose joints, A and B on the hip's axis."""
+    lines, *joints = drawn.markers
+    assert len(lines.points) == 2 * (1 + 2 + 2 + 1 + 2 + 2 + 1)
+    assert [marker.id for marker in joints] == [0, 1, 2, 3, 4]
+    positions = [(joint.pose.position.x, joint.pose.position.z) for joint in joints]
+    assert positions[:2] == pytest.approx([(0.0, 0.0), (0.0, 0.0)], abs=1e-12)
+    assert max(z for _, z in positions[2:]) < -0.3
 
 
 def is_what_a_replay_gives(recording: Path, config: MonitorConfig) -> None:

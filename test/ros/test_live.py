@@ -99,7 +99,7 @@ def draws_the_leg(drawn: MarkerArray) -> None:
     assert len(lines.points) == 2 * (1 + 2 + 2 + 1 + 2 + 2 + 1)
     assert [marker.id for marker in joints] == [0, 1, 2, 3, 4]
     positions = [(joint.pose.position.x, joint.pose.position.z) for joint in joints]
-    assert positions[:2] == pytest.approx([(0.0, 0.0), (0.0, 0.0)], abs=1e-12)
+    assert np.array(positions[:2]) == pytest.approx(np.zeros((2, 2)), abs=1e-12)
     assert max(z for _, z in positions[2:]) < -0.3
 
 

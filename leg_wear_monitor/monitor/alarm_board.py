@@ -21,10 +21,10 @@ def limits_of(config: MonitorConfig, loose: tuple[str, ...]) -> dict[str, Limit]
     for k, joint in enumerate(loose):
         impact = limits.joint_impact_force_n[k] if limits.joint_impact_force_n else limits.impact_force_n
         clearance = limits.joint_clearance_m[k] if limits.joint_clearance_m else limits.clearance_m
-        found[f"{IMPACT} {joint}"] = _limit(config, impact, config.alarms.impact_on_delay_cycles)
+        found[f"{IMPACT} {joint}"] = _limit(config, impact, config.alarms.knock_on_delay_cycles)
         found[f"{CLEARANCE} {joint}"] = _limit(config, clearance)
         found[f"{GROWTH} {joint}"] = _limit(config, limits.growth_m_per_hour)
-    found[MISMATCH] = _limit(config, limits.torque_mismatch)
+    found[MISMATCH] = _limit(config, limits.torque_mismatch, config.alarms.knock_on_delay_cycles)
     found[CADENCE] = _limit(config, config.cadence.tolerance_rpm)
     for rate in (CRANK_RATE, TORQUE_RATE):
         found[rate] = _least(config, limits.min_rate_hz)

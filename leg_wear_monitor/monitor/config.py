@@ -48,10 +48,10 @@ class Limits:
     )
     torque_mismatch: float = quantity(
         "",
-        "RMS of measured less predicted drive torque, as a share of the predicted RMS",
+        "RMS of the drive torque that load, friction and lag do not explain, as a share of the predicted RMS",
         above=0.0,
         at_most=100.0,
-        default=0.5,
+        default=0.1,
         metadata=LIVE,
     )
     min_rate_hz: float = quantity(
@@ -93,8 +93,13 @@ class Alarms:
         default=3,
         metadata=LIVE,
     )
-    impact_on_delay_cycles: int = quantity(
-        "", "the same for impact forces", at_least=1, at_most=1000, default=1, metadata=LIVE
+    knock_on_delay_cycles: int = quantity(
+        "",
+        "the same for what shows a knock at once: impact forces and torque mismatch",
+        at_least=1,
+        at_most=1000,
+        default=1,
+        metadata=LIVE,
     )
 
 

@@ -24,9 +24,9 @@ from leg_wear_monitor.twin.leg_state import (
     UNFILTERED,
 )
 
-# the sensor's period is the shortest time between its samples lately, which may grow by so much with each; a
-# time longer than so many periods has lost samples in it
-_LONGER, _LONGEST_PERIOD = 1.05, 1.5
+# the sensor's period is a running mean of the times between its samples, each with so much weight; a time of
+# more periods than so many has lost samples in it, and counts as that many
+_WEIGHT, _LONGEST_PERIOD = 0.05, 1.5
 
 
 @kernel
@@ -60,7 +60,7 @@ def compare(cutoff, signature, leg, stepper, measured):
     dt = value[UNFILTERED] + seen
     value[UNFILTERED] = dt
     longest = value[PERIOD] * _LONGEST_PERIOD
-    value[PERIOD] = min(seen, value[PERIOD] * _LONGER) if value[PERIOD] > 0.0 else seen
+    value[PERIOD] += _WEIGHT * (min(seen, longest) - value[PERIOD]) if longest > 0.0 else seen
     if 0.0 < longest < seen:
         return
     value[UNFILTERED] = 0.0

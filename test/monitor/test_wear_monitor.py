@@ -9,6 +9,9 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from leg_wear_monitor.errors import ConfigError, LegWearError
+from leg_wear_monitor.gait.config import GaitConfig, KnockConfig
+from leg_wear_monitor.gait.leg import SyntheticLeg
+from leg_wear_monitor.gait.sensors import readings, samples
 from leg_wear_monitor.monitor.alarms import Level
 from leg_wear_monitor.monitor.config import MonitorConfig
 from leg_wear_monitor.monitor.fitting import twin_settings
@@ -113,6 +116,22 @@ def test_a_knock_raises_its_alarm_within_a_gait_cycle_and_not_before(monitor, ga
     assert alarm.value > 7000.0
     assert knock_ns - SECOND // 10 <= stamp_ns <= knock_ns + SECOND
     assert knock_ns <= now_ns <= knock_ns + SECOND
+
+
+def test_a_bushing_that_breaks_out_shows_in_the_torque_at_once(monitor):
+    """Of a leg that is not the model's: full coordinates, with clearances and sensors of its own."""
+    knock_ns = START + 4 * SECOND
+    config = GaitConfig(duration_s=6.5, knock=KnockConfig(joint="A", at_s=4.0))
+    reports = monitor.update(samples(readings(SyntheticLeg(config), config), START))
+    raised = [
+        change.stamp_ns
+        for change in reports.alarms
+        for alarm in change.alarms
+        if alarm.name == "torque_mismatch" and alarm.level is Level.ERROR
+    ]
+    assert knock_ns < raised[0] <= knock_ns + SECOND
+    named = {alarm.name for alarm in monitor.alarms.alarms if alarm.level is not Level.OK}
+    assert named == {"torque_mismatch"}
 
 
 def test_alarms_are_acknowledged(monitor, gait):

@@ -15,7 +15,9 @@ from leg_wear_monitor.share import share_directory
 
 COULD_NOT, INTERRUPTED = 2, 130
 
-_VERBS = ("check", "demo", "gait-publisher", "life", "monitor", "replay", "report", "simulate", "study")
+_VERBS = (
+    "check", "demo", "gait-publisher", "life", "measure", "monitor", "replay", "report", "simulate", "study"
+)  # fmt: skip
 
 
 class Verbs(click.Group):

@@ -14,7 +14,14 @@ from leg_wear_monitor.monitor.binding import binding_of
 from leg_wear_monitor.monitor.config import MonitorConfig
 from leg_wear_monitor.monitor.fitting import fitted
 from leg_wear_monitor.monitor.ledger import Ledger
-from leg_wear_monitor.monitor.ledger_entry import AlarmEvent, ClearancePoint, Entry, Event, JointWear
+from leg_wear_monitor.monitor.ledger_entry import (
+    AlarmEvent,
+    ClearancePoint,
+    Entry,
+    Event,
+    ForecastPoint,
+    JointWear,
+)
 from leg_wear_monitor.monitor.reports import AlarmList, CycleReport
 from leg_wear_monitor.monitor.spans import NEIGHBOURS_NS, Spans, with_span
 from leg_wear_monitor.twin.digital_twin import DigitalTwin
@@ -130,11 +137,18 @@ class Book:
             part.replaced_ns,
         )
 
-    def replace(self, joint: str, stamp_ns: int) -> JointWear:
-        """Fresh surfaces for a joint; its wear as it was."""
+    def wear_of(self, joint: str) -> JointWear:
+        """Wear of a joint as it is now; raises LegWearError for one that is not loose."""
+        return self.joint_wear(self._index(joint), self._twin.depth)
+
+    def _index(self, joint: str) -> int:
         if joint not in self._twin.loose:
             raise LegWearError(f"{joint}: no loose joint, expected one of {', '.join(self._twin.loose)}")
-        k = self._twin.loose.index(joint)
+        return self._twin.loose.index(joint)
+
+    def replace(self, joint: str, stamp_ns: int) -> JointWear:
+        """Fresh surfaces for a joint; its wear as it was."""
+        k = self._index(joint)
         was = self.joint_wear(k, self._twin.depth)
         self._twin.reset_wear(joint)
         new = PartLife(self.state.cycles, self.totals["moving_s"], stamp_ns)
@@ -168,6 +182,9 @@ class Book:
             return
         self.state.point_due_s = moving_s + POINT_S
         for joint in report.joints:
+            if joint.forecast and joint.forecast.cycles:
+                quantiles = attrs.astuple(joint.forecast.cycles)
+                self.note(ForecastPoint(report.stamp_ns, report.cycle, joint.joint, *quantiles))
             self.note(
                 ClearancePoint(
                     report.stamp_ns, report.cycle, joint.joint, joint.clearance_m, joint.clearance_max_m

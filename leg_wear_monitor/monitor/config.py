@@ -7,6 +7,7 @@ from these classes. A section is a class, so `limits.clearance_m` is the paramet
 import attrs
 
 from leg_wear_monitor.mechanism.quantity import described, quantity
+from leg_wear_monitor.monitor.forecast_config import Forecasting
 from leg_wear_monitor.monitor.input_config import LIVE, Cadence, Crank, DriveTorque, Tracker
 
 
@@ -183,6 +184,7 @@ class MonitorConfig:
     limits: Limits = described("", factory=Limits)
     alarms: Alarms = described("", factory=Alarms)
     growth: Growth = described("", factory=Growth)
+    forecast: Forecasting = described("", factory=Forecasting)
     ledger: LedgerFile = described("", factory=LedgerFile)
     record: Record = described("", factory=Record)
     diagnostics: Diagnostics = described("", factory=Diagnostics)

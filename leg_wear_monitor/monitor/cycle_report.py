@@ -3,6 +3,7 @@
 import math
 from collections.abc import Sequence
 
+from leg_wear_monitor.monitor.forecast import JointForecast
 from leg_wear_monitor.monitor.growth import GrowthWindow, growth_rate, remaining
 from leg_wear_monitor.monitor.reports import CycleReport, JointReport
 from leg_wear_monitor.twin.figures import CycleFigures, TorqueFigures
@@ -14,6 +15,7 @@ def cycle_report(
     loose: Sequence[str],
     growth: Sequence[GrowthWindow],
     limits_m: Sequence[float],
+    forecasts: Sequence[JointForecast],
 ) -> CycleReport:
     """Report of a gait cycle.
 
@@ -28,6 +30,7 @@ def cycle_report(
         Of each of them, this cycle included.
     limits_m : sequence of float
         Limit of each one's clearance.
+    forecasts : sequence of JointForecast
     """
     torque = figures.torque
     return CycleReport(
@@ -38,7 +41,8 @@ def cycle_report(
         moving_s=figures.moving_s,
         bridged_s=figures.bridged_s,
         joints=tuple(
-            _joint_report(figures, k, joint, growth[k], limits_m[k]) for k, joint in enumerate(loose)
+            _joint_report(figures, k, joint, growth[k], limits_m[k], forecasts[k])
+            for k, joint in enumerate(loose)
         ),
         torque_samples=torque.samples,
         measured_torque_rms_nm=float(torque.measured_rms_nm),
@@ -60,7 +64,7 @@ def _mismatch(torque: TorqueFigures) -> float:
 
 
 def _joint_report(
-    figures: CycleFigures, k: int, joint: str, window: GrowthWindow, limit_m: float
+    figures: CycleFigures, k: int, joint: str, window: GrowthWindow, limit_m: float, forecast: JointForecast
 ) -> JointReport:
     rate = growth_rate(window)
     clearance_m = float(figures.clearance_mean_m[k])
@@ -72,6 +76,7 @@ def _joint_report(
         growth_mps=rate.per_second_m if rate else None,
         growth_error_m_per_cycle=rate.error_m if rate else None,
         remaining=remaining(rate, clearance_m, limit_m),
+        forecast=forecast,
         peak_force_n=float(figures.peak_force_n[k]),
         p99_force_n=float(figures.p99_force_n[k]),
         mean_force_n=float(figures.mean_force_n[k]),

@@ -6,6 +6,7 @@ import attrs
 
 from leg_wear_monitor.monitor import alarm_board as names
 from leg_wear_monitor.monitor.alarm_board import AlarmBoard
+from leg_wear_monitor.monitor.alarms import Level
 from leg_wear_monitor.monitor.beats import A_CYCLE
 from leg_wear_monitor.monitor.config import MonitorConfig
 from leg_wear_monitor.monitor.input_health import InputHealth, TorqueRange, input_health, with_torques
@@ -60,6 +61,10 @@ class Judge:
         """Judge by other limits from now on."""
         self.config = config
         self.board.configure(config)
+
+    def holds(self) -> bool:
+        """Whether the leg does what the model holds for: in cadence, and with the torque that is expected."""
+        return self.board.level(names.CADENCE, names.MISMATCH) is not Level.ERROR
 
     def see(self, piece: Samples) -> None:
         """Take down samples that came."""

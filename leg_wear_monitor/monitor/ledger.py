@@ -15,6 +15,7 @@ from leg_wear_monitor.monitor.ledger_file import MOVE, LedgerError, connect, cre
 from leg_wear_monitor.monitor.ledger_rows import (
     read_entry,
     read_last_run,
+    read_measurements,
     read_spans,
     write_entry,
     write_event,
@@ -39,6 +40,8 @@ class Ledger:
         The last one of earlier runs; None in a new ledger.
     counted_ns : (n, 2) array of int
         Begin and end of the time whose wear is in it, of earlier runs.
+    measurements : tuple of Measurement
+        Clearances measured by hand, of earlier runs.
     cut_off_s : float or None
         If the last run was cut off: the longest time of walking whose wear was lost with it.
     kept_ns : int
@@ -65,6 +68,7 @@ class Ledger:
         try:
             self.entry = read_entry(self._db)
             self.counted_ns = read_spans(self._db)
+            self.measurements = read_measurements(self._db)
             last, closed, last_interval_s = read_last_run(self._db)
         except (sqlite3.Error, ValueError, TypeError) as error:
             self._db.close()
@@ -96,6 +100,17 @@ class Ledger:
         moving_s = entry.totals.get("moving_s", 0.0)
         self._interval_s = max(self._interval_s, moving_s - self._kept_moving_s)
         return self._write(entry, closed)
+
+    def record(self) -> None:
+        """Write the events since the last entry, and leave that in force; for a run that monitors nothing.
+
+        Raises
+        ------
+        LedgerError
+            If they could not be written.
+        """
+        if not self._write(None, closed=self.cut_off_s is None):
+            raise LedgerError(f"{self.path}: {self.fault}")
 
     def close(self) -> None:
         """Let go of the file; entries are written by `keep`."""

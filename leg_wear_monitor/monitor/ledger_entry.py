@@ -8,6 +8,7 @@ import numpy as np
 
 from leg_wear_monitor.mechanism.arrays import Floats
 from leg_wear_monitor.monitor.alarms import Alarm
+from leg_wear_monitor.wear.surfaces import SECTORS
 
 
 @attrs.frozen(eq=False)
@@ -30,6 +31,11 @@ class JointWear:
     cycles: int = 0
     moving_s: float = 0.0
     replaced_ns: int = 0
+
+
+def new_part(name: str) -> JointWear:
+    """A joint whose part is new."""
+    return JointWear(name, np.zeros((2, SECTORS)))
 
 
 @attrs.frozen(eq=False)
@@ -106,4 +112,49 @@ class ClearancePoint:
     clearance_max_m: float
 
 
-Event = Audit | AlarmEvent | ClearancePoint
+@attrs.frozen
+class Measurement:
+    """A clearance measured by hand.
+
+    Attributes
+    ----------
+    stamp_ns : int
+        By the clock; nothing follows from it.
+    joint, who : str
+    clearance_m, sigma_m : float
+        Mean radial clearance and its standard deviation.
+    wear_m : float
+        What the twin had counted for this part then.
+    cycles, replaced_ns : int
+        Of the part, as in `JointWear`.
+    expected_below : float
+        Probability with which a smaller one was expected.
+    counts : bool
+        Whether the forecast believes it.
+    """
+
+    stamp_ns: int
+    joint: str
+    who: str
+    clearance_m: float
+    sigma_m: float
+    wear_m: float
+    cycles: int
+    replaced_ns: int
+    expected_below: float
+    counts: bool
+
+
+@attrs.frozen
+class ForecastPoint:
+    """A joint's gait cycles to its limit (p10, p50, p90), as forecast after so many gait cycles."""
+
+    stamp_ns: int
+    cycle: int
+    joint: str
+    p10_cycles: float
+    p50_cycles: float
+    p90_cycles: float
+
+
+Event = Audit | AlarmEvent | ClearancePoint | Measurement | ForecastPoint

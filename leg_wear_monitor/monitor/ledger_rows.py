@@ -2,11 +2,21 @@
 
 import sqlite3
 
+import attrs
 import numpy as np
 
 from leg_wear_monitor.mechanism.arrays import Ints
 from leg_wear_monitor.monitor.alarms import Alarm, Level
-from leg_wear_monitor.monitor.ledger_entry import AlarmEvent, Audit, ClearancePoint, Entry, Event, JointWear
+from leg_wear_monitor.monitor.ledger_entry import (
+    AlarmEvent,
+    Audit,
+    ClearancePoint,
+    Entry,
+    Event,
+    ForecastPoint,
+    JointWear,
+    Measurement,
+)
 
 
 def write_entry(db: sqlite3.Connection, run: int, entry: Entry) -> None:
@@ -47,12 +57,29 @@ def write_event(db: sqlite3.Connection, event: Event) -> None:
                 "VALUES (?, ?, ?, ?, ?)",
                 (stamp_ns, cycle, joint, clearance_m, clearance_max_m),
             )
+        case Measurement() | ForecastPoint():
+            _append(db, event)
         case Audit(stamp_ns, who, what, was):
             before = (was.name, was.cycles, _depth_bytes(was)) if was else (None, None, None)
             db.execute(
                 "INSERT INTO audit (stamp_ns, who, what, joint, cycles, depth) VALUES (?, ?, ?, ?, ?, ?)",
                 (stamp_ns, who, what, *before),
             )
+
+
+def _append(db: sqlite3.Connection, event: Measurement | ForecastPoint) -> None:
+    """A row of the table whose columns are the event's fields."""
+    table = "measurement" if isinstance(event, Measurement) else "forecast"
+    values = attrs.asdict(event)
+    places = ", ".join("?" * len(values))
+    db.execute(f"INSERT INTO {table} ({', '.join(values)}) VALUES ({places})", tuple(values.values()))
+
+
+def read_measurements(db: sqlite3.Connection) -> tuple[Measurement, ...]:
+    """All measured clearances, in the order in which they were noted."""
+    names = [field.name for field in attrs.fields(Measurement)]
+    rows = db.execute(f"SELECT {', '.join(names)} FROM measurement ORDER BY id")
+    return tuple(Measurement(**dict(zip(names, (*row[:-1], bool(row[-1])), strict=True))) for row in rows)
 
 
 def read_entry(db: sqlite3.Connection) -> Entry | None:

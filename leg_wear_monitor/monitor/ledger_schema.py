@@ -59,6 +59,22 @@ CREATE TABLE history (
 ) STRICT;
 """
 
-MIGRATIONS = (_FIRST,)
+_SECOND = """
+-- clearances measured by hand: of which part (replaced_ns as in joint), what the twin had counted for it,
+-- with what probability a smaller one was expected, and whether the forecast believes it
+CREATE TABLE measurement (
+    id INTEGER PRIMARY KEY, stamp_ns INTEGER NOT NULL, joint TEXT NOT NULL, who TEXT NOT NULL,
+    clearance_m REAL NOT NULL, sigma_m REAL NOT NULL, wear_m REAL NOT NULL, cycles INTEGER NOT NULL,
+    replaced_ns INTEGER NOT NULL, expected_below REAL NOT NULL, counts INTEGER NOT NULL
+) STRICT;
+
+-- forecasts now and then: gait cycles to the limit, counted from cycle
+CREATE TABLE forecast (
+    id INTEGER PRIMARY KEY, stamp_ns INTEGER NOT NULL, cycle INTEGER NOT NULL, joint TEXT NOT NULL,
+    p10_cycles REAL NOT NULL, p50_cycles REAL NOT NULL, p90_cycles REAL NOT NULL
+) STRICT;
+"""
+
+MIGRATIONS = (_FIRST, _SECOND)
 
 FORMAT = len(MIGRATIONS)

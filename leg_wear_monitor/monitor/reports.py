@@ -3,6 +3,7 @@
 import attrs
 
 from leg_wear_monitor.monitor.alarms import Alarm, Level
+from leg_wear_monitor.monitor.forecast import JointForecast
 from leg_wear_monitor.twin.figures import Intake, SampleFigures
 
 SampleReports = SampleFigures
@@ -42,6 +43,8 @@ class JointReport:
     peak_force_n, p99_force_n, mean_force_n : float
         Of the contact force in this cycle; the peak is a sample of a heavy tail.
     impacts : int
+    forecast : JointForecast or None
+        Renewed once a minute.
     """
 
     joint: str
@@ -55,6 +58,7 @@ class JointReport:
     p99_force_n: float
     mean_force_n: float
     impacts: int
+    forecast: JointForecast | None = None
 
 
 @attrs.frozen(kw_only=True)

@@ -12,10 +12,12 @@ from leg_wear_monitor.monitor.book import Book, BookState
 from leg_wear_monitor.monitor.config import MonitorConfig
 from leg_wear_monitor.monitor.cycle_report import cycle_report
 from leg_wear_monitor.monitor.fitting import fitted, twin_settings
+from leg_wear_monitor.monitor.forecaster import Forecaster, ForecastState
 from leg_wear_monitor.monitor.growth import GrowthWindow, extended
 from leg_wear_monitor.monitor.judge import Judge, JudgeState
 from leg_wear_monitor.monitor.ledger import Ledger
 from leg_wear_monitor.monitor.ledger_entry import AlarmEvent, Audit
+from leg_wear_monitor.monitor.measure import Finding
 from leg_wear_monitor.monitor.reports import (
     AlarmList,
     CycleReport,
@@ -52,6 +54,7 @@ class MonitorSnapshot:
     state: MonitorState
     book: BookState
     judge: JudgeState
+    forecast: ForecastState
     alarms: dict[str, Alarm]
     beats: Ints
 
@@ -93,6 +96,12 @@ class WearMonitor:
         self._book = Book(self._twin, ledger, self.config.ledger.checkpoint_s)
         cycle_ns = round(60.0e9 / abs(self.config.cadence.commanded_rpm))
         self._judge = Judge(self._twin, self.config, cycle_ns)
+        self._forecaster = Forecaster(
+            self.mechanism,
+            self.config.forecast,
+            ledger.measurements if ledger else (),
+            [part.replaced_ns for part in self._book.state.parts],
+        )
         if ledger and ledger.entry:
             self._judge.board.restore(ledger.entry.alarms)
         self._beats = Beats(cycle_ns // A_CYCLE)
@@ -181,8 +190,44 @@ class WearMonitor:
         k = self.loose.index(joint)
         growth = self._state.growth
         self._state.growth = (*growth[:k], GrowthWindow(), *growth[k + 1 :])
+        self._forecaster.replaced(joint)
         self._book.note(Audit(stamp_ns, who, "reset_wear", was))
         self._keep()
+
+    def measure(
+        self, joint: str, clearance_m: float, sigma_m: float, stamp_ns: int, who: str, accept: bool = False
+    ) -> Finding:
+        """Somebody has measured a clearance: the forecast learns from it, and it is kept in the ledger.
+
+        Parameters
+        ----------
+        joint : str
+        clearance_m, sigma_m : float
+            Mean radial clearance, and its standard deviation.
+        stamp_ns : int
+        who : str
+        accept : bool
+            Whether it counts even if it contradicts the model.
+
+        Raises
+        ------
+        LegWearError
+            For a joint that is not loose, or figures that cannot be.
+        """
+        wear = self._book.wear_of(joint)
+        kept_ns = self._book.ledger.kept_ns if self._book.ledger else 0
+        found = self._forecaster.measured(
+            wear,
+            clearance_m=clearance_m,
+            sigma_m=sigma_m,
+            stamp_ns=stamp_ns,
+            who=who,
+            kept_ns=kept_ns,
+            accept=accept,
+        )
+        self._book.note(found.measurement)
+        self._keep()
+        return found
 
     def save(self) -> None:
         """Write an entry into the ledger now.
@@ -211,6 +256,7 @@ class WearMonitor:
             attrs.evolve(self._state),
             attrs.evolve(self._book.state),
             attrs.evolve(self._judge.state),
+            attrs.evolve(self._forecaster.state),
             self._judge.board.alarms,
             self._beats.state.copy(),
         )
@@ -221,6 +267,7 @@ class WearMonitor:
         self._state = attrs.evolve(snapshot.state)
         self._book.state = attrs.evolve(snapshot.book)
         self._judge.state = attrs.evolve(snapshot.judge)
+        self._forecaster.state = attrs.evolve(snapshot.forecast)
         self._judge.board.alarms = snapshot.alarms
         self._beats.state[:] = snapshot.beats
 
@@ -242,9 +289,10 @@ class WearMonitor:
         self._judge.see(piece)
         self._book.followed(update.samples)
         self._state.happened = (*self._state.happened, *update.events)[-_KEPT_EVENTS:]
-        cycles = [self._report(figures) for figures in update.cycles]
-        for report in cycles:
-            self._tell(self._judge.end_cycle(report), changes)
+        cycles: list[CycleReport] = []
+        for figures in update.cycles:
+            cycles.append(self._report(figures))
+            self._tell(self._judge.end_cycle(cycles[-1]), changes)
         return update.samples, cycles
 
     def _report(self, figures: CycleFigures) -> CycleReport:
@@ -256,9 +304,13 @@ class WearMonitor:
             for window, growth in zip(state.growth, figures.growth_mean_m, strict=True)
         )
         limits = self._judge.board.clearance_limits_m
-        state.last = cycle_report(figures, book.state.cycles, self.loose, state.growth, limits)
+        forecasts = self._forecaster.after(figures, self._worn_m(), limits, self._judge.holds)
+        state.last = cycle_report(figures, book.state.cycles, self.loose, state.growth, limits, forecasts)
         book.note_clearances(state.last)
         return state.last
+
+    def _worn_m(self) -> Floats:
+        return np.asarray(self._twin.depth.mean(axis=2).sum(axis=1))
 
     def _tell(self, changed: tuple[AlarmList, ...], changes: list[AlarmList]) -> None:
         for change in changed:

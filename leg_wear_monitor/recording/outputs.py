@@ -9,6 +9,7 @@ from numpy.typing import NDArray
 
 from leg_wear_monitor.monitor.alarms import Alarm, Level
 from leg_wear_monitor.monitor.config import MonitorConfig
+from leg_wear_monitor.monitor.forecast import Quantiles
 from leg_wear_monitor.monitor.reports import (
     AlarmList,
     CycleReport,
@@ -184,7 +185,17 @@ def state_of(alarm: Alarm) -> str:
 
 
 def _lifetime(joint: JointReport) -> Status:
-    if joint.remaining is None:
-        return Status(f"forecast {joint.joint}", Level.OK, "too little growth or data to say", {})
-    values = {"remaining_cycles": joint.remaining.cycles, "remaining_hours": joint.remaining.hours}
-    return Status(f"forecast {joint.joint}", Level.OK, "if it goes on as it does", values)
+    values: dict[str, float] = {}
+    if joint.remaining is not None:
+        values = {"remaining_cycles": joint.remaining.cycles, "remaining_hours": joint.remaining.hours}
+    name, told = f"forecast {joint.joint}", joint.forecast
+    if told is None:
+        words = "if it goes on as it does" if values else "too little growth or data to say"
+        return Status(name, Level.OK, words, values)
+    for key in ("cycles", "hours", "days"):
+        quantiles: Quantiles | None = getattr(told, key)
+        if quantiles is not None:
+            values |= {f"{share}_{key}": value for share, value in attrs.asdict(quantiles).items()}
+    values |= {f"clearance_{share}_m": value for share, value in attrs.asdict(told.clearance_m).items()}
+    values["measurements"] = float(told.measurements)
+    return Status(name, Level.OK, told.answer.value, values)

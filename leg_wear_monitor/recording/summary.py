@@ -8,6 +8,7 @@ import numpy as np
 
 from leg_wear_monitor.mechanism.arrays import Floats
 from leg_wear_monitor.monitor.alarms import Alarm
+from leg_wear_monitor.monitor.forecast import JointForecast
 from leg_wear_monitor.recording.history import CYCLE_COLUMNS, JOINT_COLUMNS, History
 from leg_wear_monitor.recording.outputs import state_of
 from leg_wear_monitor.recording.replay import ReplayResult
@@ -98,11 +99,16 @@ def _joints(result: ReplayResult) -> dict[str, Any]:
             "growth_error_m_per_cycle": joint.growth_error_m_per_cycle,
             "growth_mps": joint.growth_mps,
             "remaining": None if joint.remaining is None else attrs.asdict(joint.remaining),
+            "forecast": None if joint.forecast is None else _forecast(joint.forecast),
             "peak_force_n": history.joint_column("peak_force_n")[:, k].max(),
             "mean_force_n": history.joint_column("mean_force_n")[:, k].mean(),
             "impacts": int(history.joint_column("impacts")[:, k].sum()),
         }
     return joints
+
+
+def _forecast(told: JointForecast) -> dict[str, Any]:
+    return {**attrs.asdict(told), "answer": told.answer.value}
 
 
 def _alarm(alarm: Alarm) -> dict[str, Any]:

@@ -10,6 +10,7 @@ import pytest
 
 from leg_wear_monitor.monitor.alarms import Alarm, Level
 from leg_wear_monitor.monitor.config import MonitorConfig
+from leg_wear_monitor.monitor.forecast import Answer, JointForecast, Quantiles
 from leg_wear_monitor.monitor.input_config import DriveTorque
 from leg_wear_monitor.monitor.reports import (
     AlarmList,
@@ -51,7 +52,7 @@ def reports() -> Reports:
         contact_force_n=np.array([[nan, nan], [1.0, 2.0], [3.0, 4.0], [5.0, 6.0]]),
     )
     blank = {field.name: 0 for field in attrs.fields(JointReport)}
-    known = {**blank, "clearance_m": 3e-4, "growth_mps": 1e-15, "peak_force_n": 50.0}
+    known = {**blank, "forecast": None, "clearance_m": 3e-4, "growth_mps": 1e-15, "peak_force_n": 50.0}
     joints = (
         JointReport(**{**known, "joint": "A", "remaining": Remaining(cycles=1e6, hours=277.5)}),
         JointReport(**{**known, "joint": "G", "growth_mps": None, "remaining": None}),
@@ -117,13 +118,23 @@ def test_an_alarm_keeps_its_name_and_gives_plain_numbers(sent: dict[str, list[An
 
 
 def test_a_forecast_says_what_is_known(store: Any, reports: Reports) -> None:
-    raw = Messages(MonitorConfig(), LOOSE).forecast(reports.cycles[0])
-    known, unknown = store.deserialize_cdr(raw, FORECAST.type).status
+    of = Quantiles(1.0, 2.0, 3.0)
+    forecast = JointForecast(
+        answer=Answer.KNOWN, cycles=of, hours=of, days=of, clearance_m=of, measurements=2
+    )
+    cycle = reports.cycles[0]
+    third = attrs.evolve(cycle.joints[1], joint="J", forecast=forecast)
+    raw = Messages(MonitorConfig(), LOOSE).forecast(attrs.evolve(cycle, joints=(*cycle.joints, third)))
+    known, unknown, told = store.deserialize_cdr(raw, FORECAST.type).status
     assert {pair.key: pair.value for pair in known.values} == {
         "remaining_cycles": "1000000",
         "remaining_hours": "277.5",
     }
     assert not unknown.values
+    assert told.message == Answer.KNOWN.value
+    values = {pair.key: pair.value for pair in told.values}
+    assert [values[f"{share}_hours"] for share in ("p10", "p50", "p90")] == ["1", "2", "3"]
+    assert (values["clearance_p90_m"], values["measurements"]) == ("3", "2")
 
 
 def test_diagnostics_are_the_monitors_status(store: Any) -> None:

@@ -1,0 +1,158 @@
+"""The forecast as gait cycles come in: renewed once a minute of their stamps, or when something is new."""
+
+from collections.abc import Callable, Sequence
+
+import attrs
+import numpy as np
+
+from leg_wear_monitor.mechanism.arrays import Floats
+from leg_wear_monitor.mechanism.spec import Mechanism
+from leg_wear_monitor.monitor.belief import Belief, believe
+from leg_wear_monitor.monitor.forecast import JointForecast, JointNow, forecast_joint, life_shapes
+from leg_wear_monitor.monitor.forecast_config import Forecasting
+from leg_wear_monitor.monitor.growth import GrowthWindow, extended, growth_rate
+from leg_wear_monitor.monitor.ledger_entry import JointWear, Measurement
+from leg_wear_monitor.monitor.measure import Finding, looks_of, measure
+from leg_wear_monitor.twin.figures import CycleFigures
+
+RENEWED_NS = 60_000_000_000
+
+
+@attrs.define
+class ForecastState:
+    """What changes; every value is immutable, so a shallow copy is a snapshot.
+
+    Attributes
+    ----------
+    growth : tuple of GrowthWindow
+    beliefs : tuple of Belief
+    last : tuple of JointForecast
+        Empty before the first.
+    stamp_ns : int
+        Of the last.
+    """
+
+    growth: tuple[GrowthWindow, ...]
+    beliefs: tuple[Belief, ...]
+    last: tuple[JointForecast, ...] = ()
+    stamp_ns: int = 0
+
+
+class Forecaster:
+    """Forecasts all loose joints.
+
+    Parameters
+    ----------
+    mechanism : Mechanism
+        As the configuration wants it.
+    settings : Forecasting
+    measurements : sequence of Measurement
+        Of the ledger.
+    replaced_ns : sequence of int
+        When each joint's part was replaced, 0 if it never was.
+
+    Raises
+    ------
+    ConfigError
+        For a life that cannot be used.
+    """
+
+    def __init__(
+        self,
+        mechanism: Mechanism,
+        settings: Forecasting,
+        measurements: Sequence[Measurement],
+        replaced_ns: Sequence[int],
+    ) -> None:
+        self._settings, self._loose = settings, mechanism.loose
+        self._fresh_m = [mechanism.clearances[joint].radial_clearance for joint in mechanism.loose]
+        self._shapes = life_shapes(settings.life, mechanism.loose)
+        self._measurements = list(measurements)
+        joints = zip(self._loose, self._fresh_m, replaced_ns, strict=True)
+        beliefs = tuple(
+            believe(settings, fresh, looks_of(measurements, joint, when)) for joint, fresh, when in joints
+        )
+        self.state = ForecastState(tuple(GrowthWindow() for _ in self._loose), beliefs)
+
+    def after(
+        self, figures: CycleFigures, wear_m: Floats, limits_m: Sequence[float], is_valid: Callable[[], bool]
+    ) -> tuple[JointForecast, ...]:
+        """Forecasts after a gait cycle: new ones if it is time, else the last.
+
+        Parameters
+        ----------
+        figures : CycleFigures
+        wear_m : (k,) array
+            What the twin has counted for each part.
+        limits_m : sequence of float
+            Of the mean clearances.
+        is_valid : callable
+            Whether the model holds for what the leg does.
+        """
+        state = self.state
+        state.growth = tuple(
+            extended(window, float(growth), figures.moving_s, self._settings.window_cycles)
+            for window, growth in zip(state.growth, figures.growth_mean_m, strict=True)
+        )
+        if not state.last or not 0 <= figures.stamp_ns - state.stamp_ns < RENEWED_NS:
+            state.stamp_ns = figures.stamp_ns
+            valid = is_valid()
+            state.last = tuple(
+                self._forecast(k, float(wear_m[k]), limits_m[k], valid) for k in range(len(self._loose))
+            )
+        return state.last
+
+    def replaced(self, joint: str) -> None:
+        """A joint's part is new: nothing is known of it."""
+        k, state = self._loose.index(joint), self.state
+        new = believe(self._settings, self._fresh_m[k])
+        state.growth = (*state.growth[:k], GrowthWindow(), *state.growth[k + 1 :])
+        self._believe(k, new)
+
+    def measured(
+        self,
+        wear: JointWear,
+        *,
+        clearance_m: float,
+        sigma_m: float,
+        stamp_ns: int,
+        who: str,
+        kept_ns: int = 0,
+        accept: bool = False,
+    ) -> Finding:
+        """Take in a measured clearance; parameters as in `measure`."""
+        k = self._loose.index(wear.name)
+        found = measure(
+            self._settings,
+            self._fresh_m[k],
+            wear,
+            self._measurements,
+            clearance_m=clearance_m,
+            sigma_m=sigma_m,
+            stamp_ns=stamp_ns,
+            who=who,
+            kept_ns=kept_ns,
+            accept=accept,
+        )
+        self._measurements.append(found.measurement)
+        self._believe(k, found.after)
+        return found
+
+    def _believe(self, k: int, belief: Belief) -> None:
+        beliefs = self.state.beliefs
+        self.state.beliefs = (*beliefs[:k], belief, *beliefs[k + 1 :])
+        self.state.last = ()
+
+    def _forecast(self, k: int, wear_m: float, limit_m: float, valid: bool) -> JointForecast:
+        window = self.state.growth[k]
+        rate = growth_rate(window)
+        now = JointNow(
+            fresh_m=self._fresh_m[k],
+            wear_m=wear_m,
+            limit_m=limit_m,
+            growth_m=rate.per_cycle_m if rate else None,
+            growth_error_m=rate.error_m if rate else 0.0,
+            cycle_s=float(np.mean(window.moving_s)),
+            valid=valid,
+        )
+        return forecast_joint(now, self.state.beliefs[k], self._settings, self._shapes[k])

@@ -1,0 +1,73 @@
+"""`measure`: a clearance into the ledger, and what it is told."""
+
+import sqlite3
+from contextlib import closing
+
+import attrs
+import numpy as np
+import pytest
+
+from leg_wear_monitor.mechanism.loader import load_mechanism
+from leg_wear_monitor.monitor.book import open_ledger
+from leg_wear_monitor.monitor.config import MonitorConfig
+from leg_wear_monitor.monitor.ledger_entry import Entry, JointWear
+
+pytestmark = pytest.mark.plain
+
+
+@pytest.fixture
+def ledger(tmp_path):
+    """A ledger of the default leg whose joints have opened by 60 µm."""
+    path = tmp_path / "wear.ledger"
+    leg, config = load_mechanism("bionic_leg"), MonitorConfig()
+    kept = open_ledger(leg, attrs.evolve(config, ledger=attrs.evolve(config.ledger, path=str(path))))
+    joints = tuple(JointWear(name, np.full((2, 720), 3e-5), 4000, 4000.0) for name in leg.loose)
+    kept.keep(Entry(stamp_ns=10**9, joints=joints, totals={"cycles": 4e3, "moving_s": 4e3}), closed=True)
+    kept.close()
+    return path
+
+
+def rows(path):
+    with closing(sqlite3.connect(path)) as db:
+        return db.execute("SELECT joint, clearance_m, wear_m, cycles, counts FROM measurement").fetchall()
+
+
+def test_a_measurement_is_kept_and_explained(run, ledger):
+    result = run("measure", "A", "0.42", "--sigma", "0.005", "--ledger", str(ledger))
+    assert (result.exit_code, result.stderr) == (0, "")
+    first, second = result.stdout.splitlines()
+    assert first == "A: 0.42 mm ± 0.005 mm, 4000 gait cycles after it was new"
+    assert second.startswith("the wear coefficient is 1.9")
+    assert rows(ledger) == [("A", pytest.approx(4.2e-4), pytest.approx(6e-5), 4000, 1)]
+
+
+def test_a_contradiction_ends_with_findings_and_leaves_wear_as_it_is(run, ledger):
+    result = run("measure", "G", "1.2", "--sigma", "0.005", "--ledger", str(ledger))
+    assert result.exit_code == 1
+    assert "contradicts the model" in result.stdout
+    assert [row[-1] for row in rows(ledger)] == [0]
+    assert run("measure", "G", "1.2", "--sigma", "0.005", "--ledger", str(ledger), "--accept").exit_code == 1
+    assert [row[-1] for row in rows(ledger)] == [0, 1]
+
+
+@pytest.mark.parametrize(
+    ("arguments", "fault"),
+    [
+        (("Z", "0.4", "--sigma", "0.01"), "'Z' is no loose joint, expected one of A, B, G, I, J"),
+        (("A", "-1", "--sigma", "0.01"), "No such option"),
+        (("A", "0.4", "--sigma", "0"), "0 is not above 0 mm"),
+        (("A", "400", "--sigma", "0.01"), "400 mm is not above 0 and below 100 mm"),
+    ],
+)
+def test_what_cannot_be_is_refused_in_one_line(run, ledger, arguments, fault):
+    result = run("measure", *arguments, "--ledger", str(ledger))
+    assert result.exit_code == 2
+    assert len(result.stderr.splitlines()) == 1
+    assert fault in result.stderr
+    assert rows(ledger) == []
+
+
+def test_a_ledger_has_to_be_named(run):
+    result = run("measure", "A", "0.4", "--sigma", "0.01")
+    assert result.exit_code == 2
+    assert "no ledger is named" in result.stderr

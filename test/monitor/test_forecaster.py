@@ -1,0 +1,81 @@
+"""The forecast in the monitor: when it is renewed, what a part and a measurement change, over new starts."""
+
+import attrs
+import numpy as np
+import pytest
+
+from leg_wear_monitor import LegWearError
+from leg_wear_monitor.monitor.forecast import Answer
+from leg_wear_monitor.monitor.forecast_config import Forecasting
+from leg_wear_monitor.monitor.forecaster import Forecaster
+from leg_wear_monitor.twin.figures import CycleFigures
+
+SECOND = 10**9
+LIMITS = [6e-4] * 5
+
+
+def cycle(second, growth=2e-11):
+    """A gait cycle's figures that end at a second, as far as the forecast looks at them."""
+    zeros = {field.name: 0 for field in attrs.fields(CycleFigures)}
+    wobble = growth * (1.0 + 0.1 * np.sin(1.7 * second + np.arange(5.0)))
+    return CycleFigures(**(zeros | {"stamp_ns": second * SECOND, "moving_s": 1.0, "growth_mean_m": wobble}))
+
+
+def walked(forecaster, seconds, worn=0.0, valid=True):
+    """Forecasts after each second."""
+    wear = np.full(5, worn)
+    return [forecaster.after(cycle(s), wear, LIMITS, lambda: valid) for s in seconds]
+
+
+@pytest.fixture
+def forecaster(leg):
+    return Forecaster(leg, Forecasting(), (), [0] * 5)
+
+
+@pytest.mark.plain
+def test_a_forecast_is_renewed_once_a_minute(forecaster):
+    told = walked(forecaster, range(1, 125))
+    renewed = [i for i in range(1, len(told)) if told[i] is not told[i - 1]]
+    assert renewed == [60, 120]
+    assert [one.answer for one in told[0]] == [Answer.NOT_ENOUGH_DATA] * 5
+    assert [one.answer for one in told[-1]] == [Answer.KNOWN] * 5
+    assert told[-1][0].cycles.p50 == pytest.approx(1.5e7, rel=0.05)
+
+
+@pytest.mark.plain
+def test_a_stamp_that_goes_back_renews_it_too(forecaster):
+    told = walked(forecaster, [*range(1000, 1030), *range(5, 10)])
+    assert told[29] is not told[30]
+
+
+@pytest.mark.plain
+def test_outside_validity_is_an_answer(forecaster):
+    walked(forecaster, range(1, 60))
+    assert walked(forecaster, [200], valid=False)[0][0].answer is Answer.OUTSIDE_VALIDITY
+
+
+@pytest.mark.plain
+def test_a_replaced_part_is_not_known(forecaster):
+    walked(forecaster, range(1, 80))
+    forecaster.replaced("G")
+    (told,) = walked(forecaster, [80])
+    assert [one.answer is Answer.NOT_ENOUGH_DATA for one in told] == [False, False, True, False, False]
+
+
+def test_the_monitor_forecasts_and_learns(leg, new_monitor, gait):
+    """Over a snapshot, too; wear so fast that it shows."""
+    monitor = new_monitor()
+    reports = monitor.update(gait(14.0))
+    first = reports.cycles[-1].joints[0].forecast
+    assert first.answer is Answer.NOT_ENOUGH_DATA
+    snapshot = monitor.snapshot()
+    found = monitor.measure("A", 3.05e-4, 2e-6, 10**18, "ann")
+    assert found.measurement.counts
+    told = monitor.update(gait(3.0, begin_s=14.0)).cycles[-1].joints[0].forecast
+    assert told.measurements == 1
+    assert told.clearance_m.p50 == pytest.approx(3.05e-4, abs=2e-6)
+    monitor.restore(snapshot)
+    again = monitor.update(gait(3.0, begin_s=14.0)).cycles[-1].joints[0].forecast
+    assert again == first
+    with pytest.raises(LegWearError, match="Z: no loose joint"):
+        monitor.measure("Z", 3e-4, 1e-6, 0, "ann")

@@ -20,6 +20,7 @@ from leg_wear_monitor.twin.tracker_state import (
     JUMP,
     LATE,
     NEWEST,
+    NEWEST_OF,
     RELEASED,
     RELEASED_KINDS,
     STRAY,
@@ -90,8 +91,24 @@ def arrive(model, state, stamp, kind, values):
         clock[CANDIDATE] = 0
     if stamp < clock[RELEASED] or (stamp == clock[RELEASED] and _was_released(state, stamp, kind)):
         count[DUPLICATES if _was_released(state, stamp, kind) else LATE] += 1
+        clock[NEWEST_OF + kind] = max(clock[NEWEST_OF + kind], stamp)  # from now on it is waited for
         return DROP_IT
     return KEEP_IT
+
+
+@kernel
+def horizon_of(model, clock):
+    """Stamp up to which samples have their order, a window behind the youngest.
+
+    One kind waits for the other as long as gaps are bridged: what one topic brings late, or after a burst of
+    the other, is not lost.
+    """
+    newest = clock[NEWEST]
+    horizon = newest
+    for kind in range(CRANK, TORQUE + 1):
+        if newest - clock[NEWEST_OF + kind] <= model.ns[BRIDGE]:
+            horizon = min(horizon, clock[NEWEST_OF + kind])
+    return horizon - model.ns[WINDOW]
 
 
 @kernel
@@ -111,4 +128,6 @@ def insert(state, stamp, kind, values):
     for c in range(3):
         state.arrival[i, c] = values[c]
     clock[WAITING] += 1
+    clock[NEWEST] = max(clock[NEWEST], stamp)
+    clock[NEWEST_OF + kind] = max(clock[NEWEST_OF + kind], stamp)
     return True

@@ -29,7 +29,8 @@ class TrackerSettings:
         A sample further from what was predicted is an outlier, beyond five standard deviations of the
         prediction.
     reorder_window_s : float
-        How much later than younger samples a sample may arrive.
+        How much later than younger samples of its kind a sample may arrive. A kind that comes later as a
+        whole is waited for, up to `bridge_limit_s`.
     lag_s : float
         How far the leg follows behind the newest sample, so that samples on both sides say how the crank
         moved; 0 means what the bandwidth asks for (0.8 / bandwidth_hz).

@@ -10,6 +10,7 @@ from leg_wear_monitor.twin.arrival import (
     LARGEST_TORQUE,
     arrive,
     find_fault,
+    horizon_of,
     insert,
 )
 from leg_wear_monitor.twin.crank_filter import begin_filter, update
@@ -48,6 +49,7 @@ from leg_wear_monitor.twin.tracker_state import (
     LAST_CRANK,
     MARK,
     NEWEST,
+    NEWEST_OF,
     OUT_SINCE,
     OUTLIERS,
     QUEUE,
@@ -62,7 +64,6 @@ from leg_wear_monitor.twin.tracker_state import (
     TORQUES,
     VELOCITY_OUTLIERS,
     WAITING,
-    WINDOW,
     P,
     X,
 )
@@ -197,7 +198,7 @@ def _take_new_time_base(state, steps, n):
         state.counts[JUMPS] += 1
         n = lose(state, stamp, LOST_BY_JUMP, steps, n)
         clock[RELEASED], clock[RELEASED_KINDS], clock[OUT_SINCE] = 0, 0, 0
-    clock[NEWEST], clock[CANDIDATE] = stamp, 0
+    clock[NEWEST], clock[CANDIDATE], clock[NEWEST_OF + CRANK], clock[NEWEST_OF + TORQUE] = stamp, 0, 0, 0
     insert(state, stamp, clock[CANDIDATE_KIND], state.candidate)
     return n
 
@@ -229,8 +230,7 @@ def track(model, state, stamp, kind, fault, angle, velocity, torque, work, steps
                 if not insert(state, stamp[i], kind[i], values):
                     count[DUPLICATES] += 1
                     break
-                clock[NEWEST] = max(clock[NEWEST], stamp[i])
-                horizon = clock[NEWEST] - model.ns[WINDOW]
+                horizon = horizon_of(model, clock)
             n = _release(model, state, horizon, released, target, steps, n)
             if decision == KEEP_IT:
                 break

@@ -5,10 +5,10 @@ from typing import NamedTuple
 import numpy as np
 
 from leg_wear_monitor.mechanism.arrays import Floats, Ints
-from leg_wear_monitor.twin.sample import FAULTS
+from leg_wear_monitor.twin.sample import FAULTS, KINDS
 from leg_wear_monitor.twin.settings import TrackerSettings
 
-ARRIVALS, QUEUE = 1024, 4096  # samples that may wait for their order, and for the leg
+ARRIVALS, QUEUE = 2048, 4096  # samples that may wait for their order, and for the leg
 
 # settings in ns
 WINDOW, LAG, BRIDGE, MARK, JUMP, ACQUIRE, STOP_HOLD, SETTLE, KNOT, RUN_UP = range(10)
@@ -33,13 +33,14 @@ COUNTS = FAULTY + len(FAULTS)
 # of this acquisition; last knot;
 # since when the leg is not followed; 1 where it is followed, 1 at rest; how long that rest is told; since
 # when it is slow; tracking state, since when the speed is within tolerance or out of it, and which of both;
-# direction; turns; how many velocities in a row agreed with the angles
+# direction; turns; how many velocities in a row agreed with the angles; youngest
+# stamp of each kind
 (
     NEWEST, RELEASED, RELEASED_KINDS, CANDIDATE, CANDIDATE_KIND, WAITING, HEAD, TAIL, LAST_CRANK, REFUSED,
     FILTER_TIME, ACQUIRING, LAST_KNOT, OUT_SINCE, FOLLOWED, RESTS, RESTED, SLOW_SINCE, TRACKING, SINCE,
-    WITHIN, DIRECTION, TURN_COUNT, CREDIT,
-) = range(24)  # fmt: skip
-CLOCKS = 24
+    WITHIN, DIRECTION, TURN_COUNT, CREDIT, NEWEST_OF,
+) = range(25)  # fmt: skip
+CLOCKS = NEWEST_OF + len(KINDS)
 
 # columns of a queued sample: torque; for a crank sample the time since the one before [s], whether that was
 # a bridged gap, prediction (3) and its covariance (6: 00 01 02 11 12 22), and for angle and velocity each:

@@ -105,6 +105,34 @@ def test_order_and_duplicates_within_the_window_change_nothing(gait, seed, late_
     assert tracker.state.counts[at.LATE] == 0
 
 
+def assert_all_but_the_first_are_used(steps: Told, tracker: CrankTracker, whole: Told, late_s: float) -> None:
+    """The motion is the same as far as it goes; torques are late until it is known that they come late."""
+    late = tracker.state.counts[at.LATE]
+    assert late <= 200.0 * late_s + 1
+    moves = steps.of(MOVE)
+    np.testing.assert_array_equal(moves, whole.of(MOVE)[: len(moves)])
+    looked = len(steps.of(LOOK)) + late
+    assert looked >= len(whole.of(LOOK)) - 2 * 200.0 * late_s - 2
+
+
+@pytest.mark.parametrize("late_s", [0.05, 0.3])
+def test_a_topic_that_comes_later_is_waited_for(gait, late_s):
+    samples = with_torque(gait(3.0))
+    arrival = samples["stamp_ns"] + np.where(samples["kind"] == TORQUE, round(late_s * S), 0)
+    tracker, whole = CrankTracker(TrackerSettings()), track([samples])
+    delayed = track([samples[np.argsort(arrival, kind="stable")]], tracker)
+    assert_all_but_the_first_are_used(delayed, tracker, whole, late_s)
+
+
+def test_topics_that_come_in_bursts_are_sorted(gait):
+    """A tenth of a second of the one, then of the other: as a busy node serves them."""
+    samples = with_torque(gait(3.0))
+    crank, torque = samples[samples["kind"] != TORQUE], samples[samples["kind"] == TORQUE]
+    bursts = [part for pair in zip(np.split(crank, 30), np.split(torque, 30), strict=True) for part in pair]
+    tracker = CrankTracker(TrackerSettings())
+    assert_all_but_the_first_are_used(track(bursts, tracker), tracker, track([samples]), 0.1)
+
+
 @settings(max_examples=30)
 @given(where=st.integers(0, 1000))
 def test_restored_it_goes_on_bit_for_bit(gait, where):

@@ -35,7 +35,8 @@ class TrackerSettings:
         How far the leg follows behind the newest sample, so that samples on both sides say how the crank
         moved; 0 means what the bandwidth asks for (0.8 / bandwidth_hz).
     bridge_limit_s : float
-        Gaps up to this are bridged, from `mark_gap_s` on counted; the crank is lost in longer ones.
+        Gaps up to this are bridged, and counted if they are longer than `mark_gap_s` and two periods of the
+        samples; the crank is lost in longer ones.
     mark_gap_s : float
     backward_jump_s : float
         Stamps that go back by more than this start a new time base.

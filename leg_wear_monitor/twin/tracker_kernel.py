@@ -52,6 +52,7 @@ from leg_wear_monitor.twin.tracker_state import (
     NEWEST_OF,
     OUT_SINCE,
     OUTLIERS,
+    PERIOD,
     QUEUE,
     RECEIVED,
     REFUSED,
@@ -71,6 +72,9 @@ from leg_wear_monitor.twin.tracker_state import (
 # velocities in a row that must agree with the angles of a moving crank before any is used: many drivers
 # send zeros, which are right at rest only
 _ENOUGH_CREDIT = 20
+_GAP_PERIODS = (
+    2  # of the crank's samples, shortest lately: a longer time between them is a gap, if it is long
+)
 _AT_LEAST_REFUSED = 5  # samples in a row, before the crank is held to be elsewhere
 
 
@@ -127,7 +131,9 @@ def _filter(model, state, stamp, angle, velocity, row):
     elif verdict > 0 and abs(state.filtered[1]) > 0.5 * model.real[SLOWEST]:
         clock[CREDIT] = min(clock[CREDIT] + 1, _ENOUGH_CREDIT)
     row[BRIDGED] = 0.0
-    if gap > model.ns[MARK]:
+    longest = _GAP_PERIODS * clock[PERIOD]
+    clock[PERIOD] = min(gap, clock[PERIOD] * 21 // 20 + 1) if clock[PERIOD] > 0 else gap
+    if gap > max(model.ns[MARK], longest) and longest > 0:
         row[BRIDGED] = 1.0
         count[GAPS] += 1
     return True

@@ -33,13 +33,13 @@ COUNTS = FAULTY + len(FAULTS)
 # of this acquisition; last knot;
 # since when the leg is not followed; 1 where it is followed, 1 at rest; how long that rest is told; since
 # when it is slow; tracking state, since when the speed is within tolerance or out of it, and which of both;
-# direction; turns; how many velocities in a row agreed with the angles; youngest
-# stamp of each kind
+# direction; turns; how many velocities in a row agreed with the angles; shortest
+# time between crank samples lately; youngest stamp of each kind
 (
     NEWEST, RELEASED, RELEASED_KINDS, CANDIDATE, CANDIDATE_KIND, WAITING, HEAD, TAIL, LAST_CRANK, REFUSED,
     FILTER_TIME, ACQUIRING, LAST_KNOT, OUT_SINCE, FOLLOWED, RESTS, RESTED, SLOW_SINCE, TRACKING, SINCE,
-    WITHIN, DIRECTION, TURN_COUNT, CREDIT, NEWEST_OF,
-) = range(25)  # fmt: skip
+    WITHIN, DIRECTION, TURN_COUNT, CREDIT, PERIOD, NEWEST_OF,
+) = range(26)  # fmt: skip
 CLOCKS = NEWEST_OF + len(KINDS)
 
 # columns of a queued sample: torque; for a crank sample the time since the one before [s], whether that was

@@ -149,6 +149,17 @@ def test_a_steady_gait_wears_as_a_steady_simulation(leg, twin, gait):
         assert cycle.moving_s == pytest.approx(cycle.duration_s, abs=2.0e-4)
 
 
+def test_the_leg_does_not_care_when_it_walks(twin, gait):
+    """Beyond the stepper's change of its time base too, at two instants a century apart."""
+    new, seen = twin.snapshot(), []
+    for start_ns in (12_345, 4_900_000_000_000_000_003):
+        twin.restore(new)
+        seen.append((twin.update(gait(9.5, start_ns=start_ns)), twin.depth))
+    for one, other in zip(seen[0][0].cycles, seen[1][0].cycles, strict=True):
+        np.testing.assert_array_equal(one.archard_j, other.archard_j)
+    np.testing.assert_array_equal(seen[0][1], seen[1][1])
+
+
 def test_growth_adds_up_to_the_clearance(twin, gait):
     fresh = twin.clearance_mean_m
     update = twin.update(gait(6.0))

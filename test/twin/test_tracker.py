@@ -226,6 +226,25 @@ def test_gaps_are_bridged_and_marked(gait, gap_s):
     assert not len(steps.of(LEAVE))
 
 
+@pytest.mark.parametrize("rate_hz", [10.0, 20.0])
+def test_slow_samples_are_no_gaps(gait, rate_hz):
+    tracker = CrankTracker(TrackerSettings())
+    time, angle, _, _ = track([gait(10.0, rate_hz)], tracker).motion_at()
+    np.testing.assert_allclose(angle, TURN * time + 0.5, atol=0.01)
+    assert tracker.state.counts[at.GAPS] == 0
+
+
+@given(shift_ns=st.integers(-START_NS + 1, 7_000_000_000_000_000_000))
+def test_the_motion_does_not_depend_on_when_it_is(gait, shift_ns):
+    """Bit for bit, from 1970 to 2240."""
+    samples = with_torque(gait(2.0))
+    moved = samples.copy()
+    moved["stamp_ns"] += shift_ns
+    here, there = track([samples]), track([moved])
+    np.testing.assert_array_equal(there.motion, here.motion)
+    np.testing.assert_array_equal(there.of(MOVE)[:, BEGIN], here.of(MOVE)[:, BEGIN] + shift_ns)
+
+
 def test_longer_gaps_are_not_made_up(gait):
     """The crank is lost and found again; the time between, and to be sure of it, is unmonitored."""
     samples = gait(6.0)

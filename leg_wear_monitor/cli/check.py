@@ -90,11 +90,12 @@ def _file(name: str) -> str:
 def _parameters(path: str) -> str:
     """Read the monitor's parameters, and say what they are set to."""
     from leg_wear_monitor.mechanism.loader import load_mechanism
-    from leg_wear_monitor.monitor.fitting import fitted
+    from leg_wear_monitor.monitor.fitting import fitted, twin_settings
     from leg_wear_monitor.monitor.parameter_file import load_config
 
     config = load_config(path)
     leg = fitted(load_mechanism(config.mechanism), config, path)
+    twin_settings(config, path)
     return (
         f"parameters of the monitor: {config.mechanism}, {', '.join(leg.loose)} loose, "
         f"{config.cadence.commanded_rpm:g} rpm, hardware {config.hardware_id}"

@@ -1,0 +1,42 @@
+"""``check`` on files of the monitor's parameters: what is in order, and one line for what is not."""
+
+import pytest
+
+BEGIN = "/**:\n  ros__parameters:\n    "
+
+BROKEN = [
+    ("limits: {clearance_m: -1.0}", ["limits.clearance_m", "-1.0", "not above 0 m", "at most 0.1"]),
+    ("limits: {clearance_m: 1}", ["limits.clearance_m", "whole number to ROS", "expected 1.0 [m]"]),
+    ("limits: {clearence_m: 0.1}", ["limits.clearence_m", "did you mean limits.clearance_m?"]),
+    ("loose_joints: [A, Q]", ["loose_joints", "'Q'", "bionic_leg.yaml", "A, B, C"]),
+    ("mechanism: bionic_log", ["bionic_log", "no mechanism of this name"]),
+    ("mechanism: andrews", ["mechanism", "'andrews'", "driven by a torque"]),
+    ("tracker: {reorder_window_s: 0.4, gap_limit_s: 0.3}", ["tracker.reorder_window_s", "0.4 s", "0.3 s"]),
+    ("mechanism: [", ["not YAML", "line 3"]),
+]
+
+
+@pytest.mark.plain
+@pytest.mark.parametrize(("text", "said"), BROKEN, ids=[text for text, _ in BROKEN])
+def test_a_broken_parameter_file_is_one_line(run, complaints, tmp_path, text, said):
+    (tmp_path / "monitor.yaml").write_text(BEGIN + text)
+    result = run("check", "monitor.yaml")
+    assert result.exit_code == 2
+    assert result.stdout == ""
+    (line,) = complaints(result)
+    for part in ["error: ", *said]:
+        assert part in line
+    assert line.startswith("error: monitor.yaml: ") or "bionic_log" in line
+
+
+@pytest.mark.plain
+def test_a_parameter_file_in_order_is_told_in_one_line(run, tmp_path):
+    (tmp_path / "mine.yaml").write_text(
+        BEGIN + "{hardware_id: leg-7, loose_joints: [G], cadence.commanded_rpm: -30.0}"
+    )
+    result = run("check", "mine.yaml")
+    assert (result.exit_code, result.stderr) == (0, "")
+    (line,) = result.stdout.splitlines()
+    assert line.startswith("mine.yaml")
+    for part in ("bionic_leg, G loose", "-30 rpm", "leg-7"):
+        assert part in line

@@ -1,0 +1,205 @@
+"""The live node under load: what is lost, what it takes, how long a report takes.
+
+python benchmarks/live.py [--legs 1] [--rate-hz 1000] [--seconds 20] [--joints A,B,G,I,J]
+
+Each leg is a monitor in a process and a namespace of its own; one more process sends the joint states and
+the torque of all legs, a recorded walk again and again; this one listens to the predicted torque.
+"""
+
+import argparse
+import os
+import struct
+import subprocess
+import sys
+import threading
+import time
+from pathlib import Path
+
+import numpy as np
+import rclpy
+from diagnostic_msgs.msg import DiagnosticArray
+from geometry_msgs.msg import WrenchStamped
+from rclpy.node import Node
+from rclpy.qos import QoSProfile, ReliabilityPolicy
+from rclpy.serialization import serialize_message
+from sensor_msgs.msg import JointState
+
+from leg_wear_monitor.gait.config import EncoderConfig, TorqueSensorConfig
+from leg_wear_monitor.gait.leg import SyntheticLeg
+from leg_wear_monitor.gait.sensors import readings
+from leg_wear_monitor.ros.publisher_config import PublisherConfig
+from leg_wear_monitor.ros.running import spin
+from leg_wear_monitor.ros.sensor_messages import sensor_message
+from leg_wear_monitor.twin.sample import CRANK
+
+LOOP_S = 8  # of walking that is sent again and again; whole gait cycles, with an angle that wraps
+STAMP = slice(4, 12)  # of a header in CDR
+BEST_EFFORT = QoSProfile(depth=200, reliability=ReliabilityPolicy.BEST_EFFORT)
+
+
+def recorded(rate_hz: float) -> list[tuple[float, int, bytes]]:
+    """When [s], which topic, which bytes: a walk at 60 rpm."""
+    config = PublisherConfig(
+        duration_s=float(LOOP_S),
+        further_joints=tuple(f"joint_{i}" for i in range(6)),
+        encoder=EncoderConfig(rate_hz=rate_hz, wrapped=True),
+        torque_sensor=TorqueSensorConfig(rate_hz=rate_hz),
+    )
+    walk = readings(SyntheticLeg(config), config)
+    return [(one.taken_s, one.kind, serialize_message(sensor_message(one, 0, config))) for one in walk]
+
+
+def publish(legs: int, rate_hz: float, seconds: float) -> None:
+    """Send the walk to all legs in step with the clock, once all listen; print how many messages each."""
+    walk = recorded(rate_hz)
+    rclpy.init()
+    node = Node("walkers")
+    topics = [
+        {
+            kind: node.create_publisher(message, f"leg{leg}/{name}", BEST_EFFORT)
+            for kind, message, name in (
+                (CRANK, JointState, "joint_states"),
+                (1 - CRANK, WrenchStamped, "drive_torque"),
+            )
+        }
+        for leg in range(legs)
+    ]
+    while not all(one.get_subscription_count() for topic in topics for one in topic.values()):
+        time.sleep(0.05)
+    began_ns, began, sent = time.time_ns(), time.monotonic(), 0
+    for turn in range(int(np.ceil(seconds / LOOP_S))):
+        for taken_s, kind, raw in walk:
+            at = turn * LOOP_S + taken_s
+            if at > seconds:
+                break
+            if (wait := began + at - time.monotonic()) > 0.0:
+                time.sleep(wait)
+            stamp = struct.pack("<iI", *divmod(began_ns + round(at * 1e9), 1_000_000_000))
+            for topic in topics:
+                topic[kind].publish(raw[: STAMP.start] + stamp + raw[STAMP.stop :])
+            sent += 1
+    print(sent, flush=True)
+    time.sleep(2.5)
+    rclpy.try_shutdown()
+
+
+class Listener(Node):
+    """Delays of predicted torques behind their stamps, and what the nodes say of themselves."""
+
+    def __init__(self, legs: int) -> None:
+        super().__init__("listener")
+        self.delays_s: list[list[float]] = [[] for _ in range(legs)]
+        self.told: list[dict[str, float]] = [{} for _ in range(legs)]
+        self.hardware = {f"leg{leg}": leg for leg in range(legs)}
+        deep = QoSProfile(depth=2000, reliability=ReliabilityPolicy.BEST_EFFORT)
+        for leg in range(legs):
+            topic, delays = f"leg{leg}/leg_wear_monitor/predicted_torque", self.delays_s[leg]
+            self.create_subscription(
+                WrenchStamped, topic, lambda raw, delays=delays: self.hear(raw, delays), deep, raw=True
+            )
+        self.create_subscription(DiagnosticArray, "/diagnostics", self.hear_diagnostics, 50)
+
+    def hear(self, raw: bytes, delays: list[float]) -> None:
+        seconds, rest = struct.unpack("<iI", raw[STAMP])
+        delays.append((time.time_ns() - seconds * 1_000_000_000 - rest) * 1e-9)
+
+    def hear_diagnostics(self, message: DiagnosticArray) -> None:
+        leg = self.hardware.get(message.status[0].hardware_id)
+        if leg is None:
+            return  # somebody else's in the same domain
+        told = self.told[leg]
+        for status in message.status:
+            if status.name.endswith((": load", ": topics", ": input")):
+                told.update((one.key, float(one.value)) for one in status.values)
+
+
+def used(pid: int) -> tuple[float, float]:
+    """Processor time [s] and resident memory [MB] of a process."""
+    ticks = Path(f"/proc/{pid}/stat").read_text().rsplit(")", 1)[1].split()[11:13]
+    pages = int(Path(f"/proc/{pid}/statm").read_text().split()[1])
+    return sum(map(int, ticks)) / os.sysconf("SC_CLK_TCK"), pages * os.sysconf("SC_PAGE_SIZE") / 1e6
+
+
+def monitors(legs: int, joints: str) -> list["subprocess.Popen[bytes]"]:
+    """A monitor a leg."""
+    command = [sys.executable, "-m", "leg_wear_monitor", "monitor", "--ros-args", "--log-level", "warn"]
+    loose = ",".join(f"'{joint}'" for joint in joints.split(","))
+    return [
+        subprocess.Popen(
+            [
+                *command,
+                "-r",
+                f"__ns:=/leg{leg}",
+                "-p",
+                f"hardware_id:=leg{leg}",
+                "-p",
+                f"loose_joints:=[{loose}]",
+            ]
+        )
+        for leg in range(legs)
+    ]
+
+
+def measure(
+    nodes: list["subprocess.Popen[bytes]"], source: "subprocess.Popen[str]"
+) -> list[list[tuple[float, ...]]]:
+    """Clock [s], processor time and memory of each node, every five seconds from the first message on."""
+    seen: list[list[tuple[float, ...]]] = [[] for _ in nodes]
+    while source.poll() is None:
+        for node, rows in zip(nodes, seen, strict=True):
+            rows.append((time.monotonic(), *used(node.pid)))
+        try:
+            source.wait(5.0)
+        except subprocess.TimeoutExpired:
+            continue
+    return seen
+
+
+def main() -> None:
+    parser = argparse.ArgumentParser(description=__doc__)
+    parser.add_argument("--legs", type=int, default=1)
+    parser.add_argument("--rate-hz", type=float, default=1000.0)
+    parser.add_argument("--seconds", type=float, default=20.0)
+    parser.add_argument("--joints", default="A,B,G,I,J")
+    args = parser.parse_args()
+    os.environ["ROS_AUTOMATIC_DISCOVERY_RANGE"] = "LOCALHOST"
+    os.environ["ROS_DOMAIN_ID"] = str(os.getpid() % 100)
+    rclpy.init()
+    listener = Listener(args.legs)
+    hearing = threading.Thread(target=spin, args=(listener,))
+    hearing.start()
+    nodes = monitors(args.legs, args.joints)
+    rest = [sys.executable, __file__, "publish", str(args.legs), str(args.rate_hz), str(args.seconds)]
+    source = subprocess.Popen(rest, stdout=subprocess.PIPE, text=True)
+    try:
+        while not all(listener.delays_s):
+            time.sleep(0.1)
+        seen = measure(nodes, source)
+        sent = int(source.stdout.read())
+        for leg, rows in enumerate(seen):
+            report(leg, sent, rows, listener)
+    finally:
+        for process in (*nodes, source):
+            process.terminate()
+            process.wait()
+        rclpy.try_shutdown()
+        hearing.join()
+
+
+def report(leg: int, sent: int, rows: list[tuple[float, ...]], listener: Listener) -> None:
+    told, delays = listener.told[leg], np.array(listener.delays_s[leg])
+    clock, busy, memory = np.array(rows).T
+    share = (busy[-2] - busy[0]) / (clock[-2] - clock[0])
+    median, p99 = 1e3 * np.percentile(delays, [50, 99])
+    print(
+        f"leg {leg}: sent {sent}, received {told['received']:.0f}, shed {told['shed_messages']:.0f}; "
+        f"{share:.1%} of a core; memory {memory[0]:.0f} to {memory[-1]:.0f} MB; "
+        f"stamp to report: median {median:.0f} ms, p99 {p99:.0f} ms of {len(delays)}"
+    )
+
+
+if __name__ == "__main__":
+    if sys.argv[1:2] == ["publish"]:
+        publish(int(sys.argv[2]), float(sys.argv[3]), float(sys.argv[4]))
+    else:
+        main()

@@ -31,6 +31,8 @@ class InputTopic:
         Full name of the topic, and its type.
     kind : int
         A code of `recording.cdr.TYPES`.
+    heard_ns : int
+        When its last message came, by the node's clock; 0 before the first.
     lost : int
         Messages that were sent and did not come through.
     incompatible : str
@@ -40,6 +42,7 @@ class InputTopic:
     name: str
     type: str
     kind: int
+    heard_ns: int = 0
     lost: int = 0
     incompatible: str = ""
 

@@ -92,7 +92,8 @@ class MonitorNode(ClosingNode):
         return self.get_clock().now().nanoseconds
 
     def _receive(self, topic: InputTopic, raw: bytes) -> None:
-        self._inbox.add(topic.kind, raw, self._now_ns())
+        topic.heard_ns = self._now_ns()
+        self._inbox.add(topic.kind, raw, topic.heard_ns)
 
     def _work(self) -> None:
         """Pass on what has come, a bounded part at a time."""
@@ -130,7 +131,7 @@ class MonitorNode(ClosingNode):
         status = (
             *self._monitor.status(),
             load_status(self._load, self._inbox),
-            topics_status(publishers),
+            topics_status(publishers, now_ns),
             recording_status(self._black_box),
         )
         self._outlets.send(outputs.DIAGNOSTICS, now_ns, self._messages.diagnostics(now_ns, status))

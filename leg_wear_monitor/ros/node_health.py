@@ -1,5 +1,6 @@
 """How the node itself does, for /diagnostics: can it keep up, what got lost on the way, is it recording."""
 
+import math
 from collections.abc import Iterable
 
 import attrs
@@ -12,6 +13,7 @@ from leg_wear_monitor.ros.inputs import InputTopic
 
 # From here on, the topics that have a message a sample are left out, so that the monitor can catch up.
 COARSE_FROM_S = 0.25
+SILENT_FROM_S = 1.0
 
 
 @attrs.define
@@ -58,19 +60,28 @@ def load_status(load: Load, inbox: Inbox) -> Status:
     return Status("load", level, message, values)
 
 
-def topics_status(topics: Iterable[tuple[InputTopic, int]]) -> Status:
-    """The input topics, each with the number of its publishers."""
+def topics_status(topics: Iterable[tuple[InputTopic, int]], now_ns: int) -> Status:
+    """The input topics, each with the number of its publishers.
+
+    The monitor below has no clock and does not see that nothing comes; here is one.
+    """
     messages, values, level = [], {}, Level.OK
     for topic, publishers in topics:
         short = topic.name.rsplit("/", 1)[-1]
+        silent_s = max(0, now_ns - topic.heard_ns) * 1.0e-9 if topic.heard_ns else math.nan
         values[f"{short}_publishers"] = float(publishers)
+        values[f"{short}_silent_s"] = silent_s
         values[f"{short}_lost_messages"] = float(topic.lost)
         if topic.incompatible:
-            messages.append(f"{topic.name}: {topic.incompatible}")
-            level = Level.ERROR
+            fault, at = topic.incompatible, Level.ERROR
+        elif silent_s > SILENT_FROM_S:
+            fault, at = "has fallen silent: nothing is monitored", Level.ERROR
         elif not publishers:
-            messages.append(f"{topic.name}: nobody publishes it")
-            level = max(level, Level.WARN)
+            fault, at = "nobody publishes it", Level.WARN
+        else:
+            continue
+        messages.append(f"{topic.name}: {fault}")
+        level = max(level, at)
     return Status("topics", level, "; ".join(messages) or "connected", values)
 
 

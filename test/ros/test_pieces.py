@@ -27,6 +27,7 @@ from leg_wear_monitor.ros.sensor_messages import sensor_message
 from leg_wear_monitor.twin.sample import CRANK, FAULTS, NO_FAULT, OUT_OF_RANGE, TORQUE, WRONG_TYPE
 
 START_NS = 1_700_000_000_000_000_000
+SECOND = 1_000_000_000
 CODES = {CRANK: cdr.JOINT_STATE, TORQUE: cdr.WRENCH_STAMPED}
 CRANK_FAULTS = [fault for fault in FAULTS if fault not in (NO_FAULT, OUT_OF_RANGE, WRONG_TYPE)]
 
@@ -118,10 +119,20 @@ def test_falling_behind_is_told_and_then_over() -> None:
 
 def test_topics_without_publishers_are_a_warning_and_misfits_an_error() -> None:
     topic = InputTopic("/left/joint_states", "sensor_msgs/msg/JointState", cdr.JOINT_STATE)
-    assert topics_status([(topic, 1)]).level is Level.OK
-    assert topics_status([(topic, 0)]).level is Level.WARN
+    assert topics_status([(topic, 1)], SECOND).level is Level.OK
+    assert topics_status([(topic, 0)], SECOND).level is Level.WARN
     topic.incompatible = "its reliability is less"
-    assert topics_status([(topic, 1)]).level is Level.ERROR
+    assert topics_status([(topic, 1)], SECOND).level is Level.ERROR
+
+
+def test_a_topic_that_falls_silent_is_an_error() -> None:
+    topic = InputTopic("/left/joint_states", "sensor_msgs/msg/JointState", cdr.JOINT_STATE)
+    topic.heard_ns = 10 * SECOND
+    spoken = topics_status([(topic, 1)], 11 * SECOND)
+    assert (spoken.level, spoken.values["joint_states_silent_s"]) == (Level.OK, 1.0)
+    silent = topics_status([(topic, 0)], 13 * SECOND)
+    assert (silent.level, silent.values["joint_states_silent_s"]) == (Level.ERROR, 3.0)
+    assert "silent" in silent.message
 
 
 def test_the_black_box_keeps_bytes_in_their_order(tmp_path: Path) -> None:

@@ -22,7 +22,7 @@ class Tracking(Enum):
 class Happening(Enum):
     """What may happen to the twin; the value is fit for a key."""
 
-    ACQUIRED = "acquired"  # the leg is (again) set in motion, journals centred, wear as it was
+    ACQUIRED = "acquired"  # the leg is (again) set in motion, wear as it was
     STOPPED = "stopped"
     MOVING = "moving"
     REVERSED = "reversed"

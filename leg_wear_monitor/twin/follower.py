@@ -4,10 +4,13 @@ from typing import NamedTuple
 
 import numpy as np
 
+from leg_wear_monitor.dynamics.clearance_contact import F_T
 from leg_wear_monitor.dynamics.clearance_run import INTERVALS, ClearanceStepper
 from leg_wear_monitor.dynamics.clearance_run import Snapshot as StepperSnapshot
+from leg_wear_monitor.dynamics.drive import steady_drive
 from leg_wear_monitor.dynamics.run import DONE, INVALID_DRIVE, PUSHED_THROUGH, STEP_TOO_SMALL, Setup
-from leg_wear_monitor.dynamics.tally import new_tally
+from leg_wear_monitor.dynamics.tally import TORQUE, new_tally
+from leg_wear_monitor.dynamics.touch import F_N
 from leg_wear_monitor.mechanism.arrays import Floats
 from leg_wear_monitor.mechanism.ideal import TURN
 from leg_wear_monitor.twin import steps as told
@@ -27,6 +30,7 @@ from leg_wear_monitor.twin.leg_state import (
     FAILED_NS,
     FILTERING,
     LOOKS,
+    MEAN_TORQUE,
     NUMBER,
     PIECE_BEGIN,
     PIECE_END,
@@ -41,6 +45,8 @@ from leg_wear_monitor.twin.leg_state import (
 from leg_wear_monitor.twin.load import FootLoad
 from leg_wear_monitor.twin.settings import TwinSettings
 from leg_wear_monitor.twin.steps import BEGIN, CODE, EXTRA, MOVE, TURNS, Steps
+
+_RUN_IN_S = 0.2
 
 _HAPPENINGS = {
     told.LOST_IN_GAP: Happening.LOST_IN_GAP,
@@ -138,22 +144,52 @@ class LegFollower:
         return SampleFigures(stamp, kind, angle, torque, seen.force[:m])
 
     def _start(self, steps: Steps, i: int) -> Event:
-        """Set the leg in motion where step i begins: journals centred, wear as it was."""
+        """Set the leg in motion where step i begins, wear as it was."""
         mark, stamp = self.state.mark, int(steps.what[i, BEGIN])
         angle, speed = steps.motion[i, :2]
-        self._stepper.init(float(angle), float(speed))
+        self.state.value[:] = 0.0
+        mark[BASE] = stamp - self._run_in(float(angle), float(speed))
         if mark[AFRESH]:
             mark[FAILED_NS] += stamp - mark[FAILED_AT]
-        for where in (BASE, PIECE_BEGIN, PIECE_END):
-            mark[where] = stamp
+        mark[PIECE_BEGIN] = mark[PIECE_END] = stamp
         for where in (AFRESH, ANCHORED, CUT, FILTERING, CYCLE_BEGIN, CYCLE_BRIDGED):
             mark[where] = 0
         mark[RUNNING], mark[TURNS_BEFORE] = 1, steps.what[i, TURNS]
         self.state.polynomial[:] = 0.0, angle, speed, 0.0, 0.0, 0.0, 0.0
-        self.state.value[:], self.state.force[:] = 0.0, 0.0
         clear_sums(self.state)
         clear_tally(self.tally)
         return Event(stamp, Happening.ACQUIRED)
+
+    def _run_in(self, angle: float, speed: float) -> int:
+        """Bring the leg to a crank angle [rad] at a speed [rad/s] from a little before, without wear.
+
+        Journals start centred, and their first impacts can be several times those of a gait: they must be
+        over when somebody looks.
+
+        Returns
+        -------
+        int
+            How long that took [ns].
+        """
+        stepper, depth = self._stepper, self._setup.surfaces.depth
+        intervals = round(_RUN_IN_S / stepper.model.interval)
+        worn, time = depth.copy(), intervals * stepper.model.interval
+        polynomial = steady_drive(angle - speed * time, speed)
+        stepper.init(polynomial[1], speed)
+        reached = stepper.advance(polynomial, 0.9 * time, self.tally)[0]
+        clear_tally(self.tally)
+        if reached == DONE:
+            reached = stepper.advance(polynomial, time, self.tally)[0]
+        depth[:] = worn
+        stepper.state.pending[:] = 0.0
+        if reached != DONE:  # so it goes on from centred journals, and says itself why it cannot
+            stepper.init(angle, speed)
+            self.state.force[:] = 0.0
+            return 0
+        sample = stepper.work.start
+        self.state.force[:] = np.hypot(sample[:, F_N], sample[:, F_T])
+        self.state.value[MEAN_TORQUE] = self.tally.drive_integral[TORQUE] / self.tally.time[0]
+        return round(1.0e9 * time)
 
     def _end_cycle(self, stamp: int, cycles: list[CycleFigures]) -> None:
         """Report the gait cycle that ends at a stamp, if it is a whole one; begin the next."""

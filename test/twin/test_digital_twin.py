@@ -160,6 +160,21 @@ def test_the_leg_does_not_care_when_it_walks(twin, gait):
     np.testing.assert_array_equal(seen[0][1], seen[1][1])
 
 
+def test_a_start_makes_no_impacts_that_a_gait_does_not(twin, gait):
+    """Wherever the crank is: the first impacts of centred journals are over, and have worn nothing."""
+    new, fresh, peaks = twin.snapshot(), twin.depth, []
+    usual = np.max([cycle.peak_force_n for cycle in twin.update(gait(12.0)).cycles], axis=0)
+    for phase in np.linspace(0.0, TURN, 12, endpoint=False):
+        twin.restore(new)
+        before = twin.update(gait(0.22, angle=lambda t, phase=phase: TURN * t + phase))
+        np.testing.assert_array_equal(twin.depth, fresh)
+        assert not before.cycles
+        twin.update(gait(0.6, angle=lambda t, phase=phase: TURN * t + phase)[44:])
+        peaks.append(twin.peak_force_n)
+    assert (np.max(peaks, axis=0) < 1.5 * usual).all()
+    assert (np.median(peaks, axis=0) < usual).all()
+
+
 def test_growth_adds_up_to_the_clearance(twin, gait):
     fresh = twin.clearance_mean_m
     update = twin.update(gait(6.0))

@@ -1,0 +1,61 @@
+"""docs/ros.md lists the gait publisher's parameters as they are declared; a script renews the table."""
+
+import re
+from pathlib import Path
+from typing import Any
+
+import pytest
+from ruamel.yaml import YAML
+
+from leg_wear_monitor.monitor.parameter_file import parse_config
+from leg_wear_monitor.monitor.parameters import Parameter, parameters_of, structured
+from leg_wear_monitor.ros.publisher_config import PublisherConfig
+from leg_wear_monitor.share import share_directory
+
+PAGE = Path(__file__).parents[2] / "docs" / "ros.md"
+TABLE = re.compile(r"(<!-- parameters -->\n).*?(<!-- end -->)", re.DOTALL)
+
+
+def cell(value: Any) -> str:
+    if isinstance(value, bool):
+        return str(value).lower()
+    return repr(list(value)) if isinstance(value, tuple) else str(value)
+
+
+def row(one: Parameter) -> str:
+    cells = (f"`{one.name}`", one.type, one.unit, cell(one.default), one.bounds, one.description)
+    return f"| {' | '.join(cells)} |"
+
+
+def renewed(page: str) -> str:
+    head = ["| name | type | unit | default | bounds | what it is |", "|---|---|---|---|---|---|"]
+    table = "\n".join([*head, *map(row, parameters_of(PublisherConfig).values()), ""])
+    return TABLE.sub(lambda found: found[1] + table + found[2], page)
+
+
+@pytest.mark.plain
+def test_the_page_lists_every_parameter_as_it_is_declared() -> None:
+    page = PAGE.read_text(encoding="utf-8")
+    assert renewed(page) == page
+
+
+def flat(mapping: dict[str, Any], prefix: str = "") -> dict[str, Any]:
+    values: dict[str, Any] = {}
+    for key, value in mapping.items():
+        values |= flat(value, f"{prefix}{key}.") if isinstance(value, dict) else {prefix + key: value}
+    return values
+
+
+@pytest.mark.plain
+def test_the_demo_s_parameters_fit_both_nodes() -> None:
+    path = share_directory() / "config" / "demo.yaml"
+    document = YAML(typ="safe", pure=True).load(path.read_text(encoding="utf-8"))
+    monitor = parse_config(document, path.name, "/demo/leg_wear_monitor")
+    leg = structured(PublisherConfig, flat(document["/**/gait_publisher"]["ros__parameters"]), path.name)
+    assert monitor.wear_acceleration == leg.wear_acceleration == 1.0e3
+    fastest = max(abs(speed - monitor.cadence.commanded_rpm) for speed in leg.pace.speeds_rpm)
+    assert 0.0 < fastest < monitor.cadence.tolerance_rpm
+
+
+if __name__ == "__main__":
+    PAGE.write_text(renewed(PAGE.read_text(encoding="utf-8")), encoding="utf-8")

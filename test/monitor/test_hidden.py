@@ -1,0 +1,172 @@
+"""Clearances from encoders: what is put into angles is found again, and what cannot be seen is said."""
+
+import numpy as np
+import pytest
+
+from leg_wear_monitor import ConfigError
+from leg_wear_monitor.dynamics.full_run import FullRun
+from leg_wear_monitor.dynamics.simulation import prepare
+from leg_wear_monitor.dynamics.tally import new_tally
+from leg_wear_monitor.mechanism.arrays import body_names
+from leg_wear_monitor.mechanism.ideal import TURN
+from leg_wear_monitor.monitor.hidden import (
+    HiddenClearance,
+    Observable,
+    known_before,
+    observability,
+    with_clearances,
+    worn_joint,
+)
+from leg_wear_monitor.twin.joint_angles import PHASES, angle_model, contact_shape, design
+
+SENSORS = ("B", "G", "I")  # hip, knee, ankle
+FRESH = [3e-4] * 5
+ERRORS = np.array([1e-3, 0.01, -0.02, 0.015, 2e-3, -1e-3, 3e-3])  # crank's offset, offsets, scales
+
+
+@pytest.fixture(scope="module")
+def model(leg):
+    return angle_model(leg, SENSORS)
+
+
+@pytest.fixture(scope="module")
+def shape():
+    """Directions that turn with the crank, each joint's in its own way."""
+    phase = (np.arange(PHASES) + 0.5) * (TURN / PHASES)
+    angle = np.stack([a * np.sin(phase + a) + b for a, b in ((1, 0), (2, 1), (3, 4), (1, 2), (2, 5))], axis=1)
+    return np.stack([np.cos(angle), np.sin(angle)], axis=2)
+
+
+def read(model, shape, clearance, errors=ERRORS, noise=0.0, seed=0, scatter=0.05):
+    """A cycle's samples of encoders on a leg that obeys the model, but for scatter of its clearances."""
+    random = np.random.default_rng(seed)
+    crank = (np.arange(PHASES) + 0.5) * (TURN / PHASES)
+    seen = np.asarray(clearance) * (1.0 + scatter * random.standard_normal(len(clearance)))
+    deviation = design(model, shape) @ np.concatenate([seen, errors])
+    ideal = model.angle[len(model.angle) // PHASES // 2 :: len(model.angle) // PHASES]
+    return crank, ideal + deviation + noise * random.standard_normal(ideal.shape)
+
+
+def watched(model, shape, before, clearance, cycles=40, **more):
+    """Encoders watched over cycles."""
+    hidden = HiddenClearance(model, shape, before, shape_cycles=10**9)
+    for seed in range(cycles):
+        hidden.add(*read(model, shape, clearance, seed=seed, **more))
+    return hidden
+
+
+WORN = [3e-4, 3.3e-4, 4.5e-4, 3e-4, 3.1e-4]
+
+
+@pytest.mark.plain
+@pytest.mark.parametrize("noise", [0.0, 1e-4, 1e-3])
+def test_clearances_and_the_encoders_errors_are_found_at_once(model, shape, noise):
+    found = watched(model, shape, known_before(FRESH, 3e-4, 3), WORN, noise=noise).fused()
+    np.testing.assert_allclose(found.clearance_m, WORN, atol=1e-5 + 0.02 * noise)
+    np.testing.assert_allclose(found.mean[5:9], ERRORS[:4], atol=2e-4 + noise)
+    assert (found.sigma_m < 2e-5 + 0.02 * noise).all()
+
+
+@pytest.mark.plain
+def test_outliers_do_no_harm(model, shape):
+    hidden = HiddenClearance(model, shape, known_before(FRESH, 3e-4, 3))
+    for seed in range(30):
+        crank, angles = read(model, shape, WORN, seed=seed, noise=1e-4)
+        angles[seed::20] += 0.5
+        hidden.add(crank, angles)
+    np.testing.assert_allclose(hidden.fused().clearance_m, WORN, atol=2e-5)
+
+
+@pytest.mark.plain
+def test_more_cycles_make_it_surer(model, shape):
+    before = known_before(FRESH, 3e-4, 3)
+    few, many = (
+        watched(model, shape, before, WORN, cycles, noise=1e-3, scatter=0.3).alone().sigma_m
+        for cycles in (20, 160)
+    )
+    assert (many < 0.75 * few).all()
+
+
+@pytest.mark.plain
+def test_too_few_cycles_say_nothing(model, shape):
+    assert watched(model, shape, known_before(FRESH, 3e-4, 3), WORN, cycles=5).fused() is None
+
+
+@pytest.mark.plain
+def test_the_hip_alone_says_nothing_of_the_ankle(model, shape):
+    """What was known before stays, mean and deviation."""
+    seen = [word for word, _ in observability(design(model, shape), [0], 5)]
+    assert [word is Observable.NO for word in seen] == [False, False, False, True, True]
+    hidden = HiddenClearance(model, shape, known_before(FRESH, 2e-5, 3))
+    for seed in range(30):
+        crank, angles = read(model, shape, WORN, seed=seed)
+        angles[:, 1:] = np.nan
+        hidden.add(crank, angles)
+    found = hidden.fused()
+    np.testing.assert_allclose(found.clearance_m[3:], FRESH[3:], atol=1e-9)
+    np.testing.assert_allclose(found.sigma_m[3:], 2e-5, rtol=1e-3)
+
+
+@pytest.mark.plain
+def test_all_three_sensors_show_all_joints(model, shape):
+    assert {word for word, _ in observability(design(model, shape), [0, 1, 2], 5)} == {Observable.YES}
+
+
+@pytest.mark.plain
+def test_a_sensor_that_is_added_later_is_commissioned_by_what_is_known_then(model, shape):
+    hidden = HiddenClearance(model, shape, known_before(FRESH, 2e-4, 3))
+    for seed in range(30):
+        crank, angles = read(model, shape, WORN, seed=seed)
+        angles[:, 2] = np.nan  # no ankle yet
+        hidden.add(crank, angles)
+    without = hidden.fused()
+    later = watched(model, shape, without, WORN).fused()
+    assert (later.sigma_m[3:] < 0.3 * without.sigma_m[3:]).all()
+    np.testing.assert_allclose(later.clearance_m, WORN, atol=2e-5)
+    assert later.mean[8] == pytest.approx(ERRORS[3], abs=1e-3)
+
+
+@pytest.mark.plain
+def test_a_worn_joint_is_named_and_a_sound_leg_is_left_alone(model, shape):
+    held = watched(model, shape, known_before(FRESH, 5e-6, 3), FRESH, noise=1e-4).fused()
+    expected = with_clearances(held, FRESH, 1e-4)
+    for k in range(5):
+        worn = [4.5e-4 if j == k else 3e-4 for j in range(5)]
+        assert worn_joint(expected, watched(model, shape, expected, worn, noise=1e-4).fused()) == k
+    assert worn_joint(expected, watched(model, shape, expected, FRESH, noise=1e-4).fused()) is None
+
+
+@pytest.mark.plain
+def test_fusion_weighs_by_covariance(model, shape):
+    """A sure prediction moves little, an unsure one takes over what is seen."""
+    sure = watched(model, shape, known_before(FRESH, 1e-7, 3), WORN, scatter=0.2).fused()
+    unsure = watched(model, shape, known_before(FRESH, 1e-3, 3), WORN, scatter=0.2).fused()
+    assert sure.clearance_m[2] == pytest.approx(FRESH[2], abs=1e-6)
+    assert unsure.clearance_m[2] == pytest.approx(WORN[2], abs=3e-5)
+
+
+def test_a_leg_in_full_coordinates_shows_its_worn_knee(leg, model):
+    """Its angles come from its own equations of motion, not from the model that looks at them."""
+    setup, names = prepare(leg), body_names(leg)
+    setup.contacts.clearance[setup.loose.index("G")] = 4.5e-4
+    run, tally = FullRun(setup, tolerance_m=1e-9), new_tally(len(leg.joints))
+    run.advance(1.0, tally)
+    hidden = HiddenClearance(model, contact_shape(leg, np.array(FRESH)), known_before(FRESH, 1e-4, 3))
+    random, pairs = np.random.default_rng(1), [[names.index(b) for b in leg.sides(j)] for j in SENSORS]
+    for cycle in range(20):
+        turned = []
+        for sample in range(200):
+            run.advance(1.0 + cycle + (sample + 1) / 200.0, tally)
+            turned.append(run.q[:, 2].copy())
+        angle = np.array(turned)
+        seen = np.stack([angle[:, j] - angle[:, b] for b, j in pairs], axis=1)
+        hidden.add(angle[:, 1], seen + 1e-4 * random.standard_normal(seen.shape))
+    found = hidden.fused()
+    assert worn_joint(known_before(FRESH, 1e-4, 3), found) == setup.loose.index("G")
+    assert found.clearance_m[2] == pytest.approx(4.5e-4, abs=8e-5)
+
+
+@pytest.mark.plain
+def test_a_sensor_has_to_sit_on_a_revolute_joint(leg):
+    with pytest.raises(ConfigError, match="'Z' is no revolute joint"):
+        angle_model(leg, ("Z",))

@@ -13,8 +13,8 @@ if TYPE_CHECKING:
     from leg_wear_monitor.dynamics.simulation import simulate
     from leg_wear_monitor.mechanism.loader import load_mechanism
     from leg_wear_monitor.mechanism.spec import Mechanism
-    from leg_wear_monitor.monitor.book import open_ledger
     from leg_wear_monitor.monitor.config import MonitorConfig
+    from leg_wear_monitor.monitor.ledger import open_ledger
     from leg_wear_monitor.monitor.parameter_file import load_config
     from leg_wear_monitor.monitor.wear_monitor import WearMonitor
     from leg_wear_monitor.recording.replay import ReplayResult, replay
@@ -27,7 +27,7 @@ _HOME = {
     "WearMonitor": "monitor.wear_monitor",
     "load_config": "monitor.parameter_file",
     "load_mechanism": "mechanism.loader",
-    "open_ledger": "monitor.book",
+    "open_ledger": "monitor.ledger",
     "replay": "recording.replay",
     "simulate": "dynamics.simulation",
 }

@@ -61,8 +61,8 @@ def _measured(
     import attrs
 
     from leg_wear_monitor.mechanism.loader import load_mechanism
-    from leg_wear_monitor.monitor.book import open_ledger
     from leg_wear_monitor.monitor.fitting import fitted
+    from leg_wear_monitor.monitor.ledger import open_ledger
     from leg_wear_monitor.monitor.ledger_entry import new_part
     from leg_wear_monitor.monitor.measure import measure as judge
     from leg_wear_monitor.monitor.parameter_file import load_config

@@ -8,11 +8,8 @@ from numpy.typing import NDArray
 
 from leg_wear_monitor.errors import LegWearError
 from leg_wear_monitor.mechanism.arrays import Floats, Ints
-from leg_wear_monitor.mechanism.spec import Mechanism
 from leg_wear_monitor.monitor.alarms import Alarm, Level
-from leg_wear_monitor.monitor.binding import binding_of
-from leg_wear_monitor.monitor.config import MonitorConfig
-from leg_wear_monitor.monitor.fitting import fitted
+from leg_wear_monitor.monitor.config import LedgerFile
 from leg_wear_monitor.monitor.ledger import Ledger
 from leg_wear_monitor.monitor.ledger_entry import (
     AlarmEvent,
@@ -23,29 +20,14 @@ from leg_wear_monitor.monitor.ledger_entry import (
     JointWear,
 )
 from leg_wear_monitor.monitor.reports import AlarmList, CycleReport
-from leg_wear_monitor.monitor.spans import NEIGHBOURS_NS, Spans, with_span
+from leg_wear_monitor.monitor.spans import NEIGHBOURS_NS, Spans, is_within, with_span
 from leg_wear_monitor.twin.digital_twin import DigitalTwin
 from leg_wear_monitor.twin.figures import SampleFigures
+from leg_wear_monitor.twin.sample import Samples
 
 POINT_S = 600.0  # of walking, between two points of the clearances' history
 
 _SUMS = ("moving_s", "standing_s", "bridged_s", "unmonitored_s")
-
-
-def open_ledger(mechanism: Mechanism, config: MonitorConfig) -> Ledger | None:
-    """The ledger that a configuration names, None if it names none.
-
-    Raises
-    ------
-    ConfigError
-        For parameters that do not fit the mechanism.
-    LedgerError
-        If it must not be continued.
-    """
-    if not config.ledger.path:
-        return None
-    binding = binding_of(fitted(mechanism, config), config)
-    return Ledger(config.ledger.path, binding, config.ledger.checkpoint_s)
 
 
 @attrs.frozen
@@ -59,13 +41,33 @@ class PartLife:
 
 @attrs.define
 class BookState:
-    """What changes; every value is immutable, so a shallow copy is a snapshot."""
+    """What changes; every value is immutable, so a shallow copy is a snapshot.
+
+    Attributes
+    ----------
+    cycles : int
+        Over all runs.
+    parts : tuple of PartLife
+    spans : Spans
+        Time that this run has counted.
+    point_due_s : float
+        Time in motion at which the history wants its next point.
+    cut_off_s : float or None
+        What an earlier run lost, until it is acknowledged.
+    skipped, skipped_s, skipped_ns : int, float, int
+        Samples left out since they are counted, their time, and the stamp of the last.
+    shown : mapping of str to (Level, bool)
+        Of the alarms, what the history has last.
+    """
 
     cycles: int
     parts: tuple[PartLife, ...]
     spans: Spans = ()
     point_due_s: float = 0.0
     cut_off_s: float | None = None
+    skipped: int = 0
+    skipped_s: float = 0.0
+    skipped_ns: int = 0
     shown: Mapping[str, tuple[Level, bool]] = attrs.field(factory=dict)
 
 
@@ -81,14 +83,14 @@ class Book:
     twin : DigitalTwin
         Its wear is set to that of the ledger.
     ledger : Ledger or None
-    checkpoint_s : float
-        Time between two entries.
+    settings : LedgerFile
     """
 
-    def __init__(self, twin: DigitalTwin, ledger: Ledger | None, checkpoint_s: float) -> None:
+    def __init__(self, twin: DigitalTwin, ledger: Ledger | None, settings: LedgerFile) -> None:
         self.ledger = ledger
         self._twin = twin
-        self._checkpoint_ns = int(checkpoint_s * 1.0e9)
+        self._checkpoint_ns = int(settings.checkpoint_s * 1.0e9)
+        self._counted = ledger.counted_ns if ledger and settings.skip_counted else np.zeros((0, 2), np.int64)
         self._tried_ns = 0
         entry = ledger.entry if ledger else None
         self._before = entry.totals if entry else {}
@@ -115,11 +117,31 @@ class Book:
         )
 
     @property
+    def unmonitored_s(self) -> float:
+        """Time in which the leg was not followed in this run, but for what earlier runs have counted."""
+        return max(0.0, self._twin.intake.unmonitored_s - self.state.skipped_s)
+
+    @property
     def totals(self) -> dict[str, float]:
         """Counters over all runs."""
-        intake = self._twin.intake
-        sums = {name: self._before.get(name, 0.0) + getattr(intake, name) for name in _SUMS}
+        intake, before = self._twin.intake, self._before
+        now = {name: getattr(intake, name) for name in _SUMS} | {"unmonitored_s": self.unmonitored_s}
+        sums = {name: before.get(name, 0.0) + value for name, value in now.items()}
         return {"cycles": float(self.state.cycles), **sums}
+
+    def not_counted(self, samples: Samples) -> Samples:
+        """Samples but those of a time whose wear is in the ledger from an earlier run."""
+        if not len(self._counted):
+            return samples
+        known = is_within(samples["stamp_ns"], self._counted)
+        if not known.any():
+            return samples
+        stamps = np.concatenate([[self.state.skipped_ns], samples["stamp_ns"][known]])
+        steps = np.diff(stamps)
+        self.state.skipped += len(steps)
+        self.state.skipped_s += 1.0e-9 * float(steps[(steps > 0) & (steps <= NEIGHBOURS_NS)].sum())
+        self.state.skipped_ns = int(stamps[-1])
+        return np.asarray(samples[~known])
 
     @property
     def not_kept_s(self) -> float:

@@ -56,7 +56,7 @@ class InputHealth:
     Attributes
     ----------
     duration_s : float
-        NaN if stamps did not advance.
+        NaN if that is not known, or stamps did not advance.
     crank_rate_hz, torque_rate_hz : float
         Of samples that were used.
     bad_share : float
@@ -76,7 +76,7 @@ class InputHealth:
     stuck_torque_share: float
 
 
-def input_health(before: Intake, after: Intake, torque: TorqueRange) -> InputHealth:
+def input_health(before: Intake, after: Intake, torque: TorqueRange, is_whole: bool = True) -> InputHealth:
     """Health of what came between two counts.
 
     Parameters
@@ -84,9 +84,12 @@ def input_health(before: Intake, after: Intake, torque: TorqueRange) -> InputHea
     before, after : Intake
     torque : TorqueRange
         Of what came meanwhile.
+    is_whole : bool
+        Whether all that came was counted; else nothing is known of time.
     """
     span_s = (after.newest_stamp_ns - before.newest_stamp_ns) * 1.0e-9
-    duration_s = span_s if span_s > 0.0 and before.newest_stamp_ns > 0 else math.nan
+    is_known = is_whole and span_s > 0.0 and before.newest_stamp_ns > 0
+    duration_s = span_s if is_known else math.nan
     monitored_s = after.moving_s - before.moving_s + after.standing_s - before.standing_s
     received = after.received - before.received
     return InputHealth(
@@ -94,7 +97,7 @@ def input_health(before: Intake, after: Intake, torque: TorqueRange) -> InputHea
         crank_rate_hz=(after.crank_used - before.crank_used) / duration_s,
         torque_rate_hz=(after.torque_used - before.torque_used) / duration_s,
         bad_share=(unused(after) - unused(before)) / received if received else math.nan,
-        lost_share=min(1.0, max(0.0, 1.0 - monitored_s / duration_s)) if span_s > 0.0 else math.nan,
+        lost_share=min(1.0, max(0.0, 1.0 - monitored_s / duration_s)) if is_known else math.nan,
         stuck_torque_share=torque.stuck_share,
     )
 

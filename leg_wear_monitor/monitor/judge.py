@@ -24,6 +24,8 @@ class JudgeState:
     ----------
     before : Intake
         Counts when the input was last judged.
+    skipped, skipped_before : int
+        Samples skipped by then, and by the time before.
     torque : TorqueRange
         Torques since then.
     beats, cycles : int
@@ -33,6 +35,8 @@ class JudgeState:
     """
 
     before: Intake
+    skipped: int = 0
+    skipped_before: int = 0
     torque: TorqueRange = TorqueRange()
     beats: int = 0
     cycles: int = 0
@@ -85,8 +89,14 @@ class Judge:
             values[f"{names.GROWTH} {joint.joint}"] = per_hour
         return self.board.judge(values, report.stamp_ns)
 
-    def end_beat(self) -> tuple[AlarmList, ...]:
-        """Judge impacts of the gait cycle that runs, and once in a cycle's time the input."""
+    def end_beat(self, skipped: int = 0) -> tuple[AlarmList, ...]:
+        """Judge impacts of the gait cycle that runs, and once in a cycle's time the input.
+
+        Parameters
+        ----------
+        skipped : int
+            Samples that were not handed on so far, their wear is counted already.
+        """
         peaks = {
             f"{names.IMPACT} {joint}": float(peak)
             for joint, peak in zip(self._twin.loose, self._twin.peak_force_n, strict=True)
@@ -95,11 +105,12 @@ class Judge:
         self.state.beats += 1
         if self.state.beats < A_CYCLE:
             return early
-        return early + self._judge_input()
+        return early + self._judge_input(skipped)
 
-    def _judge_input(self) -> tuple[AlarmList, ...]:
+    def _judge_input(self, skipped: int) -> tuple[AlarmList, ...]:
         state, intake, config = self.state, self._twin.intake, self.config
-        health = input_health(state.before, intake, state.torque)
+        is_whole = skipped == state.skipped == state.skipped_before
+        health = input_health(state.before, intake, state.torque, is_whole)
         values = {
             names.CRANK_RATE: health.crank_rate_hz,
             names.TORQUE_RATE: health.torque_rate_hz,
@@ -110,6 +121,6 @@ class Judge:
         if state.cycles == 0 and self._twin.tracking is Tracking.OUT_OF_STEP:
             speed_rpm = self._twin.speed_radps * 30.0 / math.pi
             values[names.CADENCE] = abs(speed_rpm - config.cadence.commanded_rpm)
-        self.state = JudgeState(intake, health=health)
+        self.state = JudgeState(intake, skipped, state.skipped, health=health)
         cycles = 1 if math.isnan(health.duration_s) else round(1.0e9 * health.duration_s / self._cycle_ns)
         return self.board.judge(values, intake.newest_stamp_ns, max(1, cycles))

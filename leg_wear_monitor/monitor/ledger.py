@@ -9,7 +9,10 @@ import os
 import sqlite3
 from pathlib import Path
 
-from leg_wear_monitor.monitor.binding import Binding
+from leg_wear_monitor.mechanism.spec import Mechanism
+from leg_wear_monitor.monitor.binding import Binding, binding_of
+from leg_wear_monitor.monitor.config import MonitorConfig
+from leg_wear_monitor.monitor.fitting import fitted
 from leg_wear_monitor.monitor.ledger_entry import Entry, Event
 from leg_wear_monitor.monitor.ledger_file import MOVE, LedgerError, connect, create, transaction
 from leg_wear_monitor.monitor.ledger_rows import (
@@ -158,3 +161,19 @@ def _place(path: Path) -> tuple[int, int] | None:
     except OSError:
         return None
     return found.st_dev, found.st_ino
+
+
+def open_ledger(mechanism: Mechanism, config: MonitorConfig) -> Ledger | None:
+    """The ledger that a configuration names, None if it names none.
+
+    Raises
+    ------
+    ConfigError
+        For parameters that do not fit the mechanism.
+    LedgerError
+        If it must not be continued.
+    """
+    if not config.ledger.path:
+        return None
+    binding = binding_of(fitted(mechanism, config), config)
+    return Ledger(config.ledger.path, binding, config.ledger.checkpoint_s)

@@ -161,10 +161,10 @@ class Lost:
     failures: int
 
 
-def lost(intake: Intake, already_counted: int) -> Lost:
+def lost(intake: Intake, already_counted: int, unmonitored_s: float) -> Lost:
     """What was not integrated, from a twin's counts."""
     return Lost(
-        unmonitored_s=intake.unmonitored_s,
+        unmonitored_s=unmonitored_s,
         already_counted=already_counted,
         faulty=intake.faulty,
         duplicates=intake.duplicates,

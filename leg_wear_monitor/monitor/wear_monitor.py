@@ -4,20 +4,21 @@ import attrs
 import numpy as np
 
 from leg_wear_monitor.errors import LegWearError
-from leg_wear_monitor.mechanism.arrays import Floats, Ints
+from leg_wear_monitor.mechanism.arrays import Floats
 from leg_wear_monitor.mechanism.spec import Mechanism
 from leg_wear_monitor.monitor.alarms import Alarm
 from leg_wear_monitor.monitor.beats import A_CYCLE, Beats
-from leg_wear_monitor.monitor.book import Book, BookState
+from leg_wear_monitor.monitor.book import Book
 from leg_wear_monitor.monitor.config import MonitorConfig
 from leg_wear_monitor.monitor.cycle_report import cycle_report
 from leg_wear_monitor.monitor.fitting import fitted, twin_settings
-from leg_wear_monitor.monitor.forecaster import Forecaster, ForecastState
+from leg_wear_monitor.monitor.forecaster import Forecaster
 from leg_wear_monitor.monitor.growth import GrowthWindow, extended
-from leg_wear_monitor.monitor.judge import Judge, JudgeState
+from leg_wear_monitor.monitor.judge import Judge
 from leg_wear_monitor.monitor.ledger import Ledger
 from leg_wear_monitor.monitor.ledger_entry import AlarmEvent, Audit
 from leg_wear_monitor.monitor.measure import Finding
+from leg_wear_monitor.monitor.monitor_state import MonitorSnapshot, MonitorState
 from leg_wear_monitor.monitor.reports import (
     AlarmList,
     CycleReport,
@@ -27,36 +28,12 @@ from leg_wear_monitor.monitor.reports import (
     Status,
     lost,
 )
-from leg_wear_monitor.monitor.spans import is_within
 from leg_wear_monitor.monitor.status import statuses
-from leg_wear_monitor.twin.digital_twin import DigitalTwin, TwinSnapshot
-from leg_wear_monitor.twin.figures import CycleFigures, Event, joined
+from leg_wear_monitor.twin.digital_twin import DigitalTwin
+from leg_wear_monitor.twin.figures import CycleFigures, joined
 from leg_wear_monitor.twin.sample import GAIT_SAMPLE, Samples
 
 _KEPT_EVENTS = 1
-
-
-@attrs.define
-class MonitorState:
-    """What changes, beside twin, alarms and books; every value is immutable."""
-
-    growth: tuple[GrowthWindow, ...]
-    already_counted: int = 0
-    last: CycleReport | None = None
-    happened: tuple[Event, ...] = ()
-
-
-@attrs.frozen(eq=False)
-class MonitorSnapshot:
-    """All of a monitor but its ledger."""
-
-    twin: TwinSnapshot
-    state: MonitorState
-    book: BookState
-    judge: JudgeState
-    forecast: ForecastState
-    alarms: dict[str, Alarm]
-    beats: Ints
 
 
 class WearMonitor:
@@ -93,7 +70,7 @@ class WearMonitor:
         self.mechanism = fitted(mechanism, self.config)
         self.loose = self.mechanism.loose
         self._twin = DigitalTwin(self.mechanism, twin_settings(self.config))
-        self._book = Book(self._twin, ledger, self.config.ledger.checkpoint_s)
+        self._book = Book(self._twin, ledger, self.config.ledger)
         cycle_ns = round(60.0e9 / abs(self.config.cadence.commanded_rpm))
         self._judge = Judge(self._twin, self.config, cycle_ns)
         self._forecaster = Forecaster(
@@ -129,12 +106,12 @@ class WearMonitor:
         looks: list[SampleReports] = []
         cycles: list[CycleReport] = []
         changes: list[AlarmList] = []
-        for piece, ends_beat in self._beats.pieces(self._not_counted(samples)):
+        for piece, ends_beat in self._beats.pieces(samples):
             seen, ended = self._take(piece, changes)
             looks.append(seen)
             cycles += ended
             if ends_beat:
-                self._tell(self._judge.end_beat(), changes)
+                self._tell(self._judge.end_beat(self._book.state.skipped), changes)
             self._book.keep_if_due(self._judge.board.alarms.values())
         return Reports(joined(looks, len(self.loose)), tuple(cycles), tuple(changes), self.lost)
 
@@ -146,7 +123,7 @@ class WearMonitor:
     @property
     def lost(self) -> Lost:
         """What was not integrated so far."""
-        return lost(self._twin.intake, self._state.already_counted)
+        return lost(self._twin.intake, self._book.state.skipped, self._book.unmonitored_s)
 
     @property
     def wear_depth_m(self) -> Floats:
@@ -274,17 +251,9 @@ class WearMonitor:
     def _keep(self, closed: bool = False) -> bool:
         return self._book.keep(self._judge.board.alarms.values(), closed)
 
-    def _not_counted(self, samples: Samples) -> Samples:
-        """Samples but those of a time whose wear is in the ledger already."""
-        ledger = self._book.ledger
-        if ledger is None or not len(ledger.counted_ns) or not self.config.ledger.skip_counted:
-            return samples
-        known = is_within(samples["stamp_ns"], ledger.counted_ns)
-        self._state.already_counted += int(np.count_nonzero(known))
-        return samples[~known]
-
     def _take(self, piece: Samples, changes: list[AlarmList]) -> tuple[SampleReports, list[CycleReport]]:
         """Follow a piece of a beat, and judge the gait cycles that it ends."""
+        piece = self._book.not_counted(piece)
         update = self._twin.update(piece)
         self._judge.see(piece)
         self._book.followed(update.samples)

@@ -8,8 +8,8 @@ import attrs
 import numpy as np
 
 from leg_wear_monitor.mechanism.loader import load_mechanism
-from leg_wear_monitor.monitor.book import open_ledger
 from leg_wear_monitor.monitor.config import MonitorConfig
+from leg_wear_monitor.monitor.ledger import open_ledger
 from leg_wear_monitor.monitor.parameter_file import load_config
 from leg_wear_monitor.monitor.wear_monitor import WearMonitor
 from leg_wear_monitor.recording.findings import Finding, RecordingError

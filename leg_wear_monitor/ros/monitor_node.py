@@ -9,8 +9,8 @@ from std_srvs.srv import Trigger
 from leg_wear_monitor.errors import LegWearError
 from leg_wear_monitor.mechanism.loader import load_mechanism
 from leg_wear_monitor.monitor.alarms import Alarm
-from leg_wear_monitor.monitor.book import open_ledger
 from leg_wear_monitor.monitor.config import MonitorConfig
+from leg_wear_monitor.monitor.ledger import open_ledger
 from leg_wear_monitor.monitor.reports import AlarmList, Reports
 from leg_wear_monitor.monitor.wear_monitor import WearMonitor
 from leg_wear_monitor.recording import outputs

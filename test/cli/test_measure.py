@@ -8,8 +8,8 @@ import numpy as np
 import pytest
 
 from leg_wear_monitor.mechanism.loader import load_mechanism
-from leg_wear_monitor.monitor.book import open_ledger
 from leg_wear_monitor.monitor.config import MonitorConfig
+from leg_wear_monitor.monitor.ledger import open_ledger
 from leg_wear_monitor.monitor.ledger_entry import Entry, JointWear
 
 pytestmark = pytest.mark.plain

@@ -69,9 +69,13 @@ def test_time_that_is_counted_is_not_counted_again(begin, gait):
     again, _ = begin()
     samples = gait(4.0)
     reports = again.update(samples)
-    assert reports.lost.already_counted > 750  # but for the tracker's lag at the end
     np.testing.assert_array_equal(again._twin.depth, worn)
     assert again._book.totals["moving_s"] == totals["moving_s"]
+    assert reports.lost.already_counted > 750  # but for the tracker's lag at the end
+    after = again.update(gait(5.5, begin_s=4.0))
+    assert len(after.cycles) >= 3
+    assert after.lost.unmonitored_s < 0.3
+    assert {alarm.name for alarm in again.alarms.alarms if alarm.level} == {"input_rate torque"}
     again.close()
     third, _ = begin({"ledger.skip_counted": False})  # for a clock that begins anew each time
     third.update(samples)

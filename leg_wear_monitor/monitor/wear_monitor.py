@@ -273,13 +273,15 @@ class WearMonitor:
             for window, growth in zip(state.growth, figures.growth_mean_m, strict=True)
         )
         limits = self._judge.board.clearance_limits_m
-        forecasts = self._forecaster.after(figures, self._worn_m(), limits, self._judge.holds)
+        forecasts = self._forecaster.after(figures, self._worn_m(figures), limits, self._judge.holds)
         state.last = cycle_report(figures, book.state.cycles, self.loose, state.growth, limits, forecasts)
         book.note_clearances(state.last)
         return state.last
 
-    def _worn_m(self) -> Floats:
-        return np.asarray(self._twin.depth.mean(axis=2).sum(axis=1))
+    def _worn_m(self, figures: CycleFigures) -> Floats:
+        """Wear of each part at the end of a gait cycle; the twin itself may be further on."""
+        fresh = [self.mechanism.clearances[joint].radial_clearance for joint in self.loose]
+        return np.asarray(figures.clearance_mean_m - fresh)
 
     def _tell(self, changed: tuple[AlarmList, ...], changes: list[AlarmList]) -> None:
         for change in changed:

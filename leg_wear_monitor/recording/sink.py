@@ -4,14 +4,14 @@ from contextlib import suppress
 from pathlib import Path
 from types import TracebackType
 
-from leg_wear_monitor.monitor.reports import CycleReport, Reports
+from leg_wear_monitor.monitor.reports import Reports
 from leg_wear_monitor.monitor.wear_monitor import WearMonitor
 from leg_wear_monitor.recording.findings import RecordingError
-from leg_wear_monitor.recording.outputs import DIAGNOSTICS, FORECAST, OUTPUTS, Messages, topic_of
+from leg_wear_monitor.recording.forecast_times import ForecastTimes
+from leg_wear_monitor.recording.outputs import ALARMS, DIAGNOSTICS, FORECAST, OUTPUTS, Messages, topic_of
 from leg_wear_monitor.recording.writer import McapWriter
 
 NODE = "/leg_wear_monitor"
-_FORECAST_NS = 60 * 10**9
 _CHUNK_BYTES = 2**20
 
 
@@ -37,7 +37,8 @@ class Sink:
             output: self._writer.channel(topic_of(output, NODE), output.type, output.qos)
             for output in OUTPUTS
         }
-        self._forecast_ns: int | None = None
+        self._start, self._has_begun = monitor.alarms, False
+        self._forecasts = ForecastTimes()
 
     def __enter__(self) -> "Sink":
         return self
@@ -60,17 +61,14 @@ class Sink:
         stamp_ns : int
             Of the status; 0 before there is any time.
         """
+        if stamp_ns > 0 and not self._has_begun:
+            self._has_begun = True  # as the node begins: with all alarms as they stand
+            self._writer.write(self._channels[ALARMS], stamp_ns, self._messages.alarms(self._start))
         for outgoing in self._messages.of(reports):
             self._writer.write_many(self._channels[outgoing.output], outgoing.stamp_ns, outgoing.messages)
-        for cycle in reports.cycles:
-            self._forecast(cycle)
+        for cycle in self._forecasts.due(reports):
+            raw = self._messages.forecast(cycle)
+            self._writer.write(self._channels[FORECAST], cycle.stamp_ns, raw)
         if stamp_ns > 0:
             raw = self._messages.diagnostics(stamp_ns, self._monitor.status())
             self._writer.write(self._channels[DIAGNOSTICS], stamp_ns, raw)
-
-    def _forecast(self, cycle: CycleReport) -> None:
-        """Write a forecast with the first gait cycle of each minute."""
-        if self._forecast_ns is not None and 0 <= cycle.stamp_ns - self._forecast_ns < _FORECAST_NS:
-            return
-        self._forecast_ns = cycle.stamp_ns
-        self._writer.write(self._channels[FORECAST], cycle.stamp_ns, self._messages.forecast(cycle))

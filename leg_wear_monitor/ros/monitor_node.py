@@ -16,6 +16,7 @@ from leg_wear_monitor.monitor.wear_monitor import WearMonitor
 from leg_wear_monitor.recording import outputs
 from leg_wear_monitor.recording.cdr import TYPES
 from leg_wear_monitor.recording.decoder import Decoder
+from leg_wear_monitor.recording.forecast_times import ForecastTimes
 from leg_wear_monitor.recording.outputs import Messages
 from leg_wear_monitor.recording.qos import SENSOR_DATA
 from leg_wear_monitor.ros.black_box import BlackBox
@@ -34,7 +35,6 @@ ADVICE = (
 _WORK_S = 0.01  # the monitor takes what has come, this often
 _AT_ONCE = 500  # messages, so that services and parameters get their turn, too
 _HELD = 20_000  # messages, ten seconds at 1 kHz on both topics
-_FORECAST_NS = 60_000_000_000
 _A_SAMPLE = (outputs.TORQUE, outputs.IMPACTS)
 
 
@@ -54,7 +54,7 @@ class MonitorNode(ClosingNode):
         self._messages = Messages(config, self._monitor.loose, self.get_name())
         self._black_box = BlackBox(config.record.path)
         self._outlets = Outlets(self, outputs.OUTPUTS, self._black_box)
-        self._forecast_ns = 0
+        self._forecasts = ForecastTimes()
         self._compile(decoder)
         parameters.follow(self, self._configure)
         self._serve()
@@ -117,10 +117,8 @@ class MonitorNode(ClosingNode):
                 self._load.unpublished += len(outgoing.stamp_ns)
             elif self._outlets.wanted(outgoing.output):
                 self._outlets.send_many(outgoing.output, now_ns, outgoing.messages)
-        for cycle in reports.cycles:
-            if reports.alarms or cycle.stamp_ns - self._forecast_ns >= _FORECAST_NS:
-                self._forecast_ns = cycle.stamp_ns
-                self._outlets.send(outputs.FORECAST, now_ns, self._messages.forecast(cycle))
+        for cycle in self._forecasts.due(reports):
+            self._outlets.send(outputs.FORECAST, now_ns, self._messages.forecast(cycle))
 
     def _send_alarms(self, alarms: AlarmList) -> None:
         self._outlets.send(outputs.ALARMS, self._now_ns(), self._messages.alarms(alarms))

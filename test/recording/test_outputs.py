@@ -2,6 +2,7 @@
 
 import math
 from collections.abc import Callable
+from itertools import pairwise
 from typing import Any
 
 import attrs
@@ -22,6 +23,7 @@ from leg_wear_monitor.monitor.reports import (
     SampleReports,
     Status,
 )
+from leg_wear_monitor.recording.forecast_times import ForecastTimes
 from leg_wear_monitor.recording.outputs import (
     ALARMS,
     CLEARANCES,
@@ -156,3 +158,23 @@ def test_numbers_are_plain(value: float, text: str) -> None:
 def test_topics_are_of_the_node(store: Callable[..., Any]) -> None:
     assert topic_of(ALARMS, "/robot/leg_wear_monitor") == "/robot/leg_wear_monitor/alarms"
     assert topic_of(DIAGNOSTICS, "/robot/leg_wear_monitor") == "/diagnostics"
+
+
+@pytest.mark.parametrize("cuts", [[], [3], [1, 2, 3, 4, 5, 6, 7]])
+def test_forecasts_are_due_by_stamps_however_reports_are_cut(reports: Reports, cuts: list[int]) -> None:
+    """Seconds of gait cycles and of changes in order of arrival; some changes are told before their time."""
+    second, told = 10**9, []
+    arrivals = [("cycle", 1), ("change", 2.1), ("cycle", 2), ("cycle", 3), ("cycle", 4), ("change", 5),
+                ("cycle", 5), ("cycle", 70)]  # fmt: skip
+    times = ForecastTimes()
+    for begin, end in pairwise([0, *cuts, len(arrivals)]):
+        part = arrivals[begin:end]
+        cycles = [
+            attrs.evolve(reports.cycles[0], stamp_ns=round(at * second))
+            for what, at in part
+            if what == "cycle"
+        ]
+        alarms = [AlarmList(round(at * second), ()) for what, at in part if what == "change"]
+        now = attrs.evolve(reports, cycles=tuple(cycles), alarms=tuple(alarms))
+        told += [cycle.stamp_ns / second for cycle in times.due(now)]
+    assert told == [1, 3, 5, 70]

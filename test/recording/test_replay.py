@@ -13,6 +13,7 @@ from leg_wear_monitor.monitor.config import LedgerFile
 from leg_wear_monitor.recording import encode
 from leg_wear_monitor.recording.cdr import JOINT_STATE, WRENCH_STAMPED
 from leg_wear_monitor.recording.decoder import Decoder
+from leg_wear_monitor.recording.forecast_times import ForecastTimes
 from leg_wear_monitor.recording.outputs import Messages, topic_of
 from leg_wear_monitor.recording.summary import summary
 from leg_wear_monitor.recording.writer import McapWriter
@@ -87,20 +88,28 @@ def test_a_replay_reports_bit_for_bit_what_the_monitor_reported_live(
     monitor, decoder = lw.WearMonitor(leg, config), Decoder(config)
     messages = Messages(config, monitor.loose)
     live: dict[str, list[bytes]] = {}
+    forecasts: list[bytes] = []
+    times = ForecastTimes()
     begin, sizes = 0, np.random.default_rng(3)
     while begin < len(walk):
         end = begin + int(sizes.integers(1, 60))
         samples = [decoder.one(raw, kind, time) for kind, time, raw in walk[begin:end]]
-        for outgoing in messages.of(monitor.update(np.concatenate(samples))):
+        reports = monitor.update(np.concatenate(samples))
+        forecasts += [messages.forecast(cycle) for cycle in times.due(reports)]
+        for outgoing in messages.of(reports):
             topic = topic_of(outgoing.output, "/leg_wear_monitor")
             live.setdefault(topic, []).extend(row.tobytes() for row in outgoing.messages)
         begin = end
     replayed = reported(out[0] / "reports.mcap")
     assert len(live["/leg_wear_monitor/impact_forces"]) > 0.9 * SECONDS * RATE_HZ
     assert len(live["/leg_wear_monitor/clearance_states"]) >= CYCLES
+    begun_with, *changes = replayed.pop("/leg_wear_monitor/alarms")
+    assert changes == live.pop("/leg_wear_monitor/alarms", [])
+    assert begun_with == messages.alarms(lw.WearMonitor(leg, config).alarms)
     for topic, rows in live.items():
         assert replayed[topic] == rows
-    assert set(replayed) - set(live) <= {"/diagnostics", "/leg_wear_monitor/forecast"}
+    assert set(replayed) - set(live) == {"/diagnostics", "/leg_wear_monitor/forecast"}
+    assert replayed["/leg_wear_monitor/forecast"] == forecasts
     assert len(replayed["/diagnostics"]) >= SECONDS - 1
     assert monitor.wear_depth_m.tobytes() == out[1].monitor.wear_depth_m.tobytes()
 

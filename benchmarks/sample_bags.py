@@ -1,0 +1,96 @@
+"""Make the recordings in bags/ anew: by the synthetic leg and the monitor, as two ROS processes."""
+
+import argparse
+import json
+import os
+import signal
+import subprocess
+import sys
+import time
+from pathlib import Path
+from typing import Any
+
+import leg_wear_monitor as lw
+from leg_wear_monitor.recording.summary import summary
+
+ROOT = Path(__file__).parents[1]
+DOMAIN = "77"
+
+# for each recording, parameters of the leg; those of the monitor are in bags/NAME.yaml
+BAGS: dict[str, dict[str, object]] = {
+    "healthy": {},
+    "knocking": {"knock.joint": "G", "knock.at_s": 5.0, "knock.clearance_m": 2.0e-3},
+    "bad_input": {
+        "transport.drop_share": 0.05,
+        "transport.duplicate_share": 0.02,
+        "transport.late_share": 0.02,
+        "transport.fault_share": 0.06,
+        "transport.gaps_s": [4.0],
+        "transport.gap_s": 0.8,
+    },
+}
+LEG = {"duration_s": 12.0, "seed": 4, "wait_for_subscribers": 1, "precompute": True}
+PATIENCE_S = 300.0
+
+
+def start(verb: str, parameters: dict[str, object], *further: str) -> subprocess.Popen[bytes]:
+    """A node as a process of its own."""
+    # JSON is what rcl takes for a value, too
+    settings = [word for name, value in parameters.items() for word in ("-p", f"{name}:={json.dumps(value)}")]
+    environment = {
+        **os.environ,
+        "ROS_DOMAIN_ID": DOMAIN,
+        "ROS_AUTOMATIC_DISCOVERY_RANGE": "LOCALHOST",
+        "AMENT_PREFIX_PATH": sys.prefix,
+        "FASTRTPS_DEFAULT_PROFILES_FILE": str(ROOT / "test" / "ros" / "fast_discovery.xml"),
+    }
+    command = [sys.executable, "-m", "leg_wear_monitor", verb, "--ros-args", *further, *settings]
+    return subprocess.Popen(command, env=environment, cwd=ROOT)
+
+
+def record(name: str, path: Path, parameters: Path) -> None:
+    """One recording."""
+    monitor = start("monitor", {"record.path": str(path)}, "--params-file", str(parameters))
+    try:
+        leg = start("gait-publisher", LEG | BAGS[name])
+        if leg.wait(PATIENCE_S) != 0:
+            raise SystemExit(f"{name}: the leg ended with {leg.returncode}")
+        time.sleep(2.0)  # what is on its way arrives
+    finally:
+        monitor.send_signal(signal.SIGINT)
+        monitor.wait(PATIENCE_S)
+
+
+def expectation(path: Path, parameters: Path) -> dict[str, Any]:
+    """What a replay must find: counts, alarms, and of chaotic figures those that repeat."""
+    record = summary(lw.replay(path, parameters), 1.0)
+    return {
+        "crank_samples": record["recording"]["crank_samples"],
+        "torque_samples": record["recording"]["torque_samples"],
+        "findings": [finding["text"] for finding in record["recording"]["findings"]],
+        "cycles": record["cycles"],
+        "lost": record["lost"],
+        "alarms": sorted({f"{each['name']}: {each['level']}" for each in record["alarms"]["changes"]}),
+        "mean_force_n": {name: joint["mean_force_n"] for name, joint in record["joints"].items()},
+        "opened_m": {
+            name: joint["clearance_m"]["last"] - joint["clearance_m"]["first"]
+            for name, joint in record["joints"].items()
+        },
+    }
+
+
+def main() -> None:
+    parser = argparse.ArgumentParser(description=__doc__)
+    parser.add_argument("names", nargs="*", default=list(BAGS), help=f"of {', '.join(BAGS)}")
+    parser.add_argument("--out", type=Path, default=ROOT / "bags")
+    arguments = parser.parse_args()
+    for name in arguments.names:
+        path, parameters = arguments.out / f"{name}.mcap", ROOT / "bags" / f"{name}.yaml"
+        record(name, path, parameters)
+        expected = json.dumps(expectation(path, parameters), indent=1)
+        path.with_suffix(".json").write_text(expected + "\n")
+        print(f"{path}: {path.stat().st_size / 1e3:.0f} kB\n{expected}")
+
+
+if __name__ == "__main__":
+    main()

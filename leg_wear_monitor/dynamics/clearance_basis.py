@@ -29,6 +29,8 @@ class Basis:
         S and s side by side.
     b_e, c_ee : (N, d, d) arrays
         B_e and c_ee of the Lagrangian.
+    gamma : (N, d, d, d) array
+        Gamma = S^T M q_ee: force on e [i] that e' takes twice [j, k]; A changes by Gamma e and its transpose.
     c_e : (N, d) array
     force, load : (N, 3 b) arrays
         Applied forces at rest, and the loads among them.
@@ -79,6 +81,8 @@ class Basis:
         momentum = self.mass * self.drive
         self.b_e = np.einsum("nr,nrij->nij", momentum, curvature) + project(self.s, mass * self.s_t)
         self.c_e = 2.0 * np.einsum("nr,nri->ni", momentum, self.s_t)
+        flat = (mass * self.s).transpose(0, 2, 1) @ curvature.reshape(len(q), -1, d * d)
+        self.gamma = flat.reshape(-1, d, d, d)
         swing = np.einsum("nr,nrij->nij", momentum, derivative(curvature))
         self.c_ee = 2.0 * (project(self.s_t, mass * self.s_t) + swing)
         self.force_e = np.einsum("nr,nrij->nij", self.force, curvature) + project(self.s, force_s)

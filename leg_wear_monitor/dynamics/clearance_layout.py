@@ -13,26 +13,26 @@ Shapes = dict[str, tuple[int, ...]]
 def motion_shapes(k: int, damped: bool) -> Shapes:
     """Parts of a row that moves k loose joints, d = 2 k eccentricities e.
 
-    Accelerations of e: ``inverse_mass``; ``coriolis`` by w e'; ``free`` without contact by 1, w' and w^2 and
-    ``free_e`` the same times e; ``lever_response`` by the friction force in each joint. Slip of each joint
-    beyond t . e': ``lever`` by e', ``lever_drive`` by w. Drive torque: ``torque`` by (1, w', w^2, w),
-    ``torque_a`` by e'', ``torque_v`` by w e' and e', ``torque_t`` by the friction forces, ``torque_e`` by e
-    times (1, w', w^2), and the forms ``torque_ae`` of (e'', e), ``torque_vv`` of (e', e'), ``torque_ve`` of
-    (w e', e). In all square parts the second index is the one that results (of the torque's forms the first
-    vector's), so that loops run along rows. ``angle`` of the bushing's and the journal's bodies, ``turn`` its
-    derivative; ``toe`` its position, by 1 and e, and the derivative of the latter by the crank angle;
-    ``load_power`` the power of loads by (e', w). With dampers, ``viscous`` accelerations and ``damper`` the
-    power taken as a quadratic form, both by (e', w).
+    ``inverse_mass`` of e at e = 0, and ``bend`` how it changes, A^-1 Gamma by e (or e') first. Acceleration
+    of e: ``coriolis`` by w e'. Forces on e: ``free`` without contact by 1, w' and w^2, ``free_e`` the same
+    times e. Slip of each joint beyond t . e': ``lever`` by e', ``lever_drive`` by w. Drive torque:
+    ``torque`` by (1, w', w^2, w), ``torque_a`` by e'', ``torque_v`` by w e' and e', ``torque_t`` by the
+    friction forces, ``torque_e`` by e times (1, w', w^2), and the forms ``torque_ae`` of (e'', e),
+    ``torque_vv`` of (e', e'), ``torque_ve`` of (w e', e). In all square parts the second index is the one
+    that results (of the torque's forms the first vector's), so that loops run along rows. ``angle`` of the
+    bushing's and the journal's bodies, ``turn`` its derivative; ``toe`` its position, by 1 and e, and the
+    derivative of the latter by the crank angle; ``load_power`` the power of loads by (e', w). With dampers,
+    ``viscous`` accelerations and ``damper`` the power taken as a quadratic form, both by (e', w).
     """
     d = 2 * k
     return {
         "inverse_mass": (d, d),
+        "bend": (d, d, d),
         "coriolis": (d, d),
         "free": (3, d),
         "free_e": (3, d, d),
         "lever": (k, d),
         "lever_drive": (k,),
-        "lever_response": (k, d),
         "torque": (4,),
         "torque_a": (d,),
         "torque_v": (2, d),

@@ -51,13 +51,12 @@ from leg_wear_monitor.wear.surfaces import deposit_wear
 @kernel
 def drift(now, x):
     """Acceleration that is not contact, at row V0: gravity, crank, Coriolis, dampers; row DRIFT."""
-    coriolis, viscous, d = now.coriolis, now.viscous, x.shape[1]
+    by_v, viscous, d = now.drift, now.viscous, x.shape[1]
     for i in range(d):
         x[DRIFT, i] = now.bare[i]
     for j in range(d):
-        rate = now.speed[0] * x[V0, j]
         for i in range(d):
-            x[DRIFT, i] += coriolis[j, i] * rate
+            x[DRIFT, i] += by_v[j, i] * x[V0, j]
     for i in range(viscous.shape[0]):
         for j in range(d):
             x[DRIFT, i] += viscous[i, j] * x[V0, j]

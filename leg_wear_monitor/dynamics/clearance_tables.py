@@ -10,8 +10,8 @@ speed, the Lagrangian to the first order of e / L beside w, and to the second be
     c_ee = 2 S_t M S_t + 2 s M q_ee_t,      q_ee = -X (dJ along S) S  the curvature of the linkage,
 
 with _t the derivative by the crank angle. Its equations of motion and its drive torque belong to one
-energy, so work in, losses and stored energy add up. What is left out (A's dependence on e and with it
-forces of the order e'^2 on the eccentricities) is of the order e / L.
+energy, so work in, losses and stored energy add up. Beside them A changes with e by Gamma e and its
+transpose, Gamma = S M q_ee, and Gamma e' e' acts against e''; torque and stored energy leave both out.
 """
 
 from typing import NamedTuple
@@ -106,7 +106,7 @@ def _parts(table: Floats) -> Ints:
 
 
 def _accelerations(basis: Basis) -> dict[str, Floats]:
-    """Parts that give the accelerations of the eccentricities."""
+    """Parts that move the eccentricities."""
     mass = basis.mass[:, None]
     inverse_mass: Floats = np.asarray(np.linalg.inv(project(basis.s, mass * basis.s)), dtype=np.float64)
 
@@ -116,12 +116,14 @@ def _accelerations(basis: Basis) -> dict[str, Floats]:
 
     free = np.stack([basis.force, -basis.mass * basis.drive, -basis.mass * basis.drive_t], axis=2)
     by_e = [basis.force_e, -basis.b_e, 0.5 * basis.c_ee - derivative(basis.b_e)]
+    d = inverse_mass.shape[1]
+    bend = (inverse_mass @ basis.gamma.reshape(-1, d, d * d)).reshape(-1, d, d, d)
     return {
         "inverse_mass": inverse_mass,
+        "bend": np.ascontiguousarray(bend.transpose(0, 3, 2, 1)),
         "coriolis": -2.0 * respond(mass * basis.s_t).transpose(0, 2, 1),
-        "free": respond(free).transpose(0, 2, 1),
-        "free_e": np.stack([(inverse_mass @ slope).transpose(0, 2, 1) for slope in by_e], axis=1),
-        "lever_response": respond(basis.friction).transpose(0, 2, 1),
+        "free": project(basis.s, free).transpose(0, 2, 1),
+        "free_e": np.stack([slope.transpose(0, 2, 1) for slope in by_e], axis=1),
         "viscous": -respond(basis.drag),
     }
 

@@ -323,9 +323,9 @@ def assert_means_agree(one: np.ndarray, other: np.ndarray) -> None:
     "finer", [{"interval_s": 0.5 / 2048}, {"tolerance_m": 0.1 * TOLERANCE_M}], ids=["interval", "tolerance"]
 )
 def test_means_hold_at_half_the_interval_and_a_tenth_of_the_tolerance(leg, tables, finer):
-    """All five joints' figures, over twelve runs of five cycles."""
+    """All five joints' figures, over twenty-four runs of five cycles."""
     usual, fine = (
-        run_figures(lambda options=options: ClearanceStepper(prepare(leg), tables=tables, **options), 12, 5)
+        run_figures(lambda options=options: ClearanceStepper(prepare(leg), tables=tables, **options), 24, 5)
         for options in ({}, finer)
     )
     assert_means_agree(fine, usual)

@@ -12,7 +12,8 @@ from leg_wear_monitor.dynamics.run import Setup
 from leg_wear_monitor.errors import ConfigError
 from leg_wear_monitor.mechanism.ideal import TURN
 from leg_wear_monitor.mechanism.spec import Mechanism
-from leg_wear_monitor.studies.watch import SAMPLES, WatchedLeg
+from leg_wear_monitor.studies.grid import SAMPLES
+from leg_wear_monitor.studies.watch import WatchedLeg
 
 
 def with_friction(mechanism: Mechanism, changes: dict[str, Any]) -> Mechanism:

@@ -16,9 +16,10 @@ from leg_wear_monitor.mechanism.arrays import Floats
 from leg_wear_monitor.mechanism.ideal import TURN
 from leg_wear_monitor.mechanism.spec import Mechanism
 from leg_wear_monitor.studies.ensemble import ensemble, watch
+from leg_wear_monitor.studies.grid import SAMPLES
 from leg_wear_monitor.studies.lyapunov import Flags, stretches
 from leg_wear_monitor.studies.point import Arrays
-from leg_wear_monitor.studies.watch import SAMPLES, WatchedLeg
+from leg_wear_monitor.studies.watch import WatchedLeg
 
 
 def expand(mechanism: Mechanism, settings: dict[str, Any]) -> Arrays:

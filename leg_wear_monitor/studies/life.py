@@ -13,8 +13,9 @@ from leg_wear_monitor.dynamics.tally import new_tally
 from leg_wear_monitor.mechanism.arrays import Floats
 from leg_wear_monitor.mechanism.spec import Mechanism
 from leg_wear_monitor.studies.ensemble import ensemble, watch
+from leg_wear_monitor.studies.grid import SAMPLES
 from leg_wear_monitor.studies.point import Arrays
-from leg_wear_monitor.studies.watch import SAMPLES, WatchedLeg
+from leg_wear_monitor.studies.watch import WatchedLeg
 
 SETTLE_CYCLES = 1  # before those whose wear is repeated: the surfaces have just changed
 

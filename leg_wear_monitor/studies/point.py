@@ -15,7 +15,7 @@ Arrays = dict[str, np.ndarray[Any, Any]]
 
 # what a result depends on; of studies only what computes
 _ROOMS = ("mechanism", "contact", "wear", "dynamics")
-_TASKS = ("ensemble", "watch", "response", "life", "section", "exponent", "lyapunov", "tasks")
+_TASKS = ("ensemble", "grid", "watch", "response", "life", "section", "exponent", "lyapunov", "tasks")
 
 
 @attrs.frozen(kw_only=True)

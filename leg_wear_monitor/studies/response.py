@@ -11,8 +11,9 @@ from leg_wear_monitor.mechanism.ideal import one_cycle, point_motion
 from leg_wear_monitor.mechanism.position import Linkage
 from leg_wear_monitor.mechanism.spec import Mechanism
 from leg_wear_monitor.studies.ensemble import ensemble, watch
+from leg_wear_monitor.studies.grid import SAMPLES
 from leg_wear_monitor.studies.point import Arrays
-from leg_wear_monitor.studies.watch import SAMPLES, Moment, WatchedLeg
+from leg_wear_monitor.studies.watch import Moment, WatchedLeg
 
 BAND = (0.05, 0.5, 0.95)  # shares of an ensemble's cycles below its band, its middle, and its top
 ERRORS = ("toe_position_m", "toe_velocity_mps", "toe_acceleration_mps2", "drive_torque_nm")

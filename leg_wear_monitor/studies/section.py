@@ -10,8 +10,8 @@ from leg_wear_monitor.mechanism.arrays import Floats
 from leg_wear_monitor.mechanism.ideal import TURN
 from leg_wear_monitor.mechanism.spec import Mechanism
 from leg_wear_monitor.studies.ensemble import ensemble, watch
+from leg_wear_monitor.studies.grid import SAMPLES
 from leg_wear_monitor.studies.point import Arrays
-from leg_wear_monitor.studies.watch import SAMPLES
 
 
 def intersect(mechanism: Mechanism, settings: dict[str, Any]) -> Arrays:

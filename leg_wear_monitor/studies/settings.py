@@ -1,7 +1,5 @@
 """A study's description as types: every key of config/studies/*.yaml, its unit, bounds and meaning."""
 
-from collections.abc import Callable
-from itertools import pairwise
 from pathlib import Path
 from typing import Any
 
@@ -13,69 +11,28 @@ from leg_wear_monitor.mechanism.loader import read_yaml
 from leg_wear_monitor.mechanism.quantity import FieldError, described, quantity
 from leg_wear_monitor.mechanism.strict import structure
 from leg_wear_monitor.share import share_directory
-
-Names = tuple[str, ...]
-MOST = 1_000_000
-
-
-def _rising(values: tuple[float, ...]) -> str | None:
-    if values and all(a < b for a, b in pairwise(values)):
-        return None
-    return f"{list(values)} does not rise from value to value"
-
-
-def _joints(names: Names) -> str | None:
-    if names and len(set(names)) == len(names):
-        return None
-    return f"{list(names)} is not a list of at least one joint, each once"
-
-
-def _sets(sets: tuple[Names, ...]) -> str | None:
-    if not sets:
-        return "is empty, expected at least one list of joints"
-    return next((fault for fault in map(_joints, sets) if fault), None)
-
-
-def _some_of(known: Names) -> Callable[[Names], str | None]:
-    def check(names: Names) -> str | None:
-        strange = [name for name in names if name not in known]
-        return f"{strange[0]!r} is not one of {', '.join(known)}" if strange else _joints(names)
-
-    return check
-
-
-def _count(doc: str, least: int, default: int) -> Any:
-    return quantity("", doc, at_least=least, at_most=MOST, default=default)
-
-
-def _clearance() -> Any:
-    return quantity("m", "radial clearance of the loose joints", above=0.0, at_most=0.1, default=3.0e-4)
-
-
-def _clearances() -> Any:
-    return quantity("m", "radial clearances of the loose joints", above=0.0, at_most=0.1, check=_rising)
-
-
-def _speed() -> Any:
-    return quantity("rpm", "speed of the crank", above=0.0, at_most=10_000.0, default=60.0)
-
-
-def _speeds() -> Any:
-    return quantity("rpm", "speeds of the crank", above=0.0, at_most=10_000.0, check=_rising)
-
-
-def _loose() -> Any:
-    return described("joints that are loose", check=_joints)
+from leg_wear_monitor.studies.grid import SAMPLES
+from leg_wear_monitor.studies.keys import (
+    Names,
+    check_sets,
+    clearance_field,
+    clearances_field,
+    count_field,
+    loose_field,
+    some_of,
+    speed_field,
+    speeds_field,
+)
 
 
 @attrs.frozen(kw_only=True)
 class Ensemble:
     """The runs behind each number: motion with clearance is chaotic, so one run says little."""
 
-    runs: int = _count("runs that differ in where they start", 2, 12)
-    cycles: int = _count("gait cycles counted in each run", 2, 20)
-    skip_cycles: int = _count("gait cycles before them", 0, 3)
-    traced_cycles: int = _count("counted cycles of each run whose curves are kept", 1, 5)
+    runs: int = count_field("runs that differ in where they start", 2, 12)
+    cycles: int = count_field("gait cycles counted in each run", 2, 20)
+    skip_cycles: int = count_field("gait cycles before them", 0, 3)
+    traced_cycles: int = count_field("counted cycles of each run whose curves are kept", 1, 5)
     perturb_share: float = quantity(
         "",
         "journals start up to this share of the clearance from the centre",
@@ -83,7 +40,7 @@ class Ensemble:
         at_most=1.0,
         default=0.3,
     )
-    seed: int = _count("of where the runs start", 0, 1)
+    seed: int = count_field("of where the runs start", 0, 1)
 
     def __attrs_post_init__(self) -> None:
         if self.traced_cycles > self.cycles:
@@ -104,27 +61,27 @@ class Study:
 class Size(Study):
     """Clearance size at chosen joints."""
 
-    joints: Names = _loose()
-    clearances_m: tuple[float, ...] = _clearances()
-    speed_rpm: float = _speed()
+    joints: Names = loose_field()
+    clearances_m: tuple[float, ...] = clearances_field()
+    speed_rpm: float = speed_field()
 
 
 @attrs.frozen(kw_only=True)
 class Speed(Study):
     """Crank speed with clearance at chosen joints."""
 
-    joints: Names = _loose()
-    speeds_rpm: tuple[float, ...] = _speeds()
-    clearance_m: float = _clearance()
+    joints: Names = loose_field()
+    speeds_rpm: tuple[float, ...] = speeds_field()
+    clearance_m: float = clearance_field()
 
 
 @attrs.frozen(kw_only=True)
 class Location(Study):
     """Clearance in one place or another."""
 
-    sets: tuple[Names, ...] = described("joints that are loose together, a list of lists", check=_sets)
-    clearance_m: float = _clearance()
-    speed_rpm: float = _speed()
+    sets: tuple[Names, ...] = described("joints that are loose together, a list of lists", check=check_sets)
+    clearance_m: float = clearance_field()
+    speed_rpm: float = speed_field()
 
 
 @attrs.frozen(kw_only=True)
@@ -142,9 +99,9 @@ class Life:
         above=0.0,
         default=1.0e-4,
     )
-    jumps: int = _count("jumps until then, of equal opening", 1, 40)
-    cycles: int = _count("gait cycles simulated before each jump", 1, 6)
-    runs: int = _count("lives that differ in where they start", 2, 4)
+    jumps: int = count_field("jumps until then, of equal opening", 1, 40)
+    cycles: int = count_field("gait cycles simulated before each jump", 1, 6)
+    runs: int = count_field("lives that differ in where they start", 2, 4)
 
 
 @attrs.frozen(kw_only=True)
@@ -158,9 +115,16 @@ class Wear(Location):
 class Exponent:
     """How the largest Lyapunov exponent is measured."""
 
-    runs: int = _count("pairs of neighbours that differ in where they start", 2, 4)
-    cycles: int = _count("gait cycles over which neighbours are followed", 10, 100)
-    renewals: int = _count("times in a cycle that the neighbour is brought back", 1, 64)
+    runs: int = count_field("pairs of neighbours that differ in where they start", 2, 4)
+    cycles: int = count_field("gait cycles over which neighbours are followed", 10, 100)
+    renewals: int = quantity(
+        "",
+        "times in a cycle that the neighbour is brought back, a power of 2",
+        at_least=1,
+        at_most=SAMPLES,
+        default=64,
+        check=lambda times: None if SAMPLES % times == 0 else f"{times} does not divide {SAMPLES}",
+    )
     distance: float = quantity(
         "", "distance it is brought back to, in clearances", above=0.0, at_most=1.0e-3, default=1.0e-8
     )
@@ -176,21 +140,21 @@ class Exponent:
 class Bifurcation:
     """Poincaré sections over a parameter."""
 
-    clearances_m: tuple[float, ...] = _clearances()
-    speeds_rpm: tuple[float, ...] = _speeds()
-    cycles: int = _count("gait cycles drawn at each value", 1, 60)
-    skip_cycles: int = _count("gait cycles before them", 0, 20)
+    clearances_m: tuple[float, ...] = clearances_field()
+    speeds_rpm: tuple[float, ...] = speeds_field()
+    cycles: int = count_field("gait cycles drawn at each value", 1, 60)
+    skip_cycles: int = count_field("gait cycles before them", 0, 20)
 
 
 @attrs.frozen(kw_only=True)
 class Chaos(Study):
     """How far the motion can be foretold."""
 
-    joints: Names = _loose()
+    joints: Names = loose_field()
     others: tuple[Names, ...] = described("other sets whose exponents are compared", default=())
-    clearance_m: float = _clearance()
-    speed_rpm: float = _speed()
-    section_cycles: int = _count("points of a Poincaré map, one a cycle", 2, 1000)
+    clearance_m: float = clearance_field()
+    speed_rpm: float = speed_field()
+    section_cycles: int = count_field("points of a Poincaré map, one a cycle", 2, 1000)
     section_crank_angle_deg: float = quantity(
         "deg", "crank angle of the map", at_least=0.0, at_most=360.0, default=0.0
     )
@@ -202,16 +166,16 @@ class Chaos(Study):
 class Laws(Study):
     """The normal force and friction laws against each other."""
 
-    joints: Names = _loose()
-    clearance_m: float = _clearance()
-    speed_rpm: float = _speed()
+    joints: Names = loose_field()
+    clearance_m: float = clearance_field()
+    speed_rpm: float = speed_field()
     normal_laws: Names = described(
-        "laws of the normal force", default=NORMAL_LAWS, check=_some_of(NORMAL_LAWS)
+        "laws of the normal force", default=NORMAL_LAWS, check=some_of(NORMAL_LAWS)
     )
     friction_laws: Names = described(
         "ramps of friction, each with the mechanism's own normal law",
         default=FRICTION_LAWS,
-        check=_some_of(FRICTION_LAWS),
+        check=some_of(FRICTION_LAWS),
     )
     friction_coefficients: tuple[float, ...] = quantity(
         "",

@@ -16,8 +16,7 @@ from leg_wear_monitor.dynamics.tally import Tally
 from leg_wear_monitor.dynamics.touch import F_N
 from leg_wear_monitor.mechanism.arrays import Floats
 from leg_wear_monitor.mechanism.ideal import TURN
-
-SAMPLES = 512  # of a cycle, at whole intervals of the stepper
+from leg_wear_monitor.studies.grid import SAMPLES
 
 
 class Moment(NamedTuple):

@@ -9,9 +9,9 @@ from leg_wear_monitor.dynamics.simulation import prepare
 from leg_wear_monitor.dynamics.tally import new_tally
 from leg_wear_monitor.mechanism.ideal import TURN
 from leg_wear_monitor.studies.ensemble import ensemble, start_angles, watch
+from leg_wear_monitor.studies.grid import SAMPLES
 from leg_wear_monitor.studies.response import ERRORS, respond
 from leg_wear_monitor.studies.summary import RANGES, share_of_range
-from leg_wear_monitor.studies.watch import SAMPLES
 from leg_wear_monitor.wear.surfaces import BUSHING
 
 PLACE = {"loose": ["G"], "clearance_m": 3.0e-4, "speed_rpm": 60.0, "perturb_share": 0.3, "seed": 1}

@@ -74,6 +74,11 @@ def test_studies_cover_what_was_asked():
             {"sets": [["A"]], "ensemble": {"cycles": 2, "traced_cycles": 3}},
             "ensemble.traced_cycles: 3 is more than the 2 cycles counted",
         ),
+        (
+            "chaos",
+            {"joints": ["A"], "exponent": {"renewals": 48}},
+            "exponent.renewals: 48 does not divide 512",
+        ),
         ("laws", {"joints": ["A"], "normal_laws": ["hooke"]}, "normal_laws: 'hooke' is not one of hertz,"),
     ],
 )

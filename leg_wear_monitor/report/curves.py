@@ -91,8 +91,8 @@ def _draw(part: dict[str, _Line], limits: tuple[float, float], label: str, unit:
 def _draw_line(axes: Axes, ideal: Floats, band: Floats, example: Floats) -> None:
     angle = np.arange(len(example)) * (360.0 / len(example))
     axes.fill_between(angle, band[0], band[-1], color=SKY, alpha=0.45, linewidth=0.0)
+    axes.plot(angle, ideal, color=INK, linewidth=1.2, linestyle=(0, (4, 2)))
     axes.plot(angle, example, color=BLUE, linewidth=0.7)
-    axes.plot(angle, ideal, color=INK, linewidth=1.0, linestyle=(0, (4, 2)))
 
 
 def _finish(panels: Sequence[Axes], label: str) -> None:

@@ -138,12 +138,17 @@ def regularity(labelled: Labelled) -> list[str]:
 
 def zones(labelled: Labelled) -> list[str]:
     """Whose wear is concentrated in a zone."""
-    known = [(name, zone) for name, joint, a in _joints(labelled) if (zone := worst_zone(a, joint))]
-    ranked = sorted(known, key=lambda one: one[1][1] - one[1][0])
-    texts = [f"{name} {zone_text(zone)}" for name, zone in ranked]
-    if not texts:
-        return []
-    return [f"Zone that holds 90 % of the bushing's wear, the narrowest first: {'; '.join(texts)}."]
+    sentences = []
+    for share in (0.5, 0.9):
+        known = [
+            (name, zone) for name, joint, a in _joints(labelled) if (zone := worst_zone(a, joint, share))
+        ]
+        ranked = sorted(known, key=lambda one: one[1][1] - one[1][0])
+        texts = "; ".join(f"{name} {zone_text(zone)}" for name, zone in ranked)
+        if texts:
+            head = f"Zone that holds {percent(share)} of the bushing's wear"
+            sentences.append(f"{head}, the narrowest first: {texts}.")
+    return sentences
 
 
 def superposition(parts: Labelled, whole: Arrays) -> list[str]:

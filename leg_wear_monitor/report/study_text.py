@@ -64,7 +64,8 @@ def with_spread(value: Spread, factor: float = 1.0) -> str:
 
 def percent(share: float) -> str:
     """A share for people."""
-    return f"{number(100.0 * share)} %"
+    text = number(100.0 * share)
+    return f"{text.rstrip('0').rstrip('.') if text.endswith('.0') else text} %"
 
 
 def zone_text(zone: tuple[float, float] | None) -> str:
@@ -144,6 +145,7 @@ def wear_table(labelled: Labelled, head: str) -> Table:
             f"{label}: {joint}" if len(loose_of(arrays)) > 1 else label,
             with_spread(depth_per_cycle(arrays, joint), PICO),
             with_spread(of_loose(arrays, "archard_integral_j_per_cycle", joint)),
+            zone_text(worst_zone(arrays, joint, 0.5)),
             zone_text(worst_zone(arrays, joint)),
         ]
         for label, arrays in labelled
@@ -155,7 +157,8 @@ def wear_table(labelled: Labelled, head: str) -> Table:
             f"{head}, joint",
             "greatest depth [pm a cycle]",
             "∫ F |v| dt [J a cycle]",
-            "zone with 90 % of the wear",
+            "zone with half of the wear",
+            "zone with 90 % of it",
         ],
         rows=rows,
         note="1 pm a cycle is 1 µm in a million cycles. Mean and standard deviation over runs; "

@@ -77,9 +77,9 @@ def mean_profile(arrays: Arrays, joint: str, surface: int = BUSHING) -> Floats:
     )
 
 
-def worst_zone(arrays: Arrays, joint: str) -> tuple[float, float] | None:
-    """Narrowest zone [deg] with 90 % of the bushing's mean wear; None without wear."""
-    return wear_zone(mean_profile(arrays, joint))
+def worst_zone(arrays: Arrays, joint: str, share: float = 0.9) -> tuple[float, float] | None:
+    """Narrowest zone [deg] with a share of the bushing's mean wear; None without wear."""
+    return wear_zone(mean_profile(arrays, joint), share)
 
 
 def power_law(values: ArrayLike, errors: ArrayLike) -> tuple[float, float]:

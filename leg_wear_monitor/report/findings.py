@@ -4,6 +4,7 @@ from collections.abc import Sequence
 
 import numpy as np
 
+from leg_wear_monitor.mechanism.clearance import NORMAL_LAWS
 from leg_wear_monitor.report.study_text import (
     PICO,
     QUANTITIES,
@@ -29,6 +30,7 @@ from leg_wear_monitor.studies.summary import (
 )
 
 _SUM_WITHIN = 0.1  # of the sum
+_NO_POWER = 0.1  # standard error of an exponent beyond which no one power describes the values
 
 
 def _known(arrays: Arrays) -> list[Quantity]:
@@ -74,12 +76,27 @@ def growth(values: Sequence[float], labelled: Labelled, what: str) -> list[str]:
     return sentences
 
 
+def regular_where(labelled: Labelled) -> list[str]:
+    """How far the contact force repeats itself from cycle to cycle, over what is varied."""
+    sentences = []
+    for joint in loose_of(labelled[0][1]):
+        shares = [of_loose(arrays, "repeats_contact_force", joint).mean for _, arrays in labelled]
+        parts = [f"{label} {100.0 * share:.0f}" for (label, _), share in zip(labelled, shares, strict=True)]
+        sentences.append(
+            f"Joint {joint}: share of the contact force's variance that repeats from cycle to cycle [%] "
+            f"(100 is periodic): {'; '.join(parts)}."
+        )
+    return sentences
+
+
 def _as_power(values: Sequence[float], spreads: Sequence[Spread], what: str) -> str:
     means = np.array([each.mean for each in spreads])
     if len(values) < 4 or not (means > 0.0).all():
         return ""
     power, error = power_law(values, means)
-    return f", about as {what} to the power {power:.2f} ± {error:.2f}"
+    if error > _NO_POWER:
+        return ""
+    return f", about as {what} to the power {with_spread(Spread(power, error, power, power))}"
 
 
 def places(labelled: Labelled) -> list[str]:
@@ -192,24 +209,41 @@ def worst_joint(whole: Arrays) -> list[str]:
 
 
 def laws(labelled: Labelled) -> list[str]:
-    """How much depends on the law, against how much cycles and runs differ anyway."""
-    sentences = []
-    for each in _known(labelled[0][1]):
-        spreads = [largest_error(arrays, each.name) for _, arrays in labelled]
-        sentences.append(
-            _law_sentence(f"Largest {each.title} error", each.unit, each.factor, labelled, spreads)
-        )
+    """How much depends on the law of the normal force, and how much on friction."""
+    normal = [one for one in labelled if one[0] in NORMAL_LAWS]
+    lossy = [one for one in normal if one[0] != "hertz"]
+    friction = [one for one in labelled if one[0] not in NORMAL_LAWS]
+    groups = (("The normal laws", normal), ("Those with a loss", lossy), ("Friction", friction))
+    sentences = [_law_sentence(what, group) for what, group in groups if len(group) > 1]
     for joint in loose_of(labelled[0][1]):
         volumes = [of_loose(arrays, "archard_integral_j_per_cycle", joint) for _, arrays in labelled]
-        sentences.append(_law_sentence(f"Wear of {joint}, ∫ F |v| dt", "J a cycle", 1.0, labelled, volumes))
+        low, high = _ends(volumes)
+        sentences.append(
+            f"Wear of {joint}, ∫ F |v| dt: from {with_spread(volumes[low])} J a cycle ({labelled[low][0]}) to "
+            f"{with_spread(volumes[high])} J ({labelled[high][0]})."
+        )
     return sentences
 
 
-def _law_sentence(what: str, unit: str, factor: float, labelled: Labelled, spreads: Sequence[Spread]) -> str:
+def _ends(spreads: Sequence[Spread]) -> tuple[int, int]:
+    """Where the mean is least and greatest."""
+    means = [each.mean for each in spreads]
+    return means.index(min(means)), means.index(max(means))
+
+
+def _law_sentence(what: str, group: Labelled) -> str:
+    """How far means of a group of laws lie apart."""
+    parts = []
+    for each in _known(group[0][1]):
+        parts.append((each.title, [largest_error(arrays, each.name) for _, arrays in group]))
+    for joint in loose_of(group[0][1]):
+        volumes = [of_loose(arrays, "archard_integral_j_per_cycle", joint) for _, arrays in group]
+        parts.append((f"wear of {joint}", volumes))
+    texts = [f"{name} {percent(_span(spreads))}" for name, spreads in parts]
+    names = joined([label.removeprefix("friction ") for label, _ in group])
+    return f"{what} ({names}): greatest less least mean, of the mean: {', '.join(texts)}."
+
+
+def _span(spreads: Sequence[Spread]) -> float:
     means = np.array([each.mean for each in spreads])
-    low, high = int(means.argmin()), int(means.argmax())
-    share = percent((means[high] - means[low]) / means.mean())
-    return (
-        f"{what}: from {number(factor * means[low])} ({labelled[low][0]}) to {number(factor * means[high])} "
-        f"({labelled[high][0]}) {unit}, {share} of the mean."
-    )
+    return float(np.ptp(means) / means.mean())

@@ -83,7 +83,11 @@ def _notice(results: StudyResults) -> Sections:
 def _sweep(results: StudyResults, labelled: Labelled, axis: str, what: str, values: list[float]) -> Sections:
     chosen = ends_and_middle(results.of("response"))
     shown = [(point.label, arrays) for point, arrays in chosen]
-    sentences = findings.disturbance(labelled) + findings.growth(values, labelled, what)
+    sentences = [
+        *findings.disturbance(labelled),
+        *findings.growth(values, labelled, what),
+        *findings.regular_where(labelled),
+    ]
     arrays = [each for _, each in labelled]
     return [
         asked(results),

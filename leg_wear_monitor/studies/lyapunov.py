@@ -78,7 +78,9 @@ def _beside(state: Floats, counts: Flags, offset: Floats) -> Floats:
 
 
 def exponent(logs: Floats, step_time: float, skip: int = 0) -> Estimate:
-    """Exponent from the stretches of independent runs, with its standard error between them.
+    """Exponent from the stretches of independent runs, with its standard error.
+
+    That is the larger one of the errors between runs and between steps: a few runs may agree by chance.
 
     Parameters
     ----------
@@ -87,5 +89,7 @@ def exponent(logs: Floats, step_time: float, skip: int = 0) -> Estimate:
     skip : int
         First steps to leave out, while the neighbour turns into the direction that grows most.
     """
-    each = logs[:, skip:].mean(axis=1) / step_time
-    return Estimate(float(each.mean()), float(each.std(ddof=1) / np.sqrt(len(each))))
+    rates = logs[:, skip:] / step_time
+    each = rates.mean(axis=1)
+    errors = each.std(ddof=1) / np.sqrt(len(each)), rates.std(ddof=1) / np.sqrt(rates.size)
+    return Estimate(float(each.mean()), float(max(errors)))

@@ -219,8 +219,8 @@ def laws(labelled: Labelled) -> list[str]:
         volumes = [of_loose(arrays, "archard_integral_j_per_cycle", joint) for _, arrays in labelled]
         low, high = _ends(volumes)
         sentences.append(
-            f"Wear of {joint}, ∫ F |v| dt: from {with_spread(volumes[low])} J a cycle ({labelled[low][0]}) to "
-            f"{with_spread(volumes[high])} J ({labelled[high][0]})."
+            f"Wear of {joint}, ∫ F |v| dt [J a cycle]: from {with_spread(volumes[low])} ({labelled[low][0]}) "
+            f"to {with_spread(volumes[high])} ({labelled[high][0]})."
         )
     return sentences
 

@@ -126,7 +126,7 @@ def replay(
         monitor = WearMonitor(mechanism, config, open_ledger(mechanism, config))
         stack.callback(monitor.close)
         result = ReplayResult(monitor, History(monitor.loose), recording.files, recording.topics, time)
-        sink = None if out is None else stack.enter_context(_sink(Path(out), monitor))
+        sink = None if out is None else stack.enter_context(_sink(Path(out), monitor, recording.files))
         if ready:
             ready(monitor)
         for block in recording.blocks():
@@ -150,12 +150,15 @@ def _take(result: ReplayResult, samples: Samples, sink: Sink | None) -> None:
         sink.take(reports, result.end_ns)
 
 
-def _sink(directory: Path, monitor: WearMonitor) -> Sink:
+def _sink(directory: Path, monitor: WearMonitor, files: list[Path]) -> Sink:
+    path = directory / REPORTS_FILE
+    if any(path.resolve() == file.resolve() for file in files):
+        raise RecordingError(str(path), "", "is to be read and written, expected another directory")
     try:
         directory.mkdir(parents=True, exist_ok=True)
     except OSError as error:
         raise RecordingError(str(directory), "", f"cannot be made: {error.strerror}") from error
-    return Sink(directory / REPORTS_FILE, monitor)
+    return Sink(path, monitor)
 
 
 def _beats(block: Block, config: MonitorConfig) -> Iterator[Samples]:

@@ -182,6 +182,14 @@ def test_the_ledger_of_the_parameters_is_left_alone_and_one_that_is_asked_for_is
     np.testing.assert_allclose(again.monitor.wear_depth_m, first.monitor.wear_depth_m, rtol=1e-12)
 
 
+def test_a_recording_is_not_written_over_by_its_own_reports(bag: Path, tmp_path: Path) -> None:
+    path = tmp_path / "reports.mcap"
+    path.write_bytes(bag.read_bytes())
+    with pytest.raises(lw.LegWearError, match="is to be read and written"):
+        lw.replay(path, lw.MonitorConfig(), out=tmp_path)
+    assert path.read_bytes() == bag.read_bytes()
+
+
 def test_progress_goes_from_little_to_all(bag: Path) -> None:
     shares: list[float] = []
     lw.replay(bag, lw.MonitorConfig(), progress=shares.append)

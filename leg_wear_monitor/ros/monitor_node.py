@@ -1,9 +1,12 @@
 """Node ``leg_wear_monitor``: samples from topics to the monitor, its reports to topics."""
 
+import time
 from collections.abc import Callable, Sequence
 from functools import partial
 from typing import Any
 
+from rclpy.clock import Clock
+from rclpy.clock_type import ClockType
 from std_srvs.srv import Trigger
 
 from leg_wear_monitor.errors import LegWearError
@@ -63,8 +66,10 @@ class MonitorNode(ClosingNode):
         self._inputs = subscribe(self, config, self._receive)
         for topic, _ in self._inputs:
             self._black_box.add_topic(topic.name, topic.type, SENSOR_DATA)
-        self.create_timer(_WORK_S, self._work)
-        self.create_timer(config.diagnostics.period_s, self._diagnose)
+        # work and diagnostics go on where simulated time stands still
+        steady = Clock(clock_type=ClockType.STEADY_TIME)
+        self.create_timer(_WORK_S, self._work, clock=steady)
+        self.create_timer(config.diagnostics.period_s, self._diagnose, clock=steady)
         self.get_logger().info(f"monitoring joints {', '.join(self._monitor.loose)} of {mechanism.name}")
 
     @property
@@ -88,18 +93,19 @@ class MonitorNode(ClosingNode):
 
     # --- in ---
 
-    def _now_ns(self) -> int:
+    def _ros_now_ns(self) -> int:
+        """Now, as people and other nodes see it [ns]."""
         return self.get_clock().now().nanoseconds
 
     def _receive(self, topic: InputTopic, raw: bytes) -> None:
-        topic.heard_ns = self._now_ns()
+        topic.heard_ns = time.time_ns()
         self._inbox.add(topic.kind, raw, topic.heard_ns)
 
     def _work(self) -> None:
         """Pass on what has come, a bounded part at a time."""
         if not len(self._inbox):
             return
-        coarse = self._load.note(self._inbox.delay_s(self._now_ns()))
+        coarse = self._load.note(self._inbox.delay_s(time.time_ns()))
         arrivals = self._inbox.take(_AT_ONCE)
         if self._black_box.on:
             names = {topic.kind: topic.name for topic, _ in self._inputs}
@@ -110,7 +116,7 @@ class MonitorNode(ClosingNode):
     # --- out ---
 
     def _publish(self, reports: Reports, coarse: bool) -> None:
-        now_ns = self._now_ns()
+        now_ns = time.time_ns()
         self._markers.note(reports.samples)
         for outgoing in self._messages.of(reports):
             if coarse and outgoing.output in _A_SAMPLE and not self._black_box.on:
@@ -121,10 +127,10 @@ class MonitorNode(ClosingNode):
             self._outlets.send(outputs.FORECAST, now_ns, self._messages.forecast(cycle))
 
     def _send_alarms(self, alarms: AlarmList) -> None:
-        self._outlets.send(outputs.ALARMS, self._now_ns(), self._messages.alarms(alarms))
+        self._outlets.send(outputs.ALARMS, time.time_ns(), self._messages.alarms(alarms))
 
     def _diagnose(self) -> None:
-        now_ns = self._now_ns()
+        now_ns = time.time_ns()
         publishers = [(topic, self.count_publishers(topic.name)) for topic, _ in self._inputs]
         status = (
             *self._monitor.status(),
@@ -132,7 +138,8 @@ class MonitorNode(ClosingNode):
             topics_status(publishers, now_ns),
             recording_status(self._black_box),
         )
-        self._outlets.send(outputs.DIAGNOSTICS, now_ns, self._messages.diagnostics(now_ns, status))
+        message = self._messages.diagnostics(self._ros_now_ns(), status)
+        self._outlets.send(outputs.DIAGNOSTICS, now_ns, message)
         self._black_box.flush()
 
     # --- people ---
@@ -161,7 +168,7 @@ class MonitorNode(ClosingNode):
         self.create_service(Trigger, name, answer)
 
     def _acknowledge(self) -> str:
-        cleared, kept = self._monitor.acknowledge(self._now_ns())
+        cleared, kept = self._monitor.acknowledge(self._ros_now_ns())
         self._send_alarms(self._monitor.alarms)
         return f"cleared: {_listed(cleared)}; still present: {_listed(kept)}"
 
@@ -170,7 +177,7 @@ class MonitorNode(ClosingNode):
         return f"saved in {self._monitor.config.ledger.path}"
 
     def _reset_wear(self, joint: str) -> str:
-        self._monitor.reset_wear(joint, self._now_ns(), "service ~/reset_wear")
+        self._monitor.reset_wear(joint, self._ros_now_ns(), "service ~/reset_wear")
         return f"joint {joint}: fresh surfaces, history kept"
 
 

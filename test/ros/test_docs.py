@@ -1,8 +1,10 @@
 """docs/ros.md lists the gait publisher's parameters as they are declared; a script renews the table."""
 
 import re
+from configparser import ConfigParser
 from pathlib import Path
 from typing import Any
+from xml.etree import ElementTree
 
 import pytest
 from ruamel.yaml import YAML
@@ -55,6 +57,19 @@ def test_the_demo_s_parameters_fit_both_nodes() -> None:
     assert monitor.wear_acceleration == leg.wear_acceleration == 1.0e3
     fastest = max(abs(speed - monitor.cadence.commanded_rpm) for speed in leg.pace.speeds_rpm)
     assert 0.0 < fastest < monitor.cadence.tolerance_rpm
+
+
+@pytest.mark.plain
+def test_launch_files_start_what_is_installed() -> None:
+    package = share_directory()
+    setup = ConfigParser()
+    setup.read(package / "setup.cfg")
+    scripts = setup["options.entry_points"]["console_scripts"].split("\n")
+    installed = {line.split("=")[0].strip() for line in scripts if line}
+    nodes = [node for path in package.glob("launch/*.xml") for node in ElementTree.parse(path).iter("node")]
+    assert len(nodes) == 3
+    assert {node.get("pkg") for node in nodes} == {"leg_wear_monitor"}
+    assert {node.get("exec") for node in nodes} <= installed
 
 
 if __name__ == "__main__":

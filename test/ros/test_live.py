@@ -209,7 +209,10 @@ def test_malformed_messages_are_counted_and_harm_nothing(stage) -> None:
     monitor = stage.monitor(alarms__on_delay_cycles=1)
     stage.legs().play(walk, monitor)
     lost = monitor.node.monitor.lost
-    assert sum(lost.faulty.values()) == sum(one.fault != 0 for one in walk.readings)
+    # the last of them still wait with their topic for the other one
+    assert monitor.received == len(walk.readings)
+    waited = sum(one.fault != 0 for one in walk.readings if one.arrival_s < 2.5)
+    assert waited <= sum(lost.faulty.values()) <= sum(one.fault != 0 for one in walk.readings)
     assert {"empty", "wrong_length", "missing_joint", "not_finite", "zero_stamp"} <= {
         name for name, count in lost.faulty.items() if count
     }

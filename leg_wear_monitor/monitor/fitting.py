@@ -40,16 +40,21 @@ def fitted(mechanism: Mechanism, config: MonitorConfig, source: str = "parameter
     _check_joints(loose, mechanism, source)
     speed = 2.0 * math.pi * (config.cadence.commanded_rpm / 60.0)
     settings = {name: _settings(mechanism, config, loose, k, source) for k, name in enumerate(loose)}
-    for limits in ("joint_impact_force_n", "joint_clearance_m"):
-        given = getattr(config.limits, limits)
-        if given and len(given) != len(loose):
-            raise _wrong_length(source, f"limits.{limits}", given, loose, "")
+    check_limits(config, loose, source)
     return attrs.evolve(
         mechanism,
         loose=loose,
         clearances=mechanism.clearances | settings,
         drive=attrs.evolve(mechanism.drive, speed=speed),
     )
+
+
+def check_limits(config: MonitorConfig, loose: Sequence[str], source: str = "parameters") -> None:
+    """Whether limits that are given one a joint are one each; raises ConfigError if not."""
+    for limits in ("joint_impact_force_n", "joint_clearance_m"):
+        given = getattr(config.limits, limits)
+        if given and len(given) != len(loose):
+            raise _wrong_length(source, f"limits.{limits}", given, loose, "")
 
 
 def twin_settings(config: MonitorConfig, source: str = "parameters") -> TwinSettings:

@@ -11,7 +11,7 @@ from leg_wear_monitor.monitor.beats import A_CYCLE, Beats
 from leg_wear_monitor.monitor.book import Book
 from leg_wear_monitor.monitor.config import MonitorConfig
 from leg_wear_monitor.monitor.cycle_report import cycle_report
-from leg_wear_monitor.monitor.fitting import fitted, twin_settings
+from leg_wear_monitor.monitor.fitting import check_limits, fitted, twin_settings
 from leg_wear_monitor.monitor.forecaster import Forecaster
 from leg_wear_monitor.monitor.growth import GrowthWindow, extended
 from leg_wear_monitor.monitor.judge import Judge
@@ -135,7 +135,14 @@ class WearMonitor:
         return statuses(self._twin, self._judge, self._book, self._state.last, self._state.happened)
 
     def configure(self, config: MonitorConfig) -> None:
-        """Take over parameters that may change while it runs; see `parameters.changed`."""
+        """Take over parameters that may change while it runs; see `parameters.changed`.
+
+        Raises
+        ------
+        ConfigError
+            For limits of joints that are not one each; nothing has changed then.
+        """
+        check_limits(config, self.loose)
         self.config = config
         self._judge.configure(config)
 

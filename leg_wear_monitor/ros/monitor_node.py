@@ -13,6 +13,7 @@ from leg_wear_monitor.errors import LegWearError
 from leg_wear_monitor.mechanism.loader import load_mechanism
 from leg_wear_monitor.monitor.alarms import Alarm
 from leg_wear_monitor.monitor.config import MonitorConfig
+from leg_wear_monitor.monitor.fitting import check_limits
 from leg_wear_monitor.monitor.ledger import open_ledger
 from leg_wear_monitor.monitor.reports import AlarmList, Reports
 from leg_wear_monitor.monitor.wear_monitor import WearMonitor
@@ -59,7 +60,9 @@ class MonitorNode(ClosingNode):
         self._outlets = Outlets(self, outputs.OUTPUTS, self._black_box)
         self._forecasts = ForecastTimes()
         self._compile(decoder)
-        parameters.follow(self, self._configure)
+        parameters.follow(
+            self, self._configure, lambda config: check_limits(config, self._monitor.loose, self.get_name())
+        )
         self._serve()
         self._markers = MarkerTopic(self, self._monitor)
         self._send_alarms(self._monitor.alarms)

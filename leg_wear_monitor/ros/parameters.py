@@ -46,12 +46,25 @@ class Parameters(Generic[Config]):
         for name, value in values_of(self.config).items():
             _declare(node, parameters_of(kind)[name], value)
 
-    def follow(self, node: Node, changed_to: Callable[[Config], None]) -> None:
-        """Let parameters change while the node runs, and tell of each change that was accepted."""
+    def follow(
+        self,
+        node: Node,
+        changed_to: Callable[[Config], None],
+        check_fit: Callable[[Config], None] = lambda _: None,
+    ) -> None:
+        """Let parameters change while the node runs, and tell of each change that was accepted.
+
+        Parameters
+        ----------
+        node : rclpy.node.Node
+        changed_to : callable
+        check_fit : callable, optional
+            Raises ConfigError for values that are good by themselves but do not fit the rest.
+        """
 
         def check(parameters: list[RosParameter]) -> SetParametersResult:
             try:
-                self._with(parameters)
+                check_fit(self._with(parameters))
             except ConfigError as error:
                 return SetParametersResult(successful=False, reason=str(error))
             return SetParametersResult(successful=True)

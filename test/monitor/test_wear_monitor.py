@@ -196,6 +196,15 @@ def test_limits_change_while_it_runs(monitor, gait):
     } == {*monitor.loose}
 
 
+def test_limits_that_are_not_one_a_joint_change_nothing(monitor):
+    before = monitor.config
+    with pytest.raises(
+        ConfigError, match=r"limits.joint_clearance_m: \[0.001\] has 1 values, expected one each"
+    ):
+        monitor.configure(changed(before, {"limits.joint_clearance_m": [1.0e-3]}))
+    assert monitor.config is before
+
+
 @pytest.mark.parametrize(
     ("values", "rpm", "raised"),
     [

@@ -65,6 +65,7 @@ def test_a_live_parameter_changes_the_running_monitor(shared_stage, monitor) -> 
         ("limits.clearance_m", "wide", "Wrong parameter type"),
         ("hardware_id", "other", "read-only"),
         ("limits.clearence_m", 0.001, "declared"),
+        ("limits.joint_clearance_m", [0.001], "has 1 values, expected one each for A, B, G, I, J"),
     ],
 )
 def test_a_change_that_cannot_be_is_refused_in_a_line(shared_stage, monitor, name, value, reason) -> None:

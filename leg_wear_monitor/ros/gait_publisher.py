@@ -26,6 +26,7 @@ from leg_wear_monitor.twin.sample import CRANK, TORQUE
 
 _BLOCK_S = 0.05  # of walking, computed at a time
 _AHEAD = 20  # blocks
+_LATE_S = 0.2
 
 
 class GaitPublisher(ClosingNode):
@@ -66,6 +67,11 @@ class GaitPublisher(ClosingNode):
                 time.sleep(min(wait, WAKE_S))
             if not self.context.ok():
                 return
+            if wait < -_LATE_S:
+                self.get_logger().warning(
+                    "cannot walk in step with the clock; lower rates or time_scale, or precompute",
+                    throttle_duration_sec=5.0,
+                )
             message = sensor_message(reading, self._start_ns, self.config)
             self._by_kind[reading.kind].publish(message)
             self.published += 1

@@ -82,10 +82,12 @@ class MonitorNode(ClosingNode):
 
     def close(self) -> None:
         """Take what has come, save the ledger, end the recording."""
-        while len(self._inbox):
-            self._work()
-        self._monitor.close()
-        self._black_box.close()
+        try:
+            while len(self._inbox):
+                self._work()
+        finally:
+            self._monitor.close()
+            self._black_box.close()
 
     def _compile(self, decoder: Decoder) -> None:
         """Pay for compilation before the first sample."""

@@ -34,7 +34,8 @@ def find_beat(stamp, first, length, state):  # type: ignore[no-untyped-def]
         if at > 0:
             if state[BEGIN] == 0:
                 state[BEGIN], state[NEWEST] = at, at
-            outside = at >= state[BEGIN] + length or at < state[BEGIN] - length
+            since = at - state[BEGIN]  # of two stamps above 0: it cannot overflow
+            outside = since >= length or since < -length
             if at > state[NEWEST] and not outside:
                 state[NEWEST], state[IDLE] = at, 0
             if outside and state[OUTSIDE] > 0:

@@ -16,7 +16,7 @@ from leg_wear_monitor.monitor.forecaster import Forecaster
 from leg_wear_monitor.monitor.growth import GrowthWindow, extended
 from leg_wear_monitor.monitor.judge import Judge
 from leg_wear_monitor.monitor.ledger import Ledger
-from leg_wear_monitor.monitor.ledger_entry import AlarmEvent, Audit
+from leg_wear_monitor.monitor.ledger_entry import Audit
 from leg_wear_monitor.monitor.measure import Finding
 from leg_wear_monitor.monitor.monitor_state import MonitorSnapshot, MonitorState
 from leg_wear_monitor.monitor.reports import (
@@ -156,8 +156,7 @@ class WearMonitor:
         """
         cleared, kept = self._judge.board.acknowledge()
         self._book.state.cut_off_s = None
-        for alarm in (*cleared, *kept):
-            self._book.note(AlarmEvent(stamp_ns, alarm))
+        self._book.note_alarms(AlarmList(stamp_ns, self.alarms.alarms))
         if cleared or kept:
             self._keep()
         return cleared, kept

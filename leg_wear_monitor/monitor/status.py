@@ -29,7 +29,7 @@ def statuses(
     joints = [_joint(k, name, twin, judge, last) for k, name in enumerate(twin.loose)]
     return (
         _gait(twin, judge, book, last, happened),
-        _input(twin, judge),
+        _input(twin, judge, book),
         _torque(judge, last),
         *joints,
         _alarms(judge),
@@ -44,6 +44,8 @@ def _gait(
     message = tracking.name.lower().replace("_", " ")
     if happened and tracking in (Tracking.STARTING, Tracking.OUT_OF_STEP):
         message += f", last {happened[-1].what.value.replace('_', ' ')}"
+    if judge.config.wear_acceleration != 1.0:
+        message += "; wear is accelerated, this is a demonstration"
     values = {
         "cadence_rpm": twin.speed_radps * 30.0 / math.pi,
         "commanded_rpm": judge.config.cadence.commanded_rpm,
@@ -54,8 +56,8 @@ def _gait(
     return Status("gait", judge.board.level(names.CADENCE), message, values)
 
 
-def _input(twin: DigitalTwin, judge: Judge) -> Status:
-    counts = attrs.asdict(twin.intake)
+def _input(twin: DigitalTwin, judge: Judge, book: Book) -> Status:
+    counts = attrs.asdict(twin.intake) | {"already_counted": book.state.skipped}
     faulty = counts.pop("faulty")
     for stamp in ("newest_stamp_ns", "followed_stamp_ns"):
         counts.pop(stamp)

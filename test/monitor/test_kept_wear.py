@@ -72,6 +72,8 @@ def test_time_that_is_counted_is_not_counted_again(begin, gait):
     np.testing.assert_array_equal(again._twin.depth, worn)
     assert again._book.totals["moving_s"] == totals["moving_s"]
     assert reports.lost.already_counted > 750  # but for the tracker's lag at the end
+    (status,) = [status for status in again.status() if status.name == "input"]
+    assert status.values["already_counted"] == reports.lost.already_counted
     after = again.update(gait(5.5, begin_s=4.0))
     assert len(after.cycles) >= 3
     assert after.lost.unmonitored_s < 0.3

@@ -48,16 +48,16 @@ def measure(
     By feeler gauge, micrometer or dial; a dial that is moved to and fro shows twice the radial clearance. The
     monitor of this leg must not run meanwhile. Exit code 1 if the measurement contradicts the model.
     """
-    found = _measured(joint, 1.0e-3 * mm, 1.0e-3 * sigma, config, ledger, accept)
+    found, record = _measured(joint, 1.0e-3 * mm, 1.0e-3 * sigma, config, ledger, accept)
     click.echo(f"{joint}: {mm:g} mm ± {sigma:g} mm, {found.measurement.cycles} gait cycles after it was new")
-    for line in found.words:
+    for line in (*found.words, record):
         click.echo(line)
     return CONTRADICTS if found.contradicts else 0
 
 
 def _measured(
     joint: str, clearance_m: float, sigma_m: float, config_file: Path | None, path: Path | None, accept: bool
-) -> "Finding":
+) -> tuple["Finding", str]:
     import attrs
 
     from leg_wear_monitor.mechanism.loader import load_mechanism
@@ -66,6 +66,7 @@ def _measured(
     from leg_wear_monitor.monitor.ledger_entry import new_part
     from leg_wear_monitor.monitor.measure import measure as judge
     from leg_wear_monitor.monitor.parameter_file import load_config
+    from leg_wear_monitor.monitor.validity import validity
 
     config = load_config(config_file)
     if path is not None:
@@ -95,4 +96,4 @@ def _measured(
         ledger.record()
     finally:
         ledger.close()
-    return found
+    return found, validity([*ledger.measurements, found.measurement]).words

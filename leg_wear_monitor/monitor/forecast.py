@@ -190,7 +190,7 @@ def forecast_joint(
         return say(Answer.NOT_ENOUGH_DATA)
     if not now.growth_m > 0.0:
         return say(Answer.NO_GROWTH)
-    log_rate = log_factor + settings.load_sigma * _NORMAL[2]
+    log_rate = log_factor + math.hypot(settings.load_sigma, settings.model_sigma) * _NORMAL[2]
     log_rate += now.growth_error_m / now.growth_m * _NORMAL[3]
     room = np.maximum(now.limit_m - clearance, 0.0)
     if shape is not None:

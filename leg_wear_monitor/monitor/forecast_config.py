@@ -27,6 +27,13 @@ class Forecasting:
         at_most=3.0,
         default=0.1,
     )
+    model_sigma: float = quantity(
+        "",
+        "the same of what the model's growth is off, for joints act upon each other (docs/forecast.md)",
+        at_least=0.0,
+        at_most=3.0,
+        default=0.07,
+    )
     clearance_sigma_m: float = quantity(
         "m", "standard deviation of a new joint's clearance", above=0.0, at_most=1.0e-3, default=5.0e-6
     )

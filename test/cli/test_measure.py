@@ -35,9 +35,10 @@ def rows(path):
 def test_a_measurement_is_kept_and_explained(run, ledger):
     result = run("measure", "A", "0.42", "--sigma", "0.005", "--ledger", str(ledger))
     assert (result.exit_code, result.stderr) == (0, "")
-    first, second = result.stdout.splitlines()
+    first, second, third = result.stdout.splitlines()
     assert first == "A: 0.42 mm ± 0.005 mm, 4000 gait cycles after it was new"
     assert second.startswith("the wear coefficient is 1.9")
+    assert third.startswith("1 of 1 measured clearances were between expected p10 and p90")
     assert rows(ledger) == [("A", pytest.approx(4.2e-4), pytest.approx(6e-5), 4000, 1)]
 
 

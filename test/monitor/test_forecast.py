@@ -18,7 +18,7 @@ from leg_wear_monitor.monitor.forecast_config import Forecasting
 pytestmark = pytest.mark.plain
 
 SETTINGS = Forecasting()
-SURE = Forecasting(load_sigma=0.0, clearance_sigma_m=1e-12, duty_sigma=0.0)
+SURE = Forecasting(load_sigma=0.0, model_sigma=0.0, clearance_sigma_m=1e-12, duty_sigma=0.0)
 NOW = JointNow(
     fresh_m=3e-4, wear_m=0.0, limit_m=6e-4, growth_m=1.5e-11, growth_error_m=0.0, cycle_s=1.0, valid=True
 )

@@ -64,7 +64,7 @@ def test_clearances_and_the_encoders_errors_are_found_at_once(model, shape, nois
     found = watched(model, shape, known_before(FRESH, 3e-4, 3), WORN, noise=noise).fused()
     np.testing.assert_allclose(found.clearance_m, WORN, atol=1e-5 + 0.02 * noise)
     np.testing.assert_allclose(found.mean[5:9], ERRORS[:4], atol=2e-4 + noise)
-    assert (found.sigma_m < 2e-5 + 0.02 * noise).all()
+    assert (found.sigma_m < 3e-5 + 0.02 * noise).all()
 
 
 @pytest.mark.plain
@@ -84,7 +84,7 @@ def test_more_cycles_make_it_surer(model, shape):
         watched(model, shape, before, WORN, cycles, noise=1e-3, scatter=0.3).alone().sigma_m
         for cycles in (20, 160)
     )
-    assert (many < 0.75 * few).all()
+    assert (many < 0.9 * few).all()
 
 
 @pytest.mark.plain

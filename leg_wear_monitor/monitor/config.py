@@ -120,7 +120,7 @@ class LedgerFile:
     path: str = described("file of the ledger; empty: none is kept, wear is lost at the end", default="")
     checkpoint_s: float = quantity(
         "s",
-        "longest time between two entries, rounded up to gait cycles",
+        "longest time between two entries while the leg moves, and a beat (a quarter of a gait cycle)",
         above=0.0,
         at_most=600.0,
         default=5.0,

@@ -38,6 +38,8 @@ def costs() -> dict[str, float]:
     """Processor seconds of every study that comes with the package: one point of each task, scaled by its "
     "cost."""
     leg, found = load_mechanism(), {}
+    for point in points_of(work(1)):  # compiled before anything is measured
+        compute(point.task, leg, point.settings, code_digest())
     print("Cost of the studies as they come, by the processor's time")
     print(f"  {'study':>10} {'points':>7} {'seconds':>9}   of which")
     for name in STUDIES:
@@ -57,16 +59,9 @@ def costs() -> dict[str, float]:
 
 def sweep(found: dict[str, float]) -> None:
     """What all studies of a thousand legs would take, on paper."""
-    whole = sum(found.values())
-    hours = LEGS * whole / CORES / 3600.0
-    print(
-        f"\n{LEGS} legs, all studies each: {LEGS * whole / 3600.0:.0f} core hours, on {CORES} cores "
-        f"{hours:.1f} h,"
-    )
-    print(
-        "  without what the scheduler, the network and the last points cost; multi alone "
-        f"{LEGS * found['multi'] / CORES / 60.0:.0f} min"
-    )
+    whole, multi = sum(found.values()), found["multi"]
+    print(f"\n{LEGS} legs on {CORES} cores, on paper: all studies {LEGS * whole / CORES / 3600.0:.1f} h,")
+    print(f"  multi alone {LEGS * multi / CORES / 60.0:.0f} min; without what scheduler and network cost")
 
 
 def work(points: int) -> Study:

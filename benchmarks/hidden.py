@@ -14,14 +14,8 @@ from leg_wear_monitor.dynamics.simulation import prepare
 from leg_wear_monitor.dynamics.tally import new_tally
 from leg_wear_monitor.mechanism.arrays import body_names
 from leg_wear_monitor.mechanism.spec import Mechanism
-from leg_wear_monitor.monitor.hidden import (
-    LEAST_CYCLES,
-    HiddenClearance,
-    known_before,
-    observability,
-    with_clearances,
-    worn_joint,
-)
+from leg_wear_monitor.monitor.angle_regression import known_before, observability, with_clearances
+from leg_wear_monitor.monitor.hidden import LEAST_CYCLES, HiddenClearance, likeliest_worn, worn_joint
 from leg_wear_monitor.twin.joint_angles import angle_model, contact_shape, design
 
 SENSORS = {"B": "hip", "G": "knee", "I": "ankle"}
@@ -104,21 +98,9 @@ def told(leg, k, watched, held):
     true = "none" if k is None else leg.loose[k]
     print(f"  worn {true:>4}: {cells}   {first or '-':>3}", end="")
     if first is not None:
-        named, clearance_m = only_one(leg, hidden, held)
+        named, clearance_m = likeliest_worn(leg, hidden, held)
         print(f"  {leg.loose[named]}, {1e6 * clearance_m:.0f}", end="")
     print()
-
-
-def only_one(leg, hidden, held):
-    """The joint that, worn alone, fits best what was seen, and its clearance."""
-    most = float(np.abs(hidden.fused().clearance_m - held.clearance_m).max())
-    fits = []
-    for k in range(len(leg.loose)):
-        clearance = held.clearance_m.copy()
-        clearance[k] += most
-        fits.append(hidden.alone_worn(k, contact_shape(leg, clearance)))
-    named = int(np.argmin([misfit for misfit, _ in fits]))
-    return named, fits[named][1]
 
 
 if __name__ == "__main__":

@@ -6,141 +6,19 @@ is fused with what was known before: the clearances that Archard's law predicts,
 held since commissioning. A sensor that comes later starts with errors that are not known.
 """
 
-from collections.abc import Sequence
-from enum import Enum
-
-import attrs
 import numpy as np
 
 from leg_wear_monitor.mechanism.arrays import Floats
-from leg_wear_monitor.mechanism.ideal import TURN
-from leg_wear_monitor.twin.joint_angles import PHASES, SHAPE_CYCLES, AngleModel, design
+from leg_wear_monitor.mechanism.spec import Mechanism
+from leg_wear_monitor.monitor.angle_regression import Estimate, binned, blind_directions, regress, rms
+from leg_wear_monitor.twin.joint_angles import SHAPE_CYCLES, AngleModel, contact_shape, design
 
-OFFSET_SIGMA_RAD = 0.05  # of an encoder that is not commissioned
-SCALE_SIGMA = 0.01
 LEAST_CYCLES = 20
 # what the linear model and its shape are off against full coordinates (benchmarks/hidden.py)
 MODEL_SIGMA_M = 2.0e-5
 
-_RIDGE = 1.0e-9
-_HUBER = 1.5  # standard deviations beyond which a bin loses weight
-_ROUNDS = 4
 _BATCH = 2  # cycles: neighbours hang together
 _NO_NEWS = 1.0e6  # of the variance before
-_BLIND = 1.0e-3  # of the largest singular value: less is not shown
-
-
-class Observable(Enum):
-    """Whether sensors show a joint's clearance."""
-
-    YES = "observable"
-    TOGETHER = "observable only together with others"
-    NO = "not observable"
-
-
-@attrs.frozen(eq=False)
-class Estimate:
-    """Clearances and encoder errors, with their covariance.
-
-    Attributes
-    ----------
-    mean : (k + 1 + 2 m,) array
-        Clearances [m], offset of the crank's encoder [rad], offsets [rad] and scale errors of the others.
-    covariance : array
-    joints : int
-        k.
-    """
-
-    mean: Floats
-    covariance: Floats
-    joints: int
-
-    @property
-    def clearance_m(self) -> Floats:
-        """Clearances (k,)."""
-        return self.mean[: self.joints]
-
-    @property
-    def sigma_m(self) -> Floats:
-        """Their standard deviations (k,)."""
-        return np.asarray(np.sqrt(np.diagonal(self.covariance)[: self.joints]))
-
-
-def known_before(clearance_m: Sequence[float], sigma_m: float | Floats, sensors: int) -> Estimate:
-    """What is known without a look at encoders: the clearances, and nothing of the encoders' errors.
-
-    Parameters
-    ----------
-    clearance_m : sequence of k float
-        When new, or as Archard's law predicts.
-    sigma_m : float or (k,) array
-    sensors : int
-        Encoders beside the crank's.
-    """
-    k = len(clearance_m)
-    sigma = np.concatenate(
-        [
-            np.broadcast_to(sigma_m, k),
-            np.full(1 + sensors, OFFSET_SIGMA_RAD),
-            np.full(sensors, SCALE_SIGMA),
-        ]
-    )
-    return Estimate(np.concatenate([clearance_m, np.zeros(1 + 2 * sensors)]), np.diag(np.square(sigma)), k)
-
-
-def with_clearances(before: Estimate, clearance_m: Sequence[float], sigma_m: float | Floats) -> Estimate:
-    """The encoders' errors as held, and clearances as predicted anew."""
-    k = before.joints
-    mean, covariance = before.mean.copy(), before.covariance.copy()
-    mean[:k] = clearance_m
-    covariance[:k], covariance[:, :k] = 0.0, 0.0
-    covariance[:k, :k] = np.diag(np.square(np.broadcast_to(sigma_m, k)))
-    return Estimate(mean, covariance, k)
-
-
-def binned(model: AngleModel, crank_angle: Floats, angles: Floats) -> tuple[Floats, Floats]:
-    """Mean deviation (P, m) [rad] of a cycle's samples in each phase, NaN without any; and their counts."""
-    at = np.minimum((crank_angle % TURN) * (PHASES / TURN), PHASES - 0.5).astype(np.int64)
-    deviation = model.deviation(crank_angle, angles)
-    there = np.isfinite(deviation)
-    sums, counts = np.zeros((2, PHASES, angles.shape[1]))
-    np.add.at(sums, at, np.where(there, deviation, 0.0))
-    np.add.at(counts, at, there.astype(float))
-    with np.errstate(invalid="ignore"):
-        return sums / counts, counts
-
-
-def regress(columns: Floats, deviation: Floats, counts: Floats, before: Estimate) -> Floats:
-    """Clearances and encoder errors (k + 1 + 2 m,) of one cycle, by Huber's M-estimate.
-
-    What no sensor shows stays as it was before.
-
-    Parameters
-    ----------
-    columns : (P, m, k + 1 + 2 m) array
-        As `design` gives them.
-    deviation, counts : (P, m) arrays
-        Of `binned`.
-    before : Estimate
-        Keeps apart, very weakly, what sensors cannot.
-    """
-    p = columns.shape[-1]
-    used = (counts > 0.0).ravel()
-    x, y = columns.reshape(-1, p)[used], deviation.ravel()[used]
-    root = np.sqrt(counts.ravel()[used])
-    y = y - x @ before.mean
-    length = np.linalg.norm(x, axis=0)
-    scale = 1.0 / np.where(length > 0.0, length, 1.0)
-    x = x * scale
-    weight, solution = root.copy(), np.zeros(p)
-    for _ in range(_ROUNDS):
-        a = x * weight[:, None]
-        ridge = _RIDGE * np.linalg.norm(a) ** 2 / p
-        solution = np.linalg.solve(a.T @ a + ridge * np.eye(p), a.T @ (y * weight))
-        residual = np.abs(y - x @ solution) * root
-        spread = max(1.4826 * float(np.median(residual)), 1.0e-12)
-        weight = root * np.sqrt(np.minimum(1.0, _HUBER * spread / np.maximum(residual, 1.0e-300)))
-    return np.asarray(before.mean + scale * solution)
 
 
 class HiddenClearance:
@@ -207,7 +85,7 @@ class HiddenClearance:
         left = (sums.ravel()[used] / counts.ravel()[used]) - columns @ rest
         size = float(column @ column)
         clearance_m = float(column @ left) / size if size > 0.0 else float(self.before.mean[k])
-        return _rms(left - clearance_m * column), clearance_m
+        return rms(left - clearance_m * column), clearance_m
 
     @property
     def cycles(self) -> int:
@@ -246,54 +124,6 @@ class HiddenClearance:
         return Estimate(mean, covariance * np.outer(scale, scale), self.before.joints)
 
 
-def blind_directions(columns: Floats, counts: Floats) -> Floats:
-    """Changes (n, p) of the parameters that sensors do not show; ``counts`` (P, m) samples in each bin."""
-    a = columns.reshape(-1, columns.shape[-1])[(counts > 0.0).ravel()]
-    length = np.linalg.norm(a, axis=0)
-    length[length == 0.0] = 1.0
-    _, s, vt = np.linalg.svd(a / length)
-    return np.asarray(vt[s <= _BLIND * s[0]] / length)
-
-
-def observability(columns: Floats, sensors: Sequence[int], joints: int) -> list[tuple[Observable, float]]:
-    """Of each loose joint, whether some of the sensors show its clearance, and how much.
-
-    Parameters
-    ----------
-    columns : (P, m, k + 1 + 2 m) array
-        As `design` gives them.
-    sensors : sequence of int
-        Those of the m that are there.
-    joints : int
-        k.
-
-    Returns
-    -------
-    list of (Observable, float)
-        With the RMS deviation [rad/m] that its clearance makes beyond what other clearances and the
-        encoders' errors can make, too.
-    """
-    m, errors = columns.shape[1], joints + 1
-    own = [*range(errors), *(errors + i for i in sensors), *(errors + m + i for i in sensors)]
-    a = columns[:, list(sensors)][:, :, own].reshape(-1, len(own))
-    found = []
-    for k in range(joints):
-        alone = _rms(_beyond(a[:, joints:], a[:, k]))
-        apart = _rms(_beyond(np.delete(a, k, axis=1), a[:, k]))
-        seen = Observable.TOGETHER if apart < 0.02 * alone else Observable.YES
-        found.append((Observable.NO if alone < 1.0e-3 else seen, apart))
-    return found
-
-
-def _beyond(others: Floats, column: Floats) -> Floats:
-    """What of a column others cannot make."""
-    return np.asarray(column - others @ np.linalg.lstsq(others, column, rcond=1.0e-9)[0])
-
-
-def _rms(values: Floats) -> float:
-    return float(np.sqrt(np.mean(np.square(values))))
-
-
 def worn_joint(
     expected: Estimate, found: Estimate, sigmas: float = 4.0, least_m: float = 5.0e-5
 ) -> int | None:
@@ -312,3 +142,26 @@ def worn_joint(
     surely = np.where(off >= least_m, off / found.sigma_m, 0.0)
     k = int(surely.argmax())
     return k if surely[k] >= sigmas else None
+
+
+def likeliest_worn(
+    mechanism: Mechanism, hidden: HiddenClearance, expected: Estimate, shape_cycles: int = SHAPE_CYCLES
+) -> tuple[int, float]:
+    """The joint that, alone not as expected, fits the kept cycles best; and its clearance then [m].
+
+    To be asked once `worn_joint` has found that something is worn. Each joint in turn is supposed to be the
+    one, with the shape that contacts have then: joints that act alike are told apart.
+
+    Raises
+    ------
+    SimulationError
+    """
+    found = hidden.fused() or expected
+    most = float(np.abs(found.clearance_m - expected.clearance_m).max())
+    fits = []
+    for k in range(expected.joints):
+        clearance = expected.clearance_m.copy()
+        clearance[k] += most
+        fits.append(hidden.alone_worn(k, contact_shape(mechanism, clearance, shape_cycles)))
+    likeliest = int(np.argmin([misfit for misfit, _ in fits]))
+    return likeliest, fits[likeliest][1]

@@ -9,14 +9,8 @@ from leg_wear_monitor.dynamics.simulation import prepare
 from leg_wear_monitor.dynamics.tally import new_tally
 from leg_wear_monitor.mechanism.arrays import body_names
 from leg_wear_monitor.mechanism.ideal import TURN
-from leg_wear_monitor.monitor.hidden import (
-    HiddenClearance,
-    Observable,
-    known_before,
-    observability,
-    with_clearances,
-    worn_joint,
-)
+from leg_wear_monitor.monitor.angle_regression import Observable, known_before, observability, with_clearances
+from leg_wear_monitor.monitor.hidden import HiddenClearance, likeliest_worn, worn_joint
 from leg_wear_monitor.twin.joint_angles import PHASES, angle_model, contact_shape, design
 
 SENSORS = ("B", "G", "I")  # hip, knee, ankle
@@ -164,6 +158,9 @@ def test_a_leg_in_full_coordinates_shows_its_worn_knee(leg, model):
     found = hidden.fused()
     assert worn_joint(known_before(FRESH, 1e-4, 3), found) == setup.loose.index("G")
     assert found.clearance_m[2] == pytest.approx(4.5e-4, abs=8e-5)
+    named, clearance_m = likeliest_worn(leg, hidden, known_before(FRESH, 1e-4, 3), shape_cycles=12)
+    assert named == setup.loose.index("G")
+    assert clearance_m == pytest.approx(4.5e-4, abs=5e-5)
 
 
 @pytest.mark.plain

@@ -20,7 +20,7 @@ from leg_wear_monitor.gait.leg import SyntheticLeg
 from leg_wear_monitor.gait.sensors import Reading, readings
 from leg_wear_monitor.ros.parameters import Parameters
 from leg_wear_monitor.ros.publisher_config import PublisherConfig
-from leg_wear_monitor.ros.running import WAKE_S, ClosingNode, run, spin
+from leg_wear_monitor.ros.running import WAKE_S, ClosingNode, run, spin, until_down
 from leg_wear_monitor.ros.sensor_messages import DRIVE_TORQUE_TYPES, sensor_message
 from leg_wear_monitor.twin.sample import CRANK, TORQUE
 
@@ -56,6 +56,10 @@ class GaitPublisher(ClosingNode):
 
     def walk(self) -> None:
         """Publish in step with the clock until the walk ends or the context goes down."""
+        with until_down(self.context):
+            self._walk_on()
+
+    def _walk_on(self) -> None:
         blocks = self._blocks if self.config.precompute else self._computed_ahead()
         while self.context.ok() and not self._heard():
             time.sleep(0.02)

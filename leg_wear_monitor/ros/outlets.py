@@ -15,6 +15,7 @@ from sensor_msgs.msg import JointState
 from leg_wear_monitor.recording.outputs import Output
 from leg_wear_monitor.recording.qos import Qos
 from leg_wear_monitor.ros.black_box import BlackBox
+from leg_wear_monitor.ros.running import until_down
 
 VOLATILE = "volatile"
 
@@ -63,18 +64,20 @@ class Outlets:
         """Whether anyone listens, now or later, or it is recorded."""
         if self._black_box.on or output.qos.durability != VOLATILE:
             return True
-        return self._context.ok() and self._publishers[output].get_subscription_count() > 0
+        with until_down(self._context):
+            return self._publishers[output].get_subscription_count() > 0
+        return False
 
     def send(self, output: Output, now_ns: int, raw: bytes) -> None:
         """Publish and keep a message; only keep it where the context is down already."""
         self._black_box.write(self._topics[output], now_ns, raw)
-        if self._context.ok():
+        with until_down(self._context):
             self._publishers[output].publish(raw)
 
     def send_many(self, output: Output, now_ns: int, rows: NDArray[np.uint8]) -> None:
         """Publish and keep messages of one length, (n, bytes)."""
         self._black_box.write_many(self._topics[output], now_ns, rows)
-        if self._context.ok():
-            publish = self._publishers[output].publish
+        publish = self._publishers[output].publish
+        with until_down(self._context):
             for row in rows:
                 publish(row.tobytes())

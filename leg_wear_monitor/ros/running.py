@@ -1,10 +1,12 @@
 """From a shell to a running node and back: arguments, signals, executor, exit code."""
 
 import sys
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Iterator, Sequence
+from contextlib import contextmanager
 from typing import TypeVar
 
 import rclpy
+from rclpy.context import Context
 from rclpy.executors import ExternalShutdownException
 from rclpy.experimental.events_executor import EventsExecutor
 from rclpy.impl.implementation_singleton import rclpy_implementation as _rclpy
@@ -30,15 +32,24 @@ class ClosingNode(Node):
 _Node = TypeVar("_Node", bound=ClosingNode)
 
 
+@contextmanager
+def until_down(context: Context) -> Iterator[None]:
+    """Let pass what rclpy raises when the context goes down: a signal may do that between any two calls."""
+    try:
+        yield
+    except (ExternalShutdownException, RuntimeError):
+        if context.ok():
+            raise
+
+
 def spin(node: Node, wanted: Callable[[], bool] = lambda: True) -> None:
     """Serve a node until its context goes down, or it is not wanted any more."""
     executor = EventsExecutor(context=node.context)
-    executor.add_node(node)
     try:
-        while node.context.ok() and wanted():
-            executor.spin_once(timeout_sec=WAKE_S)
-    except ExternalShutdownException:
-        return  # the context went down while it waited
+        with until_down(node.context):
+            executor.add_node(node)
+            while node.context.ok() and wanted():
+                executor.spin_once(timeout_sec=WAKE_S)
     finally:
         executor.shutdown()
 

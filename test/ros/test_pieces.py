@@ -71,6 +71,14 @@ def test_a_malformed_torque_is_a_fault_of_some_kind(fault: int) -> None:
     assert box.decoded(box.take(1))["fault"][0] != NO_FAULT
 
 
+@given(st.lists(st.tuples(st.sampled_from(sorted(cdr.TYPES.values())), st.binary(max_size=200)), max_size=5))
+def test_no_bytes_harm_the_inbox(messages: list[tuple[int, bytes]]) -> None:
+    box = inbox()
+    for kind, raw in messages:
+        box.add(kind, raw, 1)
+    assert len(box.decoded(box.take(100))) == len(messages)
+
+
 @given(st.lists(st.integers(0, 50), min_size=1, max_size=60))
 def test_log_times_rise_whatever_the_clock_does(clock: list[int]) -> None:
     box = inbox()

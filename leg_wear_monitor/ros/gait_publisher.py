@@ -5,7 +5,7 @@ import json
 import queue
 import threading
 import time
-from collections.abc import Iterator, Sequence
+from collections.abc import Callable, Iterator, Sequence
 from pathlib import Path
 from typing import Any
 
@@ -54,22 +54,22 @@ class GaitPublisher(ClosingNode):
             self._by_kind[TORQUE] = self._publisher(kind, "drive_torque", qos)
         self.published, self._start_ns = 0, 0
 
-    def walk(self) -> None:
-        """Publish in step with the clock until the walk ends or the context goes down."""
+    def walk(self, wanted: Callable[[], bool] = lambda: True) -> None:
+        """Publish in step with the clock until the walk ends or is not wanted any more."""
         with until_down(self.context):
-            self._walk_on()
+            self._walk_on(wanted)
 
-    def _walk_on(self) -> None:
+    def _walk_on(self, wanted: Callable[[], bool]) -> None:
         blocks = self._blocks if self.config.precompute else self._computed_ahead()
-        while self.context.ok() and not self._heard():
+        while wanted() and not self._heard():
             time.sleep(0.02)
         self._start_ns, began = self.get_clock().now().nanoseconds, time.monotonic()
         self.get_logger().info("walking")
         for reading in itertools.chain.from_iterable(blocks):
             due = began + reading.arrival_s / self.config.time_scale
-            while (wait := due - time.monotonic()) > 0.0 and self.context.ok():
+            while (wait := due - time.monotonic()) > 0.0 and wanted():
                 time.sleep(min(wait, WAKE_S))
-            if not self.context.ok():
+            if not wanted():
                 return
             if wait < -_LATE_S:
                 self.get_logger().warning(
@@ -129,14 +129,14 @@ class GaitPublisher(ClosingNode):
             yield block
 
 
-def _serve(node: GaitPublisher) -> None:
+def _serve(node: GaitPublisher, wanted: Callable[[], bool]) -> None:
     """Walk, while a thread answers to parameter requests."""
     walking = threading.Event()
     walking.set()
     server = threading.Thread(target=spin, args=(node, walking.is_set))
     server.start()
     try:
-        node.walk()
+        node.walk(wanted)
     finally:
         walking.clear()
         server.join()

@@ -1,6 +1,8 @@
 """From a shell to a running node and back: arguments, signals, executor, exit code."""
 
+import signal
 import sys
+import threading
 from collections.abc import Callable, Iterator, Sequence
 from contextlib import contextmanager
 from typing import TypeVar
@@ -11,6 +13,7 @@ from rclpy.executors import ExternalShutdownException
 from rclpy.experimental.events_executor import EventsExecutor
 from rclpy.impl.implementation_singleton import rclpy_implementation as _rclpy
 from rclpy.node import Node
+from rclpy.signals import SignalHandlerOptions
 from rclpy.utilities import remove_ros_args, try_shutdown
 
 from leg_wear_monitor.errors import ConfigError, LegWearError
@@ -59,22 +62,27 @@ def _init(argv: list[str]) -> None:
     try:
         stray = remove_ros_args(argv)[1:]
         if not stray:
-            rclpy.init(args=argv)
+            rclpy.init(args=argv, signal_handler_options=SignalHandlerOptions.NO)
     except (RuntimeError, _rclpy.RCLInvalidROSArgsError) as error:
         raise ConfigError(argv[0], "", str(error).split(", at /")[0]) from error
     if stray:
         raise ConfigError(argv[0], "", f"unknown argument {stray[0]!r}, expected --ros-args ...")
 
 
-def run(make: Callable[[], _Node], serve: Callable[[_Node], None], argv: Sequence[str] | None) -> int:
+def run(
+    make: Callable[[], _Node], serve: Callable[[_Node, Callable[[], bool]], None], argv: Sequence[str] | None
+) -> int:
     """Make a node, serve it until a signal or its own end, and take it down.
+
+    Signals are ours and not rclpy's: its handlers take the context down at once, between any two calls, and
+    with it the way to publish what was taken in last.
 
     Parameters
     ----------
     make : callable
         Gives the node.
     serve : callable
-        Returns when the node is done or its context is down.
+        Given the node, and whether it is still wanted; returns when it is done or not wanted any more.
     argv : sequence of str, optional
         As of ``sys.argv``, ROS arguments included.
 
@@ -84,15 +92,19 @@ def run(make: Callable[[], _Node], serve: Callable[[_Node], None], argv: Sequenc
         Exit code: 0 done, 2 could not, with one line on stderr.
     """
     node: _Node | None = None
+    asked = threading.Event()
+    signal.signal(signal.SIGTERM, signal.default_int_handler)
     try:
         _init(list(sys.argv if argv is None else argv))
         node = make()
+        for number in (signal.SIGINT, signal.SIGTERM):
+            signal.signal(number, lambda *_: asked.set())
         try:
-            serve(node)
+            serve(node, lambda: not asked.is_set())
         finally:
             node.close()
-    except (KeyboardInterrupt, ExternalShutdownException):
-        return DONE  # asked to stop; no logging any more, the context is down
+    except KeyboardInterrupt:
+        return DONE  # asked to stop before it had begun
     except LegWearError as error:
         print(f"error: {' '.join(str(error).split())}", file=sys.stderr, flush=True)
         return COULD_NOT

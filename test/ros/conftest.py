@@ -126,13 +126,13 @@ class Monitor:
         return len(self.node._inbox)
 
     def stop(self) -> None:
-        """End as after a signal: the context goes down, the node puts its house in order."""
+        """End as after a signal."""
         if self._thread.is_alive():
-            try_shutdown(context=self._context)
             self._running.clear()
             self._thread.join()
             self.node.close()
             self.node.destroy_node()
+            try_shutdown(context=self._context)
 
 
 class Stage:

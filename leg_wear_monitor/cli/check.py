@@ -15,7 +15,7 @@ from leg_wear_monitor.cli.waiting import compilation, is_compiled
 from leg_wear_monitor.errors import LegWearError
 from leg_wear_monitor.share import share_directory
 
-_LIBRARIES = ("attrs", "cattrs", "click", "matplotlib", "numba", "numpy", "rich", "ruamel.yaml")
+_LIBRARIES = ("attrs", "cattrs", "click", "jinja2", "matplotlib", "numba", "numpy", "rich", "ruamel.yaml")
 
 
 @click.command(short_help="Say what is wrong with a configuration or an installation.")

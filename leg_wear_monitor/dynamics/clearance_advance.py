@@ -156,14 +156,17 @@ def _steps(model, surfaces, state, begin, length, tally, work):
         if cut == NEVER:
             state.step[0] = h * min(3.0, 0.9 * max(error, 1.0e-6) ** (-1.0 / 3.0))
         cut = NEVER
-        _take(model, surfaces, state, begin + done, h, tally, work)
+        _take(model, surfaces, state, begin + done, h, turned, tally, work)
         done = length if h >= left * (1.0 - 1.0e-9) else done + h
     return DONE, -1
 
 
 @kernel
-def _take(model, surfaces, state, t, h, tally, work):
-    """Take the trial step of length h [s] from time t: sums, wear, contacts; make its end the next start."""
+def _take(model, surfaces, state, t, h, turned, tally, work):
+    """Take the trial step of length h [s] from time t: sums, wear, contacts; make its end the next start.
+
+    ``turned`` [rad] is by how much the crank is then beyond the angle of the tables.
+    """
     x, now, start, end, contacts = work.x, work.now, work.start, work.end, model.contacts
     tally.steps[1] += 1
     integrate_joints(model.law, state.approach, h, start, end, work.added)
@@ -177,7 +180,9 @@ def _take(model, surfaces, state, t, h, tally, work):
     )  # fmt: skip
     shift_start(now, x)
     copy_array(end, start)
-    wear_what_turned(contacts, surfaces, state.approach, start, now, state.pending, work.weight)
+    tally.worn_energy[0] += wear_what_turned(
+        contacts, surfaces, state.approach, start, now, turned, state.pending, work.weight
+    )
     _look_at_drive(now, x, start, work.drive_end, tally)
     toe_deviation(now, x, tally.response)
     first, last = work.drive_start, work.drive_end
@@ -212,11 +217,14 @@ def _finish(model, surfaces, state, tally, work):
     """At the end of an interval: wear, distributions, and the reactions of the ideal joints."""
     joint, now, sample, interval = model.contacts.joint, work.now, work.start, model.interval
     count = int(state.intervals[0])
-    amid = 0.5 * (1 - WEARING) * interval * now.speed[0]
+    here = 0.5 * interval * now.speed[0]
+    amid = (1 - WEARING) * here
     tally.time[0] += interval
     for k in range(state.approach.shape[0]):
         if (count + k) % WEARING == 0:
-            wear_off(model.contacts, surfaces, k, now, amid, state.pending, work.weight)
+            tally.worn_energy[0] += wear_off(
+                model.contacts, surfaces, k, sample, now, here, amid, state.pending, work.weight
+            )
         force = math.sqrt(sample[k, F_N] ** 2 + sample[k, F_T] ** 2)
         tally.force_time[joint[k], bin_of(force)] += interval
     torque = work.drive_start[WHOLE]

@@ -33,6 +33,7 @@ from leg_wear_monitor.dynamics.clearance_contact import (
     accelerate_clearances,
 )
 from leg_wear_monitor.dynamics.dormand_prince import hermite
+from leg_wear_monitor.dynamics.joint_contact import wear_joint
 from leg_wear_monitor.dynamics.rosenbrock import factorise_contacts, solve_contacts
 from leg_wear_monitor.dynamics.tally import (
     ARCHARD,
@@ -45,7 +46,6 @@ from leg_wear_monitor.dynamics.tally import (
 )
 from leg_wear_monitor.dynamics.touch import DELTA, DELTA_DOT, EX, EY, F_N
 from leg_wear_monitor.kernel import kernel
-from leg_wear_monitor.wear.surfaces import deposit_wear
 
 
 @kernel
@@ -178,27 +178,38 @@ def gather_wear(added, start, end, pending):
 
 
 @kernel
-def wear_off(contacts, surfaces, k, now, turned, pending, out_weight):
+def wear_off(contacts, surfaces, k, start, now, turned, acted, pending, out_weight):
     """Wear the surfaces of joint k by what is pending, at its mean normal and eccentricity.
 
-    ``turned`` [rad] is by how much the crank was beyond the angle of the tables when it acted.
+    By how much the crank is beyond the angle of the tables [rad] say ``turned``, and ``acted`` for when it
+    acted. Returns the energy that the contact loses with its wall [J].
     """
+    gone = 0.0
     integral = pending[k, 0]
     if integral > 0.0:
         scale = pending[k, 3] / integral / math.hypot(pending[k, 1], pending[k, 2])
         ex, ey = scale * pending[k, 1], scale * pending[k, 2]
-        angle_b = now.angle[k, 0] + now.turn[k, 0] * turned
-        angle_j = now.angle[k, 1] + now.turn[k, 1] * turned
-        deposit_wear(contacts, surfaces, k, ex, ey, angle_b, angle_j, integral, out_weight)
+        angle_b, turn_b = now.angle[k, 0], now.turn[k, 0]
+        angle_j, turn_j = now.angle[k, 1], now.turn[k, 1]
+        there = (ex, ey, angle_b + turn_b * acted, angle_j + turn_j * acted)
+        gone = wear_joint(
+            contacts, surfaces, k, start[k, EX], start[k, EY],
+            angle_b + turn_b * turned, angle_j + turn_j * turned, there, integral, out_weight,
+        )  # fmt: skip
         for i in range(pending.shape[1]):
             pending[k, i] = 0.0
+    return gone
 
 
 @kernel
-def wear_what_turned(contacts, surfaces, approach, start, now, pending, out_weight):
-    """Wear off what is pending where contact has ended or its normal has turned by two sectors."""
-    limit = 4.0 * math.pi / surfaces.depth.shape[2]
+def wear_what_turned(contacts, surfaces, approach, start, now, turned, pending, out_weight):
+    """Wear off what is pending where contact has ended or its normal has turned by two sectors.
+
+    Returns the energy that contacts lose with their walls [J]; ``turned`` as in `wear_off`.
+    """
+    limit, gone = 4.0 * math.pi / surfaces.depth.shape[2], 0.0
     for k in range(pending.shape[0]):
-        turned = abs(pending[k, 1] * start[k, EY] - pending[k, 2] * start[k, EX])
-        if approach[k] == 0.0 or turned > limit * pending[k, 3]:
-            wear_off(contacts, surfaces, k, now, 0.0, pending, out_weight)
+        across = abs(pending[k, 1] * start[k, EY] - pending[k, 2] * start[k, EX])
+        if approach[k] == 0.0 or across > limit * pending[k, 3]:
+            gone += wear_off(contacts, surfaces, k, start, now, turned, 0.0, pending, out_weight)
+    return gone

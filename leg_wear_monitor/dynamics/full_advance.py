@@ -19,13 +19,13 @@ from leg_wear_monitor.dynamics.dormand_prince import (
     stage_state,
 )
 from leg_wear_monitor.dynamics.full import FullModel, FullScratch, accelerate, full_scratch
+from leg_wear_monitor.dynamics.joint_contact import wear_joint
 from leg_wear_monitor.dynamics.response import compare_toe
 from leg_wear_monitor.dynamics.run import DONE, PUSHED_THROUGH, SINGULAR, STEP_TOO_SMALL
 from leg_wear_monitor.dynamics.tally import ARCHARD, DRIVE_RATES, JOINT_RATES, TORQUE, add_step
 from leg_wear_monitor.dynamics.touch import DELTA, EX, EY, NEVER, SAMPLE, first_touch, update_contacts
 from leg_wear_monitor.kernel import copy_array, entry, kernel
 from leg_wear_monitor.mechanism.arrays import Floats
-from leg_wear_monitor.wear.surfaces import deposit_wear
 
 LONGEST_STEP = 1.0e-3  # s: Baumgarte's alpha times it stays well inside the region of stability
 _SHORTEST_STEP = 1.0e-14  # s
@@ -132,7 +132,10 @@ def _accept(model, surfaces, state, h, toe, tally, work):
                 integral += h * WEIGHTS[s] * work.rates[s, joint, ARCHARD]
             b, j = arrays.joint_body[joint, 0], arrays.joint_body[joint, 1]
             ex, ey = scratch.contact[k, EX], scratch.contact[k, EY]
-            deposit_wear(contacts, surfaces, k, ex, ey, q[b, 2], q[j, 2], integral, work.weight)
+            here = (ex, ey, q[b, 2], q[j, 2])
+            tally.worn_energy[0] += wear_joint(
+                contacts, surfaces, k, ex, ey, q[b, 2], q[j, 2], here, integral, work.weight
+            )
     changed = update_contacts(
         contacts.joint, contacts.speed_floor, state.clock[0], h, work.start, scratch.contact,
         state.approach, state.recent, tally.peak, tally.impact, tally.impacts,

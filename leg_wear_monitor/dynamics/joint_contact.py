@@ -9,7 +9,7 @@ from leg_wear_monitor.contact.friction import friction_force
 from leg_wear_monitor.contact.geometry import contact_stiffness, journal_contact, worn_contact
 from leg_wear_monitor.contact.normal import elastic_energy, normal_force
 from leg_wear_monitor.kernel import kernel
-from leg_wear_monitor.wear.surfaces import local_surfaces
+from leg_wear_monitor.wear.surfaces import deposit_wear, local_surfaces
 
 
 @kernel
@@ -74,3 +74,19 @@ def contact_energy(contacts, surfaces, k, ex, ey, angle_b, angle_j):
         contacts, surfaces, k, ex, ey, direction, angle_b, angle_j
     )
     return elastic_energy(stiffness_at(contacts, k, bushing, journal), delta)
+
+
+@kernel
+def wear_joint(contacts, surfaces, k, ex, ey, angle_b, angle_j, acted, integral, out_weight):
+    """Wear loose joint k by the increment ``integral`` of F_N |v_t| dt [J]; returns the energy that goes [J].
+
+    The journal is at (ex, ey) [m], and the wall that goes from under it takes what it stored along.
+    ``acted`` is where the increment acted: eccentricity [m], and angles of bushing and journal [rad].
+    """
+    stored = 0.0
+    if surfaces.feeds_back:
+        stored = contact_energy(contacts, surfaces, k, ex, ey, angle_b, angle_j)
+    deposit_wear(contacts, surfaces, k, acted[0], acted[1], acted[2], acted[3], integral, out_weight)
+    if surfaces.feeds_back:
+        stored -= contact_energy(contacts, surfaces, k, ex, ey, angle_b, angle_j)
+    return stored

@@ -37,7 +37,8 @@ class Tally(NamedTuple):
     ``drive_range`` (2,) least and largest torque; ``force_time`` (j, bins) and ``torque_time`` (2, bins)
     seconds spent at each magnitude, the torque's by sign; ``impact`` (j, 1000, 4); ``impacts`` (j,) their
     number; ``response`` (4,) largest deviation of the toe's position, velocity and acceleration and of the
-    drive torque from the ideal linkage; ``steps`` (2,) tried and taken.
+    drive torque from the ideal linkage; ``worn_energy`` (1,) elastic energy of the contacts that went with
+    the walls that wore away [J]; ``steps`` (2,) tried and taken.
     """
 
     time: Floats
@@ -50,6 +51,7 @@ class Tally(NamedTuple):
     impact: Floats
     impacts: Ints
     response: Floats
+    worn_energy: Floats
     steps: Ints
 
 
@@ -66,6 +68,7 @@ def new_tally(joints: int) -> Tally:
         impact=np.zeros((joints, IMPACTS, 4)),
         impacts=np.zeros(joints, dtype=np.int64),
         response=np.zeros(4),
+        worn_energy=np.zeros(1),
         steps=np.zeros(2, dtype=np.int64),
     )
 

@@ -1,9 +1,12 @@
 """Work of the drive = change of stored energy + losses."""
 
+import attrs
 import numpy as np
 import pytest
 
+from leg_wear_monitor.dynamics.clearance_run import ClearanceRun
 from leg_wear_monitor.dynamics.full_run import FullRun
+from leg_wear_monitor.dynamics.result import energy_balance
 from leg_wear_monitor.dynamics.simulation import prepare
 from leg_wear_monitor.dynamics.tally import DISSIPATION, FRICTION, POWER, new_tally
 from leg_wear_monitor.mechanism.ideal import TURN, one_cycle
@@ -18,6 +21,25 @@ def test_energy_with_clearances(leg_cycles, loose):
         assert energy["friction_loss"] > 0.0
         assert energy["contact_loss"] > 0.0
         assert abs(energy["residual"]) < 1.0e-3 * (energy["friction_loss"] + energy["contact_loss"])
+
+
+@pytest.mark.parametrize("model, cycles, share", [(FullRun, 2, 0.01), (ClearanceRun, 8, 0.2)])
+def test_walls_that_wear_away_take_energy_along(leg, model, cycles, share):
+    """Ten thousand times the pace of real wear: what contacts had stored in it, and nothing else, is missing.
+
+    Up to a share of it: the clearance model's own residual is a tenth.
+    """
+    fast = {
+        name: attrs.evolve(c, wear_coefficient=tuple(1.0e4 * k for k in c.wear_coefficient))
+        for name, c in leg.clearances.items()
+    }
+    run = model(prepare(attrs.evolve(leg, clearances=fast), clearances="ABGIJ", wear=True))
+    run.advance(1.0, new_tally(len(leg.joints)))
+    tally, start = new_tally(len(leg.joints)), run.stored_energy
+    run.advance(1.0 + cycles, tally)
+    energy = energy_balance(tally, start, run.stored_energy)
+    assert energy["wear_loss"] > 1.0e-3 * (energy["friction_loss"] + energy["contact_loss"])
+    assert abs(energy["residual"]) < share * energy["wear_loss"]
 
 
 def test_energy_of_the_ideal_leg(leg):

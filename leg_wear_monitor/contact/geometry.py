@@ -15,16 +15,28 @@ def journal_contact(ex, ey, clearance):
 
 
 @kernel
-def worn_contact(ex, ey, clearance, slope):
-    """Penetration [m] and unit normal where the clearance changes with direction by a slope [m/rad].
+def worn_contact(ex, ey, clearance, slope, bend):
+    """Penetration [m] and its gradient where the clearance changes with direction.
 
-    The normal is that of the worn wall, the gradient of |e| - c, and the penetration is measured along it:
-    so the normal force has a potential.
+    By a slope [m/rad], that changes by a ``bend`` [m/rad^2]. The penetration is |e| - c, measured along the
+    worn wall's normal. So that the normal force has a potential, it acts along the penetration's whole
+    gradient: the wall's unit normal, but for parts of the order of penetration / clearance, because the
+    normal turns from place to place.
+
+    Returns
+    -------
+    delta, nx, ny, scale, turned
+        The clearance's own share in the gradient is ``scale`` times its change, and ``turned`` times that of
+        its slope.
     """
     delta, rx, ry = journal_contact(ex, ey, clearance)
-    tilt = slope / (clearance + max(delta, 0.0))  # a journal that touches is at least that far out
+    inside = max(delta, 0.0)
+    distance = clearance + inside  # a journal that touches is at least that far out
+    tilt = slope / distance
     scale = 1.0 / math.sqrt(1.0 + tilt * tilt)
-    return delta * scale, (rx + tilt * ry) * scale, (ry - tilt * rx) * scale, scale
+    turned = inside * scale * scale * scale * tilt / distance
+    outwards, back = scale + turned * tilt, scale * tilt + turned * bend / distance
+    return delta * scale, outwards * rx + back * ry, outwards * ry - back * rx, scale, turned
 
 
 @kernel

@@ -14,17 +14,30 @@ from leg_wear_monitor.wear.surfaces import deposit_wear, local_surfaces
 
 @kernel
 def penetration(contacts, surfaces, k, ex, ey, direction, angle_b, angle_j):
-    """Penetration [m], unit normal and local radii of bushing and journal [m] of loose joint k.
+    """Penetration [m], normal and local radii of bushing and journal [m] of loose joint k.
 
-    ``direction`` [rad] is that of the eccentricity, and only asked for where wear feeds back. Then come the
+    ``direction`` [rad] is that of the eccentricity, and only asked for where wear feeds back. Last come the
     shares of the penetration's rate that the turning of bushing and journal make, by their speeds [m/rad].
+    The normal is a unit vector on fresh surfaces, see `worn_contact` for worn ones: the normal force times
+    it is the gradient of the contact's energy, to which the stiffness that changes from place to place adds.
     """
-    bushing, journal, slope_b, slope_j = local_surfaces(contacts, surfaces, k, direction, angle_b, angle_j)
-    if surfaces.feeds_back:
-        delta, nx, ny, scale = worn_contact(ex, ey, bushing - journal, slope_b + slope_j)
-        return delta, nx, ny, bushing, journal, slope_b * scale, slope_j * scale
-    delta, nx, ny = journal_contact(ex, ey, contacts.clearance[k])
-    return delta, nx, ny, bushing, journal, 0.0, 0.0
+    bushing, journal, slope_b, slope_j, bend_b, bend_j = local_surfaces(
+        contacts, surfaces, k, direction, angle_b, angle_j
+    )
+    if not surfaces.feeds_back:
+        delta, nx, ny = journal_contact(ex, ey, contacts.clearance[k])
+        return delta, nx, ny, bushing, journal, 0.0, 0.0
+    clearance = bushing - journal
+    delta, nx, ny, scale, turned = worn_contact(ex, ey, clearance, slope_b + slope_j, bend_b + bend_j)
+    cam_b, cam_j = slope_b * scale + turned * bend_b, slope_j * scale + turned * bend_j
+    if delta > 0.0 and contacts.stiffness[k] == 0.0:  # the stiffness is the local radii's
+        # d(2/5 K delta^2.5) = K delta^1.5 (d delta + 2/5 delta dK / K)
+        softer = 0.2 * delta / clearance
+        softer_b, softer_j = softer * slope_b * journal / bushing, softer * slope_j * bushing / journal
+        along = (softer_b + softer_j) / (ex * ex + ey * ey)
+        nx, ny = nx + along * ey, ny - along * ex
+        cam_b, cam_j = cam_b + softer_b, cam_j + softer_j
+    return delta, nx, ny, bushing, journal, cam_b, cam_j
 
 
 @kernel

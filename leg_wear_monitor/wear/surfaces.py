@@ -34,9 +34,9 @@ def fresh_surfaces(contacts: ContactArrays, feeds_back: bool, sectors: int = SEC
 
 @kernel
 def profile_at(profile, angle):
-    """Depth [m] at an angle of the surface's own frame [rad], and its derivative by the angle [m/rad].
+    """Depth [m] at an angle of the surface's own frame [rad], and its first and second derivative by it.
 
-    That of the quadratic spline over the sectors: the slope has no jumps.
+    Those of the quadratic spline over the sectors: the slope has no jumps.
     """
     n = profile.shape[0]
     u = angle * (n / (2.0 * math.pi))
@@ -45,22 +45,25 @@ def profile_at(profile, angle):
     w = u - i
     before, here, after = profile[i - 1 if i > 0 else n - 1], profile[i], profile[i + 1 if i < n - 1 else 0]
     depth = 0.5 * ((1.0 - w) ** 2 * before + (1.0 + 2.0 * w * (1.0 - w)) * here + w * w * after)
-    return depth, ((1.0 - w) * (here - before) + w * (after - here)) * (n / (2.0 * math.pi))
+    per_rad = n / (2.0 * math.pi)
+    rise, next_rise = here - before, after - here
+    return depth, (rise + w * (next_rise - rise)) * per_rad, (next_rise - rise) * per_rad * per_rad
 
 
 @kernel
 def local_surfaces(contacts, surfaces, k, direction, angle_b, angle_j):
-    """Radii [m] of bushing and journal in a direction [rad] of the ground's frame, and their depths' slopes.
+    """Radii [m] of bushing and journal in a direction [rad] of the ground's frame, and how depths change.
 
-    The slopes are derivatives by the direction [m/rad], 0 unless wear feeds back.
+    First and second derivatives of the depths by the direction: slopes of both [m/rad], then bends [m/rad^2];
+    0 unless wear feeds back.
     """
     bushing = contacts.bushing_radius[k]
     journal = bushing - contacts.clearance[k]
     if not surfaces.feeds_back:
-        return bushing, journal, 0.0, 0.0
-    depth_b, slope_b = profile_at(surfaces.depth[k, BUSHING], direction - angle_b)
-    depth_j, slope_j = profile_at(surfaces.depth[k, JOURNAL], direction - angle_j)
-    return bushing + depth_b, journal - depth_j, slope_b, slope_j
+        return bushing, journal, 0.0, 0.0, 0.0, 0.0
+    depth_b, slope_b, bend_b = profile_at(surfaces.depth[k, BUSHING], direction - angle_b)
+    depth_j, slope_j, bend_j = profile_at(surfaces.depth[k, JOURNAL], direction - angle_j)
+    return bushing + depth_b, journal - depth_j, slope_b, slope_j, bend_b, bend_j
 
 
 @kernel

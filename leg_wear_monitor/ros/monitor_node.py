@@ -52,6 +52,15 @@ class MonitorNode(ClosingNode):
         config = parameters.config
         mechanism = load_mechanism(config.mechanism)
         self._monitor = WearMonitor(mechanism, config, open_ledger(mechanism, config))
+        try:
+            self._get_ready(parameters)
+        except BaseException:  # a signal, too: the next start must not take the ledger for cut off
+            self._monitor.close()
+            raise
+
+    def _get_ready(self, parameters: Parameters[MonitorConfig]) -> None:
+        """All that comes after the ledger was opened; says so when done."""
+        config = parameters.config
         decoder = Decoder(config)
         self._inbox = Inbox(decoder, _HELD)
         self._load = Load()
@@ -73,7 +82,8 @@ class MonitorNode(ClosingNode):
         steady = Clock(clock_type=ClockType.STEADY_TIME)
         self.create_timer(_WORK_S, self._work, clock=steady)
         self.create_timer(config.diagnostics.period_s, self._diagnose, clock=steady)
-        self.get_logger().info(f"monitoring joints {', '.join(self._monitor.loose)} of {mechanism.name}")
+        joints, leg = ", ".join(self._monitor.loose), self._monitor.mechanism.name
+        self.get_logger().info(f"monitoring joints {joints} of {leg}")
 
     @property
     def monitor(self) -> WearMonitor:

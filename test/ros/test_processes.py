@@ -45,6 +45,24 @@ def test_sigterm_ends_both_nodes_in_order(stage, tmp_path: Path, monkeypatch: py
     assert all(b"Traceback" not in log.read_bytes() for log in logs.values())
 
 
+def test_a_monitor_stopped_while_it_gets_ready_leaves_an_ordered_ledger(
+    stage, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setenv("ROS_DOMAIN_ID", str(stage.domain))
+    ledger, log = tmp_path / "wear.db", tmp_path / "monitor.log"
+    node = started("monitor", log, "-p", f"ledger.path:={ledger}")
+    try:
+        stage.wait_for(lambda: b"getting ready" in log.read_bytes(), f"getting ready in {log}")
+        node.send_signal(signal.SIGTERM)
+        assert node.wait(60) == 0
+    finally:
+        node.kill()
+        node.wait()
+    with sqlite3.connect(ledger) as db:
+        assert db.execute("SELECT closed FROM run").fetchall() == [(1,)]
+    db.close()
+
+
 def test_the_demo_tells_its_story(stage, tmp_path: Path) -> None:
     environment = {**os.environ, "ROS_DOMAIN_ID": str(stage.domain)}
     command = [sys.executable, "-m", "leg_wear_monitor", "demo", "--out", str(tmp_path / "demo")]

@@ -12,6 +12,10 @@ from leg_wear_monitor.cli.waiting import compilation, progress_bar
 
 if TYPE_CHECKING:
     from leg_wear_monitor.dynamics.life_result import Life
+    from leg_wear_monitor.mechanism.arrays import Floats
+    from leg_wear_monitor.mechanism.spec import Mechanism
+
+    Lives = list[tuple[Floats, Life]]  # with the factors on their wear coefficients
 
 _ROWS = 12  # of the table
 
@@ -61,6 +65,15 @@ _ROWS = 12  # of the table
     "--cycles", type=click.IntRange(min=2), metavar="N", help="Cycles of each averaged.  [default: 4]"
 )
 @click.option(
+    "--lives",
+    type=click.IntRange(min=1),
+    default=1,
+    show_default=True,
+    metavar="N",
+    help="Lives for --json: further ones have coefficients that differ, to show the forecast how joints act "
+    "upon each other.",
+)
+@click.option(
     "--json",
     "json_file",
     type=click.Path(path_type=Path),
@@ -76,15 +89,17 @@ def life(mechanism: str, json_file: Path | None, out: Path | None, **options: An
     """
     from leg_wear_monitor.mechanism.loader import load_mechanism
 
-    leg = load_mechanism(mechanism)
+    names = options.pop("clearances")
+    leg = _with_loose(load_mechanism(mechanism), names)
     if json_file is not None:
         check_file("--json", json_file)
     if out is not None:
         check_directory("--out", out)
-    result = _run(leg, **options)
+    lives = _lives(leg, **options)
+    result = lives[0][1]
     for line in lines(result, options["limit_m"]):
         click.echo(line)
-    text = (json.dumps(result.to_dict(), indent=1, allow_nan=False) + "\n").encode()
+    text = (json.dumps(_document(leg, lives), indent=1, allow_nan=False) + "\n").encode()
     if json_file is not None:
         write_file(json_file, text)
         click.echo(f"written: {json_file}")
@@ -95,30 +110,34 @@ def life(mechanism: str, json_file: Path | None, out: Path | None, **options: An
             click.echo(f"written: {path}")
 
 
-def _run(leg: Any, **options: Any) -> "Life":
+def _with_loose(leg: "Mechanism", names: str | None) -> "Mechanism":
+    """The leg with these loose joints, of comma-separated names."""
     import attrs
 
-    from leg_wear_monitor.dynamics.life import LifeRun, LifeSettings, simulate_life
+    return attrs.evolve(leg, loose=tuple(name.strip() for name in names.split(","))) if names else leg
+
+
+def _lives(leg: "Mechanism", lives: int, opens_m: float | None, **options: Any) -> "Lives":
+    import attrs
+
+    from leg_wear_monitor.dynamics.life import LifeSettings
+    from leg_wear_monitor.dynamics.many_lives import simulate_lives
     from leg_wear_monitor.wear.cycle_jump import JumpControl
 
-    given = {name: options[name] for name in ("legs", "cycles") if options[name] is not None}
+    given = {name: value for name in ("legs", "cycles") if (value := options.pop(name)) is not None}
     settings = LifeSettings(**given)
-    if options["opens_m"] is not None:
-        control = JumpControl(opens_m=options["opens_m"], tolerance_m=0.1 * options["opens_m"])
-        settings = attrs.evolve(settings, jump=control)
-    names = options["clearances"]
-    with compilation("clearance"):
-        run = LifeRun(
-            leg,
-            settings,
-            clearances=[name.strip() for name in names.split(",")] if names else None,
-            speed_rpm=options["speed_rpm"],
-            wear_factor=options["wear_factor"],
-        )
-    with progress_bar("life") as progress:
-        return simulate_life(
-            run, limit_m=options["limit_m"], horizon_cycles=options["horizon_cycles"], progress=progress
-        )
+    if opens_m is not None:
+        settings = attrs.evolve(settings, jump=JumpControl(opens_m=opens_m, tolerance_m=0.1 * opens_m))
+    with compilation("clearance"), progress_bar("life") as progress:
+        return list(simulate_lives(leg, settings, lives, progress=progress, **options))
+
+
+def _document(leg: "Mechanism", lives: "Lives") -> dict[str, Any]:
+    """Lives, bound to the leg that they are of."""
+    from leg_wear_monitor.dynamics.many_lives import lives_document
+    from leg_wear_monitor.monitor.binding import fingerprint
+
+    return {"mechanism": leg.name, "fingerprint": fingerprint(leg), **lives_document(lives)}
 
 
 def lines(result: "Life", limit_m: float) -> list[str]:

@@ -139,6 +139,14 @@ class LifeRun:
         self.points.append(LifePoint(last.cycles + cycles, depth, rate, peak, worked, error))
         return self.points[-1]
 
+    def hold(self, k: int) -> None:
+        """Let joint k wear no further, as if its part were replaced before its clearance opens more."""
+        depth = self._rate.depth.copy()
+        depth[k] = 0.0
+        self._rate = attrs.evolve(self._rate, depth=depth)
+        for setup in self._setups:
+            setup.contacts.wear_coefficient[k] = 0.0
+
     @property
     def life(self) -> Life:
         """The life so far."""

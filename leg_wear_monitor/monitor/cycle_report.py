@@ -3,7 +3,7 @@
 import math
 from collections.abc import Sequence
 
-from leg_wear_monitor.monitor.forecast import JointForecast
+from leg_wear_monitor.monitor.forecast import Forecast, JointForecast
 from leg_wear_monitor.monitor.growth import GrowthWindow, growth_rate, remaining
 from leg_wear_monitor.monitor.reports import CycleReport, JointReport
 from leg_wear_monitor.twin.figures import CycleFigures, TorqueFigures
@@ -15,7 +15,7 @@ def cycle_report(
     loose: Sequence[str],
     growth: Sequence[GrowthWindow],
     limits_m: Sequence[float],
-    forecasts: Sequence[JointForecast],
+    forecast: Forecast,
 ) -> CycleReport:
     """Report of a gait cycle.
 
@@ -30,7 +30,7 @@ def cycle_report(
         Of each of them, this cycle included.
     limits_m : sequence of float
         Limit of each one's clearance.
-    forecasts : sequence of JointForecast
+    forecast : Forecast
     """
     torque = figures.torque
     return CycleReport(
@@ -41,7 +41,7 @@ def cycle_report(
         moving_s=figures.moving_s,
         bridged_s=figures.bridged_s,
         joints=tuple(
-            _joint_report(figures, k, joint, growth[k], limits_m[k], forecasts[k])
+            _joint_report(figures, k, joint, growth[k], limits_m[k], forecast.joints[k])
             for k, joint in enumerate(loose)
         ),
         torque_samples=torque.samples,
@@ -54,6 +54,7 @@ def cycle_report(
         load_acting_n=float(torque.load_acting_n),
         friction_nm=float(torque.friction_nm),
         torque_lag_s=float(torque.torque_lag_s),
+        forecast=forecast.leg,
     )
 
 

@@ -1,33 +1,28 @@
-"""How long a joint will last, and how sure that is: a distribution, from all that is not known.
+"""How long joints and the leg will last, and how sure that is: a distribution, from all that is not known.
 
-An ensemble over the joint's wear coefficient and its excess clearance as believed, the growth's own scatter,
-and the load to come. Wear enters by coefficient times cycles, so a member needs no simulation of its own: its
-remaining life is the nominal one divided by its factors. This is exact where all joints' coefficients are off
-alike; where they differ, joints act upon each other through their clearances (docs/forecast.md has figures).
+An ensemble of legs over what is believed of every joint's wear coefficient and clearance, over the growth's
+own scatter and the load to come. In each of them all joints grow together by the law of growth, until each
+has reached its limit (`growth_law.py`).
 """
 
-import json
-import math
+from collections.abc import Sequence
 from enum import Enum
-from pathlib import Path
-from statistics import NormalDist
-from typing import Any
 
 import attrs
 import numpy as np
 
-from leg_wear_monitor.errors import ConfigError
 from leg_wear_monitor.mechanism.arrays import Floats
 from leg_wear_monitor.monitor.belief import Belief
+from leg_wear_monitor.monitor.even_draws import MEMBERS, even_normals, even_shares
 from leg_wear_monitor.monitor.forecast_config import Forecasting
-
-MEMBERS = 1024
+from leg_wear_monitor.monitor.growth_law import GrowthLaw, cycles_to
 
 
 class Answer(Enum):
     """What the forecast can say; the value is fit for people."""
 
     KNOWN = "from growth as it is, and what is not known of it"
+    PARTLY_KNOWN = "of the joints whose growth is known; that of others is not"
     AT_LIMIT = "at its limit"
     NOT_ENOUGH_DATA = "not enough data for a growth rate yet"
     OUTSIDE_VALIDITY = "outside validity: the leg does not do what the model holds for"
@@ -68,167 +63,180 @@ class JointForecast:
 
 
 @attrs.frozen(kw_only=True)
+class LegForecast:
+    """The leg's remaining life: until the first of its joints reaches its limit.
+
+    Attributes
+    ----------
+    answer : Answer
+    cycles, hours, days : Quantiles or None
+        As those of a joint.
+    first_probability : dict of str to float
+        With which each joint is the first; empty unless known.
+    simulated_lives : int
+        That tell how joints act upon each other; 0: growth is supposed to stay as it is.
+    """
+
+    answer: Answer
+    cycles: Quantiles | None
+    hours: Quantiles | None
+    days: Quantiles | None
+    first_probability: dict[str, float]
+    simulated_lives: int
+
+    @property
+    def first(self) -> str | None:
+        """The joint that is most likely the first; None if that is not known."""
+        return max(self.first_probability, key=lambda j: self.first_probability[j], default=None)
+
+
+@attrs.frozen(kw_only=True)
+class Forecast:
+    """All joints', in the order of the loose joints, and the leg's."""
+
+    joints: tuple[JointForecast, ...]
+    leg: LegForecast
+
+
+@attrs.frozen(kw_only=True)
 class JointNow:
     """A joint as the twin has it, with the nominal wear coefficient.
 
     Attributes
     ----------
+    joint : str
     fresh_m, wear_m, limit_m : float
         Clearance when new, wear since, and limit of the mean clearance.
     growth_m : float or None
         A cycle; None while there is not enough data.
     growth_error_m : float
         Its standard error.
-    cycle_s : float
-        Time of a gait cycle.
-    valid : bool
-        Whether the model holds for what the leg does.
     """
 
+    joint: str
     fresh_m: float
     wear_m: float
     limit_m: float
     growth_m: float | None
     growth_error_m: float
-    cycle_s: float
-    valid: bool
+
+    def answer(self, clearance_m: float, valid: bool) -> Answer:
+        """What can be said of it, supposing its clearance."""
+        if clearance_m >= self.limit_m:
+            return Answer.AT_LIMIT
+        if not valid:
+            return Answer.OUTSIDE_VALIDITY
+        if self.growth_m is None:
+            return Answer.NOT_ENOUGH_DATA
+        return Answer.KNOWN if self.growth_m > 0.0 else Answer.NO_GROWTH
 
 
 @attrs.frozen(eq=False)
-class LifeShape:
-    """How the growth of a joint's clearance changes as it opens, from a simulated life.
+class _Legs:
+    """The ensemble: n legs that might be this one.
 
     Attributes
     ----------
-    clearance_m : (p,) array
-        Rising.
-    spent : (p,) array
-        Nominal cycles until then; any unit.
+    clearance_m : (k, n) array
+        Now.
+    base_m : (k, n) array
+        Growth a cycle when all was new.
+    duty_h : (n,) array
+        Walking a day.
     """
 
     clearance_m: Floats
-    spent: Floats
-
-    def growth(self, clearance_m: float) -> float:
-        """Growth at a clearance, in the life's own unit: of the stretch that it lies in."""
-        p = len(self.spent)
-        i = int(np.clip(np.searchsorted(self.clearance_m, clearance_m) - 1, 0, p - 2))
-        low, high = max(0, i - 1), min(p - 1, i + 2)
-        opened = self.clearance_m[high] - self.clearance_m[low]
-        return float(opened / (self.spent[high] - self.spent[low]))
-
-    def cycles_at(self, clearance_m: Floats) -> Floats:
-        """Cycles at clearances; beyond the ends at the growth there."""
-        c, t = self.clearance_m, self.spent
-        inside = np.interp(clearance_m, c, t)
-        after = np.maximum(clearance_m - c[-1], 0.0) / self.growth(float(c[-1]))
-        before = np.minimum(clearance_m - c[0], 0.0) / self.growth(float(c[0]))
-        return np.asarray(inside + after + before)
+    base_m: Floats
+    duty_h: Floats
 
 
-def _draws() -> Floats:
-    """Standard normal numbers (5, MEMBERS), evenly spread: an additive recurrence, the same at every call."""
-    golden = 1.1673039782614187  # of dimension 5: the root of x^6 = x + 1 (Roberts's sequence)
-    golden = _root(5, golden)
-    index = np.arange(1, MEMBERS + 1)
-    normal = NormalDist().inv_cdf
-    return np.array(
-        [[normal((0.5 + i * golden**-axis) % 1.0) for i in index.tolist()] for axis in range(1, 6)]
-    )
-
-
-def _root(dimension: int, x: float) -> float:
-    for _ in range(40):
-        x = (1.0 + x) ** (1.0 / (dimension + 1))
-    return x
-
-
-_NORMAL = _draws()
-_SHARE = np.array([NormalDist().cdf(z) for z in _NORMAL[0].tolist()])
-
-
-def forecast_joint(
-    now: JointNow, belief: Belief, settings: Forecasting, shape: LifeShape | None = None
-) -> JointForecast:
-    """Remaining life of a joint.
+def forecast(
+    now: Sequence[JointNow],
+    beliefs: Sequence[Belief],
+    settings: Forecasting,
+    law: GrowthLaw,
+    *,
+    cycle_s: float,
+    valid: bool,
+) -> Forecast:
+    """Remaining life of all loose joints, and of the leg.
 
     Parameters
     ----------
-    now : JointNow
-    belief : Belief
-        Of its wear coefficient.
+    now : sequence of JointNow
+    beliefs : sequence of Belief
+        Of their wear coefficients.
     settings : Forecasting
-    shape : LifeShape, optional
-        Without one, growth stays as it is.
+    law : GrowthLaw
+        Of the same joints in the same order.
+    cycle_s : float
+        Time of a gait cycle.
+    valid : bool
+        Whether the model holds for what the leg does.
     """
-    log_factor = belief.log_factors(_SHARE)
-    excess = np.interp(log_factor, belief.log_factor, belief.excess_m) + belief.excess_sigma_m * _NORMAL[1]
-    clearance = np.maximum(now.fresh_m + excess + np.exp(log_factor) * now.wear_m, 0.0)
-    seen = quantiles(clearance)
+    legs = _legs(now, beliefs, settings, law)
+    seen = [quantiles(row) for row in legs.clearance_m]
+    answers = [each.answer(q.p50, valid) for each, q in zip(now, seen, strict=True)]
+    limit = np.array([each.limit_m for each in now])
+    ended = np.array([[answer is Answer.AT_LIMIT] for answer in answers])
+    ends = cycles_to(law, np.where(ended, limit[:, None], legs.clearance_m), legs.base_m, limit)
+    day = cycle_s / 3600.0 / legs.duty_h
+    joints = tuple(
+        JointForecast(answer=a, **_life(a, end, cycle_s, day), clearance_m=q, measurements=belief.looks)
+        for a, end, q, belief in zip(answers, ends, seen, beliefs, strict=True)
+    )
+    answer = _leg_answer(answers)
+    life, first = _life(answer, ends.min(axis=0), cycle_s, day), {}
+    if life["cycles"] is not None:
+        share = np.bincount(ends.argmin(axis=0), minlength=len(now)) / MEMBERS
+        first = {each.joint: float(p) for each, p in zip(now, share, strict=True)}
+    leg = LegForecast(answer=answer, **life, first_probability=first, simulated_lives=law.lives)
+    return Forecast(joints=joints, leg=leg)
 
-    def say(answer: Answer, cycles: Floats | None = None) -> JointForecast:
-        if cycles is None:
-            return JointForecast(
-                answer=answer, cycles=None, hours=None, days=None, clearance_m=seen, measurements=belief.looks
-            )
-        hours = cycles * (now.cycle_s / 3600.0)
-        duty = settings.duty_hours_per_day * np.exp(settings.duty_sigma * _NORMAL[4])
-        return JointForecast(
-            answer=answer,
-            cycles=quantiles(cycles),
-            hours=quantiles(hours),
-            days=quantiles(hours / duty),
-            clearance_m=seen,
-            measurements=belief.looks,
-        )
 
-    if seen.p50 >= now.limit_m:
-        return say(Answer.AT_LIMIT, np.zeros(MEMBERS))
-    if not now.valid:
-        return say(Answer.OUTSIDE_VALIDITY)
-    if now.growth_m is None:
-        return say(Answer.NOT_ENOUGH_DATA)
-    if not now.growth_m > 0.0:
-        return say(Answer.NO_GROWTH)
-    log_rate = log_factor + math.hypot(settings.load_sigma, settings.model_sigma) * _NORMAL[2]
-    log_rate += now.growth_error_m / now.growth_m * _NORMAL[3]
-    room = np.maximum(now.limit_m - clearance, 0.0)
-    if shape is not None:
-        spent = shape.cycles_at(np.append(np.minimum(clearance, now.limit_m), now.limit_m))
-        room = (spent[-1] - spent[:-1]) * shape.growth(now.fresh_m + now.wear_m)
-    return say(Answer.KNOWN, room / (now.growth_m * np.exp(log_rate)))
+def _legs(now: Sequence[JointNow], beliefs: Sequence[Belief], settings: Forecasting, law: GrowthLaw) -> _Legs:
+    k = len(now)
+    shares, normals = even_shares(3 * k + 2), even_normals(3 * k + 2)
+    log_factor = np.array([belief.log_factors(row) for belief, row in zip(beliefs, shares, strict=False)])
+    excess = np.array(
+        [
+            np.interp(own, belief.log_factor, belief.excess_m) + belief.excess_sigma_m * row
+            for own, belief, row in zip(log_factor, beliefs, normals[k:], strict=False)
+        ]
+    )
+    fresh, wear, growth, error = (
+        np.array([[getattr(each, name) or 0.0] for each in now])
+        for name in ("fresh_m", "wear_m", "growth_m", "growth_error_m")
+    )
+    clearance = np.maximum(fresh + excess + np.exp(log_factor) * wear, 0.0)
+    relative = np.divide(error, growth, out=np.zeros_like(error), where=growth > 0.0)
+    log_rate = log_factor + np.hypot(law.sigma[:, None], relative) * normals[2 * k : 3 * k]
+    log_rate += settings.load_sigma * normals[3 * k]
+    # The twin's growth is that at its own clearances. What is believed of a factor is a mean over the part's
+    # past, in which the other clearances departed from the twin's by and by: half of their doing is in it.
+    here, twin = law.log_growth(clearance), law.log_growth(fresh + wear)
+    log_base = log_rate + 0.5 * (here - twin) - here
+    duty = settings.duty_hours_per_day * np.exp(settings.duty_sigma * normals[3 * k + 1])
+    return _Legs(clearance, np.maximum(growth, 0.0) * np.exp(log_base), duty)
+
+
+def _life(answer: Answer, cycles: Floats, cycle_s: float, day: Floats) -> dict[str, Quantiles | None]:
+    """Remaining life in cycles, hours and days; ``day`` (n,) days of a cycle."""
+    if answer not in (Answer.KNOWN, Answer.PARTLY_KNOWN, Answer.AT_LIMIT):
+        return dict.fromkeys(("cycles", "hours", "days"))
+    hours = cycles * (cycle_s / 3600.0)
+    return {"cycles": quantiles(cycles), "hours": quantiles(hours), "days": quantiles(cycles * day)}
+
+
+def _leg_answer(joints: Sequence[Answer]) -> Answer:
+    for answer in (Answer.AT_LIMIT, Answer.OUTSIDE_VALIDITY):
+        if answer in joints:
+            return answer
+    if Answer.KNOWN not in joints:
+        return Answer.NOT_ENOUGH_DATA if Answer.NOT_ENOUGH_DATA in joints else Answer.NO_GROWTH
+    return Answer.PARTLY_KNOWN if Answer.NOT_ENOUGH_DATA in joints else Answer.KNOWN
 
 
 def quantiles(values: Floats) -> Quantiles:
     """Quantiles of equally likely values."""
     return Quantiles(*np.quantile(values, (0.1, 0.5, 0.9)).tolist())
-
-
-def life_shapes(path: str, loose: tuple[str, ...]) -> tuple[LifeShape | None, ...]:
-    """Shapes of the loose joints from a file of `leg-wear-monitor life --json`; None each for no path.
-
-    Raises
-    ------
-    ConfigError
-        If the file cannot be read, or lacks a joint.
-    """
-    if not path:
-        return (None,) * len(loose)
-    try:
-        life = json.loads(Path(path).read_text(encoding="utf-8"))
-        return tuple(_shape(life, joint) for joint in loose)
-    except OSError as error:
-        raise ConfigError(path, "", f"cannot be read: {error.strerror}") from error
-    except (ValueError, KeyError, TypeError) as error:
-        raise ConfigError(
-            path, "", f"is no life of the joints {', '.join(loose)}, expected what `life --json` writes"
-        ) from error
-
-
-def _shape(life: dict[str, Any], joint: str) -> LifeShape:
-    clearance = np.array(life["joints"][joint]["clearance_m"], dtype=float)
-    cycles = np.array(life["cycles"], dtype=float)
-    rising = np.concatenate([[True], np.diff(np.maximum.accumulate(clearance)) > 0.0])
-    if rising.sum() < 3 or len(cycles) != len(clearance) or not math.isfinite(clearance.sum()):
-        raise ValueError(joint)
-    return LifeShape(clearance[rising], cycles[rising])

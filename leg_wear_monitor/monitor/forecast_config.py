@@ -29,10 +29,11 @@ class Forecasting:
     )
     model_sigma: float = quantity(
         "",
-        "the same of what the model's growth is off, for joints act upon each other (docs/forecast.md)",
+        "the same of what growth is off that is supposed to stay as it is, where no lives tell how it "
+        "changes (docs/forecast.md)",
         at_least=0.0,
         at_most=3.0,
-        default=0.07,
+        default=0.4,
     )
     clearance_sigma_m: float = quantity(
         "m", "standard deviation of a new joint's clearance", above=0.0, at_most=1.0e-3, default=5.0e-6
@@ -53,7 +54,7 @@ class Forecasting:
         default=2000,
     )
     life: str = described(
-        "file that `leg-wear-monitor life --json` wrote, for growth that changes as clearances open; "
-        "empty: growth stays as it is",
+        "file that `leg-wear-monitor life --lives 16 --json` wrote for this leg: how growth changes as all "
+        "clearances open; empty: the one that comes with the package for just this leg, if there is one",
         default="",
     )

@@ -8,10 +8,11 @@ import numpy as np
 from leg_wear_monitor.mechanism.arrays import Floats
 from leg_wear_monitor.mechanism.spec import Mechanism
 from leg_wear_monitor.monitor.belief import Belief, believe
-from leg_wear_monitor.monitor.forecast import JointForecast, JointNow, forecast_joint, life_shapes
+from leg_wear_monitor.monitor.forecast import Forecast, JointNow, forecast
 from leg_wear_monitor.monitor.forecast_config import Forecasting
 from leg_wear_monitor.monitor.growth import GrowthWindow, extended, growth_rate
 from leg_wear_monitor.monitor.ledger_entry import JointWear, Measurement
+from leg_wear_monitor.monitor.life_file import law_of
 from leg_wear_monitor.monitor.measure import Finding, looks_of, measure
 from leg_wear_monitor.twin.figures import CycleFigures
 
@@ -26,20 +27,20 @@ class ForecastState:
     ----------
     growth : tuple of GrowthWindow
     beliefs : tuple of Belief
-    last : tuple of JointForecast
-        Empty before the first.
+    last : Forecast or None
+        None before the first, and when something is new.
     stamp_ns : int
         Of the last.
     """
 
     growth: tuple[GrowthWindow, ...]
     beliefs: tuple[Belief, ...]
-    last: tuple[JointForecast, ...] = ()
+    last: Forecast | None = None
     stamp_ns: int = 0
 
 
 class Forecaster:
-    """Forecasts all loose joints.
+    """Forecasts all loose joints, and the leg.
 
     Parameters
     ----------
@@ -54,7 +55,7 @@ class Forecaster:
     Raises
     ------
     ConfigError
-        For a life that cannot be used.
+        For a file of lives that cannot be used.
     """
 
     def __init__(
@@ -66,7 +67,7 @@ class Forecaster:
     ) -> None:
         self._settings, self._loose = settings, mechanism.loose
         self._fresh_m = [mechanism.clearances[joint].radial_clearance for joint in mechanism.loose]
-        self._shapes = life_shapes(settings.life, mechanism.loose)
+        self._law = law_of(mechanism, settings.life, settings.model_sigma)
         self._measurements = list(measurements)
         joints = zip(self._loose, self._fresh_m, replaced_ns, strict=True)
         beliefs = tuple(
@@ -76,8 +77,8 @@ class Forecaster:
 
     def after(
         self, figures: CycleFigures, wear_m: Floats, limits_m: Sequence[float], is_valid: Callable[[], bool]
-    ) -> tuple[JointForecast, ...]:
-        """Forecasts after a gait cycle: new ones if it is time, else the last.
+    ) -> Forecast:
+        """Forecast after a gait cycle: a new one if it is time, else the last.
 
         Parameters
         ----------
@@ -94,13 +95,15 @@ class Forecaster:
             extended(window, float(growth), figures.moving_s, self._settings.window_cycles)
             for window, growth in zip(state.growth, figures.growth_mean_m, strict=True)
         )
-        if not state.last or not 0 <= figures.stamp_ns - state.stamp_ns < RENEWED_NS:
+        if state.last is None or not 0 <= figures.stamp_ns - state.stamp_ns < RENEWED_NS:
             state.stamp_ns = figures.stamp_ns
-            valid = is_valid()
-            state.last = tuple(
-                self._forecast(k, float(wear_m[k]), limits_m[k], valid) for k in range(len(self._loose))
-            )
+            state.last = self._forecast(wear_m, limits_m, is_valid())
         return state.last
+
+    @property
+    def measurements(self) -> tuple[Measurement, ...]:
+        """Of the ledger, and since."""
+        return tuple(self._measurements)
 
     def replaced(self, joint: str) -> None:
         """A joint's part is new: nothing is known of it."""
@@ -141,18 +144,24 @@ class Forecaster:
     def _believe(self, k: int, belief: Belief) -> None:
         beliefs = self.state.beliefs
         self.state.beliefs = (*beliefs[:k], belief, *beliefs[k + 1 :])
-        self.state.last = ()
+        self.state.last = None
 
-    def _forecast(self, k: int, wear_m: float, limit_m: float, valid: bool) -> JointForecast:
-        window = self.state.growth[k]
-        rate = growth_rate(window)
-        now = JointNow(
-            fresh_m=self._fresh_m[k],
-            wear_m=wear_m,
-            limit_m=limit_m,
-            growth_m=rate.per_cycle_m if rate else None,
-            growth_error_m=rate.error_m if rate else 0.0,
-            cycle_s=float(np.mean(window.moving_s)),
-            valid=valid,
+    def _forecast(self, wear_m: Floats, limits_m: Sequence[float], valid: bool) -> Forecast:
+        state = self.state
+        rates = [growth_rate(window) for window in state.growth]
+        now = [
+            JointNow(
+                joint=joint,
+                fresh_m=self._fresh_m[k],
+                wear_m=float(wear_m[k]),
+                limit_m=limits_m[k],
+                growth_m=rate.per_cycle_m if rate else None,
+                growth_error_m=rate.error_m if rate else 0.0,
+            )
+            for k, (joint, rate) in enumerate(zip(self._loose, rates, strict=True))
+        ]
+        # a new part's window is shorter than the others'
+        walked = max((window.moving_s for window in state.growth), key=len)
+        return forecast(
+            now, state.beliefs, self._settings, self._law, cycle_s=float(np.mean(walked)), valid=valid
         )
-        return forecast_joint(now, self.state.beliefs[k], self._settings, self._shapes[k])

@@ -3,7 +3,7 @@
 import attrs
 
 from leg_wear_monitor.monitor.alarms import Alarm, Level
-from leg_wear_monitor.monitor.forecast import JointForecast
+from leg_wear_monitor.monitor.forecast import JointForecast, LegForecast
 from leg_wear_monitor.twin.figures import Intake, SampleFigures
 
 SampleReports = SampleFigures
@@ -88,6 +88,8 @@ class CycleReport:
         Foot load at work in the model: that above where it is believed, else 0.
     friction_nm, torque_lag_s : float
         Friction in the drive, and by how much the measured torque comes late.
+    forecast : LegForecast or None
+        Renewed once a minute.
     """
 
     cycle: int
@@ -107,6 +109,7 @@ class CycleReport:
     load_acting_n: float
     friction_nm: float
     torque_lag_s: float
+    forecast: LegForecast | None = None
 
 
 @attrs.frozen

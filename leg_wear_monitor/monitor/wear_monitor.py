@@ -16,7 +16,7 @@ from leg_wear_monitor.monitor.forecaster import Forecaster
 from leg_wear_monitor.monitor.growth import GrowthWindow, extended
 from leg_wear_monitor.monitor.judge import Judge
 from leg_wear_monitor.monitor.ledger import Ledger
-from leg_wear_monitor.monitor.ledger_entry import Audit
+from leg_wear_monitor.monitor.ledger_entry import Audit, Measurement
 from leg_wear_monitor.monitor.measure import Finding
 from leg_wear_monitor.monitor.monitor_state import MonitorSnapshot, MonitorState
 from leg_wear_monitor.monitor.reports import (
@@ -124,6 +124,11 @@ class WearMonitor:
     def lost(self) -> Lost:
         """What was not integrated so far."""
         return lost(self._twin.intake, self._book.state.skipped, self._book.unmonitored_s)
+
+    @property
+    def measurements(self) -> tuple[Measurement, ...]:
+        """Measured clearances, those of the ledger first."""
+        return self._forecaster.measurements
 
     @property
     def wear_depth_m(self) -> Floats:
@@ -279,8 +284,8 @@ class WearMonitor:
             for window, growth in zip(state.growth, figures.growth_mean_m, strict=True)
         )
         limits = self._judge.board.clearance_limits_m
-        forecasts = self._forecaster.after(figures, self._worn_m(figures), limits, self._judge.holds)
-        state.last = cycle_report(figures, book.state.cycles, self.loose, state.growth, limits, forecasts)
+        forecast = self._forecaster.after(figures, self._worn_m(figures), limits, self._judge.holds)
+        state.last = cycle_report(figures, book.state.cycles, self.loose, state.growth, limits, forecast)
         book.note_clearances(state.last)
         return state.last
 

@@ -9,7 +9,7 @@ from numpy.typing import NDArray
 
 from leg_wear_monitor.monitor.alarms import Alarm, Level
 from leg_wear_monitor.monitor.config import MonitorConfig
-from leg_wear_monitor.monitor.forecast import Quantiles
+from leg_wear_monitor.monitor.forecast import JointForecast, LegForecast, Quantiles
 from leg_wear_monitor.monitor.reports import (
     AlarmList,
     CycleReport,
@@ -123,8 +123,9 @@ class Messages:
         return raw
 
     def forecast(self, cycle: CycleReport) -> bytes:
-        """The message of `FORECAST` after a gait cycle: how long each joint lasts if it goes on so."""
-        return self._array(cycle.stamp_ns, map(_lifetime, cycle.joints))
+        """The message of `FORECAST` after a gait cycle: how long each joint lasts, and the leg."""
+        leg = [] if cycle.forecast is None else [_leg_lifetime(cycle.forecast)]
+        return self._array(cycle.stamp_ns, [*map(_lifetime, cycle.joints), *leg])
 
     def alarms(self, alarms: AlarmList) -> bytes:
         """The message of `ALARMS`: all of them, as they stand."""
@@ -192,10 +193,24 @@ def _lifetime(joint: JointReport) -> Status:
     if told is None:
         words = "if it goes on as it does" if values else "too little growth or data to say"
         return Status(name, Level.OK, words, values)
+    values |= _quantiles(told)
+    values |= {f"clearance_{share}_m": value for share, value in attrs.asdict(told.clearance_m).items()}
+    values["measurements"] = float(told.measurements)
+    return Status(name, Level.OK, told.answer.value, values)
+
+
+def _leg_lifetime(told: LegForecast) -> Status:
+    """Until the first joint reaches its limit; the probability of each to be the first."""
+    values = _quantiles(told)
+    values |= {f"{joint}_first_probability": value for joint, value in told.first_probability.items()}
+    values["simulated_lives"] = float(told.simulated_lives)
+    return Status("forecast leg", Level.OK, told.answer.value, values)
+
+
+def _quantiles(told: JointForecast | LegForecast) -> dict[str, float]:
+    values: dict[str, float] = {}
     for key in ("cycles", "hours", "days"):
         quantiles: Quantiles | None = getattr(told, key)
         if quantiles is not None:
             values |= {f"{share}_{key}": value for share, value in attrs.asdict(quantiles).items()}
-    values |= {f"clearance_{share}_m": value for share, value in attrs.asdict(told.clearance_m).items()}
-    values["measurements"] = float(told.measurements)
-    return Status(name, Level.OK, told.answer.value, values)
+    return values

@@ -8,7 +8,7 @@ import numpy as np
 
 from leg_wear_monitor.mechanism.arrays import Floats
 from leg_wear_monitor.monitor.alarms import Alarm
-from leg_wear_monitor.monitor.forecast import JointForecast
+from leg_wear_monitor.monitor.forecast import JointForecast, LegForecast
 from leg_wear_monitor.recording.history import CYCLE_COLUMNS, JOINT_COLUMNS, History
 from leg_wear_monitor.recording.outputs import state_of
 from leg_wear_monitor.recording.replay import ReplayResult
@@ -36,6 +36,8 @@ def summary(result: ReplayResult, wall_s: float) -> dict[str, Any]:
         "real_time_factor": result.duration_s / wall_s,
         "cycles": len(result.history),
         "joints": _joints(result),
+        "forecast": _leg(result),
+        "measurements": [attrs.asdict(measurement) for measurement in result.monitor.measurements],
         "alarms": {
             "now": [_alarm(alarm) for alarm in result.monitor.alarms.alarms],
             "changes": [{"stamp_ns": stamp, **_alarm(alarm)} for stamp, alarm in result.history.changes],
@@ -107,7 +109,15 @@ def _joints(result: ReplayResult) -> dict[str, Any]:
     return joints
 
 
-def _forecast(told: JointForecast) -> dict[str, Any]:
+def _leg(result: ReplayResult) -> dict[str, Any] | None:
+    """Forecast of the leg's own end: its first joint's."""
+    last = result.history.last
+    if last is None or last.forecast is None:
+        return None
+    return {**_forecast(last.forecast), "first": last.forecast.first}
+
+
+def _forecast(told: JointForecast | LegForecast) -> dict[str, Any]:
     return {**attrs.asdict(told), "answer": told.answer.value}
 
 

@@ -2,11 +2,15 @@
 
 import json
 
+from leg_wear_monitor import load_mechanism
+from leg_wear_monitor.monitor.binding import fingerprint
+from leg_wear_monitor.monitor.life_file import read_lives
+
 ONE = ("life", "--mechanism", "four_bar", "--legs", "1", "--cycles", "2", "--opens-m", "2e-5")
 
 
 def test_life_tells_when_each_joint_reaches_its_limit(run, tmp_path):
-    result = run(*ONE, "--limit-m", "5.2e-4", "--out", "out")
+    result = run(*ONE, "--limit-m", "5.2e-4", "--lives", "3", "--out", "out")
     assert result.exit_code == 0
     life = json.loads((tmp_path / "out" / "life.json").read_text())
     assert (tmp_path / "out" / "life.png").read_bytes().startswith(b"\x89PNG")
@@ -14,6 +18,14 @@ def test_life_tells_when_each_joint_reaches_its_limit(run, tmp_path):
     for joint, figures in life["joints"].items():
         assert figures["clearance_m"] == sorted(figures["clearance_m"])
         assert f"{joint} reaches 520 µm after" in result.stdout
+    leg = load_mechanism("four_bar")
+    assert life["fingerprint"] == fingerprint(leg)
+    nominal, *others = read_lives(str(tmp_path / "out" / "life.json"), leg)
+    assert nominal.factor.tolist() == [1.0, 1.0]
+    # the others open the joints in other proportions
+    assert len(others) == 2
+    shares = [life.clearance_m[-1] - life.clearance_m[0] for life in (nominal, *others)]
+    assert len({round(share[0] / share[1], 2) for share in shares}) == 3
 
 
 def test_life_refuses_what_cannot_be(run):

@@ -11,7 +11,7 @@ import pytest
 
 from leg_wear_monitor.monitor.alarms import Alarm, Level
 from leg_wear_monitor.monitor.config import MonitorConfig
-from leg_wear_monitor.monitor.forecast import Answer, JointForecast, Quantiles
+from leg_wear_monitor.monitor.forecast import Answer, JointForecast, LegForecast, Quantiles
 from leg_wear_monitor.monitor.input_config import DriveTorque
 from leg_wear_monitor.monitor.reports import (
     AlarmList,
@@ -60,7 +60,7 @@ def reports() -> Reports:
         JointReport(**{**known, "joint": "G", "growth_mps": None, "remaining": None}),
     )
     blank = {field.name: 0 for field in attrs.fields(CycleReport)}
-    cycle = CycleReport(**{**blank, "stamp_ns": 35, "joints": joints})
+    cycle = CycleReport(**{**blank, "stamp_ns": 35, "joints": joints, "forecast": None})
     alarm = Alarm(
         kind="clearance", subject="A", unit="m", level=Level.ERROR, present=Level.OK, value=6e-4, limit=5e-4,
         raised_ns=1_700_000_000_123_456_789,
@@ -137,6 +137,25 @@ def test_a_forecast_says_what_is_known(store: Any, reports: Reports) -> None:
     values = {pair.key: pair.value for pair in told.values}
     assert [values[f"{share}_hours"] for share in ("p10", "p50", "p90")] == ["1", "2", "3"]
     assert (values["clearance_p90_m"], values["measurements"]) == ("3", "2")
+
+
+def test_the_leg_s_forecast_is_a_status_after_those_of_the_joints(store: Any, reports: Reports) -> None:
+    of = Quantiles(1.0, 2.0, 3.0)
+    leg = LegForecast(
+        answer=Answer.KNOWN,
+        cycles=of,
+        hours=of,
+        days=of,
+        first_probability={"A": 0.75, "G": 0.25},
+        simulated_lives=9,
+    )
+    raw = Messages(MonitorConfig(), LOOSE).forecast(attrs.evolve(reports.cycles[0], forecast=leg))
+    *joints, told = store.deserialize_cdr(raw, FORECAST.type).status
+    assert [status.name.split(": ")[1] for status in joints] == ["forecast A", "forecast G"]
+    assert (told.name, told.message) == ("leg_wear_monitor: forecast leg", Answer.KNOWN.value)
+    values = {pair.key: pair.value for pair in told.values}
+    assert [values[f"{share}_cycles"] for share in ("p10", "p50", "p90")] == ["1", "2", "3"]
+    assert (values["A_first_probability"], values["simulated_lives"]) == ("0.75", "9")
 
 
 def test_diagnostics_are_the_monitors_status(store: Any) -> None:

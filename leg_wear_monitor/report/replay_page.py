@@ -6,13 +6,13 @@ from typing import Any
 import numpy as np
 
 from leg_wear_monitor.report.figure import png
+from leg_wear_monitor.report.forecast_section import forecast_section, hours, leg_sentence
 from leg_wear_monitor.report.page import Findings, Page, Part, Picture, Section, Table, Text
 from leg_wear_monitor.report.replay_charts import alarm_chart, clearance_chart, force_chart, health_chart
 from leg_wear_monitor.report.worn_bushings import worn_bushings
 from leg_wear_monitor.wear.surfaces import Surfaces
 
 _MOST_ROWS = 50
-_YEAR_H = 8766.0
 
 
 def replay_page(record: dict[str, Any]) -> Page:
@@ -30,7 +30,7 @@ def replay_page(record: dict[str, Any]) -> Page:
     )
     sections = [Section("What was found", [Findings(_sentences(record))]), _recording(recording)]
     if record["cycles"]:
-        sections += [_clearance(record), _forces(record), _wear(record)]
+        sections += [_clearance(record), forecast_section(record), _forces(record), _wear(record)]
     sections += [_alarms(record), _health(record)]
     title = f"Joint wear of {monitor['hardware_id']}"
     return Page(title=title, summary=summary, sections=sections, versions=record["made_with"])
@@ -58,8 +58,9 @@ def _sentences(record: dict[str, Any]) -> list[str]:
         text = f"{fastest} wears fastest: {growing[fastest]:.3g} m a gait cycle"
         remaining = record["joints"][fastest]["remaining"]
         if remaining and remaining["hours"] is not None:
-            text += f"; going on so, it reaches its limit in {_hours(remaining['hours'])} of walking"
+            text += f"; going on so, it reaches its limit in {hours(remaining['hours'])} of walking"
         sentences.append(f"{text}.")
+    sentences += leg_sentence(record)
     if record["monitor"]["wear_acceleration"] != 1.0:
         factor = record["monitor"]["wear_acceleration"]
         sentences.append(f"All wear is multiplied by {factor:g}: a demonstration, not a measurement.")
@@ -215,10 +216,6 @@ def _time(seconds: float) -> str:
     if seconds < 120.0:
         return f"{seconds:.3g} s"
     return f"{seconds / 60.0:.3g} min" if seconds < 7200.0 else f"{seconds / 3600.0:.3g} h"
-
-
-def _hours(hours: float) -> str:
-    return f"{hours:.3g} hours" if hours < _YEAR_H else f"{hours / _YEAR_H:.3g} years"
 
 
 def _date(stamp_ns: int) -> str:

@@ -10,6 +10,8 @@ import pytest
 
 import leg_wear_monitor as lw
 from leg_wear_monitor.monitor.config import LedgerFile
+from leg_wear_monitor.monitor.forecast import Answer
+from leg_wear_monitor.monitor.ledger_entry import Measurement
 from leg_wear_monitor.recording import encode
 from leg_wear_monitor.recording.cdr import JOINT_STATE, WRENCH_STAMPED
 from leg_wear_monitor.recording.decoder import Decoder
@@ -158,6 +160,7 @@ def test_the_page_is_whole_and_of_one_file(out: tuple[Path, Any]) -> None:
     html = page_html(replay_page(record))
     for title in (
         "Clearance over time",
+        "Forecast",
         "Impact forces",
         "Wear around each bushing",
         "Alarms",
@@ -167,6 +170,37 @@ def test_the_page_is_whole_and_of_one_file(out: tuple[Path, Any]) -> None:
     assert "http://" not in html and "https://" not in html
     assert html.count("<img") >= 4
     assert page_html(replay_page(json.loads(json.dumps(record)))) == html
+    assert "No clearance was measured yet" in html
+    # a walk of seconds is too short for a growth rate
+    assert record["forecast"]["answer"] == Answer.NOT_ENOUGH_DATA.value
+    assert "The leg lasts" not in html
+
+
+def test_the_page_says_how_long_the_leg_lasts(out: tuple[Path, Any]) -> None:
+    pytest.importorskip("jinja2")
+    from leg_wear_monitor.report.page import page_html
+    from leg_wear_monitor.report.replay_page import replay_page
+
+    record = {**summary(out[1], 2.0), "made_with": {}}
+    life = {"p10": 700.0, "p50": 1000.0, "p90": 17532.0}
+    first = dict.fromkeys(record["joints"], 0.1) | {"G": 0.6}
+    leg = {**record["forecast"], "hours": life, "first_probability": first, "first": "G"}
+    html = page_html(replay_page({**record, "forecast": leg}))
+    assert "The leg lasts 1e+03 hours of walking (p10 700 hours, p90 2 years); G is the first" in html
+    assert "with a probability of 60 %." in html
+
+
+def test_the_page_shows_where_measured_clearances_lay_in_what_was_expected(out: tuple[Path, Any]) -> None:
+    pytest.importorskip("jinja2")
+    from leg_wear_monitor.report.page import page_html
+    from leg_wear_monitor.report.replay_page import replay_page
+
+    looked = [Measurement(7, "A", "ann", 3e-4, 1e-6, 0.0, 9, 0, share, True) for share in (0.2, 0.6)]
+    record = {**summary(out[1], 2.0), "made_with": {}}
+    without = page_html(replay_page(record))
+    html = page_html(replay_page({**record, "measurements": [attrs.asdict(each) for each in looked]}))
+    assert html.count("<img") == without.count("<img") + 1
+    assert "lie in the shaded band" in html and "No clearance was measured yet" not in html
 
 
 def test_the_ledger_of_the_parameters_is_left_alone_and_one_that_is_asked_for_is_continued(

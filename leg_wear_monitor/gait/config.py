@@ -6,12 +6,17 @@ import attrs
 
 from leg_wear_monitor.mechanism.quantity import FieldError, choice, described, quantity
 
+MOST_ENCODERS = 4
 WRENCH, EFFORT, FLOAT64 = TORQUE_SOURCES = ("wrench", "effort", "float64")
 
 
 def _share(doc: str) -> float:
     share: float = quantity("", doc, at_least=0.0, at_most=1.0, default=0.0)
     return share
+
+
+def _at_most_four(names: tuple[str, ...]) -> str | None:
+    return None if len(names) <= MOST_ENCODERS else f"{list(names)} are more than {MOST_ENCODERS}"
 
 
 def _rises_from_zero(times: tuple[float, ...]) -> str | None:
@@ -58,6 +63,32 @@ class EncoderConfig:
     )
     offset_rad: float = quantity("rad", "what it reads at crank angle 0", default=0.0)
     wrapped: bool = described("angle wrapped to a turn; else it counts on", default=False)
+
+
+@attrs.frozen(kw_only=True)
+class JointEncodersConfig:
+    """Further encoders, read with the crank's: each on a revolute joint, with errors of its own."""
+
+    names: tuple[str, ...] = described(
+        "their names in joint_states, four at most; none if empty", default=(), check=_at_most_four
+    )
+    joints: tuple[str, ...] = described(
+        "the revolute joint that each is on; it reads from the bushing's body to the journal's", default=()
+    )
+    noise_rad: float = quantity(
+        "rad", "noise of the angles, standard deviation", at_least=0.0, default=1.0e-4
+    )
+    offsets_rad: tuple[float, ...] = quantity(
+        "rad", "what each reads more than the angle; 0 if empty", default=()
+    )
+    scale_errors: tuple[float, ...] = quantity("", "by what share each reads more; 0 if empty", default=())
+
+    def __attrs_post_init__(self) -> None:
+        for key in ("joints", "offsets_rad", "scale_errors"):
+            given = len(getattr(self, key))
+            if given != len(self.names) and (given or key == "joints"):
+                fault = f"has {given} values for {len(self.names)} encoders, expected one each"
+                raise FieldError(key, fault)
 
 
 @attrs.frozen(kw_only=True)
@@ -128,6 +159,7 @@ class GaitConfig:
     wear_acceleration: float = quantity("", "wear coefficients, times this", at_least=0.0, default=1.0)
     pace: PaceConfig = described("how the crank turns", factory=PaceConfig)
     encoder: EncoderConfig = described("the crank's encoder", factory=EncoderConfig)
+    joint_encoders: JointEncodersConfig = described("encoders on further joints", factory=JointEncodersConfig)
     torque_sensor: TorqueSensorConfig = described("the drive's torque sensor", factory=TorqueSensorConfig)
     transport: TransportConfig = described("what happens to a reading on its way", factory=TransportConfig)
     load: LoadConfig = described("what a monitor cannot know of", factory=LoadConfig)

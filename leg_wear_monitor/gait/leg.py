@@ -1,6 +1,7 @@
 """The leg itself: full coordinates, clearances and wear of its own, all of it known."""
 
 import math
+from collections.abc import Sequence
 from typing import Any, NamedTuple
 
 import attrs
@@ -13,11 +14,11 @@ from leg_wear_monitor.dynamics.tally import TORQUE, Tally, new_tally
 from leg_wear_monitor.errors import ConfigError
 from leg_wear_monitor.gait.config import GaitConfig, KnockConfig
 from leg_wear_monitor.gait.pace import CrankMotion, Pace, quintic
-from leg_wear_monitor.mechanism.arrays import Floats
+from leg_wear_monitor.mechanism.arrays import Floats, body_names
 from leg_wear_monitor.mechanism.ideal import TURN, one_cycle, point_motion
 from leg_wear_monitor.mechanism.loader import load_mechanism
 from leg_wear_monitor.mechanism.position import build_linkage
-from leg_wear_monitor.mechanism.spec import Mechanism, PhaseLoad, SpeedDrive
+from leg_wear_monitor.mechanism.spec import Mechanism, PhaseLoad, RevoluteJoint, SpeedDrive
 
 _LONGEST_PIECE_S = 2.0e-3  # of the drive's polynomial: it then follows a ripple of 50 Hz to 1e-9 rad
 _LOAD_PHASES = 72
@@ -25,10 +26,15 @@ _FRICTION_RAMP_RADPS = 0.05
 
 
 class Instant(NamedTuple):
-    """The crank at a time, and the integral of the drive torque over all time before [N m s]."""
+    """The crank at a time, and what sensors see of it.
+
+    ``torque_impulse`` is the integral of the drive torque over all time before [N m s]; ``encoder_rad`` what
+    further encoders would read without an error.
+    """
 
     crank: CrankMotion
     torque_impulse: float
+    encoder_rad: tuple[float, ...] = ()
 
 
 class SyntheticLeg:
@@ -57,6 +63,7 @@ class SyntheticLeg:
         self.loose = setup.loose
         self._setup, self._run = setup, FullRun(setup)
         self._knock, self._friction = _checked(config.knock, setup), config.load.friction_nm
+        self._sides = _sides(mechanism, config.joint_encoders.joints)
         self._tally: Tally = new_tally(len(mechanism.joints))
         self._friction_impulse = 0.0
         self._cycles: list[tuple[float, Floats]] = [(0.0, self.clearance_m())]
@@ -82,7 +89,8 @@ class SyntheticLeg:
         for piece in range(pieces, 0, -1):
             self._step(t if piece == 1 else self.time + (t - self.time) / piece)
         impulse = float(self._tally.drive_integral[TORQUE]) + self._friction_impulse
-        return Instant(self._pace.at(t), impulse)
+        turned = tuple(float(self._run.q[j, 2] - self._run.q[b, 2]) for b, j in self._sides)
+        return Instant(self._pace.at(t), impulse, turned)
 
     def truth(self) -> dict[str, Any]:
         """What is known of the leg: each joint's clearance at the start, after each cycle, and now [m]."""
@@ -147,6 +155,15 @@ def _loaded(mechanism: Mechanism, force_n: float) -> Mechanism:
         force=tuple((0.0, float(f)) for f in push),
     )
     return attrs.evolve(mechanism, loads={**mechanism.loads, "ground": ground})
+
+
+def _sides(mechanism: Mechanism, joints: Sequence[str]) -> list[list[int]]:
+    """Rows of the bushing's and the journal's body of revolute joints."""
+    names = body_names(mechanism)
+    for name in joints:
+        if not isinstance(mechanism.joints.get(name), RevoluteJoint):
+            raise ConfigError("gait", "joint_encoders.joints", f"{name!r} is no revolute joint")
+    return [[names.index(body) for body in mechanism.sides(joint)] for joint in joints]
 
 
 def _checked(knock: KnockConfig, setup: Setup) -> KnockConfig | None:

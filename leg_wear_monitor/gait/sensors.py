@@ -12,6 +12,7 @@ from leg_wear_monitor.gait.config import (
     EFFORT,
     EncoderConfig,
     GaitConfig,
+    JointEncodersConfig,
     TorqueSensorConfig,
     TransportConfig,
 )
@@ -20,6 +21,7 @@ from leg_wear_monitor.gait.pace import CrankMotion
 from leg_wear_monitor.mechanism.ideal import TURN
 from leg_wear_monitor.twin.sample import (
     CRANK,
+    ENCODERS,
     FAULTS,
     GAIT_SAMPLE,
     NO_FAULT,
@@ -43,6 +45,7 @@ class Reading(NamedTuple):
     crank_angle_rad: float
     crank_velocity_radps: float
     torque_nm: float
+    encoder_rad: tuple[float, ...] = ()
 
 
 class Noise:
@@ -75,8 +78,15 @@ def readings(leg: SyntheticLeg, config: GaitConfig) -> Iterator[Reading]:
 
 def samples(block: Iterable[Reading], start_ns: int) -> Samples:
     """Readings as samples that a monitor takes, (n,) of GAIT_SAMPLE; time 0 is ``start_ns``."""
-    rows = [(stamp_ns(reading, start_ns), reading.kind, reading.fault, *reading[4:]) for reading in block]
+    rows = [
+        (stamp_ns(reading, start_ns), reading.kind, reading.fault, *reading[4:7], _four(reading.encoder_rad))
+        for reading in block
+    ]
     return np.array(rows, dtype=GAIT_SAMPLE)
+
+
+def _four(angles: tuple[float, ...]) -> tuple[float, ...]:
+    return (*angles, *(math.nan,) * (ENCODERS - len(angles)))
 
 
 def stamp_ns(reading: Reading, start_ns: int) -> int:
@@ -88,6 +98,8 @@ def _taken(leg: SyntheticLeg, config: GaitConfig) -> Iterator[Reading]:
     """Readings in the order in which they are taken."""
     jitter = config.transport.jitter_s
     encoder, torque = Noise([config.seed, 1]), Noise([config.seed, 2])
+    further = Noise([config.seed, 4])
+    turned: tuple[float, ...] = ()
     by_effort = config.torque_sensor.source == EFFORT
     crank_times = _times(config.encoder.rate_hz, jitter, encoder, CRANK)
     torque_times = iter(()) if by_effort else _times(config.torque_sensor.rate_hz, jitter, torque, TORQUE)
@@ -99,11 +111,12 @@ def _taken(leg: SyntheticLeg, config: GaitConfig) -> Iterator[Reading]:
         angle, velocity, torque_nm = math.nan, math.nan, math.nan
         if kind == CRANK:
             angle, velocity = _encoder(config.encoder, instant.crank, encoder)
+            turned = _further(config.joint_encoders, instant.encoder_rad, further)
         if kind == TORQUE or by_effort:
             mean = (instant.torque_impulse - impulse) / (t - since)
             since, impulse = t, instant.torque_impulse
             torque_nm = _torque(config.torque_sensor, mean, torque)
-        yield Reading(t, t, kind, NO_FAULT, angle, velocity, torque_nm)
+        yield Reading(t, t, kind, NO_FAULT, angle, velocity, torque_nm, turned if kind == CRANK else ())
 
 
 def _times(rate_hz: float, jitter_s: float, noise: Noise, kind: int) -> Iterator[tuple[float, int]]:
@@ -120,6 +133,14 @@ def _encoder(config: EncoderConfig, crank: CrankMotion, noise: Noise) -> tuple[f
         step = TURN / config.counts_per_turn
         angle = round(angle / step) * step
     return angle % TURN if config.wrapped else angle, velocity
+
+
+def _further(config: JointEncodersConfig, angles: tuple[float, ...], noise: Noise) -> tuple[float, ...]:
+    none = (0.0,) * len(angles)
+    errors = zip(angles, config.offsets_rad or none, config.scale_errors or none, strict=True)
+    return tuple(
+        angle * (1.0 + scale) + offset + config.noise_rad * noise.normal() for angle, offset, scale in errors
+    )
 
 
 def _torque(config: TorqueSensorConfig, torque_nm: float, noise: Noise) -> float:

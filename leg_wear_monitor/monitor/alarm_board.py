@@ -9,6 +9,7 @@ from leg_wear_monitor.monitor.config import MonitorConfig
 from leg_wear_monitor.monitor.reports import AlarmList
 
 IMPACT, CLEARANCE, GROWTH = "impact_force", "clearance", "growth"
+DEPARTURE = "clearance_departure"
 MISMATCH, CADENCE = "torque_mismatch", "cadence"
 CRANK_RATE, TORQUE_RATE = "input_rate crank", "input_rate torque"
 BAD_SAMPLES, LOST_TIME, STUCK_TORQUE = "input_samples", "input_gaps", "input_torque"
@@ -24,6 +25,8 @@ def limits_of(config: MonitorConfig, loose: tuple[str, ...]) -> dict[str, Limit]
         found[f"{IMPACT} {joint}"] = _limit(config, impact, config.alarms.knock_on_delay_cycles)
         found[f"{CLEARANCE} {joint}"] = _limit(config, clearance)
         found[f"{GROWTH} {joint}"] = _limit(config, limits.growth_m_per_hour)
+        if config.encoders.names:
+            found[f"{DEPARTURE} {joint}"] = _limit(config, limits.clearance_departure_m)
     found[MISMATCH] = _limit(config, limits.torque_mismatch, config.alarms.knock_on_delay_cycles)
     found[CADENCE] = _limit(config, config.cadence.tolerance_rpm)
     for rate in (CRANK_RATE, TORQUE_RATE):
@@ -47,7 +50,8 @@ def _least(config: MonitorConfig, error: float) -> Limit:
 
 
 _UNITS = {
-    IMPACT: "N", CLEARANCE: "m", GROWTH: "m/h", CADENCE: "rpm", CRANK_RATE: "Hz", TORQUE_RATE: "Hz",
+    IMPACT: "N", CLEARANCE: "m", DEPARTURE: "m",
+    GROWTH: "m/h", CADENCE: "rpm", CRANK_RATE: "Hz", TORQUE_RATE: "Hz",
 }  # fmt: skip
 
 

@@ -137,8 +137,9 @@ def blind_directions(columns: Floats, counts: Floats) -> Floats:
     a = columns.reshape(-1, columns.shape[-1])[(counts > 0.0).ravel()]
     length = np.linalg.norm(a, axis=0)
     length[length == 0.0] = 1.0
-    _, s, vt = np.linalg.svd(a / length)
-    return np.asarray(vt[s <= _BLIND * s[0]] / length)
+    _, s, vt = np.linalg.svd(a / length, full_matrices=len(a) < a.shape[1])
+    shown = np.pad(s, (0, len(vt) - len(s)))
+    return np.asarray(vt[shown <= _BLIND * s[0]] / length)
 
 
 def observability(columns: Floats, sensors: Sequence[int], joints: int) -> list[tuple[Observable, float]]:

@@ -8,7 +8,7 @@ import attrs
 
 from leg_wear_monitor.mechanism.quantity import described, quantity
 from leg_wear_monitor.monitor.forecast_config import Forecasting
-from leg_wear_monitor.monitor.input_config import LIVE, Cadence, Crank, DriveTorque, Tracker
+from leg_wear_monitor.monitor.input_config import LIVE, Cadence, Crank, DriveTorque, Encoders, Tracker
 
 
 def _filled(text: str) -> str | None:
@@ -43,6 +43,14 @@ class Limits:
     )
     joint_clearance_m: tuple[float, ...] = quantity(
         "m", "the same, one a loose joint, instead of the one for all", above=0.0, default=(), metadata=LIVE
+    )
+    clearance_departure_m: float = quantity(
+        "m",
+        "departure of a clearance that further encoders show from the one that is counted",
+        above=0.0,
+        at_most=0.1,
+        default=0.0001,
+        metadata=LIVE,
     )
     growth_m_per_hour: float = quantity(
         "m/h", "growth of a joint's mean clearance", above=0.0, at_most=1.0, default=1.0e-6, metadata=LIVE
@@ -178,6 +186,7 @@ class MonitorConfig:
     )
     crank_joint: str = described("name of the crank in joint_states", default="crank", check=_filled)
     crank: Crank = described("", factory=Crank)
+    encoders: Encoders = described("", factory=Encoders)
     drive_torque: DriveTorque = described("", factory=DriveTorque)
     cadence: Cadence = described("", factory=Cadence)
     tracker: Tracker = described("", factory=Tracker)

@@ -6,6 +6,7 @@ from collections.abc import Sequence
 from leg_wear_monitor.monitor.forecast import Forecast, JointForecast
 from leg_wear_monitor.monitor.growth import GrowthWindow, growth_rate, remaining
 from leg_wear_monitor.monitor.reports import CycleReport, JointReport
+from leg_wear_monitor.monitor.seen import SeenClearance
 from leg_wear_monitor.twin.figures import CycleFigures, TorqueFigures
 
 
@@ -16,6 +17,7 @@ def cycle_report(
     growth: Sequence[GrowthWindow],
     limits_m: Sequence[float],
     forecast: Forecast,
+    seen: Sequence[SeenClearance] | None = None,
 ) -> CycleReport:
     """Report of a gait cycle.
 
@@ -31,6 +33,7 @@ def cycle_report(
     limits_m : sequence of float
         Limit of each one's clearance.
     forecast : Forecast
+    seen : sequence of SeenClearance, optional
     """
     torque = figures.torque
     return CycleReport(
@@ -41,7 +44,9 @@ def cycle_report(
         moving_s=figures.moving_s,
         bridged_s=figures.bridged_s,
         joints=tuple(
-            _joint_report(figures, k, joint, growth[k], limits_m[k], forecast.joints[k])
+            _joint_report(
+                figures, k, joint, growth[k], limits_m[k], forecast.joints[k], seen[k] if seen else None
+            )
             for k, joint in enumerate(loose)
         ),
         torque_samples=torque.samples,
@@ -65,7 +70,13 @@ def _mismatch(torque: TorqueFigures) -> float:
 
 
 def _joint_report(
-    figures: CycleFigures, k: int, joint: str, window: GrowthWindow, limit_m: float, forecast: JointForecast
+    figures: CycleFigures,
+    k: int,
+    joint: str,
+    window: GrowthWindow,
+    limit_m: float,
+    forecast: JointForecast,
+    seen: SeenClearance | None,
 ) -> JointReport:
     rate = growth_rate(window)
     clearance_m = float(figures.clearance_mean_m[k])
@@ -78,6 +89,7 @@ def _joint_report(
         growth_error_m_per_cycle=rate.error_m if rate else None,
         remaining=remaining(rate, clearance_m, limit_m),
         forecast=forecast,
+        seen=seen,
         peak_force_n=float(figures.peak_force_n[k]),
         p99_force_n=float(figures.p99_force_n[k]),
         mean_force_n=float(figures.mean_force_n[k]),

@@ -7,13 +7,13 @@ import numpy as np
 
 from leg_wear_monitor.mechanism.arrays import Floats
 from leg_wear_monitor.mechanism.spec import Mechanism
-from leg_wear_monitor.monitor.belief import Belief, believe
+from leg_wear_monitor.monitor.belief import Belief, Look, believe
 from leg_wear_monitor.monitor.forecast import Forecast, JointNow, forecast
 from leg_wear_monitor.monitor.forecast_config import Forecasting
 from leg_wear_monitor.monitor.growth import GrowthWindow, extended, growth_rate
 from leg_wear_monitor.monitor.ledger_entry import JointWear, Measurement
 from leg_wear_monitor.monitor.life_file import law_of
-from leg_wear_monitor.monitor.measure import Finding, looks_of, measure
+from leg_wear_monitor.monitor.measure import CONTRADICTS, Finding, looks_of, measure
 from leg_wear_monitor.twin.figures import CycleFigures
 
 RENEWED_NS = 60_000_000_000
@@ -140,6 +140,29 @@ class Forecaster:
         self._measurements.append(found.measurement)
         self._believe(k, found.after)
         return found
+
+    def seen(self, joint: str, look: Look, replaced_ns: int) -> bool:
+        """Take in a clearance that encoders show, instead of the last such one.
+
+        Parameters
+        ----------
+        joint : str
+        look : Look
+            Its error does not average out, so the newest says all there is.
+        replaced_ns : int
+            When its part was replaced, 0 if it never was.
+
+        Returns
+        -------
+        bool
+            Whether it is believed: not, if the model holds it next to impossible.
+        """
+        k = self._loose.index(joint)
+        looks = looks_of(self._measurements, joint, replaced_ns)
+        below = believe(self._settings, self._fresh_m[k], looks).probability_below(self._fresh_m[k], look)
+        believed = CONTRADICTS <= below <= 1.0 - CONTRADICTS
+        self._believe(k, believe(self._settings, self._fresh_m[k], [*looks, look] if believed else looks))
+        return believed
 
     def _believe(self, k: int, belief: Belief) -> None:
         beliefs = self.state.beliefs

@@ -2,23 +2,35 @@
 
 Each gait cycle gives an estimate of all clearances and of the encoders' own errors, robust against outliers.
 Single cycles are chaotic, so how far cycles scatter, and nothing else, says how good their mean is. That mean
-is fused with what was known before: the clearances that Archard's law predicts, and the encoders' errors as
-held since commissioning. A sensor that comes later starts with errors that are not known.
+is fused with what was known before: the clearances that are expected, and the encoders' errors as held since
+commissioning. A sensor that comes later starts with errors that are not known.
 """
+
+from typing import NamedTuple
 
 import numpy as np
 
+from leg_wear_monitor.errors import LegWearError
 from leg_wear_monitor.mechanism.arrays import Floats
-from leg_wear_monitor.mechanism.spec import Mechanism
-from leg_wear_monitor.monitor.angle_regression import Estimate, binned, blind_directions, regress, rms
-from leg_wear_monitor.twin.joint_angles import SHAPE_CYCLES, AngleModel, contact_shape, design
+from leg_wear_monitor.monitor.angle_regression import Estimate, binned, blind_directions, regress
+from leg_wear_monitor.twin.joint_angles import AngleModel
+from leg_wear_monitor.twin.reference import Reference
 
 LEAST_CYCLES = 20
-# what the linear model and its shape are off against full coordinates (benchmarks/hidden.py)
+# what the linear model and its reference are off against full coordinates (benchmarks/hidden.py)
 MODEL_SIGMA_M = 2.0e-5
 
 _BATCH = 2  # cycles: neighbours hang together
 _NO_NEWS = 1.0e6  # of the variance before
+
+
+class HiddenSnapshot(NamedTuple):
+    """All of a `HiddenClearance`; nothing in it changes."""
+
+    reference: Reference | None
+    before: Estimate | None
+    seen: tuple[tuple[Floats, Floats], ...]
+    each: tuple[Floats, ...]
 
 
 class HiddenClearance:
@@ -27,101 +39,117 @@ class HiddenClearance:
     Parameters
     ----------
     model : AngleModel
-    shape : (P, k, 2) array
-        As `contact_shape` gives it.
-    before : Estimate
-        What is known without these cycles.
-    cycles : int
-        That are kept: the estimate is of these last ones.
-    shape_cycles : int
-        That were simulated for a shape.
+    reference : Reference, optional
+        What is to be expected; cycles wait for it.
+    before : Estimate, optional
+        What is known without these cycles; given with the reference.
+    most : int
+        Cycles that are kept: the estimate is of these last ones.
+
+    Attributes
+    ----------
+    most : int
+        It may change.
     """
 
     def __init__(
         self,
         model: AngleModel,
-        shape: Floats,
-        before: Estimate,
-        cycles: int = 300,
-        shape_cycles: int = SHAPE_CYCLES,
+        reference: Reference | None = None,
+        before: Estimate | None = None,
+        most: int = 300,
     ) -> None:
-        self._model, self._columns, self._most = model, design(model, shape), cycles
-        self.before, self._shape_cycles = before, shape_cycles
+        self._model, self.most = model, most
+        self._reference, self._before = reference, before
         self._seen: list[tuple[Floats, Floats]] = []
         self._each: list[Floats] = []
 
     def add(self, crank_angle: Floats, angles: Floats) -> None:
         """Take in a gait cycle's samples: crank angles (n,) [rad], encoders (n, m) [rad], NaN where none."""
-        deviation, counts = binned(self._model, crank_angle, angles)
+        self.add_binned(*binned(self._model, crank_angle, angles))
+
+    def add_binned(self, deviation: Floats, counts: Floats) -> None:
+        """Take in a gait cycle as `binned` gives it."""
         self._seen.append((deviation, counts))
-        self._each.append(regress(self._columns, deviation, counts, self.before))
-        del self._seen[: -self._most], self._each[: -self._most]
+        if self._reference is not None:
+            self._each.append(self._regressed(deviation, counts))
+        del self._seen[: -self.most], self._each[: -self.most]
 
-    def reshape(self, shape: Floats) -> None:
-        """Look at the kept cycles again with another shape: that of the clearances found."""
-        self._columns = design(self._model, shape)
-        self._each = [regress(self._columns, *seen, self.before) for seen in self._seen]
+    def refer(self, reference: Reference, before: Estimate) -> None:
+        """Look at the kept cycles (again) with another reference, and other things known before."""
+        self._reference, self._before = reference, before
+        self._each = [self._regressed(*seen) for seen in self._seen]
 
-    def alone_worn(self, k: int, shape: Floats) -> tuple[float, float]:
-        """How badly the kept cycles fit if joint k alone is not as expected; and its clearance then [m].
+    def forget(self) -> None:
+        """Let go of the kept cycles: the leg is another one now."""
+        self._seen, self._each = [], []
 
-        Parameters
-        ----------
-        k : int
-        shape : (P, k, 2) array
-            As `contact_shape` gives it for such a leg.
+    def _regressed(self, deviation: Floats, counts: Floats) -> Floats:
+        reference, before = self._given()
+        joints = before.joints
+        # the regression has what is expected at its own linear point: at the reference's clearances
+        shift = reference.deviation - reference.columns[:, :, :joints] @ reference.clearance_m
+        return regress(reference.columns, deviation - shift, counts, before)
 
-        Returns
-        -------
-        misfit, clearance_m : float
-            RMS of what is left [rad], and the clearance that leaves least.
-        """
-        counts = np.sum([counts for _, counts in self._seen], axis=0)
-        sums = np.nansum([deviation * counts for deviation, counts in self._seen], axis=0)
-        used = counts.ravel() > 0.0
-        columns = design(self._model, shape).reshape(-1, len(self.before.mean))[used]
-        rest, column = self.before.mean.copy(), columns[:, k]
-        rest[k] = 0.0
-        left = (sums.ravel()[used] / counts.ravel()[used]) - columns @ rest
-        size = float(column @ column)
-        clearance_m = float(column @ left) / size if size > 0.0 else float(self.before.mean[k])
-        return rms(left - clearance_m * column), clearance_m
+    def _given(self) -> tuple[Reference, Estimate]:
+        if self._reference is None or self._before is None:
+            raise LegWearError("no reference was given yet")
+        return self._reference, self._before
+
+    @property
+    def reference(self) -> Reference | None:
+        """What the cycles are compared with."""
+        return self._reference
 
     @property
     def cycles(self) -> int:
         """Cycles that are kept."""
-        return len(self._each)
+        return len(self._seen)
 
     def alone(self) -> Estimate | None:
         """What the cycles say by themselves; None while there are not enough."""
         if len(self._each) < LEAST_CYCLES:
             return None
+        reference, before = self._given()
         each = np.array(self._each)
         size = len(each) // _BATCH
         batches = each[len(each) - _BATCH * size :].reshape(size, _BATCH, -1).mean(axis=1)
-        # a shape has the scatter of the cycles that it was simulated from
-        covariance = np.cov(batches, rowvar=False) * (1.0 / size + _BATCH / self._shape_cycles)
-        floor = 1.0e-6 * np.diagonal(self.before.covariance)
-        floor[: self.before.joints] += MODEL_SIGMA_M**2
-        return Estimate(np.median(batches, axis=0), covariance + np.diag(floor), self.before.joints)
+        # by differences of neighbours: a change within the kept cycles is no scatter
+        steps = np.diff(batches, axis=0)
+        scatter = steps.T @ steps / (2.0 * len(steps))
+        # a reference has the scatter of the cycles that it was simulated from
+        covariance = scatter * (1.0 / size + _BATCH / reference.cycles)
+        floor = 1.0e-6 * np.diagonal(before.covariance)
+        floor[: before.joints] += MODEL_SIGMA_M**2
+        return Estimate(np.median(batches, axis=0), covariance + np.diag(floor), before.joints)
 
     def fused(self) -> Estimate | None:
         """The cycles and what was known before, weighted by their covariances (a Kalman filter's update)."""
         seen = self.alone()
         if seen is None:
             return None
-        blind = blind_directions(self._columns, np.sum([counts for _, counts in self._seen], axis=0))
+        reference, before = self._given()
+        blind = blind_directions(reference.columns, np.sum([counts for _, counts in self._seen], axis=0))
         # along what the sensors do not show, each cycle repeats what was known before: that is no news
-        scale = np.sqrt(np.diagonal(self.before.covariance))
+        scale = np.sqrt(np.diagonal(before.covariance))
         across = blind / scale
         across /= np.linalg.norm(across, axis=1, keepdims=True)
-        prior = self.before.covariance / np.outer(scale, scale)
+        prior = before.covariance / np.outer(scale, scale)
         noise = seen.covariance / np.outer(scale, scale) + _NO_NEWS * across.T @ across
         gain = np.linalg.solve(prior + noise, prior).T
-        mean = self.before.mean + scale * (gain @ ((seen.mean - self.before.mean) / scale))
+        mean = before.mean + scale * (gain @ ((seen.mean - before.mean) / scale))
         rest = np.eye(len(mean)) - gain
         covariance = rest @ prior @ rest.T + gain @ noise @ gain.T
-        return Estimate(mean, covariance * np.outer(scale, scale), self.before.joints)
+        return Estimate(mean, covariance * np.outer(scale, scale), before.joints)
+
+    def snapshot(self) -> HiddenSnapshot:
+        """The whole state."""
+        return HiddenSnapshot(self._reference, self._before, tuple(self._seen), tuple(self._each))
+
+    def restore(self, snapshot: HiddenSnapshot) -> None:
+        """Go back to a snapshot."""
+        self._reference, self._before = snapshot.reference, snapshot.before
+        self._seen, self._each = list(snapshot.seen), list(snapshot.each)
 
 
 def worn_joint(
@@ -142,26 +170,3 @@ def worn_joint(
     surely = np.where(off >= least_m, off / found.sigma_m, 0.0)
     k = int(surely.argmax())
     return k if surely[k] >= sigmas else None
-
-
-def likeliest_worn(
-    mechanism: Mechanism, hidden: HiddenClearance, expected: Estimate, shape_cycles: int = SHAPE_CYCLES
-) -> tuple[int, float]:
-    """The joint that, alone not as expected, fits the kept cycles best; and its clearance then [m].
-
-    To be asked once `worn_joint` has found that something is worn. Each joint in turn is supposed to be the
-    one, with the shape that contacts have then: joints that act alike are told apart.
-
-    Raises
-    ------
-    SimulationError
-    """
-    found = hidden.fused() or expected
-    most = float(np.abs(found.clearance_m - expected.clearance_m).max())
-    fits = []
-    for k in range(expected.joints):
-        clearance = expected.clearance_m.copy()
-        clearance[k] += most
-        fits.append(hidden.alone_worn(k, contact_shape(mechanism, clearance, shape_cycles)))
-    likeliest = int(np.argmin([misfit for misfit, _ in fits]))
-    return likeliest, fits[likeliest][1]

@@ -1,10 +1,11 @@
-"""Parameters of what comes in: the crank's joint, the drive torque, the commanded gait, the tracker."""
+"""Parameters of what comes in: the crank, further encoders, the drive torque, the gait, the tracker."""
 
 from typing import Any
 
 import attrs
 
-from leg_wear_monitor.mechanism.quantity import choice, described, quantity
+from leg_wear_monitor.mechanism.quantity import FieldError, choice, described, quantity
+from leg_wear_monitor.twin.sample import ENCODERS
 
 LIVE = {"live": True}  # may change while the monitor runs
 
@@ -38,6 +39,61 @@ class Crank:
         at_most=1.0e4,
         default=1.0,
     )
+
+
+def _few_and_different(names: tuple[str, ...]) -> str | None:
+    if len(names) > ENCODERS:
+        return f"{list(names)} are {len(names)}, expected at most {ENCODERS}"
+    return None if len(set(names)) == len(names) and all(names) else f"{list(names)} are no different names"
+
+
+def _signs(signs: tuple[float, ...]) -> str | None:
+    return None if all(sign in (-1.0, 1.0) for sign in signs) else f"{list(signs)} are not all 1.0 or -1.0"
+
+
+@attrs.frozen(kw_only=True)
+class Encoders:
+    """Further encoders, in whose angles clearances show (docs/forecast.md); by default there are none."""
+
+    names: tuple[str, ...] = described(
+        "their names in joint_states, in the messages with the crank; empty: none is read",
+        default=(),
+        check=_few_and_different,
+    )
+    joints: tuple[str, ...] = described(
+        "the mechanism's revolute joint that each is on; its angle is that from the bushing's body to the "
+        "journal's, but for an offset that is found",
+        default=(),
+        check=_few_and_different,
+    )
+    signs: tuple[float, ...] = quantity(
+        "",
+        "1.0 if an encoder counts as the mechanism's angles do, -1.0 if the other way; empty: all 1.0",
+        at_least=-1.0,
+        at_most=1.0,
+        default=(),
+        check=_signs,
+    )
+    commissioning_cycles: int = quantity(
+        "",
+        "gait cycles from which an encoder's offset and scale are found when it is new; then they are held",
+        at_least=20,
+        at_most=10000,
+        default=100,
+    )
+    window_cycles: int = quantity(
+        "",
+        "gait cycles that clearances are estimated from; a sudden change shows after half of them",
+        at_least=20,
+        at_most=2000,
+        default=60,
+    )
+
+    def __attrs_post_init__(self) -> None:
+        for key, given in (("joints", self.joints), ("signs", self.signs)):
+            if len(given) != len(self.names) and (given or key == "joints"):
+                fault = f"has {len(given)} values for {len(self.names)} encoders, expected one each"
+                raise FieldError(key, fault)
 
 
 @attrs.frozen(kw_only=True)

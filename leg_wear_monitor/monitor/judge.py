@@ -87,6 +87,8 @@ class Judge:
             values[f"{names.IMPACT} {joint.joint}"] = joint.peak_force_n
             values[f"{names.CLEARANCE} {joint.joint}"] = joint.clearance_m
             values[f"{names.GROWTH} {joint.joint}"] = per_hour
+            if joint.seen:
+                values[f"{names.DEPARTURE} {joint.joint}"] = joint.seen.surely_m
         return self.board.judge(values, report.stamp_ns)
 
     def end_beat(self, skipped: int = 0) -> tuple[AlarmList, ...]:

@@ -16,6 +16,7 @@ from leg_wear_monitor.monitor.fitting import fitted
 from leg_wear_monitor.monitor.ledger_entry import Entry, Event
 from leg_wear_monitor.monitor.ledger_file import MOVE, LedgerError, connect, create, transaction
 from leg_wear_monitor.monitor.ledger_rows import (
+    read_commissioned,
     read_entry,
     read_last_run,
     read_measurements,
@@ -45,6 +46,8 @@ class Ledger:
         Begin and end of the time whose wear is in it, of earlier runs.
     measurements : tuple of Measurement
         Clearances measured by hand, of earlier runs.
+    commissioned : Commissioned or None
+        Errors of further encoders, of earlier runs.
     cut_off_s : float or None
         If the last run was cut off: the longest time of walking whose wear was lost with it.
     kept_ns : int
@@ -72,6 +75,7 @@ class Ledger:
             self.entry = read_entry(self._db)
             self.counted_ns = read_spans(self._db)
             self.measurements = read_measurements(self._db)
+            self.commissioned = read_commissioned(self._db)
             last, closed, last_interval_s = read_last_run(self._db)
         except (sqlite3.Error, ValueError, TypeError) as error:
             self._db.close()

@@ -157,4 +157,34 @@ class ForecastPoint:
     p90_cycles: float
 
 
-Event = Audit | AlarmEvent | ClearancePoint | Measurement | ForecastPoint
+@attrs.frozen(eq=False)
+class Commissioned:
+    """Errors of further encoders, as found while the clearances were known.
+
+    Attributes
+    ----------
+    stamp_ns : int
+        End of the last gait cycle that they were found from.
+    encoders : tuple of str
+        What tells the m encoders from one another.
+    centre_rad : (m,) array
+    mean : (1 + 2 m,) array
+    covariance : array
+        As in `commissioning.EncoderErrors`.
+    """
+
+    stamp_ns: int
+    encoders: tuple[str, ...]
+    centre_rad: Floats
+    mean: Floats
+    covariance: Floats
+
+    def digest(self) -> bytes:
+        """Checksum of everything."""
+        sum_ = hashlib.sha256(repr((self.stamp_ns, self.encoders)).encode())
+        for part in (self.centre_rad, self.mean, self.covariance):
+            sum_.update(np.ascontiguousarray(part, dtype="<f8").tobytes())
+        return sum_.digest()
+
+
+Event = Audit | AlarmEvent | ClearancePoint | Measurement | ForecastPoint | Commissioned

@@ -11,6 +11,7 @@ from leg_wear_monitor.monitor.ledger_entry import (
     AlarmEvent,
     Audit,
     ClearancePoint,
+    Commissioned,
     Entry,
     Event,
     ForecastPoint,
@@ -59,6 +60,12 @@ def write_event(db: sqlite3.Connection, event: Event) -> None:
             )
         case Measurement() | ForecastPoint():
             _append(db, event)
+        case Commissioned(stamp_ns, encoders, centre_rad, mean, covariance):
+            errors = np.concatenate([centre_rad, mean, covariance.ravel()])
+            db.execute(
+                "INSERT INTO commissioning (stamp_ns, encoders, errors, digest) VALUES (?, ?, ?, ?)",
+                (stamp_ns, "\n".join(encoders), errors.astype("<f8").tobytes(), event.digest()),
+            )
         case Audit(stamp_ns, who, what, was):
             before = (was.name, was.cycles, _depth_bytes(was)) if was else (None, None, None)
             db.execute(
@@ -80,6 +87,27 @@ def read_measurements(db: sqlite3.Connection) -> tuple[Measurement, ...]:
     names = [field.name for field in attrs.fields(Measurement)]
     rows = db.execute(f"SELECT {', '.join(names)} FROM measurement ORDER BY id")
     return tuple(Measurement(**dict(zip(names, (*row[:-1], bool(row[-1])), strict=True))) for row in rows)
+
+
+def read_commissioned(db: sqlite3.Connection) -> Commissioned | None:
+    """Errors of further encoders as they are held, None if none were commissioned.
+
+    Raises
+    ------
+    ValueError
+        If their checksum is not that of what the table holds.
+    """
+    columns = "stamp_ns, encoders, errors, digest"
+    row = db.execute(f"SELECT {columns} FROM commissioning ORDER BY id DESC LIMIT 1").fetchone()
+    if row is None:
+        return None
+    encoders, errors = tuple(row[1].split("\n")), np.frombuffer(row[2], "<f8").astype(float)
+    m = len(encoders)
+    p = 1 + 2 * m
+    found = Commissioned(row[0], encoders, errors[:m], errors[m : m + p], errors[m + p :].reshape(p, p))
+    if found.digest() != row[3]:
+        raise ValueError("the checksum of its encoders' errors is not that of its content")
+    return found
 
 
 def read_entry(db: sqlite3.Connection) -> Entry | None:

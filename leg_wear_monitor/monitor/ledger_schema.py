@@ -75,6 +75,15 @@ CREATE TABLE forecast (
 ) STRICT;
 """
 
-MIGRATIONS = (_FIRST, _SECOND)
+_THIRD = """
+-- errors of further encoders; the last row is in force. encoders: a line each; errors: float64, little
+-- endian: centres (m), their mean (1 + 2 m) and its covariance
+CREATE TABLE commissioning (
+    id INTEGER PRIMARY KEY, stamp_ns INTEGER NOT NULL, encoders TEXT NOT NULL, errors BLOB NOT NULL,
+    digest BLOB NOT NULL
+) STRICT;
+"""
+
+MIGRATIONS = (_FIRST, _SECOND, _THIRD)
 
 FORMAT = len(MIGRATIONS)

@@ -5,6 +5,7 @@ import attrs
 from leg_wear_monitor.mechanism.arrays import Ints
 from leg_wear_monitor.monitor.alarms import Alarm
 from leg_wear_monitor.monitor.book import BookState
+from leg_wear_monitor.monitor.encoder_watch import EncoderSnapshot
 from leg_wear_monitor.monitor.forecaster import ForecastState
 from leg_wear_monitor.monitor.growth import GrowthWindow
 from leg_wear_monitor.monitor.judge import JudgeState
@@ -15,9 +16,25 @@ from leg_wear_monitor.twin.figures import Event
 
 @attrs.define
 class MonitorState:
-    """What changes, beside twin, alarms and books; every value is immutable."""
+    """What changes, beside twin, alarms and books; every value is immutable.
+
+    Attributes
+    ----------
+    growth : tuple of GrowthWindow
+    believed : tuple of bool
+        Which joints' clearances, as encoders showed them, the forecast has last taken in.
+    other : tuple of bool
+        Which of them were other than counted then.
+    handed_ns : int
+        When they were handed to it, 0 if that is due.
+    last : CycleReport or None
+    happened : tuple of Event
+    """
 
     growth: tuple[GrowthWindow, ...]
+    believed: tuple[bool, ...]
+    other: tuple[bool, ...] = ()
+    handed_ns: int = 0
     last: CycleReport | None = None
     happened: tuple[Event, ...] = ()
 
@@ -33,3 +50,4 @@ class MonitorSnapshot:
     forecast: ForecastState
     alarms: dict[str, Alarm]
     beats: Ints
+    encoders: EncoderSnapshot | None = None

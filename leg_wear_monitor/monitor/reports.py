@@ -4,6 +4,7 @@ import attrs
 
 from leg_wear_monitor.monitor.alarms import Alarm, Level
 from leg_wear_monitor.monitor.forecast import JointForecast, LegForecast
+from leg_wear_monitor.monitor.seen import SeenClearance
 from leg_wear_monitor.twin.figures import Intake, SampleFigures
 
 SampleReports = SampleFigures
@@ -45,6 +46,8 @@ class JointReport:
     impacts : int
     forecast : JointForecast or None
         Renewed once a minute.
+    seen : SeenClearance or None
+        The clearance that further encoders show; None without such.
     """
 
     joint: str
@@ -59,6 +62,7 @@ class JointReport:
     mean_force_n: float
     impacts: int
     forecast: JointForecast | None = None
+    seen: SeenClearance | None = None
 
 
 @attrs.frozen(kw_only=True)

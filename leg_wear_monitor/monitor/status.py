@@ -8,8 +8,10 @@ import attrs
 from leg_wear_monitor.monitor import alarm_board as names
 from leg_wear_monitor.monitor.alarms import Level
 from leg_wear_monitor.monitor.book import Book
+from leg_wear_monitor.monitor.encoder_watch import EncoderWatch, faults
 from leg_wear_monitor.monitor.judge import Judge
 from leg_wear_monitor.monitor.reports import CycleReport, JointReport, Status
+from leg_wear_monitor.monitor.seen import Sight
 from leg_wear_monitor.twin.digital_twin import DigitalTwin
 from leg_wear_monitor.twin.figures import Event, Tracking
 
@@ -24,14 +26,16 @@ def statuses(
     book: Book,
     last: CycleReport | None,
     happened: Sequence[Event],
+    encoders: EncoderWatch | None = None,
 ) -> tuple[Status, ...]:
-    """All of it: gait, input, torque, each joint, alarms, ledger."""
+    """All of it: gait, input, torque, each joint, further encoders if there are any, alarms, ledger."""
     joints = [_joint(k, name, twin, judge, last) for k, name in enumerate(twin.loose)]
     return (
         _gait(twin, judge, book, last, happened),
         _input(twin, judge, book),
         _torque(judge, last),
         *joints,
+        *((_encoders(encoders, judge, last),) if encoders else ()),
         _alarms(judge),
         _ledger(book),
     )
@@ -111,6 +115,45 @@ def _joint(k: int, name: str, twin: DigitalTwin, judge: Judge, last: CycleReport
         "impacts": float(report.impacts),
     }
     return Status(f"joint {name}", level, _growth_message(report), values)
+
+
+def _encoders(encoders: EncoderWatch, judge: Judge, last: CycleReport | None) -> Status:
+    """Further encoders: what is wrong with them, how they are off, and the clearances that they show."""
+    settings, state = judge.config.encoders, encoders.state
+    level = judge.board.level(*(name for name in judge.board.alarms if name.startswith(names.DEPARTURE)))
+    values = {"cycles": float(encoders.cycles)}
+    for i, name in enumerate(settings.names):
+        kept = state.samples
+        for what, count in (("samples", kept.samples), ("absent", kept.absent), ("no_angle", kept.no_angle)):
+            values[f"{name}_{what}"] = float(count[i])
+        if state.errors.known[i]:
+            values[f"{name}_offset_rad"] = float(state.errors.centre_rad[i] + state.errors.mean[1 + i])
+            values[f"{name}_scale_error"] = float(state.errors.mean[1 + len(settings.names) + i])
+    for joint in last.joints if last else ():
+        if joint.seen:
+            values[f"{joint.joint}_seen_m"] = joint.seen.clearance_m
+            values[f"{joint.joint}_sigma_m"] = joint.seen.sigma_m
+            values[f"{joint.joint}_departure_m"] = joint.seen.departure_m
+    wrong = faults(settings.names, state)
+    told = [*wrong, *_shown(last)]
+    return Status("encoders", max(level, Level.WARN) if wrong else level, "; ".join(told), values)
+
+
+def _shown(last: CycleReport | None) -> list[str]:
+    """What encoders show, in words: the joints that are not as counted, or why nothing can be said."""
+    seen = [(joint.joint, joint.seen) for joint in last.joints if joint.seen] if last else []
+    if not seen:
+        return ["no whole gait cycle yet"]
+    told = [
+        f"joint {joint} is {'wider' if one.departure_m > 0.0 else 'narrower'} than counted"
+        for joint, one in seen
+        if one.is_other
+    ]
+    hidden = [joint for joint, one in seen if one.sight is Sight.NOT_OBSERVABLE]
+    waiting = {one.sight.value for _, one in seen if one.sight in (Sight.WAITING, Sight.COMMISSIONING)}
+    if not told and not waiting and len(hidden) < len(seen):
+        told = ["clearances are as counted"]
+    return [*told, *(f"{joint} {Sight.NOT_OBSERVABLE.value}" for joint in hidden), *waiting]
 
 
 def _growth_message(report: JointReport) -> str:

@@ -8,11 +8,13 @@ from leg_wear_monitor.mechanism.arrays import Floats
 from leg_wear_monitor.mechanism.spec import Mechanism
 from leg_wear_monitor.monitor.alarms import Alarm
 from leg_wear_monitor.monitor.beats import A_CYCLE, Beats
+from leg_wear_monitor.monitor.belief import Look
 from leg_wear_monitor.monitor.book import Book
 from leg_wear_monitor.monitor.config import MonitorConfig
 from leg_wear_monitor.monitor.cycle_report import cycle_report
+from leg_wear_monitor.monitor.encoder_watch import EncoderWatch
 from leg_wear_monitor.monitor.fitting import check_limits, fitted, twin_settings
-from leg_wear_monitor.monitor.forecaster import Forecaster
+from leg_wear_monitor.monitor.forecaster import RENEWED_NS, Forecaster
 from leg_wear_monitor.monitor.growth import GrowthWindow, extended
 from leg_wear_monitor.monitor.judge import Judge
 from leg_wear_monitor.monitor.ledger import Ledger
@@ -28,6 +30,7 @@ from leg_wear_monitor.monitor.reports import (
     Status,
     lost,
 )
+from leg_wear_monitor.monitor.seen import SeenClearance, Sight
 from leg_wear_monitor.monitor.status import statuses
 from leg_wear_monitor.twin.digital_twin import DigitalTwin
 from leg_wear_monitor.twin.figures import CycleFigures, joined
@@ -79,10 +82,17 @@ class WearMonitor:
             ledger.measurements if ledger else (),
             [part.replaced_ns for part in self._book.state.parts],
         )
+        self._encoders = (
+            EncoderWatch(self.mechanism, self.config, ledger.commissioned if ledger else None)
+            if self.config.encoders.names
+            else None
+        )
         if ledger and ledger.entry:
             self._judge.board.restore(ledger.entry.alarms)
         self._beats = Beats(cycle_ns // A_CYCLE)
-        self._state = MonitorState(tuple(GrowthWindow() for _ in self.loose))
+        self._state = MonitorState(
+            tuple(GrowthWindow() for _ in self.loose), believed=(False,) * len(self.loose)
+        )
 
     def warm_up(self) -> None:
         """Compile all that `update` needs, before the first sample; takes about a minute once."""
@@ -112,6 +122,7 @@ class WearMonitor:
             cycles += ended
             if ends_beat:
                 self._tell(self._judge.end_beat(self._book.state.skipped), changes)
+                self._look_at_encoders()
             self._book.keep_if_due(self._judge.board.alarms.values())
         return Reports(joined(looks, len(self.loose)), tuple(cycles), tuple(changes), self.lost)
 
@@ -137,7 +148,8 @@ class WearMonitor:
 
     def status(self) -> tuple[Status, ...]:
         """What /diagnostics shows; names and their order stay the same."""
-        return statuses(self._twin, self._judge, self._book, self._state.last, self._state.happened)
+        state = self._state
+        return statuses(self._twin, self._judge, self._book, state.last, state.happened, self._encoders)
 
     def configure(self, config: MonitorConfig) -> None:
         """Take over parameters that may change while it runs; see `parameters.changed`.
@@ -150,6 +162,8 @@ class WearMonitor:
         check_limits(config, self.loose)
         self.config = config
         self._judge.configure(config)
+        if self._encoders:
+            self._encoders.config = config
 
     def acknowledge(self, stamp_ns: int) -> tuple[tuple[Alarm, ...], tuple[Alarm, ...]]:
         """Acknowledge all alarms, and that the run before was cut off.
@@ -179,6 +193,9 @@ class WearMonitor:
         growth = self._state.growth
         self._state.growth = (*growth[:k], GrowthWindow(), *growth[k + 1 :])
         self._forecaster.replaced(joint)
+        if self._encoders:
+            self._encoders.replaced()
+            self._state.handed_ns = 0
         self._book.note(Audit(stamp_ns, who, "reset_wear", was))
         self._keep()
 
@@ -214,6 +231,7 @@ class WearMonitor:
             accept=accept,
         )
         self._book.note(found.measurement)
+        self._state.handed_ns = 0
         self._keep()
         return found
 
@@ -247,6 +265,7 @@ class WearMonitor:
             attrs.evolve(self._forecaster.state),
             self._judge.board.alarms,
             self._beats.state.copy(),
+            self._encoders.snapshot() if self._encoders else None,
         )
 
     def restore(self, snapshot: MonitorSnapshot) -> None:
@@ -258,6 +277,8 @@ class WearMonitor:
         self._forecaster.state = attrs.evolve(snapshot.forecast)
         self._judge.board.alarms = snapshot.alarms
         self._beats.state[:] = snapshot.beats
+        if self._encoders and snapshot.encoders:
+            self._encoders.restore(snapshot.encoders)
 
     def _keep(self, closed: bool = False) -> bool:
         return self._book.keep(self._judge.board.alarms.values(), closed)
@@ -267,10 +288,14 @@ class WearMonitor:
         piece = self._book.not_counted(piece)
         update = self._twin.update(piece)
         self._judge.see(piece)
+        if self._encoders:
+            self._encoders.see(piece)
         self._book.followed(update.samples)
         self._state.happened = (*self._state.happened, *update.events)[-_KEPT_EVENTS:]
         cycles: list[CycleReport] = []
         for figures in update.cycles:
+            if self._encoders:
+                self._encoders.ended(figures)
             cycles.append(self._report(figures))
             self._tell(self._judge.end_cycle(cycles[-1]), changes)
         return update.samples, cycles
@@ -283,11 +308,41 @@ class WearMonitor:
             extended(window, float(growth), figures.moving_s, self.config.growth.window_cycles)
             for window, growth in zip(state.growth, figures.growth_mean_m, strict=True)
         )
+        seen = self._seen(figures)
         limits = self._judge.board.clearance_limits_m
         forecast = self._forecaster.after(figures, self._worn_m(figures), limits, self._judge.holds)
-        state.last = cycle_report(figures, book.state.cycles, self.loose, state.growth, limits, forecast)
+        state.last = cycle_report(
+            figures, book.state.cycles, self.loose, state.growth, limits, forecast, seen
+        )
         book.note_clearances(state.last)
         return state.last
+
+    def _look_at_encoders(self) -> None:
+        if self._encoders:
+            new = self._encoders.end_beat(self._twin.clearance_mean_m, self._twin.depth)
+            if new:
+                self._book.note(new)
+
+    def _seen(self, figures: CycleFigures) -> tuple[SeenClearance, ...] | None:
+        """Clearances as encoders show them; the forecast takes them in once a minute, or on a finding."""
+        if not self._encoders:
+            return None
+        state, seen = self._state, self._encoders.seen(figures.clearance_mean_m)
+        other = tuple(one.is_other for one in seen)
+        is_due = other != state.other or not 0 <= figures.stamp_ns - state.handed_ns < RENEWED_NS
+        if is_due and any(one.sight is Sight.SEEN for one in seen):
+            state.handed_ns, state.other = figures.stamp_ns, other
+            worn = zip(self.loose, seen, self._worn_m(figures), self._book.state.parts, strict=True)
+            state.believed = tuple(
+                one.sight is Sight.SEEN
+                and self._forecaster.seen(
+                    joint, Look(one.clearance_m, one.sigma_m, float(wear_m)), part.replaced_ns
+                )
+                for joint, one, wear_m, part in worn
+            )
+        return tuple(
+            attrs.evolve(one, believed=believed) for one, believed in zip(seen, state.believed, strict=True)
+        )
 
     def _worn_m(self, figures: CycleFigures) -> Floats:
         """Wear of each part at the end of a gait cycle; the twin itself may be further on."""

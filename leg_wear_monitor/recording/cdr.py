@@ -182,6 +182,19 @@ def joint_state(data, begin, end, big, crank):
 
 
 @kernel
+def joint_angle(data, begin, end, big, wanted):
+    """Position of a joint in a sound sensor_msgs/JointState: NaN if it is not in it, infinite if no angle."""
+    origin = begin + ENCAPSULATION
+    _, at = header(data, origin, end, big)
+    _, index, at = names(data, at, end, origin, big, wanted)
+    if index < 0:
+        return math.nan
+    count, first, _ = numbers(data, at, end, origin, big)
+    position = value(data, count, first, index, big)
+    return position if math.isfinite(position) else math.inf
+
+
+@kernel
 def wrench_stamped(data, begin, end, big, axis):
     """Read geometry_msgs/WrenchStamped: fault, stamp [ns], torque about an axis (0, 1, 2 for x, y, z)."""
     origin = begin + ENCAPSULATION
@@ -205,7 +218,7 @@ def float64_message(data, begin, end, big):
 
 
 @entry
-def decode(data, messages, crank, axis, use_effort, out):
+def decode(data, messages, crank, encoders, ends_at, axis, use_effort, out, out_angles):
     """Read messages into samples as they are: no sign, no scale, no offset.
 
     Parameters
@@ -214,12 +227,19 @@ def decode(data, messages, crank, axis, use_effort, out):
     messages : (n,) array of MESSAGE
     crank : (characters,) array of uint8
         Name of the crank's joint, UTF-8.
+    encoders : (characters,) array of uint8
+        Names of the joints with further encoders, one after the other.
+    ends_at : (m,) array of int
+        Where each of them ends.
     axis : int
         Axis of a wrench's torque: 0, 1, 2 for x, y, z.
     use_effort : bool
         Whether the crank's effort is its torque.
     out : (n,) array of GAIT_SAMPLE
-        The stamp is the header's; the log time where a type has no header; 0 where it cannot be read.
+        The stamp is the header's; the log time where a type has no header; 0 where it cannot be read. Its
+        ``encoder_rad`` is left alone.
+    out_angles : (n, m) array
+        Of the further encoders.
     """
     for i in range(messages.shape[0]):
         begin, end = messages[i]["begin"], messages[i]["end"]
@@ -242,3 +262,10 @@ def decode(data, messages, crank, axis, use_effort, out):
         out[i]["crank_angle_rad"] = position
         out[i]["crank_velocity_radps"] = velocity
         out[i]["torque_nm"] = torque if kind != JOINT_STATE or use_effort else math.nan
+        first = 0
+        for j in range(ends_at.shape[0]):
+            out_angles[i, j] = math.nan
+            if kind == JOINT_STATE and fault == NO_FAULT:
+                wanted = encoders[first : ends_at[j]]
+                out_angles[i, j] = joint_angle(data, begin, end, data[begin + 1] == 0, wanted)
+            first = ends_at[j]

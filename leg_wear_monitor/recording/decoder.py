@@ -16,7 +16,7 @@ class Decoder:
     Parameters
     ----------
     config : MonitorConfig
-        Of which `crank_joint`, `crank` and `drive_torque` are used.
+        Of which `crank_joint`, `crank`, `encoders` and `drive_torque` are used.
     """
 
     def __init__(self, config: MonitorConfig) -> None:
@@ -27,6 +27,10 @@ class Decoder:
         self._torque_scale = torque.sign * torque.scale * torque.gear_ratio
         self._axis = _AXES[torque.axis]
         self._effort = torque.source == "effort"
+        names = [name.encode() for name in config.encoders.names]
+        self._encoders = np.frombuffer(b"".join(names), np.uint8)
+        self._ends = np.cumsum([len(name) for name in names], dtype=np.int64)
+        self._signs = np.array(config.encoders.signs or (1.0,) * len(names))
 
     def many(self, data: NDArray[np.uint8], messages: NDArray[np.void]) -> Samples:
         """Samples of messages, in their order; one that cannot be used becomes a sample with a fault.
@@ -41,7 +45,12 @@ class Decoder:
         (n,) array of GAIT_SAMPLE
         """
         samples = np.empty(len(messages), GAIT_SAMPLE)
-        decode(data, messages, self._crank, self._axis, self._effort, samples)
+        angles = np.empty((len(messages), len(self._ends)))
+        decode(
+            data, messages, self._crank, self._encoders, self._ends, self._axis, self._effort, samples, angles
+        )
+        samples["encoder_rad"] = np.nan
+        samples["encoder_rad"][:, : len(self._ends)] = angles * self._signs
         samples["crank_angle_rad"] *= self._crank_scale
         samples["crank_angle_rad"] += self._offset_rad
         samples["crank_velocity_radps"] *= self._crank_scale

@@ -9,6 +9,7 @@ import numpy as np
 from leg_wear_monitor.mechanism.arrays import Floats
 from leg_wear_monitor.monitor.alarms import Alarm
 from leg_wear_monitor.monitor.forecast import JointForecast, LegForecast
+from leg_wear_monitor.monitor.seen import SeenClearance
 from leg_wear_monitor.recording.history import CYCLE_COLUMNS, JOINT_COLUMNS, History
 from leg_wear_monitor.recording.outputs import state_of
 from leg_wear_monitor.recording.replay import ReplayResult
@@ -104,9 +105,14 @@ def _joints(result: ReplayResult) -> dict[str, Any]:
             "forecast": None if joint.forecast is None else _forecast(joint.forecast),
             "peak_force_n": history.joint_column("peak_force_n")[:, k].max(),
             "mean_force_n": history.joint_column("mean_force_n")[:, k].mean(),
+            **({"seen": _seen(joint.seen)} if joint.seen else {}),
             "impacts": int(history.joint_column("impacts")[:, k].sum()),
         }
     return joints
+
+
+def _seen(seen: SeenClearance) -> dict[str, Any]:
+    return {**attrs.asdict(seen), "sight": seen.sight.value, "is_other": seen.is_other}
 
 
 def _leg(result: ReplayResult) -> dict[str, Any] | None:

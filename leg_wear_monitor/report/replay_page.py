@@ -9,6 +9,7 @@ from leg_wear_monitor.report.figure import png
 from leg_wear_monitor.report.forecast_section import forecast_section, hours, leg_sentence
 from leg_wear_monitor.report.page import Findings, Page, Part, Picture, Section, Table, Text
 from leg_wear_monitor.report.replay_charts import alarm_chart, clearance_chart, force_chart, health_chart
+from leg_wear_monitor.report.seen_section import seen_sections, seen_sentences
 from leg_wear_monitor.report.worn_bushings import worn_bushings
 from leg_wear_monitor.wear.surfaces import Surfaces
 
@@ -30,7 +31,8 @@ def replay_page(record: dict[str, Any]) -> Page:
     )
     sections = [Section("What was found", [Findings(_sentences(record))]), _recording(recording)]
     if record["cycles"]:
-        sections += [_clearance(record), forecast_section(record), _forces(record), _wear(record)]
+        sections += [_clearance(record), *seen_sections(record), forecast_section(record)]
+        sections += [_forces(record), _wear(record)]
     sections += [_alarms(record), _health(record)]
     title = f"Joint wear of {monitor['hardware_id']}"
     return Page(title=title, summary=summary, sections=sections, versions=record["made_with"])
@@ -61,6 +63,7 @@ def _sentences(record: dict[str, Any]) -> list[str]:
             text += f"; going on so, it reaches its limit in {hours(remaining['hours'])} of walking"
         sentences.append(f"{text}.")
     sentences += leg_sentence(record)
+    sentences += seen_sentences(record)
     if record["monitor"]["wear_acceleration"] != 1.0:
         factor = record["monitor"]["wear_acceleration"]
         sentences.append(f"All wear is multiplied by {factor:g}: a demonstration, not a measurement.")

@@ -55,14 +55,16 @@ def _whole(reading: Reading, start_ns: int, config: PublisherConfig) -> Message:
 
 def _joint_state(reading: Reading, stamp: Time, config: PublisherConfig) -> JointState:
     """The crank stands last, so that nobody may count on its place."""
+    further = [*config.further_joints, *config.joint_encoders.names]
     still = [0.0] * len(config.further_joints)
+    unmeasured = [*still, *(math.nan,) * len(config.joint_encoders.names)]
     with_effort = not math.isnan(reading.torque_nm)
     return JointState(
         header=Header(stamp=stamp),
-        name=[*config.further_joints, config.crank_joint],
-        position=[*still, reading.crank_angle_rad],
-        velocity=[*still, reading.crank_velocity_radps],
-        effort=[*still, reading.torque_nm] if with_effort else [],
+        name=[*further, config.crank_joint],
+        position=[*still, *reading.encoder_rad, reading.crank_angle_rad],
+        velocity=[*unmeasured, reading.crank_velocity_radps],
+        effort=[*unmeasured, reading.torque_nm] if with_effort else [],
     )
 
 

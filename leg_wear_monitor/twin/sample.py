@@ -10,6 +10,8 @@ from leg_wear_monitor.errors import LegWearError
 Samples = NDArray[Any]
 """Records of `GAIT_SAMPLE`, shape (n,), in order of arrival."""
 
+ENCODERS = 4  # beside the crank's, at most
+
 GAIT_SAMPLE = np.dtype(
     [
         ("stamp_ns", "i8"),
@@ -18,12 +20,15 @@ GAIT_SAMPLE = np.dtype(
         ("crank_angle_rad", "f8"),
         ("crank_velocity_radps", "f8"),
         ("torque_nm", "f8"),
+        ("encoder_rad", "f8", (ENCODERS,)),
     ]
 )
 """One sample: the header's stamp, its kind, what is wrong with it, and the values, NaN where absent.
 
 The angle is that of the mechanism's crank: sign, offset and gear ratio are applied above the seam. It may
-be wrapped to a turn or count on. A crank sample may bring a torque too (``effort``).
+be wrapped to a turn or count on. A crank sample may bring a torque too (``effort``), and the angles of
+further encoders, in the order of ``encoders.names``, signs applied: NaN where absent, infinite where what
+came is no angle. What is wrong with those is no fault of the sample.
 """
 
 CRANK, TORQUE = 0, 1
@@ -54,6 +59,7 @@ def gait_samples(
     crank_angle_rad: ArrayLike = np.nan,
     crank_velocity_radps: ArrayLike = np.nan,
     torque_nm: ArrayLike = np.nan,
+    encoder_rad: ArrayLike = np.nan,
     fault: ArrayLike = NO_FAULT,
 ) -> Samples:
     """A block of samples.
@@ -66,6 +72,8 @@ def gait_samples(
         `CRANK` or `TORQUE`.
     crank_angle_rad, crank_velocity_radps, torque_nm : (n,) array or float
         NaN where absent.
+    encoder_rad : (n, m) array or float
+        Of at most `ENCODERS` further encoders.
     fault : (n,) array or int
         A key of `FAULTS`.
 
@@ -91,4 +99,7 @@ def gait_samples(
     block["crank_angle_rad"] = crank_angle_rad
     block["crank_velocity_radps"] = crank_velocity_radps
     block["torque_nm"] = torque_nm
+    angles = np.asarray(encoder_rad, dtype=float)
+    block["encoder_rad"] = np.nan
+    block["encoder_rad"][:, : angles.shape[-1] if angles.ndim else None] = angles
     return block

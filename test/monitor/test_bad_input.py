@@ -6,7 +6,7 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from leg_wear_monitor.monitor.alarms import Level
-from leg_wear_monitor.twin.sample import CRANK, FAULTS, GAIT_SAMPLE, NO_FAULT, TORQUE
+from leg_wear_monitor.twin.sample import CRANK, ENCODERS, FAULTS, GAIT_SAMPLE, NO_FAULT, TORQUE
 
 SECOND = 10**9
 START_NS = 1_700_000_000_123_456_789
@@ -25,7 +25,7 @@ anything = st.tuples(stamps, kinds, faults | st.just(NO_FAULT), numbers, numbers
 
 
 def block(samples):
-    return np.array(samples, GAIT_SAMPLE)
+    return np.array([(*sample, (np.nan,) * ENCODERS) for sample in samples], GAIT_SAMPLE)
 
 
 def worn(monitor):

@@ -82,6 +82,7 @@ def test_a_ledger_of_the_first_format_is_migrated_and_goes_on(open_ledger, entry
     with closing(sqlite3.connect(tmp_path / "wear.ledger", isolation_level=None)) as db:
         db.execute("DROP TABLE measurement")
         db.execute("DROP TABLE forecast")
+        db.execute("DROP TABLE commissioning")
         db.execute("PRAGMA user_version = 1")
     found = open_ledger()
     assert found.entry.digest() == entry_at(3).digest()

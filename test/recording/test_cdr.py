@@ -10,7 +10,7 @@ from hypothesis import example, given
 from hypothesis import strategies as st
 
 from leg_wear_monitor.monitor.config import MonitorConfig
-from leg_wear_monitor.monitor.input_config import Crank, DriveTorque
+from leg_wear_monitor.monitor.input_config import Crank, DriveTorque, Encoders
 from leg_wear_monitor.recording.cdr import FLOAT64, JOINT_STATE, MESSAGE, TYPES, WRENCH_STAMPED
 from leg_wear_monitor.recording.decoder import Decoder
 from leg_wear_monitor.twin.sample import (
@@ -205,3 +205,29 @@ def test_many_at_once_are_as_one_by_one(
     together = decoder.many(np.frombuffer(data, np.uint8), messages)
     alone = np.concatenate([decoder.one(raw, JOINT_STATE, 5) for raw in raws])
     assert together.tobytes() == alone.tobytes()
+
+
+ENCODERS_TOO = MonitorConfig(
+    crank_joint=CRANK_NAME,
+    encoders=Encoders(names=("hip", "a"), joints=("B", "G"), signs=(1.0, -1.0)),
+)
+
+
+@given(parts=joint_states(), little=st.booleans())
+def test_further_encoders_are_read_with_the_crank(
+    store: Any, joint_state: Callable[..., Any], parts: dict[str, Any], little: bool
+) -> None:
+    """Absent or no angle, it is no fault of the sample; a faulty sample has none."""
+    message = joint_state(**parts)
+    raw = bytes(store.serialize_cdr(message, NAME[JOINT_STATE], little_endian=little))
+    sample = Decoder(ENCODERS_TOO).one(raw, JOINT_STATE)[0]
+    plain = Decoder(BY_EFFORT).one(raw, JOINT_STATE)[0]
+    assert sample["fault"] == plain["fault"]
+    names, angles = list(message.name), sample["encoder_rad"]
+    assert np.isnan(angles[2:]).all()
+    for angle, name, sign in zip(angles[:2], ("hip", "a"), (1.0, -1.0), strict=True):
+        if expected_crank(message, CRANK_NAME)[0] != NO_FAULT or name not in names:
+            assert math.isnan(angle)
+            continue
+        position = float(message.position[names.index(name)])
+        assert angle == sign * position if math.isfinite(position) else math.isinf(angle)

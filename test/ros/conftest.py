@@ -31,6 +31,7 @@ if find_spec("rclpy"):
     from rclpy.utilities import try_shutdown
     from sensor_msgs.msg import JointState
 
+    from leg_wear_monitor.gait.config import JointEncodersConfig
     from leg_wear_monitor.gait.leg import SyntheticLeg
     from leg_wear_monitor.gait.sensors import readings
     from leg_wear_monitor.ros.monitor_node import MonitorNode
@@ -201,5 +202,6 @@ shared_stage = pytest.fixture(_stage, name="shared_stage", scope="module")
 
 @pytest.fixture(scope="session")
 def walk() -> Walk:
-    """Six seconds at an even pace, wearing a hundred thousand times as fast as steel."""
-    return Walk(PublisherConfig(duration_s=6.0, wear_acceleration=1.0e5))
+    """Six seconds at an even pace, wearing a hundred thousand times as fast as steel; with further encoders."""
+    encoders = JointEncodersConfig(names=("hip", "knee"), joints=("B", "G"), offsets_rad=(0.1, -2.0))
+    return Walk(PublisherConfig(duration_s=6.0, wear_acceleration=1.0e5, joint_encoders=encoders))

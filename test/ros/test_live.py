@@ -25,6 +25,11 @@ from leg_wear_monitor.ros.publisher_config import PublisherConfig
 
 ME = "/leg_wear_monitor"
 FAST = {"wear_acceleration": 1.0e5}
+ENCODERS = {"encoders__names": ["hip", "knee", "shin"], "encoders__joints": ["B", "G", "I"]}
+
+
+def dotted(values):
+    return {name.replace("__", "."): value for name, value in values.items()}
 
 
 def seconds(message) -> float:
@@ -52,7 +57,7 @@ def raised(messages: list[DiagnosticArray]) -> list[tuple[float, str]]:
 def test_an_even_gait_is_followed_told_recorded_and_replayed(stage, walk, tmp_path: Path) -> None:
     recording = tmp_path / "live.mcap"
     monitor = stage.monitor(
-        record__path=str(recording), diagnostics__period_s=0.2, publish_markers=True, **FAST
+        record__path=str(recording), diagnostics__period_s=0.2, publish_markers=True, **(FAST | ENCODERS)
     )
     clearances = stage.listen(f"{ME}/clearance_states", JointState)
     forces = stage.listen(f"{ME}/impact_forces", JointState)
@@ -68,7 +73,7 @@ def test_an_even_gait_is_followed_told_recorded_and_replayed(stage, walk, tmp_pa
     assert np.ptp([message.wrench.torque.z for message in torques]) > 50.0
     are_one_number_a_value(diagnostics)
     draws_the_leg(markers[-1])
-    is_what_a_replay_gives(recording, config_from(FAST))
+    is_what_a_replay_gives(recording, config_from(dotted(FAST | ENCODERS)), monitor.node.monitor)
 
 
 def tells_the_wear(clearances: list[JointState], walk) -> None:
@@ -103,8 +108,13 @@ def draws_the_leg(drawn: MarkerArray) -> None:
     assert max(z for _, z in positions[2:]) < -0.3
 
 
-def is_what_a_replay_gives(recording: Path, config: MonitorConfig) -> None:
-    lived, replayed = published(recording), replayed_from(recording, config)
+def is_what_a_replay_gives(recording: Path, config: MonitorConfig, live: WearMonitor) -> None:
+    again = WearMonitor(load_mechanism(config.mechanism), config)
+    lived, replayed = published(recording), replayed_from(recording, again)
+    (now,) = (one for one in live.status() if one.name == "encoders")
+    assert now.message.startswith("shin is not in joint_states with the crank")
+    assert now.values["cycles"] >= 4
+    assert repr(now) in map(repr, again.status())
     assert len(replayed["~/clearance_states"]) >= 4
     assert len(replayed["~/predicted_torque"]) > 1900
     for topic, messages in replayed.items():
@@ -228,8 +238,8 @@ def published(path: Path) -> dict[str, list[bytes]]:
     return found
 
 
-def replayed_from(path: Path, config: MonitorConfig) -> dict[str, list[bytes]]:
-    monitor = WearMonitor(load_mechanism(config.mechanism), config)
+def replayed_from(path: Path, monitor: WearMonitor) -> dict[str, list[bytes]]:
+    config = monitor.config
     messages = Messages(config, monitor.loose)
     found: dict[str, list[bytes]] = {}
     with Recording([path], config) as recording:

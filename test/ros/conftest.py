@@ -202,6 +202,6 @@ shared_stage = pytest.fixture(_stage, name="shared_stage", scope="module")
 
 @pytest.fixture(scope="session")
 def walk() -> Walk:
-    """Six seconds at an even pace, wearing a hundred thousand times as fast as steel; with further encoders."""
+    """Six seconds at an even pace, wearing a hundred thousand times as fast as steel; with two encoders."""
     encoders = JointEncodersConfig(names=("hip", "knee"), joints=("B", "G"), offsets_rad=(0.1, -2.0))
     return Walk(PublisherConfig(duration_s=6.0, wear_acceleration=1.0e5, joint_encoders=encoders))

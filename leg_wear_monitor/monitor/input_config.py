@@ -154,7 +154,7 @@ class Tracker:
     """How the crank's motion is taken from its samples."""
 
     bandwidth_hz: float = quantity(
-        "Hz", "bandwidth of the crank's tracker", at_least=0.1, at_most=200.0, default=8.0
+        "Hz", "bandwidth of the crank's tracker", at_least=1.0, at_most=100.0, default=8.0
     )
     reorder_window_s: float = quantity(
         "s", "how long a sample waits for earlier ones", at_least=0.0, at_most=0.5, default=0.02

@@ -92,12 +92,12 @@ def accelerate_clearances(model, surfaces, approach, now, turned, x, at_e, at_v,
             turn_b, turn_j = now.turn[k, 0], now.turn[k, 1]
             angle_b, angle_j = now.angle[k, 0] + turn_b * turned, now.angle[k, 1] + turn_j * turned
             direction = direction_of(ex, ey, k, now.toward)
-            delta, nx, ny, bushing, journal, slope_b, slope_j, factor = penetration(
+            delta, nx, ny, bushing, journal, slope_b, slope_j = penetration(
                 contacts, surfaces, k, ex, ey, direction, angle_b, angle_j
             )
             cam = slope_b * turn_b + slope_j * turn_j
             if delta > 0.0:
-                hertz = factor * stiffness_at(contacts, k, bushing, journal)
+                hertz = stiffness_at(contacts, k, bushing, journal)
         else:
             delta, nx, ny = journal_contact(ex, ey, contacts.clearance[k])
         delta_dot = nx * vx + ny * vy + cam * speed

@@ -14,19 +14,19 @@ from leg_wear_monitor.wear.surfaces import deposit_wear, local_surfaces
 
 @kernel
 def penetration(contacts, surfaces, k, ex, ey, direction, angle_b, angle_j):
-    """Penetration [m], unit normal and local radii of bushing and journal [m] of loose joint k.
+    """Penetration [m], normal and local radii of bushing and journal [m] of loose joint k.
 
-    ``direction`` [rad] is that of the eccentricity, and only asked for where wear feeds back. Then come the
-    shares of the penetration's rate that the turning of bushing and journal make, by their speeds [m/rad],
-    and a factor on the stiffness. With these, on worn walls the force is the gradient of the energy that the
-    contact stores: `worn_contact`, and the part of the stiffness that changes from place to place.
+    ``direction`` [rad] is that of the eccentricity, and only asked for where wear feeds back. Last come the
+    shares of the penetration's rate that the turning of bushing and journal make, by their speeds [m/rad].
+    The normal is a unit vector on fresh surfaces, see `worn_contact` for worn ones: the normal force times
+    it is the gradient of the contact's energy, to which the stiffness that changes from place to place adds.
     """
     bushing, journal, slope_b, slope_j, bend_b, bend_j = local_surfaces(
         contacts, surfaces, k, direction, angle_b, angle_j
     )
     if not surfaces.feeds_back:
         delta, nx, ny = journal_contact(ex, ey, contacts.clearance[k])
-        return delta, nx, ny, bushing, journal, 0.0, 0.0, 1.0
+        return delta, nx, ny, bushing, journal, 0.0, 0.0
     clearance = bushing - journal
     delta, nx, ny, scale, turned = worn_contact(ex, ey, clearance, slope_b + slope_j, bend_b + bend_j)
     cam_b, cam_j = slope_b * scale + turned * bend_b, slope_j * scale + turned * bend_j
@@ -37,8 +37,7 @@ def penetration(contacts, surfaces, k, ex, ey, direction, angle_b, angle_j):
         along = (softer_b + softer_j) / (ex * ex + ey * ey)
         nx, ny = nx + along * ey, ny - along * ex
         cam_b, cam_j = cam_b + softer_b, cam_j + softer_j
-    size = math.hypot(nx, ny)
-    return delta, nx / size, ny / size, bushing, journal, cam_b / size, cam_j / size, size
+    return delta, nx, ny, bushing, journal, cam_b, cam_j
 
 
 @kernel
@@ -65,15 +64,15 @@ def joint_force(contacts, surfaces, k, ex, ey, vx, vy, angle_b, angle_j, speed_b
         The force on the journal is -f_n n + f_t t with t = (-n_y, n_x), the couple on it ``moment`` [N m].
     """
     direction = math.atan2(ey, ex) if surfaces.feeds_back else 0.0
-    delta, nx, ny, bushing, journal, slope_b, slope_j, factor = penetration(
+    delta, nx, ny, bushing, journal, slope_b, slope_j = penetration(
         contacts, surfaces, k, ex, ey, direction, angle_b, angle_j
     )
     delta_dot = nx * vx + ny * vy + slope_b * speed_b + slope_j * speed_j
-    radius = contacts.bushing_radius[k]
-    slip = nx * vy - ny * vx + speed_j * (radius - ex * nx - ey * ny) - speed_b * radius
+    arm = contacts.bushing_radius[k] * (nx * nx + ny * ny)
+    slip = nx * vy - ny * vx + speed_j * (arm - ex * nx - ey * ny) - speed_b * arm
     if delta <= 0.0 or approach_speed == 0.0:
         return 0.0, 0.0, delta, delta_dot, slip, nx, ny, 0.0, 0.0
-    stiffness = factor * stiffness_at(contacts, k, bushing, journal)
+    stiffness = stiffness_at(contacts, k, bushing, journal)
     f_n = normal_force(stiffness, contacts.hysteresis[k], delta, delta_dot, approach_speed)
     mu, v0, v1 = contacts.friction[k, 0], contacts.friction[k, 1], contacts.friction[k, 2]
     f_t = friction_force(contacts.friction_law[k], mu, v0, v1, f_n, slip)
@@ -84,7 +83,7 @@ def joint_force(contacts, surfaces, k, ex, ey, vx, vy, angle_b, angle_j, speed_b
 def contact_energy(contacts, surfaces, k, ex, ey, angle_b, angle_j):
     """Elastic energy [J] in loose joint k."""
     direction = math.atan2(ey, ex) if surfaces.feeds_back else 0.0
-    delta, _, _, bushing, journal, _, _, _ = penetration(
+    delta, _, _, bushing, journal, _, _ = penetration(
         contacts, surfaces, k, ex, ey, direction, angle_b, angle_j
     )
     return elastic_energy(stiffness_at(contacts, k, bushing, journal), delta)

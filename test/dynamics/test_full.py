@@ -124,7 +124,7 @@ def test_slip_is_that_of_the_two_bodies_where_they_touch(model, worn, cycle, pha
         relative = at[1] - at[0]
         ex, ey = eccentricity(model, k, q, v, cs)[:2]
         direction = math.atan2(ey, ex)
-        delta, *_, slope_b, _, _ = penetration(model.contacts, worn, k, ex, ey, direction, q[b, 2], q[j, 2])
+        delta, *_, slope_b, _ = penetration(model.contacts, worn, k, ex, ey, direction, q[b, 2], q[j, 2])
         cam = slope_b * (v[b, 2] - v[j, 2])  # a worn bushing that turns closes in on the journal
         if delta > 0.0:  # else there is no wall's normal
             assert relative @ n + cam == pytest.approx(delta_dot, abs=1.0e-12)

@@ -5,6 +5,9 @@
 # Percent of lines and branches that the two runs of the tests reach together.
 COVERAGE_MIN ?= 90
 
+# Two files of tests at a time: more would compile the same kernels more often than they save.
+TWO := --numprocesses 2 --dist loadfile
+
 # ROS finds packages below the environment's root; its log and matplotlib's font cache stay in the checkout.
 export AMENT_PREFIX_PATH := $(CURDIR)/.venv
 export ROS_LOG_DIR := $(CURDIR)/build/ros_log
@@ -20,16 +23,16 @@ test: .venv/installed
 	.venv/bin/ruff format --check
 	.venv/bin/mypy
 	.venv/bin/lint-imports --no-logo
-	.venv/bin/python -m pytest --cov --cov-report=
+	.venv/bin/python -m pytest $(TWO) --cov --cov-report=
 	@# Coverage cannot see into compiled kernels: once more, uncompiled, and the sum of both is judged.
-	NUMBA_DISABLE_JIT=1 .venv/bin/python -m pytest -m plain --cov --cov-append --cov-fail-under=$(COVERAGE_MIN)
+	NUMBA_DISABLE_JIT=1 .venv/bin/python -m pytest $(TWO) -m plain --cov --cov-append --cov-fail-under=$(COVERAGE_MIN)
 
 demo: .venv/installed
 	.venv/bin/leg-wear-monitor demo --out build/demo
 
 # The oldest libraries we support, without ROS; their deprecations are not ours to mend.
 test-oldest: .venv-oldest/installed
-	.venv-oldest/bin/python -m pytest -W default
+	.venv-oldest/bin/python -m pytest $(TWO) -W default
 
 clean:
 	rm -rf .venv .venv-oldest build dist *.egg-info .coverage .hypothesis .import_linter_cache .*_cache

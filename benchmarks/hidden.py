@@ -12,6 +12,8 @@ from pathlib import Path
 import numpy as np
 
 from leg_wear_monitor import load_mechanism
+from leg_wear_monitor.dynamics.clearance_run import ClearanceStepper
+from leg_wear_monitor.dynamics.drive import steady_drive
 from leg_wear_monitor.dynamics.full_run import FullRun
 from leg_wear_monitor.dynamics.simulation import prepare
 from leg_wear_monitor.dynamics.tally import new_tally
@@ -31,10 +33,14 @@ COMMISSIONING, WINDOW = 100, 60
 COUNTS = (20, 40, 80, 160, 320)
 
 
-def walked(leg: Mechanism, clearance: np.ndarray, cycles: int) -> tuple[np.ndarray, np.ndarray]:
+def walked(
+    leg: Mechanism, clearance: np.ndarray, cycles: int, depth: np.ndarray | None = None
+) -> tuple[np.ndarray, np.ndarray]:
     """Crank (cycles, 1000) and encoder angles (cycles, 1000, m) at 1 kHz, without errors."""
-    setup, names = prepare(leg), body_names(leg)
+    setup, names = prepare(leg, wear=depth is not None), body_names(leg)
     setup.contacts.clearance[:] = clearance
+    if depth is not None:
+        setup.contacts.wear_coefficient[:], setup.surfaces.depth[:] = 0.0, depth
     run, tally = FullRun(setup, tolerance_m=1e-9), new_tally(len(leg.joints))
     run.advance(1.0, tally)
     angle = np.empty((cycles * 1000, len(names)))
@@ -75,10 +81,23 @@ def read(walk, every, noise, seed):
         )
 
 
-def referred(leg, model, clearance):
+def worn_by_archard(leg: Mechanism) -> np.ndarray:
+    """Depths of a leg that walked until A had opened by 150 um; wear 50 000 times as fast."""
+    setup = prepare(leg, wear=True)
+    setup.contacts.wear_coefficient[:] *= 5.0e4
+    stepper, tally = ClearanceStepper(setup), new_tally(len(leg.joints))
+    stepper.init(0.0, setup.speed)
+    cycle = 0
+    while setup.surfaces.depth[0].sum(axis=0).mean() < WORN - FRESH:
+        cycle += 1
+        stepper.advance(steady_drive(0.0, setup.speed), float(cycle), tally)
+    return setup.surfaces.depth
+
+
+def referred(leg, model, clearance, depth=None):
     """A reference, and what it took [s]."""
     run, began = ReferenceRun(leg, model), time.process_time()
-    run.begin(clearance, np.zeros((5, 2, SECTORS)))
+    run.begin(clearance, np.zeros((5, 2, SECTORS)) if depth is None else depth)
     while (found := run.advance()) is None:
         pass
     return found, time.process_time() - began
@@ -154,6 +173,22 @@ def show_all_worn(leg, model, reference, held, walk):
         reference, _ = referred(leg, model, found.clearance_m)
 
 
+def show_locally_worn(leg, model, reference, held):
+    """A leg worn where its joints bear: by the reference of a new one, then by one of what was counted."""
+    depth = worn_by_archard(leg)
+    opened = depth.sum(axis=1).mean(axis=1)
+    print("  worn by [um]", np.round(1e6 * opened), "deepest", np.round(1e6 * depth.sum(axis=1).max(axis=1)))
+    walk = walked(leg, np.full(5, FRESH), WINDOW, depth)
+    for share in (0.0, 1.0, 0.5, 0.25):
+        if share:
+            reference, _ = referred(leg, model, FRESH + share * opened, share * depth)
+        hidden = HiddenClearance(model, reference, with_clearances(held, reference.clearance_m, 1e-3))
+        for cycle in read(walk, 5, 1e-4, 4):
+            hidden.add(*cycle)
+        off = hidden.fused().clearance_m - FRESH - opened
+        print(f"  counted {share:g} of it: off [um]", np.round(1e6 * off))
+
+
 def main() -> None:
     parser = argparse.ArgumentParser(description=__doc__)
     parser.add_argument("--keep", help="directory for the walks")
@@ -176,6 +211,7 @@ def main() -> None:
             show_finding(leg, model, reference, held, walks, every, noise)
             if (noise, every) == (1e-4, 5):
                 show_all_worn(leg, model, reference, held, walks["all"])
+                show_locally_worn(leg, model, reference, held)
 
 
 if __name__ == "__main__":

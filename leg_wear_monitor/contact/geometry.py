@@ -11,7 +11,8 @@ def journal_contact(ex, ey, clearance):
     e = math.sqrt(ex * ex + ey * ey)
     if e == 0.0:
         return -clearance, 1.0, 0.0
-    return e - clearance, ex / e, ey / e
+    inverse = 1.0 / e
+    return e - clearance, ex * inverse, ey * inverse
 
 
 @kernel
@@ -31,11 +32,12 @@ def worn_contact(ex, ey, clearance, slope, bend):
     """
     delta, rx, ry = journal_contact(ex, ey, clearance)
     inside = max(delta, 0.0)
-    distance = clearance + inside  # a journal that touches is at least that far out
-    tilt = slope / distance
-    scale = 1.0 / math.sqrt(1.0 + tilt * tilt)
-    turned = inside * scale * scale * scale * tilt / distance
-    outwards, back = scale + turned * tilt, scale * tilt + turned * bend / distance
+    inverse = 1.0 / (clearance + inside)  # a journal that touches is at least that far out
+    tilt = slope * inverse
+    square = 1.0 / (1.0 + tilt * tilt)
+    scale = math.sqrt(square)
+    turned = inside * square * scale * tilt * inverse
+    outwards, back = scale + turned * tilt, scale * tilt + turned * bend * inverse
     return delta * scale, outwards * rx + back * ry, outwards * ry - back * rx, scale, turned
 
 

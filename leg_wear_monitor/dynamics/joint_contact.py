@@ -32,8 +32,8 @@ def penetration(contacts, surfaces, k, ex, ey, direction, angle_b, angle_j):
     cam_b, cam_j = slope_b * scale + turned * bend_b, slope_j * scale + turned * bend_j
     if delta > 0.0 and contacts.stiffness[k] == 0.0:  # the stiffness is the local radii's
         # d(2/5 K delta^2.5) = K delta^1.5 (d delta + 2/5 delta dK / K)
-        softer = 0.2 * delta / clearance
-        softer_b, softer_j = softer * slope_b * journal / bushing, softer * slope_j * bushing / journal
+        softer = 0.2 * delta / (clearance * bushing * journal)
+        softer_b, softer_j = softer * slope_b * journal * journal, softer * slope_j * bushing * bushing
         along = (softer_b + softer_j) / (ex * ex + ey * ey)
         nx, ny = nx + along * ey, ny - along * ex
         cam_b, cam_j = cam_b + softer_b, cam_j + softer_j

@@ -19,6 +19,8 @@ SECTORS = 720
 
 BUSHING, JOURNAL = 0, 1
 
+_TURNS_PER_RAD = 0.5 / math.pi
+
 
 class Surfaces(NamedTuple):
     """Wear depth (k, 2, N) [m] of bushing and journal; ``feeds_back`` 1 if it opens the clearances."""
@@ -39,13 +41,13 @@ def profile_at(profile, angle):
     Those of the quadratic spline over the sectors: the slope has no jumps.
     """
     n = profile.shape[0]
-    u = angle * (n / (2.0 * math.pi))
-    u -= n * math.floor(u / n)
+    turns = angle * _TURNS_PER_RAD
+    u = n * (turns - math.floor(turns))
     i = min(int(u), n - 1)
     w = u - i
     before, here, after = profile[i - 1 if i > 0 else n - 1], profile[i], profile[i + 1 if i < n - 1 else 0]
     depth = 0.5 * ((1.0 - w) ** 2 * before + (1.0 + 2.0 * w * (1.0 - w)) * here + w * w * after)
-    per_rad = n / (2.0 * math.pi)
+    per_rad = n * _TURNS_PER_RAD
     rise, next_rise = here - before, after - here
     return depth, (rise + w * (next_rise - rise)) * per_rad, (next_rise - rise) * per_rad * per_rad
 

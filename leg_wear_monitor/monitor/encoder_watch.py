@@ -4,7 +4,6 @@ All of it happens at the ends of beats, which follow from the order of arrival a
 at when it is over, one more is simulated for the reference, and no beat does more than that.
 """
 
-from collections.abc import Sequence
 from typing import NamedTuple
 
 import attrs
@@ -12,76 +11,31 @@ import numpy as np
 
 from leg_wear_monitor.mechanism.arrays import Floats
 from leg_wear_monitor.mechanism.spec import Mechanism
-from leg_wear_monitor.monitor.angle_regression import Estimate, binned, rms
+from leg_wear_monitor.monitor.angle_regression import Estimate, binned
 from leg_wear_monitor.monitor.commissioning import (
-    EncoderErrors,
     commissioned,
     errors_of,
     held,
     known_with,
 )
 from leg_wear_monitor.monitor.config import MonitorConfig
-from leg_wear_monitor.monitor.encoder_samples import (
-    EncoderSamples,
-    after,
-    extended,
-    no_encoder_samples,
-    within,
-)
+from leg_wear_monitor.monitor.encoder_samples import after, extended, no_encoder_samples, within
+from leg_wear_monitor.monitor.encoder_state import LEAST_PHASES, EncoderState, fault_of
 from leg_wear_monitor.monitor.hidden import HiddenClearance, HiddenSnapshot
 from leg_wear_monitor.monitor.ledger_entry import Commissioned
 from leg_wear_monitor.monitor.seen import SeenClearance, Sight
 from leg_wear_monitor.twin.figures import CycleFigures
-from leg_wear_monitor.twin.joint_angles import PHASES, angle_model
+from leg_wear_monitor.twin.joint_angles import angle_model
 from leg_wear_monitor.twin.reference import ReferenceRun, ReferenceSnapshot
 from leg_wear_monitor.twin.sample import Samples
 
 OTHERWISE_CYCLES = 20  # in a row with other encoders than before, until those are believed to be the ones
 
-_LEAST_PHASES = PHASES // 4  # with samples: at 60 rpm a rate of 32 Hz
-_STRANGE_RAD = 0.1  # of deviation within a cycle: many times what clearances and scale errors make
 _UNKNOWN_M = 1.0e-3  # standard deviation of a clearance of which nothing is to be supposed
 _SEEN_M = 1.0e-4  # that of one that is seen
 _FAR_M = 1.0e-4  # from the reference: then it is made again
 _LONGEST = 1.5  # of a cycle's time in motion: with more standing in it, it is none of a steady gait
 _AGAIN_CYCLES = 100  # between two references
-
-
-@attrs.define
-class EncoderState:
-    """What changes, beside the regression and the reference; every value is immutable.
-
-    Attributes
-    ----------
-    samples : EncoderSamples
-    errors : EncoderErrors
-    due : tuple of (int, int)
-        Begin and end [ns] of gait cycles that are over and not looked at yet.
-    present : tuple of bool
-        Which encoders the kept cycles have; empty before the first.
-    otherwise : tuple of bool
-        Which ones the last cycles had, if that is something else.
-    otherwise_cycles : int
-        How many of them.
-    faults : tuple of str
-        What was wrong with each encoder in the last cycle; empty before the first.
-    asked : bool
-        Whether a reference was asked for since the leg was last another one.
-    since_reference : int
-        Cycles since the last reference was ready.
-    found : Estimate or None
-    """
-
-    samples: EncoderSamples
-    errors: EncoderErrors
-    due: tuple[tuple[int, int], ...] = ()
-    present: tuple[bool, ...] = ()
-    otherwise: tuple[bool, ...] = ()
-    otherwise_cycles: int = 0
-    faults: tuple[str, ...] = ()
-    asked: bool = False
-    since_reference: int = 0
-    found: Estimate | None = None
 
 
 class EncoderSnapshot(NamedTuple):
@@ -169,7 +123,7 @@ class EncoderWatch:
     def replaced(self) -> None:
         """A part is new: the leg is another one."""
         self._hidden.forget()
-        self.state.found, self.state.asked = None, False
+        self.state.found, self.state.asked, self.state.handed_ns = None, False, 0
 
     def seen(self, counted_m: Floats) -> tuple[SeenClearance, ...]:
         """What the encoders show of each joint, beside the clearances (k,) that are counted [m]."""
@@ -200,7 +154,7 @@ class EncoderWatch:
         self._centre(crank, angles)
         deviation, counts = binned(self._model, crank, angles - state.errors.centre_rad)
         state.faults = tuple(
-            _fault(raw[:, i], deviation[:, i], joint) for i, joint in enumerate(self._settings.joints)
+            fault_of(raw[:, i], deviation[:, i], joint) for i, joint in enumerate(self._settings.joints)
         )
         present = tuple(not fault for fault in state.faults)
         if present != state.present and not self._is_changed(present):
@@ -232,7 +186,7 @@ class EncoderWatch:
         if not np.isnan(errors.centre_rad).any() or not len(crank):
             return
         deviation = self._model.deviation(crank, angles)
-        there = np.isfinite(deviation).sum(axis=0) >= _LEAST_PHASES
+        there = np.isfinite(deviation).sum(axis=0) >= LEAST_PHASES
         mean = np.angle(np.nansum(np.exp(1j * deviation), axis=0))
         first = np.isnan(errors.centre_rad) & there
         self.state.errors = attrs.evolve(errors, centre_rad=np.where(first, mean, errors.centre_rad))
@@ -303,18 +257,3 @@ def _seen(clearance_m: float, sigma_m: float, counted_m: float) -> SeenClearance
     return SeenClearance(
         sight=Sight.SEEN, clearance_m=clearance_m, sigma_m=sigma_m, departure_m=clearance_m - counted_m
     )
-
-
-def _fault(raw: Floats, deviation: Floats, joint: str) -> str:
-    """What is wrong with an encoder in a cycle; empty if nothing."""
-    seen = deviation[np.isfinite(deviation)]
-    if len(seen) < _LEAST_PHASES:
-        return "gives no angle" if np.isinf(raw).any() else "is not in joint_states with the crank"
-    if rms(seen - seen.mean()) > _STRANGE_RAD:
-        return f"does not turn as joint {joint} does, look at encoders.joints and encoders.signs"
-    return ""
-
-
-def faults(names: Sequence[str], state: EncoderState) -> list[str]:
-    """What is wrong with encoders, for people."""
-    return [f"{name} {fault}" for name, fault in zip(names, state.faults, strict=False) if fault]

@@ -141,12 +141,13 @@ class Forecaster:
         self._believe(k, found.after)
         return found
 
-    def seen(self, joint: str, look: Look, replaced_ns: int) -> bool:
+    def seen(self, k: int, look: Look, replaced_ns: int) -> bool:
         """Take in a clearance that encoders show, instead of the last such one.
 
         Parameters
         ----------
-        joint : str
+        k : int
+            Of the loose joint.
         look : Look
             Its error does not average out, so the newest says all there is.
         replaced_ns : int
@@ -157,8 +158,7 @@ class Forecaster:
         bool
             Whether it is believed: not, if the model holds it next to impossible.
         """
-        k = self._loose.index(joint)
-        looks = looks_of(self._measurements, joint, replaced_ns)
+        looks = looks_of(self._measurements, self._loose[k], replaced_ns)
         below = believe(self._settings, self._fresh_m[k], looks).probability_below(self._fresh_m[k], look)
         believed = CONTRADICTS <= below <= 1.0 - CONTRADICTS
         self._believe(k, believe(self._settings, self._fresh_m[k], [*looks, look] if believed else looks))

@@ -16,25 +16,9 @@ from leg_wear_monitor.twin.figures import Event
 
 @attrs.define
 class MonitorState:
-    """What changes, beside twin, alarms and books; every value is immutable.
-
-    Attributes
-    ----------
-    growth : tuple of GrowthWindow
-    believed : tuple of bool
-        Which joints' clearances, as encoders showed them, the forecast has last taken in.
-    other : tuple of bool
-        Which of them were other than counted then.
-    handed_ns : int
-        When they were handed to it, 0 if that is due.
-    last : CycleReport or None
-    happened : tuple of Event
-    """
+    """What changes, beside twin, alarms and books; every value is immutable."""
 
     growth: tuple[GrowthWindow, ...]
-    believed: tuple[bool, ...]
-    other: tuple[bool, ...] = ()
-    handed_ns: int = 0
     last: CycleReport | None = None
     happened: tuple[Event, ...] = ()
 

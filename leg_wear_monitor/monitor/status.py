@@ -8,7 +8,8 @@ import attrs
 from leg_wear_monitor.monitor import alarm_board as names
 from leg_wear_monitor.monitor.alarms import Level
 from leg_wear_monitor.monitor.book import Book
-from leg_wear_monitor.monitor.encoder_watch import EncoderWatch, faults
+from leg_wear_monitor.monitor.encoder_state import faults
+from leg_wear_monitor.monitor.encoder_watch import EncoderWatch
 from leg_wear_monitor.monitor.judge import Judge
 from leg_wear_monitor.monitor.reports import CycleReport, JointReport, Status
 from leg_wear_monitor.monitor.seen import Sight

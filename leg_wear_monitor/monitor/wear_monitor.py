@@ -8,14 +8,14 @@ from leg_wear_monitor.mechanism.arrays import Floats
 from leg_wear_monitor.mechanism.spec import Mechanism
 from leg_wear_monitor.monitor.alarms import Alarm
 from leg_wear_monitor.monitor.beats import A_CYCLE, Beats
-from leg_wear_monitor.monitor.belief import Look
 from leg_wear_monitor.monitor.book import Book
 from leg_wear_monitor.monitor.config import MonitorConfig
 from leg_wear_monitor.monitor.cycle_report import cycle_report
 from leg_wear_monitor.monitor.encoder_watch import EncoderWatch
 from leg_wear_monitor.monitor.fitting import check_limits, fitted, twin_settings
-from leg_wear_monitor.monitor.forecaster import RENEWED_NS, Forecaster
+from leg_wear_monitor.monitor.forecaster import Forecaster
 from leg_wear_monitor.monitor.growth import GrowthWindow, extended
+from leg_wear_monitor.monitor.hand_over import hand_over
 from leg_wear_monitor.monitor.judge import Judge
 from leg_wear_monitor.monitor.ledger import Ledger
 from leg_wear_monitor.monitor.ledger_entry import Audit, Measurement
@@ -30,7 +30,7 @@ from leg_wear_monitor.monitor.reports import (
     Status,
     lost,
 )
-from leg_wear_monitor.monitor.seen import SeenClearance, Sight
+from leg_wear_monitor.monitor.seen import SeenClearance
 from leg_wear_monitor.monitor.status import statuses
 from leg_wear_monitor.twin.digital_twin import DigitalTwin
 from leg_wear_monitor.twin.figures import CycleFigures, joined
@@ -90,9 +90,7 @@ class WearMonitor:
         if ledger and ledger.entry:
             self._judge.board.restore(ledger.entry.alarms)
         self._beats = Beats(cycle_ns // A_CYCLE)
-        self._state = MonitorState(
-            tuple(GrowthWindow() for _ in self.loose), believed=(False,) * len(self.loose)
-        )
+        self._state = MonitorState(tuple(GrowthWindow() for _ in self.loose))
 
     def warm_up(self) -> None:
         """Compile all that `update` needs, before the first sample; takes about a minute once."""
@@ -195,7 +193,6 @@ class WearMonitor:
         self._forecaster.replaced(joint)
         if self._encoders:
             self._encoders.replaced()
-            self._state.handed_ns = 0
         self._book.note(Audit(stamp_ns, who, "reset_wear", was))
         self._keep()
 
@@ -231,7 +228,8 @@ class WearMonitor:
             accept=accept,
         )
         self._book.note(found.measurement)
-        self._state.handed_ns = 0
+        if self._encoders:
+            self._encoders.state.handed_ns = 0  # what they show counts beside it
         self._keep()
         return found
 
@@ -324,25 +322,11 @@ class WearMonitor:
                 self._book.note(new)
 
     def _seen(self, figures: CycleFigures) -> tuple[SeenClearance, ...] | None:
-        """Clearances as encoders show them; the forecast takes them in once a minute, or on a finding."""
+        """Clearances as encoders show them, which the forecast learns from."""
         if not self._encoders:
             return None
-        state, seen = self._state, self._encoders.seen(figures.clearance_mean_m)
-        other = tuple(one.is_other for one in seen)
-        is_due = other != state.other or not 0 <= figures.stamp_ns - state.handed_ns < RENEWED_NS
-        if is_due and any(one.sight is Sight.SEEN for one in seen):
-            state.handed_ns, state.other = figures.stamp_ns, other
-            worn = zip(self.loose, seen, self._worn_m(figures), self._book.state.parts, strict=True)
-            state.believed = tuple(
-                one.sight is Sight.SEEN
-                and self._forecaster.seen(
-                    joint, Look(one.clearance_m, one.sigma_m, float(wear_m)), part.replaced_ns
-                )
-                for joint, one, wear_m, part in worn
-            )
-        return tuple(
-            attrs.evolve(one, believed=believed) for one, believed in zip(seen, state.believed, strict=True)
-        )
+        replaced_ns = [part.replaced_ns for part in self._book.state.parts]
+        return hand_over(self._encoders, self._forecaster, figures, self._worn_m(figures), replaced_ns)
 
     def _worn_m(self, figures: CycleFigures) -> Floats:
         """Wear of each part at the end of a gait cycle; the twin itself may be further on."""

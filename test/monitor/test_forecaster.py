@@ -5,6 +5,7 @@ import numpy as np
 import pytest
 
 from leg_wear_monitor import LegWearError
+from leg_wear_monitor.monitor.belief import Look
 from leg_wear_monitor.monitor.forecast import Answer
 from leg_wear_monitor.monitor.forecast_config import Forecasting
 from leg_wear_monitor.monitor.forecaster import Forecaster
@@ -62,6 +63,25 @@ def test_a_replaced_part_is_not_known(forecaster):
     forecaster.replaced("G")
     (told,) = walked(forecaster, [80])
     assert [one.answer is Answer.NOT_ENOUGH_DATA for one in told.joints] == [False, False, True, False, False]
+
+
+@pytest.mark.plain
+def test_what_encoders_show_tightens_the_forecast_and_the_newest_replaces_the_last(forecaster):
+    def spread(told):
+        return told.cycles.p90 / told.cycles.p10
+
+    before = walked(forecaster, range(1, 80), worn=1e-4)[-1].joints[0]
+    assert forecaster.seen(0, Look(4.2e-4, 2e-5, 1e-4), 0)
+    after = walked(forecaster, [80], worn=1e-4)[0].joints[0]
+    assert after.measurements == 1
+    assert spread(after) < 0.5 * spread(before)
+    for _ in range(50):  # its error does not average out
+        forecaster.seen(0, Look(4.2e-4, 2e-5, 1e-4), 0)
+    again = walked(forecaster, [81], worn=1e-4)[0].joints[0]
+    assert again.measurements == 1
+    assert spread(again) == pytest.approx(spread(after), rel=1e-3)
+    assert not forecaster.seen(0, Look(9e-4, 2e-5, 1e-6), 0)
+    assert walked(forecaster, [82], worn=1e-4)[0].joints[0].measurements == 0
 
 
 def test_the_monitor_forecasts_and_learns(leg, new_monitor, gait):

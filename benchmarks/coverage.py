@@ -71,13 +71,28 @@ def lived(law: np.ndarray, off: np.ndarray, joints: int, random: np.random.Gener
     return HiddenLife(factor, fresh, np.array(cycles), np.array(clearance), np.array(growth))
 
 
+def counted(twin: HiddenLife, k: int, now: float) -> tuple[float, float]:
+    """Growth and wear that the twin has: nobody holds it at the limit, it goes on at its last rate there.
+
+    A point of a life has eight cycles, the monitor averages 2000: growth is that over many points about now.
+    """
+    grows = twin.growth_m[:, k] > 0.0
+    cycles, seen = twin.cycles[grows], twin.clearance_m[grows, k]
+    late = len(cycles) // 2
+    last = (seen[-1] - seen[late]) / (cycles[-1] - cycles[late])
+
+    def wear(when: float) -> float:
+        return float(np.interp(when, cycles, seen) - FRESH_M + max(0.0, when - cycles[-1]) * last)
+
+    return (wear(1.8 * now) - wear(0.2 * now)) / (1.6 * now), wear(now)
+
+
 def case_of(life: HiddenLife, now: float, twin: HiddenLife, joints: str, random: np.random.Generator) -> Case:
     """What the monitor has of a leg after so many cycles; from then on it wears by another load."""
     later = float(np.exp(SETTINGS.load_sigma * random.standard_normal()))
     state = []
     for k, joint in enumerate(joints):
-        growth = float(np.interp(now, twin.cycles, twin.growth_m[:, k]))
-        wear = float(np.interp(now, twin.cycles, twin.clearance_m[:, k])) - FRESH_M
+        growth, wear = counted(twin, k, now)
         seen = growth * (1.0 + GROWTH_NOISE * random.standard_normal())
         state.append(
             JointNow(

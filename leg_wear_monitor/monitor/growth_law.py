@@ -11,7 +11,6 @@ from collections.abc import Sequence
 import attrs
 import numpy as np
 
-from leg_wear_monitor.errors import ConfigError
 from leg_wear_monitor.mechanism.arrays import Floats
 
 PRIOR_SIGMA = 1.0  # of B beforehand: growth may double or halve where a clearance doubles
@@ -80,30 +79,36 @@ def fitted_law(lives: Sequence[SimulatedLife], sigma: float) -> GrowthLaw:
     lives : sequence of SimulatedLife
     sigma : float
         Standard deviation of ln growth where there are too few lives to tell it.
-
-    Raises
-    ------
-    ConfigError
-        If nothing grows in them.
     """
     fresh = lives[0].clearance_m[0]
     coupling, _ = _coefficients(lives, fresh)
     widest = np.max([life.clearance_m.max(axis=0) for life in lives], axis=0)
-    off = np.full(len(fresh), sigma)
-    if len(lives) >= LEAST_LIVES:
-        off = np.sqrt(np.mean(np.square(left_over(lives)), axis=0))
-    return GrowthLaw(coupling, fresh, widest, off, len(lives))
+    return GrowthLaw(coupling, fresh, widest, _sigma(lives, sigma), len(lives))
+
+
+def _sigma(lives: Sequence[SimulatedLife], unknown: float) -> Floats:
+    """What lives are off, of each joint; where they are too few, or it does not open, what is given."""
+    if len(lives) < LEAST_LIVES:
+        return np.full(len(lives[0].factor), unknown)
+    off = left_over(lives)
+    told = np.isfinite(off)
+    square = np.square(off, where=told, out=np.zeros_like(off)).sum(axis=0)
+    return np.where(told.any(axis=0), np.sqrt(square / np.maximum(told.sum(axis=0), 1)), unknown)
 
 
 def left_over(lives: Sequence[SimulatedLife]) -> Floats:
-    """Logarithm (n, k) of the cycles each life took to its end, over those by the law of all the others."""
+    """Logarithm (n, k) of the cycles each life took to its end, over those by the law of all the others.
+
+    NaN where a joint has not opened.
+    """
     fresh, off = lives[0].clearance_m[0], []
     for i, life in enumerate(lives):
         coupling, level = _coefficients([*lives[:i], *lives[i + 1 :]], fresh)
         law = GrowthLaw(coupling, fresh, np.full(len(fresh), np.inf), np.zeros(len(fresh)))
         base = life.factor * np.exp(level)
         told = cycles_to(law, fresh[:, None], base[:, None], life.clearance_m[-1])
-        off.append(np.log(life.cycles[-1] / told[:, 0]))
+        opened = np.isfinite(told[:, 0]) & (told[:, 0] > 0.0)
+        off.append(np.log(np.where(opened, life.cycles[-1] / np.where(opened, told[:, 0], 1.0), np.nan)))
     return np.array(off)
 
 
@@ -116,7 +121,8 @@ def _coefficients(lives: Sequence[SimulatedLife], fresh_m: Floats) -> tuple[Floa
     for k in range(x.shape[1]):
         grows = growth[:, k] > 0.0
         if not grows.any():
-            raise ConfigError("life", "growth_m_per_cycle", "a joint does not grow in any life")
+            level[k] = -np.inf
+            continue
         y, own = np.log(growth[grows, k]), x[grows]
         centred = own - own.mean(axis=0)
         coupling[k] = np.linalg.solve(centred.T @ centred + prior, centred.T @ (y - y.mean()))

@@ -114,3 +114,17 @@ def test_one_life_alone_does_not_tell_its_sigma():
     np.testing.assert_array_equal(law.sigma, 0.3)
     # yet growth follows it
     np.testing.assert_allclose(one(law, limit=life.clearance_m[-1]), life.cycles[-1], rtol=0.02)
+
+
+def test_a_joint_that_never_opens_has_no_law_of_its_own_and_leaves_the_others_theirs():
+    still = np.array([1.0, 1.0, 0.0])
+    lives = []
+    for life in (lived(f) for f in SPREAD):
+        clearance = np.where(still, life.clearance_m, FRESH)
+        lives.append(
+            attrs.evolve(life, clearance_m=clearance, growth_m_per_cycle=still * life.growth_m_per_cycle)
+        )
+    law = fitted_law(lives, sigma=0.3)
+    np.testing.assert_array_equal(law.coupling[2], 0.0)
+    assert law.sigma[2] == 0.3
+    assert (law.sigma[:2] < 0.3).all()

@@ -84,6 +84,11 @@ class EncoderWatch:
             for here, known in zip(self.state.present, self.state.errors.known, strict=False)
         )
 
+    @property
+    def has_failed(self) -> bool:
+        """Whether there is no reference, since the leg could not be simulated for one."""
+        return self.state.asked and not self._reference.is_busy and self._hidden.reference is None
+
     def see(self, piece: Samples) -> None:
         """Take in samples as they arrive."""
         self.state.samples = extended(self.state.samples, piece)

@@ -136,6 +136,8 @@ def _encoders(encoders: EncoderWatch, judge: Judge, last: CycleReport | None) ->
             values[f"{joint.joint}_sigma_m"] = joint.seen.sigma_m
             values[f"{joint.joint}_departure_m"] = joint.seen.departure_m
     wrong = faults(settings.names, state)
+    if encoders.has_failed:
+        wrong.append("nothing to compare with: the leg could not be simulated with its clearances")
     told = [*wrong, *_shown(last)]
     return Status("encoders", max(level, Level.WARN) if wrong else level, "; ".join(told), values)
 

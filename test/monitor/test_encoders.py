@@ -201,6 +201,15 @@ def test_an_encoder_that_says_nothing_is_told_and_the_others_go_on(new_watch, re
     assert len(monitor.status()[0].values) > 0 and monitor.lost.unmonitored_s < 0.2
 
 
+def test_a_leg_that_cannot_be_simulated_is_told_and_the_crank_goes_on(new_watch, read, monkeypatch):
+    monitor = new_watch()
+    monkeypatch.setattr("leg_wear_monitor.twin.reference.DONE", -1)  # whatever the stepper says, it failed
+    reports = monitor.update(read(3.5))
+    assert "could not be simulated" in status(monitor).message
+    assert status(monitor).level is Level.WARN
+    assert len(reports.cycles) == 2
+
+
 def test_an_encoder_on_another_joint_than_said_is_told(new_watch, read):
     monitor = new_watch()
     samples = read(3.5)

@@ -4,6 +4,8 @@ import math
 
 from leg_wear_monitor.kernel import kernel
 
+_SHARPEST = 1.0  # turn of the wall's normal [rad] over the way that a penetration makes aside
+
 
 @kernel
 def journal_contact(ex, ey, clearance):
@@ -22,7 +24,8 @@ def worn_contact(ex, ey, clearance, slope, bend):
     By a slope [m/rad], that changes by a ``bend`` [m/rad^2]. The penetration is |e| - c, measured along the
     worn wall's normal. So that the normal force has a potential, it acts along the penetration's whole
     gradient: the wall's unit normal, but for parts of the order of penetration / clearance, because the
-    normal turns from place to place.
+    normal turns from place to place. These are bounded: in notches narrower than a journal can enter, the law
+    is no more than that of a unit normal.
 
     Returns
     -------
@@ -37,6 +40,9 @@ def worn_contact(ex, ey, clearance, slope, bend):
     square = 1.0 / (1.0 + tilt * tilt)
     scale = math.sqrt(square)
     turned = inside * square * scale * tilt * inverse
+    bent = abs(turned * bend * inverse)
+    if bent > _SHARPEST:
+        turned *= _SHARPEST / bent
     outwards, back = scale + turned * tilt, scale * tilt + turned * bend * inverse
     return delta * scale, outwards * rx + back * ry, outwards * ry - back * rx, scale, turned
 

@@ -16,8 +16,11 @@ from leg_wear_monitor.studies.ensemble import ensemble, watch
 from leg_wear_monitor.studies.grid import SAMPLES
 from leg_wear_monitor.studies.point import Arrays
 from leg_wear_monitor.studies.watch import WatchedLeg
+from leg_wear_monitor.wear.cycle_jump import JumpControl, smoothed
 
 SETTLE_CYCLES = 1  # before those whose wear is repeated: the surfaces have just changed
+
+_SMOOTH_DEG = JumpControl().smooth_deg  # a few cycles touch here and there, repeated they would cut notches
 
 
 def live(mechanism: Mechanism, settings: dict[str, Any]) -> Arrays:
@@ -73,4 +76,4 @@ def _wear_a_cycle(leg: WatchedLeg, cycles: int) -> tuple[Floats, Floats, float]:
     tally, before = new_tally(joints), leg.setup.surfaces.depth.copy()
     leg.advance(cycles * SAMPLES, tally)
     worn = leg.setup.surfaces.depth - before
-    return worn / cycles, tally.peak.copy(), float(tally.response[0])
+    return smoothed(worn / cycles, _SMOOTH_DEG), tally.peak.copy(), float(tally.response[0])

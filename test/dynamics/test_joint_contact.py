@@ -8,7 +8,7 @@ from hypothesis import assume, given
 from hypothesis import strategies as st
 
 from leg_wear_monitor.contact.arrays import ContactArrays, clearance_settings, compile_contacts
-from leg_wear_monitor.dynamics.joint_contact import contact_energy, joint_force
+from leg_wear_monitor.dynamics.joint_contact import contact_energy, joint_force, penetration
 from leg_wear_monitor.wear.surfaces import SECTORS, Surfaces, local_surfaces
 
 pytestmark = pytest.mark.plain
@@ -68,3 +68,16 @@ def _slope(contacts: ContactArrays, surfaces: Surfaces, at: np.ndarray, i: int) 
         return contact_energy(contacts, surfaces, 0, *where)
 
     return (energy(at + step) - energy(at - step)) / (2.0 * step[i])
+
+
+@given(direction=angles, delta=st.floats(1.0e-7, 5.0e-5), seed=st.integers(0, 9))
+def test_notches_that_no_journal_enters_leave_the_normal_a_normal(elastic, direction, delta, seed):
+    """Sectors of their own depth, up to 50 um: the force keeps its order of size, and turning it all is no work."""
+    depth = np.random.default_rng(seed).uniform(0.0, 5.0e-5, (1, 2, SECTORS))
+    surfaces = Surfaces(depth, 1)
+    bushing, journal, *_ = local_surfaces(elastic, surfaces, 0, direction, 0.3, -0.7)
+    e = bushing - journal + delta
+    ex, ey = e * math.cos(direction), e * math.sin(direction)
+    _, nx, ny, *_, cam_b, cam_j = penetration(elastic, surfaces, 0, ex, ey, direction, 0.3, -0.7)
+    assert math.hypot(nx, ny) < 2.5
+    assert ex * ny - ey * nx + cam_b + cam_j == pytest.approx(0.0, abs=1.0e-9 * e)

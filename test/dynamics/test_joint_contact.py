@@ -72,7 +72,7 @@ def _slope(contacts: ContactArrays, surfaces: Surfaces, at: np.ndarray, i: int) 
 
 @given(direction=angles, delta=st.floats(1.0e-7, 5.0e-5), seed=st.integers(0, 9))
 def test_notches_that_no_journal_enters_leave_the_normal_a_normal(elastic, direction, delta, seed):
-    """Sectors of their own depth, up to 50 um: the force keeps its order of size, and turning it all is no work."""
+    """Sectors of their own depth, up to 50 um: the force keeps its order, and turning it all is no work."""
     depth = np.random.default_rng(seed).uniform(0.0, 5.0e-5, (1, 2, SECTORS))
     surfaces = Surfaces(depth, 1)
     bushing, journal, *_ = local_surfaces(elastic, surfaces, 0, direction, 0.3, -0.7)

@@ -23,14 +23,11 @@ def test_energy_with_clearances(leg_cycles, loose):
         assert abs(energy["residual"]) < 1.0e-3 * (energy["friction_loss"] + energy["contact_loss"])
 
 
-@pytest.mark.parametrize("model, cycles, share", [(FullRun, 2, 0.01), (ClearanceRun, 8, 0.2)])
-def test_walls_that_wear_away_take_energy_along(leg, model, cycles, share):
-    """Ten thousand times the pace of real wear: what contacts had stored in it, and nothing else, is missing.
-
-    Up to a share of it: the clearance model's own residual is a tenth.
-    """
+@pytest.mark.parametrize("model, cycles, bound", [(FullRun, 2, 1.0e-4), (ClearanceRun, 8, 1.0e-3)])
+def test_walls_that_wear_away_take_energy_along(leg, model, cycles, bound):
+    """At 3e4 times the pace of real wear the balance closes as ever, with what contacts had stored in it."""
     fast = {
-        name: attrs.evolve(c, wear_coefficient=tuple(1.0e4 * k for k in c.wear_coefficient))
+        name: attrs.evolve(c, wear_coefficient=tuple(3.0e4 * k for k in c.wear_coefficient))
         for name, c in leg.clearances.items()
     }
     run = model(prepare(attrs.evolve(leg, clearances=fast), clearances="ABGIJ", wear=True))
@@ -38,8 +35,9 @@ def test_walls_that_wear_away_take_energy_along(leg, model, cycles, share):
     tally, start = new_tally(len(leg.joints)), run.stored_energy
     run.advance(1.0 + cycles, tally)
     energy = energy_balance(tally, start, run.stored_energy)
-    assert energy["wear_loss"] > 1.0e-3 * (energy["friction_loss"] + energy["contact_loss"])
-    assert abs(energy["residual"]) < share * energy["wear_loss"]
+    losses = energy["friction_loss"] + energy["contact_loss"]
+    assert energy["wear_loss"] > 4.0e-3 * losses
+    assert abs(energy["residual"]) < bound * losses
 
 
 def test_energy_of_the_ideal_leg(leg):

@@ -32,12 +32,7 @@ def law_of(mechanism: Mechanism, path: str, sigma: float) -> GrowthLaw:
     ConfigError
         If the file cannot be read, or is of another leg.
     """
-    if path:
-        lives = read_lives(path, mechanism)
-    else:
-        files = sorted((share_directory() / "config" / "lives").glob("*.json"))
-        own = (file for file in files if _document(str(file)).get("fingerprint") == fingerprint(mechanism))
-        lives = next((read_lives(str(file), mechanism) for file in own), ())
+    lives = read_lives(path, mechanism) if path else _shipped_lives(mechanism)
     if not lives:
         fresh = [mechanism.clearances[joint].radial_clearance for joint in mechanism.loose]
         return no_law(np.array(fresh), sigma)
@@ -61,6 +56,20 @@ def read_lives(path: str, mechanism: Mechanism) -> Sequence[SimulatedLife]:
             f"{document.get('fingerprint')!r} is of another leg than this one, {own!r} (bodies, joints, or "
             "clearances when new); simulate its lives again with `leg-wear-monitor life --json`",
         )
+    return _lives_in(document, path, mechanism)
+
+
+def _shipped_lives(mechanism: Mechanism) -> Sequence[SimulatedLife]:
+    """Lives that come with the package for just this leg; none if there are none."""
+    own = fingerprint(mechanism)
+    for file in sorted((share_directory() / "config" / "lives").glob("*.json")):
+        document = _document(str(file))
+        if document.get("fingerprint") == own:
+            return _lives_in(document, str(file), mechanism)
+    return ()
+
+
+def _lives_in(document: dict[str, Any], path: str, mechanism: Mechanism) -> Sequence[SimulatedLife]:
     try:
         return [_life(each, mechanism.loose) for each in (document, *document["further"])]
     except (ValueError, KeyError, TypeError) as error:

@@ -4,7 +4,7 @@ import math
 
 from leg_wear_monitor.kernel import kernel
 
-_SHARPEST = 1.0  # turn of the wall's normal [rad] over the way that a penetration makes aside
+_SHARPEST = 1.0  # largest part of the gradient across e that the bend makes, where the wall's normal is 1
 
 
 @kernel
@@ -23,9 +23,9 @@ def worn_contact(ex, ey, clearance, slope, bend):
 
     By a slope [m/rad], that changes by a ``bend`` [m/rad^2]. The penetration is |e| - c, measured along the
     worn wall's normal. So that the normal force has a potential, it acts along the penetration's whole
-    gradient: the wall's unit normal, but for parts of the order of penetration / clearance, because the
-    normal turns from place to place. These are bounded: in notches narrower than a journal can enter, the law
-    is no more than that of a unit normal.
+    gradient (physics.md section 3): the wall's unit normal, but for parts of the order of penetration /
+    clearance, because the normal turns from place to place. The part that turns it aside is bounded: in
+    notches narrower than a journal can enter it would be many times the normal, and there is no potential.
 
     Returns
     -------

@@ -13,6 +13,7 @@ import numpy as np
 from leg_wear_monitor.errors import LegWearError
 from leg_wear_monitor.mechanism.arrays import Floats
 from leg_wear_monitor.monitor.angle_regression import Estimate, binned, blind_directions, regress
+from leg_wear_monitor.monitor.seen import LEAST_M, SURE_SIGMAS
 from leg_wear_monitor.twin.joint_angles import AngleModel
 from leg_wear_monitor.twin.reference import Reference
 
@@ -153,7 +154,7 @@ class HiddenClearance:
 
 
 def worn_joint(
-    expected: Estimate, found: Estimate, sigmas: float = 4.0, least_m: float = 5.0e-5
+    expected: Estimate, found: Estimate, sigmas: float = SURE_SIGMAS, least_m: float = LEAST_M
 ) -> int | None:
     """The loose joint whose clearance is most surely another than expected, None if none surely is.
 

@@ -4,16 +4,19 @@ import os
 import signal
 import threading
 from collections.abc import Callable, Iterator, Sequence
-from concurrent.futures import ProcessPoolExecutor, as_completed
+from concurrent.futures import as_completed
 from concurrent.futures.process import BrokenProcessPool
 from contextlib import contextmanager
-from multiprocessing import active_children, get_context, parent_process
-from typing import Any, NamedTuple
+from multiprocessing import get_context, parent_process
+from typing import TYPE_CHECKING, Any, NamedTuple
 
-from leg_wear_monitor.errors import LegWearError
+from leg_wear_monitor.errors import ConfigError, LegWearError
 from leg_wear_monitor.mechanism.spec import Mechanism
 from leg_wear_monitor.studies.point import Arrays
 from leg_wear_monitor.studies.tasks import compute
+
+if TYPE_CHECKING:
+    from loky import ProcessPoolExecutor
 
 TRIES = 3  # of a point whose worker dies
 
@@ -52,6 +55,8 @@ def run_in_processes(jobs: Sequence[Job], workers: int, done: Done) -> None:
 
     Raises
     ------
+    ConfigError
+        If loky is not installed.
     LegWearError
         When workers keep dying.
     """
@@ -77,19 +82,24 @@ def _compute(job: Job) -> Arrays:
 
 
 @contextmanager
-def _pool(workers: int) -> Iterator[ProcessPoolExecutor]:
-    """A pool of workers with one thread each, which does not outlive what it is used for."""
-    others = set(active_children())
+def _pool(workers: int) -> Iterator["ProcessPoolExecutor"]:
+    """A pool of workers with one thread each, which does not outlive what it is used for.
+
+    It is loky's: in that of Python 3.11 a worker that dies while points are still being handed in ends
+    the thread that watches the workers, or raises OSError (both seen).
+    """
+    try:
+        from loky import ProcessPoolExecutor
+    except ImportError as error:
+        raise ConfigError("--workers", str(workers), "needs loky (pip install loky), expected 1") from error
     with _environment(dict.fromkeys(_THREADS, "1")):
-        pool = ProcessPoolExecutor(workers, mp_context=get_context("spawn"), initializer=_begin_worker)
+        pool = ProcessPoolExecutor(workers, context=get_context("spawn"), initializer=_begin_worker)
         try:
             yield pool
         except BaseException:
-            for child in set(active_children()) - others:
-                child.terminate()
+            pool.shutdown(kill_workers=True)
             raise
-        finally:
-            pool.shutdown(cancel_futures=True)
+        pool.shutdown()
 
 
 @contextmanager

@@ -6,8 +6,10 @@ import signal
 import subprocess
 import sys
 import time
+from concurrent.futures.process import BrokenProcessPool
 
 import attrs
+import loky
 import numpy as np
 import pytest
 
@@ -135,9 +137,8 @@ def test_a_point_that_is_asked_for_twice_is_computed_once(tiny, tmp_path):
 def test_a_worker_that_dies_costs_only_time(sweep, uninterrupted, tmp_path, monkeypatch):
     """The pool is broken once, as by a lack of memory; what was done by then stays done."""
     began = []
-    whole = processes.run_in_processes
 
-    class Breaking(processes.ProcessPoolExecutor):
+    class Breaking(loky.ProcessPoolExecutor):
         def submit(self, *arguments):
             future = super().submit(*arguments)
             if not began:
@@ -147,10 +148,16 @@ def test_a_worker_that_dies_costs_only_time(sweep, uninterrupted, tmp_path, monk
                 os.kill(next(iter(self._processes)), signal.SIGKILL)
             return future
 
-    monkeypatch.setattr(processes, "ProcessPoolExecutor", Breaking)
-    assert whole is processes.run_in_processes
+    monkeypatch.setattr(loky, "ProcessPoolExecutor", Breaking)
     assert run_study("size", sweep, tmp_path, workers=2) == 4
     assert files(tmp_path) == files(uninterrupted)
+
+
+@pytest.mark.plain
+def test_where_there_is_no_pool_a_study_says_what_to_install(monkeypatch):
+    monkeypatch.setitem(sys.modules, "loky", None)
+    with pytest.raises(ConfigError, match=r"--workers: 2: needs loky \(pip install loky\), expected 1"):
+        processes.run_in_processes([], 2, lambda *_: None)
 
 
 @pytest.mark.plain
@@ -160,12 +167,12 @@ def test_workers_that_keep_dying_end_the_study(monkeypatch):
             pass
 
         def submit(self, *_):
-            raise processes.BrokenProcessPool
+            raise BrokenProcessPool
 
         def shutdown(self, **_):
             pass
 
-    monkeypatch.setattr(processes, "ProcessPoolExecutor", Broken)
+    monkeypatch.setattr(loky, "ProcessPoolExecutor", Broken)
     job = processes.Job("k", "response", None, {}, "", 1.0)
     with pytest.raises(LegWearError, match="worker processes died 3 times; finished points are kept"):
         processes.run_in_processes([job], 2, lambda *_: None)

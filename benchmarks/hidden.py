@@ -19,9 +19,12 @@ from leg_wear_monitor.dynamics.simulation import prepare
 from leg_wear_monitor.dynamics.tally import new_tally
 from leg_wear_monitor.mechanism.arrays import body_names
 from leg_wear_monitor.mechanism.spec import Mechanism
-from leg_wear_monitor.monitor.angle_regression import known_before, observability, with_clearances
-from leg_wear_monitor.monitor.hidden import HiddenClearance, worn_joint
-from leg_wear_monitor.twin.joint_angles import angle_model, contact_shape, design
+from leg_wear_monitor.monitor.angle_regression import rms
+from leg_wear_monitor.monitor.commissioning import commissioned, errors_of, known_with
+from leg_wear_monitor.monitor.hidden import HiddenClearance
+from leg_wear_monitor.monitor.input_config import Encoders
+from leg_wear_monitor.monitor.seen import Sight, seen_clearances
+from leg_wear_monitor.twin.joint_angles import angle_model
 from leg_wear_monitor.twin.reference import ReferenceRun
 from leg_wear_monitor.wear.surfaces import SECTORS
 
@@ -31,6 +34,8 @@ ALL_WORN = FRESH + 1e-6 * np.array([150.0, 50.0, 45.0, 15.0, 10.0])  # as in a l
 OFFSET, SCALE = np.array([0.01, -0.02, 0.015]), np.array([2e-3, -1e-3, 3e-3])
 COMMISSIONING, WINDOW = 100, 60
 COUNTS = (20, 40, 80, 160, 320)
+UNKNOWN = errors_of(Encoders(names=tuple(SENSORS.values()), joints=tuple(SENSORS)), None)
+UNKNOWN_M = 1.0e-3  # standard deviation of a clearance of which nothing is told
 
 
 def walked(
@@ -103,18 +108,46 @@ def referred(leg, model, clearance, depth=None):
     return found, time.process_time() - began
 
 
-def show_observability(leg, model, reference):
+def commission(model, reference, walk, every, noise):
+    """The encoders' errors, from the first gait cycles of a new leg."""
+    new = HiddenClearance(model, reference, known_with(UNKNOWN, np.full(5, FRESH), 5e-6))
+    for cycle in read([part[:COMMISSIONING] for part in walk], every, noise, 0):
+        new.add(*cycle)
+    return commissioned(UNKNOWN, new.fused(), [True] * len(SENSORS))
+
+
+def known(reference, held):
+    """The encoders' errors as held, and nothing of clearances."""
+    return known_with(held, reference.clearance_m, UNKNOWN_M)
+
+
+def show_observability(leg, model, reference, walk):
+    """What the monitor says that some of the encoders show, and by how much."""
     print("rad of RMS deviation that a metre of clearance makes beyond what others can")
-    direct = design(model, contact_shape(leg, np.full(5, FRESH)))
-    names = list(SENSORS.values())
+    held, names = commission(model, reference, walk, 5, 1e-4), list(SENSORS.values())
     for chosen in ([0], [1], [2], [0, 1], [0, 2], [1, 2], [0, 1, 2]):
-        columns = reference.columns.copy()
-        for k in range(5):
-            if not direct[:, chosen, k].any():
-                columns[:, :, k] = 0.0
-        seen = observability(columns, chosen, 5)
-        cells = "  ".join(f"{j} {w.value} {x:.2f}" for j, (w, x) in zip(leg.loose, seen, strict=True))
+        absent = [i for i in range(len(names)) if i not in chosen]
+        hidden = HiddenClearance(model, reference, known(reference, held))
+        for crank, angles in read([part[-WINDOW:] for part in walk], 5, 1e-4, 5):
+            angles[:, absent] = np.nan
+            hidden.add(crank, angles)
+        seen = seen_clearances(hidden.fused(), reference.clearance_m)
+        shown = [k for k, one in enumerate(seen) if one.sight is Sight.SEEN]
+        beyond = dict(zip(shown, beyond_others(reference.columns, chosen, shown), strict=True))
+        cells = [f"{beyond[k]:.2f}" if k in beyond else one.sight.value for k, one in enumerate(seen)]
+        cells = "  ".join(f"{joint} {cell}" for joint, cell in zip(leg.loose, cells, strict=True))
         print(f"  {'+'.join(names[i] for i in chosen):>14}: {cells}")
+
+
+def beyond_others(columns, sensors, shown):
+    """RMS [rad/m] that each joint's clearance makes beyond what the others and encoders' errors can."""
+    m = columns.shape[1]
+    k = columns.shape[2] - 1 - 2 * m
+    used = [*shown, k, *(k + 1 + i for i in sensors), *(k + 1 + m + i for i in sensors)]
+    a = columns[:, sensors][:, :, used].reshape(-1, len(used))
+    for i in range(len(shown)):
+        others = np.delete(a, i, axis=1)
+        yield rms(a[:, i] - others @ np.linalg.lstsq(others, a[:, i], rcond=1.0e-9)[0])
 
 
 def show_convergence(leg, model, reference, held, walks, every, noise):
@@ -123,7 +156,7 @@ def show_convergence(leg, model, reference, held, walks, every, noise):
     for name, (clearance, *walk) in walks.items():
         if name == "all":
             continue
-        hidden = HiddenClearance(model, reference, held, most=COUNTS[-1])
+        hidden = HiddenClearance(model, reference, known(reference, held), most=COUNTS[-1])
         for count, cycle in enumerate(read([part[-COUNTS[-1] :] for part in walk], every, noise, 1), 1):
             hidden.add(*cycle)
             if count in COUNTS:
@@ -145,15 +178,16 @@ def show_finding(leg, model, reference, held, walks, every, noise):
     for name, (_, *walk) in walks.items():
         if name == "all":
             continue
-        hidden, first, named = HiddenClearance(model, reference, held, most=WINDOW), None, {}
+        hidden = HiddenClearance(model, reference, known(reference, held), most=WINDOW)
+        first, named = None, {}
         for cycle in read(new, every, noise, 2):
             hidden.add(*cycle)
         for count, cycle in enumerate(read([part[-200:] for part in walk], every, noise, 3), 1):
             hidden.add(*cycle)
-            k = worn_joint(known_before(np.full(5, FRESH), 1e-4, 3), hidden.fused())
-            if k is not None:
-                first = first or count
-                named[leg.loose[k]] = named.get(leg.loose[k], 0) + 1
+            for joint, one in zip(leg.loose, seen_clearances(hidden.fused(), np.full(5, FRESH)), strict=True):
+                if one.is_other:
+                    first = first or count
+                    named[joint] = named.get(joint, 0) + 1
         found = hidden.fused()
         cells = " ".join(f"{1e6 * c:.0f}" for c in found.clearance_m)
         print(
@@ -165,7 +199,7 @@ def show_all_worn(leg, model, reference, held, walk):
     """A leg with all joints worn: by the reference of the new leg, then by one of what was found."""
     clearance, *walk = walk
     for again in range(3):
-        hidden = HiddenClearance(model, reference, with_clearances(held, reference.clearance_m, 1e-3))
+        hidden = HiddenClearance(model, reference, known(reference, held))
         for cycle in read([part[:WINDOW] for part in walk], 5, 1e-4, 4):
             hidden.add(*cycle)
         found = hidden.fused()
@@ -182,7 +216,7 @@ def show_locally_worn(leg, model, reference, held):
     for share in (0.0, 1.0, 0.5, 0.25):
         if share:
             reference, _ = referred(leg, model, FRESH + share * opened, share * depth)
-        hidden = HiddenClearance(model, reference, with_clearances(held, reference.clearance_m, 1e-3))
+        hidden = HiddenClearance(model, reference, known(reference, held))
         for cycle in read(walk, 5, 1e-4, 4):
             hidden.add(*cycle)
         off = hidden.fused().clearance_m - FRESH - opened
@@ -195,17 +229,15 @@ def main() -> None:
     keep = parser.parse_args().keep
     leg = load_mechanism("bionic_leg")
     walks = walks_of(leg, keep)
-    model, fresh = angle_model(leg, tuple(SENSORS)), np.full(5, FRESH)
-    reference, took_s = referred(leg, model, fresh)
+    model = angle_model(leg, tuple(SENSORS))
+    reference, took_s = referred(leg, model, np.full(5, FRESH))
     print(f"reference: {took_s:.1f} s")
-    show_observability(leg, model, reference)
+    show_observability(leg, model, reference, walks["none"][1:])
     for noise in (1e-4, 1e-3):
         for every, rate in ((5, 200), (1, 1000)):
             print(f"\nnoise {noise:g} rad, {rate} Hz: RMS off (most) stated [um]")
-            new, began = HiddenClearance(model, reference, known_before(fresh, 5e-6, 3)), time.process_time()
-            for cycle in read([part[:COMMISSIONING] for part in walks["none"][1:]], every, noise, 0):
-                new.add(*cycle)
-            held = with_clearances(new.fused(), fresh, 1e-3)
+            began = time.process_time()
+            held = commission(model, reference, walks["none"][1:], every, noise)
             print(f"  a cycle takes {1e3 * (time.process_time() - began) / COMMISSIONING:.2f} ms")
             show_convergence(leg, model, reference, held, walks, every, noise)
             show_finding(leg, model, reference, held, walks, every, noise)

@@ -1,8 +1,5 @@
 """Regression of encoder angles on clearances and on the encoders' own errors, one gait cycle at a time."""
 
-from collections.abc import Sequence
-from enum import Enum
-
 import attrs
 import numpy as np
 
@@ -10,21 +7,10 @@ from leg_wear_monitor.mechanism.arrays import Floats
 from leg_wear_monitor.mechanism.ideal import TURN
 from leg_wear_monitor.twin.joint_angles import PHASES, AngleModel
 
-OFFSET_SIGMA_RAD = 0.05  # of an encoder that is not commissioned
-SCALE_SIGMA = 0.01
-
 _RIDGE = 1.0e-9
 _HUBER = 1.5  # standard deviations beyond which a bin loses weight
 _ROUNDS = 4
 _BLIND = 1.0e-3  # of the largest singular value: less is not shown
-
-
-class Observable(Enum):
-    """Whether sensors show a joint's clearance."""
-
-    YES = "observable"
-    TOGETHER = "observable only together with others"
-    NO = "not observable"
 
 
 @attrs.frozen(eq=False)
@@ -53,38 +39,6 @@ class Estimate:
     def sigma_m(self) -> Floats:
         """Their standard deviations (k,)."""
         return np.asarray(np.sqrt(np.diagonal(self.covariance)[: self.joints]))
-
-
-def known_before(clearance_m: Sequence[float], sigma_m: float | Floats, sensors: int) -> Estimate:
-    """What is known without a look at encoders: the clearances, and nothing of the encoders' errors.
-
-    Parameters
-    ----------
-    clearance_m : sequence of k float
-        When new, or as Archard's law predicts.
-    sigma_m : float or (k,) array
-    sensors : int
-        Encoders beside the crank's.
-    """
-    k = len(clearance_m)
-    sigma = np.concatenate(
-        [
-            np.broadcast_to(sigma_m, k),
-            np.full(1 + sensors, OFFSET_SIGMA_RAD),
-            np.full(sensors, SCALE_SIGMA),
-        ]
-    )
-    return Estimate(np.concatenate([clearance_m, np.zeros(1 + 2 * sensors)]), np.diag(np.square(sigma)), k)
-
-
-def with_clearances(before: Estimate, clearance_m: Sequence[float], sigma_m: float | Floats) -> Estimate:
-    """The encoders' errors as held, and clearances as predicted anew."""
-    k = before.joints
-    mean, covariance = before.mean.copy(), before.covariance.copy()
-    mean[:k] = clearance_m
-    covariance[:k], covariance[:, :k] = 0.0, 0.0
-    covariance[:k, :k] = np.diag(np.square(np.broadcast_to(sigma_m, k)))
-    return Estimate(mean, covariance, k)
 
 
 def binned(model: AngleModel, crank_angle: Floats, angles: Floats) -> tuple[Floats, Floats]:
@@ -140,41 +94,6 @@ def blind_directions(columns: Floats, counts: Floats) -> Floats:
     _, s, vt = np.linalg.svd(a / length, full_matrices=len(a) < a.shape[1])
     shown = np.pad(s, (0, len(vt) - len(s)))
     return np.asarray(vt[shown <= _BLIND * s[0]] / length)
-
-
-def observability(columns: Floats, sensors: Sequence[int], joints: int) -> list[tuple[Observable, float]]:
-    """Of each loose joint, whether some of the sensors show its clearance, and how much.
-
-    Parameters
-    ----------
-    columns : (P, m, k + 1 + 2 m) array
-        As `design` gives them.
-    sensors : sequence of int
-        Those of the m that are there.
-    joints : int
-        k.
-
-    Returns
-    -------
-    list of (Observable, float)
-        With the RMS deviation [rad/m] that its clearance makes beyond what other clearances and the
-        encoders' errors can make, too.
-    """
-    m, errors = columns.shape[1], joints + 1
-    own = [*range(errors), *(errors + i for i in sensors), *(errors + m + i for i in sensors)]
-    a = columns[:, list(sensors)][:, :, own].reshape(-1, len(own))
-    found = []
-    for k in range(joints):
-        alone = rms(_beyond(a[:, joints:], a[:, k]))
-        apart = rms(_beyond(np.delete(a, k, axis=1), a[:, k]))
-        seen = Observable.TOGETHER if apart < 0.02 * alone else Observable.YES
-        found.append((Observable.NO if alone < 1.0e-3 else seen, apart))
-    return found
-
-
-def _beyond(others: Floats, column: Floats) -> Floats:
-    """What of a column others cannot make."""
-    return np.asarray(column - others @ np.linalg.lstsq(others, column, rcond=1.0e-9)[0])
 
 
 def rms(values: Floats) -> float:

@@ -6,9 +6,12 @@ import attrs
 import numpy as np
 
 from leg_wear_monitor.mechanism.arrays import Floats
-from leg_wear_monitor.monitor.angle_regression import OFFSET_SIGMA_RAD, SCALE_SIGMA, Estimate
+from leg_wear_monitor.monitor.angle_regression import Estimate
 from leg_wear_monitor.monitor.input_config import Encoders
 from leg_wear_monitor.monitor.ledger_entry import Commissioned
+
+_OFFSET_SIGMA_RAD = 0.05  # of an encoder that is not commissioned
+_SCALE_SIGMA = 0.01
 
 
 @attrs.frozen(eq=False)
@@ -47,7 +50,7 @@ def errors_of(encoders: Encoders, held: Commissioned | None) -> EncoderErrors:
     names = names_of(encoders)
     m = len(names)
     centre, mean = np.full(m, np.nan), np.zeros(1 + 2 * m)
-    sigma = np.concatenate([np.full(1 + m, OFFSET_SIGMA_RAD), np.full(m, SCALE_SIGMA)])
+    sigma = np.concatenate([np.full(1 + m, _OFFSET_SIGMA_RAD), np.full(m, _SCALE_SIGMA)])
     covariance = np.diag(np.square(sigma))
     if held is None:
         return EncoderErrors(centre, mean, covariance, (False,) * m)

@@ -12,18 +12,13 @@ import numpy as np
 from leg_wear_monitor.mechanism.arrays import Floats
 from leg_wear_monitor.mechanism.spec import Mechanism
 from leg_wear_monitor.monitor.angle_regression import Estimate, binned
-from leg_wear_monitor.monitor.commissioning import (
-    commissioned,
-    errors_of,
-    held,
-    known_with,
-)
+from leg_wear_monitor.monitor.commissioning import commissioned, errors_of, held, known_with
 from leg_wear_monitor.monitor.config import MonitorConfig
 from leg_wear_monitor.monitor.encoder_samples import after, extended, no_encoder_samples, within
 from leg_wear_monitor.monitor.encoder_state import LEAST_PHASES, EncoderState, fault_of
 from leg_wear_monitor.monitor.hidden import HiddenClearance, HiddenSnapshot
 from leg_wear_monitor.monitor.ledger_entry import Commissioned
-from leg_wear_monitor.monitor.seen import SeenClearance, Sight
+from leg_wear_monitor.monitor.seen import SEEN_M, SeenClearance, Sight, seen_clearances
 from leg_wear_monitor.twin.figures import CycleFigures
 from leg_wear_monitor.twin.joint_angles import angle_model
 from leg_wear_monitor.twin.reference import ReferenceRun, ReferenceSnapshot
@@ -32,7 +27,6 @@ from leg_wear_monitor.twin.sample import Samples
 OTHERWISE_CYCLES = 20  # in a row with other encoders than before, until those are believed to be the ones
 
 _UNKNOWN_M = 1.0e-3  # standard deviation of a clearance of which nothing is to be supposed
-_SEEN_M = 1.0e-4  # that of one that is seen
 _FAR_M = 1.0e-4  # from the reference: then it is made again
 _LONGEST = 1.5  # of a cycle's time in motion: with more standing in it, it is none of a steady gait
 _AGAIN_CYCLES = 100  # between two references
@@ -136,10 +130,7 @@ class EncoderWatch:
         if found is None:
             sight = Sight.COMMISSIONING if self.commissions else Sight.WAITING
             return (SeenClearance(sight=sight),) * len(counted_m)
-        return tuple(
-            _seen(float(clearance), float(sigma), float(counted))
-            for clearance, sigma, counted in zip(found.clearance_m, found.sigma_m, counted_m, strict=True)
-        )
+        return seen_clearances(found, counted_m)
 
     def snapshot(self) -> EncoderSnapshot:
         """A copy of the whole state."""
@@ -232,14 +223,14 @@ class EncoderWatch:
         if found is None or reference is None or self.state.since_reference < _AGAIN_CYCLES:
             return False
         off = np.abs(found.clearance_m - reference.clearance_m)
-        return bool((off[found.sigma_m <= _SEEN_M] > _FAR_M).any())
+        return bool((off[found.sigma_m <= SEEN_M] > _FAR_M).any())
 
     def _best(self, counted_m: Floats) -> Floats:
         """Clearances as seen, where they are; else as counted."""
         found = self.state.found
         if found is None:
             return counted_m
-        return np.where(found.sigma_m <= _SEEN_M, found.clearance_m, counted_m)
+        return np.where(found.sigma_m <= SEEN_M, found.clearance_m, counted_m)
 
     def _look_anew(self) -> None:
         """Look at the kept cycles with what is known of the encoders now."""
@@ -254,11 +245,3 @@ class EncoderWatch:
             return known_with(self.state.errors, clearance_m, _UNKNOWN_M)
         worn = forecast.wear_coefficient_sigma * (clearance_m - self._fresh)
         return known_with(self.state.errors, clearance_m, np.hypot(forecast.clearance_sigma_m, worn))
-
-
-def _seen(clearance_m: float, sigma_m: float, counted_m: float) -> SeenClearance:
-    if sigma_m > _SEEN_M:
-        return SeenClearance(sight=Sight.NOT_OBSERVABLE)
-    return SeenClearance(
-        sight=Sight.SEEN, clearance_m=clearance_m, sigma_m=sigma_m, departure_m=clearance_m - counted_m
-    )

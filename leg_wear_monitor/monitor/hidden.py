@@ -13,7 +13,6 @@ import numpy as np
 from leg_wear_monitor.errors import LegWearError
 from leg_wear_monitor.mechanism.arrays import Floats
 from leg_wear_monitor.monitor.angle_regression import Estimate, binned, blind_directions, regress
-from leg_wear_monitor.monitor.seen import LEAST_M, SURE_SIGMAS
 from leg_wear_monitor.twin.joint_angles import AngleModel
 from leg_wear_monitor.twin.reference import Reference
 
@@ -151,23 +150,3 @@ class HiddenClearance:
         """Go back to a snapshot."""
         self._reference, self._before = snapshot.reference, snapshot.before
         self._seen, self._each = list(snapshot.seen), list(snapshot.each)
-
-
-def worn_joint(
-    expected: Estimate, found: Estimate, sigmas: float = SURE_SIGMAS, least_m: float = LEAST_M
-) -> int | None:
-    """The loose joint whose clearance is most surely another than expected, None if none surely is.
-
-    Parameters
-    ----------
-    expected : Estimate
-        By Archard's law.
-    found : Estimate
-        By the encoders.
-    sigmas, least_m : float
-        Least departure, in standard deviations and in metres.
-    """
-    off = np.abs(found.clearance_m - expected.clearance_m)
-    surely = np.where(off >= least_m, off / found.sigma_m, 0.0)
-    k = int(surely.argmax())
-    return k if surely[k] >= sigmas else None

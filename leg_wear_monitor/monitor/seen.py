@@ -5,6 +5,10 @@ from enum import Enum
 
 import attrs
 
+from leg_wear_monitor.mechanism.arrays import Floats
+from leg_wear_monitor.monitor.angle_regression import Estimate
+
+SEEN_M = 1.0e-4  # standard deviation of a clearance that is seen, at most
 SURE_SIGMAS = 4.0
 LEAST_M = 5.0e-5  # a departure that is worth telling
 
@@ -48,3 +52,19 @@ class SeenClearance:
     def surely_m(self) -> float:
         """Size of a sure departure, 0 if there is none; NaN unless it is seen."""
         return abs(self.departure_m) if self.is_other else 0.0 * self.departure_m
+
+
+def seen_clearances(found: Estimate, counted_m: Floats) -> tuple[SeenClearance, ...]:
+    """What an estimate says of each joint, beside the clearances (k,) that are counted [m]."""
+    return tuple(
+        _seen(float(clearance), float(sigma), float(counted))
+        for clearance, sigma, counted in zip(found.clearance_m, found.sigma_m, counted_m, strict=True)
+    )
+
+
+def _seen(clearance_m: float, sigma_m: float, counted_m: float) -> SeenClearance:
+    if sigma_m > SEEN_M:
+        return SeenClearance(sight=Sight.NOT_OBSERVABLE)
+    return SeenClearance(
+        sight=Sight.SEEN, clearance_m=clearance_m, sigma_m=sigma_m, departure_m=clearance_m - counted_m
+    )

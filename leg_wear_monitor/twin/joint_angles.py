@@ -13,11 +13,6 @@ import numpy as np
 
 from leg_wear_monitor.contact.arrays import clearance_settings, compile_contacts
 from leg_wear_monitor.dynamics.clearance_basis import Basis
-from leg_wear_monitor.dynamics.clearance_run import ClearanceStepper
-from leg_wear_monitor.dynamics.drive import steady_drive
-from leg_wear_monitor.dynamics.run import DONE, stop
-from leg_wear_monitor.dynamics.simulation import prepare
-from leg_wear_monitor.dynamics.tally import new_tally
 from leg_wear_monitor.errors import ConfigError
 from leg_wear_monitor.mechanism.arrays import Floats, body_names
 from leg_wear_monitor.mechanism.ideal import TURN, one_cycle
@@ -25,8 +20,6 @@ from leg_wear_monitor.mechanism.position import build_linkage
 from leg_wear_monitor.mechanism.spec import Mechanism, RevoluteJoint
 
 PHASES = 128  # of a turn: bins of samples, and points of all tables here
-
-SHAPE_CYCLES = 48  # simulated for a shape: its scatter is that of as many cycles seen
 
 _ROUNDING = 1.0e-9  # rad/m
 _FINE = 64  # points of the ideal angles between two phases
@@ -103,30 +96,6 @@ def _finer(table: Floats, points: int) -> Floats:
     """A smooth periodic table (p, m) at more points, by its Fourier series."""
     series = np.fft.rfft(table, axis=0)
     return np.asarray(np.fft.irfft(series, points, axis=0) * (points / len(table)))
-
-
-def contact_shape(mechanism: Mechanism, clearance_m: Floats, cycles: int = SHAPE_CYCLES) -> Floats:
-    """Mean eccentricities over clearances, u (P, k, 2), of a leg with clearances (k,) [m], by simulation.
-
-    Raises
-    ------
-    SimulationError
-    """
-    setup = prepare(mechanism)
-    setup.contacts.clearance[:] = clearance_m
-    stepper, tally = ClearanceStepper(setup), new_tally(len(mechanism.joints))
-    angle = 0.5 * TURN / PHASES
-    stepper.init(angle, setup.speed)
-    polynomial, period = steady_drive(angle, setup.speed), TURN / abs(setup.speed)
-    total = np.zeros((PHASES, 2 * len(setup.loose)))
-    for step in range(PHASES, (cycles + 1) * PHASES):  # the first cycle settles
-        status, k = stepper.advance(polynomial, step * period / PHASES, tally)
-        if status != DONE:
-            raise stop(setup, status, k, stepper.time)
-        total[step % PHASES] += stepper.state.e
-    if setup.speed < 0.0:  # phases count with the crank angle
-        total = np.roll(total[::-1], 1, axis=0)
-    return np.asarray((total / cycles).reshape(PHASES, -1, 2) / clearance_m[:, None])
 
 
 def design(model: AngleModel, shape: Floats) -> Floats:

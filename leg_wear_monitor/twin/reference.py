@@ -19,8 +19,9 @@ from leg_wear_monitor.dynamics.tally import new_tally
 from leg_wear_monitor.mechanism.arrays import Floats
 from leg_wear_monitor.mechanism.ideal import TURN
 from leg_wear_monitor.mechanism.spec import Mechanism
-from leg_wear_monitor.twin.joint_angles import PHASES, SHAPE_CYCLES, AngleModel, design
+from leg_wear_monitor.twin.joint_angles import PHASES, AngleModel, design
 
+CYCLES = 48  # simulated for each leg: its scatter is that of as many cycles seen
 OPENED_M = 1.5e-4  # by which each clearance is wider in turn
 
 _LEAST_CLEARANCE_M = 5.0e-5
@@ -48,12 +49,6 @@ class Reference:
     cycles: int
 
 
-def linear_reference(model: AngleModel, shape: Floats, clearance_m: Floats, cycles: int) -> Reference:
-    """Reference of eccentricities in proportion to clearances, by a shape (P, k, 2) of `contact_shape`."""
-    columns = design(model, shape)
-    return Reference(clearance_m, columns[:, :, : len(clearance_m)] @ clearance_m, columns, cycles)
-
-
 class ReferenceSnapshot(NamedTuple):
     """All of a `ReferenceRun`; plain arrays and numbers."""
 
@@ -77,7 +72,7 @@ class ReferenceRun:
         That each of the legs is simulated for, after a first one that settles.
     """
 
-    def __init__(self, mechanism: Mechanism, model: AngleModel, cycles: int = SHAPE_CYCLES) -> None:
+    def __init__(self, mechanism: Mechanism, model: AngleModel, cycles: int = CYCLES) -> None:
         self._setup, self._model, self._cycles = prepare(mechanism, wear=True), model, cycles
         self._setup.contacts.wear_coefficient[:] = 0.0
         self._fresh = self._setup.contacts.clearance.copy()

@@ -87,9 +87,22 @@ class HiddenClearance:
     def _regressed(self, deviation: Floats, counts: Floats) -> Floats:
         reference, before = self._given()
         joints = before.joints
+        columns = self._columns(counts)
         # the regression has what is expected at its own linear point: at the reference's clearances
-        shift = reference.deviation - reference.columns[:, :, :joints] @ reference.clearance_m
-        return regress(reference.columns, deviation - shift, counts, before)
+        shift = reference.deviation - columns[:, :, :joints] @ reference.clearance_m
+        return regress(columns, deviation - shift, counts, before)
+
+    def _columns(self, counts: Floats) -> Floats:
+        """Columns of the regression for the encoders that are there, by their samples' counts (P, m).
+
+        What a joint does by way of others alone is not proportional to its clearance: it would be mistaken.
+        """
+        reference, before = self._given()
+        there = counts.any(axis=0)
+        shown = self._model.by_e[:, there].any(axis=(0, 1, 3))
+        columns = reference.columns.copy()
+        columns[:, :, : before.joints][:, :, ~shown] = 0.0
+        return columns
 
     def _given(self) -> tuple[Reference, Estimate]:
         if self._reference is None or self._before is None:
@@ -128,8 +141,9 @@ class HiddenClearance:
         seen = self.alone()
         if seen is None:
             return None
-        reference, before = self._given()
-        blind = blind_directions(reference.columns, np.sum([counts for _, counts in self._seen], axis=0))
+        _, before = self._given()
+        counts = np.sum([counts for _, counts in self._seen], axis=0)
+        blind = blind_directions(self._columns(counts), counts)
         # along what the sensors do not show, each cycle repeats what was known before: that is no news
         scale = np.sqrt(np.diagonal(before.covariance))
         across = blind / scale

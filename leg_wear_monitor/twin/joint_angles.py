@@ -21,7 +21,7 @@ from leg_wear_monitor.mechanism.spec import Mechanism, RevoluteJoint
 
 PHASES = 128  # of a turn: bins of samples, and points of all tables here
 
-_ROUNDING = 1.0e-9  # rad/m
+_ROUNDING = 1.0e-9  # rad/m: a joint that an encoder cannot see
 _FINE = 64  # points of the ideal angles between two phases
 
 
@@ -38,7 +38,7 @@ class AngleModel:
     by_crank : (P, m) array
         Its derivative by the crank angle, at the middle of each bin.
     by_e : (P, m, k, 2) array, rad/m
-        S_phi there.
+        S_phi there; exactly 0 where an eccentricity does not turn an encoder's joint.
     """
 
     sensors: tuple[str, ...]
@@ -80,6 +80,7 @@ def angle_model(mechanism: Mechanism, sensors: Sequence[str]) -> AngleModel:
     s = Basis(linkage, contacts, motion).s
     rotation = np.concatenate([np.zeros((len(s), 1, s.shape[2])), s[:, 2::3]], axis=1)
     by_e = _differences(mechanism, sensors, rotation).reshape(2 * PHASES, len(sensors), -1, 2)
+    by_e[np.abs(by_e) < _ROUNDING] = 0.0
     return AngleModel(
         tuple(sensors), mechanism.loose, _finer(turns, PHASES * _FINE), by_crank[1::2], by_e[1::2]
     )
@@ -105,7 +106,6 @@ def design(model: AngleModel, shape: Floats) -> Floats:
     """
     sensors = len(model.sensors)
     by_clearance = np.einsum("pmkd,pkd->pmk", model.by_e, shape)
-    by_clearance[np.abs(by_clearance) < _ROUNDING] = 0.0  # a joint that a sensor cannot see at all
     angle = model.angle[_FINE // 2 :: _FINE]
     own = np.zeros((PHASES, sensors, 2 * sensors))
     for i in range(sensors):

@@ -159,8 +159,7 @@ class ReferenceRun:
         seen = [np.einsum("pmkd,pkd->pm", by_e, mean) for mean in self._means]
         columns = design(self._model, self._means[0] / self._target[:, None])
         for k in range(joints):
-            if columns[:, :, k].any():  # what a joint does by way of others alone is too little to find it by
-                columns[:, :, k] = (seen[k + 1] - seen[0]) / OPENED_M
+            columns[:, :, k] = (seen[k + 1] - seen[0]) / OPENED_M
         return Reference(self._target, seen[0], columns, self._cycles)
 
 

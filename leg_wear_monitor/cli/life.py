@@ -127,7 +127,7 @@ def _lives(leg: "Mechanism", lives: int, opens_m: float | None, **options: Any) 
     given = {name: value for name in ("legs", "cycles") if (value := options.pop(name)) is not None}
     settings = LifeSettings(**given)
     if opens_m is not None:
-        settings = attrs.evolve(settings, jump=JumpControl(opens_m=opens_m, tolerance_m=0.1 * opens_m))
+        settings = attrs.evolve(settings, jump=JumpControl.of(opens_m))
     with compilation("clearance"), progress_bar("life") as progress:
         return list(simulate_lives(leg, settings, lives, progress=progress, **options))
 

@@ -11,6 +11,7 @@ faster: wear enters by coefficient times cycles only. See `monitor.forecast` for
 """
 
 from collections.abc import Callable, Sequence
+from typing import NamedTuple
 
 import attrs
 import numpy as np
@@ -38,7 +39,6 @@ from leg_wear_monitor.wear.cycle_jump import (
     wear_rate,
 )
 
-_PERTURB = 0.5  # of the smallest clearance: how far from the centre journals may start
 _TRIALS = 4  # of a jump whose error is too large, before it is taken all the same, and says so
 
 
@@ -51,8 +51,24 @@ class LifeSettings:
     settle_cycles: int = quantity(
         "", "gait cycles before those, since the surfaces have changed", at_least=0, default=1
     )
+    perturb_share: float = quantity(
+        "",
+        "journals start up to this share of the smallest clearance from the centre",
+        at_least=0.0,
+        at_most=1.0,
+        default=0.5,
+    )
     jump: JumpControl = described("how far a jump may go", factory=JumpControl)
     seed: int = quantity("", "of where legs start", at_least=0, default=0)
+
+
+class _Probe(NamedTuple):
+    """Mean of the cycles simulated at one state of wear: what `LifePoint` has of them."""
+
+    rate: WearRate
+    archard_j: Floats
+    peak_force_n: Floats
+    toe_position_m: float
 
 
 class LifeRun:
@@ -64,7 +80,8 @@ class LifeRun:
     settings : LifeSettings, optional
     clearances : sequence of str, optional
         Names of the loose joints; the mechanism's own if not given.
-    speed_rpm : float, optional
+    clearance_m, speed_rpm : float, optional
+        The mechanism's own if not given.
     wear_factor : float or (k,) array
         On the wear coefficients of the loose joints.
     depth : (k, 2, N) array, optional
@@ -91,6 +108,7 @@ class LifeRun:
         settings: LifeSettings | None = None,
         *,
         clearances: Sequence[str] | None = None,
+        clearance_m: float | None = None,
         speed_rpm: float | None = None,
         wear_factor: ArrayLike = 1.0,
         depth: Floats | None = None,
@@ -98,7 +116,15 @@ class LifeRun:
     ) -> None:
         self._settings = settings or LifeSettings()
         self._workers = workers
-        self._setups = _setups(mechanism, self._settings, clearances, speed_rpm, wear_factor)
+        alike = Leg(
+            mechanism=mechanism,
+            clearances=clearances,
+            clearance_m=clearance_m,
+            speed_rpm=speed_rpm,
+            wear=True,
+        )
+        legs = _spread_out(alike, self._settings)
+        self._setups = _setups(legs, wear_factor)
         first = self._setups[0]
         if not first.loose:
             raise ConfigError(mechanism.source, "clearances.joints", "no joint is loose, nothing can wear")
@@ -106,15 +132,15 @@ class LifeRun:
         tables = build_tables(first.linkage, first.contacts)
         self._steppers = [ClearanceStepper(setup, tables=tables) for setup in self._setups]
         self._polynomials = []
-        for i, stepper in enumerate(self._steppers):
-            leg = _leg(mechanism, self._settings, clearances, speed_rpm, i, float(self.fresh_m.min()))
-            leg.start(stepper)
+        perturb_m = self._settings.perturb_share * float(self.fresh_m.min())
+        for leg, stepper in zip(legs, self._steppers, strict=True):
+            attrs.evolve(leg, perturb_m=perturb_m).start(stepper)
             self._polynomials.append(steady_drive(leg.crank_angle_rad, first.speed))
         start = np.zeros_like(first.surfaces.depth) if depth is None else depth.copy()
-        self._rate, archard, peak = self._probe(start)
-        self._archard = archard
-        self._wish = longest_jump(self._rate, self._settings.jump)
-        self.points = [LifePoint(0.0, start, self._rate, peak, np.zeros_like(archard), 0.0)]
+        now = self._now = self._probe(start)
+        self._wish = longest_jump(now.rate, self._settings.jump)
+        none = np.zeros_like(now.archard_j)
+        self.points = [LifePoint(0.0, start, now.rate, now.peak_force_n, now.toe_position_m, none, 0.0)]
 
     def jump(self, most_cycles: float = np.inf) -> LifePoint:
         """Go on by one jump, of at most so many gait cycles.
@@ -124,26 +150,27 @@ class LifeRun:
         SimulationError
             Where the motion diverges.
         """
-        control, last = self._settings.jump, self.points[-1]
-        cycles = min(self._wish, longest_jump(self._rate, control), most_cycles)
+        control, last, now = self._settings.jump, self.points[-1], self._now
+        cycles = min(self._wish, longest_jump(now.rate, control), most_cycles)
         for trial in range(_TRIALS):
-            rate, archard, peak = self._probe(last.depth + cycles * self._rate.depth)
-            error = float(jump_error(self._rate, rate, cycles).max())
+            then = self._probe(last.depth + cycles * now.rate.depth)
+            error = float(jump_error(now.rate, then.rate, cycles).max())
             wish = next_jump(cycles, error, control)
             if error <= control.tolerance_m or trial == _TRIALS - 1:
                 break
             cycles = wish
-        depth = last.depth + 0.5 * cycles * (self._rate.depth + rate.depth)
-        worked = last.archard_j + 0.5 * cycles * (self._archard + archard)
-        self._rate, self._archard, self._wish = rate, archard, wish
-        self.points.append(LifePoint(last.cycles + cycles, depth, rate, peak, worked, error))
+        depth = last.depth + 0.5 * cycles * (now.rate.depth + then.rate.depth)
+        worked = last.archard_j + 0.5 * cycles * (now.archard_j + then.archard_j)
+        self._now, self._wish = then, wish
+        at, peak, toe = last.cycles + cycles, then.peak_force_n, then.toe_position_m
+        self.points.append(LifePoint(at, depth, then.rate, peak, toe, worked, error))
         return self.points[-1]
 
     def hold(self, k: int) -> None:
         """Let joint k wear no further, as if its part were replaced before its clearance opens more."""
-        depth = self._rate.depth.copy()
+        depth = self._now.rate.depth.copy()
         depth[k] = 0.0
-        self._rate = attrs.evolve(self._rate, depth=depth)
+        self._now = self._now._replace(rate=attrs.evolve(self._now.rate, depth=depth))
         for setup in self._setups:
             setup.contacts.wear_coefficient[k] = 0.0
 
@@ -152,12 +179,12 @@ class LifeRun:
         """The life so far."""
         return life_of(self.loose, self.fresh_m, self.points)
 
-    def _probe(self, depth: Floats) -> tuple[WearRate, Floats, Floats]:
-        """Mean wear, Archard integral (k,) [J] and peak force (k,) [N] of a cycle; surfaces (k, 2, N) [m]."""
+    def _probe(self, depth: Floats) -> _Probe:
+        """Simulate a few cycles with surfaces (k, 2, N) [m]."""
         for setup in self._setups:
             setup.surfaces.depth[:] = depth
         self._advance(self._settings.settle_cycles)
-        worn, archard, peak = [], [], []
+        worn, archard, peak, toe = [], [], [], []
         for _ in range(self._settings.cycles):
             before = [setup.surfaces.depth.copy() for setup in self._setups]
             tallies = self._advance(1)
@@ -165,8 +192,9 @@ class LifeRun:
             worn += [setup.surfaces.depth - was for setup, was in zip(self._setups, before, strict=True)]
             archard += [tally.integral[joints, ARCHARD] for tally in tallies]
             peak += [tally.peak[joints] for tally in tallies]
+            toe += [tally.response[0] for tally in tallies]
         rate = wear_rate(np.array(worn), self._settings.jump.smooth_deg)
-        return rate, np.mean(archard, axis=0), np.mean(peak, axis=0)
+        return _Probe(rate, np.mean(archard, axis=0), np.mean(peak, axis=0), float(np.mean(toe)))
 
     def _advance(self, cycles: int) -> list[Tally]:
         joints = len(self._setups[0].linkage.mechanism.joints)
@@ -220,36 +248,17 @@ def simulate_life(
     return run.life
 
 
-def _leg(
-    mechanism: Mechanism,
-    settings: LifeSettings,
-    clearances: Sequence[str] | None,
-    speed_rpm: float | None,
-    member: int,
-    smallest_m: float = 0.0,
-) -> Leg:
-    return Leg(
-        mechanism=mechanism,
-        clearances=clearances,
-        speed_rpm=speed_rpm,
-        wear=True,
-        crank_angle_rad=TURN * (member + 0.5) / settings.legs,
-        perturb_m=_PERTURB * smallest_m,
-        seed=settings.seed + member,
-    )
+def _spread_out(leg: Leg, settings: LifeSettings) -> list[Leg]:
+    """Legs alike, but for where they start."""
+    return [
+        attrs.evolve(leg, crank_angle_rad=TURN * (i + 0.5) / settings.legs, seed=settings.seed + i)
+        for i in range(settings.legs)
+    ]
 
 
-def _setups(
-    mechanism: Mechanism,
-    settings: LifeSettings,
-    clearances: Sequence[str] | None,
-    speed_rpm: float | None,
-    wear_factor: ArrayLike,
-) -> list[Setup]:
+def _setups(legs: Sequence[Leg], wear_factor: ArrayLike) -> list[Setup]:
     setups = []
-    for setup in prepare_legs(
-        [_leg(mechanism, settings, clearances, speed_rpm, i) for i in range(settings.legs)]
-    ):
+    for setup in prepare_legs(legs):
         if not isinstance(setup, Setup):
             raise setup
         factor = np.broadcast_to(np.asarray(wear_factor, dtype=float), len(setup.loose))

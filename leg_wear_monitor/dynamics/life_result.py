@@ -24,6 +24,8 @@ class LifePoint:
         Mean wear of a cycle about then.
     peak_force_n : (k,) array
         Largest contact force of a cycle, mean of those simulated.
+    toe_position_m : float
+        Largest departure of the toe from the ideal linkage's in a cycle, likewise; 0 without a toe.
     archard_j : (k,) array
         Integral of F_N |v_t| dt since the life began.
     error_m : float
@@ -34,6 +36,7 @@ class LifePoint:
     depth: Floats
     rate: WearRate
     peak_force_n: Floats
+    toe_position_m: float
     archard_j: Floats
     error_m: float
 

@@ -32,7 +32,7 @@ def start_angles(runs: int, seed: int) -> list[float]:
     return [float(step) * (TURN / SAMPLES) for step in steps]
 
 
-def ensemble(mechanism: Mechanism, settings: dict[str, Any], wear: bool = False) -> list[Leg]:
+def ensemble(mechanism: Mechanism, settings: dict[str, Any]) -> list[Leg]:
     """Legs that differ in where they start.
 
     Parameters
@@ -41,8 +41,6 @@ def ensemble(mechanism: Mechanism, settings: dict[str, Any], wear: bool = False)
     settings : dict
         ``loose``, ``clearance_m``, ``speed_rpm``, ``runs``, ``seed``, ``perturb_share``; may have
         ``normal_law`` and ``friction``.
-    wear : bool
-        Whether wear feeds back.
     """
     if settings.get("friction"):
         mechanism = with_friction(mechanism, settings["friction"])
@@ -55,7 +53,6 @@ def ensemble(mechanism: Mechanism, settings: dict[str, Any], wear: bool = False)
             clearance_m=clearance_m,
             speed_rpm=settings["speed_rpm"],
             normal_law=settings.get("normal_law"),
-            wear=wear,
             crank_angle_rad=angle,
             perturb_m=settings["perturb_share"] * smallest,
             seed=settings["seed"] + member,

@@ -1,26 +1,17 @@
-"""Wear that feeds back over a life: some cycles are simulated, their mean wear is repeated, and so on.
-
-An extrapolation as that of Mukras and others (Wear 268, 2010): a jump ends where the joint that wears fastest
-has opened by a given step.
-"""
+"""Wear that feeds back over a life: lives by cycle jumps, each read off where a joint has opened so far."""
 
 from typing import Any
 
 import numpy as np
 
-from leg_wear_monitor.dynamics.batch_leg import Leg
-from leg_wear_monitor.dynamics.tally import new_tally
+from leg_wear_monitor.dynamics.life import LifeRun, LifeSettings, simulate_life
+from leg_wear_monitor.errors import SimulationError
 from leg_wear_monitor.mechanism.arrays import Floats
 from leg_wear_monitor.mechanism.spec import Mechanism
-from leg_wear_monitor.studies.ensemble import ensemble, watch
-from leg_wear_monitor.studies.grid import SAMPLES
 from leg_wear_monitor.studies.point import Arrays
-from leg_wear_monitor.studies.watch import WatchedLeg
-from leg_wear_monitor.wear.cycle_jump import JumpControl, smoothed
+from leg_wear_monitor.wear.cycle_jump import JumpControl
 
-SETTLE_CYCLES = 1  # before those whose wear is repeated: the surfaces have just changed
-
-_SMOOTH_DEG = JumpControl().smooth_deg  # a few cycles touch here and there, repeated they would cut notches
+STATES = 41  # of a life, from new to its end, by equal openings; an odd number
 
 
 def live(mechanism: Mechanism, settings: dict[str, Any]) -> Arrays:
@@ -31,49 +22,56 @@ def live(mechanism: Mechanism, settings: dict[str, Any]) -> Arrays:
     dict of arrays
         Over runs r, states of wear w (the first without any), loose joints k and sectors N: ``cycles`` (r, w)
         since new; ``clearance_mean_m`` and ``clearance_max_m`` (r, w, k); ``depth_m`` (r, 2, k, 2, N) halfway
-        and at the end; ``rate_m_per_cycle`` (r, 2, k, 2, N) when new and at the end; ``peak_force_n``,
-        ``toe_position_m`` (r, w - 1, ...) the largest of the cycles simulated before each jump.
+        and at the end; ``rate_m_per_cycle`` (r, 2, k, 2, N) when new and at the end; ``peak_force_n``
+        (r, w, k) and ``toe_position_m`` (r, w) the largest of a cycle.
+
+    Raises
+    ------
+    SimulationError
+        Where the motion diverges, or nothing wears.
     """
-    legs: list[Leg] = ensemble(mechanism, settings, wear=True)
-    lives = [_life(leg, settings) for leg in watch(legs)]
+    lives = [_life(mechanism, settings, run) for run in range(settings["runs"])]
     result = {name: np.array([life[name] for life in lives]) for name in lives[0]}
     return result | {"loose": np.array(settings["loose"])}
 
 
-def _life(leg: WatchedLeg, settings: dict[str, Any]) -> dict[str, Floats]:
-    surfaces, clearance = leg.setup.surfaces, leg.setup.contacts.clearance
-    step, jumps = settings["opens_m"] / settings["jumps"], settings["jumps"]
-    cycles, opened = [0.0], [surfaces.depth.copy()]
-    rates: list[Floats] = []
-    peaks: list[Floats] = []
-    errors: list[float] = []
-    for _ in range(jumps):
-        rate, peak, error = _wear_a_cycle(leg, settings["cycles"])
-        fastest = rate.mean(axis=2).sum(axis=1).max()
-        surfaces.depth[:] = opened[-1] + rate * (step / fastest)
-        cycles.append(cycles[-1] + step / fastest)
-        opened.append(surfaces.depth.copy())
-        rates.append(rate)
-        peaks.append(peak)
-        errors.append(error)
-    depths = [opened[jumps // 2], opened[-1]]
-    profile = np.array(opened).sum(axis=2)  # of both surfaces, each in its own frame
+def _life(mechanism: Mechanism, settings: dict[str, Any], member: int) -> dict[str, Floats]:
+    run = LifeRun(
+        mechanism,
+        LifeSettings(
+            legs=1,
+            cycles=settings["cycles"],
+            perturb_share=settings["perturb_share"],
+            jump=JumpControl.of(settings["jump_m"]),
+            seed=settings["seed"] + member,
+        ),
+        clearances=settings["loose"],
+        clearance_m=settings["clearance_m"],
+        speed_rpm=settings["speed_rpm"],
+    )
+    life = simulate_life(run, limit_m=run.fresh_m + settings["opens_m"], horizon_cycles=np.inf)
+    opened = (life.clearance_m - run.fresh_m).max(axis=1)
+    if opened[-1] < settings["opens_m"]:
+        raise SimulationError(f"none of {', '.join(run.loose)} wears, look at their wear_coefficient")
+    cycles = np.interp(np.linspace(0.0, settings["opens_m"], STATES), opened, life.cycles)
+    depth = between(life.cycles, life.depth, cycles)
+    rate = between(life.cycles, np.array([point.rate.depth for point in run.points]), cycles[[0, -1]])
+    toe = np.array([point.toe_position_m for point in run.points])
+    profile = depth.sum(axis=2)  # of both surfaces, each in its own frame
     return {
-        "cycles": np.array(cycles),
-        "clearance_mean_m": clearance + profile.mean(axis=2),
-        "clearance_max_m": clearance + profile.max(axis=2),
-        "depth_m": np.array(depths, dtype=np.float32),
-        "rate_m_per_cycle": np.array([rates[0], rates[-1]], dtype=np.float32),
-        "peak_force_n": np.array(peaks),
-        "toe_position_m": np.array(errors),
+        "cycles": cycles,
+        "clearance_mean_m": run.fresh_m + profile.mean(axis=2),
+        "clearance_max_m": run.fresh_m + profile.max(axis=2),
+        "depth_m": depth[[STATES // 2, -1]].astype(np.float32),
+        "rate_m_per_cycle": rate.astype(np.float32),
+        "peak_force_n": between(life.cycles, life.peak_force_n, cycles),
+        "toe_position_m": between(life.cycles, toe, cycles),
     }
 
 
-def _wear_a_cycle(leg: WatchedLeg, cycles: int) -> tuple[Floats, Floats, float]:
-    """Mean wear of a cycle (k, 2, N) [m]; largest forces (j,) [N] and toe error [m] meanwhile."""
-    joints = len(leg.setup.linkage.mechanism.joints)
-    leg.advance(SETTLE_CYCLES * SAMPLES, new_tally(joints))
-    tally, before = new_tally(joints), leg.setup.surfaces.depth.copy()
-    leg.advance(cycles * SAMPLES, tally)
-    worn = leg.setup.surfaces.depth - before
-    return smoothed(worn / cycles, _SMOOTH_DEG), tally.peak.copy(), float(tally.response[0])
+def between(cycles: Floats, values: Floats, at: Floats) -> Floats:
+    """Values (p, ...) at other cycles (w,) than those (p,) that they are known at, on straight lines."""
+    left = np.clip(np.searchsorted(cycles, at) - 1, 0, len(cycles) - 2)
+    share = (at - cycles[left]) / np.diff(cycles)[left]
+    share = share.reshape(-1, *[1] * (values.ndim - 1))
+    return np.asarray(values[left] + share * (values[left + 1] - values[left]))

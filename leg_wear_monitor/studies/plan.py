@@ -25,6 +25,7 @@ _Place = dict[str, Any]
 PORTRAIT_CYCLES = 6
 
 _EACH_JOINT = 0.7  # cost of a further loose joint, in that of the first
+_LIKELY_JUMPS = 2.7  # of a life, for each time that the longest one is in the mean opening
 _MOMENTS = 20.0  # cost of watching a cycle, in that of a cycle of one loose joint
 
 
@@ -94,8 +95,8 @@ def _wear(study: Wear) -> list[Point]:
             loose, study.clearance_m, study.speed_rpm, **attrs.asdict(study.life),
             perturb_share=study.ensemble.perturb_share, seed=study.ensemble.seed,
         )  # fmt: skip
-        cost = study.life.runs * study.life.jumps * study.life.cycles * 3.0
-        cost *= _cycle_cost(loose, study.speed_rpm)
+        cycles = _LIKELY_JUMPS * study.life.opens_m / study.life.jump_m * (study.life.cycles + 1)
+        cost = study.life.runs * cycles * _cycle_cost(loose, study.speed_rpm)
         lives.append(Point(label=set_name(loose), task="life", settings=settings, cost=cost))
     return _location(study) + lives
 

@@ -91,7 +91,7 @@ class Multi(Location):
 
 @attrs.frozen(kw_only=True)
 class Life:
-    """How far wear is followed: by jumps between which some cycles are simulated."""
+    """How far wear is followed, and by what jumps, as in `dynamics.life`."""
 
     opens_m: float = quantity(
         "m",
@@ -99,8 +99,10 @@ class Life:
         above=0.0,
         default=1.0e-4,
     )
-    jumps: int = count_field("jumps until then, of equal opening", 1, 40)
-    cycles: int = count_field("gait cycles simulated before each jump", 1, 6)
+    jump_m: float = quantity(
+        "m", "deepest change of a surface that a jump may make", above=0.0, default=1.0e-5
+    )
+    cycles: int = count_field("gait cycles simulated and averaged before each jump", 2, 6)
     runs: int = count_field("lives that differ in where they start", 2, 4)
 
 

@@ -14,6 +14,7 @@ from leg_wear_monitor.mechanism.arrays import Floats
 from leg_wear_monitor.mechanism.quantity import quantity
 
 _GROWS, _SHRINKS, _SAFETY = 2.0, 0.3, 0.8
+_TOLERATED = 0.1  # of the deepest change
 
 
 @attrs.frozen(kw_only=True)
@@ -29,6 +30,11 @@ class JumpControl:
     smooth_deg: float = quantity(
         "deg", "standard deviation of the window that rates are smoothed by", at_least=0.0, default=5.0
     )
+
+    @classmethod
+    def of(cls, opens_m: float) -> "JumpControl":
+        """Jumps of a length, with an error in proportion to it."""
+        return cls(opens_m=opens_m, tolerance_m=_TOLERATED * opens_m)
 
 
 @attrs.frozen(eq=False)

@@ -1,5 +1,7 @@
 """A life by cycle jumps: what it keeps, what it repeats, and that it meets the wear it jumps over."""
 
+from itertools import pairwise
+
 import numpy as np
 import pytest
 
@@ -31,6 +33,13 @@ def test_volume_worn_is_coefficient_times_archard_integral(leg, lived):
     expected = setup.contacts.wear_coefficient * last.archard_j[:, None]
     # what is pending when a cycle is counted is worn off in the next one
     np.testing.assert_allclose(volume, expected, rtol=2e-3)
+
+
+def test_a_jump_repeats_the_mean_wear_of_a_cycle_at_its_ends(lived):
+    for here, there in pairwise(lived[0].points):
+        rate = 0.5 * (here.rate.depth + there.rate.depth)
+        grown = there.depth - here.depth
+        np.testing.assert_allclose(grown, (there.cycles - here.cycles) * rate, rtol=1e-9, atol=1e-15)
 
 
 def test_clearances_only_grow_and_the_life_ends_at_the_first_limit(lived):

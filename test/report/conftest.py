@@ -22,7 +22,10 @@ TINY = {
         "joints": ["G"], "normal_laws": ["hertz", "flores"], "friction_laws": ["none"],
         "friction_coefficients": [0.1],
     },
-    "wear": {"sets": [["I", "J"]], "life": {"opens_m": 5.0e-6, "jumps": 2, "cycles": 1, "runs": 2}},
+    "wear": {
+        "sets": [["I", "J"]],
+        "life": {"opens_m": 5.0e-6, "jump_m": 1.0e-5, "cycles": 2, "runs": 2},
+    },
     "chaos": {
         "joints": ["A", "B"], "others": [["G"]], "section_cycles": 6,
         "exponent": {"runs": 2, "cycles": 10, "renewals": 16}, "bifurcation": DIAGRAM,

@@ -128,7 +128,7 @@ def tables(count, chain, model, state, work):
     for i in range(count):
         angle = 0.003 * i + chain * work.now.row[0]
         take_tables(model.tables, angle, work.now.speed[0], 0.0, work.now)
-        hold_eccentricities(state.e, state.v, 0.0, work.now)
+        hold_eccentricities(model.tables, angle, state.e, state.v, 0.0, work.now)
 
 
 @entry

@@ -60,42 +60,35 @@ class ClearanceState(NamedTuple):
 class Now(NamedTuple):
     """Tables at the present crank angle: ``row`` (w,) of the table ``motion`` and its parts, `motion_shapes`.
 
-    ``speed`` (2,) and acceleration of the crank. At them and at the eccentricities in the middle of the
-    part: ``inverse_mass`` of the latter, and what changes it, ``bend_e`` and ``bend_v`` (d, d) by e and e';
-    ``force`` (d,) without contact at rest and ``bare`` (d,) its acceleration, ``drift`` (d, d) that by e',
-    ``lever_response`` (k, d) that by the friction force in each joint; the drive torque at rest is
-    ``torque_0`` (1,), its part by e'' is ``torque_by_a`` (d,), that by e' is ``torque_by_v`` (d,), that by e
-    ``torque_by_e`` (d,). ``toward`` (k, 3) the directions of the eccentricities at the interval's start.
+    Those that change with e are at the eccentricities in the middle of the part of an interval. ``speed``
+    (2,) and acceleration of the crank. At all these: ``force`` (d,) without contact at rest and ``bare``
+    (d,) its acceleration, ``drift`` (d, d) that by e', ``lever_response`` (k, d) that by the friction force
+    in each joint; the drive torque at rest is ``torque_0`` (1,), its part by e' is ``torque_by_v`` (d,),
+    that by e ``torque_by_e`` (d,). ``toward`` (k, 3) the directions of the eccentricities at the interval's
+    start.
     """
 
     row: Floats
     speed: Floats
-    bend_e: Floats
-    bend_v: Floats
     force: Floats
     bare: Floats
     drift: Floats
     lever_response: Floats
     torque_0: Floats
-    torque_by_a: Floats
     torque_by_v: Floats
     torque_by_e: Floats
     toward: Floats
     inverse_mass: Floats
-    bend: Floats
-    coriolis: Floats
     free: Floats
-    free_e: Floats
+    torque_a: Floats
+    torque_v: Floats
+    coriolis: Floats
     lever: Floats
     lever_drive: Floats
     torque: Floats
-    torque_a: Floats
-    torque_v: Floats
     torque_t: Floats
     torque_e: Floats
-    torque_ae: Floats
     torque_vv: Floats
-    torque_ve: Floats
     angle: Floats
     turn: Floats
     toe: Floats
@@ -152,14 +145,11 @@ def clearance_work(model: ClearanceModel, state: ClearanceState) -> ClearanceWor
     now = Now(
         row=row,
         speed=np.zeros(2),
-        bend_e=np.zeros((d, d)),
-        bend_v=np.zeros((d, d)),
         force=np.zeros(d),
         bare=np.zeros(d),
         drift=np.zeros((d, d)),
         lever_response=np.zeros((loose, d)),
         torque_0=np.zeros(1),
-        torque_by_a=np.zeros(d),
         torque_by_v=np.zeros(d),
         torque_by_e=np.zeros(d),
         toward=np.zeros((loose, TO_ANGLE + 1)),
@@ -203,30 +193,21 @@ def take_tables(tables, angle, speed, acceleration, out_now):
 
 
 @kernel
-def hold_eccentricities(e, v, ahead, now):
+def hold_eccentricities(tables, angle, e, v, ahead, now):
     """Put what depends on the eccentricities little in the tables, as if they were e + ahead v all the time.
 
     Inside a part of an interval it changes by a thousandth of e / L.
     """
-    free, free_e, by, by_e, force, d = now.free, now.free_e, now.torque, now.torque_e, now.force, e.shape[0]
-    speed, acceleration = now.speed[0], now.speed[1]
+    d, speed, acceleration = e.shape[0], now.speed[0], now.speed[1]
     square = speed * speed
+    _follow_eccentricities(tables, angle, e, v, ahead, now)
+    free, by, by_e, force = now.free, now.torque, now.torque_e, now.force
     now.torque_0[0] = by[0] + acceleration * by[1] + speed * (speed * by[2] + by[3])
     for i in range(d):
         force[i] = free[0, i] + acceleration * free[1, i] + square * free[2, i]
-        now.torque_by_a[i] = now.torque_a[i]
         now.torque_by_v[i] = speed * now.torque_v[0, i] + now.torque_v[1, i]
         now.torque_by_e[i] = by_e[0, i] + acceleration * by_e[1, i] + square * by_e[2, i]
-    for j in range(d):
-        middle = e[j] + ahead * v[j]
-        for i in range(d):
-            turned = free_e[0, j, i] + acceleration * free_e[1, j, i] + square * free_e[2, j, i]
-            force[i] += turned * middle
-            now.torque_by_a[i] += now.torque_ae[j, i] * middle
-            now.torque_by_v[i] += now.torque_ve[j, i] * (speed * middle)
-    _bend(e, v, ahead, now)
-    for i in range(d):
-        now.bare[i] = 0.0
+        now.bare[i] = speed * now.viscous[i, d] if now.viscous.shape[0] > 0 else 0.0
         for k in range(now.lever.shape[0]):
             now.lever_response[k, i] = 0.0
     for j in range(d):
@@ -235,43 +216,24 @@ def hold_eccentricities(e, v, ahead, now):
         for k in range(now.lever.shape[0]):
             for i in range(d):
                 now.lever_response[k, i] += now.inverse_mass[j, i] * now.lever[k, j]
-    if now.viscous.shape[0] > 0:
-        for i in range(d):
-            now.bare[i] += speed * now.viscous[i, d]
 
 
 @kernel
-def _bend(e, v, ahead, now):
-    """Take the inverse mass from centred journals to e + ahead v, and the forces by e' twice to Coriolis's.
-
-    With P = A^-1 Gamma e the inverse of A + Gamma e + (Gamma e)^T is A^-1 - P A^-1 - (P A^-1)^T.
-    """
-    d, speed = e.shape[0], now.speed[0]
-    bend, flat_e, flat_v = now.bend.reshape(d, d * d), now.bend_e.reshape(-1), now.bend_v.reshape(-1)
-    inverse_mass, product = now.inverse_mass, now.drift
-    for i in range(d * d):
-        flat_e[i] = flat_v[i] = 0.0
-    for k in range(d):
-        middle, rate = e[k] + ahead * v[k], v[k]
-        for i in range(d * d):
-            flat_e[i] += bend[k, i] * middle
-            flat_v[i] += bend[k, i] * rate
-    for i in range(d):
-        for j in range(d):
-            product[i, j] = 0.0
-        for c in range(d):
-            share = now.bend_e[c, i]
-            for j in range(d):
-                product[i, j] += share * inverse_mass[c, j]
-    for i in range(d):
-        for j in range(i + 1):
-            change = product[i, j] + product[j, i]
-            inverse_mass[i, j] -= change
-            if j < i:
-                inverse_mass[j, i] -= change
-    for i in range(d):
-        for j in range(d):
-            now.drift[i, j] = speed * now.coriolis[i, j] - now.bend_v[i, j]
+def _follow_eccentricities(tables, angle, e, v, ahead, now):
+    """Take what changes with e to e + ahead v, and the forces by e' twice to Coriolis's."""
+    by_e, bend, row, speed = tables.by_e, tables.bend, now.row, now.speed[0]
+    drift, coriolis = now.drift.reshape(-1), now.coriolis.reshape(-1)
+    n, w = blend(by_e.shape[0] - 1, angle)
+    for i in range(drift.shape[0]):
+        drift[i] = speed * coriolis[i]
+    for j in range(e.shape[0]):
+        middle, rate = e[j] + ahead * v[j], v[j]
+        before, after = (1.0 - w) * middle, w * middle
+        for i in range(by_e.shape[2]):
+            row[i] += before * by_e[n, j, i] + after * by_e[n + 1, j, i]
+        before, after = (1.0 - w) * rate, w * rate
+        for i in range(drift.shape[0]):
+            drift[i] -= before * bend[n, j, i] + after * bend[n + 1, j, i]
 
 
 @kernel

@@ -18,7 +18,7 @@ def drive_torque(now, x, sample):
         for j in range(d):
             by_v += vv[i, j] * x[V0, j]
         torque += by_v * x[V0, i] + now.torque_by_e[i] * x[E0, i]
-        sudden += now.torque_by_a[i] * x[A0, i]
+        sudden += now.torque_a[i] * x[A0, i]
     for k in range(sample.shape[0]):
         torque += now.torque_t[k] * sample[k, F_T] + sample[k, F_N] * sample[k, CAM]
     return torque + sudden, sudden
@@ -32,7 +32,7 @@ def sudden_impulse(now, x):
     """
     total = 0.0
     for i in range(x.shape[1]):
-        total += now.torque_by_a[i] * x[DV, i]
+        total += now.torque_a[i] * x[DV, i]
     return total
 
 

@@ -12,7 +12,7 @@ def load_state(model, surfaces, state, angle, speed, acceleration, ahead, work):
     """Load the state, and the tables at a crank angle, with the eccentricities of ``ahead`` [s] later."""
     x, now = work.x, work.now
     take_tables(model.tables, angle, speed, acceleration, now)
-    hold_eccentricities(state.e, state.v, ahead, now)
+    hold_eccentricities(model.tables, angle, state.e, state.v, ahead, now)
     for i in range(state.e.shape[0]):
         x[E0, i], x[V0, i] = state.e[i], state.v[i]
     if surfaces.feeds_back:

@@ -20,13 +20,14 @@ import numpy as np
 
 from leg_wear_monitor.contact.arrays import ContactArrays
 from leg_wear_monitor.dynamics.clearance_basis import Basis, derivative, project
-from leg_wear_monitor.dynamics.clearance_layout import motion_shapes, views
-from leg_wear_monitor.mechanism.arrays import Floats, Ints, body_names, point_from_com
+from leg_wear_monitor.dynamics.clearance_layout import changing_shapes, motion_shapes, views
+from leg_wear_monitor.mechanism.arrays import Floats, Ints, Singles, body_names, point_from_com
 from leg_wear_monitor.mechanism.constraints import DRIVE
 from leg_wear_monitor.mechanism.ideal import TURN, IdealMotion, one_cycle, turned
 from leg_wear_monitor.mechanism.position import Linkage
 
 POINTS = 1024  # of a turn; tables are linear between them
+COARSER = 4  # times as far apart are the points of what e and e' change
 
 _BENT = 10.0  # 1/rad^2: bend of the Coriolis terms over their root mean square that one interval follows
 _MOST_PARTS = 8
@@ -40,6 +41,10 @@ class ClearanceTables(NamedTuple):
     ``reaction_joint`` (r,) the joint of each, ``DRIVE`` first; ``stored`` (N + 1, u) the parts of the
     stored energy that `stored_shapes` names; ``parts`` (N,) into how many an interval is to be cut for the
     tables to be held in each.
+
+    ``by_e`` (M + 1, d, u) is how the parts that `changing_shapes` names change with e, and ``bend``
+    (M + 1, d, d d) the acceleration A^-1 Gamma that e' takes twice. Both are small beside the above, and so
+    in single precision at every `COARSER`-th point: that stays in the processor's caches.
     """
 
     motion: Floats
@@ -47,6 +52,8 @@ class ClearanceTables(NamedTuple):
     reaction_joint: Ints
     stored: Floats
     parts: Ints
+    by_e: Singles
+    bend: Singles
 
 
 def build_tables(linkage: Linkage, contacts: ContactArrays, points: int = POINTS) -> ClearanceTables:
@@ -91,6 +98,7 @@ def build_tables(linkage: Linkage, contacts: ContactArrays, points: int = POINTS
         reaction_joint=joints,
         stored=_stored(basis),
         parts=_parts(parts["coriolis"]),
+        **_first_order(basis, parts["inverse_mass"]),
     )
 
 
@@ -115,16 +123,34 @@ def _accelerations(basis: Basis) -> dict[str, Floats]:
         return np.asarray(inverse_mass @ project(basis.s, generalised))
 
     free = np.stack([basis.force, -basis.mass * basis.drive, -basis.mass * basis.drive_t], axis=2)
-    by_e = [basis.force_e, -basis.b_e, 0.5 * basis.c_ee - derivative(basis.b_e)]
-    d = inverse_mass.shape[1]
-    bend = (inverse_mass @ basis.gamma.reshape(-1, d, d * d)).reshape(-1, d, d, d)
     return {
         "inverse_mass": inverse_mass,
-        "bend": np.ascontiguousarray(bend.transpose(0, 3, 2, 1)),
         "coriolis": -2.0 * respond(mass * basis.s_t).transpose(0, 2, 1),
         "free": project(basis.s, free).transpose(0, 2, 1),
-        "free_e": np.stack([slope.transpose(0, 2, 1) for slope in by_e], axis=1),
         "viscous": -respond(basis.drag),
+    }
+
+
+def _first_order(basis: Basis, inverse_mass: Floats) -> dict[str, Singles]:
+    """Tables ``by_e`` and ``bend``, by the inverse mass (N, d, d) at e = 0.
+
+    The inverse of A + Gamma e + (Gamma e)^T is A^-1 - Q e - (Q e)^T with Q = A^-1 Gamma A^-1.
+    """
+    n, d = inverse_mass.shape[:2]
+    bend = (inverse_mass @ basis.gamma.reshape(n, d, d * d)).reshape(n, d, d, d).transpose(0, 3, 2, 1)
+    change = inverse_mass[:, None] @ bend
+    free = np.stack([basis.force_e, -basis.b_e, 0.5 * basis.c_ee - derivative(basis.b_e)], axis=1)
+    parts = {
+        "inverse_mass": -(change + change.transpose(0, 1, 3, 2)),
+        "free": free.transpose(0, 3, 1, 2),
+        "torque_a": basis.b_e.transpose(0, 2, 1),
+        "torque_v": basis.c_ee.transpose(0, 2, 1),
+    }
+    by_e = np.concatenate([parts[name].reshape(n, d, -1) for name in changing_shapes(d // 2)], axis=2)
+    coarse = [*range(0, n, COARSER), 0]
+    return {
+        "by_e": np.ascontiguousarray(by_e[coarse], dtype=np.float32),
+        "bend": np.ascontiguousarray(bend.reshape(n, d, d * d)[coarse], dtype=np.float32),
     }
 
 
@@ -141,9 +167,7 @@ def _torque(basis: Basis) -> dict[str, Floats]:
         "torque_v": np.stack([c_e, drag[:, :-1]], axis=1),
         "torque_t": -project(basis.drive[:, :, None], basis.friction)[:, 0],
         "torque_e": np.stack([-basis.drive_force_e, c_e, 0.5 * derivative(c_e)], axis=1),
-        "torque_ae": basis.b_e.transpose(0, 2, 1),
         "torque_vv": (basis.b_e - 0.5 * a_t).transpose(0, 2, 1),
-        "torque_ve": basis.c_ee.transpose(0, 2, 1),
     }
 
 

@@ -8,6 +8,7 @@ from numpy.typing import NDArray
 from leg_wear_monitor.mechanism.spec import GROUND, Mechanism, PhaseLoad, PrismaticJoint, TorqueDrive, Vector
 
 Floats = NDArray[np.float64]
+Singles = NDArray[np.float32]
 Ints = NDArray[np.int64]
 
 REVOLUTE, PRISMATIC = 0, 1

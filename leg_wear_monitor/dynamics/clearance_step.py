@@ -54,9 +54,10 @@ def drift(now, x):
     by_v, viscous, d = now.drift, now.viscous, x.shape[1]
     for i in range(d):
         x[DRIFT, i] = now.bare[i]
-    for j in range(d):
+    for k in range(now.lever.shape[0]):
+        vx, vy = x[V0, 2 * k], x[V0, 2 * k + 1]
         for i in range(d):
-            x[DRIFT, i] += by_v[j, i] * x[V0, j]
+            x[DRIFT, i] += by_v[2 * k, i] * vx + by_v[2 * k + 1, i] * vy
     for i in range(viscous.shape[0]):
         for j in range(d):
             x[DRIFT, i] += viscous[i, j] * x[V0, j]

@@ -32,9 +32,9 @@ HYSTERESIS_FACTOR, FRICTION_COEFFICIENT, RAMP_0, RAMP_1, FRICTION_LAW, FRESH_STI
 
 # rows of the step's vectors (d,): eccentricities, rates and accelerations at its start (0), between its
 # stages (M) and at its end (1); the acceleration that is not contact; the stages' slopes; right-hand sides;
-# the change of the rates in the last step
-E0, V0, A0, EM, VM, E1, V1, A1, DRIFT, K1E, K1V, K2E, K2V, RE, RV, DV = range(16)
-VECTORS = 16
+# the change of the rates in the last step; what the rates have to be multiplied by in the drive torque
+E0, V0, A0, EM, VM, E1, V1, A1, DRIFT, K1E, K1V, K2E, K2V, RE, RV, DV, BY_V = range(17)
+VECTORS = 17
 
 _NEAR = 0.1  # sine of an angle for which the arc sine's series is good to 3e-11 rad
 

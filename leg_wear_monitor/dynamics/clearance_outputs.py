@@ -3,21 +3,17 @@
 import math
 
 from leg_wear_monitor.dynamics.clearance import blend
-from leg_wear_monitor.dynamics.clearance_contact import A0, CAM, DV, E0, F_T, V0
+from leg_wear_monitor.dynamics.clearance_contact import A0, BY_V, CAM, DV, E0, F_T, V0
 from leg_wear_monitor.dynamics.touch import F_N
 from leg_wear_monitor.kernel import kernel
 
 
 @kernel
 def drive_torque(now, x, sample):
-    """Torque of the drive [N m] at rows E0, V0 and A0, and the part of it by e'' alone."""
-    d, vv = x.shape[1], now.torque_vv
+    """Torque of the drive [N m] at rows E0, V0, A0 and BY_V, and the part of it by e'' alone."""
     sudden, torque = 0.0, now.torque_0[0]
-    for i in range(d):
-        by_v = now.torque_by_v[i]
-        for j in range(d):
-            by_v += vv[i, j] * x[V0, j]
-        torque += by_v * x[V0, i] + now.torque_by_e[i] * x[E0, i]
+    for i in range(x.shape[1]):
+        torque += x[BY_V, i] * x[V0, i] + now.torque_by_e[i] * x[E0, i]
         sudden += now.torque_a[i] * x[A0, i]
     for k in range(sample.shape[0]):
         torque += now.torque_t[k] * sample[k, F_T] + sample[k, F_N] * sample[k, CAM]

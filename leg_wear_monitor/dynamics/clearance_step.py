@@ -7,6 +7,7 @@ from leg_wear_monitor.contact.normal import damped_force, elastic_force
 from leg_wear_monitor.dynamics.clearance_contact import (
     A0,
     A1,
+    BY_V,
     DRIFT,
     DV,
     E0,
@@ -50,14 +51,20 @@ from leg_wear_monitor.kernel import kernel
 
 @kernel
 def drift(now, x):
-    """Acceleration that is not contact, at row V0: gravity, crank, Coriolis, dampers; row DRIFT."""
-    by_v, viscous, d = now.drift, now.viscous, x.shape[1]
+    """What the rates at row V0 make.
+
+    Row DRIFT, the acceleration that is not contact: gravity, crank, Coriolis, dampers; row BY_V, what e'
+    has to be multiplied by in the drive torque.
+    """
+    by_v, torque, viscous, d = now.drift, now.torque_vv, now.viscous, x.shape[1]
     for i in range(d):
-        x[DRIFT, i] = now.bare[i]
+        x[DRIFT, i], x[BY_V, i] = now.bare[i], now.torque_by_v[i]
     for k in range(now.lever.shape[0]):
         vx, vy = x[V0, 2 * k], x[V0, 2 * k + 1]
         for i in range(d):
             x[DRIFT, i] += by_v[2 * k, i] * vx + by_v[2 * k + 1, i] * vy
+        for i in range(d):
+            x[BY_V, i] += torque[2 * k, i] * vx + torque[2 * k + 1, i] * vy
     for i in range(viscous.shape[0]):
         for j in range(d):
             x[DRIFT, i] += viscous[i, j] * x[V0, j]

@@ -135,7 +135,7 @@ def tables(count, chain, model, state, work):
 def ideal_reactions(count, chain, model, state, work):
     for i in range(count):
         angle = 0.003 * i + chain * work.reaction[0]
-        reactions(model.tables, angle, work.now, work.x, work.start, work.reaction)
+        reactions(model.tables, angle, work.now, work.x, work.start, work.by, work.reaction)
 
 
 @entry

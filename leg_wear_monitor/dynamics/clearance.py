@@ -101,8 +101,8 @@ class ClearanceWork(NamedTuple):
     """Room for an interval.
 
     The tables ``now``; samples of the joints at a step's ``start`` and ``end`` (k, COLUMNS); ``x``
-    (VECTORS, d) the vectors of a step; ``weight`` (N,) of the wear on an arc; ``reaction`` (r,) and ``toe``
-    (2,) as observed; ``added`` (k, JOINT_RATES) to the joints' integrals in a step; ``drive_start`` and
+    (VECTORS, d) the vectors of a step; ``weight`` (N,) of the wear on an arc; ``by`` (c,) the multipliers
+    of the columns of the reactions' table; ``reaction`` (r,) and ``toe`` (2,) as observed; ``added`` (k, JOINT_RATES) to the joints' integrals in a step; ``drive_start`` and
     ``drive_end`` (3,) the torque at its ends; ``backup`` the motion that a failed interval falls back to,
     but for what it leaves ``pending``; ``crank`` (3,) the drive at the interval's start.
     """
@@ -113,6 +113,7 @@ class ClearanceWork(NamedTuple):
     end: Floats
     x: Floats
     weight: Floats
+    by: Floats
     reaction: Floats
     toe: Floats
     added: Floats
@@ -162,6 +163,7 @@ def clearance_work(model: ClearanceModel, state: ClearanceState) -> ClearanceWor
         end=np.zeros((loose, COLUMNS)),
         x=np.zeros((VECTORS, d)),
         weight=np.zeros(state.depth.shape[2]),
+        by=np.zeros(model.tables.reaction.shape[1]),
         reaction=np.zeros(len(model.tables.reaction_joint)),
         toe=np.zeros(2),
         added=np.zeros((loose, JOINT_RATES)),

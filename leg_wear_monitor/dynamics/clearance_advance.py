@@ -230,7 +230,7 @@ def _finish(model, surfaces, state, tally, work):
     torque = work.drive_start[WHOLE]
     tally.torque_time[1 if torque > 0.0 else 0, bin_of(abs(torque))] += interval
     if count % RENEWAL == 0:
-        reactions(model.tables, state.drive[ANGLE], now, work.x, sample, work.reaction)
+        reactions(model.tables, state.drive[ANGLE], now, work.x, sample, work.by, work.reaction)
         _add_reactions(model.tables.reaction_joint, work.reaction, RENEWAL * interval, tally)
 
 
@@ -262,7 +262,7 @@ def observe(model, feeds_back, state, work):
     load_state(model, surfaces, state, angle, speed, state.drive[ACCELERATION], 0.0, work)
     accelerate_clearances(model, surfaces, state.approach, now, 0.0, x, E0, V0, A0, work.start)
     copy_array(work.backup, state.motion)
-    reactions(model.tables, angle, now, x, work.start, work.reaction)
+    reactions(model.tables, angle, now, x, work.start, work.by, work.reaction)
     work.reaction[0] = drive_torque(now, x, work.start)[0]
     d = x.shape[1]
     for i in range(2):

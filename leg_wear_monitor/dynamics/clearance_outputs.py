@@ -33,25 +33,24 @@ def sudden_impulse(now, x):
 
 
 @kernel
-def reactions(tables, angle, now, x, sample, out_reaction):
-    """Drive torque and reactions (r,) of the ideal joints at a crank angle; rows as in the tables."""
+def reactions(tables, angle, now, x, sample, out_by, out_reaction):
+    """Drive torque and reactions (r,) of the ideal joints at a crank angle; rows and columns as in the tables.
+
+    ``out_by`` (4 + 3 d + k,) is what the columns have to be multiplied by.
+    """
     table, speed, d = tables.reaction, now.speed[0], x.shape[1]
+    out_by[0], out_by[1], out_by[2], out_by[3] = 1.0, now.speed[1], speed * speed, speed
+    for i in range(d):
+        out_by[4 + i], out_by[4 + d + i], out_by[4 + 2 * d + i] = x[A0, i], speed * x[V0, i], x[V0, i]
+    for k in range(sample.shape[0]):
+        out_by[4 + 3 * d + k] = sample[k, F_T]
     i, w = blend(table.shape[0] - 1, angle)
     for r in range(out_reaction.shape[0]):
         out_reaction[r] = 0.0
-        for side in range(2):
-            j, share = i + side, w if side else 1.0 - w
-            total = (
-                table[j, r, 0]
-                + now.speed[1] * table[j, r, 1]
-                + speed * (speed * table[j, r, 2] + table[j, r, 3])
-            )
-            for c in range(d):
-                total += table[j, r, 4 + c] * x[A0, c]
-                total += (speed * table[j, r, 4 + d + c] + table[j, r, 4 + 2 * d + c]) * x[V0, c]
-            for k in range(sample.shape[0]):
-                total += table[j, r, 4 + 3 * d + k] * sample[k, F_T]
-            out_reaction[r] += share * total
+    for c in range(out_by.shape[0]):
+        before, after = (1.0 - w) * out_by[c], w * out_by[c]
+        for r in range(out_reaction.shape[0]):
+            out_reaction[r] += before * table[i, c, r] + after * table[i + 1, c, r]
 
 
 @kernel

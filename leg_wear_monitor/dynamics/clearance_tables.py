@@ -36,7 +36,7 @@ _MOST_PARTS = 8
 class ClearanceTables(NamedTuple):
     """Tables at N equal steps of the crank, the first repeated at the end; k loose joints, d = 2 k.
 
-    ``motion`` (N + 1, w) the rows that `motion_shapes` names; ``reaction`` (N + 1, r, 4 + 3 d + k) the
+    ``motion`` (N + 1, w) the rows that `motion_shapes` names; ``reaction`` (N + 1, 4 + 3 d + k, r) the
     drive torque and the reactions of the ideal joints by (1, w', w^2, w, e'', w e', e', F_t), and
     ``reaction_joint`` (r,) the joint of each, ``DRIVE`` first; ``stored`` (N + 1, u) the parts of the
     stored energy that `stored_shapes` names; ``parts`` (N,) into how many an interval is to be cut for the
@@ -199,7 +199,7 @@ def _reactions(linkage: Linkage, basis: Basis) -> tuple[Floats, Ints]:
     by = [-basis.force[:, :, None], mass * basis.drive[:, :, None], mass * basis.drive_t[:, :, None]]
     by += [basis.drag[:, :, -1:], mass * basis.s, 2.0 * mass * basis.s_t]
     by += [basis.drag[:, :, :-1], -basis.friction]
-    reaction = project(basis.x[:, :, rows], np.concatenate(by, axis=2))
+    reaction = project(np.concatenate(by, axis=2), basis.x[:, :, rows])
     return reaction, np.array(joints, dtype=np.int64)
 
 

@@ -81,6 +81,6 @@ def toe_deviation(now, x, out_response):
         vy += sy * x[V0, i] + ty * x[E0, i]
         ax += sx * x[A0, i] + 2.0 * tx * x[V0, i]
         ay += sy * x[A0, i] + 2.0 * ty * x[V0, i]
-    out_response[0] = max(out_response[0], math.hypot(px, py))
-    out_response[1] = max(out_response[1], math.hypot(vx, vy))
-    out_response[2] = max(out_response[2], math.hypot(ax, ay))
+    out_response[0] = max(out_response[0], math.sqrt(px * px + py * py))
+    out_response[1] = max(out_response[1], math.sqrt(vx * vx + vy * vy))
+    out_response[2] = max(out_response[2], math.sqrt(ax * ax + ay * ay))

@@ -178,7 +178,7 @@ def gather_wear(added, start, end, pending):
             w = end[k, F_N] / (start[k, F_N] + end[k, F_N])
             ex = start[k, EX] + w * (end[k, EX] - start[k, EX])
             ey = start[k, EY] + w * (end[k, EY] - start[k, EY])
-            length = math.hypot(ex, ey)
+            length = math.sqrt(ex * ex + ey * ey)
             pending[k, 0] += integral
             pending[k, 1] += integral * ex / length
             pending[k, 2] += integral * ey / length

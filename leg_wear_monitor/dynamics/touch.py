@@ -14,17 +14,28 @@ SAMPLE = 7
 TOUCH = 1.0e-11  # penetration [m] at which a contact counts as just begun
 NEVER = 2.0
 
+_CLOSE = 1.0e-14  # share of a step to which a crossing is found
+
 
 @kernel
 def _crossing(low, high, rising, h, k, start, end):
-    """Share of a step between low and high at which the penetration of joint k changes sign, by bisection."""
+    """Share of a step between low and high at which the penetration of joint k changes sign.
+
+    Newton's iteration, and bisection where that would leave what is known to hold the place.
+    """
+    u = 0.5 * (low + high)
     for _ in range(48):
-        middle = 0.5 * (low + high)
-        if (_delta_at(middle, h, k, start, end) > 0.0) == rising:
-            high = middle
+        delta, rate = hermite(u, h, start[k, DELTA], start[k, DELTA_DOT], end[k, DELTA], end[k, DELTA_DOT])
+        if (delta > 0.0) == rising:
+            high = u
         else:
-            low = middle
-    return 0.5 * (low + high)
+            low = u
+        last, u = u, u - delta / (h * rate)
+        if not low < u < high:
+            u = 0.5 * (low + high)
+        if abs(u - last) < _CLOSE:
+            break
+    return u
 
 
 @kernel

@@ -16,12 +16,12 @@ from leg_wear_monitor.dynamics.touch import DELTA, DELTA_DOT, EX, EY, F_N, SAMPL
 from leg_wear_monitor.kernel import kernel
 from leg_wear_monitor.mechanism.arrays import Floats
 
-# a sample of a loose joint goes on with: unit normal, friction force [N], slip speed [m/s], derivatives of
-# the normal force by penetration [N/m] and by its rate [N s/m], its elastic part [N], the share of the
-# penetration's rate that the bodies' turning makes, by the crank's speed [m/rad], and the contact stiffness
+# a sample of a loose joint goes on with: unit normal, friction force [N], slip speed [m/s], derivative of
+# the normal force by the penetration's rate [N s/m], its elastic part [N], the share of the penetration's
+# rate that the bodies' turning makes, by the crank's speed [m/rad], and the contact stiffness
 # there [N/m^1.5]
-NX, NY, F_T, SLIP, STIFFNESS, DAMPING, ELASTIC, CAM, HERTZ = range(SAMPLE, SAMPLE + 9)
-COLUMNS = SAMPLE + 9
+NX, NY, F_T, SLIP, DAMPING, ELASTIC, CAM, HERTZ = range(SAMPLE, SAMPLE + 8)
+COLUMNS = SAMPLE + 8
 
 # a direction near which angles need no arc tangent: its cosine, sine and angle [rad]
 TO_X, TO_Y, TO_ANGLE = range(3)
@@ -101,13 +101,12 @@ def accelerate_clearances(model, surfaces, approach, now, turned, x, at_e, at_v,
         else:
             delta, nx, ny = journal_contact(ex, ey, contacts.clearance[k])
         delta_dot = nx * vx + ny * vy + cam * speed
-        f_n, f_t, slip, elastic, stiffness, damping = 0.0, 0.0, 0.0, 0.0, 0.0, 0.0
+        f_n, f_t, slip, elastic, damping = 0.0, 0.0, 0.0, 0.0, 0.0
         if delta > 0.0 and approach[k] > 0.0:
             elastic = elastic_force(hertz, delta)
             loss = law[k, HYSTERESIS_FACTOR] / approach[k]
             f_n = damped_force(elastic, loss, delta_dot)
             if f_n > 0.0:
-                stiffness = 1.5 * f_n / delta
                 damping = elastic * loss
                 slip = nx * vy - ny * vx + now.lever_drive[k] * speed
                 for i in range(d):
@@ -122,5 +121,5 @@ def accelerate_clearances(model, surfaces, approach, now, turned, x, at_e, at_v,
         out_sample[k, EX], out_sample[k, EY], out_sample[k, VX], out_sample[k, VY] = ex, ey, vx, vy
         out_sample[k, F_N], out_sample[k, DELTA], out_sample[k, DELTA_DOT] = f_n, delta, delta_dot
         out_sample[k, NX], out_sample[k, NY], out_sample[k, F_T], out_sample[k, SLIP] = nx, ny, f_t, slip
-        out_sample[k, STIFFNESS], out_sample[k, DAMPING], out_sample[k, ELASTIC] = stiffness, damping, elastic
+        out_sample[k, DAMPING], out_sample[k, ELASTIC] = damping, elastic
         out_sample[k, CAM], out_sample[k, HERTZ] = cam, hertz

@@ -101,10 +101,11 @@ class ClearanceWork(NamedTuple):
     """Room for an interval.
 
     The tables ``now``; samples of the joints at a step's ``start`` and ``end`` (k, COLUMNS); ``x``
-    (VECTORS, d) the vectors of a step; ``weight`` (N,) of the wear on an arc; ``by`` (c,) the multipliers
-    of the columns of the reactions' table; ``reaction`` (r,) and ``toe`` (2,) as observed; ``added`` (k, JOINT_RATES) to the joints' integrals in a step; ``drive_start`` and
-    ``drive_end`` (3,) the torque at its ends; ``backup`` the motion that a failed interval falls back to,
-    but for what it leaves ``pending``; ``crank`` (3,) the drive at the interval's start.
+    (VECTORS, d) the vectors of a step; ``weight`` (N,) of the wear on an arc; ``by`` (c,) what the reactions'
+    table is multiplied by; ``reaction`` (r,) and ``toe`` (2,) as observed; ``added`` (k, JOINT_RATES) to the
+    joints' integrals in a step; ``drive_start`` and ``drive_end`` (3,) the torque at its ends; ``backup`` the
+    motion that a failed interval falls back to, but for what it leaves ``pending``; ``crank`` (3,) the drive
+    at the interval's start.
     """
 
     now: Now

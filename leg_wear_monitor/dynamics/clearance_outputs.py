@@ -34,9 +34,9 @@ def sudden_impulse(now, x):
 
 @kernel
 def reactions(tables, angle, now, x, sample, out_by, out_reaction):
-    """Drive torque and reactions (r,) of the ideal joints at a crank angle; rows and columns as in the tables.
+    """Drive torque and reactions (r,) of the ideal joints at a crank angle, in the order of the tables.
 
-    ``out_by`` (4 + 3 d + k,) is what the columns have to be multiplied by.
+    ``out_by`` (4 + 3 d + k,) is what the table is multiplied by.
     """
     table, speed, d = tables.reaction, now.speed[0], x.shape[1]
     out_by[0], out_by[1], out_by[2], out_by[3] = 1.0, now.speed[1], speed * speed, speed

@@ -27,7 +27,7 @@ from leg_wear_monitor.mechanism.ideal import TURN, IdealMotion, one_cycle, turne
 from leg_wear_monitor.mechanism.position import Linkage
 
 POINTS = 1024  # of a turn; tables are linear between them
-COARSER = 4  # times as far apart are the points of what e and e' change
+COARSER = 2  # times as far apart as those are the points of what e and e' change
 
 _BENT = 10.0  # 1/rad^2: bend of the Coriolis terms over their root mean square that one interval follows
 _MOST_PARTS = 8
@@ -44,7 +44,7 @@ class ClearanceTables(NamedTuple):
 
     ``by_e`` (M + 1, d, u) is how the parts that `changing_shapes` names change with e, and ``bend``
     (M + 1, d, d d) the acceleration A^-1 Gamma that e' takes twice. Both are small beside the above, and so
-    in single precision at every `COARSER`-th point: that stays in the processor's caches.
+    in single precision at every `COARSER`-th point: less to fetch for every interval.
     """
 
     motion: Floats

@@ -3,6 +3,7 @@
 All tables are linear in a load, so a load is a sum of two tables over the few columns that it changes.
 """
 
+from collections.abc import Iterable
 from typing import Any
 
 import attrs
@@ -58,7 +59,8 @@ class FootLoad:
 
     def _find_parts(self, loaded: ClearanceTables) -> None:
         """The columns that a load changes, their values without it, and by how much a newton changes them."""
-        for table, other in zip(self.tables, loaded, strict=True):
+        pairs: Iterable[tuple[NDArray[Any], NDArray[Any]]] = zip(self.tables, loaded, strict=True)
+        for table, other in pairs:
             flat = table.reshape(len(table), -1)  # a view
             slope = (other.reshape(flat.shape) - flat) / _TRIAL_N
             columns = np.flatnonzero(slope.any(axis=0))

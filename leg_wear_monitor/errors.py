@@ -22,6 +22,10 @@ class ConfigError(LegWearError):
         self.source, self.key, self.fault = source, key, fault
         super().__init__(": ".join(part for part in (source, key, fault) if part))
 
+    def __reduce__(self) -> tuple[type["ConfigError"], tuple[str, str, str]]:
+        """By its parts, so that it survives the way from a worker process; the message alone does not."""
+        return type(self), (self.source, self.key, self.fault)
+
 
 class AssemblyError(LegWearError):
     """The linkage cannot be put together, or its crank cannot pass a dead point."""

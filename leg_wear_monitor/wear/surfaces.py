@@ -20,6 +20,7 @@ SECTORS = 720
 BUSHING, JOURNAL = 0, 1
 
 _TURNS_PER_RAD = 0.5 / math.pi
+_BESIDE = 16  # sectors to either side of an eccentricity's direction where its contact is looked for
 
 
 class Surfaces(NamedTuple):
@@ -105,12 +106,22 @@ def deposit_wear(contacts, surfaces, k, ex, ey, angle_b, angle_j, integral, out_
     """
     n = surfaces.depth.shape[2]
     sector = 2.0 * math.pi / n
-    centre = math.floor((math.atan2(ey, ex) - angle_b) / sector) % n
-    right, count_right = _weigh_arc(contacts, surfaces, k, ex, ey, angle_b, angle_j, centre, 1, out_weight)
+    towards = math.floor((math.atan2(ey, ex) - angle_b) / sector) % n
+    for beside in range(
+        2 * _BESIDE + 1
+    ):  # on a flank the overlap may begin some sectors up: 0, 1, -1, 2, ...
+        aside = (beside + 1) // 2
+        centre = (towards + (aside if beside % 2 == 1 else -aside)) % n
+        right, count_right = _weigh_arc(
+            contacts, surfaces, k, ex, ey, angle_b, angle_j, centre, 1, out_weight
+        )
+        if right > 0.0:
+            break
     left, count_left = _weigh_arc(contacts, surfaces, k, ex, ey, angle_b, angle_j, centre, -1, out_weight)
-    if right + left <= 0.0:  # touch narrower than a sector
-        out_weight[centre] = 1.0
-        right, count_right, count_left = 1.0, 1, 1
+    if right <= 0.0:  # touch narrower than a sector
+        centre, count_right, count_left = towards, 1, 1
+        out_weight[centre] = right = 1.0
+        left = 0.0
     depth = integral / ((right + left) * contacts.bushing_radius[k] * sector * contacts.width[k])
     shift = (angle_b - angle_j) / sector
     floor = math.floor(shift)

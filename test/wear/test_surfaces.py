@@ -55,6 +55,27 @@ def _rub(joint, surfaces, direction, delta, angle_b, angle_j, integral=1.0e6):
 contacts = st.lists(st.tuples(angles, touches, angles, angles, st.floats(0.0, 1.0e6)), min_size=1, max_size=8)
 
 
+@given(
+    sector=st.integers(0, SECTORS - 1),
+    width=st.integers(1, 9),
+    notch=st.floats(2.0e-6, 1.0e-4),
+    delta=st.floats(1.0e-6, 1.9e-6),
+    angle_j=angles,
+)
+def test_a_notch_that_the_journal_spans_wears_no_deeper(joint, sector, width, notch, delta, angle_j):
+    """It rests on the flanks, wherever its centre points: there is no overlap in the notch."""
+    surfaces = fresh_surfaces(joint, feeds_back=True)
+    inside = (sector + np.arange(width) - width // 2) % SECTORS
+    surfaces.depth[0, BUSHING, inside] = notch
+    before = surfaces.depth.copy()
+    e, direction = CLEARANCE + delta, (sector + 0.5) * TURN / SECTORS
+    ex, ey = e * math.cos(direction), e * math.sin(direction)
+    deposit_wear(joint, surfaces, 0, ex, ey, 0.0, angle_j, 1.0, np.zeros(SECTORS))
+    worn = surfaces.depth[0, BUSHING] - before[0, BUSHING]
+    np.testing.assert_array_equal(worn[inside], 0.0)
+    assert worn.sum() > 0.0
+
+
 @given(contacts=contacts, feeds_back=st.sampled_from([0, 1]), seed=st.integers(0, 9))
 def test_volume_is_archards_to_rounding(joint, contacts, feeds_back, seed):
     """On each surface by itself: V = k x integral of F_N |v_t| dt, wherever and however it wore."""

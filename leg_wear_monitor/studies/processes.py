@@ -1,4 +1,4 @@
-"""Points on this machine's cores, in processes of one thread; one that dies costs only its point."""
+"""Points on this machine's cores, in processes of one thread; one that dies costs what was at work then."""
 
 import os
 import signal

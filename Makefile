@@ -1,5 +1,5 @@
 # `make test` and `make demo` do all the set-up themselves, once: Python 3.11 to 3.13 with venv and a C compiler are enough.
-.PHONY: test demo test-oldest clean
+.PHONY: test demo campaign test-oldest clean
 .DELETE_ON_ERROR:
 
 # Percent of lines and branches that the two runs of the tests reach together.
@@ -29,6 +29,10 @@ test: .venv/installed
 
 demo: .venv/installed
 	.venv/bin/leg-wear-monitor demo --out build/demo
+
+# Hostile users by the hundred, minutes to an hour (docs/campaign.md); the tests run a few of each family.
+campaign: .venv/installed
+	PYTHONPATH=test .venv/bin/python -m campaign
 
 # The oldest libraries we support, without ROS; their deprecations are not ours to mend.
 test-oldest: .venv-oldest/installed

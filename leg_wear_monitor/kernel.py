@@ -1,9 +1,7 @@
 """The two ways to compile: ``@kernel`` a formula, ``@entry`` what Python calls, cached and never stale."""
 
 import hashlib
-import os
 import re
-import tempfile
 from collections.abc import Callable, Iterable
 from functools import cache
 from pathlib import Path
@@ -11,17 +9,11 @@ from typing import TypeVar
 
 import numba
 
+from leg_wear_monitor.code_cache import code_directory
+
 _Function = TypeVar("_Function", bound=Callable[..., object])
 
 _IMPORT = re.compile(r"^\s*(?:from|import)\s+(leg_wear_monitor(?:\.\w+)+)", re.MULTILINE)
-
-
-def _writable(directory: Path) -> bool:
-    try:
-        directory.mkdir(parents=True, exist_ok=True)
-    except OSError:
-        return False
-    return os.access(directory, os.W_OK | os.X_OK)
 
 
 @cache
@@ -57,7 +49,7 @@ def _digest(sources: Iterable[Path]) -> str:
 
 
 @cache
-def cache_directory(root: Path | None = None) -> Path:
+def cache_directory(root: Path | None = None) -> Path | None:
     """Directory of the compiled code of a file, named after its sources: what they say and where they lie.
 
     numba looks only at the file of the function it caches: a kernel that calls a kernel of another
@@ -71,20 +63,11 @@ def cache_directory(root: Path | None = None) -> Path:
 
     Returns
     -------
-    pathlib.Path
+    pathlib.Path or None
         Below ``$NUMBA_CACHE_DIR`` if set, else ``$XDG_CACHE_HOME`` or ``~/.cache``, else the temporary
-        directory.
+        directory: the first that is private (`leg_wear_monitor.code_cache`). None if none is.
     """
-    leaf = f"leg_wear_monitor/{_digest(_sources(root) if root else Path(__file__).parent.rglob('*.py'))}"
-    homes = [
-        os.environ.get("NUMBA_CACHE_DIR"),
-        os.environ.get("XDG_CACHE_HOME"),
-        os.path.expanduser("~/.cache"),
-    ]
-    for home in homes:
-        if home and _writable(Path(home) / leaf):
-            return Path(home) / leaf
-    return Path(tempfile.gettempdir()) / f"leg_wear_monitor-{os.getuid()}" / leaf
+    return code_directory(_digest(_sources(root) if root else Path(__file__).parent.rglob("*.py")))
 
 
 def kernel(function: _Function) -> _Function:
@@ -99,12 +82,13 @@ def kernel(function: _Function) -> _Function:
 
 def entry(function: _Function) -> _Function:
     """Compile what Python calls: a kernel with a cache of its own, that lets other threads run meanwhile."""
-    previous = numba.config.CACHE_DIR
-    numba.config.CACHE_DIR = str(cache_directory(Path(function.__code__.co_filename)))
+    home, previous = cache_directory(Path(function.__code__.co_filename)), numba.config.CACHE_DIR
+    numba.config.CACHE_DIR = str(home or previous)
     try:
-        return numba.njit(cache=True, error_model="numpy", _nrt=False, nogil=True)(function)  # type: ignore[no-any-return]
+        compiled = numba.njit(cache=home is not None, error_model="numpy", _nrt=False, nogil=True)(function)
     finally:
         numba.config.CACHE_DIR = previous
+    return compiled  # type: ignore[no-any-return]
 
 
 @kernel

@@ -10,7 +10,7 @@ import numpy as np
 import pytest
 from numba.core.errors import NumbaError
 
-import leg_wear_monitor.kernel
+import leg_wear_monitor
 from leg_wear_monitor.kernel import kernel
 
 LEAF = "from leg_wear_monitor.kernel import kernel\n@kernel\ndef slope(x):\n    return {factor} * x\n"
@@ -32,7 +32,8 @@ class Package:
         self.directory = directory / "leg_wear_monitor"
         self.directory.mkdir()
         (self.directory / "__init__.py").write_text("")
-        shutil.copy(leg_wear_monitor.kernel.__file__, self.directory)
+        for name in ("code_cache", "errors", "kernel"):
+            shutil.copy(Path(leg_wear_monitor.__file__).with_name(f"{name}.py"), self.directory)
         (self.directory / "root.py").write_text(ROOT)
         self.write(2.0)
 

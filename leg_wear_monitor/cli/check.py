@@ -68,6 +68,8 @@ def _kernels() -> str:
     from leg_wear_monitor.kernel import cache_directory
 
     place = cache_directory()
+    if place is None:
+        return "compiled anew at every start: no place for compiled code is private"
     check_directory("NUMBA_CACHE_DIR", place)
     state = "compiled" if is_compiled(DEFAULT_MODEL) else "to be compiled by the first simulation"
     return f"{state}, in {place}"

@@ -8,17 +8,19 @@ from pathlib import Path
 import click
 
 
-def _mark(kernels: str) -> Path:
+def _mark(kernels: str) -> Path | None:
     from leg_wear_monitor.kernel import cache_directory
 
-    return cache_directory() / f"{kernels}.compiled"
+    place = cache_directory()
+    return None if place is None else place / f"{kernels}.compiled"
 
 
 def is_compiled(kernels: str) -> bool:
     """Whether a set of kernels has once been compiled to its end, for exactly these sources."""
     import numba
 
-    return bool(numba.config.DISABLE_JIT) or _mark(kernels).exists()
+    mark = _mark(kernels)
+    return bool(numba.config.DISABLE_JIT) or (mark is not None and mark.exists())
 
 
 @contextmanager
@@ -29,7 +31,9 @@ def compilation(kernels: str, how_long: str = "about half a minute") -> Iterator
         return
     click.echo(f"compiling for this machine, once: {how_long}", err=True)
     yield
-    _mark(kernels).touch()
+    mark = _mark(kernels)
+    if mark is not None:
+        mark.touch()
 
 
 @contextmanager

@@ -1,0 +1,174 @@
+"""Where compiled code may lie. Its index files are pickles, so nobody else may be able to write them."""
+
+import atexit
+import os
+import shutil
+import stat
+import tempfile
+import warnings
+from functools import cache
+from pathlib import Path
+
+from leg_wear_monitor.errors import ConfigWarning
+
+PACKAGE, VARIABLE = "leg_wear_monitor", "NUMBA_CACHE_DIR"
+
+_ASKED = (VARIABLE, "XDG_CACHE_HOME")
+_NOT_KEPT = "compiled code is not kept, so every start compiles anew"
+_MOST_LINKS = 40  # as the kernel follows
+_OTHERS_WRITE, _OTHERS_ENTER, _OTHERS = 0o022, 0o011, 0o077
+
+
+def fault_of(path: Path) -> str | None:
+    """Say why another local user could write below a path, or put another directory in its place.
+
+    Every directory and symbolic link on the way must belong to this user or to root. A directory that
+    others can write to is accepted only with the sticky bit, as ``/tmp`` has it, and only on the way; below a
+    directory that nobody else can enter, the modes do not matter.
+
+    Parameters
+    ----------
+    path : pathlib.Path
+        Need not exist; what does not exist is not judged.
+
+    Returns
+    -------
+    str or None
+        The first thing wrong and how to mend it, None if nothing is.
+    """
+    here, pending, closed, links = Path("/"), _reversed_parts(path.absolute()), False, 0
+    while pending:
+        here, last = here / pending.pop(), not pending
+        if here.name == "..":
+            here, closed = here.parent.parent, False
+            continue
+        try:
+            found = here.lstat()
+        except FileNotFoundError:
+            return None
+        except OSError as error:
+            return f"{here} cannot be read: {error.strerror}"
+        if found.st_uid not in (0, os.geteuid()):
+            return f"{here} belongs to another user (uid {found.st_uid})"
+        if stat.S_ISLNK(found.st_mode):
+            links += 1
+            if links > _MOST_LINKS:
+                return f"{here} is a symbolic link in a loop"
+            rest = [*reversed(pending)]
+            pending = _reversed_parts(here.parent.joinpath(os.readlink(here), *rest))
+            here, closed = Path("/"), False
+        elif not closed and found.st_mode & _OTHERS_WRITE and (last or not found.st_mode & stat.S_ISVTX):
+            return f"{here} can be written to by others (chmod go-w {here})"
+        else:
+            closed = closed or not found.st_mode & _OTHERS_ENTER
+    return None
+
+
+def _reversed_parts(path: Path) -> list[str]:
+    return list(reversed(path.parts[1:]))
+
+
+def make_private(path: Path) -> str | None:
+    """Make a directory for this user alone, mode 0700, or take one that is there; say why it cannot be used.
+
+    Parameters
+    ----------
+    path : pathlib.Path
+        Directories above it are made with mode 0700, too.
+
+    Returns
+    -------
+    str or None
+        What is wrong with it, None if it can be used.
+    """
+    fault = fault_of(path)
+    if fault:
+        return fault
+    try:
+        for directory in (*reversed(path.absolute().parents), path):
+            if not directory.exists():
+                directory.mkdir(mode=0o700, exist_ok=True)
+        if path.stat().st_mode & _OTHERS:
+            path.chmod(0o700)
+    except OSError as error:
+        return f"{path} cannot be made: {error.strerror}"
+    if not os.access(path, os.W_OK | os.X_OK):
+        return f"{path} cannot be written to"
+    return fault_of(path)  # somebody may have been quicker with a part of it
+
+
+@cache
+def code_directory(name: str) -> Path | None:
+    """Directory of this user alone for compiled code.
+
+    Parameters
+    ----------
+    name : str
+        Of the directory itself.
+
+    Returns
+    -------
+    pathlib.Path or None
+        None if no place is safe: then nothing can be kept.
+
+    Warns
+    -----
+    ConfigWarning
+        If a directory that was asked for is refused, or compiled code is not kept.
+    """
+    home = _home()
+    if home is None:
+        return None
+    leaf = home / PACKAGE / name
+    fault = make_private(leaf)
+    if fault:
+        _warn([fault], _NOT_KEPT)
+        return None
+    return leaf
+
+
+@cache
+def _home() -> Path | None:
+    """The first of the usual places that is safe, else a new one that goes with this process."""
+    faults: list[str] = []
+    for name, home in _usual_homes():
+        fault = make_private(home / PACKAGE)
+        if fault is None:
+            refused = [each for each in faults if each.startswith(_ASKED)]
+            if refused:
+                _warn(refused, f"compiled code goes to {home}")
+                os.environ[VARIABLE] = str(home)  # or every child process would say so again
+            return home
+        faults.append(f"{name}: {fault}")
+    _warn(faults, _NOT_KEPT)
+    return _home_of_this_process()
+
+
+def _usual_homes() -> list[tuple[str, Path]]:
+    """Where compiled code may lie, in the order of preference, each with who says so."""
+    asked = [(name, os.environ.get(name)) for name in _ASKED]
+    homes = [(name, Path(home).absolute()) for name, home in asked if home]
+    user = Path(os.path.expanduser("~"))  # "~" itself where there is none
+    if user.is_absolute():
+        homes.append(("home directory", user / ".cache"))
+    shared = Path(tempfile.gettempdir()) / f"{PACKAGE}-{os.geteuid()}"
+    return [*homes, ("temporary directory", shared)]
+
+
+def _home_of_this_process() -> Path | None:
+    """A new private directory, removed at the end; child processes find it through the environment."""
+    home, owner = Path(tempfile.mkdtemp(prefix=f"{PACKAGE}-")), os.getpid()
+
+    def remove() -> None:
+        if os.getpid() == owner:  # not a fork of it
+            shutil.rmtree(home, ignore_errors=True)
+
+    atexit.register(remove)
+    if fault_of(home):  # the temporary directory itself is another's
+        return None
+    os.environ[VARIABLE] = str(home)
+    return home
+
+
+def _warn(faults: list[str], instead: str) -> None:
+    warnings.warn(f"{'; '.join(faults)}; {instead}", ConfigWarning, stacklevel=2)

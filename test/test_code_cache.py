@@ -1,0 +1,197 @@
+"""Compiled code lies where no other local user can put or replace a file: its index files are pickles."""
+
+import os
+import subprocess
+import sys
+import warnings
+from pathlib import Path
+
+import pytest
+
+from leg_wear_monitor.code_cache import code_directory, fault_of, make_private
+from leg_wear_monitor.errors import ConfigWarning
+
+NOBODY = 65534
+WHERE = "from leg_wear_monitor.code_cache import code_directory; print(code_directory('leaf'))"
+TWICE = (
+    f"import subprocess, sys; {WHERE}; sys.stdout.flush(); subprocess.run([sys.executable, '-c', {WHERE!r}])"
+)
+KERNELS = "from leg_wear_monitor.kernel import cache_directory; print(cache_directory())"
+
+as_root = pytest.mark.skipif(os.geteuid() != 0, reason="needs root, to be two users")
+
+
+def mode(path):
+    return path.stat().st_mode & 0o7777
+
+
+def where(program=WHERE, user=None, **environment):
+    """Where a fresh process puts its compiled code, and what it says on stderr."""
+    unset = ("NUMBA_", "XDG_", "COV_", "TMPDIR")
+    kept = {key: value for key, value in os.environ.items() if not key.startswith(unset)} | environment
+    command = [sys.executable, "-W", "default", "-c", program]
+    done = subprocess.run(command, env=kept, text=True, capture_output=True, check=True, user=user)
+    return done.stdout.splitlines(), done.stderr
+
+
+@pytest.fixture
+def shared(tmp_path):
+    """A directory like /tmp, on a way that other users can go, too."""
+    for directory in (tmp_path, *tmp_path.parents):
+        if directory.stat().st_uid == os.geteuid() and directory.name.startswith(("pytest", "test")):
+            directory.chmod(0o755)
+    (tmp_path / "tmp").mkdir()
+    (tmp_path / "tmp").chmod(0o1777)
+    return tmp_path / "tmp"
+
+
+@pytest.mark.plain
+def test_what_is_made_is_private_whatever_the_umask(tmp_path):
+    before = os.umask(0)
+    try:
+        assert make_private(tmp_path / "a" / "b") is None
+    finally:
+        os.umask(before)
+    assert [mode(tmp_path / "a"), mode(tmp_path / "a" / "b")] == [0o700, 0o700]
+
+
+@pytest.mark.plain
+def test_a_directory_of_ours_that_others_can_read_becomes_private(tmp_path):
+    (tmp_path / "a").mkdir(mode=0o755)
+    assert make_private(tmp_path / "a") is None
+    assert mode(tmp_path / "a") == 0o700
+
+
+@pytest.mark.plain
+@pytest.mark.parametrize("bits", [0o777, 0o775, 0o757, 0o1777])
+def test_a_directory_that_others_can_write_to_is_refused(shared, bits):
+    (shared / "a").mkdir()
+    (shared / "a").chmod(bits)
+    fault = make_private(shared / "a")
+    assert fault == f"{shared / 'a'} can be written to by others (chmod go-w {shared / 'a'})"
+    assert mode(shared / "a") == bits
+
+
+@pytest.mark.plain
+def test_on_the_way_the_sticky_bit_makes_the_difference(shared):
+    (shared / "a").mkdir()
+    assert fault_of(shared / "a" / "b") is None
+    shared.chmod(0o777)
+    assert "can be written to by others" in fault_of(shared / "a" / "b")
+
+
+@pytest.mark.plain
+def test_below_a_directory_that_nobody_else_enters_modes_do_not_matter(shared):
+    (shared / "mine" / "open").mkdir(parents=True)
+    (shared / "mine" / "open").chmod(0o777)
+    (shared / "mine").chmod(0o700)
+    assert make_private(shared / "mine" / "open" / "leaf") is None
+    (shared / "mine").chmod(0o711)
+    assert make_private(shared / "mine" / "open" / "leaf") is not None
+
+
+@pytest.mark.plain
+def test_a_link_is_judged_by_where_it_leads(shared):
+    (shared / "open").mkdir()
+    (shared / "open").chmod(0o777)
+    (shared / "mine").mkdir(mode=0o700)
+    (shared / "mine" / "link").symlink_to(shared / "open")
+    (shared / "mine" / "up").symlink_to("../mine/../open")
+    (shared / "mine" / "good").symlink_to("../mine")
+    (shared / "mine" / "loop").symlink_to("loop")
+    assert f"{shared / 'open'} can be written" in fault_of(shared / "mine" / "link" / "leaf")
+    assert f"{shared / 'open'} can be written" in fault_of(shared / "mine" / "up" / "leaf")
+    assert f"{shared / 'open'} can be written" in fault_of(shared / "mine" / "good" / ".." / "open")
+    assert fault_of(shared / "mine" / "good") is None
+    assert "loop" in fault_of(shared / "mine" / "loop")
+
+
+@pytest.mark.plain
+def test_a_file_in_the_way_is_told(tmp_path):
+    (tmp_path / "file").write_text("")
+    assert "Not a directory" in make_private(tmp_path / "file" / "a")
+
+
+@as_root
+@pytest.mark.plain
+def test_what_another_user_owns_is_refused(shared):
+    for name in ("theirs", "link"):
+        (shared / name).mkdir() if name == "theirs" else (shared / name).symlink_to("/root")
+        os.chown(shared / name, NOBODY, NOBODY, follow_symlinks=False)
+        fault = make_private(shared / name / "leaf")
+        assert fault == f"{shared / name} belongs to another user (uid {NOBODY})"
+    assert list((shared / "theirs").iterdir()) == []
+
+
+@as_root
+def test_a_directory_laid_in_advance_by_another_user_is_not_used(shared, tmp_path):
+    """The way in: a service without a home, and a name below /tmp that anybody can foretell."""
+    laid = shared / f"leg_wear_monitor-{os.geteuid()}" / "leg_wear_monitor"
+    laid.mkdir(parents=True)
+    for path in (laid, laid.parent):
+        os.chown(path, NOBODY, NOBODY)
+    (tmp_path / "file").write_text("")
+    (place,), told = where(KERNELS, TMPDIR=str(shared), HOME=str(tmp_path / "file"))
+    assert not any(laid.iterdir())
+    assert Path(place).parents[1].parent == shared
+    assert not Path(place).is_relative_to(laid.parent)
+    assert f"{laid.parent} belongs to another user (uid {NOBODY})" in told
+    assert "compiled code is not kept" in told
+    assert not Path(place).exists()  # gone with the process
+
+
+@as_root
+def test_two_users_have_two_places(shared, tmp_path):
+    """The second user cannot enter the first one's, nor is it led there."""
+    program = (
+        "import os; from leg_wear_monitor.code_cache import code_directory\n"
+        f"os.setgroups([]); os.setgid({NOBODY}); os.setuid({NOBODY})\n"
+        "print(code_directory('leaf'))"
+    )
+    ours, _ = where(TMPDIR=str(shared), HOME="/dev/null")
+    theirs, told = where(program, TMPDIR=str(shared), HOME="/dev/null")
+    assert (Path(ours[0]).parents[1].name, Path(theirs[0]).parents[1].name) == (
+        "leg_wear_monitor-0",
+        f"leg_wear_monitor-{NOBODY}",
+    )
+    assert [Path(each[0]).parents[1].stat().st_mode & 0o077 for each in (ours, theirs)] == [0, 0]
+    assert told == ""
+
+
+def test_a_directory_that_was_asked_for_and_is_refused_is_told_once(shared, tmp_path):
+    """Child processes go where their parent went and say nothing."""
+    (shared / "asked" / "leg_wear_monitor").mkdir(parents=True)
+    (shared / "asked" / "leg_wear_monitor").chmod(0o777)
+    places, told = where(TWICE, NUMBA_CACHE_DIR=str(shared / "asked"), HOME=str(tmp_path / "home"))
+    assert places == [str(tmp_path / "home" / ".cache" / "leg_wear_monitor" / "leaf")] * 2
+    assert told.count("ConfigWarning") == 1
+    assert "NUMBA_CACHE_DIR: " in told
+    assert "can be written to by others (chmod go-w" in told
+
+
+def test_child_processes_share_what_goes_with_their_parent(shared):
+    shared.joinpath(f"leg_wear_monitor-{os.geteuid()}").write_text("in the way")
+    places, told = where(TWICE, TMPDIR=str(shared), HOME="/dev/null")
+    assert places[0] == places[1]
+    assert told.count("compiled code is not kept") == 1
+    assert [path.name for path in shared.iterdir()] == [f"leg_wear_monitor-{os.geteuid()}"]
+
+
+def test_where_no_place_is_safe_nothing_is_kept(shared):
+    """A temporary directory whose entries anybody can rename."""
+    shared.chmod(0o777)
+    places, told = where(TMPDIR=str(shared), HOME="/dev/null")
+    assert places == ["None"]
+    assert "can be written to by others" in told
+
+
+@pytest.mark.plain
+def test_the_usual_place_is_taken_without_a_word(tmp_path, monkeypatch):
+    monkeypatch.setenv("NUMBA_CACHE_DIR", str(tmp_path))
+    from leg_wear_monitor import code_cache
+
+    code_cache._home.cache_clear()
+    with warnings.catch_warnings():
+        warnings.simplefilter("error", ConfigWarning)
+        assert code_directory("a leaf of this test") == tmp_path / "leg_wear_monitor" / "a leaf of this test"
+    code_cache._home.cache_clear()

@@ -38,7 +38,7 @@ class GaitPublisher(ClosingNode):
     """
 
     def __init__(self, **options: Any) -> None:
-        super().__init__("gait_publisher", automatically_declare_parameters_from_overrides=True, **options)
+        super().__init__("gait_publisher", **options)
         self.config = Parameters(self, PublisherConfig).config
         if self.config.precompute and not self.config.duration_s:
             raise ConfigError(self.get_fully_qualified_name(), "precompute", "needs a duration_s above 0 s")

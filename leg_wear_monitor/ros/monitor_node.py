@@ -46,7 +46,7 @@ class MonitorNode(ClosingNode):
     """The monitor, live."""
 
     def __init__(self, **options: Any) -> None:
-        super().__init__("leg_wear_monitor", automatically_declare_parameters_from_overrides=True, **options)
+        super().__init__("leg_wear_monitor", **options)
         self.get_logger().info(ADVICE)
         parameters = Parameters(self, MonitorConfig)
         config = parameters.config

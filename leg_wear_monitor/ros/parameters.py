@@ -4,11 +4,11 @@ from collections.abc import Callable
 from typing import Any, Generic, TypeVar
 
 from rcl_interfaces.msg import ParameterDescriptor, SetParametersResult
-from rclpy.node import Node
 from rclpy.parameter import Parameter as RosParameter
 
 from leg_wear_monitor.errors import ConfigError
 from leg_wear_monitor.monitor.parameters import Parameter, changed, parameters_of, structured, values_of
+from leg_wear_monitor.ros.parameter_node import ParameterNode, plain
 
 Config = TypeVar("Config")
 
@@ -19,12 +19,11 @@ _OF_ROS = ("use_sim_time", "start_type_description_service", "qos_overrides.")
 class Parameters(Generic[Config]):
     """Parameters of a node.
 
-    The node must have been made with ``automatically_declare_parameters_from_overrides=True``: that shows
-    what it was given, unknown names too, which rclpy would ignore.
+    Unknown names that the node was given are refused; rclpy would ignore them.
 
     Parameters
     ----------
-    node : rclpy.node.Node
+    node : ParameterNode
     kind : type
         Class of sections, such as ``MonitorConfig``.
 
@@ -39,16 +38,16 @@ class Parameters(Generic[Config]):
         Naming node, parameter, value, unit and what was expected.
     """
 
-    def __init__(self, node: Node, kind: type[Config]) -> None:
+    def __init__(self, node: ParameterNode, kind: type[Config]) -> None:
         self._source = node.get_fully_qualified_name()
-        given = _given(node)
+        given = {name: value for name, value in node.given.items() if not name.startswith(_OF_ROS)}
         self.config: Config = structured(kind, given, self._source)
         for name, value in values_of(self.config).items():
             _declare(node, parameters_of(kind)[name], value)
 
     def follow(
         self,
-        node: Node,
+        node: ParameterNode,
         changed_to: Callable[[Config], None],
         check_fit: Callable[[Config], None] = lambda _: None,
     ) -> None:
@@ -56,7 +55,7 @@ class Parameters(Generic[Config]):
 
         Parameters
         ----------
-        node : rclpy.node.Node
+        node : ParameterNode
         changed_to : callable
         check_fit : callable, optional
             Raises ConfigError for values that are good by themselves but do not fit the rest.
@@ -78,27 +77,11 @@ class Parameters(Generic[Config]):
 
     def _with(self, parameters: list[RosParameter]) -> Config:
         known = values_of(self.config)
-        changes = {one.name: _plain(one) for one in parameters if one.name in known}
+        changes = {one.name: plain(one) for one in parameters if one.name in known}
         return changed(self.config, changes, self._source)
 
 
-def _given(node: Node) -> dict[str, Any]:
-    """What the node was given, which then is free to be declared as it should be."""
-    given = {}
-    for name in node.get_parameters_by_prefix(""):
-        if not name.startswith(_OF_ROS):
-            given[name] = _plain(node.get_parameter(name))
-            node.undeclare_parameter(name)
-    return given
-
-
-def _plain(parameter: RosParameter) -> Any:
-    """Value as a file would hold it; ROS gives arrays of several kinds."""
-    value = parameter.value
-    return value if isinstance(value, bool | int | float | str) or value is None else list(value)
-
-
-def _declare(node: Node, parameter: Parameter, value: Any) -> None:
+def _declare(node: ParameterNode, parameter: Parameter, value: Any) -> None:
     unit = f" [{parameter.unit}]" if parameter.unit else ""
     descriptor = ParameterDescriptor(
         description=f"{parameter.description}{unit}",
@@ -106,8 +89,12 @@ def _declare(node: Node, parameter: Parameter, value: Any) -> None:
         read_only=parameter.read_only,
     )
     if isinstance(value, tuple) and not value:
-        # rclpy takes an empty array for one of bytes, so it stays unset, but of its type
-        node.declare_parameter(parameter.name, RosParameter.Type[parameter.type.upper()], descriptor)
+        # rclpy takes an empty array for one of bytes; unset it would break every answer that it is in
+        kind = RosParameter.Type[parameter.type.upper()]
+        node.declare_parameter(parameter.name, kind, ParameterDescriptor(), ignore_override=True)
+        node.set_parameters_atomically([RosParameter(parameter.name, kind, [])])
+        descriptor.type = kind.value
+        node.set_descriptor(parameter.name, descriptor)
         return
     node.declare_parameter(
         parameter.name, list(value) if isinstance(value, tuple) else value, descriptor, ignore_override=True

@@ -17,6 +17,7 @@ from rclpy.signals import SignalHandlerOptions
 from rclpy.utilities import remove_ros_args, try_shutdown
 
 from leg_wear_monitor.errors import ConfigError, LegWearError
+from leg_wear_monitor.ros.parameter_node import ParameterNode
 
 DONE, COULD_NOT = 0, 2
 
@@ -25,7 +26,7 @@ DONE, COULD_NOT = 0, 2
 WAKE_S = 0.2
 
 
-class ClosingNode(Node):
+class ClosingNode(ParameterNode):
     """A node that has something to put in order before it goes."""
 
     def close(self) -> None:

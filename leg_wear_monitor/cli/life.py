@@ -6,7 +6,7 @@ from typing import TYPE_CHECKING, Any
 
 import click
 
-from leg_wear_monitor.cli.number import bounded
+from leg_wear_monitor.cli.number import bounded, options_named
 from leg_wear_monitor.cli.output import check_directory, check_file, write_directory, write_file
 from leg_wear_monitor.cli.waiting import compilation, progress_bar
 
@@ -95,7 +95,8 @@ def life(mechanism: str, json_file: Path | None, out: Path | None, **options: An
         check_file("--json", json_file)
     if out is not None:
         check_directory("--out", out)
-    lives = _lives(leg, **options)
+    with options_named():
+        lives = _lives(leg, **options)
     result = lives[0][1]
     for line in lines(result, options["limit_m"]):
         click.echo(line)
@@ -119,8 +120,11 @@ def _with_loose(leg: "Mechanism", names: str | None) -> "Mechanism":
 
 def _lives(leg: "Mechanism", lives: int, opens_m: float | None, **options: Any) -> "Lives":
     import attrs
+    import numpy as np
 
+    from leg_wear_monitor.contact.arrays import clearance_settings
     from leg_wear_monitor.dynamics.life import LifeSettings
+    from leg_wear_monitor.dynamics.life_limits import check_life
     from leg_wear_monitor.dynamics.many_lives import simulate_lives
     from leg_wear_monitor.wear.cycle_jump import JumpControl
 
@@ -128,6 +132,9 @@ def _lives(leg: "Mechanism", lives: int, opens_m: float | None, **options: Any) 
     settings = LifeSettings(**given)
     if opens_m is not None:
         settings = attrs.evolve(settings, jump=JumpControl.of(opens_m))
+    own = clearance_settings(leg, leg.loose)
+    fresh_m, radius_m = np.array([[c.radial_clearance, c.bushing_radius] for c in own]).reshape(-1, 2).T
+    check_life(leg.loose, fresh_m, radius_m, options["limit_m"], settings.jump)
     with compilation("clearance"), progress_bar("life") as progress:
         return list(simulate_lives(leg, settings, lives, progress=progress, **options))
 

@@ -11,6 +11,7 @@ from xml.etree import ElementTree
 import click
 
 from leg_wear_monitor.errors import ConfigWarning, LegWearError
+from leg_wear_monitor.mechanism.nearest import did_you_mean
 from leg_wear_monitor.share import share_directory
 
 COULD_NOT, INTERRUPTED = 2, 130
@@ -30,7 +31,8 @@ class Verbs(click.Group):
     def get_command(self, ctx: click.Context, cmd_name: str) -> click.Command | None:
         """Import a verb's module and give its command."""
         if cmd_name not in _VERBS:
-            raise click.UsageError(f"{cmd_name!r} is no verb, expected one of {', '.join(_VERBS)}", ctx)
+            fault = f"{cmd_name!r} is no verb, expected one of {', '.join(_VERBS)}"
+            raise click.UsageError(fault + did_you_mean(cmd_name, _VERBS), ctx)
         name = cmd_name.replace("-", "_")
         verb: click.Command = getattr(import_module(f"leg_wear_monitor.cli.{name}"), name)
         return verb

@@ -1,9 +1,12 @@
 """A number on the command line: finite, within bounds, and told with its unit when it is not."""
 
 import math
-from collections.abc import Callable
+from collections.abc import Callable, Iterator
+from contextlib import contextmanager
 
 import click
+
+from leg_wear_monitor.errors import ConfigError
 
 
 def bounded(
@@ -36,3 +39,16 @@ def bounded(
         return value
 
     return check
+
+
+@contextmanager
+def options_named() -> Iterator[None]:
+    """Name an option as it is written on the command line, where the library names its parameter."""
+    options = {name for option in click.get_current_context().command.params for name in option.opts}
+    try:
+        yield
+    except ConfigError as error:
+        option = f"--{error.source}".replace("_", "-")
+        if option not in options:
+            raise
+        raise ConfigError(option, error.key, error.fault) from error

@@ -2,17 +2,14 @@
 
 import json
 import time
-from collections.abc import Iterator
-from contextlib import contextmanager
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 import click
 
-from leg_wear_monitor.cli.number import bounded
+from leg_wear_monitor.cli.number import bounded, options_named
 from leg_wear_monitor.cli.output import check_directory, check_file, write_directory, write_file
 from leg_wear_monitor.cli.waiting import compilation, progress_bar
-from leg_wear_monitor.errors import ConfigError
 
 if TYPE_CHECKING:
     from leg_wear_monitor.dynamics.result import SimulationResult
@@ -118,7 +115,7 @@ def simulate(mechanism: str, json_file: Path | None, out: Path | None, **options
         check_file("--json", json_file)
     if out is not None:
         check_directory("--out", out)
-    with _options_named():
+    with options_named():
         result, wall_s = _run(leg, _keywords(**options))
     record = _record(result, wall_s)
     written = _write(record, leg, result, json_file, out)
@@ -157,19 +154,6 @@ def _run(leg: "Mechanism", keywords: dict[str, Any]) -> tuple["SimulationResult"
         began = time.perf_counter()
         result = simulate(leg, **keywords, progress=progress)
         return result, time.perf_counter() - began
-
-
-@contextmanager
-def _options_named() -> Iterator[None]:
-    """Name an option as it is written on the command line."""
-    options = {name for option in click.get_current_context().command.params for name in option.opts}
-    try:
-        yield
-    except ConfigError as error:
-        option = f"--{error.source}".replace("_", "-")
-        if option not in options:
-            raise
-        raise ConfigError(option, error.key, error.fault) from error
 
 
 def _record(result: "SimulationResult", wall_s: float) -> dict[str, Any]:

@@ -22,10 +22,11 @@ from leg_wear_monitor.dynamics.batch_leg import Leg, prepare_legs
 from leg_wear_monitor.dynamics.clearance_run import ClearanceStepper
 from leg_wear_monitor.dynamics.clearance_tables import build_tables
 from leg_wear_monitor.dynamics.drive import steady_drive
+from leg_wear_monitor.dynamics.life_limits import MOST_JUMPS, check_life
 from leg_wear_monitor.dynamics.life_result import Life, LifePoint, life_of
 from leg_wear_monitor.dynamics.run import DONE, Setup, stop
 from leg_wear_monitor.dynamics.tally import ARCHARD, Tally, new_tally
-from leg_wear_monitor.errors import ConfigError
+from leg_wear_monitor.errors import ConfigError, SimulationError
 from leg_wear_monitor.mechanism.arrays import Floats
 from leg_wear_monitor.mechanism.ideal import TURN
 from leg_wear_monitor.mechanism.quantity import described, quantity
@@ -92,8 +93,9 @@ class LifeRun:
     Attributes
     ----------
     loose : tuple of str
-    fresh_m : (k,) array
-        Radial clearances without wear.
+    fresh_m, radius_m : (k,) arrays
+        Radial clearances without wear, and radii of the bushings.
+    settings : LifeSettings
     points : list of LifePoint
         The life so far; the first is where it began.
 
@@ -114,7 +116,7 @@ class LifeRun:
         depth: Floats | None = None,
         workers: int = 1,
     ) -> None:
-        self._settings = settings or LifeSettings()
+        self.settings = settings or LifeSettings()
         self._workers = workers
         alike = Leg(
             mechanism=mechanism,
@@ -123,22 +125,23 @@ class LifeRun:
             speed_rpm=speed_rpm,
             wear=True,
         )
-        legs = _spread_out(alike, self._settings)
+        legs = _spread_out(alike, self.settings)
         self._setups = _setups(legs, wear_factor)
         first = self._setups[0]
         if not first.loose:
             raise ConfigError(mechanism.source, "clearances.joints", "no joint is loose, nothing can wear")
         self.loose, self.fresh_m = first.loose, first.contacts.clearance
+        self.radius_m = first.contacts.bushing_radius
         tables = build_tables(first.linkage, first.contacts)
         self._steppers = [ClearanceStepper(setup, tables=tables) for setup in self._setups]
         self._polynomials = []
-        perturb_m = self._settings.perturb_share * float(self.fresh_m.min())
+        perturb_m = self.settings.perturb_share * float(self.fresh_m.min())
         for leg, stepper in zip(legs, self._steppers, strict=True):
             attrs.evolve(leg, perturb_m=perturb_m).start(stepper)
             self._polynomials.append(steady_drive(leg.crank_angle_rad, first.speed))
         start = np.zeros_like(first.surfaces.depth) if depth is None else depth.copy()
         now = self._now = self._probe(start)
-        self._wish = longest_jump(now.rate, self._settings.jump)
+        self._wish = longest_jump(now.rate, self.settings.jump)
         none = np.zeros_like(now.archard_j)
         self.points = [LifePoint(0.0, start, now.rate, now.peak_force_n, now.toe_position_m, none, 0.0)]
 
@@ -150,7 +153,7 @@ class LifeRun:
         SimulationError
             Where the motion diverges.
         """
-        control, last, now = self._settings.jump, self.points[-1], self._now
+        control, last, now = self.settings.jump, self.points[-1], self._now
         cycles = min(self._wish, longest_jump(now.rate, control), most_cycles)
         for trial in range(_TRIALS):
             then = self._probe(last.depth + cycles * now.rate.depth)
@@ -183,9 +186,9 @@ class LifeRun:
         """Simulate a few cycles with surfaces (k, 2, N) [m]."""
         for setup in self._setups:
             setup.surfaces.depth[:] = depth
-        self._advance(self._settings.settle_cycles)
+        self._advance(self.settings.settle_cycles)
         worn, archard, peak, toe = [], [], [], []
-        for _ in range(self._settings.cycles):
+        for _ in range(self.settings.cycles):
             before = [setup.surfaces.depth.copy() for setup in self._setups]
             tallies = self._advance(1)
             joints = self._setups[0].contacts.joint
@@ -193,7 +196,7 @@ class LifeRun:
             archard += [tally.integral[joints, ARCHARD] for tally in tallies]
             peak += [tally.peak[joints] for tally in tallies]
             toe += [tally.response[0] for tally in tallies]
-        rate = wear_rate(np.array(worn), self._settings.jump.smooth_deg)
+        rate = wear_rate(np.array(worn), self.settings.jump.smooth_deg)
         return _Probe(rate, np.mean(archard, axis=0), np.mean(peak, axis=0), float(np.mean(toe)))
 
     def _advance(self, cycles: int) -> list[Tally]:
@@ -231,11 +234,19 @@ def simulate_life(
     Raises
     ------
     ConfigError
-        If a limit is reached from the start.
+        If a limit does not lie between a joint's new clearance and the radius of its bushing, or if the run's
+        jumps are too short to get there.
     SimulationError
+        Where the motion diverges, or if the life takes more than `MOST_JUMPS` jumps.
     """
     limits = np.broadcast_to(np.asarray(limit_m, dtype=float), len(run.loose))
+    check_life(run.loose, run.fresh_m, run.radius_m, limits, run.settings.jump)
     while run.points[-1].cycles < horizon_cycles:
+        if len(run.points) > MOST_JUMPS:
+            raise SimulationError(
+                f"the life does not end within {MOST_JUMPS} jumps, it is at {run.points[-1].cycles:.3g} "
+                f"of {horizon_cycles:.3g} gait cycles; try longer jumps or a nearer limit"
+            )
         opened = run.points[-1].opened_m
         shares = opened / (limits - run.fresh_m)
         if (shares >= 1.0).any():

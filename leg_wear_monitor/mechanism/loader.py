@@ -12,6 +12,7 @@ from leg_wear_monitor.errors import ConfigError
 from leg_wear_monitor.mechanism import spec
 from leg_wear_monitor.mechanism.clearance import ClearanceSection
 from leg_wear_monitor.mechanism.loose_joints import loose_joints
+from leg_wear_monitor.mechanism.nearest import did_you_mean
 from leg_wear_monitor.mechanism.quantity import FieldError
 from leg_wear_monitor.mechanism.references import check_references
 from leg_wear_monitor.mechanism.strict import choose, mapping, shown, structure
@@ -67,7 +68,8 @@ def load_mechanism(name_or_path: str | Path = "bionic_leg") -> spec.Mechanism:
         raise ConfigError(
             str(name_or_path),
             "",
-            f"no mechanism of this name, expected a file such as ./leg.yaml or one of {', '.join(shipped)}",
+            f"no mechanism of this name, expected a file such as ./leg.yaml or one of {', '.join(shipped)}"
+            + did_you_mean(path.name, shipped),
         )
     path = shipped[path.name]
     return parse_mechanism(read_yaml(path, path.name), path.name)

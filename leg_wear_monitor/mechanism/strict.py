@@ -1,6 +1,5 @@
 """cattrs, made strict: a number is a number, a text a text, an unknown key an error; each fault one line."""
 
-import difflib
 import math
 import reprlib
 from collections.abc import Callable
@@ -12,6 +11,7 @@ from cattrs.errors import ClassValidationError, ForbiddenExtraKeysError
 from cattrs.gen import make_dict_structure_fn
 
 from leg_wear_monitor.errors import ConfigError
+from leg_wear_monitor.mechanism.nearest import nearest
 from leg_wear_monitor.mechanism.quantity import FieldError
 
 _Hook = Callable[[Any, Any], Any]
@@ -82,8 +82,8 @@ def _field_error(error: BaseException) -> FieldError:
 
 
 def _unknown(key: str, known: list[str]) -> FieldError:
-    near = difflib.get_close_matches(key, known, n=1)
-    expected = f"did you mean {near[0]}?" if near else f"expected one of {', '.join(known)}"
+    near = nearest(key, known)
+    expected = f"did you mean {near}?" if near else f"expected one of {', '.join(known)}"
     return FieldError(key, f"unknown key, {expected}")
 
 

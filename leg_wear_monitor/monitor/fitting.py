@@ -8,6 +8,8 @@ import attrs
 
 from leg_wear_monitor.errors import ConfigError
 from leg_wear_monitor.mechanism.clearance import Clearance
+from leg_wear_monitor.mechanism.clearance_range import limit_fault
+from leg_wear_monitor.mechanism.nearest import did_you_mean
 from leg_wear_monitor.mechanism.quantity import FieldError
 from leg_wear_monitor.mechanism.spec import Mechanism, SpeedDrive
 from leg_wear_monitor.monitor.config import MonitorConfig
@@ -40,21 +42,38 @@ def fitted(mechanism: Mechanism, config: MonitorConfig, source: str = "parameter
     _check_joints(loose, mechanism, source)
     speed = 2.0 * math.pi * (config.cadence.commanded_rpm / 60.0)
     settings = {name: _settings(mechanism, config, loose, k, source) for k, name in enumerate(loose)}
-    check_limits(config, loose, source)
-    return attrs.evolve(
+    leg = attrs.evolve(
         mechanism,
         loose=loose,
         clearances=mechanism.clearances | settings,
         drive=attrs.evolve(mechanism.drive, speed=speed),
     )
+    check_limits(config, leg, source)
+    return leg
 
 
-def check_limits(config: MonitorConfig, loose: Sequence[str], source: str = "parameters") -> None:
-    """Whether limits that are given one a joint are one each; raises ConfigError if not."""
-    for limits in ("joint_impact_force_n", "joint_clearance_m"):
-        given = getattr(config.limits, limits)
+def check_limits(config: MonitorConfig, mechanism: Mechanism, source: str = "parameters") -> None:
+    """Whether limits fit a mechanism as `fitted` gives it.
+
+    Raises
+    ------
+    ConfigError
+        If limits that are given one a joint are not one each, or if the limit of a clearance is beyond the
+        bushing's radius, which no clearance reaches.
+    """
+    loose, limits = mechanism.loose, config.limits
+    for name in ("joint_impact_force_n", "joint_clearance_m"):
+        given = getattr(limits, name)
         if given and len(given) != len(loose):
-            raise _wrong_length(source, f"limits.{limits}", given, loose, "")
+            raise _wrong_length(source, f"limits.{name}", given, loose, "")
+    key = "limits.joint_clearance_m" if limits.joint_clearance_m else "limits.clearance_m"
+    each = limits.joint_clearance_m or (limits.clearance_m,) * len(loose)
+    for joint, limit in zip(loose, each, strict=True):
+        clearance = mechanism.clearances[joint]
+        fault = limit_fault(joint, clearance.radial_clearance, clearance.bushing_radius, limit)
+        # a limit below the new clearance is not silent: it raises its alarm at once
+        if fault and limit > clearance.radial_clearance:
+            raise ConfigError(source, key, fault)
 
 
 def twin_settings(config: MonitorConfig, source: str = "parameters") -> TwinSettings:
@@ -97,7 +116,7 @@ def _check_joints(loose: Sequence[str], mechanism: Mechanism, source: str) -> No
                 source,
                 "loose_joints",
                 f"{name!r} has no clearance settings in {mechanism.source}, expected some of: "
-                f"{_ready(mechanism)}",
+                f"{_ready(mechanism)}{did_you_mean(name, mechanism.clearances)}",
             )
     if len(set(loose)) < len(loose):
         raise ConfigError(source, "loose_joints", f"{list(loose)} names a joint twice")

@@ -66,7 +66,8 @@ class Forecaster:
         replaced_ns: Sequence[int],
     ) -> None:
         self._settings, self._loose = settings, mechanism.loose
-        self._fresh_m = [mechanism.clearances[joint].radial_clearance for joint in mechanism.loose]
+        self._clearances = [mechanism.clearances[joint] for joint in mechanism.loose]
+        self._fresh_m = [clearance.radial_clearance for clearance in self._clearances]
         self._law = law_of(mechanism, settings.life, settings.model_sigma)
         self._measurements = list(measurements)
         joints = zip(self._loose, self._fresh_m, replaced_ns, strict=True)
@@ -127,7 +128,7 @@ class Forecaster:
         k = self._loose.index(wear.name)
         found = measure(
             self._settings,
-            self._fresh_m[k],
+            self._clearances[k],
             wear,
             self._measurements,
             clearance_m=clearance_m,

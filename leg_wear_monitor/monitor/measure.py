@@ -6,6 +6,8 @@ import attrs
 import numpy as np
 
 from leg_wear_monitor.errors import ConfigError
+from leg_wear_monitor.mechanism.clearance import Clearance
+from leg_wear_monitor.mechanism.clearance_range import measured_fault, sigma_fault
 from leg_wear_monitor.monitor.belief import Belief, Look, believe
 from leg_wear_monitor.monitor.forecast_config import Forecasting
 from leg_wear_monitor.monitor.ledger_entry import JointWear, Measurement
@@ -49,7 +51,7 @@ def looks_of(measurements: Sequence[Measurement], joint: str, replaced_ns: int) 
 
 def measure(
     settings: Forecasting,
-    fresh_m: float,
+    clearance: Clearance,
     wear: JointWear,
     earlier: Sequence[Measurement],
     *,
@@ -65,8 +67,8 @@ def measure(
     Parameters
     ----------
     settings : Forecasting
-    fresh_m : float
-        Nominal clearance when new.
+    clearance : Clearance
+        Settings of the joint: its nominal clearance when new, and its bushing.
     wear : JointWear
         The joint's present part. The measurement counts for the wear in it, whatever the clock says.
     earlier : sequence of Measurement
@@ -84,11 +86,15 @@ def measure(
     Raises
     ------
     ConfigError
-        For figures that cannot be.
+        For figures that cannot be: they are likely meant in another unit.
     """
-    for name, value in (("clearance", clearance_m), ("sigma", sigma_m)):
-        if not 0.0 < value < 0.1:
-            raise ConfigError(name, "", f"{1e3 * value:g} mm is not above 0 and below 100 mm")
+    fresh_m, radius_m = clearance.radial_clearance, clearance.bushing_radius
+    for name, fault in (
+        ("clearance", measured_fault(wear.name, fresh_m, radius_m, clearance_m)),
+        ("sigma", sigma_fault(radius_m, sigma_m)),
+    ):
+        if fault:
+            raise ConfigError(name, "", fault)
     looks = looks_of(earlier, wear.name, wear.replaced_ns)
     look = Look(clearance_m, sigma_m, float(wear.depth.sum(axis=0).mean()))
     before = believe(settings, fresh_m, looks)

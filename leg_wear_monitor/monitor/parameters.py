@@ -1,6 +1,5 @@
 """Parameters of a node as a flat list of dotted names: for ROS, for files, for documentation."""
 
-import difflib
 from collections.abc import Iterator, Mapping
 from types import MappingProxyType
 from typing import Any, TypeVar
@@ -8,6 +7,7 @@ from typing import Any, TypeVar
 import attrs
 
 from leg_wear_monitor.errors import ConfigError
+from leg_wear_monitor.mechanism.nearest import nearest
 from leg_wear_monitor.mechanism.strict import shown, structure
 from leg_wear_monitor.monitor.config import MonitorConfig
 
@@ -165,8 +165,8 @@ def changed(config: _Config, changes: Mapping[str, Any], source: str = "paramete
 def _check_known(name: str, known: Mapping[str, Parameter], source: str) -> None:
     if name in known:
         return
-    near = difflib.get_close_matches(name, known, n=1)
-    expected = f"did you mean {near[0]}?" if near else "docs/parameters.md lists all there are"
+    near = nearest(name, known)
+    expected = f"did you mean {near}?" if near else "docs/parameters.md lists all there are"
     raise ConfigError(source, name, f"unknown parameter, {expected}")
 
 

@@ -155,9 +155,9 @@ class WearMonitor:
         Raises
         ------
         ConfigError
-            For limits of joints that are not one each; nothing has changed then.
+            For limits that do not fit the mechanism; nothing has changed then.
         """
-        check_limits(config, self.loose)
+        check_limits(config, self.mechanism)
         self.config = config
         self._judge.configure(config)
         if self._encoders:

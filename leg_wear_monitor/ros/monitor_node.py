@@ -69,8 +69,9 @@ class MonitorNode(ClosingNode):
         self._outlets = Outlets(self, outputs.OUTPUTS, self._black_box)
         self._forecasts = ForecastTimes()
         self._compile(decoder)
+        mechanism = self._monitor.mechanism
         parameters.follow(
-            self, self._configure, lambda config: check_limits(config, self._monitor.loose, self.get_name())
+            self, self._configure, lambda config: check_limits(config, mechanism, self.get_name())
         )
         self._serve()
         self._markers = MarkerTopic(self, self._monitor)

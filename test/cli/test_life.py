@@ -2,7 +2,10 @@
 
 import json
 
+import pytest
+
 from leg_wear_monitor import load_mechanism
+from leg_wear_monitor.dynamics import many_lives
 from leg_wear_monitor.monitor.binding import fingerprint
 from leg_wear_monitor.monitor.life_file import read_lives
 
@@ -31,3 +34,27 @@ def test_life_tells_when_each_joint_reaches_its_limit(run, tmp_path):
 def test_life_refuses_what_cannot_be(run):
     assert run(*ONE, "--limit-m", "-1").exit_code == 2
     assert run(*ONE, "--clearances", "Z").exit_code == 2
+
+
+@pytest.mark.plain
+@pytest.mark.parametrize(
+    ("options", "said"),
+    [
+        ("--limit-m 0.0002", "--limit-m: 0.0002 m is not between 0.0002 m, the new clearance of joint B,"),
+        ("--limit-m 0.6", "0.008 m, the radius of its bushing; did you mean 0.0006 m (0.6 mm)?"),
+        (
+            "--opens-m 1e-15",
+            "--opens-m: 1e-15 m a jump takes 4e+11 jumps to the limit, expected at most 10000",
+        ),
+    ],
+)
+def test_a_life_that_would_not_end_is_refused_before_it_begins(run, monkeypatch, options, said):
+    def never(*_arguments, **_keywords):
+        raise AssertionError("the life has begun")
+
+    monkeypatch.setattr(many_lives, "simulate_lives", never)
+    result = run("life", "--mechanism", "four_bar", *options.split())
+    (line,) = result.stderr.splitlines()
+    assert (result.exit_code, result.stdout) == (2, "")
+    assert line.startswith("error: --")
+    assert said in line

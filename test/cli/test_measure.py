@@ -57,7 +57,20 @@ def test_a_contradiction_ends_with_findings_and_leaves_wear_as_it_is(run, ledger
         (("Z", "0.4", "--sigma", "0.01"), "'Z' is no loose joint, expected one of A, B, G, I, J"),
         (("A", "-1", "--sigma", "0.01"), "No such option"),
         (("A", "0.4", "--sigma", "0"), "0 is not above 0 mm"),
-        (("A", "400", "--sigma", "0.01"), "400 mm is not above 0 and below 100 mm"),
+        (
+            ("a", "0.4", "--sigma", "0.01"),
+            "'a' is no loose joint, expected one of A, B, G, I, J; did you mean A?",
+        ),
+        (
+            ("A", "0.00042", "--sigma", "0.005"),
+            "0.00042 mm is not between 0.003 mm, 1 % of the new clearance",
+        ),
+        (("A", "0.00042", "--sigma", "0.005"), "did you mean 0.42 mm?"),
+        (("A", "420", "--sigma", "0.005"), "and 10 mm, the radius of its bushing; did you mean 0.42 mm?"),
+        (("A", "0.0025", "--sigma", "0.005"), "did you mean 2.5 mm?"),
+        (("A", "10.1", "--sigma", "0.01"), "10.1 mm is not between"),
+        (("A", "0.42", "--sigma", "5e-6"), "5e-06 mm is not a standard deviation from 1e-05 mm to 10 mm"),
+        (("A", "0.42", "--sigma", "50"), "50 mm is not a standard deviation"),
     ],
 )
 def test_what_cannot_be_is_refused_in_one_line(run, ledger, arguments, fault):
@@ -66,6 +79,32 @@ def test_what_cannot_be_is_refused_in_one_line(run, ledger, arguments, fault):
     assert len(result.stderr.splitlines()) == 1
     assert fault in result.stderr
     assert rows(ledger) == []
+
+
+def test_a_dry_run_says_the_same_and_leaves_the_ledger_as_it_is(run, ledger):
+    before = {path.name: path.read_bytes() for path in ledger.parent.iterdir()}
+    arguments = ("measure", "A", "0.42", "--sigma", "0.005", "--ledger", str(ledger))
+    dry = run(*arguments, "--dry-run")
+    assert {path.name: path.read_bytes() for path in ledger.parent.iterdir()} == before
+    assert (dry.exit_code, dry.stderr) == (0, "")
+    assert dry.stdout.splitlines()[-1] == "dry run: nothing was written"
+    assert dry.stdout.splitlines()[:-1] == run(*arguments).stdout.splitlines()
+
+
+def test_a_dry_run_names_the_ledger_that_is_damaged_and_not_its_copy(run, tmp_path):
+    (tmp_path / "bad.ledger").write_bytes(b"no ledger" * 100)
+    result = run("measure", "A", "0.42", "--sigma", "0.005", "--ledger", "bad.ledger", "--dry-run")
+    assert result.exit_code == 2
+    (line,) = result.stderr.splitlines()
+    assert line.startswith("error: bad.ledger: ")
+    assert [path.name for path in tmp_path.iterdir()] == ["bad.ledger"]
+
+
+def test_a_dry_run_creates_no_ledger(run, tmp_path):
+    (tmp_path / "mine.yaml").write_text("/**: {ros__parameters: {ledger.path: new.ledger}}")
+    result = run("measure", "A", "0.3", "--sigma", "0.005", "--config", "mine.yaml", "--dry-run")
+    assert result.exit_code == 0
+    assert [path.name for path in tmp_path.iterdir()] == ["mine.yaml"]
 
 
 def test_a_ledger_has_to_be_named(run):

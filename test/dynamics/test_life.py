@@ -1,11 +1,14 @@
 """A life by cycle jumps: what it keeps, what it repeats, and that it meets the wear it jumps over."""
 
+import math
 from itertools import pairwise
 
+import attrs
 import numpy as np
 import pytest
 
-from leg_wear_monitor import ConfigError
+from leg_wear_monitor import ConfigError, SimulationError
+from leg_wear_monitor.dynamics import life as life_module
 from leg_wear_monitor.dynamics.batch_leg import Leg
 from leg_wear_monitor.dynamics.clearance_run import ClearanceStepper
 from leg_wear_monitor.dynamics.drive import steady_drive
@@ -91,9 +94,49 @@ def test_jumps_meet_every_single_cycle(leg):
     every = setup.surfaces.depth.mean(axis=2).sum(axis=1)
     settings = LifeSettings(legs=2, cycles=5, jump=JumpControl(opens_m=2e-5))
     run = LifeRun(leg, settings, clearances=("A", "B"), wear_factor=factor)
-    simulate_life(run, limit_m=1.0, horizon_cycles=float(cycles))
+    simulate_life(run, limit_m=9.0e-3, horizon_cycles=float(cycles))
     assert run.points[-1].cycles == pytest.approx(cycles)
     np.testing.assert_allclose(run.points[-1].opened_m, every, rtol=0.12)
+
+
+@pytest.mark.parametrize(
+    ("limit_m", "meant"),
+    [
+        (3.0e-4, None),
+        (2.0e-4, None),
+        (0.0, None),
+        (-6.0e-4, None),
+        (math.nan, None),
+        (math.inf, None),
+        (1.0e-2, None),
+        (0.6, "did you mean 0.0006 m (0.6 mm)?"),
+        (600.0, "did you mean 0.0006 m (0.6 mm)?"),
+        (6.0e-7, "did you mean 0.0006 m (0.6 mm)?"),
+    ],
+)
+def test_a_limit_lies_between_the_new_clearance_and_the_bushing(lived, limit_m, meant):
+    """Nothing else ends a life: below, the limit is behind from the start; above, no clearance gets there."""
+    with pytest.raises(ConfigError, match=r"^limit-m: .* is not between 0.0003 m, the new clearance") as told:
+        simulate_life(lived[0], limit_m=limit_m, horizon_cycles=1e9)
+    assert "0.01 m, the radius of its bushing" in str(told.value)
+    assert str(told.value).endswith(meant or "bushing")
+
+
+def test_every_joint_has_a_limit_of_its_own(lived):
+    with pytest.raises(ConfigError, match=r"0.0002 m is not between .* joint B"):
+        simulate_life(lived[0], limit_m=[3.6e-4, 2.0e-4], horizon_cycles=1e9)
+
+
+def test_jumps_too_short_to_reach_the_limit_are_refused(leg):
+    run = LifeRun(leg, attrs.evolve(SHORT, jump=JumpControl.of(1e-12)), clearances=("A",))
+    with pytest.raises(ConfigError, match=r"^opens-m: 1e-12 m a jump takes 3e\+08 jumps"):
+        simulate_life(run, limit_m=6e-4, horizon_cycles=1e9)
+
+
+def test_a_life_that_takes_too_many_jumps_says_so(lived, monkeypatch):
+    monkeypatch.setattr(life_module, "MOST_JUMPS", 1)
+    with pytest.raises(SimulationError, match="does not end within 1 jumps"):
+        simulate_life(lived[0], limit_m=9e-3, horizon_cycles=1e9)
 
 
 def test_a_leg_without_loose_joints_has_no_life(leg):

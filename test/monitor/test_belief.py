@@ -9,7 +9,7 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from leg_wear_monitor import ConfigError
+from leg_wear_monitor import ConfigError, load_mechanism
 from leg_wear_monitor.monitor.belief import Look, believe
 from leg_wear_monitor.monitor.forecast_config import Forecasting
 from leg_wear_monitor.monitor.ledger_entry import JointWear
@@ -18,6 +18,7 @@ from leg_wear_monitor.monitor.measure import measure
 pytestmark = pytest.mark.plain
 
 FRESH, PRIOR = 3.0e-4, Forecasting()
+CLEARANCE = load_mechanism("bionic_leg").clearances["A"]
 HOUR = 3_600_000_000_000
 
 
@@ -29,7 +30,7 @@ def worn(wear_m, cycles=1000, replaced_ns=0):
 def found(wear, mm, earlier=(), **more):
     """What a clearance in mm says, good to 5 µm."""
     given = {"sigma_m": 5e-6, "stamp_ns": 9 * HOUR, "who": "ann", **more}
-    return measure(PRIOR, FRESH, wear, earlier, clearance_m=1e-3 * mm, **given)
+    return measure(PRIOR, CLEARANCE, wear, earlier, clearance_m=1e-3 * mm, **given)
 
 
 def test_without_a_measurement_the_belief_is_the_lognormal_prior():
@@ -134,5 +135,7 @@ def test_a_clock_that_has_jumped_is_said_and_changes_nothing():
     ("clearance_m", "sigma_m"), [(0.0, 1e-6), (0.2, 1e-6), (3e-4, 0.0), (math.nan, 1e-6)]
 )
 def test_figures_that_cannot_be_are_refused(clearance_m, sigma_m):
-    with pytest.raises(ConfigError, match="mm is not above 0"):
-        measure(PRIOR, FRESH, worn(0.0), (), clearance_m=clearance_m, sigma_m=sigma_m, stamp_ns=1, who="ann")
+    with pytest.raises(ConfigError, match=r"mm is not (between|a standard deviation)"):
+        measure(
+            PRIOR, CLEARANCE, worn(0.0), (), clearance_m=clearance_m, sigma_m=sigma_m, stamp_ns=1, who="ann"
+        )

@@ -53,6 +53,8 @@ class Entry:
         Those that are not OK.
     spans : tuple of (int, int)
         Begin and end [ns] of the stretches of this run that are counted.
+    span_epochs : tuple of int
+        Epoch of the clock of each span; none if all are of epoch 0.
     """
 
     stamp_ns: int
@@ -60,9 +62,15 @@ class Entry:
     totals: dict[str, float]
     alarms: tuple[Alarm, ...] = ()
     spans: tuple[tuple[int, int], ...] = ()
+    span_epochs: tuple[int, ...] = ()
+
+    @property
+    def moving_s(self) -> float:
+        """Time in motion that is counted, over all runs."""
+        return self.totals.get("moving_s", 0.0)
 
     def digest(self) -> bytes:
-        """Checksum of everything: SQLite has none over its pages."""
+        """Checksum of everything but epochs, as ledgers up to format 3 keep it."""
         sum_ = hashlib.sha256(struct.pack("<q", self.stamp_ns))
         for joint in sorted(self.joints, key=lambda joint: joint.name):
             sum_.update(repr((joint.name, joint.cycles, joint.moving_s, joint.replaced_ns)).encode())
@@ -85,12 +93,18 @@ class Audit:
     who, what : str
     joint : JointWear or None
         As it was before.
+    undoes : int or None
+        The `id` of what this undid.
+    id : int
+        Of its row, 0 before it is written.
     """
 
     stamp_ns: int
     who: str
     what: str
     joint: JointWear | None = None
+    undoes: int | None = None
+    id: int = 0
 
 
 @attrs.frozen
@@ -130,7 +144,11 @@ class Measurement:
     expected_below : float
         Probability with which a smaller one was expected.
     counts : bool
-        Whether the forecast believes it.
+        Whether the forecast believes it, unless it was withdrawn.
+    withdrawn_ns, withdrawn_by : int, str
+        When and by whom it was withdrawn; 0 and empty if it was not.
+    id : int
+        Of its row in the ledger, 0 before it is written.
     """
 
     stamp_ns: int
@@ -143,6 +161,23 @@ class Measurement:
     replaced_ns: int
     expected_below: float
     counts: bool
+    withdrawn_ns: int = 0
+    withdrawn_by: str = ""
+    id: int = attrs.field(default=0, eq=False)
+
+    @property
+    def is_withdrawn(self) -> bool:
+        """Whether it was; it stays in the ledger, and does not count."""
+        return self.withdrawn_ns != 0
+
+
+@attrs.frozen
+class Withdrawal:
+    """A measurement, by the `id` of its row, does not count any more."""
+
+    stamp_ns: int
+    who: str
+    measurement: int
 
 
 @attrs.frozen
@@ -180,11 +215,11 @@ class Commissioned:
     covariance: Floats
 
     def digest(self) -> bytes:
-        """Checksum of everything."""
+        """Checksum of everything, as ledgers of format 3 keep it."""
         sum_ = hashlib.sha256(repr((self.stamp_ns, self.encoders)).encode())
         for part in (self.centre_rad, self.mean, self.covariance):
             sum_.update(np.ascontiguousarray(part, dtype="<f8").tobytes())
         return sum_.digest()
 
 
-Event = Audit | AlarmEvent | ClearancePoint | Measurement | ForecastPoint | Commissioned
+Event = Audit | AlarmEvent | ClearancePoint | Measurement | Withdrawal | ForecastPoint | Commissioned

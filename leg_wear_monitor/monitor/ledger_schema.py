@@ -5,6 +5,10 @@ all of them; an older one sees those it lacks, in one transaction, when it is op
 once it was released: what comes later is a further step. A file of a newer format is refused.
 """
 
+import sqlite3
+from contextlib import closing
+from functools import cache
+
 APPLICATION_ID = 0x4C574C31  # "LWL1"
 
 _FIRST = """
@@ -84,6 +88,139 @@ CREATE TABLE commissioning (
 ) STRICT;
 """
 
-MIGRATIONS = (_FIRST, _SECOND, _THIRD)
+# Tables are made anew, not altered: the text of each is then the one here, and can be compared with it.
+_FOURTH = """
+CREATE TEMP TABLE former AS SELECT * FROM run;
+DROP TABLE run;
+
+-- a start of the monitor; closed is 1 once it ended in order, interval_s the longest time between entries,
+-- epoch the one of its clock at its end, boot_id the computer's, '' if not known
+CREATE TABLE run (
+    id INTEGER PRIMARY KEY, closed INTEGER NOT NULL, interval_s REAL NOT NULL,
+    epoch INTEGER NOT NULL DEFAULT 0, boot_id TEXT NOT NULL DEFAULT ''
+) STRICT;
+INSERT INTO run SELECT id, closed, interval_s, 0, '' FROM former;
+DROP TABLE former;
+
+CREATE TEMP TABLE former AS SELECT * FROM span;
+DROP TABLE span;
+
+-- time whose wear is in the surfaces, by the clock of an epoch
+CREATE TABLE span (
+    run INTEGER NOT NULL, part INTEGER NOT NULL, begin_ns INTEGER NOT NULL, end_ns INTEGER NOT NULL,
+    epoch INTEGER NOT NULL DEFAULT 0, PRIMARY KEY (run, part)
+) STRICT;
+INSERT INTO span SELECT run, part, begin_ns, end_ns, 0 FROM former;
+DROP TABLE former;
+
+CREATE TEMP TABLE former AS SELECT * FROM measurement;
+DROP TABLE measurement;
+
+-- clearances measured by hand: of which part (replaced_ns as in joint), what the twin had counted for it,
+-- with what probability a smaller one was expected, whether the forecast believes it, and when and by whom it
+-- was withdrawn, 0 and '' if it was not
+CREATE TABLE measurement (
+    id INTEGER PRIMARY KEY, stamp_ns INTEGER NOT NULL, joint TEXT NOT NULL, who TEXT NOT NULL,
+    clearance_m REAL NOT NULL, sigma_m REAL NOT NULL, wear_m REAL NOT NULL, cycles INTEGER NOT NULL,
+    replaced_ns INTEGER NOT NULL, expected_below REAL NOT NULL, counts INTEGER NOT NULL,
+    withdrawn_ns INTEGER NOT NULL DEFAULT 0, withdrawn_by TEXT NOT NULL DEFAULT ''
+) STRICT;
+INSERT INTO measurement SELECT id, stamp_ns, joint, who, clearance_m, sigma_m, wear_m, cycles, replaced_ns,
+    expected_below, counts, 0, '' FROM former;
+DROP TABLE former;
+
+CREATE TEMP TABLE former AS SELECT * FROM audit;
+DROP TABLE audit;
+
+-- who did what to the wear; the joint is as it was before (of rows of older formats without moving_s and
+-- replaced_ns), undoes is the row that was undone
+CREATE TABLE audit (
+    id INTEGER PRIMARY KEY, stamp_ns INTEGER NOT NULL, who TEXT NOT NULL, what TEXT NOT NULL, joint TEXT,
+    cycles INTEGER, depth BLOB, moving_s REAL, replaced_ns INTEGER, undoes INTEGER
+) STRICT;
+INSERT INTO audit SELECT id, stamp_ns, who, what, joint, cycles, depth, NULL, NULL, NULL FROM former;
+DROP TABLE former;
+
+CREATE TEMP TABLE former AS SELECT * FROM commissioning;
+DROP TABLE commissioning;
+
+-- errors of further encoders; the last row is in force. encoders: a line each; errors: float64, little
+-- endian: centres (m), their mean (1 + 2 m) and its covariance
+CREATE TABLE commissioning (
+    id INTEGER PRIMARY KEY, stamp_ns INTEGER NOT NULL, encoders TEXT NOT NULL, errors BLOB NOT NULL
+) STRICT;
+INSERT INTO commissioning SELECT id, stamp_ns, encoders, errors FROM former;
+DROP TABLE former;
+
+CREATE TEMP TABLE former AS SELECT * FROM joint;
+DROP TABLE joint;
+
+-- depth: float64, little endian, (2, sectors) of bushing and journal [m]; the rest since the part was new.
+-- Rows of the head in force alone; they come before those of the last one go, so that they take the pages of
+-- the one before that, which are free: no page that holds anything is written over
+CREATE TABLE joint (
+    head INTEGER NOT NULL, name TEXT NOT NULL, depth BLOB NOT NULL, cycles INTEGER NOT NULL,
+    moving_s REAL NOT NULL, replaced_ns INTEGER NOT NULL, PRIMARY KEY (head, name)
+) STRICT;
+INSERT INTO joint SELECT 0, name, depth, cycles, moving_s, replaced_ns FROM former;
+DROP TABLE former;
+
+CREATE TEMP TABLE former AS SELECT * FROM entry;
+DROP TABLE entry;
+
+-- the one entry that the tables hold: joint, total, alarm and its run's spans are of this instant; what came
+-- after it is in the log beside the file
+CREATE TABLE entry (
+    id INTEGER PRIMARY KEY CHECK (id = 1), run INTEGER NOT NULL, stamp_ns INTEGER NOT NULL
+) STRICT;
+INSERT INTO entry SELECT id, run, stamp_ns FROM former;
+DROP TABLE former;
+
+-- a checksum over all rows of each table; of one that only grows up to its row of id last
+CREATE TABLE seal (name TEXT PRIMARY KEY, last INTEGER NOT NULL, digest BLOB NOT NULL) STRICT;
+
+-- the last transaction: the how many-th it was, and a checksum over seals, tables' definitions and the
+-- checksum before, which is that of the log's last record or of the head before
+CREATE TABLE head (
+    id INTEGER PRIMARY KEY CHECK (id = 1), number INTEGER NOT NULL, previous BLOB NOT NULL,
+    digest BLOB NOT NULL
+) STRICT;
+"""
+
+MIGRATIONS = (_FIRST, _SECOND, _THIRD, _FOURTH)
 
 FORMAT = len(MIGRATIONS)
+SEALED_FROM = 4  # the first format whose content has checksums all over
+
+GROWING = ("alarm_history", "audit", "commissioning", "forecast", "history")  # rows come, none changes
+CHANGING = ("alarm", "binding", "entry", "joint", "measurement", "run", "span", "total")
+
+Definitions = list[tuple[str, str, str, str | None]]
+
+
+def migrate(db: sqlite3.Connection, found: int) -> None:
+    """Bring a file of a format to ours; to be called within a transaction."""
+    for step in MIGRATIONS[found:]:
+        run_step(db, step)
+    db.execute(f"PRAGMA user_version = {FORMAT}")
+
+
+def run_step(db: sqlite3.Connection, step: str) -> None:
+    """Execute the statements of a step, without ending the transaction."""
+    for statement in step.split(";\n"):
+        if statement.strip():
+            db.execute(statement)
+
+
+def definitions(db: sqlite3.Connection) -> Definitions:
+    """All that a file defines: tables and indexes, and triggers and views if anybody put some in."""
+    return db.execute("SELECT type, name, tbl_name, sql FROM sqlite_master ORDER BY type, name").fetchall()
+
+
+@cache
+def expected_definitions(number: int) -> tuple[tuple[str, str, str, str | None], ...]:
+    """What a file of a format defines."""
+    with closing(sqlite3.connect(":memory:", isolation_level=None)) as db:
+        for step in MIGRATIONS[:number]:
+            run_step(db, step)
+        return tuple(definitions(db))

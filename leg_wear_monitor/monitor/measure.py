@@ -45,7 +45,7 @@ def looks_of(measurements: Sequence[Measurement], joint: str, replaced_ns: int) 
     return [
         Look(m.clearance_m, m.sigma_m, m.wear_m)
         for m in measurements
-        if m.joint == joint and m.replaced_ns == replaced_ns and m.counts
+        if m.joint == joint and m.replaced_ns == replaced_ns and m.counts and not m.is_withdrawn
     ]
 
 

@@ -19,7 +19,6 @@ from leg_wear_monitor.monitor.ledger_entry import (
     Audit,
     ClearancePoint,
     ForecastPoint,
-    Measurement,
 )
 from leg_wear_monitor.monitor.ledger_file import LedgerError
 from leg_wear_monitor.monitor.ledger_schema import FORMAT
@@ -73,31 +72,6 @@ def test_a_run_that_was_cut_off_says_how_much_may_be_lost(open_ledger, entry_at)
 def test_a_run_without_an_entry_is_cut_off_too(open_ledger):
     open_ledger().close()
     assert open_ledger().cut_off_s == 5.0
-
-
-def test_a_ledger_of_the_first_format_is_migrated_and_goes_on(open_ledger, entry_at, tmp_path):
-    ledger = open_ledger()
-    ledger.keep(entry_at(3), closed=True)
-    ledger.close()
-    with closing(sqlite3.connect(tmp_path / "wear.ledger", isolation_level=None)) as db:
-        db.execute("DROP TABLE measurement")
-        db.execute("DROP TABLE forecast")
-        db.execute("DROP TABLE commissioning")
-        db.execute("PRAGMA user_version = 1")
-    found = open_ledger()
-    assert found.entry.digest() == entry_at(3).digest()
-    measured = Measurement(
-        stamp_ns=1, joint="A", who="ann", clearance_m=3e-4, sigma_m=1e-6, wear_m=1e-5, cycles=3,
-        replaced_ns=0, expected_below=0.3, counts=True,
-    )  # fmt: skip
-    found.note(measured)
-    found.note(ForecastPoint(5, 7, "A", 1.0, 2.0, 3.0))
-    found.record()
-    found.close()
-    again = open_ledger()
-    assert again.measurements == (measured,)
-    assert again.entry.digest() == entry_at(3).digest()
-    assert again.cut_off_s is None
 
 
 def test_events_that_are_recorded_leave_it_known_that_a_run_was_cut_off(open_ledger, entry_at):

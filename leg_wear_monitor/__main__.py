@@ -1,5 +1,5 @@
 """``python -m leg_wear_monitor``."""
 
-from leg_wear_monitor.cli.main import main
+from leg_wear_monitor.cli.start import main
 
 main()

@@ -1,6 +1,6 @@
 """``leg-wear-monitor gait-publisher``: the synthetic leg as a node."""
 
-from leg_wear_monitor.cli.node import node_script, node_verb
+from leg_wear_monitor.cli.node import node_verb
 
 gait_publisher = node_verb(
     "gait-publisher",
@@ -13,8 +13,3 @@ gait_publisher = node_verb(
     tells them. What `ros2 run leg_wear_monitor gait_publisher` starts.
     """,
 )
-
-
-def main() -> None:
-    """Entry point of ``ros2 run leg_wear_monitor gait_publisher``."""
-    node_script(gait_publisher)

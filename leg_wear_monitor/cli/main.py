@@ -30,7 +30,7 @@ class Verbs(click.Group):
 
     def get_command(self, ctx: click.Context, cmd_name: str) -> click.Command | None:
         """Import a verb's module and give its command."""
-        if cmd_name not in _VERBS:
+        if cmd_name.replace("_", "-") not in _VERBS:
             fault = f"{cmd_name!r} is no verb, expected one of {', '.join(_VERBS)}"
             raise click.UsageError(fault + did_you_mean(cmd_name, _VERBS), ctx)
         name = cmd_name.replace("-", "_")
@@ -127,6 +127,9 @@ def cli(ctx: click.Context) -> None:
         raise click.UsageError(f"no verb, expected one of {', '.join(_VERBS)}", ctx)
 
 
-def main() -> None:
-    """Entry point of ``leg-wear-monitor``."""
-    cli()
+def main(node: str | None = None) -> None:
+    """Run the command line, or the verb of a node as the program that ``ros2 run`` starts."""
+    if node is None:
+        cli()
+    else:
+        cli([node, *sys.argv[1:]], prog_name="ros2 run leg_wear_monitor")

@@ -1,6 +1,6 @@
 """``leg-wear-monitor monitor``: the node that follows a real leg."""
 
-from leg_wear_monitor.cli.node import node_script, node_verb
+from leg_wear_monitor.cli.node import node_verb
 
 monitor = node_verb(
     "monitor",
@@ -12,8 +12,3 @@ monitor = node_verb(
     docs/parameters.md lists them. What `ros2 run leg_wear_monitor monitor` starts.
     """,
 )
-
-
-def main() -> None:
-    """Entry point of ``ros2 run leg_wear_monitor monitor``."""
-    node_script(monitor)

@@ -1,6 +1,5 @@
 """A node as a verb: its arguments are those of ROS, and without ROS there is one line."""
 
-import sys
 from collections.abc import Callable, Sequence
 from importlib import import_module
 
@@ -43,10 +42,3 @@ def node_verb(name: str, module: str, summary: str, text: str) -> click.Command:
         return node_main(module)([name, *arguments])
 
     return verb
-
-
-def node_script(verb: click.Command) -> None:
-    """Run a verb as what ``ros2 run`` starts, errors as lines."""
-    from leg_wear_monitor.cli.main import cli
-
-    cli([verb.name or "", *sys.argv[1:]])

@@ -11,6 +11,7 @@ from leg_wear_monitor.cli.main import version
 from leg_wear_monitor.cli.output import check_directory, check_file, write_directory, write_file
 from leg_wear_monitor.cli.waiting import compilation, progress_bar
 from leg_wear_monitor.errors import LegWearError
+from leg_wear_monitor.interrupt import closed_at_the_end
 
 if TYPE_CHECKING:
     from leg_wear_monitor.monitor.config import MonitorConfig
@@ -121,7 +122,7 @@ def _run(
     began = [0.0]
 
     def ready(monitor: Any) -> None:
-        with compilation("monitor", "about a minute"):
+        with compilation("monitor", "about a minute"), closed_at_the_end(monitor.close):
             monitor.warm_up()
         began[0] = time.perf_counter()
 

@@ -7,6 +7,8 @@ from pathlib import Path
 
 import click
 
+from leg_wear_monitor.interrupt import closed_at_the_end
+
 
 def _mark(kernels: str) -> Path | None:
     from leg_wear_monitor.kernel import cache_directory
@@ -48,4 +50,5 @@ def progress_bar(what: str) -> Iterator[Callable[[float], None]]:
     columns = (TextColumn(what), BarColumn(), TaskProgressColumn(), TimeRemainingColumn())
     with Progress(*columns, console=Console(stderr=True), transient=True) as bar:
         task = bar.add_task(what, total=1.0)
-        yield lambda share: bar.update(task, completed=share)
+        with closed_at_the_end(bar.stop):  # it hides the cursor
+            yield lambda share: bar.update(task, completed=share)

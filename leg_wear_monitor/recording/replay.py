@@ -9,7 +9,7 @@ import numpy as np
 
 from leg_wear_monitor.mechanism.loader import load_mechanism
 from leg_wear_monitor.monitor.config import MonitorConfig
-from leg_wear_monitor.monitor.ledger import open_ledger
+from leg_wear_monitor.monitor.opening import open_monitor
 from leg_wear_monitor.monitor.parameter_file import load_config
 from leg_wear_monitor.monitor.wear_monitor import WearMonitor
 from leg_wear_monitor.recording.findings import Finding, RecordingError
@@ -123,7 +123,7 @@ def replay(
     topics = {"joint_states": joint_states, "drive_torque": drive_torque}
     with Recording(named, config, time=time, **topics) as recording, ExitStack() as stack:
         mechanism = load_mechanism(config.mechanism)
-        monitor = WearMonitor(mechanism, config, open_ledger(mechanism, config))
+        monitor = open_monitor(mechanism, config)
         stack.callback(monitor.close)
         result = ReplayResult(monitor, History(monitor.loose), recording.files, recording.topics, time)
         sink = None if out is None else stack.enter_context(_sink(Path(out), monitor, recording.files))

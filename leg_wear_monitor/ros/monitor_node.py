@@ -10,11 +10,12 @@ from rclpy.clock_type import ClockType
 from std_srvs.srv import Trigger
 
 from leg_wear_monitor.errors import LegWearError
+from leg_wear_monitor.interrupt import closed_at_the_end
 from leg_wear_monitor.mechanism.loader import load_mechanism
 from leg_wear_monitor.monitor.alarms import Alarm
 from leg_wear_monitor.monitor.config import MonitorConfig
 from leg_wear_monitor.monitor.fitting import check_limits
-from leg_wear_monitor.monitor.ledger import open_ledger
+from leg_wear_monitor.monitor.opening import open_monitor
 from leg_wear_monitor.monitor.reports import AlarmList, Reports
 from leg_wear_monitor.monitor.wear_monitor import WearMonitor
 from leg_wear_monitor.recording import outputs
@@ -51,12 +52,13 @@ class MonitorNode(ClosingNode):
         parameters = Parameters(self, MonitorConfig)
         config = parameters.config
         mechanism = load_mechanism(config.mechanism)
-        self._monitor = WearMonitor(mechanism, config, open_ledger(mechanism, config))
-        try:
-            self._get_ready(parameters)
-        except BaseException:  # a signal, too: the next start must not take the ledger for cut off
-            self._monitor.close()
-            raise
+        self._monitor = open_monitor(mechanism, config)
+        with closed_at_the_end(self._monitor.close):
+            try:
+                self._get_ready(parameters)
+            except BaseException:  # a signal, too: the next start must not take the ledger for cut off
+                self._monitor.close()
+                raise
 
     def _get_ready(self, parameters: Parameters[MonitorConfig]) -> None:
         """All that comes after the ledger was opened; says so when done."""

@@ -1,10 +1,12 @@
 """From a shell to a running node and back: arguments, signals, executor, exit code."""
 
+import os
 import signal
 import sys
 import threading
 from collections.abc import Callable, Iterator, Sequence
 from contextlib import contextmanager
+from types import FrameType
 from typing import TypeVar
 
 import rclpy
@@ -17,9 +19,12 @@ from rclpy.signals import SignalHandlerOptions
 from rclpy.utilities import remove_ros_args, try_shutdown
 
 from leg_wear_monitor.errors import ConfigError, LegWearError
+from leg_wear_monitor.interrupt import put_in_order, would_be_lost
 from leg_wear_monitor.ros.parameter_node import ParameterNode
 
 DONE, COULD_NOT = 0, 2
+
+_SIGNALS = (signal.SIGINT, signal.SIGTERM)
 
 # An executor of events took a sixth of the default one's time (docs/decisions/0008-live-node.md). Its spin()
 # without a timeout hangs at full load in the Jazzy wheels, so it is called with one, again and again.
@@ -70,6 +75,26 @@ def _init(argv: list[str]) -> None:
         raise ConfigError(argv[0], "", f"unknown argument {stray[0]!r}, expected --ros-args ...")
 
 
+def _stop_making(_number: int, frame: FrameType | None) -> None:
+    """Give up a node that is being made: by an exception, or, where that would be lost, here and now."""
+    for number in _SIGNALS:
+        signal.signal(number, signal.SIG_IGN)  # once; a launch file sends more of them
+    if not would_be_lost(frame):
+        raise KeyboardInterrupt
+    code = COULD_NOT
+    try:
+        put_in_order()
+        code = DONE
+    except LegWearError as error:
+        _say(error)
+    finally:
+        os._exit(code)
+
+
+def _say(error: LegWearError) -> None:
+    print(f"error: {' '.join(str(error).split())}", file=sys.stderr, flush=True)
+
+
 def run(
     make: Callable[[], _Node], serve: Callable[[_Node, Callable[[], bool]], None], argv: Sequence[str] | None
 ) -> int:
@@ -94,11 +119,12 @@ def run(
     """
     node: _Node | None = None
     asked = threading.Event()
-    signal.signal(signal.SIGTERM, signal.default_int_handler)
+    for number in _SIGNALS:
+        signal.signal(number, _stop_making)
     try:
         _init(list(sys.argv if argv is None else argv))
         node = make()
-        for number in (signal.SIGINT, signal.SIGTERM):
+        for number in _SIGNALS:
             signal.signal(number, lambda *_: asked.set())
         try:
             serve(node, lambda: not asked.is_set())
@@ -107,7 +133,7 @@ def run(
     except KeyboardInterrupt:
         return DONE  # asked to stop before it had begun
     except LegWearError as error:
-        print(f"error: {' '.join(str(error).split())}", file=sys.stderr, flush=True)
+        _say(error)
         return COULD_NOT
     finally:
         if node is not None:

@@ -81,3 +81,12 @@ def test_without_ros_a_node_says_so_in_a_line(run, complaints, monkeypatch, verb
     assert result.exit_code == 2
     assert len(complaints(result)) == 1
     assert "leg_wear_monitor[ros]" in result.stderr
+
+
+@pytest.mark.plain
+@pytest.mark.parametrize("node", ["monitor", "gait_publisher"])
+def test_the_help_of_a_node_shows_the_line_that_starts_it(node):
+    """It said `monitor monitor`."""
+    code = f"import sys; sys.argv = ['x', '--help']; from leg_wear_monitor.cli.start import {node}; {node}()"
+    done = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, check=True)
+    assert done.stdout.splitlines()[0] == f"Usage: ros2 run leg_wear_monitor {node} [--ros-args ...]"

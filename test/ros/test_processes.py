@@ -63,6 +63,36 @@ def test_a_monitor_stopped_while_it_gets_ready_leaves_an_ordered_ledger(
     db.close()
 
 
+@pytest.mark.parametrize("name", ["SIGINT", "SIGTERM"])
+def test_a_monitor_stopped_while_it_compiles_leaves_an_ordered_ledger(
+    stage, tmp_path: Path, name: str
+) -> None:
+    """In a callback of LLVM, where Python prints an exception and goes on: the node went on, too."""
+    ledger = tmp_path / "wear.db"
+    code = (
+        "import os, signal, sys\n"
+        f"sys.argv = ['monitor', '--ros-args', '-p', 'ledger.path:={ledger}']\n"
+        "def on_call(frame, event, _):\n"
+        "    if event == 'call' and frame.f_code.co_name == '_object_compiled_hook':\n"
+        "        sys.setprofile(None)\n"
+        f"        os.kill(os.getpid(), signal.{name})\n"
+        "from leg_wear_monitor.cli.start import monitor\n"
+        "sys.setprofile(on_call)\n"
+        "monitor()\n"
+    )
+    environment = {
+        **os.environ, "ROS_DOMAIN_ID": str(stage.domain), "NUMBA_CACHE_DIR": str(tmp_path / "cache")
+    }  # fmt: skip
+    line = [sys.executable, "-c", code]
+    done = subprocess.run(line, env=environment, capture_output=True, text=True, check=False, timeout=300)
+    assert done.returncode == 0, done.stderr
+    assert "Exception ignored" not in done.stderr
+    assert "Traceback" not in done.stderr
+    with sqlite3.connect(ledger) as db:
+        assert db.execute("SELECT closed FROM run").fetchall() == [(1,)]
+    db.close()
+
+
 def test_the_demo_tells_its_story(stage, tmp_path: Path) -> None:
     environment = {**os.environ, "ROS_DOMAIN_ID": str(stage.domain)}
     command = [sys.executable, "-m", "leg_wear_monitor", "demo", "--out", str(tmp_path / "demo")]

@@ -1,0 +1,35 @@
+"""A monitor with the ledger that its parameters name, from the one to the other without a gap."""
+
+from leg_wear_monitor.interrupt import closed_at_the_end
+from leg_wear_monitor.mechanism.spec import Mechanism
+from leg_wear_monitor.monitor.config import MonitorConfig
+from leg_wear_monitor.monitor.ledger import open_ledger
+from leg_wear_monitor.monitor.wear_monitor import WearMonitor
+
+
+def open_monitor(mechanism: Mechanism, config: MonitorConfig) -> WearMonitor:
+    """Open the ledger and build the monitor that continues it.
+
+    Building takes seconds, and a minute where kernels are compiled: if it is cut short, the ledger must not
+    look as if a run that monitored something had been.
+
+    Parameters
+    ----------
+    mechanism : Mechanism
+    config : MonitorConfig
+
+    Raises
+    ------
+    ConfigError, LedgerError
+        For parameters or a ledger that cannot be used.
+    """
+    ledger = open_ledger(mechanism, config)
+    if ledger is None:
+        return WearMonitor(mechanism, config)
+    with closed_at_the_end(ledger.record):
+        try:
+            return WearMonitor(mechanism, config, ledger)
+        except BaseException:
+            ledger.record()
+            ledger.close()
+            raise

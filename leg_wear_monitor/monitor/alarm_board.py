@@ -13,6 +13,9 @@ DEPARTURE = "clearance_departure"
 MISMATCH, CADENCE = "torque_mismatch", "cadence"
 CRANK_RATE, TORQUE_RATE = "input_rate crank", "input_rate torque"
 BAD_SAMPLES, LOST_TIME, STUCK_TORQUE = "input_samples", "input_gaps", "input_torque"
+SOURCES = "input_sources"
+
+TWO_SOURCES = Limit(2.0, 2.0)  # of one crank
 
 
 def limits_of(config: MonitorConfig, loose: tuple[str, ...]) -> dict[str, Limit]:
@@ -34,6 +37,7 @@ def limits_of(config: MonitorConfig, loose: tuple[str, ...]) -> dict[str, Limit]
     found[BAD_SAMPLES] = _limit(config, limits.bad_sample_share)
     found[LOST_TIME] = _limit(config, limits.lost_time_share)
     found[STUCK_TORQUE] = _limit(config, limits.stuck_torque_share)
+    found[SOURCES] = TWO_SOURCES
     return found
 
 

@@ -9,6 +9,8 @@ from leg_wear_monitor.monitor.alarm_board import AlarmBoard
 from leg_wear_monitor.monitor.alarms import Level
 from leg_wear_monitor.monitor.beats import A_CYCLE
 from leg_wear_monitor.monitor.config import MonitorConfig
+from leg_wear_monitor.monitor.input_causes import causes
+from leg_wear_monitor.monitor.input_guard import InputGuard
 from leg_wear_monitor.monitor.input_health import InputHealth, TorqueRange, input_health, with_torques
 from leg_wear_monitor.monitor.reports import AlarmList, CycleReport
 from leg_wear_monitor.twin.digital_twin import DigitalTwin
@@ -32,6 +34,10 @@ class JudgeState:
         Beats and whole gait cycles since then.
     health : InputHealth or None
         As last judged.
+    withheld : int
+        Samples that the guard had withheld when the input was last judged.
+    causes : tuple of str or None
+        Why samples could not be used, as last judged.
     """
 
     before: Intake
@@ -41,6 +47,8 @@ class JudgeState:
     beats: int = 0
     cycles: int = 0
     health: InputHealth | None = None
+    withheld: int = 0
+    causes: tuple[str, ...] | None = None
 
 
 class Judge:
@@ -52,10 +60,12 @@ class Judge:
     config : MonitorConfig
     cycle_ns : int
         A gait cycle as commanded.
+    guard : InputGuard
     """
 
-    def __init__(self, twin: DigitalTwin, config: MonitorConfig, cycle_ns: int) -> None:
+    def __init__(self, twin: DigitalTwin, config: MonitorConfig, cycle_ns: int, guard: InputGuard) -> None:
         self._twin = twin
+        self.guard = guard
         self._cycle_ns = cycle_ns
         self.config = config
         self.board = AlarmBoard(config, twin.loose)
@@ -74,6 +84,20 @@ class Judge:
         """Take down samples that came."""
         saturation_nm = self.config.drive_torque.saturation_nm
         self.state.torque = with_torques(self.state.torque, piece, saturation_nm)
+
+    @property
+    def causes(self) -> tuple[str, ...]:
+        """Why samples cannot be used: at present, and over the last gait cycle's time."""
+        now = (self.guard.cause,) if self.guard.cause else ()
+        return now + (self._causes() if self.state.causes is None else self.state.causes)
+
+    @property
+    def _withheld(self) -> int:
+        return self.guard.conflicting + self.guard.implausible
+
+    def _causes(self) -> tuple[str, ...]:
+        withheld = self._withheld - self.state.withheld
+        return tuple(causes(self.state.before, self._twin.intake, withheld, self.config))
 
     def end_cycle(self, report: CycleReport) -> tuple[AlarmList, ...]:
         """Judge a whole gait cycle; all alarms, if one has changed."""
@@ -104,6 +128,7 @@ class Judge:
             for joint, peak in zip(self._twin.loose, self._twin.peak_force_n, strict=True)
         }
         early = self.board.judge_early(peaks, self._twin.intake.followed_stamp_ns)
+        early += self.board.judge({names.SOURCES: float(self.guard.sources)}, self.guard.stamp_ns)
         self.state.beats += 1
         if self.state.beats < A_CYCLE:
             return early
@@ -123,6 +148,13 @@ class Judge:
         if state.cycles == 0 and self._twin.tracking is Tracking.OUT_OF_STEP:
             speed_rpm = self._twin.speed_radps * 30.0 / math.pi
             values[names.CADENCE] = abs(speed_rpm - config.cadence.commanded_rpm)
-        self.state = JudgeState(intake, skipped, state.skipped, health=health)
+        self.state = JudgeState(
+            intake,
+            skipped,
+            state.skipped,
+            health=health,
+            withheld=self._withheld,
+            causes=self._causes(),
+        )
         cycles = 1 if math.isnan(health.duration_s) else round(1.0e9 * health.duration_s / self._cycle_ns)
         return self.board.judge(values, intake.newest_stamp_ns, max(1, cycles))

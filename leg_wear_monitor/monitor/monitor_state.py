@@ -8,6 +8,7 @@ from leg_wear_monitor.monitor.book import BookState
 from leg_wear_monitor.monitor.encoder_watch import EncoderSnapshot
 from leg_wear_monitor.monitor.forecaster import ForecastState
 from leg_wear_monitor.monitor.growth import GrowthWindow
+from leg_wear_monitor.monitor.input_guard import GuardSnapshot
 from leg_wear_monitor.monitor.judge import JudgeState
 from leg_wear_monitor.monitor.reports import CycleReport
 from leg_wear_monitor.twin.digital_twin import TwinSnapshot
@@ -34,4 +35,5 @@ class MonitorSnapshot:
     forecast: ForecastState
     alarms: dict[str, Alarm]
     beats: Ints
+    guard: GuardSnapshot
     encoders: EncoderSnapshot | None = None

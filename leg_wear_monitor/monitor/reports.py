@@ -4,6 +4,7 @@ import attrs
 
 from leg_wear_monitor.monitor.alarms import Alarm, Level
 from leg_wear_monitor.monitor.forecast import JointForecast, LegForecast
+from leg_wear_monitor.monitor.input_guard import InputGuard
 from leg_wear_monitor.monitor.seen import SeenClearance
 from leg_wear_monitor.twin.figures import Intake, SampleFigures
 
@@ -149,6 +150,8 @@ class Lost:
         Samples of a time whose wear is in the ledger from an earlier run.
     faulty : dict of str to int
         Samples that came with a fault, by its name.
+    conflicting, implausible : int
+        Of those out of range, samples of a crank angle that two sources sent, and of one in another unit.
     duplicates, late, stray_stamps, outliers : int
         Samples dropped: seen before, later than the window, a stamp far off, a value far off.
     gaps_bridged, gaps_lost, backward_jumps, failures : int
@@ -158,6 +161,8 @@ class Lost:
     unmonitored_s: float
     already_counted: int
     faulty: dict[str, int]
+    conflicting: int
+    implausible: int
     duplicates: int
     late: int
     stray_stamps: int
@@ -168,12 +173,14 @@ class Lost:
     failures: int
 
 
-def lost(intake: Intake, already_counted: int, unmonitored_s: float) -> Lost:
-    """What was not integrated, from a twin's counts."""
+def lost(intake: Intake, already_counted: int, unmonitored_s: float, guard: InputGuard) -> Lost:
+    """What was not integrated, from the counts of a twin and of what guards its input."""
     return Lost(
         unmonitored_s=unmonitored_s,
         already_counted=already_counted,
         faulty=intake.faulty,
+        conflicting=guard.conflicting,
+        implausible=guard.implausible,
         duplicates=intake.duplicates,
         late=intake.late,
         stray_stamps=intake.stray_stamps,

@@ -18,7 +18,8 @@ from leg_wear_monitor.twin.figures import Event, Tracking
 
 ADVICE = "the monitor advises; no alarm is no proof of health"
 
-_INPUT = (names.CRANK_RATE, names.TORQUE_RATE, names.BAD_SAMPLES, names.LOST_TIME, names.STUCK_TORQUE)
+_RATES = (names.CRANK_RATE, names.TORQUE_RATE)
+_INPUT = (*_RATES, names.BAD_SAMPLES, names.LOST_TIME, names.STUCK_TORQUE, names.SOURCES)
 
 
 def statuses(
@@ -46,8 +47,10 @@ def _gait(
     twin: DigitalTwin, judge: Judge, book: Book, last: CycleReport | None, happened: Sequence[Event]
 ) -> Status:
     tracking = twin.tracking
-    message = tracking.name.lower().replace("_", " ")
-    if happened and tracking in (Tracking.STARTING, Tracking.OUT_OF_STEP):
+    message, level = tracking.name.lower().replace("_", " "), judge.board.level(names.CADENCE)
+    if judge.guard.cause:
+        message, level = "not monitored: see input", Level.ERROR
+    elif happened and tracking in (Tracking.STARTING, Tracking.OUT_OF_STEP):
         message += f", last {happened[-1].what.value.replace('_', ' ')}"
     if judge.config.wear_acceleration != 1.0:
         message += "; wear is accelerated, this is a demonstration"
@@ -58,7 +61,7 @@ def _gait(
         **book.totals,
         "cycle_moving_s": last.moving_s if last else math.nan,
     }
-    return Status("gait", judge.board.level(names.CADENCE), message, values)
+    return Status("gait", level, message, values)
 
 
 def _input(twin: DigitalTwin, judge: Judge, book: Book) -> Status:
@@ -67,10 +70,14 @@ def _input(twin: DigitalTwin, judge: Judge, book: Book) -> Status:
     for stamp in ("newest_stamp_ns", "followed_stamp_ns"):
         counts.pop(stamp)
     health = attrs.asdict(judge.state.health) if judge.state.health else {}
+    counts |= {"conflicting": judge.guard.conflicting, "implausible": judge.guard.implausible}
     values = {**health, **counts, **{f"faulty_{name}": count for name, count in faulty.items()}}
     level = judge.board.level(*_INPUT)
     bad = [name for name in _INPUT if judge.board.alarms[name].level is not Level.OK]
-    message = f"look at: {', '.join(bad)}" if bad else "in order"
+    told = [*judge.causes, *([f"look at: {', '.join(bad)}"] if bad else [])]
+    message = "; ".join(told) or "in order"
+    if judge.guard.cause:
+        level = Level.ERROR
     return Status("input", level, message, {name: float(value) for name, value in values.items()})
 
 

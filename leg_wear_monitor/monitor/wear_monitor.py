@@ -16,6 +16,7 @@ from leg_wear_monitor.monitor.fitting import check_limits, fitted, twin_settings
 from leg_wear_monitor.monitor.forecaster import Forecaster
 from leg_wear_monitor.monitor.growth import GrowthWindow, extended
 from leg_wear_monitor.monitor.hand_over import hand_over
+from leg_wear_monitor.monitor.input_guard import InputGuard
 from leg_wear_monitor.monitor.judge import Judge
 from leg_wear_monitor.monitor.ledger import Ledger
 from leg_wear_monitor.monitor.ledger_entry import Audit, Measurement
@@ -73,9 +74,10 @@ class WearMonitor:
         self.mechanism = fitted(mechanism, self.config)
         self.loose = self.mechanism.loose
         self._twin = DigitalTwin(self.mechanism, twin_settings(self.config))
+        self._guard = InputGuard(self._twin.settings.tracker)
         self._book = Book(self._twin, ledger, self.config.ledger)
         cycle_ns = round(60.0e9 / abs(self.config.cadence.commanded_rpm))
-        self._judge = Judge(self._twin, self.config, cycle_ns)
+        self._judge = Judge(self._twin, self.config, cycle_ns, self._guard)
         self._forecaster = Forecaster(
             self.mechanism,
             self.config.forecast,
@@ -95,6 +97,7 @@ class WearMonitor:
     def warm_up(self) -> None:
         """Compile all that `update` needs, before the first sample; takes about a minute once."""
         self._twin.warm_up()
+        self._guard.warm_up()
         list(Beats(1).pieces(np.zeros(1, GAIT_SAMPLE)))
 
     def update(self, samples: Samples) -> Reports:
@@ -132,7 +135,7 @@ class WearMonitor:
     @property
     def lost(self) -> Lost:
         """What was not integrated so far."""
-        return lost(self._twin.intake, self._book.state.skipped, self._book.unmonitored_s)
+        return lost(self._twin.intake, self._book.state.skipped, self._book.unmonitored_s, self._guard)
 
     @property
     def measurements(self) -> tuple[Measurement, ...]:
@@ -263,6 +266,7 @@ class WearMonitor:
             attrs.evolve(self._forecaster.state),
             self._judge.board.alarms,
             self._beats.state.copy(),
+            self._guard.snapshot(),
             self._encoders.snapshot() if self._encoders else None,
         )
 
@@ -275,6 +279,7 @@ class WearMonitor:
         self._forecaster.state = attrs.evolve(snapshot.forecast)
         self._judge.board.alarms = snapshot.alarms
         self._beats.state[:] = snapshot.beats
+        self._guard.restore(snapshot.guard)
         if self._encoders and snapshot.encoders:
             self._encoders.restore(snapshot.encoders)
 
@@ -283,7 +288,7 @@ class WearMonitor:
 
     def _take(self, piece: Samples, changes: list[AlarmList]) -> tuple[SampleReports, list[CycleReport]]:
         """Follow a piece of a beat, and judge the gait cycles that it ends."""
-        piece = self._book.not_counted(piece)
+        piece = self._guard.checked(self._book.not_counted(piece))
         update = self._twin.update(piece)
         self._judge.see(piece)
         if self._encoders:

@@ -1,5 +1,6 @@
 """A study run: points that are not there yet are computed and kept, each as soon as it is there."""
 
+import warnings
 from collections.abc import Callable
 from importlib import metadata
 from pathlib import Path
@@ -8,7 +9,7 @@ from xml.etree import ElementTree
 
 import attrs
 
-from leg_wear_monitor.errors import ConfigError
+from leg_wear_monitor.errors import ConfigError, ConfigWarning
 from leg_wear_monitor.mechanism.loader import is_file_name, load_mechanism, shipped_mechanisms
 from leg_wear_monitor.share import share_directory
 from leg_wear_monitor.studies.cluster import run_on_cluster
@@ -39,7 +40,8 @@ def run_study(
         A key of `leg_wear_monitor.studies.settings.STUDIES`.
     settings : Study
     out : pathlib.Path
-        Its directory; points that are there for this mechanism, settings and code are kept.
+        Its directory; points that are there for this mechanism, settings and code are kept, if their
+        checksums hold.
     workers : int
         Processes on this machine; 1 for this one alone. Results do not depend on it.
     scheduler : str, optional
@@ -56,6 +58,11 @@ def run_study(
     ------
     ConfigError, AssemblyError
         For values that cannot be, before anything is computed.
+
+    Warns
+    -----
+    ConfigWarning
+        For each point that is there but was altered, exchanged or damaged; it is computed again.
     """
     mechanism, points = load_mechanism(settings.mechanism), points_of(settings)
     check_points(mechanism, [point.settings for point in points])
@@ -67,7 +74,7 @@ def run_study(
         key: Job(key, point.task, mechanism, point.settings, code_digest(), point.cost)
         for key, point in zip(keys, points, strict=True)
     }
-    missing = [job for job in jobs.values() if not directory.has(job.key)]
+    missing = [job for job in jobs.values() if not _is_kept(directory, job)]
     report, total = progress or (lambda _share: None), sum(job.cost for job in jobs.values())
     spent = total - sum(job.cost for job in missing)
 
@@ -85,6 +92,18 @@ def run_study(
     else:
         run_here(missing, done)
     return len(missing)
+
+
+def _is_kept(directory: StudyDirectory, job: Job) -> bool:
+    """Whether the directory holds a point's result; warns of one that cannot be taken for it."""
+    if not directory.has(job.key):
+        return False
+    try:
+        directory.read(job.key, job.task, job.settings)
+    except ConfigError as error:
+        warnings.warn(f"{error}; it is computed again", ConfigWarning, stacklevel=2)
+        return False
+    return True
 
 
 def versions() -> dict[str, str]:

@@ -1,6 +1,8 @@
 """The verb `replay`: what it writes, what it says, and its exit codes."""
 
 import json
+import math
+import random
 from types import SimpleNamespace
 
 import numpy as np
@@ -67,6 +69,42 @@ def test_a_whole_recording(run, bag, complaints, tmp_path):
     (tmp_path / "out" / "report.html").unlink()
     assert run("report", "out").exit_code == 0
     assert (tmp_path / "out" / "report.html").read_text() == page
+
+
+def spoilt(document, draw):
+    """A copy with one part removed, or of another type or value, at any depth."""
+    document = json.loads(json.dumps(document))
+    places = [(document, key) for key in document]
+    for parent, key in places:
+        below = parent[key]
+        if isinstance(below, dict | list):
+            inner = list(below) if isinstance(below, dict) else range(len(below))[:2]
+            places += [(below, each) for each in inner]
+    parent, key = draw.choice(places)
+    if draw.random() < 0.3:
+        del parent[key]
+    else:
+        deep = json.loads("[" * 60 + "]" * 60)
+        parent[key] = draw.choice([None, [], {}, "", "x", -1, 1e308, 2**70, True, math.nan, deep])
+    return document
+
+
+def test_a_summary_changed_anywhere_gives_a_page_or_one_line(run, bag, tmp_path, monkeypatch):
+    """Pictures are made but not painted: that takes most of the time and depends on nothing else."""
+    monkeypatch.setattr("leg_wear_monitor.report.replay_page.png", lambda figure: b"")
+    run("replay", str(bag), "--out", "out")
+    file, draw, refused = tmp_path / "out" / "summary.json", random.Random(16), 0
+    whole = json.loads(file.read_text())
+    texts = [json.dumps(spoilt(whole, draw)) for _ in range(10)]
+    for text in [*texts, "", "[]", "{", "7", "[" * 100_000, '{"a": NaN}', '"\\ud800"']:
+        file.write_text(text)
+        result = run("report", "out")
+        told = result.stderr.splitlines()
+        assert (result.exit_code, len(told)) in {(0, 0), (2, 1)}, text
+        if told:
+            refused += 1
+            assert told[0].startswith("error: out/summary.json: is not what a replay of this version writes")
+    assert refused >= 7
 
 
 def test_json_on_stdout_is_all_that_is_there(run, bag):

@@ -100,7 +100,7 @@ def _parameters(path: str) -> str:
     twin_settings(config, path)
     return (
         f"parameters of the monitor: {config.mechanism}, {', '.join(leg.loose)} loose, "
-        f"{config.cadence.commanded_rpm:g} rpm, hardware {config.hardware_id}"
+        f"{config.cadence.commanded_rpm:g} rpm, hardware {config.hardware}"
     )
 
 

@@ -50,6 +50,11 @@ _MOST_LINES = 20
 )
 @click.option("--joint-states", metavar="TOPIC", help="Topic of the crank.  [default: */joint_states]")
 @click.option("--drive-torque", metavar="TOPIC", help="Topic of the torque.  [default: */drive_torque]")
+@click.option(
+    "--node",
+    metavar="NAME",
+    help="Full name of the node to be in the stead of.  [default: leg_wear_monitor beside the crank's topic]",
+)
 @click.option("--crank-joint", metavar="NAME", help="The crank's name.  [default: as the parameters say]")
 @click.option(
     "--ledger",
@@ -112,6 +117,7 @@ def _run(
     config: Path | None,
     time_source: str,
     crank_joint: str | None,
+    node: str | None,
     **options: Any,
 ) -> tuple["ReplayResult", float]:
     """The result, and the time [s] it took once all was compiled."""
@@ -129,7 +135,8 @@ def _run(
     with progress_bar("replaying") as progress:
         result = run(
             bags,
-            _config(config, crank_joint),
+            _config(config, crank_joint, node),
+            node=node,
             out=out,
             time=time_source,
             ready=ready,
@@ -139,12 +146,12 @@ def _run(
     return result, time.perf_counter() - began[0]
 
 
-def _config(path: Path | None, crank_joint: str | None) -> "MonitorConfig":
+def _config(path: Path | None, crank_joint: str | None, node: str | None) -> "MonitorConfig":
     import attrs
 
     from leg_wear_monitor.monitor.parameter_file import load_config
 
-    config = load_config(path)
+    config = load_config(path, node)
     return config if crank_joint is None else attrs.evolve(config, crank_joint=crank_joint)
 
 

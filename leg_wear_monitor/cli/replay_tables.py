@@ -23,7 +23,7 @@ def print_replay(result: "ReplayResult", wall_s: float) -> None:
     console = Console(highlight=False)
     monitor = result.monitor
     console.print(
-        f"\n[bold]{monitor.config.hardware_id}[/bold]: {monitor.mechanism.name}, "
+        f"\n[bold]{monitor.config.hardware}[/bold]: {monitor.mechanism.name}, "
         f"{', '.join(monitor.loose)} loose; {result.crank_samples} crank and {result.torque_samples} torque "
         f"samples, {len(result.history)} gait cycles\n"
     )

@@ -73,7 +73,7 @@ class Binding:
 def binding_of(mechanism: Mechanism, config: MonitorConfig) -> Binding:
     """Binding of a mechanism as `fitted` gives it."""
     return Binding(
-        hardware_id=config.hardware_id,
+        hardware_id=config.hardware,
         mechanism=mechanism.name,
         fingerprint=fingerprint(mechanism),
         joints=mechanism.loose,

@@ -162,7 +162,8 @@ class MonitorConfig:
         check=_filled,
     )
     hardware_id: str = described(
-        "which leg this is, for diagnostics and the ledger", default="leg", check=_filled
+        "which leg this is, for diagnostics and the ledger; empty: namespace of the node, or leg",
+        default="",
     )
     loose_joints: tuple[str, ...] = described(
         "joints with clearance; empty: those of the mechanism's file", default=()
@@ -204,3 +205,13 @@ class MonitorConfig:
     frame_id: str = described(
         "frame of the pelvis, for wrenches and markers", default="pelvis", check=_filled
     )
+
+    @property
+    def hardware(self) -> str:
+        """Which leg this is: `hardware_id`, or ``leg``."""
+        return self.hardware_id or "leg"
+
+    def on_node(self, node: str) -> "MonitorConfig":
+        """Parameters on a node such as ``/left/leg_wear_monitor``, whose namespace may name the leg."""
+        namespace = node.strip("/").rpartition("/")[0]
+        return attrs.evolve(self, hardware_id=self.hardware_id or namespace)

@@ -227,9 +227,11 @@ def _check_binding(db: sqlite3.Connection, path: Path, binding: Binding) -> None
     found = dict(db.execute("SELECT key, value FROM binding"))
     for key, ours in binding.as_texts().items():
         if found.get(key) != ours:
+            what = f"{path}: is of {key.replace('_', ' ')} {found.get(key)}, not {ours}; "
+            if key == "hardware_id":
+                what += f"if it is this leg's, set {key}: {found.get(key)}, else "
             raise LedgerError(
-                f"{path}: is of {key.replace('_', ' ')} {found.get(key)}, not {ours}; "
-                "set ledger.path to another file for this leg, or the parameters back to that one"
+                what + "set ledger.path to another file for this leg, or the parameters back to that one"
             )
 
 

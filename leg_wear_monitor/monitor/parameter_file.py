@@ -23,15 +23,16 @@ def shipped_config() -> Path:
     return share_directory() / "config" / "monitor.yaml"
 
 
-def load_config(path: str | Path | None = None, node: str = NODE) -> MonitorConfig:
+def load_config(path: str | Path | None = None, node: str | None = None) -> MonitorConfig:
     """Read the monitor's parameters from a ROS parameter file.
 
     Parameters
     ----------
     path : str or pathlib.Path, optional
         The one that comes with the package if not given.
-    node : str
-        Full name of the node whose parameters are wanted, such as ``/robot/leg_wear_monitor``.
+    node : str, optional
+        Full name of the node whose parameters are wanted, such as ``/robot/leg_wear_monitor``; if not given,
+        the one in the root, or the one node that the file is of.
 
     Raises
     ------
@@ -50,7 +51,7 @@ def is_parameter_file(document: Any) -> bool:
     )
 
 
-def parse_config(document: Any, source: str, node: str = NODE) -> MonitorConfig:
+def parse_config(document: Any, source: str, node: str | None = None) -> MonitorConfig:
     """Configuration from the plain mapping that a parameter file holds; see `load_config`.
 
     Sections that are for the node are taken in their order, so that later ones prevail.
@@ -58,7 +59,7 @@ def parse_config(document: Any, source: str, node: str = NODE) -> MonitorConfig:
     if not is_parameter_file(document):
         raise ConfigError(source, "", f"is no ROS parameter file, expected '/**: {{{MARK}: ...}}'")
     values: dict[str, Any] = {}
-    taken = False
+    node, taken = node or _node_of(document), False
     for pattern, entry in document.items():
         parameters = _parameters(entry, source, str(pattern))
         if _is_for(str(pattern), node):
@@ -68,6 +69,13 @@ def parse_config(document: Any, source: str, node: str = NODE) -> MonitorConfig:
         sections = ", ".join(map(str, document))
         raise ConfigError(source, "", f"has nothing for the node {node}, its sections are for: {sections}")
     return config_from({name: value for name, value in values.items() if not _OF_ROS.fullmatch(name)}, source)
+
+
+def _node_of(document: dict[Any, Any]) -> str:
+    """The node in the root, or the one monitor that all of a file, such as a dump, is of."""
+    only = str(next(iter(document)))
+    is_one = len(document) == 1 and "*" not in only and only.endswith(NODE)
+    return "/" + only.strip("/") if is_one else NODE
 
 
 def _parameters(entry: Any, source: str, pattern: str) -> dict[Any, Any]:

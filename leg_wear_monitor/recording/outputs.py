@@ -10,6 +10,7 @@ from numpy.typing import NDArray
 from leg_wear_monitor.monitor.alarms import Alarm, Level
 from leg_wear_monitor.monitor.config import MonitorConfig
 from leg_wear_monitor.monitor.forecast import JointForecast, LegForecast, Quantiles
+from leg_wear_monitor.monitor.parameter_file import NODE
 from leg_wear_monitor.monitor.reports import (
     AlarmList,
     CycleReport,
@@ -71,11 +72,11 @@ class Messages:
     loose : sequence of str
         The loose joints, in the order of the reports.
     node : str
-        Name of the node, before the names in diagnostics.
+        Full name of the node. It stands before the names in diagnostics, without the leading slash.
     """
 
-    def __init__(self, config: MonitorConfig, loose: Sequence[str], node: str = "leg_wear_monitor") -> None:
-        self.config, self._node = config, node
+    def __init__(self, config: MonitorConfig, loose: Sequence[str], node: str = NODE) -> None:
+        self.config, self._node = config, node.lstrip("/")
         self._clearances = [f"{joint}_clearance" for joint in loose]
         self._impacts = [f"{joint}_impact" for joint in loose]
 
@@ -136,7 +137,7 @@ class Messages:
         return self._array(stamp_ns, statuses)
 
     def _array(self, stamp_ns: int, statuses: Iterable[Status]) -> bytes:
-        hardware = self.config.hardware_id
+        hardware = self.config.hardware
         lines = [
             (
                 f"{self._node}: {status.name}",

@@ -10,7 +10,7 @@ import numpy as np
 from leg_wear_monitor.mechanism.loader import load_mechanism
 from leg_wear_monitor.monitor.config import MonitorConfig
 from leg_wear_monitor.monitor.opening import open_monitor
-from leg_wear_monitor.monitor.parameter_file import load_config
+from leg_wear_monitor.monitor.parameter_file import NODE, load_config
 from leg_wear_monitor.monitor.wear_monitor import WearMonitor
 from leg_wear_monitor.recording.findings import Finding, RecordingError
 from leg_wear_monitor.recording.history import History
@@ -81,6 +81,7 @@ def replay(
     time: str = "header",
     joint_states: str | None = None,
     drive_torque: str | None = None,
+    node: str | None = None,
     ready: Callable[[WearMonitor], None] | None = None,
     progress: Callable[[float], None] | None = None,
 ) -> ReplayResult:
@@ -100,6 +101,9 @@ def replay(
         Which time stamps the samples: ``header``, ``log`` or ``publish``.
     joint_states, drive_torque : str, optional
         Topics; found by their relative names if not given.
+    node : str, optional
+        Full name of the node whose parameters, names and messages are wanted; if not given, the one beside
+        the topic of the crank, such as ``/left/leg_wear_monitor`` for ``/left/joint_states``.
     ready : callable, optional
         Given the monitor before the first sample.
     progress : callable, optional
@@ -116,17 +120,19 @@ def replay(
     ConfigError, LedgerError
         For parameters or a ledger that cannot be used.
     """
-    config = config if isinstance(config, MonitorConfig) else load_config(config)
+    config = config if isinstance(config, MonitorConfig) else load_config(config, node)
     kept = attrs.evolve(config.ledger, path="" if ledger is None else str(ledger))
     config = attrs.evolve(config, ledger=kept)
     named = [paths] if isinstance(paths, str | Path) else list(paths)
     topics = {"joint_states": joint_states, "drive_torque": drive_torque}
     with Recording(named, config, time=time, **topics) as recording, ExitStack() as stack:
+        node = node or node_beside(recording.topics["joint_states"])
+        config = config.on_node(node)
         mechanism = load_mechanism(config.mechanism)
         monitor = open_monitor(mechanism, config)
         stack.callback(monitor.close)
         result = ReplayResult(monitor, History(monitor.loose), recording.files, recording.topics, time)
-        sink = None if out is None else stack.enter_context(_sink(Path(out), monitor, recording.files))
+        sink = None if out is None else stack.enter_context(_sink(Path(out), monitor, node, recording.files))
         if ready:
             ready(monitor)
         for block in recording.blocks():
@@ -150,7 +156,12 @@ def _take(result: ReplayResult, samples: Samples, sink: Sink | None) -> None:
         sink.take(reports, result.end_ns)
 
 
-def _sink(directory: Path, monitor: WearMonitor, files: list[Path]) -> Sink:
+def node_beside(topic: str) -> str:
+    """Full name of the monitor's node in the namespace of a topic."""
+    return topic.rpartition("/")[0] + NODE
+
+
+def _sink(directory: Path, monitor: WearMonitor, node: str, files: list[Path]) -> Sink:
     path = directory / REPORTS_FILE
     if any(path.resolve() == file.resolve() for file in files):
         raise RecordingError(str(path), "", "is to be read and written, expected another directory")
@@ -158,7 +169,7 @@ def _sink(directory: Path, monitor: WearMonitor, files: list[Path]) -> Sink:
         directory.mkdir(parents=True, exist_ok=True)
     except OSError as error:
         raise RecordingError(str(directory), "", f"cannot be made: {error.strerror}") from error
-    return Sink(path, monitor)
+    return Sink(path, monitor, node)
 
 
 def _beats(block: Block, config: MonitorConfig) -> Iterator[Samples]:

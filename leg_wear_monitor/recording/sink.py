@@ -4,6 +4,7 @@ from contextlib import suppress
 from pathlib import Path
 from types import TracebackType
 
+from leg_wear_monitor.monitor.parameter_file import NODE
 from leg_wear_monitor.monitor.reports import Reports
 from leg_wear_monitor.monitor.wear_monitor import WearMonitor
 from leg_wear_monitor.recording.findings import RecordingError
@@ -11,7 +12,6 @@ from leg_wear_monitor.recording.forecast_times import ForecastTimes
 from leg_wear_monitor.recording.outputs import ALARMS, DIAGNOSTICS, FORECAST, OUTPUTS, Messages, topic_of
 from leg_wear_monitor.recording.writer import McapWriter
 
-NODE = "/leg_wear_monitor"
 _CHUNK_BYTES = 2**20
 
 
@@ -22,6 +22,8 @@ class Sink:
     ----------
     path : pathlib.Path
     monitor : WearMonitor
+    node : str
+        Full name of the node that would have published.
 
     Raises
     ------
@@ -29,12 +31,12 @@ class Sink:
         If the disk does not take it.
     """
 
-    def __init__(self, path: Path, monitor: WearMonitor) -> None:
+    def __init__(self, path: Path, monitor: WearMonitor, node: str = NODE) -> None:
         self._monitor = monitor
-        self._messages = Messages(monitor.config, monitor.loose)
+        self._messages = Messages(monitor.config, monitor.loose, node)
         self._writer = McapWriter(path, chunk_bytes=_CHUNK_BYTES)
         self._channels = {
-            output: self._writer.channel(topic_of(output, NODE), output.type, output.qos)
+            output: self._writer.channel(topic_of(output, node), output.type, output.qos)
             for output in OUTPUTS
         }
         self._start, self._has_begun = monitor.alarms, False

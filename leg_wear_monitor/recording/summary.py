@@ -77,7 +77,7 @@ def _monitor(result: ReplayResult) -> dict[str, Any]:
     config = result.monitor.config
     return {
         "mechanism": result.monitor.mechanism.name,
-        "hardware_id": config.hardware_id,
+        "hardware_id": config.hardware,
         "loose": list(result.monitor.loose),
         "commanded_rpm": config.cadence.commanded_rpm,
         "wear_acceleration": config.wear_acceleration,

@@ -49,7 +49,8 @@ class MonitorNode(ClosingNode):
     def __init__(self, **options: Any) -> None:
         super().__init__("leg_wear_monitor", **options)
         self.get_logger().info(ADVICE)
-        parameters = Parameters(self, MonitorConfig)
+        namespace = self.get_namespace().strip("/")
+        parameters = Parameters(self, MonitorConfig, empty={"hardware_id": namespace or "leg"})
         config = parameters.config
         mechanism = load_mechanism(config.mechanism)
         self._monitor = open_monitor(mechanism, config)
@@ -66,7 +67,7 @@ class MonitorNode(ClosingNode):
         decoder = Decoder(config)
         self._inbox = Inbox(decoder, _HELD)
         self._load = Load()
-        self._messages = Messages(config, self._monitor.loose, self.get_name())
+        self._messages = Messages(config, self._monitor.loose, self.get_fully_qualified_name())
         self._black_box = BlackBox(config.record.path)
         self._outlets = Outlets(self, outputs.OUTPUTS, self._black_box)
         self._forecasts = ForecastTimes()

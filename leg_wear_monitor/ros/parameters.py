@@ -1,6 +1,6 @@
 """A node's parameters from the class that declares them: read, refused, described, changed."""
 
-from collections.abc import Callable
+from collections.abc import Callable, Mapping
 from typing import Any, Generic, TypeVar
 
 from rcl_interfaces.msg import ParameterDescriptor, SetParametersResult
@@ -26,6 +26,8 @@ class Parameters(Generic[Config]):
     node : ParameterNode
     kind : type
         Class of sections, such as ``MonitorConfig``.
+    empty : mapping of str to str, optional
+        What parameters are set to whose text is not given or empty.
 
     Attributes
     ----------
@@ -38,9 +40,12 @@ class Parameters(Generic[Config]):
         Naming node, parameter, value, unit and what was expected.
     """
 
-    def __init__(self, node: ParameterNode, kind: type[Config]) -> None:
+    def __init__(
+        self, node: ParameterNode, kind: type[Config], empty: Mapping[str, str] | None = None
+    ) -> None:
         self._source = node.get_fully_qualified_name()
         given = {name: value for name, value in node.given.items() if not name.startswith(_OF_ROS)}
+        given |= {name: text for name, text in (empty or {}).items() if not given.get(name)}
         self.config: Config = structured(kind, given, self._source)
         for name, value in values_of(self.config).items():
             _declare(node, parameters_of(kind)[name], value)

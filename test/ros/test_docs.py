@@ -67,7 +67,7 @@ def test_launch_files_start_what_is_installed() -> None:
     scripts = setup["options.entry_points"]["console_scripts"].split("\n")
     installed = {line.split("=")[0].strip() for line in scripts if line}
     nodes = [node for path in package.glob("launch/*.xml") for node in ElementTree.parse(path).iter("node")]
-    assert len(nodes) == 3
+    assert len(nodes) == 4
     assert {node.get("pkg") for node in nodes} == {"leg_wear_monitor"}
     assert {node.get("exec") for node in nodes} <= installed
 

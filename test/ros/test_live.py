@@ -11,6 +11,7 @@ pytest.importorskip("rclpy")
 from diagnostic_msgs.msg import DiagnosticArray
 from geometry_msgs.msg import WrenchStamped
 from mcap.reader import make_reader
+from ruamel.yaml import YAML
 from sensor_msgs.msg import JointState
 from visualization_msgs.msg import MarkerArray
 
@@ -22,6 +23,7 @@ from leg_wear_monitor.monitor.wear_monitor import WearMonitor
 from leg_wear_monitor.recording.outputs import Messages
 from leg_wear_monitor.recording.reader import Recording
 from leg_wear_monitor.ros.publisher_config import PublisherConfig
+from leg_wear_monitor.share import share_directory
 
 ME = "/leg_wear_monitor"
 FAST = {"wear_acceleration": 1.0e5}
@@ -213,6 +215,26 @@ def test_several_legs_in_namespaces_do_not_hear_each_other(stage, walk) -> None:
     assert speeds == pytest.approx([60.0, 50.0], abs=1.0)
     topics = {name for name, _ in stage.node.get_topic_names_and_types()}
     assert {"/left/leg_wear_monitor/alarms", "/right/leg_wear_monitor/alarms"} <= topics
+    heard = stage.listen("/diagnostics", DiagnosticArray)
+    stage.wait_for(lambda: len({one.status[0].hardware_id for one in heard}) == 2, "statuses of both legs")
+    names = {
+        leg: {line.name for one in heard for line in one.status if line.hardware_id == leg} for leg in SIDES
+    }
+    assert not names["left"] & names["right"]
+    for leg in SIDES:
+        assert f"{leg}/leg_wear_monitor: joint A" in names[leg]
+        assert {len(groups_of(name)) for name in names[leg]} == {1}
+
+
+SIDES = ("left", "right")
+
+
+def groups_of(status: str) -> list[str]:
+    """Analysers of config/diagnostics.yaml that take a status, as diagnostic_aggregator matches it."""
+    path = share_directory() / "config" / "diagnostics.yaml"
+    analysers = YAML(typ="safe", pure=True).load(path.read_text())["analyzers"]["ros__parameters"]
+    groups = {name: one for name, one in analysers.items() if name != "path"}
+    return [name for name, one in groups.items() if any(part in status for part in one["contains"])]
 
 
 def test_malformed_messages_are_counted_and_harm_nothing(stage) -> None:

@@ -1,0 +1,64 @@
+"""security/policy.xml allows what the live nodes do, and nothing else."""
+
+from collections.abc import Callable
+from fnmatch import fnmatchcase
+from typing import Any
+from xml.etree import ElementTree
+
+import pytest
+
+pytest.importorskip("rclpy")
+
+import rclpy
+from rclpy.parameter import Parameter
+from rclpy.utilities import try_shutdown
+
+from leg_wear_monitor.ros.gait_publisher import GaitPublisher
+from leg_wear_monitor.ros.monitor_node import MonitorNode
+from leg_wear_monitor.share import share_directory
+
+POLICY = ElementTree.parse(share_directory() / "security" / "policy.xml").getroot()
+
+
+def allowed(node: str, kind: str, right: str) -> set[str]:
+    """Full names, patterns among them, of what a node in the root may publish, subscribe or reply to."""
+    (profile,) = POLICY.iterfind(f".//profile[@node='{node}']")
+    assert profile.get("ns") == "/"
+    rules = profile.iterfind(f"{kind}s[@{right}='ALLOW']/{kind}")
+    return {"/" + rule.text.replace("~", node).lstrip("/") for rule in rules}
+
+
+@pytest.mark.parametrize("make", [MonitorNode, GaitPublisher])
+def test_a_node_may_do_what_it_does_and_nothing_else(
+    make: Callable[..., Any], monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setattr(MonitorNode, "_compile", lambda self, decoder: None)
+    context = rclpy.Context()
+    rclpy.init(args=["--ros-args", "--log-level", "fatal"], context=context)
+    clock = [Parameter("use_sim_time", value=True)]
+    try:
+        node = make(context=context, parameter_overrides=clock)
+        name = node.get_name()
+        agrees(node.get_publisher_names_and_types_by_node, name, allowed(name, "topic", "publish"))
+        agrees(node.get_subscriber_names_and_types_by_node, name, allowed(name, "topic", "subscribe"))
+        agrees(node.get_service_names_and_types_by_node, name, allowed(name, "service", "reply"))
+        agrees(node.get_client_names_and_types_by_node, name, allowed(name, "service", "request"))
+        node.close()
+        node.destroy_node()
+    finally:
+        try_shutdown(context=context)
+
+
+def agrees(graph: Callable[[str, str], list[tuple[str, list[str]]]], node: str, rules: set[str]) -> None:
+    there = {name for name, _ in graph(node, "/")}
+    assert {name for name in there if not any(fnmatchcase(name, rule) for rule in rules)} == set()
+    assert {rule for rule in rules if not any(fnmatchcase(name, rule) for name in there)} == set()
+
+
+def test_the_policy_says_nothing_that_is_not_compared() -> None:
+    """As in sros2's schema: rules of topics and services, and each right an ALLOW."""
+    assert POLICY.get("version") == "0.2.0"
+    rights = {"topics": {"publish", "subscribe"}, "services": {"reply"}}
+    for rule in POLICY.iterfind(".//profile/*"):
+        assert set(rule.attrib) <= rights[rule.tag]
+        assert set(rule.attrib.values()) == {"ALLOW"}

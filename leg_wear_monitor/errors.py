@@ -1,4 +1,24 @@
-"""The one root of everything this package raises on purpose."""
+"""The one root of everything this package raises on purpose, and text that is fit to be shown."""
+
+_MOST_SHOWN = 2000
+
+
+def printable(text: str, most: int = _MOST_SHOWN) -> str:
+    r"""Text from a file as it may be shown: on one line, nothing in it that a terminal obeys, not too long.
+
+    What cannot be printed stands as its escape (``\x1b``); so do line breaks, marks that turn the direction
+    of writing, and bytes of a file name that are no UTF-8.
+
+    Parameters
+    ----------
+    text : str
+    most : int
+        Characters that are kept.
+    """
+    shown = "".join(
+        each if each.isprintable() else each.encode("unicode_escape").decode("ascii") for each in text[:most]
+    )
+    return shown if len(text) <= most else f"{shown} and {len(text) - most} characters more"
 
 
 class LegWearError(Exception):

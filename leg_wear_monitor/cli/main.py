@@ -10,7 +10,7 @@ from xml.etree import ElementTree
 
 import click
 
-from leg_wear_monitor.errors import ConfigWarning, LegWearError
+from leg_wear_monitor.errors import ConfigWarning, LegWearError, printable
 from leg_wear_monitor.mechanism.nearest import did_you_mean
 from leg_wear_monitor.share import share_directory
 
@@ -68,7 +68,7 @@ class Verbs(click.Group):
 
 
 def _say_error(text: str) -> None:
-    click.echo(f"error: {' '.join(text.split())}", err=True)
+    click.echo(f"error: {printable(' '.join(text.split()), most=10_000)}", err=True)
 
 
 @contextmanager

@@ -5,11 +5,17 @@ from pathlib import Path
 
 import attrs
 
-from leg_wear_monitor.errors import ConfigError
+from leg_wear_monitor.errors import ConfigError, printable
 
 
 class RecordingError(ConfigError):
-    """A recording of which nothing can be used: names the file, the topic where there is one, and why."""
+    """A recording of which nothing can be used: names the file, the topic where there is one, and why.
+
+    What a recording holds may stand in it: it is made printable.
+    """
+
+    def __init__(self, source: str, key: str, fault: str) -> None:
+        super().__init__(printable(source), printable(key), printable(fault))
 
 
 class Weight(Enum):
@@ -29,16 +35,16 @@ class Finding:
     ----------
     file : pathlib.Path
     text : str
-        One line: what, and where in bytes.
+        One line: what, and where in bytes; it is made printable.
     weight : Weight
     """
 
     file: Path
-    text: str
+    text: str = attrs.field(converter=printable)
     weight: Weight = Weight.LOSS
 
     def __str__(self) -> str:
-        return f"{self.file}: {self.text}"
+        return f"{printable(str(self.file))}: {self.text}"
 
 
 class DamageError(Exception):

@@ -4,6 +4,7 @@ from collections.abc import Iterable
 
 import attrs
 
+from leg_wear_monitor.errors import printable
 from leg_wear_monitor.recording.cdr import TYPES
 from leg_wear_monitor.recording.findings import RecordingError
 from leg_wear_monitor.recording.layout import Channel
@@ -127,4 +128,4 @@ def listed(names: Iterable[str]) -> str:
     """Names in order, not too many."""
     names = sorted(set(names))
     more = f" and {len(names) - 20} more" if len(names) > 20 else ""
-    return (", ".join(names[:20]) or "none") + more
+    return (", ".join(printable(name, 100) for name in names[:20]) or "none") + more

@@ -1,19 +1,20 @@
 """From what a user names to files in their order: files, bag directories, split and compressed bags."""
 
+import os
 import re
+import stat
 from collections.abc import Iterable
 from pathlib import Path
 from typing import Any
 
 import attrs
-from ruamel.yaml import YAML
-from ruamel.yaml.error import YAMLError
 
-from leg_wear_monitor.recording.findings import Finding, RecordingError, Weight
+from leg_wear_monitor.recording.findings import DamageError, Finding, RecordingError, Weight
+from leg_wear_monitor.recording.metadata import METADATA, read_metadata
+from leg_wear_monitor.recording.regular_file import kind_of
 
-METADATA = "metadata.yaml"
 MCAP, SQLITE = ".mcap", ".db3"
-_NAME = re.compile(r".*(\.mcap|\.db3)(\.zstd)?")
+_NAME = re.compile(r".*(\.mcap|\.db3)(\.zstd)?", re.DOTALL)
 
 
 @attrs.frozen
@@ -56,62 +57,86 @@ def find_files(paths: Iterable[str | Path]) -> tuple[list[BagFile], list[Finding
     files: list[BagFile] = []
     findings: list[Finding] = []
     for path in map(Path, paths):
-        if not path.exists():
+        mode = _mode(path)
+        if mode is None:
             raise RecordingError(str(path), "", "is not there, expected a bag directory, .mcap or .db3")
-        if path.is_dir():
+        if stat.S_ISDIR(mode):
             files += _directory(path, findings)
         else:
-            files.append(_file(path))
+            files.append(_file(path, mode))
     if not files:
         raise RecordingError("", "", "no recording is named, expected bag directories or .mcap or .db3 files")
     return files, findings
 
 
-def _file(path: Path, **parts: Any) -> BagFile:
+def _mode(path: Path) -> int | None:
+    """What a path is, without opening it: opening a pipe would wait for ever; None if it is not there."""
+    try:
+        return path.stat().st_mode
+    except (FileNotFoundError, NotADirectoryError):
+        return None
+    except (OSError, ValueError) as error:
+        why = error.strerror if isinstance(error, OSError) else error
+        raise RecordingError(str(path), "", f"cannot be read: {why}") from error
+
+
+def _file(path: Path, mode: int, **parts: Any) -> BagFile:
     match = _NAME.fullmatch(path.name)
     if match is None:
         raise RecordingError(str(path), "", "is neither a bag directory nor an .mcap or .db3 file")
+    if what := kind_of(mode):
+        raise RecordingError(str(path), "", f"is {what}, expected a file")
     return BagFile(path, match[1], match[2] is not None, **parts)
 
 
 def _directory(path: Path, findings: list[Finding]) -> list[BagFile]:
     """Files of a bag directory in the order of its metadata, else in the order of their numbers."""
-    there = sorted((file for file in path.iterdir() if _NAME.fullmatch(file.name)), key=_by_number)
+    there = _recordings(path, findings)
     named, parts = _metadata(path / METADATA, findings)
     if named:
-        missing = [name for name in named if not (path / name).is_file()]
+        missing = [name for name in named if name not in there]
         for name in missing:
             findings.append(Finding(path / METADATA, f"names {name}, which is not there: it is lost"))
-        there = [path / name for name in named if name not in missing]
+        there = [name for name in named if name not in missing]
     if not there:
         raise RecordingError(str(path), "", "holds no .mcap or .db3 file")
-    return [_file(file, **parts) for file in there]
+    return [_file(path / name, stat.S_IFREG, **parts) for name in there]
+
+
+def _recordings(path: Path, findings: list[Finding]) -> list[str]:
+    """Names of the files of a directory that are recordings by their names, in the order of their numbers."""
+    try:
+        named = sorted((file for file in path.iterdir() if _NAME.fullmatch(file.name)), key=_by_number)
+    except OSError as error:
+        raise RecordingError(str(path), "", f"cannot be read: {error.strerror}") from error
+    names = []
+    for file in named:
+        what = kind_of(_mode(file) or 0)
+        if what:
+            findings.append(Finding(file, f"is {what}, expected a file: it is not read", Weight.NOTE))
+        else:
+            names.append(file.name)
+    return names
 
 
 def _metadata(path: Path, findings: list[Finding]) -> tuple[list[str], dict[str, Any]]:
     """Names of the files and what holds for all of them; nothing where there is no metadata to rely on."""
-    if not path.is_file():
+    if not os.path.lexists(path):
         return [], {}
     try:
-        information = YAML(typ="safe", pure=True).load(path.read_text())["rosbag2_bagfile_information"]
-        names = [Path(name).name for name in information["relative_file_paths"]]
-        types = {
-            str(topic["topic_metadata"]["name"]): str(topic["topic_metadata"]["type"])
-            for topic in information.get("topics_with_message_count", [])
-        }
-        by_message = str(information.get("compression_mode", "")).lower() == "message"
-    except (YAMLError, UnicodeDecodeError, KeyError, TypeError, AttributeError, ValueError):
-        findings.append(Finding(path, "cannot be read: the directory's files are taken instead", Weight.NOTE))
+        metadata = read_metadata(path)
+    except DamageError as error:
+        findings.append(Finding(path, f"{error}: the directory's files are taken instead", Weight.NOTE))
         return [], {}
-    if not all(_NAME.fullmatch(name) for name in names):
+    names = [name for name in metadata.files if _NAME.fullmatch(name)]
+    if names != metadata.files:
         findings.append(
             Finding(path, "names other files than .mcap and .db3: they are not read", Weight.NOTE)
         )
-        names = [name for name in names if _NAME.fullmatch(name)]
-    return names, {"by_message": by_message, "types": types}
+    return names, {"by_message": metadata.by_message, "types": metadata.types}
 
 
 def _by_number(path: Path) -> tuple[list[tuple[int, str]], str]:
     """Key that puts run_2.mcap before run_10.mcap."""
     parts = re.findall(r"\d+|\D+", path.name)
-    return [(int(part), "") if part.isdigit() else (-1, part) for part in parts], path.name
+    return [(int(part), "") if part.isdecimal() else (-1, part) for part in parts], path.name

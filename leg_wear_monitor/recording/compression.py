@@ -1,26 +1,34 @@
 """Decompression that trusts no length and no checksum before it has seen it hold."""
 
 import zlib
-from pathlib import Path
+from collections.abc import Iterator
+from io import BytesIO
 from typing import IO
 
-from leg_wear_monitor.recording.findings import DamageError, RecordingError
+from leg_wear_monitor.recording.findings import DamageError
 
 ZSTD_MAGIC = b"\x28\xb5\x2f\xfd"
-LARGEST = 2**31
-"""Bytes that one chunk may have; a damaged length must not fill the memory."""
+_LARGEST_MESSAGE = 2**24
+_PART = 2**18  # bytes that are read together
+_BLOCK = 2**17  # bytes that are expanded together: zstd's own blocks have no more
+_LARGEST_WINDOW = 2**27  # bytes a zstd frame may look back; what zstd itself expands unless told otherwise
 
 
 def expand(data: bytes, compression: str, size: int) -> bytes:
     """Content of a chunk.
+
+    Parameters
+    ----------
+    data : bytes
+    compression : str
+    size : int
+        Bytes that it should have; no more are expanded, whatever the data claim.
 
     Raises
     ------
     DamageError
         Where the data are not what their head says.
     """
-    if size > LARGEST:
-        raise DamageError(f"claims {size} bytes")
     if compression == "zstd":
         content = _zstd(data, size)
     elif compression == "lz4":
@@ -37,21 +45,34 @@ def expand(data: bytes, compression: str, size: int) -> bytes:
 def expand_part(data: bytes, compression: str, size: int) -> bytes:
     """As much of a chunk's content as can be had from its first bytes; empty where that is nothing."""
     import lz4.frame
+
+    if compression == "":
+        return data[:size]
+    if compression == "zstd":
+        return _join(expanded(BytesIO(data)), size)
+    if compression == "lz4":
+        try:
+            part: bytes = lz4.frame.LZ4FrameDecompressor().decompress(data, size)
+        except RuntimeError:
+            return b""
+        return part
+    return b""
+
+
+def expanded(file: IO[bytes]) -> Iterator[bytes]:
+    """Content of a zstd file in parts of bounded size, until it ends or is damaged."""
     import zstandard
 
-    if size > LARGEST:
-        return b""
-    if compression == "":
-        return data
-    try:
-        if compression == "zstd":
-            return zstandard.ZstdDecompressor().decompressobj().decompress(data)[:size]
-        if compression == "lz4":
-            part: bytes = lz4.frame.LZ4FrameDecompressor().decompress(data, size)
-            return part
-    except (zstandard.ZstdError, RuntimeError):
-        return b""
-    return b""
+    expander = zstandard.ZstdDecompressor(max_window_size=_LARGEST_WINDOW)
+    parts = expander.read_to_iter(file, read_size=_PART, write_size=_BLOCK)
+    while True:
+        try:
+            part = next(parts, b"")
+        except zstandard.ZstdError:
+            return  # whoever reads the content finds that it ends early
+        if not part:
+            return
+        yield part
 
 
 def check(content: bytes, crc: int) -> None:
@@ -65,41 +86,36 @@ def check(content: bytes, crc: int) -> None:
         raise DamageError("does not match its checksum")
 
 
-def expand_message(data: bytes) -> bytes:
-    """Content of a message that was compressed by itself; other messages as they are."""
+def expand_message(data: bytes, most: int) -> bytes:
+    """Content of a message that was compressed by itself, other messages as they are; empty where none is.
+
+    Parameters
+    ----------
+    data : bytes
+    most : int
+        Bytes that it may have.
+    """
     import zstandard
 
     if not data.startswith(ZSTD_MAGIC):
         return data
+    most = min(most, _LARGEST_MESSAGE)
     try:
-        return zstandard.ZstdDecompressor().decompress(data, max_output_size=2**24)
+        if zstandard.frame_content_size(data) > most:
+            return b""
     except zstandard.ZstdError:
         return b""
+    return _join(expanded(BytesIO(data)), most)
 
 
-def expand_file(source: Path, target: IO[bytes]) -> None:
-    """Write the content of a file that was compressed as a whole.
-
-    A file that is cut short, or damaged, gives what comes before.
-
-    Raises
-    ------
-    RecordingError
-        If it is no zstd file at all.
-    """
-    import zstandard
-
-    with source.open("rb") as file:
-        if file.read(4) != ZSTD_MAGIC:
-            raise RecordingError(str(source), "", "is no zstd file, as its name says")
-        file.seek(0)
-        expander = zstandard.ZstdDecompressor().decompressobj()
-        while not expander.eof and (part := file.read(2**18)):
-            try:
-                target.write(expander.decompress(part))
-            except zstandard.ZstdError:
-                break  # the reader finds that its file ends early
-    target.flush()
+def _join(parts: Iterator[bytes], most: int) -> bytes:
+    """Parts in one, as many bytes as asked for."""
+    content = bytearray()
+    for part in parts:
+        content += part[: most - len(content)]
+        if len(content) >= most:
+            break
+    return bytes(content)
 
 
 def _zstd(data: bytes, size: int) -> bytes:

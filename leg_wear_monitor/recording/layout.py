@@ -4,6 +4,7 @@ import struct
 import zlib
 from collections.abc import Iterable, Iterator
 from io import BytesIO
+from itertools import pairwise
 from typing import IO, Any
 
 import attrs
@@ -13,6 +14,7 @@ from mcap.records import Channel as ChannelRecord
 from mcap.records import ChunkIndex, Schema, Statistics
 from mcap.stream_reader import StreamReader
 
+from leg_wear_monitor.recording.budget import Budget
 from leg_wear_monitor.recording.findings import DamageError
 from leg_wear_monitor.recording.records import CHANNEL, CHUNK, DATA_END, RECORD_HEAD, SCHEMA
 
@@ -21,6 +23,8 @@ HEAD = struct.Struct("<BQ")
 UNREADABLE = (McapError, struct.error, UnicodeDecodeError, ValueError, KeyError, OverflowError, MemoryError)
 """What the library raises over records that are damaged."""
 
+_OF_A_SUMMARY = 16  # its records take so many times its bytes
+_OF_USE = (ChannelRecord, ChunkIndex, Schema, Statistics)
 _CHUNK_HEAD = struct.Struct("<QQQI")
 _FOOTER = struct.Struct("<BQQQI")
 _DATA_END = struct.Struct("<BQI")
@@ -90,9 +94,9 @@ class Layout:
     notes: list[str] = attrs.Factory(list)
 
 
-def by_index(file: IO[bytes], size: int) -> Layout | None:
+def by_index(file: IO[bytes], size: int, budget: Budget) -> Layout | None:
     """Layout from a file's summary; None where there is none that can be relied on."""
-    records = _summary(file, size)
+    records = _summary(file, size, budget.at_once // _OF_A_SUMMARY)
     if records is None:
         return None
     layout = Layout([], channels_of(records))
@@ -105,12 +109,20 @@ def by_index(file: IO[bytes], size: int) -> Layout | None:
             return None
     if not layout.channels or (not indexes and (statistics is None or statistics.message_count)):
         return None
+    if _overlap(indexes):
+        return None
     for index in sorted(indexes, key=lambda index: (index.message_start_time, index.chunk_start_offset)):
         at, head = index.chunk_start_offset, RECORD_HEAD + _CHUNK_HEAD.size + 4 + len(index.compression) + 8
         if at + index.chunk_length > size:
             return None
         layout.segments.append(_indexed(index, at + head))
     return layout
+
+
+def _overlap(indexes: list[ChunkIndex]) -> bool:
+    """Whether chunks lie one in another: an index could name one a million times."""
+    spans = sorted((index.chunk_start_offset, index.chunk_length) for index in indexes)
+    return any(at + length > after for (at, length), (after, _) in pairwise(spans))
 
 
 def _indexed(index: ChunkIndex, data_at: int) -> Segment:
@@ -135,17 +147,19 @@ def _footer(file: IO[bytes], size: int) -> tuple[int, int]:
     return (start, crc) if (opcode, length) == (0x02, 20) and start < size else (0, 0)
 
 
-def _summary(file: IO[bytes], size: int) -> list[Any] | None:
-    """Records of the summary, None where it is absent or damaged."""
+def _summary(file: IO[bytes], size: int, most: int) -> list[Any] | None:
+    """Records of the summary that are of use; None where it is absent, damaged or larger than that."""
     start, crc = _footer(file, size)
-    if not start:
+    if not start or size - start > most:
         return None
     file.seek(start)
     data = file.read()
     if crc and zlib.crc32(data[: -len(MAGIC) - 4]) != crc:
         return None
     try:
-        return list(StreamReader(BytesIO(data), skip_magic=True, record_size_limit=len(data)).records)
+        # emit_chunks: what stands there as a chunk would be expanded without a bound
+        reader = StreamReader(BytesIO(data), skip_magic=True, record_size_limit=len(data), emit_chunks=True)
+        return [record for record in reader.records if isinstance(record, _OF_USE)]
     except UNREADABLE:
         return None
 

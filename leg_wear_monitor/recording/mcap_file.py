@@ -1,7 +1,8 @@
 """One MCAP file: its topics, and their messages piece by piece in order of log time."""
 
 import zlib
-from collections.abc import Iterator
+from collections.abc import Callable, Iterator
+from functools import partial
 from pathlib import Path
 from typing import IO
 
@@ -10,6 +11,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from leg_wear_monitor.recording import records
+from leg_wear_monitor.recording.budget import Budget
 from leg_wear_monitor.recording.cdr import MESSAGE
 from leg_wear_monitor.recording.compression import check
 from leg_wear_monitor.recording.findings import DamageError, Finding, RecordingError, Weight
@@ -19,6 +21,10 @@ from leg_wear_monitor.recording.salvage import by_scan, content
 
 _NO_POSITIONS = np.zeros(0, np.int64)
 _NO_MESSAGES = np.zeros(0, MESSAGE)
+
+
+_OF_A_MESSAGE = 400  # bytes that it takes on its way to a sample, beside its own
+_MOST_FINDINGS = 1000
 
 
 @attrs.frozen(eq=False)
@@ -41,6 +47,22 @@ class Piece:
     stored: int
 
 
+@attrs.frozen(eq=False)
+class Due:
+    """A piece that is not loaded yet, so that many files wait for their turn without taking memory.
+
+    Attributes
+    ----------
+    start_ns : int
+        As in the piece [ns].
+    load : callable
+        Gives the piece, or None where it is damaged. To be called before the next one is asked for.
+    """
+
+    start_ns: int
+    load: Callable[[], Piece | None]
+
+
 class McapFile:
     """An MCAP file, open; what is wrong with it is in `findings`.
 
@@ -50,6 +72,7 @@ class McapFile:
         Name for messages.
     file : binary file
         From which can be read anywhere.
+    budget : Budget
 
     Raises
     ------
@@ -57,14 +80,15 @@ class McapFile:
         If it is empty or no MCAP file.
     """
 
-    def __init__(self, path: Path, file: IO[bytes]) -> None:
-        self.path, self.file = path, file
+    def __init__(self, path: Path, file: IO[bytes], budget: Budget) -> None:
+        self.path, self.file, self.budget = path, file, budget
         self.size = file.seek(0, 2)
         self.findings: list[Finding] = []
         self.without_checksum = 0
+        self._found = 0
         self._check_magic()
-        indexed = by_index(file, self.size)
-        self.layout = indexed or by_scan(file, self.size)
+        indexed = by_index(file, self.size, budget)
+        self.layout = indexed or by_scan(file, self.size, budget)
         self.is_indexed = indexed is not None
         for text in self.layout.losses:
             self._find(text)
@@ -77,8 +101,8 @@ class McapFile:
         """Channels of the file by their number."""
         return self.layout.channels
 
-    def pieces(self, types: dict[int, int]) -> Iterator[Piece]:
-        """Messages of the channels asked for; damaged parts are left out and found.
+    def pieces(self, types: dict[int, int]) -> Iterator[Due]:
+        """Messages of the channels asked for, to be loaded in turn; damaged parts are left out and found.
 
         Parameters
         ----------
@@ -89,23 +113,26 @@ class McapFile:
         roles[list(self.channels)] = records.IGNORED
         for number, code in types.items():
             roles[number] = code
-        found = 0
         for segment in self.layout.segments:
-            try:
-                data = np.frombuffer(self._load(segment), np.uint8)
-            except DamageError as error:
-                self._find(f"chunk at byte {segment.at} {error}: its messages are lost")
-                continue
+            yield Due(segment.start_ns, partial(self._piece, segment, roles))
+        self._account(types, self._found)
+
+    def _piece(self, segment: Segment, roles: NDArray[np.uint8]) -> Piece | None:
+        """Messages of a segment; None where it is damaged."""
+        try:
+            data = np.frombuffer(self._load(segment), np.uint8)
             messages = self._messages(segment, data, roles)
-            found += len(messages)
-            yield Piece(segment.start_ns, data, messages, segment.stored)
-        self._account(types, found)
+        except DamageError as error:
+            self._find(f"chunk at byte {segment.at} {error}: its messages are lost")
+            return None
+        self._found += len(messages)
+        return Piece(segment.start_ns, data, messages, segment.stored)
 
     def _load(self, segment: Segment) -> bytes:
         """Records of a segment, whose checksum holds where there is one."""
         if segment.data_at == segment.at:
             self.without_checksum += 1
-            return content(self.file, segment)
+            return content(self.file, segment, self.budget)
         head = chunk_head(self.file, segment.at, self.size)
         if (head.data_at, head.stored, head.size, head.compression) != (
             segment.data_at,
@@ -114,7 +141,7 @@ class McapFile:
             segment.compression,
         ):
             raise DamageError("is not what the index says")
-        data = content(self.file, segment)
+        data = content(self.file, segment, self.budget)
         if not segment.cut:
             check(data, head.crc)
         self.without_checksum += not head.crc or segment.cut
@@ -125,7 +152,9 @@ class McapFile:
     ) -> NDArray[np.void]:
         tally = np.zeros(1, TALLY)
         records.walk(data, roles, _NO_MESSAGES, _NO_POSITIONS, tally)
-        messages = np.zeros(int(tally["wanted"][0]), MESSAGE)
+        wanted = int(tally["wanted"][0])
+        self.budget.check(segment.stored + len(data) + _OF_A_MESSAGE * wanted)
+        messages = np.zeros(wanted, MESSAGE)
         if len(messages):
             records.walk(data, roles, messages, _NO_POSITIONS, tally)
         rest = len(data) - int(tally["read"][0])
@@ -171,4 +200,7 @@ class McapFile:
             self._find("does not match the checksum of its data: something in it is damaged")
 
     def _find(self, text: str, weight: Weight = Weight.LOSS) -> None:
-        self.findings.append(Finding(self.path, text, weight))
+        if len(self.findings) < _MOST_FINDINGS:
+            self.findings.append(Finding(self.path, text, weight))
+        elif len(self.findings) == _MOST_FINDINGS:
+            self.findings.append(Finding(self.path, "has more findings than these; they are not listed"))

@@ -3,7 +3,7 @@
 import heapq
 from collections.abc import Iterable, Iterator
 from contextlib import ExitStack
-from operator import attrgetter
+from itertools import repeat
 from pathlib import Path
 
 import attrs
@@ -12,16 +12,20 @@ from numpy.typing import NDArray
 
 from leg_wear_monitor.monitor.config import MonitorConfig
 from leg_wear_monitor.recording.bag import find_files
+from leg_wear_monitor.recording.budget import DEFAULT_MB, Budget
 from leg_wear_monitor.recording.clocks import Clocks
 from leg_wear_monitor.recording.decoder import Decoder, mark_zero_stamps
 from leg_wear_monitor.recording.findings import Finding, RecordingError, Weight
+from leg_wear_monitor.recording.joint_names import JointNames
 from leg_wear_monitor.recording.mcap_file import Piece
+from leg_wear_monitor.recording.one_leg import OneLeg, check_topics
 from leg_wear_monitor.recording.sources import assign, open_sources
 from leg_wear_monitor.recording.topics import roles
 from leg_wear_monitor.twin.sample import GAIT_SAMPLE, NO_FAULT, ZERO_STAMP, Samples
 
 TIMES = ("header", "log", "publish")
 _TOGETHER = 4096  # samples that a block should have at least
+_OF_A_SAMPLE = 800  # bytes that one takes while it waits for its turn, its copies included
 
 
 @attrs.frozen(eq=False)
@@ -57,6 +61,8 @@ class Recording:
         Topics; found by their relative names if not given.
     time : str
         One of `TIMES`: which time stamps the samples. Float64 has no header, it takes the log time.
+    memory_mb : float
+        Memory that reading may take, temporary files included [10⁶ bytes].
 
     Attributes
     ----------
@@ -77,19 +83,23 @@ class Recording:
         joint_states: str | None = None,
         drive_torque: str | None = None,
         time: str = "header",
+        memory_mb: float = DEFAULT_MB,
     ) -> None:
         if time not in TIMES:
             raise RecordingError("time", "", f"{time!r} is not one of {', '.join(TIMES)}")
         self.time = time
         self._clocks = Clocks()
         self._decoder = Decoder(config)
+        self._budget = Budget(memory_mb)
+        self._joints = JointNames(config.crank_joint)
+        self._one_leg = OneLeg()
         bag_files, self._findings = find_files(paths)
         with ExitStack() as stack:
-            self._sources, lost = open_sources(bag_files, stack)
+            self._sources, lost = open_sources(bag_files, self._budget, stack)
             wanted = roles(config.drive_torque.source, joint_states, drive_torque)
             self.topics, missing = assign(self._sources, wanted)
+            self._findings += lost + missing + check_topics(self._sources, self.topics, joint_states)
             self._close = stack.pop_all()
-        self._findings += lost + missing
 
     def __enter__(self) -> "Recording":
         return self
@@ -117,25 +127,53 @@ class Recording:
         return any(finding.weight is Weight.LOSS for finding in self.findings)
 
     def blocks(self) -> Iterator[Block]:
-        """Samples of the whole recording; once."""
+        """Samples of the whole recording; once.
+
+        Raises
+        ------
+        RecordingError
+            At the end, if the crank is in no message; as soon as files are of two legs.
+        """
         read, total = 0, max(1, sum(source.file.size for source in self._sources))
         waiting = Block(np.zeros(0, GAIT_SAMPLE), np.zeros(0, np.int64), 0.0)
-        pieces = (source.pieces() for source in self._sources)
-        for piece in heapq.merge(*pieces, key=attrgetter("start_ns")):
+        for path, piece in self._pieces():
             passed = int(np.searchsorted(waiting.log_time_ns, piece.start_ns))
             if passed >= _TOGETHER:
                 yield _part(waiting, slice(passed))
                 waiting = _part(waiting, slice(passed, None))
+            elif len(waiting.samples) * _OF_A_SAMPLE > self._budget.left:
+                self._too_many_wait(path)
+                yield waiting
+                waiting = _part(waiting, slice(0))
             read += piece.stored
-            waiting = _merged(waiting, piece, self._samples(piece), min(read / total, 1.0))
+            waiting = _merged(waiting, piece, self._samples(path, piece), min(read / total, 1.0))
         if len(waiting.samples):
             yield attrs.evolve(waiting, share=1.0)
+        self._findings += self._joints.findings()
         notes = self._clocks.notes()
         self._findings += [Finding(self.files[0], text, Weight.NOTE) for text in notes]
 
-    def _samples(self, piece: Piece) -> Samples:
+    def _pieces(self) -> Iterator[tuple[Path, Piece]]:
+        """Pieces of all files as they begin, with their files; each is loaded when its turn has come."""
+        dues = (zip(repeat(source.bag_file.path), source.pieces(), strict=False) for source in self._sources)
+        for path, due in heapq.merge(*dues, key=lambda each: each[1].start_ns):
+            piece = due.load()
+            if piece is not None:
+                yield path, piece
+
+    def _too_many_wait(self, path: Path) -> None:
+        text = (
+            "has chunks that overlap in time by more messages than --memory-mb allows: some come out of order"
+        )
+        if not any(finding.text == text for finding in self._findings):
+            self._findings.append(Finding(path, text))
+
+    def _samples(self, path: Path, piece: Piece) -> Samples:
         """Decode a piece, and stamp its samples as asked for."""
         samples = self._decoder.many(piece.data, piece.messages)
+        self._joints.see(path, piece.data, piece.messages, samples)
+        if len(self._sources) > 1:
+            self._one_leg.see(path, samples)
         self._clocks.compare(samples, piece.messages)
         if self.time != "header":
             samples["fault"][samples["fault"] == ZERO_STAMP] = NO_FAULT

@@ -4,8 +4,10 @@ from typing import IO, Any
 
 import attrs
 import numpy as np
+from mcap.records import Schema
 
 from leg_wear_monitor.recording import records
+from leg_wear_monitor.recording.budget import Budget
 from leg_wear_monitor.recording.cdr import MESSAGE
 from leg_wear_monitor.recording.compression import expand, expand_part
 from leg_wear_monitor.recording.findings import DamageError
@@ -21,12 +23,13 @@ from leg_wear_monitor.recording.layout import (
 from leg_wear_monitor.recording.records import RECORD_HEAD, TALLY
 
 _WINDOW = 2**20  # bytes looked at together outside of chunks
+_OF_A_SEGMENT = 400  # bytes in memory
 _LAST_OPCODE, _PRIVATE = 0x0F, 0x80
 _MOST_DEFINITIONS = 4096
 _ALL_IGNORED = np.full(2**16, records.IGNORED, np.uint8)
 
 
-def by_scan(file: IO[bytes], size: int) -> Layout:
+def by_scan(file: IO[bytes], size: int, budget: Budget) -> Layout:
     """Layout from the records themselves: chunks are expanded for their channels and their true times.
 
     Parameters
@@ -34,11 +37,12 @@ def by_scan(file: IO[bytes], size: int) -> Layout:
     file : binary file, from which can be read anywhere
     size : int
         Its bytes.
+    budget : Budget
     """
-    scan = _Scan(file, size)
+    scan = _Scan(file, size, budget)
     scan.run()
     layout = scan.layout
-    layout.channels = channels_of(scan.definitions)
+    layout.channels = channels_of(scan.definitions.values())
     layout.segments.sort(key=lambda segment: (segment.start_ns, segment.at))
     return layout
 
@@ -46,10 +50,12 @@ def by_scan(file: IO[bytes], size: int) -> Layout:
 class _Scan:
     """Where the walk is, and what it has found."""
 
-    def __init__(self, file: IO[bytes], size: int) -> None:
+    def __init__(self, file: IO[bytes], size: int, budget: Budget) -> None:
         self.file, self.size, self.at = file, size, len(MAGIC)
+        self.budget = budget
         self.layout = Layout([], {})
-        self.definitions: list[Any] = []
+        self.definitions: dict[tuple[type, int], Any] = {}  # chunks may repeat them
+        self.defined = 0  # bytes
 
     def run(self) -> None:
         """Go from record to record until the data end, or can no longer be followed."""
@@ -87,8 +93,15 @@ class _Scan:
             self._ends_early(self.size - self.at)
             return False
         elif opcode in (records.SCHEMA, records.CHANNEL, records.MESSAGE_RECORD):
-            end = self._outside(end)
+            try:
+                self.budget.check(end - self.at)
+                end = self._outside(end)
+            except DamageError as error:
+                self.layout.losses.append(f"record at byte {self.at} {error}: it is lost")
         self.at = end
+        if len(self.layout.segments) * _OF_A_SEGMENT > self.budget.at_once:
+            self._lost(f"is behind {len(self.layout.segments)} chunks, more than --memory-mb allows")
+            return False
         return True
 
     def _outside(self, end: int) -> int:
@@ -100,13 +113,13 @@ class _Scan:
     def _take(self, segment: Segment) -> None:
         """Keep a segment with its true times, and the definitions in it."""
         try:
-            data = content(self.file, segment)
+            data = content(self.file, segment, self.budget)
         except DamageError:
             self.layout.segments.append(segment)  # whoever reads it says what is wrong
             return
         tally, positions = np.zeros(1, TALLY), np.zeros(_MOST_DEFINITIONS, np.int64)
         records.walk(np.frombuffer(data, np.uint8), _ALL_IGNORED, np.zeros(0, MESSAGE), positions, tally)
-        self.definitions += definitions(data, positions[: int(tally["definitions"][0])].tolist())
+        self._define(data, positions[: int(tally["definitions"][0])].tolist())
         if tally["last_log_time_ns"][0] >= 0:
             first, last = int(tally["first_log_time_ns"][0]), int(tally["last_log_time_ns"][0])
             segment = attrs.evolve(segment, start_ns=first, end_ns=last)
@@ -114,6 +127,13 @@ class _Scan:
             read = int(tally["read"][0])
             segment = attrs.evolve(segment, stored=read, size=read)
         self.layout.segments.append(segment)
+
+    def _define(self, data: bytes, positions: list[int]) -> None:
+        """Keep schemas and channels, the last of each number, as long as there is room for them."""
+        for record in definitions(data, positions):
+            self.defined += len(record.data) if isinstance(record, Schema) else len(record.topic)
+            if self.defined <= self.budget.at_once // 4:
+                self.definitions[type(record), record.id] = record
 
     def _ends_early(self, rest: int) -> None:
         self.layout.losses.append(
@@ -127,13 +147,15 @@ class _Scan:
         )
 
 
-def content(file: IO[bytes], segment: Segment) -> bytes:
+def content(file: IO[bytes], segment: Segment, budget: Budget) -> bytes:
     """Records of a segment, without a look at its checksum; what can be had of one that is cut.
 
     Raises
     ------
     DamageError
+        Also if it needs more than the budget leaves.
     """
+    budget.check(segment.size + (segment.stored if segment.data_at != segment.at else 0))
     file.seek(segment.data_at)
     data = file.read(segment.stored)
     if segment.cut:

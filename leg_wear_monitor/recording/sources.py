@@ -3,6 +3,7 @@
 import tempfile
 from collections.abc import Iterable, Iterator
 from contextlib import ExitStack
+from functools import partial
 from pathlib import Path
 from typing import Protocol
 
@@ -10,10 +11,12 @@ import attrs
 import numpy as np
 
 from leg_wear_monitor.recording.bag import MCAP, BagFile
-from leg_wear_monitor.recording.compression import expand_file, expand_message
-from leg_wear_monitor.recording.findings import Finding, RecordingError, Weight
+from leg_wear_monitor.recording.budget import Budget
+from leg_wear_monitor.recording.compression import ZSTD_MAGIC, expand_message, expanded
+from leg_wear_monitor.recording.findings import DamageError, Finding, RecordingError, Weight
 from leg_wear_monitor.recording.layout import Channel
-from leg_wear_monitor.recording.mcap_file import McapFile, Piece
+from leg_wear_monitor.recording.mcap_file import Due, McapFile, Piece
+from leg_wear_monitor.recording.regular_file import open_regular
 from leg_wear_monitor.recording.topics import Role, check_channel, find_topic, listed
 
 
@@ -28,7 +31,7 @@ class OpenFile(Protocol):
     def channels(self) -> dict[int, Channel]:
         """Channels of the file by their number."""
 
-    def pieces(self, types: dict[int, int]) -> Iterator[Piece]:
+    def pieces(self, types: dict[int, int]) -> Iterator[Due]:
         """Messages of channels, given with the codes of their types."""
 
 
@@ -38,20 +41,29 @@ class Source:
 
     bag_file: BagFile
     file: OpenFile
+    budget: Budget
     types: dict[int, int] = attrs.Factory(dict)
 
-    def pieces(self) -> Iterator[Piece]:
+    def pieces(self) -> Iterator[Due]:
         """Messages that are wanted, in order of log time."""
-        for piece in self.file.pieces(self.types):
-            yield _expanded(piece) if self.bag_file.by_message else piece
+        for due in self.file.pieces(self.types):
+            yield attrs.evolve(due, load=partial(self._expanded, due)) if self.bag_file.by_message else due
+
+    def _expanded(self, due: Due) -> Piece | None:
+        """The messages of a piece, each decompressed."""
+        piece = due.load()
+        return None if piece is None else _expanded(piece, self.budget.at_once // 2)
 
 
-def open_sources(bag_files: Iterable[BagFile], stack: ExitStack) -> tuple[list[Source], list[Finding]]:
+def open_sources(
+    bag_files: Iterable[BagFile], budget: Budget, stack: ExitStack
+) -> tuple[list[Source], list[Finding]]:
     """Open what can be opened; a file that cannot be is lost if there are others.
 
     Parameters
     ----------
     bag_files : iterable of BagFile
+    budget : Budget
     stack : contextlib.ExitStack
         Closes them.
 
@@ -64,7 +76,7 @@ def open_sources(bag_files: Iterable[BagFile], stack: ExitStack) -> tuple[list[S
     failed: list[RecordingError] = []
     for bag_file in bag_files:
         try:
-            sources.append(Source(bag_file, _open(bag_file, stack)))
+            sources.append(Source(bag_file, _open(bag_file, budget, stack), budget))
         except RecordingError as error:
             failed.append(error)
     if not sources:
@@ -113,35 +125,43 @@ def _types(source: Source, role: Role, topic: str) -> dict[int, int]:
     }
 
 
-def _open(bag_file: BagFile, stack: ExitStack) -> OpenFile:
+def _open(bag_file: BagFile, budget: Budget, stack: ExitStack) -> OpenFile:
     path = bag_file.path
     try:
         if bag_file.compressed:
-            path = _expanded_file(bag_file, stack)
+            path = _expanded_file(bag_file, budget, stack)
         if bag_file.storage == MCAP:
-            return McapFile(bag_file.path, stack.enter_context(path.open("rb")))
+            return McapFile(bag_file.path, stack.enter_context(open_regular(path)), budget)
+    except DamageError as error:
+        raise RecordingError(str(bag_file.path), "", str(error)) from error
     except OSError as error:
         raise RecordingError(str(bag_file.path), "", f"cannot be read: {error.strerror}") from error
     from leg_wear_monitor.recording.sqlite_file import SqliteFile
 
-    return SqliteFile(bag_file.path, path, stack)
+    return SqliteFile(bag_file.path, path, budget, stack)
 
 
-def _expanded_file(bag_file: BagFile, stack: ExitStack) -> Path:
-    """Temporary file with the content of a compressed one."""
+def _expanded_file(bag_file: BagFile, budget: Budget, stack: ExitStack) -> Path:
+    """Temporary file with the content of a compressed one; it counts as memory."""
     path = Path(stack.enter_context(tempfile.TemporaryDirectory())) / f"content{bag_file.storage}"
-    with path.open("wb") as content:
-        expand_file(bag_file.path, content)
-    if not path.stat().st_size:
-        raise RecordingError(str(bag_file.path), "", "holds nothing that can be decompressed")
+    with open_regular(bag_file.path) as file, path.open("wb") as content:
+        if file.read(len(ZSTD_MAGIC)) != ZSTD_MAGIC:
+            raise DamageError("is no zstd file, as its name says")
+        file.seek(0)
+        for part in expanded(file):
+            budget.take(len(part))
+            content.write(part)
+        if not content.tell():
+            raise DamageError("holds nothing that can be decompressed")
     return path
 
 
-def _expanded(piece: Piece) -> Piece:
-    """The same messages, each decompressed."""
-    raw = piece.data.tobytes()
-    bounds = zip(piece.messages["begin"].tolist(), piece.messages["end"].tolist(), strict=True)
-    contents = [expand_message(raw[begin:end]) for begin, end in bounds]
+def _expanded(piece: Piece, most: int) -> Piece:
+    """The same messages, each decompressed, and no more bytes of all of them than asked for."""
+    contents = []
+    for begin, end in zip(piece.messages["begin"].tolist(), piece.messages["end"].tolist(), strict=True):
+        contents.append(expand_message(piece.data[begin:end].tobytes(), most))
+        most -= len(contents[-1])
     messages = piece.messages.copy()
     messages["end"] = np.cumsum([len(content) for content in contents])
     messages["begin"] = messages["end"] - [len(content) for content in contents]

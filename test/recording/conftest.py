@@ -140,6 +140,26 @@ def write_bag() -> Callable[..., Path]:
 
 
 @pytest.fixture(scope="session")
+def write_database(store: Any) -> Callable[..., Path]:
+    """Write messages of known types as a .db3 bag with rosbags' own writer."""
+    rosbag2 = pytest.importorskip("rosbags.rosbag2")
+
+    def write(directory: Path, sent: list[Sent]) -> Path:
+        with rosbag2.Writer(directory, version=9, storage_plugin=rosbag2.StoragePlugin.SQLITE3) as writer:
+            ours = [each for each in sent if each.type in store.types]
+            connections = {
+                topic: writer.add_connection(topic, kind, typestore=store)
+                for topic, kind in sorted({(each.topic, each.type) for each in ours})
+            }
+            for each in ours:
+                writer.write(connections[each.topic], each.log_time_ns, each.raw)
+        (path,) = directory.glob("*.db3")
+        return path
+
+    return write
+
+
+@pytest.fixture(scope="session")
 def expected() -> Callable[..., Any]:
     """Samples that messages should give, one by one, in order of log time."""
 

@@ -151,24 +151,9 @@ def test_a_part_that_cannot_be_opened_is_a_loss(
     assert losses == [f"{tmp_path / 'a_1.mcap'}: is empty, expected an MCAP file: it is lost"]
 
 
-def write_database(directory: Path, sent: Any, store: Any) -> Path:
-    """A .db3 bag, written by rosbags."""
-    rosbag2 = pytest.importorskip("rosbags.rosbag2")
-    with rosbag2.Writer(directory, version=9, storage_plugin=rosbag2.StoragePlugin.SQLITE3) as writer:
-        ours = [each for each in sent if each.type in store.types]
-        connections = {
-            topic: writer.add_connection(topic, kind, typestore=store)
-            for topic, kind in sorted({(each.topic, each.type) for each in ours})
-        }
-        for each in ours:
-            writer.write(connections[each.topic], each.log_time_ns, each.raw)
-    (path,) = directory.glob("*.db3")
-    return path
-
-
-def test_a_damaged_database(tmp_path: Path, sent: Any, store: Any, expected: Any, read: Any) -> None:
+def test_a_damaged_database(tmp_path: Path, sent: Any, write_database: Any, expected: Any, read: Any) -> None:
     """Cut short it gives what was sent or nothing; a flipped bit may pass, but not unsaid."""
-    path = write_database(tmp_path / "bag", sent, store)
+    path = write_database(tmp_path / "bag", sent)
     whole, true = path.read_bytes(), expected(sent)
     for cut in np.random.default_rng(4).integers(0, len(whole), TRUNCATIONS).tolist():
         path.write_bytes(whole[:cut])
@@ -183,10 +168,10 @@ def test_a_damaged_database(tmp_path: Path, sent: Any, store: Any, expected: Any
 
 
 def test_rows_of_another_kind_are_lost_and_counted(
-    tmp_path: Path, sent: Any, store: Any, expected: Any, read: Any
+    tmp_path: Path, sent: Any, write_database: Any, expected: Any, read: Any
 ) -> None:
     """SQLite takes anything for a time; only what can be one is taken from it."""
-    path = write_database(tmp_path / "bag", sent, store)
+    path = write_database(tmp_path / "bag", sent)
     with closing(sqlite3.connect(path)) as database, database:
         database.execute("UPDATE messages SET timestamp = x'17' WHERE id = 5")
         database.execute("UPDATE messages SET data = 'text' WHERE id = 7")

@@ -15,6 +15,7 @@ from leg_wear_monitor.monitor.ledger_entry import Measurement
 from leg_wear_monitor.recording import encode
 from leg_wear_monitor.recording.cdr import JOINT_STATE, WRENCH_STAMPED
 from leg_wear_monitor.recording.decoder import Decoder
+from leg_wear_monitor.recording.findings import RecordingError
 from leg_wear_monitor.recording.forecast_times import ForecastTimes
 from leg_wear_monitor.recording.outputs import Messages, topic_of
 from leg_wear_monitor.recording.summary import summary
@@ -230,16 +231,22 @@ def test_progress_goes_from_little_to_all(bag: Path) -> None:
     assert shares == sorted(shares) and shares[-1] == 1.0
 
 
-def test_a_recording_of_another_crank_gives_a_result_of_nothing(bag: Path, tmp_path: Path) -> None:
-    """Nothing is followed, nothing is made up, and the reason is counted."""
+def test_a_recording_of_another_crank_is_refused(bag: Path) -> None:
+    with pytest.raises(RecordingError, match=r"wheel: is not among the joints of 1600 messages"):
+        lw.replay(bag, lw.MonitorConfig(crank_joint="wheel"))
+
+
+def test_a_crank_that_hardly_turns_gives_a_result_of_nothing(bag: Path) -> None:
+    """Nothing is made up, and the reason is said."""
     pytest.importorskip("jinja2")
     from leg_wear_monitor.report.page import page_html
     from leg_wear_monitor.report.replay_page import replay_page
 
-    result = lw.replay(bag, lw.MonitorConfig(crank_joint="wheel"), out=tmp_path / "out")
+    config = lw.MonitorConfig()
+    result = lw.replay(bag, attrs.evolve(config, crank=attrs.evolve(config.crank, gear_ratio=100.0)))
     record = {**summary(result, 1.0), "made_with": {}}
     assert record["cycles"] == 0 and record["joints"] == {}
-    assert record["lost"]["faulty"]["missing_joint"] == SECONDS * RATE_HZ
-    assert np.all(result.monitor.wear_depth_m == 0.0)
-    assert "nothing to say about wear" in page_html(replay_page(record))
-    assert reported(tmp_path / "out" / "reports.mcap").keys() <= {"/diagnostics", "/leg_wear_monitor/alarms"}
+    assert record["gait"]["missing"].startswith("the crank turns 0.08 times in 8 s")
+    page = page_html(replay_page(record))
+    assert "nothing to say about forces and wear" in page
+    assert "the crank turns 0.08 times in 8 s" in page

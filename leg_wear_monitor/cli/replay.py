@@ -57,6 +57,14 @@ _MOST_LINES = 20
 )
 @click.option("--crank-joint", metavar="NAME", help="The crank's name.  [default: as the parameters say]")
 @click.option(
+    "--memory-mb",
+    type=click.FloatRange(min=16.0),
+    default=512.0,
+    show_default=True,
+    metavar="MB",
+    help="Memory that reading may take, temporary files included.",
+)
+@click.option(
     "--ledger",
     type=click.Path(path_type=Path, dir_okay=False),
     metavar="FILE",
@@ -88,7 +96,8 @@ def replay(
 ) -> int:
     """Put recordings through the monitor: MCAP and .db3 files or bag directories, several as one recording.
 
-    Exits with 1 if parts of a recording were lost, or for an alarm asked for with --fail-on.
+    Exits with 1 if parts of a recording were lost, if no gait cycle in it can be this leg's, or for an alarm
+    asked for with --fail-on.
     """
     to_stdout = json_file == Path("-")
     if json_file is not None and not to_stdout:
@@ -100,6 +109,9 @@ def replay(
         click.echo(f"warning: {finding}", err=True)
     if len(result.findings) > _MOST_LINES:
         click.echo(f"warning: and {len(result.findings) - _MOST_LINES} findings more", err=True)
+    if not result.is_believable:
+        missing = result.evidence.missing()
+        click.echo(f"warning: no gait cycle can be this leg's, so no forces are given: {missing}", err=True)
     written = _write(result, wall_s, out, json_file)
     if not to_stdout:
         from leg_wear_monitor.cli.replay_tables import print_replay
@@ -108,6 +120,7 @@ def replay(
         for path in written:
             click.echo(f"written: {path}")
     failed = (result.is_partial and not allow_partial) or is_raised(result, fail_on)
+    failed = failed or not result.is_believable
     return WITH_FINDINGS if failed else 0
 
 

@@ -27,7 +27,9 @@ def print_replay(result: "ReplayResult", wall_s: float) -> None:
         f"{', '.join(monitor.loose)} loose; {result.crank_samples} crank and {result.torque_samples} torque "
         f"samples, {len(result.history)} gait cycles\n"
     )
-    if len(result.history):
+    if result.evidence.doubtful:
+        console.print(f"{result.evidence.doubtful} of the gait cycles can hardly be this leg's\n")
+    if result.is_believable:
         console.print(_joints(result))
         console.print()
     raised = [alarm for alarm in monitor.alarms.alarms if alarm.level]
@@ -35,11 +37,10 @@ def print_replay(result: "ReplayResult", wall_s: float) -> None:
         console.print(f"{alarm.level.name:<6} {alarm.name}: {figure(alarm.value)} {alarm.unit}".rstrip())
     if not raised:
         console.print("no alarm stands at the end")
-    factor = result.duration_s / wall_s
-    console.print(
-        f"speed  {result.duration_s:.4g} s in {wall_s:.3g} s: {figure(factor)} times real time\n"
-        "The monitor advises; no alarm is no proof of health."
-    )
+    if result.is_believable:
+        factor = result.duration_s / wall_s
+        console.print(f"speed  {result.duration_s:.4g} s in {wall_s:.3g} s: {figure(factor)} times real time")
+    console.print("The monitor advises; no alarm is no proof of health.")
 
 
 def _joints(result: "ReplayResult") -> Table:

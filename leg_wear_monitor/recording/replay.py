@@ -7,11 +7,14 @@ from pathlib import Path
 import attrs
 import numpy as np
 
+from leg_wear_monitor.errors import printable
 from leg_wear_monitor.mechanism.loader import load_mechanism
 from leg_wear_monitor.monitor.config import MonitorConfig
+from leg_wear_monitor.monitor.gait_evidence import GaitEvidence
 from leg_wear_monitor.monitor.opening import open_monitor
 from leg_wear_monitor.monitor.parameter_file import NODE, load_config
 from leg_wear_monitor.monitor.wear_monitor import WearMonitor
+from leg_wear_monitor.recording.budget import DEFAULT_MB
 from leg_wear_monitor.recording.findings import Finding, RecordingError
 from leg_wear_monitor.recording.history import History
 from leg_wear_monitor.recording.reader import Block, Recording
@@ -19,6 +22,7 @@ from leg_wear_monitor.recording.sink import Sink
 from leg_wear_monitor.twin.sample import CRANK, Samples
 
 REPORTS_FILE = "reports.mcap"
+_LONGER, _LONGER_S = 1.05, 1.0  # what stamps may span beyond the time in which they came
 
 
 @attrs.define(eq=False)
@@ -39,9 +43,13 @@ class ReplayResult:
         What is wrong with the recording.
     is_partial : bool
         Whether something that was recorded is lost, or may be wrong.
+    evidence : GaitEvidence
+        Whether what was followed can be this leg's gait.
     crank_samples, torque_samples : int
     begin_ns, end_ns : int
         First and last stamp of sound samples; 0 without any.
+    logged_s : float
+        Time between the first and the last message [s].
     """
 
     monitor: WearMonitor
@@ -49,20 +57,30 @@ class ReplayResult:
     files: list[Path]
     topics: dict[str, str]
     time: str
+    evidence: GaitEvidence
     findings: list[Finding] = attrs.Factory(list)
     is_partial: bool = False
     crank_samples: int = 0
     torque_samples: int = 0
     begin_ns: int = 0
     end_ns: int = 0
+    logged_s: float = 0.0
+
+    @property
+    def is_believable(self) -> bool:
+        """Whether a gait cycle was found that can be this leg's: without one, no figure means anything."""
+        return self.evidence.believable > 0
 
     @property
     def duration_s(self) -> float:
-        """Time between the first and the last stamp [s]."""
-        return (self.end_ns - self.begin_ns) / 1e9
+        """Time between the first and the last stamp, of the messages' arrival where stamps jump [s]."""
+        stamped_s = (self.end_ns - self.begin_ns) / 1e9
+        jumps = not 0.0 <= stamped_s <= _LONGER * self.logged_s + _LONGER_S
+        return self.logged_s if jumps else stamped_s
 
     def count(self, samples: Samples) -> None:
         """Take account of samples that go to the monitor."""
+        self.evidence.see(samples)
         cranks = int(np.count_nonzero(samples["kind"] == CRANK))
         self.crank_samples += cranks
         self.torque_samples += len(samples) - cranks
@@ -82,6 +100,7 @@ def replay(
     joint_states: str | None = None,
     drive_torque: str | None = None,
     node: str | None = None,
+    memory_mb: float = DEFAULT_MB,
     ready: Callable[[WearMonitor], None] | None = None,
     progress: Callable[[float], None] | None = None,
 ) -> ReplayResult:
@@ -104,6 +123,8 @@ def replay(
     node : str, optional
         Full name of the node whose parameters, names and messages are wanted; if not given, the one beside
         the topic of the crank, such as ``/left/leg_wear_monitor`` for ``/left/joint_states``.
+    memory_mb : float
+        Memory that reading the recording may take, temporary files included [10⁶ bytes].
     ready : callable, optional
         Given the monitor before the first sample.
     progress : callable, optional
@@ -124,18 +145,25 @@ def replay(
     kept = attrs.evolve(config.ledger, path="" if ledger is None else str(ledger))
     config = attrs.evolve(config, ledger=kept)
     named = [paths] if isinstance(paths, str | Path) else list(paths)
-    topics = {"joint_states": joint_states, "drive_torque": drive_torque}
-    with Recording(named, config, time=time, **topics) as recording, ExitStack() as stack:
-        node = node or node_beside(recording.topics["joint_states"])
+    asked = {"joint_states": joint_states, "drive_torque": drive_torque}
+    with (
+        Recording(named, config, time=time, memory_mb=memory_mb, **asked) as recording,
+        ExitStack() as stack,
+    ):
+        node = node or node_beside(printable(recording.topics["joint_states"]))
         config = config.on_node(node)
         mechanism = load_mechanism(config.mechanism)
         monitor = open_monitor(mechanism, config)
         stack.callback(monitor.close)
-        result = ReplayResult(monitor, History(monitor.loose), recording.files, recording.topics, time)
+        history, evidence = History(monitor.loose), GaitEvidence(config)
+        result = ReplayResult(monitor, history, recording.files, recording.topics, time, evidence)
         sink = None if out is None else stack.enter_context(_sink(Path(out), monitor, node, recording.files))
         if ready:
             ready(monitor)
+        first_ns: int | None = None
         for block in recording.blocks():
+            first_ns = int(block.log_time_ns[0]) if first_ns is None else first_ns
+            result.logged_s = max(result.logged_s, (int(block.log_time_ns[-1]) - first_ns) / 1e9)
             for samples in _beats(block, config):
                 result.count(samples)
                 _take(result, samples, sink)
@@ -150,6 +178,7 @@ def _take(result: ReplayResult, samples: Samples, sink: Sink | None) -> None:
     reports = result.monitor.update(samples)
     for cycle in reports.cycles:
         result.history.add_cycle(cycle)
+        result.evidence.add(cycle)
     for alarms in reports.alarms:
         result.history.add_alarms(alarms)
     if sink:

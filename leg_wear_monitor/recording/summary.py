@@ -6,6 +6,7 @@ from typing import Any
 import attrs
 import numpy as np
 
+from leg_wear_monitor.errors import printable
 from leg_wear_monitor.mechanism.arrays import Floats
 from leg_wear_monitor.monitor.alarms import Alarm
 from leg_wear_monitor.monitor.forecast import JointForecast, LegForecast
@@ -36,8 +37,13 @@ def summary(result: ReplayResult, wall_s: float) -> dict[str, Any]:
         "wall_s": wall_s,
         "real_time_factor": result.duration_s / wall_s,
         "cycles": len(result.history),
-        "joints": _joints(result),
-        "forecast": _leg(result),
+        "gait": {
+            "believable_cycles": result.evidence.believable,
+            "doubtful_cycles": result.evidence.doubtful,
+            "missing": printable(result.evidence.missing()),
+        },
+        "joints": _joints(result) if result.is_believable else {},
+        "forecast": _leg(result) if result.is_believable else None,
         "measurements": [attrs.asdict(measurement) for measurement in result.monitor.measurements],
         "alarms": {
             "now": [_alarm(alarm) for alarm in result.monitor.alarms.alarms],
@@ -57,12 +63,12 @@ def summary(result: ReplayResult, wall_s: float) -> dict[str, Any]:
 
 def _recording(result: ReplayResult) -> dict[str, Any]:
     return {
-        "files": [str(path) for path in result.files],
-        "topics": result.topics,
+        "files": [printable(str(path)) for path in result.files],
+        "topics": {role: printable(topic) for role, topic in result.topics.items()},
         "time": result.time,
         "is_partial": result.is_partial,
         "findings": [
-            {"file": str(finding.file), "text": finding.text, "weight": finding.weight.value}
+            {"file": printable(str(finding.file)), "text": finding.text, "weight": finding.weight.value}
             for finding in result.findings
         ],
         "crank_samples": result.crank_samples,

@@ -30,7 +30,7 @@ def replay_page(record: dict[str, Any]) -> Page:
         f"{_date(recording['begin_ns'])}, {record['cycles']} gait cycles. {record['advice']}"
     )
     sections = [Section("What was found", [Findings(_sentences(record))]), _recording(recording)]
-    if record["cycles"]:
+    if _is_believable(record):
         sections += [_clearance(record), *seen_sections(record), forecast_section(record)]
         sections += [_forces(record), _wear(record)]
     sections += [_alarms(record), _health(record)]
@@ -43,8 +43,10 @@ def _sentences(record: dict[str, Any]) -> list[str]:
     sentences = []
     if record["recording"]["is_partial"]:
         sentences.append("The recording is damaged or incomplete: what follows is of what could be read.")
-    if not record["cycles"]:
-        sentences.append("No whole gait cycle was followed, so there is nothing to say about wear.")
+    if not _is_believable(record):
+        sentences.append("No gait cycle can be this leg's, so there is nothing to say about forces and wear.")
+        if missing := record.get("gait", {}).get("missing"):
+            sentences.append(f"What is missing: {missing}.")
     raised = [alarm for alarm in record["alarms"]["now"] if alarm["level"] != "OK"]
     for alarm in raised:
         sentences.append(f"{alarm['name']}: {alarm['level']}, {alarm['state']}.")
@@ -71,6 +73,11 @@ def _sentences(record: dict[str, Any]) -> list[str]:
     if lost_s:
         sentences.append(f"{_time(lost_s)} could not be followed and is not counted.")
     return sentences
+
+
+def _is_believable(record: dict[str, Any]) -> bool:
+    """Whether a gait cycle can be this leg's; a summary of an older version counts any."""
+    return bool(record["gait"]["believable_cycles"] if "gait" in record else record["cycles"])
 
 
 def _recording(recording: dict[str, Any]) -> Section:

@@ -1,5 +1,6 @@
 """The verb `replay`: what it writes, what it says, and its exit codes."""
 
+import html
 import json
 import math
 import random
@@ -175,6 +176,57 @@ def test_nothing_in_it(run, complaints, tmp_path):
     assert not (tmp_path / "out").exists()
 
 
-def test_another_crank_by_option(run, bag):
-    record = json.loads(run("replay", str(bag), "--crank-joint", "wheel", "--json", "-").stdout)
-    assert record["lost"]["faulty"]["missing_joint"] == SECONDS * RATE_HZ
+def test_a_crank_that_is_in_no_message_is_refused_with_the_names_that_are_there(run, bag, complaints):
+    result = run("replay", str(bag), "--crank-joint", "wheel", "--json", "-")
+    assert result.exit_code == 2
+    assert result.stdout == ""
+    assert complaints(result) == [
+        f"error: {bag}: wheel: is not among the joints of {SECONDS * RATE_HZ} messages, they have crank; say "
+        "which is the crank by --crank-joint (crank_joint in the parameters)"
+    ]
+
+
+def write(path, stamps, angle, name="crank"):
+    """A crank's motion, logged when it would have come."""
+    logged = 1_700_000_000 * 10**9 + np.arange(len(stamps), dtype=np.int64) * (10**9 // RATE_HZ)
+    rows = encode.joint_states(stamps, [name], position=np.asarray(angle, float)[:, None])
+    with McapWriter(path) as writer:
+        writer.write_many(writer.channel("/joint_states", encode.JOINT_STATE), logged, rows)
+    return path
+
+
+N = SECONDS * RATE_HZ
+STAMPS = 1_700_000_000 * 10**9 + np.arange(N, dtype=np.int64) * (10**9 // RATE_HZ)
+TURNING = 2.0 * np.pi * np.arange(N) / RATE_HZ
+
+
+@pytest.mark.parametrize(
+    ("stamps", "angle", "why"),
+    [
+        (STAMPS, 0.0 * TURNING, "the crank turns 0 times in 4 s: that is no whole gait cycle"),
+        (STAMPS, 4.0 * TURNING, "the crank turns at 240 rpm, commanded are 60 rpm"),
+        (STAMPS, np.full(N, np.nan), f"no crank sample can be used ({N} not_finite)"),
+        (0 * STAMPS, TURNING, f"no crank sample can be used ({N} zero_stamp)"),
+    ],
+    ids=["still", "a wheel", "no numbers", "no clock"],
+)
+def test_without_a_believable_gait_cycle_there_are_no_forces(run, tmp_path, stamps, angle, why, complaints):
+    result = run("replay", str(write(tmp_path / "x.mcap", stamps, angle)), "--out", "out")
+    assert result.exit_code == 1
+    assert f"warning: no gait cycle can be this leg's, so no forces are given: {why}" in complaints(result)
+    assert "pm/cycle" not in result.stdout
+    assert "speed" not in result.stdout
+    record = json.loads((tmp_path / "out" / "summary.json").read_text())
+    assert record["joints"] == {}
+    assert record["gait"] == {
+        "believable_cycles": 0,
+        "doubtful_cycles": record["cycles"],
+        "missing": why,
+    }
+    assert f"What is missing: {why}" in html.unescape((tmp_path / "out" / "report.html").read_text())
+
+
+def test_a_clock_that_goes_back_makes_no_negative_time(run, tmp_path):
+    stamps = np.where(np.arange(N) < N // 2, STAMPS, STAMPS - 1_600_000_000 * 10**9)
+    result = run("replay", str(write(tmp_path / "x.mcap", stamps, TURNING)), "--json", "-")
+    assert json.loads(result.stdout)["recording"]["duration_s"] == pytest.approx(SECONDS, abs=0.1)

@@ -86,7 +86,6 @@ class Now(NamedTuple):
     lever: Floats
     lever_drive: Floats
     torque: Floats
-    torque_t: Floats
     torque_e: Floats
     torque_vv: Floats
     angle: Floats

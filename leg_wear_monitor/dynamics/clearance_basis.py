@@ -36,8 +36,8 @@ class Basis:
         Applied forces at rest, and the loads among them.
     force_e, load_e : (N, d, d) arrays
         Derivatives by e of their generalised forces on e.
-    drive_force_e : (N, d) array
-        Derivative by e of the applied forces' generalised force on the crank.
+    drive_force_e, drive_load_e : (N, d) arrays
+        Derivatives by e of the applied forces' and the loads' generalised force on the crank.
     potential : (N,) array
     friction : (N, 3 b, k) array
         Generalised force of a unit friction force in each joint, beyond its force on e.
@@ -87,8 +87,13 @@ class Basis:
         self.c_ee = 2.0 * (project(self.s_t, mass * self.s_t) + swing)
         self.force_e = np.einsum("nr,nrij->nij", self.force, curvature) + project(self.s, force_s)
         self.load_e = np.einsum("nr,nrij->nij", self.load, curvature) + project(self.s, load_s)
-        along = np.einsum("nr,nri->ni", self.force, self.s_t)
-        self.drive_force_e = along + np.einsum("nr,nri->ni", self.drive, force_s)
+        self.drive_force_e = self._on_crank(self.force, force_s)
+        self.drive_load_e = self._on_crank(self.load, load_s)
+
+    def _on_crank(self, force: Floats, force_s: Floats) -> Floats:
+        """Derivative by e of the force on the crank of forces (N, 3 b) that change by force_s (N, 3 b, d)."""
+        along = np.einsum("nr,nri->ni", force, self.s_t)
+        return np.asarray(along + np.einsum("nr,nri->ni", self.drive, force_s))
 
 
 def project(basis: Floats, forces: Floats) -> Floats:

@@ -14,34 +14,34 @@ def motion_shapes(k: int, damped: bool) -> Shapes:
     """Parts of a row that moves k loose joints, d = 2 k eccentricities e.
 
     What changes with e comes first, as `changing_shapes` says: ``inverse_mass`` of e; forces on e
-    without contact, ``free`` by 1, w' and w^2; drive torque, ``torque_a`` by e'', ``torque_v`` by w e' and
-    (this row does not change) by e'.
+    without contact, ``free`` by 1, w' and w^2; slip of each joint by w, ``lever_drive``, which is also what
+    its friction force takes from the drive torque; ``load_power`` the power of loads by (e', w); drive
+    torque, ``torque_a`` by e'', ``torque_v`` by w e' and (this row does not change) by e'.
 
-    Acceleration of e: ``coriolis`` by w e'. Slip of each joint beyond t . e': ``lever`` by e',
-    ``lever_drive`` by w. Drive torque: ``torque`` by (1, w', w^2, w), ``torque_t`` by the friction forces,
-    ``torque_e`` by e times (1, w', w^2), and the form ``torque_vv`` of (e', e'). In square parts the second
+    Acceleration of e: ``coriolis`` by w e'. Slip of each joint beyond t . e': ``lever`` by e'. Drive torque:
+    ``torque`` by (1, w', w^2, w), ``torque_e`` by e times (1, w', w^2), and the form ``torque_vv`` of
+    (e', e'). In square parts the second
     index is the one that results (of the form the first vector's), so that loops run along rows. ``angle``
     of the bushing's and the journal's bodies, ``turn`` its derivative; ``toe`` its position, by 1 and e, and
-    the derivative of the latter by the crank angle; ``load_power`` the power of loads by (e', w). With
-    dampers, ``viscous`` accelerations and ``damper`` the power taken as a quadratic form, both by (e', w).
+    the derivative of the latter by the crank angle. With dampers, ``viscous`` accelerations and ``damper``
+    the power taken as a quadratic form, both by (e', w).
     """
     d = 2 * k
     return {
         "inverse_mass": (d, d),
         "free": (3, d),
+        "lever_drive": (k,),
+        "load_power": (d + 1,),
         "torque_a": (d,),
         "torque_v": (2, d),
         "coriolis": (d, d),
         "lever": (k, d),
-        "lever_drive": (k,),
         "torque": (4,),
-        "torque_t": (k,),
         "torque_e": (3, d),
         "torque_vv": (d, d),
         "angle": (k, 2),
         "turn": (k, 2),
         "toe": (2, 1 + 2 * d),
-        "load_power": (d + 1,),
         "viscous": (d, d + 1) if damped else (0, 0),
         "damper": (d + 1, d + 1) if damped else (0, 0),
     }
@@ -50,7 +50,14 @@ def motion_shapes(k: int, damped: bool) -> Shapes:
 def changing_shapes(k: int) -> Shapes:
     """Parts at the start of that row that change with e."""
     d = 2 * k
-    return {"inverse_mass": (d, d), "free": (3, d), "torque_a": (d,), "torque_v": (d,)}
+    return {
+        "inverse_mass": (d, d),
+        "free": (3, d),
+        "lever_drive": (k,),
+        "load_power": (d + 1,),
+        "torque_a": (d,),
+        "torque_v": (d,),
+    }
 
 
 def stored_shapes(k: int) -> Shapes:

@@ -16,7 +16,7 @@ def drive_torque(now, x, sample):
         torque += x[BY_V, i] * x[V0, i] + now.torque_by_e[i] * x[E0, i]
         sudden += now.torque_a[i] * x[A0, i]
     for k in range(sample.shape[0]):
-        torque += now.torque_t[k] * sample[k, F_T] + sample[k, F_N] * sample[k, CAM]
+        torque += sample[k, F_N] * sample[k, CAM] - now.lever_drive[k] * sample[k, F_T]
     return torque + sudden, sudden
 
 

@@ -143,6 +143,10 @@ def _first_order(basis: Basis, inverse_mass: Floats) -> dict[str, Singles]:
     parts = {
         "inverse_mass": -(change + change.transpose(0, 1, 3, 2)),
         "free": free.transpose(0, 3, 1, 2),
+        "lever_drive": project(basis.s_t, basis.friction),
+        "load_power": np.concatenate(
+            [basis.load_e.transpose(0, 2, 1), basis.drive_load_e[:, :, None]], axis=2
+        ),
         "torque_a": basis.b_e.transpose(0, 2, 1),
         "torque_v": basis.c_ee.transpose(0, 2, 1),
     }
@@ -165,7 +169,6 @@ def _torque(basis: Basis) -> dict[str, Floats]:
         "torque": np.stack([rest, c, 0.5 * derivative(c), drag[:, -1]], axis=1),
         "torque_a": project(basis.s, mass * basis.drive[:, :, None])[:, :, 0],
         "torque_v": np.stack([c_e, drag[:, :-1]], axis=1),
-        "torque_t": -project(basis.drive[:, :, None], basis.friction)[:, 0],
         "torque_e": np.stack([-basis.drive_force_e, c_e, 0.5 * derivative(c_e)], axis=1),
         "torque_vv": (basis.b_e - 0.5 * a_t).transpose(0, 2, 1),
     }

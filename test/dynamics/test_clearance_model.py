@@ -9,10 +9,11 @@ from leg_wear_monitor.dynamics.clearance_basis import Basis
 from leg_wear_monitor.dynamics.clearance_layout import changing_shapes, motion_shapes, views
 from leg_wear_monitor.dynamics.clearance_tables import COARSER, ClearanceTables, build_tables
 from leg_wear_monitor.dynamics.simulation import prepare
-from leg_wear_monitor.mechanism.forces import applied_forces_at
+from leg_wear_monitor.mechanism.forces import applied_forces_at, external_power
 from leg_wear_monitor.mechanism.ideal import TURN, ideal_motion, one_cycle
 from leg_wear_monitor.mechanism.loader import load_mechanism, parse_mechanism
 from leg_wear_monitor.mechanism.position import Linkage, evaluate
+from leg_wear_monitor.mechanism.spec import ConstantLoad
 
 pytestmark = pytest.mark.plain
 
@@ -201,6 +202,50 @@ def test_the_inverse_mass_holds_to_the_first_order_in_the_eccentricities(cases, 
     exact = at["inverse_mass"] @ (s.T @ (mass * bodies))
     table = rates @ (rates @ case.tables.bend[i // COARSER]).reshape(len(rates), len(rates))
     np.testing.assert_allclose(table, exact, atol=1.0e-6 * np.abs(exact).max())
+
+
+@pytest.mark.parametrize("name", LEGS)
+@pytest.mark.parametrize("i", [0, 80, 168])
+def test_slip_holds_to_the_first_order_in_the_eccentricities(cases, name, i):
+    """Its part by the crank's speed, which the bodies' turning makes: a quarter of the error at half."""
+    case, at, contacts = cases[name], cases[name].parts(i), cases[name].contacts
+    direction = np.random.default_rng(i).normal(size=2 * len(contacts.joint))
+    b, j = case.linkage.arrays.joint_body[contacts.joint].T
+    errors, changes = [], []
+    for size in (3.0e-4, 1.5e-4):
+        e = size * direction / np.abs(direction).max()
+        table = at["lever_drive"] + case.changes(i, e)["lever_drive"]
+        turn = _displaced(case, TURN * i / POINTS, 1.0, e)[1][:, 2]
+        radius = contacts.bushing_radius
+        exact = turn[j] * (radius - contacts.clearance) - turn[b] * radius
+        errors.append(np.abs(table - exact).max())
+        changes.append(np.abs(exact - at["lever_drive"]).max())
+    assert errors[0] < 0.02 * changes[0]
+    assert errors[1] == pytest.approx(0.25 * errors[0], rel=0.2)
+
+
+@pytest.mark.parametrize("i", [0, 80, 168])
+def test_the_power_of_loads_holds_to_the_first_order_in_the_eccentricities(leg, i):
+    """By any rates of crank and journals: a quarter of the error at half of the eccentricities."""
+    ground = ConstantLoad(body="foot", point="toe", force=(40.0, 290.0))
+    setup = prepare(attrs.evolve(leg, loads={"ground": ground}))
+    case = Case(
+        setup.linkage, setup.contacts, build_tables(setup.linkage, setup.contacts, POINTS), damped=False
+    )
+    random = np.random.default_rng(i)
+    direction, rates = random.normal(size=(2, 2 * len(setup.loose)))
+    errors, changes = [], []
+    for size in (3.0e-4, 1.5e-4):
+        e = size * direction / np.abs(direction).max()
+        table = case.parts(i)["load_power"] + case.changes(i, e)["load_power"]
+        q, v, jacobian = _displaced(case, TURN * i / POINTS, TURN, e)
+        v[1:] += (np.linalg.inv(jacobian)[:, case.rows] @ rates).reshape(-1, 3)
+        cs = np.column_stack([np.cos(q[:, 2]), np.sin(q[:, 2])])
+        exact = external_power(case.linkage.arrays, q, v, cs)
+        errors.append(abs(table @ [*rates, TURN] - exact))
+        changes.append(abs(case.parts(i)["load_power"] @ [*rates, TURN] - exact))
+    assert errors[0] < 0.02 * changes[0]
+    assert errors[1] == pytest.approx(0.25 * errors[0], rel=0.2)
 
 
 @pytest.mark.parametrize("name", LEGS[:2])

@@ -11,6 +11,7 @@ from leg_wear_monitor.dynamics.simulation import prepare
 from leg_wear_monitor.dynamics.tally import DISSIPATION, FRICTION, POWER, new_tally
 from leg_wear_monitor.mechanism.ideal import TURN, one_cycle
 from leg_wear_monitor.mechanism.loader import parse_mechanism
+from leg_wear_monitor.mechanism.spec import ConstantLoad, PhaseLoad
 
 
 @pytest.mark.parametrize("loose", ["G", "AB", "IJ", "ABGIJ"])
@@ -38,6 +39,28 @@ def test_walls_that_wear_away_take_energy_along(leg, model, cycles, bound):
     losses = energy["friction_loss"] + energy["contact_loss"]
     assert energy["wear_loss"] > 4.0e-3 * losses
     assert abs(energy["residual"]) < bound * losses
+
+
+PUSH = 290.0  # N
+STANCE = tuple((0.2 * up, up) for up in (PUSH * max(0.0, np.sin(TURN * i / 16)) for i in range(16)))
+LOADS = {
+    "constant": {"force": (0.0, PUSH)},
+    "stance": {"phase": tuple(i / 16 for i in range(16)), "force": STANCE},
+}
+
+
+@pytest.mark.parametrize("loose", ["AB", "ABGIJ"])
+@pytest.mark.parametrize("load", LOADS)
+def test_energy_of_the_clearance_model_under_a_foot_load(leg, loose, load):
+    """The load does its work where the toe is, which the eccentricities move."""
+    kind = PhaseLoad if load == "stance" else ConstantLoad
+    pushed = attrs.evolve(leg, loads={"ground": kind(body="foot", point="toe", **LOADS[load])})
+    run = ClearanceRun(prepare(pushed, clearances=loose))
+    run.advance(1.0, new_tally(len(leg.joints)))
+    tally, start = new_tally(len(leg.joints)), run.stored_energy
+    run.advance(7.0, tally)
+    energy = energy_balance(tally, start, run.stored_energy)
+    assert abs(energy["residual"]) < 3.0e-3 * (energy["friction_loss"] + energy["contact_loss"])
 
 
 def test_energy_of_the_ideal_leg(leg):

@@ -24,7 +24,7 @@ from leg_wear_monitor.dynamics.touch import F_N
 from leg_wear_monitor.errors import ConfigError
 from leg_wear_monitor.mechanism.arrays import Floats
 from leg_wear_monitor.mechanism.ideal import TURN
-from leg_wear_monitor.mechanism.spec import Mechanism, SpeedDrive
+from leg_wear_monitor.mechanism.spec import Mechanism, SpeedDrive, TorqueDrive
 
 INTERVALS = 2048  # of a turn at the setup's speed
 TOLERANCE_M = 5.0e-9  # local error of a step in the eccentricities [m]: finer, the means stay as they are
@@ -123,10 +123,9 @@ class ClearanceStepper:
 
 
 def needs_speed(mechanism: Mechanism) -> ConfigError:
-    """Error for a mechanism that a torque drives."""
-    return ConfigError(
-        mechanism.source, "drive.torque", "the clearance model needs drive.speed; try --model full"
-    )
+    """Error for a mechanism that a torque drives, constant or a controller's."""
+    key = "drive.torque" if isinstance(mechanism.drive, TorqueDrive) else "drive.track"
+    return ConfigError(mechanism.source, key, "the clearance model needs drive.speed; try --model full")
 
 
 class ClearanceRun:

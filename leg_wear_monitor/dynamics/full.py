@@ -30,7 +30,13 @@ from leg_wear_monitor.dynamics.touch import DELTA, DELTA_DOT, EX, EY, F_N, SAMPL
 from leg_wear_monitor.kernel import entry, kernel
 from leg_wear_monitor.mechanism.arrays import Floats, MechanismArrays
 from leg_wear_monitor.mechanism.constraints import DRIVE, Rows, arm, closures, rotations, select_rows
-from leg_wear_monitor.mechanism.forces import add_force, applied_forces, external_power, stored_energy
+from leg_wear_monitor.mechanism.forces import (
+    add_force,
+    applied_forces,
+    controller_torque,
+    external_power,
+    stored_energy,
+)
 
 BAUMGARTE = 200.0  # alpha = beta [1/s]: drift decays within 5 ms, far slower than any step resolves
 
@@ -159,6 +165,11 @@ def accelerate(model, surfaces, approach, polynomial, t, q, v, scratch, out_a, o
     applied_forces(arrays, q, v, scratch.cs, scratch.force)
     add_contacts(model, surfaces, approach, q, v, scratch, out_rate)
     drive_at(polynomial, t, scratch.drive)
+    torque = 0.0
+    if rows.drive_row < 0:
+        crank = arrays.drive_body
+        torque = controller_torque(arrays, scratch.drive, q[crank, 2], v[crank, 2])
+        scratch.force[crank, 2] += torque
     closures(arrays, rows, q, v, scratch.cs, scratch.drive, scratch.phi, scratch.jac, scratch.gamma)
     _right_hand_side(model, v, scratch)
     assemble_schur(rows, arrays, scratch.jac, scratch.schur)
@@ -166,7 +177,7 @@ def accelerate(model, surfaces, approach, polynomial, t, q, v, scratch, out_a, o
         return False
     substitute(rows.first, scratch.schur, scratch.lam)
     _accelerations(model, scratch, out_a)
-    _ideal_rates(model, q, v, scratch, out_rate, out_drive_rate)
+    _ideal_rates(model, q, v, torque, scratch, out_rate, out_drive_rate)
     return True
 
 
@@ -200,9 +211,11 @@ def _accelerations(model, scratch, out_a):
 
 
 @kernel
-def _ideal_rates(model, q, v, scratch, out_rate, out_drive_rate):
-    """Rates of the integrals of ideal joints and of the drive; power from outside counts with the drive's."""
-    torque = model.arrays.drive_torque
+def _ideal_rates(model, q, v, torque, scratch, out_rate, out_drive_rate):
+    """Rates of the integrals of ideal joints and of the drive; power from outside counts with the drive's.
+
+    ``torque`` [N m] is that of a drive that is no constraint.
+    """
     for c in range(model.rows.closure.shape[0]):
         joint, r = model.rows.closure[c], model.rows.row[c]
         if joint == DRIVE:
@@ -216,8 +229,7 @@ def _ideal_rates(model, q, v, scratch, out_rate, out_drive_rate):
     out_drive_rate[TORQUE] = torque
     out_drive_rate[TORQUE_SQUARED] = torque * torque
     out_drive_rate[POWER] = external_power(model.arrays, q, v, scratch.cs)
-    if model.rows.drive_row >= 0:
-        out_drive_rate[POWER] += torque * v[model.arrays.drive_body, 2]
+    out_drive_rate[POWER] += torque * v[model.arrays.drive_body, 2]
 
 
 @entry

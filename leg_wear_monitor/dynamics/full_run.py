@@ -11,7 +11,7 @@ from leg_wear_monitor.dynamics.tally import FORCE, TORQUE, Tally, new_tally
 from leg_wear_monitor.mechanism.arrays import Floats
 from leg_wear_monitor.mechanism.ideal import ideal_motion, turned
 from leg_wear_monitor.mechanism.position import assemble
-from leg_wear_monitor.mechanism.spec import SpeedDrive
+from leg_wear_monitor.mechanism.spec import SpeedDrive, TorqueDrive
 
 TOLERANCE_M = (
     1.0e-10  # local error of a step in every coordinate [m, rad]; energy adds up to 1e-3 of the losses
@@ -41,7 +41,7 @@ class FullRun:
         driven = isinstance(linkage.mechanism.drive, SpeedDrive)
         self._setup = setup
         self.model = full_model(linkage.arrays, setup.contacts, driven)
-        self.state = _start(setup, driven)
+        self.state = _start(setup)
         self.toe: Toe = ideal_toe(linkage, setup.speed) if driven else NO_TOE
         self.polynomial = steady_drive(0.0, setup.speed)
         sectors = setup.surfaces.depth.shape[2]
@@ -99,10 +99,10 @@ class FullRun:
         return Sample(crank_angle, toe, float(self._work.drive_rates[0, TORQUE]), force)
 
 
-def _start(setup: Setup, driven: bool) -> FullState:
-    """The ideal motion at crank angle 0; for a drive by torque, at the assembly's angle."""
+def _start(setup: Setup) -> FullState:
+    """The ideal motion at crank angle 0; under a constant torque, at the assembly's angle."""
     linkage = setup.linkage
-    if driven:
+    if not isinstance(linkage.mechanism.drive, TorqueDrive):
         motion = ideal_motion(linkage, [0.0], setup.speed)
         return full_state(motion.q[0], motion.v[0], len(setup.loose))
     angle = linkage.mechanism.assembly.crank_angle

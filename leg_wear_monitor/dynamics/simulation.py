@@ -21,7 +21,7 @@ from leg_wear_monitor.dynamics.tally import new_tally
 from leg_wear_monitor.errors import ConfigError
 from leg_wear_monitor.mechanism.ideal import TURN, check_cycle
 from leg_wear_monitor.mechanism.position import build_linkage
-from leg_wear_monitor.mechanism.spec import Mechanism, SpeedDrive
+from leg_wear_monitor.mechanism.spec import Mechanism, SpeedDrive, TorqueDrive
 from leg_wear_monitor.wear.surfaces import SECTORS, fresh_surfaces
 
 MODELS: dict[str, Callable[[Setup, int], Run]] = {"clearance": ClearanceRun, "full": FullRun}
@@ -30,7 +30,7 @@ _REPORTS_A_CYCLE = 20
 
 
 def default_model(mechanism: Mechanism) -> str:
-    """Formulation for a mechanism: only the full one can let a torque drive the crank."""
+    """Formulation for a mechanism: only the full one lets a torque, constant or not, drive the crank."""
     return "clearance" if isinstance(mechanism.drive, SpeedDrive) else "full"
 
 
@@ -93,7 +93,8 @@ def simulate(
     skip_cycles : float, optional
         Gait cycles simulated before counting starts; 1, or 0 with ``duration_s``.
     model : str, optional
-        A key of `MODELS`: ``clearance``, the default, or ``full``, the default for a drive by torque.
+        A key of `MODELS`: ``clearance``, the default, or ``full``, the default for a drive by torque or a
+        controller.
     wear : bool
         Whether wear opens the clearance as it goes; it is counted either way.
     normal_law : str, optional
@@ -131,12 +132,13 @@ def simulate(
 
 def _speed(mechanism: Mechanism, speed_rpm: float | None) -> float:
     """Crank speed at the start [rad/s]."""
-    if not isinstance(mechanism.drive, SpeedDrive):
+    drive = mechanism.drive
+    if isinstance(drive, TorqueDrive):
         if speed_rpm is not None:
             raise ConfigError("speed-rpm", "", f"{speed_rpm:g} rpm: {mechanism.source} is driven by a torque")
-        return mechanism.drive.initial_speed
+        return drive.initial_speed
     if speed_rpm is None:
-        return mechanism.drive.speed
+        return drive.speed if isinstance(drive, SpeedDrive) else drive.track.speed_radps
     if not math.isfinite(speed_rpm) or speed_rpm == 0.0:
         raise ConfigError(
             "speed-rpm", "", f"{speed_rpm} rpm does not turn the crank; expected a speed other than 0 rpm"
@@ -153,8 +155,8 @@ def _spans(
     skip = skip_cycles if skip_cycles is not None else (1.0 if duration_s is None else 0.0)
     if not (math.isfinite(skip) and skip >= 0.0):
         raise ConfigError("skip-cycles", "", f"{skip:g} is not a finite number of cycles from 0 up")
-    even = isinstance(setup.linkage.mechanism.drive, SpeedDrive)
-    if not even and (duration_s is None or skip > 0.0 or trace):
+    constant = isinstance(setup.linkage.mechanism.drive, TorqueDrive)
+    if constant and (duration_s is None or skip > 0.0 or trace):
         raise ConfigError(
             setup.linkage.mechanism.source,
             "drive.torque",
@@ -185,6 +187,7 @@ def _run(
         run.advance(t, new_tally(joints))
         report(t / (skipped + counted))
     tally, samples = new_tally(joints), [run.sample()]
+    angle = samples[0].crank_angle
     stored, depth = run.stored_energy, setup.surfaces.depth.copy()
     for t in _instants(skipped, skipped + counted, period / (trace or _REPORTS_A_CYCLE)):
         run.advance(t, tally)
@@ -195,7 +198,9 @@ def _run(
         raise ConfigError(
             "duration", "", f"{counted:g} s is too short for this model; expected more, or model full"
         )
-    turned = counted / period if isinstance(mechanism.drive, SpeedDrive) else _turns(run, mechanism)
+    turned = counted / period
+    if not isinstance(mechanism.drive, SpeedDrive):
+        turned = abs(run.sample().crank_angle - angle) / TURN
     return SimulationResult(
         mechanism=mechanism.name,
         model=model,
@@ -211,11 +216,6 @@ def _run(
         loose=setup.loose,
         surfaces=setup.surfaces,
     )
-
-
-def _turns(run: Run, mechanism: Mechanism) -> float:
-    """Turns of a crank that a torque drives, since the start."""
-    return abs(run.sample().crank_angle - mechanism.assembly.crank_angle) / TURN
 
 
 def _instants(start: float, end: float, step: float) -> Iterator[float]:

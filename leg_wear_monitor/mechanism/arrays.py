@@ -5,7 +5,16 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from leg_wear_monitor.mechanism.spec import GROUND, Mechanism, PhaseLoad, PrismaticJoint, TorqueDrive, Vector
+from leg_wear_monitor.mechanism.spec import (
+    GROUND,
+    Drive,
+    Mechanism,
+    PhaseLoad,
+    PrismaticJoint,
+    SpeedDrive,
+    TorqueDrive,
+    Vector,
+)
 
 Floats = NDArray[np.float64]
 Singles = NDArray[np.float32]
@@ -22,7 +31,9 @@ class MechanismArrays(NamedTuple):
     ``joint_kind`` (j,), ``joint_body`` (j, 2), ``joint_point`` (j, 2, 2), ``joint_normal`` (j, 2),
     ``joint_angle`` (j,); ``spring_body`` (s, 2), ``spring_point`` (s, 2, 2), ``spring_law`` (s, 3) as
     stiffness, free length, damping; ``load_body`` (l,), ``load_point`` (l, 2), ``load_phase`` (l, p),
-    ``load_force`` (l, p, 2); ``drive_body`` the crank, ``drive_torque`` 0 for a drive by speed.
+    ``load_force`` (l, p, 2); ``drive_body`` the crank; of a drive that is no constraint ``drive_gains`` (3,)
+    by the angle's error and the speed's, and the largest torque, ``drive_phase`` (p,) and ``drive_feed``
+    (p,) its torque without error.
     """
 
     mass: Floats
@@ -41,7 +52,9 @@ class MechanismArrays(NamedTuple):
     load_phase: Floats
     load_force: Floats
     drive_body: int
-    drive_torque: float
+    drive_gains: Floats
+    drive_phase: Floats
+    drive_feed: Floats
 
 
 def body_names(mechanism: Mechanism) -> list[str]:
@@ -86,8 +99,24 @@ def compile_arrays(mechanism: Mechanism) -> MechanismArrays:
         **_springs(mechanism, index),
         **_loads(mechanism, index),
         drive_body=index[drive.body],
-        drive_torque=drive.torque if isinstance(drive, TorqueDrive) else 0.0,
+        **_drive(drive),
     )
+
+
+def _drive(drive: Drive) -> dict[str, np.ndarray]:
+    """A constant torque is a controller without gains; a drive by speed has neither."""
+    gains, phase, feed = (0.0, 0.0, np.inf), [0.0], [0.0]
+    if isinstance(drive, TorqueDrive):
+        feed = [drive.torque]
+    elif not isinstance(drive, SpeedDrive):
+        track = drive.track
+        gains = (track.kp_nm_per_rad, track.kd_nm_s_per_rad, track.max_torque_nm or np.inf)
+        phase, feed = list(track.feed_forward_phase), list(track.feed_forward_nm)
+    return {
+        "drive_gains": np.array(gains),
+        "drive_phase": np.array([phase[-1] - 1.0, *phase, phase[0] + 1.0]),
+        "drive_feed": np.array([feed[-1], *feed, feed[0]]),
+    }
 
 
 def _joint_shapes(mechanism: Mechanism) -> tuple[Ints, Floats, Floats]:

@@ -1,4 +1,4 @@
-"""Applied forces: gravity, springs, loads over the gait phase, drive torque; and the energy they store."""
+"""Applied forces: gravity, springs, loads over the gait phase; the energy they store; a drive's torque."""
 
 import math
 
@@ -16,12 +16,11 @@ def add_force(body, sx, sy, fx, fy, out_force):
 
 @kernel
 def applied_forces(arrays, q, v, cs, out_force):
-    """Generalised forces (n, 3) of all but contacts and constraints."""
+    """Generalised forces (n, 3) of all but contacts, constraints and the drive."""
     for i in range(q.shape[0]):
         out_force[i, 0] = arrays.mass[i, 0] * arrays.gravity[0]
         out_force[i, 1] = arrays.mass[i, 1] * arrays.gravity[1]
         out_force[i, 2] = 0.0
-    out_force[arrays.drive_body, 2] += arrays.drive_torque
     for k in range(arrays.spring_body.shape[0]):
         _add_spring(arrays, k, q, v, cs, out_force)
     for k in range(arrays.load_body.shape[0]):
@@ -34,16 +33,34 @@ def applied_forces(arrays, q, v, cs, out_force):
 @kernel
 def load_force(arrays, k, crank_angle):
     """Force of load k [N] at a crank angle, linear between the entries of its table."""
-    table = arrays.load_phase[k]
+    i, w = _place(arrays.load_phase[k], crank_angle)
+    before, after = arrays.load_force[k, i - 1], arrays.load_force[k, i]
+    return before[0] + w * (after[0] - before[0]), before[1] + w * (after[1] - before[1])
+
+
+@kernel
+def _place(table, crank_angle):
+    """First entry of a table of phases that is not before a crank angle, and the way to it from the last."""
     phase = crank_angle / (2.0 * math.pi)
     phase -= math.floor(phase)
     i = 1
     while i < table.shape[0] - 1 and table[i] < phase:
         i += 1
     width = table[i] - table[i - 1]
-    w = (phase - table[i - 1]) / width if width > 0.0 else 0.0
-    before, after = arrays.load_force[k, i - 1], arrays.load_force[k, i]
-    return before[0] + w * (after[0] - before[0]), before[1] + w * (after[1] - before[1])
+    return i, (phase - table[i - 1]) / width if width > 0.0 else 0.0
+
+
+@kernel
+def controller_torque(arrays, wanted, angle, speed):
+    """Torque [N m] of a drive that is no constraint: feed-forward and gains on the errors, within its limit.
+
+    ``wanted`` holds the angle [rad] and speed [rad/s] to follow; ``angle`` and ``speed`` are the crank's.
+    """
+    i, w = _place(arrays.drive_phase, wanted[0])
+    before, after = arrays.drive_feed[i - 1], arrays.drive_feed[i]
+    by_angle, by_speed, most = arrays.drive_gains
+    torque = before + w * (after - before) + by_angle * (wanted[0] - angle) + by_speed * (wanted[1] - speed)
+    return min(max(torque, -most), most)
 
 
 @kernel
@@ -87,8 +104,8 @@ def stored_energy(arrays, q, v, cs):
 
 @kernel
 def external_power(arrays, q, v, cs):
-    """Power of loads, of a torque drive and of spring dampers [W]."""
-    power = arrays.drive_torque * v[arrays.drive_body, 2]
+    """Power of loads and of spring dampers [W]."""
+    power = 0.0
     for k in range(arrays.load_body.shape[0]):
         body = arrays.load_body[k]
         fx, fy = load_force(arrays, k, q[arrays.drive_body, 2])

@@ -124,15 +124,25 @@ def _load_class(entry: Any) -> tuple[type, Any]:
     return spec.PhaseLoad if "phase" in mapping(entry) else spec.ConstantLoad, entry
 
 
+_DRIVES = {"speed": spec.SpeedDrive, "torque": spec.TorqueDrive, "track": spec.TrackDrive}
+
+
 def _drive_class(entry: Any) -> tuple[type, Any]:
-    given = [key for key in ("speed", "torque") if key in mapping(entry)]
+    given = [key for key in _DRIVES if key in mapping(entry)]
     if len(given) != 1:
         raise FieldError(
-            "", f"has {' and '.join(given) or 'neither of them'}, expected one of speed [rad/s], torque [N m]"
+            "",
+            f"has {' and '.join(given) or 'none of them'}, "
+            "expected one of speed [rad/s], torque [N m], track",
         )
-    return spec.SpeedDrive if given == ["speed"] else spec.TorqueDrive, entry
+    return _DRIVES[given[0]], entry
+
+
+def _torques(entry: Any) -> tuple[Any, Any]:
+    return tuple[float, ...], entry if isinstance(entry, list) else [entry]
 
 
 choose(spec.RevoluteJoint | spec.PrismaticJoint, _joint_class)
 choose(spec.ConstantLoad | spec.PhaseLoad, _load_class)
-choose(spec.SpeedDrive | spec.TorqueDrive, _drive_class)
+choose(spec.Drive, _drive_class)
+choose(spec.Torques, _torques)

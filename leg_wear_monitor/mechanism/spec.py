@@ -1,7 +1,7 @@
 """A mechanism file as types: every key, its unit, its bounds and its meaning."""
 
 from itertools import pairwise
-from typing import Literal
+from typing import Annotated, Literal
 
 import attrs
 
@@ -10,6 +10,7 @@ from leg_wear_monitor.mechanism.quantity import FieldError, described, quantity
 
 Vector = tuple[float, float]
 Pose = tuple[float, float, float]
+Torques = Annotated[tuple[float, ...], "one for each phase"]  # in a file, one number is a constant torque
 
 GROUND = "ground"
 
@@ -54,16 +55,22 @@ class PrismaticJoint:
     kind: Literal["prismatic"] = described("prismatic")
 
 
+def _turns(speed: float) -> str | None:
+    return None if speed else "0.0 rad/s does not turn the crank, expected another speed"
+
+
+def _rises_below_one(phase: tuple[float, ...]) -> str | None:
+    if phase and all(a < b for a, b in pairwise(phase)) and phase[-1] < 1.0:
+        return None
+    return f"{list(phase)} does not increase from 0 to below 1"
+
+
 @attrs.frozen(kw_only=True)
 class SpeedDrive:
     """The crank turns at a constant speed."""
 
     body: str = described("the crank")
-    speed: float = quantity(
-        "rad/s",
-        "crank speed, counter-clockwise positive, not 0",
-        check=lambda speed: None if speed else "0.0 rad/s does not turn the crank, expected another speed",
-    )
+    speed: float = quantity("rad/s", "crank speed, counter-clockwise positive, not 0", check=_turns)
 
 
 @attrs.frozen(kw_only=True)
@@ -73,6 +80,51 @@ class TorqueDrive:
     body: str = described("the crank")
     torque: float = quantity("N m", "torque on the crank, counter-clockwise positive")
     initial_speed: float = quantity("rad/s", "crank speed at the start", default=0.0)
+
+
+@attrs.frozen(kw_only=True)
+class Track:
+    """A controller: its torque is the feed-forward plus gains on the errors of angle and speed."""
+
+    speed_radps: float = quantity(
+        "rad/s", "speed to follow, counter-clockwise positive, not 0; the crank starts at it", check=_turns
+    )
+    kp_nm_per_rad: float = quantity("N m/rad", "gain on the angle's error", at_least=0.0, default=0.0)
+    kd_nm_s_per_rad: float = quantity("N m s/rad", "gain on the speed's error", at_least=0.0, default=0.0)
+    feed_forward_nm: Torques = quantity(
+        "N m", "torque added to that of the gains; a number, or one for each phase", default=(0.0,)
+    )
+    feed_forward_phase: tuple[float, ...] = quantity(
+        "",
+        "fractions of the gait cycle, 0 at crank angle 0 of the motion to follow",
+        at_least=0.0,
+        default=(0.0,),
+        check=_rises_below_one,
+    )
+    max_torque_nm: float | None = quantity(
+        "N m",
+        "largest torque of the drive, either way; without it there is no limit",
+        above=0.0,
+        default=None,
+    )
+
+    def __attrs_post_init__(self) -> None:
+        torques, phases = len(self.feed_forward_nm), len(self.feed_forward_phase)
+        if torques != phases:
+            raise FieldError(
+                "feed_forward_nm", f"has {torques} torques for {phases} phases, expected one each"
+            )
+
+
+@attrs.frozen(kw_only=True)
+class TrackDrive:
+    """A controller's torque acts on the crank, which starts in step with the motion to follow."""
+
+    body: str = described("the crank")
+    track: Track = described("the controller, a mapping of the keys below")
+
+
+Drive = SpeedDrive | TorqueDrive | TrackDrive
 
 
 @attrs.frozen(kw_only=True)
@@ -93,12 +145,6 @@ class ConstantLoad:
     body: str = described("body that is pushed")
     point: str = described("its point")
     force: Vector = quantity("N", "force in the ground's frame, [x, y]")
-
-
-def _rises_below_one(phase: tuple[float, ...]) -> str | None:
-    if phase and all(a < b for a, b in pairwise(phase)) and phase[-1] < 1.0:
-        return None
-    return f"{list(phase)} does not increase from 0 to below 1"
 
 
 @attrs.frozen(kw_only=True)
@@ -150,7 +196,7 @@ class Mechanism:
     joints: dict[str, RevoluteJoint | PrismaticJoint] = described(
         "joints by name, which is also the name of their point on both bodies"
     )
-    drive: SpeedDrive | TorqueDrive = described("what turns the crank")
+    drive: Drive = described("what turns the crank")
     assembly: Assembly = described("where to start looking: crank angle and each body's pose")
     springs: dict[str, Spring] = described("springs by name", factory=dict)
     loads: dict[str, ConstantLoad | PhaseLoad] = described("forces on points by name", factory=dict)

@@ -11,7 +11,7 @@ SHARE = "share/leg_wear_monitor"
 def share_files() -> list[tuple[str, list[str]]]:
     """Every file below the top-level data directories, with the directory it is installed to."""
     found: dict[str, list[str]] = {}
-    for top in ("bags", "config", "launch", "security"):
+    for top in ("bags", "config", "docs", "launch", "security"):
         for path in sorted(Path(top).rglob("*")):
             if path.is_file() and "__pycache__" not in path.parts:
                 found.setdefault(f"{SHARE}/{path.parent.as_posix()}", []).append(path.as_posix())
@@ -24,7 +24,7 @@ setup(
     python_requires=">=3.11",
     data_files=[
         ("share/ament_index/resource_index/packages", ["resource/leg_wear_monitor"]),
-        (SHARE, ["package.xml"]),
+        (SHARE, ["README.md", "SECURITY.md", "package.xml"]),  # the first two name files below docs/
         *share_files(),
     ],
 )

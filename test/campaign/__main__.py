@@ -13,6 +13,7 @@ def main() -> int:
     parser.add_argument("families", nargs="*", metavar="FAMILY", help=f"of {', '.join(family.names())}")
     parser.add_argument("--short", action="store_true", help="only the cases that the tests run")
     parser.add_argument("--number", type=int, help="so many cases of each")
+    parser.add_argument("--begin", type=int, default=0, metavar="SEED", help="leave out the seeds before")
     parser.add_argument("--case", type=int, metavar="SEED", help="one case of one family; its files are kept")
     parser.add_argument("--jobs", type=int, default=2)
     parser.add_argument("--all", action="store_true", help="print every case, not only faults")
@@ -28,7 +29,7 @@ def main() -> int:
             print(f"{name}: left out, {module} is not installed")
             continue
         results = []
-        for result in family.run_all(name, _number(name, arguments), arguments.jobs):
+        for result in family.run_all(name, _seeds(name, arguments), arguments.jobs):
             results.append(result)
             faults += result.outcome.is_fault
             if result.outcome.is_fault or arguments.all:
@@ -38,9 +39,10 @@ def main() -> int:
     return 1 if faults else 0
 
 
-def _number(name: str, arguments: argparse.Namespace) -> int:
+def _seeds(name: str, arguments: argparse.Namespace) -> range:
     module = family.load(name)
-    return arguments.number or (module.SHORT if arguments.short else module.LONG)
+    number = arguments.number or (module.SHORT if arguments.short else module.LONG)
+    return range(arguments.begin, arguments.begin + number)
 
 
 def _one(name: str, seed: int) -> int:

@@ -83,12 +83,12 @@ def run(name: str, seeds: Iterable[int], keep: Path | None = None) -> Iterator[R
         yield Result(name, seed, case.description, outcome, why, left.memory_mb, left.seconds)
 
 
-def run_all(name: str, number: int, jobs: int) -> Iterator[Result]:
-    """Run the cases of so many seeds in so many processes at once, in order of their seeds within each."""
+def run_all(name: str, seeds: range, jobs: int) -> Iterator[Result]:
+    """Run the cases of seeds in so many processes at once, in order of their seeds within each."""
     context = multiprocessing.get_context("spawn")
     results = context.SimpleQueue()
     workers = [
-        context.Process(target=_work, args=(name, range(job, number, jobs), results)) for job in range(jobs)
+        context.Process(target=_work, args=(name, seeds[job::jobs], results)) for job in range(jobs)
     ]
     for worker in workers:
         worker.start()

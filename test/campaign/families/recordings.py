@@ -15,7 +15,7 @@ from leg_wear_monitor.monitor.wear_monitor import WearMonitor
 from leg_wear_monitor.twin import follower
 from leg_wear_monitor.twin.load import FootLoad
 
-SHORT, LONG = 60, 2000
+SHORT, LONG = 40, 2000
 
 # Of twenty cases: most compare every sample that comes out with those that went in.
 _KINDS: tuple[Callable[[int], Case], ...] = (

@@ -87,9 +87,7 @@ def run_all(name: str, seeds: range, jobs: int) -> Iterator[Result]:
     """Run the cases of seeds in so many processes at once, in order of their seeds within each."""
     context = multiprocessing.get_context("spawn")
     results = context.SimpleQueue()
-    workers = [
-        context.Process(target=_work, args=(name, seeds[job::jobs], results)) for job in range(jobs)
-    ]
+    workers = [context.Process(target=_work, args=(name, seeds[job::jobs], results)) for job in range(jobs)]
     for worker in workers:
         worker.start()
     running = jobs

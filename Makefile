@@ -1,5 +1,5 @@
 # `make test` and `make demo` do all the set-up themselves, once: Python 3.11 to 3.13 with venv and a C compiler are enough.
-.PHONY: test demo campaign test-oldest clean
+.PHONY: test demo campaign test-oldest lock sbom clean
 .DELETE_ON_ERROR:
 
 # Percent of lines and branches that the two runs of the tests reach together.
@@ -39,24 +39,52 @@ test-oldest: .venv-oldest/installed
 	.venv-oldest/bin/python -m pytest $(TWO) -W default
 
 clean:
-	rm -rf .venv .venv-oldest build dist *.egg-info .coverage .hypothesis .import_linter_cache .*_cache
+	rm -rf .venv .venv-oldest .venv-tools build dist *.egg-info .coverage .hypothesis .import_linter_cache .*_cache
 
-.venv/installed: setup.cfg setup.py package.xml constraints.txt
-	$(call install,python3.13 python3.12 python3.11 python3,constraints.txt,ros$(comma)bags$(comma)test$(comma)lint$(comma)dask)
+# What the packages are built with comes first: without build isolation, which would fetch a setuptools that nothing pins.
+.venv/installed: setup.cfg setup.py package.xml requirements-build.lock requirements.lock
+	$(call environment,python3.13 python3.12 python3.11 python3)
+	$(call locked,requirements-build.lock)
+	$(call locked,requirements.lock)
+	$(@D)/bin/python -m pip install --quiet --no-deps --no-build-isolation --editable .
+	@touch $@
 
+# The oldest ones differ from Python to Python: pinned, without hashes.
 .venv-oldest/installed: setup.cfg setup.py package.xml constraints-oldest.txt
-	$(call install,python3.12 python3.11 python3,constraints-oldest.txt,bags$(comma)test)
+	$(call environment,python3.12 python3.11 python3)
+	$(@D)/bin/python -m pip install --quiet --constraint constraints-oldest.txt setuptools wheel
+	$(@D)/bin/python -m pip install --quiet --constraint constraints-oldest.txt --no-build-isolation --editable ".[bags,test]"
+	@touch $@
 
-comma := ,
+.venv-tools/installed: requirements-tools.lock
+	$(call environment,python3.13 python3.12 python3.11 python3)
+	$(call locked,requirements-tools.lock)
+	@touch $@
 
-# $(call install,PYTHONS,CONSTRAINTS,EXTRAS): a fresh environment in the target's directory, from the first Python
-# that will do. No build isolation: that would fetch a setuptools that the constraints do not pin.
-define install
+# The locks anew: of what constraints.txt pins, the hashes of all files, so that one lock serves Python 3.11 to 3.13.
+lock: .venv-tools/installed
+	$(LOCK) --constraint constraints.txt --extra ros --extra bags --extra test --extra lint --extra dask \
+		--output-file requirements.lock setup.py
+	printf 'setuptools\nwheel\n' | $(LOCK) --constraint constraints.txt --output-file requirements-build.lock -
+	printf 'cyclonedx-bom[validation]\nuv\n' | $(LOCK) --output-file requirements-tools.lock -
+
+# A bill of materials in CycloneDX's format: all that is in the environment of `make test`, this package included.
+sbom: .venv/installed .venv-tools/installed
+	@mkdir -p build
+	.venv-tools/bin/cyclonedx-py environment --spec-version 1.6 --output-format JSON --output-reproducible --validate \
+		--output-file build/sbom.cdx.json .venv/bin/python
+
+LOCK := .venv-tools/bin/uv pip compile --quiet --universal --python-version 3.11 --generate-hashes --no-annotate --no-header \
+	--no-emit-index-url --no-emit-find-links
+
+# $(call locked,LOCK): install what a lock names; of empy there is only the source.
+locked = $(@D)/bin/python -m pip install --quiet --require-hashes --no-deps --no-build-isolation \
+	--only-binary :all: --no-binary empy --requirement $(1)
+
+# $(call environment,PYTHONS): a fresh environment in the target's directory, from the first Python that will do.
+define environment
 @for python in $(1); do \
 	"$$python" -c 'import ensurepip, sys, venv; sys.exit(not (3, 11) <= sys.version_info < (3, 14))' 2>/dev/null \
 		&& exec "$$python" -m venv --clear $(@D); \
 done; echo "No Python 3.11 to 3.13 with venv among: $(1) (Debian, Ubuntu: apt install python3-venv)" >&2; exit 1
-$(@D)/bin/python -m pip install --quiet --constraint $(2) setuptools wheel
-$(@D)/bin/python -m pip install --quiet --constraint $(2) --no-build-isolation --editable ".[$(3)]"
-@touch $@
 endef

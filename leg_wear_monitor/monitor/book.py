@@ -49,7 +49,11 @@ class BookState:
         Over all runs.
     parts : tuple of PartLife
     spans : Spans
-        Time that this run has counted.
+        Time that this run has counted, by the present epoch of the clock.
+    past : tuple of (int, int, int)
+        Begin, end and epoch of what it counted by earlier ones.
+    anew : bool
+        Whether the clock began anew in this run, so that nothing that comes is counted already.
     point_due_s : float
         Time in motion at which the history wants its next point.
     cut_off_s : float or None
@@ -63,6 +67,8 @@ class BookState:
     cycles: int
     parts: tuple[PartLife, ...]
     spans: Spans = ()
+    past: tuple[tuple[int, int, int], ...] = ()
+    anew: bool = False
     point_due_s: float = 0.0
     cut_off_s: float | None = None
     skipped: int = 0
@@ -131,9 +137,7 @@ class Book:
 
     def not_counted(self, samples: Samples) -> Samples:
         """Samples but those of a time whose wear is in the ledger from an earlier run."""
-        if not len(self._counted):
-            return samples
-        known = is_within(samples["stamp_ns"], self._counted)
+        known = self.counted(samples)
         if not known.any():
             return samples
         stamps = np.concatenate([[self.state.skipped_ns], samples["stamp_ns"][known]])
@@ -142,6 +146,20 @@ class Book:
         self.state.skipped_s += 1.0e-9 * float(steps[(steps > 0) & (steps <= NEIGHBOURS_NS)].sum())
         self.state.skipped_ns = int(stamps[-1])
         return np.asarray(samples[~known])
+
+    def counted(self, samples: Samples) -> NDArray[np.bool_]:
+        """Which samples are of a time whose wear is in the ledger from an earlier run."""
+        if self.state.anew or not len(self._counted):
+            return np.zeros(len(samples), bool)
+        return is_within(samples["stamp_ns"], self._counted)
+
+    def begin_epoch(self) -> None:
+        """The clock has begun anew: stamps from now on are of another time than those before."""
+        epoch = self.ledger.epoch if self.ledger else 0
+        self.state.past = (*self.state.past, *((*span, epoch) for span in self.state.spans))
+        self.state.spans, self.state.anew = (), True
+        if self.ledger:
+            self.ledger.epoch += 1
 
     @property
     def not_kept_s(self) -> float:
@@ -173,9 +191,22 @@ class Book:
         k = self._index(joint)
         was = self.joint_wear(k, self._twin.depth)
         self._twin.reset_wear(joint)
-        new = PartLife(self.state.cycles, self.totals["moving_s"], stamp_ns)
-        self.state.parts = (*self.state.parts[:k], new, *self.state.parts[k + 1 :])
+        self._set_part(k, PartLife(self.state.cycles, self.totals["moving_s"], stamp_ns))
         return was
+
+    def put_back(self, joint: str, before: JointWear) -> JointWear:
+        """Undo `replace`: the wear before and that since are of one part. Gives the wear since."""
+        k = self._index(joint)
+        since, depth = self.joint_wear(k, self._twin.depth), self._twin.depth
+        depth[k] += before.depth
+        self._twin.set_depth(depth)
+        begun_s = self.totals["moving_s"] - before.moving_s - since.moving_s
+        cycles = self.state.cycles - before.cycles - since.cycles
+        self._set_part(k, PartLife(cycles, begun_s, before.replaced_ns))
+        return since
+
+    def _set_part(self, k: int, part: PartLife) -> None:
+        self.state.parts = (*self.state.parts[:k], part, *self.state.parts[k + 1 :])
 
     def followed(self, samples: SampleFigures) -> None:
         """Take down the time in which the leg was followed."""
@@ -235,10 +266,13 @@ class Book:
 
     def _entry(self, alarms: Iterable[Alarm]) -> Entry:
         depth = self._twin.depth
+        epoch = self.ledger.epoch if self.ledger else 0
+        spans = (*self.state.past, *((*span, epoch) for span in self.state.spans))
         return Entry(
             stamp_ns=self._twin.intake.followed_stamp_ns or (self.ledger.kept_ns if self.ledger else 0),
             joints=tuple(self.joint_wear(k, depth) for k in range(len(self._twin.loose))),
             totals=self.totals,
             alarms=tuple(alarm for alarm in alarms if alarm.level is not Level.OK),
-            spans=self.state.spans,
+            spans=tuple((begin, end) for begin, end, _ in spans),
+            span_epochs=tuple(of for *_, of in spans) if any(of for *_, of in spans) else (),
         )

@@ -106,12 +106,12 @@ class Forecaster:
         """Of the ledger, and since."""
         return tuple(self._measurements)
 
-    def replaced(self, joint: str) -> None:
-        """A joint's part is new: nothing is known of it."""
+    def replaced(self, joint: str, replaced_ns: int) -> None:
+        """A joint has another part: known of it is what was measured on it, on a new one nothing."""
         k, state = self._loose.index(joint), self.state
-        new = believe(self._settings, self._fresh_m[k])
+        looks = looks_of(self._measurements, joint, replaced_ns)
         state.growth = (*state.growth[:k], GrowthWindow(), *state.growth[k + 1 :])
-        self._believe(k, new)
+        self._believe(k, believe(self._settings, self._fresh_m[k], looks))
 
     def measured(
         self,

@@ -2,6 +2,7 @@
 
 import attrs
 import numpy as np
+from numpy.typing import NDArray
 
 from leg_wear_monitor.errors import LegWearError
 from leg_wear_monitor.mechanism.arrays import Floats
@@ -19,7 +20,7 @@ from leg_wear_monitor.monitor.hand_over import hand_over
 from leg_wear_monitor.monitor.input_guard import InputGuard
 from leg_wear_monitor.monitor.judge import Judge
 from leg_wear_monitor.monitor.ledger import Ledger
-from leg_wear_monitor.monitor.ledger_entry import Audit, Measurement
+from leg_wear_monitor.monitor.ledger_entry import Audit, JointWear, Measurement
 from leg_wear_monitor.monitor.measure import Finding
 from leg_wear_monitor.monitor.monitor_state import MonitorSnapshot, MonitorState
 from leg_wear_monitor.monitor.reports import (
@@ -31,6 +32,7 @@ from leg_wear_monitor.monitor.reports import (
     Status,
     lost,
 )
+from leg_wear_monitor.monitor.resets import last_reset
 from leg_wear_monitor.monitor.seen import SeenClearance
 from leg_wear_monitor.monitor.status import statuses
 from leg_wear_monitor.twin.digital_twin import DigitalTwin
@@ -147,6 +149,28 @@ class WearMonitor:
         """Wear depth (loose, 2, sectors) of bushings and journals; a copy."""
         return self._twin.depth
 
+    def wear_of(self, joint: str) -> JointWear:
+        """Wear of a joint's part as it is now; raises LegWearError for one that is not loose."""
+        return self._book.wear_of(joint)
+
+    def begin_run(self, boot_id: str) -> bool:
+        """Note which start of the computer this is; whether the last run is known to be of another."""
+        ledger = self._book.ledger
+        if ledger is None:
+            return False
+        ledger.boot_id = boot_id
+        return bool(boot_id and ledger.last_run.boot_id) and boot_id != ledger.last_run.boot_id
+
+    def counted(self, samples: Samples) -> NDArray[np.bool_]:
+        """Which samples `update` would leave out, since the ledger has the wear of their time."""
+        return self._book.counted(samples)
+
+    def begin_epoch(self, stamp_ns: int, who: str) -> None:
+        """The clock of the samples has begun anew at a stamp: what comes is counted."""
+        self._book.begin_epoch()
+        self._book.note(Audit(stamp_ns, who, "new_epoch"))
+        self._keep()
+
     def status(self) -> tuple[Status, ...]:
         """What /diagnostics shows; names and their order stay the same."""
         state = self._state
@@ -190,14 +214,37 @@ class WearMonitor:
             For a joint that is not loose.
         """
         was = self._book.replace(joint, stamp_ns)
-        k = self.loose.index(joint)
-        growth = self._state.growth
-        self._state.growth = (*growth[:k], GrowthWindow(), *growth[k + 1 :])
-        self._forecaster.replaced(joint)
-        if self._encoders:
-            self._encoders.replaced()
+        self._part_changed(joint, stamp_ns)
         self._book.note(Audit(stamp_ns, who, "reset_wear", was))
         self._keep()
+
+    def undo_reset(self, joint: str, stamp_ns: int, who: str) -> JointWear:
+        """Take the last `reset_wear` of a joint back: its part was not replaced, and has worn on since.
+
+        Returns
+        -------
+        JointWear
+            As it is now: the wear before the reset and the wear since.
+
+        Raises
+        ------
+        LegWearError
+            For a joint that is not loose, or if no reset is kept that can be taken back.
+        """
+        reset = last_reset(self._book.ledger, joint, self._book.wear_of(joint))
+        since = self._book.put_back(joint, reset.before)
+        self._part_changed(joint, reset.before.replaced_ns)
+        self._book.note(Audit(stamp_ns, who, "undo_reset", since, undoes=reset.id))
+        self._keep()
+        return self._book.wear_of(joint)
+
+    def _part_changed(self, joint: str, replaced_ns: int) -> None:
+        """What was found of the growth of another part does not hold for this one."""
+        k, growth = self.loose.index(joint), self._state.growth
+        self._state.growth = (*growth[:k], GrowthWindow(), *growth[k + 1 :])
+        self._forecaster.replaced(joint, replaced_ns)
+        if self._encoders:
+            self._encoders.replaced()
 
     def measure(
         self, joint: str, clearance_m: float, sigma_m: float, stamp_ns: int, who: str, accept: bool = False

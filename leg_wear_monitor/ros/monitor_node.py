@@ -25,6 +25,7 @@ from leg_wear_monitor.recording.forecast_times import ForecastTimes
 from leg_wear_monitor.recording.outputs import Messages
 from leg_wear_monitor.recording.qos import SENSOR_DATA
 from leg_wear_monitor.ros.black_box import BlackBox
+from leg_wear_monitor.ros.epochs import Epochs, boot_id
 from leg_wear_monitor.ros.inbox import Inbox
 from leg_wear_monitor.ros.inputs import InputTopic, subscribe
 from leg_wear_monitor.ros.markers import MarkerTopic
@@ -32,6 +33,7 @@ from leg_wear_monitor.ros.node_health import Load, load_status, recording_status
 from leg_wear_monitor.ros.outlets import Outlets
 from leg_wear_monitor.ros.parameters import Parameters
 from leg_wear_monitor.ros.running import ClosingNode, run, spin
+from leg_wear_monitor.ros.services import Confirmation, asked_once, audit_time, undone
 
 ADVICE = (
     "this monitor advises: it commands nothing, no alarm is no proof of health, keep it out of safety paths"
@@ -67,6 +69,7 @@ class MonitorNode(ClosingNode):
         decoder = Decoder(config)
         self._inbox = Inbox(decoder, _HELD)
         self._load = Load()
+        self._epochs = Epochs(self._monitor, boot_id(), self._ros_now_ns, self._say)
         self._messages = Messages(config, self._monitor.loose, self.get_fully_qualified_name())
         self._black_box = BlackBox(config.record.path)
         self._outlets = Outlets(self, outputs.OUTPUTS, self._black_box)
@@ -76,6 +79,7 @@ class MonitorNode(ClosingNode):
         parameters.follow(
             self, self._configure, lambda config: check_limits(config, mechanism, self.get_name())
         )
+        self._confirmation = Confirmation()
         self._serve()
         self._markers = MarkerTopic(self, self._monitor)
         self._send_alarms(self._monitor.alarms)
@@ -116,6 +120,10 @@ class MonitorNode(ClosingNode):
         """Now, as people and other nodes see it [ns]."""
         return self.get_clock().now().nanoseconds
 
+    def _say(self, is_error: bool, line: str) -> None:
+        logger = self.get_logger()
+        logger.error(line) if is_error else logger.warning(line)
+
     def _receive(self, topic: InputTopic, raw: bytes) -> None:
         topic.heard_ns = time.time_ns()
         self._inbox.add(topic.kind, raw, topic.heard_ns)
@@ -130,7 +138,9 @@ class MonitorNode(ClosingNode):
             names = {topic.kind: topic.name for topic, _ in self._inputs}
             for arrival in arrivals:
                 self._black_box.write(names[arrival.kind], arrival.log_time_ns, arrival.raw)
-        self._publish(self._monitor.update(self._inbox.decoded(arrivals)), coarse)
+        samples = self._inbox.decoded(arrivals)
+        self._epochs.see(samples)
+        self._publish(self._monitor.update(samples), coarse)
 
     # --- out ---
 
@@ -156,6 +166,7 @@ class MonitorNode(ClosingNode):
             load_status(self._load, self._inbox),
             topics_status(publishers, now_ns),
             recording_status(self._black_box),
+            self._epochs.status(),
         )
         message = self._messages.diagnostics(self._ros_now_ns(), status)
         self._outlets.send(outputs.DIAGNOSTICS, now_ns, message)
@@ -172,6 +183,7 @@ class MonitorNode(ClosingNode):
         self._offer("~/save_state", self._save)
         for joint in self._monitor.loose:
             self._offer(f"~/reset_wear/{joint}", partial(self._reset_wear, joint))
+            self._offer(f"~/undo_reset/{joint}", partial(self._undo_reset, joint))
 
     def _offer(self, name: str, act: Callable[[], str]) -> None:
         """A service that acts and says in a line what it did, or why it could not."""
@@ -196,8 +208,15 @@ class MonitorNode(ClosingNode):
         return f"saved in {self._monitor.config.ledger.path}"
 
     def _reset_wear(self, joint: str) -> str:
-        self._monitor.reset_wear(joint, self._ros_now_ns(), "service ~/reset_wear")
-        return f"joint {joint}: fresh surfaces, history kept"
+        stamp_ns = audit_time(self._ros_now_ns())
+        if not self._confirmation.is_confirmed(joint):
+            raise LegWearError(asked_once(joint, self._monitor.wear_of(joint)))
+        self._monitor.reset_wear(joint, stamp_ns, "service ~/reset_wear")
+        return f"joint {joint}: fresh surfaces, history kept; ~/undo_reset/{joint} takes it back"
+
+    def _undo_reset(self, joint: str) -> str:
+        stamp_ns = audit_time(self._ros_now_ns())
+        return undone(joint, self._monitor.undo_reset(joint, stamp_ns, "service ~/undo_reset"))
 
 
 def _listed(alarms: Sequence[Alarm]) -> str:

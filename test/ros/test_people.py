@@ -99,6 +99,11 @@ def test_alarms_are_acknowledged_and_stay_while_they_are_present(shared_stage, m
 def test_a_part_is_replaced_and_the_ledger_saved(shared_stage, monitor, ledger: Path) -> None:
     wear_monitor = monitor.node.monitor
     worn = wear_monitor.status()
+    asked = trigger(shared_stage, "reset_wear/A")
+    assert not asked.success
+    assert "not reset yet" in asked.message
+    assert "call again within 30 s" in asked.message
+    assert [repr(one) for one in wear_monitor.status()] == [repr(one) for one in worn]
     answer = trigger(shared_stage, "reset_wear/A")
     assert answer.success
     joints = {one.name: one.values["clearance_m"] for one in wear_monitor.status() if "joint" in one.name}
@@ -108,6 +113,14 @@ def test_a_part_is_replaced_and_the_ledger_saved(shared_stage, monitor, ledger: 
     assert joints["joint B"] == before["joint B"]
     assert trigger(shared_stage, "save_state").success
     assert ledger.exists()
+    answer = trigger(shared_stage, "undo_reset/A")
+    assert answer.success
+    assert "taken back" in answer.message
+    joints = {one.name: one.values["clearance_m"] for one in wear_monitor.status() if "joint" in one.name}
+    assert joints == before
+    answer = trigger(shared_stage, "undo_reset/A")
+    assert not answer.success
+    assert "has no reset that was not taken back" in answer.message
 
 
 def test_saving_without_a_ledger_says_so(stage) -> None:

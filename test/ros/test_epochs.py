@@ -1,0 +1,87 @@
+"""A clock that begins anew beside a ledger, and what cannot be told from a recording that is played."""
+
+import numpy as np
+import pytest
+
+pytest.importorskip("rclpy")
+
+from leg_wear_monitor.monitor.alarms import Level
+from leg_wear_monitor.ros.epochs import BEGUN, UNDECIDED, Epochs
+from leg_wear_monitor.twin.sample import Samples, gait_samples
+
+SECOND = 10**9
+DATE_NS = 1_700_000_000 * SECOND
+COUNTED_S = 100
+
+
+class Counted:
+    """A monitor whose ledger has the time from a stamp on, a hundred seconds."""
+
+    def __init__(self, begin_ns: int, is_other_boot: bool = False) -> None:
+        self.begin_ns, self.is_other_boot = begin_ns, is_other_boot
+        self.begun: list[int] = []
+
+    def begin_run(self, boot_id: str) -> bool:
+        return self.is_other_boot
+
+    def counted(self, samples: Samples) -> np.ndarray:
+        stamps = samples["stamp_ns"] - self.begin_ns
+        return (stamps >= 0) & (stamps <= COUNTED_S * SECOND) & (not self.begun)
+
+    def begin_epoch(self, stamp_ns: int, who: str) -> None:
+        self.begun.append(stamp_ns)
+
+
+def seen(monitor: Counted, from_ns: int, now_ns: int) -> tuple[Epochs, list[tuple[bool, str]]]:
+    """What comes of two blocks of samples from a stamp on."""
+    said: list[tuple[bool, str]] = []
+    epochs = Epochs(monitor, "boot", lambda: now_ns, lambda *line: said.append(line))
+    for k in range(2):
+        stamps = from_ns + (5 * k + np.arange(5)) * 5_000_000
+        epochs.see(gait_samples(stamps, crank_angle_rad=np.zeros(5)))
+    return epochs, said
+
+
+@pytest.mark.plain
+@pytest.mark.parametrize("begin_ns", [1, DATE_NS])
+def test_samples_of_now_are_never_counted_already(begin_ns: int) -> None:
+    """Simulated time that was reset, a computer that starts in 1970, a clock that was set back."""
+    monitor = Counted(begin_ns)
+    epochs, said = seen(monitor, begin_ns + 5 * SECOND, begin_ns + 6 * SECOND)
+    assert len(monitor.begun) == 1
+    assert said == [(False, BEGUN)]
+    status = epochs.status()
+    assert (status.level, status.message) == (Level.OK, BEGUN)
+    assert status.values == {"left_out_samples": 0.0, "epochs_begun": 1.0}
+
+
+@pytest.mark.plain
+def test_stamps_that_are_no_dates_begin_anew_with_the_computer() -> None:
+    monitor = Counted(1, is_other_boot=True)
+    seen(monitor, 5 * SECOND, DATE_NS)
+    assert len(monitor.begun) == 1
+    dated = Counted(DATE_NS, is_other_boot=True)
+    seen(dated, DATE_NS + SECOND, DATE_NS + 3600 * SECOND)
+    assert not dated.begun
+
+
+@pytest.mark.plain
+@pytest.mark.parametrize("begin_ns", [1, DATE_NS])
+def test_what_cannot_be_decided_is_an_error_at_once_and_once_in_the_log(begin_ns: int) -> None:
+    monitor = Counted(begin_ns)
+    epochs, said = seen(monitor, begin_ns + SECOND, DATE_NS + 3600 * SECOND)
+    assert not monitor.begun
+    assert said == [(True, UNDECIDED)]
+    status = epochs.status()
+    assert (status.level, status.message) == (Level.ERROR, UNDECIDED)
+    assert "ledger.skip_counted: false" in status.message
+    assert epochs.status().level is Level.OK
+
+
+@pytest.mark.plain
+def test_samples_after_what_is_counted_are_nothing_to_speak_of() -> None:
+    monitor = Counted(DATE_NS)
+    epochs, said = seen(monitor, DATE_NS + (COUNTED_S + 1) * SECOND, DATE_NS)
+    assert not said
+    assert not monitor.begun
+    assert epochs.status().level is Level.OK

@@ -35,9 +35,9 @@ def test_a_node_may_do_what_it_does_and_nothing_else(
     monkeypatch.setattr(MonitorNode, "_compile", lambda self, decoder: None)
     context = rclpy.Context()
     rclpy.init(args=["--ros-args", "--log-level", "fatal"], context=context)
-    clock = [Parameter("use_sim_time", value=True)]
+    overrides = [Parameter("use_sim_time", value=True), Parameter("loose_joints", value=["G"])]
     try:
-        node = make(context=context, parameter_overrides=clock)
+        node = make(context=context, parameter_overrides=overrides)
         name = node.get_name()
         agrees(node.get_publisher_names_and_types_by_node, name, allowed(name, "topic", "publish"))
         agrees(node.get_subscriber_names_and_types_by_node, name, allowed(name, "topic", "subscribe"))

@@ -22,7 +22,17 @@ SUMMARY, PAGE = "summary.json", "report.html"
 
 # Spelled out, for --help shall not wait for numba; the tests compare them with the library's.
 TIMES = ("header", "log", "publish")
-ALARM_KINDS = ("impact_force", "clearance", "growth", "torque_mismatch", "cadence", "input")
+ALARM_KINDS = (
+    "impact_force",
+    "clearance",
+    "growth",
+    "torque_mismatch",
+    "torque_bias",
+    "torque_drift",
+    "torque_lag",
+    "cadence",
+    "input",
+)
 _MOST_LINES = 20
 
 

@@ -1,5 +1,6 @@
 """A replay's figures as text for people."""
 
+from collections.abc import Mapping
 from typing import TYPE_CHECKING
 
 from rich.console import Console
@@ -8,6 +9,8 @@ from rich.table import Table
 from leg_wear_monitor.cli.tables import figure
 
 if TYPE_CHECKING:
+    from leg_wear_monitor.monitor.forecast import JointForecast, LegForecast
+    from leg_wear_monitor.monitor.reports import CycleReport, JointReport
     from leg_wear_monitor.recording.replay import ReplayResult
 
 
@@ -29,12 +32,17 @@ def print_replay(result: "ReplayResult", wall_s: float) -> None:
     )
     if result.evidence.doubtful:
         console.print(f"{result.evidence.doubtful} of the gait cycles can hardly be this leg's\n")
-    if result.is_believable:
+    last = result.history.last
+    if result.is_believable and last is not None:
         console.print(_joints(result))
         console.print()
+        _print_lifetimes(console, last, monitor.config.forecast.duty_hours_per_day)
+    from leg_wear_monitor.monitor.alarm_words import raised_words, state_of
+
     raised = [alarm for alarm in monitor.alarms.alarms if alarm.level]
     for alarm in raised:
-        console.print(f"{alarm.level.name:<6} {alarm.name}: {figure(alarm.value)} {alarm.unit}".rstrip())
+        words = raised_words(state_of(alarm), alarm.worst, alarm.limit, alarm.unit, alarm.raised_ns)
+        console.print(f"{alarm.level.name:<6} {alarm.name}: {words}", soft_wrap=True)
     if not raised:
         console.print("no alarm stands at the end")
     if result.is_believable:
@@ -45,20 +53,66 @@ def print_replay(result: "ReplayResult", wall_s: float) -> None:
 
 def _joints(result: "ReplayResult") -> Table:
     table = Table(box=None, pad_edge=False, padding=(0, 1), header_style="bold")
-    for column in ("\njoint", "clearance\nmm", "growth\npm/cycle", "±\npm/cycle", "remaining\nh", "peak\nN"):
+    columns = ("\njoint", "counted clearance\nmm", "growth\npm/cycle", "±\npm/cycle", "peak\nN")
+    for column in columns:
         table.add_column(column, justify="left" if column == "\njoint" else "right")
     peaks = result.history.joint_column("peak_force_n").max(axis=0)
     last = result.history.last
     for joint, peak in zip(last.joints if last else (), peaks, strict=True):
         table.add_row(
             joint.joint,
-            f"{1.0e3 * joint.clearance_m:.6f}",
+            _counted(joint),
             _known(1.0e12, joint.growth_m_per_cycle),
             _known(1.0e12, joint.growth_error_m_per_cycle),
-            _known(1.0, joint.remaining.hours if joint.remaining else None),
             figure(float(peak)),
         )
     return table
+
+
+def _counted(joint: "JointReport") -> str:
+    from leg_wear_monitor.monitor.lifetime_words import clearance_mm
+
+    if joint.forecast is None:
+        return f"{1.0e3 * joint.clearance_m:.3f}"
+    may_be = joint.forecast.clearance_m
+    return clearance_mm(joint.clearance_m, may_be.p10, may_be.p90)
+
+
+def _print_lifetimes(console: Console, report: "CycleReport", duty_hours: float) -> None:
+    """How long each joint and the leg last: hours of walking, and days of duty; or why that is not known."""
+    from leg_wear_monitor.monitor.forecast import Answer
+
+    told = {joint.joint: joint.forecast for joint in report.joints if joint.forecast is not None}
+    both: dict[str, JointForecast | LegForecast] = {**told}
+    if report.forecast is not None:
+        both["leg"] = report.forecast
+    if any(each.hours for each in both.values()):
+        console.print(_lifetime_table(both))
+        console.print(f"hours of walking and days of {duty_hours:g} h until the limit of the clearance")
+    for answer in Answer:
+        names = [name for name, each in both.items() if each.answer is answer]
+        if names and answer is not Answer.KNOWN:
+            console.print(f"lasts  {', '.join(names)}: {answer.value}", soft_wrap=True)
+    console.print()
+
+
+def _lifetime_table(told: "Mapping[str, JointForecast | LegForecast]") -> Table:
+    table = Table(box=None, pad_edge=False, padding=(0, 1), header_style="bold")
+    table.add_column("\nlasts", min_width=5)
+    for unit in ("h", "days"):
+        for share in ("p10", "p50", "p90"):
+            table.add_column(f"{share}\n{unit}", justify="right", no_wrap=True)
+    for name, each in told.items():
+        table.add_row(name, *_lifetime(each))
+    return table
+
+
+def _lifetime(told: "JointForecast | LegForecast") -> list[str]:
+    from leg_wear_monitor.monitor.lifetime_words import lifetime_values, three_digits
+
+    values = lifetime_values(told)
+    keys = (f"{share}_{unit}" for unit in ("hours", "days") for share in ("p10", "p50", "p90"))
+    return [three_digits(values[key]) if key in values else "-" for key in keys]
 
 
 def _known(factor: float, value: float | None) -> str:

@@ -8,6 +8,7 @@ from leg_wear_monitor.mechanism.quantity import FieldError, choice, described, q
 
 MOST_ENCODERS = 4
 WRENCH, EFFORT, FLOAT64 = TORQUE_SOURCES = ("wrench", "effort", "float64")
+AVERAGE, INSTANT = SAMPLINGS = ("average", "instant")
 
 
 def _share(doc: str) -> float:
@@ -93,7 +94,7 @@ class JointEncodersConfig:
 
 @attrs.frozen(kw_only=True)
 class TorqueSensorConfig:
-    """The drive's torque sensor, which gives means over the time since its last reading."""
+    """The drive's torque sensor."""
 
     source: str = choice(
         TORQUE_SOURCES,
@@ -101,6 +102,11 @@ class TorqueSensorConfig:
         default="wrench",
     )
     rate_hz: float = quantity("Hz", "messages a second", above=0.0, at_most=10000.0, default=200.0)
+    sampling: str = choice(
+        SAMPLINGS,
+        "what a reading is: the average since the one before, or the torque at its instant",
+        default=AVERAGE,
+    )
     noise_nm: float = quantity("N m", "noise, standard deviation", at_least=0.0, default=0.05)
     resolution_nm: float = quantity("N m", "step of the reading, 0 for none", at_least=0.0, default=0.01)
     offset_nm: float = quantity("N m", "what it reads without torque", default=0.0)

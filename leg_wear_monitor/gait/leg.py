@@ -29,12 +29,13 @@ class Instant(NamedTuple):
     """The crank at a time, and what sensors see of it.
 
     ``torque_impulse`` is the integral of the drive torque over all time before [N m s]; ``encoder_rad`` what
-    further encoders would read without an error.
+    further encoders would read without an error; ``torque_nm`` the drive torque at the time.
     """
 
     crank: CrankMotion
     torque_impulse: float
     encoder_rad: tuple[float, ...] = ()
+    torque_nm: float = math.nan
 
 
 class SyntheticLeg:
@@ -90,7 +91,12 @@ class SyntheticLeg:
             self._step(t if piece == 1 else self.time + (t - self.time) / piece)
         impulse = float(self._tally.drive_integral[TORQUE]) + self._friction_impulse
         turned = tuple(float(self._run.q[j, 2] - self._run.q[b, 2]) for b, j in self._sides)
-        return Instant(self._pace.at(t), impulse, turned)
+        now = self._pace.at(t)
+        torque_nm = self._run.sample().drive_torque + self._friction_torque(now.speed)
+        return Instant(now, impulse, turned, torque_nm)
+
+    def _friction_torque(self, speed: float) -> float:
+        return self._friction * math.tanh(speed / _FRICTION_RAMP_RADPS)
 
     def truth(self) -> dict[str, Any]:
         """What is known of the leg: each joint's clearance at the start, after each cycle, and now [m]."""
@@ -115,7 +121,7 @@ class SyntheticLeg:
         start, end = self._pace.at(before), self._pace.at(t)
         self._run.polynomial[:] = quintic(before, start, t - before, end)
         self._run.advance(t, self._tally)
-        self._friction_impulse += self._friction * math.tanh(end.speed / _FRICTION_RAMP_RADPS) * (t - before)
+        self._friction_impulse += self._friction_torque(end.speed) * (t - before)
         if math.floor(start.angle / TURN) != math.floor(end.angle / TURN):
             self._cycles.append((t, self.clearance_m()))
 

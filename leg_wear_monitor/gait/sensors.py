@@ -10,6 +10,7 @@ import numpy as np
 
 from leg_wear_monitor.gait.config import (
     EFFORT,
+    INSTANT,
     EncoderConfig,
     GaitConfig,
     JointEncodersConfig,
@@ -115,7 +116,8 @@ def _taken(leg: SyntheticLeg, config: GaitConfig) -> Iterator[Reading]:
         if kind == TORQUE or by_effort:
             mean = (instant.torque_impulse - impulse) / (t - since)
             since, impulse = t, instant.torque_impulse
-            torque_nm = _torque(config.torque_sensor, mean, torque)
+            at_once = config.torque_sensor.sampling == INSTANT
+            torque_nm = _torque(config.torque_sensor, instant.torque_nm if at_once else mean, torque)
         yield Reading(t, t, kind, NO_FAULT, angle, velocity, torque_nm, turned if kind == CRANK else ())
 
 

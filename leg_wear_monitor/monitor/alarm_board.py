@@ -7,6 +7,7 @@ import attrs
 from leg_wear_monitor.monitor.alarms import Alarm, Level, Limit, acknowledged, has_changed, judged
 from leg_wear_monitor.monitor.config import MonitorConfig
 from leg_wear_monitor.monitor.reports import AlarmList
+from leg_wear_monitor.monitor.torque_checks import BIAS, DRIFT, LAG, torque_bounds
 
 IMPACT, CLEARANCE, GROWTH = "impact_force", "clearance", "growth"
 DEPARTURE = "clearance_departure"
@@ -18,8 +19,8 @@ SOURCES = "input_sources"
 TWO_SOURCES = Limit(2.0, 2.0)  # of one crank
 
 
-def limits_of(config: MonitorConfig, loose: tuple[str, ...]) -> dict[str, Limit]:
-    """Limit of every alarm by its name."""
+def limits_of(config: MonitorConfig, loose: tuple[str, ...], torque_size_nm: float = 1.0) -> dict[str, Limit]:
+    """Limit of every alarm by its name; ``torque_size_nm`` RMS of the drive torque as predicted."""
     limits = config.limits
     found: dict[str, Limit] = {}
     for k, joint in enumerate(loose):
@@ -31,6 +32,9 @@ def limits_of(config: MonitorConfig, loose: tuple[str, ...]) -> dict[str, Limit]
         if config.encoders.names:
             found[f"{DEPARTURE} {joint}"] = _limit(config, limits.clearance_departure_m)
     found[MISMATCH] = _limit(config, limits.torque_mismatch, config.alarms.knock_on_delay_cycles)
+    bounds = torque_bounds(config, torque_size_nm)
+    for name, error in ((BIAS, bounds.bias_nm), (DRIFT, bounds.drift_nm), (LAG, bounds.max_lag_s)):
+        found[name] = _limit(config, error)
     found[CADENCE] = _limit(config, config.cadence.tolerance_rpm)
     for rate in (CRANK_RATE, TORQUE_RATE):
         found[rate] = _least(config, limits.min_rate_hz)
@@ -54,7 +58,7 @@ def _least(config: MonitorConfig, error: float) -> Limit:
 
 
 _UNITS = {
-    IMPACT: "N", CLEARANCE: "m", DEPARTURE: "m",
+    BIAS: "N m", DRIFT: "N m", LAG: "s", IMPACT: "N", CLEARANCE: "m", DEPARTURE: "m",
     GROWTH: "m/h", CADENCE: "rpm", CRANK_RATE: "Hz", TORQUE_RATE: "Hz",
 }  # fmt: skip
 
@@ -66,6 +70,8 @@ class AlarmBoard:
     ----------
     config : MonitorConfig
     loose : tuple of str
+    torque_size_nm : float
+        RMS of the drive torque as predicted.
 
     Attributes
     ----------
@@ -73,14 +79,14 @@ class AlarmBoard:
         By name, always the same ones in the same order.
     """
 
-    def __init__(self, config: MonitorConfig, loose: tuple[str, ...]) -> None:
-        self._loose = loose
-        self._limits = limits_of(config, loose)
+    def __init__(self, config: MonitorConfig, loose: tuple[str, ...], torque_size_nm: float = 1.0) -> None:
+        self._loose, self._torque_size_nm = loose, torque_size_nm
+        self._limits = limits_of(config, loose, torque_size_nm)
         self.alarms = {name: _new(name) for name in self._limits}
 
     def configure(self, config: MonitorConfig) -> None:
         """Judge by other limits from now on."""
-        self._limits = limits_of(config, self._loose)
+        self._limits = limits_of(config, self._loose, self._torque_size_nm)
 
     @property
     def clearance_limits_m(self) -> tuple[float, ...]:

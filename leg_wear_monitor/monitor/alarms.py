@@ -77,6 +77,8 @@ class Alarm:
         The limit of ERROR it was judged against; NaN before.
     raised_ns : int
         When the level was last raised; 0 before.
+    worst : float
+        The worst value since it was raised; NaN while its level is OK.
     beyond : tuple of int
         For how many gait cycles in a row the value has been beyond the limits of WARN and ERROR.
     """
@@ -90,6 +92,7 @@ class Alarm:
     value: float = math.nan
     limit: float = math.nan
     raised_ns: int = 0
+    worst: float = math.nan
     beyond: tuple[int, int] = (0, 0)
 
     @property
@@ -146,17 +149,28 @@ def judged(alarm: Alarm, value: float, limit: Limit, stamp_ns: int, cycles: int 
     present, beyond = next_level(alarm.present, value, limit, alarm.beyond, cycles)
     alarm = attrs.evolve(alarm, present=present, value=value, limit=limit.error, beyond=beyond)
     if present > alarm.level:
-        return attrs.evolve(alarm, level=present, acknowledged=False, raised_ns=stamp_ns)
-    if alarm.acknowledged and present < alarm.level:
-        return attrs.evolve(alarm, level=present, acknowledged=present is not Level.OK)
-    return alarm
+        alarm = attrs.evolve(alarm, level=present, acknowledged=False, raised_ns=stamp_ns)
+    elif alarm.acknowledged and present < alarm.level:
+        alarm = attrs.evolve(alarm, level=present, acknowledged=present is not Level.OK)
+    return attrs.evolve(alarm, worst=_worst(alarm, value, limit))
+
+
+def _worst(alarm: Alarm, value: float, limit: Limit) -> float:
+    """The worst value of an alarm since it was raised; NaN while its level is OK."""
+    if alarm.level is Level.OK:
+        return math.nan
+    if math.isnan(alarm.worst):
+        return value
+    return min(alarm.worst, value) if limit.is_least else max(alarm.worst, value)
 
 
 def acknowledged(alarm: Alarm) -> Alarm:
     """Alarm after somebody has seen it: cleared if it has returned to normal, marked if not."""
     if alarm.level is Level.OK:
         return alarm
-    return attrs.evolve(alarm, level=alarm.present, acknowledged=alarm.present is not Level.OK)
+    if alarm.present is Level.OK:
+        return attrs.evolve(alarm, level=Level.OK, acknowledged=False, worst=math.nan)
+    return attrs.evolve(alarm, level=alarm.present, acknowledged=True)
 
 
 def has_changed(before: Alarm, after: Alarm) -> bool:

@@ -19,8 +19,10 @@ from leg_wear_monitor.monitor.ledger_entry import (
     ForecastPoint,
     JointWear,
 )
+from leg_wear_monitor.monitor.pauses import Pauses
 from leg_wear_monitor.monitor.reports import AlarmList, CycleReport
 from leg_wear_monitor.monitor.spans import NEIGHBOURS_NS, Spans, is_within, with_span
+from leg_wear_monitor.monitor.torque_record import FRICTION_KEY, SIGMA_KEY
 from leg_wear_monitor.twin.digital_twin import DigitalTwin
 from leg_wear_monitor.twin.figures import SampleFigures
 from leg_wear_monitor.twin.sample import Samples
@@ -62,6 +64,10 @@ class BookState:
         Samples left out since they are counted, their time, and the stamp of the last.
     shown : mapping of str to (Level, bool)
         Of the alarms, what the history has last.
+    pauses : Pauses
+        Times in which nobody recorded.
+    commissioned : dict of str to float
+        What the ledger keeps of this leg's torque, by names that end in their unit.
     """
 
     cycles: int
@@ -75,6 +81,8 @@ class BookState:
     skipped_s: float = 0.0
     skipped_ns: int = 0
     shown: Mapping[str, tuple[Level, bool]] = attrs.field(factory=dict)
+    pauses: Pauses = Pauses()
+    commissioned: dict[str, float] = attrs.field(factory=dict)
 
 
 def _is_apart(step_ns: Ints) -> NDArray[np.bool_]:
@@ -107,6 +115,9 @@ class Book:
             cut_off_s=ledger.cut_off_s if ledger else None,
         )
         if entry:
+            self.state.commissioned = {
+                name: entry.totals[name] for name in (FRICTION_KEY, SIGMA_KEY) if name in entry.totals
+            }
             self.state.shown = {a.name: (a.level, a.acknowledged) for a in entry.alarms}
             self._take_over({joint.name: joint for joint in entry.joints})
 
@@ -124,8 +135,16 @@ class Book:
 
     @property
     def unmonitored_s(self) -> float:
-        """Time in which the leg was not followed in this run, but for what earlier runs have counted."""
-        return max(0.0, self._twin.intake.unmonitored_s - self.state.skipped_s)
+        """Time in which the leg was not followed in this run.
+
+        What earlier runs have counted is not in it, nor are pauses between recordings.
+        """
+        unmonitored_s = self._twin.intake.unmonitored_s
+        return max(0.0, unmonitored_s - self.state.skipped_s - self.state.pauses.passed_s(unmonitored_s))
+
+    def pause(self, pause_s: float) -> None:
+        """Nobody records for a time [s], from the newest sample on."""
+        self.state.pauses = self.state.pauses.with_pause(pause_s, self._twin.intake.unmonitored_s)
 
     @property
     def totals(self) -> dict[str, float]:
@@ -271,7 +290,7 @@ class Book:
         return Entry(
             stamp_ns=self._twin.intake.followed_stamp_ns or (self.ledger.kept_ns if self.ledger else 0),
             joints=tuple(self.joint_wear(k, depth) for k in range(len(self._twin.loose))),
-            totals=self.totals,
+            totals=self.totals | self.state.commissioned,
             alarms=tuple(alarm for alarm in alarms if alarm.level is not Level.OK),
             spans=tuple((begin, end) for begin, end, _ in spans),
             span_epochs=tuple(of for *_, of in spans) if any(of for *_, of in spans) else (),

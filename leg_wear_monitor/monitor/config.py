@@ -63,6 +63,22 @@ class Limits:
         default=0.1,
         metadata=LIVE,
     )
+    torque_bias_nm: float = quantity(
+        "N m",
+        "constant drive torque beyond 0 to drive_torque.max_friction_nm; 0: a tenth of the predicted RMS",
+        at_least=0.0,
+        at_most=1.0e6,
+        default=0.0,
+        metadata=LIVE,
+    )
+    torque_drift_nm: float = quantity(
+        "N m",
+        "change of the constant drive torque since this leg was commissioned; 0: 0.15 of the predicted RMS",
+        at_least=0.0,
+        at_most=1.0e6,
+        default=0.0,
+        metadata=LIVE,
+    )
     min_rate_hz: float = quantity(
         "Hz", "least rate of crank samples", above=0.0, at_most=1.0e5, default=40.0, metadata=LIVE
     )

@@ -3,9 +3,11 @@
 import math
 from collections.abc import Sequence
 
+import attrs
+
 from leg_wear_monitor.monitor.forecast import Forecast, JointForecast
-from leg_wear_monitor.monitor.growth import GrowthWindow, growth_rate, remaining
-from leg_wear_monitor.monitor.reports import CycleReport, JointReport
+from leg_wear_monitor.monitor.growth import GrowthWindow, growth_rate
+from leg_wear_monitor.monitor.reports import CycleReport, JointReport, Remaining
 from leg_wear_monitor.monitor.seen import SeenClearance
 from leg_wear_monitor.twin.figures import CycleFigures, TorqueFigures
 
@@ -15,7 +17,6 @@ def cycle_report(
     cycle: int,
     loose: Sequence[str],
     growth: Sequence[GrowthWindow],
-    limits_m: Sequence[float],
     forecast: Forecast,
     seen: Sequence[SeenClearance] | None = None,
 ) -> CycleReport:
@@ -30,8 +31,6 @@ def cycle_report(
         Names of the loose joints.
     growth : sequence of GrowthWindow
         Of each of them, this cycle included.
-    limits_m : sequence of float
-        Limit of each one's clearance.
     forecast : Forecast
     seen : sequence of SeenClearance, optional
     """
@@ -44,9 +43,7 @@ def cycle_report(
         moving_s=figures.moving_s,
         bridged_s=figures.bridged_s,
         joints=tuple(
-            _joint_report(
-                figures, k, joint, growth[k], limits_m[k], forecast.joints[k], seen[k] if seen else None
-            )
+            _joint_report(figures, k, joint, growth[k], forecast.joints[k], seen[k] if seen else None)
             for k, joint in enumerate(loose)
         ),
         torque_samples=torque.samples,
@@ -59,6 +56,8 @@ def cycle_report(
         load_acting_n=float(torque.load_acting_n),
         friction_nm=float(torque.friction_nm),
         torque_lag_s=float(torque.torque_lag_s),
+        friction_sigma_nm=float(torque.friction_sigma_nm),
+        torque_lag_sigma_s=float(torque.torque_lag_sigma_s),
         forecast=forecast.leg,
     )
 
@@ -69,25 +68,37 @@ def _mismatch(torque: TorqueFigures) -> float:
     return float(left / torque.predicted_rms_nm) if torque.predicted_rms_nm > 0.0 else math.nan
 
 
+def with_forecast(report: CycleReport, forecast: Forecast) -> CycleReport:
+    """The same gait cycle with a newer forecast."""
+    joints = zip(report.joints, forecast.joints, strict=True)
+    renewed = tuple(attrs.evolve(joint, forecast=new, remaining=_remaining(new)) for joint, new in joints)
+    return attrs.evolve(report, joints=renewed, forecast=forecast.leg)
+
+
+def _remaining(forecast: JointForecast) -> Remaining | None:
+    """The forecast's median; None where it does not know."""
+    if forecast.cycles is None or forecast.hours is None:
+        return None
+    return Remaining(cycles=forecast.cycles.p50, hours=forecast.hours.p50)
+
+
 def _joint_report(
     figures: CycleFigures,
     k: int,
     joint: str,
     window: GrowthWindow,
-    limit_m: float,
     forecast: JointForecast,
     seen: SeenClearance | None,
 ) -> JointReport:
     rate = growth_rate(window)
-    clearance_m = float(figures.clearance_mean_m[k])
     return JointReport(
         joint=joint,
-        clearance_m=clearance_m,
+        clearance_m=float(figures.clearance_mean_m[k]),
         clearance_max_m=float(figures.clearance_max_m[k]),
         growth_m_per_cycle=rate.per_cycle_m if rate else None,
         growth_mps=rate.per_second_m if rate else None,
         growth_error_m_per_cycle=rate.error_m if rate else None,
-        remaining=remaining(rate, clearance_m, limit_m),
+        remaining=_remaining(forecast),
         forecast=forecast,
         seen=seen,
         peak_force_n=float(figures.peak_force_n[k]),

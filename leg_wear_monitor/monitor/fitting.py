@@ -100,6 +100,7 @@ def twin_settings(config: MonitorConfig, source: str = "parameters") -> TwinSett
             speed_tolerance=cadence.tolerance_rpm / abs(cadence.commanded_rpm),
         ),
         wear_acceleration=config.wear_acceleration,
+        torque_sampling=config.drive_torque.sampling,
     )
 
 

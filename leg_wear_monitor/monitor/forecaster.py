@@ -1,4 +1,4 @@
-"""The forecast as gait cycles come in: renewed once a minute of their stamps, or when something is new."""
+"""The forecast as gait cycles come in: renewed once a minute of their stamps, or when more is known."""
 
 from collections.abc import Callable, Sequence
 
@@ -10,7 +10,7 @@ from leg_wear_monitor.mechanism.spec import Mechanism
 from leg_wear_monitor.monitor.belief import Belief, Look, believe
 from leg_wear_monitor.monitor.forecast import Forecast, JointNow, forecast
 from leg_wear_monitor.monitor.forecast_config import Forecasting
-from leg_wear_monitor.monitor.growth import GrowthWindow, extended, growth_rate
+from leg_wear_monitor.monitor.growth import GrowthRate, GrowthWindow, extended, growth_rate
 from leg_wear_monitor.monitor.ledger_entry import JointWear, Measurement
 from leg_wear_monitor.monitor.life_file import law_of
 from leg_wear_monitor.monitor.measure import CONTRADICTS, Finding, looks_of, measure
@@ -31,12 +31,15 @@ class ForecastState:
         None before the first, and when something is new.
     stamp_ns : int
         Of the last.
+    known : int
+        Joints whose growth was known then.
     """
 
     growth: tuple[GrowthWindow, ...]
     beliefs: tuple[Belief, ...]
     last: Forecast | None = None
     stamp_ns: int = 0
+    known: int = 0
 
 
 class Forecaster:
@@ -96,10 +99,19 @@ class Forecaster:
             extended(window, float(growth), figures.moving_s, self._settings.window_cycles)
             for window, growth in zip(state.growth, figures.growth_mean_m, strict=True)
         )
-        if state.last is None or not 0 <= figures.stamp_ns - state.stamp_ns < RENEWED_NS:
+        rates = [growth_rate(window) for window in state.growth]
+        is_recent = 0 <= figures.stamp_ns - state.stamp_ns < RENEWED_NS
+        if state.last is None or not is_recent or _known(rates) > state.known:
             state.stamp_ns = figures.stamp_ns
-            state.last = self._forecast(wear_m, limits_m, is_valid())
+            return self.renewed(wear_m, limits_m, is_valid())
         return state.last
+
+    def renewed(self, wear_m: Floats, limits_m: Sequence[float], is_valid: bool) -> Forecast:
+        """A new forecast from all that is known now; parameters as in `after`."""
+        rates = [growth_rate(window) for window in self.state.growth]
+        self.state.known = _known(rates)
+        self.state.last = self._forecast(rates, wear_m, limits_m, is_valid)
+        return self.state.last
 
     @property
     def measurements(self) -> tuple[Measurement, ...]:
@@ -170,9 +182,10 @@ class Forecaster:
         self.state.beliefs = (*beliefs[:k], belief, *beliefs[k + 1 :])
         self.state.last = None
 
-    def _forecast(self, wear_m: Floats, limits_m: Sequence[float], valid: bool) -> Forecast:
+    def _forecast(
+        self, rates: Sequence[GrowthRate | None], wear_m: Floats, limits_m: Sequence[float], valid: bool
+    ) -> Forecast:
         state = self.state
-        rates = [growth_rate(window) for window in state.growth]
         now = [
             JointNow(
                 joint=joint,
@@ -189,3 +202,7 @@ class Forecaster:
         return forecast(
             now, state.beliefs, self._settings, self._law, cycle_s=float(np.mean(walked)), valid=valid
         )
+
+
+def _known(rates: Sequence[GrowthRate | None]) -> int:
+    return sum(rate is not None for rate in rates)

@@ -6,7 +6,6 @@ import attrs
 import numpy as np
 
 from leg_wear_monitor.mechanism.arrays import Floats
-from leg_wear_monitor.monitor.reports import Remaining
 
 LEAST_CYCLES = 10
 LARGEST_ERROR = 0.5  # of the mean: beyond it the scatter says more than the mean
@@ -73,20 +72,3 @@ def _standard_error(values: Floats, batches: int = 5) -> float:
     size = len(values) // batches
     means = values[len(values) - batches * size :].reshape(batches, size).mean(axis=1)
     return float(means.std(ddof=1) / math.sqrt(batches))
-
-
-def remaining(rate: GrowthRate | None, clearance_m: float, limit_m: float) -> Remaining | None:
-    """Cycles and hours until a clearance reaches its limit at this rate; None if that is not known.
-
-    Parameters
-    ----------
-    rate : GrowthRate or None
-        None while there is not enough data.
-    clearance_m, limit_m : float
-    """
-    if clearance_m >= limit_m:
-        return Remaining(cycles=0.0, hours=0.0)
-    if rate is None or not rate.per_cycle_m > 0.0:
-        return None
-    room = limit_m - clearance_m
-    return Remaining(cycles=room / rate.per_cycle_m, hours=room / rate.per_second_m / 3600.0)

@@ -6,6 +6,7 @@ import attrs
 
 from leg_wear_monitor.mechanism.quantity import FieldError, choice, described, quantity
 from leg_wear_monitor.twin.sample import ENCODERS
+from leg_wear_monitor.twin.settings import AVERAGE, SAMPLINGS
 
 LIVE = {"live": True}  # may change while the monitor runs
 
@@ -105,6 +106,11 @@ class DriveTorque:
         "WrenchStamped or Float64 on drive_torque, or the crank's effort in joint_states",
         default="wrench",
     )
+    sampling: str = choice(
+        SAMPLINGS,
+        "what a torque sample is: the average since the one before, or the torque at its instant",
+        default=AVERAGE,
+    )
     axis: str = choice(("x", "y", "z"), "axis of the wrench that the drive turns about", default="z")
     sign: int = _sign("1 if the torque drives the crank the way its angle counts, -1 if against")
     scale: float = quantity(
@@ -116,6 +122,23 @@ class DriveTorque:
     )
     gear_ratio: float = quantity(
         "", "turns of the shaft with the sensor for one of the crank", above=0.0, at_most=1.0e4, default=1.0
+    )
+    max_friction_nm: float = quantity(
+        "N m",
+        "largest friction of the drive, on the crank; a constant torque beyond is a bias; 0: 0.3 of the "
+        "predicted RMS",
+        at_least=0.0,
+        at_most=1.0e6,
+        default=0.0,
+        metadata=LIVE,
+    )
+    max_lag_s: float = quantity(
+        "s",
+        "largest time by which the measured torque is late or early; beyond, crank.offset_rad may be off",
+        above=0.0,
+        at_most=1.0,
+        default=0.005,
+        metadata=LIVE,
     )
     saturation_nm: float = quantity(
         "N m",

@@ -13,6 +13,8 @@ from leg_wear_monitor.monitor.input_causes import causes
 from leg_wear_monitor.monitor.input_guard import InputGuard
 from leg_wear_monitor.monitor.input_health import InputHealth, TorqueRange, input_health, with_torques
 from leg_wear_monitor.monitor.reports import AlarmList, CycleReport
+from leg_wear_monitor.monitor.torque_checks import TorqueBounds, torque_bounds, torque_values
+from leg_wear_monitor.monitor.torque_record import TorqueRecord
 from leg_wear_monitor.twin.digital_twin import DigitalTwin
 from leg_wear_monitor.twin.figures import Intake, Tracking
 from leg_wear_monitor.twin.sample import Samples
@@ -68,7 +70,7 @@ class Judge:
         self.guard = guard
         self._cycle_ns = cycle_ns
         self.config = config
-        self.board = AlarmBoard(config, twin.loose)
+        self.board = AlarmBoard(config, twin.loose, twin.torque_size_nm)
         self.state = JudgeState(twin.intake)
 
     def configure(self, config: MonitorConfig) -> None:
@@ -99,13 +101,23 @@ class Judge:
         withheld = self._withheld - self.state.withheld
         return tuple(causes(self.state.before, self._twin.intake, withheld, self.config))
 
-    def end_cycle(self, report: CycleReport) -> tuple[AlarmList, ...]:
-        """Judge a whole gait cycle; all alarms, if one has changed."""
+    @property
+    def torque_bounds(self) -> TorqueBounds:
+        """What the drive may do."""
+        return torque_bounds(self.config, self._twin.torque_size_nm)
+
+    def is_torque_sound(self, report: CycleReport) -> bool:
+        """Whether a gait cycle's torque is as predicted, so that what it needs is this leg's own."""
+        return report.torque_mismatch < self.config.limits.warn_share * self.config.limits.torque_mismatch
+
+    def end_cycle(self, report: CycleReport, record: TorqueRecord) -> tuple[AlarmList, ...]:
+        """Judge a whole gait cycle, its torque beside its record; all alarms, if one has changed."""
         self.state.cycles += 1
         values = {
             names.MISMATCH: report.torque_mismatch,
             names.CADENCE: abs(report.cadence_rpm - self.config.cadence.commanded_rpm),
         }
+        values |= torque_values(report, record, self.torque_bounds)
         for joint in report.joints:
             per_hour = math.nan if joint.growth_mps is None else 3600.0 * joint.growth_mps
             values[f"{names.IMPACT} {joint.joint}"] = joint.peak_force_n
@@ -133,6 +145,11 @@ class Judge:
         if self.state.beats < A_CYCLE:
             return early
         return early + self._judge_input(skipped)
+
+    def pause(self) -> None:
+        """Nobody records for a while: the input is judged afresh from the next sample on, as at the start."""
+        intake = attrs.evolve(self._twin.intake, newest_stamp_ns=0)
+        self.state = JudgeState(intake, self.state.skipped, self.state.skipped_before)
 
     def _judge_input(self, skipped: int) -> tuple[AlarmList, ...]:
         state, intake, config = self.state, self._twin.intake, self.config

@@ -1,5 +1,6 @@
 """Entries and events as rows of the ledger's tables, and back."""
 
+import math
 import sqlite3
 
 import attrs
@@ -73,9 +74,12 @@ def write_entry(db: sqlite3.Connection, run: int, head: int, entry: Entry) -> No
     db.executemany("INSERT OR REPLACE INTO total VALUES (?, ?)", entry.totals.items())
     db.execute("DELETE FROM alarm")
     db.executemany(
-        "INSERT INTO alarm VALUES (?, ?, ?, ?, ?, ?)",
+        "INSERT INTO alarm VALUES (?, ?, ?, ?, ?, ?, ?, ?)",
         [
-            (a.kind, a.subject, int(a.level), int(a.present), int(a.acknowledged), a.raised_ns)
+            (
+                *(a.kind, a.subject, int(a.level), int(a.present), int(a.acknowledged), a.raised_ns),
+                *(a.worst, a.limit),  # SQLite makes NULL of NaN
+            )
             for a in entry.alarms
         ],
     )
@@ -219,7 +223,16 @@ def _joint(name: str, depth: bytes, cycles: int, moving_s: float, replaced_ns: i
     return JointWear(name, np.frombuffer(depth, "<f8").reshape(2, -1).copy(), cycles, moving_s, replaced_ns)
 
 
-def _alarm(kind: str, subject: str, level: int, present: int, acknowledged: int, raised_ns: int) -> Alarm:
+def _alarm(
+    kind: str,
+    subject: str,
+    level: int,
+    present: int,
+    acknowledged: int,
+    raised_ns: int,
+    worst: float | None,
+    limit: float | None,
+) -> Alarm:
     return Alarm(
         kind=kind,
         subject=subject,
@@ -227,4 +240,6 @@ def _alarm(kind: str, subject: str, level: int, present: int, acknowledged: int,
         present=Level(present),
         acknowledged=bool(acknowledged),
         raised_ns=raised_ns,
+        worst=math.nan if worst is None else worst,
+        limit=math.nan if limit is None else limit,
     )

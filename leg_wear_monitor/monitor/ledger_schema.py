@@ -165,6 +165,18 @@ CREATE TABLE joint (
 INSERT INTO joint SELECT 0, name, depth, cycles, moving_s, replaced_ns FROM former;
 DROP TABLE former;
 
+CREATE TEMP TABLE former AS SELECT * FROM alarm;
+DROP TABLE alarm;
+
+-- alarms that are not OK: they stay latched over a new start; worst and limit as far as they are known
+CREATE TABLE alarm (
+    kind TEXT NOT NULL, subject TEXT NOT NULL, level INTEGER NOT NULL, present INTEGER NOT NULL,
+    acknowledged INTEGER NOT NULL, raised_ns INTEGER NOT NULL, worst REAL, limit_value REAL,
+    PRIMARY KEY (kind, subject)
+) STRICT;
+INSERT INTO alarm SELECT kind, subject, level, present, acknowledged, raised_ns, NULL, NULL FROM former;
+DROP TABLE former;
+
 CREATE TEMP TABLE former AS SELECT * FROM entry;
 DROP TABLE entry;
 

@@ -11,6 +11,7 @@ from leg_wear_monitor.monitor.growth import GrowthWindow
 from leg_wear_monitor.monitor.input_guard import GuardSnapshot
 from leg_wear_monitor.monitor.judge import JudgeState
 from leg_wear_monitor.monitor.reports import CycleReport
+from leg_wear_monitor.monitor.torque_record import TorqueRecord
 from leg_wear_monitor.twin.digital_twin import TwinSnapshot
 from leg_wear_monitor.twin.figures import Event
 
@@ -20,6 +21,7 @@ class MonitorState:
     """What changes, beside twin, alarms and books; every value is immutable."""
 
     growth: tuple[GrowthWindow, ...]
+    torque: TorqueRecord
     last: CycleReport | None = None
     happened: tuple[Event, ...] = ()
 

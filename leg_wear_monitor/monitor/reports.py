@@ -1,10 +1,13 @@
 """What the monitor says: at each sample, of each gait cycle, when an alarm changes, and of its own state."""
 
+import math
+
 import attrs
 
 from leg_wear_monitor.monitor.alarms import Alarm, Level
 from leg_wear_monitor.monitor.forecast import JointForecast, LegForecast
 from leg_wear_monitor.monitor.input_guard import InputGuard
+from leg_wear_monitor.monitor.pauses import Pauses
 from leg_wear_monitor.monitor.seen import SeenClearance
 from leg_wear_monitor.twin.figures import Intake, SampleFigures
 
@@ -14,7 +17,7 @@ SampleReports = SampleFigures
 
 @attrs.frozen(kw_only=True)
 class Remaining:
-    """How long a joint lasts if its clearance goes on growing as it does.
+    """How long a joint lasts: the median (p50) of its forecast.
 
     Attributes
     ----------
@@ -41,12 +44,12 @@ class JointReport:
     growth_error_m_per_cycle : float or None
         Standard error of that average.
     remaining : Remaining or None
-        None while there is not enough data, or nothing grows.
+        None while the forecast does not know.
     peak_force_n, p99_force_n, mean_force_n : float
         Of the contact force in this cycle; the peak is a sample of a heavy tail.
     impacts : int
     forecast : JointForecast or None
-        Renewed once a minute.
+        Renewed once a minute, and when more is known.
     seen : SeenClearance or None
         The clearance that further encoders show; None without such.
     """
@@ -92,7 +95,10 @@ class CycleReport:
     load_acting_n : float
         Foot load at work in the model: that above where it is believed, else 0.
     friction_nm, torque_lag_s : float
-        Friction in the drive, and by how much the measured torque comes late.
+        Friction in the drive, and by how much the measured torque comes late, as the torque says; values that
+        no drive has raise ``torque_bias`` and ``torque_lag``.
+    friction_sigma_nm, torque_lag_sigma_s : float
+        Their standard deviations.
     forecast : LegForecast or None
         Renewed once a minute.
     """
@@ -114,6 +120,8 @@ class CycleReport:
     load_acting_n: float
     friction_nm: float
     torque_lag_s: float
+    friction_sigma_nm: float = math.nan
+    torque_lag_sigma_s: float = math.nan
     forecast: LegForecast | None = None
 
 
@@ -156,6 +164,8 @@ class Lost:
         Samples dropped: seen before, later than the window, a stamp far off, a value far off.
     gaps_bridged, gaps_lost, backward_jumps, failures : int
         Gaps bridged and not; new time bases; motions that the model could not resolve.
+    paused_s : float
+        Time between recordings that were given together; it is in none of the others.
     """
 
     unmonitored_s: float
@@ -171,9 +181,12 @@ class Lost:
     gaps_lost: int
     backward_jumps: int
     failures: int
+    paused_s: float = 0.0
 
 
-def lost(intake: Intake, already_counted: int, unmonitored_s: float, guard: InputGuard) -> Lost:
+def lost(
+    intake: Intake, already_counted: int, unmonitored_s: float, guard: InputGuard, pauses: Pauses
+) -> Lost:
     """What was not integrated, from the counts of a twin and of what guards its input."""
     return Lost(
         unmonitored_s=unmonitored_s,
@@ -186,9 +199,10 @@ def lost(intake: Intake, already_counted: int, unmonitored_s: float, guard: Inpu
         stray_stamps=intake.stray_stamps,
         outliers=intake.outliers,
         gaps_bridged=intake.gaps_bridged,
-        gaps_lost=intake.lost,
+        gaps_lost=max(0, intake.lost - pauses.number),
         backward_jumps=intake.backward_jumps,
         failures=intake.failures,
+        paused_s=pauses.total_s,
     )
 
 

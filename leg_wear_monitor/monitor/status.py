@@ -11,14 +11,18 @@ from leg_wear_monitor.monitor.book import Book
 from leg_wear_monitor.monitor.encoder_state import faults
 from leg_wear_monitor.monitor.encoder_watch import EncoderWatch
 from leg_wear_monitor.monitor.judge import Judge
-from leg_wear_monitor.monitor.reports import CycleReport, JointReport, Status
+from leg_wear_monitor.monitor.lifetime_words import UNKNOWN, lifetime_values
+from leg_wear_monitor.monitor.reports import CycleReport, Status
 from leg_wear_monitor.monitor.seen import Sight
+from leg_wear_monitor.monitor.torque_checks import BIAS, DRIFT, LAG, offset_error_rad, torque_causes
+from leg_wear_monitor.monitor.torque_record import TorqueRecord
 from leg_wear_monitor.twin.digital_twin import DigitalTwin
 from leg_wear_monitor.twin.figures import Event, Tracking
 
 ADVICE = "the monitor advises; no alarm is no proof of health"
 
 _RATES = (names.CRANK_RATE, names.TORQUE_RATE)
+_TORQUE = (names.MISMATCH, BIAS, DRIFT, LAG)
 _INPUT = (*_RATES, names.BAD_SAMPLES, names.LOST_TIME, names.STUCK_TORQUE, names.SOURCES)
 
 
@@ -28,6 +32,7 @@ def statuses(
     book: Book,
     last: CycleReport | None,
     happened: Sequence[Event],
+    record: TorqueRecord,
     encoders: EncoderWatch | None = None,
 ) -> tuple[Status, ...]:
     """All of it: gait, input, torque, each joint, further encoders if there are any, alarms, ledger."""
@@ -35,7 +40,7 @@ def statuses(
     return (
         _gait(twin, judge, book, last, happened),
         _input(twin, judge, book),
-        _torque(judge, last),
+        _torque(judge, last, record),
         *joints,
         *((_encoders(encoders, judge, last),) if encoders else ()),
         _alarms(judge),
@@ -81,8 +86,8 @@ def _input(twin: DigitalTwin, judge: Judge, book: Book) -> Status:
     return Status("input", level, message, {name: float(value) for name, value in values.items()})
 
 
-def _torque(judge: Judge, last: CycleReport | None) -> Status:
-    level = judge.board.level(names.MISMATCH)
+def _torque(judge: Judge, last: CycleReport | None, record: TorqueRecord) -> Status:
+    level = judge.board.level(*_TORQUE)
     if last is None or not last.torque_samples:
         return Status("torque", level, "not compared: no drive torque in the last gait cycle", {})
     values = {
@@ -96,9 +101,17 @@ def _torque(judge: Judge, last: CycleReport | None) -> Status:
         "friction_nm": last.friction_nm,
         "torque_lag_s": last.torque_lag_s,
         "samples": float(last.torque_samples),
+        "friction_sigma_nm": last.friction_sigma_nm,
+        "friction_commissioned_nm": record.friction_nm,
+        "torque_lag_sigma_s": last.torque_lag_sigma_s,
+        "crank_offset_error_rad": offset_error_rad(last, record),
     }
-    message = "measured as predicted" if level is Level.OK else "measured is not what was predicted"
-    return Status("torque", level, message, values)
+    raised = {name for name in _TORQUE if judge.board.alarms[name].level is not Level.OK}
+    told = ["measured is not what was predicted"] if names.MISMATCH in raised else []
+    told += torque_causes(raised, last, record, judge.torque_bounds)
+    if not told and math.isnan(last.torque_mismatch):
+        told = ["instants are compared over several gait cycles, not enough yet"]
+    return Status("torque", level, "; ".join(told or ["measured as predicted"]), values)
 
 
 def _joint(k: int, name: str, twin: DigitalTwin, judge: Judge, last: CycleReport | None) -> Status:
@@ -122,7 +135,10 @@ def _joint(k: int, name: str, twin: DigitalTwin, judge: Judge, last: CycleReport
         "mean_force_n": report.mean_force_n,
         "impacts": float(report.impacts),
     }
-    return Status(f"joint {name}", level, _growth_message(report), values)
+    if report.forecast is None:
+        return Status(f"joint {name}", level, "no forecast yet", values)
+    values |= UNKNOWN | lifetime_values(report.forecast)
+    return Status(f"joint {name}", level, report.forecast.answer.value, values)
 
 
 def _encoders(encoders: EncoderWatch, judge: Judge, last: CycleReport | None) -> Status:
@@ -164,14 +180,6 @@ def _shown(last: CycleReport | None) -> list[str]:
     if not told and not waiting and len(hidden) < len(seen):
         told = ["clearances are as counted"]
     return [*told, *(f"{joint} {Sight.NOT_OBSERVABLE.value}" for joint in hidden), *waiting]
-
-
-def _growth_message(report: JointReport) -> str:
-    if report.growth_m_per_cycle is None:
-        return "not enough data for a growth rate yet"
-    if report.remaining is None:
-        return "clearance does not grow"
-    return "at its limit" if report.remaining.cycles == 0.0 else "clearance grows"
 
 
 def _or_nan(value: float | None) -> float:

@@ -11,7 +11,7 @@ from leg_wear_monitor.monitor.alarms import Alarm
 from leg_wear_monitor.monitor.beats import A_CYCLE, Beats
 from leg_wear_monitor.monitor.book import Book
 from leg_wear_monitor.monitor.config import MonitorConfig
-from leg_wear_monitor.monitor.cycle_report import cycle_report
+from leg_wear_monitor.monitor.cycle_report import cycle_report, with_forecast
 from leg_wear_monitor.monitor.encoder_watch import EncoderWatch
 from leg_wear_monitor.monitor.fitting import check_limits, fitted, twin_settings
 from leg_wear_monitor.monitor.forecaster import Forecaster
@@ -35,6 +35,7 @@ from leg_wear_monitor.monitor.reports import (
 from leg_wear_monitor.monitor.resets import last_reset
 from leg_wear_monitor.monitor.seen import SeenClearance
 from leg_wear_monitor.monitor.status import statuses
+from leg_wear_monitor.monitor.torque_record import TorqueRecord
 from leg_wear_monitor.twin.digital_twin import DigitalTwin
 from leg_wear_monitor.twin.figures import CycleFigures, joined
 from leg_wear_monitor.twin.sample import GAIT_SAMPLE, Samples
@@ -94,7 +95,8 @@ class WearMonitor:
         if ledger and ledger.entry:
             self._judge.board.restore(ledger.entry.alarms)
         self._beats = Beats(cycle_ns // A_CYCLE)
-        self._state = MonitorState(tuple(GrowthWindow() for _ in self.loose))
+        kept = TorqueRecord.of(self._book.state.commissioned)
+        self._state = MonitorState(tuple(GrowthWindow() for _ in self.loose), kept)
 
     def warm_up(self) -> None:
         """Compile all that `update` needs, before the first sample; takes about a minute once."""
@@ -129,6 +131,17 @@ class WearMonitor:
             self._book.keep_if_due(self._judge.board.alarms.values())
         return Reports(joined(looks, len(self.loose)), tuple(cycles), tuple(changes), self.lost)
 
+    def pause(self, pause_s: float) -> None:
+        """Between the samples so far and the next ones nobody recorded: no fault of the input.
+
+        Parameters
+        ----------
+        pause_s : float
+            From the newest stamp to the next.
+        """
+        self._judge.pause()
+        self._book.pause(pause_s)
+
     @property
     def alarms(self) -> AlarmList:
         """All alarms as they stand."""
@@ -137,7 +150,8 @@ class WearMonitor:
     @property
     def lost(self) -> Lost:
         """What was not integrated so far."""
-        return lost(self._twin.intake, self._book.state.skipped, self._book.unmonitored_s, self._guard)
+        book = self._book.state
+        return lost(self._twin.intake, book.skipped, self._book.unmonitored_s, self._guard, book.pauses)
 
     @property
     def measurements(self) -> tuple[Measurement, ...]:
@@ -174,7 +188,9 @@ class WearMonitor:
     def status(self) -> tuple[Status, ...]:
         """What /diagnostics shows; names and their order stay the same."""
         state = self._state
-        return statuses(self._twin, self._judge, self._book, state.last, state.happened, self._encoders)
+        return statuses(
+            self._twin, self._judge, self._book, state.last, state.happened, state.torque, self._encoders
+        )
 
     def configure(self, config: MonitorConfig) -> None:
         """Take over parameters that may change while it runs; see `parameters.changed`.
@@ -283,6 +299,23 @@ class WearMonitor:
         self._keep()
         return found
 
+    def renew_forecast(self) -> CycleReport | None:
+        """Forecast from all that is known now, instead of up to a minute ago.
+
+        Returns
+        -------
+        CycleReport or None
+            The last gait cycle with this forecast; None before the first.
+        """
+        last = self._state.last
+        if last is None:
+            return None
+        fresh = [self.mechanism.clearances[joint].radial_clearance for joint in self.loose]
+        worn_m = np.asarray(self._twin.clearance_mean_m - fresh)
+        limits = self._judge.board.clearance_limits_m
+        self._state.last = with_forecast(last, self._forecaster.renewed(worn_m, limits, self._judge.holds()))
+        return self._state.last
+
     def save(self) -> None:
         """Write an entry into the ledger now.
 
@@ -347,7 +380,8 @@ class WearMonitor:
             if self._encoders:
                 self._encoders.ended(figures)
             cycles.append(self._report(figures))
-            self._tell(self._judge.end_cycle(cycles[-1]), changes)
+            self._tell(self._judge.end_cycle(cycles[-1], self._state.torque), changes)
+            self._keep_torque(figures, cycles[-1])
         return update.samples, cycles
 
     def _report(self, figures: CycleFigures) -> CycleReport:
@@ -361,11 +395,15 @@ class WearMonitor:
         seen = self._seen(figures)
         limits = self._judge.board.clearance_limits_m
         forecast = self._forecaster.after(figures, self._worn_m(figures), limits, self._judge.holds)
-        state.last = cycle_report(
-            figures, book.state.cycles, self.loose, state.growth, limits, forecast, seen
-        )
+        state.last = cycle_report(figures, book.state.cycles, self.loose, state.growth, forecast, seen)
         book.note_clearances(state.last)
         return state.last
+
+    def _keep_torque(self, figures: CycleFigures, report: CycleReport) -> None:
+        """Take down what the torque was like, while it is as predicted."""
+        is_sound = self._judge.is_torque_sound(report)
+        self._state.torque = self._state.torque.with_cycle(figures, report, is_sound)
+        self._book.state.commissioned = self._state.torque.totals
 
     def _look_at_encoders(self) -> None:
         if self._encoders:

@@ -32,6 +32,8 @@ class BagFile:
         Whether each message in it is.
     types : dict
         Types of topics that metadata.yaml names.
+    recording : int
+        Which of the named recordings it belongs to.
     """
 
     path: Path
@@ -39,6 +41,7 @@ class BagFile:
     compressed: bool = False
     by_message: bool = False
     types: dict[str, str] = attrs.Factory(dict)
+    recording: int = 0
 
 
 def find_files(paths: Iterable[str | Path]) -> tuple[list[BagFile], list[Finding]]:
@@ -56,14 +59,12 @@ def find_files(paths: Iterable[str | Path]) -> tuple[list[BagFile], list[Finding
     """
     files: list[BagFile] = []
     findings: list[Finding] = []
-    for path in map(Path, paths):
+    for number, path in enumerate(map(Path, paths)):
         mode = _mode(path)
         if mode is None:
             raise RecordingError(str(path), "", "is not there, expected a bag directory, .mcap or .db3")
-        if stat.S_ISDIR(mode):
-            files += _directory(path, findings)
-        else:
-            files.append(_file(path, mode))
+        found = _directory(path, findings) if stat.S_ISDIR(mode) else [_file(path, mode)]
+        files += [attrs.evolve(file, recording=number) for file in found]
     if not files:
         raise RecordingError("", "", "no recording is named, expected bag directories or .mcap or .db3 files")
     return files, findings

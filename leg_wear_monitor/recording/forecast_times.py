@@ -1,7 +1,8 @@
-"""When a forecast is told: with the first gait cycle of a minute, and the first after an alarm's change."""
+"""When a forecast is told: with a minute's first gait cycle, after an alarm's change, with a new answer."""
 
 from collections.abc import Iterator
 
+from leg_wear_monitor.monitor.forecast import Answer
 from leg_wear_monitor.monitor.reports import CycleReport, Reports
 
 _MINUTE_NS = 60 * 10**9
@@ -13,13 +14,17 @@ class ForecastTimes:
     def __init__(self) -> None:
         self._told_ns: int | None = None
         self._changes_ns: list[int] = []
+        self._answers: list[Answer] = []
 
     def due(self, reports: Reports) -> Iterator[CycleReport]:
         """Gait cycles of reports after which a forecast is due."""
         self._changes_ns += [change.stamp_ns for change in reports.alarms]
         for cycle in reports.cycles:
             seen = [stamp for stamp in self._changes_ns if stamp <= cycle.stamp_ns]
-            if seen or self._is_minute(cycle.stamp_ns):
+            told = [joint.forecast for joint in cycle.joints] + [cycle.forecast]
+            answers = [each.answer for each in told if each is not None]
+            if seen or answers != self._answers or self._is_minute(cycle.stamp_ns):
+                self._answers = answers
                 self._changes_ns = [stamp for stamp in self._changes_ns if stamp > cycle.stamp_ns]
                 self._told_ns = cycle.stamp_ns
                 yield cycle

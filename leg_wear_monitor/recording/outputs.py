@@ -7,9 +7,11 @@ import attrs
 import numpy as np
 from numpy.typing import NDArray
 
+from leg_wear_monitor.monitor.alarm_words import state_of
 from leg_wear_monitor.monitor.alarms import Alarm, Level
 from leg_wear_monitor.monitor.config import MonitorConfig
-from leg_wear_monitor.monitor.forecast import JointForecast, LegForecast, Quantiles
+from leg_wear_monitor.monitor.forecast import LegForecast
+from leg_wear_monitor.monitor.lifetime_words import lifetime_values
 from leg_wear_monitor.monitor.parameter_file import NODE
 from leg_wear_monitor.monitor.reports import (
     AlarmList,
@@ -42,7 +44,7 @@ DIAGNOSTICS = Output("/diagnostics", encode.DIAGNOSTIC_ARRAY)
 OUTPUTS = (CLEARANCES, IMPACTS, TORQUE, FORECAST, ALARMS, DIAGNOSTICS)
 
 _AXES = {"x": 0, "y": 1, "z": 2}
-_KEY_UNITS = {"m/h": "m_per_hour"}
+_KEY_UNITS = {"m/h": "m_per_hour", "N m": "nm"}
 _DIGITS = 15
 
 
@@ -171,19 +173,12 @@ def _alarm(alarm: Alarm) -> Status:
     values = {
         f"value{suffix}": alarm.value,
         f"limit{suffix}": alarm.limit,
+        f"worst{suffix}": alarm.worst,
         "raised_s": alarm.raised_ns / 1e9,
         "acknowledged": float(alarm.acknowledged),
         "present_level": float(alarm.present),
     }
     return Status(alarm.name, alarm.level, state_of(alarm), values)
-
-
-def state_of(alarm: Alarm) -> str:
-    """An alarm's state in words, free of values."""
-    if alarm.level is Level.OK:
-        return "OK"
-    present = "present" if alarm.present is alarm.level else "latched"
-    return f"{present}, acknowledged" if alarm.acknowledged else present
 
 
 def _lifetime(joint: JointReport) -> Status:
@@ -194,7 +189,7 @@ def _lifetime(joint: JointReport) -> Status:
     if told is None:
         words = "if it goes on as it does" if values else "too little growth or data to say"
         return Status(name, Level.OK, words, values)
-    values |= _quantiles(told)
+    values |= lifetime_values(told)
     values |= {f"clearance_{share}_m": value for share, value in attrs.asdict(told.clearance_m).items()}
     values["measurements"] = float(told.measurements)
     return Status(name, Level.OK, told.answer.value, values)
@@ -202,16 +197,7 @@ def _lifetime(joint: JointReport) -> Status:
 
 def _leg_lifetime(told: LegForecast) -> Status:
     """Until the first joint reaches its limit; the probability of each to be the first."""
-    values = _quantiles(told)
+    values = lifetime_values(told)
     values |= {f"{joint}_first_probability": value for joint, value in told.first_probability.items()}
     values["simulated_lives"] = float(told.simulated_lives)
     return Status("forecast leg", Level.OK, told.answer.value, values)
-
-
-def _quantiles(told: JointForecast | LegForecast) -> dict[str, float]:
-    values: dict[str, float] = {}
-    for key in ("cycles", "hours", "days"):
-        quantiles: Quantiles | None = getattr(told, key)
-        if quantiles is not None:
-            values |= {f"{share}_{key}": value for share, value in attrs.asdict(quantiles).items()}
-    return values

@@ -19,6 +19,7 @@ from leg_wear_monitor.recording.findings import Finding, RecordingError, Weight
 from leg_wear_monitor.recording.joint_names import JointNames
 from leg_wear_monitor.recording.mcap_file import Piece
 from leg_wear_monitor.recording.one_leg import OneLeg, check_topics
+from leg_wear_monitor.recording.pauses import Block, Pauses
 from leg_wear_monitor.recording.sources import assign, open_sources
 from leg_wear_monitor.recording.topics import roles
 from leg_wear_monitor.twin.sample import GAIT_SAMPLE, NO_FAULT, ZERO_STAMP, Samples
@@ -26,23 +27,6 @@ from leg_wear_monitor.twin.sample import GAIT_SAMPLE, NO_FAULT, ZERO_STAMP, Samp
 TIMES = ("header", "log", "publish")
 _TOGETHER = 4096  # samples that a block should have at least
 _OF_A_SAMPLE = 800  # bytes that one takes while it waits for its turn, its copies included
-
-
-@attrs.frozen(eq=False)
-class Block:
-    """Samples in order of log time.
-
-    Attributes
-    ----------
-    samples : (n,) array of GAIT_SAMPLE
-    log_time_ns : (n,) array of int
-    share : float
-        Part of the recording's bytes read so far, 0 to 1.
-    """
-
-    samples: Samples
-    log_time_ns: NDArray[np.int64]
-    share: float
 
 
 class Recording:
@@ -100,6 +84,8 @@ class Recording:
             self.topics, missing = assign(self._sources, wanted)
             self._findings += lost + missing + check_topics(self._sources, self.topics, joint_states)
             self._close = stack.pop_all()
+        recordings = [source.bag_file.recording for source in self._sources]
+        self._pauses = Pauses(self.files, recordings, round(config.tracker.gap_limit_s * 1.0e9))
 
     def __enter__(self) -> "Recording":
         return self
@@ -119,7 +105,8 @@ class Recording:
     @property
     def findings(self) -> list[Finding]:
         """What was found so far; complete once all blocks are read."""
-        return self._findings + [each for source in self._sources for each in source.file.findings]
+        found = [each for source in self._sources for each in source.file.findings]
+        return self._findings + found + self._pauses.findings
 
     @property
     def is_partial(self) -> bool:
@@ -134,32 +121,44 @@ class Recording:
         RecordingError
             At the end, if the crank is in no message; as soon as files are of two legs.
         """
-        read, total = 0, max(1, sum(source.file.size for source in self._sources))
-        waiting = Block(np.zeros(0, GAIT_SAMPLE), np.zeros(0, np.int64), 0.0)
-        for path, piece in self._pieces():
-            passed = int(np.searchsorted(waiting.log_time_ns, piece.start_ns))
-            if passed >= _TOGETHER:
-                yield _part(waiting, slice(passed))
-                waiting = _part(waiting, slice(passed, None))
-            elif len(waiting.samples) * _OF_A_SAMPLE > self._budget.left:
-                self._too_many_wait(path)
-                yield waiting
-                waiting = _part(waiting, slice(0))
-            read += piece.stored
-            waiting = _merged(waiting, piece, self._samples(path, piece), min(read / total, 1.0))
-        if len(waiting.samples):
-            yield attrs.evolve(waiting, share=1.0)
+        for block in self._joined():
+            yield from self._pauses.cut(block)
         self._findings += self._joints.findings()
         notes = self._clocks.notes()
         self._findings += [Finding(self.files[0], text, Weight.NOTE) for text in notes]
 
-    def _pieces(self) -> Iterator[tuple[Path, Piece]]:
-        """Pieces of all files as they begin, with their files; each is loaded when its turn has come."""
-        dues = (zip(repeat(source.bag_file.path), source.pieces(), strict=False) for source in self._sources)
-        for path, due in heapq.merge(*dues, key=lambda each: each[1].start_ns):
+    def _joined(self) -> Iterator[Block]:
+        """Samples of all files in order of log time."""
+        read, total = 0, max(1, sum(source.file.size for source in self._sources))
+        none: NDArray[np.int64] = np.zeros(0, np.int64)
+        waiting = Block(np.zeros(0, GAIT_SAMPLE), none, 0.0, none)
+        for number, piece in self._pieces():
+            path = self.files[number]
+            passed = int(np.searchsorted(waiting.log_time_ns, piece.start_ns))
+            if passed >= _TOGETHER:
+                yield waiting.part(slice(passed))
+                waiting = waiting.part(slice(passed, None))
+            elif len(waiting.samples) * _OF_A_SAMPLE > self._budget.left:
+                self._too_many_wait(path)
+                yield waiting
+                waiting = waiting.part(slice(0))
+            read += piece.stored
+            times = piece.messages["log_time_ns"]
+            source = np.full(len(times), number, np.int64)
+            new = Block(self._samples(path, piece), times, min(read / total, 1.0), source)
+            waiting = _merged(waiting, new)
+        if len(waiting.samples):
+            yield attrs.evolve(waiting, share=1.0)
+
+    def _pieces(self) -> Iterator[tuple[int, Piece]]:
+        """Pieces of all files as they begin, with their file's index; each is loaded when it is due."""
+        dues = (
+            zip(repeat(number), source.pieces(), strict=False) for number, source in enumerate(self._sources)
+        )
+        for number, due in heapq.merge(*dues, key=lambda each: each[1].start_ns):
             piece = due.load()
             if piece is not None:
-                yield path, piece
+                yield number, piece
 
     def _too_many_wait(self, path: Path) -> None:
         text = (
@@ -182,15 +181,12 @@ class Recording:
         return samples
 
 
-def _part(block: Block, which: slice) -> Block:
-    return Block(block.samples[which], block.log_time_ns[which], block.share)
-
-
-def _merged(block: Block, piece: Piece, samples: Samples, share: float) -> Block:
-    """Samples of a block and of a piece in order of log time."""
-    times = np.concatenate([block.log_time_ns, piece.messages["log_time_ns"]])
-    samples = np.concatenate([block.samples, samples])
+def _merged(block: Block, new: Block) -> Block:
+    """Samples of two blocks in order of log time."""
+    times = np.concatenate([block.log_time_ns, new.log_time_ns])
+    samples = np.concatenate([block.samples, new.samples])
+    source = np.concatenate([block.source, new.source])
     if np.any(times[1:] < times[:-1]):
         order = np.argsort(times, kind="stable")
-        times, samples = times[order], samples[order]
-    return Block(samples, times, share)
+        times, samples, source = times[order], samples[order], source[order]
+    return Block(samples, times, new.share, source)

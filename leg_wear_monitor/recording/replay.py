@@ -17,7 +17,8 @@ from leg_wear_monitor.monitor.wear_monitor import WearMonitor
 from leg_wear_monitor.recording.budget import DEFAULT_MB
 from leg_wear_monitor.recording.findings import Finding, RecordingError
 from leg_wear_monitor.recording.history import History
-from leg_wear_monitor.recording.reader import Block, Recording
+from leg_wear_monitor.recording.pauses import Block
+from leg_wear_monitor.recording.reader import Recording
 from leg_wear_monitor.recording.sink import Sink
 from leg_wear_monitor.twin.sample import CRANK, Samples
 
@@ -46,6 +47,7 @@ class ReplayResult:
     evidence : GaitEvidence
         Whether what was followed can be this leg's gait.
     crank_samples, torque_samples : int
+        A crank sample with an effort is both.
     begin_ns, end_ns : int
         First and last stamp of sound samples; 0 without any.
     logged_s : float
@@ -81,9 +83,9 @@ class ReplayResult:
     def count(self, samples: Samples) -> None:
         """Take account of samples that go to the monitor."""
         self.evidence.see(samples)
-        cranks = int(np.count_nonzero(samples["kind"] == CRANK))
-        self.crank_samples += cranks
-        self.torque_samples += len(samples) - cranks
+        is_crank = samples["kind"] == CRANK
+        self.crank_samples += int(np.count_nonzero(is_crank))
+        self.torque_samples += int(np.count_nonzero(~is_crank | np.isfinite(samples["torque_nm"])))
         stamps = samples["stamp_ns"][samples["fault"] == 0]
         if len(stamps):
             self.begin_ns = self.begin_ns or int(stamps[0])
@@ -164,13 +166,22 @@ def replay(
         for block in recording.blocks():
             first_ns = int(block.log_time_ns[0]) if first_ns is None else first_ns
             result.logged_s = max(result.logged_s, (int(block.log_time_ns[-1]) - first_ns) / 1e9)
+            if block.pause_ns:
+                monitor.pause(_stamps_apart_s(result, block))
             for samples in _beats(block, config):
                 result.count(samples)
                 _take(result, samples, sink)
             if progress:
                 progress(block.share)
+        result.history.last = monitor.renew_forecast()
         result.findings, result.is_partial = recording.findings, recording.is_partial
     return result
+
+
+def _stamps_apart_s(result: ReplayResult, block: Block) -> float:
+    """From the last stamp so far to the first of a block [s]; 0 where stamps do not go on."""
+    stamps = block.samples["stamp_ns"][block.samples["fault"] == 0]
+    return max(0.0, (int(stamps[0]) - result.end_ns) * 1.0e-9) if len(stamps) and result.end_ns else 0.0
 
 
 def _take(result: ReplayResult, samples: Samples, sink: Sink | None) -> None:

@@ -8,11 +8,11 @@ import numpy as np
 
 from leg_wear_monitor.errors import printable
 from leg_wear_monitor.mechanism.arrays import Floats
+from leg_wear_monitor.monitor.alarm_words import state_of
 from leg_wear_monitor.monitor.alarms import Alarm
 from leg_wear_monitor.monitor.forecast import JointForecast, LegForecast
 from leg_wear_monitor.monitor.seen import SeenClearance
 from leg_wear_monitor.recording.history import CYCLE_COLUMNS, JOINT_COLUMNS, History
-from leg_wear_monitor.recording.outputs import state_of
 from leg_wear_monitor.recording.replay import ReplayResult
 from leg_wear_monitor.wear.surfaces import BUSHING, JOURNAL
 
@@ -91,6 +91,7 @@ def _monitor(result: ReplayResult) -> dict[str, Any]:
             joint: result.monitor.mechanism.clearances[joint].bushing_radius for joint in result.monitor.loose
         },
         "limits": attrs.asdict(config.limits),
+        "duty_hours_per_day": config.forecast.duty_hours_per_day,
     }
 
 
@@ -141,6 +142,8 @@ def _alarm(alarm: Alarm) -> dict[str, Any]:
         "value": alarm.value,
         "limit": alarm.limit,
         "unit": alarm.unit,
+        "worst": alarm.worst,
+        "raised_ns": alarm.raised_ns,
     }
 
 

@@ -3,10 +3,9 @@
 from typing import Any
 
 from leg_wear_monitor.monitor.ledger_entry import Measurement
+from leg_wear_monitor.monitor.lifetime_words import clearance_mm, three_digits
 from leg_wear_monitor.report.page import Part, Picture, Section, Table, Text
 from leg_wear_monitor.report.validity_picture import validity_picture
-
-_YEAR_H = 8766.0
 
 
 def forecast_section(record: dict[str, Any]) -> Section:
@@ -19,15 +18,16 @@ def forecast_section(record: dict[str, Any]) -> Section:
     ]
     if leg is not None:
         rows.append(("leg", "", *_lasts(leg), "", leg["answer"]))
-    head = ("", "clearance [mm]", "p10 [h]", "p50 [h]", "p90 [h]", "first [%]", "")
+    quantiles = [f"{share} [{unit}]" for unit in ("h", "days") for share in ("p10", "p50", "p90")]
+    head = ("", "clearance [mm]", *quantiles, "first [%]", "")
     parts: list[Part] = [
         Table(
-            caption="Hours of walking until the limit of the mean clearance",
+            caption="Hours of walking, and days of duty, until the limit of the mean clearance",
             head=head,
             rows=rows,
-            note="p10, p50 and p90 are not exceeded with a probability of 10, 50 and 90 %. Clearance: p10 to "
-            "p90 of what it may be now. First: probability of this joint to be the first at its limit, which "
-            "ends the leg's life.",
+            note="p10, p50 and p90 are not exceeded with a probability of 10, 50 and 90 %. "
+            f"{_duty(record)}Clearance: p10 to p90 of what it may be now. First: probability of this joint "
+            "to be the first at its limit, which ends the leg's life.",
         )
     ]
     measurements = [Measurement(**each) for each in record["measurements"]]
@@ -43,17 +43,30 @@ def leg_sentence(record: dict[str, Any]) -> list[str]:
     leg = record["forecast"]
     if leg is None or leg["hours"] is None:
         return []
-    p10, p50, p90 = (hours(leg["hours"][share]) for share in ("p10", "p50", "p90"))
+    p10, p50, p90 = (_life(leg, share) for share in ("p10", "p50", "p90"))
     probability = 100.0 * leg["first_probability"][leg["first"]]
     return [
-        f"The leg lasts {p50} of walking (p10 {p10}, p90 {p90}); {leg['first']} is the first joint at its "
+        f"The leg lasts {p50} (p10 {p10}, p90 {p90}); {leg['first']} is the first joint at its "
         f"limit with a probability of {probability:.0f} %."
     ]
 
 
-def hours(value: float) -> str:
-    """Hours in words, as years where they are many."""
-    return f"{value:.3g} hours" if value < _YEAR_H else f"{value / _YEAR_H:.3g} years"
+def counted_mm(joint: dict[str, Any]) -> str:
+    """A joint's counted clearance [mm] in the digits that are known of it."""
+    counted, told = joint["clearance_m"]["last"], joint["forecast"]
+    if told is None:
+        return f"{1.0e3 * counted:.3f}"
+    return clearance_mm(counted, told["clearance_m"]["p10"], told["clearance_m"]["p90"])
+
+
+def _life(told: dict[str, Any], share: str) -> str:
+    days = f" or {three_digits(told['days'][share])} days" if told["days"] else ""
+    return f"{three_digits(told['hours'][share])} hours of walking{days}"
+
+
+def _duty(record: dict[str, Any]) -> str:
+    hours = record["monitor"].get("duty_hours_per_day")
+    return f"A day of duty has {hours:g} h of walking. " if hours else ""
 
 
 def _validity(measurements: list[Measurement]) -> Picture:
@@ -72,9 +85,9 @@ def _clearance(told: dict[str, Any]) -> tuple[str]:
 
 
 def _lasts(told: dict[str, Any]) -> tuple[str, ...]:
-    if told["hours"] is None:
-        return ("-", "-", "-")
-    return tuple(f"{told['hours'][share]:.4g}" for share in ("p10", "p50", "p90"))
+    shares = ("p10", "p50", "p90")
+    units = (told["hours"], told["days"])
+    return tuple(three_digits(unit[share]) if unit else "-" for unit in units for share in shares)
 
 
 def _first(leg: dict[str, Any] | None, joint: str) -> str:

@@ -1,12 +1,12 @@
 """The page of a replay, from its summary."""
 
-from datetime import UTC, datetime
 from typing import Any
 
 import numpy as np
 
+from leg_wear_monitor.monitor.alarm_words import raised_words, time_words
 from leg_wear_monitor.report.figure import png
-from leg_wear_monitor.report.forecast_section import forecast_section, hours, leg_sentence
+from leg_wear_monitor.report.forecast_section import counted_mm, forecast_section, leg_sentence
 from leg_wear_monitor.report.page import Findings, Page, Part, Picture, Section, Table, Text
 from leg_wear_monitor.report.replay_charts import alarm_chart, clearance_chart, force_chart, health_chart
 from leg_wear_monitor.report.seen_section import seen_sections, seen_sentences
@@ -27,7 +27,7 @@ def replay_page(record: dict[str, Any]) -> Page:
     recording, monitor = record["recording"], record["monitor"]
     summary = (
         f"{monitor['mechanism']}, {', '.join(monitor['loose'])} loose: {_time(recording['duration_s'])} from "
-        f"{_date(recording['begin_ns'])}, {record['cycles']} gait cycles. {record['advice']}"
+        f"{time_words(recording['begin_ns'])}, {record['cycles']} gait cycles. {record['advice']}"
     )
     sections = [Section("What was found", [Findings(_sentences(record))]), _recording(recording)]
     if _is_believable(record):
@@ -49,7 +49,8 @@ def _sentences(record: dict[str, Any]) -> list[str]:
             sentences.append(f"What is missing: {missing}.")
     raised = [alarm for alarm in record["alarms"]["now"] if alarm["level"] != "OK"]
     for alarm in raised:
-        sentences.append(f"{alarm['name']}: {alarm['level']}, {alarm['state']}.")
+        values = (alarm.get(key) for key in ("state", "worst", "limit", "unit", "raised_ns"))
+        sentences.append(f"{alarm['name']}: {alarm['level']}, {raised_words(*values)}.")
     if not raised:
         sentences.append("No alarm stands at the end.")
     growing = {
@@ -59,11 +60,7 @@ def _sentences(record: dict[str, Any]) -> list[str]:
     }
     if growing:
         fastest = max(growing, key=lambda name: growing[name])
-        text = f"{fastest} wears fastest: {growing[fastest]:.3g} m a gait cycle"
-        remaining = record["joints"][fastest]["remaining"]
-        if remaining and remaining["hours"] is not None:
-            text += f"; going on so, it reaches its limit in {hours(remaining['hours'])} of walking"
-        sentences.append(f"{text}.")
+        sentences.append(f"{fastest} wears fastest: {1.0e12 * growing[fastest]:.3g} pm a gait cycle.")
     sentences += leg_sentence(record)
     sentences += seen_sentences(record)
     if record["monitor"]["wear_acceleration"] != 1.0:
@@ -87,8 +84,8 @@ def _recording(recording: dict[str, Any]) -> Section:
         ("stamps", f"{recording['time']} time"),
         ("crank samples", f"{recording['crank_samples']}"),
         ("torque samples", f"{recording['torque_samples']}"),
-        ("begin", _date(recording["begin_ns"])),
-        ("end", _date(recording["end_ns"])),
+        ("begin", time_words(recording["begin_ns"])),
+        ("end", time_words(recording["end_ns"])),
     ]
     parts: list[Part] = [Table(caption="What was read", head=("", ""), rows=rows)]
     findings = [f"{each['file']}: {each['text']}" for each in recording["findings"]]
@@ -107,26 +104,26 @@ def _clearance(record: dict[str, Any]) -> Section:
         caption="Mean radial clearance of each joint, less what it was after the first gait cycle.",
         wide=True,
     )
-    head = ("joint", "clearance [mm]", "opened [nm]", "growth [pm/cycle]", "± [pm/cycle]", "remaining [h]")
+    head = ("joint", "counted clearance [mm]", "opened [nm]", "growth [pm/cycle]", "± [pm/cycle]")
     rows = []
     for name, joint in record["joints"].items():
-        clearance, remaining = joint["clearance_m"], joint["remaining"]
+        clearance = joint["clearance_m"]
         rows.append(
             (
                 name,
-                f"{1.0e3 * clearance['last']:.6f}",
+                counted_mm(joint),
                 _figure(1.0e9, clearance["last"] - clearance["first"]),
                 _figure(1.0e12, joint["growth_m_per_cycle"]),
                 _figure(1.0e12, joint["growth_error_m_per_cycle"]),
-                _figure(1.0, remaining["hours"] if remaining else None),
             )
         )
     table = Table(
         caption="Clearances at the end",
         head=head,
         rows=rows,
-        note="± is the standard error of the growth; single gait cycles of a chaotic motion scatter. "
-        "Remaining: hours of walking until the limit, if all goes on as it does.",
+        note="Counted: the clearance when new plus the wear that the model has counted since, in the digits "
+        "that are known of it. ± is the standard error of the growth; single gait cycles of a chaotic "
+        "motion scatter.",
     )
     return Section("Clearance over time", [picture, table])
 
@@ -226,11 +223,3 @@ def _time(seconds: float) -> str:
     if seconds < 120.0:
         return f"{seconds:.3g} s"
     return f"{seconds / 60.0:.3g} min" if seconds < 7200.0 else f"{seconds / 3600.0:.3g} h"
-
-
-def _date(stamp_ns: int) -> str:
-    """A stamp as date and time, or as seconds where it is of a clock that began at zero."""
-    seconds = stamp_ns / 1.0e9
-    if seconds < 1.0e8:
-        return f"{seconds:.3f} s"
-    return datetime.fromtimestamp(seconds, UTC).strftime("%Y-%m-%d %H:%M:%S UTC")

@@ -4,6 +4,7 @@ import math
 
 from leg_wear_monitor.dynamics.clearance import ANGLE, SPEED, blend
 from leg_wear_monitor.kernel import kernel
+from leg_wear_monitor.twin.compare_instants import take_instant
 from leg_wear_monitor.twin.estimate import FRICTION, LAG, LOAD
 from leg_wear_monitor.twin.leg_state import (
     FILTERING,
@@ -20,9 +21,12 @@ from leg_wear_monitor.twin.leg_state import (
     RESIDUAL,
     RESIDUAL_2,
     TORQUE_IMPULSE,
+    TORQUE_SQUARES,
     TORQUE_TIME,
     UNFILTERED,
+    W_TIME,
 )
+from leg_wear_monitor.twin.low_pass import pass_low
 
 # the sensor's period is a running mean of the times between its samples, each with so much weight; a time of
 # more periods than so many has lost samples in it, and counts as that many
@@ -30,32 +34,24 @@ _WEIGHT, _LONGEST_PERIOD = 0.05, 1.5
 
 
 @kernel
-def _pass_low(share, fresh, low_pass, i, value):
-    """Value of channel i after the two stages of the low-pass; a fresh filter starts at its first value."""
-    for stage in range(2):
-        if fresh:
-            low_pass[stage, i] = value
-        low_pass[stage, i] += share * (value - low_pass[stage, i])
-        value = low_pass[stage, i]
-    return value
-
-
-@kernel
-def compare(cutoff, signature, leg, stepper, measured):
+def compare(sensor, signature, leg, stepper, measured):
     """Compare a measured torque [N m] with the mean of the predicted one since the torque sample before.
 
-    ``cutoff`` [rad/s] of the low-pass; ``signature`` (N + 1,) drive torque by a unit foot load [N m/N]. Where
-    samples were lost, that mean is over more than the sensor saw, and the sample is left out.
+    ``sensor`` (3,) cut-off of the low-pass [rad/s], the size of the torque [N m], and 1 where the sensor
+    samples instants; ``signature`` (N + 1,) drive torque by a unit foot load [N m/N]. Where some were lost,
+    that mean is over more than the sensor saw, and the sample is left out.
     """
+    cutoff, size, instants = sensor[0], sensor[1], sensor[2] != 0.0
     mark, value, by, low_pass = leg.mark, leg.value, leg.regressor, leg.low_pass
     i, w = blend(signature.shape[0] - 1, stepper.drive[ANGLE])
     lever = signature[i] + w * (signature[i + 1] - signature[i])
     mean, seen = value[TORQUE_IMPULSE], value[TORQUE_TIME]
-    value[TORQUE_IMPULSE], value[TORQUE_TIME] = 0.0, 0.0
+    squares = value[TORQUE_SQUARES]
+    value[TORQUE_IMPULSE], value[TORQUE_TIME], value[TORQUE_SQUARES] = 0.0, 0.0, 0.0
     before, value[LAST_SIGNATURE] = value[LAST_SIGNATURE], lever
     if mark[FILTERING] == 0 or not seen > 0.0:  # the first since the leg moves
         mark[FILTERING] = max(mark[FILTERING], 1)
-        value[UNFILTERED] = 0.0
+        value[UNFILTERED], leg.waiting[W_TIME] = 0.0, 0.0
         return
     dt = value[UNFILTERED] + seen
     value[UNFILTERED] = dt
@@ -64,13 +60,22 @@ def compare(cutoff, signature, leg, stepper, measured):
     if 0.0 < longest < seen:
         return
     value[UNFILTERED] = 0.0
+    direction = 1.0 if stepper.drive[SPEED] > 0.0 else -1.0
+    if instants:
+        mean /= seen
+        variance = max(squares / seen - mean * mean, 0.0)
+        angle = stepper.drive[ANGLE]
+        r = take_instant(cutoff, size, leg, measured, mean, variance, lever, direction, dt, angle)
+        if math.isfinite(r):
+            p = value[LAST_PREDICTED]
+            _add_up(p + r, p, by, leg.sums, leg.gram, leg.along)
+        return
     fresh, share = mark[FILTERING] == 1, 1.0 - math.exp(-cutoff * dt)
     mark[FILTERING] = 2
-    direction = 1.0 if stepper.drive[SPEED] > 0.0 else -1.0
-    m = _pass_low(share, fresh, low_pass, MEASURED, measured)
-    p = _pass_low(share, fresh, low_pass, PREDICTED, mean / seen)
-    by[LOAD] = _pass_low(share, fresh, low_pass, OF_LOAD, 0.5 * (before + lever))
-    by[FRICTION] = _pass_low(share, fresh, low_pass, OF_FRICTION, direction)
+    m = pass_low(share, fresh, low_pass, MEASURED, measured)
+    p = pass_low(share, fresh, low_pass, PREDICTED, mean / seen)
+    by[LOAD] = pass_low(share, fresh, low_pass, OF_LOAD, 0.5 * (before + lever))
+    by[FRICTION] = pass_low(share, fresh, low_pass, OF_FRICTION, direction)
     by[LAG] = 0.0 if fresh else (value[LAST_PREDICTED] - p) / dt
     value[LAST_PREDICTED] = p
     _add_up(m, p, by, leg.sums, leg.gram, leg.along)

@@ -5,7 +5,7 @@ import numpy as np
 from leg_wear_monitor.contact.arrays import ContactArrays
 from leg_wear_monitor.dynamics.tally import ARCHARD, CONTACT, FORCE, Tally, percentile
 from leg_wear_monitor.mechanism.arrays import Floats
-from leg_wear_monitor.twin.estimate import LOAD, Finding, LoadEstimate
+from leg_wear_monitor.twin.estimate import FRICTION, LAG, LOAD, Finding, LoadEstimate
 from leg_wear_monitor.twin.figures import CycleFigures, TorqueFigures
 from leg_wear_monitor.twin.leg_state import (
     CUT_RISES,
@@ -34,7 +34,9 @@ def clearances(contacts: ContactArrays, depth: Floats) -> Floats:
     return np.stack([contacts.clearance + opened.mean(axis=1), contacts.clearance + opened.max(axis=1)])
 
 
-def torque_figures(sums: Floats, found: Finding | None, settled: LoadEstimate) -> TorqueFigures:
+def torque_figures(
+    sums: Floats, found: Finding | None, settled: LoadEstimate, unexplained_nm: float
+) -> TorqueFigures:
     """Of the sums (SUMS,) of a cycle, what it alone says, and what has settled."""
     n = int(sums[NUMBER])
 
@@ -48,13 +50,17 @@ def torque_figures(sums: Floats, found: Finding | None, settled: LoadEstimate) -
         predicted_rms_nm=rms(PREDICTED_2),
         residual_mean_nm=float(sums[RESIDUAL] / n) if n else np.nan,
         residual_rms_nm=rms(RESIDUAL_2),
-        unexplained_rms_nm=found.left if found else np.nan,
+        unexplained_rms_nm=unexplained_nm,
         condition=found.condition if found else np.nan,
         load_n=load,
         load_sigma_n=float(settled.sigma[LOAD]),
         load_acting_n=settled.acting,
         friction_nm=friction,
         torque_lag_s=lag,
+        friction_sigma_nm=float(settled.sigma[FRICTION]),
+        torque_lag_sigma_s=float(settled.sigma[LAG]),
+        cycle_lag_s=float(found.values[LAG]) if found else np.nan,
+        cycle_lag_sigma_s=float(found.sigma[LAG]) if found else np.nan,
     )
 
 

@@ -117,6 +117,11 @@ class DigitalTwin:
         return np.asarray(self._follower.tally.peak[self._setup.contacts.joint])
 
     @property
+    def torque_size_nm(self) -> float:
+        """RMS of the ideal drive torque at the commanded speed."""
+        return self._follower.torque_size_nm
+
+    @property
     def tracking(self) -> Tracking:
         """How the crank is followed."""
         return Tracking(int(self._tracker.state.clock[TRACKING]))

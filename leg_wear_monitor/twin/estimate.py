@@ -9,6 +9,7 @@ drive makes no force in the joints; the load does.
 
 import attrs
 import numpy as np
+from numpy.typing import NDArray
 
 from leg_wear_monitor.mechanism.arrays import Floats
 from leg_wear_monitor.twin.leg_state import NUMBER, RESIDUAL_2
@@ -27,7 +28,10 @@ _BELIEVED, _DOUBTED = 3.0, 2.0  # standard deviations from 0 at which a load beg
 
 @attrs.frozen(eq=False)
 class Finding:
-    """What a cycle says: values (3,), their standard deviations, condition number, RMS of the rest [N m]."""
+    """What a cycle says: values (3,), their standard deviations, condition number, RMS of the rest [N m].
+
+    The rest is that for a load within its bounds; the values are what the torque says, bounded or not.
+    """
 
     values: Floats
     sigma: Floats
@@ -35,7 +39,13 @@ class Finding:
     left: float
 
 
-def find(sums: Floats, gram: Floats, along: Floats, correlated: float) -> Finding | None:
+def find(
+    sums: Floats,
+    gram: Floats,
+    along: Floats,
+    correlated: float,
+    loads: tuple[float, float] = (-np.inf, np.inf),
+) -> Finding | None:
     """Least squares from the sums of a cycle; None without enough samples.
 
     Parameters
@@ -44,6 +54,8 @@ def find(sums: Floats, gram: Floats, along: Floats, correlated: float) -> Findin
         As in `leg_state`.
     correlated : float
         How many samples count as one, since all went through a low-pass.
+    loads : (float, float)
+        Least and largest load that there may be, less the load that acts [N].
 
     Returns
     -------
@@ -62,9 +74,25 @@ def find(sums: Floats, gram: Floats, along: Floats, correlated: float) -> Findin
     inverse = np.linalg.inv(scaled) / np.outer(scale[seen], scale[seen])
     values, sigma = np.zeros(3), np.zeros(3)
     values[seen] = inverse @ along[seen]
-    left = max(float(sums[RESIDUAL_2] - values @ along), 0.0) / sums[NUMBER]
+    bounded = _bounded(values, gram, along, seen, loads)
+    square = float(sums[RESIDUAL_2] - 2.0 * bounded @ along + bounded @ gram @ bounded)
+    left = max(square, 0.0) / sums[NUMBER]
     sigma[seen] = np.sqrt(left * max(correlated, 1.0) * np.diag(inverse))
     return Finding(values, sigma, condition, float(left**0.5))
+
+
+def _bounded(
+    values: Floats, gram: Floats, along: Floats, seen: NDArray[np.bool_], loads: tuple[float, float]
+) -> Floats:
+    """The best values with a load within bounds."""
+    load = min(max(float(values[LOAD]), loads[0]), loads[1])
+    if load == values[LOAD]:
+        return values
+    rest = seen & (np.arange(3) != LOAD)
+    found = np.zeros(3)
+    found[LOAD] = load
+    found[rest] = np.linalg.solve(gram[np.ix_(rest, rest)], along[rest] - gram[rest, LOAD] * load)
+    return found
 
 
 class LoadEstimate:
@@ -74,6 +102,8 @@ class LoadEstimate:
     ----------
     limit : float
         Largest load believed [N].
+    least : float, optional
+        Least load that there may be [N]; minus the largest if not given.
 
     Attributes
     ----------
@@ -81,8 +111,8 @@ class LoadEstimate:
         The three values, their variances, and the load that acts on the leg.
     """
 
-    def __init__(self, limit: float) -> None:
-        self._limit = limit
+    def __init__(self, limit: float, least: float | None = None) -> None:
+        self._limit, self._least = limit, -limit if least is None else least
         self.state = np.concatenate([np.zeros(3), _UNKNOWN**2, np.zeros(1)])
 
     @property
@@ -100,6 +130,11 @@ class LoadEstimate:
         """The load that acts on the leg [N]."""
         return float(self.state[6])
 
+    @property
+    def room(self) -> tuple[float, float]:
+        """Least and largest load that there may be beside the one that acts [N]."""
+        return self._least - self.acting, self._limit - self.acting
+
     def take(self, found: Finding, acts: bool) -> None:
         """Take in a cycle's finding; ``acts`` whether a load that is believed shall act on the leg."""
         values, variance = self.state[:3], self.state[3:6]
@@ -111,6 +146,6 @@ class LoadEstimate:
         gain = variance / (variance + found.sigma**2 + _SMALL)
         values += gain * surprise
         variance *= 1.0 - gain
-        values[LOAD] = np.clip(values[LOAD], -self._limit, self._limit)
+        values[LOAD] = np.clip(values[LOAD], self._least, self._limit)
         enough = (_DOUBTED if self.acting else _BELIEVED) * self.sigma[LOAD]
         self.state[6] = values[LOAD] if acts and abs(values[LOAD]) > enough else 0.0

@@ -92,6 +92,10 @@ class TorqueFigures:
         Torque of friction in the drive, against the motion; no force in the joints comes of it.
     torque_lag_s : float
         By how much the measured torque comes late.
+    friction_sigma_nm, torque_lag_sigma_s : float
+        Standard deviations of these two.
+    cycle_lag_s, cycle_lag_sigma_s : float
+        The lag by this cycle alone, and its standard deviation.
     """
 
     samples: int
@@ -106,6 +110,10 @@ class TorqueFigures:
     load_acting_n: float
     friction_nm: float
     torque_lag_s: float
+    friction_sigma_nm: float
+    torque_lag_sigma_s: float
+    cycle_lag_s: float
+    cycle_lag_sigma_s: float
 
 
 @attrs.frozen(eq=False)

@@ -15,7 +15,7 @@ from leg_wear_monitor.mechanism.arrays import Floats
 from leg_wear_monitor.mechanism.ideal import TURN
 from leg_wear_monitor.twin import steps as told
 from leg_wear_monitor.twin.cycle import clear_tally, clearances, cycle_figures, torque_figures
-from leg_wear_monitor.twin.estimate import LoadEstimate, find
+from leg_wear_monitor.twin.estimate import Finding, LoadEstimate, find
 from leg_wear_monitor.twin.figures import CycleFigures, Event, Happening, SampleFigures
 from leg_wear_monitor.twin.leg_kernel import CYCLE, LEFT, NEEDS_START, TOLD, follow
 from leg_wear_monitor.twin.leg_state import (
@@ -42,11 +42,13 @@ from leg_wear_monitor.twin.leg_state import (
     leg_state,
     room_for_looks,
 )
-from leg_wear_monitor.twin.load import FootLoad
-from leg_wear_monitor.twin.settings import TwinSettings
+from leg_wear_monitor.twin.load import FootLoad, torque_size
+from leg_wear_monitor.twin.repeating import RepeatingResidual
+from leg_wear_monitor.twin.settings import INSTANT, STANCE, TwinSettings
 from leg_wear_monitor.twin.steps import BEGIN, CODE, EXTRA, MOVE, TURNS, Steps
 
 _RUN_IN_S = 0.2
+_LEAST_TORQUE_NM = 1.0e-6  # of a leg that needs none
 
 _HAPPENINGS = {
     told.LOST_IN_GAP: Happening.LOST_IN_GAP,
@@ -72,6 +74,7 @@ class FollowerSnapshot(NamedTuple):
     tally: tuple[np.ndarray, ...]
     before: Floats
     estimate: Floats
+    repeating: tuple[Floats, ...]
 
 
 class LegFollower:
@@ -89,6 +92,8 @@ class LegFollower:
     tally : Tally
         Of the present gait cycle.
     estimate : LoadEstimate
+    torque_size_nm : float
+        RMS of the ideal drive torque at the commanded speed.
     """
 
     def __init__(self, setup: Setup, settings: TwinSettings) -> None:
@@ -99,8 +104,15 @@ class LegFollower:
         self._stepper = ClearanceStepper(setup, interval, tables=self._load.tables)
         self.state: LegState = leg_state(len(setup.loose))
         self.tally = new_tally(len(setup.linkage.mechanism.joints))
-        self.estimate = LoadEstimate(settings.load_limit_n)
+        # the ground only pushes
+        self.estimate = LoadEstimate(
+            settings.load_limit_n, 0.0 if settings.load_shape == STANCE else -settings.load_limit_n
+        )
         self._cutoff = TURN * settings.torque_bandwidth_hz
+        self._instants = settings.torque_sampling == INSTANT
+        self._repeating = RepeatingResidual()
+        self.torque_size_nm = max(torque_size(setup.linkage, setup.speed), _LEAST_TORQUE_NM)
+        self._sensor = np.array([self._cutoff, self.torque_size_nm, float(self._instants)])
         self._before = self.clearances
 
     @property
@@ -124,7 +136,7 @@ class LegFollower:
         while i < n:
             reason, i, k = follow(
                 self._stepper.model, self._setup.surfaces.feeds_back, self._stepper.state, self.tally,
-                self._stepper.work, self._cutoff, self._load.signature, self.state, steps, i, n, seen,
+                self._stepper.work, self._sensor, self._load.signature, self.state, steps, i, n, seen,
             )  # fmt: skip
             if reason == CYCLE:
                 self._end_cycle(k, cycles)
@@ -199,11 +211,12 @@ class LegFollower:
             # two like stages of a low-pass leave noise of so many independent samples
             independent = max(0.25 * self._cutoff * self.tally.time[0], 1.0)
             sums = self.state.sums
-            found = find(sums, self.state.gram, self.state.along, sums[NUMBER] / independent)
+            correlated = sums[NUMBER] / independent
+            found = find(sums, self.state.gram, self.state.along, correlated, self.estimate.room)
             if found is not None:
                 self.estimate.take(found, self._acts)
                 self._load.set(self.estimate.acting)
-            torque = torque_figures(sums, found, self.estimate)
+            torque = torque_figures(sums, found, self.estimate, self._unexplained_nm(found))
             cycles.append(
                 cycle_figures(
                     self.state, stamp, self._setup.contacts, depth, self._before, self.tally, torque
@@ -214,6 +227,15 @@ class LegFollower:
         clear_tally(self.tally)
         self._before = self.clearances
 
+    def _unexplained_nm(self, found: Finding | None) -> float:
+        """RMS of what is left of the residual [N m], of this cycle or over cycles; NaN if not known."""
+        if not self._instants:
+            return found.left if found else np.nan
+        if found is None:
+            return np.nan
+        self._repeating.take(self.state.by_phase)
+        return self._repeating.rms_nm
+
     def snapshot(self) -> FollowerSnapshot:
         """A copy of the whole state, surfaces included."""
         return FollowerSnapshot(
@@ -222,6 +244,7 @@ class LegFollower:
             tuple(part.copy() for part in self.tally),
             self._before.copy(),
             self.estimate.state.copy(),
+            self._repeating.cycles,
         )
 
     def restore(self, snapshot: FollowerSnapshot) -> None:
@@ -232,4 +255,5 @@ class LegFollower:
                 part[...] = values
         self._before = snapshot.before.copy()
         self.estimate.state[:] = snapshot.estimate
+        self._repeating.cycles = snapshot.repeating
         self._load.set(self.estimate.acting)

@@ -6,7 +6,7 @@ from leg_wear_monitor.dynamics.clearance import ANGLE
 from leg_wear_monitor.dynamics.clearance_advance import advance_clearances
 from leg_wear_monitor.dynamics.clearance_contact import F_T
 from leg_wear_monitor.dynamics.run import DONE
-from leg_wear_monitor.dynamics.tally import TORQUE
+from leg_wear_monitor.dynamics.tally import TORQUE, TORQUE_SQUARED
 from leg_wear_monitor.dynamics.touch import F_N
 from leg_wear_monitor.kernel import entry, kernel
 from leg_wear_monitor.twin.compare import compare
@@ -31,6 +31,7 @@ from leg_wear_monitor.twin.leg_state import (
     RUNNING,
     TIME,
     TORQUE_IMPULSE,
+    TORQUE_SQUARES,
     TORQUE_TIME,
     TURNS_BEFORE,
     WHOLE,
@@ -116,7 +117,7 @@ def _load_piece(model, stepper, leg, what, motion):
 
 
 @kernel
-def _look(cutoff, signature, leg, stepper, what, measured, looks):
+def _look(sensor, signature, leg, stepper, what, measured, looks):
     """Note the leg at a sample, NaN where it does not run."""
     mark, value, m = leg.mark, leg.value, leg.mark[LOOKS]
     mark[LOOKS] += 1
@@ -135,11 +136,11 @@ def _look(cutoff, signature, leg, stepper, what, measured, looks):
     for k in range(leg.force.shape[0]):
         looks.force[m, k] = leg.force[k] if running else math.nan
     if running and mark[PIECE_BEGIN] <= what[END] <= mark[PIECE_END] and math.isfinite(measured):
-        compare(cutoff, signature, leg, stepper, measured)
+        compare(sensor, signature, leg, stepper, measured)
 
 
 @entry
-def follow(model, feeds_back, stepper, tally, work, cutoff, signature, leg, steps, first, n, looks):
+def follow(model, feeds_back, stepper, tally, work, sensor, signature, leg, steps, first, n, looks):
     """Follow steps from index ``first`` to n; ``stepper`` is the ClearanceState.
 
     Returns
@@ -157,6 +158,7 @@ def follow(model, feeds_back, stepper, tally, work, cutoff, signature, leg, step
             if cuts:
                 until = mark[CUT]
             impulse, time, before = tally.drive_integral[TORQUE], tally.time[0], stepper.intervals[0]
+            squares = tally.drive_integral[TORQUE_SQUARED]
             status, k = advance_clearances(
                 model, feeds_back, stepper, leg.polynomial, 1.0e-9 * (until - mark[BASE]), tally, work
             )
@@ -166,6 +168,7 @@ def follow(model, feeds_back, stepper, tally, work, cutoff, signature, leg, step
                 value[TIME] += time
                 value[TORQUE_IMPULSE] += impulse
                 value[TORQUE_TIME] += time
+                value[TORQUE_SQUARES] += tally.drive_integral[TORQUE_SQUARED] - squares
                 for j in range(leg.force.shape[0]):
                     leg.force[j] = math.hypot(work.start[j, F_N], work.start[j, F_T])
             if status != DONE:
@@ -184,7 +187,7 @@ def follow(model, feeds_back, stepper, tally, work, cutoff, signature, leg, step
                 return NEEDS_START, i, -1
             _load_piece(model, stepper, leg, what, steps.motion[i])
         elif code == LOOK:
-            _look(cutoff, signature, leg, stepper, what, steps.motion[i, 0], looks)
+            _look(sensor, signature, leg, stepper, what, steps.motion[i, 0], looks)
         elif code == START:
             return NEEDS_START, i, -1
         elif code == LEAVE:

@@ -20,15 +20,30 @@ MARKS = 21
 
 # values: drive torque's impulse and time since the last sample, and since the last torque; mean torque before
 # the last sample; last load signature; predicted torque after the low-pass, as it was last; period of the
-# torque sensor; time since what was last filtered
+# torque sensor; time since what was last filtered; integral of the squared drive torque since the last torque
 (
     IMPULSE, TIME, TORQUE_IMPULSE, TORQUE_TIME, MEAN_TORQUE, LAST_SIGNATURE, LAST_PREDICTED, PERIOD,
-    UNFILTERED,
-) = range(9)  # fmt: skip
-VALUES = 9
+    UNFILTERED, TORQUE_SQUARES,
+) = range(10)  # fmt: skip
+VALUES = 10
 
-# what goes through the low-pass: torque measured, predicted, of a unit foot load, and of unit friction
-MEASURED, PREDICTED, OF_LOAD, OF_FRICTION = range(4)
+# what goes through the low-pass: torque measured, predicted, of a unit foot load, and of unit friction; of a
+# sensor that samples instants the weight, and times the weight the residual and what may explain it
+(
+    MEASURED, PREDICTED, OF_LOAD, OF_FRICTION, WEIGHT, WEIGHTED_RESIDUAL, WEIGHTED_LOAD, WEIGHTED_FRICTION,
+    WEIGHTED_LAG,
+) = range(9)  # fmt: skip
+CHANNELS = 9
+
+# an instant that waits for the next one: measured torque, mean and variance of the predicted one since the
+# instant before, load signature, direction, minus the rate of the predicted torque, time, crank angle
+(
+    W_MEASURED, W_MEAN, W_VARIANCE, W_SIGNATURE, W_DIRECTION, W_LAG, W_TIME, W_ANGLE,
+) = range(8)  # fmt: skip
+WAITING_VALUES = 8
+
+PHASES = 32  # of the crank's turn, for what repeats from one gait cycle to the next
+BY_PHASE = 5  # rows: weight, and times the weight the residual and what load, friction and lag make
 
 # sums over a cycle: number; of the residual and its square; squares of measured and predicted
 NUMBER, RESIDUAL, RESIDUAL_2, MEASURED_2, PREDICTED_2 = range(5)
@@ -38,9 +53,11 @@ SUMS = 5
 class LegState(NamedTuple):
     """``mark`` and ``value`` as above.
 
-    ``polynomial`` (7,) the piece; ``low_pass`` (2, 4) two stages of what is filtered; ``sums`` (SUMS,), and
-    ``gram`` (3, 3) and ``along`` (3,) of the products of the torques by load, friction and lag, ``regressor``
-    (3,), with each other and with the residual; ``force`` (k,) contact forces [N] at the last look.
+    ``polynomial`` (7,) the piece; ``low_pass`` (2, CHANNELS) its two stages; ``sums`` (SUMS,),
+    and ``gram`` (3, 3) and ``along`` (3,) of the products of the torques by load, friction and lag,
+    ``regressor`` (3,), with each other and with the residual; ``force`` (k,) contact forces [N] at the last
+    look. ``waiting`` (WAITING_VALUES,) an instant as above, and ``by_phase`` (BY_PHASE, PHASES) the sums of a
+    cycle; both are of sensors that sample instants alone.
     """
 
     mark: Ints
@@ -52,6 +69,8 @@ class LegState(NamedTuple):
     along: Floats
     regressor: Floats
     force: Floats
+    waiting: Floats
+    by_phase: Floats
 
 
 class Looks(NamedTuple):
@@ -65,14 +84,15 @@ class Looks(NamedTuple):
 def leg_state(loose: int) -> LegState:
     """State before the first step."""
     return LegState(
-        np.zeros(MARKS, dtype=np.int64), np.zeros(VALUES), np.zeros(7), np.zeros((2, 4)), np.zeros(SUMS),
-        np.zeros((3, 3)), np.zeros(3), np.zeros(3), np.zeros(loose),
+        np.zeros(MARKS, dtype=np.int64), np.zeros(VALUES), np.zeros(7), np.zeros((2, CHANNELS)),
+        np.zeros(SUMS), np.zeros((3, 3)), np.zeros(3), np.zeros(3), np.zeros(loose),
+        np.zeros(WAITING_VALUES), np.zeros((BY_PHASE, PHASES)),
     )  # fmt: skip
 
 
 def clear_sums(leg: LegState) -> None:
     """Start to compare torques afresh."""
-    for part in (leg.sums, leg.gram, leg.along):
+    for part in (leg.sums, leg.gram, leg.along, leg.by_phase):
         part[...] = 0.0
 
 

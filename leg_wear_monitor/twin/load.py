@@ -76,6 +76,11 @@ class FootLoad:
             flat[:, columns] = bare + load * slope
 
 
+def torque_size(linkage: Linkage, speed: float) -> float:
+    """RMS of the ideal linkage's drive torque [N m] over a turn at a speed [rad/s]."""
+    return float(np.sqrt(np.mean(one_cycle(linkage, POINTS, speed).drive_torque ** 2)))
+
+
 def _up(mechanism: Mechanism) -> Floats:
     """Unit vector against gravity; y where there is none."""
     gravity = np.array(mechanism.gravity)

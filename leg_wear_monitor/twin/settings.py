@@ -10,6 +10,7 @@ FOREVER = 1.0e9
 
 _FROM_ZERO = ("lag_s", "reorder_window_s", "largest_speed_radps")
 
+SAMPLINGS = AVERAGE, INSTANT = "average", "instant"
 LOAD_SHAPES = STANCE, CONSTANT = "stance", "constant"
 
 
@@ -116,6 +117,8 @@ class TwinSettings:
         weight that it carries.
     load_limit_n : float
         Largest foot load believed [N].
+    torque_sampling : str
+        What a torque sample is: ``average``, the mean since the sample before; ``instant``, the value then.
     """
 
     tracker: TrackerSettings = attrs.field(factory=TrackerSettings)
@@ -125,11 +128,15 @@ class TwinSettings:
     estimate_load: bool = True
     load_shape: str = STANCE
     load_limit_n: float = 1000.0
+    torque_sampling: str = AVERAGE
 
     def __attrs_post_init__(self) -> None:
         for name in ("wear_acceleration", "torque_bandwidth_hz", "load_limit_n"):
             value = getattr(self, name)
             if not (math.isfinite(value) and (value > 0.0 or (name == "wear_acceleration" and value == 0.0))):
                 raise LegWearError(f"{name}: {value} is not a finite number above 0")
+        if self.torque_sampling not in SAMPLINGS:
+            fault = f"{self.torque_sampling!r} is not one of {', '.join(SAMPLINGS)}"
+            raise LegWearError(f"torque_sampling: {fault}")
         if self.load_shape not in LOAD_SHAPES:
             raise LegWearError(f"load_shape: {self.load_shape!r} is not one of {', '.join(LOAD_SHAPES)}")

@@ -164,6 +164,8 @@ def _follow(model, state, stamp, kind, values, out_target, steps, n):
         elif not _filter(model, state, stamp, values[0], values[1], row):
             return n
         count[CRANKS] += 1
+        if math.isfinite(row[TORQUE_VALUE]):  # the crank's effort
+            count[TORQUES] += 1
         clock[LAST_CRANK], clock[FILTER_TIME], clock[REFUSED] = stamp, stamp, 0
     state.queue_stamp[clock[TAIL]], state.queue_kind[clock[TAIL]] = stamp, kind
     clock[TAIL] += 1

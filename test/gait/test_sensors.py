@@ -30,7 +30,7 @@ class EvenLeg:
     """Turns at 6 rad/s under a torque of 4 N m + 1 N m/s t."""
 
     def advance(self, t: float) -> Instant:
-        return Instant(CrankMotion(6.0 * t, 6.0, 0.0), 4.0 * t + 0.5 * t * t)
+        return Instant(CrankMotion(6.0 * t, 6.0, 0.0), 4.0 * t + 0.5 * t * t, torque_nm=4.0 + t)
 
 
 def heard(config: GaitConfig = CLEAN, **transport: Any) -> list[Reading]:
@@ -58,6 +58,12 @@ def test_the_crank_can_bring_the_torque() -> None:
     got = heard(attrs.evolve(CLEAN, torque_sensor=attrs.evolve(CLEAN.torque_sensor, source="effort")))
     assert {reading.kind for reading in got} == {CRANK}
     assert [r.torque_nm for r in got] == pytest.approx([4.0 + r.taken_s - 0.0025 for r in got])
+
+
+def test_a_sensor_may_sample_instants() -> None:
+    got = heard(attrs.evolve(CLEAN, torque_sensor=attrs.evolve(CLEAN.torque_sensor, sampling="instant")))
+    torque = [reading for reading in got if reading.kind == TORQUE]
+    assert [r.torque_nm for r in torque] == pytest.approx([4.0 + r.taken_s for r in torque])
 
 
 def test_noise_has_the_deviation_asked_for() -> None:

@@ -10,7 +10,6 @@ from leg_wear_monitor.monitor.growth import (
     GrowthWindow,
     extended,
     growth_rate,
-    remaining,
 )
 
 pytestmark = pytest.mark.plain
@@ -29,9 +28,6 @@ def test_even_growth_is_known_exactly(growth, period_s, n):
     assert rate.per_cycle_m == pytest.approx(growth, rel=1e-12)
     assert rate.per_second_m == pytest.approx(growth / period_s, rel=1e-12)
     assert rate.error_m == pytest.approx(0.0, abs=1e-12 * growth)
-    left = remaining(rate, 3.0e-4, 6.0e-4)
-    assert left.cycles == pytest.approx(3.0e-4 / growth, rel=1e-9)
-    assert left.hours * 3600.0 == pytest.approx(left.cycles * period_s, rel=1e-9)
 
 
 @given(st.integers(0, LEAST_CYCLES - 1))
@@ -45,15 +41,9 @@ def test_scatter_as_large_as_the_mean_is_not_enough():
     assert growth_rate(window(growths)) is None
 
 
-def test_no_wear_is_a_rate_of_zero_and_no_end():
+def test_no_wear_is_a_rate_of_zero():
     rate = growth_rate(window([0.0] * 30))
     assert rate.per_cycle_m == 0.0
-    assert remaining(rate, 3.0e-4, 6.0e-4) is None
-
-
-def test_a_clearance_beyond_its_limit_has_nothing_left_whatever_is_known():
-    assert remaining(None, 6.0e-4, 6.0e-4).cycles == 0.0
-    assert remaining(None, 5.0e-4, 6.0e-4) is None
 
 
 def test_only_the_last_cycles_count():

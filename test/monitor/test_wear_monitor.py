@@ -15,6 +15,7 @@ from leg_wear_monitor.gait.sensors import readings, samples
 from leg_wear_monitor.monitor.alarms import Level
 from leg_wear_monitor.monitor.config import MonitorConfig
 from leg_wear_monitor.monitor.fitting import twin_settings
+from leg_wear_monitor.monitor.forecast import Answer
 from leg_wear_monitor.monitor.parameters import changed, config_from
 from leg_wear_monitor.twin.sample import EMPTY, TORQUE, gait_samples
 from leg_wear_monitor.twin.settings import TwinSettings
@@ -78,9 +79,11 @@ def test_a_gait_cycle_is_reported_as_the_twin_saw_it(monitor, gait):
         assert joint.clearance_m > 3.0e-4
         assert joint.growth_m_per_cycle > 0.0
         assert joint.growth_mps == pytest.approx(joint.growth_m_per_cycle, rel=1e-3)
-        room = 6.0e-4 - joint.clearance_m
-        assert joint.remaining.cycles == pytest.approx(room / joint.growth_m_per_cycle)
-        assert joint.remaining.hours == pytest.approx(joint.remaining.cycles / 3600.0, rel=1e-3)
+        # the only answer to "how long": what remains is the forecast's median
+        assert joint.forecast.answer is Answer.KNOWN
+        assert joint.remaining.cycles == joint.forecast.cycles.p50
+        assert joint.remaining.hours == joint.forecast.hours.p50
+        assert joint.remaining.hours == pytest.approx(joint.remaining.cycles / 3600.0, rel=1e-2)
     assert reports.cycles[3].joints[0].growth_m_per_cycle is None
     assert math.isnan(last.torque_mismatch)
 

@@ -172,8 +172,8 @@ def test_the_page_is_whole_and_of_one_file(out: tuple[Path, Any]) -> None:
     assert html.count("<img") >= 4
     assert page_html(replay_page(json.loads(json.dumps(record)))) == html
     assert "No clearance was measured yet" in html
-    # a walk of seconds is too short for a growth rate
-    assert record["forecast"]["answer"] == Answer.NOT_ENOUGH_DATA.value
+    # this torque is that of an ideal leg, which is not what a leg with clearances needs
+    assert record["forecast"]["answer"] == Answer.OUTSIDE_VALIDITY.value
     assert "The leg lasts" not in html
 
 
@@ -185,9 +185,11 @@ def test_the_page_says_how_long_the_leg_lasts(out: tuple[Path, Any]) -> None:
     record = {**summary(out[1], 2.0), "made_with": {}}
     life = {"p10": 700.0, "p50": 1000.0, "p90": 17532.0}
     first = dict.fromkeys(record["joints"], 0.1) | {"G": 0.6}
-    leg = {**record["forecast"], "hours": life, "first_probability": first, "first": "G"}
+    days = {share: hours / 8.0 for share, hours in life.items()}
+    leg = {**record["forecast"], "hours": life, "days": days, "first_probability": first, "first": "G"}
     html = page_html(replay_page({**record, "forecast": leg}))
-    assert "The leg lasts 1e+03 hours of walking (p10 700 hours, p90 2 years); G is the first" in html
+    assert "The leg lasts 1000 hours of walking or 125 days (p10 700 hours of walking or 87.5 days, " in html
+    assert "p90 17500 hours of walking or 2190 days); G is the first" in html
     assert "with a probability of 60 %." in html
 
 

@@ -23,7 +23,6 @@ os.environ["ROS_AUTOMATIC_DISCOVERY_RANGE"] = "LOCALHOST"
 # without it, the modules that need a stage are skipped
 if find_spec("rclpy"):
     import rclpy
-    from geometry_msgs.msg import WrenchStamped
     from rclpy.context import Context
     from rclpy.node import Node
     from rclpy.parameter import Parameter
@@ -37,7 +36,7 @@ if find_spec("rclpy"):
     from leg_wear_monitor.ros.monitor_node import MonitorNode
     from leg_wear_monitor.ros.publisher_config import PublisherConfig
     from leg_wear_monitor.ros.running import spin
-    from leg_wear_monitor.ros.sensor_messages import sensor_message
+    from leg_wear_monitor.ros.sensor_messages import DRIVE_TORQUE_TYPES, sensor_message
     from leg_wear_monitor.twin.sample import CRANK, TORQUE
 
 START_NS = 1_700_000_000_000_000_000
@@ -69,34 +68,41 @@ class Walk:
 class Legs:
     """Publishers of a leg's two topics, in a namespace."""
 
-    def __init__(self, node: Node, namespace: str, reliable: bool) -> None:
+    def __init__(self, node: Node, namespace: str, reliable: bool, source: str = "wrench") -> None:
         self._node = node
         reliability = ReliabilityPolicy.RELIABLE if reliable else ReliabilityPolicy.BEST_EFFORT
         qos = QoSProfile(depth=200, reliability=reliability)
-        self._publishers = {
-            CRANK: node.create_publisher(JointState, f"{namespace}/joint_states", qos),
-            TORQUE: node.create_publisher(WrenchStamped, f"{namespace}/drive_torque", qos),
-        }
+        self._publishers = {CRANK: node.create_publisher(JointState, f"{namespace}/joint_states", qos)}
+        if source in DRIVE_TORQUE_TYPES:
+            kind = DRIVE_TORQUE_TYPES[source]
+            self._publishers[TORQUE] = node.create_publisher(kind, f"{namespace}/drive_torque", qos)
 
     def listeners(self) -> int:
         """How many listen to the topic that fewest listen to."""
         return min(one.get_subscription_count() for one in self._publishers.values())
 
     def play(
-        self, walk: Walk, monitor: Monitor | None = None, begin_s: float = 0.0, end_s: float = 1e9
+        self,
+        walk: Walk,
+        monitor: Monitor | None = None,
+        begin_s: float = 0.0,
+        end_s: float = 1e9,
+        block_s: float = 0.015,
+        before: Callable[[float], None] = lambda _: None,
     ) -> None:
-        """Publish a part of a walk, no faster than it is taken in."""
+        """Publish a part of a walk, no faster than it is taken in; ``before`` is told when each block is."""
         if monitor:
             wait_for(lambda: self.listeners() > 0, "the monitor's subscriptions")
         part = [one for one in walk.readings if begin_s <= one.arrival_s < end_s]
         # topics overtake each other in what is sent at once: that must be less than the reorder window
-        for _, together in itertools.groupby(part, lambda one: int(one.arrival_s / 0.015)):
+        for _, together in itertools.groupby(part, lambda one: int(one.arrival_s / block_s)):
             block = list(together)
-            before = monitor.received if monitor else 0
+            before(block[0].arrival_s)
+            taken = monitor.received if monitor else 0
             for reading in block:
                 self._publishers[reading.kind].publish(sensor_message(reading, START_NS, walk.config))
             if monitor:
-                sent = before + len(block)
+                sent = taken + len(block)
                 wait_for(lambda sent=sent: monitor.received >= sent, "a message on its way")
         if monitor:
             wait_for(lambda: monitor.waiting == 0, "the monitor to take what it got")
@@ -160,8 +166,8 @@ class Stage:
         self._monitors.append(monitor)
         return monitor
 
-    def legs(self, namespace: str = "", reliable: bool = False) -> Legs:
-        return Legs(self.node, namespace, reliable)
+    def legs(self, namespace: str = "", reliable: bool = False, source: str = "wrench") -> Legs:
+        return Legs(self.node, namespace, reliable, source)
 
     def listen(self, topic: str, kind: type, latched: bool = False, matched: bool = True) -> list[Any]:
         """Messages of a topic as they come, once somebody publishes it."""

@@ -4,11 +4,13 @@ Names are imported when they are first used, so that the command line can answer
 """
 
 from importlib import import_module
-from typing import TYPE_CHECKING, Any
 
 from leg_wear_monitor.errors import AssemblyError, ConfigError, LegWearError, SimulationError
 
+TYPE_CHECKING = False  # as typing has it, without the time to import that
 if TYPE_CHECKING:
+    from typing import Any
+
     from leg_wear_monitor.dynamics.result import SimulationResult
     from leg_wear_monitor.dynamics.simulation import simulate
     from leg_wear_monitor.mechanism.loader import load_mechanism
@@ -50,7 +52,7 @@ __all__ = [
 ]
 
 
-def __getattr__(name: str) -> Any:
+def __getattr__(name: str) -> "Any":
     if name not in _HOME:
         raise AttributeError(f"module {__name__!r} has no attribute {name!r}")
     return getattr(import_module(f"{__name__}.{_HOME[name]}"), name)

@@ -17,6 +17,7 @@ from leg_wear_monitor.cli.node import need_rclpy
 from leg_wear_monitor.cli.output import check_directory
 from leg_wear_monitor.cli.waiting import compilation, is_compiled
 from leg_wear_monitor.errors import LegWearError
+from leg_wear_monitor.interrupt import closed_at_the_end
 from leg_wear_monitor.share import share_directory
 
 if TYPE_CHECKING:
@@ -112,7 +113,8 @@ def _process(verb: str, out: Path, domain: int, **paths: Path) -> "Iterator[subp
     with (out / f"{verb}.log").open("wb") as log:
         process = subprocess.Popen(command, env=environment, stdout=log, stderr=subprocess.STDOUT)
         try:
-            yield process
+            with closed_at_the_end(process.terminate):
+                yield process
         finally:
             if process.poll() is None:
                 process.send_signal(signal.SIGINT)

@@ -177,3 +177,15 @@ def test_parameters_make_the_leg_what_they_say(leg):
     assert other.clearances["G"].wear_coefficient == (4.0e-15, 4.0e-15)
     assert other.clearances["B"] == leg.clearances["B"]
     assert other.drive.speed == pytest.approx(-leg.drive.speed / 2.0)
+
+
+def test_a_file_of_one_node_is_read_for_that_node_and_one_of_two_needs_to_know_which():
+    left, right = ("/left/leg_wear_monitor", "/right/leg_wear_monitor")
+    dump = {left: {"ros__parameters": {"hardware_id": "L"}}}
+    assert parse_config(dump, "dump.yaml").hardware == "L"
+    both = dump | {right: {"ros__parameters": {"hardware_id": "R"}}}
+    assert parse_config(both, "both.yaml", right).hardware == "R"
+    with pytest.raises(ConfigError, match="has nothing for the node /leg_wear_monitor"):
+        parse_config(both, "both.yaml")
+    with pytest.raises(ConfigError, match="has nothing for the node /leg_wear_monitor"):
+        parse_config({"/camera": {"ros__parameters": {}}}, "camera.yaml")

@@ -35,6 +35,7 @@ from leg_wear_monitor.recording.outputs import (
     plain,
     topic_of,
 )
+from leg_wear_monitor.recording.replay import node_beside
 from leg_wear_monitor.twin.sample import CRANK
 from leg_wear_monitor.twin.sample import TORQUE as TORQUE_SAMPLE
 
@@ -197,3 +198,18 @@ def test_forecasts_are_due_by_stamps_however_reports_are_cut(reports: Reports, c
         now = attrs.evolve(reports, cycles=tuple(cycles), alarms=tuple(alarms))
         told += [cycle.stamp_ns / second for cycle in times.due(now)]
     assert told == [1, 3, 5, 70]
+
+
+@pytest.mark.parametrize(
+    ("topic", "node"),
+    [("/joint_states", "/leg_wear_monitor"), ("/robot/left/joint_states", "/robot/left/leg_wear_monitor")],
+)
+def test_a_replay_stands_in_for_the_node_beside_the_topic_of_the_crank(
+    store: Any, topic: str, node: str
+) -> None:
+    assert node_beside(topic) == node
+    config = MonitorConfig().on_node(node)
+    raw = Messages(config, LOOSE, node).diagnostics(7, [Status("input", Level.OK, "", {})])
+    (status,) = store.deserialize_cdr(raw, DIAGNOSTICS.type).status
+    assert status.name == f"{node[1:]}: input"
+    assert status.hardware_id == (node[1:].rpartition("/")[0] or "leg")

@@ -1,12 +1,23 @@
 """A clock that begins anew beside a ledger, and what cannot be told from a recording that is played."""
 
+from pathlib import Path
+
 import numpy as np
 import pytest
 
 pytest.importorskip("rclpy")
 
+import rclpy
+from rclpy.parameter import Parameter
+from rclpy.serialization import serialize_message
+from rclpy.utilities import try_shutdown
+from sensor_msgs.msg import JointState
+
 from leg_wear_monitor.monitor.alarms import Level
+from leg_wear_monitor.monitor.ledger_entry import JointWear
+from leg_wear_monitor.recording.cdr import JOINT_STATE
 from leg_wear_monitor.ros.epochs import BEGUN, UNDECIDED, Epochs
+from leg_wear_monitor.ros.monitor_node import MonitorNode
 from leg_wear_monitor.twin.sample import Samples, gait_samples
 
 SECOND = 10**9
@@ -85,3 +96,42 @@ def test_samples_after_what_is_counted_are_nothing_to_speak_of() -> None:
     assert not said
     assert not monitor.begun
     assert epochs.status().level is Level.OK
+
+
+def walked(ledger: Path, monkeypatch: pytest.MonkeyPatch, now_ns: int) -> tuple[Epochs, JointWear]:
+    """Two turns of the crank, from one second of simulated time on, in a run of the node."""
+    monkeypatch.setattr(MonitorNode, "_ros_now_ns", lambda self: now_ns)
+    context = rclpy.Context()
+    rclpy.init(args=["--ros-args", "--log-level", "fatal"], context=context)
+    parameters = {"ledger.path": str(ledger), "loose_joints": ["G"], "clearances_m": [3.0e-4]}
+    overrides = [Parameter(name, value=value) for name, value in parameters.items()]
+    try:
+        node = MonitorNode(context=context, parameter_overrides=overrides)
+        for k in range(500):
+            message = JointState(name=["crank"], position=[2.0 * np.pi * k / 200.0])
+            message.header.stamp.sec, rest = divmod(SECOND + 5_000_000 * k, SECOND)
+            message.header.stamp.nanosec = rest
+            node._inbox.add(JOINT_STATE, serialize_message(message), DATE_NS + 5_000_000 * k)
+        while len(node._inbox):
+            node._work()
+        node.close()
+        wear = node.monitor.wear_of("G")
+        node.destroy_node()
+    finally:
+        try_shutdown(context=context)
+    return node._epochs, wear
+
+
+def test_a_node_counts_simulated_time_that_began_anew_and_nothing_that_is_played(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setattr(MonitorNode, "_compile", lambda self, decoder: None)
+    ledger = tmp_path / "wear.db"
+    _, once = walked(ledger, monkeypatch, now_ns=3 * SECOND)
+    assert once.depth.sum() > 0.0
+    epochs, played = walked(ledger, monkeypatch, now_ns=DATE_NS)
+    assert epochs.status().level is Level.ERROR
+    assert np.array_equal(played.depth, once.depth)
+    epochs, anew = walked(ledger, monkeypatch, now_ns=3 * SECOND)
+    assert (epochs.status().level, epochs.status().message) == (Level.OK, BEGUN)
+    assert anew.depth.sum() > 1.9 * once.depth.sum()

@@ -14,7 +14,7 @@ from leg_wear_monitor.studies.checksum import canonical, result_checksum
 from leg_wear_monitor.studies.point import Arrays
 
 _ABOUT = "about"
-_MOST_BYTES = 2**29  # uncompressed; of the studies that come with the package the largest point has 2**24
+_MOST_BYTES = 2**29  # uncompressed; a small archive can claim any size
 
 _UNREADABLE = (
     ArithmeticError, EOFError, KeyError, MemoryError, OSError, RuntimeError, TypeError, ValueError,

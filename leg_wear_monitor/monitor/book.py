@@ -265,20 +265,20 @@ class Book:
 
     def keep_if_due(self, alarms: Iterable[Alarm]) -> None:
         """Write an entry if the last is old enough, and there is something new to write."""
-        if self.ledger is None:
+        if self.ledger is None or self.ledger.at_end:
             return
         now = self._twin.intake.followed_stamp_ns
         is_due = now and not 0 <= now - self._tried_ns < self._checkpoint_ns
         if is_due and (self.not_kept_s > 0.0 or self.ledger.waiting or self.ledger.fault):
-            self.keep(alarms)
+            self.keep(alarms, whole=False)
 
-    def keep(self, alarms: Iterable[Alarm], closed: bool = False) -> bool:
+    def keep(self, alarms: Iterable[Alarm], closed: bool = False, whole: bool = True) -> bool:
         """Write an entry; False without a ledger, or if it could not be written."""
         if self.ledger is None:
             return False
         entry = self._entry(alarms)
         self._tried_ns = self._twin.intake.followed_stamp_ns
-        kept = self.ledger.keep(entry, closed)
+        kept = self.ledger.keep(entry, closed, whole=whole)
         if kept:
             self._kept_s = entry.totals["moving_s"]
         return kept

@@ -1,17 +1,16 @@
 """Wear is months of work: the ledger keeps it in an SQLite file, over a kill, a full disk, a wrong leg.
 
-An entry is one transaction. A write that fails is said in `Ledger.fault`, the monitor goes on, and the next
-entry tries again with all that has happened since. What is not an entry yet is lost with the process: at most
-the time between two entries, and the next start says how much that was.
+An entry is on the disk when `keep` returns. A write that fails is said in `Ledger.fault`, the monitor goes
+on, and the next entry tries again with all that has happened since. What is not an entry yet is lost with the
+process: at most the time between two entries, and the next start says how much that was.
 """
 
-import os
 import sqlite3
 from collections.abc import Callable
 from pathlib import Path
-from typing import TypeVar
 
 import attrs
+import numpy as np
 
 from leg_wear_monitor.mechanism.arrays import Ints
 from leg_wear_monitor.mechanism.spec import Mechanism
@@ -19,22 +18,16 @@ from leg_wear_monitor.monitor.binding import Binding, binding_of
 from leg_wear_monitor.monitor.config import MonitorConfig
 from leg_wear_monitor.monitor.fitting import fitted
 from leg_wear_monitor.monitor.ledger_entry import Audit, Entry, Event, Measurement, Withdrawal
-from leg_wear_monitor.monitor.ledger_file import MOVE, LedgerError, connect, create, transaction
+from leg_wear_monitor.monitor.ledger_file import LedgerError
+from leg_wear_monitor.monitor.ledger_recovery import Recovered
 from leg_wear_monitor.monitor.ledger_rows import (
-    Run,
     read_commissioned,
-    read_entry,
     read_last_reset,
-    read_last_run,
     read_measurements,
     read_spans,
-    write_entry,
-    write_event,
-    write_run,
 )
-from leg_wear_monitor.monitor.ledger_seal import read_head, write_head
-
-_Answer = TypeVar("_Answer")
+from leg_wear_monitor.monitor.ledger_run import Run
+from leg_wear_monitor.monitor.ledger_store import LedgerStore
 
 
 class Ledger:
@@ -48,13 +41,13 @@ class Ledger:
         What its wear must belong to.
     interval_s : float
         Longest time between two entries that is intended.
+    at_end : bool
+        Whether only the end of the run is written, all of it or nothing, as for a recording.
 
     Attributes
     ----------
     entry : Entry or None
         The last one of earlier runs; None in a new ledger.
-    counted_ns : (n, 2) array of int
-        Begin and end of the time whose wear is in it, of earlier runs, by whatever epoch of the clock.
     measurements : tuple of Measurement
         Clearances measured by hand, of earlier runs, withdrawn ones with them.
     commissioned : Commissioned or None
@@ -67,6 +60,8 @@ class Ledger:
         If the last run was cut off: the longest time of walking whose wear was lost with it.
     kept_ns : int
         Stamp of the last entry on the disk, 0 before.
+    told : str
+        What is wrong with what was found, and may be lost with it; empty if nothing is.
     fault : str
         Why the last write failed; empty if it did not.
 
@@ -76,36 +71,54 @@ class Ledger:
         If it cannot be read, or must not be continued; it is left as it is.
     """
 
-    def __init__(self, path: Path | str, binding: Binding, interval_s: float) -> None:
+    def __init__(self, path: Path | str, binding: Binding, interval_s: float, at_end: bool = False) -> None:
         self.path = Path(path)
-        self.fault = ""
-        self._binding = binding
+        self.at_end = at_end
         self._events: list[Event] = []
+        self._store = LedgerStore(self.path, binding)
+        found = self._store.found
+        self.entry, self.last_run, self.told = found.entry, found.run, found.told
+        self.epoch, self.boot_id = found.run.epoch, found.run.boot_id
+        self.cut_off_s = found.lost_s
         self._interval_s = interval_s
-        if not os.path.lexists(self.path):
-            create(self.path, binding)
-        self._db: sqlite3.Connection | None = connect(self.path, binding)
-        self._place = _place(self.path)
-        try:
-            self._read(self._db)
-        except (sqlite3.Error, ValueError, TypeError) as error:
-            self._db.close()
-            raise LedgerError(f"{self.path}: is damaged: {error}; {MOVE}") from error
-        last = self.last_run
-        self.epoch, self.boot_id = last.epoch, last.boot_id
-        self.cut_off_s = None if last.closed else last.interval_s
         self.kept_ns = self.entry.stamp_ns if self.entry else 0
         self._kept_moving_s = self.entry.moving_s if self.entry else 0.0
-        self._run = last.number + 1
-        self._write(None, closed=False)
+        self.fault = ""
+        self._number = found.run.number + 1
+        try:
+            self._begin(found)
+            self._read()
+        except BaseException:
+            self._store.close()
+            raise
 
-    def _read(self, db: sqlite3.Connection) -> None:
-        found = read_entry(db)
-        self.entry = found[1] if found else None
-        self.counted_ns = read_spans(db)
-        self.measurements = read_measurements(db)
-        self.commissioned = read_commissioned(db)
-        self.last_run = read_last_run(db)
+    def _begin(self, found: Recovered) -> None:
+        """Have in the tables what was in the log alone, and that this run has begun."""
+        newer = found.entry if found.is_newer else None
+        told_s = max(found.run.interval_s, found.lost_s or 0.0)
+        run = attrs.evolve(found.run, interval_s=told_s) if self.at_end else self._run(closed=False)
+        if newer or not self.at_end:
+            self._try(lambda: self._store.write(run, newer, entry_run=found.entry_run))
+        if self.at_end:
+            self._store.check_writable()
+
+    def _read(self) -> None:
+        spans = self._store.ask(read_spans)
+        if self.entry:  # also where the tables could not be written
+            own = self.entry.span_epochs or (0,) * len(self.entry.spans)
+            spans += [(*span, epoch) for span, epoch in zip(self.entry.spans, own, strict=True)]
+        self._spans = np.array(sorted(set(spans)), dtype=np.int64).reshape(-1, 3)
+        self.measurements = self._store.ask(read_measurements)
+        self.commissioned = self._store.ask(read_commissioned)
+
+    @property
+    def counted_ns(self) -> Ints:
+        """Begin and end (n, 2) [ns] of the time whose wear is in it, of earlier runs, of all epochs."""
+        return self._spans[:, :2]
+
+    def counted_in(self, epoch: int) -> Ints:
+        """Those (n, 2) of an epoch of the clock."""
+        return self._spans[self._spans[:, 2] == epoch, :2]
 
     @property
     def waiting(self) -> int:
@@ -148,16 +161,6 @@ class Ledger:
         self.note(Withdrawal(stamp_ns, who, measurement))
         return now
 
-    def counted_in(self, epoch: int) -> Ints:
-        """Begin and end (n, 2) [ns] of the time that is counted by the clock of an epoch.
-
-        Raises
-        ------
-        LedgerError
-            If it cannot be read now.
-        """
-        return self._asked(lambda db: read_spans(db, epoch))
-
     def last_reset(self, joint: str) -> Audit | None:
         """The last `reset_wear` of a joint that is kept and was not undone, None if there is none.
 
@@ -168,9 +171,9 @@ class Ledger:
         LedgerError
             If it cannot be read now.
         """
-        return self._asked(lambda db: read_last_reset(db, joint))
+        return self._store.ask(lambda db: read_last_reset(db, joint))
 
-    def keep(self, entry: Entry, closed: bool = False) -> bool:
+    def keep(self, entry: Entry, closed: bool = False, *, whole: bool = True) -> bool:
         """Write an entry and all events since the last; False, and `fault` says why, if that failed.
 
         Parameters
@@ -178,9 +181,23 @@ class Ledger:
         entry : Entry
         closed : bool
             Whether the run ends here in order.
+        whole : bool
+            False: of the surfaces, what they have risen will do, to the 60th part of the largest rise since
+            the entry before. A whole one is written all the same each ten minutes of motion, or with events.
         """
+        if self.at_end and not closed:
+            return False
         self._interval_s = max(self._interval_s, entry.moving_s - self._kept_moving_s)
-        return self._write(entry, closed)
+        run = self._run(closed)
+        if closed or whole or self._events or self._store.is_due(entry):
+            kept = self._try(lambda: self._store.write(run, entry, self._events))
+        else:
+            kept = self._try(lambda: self._store.append(run, entry))
+        if kept:
+            self._events.clear()
+            self.kept_ns = entry.stamp_ns
+            self._kept_moving_s = entry.moving_s
+        return kept
 
     def record(self) -> None:
         """Write the events since the last entry, and leave that in force; for a run that monitors nothing.
@@ -190,66 +207,39 @@ class Ledger:
         LedgerError
             If they could not be written.
         """
-        if not self._write(None, closed=self.cut_off_s is None):
+        self._interval_s = max(self._interval_s, self.cut_off_s or 0.0)  # as long as nobody was told
+        run = self._run(closed=self.cut_off_s is None)
+        if not self._try(lambda: self._store.write(run, None, self._events)):
             raise LedgerError(f"{self.path}: {self.fault}")
+        self._events.clear()
 
     def close(self) -> None:
         """Let go of the file; entries are written by `keep`."""
-        if self._db is not None:
-            self._db.close()
-            self._db = None
+        self._store.close()
 
-    def _asked(self, ask: Callable[[sqlite3.Connection], _Answer]) -> _Answer:
-        try:
-            return ask(self._connection())
-        except (sqlite3.Error, ValueError) as error:
-            raise LedgerError(f"{self.path}: cannot be read: {error}") from error
+    def _run(self, closed: bool) -> Run:
+        return Run(self._number, closed, self._interval_s, self.epoch, self.boot_id)
 
-    def _write(self, entry: Entry | None, closed: bool) -> bool:
+    def _try(self, write: Callable[[], None]) -> bool:
+        """Whether it could be written; `fault` says why not."""
         try:
-            db = self._connection()
-            with transaction(db):
-                head = read_head(db)
-                write_run(db, Run(self._run, closed, self._interval_s, self.epoch, self.boot_id))
-                if entry is not None:
-                    write_entry(db, self._run, head.number + 1, entry)
-                for event in self._events:
-                    write_event(db, event)
-                write_head(db, head.number + 1, head.digest)
-        except (sqlite3.Error, LedgerError) as error:
+            write()
+        except (sqlite3.Error, OSError, ValueError, LedgerError) as error:
             self.fault = " ".join(str(error).split())
-            self.close()
             return False
         self.fault = ""
-        self._events.clear()
-        if entry is not None:
-            self.kept_ns = entry.stamp_ns
-            self._kept_moving_s = entry.moving_s
         return True
 
-    def _connection(self) -> sqlite3.Connection:
-        """The open file; it is opened again after a write has failed."""
-        if _place(self.path) != self._place:
-            self.close()
-            raise LedgerError(f"{self.path}: was moved away or replaced while in use; put it back")
-        if self._db is None:
-            self._db = connect(self.path, self._binding)
-        if read_last_run(self._db).number > self._run:
-            raise LedgerError(f"{self.path}: was continued by another monitor meanwhile; end one of them")
-        return self._db
 
-
-def _place(path: Path) -> tuple[int, int] | None:
-    """What tells a file from another one of the same name."""
-    try:
-        found = path.stat()
-    except OSError:
-        return None
-    return found.st_dev, found.st_ino
-
-
-def open_ledger(mechanism: Mechanism, config: MonitorConfig) -> Ledger | None:
+def open_ledger(mechanism: Mechanism, config: MonitorConfig, at_end: bool = False) -> Ledger | None:
     """The ledger that a configuration names, None if it names none.
+
+    Parameters
+    ----------
+    mechanism : Mechanism
+    config : MonitorConfig
+    at_end : bool
+        Whether only the end of the run is written, all of it or nothing, as for a recording.
 
     Raises
     ------
@@ -261,4 +251,4 @@ def open_ledger(mechanism: Mechanism, config: MonitorConfig) -> Ledger | None:
     if not config.ledger.path:
         return None
     binding = binding_of(fitted(mechanism, config), config)
-    return Ledger(config.ledger.path, binding, config.ledger.checkpoint_s)
+    return Ledger(config.ledger.path, binding, config.ledger.checkpoint_s, at_end)

@@ -24,7 +24,7 @@ from leg_wear_monitor.monitor.ledger_schema import (
 )
 from leg_wear_monitor.monitor.ledger_seal import verify, write_head
 
-MOVE = "move it away to begin with new parts, or put a copy of it back"
+MOVE = "move it away (and its -log) to begin with new parts, or put a copy of it back"
 MODE = 0o640  # of new files, less what the umask takes away
 
 _HEADER = 100

@@ -6,7 +6,6 @@ import sqlite3
 import attrs
 import numpy as np
 
-from leg_wear_monitor.mechanism.arrays import Ints
 from leg_wear_monitor.monitor.alarms import Alarm, Level
 from leg_wear_monitor.monitor.ledger_entry import (
     AlarmEvent,
@@ -20,31 +19,7 @@ from leg_wear_monitor.monitor.ledger_entry import (
     Measurement,
     Withdrawal,
 )
-
-
-@attrs.frozen
-class Run:
-    """A start of the monitor.
-
-    Attributes
-    ----------
-    number : int
-        0 before the first.
-    closed : bool
-        Whether it ended in order.
-    interval_s : float
-        Longest time in motion between two of its entries.
-    epoch : int
-        Of its clock, at its end.
-    boot_id : str
-        Of the computer; empty if not known.
-    """
-
-    number: int = 0
-    closed: bool = True
-    interval_s: float = 0.0
-    epoch: int = 0
-    boot_id: str = ""
+from leg_wear_monitor.monitor.ledger_run import Run
 
 
 def write_run(db: sqlite3.Connection, run: Run) -> None:
@@ -200,11 +175,9 @@ def read_entry(db: sqlite3.Connection) -> tuple[int, Entry] | None:
     )
 
 
-def read_spans(db: sqlite3.Connection, epoch: int | None = None) -> Ints:
-    """Begin and end (n, 2) [ns] of all time whose wear is counted, or that of an epoch, in order of time."""
-    which, values = ("", ()) if epoch is None else ("WHERE epoch = ?", (epoch,))
-    spans = db.execute(f"SELECT begin_ns, end_ns FROM span {which} ORDER BY begin_ns", values).fetchall()
-    return np.array(spans, dtype=np.int64).reshape(-1, 2)
+def read_spans(db: sqlite3.Connection) -> list[tuple[int, int, int]]:
+    """Begin, end [ns] and epoch of all time whose wear is counted."""
+    return db.execute("SELECT begin_ns, end_ns, epoch FROM span").fetchall()
 
 
 def read_last_run(db: sqlite3.Connection) -> Run:

@@ -15,6 +15,8 @@ from pathlib import Path
 
 import numpy as np
 
+from leg_wear_monitor.monitor.ledger_recovery import recover
+
 WALKER = Path(__file__).parent / "walker.py"
 CHECKPOINT_S, LAG_S, BLOCK_S = 0.5, 0.25, 0.1
 TIMEOUT_S = 900.0
@@ -54,10 +56,14 @@ def kept(path):
     if not path.exists():
         return 0, {}, []
     with closing(sqlite3.connect(path)) as db:
-        stamp_ns = db.execute("SELECT coalesce(max(stamp_ns), 0) FROM entry").fetchone()[0]
-        totals = dict(db.execute("SELECT name, value FROM total"))
-        spans = sorted(db.execute("SELECT begin_ns, end_ns FROM span").fetchall())
-    return stamp_ns, totals, spans
+        found = recover(db, path)
+        earlier = db.execute(
+            "SELECT begin_ns, end_ns FROM span WHERE run != ?", (found.entry_run,)
+        ).fetchall()
+    assert found.told == "", "the log does not fit"
+    if found.entry is None:
+        return 0, {}, earlier
+    return found.entry.stamp_ns, found.entry.totals, sorted([*earlier, *found.entry.spans])
 
 
 def check(said, before, after):

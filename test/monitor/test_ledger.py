@@ -214,7 +214,7 @@ def test_no_damage_goes_unnoticed(open_ledger, entry_at, tmp_path):
 def test_a_write_that_fails_is_said_and_made_up_for(open_ledger, entry_at):
     ledger = open_ledger()
     ledger.keep(entry_at(1))
-    ledger._db.execute("PRAGMA query_only = ON")  # what a file system gone read-only gives
+    ledger._store._db.execute("PRAGMA query_only = ON")  # what a file system gone read-only gives
     ledger.note(Audit(2, "ann", "reset_wear"))
     assert not ledger.keep(entry_at(2))
     assert "readonly" in ledger.fault
@@ -225,14 +225,14 @@ def test_a_write_that_fails_is_said_and_made_up_for(open_ledger, entry_at):
     found = open_ledger()
     assert found.entry.digest() == entry_at(3).digest()
     assert found.cut_off_s == 5.0
-    assert found._db.execute("SELECT count(*) FROM audit").fetchone() == (1,)
+    assert found._store._db.execute("SELECT count(*) FROM audit").fetchone() == (1,)
 
 
 def test_a_full_disk_is_said_and_leaves_the_last_entry(open_ledger, entry_at):
     ledger = open_ledger()
     ledger.keep(entry_at(1))
-    pages = ledger._db.execute("PRAGMA page_count").fetchone()[0]
-    ledger._db.execute(f"PRAGMA max_page_count = {pages}")
+    pages = ledger._store._db.execute("PRAGMA page_count").fetchone()[0]
+    ledger._store._db.execute(f"PRAGMA max_page_count = {pages}")
     for _ in range(20):
         ledger.note(Audit(2, "ann", "reset_wear", entry_at(2).joints[0]))
     assert not ledger.keep(entry_at(2))
@@ -253,7 +253,7 @@ def test_a_ledger_moved_away_while_in_use_is_said(open_ledger, entry_at, tmp_pat
 
 def test_a_ledger_continued_by_another_after_a_fault_is_not_written(open_ledger, entry_at):
     ledger = open_ledger()
-    ledger._db.execute("PRAGMA query_only = ON")
+    ledger._store._db.execute("PRAGMA query_only = ON")
     assert not ledger.keep(entry_at(1))  # lets go of the file
     other = open_ledger()
     other.keep(entry_at(5))

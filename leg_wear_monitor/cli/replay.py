@@ -14,6 +14,8 @@ from leg_wear_monitor.errors import LegWearError
 from leg_wear_monitor.interrupt import closed_at_the_end
 
 if TYPE_CHECKING:
+    from collections.abc import Callable
+
     from leg_wear_monitor.monitor.config import MonitorConfig
     from leg_wear_monitor.recording.replay import ReplayResult
 
@@ -114,7 +116,12 @@ def replay(
         check_file("--json", json_file)
     if out is not None:
         check_directory("--out", out)
-    result, wall_s = _run(bags, out, **options)
+    written: list[Path] = []
+
+    def write(result: "ReplayResult", wall_s: float) -> None:
+        written.extend(_write(result, wall_s, out, json_file))
+
+    result, wall_s = _run(bags, out, write, **options)
     for finding in result.findings[:_MOST_LINES]:
         click.echo(f"warning: {finding}", err=True)
     if len(result.findings) > _MOST_LINES:
@@ -122,7 +129,6 @@ def replay(
     if not result.is_believable:
         missing = result.evidence.missing()
         click.echo(f"warning: no gait cycle can be this leg's, so no forces are given: {missing}", err=True)
-    written = _write(result, wall_s, out, json_file)
     if not to_stdout:
         from leg_wear_monitor.cli.replay_tables import print_replay
 
@@ -137,6 +143,7 @@ def replay(
 def _run(
     bags: tuple[Path, ...],
     out: Path | None,
+    write: "Callable[[ReplayResult, float], None]",
     config: Path | None,
     time_source: str,
     crank_joint: str | None,
@@ -148,12 +155,16 @@ def _run(
         from leg_wear_monitor.recording.replay import replay as run
     except ModuleNotFoundError as error:
         raise LegWearError(f"{error.name} is not installed; pip install 'leg_wear_monitor[bags]'") from error
-    began = [0.0]
+    began, took = [0.0], [0.0]
 
     def ready(monitor: Any) -> None:
-        with compilation("monitor", "about a minute"), closed_at_the_end(monitor.close):
+        with compilation("monitor", "about a minute"), closed_at_the_end(monitor.abandon):
             monitor.warm_up()
         began[0] = time.perf_counter()
+
+    def finish(result: "ReplayResult") -> None:
+        took[0] = time.perf_counter() - began[0]
+        write(result, took[0])
 
     with progress_bar("replaying") as progress:
         result = run(
@@ -164,9 +175,10 @@ def _run(
             time=time_source,
             ready=ready,
             progress=progress,
+            finish=finish,
             **options,
         )
-    return result, time.perf_counter() - began[0]
+    return result, took[0]
 
 
 def _config(path: Path | None, crank_joint: str | None, node: str | None) -> "MonitorConfig":

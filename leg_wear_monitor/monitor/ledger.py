@@ -213,6 +213,20 @@ class Ledger:
             raise LedgerError(f"{self.path}: {self.fault}")
         self._events.clear()
 
+    def abandon(self) -> None:
+        """End a run that monitored nothing, or of which nothing shall be kept, and let go of the file.
+
+        Raises
+        ------
+        LedgerError
+            If that could not be written.
+        """
+        try:
+            if not self.at_end:
+                self.record()
+        finally:
+            self.close()
+
     def close(self) -> None:
         """Let go of the file; entries are written by `keep`."""
         self._store.close()

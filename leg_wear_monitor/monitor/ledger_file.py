@@ -171,8 +171,9 @@ def _rehearse(path: Path, found: int, binding: Binding) -> None:
         try:
             with closing(_connect(copy, "rw")) as db:
                 _begin(db, copy, found, binding, writable=True)
-        except LedgerError as error:
-            reason = str(error).removeprefix(f"{copy}: ").removesuffix(f"; {MOVE}")
+        except (sqlite3.Error, LedgerError) as error:
+            fault = error if isinstance(error, LedgerError) else _refusal(copy, error)
+            reason = str(fault).removeprefix(f"{copy}: ").removesuffix(f"; {MOVE}")
             raise LedgerError(
                 f"{path}: with {path.name}-journal beside it, it {reason}; that is of another file or time: "
                 "move it away, or put a copy of both back"

@@ -7,7 +7,7 @@ from leg_wear_monitor.monitor.ledger import open_ledger
 from leg_wear_monitor.monitor.wear_monitor import WearMonitor
 
 
-def open_monitor(mechanism: Mechanism, config: MonitorConfig) -> WearMonitor:
+def open_monitor(mechanism: Mechanism, config: MonitorConfig, at_end: bool = False) -> WearMonitor:
     """Open the ledger and build the monitor that continues it.
 
     Building takes seconds, and a minute where kernels are compiled: if it is cut short, the ledger must not
@@ -17,19 +17,20 @@ def open_monitor(mechanism: Mechanism, config: MonitorConfig) -> WearMonitor:
     ----------
     mechanism : Mechanism
     config : MonitorConfig
+    at_end : bool
+        Whether the ledger is written at the end of the run alone, see `open_ledger`.
 
     Raises
     ------
     ConfigError, LedgerError
         For parameters or a ledger that cannot be used.
     """
-    ledger = open_ledger(mechanism, config)
+    ledger = open_ledger(mechanism, config, at_end)
     if ledger is None:
         return WearMonitor(mechanism, config)
-    with closed_at_the_end(ledger.record):
+    with closed_at_the_end(ledger.abandon):
         try:
             return WearMonitor(mechanism, config, ledger)
         except BaseException:
-            ledger.record()
-            ledger.close()
+            ledger.abandon()
             raise

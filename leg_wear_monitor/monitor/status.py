@@ -203,6 +203,7 @@ def _ledger(book: Book) -> Status:
         return Status("ledger", Level.ERROR, f"not written: {ledger.fault}; trying again", values)
     if book.state.cut_off_s is not None:
         values["cut_off_s"] = book.state.cut_off_s
-        message = "the run before was cut off, the wear of its last seconds is lost"
+        message = ledger.told or "the run before was cut off, the wear of its last seconds is lost"
         return Status("ledger", Level.WARN, message, values)
-    return Status("ledger", Level.OK, "kept", values)
+    message = "is written at the end of the recording" if ledger.at_end else "kept"
+    return Status("ledger", Level.OK, message, values)

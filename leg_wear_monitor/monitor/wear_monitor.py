@@ -21,6 +21,7 @@ from leg_wear_monitor.monitor.input_guard import InputGuard
 from leg_wear_monitor.monitor.judge import Judge
 from leg_wear_monitor.monitor.ledger import Ledger
 from leg_wear_monitor.monitor.ledger_entry import Audit, JointWear, Measurement
+from leg_wear_monitor.monitor.ledger_file import LedgerError
 from leg_wear_monitor.monitor.measure import Finding
 from leg_wear_monitor.monitor.monitor_state import MonitorSnapshot, MonitorState
 from leg_wear_monitor.monitor.reports import (
@@ -328,13 +329,38 @@ class WearMonitor:
         if ledger is None:
             raise LegWearError("no ledger is kept; set ledger.path")
         if not self._keep():
-            raise LegWearError(ledger.fault)
+            raise LegWearError(ledger.fault or "the ledger is written at the end of the recording")
 
     def close(self) -> None:
-        """End in order: write the last entry and let go of the ledger."""
-        self._keep(closed=True)
+        """End in order: write the last entry and let go of the ledger.
+
+        Raises
+        ------
+        LedgerError
+            If a ledger that is written at the end alone could not be: then nothing is kept.
+        """
+        ledger = self._book.ledger
+        if ledger is None:
+            return
+        kept = self._keep(closed=True)
+        ledger.close()
+        if ledger.at_end and not kept:
+            raise LedgerError(f"{ledger.path}: {ledger.fault}; nothing of this run is in it")
+
+    def abandon(self) -> None:
+        """Let go of the ledger without a further entry."""
         if self._book.ledger:
             self._book.ledger.close()
+
+    @property
+    def ledger_told(self) -> str:
+        """What was wrong with the ledger as it was found, and may be lost with it; empty if nothing was."""
+        return self._book.ledger.told if self._book.ledger else ""
+
+    @property
+    def is_all_counted(self) -> bool:
+        """Whether samples came, and the wear of all of them was in the ledger already."""
+        return self._book.state.skipped > 0 and not self._book.state.spans
 
     def snapshot(self) -> MonitorSnapshot:
         """A copy of the whole state but the ledger's."""

@@ -1,7 +1,7 @@
 """A recording through the monitor: the reports that it would have given live."""
 
 from collections.abc import Callable, Iterable, Iterator
-from contextlib import ExitStack
+from contextlib import ExitStack, nullcontext
 from pathlib import Path
 
 import attrs
@@ -15,7 +15,7 @@ from leg_wear_monitor.monitor.opening import open_monitor
 from leg_wear_monitor.monitor.parameter_file import NODE, load_config
 from leg_wear_monitor.monitor.wear_monitor import WearMonitor
 from leg_wear_monitor.recording.budget import DEFAULT_MB
-from leg_wear_monitor.recording.findings import Finding, RecordingError
+from leg_wear_monitor.recording.findings import Finding, RecordingError, Weight
 from leg_wear_monitor.recording.history import History
 from leg_wear_monitor.recording.pauses import Block
 from leg_wear_monitor.recording.reader import Recording
@@ -105,8 +105,12 @@ def replay(
     memory_mb: float = DEFAULT_MB,
     ready: Callable[[WearMonitor], None] | None = None,
     progress: Callable[[float], None] | None = None,
+    finish: Callable[[ReplayResult], None] | None = None,
 ) -> ReplayResult:
     """Put a recording through the monitor.
+
+    The ledger is written last, all of it or nothing: a replay that was cut off is not in it, and one that is
+    repeated gives what it would have given.
 
     Parameters
     ----------
@@ -131,6 +135,8 @@ def replay(
         Given the monitor before the first sample.
     progress : callable, optional
         Told the share of the recording that is done, 0 to 1.
+    finish : callable, optional
+        Given the result before the ledger is written: what has to be on the disk first.
 
     Returns
     -------
@@ -155,33 +161,59 @@ def replay(
         node = node or node_beside(printable(recording.topics["joint_states"]))
         config = config.on_node(node)
         mechanism = load_mechanism(config.mechanism)
-        monitor = open_monitor(mechanism, config)
-        stack.callback(monitor.close)
+        monitor = open_monitor(mechanism, config, at_end=True)
+        stack.callback(monitor.abandon)
         history, evidence = History(monitor.loose), GaitEvidence(config)
         result = ReplayResult(monitor, history, recording.files, recording.topics, time, evidence)
-        sink = None if out is None else stack.enter_context(_sink(Path(out), monitor, node, recording.files))
-        if ready:
-            ready(monitor)
-        first_ns: int | None = None
-        for block in recording.blocks():
-            first_ns = int(block.log_time_ns[0]) if first_ns is None else first_ns
-            result.logged_s = max(result.logged_s, (int(block.log_time_ns[-1]) - first_ns) / 1e9)
-            if block.pause_ns:
-                monitor.pause(_stamps_apart_s(result, block))
-            for samples in _beats(block, config):
-                result.count(samples)
-                _take(result, samples, sink)
-            if progress:
-                progress(block.share)
-        result.history.last = monitor.renew_forecast()
-        result.findings, result.is_partial = recording.findings, recording.is_partial
+        with nullcontext() if out is None else _sink(Path(out), monitor, node, recording.files) as sink:
+            if ready:
+                ready(monitor)
+            _run(result, recording, sink, progress)
+        result.findings = recording.findings + _about_the_ledger(result)
+        result.is_partial = recording.is_partial
+        if finish:
+            finish(result)
+        monitor.close()
     return result
+
+
+def _run(
+    result: ReplayResult,
+    recording: Recording,
+    sink: Sink | None,
+    progress: Callable[[float], None] | None,
+) -> None:
+    """Put all blocks of a recording through the monitor."""
+    monitor = result.monitor
+    first_ns: int | None = None
+    for block in recording.blocks():
+        first_ns = int(block.log_time_ns[0]) if first_ns is None else first_ns
+        result.logged_s = max(result.logged_s, (int(block.log_time_ns[-1]) - first_ns) / 1e9)
+        if block.pause_ns:
+            monitor.pause(_stamps_apart_s(result, block))
+        for samples in _beats(block, monitor.config):
+            result.count(samples)
+            _take(result, samples, sink)
+        if progress:
+            progress(block.share)
+    result.history.last = monitor.renew_forecast()
 
 
 def _stamps_apart_s(result: ReplayResult, block: Block) -> float:
     """From the last stamp so far to the first of a block [s]; 0 where stamps do not go on."""
     stamps = block.samples["stamp_ns"][block.samples["fault"] == 0]
     return max(0.0, (int(stamps[0]) - result.end_ns) * 1.0e-9) if len(stamps) and result.end_ns else 0.0
+
+
+def _about_the_ledger(result: ReplayResult) -> list[Finding]:
+    """What is to be told of the ledger as it was found."""
+    found = []
+    if result.monitor.ledger_told:
+        path = Path(result.monitor.config.ledger.path)
+        found.append(Finding(path, result.monitor.ledger_told, Weight.NOTE))
+    if result.monitor.is_all_counted:
+        found.append(Finding(result.files[0], "all of it is in the ledger already", Weight.NOTE))
+    return found
 
 
 def _take(result: ReplayResult, samples: Samples, sink: Sink | None) -> None:

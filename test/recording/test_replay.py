@@ -1,6 +1,8 @@
 """A replay is the live run: the same samples, the same reports, however they were cut and stored."""
 
 import json
+import sqlite3
+from contextlib import closing
 from pathlib import Path
 from typing import Any
 
@@ -11,6 +13,7 @@ import pytest
 import leg_wear_monitor as lw
 from leg_wear_monitor.monitor.config import LedgerFile
 from leg_wear_monitor.monitor.forecast import Answer
+from leg_wear_monitor.monitor.ledger import open_ledger
 from leg_wear_monitor.monitor.ledger_entry import Measurement
 from leg_wear_monitor.recording import encode
 from leg_wear_monitor.recording.cdr import JOINT_STATE, WRENCH_STAMPED
@@ -216,7 +219,58 @@ def test_the_ledger_of_the_parameters_is_left_alone_and_one_that_is_asked_for_is
     again = lw.replay(bag, config, ledger=own)
     assert again.monitor.lost.already_counted > 0.95 * 2 * SECONDS * RATE_HZ
     assert len(again.history) == 0
-    np.testing.assert_allclose(again.monitor.wear_depth_m, first.monitor.wear_depth_m, rtol=1e-12)
+    assert again.monitor.wear_depth_m.tobytes() == first.monitor.wear_depth_m.tobytes()
+    assert not first.findings
+    assert [str(finding) for finding in again.findings] == [f"{bag}: all of it is in the ledger already"]
+    assert summary(again, 1.0)["recording"]["findings"][0]["text"] == "all of it is in the ledger already"
+
+
+def rows(path: Path) -> list[str]:
+    """All that a ledger holds."""
+    with closing(sqlite3.connect(path)) as db:
+        return list(db.iterdump())
+
+
+def test_a_replay_that_is_cut_off_is_not_in_the_ledger_and_comes_out_the_same_when_repeated(
+    bag: Path, out: tuple[Path, Any], tmp_path: Path
+) -> None:
+    class CutError(Exception):
+        pass
+
+    def cut(share: float) -> None:
+        if share > 0.6:
+            raise CutError
+
+    whole = lw.replay(bag, lw.MonitorConfig(), ledger=tmp_path / "whole.db", out=tmp_path / "whole")
+    path = tmp_path / "own.db"
+    with pytest.raises(CutError):
+        lw.replay(bag, lw.MonitorConfig(), ledger=path, out=tmp_path / "own", progress=cut)
+    begun = rows(path)
+    with pytest.raises(CutError):
+        lw.replay(bag, lw.MonitorConfig(), ledger=path, out=tmp_path / "own", progress=cut)
+    assert rows(path) == begun
+    again = lw.replay(bag, lw.MonitorConfig(), ledger=path, out=tmp_path / "own")
+    assert rows(path) == rows(tmp_path / "whole.db") != begun
+    assert {found.name for found in tmp_path.iterdir()} == {"whole.db", "own.db", "whole", "own"}
+    reports = [(tmp_path / name / "reports.mcap").read_bytes() for name in ("whole", "own")]
+    assert reports[0] == reports[1]
+    assert summary(again, 1.0) == summary(whole, 1.0)
+
+
+def test_a_ledger_that_cannot_be_written_is_refused_before_the_work(
+    bag: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    path = tmp_path / "own.db"
+    open_ledger(lw.load_mechanism("bionic_leg"), ledger_at(path)).abandon()
+    before = path.read_bytes()
+    monkeypatch.setattr("leg_wear_monitor.monitor.ledger_file._is_writable", lambda _path: False)
+    with pytest.raises(lw.LegWearError, match=r"own.db: cannot be written: attempt to write a readonly"):
+        lw.replay(bag, lw.MonitorConfig(), ledger=path, ready=pytest.fail)
+    assert path.read_bytes() == before
+
+
+def ledger_at(path: Path) -> lw.MonitorConfig:
+    return attrs.evolve(lw.MonitorConfig(), ledger=LedgerFile(path=str(path)))
 
 
 def test_a_recording_is_not_written_over_by_its_own_reports(bag: Path, tmp_path: Path) -> None:

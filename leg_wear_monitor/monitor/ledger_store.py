@@ -136,9 +136,11 @@ class LedgerStore:
 
     def check_writable(self) -> None:
         """Raise LedgerError where nothing could be written later."""
+        db = self._connection()
         try:
-            with transaction(self._connection()):
-                pass
+            db.execute("BEGIN EXCLUSIVE")
+            db.execute("UPDATE run SET closed = closed")
+            db.execute("ROLLBACK")
         except sqlite3.Error as error:
             raise LedgerError(f"{self.path}: cannot be written: {error}") from error
 

@@ -1,0 +1,359 @@
+"""Damaged ledgers: refused in a line and left alone, told of with what may be lost, or as if whole.
+
+A ledger of three runs is made, its last one killed, with each state that was ever kept taken down. Whatever
+is opened without a word has to hold the last of them, and what is opened with a word one of them, no more
+walking behind the last than was told.
+"""
+
+import shutil
+import sqlite3
+import tempfile
+from collections.abc import Callable
+from contextlib import closing
+from functools import cache
+from pathlib import Path
+
+import attrs
+import numpy as np
+
+from campaign.case import Case, Outcome
+
+SHORT, LONG = 52, 520
+
+_NAME = "wear.ledger"
+_SECOND = 10**9
+
+
+def warm() -> None:
+    """Make the ledger."""
+    _made()
+
+
+@attrs.frozen
+class _Made:
+    """Files of a killed ledger, of it as it was closed before, and all states that were kept."""
+
+    killed: dict[str, bytes]
+    closed: dict[str, bytes]
+    earlier: dict[str, bytes]
+    moving_s: dict[str, float]
+    last: dict[str, str]
+
+
+def case(seed: int) -> Case:
+    """One damage."""
+    rng = np.random.default_rng(seed)
+    state = ("killed", "closed")[seed // len(_DAMAGES) % 2]
+    damage = _DAMAGES[seed % len(_DAMAGES)]
+    notes: list[str] = []
+
+    def prepare(directory: Path) -> None:
+        for name, content in getattr(_made(), state).items():
+            (directory / name).write_bytes(content)
+        notes.append(damage(directory, rng))
+
+    return Case(
+        description=f"{damage.__name__.strip('_')} in one that was {state}",
+        prepare=prepare,
+        run=lambda directory: _opened(directory, state),
+        seconds=30.0,
+    )
+
+
+def _opened(directory: Path, state: str) -> tuple[Outcome, str]:
+    """What opening does."""
+    from leg_wear_monitor.monitor.ledger_file import LedgerError
+
+    made, path = _made(), directory / _NAME
+    before = {each.name: each.read_bytes() for each in directory.iterdir() if each.is_file()}
+    try:
+        ledger = _open(path)
+    except LedgerError as error:
+        text = str(error)
+        after = {each.name: each.read_bytes() for each in directory.iterdir() if each.is_file()}
+        if "\n" in text or "Traceback" in text:
+            return Outcome.CRASH, f"not one line: {text}"
+        if after != before:
+            changed = sorted(name for name in {*before, *after} if before.get(name) != after.get(name))
+            return Outcome.SILENT, f"refused, but {changed} changed: {text}"
+        return Outcome.REFUSED, text.replace(str(directory), "")
+    try:
+        found = _state(ledger)
+        last = made.last[state]
+        if found not in made.moving_s:
+            return Outcome.SILENT, "a state that never was kept"
+        lost_s = made.moving_s[last] - made.moving_s[found]
+        if ledger.told and lost_s <= (ledger.cut_off_s or 0.0):
+            return Outcome.TOLD, ledger.told
+        if found != last:
+            return Outcome.SILENT, f"{lost_s:g} s lost, said: {ledger.cut_off_s} {ledger.told!r}"
+        return Outcome.SOUND, ""
+    finally:
+        ledger.close()
+
+
+# --- the ledger ---
+
+
+def _open(path: Path):  # type: ignore[no-untyped-def]
+    from leg_wear_monitor.monitor.binding import Binding
+    from leg_wear_monitor.monitor.ledger import Ledger
+
+    binding = Binding(hardware_id="leg-7", mechanism="bionic_leg", fingerprint="00ff", joints=("A", "B"))
+    return Ledger(path, binding, interval_s=5.0)
+
+
+def _state(ledger) -> str:  # type: ignore[no-untyped-def]
+    """Checksum of all that a monitor takes from a ledger."""
+    parts = (
+        ledger.entry.digest().hex() if ledger.entry else "",
+        ledger.counted_ns.tolist(),
+        ledger.measurements,
+        ledger.commissioned.digest().hex() if ledger.commissioned else "",
+        (ledger.epoch, ledger.boot_id),
+        [reset.stamp_ns if (reset := ledger.last_reset(name)) else 0 for name in "AB"],
+    )
+    return repr(parts)
+
+
+@cache
+def _made() -> _Made:
+    with tempfile.TemporaryDirectory() as place:
+        path, moving_s = Path(place) / _NAME, {}
+        _walk(path, 0, closed=True)
+        earlier = _files(path)
+        _walk(path, 1, closed=True)
+        closed = _files(path)
+        records = _walk(path, 2, closed=False)
+        killed = _files(path)
+        last = {}
+        for name, files in (("earlier", earlier), ("closed", closed), ("killed", killed)):
+            last[name] = _seen(files, moving_s)
+        for cut in records:  # the log as it was after each entry
+            log = {_NAME + "-log": killed[_NAME + "-log"][:cut]}
+            _seen(killed | log, moving_s)
+    return _Made(killed, closed, earlier, moving_s, last)
+
+
+def _walk(path: Path, run: int, closed: bool) -> list[int]:
+    """A run of nine entries with some events; sizes of the log on the way."""
+    from leg_wear_monitor.monitor.ledger_entry import Audit, ClearancePoint, Measurement
+
+    ledger, sizes = _open(path), []
+    first = ledger.entry
+    for step in range(9):
+        ledger.keep(entry := _entry(first, run, step), whole=step == 4)
+        if step == 3:
+            ledger.note(ClearancePoint(entry.stamp_ns, 7, "A", 3.0e-4, 4.0e-4))
+            ledger.note(Audit(entry.stamp_ns, "ann", "reset_wear", entry.joints[0]))
+            ledger.note(Measurement(run, "A", "ann", 3e-4, 1e-6, 1e-5, 3, 0, 0.3, True))
+        log = path.with_name(_NAME + "-log")
+        sizes.append(log.stat().st_size)
+    if closed:
+        ledger.keep(entry, closed=True)
+    ledger.close()
+    return sizes[4:]
+
+
+def _entry(first, run: int, step: int):  # type: ignore[no-untyped-def]
+    from leg_wear_monitor.monitor.alarms import Alarm, Level
+    from leg_wear_monitor.monitor.ledger_entry import Entry, JointWear
+
+    n = 9 * run + step + 1
+    depth = np.random.default_rng(7).random((2, 2, 720)) * 1.0e-10 * n
+    return Entry(
+        stamp_ns=(5 * n + 100 * run) * _SECOND,
+        joints=tuple(JointWear(name, depth[k], 5 * n, 5.0 * n, k) for k, name in enumerate("AB")),
+        totals={"cycles": 5.0 * n, "moving_s": 5.0 * n},
+        alarms=(Alarm(kind="clearance", subject="A", level=Level.WARN),),
+        spans=(((5 * 9 * run + 100 * run) * _SECOND, (5 * n + 100 * run) * _SECOND),),
+    )
+
+
+def _files(path: Path) -> dict[str, bytes]:
+    return {each.name: each.read_bytes() for each in path.parent.iterdir()}
+
+
+def _seen(files: dict[str, bytes], moving_s: dict[str, float]) -> str:
+    """Take down what files hold."""
+    with tempfile.TemporaryDirectory() as place:
+        for name, content in files.items():
+            (Path(place) / name).write_bytes(content)
+        ledger = _open(Path(place) / _NAME)
+        found = _state(ledger)
+        moving_s[found] = ledger.entry.moving_s
+        ledger.close()
+    return found
+
+
+# --- damages: each is given the directory and random numbers, and says what it did ---
+
+_Damage = Callable[[Path, np.random.Generator], str]
+
+
+def _in_file(name: str) -> Callable[[Callable[[bytearray, np.random.Generator], None]], _Damage]:
+    """A damage of the bytes of one file, if it is there."""
+
+    def made(change: Callable[[bytearray, np.random.Generator], None]) -> _Damage:
+        def damage(directory: Path, rng: np.random.Generator) -> str:
+            path = directory / name
+            content = bytearray(path.read_bytes() if path.exists() else b"")
+            if content:
+                change(content, rng)
+                path.write_bytes(content)
+            return name
+
+        damage.__name__ = f"{change.__name__} of {name}"
+        return damage
+
+    return made
+
+
+def _bit(content: bytearray, rng: np.random.Generator) -> None:
+    content[rng.integers(len(content))] ^= 1 << int(rng.integers(8))
+
+
+def _bit_of_the_head(content: bytearray, rng: np.random.Generator) -> None:
+    content[rng.integers(min(200, len(content)))] ^= 1 << int(rng.integers(8))
+
+
+def _cut(content: bytearray, rng: np.random.Generator) -> None:
+    del content[rng.integers(len(content)) :]
+
+
+def _zeros(content: bytearray, rng: np.random.Generator) -> None:
+    at = int(rng.integers(len(content)))
+    content[at : at + 512] = bytes(len(content[at : at + 512]))
+
+
+def _noise(content: bytearray, rng: np.random.Generator) -> None:
+    at, size = int(rng.integers(len(content))), int(rng.integers(1, 2000))
+    content[at : at + size] = rng.bytes(len(content[at : at + size]))
+
+
+def _more(content: bytearray, rng: np.random.Generator) -> None:
+    content += rng.bytes(int(rng.integers(1, 5000)))
+
+
+def _pages_exchanged(content: bytearray, rng: np.random.Generator) -> None:
+    pages = len(content) // 4096
+    if pages > 1:
+        a, b = (4096 * int(at) for at in rng.choice(pages, 2, replace=False))
+        content[a : a + 4096], content[b : b + 4096] = content[b : b + 4096], content[a : a + 4096]
+
+
+def _part_twice(content: bytearray, rng: np.random.Generator) -> None:
+    at = int(rng.integers(len(content)))
+    content[at:at] = content[at : at + int(rng.integers(1, 3000))]
+
+
+def _part_missing(content: bytearray, rng: np.random.Generator) -> None:
+    at = int(rng.integers(len(content)))
+    del content[at : at + int(rng.integers(1, 3000))]
+
+
+def _nothing(content: bytearray, _rng: np.random.Generator) -> None:
+    content.clear()
+
+
+def _log_missing(directory: Path, _rng: np.random.Generator) -> str:
+    (directory / f"{_NAME}-log").unlink(missing_ok=True)
+    return ""
+
+
+def _tables_missing(directory: Path, _rng: np.random.Generator) -> str:
+    if (directory / f"{_NAME}-log").exists():
+        (directory / _NAME).unlink()
+    return ""
+
+
+def _older_tables(directory: Path, _rng: np.random.Generator) -> str:
+    if (directory / f"{_NAME}-log").exists():
+        (directory / _NAME).write_bytes(_made().closed[_NAME])
+    return ""
+
+
+def _log_of_another_time(directory: Path, _rng: np.random.Generator) -> str:
+    if (directory / f"{_NAME}-log").exists():
+        _open(directory / _NAME).close()
+    (directory / f"{_NAME}-log").write_bytes(_made().killed[f"{_NAME}-log"])
+    if (directory / _NAME).read_bytes() == _made().closed[_NAME]:
+        (directory / f"{_NAME}-log").unlink()
+    return ""
+
+
+def _sql(directory: Path, rng: np.random.Generator) -> str:
+    """A value changed, a row gone, or something planted, by SQLite itself."""
+    tables = ("span", "run", "joint", "total", "alarm", "audit", "measurement", "history", "entry", "binding")
+    table = tables[rng.integers(len(tables))]
+    statements = (
+        f"DELETE FROM {table} WHERE rowid = (SELECT max(rowid) FROM {table})",
+        "UPDATE span SET end_ns = end_ns + 3600000000000",
+        "UPDATE total SET value = value * 1.01",
+        f"CREATE TRIGGER t AFTER INSERT ON {table} BEGIN DELETE FROM span; END",
+        "CREATE VIEW v AS SELECT * FROM run",
+        f"DROP TABLE {table}",
+        "PRAGMA user_version = 3",
+        "PRAGMA user_version = 0",
+        f"INSERT INTO {table} SELECT * FROM {table} WHERE 0",
+    )
+    with closing(sqlite3.connect(directory / _NAME, isolation_level=None)) as db:
+        db.execute(statements[rng.integers(len(statements))])
+    return ""
+
+
+def _journal_of_another_time(directory: Path, _rng: np.random.Generator) -> str:
+    copy = directory / "copy"
+    copy.write_bytes(_made().earlier[_NAME])
+    _keep_journal(copy, directory / f"{_NAME}-journal")
+    copy.unlink()
+    return ""
+
+
+def _journal_of_its_own(directory: Path, rng: np.random.Generator) -> str:
+    """A transaction cut off; its journal whole, damaged, cut or gone."""
+    kept, journal = directory / "kept", directory / f"{_NAME}-journal"
+    _keep_journal(directory / _NAME, kept, directory / "cut")
+    shutil.move(directory / "cut", directory / _NAME)
+    content = bytearray(kept.read_bytes())
+    kept.unlink()
+    change = (None, _bit, _cut, _noise, _nothing)[rng.integers(5)]
+    if change:
+        change(content, rng)
+    journal.write_bytes(content)
+    return ""
+
+
+def _keep_journal(path: Path, journal: Path, cut: Path | None = None) -> None:
+    with closing(sqlite3.connect(path, isolation_level=None)) as db:
+        db.execute("PRAGMA cache_size = 1")
+        db.execute("BEGIN")
+        db.execute("UPDATE joint SET depth = zeroblob(length(depth))")
+        db.execute("UPDATE span SET end_ns = 1")
+        shutil.copy(path.with_name(path.name + "-journal"), journal)
+        if cut:
+            shutil.copy(path, cut)
+        db.execute("ROLLBACK")
+
+
+def _wal_beside(directory: Path, _rng: np.random.Generator) -> str:
+    copy = directory / "copy"
+    shutil.copy(directory / _NAME, copy)
+    with closing(sqlite3.connect(copy, isolation_level=None)) as db:
+        db.execute("PRAGMA journal_mode = WAL")
+        db.execute("DELETE FROM span")
+        shutil.copy(directory / "copy-wal", directory / f"{_NAME}-wal")
+    for name in ("copy", "copy-wal", "copy-shm"):
+        (directory / name).unlink(missing_ok=True)
+    return ""
+
+
+_TABLES, _LOG = _in_file(_NAME), _in_file(f"{_NAME}-log")
+_DAMAGES: tuple[_Damage, ...] = (
+    *(_TABLES(each) for each in (_bit, _bit, _bit_of_the_head, _cut, _zeros, _noise, _more)),
+    *(_TABLES(each) for each in (_pages_exchanged, _part_twice, _part_missing, _nothing)),
+    *(_LOG(each) for each in (_bit, _bit_of_the_head, _cut, _zeros, _noise, _more)),
+    *(_LOG(each) for each in (_part_twice, _part_missing, _nothing)),
+    _log_missing, _tables_missing, _older_tables, _log_of_another_time, _sql, _sql,
+    _journal_of_another_time, _journal_of_its_own, _journal_of_its_own, _wal_beside,
+)  # fmt: skip

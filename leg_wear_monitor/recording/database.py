@@ -14,6 +14,8 @@ from leg_wear_monitor.recording.regular_file import open_regular
 _NEEDED = {"topics": {"id", "name", "type"}, "messages": {"id", "topic_id", "timestamp", "data"}}
 _JOURNALS = ("-wal", "-journal")
 _LONGEST_ROW = 2**25  # bytes
+UNREADABLE = (sqlite3.Error, UnicodeDecodeError)
+"""What reading a damaged database raises; its own complaint may hold bytes of it that are no text."""
 
 
 def open_database(
@@ -59,7 +61,7 @@ def open_database(
         _check_tables(database)
     except DamageError as error:
         raise RecordingError(str(path), "", str(error)) from error
-    except (sqlite3.Error, OSError) as error:
+    except (*UNREADABLE, OSError) as error:
         raise RecordingError(str(path), "", f"is no readable .db3 file: {one_line(error)}") from error
     names = " and ".join(each.name for each in beside)
     return database, [f"was not closed: what stands in {names} beside it is read, too"] if beside else []

@@ -11,7 +11,7 @@ import numpy as np
 
 from leg_wear_monitor.recording.budget import Budget
 from leg_wear_monitor.recording.cdr import MESSAGE
-from leg_wear_monitor.recording.database import one_line, open_database
+from leg_wear_monitor.recording.database import UNREADABLE, one_line, open_database
 from leg_wear_monitor.recording.findings import Finding, RecordingError, Weight
 from leg_wear_monitor.recording.layout import Channel
 from leg_wear_monitor.recording.mcap_file import Due, Piece
@@ -54,7 +54,7 @@ class SqliteFile:
                     "SELECT topic_id, COUNT(*) FROM messages NOT INDEXED GROUP BY topic_id"
                 )
             )
-        except (sqlite3.Error, OSError) as error:
+        except (*UNREADABLE, OSError) as error:
             raise RecordingError(str(path), "", f"is no readable .db3 file: {one_line(error)}") from error
         self._found = 0
         self._tell_strangers()
@@ -88,7 +88,7 @@ class SqliteFile:
             )
             while rows := cursor.fetchmany(_TOGETHER):
                 yield deque(rows)
-        except sqlite3.Error as error:
+        except UNREADABLE as error:
             self.findings.append(Finding(self.path, f"breaks off: {one_line(error)}"))
 
     def _piece(self, rows: deque[_Row], types: dict[int, int], stored: int) -> Piece:
@@ -119,7 +119,7 @@ class SqliteFile:
                 "SELECT data FROM messages WHERE id = ? AND length(data) <= ?",
                 (number, self.budget.at_once // 8),
             ).fetchone()
-        except sqlite3.Error:
+        except UNREADABLE:
             return None  # counted as one that could not be read
         return row[0] if row and isinstance(row[0], bytes) else None
 

@@ -143,7 +143,8 @@ def _database(directory: Path, rng: Generator) -> Made:
         "a huge row": "UPDATE messages SET data = zeroblob(200000000) WHERE id = 5",
         "bad names": "UPDATE topics SET name = name || char(27) || '[2J', type = char(27)",
         "huge names": "UPDATE topics SET name = hex(zeroblob(2000000))",
-        "nulls": "UPDATE messages SET timestamp = NULL WHERE id < 9; UPDATE topics SET type = NULL",
+        "numbers for texts": "UPDATE messages SET timestamp = 1e300 WHERE id < 9; "
+        "UPDATE topics SET type = x'00ff'",
         "a profile of aliases": "UPDATE topics SET offered_qos_profiles = '" + "[" * 100_000 + "'",
         "a renamed column": "ALTER TABLE messages RENAME COLUMN data TO stuff",
         "extreme times": "UPDATE messages SET timestamp = -9223372036854775808 WHERE id % 2",

@@ -203,12 +203,10 @@ TURNING = 2.0 * np.pi * np.arange(N) / RATE_HZ
 @pytest.mark.parametrize(
     ("stamps", "angle", "why"),
     [
-        (STAMPS, 0.0 * TURNING, "the crank turns 0 times in 4 s: that is no whole gait cycle"),
         (STAMPS, 4.0 * TURNING, "the crank turns at 240 rpm, commanded are 60 rpm"),
-        (STAMPS, np.full(N, np.nan), f"no crank sample can be used ({N} not_finite)"),
         (0 * STAMPS, TURNING, f"no crank sample can be used ({N} zero_stamp)"),
     ],
-    ids=["still", "a wheel", "no numbers", "no clock"],
+    ids=["a wheel", "no clock"],
 )
 def test_without_a_believable_gait_cycle_there_are_no_forces(run, tmp_path, stamps, angle, why, complaints):
     result = run("replay", str(write(tmp_path / "x.mcap", stamps, angle)), "--out", "out")

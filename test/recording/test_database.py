@@ -107,3 +107,13 @@ def test_without_an_index_of_time_the_order_is_the_same(
             database.execute(f"DROP INDEX {name}")
     samples, _ = read(path)
     assert samples.tobytes() == expected(sent).tobytes()
+
+
+def test_a_complaint_that_is_no_text_is_one(path: Path, read: Any) -> None:
+    """SQLite repeats what it cannot understand, byte by byte."""
+    content = path.read_bytes()
+    assert b"CREATE TABLE messages(" in content
+    path.write_bytes(content.replace(b"CREATE TABLE messages(", b"CREATE TABLE \xd2\x89ess ag("))
+    with pytest.raises(RecordingError, match=r"x\.db3: is no readable \.db3 file: ") as caught:
+        read(path)
+    assert str(caught.value).isprintable()

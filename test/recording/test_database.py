@@ -113,7 +113,7 @@ def test_a_complaint_that_is_no_text_is_one(path: Path, read: Any) -> None:
     """SQLite repeats what it cannot understand, byte by byte."""
     content = path.read_bytes()
     assert b"CREATE TABLE messages(" in content
-    path.write_bytes(content.replace(b"CREATE TABLE messages(", b"CREATE TABLE \xd2\x89ess ag("))
+    path.write_bytes(content.replace(b"CREATE TABLE messages(", b"CR\x89ATE TABLE messages("))
     with pytest.raises(RecordingError, match=r"x\.db3: is no readable \.db3 file: ") as caught:
         read(path)
     assert str(caught.value).isprintable()

@@ -7,6 +7,7 @@ rise between two entries, what a sector wears in 0.1 s of 5.
 """
 
 import json
+import math
 import zlib
 from typing import Any
 
@@ -113,7 +114,8 @@ def _span(entry: Entry, i: int) -> list[int]:
 
 def _alarm_values(alarm: Alarm) -> list[Any]:
     level, present = int(alarm.level), int(alarm.present)
-    return [alarm.kind, alarm.subject, level, present, bool(alarm.acknowledged), alarm.raised_ns]
+    known = [value if math.isfinite(value) else None for value in (alarm.worst, alarm.limit)]
+    return [alarm.kind, alarm.subject, level, present, bool(alarm.acknowledged), alarm.raised_ns, *known]
 
 
 def _entry(values: dict[str, Any], before: Entry, depth: Floats) -> Entry:
@@ -130,8 +132,9 @@ def _entry(values: dict[str, Any], before: Entry, depth: Floats) -> Entry:
             Alarm(
                 kind=kind, subject=subject, level=Level(level), present=Level(present),
                 acknowledged=acknowledged, raised_ns=raised_ns,
+                worst=math.nan if worst is None else worst, limit=math.nan if limit is None else limit,
             )
-            for kind, subject, level, present, acknowledged, raised_ns in values["alarms"]
+            for kind, subject, level, present, acknowledged, raised_ns, worst, limit in values["alarms"]
         ),
         spans=tuple((begin, end) for begin, end, _ in spans),
         span_epochs=epochs if any(epochs) else (),

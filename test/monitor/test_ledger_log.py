@@ -8,9 +8,12 @@ import attrs
 import numpy as np
 import pytest
 
+from leg_wear_monitor.monitor.alarms import Alarm, Level
 from leg_wear_monitor.monitor.ledger_file import LedgerError
 from leg_wear_monitor.monitor.ledger_log import read_log
 from leg_wear_monitor.monitor.ledger_recovery import WHOLE_S
+from leg_wear_monitor.monitor.ledger_run import Run
+from leg_wear_monitor.monitor.ledger_step import decode, encode
 
 pytestmark = pytest.mark.plain
 
@@ -202,3 +205,13 @@ def test_files_can_be_read_by_owner_and_group_alone_or_less(open_ledger, walk, t
         finally:
             os.umask(was)
         assert [path.stat().st_mode & 0o777 for path in (ledger.path, log_of(ledger.path))] == [mode] * 2
+
+
+@pytest.mark.plain
+def test_a_raised_alarm_keeps_its_worst_value_between_whole_entries(entry_at) -> None:
+    worst = Alarm(kind="input_gaps", level=Level.ERROR, value=0.0, worst=0.42, limit=0.05, raised_ns=7)
+    before, entry = entry_at(1), attrs.evolve(entry_at(2), alarms=(worst, Alarm(kind="cadence")))
+    record, _ = encode(entry, Run(1), before, 0)
+    kept, unknown = decode(record, before)[1].alarms
+    assert (kept.name, kept.worst, kept.limit) == ("input_gaps", 0.42, 0.05)
+    assert np.isnan(unknown.worst) and np.isnan(unknown.limit)

@@ -155,6 +155,12 @@ class WearMonitor:
         return lost(self._twin.intake, book.skipped, self._book.unmonitored_s, self._guard, book.pauses)
 
     @property
+    def used(self) -> tuple[int, int]:
+        """How many crank and torque samples were used so far."""
+        intake = self._twin.intake
+        return intake.crank_used, intake.torque_used
+
+    @property
     def measurements(self) -> tuple[Measurement, ...]:
         """Measured clearances, those of the ledger first."""
         return self._forecaster.measurements

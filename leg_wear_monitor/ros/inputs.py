@@ -15,6 +15,7 @@ from std_msgs.msg import Float64
 
 from leg_wear_monitor.monitor.config import MonitorConfig
 from leg_wear_monitor.recording import cdr
+from leg_wear_monitor.ros.publishers import Publishers
 
 DEPTH = 200
 
@@ -31,20 +32,33 @@ class InputTopic:
         Full name of the topic, and its type.
     kind : int
         A code of `recording.cdr.TYPES`.
-    heard_ns : int
-        When its last message came, by the node's clock; 0 before the first.
-    lost : int
-        Messages that were sent and did not come through.
+    heard_ns, heard_wall_ns : int
+        When its last message came, by a clock that only goes forward and by the one that people read;
+        0 before the first.
+    lost, lost_told : int
+        Messages that were sent and did not come through, as the middleware says; and how many of them had
+        been reported before.
     incompatible : str
         What of a publisher's quality of service or type does not fit; empty if nothing.
+    publishers : Publishers
+        As the graph last had them.
+    sources : int
+        How many of them certainly send what this topic is for; 1 while that is not known.
+    without_crank : str
+        What is known of messages in which the crank is missing; empty if it is in all of them.
     """
 
     name: str
     type: str
     kind: int
     heard_ns: int = 0
+    heard_wall_ns: int = 0
     lost: int = 0
+    lost_told: int = 0
     incompatible: str = ""
+    publishers: Publishers = Publishers()
+    sources: int = 1
+    without_crank: str = ""
 
 
 def subscribe(

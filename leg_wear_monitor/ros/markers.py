@@ -1,5 +1,7 @@
 """The leg as RViz and Foxglove draw it: its bodies, and its loose joints in the colour of their alarms."""
 
+from collections.abc import Callable
+
 import numpy as np
 from builtin_interfaces.msg import Time
 from geometry_msgs.msg import Point, Vector3
@@ -18,6 +20,7 @@ from leg_wear_monitor.monitor.wear_monitor import WearMonitor
 PERIOD_S = 0.1
 
 _STEPS = 180  # of a turn; between them the nearest one is drawn
+_NO_DATA = (0.55, 0.55, 0.55)
 _COLOURS = {Level.OK: (0.2, 0.7, 0.3), Level.WARN: (0.95, 0.7, 0.1), Level.ERROR: (0.85, 0.15, 0.15)}
 _LINE_M, _JOINT_M = 0.006, 0.03
 
@@ -43,8 +46,8 @@ class LegMarkers:
         }
         self._joints = {name: (mechanism.sides(name)[0], name) for name in mechanism.loose}
 
-    def at(self, crank_angle: float, levels: dict[str, Level], stamp: Time) -> MarkerArray:
-        """The leg at a crank angle [rad], its loose joints by their levels."""
+    def at(self, crank_angle: float, levels: dict[str, Level] | None, stamp: Time) -> MarkerArray:
+        """The leg at a crank angle [rad], its joints by their levels; grey where there are none."""
         i = round(crank_angle / TURN * _STEPS) % _STEPS
         header = Header(stamp=stamp, frame_id=self._frame_id)
         bodies = Marker(header=header, ns="bodies", type=Marker.LINE_LIST, color=_colour((0.6, 0.6, 0.65)))
@@ -64,12 +67,12 @@ class LegMarkers:
             first.setdefault(body, here)
         return pairs
 
-    def _joint(self, name: str, i: int, levels: dict[str, Level], header: Header) -> Marker:
+    def _joint(self, name: str, i: int, levels: dict[str, Level] | None, header: Header) -> Marker:
         marker = Marker(header=header, ns="joints", id=self._loose.index(name), type=Marker.SPHERE)
         marker.pose.position = _point(self._points[self._joints[name]][i])
         marker.pose.orientation.w = 1.0
         marker.scale = Vector3(x=_JOINT_M, y=_JOINT_M, z=_JOINT_M)
-        marker.color = _colour(_COLOURS[levels.get(name, Level.OK)])
+        marker.color = _colour(_NO_DATA if levels is None else _COLOURS[levels.get(name, Level.OK)])
         return marker
 
 
@@ -80,10 +83,12 @@ class MarkerTopic:
     ----------
     node : rclpy.node.Node
     monitor : WearMonitor
+    is_current : callable
+        Whether there is data now; if not, joints are grey.
     """
 
-    def __init__(self, node: Node, monitor: WearMonitor) -> None:
-        self._node, self._monitor = node, monitor
+    def __init__(self, node: Node, monitor: WearMonitor, is_current: Callable[[], bool]) -> None:
+        self._node, self._monitor, self._is_current = node, monitor, is_current
         self._markers = LegMarkers(monitor.mechanism, monitor.config.frame_id)
         self._publisher = node.create_publisher(MarkerArray, "~/markers", 10)
         self._crank_angle = 0.0
@@ -104,7 +109,8 @@ class MarkerTopic:
             if status.name.startswith("joint ")
         }
         stamp = self._node.get_clock().now().to_msg()
-        self._publisher.publish(self._markers.at(self._crank_angle, levels, stamp))
+        shown = levels if self._is_current() else None
+        self._publisher.publish(self._markers.at(self._crank_angle, shown, stamp))
 
 
 def _point(position: Floats) -> Point:

@@ -5,6 +5,7 @@ from collections.abc import Callable, Sequence
 from functools import partial
 from typing import Any
 
+import attrs
 from rclpy.clock import Clock
 from rclpy.clock_type import ClockType
 from std_srvs.srv import Trigger
@@ -16,7 +17,7 @@ from leg_wear_monitor.monitor.alarms import Alarm
 from leg_wear_monitor.monitor.config import MonitorConfig
 from leg_wear_monitor.monitor.fitting import check_limits
 from leg_wear_monitor.monitor.opening import open_monitor
-from leg_wear_monitor.monitor.reports import AlarmList, Reports
+from leg_wear_monitor.monitor.reports import Reports
 from leg_wear_monitor.monitor.wear_monitor import WearMonitor
 from leg_wear_monitor.recording import outputs
 from leg_wear_monitor.recording.cdr import TYPES
@@ -29,11 +30,12 @@ from leg_wear_monitor.ros.epochs import Epochs, boot_id
 from leg_wear_monitor.ros.inbox import Inbox
 from leg_wear_monitor.ros.inputs import InputTopic, subscribe
 from leg_wear_monitor.ros.markers import MarkerTopic
-from leg_wear_monitor.ros.node_health import Load, load_status, recording_status, topics_status
+from leg_wear_monitor.ros.node_health import Load, load_status, recording_status
 from leg_wear_monitor.ros.outlets import Outlets
 from leg_wear_monitor.ros.parameters import Parameters
 from leg_wear_monitor.ros.running import ClosingNode, run, spin
 from leg_wear_monitor.ros.services import Confirmation, asked_once, audit_time, undone
+from leg_wear_monitor.ros.supervision import Supervision
 
 ADVICE = (
     "this monitor advises: it commands nothing, no alarm is no proof of health, keep it out of safety paths"
@@ -81,10 +83,12 @@ class MonitorNode(ClosingNode):
         )
         self._confirmation = Confirmation()
         self._serve()
-        self._markers = MarkerTopic(self, self._monitor)
-        self._send_alarms(self._monitor.alarms)
+        self._supervision = Supervision(self, self._monitor, config)
+        self._markers = MarkerTopic(self, self._monitor, lambda: self._supervision.is_current)
+        self._send_alarms()
         self._inputs = subscribe(self, config, self._receive)
-        for topic, _ in self._inputs:
+        self._supervision.inputs = [topic for topic, _ in self._inputs]
+        for topic in self._supervision.inputs:
             self._black_box.add_topic(topic.name, topic.type, SENSOR_DATA)
         # work and diagnostics go on where simulated time stands still
         steady = Clock(clock_type=ClockType.STEADY_TIME)
@@ -125,8 +129,8 @@ class MonitorNode(ClosingNode):
         logger.error(line) if is_error else logger.warning(line)
 
     def _receive(self, topic: InputTopic, raw: bytes) -> None:
-        topic.heard_ns = time.time_ns()
-        self._inbox.add(topic.kind, raw, topic.heard_ns)
+        topic.heard_ns, topic.heard_wall_ns = time.monotonic_ns(), time.time_ns()
+        self._inbox.add(topic.kind, raw, topic.heard_wall_ns)
 
     def _work(self) -> None:
         """Pass on what has come, a bounded part at a time."""
@@ -140,13 +144,16 @@ class MonitorNode(ClosingNode):
                 self._black_box.write(names[arrival.kind], arrival.log_time_ns, arrival.raw)
         samples = self._inbox.decoded(arrivals)
         self._epochs.see(samples)
-        self._publish(self._monitor.update(samples), coarse)
+        reports = self._monitor.update(samples)
+        self._supervision.note(arrivals, samples)
+        self._publish(reports, coarse)
 
     # --- out ---
 
     def _publish(self, reports: Reports, coarse: bool) -> None:
         now_ns = time.time_ns()
         self._markers.note(reports.samples)
+        reports = attrs.evolve(reports, alarms=tuple(map(self._supervision.alarms, reports.alarms)))
         for outgoing in self._messages.of(reports):
             if coarse and outgoing.output in _A_SAMPLE and not self._black_box.on:
                 self._load.unpublished += len(outgoing.stamp_ns)
@@ -155,20 +162,21 @@ class MonitorNode(ClosingNode):
         for cycle in self._forecasts.due(reports):
             self._outlets.send(outputs.FORECAST, now_ns, self._messages.forecast(cycle))
 
-    def _send_alarms(self, alarms: AlarmList) -> None:
+    def _send_alarms(self) -> None:
+        alarms = self._supervision.alarms(self._monitor.alarms)
         self._outlets.send(outputs.ALARMS, time.time_ns(), self._messages.alarms(alarms))
 
     def _diagnose(self) -> None:
         now_ns = time.time_ns()
-        publishers = [(topic, self.count_publishers(topic.name)) for topic, _ in self._inputs]
+        if self._supervision.look():
+            self._send_alarms()
         status = (
             *self._monitor.status(),
             load_status(self._load, self._inbox),
-            topics_status(publishers, now_ns),
             recording_status(self._black_box),
             self._epochs.status(),
         )
-        message = self._messages.diagnostics(self._ros_now_ns(), status)
+        message = self._messages.diagnostics(self._ros_now_ns(), self._supervision.statuses(status))
         self._outlets.send(outputs.DIAGNOSTICS, now_ns, message)
         self._black_box.flush()
 
@@ -200,7 +208,9 @@ class MonitorNode(ClosingNode):
 
     def _acknowledge(self) -> str:
         cleared, kept = self._monitor.acknowledge(self._ros_now_ns())
-        self._send_alarms(self._monitor.alarms)
+        own_cleared, own_kept = self._supervision.acknowledge()
+        cleared, kept = (*cleared, *own_cleared), (*kept, *own_kept)
+        self._send_alarms()
         return f"cleared: {_listed(cleared)}; still present: {_listed(kept)}"
 
     def _save(self) -> str:

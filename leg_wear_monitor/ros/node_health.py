@@ -1,7 +1,7 @@
 """How the node itself does, for /diagnostics: can it keep up, what got lost on the way, is it recording."""
 
 import math
-from collections.abc import Iterable
+from collections.abc import Iterable, Iterator
 
 import attrs
 
@@ -10,10 +10,11 @@ from leg_wear_monitor.monitor.reports import Status
 from leg_wear_monitor.ros.black_box import BlackBox
 from leg_wear_monitor.ros.inbox import Inbox
 from leg_wear_monitor.ros.inputs import InputTopic
+from leg_wear_monitor.ros.publishers import misfit, several
+from leg_wear_monitor.ros.silence import NOTHING_FROM_S, SILENT_FROM_S, utc
 
 # From here on, the topics that have a message a sample are left out, so that the monitor can catch up.
 COARSE_FROM_S = 0.25
-SILENT_FROM_S = 1.0
 
 
 @attrs.define
@@ -60,29 +61,49 @@ def load_status(load: Load, inbox: Inbox) -> Status:
     return Status("load", level, message, values)
 
 
-def topics_status(topics: Iterable[tuple[InputTopic, int]], now_ns: int) -> Status:
-    """The input topics, each with the number of its publishers.
+def topics_status(topics: Iterable[InputTopic], now_ns: int, started_ns: int) -> Status:
+    """The input topics: who publishes them, and what is wrong with that.
 
     The monitor below has no clock and does not see that nothing comes; here is one.
+
+    Parameters
+    ----------
+    topics : iterable of InputTopic
+    now_ns, started_ns : int
+        By a clock that only goes forward.
     """
     messages, values, level = [], {}, Level.OK
-    for topic, publishers in topics:
+    for topic in topics:
         short = topic.name.rsplit("/", 1)[-1]
         silent_s = max(0, now_ns - topic.heard_ns) * 1.0e-9 if topic.heard_ns else math.nan
-        values[f"{short}_publishers"] = float(publishers)
+        values[f"{short}_publishers"] = float(len(topic.publishers.fitting))
         values[f"{short}_silent_s"] = silent_s
         values[f"{short}_lost_messages"] = float(topic.lost)
-        if topic.incompatible:
-            fault, at = topic.incompatible, Level.ERROR
-        elif silent_s > SILENT_FROM_S:
-            fault, at = "has fallen silent: nothing is monitored", Level.ERROR
-        elif not publishers:
-            fault, at = "nobody publishes it", Level.WARN
-        else:
-            continue
-        messages.append(f"{topic.name}: {fault}")
-        level = max(level, at)
+        for at, fault in _faults(topic, silent_s, (now_ns - started_ns) * 1.0e-9):
+            messages.append(f"{topic.name}: {fault}")
+            level = max(level, at)
     return Status("topics", level, "; ".join(messages) or "connected", values)
+
+
+def _faults(topic: InputTopic, silent_s: float, running_s: float) -> Iterator[tuple[Level, str]]:
+    """What is wrong with a topic."""
+    if other := misfit(topic.publishers, topic.type):
+        yield Level.ERROR, other
+    elif topic.incompatible:
+        yield Level.ERROR, topic.incompatible
+    if silent_s > SILENT_FROM_S:
+        yield Level.ERROR, f"has fallen silent since {utc(topic.heard_wall_ns)}: nothing is monitored"
+    elif not topic.publishers.fitting and not topic.publishers.other:
+        yield Level.ERROR if running_s >= NOTHING_FROM_S else Level.WARN, "nobody publishes it"
+    elif math.isnan(silent_s) and running_s >= NOTHING_FROM_S:
+        yield Level.ERROR, "has a publisher, but no message came yet"
+    if topic.lost > topic.lost_told:
+        yield Level.WARN, "messages are lost on the way to this node"
+    if topic.without_crank:
+        yield Level.ERROR, topic.without_crank
+    if several_of := several(topic.publishers):
+        at = Level.ERROR if topic.sources > 1 else Level.WARN
+        yield at, f"{several_of}; expected one"
 
 
 def recording_status(black_box: BlackBox) -> Status:

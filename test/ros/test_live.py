@@ -120,6 +120,8 @@ def is_what_a_replay_gives(recording: Path, config: MonitorConfig, live: WearMon
     assert repr(now) in map(repr, again.status())
     assert len(replayed["~/clearance_states"]) >= 4
     assert len(replayed["~/predicted_torque"]) > 1900
+    # silence is seen by a clock, which a replay has not
+    lived["~/alarms"] = [raw for raw in lived["~/alarms"] if b"input_silence" not in raw]
     for topic, messages in replayed.items():
         begin = len(lived[topic]) - len(messages)  # the alarms as they stood at the start come first
         assert begin == (topic == "~/alarms")

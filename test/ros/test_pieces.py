@@ -23,11 +23,13 @@ from leg_wear_monitor.ros.inbox import Inbox
 from leg_wear_monitor.ros.inputs import InputTopic
 from leg_wear_monitor.ros.node_health import Load, load_status, recording_status, topics_status
 from leg_wear_monitor.ros.publisher_config import PublisherConfig
+from leg_wear_monitor.ros.publishers import Publishers
 from leg_wear_monitor.ros.sensor_messages import sensor_message
 from leg_wear_monitor.twin.sample import CRANK, FAULTS, NO_FAULT, OUT_OF_RANGE, TORQUE, WRONG_TYPE
 
 START_NS = 1_700_000_000_000_000_000
 SECOND = 1_000_000_000
+JOINT_STATE = "sensor_msgs/msg/JointState"
 CODES = {CRANK: cdr.JOINT_STATE, TORQUE: cdr.WRENCH_STAMPED}
 CRANK_FAULTS = [fault for fault in FAULTS if fault not in (NO_FAULT, OUT_OF_RANGE, WRONG_TYPE)]
 
@@ -125,22 +127,82 @@ def test_falling_behind_is_told_and_then_over() -> None:
     assert load_status(load, box).level is Level.OK
 
 
-def test_topics_without_publishers_are_a_warning_and_misfits_an_error() -> None:
-    topic = InputTopic("/left/joint_states", "sensor_msgs/msg/JointState", cdr.JOINT_STATE)
-    assert topics_status([(topic, 1)], SECOND).level is Level.OK
-    assert topics_status([(topic, 0)], SECOND).level is Level.WARN
-    topic.incompatible = "its reliability is less"
-    assert topics_status([(topic, 1)], SECOND).level is Level.ERROR
+def topic(**fields) -> InputTopic:
+    publishers = Publishers(("/driver",))
+    known = {"publishers": publishers, "heard_ns": 10 * SECOND, "heard_wall_ns": START_NS}
+    return InputTopic("/left/joint_states", JOINT_STATE, cdr.JOINT_STATE, **(known | fields))
+
+
+def test_a_topic_with_a_publisher_is_connected() -> None:
+    told = topics_status([topic()], 11 * SECOND, SECOND)
+    assert (told.level, told.message) == (Level.OK, "connected")
+    assert told.values["joint_states_publishers"] == 1.0
+
+
+@pytest.mark.parametrize(("after_s", "level"), [(1, Level.WARN), (9, Level.WARN), (10, Level.ERROR)])
+def test_nobody_publishing_is_an_error_after_ten_seconds(after_s: int, level: Level) -> None:
+    nobody = topic(publishers=Publishers(), heard_ns=0)
+    told = topics_status([nobody], SECOND + after_s * SECOND, SECOND)
+    assert (told.level, told.message) == (level, "/left/joint_states: nobody publishes it")
+
+
+def test_a_publisher_of_another_type_is_named_with_both_types() -> None:
+    other = Publishers(other=(("/arm/driver", "std_msgs/msg/Float64"),))
+    told = topics_status([topic(publishers=other, heard_ns=0)], 2 * SECOND, SECOND)
+    assert told.level is Level.ERROR
+    assert told.message == (
+        "/left/joint_states: /arm/driver publishes std_msgs/msg/Float64, "
+        "expected sensor_msgs/msg/JointState; nothing comes from it"
+    )
+
+
+def test_a_quality_of_service_that_does_not_fit_is_an_error() -> None:
+    told = topics_status([topic(incompatible="its reliability is less")], 11 * SECOND, SECOND)
+    assert told.level is Level.ERROR
+
+
+def test_messages_that_the_middleware_loses_are_a_warning_until_told() -> None:
+    assert topics_status([topic(lost=7)], 11 * SECOND, SECOND).level is Level.WARN
+    assert topics_status([topic(lost=7, lost_told=7)], 11 * SECOND, SECOND).level is Level.OK
+
+
+@pytest.mark.parametrize(("sources", "level"), [(1, Level.WARN), (2, Level.ERROR)])
+def test_several_publishers_are_named(sources: int, level: Level) -> None:
+    two = Publishers(("/driver", "/simulator"))
+    told = topics_status([topic(publishers=two, sources=sources)], 11 * SECOND, SECOND)
+    assert told.level is level
+    assert told.message == "/left/joint_states: 2 publishers: /driver, /simulator; expected one"
 
 
 def test_a_topic_that_falls_silent_is_an_error() -> None:
-    topic = InputTopic("/left/joint_states", "sensor_msgs/msg/JointState", cdr.JOINT_STATE)
-    topic.heard_ns = 10 * SECOND
-    spoken = topics_status([(topic, 1)], 11 * SECOND)
+    spoken = topics_status([topic()], 11 * SECOND, SECOND)
     assert (spoken.level, spoken.values["joint_states_silent_s"]) == (Level.OK, 1.0)
-    silent = topics_status([(topic, 0)], 13 * SECOND)
+    silent = topics_status([topic(publishers=Publishers())], 13 * SECOND, SECOND)
     assert (silent.level, silent.values["joint_states_silent_s"]) == (Level.ERROR, 3.0)
-    assert "silent" in silent.message
+    assert "has fallen silent since 2023-11-14T22:13:20.000Z" in silent.message
+
+
+def test_an_inbox_holds_its_bytes_and_counts_what_it_sheds() -> None:
+    box = Inbox(Decoder(MonitorConfig()), 1000, limit_bytes=100)
+    for number in range(50):
+        box.add(cdr.JOINT_STATE, bytes([number]) * 30, number)
+        assert len(box) <= 3
+    box.add(cdr.JOINT_STATE, bytes(101), 50)  # alone too large
+    box.add(cdr.JOINT_STATE, bytes([51]) * 60, 51)
+    left = [arrival.raw for arrival in box.take(1000)]
+    assert box.received == 52 == box.shed + len(left)
+    assert left[-1] == bytes([51]) * 60
+    assert sum(map(len, left)) <= 100
+
+
+def test_no_more_bytes_are_taken_than_asked_for_but_one_message_always() -> None:
+    box = inbox()
+    for size in (50, 10, 10, 10):
+        box.add(cdr.JOINT_STATE, bytes(size), 1)
+    assert [len(one.raw) for one in box.take(100, 20)] == [50]
+    assert [len(one.raw) for one in box.take(100, 20)] == [10, 10]
+    assert [len(one.raw) for one in box.take(100, 20)] == [10]
+    assert box.take(100, 20) == []
 
 
 def test_the_black_box_keeps_bytes_in_their_order(tmp_path: Path) -> None:

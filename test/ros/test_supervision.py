@@ -1,0 +1,324 @@
+"""What the node tells of silence, of alarms and of its own faults: by itself, and over real DDS."""
+
+import math
+
+import pytest
+
+pytest.importorskip("rclpy")
+
+from diagnostic_msgs.msg import DiagnosticArray
+from geometry_msgs.msg import WrenchStamped
+from rcl_interfaces.msg import Log
+from rclpy.node import Node
+from rclpy.serialization import serialize_message
+from sensor_msgs.msg import JointState
+from std_msgs.msg import Float64
+from std_srvs.srv import Trigger
+from visualization_msgs.msg import MarkerArray
+
+from leg_wear_monitor.monitor.alarms import Alarm, Level
+from leg_wear_monitor.monitor.config import MonitorConfig
+from leg_wear_monitor.monitor.reports import AlarmList, Status
+from leg_wear_monitor.recording import cdr
+from leg_wear_monitor.recording.decoder import Decoder
+from leg_wear_monitor.ros.clock_watch import ClockWatch, both_clocks
+from leg_wear_monitor.ros.crank_names import CrankNames
+from leg_wear_monitor.ros.inbox import Inbox
+from leg_wear_monitor.ros.node_alarms import NodeAlarms
+from leg_wear_monitor.ros.node_log import AlarmLog, StatusLog
+from leg_wear_monitor.ros.silence import CRANK, TORQUE, Silence
+
+ME = "/leg_wear_monitor"
+SECOND = 10**9
+NOON_NS = 1_700_000_000 * SECOND
+
+
+class Lines:
+    """A logger that keeps what it is told."""
+
+    def __init__(self) -> None:
+        self.lines: list[tuple[Level, str]] = []
+
+    def info(self, text: str) -> None:
+        self.lines.append((Level.OK, text))
+
+    def warning(self, text: str) -> None:
+        self.lines.append((Level.WARN, text))
+
+    def error(self, text: str) -> None:
+        self.lines.append((Level.ERROR, text))
+
+
+# --- silence ---
+
+STATUSES = (
+    Status("gait", Level.OK, "in step", {"cadence_rpm": 60.0, "cycles": 5.0}),
+    Status("input", Level.OK, "in order", {"crank_rate_hz": 200.0, "torque_rate_hz": 200.0}),
+    Status("torque", Level.OK, "measured as predicted", {"mismatch": 0.03}),
+    Status("joint A", Level.WARN, "clearance grows", {"clearance_m": 3.0e-4}),
+    Status("ledger", Level.OK, "kept", {}),
+)
+
+
+def silence() -> Silence:
+    return Silence((CRANK, TORQUE), 5 * SECOND, NOON_NS)
+
+
+def used(crank: int, torque: int) -> dict[str, int]:
+    return {CRANK: crank, TORQUE: torque}
+
+
+def test_after_a_silence_every_status_says_since_when_it_has_no_data() -> None:
+    one = silence()
+    one.note(used(10, 10), 6 * SECOND, NOON_NS + SECOND)
+    assert one.told(STATUSES, 7 * SECOND) == STATUSES
+    told = one.told(STATUSES, 9 * SECOND)
+    assert [status.name for status in told] == [status.name for status in STATUSES]
+    for status in told:
+        assert status.level is Level.ERROR
+        assert status.message.startswith("no current data since 2023-11-14T22:13:21.000Z")
+        assert status.values["no_data_s"] == 3.0
+        assert "in step" not in status.message
+        assert "in order" not in status.message
+        assert "as predicted" not in status.message
+    by_name = {status.name: status for status in told}
+    assert math.isnan(by_name["gait"].values["cadence_rpm"])
+    assert by_name["gait"].values["cycles"] == 5.0
+    assert by_name["input"].values["crank_rate_hz"] == 0.0
+    assert by_name["ledger"].message.endswith("; kept")
+
+
+def test_messages_that_cannot_be_used_are_silence_and_their_cause_stays() -> None:
+    one = silence()
+    one.note(used(10, 10), 6 * SECOND, NOON_NS)
+    one.note(used(10, 10), 8 * SECOND, NOON_NS)
+    faulty = Status("input", Level.WARN, "9 of 9 samples have a zero stamp: set header.stamp", {})
+    (told,) = one.told([faulty], 9 * SECOND)
+    assert told.message.endswith("; 9 of 9 samples have a zero stamp: set header.stamp")
+    assert told.message.startswith("no current data since")
+
+
+def test_silence_is_over_with_the_next_sample() -> None:
+    one = silence()
+    one.note(used(10, 10), 6 * SECOND, NOON_NS)
+    one.note(used(11, 11), 9 * SECOND, NOON_NS)
+    assert one.told(STATUSES, 9 * SECOND) == STATUSES
+
+
+@pytest.mark.parametrize(("after_s", "level"), [(0, Level.WARN), (9, Level.WARN), (10, Level.ERROR)])
+def test_no_data_from_the_start_is_an_error_after_ten_seconds(after_s: int, level: Level) -> None:
+    told = silence().told(STATUSES, (5 + after_s) * SECOND)
+    assert {status.level for status in told} == {level}
+    assert all("since the start at 2023-11-14T22:13:20.000Z" in status.message for status in told)
+
+
+def test_a_silent_torque_concerns_the_torque() -> None:
+    one = silence()
+    one.note(used(10, 10), 6 * SECOND, NOON_NS)
+    one.note(used(20, 10), 9 * SECOND, NOON_NS + 3 * SECOND)
+    told = {status.name: status for status in one.told(STATUSES, 9 * SECOND)}
+    assert told["torque"].message == "no current data since 2023-11-14T22:13:20.000Z"
+    assert told["gait"].message == "in step"
+
+
+# --- alarms and log ---
+
+
+def listed(*alarms: Alarm) -> AlarmList:
+    return AlarmList(NOON_NS, alarms)
+
+
+def clearance(present: Level, level: Level) -> Alarm:
+    return Alarm(
+        kind="clearance", subject="G", unit="m", present=present, level=level, value=6.12e-4, limit=6e-4
+    )
+
+
+def test_each_rise_and_fall_of_an_alarm_is_logged_once_with_value_limit_and_time() -> None:
+    lines = Lines()
+    log = AlarmLog(lines)
+    quiet, loud = clearance(Level.OK, Level.OK), clearance(Level.ERROR, Level.ERROR)
+    latched = clearance(Level.OK, Level.ERROR)
+    for alarm in (quiet, quiet, loud, loud, latched, latched):
+        log.note(listed(alarm))
+    assert lines.lines == [
+        (
+            Level.ERROR,
+            "alarm clearance G rises from OK to ERROR: 0.000612 m, limit 0.0006 m, "
+            "at 2023-11-14T22:13:20.000Z",
+        ),
+        (
+            Level.OK,
+            "alarm clearance G falls from ERROR to OK: 0.000612 m, limit 0.0006 m, "
+            "at 2023-11-14T22:13:20.000Z, "
+            "shown until it is acknowledged",
+        ),
+    ]
+
+
+def test_a_fault_of_the_node_is_logged_once_and_its_end_too() -> None:
+    lines = Lines()
+    log = StatusLog(lines)
+    full = Status("recording", Level.ERROR, "stopped: no space left", {})
+    behind = Status("load", Level.WARN, "falls behind", {"waiting": 7.0})
+    fine = Status("recording", Level.OK, "on", {})
+    for statuses in (
+        [fine],
+        [full, behind],
+        [full, behind],
+        [fine, Status("load", Level.OK, "keeps up", {})],
+    ):
+        log.note(statuses)
+    assert lines.lines == [
+        (Level.ERROR, "recording: stopped: no space left"),
+        (Level.WARN, "load: falls behind"),
+        (Level.OK, "recording: on"),
+        (Level.OK, "load: keeps up"),
+    ]
+
+
+def test_alarms_of_the_node_are_listed_while_they_are_raised_and_acknowledged_like_others() -> None:
+    node, monitors = NodeAlarms((CRANK, TORQUE)), listed(Alarm(kind="input_sources"))
+    assert node.beside(monitors) is monitors
+    assert node.judge({"input_silence crank": 2.5, "input_sources": 2.0}, NOON_NS)
+    assert not node.judge({"input_silence crank": 3.5, "input_sources": 2.0}, NOON_NS)
+    shown = {alarm.name: alarm for alarm in node.beside(monitors).alarms}
+    assert set(shown) == {"input_sources", "input_silence crank"}
+    assert (shown["input_silence crank"].level, shown["input_silence crank"].value) == (Level.ERROR, 3.5)
+    assert (shown["input_sources"].level, shown["input_sources"].value) == (Level.ERROR, 2.0)
+    node.judge({"input_silence crank": 0.0, "input_sources": 2.0}, NOON_NS)
+    cleared, kept = node.acknowledge()
+    assert [alarm.name for alarm in cleared] == ["input_silence crank"]
+    assert [alarm.name for alarm in kept] == ["input_sources"]
+
+
+def test_a_clock_that_stands_or_is_set_back_is_told() -> None:
+    watch = ClockWatch()
+    assert watch.status(0, SECOND, True).message == "use_sim_time is set and nobody publishes /clock"
+    assert watch.status(7, 2 * SECOND, True).level is Level.OK
+    stands = watch.status(7, 4 * SECOND, True)
+    assert (stands.level, stands.message) == (Level.ERROR, "stands still: /clock has stopped")
+    assert watch.status(9 * SECOND, 5 * SECOND, True).level is Level.OK
+    assert watch.status(3 * SECOND, 6 * SECOND, True).level is Level.WARN
+    assert watch.status(4 * SECOND, 7 * SECOND, True).level is Level.OK
+
+
+def test_two_statuses_of_the_clock_are_one() -> None:
+    counted = Status("clock", Level.OK, "goes on from what is counted", {"epochs_begun": 0.0})
+    fine, stands = Status("clock", Level.OK, "goes on", {}), Status("clock", Level.ERROR, "stands still", {})
+    assert both_clocks(counted, fine).message == "goes on from what is counted"
+    told = both_clocks(counted, stands)
+    assert (told.level, told.message, told.values) == (Level.ERROR, "stands still", {"epochs_begun": 0.0})
+
+
+def noted(names: CrankNames, *messages: list[str]) -> str:
+    box = Inbox(Decoder(MonitorConfig()), 100)
+    for joints in messages:
+        message = JointState(name=joints, position=[0.0] * len(joints))
+        message.header.stamp.sec = 5
+        box.add(cdr.JOINT_STATE, serialize_message(message), 1)
+    arrivals = box.take(100)
+    names.note(arrivals, box.decoded(arrivals))
+    return names.told()
+
+
+def test_a_crank_that_no_message_names_is_told_with_the_names_that_are_there() -> None:
+    names = CrankNames("crank")
+    told = noted(names, ["knee", "hip"])
+    assert told == "no joint is named 'crank'; there are hip, knee; set crank_joint to its name"
+    assert noted(names) == told
+    assert noted(names, ["knee"], ["hip", "crank"]) == ""
+
+
+def test_names_that_would_harm_a_terminal_or_fill_it_are_tamed() -> None:
+    told = noted(CrankNames("crank"), [f"joint{i:03d}" for i in range(300)] + ["a\x1b[2J", "b" * 200])
+    assert "\x1b" not in told
+    assert "and 290 more" in told
+    assert len(told) < 400
+
+
+# --- over real DDS ---
+
+
+def line(messages: list[DiagnosticArray], name: str):
+    return (
+        next((one for one in messages[-1].status if one.name.endswith(f": {name}")), None)
+        if messages
+        else None
+    )
+
+
+def test_silence_reaches_statuses_alarms_markers_and_log(stage, walk) -> None:
+    monitor = stage.monitor(diagnostics__period_s=0.1, publish_markers=True)
+    diagnostics = stage.listen("/diagnostics", DiagnosticArray)
+    alarms = stage.listen(f"{ME}/alarms", DiagnosticArray, latched=True)
+    markers = stage.listen(f"{ME}/markers", MarkerArray)
+    logged = Lines()
+    monitor.node._supervision._alarm_log._logger = logged
+    monitor.node._supervision._status_log._logger = logged
+    stage.legs().play(walk, monitor, end_s=2.5)
+    stage.wait_for(lambda: "no current data" in line(diagnostics, "gait").message, "the silence")
+    for status in diagnostics[-1].status:
+        assert status.level == b"\2", status.name
+        assert "no current data since" in status.message
+    stage.wait_for(lambda: line(alarms, "input_silence crank") is not None, "the alarm of silence")
+    stage.wait_for(lambda: markers[-1].markers[1].color.r == markers[-1].markers[1].color.g, "grey joints")
+    assert any("has fallen silent since" in text for _, text in logged.lines)
+    rises = [text for _, text in logged.lines if text.startswith("alarm input_silence crank rises")]
+    assert len(rises) == 1
+    stage.legs().play(walk, monitor, begin_s=2.5)
+    answer = stage.call(Trigger, f"{ME}/acknowledge_alarms", Trigger.Request())
+    assert "input_silence" in answer.message
+
+
+def test_the_names_that_are_there_are_told_where_the_crank_is_not(stage, walk) -> None:
+    monitor = stage.monitor(diagnostics__period_s=0.1, crank_joint="kurbel")
+    diagnostics = stage.listen("/diagnostics", DiagnosticArray)
+    stage.legs().play(walk, monitor, end_s=0.5)
+
+    def told() -> bool:
+        one = line(diagnostics, "topics")
+        return one is not None and "no joint is named 'kurbel'; there are crank, hip, knee" in one.message
+
+    stage.wait_for(told, "the names")
+    assert "crank_joint" in line(diagnostics, "topics").message
+    assert line(diagnostics, "topics").level == b"\2"
+    stage.wait_for(
+        lambda: "do not name the crank 'kurbel'" in line(diagnostics, "input").message, "the cause"
+    )
+
+
+def test_a_topic_of_another_type_is_named_with_node_and_types(stage, walk) -> None:
+    stage.node.create_publisher(Float64, "drive_torque", 10)
+    stage.monitor(diagnostics__period_s=0.1)
+    diagnostics = stage.listen("/diagnostics", DiagnosticArray)
+    expected = (
+        "/drive_torque: /stage publishes std_msgs/msg/Float64, expected geometry_msgs/msg/WrenchStamped; "
+        "nothing comes from it"
+    )
+    stage.wait_for(lambda: diagnostics and expected in line(diagnostics, "topics").message, "both types")
+    assert line(diagnostics, "topics").level == b"\2"
+
+
+def test_two_publishers_of_one_crank_are_named_even_if_they_agree(stage, walk) -> None:
+    other = Node("simulator", context=stage.node.context)
+    other.create_publisher(JointState, "joint_states", 10)
+    other.create_publisher(WrenchStamped, "drive_torque", 10)
+    monitor = stage.monitor(diagnostics__period_s=0.1)
+    diagnostics = stage.listen("/diagnostics", DiagnosticArray)
+    alarms = stage.listen(f"{ME}/alarms", DiagnosticArray, latched=True)
+    stage.legs().play(walk, monitor, end_s=0.5)
+    expected = "/joint_states: 2 publishers: /simulator, /stage; expected one"
+    stage.wait_for(lambda: expected in line(diagnostics, "topics").message, "both publishers")
+    stage.wait_for(lambda: line(alarms, "input_sources torque") is not None, "the alarm of two torques")
+    assert line(alarms, "input_sources").level == b"\2"
+    other.destroy_node()
+
+
+def test_alarms_reach_the_log_of_the_node(stage, walk) -> None:
+    heard = stage.listen("/rosout", Log, matched=False)
+    monitor = stage.monitor(limits__clearance_m=3.05e-4, alarms__on_delay_cycles=1, diagnostics__period_s=0.1)
+    stage.legs().play(walk, monitor, end_s=3.0)
+    stage.wait_for(
+        lambda: any(one.msg.startswith("alarm clearance A rises from OK to WARN") for one in heard), "the log"
+    )

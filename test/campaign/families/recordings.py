@@ -1,7 +1,6 @@
 """Recordings: damaged, hostile, of another robot. Refused, told of, or as if whole."""
 
 from collections.abc import Callable
-from typing import Any
 
 from campaign.case import Case
 from campaign.recordings_bombs import bomb
@@ -9,11 +8,7 @@ from campaign.recordings_damaged import damaged
 from campaign.recordings_stored import expected
 from campaign.recordings_told import told, unlikely
 from campaign.recordings_traps import trap
-from leg_wear_monitor.mechanism.loader import load_mechanism
-from leg_wear_monitor.monitor.config import MonitorConfig
-from leg_wear_monitor.monitor.wear_monitor import WearMonitor
-from leg_wear_monitor.twin import follower
-from leg_wear_monitor.twin.load import FootLoad
+from campaign.warm_twin import keep_twin
 
 SHORT, LONG = 40, 2000
 
@@ -26,9 +21,9 @@ _KINDS: tuple[Callable[[int], Case], ...] = (
 
 def warm() -> None:
     """Compile what reads, and what replays; the tables of the leg are built once for all cases."""
+    keep_twin()
     expected()
     told(0)
-    _share_load()
 
 
 def case(seed: int) -> Case:
@@ -37,16 +32,3 @@ def case(seed: int) -> Case:
     make = _KINDS[kind]
     before = sum(each is make for each in _KINDS[:kind])
     return make(turn * sum(each is make for each in _KINDS) + before)
-
-
-def _share_load() -> None:
-    """All cases have the same leg, and each its own process: what takes seconds to build is built once."""
-    make, made = follower.FootLoad, []
-
-    def shared(*arguments: Any) -> FootLoad:
-        made.extend([] if made else [make(*arguments)])
-        return made[0]
-
-    follower.FootLoad = shared
-    config = MonitorConfig()
-    WearMonitor(load_mechanism(config.mechanism), config)

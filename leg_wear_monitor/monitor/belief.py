@@ -2,7 +2,8 @@
 
 The clearance is c = c_0 + d + x w: c_0 the nominal one when new, d what the part is off it, w the wear that
 the twin has counted with the nominal coefficient, x the joint's factor on it. x is lognormal and d normal
-beforehand; measured clearances have normal errors. d drops out in closed form, x stays on a grid.
+beforehand; measured clearances have normal errors. d drops out in closed form, x stays on a grid that is
+laid where the belief is: a measurement that counts moves it as far as it says, however far that is.
 """
 
 import math
@@ -17,7 +18,9 @@ from leg_wear_monitor.mechanism.arrays import Floats
 from leg_wear_monitor.monitor.forecast_config import Forecasting
 
 GRID = 801
-_WIDTH = 5.0  # standard deviations of the prior on both sides
+_WIDTH = 8.0  # standard deviations on both sides, of the prior and of what measurements say
+_DEEP = 25.0  # below the highest, of log density: what is left out weighs less than 1e-9
+_ZOOMS = 12  # each at least halves the grid's extent
 
 _phi = np.frompyfunc(NormalDist().cdf, 1, 1)
 
@@ -94,14 +97,46 @@ def believe(settings: Forecasting, fresh_m: float, looks: Sequence[Look] = ()) -
         Nominal clearance when new.
     looks : sequence of Look
     """
-    sigma = settings.wear_coefficient_sigma
-    log_factor = np.linspace(-_WIDTH * sigma, _WIDTH * sigma, GRID)
-    precision = 1.0 / settings.clearance_sigma_m**2 + sum(look.sigma_m**-2 for look in looks)
-    log_weight, pull = -0.5 * np.square(log_factor / sigma), np.zeros(GRID)
-    for look in looks:
-        residual = look.clearance_m - fresh_m - np.exp(log_factor) * look.wear_m
-        log_weight -= 0.5 * np.square(residual / look.sigma_m)
-        pull += residual / look.sigma_m**2
-    log_weight += 0.5 * np.square(pull) / precision
+    says = _says(settings, fresh_m, looks)
+    log_factor, log_weight = _laid_out(settings.wear_coefficient_sigma, *says)
     weight = np.exp(log_weight - log_weight.max())
+    precision = 1.0 / settings.clearance_sigma_m**2 + sum(look.sigma_m**-2 for look in looks)
+    pull = np.zeros(GRID)
+    for look in looks:
+        pull += (look.clearance_m - fresh_m - np.exp(log_factor) * look.wear_m) / look.sigma_m**2
     return Belief(log_factor, weight / weight.sum(), pull / precision, precision**-0.5, len(looks))
+
+
+def _says(settings: Forecasting, fresh_m: float, looks: Sequence[Look]) -> tuple[float, float]:
+    """What measurements say of the factor by themselves: its mean and its precision, 0 if they say nothing.
+
+    The clearance when new drops out: it makes their errors hang together.
+    """
+    if not any(look.wear_m for look in looks):
+        return 0.0, 0.0
+    opened, wear, sigma = np.array([(one.clearance_m - fresh_m, one.wear_m, one.sigma_m) for one in looks]).T
+    own, new = sigma**-2.0, settings.clearance_sigma_m**-2.0
+    # about what is common to all of them, so that nothing large cancels
+    common_wear, common = (float(own @ values) / (float(own.sum()) + new) for values in (wear, opened))
+    precision = float(own @ np.square(wear - common_wear)) + new * common_wear**2
+    product = float(own @ ((wear - common_wear) * (opened - common))) + new * common_wear * common
+    return product / precision, precision
+
+
+def _laid_out(sigma: float, mean: float, precision: float) -> tuple[Floats, Floats]:
+    """Grid (g,) over the factor's logarithm where its density is, and the logarithm of that, (g,)."""
+    low, high = -_WIDTH * sigma, _WIDTH * sigma
+    if precision > 0.0:
+        own = precision**-0.5
+        least = min(own, own**2 / abs(mean)) if mean < 0.0 else own
+        low += min(0.0, math.log(least) - _WIDTH)
+        high = max(high, math.log(max(mean, 0.0) + _WIDTH * own))
+    for _ in range(_ZOOMS):
+        grid = np.linspace(low, high, GRID)
+        density = -0.5 * np.square(grid / sigma) - 0.5 * precision * np.square(np.exp(grid) - mean)
+        near = np.flatnonzero(density > density.max() - _DEEP)
+        first, last = max(near[0] - 1, 0), min(near[-1] + 1, GRID - 1)
+        if last - first > GRID // 2:
+            break
+        low, high = grid[first], grid[last]
+    return grid, density

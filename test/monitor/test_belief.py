@@ -6,7 +6,7 @@ import statistics
 import attrs
 import numpy as np
 import pytest
-from hypothesis import given
+from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from leg_wear_monitor import ConfigError, load_mechanism
@@ -48,6 +48,49 @@ def test_an_accurate_measurement_of_much_wear_tells_the_factor(factor):
     belief = believe(exact, FRESH, [Look(FRESH + factor * wear, 5e-6, wear)])
     assert math.exp(belief.mean) == pytest.approx(factor, rel=0.02 / factor + 0.01)
     assert belief.sigma == pytest.approx(5e-6 / (factor * wear), rel=0.2)
+
+
+@given(st.floats(-3.0, 3.0), st.floats(-7.0, -4.0))
+def test_exact_measurements_are_believed_however_far_they_are_from_the_prior(power, sigma_power):
+    """Two measurements of one part: their difference is the factor times the wear between them."""
+    factor, sigma = 10.0**power, 10.0**sigma_power * 10.0**power * 1e-3
+    looks = [Look(FRESH, sigma, 0.0), Look(FRESH + factor * 1e-4, sigma, 1e-4)]
+    belief = believe(attrs.evolve(PRIOR, clearance_sigma_m=1e-3), FRESH, looks)
+    spread = sigma * math.sqrt(2.0) / (factor * 1e-4)
+    p10, p50, p90 = np.exp(belief.log_factors((0.1, 0.5, 0.9)))
+    # the prior's pull is its slope times the variance of what was measured
+    assert math.log(p50 / factor) == pytest.approx(0.0, abs=spread + 40.0 * spread**2)
+    assert belief.sigma == pytest.approx(spread, rel=0.05)
+    z = statistics.NormalDist().inv_cdf(0.9)
+    assert math.log(p90 / p50) == pytest.approx(z * spread, rel=0.1)
+    assert math.log(p50 / p10) == pytest.approx(z * spread, rel=0.1)
+
+
+@pytest.mark.parametrize("factor", [0.02, 60.0, 200.0, 5000.0])
+def test_an_accepted_measurement_moves_the_belief_as_far_as_it_says(factor):
+    told = found(worn(1e-6 if factor > 1.0 else 1e-4), 1e3 * (FRESH + factor * 1e-6), accept=True)
+    if factor > 1.0:
+        low, middle, high = np.exp(told.after.log_factors((0.1, 0.5, 0.9)))
+        assert middle == pytest.approx(factor, rel=0.5 if factor < 100.0 else 0.05)
+        assert 0.0 < low < middle < high
+        assert f"{middle:.3g} times the nominal one" in told.words[-1]
+    else:  # next to no wear where the twin has counted much
+        assert np.exp(told.after.log_factors(0.9)) < 0.2
+
+
+@settings(max_examples=25)
+@given(st.floats(-0.9, 60.0), st.floats(0.1, 10.0), st.floats(0.02, 3.0))
+def test_the_belief_is_prior_times_likelihood(mean, own, sigma):
+    """Against a plain sum over a grid that is wide and fine, for a measurement that is not exact."""
+    prior = attrs.evolve(PRIOR, wear_coefficient_sigma=sigma, clearance_sigma_m=1e-9)
+    belief = believe(prior, FRESH, [Look(FRESH + mean * 1e-5, own * 1e-5, 1e-5)])
+    u = np.linspace(-12.0 * sigma - 5.0, 12.0 * sigma + 5.0, 200_001)
+    log_weight = -0.5 * (u / sigma) ** 2 - 0.5 * ((np.exp(u) - mean) / own) ** 2
+    weight = np.exp(log_weight - log_weight.max())
+    weight /= weight.sum()
+    assert belief.mean == pytest.approx(weight @ u, abs=0.01 * belief.sigma + 2e-4)
+    assert belief.sigma == pytest.approx(np.sqrt(weight @ (u - weight @ u) ** 2), rel=0.02)
+    assert belief.weight[[0, -1]].max() < 1e-6
 
 
 @given(st.permutations(range(4)))

@@ -1,6 +1,7 @@
 """``leg-wear-monitor check``: what is wrong with a configuration or an installation."""
 
 import platform
+import warnings
 from collections.abc import Callable, Mapping
 from functools import partial
 from importlib import metadata
@@ -8,12 +9,15 @@ from pathlib import Path
 
 import click
 
+from leg_wear_monitor.cli.doubts import warn_of
 from leg_wear_monitor.cli.main import version
 from leg_wear_monitor.cli.output import check_directory
 from leg_wear_monitor.cli.simulate import DEFAULT_MODEL
 from leg_wear_monitor.cli.waiting import compilation, is_compiled
-from leg_wear_monitor.errors import LegWearError
+from leg_wear_monitor.errors import ConfigWarning, LegWearError
 from leg_wear_monitor.share import share_directory
+
+DOUBTED = 1
 
 _LIBRARIES = ("attrs", "cattrs", "click", "jinja2", "matplotlib", "numba", "numpy", "rich", "ruamel.yaml")
 
@@ -23,9 +27,17 @@ _LIBRARIES = ("attrs", "cattrs", "click", "jinja2", "matplotlib", "numba", "nump
 def check(configs: tuple[str, ...]) -> int:
     """Check files of mechanisms and of parameters, or, without any, the installation and its own files.
 
-    Prints a line for each that is in order, and one on stderr for each that is not.
+    Prints what was understood of each that is in order, and a line on stderr for each that is not. A value
+    that is likely meant in another unit is a warning; the exit code is then 1.
     """
-    return 0 if (_all_well(_files(configs)) if configs else _installation()) else 2
+    with warnings.catch_warnings(record=True) as doubted:
+        warnings.simplefilter("always", ConfigWarning)
+        well = _all_well(_files(configs)) if configs else _installation()
+    for doubt in doubted:
+        warnings.showwarning(doubt.message, doubt.category, doubt.filename, doubt.lineno)
+    if not well:
+        return 2
+    return DOUBTED if any(one.category is ConfigWarning for one in doubted) else 0
 
 
 def _installation() -> bool:
@@ -39,7 +51,7 @@ def _installation() -> bool:
     from leg_wear_monitor.monitor.parameter_file import shipped_config
 
     shipped = {"monitor.yaml": partial(_parameters, str(shipped_config()))}
-    return _all_well({name: partial(_mechanism, name) for name in shipped_mechanisms()} | shipped)
+    return _all_well({name: partial(_first_line, name) for name in shipped_mechanisms()} | shipped)
 
 
 def _all_well(parts: Mapping[str, Callable[[], str]]) -> bool:
@@ -94,27 +106,37 @@ def _parameters(path: str) -> str:
     from leg_wear_monitor.mechanism.loader import load_mechanism
     from leg_wear_monitor.monitor.fitting import fitted, twin_settings
     from leg_wear_monitor.monitor.parameter_file import load_config
+    from leg_wear_monitor.monitor.plausible_parameters import parameter_doubts
 
     config = load_config(path)
     leg = fitted(load_mechanism(config.mechanism), config, path)
     twin_settings(config, path)
+    warn_of(path, parameter_doubts(config, leg))
     return (
         f"parameters of the monitor: {config.mechanism}, {', '.join(leg.loose)} loose, "
         f"{config.cadence.commanded_rpm:g} rpm, hardware {config.hardware}"
     )
 
 
+def _first_line(name: str) -> str:
+    return _mechanism(name).splitlines()[0]
+
+
 def _mechanism(name: str) -> str:
     """Load, assemble and turn a mechanism, and say what it is."""
     from leg_wear_monitor.mechanism.loader import load_mechanism
+    from leg_wear_monitor.mechanism.plausible import doubts
+    from leg_wear_monitor.mechanism.understood import understood
 
     leg = load_mechanism(name)
     with compilation("mechanism", "a few seconds"):
         from leg_wear_monitor.dynamics.simulation import prepare
 
-        prepare(leg)
+        linkage = prepare(leg).linkage
+    warn_of(leg.source, doubts(leg))
     loose = f"{', '.join(leg.loose)} loose" if leg.loose else "none loose"
-    return (
+    what = (
         f"{len(leg.bodies)} moving bodies, {len(leg.joints)} joints ({loose}), mobility 1, "
         "closes, and the crank turns through"
     )
+    return "\n".join([what, *(f"{'':13} {statement}" for statement in understood(linkage))])

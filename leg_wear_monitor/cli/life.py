@@ -6,6 +6,7 @@ from typing import TYPE_CHECKING, Any
 
 import click
 
+from leg_wear_monitor.cli.doubts import warn_of
 from leg_wear_monitor.cli.number import bounded, options_named
 from leg_wear_monitor.cli.output import check_directory, check_file, write_directory, write_file
 from leg_wear_monitor.cli.waiting import compilation, progress_bar
@@ -88,6 +89,7 @@ def life(mechanism: str, json_file: Path | None, out: Path | None, **options: An
     the figures have scatter, which is told.
     """
     from leg_wear_monitor.mechanism.loader import load_mechanism
+    from leg_wear_monitor.mechanism.plausible import doubts
 
     names = options.pop("clearances")
     leg = _with_loose(load_mechanism(mechanism), names)
@@ -97,6 +99,7 @@ def life(mechanism: str, json_file: Path | None, out: Path | None, **options: An
         check_directory("--out", out)
     with options_named():
         lives = _lives(leg, **options)
+    warn_of(leg.source, doubts(leg))  # what fails names them itself, in its one line
     result = lives[0][1]
     for line in lines(result, options["limit_m"]):
         click.echo(line)

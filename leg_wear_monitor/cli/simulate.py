@@ -7,6 +7,7 @@ from typing import TYPE_CHECKING, Any
 
 import click
 
+from leg_wear_monitor.cli.doubts import warn_of
 from leg_wear_monitor.cli.number import bounded, options_named
 from leg_wear_monitor.cli.output import check_directory, check_file, write_directory, write_file
 from leg_wear_monitor.cli.waiting import compilation, progress_bar
@@ -108,6 +109,7 @@ def simulate(mechanism: str, json_file: Path | None, out: Path | None, **options
     if options["cycles"] is not None and options["duration"] is not None:
         raise click.UsageError("--cycles and --duration exclude each other")
     from leg_wear_monitor.mechanism.loader import load_mechanism
+    from leg_wear_monitor.mechanism.plausible import doubts
 
     leg = load_mechanism(mechanism)
     to_stdout = json_file == Path("-")
@@ -117,6 +119,7 @@ def simulate(mechanism: str, json_file: Path | None, out: Path | None, **options
         check_directory("--out", out)
     with options_named():
         result, wall_s = _run(leg, _keywords(**options))
+    warn_of(leg.source, doubts(leg))  # what fails names them itself, in its one line
     record = _record(result, wall_s)
     written = _write(record, leg, result, json_file, out)
     if not to_stdout:

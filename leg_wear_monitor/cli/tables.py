@@ -83,7 +83,8 @@ def _summary(record: dict[str, Any], result: "SimulationResult") -> Iterator[tup
         yield "wear", "greatest depth; 1 pm a cycle makes 1 um in a million cycles"
         yield "zone", "holds 90 % of the bushing's wear, in angles of its own body"
     names = ("mean", "rms", "min", "max", "p99")
-    yield "drive torque", ", ".join(f"{name} {figure(torque[name])}" for name in names) + " N m"
+    signed = ", ".join(f"{name} {figure(torque[name])}" for name in names)
+    yield "drive torque", f"{signed} N m; largest magnitude {figure(torque['max_abs'])} N m"
     if result.loose and record["toe"] is not None:
         yield "off the ideal", f"at most {_response(record['toe'], torque)}"
     if record["energy_j"] is not None:

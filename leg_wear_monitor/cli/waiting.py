@@ -27,11 +27,15 @@ def is_compiled(kernels: str) -> bool:
 
 @contextmanager
 def compilation(kernels: str, how_long: str = "about half a minute") -> Iterator[None]:
-    """Say so before the work inside compiles a set of kernels for the first time; note when it is done."""
+    """Say so before the work inside compiles a set of kernels for the first time; note when it is done.
+
+    Only a terminal is told: in a pipe, stderr is for what programs must see.
+    """
     if is_compiled(kernels):
         yield
         return
-    click.echo(f"compiling for this machine, once: {how_long}", err=True)
+    if sys.stderr.isatty():
+        click.echo(f"compiling for this machine, once: {how_long}", err=True)
     yield
     mark = _mark(kernels)
     if mark is not None:

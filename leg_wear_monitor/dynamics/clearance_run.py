@@ -1,8 +1,9 @@
 """The real-time formulation: a stepper that a twin can drive, and a run that a simulation can ask."""
 
-import math
+from copy import copy
 from typing import NamedTuple
 
+import attrs
 import numpy as np
 
 from leg_wear_monitor.dynamics.clearance import (
@@ -19,7 +20,7 @@ from leg_wear_monitor.dynamics.clearance_layout import stored_shapes, views
 from leg_wear_monitor.dynamics.clearance_tables import ClearanceTables, build_tables
 from leg_wear_monitor.dynamics.drive import steady_drive
 from leg_wear_monitor.dynamics.run import DONE, Sample, Setup, stop
-from leg_wear_monitor.dynamics.tally import Tally
+from leg_wear_monitor.dynamics.tally import Tally, new_tally
 from leg_wear_monitor.dynamics.touch import F_N
 from leg_wear_monitor.errors import ConfigError
 from leg_wear_monitor.mechanism.arrays import Floats
@@ -29,6 +30,7 @@ from leg_wear_monitor.mechanism.spec import Mechanism, SpeedDrive, TorqueDrive
 INTERVALS = 2048  # of a turn at the setup's speed
 TOLERANCE_M = 5.0e-9  # local error of a step in the eccentricities [m]: finer, the means stay as they are
 TOLERANCE_RATE = 1.0e4  # 1/s: the same for their rates, over the time a contact takes
+_ROUNDING = 1.0e-6  # of an interval: what is left to a time that falls on a whole one
 
 
 class Snapshot(NamedTuple):
@@ -134,14 +136,13 @@ class ClearanceRun:
     Parameters
     ----------
     setup : Setup
-    samples : int
-        Samples a turn that must fall on whole intervals; 0 for none.
+    intervals : int
+        Of a turn, as `INTERVALS`.
     """
 
-    def __init__(self, setup: Setup, samples: int = 0) -> None:
+    def __init__(self, setup: Setup, intervals: int = INTERVALS) -> None:
         if not isinstance(setup.linkage.mechanism.drive, SpeedDrive):
             raise needs_speed(setup.linkage.mechanism)
-        intervals = max(samples, 1) * math.ceil(INTERVALS / max(samples, 1))
         self.stepper = ClearanceStepper(setup, TURN / abs(setup.speed) / intervals)
         self._setup = setup
         self._polynomial = steady_drive(0.0, setup.speed)
@@ -188,6 +189,28 @@ class ClearanceRun:
         force[ideal] = np.sqrt(force[ideal])
         toe = work.toe.copy() if self._setup.linkage.mechanism.toe else None
         return Sample(float(self.stepper.state.drive[ANGLE]), toe, float(work.reaction[0]), force)
+
+    def branch(self) -> "ClearanceRun":
+        """A run of its own that goes on from here; this one stays as it is."""
+        surfaces = self._setup.surfaces._replace(depth=self.stepper.state.depth.copy())
+        run, model = copy(self), self.stepper.model
+        run._setup = attrs.evolve(self._setup, surfaces=surfaces)
+        run.stepper = ClearanceStepper(run._setup, model.interval, tables=model.tables)
+        run.stepper.restore(self.stepper.snapshot())
+        return run
+
+    def sample_at(self, t: float) -> Sample:
+        """The leg at a time [s] less than an interval from here; what is left to it is a shorter interval."""
+        stepper, rest = self.stepper, t - self.time
+        if rest <= _ROUNDING * stepper.model.interval:
+            return self.sample()
+        run = self.branch()
+        run.stepper.model = stepper.model._replace(interval=rest)
+        run.stepper.state.intervals[0] = 0.0
+        angle, speed, _ = stepper.state.drive
+        run._polynomial = steady_drive(angle, speed)
+        run.advance(rest, new_tally(len(self._setup.linkage.mechanism.joints)))
+        return run.sample()
 
     def _observe(self) -> float:
         stepper = self.stepper

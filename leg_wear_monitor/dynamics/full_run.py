@@ -1,5 +1,8 @@
 """The full-coordinate formulation as a run."""
 
+from copy import copy
+
+import attrs
 import numpy as np
 
 from leg_wear_monitor.dynamics.drive import steady_drive
@@ -25,8 +28,6 @@ class FullRun:
     Parameters
     ----------
     setup : Setup
-    samples : int
-        Samples a turn, which this formulation can take anywhere.
     tolerance_m : float
         Local error allowed in a step [m or rad]; that of velocities is 1e4 times it per second.
 
@@ -36,7 +37,7 @@ class FullRun:
         All that a continuation needs, the surfaces aside.
     """
 
-    def __init__(self, setup: Setup, samples: int = 0, tolerance_m: float = TOLERANCE_M) -> None:
+    def __init__(self, setup: Setup, tolerance_m: float = TOLERANCE_M) -> None:
         linkage = setup.linkage
         driven = isinstance(linkage.mechanism.drive, SpeedDrive)
         self._setup = setup
@@ -45,7 +46,8 @@ class FullRun:
         self.toe: Toe = ideal_toe(linkage, setup.speed) if driven else NO_TOE
         self.polynomial = steady_drive(0.0, setup.speed)
         sectors = setup.surfaces.depth.shape[2]
-        self._work = full_work(self.model, tolerance_m, tolerance_m * TOLERANCE_RATE, sectors)
+        self._tolerances = tolerance_m, tolerance_m * TOLERANCE_RATE
+        self._work = full_work(self.model, *self._tolerances, sectors)
         self.advance(0.0, new_tally(0))  # evaluates the start, so that it can be sampled
 
     @property
@@ -87,6 +89,19 @@ class FullRun:
         )
         if status != DONE:
             raise stop(self._setup, status, k, self.time)
+
+    def branch(self) -> "FullRun":
+        """A run of its own that goes on from here; this one stays as it is."""
+        run = copy(self)
+        surfaces = self._setup.surfaces._replace(depth=self._setup.surfaces.depth.copy())
+        run._setup = attrs.evolve(self._setup, surfaces=surfaces)
+        run.state = FullState(*(part.copy() for part in self.state))
+        run._work = full_work(run.model, *self._tolerances, surfaces.depth.shape[2])
+        return run
+
+    def sample_at(self, _t: float) -> Sample:
+        """The leg as it is now: this formulation goes to any time."""
+        return self.sample()
 
     def sample(self) -> Sample:
         """The leg as it is now."""

@@ -31,6 +31,7 @@ def ideal_result(setup: Setup, cycles: float, trace: int) -> SimulationResult:
             "min": float(torque.min()),
             "max": float(torque.max()),
             "p99": float(np.percentile(torque, 99.0)),
+            "max_abs": float(np.abs(torque).max()),
             "max_error": 0.0,
         },
         energy_j=None,

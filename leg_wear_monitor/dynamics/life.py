@@ -29,6 +29,7 @@ from leg_wear_monitor.dynamics.tally import ARCHARD, Tally, new_tally
 from leg_wear_monitor.errors import ConfigError, SimulationError
 from leg_wear_monitor.mechanism.arrays import Floats
 from leg_wear_monitor.mechanism.ideal import TURN
+from leg_wear_monitor.mechanism.plausible import suspects
 from leg_wear_monitor.mechanism.quantity import described, quantity
 from leg_wear_monitor.mechanism.spec import Mechanism
 from leg_wear_monitor.wear.cycle_jump import (
@@ -207,7 +208,8 @@ class LifeRun:
         outcomes = advance_batch(self._steppers, self._polynomials, ends, tallies, self._workers)
         for (status, k), setup, stepper in zip(outcomes, self._setups, self._steppers, strict=True):
             if status != DONE:
-                raise stop(setup, status, k, stepper.time)
+                stopped = stop(setup, status, k, stepper.time)
+                raise SimulationError(f"{stopped}{suspects(setup.linkage.mechanism)}")
         return tallies
 
 

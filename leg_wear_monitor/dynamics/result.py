@@ -81,7 +81,10 @@ class SimulationResult:
 
 
 def drive_torque(tally: Tally) -> dict[str, float]:
-    """Mean, RMS, range and 99th percentile of the drive torque, and its largest error against the ideal."""
+    """Mean, RMS, range and 99th percentile of the drive torque, its largest magnitude, and its largest error.
+
+    ``p99`` is of the signed torque, as ``min`` and ``max`` are; ``max_error`` is against the ideal linkage.
+    """
     mean, square = tally.drive_integral[[TORQUE, TORQUE_SQUARED]] / tally.time[0]
     return {
         "mean": float(mean),
@@ -89,6 +92,7 @@ def drive_torque(tally: Tally) -> dict[str, float]:
         "min": float(tally.drive_range[0]),
         "max": float(tally.drive_range[1]),
         "p99": signed_percentile(tally.torque_time, 0.99),
+        "max_abs": float(np.abs(tally.drive_range).max()),
         "max_error": float(tally.response[3]),
     }
 

@@ -2,8 +2,10 @@
 
 import math
 from collections.abc import Callable, Iterator, Sequence
+from pathlib import Path
 
 from leg_wear_monitor.contact.arrays import clearance_settings, compile_contacts
+from leg_wear_monitor.dynamics.arguments import check_kinds, given_joints, given_mechanism
 from leg_wear_monitor.dynamics.clearance_run import ClearanceRun
 from leg_wear_monitor.dynamics.full_run import FullRun
 from leg_wear_monitor.dynamics.ideal_result import ideal_result
@@ -18,13 +20,16 @@ from leg_wear_monitor.dynamics.result import (
 )
 from leg_wear_monitor.dynamics.run import Run, Setup
 from leg_wear_monitor.dynamics.tally import new_tally
-from leg_wear_monitor.errors import ConfigError
+from leg_wear_monitor.dynamics.tracer import Traceable, Tracer
+from leg_wear_monitor.errors import AssemblyError, ConfigError, SimulationError
 from leg_wear_monitor.mechanism.ideal import TURN, check_cycle
+from leg_wear_monitor.mechanism.plausible import suspects
 from leg_wear_monitor.mechanism.position import build_linkage
 from leg_wear_monitor.mechanism.spec import Mechanism, SpeedDrive, TorqueDrive
+from leg_wear_monitor.mechanism.strict import shown
 from leg_wear_monitor.wear.surfaces import SECTORS, fresh_surfaces
 
-MODELS: dict[str, Callable[[Setup, int], Run]] = {"clearance": ClearanceRun, "full": FullRun}
+MODELS: dict[str, Callable[[Setup], Traceable]] = {"clearance": ClearanceRun, "full": FullRun}
 
 _REPORTS_A_CYCLE = 20
 
@@ -50,11 +55,13 @@ def prepare(
     ------
     ConfigError, AssemblyError
     """
-    loose = mechanism.loose if clearances is None else tuple(clearances)
-    if len(set(loose)) < len(loose):
-        raise ConfigError("clearances", "", f"{','.join(loose)!r} names a joint twice")
+    check_kinds(clearance_m=clearance_m, speed_rpm=speed_rpm)
+    loose = mechanism.loose if clearances is None else given_joints(clearances, mechanism)
     linkage = build_linkage(mechanism)
-    check_cycle(linkage)
+    try:
+        check_cycle(linkage)
+    except AssemblyError as error:
+        raise AssemblyError(f"{error}{suspects(mechanism)}") from error
     settings = clearance_settings(mechanism, loose, clearance_m, normal_law)
     contacts = compile_contacts(mechanism, loose, settings)
     return Setup(
@@ -63,7 +70,7 @@ def prepare(
 
 
 def simulate(
-    mechanism: Mechanism,
+    mechanism: Mechanism | str | Path,
     *,
     clearances: Sequence[str] | None = None,
     clearance_m: float | None = None,
@@ -81,7 +88,8 @@ def simulate(
 
     Parameters
     ----------
-    mechanism : Mechanism
+    mechanism : Mechanism, str or pathlib.Path
+        A mechanism, the name of one that comes with the package, or its file.
     clearances : sequence of str, optional
         Names of the loose joints; empty for the ideal leg; the mechanism's own if not given.
     clearance_m : float, optional
@@ -113,6 +121,8 @@ def simulate(
     SimulationError
         Where the motion diverges, naming joint, time and what to try.
     """
+    mechanism = given_mechanism(mechanism)
+    check_kinds(cycles=cycles, duration_s=duration_s, skip_cycles=skip_cycles, trace=trace, wear=wear)
     setup = prepare(
         mechanism,
         clearances=clearances,
@@ -122,12 +132,15 @@ def simulate(
         normal_law=normal_law,
     )
     model = model or default_model(mechanism)
-    if model not in MODELS:
-        raise ConfigError("model", "", f"{model!r} is not one of {', '.join(MODELS)}")
+    if not isinstance(model, str) or model not in MODELS:
+        raise ConfigError("model", "", f"{shown(model)} is not one of {', '.join(MODELS)}")
     skipped, counted = _spans(setup, cycles, duration_s, skip_cycles, trace)
     if not setup.loose and isinstance(mechanism.drive, SpeedDrive):
         return ideal_result(setup, counted * abs(setup.speed) / TURN, trace)
-    return _run(setup, MODELS[model](setup, trace), model, skipped, counted, trace, progress)
+    try:
+        return _run(setup, MODELS[model](setup), model, skipped, counted, trace, progress)
+    except SimulationError as error:
+        raise SimulationError(f"{error}{suspects(mechanism)}") from error
 
 
 def _speed(mechanism: Mechanism, speed_rpm: float | None) -> float:
@@ -172,7 +185,7 @@ def _spans(
 
 def _run(
     setup: Setup,
-    run: Run,
+    run: Traceable,
     model: str,
     skipped: float,
     counted: float,
@@ -186,14 +199,15 @@ def _run(
     for t in _instants(0.0, skipped, period / _REPORTS_A_CYCLE):
         run.advance(t, new_tally(joints))
         report(t / (skipped + counted))
-    tally, samples = new_tally(joints), [run.sample()]
-    angle = samples[0].crank_angle
+    tally = new_tally(joints)
+    tracer = Tracer(run, joints, skipped, skipped + counted, period / trace if trace else math.inf)
+    angle = run.sample().crank_angle
     stored, depth = run.stored_energy, setup.surfaces.depth.copy()
-    for t in _instants(skipped, skipped + counted, period / (trace or _REPORTS_A_CYCLE)):
+    # the run goes to the same instants with and without a trace, which only looks ahead: so it is the same
+    for t in _instants(skipped, skipped + counted, period / _REPORTS_A_CYCLE):
+        tracer.look_ahead(t)
         run.advance(t, tally)
         report(t / (skipped + counted))
-        if trace:
-            samples.append(run.sample())
     if not tally.time[0] > 0.0:
         raise ConfigError(
             "duration", "", f"{counted:g} s is too short for this model; expected more, or model full"
@@ -212,7 +226,7 @@ def _run(
         toe=toe_errors(tally) if mechanism.toe and isinstance(mechanism.drive, SpeedDrive) else None,
         joints=joint_figures(setup, tally, setup.surfaces.depth - depth, turned),
         impacts=impact_lists(setup, tally),
-        trace=trace_columns(setup, samples[:-1]) if trace else None,
+        trace=trace_columns(setup, tracer.samples) if trace else None,
         loose=setup.loose,
         surfaces=setup.surfaces,
     )

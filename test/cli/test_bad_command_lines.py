@@ -2,12 +2,13 @@
 
 import pytest
 
+from leg_wear_monitor.cli import waiting
 from leg_wear_monitor.dynamics import simulation
 
 # arguments, and what the line must say
 WRONG = [
     ("", ["no verb", "check, ", "--help"]),
-    ("simulat", ["'simulat'", "check, "]),
+    ("simulat", ["'simulat'", "check, ", "did you mean simulate?"]),
     ("simulate --clearence A", ["--clearence", "--clearance"]),
     ("simulate bionic_leg", ["bionic_leg", "unexpected"]),
     ("simulate --json", ["--json", "argument"]),
@@ -34,6 +35,8 @@ WRONG = [
     ("simulate --mechanism andrews", ["andrews.yaml", "drive.torque", "--duration"]),
     ("simulate --mechanism andrews --duration 1 --speed-rpm 9", ["--speed-rpm", "9 rpm", "torque"]),
     ("simulate --mechanism dog_leg", ["dog_leg", "./leg.yaml", "bionic_leg"]),
+    ("simulate --mechanism bionicleg", ["did you mean bionic_leg?"]),
+    ("simulate --clearances a,B", ["--clearances", "'a'", "did you mean A?"]),
     ("simulate --mechanism dog_leg.yaml", ["dog_leg.yaml", "No such file"]),
     ("simulate --mechanism four_bar.yaml", ["four_bar.yaml", "No such file", "four_bar without .yaml"]),
     ("simulate --mechanism ./", [".", "no mechanism"]),
@@ -84,6 +87,17 @@ def test_a_target_that_cannot_be_written_is_found_before_the_run(
 
 
 @pytest.mark.plain
+def test_bad_input_is_one_line_where_kernels_are_still_to_be_compiled(run, monkeypatch, tmp_path):
+    """A pipe's reader takes the first line on stderr for the fault."""
+    monkeypatch.setattr(waiting, "is_compiled", lambda _kernels: False)
+    monkeypatch.setattr(waiting, "_mark", lambda _kernels: tmp_path / "mark")
+    result = run("simulate", "--speed-rpm", "0")
+    assert result.exit_code == 2
+    (line,) = result.stderr.splitlines()
+    assert line.startswith("error: --speed-rpm: ")
+
+
+@pytest.mark.plain
 def test_check_names_every_bad_file_and_describes_the_good(run, complaints, shipped, tmp_path):
     (tmp_path / "one.yaml").write_text(shipped("four_bar").replace("mass: 0.40", "mass: 0"))
     (tmp_path / "two.yaml").write_text(shipped("four_bar").replace("gravity", "gravitas"))
@@ -96,3 +110,25 @@ def test_check_names_every_bad_file_and_describes_the_good(run, complaints, ship
     assert result.stdout.startswith("good.yaml")
     for part in ("3 moving bodies", "4 joints", "B, C loose", "mobility 1", "turns through"):
         assert part in result.stdout
+
+
+@pytest.mark.plain
+def test_check_doubts_another_unit_and_says_what_it_understood(run, complaints, shipped, tmp_path):
+    text = shipped("four_bar")
+    (tmp_path / "good.yaml").write_text(text)
+    (tmp_path / "soft.yaml").write_text(text.replace("2.07e11", "207"))
+    good, soft = run("check", "good.yaml"), run("check", "soft.yaml")
+    assert (good.exit_code, complaints(good)) == (0, [])
+    for part in (
+        "largest link",
+        "heaviest mass",
+        "120 rpm counter-clockwise",
+        "E 207 GPa",
+        "0.2 mm in a radius of 8 mm",
+    ):
+        assert part in good.stdout
+    assert soft.exit_code == 1
+    (line,) = complaints(soft)
+    assert line.startswith("warning: soft.yaml: clearances (")
+    assert "youngs_modulus: 207 Pa" in line
+    assert line.endswith("GPa for Pa?")

@@ -13,7 +13,7 @@ TOP = [
     "mechanism", "model", "speed_rpm", "cycles", "wall_s", "simulated_s", "real_time_factor",
     "drive_torque_nm", "energy_j", "toe", "joints", "impacts", "trace",
 ]  # fmt: skip
-TORQUE = {"mean", "rms", "min", "max", "p99", "max_error"}
+TORQUE = {"mean", "rms", "min", "max", "p99", "max_abs", "max_error"}
 TOE = {"max_position_error_m", "max_velocity_error_mps", "max_acceleration_error_mps2"}
 ANY_JOINT = {"mean_force_n", "rms_force_n", "p99_force_n", "max_force_n"}
 LOOSE_JOINT = ANY_JOINT | {

@@ -31,7 +31,7 @@ def test_walls_that_wear_away_take_energy_along(leg, model, cycles, bound):
         name: attrs.evolve(c, wear_coefficient=tuple(3.0e4 * k for k in c.wear_coefficient))
         for name, c in leg.clearances.items()
     }
-    run = model(prepare(attrs.evolve(leg, clearances=fast), clearances="ABGIJ", wear=True))
+    run = model(prepare(attrs.evolve(leg, clearances=fast), clearances=tuple("ABGIJ"), wear=True))
     run.advance(1.0, new_tally(len(leg.joints)))
     tally, start = new_tally(len(leg.joints)), run.stored_energy
     run.advance(1.0 + cycles, tally)

@@ -1,10 +1,13 @@
 """simulate: what is counted, and that its figures are those of the parts below it."""
 
+import math
+
 import numpy as np
 import pytest
 
 from leg_wear_monitor import ConfigError, load_mechanism, simulate
 from leg_wear_monitor.mechanism.ideal import TURN, one_cycle
+from leg_wear_monitor.share import share_directory
 
 FULL = {"model": "full"}
 
@@ -37,7 +40,7 @@ def test_backwards_the_ideal_trace_runs_backwards(leg):
 
 
 def test_backwards_with_clearances(leg):
-    result = simulate(leg, clearances="G", cycles=0.25, skip_cycles=0.0, speed_rpm=-60.0, trace=16, **FULL)
+    result = simulate(leg, clearances=("G",), cycles=0.25, skip_cycles=0.0, speed_rpm=-60.0, trace=16, **FULL)
     assert result.speed_rpm == pytest.approx(-60.0)
     assert result.trace["crank_angle_rad"] == pytest.approx(np.arange(4) * -TURN / 16, abs=1.0e-6)
     assert result.joints["G"]["mean_force_n"] > 10.0
@@ -113,3 +116,72 @@ def test_a_torque_drive_has_no_cycles():
 def test_what_cannot_be_is_refused(leg, options, fault):
     with pytest.raises(ConfigError, match=fault):
         simulate(leg, **options)
+
+
+@pytest.mark.parametrize("model", ["clearance", "full"])
+@pytest.mark.parametrize("points", [7, 64])
+def test_a_trace_does_not_change_the_motion(leg, model, points):
+    span = {"clearances": ("A", "G"), "cycles": 0.5, "skip_cycles": 0.1, "wear": True, "model": model}
+    plain, traced = (simulate(leg, **span, trace=n) for n in (0, points))
+    with_trace = traced.to_dict()
+    trace = with_trace.pop("trace")
+    assert with_trace == plain.to_dict()
+    np.testing.assert_array_equal(traced.surfaces.depth, plain.surfaces.depth)
+    wanted = TURN * (0.1 + np.arange(math.ceil(points / 2)) / points)
+    np.testing.assert_allclose(trace["crank_angle_rad"], wanted, atol=1e-9)
+
+
+def test_a_trace_lies_on_the_motion(leg):
+    """Samples of two traces at the same crank angles agree, though they were taken on different branches."""
+    span = {"clearances": ("G",), "cycles": 0.25, "skip_cycles": 0.0}
+    few, many = (simulate(leg, **span, trace=n).trace for n in (24, 72))
+    for name in ("toe_x_m", "toe_y_m", "drive_torque_nm"):
+        np.testing.assert_allclose(few[name], many[name][::3], rtol=1e-6, atol=1e-9)
+
+
+def test_the_largest_magnitude_of_the_torque_stands_beside_its_signed_percentile(leg):
+    for clearances in ((), ("G",)):
+        torque = simulate(leg, clearances=clearances, cycles=0.5, skip_cycles=0.0).drive_torque_nm
+        assert torque["max_abs"] == max(-torque["min"], torque["max"]) > 0.0
+        assert torque["p99"] <= torque["max"]
+
+
+def test_a_mechanism_can_be_given_by_name_and_by_path(leg, document, tmp_path):
+    (tmp_path / "my leg.yaml").write_text(
+        (share_directory() / "config/mechanisms/bionic_leg.yaml").read_text()
+    )
+    wanted = simulate(leg, clearances=(), cycles=1).to_dict()
+    assert simulate("bionic_leg", clearances=(), cycles=1).to_dict() == wanted
+    assert simulate(tmp_path / "my leg.yaml", clearances=(), cycles=1).to_dict() == wanted
+
+
+@pytest.mark.parametrize(
+    ("given", "said"),
+    [
+        ({"mechanism": "bionik_leg"}, "did you mean bionic_leg?"),
+        ({"mechanism": 7}, "mechanism: 7 is no Mechanism, nor a name or a file of one"),
+        ({"clearances": "AB"}, "clearances: 'AB' is a text, expected a list of names"),
+        ({"clearances": 5}, "clearances: 5 is not a list of names"),
+        ({"clearances": [1]}, "clearances: 1 is not the name of a joint"),
+        ({"clearances": ["g"]}, "did you mean G?"),
+        ({"cycles": "5"}, "cycles: '5' is not a number"),
+        ({"cycles": None}, "cycles: nothing is not a number"),
+        ({"cycles": True}, "cycles: True is not a number"),
+        ({"cycles": [1]}, "is not a number"),
+        ({"duration_s": "1"}, "duration: '1' is not a number"),
+        ({"skip_cycles": "1"}, "skip-cycles: '1' is not a number"),
+        ({"clearance_m": "3e-4"}, "clearance-m: '3e-4' is not a number"),
+        ({"speed_rpm": "60"}, "speed-rpm: '60' is not a number"),
+        ({"trace": 1.5}, "trace: 1.5 is not a whole number"),
+        ({"trace": "1"}, "trace: '1' is not a whole number"),
+        ({"model": ["full"]}, "is not one of clearance, full"),
+        ({"normal_law": 3}, "is not one of hertz"),
+        ({"wear": "off"}, "wear: 'off' is not true or false"),
+    ],
+)
+@pytest.mark.plain
+def test_what_callers_get_wrong_is_one_line(given, said):
+    with pytest.raises(ConfigError) as told:
+        simulate(**{"mechanism": "bionic_leg", **given})
+    assert said in str(told.value)
+    assert "\n" not in str(told.value)

@@ -109,7 +109,7 @@ def test_errors_are_those_of_the_full_coordinates():
     runs = {"runs": 4, "cycles": 8, "skip_cycles": 2, "traced_cycles": 1}
     ours = respond(load_mechanism(), PLACE | runs)
     setup = prepare(load_mechanism(), clearances=["G"], clearance_m=3.0e-4, speed_rpm=60.0)
-    full, tally, errors, peaks = FullRun(setup, 0), new_tally(10), [], []
+    full, tally, errors, peaks = FullRun(setup), new_tally(10), [], []
     for cycle in range(10):
         full.advance(cycle + 1.0, tally)
         errors.append(tally.response.copy())

@@ -35,7 +35,7 @@ def measured(
 ) -> tuple[Samples, np.ndarray]:
     """Samples of a leg at 60 rpm whose torque sensor gives means between samples; its mean contact forces."""
     setup = prepare(leg)
-    run, tally, chance = ClearanceRun(setup, RATE), new_tally(10), np.random.default_rng(1)
+    run, tally, chance = ClearanceRun(setup, 11 * RATE), new_tally(10), np.random.default_rng(1)
     impulse = np.zeros(seconds * RATE + 1)
     for i in range(1, len(impulse)):
         run.advance(i / RATE, tally)

@@ -1,0 +1,185 @@
+"""Values of a mechanism that can be used but are far from what such mechanisms have: likely another unit.
+
+Ranges are wide: the shipped mechanisms, from Andrews' squeezer with links of 7 mm to a leg, lie well within.
+"""
+
+import math
+from collections.abc import Iterator
+from itertools import islice
+
+import attrs
+
+from leg_wear_monitor.mechanism.clearance import Clearance
+from leg_wear_monitor.mechanism.spec import Body, Mechanism, PhaseLoad, SpeedDrive, Vector
+
+TURN = 2.0 * math.pi
+_USUAL_LENGTH = 5.0e-3, 5.0  # m, of the largest link
+_ROUND = 1.0e-3  # rpm: how near a speed in rad/s is to a whole number of rpm when it was converted
+
+
+@attrs.frozen
+class Doubt:
+    """A value that is likely meant in another unit.
+
+    Attributes
+    ----------
+    key : str
+        Dotted path in the file.
+    fault : str
+        What the value comes to, what is usual, and the likely slip.
+    """
+
+    key: str
+    fault: str
+
+    def __str__(self) -> str:
+        return f"{self.key}: {self.fault}"
+
+
+def doubts(mechanism: Mechanism) -> tuple[Doubt, ...]:
+    """All doubtful values of a mechanism, those that explain most first."""
+    parts = (_lengths, _angles, _speed, _masses, _gravity, _joints, _loads)
+    return tuple(doubt for part in parts for doubt in part(mechanism))
+
+
+def suspects(mechanism: Mechanism) -> str:
+    """The end of a message about a mechanism that does not move: what to look at; empty without doubts."""
+    found = [str(doubt) for doubt in doubts(mechanism)]
+    return f"; look at {'; '.join(found)}" if found else ""
+
+
+def span(points: dict[str, Vector]) -> float:
+    """Longest distance between two points [m], 0 without two."""
+    return max((math.dist(a, b) for a in points.values() for b in points.values()), default=0.0)
+
+
+def largest_link(mechanism: Mechanism) -> tuple[str, float]:
+    """The body with the longest distance between two of its points, and that distance [m]."""
+    spans = {name: span(body.points) for name, body in mechanism.bodies.items()}
+    name = max(spans, key=lambda body: spans[body])
+    return name, spans[name]
+
+
+def _beyond(value: float, least: float, most: float) -> bool:
+    return not least <= abs(value) <= most
+
+
+def _lengths(mechanism: Mechanism) -> Iterator[Doubt]:
+    name, length = largest_link(mechanism)
+    if _beyond(length, *_USUAL_LENGTH):
+        slip = "mm for m" if length > 5.0 else "km for m"
+        yield Doubt(
+            f"bodies.{name}.points", f"{length:g} m from point to point, usual are 0.005 to 5 m; {slip}?"
+        )
+        return
+    for name, body in mechanism.bodies.items():
+        away = math.hypot(*body.com)
+        if away > 20.0 * max(span(body.points), 0.05 * length):
+            yield Doubt(f"bodies.{name}.com", f"{away:g} m away from a link that is far shorter; mm for m?")
+
+
+def _angles(mechanism: Mechanism) -> Iterator[Doubt]:
+    angles = {"crank_angle": mechanism.assembly.crank_angle}
+    angles |= {body: pose[2] for body, pose in mechanism.assembly.poses.items()}
+    name = max(angles, key=lambda each: abs(angles[each]))  # where one is in degrees, all are
+    if _beyond(angles[name], 0.0, TURN):
+        turns = angles[name] / TURN
+        yield Doubt(f"assembly.{name}", f"{angles[name]:g} rad is {turns:.3g} turns; degrees for rad?")
+
+
+def _speed(mechanism: Mechanism) -> Iterator[Doubt]:
+    if not isinstance(mechanism.drive, SpeedDrive):
+        if _beyond(mechanism.drive.torque, 0.0, 1.0e4):
+            yield Doubt(
+                "drive.torque", f"{mechanism.drive.torque:g} N m, usual are below 1e4 N m; N mm for N m?"
+            )
+        return
+    speed = mechanism.drive.speed
+    rpm = 60.0 * speed / TURN
+    # a speed that was converted is a whole number of rpm; one that is a whole number of rad/s may be rpm
+    if _beyond(speed, 0.0, 20.0) and speed == round(speed) and abs(rpm - round(rpm)) > _ROUND:
+        yield Doubt(
+            "drive.speed",
+            f"{speed:g} rad/s is {rpm:.4g} rpm; rpm for rad/s? "
+            f"{speed:g} rpm is {speed * TURN / 60.0:.6g} rad/s",
+        )
+    elif _beyond(rpm, 0.1, 30_000.0):
+        yield Doubt("drive.speed", f"{speed:g} rad/s is {rpm:.3g} rpm, usual are 0.1 to 30000 rpm")
+
+
+def _masses(mechanism: Mechanism) -> Iterator[Doubt]:
+    heaviest = max(mechanism.bodies, key=lambda name: mechanism.bodies[name].mass)
+    mass = mechanism.bodies[heaviest].mass
+    if _beyond(mass, 1.0e-4, 300.0):
+        slip = "g for kg" if mass > 300.0 else "t for kg"
+        yield Doubt(f"bodies.{heaviest}.mass", f"{mass:g} kg, usual are 0.0001 to 300 kg; {slip}?")
+    length = largest_link(mechanism)[1]
+    if not _beyond(length, *_USUAL_LENGTH):
+        each = (doubt for name, body in mechanism.bodies.items() for doubt in _inertia(name, body, length))
+        yield from islice(each, 1)
+
+
+def _inertia(name: str, body: Body, length: float) -> Iterator[Doubt]:
+    """A radius of gyration of some links is of no link; one of a thousandth of it, neither."""
+    gyration = math.sqrt(body.inertia / body.mass)
+    if _beyond(gyration, 1.0e-3 * length, 10.0 * length):
+        slip = "kg mm^2 for kg m^2" if gyration > length else "t m^2 for kg m^2"
+        yield Doubt(
+            f"bodies.{name}.inertia",
+            f"{body.inertia:g} kg m^2 of {body.mass:g} kg is a radius of gyration of {gyration:.3g} m beside "
+            f"links of {length:.3g} m; {slip}?",
+        )
+
+
+def _gravity(mechanism: Mechanism) -> Iterator[Doubt]:
+    pull = math.hypot(*mechanism.gravity)
+    if pull > 30.0:
+        yield Doubt("gravity", f"{pull:g} m/s^2, on earth it is 9.81 m/s^2; mm/s^2 for m/s^2?")
+
+
+def _joints(mechanism: Mechanism) -> Iterator[Doubt]:
+    """Each doubt of the first joint that has it: they mostly come from the defaults."""
+    told: set[str] = set()
+    for joint, clearance in mechanism.clearances.items():
+        for doubt in _clearance(clearance):
+            if doubt.key not in told:
+                told.add(doubt.key)
+                yield attrs.evolve(doubt, key=f"clearances ({joint}): {doubt.key}")
+
+
+def _clearance(c: Clearance) -> Iterator[Doubt]:
+    for modulus in c.youngs_modulus:
+        if _beyond(modulus, 1.0e6, 2.0e12):
+            slip = "GPa for Pa" if modulus < 1.0e4 else "MPa for Pa" if modulus < 1.0e6 else "kPa for Pa"
+            yield Doubt(
+                "youngs_modulus", f"{modulus:g} Pa, usual are 1e6 to 2e12 Pa, steel has 2.1e11; {slip}?"
+            )
+    ratio = c.radial_clearance / c.bushing_radius
+    if _beyond(ratio, 1.0e-5, 0.25):
+        yield Doubt(
+            "radial_clearance",
+            f"{c.radial_clearance:g} m is {100.0 * ratio:.3g} % of the bushing's radius of "
+            f"{c.bushing_radius:g} m, usual are 0.01 to 5 %; another unit than the radius?",
+        )
+    for key, value, least, most in (
+        ("bushing_radius", c.bushing_radius, 1.0e-4, 0.25),
+        ("width", c.width, 1.0e-4, 0.5),
+    ):
+        if _beyond(value, least, most):
+            slip = "mm for m" if value > most else "km for m"
+            yield Doubt(key, f"{value:g} m, usual are {least:g} to {most:g} m; {slip}?")
+    if max(c.wear_coefficient) > 1.0e-9:
+        k = max(c.wear_coefficient)
+        yield Doubt(
+            "wear_coefficient", f"{k:g} 1/Pa, usual are below 1e-9 1/Pa; K for K/H, or 1/MPa for 1/Pa?"
+        )
+    if c.stiffness is not None and _beyond(c.stiffness, 1.0e6, 1.0e14):
+        yield Doubt("stiffness", f"{c.stiffness:g} N/m^1.5, usual are 1e6 to 1e14 N/m^1.5")
+
+
+def _loads(mechanism: Mechanism) -> Iterator[Doubt]:
+    for name, load in mechanism.loads.items():
+        forces = load.force if isinstance(load, PhaseLoad) else (load.force,)
+        force = max((math.hypot(*each) for each in forces), default=0.0)
+        if force > 1.0e5:
+            yield Doubt(f"loads.{name}.force", f"{force:g} N, usual are below 1e5 N; mN for N?")

@@ -1,0 +1,49 @@
+"""What was understood of a mechanism, in units that people think in: a wrong unit shows at once."""
+
+from collections.abc import Iterator
+
+import numpy as np
+
+from leg_wear_monitor.mechanism.ideal import TURN, one_cycle, point_motion
+from leg_wear_monitor.mechanism.plausible import largest_link
+from leg_wear_monitor.mechanism.position import Linkage
+from leg_wear_monitor.mechanism.spec import Mechanism, SpeedDrive
+
+_POINTS = 180  # of a turn: the stride is then good to a thousandth
+
+
+def understood(linkage: Linkage) -> tuple[str, ...]:
+    """What a mechanism is, as statements with units."""
+    return tuple(_statements(linkage))
+
+
+def _statements(linkage: Linkage) -> Iterator[str]:
+    mechanism = linkage.mechanism
+    link, length = largest_link(mechanism)
+    yield f"largest link {length:.4g} m ({link})"
+    body = max(mechanism.bodies, key=lambda name: mechanism.bodies[name].mass)
+    yield f"heaviest mass {mechanism.bodies[body].mass:.4g} kg ({body})"
+    yield _drive(mechanism)
+    if mechanism.toe is not None:
+        x, y = point_motion(one_cycle(linkage, _POINTS, 1.0), linkage, *mechanism.toe)[0].T
+        yield f"toe's stride {np.ptp(x):.4g} m, lift {np.ptp(y):.4g} m"
+    yield from _clearances(mechanism)
+
+
+def _drive(mechanism: Mechanism) -> str:
+    drive = mechanism.drive
+    if not isinstance(drive, SpeedDrive):
+        return f"crank driven by {drive.torque:.4g} N m"
+    sense = "counter-clockwise" if drive.speed > 0.0 else "clockwise"
+    return f"crank {60.0 * abs(drive.speed) / TURN:.4g} rpm {sense}"
+
+
+def _clearances(mechanism: Mechanism) -> Iterator[str]:
+    """Young's moduli and clearances of the loose joints, each value once."""
+    loose = [mechanism.clearances[joint] for joint in mechanism.loose]
+    moduli = sorted({modulus for c in loose for modulus in c.youngs_modulus})
+    if moduli:
+        yield "E " + " and ".join(f"{1.0e-9 * modulus:.4g}" for modulus in moduli) + " GPa"
+    for fresh, radius in sorted({(c.radial_clearance, c.bushing_radius) for c in loose}):
+        ratio = 100.0 * fresh / radius
+        yield f"clearance {1.0e3 * fresh:.4g} mm in a radius of {1.0e3 * radius:.4g} mm ({ratio:.2g} %)"

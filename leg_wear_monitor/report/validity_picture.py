@@ -16,7 +16,7 @@ def validity_picture(measurements: Sequence[Measurement]) -> bytes:
     axes.axhspan(0.1, 0.9, color=PALE, alpha=0.6, linewidth=0.0)
     axes.axhline(0.5, color=INK, linewidth=0.6)
     for counts, colour, label in ((True, BLUE, "measured"), (False, VERMILION, "contradicts, not used")):
-        chosen = [m for m in measurements if m.counts is counts]
+        chosen = [m for m in measurements if m.counts is counts and not m.is_withdrawn]
         at, below = [m.cycles for m in chosen], [m.expected_below for m in chosen]
         axes.plot(at, below, "o", color=colour, label=label)
         for m in chosen:

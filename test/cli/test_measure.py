@@ -107,6 +107,53 @@ def test_a_dry_run_creates_no_ledger(run, tmp_path):
     assert [path.name for path in tmp_path.iterdir()] == ["mine.yaml"]
 
 
+def test_a_withdrawn_measurement_is_kept_and_teaches_nothing(run, ledger):
+    kept = ("--ledger", str(ledger))
+    first = run("measure", "A", "0.42", "--sigma", "0.005", *kept)
+    run("measure", "B", "0.31", "--sigma", "0.005", *kept)
+    shown = run("measure", "A", "--withdraw", "last", *kept)
+    assert (shown.exit_code, shown.stderr) == (0, "")
+    assert shown.stdout.startswith("1: A 0.42 mm ± 0.005 mm, 20")
+    assert ", withdrawn 20" in shown.stdout
+    assert len(rows(ledger)) == 2
+    listed = run("measure", "--list", *kept).stdout.splitlines()
+    assert [line.split(":")[0] for line in listed] == ["1", "2"]
+    assert "withdrawn" in listed[0]
+    assert listed[1].endswith(", counts")
+    # the next one is judged as the first was
+    again = run("measure", "A", "0.42", "--sigma", "0.005", *kept)
+    assert again.stdout.splitlines()[:2] == first.stdout.splitlines()[:2]
+    assert again.stdout.splitlines()[2].startswith("1 of 2 measured clearances")
+    assert run("measure", "--withdraw", "3", *kept).exit_code == 0
+
+
+def test_a_withdrawal_can_be_tried(run, ledger):
+    kept = ("--ledger", str(ledger))
+    run("measure", "A", "0.42", "--sigma", "0.005", *kept)
+    assert "withdrawn" in run("measure", "--withdraw", "1", "--dry-run", *kept).stdout
+    assert run("measure", "--list", *kept).stdout.rstrip().endswith("counts")
+
+
+@pytest.mark.parametrize(
+    ("arguments", "fault"),
+    [
+        (("--withdraw", "last"), "no measurement is there to be withdrawn"),
+        (("A", "--withdraw", "last"), "no measurement of joint A is there to be withdrawn"),
+        (("--withdraw", "7"), "'7' is not last, nor a measurement (none)"),
+        (("--withdraw", "first"), "'first' is not last, nor a measurement (none)"),
+        (("--withdraw", "1", "--list"), "exclude each other"),
+        (("A", "0.4", "--withdraw", "1"), "exclude each other"),
+        (("A", "0.4"), "expected JOINT MM --sigma MM, or --list, or --withdraw"),
+        ((), "expected JOINT MM --sigma MM, or --list, or --withdraw"),
+    ],
+)
+def test_what_cannot_be_withdrawn_is_one_line(run, ledger, arguments, fault):
+    result = run("measure", *arguments, "--ledger", str(ledger))
+    assert result.exit_code == 2
+    (line,) = result.stderr.splitlines()
+    assert fault in line
+
+
 def test_a_ledger_has_to_be_named(run):
     result = run("measure", "A", "0.4", "--sigma", "0.01")
     assert result.exit_code == 2

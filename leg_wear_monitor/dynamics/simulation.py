@@ -31,6 +31,8 @@ from leg_wear_monitor.wear.surfaces import SECTORS, fresh_surfaces
 
 MODELS: dict[str, Callable[[Setup], Traceable]] = {"clearance": ClearanceRun, "full": FullRun}
 
+LEAST_RPM = 0.01  # slower, a gait cycle takes hours
+
 _REPORTS_A_CYCLE = 20
 
 
@@ -152,10 +154,9 @@ def _speed(mechanism: Mechanism, speed_rpm: float | None) -> float:
         return drive.initial_speed
     if speed_rpm is None:
         return drive.speed if isinstance(drive, SpeedDrive) else drive.track.speed_radps
-    if not math.isfinite(speed_rpm) or speed_rpm == 0.0:
-        raise ConfigError(
-            "speed-rpm", "", f"{speed_rpm} rpm does not turn the crank; expected a speed other than 0 rpm"
-        )
+    if not (math.isfinite(speed_rpm) and abs(speed_rpm) >= LEAST_RPM):
+        expected = f"expected a speed other than 0 rpm, from {LEAST_RPM:g} on"
+        raise ConfigError("speed-rpm", "", f"{speed_rpm} rpm does not turn the crank; {expected}")
     return speed_rpm * TURN / 60.0
 
 

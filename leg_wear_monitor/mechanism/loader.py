@@ -4,9 +4,6 @@ from pathlib import Path
 from typing import Any
 
 import attrs
-from ruamel.yaml import YAML
-from ruamel.yaml.constructor import DuplicateKeyError
-from ruamel.yaml.error import MarkedYAMLError, YAMLError
 
 from leg_wear_monitor.errors import ConfigError
 from leg_wear_monitor.mechanism import spec
@@ -16,6 +13,7 @@ from leg_wear_monitor.mechanism.nearest import did_you_mean
 from leg_wear_monitor.mechanism.quantity import FieldError
 from leg_wear_monitor.mechanism.references import check_references
 from leg_wear_monitor.mechanism.strict import choose, mapping, shown, structure
+from leg_wear_monitor.mechanism.yaml_file import read_document
 from leg_wear_monitor.share import share_directory
 
 
@@ -86,27 +84,13 @@ def parse_mechanism(document: Any, source: str) -> spec.Mechanism:
 
 
 def read_yaml(path: Path, source: str) -> Any:
-    """What a YAML 1.2 file holds, as plain values; raises ConfigError naming the line at fault."""
+    """What a YAML 1.2 file holds, as plain values; see `yaml_file.read_document`."""
     try:
-        return YAML(typ="safe", pure=True).load(path.read_text(encoding="utf-8"))
-    except OSError as error:
+        return read_document(path, source)
+    except FileNotFoundError as error:
         hint = f"; {path.stem} without .yaml is the one that comes with the package"
         known = path.parent == Path() and path.stem in shipped_mechanisms()
         raise ConfigError(source, "", f"cannot be read: {error.strerror}{hint if known else ''}") from error
-    except UnicodeDecodeError as error:
-        raise ConfigError(source, "", f"is not UTF-8 text: byte {error.start}") from error
-    except (YAMLError, ValueError, RecursionError) as error:  # a date or a number too odd; nested too deeply
-        raise ConfigError(source, "", f"is not YAML: {_yaml_fault(error)}") from error
-
-
-def _yaml_fault(error: Exception) -> str:
-    """What is wrong, and in which line, without the excerpt that ruamel.yaml prints below."""
-    mark = error.problem_mark if isinstance(error, MarkedYAMLError) else None
-    text = error.problem if isinstance(error, MarkedYAMLError) and error.problem else str(error)
-    text = text.splitlines()[0]
-    if isinstance(error, DuplicateKeyError):
-        text = text.split(" with value ")[0].replace("found ", "")
-    return f"line {mark.line + 1}: {text}" if mark else text
 
 
 # --- entries that are one class or another ---

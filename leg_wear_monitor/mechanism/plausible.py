@@ -10,7 +10,7 @@ from itertools import islice
 import attrs
 
 from leg_wear_monitor.mechanism.clearance import Clearance
-from leg_wear_monitor.mechanism.spec import Body, Mechanism, PhaseLoad, SpeedDrive, Vector
+from leg_wear_monitor.mechanism.spec import Body, Mechanism, PhaseLoad, SpeedDrive, TorqueDrive, Vector
 
 TURN = 2.0 * math.pi
 _USUAL_LENGTH = 5.0e-3, 5.0  # m, of the largest link
@@ -88,23 +88,22 @@ def _angles(mechanism: Mechanism) -> Iterator[Doubt]:
 
 
 def _speed(mechanism: Mechanism) -> Iterator[Doubt]:
-    if not isinstance(mechanism.drive, SpeedDrive):
-        if _beyond(mechanism.drive.torque, 0.0, 1.0e4):
-            yield Doubt(
-                "drive.torque", f"{mechanism.drive.torque:g} N m, usual are below 1e4 N m; N mm for N m?"
-            )
+    drive = mechanism.drive
+    if isinstance(drive, TorqueDrive):
+        if _beyond(drive.torque, 0.0, 1.0e4):
+            fault = f"{drive.torque:g} N m, usual are below 1e4 N m; N mm for N m?"
+            yield Doubt("drive.torque", fault)
         return
-    speed = mechanism.drive.speed
+    key, speed = "drive.speed", drive.speed if isinstance(drive, SpeedDrive) else drive.track.speed_radps
+    if not isinstance(drive, SpeedDrive):
+        key = "drive.track.speed_radps"
     rpm = 60.0 * speed / TURN
     # a speed that was converted is a whole number of rpm; one that is a whole number of rad/s may be rpm
     if _beyond(speed, 0.0, 20.0) and speed == round(speed) and abs(rpm - round(rpm)) > _ROUND:
-        yield Doubt(
-            "drive.speed",
-            f"{speed:g} rad/s is {rpm:.4g} rpm; rpm for rad/s? "
-            f"{speed:g} rpm is {speed * TURN / 60.0:.6g} rad/s",
-        )
+        meant = f"{speed:g} rpm is {speed * TURN / 60.0:.6g} rad/s"
+        yield Doubt(key, f"{speed:g} rad/s is {rpm:.4g} rpm; rpm for rad/s? {meant}")
     elif _beyond(rpm, 0.1, 30_000.0):
-        yield Doubt("drive.speed", f"{speed:g} rad/s is {rpm:.3g} rpm, usual are 0.1 to 30000 rpm")
+        yield Doubt(key, f"{speed:g} rad/s is {rpm:.3g} rpm, usual are 0.1 to 30000 rpm")
 
 
 def _masses(mechanism: Mechanism) -> Iterator[Doubt]:

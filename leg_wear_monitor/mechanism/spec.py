@@ -56,7 +56,12 @@ class PrismaticJoint:
 
 
 def _turns(speed: float) -> str | None:
-    return None if speed else "0.0 rad/s does not turn the crank, expected another speed"
+    least, most = 1.0e-3, 1.0e4
+    if least <= abs(speed) <= most:
+        return None
+    return (
+        f"{speed!r} rad/s does not turn the crank, expected another speed, from {least:g} to {most:g} rad/s"
+    )
 
 
 def _rises_below_one(phase: tuple[float, ...]) -> str | None:
@@ -70,7 +75,11 @@ class SpeedDrive:
     """The crank turns at a constant speed."""
 
     body: str = described("the crank")
-    speed: float = quantity("rad/s", "crank speed, counter-clockwise positive, not 0", check=_turns)
+    speed: float = quantity(
+        "rad/s",
+        "crank speed, counter-clockwise positive, from 0.001 to 10000 either way",
+        check=_turns,
+    )
 
 
 @attrs.frozen(kw_only=True)

@@ -7,7 +7,7 @@ import numpy as np
 from leg_wear_monitor.mechanism.ideal import TURN, one_cycle, point_motion
 from leg_wear_monitor.mechanism.plausible import largest_link
 from leg_wear_monitor.mechanism.position import Linkage
-from leg_wear_monitor.mechanism.spec import Mechanism, SpeedDrive
+from leg_wear_monitor.mechanism.spec import Mechanism, SpeedDrive, TorqueDrive
 
 _POINTS = 180  # of a turn: the stride is then good to a thousandth
 
@@ -32,10 +32,11 @@ def _statements(linkage: Linkage) -> Iterator[str]:
 
 def _drive(mechanism: Mechanism) -> str:
     drive = mechanism.drive
-    if not isinstance(drive, SpeedDrive):
+    if isinstance(drive, TorqueDrive):
         return f"crank driven by {drive.torque:.4g} N m"
-    sense = "counter-clockwise" if drive.speed > 0.0 else "clockwise"
-    return f"crank {60.0 * abs(drive.speed) / TURN:.4g} rpm {sense}"
+    speed = drive.speed if isinstance(drive, SpeedDrive) else drive.track.speed_radps
+    sense = "counter-clockwise" if speed > 0.0 else "clockwise"
+    return f"crank {60.0 * abs(speed) / TURN:.4g} rpm {sense}"
 
 
 def _clearances(mechanism: Mechanism) -> Iterator[str]:

@@ -36,13 +36,23 @@ class Limits:
         metadata=LIVE,
     )
     joint_impact_force_n: tuple[float, ...] = quantity(
-        "N", "the same, one a loose joint, instead of the one for all", above=0.0, default=(), metadata=LIVE
+        "N",
+        "the same, one a loose joint, instead of the one for all",
+        above=0.0,
+        at_most=1.0e7,
+        default=(),
+        metadata=LIVE,
     )
     clearance_m: float = quantity(
         "m", "mean radial clearance of a joint", above=0.0, at_most=0.1, default=0.0006, metadata=LIVE
     )
     joint_clearance_m: tuple[float, ...] = quantity(
-        "m", "the same, one a loose joint, instead of the one for all", above=0.0, default=(), metadata=LIVE
+        "m",
+        "the same, one a loose joint, instead of the one for all",
+        above=0.0,
+        at_most=0.1,
+        default=(),
+        metadata=LIVE,
     )
     clearance_departure_m: float = quantity(
         "m",
@@ -145,7 +155,7 @@ class LedgerFile:
     checkpoint_s: float = quantity(
         "s",
         "longest time between two entries while the leg moves, and a beat (a quarter of a gait cycle)",
-        above=0.0,
+        at_least=0.01,
         at_most=600.0,
         default=5.0,
     )
@@ -187,7 +197,7 @@ class MonitorConfig:
     clearances_m: tuple[float, ...] = quantity(
         "m",
         "radial clearances when new, one for all loose joints or one each; empty: those of the file",
-        above=0.0,
+        at_least=1.0e-6,
         at_most=0.1,
         default=(),
     )
@@ -199,7 +209,11 @@ class MonitorConfig:
         default=(),
     )
     wear_acceleration: float = quantity(
-        "", "factor on all wear, other than 1 for demonstrations only", above=0.0, at_most=1.0e9, default=1.0
+        "",
+        "factor on all wear, other than 1 for demonstrations only",
+        at_least=1.0e-9,
+        at_most=1.0e9,
+        default=1.0,
     )
     crank_joint: str = described("name of the crank in joint_states", default="crank", check=_filled)
     crank: Crank = described("", factory=Crank)

@@ -16,7 +16,7 @@ class Forecasting:
     wear_coefficient_sigma: float = quantity(
         "",
         "standard deviation of the logarithm of a joint's wear coefficient about the given one",
-        above=0.0,
+        at_least=0.001,
         at_most=3.0,
         default=0.7,
     )
@@ -36,9 +36,9 @@ class Forecasting:
         default=0.4,
     )
     clearance_sigma_m: float = quantity(
-        "m", "standard deviation of a new joint's clearance", above=0.0, at_most=1.0e-3, default=5.0e-6
+        "m", "standard deviation of a new joint's clearance", at_least=1.0e-9, at_most=1.0e-3, default=5.0e-6
     )
-    duty_hours_per_day: float = quantity("h", "walking a day", above=0.0, at_most=24.0, default=8.0)
+    duty_hours_per_day: float = quantity("h", "walking a day", at_least=0.01, at_most=24.0, default=8.0)
     duty_sigma: float = quantity(
         "",
         "standard deviation of the logarithm of the walking a day",

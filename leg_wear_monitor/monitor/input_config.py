@@ -13,8 +13,13 @@ LIVE = {"live": True}  # may change while the monitor runs
 TORQUE_SOURCES = ("wrench", "float64", "effort")
 
 
-def _not_zero(speed: float) -> str | None:
-    return None if speed else f"{speed!r} rpm does not turn the crank, expected another speed"
+LEAST_RPM = 0.1  # ten minutes a gait cycle: nothing that walks is slower
+
+
+def _turns(speed: float) -> str | None:
+    if abs(speed) >= LEAST_RPM:
+        return None
+    return f"{speed!r} rpm does not turn the crank, expected a speed of at least {LEAST_RPM:g} rpm either way"
 
 
 def _one_way_or_other(number: float) -> str | None:
@@ -36,7 +41,7 @@ class Crank:
     gear_ratio: float = quantity(
         "",
         "turns of the joint for one of the crank; other than 1, its position must count on and not wrap",
-        above=0.0,
+        at_least=1.0e-4,
         at_most=1.0e4,
         default=1.0,
     )
@@ -116,12 +121,16 @@ class DriveTorque:
     scale: float = quantity(
         "",
         "factor on the torque, its unit's and the gear's efficiency",
-        above=0.0,
+        at_least=1.0e-6,
         at_most=1.0e6,
         default=1.0,
     )
     gear_ratio: float = quantity(
-        "", "turns of the shaft with the sensor for one of the crank", above=0.0, at_most=1.0e4, default=1.0
+        "",
+        "turns of the shaft with the sensor for one of the crank",
+        at_least=1.0e-4,
+        at_most=1.0e4,
+        default=1.0,
     )
     max_friction_nm: float = quantity(
         "N m",
@@ -156,11 +165,11 @@ class Cadence:
 
     commanded_rpm: float = quantity(
         "rpm",
-        "commanded crank speed, negative for clockwise, not 0",
+        "commanded crank speed, negative for clockwise, at least 0.1 either way",
         at_least=-1200.0,
         at_most=1200.0,
         default=60.0,
-        check=_not_zero,
+        check=_turns,
     )
     tolerance_rpm: float = quantity(
         "rpm",

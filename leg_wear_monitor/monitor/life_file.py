@@ -72,7 +72,7 @@ def _shipped_lives(mechanism: Mechanism) -> Sequence[SimulatedLife]:
 def _lives_in(document: dict[str, Any], path: str, mechanism: Mechanism) -> Sequence[SimulatedLife]:
     try:
         return [_life(each, mechanism.loose) for each in (document, *document["further"])]
-    except (ValueError, KeyError, TypeError) as error:
+    except (ValueError, KeyError, TypeError, OverflowError) as error:
         joints = ", ".join(mechanism.loose)
         raise ConfigError(
             path, "", f"is no life of the joints {joints}, expected what `life --json` writes"
@@ -84,8 +84,8 @@ def _document(path: str) -> dict[str, Any]:
         document = json.loads(Path(path).read_text(encoding="utf-8"))
     except OSError as error:
         raise ConfigError(path, "", f"cannot be read: {error.strerror}") from error
-    except ValueError as error:
-        raise ConfigError(path, "", f"is no JSON: {error}") from error
+    except (ValueError, RecursionError) as error:
+        raise ConfigError(path, "", f"is no JSON: {' '.join(str(error).split())}") from error
     if not isinstance(document, dict):
         raise ConfigError(path, "", "is no life, expected what `life --json` writes")
     return document
@@ -102,7 +102,18 @@ def _life(record: dict[str, Any], loose: Sequence[str]) -> SimulatedLife:
         growth_m_per_cycle=columns("growth_m_per_cycle"),
     )
     shapes = {life.clearance_m.shape, life.growth_m_per_cycle.shape, (len(life.cycles), len(life.factor))}
-    sums = life.cycles.sum() + life.clearance_m.sum() + life.growth_m_per_cycle.sum()
-    if len(shapes) > 1 or len(life.cycles) < 2 or not np.isfinite(sums) or not (life.factor > 0.0).all():
+    if len(shapes) > 1 or len(life.cycles) < 2 or not _can_be(life):
         raise ValueError("figures that do not fit together")
     return life
+
+
+def _can_be(life: SimulatedLife) -> bool:
+    """Whether the figures of a life can be those of one; NaN is within no bounds."""
+    within = (
+        (life.factor, 1.0e-9, 1.0e9),
+        (life.cycles, 0.0, 1.0e30),
+        (life.clearance_m, 1.0e-9, 1.0),
+        (life.growth_m_per_cycle, 0.0, 1.0),
+    )
+    bounded = all(bool(((least <= values) & (values <= most)).all()) for values, least, most in within)
+    return bounded and bool((np.diff(life.cycles) >= 0.0).all())

@@ -41,7 +41,7 @@ class Validity:
 
 
 def validity(measurements: Sequence[Measurement]) -> Validity:
-    """What measurements say of the forecasts before each of them; contradictions count, withdrawn ones not."""
+    """What measurements say of the forecasts before each of them; contradictions too, not withdrawn ones."""
     below = np.array([m.expected_below for m in measurements if not m.is_withdrawn])
     within = int(np.count_nonzero((below >= 0.1) & (below <= 0.9)))
     return Validity(len(below), within, float(below.mean() - 0.5) if len(below) else 0.0)

@@ -48,22 +48,24 @@ def count_field(doc: str, least: int, default: int) -> Any:
 
 def clearance_field() -> Any:
     """The clearance of all loose joints."""
-    return quantity("m", "radial clearance of the loose joints", above=0.0, at_most=0.1, default=3.0e-4)
+    return quantity("m", "radial clearance of the loose joints", at_least=1.0e-6, at_most=0.1, default=3.0e-4)
 
 
 def clearances_field() -> Any:
     """Clearances, one a point."""
-    return quantity("m", "radial clearances of the loose joints", above=0.0, at_most=0.1, check=check_rising)
+    return quantity(
+        "m", "radial clearances of the loose joints", at_least=1.0e-6, at_most=0.1, check=check_rising
+    )
 
 
 def speed_field() -> Any:
     """The crank's speed."""
-    return quantity("rpm", "speed of the crank", above=0.0, at_most=10_000.0, default=60.0)
+    return quantity("rpm", "speed of the crank", at_least=0.1, at_most=10_000.0, default=60.0)
 
 
 def speeds_field() -> Any:
     """Speeds, one a point."""
-    return quantity("rpm", "speeds of the crank", above=0.0, at_most=10_000.0, check=check_rising)
+    return quantity("rpm", "speeds of the crank", at_least=0.1, at_most=10_000.0, check=check_rising)
 
 
 def loose_field() -> Any:

@@ -96,11 +96,16 @@ class Life:
     opens_m: float = quantity(
         "m",
         "opening of the mean clearance of the joint that wears fastest",
-        above=0.0,
+        at_least=1.0e-7,
+        at_most=0.1,
         default=1.0e-4,
     )
     jump_m: float = quantity(
-        "m", "deepest change of a surface that a jump may make", above=0.0, default=1.0e-5
+        "m",
+        "deepest change of a surface that a jump may make",
+        at_least=1.0e-9,
+        at_most=0.1,
+        default=1.0e-5,
     )
     cycles: int = count_field("gait cycles simulated and averaged before each jump", 2, 6)
     runs: int = count_field("lives that differ in where they start", 2, 4)
@@ -128,12 +133,13 @@ class Exponent:
         check=lambda times: None if SAMPLES % times == 0 else f"{times} does not divide {SAMPLES}",
     )
     distance: float = quantity(
-        "", "distance it is brought back to, in clearances", above=0.0, at_most=1.0e-3, default=1.0e-8
+        "", "distance it is brought back to, in clearances", at_least=1.0e-12, at_most=1.0e-3, default=1.0e-8
     )
     tolerance_m: float = quantity(
         "m",
         "local error allowed in a step: errors of the usual size add to the growth",
-        above=0.0,
+        at_least=1.0e-15,
+        at_most=1.0e-6,
         default=1.0e-10,
     )
 

@@ -1,0 +1,91 @@
+"""A YAML file read within bounds, whatever it holds: its size, its depth, and what its aliases stand for."""
+
+import stat
+from pathlib import Path
+from typing import Any
+
+from ruamel.yaml import YAML
+from ruamel.yaml.constructor import DuplicateKeyError
+from ruamel.yaml.error import MarkedYAMLError, YAMLError
+
+from leg_wear_monitor.errors import ConfigError
+
+MOST_BYTES = 1_000_000  # the largest that comes with the package has 3000
+MOST_VALUES, DEEPEST = 100_000, 50  # with all aliases written out
+
+
+def read_document(path: Path, source: str) -> Any:
+    """What a YAML 1.2 file holds, as plain values.
+
+    Parameters
+    ----------
+    path : pathlib.Path
+    source : str
+        Its name in messages.
+
+    Raises
+    ------
+    FileNotFoundError
+    ConfigError
+        Naming the line at fault, or the bound that is passed.
+    """
+    try:
+        document = YAML(typ="safe", pure=True).load(_text(path, source))
+    except UnicodeDecodeError as error:
+        raise ConfigError(source, "", f"is not UTF-8 text: byte {error.start}") from error
+    # a date or a number too odd; a tag that does not fit its value; nested too deeply
+    except (YAMLError, ValueError, TypeError, AttributeError, LookupError, RecursionError) as error:
+        raise ConfigError(source, "", f"is not YAML: {_fault(error)}") from error
+    _check_size(document, source)
+    return document
+
+
+def _text(path: Path, source: str) -> str:
+    """The file's text; a device has no end, so it is not read."""
+    try:
+        kind = path.stat().st_mode
+        if stat.S_ISCHR(kind) or stat.S_ISBLK(kind) or stat.S_ISSOCK(kind):
+            raise ConfigError(source, "", "is a device, expected a file")
+        with path.open("rb") as file:
+            content = file.read(MOST_BYTES + 1)
+    except FileNotFoundError:
+        raise
+    except (OSError, ValueError) as error:
+        reason = error.strerror if isinstance(error, OSError) else str(error)
+        raise ConfigError(source, "", f"cannot be read: {reason}") from error
+    if len(content) > MOST_BYTES:
+        raise ConfigError(source, "", f"has more than {MOST_BYTES} bytes, it is no configuration")
+    return content.decode("utf-8")
+
+
+def _check_size(document: Any, source: str) -> None:
+    """Measure a document with its aliases written out, but looking at each part only once."""
+    values, levels = _extent(document, {}, frozenset())
+    if levels > DEEPEST:
+        raise ConfigError(source, "", f"is nested more than {DEEPEST} deep, or holds itself")
+    if values > MOST_VALUES:
+        raise ConfigError(source, "", f"its aliases stand for more than {MOST_VALUES} values")
+
+
+def _extent(value: Any, known: dict[int, tuple[int, int]], above: frozenset[int]) -> tuple[int, int]:
+    """Number of values in a value, itself with them, and their levels; one that holds itself has too many."""
+    if not isinstance(value, dict | list | tuple | set):
+        return 1, 0
+    if id(value) in above or len(above) > DEEPEST:
+        return 1, DEEPEST + 1
+    if id(value) not in known:
+        parts = [*value.keys(), *value.values()] if isinstance(value, dict) else list(value)
+        extents = [_extent(part, known, above | {id(value)}) for part in parts]
+        values, levels = 1 + sum(each[0] for each in extents), 1 + max((e[1] for e in extents), default=0)
+        known[id(value)] = values, levels
+    return known[id(value)]
+
+
+def _fault(error: Exception) -> str:
+    """What is wrong, and in which line, without the excerpt that ruamel.yaml prints below."""
+    mark = error.problem_mark if isinstance(error, MarkedYAMLError) else None
+    text = error.problem if isinstance(error, MarkedYAMLError) and error.problem else str(error)
+    text = next(iter(text.splitlines()), type(error).__name__)
+    if isinstance(error, DuplicateKeyError):
+        text = text.split(" with value ")[0].replace("found ", "")
+    return f"line {mark.line + 1}: {text}" if mark else text

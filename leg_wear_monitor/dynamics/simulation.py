@@ -18,7 +18,7 @@ from leg_wear_monitor.dynamics.result import (
     toe_errors,
     trace_columns,
 )
-from leg_wear_monitor.dynamics.run import Run, Setup
+from leg_wear_monitor.dynamics.run import Setup
 from leg_wear_monitor.dynamics.tally import new_tally
 from leg_wear_monitor.dynamics.tracer import Traceable, Tracer
 from leg_wear_monitor.errors import AssemblyError, ConfigError, SimulationError

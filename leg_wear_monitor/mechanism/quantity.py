@@ -5,6 +5,8 @@ from typing import Any
 
 import attrs
 
+LEAST = 1.0e-30  # of what must be above 0: in SI units, its square and its inverse stay finite
+
 
 class FieldError(ValueError):
     """A value that its key cannot take.
@@ -102,6 +104,8 @@ def quantity(
         for number in value if isinstance(value, tuple) else (value,):
             if above is not None and not number > above:
                 return f"{number!r} is not above {above:g} {unit}".rstrip()
+            if above == 0.0 and number < LEAST:
+                return f"{number!r} is as good as 0, expected more than {LEAST:g} {unit}".rstrip()
             if at_least is not None and not number >= at_least:
                 return f"{number!r} is not at least {at_least:g} {unit}".rstrip()
             if at_most is not None and not number <= at_most:

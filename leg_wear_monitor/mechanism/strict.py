@@ -14,7 +14,7 @@ from leg_wear_monitor.errors import ConfigError
 from leg_wear_monitor.mechanism.nearest import nearest
 from leg_wear_monitor.mechanism.quantity import FieldError
 
-LEAST, MOST = 1.0e-30, 1.0e30  # in SI units, nothing that is built is beyond; squares and ratios stay finite
+MOST = 1.0e30  # in SI units: squares, and ratios to the smallest, stay finite
 
 _Hook = Callable[[Any, Any], Any]
 _FAULTS = (ClassValidationError, FieldError)
@@ -111,8 +111,8 @@ def _number(value: Any, _kind: Any) -> float:
         number = math.inf
     if not math.isfinite(number):
         raise FieldError("", f"{shown(value)} is not a finite number")
-    if number and not LEAST <= abs(number) <= MOST:
-        raise FieldError("", f"{shown(value)} is not 0, nor of a size from {LEAST:g} to {MOST:g}")
+    if abs(number) > MOST:
+        raise FieldError("", f"{shown(value)} is larger than anything that is built, {MOST:g}")
     return number
 
 

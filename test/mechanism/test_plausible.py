@@ -103,7 +103,11 @@ PARAMETERS = [
     ({"crank.offset_rad": 90.0}, "crank.offset_rad: 90 rad", "degrees for rad?"),
     ({"limits.clearance_m": 2e-4}, "limits.clearance_m: 0.0002 m is no more than the new clearance", "A"),
     ({"limits.impact_force_n": 1.5}, "limits.impact_force_n: 1.5 N", "kN for N?"),
-    ({"clearances_m": [3e-8]}, "clearances_m: 3e-08 m is 0.0003 %", "mm for m"),
+    (
+        {"clearances_m": [3e-3], "limits.clearance_m": 5e-3},
+        "clearances_m: 0.003 m is 30 % of the bushing's radius",
+        "mm for m",
+    ),
 ]
 
 

@@ -62,7 +62,7 @@ def test_studies_cover_what_was_asked():
             "unknown key, did you mean clearances_m?",
         ),
         ("location", {"sets": [["A"], []]}, "sets: [] is not a list of at least one joint"),
-        ("location", {"sets": [["A"]], "speed_rpm": -60}, "speed_rpm: -60.0 is not above 0 rpm"),
+        ("location", {"sets": [["A"]], "speed_rpm": -60}, "speed_rpm: -60.0 is not at least 0.1 rpm"),
         ("location", {"sets": [["A"]], "ensemble": {"runs": 1}}, "ensemble.runs: 1 is not at least 2"),
         (
             "location",

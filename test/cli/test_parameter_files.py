@@ -9,7 +9,7 @@ BROKEN = [
     ("limits: {clearance_m: 1}", ["limits.clearance_m", "whole number to ROS", "expected 1.0 [m]"]),
     ("limits: {clearence_m: 0.1}", ["limits.clearence_m", "did you mean limits.clearance_m?"]),
     ("limits: {clearance_m: 0.03}", ["limits.clearance_m: 0.03 m", "0.01 m, the radius of its bushing"]),
-    ("limits: {joint_clearance_m: [6.0e-4, 6.0e-4, 0.06, 6.0e-4, 6.0e-4]}", ["joint G", "0.01 m, the radius"]),
+    ("limits: {joint_clearance_m: [6.0e-4, 6.0e-4, 0.06, 6.0e-4, 6.0e-4]}", ["joint G", "the radius"]),
     ("loose_joints: [A, Q]", ["loose_joints", "'Q'", "bionic_leg.yaml", "A, B, C"]),
     ("mechanism: bionic_log", ["bionic_log", "no mechanism of this name"]),
     ("mechanism: andrews", ["mechanism", "'andrews'", "driven by a torque"]),

@@ -102,8 +102,15 @@ def unlikely(seed: int) -> Case:
         prepare=lambda directory: write(directory / "x.mcap", stamps, angle, torque),
         run=command_line("replay", "x.mcap"),
         is_told=lambda ran: ran.code == 1 and bool(ran.complaints) and " pm/cycle" not in ran.stdout,
-        unsound=lambda ran: "" if what.startswith("stamps jump") else f"exit {ran.code}: {ran.stdout}",
+        unsound=lambda ran: _impossible(ran) if what.startswith("stamps jump") else f"exit {ran.code}",
     )
+
+
+def _impossible(ran: Ran) -> str:
+    """What cannot be in the last lines: a leg whose clock jumps is one, but its time has a length."""
+    (line,) = [line for line in ran.stdout.splitlines() if line.startswith("speed")] or [""]
+    seconds = float(line.split()[1]) if line else 0.0
+    return "" if 0.0 <= seconds < 10.0 * _SECONDS else line
 
 
 @cache

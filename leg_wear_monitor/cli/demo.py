@@ -85,7 +85,7 @@ def _live(out: Path) -> "Witness":
         click.echo(f"{(stamp_ns - first[0]) / 1e9:6.2f} s  {line}")
 
     paths = {"record": out / "live.mcap", "ledger": out / "wear.db", "truth": out / "truth.json"}
-    for path in paths.values():
+    for path in (*paths.values(), out / "wear.db-log"):  # a ledger is not begun beside the log of another
         path.unlink(missing_ok=True)
     click.echo(f"starting the monitor and the leg in ROS domain {domain}")
     witness = Witness(_NAMESPACE, domain, say)

@@ -182,7 +182,7 @@ class Ledger:
         closed : bool
             Whether the run ends here in order.
         whole : bool
-            False: of the surfaces, what they have risen will do, to the 60th part of the largest rise since
+            False: of the surfaces, what they have risen will do, to the 36th part of the largest rise since
             the entry before. A whole one is written all the same each ten minutes of motion, or with events.
         """
         if self.at_end and not closed:

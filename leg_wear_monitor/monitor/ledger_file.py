@@ -27,6 +27,7 @@ from leg_wear_monitor.monitor.ledger_seal import verify, write_head
 MOVE = "move it away (and its -log) to begin with new parts, or put a copy of it back"
 MODE = 0o640  # of new files, less what the umask takes away
 
+_PAGE = 512  # bytes: most of what a whole entry changes beside the surfaces is a row here and a row there
 _HEADER = 100
 _MAGIC = b"SQLite format 3\0"
 _IN_USE = "is in use by another monitor; end that one, or set another ledger.path"
@@ -54,17 +55,24 @@ def create(path: Path, binding: Binding) -> None:
     try:
         new.unlink(missing_ok=True)
         os.close(os.open(new, os.O_CREAT | os.O_EXCL | os.O_WRONLY, MODE))
-        with closing(_connect(new, "rw")) as db, transaction(db):
-            db.execute(f"PRAGMA application_id = {APPLICATION_ID}")
-            migrate(db, 0)
-            db.executemany("INSERT INTO binding VALUES (?, ?)", binding.as_texts().items())
-            write_head(db, 1, b"")
+        with closing(_connect(new, "rw")) as db:
+            db.execute(f"PRAGMA page_size = {_PAGE}")
+            _fill(db, binding)
         new.rename(path)
         sync_directory(path)
     except (sqlite3.Error, OSError) as error:
         raise LedgerError(
             f"{path}: cannot be created: {_reason(error)}; expected a writable place"
         ) from error
+
+
+def _fill(db: sqlite3.Connection, binding: Binding) -> None:
+    """Make a new file's tables."""
+    with transaction(db):
+        db.execute(f"PRAGMA application_id = {APPLICATION_ID}")
+        migrate(db, 0)
+        db.executemany("INSERT INTO binding VALUES (?, ?)", binding.as_texts().items())
+        write_head(db, 1, b"")
 
 
 def connect(path: Path, binding: Binding) -> sqlite3.Connection:
@@ -85,7 +93,7 @@ def connect(path: Path, binding: Binding) -> sqlite3.Connection:
         db = _connect(path, "rw" if writable else "ro&immutable=1")
     except OSError as error:
         raise LedgerError(f"{path}: cannot be opened: {_reason(error)}") from error
-    except sqlite3.Error as error:
+    except (sqlite3.Error, ValueError) as error:
         raise _refusal(path, error) from error
     try:
         _begin(db, path, found, binding, writable)
@@ -128,6 +136,7 @@ def _connect(path: Path, mode: str) -> sqlite3.Connection:
     )
     db.execute("PRAGMA trusted_schema = OFF")  # nothing that somebody put into the file is run
     db.execute("PRAGMA cell_size_check = ON")
+    db.execute("PRAGMA secure_delete = OFF")  # it would write zeros over pages that the next entry takes
     db.execute("PRAGMA temp_store = MEMORY")
     db.execute("PRAGMA synchronous = EXTRA")
     # Held until it is closed, by the system even after a kill.
@@ -171,7 +180,7 @@ def _rehearse(path: Path, found: int, binding: Binding) -> None:
         try:
             with closing(_connect(copy, "rw")) as db:
                 _begin(db, copy, found, binding, writable=True)
-        except (sqlite3.Error, LedgerError) as error:
+        except (sqlite3.Error, ValueError, LedgerError) as error:
             fault = error if isinstance(error, LedgerError) else _refusal(copy, error)
             reason = str(fault).removeprefix(f"{copy}: ").removesuffix(f"; {MOVE}")
             raise LedgerError(
@@ -203,10 +212,10 @@ def _begin(db: sqlite3.Connection, path: Path, found: int, binding: Binding, wri
             with transaction(db):
                 migrate(db, found)
                 write_head(db, 1, b"")
-    except sqlite3.Error as error:
+            db.execute(f"PRAGMA page_size = {_PAGE}")
+            db.execute("VACUUM")
+    except (sqlite3.Error, ValueError, TypeError, OverflowError) as error:
         raise _refusal(path, error) from error
-    except (ValueError, TypeError, OverflowError) as error:
-        raise LedgerError(f"{path}: is damaged: {error}; {MOVE}") from error
 
 
 def _check(db: sqlite3.Connection, path: Path, found: int) -> None:
@@ -236,7 +245,10 @@ def _check_binding(db: sqlite3.Connection, path: Path, binding: Binding) -> None
             )
 
 
-def _refusal(path: Path, error: sqlite3.Error) -> LedgerError:
+def _refusal(path: Path, error: Exception) -> LedgerError:
+    """Why a file cannot be used; ValueError and TypeError come of damage, also out of SQLite's messages."""
+    if not isinstance(error, sqlite3.Error):
+        return LedgerError(f"{path}: is damaged: {_reason(error)}; {MOVE}")
     code = getattr(error, "sqlite_errorcode", sqlite3.SQLITE_CORRUPT)  # some are of Python's, not of SQLite's
     if code == sqlite3.SQLITE_BUSY:
         return LedgerError(f"{path}: {_IN_USE}")

@@ -19,6 +19,8 @@ ENDING = "-log"
 
 _HEADER = struct.Struct("<8sq32s")  # what it is, number and checksum of the head
 _MAGIC = b"LWMLOG1\n"
+_COUNT = struct.Struct("<Q")  # behind that: of records, written after each, so that none is missing unseen
+_BEGIN = _HEADER.size + _COUNT.size
 _RECORD = struct.Struct("<I32s")  # bytes of the content, checksum
 _MOST = 2**28  # bytes that a log may have: it begins anew each ten minutes
 
@@ -35,6 +37,8 @@ class LogContent:
         Contents, up to the first one that does not fit.
     digest : bytes
         Checksum of the last of them, or of the head.
+    missing : int
+        How many more there were.
     left : int
         Bytes after them, 0 in a whole log.
     is_torn : bool
@@ -45,6 +49,7 @@ class LogContent:
     head: bytes
     records: tuple[bytes, ...]
     digest: bytes
+    missing: int
     left: int
     is_torn: bool
 
@@ -57,6 +62,7 @@ class EntryLog:
         self._handle: int | None = None
         self._size = 0
         self._digest = b""
+        self._count = 0
 
     @property
     def is_open(self) -> bool:
@@ -71,13 +77,14 @@ class EntryLog:
         handle = os.open(new, os.O_CREAT | os.O_EXCL | os.O_WRONLY, MODE)
         try:
             os.fchmod(handle, mode & 0o666)
-            _write(handle, _HEADER.pack(_MAGIC, head.number, head.digest))
+            _write(handle, _HEADER.pack(_MAGIC, head.number, head.digest) + _COUNT.pack(0))
+            os.fdatasync(handle)
             new.rename(self.path)
             sync_directory(self.path)
         except BaseException:
             os.close(handle)
             raise
-        self._handle, self._size, self._digest = handle, _HEADER.size, head.digest
+        self._handle, self._size, self._digest, self._count = handle, _BEGIN, head.digest, 0
 
     def append(self, content: bytes) -> bytes:
         """Have a record on the disk; its checksum.
@@ -97,6 +104,8 @@ class EntryLog:
             if not os.path.samestat(os.fstat(self._handle), self.path.stat()):
                 raise LedgerError(f"{self.path}: was replaced while in use")
             _write(self._handle, record)
+            os.pwrite(self._handle, _COUNT.pack(self._count + 1), _HEADER.size)
+            os.fdatasync(self._handle)
         except (OSError, LedgerError):
             handle, self._handle = self._handle, None
             try:
@@ -105,6 +114,7 @@ class EntryLog:
                 os.close(handle)
             raise
         self._size += len(record)
+        self._count += 1
         self._digest = digest
         return digest
 
@@ -137,10 +147,11 @@ def read_log(ledger: Path) -> LogContent | None:
     if not path.is_file() or path.stat().st_size > _MOST:
         raise ValueError("is no log")
     data = path.read_bytes()
-    if len(data) < _HEADER.size or not data.startswith(_MAGIC):
+    if len(data) < _BEGIN or not data.startswith(_MAGIC):
         raise ValueError("does not begin as a log does")
     _, number, head = _HEADER.unpack_from(data)
-    at, digest, records = _HEADER.size, head, []
+    (count,) = _COUNT.unpack_from(data, _HEADER.size)
+    at, digest, records = _BEGIN, head, []
     while at + _RECORD.size <= len(data):
         size, checksum = _RECORD.unpack_from(data, at)
         content = data[at + _RECORD.size : at + _RECORD.size + size]
@@ -149,7 +160,8 @@ def read_log(ledger: Path) -> LogContent | None:
         records.append(content)
         digest = checksum
         at += _RECORD.size + size
-    return LogContent(number, head, tuple(records), digest, len(data) - at, _is_torn(data[at:]))
+    missing = max(0, count - len(records))
+    return LogContent(number, head, tuple(records), digest, missing, len(data) - at, _is_torn(data[at:]))
 
 
 def _is_torn(rest: bytes) -> bool:
@@ -165,4 +177,3 @@ def _write(handle: int, data: bytes) -> None:
     left = memoryview(data)
     while left:
         left = left[os.write(handle, left) :]
-    os.fdatasync(handle)

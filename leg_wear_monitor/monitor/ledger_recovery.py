@@ -110,10 +110,10 @@ def _applied(there: Recovered, content: LogContent, name: str) -> Recovered:
             raise LedgerError(f"{name}: follows a ledger that has no entry; {MOVE}")
         run, entry = decode(record, entry)
     lost_s, told = run.interval_s, ""
-    if content.left:
-        if not content.is_torn:
-            lost_s = max(0.0, WHOLE_S - _moved_s(there.entry, entry)) + 2.0 * run.interval_s
-        told = _told(name, f"has {content.left} bytes that are not what was written", lost_s)
+    if content.left or content.missing:
+        most_s = max(0.0, WHOLE_S - _moved_s(there.entry, entry)) + 2.0 * run.interval_s
+        lost_s = min(most_s, (content.missing + 1) * run.interval_s) if content.is_torn else most_s
+        told = _told(name, "is not whole", lost_s)
     return attrs.evolve(
         there,
         digest=content.digest,

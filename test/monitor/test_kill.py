@@ -80,7 +80,7 @@ def check(said, before, after):
     if reached <= before[0]:
         return None
     lost_s = (reached - stamp_ns) * 1e-9
-    assert lost_s <= CHECKPOINT_S + LAG_S + BLOCK_S, "more was lost than the interval"
+    assert lost_s <= CHECKPOINT_S + LAG_S + BLOCK_S, f"{lost_s:.3f} s were lost, more than the interval"
     return lost_s
 
 

@@ -65,9 +65,9 @@ def assert_is(found, entry, before):
         lives = [(joint.name, joint.cycles, joint.moving_s, joint.replaced_ns) for joint in (got, given)]
         assert lives[0] == lives[1]
         largest = np.abs(given.depth - was.depth).max(axis=1, keepdims=True)
-        assert (np.abs(got.depth - given.depth) <= largest / 60).all()
+        assert (np.abs(got.depth - given.depth) <= largest / 36).all()
         mean = np.abs((got.depth - given.depth).mean(axis=1, keepdims=True))
-        assert (mean < largest / 500).all()
+        assert (mean < largest / 300).all()
 
 
 def test_an_entry_costs_some_kilobytes_and_the_tables_stay_as_they_are(open_ledger, walk):
@@ -118,19 +118,29 @@ def test_a_record_cut_off_by_a_power_cut_is_not_there_and_the_one_before_is(open
     log_of(killed).write_bytes(whole[:-7])
     found = open_ledger()
     assert_is(found.entry, walk[-2], walk[-3])
-    assert found.cut_off_s == 5.0
-    assert "bytes that are not what was written: the wear of at most 5 s of walking is lost" in found.told
+    assert found.cut_off_s == 10.0  # of that record, and since
+    assert "wear.ledger-log is not whole: the wear of at most 10 s of walking is lost" in found.told
+
+
+def test_records_that_are_missing_at_the_end_are_missed(open_ledger, killed, walk):
+    sizes = [len(record) + 36 for record in read_log(killed).records]
+    whole = log_of(killed).read_bytes()
+    log_of(killed).write_bytes(whole[: len(whole) - sum(sizes[-3:])])
+    found = open_ledger()
+    assert_is(found.entry, walk[-4], walk[-5])
+    assert found.cut_off_s == 20.0
+    assert "is not whole: the wear of at most 20 s of walking is lost" in found.told
 
 
 def test_a_flipped_bit_in_the_log_is_told_with_what_may_be_lost(open_ledger, killed, walk):
     sizes = [len(record) + 36 for record in read_log(killed).records]
     broken = bytearray(log_of(killed).read_bytes())
-    broken[48 + sum(sizes[:4]) + 100] ^= 4  # in the fifth record
+    broken[56 + sum(sizes[:4]) + 100] ^= 4  # in the fifth record
     log_of(killed).write_bytes(broken)
     found = open_ledger()
     assert_is(found.entry, walk[4], walk[3])
     assert found.cut_off_s == pytest.approx(WHOLE_S - 20.0 + 10.0)
-    assert "wear.ledger-log has" in found.told
+    assert "wear.ledger-log is not whole" in found.told
     assert "at most 590 s of walking is lost" in found.told
 
 

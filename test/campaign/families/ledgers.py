@@ -236,10 +236,10 @@ def _more(content: bytearray, rng: np.random.Generator) -> None:
 
 
 def _pages_exchanged(content: bytearray, rng: np.random.Generator) -> None:
-    pages = len(content) // 4096
+    pages = len(content) // 512
     if pages > 1:
-        a, b = (4096 * int(at) for at in rng.choice(pages, 2, replace=False))
-        content[a : a + 4096], content[b : b + 4096] = content[b : b + 4096], content[a : a + 4096]
+        a, b = (512 * int(at) for at in rng.choice(pages, 2, replace=False))
+        content[a : a + 512], content[b : b + 512] = content[b : b + 512], content[a : a + 512]
 
 
 def _part_twice(content: bytearray, rng: np.random.Generator) -> None:

@@ -80,5 +80,5 @@ class Epochs:
         values = {"left_out_samples": float(self._left_out), "epochs_begun": float(self._begun)}
         is_undecided, self._told = self._left_out > self._told, self._left_out
         if is_undecided:
-            return Status("epochs", Level.ERROR, UNDECIDED, values)
-        return Status("epochs", Level.OK, BEGUN if self._begun else "goes on from what is counted", values)
+            return Status("clock", Level.ERROR, UNDECIDED, values)
+        return Status("clock", Level.OK, BEGUN if self._begun else "goes on from what is counted", values)

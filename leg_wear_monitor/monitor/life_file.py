@@ -93,11 +93,11 @@ def _document(path: str) -> dict[str, Any]:
 
 def _life(record: dict[str, Any], loose: Sequence[str]) -> SimulatedLife:
     def columns(name: str) -> Any:
-        return np.array([record["joints"][joint][name] for joint in loose], dtype=float).T
+        return np.array([_numbers(record["joints"][joint][name]) for joint in loose], dtype=float).T
 
     life = SimulatedLife(
-        factor=np.array([record["wear_factor"][joint] for joint in loose], dtype=float),
-        cycles=np.array(record["cycles"], dtype=float),
+        factor=np.array(_numbers([record["wear_factor"][joint] for joint in loose]), dtype=float),
+        cycles=np.array(_numbers(record["cycles"]), dtype=float),
         clearance_m=columns("clearance_m"),
         growth_m_per_cycle=columns("growth_m_per_cycle"),
     )
@@ -105,6 +105,13 @@ def _life(record: dict[str, Any], loose: Sequence[str]) -> SimulatedLife:
     if len(shapes) > 1 or len(life.cycles) < 2 or not _can_be(life):
         raise ValueError("figures that do not fit together")
     return life
+
+
+def _numbers(values: Any) -> list[float]:
+    """A list of numbers as it is; numpy would take texts and flags for some."""
+    if not isinstance(values, list) or not all(type(value) in (int, float) for value in values):
+        raise ValueError("no list of numbers")
+    return values
 
 
 def _can_be(life: SimulatedLife) -> bool:

@@ -61,7 +61,9 @@ def parse_config(document: Any, source: str, node: str | None = None) -> Monitor
     values: dict[str, Any] = {}
     node, taken = node or _node_of(document), False
     for pattern, entry in document.items():
-        parameters = _parameters(entry, source, str(pattern))
+        parameters = _parameters(
+            entry, source, str(pattern) if str(pattern).isprintable() else shown(pattern)
+        )
         if _is_for(str(pattern), node):
             taken = True
             values |= _flat(parameters, "", source)

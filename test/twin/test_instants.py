@@ -20,7 +20,11 @@ WARN, ERROR = 0.08, 0.1  # of the alarm, by default
 
 def sampled_at_instants(leg: Mechanism) -> Samples:
     """Crank samples with the torque at their instants, which scatter by a quarter of a millisecond."""
-    run, tally, chance = ClearanceRun(prepare(leg), RATE), new_tally(10), np.random.default_rng(3)
+    run, tally, chance = (
+        ClearanceRun(prepare(leg), 11 * RATE),
+        new_tally(10),
+        np.random.default_rng(3),
+    )
     n = SECONDS * RATE
     t = np.arange(1, n + 1) / RATE + 2.5e-4 * chance.uniform(-1.0, 1.0, n)
     torque = np.zeros(n)

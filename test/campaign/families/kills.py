@@ -18,7 +18,7 @@ from campaign.case import Case, Outcome
 from campaign.warm_twin import keep_twin
 
 KILLS = 2  # in each case
-SHORT, LONG = 3, 30
+SHORT, LONG = 3, 50
 
 _BAG = Path(__file__).parents[3] / "bags" / "healthy.mcap"
 _KNOCKING = _BAG.with_name("knocking.mcap")

@@ -126,7 +126,7 @@ def replay(
         click.echo(f"warning: {finding}", err=True)
     if len(result.findings) > _MOST_LINES:
         click.echo(f"warning: and {len(result.findings) - _MOST_LINES} findings more", err=True)
-    if not result.is_believable:
+    if result.is_unusable:
         missing = result.evidence.missing()
         click.echo(f"warning: no gait cycle can be this leg's, so no forces are given: {missing}", err=True)
     if not to_stdout:
@@ -136,7 +136,7 @@ def replay(
         for path in written:
             click.echo(f"written: {path}")
     failed = (result.is_partial and not allow_partial) or is_raised(result, fail_on)
-    failed = failed or not result.is_believable
+    failed = failed or result.is_unusable
     return WITH_FINDINGS if failed else 0
 
 

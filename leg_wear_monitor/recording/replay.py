@@ -74,6 +74,11 @@ class ReplayResult:
         return self.evidence.believable > 0
 
     @property
+    def is_unusable(self) -> bool:
+        """Whether there was something to follow, and none of it can be this leg's gait."""
+        return not self.is_believable and not self.monitor.is_all_counted
+
+    @property
     def duration_s(self) -> float:
         """Time between the first and the last stamp, of the messages' arrival where stamps jump [s]."""
         stamped_s = (self.end_ns - self.begin_ns) / 1e9
@@ -173,7 +178,8 @@ def replay(
         result.is_partial = recording.is_partial
         if finish:
             finish(result)
-        monitor.close()
+        if not result.is_unusable:  # wear of another machine would stay in the ledger for ever
+            monitor.close()
     return result
 
 
@@ -206,13 +212,16 @@ def _stamps_apart_s(result: ReplayResult, block: Block) -> float:
 
 
 def _about_the_ledger(result: ReplayResult) -> list[Finding]:
-    """What is to be told of the ledger as it was found."""
+    """What is to be told of the ledger as it was found, and as it is left."""
     found = []
     if result.monitor.ledger_told:
         path = Path(result.monitor.config.ledger.path)
         found.append(Finding(path, result.monitor.ledger_told, Weight.NOTE))
     if result.monitor.is_all_counted:
         found.append(Finding(result.files[0], "all of it is in the ledger already", Weight.NOTE))
+    if result.monitor.config.ledger.path and result.is_unusable:
+        path = Path(result.monitor.config.ledger.path)
+        found.append(Finding(path, "nothing of this recording is written into the ledger", Weight.NOTE))
     return found
 
 

@@ -40,7 +40,8 @@ def summary(result: ReplayResult, wall_s: float) -> dict[str, Any]:
         "gait": {
             "believable_cycles": result.evidence.believable,
             "doubtful_cycles": result.evidence.doubtful,
-            "missing": printable(result.evidence.missing()),
+            "missing": printable(result.evidence.missing()) if result.is_unusable else "",
+            "is_counted": result.monitor.is_all_counted,
         },
         "joints": _joints(result) if result.is_believable else {},
         "forecast": _leg(result) if result.is_believable else None,

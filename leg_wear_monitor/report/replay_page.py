@@ -43,7 +43,9 @@ def _sentences(record: dict[str, Any]) -> list[str]:
     sentences = []
     if record["recording"]["is_partial"]:
         sentences.append("The recording is damaged or incomplete: what follows is of what could be read.")
-    if not _is_believable(record):
+    if record.get("gait", {}).get("is_counted"):
+        sentences.append("All of it is in the ledger already, so nothing of it was followed again.")
+    elif not _is_believable(record):
         sentences.append("No gait cycle can be this leg's, so there is nothing to say about forces and wear.")
         if missing := record.get("gait", {}).get("missing"):
             sentences.append(f"What is missing: {missing}.")

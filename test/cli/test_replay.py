@@ -220,6 +220,7 @@ def test_without_a_believable_gait_cycle_there_are_no_forces(run, tmp_path, stam
         "believable_cycles": 0,
         "doubtful_cycles": record["cycles"],
         "missing": why,
+        "is_counted": False,
     }
     assert f"What is missing: {why}" in html.unescape((tmp_path / "out" / "report.html").read_text())
 

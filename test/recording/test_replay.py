@@ -13,6 +13,7 @@ import pytest
 import leg_wear_monitor as lw
 from leg_wear_monitor.monitor.config import LedgerFile
 from leg_wear_monitor.monitor.forecast import Answer
+from leg_wear_monitor.monitor.input_config import Cadence
 from leg_wear_monitor.monitor.ledger import open_ledger
 from leg_wear_monitor.monitor.ledger_entry import Measurement
 from leg_wear_monitor.recording import encode
@@ -223,6 +224,25 @@ def test_the_ledger_of_the_parameters_is_left_alone_and_one_that_is_asked_for_is
     assert not first.findings
     assert [str(finding) for finding in again.findings] == [f"{bag}: all of it is in the ledger already"]
     assert summary(again, 1.0)["recording"]["findings"][0]["text"] == "all of it is in the ledger already"
+
+
+def test_what_is_counted_already_is_no_doubt_and_another_machine_is_not_counted(
+    bag: Path, tmp_path: Path, leg: lw.Mechanism
+) -> None:
+    own = tmp_path / "own.db"
+    lw.replay(bag, lw.MonitorConfig(), ledger=own)
+    again = lw.replay(bag, lw.MonitorConfig(), ledger=own)
+    assert not again.is_believable and not again.is_unusable
+    assert summary(again, 1.0)["gait"]["is_counted"] is True
+    fast = attrs.evolve(lw.MonitorConfig(), cadence=Cadence(commanded_rpm=240.0))
+    other = lw.replay(bag, fast, ledger=tmp_path / "other.db")
+    assert other.is_unusable and len(other.history) == CYCLES
+    text = f"{tmp_path / 'other.db'}: nothing of this recording is written into the ledger"
+    assert text in [str(finding) for finding in other.findings]
+    config = attrs.evolve(fast, ledger=LedgerFile(path=str(tmp_path / "other.db")))
+    kept = open_ledger(leg, config)
+    assert kept is not None and kept.entry is None
+    kept.close()
 
 
 def rows(path: Path) -> list[str]:

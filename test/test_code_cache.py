@@ -38,7 +38,7 @@ def where(program=WHERE, user=None, **environment):
 def shared(tmp_path):
     """A directory like /tmp, on a way that other users can go, too."""
     for directory in (tmp_path, *tmp_path.parents):
-        if directory.stat().st_uid == os.geteuid() and directory.name.startswith(("pytest", "test")):
+        if directory.stat().st_uid == os.geteuid() and directory.name.startswith(("popen", "pytest", "test")):
             directory.chmod(0o755)
     (tmp_path / "tmp").mkdir()
     (tmp_path / "tmp").chmod(0o1777)

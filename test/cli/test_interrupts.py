@@ -56,9 +56,7 @@ def test_while_modules_are_imported(tmp_path, module):
 
 
 def test_while_kernels_are_compiled(tmp_path):
-    code, told = interrupted(tmp_path, "check", "jansen_leg")
-    assert code == 130
-    assert told == ["compiling for this machine, once: a few seconds", "error: interrupted"]
+    assert interrupted(tmp_path, "check", "jansen_leg") == (130, ["error: interrupted"])
 
 
 def test_the_ledger_of_a_replay_that_is_still_compiling_is_left_in_order(tmp_path):
@@ -69,7 +67,7 @@ def test_the_ledger_of_a_replay_that_is_still_compiling_is_left_in_order(tmp_pat
     code, told = interrupted(tmp_path, *line, below="open_monitor")
     assert (code, told[-1]) == (130, "error: interrupted")
     with sqlite3.connect(ledger) as db:
-        assert db.execute("SELECT closed FROM run").fetchall() == [(1,)]
+        assert db.execute("SELECT closed FROM run").fetchall() == []
     db.close()
 
 

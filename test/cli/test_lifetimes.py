@@ -50,7 +50,8 @@ def test_terminal_page_summary_and_status_agree(run, bag, tmp_path):
         assert [status[f"joint {name}"][f"{share}_days"] for share in SHARES] == list(told["days"].values())
         assert rows[name][0] == name
     assert [line.split()[0] for line in lasting if line.startswith("leg ")] == ["leg"]
-    assert all(len(line) <= 80 and "…" not in line for line in lasting)
+    table = lasting[: next(i for i, line in enumerate(lasting) if line.startswith("hours of walking")) + 1]
+    assert all(len(line) <= 80 and "…" not in line for line in table)
     assert three_digits(record["forecast"]["hours"]["p50"]) in page
     assert "not enough data" not in result.stdout + page
     assert "counted clearance" in page and "counted clearance" in result.stdout

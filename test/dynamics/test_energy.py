@@ -55,7 +55,7 @@ def test_energy_of_the_clearance_model_under_a_foot_load(leg, loose, load):
     """The load does its work where the toe is, which the eccentricities move."""
     kind = PhaseLoad if load == "stance" else ConstantLoad
     pushed = attrs.evolve(leg, loads={"ground": kind(body="foot", point="toe", **LOADS[load])})
-    run = ClearanceRun(prepare(pushed, clearances=loose))
+    run = ClearanceRun(prepare(pushed, clearances=tuple(loose)))
     run.advance(1.0, new_tally(len(leg.joints)))
     tally, start = new_tally(len(leg.joints)), run.stored_energy
     run.advance(7.0, tally)

@@ -17,7 +17,7 @@ from leg_wear_monitor.monitor.growth_law import GrowthLaw, no_law
 pytestmark = pytest.mark.plain
 
 SETTINGS = Forecasting(model_sigma=0.05)
-SURE = Forecasting(load_sigma=0.0, model_sigma=0.0, clearance_sigma_m=1e-12, duty_sigma=0.0)
+SURE = Forecasting(load_sigma=0.0, model_sigma=0.0, clearance_sigma_m=1e-9, duty_sigma=0.0)
 NOW = JointNow(joint="A", fresh_m=3e-4, wear_m=0.0, limit_m=6e-4, growth_m=1.5e-11, growth_error_m=0.0)
 B = attrs.evolve(NOW, joint="B", growth_m=5e-12)
 Z = statistics.NormalDist().inv_cdf(0.9)

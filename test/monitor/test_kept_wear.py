@@ -196,7 +196,7 @@ def test_another_leg_is_refused_before_anything_is_worn(begin, gait):
     monitor, _ = begin()
     monitor.update(gait(2.0))
     monitor.close()
-    with pytest.raises(LedgerError, match=r"is of hardware id leg, not other; set ledger.path"):
+    with pytest.raises(LedgerError, match=r"is of hardware id leg, not other; .*else set ledger.path to"):
         begin({"hardware_id": "other"})
 
 

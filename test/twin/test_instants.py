@@ -30,7 +30,7 @@ def sampled_at_instants(leg: Mechanism) -> Samples:
     torque = np.zeros(n)
     for i in range(n):
         run.advance(t[i], tally)
-        torque[i] = run.sample().drive_torque
+        torque[i] = run.sample_at(t[i]).drive_torque
     stamps = START_NS + np.round(1.0e9 * t).astype(np.int64)
     angle = TURN * t + 1.0e-3 * chance.standard_normal(n)
     return gait_samples(

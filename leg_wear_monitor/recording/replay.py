@@ -75,8 +75,9 @@ class ReplayResult:
 
     @property
     def is_unusable(self) -> bool:
-        """Whether there was something to follow, and none of it can be this leg's gait."""
-        return not self.is_believable and not self.monitor.is_all_counted
+        """Whether nothing of it can be this leg's gait; what is left beside counted time may be no cycle."""
+        is_rest = self.monitor.lost.already_counted > 0 and not self.evidence.doubtful
+        return not self.is_believable and not is_rest
 
     @property
     def duration_s(self) -> float:

@@ -7,6 +7,7 @@ from typing import Any
 from ruamel.yaml import YAML
 from ruamel.yaml.constructor import DuplicateKeyError
 from ruamel.yaml.error import MarkedYAMLError, YAMLError
+from ruamel.yaml.events import CollectionEndEvent, CollectionStartEvent
 
 from leg_wear_monitor.errors import ConfigError
 
@@ -30,10 +31,12 @@ def read_document(path: Path, source: str) -> Any:
         Naming the line at fault, or the bound that is passed.
     """
     try:
-        document = YAML(typ="safe", pure=True).load(_text(path, source))
+        text = _text(path, source)
+        _check_depth(text, source)
+        document = YAML(typ="safe", pure=True).load(text)
     except UnicodeDecodeError as error:
         raise ConfigError(source, "", f"is not UTF-8 text: byte {error.start}") from error
-    # a date or a number too odd; a tag that does not fit its value; nested too deeply
+    # a date or a number too odd; a tag that does not fit its value; recursion
     except (YAMLError, ValueError, TypeError, AttributeError, LookupError, RecursionError) as error:
         raise ConfigError(source, "", f"is not YAML: {_fault(error)}") from error
     _check_size(document, source)
@@ -56,6 +59,15 @@ def _text(path: Path, source: str) -> str:
     if len(content) > MOST_BYTES:
         raise ConfigError(source, "", f"has more than {MOST_BYTES} bytes, it is no configuration")
     return content.decode("utf-8")
+
+
+def _check_depth(text: str, source: str) -> None:
+    """Stop where the text first goes too deep: to compose thousands of levels takes seconds."""
+    depth = 0
+    for event in YAML(typ="safe", pure=True).parse(text):
+        depth += isinstance(event, CollectionStartEvent) - isinstance(event, CollectionEndEvent)
+        if depth > DEEPEST:
+            raise ConfigError(source, "", f"is nested more than {DEEPEST} deep")
 
 
 def _check_size(document: Any, source: str) -> None:

@@ -17,7 +17,7 @@ HOSTILE = {
     "a list in itself": ("name: &x [*x]", "holds itself"),
     "aliases of aliases": (LAUGHS, "its aliases stand for more than 100000 values"),
     "a chain of aliases": (CHAIN, "nested more than 50 deep"),
-    "brackets": ("a: " + 5000 * "[", "is not YAML"),
+    "brackets": ("a: " + 5000 * "[", "nested more than 50 deep"),
     "braces in brackets": ("a: " + 60 * "[" + 60 * "]", "nested more than 50 deep"),
     "code": ("name: !!python/object/apply:os.system ['touch pwned']", "is not YAML"),
     "a tag that does not fit": ("name: !!int many", "is not YAML"),

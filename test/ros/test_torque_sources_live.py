@@ -1,5 +1,6 @@
 """The monitor over real DDS with every source of the drive torque: no alarm on a healthy leg."""
 
+import time
 from types import SimpleNamespace
 
 import numpy as np
@@ -50,7 +51,7 @@ def walk_with(readings, source):
 def test_a_healthy_leg_raises_no_alarm(stage, healthy, source, monkeypatch) -> None:
     now = [START_NS]
     # a Float64 has no stamp: it is of the time at which it comes, here that of the walk
-    monkeypatch.setattr("leg_wear_monitor.ros.monitor_node.time", SimpleNamespace(time_ns=lambda: now[0]))
+    monkeypatch.setattr("leg_wear_monitor.ros.monitor_node.time", SimpleNamespace(time_ns=lambda: now[0], monotonic_ns=time.monotonic_ns))
 
     def set_clock(at_s: float) -> None:
         now[0] = START_NS + round(1.0e9 * at_s)

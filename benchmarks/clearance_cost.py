@@ -9,10 +9,10 @@ import clearance_loops as loops
 import numpy as np
 from watch import Watch
 
-from leg_wear_monitor.dynamics.clearance_run import INTERVALS, ClearanceStepper
-from leg_wear_monitor.dynamics.drive import steady_drive
-from leg_wear_monitor.dynamics.run import Setup
-from leg_wear_monitor.dynamics.tally import new_tally
+from leg_wear_monitor.dynamics.clearance.run import INTERVALS, ClearanceStepper
+from leg_wear_monitor.dynamics.run.drive import steady_drive
+from leg_wear_monitor.dynamics.run.protocol import Setup
+from leg_wear_monitor.dynamics.run.run_statistics import new_tally
 from leg_wear_monitor.mechanism.ideal import TURN
 
 CALLS = 100_000

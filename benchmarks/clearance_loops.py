@@ -8,8 +8,7 @@ import math
 
 from leg_wear_monitor.contact.friction import friction_force
 from leg_wear_monitor.contact.normal import damped_force, elastic_force
-from leg_wear_monitor.dynamics.clearance import hold_eccentricities, take_tables
-from leg_wear_monitor.dynamics.clearance_contact import (
+from leg_wear_monitor.dynamics.clearance.contact import (
     A0,
     E0,
     FRESH_STIFFNESS,
@@ -23,10 +22,11 @@ from leg_wear_monitor.dynamics.clearance_contact import (
     V0,
     accelerate_clearances,
 )
-from leg_wear_monitor.dynamics.clearance_outputs import drive_torque, reactions, toe_deviation
-from leg_wear_monitor.dynamics.clearance_step import integrate_joints, shift_start, try_step
-from leg_wear_monitor.dynamics.rosenbrock import factorise_contacts, solve_contacts
-from leg_wear_monitor.dynamics.touch import DELTA, first_touch, update_contacts
+from leg_wear_monitor.dynamics.clearance.model import hold_eccentricities, take_tables
+from leg_wear_monitor.dynamics.clearance.outputs import drive_torque, reactions, toe_deviation
+from leg_wear_monitor.dynamics.clearance.rosenbrock import factorise_contacts, solve_contacts
+from leg_wear_monitor.dynamics.clearance.step import integrate_joints, shift_start, try_step
+from leg_wear_monitor.dynamics.joint.contact_event import DELTA, first_touch, update_contacts
 from leg_wear_monitor.kernel import entry
 from leg_wear_monitor.wear.surfaces import deposit_wear
 

@@ -15,11 +15,11 @@ import numpy as np
 from hidden_lives import LIMIT_M, HiddenLife, read
 
 from leg_wear_monitor import load_mechanism
-from leg_wear_monitor.monitor.belief import Look, believe
-from leg_wear_monitor.monitor.forecast import Forecast, JointNow, forecast
-from leg_wear_monitor.monitor.forecast_config import Forecasting
-from leg_wear_monitor.monitor.growth_law import GrowthLaw
-from leg_wear_monitor.monitor.life_file import law_of
+from leg_wear_monitor.monitor.config.forecast import Forecasting
+from leg_wear_monitor.monitor.forecast.forecast import Forecast, JointNow, forecast
+from leg_wear_monitor.monitor.forecast.growth_law import GrowthLaw
+from leg_wear_monitor.monitor.forecast.life_file import law_of
+from leg_wear_monitor.monitor.forecast.wear_coefficients import Look, believe
 
 FRESH_M, MEASURED_M, GROWTH_NOISE = 3.0e-4, 5.0e-6, 0.03
 STEPS = 100  # of a joint's way to its limit, in the truth by a law

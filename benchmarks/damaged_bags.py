@@ -14,11 +14,11 @@ from mcap.writer import CompressionType, Writer
 from rosbags.rosbag2 import StoragePlugin
 from rosbags.rosbag2 import Writer as Rosbag2Writer
 
+from leg_wear_monitor.bags.reader import Recording
 from leg_wear_monitor.errors import LegWearError
-from leg_wear_monitor.monitor.config import MonitorConfig
-from leg_wear_monitor.recording import encode
-from leg_wear_monitor.recording.definitions import definition, types
-from leg_wear_monitor.recording.reader import Recording
+from leg_wear_monitor.messages import encode
+from leg_wear_monitor.messages.definitions import definition, types
+from leg_wear_monitor.monitor.config.settings import MonitorConfig
 from leg_wear_monitor.twin.sample import NO_FAULT, Samples
 
 SECONDS, RATE_HZ, LIMIT_S = 10, 200, 30

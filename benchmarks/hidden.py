@@ -12,20 +12,20 @@ from pathlib import Path
 import numpy as np
 
 from leg_wear_monitor import load_mechanism
-from leg_wear_monitor.dynamics.clearance_run import ClearanceStepper
-from leg_wear_monitor.dynamics.drive import steady_drive
-from leg_wear_monitor.dynamics.full_run import FullRun
+from leg_wear_monitor.dynamics.clearance.run import ClearanceStepper
+from leg_wear_monitor.dynamics.full.run import FullRun
+from leg_wear_monitor.dynamics.run.drive import steady_drive
+from leg_wear_monitor.dynamics.run.run_statistics import new_tally
 from leg_wear_monitor.dynamics.simulation import prepare
-from leg_wear_monitor.dynamics.tally import new_tally
 from leg_wear_monitor.mechanism.arrays import body_names
 from leg_wear_monitor.mechanism.spec import Mechanism
-from leg_wear_monitor.monitor.angle_regression import rms
-from leg_wear_monitor.monitor.commissioning import commissioned, errors_of, known_with
-from leg_wear_monitor.monitor.hidden import HiddenClearance
-from leg_wear_monitor.monitor.input_config import Encoders
-from leg_wear_monitor.monitor.seen import Sight, seen_clearances
-from leg_wear_monitor.twin.joint_angles import angle_model
-from leg_wear_monitor.twin.reference import ReferenceRun
+from leg_wear_monitor.monitor.config.inputs import Encoders
+from leg_wear_monitor.monitor.encoders.angle_regression import rms
+from leg_wear_monitor.monitor.encoders.clearance_estimate import Sight, seen_clearances
+from leg_wear_monitor.monitor.encoders.clearance_regression import HiddenClearance
+from leg_wear_monitor.monitor.encoders.commissioning import commissioned, errors_of, known_with
+from leg_wear_monitor.twin.reference.joint_angles import angle_model
+from leg_wear_monitor.twin.reference.reference import ReferenceRun
 from leg_wear_monitor.wear.surfaces import SECTORS
 
 SENSORS = {"B": "hip", "G": "knee", "I": "ankle"}

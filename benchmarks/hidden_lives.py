@@ -14,9 +14,9 @@ import attrs
 import numpy as np
 
 from leg_wear_monitor import load_mechanism
-from leg_wear_monitor.dynamics.life import LifeRun, LifeSettings
+from leg_wear_monitor.life.life import LifeRun, LifeSettings
 from leg_wear_monitor.mechanism.spec import Mechanism
-from leg_wear_monitor.monitor.forecast_config import Forecasting
+from leg_wear_monitor.monitor.config.forecast import Forecasting
 
 LIMIT_M = 6.0e-4
 MOST_JUMPS = 400

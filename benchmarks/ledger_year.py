@@ -18,10 +18,10 @@ import attrs
 import numpy as np
 
 import leg_wear_monitor as lw
-from leg_wear_monitor.monitor.binding import binding_of
-from leg_wear_monitor.monitor.fitting import fitted
-from leg_wear_monitor.monitor.ledger import Ledger
-from leg_wear_monitor.monitor.ledger_entry import ClearancePoint, Entry, ForecastPoint, JointWear
+from leg_wear_monitor.monitor.config.fitting import fitted
+from leg_wear_monitor.monitor.ledger.binding import binding_of
+from leg_wear_monitor.monitor.ledger.entry import ClearancePoint, Entry, ForecastPoint, JointWear
+from leg_wear_monitor.monitor.ledger.ledger import Ledger
 from leg_wear_monitor.twin.sample import gait_samples
 
 CHECKPOINT_S, POINT_S, DAY_S = 5.0, 600.0, 8 * 3600.0

@@ -10,19 +10,19 @@ import time
 import numpy as np
 
 from leg_wear_monitor import load_mechanism
-from leg_wear_monitor.dynamics.clearance_run import ClearanceStepper
-from leg_wear_monitor.dynamics.drive import steady_drive
-from leg_wear_monitor.dynamics.life import LifeRun, LifeSettings, simulate_life
-from leg_wear_monitor.dynamics.life_result import Life
-from leg_wear_monitor.dynamics.run import DONE
+from leg_wear_monitor.dynamics.clearance.run import ClearanceStepper
+from leg_wear_monitor.dynamics.run.drive import steady_drive
+from leg_wear_monitor.dynamics.run.protocol import DONE
+from leg_wear_monitor.dynamics.run.run_statistics import new_tally
 from leg_wear_monitor.dynamics.simulation import prepare
-from leg_wear_monitor.dynamics.tally import new_tally
+from leg_wear_monitor.life.life import LifeRun, LifeSettings, simulate_life
+from leg_wear_monitor.life.result import Life
 from leg_wear_monitor.mechanism.spec import Mechanism
-from leg_wear_monitor.monitor.belief import believe
-from leg_wear_monitor.monitor.forecast import JointNow, forecast
-from leg_wear_monitor.monitor.forecast_config import Forecasting
-from leg_wear_monitor.monitor.growth_law import left_over
-from leg_wear_monitor.monitor.life_file import law_of, read_lives
+from leg_wear_monitor.monitor.config.forecast import Forecasting
+from leg_wear_monitor.monitor.forecast.forecast import JointNow, forecast
+from leg_wear_monitor.monitor.forecast.growth_law import left_over
+from leg_wear_monitor.monitor.forecast.life_file import law_of, read_lives
+from leg_wear_monitor.monitor.forecast.wear_coefficients import believe
 from leg_wear_monitor.share import share_directory
 from leg_wear_monitor.wear.cycle_jump import JumpControl
 

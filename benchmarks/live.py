@@ -27,9 +27,9 @@ from sensor_msgs.msg import JointState
 from leg_wear_monitor.gait.config import EncoderConfig, TorqueSensorConfig
 from leg_wear_monitor.gait.leg import SyntheticLeg
 from leg_wear_monitor.gait.sensors import readings
-from leg_wear_monitor.ros.publisher_config import PublisherConfig
+from leg_wear_monitor.ros.gait_publisher.config import PublisherConfig
+from leg_wear_monitor.ros.gait_publisher.sensor_messages import sensor_message
 from leg_wear_monitor.ros.running import spin
-from leg_wear_monitor.ros.sensor_messages import sensor_message
 from leg_wear_monitor.twin.sample import CRANK
 
 LOOP_S = 8  # of walking that is sent again and again; whole gait cycles, with an angle that wraps

@@ -13,10 +13,10 @@ from mcap_ros2.decoder import DecoderFactory
 from rosbags.highlevel import AnyReader
 from watch import Watch
 
-from leg_wear_monitor.monitor.config import MonitorConfig
-from leg_wear_monitor.recording import encode
-from leg_wear_monitor.recording.definitions import definition
-from leg_wear_monitor.recording.reader import Recording
+from leg_wear_monitor.bags.reader import Recording
+from leg_wear_monitor.messages import encode
+from leg_wear_monitor.messages.definitions import definition
+from leg_wear_monitor.monitor.config.settings import MonitorConfig
 from leg_wear_monitor.twin.sample import CRANK
 
 NAMES = ["hip", "knee", "ankle", "crank", "toe", "pelvis", "spare"]

@@ -44,11 +44,11 @@ from scipy_leg import ScipyLeg, impact_speeds
 from watch import Watch
 
 from leg_wear_monitor import load_mechanism
-from leg_wear_monitor.dynamics.clearance_run import ClearanceRun
-from leg_wear_monitor.dynamics.full_run import FullRun
-from leg_wear_monitor.dynamics.run import Setup
+from leg_wear_monitor.dynamics.clearance.run import ClearanceRun
+from leg_wear_monitor.dynamics.full.run import FullRun
+from leg_wear_monitor.dynamics.run.protocol import Setup
+from leg_wear_monitor.dynamics.run.run_statistics import Tally, new_tally
 from leg_wear_monitor.dynamics.simulation import prepare
-from leg_wear_monitor.dynamics.tally import Tally, new_tally
 
 LEG = load_mechanism("bionic_leg")
 FIVE = ("A", "B", "G", "I", "J")

@@ -8,9 +8,9 @@ import numpy as np
 from watch import Watch
 
 import leg_wear_monitor as lw
-from leg_wear_monitor.recording import encode
-from leg_wear_monitor.recording.reader import Recording
-from leg_wear_monitor.recording.writer import McapWriter
+from leg_wear_monitor.bags.mcap.writer import McapWriter
+from leg_wear_monitor.bags.reader import Recording
+from leg_wear_monitor.messages import encode
 
 NAMES = ["hip", "knee", "ankle", "crank", "toe", "pelvis", "spare"]
 RATE_HZ = 1000

@@ -11,7 +11,7 @@ from pathlib import Path
 from typing import Any
 
 import leg_wear_monitor as lw
-from leg_wear_monitor.recording.summary import summary
+from leg_wear_monitor.playback.summary import summary
 
 ROOT = Path(__file__).parents[1]
 DOMAIN = "77"

@@ -19,10 +19,10 @@ import one_core  # before numpy
 from watch import Watch
 
 from leg_wear_monitor import load_mechanism
-from leg_wear_monitor.dynamics.batch import Leg, simulate_batch
-from leg_wear_monitor.dynamics.clearance_run import ClearanceRun
+from leg_wear_monitor.dynamics.batch.batch import Leg, simulate_batch
+from leg_wear_monitor.dynamics.clearance.run import ClearanceRun
+from leg_wear_monitor.dynamics.run.run_statistics import new_tally
 from leg_wear_monitor.dynamics.simulation import prepare
-from leg_wear_monitor.dynamics.tally import new_tally
 
 LEG = load_mechanism("bionic_leg")
 JOINTS = tuple(LEG.joints)

@@ -11,10 +11,10 @@ import attrs
 import numpy as np
 
 from leg_wear_monitor import load_mechanism
-from leg_wear_monitor.dynamics.clearance_run import ClearanceRun
+from leg_wear_monitor.dynamics.clearance.run import ClearanceRun
 from leg_wear_monitor.dynamics.result import energy_balance, joint_figures
+from leg_wear_monitor.dynamics.run.run_statistics import ARCHARD, new_tally
 from leg_wear_monitor.dynamics.simulation import prepare
-from leg_wear_monitor.dynamics.tally import ARCHARD, new_tally
 from leg_wear_monitor.mechanism.spec import Mechanism
 from leg_wear_monitor.wear.surfaces import worn_volume
 

@@ -24,12 +24,12 @@ os.environ |= dict.fromkeys(("OMP_NUM_THREADS", "OPENBLAS_NUM_THREADS", "MKL_NUM
 from watch import Watch
 
 from leg_wear_monitor import load_mechanism
-from leg_wear_monitor.studies.plan import points_of
+from leg_wear_monitor.studies.execution.run import run_study
+from leg_wear_monitor.studies.plan.plan import points_of
+from leg_wear_monitor.studies.plan.settings import STUDIES, Study, load_settings, parse_settings
 from leg_wear_monitor.studies.point import code_digest
-from leg_wear_monitor.studies.run import run_study
-from leg_wear_monitor.studies.settings import STUDIES, Study, load_settings, parse_settings
-from leg_wear_monitor.studies.store import load_results
-from leg_wear_monitor.studies.tasks import compute
+from leg_wear_monitor.studies.storage.store import load_results
+from leg_wear_monitor.studies.tasks.compute import compute
 
 CORES, LEGS = 100, 1000
 

@@ -15,22 +15,22 @@ if TYPE_CHECKING:
     from leg_wear_monitor.dynamics.simulation import simulate
     from leg_wear_monitor.mechanism.loader import load_mechanism
     from leg_wear_monitor.mechanism.spec import Mechanism
-    from leg_wear_monitor.monitor.config import MonitorConfig
-    from leg_wear_monitor.monitor.ledger import open_ledger
-    from leg_wear_monitor.monitor.parameter_file import load_config
+    from leg_wear_monitor.monitor.config.parameter_file import load_config
+    from leg_wear_monitor.monitor.config.settings import MonitorConfig
+    from leg_wear_monitor.monitor.ledger.ledger import open_ledger
     from leg_wear_monitor.monitor.wear_monitor import WearMonitor
-    from leg_wear_monitor.recording.replay import ReplayResult, replay
+    from leg_wear_monitor.playback.replay import ReplayResult, replay
 
 _HOME = {
     "Mechanism": "mechanism.spec",
-    "MonitorConfig": "monitor.config",
-    "ReplayResult": "recording.replay",
+    "MonitorConfig": "monitor.config.settings",
+    "ReplayResult": "playback.replay",
     "SimulationResult": "dynamics.result",
     "WearMonitor": "monitor.wear_monitor",
-    "load_config": "monitor.parameter_file",
+    "load_config": "monitor.config.parameter_file",
     "load_mechanism": "mechanism.loader",
-    "open_ledger": "monitor.ledger",
-    "replay": "recording.replay",
+    "open_ledger": "monitor.ledger.ledger",
+    "replay": "playback.replay",
     "simulate": "dynamics.simulation",
 }
 

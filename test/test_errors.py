@@ -4,8 +4,8 @@ import pickle
 
 import pytest
 
+from leg_wear_monitor.bags.findings import RecordingError
 from leg_wear_monitor.errors import AssemblyError, ConfigError, LegWearError, SimulationError
-from leg_wear_monitor.recording.findings import RecordingError
 
 pytestmark = pytest.mark.plain
 

@@ -5,11 +5,11 @@ import argparse
 import numpy as np
 
 from leg_wear_monitor import load_mechanism
-from leg_wear_monitor.dynamics.full import BAUMGARTE
-from leg_wear_monitor.dynamics.full_run import TOLERANCE_M, FullRun
+from leg_wear_monitor.dynamics.full.model import BAUMGARTE
+from leg_wear_monitor.dynamics.full.run import TOLERANCE_M, FullRun
 from leg_wear_monitor.dynamics.result import energy_balance
+from leg_wear_monitor.dynamics.run.run_statistics import ARCHARD, CONTACT, FORCE, new_tally, percentile
 from leg_wear_monitor.dynamics.simulation import prepare
-from leg_wear_monitor.dynamics.tally import ARCHARD, CONTACT, FORCE, new_tally, percentile
 from leg_wear_monitor.mechanism.constraints import closures_at
 from leg_wear_monitor.mechanism.ideal import TURN, one_cycle
 from leg_wear_monitor.mechanism.position import build_linkage, dense_jacobian

@@ -15,9 +15,9 @@ import numpy as np
 from leg_wear_monitor import load_mechanism
 from leg_wear_monitor.contact.arrays import compile_contacts
 from leg_wear_monitor.contact.normal import HYSTERESIS, delivered_restitution
-from leg_wear_monitor.dynamics.full_run import TOLERANCE_M, FullRun
+from leg_wear_monitor.dynamics.full.run import TOLERANCE_M, FullRun
+from leg_wear_monitor.dynamics.run.run_statistics import POWER, new_tally
 from leg_wear_monitor.dynamics.simulation import prepare
-from leg_wear_monitor.dynamics.tally import POWER, new_tally
 from leg_wear_monitor.mechanism.ideal import TURN, one_cycle, point_motion
 from leg_wear_monitor.mechanism.position import build_linkage
 

@@ -10,8 +10,8 @@ from xml.etree import ElementTree
 
 import click
 
+from leg_wear_monitor.configuration.nearest import did_you_mean
 from leg_wear_monitor.errors import ConfigWarning, LegWearError, printable
-from leg_wear_monitor.mechanism.nearest import did_you_mean
 from leg_wear_monitor.share import share_directory
 
 COULD_NOT, INTERRUPTED = 2, 130
@@ -34,7 +34,7 @@ class Verbs(click.Group):
             fault = f"{cmd_name!r} is no verb, expected one of {', '.join(_VERBS)}"
             raise click.UsageError(fault + did_you_mean(cmd_name, _VERBS), ctx)
         name = cmd_name.replace("-", "_")
-        verb: click.Command = getattr(import_module(f"leg_wear_monitor.cli.{name}"), name)
+        verb: click.Command = getattr(import_module(f"leg_wear_monitor.cli.verbs.{name}"), name)
         return verb
 
     def invoke(self, ctx: click.Context) -> Any:

@@ -13,9 +13,9 @@ from leg_wear_monitor.errors import ConfigError
 
 if TYPE_CHECKING:
     from leg_wear_monitor.mechanism.spec import Mechanism
-    from leg_wear_monitor.monitor.config import MonitorConfig
-    from leg_wear_monitor.monitor.ledger import Ledger
-    from leg_wear_monitor.monitor.ledger_entry import Measurement
+    from leg_wear_monitor.monitor.config.settings import MonitorConfig
+    from leg_wear_monitor.monitor.ledger.entry import Measurement
+    from leg_wear_monitor.monitor.ledger.ledger import Ledger
 
 LAST = "last"
 
@@ -25,8 +25,8 @@ def leg_of(config: Path | None, ledger: Path | None) -> tuple["MonitorConfig", "
     import attrs
 
     from leg_wear_monitor.mechanism.loader import load_mechanism
-    from leg_wear_monitor.monitor.fitting import fitted
-    from leg_wear_monitor.monitor.parameter_file import load_config
+    from leg_wear_monitor.monitor.config.fitting import fitted
+    from leg_wear_monitor.monitor.config.parameter_file import load_config
 
     settings = load_config(config)
     if ledger is not None:
@@ -41,8 +41,8 @@ def opened(leg: "Mechanism", settings: "MonitorConfig", dry_run: bool) -> Iterat
     """The ledger; a copy of it that is thrown away, if nothing shall be written."""
     import attrs
 
-    from leg_wear_monitor.monitor.ledger import open_ledger
-    from leg_wear_monitor.monitor.ledger_copy import copy_of
+    from leg_wear_monitor.monitor.ledger.copy import copy_of
+    from leg_wear_monitor.monitor.ledger.ledger import open_ledger
 
     with copy_of(settings.ledger.path) if dry_run else nullcontext(settings.ledger.path) as path:
         kept = open_ledger(leg, attrs.evolve(settings, ledger=attrs.evolve(settings.ledger, path=str(path))))

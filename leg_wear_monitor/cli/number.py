@@ -12,7 +12,7 @@ from leg_wear_monitor.errors import ConfigError
 def bounded(
     unit: str = "", *, above: float | None = None, at_least: float | None = None
 ) -> Callable[[click.Context, click.Parameter, float | None], float | None]:
-    """Callback of a click option of type float; for files see `leg_wear_monitor.mechanism.quantity`.
+    """Callback of a click option of type float; for files see `leg_wear_monitor.configuration.quantity`.
 
     Parameters
     ----------

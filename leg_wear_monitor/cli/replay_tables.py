@@ -9,9 +9,9 @@ from rich.table import Table
 from leg_wear_monitor.cli.tables import figure
 
 if TYPE_CHECKING:
-    from leg_wear_monitor.monitor.forecast import JointForecast, LegForecast
+    from leg_wear_monitor.monitor.forecast.forecast import JointForecast, LegForecast
     from leg_wear_monitor.monitor.reports import CycleReport, JointReport
-    from leg_wear_monitor.recording.replay import ReplayResult
+    from leg_wear_monitor.playback.replay import ReplayResult
 
 
 def print_replay(result: "ReplayResult", wall_s: float) -> None:
@@ -37,7 +37,7 @@ def print_replay(result: "ReplayResult", wall_s: float) -> None:
         console.print(_joints(result))
         console.print()
         _print_lifetimes(console, last, monitor.config.forecast.duty_hours_per_day)
-    from leg_wear_monitor.monitor.alarm_words import raised_words, state_of
+    from leg_wear_monitor.monitor.alarms.words import raised_words, state_of
 
     raised = [alarm for alarm in monitor.alarms.alarms if alarm.level]
     for alarm in raised:
@@ -70,7 +70,7 @@ def _joints(result: "ReplayResult") -> Table:
 
 
 def _counted(joint: "JointReport") -> str:
-    from leg_wear_monitor.monitor.lifetime_words import clearance_mm
+    from leg_wear_monitor.monitor.forecast.words import clearance_mm
 
     if joint.forecast is None:
         return f"{1.0e3 * joint.clearance_m:.3f}"
@@ -80,7 +80,7 @@ def _counted(joint: "JointReport") -> str:
 
 def _print_lifetimes(console: Console, report: "CycleReport", duty_hours: float) -> None:
     """How long each joint and the leg last: hours of walking, and days of duty; or why that is not known."""
-    from leg_wear_monitor.monitor.forecast import Answer
+    from leg_wear_monitor.monitor.forecast.forecast import Answer
 
     told = {joint.joint: joint.forecast for joint in report.joints if joint.forecast is not None}
     both: dict[str, JointForecast | LegForecast] = {**told}
@@ -108,7 +108,7 @@ def _lifetime_table(told: "Mapping[str, JointForecast | LegForecast]") -> Table:
 
 
 def _lifetime(told: "JointForecast | LegForecast") -> list[str]:
-    from leg_wear_monitor.monitor.lifetime_words import lifetime_values, three_digits
+    from leg_wear_monitor.monitor.forecast.words import lifetime_values, three_digits
 
     values = lifetime_values(told)
     keys = (f"{share}_{unit}" for unit in ("hours", "days") for share in ("p10", "p50", "p90"))

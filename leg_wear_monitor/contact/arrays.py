@@ -7,13 +7,13 @@ from typing import Any, NamedTuple
 import attrs
 import numpy as np
 
+from leg_wear_monitor.configuration.quantity import FieldError
 from leg_wear_monitor.contact.friction import FRICTION_CODES
 from leg_wear_monitor.contact.geometry import contact_modulus
 from leg_wear_monitor.contact.normal import HYSTERESIS, delivered_restitution
 from leg_wear_monitor.errors import ConfigError, ConfigWarning
 from leg_wear_monitor.mechanism.arrays import Floats, Ints
 from leg_wear_monitor.mechanism.clearance import Clearance
-from leg_wear_monitor.mechanism.quantity import FieldError
 from leg_wear_monitor.mechanism.spec import Mechanism
 
 NEARLY_ELASTIC, LEAST_RESTITUTION = ("hunt-crossley", "lankarani-nikravesh"), 0.7

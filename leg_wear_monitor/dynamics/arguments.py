@@ -7,11 +7,11 @@ from typing import Any
 
 import numpy as np
 
+from leg_wear_monitor.configuration.nearest import did_you_mean
+from leg_wear_monitor.configuration.strict import shown
 from leg_wear_monitor.errors import ConfigError
 from leg_wear_monitor.mechanism.loader import load_mechanism
-from leg_wear_monitor.mechanism.nearest import did_you_mean
 from leg_wear_monitor.mechanism.spec import Mechanism
-from leg_wear_monitor.mechanism.strict import shown
 
 _KINDS: dict[str, tuple[Any, str]] = {
     "trace": (Integral, "a whole number"),

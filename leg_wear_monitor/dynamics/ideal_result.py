@@ -3,8 +3,8 @@
 import numpy as np
 
 from leg_wear_monitor.dynamics.result import JsonObject, SimulationResult, toe_errors
-from leg_wear_monitor.dynamics.run import Setup
-from leg_wear_monitor.dynamics.tally import new_tally
+from leg_wear_monitor.dynamics.run.protocol import Setup
+from leg_wear_monitor.dynamics.run.run_statistics import new_tally
 from leg_wear_monitor.mechanism.ideal import TURN, IdealMotion, one_cycle, point_motion
 
 _POINTS = 1440

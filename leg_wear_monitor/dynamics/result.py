@@ -5,8 +5,8 @@ from typing import Any
 import attrs
 import numpy as np
 
-from leg_wear_monitor.dynamics.run import Sample, Setup
-from leg_wear_monitor.dynamics.tally import (
+from leg_wear_monitor.dynamics.run.protocol import Sample, Setup
+from leg_wear_monitor.dynamics.run.run_statistics import (
     ARCHARD,
     CONTACT,
     DISSIPATION,

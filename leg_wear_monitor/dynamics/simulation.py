@@ -4,10 +4,11 @@ import math
 from collections.abc import Callable, Iterator, Sequence
 from pathlib import Path
 
+from leg_wear_monitor.configuration.strict import shown
 from leg_wear_monitor.contact.arrays import clearance_settings, compile_contacts
 from leg_wear_monitor.dynamics.arguments import check_kinds, given_joints, given_mechanism
-from leg_wear_monitor.dynamics.clearance_run import ClearanceRun
-from leg_wear_monitor.dynamics.full_run import FullRun
+from leg_wear_monitor.dynamics.clearance.run import ClearanceRun
+from leg_wear_monitor.dynamics.full.run import FullRun
 from leg_wear_monitor.dynamics.ideal_result import ideal_result
 from leg_wear_monitor.dynamics.result import (
     SimulationResult,
@@ -18,15 +19,14 @@ from leg_wear_monitor.dynamics.result import (
     toe_errors,
     trace_columns,
 )
-from leg_wear_monitor.dynamics.run import Setup
-from leg_wear_monitor.dynamics.tally import new_tally
-from leg_wear_monitor.dynamics.tracer import Traceable, Tracer
+from leg_wear_monitor.dynamics.run.protocol import Setup
+from leg_wear_monitor.dynamics.run.run_statistics import new_tally
+from leg_wear_monitor.dynamics.run.tracer import Traceable, Tracer
 from leg_wear_monitor.errors import AssemblyError, ConfigError, SimulationError
 from leg_wear_monitor.mechanism.ideal import TURN, check_cycle
 from leg_wear_monitor.mechanism.plausible import suspects
 from leg_wear_monitor.mechanism.position import build_linkage
 from leg_wear_monitor.mechanism.spec import Mechanism, SpeedDrive, TorqueDrive
-from leg_wear_monitor.mechanism.strict import shown
 from leg_wear_monitor.wear.surfaces import SECTORS, fresh_surfaces
 
 MODELS: dict[str, Callable[[Setup], Traceable]] = {"clearance": ClearanceRun, "full": FullRun}

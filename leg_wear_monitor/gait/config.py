@@ -4,7 +4,7 @@ from itertools import pairwise
 
 import attrs
 
-from leg_wear_monitor.mechanism.quantity import FieldError, choice, described, quantity
+from leg_wear_monitor.configuration.quantity import FieldError, choice, described, quantity
 
 MOST_ENCODERS = 4
 WRENCH, EFFORT, FLOAT64 = TORQUE_SOURCES = ("wrench", "effort", "float64")

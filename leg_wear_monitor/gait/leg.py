@@ -7,10 +7,10 @@ from typing import Any, NamedTuple
 import attrs
 import numpy as np
 
-from leg_wear_monitor.dynamics.full_run import FullRun
-from leg_wear_monitor.dynamics.run import Setup
+from leg_wear_monitor.dynamics.full.run import FullRun
+from leg_wear_monitor.dynamics.run.protocol import Setup
+from leg_wear_monitor.dynamics.run.run_statistics import TORQUE, Tally, new_tally
 from leg_wear_monitor.dynamics.simulation import prepare
-from leg_wear_monitor.dynamics.tally import TORQUE, Tally, new_tally
 from leg_wear_monitor.errors import ConfigError
 from leg_wear_monitor.gait.config import GaitConfig, KnockConfig
 from leg_wear_monitor.gait.pace import CrankMotion, Pace, quintic

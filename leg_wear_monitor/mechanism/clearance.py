@@ -4,7 +4,7 @@ from typing import Annotated, Any
 
 import attrs
 
-from leg_wear_monitor.mechanism.quantity import FieldError, choice, described, quantity
+from leg_wear_monitor.configuration.quantity import FieldError, choice, described, quantity
 
 Pair = Annotated[tuple[float, float], "bushing, journal"]  # in a file, one number stands for both
 

@@ -5,15 +5,15 @@ from typing import Any
 
 import attrs
 
+from leg_wear_monitor.configuration.nearest import did_you_mean
+from leg_wear_monitor.configuration.quantity import FieldError
+from leg_wear_monitor.configuration.strict import choose, mapping, shown, structure
+from leg_wear_monitor.configuration.yaml_file import read_document
 from leg_wear_monitor.errors import ConfigError
 from leg_wear_monitor.mechanism import spec
 from leg_wear_monitor.mechanism.clearance import ClearanceSection
-from leg_wear_monitor.mechanism.loose_joints import loose_joints
-from leg_wear_monitor.mechanism.nearest import did_you_mean
-from leg_wear_monitor.mechanism.quantity import FieldError
+from leg_wear_monitor.mechanism.clearance_joints import loose_joints
 from leg_wear_monitor.mechanism.references import check_references
-from leg_wear_monitor.mechanism.strict import choose, mapping, shown, structure
-from leg_wear_monitor.mechanism.yaml_file import read_document
 from leg_wear_monitor.share import share_directory
 
 

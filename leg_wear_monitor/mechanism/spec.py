@@ -5,8 +5,8 @@ from typing import Annotated, Literal
 
 import attrs
 
+from leg_wear_monitor.configuration.quantity import FieldError, described, quantity
 from leg_wear_monitor.mechanism.clearance import Clearance
-from leg_wear_monitor.mechanism.quantity import FieldError, described, quantity
 
 Vector = tuple[float, float]
 Pose = tuple[float, float, float]

@@ -5,11 +5,11 @@ from collections.abc import Sequence
 
 import attrs
 
-from leg_wear_monitor.monitor.forecast import Forecast, JointForecast
-from leg_wear_monitor.monitor.growth import GrowthWindow, growth_rate
+from leg_wear_monitor.monitor.encoders.clearance_estimate import SeenClearance
+from leg_wear_monitor.monitor.forecast.forecast import Forecast, JointForecast
+from leg_wear_monitor.monitor.forecast.growth import GrowthWindow, growth_rate
 from leg_wear_monitor.monitor.reports import CycleReport, JointReport, Remaining
-from leg_wear_monitor.monitor.seen import SeenClearance
-from leg_wear_monitor.twin.figures import CycleFigures, TorqueFigures
+from leg_wear_monitor.twin.statistics import CycleFigures, TorqueFigures
 
 
 def cycle_report(

@@ -2,8 +2,8 @@
 
 from leg_wear_monitor.interrupt import closed_at_the_end
 from leg_wear_monitor.mechanism.spec import Mechanism
-from leg_wear_monitor.monitor.config import MonitorConfig
-from leg_wear_monitor.monitor.ledger import open_ledger
+from leg_wear_monitor.monitor.config.settings import MonitorConfig
+from leg_wear_monitor.monitor.ledger.ledger import open_ledger
 from leg_wear_monitor.monitor.wear_monitor import WearMonitor
 
 

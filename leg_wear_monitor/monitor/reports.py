@@ -4,12 +4,12 @@ import math
 
 import attrs
 
-from leg_wear_monitor.monitor.alarms import Alarm, Level
-from leg_wear_monitor.monitor.forecast import JointForecast, LegForecast
-from leg_wear_monitor.monitor.input_guard import InputGuard
-from leg_wear_monitor.monitor.pauses import Pauses
-from leg_wear_monitor.monitor.seen import SeenClearance
-from leg_wear_monitor.twin.figures import Intake, SampleFigures
+from leg_wear_monitor.monitor.alarms.alarm import Alarm, Level
+from leg_wear_monitor.monitor.encoders.clearance_estimate import SeenClearance
+from leg_wear_monitor.monitor.forecast.forecast import JointForecast, LegForecast
+from leg_wear_monitor.monitor.inputs.guard import InputGuard
+from leg_wear_monitor.monitor.inputs.pauses import Pauses
+from leg_wear_monitor.twin.statistics import Intake, SampleFigures
 
 SampleReports = SampleFigures
 """The leg at each sample that was passed now; NaN while it is not followed."""

@@ -3,8 +3,8 @@
 import attrs
 
 from leg_wear_monitor.errors import LegWearError
-from leg_wear_monitor.monitor.ledger import Ledger
-from leg_wear_monitor.monitor.ledger_entry import JointWear
+from leg_wear_monitor.monitor.ledger.entry import JointWear
+from leg_wear_monitor.monitor.ledger.ledger import Ledger
 
 
 @attrs.frozen(eq=False)

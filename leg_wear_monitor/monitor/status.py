@@ -5,19 +5,25 @@ from collections.abc import Sequence
 
 import attrs
 
-from leg_wear_monitor.monitor import alarm_board as names
-from leg_wear_monitor.monitor.alarms import Level
-from leg_wear_monitor.monitor.book import Book
-from leg_wear_monitor.monitor.encoder_state import faults
-from leg_wear_monitor.monitor.encoder_watch import EncoderWatch
-from leg_wear_monitor.monitor.judge import Judge
-from leg_wear_monitor.monitor.lifetime_words import UNKNOWN, lifetime_values
+from leg_wear_monitor.monitor.accounting import Book
+from leg_wear_monitor.monitor.alarms.alarm import Level
+from leg_wear_monitor.monitor.encoders.clearance_estimate import Sight
+from leg_wear_monitor.monitor.encoders.observer import EncoderWatch
+from leg_wear_monitor.monitor.encoders.state import faults
+from leg_wear_monitor.monitor.evaluation import board as names
+from leg_wear_monitor.monitor.evaluation.evaluation import Judge
+from leg_wear_monitor.monitor.evaluation.torque_checks import (
+    BIAS,
+    DRIFT,
+    LAG,
+    offset_error_rad,
+    torque_causes,
+)
+from leg_wear_monitor.monitor.evaluation.torque_record import TorqueRecord
+from leg_wear_monitor.monitor.forecast.words import UNKNOWN, lifetime_values
 from leg_wear_monitor.monitor.reports import CycleReport, Status
-from leg_wear_monitor.monitor.seen import Sight
-from leg_wear_monitor.monitor.torque_checks import BIAS, DRIFT, LAG, offset_error_rad, torque_causes
-from leg_wear_monitor.monitor.torque_record import TorqueRecord
 from leg_wear_monitor.twin.digital_twin import DigitalTwin
-from leg_wear_monitor.twin.figures import Event, Tracking
+from leg_wear_monitor.twin.statistics import Event, Tracking
 
 ADVICE = "the monitor advises; no alarm is no proof of health"
 

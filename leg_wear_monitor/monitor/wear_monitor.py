@@ -7,23 +7,24 @@ from numpy.typing import NDArray
 from leg_wear_monitor.errors import LegWearError
 from leg_wear_monitor.mechanism.arrays import Floats
 from leg_wear_monitor.mechanism.spec import Mechanism
-from leg_wear_monitor.monitor.alarms import Alarm
-from leg_wear_monitor.monitor.beats import A_CYCLE, Beats
-from leg_wear_monitor.monitor.book import Book
-from leg_wear_monitor.monitor.config import MonitorConfig
+from leg_wear_monitor.monitor.accounting import Book
+from leg_wear_monitor.monitor.alarms.alarm import Alarm
+from leg_wear_monitor.monitor.config.fitting import check_limits, fitted, twin_settings
+from leg_wear_monitor.monitor.config.settings import MonitorConfig
 from leg_wear_monitor.monitor.cycle_report import cycle_report, with_forecast
-from leg_wear_monitor.monitor.encoder_watch import EncoderWatch
-from leg_wear_monitor.monitor.fitting import check_limits, fitted, twin_settings
-from leg_wear_monitor.monitor.forecaster import Forecaster
-from leg_wear_monitor.monitor.growth import GrowthWindow, extended
-from leg_wear_monitor.monitor.hand_over import hand_over
-from leg_wear_monitor.monitor.input_guard import InputGuard
-from leg_wear_monitor.monitor.judge import Judge
-from leg_wear_monitor.monitor.ledger import Ledger
-from leg_wear_monitor.monitor.ledger_entry import Audit, JointWear, Measurement
-from leg_wear_monitor.monitor.ledger_file import LedgerError
-from leg_wear_monitor.monitor.measure import Finding
-from leg_wear_monitor.monitor.monitor_state import MonitorSnapshot, MonitorState
+from leg_wear_monitor.monitor.encoders.clearance_estimate import SeenClearance
+from leg_wear_monitor.monitor.encoders.observer import EncoderWatch
+from leg_wear_monitor.monitor.evaluation.evaluation import Judge
+from leg_wear_monitor.monitor.evaluation.evaluation_period import A_CYCLE, Beats
+from leg_wear_monitor.monitor.evaluation.torque_record import TorqueRecord
+from leg_wear_monitor.monitor.forecast.forecaster import Forecaster
+from leg_wear_monitor.monitor.forecast.growth import GrowthWindow, extended
+from leg_wear_monitor.monitor.forecast.measurement import Finding
+from leg_wear_monitor.monitor.forecast_update import hand_over
+from leg_wear_monitor.monitor.inputs.guard import InputGuard
+from leg_wear_monitor.monitor.ledger.entry import Audit, JointWear, Measurement
+from leg_wear_monitor.monitor.ledger.file import LedgerError
+from leg_wear_monitor.monitor.ledger.ledger import Ledger
 from leg_wear_monitor.monitor.reports import (
     AlarmList,
     CycleReport,
@@ -34,12 +35,11 @@ from leg_wear_monitor.monitor.reports import (
     lost,
 )
 from leg_wear_monitor.monitor.resets import last_reset
-from leg_wear_monitor.monitor.seen import SeenClearance
+from leg_wear_monitor.monitor.state import MonitorSnapshot, MonitorState
 from leg_wear_monitor.monitor.status import statuses
-from leg_wear_monitor.monitor.torque_record import TorqueRecord
 from leg_wear_monitor.twin.digital_twin import DigitalTwin
-from leg_wear_monitor.twin.figures import CycleFigures, joined
 from leg_wear_monitor.twin.sample import GAIT_SAMPLE, Samples
+from leg_wear_monitor.twin.statistics import CycleFigures, joined
 
 _KEPT_EVENTS = 1
 

@@ -11,7 +11,7 @@ from pathlib import Path
 
 import numpy as np
 
-from leg_wear_monitor.monitor.alarms import Level
+from leg_wear_monitor.monitor.alarms.alarm import Level
 from leg_wear_monitor.monitor.reports import Status
 from leg_wear_monitor.monitor.wear_monitor import WearMonitor
 from leg_wear_monitor.twin.sample import NO_FAULT, Samples

@@ -13,29 +13,29 @@ from std_srvs.srv import Trigger
 from leg_wear_monitor.errors import LegWearError
 from leg_wear_monitor.interrupt import closed_at_the_end
 from leg_wear_monitor.mechanism.loader import load_mechanism
-from leg_wear_monitor.monitor.alarms import Alarm
-from leg_wear_monitor.monitor.config import MonitorConfig
-from leg_wear_monitor.monitor.fitting import check_limits
+from leg_wear_monitor.messages import outputs
+from leg_wear_monitor.messages.cdr import TYPES
+from leg_wear_monitor.messages.decode import Decoder
+from leg_wear_monitor.messages.forecast_times import ForecastTimes
+from leg_wear_monitor.messages.outputs import Messages
+from leg_wear_monitor.messages.qos import SENSOR_DATA
+from leg_wear_monitor.monitor.alarms.alarm import Alarm
+from leg_wear_monitor.monitor.config.fitting import check_limits
+from leg_wear_monitor.monitor.config.settings import MonitorConfig
 from leg_wear_monitor.monitor.opening import open_monitor
 from leg_wear_monitor.monitor.reports import Reports
 from leg_wear_monitor.monitor.wear_monitor import WearMonitor
-from leg_wear_monitor.recording import outputs
-from leg_wear_monitor.recording.cdr import TYPES
-from leg_wear_monitor.recording.decoder import Decoder
-from leg_wear_monitor.recording.forecast_times import ForecastTimes
-from leg_wear_monitor.recording.outputs import Messages
-from leg_wear_monitor.recording.qos import SENSOR_DATA
-from leg_wear_monitor.ros.black_box import BlackBox
 from leg_wear_monitor.ros.epochs import Epochs, boot_id
-from leg_wear_monitor.ros.inbox import Inbox
-from leg_wear_monitor.ros.inputs import InputTopic, subscribe
-from leg_wear_monitor.ros.markers import MarkerTopic
-from leg_wear_monitor.ros.node_health import Load, load_status, recording_status
-from leg_wear_monitor.ros.outlets import Outlets
-from leg_wear_monitor.ros.parameters import Parameters
+from leg_wear_monitor.ros.health.node_health import Load, load_status, recording_status
+from leg_wear_monitor.ros.health.supervision import Supervision
+from leg_wear_monitor.ros.inputs.inbox import Inbox
+from leg_wear_monitor.ros.inputs.inputs import InputTopic, subscribe
+from leg_wear_monitor.ros.outputs.black_box import BlackBox
+from leg_wear_monitor.ros.outputs.markers import MarkerTopic
+from leg_wear_monitor.ros.outputs.outlets import Outlets
+from leg_wear_monitor.ros.parameters.parameters import Parameters
 from leg_wear_monitor.ros.running import ClosingNode, run, spin
 from leg_wear_monitor.ros.services import Confirmation, asked_once, audit_time, undone
-from leg_wear_monitor.ros.supervision import Supervision
 
 ADVICE = (
     "this monitor advises: it commands nothing, no alarm is no proof of health, keep it out of safety paths"

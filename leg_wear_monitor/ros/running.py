@@ -20,7 +20,7 @@ from rclpy.utilities import remove_ros_args, try_shutdown
 
 from leg_wear_monitor.errors import ConfigError, LegWearError
 from leg_wear_monitor.interrupt import put_in_order, would_be_lost
-from leg_wear_monitor.ros.parameter_node import ParameterNode
+from leg_wear_monitor.ros.parameters.node import ParameterNode
 
 DONE, COULD_NOT = 0, 2
 

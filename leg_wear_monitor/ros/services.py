@@ -4,7 +4,7 @@ import time
 from collections.abc import Callable
 
 from leg_wear_monitor.errors import LegWearError
-from leg_wear_monitor.monitor.ledger_entry import JointWear
+from leg_wear_monitor.monitor.ledger.entry import JointWear
 
 CONFIRM_S = 30.0
 

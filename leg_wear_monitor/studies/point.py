@@ -27,7 +27,7 @@ class Point:
     label : str
         Its name in figures and tables; the result does not depend on it.
     task : str
-        What is computed, a key of `leg_wear_monitor.studies.tasks.TASKS`.
+        What is computed, a key of `leg_wear_monitor.studies.tasks.compute.TASKS`.
     settings : dict
         Plain values, seed included.
     cost : float

@@ -24,7 +24,11 @@ from leg_wear_monitor.errors import ConfigError, LegWearError
 from leg_wear_monitor.mechanism.arrays import Floats
 from leg_wear_monitor.mechanism.ideal import TURN
 from leg_wear_monitor.mechanism.spec import Mechanism
-from leg_wear_monitor.twin.figures import (
+from leg_wear_monitor.twin.follower.follower import FollowerSnapshot, LegFollower
+from leg_wear_monitor.twin.intake import intake
+from leg_wear_monitor.twin.sample import Samples, gait_samples
+from leg_wear_monitor.twin.settings import TwinSettings
+from leg_wear_monitor.twin.statistics import (
     CycleFigures,
     Event,
     Intake,
@@ -33,12 +37,8 @@ from leg_wear_monitor.twin.figures import (
     TwinUpdate,
     joined,
 )
-from leg_wear_monitor.twin.follower import FollowerSnapshot, LegFollower
-from leg_wear_monitor.twin.intake import intake
-from leg_wear_monitor.twin.sample import Samples, gait_samples
-from leg_wear_monitor.twin.settings import TwinSettings
-from leg_wear_monitor.twin.tracker import CrankTracker, TrackerSnapshot
-from leg_wear_monitor.twin.tracker_state import TRACKING
+from leg_wear_monitor.twin.tracker.state import TRACKING
+from leg_wear_monitor.twin.tracker.tracker import CrankTracker, TrackerSnapshot
 
 
 class TwinSnapshot(NamedTuple):

@@ -1,9 +1,9 @@
 """What was taken in, as counts with names."""
 
-from leg_wear_monitor.twin import tracker_state as t
-from leg_wear_monitor.twin.figures import Intake
-from leg_wear_monitor.twin.leg_state import FAILED_NS, FAILURES, MOVING_NS, LegState
+from leg_wear_monitor.twin.follower.state import FAILED_NS, FAILURES, MOVING_NS, LegState
 from leg_wear_monitor.twin.sample import FAULTS, NO_FAULT
+from leg_wear_monitor.twin.statistics import Intake
+from leg_wear_monitor.twin.tracker import state as t
 
 
 def intake(tracker: t.TrackerState, leg: LegState) -> Intake:

@@ -10,8 +10,8 @@ import math
 import attrs
 import numpy as np
 
+from leg_wear_monitor.configuration.quantity import quantity
 from leg_wear_monitor.mechanism.arrays import Floats
-from leg_wear_monitor.mechanism.quantity import quantity
 
 _GROWS, _SHRINKS, _SAFETY = 2.0, 0.3, 0.8
 _TOLERATED = 0.1  # of the deepest change

@@ -19,7 +19,7 @@ from rclpy.serialization import serialize_message
 from sensor_msgs.msg import JointState
 
 from leg_wear_monitor import WearMonitor, load_mechanism
-from leg_wear_monitor.monitor.config import MonitorConfig
+from leg_wear_monitor.monitor.config.settings import MonitorConfig
 from leg_wear_monitor.monitor.reports import Status
 from leg_wear_monitor.ros import monitor_node
 

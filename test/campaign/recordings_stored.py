@@ -10,10 +10,10 @@ from mcap.writer import CompressionType, IndexType, Writer
 from rosbags.rosbag2 import CompressionFormat, CompressionMode, StoragePlugin
 from rosbags.rosbag2 import Writer as Rosbag2Writer
 
-from leg_wear_monitor.monitor.config import MonitorConfig
-from leg_wear_monitor.recording import encode
-from leg_wear_monitor.recording.definitions import definition, types
-from leg_wear_monitor.recording.reader import Recording
+from leg_wear_monitor.bags.reader import Recording
+from leg_wear_monitor.messages import encode
+from leg_wear_monitor.messages.definitions import definition, types
+from leg_wear_monitor.monitor.config.settings import MonitorConfig
 from leg_wear_monitor.twin.sample import GAIT_SAMPLE, Samples
 
 TOPICS = {"/joint_states": encode.JOINT_STATE, "/drive_torque": encode.WRENCH_STAMPED}

@@ -11,7 +11,7 @@ import numpy as np
 from campaign.case import Case, Ran, command_line
 from campaign.recordings_damaged import DAMAGES
 from campaign.recordings_stored import write_mcap
-from leg_wear_monitor.recording import encode
+from leg_wear_monitor.messages import encode
 
 Generator = np.random.Generator
 _BAG = Path(__file__).parents[2] / "bags" / "healthy.mcap"
@@ -22,8 +22,8 @@ _COUNTED = ("cycles", "joints", "gait")
 @cache
 def walk() -> tuple[np.ndarray, np.ndarray, np.ndarray]:
     """Stamps [ns], crank angles [rad] and torques [N m] of a healthy leg."""
-    from leg_wear_monitor.monitor.config import MonitorConfig
-    from leg_wear_monitor.recording.reader import Recording
+    from leg_wear_monitor.bags.reader import Recording
+    from leg_wear_monitor.monitor.config.settings import MonitorConfig
     from leg_wear_monitor.twin.sample import CRANK, TORQUE
 
     with Recording([_BAG], MonitorConfig()) as recording:
@@ -127,8 +127,8 @@ def _true() -> bytes:
 def _summary() -> dict[str, Any]:
     import tempfile
 
-    from leg_wear_monitor.recording.replay import replay
-    from leg_wear_monitor.recording.summary import summary
+    from leg_wear_monitor.playback.replay import replay
+    from leg_wear_monitor.playback.summary import summary
 
     with tempfile.TemporaryDirectory() as place:
         (Path(place) / "x.mcap").write_bytes(_true())

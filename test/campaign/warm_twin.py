@@ -7,7 +7,7 @@ def keep_twin() -> None:
     """Have every monitor of the default leg from now on take the same twin, as new each time."""
     from leg_wear_monitor import MonitorConfig, load_mechanism
     from leg_wear_monitor.monitor import wear_monitor
-    from leg_wear_monitor.monitor.fitting import fitted, twin_settings
+    from leg_wear_monitor.monitor.config.fitting import fitted, twin_settings
 
     config = MonitorConfig()
     made = wear_monitor.DigitalTwin

@@ -5,9 +5,9 @@ import json
 import pytest
 
 from leg_wear_monitor import load_mechanism
-from leg_wear_monitor.dynamics import many_lives
-from leg_wear_monitor.monitor.binding import fingerprint
-from leg_wear_monitor.monitor.life_file import read_lives
+from leg_wear_monitor.life import many_lives
+from leg_wear_monitor.monitor.forecast.life_file import read_lives
+from leg_wear_monitor.monitor.ledger.binding import fingerprint
 
 ONE = ("life", "--mechanism", "four_bar", "--legs", "1", "--cycles", "2", "--opens-m", "2e-5")
 

@@ -6,13 +6,13 @@ import re
 import numpy as np
 import pytest
 
-from leg_wear_monitor.monitor.lifetime_words import clearance_mm, three_digits
+from leg_wear_monitor.monitor.forecast.words import clearance_mm, three_digits
 
 pytest.importorskip("mcap")
 pytest.importorskip("rosbags")
 
-from leg_wear_monitor.recording import encode
-from leg_wear_monitor.recording.writer import McapWriter
+from leg_wear_monitor.bags.mcap.writer import McapWriter
+from leg_wear_monitor.messages import encode
 
 SECONDS, RATE_HZ = 14, 200
 SHARES = ("p10", "p50", "p90")

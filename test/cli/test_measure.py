@@ -8,9 +8,9 @@ import numpy as np
 import pytest
 
 from leg_wear_monitor.mechanism.loader import load_mechanism
-from leg_wear_monitor.monitor.config import MonitorConfig
-from leg_wear_monitor.monitor.ledger import open_ledger
-from leg_wear_monitor.monitor.ledger_entry import Entry, JointWear
+from leg_wear_monitor.monitor.config.settings import MonitorConfig
+from leg_wear_monitor.monitor.ledger.entry import Entry, JointWear
+from leg_wear_monitor.monitor.ledger.ledger import open_ledger
 
 pytestmark = pytest.mark.plain
 

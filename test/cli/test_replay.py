@@ -9,17 +9,17 @@ from types import SimpleNamespace
 import numpy as np
 import pytest
 
-from leg_wear_monitor.cli import replay as verb
-from leg_wear_monitor.monitor.alarm_board import limits_of
-from leg_wear_monitor.monitor.alarms import Level
-from leg_wear_monitor.monitor.config import MonitorConfig
+from leg_wear_monitor.cli.verbs import replay as verb
+from leg_wear_monitor.monitor.alarms.alarm import Level
+from leg_wear_monitor.monitor.config.settings import MonitorConfig
+from leg_wear_monitor.monitor.evaluation.board import limits_of
 
 pytest.importorskip("mcap")
 pytest.importorskip("rosbags")
 
-from leg_wear_monitor.recording import encode
-from leg_wear_monitor.recording.reader import TIMES
-from leg_wear_monitor.recording.writer import McapWriter
+from leg_wear_monitor.bags.mcap.writer import McapWriter
+from leg_wear_monitor.bags.reader import TIMES
+from leg_wear_monitor.messages import encode
 
 SECONDS, RATE_HZ = 4, 200
 
@@ -92,7 +92,7 @@ def spoilt(document, draw):
 
 def test_a_summary_changed_anywhere_gives_a_page_or_one_line(run, bag, tmp_path, monkeypatch):
     """Pictures are made but not painted: that takes most of the time and depends on nothing else."""
-    monkeypatch.setattr("leg_wear_monitor.report.replay_page.png", lambda figure: b"")
+    monkeypatch.setattr("leg_wear_monitor.report.replay.page.png", lambda figure: b"")
     run("replay", str(bag), "--out", "out")
     file, draw, refused = tmp_path / "out" / "summary.json", random.Random(16), 0
     whole = json.loads(file.read_text())

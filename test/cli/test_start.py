@@ -6,7 +6,7 @@ import sys
 import pytest
 
 from leg_wear_monitor import load_mechanism
-from leg_wear_monitor.cli import simulate as verb
+from leg_wear_monitor.cli.verbs import simulate as verb
 from leg_wear_monitor.dynamics.simulation import MODELS, default_model
 from leg_wear_monitor.mechanism.clearance import NORMAL_LAWS
 

@@ -5,7 +5,7 @@ import json
 import pytest
 
 from leg_wear_monitor.report.page import page_html
-from leg_wear_monitor.studies.store import load_results
+from leg_wear_monitor.studies.storage.store import load_results
 
 TINY = """\
 joints: [G]
@@ -84,7 +84,7 @@ def test_a_scheduler_that_does_not_answer_is_told(run, tmp_path):
 
 
 def test_the_page_holds_what_was_computed(done, tmp_path):
-    from leg_wear_monitor.report.study_page import study_page
+    from leg_wear_monitor.report.study.page import study_page
 
     results = load_results(tmp_path / "out")
     page = study_page(results)

@@ -8,10 +8,10 @@ import numpy as np
 import pytest
 
 from leg_wear_monitor import Mechanism
-from leg_wear_monitor.dynamics.full_run import TOLERANCE_M, FullRun
+from leg_wear_monitor.dynamics.full.run import TOLERANCE_M, FullRun
 from leg_wear_monitor.dynamics.result import energy_balance
+from leg_wear_monitor.dynamics.run.run_statistics import ARCHARD, CONTACT, FORCE, Tally, new_tally
 from leg_wear_monitor.dynamics.simulation import prepare
-from leg_wear_monitor.dynamics.tally import ARCHARD, CONTACT, FORCE, Tally, new_tally
 
 
 @attrs.frozen(eq=False)

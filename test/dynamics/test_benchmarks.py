@@ -4,9 +4,9 @@ import numpy as np
 import pytest
 
 from leg_wear_monitor import load_mechanism
-from leg_wear_monitor.dynamics.full_run import FullRun
+from leg_wear_monitor.dynamics.full.run import FullRun
+from leg_wear_monitor.dynamics.run.run_statistics import POWER, new_tally
 from leg_wear_monitor.dynamics.simulation import prepare
-from leg_wear_monitor.dynamics.tally import POWER, new_tally
 from leg_wear_monitor.mechanism.ideal import one_cycle
 
 # IVP Test Set, problem "andrews", at t = 0.03 s: beta, Theta, gamma, phi, delta, Omega, epsilon [rad]

@@ -4,11 +4,11 @@ import attrs
 import numpy as np
 import pytest
 
-from leg_wear_monitor.dynamics.clearance_run import ClearanceRun
-from leg_wear_monitor.dynamics.full_run import FullRun
+from leg_wear_monitor.dynamics.clearance.run import ClearanceRun
+from leg_wear_monitor.dynamics.full.run import FullRun
 from leg_wear_monitor.dynamics.result import energy_balance
+from leg_wear_monitor.dynamics.run.run_statistics import DISSIPATION, FRICTION, POWER, new_tally
 from leg_wear_monitor.dynamics.simulation import prepare
-from leg_wear_monitor.dynamics.tally import DISSIPATION, FRICTION, POWER, new_tally
 from leg_wear_monitor.mechanism.ideal import TURN, one_cycle
 from leg_wear_monitor.mechanism.loader import parse_mechanism
 from leg_wear_monitor.mechanism.spec import ConstantLoad, PhaseLoad

@@ -7,9 +7,9 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
+from leg_wear_monitor.configuration.quantity import FieldError
 from leg_wear_monitor.gait.config import PaceConfig
 from leg_wear_monitor.gait.pace import CrankMotion, Pace, quintic
-from leg_wear_monitor.mechanism.quantity import FieldError
 
 pytestmark = pytest.mark.plain
 

@@ -8,10 +8,10 @@ from leg_wear_monitor.dynamics.simulation import prepare
 from leg_wear_monitor.mechanism.loader import load_mechanism, parse_mechanism, shipped_mechanisms
 from leg_wear_monitor.mechanism.plausible import doubts, suspects
 from leg_wear_monitor.mechanism.understood import understood
-from leg_wear_monitor.monitor.fitting import fitted
-from leg_wear_monitor.monitor.parameter_file import load_config
-from leg_wear_monitor.monitor.parameters import config_from
-from leg_wear_monitor.monitor.plausible_parameters import parameter_doubts
+from leg_wear_monitor.monitor.config.fitting import fitted
+from leg_wear_monitor.monitor.config.parameter_file import load_config
+from leg_wear_monitor.monitor.config.parameters import config_from
+from leg_wear_monitor.monitor.config.plausible import parameter_doubts
 
 pytestmark = pytest.mark.plain
 

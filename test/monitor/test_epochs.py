@@ -7,7 +7,7 @@ import numpy as np
 import pytest
 
 from leg_wear_monitor import WearMonitor, open_ledger
-from leg_wear_monitor.monitor.parameters import config_from
+from leg_wear_monitor.monitor.config.parameters import config_from
 
 
 @pytest.fixture

@@ -8,8 +8,8 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from leg_wear_monitor.monitor.beats import IDLE_LIMIT, Beats
-from leg_wear_monitor.monitor.input_health import TorqueRange, with_torques
+from leg_wear_monitor.monitor.evaluation.evaluation_period import IDLE_LIMIT, Beats
+from leg_wear_monitor.monitor.inputs.health import TorqueRange, with_torques
 from leg_wear_monitor.monitor.spans import NEIGHBOURS_NS, is_within, with_span
 from leg_wear_monitor.twin.sample import EMPTY, GAIT_SAMPLE, TORQUE, gait_samples
 

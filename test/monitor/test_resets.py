@@ -8,7 +8,7 @@ import pytest
 
 from leg_wear_monitor import WearMonitor, open_ledger
 from leg_wear_monitor.errors import LegWearError
-from leg_wear_monitor.monitor.parameters import config_from
+from leg_wear_monitor.monitor.config.parameters import config_from
 
 START_NS = 1_700_000_000_123_456_789
 

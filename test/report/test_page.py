@@ -6,7 +6,7 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from leg_wear_monitor.report.figure import new_figure, png, svg
+from leg_wear_monitor.report.figures.figure import new_figure, png, svg
 from leg_wear_monitor.report.page import (
     Findings,
     Gallery,

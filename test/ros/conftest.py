@@ -33,10 +33,10 @@ if find_spec("rclpy"):
     from leg_wear_monitor.gait.config import JointEncodersConfig
     from leg_wear_monitor.gait.leg import SyntheticLeg
     from leg_wear_monitor.gait.sensors import readings
+    from leg_wear_monitor.ros.gait_publisher.config import PublisherConfig
+    from leg_wear_monitor.ros.gait_publisher.sensor_messages import DRIVE_TORQUE_TYPES, sensor_message
     from leg_wear_monitor.ros.monitor_node import MonitorNode
-    from leg_wear_monitor.ros.publisher_config import PublisherConfig
     from leg_wear_monitor.ros.running import spin
-    from leg_wear_monitor.ros.sensor_messages import DRIVE_TORQUE_TYPES, sensor_message
     from leg_wear_monitor.twin.sample import CRANK, TORQUE
 
 START_NS = 1_700_000_000_000_000_000

@@ -9,9 +9,9 @@ from xml.etree import ElementTree
 import pytest
 from ruamel.yaml import YAML
 
-from leg_wear_monitor.monitor.parameter_file import parse_config
-from leg_wear_monitor.monitor.parameters import Parameter, parameters_of, structured
-from leg_wear_monitor.ros.publisher_config import PublisherConfig
+from leg_wear_monitor.monitor.config.parameter_file import parse_config
+from leg_wear_monitor.monitor.config.parameters import Parameter, parameters_of, structured
+from leg_wear_monitor.ros.gait_publisher.config import PublisherConfig
 from leg_wear_monitor.share import share_directory
 
 PAGE = Path(__file__).parents[2] / "docs" / "ros.md"

@@ -16,13 +16,13 @@ from sensor_msgs.msg import JointState
 from visualization_msgs.msg import MarkerArray
 
 from leg_wear_monitor import load_mechanism
+from leg_wear_monitor.bags.reader import Recording
 from leg_wear_monitor.gait.config import KnockConfig, PaceConfig, TransportConfig
-from leg_wear_monitor.monitor.config import MonitorConfig
-from leg_wear_monitor.monitor.parameters import config_from
+from leg_wear_monitor.messages.outputs import Messages
+from leg_wear_monitor.monitor.config.parameters import config_from
+from leg_wear_monitor.monitor.config.settings import MonitorConfig
 from leg_wear_monitor.monitor.wear_monitor import WearMonitor
-from leg_wear_monitor.recording.outputs import Messages
-from leg_wear_monitor.recording.reader import Recording
-from leg_wear_monitor.ros.publisher_config import PublisherConfig
+from leg_wear_monitor.ros.gait_publisher.config import PublisherConfig
 from leg_wear_monitor.share import share_directory
 
 ME = "/leg_wear_monitor"

@@ -12,7 +12,7 @@ from rclpy.parameter import Parameter
 from rclpy.utilities import try_shutdown
 
 from leg_wear_monitor.errors import LegWearError
-from leg_wear_monitor.monitor.config import MonitorConfig
+from leg_wear_monitor.monitor.config.settings import MonitorConfig
 from leg_wear_monitor.ros.monitor_node import MonitorNode
 
 

@@ -20,11 +20,11 @@ from rcl_interfaces.srv import (
 from rclpy.parameter import Parameter, parameter_dict_from_yaml_file, parameter_value_to_python
 from rclpy.utilities import try_shutdown
 
-from leg_wear_monitor.monitor.config import MonitorConfig
-from leg_wear_monitor.monitor.parameter_file import load_config
-from leg_wear_monitor.monitor.parameters import PARAMETERS
+from leg_wear_monitor.monitor.config.parameter_file import load_config
+from leg_wear_monitor.monitor.config.parameters import PARAMETERS
+from leg_wear_monitor.monitor.config.settings import MonitorConfig
 from leg_wear_monitor.ros.monitor_node import MonitorNode
-from leg_wear_monitor.ros.parameters import Parameters
+from leg_wear_monitor.ros.parameters.parameters import Parameters
 from leg_wear_monitor.ros.running import ClosingNode
 
 ME = "/leg_wear_monitor"

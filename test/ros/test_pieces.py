@@ -13,18 +13,18 @@ from mcap.reader import make_reader
 from rclpy.serialization import serialize_message
 
 from leg_wear_monitor.gait.sensors import Reading, samples
-from leg_wear_monitor.monitor.alarms import Level
-from leg_wear_monitor.monitor.config import MonitorConfig
-from leg_wear_monitor.recording import cdr
-from leg_wear_monitor.recording.decoder import Decoder
-from leg_wear_monitor.recording.qos import SENSOR_DATA
-from leg_wear_monitor.ros.black_box import BlackBox
-from leg_wear_monitor.ros.inbox import Inbox
-from leg_wear_monitor.ros.inputs import InputTopic
-from leg_wear_monitor.ros.node_health import Load, load_status, recording_status, topics_status
-from leg_wear_monitor.ros.publisher_config import PublisherConfig
-from leg_wear_monitor.ros.publishers import Publishers
-from leg_wear_monitor.ros.sensor_messages import sensor_message
+from leg_wear_monitor.messages import cdr
+from leg_wear_monitor.messages.decode import Decoder
+from leg_wear_monitor.messages.qos import SENSOR_DATA
+from leg_wear_monitor.monitor.alarms.alarm import Level
+from leg_wear_monitor.monitor.config.settings import MonitorConfig
+from leg_wear_monitor.ros.gait_publisher.config import PublisherConfig
+from leg_wear_monitor.ros.gait_publisher.sensor_messages import sensor_message
+from leg_wear_monitor.ros.health.node_health import Load, load_status, recording_status, topics_status
+from leg_wear_monitor.ros.inputs.inbox import Inbox
+from leg_wear_monitor.ros.inputs.inputs import InputTopic
+from leg_wear_monitor.ros.inputs.publishers import Publishers
+from leg_wear_monitor.ros.outputs.black_box import BlackBox
 from leg_wear_monitor.twin.sample import CRANK, FAULTS, NO_FAULT, OUT_OF_RANGE, TORQUE, WRONG_TYPE
 
 START_NS = 1_700_000_000_000_000_000

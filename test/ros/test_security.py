@@ -13,7 +13,7 @@ import rclpy
 from rclpy.parameter import Parameter
 from rclpy.utilities import try_shutdown
 
-from leg_wear_monitor.ros.gait_publisher import GaitPublisher
+from leg_wear_monitor.ros.gait_publisher.node import GaitPublisher
 from leg_wear_monitor.ros.monitor_node import MonitorNode
 from leg_wear_monitor.share import share_directory
 

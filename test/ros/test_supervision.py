@@ -16,17 +16,17 @@ from std_msgs.msg import Float64
 from std_srvs.srv import Trigger
 from visualization_msgs.msg import MarkerArray
 
-from leg_wear_monitor.monitor.alarms import Alarm, Level
-from leg_wear_monitor.monitor.config import MonitorConfig
+from leg_wear_monitor.messages import cdr
+from leg_wear_monitor.messages.decode import Decoder
+from leg_wear_monitor.monitor.alarms.alarm import Alarm, Level
+from leg_wear_monitor.monitor.config.settings import MonitorConfig
 from leg_wear_monitor.monitor.reports import AlarmList, Status
-from leg_wear_monitor.recording import cdr
-from leg_wear_monitor.recording.decoder import Decoder
-from leg_wear_monitor.ros.clock_watch import ClockWatch, both_clocks
-from leg_wear_monitor.ros.crank_names import CrankNames
-from leg_wear_monitor.ros.inbox import Inbox
-from leg_wear_monitor.ros.node_alarms import NodeAlarms
-from leg_wear_monitor.ros.node_log import AlarmLog, StatusLog
-from leg_wear_monitor.ros.silence import CRANK, TORQUE, Silence
+from leg_wear_monitor.ros.health.clock_watch import ClockWatch, both_clocks
+from leg_wear_monitor.ros.health.node_alarms import NodeAlarms
+from leg_wear_monitor.ros.health.node_log import AlarmLog, StatusLog
+from leg_wear_monitor.ros.health.silence import CRANK, TORQUE, Silence
+from leg_wear_monitor.ros.inputs.crank_names import CrankNames
+from leg_wear_monitor.ros.inputs.inbox import Inbox
 
 ME = "/leg_wear_monitor"
 SECOND = 10**9

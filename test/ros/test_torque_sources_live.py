@@ -10,11 +10,11 @@ pytest.importorskip("rclpy")
 
 from diagnostic_msgs.msg import DiagnosticArray
 
+from leg_wear_monitor.bags.reader import Recording
 from leg_wear_monitor.gait.config import EFFORT, FLOAT64, TORQUE_SOURCES, TorqueSensorConfig
 from leg_wear_monitor.gait.sensors import Reading
-from leg_wear_monitor.monitor.config import MonitorConfig
-from leg_wear_monitor.recording.reader import Recording
-from leg_wear_monitor.ros.publisher_config import PublisherConfig
+from leg_wear_monitor.monitor.config.settings import MonitorConfig
+from leg_wear_monitor.ros.gait_publisher.config import PublisherConfig
 from leg_wear_monitor.share import share_directory
 from leg_wear_monitor.twin.sample import CRANK, NO_FAULT, TORQUE
 
@@ -51,7 +51,10 @@ def walk_with(readings, source):
 def test_a_healthy_leg_raises_no_alarm(stage, healthy, source, monkeypatch) -> None:
     now = [START_NS]
     # a Float64 has no stamp: it is of the time at which it comes, here that of the walk
-    monkeypatch.setattr("leg_wear_monitor.ros.monitor_node.time", SimpleNamespace(time_ns=lambda: now[0], monotonic_ns=time.monotonic_ns))
+    monkeypatch.setattr(
+        "leg_wear_monitor.ros.monitor_node.time",
+        SimpleNamespace(time_ns=lambda: now[0], monotonic_ns=time.monotonic_ns),
+    )
 
     def set_clock(at_s: float) -> None:
         now[0] = START_NS + round(1.0e9 * at_s)

@@ -5,7 +5,7 @@ from typing import Any
 
 import pytest
 
-from leg_wear_monitor.studies.settings import Study, parse_settings
+from leg_wear_monitor.studies.plan.settings import Study, parse_settings
 
 ENSEMBLE = {"runs": 2, "cycles": 2, "skip_cycles": 1, "traced_cycles": 1}
 

@@ -7,9 +7,9 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from leg_wear_monitor import load_mechanism
-from leg_wear_monitor.dynamics.life import LifeRun, LifeSettings, simulate_life
 from leg_wear_monitor.errors import SimulationError
-from leg_wear_monitor.studies.life import STATES, between, live
+from leg_wear_monitor.life.life import LifeRun, LifeSettings, simulate_life
+from leg_wear_monitor.studies.tasks.life import STATES, between, live
 from leg_wear_monitor.wear.cycle_jump import JumpControl
 from leg_wear_monitor.wear.surfaces import BUSHING
 

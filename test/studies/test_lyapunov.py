@@ -6,8 +6,8 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from leg_wear_monitor import load_mechanism
-from leg_wear_monitor.studies.exponent import expand
-from leg_wear_monitor.studies.lyapunov import exponent, stretches
+from leg_wear_monitor.studies.tasks.exponent import expand
+from leg_wear_monitor.studies.tasks.lyapunov import exponent, stretches
 
 PLAIN = pytest.mark.plain
 

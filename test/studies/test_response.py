@@ -4,16 +4,16 @@ import numpy as np
 import pytest
 
 from leg_wear_monitor import load_mechanism
-from leg_wear_monitor.dynamics.clearance_run import ClearanceStepper
-from leg_wear_monitor.dynamics.drive import steady_drive
-from leg_wear_monitor.dynamics.full_run import FullRun
+from leg_wear_monitor.dynamics.clearance.run import ClearanceStepper
+from leg_wear_monitor.dynamics.full.run import FullRun
+from leg_wear_monitor.dynamics.run.drive import steady_drive
+from leg_wear_monitor.dynamics.run.run_statistics import TORQUE_ERROR, new_tally
 from leg_wear_monitor.dynamics.simulation import prepare
-from leg_wear_monitor.dynamics.tally import TORQUE_ERROR, new_tally
 from leg_wear_monitor.mechanism.ideal import TURN
-from leg_wear_monitor.studies.ensemble import ensemble, start_angles, watch
-from leg_wear_monitor.studies.grid import SAMPLES
-from leg_wear_monitor.studies.response import ERRORS, respond
 from leg_wear_monitor.studies.summary import RANGES, share_of_range
+from leg_wear_monitor.studies.tasks.ensemble import ensemble, start_angles, watch
+from leg_wear_monitor.studies.tasks.grid import SAMPLES
+from leg_wear_monitor.studies.tasks.response import ERRORS, respond
 from leg_wear_monitor.wear.surfaces import BUSHING
 
 PLACE = {"loose": ["G"], "clearance_m": 3.0e-4, "speed_rpm": 60.0, "perturb_share": 0.3, "seed": 1}

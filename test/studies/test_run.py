@@ -14,9 +14,10 @@ import numpy as np
 import pytest
 
 from leg_wear_monitor.errors import ConfigError, LegWearError
-from leg_wear_monitor.studies import processes, tasks
-from leg_wear_monitor.studies.run import run_study
-from leg_wear_monitor.studies.store import StudyDirectory, load_results
+from leg_wear_monitor.studies.execution import processes
+from leg_wear_monitor.studies.execution.run import run_study
+from leg_wear_monitor.studies.storage.store import StudyDirectory, load_results
+from leg_wear_monitor.studies.tasks import compute as tasks
 
 
 def files(directory):
@@ -110,7 +111,7 @@ def test_a_directory_of_another_study_or_a_damaged_one_is_told(tiny, tmp_path):
 @pytest.mark.plain
 def test_a_motion_that_diverges_is_a_result_with_its_fault(tiny, tmp_path, monkeypatch):
     from leg_wear_monitor.errors import SimulationError
-    from leg_wear_monitor.studies import response
+    from leg_wear_monitor.studies.tasks import response
 
     def diverge(mechanism, settings):
         raise SimulationError("joint G at t = 1 s: pushed through")

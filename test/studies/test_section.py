@@ -6,8 +6,8 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from leg_wear_monitor import load_mechanism
-from leg_wear_monitor.studies.grid import SAMPLES
-from leg_wear_monitor.studies.section import intersect, period_of
+from leg_wear_monitor.studies.tasks.grid import SAMPLES
+from leg_wear_monitor.studies.tasks.section import intersect, period_of
 
 SETTINGS = {
     "loose": ["G"], "clearance_m": 3.0e-4, "perturb_share": 0.3, "seed": 1, "skip_cycles": 4,

@@ -4,12 +4,12 @@ import attrs
 import pytest
 
 from leg_wear_monitor import load_mechanism
-from leg_wear_monitor.cli.study import NAMES
+from leg_wear_monitor.cli.verbs.study import NAMES
 from leg_wear_monitor.errors import ConfigError
-from leg_wear_monitor.studies.ensemble import check_points
-from leg_wear_monitor.studies.plan import points_of
-from leg_wear_monitor.studies.settings import STUDIES, load_settings, parse_settings
-from leg_wear_monitor.studies.tasks import TASKS
+from leg_wear_monitor.studies.plan.plan import points_of
+from leg_wear_monitor.studies.plan.settings import STUDIES, load_settings, parse_settings
+from leg_wear_monitor.studies.tasks.compute import TASKS
+from leg_wear_monitor.studies.tasks.ensemble import check_points
 
 pytestmark = pytest.mark.plain
 

@@ -12,9 +12,9 @@ import leg_wear_monitor as lw
 from leg_wear_monitor.errors import ConfigError, LegWearError
 from leg_wear_monitor.mechanism.ideal import TURN
 from leg_wear_monitor.twin.digital_twin import DigitalTwin
-from leg_wear_monitor.twin.figures import CycleFigures, Happening, SampleFigures, Tracking, TwinUpdate
 from leg_wear_monitor.twin.sample import TORQUE, Samples, gait_samples
 from leg_wear_monitor.twin.settings import TrackerSettings, TwinSettings
+from leg_wear_monitor.twin.statistics import CycleFigures, Happening, SampleFigures, Tracking, TwinUpdate
 
 S = 1_000_000_000
 

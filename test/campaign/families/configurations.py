@@ -32,7 +32,7 @@ def warm() -> None:
     """Import and compile all that reading and a short run need."""
     from leg_wear_monitor.dynamics.simulation import simulate
 
-    for module in ("monitor.forecaster", "monitor.plausible_parameters", "studies.plan"):
+    for module in ("monitor.forecast.forecaster", "monitor.config.plausible", "studies.plan.plan"):
         import_module(f"leg_wear_monitor.{module}")
     simulate("four_bar", cycles=1.0 / 64.0, skip_cycles=0.0)
     _life_text()
@@ -74,11 +74,11 @@ def _used(kind: str, path: Path, must_be_refused: bool) -> tuple[Outcome, str]:
 
 def _parameters(path: Path) -> str:
     from leg_wear_monitor.mechanism.loader import load_mechanism
-    from leg_wear_monitor.monitor.belief import Look, believe
-    from leg_wear_monitor.monitor.fitting import fitted, twin_settings
-    from leg_wear_monitor.monitor.parameter_file import load_config
-    from leg_wear_monitor.monitor.parameters import PARAMETERS, values_of
-    from leg_wear_monitor.monitor.plausible_parameters import parameter_doubts
+    from leg_wear_monitor.monitor.config.fitting import fitted, twin_settings
+    from leg_wear_monitor.monitor.config.parameter_file import load_config
+    from leg_wear_monitor.monitor.config.parameters import PARAMETERS, values_of
+    from leg_wear_monitor.monitor.config.plausible import parameter_doubts
+    from leg_wear_monitor.monitor.forecast.wear_coefficients import Look, believe
 
     config = load_config(path)
     leg = fitted(load_mechanism(config.mechanism), config)
@@ -122,8 +122,8 @@ def _mechanism(path: Path) -> str:
 
 
 def _study(path: Path) -> str:
-    from leg_wear_monitor.studies.plan import points_of
-    from leg_wear_monitor.studies.settings import load_settings
+    from leg_wear_monitor.studies.plan.plan import points_of
+    from leg_wear_monitor.studies.plan.settings import load_settings
 
     points = points_of(load_settings("wear", path))
     wrong = [point.label for point in points if not (math.isfinite(point.cost) and point.cost > 0.0)]
@@ -132,7 +132,7 @@ def _study(path: Path) -> str:
 
 def _life(path: Path) -> str:
     from leg_wear_monitor.mechanism.loader import load_mechanism
-    from leg_wear_monitor.monitor.life_file import law_of
+    from leg_wear_monitor.monitor.forecast.life_file import law_of
 
     law = law_of(load_mechanism("four_bar"), str(path), 0.4)
     known = bool(np.isfinite(law.coupling).all() and np.isfinite(law.sigma).all())
@@ -163,7 +163,7 @@ def _life_text() -> str:
     """Five lives of the four-bar, made up, and bound to it."""
     if not _LIFE:
         from leg_wear_monitor.mechanism.loader import load_mechanism
-        from leg_wear_monitor.monitor.binding import fingerprint
+        from leg_wear_monitor.monitor.ledger.binding import fingerprint
 
         leg = load_mechanism("four_bar")
         lives = []

@@ -92,7 +92,7 @@ def _run(directory: Path, kill_after_s: float | None = None) -> bool:
 
 def _replay(directory: Path) -> int:
     import leg_wear_monitor as lw
-    from leg_wear_monitor.recording.summary import summary
+    from leg_wear_monitor.playback.summary import summary
 
     out = directory / "out"
     lw.replay(
@@ -149,8 +149,8 @@ def _ledger(kind: int) -> dict[str, bytes]:
     if kind == 0:
         return {}
     import leg_wear_monitor as lw
-    from leg_wear_monitor.monitor.parameters import config_from
-    from leg_wear_monitor.recording.reader import Recording
+    from leg_wear_monitor.bags.reader import Recording
+    from leg_wear_monitor.monitor.config.parameters import config_from
 
     with tempfile.TemporaryDirectory() as place:
         path = Path(place) / "wear.ledger"

@@ -62,7 +62,7 @@ def case(seed: int) -> Case:
 
 def _opened(directory: Path, state: str) -> tuple[Outcome, str]:
     """What opening does."""
-    from leg_wear_monitor.monitor.ledger_file import LedgerError
+    from leg_wear_monitor.monitor.ledger.file import LedgerError
 
     made, path = _made(), directory / _NAME
     before = {each.name: each.read_bytes() for each in directory.iterdir() if each.is_file()}
@@ -96,8 +96,8 @@ def _opened(directory: Path, state: str) -> tuple[Outcome, str]:
 
 
 def _open(path: Path):  # type: ignore[no-untyped-def]
-    from leg_wear_monitor.monitor.binding import Binding
-    from leg_wear_monitor.monitor.ledger import Ledger
+    from leg_wear_monitor.monitor.ledger.binding import Binding
+    from leg_wear_monitor.monitor.ledger.ledger import Ledger
 
     binding = Binding(hardware_id="leg-7", mechanism="bionic_leg", fingerprint="00ff", joints=("A", "B"))
     return Ledger(path, binding, interval_s=5.0)
@@ -137,7 +137,7 @@ def _made() -> _Made:
 
 def _walk(path: Path, run: int, closed: bool) -> list[int]:
     """A run of nine entries with some events; sizes of the log on the way."""
-    from leg_wear_monitor.monitor.ledger_entry import Audit, ClearancePoint, Measurement
+    from leg_wear_monitor.monitor.ledger.entry import Audit, ClearancePoint, Measurement
 
     ledger, sizes = _open(path), []
     first = ledger.entry
@@ -156,8 +156,8 @@ def _walk(path: Path, run: int, closed: bool) -> list[int]:
 
 
 def _entry(first, run: int, step: int):  # type: ignore[no-untyped-def]
-    from leg_wear_monitor.monitor.alarms import Alarm, Level
-    from leg_wear_monitor.monitor.ledger_entry import Entry, JointWear
+    from leg_wear_monitor.monitor.alarms.alarm import Alarm, Level
+    from leg_wear_monitor.monitor.ledger.entry import Entry, JointWear
 
     n = 9 * run + step + 1
     depth = np.random.default_rng(7).random((2, 2, 720)) * 1.0e-10 * n

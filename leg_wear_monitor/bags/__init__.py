@@ -1,0 +1,1 @@
+"""Recordings on disk: MCAP and SQLite readers with salvage, MCAP writer."""

@@ -1,0 +1,143 @@
+"""From what a user names to files in their order: files, bag directories, split and compressed bags."""
+
+import os
+import re
+import stat
+from collections.abc import Iterable
+from pathlib import Path
+from typing import Any
+
+import attrs
+
+from leg_wear_monitor.bags.findings import DamageError, Finding, RecordingError, Weight
+from leg_wear_monitor.bags.metadata import METADATA, read_metadata
+from leg_wear_monitor.bags.regular_file import kind_of
+
+MCAP, SQLITE = ".mcap", ".db3"
+_NAME = re.compile(r".*(\.mcap|\.db3)(\.zstd)?", re.DOTALL)
+
+
+@attrs.frozen
+class BagFile:
+    """One file of a recording.
+
+    Attributes
+    ----------
+    path : pathlib.Path
+    storage : str
+        `MCAP` or `SQLITE`.
+    compressed : bool
+        Whether the whole file is.
+    by_message : bool
+        Whether each message in it is.
+    types : dict
+        Types of topics that metadata.yaml names.
+    recording : int
+        Which of the named recordings it belongs to.
+    """
+
+    path: Path
+    storage: str
+    compressed: bool = False
+    by_message: bool = False
+    types: dict[str, str] = attrs.Factory(dict)
+    recording: int = 0
+
+
+def find_files(paths: Iterable[str | Path]) -> tuple[list[BagFile], list[Finding]]:
+    """Files of recordings, and what is wrong with their directories.
+
+    Parameters
+    ----------
+    paths : iterable
+        Files and bag directories.
+
+    Raises
+    ------
+    RecordingError
+        For what is not there or is no recording by its name.
+    """
+    files: list[BagFile] = []
+    findings: list[Finding] = []
+    for number, path in enumerate(map(Path, paths)):
+        mode = _mode(path)
+        if mode is None:
+            raise RecordingError(str(path), "", "is not there, expected a bag directory, .mcap or .db3")
+        found = _directory(path, findings) if stat.S_ISDIR(mode) else [_file(path, mode)]
+        files += [attrs.evolve(file, recording=number) for file in found]
+    if not files:
+        raise RecordingError("", "", "no recording is named, expected bag directories or .mcap or .db3 files")
+    return files, findings
+
+
+def _mode(path: Path) -> int | None:
+    """What a path is, without opening it: opening a pipe would wait for ever; None if it is not there."""
+    try:
+        return path.stat().st_mode
+    except (FileNotFoundError, NotADirectoryError):
+        return None
+    except (OSError, ValueError) as error:
+        why = error.strerror if isinstance(error, OSError) else error
+        raise RecordingError(str(path), "", f"cannot be read: {why}") from error
+
+
+def _file(path: Path, mode: int, **parts: Any) -> BagFile:
+    match = _NAME.fullmatch(path.name)
+    if match is None:
+        raise RecordingError(str(path), "", "is neither a bag directory nor an .mcap or .db3 file")
+    if what := kind_of(mode):
+        raise RecordingError(str(path), "", f"is {what}, expected a file")
+    return BagFile(path, match[1], match[2] is not None, **parts)
+
+
+def _directory(path: Path, findings: list[Finding]) -> list[BagFile]:
+    """Files of a bag directory in the order of its metadata, else in the order of their numbers."""
+    there = _recordings(path, findings)
+    named, parts = _metadata(path / METADATA, findings)
+    if named:
+        missing = [name for name in named if name not in there]
+        for name in missing:
+            findings.append(Finding(path / METADATA, f"names {name}, which is not there: it is lost"))
+        there = [name for name in named if name not in missing]
+    if not there:
+        raise RecordingError(str(path), "", "holds no .mcap or .db3 file")
+    return [_file(path / name, stat.S_IFREG, **parts) for name in there]
+
+
+def _recordings(path: Path, findings: list[Finding]) -> list[str]:
+    """Names of the files of a directory that are recordings by their names, in the order of their numbers."""
+    try:
+        named = sorted((file for file in path.iterdir() if _NAME.fullmatch(file.name)), key=_by_number)
+    except OSError as error:
+        raise RecordingError(str(path), "", f"cannot be read: {error.strerror}") from error
+    names = []
+    for file in named:
+        what = kind_of(_mode(file) or 0)
+        if what:
+            findings.append(Finding(file, f"is {what}, expected a file: it is not read", Weight.NOTE))
+        else:
+            names.append(file.name)
+    return names
+
+
+def _metadata(path: Path, findings: list[Finding]) -> tuple[list[str], dict[str, Any]]:
+    """Names of the files and what holds for all of them; nothing where there is no metadata to rely on."""
+    if not os.path.lexists(path):
+        return [], {}
+    try:
+        metadata = read_metadata(path)
+    except DamageError as error:
+        findings.append(Finding(path, f"{error}: the directory's files are taken instead", Weight.NOTE))
+        return [], {}
+    names = [name for name in metadata.files if _NAME.fullmatch(name)]
+    if names != metadata.files:
+        findings.append(
+            Finding(path, "names other files than .mcap and .db3: they are not read", Weight.NOTE)
+        )
+    return names, {"by_message": metadata.by_message, "types": metadata.types}
+
+
+def _by_number(path: Path) -> tuple[list[tuple[int, str]], str]:
+    """Key that puts run_2.mcap before run_10.mcap."""
+    parts = re.findall(r"\d+|\D+", path.name)
+    return [(int(part), "") if part.isdecimal() else (-1, part) for part in parts], path.name

@@ -1,0 +1,94 @@
+"""Whether the crank is among the joints of a recording's messages, and what is there instead."""
+
+import struct
+from pathlib import Path
+
+import attrs
+import numpy as np
+from numpy.typing import NDArray
+
+from leg_wear_monitor.bags.findings import Finding, RecordingError, Weight
+from leg_wear_monitor.bags.topics import listed
+from leg_wear_monitor.messages.cdr import ENCAPSULATION, JOINT_STATE
+from leg_wear_monitor.twin.sample import MISSING_JOINT, NO_FAULT, NOT_FINITE, ZERO_STAMP, Samples
+
+_MOST = 1000
+_NAMED = (NO_FAULT, NOT_FINITE, ZERO_STAMP)
+
+
+@attrs.define
+class _Tally:
+    """Messages of a file that have the crank, and that do not; names in the latter."""
+
+    found: int = 0
+    missing: int = 0
+    names: set[str] = attrs.Factory(set)
+
+
+class JointNames:
+    """Looks for the crank's name in the messages of each file.
+
+    Parameters
+    ----------
+    crank_joint : str
+    """
+
+    def __init__(self, crank_joint: str) -> None:
+        self._crank = crank_joint
+        self._files: dict[Path, _Tally] = {}
+
+    def see(self, path: Path, data: NDArray[np.uint8], messages: NDArray[np.void], samples: Samples) -> None:
+        """Take account of messages of a file and of what was decoded from them."""
+        tally = self._files.setdefault(path, _Tally())
+        cranks = messages["type"] == JOINT_STATE
+        tally.found += int(np.count_nonzero(cranks & np.isin(samples["fault"], _NAMED)))
+        missing = np.flatnonzero(samples["fault"] == MISSING_JOINT)
+        tally.missing += len(missing)
+        if len(missing) and len(tally.names) < _MOST:
+            message = messages[missing[0]]
+            tally.names |= set(names_in(data[message["begin"] : message["end"]].tobytes())[:_MOST])
+
+    def findings(self) -> list[Finding]:
+        """What to say when all was read.
+
+        Raises
+        ------
+        RecordingError
+            If messages have joints, but none of them the crank; or none of a file's while another's have it.
+        """
+        found = sum(tally.found for tally in self._files.values())
+        findings = []
+        for path, tally in self._files.items():
+            if not tally.missing:
+                continue
+            text = f"is not among the joints of {tally.missing} messages, they have {listed(tally.names)}"
+            if not tally.found:
+                told = "say which is the crank by --crank-joint (crank_joint in the parameters)"
+                if found:
+                    told = "the other files have it: give the recordings of one leg at a time"
+                raise RecordingError(str(path), self._crank, f"{text}; {told}")
+            text = f"joint {self._crank} {text}; {tally.found} have it"
+            findings.append(Finding(path, text, Weight.NOTE))
+        return findings
+
+
+def names_in(raw: bytes) -> list[str]:
+    """Names of the joints in a sensor_msgs/JointState that could be decoded."""
+    order = "<" if raw[1] else ">"
+    body, names = raw[ENCAPSULATION:], []
+    _, at = _text(body, 8, order)
+    count, at = _count(body, at, order)
+    for _ in range(count):
+        text, at = _text(body, at, order)
+        names.append(text.rstrip(b"\0").decode("utf-8", "replace"))
+    return names
+
+
+def _count(body: bytes, at: int, order: str) -> tuple[int, int]:
+    at += -at % 4
+    return struct.unpack_from(f"{order}I", body, at)[0], at + 4
+
+
+def _text(body: bytes, at: int, order: str) -> tuple[bytes, int]:
+    size, at = _count(body, at, order)
+    return body[at : at + size], at + size

@@ -1,0 +1,210 @@
+"""MCAP of ROS 2 messages: chunk by chunk, each on its way to the disk before the next is begun.
+
+The library's own writer takes one message at a time, slower than a replay can wait for, and holds a chunk
+back until it is full. Here messages of one topic go in together, and a chunk can be closed at any time; all
+records but messages, chunks and their indexes are the library's.
+"""
+
+import zlib
+from contextlib import suppress
+from pathlib import Path
+from types import TracebackType
+from typing import Any
+
+import numpy as np
+import zstandard
+from mcap.data_stream import RecordBuilder
+from mcap.opcode import Opcode
+from mcap.records import Channel, ChunkIndex, DataEnd, Footer, Header, Schema, Statistics, SummaryOffset
+from numpy.typing import NDArray
+
+from leg_wear_monitor.bags.findings import RecordingError
+from leg_wear_monitor.bags.mcap.chunk import Chunk
+from leg_wear_monitor.bags.mcap.layout import MAGIC
+from leg_wear_monitor.messages.definitions import definition
+from leg_wear_monitor.messages.qos import RELIABLE, Qos
+
+PROFILE, LIBRARY = "ros2", "leg_wear_monitor"
+
+
+class McapWriter:
+    """An MCAP file of the ros2 profile. What was flushed can be read if the process dies.
+
+    Parameters
+    ----------
+    path : str or pathlib.Path
+        Overwritten if there.
+    chunk_bytes : int
+        Size from which on a chunk is written.
+
+    Raises
+    ------
+    RecordingError
+        Here and in every method that writes, if the disk does not take it. What was written before stays
+        readable, and writing may be tried again; the chunk that did not fit is gone.
+    """
+
+    def __init__(self, path: str | Path, *, chunk_bytes: int = 2**17) -> None:
+        self.path = Path(path)
+        self._chunk_bytes = chunk_bytes
+        self._chunk = Chunk()
+        self._compressor = zstandard.ZstdCompressor(level=1)
+        self._schemas: dict[str, Schema] = {}
+        self._channels: dict[int, Channel] = {}
+        self._indexes: list[ChunkIndex] = []
+        self._counts: dict[int, int] = {}
+        try:
+            self._file = self.path.open("wb", buffering=0)
+        except OSError as error:
+            raise RecordingError(str(path), "", f"cannot be written: {error.strerror}") from error
+        self._at = 0
+        try:
+            self._write(MAGIC + _written(Header(PROFILE, LIBRARY)))
+        except RecordingError:
+            self._file.close()
+            raise
+
+    def __enter__(self) -> "McapWriter":
+        return self
+
+    def __exit__(
+        self, kind: type[BaseException] | None, error: BaseException | None, trace: TracebackType | None
+    ) -> None:
+        self.close()
+
+    def channel(self, topic: str, type_name: str, qos: Qos = RELIABLE) -> int:
+        """Number of a new channel.
+
+        Parameters
+        ----------
+        topic : str
+            Full name, with its slash.
+        type_name : str
+            Such as ``sensor_msgs/msg/JointState``.
+        qos : Qos
+            What its publisher offers.
+        """
+        known = definition(type_name)
+        if type_name not in self._schemas:
+            schema = Schema(len(self._schemas) + 1, known.text.encode(), "ros2msg", type_name)
+            self._schemas[type_name] = schema
+            self._chunk.content += _written(schema)
+        number = len(self._channels) + 1
+        metadata = {"offered_qos_profiles": qos.text(), "topic_type_hash": known.digest}
+        channel = Channel(number, topic, "cdr", metadata, self._schemas[type_name].id)
+        self._channels[number] = channel
+        self._counts[number] = 0
+        self._chunk.content += _written(channel)
+        return number
+
+    def write(self, channel: int, log_time_ns: int, raw: bytes, publish_time_ns: int | None = None) -> None:
+        """Add one message as it is on the wire.
+
+        Parameters
+        ----------
+        channel : int
+        log_time_ns : int
+            When it was received [ns].
+        raw : bytes
+            CDR with its encapsulation.
+        publish_time_ns : int, optional
+            When it was sent, the log time if not known [ns].
+        """
+        sent = log_time_ns if publish_time_ns is None else publish_time_ns
+        self._chunk.add(channel, log_time_ns, sent, raw)
+        self._counts[channel] += 1
+        if len(self._chunk.content) >= self._chunk_bytes:
+            self.flush()
+
+    def write_many(self, channel: int, log_time_ns: NDArray[np.int64], messages: NDArray[np.uint8]) -> None:
+        """Add messages of one length.
+
+        Parameters
+        ----------
+        channel : int
+        log_time_ns : (n,) array of int
+            Taken for the time of sending, too [ns].
+        messages : (n, bytes) array of uint8
+            A message a row.
+        """
+        self._chunk.add_many(channel, log_time_ns, messages)
+        self._counts[channel] += len(messages)
+        if len(self._chunk.content) >= self._chunk_bytes:
+            self.flush()
+
+    def flush(self) -> None:
+        """Write the chunk begun; after that a reader finds all messages so far."""
+        chunk, self._chunk = self._chunk, Chunk()
+        if not chunk.content:
+            return
+        index, records = chunk.records(self._at, self._compressor)
+        self._write(records)
+        self._indexes.append(index)
+
+    def close(self) -> None:
+        """Write what is left, and the summary; nothing if it is closed already."""
+        if self._file.closed:
+            return
+        try:
+            self.flush()
+            self._write(_written(DataEnd(0)))
+            self._write(self._summary())
+        finally:
+            self._file.close()
+
+    def _summary(self) -> bytes:
+        """All that a reader needs to find its way, the footer, and the magic."""
+        builder, offsets = RecordBuilder(), []
+        groups: list[list[Any]] = [
+            list(self._schemas.values()),
+            list(self._channels.values()),
+            [self._statistics()],
+            self._indexes,
+        ]
+        opcodes = (Opcode.SCHEMA, Opcode.CHANNEL, Opcode.STATISTICS, Opcode.CHUNK_INDEX)
+        for opcode, group in zip(opcodes, groups, strict=True):
+            start = builder.count
+            for record in group:
+                record.write(builder)
+            if group:
+                offsets.append(SummaryOffset(opcode, self._at + start, builder.count - start))
+        offsets_at = self._at + builder.count
+        for offset in offsets:
+            offset.write(builder)
+        data: bytes = builder.end()
+        crc = zlib.crc32(data + _written(Footer(self._at, offsets_at, 0))[:-4])
+        return data + _written(Footer(self._at, offsets_at, crc)) + MAGIC
+
+    def _statistics(self) -> Statistics:
+        filled = [index for index in self._indexes if index.message_index_offsets]
+        return Statistics(
+            attachment_count=0,
+            channel_count=len(self._channels),
+            channel_message_counts=dict(self._counts),
+            chunk_count=len(self._indexes),
+            message_count=sum(self._counts.values()),
+            message_end_time=max((index.message_end_time for index in filled), default=0),
+            message_start_time=min((index.message_start_time for index in filled), default=0),
+            metadata_count=0,
+            schema_count=len(self._schemas),
+        )
+
+    def _write(self, data: bytes) -> None:
+        """Write all of it, or nothing."""
+        left = memoryview(data)
+        try:
+            while left:
+                left = left[self._file.write(left) :]
+        except OSError as error:
+            with suppress(OSError):  # a device cannot be shortened
+                self._file.truncate(self._at)
+                self._file.seek(self._at)
+            raise RecordingError(str(self.path), "", f"cannot be written: {error.strerror}") from error
+        self._at += len(data)
+
+
+def _written(record: Any) -> bytes:
+    builder = RecordBuilder()
+    record.write(builder)
+    data: bytes = builder.end()
+    return data

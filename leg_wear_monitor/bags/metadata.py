@@ -1,0 +1,83 @@
+"""metadata.yaml of a bag directory: files, topics and compression, and no more than a small file can say."""
+
+import stat
+from pathlib import Path
+from typing import Any
+
+import attrs
+from ruamel.yaml import YAML
+from ruamel.yaml.error import YAMLError
+from ruamel.yaml.events import AliasEvent, CollectionEndEvent, CollectionStartEvent
+
+from leg_wear_monitor.bags.findings import DamageError
+from leg_wear_monitor.bags.regular_file import open_regular
+
+METADATA = "metadata.yaml"
+_LARGEST = 2**20  # bytes; a bag of 200 topics and 1000 files has some 250 kB
+_DEEPEST = 20
+
+
+@attrs.frozen
+class Metadata:
+    """What a bag directory says of itself.
+
+    Attributes
+    ----------
+    files : list of str
+        Names of its files, in their order, each once.
+    by_message : bool
+        Whether each message is compressed.
+    types : dict
+        Types of topics.
+    """
+
+    files: list[str]
+    by_message: bool
+    types: dict[str, str]
+
+
+def read_metadata(path: Path) -> Metadata:
+    """Read metadata.yaml.
+
+    Raises
+    ------
+    DamageError
+        For one that cannot be relied on, in words that follow its name.
+    """
+    try:
+        if not stat.S_ISREG(path.stat().st_mode):
+            raise DamageError("is no file")
+        if path.stat().st_size > _LARGEST:
+            raise DamageError(f"has {path.stat().st_size} bytes, expected at most {_LARGEST}")
+        with open_regular(path) as file:
+            text = file.read(_LARGEST).decode("utf-8")
+        _check_simple(text)
+        return _structured(YAML(typ="safe", pure=True).load(text)["rosbag2_bagfile_information"])
+    except (OSError, YAMLError, KeyError, TypeError, AttributeError, ValueError) as error:
+        raise DamageError("cannot be read") from error
+
+
+def _check_simple(text: str) -> None:
+    """Refuse what a few lines can blow up beyond any bound: aliases, and brackets without end."""
+    depth = 0
+    for event in YAML(typ="safe", pure=True).parse(text):
+        depth += isinstance(event, CollectionStartEvent) - isinstance(event, CollectionEndEvent)
+        if isinstance(event, AliasEvent):
+            raise DamageError("holds aliases, which no bag's has")
+        if depth > _DEEPEST:
+            raise DamageError(f"is nested more than {_DEEPEST} deep")
+
+
+def _structured(information: Any) -> Metadata:
+    names = [Path(name).name for name in information["relative_file_paths"]]
+    topics = [topic["topic_metadata"] for topic in information.get("topics_with_message_count", [])]
+    mode = information.get("compression_mode", "")
+    return Metadata(
+        files=list(dict.fromkeys(names)),
+        by_message=isinstance(mode, str) and mode.lower() == "message",
+        types={topic["name"]: topic["type"] for topic in topics if _is_text(topic["name"], topic["type"])},
+    )
+
+
+def _is_text(*values: object) -> bool:
+    return all(isinstance(value, str) for value in values)

@@ -1,0 +1,116 @@
+"""Whether several files are recordings of one leg: the same topics, and never two angles at one time."""
+
+import math
+from collections.abc import Iterable
+from pathlib import Path
+
+import attrs
+import numpy as np
+from numpy.typing import NDArray
+
+from leg_wear_monitor.bags.findings import Finding, RecordingError, Weight
+from leg_wear_monitor.bags.sources import Source
+from leg_wear_monitor.bags.topics import listed
+from leg_wear_monitor.mechanism.arrays import Floats
+from leg_wear_monitor.twin.sample import CRANK, NO_FAULT, Samples
+
+_KEPT = 8192  # samples of each file that others are compared with
+_ENOUGH = 20  # samples in common that say something
+_APART_RAD = 0.1  # more than clocks and noise of one crank's two recordings make
+_LONGEST_NS = 100_000_000  # between two samples that are interpolated
+_ADVICE = "are these two legs? Give one leg at a time, or say whose joints by --joint-states"
+
+
+def check_topics(
+    sources: Iterable[Source], topics: dict[str, str], joint_states: str | None
+) -> list[Finding]:
+    """See that each file has the crank's topic, or at least no other one that could be a crank's.
+
+    Parameters
+    ----------
+    sources : iterable of Source
+    topics : dict
+        Topics that are read, by their roles.
+    joint_states : str, optional
+        The topic, if somebody named it.
+
+    Raises
+    ------
+    RecordingError
+        If a file has a crank's topic in another namespace, and nobody said which one is meant.
+    """
+    topic, findings = topics["joint_states"], []
+    for source in sources:
+        there = {channel.topic for channel in source.file.channels.values()}
+        if topic in there:
+            continue
+        others = [other for other in there if other.endswith("/joint_states")]
+        if others and joint_states is None:
+            text = f"has {listed(others)}, where other files have {listed([topic])}: {_ADVICE}"
+            raise RecordingError(str(source.bag_file.path), "joint_states", text)
+        text = f"has no topic {topic}: no crank is read from it"
+        findings.append(Finding(source.bag_file.path, text, Weight.NOTE))
+    return findings
+
+
+@attrs.frozen(eq=False)
+class _Motion:
+    """Angles of a crank, in order of their stamps."""
+
+    stamp_ns: NDArray[np.int64]
+    angle_rad: Floats
+
+    def apart(self, other: "_Motion") -> Floats:
+        """Differences [rad] to the angles of another that lie between close samples of this one."""
+        after = np.searchsorted(self.stamp_ns, other.stamp_ns)
+        inside = (after > 0) & (after < len(self.stamp_ns))
+        after, stamps = after[inside], other.stamp_ns[inside]
+        step = self.stamp_ns[after] - self.stamp_ns[after - 1]
+        close = (step > 0) & (step <= _LONGEST_NS)
+        after, step = after[close], step[close]
+        begin = self.angle_rad[after - 1]
+        part = (stamps[close] - self.stamp_ns[after - 1]) / step
+        expected = begin + part * _wrapped(self.angle_rad[after] - begin)
+        return np.abs(_wrapped(other.angle_rad[inside][close] - expected))
+
+
+class OneLeg:
+    """Compares what files say of the crank where they overlap in time."""
+
+    def __init__(self) -> None:
+        self._files: dict[Path, _Motion] = {}
+
+    def see(self, path: Path, samples: Samples) -> None:
+        """Take account of samples of a file, stamped by their headers.
+
+        Raises
+        ------
+        RecordingError
+            If another file has other angles at the same times.
+        """
+        new = _motion(samples)
+        if not len(new.stamp_ns):
+            return
+        for other, motion in self._files.items():
+            if other != path:
+                apart = motion.apart(new)
+                if len(apart) >= _ENOUGH and np.median(apart) > _APART_RAD:
+                    text = f"has other crank angles than {other.name} at the same times: {_ADVICE}"
+                    raise RecordingError(str(path), "joint_states", text)
+        kept = self._files.get(path, new)
+        if kept is not new:
+            new = _Motion(
+                np.concatenate([kept.stamp_ns, new.stamp_ns]), np.concatenate([kept.angle_rad, new.angle_rad])
+            )
+        order = np.argsort(new.stamp_ns, kind="stable")[-_KEPT:]
+        self._files[path] = _Motion(new.stamp_ns[order], new.angle_rad[order])
+
+
+def _motion(samples: Samples) -> _Motion:
+    chosen = samples[(samples["kind"] == CRANK) & (samples["fault"] == NO_FAULT)]
+    return _Motion(chosen["stamp_ns"].astype(np.int64), chosen["crank_angle_rad"].astype(float))
+
+
+def _wrapped(angle: Floats) -> Floats:
+    """The same angle within half a turn of 0 [rad]."""
+    return np.asarray((angle + math.pi) % (2.0 * math.pi) - math.pi)

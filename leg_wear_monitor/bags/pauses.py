@@ -1,0 +1,87 @@
+"""Pauses between recordings that are given together: time in which nobody recorded, no fault of the input."""
+
+from collections.abc import Iterator, Sequence
+from pathlib import Path
+
+import attrs
+import numpy as np
+from numpy.typing import NDArray
+
+from leg_wear_monitor.bags.findings import Finding, Weight
+from leg_wear_monitor.twin.sample import Samples
+
+
+@attrs.frozen(eq=False)
+class Block:
+    """Samples in order of log time.
+
+    Attributes
+    ----------
+    samples : (n,) array of GAIT_SAMPLE
+    log_time_ns : (n,) array of int
+    share : float
+        Part of the recording's bytes read so far, 0 to 1.
+    source : (n,) array of int
+        Index of the file that each sample is from.
+    pause_ns : int
+        How long nobody recorded before this block, by log time; 0 if there was no pause.
+    """
+
+    samples: Samples
+    log_time_ns: NDArray[np.int64]
+    share: float
+    source: NDArray[np.int64]
+    pause_ns: int = 0
+
+    def part(self, which: slice, pause_ns: int = 0) -> "Block":
+        """Some of its samples."""
+        return Block(self.samples[which], self.log_time_ns[which], self.share, self.source[which], pause_ns)
+
+
+class Pauses:
+    """Cuts blocks where one recording has ended and the next begins later.
+
+    Parameters
+    ----------
+    files : sequence of pathlib.Path
+        By the indices of sources.
+    recordings : sequence of int
+        Which of the named recordings each file belongs to: the files of one bag have no pauses in between.
+    shortest_ns : int
+        What is shorter is no pause.
+
+    Attributes
+    ----------
+    findings : list of Finding
+    """
+
+    def __init__(self, files: Sequence[Path], recordings: Sequence[int], shortest_ns: int) -> None:
+        self._files, self._shortest_ns = files, shortest_ns
+        self._recordings = np.array(recordings, np.int64)
+        self._known: set[int] = set()
+        self._last_ns = 0
+        self.findings: list[Finding] = []
+
+    def cut(self, block: Block) -> Iterator[Block]:
+        """Parts of a block, a new one after each pause."""
+        times = np.concatenate([[self._last_ns], block.log_time_ns])
+        begin, pause_ns = 0, 0
+        for at in np.flatnonzero(np.diff(times) > self._shortest_ns).tolist():
+            recordings = self._recordings[block.source]
+            self._known.update(recordings[:at].tolist())
+            if self._known and recordings[at] not in self._known:
+                if at > begin:
+                    yield block.part(slice(begin, at), pause_ns)
+                begin, pause_ns = at, int(times[at + 1] - times[at])
+                self._tell(block.source[at], pause_ns)
+        self._known.update(self._recordings[block.source].tolist())
+        self._last_ns = int(times[-1])
+        if begin < len(block.samples):
+            yield block.part(slice(begin, None), pause_ns)
+
+    def _tell(self, source: int, pause_ns: int) -> None:
+        text = (
+            f"begins {pause_ns * 1.0e-9:.4g} s after the recording before it ended; the leg was not "
+            "monitored during this pause, which is no fault of the input"
+        )
+        self.findings.append(Finding(self._files[source], text, Weight.NOTE))

@@ -1,0 +1,192 @@
+"""A recording as blocks of gait samples: any files, any damage, in order of log time, in bounded memory."""
+
+import heapq
+from collections.abc import Iterable, Iterator
+from contextlib import ExitStack
+from itertools import repeat
+from pathlib import Path
+
+import attrs
+import numpy as np
+from numpy.typing import NDArray
+
+from leg_wear_monitor.bags.bag import find_files
+from leg_wear_monitor.bags.budget import DEFAULT_MB, Budget
+from leg_wear_monitor.bags.findings import Finding, RecordingError, Weight
+from leg_wear_monitor.bags.joint_names import JointNames
+from leg_wear_monitor.bags.mcap.file import Piece
+from leg_wear_monitor.bags.one_leg import OneLeg, check_topics
+from leg_wear_monitor.bags.pauses import Block, Pauses
+from leg_wear_monitor.bags.sources import assign, open_sources
+from leg_wear_monitor.bags.topics import roles
+from leg_wear_monitor.messages.clocks import Clocks
+from leg_wear_monitor.messages.decode import Decoder, mark_zero_stamps
+from leg_wear_monitor.monitor.config.settings import MonitorConfig
+from leg_wear_monitor.twin.sample import GAIT_SAMPLE, NO_FAULT, ZERO_STAMP, Samples
+
+TIMES = ("header", "log", "publish")
+_TOGETHER = 4096  # samples that a block should have at least
+_OF_A_SAMPLE = 800  # bytes that one takes while it waits for its turn, its copies included
+
+
+class Recording:
+    """Open recordings, several as one.
+
+    Messages come in order of their log time, and as they stand in the file where it is the same: the order
+    in which they were received.
+
+    Parameters
+    ----------
+    paths : iterable
+        MCAP and .db3 files, bag directories; zstd-compressed or not.
+    config : MonitorConfig
+        What the crank is called and where the torque comes from.
+    joint_states, drive_torque : str, optional
+        Topics; found by their relative names if not given.
+    time : str
+        One of `TIMES`: which time stamps the samples. Float64 has no header, it takes the log time.
+    memory_mb : float
+        Memory that reading may take, temporary files included [10⁶ bytes].
+
+    Attributes
+    ----------
+    topics : dict
+        Topics that are read, by what they are in the node.
+
+    Raises
+    ------
+    RecordingError
+        If there is nothing in them that can be used.
+    """
+
+    def __init__(
+        self,
+        paths: Iterable[str | Path],
+        config: MonitorConfig,
+        *,
+        joint_states: str | None = None,
+        drive_torque: str | None = None,
+        time: str = "header",
+        memory_mb: float = DEFAULT_MB,
+    ) -> None:
+        if time not in TIMES:
+            raise RecordingError("time", "", f"{time!r} is not one of {', '.join(TIMES)}")
+        self.time = time
+        self._clocks = Clocks()
+        self._decoder = Decoder(config)
+        self._budget = Budget(memory_mb)
+        self._joints = JointNames(config.crank_joint)
+        self._one_leg = OneLeg()
+        bag_files, self._findings = find_files(paths)
+        with ExitStack() as stack:
+            self._sources, lost = open_sources(bag_files, self._budget, stack)
+            wanted = roles(config.drive_torque.source, joint_states, drive_torque)
+            self.topics, missing = assign(self._sources, wanted)
+            self._findings += lost + missing + check_topics(self._sources, self.topics, joint_states)
+            self._close = stack.pop_all()
+        recordings = [source.bag_file.recording for source in self._sources]
+        self._pauses = Pauses(self.files, recordings, round(config.tracker.gap_limit_s * 1.0e9))
+
+    def __enter__(self) -> "Recording":
+        return self
+
+    def __exit__(self, *_: object) -> None:
+        self.close()
+
+    def close(self) -> None:
+        """Close the files."""
+        self._close.close()
+
+    @property
+    def files(self) -> list[Path]:
+        """The files that are read."""
+        return [source.bag_file.path for source in self._sources]
+
+    @property
+    def findings(self) -> list[Finding]:
+        """What was found so far; complete once all blocks are read."""
+        found = [each for source in self._sources for each in source.file.findings]
+        return self._findings + found + self._pauses.findings
+
+    @property
+    def is_partial(self) -> bool:
+        """Whether something that was recorded is lost, or may be wrong."""
+        return any(finding.weight is Weight.LOSS for finding in self.findings)
+
+    def blocks(self) -> Iterator[Block]:
+        """Samples of the whole recording; once.
+
+        Raises
+        ------
+        RecordingError
+            At the end, if the crank is in no message; as soon as files are of two legs.
+        """
+        for block in self._joined():
+            yield from self._pauses.cut(block)
+        self._findings += self._joints.findings()
+        notes = self._clocks.notes()
+        self._findings += [Finding(self.files[0], text, Weight.NOTE) for text in notes]
+
+    def _joined(self) -> Iterator[Block]:
+        """Samples of all files in order of log time."""
+        read, total = 0, max(1, sum(source.file.size for source in self._sources))
+        none: NDArray[np.int64] = np.zeros(0, np.int64)
+        waiting = Block(np.zeros(0, GAIT_SAMPLE), none, 0.0, none)
+        for number, piece in self._pieces():
+            path = self.files[number]
+            passed = int(np.searchsorted(waiting.log_time_ns, piece.start_ns))
+            if passed >= _TOGETHER:
+                yield waiting.part(slice(passed))
+                waiting = waiting.part(slice(passed, None))
+            elif len(waiting.samples) * _OF_A_SAMPLE > self._budget.left:
+                self._too_many_wait(path)
+                yield waiting
+                waiting = waiting.part(slice(0))
+            read += piece.stored
+            times = piece.messages["log_time_ns"]
+            source = np.full(len(times), number, np.int64)
+            new = Block(self._samples(path, piece), times, min(read / total, 1.0), source)
+            waiting = _merged(waiting, new)
+        if len(waiting.samples):
+            yield attrs.evolve(waiting, share=1.0)
+
+    def _pieces(self) -> Iterator[tuple[int, Piece]]:
+        """Pieces of all files as they begin, with their file's index; each is loaded when it is due."""
+        dues = (
+            zip(repeat(number), source.pieces(), strict=False) for number, source in enumerate(self._sources)
+        )
+        for number, due in heapq.merge(*dues, key=lambda each: each[1].start_ns):
+            piece = due.load()
+            if piece is not None:
+                yield number, piece
+
+    def _too_many_wait(self, path: Path) -> None:
+        text = (
+            "has chunks that overlap in time by more messages than --memory-mb allows: some come out of order"
+        )
+        if not any(finding.text == text for finding in self._findings):
+            self._findings.append(Finding(path, text))
+
+    def _samples(self, path: Path, piece: Piece) -> Samples:
+        """Decode a piece, and stamp its samples as asked for."""
+        samples = self._decoder.many(piece.data, piece.messages)
+        self._joints.see(path, piece.data, piece.messages, samples)
+        if len(self._sources) > 1:
+            self._one_leg.see(path, samples)
+        self._clocks.compare(samples, piece.messages)
+        if self.time != "header":
+            samples["fault"][samples["fault"] == ZERO_STAMP] = NO_FAULT
+            samples["stamp_ns"] = piece.messages[f"{self.time}_time_ns"]
+            mark_zero_stamps(samples)
+        return samples
+
+
+def _merged(block: Block, new: Block) -> Block:
+    """Samples of two blocks in order of log time."""
+    times = np.concatenate([block.log_time_ns, new.log_time_ns])
+    samples = np.concatenate([block.samples, new.samples])
+    source = np.concatenate([block.source, new.source])
+    if np.any(times[1:] < times[:-1]):
+        order = np.argsort(times, kind="stable")
+        times, samples, source = times[order], samples[order], source[order]
+    return Block(samples, times, new.share, source)

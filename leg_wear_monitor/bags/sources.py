@@ -1,0 +1,168 @@
+"""The files of a recording, opened alike, and which of their channels are wanted."""
+
+import tempfile
+from collections.abc import Iterable, Iterator
+from contextlib import ExitStack
+from functools import partial
+from pathlib import Path
+from typing import Protocol
+
+import attrs
+import numpy as np
+
+from leg_wear_monitor.bags.bag import MCAP, BagFile
+from leg_wear_monitor.bags.budget import Budget
+from leg_wear_monitor.bags.findings import DamageError, Finding, RecordingError, Weight
+from leg_wear_monitor.bags.mcap.compression import ZSTD_MAGIC, expand_message, expanded
+from leg_wear_monitor.bags.mcap.file import Due, McapFile, Piece
+from leg_wear_monitor.bags.mcap.layout import Channel
+from leg_wear_monitor.bags.regular_file import open_regular
+from leg_wear_monitor.bags.topics import Role, check_channel, find_topic, listed
+
+
+class OpenFile(Protocol):
+    """What an MCAP and a .db3 file have in common."""
+
+    path: Path
+    size: int
+    findings: list[Finding]
+
+    @property
+    def channels(self) -> dict[int, Channel]:
+        """Channels of the file by their number."""
+
+    def pieces(self, types: dict[int, int]) -> Iterator[Due]:
+        """Messages of channels, given with the codes of their types."""
+
+
+@attrs.define(eq=False)
+class Source:
+    """An open file of a recording, and the channels to read with their types."""
+
+    bag_file: BagFile
+    file: OpenFile
+    budget: Budget
+    types: dict[int, int] = attrs.Factory(dict)
+
+    def pieces(self) -> Iterator[Due]:
+        """Messages that are wanted, in order of log time."""
+        for due in self.file.pieces(self.types):
+            yield attrs.evolve(due, load=partial(self._expanded, due)) if self.bag_file.by_message else due
+
+    def _expanded(self, due: Due) -> Piece | None:
+        """The messages of a piece, each decompressed."""
+        piece = due.load()
+        return None if piece is None else _expanded(piece, self.budget.at_once // 2)
+
+
+def open_sources(
+    bag_files: Iterable[BagFile], budget: Budget, stack: ExitStack
+) -> tuple[list[Source], list[Finding]]:
+    """Open what can be opened; a file that cannot be is lost if there are others.
+
+    Parameters
+    ----------
+    bag_files : iterable of BagFile
+    budget : Budget
+    stack : contextlib.ExitStack
+        Closes them.
+
+    Raises
+    ------
+    RecordingError
+        If none can be opened.
+    """
+    sources: list[Source] = []
+    failed: list[RecordingError] = []
+    for bag_file in bag_files:
+        try:
+            sources.append(Source(bag_file, _open(bag_file, budget, stack), budget))
+        except RecordingError as error:
+            failed.append(error)
+    if not sources:
+        raise failed[0]
+    return sources, [Finding(Path(error.source), f"{error.fault}: it is lost") for error in failed]
+
+
+def assign(sources: list[Source], wanted: Iterable[Role]) -> tuple[dict[str, str], list[Finding]]:
+    """Find the topics of roles, and set what to read from each source.
+
+    Returns
+    -------
+    topics : dict
+        Topic of each role that is there, by its name.
+    findings : list of Finding
+
+    Raises
+    ------
+    RecordingError
+        If the crank's topic is not there, or a topic holds what cannot be read.
+    """
+    there = [channel.topic for source in sources for channel in source.file.channels.values()]
+    first = sources[0].bag_file.path
+    topics: dict[str, str] = {}
+    findings: list[Finding] = []
+    for role in wanted:
+        topic = find_topic(role, there, str(first))
+        if topic is not None:
+            topics[role.name] = topic
+            for source in sources:
+                source.types |= _types(source, role, topic)
+            continue
+        text = f"is no topic of the recording, it has {listed(there)}"
+        if role.needed:
+            raise RecordingError(str(first), role.name, text)
+        findings.append(Finding(first, f"{role.name}: {text}", Weight.NOTE))
+    return topics, findings
+
+
+def _types(source: Source, role: Role, topic: str) -> dict[int, int]:
+    known = source.bag_file.types.get(topic, "")
+    return {
+        number: check_channel(role, channel, known, str(source.bag_file.path))
+        for number, channel in source.file.channels.items()
+        if channel.topic == topic
+    }
+
+
+def _open(bag_file: BagFile, budget: Budget, stack: ExitStack) -> OpenFile:
+    path = bag_file.path
+    try:
+        if bag_file.compressed:
+            path = _expanded_file(bag_file, budget, stack)
+        if bag_file.storage == MCAP:
+            return McapFile(bag_file.path, stack.enter_context(open_regular(path)), budget)
+    except DamageError as error:
+        raise RecordingError(str(bag_file.path), "", str(error)) from error
+    except OSError as error:
+        raise RecordingError(str(bag_file.path), "", f"cannot be read: {error.strerror}") from error
+    from leg_wear_monitor.bags.sqlite.file import SqliteFile
+
+    return SqliteFile(bag_file.path, path, budget, stack)
+
+
+def _expanded_file(bag_file: BagFile, budget: Budget, stack: ExitStack) -> Path:
+    """Temporary file with the content of a compressed one; it counts as memory."""
+    path = Path(stack.enter_context(tempfile.TemporaryDirectory())) / f"content{bag_file.storage}"
+    with open_regular(bag_file.path) as file, path.open("wb") as content:
+        if file.read(len(ZSTD_MAGIC)) != ZSTD_MAGIC:
+            raise DamageError("is no zstd file, as its name says")
+        file.seek(0)
+        for part in expanded(file):
+            budget.take(len(part))
+            content.write(part)
+        if not content.tell():
+            raise DamageError("holds nothing that can be decompressed")
+    return path
+
+
+def _expanded(piece: Piece, most: int) -> Piece:
+    """The same messages, each decompressed, and no more bytes of all of them than asked for."""
+    contents = []
+    for begin, end in zip(piece.messages["begin"].tolist(), piece.messages["end"].tolist(), strict=True):
+        contents.append(expand_message(piece.data[begin:end].tobytes(), most))
+        most -= len(contents[-1])
+    messages = piece.messages.copy()
+    messages["end"] = np.cumsum([len(content) for content in contents])
+    messages["begin"] = messages["end"] - [len(content) for content in contents]
+    return attrs.evolve(piece, data=np.frombuffer(b"".join(contents), np.uint8), messages=messages)

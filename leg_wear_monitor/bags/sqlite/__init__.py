@@ -1,0 +1,1 @@
+"""SQLite recordings (.db3)."""

@@ -1,0 +1,148 @@
+"""One .db3 file of rosbag2: its topics, and their messages piece by piece in order of log time."""
+
+import sqlite3
+from collections import deque
+from collections.abc import Iterator
+from contextlib import ExitStack
+from functools import partial
+from pathlib import Path
+
+import numpy as np
+
+from leg_wear_monitor.bags.budget import Budget
+from leg_wear_monitor.bags.findings import Finding, RecordingError, Weight
+from leg_wear_monitor.bags.mcap.file import Due, Piece
+from leg_wear_monitor.bags.mcap.layout import Channel
+from leg_wear_monitor.bags.sqlite.database import UNREADABLE, one_line, open_database
+from leg_wear_monitor.messages.cdr import MESSAGE
+
+_Row = tuple[int, int, int]  # id, time, topic
+_TOGETHER = 4096
+_MOST_TOPICS = 65536
+_NO_CHECKSUMS = "has no checksums, as no .db3 has: a damaged number would not be seen"
+
+
+class SqliteFile:
+    """A .db3 file, open; what is wrong with it is in `findings`.
+
+    Parameters
+    ----------
+    path : pathlib.Path
+        Name for messages.
+    file : pathlib.Path
+        What is opened; it is not written to.
+    budget : Budget
+    stack : contextlib.ExitStack
+        Closes it.
+
+    Raises
+    ------
+    RecordingError
+        If it is no such file.
+    """
+
+    def __init__(self, path: Path, file: Path, budget: Budget, stack: ExitStack) -> None:
+        self.path, self.budget = path, budget
+        self.findings: list[Finding] = [Finding(path, _NO_CHECKSUMS, Weight.NOTE)]
+        self._database, notes = open_database(path, file, budget, stack)
+        self.findings += [Finding(path, note, Weight.NOTE) for note in notes]
+        try:
+            self.size = file.stat().st_size
+            self.channels = _channels(self._database)
+            self._counts: dict[object, int] = dict(
+                self._database.execute(
+                    "SELECT topic_id, COUNT(*) FROM messages NOT INDEXED GROUP BY topic_id"
+                )
+            )
+        except (*UNREADABLE, OSError) as error:
+            raise RecordingError(str(path), "", f"is no readable .db3 file: {one_line(error)}") from error
+        self._found = 0
+        self._tell_strangers()
+
+    def pieces(self, types: dict[int, int]) -> Iterator[Due]:
+        """Messages of the channels asked for, as far as they can be read.
+
+        Parameters
+        ----------
+        types : dict
+            Codes of `cdr.TYPES` by number of the channel.
+        """
+        expected = sum(self._counts.get(number, 0) for number in types)
+        for rows in self._pages(types):
+            while rows:
+                yield Due(rows[0][1], partial(self._piece, rows, types, self.size // max(expected, 1)))
+        if self._found != expected:
+            text = f"{self._found} messages could be read of the {expected} that it counts"
+            self.findings.append(Finding(self.path, text))
+
+    def _pages(self, types: dict[int, int]) -> Iterator[deque[_Row]]:
+        """Which messages there are, in order of their time: many at a time, without what is in them."""
+        if not types:
+            return
+        places = ", ".join("?" * len(types))
+        try:
+            cursor = self._database.execute(
+                f"SELECT id, timestamp, topic_id FROM messages WHERE topic_id IN ({places}) "
+                "AND typeof(timestamp) = 'integer' AND typeof(data) = 'blob' ORDER BY timestamp, id",
+                list(types),
+            )
+            while rows := cursor.fetchmany(_TOGETHER):
+                yield deque(rows)
+        except UNREADABLE as error:
+            self.findings.append(Finding(self.path, f"breaks off: {one_line(error)}"))
+
+    def _piece(self, rows: deque[_Row], types: dict[int, int], stored: int) -> Piece:
+        """Messages of the next rows, as many as there is room for; those rows are taken away."""
+        contents: list[bytes] = []
+        kept: list[_Row] = []
+        start_ns, room, number = rows[0][1], self.budget.at_once // 4, len(rows)
+        while rows and room > 0:
+            row = rows.popleft()
+            content = self._content(row[0])
+            if content is not None:
+                contents.append(content)
+                kept.append(row)
+                room -= len(content)
+        self._found += len(kept)
+        messages = np.zeros(len(kept), MESSAGE)
+        messages["end"] = np.cumsum([len(content) for content in contents])
+        messages["begin"][1:] = messages["end"][:-1]
+        messages["log_time_ns"] = messages["publish_time_ns"] = [time for _, time, _ in kept]
+        messages["type"] = [types[topic] for _, _, topic in kept]
+        data = np.frombuffer(b"".join(contents), np.uint8)
+        return Piece(start_ns, data, messages, stored * (number - len(rows)))
+
+    def _content(self, number: int) -> bytes | None:
+        """What one message holds; None where it cannot be read or is too large."""
+        try:
+            row = self._database.execute(
+                "SELECT data FROM messages WHERE id = ? AND length(data) <= ?",
+                (number, self.budget.at_once // 8),
+            ).fetchone()
+        except UNREADABLE:
+            return None  # counted as one that could not be read
+        return row[0] if row and isinstance(row[0], bytes) else None
+
+    def _tell_strangers(self) -> None:
+        """Say how many messages belong to no topic that it lists."""
+        count = sum(count for topic, count in self._counts.items() if topic not in self.channels)
+        if count:
+            text = f"holds {count} messages of topics that it does not list: they are lost"
+            self.findings.append(Finding(self.path, text))
+
+
+def _channels(database: sqlite3.Connection) -> dict[int, Channel]:
+    """Topics by their number, with the definitions of their types where it has them."""
+    tables = {name for (name,) in database.execute("SELECT name FROM sqlite_master WHERE type = 'table'")}
+    texts: dict[str, tuple[str, str]] = {}
+    if "message_definitions" in tables:
+        query = "SELECT topic_type, encoding, encoded_message_definition FROM message_definitions LIMIT ?"
+        for name, encoding, text in database.execute(query, (_MOST_TOPICS,)):
+            texts[str(name)] = str(encoding), str(text)
+    channels = {}
+    query = "SELECT id, name, type, serialization_format FROM topics LIMIT ?"
+    for number, name, kind, encoding in database.execute(query, (_MOST_TOPICS,)):
+        definition_encoding, text = texts.get(str(kind), ("ros2msg", ""))
+        if isinstance(number, int):
+            channels[number] = Channel(str(name), str(kind), str(encoding), text, definition_encoding)
+    return channels

@@ -1,0 +1,131 @@
+"""Which topics of a recording are the crank's and the torque's, and whether they hold what they should."""
+
+from collections.abc import Iterable
+
+import attrs
+
+from leg_wear_monitor.bags.findings import RecordingError
+from leg_wear_monitor.bags.mcap.layout import Channel
+from leg_wear_monitor.errors import printable
+from leg_wear_monitor.messages.cdr import TYPES
+
+# Fields of the types' own definitions; names of nested types without their package.
+_FIELDS = {
+    "sensor_msgs/msg/JointState": (
+        "Header header",
+        "string[] name",
+        "float64[] position",
+        "float64[] velocity",
+        "float64[] effort",
+    ),
+    "geometry_msgs/msg/WrenchStamped": ("Header header", "Wrench wrench"),
+    "std_msgs/msg/Float64": ("float64 data",),
+}
+_TORQUE_TYPES = {"wrench": "geometry_msgs/msg/WrenchStamped", "float64": "std_msgs/msg/Float64"}
+
+
+@attrs.frozen
+class Role:
+    """What is looked for in a recording.
+
+    Attributes
+    ----------
+    name : str
+        As it is in the node: a relative name.
+    type : str
+        Type its messages must have.
+    topic : str, optional
+        Where a user says it is.
+    needed : bool
+        Whether nothing can be done without.
+    """
+
+    name: str
+    type: str
+    topic: str | None = None
+    needed: bool = False
+
+
+def roles(source: str, joint_states: str | None, drive_torque: str | None) -> list[Role]:
+    """What a monitor with a source of torque needs: a key of `drive_torque.source`, and topics if given."""
+    wanted = [Role("joint_states", "sensor_msgs/msg/JointState", joint_states, needed=True)]
+    if source in _TORQUE_TYPES:
+        wanted.append(Role("drive_torque", _TORQUE_TYPES[source], drive_torque))
+    return wanted
+
+
+def find_topic(role: Role, topics: Iterable[str], where: str) -> str | None:
+    """Topic of a role: the one given, else the relative name in the root, else in the one namespace it is in.
+
+    Returns
+    -------
+    str or None
+        None where nothing was given and nothing is there.
+
+    Raises
+    ------
+    RecordingError
+        If the given topic is not there, or several namespaces have the name.
+    """
+    there = sorted(set(topics))
+    if role.topic is not None:
+        topic = "/" + role.topic.lstrip("/")
+        if topic not in there:
+            raise RecordingError(where, topic, f"is no topic of the recording, it has {listed(there)}")
+        return topic
+    if f"/{role.name}" in there:
+        return f"/{role.name}"
+    near = [topic for topic in there if topic.endswith(f"/{role.name}")]
+    if len(near) > 1:
+        option = f"--{role.name}".replace("_", "-")
+        raise RecordingError(where, role.name, f"could be {listed(near)}, say which by {option}")
+    return near[0] if near else None
+
+
+def check_channel(role: Role, channel: Channel, known_type: str, where: str) -> int:
+    """Code of a channel's type, once it is sure that its messages can be read as such.
+
+    Parameters
+    ----------
+    role : Role
+    channel : Channel
+    known_type : str
+        What else is known of the topic's type, from metadata.yaml; empty if nothing.
+    where : str
+        File, for messages.
+
+    Raises
+    ------
+    RecordingError
+        Naming file, topic, and what it should be.
+    """
+    kind = channel.type or known_type or role.type
+    if kind != role.type:
+        raise RecordingError(where, channel.topic, f"is of type {kind}, expected {role.type}")
+    if channel.encoding != "cdr":
+        raise RecordingError(where, channel.topic, f"is encoded as {channel.encoding!r}, expected 'cdr'")
+    if channel.definition_encoding == "ros2msg" and channel.definition:
+        fields = _fields(channel.definition)
+        if fields != _FIELDS[kind]:
+            text = f"defines {kind} by {'; '.join(fields)}, expected {'; '.join(_FIELDS[kind])}"
+            raise RecordingError(where, channel.topic, text)
+    return TYPES[kind]
+
+
+def _fields(definition: str) -> tuple[str, ...]:
+    """Type and name of each field of a definition's own part, without constants and comments."""
+    fields = []
+    for line in definition.splitlines():
+        if line.startswith("====="):
+            break
+        words = line.split("#")[0].split()
+        if len(words) == 2 and "=" not in words[1]:
+            fields.append(f"{words[0].split('/')[-1]} {words[1]}")
+    return tuple(fields)
+
+
+def listed(names: Iterable[str]) -> str:
+    """Names in order, not too many."""
+    names = sorted(set(names))
+    more = f" and {len(names) - 20} more" if len(names) > 20 else ""
+    return (", ".join(printable(name, 100) for name in names[:20]) or "none") + more

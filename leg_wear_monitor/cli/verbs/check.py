@@ -1,0 +1,142 @@
+"""``leg-wear-monitor check``: what is wrong with a configuration or an installation."""
+
+import platform
+import warnings
+from collections.abc import Callable, Mapping
+from functools import partial
+from importlib import metadata
+from pathlib import Path
+
+import click
+
+from leg_wear_monitor.cli.doubts import warn_of
+from leg_wear_monitor.cli.main import version
+from leg_wear_monitor.cli.output import check_directory
+from leg_wear_monitor.cli.verbs.simulate import DEFAULT_MODEL
+from leg_wear_monitor.cli.waiting import compilation, is_compiled
+from leg_wear_monitor.errors import ConfigWarning, LegWearError
+from leg_wear_monitor.share import share_directory
+
+DOUBTED = 1
+
+_LIBRARIES = ("attrs", "cattrs", "click", "jinja2", "matplotlib", "numba", "numpy", "rich", "ruamel.yaml")
+
+
+@click.command(short_help="Say what is wrong with a configuration or an installation.")
+@click.argument("configs", nargs=-1, metavar="[CONFIG]...")
+def check(configs: tuple[str, ...]) -> int:
+    """Check files of mechanisms and of parameters, or, without any, the installation and its own files.
+
+    Prints what was understood of each that is in order, and a line on stderr for each that is not. A value
+    that is likely meant in another unit is a warning; the exit code is then 1.
+    """
+    with warnings.catch_warnings(record=True) as doubted:
+        warnings.simplefilter("always", ConfigWarning)
+        well = _all_well(_files(configs)) if configs else _installation()
+    for doubt in doubted:
+        warnings.showwarning(doubt.message, doubt.category, doubt.filename, doubt.lineno)
+    if not well:
+        return 2
+    return DOUBTED if any(one.category is ConfigWarning for one in doubted) else 0
+
+
+def _installation() -> bool:
+    click.echo(f"{'version':<13} {version()}")
+    libraries = {name: _library(name) for name in _LIBRARIES}
+    if not _all_well({"python": platform.python_version, **libraries}):
+        return False  # the rest needs them
+    if not _all_well({"kernels": _kernels, "share": lambda: str(share_directory())}):
+        return False
+    from leg_wear_monitor.mechanism.loader import shipped_mechanisms
+    from leg_wear_monitor.monitor.config.parameter_file import shipped_config
+
+    shipped = {"monitor.yaml": partial(_parameters, str(shipped_config()))}
+    return _all_well({name: partial(_first_line, name) for name in shipped_mechanisms()} | shipped)
+
+
+def _all_well(parts: Mapping[str, Callable[[], str]]) -> bool:
+    """Print what each part says of itself, on stderr what is wrong with it."""
+    well = True
+    for name, part in parts.items():
+        try:
+            click.echo(f"{name:<13} {part()}")
+        except LegWearError as error:
+            click.echo(f"error: {error}", err=True)
+            well = False
+    return well
+
+
+def _library(name: str) -> Callable[[], str]:
+    def find() -> str:
+        try:
+            return metadata.version(name)
+        except metadata.PackageNotFoundError as error:
+            raise LegWearError(f"{name}: is not installed, expected by leg_wear_monitor") from error
+
+    return find
+
+
+def _kernels() -> str:
+    from leg_wear_monitor.kernel import cache_directory
+
+    place = cache_directory()
+    if place is None:
+        return "compiled anew at every start: no place for compiled code is private"
+    check_directory("NUMBA_CACHE_DIR", place)
+    state = "compiled" if is_compiled(DEFAULT_MODEL) else "to be compiled by the first simulation"
+    return f"{state}, in {place}"
+
+
+def _files(names: tuple[str, ...]) -> Mapping[str, Callable[[], str]]:
+    return {name: partial(_file, name) for name in names}
+
+
+def _file(name: str) -> str:
+    """Check a file as what it is."""
+    from leg_wear_monitor.mechanism.loader import is_file_name, read_yaml
+    from leg_wear_monitor.monitor.config.parameter_file import is_parameter_file
+
+    if is_file_name(name) and is_parameter_file(read_yaml(Path(name), name)):
+        return _parameters(name)
+    return _mechanism(name)
+
+
+def _parameters(path: str) -> str:
+    """Read the monitor's parameters, and say what they are set to."""
+    from leg_wear_monitor.mechanism.loader import load_mechanism
+    from leg_wear_monitor.monitor.config.fitting import fitted, twin_settings
+    from leg_wear_monitor.monitor.config.parameter_file import load_config
+    from leg_wear_monitor.monitor.config.plausible import parameter_doubts
+
+    config = load_config(path)
+    leg = fitted(load_mechanism(config.mechanism), config, path)
+    twin_settings(config, path)
+    warn_of(path, parameter_doubts(config, leg))
+    return (
+        f"parameters of the monitor: {config.mechanism}, {', '.join(leg.loose)} loose, "
+        f"{config.cadence.commanded_rpm:g} rpm, hardware {config.hardware}"
+    )
+
+
+def _first_line(name: str) -> str:
+    return _mechanism(name).splitlines()[0]
+
+
+def _mechanism(name: str) -> str:
+    """Load, assemble and turn a mechanism, and say what it is."""
+    from leg_wear_monitor.mechanism.loader import load_mechanism
+    from leg_wear_monitor.mechanism.plausible import doubts
+    from leg_wear_monitor.mechanism.understood import understood
+
+    leg = load_mechanism(name)
+    with compilation("mechanism", "a few seconds"):
+        from leg_wear_monitor.dynamics.simulation import prepare
+
+        linkage = prepare(leg).linkage
+    warn_of(leg.source, doubts(leg))
+    loose = f"{', '.join(leg.loose)} loose" if leg.loose else "none loose"
+    what = (
+        f"{len(leg.bodies)} moving bodies, {len(leg.joints)} joints ({loose}), mobility 1, "
+        "closes, and the crank turns through"
+    )
+    return "\n".join([what, *(f"{'':13} {statement}" for statement in understood(linkage))])

@@ -1,0 +1,171 @@
+"""``leg-wear-monitor life``: a leg from new until a clearance reaches its limit, by cycle jumps."""
+
+import json
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+import click
+
+from leg_wear_monitor.cli.doubts import warn_of
+from leg_wear_monitor.cli.number import bounded, options_named
+from leg_wear_monitor.cli.output import check_directory, check_file, write_directory, write_file
+from leg_wear_monitor.cli.waiting import compilation, progress_bar
+
+if TYPE_CHECKING:
+    from leg_wear_monitor.life.result import Life
+    from leg_wear_monitor.mechanism.arrays import Floats
+    from leg_wear_monitor.mechanism.spec import Mechanism
+
+    Lives = list[tuple[Floats, Life]]  # with the factors on their wear coefficients
+
+_ROWS = 12  # of the table
+
+
+@click.command(short_help="A leg's wear over its life, by cycle jumps.")
+@click.option("--mechanism", metavar="FILE", default="bionic_leg", show_default=True, help="The leg.")
+@click.option("--clearances", metavar="A,B", help="The loose joints.  [default: the mechanism's own]")
+@click.option(
+    "--speed-rpm", type=float, callback=bounded("rpm"), metavar="RPM", help="Crank speed.  [default: its own]"
+)
+@click.option(
+    "--limit-m",
+    type=float,
+    default=6.0e-4,
+    show_default=True,
+    callback=bounded("m", above=0.0),
+    metavar="M",
+    help="Mean radial clearance at which a joint's life ends.",
+)
+@click.option(
+    "--horizon-cycles",
+    type=float,
+    default=1.0e9,
+    show_default=True,
+    callback=bounded(above=0.0),
+    metavar="N",
+    help="Gait cycles at most.",
+)
+@click.option(
+    "--wear-factor",
+    type=float,
+    default=1.0,
+    show_default=True,
+    callback=bounded(above=0.0),
+    metavar="X",
+    help="On all wear coefficients.",
+)
+@click.option(
+    "--opens-m",
+    type=float,
+    callback=bounded("m", above=0.0),
+    metavar="M",
+    help="Deepest change of a surface in a jump.  [default: 3e-05]",
+)
+@click.option("--legs", type=click.IntRange(min=1), metavar="N", help="Legs averaged.  [default: 2]")
+@click.option(
+    "--cycles", type=click.IntRange(min=2), metavar="N", help="Cycles of each averaged.  [default: 4]"
+)
+@click.option(
+    "--lives",
+    type=click.IntRange(min=1),
+    default=1,
+    show_default=True,
+    metavar="N",
+    help="Lives for --json: further ones have coefficients that differ, to show the forecast how joints act "
+    "upon each other.",
+)
+@click.option(
+    "--json",
+    "json_file",
+    type=click.Path(path_type=Path),
+    metavar="FILE",
+    help="Write the life as JSON.",
+)
+@click.option("--out", type=click.Path(path_type=Path), metavar="DIR", help="Write life.json and life.png.")
+def life(mechanism: str, json_file: Path | None, out: Path | None, **options: Any) -> None:
+    """Let a leg wear from new until a clearance reaches its limit.
+
+    A few gait cycles are simulated, and their mean wear is applied over many; single cycles are chaotic, so
+    the figures have scatter, which is told.
+    """
+    from leg_wear_monitor.mechanism.loader import load_mechanism
+    from leg_wear_monitor.mechanism.plausible import doubts
+
+    names = options.pop("clearances")
+    leg = _with_loose(load_mechanism(mechanism), names)
+    if json_file is not None:
+        check_file("--json", json_file)
+    if out is not None:
+        check_directory("--out", out)
+    with options_named():
+        lives = _lives(leg, **options)
+    warn_of(leg.source, doubts(leg))  # what fails names them itself, in its one line
+    result = lives[0][1]
+    for line in lines(result, options["limit_m"]):
+        click.echo(line)
+    text = (json.dumps(_document(leg, lives), indent=1, allow_nan=False) + "\n").encode()
+    if json_file is not None:
+        write_file(json_file, text)
+        click.echo(f"written: {json_file}")
+    if out is not None:
+        from leg_wear_monitor.report.figures.life_picture import life_picture
+
+        for path in write_directory(out, {"life.json": text, "life.png": life_picture(result)}):
+            click.echo(f"written: {path}")
+
+
+def _with_loose(leg: "Mechanism", names: str | None) -> "Mechanism":
+    """The leg with these loose joints, of comma-separated names."""
+    import attrs
+
+    return attrs.evolve(leg, loose=tuple(name.strip() for name in names.split(","))) if names else leg
+
+
+def _lives(leg: "Mechanism", lives: int, opens_m: float | None, **options: Any) -> "Lives":
+    import attrs
+    import numpy as np
+
+    from leg_wear_monitor.contact.arrays import clearance_settings
+    from leg_wear_monitor.life.life import LifeSettings
+    from leg_wear_monitor.life.limits import check_life
+    from leg_wear_monitor.life.many_lives import simulate_lives
+    from leg_wear_monitor.wear.cycle_jump import JumpControl
+
+    given = {name: value for name in ("legs", "cycles") if (value := options.pop(name)) is not None}
+    settings = LifeSettings(**given)
+    if opens_m is not None:
+        settings = attrs.evolve(settings, jump=JumpControl.of(opens_m))
+    own = clearance_settings(leg, leg.loose)
+    fresh_m, radius_m = np.array([[c.radial_clearance, c.bushing_radius] for c in own]).reshape(-1, 2).T
+    check_life(leg.loose, fresh_m, radius_m, options["limit_m"], settings.jump)
+    with compilation("clearance"), progress_bar("life") as progress:
+        return list(simulate_lives(leg, settings, lives, progress=progress, **options))
+
+
+def _document(leg: "Mechanism", lives: "Lives") -> dict[str, Any]:
+    """Lives, bound to the leg that they are of."""
+    from leg_wear_monitor.life.many_lives import lives_document
+    from leg_wear_monitor.monitor.ledger.binding import fingerprint
+
+    return {"mechanism": leg.name, "fingerprint": fingerprint(leg), **lives_document(lives)}
+
+
+def lines(result: "Life", limit_m: float) -> list[str]:
+    """The life as a table, and when each joint reaches the limit."""
+    points = len(result.cycles)
+    shown = sorted({round(i * (points - 1) / max(1, _ROWS - 1)) for i in range(min(_ROWS, points))})
+    head = "".join(f"{joint:>22}" for joint in result.loose)
+    table = [f"{'cycles':>10}{head}", f"{'':10}" + f"{'mean µm  deg  peak N':>22}" * len(result.loose)]
+    for i in shown:
+        cells = "".join(
+            f"{1e6 * result.clearance_m[i, k]:11.1f}{result.worst_sector_deg[i, k]:5.0f}"
+            f"{result.peak_force_n[i, k]:6.0f}"
+            for k in range(len(result.loose))
+        )
+        table.append(f"{result.cycles[i]:10.3g}{cells}")
+    table.append(f"jumps: {points - 1}; greatest error seen in one: {1e6 * result.error_m.max():.2g} µm")
+    for k, joint in enumerate(result.loose):
+        cycles = result.cycles_to(k, limit_m)
+        held = "" if cycles <= result.cycles[-1] else ", if it goes on at its last rate"
+        table.append(f"{joint} reaches {1e6 * limit_m:g} µm after {cycles:.3g} gait cycles{held}")
+    return table

@@ -1,0 +1,230 @@
+"""``leg-wear-monitor replay``: a recording through the same monitor that runs live."""
+
+import json
+import time
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+import click
+
+from leg_wear_monitor.cli.main import version
+from leg_wear_monitor.cli.output import check_directory, check_file, write_directory, write_file
+from leg_wear_monitor.cli.waiting import compilation, progress_bar
+from leg_wear_monitor.errors import LegWearError
+from leg_wear_monitor.interrupt import closed_at_the_end
+
+if TYPE_CHECKING:
+    from collections.abc import Callable
+
+    from leg_wear_monitor.monitor.config.settings import MonitorConfig
+    from leg_wear_monitor.playback.replay import ReplayResult
+
+WITH_FINDINGS = 1
+SUMMARY, PAGE = "summary.json", "report.html"
+
+# Spelled out, for --help shall not wait for numba; the tests compare them with the library's.
+TIMES = ("header", "log", "publish")
+ALARM_KINDS = (
+    "impact_force",
+    "clearance",
+    "growth",
+    "torque_mismatch",
+    "torque_bias",
+    "torque_drift",
+    "torque_lag",
+    "cadence",
+    "input",
+)
+_MOST_LINES = 20
+
+
+@click.command(short_help="A recording through the same monitor that runs live.")
+@click.argument("bags", nargs=-1, required=True, type=click.Path(path_type=Path), metavar="BAG...")
+@click.option(
+    "--out",
+    type=click.Path(path_type=Path),
+    metavar="DIR",
+    help="Write reports.mcap (for rosbag2 and Foxglove), summary.json and report.html.",
+)
+@click.option(
+    "--config",
+    type=click.Path(path_type=Path),
+    metavar="FILE",
+    help="Parameter file of the node.  [default: the one that comes with the package]",
+)
+@click.option(
+    "--time",
+    "time_source",
+    type=click.Choice(TIMES),
+    default="header",
+    show_default=True,
+    help="Which time stamps the samples.",
+)
+@click.option("--joint-states", metavar="TOPIC", help="Topic of the crank.  [default: */joint_states]")
+@click.option("--drive-torque", metavar="TOPIC", help="Topic of the torque.  [default: */drive_torque]")
+@click.option(
+    "--node",
+    metavar="NAME",
+    help="Full name of the node to be in the stead of.  [default: leg_wear_monitor beside the crank's topic]",
+)
+@click.option("--crank-joint", metavar="NAME", help="The crank's name.  [default: as the parameters say]")
+@click.option(
+    "--memory-mb",
+    type=click.FloatRange(min=16.0),
+    default=512.0,
+    show_default=True,
+    metavar="MB",
+    help="Memory that reading may take, temporary files included.",
+)
+@click.option(
+    "--ledger",
+    type=click.Path(path_type=Path, dir_okay=False),
+    metavar="FILE",
+    help="Ledger to continue or to begin; the one in the parameters is never touched.",
+)
+@click.option("--allow-partial", is_flag=True, help="Exit with 0 also if parts of the recording are lost.")
+@click.option(
+    "--fail-on",
+    type=click.Choice(("alarm", "warning", *ALARM_KINDS)),
+    multiple=True,
+    metavar="WHAT",
+    help=f"Exit with 1 if any alarm was raised, any warning, or one of a kind: {', '.join(ALARM_KINDS)}. "
+    "May be repeated.",
+)
+@click.option(
+    "--json",
+    "json_file",
+    type=click.Path(allow_dash=True, path_type=Path),
+    metavar="FILE",
+    help="Write the summary as JSON; - for stdout, which then holds nothing else.",
+)
+def replay(
+    bags: tuple[Path, ...],
+    out: Path | None,
+    json_file: Path | None,
+    allow_partial: bool,
+    fail_on: tuple[str, ...],
+    **options: Any,
+) -> int:
+    """Put recordings through the monitor: MCAP and .db3 files or bag directories, several as one recording.
+
+    Exits with 1 if parts of a recording were lost, if no gait cycle in it can be this leg's, or for an alarm
+    asked for with --fail-on.
+    """
+    to_stdout = json_file == Path("-")
+    if json_file is not None and not to_stdout:
+        check_file("--json", json_file)
+    if out is not None:
+        check_directory("--out", out)
+    written: list[Path] = []
+
+    def write(result: "ReplayResult", wall_s: float) -> None:
+        written.extend(_write(result, wall_s, out, json_file))
+
+    result, wall_s = _run(bags, out, write, **options)
+    for finding in result.findings[:_MOST_LINES]:
+        click.echo(f"warning: {finding}", err=True)
+    if len(result.findings) > _MOST_LINES:
+        click.echo(f"warning: and {len(result.findings) - _MOST_LINES} findings more", err=True)
+    if result.is_unusable:
+        missing = result.evidence.missing()
+        click.echo(f"warning: no gait cycle can be this leg's, so no forces are given: {missing}", err=True)
+    if not to_stdout:
+        from leg_wear_monitor.cli.replay_tables import print_replay
+
+        print_replay(result, wall_s)
+        for path in written:
+            click.echo(f"written: {path}")
+    failed = (result.is_partial and not allow_partial) or is_raised(result, fail_on)
+    failed = failed or result.is_unusable
+    return WITH_FINDINGS if failed else 0
+
+
+def _run(
+    bags: tuple[Path, ...],
+    out: Path | None,
+    write: "Callable[[ReplayResult, float], None]",
+    config: Path | None,
+    time_source: str,
+    crank_joint: str | None,
+    node: str | None,
+    **options: Any,
+) -> tuple["ReplayResult", float]:
+    """The result, and the time [s] it took once all was compiled."""
+    try:
+        from leg_wear_monitor.playback.replay import replay as run
+    except ModuleNotFoundError as error:
+        raise LegWearError(f"{error.name} is not installed; pip install 'leg_wear_monitor[bags]'") from error
+    began, took = [0.0], [0.0]
+
+    def ready(monitor: Any) -> None:
+        with compilation("monitor", "about a minute"), closed_at_the_end(monitor.abandon):
+            monitor.warm_up()
+        began[0] = time.perf_counter()
+
+    def finish(result: "ReplayResult") -> None:
+        took[0] = time.perf_counter() - began[0]
+        write(result, took[0])
+
+    with progress_bar("replaying") as progress:
+        result = run(
+            bags,
+            _config(config, crank_joint, node),
+            node=node,
+            out=out,
+            time=time_source,
+            ready=ready,
+            progress=progress,
+            finish=finish,
+            **options,
+        )
+    return result, took[0]
+
+
+def _config(path: Path | None, crank_joint: str | None, node: str | None) -> "MonitorConfig":
+    import attrs
+
+    from leg_wear_monitor.monitor.config.parameter_file import load_config
+
+    config = load_config(path, node)
+    return config if crank_joint is None else attrs.evolve(config, crank_joint=crank_joint)
+
+
+def is_raised(result: "ReplayResult", fail_on: tuple[str, ...]) -> bool:
+    """Whether an alarm asked for was raised at any time."""
+    from leg_wear_monitor.monitor.alarms.alarm import Level
+
+    worst = result.history.worst
+    highest = max(worst.values(), default=Level.OK)
+    if ("alarm" in fail_on and highest is Level.ERROR) or ("warning" in fail_on and highest > Level.OK):
+        return True
+    return any(level is Level.ERROR and kind.startswith(fail_on) for kind, level in worst.items())
+
+
+def _write(result: "ReplayResult", wall_s: float, out: Path | None, json_file: Path | None) -> list[Path]:
+    """Write what was asked for, and give the files."""
+    if out is None and json_file is None:
+        return []
+    from leg_wear_monitor.playback.replay import REPORTS_FILE
+    from leg_wear_monitor.playback.summary import summary
+
+    record = {**summary(result, wall_s), "made_with": {"leg_wear_monitor": version()}}
+    text = json.dumps(record, indent=1, allow_nan=False) + "\n"
+    written: list[Path] = []
+    if out is not None:
+        files = {SUMMARY: text.encode(), PAGE: page_of(record)}
+        written = [out / REPORTS_FILE, *write_directory(out, files)]
+    if json_file == Path("-"):
+        click.echo(text, nl=False)
+    elif json_file is not None:
+        write_file(json_file, text.encode())
+        written.append(json_file)
+    return written
+
+
+def page_of(record: dict[str, Any]) -> bytes:
+    """The page, from what summary.json holds."""
+    from leg_wear_monitor.report.page import page_html
+    from leg_wear_monitor.report.replay.page import replay_page
+
+    return page_html(replay_page(record)).encode()

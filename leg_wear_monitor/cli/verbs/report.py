@@ -1,0 +1,61 @@
+"""``leg-wear-monitor report``: the page of a run again, from its data."""
+
+import json
+import warnings
+from collections.abc import Iterator
+from contextlib import contextmanager
+from pathlib import Path
+
+import click
+
+from leg_wear_monitor.cli.output import write_directory
+from leg_wear_monitor.cli.verbs.replay import PAGE, SUMMARY, page_of
+from leg_wear_monitor.errors import ConfigError
+
+_MISMADE = (
+    ArithmeticError, AttributeError, LookupError, MemoryError, OSError, RuntimeError, RuntimeWarning,
+    TypeError, ValueError,
+)  # fmt: skip
+
+
+@click.command(short_help="The page of a run again, from its data.")
+@click.argument("directory", type=click.Path(path_type=Path), metavar="DIR")
+def report(directory: Path) -> int:
+    """Draw the page of a study or a replay again from what lies in DIR; nothing is computed."""
+    if (directory / SUMMARY).is_file():
+        return _replay(directory)
+    if not (directory / "study.json").is_file():
+        raise ConfigError(
+            str(directory),
+            "",
+            "holds no study.json, expected the --out of a study or of a replay",
+        )
+    from leg_wear_monitor.cli.verbs.study import write_study_page
+
+    with _as_one_line(directory / "study.json", "study"):
+        return write_study_page(directory)
+
+
+def _replay(directory: Path) -> int:
+    source = directory / SUMMARY
+    with _as_one_line(source, "replay"):
+        page = page_of(json.loads(source.read_text(encoding="utf-8"), parse_constant=_refuse))
+    for path in write_directory(directory, {PAGE: page}):
+        click.echo(f"written: {path}")
+    return 0
+
+
+def _refuse(name: str) -> None:
+    raise ValueError(f"{name} is no JSON")
+
+
+@contextmanager
+def _as_one_line(source: Path, what: str) -> Iterator[None]:
+    """Data that a page cannot be made of is the file's fault: the run itself made one of what it wrote."""
+    try:
+        with warnings.catch_warnings():
+            warnings.simplefilter("error", RuntimeWarning)  # numpy would print it and go on
+            yield
+    except _MISMADE as error:
+        fault = f"is not what a {what} of this version writes ({type(error).__name__}: {error})"
+        raise ConfigError(str(source), "", fault) from error

@@ -1,0 +1,195 @@
+"""``leg-wear-monitor simulate``: the leg offline, ideal or with clearances."""
+
+import json
+import time
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+import click
+
+from leg_wear_monitor.cli.doubts import warn_of
+from leg_wear_monitor.cli.number import bounded, options_named
+from leg_wear_monitor.cli.output import check_directory, check_file, write_directory, write_file
+from leg_wear_monitor.cli.waiting import compilation, progress_bar
+
+if TYPE_CHECKING:
+    from leg_wear_monitor.dynamics.result import SimulationResult
+    from leg_wear_monitor.mechanism.spec import Mechanism
+
+# Spelled out, for --help shall not wait for numba; the tests compare them with the library's.
+MODELS, DEFAULT_MODEL = ("clearance", "full"), "clearance"
+NORMAL_LAWS = ("hertz", "hunt-crossley", "lankarani-nikravesh", "gonthier", "flores", "hu-guo")
+
+# a motion too short to take time, but through all of the code
+_WARM_UP_CYCLES, _WARM_UP_S = 1.0 / 256.0, 1.0e-9
+
+
+@click.command(short_help="The leg offline, ideal or with clearances.")
+@click.option(
+    "--mechanism",
+    metavar="FILE",
+    default="bionic_leg",
+    show_default=True,
+    help="A mechanism file, or the name of one that comes with the package.",
+)
+@click.option("--clearances", metavar="A,B|none", help="The loose joints.  [default: the mechanism's own]")
+@click.option(
+    "--clearance-m",
+    type=float,
+    callback=bounded("m", above=0.0),
+    metavar="M",
+    help="Radial clearance in metres.  [default: the mechanism's own]",
+)
+@click.option(
+    "--speed-rpm",
+    type=float,
+    callback=bounded("rpm"),
+    metavar="RPM",
+    help="Crank speed, negative for clockwise.  [default: the mechanism's own]",
+)
+@click.option(
+    "--cycles",
+    type=float,
+    callback=bounded(above=0.0),
+    metavar="N",
+    help="Gait cycles to count.  [default: 5]",
+)
+@click.option(
+    "--duration",
+    type=float,
+    callback=bounded("s", above=0.0),
+    metavar="S",
+    help="Time to count, in seconds, instead of cycles.",
+)
+@click.option(
+    "--skip-cycles",
+    type=float,
+    callback=bounded(at_least=0.0),
+    metavar="N",
+    help="Gait cycles to let pass before counting.  [default: 1; 0 with --duration]",
+)
+@click.option(
+    "--model", type=click.Choice(MODELS), help=f"Formulation of the motion.  [default: {DEFAULT_MODEL}]"
+)
+@click.option(
+    "--wear",
+    type=click.Choice(("on", "off")),
+    default="off",
+    show_default=True,
+    help="Whether wear opens the clearances as it goes; it is counted either way.",
+)
+@click.option(
+    "--normal-law",
+    type=click.Choice(NORMAL_LAWS),
+    metavar="NAME",
+    help=f"Normal contact law of all loose joints: {', '.join(NORMAL_LAWS)}.",
+)
+@click.option(
+    "--trace",
+    type=click.IntRange(min=0),
+    metavar="N",
+    default=0,
+    help="Keep N samples a cycle, for --json and, as a picture too, for --out.",
+)
+@click.option(
+    "--json",
+    "json_file",
+    type=click.Path(allow_dash=True, path_type=Path),
+    metavar="FILE",
+    help="Write the result as JSON; - for stdout, which then holds nothing else.",
+)
+@click.option(
+    "--out",
+    type=click.Path(path_type=Path),
+    metavar="DIR",
+    help="Write result.json and pictures of the leg and its worn bushings.",
+)
+def simulate(mechanism: str, json_file: Path | None, out: Path | None, **options: Any) -> None:
+    """Move the leg, ideal or with clearances, and say what forces and wear that makes."""
+    if options["cycles"] is not None and options["duration"] is not None:
+        raise click.UsageError("--cycles and --duration exclude each other")
+    from leg_wear_monitor.mechanism.loader import load_mechanism
+    from leg_wear_monitor.mechanism.plausible import doubts
+
+    leg = load_mechanism(mechanism)
+    to_stdout = json_file == Path("-")
+    if json_file is not None and not to_stdout:
+        check_file("--json", json_file)
+    if out is not None:
+        check_directory("--out", out)
+    with options_named():
+        result, wall_s = _run(leg, _keywords(**options))
+    warn_of(leg.source, doubts(leg))  # what fails names them itself, in its one line
+    record = _record(result, wall_s)
+    written = _write(record, leg, result, json_file, out)
+    if not to_stdout:
+        from leg_wear_monitor.cli.tables import print_result
+
+        print_result(record, result)
+        for path in written:
+            click.echo(f"written: {path}")
+
+
+def _keywords(clearances: str | None, wear: str, duration: float | None, **options: Any) -> dict[str, Any]:
+    """Arguments of the library's simulate; what was not asked for is left to the library."""
+    keywords = {"wear": wear == "on", "duration_s": duration, **options}
+    if clearances is not None:
+        names = [] if clearances.strip() == "none" else clearances.split(",")
+        keywords["clearances"] = [name.strip() for name in names]
+    return {name: value for name, value in keywords.items() if value is not None}
+
+
+def _run(leg: "Mechanism", keywords: dict[str, Any]) -> tuple["SimulationResult", float]:
+    """The result, and the time [s] it took once all was compiled."""
+    from leg_wear_monitor.dynamics.simulation import default_model, simulate
+    from leg_wear_monitor.mechanism.spec import SpeedDrive
+
+    span = ("cycles", "duration_s", "skip_cycles", "trace")
+    short = {name: value for name, value in keywords.items() if name not in span}
+    if isinstance(leg.drive, SpeedDrive):
+        short |= {"cycles": _WARM_UP_CYCLES, "skip_cycles": 0.0}
+    else:
+        short["duration_s"] = _WARM_UP_S
+    loose = keywords.get("clearances", leg.loose)
+    with compilation(keywords.get("model") or default_model(leg) if loose else "ideal"):
+        simulate(leg, **short)
+    with progress_bar("simulating") as progress:
+        began = time.perf_counter()
+        result = simulate(leg, **keywords, progress=progress)
+        return result, time.perf_counter() - began
+
+
+def _record(result: "SimulationResult", wall_s: float) -> dict[str, Any]:
+    """The object of interfaces.md: the result with the clock's figures before its parts."""
+    record = result.to_dict()
+    head = {name: record.pop(name) for name in ("mechanism", "model", "speed_rpm", "cycles")}
+    clock = {
+        "wall_s": wall_s,
+        "simulated_s": record.pop("simulated_s"),
+        "real_time_factor": result.simulated_s / wall_s,
+    }
+    return head | clock | record
+
+
+def _write(
+    record: dict[str, Any],
+    leg: "Mechanism",
+    result: "SimulationResult",
+    json_file: Path | None,
+    out: Path | None,
+) -> list[Path]:
+    """Write what was asked for, and give the files."""
+    if json_file is None and out is None:
+        return []
+    written: list[Path] = []
+    text = json.dumps(record, indent=1, allow_nan=False) + "\n"
+    if out is not None:
+        from leg_wear_monitor.report.figures.simulation import pictures
+
+        written += write_directory(out, {**pictures(leg, result), "result.json": text.encode()})
+    if json_file == Path("-"):
+        click.echo(text, nl=False)
+    elif json_file is not None:
+        write_file(json_file, text.encode())
+        written.append(json_file)
+    return written

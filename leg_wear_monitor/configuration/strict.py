@@ -1,0 +1,186 @@
+"""cattrs, made strict: a number is a number, a text a text, an unknown key an error; each fault one line."""
+
+import math
+import reprlib
+from collections.abc import Callable
+from typing import Any, get_args, get_origin
+
+import attrs
+import cattrs
+from cattrs.errors import ClassValidationError, ForbiddenExtraKeysError
+from cattrs.gen import make_dict_structure_fn
+
+from leg_wear_monitor.configuration.nearest import nearest
+from leg_wear_monitor.configuration.quantity import FieldError
+from leg_wear_monitor.errors import ConfigError
+
+MOST = 1.0e30  # in SI units: squares, and ratios to the smallest, stay finite
+
+_Hook = Callable[[Any, Any], Any]
+_FAULTS = (ClassValidationError, FieldError)
+
+
+def structure(value: Any, kind: Any, source: str, key: str) -> Any:
+    """Type ``kind`` from what a file holds under a key.
+
+    Raises
+    ------
+    ConfigError
+        Naming source, the key at fault, its value and what was expected.
+    """
+    try:
+        return _part(key, value, kind)
+    except FieldError as error:
+        raise ConfigError(source, error.key, error.fault) from error
+
+
+def choose(kind: Any, pick: Callable[[Any], tuple[Any, Any]]) -> None:
+    """Structure a kind as another one: for a value, ``pick`` gives that one and the value it takes."""
+
+    def hook(value: Any, _kind: Any) -> Any:
+        chosen, taken = pick(value)
+        return _converter.structure(taken, chosen)
+
+    _converter.register_structure_hook_func(lambda other: other == kind, hook)
+
+
+def mapping(value: Any) -> dict[str, Any]:
+    """Return the value, a mapping of texts; raises FieldError if it is not."""
+    if not isinstance(value, dict):
+        raise FieldError("", f"{shown(value)} is not a mapping of keys")
+    for key in value:
+        if not isinstance(key, str) or not key.isprintable():
+            raise FieldError("", f"the key {shown(key)} is not a text on one line")
+    return value
+
+
+def shown(value: Any) -> str:
+    """Value for a message: on one line, and not too long."""
+    return "nothing" if value is None else reprlib.repr(value)
+
+
+def _part(step: str, value: Any, kind: Any) -> Any:
+    """Structure a part of a file; whatever is wrong in it is told under its name."""
+    try:
+        return _converter.structure(value, kind)
+    except _FAULTS as error:
+        inner = _field_error(error)
+        raise FieldError(".".join(filter(None, (step, inner.key))), inner.fault) from error
+
+
+def _field_error(error: BaseException) -> FieldError:
+    """The first thing that is wrong; unknown keys come first, they may explain missing ones."""
+    if isinstance(error, FieldError):
+        return error
+    if isinstance(error, ForbiddenExtraKeysError):
+        return _unknown(min(error.extra_fields), [attribute.name for attribute in attrs.fields(error.cl)])
+    if not isinstance(error, ClassValidationError):
+        raise error
+    located, elsewhere = error.group_exceptions()
+    if elsewhere:
+        return _field_error(elsewhere[0])
+    inner, note = located[0]
+    return _of_attribute(inner, getattr(attrs.fields(error.cl), note.name))
+
+
+def _unknown(key: str, known: list[str]) -> FieldError:
+    near = nearest(key, known)
+    expected = f"did you mean {near}?" if near else f"expected one of {', '.join(known)}"
+    return FieldError(key, f"unknown key, {expected}")
+
+
+def _of_attribute(error: BaseException, attribute: "attrs.Attribute[Any]") -> FieldError:
+    """What is wrong with one attribute of a class, with its unit."""
+    unit = f" [{attribute.metadata['unit']}]" if attribute.metadata.get("unit") else ""
+    if isinstance(error, KeyError):
+        return FieldError(attribute.name, f"is missing, expected: {attribute.metadata['doc']}{unit}")
+    inner = _field_error(error)
+    name = "" if attribute.metadata.get("flat") else attribute.name
+    return FieldError(".".join(filter(None, (name, inner.key))), inner.fault + unit)
+
+
+# --- what is taken for what ---
+
+
+def _number(value: Any, _kind: Any) -> float:
+    if isinstance(value, bool) or not isinstance(value, int | float):
+        raise FieldError("", f"{shown(value)} is not a number")
+    try:
+        number = float(value)
+    except OverflowError:
+        number = math.inf
+    if not math.isfinite(number):
+        raise FieldError("", f"{shown(value)} is not a finite number")
+    if abs(number) > MOST:
+        raise FieldError("", f"{shown(value)} is larger than anything that is built, {MOST:g}")
+    return number
+
+
+def _integer(value: Any, _kind: Any) -> int:
+    if isinstance(value, bool) or not isinstance(value, int):
+        raise FieldError("", f"{shown(value)} is not a whole number")
+    return value
+
+
+def _flag(value: Any, _kind: Any) -> bool:
+    if not isinstance(value, bool):
+        raise FieldError("", f"{shown(value)} is not true or false")
+    return value
+
+
+def _text(value: Any, _kind: Any) -> str:
+    if not isinstance(value, str) or not value.isprintable():
+        raise FieldError("", f"{shown(value)} is not a text on one line")
+    return value
+
+
+def _optional_number(value: Any, kind: Any) -> float | None:
+    return None if value is None else _number(value, kind)
+
+
+def _strict_class(kind: type) -> _Hook:
+    inner: _Hook = make_dict_structure_fn(kind, _converter)
+    flat = next((a.name for a in attrs.fields(kind) if a.metadata.get("flat")), None)
+    own = {a.name for a in attrs.fields(kind)} - {flat}
+
+    def hook(value: Any, _kind: Any) -> Any:
+        given = mapping(value)
+        if flat:  # one attribute takes all keys that are no other's
+            rest = {key: entry for key, entry in given.items() if key not in own}
+            given = {key: entry for key, entry in given.items() if key in own} | {flat: rest}
+        return inner(given, kind)
+
+    return hook
+
+
+def _strict_mapping(kind: Any) -> _Hook:
+    item = get_args(kind)[1]
+    return lambda value, _: {name: _part(name, entry, item) for name, entry in mapping(value).items()}
+
+
+def _strict_tuple(kind: Any) -> _Hook:
+    items = get_args(kind)
+    what = {float: "numbers", str: "texts"}.get(items[0], "lists")
+    wanted = f"a list of {what}" if items[-1] is Ellipsis else f"a list of {len(items)} {what}"
+
+    def hook(value: Any, _kind: Any) -> tuple[Any, ...]:
+        if not isinstance(value, list) or (items[-1] is not Ellipsis and len(value) != len(items)):
+            raise FieldError("", f"{shown(value)} is not {wanted}")
+        return tuple(_converter.structure(entry, items[0]) for entry in value)
+
+    return hook
+
+
+def _generic(origin: Any) -> Callable[[Any], bool]:
+    return lambda kind: get_origin(kind) is origin
+
+
+_converter = cattrs.Converter(forbid_extra_keys=True, detailed_validation=True)
+_converter.register_structure_hook(float, _number)
+_converter.register_structure_hook(int, _integer)
+_converter.register_structure_hook(bool, _flag)
+_converter.register_structure_hook(str, _text)
+_converter.register_structure_hook(float | None, _optional_number)
+_converter.register_structure_hook_factory(attrs.has, _strict_class)
+_converter.register_structure_hook_factory(_generic(dict), _strict_mapping)
+_converter.register_structure_hook_factory(_generic(tuple), _strict_tuple)

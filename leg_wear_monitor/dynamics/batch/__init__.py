@@ -1,0 +1,1 @@
+"""Many clearance runs of one mechanism, in parallel."""

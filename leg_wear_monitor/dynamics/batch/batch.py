@@ -1,0 +1,169 @@
+"""Many independent legs in one call, across cores: what studies and forecasts are made of.
+
+A leg has a state and a tally of its own, and its compiled motion runs without the interpreter's lock. So
+threads are enough: they share the tables, start at once, and results do not depend on how many there are.
+"""
+
+import math
+import os
+from collections.abc import Callable, Sequence
+from concurrent.futures import Future, ThreadPoolExecutor, as_completed
+from threading import Event
+
+import numpy as np
+from numpy.typing import ArrayLike
+
+from leg_wear_monitor.dynamics.batch.leg import Leg, SharedTables, prepare_legs, share_tables
+from leg_wear_monitor.dynamics.clearance.run import ClearanceStepper
+from leg_wear_monitor.dynamics.ideal_result import ideal_result
+from leg_wear_monitor.dynamics.result import SimulationResult, drive_torque, joint_figures, toe_errors
+from leg_wear_monitor.dynamics.run.drive import steady_drive
+from leg_wear_monitor.dynamics.run.protocol import DONE, Setup, stop
+from leg_wear_monitor.dynamics.run.run_statistics import Tally, new_tally
+from leg_wear_monitor.errors import AssemblyError, ConfigError, SimulationError
+from leg_wear_monitor.mechanism.arrays import Floats
+from leg_wear_monitor.mechanism.ideal import TURN
+
+Outcome = SimulationResult | AssemblyError | SimulationError
+
+
+def advance_batch(
+    steppers: Sequence[ClearanceStepper],
+    polynomials: Sequence[Floats],
+    t_end: ArrayLike,
+    tallies: Sequence[Tally],
+    workers: int | None = None,
+) -> list[tuple[int, int]]:
+    """Advance many steppers, each to its own time, and add to its own tally.
+
+    Parameters
+    ----------
+    steppers : sequence of n ClearanceStepper
+        No two of one setup, whose surfaces they would both wear.
+    polynomials : sequence of n arrays (7,)
+        Motions of their cranks, as `ClearanceStepper.advance` takes them.
+    t_end : float or (n,) array, s
+    tallies : sequence of n Tally
+    workers : int, optional
+        Threads; as many as there are cores if not given.
+
+    Returns
+    -------
+    list of (status, k)
+        Of each stepper; one that had to stop does not keep the others from going on.
+
+    Raises
+    ------
+    ValueError
+        If the lengths differ, or a state or a tally is there twice.
+    """
+    for what in ([stepper.state.depth for stepper in steppers], [tally.time for tally in tallies]):
+        if len({id(array) for array in what}) < len(what):
+            raise ValueError("two legs of a batch share their surfaces or their tally")
+    times = np.broadcast_to(np.asarray(t_end, dtype=float), len(steppers)).tolist()
+    jobs = list(zip(steppers, polynomials, times, tallies, strict=True))
+    with ThreadPoolExecutor(workers or os.cpu_count()) as pool:
+        return list(pool.map(lambda job: job[0].advance(*job[1:]), jobs))
+
+
+def simulate_batch(
+    legs: Sequence[Leg],
+    *,
+    cycles: float = 5.0,
+    skip_cycles: float = 1.0,
+    workers: int | None = None,
+    progress: Callable[[float], None] | None = None,
+) -> list[Outcome]:
+    """Move many legs in clearance coordinates and say what their clearances do.
+
+    Parameters
+    ----------
+    legs : sequence of Leg
+    cycles, skip_cycles : float
+        Gait cycles of each leg that are counted, and those before.
+    workers : int, optional
+        Threads; as many as there are cores if not given. Results do not depend on it.
+    progress : callable, optional
+        Called with the share of the legs that are done.
+
+    Returns
+    -------
+    list of SimulationResult, AssemblyError or SimulationError
+        In the order of the legs; the error of a leg that cannot turn or whose motion diverges stands in its
+        place. Results hold no energy balance, no single impacts and no trace.
+
+    Raises
+    ------
+    ConfigError
+        For values that cannot be.
+    """
+    if not (math.isfinite(cycles) and cycles > 0.0):
+        raise ConfigError("cycles", "", f"{cycles:g} is not above 0")
+    if not (math.isfinite(skip_cycles) and skip_cycles >= 0.0):
+        raise ConfigError("skip-cycles", "", f"{skip_cycles:g} is below 0 cycles")
+    setups, stopped = prepare_legs(legs), Event()
+    with ThreadPoolExecutor(workers or os.cpu_count()) as pool:
+        try:
+            futures = {
+                i: pool.submit(_simulate, legs[i], setup, tables, cycles, skip_cycles, stopped)
+                for i, setup, tables in share_tables(setups)
+            }
+            for done, future in enumerate(as_completed(futures.values()), 1):
+                _outcome(future)  # a fault that is not the leg's own is raised here, at once
+                if progress:
+                    progress(done / len(futures))
+        finally:  # an interrupt ends the legs that run, and not only the wait for them
+            stopped.set()
+            pool.shutdown(cancel_futures=True)
+    return [
+        setup if isinstance(setup, AssemblyError) else _outcome(futures[i]) for i, setup in enumerate(setups)
+    ]
+
+
+def _outcome(future: Future[SimulationResult]) -> SimulationResult | SimulationError:
+    try:
+        return future.result()
+    except SimulationError as error:
+        return error
+
+
+def _simulate(
+    leg: Leg, setup: Setup, tables: SharedTables, cycles: float, skip_cycles: float, stopped: Event
+) -> SimulationResult:
+    """One leg from its start to its figures."""
+    if not setup.loose:
+        return ideal_result(setup, cycles, 0)
+    stepper = ClearanceStepper(setup, tables=tables.get())
+    leg.start(stepper)
+    joints = len(setup.linkage.mechanism.joints)
+    _turn(leg, setup, stepper, skip_cycles, new_tally(joints), stopped)
+    tally, depth = new_tally(joints), setup.surfaces.depth.copy()
+    _turn(leg, setup, stepper, skip_cycles + cycles, tally, stopped)
+    return SimulationResult(
+        mechanism=setup.linkage.mechanism.name,
+        model="clearance",
+        speed_rpm=60.0 * setup.speed / TURN,
+        cycles=cycles,
+        simulated_s=(skip_cycles + cycles) * TURN / abs(setup.speed),
+        drive_torque_nm=drive_torque(tally),
+        energy_j=None,
+        toe=toe_errors(tally) if setup.linkage.mechanism.toe else None,
+        joints=joint_figures(setup, tally, setup.surfaces.depth - depth, cycles),
+        impacts={},
+        trace=None,
+        loose=setup.loose,
+        surfaces=setup.surfaces,
+    )
+
+
+def _turn(
+    leg: Leg, setup: Setup, stepper: ClearanceStepper, cycles: float, tally: Tally, stopped: Event
+) -> None:
+    """Turn the crank until so many cycles since the start are done, or others have asked to stop."""
+    polynomial, period = steady_drive(leg.crank_angle_rad, setup.speed), TURN / abs(setup.speed)
+    for cycle in [*np.arange(stepper.time / period + 1.0, cycles), cycles]:
+        if stopped.is_set():
+            return
+        status, k = stepper.advance(polynomial, cycle * period, tally)
+        if status != DONE:
+            raise stop(setup, status, k, stepper.time)

@@ -1,0 +1,141 @@
+"""The legs of a batch, made ready: where each starts, and what it shares with others."""
+
+import math
+from collections.abc import Iterator, Sequence
+from threading import Lock
+
+import attrs
+import numpy as np
+
+from leg_wear_monitor.dynamics.clearance.run import ClearanceStepper, needs_speed
+from leg_wear_monitor.dynamics.clearance.tables import ClearanceTables, build_tables
+from leg_wear_monitor.dynamics.run.protocol import Setup
+from leg_wear_monitor.dynamics.simulation import prepare
+from leg_wear_monitor.errors import AssemblyError, ConfigError
+from leg_wear_monitor.mechanism.ideal import TURN
+from leg_wear_monitor.mechanism.spec import Mechanism, SpeedDrive
+from leg_wear_monitor.wear.surfaces import fresh_surfaces
+
+
+@attrs.frozen(kw_only=True, eq=False)
+class Leg:
+    """One leg of a batch; the fields that `simulate` has too mean the same.
+
+    Attributes
+    ----------
+    mechanism : Mechanism
+    clearances : sequence of str, optional
+    clearance_m, speed_rpm : float, optional
+    normal_law : str, optional
+    wear : bool
+    crank_angle_rad : float
+        Where the crank starts; cycles are counted from there.
+    perturb_m : float
+        Journals start anywhere up to this far from their bushings' centres, uniformly over the disc.
+    seed : int
+        Of where they start.
+    """
+
+    mechanism: Mechanism
+    clearances: Sequence[str] | None = None
+    clearance_m: float | None = None
+    speed_rpm: float | None = None
+    normal_law: str | None = None
+    wear: bool = False
+    crank_angle_rad: float = 0.0
+    perturb_m: float = 0.0
+    seed: int = 0
+
+    def prepare(self) -> Setup:
+        """Make the leg ready to run; raises ConfigError for values that cannot be, AssemblyError."""
+        setup = prepare(
+            self.mechanism,
+            clearances=self.clearances,
+            clearance_m=self.clearance_m,
+            speed_rpm=self.speed_rpm,
+            wear=self.wear,
+            normal_law=self.normal_law,
+        )
+        if not isinstance(self.mechanism.drive, SpeedDrive):
+            raise needs_speed(self.mechanism)
+        smallest = setup.contacts.clearance.min(initial=math.inf)
+        if not 0.0 <= self.perturb_m <= smallest:
+            raise ConfigError(
+                "perturb_m", "", f"{self.perturb_m} m is not from 0 to the smallest clearance, {smallest:g} m"
+            )
+        return setup
+
+    def start(self, stepper: ClearanceStepper) -> None:
+        """Put a stepper of this leg where the leg starts."""
+        stepper.init(self.crank_angle_rad, stepper.state.drive[1])
+        chance = np.random.default_rng(self.seed)
+        joints = len(stepper.state.approach)
+        away = self.perturb_m * np.sqrt(chance.random(joints))
+        direction = TURN * chance.random(joints)
+        stepper.state.e[0::2] = away * np.cos(direction)
+        stepper.state.e[1::2] = away * np.sin(direction)
+
+
+def prepare_legs(legs: Sequence[Leg]) -> list[Setup | AssemblyError]:
+    """Every leg ready to run, or the error of one that cannot turn.
+
+    Legs that differ only in where they start are prepared once; each has surfaces of its own.
+
+    Raises
+    ------
+    ConfigError
+        For values that cannot be.
+    """
+    known: dict[str, Setup | AssemblyError] = {}
+    setups = []
+    for leg in legs:
+        key = repr(attrs.evolve(leg, crank_angle_rad=0.0, seed=0))
+        if key not in known:
+            try:
+                known[key] = leg.prepare()
+            except AssemblyError as error:
+                known[key] = error
+        setup = known[key]
+        if isinstance(setup, Setup):
+            setup = attrs.evolve(setup, surfaces=fresh_surfaces(setup.contacts, leg.wear))
+        setups.append(setup)
+    return setups
+
+
+class SharedTables:
+    """Tables of legs that share them: made when the first of these legs runs, gone with the last.
+
+    Parameters
+    ----------
+    setup : Setup
+        Of any of these legs.
+    """
+
+    def __init__(self, setup: Setup) -> None:
+        self._lock, self._setup = Lock(), setup
+        self._tables: ClearanceTables | None = None
+
+    def get(self) -> ClearanceTables:
+        """The tables; whoever asks first makes them, and others wait."""
+        with self._lock:
+            if self._tables is None:
+                self._tables = build_tables(self._setup.linkage, self._setup.contacts)
+            return self._tables
+
+
+def share_tables(setups: Sequence[Setup | AssemblyError]) -> Iterator[tuple[int, Setup, SharedTables]]:
+    """Legs that can run, with their index; those that share tables come one after the other.
+
+    So only as many tables exist at a time as there are legs that run.
+    """
+    groups: dict[object, list[tuple[int, Setup]]] = {}
+    for i, setup in enumerate(setups):
+        if isinstance(setup, Setup):
+            mechanism, contacts = setup.linkage.mechanism, setup.contacts
+            bare = repr(attrs.evolve(mechanism, clearances={}, loose=()))
+            key = bare, setup.loose, contacts.bushing_radius.tobytes(), contacts.clearance.tobytes()
+            groups.setdefault(key, []).append((i, setup))
+    for group in groups.values():
+        tables = SharedTables(group[0][1])
+        for i, setup in group:
+            yield i, setup, tables

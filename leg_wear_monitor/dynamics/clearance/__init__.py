@@ -1,0 +1,1 @@
+"""Clearance coordinates: the real-time formulation."""

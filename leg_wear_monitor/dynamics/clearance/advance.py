@@ -1,0 +1,276 @@
+"""The real-time motion: interval by interval, sub-stepped inside, each impact met where it begins.
+
+The state exists at whole intervals of time. Inside one, or each of its parts where the linkage moves fast,
+the tables are held at its middle, and steps adapt to a local error (Rosenbrock, order 2); so the state does
+not depend on how the time axis was cut into calls, and a call costs at most its intervals times a bounded
+number of steps.
+"""
+
+import math
+
+from leg_wear_monitor.dynamics.clearance.contact import A0, E0, F_T, V0, accelerate_clearances
+from leg_wear_monitor.dynamics.clearance.model import ACCELERATION, ANGLE, SPEED, blend, crank_between
+from leg_wear_monitor.dynamics.clearance.outputs import (
+    drive_torque,
+    outside_power,
+    reactions,
+    sudden_impulse,
+    toe_deviation,
+)
+from leg_wear_monitor.dynamics.clearance.start import load_state, sample_start
+from leg_wear_monitor.dynamics.clearance.step import (
+    gather_wear,
+    integrate_joints,
+    shift_start,
+    try_step,
+    wear_off,
+    wear_what_turned,
+)
+from leg_wear_monitor.dynamics.joint.contact_event import (
+    DELTA,
+    F_N,
+    NEVER,
+    first_touch,
+    update_contacts,
+)
+from leg_wear_monitor.dynamics.joint.joint_contact import contact_energy
+from leg_wear_monitor.dynamics.run.drive import drive_at
+from leg_wear_monitor.dynamics.run.protocol import DONE, INVALID_DRIVE, PUSHED_THROUGH, STEP_TOO_SMALL
+from leg_wear_monitor.dynamics.run.run_statistics import (
+    FORCE,
+    FORCE_SQUARED,
+    JOINT_RATES,
+    POWER,
+    TORQUE,
+    TORQUE_ERROR,
+    TORQUE_SQUARED,
+    bin_of,
+)
+from leg_wear_monitor.kernel import copy_array, entry, kernel
+from leg_wear_monitor.wear.surfaces import Surfaces
+
+RENEWAL = 2  # intervals between two looks at the reactions of the ideal joints
+WEARING = 8  # intervals after which wear is taken off that has not been yet
+
+MOST_TRIALS = 20000  # steps tried in an interval before it is given up
+
+_SHORTEST_STEP = 1.0e-13  # s
+# of the drive at one end of a step: torque [N m], its part without e'', power of loads [W]
+WHOLE, SMOOTH, OUTSIDE = 0, 1, 2
+
+_FASTEST = 1.0e4  # rad/s, and its change over an interval: a crank beyond is not a leg's
+
+
+@entry
+def advance_clearances(model, feeds_back, state, polynomial, t_end, tally, work):
+    """Advance the state by all whole intervals up to t_end [s] and add to the tally.
+
+    ``polynomial`` (7,) is the crank's motion from the last time reached to t_end.
+
+    Returns
+    -------
+    status, k
+        DONE, or why it stopped and the loose joint concerned (-1 if none). The state is then that of the
+        last whole interval, finite and good to go on from.
+    """
+    surfaces = Surfaces(state.depth, feeds_back)
+    while (state.intervals[0] + 1.0) * model.interval <= t_end * (1.0 + 1.0e-12) + 1.0e-15:
+        copy_array(state.motion, work.backup)
+        status, k = _interval(model, surfaces, state, polynomial, tally, work)
+        if status != DONE:
+            copy_array(state.pending, work.pending)  # what has worn off already must not be pending again
+            copy_array(work.backup, state.motion)
+            copy_array(work.pending, state.pending)
+            return status, k
+    return DONE, -1
+
+
+@kernel
+def _interval(model, surfaces, state, polynomial, tally, work):
+    """One interval, from whole instant to whole instant; in parts where the linkage moves fast."""
+    i, _ = blend(model.tables.parts.shape[0], state.drive[ANGLE])
+    parts = model.tables.parts[i]
+    for part in range(parts):
+        begin, end = state.intervals[0] + part / parts, state.intervals[0] + (part + 1.0) / parts
+        status, k = _part(
+            model, surfaces, state, polynomial, begin * model.interval, end * model.interval, tally, work
+        )
+        if status != DONE:
+            return status, k
+    state.intervals[0] += 1.0
+    _finish(model, surfaces, state, tally, work)
+    return DONE, -1
+
+
+@kernel
+def _part(model, surfaces, state, polynomial, begin, end, tally, work):
+    """A part of an interval [s] under tables that are held."""
+    length = end - begin
+    copy_array(state.drive, work.crank)
+    drive_at(polynomial, end, state.drive)
+    angle, speed, acceleration = crank_between(work.crank, state.drive, length)
+    if not (abs(speed) < _FASTEST and abs(acceleration) * length < _FASTEST):
+        return INVALID_DRIVE, -1
+    load_state(model, surfaces, state, angle, speed, acceleration, 0.5 * length, work)
+    turned = -0.5 * length * speed  # the tables are those of the middle
+    sample_start(model, surfaces, state, turned, begin, tally, work)
+    status, k = _steps(model, surfaces, state, begin, length, tally, work)
+    if status == DONE:
+        for i in range(state.e.shape[0]):
+            state.e[i], state.v[i] = work.x[E0, i], work.x[V0, i]
+    return status, k
+
+
+@kernel
+def _steps(model, surfaces, state, begin, length, tally, work):
+    """All steps of a part."""
+    x, now, start, end, approach = work.x, work.now, work.start, work.end, state.approach
+    contacts = model.contacts
+    done, trials, cut = 0.0, 0, NEVER
+    speed = now.speed[0]
+    _look_at_drive(now, x, start, work.drive_start, tally)
+    while done < length:
+        left = length - done
+        h = min(state.step[0], left)
+        if h < left < 2.0 * h:
+            h = 0.5 * left
+        if cut < NEVER:
+            h = cut
+        turned = speed * (done + h - 0.5 * length)
+        error = try_step(model, surfaces, approach, h, turned, now, work.system, x, start, end)
+        trials += 1
+        tally.steps[0] += 1
+        if not error <= 1.0:
+            state.step[0] = h * max(0.2, 0.9 * error ** (-1.0 / 3.0)) if error < 1.0e9 else 0.1 * h
+            cut = NEVER
+            if state.step[0] < _SHORTEST_STEP or trials > MOST_TRIALS:
+                return STEP_TOO_SMALL, _pushed_through(contacts.bushing_radius, end)
+            continue
+        share = first_touch(approach, h, start, end)
+        if share < 1.0 and share * h > _SHORTEST_STEP and trials <= MOST_TRIALS:
+            cut = share * h
+            continue
+        pushed = _pushed_through(contacts.bushing_radius, end)
+        if pushed >= 0:
+            return PUSHED_THROUGH, pushed
+        if cut == NEVER:
+            state.step[0] = h * min(3.0, 0.9 * max(error, 1.0e-6) ** (-1.0 / 3.0))
+        cut = NEVER
+        _take(model, surfaces, state, begin + done, h, turned, tally, work)
+        done = length if h >= left * (1.0 - 1.0e-9) else done + h
+    return DONE, -1
+
+
+@kernel
+def _take(model, surfaces, state, t, h, turned, tally, work):
+    """Take the trial step of length h [s] from time t: sums, wear, contacts; make its end the next start.
+
+    ``turned`` [rad] is by how much the crank is then beyond the angle of the tables.
+    """
+    x, now, start, end, contacts = work.x, work.now, work.start, work.end, model.contacts
+    tally.steps[1] += 1
+    integrate_joints(model.law, state.approach, h, start, end, work.added)
+    gather_wear(work.added, start, end, state.pending)
+    for k in range(work.added.shape[0]):
+        for r in range(JOINT_RATES):
+            tally.integral[contacts.joint[k], r] += work.added[k, r]
+    update_contacts(
+        contacts.joint, contacts.speed_floor, t, h, start, end,
+        state.approach, state.recent, tally.peak, tally.impact, tally.impacts,
+    )  # fmt: skip
+    shift_start(now, x)
+    copy_array(end, start)
+    tally.worn_energy[0] += wear_what_turned(
+        contacts, surfaces, state.approach, start, now, turned, state.pending, work.weight
+    )
+    _look_at_drive(now, x, start, work.drive_end, tally)
+    toe_deviation(now, x, tally.response)
+    first, last = work.drive_start, work.drive_end
+    impulse = 0.5 * h * (first[SMOOTH] + last[SMOOTH]) + sudden_impulse(now, x)
+    tally.drive_integral[TORQUE] += impulse
+    tally.drive_integral[TORQUE_SQUARED] += 0.5 * h * (first[WHOLE] ** 2 + last[WHOLE] ** 2)
+    tally.drive_integral[POWER] += impulse * now.speed[0] + 0.5 * h * (first[OUTSIDE] + last[OUTSIDE])
+    copy_array(last, first)
+
+
+@kernel
+def _look_at_drive(now, x, sample, out_drive, tally):
+    """Drive torque, its part without the eccentricities' accelerations, and the power of loads, (3,)."""
+    torque, sudden = drive_torque(now, x, sample)
+    out_drive[WHOLE], out_drive[SMOOTH], out_drive[OUTSIDE] = torque, torque - sudden, outside_power(now, x)
+    tally.drive_range[0] = min(tally.drive_range[0], torque)
+    tally.drive_range[1] = max(tally.drive_range[1], torque)
+    tally.response[TORQUE_ERROR] = max(tally.response[TORQUE_ERROR], abs(torque - now.torque_0[0]))
+
+
+@kernel
+def _pushed_through(bushing_radius, sample):
+    """First loose joint whose journal is pushed further than a tenth of the bushing's radius, else -1."""
+    for k in range(sample.shape[0]):
+        if not sample[k, DELTA] < 0.1 * bushing_radius[k]:
+            return k
+    return -1
+
+
+@kernel
+def _finish(model, surfaces, state, tally, work):
+    """At the end of an interval: wear, distributions, and the reactions of the ideal joints."""
+    joint, now, sample, interval = model.contacts.joint, work.now, work.start, model.interval
+    count = int(state.intervals[0])
+    here = 0.5 * interval * now.speed[0]
+    amid = (1 - WEARING) * here
+    tally.time[0] += interval
+    for k in range(state.approach.shape[0]):
+        if (count + k) % WEARING == 0:
+            tally.worn_energy[0] += wear_off(
+                model.contacts, surfaces, k, sample, now, here, amid, state.pending, work.weight
+            )
+        force = math.sqrt(sample[k, F_N] ** 2 + sample[k, F_T] ** 2)
+        tally.force_time[joint[k], bin_of(force)] += interval
+    torque = work.drive_start[WHOLE]
+    tally.torque_time[1 if torque > 0.0 else 0, bin_of(abs(torque))] += interval
+    if count % RENEWAL == 0:
+        reactions(model.tables, state.drive[ANGLE], now, work.x, sample, work.by, work.reaction)
+        _add_reactions(model.tables.reaction_joint, work.reaction, RENEWAL * interval, tally)
+
+
+@kernel
+def _add_reactions(joints, reaction, weight, tally):
+    """Add the reactions of the ideal joints, which stand for a time ``weight`` [s]; rows as in the tables."""
+    row = 1
+    while row < joints.shape[0]:
+        joint = joints[row]
+        squared = reaction[row] ** 2 + reaction[row + 1] ** 2
+        force = math.sqrt(squared)
+        tally.integral[joint, FORCE] += weight * force
+        tally.integral[joint, FORCE_SQUARED] += weight * squared
+        tally.peak[joint] = max(tally.peak[joint], force)
+        tally.force_time[joint, bin_of(force)] += weight
+        row += 2
+
+
+@entry
+def observe(model, feeds_back, state, work):
+    """Look at the leg where the state stands, and leave the state as it is.
+
+    Fills the samples ``start``, ``reaction`` and ``toe`` of the work arrays; returns the elastic energy of
+    the contacts [J].
+    """
+    surfaces, now, x = Surfaces(state.depth, feeds_back), work.now, work.x
+    copy_array(state.motion, work.backup)
+    angle, speed = state.drive[ANGLE], state.drive[SPEED]
+    load_state(model, surfaces, state, angle, speed, state.drive[ACCELERATION], 0.0, work)
+    accelerate_clearances(model, surfaces, state.approach, now, 0.0, x, E0, V0, A0, work.start)
+    copy_array(work.backup, state.motion)
+    reactions(model.tables, angle, now, x, work.start, work.by, work.reaction)
+    work.reaction[0] = drive_torque(now, x, work.start)[0]
+    d = x.shape[1]
+    for i in range(2):
+        work.toe[i] = now.toe[i, 0]
+        for j in range(d):
+            work.toe[i] += now.toe[i, 1 + j] * x[E0, j]
+    energy = 0.0
+    for k in range(state.approach.shape[0]):
+        ex, ey = state.e[2 * k], state.e[2 * k + 1]
+        energy += contact_energy(model.contacts, surfaces, k, ex, ey, now.angle[k, 0], now.angle[k, 1])
+    return energy

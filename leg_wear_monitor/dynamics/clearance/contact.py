@@ -1,0 +1,125 @@
+"""Contact forces in the loose joints, and the acceleration they make, in clearance coordinates.
+
+The hot path: plain arrays indexed in place, since views and calls per joint would cost more than the laws.
+"""
+
+import math
+
+import numpy as np
+
+from leg_wear_monitor.contact.arrays import ContactArrays
+from leg_wear_monitor.contact.friction import friction_force
+from leg_wear_monitor.contact.geometry import journal_contact
+from leg_wear_monitor.contact.normal import damped_force, elastic_force
+from leg_wear_monitor.dynamics.joint.contact_event import DELTA, DELTA_DOT, EX, EY, F_N, SAMPLE, VX, VY
+from leg_wear_monitor.dynamics.joint.joint_contact import penetration, stiffness_at
+from leg_wear_monitor.kernel import kernel
+from leg_wear_monitor.mechanism.arrays import Floats
+
+# a sample of a loose joint goes on with: unit normal, friction force [N], slip speed [m/s], derivative of
+# the normal force by the penetration's rate [N s/m], its elastic part [N], the share of the penetration's
+# rate that the bodies' turning makes, by the crank's speed [m/rad], and the contact stiffness
+# there [N/m^1.5]
+NX, NY, F_T, SLIP, DAMPING, ELASTIC, CAM, HERTZ = range(SAMPLE, SAMPLE + 8)
+COLUMNS = SAMPLE + 8
+
+# a direction near which angles need no arc tangent: its cosine, sine and angle [rad]
+TO_X, TO_Y, TO_ANGLE = range(3)
+
+# the laws of a joint: hysteresis factor, friction coefficient, ramp, code of the friction law, and the
+# contact stiffness of fresh surfaces [N/m^1.5]
+HYSTERESIS_FACTOR, FRICTION_COEFFICIENT, RAMP_0, RAMP_1, FRICTION_LAW, FRESH_STIFFNESS = range(6)
+
+# rows of the step's vectors (d,): eccentricities, rates and accelerations at its start (0), between its
+# stages (M) and at its end (1); the acceleration that is not contact; the stages' slopes; right-hand sides;
+# the change of the rates in the last step; what the rates have to be multiplied by in the drive torque
+E0, V0, A0, EM, VM, E1, V1, A1, DRIFT, K1E, K1V, K2E, K2V, RE, RV, DV, BY_V = range(17)
+VECTORS = 17
+
+_NEAR = 0.1  # sine of an angle for which the arc sine's series is good to 3e-11 rad
+
+
+def contact_laws(contacts: ContactArrays) -> Floats:
+    """Laws of the loose joints (k, 6) in one array."""
+    stiffness = [
+        stiffness_at(contacts, k, radius, radius - contacts.clearance[k])
+        for k, radius in enumerate(contacts.bushing_radius)
+    ]
+    return np.column_stack([contacts.hysteresis, contacts.friction, contacts.friction_law, stiffness])
+
+
+@kernel
+def take_directions(x, out_toward):
+    """Directions (k, 3) of the eccentricities at row E0."""
+    for k in range(out_toward.shape[0]):
+        ex, ey = x[E0, 2 * k], x[E0, 2 * k + 1]
+        length = math.sqrt(ex * ex + ey * ey)
+        out_toward[k, TO_X] = ex / length if length > 0.0 else 1.0
+        out_toward[k, TO_Y] = ey / length if length > 0.0 else 0.0
+        out_toward[k, TO_ANGLE] = math.atan2(ey, ex)
+
+
+@kernel
+def direction_of(ex, ey, k, toward):
+    """Angle [rad] of an eccentricity of joint k, by the direction it had lately if that is near."""
+    to_x, to_y = toward[k, TO_X], toward[k, TO_Y]
+    across, along = to_x * ey - to_y * ex, to_x * ex + to_y * ey
+    if along > 0.0 and abs(across) < _NEAR * along:
+        s = across / math.sqrt(ex * ex + ey * ey)
+        square = s * s
+        return toward[k, TO_ANGLE] + s * (
+            1.0 + square * (1.0 / 6.0 + square * (3.0 / 40.0 + square * (15.0 / 336.0)))
+        )
+    return math.atan2(ey, ex)
+
+
+@kernel
+def accelerate_clearances(model, surfaces, approach, now, turned, x, at_e, at_v, out_a, out_sample):
+    """Accelerations of the eccentricities with all contact forces; samples the joints.
+
+    approach (k,); ``now`` the tables; ``turned`` [rad] by how much the crank is beyond their angle; x
+    (VECTORS, d) with eccentricities and rates in rows at_e and at_v, the result in row out_a; out_sample
+    (k, COLUMNS).
+    """
+    contacts, law, d, speed = model.contacts, model.law, x.shape[1], now.speed[0]
+    inverse_mass, lever, response = now.inverse_mass, now.lever, now.lever_response
+    for i in range(d):
+        x[out_a, i] = x[DRIFT, i]
+    for k in range(approach.shape[0]):
+        ex, ey, vx, vy = x[at_e, 2 * k], x[at_e, 2 * k + 1], x[at_v, 2 * k], x[at_v, 2 * k + 1]
+        cam, hertz = 0.0, law[k, FRESH_STIFFNESS]
+        if surfaces.feeds_back:
+            turn_b, turn_j = now.turn[k, 0], now.turn[k, 1]
+            angle_b, angle_j = now.angle[k, 0] + turn_b * turned, now.angle[k, 1] + turn_j * turned
+            direction = direction_of(ex, ey, k, now.toward)
+            delta, nx, ny, bushing, journal, slope_b, slope_j = penetration(
+                contacts, surfaces, k, ex, ey, direction, angle_b, angle_j
+            )
+            cam = slope_b * turn_b + slope_j * turn_j
+            if delta > 0.0:
+                hertz = stiffness_at(contacts, k, bushing, journal)
+        else:
+            delta, nx, ny = journal_contact(ex, ey, contacts.clearance[k])
+        delta_dot = nx * vx + ny * vy + cam * speed
+        f_n, f_t, slip, elastic, damping = 0.0, 0.0, 0.0, 0.0, 0.0
+        if delta > 0.0 and approach[k] > 0.0:
+            elastic = elastic_force(hertz, delta)
+            loss = law[k, HYSTERESIS_FACTOR] / approach[k]
+            f_n = damped_force(elastic, loss, delta_dot)
+            if f_n > 0.0:
+                damping = elastic * loss
+                slip = nx * vy - ny * vx + now.lever_drive[k] * speed
+                for i in range(d):
+                    slip += lever[k, i] * x[at_v, i]
+                mu, code = law[k, FRICTION_COEFFICIENT], law[k, FRICTION_LAW]
+                f_t = friction_force(code, mu, law[k, RAMP_0], law[k, RAMP_1], f_n, slip)
+                fx, fy = -f_n * nx - f_t * ny, -f_n * ny + f_t * nx
+                row = 2 * k
+                for i in range(d):
+                    pushed = inverse_mass[row, i] * fx + inverse_mass[row + 1, i] * fy
+                    x[out_a, i] += pushed + response[k, i] * f_t
+        out_sample[k, EX], out_sample[k, EY], out_sample[k, VX], out_sample[k, VY] = ex, ey, vx, vy
+        out_sample[k, F_N], out_sample[k, DELTA], out_sample[k, DELTA_DOT] = f_n, delta, delta_dot
+        out_sample[k, NX], out_sample[k, NY], out_sample[k, F_T], out_sample[k, SLIP] = nx, ny, f_t, slip
+        out_sample[k, DAMPING], out_sample[k, ELASTIC] = damping, elastic
+        out_sample[k, CAM], out_sample[k, HERTZ] = cam, hertz

@@ -1,0 +1,246 @@
+"""The leg in clearance coordinates: its model, its state, its tables at the present crank angle."""
+
+import math
+from typing import NamedTuple
+
+import numpy as np
+
+from leg_wear_monitor.contact.arrays import ContactArrays
+from leg_wear_monitor.dynamics.clearance.contact import COLUMNS, TO_ANGLE, VECTORS
+from leg_wear_monitor.dynamics.clearance.layout import motion_shapes, views
+from leg_wear_monitor.dynamics.clearance.rosenbrock import ContactSystem, contact_system
+from leg_wear_monitor.dynamics.clearance.tables import ClearanceTables
+from leg_wear_monitor.dynamics.run.run_statistics import JOINT_RATES
+from leg_wear_monitor.kernel import kernel
+from leg_wear_monitor.mechanism.arrays import Floats
+
+ANGLE, SPEED, ACCELERATION = 0, 1, 2
+
+
+class ClearanceModel(NamedTuple):
+    """What does not change during a run.
+
+    ``interval`` [s] between the instants at which the tables are taken and the drive is asked: the state
+    exists at whole numbers of them. ``tolerance`` (2,) local error allowed in a step, of eccentricities
+    [m] and of their rates [m/s]; ``law`` (k, 6) as `contact_laws` gives them; ``damped`` 1 with dampers.
+    """
+
+    contacts: ContactArrays
+    tables: ClearanceTables
+    interval: float
+    tolerance: Floats
+    law: Floats
+    damped: int
+
+
+class ClearanceState(NamedTuple):
+    """All that a continuation needs; snapshot and restore are copies of ``motion`` and ``depth``.
+
+    ``motion`` (s,) holds all but the surfaces, the rest are named views of it: ``intervals`` (1,) done
+    since time 0; ``e`` and ``v`` (d,) eccentricities [m] and rates; ``drive`` (3,) angle, speed and
+    acceleration of the crank; ``step`` (1,) next step to try [s]; ``approach`` (k,) approach speed of each
+    joint in contact, 0 for the others; ``recent`` (k, 4) its last two samples of time and normal force;
+    ``pending`` (k, 4) the Archard integral not yet
+    worn off [J], and the same times the normal and the eccentricity it acted at. ``depth`` (k, 2, N) is
+    the wear of bushing and journal [m].
+    """
+
+    depth: Floats
+    motion: Floats
+    intervals: Floats
+    e: Floats
+    v: Floats
+    drive: Floats
+    step: Floats
+    approach: Floats
+    recent: Floats
+    pending: Floats
+
+
+class Now(NamedTuple):
+    """Tables at the present crank angle: ``row`` (w,) of the table ``motion`` and its parts, `motion_shapes`.
+
+    Those that change with e are at the eccentricities in the middle of the part of an interval. ``speed``
+    (2,) and acceleration of the crank. At all these: ``force`` (d,) without contact at rest and ``bare``
+    (d,) its acceleration, ``drift`` (d, d) that by e', ``lever_response`` (k, d) that by the friction force
+    in each joint; the drive torque at rest is ``torque_0`` (1,), its part by e' is ``torque_by_v`` (d,),
+    that by e ``torque_by_e`` (d,). ``toward`` (k, 3) the directions of the eccentricities at the interval's
+    start.
+    """
+
+    row: Floats
+    speed: Floats
+    force: Floats
+    bare: Floats
+    drift: Floats
+    lever_response: Floats
+    torque_0: Floats
+    torque_by_v: Floats
+    torque_by_e: Floats
+    toward: Floats
+    inverse_mass: Floats
+    free: Floats
+    torque_a: Floats
+    torque_v: Floats
+    coriolis: Floats
+    lever: Floats
+    lever_drive: Floats
+    torque: Floats
+    torque_e: Floats
+    torque_vv: Floats
+    angle: Floats
+    turn: Floats
+    toe: Floats
+    load_power: Floats
+    viscous: Floats
+    damper: Floats
+
+
+class ClearanceWork(NamedTuple):
+    """Room for an interval.
+
+    The tables ``now``; samples of the joints at a step's ``start`` and ``end`` (k, COLUMNS); ``x``
+    (VECTORS, d) the vectors of a step; ``weight`` (N,) of the wear on an arc; ``by`` (c,) what the reactions'
+    table is multiplied by; ``reaction`` (r,) and ``toe`` (2,) as observed; ``added`` (k, JOINT_RATES) to the
+    joints' integrals in a step; ``drive_start`` and ``drive_end`` (3,) the torque at its ends; ``backup`` the
+    motion that a failed interval falls back to, but for what it leaves ``pending``; ``crank`` (3,) the drive
+    at the interval's start.
+    """
+
+    now: Now
+    system: ContactSystem
+    start: Floats
+    end: Floats
+    x: Floats
+    weight: Floats
+    by: Floats
+    reaction: Floats
+    toe: Floats
+    added: Floats
+    drive_start: Floats
+    drive_end: Floats
+    backup: Floats
+    pending: Floats
+    crank: Floats
+
+
+def clearance_state(depth: Floats, angle: float, speed: float) -> ClearanceState:
+    """Ideal start at time 0: journals centred and at rest in their bushings; depth (k, 2, N) of wear."""
+    k = len(depth)
+    shapes = {
+        "intervals": (1,), "e": (2 * k,), "v": (2 * k,), "drive": (3,), "step": (1,),
+        "approach": (k,), "recent": (k, 4), "pending": (k, 4),
+    }  # fmt: skip
+    motion = np.zeros(sum(math.prod(shape) for shape in shapes.values()))
+    state = ClearanceState(depth, motion, **views(motion, shapes))
+    state.drive[:] = angle, speed, 0.0
+    state.step[0] = 1.0e-6
+    return state
+
+
+def clearance_work(model: ClearanceModel, state: ClearanceState) -> ClearanceWork:
+    """Work arrays for a model and a state."""
+    loose, d = len(state.approach), len(state.e)
+    row = np.zeros(model.tables.motion.shape[1])
+    parts = views(row, motion_shapes(loose, model.damped > 0))
+    now = Now(
+        row=row,
+        speed=np.zeros(2),
+        force=np.zeros(d),
+        bare=np.zeros(d),
+        drift=np.zeros((d, d)),
+        lever_response=np.zeros((loose, d)),
+        torque_0=np.zeros(1),
+        torque_by_v=np.zeros(d),
+        torque_by_e=np.zeros(d),
+        toward=np.zeros((loose, TO_ANGLE + 1)),
+        **parts,
+    )
+    return ClearanceWork(
+        now=now,
+        system=contact_system(loose),
+        start=np.zeros((loose, COLUMNS)),
+        end=np.zeros((loose, COLUMNS)),
+        x=np.zeros((VECTORS, d)),
+        weight=np.zeros(state.depth.shape[2]),
+        by=np.zeros(model.tables.reaction.shape[1]),
+        reaction=np.zeros(len(model.tables.reaction_joint)),
+        toe=np.zeros(2),
+        added=np.zeros((loose, JOINT_RATES)),
+        drive_start=np.zeros(3),
+        drive_end=np.zeros(3),
+        backup=np.zeros_like(state.motion),
+        pending=np.zeros_like(state.pending),
+        crank=np.zeros(3),
+    )
+
+
+@kernel
+def blend(points, angle):
+    """Row of a table (points a turn) before a crank angle, and the share of the way to the next."""
+    u = angle * (points / (2.0 * math.pi))
+    u -= points * math.floor(u / points)
+    i = min(points - 1, int(u))
+    return i, u - i
+
+
+@kernel
+def take_tables(tables, angle, speed, acceleration, out_now):
+    """Tables at a crank angle [rad], speed [rad/s] and acceleration [rad/s^2]."""
+    motion, row = tables.motion, out_now.row
+    i, w = blend(motion.shape[0] - 1, angle)
+    for j in range(row.shape[0]):
+        row[j] = motion[i, j] + w * (motion[i + 1, j] - motion[i, j])
+    out_now.speed[0], out_now.speed[1] = speed, acceleration
+
+
+@kernel
+def hold_eccentricities(tables, angle, e, v, ahead, now):
+    """Put what depends on the eccentricities little in the tables, as if they were e + ahead v all the time.
+
+    Inside a part of an interval it changes by a thousandth of e / L.
+    """
+    d, speed, acceleration = e.shape[0], now.speed[0], now.speed[1]
+    square = speed * speed
+    _follow_eccentricities(tables, angle, e, v, ahead, now)
+    free, by, by_e, force = now.free, now.torque, now.torque_e, now.force
+    now.torque_0[0] = by[0] + acceleration * by[1] + speed * (speed * by[2] + by[3])
+    for i in range(d):
+        force[i] = free[0, i] + acceleration * free[1, i] + square * free[2, i]
+        now.torque_by_v[i] = speed * now.torque_v[0, i] + now.torque_v[1, i]
+        now.torque_by_e[i] = by_e[0, i] + acceleration * by_e[1, i] + square * by_e[2, i]
+        now.bare[i] = speed * now.viscous[i, d] if now.viscous.shape[0] > 0 else 0.0
+        for k in range(now.lever.shape[0]):
+            now.lever_response[k, i] = 0.0
+    for j in range(d):
+        for i in range(d):
+            now.bare[i] += now.inverse_mass[j, i] * force[j]
+        for k in range(now.lever.shape[0]):
+            for i in range(d):
+                now.lever_response[k, i] += now.inverse_mass[j, i] * now.lever[k, j]
+
+
+@kernel
+def _follow_eccentricities(tables, angle, e, v, ahead, now):
+    """Take what changes with e to e + ahead v, and the forces by e' twice to Coriolis's."""
+    by_e, bend, row, speed = tables.by_e, tables.bend, now.row, now.speed[0]
+    drift, coriolis = now.drift.reshape(-1), now.coriolis.reshape(-1)
+    n, w = blend(by_e.shape[0] - 1, angle)
+    for i in range(drift.shape[0]):
+        drift[i] = speed * coriolis[i]
+    for j in range(e.shape[0]):
+        middle, rate = e[j] + ahead * v[j], v[j]
+        before, after = (1.0 - w) * middle, w * middle
+        for i in range(by_e.shape[2]):
+            row[i] += before * by_e[n, j, i] + after * by_e[n + 1, j, i]
+        before, after = (1.0 - w) * rate, w * rate
+        for i in range(drift.shape[0]):
+            drift[i] -= before * bend[n, j, i] + after * bend[n + 1, j, i]
+
+
+@kernel
+def crank_between(start, end, interval):
+    """Angle, speed and acceleration of the crank amid an interval, from those at its ends (3,)."""
+    speed = 1.5 * (end[ANGLE] - start[ANGLE]) / interval - 0.25 * (start[SPEED] + end[SPEED])
+    angle = 0.5 * (start[ANGLE] + end[ANGLE]) + 0.125 * interval * (start[SPEED] - end[SPEED])
+    return angle, speed, (end[SPEED] - start[SPEED]) / interval

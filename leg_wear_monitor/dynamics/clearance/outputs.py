@@ -1,0 +1,86 @@
+"""What follows from the eccentricities' motion: drive torque, reactions of ideal joints, the toe."""
+
+import math
+
+from leg_wear_monitor.dynamics.clearance.contact import A0, BY_V, CAM, DV, E0, F_T, V0
+from leg_wear_monitor.dynamics.clearance.model import blend
+from leg_wear_monitor.dynamics.joint.contact_event import F_N
+from leg_wear_monitor.kernel import kernel
+
+
+@kernel
+def drive_torque(now, x, sample):
+    """Torque of the drive [N m] at rows E0, V0, A0 and BY_V, and the part of it by e'' alone."""
+    sudden, torque = 0.0, now.torque_0[0]
+    for i in range(x.shape[1]):
+        torque += x[BY_V, i] * x[V0, i] + now.torque_by_e[i] * x[E0, i]
+        sudden += now.torque_a[i] * x[A0, i]
+    for k in range(sample.shape[0]):
+        torque += sample[k, F_N] * sample[k, CAM] - now.lever_drive[k] * sample[k, F_T]
+    return torque + sudden, sudden
+
+
+@kernel
+def sudden_impulse(now, x):
+    """Integral over a step [N m s] of the drive torque's part by e''.
+
+    By the change of the rates, row DV: exact where impacts make the torque spiky.
+    """
+    total = 0.0
+    for i in range(x.shape[1]):
+        total += now.torque_a[i] * x[DV, i]
+    return total
+
+
+@kernel
+def reactions(tables, angle, now, x, sample, out_by, out_reaction):
+    """Drive torque and reactions (r,) of the ideal joints at a crank angle, in the order of the tables.
+
+    ``out_by`` (4 + 3 d + k,) is what the table is multiplied by.
+    """
+    table, speed, d = tables.reaction, now.speed[0], x.shape[1]
+    out_by[0], out_by[1], out_by[2], out_by[3] = 1.0, now.speed[1], speed * speed, speed
+    for i in range(d):
+        out_by[4 + i], out_by[4 + d + i], out_by[4 + 2 * d + i] = x[A0, i], speed * x[V0, i], x[V0, i]
+    for k in range(sample.shape[0]):
+        out_by[4 + 3 * d + k] = sample[k, F_T]
+    i, w = blend(table.shape[0] - 1, angle)
+    for r in range(out_reaction.shape[0]):
+        out_reaction[r] = 0.0
+    for c in range(out_by.shape[0]):
+        before, after = (1.0 - w) * out_by[c], w * out_by[c]
+        for r in range(out_reaction.shape[0]):
+            out_reaction[r] += before * table[i, c, r] + after * table[i + 1, c, r]
+
+
+@kernel
+def outside_power(now, x):
+    """Power of loads and of the springs' dampers [W] at row V0."""
+    d, speed, damper = x.shape[1], now.speed[0], now.damper
+    power = now.load_power[d] * speed
+    for i in range(d):
+        power += now.load_power[i] * x[V0, i]
+    for i in range(damper.shape[0]):
+        rate = x[V0, i] if i < d else speed
+        for j in range(d + 1):
+            power -= rate * damper[i, j] * (x[V0, j] if j < d else speed)
+    return power
+
+
+@kernel
+def toe_deviation(now, x, out_response):
+    """Raise the largest deviations (position, velocity, acceleration) of the toe from the ideal linkage."""
+    d, speed, toe = x.shape[1], now.speed[0], now.toe
+    px, py, vx, vy, ax, ay = 0.0, 0.0, 0.0, 0.0, 0.0, 0.0
+    for i in range(d):
+        sx, sy = toe[0, 1 + i], toe[1, 1 + i]
+        tx, ty = speed * toe[0, 1 + d + i], speed * toe[1, 1 + d + i]
+        px += sx * x[E0, i]
+        py += sy * x[E0, i]
+        vx += sx * x[V0, i] + tx * x[E0, i]
+        vy += sy * x[V0, i] + ty * x[E0, i]
+        ax += sx * x[A0, i] + 2.0 * tx * x[V0, i]
+        ay += sy * x[A0, i] + 2.0 * ty * x[V0, i]
+    out_response[0] = max(out_response[0], math.sqrt(px * px + py * py))
+    out_response[1] = max(out_response[1], math.sqrt(vx * vx + vy * vy))
+    out_response[2] = max(out_response[2], math.sqrt(ax * ax + ay * ay))

@@ -1,0 +1,111 @@
+"""One linearly implicit step of the eccentricities, stiff only along the contact normals.
+
+ROS2 of Verwer et al. (A second-order Rosenbrock method applied to photochemical dispersion problems,
+1999): order 2 for any approximate Jacobian, L-stable for gamma = 1 - 1 / sqrt 2 with the exact one. The
+approximation keeps what is stiff, the normal forces' stiffness K and damping C: with B = M^-1 N, N the
+normals of the contacts, the linear system in d unknowns falls to one with as many as there are contacts,
+
+    (D^-1 + N^T B) p = N^T r_v + gamma h D^-1 K N^T r_e,    D = gamma h C + (gamma h)^2 K,
+
+and x_v = r_v - B p, x_e = r_e + gamma h x_v solve (I - gamma h A) x = r.
+"""
+
+import math
+from typing import NamedTuple
+
+import numpy as np
+
+from leg_wear_monitor.dynamics.clearance.contact import CAM, DAMPING, NX, NY
+from leg_wear_monitor.dynamics.joint.contact_event import DELTA, F_N
+from leg_wear_monitor.kernel import kernel
+from leg_wear_monitor.mechanism.arrays import Floats, Ints
+
+GAMMA = 1.0 - math.sqrt(0.5)
+
+
+class ContactSystem(NamedTuple):
+    """The factored system of m contacts among k loose joints.
+
+    ``active`` (k,) their joints, ``normal`` (k, 2), ``response`` B^T (k, d), ``factor`` (k, k) L with 1 / D
+    of L D L^T on its diagonal, ``ratio`` (k,) gamma h K / D, ``cam`` (k,) the share of the
+    penetration's rate that does not come from e', ``p`` (k,).
+    """
+
+    active: Ints
+    normal: Floats
+    response: Floats
+    factor: Floats
+    ratio: Floats
+    cam: Floats
+    p: Floats
+
+
+def contact_system(k: int) -> ContactSystem:
+    """Room for k loose joints."""
+    return ContactSystem(
+        active=np.zeros(k, dtype=np.int64),
+        normal=np.zeros((k, 2)),
+        response=np.zeros((k, 2 * k)),
+        factor=np.zeros((k, k)),
+        ratio=np.zeros(k),
+        cam=np.zeros(k),
+        p=np.zeros(k),
+    )
+
+
+@kernel
+def factorise_contacts(h, inverse_mass, speed, sample, out_system):
+    """Prepare the system for a step of length h [s] from a sample (k, COLUMNS); returns how many touch."""
+    m, g = 0, GAMMA * h
+    response, factor = out_system.response, out_system.factor
+    for k in range(sample.shape[0]):
+        if sample[k, F_N] > 0.0:
+            stiffness = 1.5 * sample[k, F_N] / sample[k, DELTA]
+            nx, ny = sample[k, NX], sample[k, NY]
+            for i in range(inverse_mass.shape[0]):
+                response[m, i] = nx * inverse_mass[2 * k, i] + ny * inverse_mass[2 * k + 1, i]
+            compliance = 1.0 / (g * (sample[k, DAMPING] + g * stiffness))
+            out_system.ratio[m] = g * stiffness * compliance
+            out_system.active[m] = k
+            out_system.cam[m] = sample[k, CAM] * speed
+            out_system.normal[m, 0], out_system.normal[m, 1] = nx, ny
+            for a in range(m + 1):
+                factor[m, a] = nx * response[a, 2 * k] + ny * response[a, 2 * k + 1]
+            factor[m, m] += compliance
+            m += 1
+    for i in range(m):
+        for j in range(i):
+            for c in range(j):
+                factor[i, j] -= factor[i, c] * factor[j, c]
+        for c in range(i):
+            scaled = factor[i, c] * factor[c, c]
+            factor[i, i] -= scaled * factor[i, c]
+            factor[i, c] = scaled
+        factor[i, i] = 1.0 / factor[i, i]
+    return m
+
+
+@kernel
+def solve_contacts(h, system, m, stage, x, r_e, r_v, out_e, out_v):
+    """Solve (I - gamma h A) y = r: rows r_e, r_v of x (rows, d) are r, rows out_e, out_v become y.
+
+    ``stage`` is 1 in the first stage, -1 in the second (1 less twice the slope of time), 0 for an error.
+    """
+    g, p, factor, response = GAMMA * h, system.p, system.factor, system.response
+    for a in range(m):
+        k, nx, ny = system.active[a], system.normal[a, 0], system.normal[a, 1]
+        p[a] = nx * x[r_v, 2 * k] + ny * x[r_v, 2 * k + 1]
+        p[a] += system.ratio[a] * (nx * x[r_e, 2 * k] + ny * x[r_e, 2 * k + 1] + stage * system.cam[a])
+        for b in range(a):
+            p[a] -= factor[a, b] * p[b]
+    for a in range(m - 1, -1, -1):
+        p[a] *= factor[a, a]
+        for b in range(a + 1, m):
+            p[a] -= factor[b, a] * p[b]
+    for i in range(x.shape[1]):
+        x[out_v, i] = x[r_v, i]
+    for a in range(m):
+        for i in range(x.shape[1]):
+            x[out_v, i] -= response[a, i] * p[a]
+    for i in range(x.shape[1]):
+        x[out_e, i] = x[r_e, i] + g * x[out_v, i]

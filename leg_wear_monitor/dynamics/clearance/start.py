@@ -1,0 +1,37 @@
+"""What an interval in clearance coordinates starts from: its state, the tables, samples of the joints."""
+
+from leg_wear_monitor.dynamics.clearance.contact import A0, E0, V0, accelerate_clearances, take_directions
+from leg_wear_monitor.dynamics.clearance.model import hold_eccentricities, take_tables
+from leg_wear_monitor.dynamics.clearance.step import drift
+from leg_wear_monitor.dynamics.joint.contact_event import DELTA, DELTA_DOT, begin_contact
+from leg_wear_monitor.kernel import kernel
+
+
+@kernel
+def load_state(model, surfaces, state, angle, speed, acceleration, ahead, work):
+    """Load the state, and the tables at a crank angle, with the eccentricities of ``ahead`` [s] later."""
+    x, now = work.x, work.now
+    take_tables(model.tables, angle, speed, acceleration, now)
+    hold_eccentricities(model.tables, angle, state.e, state.v, ahead, now)
+    for i in range(state.e.shape[0]):
+        x[E0, i], x[V0, i] = state.e[i], state.v[i]
+    if surfaces.feeds_back:
+        take_directions(x, now.toward)
+    drift(now, x)
+
+
+@kernel
+def sample_start(model, surfaces, state, turned, t, tally, work):
+    """Sample the joints where a step starts; contact begins where worn flanks have closed in."""
+    x, start, now, approach, contacts = work.x, work.start, work.now, state.approach, model.contacts
+    accelerate_clearances(model, surfaces, approach, now, turned, x, E0, V0, A0, start)
+    closed = False
+    for k in range(approach.shape[0]):
+        if approach[k] == 0.0 and start[k, DELTA] > 0.0 and start[k, DELTA_DOT] > 0.0:
+            begin_contact(
+                k, contacts.joint, contacts.speed_floor, t, start[k, DELTA_DOT],
+                approach, state.recent, tally.impact, tally.impacts,
+            )  # fmt: skip
+            closed = True
+    if closed:
+        accelerate_clearances(model, surfaces, approach, now, turned, x, E0, V0, A0, start)

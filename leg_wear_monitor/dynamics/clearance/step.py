@@ -1,0 +1,223 @@
+"""One trial step in clearance coordinates, and what is added up when it is taken."""
+
+import math
+
+from leg_wear_monitor.contact.friction import friction_force
+from leg_wear_monitor.contact.normal import damped_force, elastic_force
+from leg_wear_monitor.dynamics.clearance.contact import (
+    A0,
+    A1,
+    BY_V,
+    DRIFT,
+    DV,
+    E0,
+    E1,
+    ELASTIC,
+    EM,
+    F_T,
+    FRICTION_COEFFICIENT,
+    FRICTION_LAW,
+    HERTZ,
+    HYSTERESIS_FACTOR,
+    K1E,
+    K1V,
+    K2E,
+    K2V,
+    RAMP_0,
+    RAMP_1,
+    RE,
+    RV,
+    SLIP,
+    V0,
+    V1,
+    VM,
+    accelerate_clearances,
+)
+from leg_wear_monitor.dynamics.clearance.rosenbrock import factorise_contacts, solve_contacts
+from leg_wear_monitor.dynamics.joint.contact_event import DELTA, DELTA_DOT, EX, EY, F_N
+from leg_wear_monitor.dynamics.joint.joint_contact import wear_joint
+from leg_wear_monitor.dynamics.run.dormand_prince import hermite
+from leg_wear_monitor.dynamics.run.run_statistics import (
+    ARCHARD,
+    CONTACT,
+    DISSIPATION,
+    FORCE,
+    FORCE_SQUARED,
+    FRICTION,
+    JOINT_RATES,
+)
+from leg_wear_monitor.kernel import kernel
+
+
+@kernel
+def drift(now, x):
+    """What the rates at row V0 make.
+
+    Row DRIFT, the acceleration that is not contact: gravity, crank, Coriolis, dampers; row BY_V, what e'
+    has to be multiplied by in the drive torque.
+    """
+    by_v, torque, viscous, d = now.drift, now.torque_vv, now.viscous, x.shape[1]
+    for i in range(d):
+        x[DRIFT, i], x[BY_V, i] = now.bare[i], now.torque_by_v[i]
+    for k in range(now.lever.shape[0]):
+        vx, vy = x[V0, 2 * k], x[V0, 2 * k + 1]
+        for i in range(d):
+            x[DRIFT, i] += by_v[2 * k, i] * vx + by_v[2 * k + 1, i] * vy
+        for i in range(d):
+            x[BY_V, i] += torque[2 * k, i] * vx + torque[2 * k + 1, i] * vy
+    for i in range(viscous.shape[0]):
+        for j in range(d):
+            x[DRIFT, i] += viscous[i, j] * x[V0, j]
+
+
+@kernel
+def try_step(model, surfaces, approach, h, turned, now, system, x, start, end):
+    """Step of length h [s] from rows E0, V0, A0 of x to E1, V1, A1 and sample ``end``; error over tolerance.
+
+    ``turned`` [rad] is by how much the crank is beyond the angle of the tables at the step's end.
+    The error is that of the second-order step against the cubic through the accelerations at both ends,
+    filtered like a stage so that stiff contacts do not exaggerate it (as Shampine does).
+    """
+    d, tolerance = x.shape[1], model.tolerance
+    m = factorise_contacts(h, now.inverse_mass, now.speed[0], start, system)
+    solve_contacts(h, system, m, 1.0, x, V0, A0, K1E, K1V)
+    for i in range(d):
+        x[EM, i] = x[E0, i] + h * x[K1E, i]
+        x[VM, i] = x[V0, i] + h * x[K1V, i]
+    accelerate_clearances(model, surfaces, approach, now, turned, x, EM, VM, RV, end)
+    for i in range(d):
+        x[RE, i] = x[VM, i] - 2.0 * x[K1E, i]
+        x[RV, i] -= 2.0 * x[K1V, i]
+    solve_contacts(h, system, m, -1.0, x, RE, RV, K2E, K2V)
+    for i in range(d):
+        x[E1, i] = x[E0, i] + h * (1.5 * x[K1E, i] + 0.5 * x[K2E, i])
+        x[V1, i] = x[V0, i] + h * (1.5 * x[K1V, i] + 0.5 * x[K2V, i])
+    accelerate_clearances(model, surfaces, approach, now, turned, x, E1, V1, A1, end)
+    for i in range(d):
+        x[RE, i] = x[E1, i] - x[E0, i] - h * x[V0, i] - h * h / 6.0 * (2.0 * x[A0, i] + x[A1, i])
+        x[RV, i] = x[V1, i] - x[V0, i] - 0.5 * h * (x[A0, i] + x[A1, i])
+    solve_contacts(h, system, m, 0.0, x, RE, RV, RE, RV)
+    worst = 0.0
+    for i in range(d):
+        ratio = max(abs(x[RE, i]) * tolerance[0], abs(x[RV, i]) * tolerance[1])
+        if not math.isfinite(ratio):
+            return math.inf
+        worst = max(worst, ratio)
+    return worst
+
+
+@kernel
+def shift_start(now, x):
+    """Make the end of the step the start of the next one, with the drift of its own rates; row DV."""
+    for i in range(x.shape[1]):
+        x[DV, i] = x[V1, i] - x[V0, i]
+        x[E0, i], x[V0, i] = x[E1, i], x[V1, i]
+        x[A0, i] = x[A1, i] - x[DRIFT, i]
+    drift(now, x)
+    for i in range(x.shape[1]):
+        x[A0, i] += x[DRIFT, i]
+
+
+@kernel
+def integrate_joints(law, approach, h, start, end, out_added):
+    """Integrals of the loose joints over a step of length h [s]; (k, JOINT_RATES).
+
+    Simpson's rule where a force changes much, with the contact law at the middle of the penetration's
+    cubic: an impact takes few steps. The trapezium elsewhere.
+    """
+    for k in range(start.shape[0]):
+        for r in range(JOINT_RATES):
+            out_added[k, r] = 0.0
+        before, after, weight = start[k, F_N], end[k, F_N], 0.5 * h
+        if before + after > 0.0:
+            if abs(after - before) > 0.1 * (after + before):
+                weight = h / 6.0
+                delta, rate = hermite(
+                    0.5, h, start[k, DELTA], start[k, DELTA_DOT], end[k, DELTA], end[k, DELTA_DOT]
+                )
+                slip = 0.5 * (start[k, SLIP] + end[k, SLIP])
+                elastic = elastic_force(0.5 * (start[k, HERTZ] + end[k, HERTZ]), delta)
+                f_n = damped_force(elastic, law[k, HYSTERESIS_FACTOR] / approach[k], rate)
+                mu, code = law[k, FRICTION_COEFFICIENT], law[k, FRICTION_LAW]
+                f_t = friction_force(code, mu, law[k, RAMP_0], law[k, RAMP_1], f_n, slip)
+                _add_rates(k, 4.0 * weight, f_n, f_t, elastic, rate, slip, out_added)
+            _add_rates(
+                k,
+                weight,
+                before,
+                start[k, F_T],
+                start[k, ELASTIC],
+                start[k, DELTA_DOT],
+                start[k, SLIP],
+                out_added,
+            )
+            _add_rates(
+                k, weight, after, end[k, F_T], end[k, ELASTIC], end[k, DELTA_DOT], end[k, SLIP], out_added
+            )
+
+
+@kernel
+def _add_rates(k, weight, f_n, f_t, elastic, delta_dot, slip, out_added):
+    """Add the rates of joint k's integrals at one instant, by a weight [s]."""
+    if f_n > 0.0:
+        squared = f_n * f_n + f_t * f_t
+        out_added[k, FORCE] += weight * math.sqrt(squared)
+        out_added[k, FORCE_SQUARED] += weight * squared
+        out_added[k, CONTACT] += weight
+        out_added[k, FRICTION] -= weight * f_t * slip
+        out_added[k, ARCHARD] += weight * f_n * abs(slip)
+    out_added[k, DISSIPATION] += weight * (f_n - elastic) * delta_dot
+
+
+@kernel
+def gather_wear(added, start, end, pending):
+    """Gather what a step added to the Archard integrals, and where it acted; pending as in ClearanceState."""
+    for k in range(pending.shape[0]):
+        integral = added[k, ARCHARD]
+        if integral > 0.0:
+            w = end[k, F_N] / (start[k, F_N] + end[k, F_N])
+            ex = start[k, EX] + w * (end[k, EX] - start[k, EX])
+            ey = start[k, EY] + w * (end[k, EY] - start[k, EY])
+            length = math.sqrt(ex * ex + ey * ey)
+            pending[k, 0] += integral
+            pending[k, 1] += integral * ex / length
+            pending[k, 2] += integral * ey / length
+            pending[k, 3] += integral * length
+
+
+@kernel
+def wear_off(contacts, surfaces, k, start, now, turned, acted, pending, out_weight):
+    """Wear the surfaces of joint k by what is pending, at its mean normal and eccentricity.
+
+    By how much the crank is beyond the angle of the tables [rad] say ``turned``, and ``acted`` for when it
+    acted. Returns the energy that the contact loses with its wall [J].
+    """
+    gone = 0.0
+    integral = pending[k, 0]
+    if integral > 0.0:
+        scale = pending[k, 3] / integral / math.hypot(pending[k, 1], pending[k, 2])
+        ex, ey = scale * pending[k, 1], scale * pending[k, 2]
+        angle_b, turn_b = now.angle[k, 0], now.turn[k, 0]
+        angle_j, turn_j = now.angle[k, 1], now.turn[k, 1]
+        there = (ex, ey, angle_b + turn_b * acted, angle_j + turn_j * acted)
+        gone = wear_joint(
+            contacts, surfaces, k, start[k, EX], start[k, EY],
+            angle_b + turn_b * turned, angle_j + turn_j * turned, there, integral, out_weight,
+        )  # fmt: skip
+        for i in range(pending.shape[1]):
+            pending[k, i] = 0.0
+    return gone
+
+
+@kernel
+def wear_what_turned(contacts, surfaces, approach, start, now, turned, pending, out_weight):
+    """Wear off what is pending where contact has ended or its normal has turned by two sectors.
+
+    Returns the energy that contacts lose with their walls [J]; ``turned`` as in `wear_off`.
+    """
+    limit, gone = 4.0 * math.pi / surfaces.depth.shape[2], 0.0
+    for k in range(pending.shape[0]):
+        across = abs(pending[k, 1] * start[k, EY] - pending[k, 2] * start[k, EX])
+        if approach[k] == 0.0 or across > limit * pending[k, 3]:
+            gone += wear_off(contacts, surfaces, k, start, now, turned, 0.0, pending, out_weight)
+    return gone

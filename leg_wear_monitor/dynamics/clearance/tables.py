@@ -1,0 +1,224 @@
+"""Everything of the leg but its contacts, as tables over the crank angle (physics.md section 7).
+
+With X = J^-1 at centred journals, J the Jacobian of all closures and the drive, the columns of X that
+belong to the loose joints are S and the drive's is s. In the eccentricities e and the crank angle th, w its
+speed, the Lagrangian to the first order of e / L beside w, and to the second beside w^2 and gravity, is
+
+    1/2 e' A e' + w e' (B + B_e e) + 1/2 w^2 (c + c_e e + 1/2 e c_ee e) - V,
+
+    A = S M S,  B = S M s,  c = s M s,  B_e = q_ee M s + S M S_t,  c_e = 2 s M S_t,
+    c_ee = 2 S_t M S_t + 2 s M q_ee_t,      q_ee = -X (dJ along S) S  the curvature of the linkage,
+
+with _t the derivative by the crank angle. Its equations of motion and its drive torque belong to one
+energy, so work in, losses and stored energy add up. Beside them A changes with e by Gamma e and its
+transpose, Gamma = S M q_ee, and Gamma e' e' acts against e''; torque and stored energy leave both out.
+"""
+
+from typing import NamedTuple
+
+import numpy as np
+
+from leg_wear_monitor.contact.arrays import ContactArrays
+from leg_wear_monitor.dynamics.clearance.basis import Basis, derivative, project
+from leg_wear_monitor.dynamics.clearance.layout import changing_shapes, motion_shapes, views
+from leg_wear_monitor.mechanism.arrays import Floats, Ints, Singles, body_names, point_from_com
+from leg_wear_monitor.mechanism.constraints import DRIVE
+from leg_wear_monitor.mechanism.ideal import TURN, IdealMotion, one_cycle, turned
+from leg_wear_monitor.mechanism.position import Linkage
+
+POINTS = 1024  # of a turn; tables are linear between them
+COARSER = 2  # times as far apart as those are the points of what e and e' change
+
+_BENT = 10.0  # 1/rad^2: bend of the Coriolis terms over their root mean square that one interval follows
+_MOST_PARTS = 8
+
+
+class ClearanceTables(NamedTuple):
+    """Tables at N equal steps of the crank, the first repeated at the end; k loose joints, d = 2 k.
+
+    ``motion`` (N + 1, w) the rows that `motion_shapes` names; ``reaction`` (N + 1, 4 + 3 d + k, r) the
+    drive torque and the reactions of the ideal joints by (1, w', w^2, w, e'', w e', e', F_t), and
+    ``reaction_joint`` (r,) the joint of each, ``DRIVE`` first; ``stored`` (N + 1, u) the parts of the
+    stored energy that `stored_shapes` names; ``parts`` (N,) into how many an interval is to be cut for the
+    tables to be held in each.
+
+    ``by_e`` (M + 1, d, u) is how the parts that `changing_shapes` names change with e, and ``bend``
+    (M + 1, d, d d) the acceleration A^-1 Gamma that e' takes twice. Both are small beside the above, and so
+    in single precision at every `COARSER`-th point: less to fetch for every interval.
+    """
+
+    motion: Floats
+    reaction: Floats
+    reaction_joint: Ints
+    stored: Floats
+    parts: Ints
+    by_e: Singles
+    bend: Singles
+
+
+def build_tables(linkage: Linkage, contacts: ContactArrays, points: int = POINTS) -> ClearanceTables:
+    """Tables of a linkage with the joints of ``contacts`` loose.
+
+    Parameters
+    ----------
+    linkage : Linkage
+    contacts : ContactArrays
+    points : int
+        Steps of the crank in a turn.
+
+    Raises
+    ------
+    AssemblyError
+        If the crank cannot turn.
+    """
+    motion = one_cycle(linkage, points, 1.0)
+    basis = Basis(linkage, contacts, motion)
+    reaction, joints = _reactions(linkage, basis)
+    parts = {
+        **_accelerations(basis),
+        **_torque(basis),
+        "lever": project(basis.s, basis.friction).transpose(0, 2, 1),
+        "lever_drive": project(basis.friction, basis.drive[:, :, None]),
+        "angle": motion.q[:, linkage.arrays.joint_body[contacts.joint], 2],
+        "turn": motion.v[:, linkage.arrays.joint_body[contacts.joint], 2],
+        "toe": _toe(linkage, motion, basis),
+        "load_power": project(basis.all, basis.load[:, :, None]),
+        "damper": project(basis.all, basis.drag),
+    }
+    if not basis.drag.any():
+        parts["viscous"] = parts["damper"] = np.zeros((points, 0))
+    shapes = motion_shapes(len(contacts.joint), bool(basis.drag.any()))
+    rows = np.concatenate([parts[name].reshape(points, -1) for name in shapes], axis=1)
+    closing = rows[:1].copy()
+    turns = np.round(motion.v[:, linkage.arrays.joint_body[contacts.joint], 2].mean(axis=0))
+    views(closing[0], shapes)["angle"][:] += TURN * turns
+    return ClearanceTables(
+        motion=np.concatenate([rows, closing]),
+        reaction=np.concatenate([reaction, reaction[:1]]),
+        reaction_joint=joints,
+        stored=_stored(basis),
+        parts=_parts(parts["coriolis"]),
+        **_first_order(basis, parts["inverse_mass"]),
+    )
+
+
+def _parts(table: Floats) -> Ints:
+    """How finely an interval is to be cut at each point, by the bend of a table (N, d, d) over the crank."""
+    step = TURN / len(table)
+    bend = np.roll(table, -1, axis=0) - 2.0 * table + np.roll(table, 1, axis=0)
+    size = np.sqrt((table**2).mean(axis=0)).max()
+    if size == 0.0:
+        return np.ones(len(table), dtype=np.int64)
+    roughness = np.abs(bend).max(axis=(1, 2)) / (step**2 * size * _BENT)
+    return np.asarray(np.clip(np.ceil(np.sqrt(roughness)), 1, _MOST_PARTS), dtype=np.int64)
+
+
+def _accelerations(basis: Basis) -> dict[str, Floats]:
+    """Parts that move the eccentricities."""
+    mass = basis.mass[:, None]
+    inverse_mass: Floats = np.asarray(np.linalg.inv(project(basis.s, mass * basis.s)), dtype=np.float64)
+
+    def respond(generalised: Floats) -> Floats:
+        """Accelerations (N, d, m) by forces (N, 3 b, m)."""
+        return np.asarray(inverse_mass @ project(basis.s, generalised))
+
+    free = np.stack([basis.force, -basis.mass * basis.drive, -basis.mass * basis.drive_t], axis=2)
+    return {
+        "inverse_mass": inverse_mass,
+        "coriolis": -2.0 * respond(mass * basis.s_t).transpose(0, 2, 1),
+        "free": project(basis.s, free).transpose(0, 2, 1),
+        "viscous": -respond(basis.drag),
+    }
+
+
+def _first_order(basis: Basis, inverse_mass: Floats) -> dict[str, Singles]:
+    """Tables ``by_e`` and ``bend``, by the inverse mass (N, d, d) at e = 0.
+
+    The inverse of A + Gamma e + (Gamma e)^T is A^-1 - Q e - (Q e)^T with Q = A^-1 Gamma A^-1.
+    """
+    n, d = inverse_mass.shape[:2]
+    bend = (inverse_mass @ basis.gamma.reshape(n, d, d * d)).reshape(n, d, d, d).transpose(0, 3, 2, 1)
+    change = inverse_mass[:, None] @ bend
+    free = np.stack([basis.force_e, -basis.b_e, 0.5 * basis.c_ee - derivative(basis.b_e)], axis=1)
+    parts = {
+        "inverse_mass": -(change + change.transpose(0, 1, 3, 2)),
+        "free": free.transpose(0, 3, 1, 2),
+        "lever_drive": project(basis.s_t, basis.friction),
+        "load_power": np.concatenate(
+            [basis.load_e.transpose(0, 2, 1), basis.drive_load_e[:, :, None]], axis=2
+        ),
+        "torque_a": basis.b_e.transpose(0, 2, 1),
+        "torque_v": basis.c_ee.transpose(0, 2, 1),
+    }
+    by_e = np.concatenate([parts[name].reshape(n, d, -1) for name in changing_shapes(d // 2)], axis=2)
+    coarse = [*range(0, n, COARSER), 0]
+    return {
+        "by_e": np.ascontiguousarray(by_e[coarse], dtype=np.float32),
+        "bend": np.ascontiguousarray(bend.reshape(n, d, d * d)[coarse], dtype=np.float32),
+    }
+
+
+def _torque(basis: Basis) -> dict[str, Floats]:
+    """Parts that give the drive torque."""
+    mass = basis.mass[:, None]
+    c, c_e = np.einsum("ni,i,ni->n", basis.drive, basis.mass, basis.drive), basis.c_e
+    a_t = derivative(project(basis.s, mass * basis.s))
+    drag = project(basis.drive[:, :, None], basis.drag)[:, 0]
+    rest = -np.einsum("ni,ni->n", basis.drive, basis.force)
+    return {
+        "torque": np.stack([rest, c, 0.5 * derivative(c), drag[:, -1]], axis=1),
+        "torque_a": project(basis.s, mass * basis.drive[:, :, None])[:, :, 0],
+        "torque_v": np.stack([c_e, drag[:, :-1]], axis=1),
+        "torque_e": np.stack([-basis.drive_force_e, c_e, 0.5 * derivative(c_e)], axis=1),
+        "torque_vv": (basis.b_e - 0.5 * a_t).transpose(0, 2, 1),
+    }
+
+
+def _stored(basis: Basis) -> Floats:
+    """Table ``stored``."""
+    parts = {
+        "a": project(basis.s, basis.mass[:, None] * basis.s),
+        "b": project(basis.s, (basis.mass * basis.drive)[:, :, None]),
+        "b_e": basis.b_e,
+        "c": np.einsum("ni,i,ni->n", basis.drive, basis.mass, basis.drive),
+        "c_e": basis.c_e,
+        "c_ee": basis.c_ee,
+        "potential": basis.potential,
+        "push": project(basis.s, (basis.force - basis.load)[:, :, None]),
+        "push_e": basis.force_e - basis.load_e,
+    }
+    rows = np.concatenate([part.reshape(len(basis.s), -1) for part in parts.values()], axis=1)
+    return np.concatenate([rows, rows[:1]])
+
+
+def _reactions(linkage: Linkage, basis: Basis) -> tuple[Floats, Ints]:
+    """Table ``reaction`` without its closing row, and the joint of each of its rows."""
+    rows, joints = [linkage.rows.drive_row], [DRIVE]
+    for closure, start in zip(linkage.rows.closure.tolist(), linkage.rows.row.tolist(), strict=True):
+        if closure != DRIVE and start not in basis.rows:
+            rows += [start, start + 1]
+            joints += [closure, closure]
+    mass = basis.mass[:, None]
+    by = [-basis.force[:, :, None], mass * basis.drive[:, :, None], mass * basis.drive_t[:, :, None]]
+    by += [basis.drag[:, :, -1:], mass * basis.s, 2.0 * mass * basis.s_t]
+    by += [basis.drag[:, :, :-1], -basis.friction]
+    reaction = project(np.concatenate(by, axis=2), basis.x[:, :, rows])
+    return reaction, np.array(joints, dtype=np.int64)
+
+
+def _toe(linkage: Linkage, motion: IdealMotion, basis: Basis) -> Floats:
+    """Part ``toe``; zeros without a point of that name."""
+    n, d = len(motion.q), basis.s.shape[2]
+    toe = np.zeros((n, 2, 1 + 2 * d))
+    if linkage.mechanism.toe is None:
+        return toe
+    body, point = linkage.mechanism.toe
+    i = body_names(linkage.mechanism).index(body)
+    lever = turned(point_from_com(linkage.mechanism, body, point), motion.q[:, i, 2])
+    across = np.stack([-lever[:, 1], lever[:, 0]], axis=1)[:, :, None]
+    here, turn = slice(3 * (i - 1), 3 * i - 1), basis.s[:, 3 * i - 1, None]
+    toe[:, :, 0] = motion.q[:, i, :2] + lever
+    toe[:, :, 1 : 1 + d] = basis.s[:, here] + across * turn
+    swing = motion.v[:, i, 2, None, None] * lever[:, :, None]
+    toe[:, :, 1 + d :] = basis.s_t[:, here] + across * basis.s_t[:, 3 * i - 1, None] - swing * turn
+    return toe

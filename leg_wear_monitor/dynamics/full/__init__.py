@@ -1,0 +1,1 @@
+"""Full coordinates: the reference formulation."""

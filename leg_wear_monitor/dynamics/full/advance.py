@@ -1,0 +1,214 @@
+"""The full-coordinate motion, step by step: adaptive, each impact met where it begins.
+
+The local error of every step stays below a tolerance in every coordinate and velocity (Dormand-Prince
+5(4)); an open joint is not allowed to pass into contact inside a step: the step is cut so that it ends
+where the surfaces touch, to 1e-11 m.
+"""
+
+import math
+from typing import NamedTuple
+
+import numpy as np
+
+from leg_wear_monitor.dynamics.full.model import FullModel, FullScratch, accelerate, full_scratch
+from leg_wear_monitor.dynamics.joint.contact_event import (
+    DELTA,
+    EX,
+    EY,
+    NEVER,
+    SAMPLE,
+    first_touch,
+    update_contacts,
+)
+from leg_wear_monitor.dynamics.joint.joint_contact import wear_joint
+from leg_wear_monitor.dynamics.run.dormand_prince import (
+    NODES,
+    STAGES,
+    WEIGHTS,
+    error_norm,
+    next_step,
+    stage_state,
+)
+from leg_wear_monitor.dynamics.run.protocol import DONE, PUSHED_THROUGH, SINGULAR, STEP_TOO_SMALL
+from leg_wear_monitor.dynamics.run.run_statistics import ARCHARD, DRIVE_RATES, JOINT_RATES, TORQUE, add_step
+from leg_wear_monitor.dynamics.run.toe_deviation import compare_toe
+from leg_wear_monitor.kernel import copy_array, entry, kernel
+from leg_wear_monitor.mechanism.arrays import Floats
+
+LONGEST_STEP = 1.0e-3  # s: Baumgarte's alpha times it stays well inside the region of stability
+_SHORTEST_STEP = 1.0e-14  # s
+
+
+class FullState(NamedTuple):
+    """All that a continuation needs.
+
+    ``y`` (6 n,) coordinates, then velocities, of n bodies; ``clock`` (2,) time [s] and the next step to
+    try [s]; ``approach`` (k,) approach speed of each loose joint in contact, 0 for the others [m/s];
+    ``recent`` (k, 4) its last two samples of time and normal force.
+    """
+
+    y: Floats
+    clock: Floats
+    approach: Floats
+    recent: Floats
+
+
+class FullWork(NamedTuple):
+    """Room for a step: slopes, trial state, rates at the stages, contacts at its start, error scale."""
+
+    slope: Floats
+    trial: Floats
+    rates: Floats
+    drive_rates: Floats
+    start: Floats
+    scale: Floats
+    weight: Floats
+    scratch: FullScratch
+
+
+def full_state(q: Floats, v: Floats, loose: int, t: float = 0.0) -> FullState:
+    """State at rest in all contacts: coordinates q (n, 3) and velocities v (n, 3)."""
+    y = np.concatenate([q.ravel(), v.ravel()])
+    return FullState(y, np.array([t, 1.0e-6]), np.zeros(loose), np.zeros((loose, 4)))
+
+
+def full_work(model: FullModel, tolerance_m: float, tolerance_mps: float, sectors: int) -> FullWork:
+    """Work arrays; the tolerances are the local error allowed in a step (m or rad, and per second)."""
+    n, k = len(model.arrays.mass), len(model.contacts.joint)
+    joints = len(model.arrays.joint_kind)
+    return FullWork(
+        slope=np.zeros((STAGES, 6 * n)),
+        trial=np.zeros(6 * n),
+        rates=np.zeros((STAGES, joints, JOINT_RATES)),
+        drive_rates=np.zeros((STAGES, DRIVE_RATES)),
+        start=np.zeros((k, SAMPLE)),
+        scale=np.concatenate([np.full(3 * n, tolerance_m), np.full(3 * n, tolerance_mps)]),
+        weight=np.zeros(sectors),
+        scratch=full_scratch(model),
+    )
+
+
+@kernel
+def _slope(model, surfaces, approach, polynomial, t, y, s, work):
+    """Slope of stage s at state y (6 n,): velocities, then accelerations."""
+    half = y.shape[0] // 2
+    for i in range(half):
+        work.slope[s, i] = y[half + i]
+    q, v = y[:half].reshape(-1, 3), y[half:].reshape(-1, 3)
+    a = work.slope[s, half:].reshape(-1, 3)
+    return accelerate(
+        model, surfaces, approach, polynomial, t, q, v, work.scratch, a, work.rates[s], work.drive_rates[s]
+    )
+
+
+@kernel
+def _try_step(model, surfaces, state, polynomial, h, work):
+    """Stages of a step of length h; leaves its end in ``trial`` and the last slope; error over tolerance."""
+    t = state.clock[0]
+    for s in range(1, STAGES):
+        stage_state(s, h, state.y, work.slope, work.trial)
+        if not _slope(model, surfaces, state.approach, polynomial, t + NODES[s] * h, work.trial, s, work):
+            return math.inf
+    return error_norm(h, work.slope, work.scale)
+
+
+@kernel
+def slope_here(model, surfaces, state, polynomial, work):
+    """Slope and rates where the state stands, computed afresh: the first stage of the next step."""
+    good = _slope(model, surfaces, state.approach, polynomial, state.clock[0], state.y, 0, work)
+    copy_array(work.scratch.contact, work.start)
+    return good
+
+
+@kernel
+def _accept(model, surfaces, state, h, toe, tally, work):
+    """Take the trial step: sums, wear, contacts. Returns whether a contact began or ended."""
+    arrays, contacts, scratch = model.arrays, model.contacts, work.scratch
+    half = state.y.shape[0] // 2
+    q, v = work.trial[:half].reshape(-1, 3), work.trial[half:].reshape(-1, 3)
+    last = STAGES - 1
+    tally.steps[1] += 1
+    add_step(tally, h, WEIGHTS, work.rates, work.drive_rates)
+    a = work.slope[last, half:].reshape(-1, 3)
+    torque = work.drive_rates[last, TORQUE]
+    compare_toe(toe, q[arrays.drive_body, 2], scratch.cs, q, v, a, torque, tally.response)
+    for k in range(contacts.joint.shape[0]):
+        if state.approach[k] > 0.0:
+            joint = contacts.joint[k]
+            integral = 0.0
+            for s in range(STAGES):
+                integral += h * WEIGHTS[s] * work.rates[s, joint, ARCHARD]
+            b, j = arrays.joint_body[joint, 0], arrays.joint_body[joint, 1]
+            ex, ey = scratch.contact[k, EX], scratch.contact[k, EY]
+            here = (ex, ey, q[b, 2], q[j, 2])
+            tally.worn_energy[0] += wear_joint(
+                contacts, surfaces, k, ex, ey, q[b, 2], q[j, 2], here, integral, work.weight
+            )
+    changed = update_contacts(
+        contacts.joint, contacts.speed_floor, state.clock[0], h, work.start, scratch.contact,
+        state.approach, state.recent, tally.peak, tally.impact, tally.impacts,
+    )  # fmt: skip
+    copy_array(work.trial, state.y)
+    state.clock[0] += h
+    copy_array(work.slope[last], work.slope[0])
+    copy_array(work.rates[last], work.rates[0])
+    copy_array(work.drive_rates[last], work.drive_rates[0])
+    copy_array(scratch.contact, work.start)
+    return changed
+
+
+@kernel
+def _pushed_through(model, scratch):
+    """First loose joint whose journal is pushed further than a tenth of the bushing's radius, else -1."""
+    for k in range(model.contacts.joint.shape[0]):
+        if not scratch.contact[k, DELTA] < 0.1 * model.contacts.bushing_radius[k]:
+            return k
+    return -1
+
+
+@entry
+def advance_full(model, surfaces, state, polynomial, t_end, toe, tally, work):
+    """Advance the state to t_end [s] and add to the tally.
+
+    Returns
+    -------
+    status, k
+        DONE, or why it stopped and the loose joint concerned (-1 if none). The state is then the last
+        accepted one.
+    """
+    scratch = work.scratch
+    if not slope_here(model, surfaces, state, polynomial, work):
+        return SINGULAR, -1
+    cut = NEVER  # share of the last trial after which a joint touched
+    while state.clock[0] < t_end:
+        h = state.clock[1]
+        left = t_end - state.clock[0]
+        if cut < 1.0:
+            h *= cut
+        ends = h >= left * (1.0 - 1.0e-12)
+        if ends:
+            h = left
+        tally.steps[0] += 1
+        error = _try_step(model, surfaces, state, polynomial, h, work)
+        if not error <= 1.0:
+            state.clock[1] = next_step(h, error, 1.0)
+            cut = NEVER
+            if state.clock[1] < _SHORTEST_STEP:
+                return STEP_TOO_SMALL, _pushed_through(model, scratch)
+            continue
+        share = first_touch(state.approach, h, work.start, scratch.contact)
+        if share < 1.0 and share * h > _SHORTEST_STEP:
+            cut = share * h / state.clock[1]
+            continue
+        pushed = _pushed_through(model, scratch)
+        if pushed >= 0:
+            return PUSHED_THROUGH, pushed
+        if not ends and cut == NEVER:
+            state.clock[1] = min(LONGEST_STEP, next_step(h, error, 5.0))
+        cut = NEVER
+        changed = _accept(model, surfaces, state, h, toe, tally, work)
+        if changed and not slope_here(model, surfaces, state, polynomial, work):
+            return SINGULAR, -1
+        if ends:
+            state.clock[0] = t_end
+    return DONE, -1

@@ -1,0 +1,243 @@
+"""Equations of motion in full coordinates (physics.md section 2).
+
+With M diagonal the multipliers come from the small symmetric system
+(phi_q M^-1 phi_q^T) lambda = phi_q M^-1 Q - gamma', whose rows overlap only where two closures share a
+body; gamma' = gamma - 2 alpha phi_dot - beta^2 phi is Baumgarte's stabilised right-hand side with
+alpha = beta.
+"""
+
+from typing import NamedTuple
+
+import numpy as np
+
+from leg_wear_monitor.contact.arrays import ContactArrays
+from leg_wear_monitor.contact.normal import elastic_force
+from leg_wear_monitor.dynamics.joint.contact_event import DELTA, DELTA_DOT, EX, EY, F_N, SAMPLE, VX, VY
+from leg_wear_monitor.dynamics.joint.joint_contact import contact_energy, joint_force
+from leg_wear_monitor.dynamics.run.cholesky import factorise, substitute
+from leg_wear_monitor.dynamics.run.drive import drive_at
+from leg_wear_monitor.dynamics.run.run_statistics import (
+    ARCHARD,
+    CONTACT,
+    DISSIPATION,
+    FORCE,
+    FORCE_SQUARED,
+    FRICTION,
+    POWER,
+    TORQUE,
+    TORQUE_SQUARED,
+)
+from leg_wear_monitor.kernel import entry, kernel
+from leg_wear_monitor.mechanism.arrays import Floats, MechanismArrays
+from leg_wear_monitor.mechanism.constraints import DRIVE, Rows, arm, closures, rotations, select_rows
+from leg_wear_monitor.mechanism.forces import (
+    add_force,
+    applied_forces,
+    controller_torque,
+    external_power,
+    stored_energy,
+)
+
+BAUMGARTE = 200.0  # alpha = beta [1/s]: drift decays within 5 ms, far slower than any step resolves
+
+
+class FullModel(NamedTuple):
+    """What does not change during a run.
+
+    ``rows`` are those of the ideal joints and of a drive by speed; ``contacts`` the loose joints;
+    ``baumgarte`` alpha = beta [1/s].
+    """
+
+    arrays: MechanismArrays
+    rows: Rows
+    contacts: ContactArrays
+    baumgarte: float
+
+
+class FullScratch(NamedTuple):
+    """Room for one evaluation, so that the step allocates nothing.
+
+    After it: ``lam`` (m,) multipliers, ``contact`` (k, SAMPLE) the loose joints as `touch` wants them.
+    """
+
+    cs: Floats
+    force: Floats
+    phi: Floats
+    jac: Floats
+    gamma: Floats
+    schur: Floats
+    lam: Floats
+    drive: Floats
+    contact: Floats
+
+
+def full_model(
+    arrays: MechanismArrays, contacts: ContactArrays, driven: bool, baumgarte: float = BAUMGARTE
+) -> FullModel:
+    """Model with the joints of ``contacts`` loose and all others ideal."""
+    ideal = [joint for joint in range(len(arrays.joint_kind)) if joint not in contacts.joint]
+    return FullModel(arrays, select_rows(arrays, ideal, driven), contacts, baumgarte)
+
+
+def full_scratch(model: FullModel) -> FullScratch:
+    """Scratch arrays of the right size."""
+    n, m, k = len(model.arrays.mass), len(model.rows.body), len(model.contacts.joint)
+    return FullScratch(
+        cs=np.zeros((n, 2)),
+        force=np.zeros((n, 3)),
+        phi=np.zeros(m),
+        jac=np.zeros((m, 2, 3)),
+        gamma=np.zeros(m),
+        schur=np.zeros((m, m)),
+        lam=np.zeros(m),
+        drive=np.zeros(3),
+        contact=np.zeros((k, SAMPLE)),
+    )
+
+
+@kernel
+def eccentricity(model, k, q, v, cs):
+    """Eccentricity [m] of loose joint k, its rate [m/s], and the bodies of bushing and journal."""
+    joint = model.contacts.joint[k]
+    b, j = model.arrays.joint_body[joint, 0], model.arrays.joint_body[joint, 1]
+    sbx, sby = arm(cs, b, model.arrays.joint_point[joint, 0])
+    sjx, sjy = arm(cs, j, model.arrays.joint_point[joint, 1])
+    ex, ey = q[j, 0] + sjx - q[b, 0] - sbx, q[j, 1] + sjy - q[b, 1] - sby
+    vx = v[j, 0] - v[j, 2] * sjy - v[b, 0] + v[b, 2] * sby
+    vy = v[j, 1] + v[j, 2] * sjx - v[b, 1] - v[b, 2] * sbx
+    return ex, ey, vx, vy, b, j, sbx, sby
+
+
+@kernel
+def add_contacts(model, surfaces, approach, q, v, scratch, out_rate):
+    """Add the contact forces of the loose joints; sample them and note the rates of their integrals."""
+    contacts = model.contacts
+    for k in range(contacts.joint.shape[0]):
+        ex, ey, vx, vy, b, j, sbx, sby = eccentricity(model, k, q, v, scratch.cs)
+        f_n, f_t, delta, delta_dot, slip, nx, ny, stiffness, moment = joint_force(
+            contacts, surfaces, k, ex, ey, vx, vy, q[b, 2], q[j, 2], v[b, 2], v[j, 2], approach[k]
+        )
+        sample = scratch.contact[k]
+        sample[EX], sample[EY], sample[VX], sample[VY] = ex, ey, vx, vy
+        sample[F_N], sample[DELTA], sample[DELTA_DOT] = f_n, delta, delta_dot
+        rate = out_rate[contacts.joint[k]]
+        rate[:] = 0.0
+        if f_n > 0.0:
+            fx, fy = -f_n * nx - f_t * ny, -f_n * ny + f_t * nx
+            px, py = sbx + contacts.bushing_radius[k] * nx, sby + contacts.bushing_radius[k] * ny
+            add_force(b, px, py, -fx, -fy, scratch.force)
+            add_force(j, q[b, 0] + px - q[j, 0], q[b, 1] + py - q[j, 1], fx, fy, scratch.force)
+            scratch.force[b, 2] -= moment
+            scratch.force[j, 2] += moment
+            rate[FORCE_SQUARED] = f_n * f_n + f_t * f_t
+            rate[FORCE] = np.sqrt(rate[FORCE_SQUARED])
+            rate[CONTACT] = 1.0
+            rate[FRICTION] = -f_t * slip
+            rate[ARCHARD] = f_n * abs(slip)
+        rate[DISSIPATION] = (f_n - elastic_force(stiffness, delta)) * delta_dot
+
+
+@kernel
+def assemble_schur(rows, arrays, jac, out_schur):
+    """phi_q M^-1 phi_q^T, lower triangle, from the pairs of rows that share a body."""
+    for i in range(out_schur.shape[0]):
+        for j in range(rows.first[i], i + 1):
+            out_schur[i, j] = 0.0
+    for p in range(rows.overlap.shape[0]):
+        r, s, i, j, body = rows.overlap[p]
+        w = arrays.inverse_mass[body]
+        out_schur[r, s] += (
+            jac[r, i, 0] * w[0] * jac[s, j, 0]
+            + jac[r, i, 1] * w[1] * jac[s, j, 1]
+            + jac[r, i, 2] * w[2] * jac[s, j, 2]
+        )
+
+
+@kernel
+def accelerate(model, surfaces, approach, polynomial, t, q, v, scratch, out_a, out_rate, out_drive_rate):
+    """Accelerations (n, 3) and multipliers at time t; the rates of all integrals beside.
+
+    ``approach`` (k,) holds the approach speed of each loose joint that is in contact, 0 for the others.
+    Returns False where the closures are singular.
+    """
+    arrays, rows = model.arrays, model.rows
+    rotations(q, scratch.cs)
+    applied_forces(arrays, q, v, scratch.cs, scratch.force)
+    add_contacts(model, surfaces, approach, q, v, scratch, out_rate)
+    drive_at(polynomial, t, scratch.drive)
+    torque = 0.0
+    if rows.drive_row < 0:
+        crank = arrays.drive_body
+        torque = controller_torque(arrays, scratch.drive, q[crank, 2], v[crank, 2])
+        scratch.force[crank, 2] += torque
+    closures(arrays, rows, q, v, scratch.cs, scratch.drive, scratch.phi, scratch.jac, scratch.gamma)
+    _right_hand_side(model, v, scratch)
+    assemble_schur(rows, arrays, scratch.jac, scratch.schur)
+    if not factorise(rows.first, scratch.schur):
+        return False
+    substitute(rows.first, scratch.schur, scratch.lam)
+    _accelerations(model, scratch, out_a)
+    _ideal_rates(model, q, v, torque, scratch, out_rate, out_drive_rate)
+    return True
+
+
+@kernel
+def _right_hand_side(model, v, scratch):
+    """phi_q M^-1 Q - gamma', left in ``lam``."""
+    alpha = model.baumgarte
+    for r in range(scratch.lam.shape[0]):
+        phi_dot = -scratch.drive[1] if r == model.rows.drive_row else 0.0
+        total = 0.0
+        for i in range(2):
+            body = model.rows.body[r, i]
+            for d in range(3):
+                phi_dot += scratch.jac[r, i, d] * v[body, d]
+                total += scratch.jac[r, i, d] * model.arrays.inverse_mass[body, d] * scratch.force[body, d]
+        scratch.lam[r] = total - scratch.gamma[r] + 2.0 * alpha * phi_dot + alpha * alpha * scratch.phi[r]
+
+
+@kernel
+def _accelerations(model, scratch, out_a):
+    """Accelerations M^-1 (Q - phi_q^T lambda)."""
+    inverse_mass = model.arrays.inverse_mass
+    for i in range(out_a.shape[0]):
+        for d in range(3):
+            out_a[i, d] = inverse_mass[i, d] * scratch.force[i, d]
+    for r in range(scratch.lam.shape[0]):
+        for i in range(2):
+            body = model.rows.body[r, i]
+            for d in range(3):
+                out_a[body, d] -= inverse_mass[body, d] * scratch.jac[r, i, d] * scratch.lam[r]
+
+
+@kernel
+def _ideal_rates(model, q, v, torque, scratch, out_rate, out_drive_rate):
+    """Rates of the integrals of ideal joints and of the drive; power from outside counts with the drive's.
+
+    ``torque`` [N m] is that of a drive that is no constraint.
+    """
+    for c in range(model.rows.closure.shape[0]):
+        joint, r = model.rows.closure[c], model.rows.row[c]
+        if joint == DRIVE:
+            torque = -scratch.lam[r]
+            continue
+        squared = scratch.lam[r] ** 2
+        if model.arrays.joint_kind[joint] == 0:
+            squared += scratch.lam[r + 1] ** 2
+        out_rate[joint, FORCE] = np.sqrt(squared)
+        out_rate[joint, FORCE_SQUARED] = squared
+    out_drive_rate[TORQUE] = torque
+    out_drive_rate[TORQUE_SQUARED] = torque * torque
+    out_drive_rate[POWER] = external_power(model.arrays, q, v, scratch.cs)
+    out_drive_rate[POWER] += torque * v[model.arrays.drive_body, 2]
+
+
+@entry
+def total_energy(model, surfaces, q, v, scratch):
+    """Kinetic and potential energy, that of gravity, springs and contacts [J]."""
+    rotations(q, scratch.cs)
+    energy = stored_energy(model.arrays, q, v, scratch.cs)
+    for k in range(model.contacts.joint.shape[0]):
+        ex, ey, _, _, b, j, _, _ = eccentricity(model, k, q, v, scratch.cs)
+        energy += contact_energy(model.contacts, surfaces, k, ex, ey, q[b, 2], q[j, 2])
+    return energy

@@ -1,0 +1,1 @@
+"""One clearance joint: its contact force and its contact events, for both formulations."""

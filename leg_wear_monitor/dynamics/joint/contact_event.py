@@ -1,0 +1,98 @@
+"""Contacts that begin and end inside a step, found on the cubic of the penetration through its ends.
+
+Both formulations hand over the loose joints as rows of `SAMPLE` columns at a step's start and end.
+"""
+
+from leg_wear_monitor.dynamics.run.dormand_prince import hermite
+from leg_wear_monitor.dynamics.run.run_statistics import begin_impact, end_impact, parabola_peak, raise_peak
+from leg_wear_monitor.kernel import kernel
+
+# a sample of a loose joint: eccentricity [m] and its rate, normal force [N], penetration [m] and its rate
+EX, EY, VX, VY, F_N, DELTA, DELTA_DOT = 0, 1, 2, 3, 4, 5, 6
+SAMPLE = 7
+
+TOUCH = 1.0e-11  # penetration [m] at which a contact counts as just begun
+NEVER = 2.0
+
+_CLOSE = 1.0e-14  # share of a step to which a crossing is found
+
+
+@kernel
+def _crossing(low, high, rising, h, k, start, end):
+    """Share of a step between low and high at which the penetration of joint k changes sign.
+
+    Newton's iteration, and bisection where that would leave what is known to hold the place.
+    """
+    u = 0.5 * (low + high)
+    for _ in range(48):
+        delta, rate = hermite(u, h, start[k, DELTA], start[k, DELTA_DOT], end[k, DELTA], end[k, DELTA_DOT])
+        if (delta > 0.0) == rising:
+            high = u
+        else:
+            low = u
+        last, u = u, u - delta / (h * rate)
+        if not low < u < high:
+            u = 0.5 * (low + high)
+        if abs(u - last) < _CLOSE:
+            break
+    return u
+
+
+@kernel
+def _delta_at(u, h, k, start, end):
+    """Penetration [m] of joint k at the share u of a step."""
+    return hermite(u, h, start[k, DELTA], start[k, DELTA_DOT], end[k, DELTA], end[k, DELTA_DOT])[0]
+
+
+@kernel
+def first_touch(approach, h, start, end):
+    """Share of a step after which the first of the open joints touches; NEVER if none does.
+
+    ``approach`` (k,) is 0 for open joints; ``start`` and ``end`` (k, columns) are samples. The middle of
+    the step is looked at too, for a touch and parting inside it.
+    """
+    earliest = NEVER
+    for k in range(approach.shape[0]):
+        if approach[k] == 0.0 and start[k, DELTA] <= TOUCH:
+            if start[k, DELTA_DOT] > 0.0 and _delta_at(0.5, h, k, start, end) > TOUCH:
+                earliest = min(earliest, _crossing(0.0, 0.5, True, h, k, start, end))
+            elif end[k, DELTA] > TOUCH:
+                earliest = min(earliest, _crossing(0.5, 1.0, True, h, k, start, end))
+    return earliest
+
+
+@kernel
+def begin_contact(k, joint, speed_floor, t, rate, approach, recent, impact, impacts):
+    """Contact begins in loose joint k at time t [s] with the penetration growing at a rate [m/s]."""
+    approach[k] = max(rate, speed_floor[k])
+    begin_impact(impact, impacts, joint[k], t, rate)
+    recent[k, 0], recent[k, 1], recent[k, 2], recent[k, 3] = t, 0.0, t, 0.0
+
+
+@kernel
+def update_contacts(joint, speed_floor, t, h, start, end, approach, recent, peak, impact, impacts):
+    """After a step from t to t + h: contacts that begin or end, and the peaks of those that go on.
+
+    Changes approach (k,) and recent (k, 4), the last two samples of time and normal force of each joint,
+    and the tally's peak, impact and impacts. Returns whether a contact began or ended.
+    """
+    changed = False
+    for k in range(approach.shape[0]):
+        rate, force = end[k, DELTA_DOT], end[k, F_N]
+        if approach[k] == 0.0:
+            # a worn profile can close in on a journal that does not move towards it
+            nearer = rate > 0.0 or end[k, DELTA] > start[k, DELTA]
+            if end[k, DELTA] >= -TOUCH and nearer:
+                begin_contact(k, joint, speed_floor, t + h, rate, approach, recent, impact, impacts)
+                changed = True
+            continue
+        top = force
+        if recent[k, 3] >= force and recent[k, 3] >= recent[k, 1] and recent[k, 0] < recent[k, 2]:
+            top = parabola_peak(recent[k, 0], recent[k, 1], recent[k, 2], recent[k, 3], t + h, force)
+        raise_peak(peak, impact, impacts, joint[k], top)
+        recent[k, 0], recent[k, 1], recent[k, 2], recent[k, 3] = recent[k, 2], recent[k, 3], t + h, force
+        if end[k, DELTA] <= 0.0 and rate < 0.0:
+            end_impact(impact, impacts, joint[k], t + h * _crossing(0.0, 1.0, False, h, k, start, end))
+            approach[k] = 0.0
+            changed = True
+    return changed

@@ -1,0 +1,1 @@
+"""What every run needs: drive, run statistics, integrator formulas, the Run protocol."""

@@ -1,0 +1,85 @@
+"""What a simulation needs of a formulation, and what it is told."""
+
+from typing import NamedTuple, Protocol
+
+import attrs
+
+from leg_wear_monitor.contact.arrays import ContactArrays
+from leg_wear_monitor.dynamics.run.run_statistics import Tally
+from leg_wear_monitor.errors import SimulationError
+from leg_wear_monitor.mechanism.arrays import Floats
+from leg_wear_monitor.mechanism.position import Linkage
+from leg_wear_monitor.wear.surfaces import Surfaces
+
+DONE, STEP_TOO_SMALL, SINGULAR, PUSHED_THROUGH, INVALID_DRIVE = 0, 1, 2, 3, 4
+
+_REASONS = {
+    STEP_TOO_SMALL: (
+        "the step that resolves the motion fell to nothing; "
+        "look for a mass, inertia or stiffness far out of range"
+    ),
+    SINGULAR: "the closures became singular; look for a dead point, or try smaller clearances",
+    PUSHED_THROUGH: (
+        "the journal was pushed through a tenth of the bushing's radius; "
+        "try a lower speed, a smaller clearance or a higher stiffness"
+    ),
+    INVALID_DRIVE: "the crank's motion is not finite or far too fast; look at its speed and acceleration",
+}
+
+
+@attrs.frozen(eq=False)
+class Setup:
+    """A leg ready to run.
+
+    Attributes
+    ----------
+    linkage : Linkage
+    loose : tuple of str
+        Names of the loose joints, in the order of ``contacts``.
+    contacts : ContactArrays
+    surfaces : Surfaces
+        Changed as the run goes.
+    speed : float
+        Of the crank at the start [rad/s].
+    """
+
+    linkage: Linkage
+    loose: tuple[str, ...]
+    contacts: ContactArrays
+    surfaces: Surfaces
+    speed: float
+
+
+class Sample(NamedTuple):
+    """One instant: crank angle [rad], toe (2,) [m] or None, drive torque [N m], joint forces (j,) [N]."""
+
+    crank_angle: float
+    toe: Floats | None
+    drive_torque: float
+    force: Floats
+
+
+class Run(Protocol):
+    """A formulation of the leg's motion, somewhere in time."""
+
+    @property
+    def time(self) -> float:
+        """Time reached [s]."""
+
+    @property
+    def stored_energy(self) -> float:
+        """Kinetic and potential energy, that of gravity, springs and contacts [J]."""
+
+    def advance(self, t_end: float, tally: Tally) -> None:
+        """Go on to a time [s] and add to a tally; raises SimulationError where the motion diverges."""
+
+    def sample(self) -> Sample:
+        """The leg as it is now."""
+
+
+def stop(setup: Setup, status: int, k: int, time: float) -> SimulationError:
+    """Error of a run that had to stop: loose joint k (-1 if none) at a time [s]."""
+    where = f"joint {setup.loose[k]} " if k >= 0 else ""
+    return SimulationError(
+        f"{setup.linkage.mechanism.source}: {where}at t = {time:.6g} s: {_REASONS[status]}"
+    )

@@ -1,0 +1,280 @@
+"""A leg's life: a few gait cycles of a few legs are simulated, their mean wear jumps over many.
+
+::
+
+    run = LifeRun(mechanism, LifeSettings())
+    run.jump()                                  # as often as wanted: one jump, a fraction of a second
+    life = simulate_life(mechanism, limit_m=6.0e-4, horizon_cycles=1.0e8)
+
+A life under wear coefficients that are all larger by one factor is the same life, run through that much
+faster: wear enters by coefficient times cycles only. See `monitor.forecast` for coefficients that differ.
+"""
+
+from collections.abc import Callable, Sequence
+from typing import NamedTuple
+
+import attrs
+import numpy as np
+from numpy.typing import ArrayLike
+
+from leg_wear_monitor.configuration.quantity import described, quantity
+from leg_wear_monitor.dynamics.batch.batch import advance_batch
+from leg_wear_monitor.dynamics.batch.leg import Leg, prepare_legs
+from leg_wear_monitor.dynamics.clearance.run import ClearanceStepper
+from leg_wear_monitor.dynamics.clearance.tables import build_tables
+from leg_wear_monitor.dynamics.run.drive import steady_drive
+from leg_wear_monitor.dynamics.run.protocol import DONE, Setup, stop
+from leg_wear_monitor.dynamics.run.run_statistics import ARCHARD, Tally, new_tally
+from leg_wear_monitor.errors import ConfigError, SimulationError
+from leg_wear_monitor.life.limits import MOST_JUMPS, check_life
+from leg_wear_monitor.life.result import Life, LifePoint, life_of
+from leg_wear_monitor.mechanism.arrays import Floats
+from leg_wear_monitor.mechanism.ideal import TURN
+from leg_wear_monitor.mechanism.plausible import suspects
+from leg_wear_monitor.mechanism.spec import Mechanism
+from leg_wear_monitor.wear.cycle_jump import (
+    JumpControl,
+    WearRate,
+    jump_error,
+    longest_jump,
+    next_jump,
+    wear_rate,
+)
+
+_TRIALS = 4  # of a jump whose error is too large, before it is taken all the same, and says so
+
+
+@attrs.frozen(kw_only=True)
+class LifeSettings:
+    """How a life is simulated."""
+
+    legs: int = quantity("", "legs whose wear is averaged, alike but for their start", at_least=1, default=2)
+    cycles: int = quantity("", "gait cycles of each that are averaged, before a jump", at_least=2, default=4)
+    settle_cycles: int = quantity(
+        "", "gait cycles before those, since the surfaces have changed", at_least=0, default=1
+    )
+    perturb_share: float = quantity(
+        "",
+        "journals start up to this share of the smallest clearance from the centre",
+        at_least=0.0,
+        at_most=1.0,
+        default=0.5,
+    )
+    jump: JumpControl = described("how far a jump may go", factory=JumpControl)
+    seed: int = quantity("", "of where legs start", at_least=0, default=0)
+
+
+class _Probe(NamedTuple):
+    """Mean of the cycles simulated at one state of wear: what `LifePoint` has of them."""
+
+    rate: WearRate
+    archard_j: Floats
+    peak_force_n: Floats
+    toe_position_m: float
+
+
+class LifeRun:
+    """A leg somewhere in its life, that goes on jump by jump.
+
+    Parameters
+    ----------
+    mechanism : Mechanism
+    settings : LifeSettings, optional
+    clearances : sequence of str, optional
+        Names of the loose joints; the mechanism's own if not given.
+    clearance_m, speed_rpm : float, optional
+        The mechanism's own if not given.
+    wear_factor : float or (k,) array
+        On the wear coefficients of the loose joints.
+    depth : (k, 2, N) array, optional
+        Wear to begin with [m]; none if not given.
+    workers : int
+        Threads.
+
+    Attributes
+    ----------
+    loose : tuple of str
+    fresh_m, radius_m : (k,) arrays
+        Radial clearances without wear, and radii of the bushings.
+    settings : LifeSettings
+    points : list of LifePoint
+        The life so far; the first is where it began.
+
+    Raises
+    ------
+    ConfigError, AssemblyError
+    """
+
+    def __init__(
+        self,
+        mechanism: Mechanism,
+        settings: LifeSettings | None = None,
+        *,
+        clearances: Sequence[str] | None = None,
+        clearance_m: float | None = None,
+        speed_rpm: float | None = None,
+        wear_factor: ArrayLike = 1.0,
+        depth: Floats | None = None,
+        workers: int = 1,
+    ) -> None:
+        self.settings = settings or LifeSettings()
+        self._workers = workers
+        alike = Leg(
+            mechanism=mechanism,
+            clearances=clearances,
+            clearance_m=clearance_m,
+            speed_rpm=speed_rpm,
+            wear=True,
+        )
+        legs = _spread_out(alike, self.settings)
+        self._setups = _setups(legs, wear_factor)
+        first = self._setups[0]
+        if not first.loose:
+            raise ConfigError(mechanism.source, "clearances.joints", "no joint is loose, nothing can wear")
+        self.loose, self.fresh_m = first.loose, first.contacts.clearance
+        self.radius_m = first.contacts.bushing_radius
+        tables = build_tables(first.linkage, first.contacts)
+        self._steppers = [ClearanceStepper(setup, tables=tables) for setup in self._setups]
+        self._polynomials = []
+        perturb_m = self.settings.perturb_share * float(self.fresh_m.min())
+        for leg, stepper in zip(legs, self._steppers, strict=True):
+            attrs.evolve(leg, perturb_m=perturb_m).start(stepper)
+            self._polynomials.append(steady_drive(leg.crank_angle_rad, first.speed))
+        start = np.zeros_like(first.surfaces.depth) if depth is None else depth.copy()
+        now = self._now = self._probe(start)
+        self._wish = longest_jump(now.rate, self.settings.jump)
+        none = np.zeros_like(now.archard_j)
+        self.points = [LifePoint(0.0, start, now.rate, now.peak_force_n, now.toe_position_m, none, 0.0)]
+
+    def jump(self, most_cycles: float = np.inf) -> LifePoint:
+        """Go on by one jump, of at most so many gait cycles.
+
+        Raises
+        ------
+        SimulationError
+            Where the motion diverges.
+        """
+        control, last, now = self.settings.jump, self.points[-1], self._now
+        cycles = min(self._wish, longest_jump(now.rate, control), most_cycles)
+        for trial in range(_TRIALS):
+            then = self._probe(last.depth + cycles * now.rate.depth)
+            error = float(jump_error(now.rate, then.rate, cycles).max())
+            wish = next_jump(cycles, error, control)
+            if error <= control.tolerance_m or trial == _TRIALS - 1:
+                break
+            cycles = wish
+        depth = last.depth + 0.5 * cycles * (now.rate.depth + then.rate.depth)
+        worked = last.archard_j + 0.5 * cycles * (now.archard_j + then.archard_j)
+        self._now, self._wish = then, wish
+        at, peak, toe = last.cycles + cycles, then.peak_force_n, then.toe_position_m
+        self.points.append(LifePoint(at, depth, then.rate, peak, toe, worked, error))
+        return self.points[-1]
+
+    def hold(self, k: int) -> None:
+        """Let joint k wear no further, as if its part were replaced before its clearance opens more."""
+        depth = self._now.rate.depth.copy()
+        depth[k] = 0.0
+        self._now = self._now._replace(rate=attrs.evolve(self._now.rate, depth=depth))
+        for setup in self._setups:
+            setup.contacts.wear_coefficient[k] = 0.0
+
+    @property
+    def life(self) -> Life:
+        """The life so far."""
+        return life_of(self.loose, self.fresh_m, self.points)
+
+    def _probe(self, depth: Floats) -> _Probe:
+        """Simulate a few cycles with surfaces (k, 2, N) [m]."""
+        for setup in self._setups:
+            setup.surfaces.depth[:] = depth
+        self._advance(self.settings.settle_cycles)
+        worn, archard, peak, toe = [], [], [], []
+        for _ in range(self.settings.cycles):
+            before = [setup.surfaces.depth.copy() for setup in self._setups]
+            tallies = self._advance(1)
+            joints = self._setups[0].contacts.joint
+            worn += [setup.surfaces.depth - was for setup, was in zip(self._setups, before, strict=True)]
+            archard += [tally.integral[joints, ARCHARD] for tally in tallies]
+            peak += [tally.peak[joints] for tally in tallies]
+            toe += [tally.response[0] for tally in tallies]
+        rate = wear_rate(np.array(worn), self.settings.jump.smooth_deg)
+        return _Probe(rate, np.mean(archard, axis=0), np.mean(peak, axis=0), float(np.mean(toe)))
+
+    def _advance(self, cycles: int) -> list[Tally]:
+        joints = len(self._setups[0].linkage.mechanism.joints)
+        tallies = [new_tally(joints) for _ in self._steppers]
+        period = TURN / abs(self._setups[0].speed)
+        ends = [(round(stepper.time / period) + cycles) * period for stepper in self._steppers]
+        outcomes = advance_batch(self._steppers, self._polynomials, ends, tallies, self._workers)
+        for (status, k), setup, stepper in zip(outcomes, self._setups, self._steppers, strict=True):
+            if status != DONE:
+                stopped = stop(setup, status, k, stepper.time)
+                raise SimulationError(f"{stopped}{suspects(setup.linkage.mechanism)}")
+        return tallies
+
+
+def simulate_life(
+    run: LifeRun,
+    *,
+    limit_m: ArrayLike,
+    horizon_cycles: float,
+    progress: Callable[[float], None] | None = None,
+) -> Life:
+    """Go on until a mean clearance reaches its limit, or to a horizon.
+
+    Parameters
+    ----------
+    run : LifeRun
+        Goes on from where it is.
+    limit_m : float or (k,) array
+        Of the mean radial clearance of each loose joint.
+    horizon_cycles : float
+        Gait cycles at most, since the run began.
+    progress : callable, optional
+        Called with the share that is done.
+
+    Raises
+    ------
+    ConfigError
+        If a limit does not lie between a joint's new clearance and the radius of its bushing, or if the run's
+        jumps are too short to get there.
+    SimulationError
+        Where the motion diverges, or if the life takes more than `MOST_JUMPS` jumps.
+    """
+    limits = np.broadcast_to(np.asarray(limit_m, dtype=float), len(run.loose))
+    check_life(run.loose, run.fresh_m, run.radius_m, limits, run.settings.jump)
+    while run.points[-1].cycles < horizon_cycles:
+        if len(run.points) > MOST_JUMPS:
+            raise SimulationError(
+                f"the life does not end within {MOST_JUMPS} jumps, it is at {run.points[-1].cycles:.3g} "
+                f"of {horizon_cycles:.3g} gait cycles; try longer jumps or a nearer limit"
+            )
+        opened = run.points[-1].opened_m
+        shares = opened / (limits - run.fresh_m)
+        if (shares >= 1.0).any():
+            break
+        if not run.points[-1].rate.clearance.max() > 0.0:
+            break
+        run.jump(horizon_cycles - run.points[-1].cycles)
+        if progress:
+            progress(float(min(1.0, max(shares.max(), run.points[-1].cycles / horizon_cycles))))
+    return run.life
+
+
+def _spread_out(leg: Leg, settings: LifeSettings) -> list[Leg]:
+    """Legs alike, but for where they start."""
+    return [
+        attrs.evolve(leg, crank_angle_rad=TURN * (i + 0.5) / settings.legs, seed=settings.seed + i)
+        for i in range(settings.legs)
+    ]
+
+
+def _setups(legs: Sequence[Leg], wear_factor: ArrayLike) -> list[Setup]:
+    setups = []
+    for setup in prepare_legs(legs):
+        if not isinstance(setup, Setup):
+            raise setup
+        factor = np.broadcast_to(np.asarray(wear_factor, dtype=float), len(setup.loose))
+        coefficient = setup.contacts.wear_coefficient * factor[:, None]
+        setups.append(attrs.evolve(setup, contacts=setup.contacts._replace(wear_coefficient=coefficient)))
+    return setups

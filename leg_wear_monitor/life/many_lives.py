@@ -1,0 +1,125 @@
+"""Lives whose wear coefficients differ, so that together they show how the joints act upon each other."""
+
+from collections.abc import Callable, Iterator
+from itertools import islice
+from typing import Any
+
+import attrs
+import numpy as np
+
+from leg_wear_monitor.life.life import LifeRun, LifeSettings, simulate_life
+from leg_wear_monitor.life.result import Life
+from leg_wear_monitor.mechanism.arrays import Floats
+from leg_wear_monitor.mechanism.spec import Mechanism
+
+LEAST_SHARE = 0.05  # of the way to its limit that a joint opens in every life
+LEAST_OPENING = 1.0e-3  # of the first joint's: one that hardly wears is not hurried without bound
+_DIGITS = 6
+
+
+def simulate_lives(
+    mechanism: Mechanism,
+    settings: LifeSettings,
+    number: int,
+    *,
+    limit_m: float,
+    horizon_cycles: float,
+    wear_factor: float = 1.0,
+    speed_rpm: float | None = None,
+    progress: Callable[[float], None] = lambda _share: None,
+) -> Iterator[tuple[Floats, Life]]:
+    """Lives one by one, each with the factors (k,) on its wear coefficients: the nominal one, then others.
+
+    Parameters
+    ----------
+    mechanism : Mechanism
+    settings : LifeSettings
+    number : int
+        Of lives.
+    limit_m, horizon_cycles : float
+        As in `simulate_life`.
+    wear_factor : float
+        On all wear coefficients.
+    speed_rpm : float, optional
+    progress : callable
+        Called with the share of all lives that is done.
+
+    Raises
+    ------
+    ConfigError, SimulationError
+    """
+
+    def life(index: int, factor: Floats) -> tuple[Floats, Life]:
+        own = attrs.evolve(settings, seed=settings.seed + index * settings.legs)
+        run = LifeRun(mechanism, own, speed_rpm=speed_rpm, wear_factor=factor)
+        done = simulate_life(
+            run,
+            limit_m=limit_m,
+            horizon_cycles=horizon_cycles,
+            progress=lambda share: progress((index + share) / number),
+        )
+        return factor, done
+
+    first = life(0, np.full(len(mechanism.loose), wear_factor))
+    yield first
+    for index, factor in enumerate(islice(spread_factors(first[1]), number - 1), start=1):
+        yield life(index, wear_factor * factor)
+
+
+def spread_factors(nominal: Life) -> Iterator[Floats]:
+    """Factors (k,) on the wear coefficients, life by life, without end.
+
+    Where lives end, clearances are to be spread evenly: in each the first joint opens all the way, and the
+    others by shares of an evenly spread sequence (Roberts's additive recurrence), if they grow as in the
+    nominal life.
+
+    Parameters
+    ----------
+    nominal : Life
+        With factors of 1.
+    """
+    opened = nominal.clearance_m[-1] - nominal.clearance_m[0]
+    opened = np.maximum(opened, LEAST_OPENING * opened.max())
+    step = _root(len(opened)) ** -np.arange(1.0, len(opened) + 1.0)
+    number = 0
+    while True:
+        number += 1
+        share = LEAST_SHARE + (1.0 - LEAST_SHARE) * ((0.5 + number * step) % 1.0)
+        yield np.asarray(share / share.max() * opened.max() / opened)
+
+
+def lives_document(lives: list[tuple[Floats, Life]]) -> dict[str, Any]:
+    """Plain object for JSON: the nominal life, and of the further ones what the forecast needs."""
+    (factor, nominal), *further = lives
+    return {
+        "wear_factor": _by_joint(nominal, factor),
+        **nominal.to_dict(),
+        "further": [_short(factor, life) for factor, life in further],
+    }
+
+
+def _short(factor: Floats, life: Life) -> dict[str, Any]:
+    names = ("clearance_m", "growth_m_per_cycle")
+    columns = {name: _by_joint(life, getattr(life, name).T) for name in names}
+    joints = {joint: {name: columns[name][joint] for name in names} for joint in life.loose}
+    return {
+        "wear_factor": _by_joint(life, factor),
+        "cycles": _rounded(life.cycles),
+        "joints": joints,
+    }
+
+
+def _by_joint(life: Life, values: Floats) -> dict[str, Any]:
+    return dict(zip(life.loose, map(_rounded, values), strict=True))
+
+
+def _rounded(values: Floats) -> Any:
+    return np.vectorize(lambda value: float(f"{value:.{_DIGITS}g}"))(values).tolist()
+
+
+def _root(dimension: int) -> float:
+    """The number that is by one less than its power of dimension + 1."""
+    x = 1.5
+    for _ in range(60):
+        x = (1.0 + x) ** (1.0 / (dimension + 1))
+    return x

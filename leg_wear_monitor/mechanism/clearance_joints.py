@@ -1,0 +1,73 @@
+"""The section ``clearances`` of a mechanism file: defaults merged with each joint's own settings."""
+
+from collections.abc import Mapping
+from typing import Any
+
+import attrs
+
+from leg_wear_monitor.configuration.quantity import FieldError
+from leg_wear_monitor.configuration.strict import choose, shown, structure
+from leg_wear_monitor.errors import ConfigError
+from leg_wear_monitor.mechanism.clearance import Clearance, ClearanceSection, Pair
+from leg_wear_monitor.mechanism.spec import PrismaticJoint, RevoluteJoint
+
+_REQUIRED = {field.name for field in attrs.fields(Clearance) if field.default is attrs.NOTHING}
+
+
+def loose_joints(
+    section: ClearanceSection, joints: Mapping[str, RevoluteJoint | PrismaticJoint], source: str
+) -> tuple[dict[str, Clearance], tuple[str, ...]]:
+    """Settings of every revolute joint that has a full set, and the names of those that are loose.
+
+    Raises
+    ------
+    ConfigError
+        Naming the key, among the joint's own settings or the defaults, whichever holds the fault.
+    """
+    own = section.joints if isinstance(section.joints, dict) else {name: {} for name in section.joints}
+    revolute = [name for name, joint in joints.items() if isinstance(joint, RevoluteJoint)]
+    for name in own:
+        if name not in revolute:
+            what = "is a prismatic joint" if name in joints else "is no joint"
+            raise ConfigError(
+                source,
+                f"clearances.joints.{name}",
+                f"{what}, only a revolute one can be loose: {', '.join(revolute)}",
+            )
+    # Defaults that are complete serve a joint that is named only on the command line.
+    named = revolute if set(section.defaults) >= _REQUIRED or (section.defaults and not own) else own
+    settings = {
+        name: _settings(section.defaults, own.get(name, {}), source, name)
+        for name in revolute
+        if name in named
+    }
+    return settings, tuple(own)
+
+
+def _settings(defaults: dict[str, Any], own: Any, source: str, name: str) -> Clearance:
+    """One joint's settings; what is wrong is told where it stands in the file."""
+    place = f"clearances.joints.{name}"
+    own = structure({} if own is None else own, dict[str, Any], source, place)
+    merged = defaults | own
+    if isinstance(defaults.get("friction"), dict) and isinstance(own.get("friction"), dict):
+        merged["friction"] = defaults["friction"] | own["friction"]
+    try:
+        settings: Clearance = structure(merged, Clearance, source, "")
+    except ConfigError as error:
+        key = error.key.split(".")[0]
+        if key in defaults and key not in own:
+            place = "clearances.defaults"
+        raise ConfigError(source, f"{place}.{error.key}", error.fault) from error
+    return settings
+
+
+def _list_or_mapping(value: Any) -> tuple[Any, Any]:
+    if isinstance(value, list) and any(value.count(name) > 1 for name in value):
+        raise FieldError("", f"{shown(value)} names a joint twice")
+    if not isinstance(value, list | dict):
+        raise FieldError("", f"{shown(value)} is not a list of names, nor a mapping of names to settings")
+    return (tuple[str, ...] if isinstance(value, list) else dict[str, Any]), value
+
+
+choose(tuple[str, ...] | dict[str, Any], _list_or_mapping)
+choose(Pair, lambda value: (tuple[float, float], value if isinstance(value, list) else [value, value]))

@@ -1,0 +1,1 @@
+"""ROS messages without ROS: CDR codec, definitions, decoding of inputs, encoding of outputs."""

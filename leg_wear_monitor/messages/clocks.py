@@ -1,0 +1,57 @@
+"""Whether the times of a recording agree: stamps in headers, and when messages were logged."""
+
+import numpy as np
+from numpy.typing import NDArray
+
+from leg_wear_monitor.messages.cdr import FLOAT64, JOINT_STATE
+from leg_wear_monitor.twin.sample import NO_FAULT, Samples
+
+_SHARE, _LEAST_NS = 0.05, 1_000_000_000
+_NAMES = {JOINT_STATE: "joint_states", 2: "drive_torque"}
+
+
+class Clocks:
+    """First and last stamps and log times of each type of message."""
+
+    def __init__(self) -> None:
+        self._ends: dict[int, tuple[int, int, int, int]] = {}
+
+    def compare(self, samples: Samples, messages: NDArray[np.void]) -> None:
+        """Take account of messages and what was decoded from them.
+
+        Parameters
+        ----------
+        samples : (n,) array of GAIT_SAMPLE
+            Stamped by their headers.
+        messages : (n,) array of MESSAGE
+        """
+        good = samples["fault"] == NO_FAULT
+        for kind in np.unique(messages["type"][good]).tolist():
+            chosen = np.flatnonzero(good & (messages["type"] == kind))
+            stamps, times = samples["stamp_ns"][chosen], messages["log_time_ns"][chosen]
+            first = self._ends.get(kind, (int(stamps[0]), int(times[0])))[:2]
+            self._ends[kind] = (*first, int(stamps[-1]), int(times[-1]))
+
+    def notes(self) -> list[str]:
+        """What does not agree, one line each."""
+        notes = [note for kind, name in _NAMES.items() if (note := self._rate(kind, name))]
+        joints, torque = self._ends.get(JOINT_STATE), self._ends.get(FLOAT64)
+        if joints and torque and abs(joints[1] - joints[0]) > _LEAST_NS:
+            apart = (joints[1] - joints[0]) / 1e9
+            notes.append(
+                f"drive_torque has no header and takes its log time, which is {apart:.6g} s after the header "
+                "stamps of joint_states: they do not meet, try --time log"
+            )
+        return notes
+
+    def _rate(self, kind: int, name: str) -> str | None:
+        if kind not in self._ends:
+            return None
+        first, first_log, last, last_log = self._ends[kind]
+        span, span_log = last - first, last_log - first_log
+        if abs(span - span_log) <= max(_LEAST_NS, _SHARE * abs(span_log)):
+            return None
+        return (
+            f"{name}: header stamps span {span / 1e9:.6g} s, log times {span_log / 1e9:.6g} s; header stamps "
+            "count unless --time says otherwise"
+        )

@@ -1,0 +1,203 @@
+"""From reports to the messages on the monitor's topics, as bytes: the same live and in replay."""
+
+import math
+from collections.abc import Iterable, Iterator, Sequence
+
+import attrs
+import numpy as np
+from numpy.typing import NDArray
+
+from leg_wear_monitor.messages import encode
+from leg_wear_monitor.messages.qos import LATCHED, RELIABLE, SENSOR_DATA, Qos
+from leg_wear_monitor.monitor.alarms.alarm import Alarm, Level
+from leg_wear_monitor.monitor.alarms.words import state_of
+from leg_wear_monitor.monitor.config.parameter_file import NODE
+from leg_wear_monitor.monitor.config.settings import MonitorConfig
+from leg_wear_monitor.monitor.forecast.forecast import LegForecast
+from leg_wear_monitor.monitor.forecast.words import lifetime_values
+from leg_wear_monitor.monitor.reports import (
+    AlarmList,
+    CycleReport,
+    JointReport,
+    Reports,
+    SampleReports,
+    Status,
+)
+from leg_wear_monitor.twin.sample import CRANK
+
+
+@attrs.frozen
+class Output:
+    """A topic of the monitor: its name seen from the node, its type and what it offers."""
+
+    name: str
+    type: str
+    qos: Qos = RELIABLE
+
+
+CLEARANCES = Output("~/clearance_states", encode.JOINT_STATE)
+IMPACTS = Output("~/impact_forces", encode.JOINT_STATE, SENSOR_DATA)
+TORQUE = Output("~/predicted_torque", encode.WRENCH_STAMPED, SENSOR_DATA)
+FORECAST = Output("~/forecast", encode.DIAGNOSTIC_ARRAY)
+ALARMS = Output("~/alarms", encode.DIAGNOSTIC_ARRAY, LATCHED)
+DIAGNOSTICS = Output("/diagnostics", encode.DIAGNOSTIC_ARRAY)
+OUTPUTS = (CLEARANCES, IMPACTS, TORQUE, FORECAST, ALARMS, DIAGNOSTICS)
+
+_AXES = {"x": 0, "y": 1, "z": 2}
+_KEY_UNITS = {"m/h": "m_per_hour", "N m": "nm"}
+_DIGITS = 15
+
+
+@attrs.frozen(eq=False)
+class Outgoing:
+    """Messages for one topic.
+
+    Attributes
+    ----------
+    output : Output
+    stamp_ns : (n,) array of int
+    messages : (n, bytes) array of uint8
+        A message a row.
+    """
+
+    output: Output
+    stamp_ns: NDArray[np.int64]
+    messages: NDArray[np.uint8]
+
+
+class Messages:
+    """Makes messages of reports.
+
+    Parameters
+    ----------
+    config : MonitorConfig
+    loose : sequence of str
+        The loose joints, in the order of the reports.
+    node : str
+        Full name of the node. It stands before the names in diagnostics, without the leading slash.
+    """
+
+    def __init__(self, config: MonitorConfig, loose: Sequence[str], node: str = NODE) -> None:
+        self.config, self._node = config, node.lstrip("/")
+        self._clearances = [f"{joint}_clearance" for joint in loose]
+        self._impacts = [f"{joint}_impact" for joint in loose]
+
+    def of(self, reports: Reports) -> Iterator[Outgoing]:
+        """All messages that reports make: of samples, of gait cycles, of alarms."""
+        yield from self.of_samples(reports.samples)
+        for cycle in reports.cycles:
+            yield _single(CLEARANCES, cycle.stamp_ns, self.clearances(cycle))
+        for alarms in reports.alarms:
+            yield _single(ALARMS, alarms.stamp_ns, self.alarms(alarms))
+
+    def of_samples(self, samples: SampleReports) -> Iterator[Outgoing]:
+        """Torque at each sample that was followed, contact forces at each of the crank."""
+        followed = np.isfinite(samples.predicted_torque_nm)
+        if followed.any():
+            yield self._torques(samples, followed)
+        followed &= samples.kind == CRANK
+        if self.config.publish_impact_forces and followed.any():
+            yield self._forces(samples, followed)
+
+    def _torques(self, samples: SampleReports, which: NDArray[np.bool_]) -> Outgoing:
+        stamps = samples.stamp_ns[which]
+        torque = np.zeros((len(stamps), 3))
+        torque[:, _AXES[self.config.drive_torque.axis]] = samples.predicted_torque_nm[which]
+        return Outgoing(TORQUE, stamps, encode.wrenches(stamps, torque=torque, frame_id=self.config.frame_id))
+
+    def _forces(self, samples: SampleReports, which: NDArray[np.bool_]) -> Outgoing:
+        stamps, forces = samples.stamp_ns[which], samples.contact_force_n[which]
+        rows = encode.joint_states(stamps, self._impacts, effort=forces, frame_id=self.config.frame_id)
+        return Outgoing(IMPACTS, stamps, rows)
+
+    def clearances(self, cycle: CycleReport) -> bytes:
+        """The message of `CLEARANCES` for a gait cycle."""
+        joints = cycle.joints
+        growth = [math.nan if joint.growth_mps is None else joint.growth_mps for joint in joints]
+        row = encode.joint_states(
+            [cycle.stamp_ns],
+            self._clearances,
+            position=[[joint.clearance_m for joint in joints]],
+            velocity=[growth],
+            effort=[[joint.peak_force_n for joint in joints]],
+            frame_id=self.config.frame_id,
+        )
+        raw: bytes = row[0].tobytes()
+        return raw
+
+    def forecast(self, cycle: CycleReport) -> bytes:
+        """The message of `FORECAST` after a gait cycle: how long each joint lasts, and the leg."""
+        leg = [] if cycle.forecast is None else [_leg_lifetime(cycle.forecast)]
+        return self._array(cycle.stamp_ns, [*map(_lifetime, cycle.joints), *leg])
+
+    def alarms(self, alarms: AlarmList) -> bytes:
+        """The message of `ALARMS`: all of them, as they stand."""
+        return self._array(alarms.stamp_ns, map(_alarm, alarms.alarms))
+
+    def diagnostics(self, stamp_ns: int, statuses: Iterable[Status]) -> bytes:
+        """The message of `DIAGNOSTICS`."""
+        return self._array(stamp_ns, statuses)
+
+    def _array(self, stamp_ns: int, statuses: Iterable[Status]) -> bytes:
+        hardware = self.config.hardware
+        lines = [
+            (
+                f"{self._node}: {status.name}",
+                int(status.level),
+                status.message,
+                hardware,
+                {key: plain(value) for key, value in status.values.items()},
+            )
+            for status in statuses
+        ]
+        return encode.diagnostic_array(stamp_ns, lines)
+
+
+def _single(output: Output, stamp_ns: int, raw: bytes) -> Outgoing:
+    return Outgoing(output, np.array([stamp_ns], np.int64), np.frombuffer(raw, np.uint8)[None, :])
+
+
+def topic_of(output: Output, node: str) -> str:
+    """Full name of a topic, for a node such as ``/robot/leg_wear_monitor``."""
+    return node + output.name[1:] if output.name.startswith("~") else output.name
+
+
+def plain(value: float) -> str:
+    """A number as text: whole ones without a point, others with fifteen digits."""
+    return str(int(value)) if float(value).is_integer() else f"{value:.{_DIGITS}g}"
+
+
+def _alarm(alarm: Alarm) -> Status:
+    key = _KEY_UNITS.get(alarm.unit, alarm.unit.lower())
+    suffix = f"_{key}" if key else ""
+    values = {
+        f"value{suffix}": alarm.value,
+        f"limit{suffix}": alarm.limit,
+        f"worst{suffix}": alarm.worst,
+        "raised_s": alarm.raised_ns / 1e9,
+        "acknowledged": float(alarm.acknowledged),
+        "present_level": float(alarm.present),
+    }
+    return Status(alarm.name, alarm.level, state_of(alarm), values)
+
+
+def _lifetime(joint: JointReport) -> Status:
+    values: dict[str, float] = {}
+    if joint.remaining is not None:
+        values = {"remaining_cycles": joint.remaining.cycles, "remaining_hours": joint.remaining.hours}
+    name, told = f"forecast {joint.joint}", joint.forecast
+    if told is None:
+        words = "if it goes on as it does" if values else "too little growth or data to say"
+        return Status(name, Level.OK, words, values)
+    values |= lifetime_values(told)
+    values |= {f"clearance_{share}_m": value for share, value in attrs.asdict(told.clearance_m).items()}
+    values["measurements"] = float(told.measurements)
+    return Status(name, Level.OK, told.answer.value, values)
+
+
+def _leg_lifetime(told: LegForecast) -> Status:
+    """Until the first joint reaches its limit; the probability of each to be the first."""
+    values = lifetime_values(told)
+    values |= {f"{joint}_first_probability": value for joint, value in told.first_probability.items()}
+    values["simulated_lives"] = float(told.simulated_lives)
+    return Status("forecast leg", Level.OK, told.answer.value, values)

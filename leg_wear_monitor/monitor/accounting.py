@@ -1,0 +1,297 @@
+"""The books: counters over all runs of the monitor, what time is counted, and the entries of the ledger."""
+
+from collections.abc import Iterable, Mapping
+
+import attrs
+import numpy as np
+from numpy.typing import NDArray
+
+from leg_wear_monitor.errors import LegWearError
+from leg_wear_monitor.mechanism.arrays import Floats, Ints
+from leg_wear_monitor.monitor.alarms.alarm import Alarm, Level
+from leg_wear_monitor.monitor.config.settings import LedgerFile
+from leg_wear_monitor.monitor.evaluation.torque_record import FRICTION_KEY, SIGMA_KEY
+from leg_wear_monitor.monitor.inputs.pauses import Pauses
+from leg_wear_monitor.monitor.ledger.entry import (
+    AlarmEvent,
+    ClearancePoint,
+    Entry,
+    Event,
+    ForecastPoint,
+    JointWear,
+)
+from leg_wear_monitor.monitor.ledger.ledger import Ledger
+from leg_wear_monitor.monitor.reports import AlarmList, CycleReport
+from leg_wear_monitor.monitor.spans import NEIGHBOURS_NS, Spans, is_within, with_span
+from leg_wear_monitor.twin.digital_twin import DigitalTwin
+from leg_wear_monitor.twin.sample import Samples
+from leg_wear_monitor.twin.statistics import SampleFigures
+
+POINT_S = 600.0  # of walking, between two points of the clearances' history
+
+_SUMS = ("moving_s", "standing_s", "bridged_s", "unmonitored_s")
+
+
+@attrs.frozen
+class PartLife:
+    """When a joint's part was new: gait cycles and time in motion of the leg then, and the stamp."""
+
+    cycles: int = 0
+    moving_s: float = 0.0
+    replaced_ns: int = 0
+
+
+@attrs.define
+class BookState:
+    """What changes; every value is immutable, so a shallow copy is a snapshot.
+
+    Attributes
+    ----------
+    cycles : int
+        Over all runs.
+    parts : tuple of PartLife
+    spans : Spans
+        Time that this run has counted, by the present epoch of the clock.
+    past : tuple of (int, int, int)
+        Begin, end and epoch of what it counted by earlier ones.
+    anew : bool
+        Whether the clock began anew in this run, so that nothing that comes is counted already.
+    point_due_s : float
+        Time in motion at which the history wants its next point.
+    cut_off_s : float or None
+        What an earlier run lost, until it is acknowledged.
+    skipped, skipped_s, skipped_ns : int, float, int
+        Samples left out since they are counted, their time, and the stamp of the last.
+    shown : mapping of str to (Level, bool)
+        Of the alarms, what the history has last.
+    pauses : Pauses
+        Times in which nobody recorded.
+    commissioned : dict of str to float
+        What the ledger keeps of this leg's torque, by names that end in their unit.
+    """
+
+    cycles: int
+    parts: tuple[PartLife, ...]
+    spans: Spans = ()
+    past: tuple[tuple[int, int, int], ...] = ()
+    anew: bool = False
+    point_due_s: float = 0.0
+    cut_off_s: float | None = None
+    skipped: int = 0
+    skipped_s: float = 0.0
+    skipped_ns: int = 0
+    shown: Mapping[str, tuple[Level, bool]] = attrs.field(factory=dict)
+    pauses: Pauses = Pauses()
+    commissioned: dict[str, float] = attrs.field(factory=dict)
+
+
+def _is_apart(step_ns: Ints) -> NDArray[np.bool_]:
+    return np.asarray((step_ns < 0) | (step_ns > NEIGHBOURS_NS))
+
+
+class Book:
+    """Counts for the ledger, and writes to it when it is time.
+
+    Parameters
+    ----------
+    twin : DigitalTwin
+        Its wear is set to that of the ledger.
+    ledger : Ledger or None
+    settings : LedgerFile
+    """
+
+    def __init__(self, twin: DigitalTwin, ledger: Ledger | None, settings: LedgerFile) -> None:
+        self.ledger = ledger
+        self._twin = twin
+        self._checkpoint_ns = int(settings.checkpoint_s * 1.0e9)
+        self._counted = ledger.counted_ns if ledger and settings.skip_counted else np.zeros((0, 2), np.int64)
+        self._tried_ns = 0
+        entry = ledger.entry if ledger else None
+        self._before = entry.totals if entry else {}
+        self._kept_s = self._before.get("moving_s", 0.0)
+        self.state = BookState(
+            int(self._before.get("cycles", 0)),
+            (PartLife(),) * len(twin.loose),
+            cut_off_s=ledger.cut_off_s if ledger else None,
+        )
+        if entry:
+            self.state.commissioned = {
+                name: entry.totals[name] for name in (FRICTION_KEY, SIGMA_KEY) if name in entry.totals
+            }
+            self.state.shown = {a.name: (a.level, a.acknowledged) for a in entry.alarms}
+            self._take_over({joint.name: joint for joint in entry.joints})
+
+    def _take_over(self, joints: dict[str, JointWear]) -> None:
+        own = [joints[name] for name in self._twin.loose]
+        self._twin.set_depth(np.stack([joint.depth for joint in own]))
+        self.state.parts = tuple(
+            PartLife(
+                self.state.cycles - joint.cycles,
+                self._before["moving_s"] - joint.moving_s,
+                joint.replaced_ns,
+            )
+            for joint in own
+        )
+
+    @property
+    def unmonitored_s(self) -> float:
+        """Time in which the leg was not followed in this run.
+
+        What earlier runs have counted is not in it, nor are pauses between recordings.
+        """
+        unmonitored_s = self._twin.intake.unmonitored_s
+        return max(0.0, unmonitored_s - self.state.skipped_s - self.state.pauses.passed_s(unmonitored_s))
+
+    def pause(self, pause_s: float) -> None:
+        """Nobody records for a time [s], from the newest sample on."""
+        self.state.pauses = self.state.pauses.with_pause(pause_s, self._twin.intake.unmonitored_s)
+
+    @property
+    def totals(self) -> dict[str, float]:
+        """Counters over all runs."""
+        intake, before = self._twin.intake, self._before
+        now = {name: getattr(intake, name) for name in _SUMS} | {"unmonitored_s": self.unmonitored_s}
+        sums = {name: before.get(name, 0.0) + value for name, value in now.items()}
+        return {"cycles": float(self.state.cycles), **sums}
+
+    def not_counted(self, samples: Samples) -> Samples:
+        """Samples but those of a time whose wear is in the ledger from an earlier run."""
+        known = self.counted(samples)
+        if not known.any():
+            return samples
+        stamps = np.concatenate([[self.state.skipped_ns], samples["stamp_ns"][known]])
+        steps = np.diff(stamps)
+        self.state.skipped += len(steps)
+        self.state.skipped_s += 1.0e-9 * float(steps[(steps > 0) & (steps <= NEIGHBOURS_NS)].sum())
+        self.state.skipped_ns = int(stamps[-1])
+        return np.asarray(samples[~known])
+
+    def counted(self, samples: Samples) -> NDArray[np.bool_]:
+        """Which samples are of a time whose wear is in the ledger from an earlier run."""
+        if self.state.anew or not len(self._counted):
+            return np.zeros(len(samples), bool)
+        return is_within(samples["stamp_ns"], self._counted)
+
+    def begin_epoch(self) -> None:
+        """The clock has begun anew: stamps from now on are of another time than those before."""
+        epoch = self.ledger.epoch if self.ledger else 0
+        self.state.past = (*self.state.past, *((*span, epoch) for span in self.state.spans))
+        self.state.spans, self.state.anew = (), True
+        if self.ledger:
+            self.ledger.epoch += 1
+
+    @property
+    def not_kept_s(self) -> float:
+        """Time in motion since the last entry, which a kill would lose."""
+        return self.totals["moving_s"] - self._kept_s
+
+    def joint_wear(self, k: int, depth: Floats) -> JointWear:
+        """Wear of joint k as it is now; depth (loose, 2, N) of the twin."""
+        part, totals = self.state.parts[k], self.totals
+        return JointWear(
+            self._twin.loose[k],
+            depth[k],
+            self.state.cycles - part.cycles,
+            totals["moving_s"] - part.moving_s,
+            part.replaced_ns,
+        )
+
+    def wear_of(self, joint: str) -> JointWear:
+        """Wear of a joint as it is now; raises LegWearError for one that is not loose."""
+        return self.joint_wear(self._index(joint), self._twin.depth)
+
+    def _index(self, joint: str) -> int:
+        if joint not in self._twin.loose:
+            raise LegWearError(f"{joint}: no loose joint, expected one of {', '.join(self._twin.loose)}")
+        return self._twin.loose.index(joint)
+
+    def replace(self, joint: str, stamp_ns: int) -> JointWear:
+        """Fresh surfaces for a joint; its wear as it was."""
+        k = self._index(joint)
+        was = self.joint_wear(k, self._twin.depth)
+        self._twin.reset_wear(joint)
+        self._set_part(k, PartLife(self.state.cycles, self.totals["moving_s"], stamp_ns))
+        return was
+
+    def put_back(self, joint: str, before: JointWear) -> JointWear:
+        """Undo `replace`: the wear before and that since are of one part. Gives the wear since."""
+        k = self._index(joint)
+        since, depth = self.joint_wear(k, self._twin.depth), self._twin.depth
+        depth[k] += before.depth
+        self._twin.set_depth(depth)
+        begun_s = self.totals["moving_s"] - before.moving_s - since.moving_s
+        cycles = self.state.cycles - before.cycles - since.cycles
+        self._set_part(k, PartLife(cycles, begun_s, before.replaced_ns))
+        return since
+
+    def _set_part(self, k: int, part: PartLife) -> None:
+        self.state.parts = (*self.state.parts[:k], part, *self.state.parts[k + 1 :])
+
+    def followed(self, samples: SampleFigures) -> None:
+        """Take down the time in which the leg was followed."""
+        stamp = samples.stamp_ns[np.isfinite(samples.crank_angle_rad)]
+        if len(stamp):
+            for part in np.split(stamp, np.flatnonzero(_is_apart(np.diff(stamp))) + 1):
+                self.state.spans = with_span(self.state.spans, int(part[0]), int(part[-1]))
+
+    def note(self, event: Event) -> None:
+        """Take an event down for the ledger."""
+        if self.ledger:
+            self.ledger.note(event)
+
+    def note_alarms(self, change: AlarmList) -> None:
+        """Take down which alarms are shown otherwise than they were."""
+        shown = {alarm.name: (alarm.level, alarm.acknowledged) for alarm in change.alarms}
+        for alarm in change.alarms:
+            if shown[alarm.name] != self.state.shown.get(alarm.name, (Level.OK, False)):
+                self.note(AlarmEvent(change.stamp_ns, alarm))
+        self.state.shown = shown
+
+    def note_clearances(self, report: CycleReport) -> None:
+        """Take the clearances down, now and then."""
+        moving_s = self.totals["moving_s"]
+        if moving_s < self.state.point_due_s:
+            return
+        self.state.point_due_s = moving_s + POINT_S
+        for joint in report.joints:
+            if joint.forecast and joint.forecast.cycles:
+                quantiles = attrs.astuple(joint.forecast.cycles)
+                self.note(ForecastPoint(report.stamp_ns, report.cycle, joint.joint, *quantiles))
+            self.note(
+                ClearancePoint(
+                    report.stamp_ns, report.cycle, joint.joint, joint.clearance_m, joint.clearance_max_m
+                )
+            )
+
+    def keep_if_due(self, alarms: Iterable[Alarm]) -> None:
+        """Write an entry if the last is old enough, and there is something new to write."""
+        if self.ledger is None or self.ledger.at_end:
+            return
+        now = self._twin.intake.followed_stamp_ns
+        is_due = now and not 0 <= now - self._tried_ns < self._checkpoint_ns
+        if is_due and (self.not_kept_s > 0.0 or self.ledger.waiting or self.ledger.fault):
+            self.keep(alarms, whole=False)
+
+    def keep(self, alarms: Iterable[Alarm], closed: bool = False, whole: bool = True) -> bool:
+        """Write an entry; False without a ledger, or if it could not be written."""
+        if self.ledger is None:
+            return False
+        entry = self._entry(alarms)
+        self._tried_ns = self._twin.intake.followed_stamp_ns
+        kept = self.ledger.keep(entry, closed, whole=whole)
+        if kept:
+            self._kept_s = entry.totals["moving_s"]
+        return kept
+
+    def _entry(self, alarms: Iterable[Alarm]) -> Entry:
+        depth = self._twin.depth
+        epoch = self.ledger.epoch if self.ledger else 0
+        spans = (*self.state.past, *((*span, epoch) for span in self.state.spans))
+        return Entry(
+            stamp_ns=self._twin.intake.followed_stamp_ns or (self.ledger.kept_ns if self.ledger else 0),
+            joints=tuple(self.joint_wear(k, depth) for k in range(len(self._twin.loose))),
+            totals=self.totals | self.state.commissioned,
+            alarms=tuple(alarm for alarm in alarms if alarm.level is not Level.OK),
+            spans=tuple((begin, end) for begin, end, _ in spans),
+            span_epochs=tuple(of for *_, of in spans) if any(of for *_, of in spans) else (),
+        )

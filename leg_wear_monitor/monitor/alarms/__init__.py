@@ -1,0 +1,1 @@
+"""Alarms: levels, limits, deadband and latch, and their words."""

@@ -1,0 +1,1 @@
+"""Parameters of the monitor: declaration, bounds, files, agreement with the mechanism."""

@@ -1,0 +1,159 @@
+"""The mechanism as the parameters want it: which joints are loose, how far, and how fast they wear."""
+
+import math
+from collections.abc import Sequence
+from typing import Any
+
+import attrs
+
+from leg_wear_monitor.configuration.nearest import did_you_mean
+from leg_wear_monitor.configuration.quantity import FieldError
+from leg_wear_monitor.errors import ConfigError
+from leg_wear_monitor.mechanism.clearance import Clearance
+from leg_wear_monitor.mechanism.clearance_range import limit_fault
+from leg_wear_monitor.mechanism.spec import Mechanism, SpeedDrive
+from leg_wear_monitor.monitor.config.settings import MonitorConfig
+from leg_wear_monitor.twin.settings import TrackerSettings, TwinSettings
+
+_KEYS = {"radial_clearance": "clearances_m", "wear_coefficient": "wear_coefficients_per_pa"}
+
+
+def fitted(mechanism: Mechanism, config: MonitorConfig, source: str = "parameters") -> Mechanism:
+    """Mechanism with the loose joints, clearances, wear and speed of a configuration.
+
+    Parameters
+    ----------
+    mechanism : Mechanism
+    config : MonitorConfig
+    source : str
+        Where the configuration comes from, for messages.
+
+    Raises
+    ------
+    ConfigError
+        For joints that the mechanism does not have, lists of a wrong length, a clearance that does not fit,
+        or a mechanism that a torque drives.
+    """
+    if not isinstance(mechanism.drive, SpeedDrive):
+        raise ConfigError(
+            source, "mechanism", f"{config.mechanism!r} is driven by a torque, expected one with drive.speed"
+        )
+    loose = config.loose_joints or mechanism.loose
+    _check_joints(loose, mechanism, source)
+    speed = 2.0 * math.pi * (config.cadence.commanded_rpm / 60.0)
+    settings = {name: _settings(mechanism, config, loose, k, source) for k, name in enumerate(loose)}
+    leg = attrs.evolve(
+        mechanism,
+        loose=loose,
+        clearances=mechanism.clearances | settings,
+        drive=attrs.evolve(mechanism.drive, speed=speed),
+    )
+    check_limits(config, leg, source)
+    return leg
+
+
+def check_limits(config: MonitorConfig, mechanism: Mechanism, source: str = "parameters") -> None:
+    """Whether limits fit a mechanism as `fitted` gives it.
+
+    Raises
+    ------
+    ConfigError
+        If limits that are given one a joint are not one each, or if the limit of a clearance is beyond the
+        bushing's radius, which no clearance reaches.
+    """
+    loose, limits = mechanism.loose, config.limits
+    for name in ("joint_impact_force_n", "joint_clearance_m"):
+        given = getattr(limits, name)
+        if given and len(given) != len(loose):
+            raise _wrong_length(source, f"limits.{name}", given, loose, "")
+    key = "limits.joint_clearance_m" if limits.joint_clearance_m else "limits.clearance_m"
+    each = limits.joint_clearance_m or (limits.clearance_m,) * len(loose)
+    for joint, limit in zip(loose, each, strict=True):
+        clearance = mechanism.clearances[joint]
+        fault = limit_fault(joint, clearance.radial_clearance, clearance.bushing_radius, limit)
+        # a limit below the new clearance is not silent: it raises its alarm at once
+        if fault and limit > clearance.radial_clearance:
+            raise ConfigError(source, key, fault)
+
+
+def twin_settings(config: MonitorConfig, source: str = "parameters") -> TwinSettings:
+    """Settings of the twin as a configuration has them.
+
+    Raises
+    ------
+    ConfigError
+        For a reorder window that is not shorter than the gaps that are bridged.
+    """
+    tracker, cadence = config.tracker, config.cadence
+    if not tracker.reorder_window_s < tracker.gap_limit_s:
+        raise ConfigError(
+            source,
+            "tracker.reorder_window_s",
+            f"{tracker.reorder_window_s!r} s is not below tracker.gap_limit_s, {tracker.gap_limit_s!r} s",
+        )
+    return TwinSettings(
+        tracker=TrackerSettings(
+            commanded_speed_radps=2.0 * math.pi * (cadence.commanded_rpm / 60.0),
+            bandwidth_hz=tracker.bandwidth_hz,
+            reorder_window_s=tracker.reorder_window_s,
+            bridge_limit_s=tracker.gap_limit_s,
+            speed_tolerance=cadence.tolerance_rpm / abs(cadence.commanded_rpm),
+        ),
+        wear_acceleration=config.wear_acceleration,
+        torque_sampling=config.drive_torque.sampling,
+    )
+
+
+def _check_joints(loose: Sequence[str], mechanism: Mechanism, source: str) -> None:
+    if not loose:
+        raise ConfigError(
+            source,
+            "loose_joints",
+            f"none, and {mechanism.source} has none either; expected some of: {_ready(mechanism)}",
+        )
+    for name in loose:
+        if name not in mechanism.clearances:
+            raise ConfigError(
+                source,
+                "loose_joints",
+                f"{name!r} has no clearance settings in {mechanism.source}, expected some of: "
+                f"{_ready(mechanism)}{did_you_mean(name, mechanism.clearances)}",
+            )
+    if len(set(loose)) < len(loose):
+        raise ConfigError(source, "loose_joints", f"{list(loose)} names a joint twice")
+
+
+def _ready(mechanism: Mechanism) -> str:
+    return ", ".join(mechanism.clearances) or "none"
+
+
+def _settings(
+    mechanism: Mechanism, config: MonitorConfig, loose: Sequence[str], k: int, source: str
+) -> Clearance:
+    settings = mechanism.clearances[loose[k]]
+    changes: dict[str, Any] = {}
+    wear = _own(config.wear_coefficients_per_pa, loose, k, source, _KEYS["wear_coefficient"])
+    if wear is not None:
+        changes["wear_coefficient"] = (wear, wear)
+    clearance = _own(config.clearances_m, loose, k, source, _KEYS["radial_clearance"])
+    if clearance is not None:
+        changes["radial_clearance"] = clearance
+    try:
+        return attrs.evolve(settings, **changes)
+    except FieldError as error:
+        raise ConfigError(source, _KEYS[error.key], f"joint {loose[k]}: {error.fault}") from error
+
+
+def _own(given: Sequence[float], loose: Sequence[str], k: int, source: str, key: str) -> float | None:
+    """A joint's own value of a list that has one for all or one each, None of an empty one."""
+    if len(given) not in (0, 1, len(loose)):
+        raise _wrong_length(source, key, given, loose, "one for all or ")
+    return given[k if len(given) > 1 else 0] if given else None
+
+
+def _wrong_length(
+    source: str, key: str, given: Sequence[float], loose: Sequence[str], other: str
+) -> ConfigError:
+    return ConfigError(
+        source, key, f"{list(given)} has {len(given)} values, expected {other}one each for {', '.join(loose)}"
+    )

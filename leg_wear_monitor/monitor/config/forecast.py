@@ -1,0 +1,60 @@
+"""Parameters of the forecast: what is uncertain, and by how much."""
+
+import attrs
+
+from leg_wear_monitor.configuration.quantity import described, quantity
+
+
+@attrs.frozen(kw_only=True)
+class Forecasting:
+    """What the forecast does not know; standard deviations, those of factors in their natural logarithm.
+
+    That of the wear coefficient is a factor of two either way: reported wear rates scatter by that much and
+    more (Schmitz and others, Journal of Tribology 126 (2004) 802). It is a judgement, not a measurement.
+    """
+
+    wear_coefficient_sigma: float = quantity(
+        "",
+        "standard deviation of the logarithm of a joint's wear coefficient about the given one",
+        at_least=0.001,
+        at_most=3.0,
+        default=0.7,
+    )
+    load_sigma: float = quantity(
+        "",
+        "the same of the wear a cycle to come about that so far, for load and pace vary",
+        at_least=0.0,
+        at_most=3.0,
+        default=0.1,
+    )
+    model_sigma: float = quantity(
+        "",
+        "the same of what growth is off that is supposed to stay as it is, where no lives tell how it "
+        "changes (docs/forecast.md)",
+        at_least=0.0,
+        at_most=3.0,
+        default=0.4,
+    )
+    clearance_sigma_m: float = quantity(
+        "m", "standard deviation of a new joint's clearance", at_least=1.0e-9, at_most=1.0e-3, default=5.0e-6
+    )
+    duty_hours_per_day: float = quantity("h", "walking a day", at_least=0.01, at_most=24.0, default=8.0)
+    duty_sigma: float = quantity(
+        "",
+        "standard deviation of the logarithm of the walking a day",
+        at_least=0.0,
+        at_most=3.0,
+        default=0.2,
+    )
+    window_cycles: int = quantity(
+        "",
+        "gait cycles the forecast's growth rate is averaged over",
+        at_least=10,
+        at_most=100000,
+        default=2000,
+    )
+    life: str = described(
+        "file that `leg-wear-monitor life --lives 16 --json` wrote for this leg: how growth changes as all "
+        "clearances open; empty: the one that comes with the package for just this leg, if there is one",
+        default="",
+    )

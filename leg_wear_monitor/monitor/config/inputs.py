@@ -1,0 +1,200 @@
+"""Parameters of what comes in: the crank, further encoders, the drive torque, the gait, the tracker."""
+
+from typing import Any
+
+import attrs
+
+from leg_wear_monitor.configuration.quantity import FieldError, choice, described, quantity
+from leg_wear_monitor.twin.sample import ENCODERS
+from leg_wear_monitor.twin.settings import AVERAGE, SAMPLINGS
+
+LIVE = {"live": True}  # may change while the monitor runs
+
+TORQUE_SOURCES = ("wrench", "float64", "effort")
+
+
+LEAST_RPM = 0.1  # ten minutes a gait cycle: nothing that walks is slower
+
+
+def _turns(speed: float) -> str | None:
+    if abs(speed) >= LEAST_RPM:
+        return None
+    return f"{speed!r} rpm does not turn the crank, expected a speed of at least {LEAST_RPM:g} rpm either way"
+
+
+def _one_way_or_other(number: float) -> str | None:
+    return None if number in (-1, 1) else f"{number!r} is not one of 1, -1"
+
+
+def _sign(doc: str) -> Any:
+    return described(doc, default=1, check=_one_way_or_other)
+
+
+@attrs.frozen(kw_only=True)
+class Crank:
+    """From a joint's position to the mechanism's crank angle: sign * position / gear_ratio + offset."""
+
+    sign: int = _sign("1 if the joint counts as the mechanism's crank does, -1 if it counts the other way")
+    offset_rad: float = quantity(
+        "rad", "angle of the crank where the joint stands at 0", at_least=-100.0, at_most=100.0, default=0.0
+    )
+    gear_ratio: float = quantity(
+        "",
+        "turns of the joint for one of the crank; other than 1, its position must count on and not wrap",
+        at_least=1.0e-4,
+        at_most=1.0e4,
+        default=1.0,
+    )
+
+
+def _few_and_different(names: tuple[str, ...]) -> str | None:
+    if len(names) > ENCODERS:
+        return f"{list(names)} are {len(names)}, expected at most {ENCODERS}"
+    return None if len(set(names)) == len(names) and all(names) else f"{list(names)} are no different names"
+
+
+def _signs(signs: tuple[float, ...]) -> str | None:
+    return None if all(sign in (-1.0, 1.0) for sign in signs) else f"{list(signs)} are not all 1.0 or -1.0"
+
+
+@attrs.frozen(kw_only=True)
+class Encoders:
+    """Further encoders, in whose angles clearances show (docs/forecast.md); by default there are none."""
+
+    names: tuple[str, ...] = described(
+        "their names in joint_states, in the messages with the crank; empty: none is read",
+        default=(),
+        check=_few_and_different,
+    )
+    joints: tuple[str, ...] = described(
+        "the mechanism's revolute joint that each is on; its angle is that from the bushing's body to the "
+        "journal's, but for an offset that is found",
+        default=(),
+        check=_few_and_different,
+    )
+    signs: tuple[float, ...] = quantity(
+        "",
+        "1.0 if an encoder counts as the mechanism's angles do, -1.0 if the other way; empty: all 1.0",
+        at_least=-1.0,
+        at_most=1.0,
+        default=(),
+        check=_signs,
+    )
+    commissioning_cycles: int = quantity(
+        "",
+        "gait cycles from which an encoder's offset and scale are found when it is new; then they are held",
+        at_least=20,
+        at_most=10000,
+        default=100,
+    )
+    window_cycles: int = quantity(
+        "",
+        "gait cycles that clearances are estimated from; a sudden change shows after half of them",
+        at_least=20,
+        at_most=2000,
+        default=60,
+    )
+
+    def __attrs_post_init__(self) -> None:
+        for key, given in (("joints", self.joints), ("signs", self.signs)):
+            if len(given) != len(self.names) and (given or key == "joints"):
+                fault = f"has {len(given)} values for {len(self.names)} encoders, expected one each"
+                raise FieldError(key, fault)
+
+
+@attrs.frozen(kw_only=True)
+class DriveTorque:
+    """From a torque message to the torque on the crank: sign * scale * gear_ratio * value."""
+
+    source: str = choice(
+        TORQUE_SOURCES,
+        "WrenchStamped or Float64 on drive_torque, or the crank's effort in joint_states",
+        default="wrench",
+    )
+    sampling: str = choice(
+        SAMPLINGS,
+        "what a torque sample is: the average since the one before, or the torque at its instant",
+        default=AVERAGE,
+    )
+    axis: str = choice(("x", "y", "z"), "axis of the wrench that the drive turns about", default="z")
+    sign: int = _sign("1 if the torque drives the crank the way its angle counts, -1 if against")
+    scale: float = quantity(
+        "",
+        "factor on the torque, its unit's and the gear's efficiency",
+        at_least=1.0e-6,
+        at_most=1.0e6,
+        default=1.0,
+    )
+    gear_ratio: float = quantity(
+        "",
+        "turns of the shaft with the sensor for one of the crank",
+        at_least=1.0e-4,
+        at_most=1.0e4,
+        default=1.0,
+    )
+    max_friction_nm: float = quantity(
+        "N m",
+        "largest friction of the drive, on the crank; a constant torque beyond is a bias; 0: 0.3 of the "
+        "predicted RMS",
+        at_least=0.0,
+        at_most=1.0e6,
+        default=0.0,
+        metadata=LIVE,
+    )
+    max_lag_s: float = quantity(
+        "s",
+        "largest time by which the measured torque is late or early; beyond, crank.offset_rad may be off",
+        above=0.0,
+        at_most=1.0,
+        default=0.005,
+        metadata=LIVE,
+    )
+    saturation_nm: float = quantity(
+        "N m",
+        "torque on the crank from which on the sensor is saturated; 0 if not known",
+        at_least=0.0,
+        at_most=1.0e6,
+        default=0.0,
+        metadata=LIVE,
+    )
+
+
+@attrs.frozen(kw_only=True)
+class Cadence:
+    """The gait as commanded."""
+
+    commanded_rpm: float = quantity(
+        "rpm",
+        "commanded crank speed, negative for clockwise, at least 0.1 either way",
+        at_least=-1200.0,
+        at_most=1200.0,
+        default=60.0,
+        check=_turns,
+    )
+    tolerance_rpm: float = quantity(
+        "rpm",
+        "departure from it up to which predictions are valid",
+        above=0.0,
+        at_most=1200.0,
+        default=6.0,
+        metadata=LIVE,
+    )
+
+
+@attrs.frozen(kw_only=True)
+class Tracker:
+    """How the crank's motion is taken from its samples."""
+
+    bandwidth_hz: float = quantity(
+        "Hz", "bandwidth of the crank's tracker", at_least=1.0, at_most=100.0, default=8.0
+    )
+    reorder_window_s: float = quantity(
+        "s", "how long a sample waits for earlier ones", at_least=0.0, at_most=0.5, default=0.02
+    )
+    gap_limit_s: float = quantity(
+        "s",
+        "longest gap that is bridged at the tracked speed; what is longer is not monitored",
+        above=0.0,
+        at_most=10.0,
+        default=0.5,
+    )

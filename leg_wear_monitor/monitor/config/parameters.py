@@ -1,0 +1,197 @@
+"""Parameters of a node as a flat list of dotted names: for ROS, for files, for documentation."""
+
+from collections.abc import Iterator, Mapping
+from types import MappingProxyType
+from typing import Any, TypeVar
+
+import attrs
+
+from leg_wear_monitor.configuration.nearest import nearest
+from leg_wear_monitor.configuration.strict import shown, structure
+from leg_wear_monitor.errors import ConfigError
+from leg_wear_monitor.monitor.config.settings import MonitorConfig
+
+_Config = TypeVar("_Config")
+
+# as ROS calls them (rcl_interfaces/ParameterType)
+_TYPES = {
+    bool: "bool",
+    int: "integer",
+    float: "double",
+    str: "string",
+    tuple[float, ...]: "double_array",
+    tuple[str, ...]: "string_array",
+}
+
+
+@attrs.frozen(kw_only=True)
+class Parameter:
+    """A parameter as it is declared.
+
+    Attributes
+    ----------
+    name : str
+        Dotted, such as ``limits.clearance_m``.
+    type : str
+        ``bool``, ``integer``, ``double``, ``string``, ``double_array`` or ``string_array``.
+    default : bool, int, float, str, tuple of float or tuple of str
+    unit : str
+        ``""`` where there is none.
+    description : str
+    read_only : bool
+        Whether it keeps its value from start to end.
+    above, at_least, at_most : float or None
+        Bounds of a number, or of each in an array; the first exclusive.
+    names : tuple of str
+        What a text may be; empty for any.
+    """
+
+    name: str
+    type: str
+    default: Any
+    unit: str
+    description: str
+    read_only: bool
+    above: float | None
+    at_least: float | None
+    at_most: float | None
+    names: tuple[str, ...]
+
+    @property
+    def bounds(self) -> str:
+        """Bounds or names in words, such as ``above 0, at most 1``; empty if there are none."""
+        words = (("above", self.above), ("at least", self.at_least), ("at most", self.at_most))
+        given = [f"{word} {bound:g}" for word, bound in words if bound is not None]
+        return ", ".join(given) or ("one of " + ", ".join(self.names) if self.names else "")
+
+
+def _walk(kind: type, prefix: str) -> Iterator[Parameter]:
+    for field in attrs.fields(kind):
+        name, told = f"{prefix}{field.name}", field.metadata
+        if attrs.has(field.type):
+            yield from _walk(field.type, f"{name}.")
+            continue
+        yield Parameter(
+            name=name,
+            type=_TYPES[field.type],
+            default=field.default,
+            unit=told["unit"],
+            description=told["doc"],
+            read_only=not told.get("live", False),
+            above=told.get("above"),
+            at_least=told.get("at_least"),
+            at_most=told.get("at_most"),
+            names=told.get("names", ()),
+        )
+
+
+def parameters_of(kind: type) -> Mapping[str, Parameter]:
+    """All parameters that a class of sections declares, by name, in the order of their declaration."""
+    return MappingProxyType({parameter.name: parameter for parameter in _walk(kind, "")})
+
+
+PARAMETERS: Mapping[str, Parameter] = parameters_of(MonitorConfig)
+"""Those of the monitor."""
+
+
+def config_from(values: Mapping[str, Any], source: str = "parameters") -> MonitorConfig:
+    """Configuration of the monitor; see `structured`."""
+    return structured(MonitorConfig, values, source)
+
+
+def structured(kind: type[_Config], values: Mapping[str, Any], source: str) -> _Config:
+    """Configuration from values by dotted name; what is not given has its default.
+
+    Parameters
+    ----------
+    kind : type
+        A class of sections, such as `MonitorConfig`.
+    values : mapping of str to bool, int, float, str or sequence
+    source : str
+        File or node they come from, for messages.
+
+    Raises
+    ------
+    ConfigError
+        Naming source, parameter, value, unit and bounds of what cannot be used.
+    """
+    nested: dict[str, Any] = {}
+    known = parameters_of(kind)
+    for name, value in values.items():
+        _check_known(name, known, source)
+        _check_type(known[name], value, source)
+        *sections, last = name.split(".")
+        place = nested
+        for section in sections:
+            place = place.setdefault(section, {})
+        place[last] = list(value) if isinstance(value, tuple) else value
+    try:
+        config: _Config = structure(nested, kind, source, "")
+    except ConfigError as error:
+        raise ConfigError(source, error.key, _with_bounds(error, known)) from error
+    return config
+
+
+def values_of(config: Any) -> dict[str, Any]:
+    """Value of every parameter of a configuration by dotted name, arrays as tuples."""
+    values = {}
+    for name in parameters_of(type(config)):
+        value: Any = config
+        for step in name.split("."):
+            value = getattr(value, step)
+        values[name] = value
+    return values
+
+
+def changed(config: _Config, changes: Mapping[str, Any], source: str = "parameters") -> _Config:
+    """Configuration with other values of parameters that may change while the monitor runs.
+
+    Raises
+    ------
+    ConfigError
+        If a value cannot be used, or another parameter is to change.
+    """
+    values = values_of(config)
+    wanted = structured(type(config), values | dict(changes), source)
+    after = values_of(wanted)
+    for name in changes:
+        if parameters_of(type(config))[name].read_only and after[name] != values[name]:
+            raise ConfigError(
+                source, name, f"{shown(changes[name])} comes too late, it is read at the start and then kept"
+            )
+    return wanted
+
+
+def _check_known(name: str, known: Mapping[str, Parameter], source: str) -> None:
+    if name in known:
+        return
+    near = nearest(name, known)
+    expected = f"did you mean {near}?" if near else "docs/parameters.md lists all there are"
+    raise ConfigError(source, name, f"unknown parameter, {expected}")
+
+
+def _check_type(parameter: Parameter, value: Any, source: str) -> None:
+    """ROS tells 60 from 60.0; so do we, or the same file would work here and not there."""
+    if parameter.type not in ("double", "double_array"):
+        return
+    for entry in value if isinstance(value, list | tuple) else (value,):
+        if isinstance(entry, int) and not isinstance(entry, bool):
+            unit = f" [{parameter.unit}]" if parameter.unit else ""
+            raise ConfigError(
+                source,
+                parameter.name,
+                f"{shown(value)} is a whole number to ROS, expected {float(entry)!r}{unit}",
+            )
+
+
+def _with_bounds(error: ConfigError, known: Mapping[str, Parameter]) -> str:
+    """The fault, and the bounds, unless it speaks of them."""
+    parameter = known.get(error.key)
+    if (
+        parameter is None
+        or not parameter.bounds
+        or "expected" in error.fault
+        or parameter.bounds in error.fault
+    ):
+        return error.fault
+    return f"{error.fault}, expected {parameter.bounds}"

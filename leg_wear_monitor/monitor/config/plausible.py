@@ -1,0 +1,51 @@
+"""Parameters that can be used but are likely meant in another unit; see also `mechanism.plausible`."""
+
+import math
+from collections.abc import Iterator
+
+from leg_wear_monitor.mechanism.plausible import Doubt
+from leg_wear_monitor.mechanism.spec import Mechanism
+from leg_wear_monitor.monitor.config.settings import MonitorConfig
+
+
+def parameter_doubts(config: MonitorConfig, leg: Mechanism) -> tuple[Doubt, ...]:
+    """All doubtful values of a configuration, for the mechanism as `fitted` gives it."""
+    return (*_gait(config), *_limits(config, leg), *_clearances(config, leg))
+
+
+def _gait(config: MonitorConfig) -> Iterator[Doubt]:
+    rpm, offset = config.cadence.commanded_rpm, config.crank.offset_rad
+    if abs(rpm) < 10.0:
+        meant = rpm * 30.0 / math.pi
+        cycle = f"{rpm:g} rpm is {60.0 / abs(rpm):.3g} s a gait cycle"
+        hint = f"rad/s for rpm? {rpm:g} rad/s is {meant:.4g} rpm"
+        yield Doubt("cadence.commanded_rpm", f"{cycle}; {hint}")
+    if abs(offset) > 2.0 * math.pi:
+        yield Doubt("crank.offset_rad", f"{offset:g} rad is more than a turn; degrees for rad?")
+
+
+def _limits(config: MonitorConfig, leg: Mechanism) -> Iterator[Doubt]:
+    limits = config.limits
+    key = "limits.joint_clearance_m" if limits.joint_clearance_m else "limits.clearance_m"
+    each = limits.joint_clearance_m or (limits.clearance_m,) * len(leg.loose)
+    for joint, limit in zip(leg.loose, each, strict=True):
+        fresh = leg.clearances[joint].radial_clearance
+        if limit <= fresh:
+            yield Doubt(key, f"{limit:g} m is no more than the new clearance of joint {joint}, {fresh:g} m")
+            return
+    for force in limits.joint_impact_force_n or (limits.impact_force_n,):
+        if force < 10.0:
+            yield Doubt("limits.impact_force_n", f"{force:g} N is less than a leg weighs; kN for N?")
+            return
+
+
+def _clearances(config: MonitorConfig, leg: Mechanism) -> Iterator[Doubt]:
+    if not config.clearances_m:
+        return
+    for joint in leg.loose:
+        c = leg.clearances[joint]
+        ratio = 100.0 * c.radial_clearance / c.bushing_radius
+        if not 1.0e-3 <= ratio <= 25.0:
+            share = f"{c.radial_clearance:g} m is {ratio:.3g} % of the bushing's radius of joint {joint}"
+            yield Doubt("clearances_m", f"{share}; mm for m, or m for mm?")
+            return

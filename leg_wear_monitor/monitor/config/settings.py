@@ -1,0 +1,247 @@
+"""Every parameter of the monitor, declared once: name, default, unit, bounds, meaning.
+
+The check of config/monitor.yaml, the descriptors of the ROS node and the table in docs/parameters.md follow
+from these classes. A section is a class, so `limits.clearance_m` is the parameter's name everywhere.
+"""
+
+import attrs
+
+from leg_wear_monitor.configuration.quantity import described, quantity
+from leg_wear_monitor.monitor.config.forecast import Forecasting
+from leg_wear_monitor.monitor.config.inputs import LIVE, Cadence, Crank, DriveTorque, Encoders, Tracker
+
+
+def _filled(text: str) -> str | None:
+    return None if text else "'' is empty, expected a name"
+
+
+@attrs.frozen(kw_only=True)
+class Limits:
+    """Where alarms begin: ERROR at the limit, WARN at a share of it."""
+
+    warn_share: float = quantity(
+        "",
+        "share of a limit from which on there is a warning",
+        above=0.0,
+        at_most=1.0,
+        default=0.8,
+        metadata=LIVE,
+    )
+    impact_force_n: float = quantity(
+        "N",
+        "impact force in a joint, peak of a gait cycle",
+        above=0.0,
+        at_most=1.0e7,
+        default=10000.0,
+        metadata=LIVE,
+    )
+    joint_impact_force_n: tuple[float, ...] = quantity(
+        "N",
+        "the same, one a loose joint, instead of the one for all",
+        above=0.0,
+        at_most=1.0e7,
+        default=(),
+        metadata=LIVE,
+    )
+    clearance_m: float = quantity(
+        "m", "mean radial clearance of a joint", above=0.0, at_most=0.1, default=0.0006, metadata=LIVE
+    )
+    joint_clearance_m: tuple[float, ...] = quantity(
+        "m",
+        "the same, one a loose joint, instead of the one for all",
+        above=0.0,
+        at_most=0.1,
+        default=(),
+        metadata=LIVE,
+    )
+    clearance_departure_m: float = quantity(
+        "m",
+        "departure of a clearance that further encoders show from the one that is counted",
+        above=0.0,
+        at_most=0.1,
+        default=0.0001,
+        metadata=LIVE,
+    )
+    growth_m_per_hour: float = quantity(
+        "m/h", "growth of a joint's mean clearance", above=0.0, at_most=1.0, default=1.0e-6, metadata=LIVE
+    )
+    torque_mismatch: float = quantity(
+        "",
+        "RMS of the drive torque that load, friction and lag do not explain, as a share of the predicted RMS",
+        above=0.0,
+        at_most=100.0,
+        default=0.1,
+        metadata=LIVE,
+    )
+    torque_bias_nm: float = quantity(
+        "N m",
+        "constant drive torque beyond 0 to drive_torque.max_friction_nm; 0: a tenth of the predicted RMS",
+        at_least=0.0,
+        at_most=1.0e6,
+        default=0.0,
+        metadata=LIVE,
+    )
+    torque_drift_nm: float = quantity(
+        "N m",
+        "change of the constant drive torque since this leg was commissioned; 0: 0.15 of the predicted RMS",
+        at_least=0.0,
+        at_most=1.0e6,
+        default=0.0,
+        metadata=LIVE,
+    )
+    min_rate_hz: float = quantity(
+        "Hz", "least rate of crank samples", above=0.0, at_most=1.0e5, default=40.0, metadata=LIVE
+    )
+    bad_sample_share: float = quantity(
+        "", "share of samples that cannot be used", above=0.0, at_most=1.0, default=0.05, metadata=LIVE
+    )
+    stuck_torque_share: float = quantity(
+        "",
+        "share of torque samples that are saturated, or repeat the largest or the smallest",
+        above=0.0,
+        at_most=1.0,
+        default=0.3,
+        metadata=LIVE,
+    )
+    lost_time_share: float = quantity(
+        "", "share of the time that was not monitored", above=0.0, at_most=1.0, default=0.05, metadata=LIVE
+    )
+
+
+@attrs.frozen(kw_only=True)
+class Alarms:
+    """When a level changes."""
+
+    deadband: float = quantity(
+        "",
+        "share of a limit by which a value must fall below it before the level falls",
+        at_least=0.0,
+        at_most=0.9,
+        default=0.05,
+        metadata=LIVE,
+    )
+    on_delay_cycles: int = quantity(
+        "",
+        "gait cycles in a row beyond a limit before the level rises",
+        at_least=1,
+        at_most=1000,
+        default=3,
+        metadata=LIVE,
+    )
+    knock_on_delay_cycles: int = quantity(
+        "",
+        "the same for what shows a knock at once: impact forces and torque mismatch",
+        at_least=1,
+        at_most=1000,
+        default=1,
+        metadata=LIVE,
+    )
+
+
+@attrs.frozen(kw_only=True)
+class Growth:
+    """How growth is averaged."""
+
+    window_cycles: int = quantity(
+        "", "gait cycles a growth rate is averaged over", at_least=3, at_most=10000, default=30
+    )
+
+
+@attrs.frozen(kw_only=True)
+class LedgerFile:
+    """Where the wear is kept."""
+
+    path: str = described("file of the ledger; empty: none is kept, wear is lost at the end", default="")
+    checkpoint_s: float = quantity(
+        "s",
+        "longest time between two entries while the leg moves, and a beat (a quarter of a gait cycle)",
+        at_least=0.01,
+        at_most=600.0,
+        default=5.0,
+    )
+    skip_counted: bool = described(
+        "leave out samples of a time whose wear is in the ledger from an earlier run", default=True
+    )
+
+
+@attrs.frozen(kw_only=True)
+class Record:
+    """A recording of what the node receives and publishes."""
+
+    path: str = described("MCAP file to write; empty: none", default="")
+
+
+@attrs.frozen(kw_only=True)
+class Diagnostics:
+    """What goes to /diagnostics."""
+
+    period_s: float = quantity("s", "time between two messages", at_least=0.1, at_most=2.0, default=1.0)
+
+
+@attrs.frozen(kw_only=True)
+class MonitorConfig:
+    """All parameters; their dotted names are those of the ROS node and of config/monitor.yaml."""
+
+    mechanism: str = described(
+        "the leg: the name of a mechanism that comes with the package, or a file",
+        default="bionic_leg",
+        check=_filled,
+    )
+    hardware_id: str = described(
+        "which leg this is, for diagnostics and the ledger; empty: namespace of the node, or leg",
+        default="",
+    )
+    loose_joints: tuple[str, ...] = described(
+        "joints with clearance; empty: those of the mechanism's file", default=()
+    )
+    clearances_m: tuple[float, ...] = quantity(
+        "m",
+        "radial clearances when new, one for all loose joints or one each; empty: those of the file",
+        at_least=1.0e-6,
+        at_most=0.1,
+        default=(),
+    )
+    wear_coefficients_per_pa: tuple[float, ...] = quantity(
+        "1/Pa",
+        "K/H of both surfaces, one for all loose joints or one each; empty: those of the file",
+        at_least=0.0,
+        at_most=1.0e-6,
+        default=(),
+    )
+    wear_acceleration: float = quantity(
+        "",
+        "factor on all wear, other than 1 for demonstrations only",
+        at_least=1.0e-9,
+        at_most=1.0e9,
+        default=1.0,
+    )
+    crank_joint: str = described("name of the crank in joint_states", default="crank", check=_filled)
+    crank: Crank = described("", factory=Crank)
+    encoders: Encoders = described("", factory=Encoders)
+    drive_torque: DriveTorque = described("", factory=DriveTorque)
+    cadence: Cadence = described("", factory=Cadence)
+    tracker: Tracker = described("", factory=Tracker)
+    limits: Limits = described("", factory=Limits)
+    alarms: Alarms = described("", factory=Alarms)
+    growth: Growth = described("", factory=Growth)
+    forecast: Forecasting = described("", factory=Forecasting)
+    ledger: LedgerFile = described("", factory=LedgerFile)
+    record: Record = described("", factory=Record)
+    diagnostics: Diagnostics = described("", factory=Diagnostics)
+    publish_impact_forces: bool = described(
+        "publish the contact forces of every sample", default=True, metadata=LIVE
+    )
+    publish_markers: bool = described("publish markers for RViz and Foxglove", default=False, metadata=LIVE)
+    frame_id: str = described(
+        "frame of the pelvis, for wrenches and markers", default="pelvis", check=_filled
+    )
+
+    @property
+    def hardware(self) -> str:
+        """Which leg this is: `hardware_id`, or ``leg``."""
+        return self.hardware_id or "leg"
+
+    def on_node(self, node: str) -> "MonitorConfig":
+        """Parameters on a node such as ``/left/leg_wear_monitor``, whose namespace may name the leg."""
+        namespace = node.strip("/").rpartition("/")[0]
+        return attrs.evolve(self, hardware_id=self.hardware_id or namespace)

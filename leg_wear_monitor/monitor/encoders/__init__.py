@@ -1,0 +1,1 @@
+"""Clearance estimates from joint encoders."""

@@ -1,0 +1,177 @@
+"""What gait cycles and input are judged by, and when."""
+
+import math
+
+import attrs
+
+from leg_wear_monitor.monitor.alarms.alarm import Level
+from leg_wear_monitor.monitor.config.settings import MonitorConfig
+from leg_wear_monitor.monitor.evaluation import board as names
+from leg_wear_monitor.monitor.evaluation.board import AlarmBoard
+from leg_wear_monitor.monitor.evaluation.evaluation_period import A_CYCLE
+from leg_wear_monitor.monitor.evaluation.torque_checks import TorqueBounds, torque_bounds, torque_values
+from leg_wear_monitor.monitor.evaluation.torque_record import TorqueRecord
+from leg_wear_monitor.monitor.inputs.causes import causes
+from leg_wear_monitor.monitor.inputs.guard import InputGuard
+from leg_wear_monitor.monitor.inputs.health import InputHealth, TorqueRange, input_health, with_torques
+from leg_wear_monitor.monitor.reports import AlarmList, CycleReport
+from leg_wear_monitor.twin.digital_twin import DigitalTwin
+from leg_wear_monitor.twin.sample import Samples
+from leg_wear_monitor.twin.statistics import Intake, Tracking
+
+
+@attrs.define
+class JudgeState:
+    """What changes; every value is immutable, so a shallow copy is a snapshot.
+
+    Attributes
+    ----------
+    before : Intake
+        Counts when the input was last judged.
+    skipped, skipped_before : int
+        Samples skipped by then, and by the time before.
+    torque : TorqueRange
+        Torques since then.
+    beats, cycles : int
+        Beats and whole gait cycles since then.
+    health : InputHealth or None
+        As last judged.
+    withheld : int
+        Samples that the guard had withheld when the input was last judged.
+    causes : tuple of str or None
+        Why samples could not be used, as last judged.
+    """
+
+    before: Intake
+    skipped: int = 0
+    skipped_before: int = 0
+    torque: TorqueRange = TorqueRange()
+    beats: int = 0
+    cycles: int = 0
+    health: InputHealth | None = None
+    withheld: int = 0
+    causes: tuple[str, ...] | None = None
+
+
+class Judge:
+    """Judges a twin's gait cycles and its input.
+
+    Parameters
+    ----------
+    twin : DigitalTwin
+    config : MonitorConfig
+    cycle_ns : int
+        A gait cycle as commanded.
+    guard : InputGuard
+    """
+
+    def __init__(self, twin: DigitalTwin, config: MonitorConfig, cycle_ns: int, guard: InputGuard) -> None:
+        self._twin = twin
+        self.guard = guard
+        self._cycle_ns = cycle_ns
+        self.config = config
+        self.board = AlarmBoard(config, twin.loose, twin.torque_size_nm)
+        self.state = JudgeState(twin.intake)
+
+    def configure(self, config: MonitorConfig) -> None:
+        """Judge by other limits from now on."""
+        self.config = config
+        self.board.configure(config)
+
+    def holds(self) -> bool:
+        """Whether the leg does what the model holds for: in cadence, and with the torque that is expected."""
+        return self.board.level(names.CADENCE, names.MISMATCH) is not Level.ERROR
+
+    def see(self, piece: Samples) -> None:
+        """Take down samples that came."""
+        saturation_nm = self.config.drive_torque.saturation_nm
+        self.state.torque = with_torques(self.state.torque, piece, saturation_nm)
+
+    @property
+    def causes(self) -> tuple[str, ...]:
+        """Why samples cannot be used: at present, and over the last gait cycle's time."""
+        now = (self.guard.cause,) if self.guard.cause else ()
+        return now + (self._causes() if self.state.causes is None else self.state.causes)
+
+    @property
+    def _withheld(self) -> int:
+        return self.guard.conflicting + self.guard.implausible
+
+    def _causes(self) -> tuple[str, ...]:
+        withheld = self._withheld - self.state.withheld
+        return tuple(causes(self.state.before, self._twin.intake, withheld, self.config))
+
+    @property
+    def torque_bounds(self) -> TorqueBounds:
+        """What the drive may do."""
+        return torque_bounds(self.config, self._twin.torque_size_nm)
+
+    def is_torque_sound(self, report: CycleReport) -> bool:
+        """Whether a gait cycle's torque is as predicted, so that what it needs is this leg's own."""
+        return report.torque_mismatch < self.config.limits.warn_share * self.config.limits.torque_mismatch
+
+    def end_cycle(self, report: CycleReport, record: TorqueRecord) -> tuple[AlarmList, ...]:
+        """Judge a whole gait cycle, its torque beside its record; all alarms, if one has changed."""
+        self.state.cycles += 1
+        values = {
+            names.MISMATCH: report.torque_mismatch,
+            names.CADENCE: abs(report.cadence_rpm - self.config.cadence.commanded_rpm),
+        }
+        values |= torque_values(report, record, self.torque_bounds)
+        for joint in report.joints:
+            per_hour = math.nan if joint.growth_mps is None else 3600.0 * joint.growth_mps
+            values[f"{names.IMPACT} {joint.joint}"] = joint.peak_force_n
+            values[f"{names.CLEARANCE} {joint.joint}"] = joint.clearance_m
+            values[f"{names.GROWTH} {joint.joint}"] = per_hour
+            if joint.seen:
+                values[f"{names.DEPARTURE} {joint.joint}"] = joint.seen.surely_m
+        return self.board.judge(values, report.stamp_ns)
+
+    def end_beat(self, skipped: int = 0) -> tuple[AlarmList, ...]:
+        """Judge impacts of the gait cycle that runs, and once in a cycle's time the input.
+
+        Parameters
+        ----------
+        skipped : int
+            Samples that were not handed on so far, their wear is counted already.
+        """
+        peaks = {
+            f"{names.IMPACT} {joint}": float(peak)
+            for joint, peak in zip(self._twin.loose, self._twin.peak_force_n, strict=True)
+        }
+        early = self.board.judge_early(peaks, self._twin.intake.followed_stamp_ns)
+        early += self.board.judge({names.SOURCES: float(self.guard.sources)}, self.guard.stamp_ns)
+        self.state.beats += 1
+        if self.state.beats < A_CYCLE:
+            return early
+        return early + self._judge_input(skipped)
+
+    def pause(self) -> None:
+        """Nobody records for a while: the input is judged afresh from the next sample on, as at the start."""
+        intake = attrs.evolve(self._twin.intake, newest_stamp_ns=0)
+        self.state = JudgeState(intake, self.state.skipped, self.state.skipped_before)
+
+    def _judge_input(self, skipped: int) -> tuple[AlarmList, ...]:
+        state, intake, config = self.state, self._twin.intake, self.config
+        is_whole = skipped == state.skipped == state.skipped_before
+        health = input_health(state.before, intake, state.torque, is_whole)
+        values = {
+            names.CRANK_RATE: health.crank_rate_hz,
+            names.TORQUE_RATE: health.torque_rate_hz,
+            names.BAD_SAMPLES: health.bad_share,
+            names.LOST_TIME: health.lost_share,
+            names.STUCK_TORQUE: health.stuck_torque_share,
+        }
+        if state.cycles == 0 and self._twin.tracking is Tracking.OUT_OF_STEP:
+            speed_rpm = self._twin.speed_radps * 30.0 / math.pi
+            values[names.CADENCE] = abs(speed_rpm - config.cadence.commanded_rpm)
+        self.state = JudgeState(
+            intake,
+            skipped,
+            state.skipped,
+            health=health,
+            withheld=self._withheld,
+            causes=self._causes(),
+        )
+        cycles = 1 if math.isnan(health.duration_s) else round(1.0e9 * health.duration_s / self._cycle_ns)
+        return self.board.judge(values, intake.newest_stamp_ns, max(1, cycles))

@@ -1,0 +1,121 @@
+"""Whether what was followed can be this leg's gait: without one cycle that can be, forces mean nothing."""
+
+import math
+from collections import Counter
+
+import attrs
+import numpy as np
+
+from leg_wear_monitor.monitor.config.settings import MonitorConfig
+from leg_wear_monitor.monitor.reports import CycleReport
+from leg_wear_monitor.twin.sample import CRANK, FAULTS, NO_FAULT, Samples
+
+_SLOWEST, _FASTEST = 0.5, 2.0  # cadence, of the commanded one
+_UNLIKE = 0.8  # torque that the model does not explain, of the predicted one
+_FLAT = 0.05  # measured torque, of the predicted one
+_SAMPLES_A_TURN = 12
+
+
+def doubts(cycle: CycleReport, config: MonitorConfig) -> list[str]:
+    """Why a gait cycle can hardly be one of this leg; empty if it can.
+
+    Parameters
+    ----------
+    cycle : CycleReport
+    config : MonitorConfig
+        Of which the commanded cadence is used.
+    """
+    commanded, found = config.cadence.commanded_rpm, []
+    if not _SLOWEST <= cycle.cadence_rpm / commanded <= _FASTEST:
+        found.append(f"the crank turns at {cycle.cadence_rpm:.3g} rpm, commanded are {commanded:.3g} rpm")
+    if cycle.torque_samples:
+        predicted, measured = cycle.predicted_torque_rms_nm, cycle.measured_torque_rms_nm
+        if measured < _FLAT * predicted:
+            found.append(
+                f"the drive torque of {measured:.3g} N m RMS is none, {predicted:.3g} N m are predicted"
+            )
+        elif not cycle.torque_mismatch < _UNLIKE:
+            found.append(
+                "the drive torque has nothing of the predicted one: they differ by "
+                f"{cycle.torque_mismatch:.2g} times what is predicted"
+            )
+    return found
+
+
+@attrs.define
+class GaitEvidence:
+    """Counts what speaks for a gait of this leg, and says what is missing.
+
+    Parameters
+    ----------
+    config : MonitorConfig
+
+    Attributes
+    ----------
+    believable, doubtful : int
+        Gait cycles that can be this leg's, and that can hardly be.
+    """
+
+    config: MonitorConfig
+    believable: int = 0
+    doubtful: int = 0
+    _doubts: list[str] = attrs.field(factory=list, init=False)
+    _faults: Counter[str] = attrs.field(factory=Counter, init=False)
+    _sound: int = attrs.field(default=0, init=False)
+    _turned_rad: float = attrs.field(default=0.0, init=False)
+    _passed_s: float = attrs.field(default=0.0, init=False)
+    _last: tuple[int, float] | None = attrs.field(default=None, init=False)
+
+    def see(self, samples: Samples) -> None:
+        """Take account of samples, in order of arrival."""
+        cranks = samples[samples["kind"] == CRANK]
+        for fault, number in zip(*np.unique(cranks["fault"], return_counts=True), strict=True):
+            if fault != NO_FAULT:
+                self._faults[FAULTS[int(fault)]] += int(number)
+        sound = cranks[cranks["fault"] == NO_FAULT]
+        if not len(sound):
+            return
+        self._sound += len(sound)
+        stamps, angles = sound["stamp_ns"], sound["crank_angle_rad"]
+        if self._last is not None:
+            stamps, angles = np.append(self._last[0], stamps), np.append(self._last[1], angles)
+        self._last = int(stamps[-1]), float(angles[-1])
+        steps = np.diff(stamps.astype(float)) / 1e9
+        ahead = (steps > 0.0) & (steps <= self.config.tracker.gap_limit_s)
+        with np.errstate(over="ignore", invalid="ignore"):  # an angle may be anything that is finite
+            turned = (np.diff(angles)[ahead] + math.pi) % (2.0 * math.pi) - math.pi
+        self._turned_rad += abs(float(np.nansum(turned)))
+        self._passed_s += float(steps[ahead].sum())
+
+    def add(self, cycle: CycleReport) -> None:
+        """Take account of a gait cycle."""
+        found = doubts(cycle, self.config)
+        self.believable += not found
+        self.doubtful += bool(found)
+        self._doubts = self._doubts or found
+
+    def missing(self) -> str:
+        """What is missing for one believable gait cycle; empty if there is one."""
+        if self.believable:
+            return ""
+        if self.doubtful:
+            return "; ".join(self._doubts)
+        if not self._sound:
+            faults = ", ".join(f"{number} {name}" for name, number in self._faults.items())
+            return f"no crank sample can be used ({faults})" if faults else "there is no crank sample"
+        return self._why_none()
+
+    def _why_none(self) -> str:
+        """Why sound samples make no gait cycle."""
+        gap, commanded = self.config.tracker.gap_limit_s, self.config.cadence.commanded_rpm
+        if not self._passed_s:
+            return f"no two of {self._sound} crank samples follow each other within {gap:g} s"
+        turns, rate = self._turned_rad / (2.0 * math.pi), self._sound / self._passed_s
+        rpm, needed = 60.0 * turns / self._passed_s, _SAMPLES_A_TURN * abs(commanded) / 60.0
+        if rate < needed:
+            return f"crank samples come at {rate:.3g} Hz, too few: {commanded:.3g} rpm need {needed:.3g} Hz"
+        if turns < 2.0:
+            return f"the crank turns {turns:.2g} times in {self._passed_s:.3g} s: that is no whole gait cycle"
+        if not _SLOWEST <= rpm / abs(commanded) <= _FASTEST:
+            return f"the crank turns at {rpm:.3g} rpm, commanded are {abs(commanded):.3g} rpm"
+        return f"the crank turns {turns:.3g} times, but its motion cannot be followed over a whole gait cycle"

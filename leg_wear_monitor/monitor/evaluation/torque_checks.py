@@ -1,0 +1,100 @@
+"""What of the measured torque no drive can do: a bias, a drift, a lag; bounds, values and sentences."""
+
+import math
+
+import attrs
+
+from leg_wear_monitor.monitor.config.settings import MonitorConfig
+from leg_wear_monitor.monitor.evaluation.torque_record import TorqueRecord
+from leg_wear_monitor.monitor.reports import CycleReport
+
+BIAS, DRIFT, LAG = "torque_bias", "torque_drift", "torque_lag"
+
+# fractions of the predicted torque's RMS, where the parameters are 0: joints and gears lose some tenths of
+# what they pass on; a tenth is the limit of the mismatch, too
+_FRICTION, _BIAS, _DRIFT = 0.3, 0.1, 0.15
+_SURE = 3.0  # standard deviations
+
+
+@attrs.frozen
+class TorqueBounds:
+    """What a drive may do: largest friction and lag, and limits of what is beyond and of a drift."""
+
+    max_friction_nm: float
+    max_lag_s: float
+    bias_nm: float
+    drift_nm: float
+
+
+def torque_bounds(config: MonitorConfig, size_nm: float) -> TorqueBounds:
+    """Bounds by the parameters; those that are not given follow from the torque's RMS as predicted [N m]."""
+    return TorqueBounds(
+        max_friction_nm=config.drive_torque.max_friction_nm or _FRICTION * size_nm,
+        max_lag_s=config.drive_torque.max_lag_s,
+        bias_nm=config.limits.torque_bias_nm or _BIAS * size_nm,
+        drift_nm=config.limits.torque_drift_nm or _DRIFT * size_nm,
+    )
+
+
+def torque_values(report: CycleReport, record: TorqueRecord, bounds: TorqueBounds) -> dict[str, float]:
+    """Values of the alarms: what is surely beyond, in their units; none without a torque."""
+    if not report.torque_samples:
+        return {}
+    bias, sigma = bias_of(report, bounds), _SURE * report.friction_sigma_nm
+    change, either = report.friction_nm - record.friction_nm, math.hypot(sigma, _SURE * record.sigma_nm)
+    lag_s = abs(report.torque_lag_s) - _SURE * report.torque_lag_sigma_s
+    # NaN stays NaN: not known
+    return {
+        BIAS: abs(bias) - sigma if abs(bias) > sigma else 0.0 * sigma,
+        DRIFT: abs(change) - either if abs(change) > either else 0.0 * (change + either),
+        LAG: lag_s if lag_s > 0.0 else 0.0 * lag_s,
+    }
+
+
+def bias_of(report: CycleReport, bounds: TorqueBounds) -> float:
+    """What of the constant torque is no friction [N m]: it would drive, or is more than friction may be."""
+    friction_nm = report.friction_nm
+    return min(friction_nm, 0.0) + max(friction_nm - bounds.max_friction_nm, 0.0)
+
+
+def torque_causes(
+    raised: set[str], report: CycleReport, record: TorqueRecord, bounds: TorqueBounds
+) -> list[str]:
+    """Sentences on what raised alarms of the torque may come from, free of values."""
+    told = []
+    if BIAS in raised and report.friction_nm < 0.0:
+        told.append(
+            "a constant torque drives the crank, which friction cannot: the sensor's offset is not zeroed, "
+            "or drive_torque.sign is wrong"
+        )
+    elif BIAS in raised:
+        told.append(
+            "a constant torque is more than the drive's friction may be: the sensor's offset is not zeroed, "
+            "drive_torque.sign, scale or gear_ratio is wrong, or friction has risen"
+        )
+    if DRIFT in raised:
+        told.append(
+            "the constant torque is not what it was when this leg was commissioned: the drive's friction has "
+            "changed, or the sensor's offset"
+        )
+    if LAG in raised:
+        told.append(_lag_cause(record, bounds))
+    return told
+
+
+def _lag_cause(record: TorqueRecord, bounds: TorqueBounds) -> str:
+    split = record.lags.split
+    if split is None:
+        return (
+            "the torque comes later or earlier than drive_torque.max_lag_s, or crank.offset_rad is off: at "
+            "one speed these look alike"
+        )
+    if abs(split[0]) > bounds.max_lag_s:
+        return "the torque comes later or earlier than drive_torque.max_lag_s, at every speed"
+    return "crank.offset_rad is off: the torque's lag goes with the time that the crank takes for an angle"
+
+
+def offset_error_rad(report: CycleReport, record: TorqueRecord) -> float:
+    """By how much crank.offset_rad is off, if all of the lag that is not known to be one comes from there."""
+    split = record.lags.split
+    return split[1] if split else report.torque_lag_s * report.cadence_rpm * math.pi / 30.0

@@ -1,0 +1,92 @@
+"""What a leg's drive torque was like before: friction when it was commissioned, lag at other speeds."""
+
+import math
+
+import attrs
+
+from leg_wear_monitor.monitor.reports import CycleReport
+from leg_wear_monitor.twin.statistics import CycleFigures
+
+COMMISSIONING_CYCLES = 20  # in a row with the torque as predicted, then its friction is that of this leg
+FRICTION_KEY, SIGMA_KEY = "friction_commissioned_nm", "friction_commissioned_sigma_nm"
+
+_FORGETTING = 0.99  # a gait cycle
+_RESOLVED_RAD = 0.005  # standard deviation of an offset that is known
+
+
+@attrs.frozen
+class LagBySpeed:
+    """Apparent lags over the inverse of the crank's speed: a lag is the same at all speeds, an offset is not.
+
+    Attributes
+    ----------
+    sums : tuple of float
+        Of weights, and weights times 1/speed, its square, the lag, and 1/speed times the lag.
+    """
+
+    sums: tuple[float, float, float, float, float] = (0.0,) * 5
+
+    def with_cycle(self, figures: CycleFigures) -> "LagBySpeed":
+        """With one more gait cycle; as it is without a lag."""
+        lag_s, sigma_s = figures.torque.cycle_lag_s, figures.torque.cycle_lag_sigma_s
+        if not (math.isfinite(lag_s) and sigma_s > 0.0):
+            return self
+        x, w = figures.direction * figures.moving_s / (2.0 * math.pi), 1.0 / sigma_s**2
+        new = (w, w * x, w * x * x, w * lag_s, w * x * lag_s)
+        w0, w1, w2, wy, wxy = (_FORGETTING * a + b for a, b in zip(self.sums, new, strict=True))
+        return LagBySpeed((w0, w1, w2, wy, wxy))
+
+    @property
+    def split(self) -> tuple[float, float] | None:
+        """Lag [s] and offset of the crank [rad]; None while the speeds are too much alike to tell."""
+        w, x, xx, y, xy = self.sums
+        if not w > 0.0:
+            return None
+        spread = xx - x * x / w
+        if not spread > _RESOLVED_RAD**-2:
+            return None
+        offset_rad = (xy - x * y / w) / spread
+        return (y - offset_rad * x) / w, offset_rad
+
+
+@attrs.frozen
+class TorqueRecord:
+    """What is kept of a leg's drive torque.
+
+    Attributes
+    ----------
+    cycles : int
+        In a row with the torque as predicted, before commissioning.
+    friction_nm, sigma_nm : float
+        The constant torque when this leg was commissioned, and its standard deviation; NaN before.
+    lags : LagBySpeed
+    """
+
+    cycles: int = 0
+    friction_nm: float = math.nan
+    sigma_nm: float = math.nan
+    lags: LagBySpeed = LagBySpeed()
+
+    @classmethod
+    def of(cls, totals: dict[str, float]) -> "TorqueRecord":
+        """From what a ledger keeps."""
+        return cls(0, totals.get(FRICTION_KEY, math.nan), totals.get(SIGMA_KEY, math.nan))
+
+    @property
+    def totals(self) -> dict[str, float]:
+        """What a ledger keeps; nothing before commissioning."""
+        if math.isnan(self.friction_nm):
+            return {}
+        return {FRICTION_KEY: self.friction_nm, SIGMA_KEY: self.sigma_nm}
+
+    def with_cycle(self, figures: CycleFigures, report: CycleReport, is_sound: bool) -> "TorqueRecord":
+        """With one more gait cycle, whose torque was as predicted or not."""
+        if not report.torque_samples:
+            return self
+        lags = self.lags.with_cycle(figures)
+        if not math.isnan(self.friction_nm):
+            return attrs.evolve(self, lags=lags)
+        cycles = self.cycles + 1 if is_sound else 0
+        if cycles < COMMISSIONING_CYCLES:
+            return attrs.evolve(self, cycles=cycles, lags=lags)
+        return TorqueRecord(cycles, report.friction_nm, report.friction_sigma_nm, lags)

@@ -1,0 +1,1 @@
+"""Remaining life: growth law, wear coefficients, measurements, forecast."""

@@ -1,0 +1,242 @@
+"""How long joints and the leg will last, and how sure that is: a distribution, from all that is not known.
+
+An ensemble of legs over what is believed of every joint's wear coefficient and clearance, over the growth's
+own scatter and the load to come. In each of them all joints grow together by the law of growth, until each
+has reached its limit (`growth_law.py`).
+"""
+
+from collections.abc import Sequence
+from enum import Enum
+
+import attrs
+import numpy as np
+
+from leg_wear_monitor.mechanism.arrays import Floats
+from leg_wear_monitor.monitor.config.forecast import Forecasting
+from leg_wear_monitor.monitor.forecast.even_draws import MEMBERS, even_normals, even_shares
+from leg_wear_monitor.monitor.forecast.growth_law import GrowthLaw, cycles_to
+from leg_wear_monitor.monitor.forecast.wear_coefficients import Belief
+
+
+class Answer(Enum):
+    """What the forecast can say; the value is fit for people."""
+
+    KNOWN = "from growth as it is, and what is not known of it"
+    PARTLY_KNOWN = "of the joints whose growth is known; that of others is not"
+    AT_LIMIT = "at its limit"
+    NOT_ENOUGH_DATA = "not enough data for a growth rate yet"
+    OUTSIDE_VALIDITY = "outside validity: the leg does not do what the model holds for"
+    NO_GROWTH = "clearance does not grow"
+
+
+@attrs.frozen
+class Quantiles:
+    """Values that are not exceeded with a probability of 10, 50 and 90 %."""
+
+    p10: float
+    p50: float
+    p90: float
+
+
+@attrs.frozen(kw_only=True)
+class JointForecast:
+    """A joint's remaining life.
+
+    Attributes
+    ----------
+    answer : Answer
+    cycles, hours, days : Quantiles or None
+        Gait cycles, hours of walking and days at the usual duty until the mean clearance reaches its limit;
+        None unless known (0 at the limit).
+    clearance_m : Quantiles
+        The clearance now, as far as it is known.
+    measurements : int
+        Measured clearances of this part that are in it.
+    """
+
+    answer: Answer
+    cycles: Quantiles | None
+    hours: Quantiles | None
+    days: Quantiles | None
+    clearance_m: Quantiles
+    measurements: int
+
+
+@attrs.frozen(kw_only=True)
+class LegForecast:
+    """The leg's remaining life: until the first of its joints reaches its limit.
+
+    Attributes
+    ----------
+    answer : Answer
+    cycles, hours, days : Quantiles or None
+        As those of a joint.
+    first_probability : dict of str to float
+        With which each joint is the first; empty unless known.
+    simulated_lives : int
+        That tell how joints act upon each other; 0: growth is supposed to stay as it is.
+    """
+
+    answer: Answer
+    cycles: Quantiles | None
+    hours: Quantiles | None
+    days: Quantiles | None
+    first_probability: dict[str, float]
+    simulated_lives: int
+
+    @property
+    def first(self) -> str | None:
+        """The joint that is most likely the first; None if that is not known."""
+        return max(self.first_probability, key=lambda j: self.first_probability[j], default=None)
+
+
+@attrs.frozen(kw_only=True)
+class Forecast:
+    """All joints', in the order of the loose joints, and the leg's."""
+
+    joints: tuple[JointForecast, ...]
+    leg: LegForecast
+
+
+@attrs.frozen(kw_only=True)
+class JointNow:
+    """A joint as the twin has it, with the nominal wear coefficient.
+
+    Attributes
+    ----------
+    joint : str
+    fresh_m, wear_m, limit_m : float
+        Clearance when new, wear since, and limit of the mean clearance.
+    growth_m : float or None
+        A cycle; None while there is not enough data.
+    growth_error_m : float
+        Its standard error.
+    """
+
+    joint: str
+    fresh_m: float
+    wear_m: float
+    limit_m: float
+    growth_m: float | None
+    growth_error_m: float
+
+    def answer(self, clearance_m: float, valid: bool) -> Answer:
+        """What can be said of it, supposing its clearance."""
+        if clearance_m >= self.limit_m:
+            return Answer.AT_LIMIT
+        if not valid:
+            return Answer.OUTSIDE_VALIDITY
+        if self.growth_m is None:
+            return Answer.NOT_ENOUGH_DATA
+        return Answer.KNOWN if self.growth_m > 0.0 else Answer.NO_GROWTH
+
+
+@attrs.frozen(eq=False)
+class _Legs:
+    """The ensemble: n legs that might be this one.
+
+    Attributes
+    ----------
+    clearance_m : (k, n) array
+        Now.
+    base_m : (k, n) array
+        Growth a cycle when all was new.
+    duty_h : (n,) array
+        Walking a day.
+    """
+
+    clearance_m: Floats
+    base_m: Floats
+    duty_h: Floats
+
+
+def forecast(
+    now: Sequence[JointNow],
+    beliefs: Sequence[Belief],
+    settings: Forecasting,
+    law: GrowthLaw,
+    *,
+    cycle_s: float,
+    valid: bool,
+) -> Forecast:
+    """Remaining life of all loose joints, and of the leg.
+
+    Parameters
+    ----------
+    now : sequence of JointNow
+    beliefs : sequence of Belief
+        Of their wear coefficients.
+    settings : Forecasting
+    law : GrowthLaw
+        Of the same joints in the same order.
+    cycle_s : float
+        Time of a gait cycle.
+    valid : bool
+        Whether the model holds for what the leg does.
+    """
+    legs = _legs(now, beliefs, settings, law)
+    seen = [quantiles(row) for row in legs.clearance_m]
+    answers = [each.answer(q.p50, valid) for each, q in zip(now, seen, strict=True)]
+    limit = np.array([each.limit_m for each in now])
+    ended = np.array([[answer is Answer.AT_LIMIT] for answer in answers])
+    ends = cycles_to(law, np.where(ended, limit[:, None], legs.clearance_m), legs.base_m, limit)
+    day = cycle_s / 3600.0 / legs.duty_h
+    joints = tuple(
+        JointForecast(answer=a, **_life(a, end, cycle_s, day), clearance_m=q, measurements=belief.looks)
+        for a, end, q, belief in zip(answers, ends, seen, beliefs, strict=True)
+    )
+    answer = _leg_answer(answers)
+    life, first = _life(answer, ends.min(axis=0), cycle_s, day), {}
+    if life["cycles"] is not None:
+        share = np.bincount(ends.argmin(axis=0), minlength=len(now)) / MEMBERS
+        first = {each.joint: float(p) for each, p in zip(now, share, strict=True)}
+    leg = LegForecast(answer=answer, **life, first_probability=first, simulated_lives=law.lives)
+    return Forecast(joints=joints, leg=leg)
+
+
+def _legs(now: Sequence[JointNow], beliefs: Sequence[Belief], settings: Forecasting, law: GrowthLaw) -> _Legs:
+    k = len(now)
+    shares, normals = even_shares(3 * k + 2), even_normals(3 * k + 2)
+    log_factor = np.array([belief.log_factors(row) for belief, row in zip(beliefs, shares, strict=False)])
+    excess = np.array(
+        [
+            np.interp(own, belief.log_factor, belief.excess_m) + belief.excess_sigma_m * row
+            for own, belief, row in zip(log_factor, beliefs, normals[k:], strict=False)
+        ]
+    )
+    fresh, wear, growth, error = (
+        np.array([[getattr(each, name) or 0.0] for each in now])
+        for name in ("fresh_m", "wear_m", "growth_m", "growth_error_m")
+    )
+    clearance = np.maximum(fresh + excess + np.exp(log_factor) * wear, 0.0)
+    relative = np.divide(error, growth, out=np.zeros_like(error), where=growth > 0.0)
+    log_rate = log_factor + np.hypot(law.sigma[:, None], relative) * normals[2 * k : 3 * k]
+    log_rate += settings.load_sigma * normals[3 * k]
+    # The twin's growth is that at its own clearances. What is believed of a factor is a mean over the part's
+    # past, in which the other clearances departed from the twin's by and by: half of their doing is in it.
+    here, twin = law.log_growth(clearance), law.log_growth(fresh + wear)
+    log_base = log_rate + 0.5 * (here - twin) - here
+    duty = settings.duty_hours_per_day * np.exp(settings.duty_sigma * normals[3 * k + 1])
+    return _Legs(clearance, np.maximum(growth, 0.0) * np.exp(log_base), duty)
+
+
+def _life(answer: Answer, cycles: Floats, cycle_s: float, day: Floats) -> dict[str, Quantiles | None]:
+    """Remaining life in cycles, hours and days; ``day`` (n,) days of a cycle."""
+    if answer not in (Answer.KNOWN, Answer.PARTLY_KNOWN, Answer.AT_LIMIT):
+        return dict.fromkeys(("cycles", "hours", "days"))
+    hours = cycles * (cycle_s / 3600.0)
+    return {"cycles": quantiles(cycles), "hours": quantiles(hours), "days": quantiles(cycles * day)}
+
+
+def _leg_answer(joints: Sequence[Answer]) -> Answer:
+    for answer in (Answer.AT_LIMIT, Answer.OUTSIDE_VALIDITY):
+        if answer in joints:
+            return answer
+    if Answer.KNOWN not in joints:
+        return Answer.NOT_ENOUGH_DATA if Answer.NOT_ENOUGH_DATA in joints else Answer.NO_GROWTH
+    return Answer.PARTLY_KNOWN if Answer.NOT_ENOUGH_DATA in joints else Answer.KNOWN
+
+
+def quantiles(values: Floats) -> Quantiles:
+    """Quantiles of equally likely values."""
+    return Quantiles(*np.quantile(values, (0.1, 0.5, 0.9)).tolist())

@@ -1,0 +1,208 @@
+"""The forecast as gait cycles come in: renewed once a minute of their stamps, or when more is known."""
+
+from collections.abc import Callable, Sequence
+
+import attrs
+import numpy as np
+
+from leg_wear_monitor.mechanism.arrays import Floats
+from leg_wear_monitor.mechanism.spec import Mechanism
+from leg_wear_monitor.monitor.config.forecast import Forecasting
+from leg_wear_monitor.monitor.forecast.forecast import Forecast, JointNow, forecast
+from leg_wear_monitor.monitor.forecast.growth import GrowthRate, GrowthWindow, extended, growth_rate
+from leg_wear_monitor.monitor.forecast.life_file import law_of
+from leg_wear_monitor.monitor.forecast.measurement import CONTRADICTS, Finding, looks_of, measure
+from leg_wear_monitor.monitor.forecast.wear_coefficients import Belief, Look, believe
+from leg_wear_monitor.monitor.ledger.entry import JointWear, Measurement
+from leg_wear_monitor.twin.statistics import CycleFigures
+
+RENEWED_NS = 60_000_000_000
+
+
+@attrs.define
+class ForecastState:
+    """What changes; every value is immutable, so a shallow copy is a snapshot.
+
+    Attributes
+    ----------
+    growth : tuple of GrowthWindow
+    beliefs : tuple of Belief
+    last : Forecast or None
+        None before the first, and when something is new.
+    stamp_ns : int
+        Of the last.
+    known : int
+        Joints whose growth was known then.
+    """
+
+    growth: tuple[GrowthWindow, ...]
+    beliefs: tuple[Belief, ...]
+    last: Forecast | None = None
+    stamp_ns: int = 0
+    known: int = 0
+
+
+class Forecaster:
+    """Forecasts all loose joints, and the leg.
+
+    Parameters
+    ----------
+    mechanism : Mechanism
+        As the configuration wants it.
+    settings : Forecasting
+    measurements : sequence of Measurement
+        Of the ledger.
+    replaced_ns : sequence of int
+        When each joint's part was replaced, 0 if it never was.
+
+    Raises
+    ------
+    ConfigError
+        For a file of lives that cannot be used.
+    """
+
+    def __init__(
+        self,
+        mechanism: Mechanism,
+        settings: Forecasting,
+        measurements: Sequence[Measurement],
+        replaced_ns: Sequence[int],
+    ) -> None:
+        self._settings, self._loose = settings, mechanism.loose
+        self._clearances = [mechanism.clearances[joint] for joint in mechanism.loose]
+        self._fresh_m = [clearance.radial_clearance for clearance in self._clearances]
+        self._law = law_of(mechanism, settings.life, settings.model_sigma)
+        self._measurements = list(measurements)
+        joints = zip(self._loose, self._fresh_m, replaced_ns, strict=True)
+        beliefs = tuple(
+            believe(settings, fresh, looks_of(measurements, joint, when)) for joint, fresh, when in joints
+        )
+        self.state = ForecastState(tuple(GrowthWindow() for _ in self._loose), beliefs)
+
+    def after(
+        self, figures: CycleFigures, wear_m: Floats, limits_m: Sequence[float], is_valid: Callable[[], bool]
+    ) -> Forecast:
+        """Forecast after a gait cycle: a new one if it is time, else the last.
+
+        Parameters
+        ----------
+        figures : CycleFigures
+        wear_m : (k,) array
+            What the twin has counted for each part.
+        limits_m : sequence of float
+            Of the mean clearances.
+        is_valid : callable
+            Whether the model holds for what the leg does.
+        """
+        state = self.state
+        state.growth = tuple(
+            extended(window, float(growth), figures.moving_s, self._settings.window_cycles)
+            for window, growth in zip(state.growth, figures.growth_mean_m, strict=True)
+        )
+        rates = [growth_rate(window) for window in state.growth]
+        is_recent = 0 <= figures.stamp_ns - state.stamp_ns < RENEWED_NS
+        if state.last is None or not is_recent or _known(rates) > state.known:
+            state.stamp_ns = figures.stamp_ns
+            return self.renewed(wear_m, limits_m, is_valid())
+        return state.last
+
+    def renewed(self, wear_m: Floats, limits_m: Sequence[float], is_valid: bool) -> Forecast:
+        """A new forecast from all that is known now; parameters as in `after`."""
+        rates = [growth_rate(window) for window in self.state.growth]
+        self.state.known = _known(rates)
+        self.state.last = self._forecast(rates, wear_m, limits_m, is_valid)
+        return self.state.last
+
+    @property
+    def measurements(self) -> tuple[Measurement, ...]:
+        """Of the ledger, and since."""
+        return tuple(self._measurements)
+
+    def replaced(self, joint: str, replaced_ns: int) -> None:
+        """A joint has another part: known of it is what was measured on it, on a new one nothing."""
+        k, state = self._loose.index(joint), self.state
+        looks = looks_of(self._measurements, joint, replaced_ns)
+        state.growth = (*state.growth[:k], GrowthWindow(), *state.growth[k + 1 :])
+        self._believe(k, believe(self._settings, self._fresh_m[k], looks))
+
+    def measured(
+        self,
+        wear: JointWear,
+        *,
+        clearance_m: float,
+        sigma_m: float,
+        stamp_ns: int,
+        who: str,
+        kept_ns: int = 0,
+        accept: bool = False,
+    ) -> Finding:
+        """Take in a measured clearance; parameters as in `measure`."""
+        k = self._loose.index(wear.name)
+        found = measure(
+            self._settings,
+            self._clearances[k],
+            wear,
+            self._measurements,
+            clearance_m=clearance_m,
+            sigma_m=sigma_m,
+            stamp_ns=stamp_ns,
+            who=who,
+            kept_ns=kept_ns,
+            accept=accept,
+        )
+        self._measurements.append(found.measurement)
+        self._believe(k, found.after)
+        return found
+
+    def seen(self, k: int, look: Look, replaced_ns: int) -> bool:
+        """Take in a clearance that encoders show, instead of the last such one.
+
+        Parameters
+        ----------
+        k : int
+            Of the loose joint.
+        look : Look
+            Its error does not average out, so the newest says all there is.
+        replaced_ns : int
+            When its part was replaced, 0 if it never was.
+
+        Returns
+        -------
+        bool
+            Whether it is believed: not, if the model holds it next to impossible.
+        """
+        looks = looks_of(self._measurements, self._loose[k], replaced_ns)
+        below = believe(self._settings, self._fresh_m[k], looks).probability_below(self._fresh_m[k], look)
+        believed = CONTRADICTS <= below <= 1.0 - CONTRADICTS
+        self._believe(k, believe(self._settings, self._fresh_m[k], [*looks, look] if believed else looks))
+        return believed
+
+    def _believe(self, k: int, belief: Belief) -> None:
+        beliefs = self.state.beliefs
+        self.state.beliefs = (*beliefs[:k], belief, *beliefs[k + 1 :])
+        self.state.last = None
+
+    def _forecast(
+        self, rates: Sequence[GrowthRate | None], wear_m: Floats, limits_m: Sequence[float], valid: bool
+    ) -> Forecast:
+        state = self.state
+        now = [
+            JointNow(
+                joint=joint,
+                fresh_m=self._fresh_m[k],
+                wear_m=float(wear_m[k]),
+                limit_m=limits_m[k],
+                growth_m=rate.per_cycle_m if rate else None,
+                growth_error_m=rate.error_m if rate else 0.0,
+            )
+            for k, (joint, rate) in enumerate(zip(self._loose, rates, strict=True))
+        ]
+        # a new part's window is shorter than the others'
+        walked = max((window.moving_s for window in state.growth), key=len)
+        return forecast(
+            now, state.beliefs, self._settings, self._law, cycle_s=float(np.mean(walked)), valid=valid
+        )
+
+
+def _known(rates: Sequence[GrowthRate | None]) -> int:
+    return sum(rate is not None for rate in rates)

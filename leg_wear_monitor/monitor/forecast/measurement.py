@@ -1,0 +1,151 @@
+"""A measured clearance: what it says of the joint, in figures and in words."""
+
+from collections.abc import Sequence
+
+import attrs
+import numpy as np
+
+from leg_wear_monitor.errors import ConfigError
+from leg_wear_monitor.mechanism.clearance import Clearance
+from leg_wear_monitor.mechanism.clearance_range import measured_fault, sigma_fault
+from leg_wear_monitor.monitor.config.forecast import Forecasting
+from leg_wear_monitor.monitor.forecast.wear_coefficients import Belief, Look, believe
+from leg_wear_monitor.monitor.ledger.entry import JointWear, Measurement
+
+CONTRADICTS = 0.00135  # probability of a tail: three standard deviations of a normal one
+
+_SAYS_SOMETHING = 0.9  # of the spread before: what is left after a measurement that says something
+
+
+@attrs.frozen(eq=False)
+class Finding:
+    """What a measurement says.
+
+    Attributes
+    ----------
+    measurement : Measurement
+        To be noted in the ledger.
+    before, after : Belief
+        Of the joint's wear coefficient.
+    contradicts : bool
+        Whether the model holds it next to impossible.
+    words : tuple of str
+        For people, a line each.
+    """
+
+    measurement: Measurement
+    before: Belief
+    after: Belief
+    contradicts: bool
+    words: tuple[str, ...]
+
+
+def looks_of(measurements: Sequence[Measurement], joint: str, replaced_ns: int) -> list[Look]:
+    """Measurements of a joint's present part that count."""
+    return [
+        Look(m.clearance_m, m.sigma_m, m.wear_m)
+        for m in measurements
+        if m.joint == joint and m.replaced_ns == replaced_ns and m.counts and not m.is_withdrawn
+    ]
+
+
+def measure(
+    settings: Forecasting,
+    clearance: Clearance,
+    wear: JointWear,
+    earlier: Sequence[Measurement],
+    *,
+    clearance_m: float,
+    sigma_m: float,
+    stamp_ns: int,
+    who: str,
+    kept_ns: int = 0,
+    accept: bool = False,
+) -> Finding:
+    """Judge a measured clearance.
+
+    Parameters
+    ----------
+    settings : Forecasting
+    clearance : Clearance
+        Settings of the joint: its nominal clearance when new, and its bushing.
+    wear : JointWear
+        The joint's present part. The measurement counts for the wear in it, whatever the clock says.
+    earlier : sequence of Measurement
+        All of the ledger.
+    clearance_m, sigma_m : float
+        Radial, and its standard deviation.
+    stamp_ns : int
+        By the clock.
+    who : str
+    kept_ns : int
+        Stamp of the ledger's last entry, 0 if there is none.
+    accept : bool
+        Whether it counts even if it contradicts the model.
+
+    Raises
+    ------
+    ConfigError
+        For figures that cannot be: they are likely meant in another unit.
+    """
+    fresh_m, radius_m = clearance.radial_clearance, clearance.bushing_radius
+    for name, fault in (
+        ("clearance", measured_fault(wear.name, fresh_m, radius_m, clearance_m)),
+        ("sigma", sigma_fault(radius_m, sigma_m)),
+    ):
+        if fault:
+            raise ConfigError(name, "", fault)
+    looks = looks_of(earlier, wear.name, wear.replaced_ns)
+    look = Look(clearance_m, sigma_m, float(wear.depth.sum(axis=0).mean()))
+    before = believe(settings, fresh_m, looks)
+    below = before.probability_below(fresh_m, look)
+    contradicts = not CONTRADICTS <= below <= 1.0 - CONTRADICTS
+    counts = accept or not contradicts
+    after = believe(settings, fresh_m, [*looks, look]) if counts else before
+    measurement = Measurement(
+        stamp_ns=stamp_ns,
+        joint=wear.name,
+        who=who,
+        clearance_m=clearance_m,
+        sigma_m=sigma_m,
+        wear_m=look.wear_m,
+        cycles=wear.cycles,
+        replaced_ns=wear.replaced_ns,
+        expected_below=below,
+        counts=counts,
+    )
+    words = _clock(stamp_ns, kept_ns)
+    if contradicts:
+        words += _contradiction(accept, below, wear.name)
+    return Finding(measurement, before, after, contradicts, (*words, _change(before, after)))
+
+
+def _clock(stamp_ns: int, kept_ns: int) -> list[str]:
+    if not kept_ns or stamp_ns >= kept_ns:
+        return []
+    return [
+        f"the clock stands {(kept_ns - stamp_ns) / 3.6e12:.3g} h before the ledger's last entry, it has "
+        "jumped; the measurement counts for the wear that is in the ledger now"
+    ]
+
+
+def _contradiction(accept: bool, below: float, joint: str) -> list[str]:
+    more = "larger" if below > 0.5 else "smaller"
+    done = "it counts, as asked for" if accept else "it is kept in the ledger, but does not count"
+    return [
+        f"this contradicts the model: the clearance of {joint} is far {more} than it can be; {done}",
+        "measure again; if the part was replaced, reset its wear first; if load or clearance when new are "
+        "other than configured, correct that; if it is right all the same, --accept",
+    ]
+
+
+def _change(before: Belief, after: Belief) -> str:
+    if after.looks == before.looks:
+        return "the wear coefficient is believed as before"
+    if after.sigma > _SAYS_SOMETHING * before.sigma:
+        return "it says little of the wear coefficient: too little has worn yet for its accuracy"
+    low, middle, high = (float(x) for x in np.exp(after.log_factors((0.1, 0.5, 0.9))))
+    return (
+        f"the wear coefficient is {middle:.3g} times the nominal one, {low:.3g} to {high:.3g} (p10 to p90); "
+        f"the forecast is {before.sigma / after.sigma:.3g} times as sure of it as before"
+    )

@@ -1,0 +1,142 @@
+"""What is believed of a joint's wear coefficient, and how a measured clearance changes it (Bayes).
+
+The clearance is c = c_0 + d + x w: c_0 the nominal one when new, d what the part is off it, w the wear that
+the twin has counted with the nominal coefficient, x the joint's factor on it. x is lognormal and d normal
+beforehand; measured clearances have normal errors. d drops out in closed form, x stays on a grid that is
+laid where the belief is: a measurement that counts moves it as far as it says, however far that is.
+"""
+
+import math
+from collections.abc import Sequence
+from statistics import NormalDist
+
+import attrs
+import numpy as np
+from numpy.typing import ArrayLike
+
+from leg_wear_monitor.mechanism.arrays import Floats
+from leg_wear_monitor.monitor.config.forecast import Forecasting
+
+GRID = 801
+_WIDTH = 8.0  # standard deviations on both sides, of the prior and of what measurements say
+_DEEP = 25.0  # below the highest, of log density: what is left out weighs less than 1e-9
+_ZOOMS = 12  # each at least halves the grid's extent
+
+_phi = np.frompyfunc(NormalDist().cdf, 1, 1)
+
+
+@attrs.frozen
+class Look:
+    """A measured clearance.
+
+    Attributes
+    ----------
+    clearance_m, sigma_m : float
+        Mean radial clearance and its standard deviation.
+    wear_m : float
+        Wear w that the twin had counted then.
+    """
+
+    clearance_m: float
+    sigma_m: float
+    wear_m: float
+
+
+@attrs.frozen(eq=False)
+class Belief:
+    """What is known of a joint: weights over its factor's logarithm, and its excess given the factor.
+
+    Attributes
+    ----------
+    log_factor, weight : (g,) arrays
+        Weights sum to 1.
+    excess_m : (g,) array
+        Mean of d given the factor.
+    excess_sigma_m : float
+        Its standard deviation.
+    looks : int
+        Measurements in it.
+    """
+
+    log_factor: Floats
+    weight: Floats
+    excess_m: Floats
+    excess_sigma_m: float
+    looks: int
+
+    @property
+    def mean(self) -> float:
+        """Mean of the factor's logarithm."""
+        return float(self.weight @ self.log_factor)
+
+    @property
+    def sigma(self) -> float:
+        """Standard deviation of the factor's logarithm."""
+        return math.sqrt(float(self.weight @ np.square(self.log_factor - self.mean)))
+
+    def log_factors(self, shares: ArrayLike) -> Floats:
+        """Quantiles of the factor's logarithm at shares in (0, 1)."""
+        reached = np.cumsum(self.weight) - 0.5 * self.weight
+        return np.asarray(np.interp(np.asarray(shares), reached, self.log_factor))
+
+    def probability_below(self, fresh_m: float, look: Look) -> float:
+        """Probability that a measurement of such accuracy would have come out smaller than this one did."""
+        expected = fresh_m + self.excess_m + np.exp(self.log_factor) * look.wear_m
+        spread = math.hypot(look.sigma_m, self.excess_sigma_m)
+        below = np.asarray(_phi((look.clearance_m - expected) / spread), dtype=float)
+        return float(self.weight @ below)
+
+
+def believe(settings: Forecasting, fresh_m: float, looks: Sequence[Look] = ()) -> Belief:
+    """Belief after measurements of the same part, in any order.
+
+    Parameters
+    ----------
+    settings : Forecasting
+    fresh_m : float
+        Nominal clearance when new.
+    looks : sequence of Look
+    """
+    says = _says(settings, fresh_m, looks)
+    log_factor, log_weight = _laid_out(settings.wear_coefficient_sigma, *says)
+    weight = np.exp(log_weight - log_weight.max())
+    precision = 1.0 / settings.clearance_sigma_m**2 + sum(look.sigma_m**-2 for look in looks)
+    pull = np.zeros(GRID)
+    for look in looks:
+        pull += (look.clearance_m - fresh_m - np.exp(log_factor) * look.wear_m) / look.sigma_m**2
+    return Belief(log_factor, weight / weight.sum(), pull / precision, precision**-0.5, len(looks))
+
+
+def _says(settings: Forecasting, fresh_m: float, looks: Sequence[Look]) -> tuple[float, float]:
+    """What measurements say of the factor by themselves: its mean and its precision, 0 if they say nothing.
+
+    The clearance when new drops out: it makes their errors hang together.
+    """
+    if not any(look.wear_m for look in looks):
+        return 0.0, 0.0
+    opened, wear, sigma = np.array([(one.clearance_m - fresh_m, one.wear_m, one.sigma_m) for one in looks]).T
+    own, new = sigma**-2.0, settings.clearance_sigma_m**-2.0
+    # about what is common to all of them, so that nothing large cancels
+    common_wear, common = (float(own @ values) / (float(own.sum()) + new) for values in (wear, opened))
+    precision = float(own @ np.square(wear - common_wear)) + new * common_wear**2
+    product = float(own @ ((wear - common_wear) * (opened - common))) + new * common_wear * common
+    return product / precision, precision
+
+
+def _laid_out(sigma: float, mean: float, precision: float) -> tuple[Floats, Floats]:
+    """Grid (g,) over the factor's logarithm where its density is, and the logarithm of that, (g,)."""
+    low, high = -_WIDTH * sigma, _WIDTH * sigma
+    if precision > 0.0:
+        own = precision**-0.5
+        least = min(own, own**2 / abs(mean)) if mean < 0.0 else own
+        low += min(0.0, math.log(least) - _WIDTH)
+        high = max(high, math.log(max(mean, 0.0) + _WIDTH * own))
+    for _ in range(_ZOOMS):
+        grid = np.linspace(low, high, GRID)
+        density = -0.5 * np.square(grid / sigma) - 0.5 * precision * np.square(np.exp(grid) - mean)
+        near = np.flatnonzero(density > density.max() - _DEEP)
+        first, last = max(near[0] - 1, 0), min(near[-1] + 1, GRID - 1)
+        if last - first > GRID // 2:
+            break
+        low, high = grid[first], grid[last]
+    return grid, density

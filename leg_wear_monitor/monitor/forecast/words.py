@@ -1,0 +1,48 @@
+"""How long something lasts, and how large a clearance is, in as many digits as are known."""
+
+import math
+
+import attrs
+
+from leg_wear_monitor.monitor.forecast.forecast import JointForecast, LegForecast
+
+UNKNOWN = {
+    f"{share}_{key}": math.nan for key in ("cycles", "hours", "days") for share in ("p10", "p50", "p90")
+}
+"""What `lifetime_values` gives, not known."""
+
+_SIGMAS_APART = 2.5631  # p10 and p90 of a normal distribution
+
+
+def lifetime_values(told: JointForecast | LegForecast) -> dict[str, float]:
+    """Quantiles of cycles, hours and days of duty by keys such as ``p50_hours``; none if not known."""
+    values: dict[str, float] = {}
+    for key in ("cycles", "hours", "days"):
+        quantiles = getattr(told, key)
+        if quantiles is not None:
+            values |= {f"{share}_{key}": value for share, value in attrs.asdict(quantiles).items()}
+    return values
+
+
+def three_digits(value: float) -> str:
+    """A number rounded to three digits, without an exponent as far as that is readable."""
+    if value == 0.0 or not math.isfinite(value):
+        return f"{value:.3g}"
+    if not 1.0e-4 <= abs(value) < 1.0e9:
+        return f"{value:.2e}"
+    rounded = float(f"{value:.2e}")
+    return f"{rounded:.{max(0, 2 - math.floor(math.log10(abs(rounded))))}f}"
+
+
+def clearance_mm(value_m: float, p10_m: float, p90_m: float) -> str:
+    """A counted clearance [mm] in the digits that it deserves: the last is that of its standard deviation.
+
+    Parameters
+    ----------
+    value_m : float
+    p10_m, p90_m : float
+        Quantiles of what it may be.
+    """
+    sigma_mm = 1.0e3 * (p90_m - p10_m) / _SIGMAS_APART
+    digits = -math.floor(math.log10(sigma_mm)) if sigma_mm > 0.0 else 6
+    return f"{1.0e3 * value_m:.{min(max(digits, 2), 6)}f}"

@@ -1,0 +1,52 @@
+"""What encoders show goes into the forecast, once a minute of the stamps, or on a finding."""
+
+from collections.abc import Sequence
+
+import attrs
+
+from leg_wear_monitor.mechanism.arrays import Floats
+from leg_wear_monitor.monitor.encoders.clearance_estimate import SeenClearance, Sight
+from leg_wear_monitor.monitor.encoders.observer import EncoderWatch
+from leg_wear_monitor.monitor.forecast.forecaster import RENEWED_NS, Forecaster
+from leg_wear_monitor.monitor.forecast.wear_coefficients import Look
+from leg_wear_monitor.twin.statistics import CycleFigures
+
+
+def hand_over(
+    watch: EncoderWatch,
+    forecaster: Forecaster,
+    figures: CycleFigures,
+    worn_m: Floats,
+    replaced_ns: Sequence[int],
+) -> tuple[SeenClearance, ...]:
+    """Clearances as seen after a gait cycle, and whether the forecast believes them.
+
+    Parameters
+    ----------
+    watch : EncoderWatch
+    forecaster : Forecaster
+        Takes them in, if that is due.
+    figures : CycleFigures
+    worn_m : (k,) array
+        What the twin has counted for each part.
+    replaced_ns : sequence of int
+        When each part was replaced, 0 if it never was.
+    """
+    state, seen = watch.state, watch.seen(figures.clearance_mean_m)
+    other = tuple(one.is_other for one in seen)
+    is_due = other != state.other or not 0 <= figures.stamp_ns - state.handed_ns < RENEWED_NS
+    if is_due and any(one.sight is Sight.SEEN for one in seen):
+        state.handed_ns, state.other = figures.stamp_ns, other
+        state.believed = tuple(
+            one.sight is Sight.SEEN and forecaster.seen(k, _look(one, float(worn_m[k])), replaced_ns[k])
+            for k, one in enumerate(seen)
+        )
+    believed = state.believed or (False,) * len(seen)
+    return tuple(
+        attrs.evolve(one, believed=yes and one.sight is Sight.SEEN)
+        for one, yes in zip(seen, believed, strict=True)
+    )
+
+
+def _look(seen: SeenClearance, wear_m: float) -> Look:
+    return Look(seen.clearance_m, seen.sigma_m, wear_m)

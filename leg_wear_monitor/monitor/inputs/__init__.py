@@ -1,0 +1,1 @@
+"""Input health: order, rates, gaps, units, and whether the gait is that of this leg."""

@@ -1,0 +1,51 @@
+"""Why samples could not be used, in sentences: how many of how many, what is wrong, what to do."""
+
+from collections.abc import Mapping
+
+from leg_wear_monitor.monitor.config.settings import MonitorConfig
+from leg_wear_monitor.twin.statistics import Intake
+
+_WORTH_TELLING = 0.01  # share of the samples; below it, the counters say it
+
+_DROPPED = ("duplicates", "late", "stray_stamps", "outliers")
+
+_SENTENCES = {
+    "zero_stamp": "have a zero stamp: set header.stamp",
+    "missing_joint": "do not name the crank {crank!r}: set crank_joint to its name in joint_states",
+    "empty": "have no name or no position",
+    "wrong_length": "have another number of positions, velocities or efforts than of names",
+    "not_finite": "have a value that is NaN or infinite",
+    "undecodable": "cannot be decoded: another type or another encoding",
+    "wrong_type": "are of a type that is not read",
+    "out_of_range": "have a value that no leg has: angles are in radians, torques in N m",
+    "duplicates": "repeat a stamp: two publishers, or a header.stamp that is not renewed",
+    "late": "come later than tracker.reorder_window_s after younger ones",
+    "stray_stamps": "have a stamp far from the others: see the clock of the sender",
+    "outliers": "have an angle far from the motion that the others show",
+}
+
+
+def causes(before: Intake, after: Intake, withheld: int, config: MonitorConfig) -> list[str]:
+    """Sentences about samples that came between two counts and could not be used, the most frequent first.
+
+    Parameters
+    ----------
+    before, after : Intake
+    withheld : int
+        Of those out of range, how many another sentence tells of.
+    config : MonitorConfig
+        What the crank is called.
+    """
+    received = after.received - before.received
+    lost = _unused(after, before, withheld)
+    told = [name for name, count in lost.items() if count > _WORTH_TELLING * received]
+    return [
+        f"{lost[name]} of {received} samples {_SENTENCES[name].format(crank=config.crank_joint)}"
+        for name in sorted(told, key=lambda name: -lost[name])
+    ]
+
+
+def _unused(after: Intake, before: Intake, withheld: int) -> Mapping[str, int]:
+    lost = {name: count - before.faulty[name] for name, count in after.faulty.items()}
+    lost["out_of_range"] -= withheld
+    return lost | {name: getattr(after, name) - getattr(before, name) for name in _DROPPED}

@@ -1,0 +1,102 @@
+"""Keeps from the twin what no one leg's crank can send: angles of two sources, angles in another unit."""
+
+import math
+
+import numpy as np
+
+from leg_wear_monitor.mechanism.arrays import Floats, Ints
+from leg_wear_monitor.monitor.inputs import angle_check as check
+from leg_wear_monitor.twin.sample import GAIT_SAMPLE, Samples
+from leg_wear_monitor.twin.settings import TrackerSettings
+
+_ALONE_S = 1.0
+_DEGREES, _NEAR = 180.0 / math.pi, 1.5  # a leg that runs up to so much faster or slower than commanded
+
+GuardSnapshot = tuple[Ints, Floats]
+
+
+class InputGuard:
+    """Checks crank samples before they are followed.
+
+    A sample that cannot be used becomes one with the fault ``out_of_range``: it is counted, makes the time
+    unmonitored and wears nothing.
+
+    Parameters
+    ----------
+    settings : TrackerSettings
+    """
+
+    def __init__(self, settings: TrackerSettings) -> None:
+        self._commanded = abs(settings.commanded_speed_radps)
+        gap, speed = settings.bridge_limit_s, settings.commanded_speed_radps
+        alone = max(_ALONE_S, gap)
+        self._settings = np.array([settings.gate_rad, settings.largest_speed, gap, alone, speed])
+        self._integers = np.zeros(check.INTEGERS, np.int64)
+        self._numbers = np.zeros(check.NUMBERS)
+
+    def warm_up(self) -> None:
+        """Compile, before the first sample."""
+        self.checked(np.zeros(1, GAIT_SAMPLE))
+        self._integers[:], self._numbers[:] = 0, 0.0
+
+    def checked(self, samples: Samples) -> Samples:
+        """The same samples; a copy with faults where some cannot be used."""
+        fault = np.array(samples["fault"])
+        stamp, kind, angle = (np.array(samples[name]) for name in ("stamp_ns", "kind", "crank_angle_rad"))
+        check.check_angles(self._settings, self._integers, self._numbers, stamp, kind, angle, fault)
+        if np.array_equal(fault, samples["fault"]):
+            return samples
+        samples = samples.copy()
+        samples["fault"] = fault
+        return samples
+
+    @property
+    def stamp_ns(self) -> int:
+        """Stamp of the last crank sample that was checked; 0 before."""
+        return int(self._integers[check.STAMP + self._integers[check.LAST]])
+
+    @property
+    def sources(self) -> int:
+        """How many series of crank angles come at present: 2 where two interleave that disagree."""
+        return 1 + int(self._integers[check.TWO])
+
+    @property
+    def conflicting(self) -> int:
+        """Samples withheld since two sources sent them."""
+        return int(self._integers[check.CONFLICTING])
+
+    @property
+    def implausible(self) -> int:
+        """Samples withheld since their angle runs as no leg's does."""
+        return int(self._integers[check.IMPLAUSIBLE])
+
+    @property
+    def speed_ratio(self) -> float:
+        """How many times as fast as commanded the angle runs, where that is beyond belief; else NaN."""
+        if not self._integers[check.OTHER_UNIT]:
+            return math.nan
+        return float(self._numbers[check.FAST_SPEED]) / self._commanded
+
+    @property
+    def cause(self) -> str:
+        """Why crank samples are withheld at present, and what to do; empty if they are not."""
+        if self.sources > 1:
+            return (
+                "two series of crank angles interleave and disagree: two publishers of one crank, or an "
+                "encoder that jumps; nothing is monitored until one is left"
+            )
+        ratio = self.speed_ratio
+        if math.isnan(ratio):
+            return ""
+        told = f"the crank's angle runs {ratio:.2g} times as fast as commanded, nothing is monitored: "
+        if _DEGREES / _NEAR < ratio < _DEGREES * _NEAR:
+            return told + "it seems to be in degrees, radians are expected"
+        return told + "check its unit (radians), crank.gear_ratio and cadence.commanded_rpm"
+
+    def snapshot(self) -> GuardSnapshot:
+        """A copy of the whole state."""
+        return self._integers.copy(), self._numbers.copy()
+
+    def restore(self, snapshot: GuardSnapshot) -> None:
+        """Go back to a snapshot of a guard of the same settings."""
+        self._integers[:], self._numbers[:] = snapshot

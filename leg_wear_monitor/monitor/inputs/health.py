@@ -1,0 +1,108 @@
+"""How good the input was for a while: rates, samples that could not be used, time lost, stuck torque."""
+
+import math
+
+import attrs
+import numpy as np
+
+from leg_wear_monitor.twin.sample import NO_FAULT, Samples
+from leg_wear_monitor.twin.statistics import Intake
+
+_LEAST_TORQUES = 10
+
+
+@attrs.frozen
+class TorqueRange:
+    """Torques that came without a fault: how many, their ends, how many lie at each end or are saturated."""
+
+    number: int = 0
+    least_nm: float = math.inf
+    largest_nm: float = -math.inf
+    at_least: int = 0
+    at_largest: int = 0
+    saturated: int = 0
+
+    @property
+    def stuck_share(self) -> float:
+        """Share of those that are saturated, or repeat an end; NaN while there are few."""
+        if self.number < _LEAST_TORQUES:
+            return math.nan
+        repeated = max(count for count in (self.at_least, self.at_largest, 1))
+        return max(repeated if repeated > 1 else 0, self.saturated) / self.number
+
+
+def with_torques(before: TorqueRange, samples: Samples, saturation_nm: float) -> TorqueRange:
+    """Range with the torques of more samples, the crank's efforts among them."""
+    found = samples["torque_nm"][samples["fault"] == NO_FAULT]
+    found = found[np.isfinite(found)]
+    if not len(found):
+        return before
+    least, largest = min(before.least_nm, float(found.min())), max(before.largest_nm, float(found.max()))
+    beyond = np.count_nonzero(np.abs(found) >= saturation_nm) if saturation_nm > 0.0 else 0
+    return TorqueRange(
+        before.number + len(found),
+        least,
+        largest,
+        int(np.count_nonzero(found == least)) + (before.at_least if least == before.least_nm else 0),
+        int(np.count_nonzero(found == largest)) + (before.at_largest if largest == before.largest_nm else 0),
+        before.saturated + int(beyond),
+    )
+
+
+@attrs.frozen(kw_only=True)
+class InputHealth:
+    """The input over a stretch of time; a figure that cannot be known is NaN.
+
+    Attributes
+    ----------
+    duration_s : float
+        NaN if that is not known, or stamps did not advance.
+    crank_rate_hz, torque_rate_hz : float
+        Of samples that were used.
+    bad_share : float
+        Share of the samples that were not: faulty, repeated, late, with a stray stamp, far off.
+    lost_share : float
+        Share of the time in which the leg was not followed.
+    stuck_torque_share : float
+        Share of the torque samples that are saturated or repeat the largest or the smallest one; 1 if all
+        are the same.
+    """
+
+    duration_s: float
+    crank_rate_hz: float
+    torque_rate_hz: float
+    bad_share: float
+    lost_share: float
+    stuck_torque_share: float
+
+
+def input_health(before: Intake, after: Intake, torque: TorqueRange, is_whole: bool = True) -> InputHealth:
+    """Health of what came between two counts.
+
+    Parameters
+    ----------
+    before, after : Intake
+    torque : TorqueRange
+        Of what came meanwhile.
+    is_whole : bool
+        Whether all that came was counted; else nothing is known of time.
+    """
+    span_s = (after.newest_stamp_ns - before.newest_stamp_ns) * 1.0e-9
+    is_known = is_whole and span_s > 0.0 and before.newest_stamp_ns > 0
+    duration_s = span_s if is_known else math.nan
+    monitored_s = after.moving_s - before.moving_s + after.standing_s - before.standing_s
+    received = after.received - before.received
+    return InputHealth(
+        duration_s=duration_s,
+        crank_rate_hz=(after.crank_used - before.crank_used) / duration_s,
+        torque_rate_hz=(after.torque_used - before.torque_used) / duration_s,
+        bad_share=(unused(after) - unused(before)) / received if received else math.nan,
+        lost_share=min(1.0, max(0.0, 1.0 - monitored_s / duration_s)) if is_known else math.nan,
+        stuck_torque_share=torque.stuck_share,
+    )
+
+
+def unused(counts: Intake) -> int:
+    """Samples that were not used."""
+    faulty = sum(counts.faulty.values())
+    return faulty + counts.duplicates + counts.late + counts.stray_stamps + counts.outliers

@@ -1,0 +1,1 @@
+"""Counted wear on disk: entries, log, checksums, recovery."""

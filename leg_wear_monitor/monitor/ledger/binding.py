@@ -1,0 +1,81 @@
+"""What a ledger's wear belongs to: this hardware, this mechanism, this rate of wear."""
+
+import hashlib
+import json
+from typing import Any
+
+import attrs
+
+from leg_wear_monitor.mechanism.spec import Mechanism
+from leg_wear_monitor.monitor.config.settings import MonitorConfig
+from leg_wear_monitor.wear.surfaces import SECTORS
+
+# of a mechanism, what may change without its worn parts being others
+_FREE = ("name", "source", "drive", "loads", "loose", "clearances")
+_FREE_OF_CLEARANCE = ("wear_coefficient",)
+
+
+def fingerprint(mechanism: Mechanism) -> str:
+    """Hash of the bodies, joints, springs and loose joints of a mechanism, 16 hexadecimal digits.
+
+    Neither names and comments of its file count, nor what drives and loads it, nor wear coefficients: a
+    better value of those continues the same wear.
+    """
+    fields = {field.name: getattr(mechanism, field.name) for field in attrs.fields(Mechanism)}
+    parts = {name: _plain(value) for name, value in fields.items() if name not in _FREE}
+    for joint in mechanism.loose:
+        settings = attrs.asdict(mechanism.clearances[joint])
+        parts[f"clearance {joint}"] = {
+            name: _plain(value) for name, value in settings.items() if name not in _FREE_OF_CLEARANCE
+        }
+    text = json.dumps(parts, sort_keys=True, default=_plain)
+    return hashlib.sha256(text.encode()).hexdigest()[:16]
+
+
+def _plain(value: Any) -> Any:
+    if attrs.has(type(value)):
+        return attrs.asdict(value)
+    if isinstance(value, dict):
+        return {name: _plain(entry) for name, entry in value.items()}
+    return value
+
+
+@attrs.frozen(kw_only=True)
+class Binding:
+    """What must be the same for a ledger to be continued.
+
+    Attributes
+    ----------
+    hardware_id : str
+    mechanism : str
+        Its name, for messages.
+    fingerprint : str
+    joints : tuple of str
+        The loose ones.
+    wear_acceleration : float
+    sectors : int
+        Of each surface.
+    """
+
+    hardware_id: str
+    mechanism: str
+    fingerprint: str
+    joints: tuple[str, ...]
+    wear_acceleration: float = 1.0
+    sectors: int = SECTORS
+
+    def as_texts(self) -> dict[str, str]:
+        """Texts as the ledger keeps them."""
+        texts = {name: str(value) for name, value in attrs.asdict(self).items()}
+        return texts | {"joints": ", ".join(sorted(self.joints))}
+
+
+def binding_of(mechanism: Mechanism, config: MonitorConfig) -> Binding:
+    """Binding of a mechanism as `fitted` gives it."""
+    return Binding(
+        hardware_id=config.hardware,
+        mechanism=mechanism.name,
+        fingerprint=fingerprint(mechanism),
+        joints=mechanism.loose,
+        wear_acceleration=config.wear_acceleration,
+    )

@@ -1,0 +1,281 @@
+"""The ledger's file: created whole or not at all, checked before it is believed, written in transactions."""
+
+import fcntl
+import os
+import shutil
+import sqlite3
+import stat
+import tempfile
+from collections.abc import Iterator
+from contextlib import closing, contextmanager
+from pathlib import Path
+from urllib.parse import quote
+
+from leg_wear_monitor.errors import LegWearError
+from leg_wear_monitor.monitor.ledger.binding import Binding
+from leg_wear_monitor.monitor.ledger.former_format import verify_former
+from leg_wear_monitor.monitor.ledger.schema import (
+    APPLICATION_ID,
+    FORMAT,
+    SEALED_FROM,
+    definitions,
+    expected_definitions,
+    migrate,
+)
+from leg_wear_monitor.monitor.ledger.seal import verify, write_head
+
+MOVE = "move it away (and its -log) to begin with new parts, or put a copy of it back"
+MODE = 0o640  # of new files, less what the umask takes away
+
+_PAGE = 512  # bytes: most of what a whole entry changes beside the surfaces is a row here and a row there
+_HEADER = 100
+_MAGIC = b"SQLite format 3\0"
+_IN_USE = "is in use by another monitor; end that one, or set another ledger.path"
+_SHARED_FIRST, _SHARED_SIZE = 0x40000002, 510  # bytes that SQLite locks
+_ROLLBACK = b"\1\1"  # versions of writing and reading: journal, not WAL
+
+
+class LedgerError(LegWearError):
+    """A ledger that cannot be continued; it is left as it is."""
+
+
+def beside(path: Path, ending: str) -> Path:
+    """A file that belongs to a ledger."""
+    return path.with_name(path.name + ending)
+
+
+def create(path: Path, binding: Binding) -> None:
+    """Create a ledger; at any instant there is none at the path or a whole one.
+
+    Raises
+    ------
+    LedgerError
+    """
+    new = beside(path, ".new")
+    try:
+        new.unlink(missing_ok=True)
+        os.close(os.open(new, os.O_CREAT | os.O_EXCL | os.O_WRONLY, MODE))
+        with closing(_connect(new, "rw")) as db:
+            db.execute(f"PRAGMA page_size = {_PAGE}")
+            _fill(db, binding)
+        new.rename(path)
+        sync_directory(path)
+    except (sqlite3.Error, OSError) as error:
+        raise LedgerError(
+            f"{path}: cannot be created: {_reason(error)}; expected a writable place"
+        ) from error
+
+
+def _fill(db: sqlite3.Connection, binding: Binding) -> None:
+    """Make a new file's tables."""
+    with transaction(db):
+        db.execute(f"PRAGMA application_id = {APPLICATION_ID}")
+        migrate(db, 0)
+        db.executemany("INSERT INTO binding VALUES (?, ?)", binding.as_texts().items())
+        write_head(db, 1, b"")
+
+
+def connect(path: Path, binding: Binding) -> sqlite3.Connection:
+    """Open a ledger for this hardware and mechanism alone; nobody else can while it is open.
+
+    On a disk that is read-only it can be read, and every write fails.
+
+    Raises
+    ------
+    LedgerError
+        If it is damaged, none, of a newer format, of something else, or in use.
+    """
+    try:
+        found = _look(path)
+        writable = _is_writable(path)
+        if writable and _is_hot(beside(path, "-journal")):
+            _rehearse(path, found, binding)
+        db = _connect(path, "rw" if writable else "ro&immutable=1")
+    except OSError as error:
+        raise LedgerError(f"{path}: cannot be opened: {_reason(error)}") from error
+    except (sqlite3.Error, ValueError) as error:
+        raise _refusal(path, error) from error
+    try:
+        _begin(db, path, found, binding, writable)
+    except BaseException:
+        db.close()
+        raise
+    return db
+
+
+@contextmanager
+def transaction(db: sqlite3.Connection) -> Iterator[None]:
+    """All of it or nothing; on the disk when it is left."""
+    db.execute("BEGIN EXCLUSIVE")
+    try:
+        yield
+        db.execute("COMMIT")
+    except BaseException:
+        if db.in_transaction:
+            db.execute("ROLLBACK")
+        raise
+
+
+def sync_directory(path: Path) -> None:
+    """Have the name of a file on the disk, or that it is gone."""
+    handle = os.open(path.parent, os.O_RDONLY)
+    try:
+        os.fsync(handle)
+    finally:
+        os.close(handle)
+
+
+def _connect(path: Path, mode: str) -> sqlite3.Connection:
+    # The node's executor may call from another thread than the one that opened it, never from two at once.
+    db = sqlite3.connect(
+        f"file:{quote(str(path.absolute()))}?mode={mode}",
+        uri=True,
+        timeout=0.5,
+        isolation_level=None,
+        check_same_thread=False,
+    )
+    db.execute("PRAGMA trusted_schema = OFF")  # nothing that somebody put into the file is run
+    db.execute("PRAGMA cell_size_check = ON")
+    db.execute("PRAGMA secure_delete = OFF")  # it would write zeros over pages that the next entry takes
+    db.execute("PRAGMA temp_store = MEMORY")
+    db.execute("PRAGMA synchronous = EXTRA")
+    # Held until it is closed, by the system even after a kill.
+    db.execute("PRAGMA locking_mode = EXCLUSIVE")
+    return db
+
+
+def _look(path: Path) -> int:
+    """The format that a file says it has, before SQLite reads it."""
+    status = path.stat()
+    if not stat.S_ISREG(status.st_mode):
+        raise LedgerError(f"{path}: cannot be opened: is no file")
+    if status.st_size == 0:
+        raise LedgerError(f"{path}: is empty, not a ledger; {MOVE}")
+    with path.open("rb") as file:
+        header = file.read(_HEADER)
+    if not header.startswith(_MAGIC) or len(header) < _HEADER:
+        raise LedgerError(f"{path}: is damaged or not a ledger: it is no SQLite file; {MOVE}")
+    if int.from_bytes(header[68:72], "big") != APPLICATION_ID:
+        raise LedgerError(f"{path}: is an SQLite file, but not a ledger; {MOVE}")
+    found = int.from_bytes(header[60:64], "big")
+    if found > FORMAT:
+        raise LedgerError(
+            f"{path}: has format {found}, this version knows up to {FORMAT}; install a newer one"
+        )
+    if found >= SEALED_FROM:
+        log = beside(path, "-wal")
+        if _has_content(log):
+            raise LedgerError(f"{path}: {log.name} beside it is not its own; move that away")
+        if header[18:20] != _ROLLBACK:
+            raise LedgerError(f"{path}: is damaged: its header is not what was written; {MOVE}")
+    return found
+
+
+def _rehearse(path: Path, found: int, binding: Binding) -> None:
+    """Undo a transaction that was cut off in a copy first: its journal may be of another file or time."""
+    with tempfile.TemporaryDirectory() as directory, _locked(path):
+        copy = Path(directory) / path.name
+        for ending in ("", "-journal"):
+            shutil.copyfile(beside(path, ending), beside(copy, ending))
+        try:
+            with closing(_connect(copy, "rw")) as db:
+                _begin(db, copy, found, binding, writable=True)
+        except (sqlite3.Error, ValueError, LedgerError) as error:
+            fault = error if isinstance(error, LedgerError) else _refusal(copy, error)
+            reason = str(fault).removeprefix(f"{copy}: ").removesuffix(f"; {MOVE}")
+            raise LedgerError(
+                f"{path}: with {path.name}-journal beside it, it {reason}; that is of another file or time: "
+                "move it away, or put a copy of both back"
+            ) from error
+
+
+@contextmanager
+def _locked(path: Path) -> Iterator[None]:
+    """Keep others out as SQLite does: https://sqlite.org/src/file?name=src/os.h."""
+    with path.open("r+b") as file:
+        try:
+            fcntl.lockf(file, fcntl.LOCK_EX | fcntl.LOCK_NB, _SHARED_SIZE, _SHARED_FIRST)
+        except (BlockingIOError, PermissionError) as error:
+            raise LedgerError(f"{path}: {_IN_USE}") from error
+        yield
+
+
+def _begin(db: sqlite3.Connection, path: Path, found: int, binding: Binding, writable: bool) -> None:
+    """Take hold of a file, check all of it, and bring it up to date."""
+    try:
+        db.execute("BEGIN EXCLUSIVE" if writable else "BEGIN")
+        _check(db, path, found)
+        _check_binding(db, path, binding)
+        db.execute("COMMIT")
+        if found < FORMAT:
+            db.execute("PRAGMA journal_mode = DELETE")
+            with transaction(db):
+                migrate(db, found)
+                write_head(db, 1, b"")
+            db.execute(f"PRAGMA page_size = {_PAGE}")
+            db.execute("VACUUM")
+    except (sqlite3.Error, ValueError, TypeError, OverflowError) as error:
+        raise _refusal(path, error) from error
+
+
+def _check(db: sqlite3.Connection, path: Path, found: int) -> None:
+    """Whether the file is whole, and holds what was written and nothing else."""
+    if tuple(definitions(db)) != expected_definitions(found):
+        raise LedgerError(
+            f"{path}: is damaged: it has other tables or triggers than a ledger of format {found}; {MOVE}"
+        )
+    faults = [fault for (fault,) in db.execute("PRAGMA integrity_check")]
+    if faults != ["ok"]:
+        raise LedgerError(f"{path}: is damaged: {' '.join(faults[0].split())}; {MOVE}")
+    if found >= SEALED_FROM:
+        verify(db)
+    else:
+        verify_former(db, found)
+
+
+def _check_binding(db: sqlite3.Connection, path: Path, binding: Binding) -> None:
+    found = dict(db.execute("SELECT key, value FROM binding"))
+    for key, ours in binding.as_texts().items():
+        if found.get(key) != ours:
+            what = f"{path}: is of {key.replace('_', ' ')} {found.get(key)}, not {ours}; "
+            if key == "hardware_id":
+                what += f"if it is this leg's, set {key}: {found.get(key)}, else "
+            raise LedgerError(
+                what + "set ledger.path to another file for this leg, or the parameters back to that one"
+            )
+
+
+def _refusal(path: Path, error: Exception) -> LedgerError:
+    """Why a file cannot be used; ValueError and TypeError come of damage, also out of SQLite's messages."""
+    if not isinstance(error, sqlite3.Error):
+        return LedgerError(f"{path}: is damaged: {_reason(error)}; {MOVE}")
+    code = getattr(error, "sqlite_errorcode", sqlite3.SQLITE_CORRUPT)  # some are of Python's, not of SQLite's
+    if code == sqlite3.SQLITE_BUSY:
+        return LedgerError(f"{path}: {_IN_USE}")
+    if code & 0xFF in (sqlite3.SQLITE_CORRUPT, sqlite3.SQLITE_NOTADB, sqlite3.SQLITE_ERROR):
+        return LedgerError(f"{path}: is damaged or not a ledger: {_reason(error)}; {MOVE}")
+    return LedgerError(f"{path}: cannot be read: {_reason(error)}; expected a disk that can be written")
+
+
+def _has_content(path: Path) -> bool:
+    return path.exists() and path.stat().st_size > 0
+
+
+def _is_hot(journal: Path) -> bool:
+    """Whether a transaction was cut off: else SQLite leaves the file empty, or its first bytes 0."""
+    if not journal.exists():
+        return False
+    with journal.open("rb") as file:
+        return file.read(1) not in (b"", b"\0")
+
+
+def _is_writable(path: Path) -> bool:
+    """Whether it is, or must be since the last entries are still beside it."""
+    places = (path, path.parent)
+    cut_off = any(_has_content(beside(path, ending)) for ending in ("-wal", "-journal"))
+    return cut_off or all(os.access(place, os.W_OK) for place in places)
+
+
+def _reason(error: Exception) -> str:
+    text = (error.strerror if isinstance(error, OSError) else None) or str(error)
+    return " ".join(text.split())

@@ -1,0 +1,53 @@
+"""What of a ledger up to format 3 can be checked: its entry and its encoders' errors have checksums."""
+
+import sqlite3
+
+import numpy as np
+
+from leg_wear_monitor.monitor.alarms.alarm import Alarm, Level
+from leg_wear_monitor.monitor.ledger.entry import Commissioned, Entry, JointWear
+
+
+def verify_former(db: sqlite3.Connection, found: int) -> None:
+    """Compare what has a checksum with it, before a file is migrated.
+
+    Raises
+    ------
+    ValueError
+        If it is not what was written.
+    """
+    row = db.execute("SELECT run, stamp_ns, digest FROM entry").fetchone()
+    if row is not None and _entry(db, *row[:2]).digest() != row[2]:
+        raise ValueError("its checksum is not that of its content")
+    if found < 3:
+        return
+    for stamp_ns, text, errors, digest in db.execute(
+        "SELECT stamp_ns, encoders, errors, digest FROM commissioning"
+    ):
+        names, values = tuple(text.split("\n")), np.frombuffer(errors, "<f8")
+        m, p = len(names), 1 + 2 * len(names)
+        held = Commissioned(stamp_ns, names, values[:m], values[m : m + p], values[m + p :])
+        if held.digest() != digest:
+            raise ValueError("the checksum of its encoders' errors is not that of its content")
+
+
+def _entry(db: sqlite3.Connection, run: int, stamp_ns: int) -> Entry:
+    spans = db.execute("SELECT begin_ns, end_ns FROM span WHERE run = ? ORDER BY part", (run,))
+    joints = db.execute("SELECT name, depth, cycles, moving_s, replaced_ns FROM joint ORDER BY name")
+    alarms = db.execute("SELECT kind, subject, level, present, acknowledged, raised_ns FROM alarm")
+    return Entry(
+        stamp_ns=stamp_ns,
+        joints=tuple(
+            JointWear(name, np.frombuffer(depth, "<f8").reshape(2, -1), *rest)
+            for name, depth, *rest in joints
+        ),
+        totals=dict(db.execute("SELECT name, value FROM total")),
+        alarms=tuple(
+            Alarm(
+                kind=kind, subject=subject, level=Level(level), present=Level(present),
+                acknowledged=bool(acknowledged), raised_ns=raised_ns,
+            )
+            for kind, subject, level, present, acknowledged, raised_ns in alarms
+        ),
+        spans=tuple(spans.fetchall()),
+    )  # fmt: skip

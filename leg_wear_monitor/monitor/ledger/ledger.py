@@ -1,0 +1,268 @@
+"""Wear is months of work: the ledger keeps it in an SQLite file, over a kill, a full disk, a wrong leg.
+
+An entry is on the disk when `keep` returns. A write that fails is said in `Ledger.fault`, the monitor goes
+on, and the next entry tries again with all that has happened since. What is not an entry yet is lost with the
+process: at most the time between two entries, and the next start says how much that was.
+"""
+
+import sqlite3
+from collections.abc import Callable
+from pathlib import Path
+
+import attrs
+import numpy as np
+
+from leg_wear_monitor.mechanism.arrays import Ints
+from leg_wear_monitor.mechanism.spec import Mechanism
+from leg_wear_monitor.monitor.config.fitting import fitted
+from leg_wear_monitor.monitor.config.settings import MonitorConfig
+from leg_wear_monitor.monitor.ledger.binding import Binding, binding_of
+from leg_wear_monitor.monitor.ledger.entry import Audit, Entry, Event, Measurement, Withdrawal
+from leg_wear_monitor.monitor.ledger.file import LedgerError
+from leg_wear_monitor.monitor.ledger.recovery import Recovered
+from leg_wear_monitor.monitor.ledger.rows import (
+    read_commissioned,
+    read_last_reset,
+    read_measurements,
+    read_spans,
+)
+from leg_wear_monitor.monitor.ledger.run import Run
+from leg_wear_monitor.monitor.ledger.store import LedgerStore
+
+
+class Ledger:
+    """An open ledger, ours alone.
+
+    Parameters
+    ----------
+    path : pathlib.Path or str
+        Created if it is not there.
+    binding : Binding
+        What its wear must belong to.
+    interval_s : float
+        Longest time between two entries that is intended.
+    at_end : bool
+        Whether only the end of the run is written, all of it or nothing, as for a recording.
+
+    Attributes
+    ----------
+    entry : Entry or None
+        The last one of earlier runs; None in a new ledger.
+    measurements : tuple of Measurement
+        Clearances measured by hand, of earlier runs, withdrawn ones with them.
+    commissioned : Commissioned or None
+        Errors of further encoders, of earlier runs.
+    last_run : Run
+        The run before this one.
+    epoch, boot_id : int, str
+        Of this run's clock and computer, as each entry keeps them; as in the run before until they are set.
+    cut_off_s : float or None
+        If the last run was cut off: the longest time of walking whose wear was lost with it.
+    kept_ns : int
+        Stamp of the last entry on the disk, 0 before.
+    told : str
+        What is wrong with what was found, and may be lost with it; empty if nothing is.
+    fault : str
+        Why the last write failed; empty if it did not.
+
+    Raises
+    ------
+    LedgerError
+        If it cannot be read, or must not be continued; it is left as it is.
+    """
+
+    def __init__(self, path: Path | str, binding: Binding, interval_s: float, at_end: bool = False) -> None:
+        self.path = Path(path)
+        self.at_end = at_end
+        self._events: list[Event] = []
+        self._store = LedgerStore(self.path, binding)
+        found = self._store.found
+        self.entry, self.last_run, self.told = found.entry, found.run, found.told
+        self.epoch, self.boot_id = found.run.epoch, found.run.boot_id
+        self.cut_off_s = found.lost_s
+        self._interval_s = interval_s
+        self.kept_ns = self.entry.stamp_ns if self.entry else 0
+        self._kept_moving_s = self.entry.moving_s if self.entry else 0.0
+        self.fault = ""
+        self._number = found.run.number + 1
+        try:
+            self._begin(found)
+            self._read()
+        except BaseException:
+            self._store.close()
+            raise
+
+    def _begin(self, found: Recovered) -> None:
+        """Have in the tables what was in the log alone, and that this run has begun."""
+        newer = found.entry if found.is_newer else None
+        told_s = max(found.run.interval_s, found.lost_s or 0.0)
+        run = attrs.evolve(found.run, interval_s=told_s) if self.at_end else self._run(closed=False)
+        if newer or not self.at_end:
+            self._try(lambda: self._store.write(run, newer, entry_run=found.entry_run))
+        if self.at_end:
+            self._store.check_writable()
+
+    def _read(self) -> None:
+        spans = self._store.ask(read_spans)
+        if self.entry:  # also where the tables could not be written
+            own = self.entry.span_epochs or (0,) * len(self.entry.spans)
+            spans += [(*span, epoch) for span, epoch in zip(self.entry.spans, own, strict=True)]
+        self._spans = np.array(sorted(set(spans)), dtype=np.int64).reshape(-1, 3)
+        self.measurements = self._store.ask(read_measurements)
+        self.commissioned = self._store.ask(read_commissioned)
+
+    @property
+    def counted_ns(self) -> Ints:
+        """Begin and end (n, 2) [ns] of the time whose wear is in it, of earlier runs, of all epochs."""
+        return self._spans[:, :2]
+
+    def counted_in(self, epoch: int) -> Ints:
+        """Those (n, 2) of an epoch of the clock."""
+        return self._spans[self._spans[:, 2] == epoch, :2]
+
+    @property
+    def waiting(self) -> int:
+        """Events that are not written yet."""
+        return len(self._events)
+
+    def note(self, event: Event) -> None:
+        """Take an event down; it is written with the next entry."""
+        self._events.append(event)
+
+    def withdraw(self, measurement: int, stamp_ns: int, who: str) -> Measurement:
+        """Withdraw a measurement of an earlier run: it is kept, and does not count; written as events are.
+
+        Parameters
+        ----------
+        measurement : int
+            Its `id`.
+        stamp_ns : int
+            Not 0.
+        who : str
+
+        Returns
+        -------
+        Measurement
+            As it is now.
+
+        Raises
+        ------
+        LedgerError
+            If there is none of that `id`, or it is withdrawn already.
+        """
+        found = {each.id: each for each in self.measurements}
+        if measurement not in found:
+            known = ", ".join(map(str, found)) or "none"
+            raise LedgerError(f"{self.path}: has no measurement {measurement}, it has {known}")
+        if found[measurement].is_withdrawn:
+            raise LedgerError(f"{self.path}: measurement {measurement} is withdrawn already")
+        now = attrs.evolve(found[measurement], withdrawn_ns=stamp_ns, withdrawn_by=who)
+        self.measurements = tuple(now if each.id == measurement else each for each in self.measurements)
+        self.note(Withdrawal(stamp_ns, who, measurement))
+        return now
+
+    def last_reset(self, joint: str) -> Audit | None:
+        """The last `reset_wear` of a joint that is kept and was not undone, None if there is none.
+
+        Its `joint` is None in a row of a format before 4, which does not hold all of it.
+
+        Raises
+        ------
+        LedgerError
+            If it cannot be read now.
+        """
+        return self._store.ask(lambda db: read_last_reset(db, joint))
+
+    def keep(self, entry: Entry, closed: bool = False, *, whole: bool = True) -> bool:
+        """Write an entry and all events since the last; False, and `fault` says why, if that failed.
+
+        Parameters
+        ----------
+        entry : Entry
+        closed : bool
+            Whether the run ends here in order.
+        whole : bool
+            False: of the surfaces, what they have risen will do, to the 36th part of the largest rise since
+            the entry before. A whole one is written all the same each ten minutes of motion, or with events.
+        """
+        if self.at_end and not closed:
+            return False
+        self._interval_s = max(self._interval_s, entry.moving_s - self._kept_moving_s)
+        run = self._run(closed)
+        if closed or whole or self._events or self._store.is_due(entry):
+            kept = self._try(lambda: self._store.write(run, entry, self._events))
+        else:
+            kept = self._try(lambda: self._store.append(run, entry))
+        if kept:
+            self._events.clear()
+            self.kept_ns = entry.stamp_ns
+            self._kept_moving_s = entry.moving_s
+        return kept
+
+    def record(self) -> None:
+        """Write the events since the last entry, and leave that in force; for a run that monitors nothing.
+
+        Raises
+        ------
+        LedgerError
+            If they could not be written.
+        """
+        self._interval_s = max(self._interval_s, self.cut_off_s or 0.0)  # as long as nobody was told
+        run = self._run(closed=self.cut_off_s is None)
+        if not self._try(lambda: self._store.write(run, None, self._events)):
+            raise LedgerError(f"{self.path}: {self.fault}")
+        self._events.clear()
+
+    def abandon(self) -> None:
+        """End a run that monitored nothing, or of which nothing shall be kept, and let go of the file.
+
+        Raises
+        ------
+        LedgerError
+            If that could not be written.
+        """
+        try:
+            if not self.at_end:
+                self.record()
+        finally:
+            self.close()
+
+    def close(self) -> None:
+        """Let go of the file; entries are written by `keep`."""
+        self._store.close()
+
+    def _run(self, closed: bool) -> Run:
+        return Run(self._number, closed, self._interval_s, self.epoch, self.boot_id)
+
+    def _try(self, write: Callable[[], None]) -> bool:
+        """Whether it could be written; `fault` says why not."""
+        try:
+            write()
+        except (sqlite3.Error, OSError, ValueError, LedgerError) as error:
+            self.fault = " ".join(str(error).split())
+            return False
+        self.fault = ""
+        return True
+
+
+def open_ledger(mechanism: Mechanism, config: MonitorConfig, at_end: bool = False) -> Ledger | None:
+    """The ledger that a configuration names, None if it names none.
+
+    Parameters
+    ----------
+    mechanism : Mechanism
+    config : MonitorConfig
+    at_end : bool
+        Whether only the end of the run is written, all of it or nothing, as for a recording.
+
+    Raises
+    ------
+    ConfigError
+        For parameters that do not fit the mechanism.
+    LedgerError
+        If it must not be continued.
+    """
+    if not config.ledger.path:
+        return None
+    binding = binding_of(fitted(mechanism, config), config)
+    return Ledger(config.ledger.path, binding, config.ledger.checkpoint_s, at_end)

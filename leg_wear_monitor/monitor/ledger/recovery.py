@@ -1,0 +1,134 @@
+"""From what the tables and the log hold to the last entry, and what was lost on the way."""
+
+import sqlite3
+from pathlib import Path
+
+import attrs
+
+from leg_wear_monitor.monitor.ledger.entry import Entry
+from leg_wear_monitor.monitor.ledger.file import MOVE, LedgerError, beside
+from leg_wear_monitor.monitor.ledger.log import ENDING, LogContent, read_log
+from leg_wear_monitor.monitor.ledger.rows import read_entry, read_last_run
+from leg_wear_monitor.monitor.ledger.run import Run
+from leg_wear_monitor.monitor.ledger.seal import Head, read_head
+from leg_wear_monitor.monitor.ledger.step import decode
+
+WHOLE_S = 600.0
+"""Longest time in motion between two entries that are written whole, into the tables."""
+
+
+@attrs.frozen
+class Recovered:
+    """The last entry of a ledger.
+
+    Attributes
+    ----------
+    head : Head
+        Of the tables.
+    digest : bytes
+        Checksum of the last record or head, which the next one follows.
+    run : Run
+        The last one.
+    entry_run : int
+        Number of the run that the entry's spans are of.
+    entry : Entry or None
+    is_newer : bool
+        Whether the entry is newer than the tables.
+    lost_s : float or None
+        Longest time in motion whose wear is lost; None if the last run ended in order.
+    told : str
+        What is wrong with the log; empty if nothing is.
+    """
+
+    head: Head
+    digest: bytes
+    run: Run
+    entry_run: int = 0
+    entry: Entry | None = None
+    is_newer: bool = False
+    lost_s: float | None = None
+    told: str = ""
+
+
+def recover(db: sqlite3.Connection, path: Path) -> Recovered:
+    """The last entry of a ledger whose tables were checked.
+
+    Raises
+    ------
+    LedgerError
+        If its log is newer than its tables.
+    """
+    head, run = read_head(db), read_last_run(db)
+    entry_run, entry = read_entry(db) or (0, None)
+    there = Recovered(head, head.digest, run, entry_run, entry)
+    log = beside(path, ENDING)
+    try:
+        content = read_log(path)
+        fault = _misfit(content, there)
+        if content and content.number > head.number:
+            raise LedgerError(
+                f"{path}: is older than {log.name} beside it; put back the ledger that belongs to that, or "
+                f"move {log.name} away to go on from this one without the wear since"
+            )
+    except (OSError, ValueError) as error:
+        content, fault = None, f"cannot be read: {error}"
+    if run.closed:
+        return there
+    if content is None or fault:
+        lost_s = WHOLE_S + 2.0 * run.interval_s
+        return attrs.evolve(there, lost_s=lost_s, told=_told(log.name, fault or "is missing", lost_s))
+    if content.digest == head.previous:
+        return attrs.evolve(there, lost_s=run.interval_s)
+    return _applied(there, content, log.name)
+
+
+def check_absent(path: Path) -> None:
+    """Refuse to begin a ledger where only the log of one is left."""
+    log = beside(path, ENDING)
+    if log.exists():
+        raise LedgerError(
+            f"{path}: is missing, but {log.name} beside it is there; put the ledger back, or move {log.name} "
+            "away, too, to begin with new parts"
+        )
+
+
+def _misfit(content: LogContent | None, there: Recovered) -> str:
+    """Why a log does not belong to the tables; empty if it does."""
+    if content is None:
+        return ""
+    follows = (content.number, content.head) == (there.head.number, there.head.digest)
+    # a kill between the tables' commit and a new log leaves the one that led to them
+    is_before = content.number < there.head.number and content.digest == there.head.previous
+    return "" if follows or is_before else "is of another time"
+
+
+def _applied(there: Recovered, content: LogContent, name: str) -> Recovered:
+    """The entry of the last record that fits."""
+    run, entry = there.run, there.entry
+    for record in content.records:
+        if entry is None:
+            raise LedgerError(f"{name}: follows a ledger that has no entry; {MOVE}")
+        run, entry = decode(record, entry)
+    lost_s, told = run.interval_s, ""
+    if content.left or content.missing:
+        most_s = max(0.0, WHOLE_S - _moved_s(there.entry, entry)) + 2.0 * run.interval_s
+        lost_s = min(most_s, (content.missing + 1) * run.interval_s) if content.is_torn else most_s
+        told = _told(name, "is not whole", lost_s)
+    return attrs.evolve(
+        there,
+        digest=content.digest,
+        run=run,
+        entry_run=run.number if content.records else there.entry_run,
+        entry=entry,
+        is_newer=bool(content.records),
+        lost_s=lost_s,
+        told=told,
+    )
+
+
+def _moved_s(first: Entry | None, last: Entry | None) -> float:
+    return last.moving_s - first.moving_s if first and last else 0.0
+
+
+def _told(name: str, fault: str, lost_s: float) -> str:
+    return f"{name} {fault}: the wear of at most {lost_s:.3g} s of walking is lost"

@@ -1,0 +1,218 @@
+"""Entries and events as rows of the ledger's tables, and back."""
+
+import math
+import sqlite3
+
+import attrs
+import numpy as np
+
+from leg_wear_monitor.monitor.alarms.alarm import Alarm, Level
+from leg_wear_monitor.monitor.ledger.entry import (
+    AlarmEvent,
+    Audit,
+    ClearancePoint,
+    Commissioned,
+    Entry,
+    Event,
+    ForecastPoint,
+    JointWear,
+    Measurement,
+    Withdrawal,
+)
+from leg_wear_monitor.monitor.ledger.run import Run
+
+
+def write_run(db: sqlite3.Connection, run: Run) -> None:
+    """Write a run anew; to be called within a transaction."""
+    values = (run.number, int(run.closed), run.interval_s, run.epoch, run.boot_id)
+    db.execute("INSERT OR REPLACE INTO run VALUES (?, ?, ?, ?, ?)", values)
+
+
+def write_entry(db: sqlite3.Connection, run: int, head: int, entry: Entry) -> None:
+    """Replace the entry in force; to be called within a transaction.
+
+    Parameters
+    ----------
+    db : sqlite3.Connection
+    run : int
+        The one whose spans it has.
+    head : int
+        Number of the transaction.
+    entry : Entry
+    """
+    db.execute("INSERT OR REPLACE INTO entry VALUES (1, ?, ?)", (run, entry.stamp_ns))
+    db.executemany(
+        "INSERT INTO joint VALUES (?, ?, ?, ?, ?, ?)",
+        [(head, j.name, _depth_bytes(j), j.cycles, j.moving_s, j.replaced_ns) for j in entry.joints],
+    )
+    db.execute("DELETE FROM joint WHERE head != ?", (head,))
+    db.executemany("INSERT OR REPLACE INTO total VALUES (?, ?)", entry.totals.items())
+    db.execute("DELETE FROM alarm")
+    db.executemany(
+        "INSERT INTO alarm VALUES (?, ?, ?, ?, ?, ?, ?, ?)",
+        [
+            (
+                *(a.kind, a.subject, int(a.level), int(a.present), int(a.acknowledged), a.raised_ns),
+                *(a.worst, a.limit),  # SQLite makes NULL of NaN
+            )
+            for a in entry.alarms
+        ],
+    )
+    epochs = entry.span_epochs or (0,) * len(entry.spans)
+    db.execute("DELETE FROM span WHERE run = ? AND part >= ?", (run, len(entry.spans)))
+    db.executemany(
+        "INSERT OR REPLACE INTO span VALUES (?, ?, ?, ?, ?)",
+        [
+            (run, part, *span, epoch)
+            for part, (span, epoch) in enumerate(zip(entry.spans, epochs, strict=True))
+        ],
+    )
+
+
+def write_event(db: sqlite3.Connection, event: Event) -> None:
+    """Append an event; to be called within a transaction."""
+    match event:
+        case AlarmEvent(stamp_ns, a):
+            db.execute(
+                "INSERT INTO alarm_history "
+                "(stamp_ns, kind, subject, level, acknowledged, value, limit_value) "
+                "VALUES (?, ?, ?, ?, ?, ?, ?)",
+                (stamp_ns, a.kind, a.subject, int(a.level), int(a.acknowledged), a.value, a.limit),
+            )
+        case ClearancePoint(stamp_ns, cycle, joint, clearance_m, clearance_max_m):
+            db.execute(
+                "INSERT INTO history (stamp_ns, cycle, joint, clearance_m, clearance_max_m) "
+                "VALUES (?, ?, ?, ?, ?)",
+                (stamp_ns, cycle, joint, clearance_m, clearance_max_m),
+            )
+        case Measurement() | ForecastPoint():
+            _append(db, event)
+        case Withdrawal(stamp_ns, who, measurement):
+            db.execute(
+                "UPDATE measurement SET withdrawn_ns = ?, withdrawn_by = ? WHERE id = ?",
+                (stamp_ns, who, measurement),
+            )
+        case Commissioned(stamp_ns, encoders, centre_rad, mean, covariance):
+            errors = np.concatenate([centre_rad, mean, covariance.ravel()])
+            db.execute(
+                "INSERT INTO commissioning (stamp_ns, encoders, errors) VALUES (?, ?, ?)",
+                (stamp_ns, "\n".join(encoders), errors.astype("<f8").tobytes()),
+            )
+        case Audit(stamp_ns, who, what, was, undoes):
+            values = (was.name, was.cycles, _depth_bytes(was), was.moving_s, was.replaced_ns) if was else ()
+            db.execute(
+                "INSERT INTO audit "
+                "(stamp_ns, who, what, joint, cycles, depth, moving_s, replaced_ns, undoes) "
+                "VALUES (?, ?, ?, ?, ?, ?, ?, ?, ?)",
+                (stamp_ns, who, what, *(values or (None,) * 5), undoes),
+            )
+
+
+def _append(db: sqlite3.Connection, event: Measurement | ForecastPoint) -> None:
+    """A row of the table whose columns are the event's fields."""
+    table = "measurement" if isinstance(event, Measurement) else "forecast"
+    values = attrs.asdict(event, filter=lambda field, _: field.name != "id")
+    places = ", ".join("?" * len(values))
+    db.execute(f"INSERT INTO {table} ({', '.join(values)}) VALUES ({places})", tuple(values.values()))
+
+
+def read_measurements(db: sqlite3.Connection) -> tuple[Measurement, ...]:
+    """All measured clearances, in the order in which they were noted, withdrawn ones with them."""
+    names = [field.name for field in attrs.fields(Measurement)]
+    rows = db.execute(f"SELECT {', '.join(names)} FROM measurement ORDER BY id")
+    found = (Measurement(**dict(zip(names, row, strict=True))) for row in rows)
+    return tuple(attrs.evolve(each, counts=bool(each.counts)) for each in found)
+
+
+def read_commissioned(db: sqlite3.Connection) -> Commissioned | None:
+    """Errors of further encoders as they are held, None if none were commissioned."""
+    row = db.execute(
+        "SELECT stamp_ns, encoders, errors FROM commissioning ORDER BY id DESC LIMIT 1"
+    ).fetchone()
+    if row is None:
+        return None
+    encoders, errors = tuple(row[1].split("\n")), np.frombuffer(row[2], "<f8").astype(float)
+    m = len(encoders)
+    p = 1 + 2 * m
+    return Commissioned(row[0], encoders, errors[:m], errors[m : m + p], errors[m + p :].reshape(p, p))
+
+
+def read_last_reset(db: sqlite3.Connection, joint: str) -> Audit | None:
+    """The last `reset_wear` of a joint that was not undone, None if there is none.
+
+    A row of an older format does not hold the whole joint: its `joint` is None then.
+    """
+    row = db.execute(
+        "SELECT id, stamp_ns, who, what, joint, depth, cycles, moving_s, replaced_ns FROM audit AS a "
+        "WHERE joint = ? AND what = 'reset_wear' "
+        "AND NOT EXISTS (SELECT 1 FROM audit WHERE undoes = a.id) ORDER BY id DESC LIMIT 1",
+        (joint,),
+    ).fetchone()
+    if row is None:
+        return None
+    was = None if row[7] is None else _joint(*row[4:])
+    number, stamp_ns, who, what = row[:4]
+    return Audit(stamp_ns, who, what, was, id=number)
+
+
+def read_entry(db: sqlite3.Connection) -> tuple[int, Entry] | None:
+    """Run and content of the entry that the tables hold, None in a new ledger."""
+    found = db.execute("SELECT run, stamp_ns FROM entry").fetchone()
+    if found is None:
+        return None
+    run, stamp_ns = found
+    spans = db.execute(
+        "SELECT begin_ns, end_ns, epoch FROM span WHERE run = ? ORDER BY part", (run,)
+    ).fetchall()
+    joints = db.execute("SELECT name, depth, cycles, moving_s, replaced_ns FROM joint ORDER BY name")
+    return run, Entry(
+        stamp_ns=stamp_ns,
+        joints=tuple(_joint(*row) for row in joints),
+        totals=dict(db.execute("SELECT name, value FROM total")),
+        alarms=tuple(_alarm(*row) for row in db.execute("SELECT * FROM alarm")),
+        spans=tuple((begin, end) for begin, end, _ in spans),
+        span_epochs=tuple(epoch for *_, epoch in spans) if any(epoch for *_, epoch in spans) else (),
+    )
+
+
+def read_spans(db: sqlite3.Connection) -> list[tuple[int, int, int]]:
+    """Begin, end [ns] and epoch of all time whose wear is counted."""
+    return db.execute("SELECT begin_ns, end_ns, epoch FROM span").fetchall()
+
+
+def read_last_run(db: sqlite3.Connection) -> Run:
+    """The last run."""
+    last = db.execute(
+        "SELECT id, closed, interval_s, epoch, boot_id FROM run ORDER BY id DESC LIMIT 1"
+    ).fetchone()
+    return Run(last[0], bool(last[1]), *last[2:]) if last else Run()
+
+
+def _depth_bytes(joint: JointWear) -> bytes:
+    return np.ascontiguousarray(joint.depth, dtype="<f8").tobytes()
+
+
+def _joint(name: str, depth: bytes, cycles: int, moving_s: float, replaced_ns: int) -> JointWear:
+    return JointWear(name, np.frombuffer(depth, "<f8").reshape(2, -1).copy(), cycles, moving_s, replaced_ns)
+
+
+def _alarm(
+    kind: str,
+    subject: str,
+    level: int,
+    present: int,
+    acknowledged: int,
+    raised_ns: int,
+    worst: float | None,
+    limit: float | None,
+) -> Alarm:
+    return Alarm(
+        kind=kind,
+        subject=subject,
+        level=Level(level),
+        present=Level(present),
+        acknowledged=bool(acknowledged),
+        raised_ns=raised_ns,
+        worst=math.nan if worst is None else worst,
+        limit=math.nan if limit is None else limit,
+    )

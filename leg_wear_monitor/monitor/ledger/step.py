@@ -1,0 +1,141 @@
+"""An entry as what it changes of the one before: some kB instead of all surfaces to the last bit.
+
+Five seconds of walking change nearly all sectors of all surfaces, by numbers of 40 random bits: exact, that
+cannot be made smaller. So a surface's rise is kept in whole steps of the 20th part of its largest, and what
+that leaves out is in the next rise: errors do not add up, none is larger than the 36th part of the largest
+rise between two entries, what a sector wears in 0.14 s of 5.
+"""
+
+import json
+import math
+import zlib
+from typing import Any
+
+import attrs
+import numpy as np
+
+from leg_wear_monitor.mechanism.arrays import Floats
+from leg_wear_monitor.monitor.alarms.alarm import Alarm, Level
+from leg_wear_monitor.monitor.ledger.entry import Entry, JointWear
+from leg_wear_monitor.monitor.ledger.run import Run
+
+STEPS = 20  # of a surface's largest rise
+
+_MOST = 200_000_000  # bytes that a record may hold, however small it is compressed
+
+
+def encode(entry: Entry, run: Run, before: Entry, shared: int) -> tuple[bytes, Entry]:
+    """A record of an entry, and the entry as it will be read from that.
+
+    Parameters
+    ----------
+    entry : Entry
+    run : Run
+        The one it is of.
+    before : Entry
+        The one before it, as it will be read.
+    shared : int
+        How many of the first spans of `before` are of the same run; those that are equal are not repeated.
+
+    Raises
+    ------
+    ValueError
+        If it has other joints than the one before, or surfaces that are no numbers.
+    """
+    if [joint.name for joint in entry.joints] != [joint.name for joint in before.joints]:
+        raise ValueError("the entry has other joints than the one before")
+    same = 0
+    while same < min(shared, len(entry.spans), len(before.spans)) and _span(entry, same) == _span(
+        before, same
+    ):
+        same += 1
+    values = {
+        "run": attrs.astuple(run),
+        "stamp_ns": entry.stamp_ns,
+        "totals": entry.totals,
+        "parts": [(joint.cycles, joint.moving_s, joint.replaced_ns) for joint in entry.joints],
+        "alarms": [_alarm_values(alarm) for alarm in entry.alarms],
+        "same": same,
+        "spans": [_span(entry, i) for i in range(same, len(entry.spans))],
+    }
+    scale, steps = _rise(_depth(before), _depth(entry))
+    along = np.diff(steps, axis=2, prepend=0).astype("i1")
+    text = json.dumps(values, separators=(",", ":"), allow_nan=False).encode()
+    content = b"\0".join([text, scale.tobytes() + along.tobytes()])
+    return zlib.compress(content, 9), _entry(values, before, _risen(_depth(before), scale, steps))
+
+
+def decode(record: bytes, before: Entry) -> tuple[Run, Entry]:
+    """Run and entry of a record, given the entry before it.
+
+    Raises
+    ------
+    ValueError
+        If it is no record.
+    """
+    unpacked = zlib.decompressobj()
+    try:
+        text, _, rest = unpacked.decompress(record, _MOST).partition(b"\0")
+        values = json.loads(text)
+        shape = _depth(before).shape
+        count = shape[0] * shape[1]
+        scale = np.frombuffer(rest, "<f4", count).reshape(*shape[:2], 1)
+        along = np.frombuffer(rest, "i1", offset=4 * count).reshape(shape)
+        steps = np.cumsum(along, axis=2, dtype="i1")
+        run = Run(*values["run"])
+        return run, _entry(values, before, _risen(_depth(before), scale, steps))
+    except (zlib.error, KeyError, TypeError, IndexError) as error:
+        raise ValueError(f"no record of an entry: {error}") from error
+
+
+def _depth(entry: Entry) -> Floats:
+    """Depths (joints, 2, N) [m]."""
+    return np.stack([joint.depth for joint in entry.joints])
+
+
+def _rise(kept: Floats, now: Floats) -> tuple[Floats, Floats]:
+    """Size of a step [m] for each surface (joints, 2, 1), and how many steps each sector has risen."""
+    rise = now - kept
+    if not np.isfinite(rise).all():
+        raise ValueError("a surface has a depth that is no number")
+    scale = (np.abs(rise).max(axis=2, keepdims=True) / STEPS).astype("<f4")
+    steps = np.divide(rise, scale, out=np.zeros_like(rise), where=scale > 0.0)
+    return scale, np.clip(np.rint(steps), -2 * STEPS + 1, 2 * STEPS - 1).astype("i1")
+
+
+def _risen(kept: Floats, scale: Floats, steps: Floats) -> Floats:
+    """Depths after a rise, the same to the last bit when written and when read."""
+    return np.asarray(np.maximum(kept + steps * scale.astype(float), 0.0))
+
+
+def _span(entry: Entry, i: int) -> list[int]:
+    return [*entry.spans[i], entry.span_epochs[i] if entry.span_epochs else 0]
+
+
+def _alarm_values(alarm: Alarm) -> list[Any]:
+    level, present = int(alarm.level), int(alarm.present)
+    known = [value if math.isfinite(value) else None for value in (alarm.worst, alarm.limit)]
+    return [alarm.kind, alarm.subject, level, present, bool(alarm.acknowledged), alarm.raised_ns, *known]
+
+
+def _entry(values: dict[str, Any], before: Entry, depth: Floats) -> Entry:
+    spans = [_span(before, i) for i in range(values["same"])] + values["spans"]
+    epochs = tuple(epoch for *_, epoch in spans)
+    return Entry(
+        stamp_ns=values["stamp_ns"],
+        joints=tuple(
+            JointWear(joint.name, own, *part)
+            for joint, own, part in zip(before.joints, depth, values["parts"], strict=True)
+        ),
+        totals=values["totals"],
+        alarms=tuple(
+            Alarm(
+                kind=kind, subject=subject, level=Level(level), present=Level(present),
+                acknowledged=acknowledged, raised_ns=raised_ns,
+                worst=math.nan if worst is None else worst, limit=math.nan if limit is None else limit,
+            )
+            for kind, subject, level, present, acknowledged, raised_ns, worst, limit in values["alarms"]
+        ),
+        spans=tuple((begin, end) for begin, end, _ in spans),
+        span_epochs=epochs if any(epochs) else (),
+    )  # fmt: skip

@@ -1,0 +1,41 @@
+"""All that changes in a monitor, but for its ledger."""
+
+import attrs
+
+from leg_wear_monitor.mechanism.arrays import Ints
+from leg_wear_monitor.monitor.accounting import BookState
+from leg_wear_monitor.monitor.alarms.alarm import Alarm
+from leg_wear_monitor.monitor.encoders.observer import EncoderSnapshot
+from leg_wear_monitor.monitor.evaluation.evaluation import JudgeState
+from leg_wear_monitor.monitor.evaluation.torque_record import TorqueRecord
+from leg_wear_monitor.monitor.forecast.forecaster import ForecastState
+from leg_wear_monitor.monitor.forecast.growth import GrowthWindow
+from leg_wear_monitor.monitor.inputs.guard import GuardSnapshot
+from leg_wear_monitor.monitor.reports import CycleReport
+from leg_wear_monitor.twin.digital_twin import TwinSnapshot
+from leg_wear_monitor.twin.statistics import Event
+
+
+@attrs.define
+class MonitorState:
+    """What changes, beside twin, alarms and books; every value is immutable."""
+
+    growth: tuple[GrowthWindow, ...]
+    torque: TorqueRecord
+    last: CycleReport | None = None
+    happened: tuple[Event, ...] = ()
+
+
+@attrs.frozen(eq=False)
+class MonitorSnapshot:
+    """All of a monitor but its ledger."""
+
+    twin: TwinSnapshot
+    state: MonitorState
+    book: BookState
+    judge: JudgeState
+    forecast: ForecastState
+    alarms: dict[str, Alarm]
+    beats: Ints
+    guard: GuardSnapshot
+    encoders: EncoderSnapshot | None = None

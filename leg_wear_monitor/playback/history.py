@@ -1,0 +1,103 @@
+"""What a replay brought, gait cycle after gait cycle: columns of numbers that stay small over days."""
+
+from array import array
+from typing import Any
+
+import numpy as np
+
+from leg_wear_monitor.mechanism.arrays import Floats
+from leg_wear_monitor.monitor.alarms.alarm import Alarm, Level
+from leg_wear_monitor.monitor.reports import AlarmList, CycleReport, JointReport
+
+JOINT_COLUMNS = (
+    "clearance_m",
+    "clearance_max_m",
+    "growth_m_per_cycle",
+    "peak_force_n",
+    "p99_force_n",
+    "mean_force_n",
+    "impacts",
+)
+CYCLE_COLUMNS = (
+    "cycle",
+    "cadence_rpm",
+    "moving_s",
+    "bridged_s",
+    "measured_torque_rms_nm",
+    "predicted_torque_rms_nm",
+    "torque_mismatch",
+    "load_n",
+    "friction_nm",
+)
+_MOST_CHANGES = 10_000
+
+
+class History:
+    """Gait cycles and changes of alarms, as they came.
+
+    Parameters
+    ----------
+    loose : tuple of str
+        The loose joints, in the order of the reports.
+
+    Attributes
+    ----------
+    changes : list of tuples
+        Stamp [ns] and alarm as it then stood; the first ten thousand.
+    worst : dict
+        Highest level that each kind of alarm has shown.
+    last : CycleReport or None
+        The last gait cycle.
+    """
+
+    def __init__(self, loose: tuple[str, ...]) -> None:
+        self.loose = loose
+        self.changes: list[tuple[int, Alarm]] = []
+        self.worst: dict[str, Level] = {}
+        self.last: CycleReport | None = None
+        self._stamps = array("q")
+        self._cycles = array("d")
+        self._joints = array("d")
+        self._before: dict[str, Alarm] = {}
+
+    def __len__(self) -> int:
+        return len(self._stamps)
+
+    def add_cycle(self, report: CycleReport) -> None:
+        """Add a gait cycle."""
+        self.last = report
+        self._stamps.append(report.stamp_ns)
+        self._cycles.extend(float(getattr(report, name)) for name in CYCLE_COLUMNS)
+        for joint in report.joints:
+            self._joints.extend(_number(joint, name) for name in JOINT_COLUMNS)
+
+    def add_alarms(self, alarms: AlarmList) -> None:
+        """Add those alarms of a list that are not as they were."""
+        for alarm in alarms.alarms:
+            before = self._before.get(alarm.name, Alarm(kind=alarm.kind, subject=alarm.subject))
+            shown = (alarm.level, alarm.present, alarm.acknowledged)
+            if shown != (before.level, before.present, before.acknowledged):
+                self._before[alarm.name] = alarm
+                self.worst[alarm.kind] = max(self.worst.get(alarm.kind, Level.OK), alarm.level)
+                if len(self.changes) < _MOST_CHANGES:
+                    self.changes.append((alarms.stamp_ns, alarm))
+
+    @property
+    def stamp_ns(self) -> np.ndarray[Any, np.dtype[np.int64]]:
+        """Ends of the gait cycles, shape (cycles,)."""
+        return np.array(self._stamps, np.int64)
+
+    def column(self, name: str) -> Floats:
+        """One of `CYCLE_COLUMNS`, shape (cycles,)."""
+        table = np.array(self._cycles).reshape(len(self), len(CYCLE_COLUMNS))
+        return table[:, CYCLE_COLUMNS.index(name)]
+
+    def joint_column(self, name: str) -> Floats:
+        """One of `JOINT_COLUMNS`, shape (cycles, loose); NaN where it was not known."""
+        table = np.array(self._joints).reshape(len(self), len(self.loose), len(JOINT_COLUMNS))
+        return table[:, :, JOINT_COLUMNS.index(name)]
+
+
+def _number(joint: JointReport, name: str) -> float:
+    value = getattr(joint, name)
+    return float("nan") if value is None else float(value)

@@ -1,0 +1,260 @@
+"""A recording through the monitor: the reports that it would have given live."""
+
+from collections.abc import Callable, Iterable, Iterator
+from contextlib import ExitStack, nullcontext
+from pathlib import Path
+
+import attrs
+import numpy as np
+
+from leg_wear_monitor.bags.budget import DEFAULT_MB
+from leg_wear_monitor.bags.findings import Finding, RecordingError, Weight
+from leg_wear_monitor.bags.pauses import Block
+from leg_wear_monitor.bags.reader import Recording
+from leg_wear_monitor.errors import printable
+from leg_wear_monitor.mechanism.loader import load_mechanism
+from leg_wear_monitor.monitor.config.parameter_file import NODE, load_config
+from leg_wear_monitor.monitor.config.settings import MonitorConfig
+from leg_wear_monitor.monitor.evaluation.gait_evidence import GaitEvidence
+from leg_wear_monitor.monitor.opening import open_monitor
+from leg_wear_monitor.monitor.wear_monitor import WearMonitor
+from leg_wear_monitor.playback.history import History
+from leg_wear_monitor.playback.sink import Sink
+from leg_wear_monitor.twin.sample import CRANK, Samples
+
+REPORTS_FILE = "reports.mcap"
+_LONGER, _LONGER_S = 1.05, 1.0  # what stamps may span beyond the time in which they came
+
+
+@attrs.define(eq=False)
+class ReplayResult:
+    """What a replay found.
+
+    Attributes
+    ----------
+    monitor : WearMonitor
+        As it stands at the end; its ledger is closed.
+    history : History
+    files : list of pathlib.Path
+    topics : dict
+        Topics that were read, by what they are in the node.
+    time : str
+        Which time stamped the samples.
+    findings : list of Finding
+        What is wrong with the recording.
+    is_partial : bool
+        Whether something that was recorded is lost, or may be wrong.
+    evidence : GaitEvidence
+        Whether what was followed can be this leg's gait.
+    crank_samples, torque_samples : int
+        A crank sample with an effort is both.
+    begin_ns, end_ns : int
+        First and last stamp of sound samples; 0 without any.
+    logged_s : float
+        Time between the first and the last message [s].
+    """
+
+    monitor: WearMonitor
+    history: History
+    files: list[Path]
+    topics: dict[str, str]
+    time: str
+    evidence: GaitEvidence
+    findings: list[Finding] = attrs.Factory(list)
+    is_partial: bool = False
+    crank_samples: int = 0
+    torque_samples: int = 0
+    begin_ns: int = 0
+    end_ns: int = 0
+    logged_s: float = 0.0
+
+    @property
+    def is_believable(self) -> bool:
+        """Whether a gait cycle was found that can be this leg's: without one, no figure means anything."""
+        return self.evidence.believable > 0
+
+    @property
+    def is_unusable(self) -> bool:
+        """Whether nothing of it can be this leg's gait; what is left beside counted time may be no cycle."""
+        is_rest = self.monitor.lost.already_counted > 0 and not self.evidence.doubtful
+        return not self.is_believable and not is_rest
+
+    @property
+    def duration_s(self) -> float:
+        """Time between the first and the last stamp, of the messages' arrival where stamps jump [s]."""
+        stamped_s = (self.end_ns - self.begin_ns) / 1e9
+        jumps = not 0.0 <= stamped_s <= _LONGER * self.logged_s + _LONGER_S
+        return self.logged_s if jumps else stamped_s
+
+    def count(self, samples: Samples) -> None:
+        """Take account of samples that go to the monitor."""
+        self.evidence.see(samples)
+        is_crank = samples["kind"] == CRANK
+        self.crank_samples += int(np.count_nonzero(is_crank))
+        self.torque_samples += int(np.count_nonzero(~is_crank | np.isfinite(samples["torque_nm"])))
+        stamps = samples["stamp_ns"][samples["fault"] == 0]
+        if len(stamps):
+            self.begin_ns = self.begin_ns or int(stamps[0])
+            self.end_ns = int(stamps[-1])
+
+
+def replay(
+    paths: str | Path | Iterable[str | Path],
+    config: MonitorConfig | str | Path | None = None,
+    *,
+    out: str | Path | None = None,
+    ledger: str | Path | None = None,
+    time: str = "header",
+    joint_states: str | None = None,
+    drive_torque: str | None = None,
+    node: str | None = None,
+    memory_mb: float = DEFAULT_MB,
+    ready: Callable[[WearMonitor], None] | None = None,
+    progress: Callable[[float], None] | None = None,
+    finish: Callable[[ReplayResult], None] | None = None,
+) -> ReplayResult:
+    """Put a recording through the monitor.
+
+    The ledger is written last, all of it or nothing: a replay that was cut off is not in it, and one that is
+    repeated gives what it would have given.
+
+    Parameters
+    ----------
+    paths : path, or iterable of paths
+        MCAP and .db3 files, bag directories; several are one recording.
+    config : MonitorConfig or path, optional
+        Parameters, or the parameter file of the node; the one that comes with the package if not given.
+    out : path, optional
+        Directory for ``reports.mcap``, the messages that the node would have published.
+    ledger : path, optional
+        Ledger to continue; one that the parameters name is left alone.
+    time : str
+        Which time stamps the samples: ``header``, ``log`` or ``publish``.
+    joint_states, drive_torque : str, optional
+        Topics; found by their relative names if not given.
+    node : str, optional
+        Full name of the node whose parameters, names and messages are wanted; if not given, the one beside
+        the topic of the crank, such as ``/left/leg_wear_monitor`` for ``/left/joint_states``.
+    memory_mb : float
+        Memory that reading the recording may take, temporary files included [10⁶ bytes].
+    ready : callable, optional
+        Given the monitor before the first sample.
+    progress : callable, optional
+        Told the share of the recording that is done, 0 to 1.
+    finish : callable, optional
+        Given the result before the ledger is written: what has to be on the disk first.
+
+    Returns
+    -------
+    ReplayResult
+
+    Raises
+    ------
+    RecordingError
+        If nothing in the recording can be used, or the disk does not take the reports.
+    ConfigError, LedgerError
+        For parameters or a ledger that cannot be used.
+    """
+    config = config if isinstance(config, MonitorConfig) else load_config(config, node)
+    kept = attrs.evolve(config.ledger, path="" if ledger is None else str(ledger))
+    config = attrs.evolve(config, ledger=kept)
+    named = [paths] if isinstance(paths, str | Path) else list(paths)
+    asked = {"joint_states": joint_states, "drive_torque": drive_torque}
+    with (
+        Recording(named, config, time=time, memory_mb=memory_mb, **asked) as recording,
+        ExitStack() as stack,
+    ):
+        node = node or node_beside(printable(recording.topics["joint_states"]))
+        config = config.on_node(node)
+        mechanism = load_mechanism(config.mechanism)
+        monitor = open_monitor(mechanism, config, at_end=True)
+        stack.callback(monitor.abandon)
+        history, evidence = History(monitor.loose), GaitEvidence(config)
+        result = ReplayResult(monitor, history, recording.files, recording.topics, time, evidence)
+        with nullcontext() if out is None else _sink(Path(out), monitor, node, recording.files) as sink:
+            if ready:
+                ready(monitor)
+            _run(result, recording, sink, progress)
+        result.findings = recording.findings + _about_the_ledger(result)
+        result.is_partial = recording.is_partial
+        if finish:
+            finish(result)
+        if not result.is_unusable:  # wear of another machine would stay in the ledger for ever
+            monitor.close()
+    return result
+
+
+def _run(
+    result: ReplayResult,
+    recording: Recording,
+    sink: Sink | None,
+    progress: Callable[[float], None] | None,
+) -> None:
+    """Put all blocks of a recording through the monitor."""
+    monitor = result.monitor
+    first_ns: int | None = None
+    for block in recording.blocks():
+        first_ns = int(block.log_time_ns[0]) if first_ns is None else first_ns
+        result.logged_s = max(result.logged_s, (int(block.log_time_ns[-1]) - first_ns) / 1e9)
+        if block.pause_ns:
+            monitor.pause(_stamps_apart_s(result, block))
+        for samples in _beats(block, monitor.config):
+            result.count(samples)
+            _take(result, samples, sink)
+        if progress:
+            progress(block.share)
+    result.history.last = monitor.renew_forecast()
+
+
+def _stamps_apart_s(result: ReplayResult, block: Block) -> float:
+    """From the last stamp so far to the first of a block [s]; 0 where stamps do not go on."""
+    stamps = block.samples["stamp_ns"][block.samples["fault"] == 0]
+    return max(0.0, (int(stamps[0]) - result.end_ns) * 1.0e-9) if len(stamps) and result.end_ns else 0.0
+
+
+def _about_the_ledger(result: ReplayResult) -> list[Finding]:
+    """What is to be told of the ledger as it was found, and as it is left."""
+    found = []
+    if result.monitor.ledger_told:
+        path = Path(result.monitor.config.ledger.path)
+        found.append(Finding(path, result.monitor.ledger_told, Weight.NOTE))
+    if result.monitor.is_all_counted:
+        found.append(Finding(result.files[0], "all of it is in the ledger already", Weight.NOTE))
+    if result.monitor.config.ledger.path and result.is_unusable:
+        path = Path(result.monitor.config.ledger.path)
+        found.append(Finding(path, "nothing of this recording is written into the ledger", Weight.NOTE))
+    return found
+
+
+def _take(result: ReplayResult, samples: Samples, sink: Sink | None) -> None:
+    """Put samples through the monitor, and keep what comes out."""
+    reports = result.monitor.update(samples)
+    for cycle in reports.cycles:
+        result.history.add_cycle(cycle)
+        result.evidence.add(cycle)
+    for alarms in reports.alarms:
+        result.history.add_alarms(alarms)
+    if sink:
+        sink.take(reports, result.end_ns)
+
+
+def node_beside(topic: str) -> str:
+    """Full name of the monitor's node in the namespace of a topic."""
+    return topic.rpartition("/")[0] + NODE
+
+
+def _sink(directory: Path, monitor: WearMonitor, node: str, files: list[Path]) -> Sink:
+    path = directory / REPORTS_FILE
+    if any(path.resolve() == file.resolve() for file in files):
+        raise RecordingError(str(path), "", "is to be read and written, expected another directory")
+    try:
+        directory.mkdir(parents=True, exist_ok=True)
+    except OSError as error:
+        raise RecordingError(str(directory), "", f"cannot be made: {error.strerror}") from error
+    return Sink(path, monitor, node)
+
+
+def _beats(block: Block, config: MonitorConfig) -> Iterator[Samples]:
+    """Samples of a block, cut where diagnostics are due."""
+    period_ns = round(config.diagnostics.period_s * 1e9)
+    yield from np.split(block.samples, np.flatnonzero(np.diff(block.log_time_ns // period_ns)) + 1)

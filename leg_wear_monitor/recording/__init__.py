@@ -1,1 +1,0 @@
-"""Bags: read whole or damaged ones as gait samples, write MCAP, replay."""

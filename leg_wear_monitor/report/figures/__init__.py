@@ -1,0 +1,1 @@
+"""Figures of mechanisms, forces, wear and lives."""

@@ -1,0 +1,104 @@
+"""Bodies and joints of a mechanism as drawn things."""
+
+from collections.abc import Mapping
+
+import numpy as np
+from matplotlib import patheffects
+from matplotlib.axes import Axes
+from matplotlib.colors import to_rgb
+from matplotlib.lines import Line2D
+from matplotlib.patches import Polygon
+
+from leg_wear_monitor.mechanism.arrays import Floats
+from leg_wear_monitor.report.figures.figure import INK, PAPER, USUAL, VERMILION
+
+Points = Mapping[str, Floats]
+
+_HALO = [patheffects.withStroke(linewidth=3.0, foreground=PAPER)]
+
+
+def outline(points: Points) -> Floats:
+    """Corners (n, 2) of a body's shape: its distinct points, in order around their middle."""
+    corners = np.unique(np.array(list(points.values())).round(9), axis=0)
+    around = corners - corners.mean(axis=0)
+    return np.asarray(corners[np.argsort(np.arctan2(around[:, 1], around[:, 0]))])
+
+
+def lighter(colour: str, share: float) -> tuple[float, float, float]:
+    """A colour mixed with a share of white."""
+    red, green, blue = (share + (1.0 - share) * part for part in to_rgb(colour))
+    return red, green, blue
+
+
+def draw_body(axes: Axes, corners: Floats, colour: str, layer: float, width: float = 9.0) -> None:
+    """A plate or a bar with round ends around the corners (n, 2); width in points."""
+    if len(corners) == 1:  # a slider
+        axes.plot(*corners[0], marker="s", markersize=2.4 * width, color=lighter(colour, 0.55), zorder=layer)
+        return
+    for edge, line in ((colour, width + 2.0), (lighter(colour, 0.55), width)):
+        shape = Polygon(
+            corners, closed=len(corners) > 2, facecolor=edge, edgecolor=edge, linewidth=line, zorder=layer
+        )
+        shape.set_joinstyle("round")
+        shape.set_capstyle("round")
+        axes.add_patch(shape)
+
+
+def draw_support(axes: Axes, place: Floats, away: Floats) -> None:
+    """A pivot on the ground: a triangle above or below it, on the side of ``away`` (2,)."""
+    up = 1.6 if away[1] > 0.0 else -1.6
+    triangle = [(0.0, 0.0), (-0.8, up), (0.8, up), (0.0, 0.0)]
+    axes.plot(*place, marker=triangle, markersize=32.0, color=lighter(INK, 0.6), zorder=1.0, linewidth=0.0)
+
+
+def draw_spring(axes: Axes, ends: tuple[Floats, Floats], layer: float) -> None:
+    """A zigzag between two places."""
+    start, end = ends
+    share = np.array([0.0, 0.15, *np.linspace(0.2, 0.8, 11), 0.85, 1.0])
+    side = np.array([0.0, 0.0, *(1.0 if i % 2 else -1.0 for i in range(11)), 0.0, 0.0])
+    across = 0.04 * np.array([start[1] - end[1], end[0] - start[0]])
+    line = start + share[:, None] * (end - start) + side[:, None] * across
+    axes.plot(*line.T, color=INK, linewidth=1.0, zorder=layer)
+
+
+def draw_joint(axes: Axes, place: Floats, names: Mapping[str, bool], away: Floats) -> None:
+    """Pins at one place, by name and whether they are loose; names stand on the side of ``away`` (2,)."""
+    axes.add_line(joint_mark(any(names.values()), place))
+    dx, dy = 13.0 * away / (np.hypot(*away) or 1.0)
+    wide = [6.0 * len(name) + 5.0 for name in names]
+    start = dx - 0.5 * sum(wide) + 0.5 * np.sign(dx) * (abs(dx) > 8.0) * (sum(wide) - wide[0])
+    for i, (name, loose) in enumerate(names.items()):  # side by side, each in its own colour
+        along = start + sum(wide[:i]) + 0.5 * wide[i]
+        write_beside(axes, place, name, (along, dy), VERMILION if loose else INK)
+
+
+def write_beside(axes: Axes, place: Floats, text: str, offset: tuple[float, float], colour: str) -> None:
+    """Bold text at an offset [points] from a place."""
+    axes.annotate(
+        text,
+        (float(place[0]), float(place[1])),
+        xytext=offset,
+        textcoords="offset points",
+        ha="center",
+        va="center",
+        fontsize=USUAL,
+        fontweight="bold",
+        color=colour,
+        path_effects=_HALO,
+        zorder=30.0,
+    )
+
+
+def joint_mark(loose: bool, place: Floats | tuple[float, float] = (0.0, 0.0)) -> Line2D:
+    """The mark of a joint, also for a legend."""
+    return Line2D(
+        [place[0]],
+        [place[1]],
+        linestyle="none",
+        marker="o",
+        markersize=8.5 if loose else 5.5,
+        markerfacecolor=PAPER,
+        markeredgecolor=VERMILION if loose else INK,
+        markeredgewidth=2.4 if loose else 1.2,
+        zorder=20.0,
+    )

@@ -1,0 +1,172 @@
+"""The leg to scale: its bodies, its joints and the path of its toe."""
+
+from collections.abc import Collection
+from itertools import cycle
+
+import numpy as np
+from matplotlib.axes import Axes
+from matplotlib.figure import Figure
+from matplotlib.lines import Line2D
+
+from leg_wear_monitor.mechanism.arrays import Floats
+from leg_wear_monitor.mechanism.ideal import IdealMotion, ideal_motion, one_cycle, point_motion
+from leg_wear_monitor.mechanism.position import Linkage, build_linkage
+from leg_wear_monitor.mechanism.spec import GROUND, Mechanism, PrismaticJoint
+from leg_wear_monitor.report.figures.bodies import (
+    draw_body,
+    draw_joint,
+    draw_spring,
+    draw_support,
+    joint_mark,
+    lighter,
+    outline,
+    write_beside,
+)
+from leg_wear_monitor.report.figures.figure import BODY_COLOURS, INK, SMALL, USUAL, new_figure, tidy
+
+_PATH_POINTS = 360
+_TOE_EVERY, _BODIES_EVERY = 30, 60
+_NEAR_M = 1.0e-3  # joints closer than this share a place
+_PANEL_IN, _KEY_IN = 4.4, 1.2
+
+Paths = dict[str, dict[str, Floats]]
+
+
+def leg_picture(
+    mechanism: Mechanism, loose: Collection[str] | None = None, crank_angle_rad: float = 0.0
+) -> Figure:
+    """The mechanism at a crank angle, and beside it through one cycle, both ideal and to one scale.
+
+    Parameters
+    ----------
+    mechanism : Mechanism
+    loose : collection of str, optional
+        Joints to mark as loose; the mechanism's own if not given.
+    crank_angle_rad : float
+
+    Raises
+    ------
+    AssemblyError
+        For a mechanism that does not close or cannot turn.
+    """
+    linkage = build_linkage(mechanism)
+    here = _paths(linkage, ideal_motion(linkage, [crank_angle_rad], 1.0))
+    paths = _paths(linkage, one_cycle(linkage, _PATH_POINTS, 1.0))
+    low, high = _extent(paths)
+    height = (_PANEL_IN - 0.5) * (high[1] - low[1]) / (high[0] - low[0]) + 0.75
+    figure = new_figure(2.0 * _PANEL_IN + _KEY_IN, float(np.clip(height, 2.8, 6.4)))
+    still, moving, key = figure.subplots(1, 3, width_ratios=(_PANEL_IN, _PANEL_IN, _KEY_IN))
+    _draw_still(still, mechanism, here, paths, mechanism.loose if loose is None else loose)
+    _draw_cycle(moving, mechanism, paths)
+    _draw_key(key, mechanism)
+    still.set_title(
+        f"{mechanism.name}, crank at {np.rad2deg(crank_angle_rad):.0f}°", fontsize=USUAL, color=INK
+    )
+    toe = f", the toe every {_TOE_EVERY}° of the crank" if mechanism.toe else ""
+    moving.set_title(f"one cycle{toe}", fontsize=USUAL, color=INK)
+    for axes in (still, moving):
+        tidy(axes)
+        axes.set(aspect="equal", xlim=(low[0], high[0]), ylim=(low[1], high[1]))
+        axes.set_xlabel("x [m]", fontsize=SMALL)
+    still.set_ylabel("y [m]", fontsize=SMALL)
+    return figure
+
+
+def _paths(linkage: Linkage, motion: IdealMotion) -> Paths:
+    """Every point (N, 2) of every body over the motion [m]."""
+    mechanism = linkage.mechanism
+    return {
+        body: {point: point_motion(motion, linkage, body, point)[0] for point in mechanism.points_of(body)}
+        for body in (GROUND, *mechanism.bodies)
+    }
+
+
+def _extent(paths: Paths) -> tuple[Floats, Floats]:
+    """Lower left and upper right corner of all that is passed, with a margin."""
+    every = np.concatenate([path for body in paths.values() for path in body.values()])
+    low, high = every.min(axis=0), every.max(axis=0)
+    margin = 0.07 * float((high - low).max())
+    return low - margin, high + margin
+
+
+def _colours(mechanism: Mechanism) -> dict[str, str]:
+    return dict(zip(mechanism.bodies, cycle(BODY_COLOURS), strict=False))
+
+
+def _outline_at(paths: Paths, body: str, i: int) -> Floats:
+    return outline({name: path[i] for name, path in paths[body].items()})
+
+
+def _draw_still(axes: Axes, mechanism: Mechanism, here: Paths, paths: Paths, loose: Collection[str]) -> None:
+    shapes = {body: _outline_at(here, body, 0) for body in mechanism.bodies}
+    colours = _colours(mechanism)
+    largest_first = sorted(shapes, key=lambda name: -float(np.ptp(shapes[name], axis=0).sum()))
+    for layer, body in enumerate(largest_first):
+        draw_body(axes, shapes[body], colours[body], 2.0 + 0.5 * layer)
+    for names, place in _places(mechanism, here):
+        sides = {body for name in names for body in mechanism.sides(name)}
+        away = place - np.mean([shapes[body].mean(axis=0) for body in sides - {GROUND}], axis=0)
+        for name in names:
+            joint = mechanism.joints[name]
+            if isinstance(joint, PrismaticJoint):
+                axes.plot(*paths[joint.slider][name].T, color=lighter(INK, 0.6), linewidth=4.0, zorder=1.0)
+            elif GROUND in mechanism.sides(name):
+                draw_support(axes, place, away)
+                away = np.array([-1.0, 0.3 * np.sign(away[1])])
+        draw_joint(axes, place, {name: name in loose for name in names}, away)
+    for spring in mechanism.springs.values():
+        a, b = (here[body][point][0] for body, point in zip(spring.bodies, spring.points, strict=True))
+        draw_spring(axes, (a, b), 15.0)
+    if mechanism.toe is not None:
+        body, point = mechanism.toe
+        place = here[body][point][0]
+        axes.plot(*place, "o", color=INK, markersize=4.5, zorder=20.0)
+        dx, dy = place - shapes[body].mean(axis=0)
+        write_beside(axes, place, "toe", (16.0 if dx > 0.0 else -16.0, 8.0 if dy > 0.0 else -8.0), INK)
+
+
+def _places(mechanism: Mechanism, here: Paths) -> list[tuple[list[str], Floats]]:
+    """Names of the joints that stand at one place, and the place."""
+    groups: list[tuple[list[str], Floats]] = []
+    for name in mechanism.joints:
+        place = here[mechanism.sides(name)[1]][name][0]
+        near = [names for names, other in groups if np.hypot(*(place - other)) < _NEAR_M]
+        if near:
+            near[0].append(name)
+        else:
+            groups.append(([name], place))
+    return groups
+
+
+def _draw_cycle(axes: Axes, mechanism: Mechanism, paths: Paths) -> None:
+    for body, colour in _colours(mechanism).items():
+        for i in range(0, _PATH_POINTS, _PATH_POINTS * _BODIES_EVERY // 360):
+            corners = _outline_at(paths, body, i)
+            axes.plot(
+                *np.vstack([corners, corners[:1]]).T,
+                color=lighter(colour, 0.35),
+                marker="s" if len(corners) == 1 else None,
+                linewidth=1.6,
+                alpha=0.7,
+                solid_capstyle="round",
+            )
+    if mechanism.toe is not None:
+        body, point = mechanism.toe
+        path = paths[body][point]
+        axes.plot(*np.vstack([path, path[:1]]).T, color=INK, linewidth=2.0, zorder=20.0)
+        every = _PATH_POINTS * _TOE_EVERY // 360
+        axes.plot(*path[::every].T, "o", color=INK, markersize=4.0, zorder=21.0)
+
+
+def _draw_key(axes: Axes, mechanism: Mechanism) -> None:
+    axes.set_axis_off()
+    entries = {
+        body: Line2D([], [], color=lighter(colour, 0.4), linewidth=7.0, solid_capstyle="round")
+        for body, colour in _colours(mechanism).items()
+    }
+    entries |= {"loose joint": joint_mark(True), "ideal joint": joint_mark(False)}
+    if mechanism.toe is not None:
+        entries["path of the toe"] = Line2D([], [], color=INK, linewidth=2.0, marker="o", markersize=4.0)
+    axes.legend(
+        list(entries.values()), list(entries), fontsize=SMALL, frameon=False, loc="center", labelspacing=0.9
+    )

@@ -1,0 +1,42 @@
+"""A leg's life as a picture: clearances, impacts and worn profiles over gait cycles."""
+
+import numpy as np
+from matplotlib.axes import Axes
+
+from leg_wear_monitor.life.result import Life
+from leg_wear_monitor.report.figures.figure import BODY_COLOURS, INK, SMALL, new_figure, png, tidy
+
+_PROFILES = 5
+
+
+def life_picture(life: Life) -> bytes:
+    """PNG: mean (and dashed, largest) clearance, peak force, and the bushings' profiles at five times."""
+    joints = len(life.loose)
+    figure = new_figure(max(7.0, 2.2 * joints), 6.0)
+    grid = figure.add_gridspec(2, 2 * joints, height_ratios=(1.2, 1.0))
+    clearance, peak = figure.add_subplot(grid[0, :joints]), figure.add_subplot(grid[0, joints:])
+    for k, joint in enumerate(life.loose):
+        colour = BODY_COLOURS[k % len(BODY_COLOURS)]
+        clearance.plot(life.cycles, 1e6 * life.clearance_m[:, k], color=colour, label=joint)
+        clearance.plot(life.cycles, 1e6 * life.clearance_max_m[:, k], color=colour, ls="--", lw=0.7)
+        peak.plot(life.cycles, 1e-3 * life.peak_force_n[:, k], color=colour)
+        _profiles(figure.add_subplot(grid[1, 2 * k : 2 * k + 2]), life, k, colour)
+    clearance.legend(fontsize=SMALL, frameon=False)
+    for axes, name in ((clearance, "radial clearance [µm]"), (peak, "peak contact force [kN]")):
+        axes.set_ylabel(name, fontsize=SMALL, color=INK)
+        axes.set_xlabel("gait cycles", fontsize=SMALL, color=INK)
+        tidy(axes)
+    return png(figure)
+
+
+def _profiles(axes: Axes, life: Life, k: int, colour: str) -> None:
+    """Depth of the bushing of joint k, darker as it gets older."""
+    sectors = life.depth.shape[-1]
+    angle = (np.arange(sectors) + 0.5) * (360.0 / sectors)
+    times = np.linspace(0.0, life.cycles[-1], _PROFILES + 1)[1:]
+    for shade, time in enumerate(times, 1):
+        at = int(np.abs(life.cycles - time).argmin())
+        axes.plot(angle, 1e6 * life.depth[at, k, 0], color=colour, alpha=shade / _PROFILES, lw=0.9)
+    axes.set(xlim=(0.0, 360.0), xticks=(0.0, 180.0, 360.0))
+    axes.set_title(f"{life.loose[k]}: bushing [µm] by angle [°]", fontsize=SMALL, color=INK)
+    tidy(axes)

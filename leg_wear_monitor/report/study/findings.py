@@ -1,0 +1,249 @@
+"""What to conclude from a study: sentences computed from its data, whatever they say."""
+
+from collections.abc import Sequence
+
+import numpy as np
+
+from leg_wear_monitor.mechanism.clearance import NORMAL_LAWS
+from leg_wear_monitor.report.study.text import (
+    PICO,
+    QUANTITIES,
+    Labelled,
+    Quantity,
+    joined,
+    number,
+    percent,
+    with_spread,
+    zone_text,
+)
+from leg_wear_monitor.studies.point import Arrays
+from leg_wear_monitor.studies.summary import (
+    Spread,
+    depth_per_cycle,
+    largest_error,
+    loose_of,
+    of_loose,
+    peak_force,
+    power_law,
+    share_of_range,
+    worst_zone,
+)
+
+_SUM_WITHIN = 0.1  # of the sum
+_NO_POWER = 0.1  # standard error of an exponent beyond which no one power describes the values
+
+
+def _known(arrays: Arrays) -> list[Quantity]:
+    return [quantity for quantity in QUANTITIES if f"ideal_{quantity.name}" in arrays]
+
+
+def disturbance(labelled: Labelled) -> list[str]:
+    """Which part of the motion clearance disturbs most."""
+    known = [quantity for quantity in _known(labelled[0][1]) if quantity.name.startswith("toe")]
+    if len(known) < 3:
+        return []
+    shares = {each.title: [share_of_range(arrays, each.name) for _, arrays in labelled] for each in known}
+    texts = [f"{percent(min(share))} to {percent(max(share))}" if len(share) > 1 and min(share) < max(share)
+             else percent(share[0]) for share in shares.values()]  # fmt: skip
+    rises = all(a < b < c for a, b, c in zip(*shares.values(), strict=True))
+    judged = (
+        "the higher the derivative, the more it is disturbed"
+        if rises
+        else "the order displacement, velocity, acceleration does not hold everywhere"
+    )
+    parts = [f"{title} {text}" for title, text in zip(shares, texts, strict=True)]
+    return [f"Largest errors in a cycle, of the ideal curve's range: {joined(parts)}; {judged}."]
+
+
+def growth(values: Sequence[float], labelled: Labelled, what: str) -> list[str]:
+    """How errors, forces and wear grow with a number."""
+    sentences = []
+    for each in _known(labelled[0][1]):
+        spreads = [largest_error(arrays, each.name) for _, arrays in labelled]
+        sentences.append(
+            f"The largest {each.title} error goes from {with_spread(spreads[0], each.factor)} to "
+            f"{with_spread(spreads[-1], each.factor)} {each.unit}{_as_power(values, spreads, what)}."
+        )
+    for joint in loose_of(labelled[0][1]):
+        forces = [peak_force(arrays, joint) for _, arrays in labelled]
+        wear = [depth_per_cycle(arrays, joint) for _, arrays in labelled]
+        sentences.append(
+            f"Joint {joint}: the largest contact force in a cycle goes from {with_spread(forces[0])} to "
+            f"{with_spread(forces[-1])} N{_as_power(values, forces, what)}; the greatest wear depth from "
+            f"{with_spread(wear[0], PICO)} to {with_spread(wear[-1], PICO)} pm a cycle"
+            f"{_as_power(values, wear, what)}."
+        )
+    return sentences
+
+
+def regular_where(labelled: Labelled) -> list[str]:
+    """How far the contact force repeats itself from cycle to cycle, over what is varied."""
+    sentences = []
+    for joint in loose_of(labelled[0][1]):
+        shares = [of_loose(arrays, "repeats_contact_force", joint).mean for _, arrays in labelled]
+        parts = [f"{label} {100.0 * share:.0f}" for (label, _), share in zip(labelled, shares, strict=True)]
+        sentences.append(
+            f"Joint {joint}: share of the contact force's variance that repeats from cycle to cycle [%] "
+            f"(100 is periodic): {'; '.join(parts)}."
+        )
+    return sentences
+
+
+def _as_power(values: Sequence[float], spreads: Sequence[Spread], what: str) -> str:
+    means = np.array([each.mean for each in spreads])
+    if len(values) < 4 or not (means > 0.0).all():
+        return ""
+    power, error = power_law(values, means)
+    if error > _NO_POWER:
+        return ""
+    return f", about as {what} to the power {with_spread(Spread(power, error, power, power))}"
+
+
+def places(labelled: Labelled) -> list[str]:
+    """Where clearance does most, and how impacts differ between joints."""
+    sentences = []
+    for each in _known(labelled[0][1]):
+        errors = [(label, largest_error(arrays, each.name)) for label, arrays in labelled]
+        ranking = _ranked(errors, each.factor)
+        sentences.append(
+            f"Largest {each.title} error in a cycle [{each.unit}], the greatest first: {ranking}."
+        )
+    joints = _joints(labelled)
+    forces = [(name, peak_force(arrays, joint)) for name, joint, arrays in joints]
+    sentences.append(f"Largest contact force in a cycle [N], the greatest first: {_ranked(forces)}.")
+    return [*sentences, *wear(labelled), *impacts(labelled), *regularity(labelled), *zones(labelled)]
+
+
+def _joints(labelled: Labelled) -> list[tuple[str, str, Arrays]]:
+    """Every loose joint of every point with a name that tells it from the others."""
+    several = len(labelled) > 1
+    return [
+        (f"{joint} of {{{label}}}" if several and label != joint else joint, joint, arrays)
+        for label, arrays in labelled
+        for joint in loose_of(arrays)
+    ]
+
+
+def _ranked(values: Sequence[tuple[str, Spread]], factor: float = 1.0) -> str:
+    ranked = sorted(values, key=lambda one: -one[1].mean)
+    return "; ".join(f"{name} {with_spread(value, factor)}" for name, value in ranked)
+
+
+def wear(labelled: Labelled) -> list[str]:
+    """Which joint wears most."""
+    joints = _joints(labelled)
+    depths = [(name, depth_per_cycle(arrays, joint)) for name, joint, arrays in joints]
+    return [f"Greatest wear depth [pm a cycle], the greatest first: {_ranked(depths, PICO)}."]
+
+
+def impacts(labelled: Labelled) -> list[str]:
+    """Which joint is hit most often."""
+    counts = [(name, of_loose(arrays, "impacts", joint)) for name, joint, arrays in _joints(labelled)]
+    return [f"Impacts a cycle, the most first: {_ranked(counts)}."]
+
+
+def regularity(labelled: Labelled) -> list[str]:
+    """Whose contact repeats itself from cycle to cycle."""
+    shares = [
+        (name, of_loose(arrays, "repeats_contact_force", joint)) for name, joint, arrays in _joints(labelled)
+    ]
+    return [
+        "Share of the contact force's variance that repeats from cycle to cycle [%] (100 is periodic), "
+        f"the most regular first: {_ranked(shares, 100.0)}."
+    ]
+
+
+def zones(labelled: Labelled) -> list[str]:
+    """Whose wear is concentrated in a zone."""
+    sentences = []
+    for share in (0.5, 0.9):
+        known = [
+            (name, zone) for name, joint, a in _joints(labelled) if (zone := worst_zone(a, joint, share))
+        ]
+        ranked = sorted(known, key=lambda one: one[1][1] - one[1][0])
+        texts = "; ".join(f"{name} {zone_text(zone)}" for name, zone in ranked)
+        if texts:
+            head = f"Zone that holds {percent(share)} of the bushing's wear"
+            sentences.append(f"{head}, the narrowest first: {texts}.")
+    return sentences
+
+
+def superposition(parts: Labelled, whole: Arrays) -> list[str]:
+    """Whether all clearances at once do what the places do one by one, added up."""
+    ratios, texts = [], []
+    for each in _known(whole):
+        together = largest_error(whole, each.name)
+        total = sum(largest_error(arrays, each.name).mean for _, arrays in parts)
+        ratios.append(together.mean / total)
+        summed = f"{number(each.factor * total)} {each.unit}"
+        texts.append(f"{each.title} {with_spread(together, each.factor)} against {summed}")
+    verdict = "is" if all(abs(ratio - 1.0) < _SUM_WITHIN for ratio in ratios) else "is not"
+    shares = joined([percent(ratio) for ratio in ratios])
+    return [
+        f"All at once {verdict} the sum of the places alone: largest errors are {shares} of the sum "
+        f"({joined(texts)}).",
+        *(_against_alone(joint, arrays, whole) for _, joint, arrays in _joints(parts)),
+    ]
+
+
+def _against_alone(joint: str, alone: Arrays, whole: Arrays) -> str:
+    force = peak_force(whole, joint).mean / peak_force(alone, joint).mean
+    depth = depth_per_cycle(whole, joint).mean / depth_per_cycle(alone, joint).mean
+    volume = of_loose(whole, "archard_integral_j_per_cycle", joint).mean
+    volume /= of_loose(alone, "archard_integral_j_per_cycle", joint).mean
+    return (
+        f"Joint {joint}, all at once against its place alone: largest contact force × {number(force)}, "
+        f"worn volume × {number(volume)}, greatest depth × {number(depth)}."
+    )
+
+
+def worst_joint(whole: Arrays) -> list[str]:
+    """Joints by their wear."""
+    names = loose_of(whole)
+    depth = sorted(names, key=lambda joint: -depth_per_cycle(whole, joint).mean)
+    volume = sorted(names, key=lambda joint: -of_loose(whole, "archard_integral_j_per_cycle", joint).mean)
+    return [
+        f"With all of them loose, worn volume falls in the order {' > '.join(volume)}, greatest depth in the "
+        f"order {' > '.join(depth)}: {volume[0]} wears most, {volume[-1]} least."
+    ]
+
+
+def laws(labelled: Labelled) -> list[str]:
+    """How much depends on the law of the normal force, and how much on friction."""
+    normal = [one for one in labelled if one[0] in NORMAL_LAWS]
+    lossy = [one for one in normal if one[0] != "hertz"]
+    friction = [one for one in labelled if one[0] not in NORMAL_LAWS]
+    groups = (("The normal laws", normal), ("Those with a loss", lossy), ("Friction", friction))
+    sentences = [_law_sentence(what, group) for what, group in groups if len(group) > 1]
+    for joint in loose_of(labelled[0][1]):
+        volumes = [of_loose(arrays, "archard_integral_j_per_cycle", joint) for _, arrays in labelled]
+        low, high = _ends(volumes)
+        sentences.append(
+            f"Wear of {joint}, ∫ F |v| dt [J a cycle]: from {with_spread(volumes[low])} ({labelled[low][0]}) "
+            f"to {with_spread(volumes[high])} ({labelled[high][0]})."
+        )
+    return sentences
+
+
+def _ends(spreads: Sequence[Spread]) -> tuple[int, int]:
+    """Where the mean is least and greatest."""
+    means = [each.mean for each in spreads]
+    return means.index(min(means)), means.index(max(means))
+
+
+def _law_sentence(what: str, group: Labelled) -> str:
+    """How far means of a group of laws lie apart."""
+    parts = []
+    for each in _known(group[0][1]):
+        parts.append((each.title, [largest_error(arrays, each.name) for _, arrays in group]))
+    for joint in loose_of(group[0][1]):
+        volumes = [of_loose(arrays, "archard_integral_j_per_cycle", joint) for _, arrays in group]
+        parts.append((f"wear of {joint}", volumes))
+    texts = [f"{name} {percent(_span(spreads))}" for name, spreads in parts]
+    names = joined([label.removeprefix("friction ") for label, _ in group])
+    return f"{what} ({names}): greatest less least mean, of the mean: {', '.join(texts)}."
+
+
+def _span(spreads: Sequence[Spread]) -> float:
+    means = np.array([each.mean for each in spreads])
+    return float(np.ptp(means) / means.mean())

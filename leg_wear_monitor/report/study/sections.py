@@ -1,0 +1,82 @@
+"""Sections that pages of studies are made of."""
+
+from typing import Any
+
+from leg_wear_monitor.report.figures.figure import png
+from leg_wear_monitor.report.figures.leg_picture import leg_picture
+from leg_wear_monitor.report.page import Findings, Picture, Section, Text
+from leg_wear_monitor.report.study.curves import curve_galleries
+from leg_wear_monitor.report.study.leg_slider import leg_slider
+from leg_wear_monitor.report.study.text import Labelled, error_table, joined, joint_table, wear_table
+from leg_wear_monitor.report.study.wear_pictures import wear_gallery
+from leg_wear_monitor.studies.point import Point
+from leg_wear_monitor.studies.storage.store import StudyResults
+from leg_wear_monitor.studies.summary import loose_of
+
+Sections = list[Section]
+
+
+def asked(results: StudyResults) -> Section:
+    """The ensemble in words, and the leg."""
+    ensemble = results.settings["ensemble"]
+    text = (
+        f"Each number is an ensemble of {ensemble['runs']} runs that start at different crank angles with "
+        f"their journals in different places; {ensemble['cycles']} gait cycles of each are counted, after "
+        f"{ensemble['skip_cycles']} that are not. Motion with clearance is chaotic: a single run is an "
+        "example."
+    )
+    loose = list(dict.fromkeys(name for point in results.points for name in point.settings["loose"]))
+    names = ", ".join(results.mechanism.joints)
+    leg = Picture(
+        image=png(leg_picture(results.mechanism, loose)),
+        alt=f"The leg to scale with its joints {names}; {joined(loose)} are loose; and the path of its toe",
+        caption=f"The leg to scale. Loose in this study: {joined(loose)}.",
+        wide=True,
+    )
+    return Section("What was asked", [Text(text), leg])
+
+
+def conclude(sentences: list[str]) -> Section:
+    """What to conclude."""
+    return Section("What to conclude", [Findings(sentences)])
+
+
+def cycle(results: StudyResults, chosen: list[tuple[Point, Any]]) -> Section:
+    """The leg to be moved by hand."""
+    runs = [(point.label, arrays) for point, arrays in chosen]
+    clearances = [_clearance(results, point) for point, _ in chosen]
+    return Section(
+        "One gait cycle",
+        [leg_slider(results.mechanism, runs, clearances, chosen[0][0].settings["speed_rpm"])],
+    )
+
+
+def _clearance(results: StudyResults, point: Point) -> float:
+    return float(point.settings["clearance_m"])
+
+
+def curves(labelled: Labelled) -> Section:
+    """Curves of every point over a gait cycle."""
+    return Section("Curves of a cycle", curve_galleries(labelled))
+
+
+def tables(labelled: Labelled, head: str) -> Section:
+    """Errors, forces and wear of every point; ``head`` says what tells points apart."""
+    tables = [error_table(labelled, head), joint_table(labelled, head), wear_table(labelled, head)]
+    return Section("Tables", tables)
+
+
+def wear(results: StudyResults, labelled: Labelled) -> Section:
+    """Wear of a cycle of every joint of every point."""
+    worn = [
+        (label, joint, 1.0e6 * arrays["wear_depth_m_per_cycle"][:, k])
+        for label, arrays in labelled
+        for k, joint in enumerate(loose_of(arrays))
+    ]
+    what = "Wear of a million cycles of new joints, as a million times the mean wear of a cycle"
+    return Section("Wear", [wear_gallery(results.mechanism, worn, what)])
+
+
+def ends_and_middle(pairs: list[Any]) -> list[Any]:
+    """First, middle and last of many."""
+    return pairs if len(pairs) <= 3 else [pairs[0], pairs[len(pairs) // 2], pairs[-1]]

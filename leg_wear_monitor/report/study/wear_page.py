@@ -1,0 +1,150 @@
+"""The page of the wear study: where new joints wear, and what becomes of them over a life."""
+
+from collections.abc import Sequence
+
+import numpy as np
+
+from leg_wear_monitor.report.figures.figure import INK, SMALL, new_figure, png, tidy
+from leg_wear_monitor.report.page import Gallery, Picture, Section, Table
+from leg_wear_monitor.report.study import findings
+from leg_wear_monitor.report.study.sections import Sections, asked, conclude, cycle, wear
+from leg_wear_monitor.report.study.text import (
+    PICO,
+    Labelled,
+    joint_table,
+    number,
+    wear_table,
+    with_spread,
+    zone_text,
+)
+from leg_wear_monitor.report.study.trends import MARKS
+from leg_wear_monitor.report.study.wear_pictures import wear_gallery
+from leg_wear_monitor.studies.point import Arrays
+from leg_wear_monitor.studies.storage.store import StudyResults
+from leg_wear_monitor.studies.summary import loose_of, spread
+from leg_wear_monitor.wear.surfaces import BUSHING, wear_zone
+
+_NEW, _END = 0, 1  # of rates; of depths, halfway and end
+_MILLION = 1.0e-6
+
+
+def life(results: StudyResults, labelled: Labelled) -> Sections:
+    """Sections of the wear study."""
+    lives = [(point.label, arrays) for point, arrays in results.of("life")]
+    sentences = [*findings.wear(labelled), *findings.zones(labelled)]
+    for label, arrays in lives:
+        sentences += _of_a_life(label, arrays, several=len(lives) > 1)
+    sections = [asked(results), conclude(sentences), wear(results, labelled)]
+    if lives:
+        sections += [_clearances(lives), _worn_surfaces(results, lives)]
+    sections.append(cycle(results, results.of("response")))
+    tables = [wear_table(labelled, "loose"), joint_table(labelled, "loose")]
+    return [*sections, Section("Tables", tables + ([_life_table(lives)] if lives else []))]
+
+
+def _of_a_life(label: str, arrays: Arrays, several: bool) -> list[str]:
+    """How long it took, whether wear slowed, and where it went."""
+    cycles, mean = arrays["cycles"][:, -1], arrays["clearance_mean_m"]
+    opened = 1.0e3 * (mean[:, -1] - mean[:, 0]).mean(axis=0)
+    first = loose_of(arrays)[int(opened.argmax())]
+    parts = [f"{joint} {number(each)} mm" for joint, each in zip(loose_of(arrays), opened, strict=True)]
+    rates = [
+        f"{joint} × {number(_rate(arrays, k, _END) / _rate(arrays, k, _NEW))}"
+        for k, joint in enumerate(loose_of(arrays))
+    ]
+    sets = f"With {label} loose, " if several else ""
+    toe = arrays["toe_position_m"]
+    return [
+        f"{sets}{first} opens first, after {with_spread(spread(cycles), _MILLION)} million cycles; opened "
+        "by then, "
+        ""
+        ""
+        f"on the mean: {', '.join(parts)}. Wear of a cycle at the end against new: {', '.join(rates)}; "
+        "largest toe "
+        f"error {number(1.0e3 * toe[:, 0].mean())} mm when new, {number(1.0e3 * toe[:, -1].mean())} mm at "
+        "the end."
+    ]
+
+
+def _rate(arrays: Arrays, k: int, when: int) -> float:
+    """Mean depth that a cycle takes off the bushing of a joint [m]."""
+    return float(arrays["rate_m_per_cycle"][:, when, k, BUSHING].mean())
+
+
+def _clearances(lives: Labelled) -> Section:
+    """Mean and largest clearance of every joint over the cycles."""
+    pictures = []
+    for label, arrays in lives:
+        figure = new_figure(4.6, 3.0)
+        axes = figure.subplots()
+        for k, ((colour, mark), joint) in enumerate(zip(MARKS, loose_of(arrays), strict=False)):
+            for run in range(len(arrays["cycles"])):
+                cycles = _MILLION * arrays["cycles"][run]
+                mean, largest = (1.0e3 * arrays[f"clearance_{kind}_m"][run, :, k] for kind in ("mean", "max"))
+                axes.plot(cycles, mean, color=colour, linewidth=1.2, marker=mark, markevery=(run, 8),
+                          markersize=4.0, label=joint if run == 0 else None)  # fmt: skip
+                axes.plot(cycles, largest, color=colour, linewidth=0.8, linestyle=(0, (4, 2)))
+        tidy(axes)
+        axes.set_xlim(left=0.0)
+        axes.set_xlabel("gait cycles [millions]", fontsize=SMALL)
+        axes.set_ylabel("radial clearance [mm]", fontsize=SMALL)
+        axes.set_title(label, fontsize=SMALL + 1.0, color=INK, fontweight="bold")
+        axes.legend(fontsize=SMALL, frameon=False, ncols=5, handletextpad=0.3)
+        pictures.append(
+            Picture(image=png(figure), alt=f"Clearances of {label} over the life: {_ends(arrays)}")
+        )
+    caption = (
+        "Clearances as wear feeds back. Full: mean around the joint; dashed: where it is largest, both "
+        "surfaces "
+        "added up in their own frames. A line for each run."
+    )
+    return Section("Over a life", [Gallery(pictures=pictures, caption=caption)])
+
+
+def _ends(arrays: Arrays) -> str:
+    mean = 1.0e3 * arrays["clearance_mean_m"].mean(axis=0)
+    parts = [f"{joint} {mean[0, k]:.3f} to {mean[-1, k]:.3f} mm" for k, joint in enumerate(loose_of(arrays))]
+    return ", ".join(parts)
+
+
+def _worn_surfaces(results: StudyResults, lives: Labelled) -> Section:
+    worn = [
+        (label, joint, np.asarray(arrays["depth_m"][:, _END, k], dtype=float))
+        for label, arrays in lives
+        for k, joint in enumerate(loose_of(arrays))
+    ]
+    return Section(
+        "Worn surfaces", [wear_gallery(results.mechanism, worn, "Surfaces at the end of the life")]
+    )
+
+
+def _life_table(lives: Labelled) -> Table:
+    rows: list[Sequence[str]] = []
+    for label, arrays in lives:
+        for k, joint in enumerate(loose_of(arrays)):
+            depth = arrays["depth_m"][:, _END, k, BUSHING].astype(float)
+            rate = arrays["rate_m_per_cycle"][:, :, k, BUSHING].astype(float)
+            rows.append([
+                f"{label}: {joint}" if label != joint else joint,
+                with_spread(spread(arrays["cycles"][:, -1]), _MILLION),
+                with_spread(spread(arrays["clearance_mean_m"][:, -1, k]), 1.0e3),
+                with_spread(spread(depth.max(axis=1)), 1.0e6),
+                zone_text(wear_zone(depth.mean(axis=0))),
+                with_spread(spread(rate[:, _NEW].mean(axis=1)), PICO),
+                with_spread(spread(rate[:, _END].mean(axis=1)), PICO),
+            ])  # fmt: skip
+    return Table(
+        caption="A life with wear fed back",
+        head=(
+            "loose, joint",
+            "cycles [millions]",
+            "mean clearance at the end [mm]",
+            "greatest depth of the bushing [µm]",
+            "zone with 90 % of the bushing's wear",
+            "mean depth a cycle when new [pm]",
+            "at the end [pm]",
+        ),
+        rows=rows,
+        note="Mean and standard deviation over runs; the life ends where the joint that wears fastest has "
+        "opened as far as the configuration says.",
+    )

@@ -1,0 +1,1 @@
+"""The synthetic leg as a node."""

@@ -1,0 +1,1 @@
+"""Silence, clocks, node status, node alarms, the log."""

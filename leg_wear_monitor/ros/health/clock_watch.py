@@ -1,0 +1,44 @@
+"""Whether the time that ROS has goes on."""
+
+from leg_wear_monitor.monitor.alarms.alarm import Level
+from leg_wear_monitor.monitor.reports import Status
+
+_STANDS_FROM_S = 1.0
+_TURNED_BACK_S = 1.0
+
+
+def both_clocks(one: Status, other: Status) -> Status:
+    """One status of two that tell of the clock: what is wrong with either."""
+    faults = [status.message for status in (one, other) if status.level is not Level.OK]
+    message = "; ".join(faults) or one.message
+    return Status(one.name, max(one.level, other.level), message, one.values | other.values)
+
+
+class ClockWatch:
+    """Watches the node's clock by one that only goes forward."""
+
+    def __init__(self) -> None:
+        self._ros_ns = self._changed_ns = 0
+
+    def status(self, ros_ns: int, steady_ns: int, is_simulated: bool) -> Status:
+        """The clock's status now.
+
+        Parameters
+        ----------
+        ros_ns, steady_ns : int
+            Now, as the node's clock has it, and by a clock that only goes forward.
+        is_simulated : bool
+            Whether the node follows ``/clock``.
+        """
+        since_ns, before = ros_ns - self._ros_ns, self._ros_ns
+        if since_ns or not self._changed_ns:
+            self._ros_ns, self._changed_ns = ros_ns, steady_ns
+        stands_s = (steady_ns - self._changed_ns) * 1.0e-9
+        values = {"stands_s": stands_s, "is_simulated": float(is_simulated)}
+        if is_simulated and not ros_ns:
+            return Status("clock", Level.ERROR, "use_sim_time is set and nobody publishes /clock", values)
+        if stands_s > _STANDS_FROM_S:
+            return Status("clock", Level.ERROR, "stands still: /clock has stopped", values)
+        if before and since_ns < -1.0e9 * _TURNED_BACK_S:
+            return Status("clock", Level.WARN, "was set back; samples go by their own stamps", values)
+        return Status("clock", Level.OK, "goes on", values)

@@ -1,0 +1,64 @@
+"""Alarms that need a clock or the graph: an input that is silent, several publishers of one input."""
+
+from collections.abc import Mapping
+
+import attrs
+
+from leg_wear_monitor.monitor.alarms.alarm import Alarm, Level, Limit, acknowledged, has_changed, judged
+from leg_wear_monitor.monitor.evaluation.board import SOURCES, TWO_SOURCES
+from leg_wear_monitor.monitor.reports import AlarmList
+from leg_wear_monitor.ros.health.silence import SILENT_FROM_S, TORQUE
+
+SILENCE = "input_silence"
+_SILENT = Limit(SILENT_FROM_S, SILENT_FROM_S)
+_LIMITS = {SILENCE: _SILENT, SOURCES: TWO_SOURCES}
+
+
+class NodeAlarms:
+    """Alarms of the node, beside those of the monitor.
+
+    In the list of alarms they stand only while they are raised, so that without them live and replay give
+    the same bytes. ``input_sources`` is an alarm of the monitor, too: the higher of both is shown.
+
+    Parameters
+    ----------
+    kinds : tuple of str
+        Of the inputs.
+    """
+
+    def __init__(self, kinds: tuple[str, ...]) -> None:
+        alarms = [Alarm(kind=SILENCE, subject=kind, unit="s") for kind in kinds]
+        alarms += [Alarm(kind=SOURCES, subject=kind if kind == TORQUE else "") for kind in kinds]
+        self._alarms = {alarm.name: alarm for alarm in alarms}
+
+    def judge(self, values: Mapping[str, float], stamp_ns: int) -> bool:
+        """Judge values by the names of their alarms; whether what people see has changed."""
+        changed = False
+        for name, value in values.items():
+            before = self._alarms[name]
+            after = judged(before, value, _LIMITS[before.kind], stamp_ns)
+            changed |= has_changed(before, after)
+            self._alarms[name] = after
+        return changed
+
+    def acknowledge(self) -> tuple[tuple[Alarm, ...], tuple[Alarm, ...]]:
+        """Acknowledge all: those that were cleared and those that stay."""
+        now = [acknowledged(alarm) for alarm in self.raised]
+        self._alarms |= {alarm.name: alarm for alarm in now}
+        cleared = tuple(alarm for alarm in now if alarm.level is Level.OK)
+        return cleared, tuple(alarm for alarm in now if alarm.level is not Level.OK)
+
+    @property
+    def raised(self) -> tuple[Alarm, ...]:
+        """Those that are shown."""
+        return tuple(alarm for alarm in self._alarms.values() if alarm.level is not Level.OK)
+
+    def beside(self, alarms: AlarmList) -> AlarmList:
+        """The monitor's alarms with these."""
+        if not self.raised:
+            return alarms
+        named = {alarm.name: alarm for alarm in alarms.alarms}
+        for own in self.raised:
+            if own.name not in named or own.level > named[own.name].level:
+                named[own.name] = own
+        return attrs.evolve(alarms, alarms=tuple(named.values()))

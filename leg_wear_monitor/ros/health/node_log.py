@@ -1,0 +1,81 @@
+"""What goes to the node's log, each once: alarms that rise and fall, statuses that become a fault."""
+
+import math
+from collections.abc import Iterable
+
+from rclpy.impl.rcutils_logger import RcutilsLogger
+
+from leg_wear_monitor.monitor.alarms.alarm import Alarm, Level
+from leg_wear_monitor.monitor.reports import AlarmList, Status
+from leg_wear_monitor.ros.health.silence import utc
+
+# Of these statuses the log tells; the others follow from alarms, which it tells of anyway.
+STATUSES = ("topics", "load", "recording", "ledger", "clock")
+
+
+def _write(logger: RcutilsLogger, level: Level, text: str) -> None:
+    # not by name: rclpy refuses a call at one place that changes its severity
+    if level is Level.ERROR:
+        logger.error(text)
+    elif level is Level.WARN:
+        logger.warning(text)
+    else:
+        logger.info(text)
+
+
+class AlarmLog:
+    """Writes a line for each alarm whose present level changes.
+
+    Parameters
+    ----------
+    logger : rclpy logger
+    """
+
+    def __init__(self, logger: RcutilsLogger) -> None:
+        self._logger = logger
+        self._present: dict[str, Level] = {}
+
+    def note(self, alarms: AlarmList) -> None:
+        """Take a list of all alarms as they stand."""
+        for alarm in alarms.alarms:
+            before = self._present.get(alarm.name, Level.OK)
+            if alarm.present is not before:
+                self._present[alarm.name] = alarm.present
+                _write(self._logger, alarm.present, line_of(alarm, before, alarms.stamp_ns))
+
+
+def line_of(alarm: Alarm, before: Level, stamp_ns: int) -> str:
+    """An alarm's rise or fall in a line: name, levels, value, limit, time."""
+    unit = f" {alarm.unit}" if alarm.unit else ""
+    verb = "rises" if alarm.present > before else "falls"
+    latched = ", shown until it is acknowledged" if alarm.level > alarm.present else ""
+    value = "unknown" if math.isnan(alarm.value) else f"{alarm.value:.4g}{unit}"
+    limit = "" if math.isnan(alarm.limit) else f", limit {alarm.limit:.4g}{unit}"
+    time = f", at {utc(stamp_ns)}" if stamp_ns > 0 else ""
+    return (
+        f"alarm {alarm.name} {verb} from {before.name} to {alarm.present.name}: {value}{limit}{time}{latched}"
+    )
+
+
+class StatusLog:
+    """Writes a line when a status becomes a fault, becomes another one, or is over.
+
+    Parameters
+    ----------
+    logger : rclpy logger
+    """
+
+    def __init__(self, logger: RcutilsLogger) -> None:
+        self._logger = logger
+        self._before: dict[str, tuple[Level, str]] = {}
+
+    def note(self, statuses: Iterable[Status]) -> None:
+        """Take the statuses as they are; those of `STATUSES` are looked at."""
+        for status in statuses:
+            if status.name not in STATUSES:
+                continue
+            now = (status.level, status.message)
+            level, _ = before = self._before.get(status.name, (Level.OK, ""))
+            if now != before and (status.level is not Level.OK or level is not Level.OK):
+                _write(self._logger, status.level, f"{status.name}: {status.message}")
+            self._before[status.name] = now

@@ -1,0 +1,116 @@
+"""What only the node can see: silence, publishers, names, its clock; for statuses, alarms and the log."""
+
+import time
+from collections.abc import Iterable, Sequence
+from typing import TYPE_CHECKING
+
+from rclpy.node import Node
+
+from leg_wear_monitor.messages import cdr
+from leg_wear_monitor.monitor.alarms.alarm import Alarm, Level
+from leg_wear_monitor.monitor.config.settings import MonitorConfig
+from leg_wear_monitor.monitor.evaluation.board import SOURCES
+from leg_wear_monitor.monitor.reports import AlarmList, Status
+from leg_wear_monitor.ros.health.clock_watch import ClockWatch, both_clocks
+from leg_wear_monitor.ros.health.node_alarms import SILENCE, NodeAlarms
+from leg_wear_monitor.ros.health.node_health import topics_status
+from leg_wear_monitor.ros.health.node_log import AlarmLog, StatusLog
+from leg_wear_monitor.ros.health.silence import CRANK, TORQUE, Silence
+from leg_wear_monitor.ros.inputs.crank_names import CrankNames
+from leg_wear_monitor.ros.inputs.inbox import Arrival
+from leg_wear_monitor.ros.inputs.inputs import InputTopic
+from leg_wear_monitor.ros.inputs.publishers import publishers_of
+from leg_wear_monitor.twin.sample import Samples
+
+if TYPE_CHECKING:
+    from leg_wear_monitor.monitor.wear_monitor import WearMonitor
+
+# A publisher that was killed stays in the graph until its lease runs out, 20 s by default: two of one name
+# may be one that was started again.
+_SAME_NAME_S = 30.0
+
+
+class Supervision:
+    """Watches what comes to a node and what goes out.
+
+    Parameters
+    ----------
+    node : rclpy.node.Node
+    monitor : WearMonitor
+    config : MonitorConfig
+    """
+
+    def __init__(self, node: Node, monitor: "WearMonitor", config: MonitorConfig) -> None:
+        self._node, self._monitor = node, monitor
+        self._started_ns = time.monotonic_ns()
+        kinds = (CRANK,) if config.drive_torque.source == "effort" else (CRANK, TORQUE)
+        self._silence = Silence(kinds, self._started_ns, time.time_ns())
+        self._names = CrankNames(config.crank_joint)
+        self._alarms, self._clock = NodeAlarms(kinds), ClockWatch()
+        self._alarm_log, self._status_log = AlarmLog(node.get_logger()), StatusLog(node.get_logger())
+        self._several_since: dict[str, int] = {}
+        self.inputs: Sequence[InputTopic] = ()
+
+    @property
+    def is_current(self) -> bool:
+        """Whether crank samples come that can be used."""
+        return self._silence.level(CRANK, time.monotonic_ns()) is Level.OK
+
+    def note(self, arrivals: Sequence[Arrival], samples: Samples) -> None:
+        """Take down messages that were followed, and their samples."""
+        self._names.note(arrivals, samples)
+        used = dict(zip((CRANK, TORQUE), self._monitor.used, strict=True))
+        self._silence.note(used, time.monotonic_ns(), time.time_ns())
+
+    def alarms(self, alarms: AlarmList) -> AlarmList:
+        """The monitor's alarms with those of the node; the log is told of what rose and fell."""
+        shown = self._alarms.beside(alarms)
+        self._alarm_log.note(shown)
+        return shown
+
+    def acknowledge(self) -> tuple[tuple[Alarm, ...], tuple[Alarm, ...]]:
+        """Acknowledge the node's own alarms: those that were cleared and those that stay."""
+        return self._alarms.acknowledge()
+
+    def look(self) -> bool:
+        """Look at topics and graph; whether the node's alarms have changed."""
+        now_ns, lack = time.monotonic_ns(), self._names.some_lack_it
+        without = self._names.told()
+        values: dict[str, float] = {}
+        for topic in self.inputs:
+            topic.publishers = publishers_of(self._node, topic.name, topic.type)
+            kind = CRANK if topic.kind == cdr.JOINT_STATE else TORQUE
+            if kind == CRANK:
+                topic.without_crank = without
+            # joints of one robot may come from several nodes: then messages lack the crank
+            topic.sources = 1 if kind == CRANK and lack else self._sources(topic, now_ns)
+            values[SOURCES if kind == CRANK else f"{SOURCES} {kind}"] = float(topic.sources)
+        for kind in self._silence.kinds:
+            is_silent = self._silence.level(kind, now_ns) is Level.ERROR
+            values[f"{SILENCE} {kind}"] = self._silence.silent_s(kind, now_ns) if is_silent else 0.0
+        return self._alarms.judge(values, time.time_ns())
+
+    def statuses(self, statuses: Iterable[Status]) -> tuple[Status, ...]:
+        """Statuses with those of topics and clock, each with what it has no current data of."""
+        now_ns, ros_ns = time.monotonic_ns(), self._node.get_clock().now().nanoseconds
+        is_simulated = bool(self._node.get_parameter("use_sim_time").value)
+        topics = topics_status(self.inputs, now_ns, self._started_ns)
+        for topic in self.inputs:
+            topic.lost_told = topic.lost
+        clock = self._clock.status(ros_ns, now_ns, is_simulated)
+        given = {status.name: status for status in statuses}
+        # what is given of the clock was logged where it was found
+        self._status_log.note((*(one for name, one in given.items() if name != clock.name), topics, clock))
+        given[clock.name] = both_clocks(given[clock.name], clock) if clock.name in given else clock
+        return self._silence.told((*given.values(), topics), now_ns)
+
+    def _sources(self, topic: InputTopic, now_ns: int) -> int:
+        """How many publishers a topic has for certain."""
+        names = topic.publishers.fitting
+        if len(names) < 2:
+            self._several_since.pop(topic.name, None)
+            return 1
+        since_ns = self._several_since.setdefault(topic.name, now_ns)
+        if len(set(names)) > 1 or (now_ns - since_ns) * 1.0e-9 > _SAME_NAME_S:
+            return len(names)
+        return 1

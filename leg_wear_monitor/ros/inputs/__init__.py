@@ -1,0 +1,1 @@
+"""Subscriptions: topics, publishers, names, the inbox."""

@@ -1,0 +1,66 @@
+"""Whether messages name the crank, and which joints they name where they do not."""
+
+from collections.abc import Sequence
+
+import numpy as np
+from rclpy.serialization import deserialize_message
+from sensor_msgs.msg import JointState
+
+from leg_wear_monitor.messages import cdr
+from leg_wear_monitor.ros.inputs.inbox import Arrival
+from leg_wear_monitor.twin.sample import MISSING_JOINT, NO_FAULT, Samples
+
+_MOST_NAMES, _MOST_LETTERS, _MOST_BYTES = 12, 40, 100_000
+
+
+class CrankNames:
+    """Looks for the crank's name in messages.
+
+    Parameters
+    ----------
+    crank_joint : str
+    """
+
+    def __init__(self, crank_joint: str) -> None:
+        self._crank = crank_joint
+        self._named = self._unnamed = 0
+        self._example, self._told = b"", ""
+
+    def note(self, arrivals: Sequence[Arrival], samples: Samples) -> None:
+        """Take messages, and the samples that were made of them."""
+        missing = np.flatnonzero(samples["fault"] == MISSING_JOINT)
+        self._unnamed += len(missing)
+        if len(missing):
+            self._example = arrivals[missing[-1]].raw
+        joint_states = np.array([one.kind == cdr.JOINT_STATE for one in arrivals], bool)
+        self._named += int(np.count_nonzero(joint_states & (samples["fault"] == NO_FAULT)))
+
+    @property
+    def some_lack_it(self) -> bool:
+        """Whether a message lacked the crank since `told` was last called."""
+        return self._unnamed > 0
+
+    def told(self) -> str:
+        """That no message names the crank, and what they name instead; empty once one has named it."""
+        unnamed, named, raw = self._unnamed, self._named, self._example
+        self._named = self._unnamed = 0
+        if named:
+            self._told = ""
+        elif unnamed:
+            there = _names_in(raw)
+            self._told = f"no joint is named {self._crank!r}; there are {there}; set crank_joint to its name"
+        return self._told
+
+
+def _names_in(raw: bytes) -> str:
+    """Names of a message in order, as text that a terminal can take."""
+    if len(raw) > _MOST_BYTES:
+        return "too many to name"
+    names = sorted(set(deserialize_message(raw, JointState).name))
+    shown = ", ".join(_printable(name) for name in names[:_MOST_NAMES])
+    return f"{shown} and {len(names) - _MOST_NAMES} more" if len(names) > _MOST_NAMES else shown
+
+
+def _printable(name: str) -> str:
+    short = name if len(name) <= _MOST_LETTERS else name[:_MOST_LETTERS] + "..."
+    return short if short.isprintable() and short else repr(short)

@@ -1,0 +1,1 @@
+"""Publishers, markers, the recording of the node."""

@@ -1,0 +1,112 @@
+"""A node's parameters from the class that declares them: read, refused, described, changed."""
+
+from collections.abc import Callable, Mapping
+from typing import Any, Generic, TypeVar
+
+from rcl_interfaces.msg import ParameterDescriptor, SetParametersResult
+from rclpy.parameter import Parameter as RosParameter
+
+from leg_wear_monitor.errors import ConfigError
+from leg_wear_monitor.monitor.config.parameters import (
+    Parameter,
+    changed,
+    parameters_of,
+    structured,
+    values_of,
+)
+from leg_wear_monitor.ros.parameters.node import ParameterNode, plain
+
+Config = TypeVar("Config")
+
+# what every node has, and rclpy itself looks after
+_OF_ROS = ("use_sim_time", "start_type_description_service", "qos_overrides.")
+
+
+class Parameters(Generic[Config]):
+    """Parameters of a node.
+
+    Unknown names that the node was given are refused; rclpy would ignore them.
+
+    Parameters
+    ----------
+    node : ParameterNode
+    kind : type
+        Class of sections, such as ``MonitorConfig``.
+    empty : mapping of str to str, optional
+        What parameters are set to whose text is not given or empty.
+
+    Attributes
+    ----------
+    config
+        An instance of ``kind``, as it stands now.
+
+    Raises
+    ------
+    ConfigError
+        Naming node, parameter, value, unit and what was expected.
+    """
+
+    def __init__(
+        self, node: ParameterNode, kind: type[Config], empty: Mapping[str, str] | None = None
+    ) -> None:
+        self._source = node.get_fully_qualified_name()
+        given = {name: value for name, value in node.given.items() if not name.startswith(_OF_ROS)}
+        given |= {name: text for name, text in (empty or {}).items() if not given.get(name)}
+        self.config: Config = structured(kind, given, self._source)
+        for name, value in values_of(self.config).items():
+            _declare(node, parameters_of(kind)[name], value)
+
+    def follow(
+        self,
+        node: ParameterNode,
+        changed_to: Callable[[Config], None],
+        check_fit: Callable[[Config], None] = lambda _: None,
+    ) -> None:
+        """Let parameters change while the node runs, and tell of each change that was accepted.
+
+        Parameters
+        ----------
+        node : ParameterNode
+        changed_to : callable
+        check_fit : callable, optional
+            Raises ConfigError for values that are good by themselves but do not fit the rest.
+        """
+
+        def check(parameters: list[RosParameter]) -> SetParametersResult:
+            try:
+                check_fit(self._with(parameters))
+            except ConfigError as error:
+                return SetParametersResult(successful=False, reason=str(error))
+            return SetParametersResult(successful=True)
+
+        def take(parameters: list[RosParameter]) -> None:
+            self.config = self._with(parameters)
+            changed_to(self.config)
+
+        node.add_on_set_parameters_callback(check)
+        node.add_post_set_parameters_callback(take)
+
+    def _with(self, parameters: list[RosParameter]) -> Config:
+        known = values_of(self.config)
+        changes = {one.name: plain(one) for one in parameters if one.name in known}
+        return changed(self.config, changes, self._source)
+
+
+def _declare(node: ParameterNode, parameter: Parameter, value: Any) -> None:
+    unit = f" [{parameter.unit}]" if parameter.unit else ""
+    descriptor = ParameterDescriptor(
+        description=f"{parameter.description}{unit}",
+        additional_constraints=parameter.bounds,
+        read_only=parameter.read_only,
+    )
+    if isinstance(value, tuple) and not value:
+        # rclpy takes an empty array for one of bytes; unset it would break every answer that it is in
+        kind = RosParameter.Type[parameter.type.upper()]
+        node.declare_parameter(parameter.name, kind, ParameterDescriptor(), ignore_override=True)
+        node.set_parameters_atomically([RosParameter(parameter.name, kind, [])])
+        descriptor.type = kind.value
+        node.set_descriptor(parameter.name, descriptor)
+        return
+    node.declare_parameter(
+        parameter.name, list(value) if isinstance(value, tuple) else value, descriptor, ignore_override=True
+    )

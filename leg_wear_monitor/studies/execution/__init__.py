@@ -1,0 +1,1 @@
+"""Points of a study computed in processes or on a Dask cluster."""

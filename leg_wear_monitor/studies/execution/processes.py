@@ -1,0 +1,129 @@
+"""Points on this machine's cores, in processes of one thread; one that dies costs what was at work then."""
+
+import os
+import signal
+import threading
+from collections.abc import Callable, Iterator, Sequence
+from concurrent.futures import as_completed
+from concurrent.futures.process import BrokenProcessPool
+from contextlib import contextmanager
+from multiprocessing import get_context, parent_process
+from typing import TYPE_CHECKING, Any, NamedTuple
+
+from leg_wear_monitor.errors import ConfigError, LegWearError
+from leg_wear_monitor.mechanism.spec import Mechanism
+from leg_wear_monitor.studies.point import Arrays
+from leg_wear_monitor.studies.tasks.compute import compute
+
+if TYPE_CHECKING:
+    from loky import ProcessPoolExecutor
+
+TRIES = 3  # of a point whose worker dies
+
+_THREADS = ("OMP_NUM_THREADS", "OPENBLAS_NUM_THREADS", "MKL_NUM_THREADS", "NUMBA_NUM_THREADS")
+
+
+class Job(NamedTuple):
+    """A point to compute: its key, the arguments of `studies.execution.tasks.compute`, and its cost."""
+
+    key: str
+    task: str
+    mechanism: Mechanism
+    settings: dict[str, Any]
+    code: str
+    cost: float
+
+
+Done = Callable[[Job, Arrays], None]
+
+
+def run_here(jobs: Sequence[Job], done: Done) -> None:
+    """Compute points one after the other in this process."""
+    for job in jobs:
+        done(job, _compute(job))
+
+
+def run_in_processes(jobs: Sequence[Job], workers: int, done: Done) -> None:
+    """Compute points in worker processes.
+
+    Parameters
+    ----------
+    jobs : sequence of Job
+    workers : int
+    done : callable
+        Called in this process with each job and its result, in the order in which they end.
+
+    Raises
+    ------
+    ConfigError
+        If loky is not installed.
+    LegWearError
+        When workers keep dying.
+    """
+    open_jobs = {job.key: job for job in sorted(jobs, key=lambda job: -job.cost)}
+    for _ in range(TRIES):
+        try:
+            with _pool(workers) as pool:
+                futures = {pool.submit(_compute, job): job for job in open_jobs.values()}
+                for future in as_completed(futures):
+                    done(futures[future], future.result())
+                    del open_jobs[futures[future].key]
+            return
+        except BrokenProcessPool:
+            continue
+    raise LegWearError(
+        f"worker processes died {TRIES} times; finished points are kept; "
+        f"is there enough memory for --workers {workers}?"
+    )
+
+
+def _compute(job: Job) -> Arrays:
+    return compute(job.task, job.mechanism, job.settings, job.code)
+
+
+@contextmanager
+def _pool(workers: int) -> Iterator["ProcessPoolExecutor"]:
+    """A pool of workers with one thread each, which does not outlive what it is used for.
+
+    It is loky's: in that of Python 3.11 a worker that dies while points are still being handed in ends
+    the thread that watches the workers, or raises OSError (both seen).
+    """
+    try:
+        from loky import ProcessPoolExecutor
+    except ImportError as error:
+        raise ConfigError("--workers", str(workers), "needs loky (pip install loky), expected 1") from error
+    with _environment(dict.fromkeys(_THREADS, "1")):
+        pool = ProcessPoolExecutor(workers, context=get_context("spawn"), initializer=_begin_worker)
+        try:
+            yield pool
+        except BaseException:
+            pool.shutdown(kill_workers=True)
+            raise
+        pool.shutdown()
+
+
+@contextmanager
+def _environment(changes: dict[str, str]) -> Iterator[None]:
+    before = {name: os.environ.get(name) for name in changes}
+    os.environ.update(changes)
+    try:
+        yield
+    finally:
+        for name, value in before.items():
+            if value is None:
+                os.environ.pop(name, None)
+            else:
+                os.environ[name] = value
+
+
+def _begin_worker() -> None:
+    """An interrupt is for the parent to answer; without a parent there is nothing to work for."""
+    signal.signal(signal.SIGINT, signal.SIG_IGN)
+    parent = parent_process()
+    if parent is not None:
+        threading.Thread(target=_end_with, args=(parent,), daemon=True).start()
+
+
+def _end_with(parent: Any) -> None:
+    parent.join()
+    os._exit(1)

@@ -1,0 +1,136 @@
+"""A study run: points that are not there yet are computed and kept, each as soon as it is there."""
+
+import warnings
+from collections.abc import Callable
+from importlib import metadata
+from pathlib import Path
+from typing import Any
+from xml.etree import ElementTree
+
+import attrs
+
+from leg_wear_monitor.errors import ConfigError, ConfigWarning
+from leg_wear_monitor.mechanism.loader import is_file_name, load_mechanism, shipped_mechanisms
+from leg_wear_monitor.share import share_directory
+from leg_wear_monitor.studies.execution.cluster import run_on_cluster
+from leg_wear_monitor.studies.execution.processes import Job, run_here, run_in_processes
+from leg_wear_monitor.studies.plan.plan import points_of
+from leg_wear_monitor.studies.plan.settings import Study
+from leg_wear_monitor.studies.point import Arrays, Point, code_digest
+from leg_wear_monitor.studies.storage.store import StudyDirectory
+from leg_wear_monitor.studies.tasks.ensemble import check_points
+
+_LIBRARIES = ("numpy", "numba")
+
+
+def run_study(
+    name: str,
+    settings: Study,
+    out: Path,
+    *,
+    workers: int = 1,
+    scheduler: str | None = None,
+    progress: Callable[[float], None] | None = None,
+) -> int:
+    """Compute all points of a study that its directory does not hold yet.
+
+    Parameters
+    ----------
+    name : str
+        A key of `leg_wear_monitor.studies.plan.settings.STUDIES`.
+    settings : Study
+    out : pathlib.Path
+        Its directory; points that are there for this mechanism, settings and code are kept, if their
+        checksums hold.
+    workers : int
+        Processes on this machine; 1 for this one alone. Results do not depend on it.
+    scheduler : str, optional
+        Address of a Dask scheduler whose workers do it instead.
+    progress : callable, optional
+        Called with the share of the work that is done.
+
+    Returns
+    -------
+    int
+        How many points were computed.
+
+    Raises
+    ------
+    ConfigError, AssemblyError
+        For values that cannot be, before anything is computed.
+
+    Warns
+    -----
+    ConfigWarning
+        For each point that is there but was altered, exchanged or damaged; it is computed again.
+    """
+    mechanism, points = load_mechanism(settings.mechanism), points_of(settings)
+    check_points(mechanism, [point.settings for point in points])
+    about = versions()
+    keys = [point.key(mechanism) for point in points]
+    directory = StudyDirectory(out)
+    directory.open(_manifest(name, settings, points, keys, about), _text(settings.mechanism))
+    jobs = {
+        key: Job(key, point.task, mechanism, point.settings, code_digest(), point.cost)
+        for key, point in zip(keys, points, strict=True)
+    }
+    missing = [job for job in jobs.values() if not _is_kept(directory, job)]
+    report, total = progress or (lambda _share: None), sum(job.cost for job in jobs.values())
+    spent = total - sum(job.cost for job in missing)
+
+    def done(job: Job, arrays: Arrays) -> None:
+        nonlocal spent
+        directory.write(job.key, arrays, {"task": job.task, "settings": job.settings, "versions": about})
+        spent += job.cost
+        report(spent / total)
+
+    report(spent / total)
+    if scheduler is not None:
+        run_on_cluster(missing, scheduler, done)
+    elif workers > 1 and len(missing) > 1:
+        run_in_processes(missing, min(workers, len(missing)), done)
+    else:
+        run_here(missing, done)
+    return len(missing)
+
+
+def _is_kept(directory: StudyDirectory, job: Job) -> bool:
+    """Whether the directory holds a point's result; warns of one that cannot be taken for it."""
+    if not directory.has(job.key):
+        return False
+    try:
+        directory.read(job.key, job.task, job.settings)
+    except ConfigError as error:
+        warnings.warn(f"{error}; it is computed again", ConfigWarning, stacklevel=2)
+        return False
+    return True
+
+
+def versions() -> dict[str, str]:
+    """What results come from: this package, its code, and the libraries that compute."""
+    package = ElementTree.parse(share_directory() / "package.xml").findtext("version") or "unknown"
+    libraries = {library: metadata.version(library) for library in _LIBRARIES}
+    return {"leg_wear_monitor": package, "code": code_digest(), **libraries}
+
+
+def _manifest(
+    name: str, settings: Study, points: list[Point], keys: list[str], about: dict[str, str]
+) -> dict[str, Any]:
+    return {
+        "study": name,
+        "settings": attrs.asdict(settings),
+        "points": [
+            {"label": point.label, "task": point.task, "settings": point.settings, "key": key}
+            for point, key in zip(points, keys, strict=True)
+        ],
+        "versions": about,
+    }
+
+
+def _text(mechanism: str) -> str:
+    """Text of a mechanism's file."""
+    path = Path(mechanism) if is_file_name(Path(mechanism)) else shipped_mechanisms()[mechanism]
+    try:
+        return path.read_text(encoding="utf-8")
+    except OSError as error:
+        raise ConfigError(mechanism, "", f"cannot be read: {error.strerror}") from error

@@ -1,0 +1,1 @@
+"""Settings of a study and the points to compute."""

@@ -1,0 +1,230 @@
+"""A study's directory: what was asked, and the result of every point, each file written whole or not at all.
+
+study.json       name, settings, points with their keys, versions; a checksum of these and of the leg
+mechanism.yaml   the leg, as its file was
+points/KEY.npz   arrays of a point; its settings, seed, versions and a checksum are in them as ``about``, JSON
+"""
+
+import json
+import os
+import re
+from pathlib import Path
+from typing import Any
+
+import attrs
+
+from leg_wear_monitor.errors import ConfigError
+from leg_wear_monitor.mechanism.loader import parse_mechanism, read_yaml
+from leg_wear_monitor.mechanism.spec import Mechanism
+from leg_wear_monitor.studies.plan.settings import STUDIES
+from leg_wear_monitor.studies.point import Arrays, Point
+from leg_wear_monitor.studies.storage.archive import archive, read_archive
+from leg_wear_monitor.studies.storage.checksum import canonical, text_checksum
+from leg_wear_monitor.studies.tasks.compute import TASKS
+
+MANIFEST, MECHANISM, POINTS = "study.json", "mechanism.yaml", "points"
+_FORMAT = 2
+_KEY = re.compile(r"[0-9a-f]{20}")
+_REMOVE = "remove it and run the study again, its points are kept"
+
+
+class StudyDirectory:
+    """Results of one study.
+
+    Parameters
+    ----------
+    path : pathlib.Path
+    """
+
+    def __init__(self, path: Path) -> None:
+        self.path = path
+
+    def open(self, manifest: dict[str, Any], mechanism_text: str) -> None:
+        """Make the directory, or take up one that holds the same study, whatever its settings were.
+
+        Raises
+        ------
+        ConfigError
+            If it holds another study, or cannot be written.
+        """
+        if (self.path / MANIFEST).exists():
+            there = read_manifest(self.path)["study"]
+            if there != manifest["study"]:
+                raise ConfigError(
+                    str(self.path),
+                    "",
+                    f"holds the study {there}, expected {manifest['study']} or a new directory",
+                )
+        try:
+            (self.path / POINTS).mkdir(parents=True, exist_ok=True)
+        except OSError as error:
+            raise ConfigError(str(self.path), "", f"cannot be made: {error.strerror}") from error
+        self._write(MECHANISM, mechanism_text.encode())
+        whole = {"format": _FORMAT, **manifest}
+        whole["checksum"] = text_checksum(canonical(whole), mechanism_text)
+        self._write(MANIFEST, (json.dumps(whole, indent=1, allow_nan=False) + "\n").encode())
+
+    def has(self, key: str) -> bool:
+        """Whether the result of a point is there, whole or not."""
+        return self._file(key).is_file()
+
+    def write(self, key: str, arrays: Arrays, about: dict[str, Any]) -> None:
+        """Keep the result of a point, with its task, settings and versions."""
+        self._write(f"{POINTS}/{key}.npz", archive(arrays, {"key": key, **about}))
+
+    def read(self, key: str, task: str, settings: dict[str, Any]) -> Arrays:
+        """Result of a point.
+
+        Raises
+        ------
+        ConfigError
+            If it is not there, damaged, altered, or of another point.
+        """
+        return read_archive(self._file(key), key, task, settings)
+
+    def _file(self, key: str) -> Path:
+        return self.path / POINTS / f"{key}.npz"
+
+    def _write(self, name: str, content: bytes) -> None:
+        """Beside it first, then in its place: whoever looks sees all of it or nothing."""
+        target = self.path / name
+        part = target.with_name(f".{target.name}.{os.getpid()}.part")
+        try:
+            with part.open("wb") as file:
+                file.write(content)
+                file.flush()
+                os.fsync(file.fileno())
+            os.replace(part, target)
+        except OSError as error:
+            raise ConfigError(str(target), "", f"cannot be written: {error.strerror}") from error
+        finally:
+            part.unlink(missing_ok=True)
+
+
+def read_manifest(path: Path) -> dict[str, Any]:
+    """What ``study.json`` in a directory says.
+
+    Raises
+    ------
+    ConfigError
+        If it is not one of ours, or if it or the mechanism beside it was altered.
+    """
+    source, text = path / MANIFEST, _text(path / MECHANISM)
+    try:
+        manifest = json.loads(_text(source))
+    except (ValueError, RecursionError) as error:
+        raise ConfigError(str(source), "", f"is not JSON: {error}") from error
+    if not isinstance(manifest, dict) or manifest.get("format") != _FORMAT:
+        raise ConfigError(str(source), "", f"is no study of format {_FORMAT}")
+    checksum = manifest.pop("checksum", None)
+    try:
+        is_whole = checksum == text_checksum(canonical(manifest), text)
+    except (ValueError, RecursionError):  # a number or a text that JSON has not
+        is_whole = False
+    if not is_whole:
+        altered = f"it or {MECHANISM} beside it was altered (the checksum does not hold); {_REMOVE}"
+        raise ConfigError(str(source), "", altered)
+    if not _is_study(manifest):
+        raise ConfigError(str(source), "", f"holds no study of this version; {_REMOVE}")
+    return manifest
+
+
+def _text(path: Path) -> str:
+    try:
+        return path.read_text(encoding="utf-8")
+    except OSError as error:
+        raise ConfigError(str(path), "", f"cannot be read: {error.strerror}") from error
+    except ValueError as error:
+        raise ConfigError(str(path), "", f"is not UTF-8: {error}") from error
+
+
+def _is_study(manifest: dict[str, Any]) -> bool:
+    """Whether all parts are there, each of its type; a key is a file's name, so it must be nothing else."""
+    types = {"study": str, "settings": dict, "points": list, "versions": dict}
+    return (
+        all(isinstance(manifest.get(name), kind) for name, kind in types.items())
+        and manifest["study"] in STUDIES
+        and all(isinstance(version, str) for version in manifest["versions"].values())
+        and all(isinstance(entry, dict) and _is_point(entry) for entry in manifest["points"])
+    )
+
+
+def _is_point(entry: dict[str, Any]) -> bool:
+    types = {"label": str, "task": str, "settings": dict, "key": str}
+    return (
+        all(isinstance(entry.get(name), kind) for name, kind in types.items())
+        and entry["task"] in TASKS
+        and _KEY.fullmatch(entry["key"]) is not None
+    )
+
+
+@attrs.frozen(kw_only=True, eq=False)
+class StudyResults:
+    """A study as it lies in its directory, for figures and tables.
+
+    Attributes
+    ----------
+    study : str
+    settings : dict
+        As `leg_wear_monitor.studies.plan.settings` has them, plain.
+    mechanism : Mechanism
+    points : tuple of Point
+    arrays : tuple of dict
+        The result of each point that has one, the others are empty.
+    versions : dict of str
+    """
+
+    study: str
+    settings: dict[str, Any]
+    mechanism: Mechanism
+    points: tuple[Point, ...]
+    arrays: tuple[Arrays, ...]
+    versions: dict[str, str]
+
+    def of(self, task: str) -> list[tuple[Point, Arrays]]:
+        """Points of a task that have a result, with it."""
+        pairs = zip(self.points, self.arrays, strict=True)
+        return [
+            (point, arrays)
+            for point, arrays in pairs
+            if point.task == task and arrays and "fault" not in arrays
+        ]
+
+    @property
+    def faults(self) -> list[tuple[str, str]]:
+        """Label and fault of the points whose motion diverged."""
+        pairs = zip(self.points, self.arrays, strict=True)
+        return [(point.label, str(arrays["fault"])) for point, arrays in pairs if "fault" in arrays]
+
+    @property
+    def missing(self) -> list[str]:
+        """Labels of the points that have no result yet."""
+        return [point.label for point, arrays in zip(self.points, self.arrays, strict=True) if not arrays]
+
+
+def load_results(path: Path) -> StudyResults:
+    """Read a study's directory.
+
+    Raises
+    ------
+    ConfigError
+        If it is not one, or a part of it was altered, exchanged or damaged.
+    """
+    manifest, directory = read_manifest(path), StudyDirectory(path)
+    source = str(path / MECHANISM)
+    entries = manifest["points"]
+    return StudyResults(
+        study=manifest["study"],
+        settings=manifest["settings"],
+        mechanism=parse_mechanism(read_yaml(path / MECHANISM, source), source),
+        points=tuple(
+            Point(label=entry["label"], task=entry["task"], settings=entry["settings"]) for entry in entries
+        ),
+        arrays=tuple(
+            directory.read(entry["key"], entry["task"], entry["settings"])
+            if directory.has(entry["key"])
+            else {}
+            for entry in entries
+        ),
+        versions=manifest["versions"],
+    )

@@ -1,0 +1,52 @@
+"""What can be computed for a point, by name."""
+
+from collections.abc import Callable
+from importlib import import_module
+from typing import Any
+
+import numpy as np
+
+from leg_wear_monitor.errors import SimulationError
+from leg_wear_monitor.mechanism.spec import Mechanism
+from leg_wear_monitor.studies.point import Arrays, code_digest
+
+Task = Callable[[Mechanism, dict[str, Any]], Arrays]
+
+TASKS = {
+    "response": "response.respond",
+    "life": "life.live",
+    "section": "section.intersect",
+    "exponent": "exponent.expand",
+}
+
+
+def compute(task: str, mechanism: Mechanism, settings: dict[str, Any], code: str) -> Arrays:
+    """Result of a point; what workers run.
+
+    Parameters
+    ----------
+    task : str
+        A key of `TASKS`.
+    mechanism : Mechanism
+    settings : dict
+    code : str
+        The caller's `code_digest`.
+
+    Returns
+    -------
+    dict of arrays
+        ``fault`` alone, a text, where the motion diverges: that is a result, too.
+
+    Raises
+    ------
+    RuntimeError
+        If this process has other code than the caller.
+    """
+    if code_digest() != code:
+        raise RuntimeError("a worker has another version of leg_wear_monitor than the study that asks it")
+    module, name = TASKS[task].split(".")
+    run: Task = getattr(import_module(f"leg_wear_monitor.studies.tasks.{module}"), name)
+    try:
+        return run(mechanism, settings)
+    except SimulationError as error:
+        return {"fault": np.array(str(error))}

@@ -1,0 +1,86 @@
+"""The largest Lyapunov exponent of a leg.
+
+The motion is smooth between impacts and jumps nowhere in the journals' places, but their rates change within
+the time of an impact: a neighbour that touches a moment later is for that moment far off in its rate. So a
+neighbour is brought back only while both legs have the same joints in contact. Its state are places,
+rates, and the approach speed that a contact remembers; the crank's motion is given and the same for both.
+"""
+
+from typing import Any
+
+import numpy as np
+
+from leg_wear_monitor.dynamics.clearance.run import ClearanceStepper, Snapshot
+from leg_wear_monitor.dynamics.run.run_statistics import new_tally
+from leg_wear_monitor.mechanism.arrays import Floats
+from leg_wear_monitor.mechanism.ideal import TURN
+from leg_wear_monitor.mechanism.spec import Mechanism
+from leg_wear_monitor.studies.point import Arrays
+from leg_wear_monitor.studies.tasks.contact_watch import WatchedLeg
+from leg_wear_monitor.studies.tasks.ensemble import ensemble, watch
+from leg_wear_monitor.studies.tasks.grid import SAMPLES
+from leg_wear_monitor.studies.tasks.lyapunov import Flags, stretches
+
+
+def expand(mechanism: Mechanism, settings: dict[str, Any]) -> Arrays:
+    """Growth of small distances between neighbouring motions.
+
+    Returns
+    -------
+    dict of arrays
+        ``stretch_per_cycle`` (r, c): the logarithm of the growth of a distance in each cycle of each run;
+        ``period_s`` () of a cycle.
+    """
+    legs = watch(ensemble(mechanism, settings), settings["tolerance_m"])
+    logs = np.array([_follow(leg, settings) for leg in legs])
+    runs, cycles = settings["runs"], settings["cycles"]
+    return {
+        "loose": np.array(legs[0].setup.loose),
+        "stretch_per_cycle": logs.reshape(runs, cycles, settings["renewals"]).sum(axis=2),
+        "period_s": np.array(TURN / abs(legs[0].setup.speed)),
+    }
+
+
+def _follow(leg: WatchedLeg, settings: dict[str, Any]) -> Floats:
+    """Stretches of one run."""
+    stepper, tally = leg.stepper, new_tally(len(leg.setup.linkage.mechanism.joints))
+    leg.advance(settings["skip_cycles"] * SAMPLES, tally)
+    steps, depth = SAMPLES // settings["renewals"], stepper.state.depth.copy()
+
+    def advance(motion: Floats) -> Floats:
+        stepper.restore(Snapshot(motion, depth))
+        leg.advance(steps, tally)
+        return stepper.state.motion.copy()
+
+    scale, approach = _scale(leg), _marks(stepper, "approach")
+
+    def same_contacts(one: Floats, other: Floats) -> bool:
+        return bool(np.array_equal(one[approach] > 0.0, other[approach] > 0.0))
+
+    direction = np.random.default_rng([settings["seed"], 2]).normal(size=len(scale))
+    direction[approach] = 0.0
+    return stretches(
+        advance, stepper.state.motion.copy(), direction, scale,
+        settings["distance"], settings["cycles"] * settings["renewals"], same_contacts,
+    )  # fmt: skip
+
+
+def _marks(stepper: ClearanceStepper, name: str) -> Flags:
+    """Where a part of the state is in the flat vector of all of it."""
+    kept, part = stepper.state.motion.copy(), getattr(stepper.state, name)
+    values = part.copy()
+    part[:] = np.nan
+    marks: Flags = np.isnan(stepper.state.motion) & ~np.isnan(kept)
+    part[:] = values
+    return marks
+
+
+def _scale(leg: WatchedLeg) -> Floats:
+    """Unit of each number of the state: the clearance, and the clearance a radian of the crank for rates."""
+    clearance = float(leg.setup.contacts.clearance.min())
+    rate = clearance * abs(leg.setup.speed)
+    units = {"e": clearance, "v": rate, "approach": rate}
+    scale = np.zeros(len(leg.stepper.state.motion))
+    for name, unit in units.items():
+        scale[_marks(leg.stepper, name)] = unit
+    return scale

@@ -1,0 +1,60 @@
+"""Poincaré sections: the leg at one crank angle of every cycle; and phase portraits of a few cycles."""
+
+from typing import Any
+
+import attrs
+import numpy as np
+
+from leg_wear_monitor.dynamics.run.run_statistics import new_tally
+from leg_wear_monitor.mechanism.arrays import Floats
+from leg_wear_monitor.mechanism.ideal import TURN
+from leg_wear_monitor.mechanism.spec import Mechanism
+from leg_wear_monitor.studies.point import Arrays
+from leg_wear_monitor.studies.tasks.ensemble import ensemble, watch
+from leg_wear_monitor.studies.tasks.grid import SAMPLES
+
+
+def intersect(mechanism: Mechanism, settings: dict[str, Any]) -> Arrays:
+    """Eccentricities and their rates whenever the crank passes an angle.
+
+    Returns
+    -------
+    dict of arrays
+        Over cycles c, loose joints k and samples s of ``portrait_cycles``: ``section_eccentricity_m`` and
+        ``section_rate_mps`` (c, k, 2), ``portrait_eccentricity_m`` and ``portrait_rate_mps`` (s, k, 2).
+    """
+    start = round(settings["crank_angle_deg"] / 360.0 * SAMPLES) % SAMPLES * (TURN / SAMPLES)
+    first = ensemble(mechanism, settings)[0]
+    (leg,) = watch([attrs.evolve(first, crank_angle_rad=start)])
+    tally = new_tally(len(mechanism.joints))
+    leg.advance(settings["skip_cycles"] * SAMPLES, tally)
+    portrait = [moment for _ in range(settings["portrait_cycles"]) for moment in leg.moments(tally)]
+    section = []
+    for _ in range(settings["cycles"]):
+        leg.advance(SAMPLES, tally)
+        section.append(leg.look())
+    shape = (-1, len(leg.setup.loose), 2)
+    return {
+        "loose": np.array(leg.setup.loose),
+        "section_eccentricity_m": np.array([moment.e for moment in section]),
+        "section_rate_mps": np.array([moment.rate for moment in section]),
+        "portrait_eccentricity_m": np.array([moment.e for moment in portrait]).reshape(shape),
+        "portrait_rate_mps": np.array([moment.rate for moment in portrait]).reshape(shape),
+    }
+
+
+def period_of(points: Floats, longest: int, tolerance: float) -> int | None:
+    """After how many points a section repeats itself; None if it does not.
+
+    Parameters
+    ----------
+    points : (n, m) array
+    longest : int
+        Period up to which is looked.
+    tolerance : float
+        How far apart points that repeat may be.
+    """
+    for period in range(1, min(longest, len(points) - 1) + 1):
+        if np.abs(points[period:] - points[:-period]).max() <= tolerance:
+            return period
+    return None

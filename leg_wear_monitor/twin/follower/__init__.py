@@ -1,0 +1,1 @@
+"""The leg model in step with the crank, and its comparison with the measured torque."""

@@ -1,0 +1,259 @@
+"""The leg that follows the tracker's steps, and what is to be done where its kernel stops."""
+
+from typing import NamedTuple
+
+import numpy as np
+
+from leg_wear_monitor.dynamics.clearance.contact import F_T
+from leg_wear_monitor.dynamics.clearance.run import INTERVALS, ClearanceStepper
+from leg_wear_monitor.dynamics.clearance.run import Snapshot as StepperSnapshot
+from leg_wear_monitor.dynamics.joint.contact_event import F_N
+from leg_wear_monitor.dynamics.run.drive import steady_drive
+from leg_wear_monitor.dynamics.run.protocol import DONE, INVALID_DRIVE, PUSHED_THROUGH, STEP_TOO_SMALL, Setup
+from leg_wear_monitor.dynamics.run.run_statistics import TORQUE, new_tally
+from leg_wear_monitor.mechanism.arrays import Floats
+from leg_wear_monitor.mechanism.ideal import TURN
+from leg_wear_monitor.twin import steps as told
+from leg_wear_monitor.twin.follower.cycle import clear_tally, clearances, cycle_figures, torque_figures
+from leg_wear_monitor.twin.follower.following import CYCLE, LEFT, NEEDS_START, TOLD, follow
+from leg_wear_monitor.twin.follower.load import FootLoad, torque_size
+from leg_wear_monitor.twin.follower.repeating import RepeatingResidual
+from leg_wear_monitor.twin.follower.state import (
+    AFRESH,
+    ANCHORED,
+    BASE,
+    CUT,
+    CYCLE_BEGIN,
+    CYCLE_BRIDGED,
+    CYCLES,
+    FAILED_AT,
+    FAILED_NS,
+    FILTERING,
+    LOOKS,
+    MEAN_TORQUE,
+    NUMBER,
+    PIECE_BEGIN,
+    PIECE_END,
+    RUNNING,
+    TURNS_BEFORE,
+    WHOLE,
+    LegState,
+    clear_sums,
+    leg_state,
+    room_for_looks,
+)
+from leg_wear_monitor.twin.follower.torque_estimate import Finding, LoadEstimate, find
+from leg_wear_monitor.twin.settings import INSTANT, STANCE, TwinSettings
+from leg_wear_monitor.twin.statistics import CycleFigures, Event, Happening, SampleFigures
+from leg_wear_monitor.twin.steps import BEGIN, CODE, EXTRA, MOVE, TURNS, Steps
+
+_RUN_IN_S = 0.2
+_LEAST_TORQUE_NM = 1.0e-6  # of a leg that needs none
+
+_HAPPENINGS = {
+    told.LOST_IN_GAP: Happening.LOST_IN_GAP,
+    told.LOST_BY_OUTLIERS: Happening.LOST_BY_OUTLIERS,
+    told.LOST_BY_OVERFLOW: Happening.LOST_BY_OVERFLOW,
+    told.LOST_BY_JUMP: Happening.BACKWARD_JUMP,
+    told.STOPPED: Happening.STOPPED,
+    told.MOVING: Happening.MOVING,
+    told.REVERSED: Happening.REVERSED,
+}
+_FAILURES = {
+    STEP_TOO_SMALL: Happening.STEP_TOO_SMALL,
+    PUSHED_THROUGH: Happening.PUSHED_THROUGH,
+    INVALID_DRIVE: Happening.INVALID_DRIVE,
+}
+
+
+class FollowerSnapshot(NamedTuple):
+    """All of a follower; plain arrays."""
+
+    stepper: StepperSnapshot
+    leg: tuple[np.ndarray, ...]
+    tally: tuple[np.ndarray, ...]
+    before: Floats
+    estimate: Floats
+    repeating: tuple[Floats, ...]
+
+
+class LegFollower:
+    """A leg with clearances that goes where the tracker's steps say.
+
+    Parameters
+    ----------
+    setup : Setup
+        Its surfaces are worn on the way.
+    settings : TwinSettings
+
+    Attributes
+    ----------
+    state : LegState
+    tally : Tally
+        Of the present gait cycle.
+    estimate : LoadEstimate
+    torque_size_nm : float
+        RMS of the ideal drive torque at the commanded speed.
+    """
+
+    def __init__(self, setup: Setup, settings: TwinSettings) -> None:
+        self._setup, self._acts = setup, settings.estimate_load
+        self._load = FootLoad(setup.linkage, setup.contacts, settings.load_shape)
+        # a whole number of nanoseconds, so that stamps and the stepper's time cannot drift apart
+        interval = round(1.0e9 * TURN / abs(setup.speed) / INTERVALS) * 1.0e-9
+        self._stepper = ClearanceStepper(setup, interval, tables=self._load.tables)
+        self.state: LegState = leg_state(len(setup.loose))
+        self.tally = new_tally(len(setup.linkage.mechanism.joints))
+        # the ground only pushes
+        self.estimate = LoadEstimate(
+            settings.load_limit_n, 0.0 if settings.load_shape == STANCE else -settings.load_limit_n
+        )
+        self._cutoff = TURN * settings.torque_bandwidth_hz
+        self._instants = settings.torque_sampling == INSTANT
+        self._repeating = RepeatingResidual()
+        self.torque_size_nm = max(torque_size(setup.linkage, setup.speed), _LEAST_TORQUE_NM)
+        self._sensor = np.array([self._cutoff, self.torque_size_nm, float(self._instants)])
+        self._before = self.clearances
+
+    @property
+    def clearances(self) -> Floats:
+        """Mean and largest radial clearance (2, loose) [m]."""
+        return clearances(self._setup.contacts, self._setup.surfaces.depth)
+
+    def take_surfaces(self, depth: Floats) -> None:
+        """Take over wear depths (loose, 2, N) [m]; growth counts from there for the joints that change."""
+        own, state = self._setup.surfaces.depth, self._stepper.state
+        changed = (own != depth).any(axis=(1, 2))
+        own[:] = depth
+        state.pending[changed] = 0.0
+        self._before[:, changed] = self.clearances[:, changed]
+
+    def follow(self, steps: Steps, n: int, cycles: list[CycleFigures], events: list[Event]) -> SampleFigures:
+        """Follow n steps; adds gait cycles that end and what happens, returns the samples passed."""
+        mark, i = self.state.mark, 0
+        seen = room_for_looks(n, len(self._setup.loose))
+        mark[LOOKS] = 0
+        while i < n:
+            reason, i, k = follow(
+                self._stepper.model, self._setup.surfaces.feeds_back, self._stepper.state, self.tally,
+                self._stepper.work, self._sensor, self._load.signature, self.state, steps, i, n, seen,
+            )  # fmt: skip
+            if reason == CYCLE:
+                self._end_cycle(k, cycles)
+            elif reason == NEEDS_START:
+                events.append(self._start(steps, i))
+                i += int(steps.what[i, CODE] != MOVE)
+            elif reason in (LEFT, TOLD):
+                if reason == LEFT:
+                    mark[RUNNING], mark[AFRESH] = 0, 0
+                events.append(Event(int(steps.what[i, BEGIN]), _HAPPENINGS[int(steps.what[i, EXTRA])]))
+                i += 1
+            elif reason != DONE:
+                joint = self._setup.loose[k] if k >= 0 else None
+                events.append(Event(int(mark[FAILED_AT]), _FAILURES[reason], joint))
+        m = int(mark[LOOKS])
+        stamp, kind, (angle, torque) = seen.stamp[:m, 0], seen.stamp[:m, 1], seen.figure[:m].T
+        return SampleFigures(stamp, kind, angle, torque, seen.force[:m])
+
+    def _start(self, steps: Steps, i: int) -> Event:
+        """Set the leg in motion where step i begins, wear as it was."""
+        mark, stamp = self.state.mark, int(steps.what[i, BEGIN])
+        angle, speed = steps.motion[i, :2]
+        self.state.value[:] = 0.0
+        mark[BASE] = stamp - self._run_in(float(angle), float(speed))
+        if mark[AFRESH]:
+            mark[FAILED_NS] += stamp - mark[FAILED_AT]
+        mark[PIECE_BEGIN] = mark[PIECE_END] = stamp
+        for where in (AFRESH, ANCHORED, CUT, FILTERING, CYCLE_BEGIN, CYCLE_BRIDGED):
+            mark[where] = 0
+        mark[RUNNING], mark[TURNS_BEFORE] = 1, steps.what[i, TURNS]
+        self.state.polynomial[:] = 0.0, angle, speed, 0.0, 0.0, 0.0, 0.0
+        clear_sums(self.state)
+        clear_tally(self.tally)
+        return Event(stamp, Happening.ACQUIRED)
+
+    def _run_in(self, angle: float, speed: float) -> int:
+        """Bring the leg to a crank angle [rad] at a speed [rad/s] from a little before, without wear.
+
+        Journals start centred, and their first impacts can be several times those of a gait: they must be
+        over when somebody looks.
+
+        Returns
+        -------
+        int
+            How long that took [ns].
+        """
+        stepper, depth = self._stepper, self._setup.surfaces.depth
+        intervals = round(_RUN_IN_S / stepper.model.interval)
+        worn, time = depth.copy(), intervals * stepper.model.interval
+        polynomial = steady_drive(angle - speed * time, speed)
+        stepper.init(polynomial[1], speed)
+        reached = stepper.advance(polynomial, 0.9 * time, self.tally)[0]
+        clear_tally(self.tally)
+        if reached == DONE:
+            reached = stepper.advance(polynomial, time, self.tally)[0]
+        depth[:] = worn
+        stepper.state.pending[:] = 0.0
+        if reached != DONE:  # so it goes on from centred journals, and says itself why it cannot
+            stepper.init(angle, speed)
+            self.state.force[:] = 0.0
+            return 0
+        sample = stepper.work.start
+        self.state.force[:] = np.hypot(sample[:, F_N], sample[:, F_T])
+        self.state.value[MEAN_TORQUE] = self.tally.drive_integral[TORQUE] / self.tally.time[0]
+        return round(1.0e9 * time)
+
+    def _end_cycle(self, stamp: int, cycles: list[CycleFigures]) -> None:
+        """Report the gait cycle that ends at a stamp, if it is a whole one; begin the next."""
+        mark, depth = self.state.mark, self._setup.surfaces.depth
+        if mark[WHOLE]:
+            mark[CYCLES] += 1
+            # two like stages of a low-pass leave noise of so many independent samples
+            independent = max(0.25 * self._cutoff * self.tally.time[0], 1.0)
+            sums = self.state.sums
+            correlated = sums[NUMBER] / independent
+            found = find(sums, self.state.gram, self.state.along, correlated, self.estimate.room)
+            if found is not None:
+                self.estimate.take(found, self._acts)
+                self._load.set(self.estimate.acting)
+            torque = torque_figures(sums, found, self.estimate, self._unexplained_nm(found))
+            cycles.append(
+                cycle_figures(
+                    self.state, stamp, self._setup.contacts, depth, self._before, self.tally, torque
+                )
+            )
+        mark[CYCLE_BEGIN], mark[CYCLE_BRIDGED] = stamp, 0
+        clear_sums(self.state)
+        clear_tally(self.tally)
+        self._before = self.clearances
+
+    def _unexplained_nm(self, found: Finding | None) -> float:
+        """RMS of what is left of the residual [N m], of this cycle or over cycles; NaN if not known."""
+        if not self._instants:
+            return found.left if found else np.nan
+        if found is None:
+            return np.nan
+        self._repeating.take(self.state.by_phase)
+        return self._repeating.rms_nm
+
+    def snapshot(self) -> FollowerSnapshot:
+        """A copy of the whole state, surfaces included."""
+        return FollowerSnapshot(
+            self._stepper.snapshot(),
+            tuple(part.copy() for part in self.state),
+            tuple(part.copy() for part in self.tally),
+            self._before.copy(),
+            self.estimate.state.copy(),
+            self._repeating.cycles,
+        )
+
+    def restore(self, snapshot: FollowerSnapshot) -> None:
+        """Go back to a snapshot of a follower of the same setup and settings."""
+        self._stepper.restore(snapshot.stepper)
+        for own, saved in ((self.state, snapshot.leg), (self.tally, snapshot.tally)):
+            for part, values in zip(own, saved, strict=True):
+                part[...] = values
+        self._before = snapshot.before.copy()
+        self.estimate.state[:] = snapshot.estimate
+        self._repeating.cycles = snapshot.repeating
+        self._load.set(self.estimate.acting)

@@ -1,0 +1,108 @@
+"""A load at the foot that may change with every cycle: what it asks of the drive, its place in the tables.
+
+All tables are linear in a load, so a load is a sum of two tables over the few columns that it changes.
+"""
+
+from collections.abc import Iterable
+from typing import Any
+
+import attrs
+import numpy as np
+from numpy.typing import NDArray
+
+from leg_wear_monitor.contact.arrays import ContactArrays
+from leg_wear_monitor.dynamics.clearance.tables import POINTS, ClearanceTables, build_tables
+from leg_wear_monitor.mechanism.arrays import Floats
+from leg_wear_monitor.mechanism.ideal import one_cycle, point_motion
+from leg_wear_monitor.mechanism.position import Linkage, build_linkage
+from leg_wear_monitor.mechanism.spec import Mechanism, PhaseLoad
+from leg_wear_monitor.twin.settings import STANCE
+
+_TRIAL_N = 100.0
+_PHASES = 128  # of a load's table, a divisor of the points of the leg's tables
+
+
+class FootLoad:
+    """The leg's tables under a vertical load at the toe.
+
+    Parameters
+    ----------
+    linkage : Linkage
+    contacts : ContactArrays
+    shape : str
+        How the load goes over the gait cycle, one of `settings.LOAD_SHAPES`.
+
+    Attributes
+    ----------
+    tables : ClearanceTables
+        Those of the present load; changed in place.
+    signature : (N + 1,) array
+        Drive torque by a unit load up [N m/N], zeros for a mechanism without a toe.
+    """
+
+    def __init__(self, linkage: Linkage, contacts: ContactArrays, shape: str = STANCE) -> None:
+        self.tables = build_tables(linkage, contacts)
+        self.signature = np.zeros(POINTS + 1)
+        self._load = 0.0
+        self._parts: list[tuple[NDArray[Any], ...]] = []
+        mechanism = linkage.mechanism
+        if mechanism.toe is not None:
+            up = _up(mechanism)
+            position, velocity, _ = point_motion(one_cycle(linkage, POINTS, 1.0), linkage, *mechanism.toe)
+            share = _share(position @ up, shape)
+            phases = np.arange(POINTS + 1) / POINTS * _PHASES
+            along = np.interp(phases, np.arange(_PHASES + 1), np.append(share, share[0]))
+            self.signature[:-1] = -along[:-1] * (velocity @ up)
+            self.signature[-1] = self.signature[0]
+            loaded = build_linkage(_loaded(mechanism, _TRIAL_N * share[:, None] * up))
+            self._find_parts(build_tables(loaded, contacts))
+
+    def _find_parts(self, loaded: ClearanceTables) -> None:
+        """The columns that a load changes, their values without it, and by how much a newton changes them."""
+        pairs: Iterable[tuple[NDArray[Any], NDArray[Any]]] = zip(self.tables, loaded, strict=True)
+        for table, other in pairs:
+            flat = table.reshape(len(table), -1)  # a view
+            slope = (other.reshape(flat.shape) - flat) / _TRIAL_N
+            columns = np.flatnonzero(slope.any(axis=0))
+            if columns.size:
+                self._parts.append((flat, columns, flat[:, columns], slope[:, columns]))
+
+    def set(self, load: float) -> None:
+        """Put a load [N], up positive, into the tables."""
+        if load == self._load:
+            return
+        self._load = load
+        for flat, columns, bare, slope in self._parts:
+            flat[:, columns] = bare + load * slope
+
+
+def torque_size(linkage: Linkage, speed: float) -> float:
+    """RMS of the ideal linkage's drive torque [N m] over a turn at a speed [rad/s]."""
+    return float(np.sqrt(np.mean(one_cycle(linkage, POINTS, speed).drive_torque ** 2)))
+
+
+def _up(mechanism: Mechanism) -> Floats:
+    """Unit vector against gravity; y where there is none."""
+    gravity = np.array(mechanism.gravity)
+    size = float(np.hypot(*gravity))
+    return -gravity / size if size > 0.0 else np.array([0.0, 1.0])
+
+
+def _share(height: Floats, shape: str) -> Floats:
+    """Share of the full load at `_PHASES` equal steps of the crank, by the toe's height (POINTS,) [m]."""
+    if shape != STANCE:
+        return np.ones(_PHASES)
+    depth = np.maximum(0.0, height.mean() - height)[:: POINTS // _PHASES]
+    return np.asarray(depth / (depth.max() or 1.0))
+
+
+def _loaded(mechanism: Mechanism, force: Floats) -> Mechanism:
+    """The mechanism with a further force (_PHASES, 2) [N] at its toe."""
+    if mechanism.toe is None:
+        return mechanism
+    body, point = mechanism.toe
+    phases = tuple((np.arange(len(force)) / len(force)).tolist())
+    load = PhaseLoad(
+        body=body, point=point, phase=phases, force=tuple((float(x), float(y)) for x, y in force)
+    )
+    return attrs.evolve(mechanism, loads={**mechanism.loads, "the twin's foot load": load})

@@ -1,0 +1,1 @@
+"""The reference cycle of a leg, computed before the first sample."""

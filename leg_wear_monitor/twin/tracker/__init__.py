@@ -1,0 +1,1 @@
+"""From samples to the motion of the crank: order, faults, filter, spline."""

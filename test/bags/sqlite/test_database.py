@@ -1,0 +1,119 @@
+"""A .db3 file with all that was committed to it, whatever it is called and however it was left."""
+
+import shutil
+import sqlite3
+from collections.abc import Callable
+from contextlib import closing
+from pathlib import Path
+from typing import Any
+
+import pytest
+
+from leg_wear_monitor.bags.findings import RecordingError, Weight
+
+
+@pytest.fixture(scope="module")
+def sent(traffic: Callable[..., Any]) -> Any:
+    return traffic(0.5)
+
+
+@pytest.fixture
+def path(tmp_path: Path, sent: Any, write_database: Any) -> Path:
+    """A closed database."""
+    return Path(shutil.copy(write_database(tmp_path / "bag", sent), tmp_path / "x.db3"))
+
+
+def losses(recording: Any) -> list[str]:
+    return [finding.text for finding in recording.findings if finding.weight is Weight.LOSS]
+
+
+@pytest.mark.parametrize("name", ["a.db3", "a%41.db3", "a?mode=rwc.db3", "a#b.db3", "a b&c.db3"])
+def test_rows_that_wait_in_a_wal_are_read(
+    tmp_path: Path, path: Path, sent: Any, expected: Any, read: Any, name: str
+) -> None:
+    """As a recorder leaves them that was killed; what lies there is not touched."""
+    home = tmp_path / "left"
+    home.mkdir()
+    with closing(sqlite3.connect(path, isolation_level=None)) as database:
+        rows = database.execute("SELECT * FROM messages WHERE id > 20").fetchall()
+        database.execute("DELETE FROM messages WHERE id > 20")
+        database.execute("PRAGMA journal_mode = wal")
+        database.executemany("INSERT INTO messages VALUES (?, ?, ?, ?)", rows)
+        for end in ("", "-wal"):
+            shutil.copy(f"{path}{end}", home / f"{name}{end}")
+    before = {file.name: file.read_bytes() for file in home.iterdir()}
+    samples, recording = read(home / name)
+    assert samples.tobytes() == expected(sent).tobytes()
+    assert not losses(recording)
+    assert any(f"{name}-wal" in finding.text for finding in recording.findings)
+    assert {file.name: file.read_bytes() for file in home.iterdir()} == before
+
+
+def test_what_was_not_committed_is_rolled_back(
+    tmp_path: Path, path: Path, sent: Any, expected: Any, read: Any
+) -> None:
+    with closing(sqlite3.connect(path, isolation_level=None)) as database:
+        database.execute("PRAGMA cache_size = 1")
+        database.execute("BEGIN")
+        database.execute("UPDATE messages SET data = zeroblob(length(data))")
+        left = tmp_path / "left.db3"
+        for end in ("", "-journal"):
+            shutil.copy(f"{path}{end}", f"{left}{end}")
+    assert left.read_bytes() != path.read_bytes()
+    samples, recording = read(left)
+    assert samples.tobytes() == expected(sent).tobytes()
+    assert not losses(recording)
+
+
+@pytest.mark.parametrize("name", ["a%41.db3", "a?mode=rwc.db3", "a#b.db3"])
+def test_a_name_is_a_name(path: Path, sent: Any, expected: Any, read: Any, name: str) -> None:
+    samples, _ = read(path.rename(path.with_name(name)))
+    assert samples.tobytes() == expected(sent).tobytes()
+    assert sorted(file.name for file in path.parent.iterdir()) == sorted([name, "bag"])
+
+
+def test_messages_of_no_topic_are_told(path: Path, read: Any) -> None:
+    with closing(sqlite3.connect(path)) as database, database:
+        database.execute("UPDATE messages SET topic_id = 77 WHERE id % 2 = 0")
+        (count,) = database.execute("SELECT COUNT(*) FROM messages WHERE topic_id = 77").fetchone()
+    _, recording = read(path)
+    assert losses(recording) == [f"holds {count} messages of topics that it does not list: they are lost"]
+
+
+@pytest.mark.parametrize(
+    "statements",
+    [
+        "ALTER TABLE messages RENAME TO hidden; CREATE VIEW messages AS WITH RECURSIVE n(i) AS "
+        "(SELECT 1 UNION ALL SELECT i + 1 FROM n) SELECT i AS id, 1 AS topic_id, "
+        "i AS timestamp, x'00' AS data FROM n",
+        "ALTER TABLE messages RENAME COLUMN data TO stuff",
+        "DROP TABLE topics",
+    ],
+    ids=["a view without end", "a column less", "a table less"],
+)
+def test_another_schema_is_refused_and_not_carried_out(path: Path, read: Any, statements: str) -> None:
+    with closing(sqlite3.connect(path)) as database, database:
+        database.executescript(statements)
+    with pytest.raises(RecordingError, match=r"x\.db3: is no readable \.db3 file: it(s| has)"):
+        read(path)
+
+
+def test_without_an_index_of_time_the_order_is_the_same(
+    path: Path, sent: Any, expected: Any, read: Any
+) -> None:
+    with closing(sqlite3.connect(path)) as database, database:
+        query = "SELECT name FROM sqlite_master WHERE sql LIKE 'CREATE INDEX%'"
+        for (name,) in database.execute(query).fetchall():
+            database.execute(f"DROP INDEX {name}")
+    samples, _ = read(path)
+    assert samples.tobytes() == expected(sent).tobytes()
+
+
+def test_a_complaint_that_is_no_text_is_one(path: Path, read: Any) -> None:
+    """SQLite repeats what it cannot understand, byte by byte."""
+    content = path.read_bytes()
+    assert b"CREATE TABLE messages(" in content
+    path.write_bytes(content.replace(b"CREATE TABLE messages(", b"CR\x89ATE TABLE messages("))
+    with pytest.raises(RecordingError, match=r"x\.db3: is no readable \.db3 file: ") as caught:
+        read(path)
+    assert str(caught.value).isprintable()

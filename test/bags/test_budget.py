@@ -1,0 +1,178 @@
+"""What a recording claims does not decide how much memory it gets; what it is not given, it is told of."""
+
+import os
+import struct
+from collections.abc import Callable
+from pathlib import Path
+from typing import Any
+
+import lz4.frame
+import pytest
+import zstandard
+
+from leg_wear_monitor.bags.budget import Budget
+from leg_wear_monitor.bags.findings import DamageError, RecordingError
+from leg_wear_monitor.errors import ConfigError
+
+LITTLE_MB = 16.0
+BOMB_BYTES = 100_000_000
+
+
+@pytest.fixture(scope="module")
+def sent(traffic: Callable[..., Any]) -> Any:
+    return traffic(0.5)
+
+
+def with_a_chunk(whole: bytes, data: bytes, compression: bytes, size: int, is_cut: bool = False) -> bytes:
+    """A file without an index, and one chunk more at its end."""
+    content = whole[: whole.rindex(struct.pack("<BQ", 0x0F, 4))]
+    head = struct.pack("<QQQII", 0, 0, size, 0, len(compression)) + compression + struct.pack("<Q", len(data))
+    chunk = struct.pack("<BQ", 0x06, len(head) + len(data)) + head + data
+    end = struct.pack("<BQI", 0x0F, 4, 0) + struct.pack("<BQQQI", 0x02, 20, 0, 0, 0) + b"\x89MCAP0\r\n"
+    return content + (chunk[: len(chunk) * 9 // 10] if is_cut else chunk + end)
+
+
+@pytest.mark.parametrize("is_cut", [False, True])
+@pytest.mark.parametrize("claimed", [BOMB_BYTES, 1000])
+@pytest.mark.parametrize("compression", ["zstd", "lz4"])
+def test_a_chunk_that_grows_is_left_out_and_told(
+    tmp_path: Path,
+    sent: Any,
+    write_bag: Any,
+    expected: Any,
+    read: Any,
+    compression: str,
+    claimed: int,
+    is_cut: bool,
+) -> None:
+    index_types = pytest.importorskip("mcap.writer").IndexType
+    whole = write_bag(tmp_path / "whole.mcap", sent, index_types=index_types.NONE).read_bytes()
+    compress = zstandard.compress if compression == "zstd" else lz4.frame.compress
+    path = tmp_path / "bomb.mcap"
+    bomb = compress(bytes(BOMB_BYTES))
+    path.write_bytes(with_a_chunk(whole, bomb, compression.encode(), claimed, is_cut))
+    samples, recording = read(path, memory_mb=LITTLE_MB)
+    assert samples.tobytes() == expected(sent).tobytes()
+    assert recording.is_partial
+    if claimed == BOMB_BYTES:
+        texts = [str(finding) for finding in recording.findings]
+        assert any("more than the 8 MB that --memory-mb 16 leaves for it" in text for text in texts)
+
+
+@pytest.mark.parametrize("kind", [".mcap", ".db3"])
+def test_a_file_that_grows_is_refused(tmp_path: Path, read: Any, kind: str) -> None:
+    path = tmp_path / f"bomb{kind}.zstd"
+    path.write_bytes(zstandard.compress(bytes(BOMB_BYTES)))
+    with pytest.raises(RecordingError, match=r"needs larger temporary files than --memory-mb 16 allows"):
+        read(path, memory_mb=LITTLE_MB)
+
+
+def test_an_index_that_names_a_chunk_again_and_again_is_not_followed(
+    tmp_path: Path, sent: Any, write_bag: Any, expected: Any, read: Any
+) -> None:
+    whole = write_bag(tmp_path / "whole.mcap", sent).read_bytes()
+    begin = struct.unpack_from("<Q", whole, len(whole) - 28)[0]
+    at = whole.index(b"\x08", begin)
+    while struct.unpack_from("<Q", whole, at + 1)[0] > 500:
+        at = whole.index(b"\x08", at + 1)
+    one = whole[at : at + 9 + struct.unpack_from("<Q", whole, at + 1)[0]]
+    footer = struct.pack("<BQQQI", 0x02, 20, begin, 0, 0) + b"\x89MCAP0\r\n"
+    path = tmp_path / "again.mcap"
+    path.write_bytes(whole[:-37] + one * 1000 + footer)
+    samples, recording = read(path)
+    assert samples.tobytes() == expected(sent).tobytes()
+    assert not recording.is_partial
+
+
+def test_a_hole_that_claims_gigabytes_is_passed_over(
+    tmp_path: Path, sent: Any, write_bag: Any, expected: Any, read: Any
+) -> None:
+    index_types = pytest.importorskip("mcap.writer").IndexType
+    whole = write_bag(tmp_path / "whole.mcap", sent, index_types=index_types.NONE).read_bytes()
+    content = whole[: whole.rindex(struct.pack("<BQ", 0x0F, 4))] + struct.pack("<BQ", 0x05, 2**33)
+    path = tmp_path / "hole.mcap"
+    path.write_bytes(content)
+    os.truncate(path, len(content) + 2**33)
+    samples, recording = read(path)
+    assert samples.tobytes() == expected(sent).tobytes()
+    assert any("needs 8590 MB to be read" in str(finding) for finding in recording.findings)
+
+
+METADATA = "rosbag2_bagfile_information:\n  relative_file_paths: "
+LAUGHS = "a: &a [x, x]\n" + "".join(
+    f"{chr(98 + i)}: &{chr(98 + i)} [*{chr(97 + i)}, *{chr(97 + i)}]\n" for i in range(24)
+)
+
+
+@pytest.mark.parametrize(
+    ("text", "why"),
+    [
+        (f"{LAUGHS}{METADATA}[x.mcap]\n  compression_mode: *y\n", "holds aliases"),
+        (f"{METADATA}{'[' * 5000}", "is nested more than 20 deep"),
+        (f"{METADATA}[x.mcap]\n#{'x' * 2**20}", "expected at most 1048576"),
+    ],
+    ids=["aliases", "brackets", "length"],
+)
+def test_metadata_that_grows_is_not_read(
+    tmp_path: Path, sent: Any, write_bag: Any, expected: Any, read: Any, text: str, why: str
+) -> None:
+    bag = tmp_path / "bag"
+    bag.mkdir()
+    write_bag(bag / "x.mcap", sent)
+    (bag / "metadata.yaml").write_text(text)
+    samples, recording = read(bag)
+    assert samples.tobytes() == expected(sent).tobytes()
+    (finding,) = recording.findings
+    assert why in finding.text
+    assert finding.text.endswith("the directory's files are taken instead")
+
+
+@pytest.mark.parametrize(("name", "in_a_bag"), [("x.mcap", False), ("x.db3", False), ("x.mcap", True)])
+def test_a_pipe_is_refused_without_a_wait(tmp_path: Path, read: Any, name: str, in_a_bag: bool) -> None:
+    home = tmp_path / "bag" if in_a_bag else tmp_path
+    home.mkdir(exist_ok=True)
+    os.mkfifo(home / name)
+    with pytest.raises(RecordingError, match=r"is a pipe, expected a file|holds no \.mcap or \.db3 file"):
+        read(home if in_a_bag else home / name)
+
+
+def test_a_device_is_refused(tmp_path: Path, read: Any) -> None:
+    (tmp_path / "x.mcap").symlink_to("/dev/zero")
+    with pytest.raises(RecordingError, match="is a device, expected a file"):
+        read(tmp_path / "x.mcap")
+
+
+def test_a_directory_that_is_called_like_a_file_is_told(
+    tmp_path: Path, sent: Any, write_bag: Any, expected: Any, read: Any
+) -> None:
+    (tmp_path / "a.db3").mkdir()
+    write_bag(tmp_path / "b.mcap", sent)
+    samples, recording = read(tmp_path)
+    assert samples.tobytes() == expected(sent).tobytes()
+    assert [finding.text for finding in recording.findings] == [
+        "is a directory, expected a file: it is not read"
+    ]
+
+
+@pytest.mark.parametrize("name", ["x" * 300 + ".mcap", "x\0y.mcap"])
+def test_a_name_that_cannot_be_is_refused_in_a_line(tmp_path: Path, read: Any, name: str) -> None:
+    with pytest.raises(RecordingError, match=r"cannot be read: ") as caught:
+        read(tmp_path / name)
+    assert str(caught.value).isprintable()
+
+
+def test_the_budget_is_one_for_all() -> None:
+    budget = Budget(100.0)
+    budget.take(60_000_000)
+    assert budget.left == 40_000_000
+    budget.check(20_000_000)
+    with pytest.raises(DamageError, match="needs 21 MB to be read, more than the 20 MB"):
+        budget.check(21_000_000)
+    with pytest.raises(DamageError, match="--memory-mb 100 allows"):
+        budget.take(41_000_000)
+
+
+@pytest.mark.parametrize("megabytes", [0.0, -1.0, 15.9, float("nan")])
+def test_a_budget_in_which_nothing_can_be_read_is_refused(megabytes: float) -> None:
+    with pytest.raises(ConfigError, match=r"--memory-mb: .* is too little, expected at least 16 MB"):
+        Budget(megabytes)

@@ -1,0 +1,325 @@
+"""However messages were stored, the same samples come out, in order of log time."""
+
+from collections.abc import Callable
+from pathlib import Path
+from typing import Any
+
+import attrs
+import numpy as np
+import pytest
+
+from leg_wear_monitor.bags.findings import RecordingError, Weight
+from leg_wear_monitor.messages import encode
+from leg_wear_monitor.monitor.config.inputs import DriveTorque
+from leg_wear_monitor.monitor.config.settings import MonitorConfig
+from leg_wear_monitor.twin.sample import NO_FAULT, TORQUE
+
+Read = Callable[..., Any]
+
+
+def losses(recording: Any) -> list[str]:
+    return [finding.text for finding in recording.findings if finding.weight is Weight.LOSS]
+
+
+@pytest.fixture(scope="module")
+def sent(traffic: Callable[..., Any]) -> Any:
+    return traffic()
+
+
+@pytest.mark.parametrize("compression", ["ZSTD", "LZ4", "NONE"])
+@pytest.mark.parametrize(
+    "options",
+    [
+        {},
+        {"enable_crcs": False},
+        {"use_chunking": False},
+        {"use_statistics": False},
+        {"repeat_channels": False, "repeat_schemas": False},
+        {"enable_data_crcs": True},
+        {"definitions": False},
+    ],
+    ids=lambda options: "-".join(options) or "usual",
+)
+def test_every_way_to_store_gives_the_same_samples(
+    tmp_path: Path, sent: Any, write_bag: Any, expected: Any, read: Read, compression: str, options: Any
+) -> None:
+    samples, recording = read(write_bag(tmp_path / "a.mcap", sent, compression, **options))
+    assert samples.tobytes() == expected(sent).tobytes()
+    assert not recording.is_partial
+    assert recording.topics == {"joint_states": "/joint_states", "drive_torque": "/drive_torque"}
+
+
+def test_a_file_without_checksums_is_told_apart(
+    tmp_path: Path, sent: Any, write_bag: Any, read: Read
+) -> None:
+    for name, crcs in (("with", True), ("without", False)):
+        _, recording = read(write_bag(tmp_path / f"{name}.mcap", sent, enable_crcs=crcs))
+        assert any("no checksum" in str(finding) for finding in recording.findings) == (not crcs)
+
+
+def test_messages_stored_out_of_order_come_in_order(
+    tmp_path: Path, sent: Any, write_bag: Any, expected: Any, read: Read
+) -> None:
+    """Topic after topic, as some tools write: the whole file is one overlap."""
+    by_topic = sorted(sent, key=lambda each: each.topic)
+    samples, _ = read(write_bag(tmp_path / "a.mcap", by_topic))
+    assert np.array_equal(np.sort(samples["stamp_ns"]), np.sort(expected(sent)["stamp_ns"]))
+    assert set(map(bytes, samples)) == set(map(bytes, expected(sent)))
+    assert (samples["kind"][:40] == TORQUE).any() and (samples["kind"][:40] != TORQUE).any()
+
+
+def test_split_bags_and_several_files_are_one_recording(
+    tmp_path: Path, sent: Any, write_bag: Any, expected: Any, read: Read
+) -> None:
+    parts = [write_bag(tmp_path / f"run_{i}.mcap", sent[i * 60 : (i + 1) * 60]) for i in range(15)]
+    assert sum(len(sent[i * 60 : (i + 1) * 60]) for i in range(15)) >= len(sent)
+    for paths in ([tmp_path], parts, parts[::-1]):
+        samples, recording = read(*paths)
+        assert samples.tobytes() == expected(sent).tobytes()
+        assert not recording.is_partial
+
+
+def test_topics_in_files_of_their_own_are_merged(
+    tmp_path: Path, sent: Any, write_bag: Any, expected: Any, read: Read
+) -> None:
+    paths = []
+    for topic in ("/joint_states", "/drive_torque"):
+        only = [each for each in sent if each.topic == topic]
+        paths.append(write_bag(tmp_path / f"{topic[1:]}.mcap", only))
+    samples, _ = read(*paths)
+    assert np.array_equal(samples["stamp_ns"], expected(sent)["stamp_ns"])
+
+
+def test_a_file_compressed_as_a_whole(
+    tmp_path: Path, sent: Any, write_bag: Any, expected: Any, read: Read
+) -> None:
+    zstandard = pytest.importorskip("zstandard")
+    plain = write_bag(tmp_path / "a.mcap", sent, "NONE")
+    packed = tmp_path / "b.mcap.zstd"
+    packed.write_bytes(zstandard.compress(plain.read_bytes()))
+    samples, recording = read(packed)
+    assert samples.tobytes() == expected(sent).tobytes()
+    assert recording.files == [packed]
+
+
+def test_a_file_compressed_as_a_whole_and_cut_short(
+    tmp_path: Path, traffic: Any, write_bag: Any, expected: Any, read: Read
+) -> None:
+    zstandard = pytest.importorskip("zstandard")
+    sent = traffic(10.0)
+    packed = tmp_path / "b.mcap.zstd"
+    whole = zstandard.compress(write_bag(tmp_path / "a.mcap", sent, "NONE").read_bytes())
+    packed.write_bytes(whole[: len(whole) // 2])
+    samples, recording = read(packed)
+    assert recording.is_partial
+    assert 0 < len(samples) < len(expected(sent))
+    assert samples.tobytes() == expected(sent)[: len(samples)].tobytes()
+    for content, text in ((whole[:1000], "holds nothing that can be"), (b"PK\3\4", "is no zstd file")):
+        packed.write_bytes(content)
+        with pytest.raises(RecordingError, match=text):
+            read(packed)
+
+
+@pytest.mark.parametrize(
+    ("storage", "mode"),
+    [("MCAP", mode) for mode in ("NONE", "STORAGE", "MESSAGE", "FILE")]
+    + [("SQLITE3", mode) for mode in ("NONE", "MESSAGE", "FILE")],
+)
+def test_bags_that_rosbags_writes(
+    tmp_path: Path, sent: Any, store: Any, expected: Any, read: Read, storage: str, mode: str
+) -> None:
+    rosbag2 = pytest.importorskip("rosbags.rosbag2")
+    writer = rosbag2.Writer(tmp_path / "bag", version=9, storage_plugin=rosbag2.StoragePlugin[storage])
+    if mode != "NONE":
+        writer.set_compression(rosbag2.CompressionMode[mode], rosbag2.CompressionFormat.ZSTD)
+    ours = [each for each in sent if each.type in store.types]
+    with writer:
+        connections = {
+            topic: writer.add_connection(topic, kind, typestore=store)
+            for topic, kind in sorted({(each.topic, each.type) for each in ours})
+        }
+        for each in ours:
+            writer.write(connections[each.topic], each.log_time_ns, each.raw)
+    samples, recording = read(tmp_path / "bag")
+    assert (
+        np.array_equal(samples, expected(sent), equal_nan=False)
+        or samples.tobytes() == expected(sent).tobytes()
+    )
+    assert not losses(recording)
+    (tmp_path / "bag" / "metadata.yaml").unlink()
+    if mode != "MESSAGE":  # only the metadata knows of it
+        assert read(tmp_path / "bag")[0].tobytes() == samples.tobytes()
+
+
+def test_times_are_those_asked_for(tmp_path: Path, sent: Any, write_bag: Any, read: Read) -> None:
+    path = write_bag(tmp_path / "a.mcap", sent)
+    log = np.array([each.log_time_ns for each in sent if "service" not in each.topic])
+    assert np.array_equal(read(path, time="log")[0]["stamp_ns"], log)
+    assert np.array_equal(read(path, time="publish")[0]["stamp_ns"], log - 5)
+    assert not np.array_equal(read(path)[0]["stamp_ns"], log)
+    with pytest.raises(RecordingError, match="'wall' is not one of header, log, publish"):
+        read(path, time="wall")
+
+
+def test_a_log_time_heals_a_stamp_of_zero(tmp_path: Path, write_bag: Any, traffic: Any, read: Read) -> None:
+    sent = [
+        attrs.evolve(each, raw=each.raw[:4] + bytes(8) + each.raw[12:])
+        for each in traffic(0.2)
+        if each.topic != "/joint_states/_service_event"
+    ]
+    path = write_bag(tmp_path / "a.mcap", sent)
+    assert (read(path)[0]["fault"] != NO_FAULT).all()
+    assert (read(path, time="log")[0]["fault"] == NO_FAULT).all()
+
+
+def test_clocks_that_run_apart_are_told(tmp_path: Path, sent: Any, write_bag: Any, read: Read) -> None:
+    slow = [attrs.evolve(each, log_time_ns=3 * each.log_time_ns) for each in sent]
+    _, recording = read(write_bag(tmp_path / "a.mcap", slow))
+    notes = [str(finding) for finding in recording.findings]
+    assert any("joint_states: header stamps span 1.99" in note and "log times 5.9" in note for note in notes)
+    _, recording = read(write_bag(tmp_path / "b.mcap", sent))
+    assert not recording.findings
+
+
+def test_a_torque_without_header_far_from_the_crank_is_told(
+    tmp_path: Path, sent: Any, store: Any, write_bag: Any, read: Read
+) -> None:
+    number = bytes(store.serialize_cdr(store.types["std_msgs/msg/Float64"](2.5), "std_msgs/msg/Float64"))
+    bare = [
+        attrs.evolve(each, type="std_msgs/msg/Float64", raw=number, log_time_ns=each.log_time_ns)
+        if each.topic == "/drive_torque"
+        else each
+        for each in sent
+    ]
+    later = [attrs.evolve(each, log_time_ns=each.log_time_ns + 10**12) for each in bare]
+    config = MonitorConfig(drive_torque=DriveTorque(source="float64"))
+    samples, recording = read(write_bag(tmp_path / "a.mcap", later), config=config)
+    assert (samples["torque_nm"][samples["kind"] == TORQUE] == 2.5).all()
+    assert any("1000 s after" in str(finding) for finding in recording.findings)
+    _, recording = read(write_bag(tmp_path / "b.mcap", bare), config=config)
+    assert not recording.findings
+
+
+def renamed(sent: Any, prefix: str) -> Any:
+    return [attrs.evolve(each, topic=prefix + each.topic) for each in sent]
+
+
+def test_topics_in_a_namespace_are_found_and_several_must_be_named(
+    tmp_path: Path, sent: Any, write_bag: Any, expected: Any, read: Read
+) -> None:
+    path = write_bag(tmp_path / "one.mcap", renamed(sent, "/left"))
+    samples, recording = read(path)
+    assert recording.topics["joint_states"] == "/left/joint_states"
+    assert samples.tobytes() == expected(sent).tobytes()
+    both = write_bag(tmp_path / "two.mcap", renamed(sent, "/left") + renamed(sent, "/right"))
+    with pytest.raises(RecordingError, match="could be /left/joint_states, /right/joint_states, say"):
+        read(both)
+    named = {"joint_states": "right/joint_states", "drive_torque": "/right/drive_torque"}
+    assert read(both, **named)[0].tobytes() == expected(sent).tobytes()
+    with pytest.raises(RecordingError, match="/up/joint_states: is no topic of the recording"):
+        read(both, joint_states="/up/joint_states")
+
+
+def test_what_cannot_be_used_is_refused_by_name(
+    tmp_path: Path, sent: Any, write_bag: Any, read: Read
+) -> None:
+    torque_only = [each for each in sent if each.topic == "/drive_torque"]
+    with pytest.raises(RecordingError, match=r"a.mcap: joint_states: is no topic .* it has /drive_torque"):
+        read(write_bag(tmp_path / "a.mcap", torque_only))
+    joints_only = [each for each in sent if each.topic == "/joint_states"]
+    _, recording = read(write_bag(tmp_path / "b.mcap", joints_only))
+    assert any("drive_torque: is no topic" in str(finding) for finding in recording.findings)
+    config = MonitorConfig(drive_torque=DriveTorque(source="float64"))
+    expected = "/drive_torque: is of type geometry_msgs/msg/WrenchStamped, expected std_msgs/msg/Float64"
+    with pytest.raises(RecordingError, match=expected):
+        read(write_bag(tmp_path / "c.mcap", sent), config=config)
+
+
+@pytest.mark.parametrize("encoding", ["json", "protobuf", ""])
+def test_other_encodings_are_refused(tmp_path: Path, read: Read, encoding: str) -> None:
+    writer_module = pytest.importorskip("mcap.writer")
+    with (tmp_path / "a.mcap").open("wb") as file:
+        writer = writer_module.Writer(file)
+        writer.start("", "test")
+        schema = writer.register_schema(encode.JOINT_STATE, "jsonschema", b"{}")
+        channel = writer.register_channel("/joint_states", encoding, schema)
+        writer.add_message(channel, 1, b"{}", 1)
+        writer.finish()
+    with pytest.raises(RecordingError, match=f"/joint_states: is encoded as '{encoding}', expected 'cdr'"):
+        read(tmp_path / "a.mcap")
+
+
+def test_a_type_of_the_same_name_but_other_fields_is_refused(tmp_path: Path, read: Read) -> None:
+    writer_module = pytest.importorskip("mcap.writer")
+    with (tmp_path / "a.mcap").open("wb") as file:
+        writer = writer_module.Writer(file)
+        writer.start("ros2", "test")
+        text = b"# ours\nstd_msgs/Header header\nstring[] name # with names\nfloat32[] position\n"
+        schema = writer.register_schema(encode.JOINT_STATE, "ros2msg", text)
+        channel = writer.register_channel("/joint_states", "cdr", schema)
+        writer.add_message(channel, 1, b"\0\1\0\0", 1)
+        writer.finish()
+    with pytest.raises(RecordingError, match=r"JointState by Header header; string\[\] name; float32\[\] "):
+        read(tmp_path / "a.mcap")
+
+
+def test_a_topic_without_a_type_is_read_as_what_it_must_be(
+    tmp_path: Path, sent: Any, expected: Any, read: Read
+) -> None:
+    writer_module = pytest.importorskip("mcap.writer")
+    with (tmp_path / "a.mcap").open("wb") as file:
+        writer = writer_module.Writer(file)
+        writer.start("ros2", "test")
+        channels = {
+            topic: writer.register_channel(topic, "cdr", 0) for topic in {each.topic for each in sent}
+        }
+        for each in sent:
+            writer.add_message(channels[each.topic], each.log_time_ns, each.raw, 0)
+        writer.finish()
+    assert read(tmp_path / "a.mcap")[0].tobytes() == expected(sent).tobytes()
+
+
+def test_an_effort_is_the_torque_where_it_is_asked_for(
+    tmp_path: Path, sent: Any, write_bag: Any, read: Read
+) -> None:
+    config = MonitorConfig(drive_torque=DriveTorque(source="effort"))
+    samples, recording = read(write_bag(tmp_path / "a.mcap", sent), config=config)
+    assert recording.topics == {"joint_states": "/joint_states"}
+    assert np.isfinite(samples["torque_nm"]).all()
+
+
+def test_a_damaged_metadata_file_is_told_and_done_without(
+    tmp_path: Path, sent: Any, write_bag: Any, expected: Any, read: Read
+) -> None:
+    write_bag(tmp_path / "a.mcap", sent)
+    for text in (
+        "rosbag2_bagfile_information: [",
+        "{}",
+        "\0",
+        "rosbag2_bagfile_information: {relative_file_paths: 3}",
+    ):
+        (tmp_path / "metadata.yaml").write_text(text)
+        samples, recording = read(tmp_path)
+        assert samples.tobytes() == expected(sent).tobytes()
+        assert ["metadata.yaml: cannot be read" in str(finding) for finding in recording.findings] == [True]
+
+
+def test_a_missing_part_of_a_bag_is_a_loss(tmp_path: Path, sent: Any, write_bag: Any, read: Read) -> None:
+    write_bag(tmp_path / "a_0.mcap", sent)
+    (tmp_path / "metadata.yaml").write_text(
+        "rosbag2_bagfile_information: {relative_file_paths: [a_0.mcap, a_1.mcap]}"
+    )
+    _, recording = read(tmp_path)
+    assert losses(recording) == ["names a_1.mcap, which is not there: it is lost"]
+
+
+def test_memory_stays_flat(tmp_path: Path, write_bag: Any, traffic: Any) -> None:
+    """No block holds more than a few chunks, however long the recording."""
+    from leg_wear_monitor.bags.reader import Recording
+
+    path = write_bag(tmp_path / "a.mcap", traffic(40.0))
+    with Recording([path], MonitorConfig()) as recording:
+        shares, sizes = zip(*((block.share, len(block.samples)) for block in recording.blocks()), strict=True)
+    assert sum(sizes) == 16000
+    assert max(sizes) < 5000
+    assert list(shares) == sorted(shares) and shares[-1] == 1.0

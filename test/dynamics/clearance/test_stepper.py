@@ -1,0 +1,367 @@
+"""The clearance stepper as a twin drives it: any motion of the crank, in any pieces, from any snapshot."""
+
+from collections.abc import Callable
+from itertools import pairwise
+from typing import NamedTuple
+
+import attrs
+import numpy as np
+import pytest
+from hypothesis import example, given, settings
+from hypothesis import strategies as st
+
+from leg_wear_monitor import Mechanism, load_mechanism
+from leg_wear_monitor.dynamics.clearance.run import TOLERANCE_M, ClearanceStepper
+from leg_wear_monitor.dynamics.clearance.tables import ClearanceTables, build_tables
+from leg_wear_monitor.dynamics.full.run import FullRun
+from leg_wear_monitor.dynamics.run.drive import steady_drive
+from leg_wear_monitor.dynamics.run.protocol import DONE, INVALID_DRIVE
+from leg_wear_monitor.dynamics.run.run_statistics import (
+    ARCHARD,
+    BEGIN,
+    CONTACT,
+    FORCE,
+    PEAK,
+    SPEED,
+    Tally,
+    new_tally,
+)
+from leg_wear_monitor.dynamics.simulation import prepare
+from leg_wear_monitor.mechanism.ideal import TURN, ideal_motion
+from leg_wear_monitor.wear.surfaces import SECTORS, Surfaces, worn_volume
+
+FAST_WEAR = 1.0e-11  # 1/Pa: a cycle opens clearances by what steel does in ten thousand
+SHORT = 0.3  # s
+
+
+class Piece(NamedTuple):
+    """A stretch of the crank's motion and the time at which it ends [s]."""
+
+    polynomial: np.ndarray
+    end: float
+
+
+def motion_of(speeds: list[float], duration: float) -> list[Piece]:
+    """A crank that goes from each of the speeds [rad/s] to the next, smoothly and in equal times [s]."""
+    pieces, angle, since = [], 0.0, 0.0
+    for before, after in pairwise(speeds):
+        change = after - before
+        slope = [change / duration**2, -0.5 * change / duration**3]
+        pieces.append(Piece(np.array([since, angle, before, 0.0, *slope, 0.0]), since + duration))
+        angle, since = angle + 0.5 * (before + after) * duration, since + duration
+    return pieces
+
+
+START_STOP_REVERSE = motion_of([TURN, 2.0 * TURN, 0.0, 0.0, -TURN, 0.0, TURN], 0.05)
+
+
+@pytest.fixture(scope="module")
+def worn_leg(leg: Mechanism) -> Mechanism:
+    """The leg of a material so soft that wear opens its clearances while one watches."""
+    soft = {
+        name: attrs.evolve(c, wear_coefficient=(FAST_WEAR, 2.0 * FAST_WEAR))
+        for name, c in leg.clearances.items()
+    }
+    return attrs.evolve(leg, clearances=soft)
+
+
+@pytest.fixture(scope="module")
+def tables(leg: Mechanism) -> ClearanceTables:
+    setup = prepare(leg)
+    return build_tables(setup.linkage, setup.contacts)
+
+
+@pytest.fixture(scope="module")
+def new_stepper(worn_leg, tables):
+    """Makes steppers of the soft leg with five loose joints, all at the ideal start; wear feeds back."""
+    setup = prepare(worn_leg, wear=True)
+
+    def make() -> ClearanceStepper:
+        surfaces = setup.surfaces._replace(depth=np.zeros_like(setup.surfaces.depth))
+        return ClearanceStepper(attrs.evolve(setup, surfaces=surfaces), tables=tables)
+
+    return make
+
+
+def drive(
+    stepper: ClearanceStepper, pieces: list[Piece], tally: Tally, cuts: list[float] | None = None
+) -> None:
+    """Take a stepper through pieces of motion, stopping at times [s] in between too."""
+    for polynomial, end in pieces:
+        for t in [*sorted(cut for cut in cuts or () if stepper.time < cut < end), end]:
+            assert stepper.advance(polynomial, t, tally) == (DONE, -1)
+
+
+def assert_same(one: ClearanceStepper, other: ClearanceStepper) -> None:
+    """Bit for bit."""
+    np.testing.assert_array_equal(one.state.motion, other.state.motion)
+    np.testing.assert_array_equal(one.state.depth, other.state.depth)
+
+
+def assert_same_tally(one: Tally, other: Tally) -> None:
+    for name, values, others in zip(Tally._fields, one, other, strict=True):
+        np.testing.assert_array_equal(values, others, err_msg=name)
+
+
+@pytest.fixture(scope="module")
+def in_one_go(new_stepper):
+    """The whole motion with starts, stops and reversals, one call a piece."""
+    stepper, tally = new_stepper(), new_tally(10)
+    drive(stepper, START_STOP_REVERSE, tally)
+    return stepper, tally
+
+
+@settings(max_examples=20)
+@given(cuts=st.lists(st.floats(0.0, SHORT), max_size=30))
+@example(cuts=[1.0e-9, 0.1, 0.1, np.nextafter(0.1, 1.0)])
+@example(cuts=(np.arange(1, 600) * 0.0005).tolist())
+def test_any_split_of_the_time_axis_gives_the_same(new_stepper, in_one_go, cuts):
+    """State and sums bit for bit, through starts, stops and reversals with wear fed back."""
+    stepper, tally = new_stepper(), new_tally(10)
+    drive(stepper, START_STOP_REVERSE, tally, cuts)
+    assert_same(stepper, in_one_go[0])
+    assert_same_tally(tally, in_one_go[1])
+
+
+@settings(max_examples=20)
+@given(at=st.floats(0.0, SHORT), astray=st.floats(-20.0, 20.0))
+def test_restored_it_goes_on_bit_for_bit(new_stepper, in_one_go, at, astray):
+    """Also in another stepper of the same setup, whatever either has done meanwhile."""
+    stepper, tally = new_stepper(), new_tally(10)
+    before = [Piece(polynomial, min(end, at)) for polynomial, end in START_STOP_REVERSE if end - 0.05 < at]
+    after = [piece for piece in START_STOP_REVERSE if piece.end >= at]
+    drive(stepper, before, tally)
+    snapshot = stepper.snapshot()
+    away = steady_drive(stepper.state.drive[0], astray, stepper.time)
+    drive(stepper, [Piece(away, stepper.time + 0.02)], new_tally(10))
+    another = new_stepper()
+    for restored in (stepper, another):
+        restored.restore(snapshot)
+        drive(restored, after, new_tally(10))
+        assert_same(restored, in_one_go[0])
+
+
+def test_a_snapshot_is_a_copy(new_stepper):
+    stepper = new_stepper()
+    snapshot = stepper.snapshot()
+    drive(stepper, START_STOP_REVERSE, new_tally(10))
+    assert not np.array_equal(snapshot.motion, stepper.state.motion)
+    assert not snapshot.depth.any()
+
+
+def test_a_new_start_keeps_the_wear_only(new_stepper, in_one_go):
+    stepper, other = new_stepper(), new_stepper()
+    for one in (stepper, other):
+        one.state.depth[:] = in_one_go[0].state.depth
+    drive(stepper, START_STOP_REVERSE[:2], new_tally(10))
+    depth = stepper.state.depth.copy()
+    stepper.init(1.0, TURN)
+    np.testing.assert_array_equal(stepper.state.depth, depth)
+    other.state.depth[:] = depth
+    other.init(1.0, TURN)
+    assert stepper.time == 0.0
+    for one in (stepper, other):
+        drive(one, [Piece(steady_drive(1.0, TURN), 0.1)], new_tally(10))
+    assert_same(stepper, other)
+
+
+@settings(max_examples=20)
+@given(speeds=st.lists(st.floats(-20.0, 20.0), min_size=2, max_size=5))
+@example(speeds=[0.0, 0.0, 0.0])
+@example(speeds=[20.0, -20.0, 20.0])
+def test_no_motion_of_the_crank_leaves_the_finite(new_stepper, speeds):
+    """From any speed to any other within a twentieth of a second, from rest too."""
+    stepper, tally = new_stepper(), new_tally(10)
+    stepper.init(0.0, speeds[0])
+    drive(stepper, motion_of(speeds, 0.05), tally)
+    assert np.isfinite(stepper.state.motion).all()
+    assert np.isfinite(tally.integral).all()
+    assert np.isfinite(tally.drive_integral).all()
+    eccentricity = np.hypot(*stepper.state.e.reshape(-1, 2).T)
+    assert (eccentricity < 1.2 * 3.0e-4).all()
+
+
+@settings(max_examples=30)
+@given(
+    i=st.integers(0, 6),
+    value=st.sampled_from([np.nan, np.inf, -np.inf, 1.0e300, -1.0e300]),
+    steps=st.integers(1, 200),
+)
+def test_a_senseless_drive_is_refused_and_forgotten(new_stepper, in_one_go, i, value, steps):
+    """State and sums as if it had never come, for however long it would have lasted."""
+    stepper, tally = new_stepper(), new_tally(10)
+    drive(stepper, START_STOP_REVERSE[:3], tally)
+    senseless = START_STOP_REVERSE[3].polynomial.copy()
+    senseless[i] = value
+    status = stepper.advance(senseless, stepper.time + steps * stepper.model.interval, tally)
+    assert status == (INVALID_DRIVE, -1)
+    assert np.isfinite(stepper.state.e).all()
+    drive(stepper, START_STOP_REVERSE[3:], tally)
+    assert_same(stepper, in_one_go[0])
+    assert_same_tally(tally, in_one_go[1])
+
+
+@pytest.mark.plain
+@pytest.mark.parametrize("t_end", [np.nan, -1.0, -np.inf])
+def test_an_end_that_is_not_ahead_changes_nothing(new_stepper, t_end):
+    stepper, tally = new_stepper(), new_tally(10)
+    before = stepper.snapshot()
+    assert stepper.advance(steady_drive(0.0, TURN), t_end, tally) == (DONE, -1)
+    np.testing.assert_array_equal(stepper.state.motion, before.motion)
+    assert not tally.time[0]
+
+
+def test_a_drive_that_tears_the_leg_apart_is_stopped(new_stepper):
+    """Thousands of radians a second: a status and the last good state; with new bushings it goes as new."""
+    stepper, tally = new_stepper(), new_tally(10)
+    drive(stepper, START_STOP_REVERSE[:1], tally)
+    mad = motion_of([2.0 * TURN, 9.0e3], 0.05)[0].polynomial
+    mad[:2] = 0.05, stepper.state.drive[0]
+    status, k = stepper.advance(mad, 0.1, new_tally(10))
+    assert status != DONE
+    assert -1 <= k < 5
+    assert np.isfinite(stepper.state.e).all()
+    assert np.isfinite(stepper.state.depth).all()
+    stepper.state.depth[:] = 0.0  # such a drive wears through any bushing
+    stepper.init(0.0, TURN)
+    another = new_stepper()
+    for one in (stepper, another):
+        drive(one, START_STOP_REVERSE[:2], new_tally(10))
+    assert_same(stepper, another)
+
+
+def test_at_rest_the_contacts_carry_the_weight(leg, tables):
+    """Two seconds after the crank has stopped, mean forces are the static reactions of the ideal leg.
+
+    Journals go on rocking, since friction begins at 1 mm/s only; and the leg hangs a little elsewhere.
+    """
+    setup = prepare(leg)
+    stepper, tally = ClearanceStepper(setup, tables=tables), new_tally(10)
+    pieces = motion_of([TURN, TURN, 0.0], 0.2)
+    drive(stepper, pieces, new_tally(10))
+    angle = stepper.state.drive[0]
+    rest = steady_drive(angle, 0.0)
+    drive(stepper, [Piece(rest, 2.4)], new_tally(10))
+    drive(stepper, [Piece(rest, 3.4)], tally)
+    static = ideal_motion(setup.linkage, [angle], 0.0).joint_force[0]
+    wanted = np.linalg.norm(static, axis=1)
+    np.testing.assert_allclose(tally.integral[:, FORCE] / tally.time[0], wanted, rtol=0.01)
+
+
+def _mirrored(mechanism: Mechanism) -> Mechanism:
+    """The mechanism seen in a mirror, x -> -x, its crank turning the other way."""
+
+    def points(named):
+        return {name: (-x, y) for name, (x, y) in named.items()}
+
+    start = mechanism.assembly
+    bodies = {
+        name: attrs.evolve(body, com=(-body.com[0], body.com[1]), points=points(body.points))
+        for name, body in mechanism.bodies.items()
+    }
+    return attrs.evolve(
+        mechanism,
+        gravity=(-mechanism.gravity[0], mechanism.gravity[1]),
+        ground=attrs.evolve(mechanism.ground, points=points(mechanism.ground.points)),
+        bodies=bodies,
+        drive=attrs.evolve(mechanism.drive, speed=-mechanism.drive.speed),
+        assembly=attrs.evolve(
+            start,
+            crank_angle=-start.crank_angle,
+            poses={name: (-x, y, -angle) for name, (x, y, angle) in start.poses.items()},
+        ),
+    )
+
+
+@pytest.mark.plain
+def test_a_mirrored_leg_moves_and_wears_mirrored(worn_leg):
+    """With the crank turning backwards; until rounding, multiplied by impacts, shows."""
+    steppers = []
+    for mechanism, speed in ((worn_leg, TURN), (_mirrored(worn_leg), -TURN)):
+        stepper = ClearanceStepper(prepare(mechanism, clearances=("A", "B"), wear=True))
+        drive(stepper, [Piece(steady_drive(0.0, speed), 0.1)], new_tally(10))
+        steppers.append(stepper)
+    seen, mirrored = steppers
+    assert np.abs(seen.state.e).max() > 2.9e-4
+    flip = np.tile([-1.0, 1.0], 2)
+    np.testing.assert_allclose(mirrored.state.e, flip * seen.state.e, atol=1.0e-9)
+    np.testing.assert_allclose(mirrored.state.v, flip * seen.state.v, atol=1.0e-5)
+    # an angle turns into pi less it: sector i into N / 2 - 1 - i
+    sector = (SECTORS // 2 - 1 - np.arange(SECTORS)) % SECTORS
+    depth = seen.state.depth
+    np.testing.assert_allclose(mirrored.state.depth[:, :, sector], depth, atol=1.0e-3 * depth.max())
+
+
+@settings(max_examples=10)
+@given(t=st.floats(0.01, 1.0))
+def test_no_wear_is_lost(new_stepper, t):
+    """Depth x arc x width over all sectors, with what is pending, is k times the Archard integral."""
+    stepper, tally = new_stepper(), new_tally(10)
+    drive(stepper, [Piece(steady_drive(0.0, TURN), t)], tally)
+    contacts, pending = stepper.model.contacts, stepper.state.pending[:, :1]
+    volume = worn_volume(contacts, Surfaces(stepper.state.depth, 1)) + contacts.wear_coefficient * pending
+    wanted = contacts.wear_coefficient * tally.integral[contacts.joint, ARCHARD][:, None]
+    np.testing.assert_allclose(volume, wanted, rtol=1.0e-11)
+
+
+def run_figures(new: Callable[[], ClearanceStepper], runs: int, count: int) -> np.ndarray:
+    """Means of independent runs at 60 rpm (runs, 3, k), the first second dropped: force, Archard, contact.
+
+    The journals start elsewhere in each, since regimes of the motion last for more than a few cycles.
+    """
+    polynomial, figures = steady_drive(0.0, TURN), []
+    for run in range(runs):
+        stepper, tally = new(), new_tally(10)
+        stepper.state.e[:] = np.random.default_rng(run).uniform(-1.0e-4, 1.0e-4, len(stepper.state.e))
+        drive(stepper, [Piece(polynomial, 1.0)], new_tally(10))
+        drive(stepper, [Piece(polynomial, 1.0 + count)], tally)
+        joints = stepper.model.contacts.joint
+        figures.append(tally.integral[joints][:, [FORCE, ARCHARD, CONTACT]].T / count)
+    return np.array(figures)
+
+
+def assert_means_agree(one: np.ndarray, other: np.ndarray) -> None:
+    """Within three standard errors of samples (n, 3, k), or within 2 %; 5 % for wear, which varies most."""
+    difference = np.abs(one.mean(axis=0) - other.mean(axis=0))
+    error = np.hypot(*(samples.std(axis=0, ddof=1) / np.sqrt(len(samples)) for samples in (one, other)))
+    share = np.array([[0.02], [0.05], [0.02]]) * one.mean(axis=0)
+    assert (difference < np.maximum(3.0 * error, share)).all(), difference / one.mean(axis=0)
+
+
+@pytest.mark.parametrize(
+    "finer", [{"interval_s": 0.5 / 2048}, {"tolerance_m": 0.1 * TOLERANCE_M}], ids=["interval", "tolerance"]
+)
+def test_means_hold_at_half_the_interval_and_a_tenth_of_the_tolerance(leg, tables, finer):
+    """All five joints' figures, over twenty-four runs of five cycles."""
+    usual, fine = (
+        run_figures(lambda options=options: ClearanceStepper(prepare(leg), tables=tables, **options), 24, 5)
+        for options in ({}, finer)
+    )
+    assert_means_agree(fine, usual)
+
+
+@pytest.mark.parametrize("loose", ["G", "AB", "IJ", "ABGIJ"])
+def test_means_are_those_of_full_coordinates(leg, leg_cycles, loose):
+    """Over twenty cycles; docs/validation.md has more of them, and more figures."""
+    cycles, setup = leg_cycles(loose, 20), prepare(leg, clearances=tuple(loose))
+    known = build_tables(setup.linkage, setup.contacts)
+    full = np.stack([cycles.force, cycles.archard, cycles.contact], axis=1)
+    runs = run_figures(
+        lambda: ClearanceStepper(prepare(leg, clearances=tuple(loose)), tables=known), runs=8, count=5
+    )
+    assert_means_agree(full, runs)
+
+
+@pytest.mark.parametrize("name", ["bionic_leg", "jansen_leg"])
+def test_it_is_the_full_motion_until_impacts_decorrelate(name):
+    """Every joint's first impact: when, how fast, how hard; the models differ by e / L from the start on."""
+    mechanism = load_mechanism(name)
+    setup, tallies = prepare(mechanism), [new_tally(10), new_tally(10)]
+    stepper = ClearanceStepper(prepare(mechanism), interval_s=1.0e-4)
+    drive(stepper, [Piece(steady_drive(0.0, setup.speed), 0.025)], tallies[0])
+    FullRun(setup).advance(0.025, tallies[1])
+    first, wanted = (tally.impact[setup.contacts.joint, 0] for tally in tallies)
+    assert all((tally.impacts[setup.contacts.joint] > 0).all() for tally in tallies)
+    np.testing.assert_allclose(first[:, BEGIN], wanted[:, BEGIN], atol=2.0e-5)
+    np.testing.assert_allclose(first[:, SPEED], wanted[:, SPEED], rtol=0.01)
+    np.testing.assert_allclose(first[:, PEAK], wanted[:, PEAK], rtol=0.02)

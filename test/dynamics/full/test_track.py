@@ -1,0 +1,190 @@
+"""A controller that drives the crank: gains on the errors of angle and speed, feed-forward, a limit."""
+
+import math
+
+import numpy as np
+import pytest
+
+from leg_wear_monitor.dynamics.full.run import FullRun
+from leg_wear_monitor.dynamics.run.run_statistics import DISSIPATION, FRICTION, POWER, TORQUE, new_tally
+from leg_wear_monitor.dynamics.simulation import prepare, simulate
+from leg_wear_monitor.errors import ConfigError
+from leg_wear_monitor.mechanism.ideal import TURN, one_cycle
+from leg_wear_monitor.mechanism.loader import parse_mechanism
+
+SPEED = 5.0  # rad/s
+INERTIA = 0.02  # kg m^2
+
+
+def _tracked(document, name, **track):
+    """A mechanism that comes with the package under a controller."""
+    mechanism = document(name)
+    mechanism["drive"] = {"body": mechanism["drive"]["body"], "track": {"speed_radps": SPEED} | track}
+    return mechanism
+
+
+def _rotor(**track):
+    """A rotor on a fixed pin, which closed forms know."""
+    return parse_mechanism(
+        {
+            "name": "rotor",
+            "gravity": [0.0, 0.0],
+            "ground": {"points": {"A": [0.0, 0.0]}},
+            "bodies": {
+                "rotor": {"mass": 1.0, "inertia": INERTIA, "com": [0.0, 0.0], "points": {"A": [0.0, 0.0]}}
+            },
+            "joints": {"A": {"bushing": "ground", "journal": "rotor"}},
+            "drive": {"body": "rotor", "track": {"speed_radps": SPEED} | track},
+            "assembly": {"crank_angle": 0.0, "rotor": [0.0, 0.0, 0.0]},
+        },
+        "rotor",
+    )
+
+
+def _advance(mechanism, t_end, **options):
+    run = FullRun(prepare(mechanism, clearances=options.pop("clearances", ())), **options)
+    tally, stored = new_tally(len(mechanism.joints)), run.stored_energy
+    run.advance(t_end, tally)
+    return run, tally, stored
+
+
+@pytest.mark.parametrize("t_end", [0.1, 0.35, 0.8])
+def test_a_rotor_settles_as_the_closed_form_says(t_end):
+    """A step of feed-forward moves it to where the gain holds it, as a damped oscillator."""
+    kp, kd, step = 2.0, 0.06, 0.5
+    run, _, _ = _advance(
+        _rotor(kp_nm_per_rad=kp, kd_nm_s_per_rad=kd, feed_forward_nm=step), t_end, tolerance_m=1.0e-12
+    )
+    decay = kd / (2.0 * INERTIA)
+    wave = math.sqrt(kp / INERTIA - decay**2)
+    swing = math.exp(-decay * t_end)
+    error = step / kp * (1.0 - swing * (math.cos(wave * t_end) + decay / wave * math.sin(wave * t_end)))
+    rate = step / kp * swing * (wave + decay**2 / wave) * math.sin(wave * t_end)
+    assert run.q[1, 2] == pytest.approx(SPEED * t_end + error, rel=1.0e-9)
+    assert run.v[1, 2] == pytest.approx(SPEED + rate, rel=1.0e-9)
+
+
+@pytest.mark.parametrize("asked", [7.0, -7.0])
+def test_the_drive_gives_no_more_than_its_largest_torque(asked):
+    run, tally, _ = _advance(_rotor(feed_forward_nm=asked, max_torque_nm=0.4), 0.5, tolerance_m=1.0e-12)
+    torque = math.copysign(0.4, asked)
+    assert run.v[1, 2] == pytest.approx(SPEED + torque / INERTIA * 0.5, rel=1.0e-9)
+    assert tally.drive_integral[TORQUE] == pytest.approx(0.5 * torque, rel=1.0e-12)
+
+
+def test_the_feed_forward_follows_the_phase_of_the_wanted_motion():
+    """Linear between its phases, and from the last on to the first: over a turn its mean is the table's."""
+    table = {"feed_forward_nm": [1.0, -2.0, 0.5], "feed_forward_phase": [0.0, 0.25, 0.75]}
+    _, tally, _ = _advance(_rotor(**table), TURN / SPEED, tolerance_m=1.0e-10)
+    mean = 0.25 * (1.0 - 2.0) / 2.0 + 0.5 * (-2.0 + 0.5) / 2.0 + 0.25 * (0.5 + 1.0) / 2.0
+    assert tally.drive_integral[TORQUE] * SPEED / TURN == pytest.approx(mean, rel=1.0e-6)
+
+
+def test_without_gains_it_is_a_constant_torque(document):
+    constant = document("four_bar")
+    constant["drive"] = {"body": "crank", "torque": -0.3, "initial_speed": SPEED}
+    tracked = _tracked(document, "four_bar", feed_forward_nm=-0.3)
+    a, b = (_advance(parse_mechanism(one, "four_bar"), 0.6)[0] for one in (tracked, constant))
+    assert abs(a.q[1, 2] - 0.6 * SPEED) > 0.1  # it has left the motion to follow
+    np.testing.assert_allclose(a.state.y, b.state.y, rtol=0.0, atol=1.0e-9)
+
+
+def test_high_gains_tend_to_a_constant_speed(document):
+    """Ten times the gains, a tenth of the error; the torque tends to that of the ideal linkage."""
+    errors, torques = [], []
+    for gain in (1.0, 10.0, 100.0):
+        gains = {"kp_nm_per_rad": 30.0 * gain, "kd_nm_s_per_rad": 10.0 * gain}
+        mechanism = parse_mechanism(_tracked(document, "four_bar", **gains), "four_bar")
+        run, _, _ = _advance(mechanism, 1.0)
+        errors.append(abs(run.q[1, 2] - SPEED * 1.0))
+        torques.append(run.sample().drive_torque)
+    assert errors[1] == pytest.approx(0.1 * errors[0], rel=0.1)
+    assert errors[2] == pytest.approx(0.01 * errors[0], rel=0.1)
+    steady = document("four_bar")
+    steady["drive"] = {"body": "crank", "speed": SPEED}
+    wanted = _advance(parse_mechanism(steady, "four_bar"), 1.0)[0].sample().drive_torque
+    assert torques[2] == pytest.approx(wanted, rel=5.0e-3)
+
+
+def test_the_ideal_torque_as_feed_forward_leaves_little_to_the_gains(document):
+    steady = document("four_bar")
+    steady["drive"] = {"body": "crank", "speed": SPEED}
+    linkage = prepare(parse_mechanism(steady, "four_bar"), clearances=()).linkage
+    table = {
+        "feed_forward_nm": one_cycle(linkage, 128, SPEED).drive_torque.tolist(),
+        "feed_forward_phase": (np.arange(128) / 128).tolist(),
+    }
+    gains = {"kp_nm_per_rad": 2.0, "kd_nm_s_per_rad": 0.1}
+    bare, fed = (
+        _advance(parse_mechanism(_tracked(document, "four_bar", **gains, **more), "four_bar"), 1.0)[0]
+        for more in ({}, table)
+    )
+    assert abs(fed.q[1, 2] - SPEED) < 1.0e-3 * abs(bare.q[1, 2] - SPEED)
+
+
+@pytest.mark.parametrize("clearances", [(), ("B",)])
+def test_the_work_of_the_drive_is_in_the_energy(document, clearances):
+    """With a limit that is reached, so that the torque is not that of a spring and a damper."""
+    four_bar = _tracked(
+        document, "four_bar", kp_nm_per_rad=8.0, kd_nm_s_per_rad=1.0, feed_forward_nm=0.1, max_torque_nm=0.2
+    )
+    run, tally, stored = _advance(
+        parse_mechanism(four_bar, "four_bar"), 0.5, clearances=clearances, tolerance_m=1.0e-11
+    )
+    lost = tally.integral[:, [FRICTION, DISSIPATION]].sum()
+    assert tally.drive_range[1] == 0.2
+    assert tally.drive_integral[POWER] == pytest.approx(
+        run.stored_energy - stored + lost, rel=1.0e-8 if not clearances else 1.0e-4
+    )
+
+
+def test_simulate_counts_the_turns_it_made(document):
+    """At a slow pace and with a stiff controller these are those asked for, but for the little it lags."""
+    mechanism = parse_mechanism(
+        _tracked(document, "four_bar", kp_nm_per_rad=300.0, kd_nm_s_per_rad=30.0), "four_bar"
+    )
+    result = simulate(mechanism, clearances=(), cycles=2.0, trace=8)
+    assert result.model == "full"
+    assert result.cycles == pytest.approx(2.0, abs=1.0e-3)
+    assert result.speed_rpm == pytest.approx(60.0 * SPEED / TURN, rel=1.0e-3)
+    assert abs(result.energy_j["residual"]) < 1.0e-6
+    assert len(result.trace["crank_angle_rad"]) == 16
+    faster = simulate(mechanism, clearances=(), cycles=1.0, speed_rpm=90.0)
+    assert faster.speed_rpm == pytest.approx(90.0, rel=1.0e-3)
+
+
+def test_the_clearance_model_says_what_it_needs(document):
+    mechanism = parse_mechanism(_tracked(document, "four_bar", kp_nm_per_rad=1.0), "my_leg.yaml")
+    told = r"^my_leg.yaml: drive.track: the clearance model needs drive.speed; try --model full$"
+    with pytest.raises(ConfigError, match=told):
+        simulate(mechanism, model="clearance")
+
+
+@pytest.mark.parametrize(
+    ("track", "fault"),
+    [
+        ({"speed_radps": 0.0}, r"drive.track.speed_radps: 0.0 rad/s does not turn the crank"),
+        ({"kp_nm_per_rad": -1.0}, r"drive.track.kp_nm_per_rad: -1.0 is not at least 0 N m/rad"),
+        ({"max_torque_nm": 0.0}, r"drive.track.max_torque_nm: 0.0 is not above 0 N m"),
+        ({"kp": 1.0}, r"drive.track.kp: unknown key"),
+        ({"feed_forward_nm": "much"}, r"drive.track.feed_forward_nm: 'much' is not a number"),
+        (
+            {"feed_forward_nm": [1.0, 2.0]},
+            r"drive.track.feed_forward_nm: has 2 torques for 1 phases, expected one each",
+        ),
+        (
+            {"feed_forward_nm": [1.0, 2.0], "feed_forward_phase": [0.5, 0.5]},
+            r"drive.track.feed_forward_phase: \[0.5, 0.5\] does not increase",
+        ),
+    ],
+)
+def test_a_controller_that_cannot_be_is_refused(track, fault):
+    with pytest.raises(ConfigError, match=fault):
+        _rotor(**track)
+
+
+def test_one_kind_of_drive_at_a_time(document):
+    four_bar = _tracked(document, "four_bar")
+    four_bar["drive"]["torque"] = 1.0
+    with pytest.raises(ConfigError, match=r"drive: has torque and track, expected one of speed .*, track"):
+        parse_mechanism(four_bar, "four_bar")

@@ -1,0 +1,124 @@
+"""Sums of a run against numpy's on the same samples."""
+
+import numpy as np
+import pytest
+from hypothesis import given
+from hypothesis import strategies as st
+from hypothesis.extra.numpy import arrays
+
+from leg_wear_monitor.dynamics.run.run_statistics import (
+    DRIVE_RATES,
+    FORCE,
+    JOINT_RATES,
+    TORQUE,
+    add_step,
+    begin_impact,
+    bin_of,
+    end_impact,
+    new_tally,
+    parabola_peak,
+    percentile,
+    raise_peak,
+    signed_percentile,
+)
+
+pytestmark = pytest.mark.plain
+
+BIN = 1.0085  # ratio of two bins' magnitudes
+
+magnitudes = arrays(float, st.integers(1, 200), elements=st.floats(1.0e-3, 1.0e5))
+signed = st.tuples(st.sampled_from([-1.0, 1.0]), st.floats(1.0e-3, 1.0e5)).map(np.prod)
+shares = st.floats(0.0, 1.0, exclude_min=True)
+
+
+def _histogram(samples):
+    """Equal time at each sample."""
+    seconds = np.zeros(new_tally(1).force_time.shape[1])
+    for sample in samples:
+        seconds[bin_of(sample)] += 0.001
+    return seconds
+
+
+@given(samples=magnitudes, share=shares)
+def test_percentile_divides_the_time_to_the_width_of_a_bin(samples, share):
+    got = percentile(_histogram(samples), share)
+    assert np.mean(samples <= got * BIN) >= share - 1.0e-9
+    assert np.mean(samples < got / BIN) <= share + 1.0e-9
+
+
+@given(samples=st.lists(signed, min_size=2, max_size=60).map(np.array), share=shares)
+def test_signed_percentile_divides_the_time_too(samples, share):
+    below, above = -samples[samples < 0.0], samples[samples > 0.0]
+    got = signed_percentile(np.array([_histogram(below), _histogram(above)]), share)
+    slack = (BIN - 1.0) * abs(got)
+    assert np.mean(samples <= got + slack) >= share - 1.0e-9
+    assert np.mean(samples < got - slack) <= share + 1.0e-9
+
+
+@pytest.mark.parametrize("share", [0.01, 0.5, 0.9, 0.99])
+def test_percentile_of_many_samples_is_numpys(share):
+    samples = np.random.default_rng(2).lognormal(3.0, 2.0, 20_000)
+    wanted = np.percentile(samples, 100.0 * share)
+    assert percentile(_histogram(samples), share) == pytest.approx(wanted, rel=BIN - 1.0)
+
+
+def test_percentile_of_nothing_is_nothing():
+    assert percentile(_histogram([]), 0.99) == 0.0
+    assert signed_percentile(np.zeros((2, 16)), 0.99) == 0.0
+
+
+@given(rates=arrays(float, (4, 2, JOINT_RATES), elements=st.floats(0.0, 1.0e3)), h=st.floats(1.0e-9, 1.0e-3))
+def test_a_step_adds_its_quadrature_and_its_end(rates, h):
+    tally, weights = new_tally(2), np.array([0.5, 0.0, 0.3, 0.2])
+    drive = -rates[:, 0, :DRIVE_RATES]
+    for _ in range(2):
+        add_step(tally, h, weights, rates, drive)
+    assert tally.time[0] == pytest.approx(2.0 * h)
+    mean = np.tensordot(weights, rates, axes=1)
+    np.testing.assert_allclose(tally.integral, 2.0 * h * mean, atol=1.0e-15)
+    np.testing.assert_allclose(tally.drive_integral, 2.0 * h * (weights @ drive), atol=1.0e-15)
+    np.testing.assert_array_equal(tally.peak, rates[-1, :, FORCE])
+    np.testing.assert_array_equal(tally.drive_range, drive[-1, TORQUE])
+    assert tally.force_time.sum(axis=1) == pytest.approx(2.0 * h)
+    assert tally.torque_time.sum() == pytest.approx(2.0 * h)
+
+
+@given(
+    apex=st.floats(-1.0, 1.0), top=st.floats(-1.0e4, 1.0e4), sharp=st.floats(0.1, 1.0e4),
+    before=st.floats(0.01, 1.0), gap=st.floats(0.01, 1.0), share=st.floats(0.0, 1.0),
+)  # fmt: skip
+def test_peak_of_a_parabola_is_exact(apex, top, sharp, before, gap, share):
+    """Three samples of which the middle one is largest, wherever the apex lies among them."""
+    middle = apex + (share - 0.5) * min(before, gap)
+    t = np.array([middle - before, middle, middle + gap])
+    f = top - sharp * (t - apex) ** 2
+    got = parabola_peak(t[0], f[0], t[1], f[1], t[2], f[2])
+    assert got == pytest.approx(top, abs=1.0e-9 * (abs(top) + np.abs(f).max() + sharp / min(before, gap)))
+
+
+def test_three_samples_in_a_line_have_no_other_peak():
+    assert parabola_peak(0.0, 2.0, 1.0, 2.0, 2.0, 2.0) == 2.0
+
+
+def test_an_impact_is_noted_from_begin_to_end():
+    tally = new_tally(2)
+    impact, impacts = tally.impact, tally.impacts
+    begin_impact(impact, impacts, 1, 0.1, 0.5)
+    raise_peak(tally.peak, impact, impacts, 1, 30.0)
+    raise_peak(tally.peak, impact, impacts, 1, 20.0)
+    assert np.isnan(impact[1, 0, 2])
+    end_impact(impact, impacts, 1, 0.2)
+    raise_peak(tally.peak, impact, impacts, 1, 99.0)  # no contact any more: the impact keeps its peak
+    end_impact(impact, impacts, 1, 0.3)
+    np.testing.assert_array_equal(impact[1, 0], [0.1, 0.5, 0.2, 30.0])
+    assert list(impacts) == [0, 1]
+
+
+def test_impacts_beyond_the_room_are_counted():
+    tally = new_tally(1)
+    room = tally.impact.shape[1]
+    for i in range(room + 5):
+        begin_impact(tally.impact, tally.impacts, 0, float(i), 1.0)
+        end_impact(tally.impact, tally.impacts, 0, i + 0.5)
+    assert tally.impacts[0] == room + 5
+    assert tally.impact[0, -1, 0] == room - 1.0

@@ -1,0 +1,144 @@
+"""A life by cycle jumps: what it keeps, what it repeats, and that it meets the wear it jumps over."""
+
+import math
+from itertools import pairwise
+
+import attrs
+import numpy as np
+import pytest
+
+from leg_wear_monitor import ConfigError, SimulationError
+from leg_wear_monitor.dynamics.batch.leg import Leg
+from leg_wear_monitor.dynamics.clearance.run import ClearanceStepper
+from leg_wear_monitor.dynamics.run.drive import steady_drive
+from leg_wear_monitor.dynamics.run.protocol import DONE
+from leg_wear_monitor.dynamics.run.run_statistics import new_tally
+from leg_wear_monitor.dynamics.simulation import prepare
+from leg_wear_monitor.life import life as life_module
+from leg_wear_monitor.life.life import LifeRun, LifeSettings, simulate_life
+from leg_wear_monitor.wear.cycle_jump import JumpControl
+from leg_wear_monitor.wear.surfaces import Surfaces, worn_volume
+
+SHORT = LifeSettings(legs=2, cycles=3, settle_cycles=1)
+
+
+@pytest.fixture(scope="module")
+def lived(leg):
+    """Two joints' life to where the first has opened by a fifth."""
+    run = LifeRun(leg, SHORT, clearances=("A", "B"))
+    return run, simulate_life(run, limit_m=3.6e-4, horizon_cycles=1e9)
+
+
+def test_volume_worn_is_coefficient_times_archard_integral(leg, lived):
+    run, _ = lived
+    setup, last = prepare(leg, clearances=("A", "B"), wear=True), run.points[-1]
+    volume = worn_volume(setup.contacts, Surfaces(last.depth, 1))
+    expected = setup.contacts.wear_coefficient * last.archard_j[:, None]
+    # what is pending when a cycle is counted is worn off in the next one
+    np.testing.assert_allclose(volume, expected, rtol=2e-3)
+
+
+def test_a_jump_repeats_the_mean_wear_of_a_cycle_at_its_ends(lived):
+    for here, there in pairwise(lived[0].points):
+        rate = 0.5 * (here.rate.depth + there.rate.depth)
+        grown = there.depth - here.depth
+        np.testing.assert_allclose(grown, (there.cycles - here.cycles) * rate, rtol=1e-9, atol=1e-15)
+
+
+def test_clearances_only_grow_and_the_life_ends_at_the_first_limit(lived):
+    _, life = lived
+    assert (np.diff(life.clearance_m, axis=0) >= 0.0).all()
+    assert (np.diff(life.cycles) > 0.0).all()
+    assert (life.clearance_m[:-1] < 3.6e-4).all()
+    assert life.clearance_m[-1].max() >= 3.6e-4
+    assert (life.clearance_max_m >= life.clearance_m).all()
+
+
+def test_cycles_to_a_clearance_are_read_off_the_life_and_beyond_it_at_its_last_rate(lived):
+    _, life = lived
+    k = int(life.clearance_m[-1].argmax())
+    assert life.cycles_to(k, life.clearance_m[0, k]) == 0.0
+    assert life.cycles_to(k, life.clearance_m[-1, k]) == pytest.approx(life.cycles[-1])
+    beyond = life.cycles_to(k, life.clearance_m[-1, k] + 1e-6) - life.cycles[-1]
+    assert beyond == pytest.approx(1e-6 / life.growth_m_per_cycle[-1, k])
+
+
+def test_all_coefficients_larger_by_a_factor_make_the_same_life_faster(leg):
+    """Wear enters by coefficient times cycles; what is left is the scatter of the cycles simulated."""
+    lives = []
+    for factor in (1.0, 4.0):
+        run = LifeRun(leg, SHORT, clearances=("B",), wear_factor=factor)
+        lives.append([run.jump() for _ in range(2)][-1])
+    slow, fast = lives
+    assert 4.0 * fast.cycles / slow.cycles == pytest.approx(fast.opened_m[0] / slow.opened_m[0], rel=0.1)
+
+
+def test_a_life_goes_on_from_where_another_stopped(leg, lived):
+    run, _ = lived
+    later = LifeRun(leg, SHORT, clearances=("A", "B"), depth=run.points[-1].depth)
+    np.testing.assert_array_equal(later.points[0].opened_m, run.points[-1].opened_m)
+    assert (later.jump().opened_m > run.points[-1].opened_m).all()
+
+
+def test_jumps_meet_every_single_cycle(leg):
+    """Within the scatter of a few hundred cycles; benchmarks/life.py has the long comparison."""
+    cycles, factor = 150, 3000.0
+    setup = prepare(leg, clearances=("A", "B"), wear=True)
+    setup.contacts.wear_coefficient[:] *= factor
+    stepper = ClearanceStepper(setup)
+    start = Leg(mechanism=leg, clearances=("A", "B"), crank_angle_rad=1.0)
+    start.start(stepper)
+    for cycle in range(1, cycles + 1):
+        status = stepper.advance(steady_drive(1.0, setup.speed), float(cycle), new_tally(len(leg.joints)))
+        assert status[0] == DONE
+    every = setup.surfaces.depth.mean(axis=2).sum(axis=1)
+    settings = LifeSettings(legs=2, cycles=5, jump=JumpControl(opens_m=2e-5))
+    run = LifeRun(leg, settings, clearances=("A", "B"), wear_factor=factor)
+    simulate_life(run, limit_m=9.0e-3, horizon_cycles=float(cycles))
+    assert run.points[-1].cycles == pytest.approx(cycles)
+    np.testing.assert_allclose(run.points[-1].opened_m, every, rtol=0.12)
+
+
+@pytest.mark.parametrize(
+    ("limit_m", "meant"),
+    [
+        (3.0e-4, None),
+        (2.0e-4, None),
+        (0.0, None),
+        (-6.0e-4, None),
+        (math.nan, None),
+        (math.inf, None),
+        (1.0e-2, None),
+        (0.6, "did you mean 0.0006 m (0.6 mm)?"),
+        (600.0, "did you mean 0.0006 m (0.6 mm)?"),
+        (6.0e-7, "did you mean 0.0006 m (0.6 mm)?"),
+    ],
+)
+def test_a_limit_lies_between_the_new_clearance_and_the_bushing(lived, limit_m, meant):
+    """Nothing else ends a life: below, the limit is behind from the start; above, no clearance gets there."""
+    with pytest.raises(ConfigError, match=r"^limit-m: .* is not between 0.0003 m, the new clearance") as told:
+        simulate_life(lived[0], limit_m=limit_m, horizon_cycles=1e9)
+    assert "0.01 m, the radius of its bushing" in str(told.value)
+    assert str(told.value).endswith(meant or "bushing")
+
+
+def test_every_joint_has_a_limit_of_its_own(lived):
+    with pytest.raises(ConfigError, match=r"0.0002 m is not between .* joint B"):
+        simulate_life(lived[0], limit_m=[3.6e-4, 2.0e-4], horizon_cycles=1e9)
+
+
+def test_jumps_too_short_to_reach_the_limit_are_refused(leg):
+    run = LifeRun(leg, attrs.evolve(SHORT, jump=JumpControl.of(1e-12)), clearances=("A",))
+    with pytest.raises(ConfigError, match=r"^opens-m: 1e-12 m a jump takes 3e\+08 jumps"):
+        simulate_life(run, limit_m=6e-4, horizon_cycles=1e9)
+
+
+def test_a_life_that_takes_too_many_jumps_says_so(lived, monkeypatch):
+    monkeypatch.setattr(life_module, "MOST_JUMPS", 1)
+    with pytest.raises(SimulationError, match="does not end within 1 jumps"):
+        simulate_life(lived[0], limit_m=9e-3, horizon_cycles=1e9)
+
+
+def test_a_leg_without_loose_joints_has_no_life(leg):
+    with pytest.raises(ConfigError, match="no joint is loose"):
+        LifeRun(leg, clearances=())

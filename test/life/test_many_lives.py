@@ -1,0 +1,39 @@
+"""Lives that spread: in each the first joint goes all the way, and their ends fill the room of clearances."""
+
+from itertools import islice
+
+import numpy as np
+import pytest
+
+from leg_wear_monitor.life.life import LifeRun, LifeSettings
+from leg_wear_monitor.life.many_lives import LEAST_SHARE, spread_factors
+from leg_wear_monitor.life.result import life_of
+
+
+@pytest.fixture(scope="module")
+def begun(leg):
+    """Two joints' life by one jump."""
+    run = LifeRun(leg, LifeSettings(legs=1, cycles=3), clearances=("A", "J"))
+    run.jump()
+    return run
+
+
+def test_factors_make_up_for_what_joints_grow(begun):
+    opened = begun.points[-1].opened_m
+    factors = np.array(list(islice(spread_factors(begun.life), 200)))
+    ends = factors * opened / opened.max()
+    np.testing.assert_allclose(ends.max(axis=1), 1.0)
+    assert ends.min() >= LEAST_SHARE
+    # each joint is the first as often as the other, and the other's shares are spread evenly
+    assert 0.45 < (ends[:, 0] == 1.0).mean() < 0.55
+    others = np.sort(ends.min(axis=1))
+    assert np.abs(others - np.linspace(LEAST_SHARE, 1.0, 200)).max() < 0.05
+
+
+def test_a_joint_that_is_held_wears_no_further_and_the_other_goes_on(begun):
+    was = begun.points[-1].opened_m
+    begun.hold(0)
+    now = begun.jump().opened_m
+    assert now[0] == was[0]
+    assert now[1] > was[1]
+    assert life_of(begun.loose, begun.fresh_m, begun.points).growth_m_per_cycle[-1, 0] == 0.0

@@ -1,0 +1,233 @@
+"""Every message is read as rosbags and mcap-ros2-support read it, in either byte order, whole or not."""
+
+import math
+from collections.abc import Callable
+from typing import Any
+
+import numpy as np
+import pytest
+from hypothesis import example, given
+from hypothesis import strategies as st
+
+from leg_wear_monitor.messages.cdr import FLOAT64, JOINT_STATE, MESSAGE, TYPES, WRENCH_STAMPED
+from leg_wear_monitor.messages.decode import Decoder
+from leg_wear_monitor.monitor.config.inputs import Crank, DriveTorque, Encoders
+from leg_wear_monitor.monitor.config.settings import MonitorConfig
+from leg_wear_monitor.twin.sample import (
+    CRANK,
+    EMPTY,
+    FAULTS,
+    MISSING_JOINT,
+    NO_FAULT,
+    NOT_FINITE,
+    TORQUE,
+    UNDECODABLE,
+    WRONG_LENGTH,
+    ZERO_STAMP,
+)
+
+pytestmark = pytest.mark.plain
+
+NAME = {code: name for name, code in TYPES.items()}
+CRANK_NAME = "ζ_crank"
+BY_EFFORT = MonitorConfig(crank_joint=CRANK_NAME, drive_torque=DriveTorque(source="effort"))
+
+numbers = st.floats(width=64)
+stamps = st.integers(0, 2**31 * 10**9 - 1)
+frames = st.text(st.characters(exclude_characters="\0", exclude_categories=["Cs"]), max_size=9)
+joints = st.lists(st.sampled_from(["hip", "knee", "a", "", CRANK_NAME, "crank"]), max_size=8)
+
+
+def same(mine: float, theirs: float) -> bool:
+    """Bit for bit, but for the sign and the payload of a NaN."""
+    return mine == theirs or (math.isnan(mine) and math.isnan(theirs))
+
+
+def expected_crank(message: Any, crank: str) -> tuple[int, float, float, float]:
+    """What a JointState means, told once more in plain words: fault, position, velocity, effort."""
+    nothing = (math.nan, math.nan, math.nan)
+    count = len(message.name)
+    if not count or not len(message.position):
+        return EMPTY, *nothing
+    if len(message.position) != count or {len(message.velocity), len(message.effort)} - {0, count}:
+        return WRONG_LENGTH, *nothing
+    if crank not in message.name:
+        return MISSING_JOINT, *nothing
+    index = list(message.name).index(crank)
+    position, velocity, effort = (
+        float(values[index]) if len(values) else math.nan
+        for values in (message.position, message.velocity, message.effort)
+    )
+    well = math.isfinite(position) and not math.isinf(velocity) and not math.isinf(effort)
+    return NO_FAULT if well else NOT_FINITE, position, velocity, effort
+
+
+@st.composite
+def joint_states(draw: st.DrawFn) -> dict[str, Any]:
+    """Parts of a JointState: mostly consistent, at times not."""
+    name = draw(joints)
+    lengths = st.one_of(st.just(len(name)), st.just(len(name)), st.integers(0, 3))
+    values = {
+        part: draw(lengths.flatmap(lambda size: st.lists(numbers, min_size=size, max_size=size)))
+        for part in ("position", "velocity", "effort")
+    }
+    return {"name": name, "stamp_ns": draw(stamps), "frame": draw(frames), **values}
+
+
+@given(parts=joint_states(), little=st.booleans(), padding=st.integers(0, 15))
+@example(parts={"name": [], "stamp_ns": 0, "frame": ""}, little=True, padding=0)
+def test_a_joint_state_is_read_as_the_libraries_read_it(
+    store: Any,
+    joint_state: Callable[..., Any],
+    foreign: Callable[[str, bytes], Any],
+    parts: dict[str, Any],
+    little: bool,
+    padding: int,
+) -> None:
+    raw = bytes(store.serialize_cdr(joint_state(**parts), NAME[JOINT_STATE], little_endian=little))
+    assert raw[1] == little
+    ours = Decoder(BY_EFFORT).one(raw + bytes(padding), JOINT_STATE)[0]
+    for message in (store.deserialize_cdr(raw, NAME[JOINT_STATE]), foreign(NAME[JOINT_STATE], raw)):
+        fault, position, velocity, effort = expected_crank(message, CRANK_NAME)
+        stamp = message.header.stamp
+        assert ours["stamp_ns"] == stamp.sec * 10**9 + stamp.nanosec == parts["stamp_ns"]
+        assert ours["kind"] == CRANK
+        zero = parts["stamp_ns"] == 0 and fault == NO_FAULT
+        assert FAULTS[ours["fault"]] == FAULTS[ZERO_STAMP if zero else fault]
+        assert same(ours["crank_angle_rad"], position)
+        assert same(ours["crank_velocity_radps"], velocity)
+        assert same(ours["torque_nm"], effort)
+
+
+@given(
+    force=st.tuples(numbers, numbers, numbers),
+    torque=st.tuples(numbers, numbers, numbers),
+    stamp_ns=stamps.filter(bool),
+    frame=frames,
+    axis=st.sampled_from("xyz"),
+    little=st.booleans(),
+)
+def test_a_wrench_is_read_as_the_libraries_read_it(
+    store: Any,
+    wrench: Callable[..., Any],
+    foreign: Callable[[str, bytes], Any],
+    axis: str,
+    little: bool,
+    **parts: Any,
+) -> None:
+    raw = bytes(store.serialize_cdr(wrench(**parts), NAME[WRENCH_STAMPED], little_endian=little))
+    ours = Decoder(MonitorConfig(drive_torque=DriveTorque(axis=axis))).one(raw, WRENCH_STAMPED)[0]
+    for message in (store.deserialize_cdr(raw, NAME[WRENCH_STAMPED]), foreign(NAME[WRENCH_STAMPED], raw)):
+        stamp, about = message.header.stamp, getattr(message.wrench.torque, axis)
+        assert ours["stamp_ns"] == stamp.sec * 10**9 + stamp.nanosec
+        assert ours["kind"] == TORQUE
+        assert same(ours["torque_nm"], about)
+        assert ours["fault"] == (NO_FAULT if math.isfinite(about) else NOT_FINITE)
+        assert math.isnan(ours["crank_angle_rad"])
+
+
+@given(number=numbers, little=st.booleans())
+def test_a_float64_is_read_and_stamped_with_its_log_time(store: Any, number: float, little: bool) -> None:
+    message = store.types[NAME[FLOAT64]](number)
+    raw = bytes(store.serialize_cdr(message, NAME[FLOAT64], little_endian=little))
+    ours = Decoder(MonitorConfig(drive_torque=DriveTorque(source="float64"))).one(
+        raw, FLOAT64, log_time_ns=17
+    )[0]
+    assert ours["stamp_ns"] == 17
+    assert same(ours["torque_nm"], number)
+    assert ours["fault"] == (NO_FAULT if math.isfinite(number) else NOT_FINITE)
+
+
+@given(parts=joint_states(), data=st.data())
+def test_a_message_cut_short_is_undecodable(
+    store: Any, joint_state: Callable[..., Any], parts: dict[str, Any], data: st.DataObject
+) -> None:
+    raw = bytes(store.serialize_cdr(joint_state(**parts), NAME[JOINT_STATE]))
+    cut = data.draw(st.integers(0, len(raw) - 1))
+    sample = Decoder(MonitorConfig()).one(raw[:cut], JOINT_STATE)[0]
+    assert sample["fault"] == UNDECODABLE
+    assert math.isnan(sample["crank_angle_rad"])
+
+
+@given(
+    raw=st.binary(max_size=200), kind=st.sampled_from(list(NAME)), start=st.sampled_from([b"", b"\0\1\0\0"])
+)
+def test_any_bytes_give_one_sample_and_no_crash(raw: bytes, kind: int, start: bytes) -> None:
+    sample = Decoder(MonitorConfig()).one(start + raw, kind)
+    assert sample.shape == (1,)
+    assert sample["fault"][0] in FAULTS
+
+
+@pytest.mark.parametrize("kind", [2, 3, 6, 7, 8, 9, 10, 11, 0x0101])
+def test_other_encapsulations_are_not_guessed_at(
+    store: Any, joint_state: Callable[..., Any], kind: int
+) -> None:
+    raw = bytes(store.serialize_cdr(joint_state(["crank"], [1.0]), NAME[JOINT_STATE]))
+    other = kind.to_bytes(2, "big") + raw[2:]
+    assert Decoder(MonitorConfig()).one(other, JOINT_STATE)["fault"][0] == UNDECODABLE
+
+
+def test_a_message_of_another_type_does_not_pass(
+    store: Any, joint_state: Callable[..., Any], wrench: Any
+) -> None:
+    joints_raw = bytes(store.serialize_cdr(joint_state(["crank"], [1.0], stamp_ns=9), NAME[JOINT_STATE]))
+    wrench_raw = bytes(store.serialize_cdr(wrench((1, 2, 3), (4, 5, 6), 9), NAME[WRENCH_STAMPED]))
+    decoder = Decoder(MonitorConfig())
+    assert decoder.one(wrench_raw, JOINT_STATE)["fault"][0] == UNDECODABLE
+    assert decoder.one(joints_raw, WRENCH_STAMPED)["fault"][0] == UNDECODABLE
+    assert decoder.one(joints_raw, FLOAT64)["fault"][0] == UNDECODABLE
+
+
+def test_sign_scale_and_offset_are_applied(store: Any, joint_state: Callable[..., Any]) -> None:
+    config = MonitorConfig(
+        crank=Crank(sign=-1, gear_ratio=2.0, offset_rad=0.25),
+        drive_torque=DriveTorque(source="effort", sign=-1, scale=0.5, gear_ratio=40.0),
+    )
+    raw = bytes(store.serialize_cdr(joint_state(["crank"], [3.0], [4.0], [0.125]), NAME[JOINT_STATE]))
+    sample = Decoder(config).one(raw, JOINT_STATE)[0]
+    assert sample["crank_angle_rad"] == -1.25
+    assert sample["crank_velocity_radps"] == -2.0
+    assert sample["torque_nm"] == -2.5
+
+
+@given(parts=st.lists(joint_states(), min_size=1, max_size=6), gap=st.integers(0, 9))
+def test_many_at_once_are_as_one_by_one(
+    store: Any, joint_state: Callable[..., Any], parts: list[dict[str, Any]], gap: int
+) -> None:
+    """Wherever messages lie among other bytes, aligned or not."""
+    raws = [bytes(store.serialize_cdr(joint_state(**each), NAME[JOINT_STATE])) for each in parts]
+    data, messages = b"", np.zeros(len(raws), MESSAGE)
+    for i, raw in enumerate(raws):
+        data += b"\xff" * gap
+        messages[i] = (len(data), len(data) + len(raw), 5, 5, JOINT_STATE)
+        data += raw
+    decoder = Decoder(MonitorConfig())
+    together = decoder.many(np.frombuffer(data, np.uint8), messages)
+    alone = np.concatenate([decoder.one(raw, JOINT_STATE, 5) for raw in raws])
+    assert together.tobytes() == alone.tobytes()
+
+
+ENCODERS_TOO = MonitorConfig(
+    crank_joint=CRANK_NAME,
+    encoders=Encoders(names=("hip", "a"), joints=("B", "G"), signs=(1.0, -1.0)),
+)
+
+
+@given(parts=joint_states(), little=st.booleans())
+def test_further_encoders_are_read_with_the_crank(
+    store: Any, joint_state: Callable[..., Any], parts: dict[str, Any], little: bool
+) -> None:
+    """Absent or no angle, it is no fault of the sample; a faulty sample has none."""
+    message = joint_state(**parts)
+    raw = bytes(store.serialize_cdr(message, NAME[JOINT_STATE], little_endian=little))
+    sample = Decoder(ENCODERS_TOO).one(raw, JOINT_STATE)[0]
+    plain = Decoder(BY_EFFORT).one(raw, JOINT_STATE)[0]
+    assert sample["fault"] == plain["fault"]
+    names, angles = list(message.name), sample["encoder_rad"]
+    assert np.isnan(angles[2:]).all()
+    for angle, name, sign in zip(angles[:2], ("hip", "a"), (1.0, -1.0), strict=True):
+        if expected_crank(message, CRANK_NAME)[0] != NO_FAULT or name not in names:
+            assert math.isnan(angle)
+            continue
+        position = float(message.position[names.index(name)])
+        assert angle == sign * position if math.isfinite(position) else math.isinf(angle)

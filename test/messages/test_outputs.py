@@ -1,0 +1,215 @@
+"""What the monitor's topics carry: read back by rosbags, it is what was reported."""
+
+import math
+from collections.abc import Callable
+from itertools import pairwise
+from typing import Any
+
+import attrs
+import numpy as np
+import pytest
+
+from leg_wear_monitor.messages.forecast_times import ForecastTimes
+from leg_wear_monitor.messages.outputs import (
+    ALARMS,
+    CLEARANCES,
+    DIAGNOSTICS,
+    FORECAST,
+    IMPACTS,
+    TORQUE,
+    Messages,
+    plain,
+    topic_of,
+)
+from leg_wear_monitor.monitor.alarms.alarm import Alarm, Level
+from leg_wear_monitor.monitor.config.inputs import DriveTorque
+from leg_wear_monitor.monitor.config.settings import MonitorConfig
+from leg_wear_monitor.monitor.forecast.forecast import Answer, JointForecast, LegForecast, Quantiles
+from leg_wear_monitor.monitor.reports import (
+    AlarmList,
+    CycleReport,
+    JointReport,
+    Lost,
+    Remaining,
+    Reports,
+    SampleReports,
+    Status,
+)
+from leg_wear_monitor.playback.replay import node_beside
+from leg_wear_monitor.twin.sample import CRANK
+from leg_wear_monitor.twin.sample import TORQUE as TORQUE_SAMPLE
+
+pytestmark = pytest.mark.plain
+
+LOOSE = ("A", "G")
+
+
+@pytest.fixture(scope="module")
+def reports() -> Reports:
+    nan = math.nan
+    samples = SampleReports(
+        stamp_ns=np.array([10, 20, 30, 40], np.int64),
+        kind=np.array([CRANK, TORQUE_SAMPLE, CRANK, CRANK]),
+        crank_angle_rad=np.array([nan, 0.1, 0.2, 0.3]),
+        predicted_torque_nm=np.array([nan, 1.5, 2.5, 3.5]),
+        contact_force_n=np.array([[nan, nan], [1.0, 2.0], [3.0, 4.0], [5.0, 6.0]]),
+    )
+    blank = {field.name: 0 for field in attrs.fields(JointReport)}
+    known = {**blank, "forecast": None, "clearance_m": 3e-4, "growth_mps": 1e-15, "peak_force_n": 50.0}
+    joints = (
+        JointReport(**{**known, "joint": "A", "remaining": Remaining(cycles=1e6, hours=277.5)}),
+        JointReport(**{**known, "joint": "G", "growth_mps": None, "remaining": None}),
+    )
+    blank = {field.name: 0 for field in attrs.fields(CycleReport)}
+    cycle = CycleReport(**{**blank, "stamp_ns": 35, "joints": joints, "forecast": None})
+    alarm = Alarm(
+        kind="clearance", subject="A", unit="m", level=Level.ERROR, present=Level.OK, value=6e-4, limit=5e-4,
+        raised_ns=1_700_000_000_123_456_789,
+    )  # fmt: skip
+    lost = Lost(**{**{field.name: 0 for field in attrs.fields(Lost)}, "faulty": {}})
+    return Reports(samples, (cycle,), (AlarmList(36, (alarm,)),), lost)
+
+
+@pytest.fixture(scope="module")
+def sent(store: Any, reports: Reports) -> dict[str, list[Any]]:
+    """Messages by the name of their topic, as rosbags reads them."""
+    messages: dict[str, list[Any]] = {}
+    for outgoing in Messages(MonitorConfig(), LOOSE).of(reports):
+        assert len(outgoing.stamp_ns) == len(outgoing.messages)
+        for stamp, row in zip(outgoing.stamp_ns.tolist(), outgoing.messages, strict=True):
+            message = store.deserialize_cdr(row.tobytes(), outgoing.output.type)
+            assert message.header.stamp.sec * 10**9 + message.header.stamp.nanosec == stamp
+            messages.setdefault(outgoing.output.name, []).append(message)
+    return messages
+
+
+def test_forces_are_of_the_crank_samples_that_were_followed(sent: dict[str, list[Any]]) -> None:
+    forces = sent[IMPACTS.name]
+    assert [list(message.name) for message in forces] == [["A_impact", "G_impact"]] * 2
+    assert [message.effort.tolist() for message in forces] == [[3.0, 4.0], [5.0, 6.0]]
+    assert all(message.header.frame_id == "pelvis" for message in forces)
+
+
+def test_torque_is_of_all_samples_that_were_followed(sent: dict[str, list[Any]]) -> None:
+    assert [message.wrench.torque.z for message in sent[TORQUE.name]] == [1.5, 2.5, 3.5]
+    assert [message.wrench.torque.x for message in sent[TORQUE.name]] == [0.0] * 3
+
+
+def test_torque_is_about_the_axis_of_the_parameters(store: Any, reports: Reports) -> None:
+    config = MonitorConfig(drive_torque=DriveTorque(axis="x"), publish_impact_forces=False)
+    (outgoing,) = Messages(config, LOOSE).of_samples(reports.samples)
+    message = store.deserialize_cdr(outgoing.messages[0].tobytes(), outgoing.output.type)
+    assert (message.wrench.torque.x, message.wrench.torque.z) == (1.5, 0.0)
+
+
+def test_clearances_are_those_of_the_gait_cycle(sent: dict[str, list[Any]]) -> None:
+    (message,) = sent[CLEARANCES.name]
+    assert list(message.name) == ["A_clearance", "G_clearance"]
+    assert message.position.tolist() == [3e-4, 3e-4]
+    assert message.velocity[0] == 1e-15 and math.isnan(message.velocity[1])
+    assert message.effort.tolist() == [50.0, 50.0]
+
+
+def test_an_alarm_keeps_its_name_and_gives_plain_numbers(sent: dict[str, list[Any]]) -> None:
+    ((status,),) = (message.status for message in sent[ALARMS.name])
+    assert status.name == "leg_wear_monitor: clearance A"
+    assert (status.level, status.message, status.hardware_id) == (2, "latched", "leg")
+    values = {pair.key: pair.value for pair in status.values}
+    assert values["value_m"] == "0.0006"
+    assert values["limit_m"] == "0.0005"
+    assert float(values["raised_s"]) == pytest.approx(1_700_000_000.123456, abs=1e-5)
+
+
+def test_a_forecast_says_what_is_known(store: Any, reports: Reports) -> None:
+    of = Quantiles(1.0, 2.0, 3.0)
+    forecast = JointForecast(
+        answer=Answer.KNOWN, cycles=of, hours=of, days=of, clearance_m=of, measurements=2
+    )
+    cycle = reports.cycles[0]
+    third = attrs.evolve(cycle.joints[1], joint="J", forecast=forecast)
+    raw = Messages(MonitorConfig(), LOOSE).forecast(attrs.evolve(cycle, joints=(*cycle.joints, third)))
+    known, unknown, told = store.deserialize_cdr(raw, FORECAST.type).status
+    assert {pair.key: pair.value for pair in known.values} == {
+        "remaining_cycles": "1000000",
+        "remaining_hours": "277.5",
+    }
+    assert not unknown.values
+    assert told.message == Answer.KNOWN.value
+    values = {pair.key: pair.value for pair in told.values}
+    assert [values[f"{share}_hours"] for share in ("p10", "p50", "p90")] == ["1", "2", "3"]
+    assert (values["clearance_p90_m"], values["measurements"]) == ("3", "2")
+
+
+def test_the_leg_s_forecast_is_a_status_after_those_of_the_joints(store: Any, reports: Reports) -> None:
+    of = Quantiles(1.0, 2.0, 3.0)
+    leg = LegForecast(
+        answer=Answer.KNOWN,
+        cycles=of,
+        hours=of,
+        days=of,
+        first_probability={"A": 0.75, "G": 0.25},
+        simulated_lives=9,
+    )
+    raw = Messages(MonitorConfig(), LOOSE).forecast(attrs.evolve(reports.cycles[0], forecast=leg))
+    *joints, told = store.deserialize_cdr(raw, FORECAST.type).status
+    assert [status.name.split(": ")[1] for status in joints] == ["forecast A", "forecast G"]
+    assert (told.name, told.message) == ("leg_wear_monitor: forecast leg", Answer.KNOWN.value)
+    values = {pair.key: pair.value for pair in told.values}
+    assert [values[f"{share}_cycles"] for share in ("p10", "p50", "p90")] == ["1", "2", "3"]
+    assert (values["A_first_probability"], values["simulated_lives"]) == ("0.75", "9")
+
+
+def test_diagnostics_are_the_monitors_status(store: Any) -> None:
+    told = (Status("input", Level.WARN, "look at: input_gaps", {"crank_rate_hz": 199.5}),)
+    raw = Messages(MonitorConfig(hardware_id="left"), LOOSE, node="monitor").diagnostics(7, told)
+    (status,) = store.deserialize_cdr(raw, DIAGNOSTICS.type).status
+    assert (status.name, status.level, status.hardware_id) == ("monitor: input", 1, "left")
+    assert [(pair.key, pair.value) for pair in status.values] == [("crank_rate_hz", "199.5")]
+
+
+@pytest.mark.parametrize(
+    ("value", "text"),
+    [(0.0003, "0.0003"), (0.1 + 0.2, "0.3"), (1e6, "1000000"), (math.nan, "nan"), (math.inf, "inf")],
+)
+def test_numbers_are_plain(value: float, text: str) -> None:
+    assert plain(value) == text
+
+
+def test_topics_are_of_the_node(store: Callable[..., Any]) -> None:
+    assert topic_of(ALARMS, "/robot/leg_wear_monitor") == "/robot/leg_wear_monitor/alarms"
+    assert topic_of(DIAGNOSTICS, "/robot/leg_wear_monitor") == "/diagnostics"
+
+
+@pytest.mark.parametrize("cuts", [[], [3], [1, 2, 3, 4, 5, 6, 7]])
+def test_forecasts_are_due_by_stamps_however_reports_are_cut(reports: Reports, cuts: list[int]) -> None:
+    """Seconds of gait cycles and of changes in order of arrival; some changes are told before their time."""
+    second, told = 10**9, []
+    arrivals = [("cycle", 1), ("change", 2.1), ("cycle", 2), ("cycle", 3), ("cycle", 4), ("change", 5),
+                ("cycle", 5), ("cycle", 70)]  # fmt: skip
+    times = ForecastTimes()
+    for begin, end in pairwise([0, *cuts, len(arrivals)]):
+        part = arrivals[begin:end]
+        cycles = [
+            attrs.evolve(reports.cycles[0], stamp_ns=round(at * second))
+            for what, at in part
+            if what == "cycle"
+        ]
+        alarms = [AlarmList(round(at * second), ()) for what, at in part if what == "change"]
+        now = attrs.evolve(reports, cycles=tuple(cycles), alarms=tuple(alarms))
+        told += [cycle.stamp_ns / second for cycle in times.due(now)]
+    assert told == [1, 3, 5, 70]
+
+
+@pytest.mark.parametrize(
+    ("topic", "node"),
+    [("/joint_states", "/leg_wear_monitor"), ("/robot/left/joint_states", "/robot/left/leg_wear_monitor")],
+)
+def test_a_replay_stands_in_for_the_node_beside_the_topic_of_the_crank(
+    store: Any, topic: str, node: str
+) -> None:
+    assert node_beside(topic) == node
+    config = MonitorConfig().on_node(node)
+    raw = Messages(config, LOOSE, node).diagnostics(7, [Status("input", Level.OK, "", {})])
+    (status,) = store.deserialize_cdr(raw, DIAGNOSTICS.type).status
+    assert status.name == f"{node[1:]}: input"
+    assert status.hardware_id == (node[1:].rpartition("/")[0] or "leg")

@@ -1,0 +1,149 @@
+"""Remaining life of joints and leg: closed forms, what widens it, what it refuses to say."""
+
+import math
+import statistics
+
+import attrs
+import numpy as np
+import pytest
+from hypothesis import given
+from hypothesis import strategies as st
+
+from leg_wear_monitor.monitor.config.forecast import Forecasting
+from leg_wear_monitor.monitor.forecast.forecast import Answer, JointNow, forecast
+from leg_wear_monitor.monitor.forecast.growth_law import GrowthLaw, no_law
+from leg_wear_monitor.monitor.forecast.wear_coefficients import Look, believe
+
+pytestmark = pytest.mark.plain
+
+SETTINGS = Forecasting(model_sigma=0.05)
+SURE = Forecasting(load_sigma=0.0, model_sigma=0.0, clearance_sigma_m=1e-9, duty_sigma=0.0)
+NOW = JointNow(joint="A", fresh_m=3e-4, wear_m=0.0, limit_m=6e-4, growth_m=1.5e-11, growth_error_m=0.0)
+B = attrs.evolve(NOW, joint="B", growth_m=5e-12)
+Z = statistics.NormalDist().inv_cdf(0.9)
+
+
+def whole(joints, settings=SETTINGS, looks=(), law=None, valid=True):
+    """Forecast of joints; ``looks`` (joint's number, Look)."""
+    fresh = np.array([each.fresh_m for each in joints])
+    own = [[look for at, look in looks if at == k] for k in range(len(joints))]
+    beliefs = [believe(settings, each.fresh_m, o) for each, o in zip(joints, own, strict=True)]
+    law = law or no_law(fresh, settings.model_sigma)
+    return forecast(joints, beliefs, settings, law, cycle_s=1.0, valid=valid)
+
+
+def alone(now=NOW, settings=SETTINGS, looks=(), **more):
+    return whole([now], settings, [(0, look) for look in looks], **more).joints[0]
+
+
+def test_with_the_coefficient_alone_unknown_life_is_lognormal():
+    told = alone(settings=SURE)
+    assert told.answer is Answer.KNOWN
+    assert told.cycles.p50 == pytest.approx(2e7, rel=0.01)
+    spread = math.exp(Z * SURE.wear_coefficient_sigma)
+    assert told.cycles.p90 / told.cycles.p50 == pytest.approx(spread, rel=0.02)
+    assert told.cycles.p50 / told.cycles.p10 == pytest.approx(spread, rel=0.02)
+    assert told.hours.p50 == pytest.approx(told.cycles.p50 / 3600.0)
+    assert told.days.p50 == pytest.approx(told.hours.p50 / 8.0)
+
+
+def test_what_is_not_known_adds_up_in_squares():
+    load = attrs.evolve(SURE, load_sigma=0.5)
+    noisy = attrs.evolve(NOW, growth_error_m=0.3 * NOW.growth_m)
+    told = alone(noisy, load)
+    both = math.sqrt(0.7**2 + 0.5**2 + 0.3**2)
+    assert math.log(told.cycles.p90 / told.cycles.p10) == pytest.approx(2.0 * Z * both, rel=0.03)
+
+
+@given(st.floats(0.1, 10.0))
+def test_all_wear_faster_by_a_factor_is_life_shorter_by_it(factor):
+    fast = attrs.evolve(NOW, growth_m=factor * NOW.growth_m)
+    assert alone(fast).cycles.p10 == pytest.approx(alone().cycles.p10 / factor, rel=1e-9)
+
+
+def test_a_measurement_narrows_and_moves_the_forecast():
+    now = attrs.evolve(NOW, wear_m=6e-5)
+    before = alone(now)
+    after = alone(now, looks=[Look(3e-4 + 1.5 * 6e-5, 5e-6, 6e-5)])
+    assert after.cycles.p50 < 0.75 * before.cycles.p50
+    assert (
+        math.log(after.cycles.p90 / after.cycles.p10) < math.log(before.cycles.p90 / before.cycles.p10) / 3.0
+    )
+    assert after.clearance_m.p90 - after.clearance_m.p10 < 0.2 * (
+        before.clearance_m.p90 - before.clearance_m.p10
+    )
+    assert after.measurements == 1
+
+
+@pytest.mark.parametrize(
+    ("changes", "answer"),
+    [
+        ({"growth_m": None}, Answer.NOT_ENOUGH_DATA),
+        ({"growth_m": 0.0}, Answer.NO_GROWTH),
+        ({"valid": False}, Answer.OUTSIDE_VALIDITY),
+        ({"valid": False, "growth_m": None}, Answer.OUTSIDE_VALIDITY),
+    ],
+)
+def test_what_cannot_be_known_is_said(changes, answer):
+    valid = changes.pop("valid", True)
+    told = whole([attrs.evolve(NOW, **changes)], valid=valid)
+    for each in (told.joints[0], told.leg):
+        assert (each.answer, each.cycles, each.hours, each.days) == (answer, None, None, None)
+    assert (told.leg.first, told.leg.first_probability) == (None, {})
+
+
+def test_at_the_limit_nothing_remains_whatever_else():
+    told = whole([B, attrs.evolve(NOW, wear_m=3.1e-4, growth_m=None)], valid=False)
+    for each in (told.joints[1], told.leg):
+        assert each.answer is Answer.AT_LIMIT
+        assert attrs.astuple(each.cycles) == (0.0, 0.0, 0.0)
+    assert told.joints[0].answer is Answer.OUTSIDE_VALIDITY
+    assert told.leg.first_probability == {"B": 0.0, "A": 1.0}
+
+
+def test_a_leg_of_one_joint_lasts_as_long_as_it():
+    told = whole([NOW])
+    assert told.leg.cycles == told.joints[0].cycles
+    assert told.leg.days == told.joints[0].days
+    assert (told.leg.first, told.leg.first_probability) == ("A", {"A": 1.0})
+
+
+def test_a_leg_ends_with_the_first_of_two_lognormal_lives():
+    """The smaller of two; the probability that it is A's is that of a difference of normals."""
+    told = whole([NOW, B], SURE).leg
+    gap = math.log(NOW.growth_m / B.growth_m) / (math.sqrt(2.0) * SURE.wear_coefficient_sigma)
+    assert told.first == "A"
+    assert told.first_probability["A"] == pytest.approx(statistics.NormalDist().cdf(gap), abs=0.01)
+    random = np.random.default_rng(0)
+    lives = np.array([[2e7], [6e7]]) / np.exp(
+        SURE.wear_coefficient_sigma * random.standard_normal((2, 200_000))
+    )
+    expected = np.quantile(lives.min(axis=0), (0.1, 0.5, 0.9))
+    np.testing.assert_allclose(attrs.astuple(told.cycles), expected, rtol=0.03)
+
+
+def test_a_joint_without_a_growth_rate_leaves_the_leg_partly_known():
+    told = whole([NOW, attrs.evolve(B, growth_m=None)])
+    assert [each.answer for each in told.joints] == [Answer.KNOWN, Answer.NOT_ENOUGH_DATA]
+    assert told.leg.answer is Answer.PARTLY_KNOWN
+    assert told.leg.cycles == told.joints[0].cycles
+
+
+def test_a_joint_that_does_not_grow_never_ends_the_leg():
+    told = whole([NOW, attrs.evolve(B, growth_m=0.0)])
+    assert (told.leg.answer, told.leg.cycles) == (Answer.KNOWN, told.joints[0].cycles)
+
+
+@given(st.floats(-1.0, 1.0))
+def test_a_measured_joint_tells_of_one_that_it_acts_upon(coupling):
+    """A is half as much wider again than the twin has it, and stays so: half of that is in B's past."""
+    law = GrowthLaw(np.array([[0.0, 0.0], [coupling, 0.0]]), np.full(2, 3e-4), np.full(2, 1e-3), np.zeros(2))
+    worn = attrs.evolve(NOW, wear_m=1e-4, growth_m=0.0)
+    told = whole([worn, B], SURE, [(0, Look(4.5e-4, 1e-8, 1e-4))], law).joints[1].cycles
+    expected = alone(B, SURE, law=no_law(np.array([3e-4]), 0.0)).cycles
+    apart = math.log(4.5e-4 / 4e-4)
+    assert math.log(expected.p50 / told.p50) == pytest.approx(0.5 * coupling * apart, abs=1e-3)
+
+
+def test_the_same_is_said_of_the_same():
+    assert whole([NOW, B]) == whole([NOW, B])

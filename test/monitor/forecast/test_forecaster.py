@@ -1,0 +1,104 @@
+"""The forecast in the monitor: when it is renewed, what a part and a measurement change, over new starts."""
+
+import attrs
+import numpy as np
+import pytest
+
+from leg_wear_monitor import LegWearError
+from leg_wear_monitor.monitor.config.forecast import Forecasting
+from leg_wear_monitor.monitor.forecast.forecast import Answer
+from leg_wear_monitor.monitor.forecast.forecaster import Forecaster
+from leg_wear_monitor.monitor.forecast.wear_coefficients import Look
+from leg_wear_monitor.twin.statistics import CycleFigures
+
+SECOND = 10**9
+LIMITS = [6e-4] * 5
+
+
+def cycle(second, growth=2e-11):
+    """A gait cycle's figures that end at a second, as far as the forecast looks at them."""
+    zeros = {field.name: 0 for field in attrs.fields(CycleFigures)}
+    wobble = growth * (1.0 + 0.1 * np.sin(1.7 * second + np.arange(5.0)))
+    return CycleFigures(**(zeros | {"stamp_ns": second * SECOND, "moving_s": 1.0, "growth_mean_m": wobble}))
+
+
+def walked(forecaster, seconds, worn=0.0, valid=True):
+    """Forecasts after each second."""
+    wear = np.full(5, worn)
+    return [forecaster.after(cycle(s), wear, LIMITS, lambda: valid) for s in seconds]
+
+
+@pytest.fixture
+def forecaster(leg):
+    return Forecaster(leg, Forecasting(), (), [0] * 5)
+
+
+@pytest.mark.plain
+def test_a_forecast_is_renewed_once_growth_is_known_and_then_once_a_minute(forecaster):
+    told = walked(forecaster, range(1, 125))
+    renewed = [i for i in range(1, len(told)) if told[i] is not told[i - 1]]
+    assert renewed == [9, 69]
+    assert [one.answer for one in told[0].joints] == [Answer.NOT_ENOUGH_DATA] * 5
+    assert [one.answer for one in told[-1].joints] == [Answer.KNOWN] * 5
+    # sooner than if growth stayed as it is: it rises as clearances open
+    assert 1.2e7 < told[-1].joints[0].cycles.p50 < 1.45e7
+    assert told[-1].leg.cycles.p50 < told[-1].joints[0].cycles.p50
+
+
+@pytest.mark.plain
+def test_a_stamp_that_goes_back_renews_it_too(forecaster):
+    told = walked(forecaster, [*range(1000, 1030), *range(5, 10)])
+    assert told[29] is not told[30]
+
+
+@pytest.mark.plain
+def test_outside_validity_is_an_answer(forecaster):
+    walked(forecaster, range(1, 60))
+    assert walked(forecaster, [200], valid=False)[0].joints[0].answer is Answer.OUTSIDE_VALIDITY
+
+
+@pytest.mark.plain
+def test_a_replaced_part_is_not_known(forecaster):
+    walked(forecaster, range(1, 80))
+    forecaster.replaced("G", 80 * 10**9)
+    (told,) = walked(forecaster, [80])
+    assert [one.answer is Answer.NOT_ENOUGH_DATA for one in told.joints] == [False, False, True, False, False]
+
+
+@pytest.mark.plain
+def test_what_encoders_show_tightens_the_forecast_and_the_newest_replaces_the_last(forecaster):
+    def spread(told):
+        return told.cycles.p90 / told.cycles.p10
+
+    before = walked(forecaster, range(1, 80), worn=1e-4)[-1].joints[0]
+    assert forecaster.seen(0, Look(4.2e-4, 2e-5, 1e-4), 0)
+    after = walked(forecaster, [80], worn=1e-4)[0].joints[0]
+    assert after.measurements == 1
+    assert spread(after) < 0.5 * spread(before)
+    for _ in range(50):  # its error does not average out
+        forecaster.seen(0, Look(4.2e-4, 2e-5, 1e-4), 0)
+    again = walked(forecaster, [81], worn=1e-4)[0].joints[0]
+    assert again.measurements == 1
+    assert spread(again) == pytest.approx(spread(after), rel=1e-3)
+    assert not forecaster.seen(0, Look(9e-4, 2e-5, 1e-6), 0)
+    assert walked(forecaster, [82], worn=1e-4)[0].joints[0].measurements == 0
+
+
+def test_the_monitor_forecasts_and_learns(leg, new_monitor, gait):
+    """Over a snapshot, too; wear so fast that it shows."""
+    monitor = new_monitor()
+    reports = monitor.update(gait(14.0))
+    assert reports.cycles[3].joints[0].forecast.answer is Answer.NOT_ENOUGH_DATA
+    first = reports.cycles[-1].joints[0].forecast
+    assert first.answer is Answer.KNOWN  # not only a minute after the first gait cycle
+    snapshot = monitor.snapshot()
+    found = monitor.measure("A", 3.05e-4, 2e-6, 10**18, "ann")
+    assert found.measurement.counts
+    told = monitor.update(gait(3.0, begin_s=14.0)).cycles[-1].joints[0].forecast
+    assert told.measurements == 1
+    assert told.clearance_m.p50 == pytest.approx(3.05e-4, abs=2e-6)
+    monitor.restore(snapshot)
+    again = monitor.update(gait(3.0, begin_s=14.0)).cycles[-1].joints[0].forecast
+    assert again == first
+    with pytest.raises(LegWearError, match="Z: no loose joint"):
+        monitor.measure("Z", 3e-4, 1e-6, 0, "ann")

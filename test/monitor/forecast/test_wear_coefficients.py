@@ -1,0 +1,184 @@
+"""What a measured clearance teaches: limits that are known in closed form, order, parts, contradictions."""
+
+import math
+import statistics
+
+import attrs
+import numpy as np
+import pytest
+from hypothesis import given, settings
+from hypothesis import strategies as st
+
+from leg_wear_monitor import ConfigError, load_mechanism
+from leg_wear_monitor.monitor.config.forecast import Forecasting
+from leg_wear_monitor.monitor.forecast.measurement import measure
+from leg_wear_monitor.monitor.forecast.wear_coefficients import Look, believe
+from leg_wear_monitor.monitor.ledger.entry import JointWear
+
+pytestmark = pytest.mark.plain
+
+FRESH, PRIOR = 3.0e-4, Forecasting()
+CLEARANCE = load_mechanism("bionic_leg").clearances["A"]
+HOUR = 3_600_000_000_000
+
+
+def worn(wear_m, cycles=1000, replaced_ns=0):
+    """Joint A with so much wear."""
+    return JointWear("A", np.full((2, 720), 0.5 * wear_m), cycles, float(cycles), replaced_ns)
+
+
+def found(wear, mm, earlier=(), **more):
+    """What a clearance in mm says, good to 5 µm."""
+    given = {"sigma_m": 5e-6, "stamp_ns": 9 * HOUR, "who": "ann", **more}
+    return measure(PRIOR, CLEARANCE, wear, earlier, clearance_m=1e-3 * mm, **given)
+
+
+def test_without_a_measurement_the_belief_is_the_lognormal_prior():
+    belief = believe(PRIOR, FRESH)
+    assert belief.mean == pytest.approx(0.0, abs=1e-12)
+    assert belief.sigma == pytest.approx(PRIOR.wear_coefficient_sigma, rel=1e-3)
+    z = statistics.NormalDist().inv_cdf(0.9)
+    assert belief.log_factors(0.9) == pytest.approx(PRIOR.wear_coefficient_sigma * z, rel=1e-3)
+
+
+@given(st.floats(0.3, 3.0))
+def test_an_accurate_measurement_of_much_wear_tells_the_factor(factor):
+    exact = attrs.evolve(PRIOR, clearance_sigma_m=1e-7)
+    wear = 1e-4
+    belief = believe(exact, FRESH, [Look(FRESH + factor * wear, 5e-6, wear)])
+    assert math.exp(belief.mean) == pytest.approx(factor, rel=0.02 / factor + 0.01)
+    assert belief.sigma == pytest.approx(5e-6 / (factor * wear), rel=0.2)
+
+
+@given(st.floats(-3.0, 3.0), st.floats(-7.0, -4.0))
+def test_exact_measurements_are_believed_however_far_they_are_from_the_prior(power, sigma_power):
+    """Two measurements of one part: their difference is the factor times the wear between them."""
+    factor, sigma = 10.0**power, 10.0**sigma_power * 10.0**power * 1e-3
+    looks = [Look(FRESH, sigma, 0.0), Look(FRESH + factor * 1e-4, sigma, 1e-4)]
+    belief = believe(attrs.evolve(PRIOR, clearance_sigma_m=1e-3), FRESH, looks)
+    spread = sigma * math.sqrt(2.0) / (factor * 1e-4)
+    p10, p50, p90 = np.exp(belief.log_factors((0.1, 0.5, 0.9)))
+    # the prior's pull is its slope times the variance of what was measured
+    assert math.log(p50 / factor) == pytest.approx(0.0, abs=spread + 40.0 * spread**2)
+    assert belief.sigma == pytest.approx(spread, rel=0.05)
+    z = statistics.NormalDist().inv_cdf(0.9)
+    assert math.log(p90 / p50) == pytest.approx(z * spread, rel=0.1)
+    assert math.log(p50 / p10) == pytest.approx(z * spread, rel=0.1)
+
+
+@pytest.mark.parametrize("factor", [0.02, 60.0, 200.0, 5000.0])
+def test_an_accepted_measurement_moves_the_belief_as_far_as_it_says(factor):
+    told = found(worn(1e-6 if factor > 1.0 else 1e-4), 1e3 * (FRESH + factor * 1e-6), accept=True)
+    if factor > 1.0:
+        low, middle, high = np.exp(told.after.log_factors((0.1, 0.5, 0.9)))
+        assert middle == pytest.approx(factor, rel=0.5 if factor < 100.0 else 0.05)
+        assert 0.0 < low < middle < high
+        assert f"{middle:.3g} times the nominal one" in told.words[-1]
+    else:  # next to no wear where the twin has counted much
+        assert np.exp(told.after.log_factors(0.9)) < 0.2
+
+
+@settings(max_examples=25)
+@given(st.floats(-0.9, 60.0), st.floats(0.1, 10.0), st.floats(0.02, 3.0))
+def test_the_belief_is_prior_times_likelihood(mean, own, sigma):
+    """Against a plain sum over a grid that is wide and fine, for a measurement that is not exact."""
+    prior = attrs.evolve(PRIOR, wear_coefficient_sigma=sigma, clearance_sigma_m=1e-9)
+    belief = believe(prior, FRESH, [Look(FRESH + mean * 1e-5, own * 1e-5, 1e-5)])
+    u = np.linspace(-12.0 * sigma - 5.0, 12.0 * sigma + 5.0, 200_001)
+    log_weight = -0.5 * (u / sigma) ** 2 - 0.5 * ((np.exp(u) - mean) / own) ** 2
+    weight = np.exp(log_weight - log_weight.max())
+    weight /= weight.sum()
+    assert belief.mean == pytest.approx(weight @ u, abs=0.01 * belief.sigma + 2e-4)
+    assert belief.sigma == pytest.approx(np.sqrt(weight @ (u - weight @ u) ** 2), rel=0.02)
+    assert belief.weight[[0, -1]].max() < 1e-6
+
+
+@given(st.permutations(range(4)))
+def test_the_order_of_measurements_does_not_matter(order):
+    looks = [Look(FRESH + 1e-5 * (i + 1), 3e-6 + 1e-6 * i, 0.8e-5 * i) for i in range(4)]
+    one, other = believe(PRIOR, FRESH, looks), believe(PRIOR, FRESH, [looks[i] for i in order])
+    np.testing.assert_allclose(one.weight, other.weight, rtol=1e-6, atol=1e-12)
+
+
+def test_a_new_part_s_measurement_tells_its_clearance_and_nothing_of_the_coefficient():
+    belief = believe(PRIOR, FRESH, [Look(3.05e-4, 5e-6, 0.0)])
+    assert belief.sigma == pytest.approx(PRIOR.wear_coefficient_sigma, rel=1e-3)
+    # equal sigmas: half of what was found, and 1 / sqrt 2 of the spread
+    np.testing.assert_allclose(belief.excess_m, 2.5e-6)
+    assert belief.excess_sigma_m == pytest.approx(5e-6 / math.sqrt(2.0))
+
+
+def test_a_later_measurement_knows_the_clearance_when_new():
+    alone = believe(PRIOR, FRESH, [Look(3.5e-4, 2e-6, 5e-5)])
+    both = believe(PRIOR, FRESH, [Look(3.0e-4, 2e-6, 0.0), Look(3.5e-4, 2e-6, 5e-5)])
+    assert both.sigma < 0.7 * alone.sigma
+
+
+def test_measurements_that_repeat_the_same_model_are_expected_evenly():
+    """Probability integral transform: figures drawn from the belief fall evenly into it."""
+    random, wear = np.random.default_rng(3), 6e-5
+    belief = believe(PRIOR, FRESH)
+    drawn = FRESH + PRIOR.clearance_sigma_m * random.standard_normal(400)
+    drawn += wear * np.exp(PRIOR.wear_coefficient_sigma * random.standard_normal(400))
+    drawn += 5e-6 * random.standard_normal(400)
+    below = [belief.probability_below(FRESH, Look(c, 5e-6, wear)) for c in drawn]
+    assert 0.75 <= np.mean((np.array(below) > 0.1) & (np.array(below) < 0.9)) <= 0.85
+    assert np.mean(below) == pytest.approx(0.5, abs=0.05)
+
+
+def test_a_measurement_says_in_words_what_it_taught():
+    told = found(worn(6e-5), 0.42)
+    assert not told.contradicts
+    assert told.measurement.counts
+    (line,) = told.words
+    assert line.startswith("the wear coefficient is 1.9")
+    assert "times as sure" in line
+
+
+def test_too_little_wear_says_little():
+    assert "it says little" in found(worn(2e-7), 0.302).words[0]
+
+
+def test_a_contradiction_is_said_and_kept_but_does_not_count():
+    told = found(worn(1e-5), 0.9)
+    assert (told.contradicts, told.measurement.counts) == (True, False)
+    assert "contradicts the model: the clearance of A is far larger" in told.words[0]
+    assert "if the part was replaced, reset its wear first" in told.words[1]
+    assert told.after.looks == 0
+    # and the next one is judged as if it had not been
+    assert not found(worn(1e-5), 0.31, [told.measurement]).contradicts
+
+
+def test_a_clearance_smaller_than_when_new_contradicts_too():
+    told = found(worn(6e-5), 0.2)
+    assert told.contradicts
+    assert "far smaller" in told.words[0]
+
+
+def test_a_contradiction_counts_if_that_is_asked_for():
+    told = found(worn(1e-5), 0.9, accept=True)
+    assert (told.contradicts, told.measurement.counts, told.after.looks) == (True, True, 1)
+    assert told.after.mean > 1.0
+
+
+def test_measurements_of_a_part_that_was_replaced_say_nothing_of_the_new_one():
+    old = found(worn(6e-5), 0.42).measurement
+    told = found(worn(6e-5, replaced_ns=5), 0.34, [old])
+    assert told.before.looks == 0
+    assert told.after.looks == 1
+
+
+def test_a_clock_that_has_jumped_is_said_and_changes_nothing():
+    early, right = found(worn(6e-5), 0.42, stamp_ns=HOUR, kept_ns=3 * HOUR), found(worn(6e-5), 0.42)
+    assert "the clock stands 2 h before the ledger's last entry, it has jumped" in early.words[0]
+    np.testing.assert_array_equal(early.after.weight, right.after.weight)
+
+
+@pytest.mark.parametrize(
+    ("clearance_m", "sigma_m"), [(0.0, 1e-6), (0.2, 1e-6), (3e-4, 0.0), (math.nan, 1e-6)]
+)
+def test_figures_that_cannot_be_are_refused(clearance_m, sigma_m):
+    with pytest.raises(ConfigError, match=r"mm is not (between|a standard deviation)"):
+        measure(
+            PRIOR, CLEARANCE, worn(0.0), (), clearance_m=clearance_m, sigma_m=sigma_m, stamp_ns=1, who="ann"
+        )

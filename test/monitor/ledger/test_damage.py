@@ -1,0 +1,147 @@
+"""Whatever is changed in a ledger's files, its wear is not continued as if nothing had happened."""
+
+import os
+import shutil
+import sqlite3
+from contextlib import closing
+
+import numpy as np
+import pytest
+
+from leg_wear_monitor.monitor.alarms.alarm import Alarm, Level
+from leg_wear_monitor.monitor.ledger.entry import (
+    AlarmEvent,
+    Audit,
+    ClearancePoint,
+    Commissioned,
+    ForecastPoint,
+    Measurement,
+)
+from leg_wear_monitor.monitor.ledger.file import LedgerError
+from leg_wear_monitor.monitor.ledger.schema import CHANGING, GROWING
+
+pytestmark = pytest.mark.plain
+
+
+@pytest.fixture
+def full(open_ledger, entry_at):
+    """A closed ledger with a row in each of its tables."""
+    ledger = open_ledger()
+    ledger.note(Audit(1, "ann", "reset_wear", entry_at(1).joints[0], undoes=0))
+    ledger.note(AlarmEvent(2, Alarm(kind="clearance", subject="A", level=Level.WARN, value=1.0, limit=2.0)))
+    ledger.note(ClearancePoint(3, 7, "A", 3.0e-4, 4.0e-4))
+    ledger.note(ForecastPoint(3, 7, "A", 1.0, 2.0, 3.0))
+    ledger.note(Measurement(1, "A", "ann", 3e-4, 1e-6, 1e-5, 3, 0, 0.3, True))
+    ledger.note(Commissioned(1, ("hip",), np.zeros(1), np.zeros(3), np.eye(3)))
+    ledger.keep(entry_at(2), closed=True)
+    ledger.close()
+    return ledger.path
+
+
+def edit(path, *statements):
+    with closing(sqlite3.connect(path, isolation_level=None)) as db:
+        db.execute("PRAGMA ignore_check_constraints = ON")
+        for statement in statements:
+            db.execute(statement)
+
+
+def assert_refused(open_ledger, path, said):
+    before = path.read_bytes()
+    with pytest.raises(LedgerError, match=said) as caught:
+        open_ledger()
+    assert "\n" not in str(caught.value)
+    assert path.read_bytes() == before
+
+
+@pytest.mark.parametrize("table", [*CHANGING, *GROWING, "seal", "head"])
+def test_every_value_of_every_table_is_under_a_checksum(open_ledger, full, table, tmp_path):
+    shutil.copy(full, tmp_path / "whole")
+    with closing(sqlite3.connect(full)) as db:
+        columns = [row[1] for row in db.execute(f"PRAGMA table_info({table})")]
+        assert db.execute(f"SELECT count(*) FROM {table}").fetchone()[0] > 0
+    for column in columns:
+        shutil.copy(tmp_path / "whole", full)
+        change = (
+            f"CASE typeof({column}) WHEN 'blob' THEN CAST(zeroblob(length({column})) AS BLOB) "
+            f"WHEN 'text' THEN {column} || 'x' ELSE {column} + 1 END"
+        )
+        edit(full, f"UPDATE OR REPLACE {table} SET {column} = {change} WHERE rowid = "
+                   f"(SELECT min(rowid) FROM {table})")  # fmt: skip
+        if full.read_bytes() != (tmp_path / "whole").read_bytes():
+            assert_refused(open_ledger, full, "is damaged")
+
+
+@pytest.mark.parametrize("table", [*CHANGING, *GROWING, "seal", "head"])
+def test_a_row_that_is_gone_is_missed(open_ledger, full, table):
+    edit(full, f"DELETE FROM {table} WHERE rowid = (SELECT max(rowid) FROM {table})")
+    assert_refused(open_ledger, full, "is damaged")
+
+
+@pytest.mark.parametrize(
+    "statement",
+    [
+        "CREATE TRIGGER t AFTER INSERT ON run BEGIN DELETE FROM span; END",
+        "CREATE VIEW v AS SELECT * FROM run",
+        "CREATE TABLE more (x)",
+        "CREATE INDEX i ON span (begin_ns)",
+        "ALTER TABLE span ADD COLUMN more INTEGER",
+    ],
+)
+def test_nothing_that_was_put_into_the_file_is_run(open_ledger, full, statement):
+    edit(full, statement)
+    assert_refused(open_ledger, full, "has other tables or triggers than a ledger of format")
+
+
+def test_a_view_in_the_place_of_a_table_is_refused(open_ledger, full):
+    edit(full, "ALTER TABLE span RENAME TO kept", "CREATE VIEW span AS SELECT * FROM kept")
+    assert_refused(open_ledger, full, "has other tables or triggers")
+
+
+def test_a_log_of_sqlite_put_beside_it_is_refused(open_ledger, full, tmp_path):
+    other = tmp_path / "other"
+    shutil.copy(full, other)
+    with closing(sqlite3.connect(other, isolation_level=None)) as db:
+        db.execute("PRAGMA journal_mode = WAL")
+        db.execute("DELETE FROM span")
+        shutil.copy(f"{other}-wal", f"{full}-wal")
+    assert_refused(open_ledger, full, "wear.ledger-wal beside it is not its own; move that away")
+
+
+def in_a_transaction(path, target):
+    """Copies of a ledger and of its journal in the midst of a transaction, as a power cut leaves them."""
+    with closing(sqlite3.connect(path, isolation_level=None)) as db:
+        db.execute("PRAGMA cache_size = 1")
+        db.execute("BEGIN")
+        db.execute("UPDATE joint SET depth = zeroblob(length(depth))")
+        db.execute("UPDATE span SET end_ns = 1")
+        shutil.copy(path, target)
+        shutil.copy(f"{path}-journal", f"{target}-journal")
+        db.execute("ROLLBACK")
+
+
+def test_a_transaction_that_was_cut_off_is_undone(open_ledger, full, entry_at, tmp_path):
+    target = tmp_path / "cut.ledger"
+    in_a_transaction(full, target)
+    assert target.read_bytes() != full.read_bytes()
+    assert open_ledger(path=target).entry.digest() == entry_at(2).digest()
+
+
+def test_a_journal_of_another_time_is_refused_and_nothing_is_undone_with_it(
+    open_ledger, full, entry_at, tmp_path
+):
+    in_a_transaction(full, tmp_path / "cut.ledger")
+    ledger = open_ledger()
+    ledger.keep(entry_at(9), closed=True)
+    ledger.close()
+    shutil.copy(tmp_path / "cut.ledger-journal", f"{full}-journal")
+    assert_refused(
+        open_ledger, full, "with wear.ledger-journal beside it, it .* of another file or time: move it away"
+    )
+    full.with_name("wear.ledger-journal").unlink()
+    assert open_ledger().entry.digest() == entry_at(9).digest()
+
+
+def test_what_is_no_file_is_refused_at_once(open_ledger, tmp_path):
+    os.mkfifo(tmp_path / "wear.ledger")
+    with pytest.raises(LedgerError, match="cannot be opened: is no file"):
+        open_ledger()

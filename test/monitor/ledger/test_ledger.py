@@ -1,0 +1,319 @@
+"""The ledger: what is kept is what was given; what cannot be continued is refused and left as it is."""
+
+import math
+import sqlite3
+import subprocess
+import sys
+from contextlib import closing
+
+import attrs
+import numpy as np
+import pytest
+
+from leg_wear_monitor.mechanism.loader import load_mechanism
+from leg_wear_monitor.monitor.alarms.alarm import Alarm, Level
+from leg_wear_monitor.monitor.config.fitting import fitted
+from leg_wear_monitor.monitor.config.parameters import config_from
+from leg_wear_monitor.monitor.ledger.binding import Binding, binding_of
+from leg_wear_monitor.monitor.ledger.entry import (
+    AlarmEvent,
+    Audit,
+    ClearancePoint,
+    ForecastPoint,
+)
+from leg_wear_monitor.monitor.ledger.file import LedgerError
+from leg_wear_monitor.monitor.ledger.ledger import Ledger
+from leg_wear_monitor.monitor.ledger.schema import FORMAT
+
+pytestmark = pytest.mark.plain
+
+SECOND = 10**9
+
+
+def test_a_new_ledger_is_empty(open_ledger):
+    ledger = open_ledger()
+    assert (ledger.entry, ledger.cut_off_s, ledger.kept_ns, ledger.fault) == (None, None, 0, "")
+    assert ledger.counted_ns.shape == (0, 2)
+
+
+def test_what_is_kept_is_there_again(open_ledger, entry_at):
+    ledger = open_ledger()
+    for second in (1, 2, 3):
+        assert ledger.keep(entry_at(second))
+    ledger.close()
+    found = open_ledger()
+    assert found.entry.digest() == entry_at(3).digest()
+    for joint, given in zip(found.entry.joints, entry_at(3).joints, strict=True):
+        np.testing.assert_array_equal(joint.depth, given.depth)
+        assert (joint.name, joint.cycles, joint.moving_s) == (given.name, 3, given.moving_s)
+    assert found.entry.totals == entry_at(3).totals
+    (alarm,) = found.entry.alarms
+    assert (alarm.name, alarm.level, alarm.acknowledged) == ("clearance A", Level.WARN, True)
+    assert found.counted_ns.tolist() == [[0, 3 * SECOND]]
+
+
+def test_a_run_that_ended_in_order_has_lost_nothing(open_ledger, entry_at):
+    ledger = open_ledger()
+    ledger.keep(entry_at(4), closed=True)
+    ledger.close()
+    assert open_ledger().cut_off_s is None
+
+
+def test_a_run_that_was_cut_off_says_how_much_may_be_lost(open_ledger, entry_at):
+    for second, longest in ((2, 5.0), (9, 6.3)):
+        ledger = open_ledger()
+        ledger.keep(entry_at(2))
+        ledger.keep(entry_at(second))
+        ledger.close()
+        found = open_ledger()
+        assert found.cut_off_s == pytest.approx(longest)  # what was intended, or longer if it has been longer
+        found.close()
+
+
+def test_a_run_without_an_entry_is_cut_off_too(open_ledger):
+    open_ledger().close()
+    assert open_ledger().cut_off_s == 5.0
+
+
+def test_events_that_are_recorded_leave_it_known_that_a_run_was_cut_off(open_ledger, entry_at):
+    ledger = open_ledger()
+    ledger.keep(entry_at(2))
+    ledger.close()
+    between = open_ledger()
+    between.note(ForecastPoint(5, 7, "A", 1.0, 2.0, 3.0))
+    between.record()
+    between.close()
+    assert open_ledger().cut_off_s is not None
+
+
+def test_history_and_audit_trail_are_appended_once(open_ledger, entry_at, tmp_path):
+    ledger = open_ledger()
+    for second in (1, 2):
+        entry = entry_at(second)
+        ledger.note(Audit(second, "ann", "reset_wear", entry.joints[0]))
+        ledger.note(AlarmEvent(second, Alarm(kind="cadence")))
+        ledger.note(ClearancePoint(second, 7, "A", 3.0e-4, 4.0e-4))
+        ledger.keep(entry)
+    ledger.keep(entry_at(3))
+    ledger.close()
+    with closing(sqlite3.connect(tmp_path / "wear.ledger")) as db:
+        audit = db.execute("SELECT stamp_ns, who, what, joint, cycles, depth FROM audit").fetchall()
+        alarms = db.execute("SELECT stamp_ns, kind, level, value FROM alarm_history").fetchall()
+        points = db.execute("SELECT stamp_ns, cycle, joint, clearance_m FROM history").fetchall()
+    depth = [entry_at(second).joints[0].depth.tobytes() for second in (1, 2)]
+    assert audit == [(s, "ann", "reset_wear", "A", s, depth[s - 1]) for s in (1, 2)]
+    assert alarms == [(s, "cadence", 0, None) for s in (1, 2)]  # SQLite keeps a NaN as NULL
+    assert points == [(s, 7, "A", 3.0e-4) for s in (1, 2)]
+
+
+@pytest.mark.parametrize(
+    ("change", "said"),
+    [
+        ({"hardware_id": "leg-8"}, ["hardware id leg-7, not leg-8"]),
+        ({"fingerprint": "ff00"}, ["fingerprint 00ff, not ff00"]),
+        ({"wear_acceleration": 100.0}, ["wear acceleration 1.0, not 100.0"]),
+        ({"joints": ("A", "G")}, ["joints A, B, not A, G"]),
+        ({"sectors": 360}, ["sectors 720, not 360"]),
+    ],
+)
+def test_the_wear_of_something_else_is_refused(open_ledger, entry_at, binding, change, said):
+    ledger = open_ledger()
+    ledger.keep(entry_at(1))
+    ledger.close()
+    before = ledger.path.read_bytes()
+    with pytest.raises(LedgerError) as caught:
+        open_ledger(attrs.evolve(binding, **change))
+    for part in [str(ledger.path), "ledger.path", *said]:
+        assert part in str(caught.value)
+    assert ledger.path.read_bytes() == before
+
+
+def test_the_order_of_the_joints_does_not_matter(open_ledger, binding):
+    open_ledger().close()
+    open_ledger(attrs.evolve(binding, joints=("B", "A")))
+
+
+def not_a_ledger(path):
+    with closing(sqlite3.connect(path)) as db:
+        db.execute("CREATE TABLE joint (name)")
+
+
+def newer(path):
+    Ledger(path, Binding(hardware_id="x", mechanism="x", fingerprint="x", joints=()), 5.0).close()
+    with closing(sqlite3.connect(path)) as db:
+        db.execute(f"PRAGMA user_version = {FORMAT + 1}")
+
+
+@pytest.mark.parametrize(
+    ("make", "said"),
+    [
+        (lambda path: path.write_bytes(b""), "is empty, not a ledger"),
+        (lambda path: path.write_text("bodies: {}\n" * 1000), "damaged or not a ledger"),
+        (lambda path: path.mkdir(), "cannot be opened"),
+        (lambda path: path.symlink_to("nowhere"), "cannot be opened"),
+        (not_a_ledger, "not a ledger"),
+        (newer, f"has format {FORMAT + 1}, this version knows up to {FORMAT}"),
+    ],
+)
+def test_what_is_no_ledger_is_refused_and_left_alone(open_ledger, tmp_path, make, said):
+    path = tmp_path / "wear.ledger"
+    make(path)
+    before = path.read_bytes() if path.is_file() else None
+    with pytest.raises(LedgerError, match=said):
+        open_ledger()
+    assert (path.read_bytes() if path.is_file() else None) == before
+
+
+def test_a_place_that_cannot_be_written_is_refused(open_ledger, tmp_path):
+    with pytest.raises(LedgerError, match=r"cannot be created: .*expected a writable place"):
+        open_ledger(path=tmp_path / "nowhere" / "wear.ledger")
+
+
+def test_two_monitors_cannot_keep_one_ledger(open_ledger, tmp_path, binding):
+    open_ledger()
+    code = (
+        "from leg_wear_monitor.monitor.ledger.binding import Binding\n"
+        "from leg_wear_monitor.monitor.ledger.ledger import Ledger, LedgerError\n"
+        "try:\n"
+        f"    Ledger({str(tmp_path / 'wear.ledger')!r}, {binding!r}, 5.0)\n"
+        "except LedgerError as error:\n"
+        "    print(error)\n"
+    )
+    done = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, check=True)
+    assert "is in use by another monitor" in done.stdout
+
+
+def test_no_damage_goes_unnoticed(open_ledger, entry_at, tmp_path):
+    """Bytes flipped and files cut off at many places: refused in one line, or the wear is what it was."""
+    ledger = open_ledger()
+    ledger.keep(entry_at(1), closed=True)
+    ledger.close()
+    whole = ledger.path.read_bytes()
+    random = np.random.default_rng(3)
+    refused = 0
+    for trial in range(120):
+        broken = bytearray(whole)
+        if trial % 4 == 0:
+            del broken[random.integers(len(whole)) :]
+        else:
+            broken[random.integers(len(whole))] ^= 1 << random.integers(8)
+        path = tmp_path / f"{trial}.ledger"
+        path.write_bytes(broken)
+        try:
+            found = open_ledger(path=path)
+            assert found.entry.digest() == entry_at(1).digest()
+            found.close()
+        except LedgerError as error:
+            refused += 1
+            assert "\n" not in str(error)
+            assert str(error).startswith(f"{path}: ")
+            assert path.read_bytes() == broken
+    assert refused > 40  # the rest of the file is not in use
+
+
+def test_a_write_that_fails_is_said_and_made_up_for(open_ledger, entry_at):
+    ledger = open_ledger()
+    ledger.keep(entry_at(1))
+    ledger._store._db.execute("PRAGMA query_only = ON")  # what a file system gone read-only gives
+    ledger.note(Audit(2, "ann", "reset_wear"))
+    assert not ledger.keep(entry_at(2))
+    assert "readonly" in ledger.fault
+    assert ledger.kept_ns == 1 * SECOND
+    assert ledger.keep(entry_at(3))  # on a fresh connection
+    assert (ledger.fault, ledger.kept_ns) == ("", 3 * SECOND)
+    ledger.close()
+    found = open_ledger()
+    assert found.entry.digest() == entry_at(3).digest()
+    assert found.cut_off_s == 5.0
+    assert found._store._db.execute("SELECT count(*) FROM audit").fetchone() == (1,)
+
+
+def test_a_full_disk_is_said_and_leaves_the_last_entry(open_ledger, entry_at):
+    ledger = open_ledger()
+    ledger.keep(entry_at(1))
+    pages = ledger._store._db.execute("PRAGMA page_count").fetchone()[0]
+    ledger._store._db.execute(f"PRAGMA max_page_count = {pages}")
+    for _ in range(20):
+        ledger.note(Audit(2, "ann", "reset_wear", entry_at(2).joints[0]))
+    assert not ledger.keep(entry_at(2))
+    assert "full" in ledger.fault
+    ledger.close()
+    assert open_ledger().entry.digest() == entry_at(1).digest()
+
+
+def test_a_ledger_moved_away_while_in_use_is_said(open_ledger, entry_at, tmp_path):
+    ledger = open_ledger()
+    ledger.path.rename(tmp_path / "elsewhere")
+    assert not ledger.keep(entry_at(1))
+    assert "moved away" in ledger.fault
+    assert not ledger.path.exists()  # no second ledger begins
+    (tmp_path / "elsewhere").rename(ledger.path)
+    assert ledger.keep(entry_at(2))
+
+
+def test_a_ledger_continued_by_another_after_a_fault_is_not_written(open_ledger, entry_at):
+    ledger = open_ledger()
+    ledger._store._db.execute("PRAGMA query_only = ON")
+    assert not ledger.keep(entry_at(1))  # lets go of the file
+    other = open_ledger()
+    other.keep(entry_at(5))
+    other.close()
+    assert not ledger.keep(entry_at(2))
+    assert "another monitor" in ledger.fault
+    assert open_ledger().entry.digest() == entry_at(5).digest()
+
+
+def test_a_half_made_ledger_is_no_ledger(open_ledger, tmp_path):
+    """A kill while the first one is made leaves a file of another name."""
+    (tmp_path / "wear.ledger.new").write_bytes(b"half")
+    assert open_ledger().entry is None
+    assert not (tmp_path / "wear.ledger.new").exists()
+
+
+SAME = [
+    {"wear_coefficients_per_pa": [1.0e-13]},
+    {"cadence.commanded_rpm": 30.0},
+    {"limits.clearance_m": 1.0e-3},
+]
+OTHER = [
+    {"clearances_m": [2.0e-4]},
+    {"loose_joints": ["A"]},
+    {"hardware_id": "other"},
+    {"wear_acceleration": 2.0},
+    {"mechanism": "jansen_leg", "loose_joints": ["A", "B"]},
+]
+
+
+def binding_for(values):
+    config = config_from(values)
+    return binding_of(fitted(load_mechanism(config.mechanism), config), config)
+
+
+@pytest.mark.parametrize("values", SAME)
+def test_what_does_not_make_it_another_part_keeps_the_ledger(values):
+    assert binding_for(values) == binding_for({})
+
+
+@pytest.mark.parametrize("values", OTHER)
+def test_what_makes_it_another_part_does_not(values):
+    assert binding_for(values).as_texts() != binding_for({}).as_texts()
+
+
+def test_a_leg_with_another_mass_is_another_leg(leg):
+    config = config_from({})
+    foot = attrs.evolve(leg.bodies["foot"], mass=1.3)
+    heavier = attrs.evolve(leg, bodies=leg.bodies | {"foot": foot})
+    renamed = attrs.evolve(leg, name="mine", source="mine.yaml")
+    assert binding_of(heavier, config).fingerprint != binding_of(leg, config).fingerprint
+    assert binding_of(renamed, config).fingerprint == binding_of(leg, config).fingerprint
+
+
+def test_a_raised_alarm_keeps_its_worst_value_over_a_new_start(open_ledger, entry_at) -> None:
+    alarm = Alarm(kind="input_gaps", level=Level.ERROR, value=0.0, worst=0.42, limit=0.05, raised_ns=7)
+    unknown = Alarm(kind="cadence", level=Level.WARN, raised_ns=8)
+    ledger = open_ledger()
+    assert ledger.keep(attrs.evolve(entry_at(3), alarms=(alarm, unknown)))
+    ledger.close()
+    kept = {one.name: one for one in open_ledger().entry.alarms}
+    assert (kept["input_gaps"].worst, kept["input_gaps"].limit) == (0.42, 0.05)
+    assert math.isnan(kept["cadence"].worst) and math.isnan(kept["cadence"].limit)

@@ -1,0 +1,325 @@
+"""A replay is the live run: the same samples, the same reports, however they were cut and stored."""
+
+import json
+import sqlite3
+from contextlib import closing
+from pathlib import Path
+from typing import Any
+
+import attrs
+import numpy as np
+import pytest
+
+import leg_wear_monitor as lw
+from leg_wear_monitor.bags.findings import RecordingError
+from leg_wear_monitor.bags.mcap.writer import McapWriter
+from leg_wear_monitor.messages import encode
+from leg_wear_monitor.messages.cdr import JOINT_STATE, WRENCH_STAMPED
+from leg_wear_monitor.messages.decode import Decoder
+from leg_wear_monitor.messages.forecast_times import ForecastTimes
+from leg_wear_monitor.messages.outputs import Messages, topic_of
+from leg_wear_monitor.monitor.config.inputs import Cadence
+from leg_wear_monitor.monitor.config.settings import LedgerFile
+from leg_wear_monitor.monitor.forecast.forecast import Answer
+from leg_wear_monitor.monitor.ledger.entry import Measurement
+from leg_wear_monitor.monitor.ledger.ledger import open_ledger
+from leg_wear_monitor.playback.summary import summary
+
+SECONDS, RATE_HZ = 8, 200
+CYCLES = SECONDS - 2  # the first and the last are not whole
+
+Messages_ = list[tuple[int, int, bytes]]
+
+
+@pytest.fixture(scope="module")
+def walk(leg: lw.Mechanism) -> Messages_:
+    """A steady gait as messages in order of arrival: type, log time, bytes."""
+    n = SECONDS * RATE_HZ
+    ideal = lw.simulate(leg, clearances=[], cycles=1, trace=360).trace
+    angle = 2.0 * np.pi * np.arange(n) / RATE_HZ
+    angle += np.random.default_rng(1).normal(0.0, 2.0e-4, n)
+    order = np.argsort(ideal["crank_angle_rad"])
+    torque = np.interp(
+        angle % (2.0 * np.pi),
+        np.asarray(ideal["crank_angle_rad"])[order],
+        np.asarray(ideal["drive_torque_nm"])[order],
+        period=2.0 * np.pi,
+    )
+    stamps = 1_700_000_000 * 10**9 + np.arange(n, dtype=np.int64) * (10**9 // RATE_HZ)
+    still = np.zeros(n)
+    joints = encode.joint_states(stamps, ["hip", "crank"], position=np.stack([still, angle], axis=1))
+    wrench = encode.wrenches(stamps, torque=np.stack([still, still, torque], axis=1), frame_id="pelvis")
+    messages = []
+    for i, stamp in enumerate(stamps.tolist()):
+        messages.append((JOINT_STATE, stamp + 100_000, bytes(joints[i])))
+        messages.append((WRENCH_STAMPED, stamp + 100_001, bytes(wrench[i])))
+    return messages
+
+
+@pytest.fixture(scope="module")
+def bag(walk: Messages_, tmp_path_factory: pytest.TempPathFactory) -> Path:
+    path = tmp_path_factory.mktemp("bag") / "walk.mcap"
+    with McapWriter(path, chunk_bytes=20_000) as writer:
+        channels = {
+            JOINT_STATE: writer.channel("/joint_states", encode.JOINT_STATE),
+            WRENCH_STAMPED: writer.channel("/drive_torque", encode.WRENCH_STAMPED),
+        }
+        for kind, log_time_ns, raw in walk:
+            writer.write(channels[kind], log_time_ns, raw)
+    return path
+
+
+@pytest.fixture(scope="module")
+def out(bag: Path, tmp_path_factory: pytest.TempPathFactory) -> tuple[Path, Any]:
+    """Directory and result of a replay."""
+    directory = tmp_path_factory.mktemp("out")
+    return directory, lw.replay(bag, lw.MonitorConfig(), out=directory)
+
+
+def reported(path: Path) -> dict[str, list[bytes]]:
+    """Messages of a file by topic, with all checksums looked at."""
+    reader = pytest.importorskip("mcap.reader")
+    messages: dict[str, list[bytes]] = {}
+    with path.open("rb") as file:
+        for _, channel, message in reader.make_reader(file, validate_crcs=True).iter_messages(
+            log_time_order=False
+        ):
+            messages.setdefault(channel.topic, []).append(message.data)
+    return messages
+
+
+def test_a_replay_reports_bit_for_bit_what_the_monitor_reported_live(
+    leg: lw.Mechanism, walk: Messages_, out: tuple[Path, Any]
+) -> None:
+    config = lw.MonitorConfig()
+    monitor, decoder = lw.WearMonitor(leg, config), Decoder(config)
+    messages = Messages(config, monitor.loose)
+    live: dict[str, list[bytes]] = {}
+    forecasts: list[bytes] = []
+    times = ForecastTimes()
+    begin, sizes = 0, np.random.default_rng(3)
+    while begin < len(walk):
+        end = begin + int(sizes.integers(1, 60))
+        samples = [decoder.one(raw, kind, time) for kind, time, raw in walk[begin:end]]
+        reports = monitor.update(np.concatenate(samples))
+        forecasts += [messages.forecast(cycle) for cycle in times.due(reports)]
+        for outgoing in messages.of(reports):
+            topic = topic_of(outgoing.output, "/leg_wear_monitor")
+            live.setdefault(topic, []).extend(row.tobytes() for row in outgoing.messages)
+        begin = end
+    replayed = reported(out[0] / "reports.mcap")
+    assert len(live["/leg_wear_monitor/impact_forces"]) > 0.9 * SECONDS * RATE_HZ
+    assert len(live["/leg_wear_monitor/clearance_states"]) >= CYCLES
+    begun_with, *changes = replayed.pop("/leg_wear_monitor/alarms")
+    assert changes == live.pop("/leg_wear_monitor/alarms", [])
+    assert begun_with == messages.alarms(lw.WearMonitor(leg, config).alarms)
+    for topic, rows in live.items():
+        assert replayed[topic] == rows
+    assert set(replayed) - set(live) == {"/diagnostics", "/leg_wear_monitor/forecast"}
+    assert replayed["/leg_wear_monitor/forecast"] == forecasts
+    assert len(replayed["/diagnostics"]) >= SECONDS - 1
+    assert monitor.wear_depth_m.tobytes() == out[1].monitor.wear_depth_m.tobytes()
+
+
+def test_what_a_replay_gives_does_not_depend_on_how_it_was_stored(
+    walk: Messages_, bag: Path, out: tuple[Path, Any], tmp_path: Path
+) -> None:
+    half = len(walk) // 2 // 2 * 2
+    for i, part in enumerate((walk[:half], walk[half:])):
+        with McapWriter(tmp_path / f"walk_{i}.mcap", chunk_bytes=500_000) as writer:
+            torque = writer.channel("/leg/drive_torque", encode.WRENCH_STAMPED)
+            joints = writer.channel("/leg/joint_states", encode.JOINT_STATE)
+            for kind, log_time_ns, raw in part:
+                writer.write(joints if kind == JOINT_STATE else torque, log_time_ns, raw)
+    other = lw.replay(tmp_path, lw.MonitorConfig())
+    assert np.array_equal(
+        other.history.joint_column("clearance_m"), out[1].history.joint_column("clearance_m")
+    )
+    assert other.monitor.wear_depth_m.tobytes() == out[1].monitor.wear_depth_m.tobytes()
+
+
+def test_the_summary_is_plain_json_and_tells_of_every_joint(out: tuple[Path, Any]) -> None:
+    result = out[1]
+    record = json.loads(json.dumps(summary(result, 2.0), allow_nan=False))
+    assert record["real_time_factor"] == pytest.approx(result.duration_s / 2.0)
+    assert record["cycles"] == len(result.history) >= CYCLES
+    assert record["recording"]["crank_samples"] == record["recording"]["torque_samples"] == SECONDS * RATE_HZ
+    assert not record["recording"]["is_partial"] and not record["recording"]["findings"]
+    assert set(record["joints"]) == set(result.monitor.loose) == set(record["wear_depth_m"])
+    for name, joint in record["joints"].items():
+        opened = joint["clearance_m"]["last"] - joint["clearance_m"]["first"]
+        assert 0.0 < opened < 1.0e-6
+        depth = record["wear_depth_m"][name]
+        assert np.mean(depth["bushing"]) + np.mean(depth["journal"]) >= opened
+        assert joint["peak_force_n"] > joint["mean_force_n"] > 0.0
+    assert record["lost"]["faulty"].keys() and not any(record["lost"]["faulty"].values())
+    assert "no proof" in record["advice"]
+
+
+def test_the_page_is_whole_and_of_one_file(out: tuple[Path, Any]) -> None:
+    pytest.importorskip("jinja2")
+    from leg_wear_monitor.report.page import page_html
+    from leg_wear_monitor.report.replay.page import replay_page
+
+    record = {**summary(out[1], 2.0), "made_with": {"leg_wear_monitor": "1"}}
+    html = page_html(replay_page(record))
+    for title in (
+        "Clearance over time",
+        "Forecast",
+        "Impact forces",
+        "Wear around each bushing",
+        "Alarms",
+        "Input health",
+    ):
+        assert f"{title}</h2>" in html
+    assert "http://" not in html and "https://" not in html
+    assert html.count("<img") >= 4
+    assert page_html(replay_page(json.loads(json.dumps(record)))) == html
+    assert "No clearance was measured yet" in html
+    # this torque is that of an ideal leg, which is not what a leg with clearances needs
+    assert record["forecast"]["answer"] == Answer.OUTSIDE_VALIDITY.value
+    assert "The leg lasts" not in html
+
+
+def test_the_page_says_how_long_the_leg_lasts(out: tuple[Path, Any]) -> None:
+    pytest.importorskip("jinja2")
+    from leg_wear_monitor.report.page import page_html
+    from leg_wear_monitor.report.replay.page import replay_page
+
+    record = {**summary(out[1], 2.0), "made_with": {}}
+    life = {"p10": 700.0, "p50": 1000.0, "p90": 17532.0}
+    first = dict.fromkeys(record["joints"], 0.1) | {"G": 0.6}
+    days = {share: hours / 8.0 for share, hours in life.items()}
+    leg = {**record["forecast"], "hours": life, "days": days, "first_probability": first, "first": "G"}
+    html = page_html(replay_page({**record, "forecast": leg}))
+    assert "The leg lasts 1000 hours of walking or 125 days (p10 700 hours of walking or 87.5 days, " in html
+    assert "p90 17500 hours of walking or 2190 days); G is the first" in html
+    assert "with a probability of 60 %." in html
+
+
+def test_the_page_shows_where_measured_clearances_lay_in_what_was_expected(out: tuple[Path, Any]) -> None:
+    pytest.importorskip("jinja2")
+    from leg_wear_monitor.report.page import page_html
+    from leg_wear_monitor.report.replay.page import replay_page
+
+    looked = [Measurement(7, "A", "ann", 3e-4, 1e-6, 0.0, 9, 0, share, True) for share in (0.2, 0.6)]
+    record = {**summary(out[1], 2.0), "made_with": {}}
+    without = page_html(replay_page(record))
+    html = page_html(replay_page({**record, "measurements": [attrs.asdict(each) for each in looked]}))
+    assert html.count("<img") == without.count("<img") + 1
+    assert "lie in the shaded band" in html and "No clearance was measured yet" not in html
+
+
+def test_the_ledger_of_the_parameters_is_left_alone_and_one_that_is_asked_for_is_continued(
+    bag: Path, tmp_path: Path
+) -> None:
+    live, own = tmp_path / "live.db", tmp_path / "own.db"
+    config = attrs.evolve(lw.MonitorConfig(), ledger=LedgerFile(path=str(live)))
+    first = lw.replay(bag, config, ledger=own)
+    assert own.exists() and not live.exists()
+    again = lw.replay(bag, config, ledger=own)
+    assert again.monitor.lost.already_counted > 0.95 * 2 * SECONDS * RATE_HZ
+    assert len(again.history) == 0
+    assert again.monitor.wear_depth_m.tobytes() == first.monitor.wear_depth_m.tobytes()
+    assert not first.findings
+    assert [str(finding) for finding in again.findings] == [f"{bag}: all of it is in the ledger already"]
+    assert summary(again, 1.0)["recording"]["findings"][0]["text"] == "all of it is in the ledger already"
+
+
+def test_what_is_counted_already_is_no_doubt_and_another_machine_is_not_counted(
+    bag: Path, tmp_path: Path, leg: lw.Mechanism
+) -> None:
+    own = tmp_path / "own.db"
+    lw.replay(bag, lw.MonitorConfig(), ledger=own)
+    again = lw.replay(bag, lw.MonitorConfig(), ledger=own)
+    assert not again.is_believable and not again.is_unusable
+    assert summary(again, 1.0)["gait"]["is_counted"] is True
+    fast = attrs.evolve(lw.MonitorConfig(), cadence=Cadence(commanded_rpm=240.0))
+    other = lw.replay(bag, fast, ledger=tmp_path / "other.db")
+    assert other.is_unusable and len(other.history) == CYCLES
+    text = f"{tmp_path / 'other.db'}: nothing of this recording is written into the ledger"
+    assert text in [str(finding) for finding in other.findings]
+    config = attrs.evolve(fast, ledger=LedgerFile(path=str(tmp_path / "other.db")))
+    kept = open_ledger(leg, config)
+    assert kept is not None and kept.entry is None
+    kept.close()
+
+
+def rows(path: Path) -> list[str]:
+    """All that a ledger holds."""
+    with closing(sqlite3.connect(path)) as db:
+        return list(db.iterdump())
+
+
+def test_a_replay_that_is_cut_off_is_not_in_the_ledger_and_comes_out_the_same_when_repeated(
+    bag: Path, tmp_path: Path
+) -> None:
+    class CutError(Exception):
+        pass
+
+    def cut(share: float) -> None:
+        if share > 0.6:
+            raise CutError
+
+    whole = lw.replay(bag, lw.MonitorConfig(), ledger=tmp_path / "whole.db", out=tmp_path / "whole")
+    path = tmp_path / "own.db"
+    with pytest.raises(CutError):
+        lw.replay(bag, lw.MonitorConfig(), ledger=path, out=tmp_path / "own", progress=cut)
+    begun = rows(path)
+    again = lw.replay(bag, lw.MonitorConfig(), ledger=path, out=tmp_path / "own")
+    assert rows(path) == rows(tmp_path / "whole.db") != begun
+    assert {found.name for found in tmp_path.iterdir()} == {"whole.db", "own.db", "whole", "own"}
+    reports = [(tmp_path / name / "reports.mcap").read_bytes() for name in ("whole", "own")]
+    assert reports[0] == reports[1]
+    assert summary(again, 1.0) == summary(whole, 1.0)
+
+
+def test_a_ledger_that_cannot_be_written_is_refused_before_the_work(
+    bag: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    path = tmp_path / "own.db"
+    open_ledger(lw.load_mechanism("bionic_leg"), ledger_at(path)).abandon()
+    before = path.read_bytes()
+    monkeypatch.setattr("leg_wear_monitor.monitor.ledger.file._is_writable", lambda _path: False)
+    with pytest.raises(lw.LegWearError, match=r"own.db: cannot be written: attempt to write a readonly"):
+        lw.replay(bag, lw.MonitorConfig(), ledger=path)
+    assert path.read_bytes() == before
+
+
+def ledger_at(path: Path) -> lw.MonitorConfig:
+    return attrs.evolve(lw.MonitorConfig(), ledger=LedgerFile(path=str(path)))
+
+
+def test_a_recording_is_not_written_over_by_its_own_reports(bag: Path, tmp_path: Path) -> None:
+    path = tmp_path / "reports.mcap"
+    path.write_bytes(bag.read_bytes())
+    with pytest.raises(lw.LegWearError, match="is to be read and written"):
+        lw.replay(path, lw.MonitorConfig(), out=tmp_path)
+    assert path.read_bytes() == bag.read_bytes()
+
+
+def test_progress_goes_from_little_to_all(bag: Path) -> None:
+    shares: list[float] = []
+    lw.replay(bag, lw.MonitorConfig(), progress=shares.append)
+    assert shares == sorted(shares) and shares[-1] == 1.0
+
+
+def test_a_recording_of_another_crank_is_refused(bag: Path) -> None:
+    with pytest.raises(RecordingError, match=r"wheel: is not among the joints of 1600 messages"):
+        lw.replay(bag, lw.MonitorConfig(crank_joint="wheel"))
+
+
+def test_a_crank_that_hardly_turns_gives_a_result_of_nothing(bag: Path) -> None:
+    """Nothing is made up, and the reason is said."""
+    pytest.importorskip("jinja2")
+    from leg_wear_monitor.report.page import page_html
+    from leg_wear_monitor.report.replay.page import replay_page
+
+    config = lw.MonitorConfig()
+    result = lw.replay(bag, attrs.evolve(config, crank=attrs.evolve(config.crank, gear_ratio=100.0)))
+    record = {**summary(result, 1.0), "made_with": {}}
+    assert record["cycles"] == 0 and record["joints"] == {}
+    assert record["gait"]["missing"].startswith("the crank turns 0.08 times in 8 s")
+    page = page_html(replay_page(record))
+    assert "nothing to say about forces and wear" in page
+    assert "the crank turns 0.08 times in 8 s" in page

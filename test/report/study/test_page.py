@@ -1,0 +1,104 @@
+"""A study's page says what its data say: numbers, conclusions, and what is missing."""
+
+import re
+
+import attrs
+import numpy as np
+import pytest
+
+from leg_wear_monitor.report.page import Findings, Table
+from leg_wear_monitor.report.study import findings
+from leg_wear_monitor.report.study.page import study_page
+from leg_wear_monitor.report.study.text import number, with_spread, zone_text
+from leg_wear_monitor.studies.summary import Spread, power_law, spread
+
+
+def parts(page, kind):
+    return [part for section in page.sections for part in section.parts if isinstance(part, kind)]
+
+
+def conclusions(page):
+    return "\n".join(parts(page, Findings)[0].sentences)
+
+
+def test_every_page_has_configuration_versions_conclusions_and_units(drawn):
+    for name, page in drawn.items():
+        assert "mechanism: bionic_leg" in page.configuration
+        assert {"leg_wear_monitor", "code", "seed"} <= set(page.versions)
+        assert parts(page, Findings), name
+        for table in parts(page, Table):
+            assert any("[" in cell for cell in table.head), table.caption
+            assert all(len(row) == len(table.head) for row in table.rows)
+        assert "nan" not in "".join(
+            cell for table in parts(page, Table) for row in table.rows for cell in row
+        )
+
+
+def test_conclusions_are_computed_from_the_data(studies, drawn):
+    """Doubling an error doubles what is said of it, whatever that is."""
+    results = studies["size"]
+    text = conclusions(drawn["size"])
+    before = float(re.search(r"toe displacement error goes from ([\d.]+)", text).group(1))
+    doubled = tuple(
+        {**arrays, "error_toe_position_m": 2.0 * arrays["error_toe_position_m"]} for arrays in results.arrays
+    )
+    text = conclusions(study_page(attrs.evolve(results, arrays=doubled)))
+    after = float(re.search(r"toe displacement error goes from ([\d.]+)", text).group(1))
+    assert after == pytest.approx(2.0 * before, rel=0.02)
+
+
+def test_a_superposition_is_called_one_only_where_it_is(studies):
+    parts_of = [(point.label, arrays) for point, arrays in studies["multi"].of("response")]
+    *alone, (_, whole) = parts_of
+    summed = {
+        **whole,
+        **{
+            name: sum(arrays[name] for _, arrays in alone)
+            for name in whole
+            if name.startswith("error_")
+        },
+    }  # fmt: skip
+    assert findings.superposition(alone, summed)[0].startswith("All at once is the sum of the places alone")
+    halved = {**summed, "error_toe_velocity_mps": 0.5 * summed["error_toe_velocity_mps"]}
+    assert findings.superposition(alone, halved)[0].startswith("All at once is not the sum")
+
+
+def test_points_that_failed_or_are_missing_come_first(studies):
+    results = studies["size"]
+    arrays = ({"fault": np.array("pushed through")}, {}, *results.arrays[2:])
+    page = study_page(attrs.evolve(results, arrays=arrays))
+    assert page.sections[0].title == "What is missing"
+    assert "0.1 mm: pushed through" in conclusions(page)
+    assert "Not computed yet: 0.2 mm." in conclusions(page)
+    nothing = study_page(attrs.evolve(results, arrays=({},) * len(results.arrays)))
+    assert [section.title for section in nothing.sections] == ["What is missing"]
+
+
+@pytest.mark.plain
+@pytest.mark.parametrize(
+    ("mean", "deviation", "text"),
+    [
+        (1.2345, 0.0567, "1.234 ± 0.057"),
+        (1386.2, 93.7, "1386 ± 94"),
+        (2.003533, 0.000008, "2.004 ± <0.001"),
+        (0.0, 0.0, "0"),
+        (5.0, 0.0, "5.00"),
+    ],
+)
+def test_numbers_have_the_digits_their_spread_allows(mean, deviation, text):
+    assert with_spread(Spread(mean, deviation, mean, mean)) == text
+
+
+@pytest.mark.plain
+def test_small_things_in_words():
+    assert [number(value) for value in (0.0, 1.0 / 3.0, 12345.6, 1.0e-5)] == [
+        "0",
+        "0.333",
+        "12346",
+        "1.00e-05",
+    ]
+    assert zone_text((350.0, 370.0)) == "350° to 10° (20° wide)"
+    assert spread([1.0, 2.0, 3.0]).mean == 2.0
+    slope, error = power_law([1.0, 2.0, 4.0, 8.0], [3.0, 12.0, 48.0, 192.0])
+    assert slope == pytest.approx(2.0)
+    assert error < 1.0e-6

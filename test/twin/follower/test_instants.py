@@ -1,0 +1,82 @@
+"""A torque sensor that samples instants: a healthy leg's mismatch is small, a knocking one's is not."""
+
+import attrs
+import numpy as np
+import pytest
+
+from leg_wear_monitor import Mechanism
+from leg_wear_monitor.dynamics.clearance.run import ClearanceRun
+from leg_wear_monitor.dynamics.run.run_statistics import new_tally
+from leg_wear_monitor.dynamics.simulation import prepare
+from leg_wear_monitor.mechanism.ideal import TURN
+from leg_wear_monitor.twin.digital_twin import DigitalTwin
+from leg_wear_monitor.twin.follower.repeating import CYCLES
+from leg_wear_monitor.twin.sample import Samples, gait_samples
+from leg_wear_monitor.twin.settings import AVERAGE, INSTANT, TwinSettings
+
+START_NS, RATE, SECONDS = 1_700_000_000_000_000_000, 200, 13
+WARN, ERROR = 0.08, 0.1  # of the alarm, by default
+
+
+def sampled_at_instants(leg: Mechanism) -> Samples:
+    """Crank samples with the torque at their instants, which scatter by a quarter of a millisecond."""
+    run, tally, chance = (
+        ClearanceRun(prepare(leg), 11 * RATE),
+        new_tally(10),
+        np.random.default_rng(3),
+    )
+    n = SECONDS * RATE
+    t = np.arange(1, n + 1) / RATE + 2.5e-4 * chance.uniform(-1.0, 1.0, n)
+    torque = np.zeros(n)
+    for i in range(n):
+        run.advance(t[i], tally)
+        torque[i] = run.sample_at(t[i]).drive_torque
+    stamps = START_NS + np.round(1.0e9 * t).astype(np.int64)
+    angle = TURN * t + 1.0e-3 * chance.standard_normal(n)
+    return gait_samples(
+        stamps, crank_angle_rad=angle % TURN, torque_nm=torque + 0.05 * chance.standard_normal(n)
+    )
+
+
+def mismatches(leg: Mechanism, samples: Samples, sampling: str) -> list[float]:
+    cycles = DigitalTwin(leg, TwinSettings(torque_sampling=sampling)).update(samples).cycles
+    return [cycle.torque.unexplained_rms_nm / cycle.torque.predicted_rms_nm for cycle in cycles]
+
+
+def test_a_healthy_leg_is_as_predicted_if_its_sensor_is_known(leg):
+    samples = sampled_at_instants(leg)
+    taken_for_averages = mismatches(leg, samples, AVERAGE)
+    known = mismatches(leg, samples, INSTANT)
+    assert np.median(taken_for_averages) > 2.0 * ERROR
+    assert np.isnan(known[: CYCLES - 1]).all()
+    assert max(known[CYCLES - 1 :]) < WARN
+
+
+def test_a_knock_is_still_told(leg):
+    broken = attrs.evolve(leg.clearances["G"], radial_clearance=2.0e-3)
+    other = attrs.evolve(leg, clearances={**leg.clearances, "G": broken})
+    known = mismatches(leg, sampled_at_instants(other), INSTANT)
+    assert min(known[CYCLES - 1 :]) > ERROR
+
+
+def test_it_goes_on_bit_for_bit_from_a_snapshot(leg):
+    chance = np.random.default_rng(0)
+    n = np.arange(10 * RATE)
+    samples = gait_samples(
+        START_NS + n * (10**9 // RATE),
+        crank_angle_rad=TURN * n / RATE % TURN,
+        torque_nm=chance.standard_normal(len(n)),
+    )
+    twin = DigitalTwin(leg, TwinSettings(torque_sampling=INSTANT))
+    twin.update(samples[:500])
+    middle = twin.snapshot()
+    first = twin.update(samples[500:]).cycles
+    twin.restore(middle)
+    again = twin.update(samples[500:]).cycles
+    assert repr([cycle.torque for cycle in first]) == repr([cycle.torque for cycle in again])
+    assert not np.isnan(first[-1].torque.unexplained_rms_nm)
+
+
+@pytest.mark.plain
+def test_another_sampling_is_refused(refused):
+    refused(TwinSettings, "torque_sampling", "median")

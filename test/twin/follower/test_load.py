@@ -1,0 +1,159 @@
+"""What the drive torque tells: foot load, friction and lag, apart from one another."""
+
+import attrs
+import numpy as np
+import pytest
+from hypothesis import given
+from hypothesis import strategies as st
+
+from leg_wear_monitor import Mechanism
+from leg_wear_monitor.dynamics.clearance.run import ClearanceRun
+from leg_wear_monitor.dynamics.clearance.tables import build_tables
+from leg_wear_monitor.dynamics.run.run_statistics import FORCE, TORQUE, new_tally
+from leg_wear_monitor.dynamics.simulation import prepare
+from leg_wear_monitor.mechanism.ideal import TURN, one_cycle, point_motion
+from leg_wear_monitor.mechanism.position import build_linkage
+from leg_wear_monitor.mechanism.spec import ConstantLoad
+from leg_wear_monitor.twin.digital_twin import DigitalTwin
+from leg_wear_monitor.twin.follower.load import FootLoad
+from leg_wear_monitor.twin.follower.state import NUMBER, RESIDUAL_2
+from leg_wear_monitor.twin.follower.torque_estimate import FRICTION, LAG, LOAD, LoadEstimate, find
+from leg_wear_monitor.twin.sample import Samples, gait_samples
+from leg_wear_monitor.twin.settings import CONSTANT, STANCE, TwinSettings
+
+START_NS, RATE = 1_700_000_000_000_000_000, 200
+
+
+def pushed(leg: Mechanism, force: float) -> Mechanism:
+    """The leg with a constant force up at its toe [N]."""
+    body, point = leg.toe
+    return attrs.evolve(leg, loads={"push": ConstantLoad(body=body, point=point, force=(0.0, force))})
+
+
+def measured(
+    leg: Mechanism, seconds: int, friction: float, noise: float = 0.05
+) -> tuple[Samples, np.ndarray]:
+    """Samples of a leg at 60 rpm whose torque sensor gives means between samples; its mean contact forces."""
+    setup = prepare(leg)
+    run, tally, chance = ClearanceRun(setup, 11 * RATE), new_tally(10), np.random.default_rng(1)
+    impulse = np.zeros(seconds * RATE + 1)
+    for i in range(1, len(impulse)):
+        run.advance(i / RATE, tally)
+        impulse[i] = tally.drive_integral[TORQUE]
+    n = len(impulse) - 1
+    t = np.arange(1, n + 1) / RATE
+    torque = np.diff(impulse) * RATE + friction + noise * chance.standard_normal(n)
+    angle = TURN * t + 1.0e-3 * chance.standard_normal(n)
+    stamps = START_NS + np.arange(n) * (10**9 // RATE)
+    force = tally.integral[setup.contacts.joint, FORCE] / tally.time[0]
+    return gait_samples(stamps, crank_angle_rad=angle % TURN, torque_nm=torque), force
+
+
+@pytest.mark.parametrize("force", [-60.0, 100.0])
+def test_tables_under_a_load_are_those_of_the_loaded_leg(leg, force):
+    setup = prepare(leg)
+    load = FootLoad(setup.linkage, setup.contacts, CONSTANT)
+    bare = [table.copy() for table in load.tables]
+    loaded = build_tables(build_linkage(pushed(leg, force)), setup.contacts)
+    load.set(force)
+    for table, wanted in zip(load.tables, loaded, strict=True):
+        rounding = 4.0 * float(np.finfo(np.float32).eps) if table.dtype == np.float32 else 1.0e-9
+        np.testing.assert_allclose(table, wanted, rtol=rounding, atol=rounding * np.abs(wanted).max())
+    load.set(0.0)
+    for table, wanted in zip(load.tables, bare, strict=True):
+        np.testing.assert_array_equal(table, wanted)
+
+
+@pytest.mark.parametrize("shape", [CONSTANT, STANCE])
+def test_the_signature_is_virtual_work_without_mean(leg, shape):
+    """Over the turn a load that depends on the height alone does no work."""
+    setup = prepare(leg)
+    load = FootLoad(setup.linkage, setup.contacts, shape)
+    signature = load.signature[:-1]
+    assert abs(signature.mean()) < 0.002 * np.abs(signature).max()
+    if shape == CONSTANT:
+        velocity = point_motion(one_cycle(setup.linkage, len(signature), 1.0), setup.linkage, *leg.toe)[1]
+        np.testing.assert_allclose(signature, -velocity[:, 1], atol=1.0e-9)
+
+
+def sums_of(columns: np.ndarray, residual: np.ndarray) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+    sums = np.zeros(5)
+    sums[NUMBER], sums[RESIDUAL_2] = len(residual), residual @ residual
+    return sums, columns.T @ columns, columns.T @ residual
+
+
+@given(
+    load=st.floats(-500.0, 500.0), friction=st.floats(-5.0, 5.0), lag=st.floats(-0.01, 0.01),
+    phase=st.floats(0.0, TURN),
+)  # fmt: skip
+def test_load_friction_and_lag_are_told_apart(load, friction, lag, phase):
+    angle = np.linspace(0.0, TURN, 200, endpoint=False)
+    columns = np.stack([0.1 * np.sin(angle + phase), np.ones(200), 40.0 * np.cos(3.0 * angle)], axis=1)
+    found = find(*sums_of(columns, columns @ [load, friction, lag]), 10.0)
+    np.testing.assert_allclose(found.values, [load, friction, lag], atol=1.0e-9 * 500.0)
+    assert found.condition == pytest.approx(1.0)
+    assert found.left < 1.0e-4
+
+
+def test_without_a_toe_only_friction_and_lag_are_sought():
+    angle = np.linspace(0.0, TURN, 50, endpoint=False)
+    columns = np.stack([np.zeros(50), np.ones(50), np.cos(angle)], axis=1)
+    found = find(*sums_of(columns, columns @ [0.0, 2.0, 0.1]), 1.0)
+    np.testing.assert_allclose(found.values, [0.0, 2.0, 0.1])
+    estimate = LoadEstimate(100.0)
+    estimate.take(found, True)
+    assert estimate.acting == 0.0
+
+
+def test_what_cannot_be_told_apart_is_not_guessed():
+    columns = np.ones((50, 3))
+    assert find(*sums_of(columns, np.ones(50)), 1.0) is None
+    assert find(*sums_of(columns[:3], np.ones(3)), 1.0) is None
+
+
+@pytest.mark.parametrize("force, friction", [(0.0, 0.0), (-60.0, 1.5), (100.0, 0.0)])
+def test_a_load_is_found_and_moves_the_contact_forces(leg, force, friction):
+    """An unloaded leg stays unloaded; a load is known within its scatter, and forces are those of the leg."""
+    samples, wanted = measured(pushed(leg, force) if force else leg, 8, friction)
+    twin = DigitalTwin(leg, TwinSettings(load_shape=CONSTANT))
+    last = twin.update(samples).cycles[-3:]
+    torque = last[-1].torque
+    assert torque.load_n == pytest.approx(force, abs=max(3.0, 4.0 * torque.load_sigma_n))
+    assert torque.friction_nm == pytest.approx(friction, abs=0.2)
+    assert torque.torque_lag_s == pytest.approx(0.0, abs=1.0e-3)
+    assert torque.load_acting_n == (torque.load_n if force else 0.0)
+    assert torque.unexplained_rms_nm < 0.15 * torque.measured_rms_nm
+    assert torque.condition < 1.2
+    force_n = np.mean([cycle.mean_force_n for cycle in last], axis=0)
+    np.testing.assert_allclose(force_n, wanted, rtol=0.05, atol=1.0)
+
+
+def test_a_load_that_is_not_asked_for_does_not_act(leg):
+    samples, _ = measured(pushed(leg, 100.0), 5, 0.0)
+    twin = DigitalTwin(leg, TwinSettings(load_shape=CONSTANT, estimate_load=False))
+    torque = twin.update(samples).cycles[-1].torque
+    assert torque.load_n == pytest.approx(100.0, abs=8.0)
+    assert torque.load_acting_n == 0.0
+    assert torque.residual_rms_nm > 3.0 * torque.unexplained_rms_nm
+
+
+def test_a_sudden_load_is_believed_soon_and_a_doubtful_one_not():
+    estimate = LoadEstimate(1000.0)
+    quiet, loud = ({"load": 1.0}, {"load": 40.0})
+
+    def take(load: float, sigma: float) -> None:
+        columns, chance = np.zeros((200, 3)), np.random.default_rng(0)
+        columns[:, LOAD] = 0.1 * np.sin(np.arange(200) * TURN / 200)
+        columns[:, FRICTION], columns[:, LAG] = 1.0, np.cos(np.arange(200) * 3.0 * TURN / 200)
+        residual = columns @ [load - estimate.acting, 0.0, 0.0] + sigma * chance.standard_normal(200)
+        estimate.take(find(*sums_of(columns, residual), 10.0), True)
+
+    for _ in range(20):
+        take(quiet["load"], 1.0)
+    assert estimate.acting == 0.0
+    take(loud["load"], 0.3)
+    take(loud["load"], 0.3)
+    assert estimate.acting == pytest.approx(40.0, abs=4.0)
+    for _ in range(5):
+        take(0.0, 0.3)
+    assert estimate.acting == 0.0

@@ -1,0 +1,69 @@
+"""A foot that cannot pull, and what repeats of a torque that is sampled at instants."""
+
+import numpy as np
+import pytest
+from hypothesis import given
+from hypothesis import strategies as st
+
+from leg_wear_monitor.mechanism.ideal import TURN
+from leg_wear_monitor.twin.follower.repeating import CYCLES, RepeatingResidual
+from leg_wear_monitor.twin.follower.state import BY_PHASE, NUMBER, PHASES, RESIDUAL_2
+from leg_wear_monitor.twin.follower.torque_estimate import LoadEstimate, find
+
+pytestmark = pytest.mark.plain
+
+ANGLE = np.linspace(0.0, TURN, 200, endpoint=False)
+COLUMNS = np.stack([0.1 * np.sin(ANGLE), np.ones(200), 40.0 * np.cos(3.0 * ANGLE)], axis=1)
+
+
+def sums_of(residual):
+    sums = np.zeros(5)
+    sums[NUMBER], sums[RESIDUAL_2] = len(residual), residual @ residual
+    return sums, COLUMNS.T @ COLUMNS, COLUMNS.T @ residual
+
+
+def test_a_foot_that_pulls_is_not_explained_by_a_load():
+    """What a load below 0 would explain is left in the mismatch; the friction beside it is still found."""
+    residual = COLUMNS @ [-50.0, 1.5, 0.001]
+    free, bounded = find(*sums_of(residual), 10.0), find(*sums_of(residual), 10.0, (0.0, 1000.0))
+    assert free.left == pytest.approx(0.0, abs=1e-4)
+    assert bounded.left == pytest.approx(5.0 / np.sqrt(2.0), rel=1e-6)
+    np.testing.assert_allclose(bounded.values, [-50.0, 1.5, 0.001], rtol=1e-9)
+    estimate = LoadEstimate(1000.0, 0.0)
+    estimate.take(bounded, True)
+    assert estimate.values[0] == estimate.acting == 0.0
+    assert estimate.room == (0.0, 1000.0)
+
+
+@given(st.floats(0.0, 500.0))
+def test_a_load_within_its_bounds_is_explained(load):
+    found = find(*sums_of(COLUMNS @ [load, 0.0, 0.0]), 10.0, (0.0, 1000.0))
+    assert found.left == pytest.approx(0.0, abs=1e-3)
+
+
+def instants(repeats: float, scatter: float, seed: int = 0):
+    """Residuals by phase: a wave that repeats, noise that does not, a friction of 2 N m."""
+    found, chance = RepeatingResidual(), np.random.default_rng(seed)
+    phase = (np.arange(PHASES) + 0.5) / PHASES * TURN
+    for _ in range(CYCLES):
+        sums = np.ones((BY_PHASE, PHASES))
+        wave = np.sqrt(2.0) * repeats * np.sin(5.0 * phase)
+        sums[1] = 2.0 + wave + scatter * chance.standard_normal(PHASES)
+        sums[2], sums[4] = 0.1 * np.sin(phase), np.cos(2.0 * phase)
+        weight = chance.uniform(0.5, 2.0, PHASES)
+        found.take(sums * weight)
+    return found
+
+
+def test_what_scatters_is_taken_off_and_what_repeats_stays():
+    quiet = [instants(0.0, 2.0, seed).rms_nm for seed in range(20)]
+    assert np.sqrt(np.mean(np.square(quiet))) < 0.35  # of 2 N m, 0.7 in a mean of eight cycles
+    loud = [instants(3.0, 2.0, seed).rms_nm for seed in range(20)]
+    assert np.mean(loud) == pytest.approx(3.0, rel=0.05)
+    assert instants(3.0, 0.0).rms_nm == pytest.approx(3.0, rel=1e-6)
+
+
+def test_before_enough_cycles_nothing_is_told():
+    found = instants(1.0, 0.0)
+    found.cycles = found.cycles[1:]
+    assert np.isnan(found.rms_nm)

@@ -1,0 +1,402 @@
+"""The crank tracker: whatever comes in, smooth motion comes out, and it is where the crank was."""
+
+from collections.abc import Callable, Iterable
+from typing import NamedTuple
+
+import numpy as np
+import pytest
+from hypothesis import given, settings
+from hypothesis import strategies as st
+from numpy.polynomial import Polynomial
+
+from leg_wear_monitor.mechanism.ideal import TURN
+from leg_wear_monitor.twin import steps as told
+from leg_wear_monitor.twin.sample import TORQUE, Samples, gait_samples
+from leg_wear_monitor.twin.settings import TrackerSettings
+from leg_wear_monitor.twin.steps import BEGIN, CODE, END, EXTRA, LEAVE, LOOK, MOVE, REST, START, TELL, TURNS
+from leg_wear_monitor.twin.tracker import state as at
+from leg_wear_monitor.twin.tracker.tracker import CrankTracker
+
+START_NS = 1_700_000_000_123_456_789
+S = 1_000_000_000
+
+
+class Told(NamedTuple):
+    """All steps of a tracker: what (m, 6) and motion (m, 6)."""
+
+    what: np.ndarray
+    motion: np.ndarray
+
+    def of(self, code: int) -> np.ndarray:
+        return self.what[self.what[:, CODE] == code]
+
+    def motion_at(self, moments: int = 5) -> np.ndarray:
+        """Time since START_NS [s], angle, speed, acceleration (4, n) at some moments of every piece."""
+        rows = []
+        for what, motion in zip(self.what, self.motion, strict=True):
+            if what[CODE] == MOVE:
+                piece = Polynomial(motion)
+                for tau in np.linspace(0.0, 1.0e-9 * (what[END] - what[BEGIN]), moments):
+                    since = 1.0e-9 * (what[BEGIN] - START_NS) + tau
+                    angle = TURN * what[TURNS] + piece(tau)
+                    rows.append((since, angle, piece.deriv()(tau), piece.deriv(2)(tau)))
+        return np.array(rows).T
+
+
+def track(blocks: Iterable[Samples], tracker: CrankTracker | None = None) -> Told:
+    tracker = tracker or CrankTracker(TrackerSettings())
+    what, motion = [np.zeros((0, 6), dtype=np.int64)], [np.zeros((0, 6))]
+    for block in blocks:
+        for steps, n in tracker.update(block):
+            what.append(steps.what[:n].copy())
+            motion.append(steps.motion[:n].copy())
+    return Told(np.concatenate(what), np.concatenate(motion))
+
+
+def assert_same(one: Told, other: Told) -> None:
+    """Bit for bit."""
+    np.testing.assert_array_equal(one.what, other.what)
+    np.testing.assert_array_equal(one.motion, other.motion)
+
+
+def cut(samples: Samples, at: Iterable[int]) -> list[Samples]:
+    return [block for block in np.split(samples, sorted(at)) if len(block)]
+
+
+def with_torque(samples: Samples, every: int = 1) -> Samples:
+    """Torque samples between those of the crank."""
+    torque = gait_samples(samples["stamp_ns"][::every] + 1_234_567, TORQUE, torque_nm=3.0)
+    both = np.concatenate([samples, torque])
+    return both[np.argsort(both["stamp_ns"], kind="stable")]
+
+
+def start_stop_reverse(t: np.ndarray) -> np.ndarray:
+    """Angle [rad] of a crank that runs for 3 s, rests, runs backwards from 5 s to 8 s, and rests."""
+    speed = np.interp(
+        t, [0.0, 0.2, 2.8, 3.0, 5.0, 5.2, 7.8, 8.0], TURN * np.array([0, 1, 1, 0, 0, -1, -1, 0])
+    )
+    return np.concatenate([[0.0], np.cumsum(0.5 * (speed[1:] + speed[:-1]) * np.diff(t))])
+
+
+@settings(max_examples=30)
+@given(cuts=st.lists(st.integers(0, 2000), max_size=40))
+def test_any_split_into_blocks_gives_the_same(gait, cuts):
+    samples = with_torque(gait(5.0, angle=start_stop_reverse))
+    assert_same(track(cut(samples, cuts)), track([samples]))
+
+
+@pytest.mark.plain
+def test_blocks_of_one_give_the_same(gait):
+    samples = with_torque(gait(3.0))
+    assert_same(track(cut(samples, range(len(samples)))), track([samples]))
+
+
+@settings(max_examples=30)
+@given(seed=st.integers(0, 2**32 - 1), late_s=st.floats(0.0, 0.0199), share=st.floats(0.0, 1.0))
+def test_order_and_duplicates_within_the_window_change_nothing(gait, seed, late_s, share):
+    """Samples come up to 20 ms later than younger ones, some of them twice."""
+    samples, chance = with_torque(gait(3.0)), np.random.default_rng(seed)
+    twice = np.concatenate([samples, samples[chance.random(len(samples)) < share]])
+    arrival = twice["stamp_ns"] + 1.0e9 * late_s * chance.random(len(twice))
+    shuffled = twice[np.argsort(arrival, kind="stable")]
+    tracker = CrankTracker(TrackerSettings())
+    assert_same(track([shuffled], tracker), track([samples]))
+    assert tracker.state.counts[at.DUPLICATES] == len(twice) - len(samples)
+    assert tracker.state.counts[at.LATE] == 0
+
+
+def assert_all_but_the_first_are_used(steps: Told, tracker: CrankTracker, whole: Told, late_s: float) -> None:
+    """The motion is the same as far as it goes; torques are late until it is known that they come late."""
+    late = tracker.state.counts[at.LATE]
+    assert late <= 200.0 * late_s + 1
+    moves = steps.of(MOVE)
+    np.testing.assert_array_equal(moves, whole.of(MOVE)[: len(moves)])
+    looked = len(steps.of(LOOK)) + late
+    assert looked >= len(whole.of(LOOK)) - 2 * 200.0 * late_s - 2
+
+
+@pytest.mark.parametrize("late_s", [0.05, 0.3])
+def test_a_topic_that_comes_later_is_waited_for(gait, late_s):
+    samples = with_torque(gait(3.0))
+    arrival = samples["stamp_ns"] + np.where(samples["kind"] == TORQUE, round(late_s * S), 0)
+    tracker, whole = CrankTracker(TrackerSettings()), track([samples])
+    delayed = track([samples[np.argsort(arrival, kind="stable")]], tracker)
+    assert_all_but_the_first_are_used(delayed, tracker, whole, late_s)
+
+
+def test_topics_that_come_in_bursts_are_sorted(gait):
+    """A tenth of a second of the one, then of the other: as a busy node serves them."""
+    samples = with_torque(gait(3.0))
+    crank, torque = samples[samples["kind"] != TORQUE], samples[samples["kind"] == TORQUE]
+    bursts = [part for pair in zip(np.split(crank, 30), np.split(torque, 30), strict=True) for part in pair]
+    tracker = CrankTracker(TrackerSettings())
+    assert_all_but_the_first_are_used(track(bursts, tracker), tracker, track([samples]), 0.1)
+
+
+@settings(max_examples=30)
+@given(where=st.integers(0, 1000))
+def test_restored_it_goes_on_bit_for_bit(gait, where):
+    samples = with_torque(gait(5.0, rate_hz=100.0, angle=start_stop_reverse))
+    whole, tracker, other = track([samples]), CrankTracker(TrackerSettings()), CrankTracker(TrackerSettings())
+    before = track([samples[:where]], tracker)
+    snapshot = tracker.snapshot()
+    track([gait(1.0, start_ns=START_NS + 9 * S)], tracker)  # astray
+    for one in (tracker, other):
+        one.restore(snapshot)
+        after = track([samples[where:]], one)
+        assert_same(Told(*(np.concatenate(pair) for pair in zip(before, after, strict=True))), whole)
+
+
+@settings(max_examples=20)
+@given(
+    seed=st.integers(0, 100),
+    rate_hz=st.sampled_from([50.0, 200.0, 1000.0]),
+    dropped=st.floats(0.0, 0.3),
+    noise_rad=st.floats(0.0, 2.0e-3),
+)
+def test_the_motion_is_smooth_and_true(gait, seed, rate_hz, dropped, noise_rad):
+    """Angle, speed and acceleration are continuous, through starts, rests and reversals, and true."""
+    samples = gait(8.0, rate_hz, start_stop_reverse, noise_rad, seed)
+    kept = samples[np.random.default_rng(seed).random(len(samples)) >= dropped]
+    steps = track([kept])
+    time, angle, speed, acceleration = steps.motion_at()
+    joins = np.flatnonzero(np.diff(time) < 1.0e-9)
+    assert len(joins) > 100
+    for values, small in ((angle, 1.0e-9), (speed, 1.0e-8), (acceleration, 1.0e-6)):
+        assert np.abs(np.diff(values)[joins]).max() < small
+    fine = np.arange(0.0, 8.0, 1.0e-3)
+    truth = np.interp(time, fine, start_stop_reverse(fine))
+    scatter = noise_rad * np.sqrt(200.0 / rate_hz / (1.0 - dropped))
+    assert (
+        np.abs(angle - truth - np.round((angle - truth) / TURN).mean() * TURN).max() < 0.012 + 4.0 * scatter
+    )
+
+
+@pytest.mark.parametrize("rate_hz, bound", [(50.0, 1.2), (200.0, 0.5), (1000.0, 0.25)])
+def test_encoder_noise_makes_little_acceleration(gait, rate_hz, bound):
+    """A thousandth of a radian, differentiated twice at 200 Hz, would be 100 rad/s^2."""
+    time, _, speed, acceleration = track([gait(20.0, rate_hz)]).motion_at(9)
+    steady = time > 1.0
+    assert acceleration[steady].std() < bound
+    assert speed[steady].std() < 0.02
+    assert speed[steady].mean() == pytest.approx(TURN, rel=1.0e-4)
+
+
+@pytest.mark.parametrize("times", [1, 2])
+def test_speed_ripple_is_followed(gait, times):
+    """Three percent, once or twice a turn, to a twentieth of it."""
+    ripple = 0.03 * TURN
+    w = times * TURN
+    steps = track([gait(10.0, angle=lambda t: TURN * t + ripple / w * np.sin(w * t), noise_rad=0.0)])
+    time, _, speed, acceleration = steps.motion_at(9)
+    steady = time > 1.0
+    off = speed - TURN - ripple * np.cos(w * time)
+    assert np.abs(off[steady]).max() < 0.05 * ripple
+    off = acceleration + ripple * w * np.sin(w * time)
+    assert np.abs(off[steady]).std() < 0.1 * ripple * w
+
+
+@pytest.mark.plain
+def test_a_crank_at_rest_stays_put(gait):
+    """It rests from its stop to its next start, and no noise moves it meanwhile."""
+    tracker = CrankTracker(TrackerSettings())
+    steps = track([gait(10.0, angle=start_stop_reverse)], tracker)
+    happened = [(row[EXTRA], round(1.0e-9 * (row[BEGIN] - START_NS), 1)) for row in steps.of(TELL)]
+    assert [what for what, _ in happened] == [told.STOPPED, told.MOVING, told.REVERSED, told.STOPPED]
+    assert happened[0][1] == pytest.approx(3.3, abs=0.15)
+    assert happened[1][1] == pytest.approx(5.0, abs=0.15)
+    rested = (steps.of(REST)[:, END] - steps.of(REST)[:, BEGIN]).sum()
+    assert rested == tracker.state.counts[at.STANDING_NS]
+    assert 3.0 * S < rested < 3.5 * S
+    moves = steps.of(MOVE)
+    resting = (moves[:, BEGIN] > START_NS + 3.6 * S) & (moves[:, END] < START_NS + 4.8 * S)
+    assert not resting.any()
+
+
+@pytest.mark.parametrize("gap_s", [0.06, 0.3, 0.45])
+def test_gaps_are_bridged_and_marked(gait, gap_s):
+    samples = gait(4.0)
+    since = 1.0e-9 * (samples["stamp_ns"] - START_NS)
+    tracker = CrankTracker(TrackerSettings())
+    steps = track([samples[(since < 2.0) | (since >= 2.0 + gap_s)]], tracker)
+    time, angle, _, _ = steps.motion_at()
+    np.testing.assert_allclose(angle, TURN * time + 0.5, atol=0.02 + 0.3 * gap_s**3)
+    assert tracker.state.counts[at.GAPS] == 1
+    assert tracker.state.counts[at.BRIDGED_NS] == pytest.approx(S * gap_s, abs=0.011 * S)
+    assert not len(steps.of(LEAVE))
+
+
+@pytest.mark.parametrize("rate_hz", [10.0, 20.0])
+def test_slow_samples_are_no_gaps(gait, rate_hz):
+    tracker = CrankTracker(TrackerSettings())
+    time, angle, _, _ = track([gait(10.0, rate_hz)], tracker).motion_at()
+    np.testing.assert_allclose(angle, TURN * time + 0.5, atol=0.01)
+    assert tracker.state.counts[at.GAPS] == 0
+
+
+@given(shift_ns=st.integers(-START_NS + 1, 7_000_000_000_000_000_000))
+def test_the_motion_does_not_depend_on_when_it_is(gait, shift_ns):
+    """Bit for bit, from 1970 to 2240."""
+    samples = with_torque(gait(2.0))
+    moved = samples.copy()
+    moved["stamp_ns"] += shift_ns
+    here, there = track([samples]), track([moved])
+    np.testing.assert_array_equal(there.motion, here.motion)
+    np.testing.assert_array_equal(there.of(MOVE)[:, BEGIN], here.of(MOVE)[:, BEGIN] + shift_ns)
+
+
+def test_longer_gaps_are_not_made_up(gait):
+    """The crank is lost and found again; the time between, and to be sure of it, is unmonitored."""
+    samples = gait(6.0)
+    since = 1.0e-9 * (samples["stamp_ns"] - START_NS)
+    tracker = CrankTracker(TrackerSettings())
+    steps = track([samples[(since < 2.0) | (since >= 4.0)]], tracker)
+    assert len(steps.of(START)) == 2
+    assert list(steps.of(LEAVE)[:, EXTRA]) == [told.LOST_IN_GAP]
+    moves = steps.of(MOVE)
+    moved = (moves[:, END] - moves[:, BEGIN]).sum()
+    first, last = steps.of(START)[0, BEGIN], moves[-1, END]
+    unmonitored = tracker.state.counts[at.UNMONITORED_NS]
+    assert moved + unmonitored - (first - START_NS) == last - first
+    assert unmonitored == pytest.approx(2.3 * S, abs=0.1 * S)
+
+
+@pytest.mark.plain
+def test_a_gap_of_the_crank_alone_is_one_too(gait):
+    """Torque samples go on meanwhile: they are looked at without a leg."""
+    samples = with_torque(gait(6.0))
+    since = 1.0e-9 * (samples["stamp_ns"] - START_NS)
+    steps = track([samples[(samples["kind"] == TORQUE) | (since < 2.0) | (since >= 4.0)]])
+    assert len(steps.of(START)) == 2
+    assert list(steps.of(LEAVE)[:, EXTRA]) == [told.LOST_IN_GAP]
+    looked = steps.of(LOOK)
+    assert (np.diff(looked[:, BEGIN]) >= 0).all()
+    assert ((looked[:, BEGIN] > START_NS + 2.6 * S) & (looked[:, BEGIN] < START_NS + 3.9 * S)).sum() > 200
+
+
+@pytest.mark.plain
+def test_stamps_that_jump_back_start_a_new_time_base(gait):
+    tracker = CrankTracker(TrackerSettings())
+    steps = track([gait(3.0), gait(3.0, start_ns=START_NS - 1000 * S)], tracker)
+    assert tracker.state.counts[at.JUMPS] == 1
+    assert list(steps.of(LEAVE)[:, EXTRA]) == [told.LOST_BY_JUMP]
+    assert len(steps.of(START)) == 2
+    assert tracker.state.counts[at.UNMONITORED_NS] == pytest.approx(0.2 * S, abs=0.05 * S)
+    assert steps.of(MOVE)[-1, END] > START_NS - 997.3 * S
+
+
+@settings(max_examples=30)
+@given(
+    where=st.lists(st.integers(1, 599), min_size=1, max_size=5, unique=True),
+    stamp=st.sampled_from([1, 5 * S, START_NS - 3600 * S, START_NS + 3600 * S, 2**63 - 1]),
+)
+def test_single_stray_stamps_change_nothing(gait, where, stamp):
+    samples = gait(3.0)
+    stray = np.insert(samples, where, gait_samples([stamp], crank_angle_rad=1.0)[0])
+    tracker = CrankTracker(TrackerSettings())
+    assert_same(track([stray], tracker), track([samples]))
+    assert tracker.state.counts[at.STRAY] + tracker.state.counts[at.DUPLICATES] == len(where)
+
+
+@pytest.mark.plain
+def test_outliers_change_little_and_a_crank_that_is_elsewhere_is_found_again(gait):
+    samples = gait(6.0)
+    jumped = samples.copy()
+    jumped["crank_angle_rad"][100::50] += 1.5
+    tracker = CrankTracker(TrackerSettings())
+    time, angle, _, _ = track([jumped], tracker).motion_at()
+    np.testing.assert_allclose(angle, TURN * time + 0.5, atol=2.0e-3)
+    assert tracker.state.counts[at.OUTLIERS] == len(samples[100::50])
+    jumped = samples.copy()
+    jumped["crank_angle_rad"][600:] += 1.5
+    steps = track([jumped])
+    assert list(steps.of(LEAVE)[:, EXTRA]) == [told.LOST_BY_OUTLIERS]
+    assert len(steps.of(START)) == 2
+
+
+def test_velocity_helps_where_it_is_right_and_is_dropped_where_it_is_not(gait):
+    samples = gait(20.0, rate_hz=50.0)
+    with_velocity, wrong = samples.copy(), samples.copy()
+    noise = 0.02 * np.random.default_rng(7).standard_normal(len(samples))
+    with_velocity["crank_velocity_radps"] = TURN + noise
+    wrong["crank_velocity_radps"] = 0.0  # as drivers do that know none
+    tracker = CrankTracker(TrackerSettings())
+    scatter = [
+        track([block], one).motion_at()[3][100:].std()
+        for block, one in ((samples, None), (with_velocity, None), (wrong, tracker))
+    ]
+    assert scatter[1] < 0.8 * scatter[0]
+    assert scatter[2] == pytest.approx(scatter[0], rel=1.0e-9)
+    assert tracker.state.counts[at.VELOCITY_OUTLIERS] > 990
+
+
+@pytest.mark.parametrize("what", ["random", "coarse noise", "ten times too fast", "steps"])
+def test_what_is_no_gait_moves_no_leg(gait, what):
+    """Rather lost than made up."""
+    samples, chance = gait(5.0), np.random.default_rng(0)
+    t = 1.0e-9 * (samples["stamp_ns"] - START_NS)
+    samples["crank_angle_rad"] = {
+        "random": TURN * chance.random(len(t)),
+        "coarse noise": TURN * t + 0.1 * chance.standard_normal(len(t)),
+        "ten times too fast": 10.0 * TURN * t,
+        "steps": TURN * np.floor(10.0 * t) / 10.0,
+    }[what]
+    steps = track([samples])
+    moves = steps.of(MOVE)
+    assert (moves[:, END] - moves[:, BEGIN]).sum() < 0.1 * S
+
+
+def test_a_fifth_of_the_samples_may_be_nonsense(gait):
+    """What passes the gate by chance bends the motion a little."""
+    samples, chance = gait(20.0), np.random.default_rng(0)
+    glitch = chance.random(len(samples)) < 0.2
+    samples["crank_angle_rad"][glitch] = TURN * chance.random(glitch.sum())
+    time, angle, speed, _ = track([samples]).motion_at()
+    assert np.ptp(time) > 19.0
+    off = angle - TURN * time - 0.5
+    assert np.abs(off - TURN * np.round(off / TURN)).max() < 0.15
+    assert np.abs(speed / TURN - 1.0).max() < 0.5
+
+
+_WEIRD = st.sampled_from([0.0, 1.0, -7.0, np.nan, np.inf, -np.inf, 1.0e300, -1.0e300, 1.0e6, 5.0e-324])
+
+
+@settings(max_examples=200)
+@given(
+    rows=st.lists(
+        st.tuples(
+            st.integers(-5, 400) | st.sampled_from([-(2**62), 2**62]),
+            st.integers(0, 3),
+            st.sampled_from([0, 0, 0, 1, 8, 255]),
+            _WEIRD | st.floats(0.0, TURN),
+            _WEIRD,
+            _WEIRD,
+        ),
+        max_size=60,
+    )
+)
+def test_no_sequence_of_samples_breaks_it(rows):
+    """Every sample is counted once; what comes out is finite, in order, and joins up."""
+    samples = gait_samples(np.zeros(len(rows), dtype=np.int64))
+    for sample, (stamp, kind, fault, *values) in zip(samples, rows, strict=True):
+        sample["stamp_ns"] = START_NS + 10_000_000 * stamp if abs(stamp) < 1000 else max(stamp, -1)
+        sample["kind"], sample["fault"] = kind, fault
+        sample["crank_angle_rad"], sample["crank_velocity_radps"], sample["torque_nm"] = values
+    tracker = CrankTracker(TrackerSettings())
+    steps = track([samples], tracker)
+    assert np.isfinite(steps.motion[steps.what[:, CODE] != LOOK]).all()
+    moves = steps.of(MOVE)
+    assert (moves[:, BEGIN] < moves[:, END]).all()
+    counts, clock = tracker.state.counts, tracker.state.clock
+    dropped = [at.DUPLICATES, at.LATE, at.STRAY, at.OUTLIERS]
+    settled = counts[[at.CRANKS, at.TORQUES, *dropped]].sum() + counts[at.FAULTY :].sum()
+    assert settled + clock[at.WAITING] + (clock[at.CANDIDATE] != 0) == counts[at.RECEIVED] == len(rows)
+
+
+@pytest.mark.parametrize(
+    "name, value",
+    [("bandwidth_hz", 0.0), ("gate_rad", np.nan), ("lag_s", -1.0), ("commanded_speed_radps", 0.0),
+     ("reorder_window_s", 2.0), ("bandwidth_hz", 0.1), ("largest_speed_radps", -1.0)],
+)  # fmt: skip
+def test_senseless_settings_are_refused(name: str, value: float, refused: Callable[..., None]) -> None:
+    refused(TrackerSettings, name, value)

@@ -2,6 +2,7 @@
 
 from collections.abc import Callable
 from functools import cache
+from importlib.util import find_spec
 from pathlib import Path
 from typing import Any
 
@@ -12,6 +13,11 @@ from ruamel.yaml import YAML
 from leg_wear_monitor import Mechanism, load_mechanism
 from leg_wear_monitor.mechanism.position import Linkage, build_linkage
 from leg_wear_monitor.share import share_directory
+
+if find_spec("mcap") and find_spec("rosbags"):
+    pytest_plugins = ["recordings"]
+else:  # the extra `bags` is not installed
+    collect_ignore_glob = ["bags/*", "messages/*", "playback/*"]
 
 # the first example may wait for a compilation, so there is no deadline
 settings.register_profile("repeatable", derandomize=True, deadline=None, max_examples=50)

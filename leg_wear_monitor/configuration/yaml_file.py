@@ -64,10 +64,13 @@ def _text(path: Path, source: str) -> str:
 def _check_depth(text: str, source: str) -> None:
     """Stop where the text first goes too deep: to compose thousands of levels takes seconds."""
     depth = 0
-    for event in YAML(typ="safe", pure=True).parse(text):
-        depth += isinstance(event, CollectionStartEvent) - isinstance(event, CollectionEndEvent)
-        if depth > DEEPEST:
-            raise ConfigError(source, "", f"is nested more than {DEEPEST} deep")
+    try:
+        for event in YAML(typ="safe", pure=True).parse(text):
+            depth += isinstance(event, CollectionStartEvent) - isinstance(event, CollectionEndEvent)
+            if depth > DEEPEST:
+                raise ConfigError(source, "", f"is nested more than {DEEPEST} deep")
+    except YAMLError:
+        return  # to be reported by who composes, after what is wrong before it
 
 
 def _check_size(document: Any, source: str) -> None:

@@ -14,8 +14,7 @@ from leg_wear_monitor.mechanism.spec import Mechanism
 Arrays = dict[str, np.ndarray[Any, Any]]
 
 # what a result depends on; of studies only what computes
-_ROOMS = ("mechanism", "contact", "wear", "dynamics")
-_TASKS = ("ensemble", "grid", "watch", "response", "life", "section", "exponent", "lyapunov", "tasks")
+_ROOMS = ("configuration", "mechanism", "contact", "wear", "dynamics", "life", "studies/tasks")
 
 
 @attrs.frozen(kw_only=True)
@@ -50,8 +49,7 @@ class Point:
 def code_digest() -> str:
     """Digest of the sources that results come from: the physics, and the tasks of studies."""
     home = Path(__file__).parents[1]
-    sources = [source for room in _ROOMS for source in (home / room).glob("*.py")]
-    sources += [home / "studies" / f"{name}.py" for name in _TASKS]
+    sources = [source for room in _ROOMS for source in (home / room).rglob("*.py")]
     digest = hashlib.sha256()
     for source in sorted(sources):
         digest.update(f"{source.relative_to(home).as_posix()}\n".encode())

@@ -1,7 +1,6 @@
-"""Messages made by the libraries that ours is held against."""
+"""Fixtures: messages and bags made by the libraries that ours is held against."""
 
 from collections.abc import Callable
-from importlib.util import find_spec
 from pathlib import Path
 from typing import Any
 
@@ -9,16 +8,13 @@ import attrs
 import numpy as np
 import pytest
 
-if not (find_spec("mcap") and find_spec("rosbags")):  # the extra `bags` is not installed
-    collect_ignore_glob = ["test_*.py"]
-else:
-    from leg_wear_monitor.bags.reader import Recording
-    from leg_wear_monitor.messages import encode
-    from leg_wear_monitor.messages.cdr import JOINT_STATE, TYPES, WRENCH_STAMPED
-    from leg_wear_monitor.messages.decode import Decoder
-    from leg_wear_monitor.messages.definitions import definition
-    from leg_wear_monitor.monitor.config.settings import MonitorConfig
-    from leg_wear_monitor.twin.sample import GAIT_SAMPLE
+from leg_wear_monitor.bags.reader import Recording
+from leg_wear_monitor.messages import encode
+from leg_wear_monitor.messages.cdr import JOINT_STATE, TYPES, WRENCH_STAMPED
+from leg_wear_monitor.messages.decode import Decoder
+from leg_wear_monitor.messages.definitions import definition
+from leg_wear_monitor.monitor.config.settings import MonitorConfig
+from leg_wear_monitor.twin.sample import GAIT_SAMPLE
 
 
 @pytest.fixture(scope="session")

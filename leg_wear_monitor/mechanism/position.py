@@ -187,7 +187,10 @@ def _nearest(linkage: Linkage, start: Floats, angle: float, weight: Floats) -> F
     for _ in range(200):
         normal = jacobian.T @ jacobian
         trial = q.copy()
-        step = np.linalg.solve(normal + damping * np.diag(np.diag(normal)), -jacobian.T @ phi)
+        try:
+            step = np.linalg.solve(normal + damping * np.diag(np.diag(normal)), -jacobian.T @ phi)
+        except np.linalg.LinAlgError:
+            break  # lengths too far apart for the numbers that there are
         trial[1:] += step.reshape(-1, 3)
         residual, slope = weighted(trial)
         if residual @ residual < phi @ phi:

@@ -79,8 +79,9 @@ class Stage:
         self._nodes.append(node)
         qos = QoSProfile(depth=depth, reliability=ReliabilityPolicy.BEST_EFFORT)
         publisher = node.create_publisher(kind, topic, qos)
-        if matches:
+        if matches:  # both know the other: what is sent before is lost
             self.serve(lambda: publisher.get_subscription_count() > 0, "the monitor's subscription")
+            self.serve(lambda: self.monitor.count_publishers(publisher.topic_name) > 0, "the publisher")
         return publisher.publish  # type: ignore[no-any-return]
 
     def serve(self, until: Callable[[], bool], what: str) -> None:

@@ -78,6 +78,13 @@ def test_joint_that_stays_open_is_named_with_its_gap(document):
     assert gap == pytest.approx(200.0, rel=0.01)
 
 
+def test_lengths_too_far_apart_are_no_assembly(document):
+    four_bar = document("four_bar")
+    four_bar["bodies"]["coupler"]["com"][1] = 1.0e30
+    with pytest.raises(AssemblyError, match=r"edited\.yaml: assembly: no assembly near the given start"):
+        assemble(_linkage(four_bar))
+
+
 def test_start_nearer_to_another_assembly_is_refused(document):
     four_bar = document("four_bar")
     four_bar["assembly"]["coupler"][2] -= 1.0

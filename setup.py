@@ -5,7 +5,7 @@ from xml.etree import ElementTree
 
 from setuptools import setup
 
-SHARE = "share/leg_wear_monitor"
+FRACTION = "share/leg_wear_monitor"
 
 
 def share_files() -> list[tuple[str, list[str]]]:
@@ -14,7 +14,7 @@ def share_files() -> list[tuple[str, list[str]]]:
     for top in ("bags", "config", "docs", "launch", "security"):
         for path in sorted(Path(top).rglob("*")):
             if path.is_file() and "__pycache__" not in path.parts:
-                found.setdefault(f"{SHARE}/{path.parent.as_posix()}", []).append(path.as_posix())
+                found.setdefault(f"{FRACTION}/{path.parent.as_posix()}", []).append(path.as_posix())
     return list(found.items())
 
 
@@ -24,7 +24,7 @@ setup(
     python_requires=">=3.11",
     data_files=[
         ("share/ament_index/resource_index/packages", ["resource/leg_wear_monitor"]),
-        (SHARE, ["README.md", "SECURITY.md", "package.xml"]),  # the first two name files below docs/
+        (FRACTION, ["README.md", "SECURITY.md", "package.xml"]),  # the first two name files below docs/
         *share_files(),
     ],
 )

@@ -96,12 +96,14 @@ def truth() -> np.ndarray:
 
 def ours() -> tuple[np.ndarray, float]:
     from leg_wear_monitor.monitor.config.forecast import Forecasting
-    from leg_wear_monitor.monitor.forecast.forecast import JointNow, forecast
+    from leg_wear_monitor.monitor.forecast.forecast import JointCondition, forecast
     from leg_wear_monitor.monitor.forecast.growth_law import GrowthLaw
     from leg_wear_monitor.monitor.forecast.wear_coefficients import believe
 
     law = GrowthLaw(np.array([[POWER]]), np.array([FRESH]), np.array([1.0]), np.zeros(1))
-    now = JointNow(joint="A", fresh_m=FRESH, wear_m=0.0, limit_m=LIMIT, growth_m=RATE, growth_error_m=0.0)
+    now = JointCondition(
+        joint="A", fresh_m=FRESH, wear_m=0.0, limit_m=LIMIT, growth_m=RATE, growth_error_m=0.0
+    )
     settings = Forecasting(wear_coefficient_sigma=SIGMA, load_sigma=LOAD_SIGMA, clearance_sigma_m=FRESH_SIGMA)
     began = time.perf_counter()
     told = forecast([now], [believe(settings, FRESH)], settings, law, cycle_s=1.0, valid=True).leg.cycles

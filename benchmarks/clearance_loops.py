@@ -26,7 +26,7 @@ from leg_wear_monitor.dynamics.clearance.model import hold_eccentricities, take_
 from leg_wear_monitor.dynamics.clearance.outputs import drive_torque, reactions, toe_deviation
 from leg_wear_monitor.dynamics.clearance.rosenbrock import factorise_contacts, solve_contacts
 from leg_wear_monitor.dynamics.clearance.step import integrate_joints, shift_start, try_step
-from leg_wear_monitor.dynamics.joint.contact_event import DELTA, first_touch, update_contacts
+from leg_wear_monitor.dynamics.joint.contact_event import DELTA, first_contact_event, update_contacts
 from leg_wear_monitor.kernel import entry
 from leg_wear_monitor.wear.surfaces import deposit_wear
 
@@ -93,14 +93,14 @@ def integrals(count, chain, model, state, work, added):
 
 
 @entry
-def touches(count, chain, model, state, work, contacts, tally):
+def touches(count, chain, model, state, work, contacts, statistics):
     for _ in range(count):
-        share = first_touch(state.approach, STEP, work.start, work.end)
+        fraction = first_contact_event(state.approach, STEP, work.start, work.end)
         update_contacts(
-            contacts.joint, contacts.speed_floor, 0.0, STEP + chain * share, work.start, work.end,
-            state.approach, state.recent, tally.peak, tally.impact, tally.impacts,
+            contacts.joint, contacts.speed_floor, 0.0, STEP + chain * fraction, work.start, work.end,
+            state.approach, state.recent, statistics.peak, statistics.impact, statistics.impacts,
         )  # fmt: skip
-        work.end[0, DELTA] += chain * tally.peak[0]
+        work.end[0, DELTA] += chain * statistics.peak[0]
 
 
 @entry
@@ -117,10 +117,10 @@ def torques(count, chain, model, state, work):
 
 
 @entry
-def toes(count, chain, model, state, work, tally):
+def toes(count, chain, model, state, work, statistics):
     for _ in range(count):
-        toe_deviation(work.now, work.x, tally.response)
-        work.x[A0, 0] += chain * tally.response[2]
+        toe_deviation(work.now, work.x, statistics.response)
+        work.x[A0, 0] += chain * statistics.response[2]
 
 
 @entry

@@ -16,7 +16,7 @@ from hidden_lives import LIMIT_M, HiddenLife, read
 
 from leg_wear_monitor import load_mechanism
 from leg_wear_monitor.monitor.config.forecast import Forecasting
-from leg_wear_monitor.monitor.forecast.forecast import Forecast, JointNow, forecast
+from leg_wear_monitor.monitor.forecast.forecast import Forecast, JointCondition, forecast
 from leg_wear_monitor.monitor.forecast.growth_law import GrowthLaw
 from leg_wear_monitor.monitor.forecast.life_file import law_of
 from leg_wear_monitor.monitor.forecast.wear_coefficients import Look, believe
@@ -30,7 +30,7 @@ SETTINGS = Forecasting()
 class Case:
     """A leg now: what the monitor has, the true clearances, and what remains to the joints' ends."""
 
-    now: list[JointNow]
+    now: list[JointCondition]
     clearance_m: np.ndarray
     remain: np.ndarray
 
@@ -95,7 +95,7 @@ def case_of(life: HiddenLife, now: float, twin: HiddenLife, joints: str, random:
         growth, wear = counted(twin, k, now)
         seen = growth * (1.0 + GROWTH_NOISE * random.standard_normal())
         state.append(
-            JointNow(
+            JointCondition(
                 joint=joint, fresh_m=FRESH_M, wear_m=wear, limit_m=LIMIT_M, growth_m=seen,
                 growth_error_m=GROWTH_NOISE * growth,
             )
@@ -105,13 +105,13 @@ def case_of(life: HiddenLife, now: float, twin: HiddenLife, joints: str, random:
 
 
 def told(case: Case, law: GrowthLaw, measured: dict[int, Look]) -> Forecast:
-    beliefs = [
+    coefficient_estimates = [
         believe(SETTINGS, FRESH_M, [measured[k]] if k in measured else []) for k in range(len(case.now))
     ]
-    return forecast(case.now, beliefs, SETTINGS, law, cycle_s=1.0, valid=True)
+    return forecast(case.now, coefficient_estimates, SETTINGS, law, cycle_s=1.0, valid=True)
 
 
-def judged(case: Case, law: GrowthLaw, random: np.random.Generator) -> np.ndarray:
+def evaluated(case: Case, law: GrowthLaw, random: np.random.Generator) -> np.ndarray:
     """p10, p50 and p90 over truth: (without, one, all) x (joints and the leg) x 3."""
     noise = MEASURED_M * random.standard_normal(len(case.now))
     looks = {
@@ -150,13 +150,13 @@ def tables(name: str, lives: list[HiddenLife], twin: HiddenLife, law: GrowthLaw,
         f"p10 to p90 holds the end [%], narrower by, p50 off [%], its bias; a fifth of the leg's life\n{head}"
     )
     cases = [case_of(v, 0.2 * v.ends().min(), twin, joints, random) for v in lives for _ in range(again)]
-    ratio = np.array([judged(case, law, random) for case in cases])
+    ratio = np.array([evaluated(case, law, random) for case in cases])
     for k, joint in enumerate([*joints, "leg"]):
         row(joint, ratio[:, :, k])
     print("a fifth of the joint's own life")
     for k, joint in enumerate(joints):
         cases = [case_of(v, 0.2 * v.ends()[k], twin, joints, random) for v in lives for _ in range(again)]
-        row(joint, np.array([judged(case, law, random)[:, k] for case in cases]))
+        row(joint, np.array([evaluated(case, law, random)[:, k] for case in cases]))
 
 
 def main() -> None:

@@ -89,7 +89,7 @@ def read(path: Path) -> tuple[Samples, Recording]:
     return np.concatenate([np.zeros(0, blocks[0].dtype if blocks else np.void), *blocks]), recording
 
 
-def judged(path: Path, true: Samples, known: set[bytes]) -> str:
+def evaluated(path: Path, true: Samples, known: set[bytes]) -> str:
     """What came of a damaged file."""
     try:
         samples, recording = read(path)
@@ -119,7 +119,9 @@ def too_long(_signal: int, _frame: FrameType | None) -> None:
     raise TimeoutError(f"not read within {LIMIT_S} s")
 
 
-def tally(path: Path, damage: Callable[[bytes, np.random.Generator], bytes], number: int) -> Counter[str]:
+def statistics(
+    path: Path, damage: Callable[[bytes, np.random.Generator], bytes], number: int
+) -> Counter[str]:
     """What came of so many damaged copies of a file."""
     true, _ = read(path)
     known = {bytes(sample) for sample in true}
@@ -128,7 +130,7 @@ def tally(path: Path, damage: Callable[[bytes, np.random.Generator], bytes], num
     for _ in range(number):
         copy.write_bytes(damage(content, rng))
         signal.alarm(LIMIT_S)
-        outcomes[judged(copy, true, known)] += 1
+        outcomes[evaluated(copy, true, known)] += 1
         signal.alarm(0)
     copy.unlink()
     return outcomes
@@ -147,7 +149,7 @@ def main() -> None:
                 ("truncated", truncated, arguments.truncations),
                 ("flipped", flipped, arguments.flips),
             ):
-                outcomes = tally(path, damage, number)
+                outcomes = statistics(path, damage, number)
                 print(f"  {what:10}", "; ".join(f"{count} {text}" for text, count in outcomes.most_common()))
 
 

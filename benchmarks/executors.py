@@ -1,4 +1,4 @@
-"""Executors of rclpy with raw and with typed subscriptions: share of a core, and what is lost.
+"""Executors of rclpy with raw and with typed subscriptions: fraction of a core, and what is lost.
 
 python benchmarks/executors.py [--rate-hz 1000] [--seconds 5]
 
@@ -67,9 +67,9 @@ def subscribe(name: str, raw: bool, rate_hz: float, seconds: float) -> None:
     busy, began = time.process_time(), time.monotonic()
     while source.poll() is None:
         executor.spin_once(timeout_sec=0.2)
-    share = (time.process_time() - busy) / (time.monotonic() - began)
+    fraction = (time.process_time() - busy) / (time.monotonic() - began)
     sent = 2 * int(rate_hz * seconds)
-    print(f"{name:7} {'raw' if raw else 'typed':6} {share:6.1%} of a core, lost {1 - got[0] / sent:7.3%}")
+    print(f"{name:7} {'raw' if raw else 'typed':6} {fraction:6.1%} of a core, lost {1 - got[0] / sent:7.3%}")
     executor.shutdown()
     node.destroy_node()
     rclpy.try_shutdown()

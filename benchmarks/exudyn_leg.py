@@ -1,6 +1,6 @@
 """The leg in Exudyn (Gerstmayr, https://github.com/jgerstmayr/EXUDYN), set up from the package's own arrays.
 
-Rigid bodies in the plane, gravity, the crank turning evenly. A loose joint is `ObjectContactSphereSphere`
+Rigid bodies in the plane, gravity, the crank turning evenly. A clearance joint is `ObjectContactSphereSphere`
 with a hollow sphere, which in the plane is a pin in a bushing: Hertz exponent 1.5, the package's stiffness
 and hysteresis factor (Exudyn's Hunt-Crossley model with the restitution that gives this factor), friction
 with the ramp's upper end. Two ways to keep the other joints together:
@@ -42,7 +42,7 @@ class Scheme:
         return f"springs {self.penalty:.0e} N/m, explicit" if self.penalty else "ideal joints, implicit"
 
     def settings(self, seconds: float, sampling: float) -> "exudyn.SimulationSettings":
-        """Exudyn's settings, the best that were found for this leg with five loose joints."""
+        """Exudyn's settings, the best that were found for this leg with five clearance joints."""
         settings = exudyn.SimulationSettings()
         settings.solution.file.write = False
         settings.solution.sensors.writePeriod = sampling
@@ -86,8 +86,8 @@ class ExudynLeg:
         self._bodies = [self._system.AddObject(item.ObjectGround())]
         self._add_bodies()
         objects = [self._add_joint(joint) for joint in range(len(setup.linkage.arrays.joint_kind))]
-        loose = setup.contacts.joint if watched else []
-        self._sensors = [self._watch(objects[joint]) for joint in loose]
+        clearance_joints = setup.contacts.joint if watched else []
+        self._sensors = [self._watch(objects[joint]) for joint in clearance_joints]
         self._system.Assemble()
 
     def solve(self, scheme: Scheme, seconds: float) -> tuple[float, float]:
@@ -136,14 +136,14 @@ class ExudynLeg:
     def _add_joint(self, joint: int) -> int:
         """Add a joint, loose or not; returns its object."""
         arrays, system = self._setup.linkage.arrays, self._system
-        loose = self._setup.contacts.joint.tolist()
-        kind = item.MarkerBodyRigid if joint in loose else item.MarkerBodyPosition
+        clearance_joints = self._setup.contacts.joint.tolist()
+        kind = item.MarkerBodyRigid if joint in clearance_joints else item.MarkerBodyPosition
         bushing, journal = (
             system.AddMarker(kind(bodyNumber=self._bodies[body], localPosition=[*point.tolist(), 0.0]))
             for body, point in zip(arrays.joint_body[joint], arrays.joint_point[joint], strict=True)
         )
-        if joint in loose:
-            return int(system.AddObject(self._contact(loose.index(joint), bushing, journal)))
+        if joint in clearance_joints:
+            return int(system.AddObject(self._contact(clearance_joints.index(joint), bushing, journal)))
         markers, k = [bushing, journal], self._penalty
         if not k:
             return int(system.AddObject(item.ObjectJointRevolute2D(markerNumbers=markers)))
@@ -154,7 +154,7 @@ class ExudynLeg:
         )
 
     def _contact(self, k: int, bushing: int, journal: int) -> item.ObjectContactSphereSphere:
-        """Loose joint k, a sphere (the journal) in a hollow sphere (the bushing)."""
+        """Clearance joint k, a sphere (the journal) in a hollow sphere (the bushing)."""
         contacts = self._setup.contacts
         outer, clearance = float(contacts.bushing_radius[k]), float(contacts.clearance[k])
         inner = outer - clearance

@@ -8,9 +8,9 @@ dense algebra. About two minutes on one core.
 """
 
 import argparse
-import statistics
 import time
 from collections.abc import Callable
+from statistics import median
 
 import numba
 import numpy as np
@@ -18,7 +18,7 @@ import numpy as np
 from leg_wear_monitor import load_mechanism
 from leg_wear_monitor.dynamics.full.model import FullModel, accelerate, add_contacts, full_scratch
 from leg_wear_monitor.dynamics.full.run import TOLERANCE_M, FullRun
-from leg_wear_monitor.dynamics.run.run_statistics import FORCE, JOINT_RATES, new_tally
+from leg_wear_monitor.dynamics.run.run_statistics import FORCE, JOINT_RATES, new_run_statistics
 from leg_wear_monitor.dynamics.simulation import prepare
 from leg_wear_monitor.kernel import entry
 from leg_wear_monitor.mechanism.constraints import closures, rotations
@@ -29,29 +29,31 @@ FIVE = ("A", "B", "G", "I", "J")
 EVALUATIONS = 20_000
 
 
-def real_time_factor(loose: tuple[str, ...], tolerance_m: float, repeats: int) -> tuple[float, float, float]:
+def real_time_factor(
+    clearance_joints: tuple[str, ...], tolerance_m: float, repeats: int
+) -> tuple[float, float, float]:
     """Motion of a cycle over the wall clock's and the processor's time, medians; steps tried in it."""
-    run = FullRun(prepare(LEG, clearances=loose), tolerance_m=tolerance_m)
-    run.advance(1.0, new_tally(len(LEG.joints)))  # compiles, and leaves the start behind
-    tally = new_tally(len(LEG.joints))
+    run = FullRun(prepare(LEG, clearances=clearance_joints), tolerance_m=tolerance_m)
+    run.advance(1.0, new_run_statistics(len(LEG.joints)))  # compiles, and leaves the start behind
+    statistics = new_run_statistics(len(LEG.joints))
     wall, processor = [], []
     for cycle in range(repeats):
         since = time.perf_counter(), time.process_time()
-        run.advance(2.0 + cycle, tally)
+        run.advance(2.0 + cycle, statistics)
         wall.append(time.perf_counter() - since[0])
         processor.append(time.process_time() - since[1])
-    return 1.0 / statistics.median(wall), 1.0 / statistics.median(processor), tally.steps[0] / repeats
+    return 1.0 / median(wall), 1.0 / median(processor), statistics.steps[0] / repeats
 
 
 def mean_forces(tolerance_m: float, cycles: int) -> tuple[np.ndarray, np.ndarray]:
-    """Mean contact force of the five loose joints [N], and its standard error from the scatter of cycles."""
+    """Mean contact force of the five clearance joints [N], and its standard error over cycles."""
     setup = prepare(LEG, clearances=FIVE)
     run, forces = FullRun(setup, tolerance_m=tolerance_m), []
-    run.advance(1.0, new_tally(len(LEG.joints)))
+    run.advance(1.0, new_run_statistics(len(LEG.joints)))
     for cycle in range(cycles):
-        tally = new_tally(len(LEG.joints))
-        run.advance(2.0 + cycle, tally)
-        forces.append(tally.integral[setup.contacts.joint, FORCE])
+        statistics = new_run_statistics(len(LEG.joints))
+        run.advance(2.0 + cycle, statistics)
+        forces.append(statistics.integral[setup.contacts.joint, FORCE])
     return np.mean(forces, axis=0), np.std(forces, axis=0, ddof=1) / np.sqrt(cycles)
 
 
@@ -102,11 +104,11 @@ def evaluation_time(function: Callable[..., None], *arguments: object) -> float:
     return min(rounds)
 
 
-def compare_algebra(loose: tuple[str, ...]) -> tuple[float, float]:
+def compare_algebra(clearance_joints: tuple[str, ...]) -> tuple[float, float]:
     """Seconds of one evaluation by structure and by dense algebra, which must agree."""
-    setup = prepare(LEG, clearances=loose)
+    setup = prepare(LEG, clearances=clearance_joints)
     run = FullRun(setup)
-    run.advance(0.3, new_tally(len(LEG.joints)))
+    run.advance(0.3, new_run_statistics(len(LEG.joints)))
     model: FullModel = run.model
     state, drive = run.state, np.array([setup.speed * run.time, setup.speed, 0.0])
     scratch, rate = full_scratch(model), np.zeros((len(LEG.joints), JOINT_RATES))
@@ -129,8 +131,8 @@ def main() -> None:
     options = parser.parse_args()
 
     print("Real-time factor of the leg at 60 rpm: by the wall clock (by the processor's time)")
-    for what, loose in (("ideal joints", ()), ("five clearances", FIVE)):
-        wall, processor, steps = real_time_factor(loose, TOLERANCE_M, options.repeats)
+    for what, clearance_joints in (("ideal joints", ()), ("five clearances", FIVE)):
+        wall, processor, steps = real_time_factor(clearance_joints, TOLERANCE_M, options.repeats)
         print(f"  {what:16} {wall:7.2f} ({processor:.2f}), {steps:,.0f} steps of six evaluations a cycle")
 
     print(
@@ -155,8 +157,8 @@ def main() -> None:
         )
 
     print("\nOne evaluation of the accelerations")
-    for what, loose in (("ideal joints", ()), ("five clearances", FIVE)):
-        structure, lapack = compare_algebra(loose)
+    for what, clearance_joints in (("ideal joints", ()), ("five clearances", FIVE)):
+        structure, lapack = compare_algebra(clearance_joints)
         print(
             f"  {what:16} structure {1e6 * structure:6.2f} us, dense {1e6 * lapack:6.2f} us: "
             f"{lapack / structure:.1f} times as long"

@@ -15,14 +15,14 @@ from leg_wear_monitor import load_mechanism
 from leg_wear_monitor.dynamics.clearance.run import ClearanceStepper
 from leg_wear_monitor.dynamics.full.run import FullRun
 from leg_wear_monitor.dynamics.run.drive import steady_drive
-from leg_wear_monitor.dynamics.run.run_statistics import new_tally
+from leg_wear_monitor.dynamics.run.run_statistics import new_run_statistics
 from leg_wear_monitor.dynamics.simulation import prepare
 from leg_wear_monitor.mechanism.arrays import body_names
 from leg_wear_monitor.mechanism.spec import Mechanism
 from leg_wear_monitor.monitor.config.inputs import Encoders
 from leg_wear_monitor.monitor.encoders.angle_regression import rms
-from leg_wear_monitor.monitor.encoders.clearance_estimate import Sight, seen_clearances
-from leg_wear_monitor.monitor.encoders.clearance_regression import HiddenClearance
+from leg_wear_monitor.monitor.encoders.clearance_estimate import ClearanceObservation, clearance_estimates
+from leg_wear_monitor.monitor.encoders.clearance_regression import ClearanceRegression
 from leg_wear_monitor.monitor.encoders.commissioning import commissioned, errors_of, known_with
 from leg_wear_monitor.twin.reference.joint_angles import angle_model
 from leg_wear_monitor.twin.reference.reference import ReferenceRun
@@ -46,11 +46,11 @@ def walked(
     setup.contacts.clearance[:] = clearance
     if depth is not None:
         setup.contacts.wear_coefficient[:], setup.surfaces.depth[:] = 0.0, depth
-    run, tally = FullRun(setup, tolerance_m=1e-9), new_tally(len(leg.joints))
-    run.advance(1.0, tally)
+    run, statistics = FullRun(setup, tolerance_m=1e-9), new_run_statistics(len(leg.joints))
+    run.advance(1.0, statistics)
     angle = np.empty((cycles * 1000, len(names)))
     for i in range(len(angle)):
-        run.advance(1.0 + (i + 1) / 1000.0, tally)
+        run.advance(1.0 + (i + 1) / 1000.0, statistics)
         angle[i] = run.q[:, 2]
     pairs = [[names.index(body) for body in leg.sides(joint)] for joint in SENSORS]
     encoders = np.stack([angle[:, j] - angle[:, b] for b, j in pairs], axis=1)
@@ -61,7 +61,7 @@ def walked(
 def walks_of(leg, keep):
     """Walks by who is worn: clearances, crank and encoder angles."""
     legs = {"none": np.full(5, FRESH)}
-    legs |= {name: np.where(np.arange(5) == k, WORN, FRESH) for k, name in enumerate(leg.loose)}
+    legs |= {name: np.where(np.arange(5) == k, WORN, FRESH) for k, name in enumerate(leg.clearance_joints)}
     walks = {}
     for name, clearance in (legs | {"all": ALL_WORN}).items():
         file = Path(keep, f"{name}.npz") if keep else None
@@ -90,12 +90,12 @@ def worn_by_archard(leg: Mechanism) -> np.ndarray:
     """Depths of a leg that walked until A had opened by 150 um; wear 50 000 times as fast."""
     setup = prepare(leg, wear=True)
     setup.contacts.wear_coefficient[:] *= 5.0e4
-    stepper, tally = ClearanceStepper(setup), new_tally(len(leg.joints))
+    stepper, statistics = ClearanceStepper(setup), new_run_statistics(len(leg.joints))
     stepper.init(0.0, setup.speed)
     cycle = 0
     while setup.surfaces.depth[0].sum(axis=0).mean() < WORN - FRESH:
         cycle += 1
-        stepper.advance(steady_drive(0.0, setup.speed), float(cycle), tally)
+        stepper.advance(steady_drive(0.0, setup.speed), float(cycle), statistics)
     return setup.surfaces.depth
 
 
@@ -110,7 +110,7 @@ def referred(leg, model, clearance, depth=None):
 
 def commission(model, reference, walk, every, noise):
     """The encoders' errors, from the first gait cycles of a new leg."""
-    new = HiddenClearance(model, reference, known_with(UNKNOWN, np.full(5, FRESH), 5e-6))
+    new = ClearanceRegression(model, reference, known_with(UNKNOWN, np.full(5, FRESH), 5e-6))
     for cycle in read([part[:COMMISSIONING] for part in walk], every, noise, 0):
         new.add(*cycle)
     return commissioned(UNKNOWN, new.fused(), [True] * len(SENSORS))
@@ -127,15 +127,15 @@ def show_observability(leg, model, reference, walk):
     held, names = commission(model, reference, walk, 5, 1e-4), list(SENSORS.values())
     for chosen in ([0], [1], [2], [0, 1], [0, 2], [1, 2], [0, 1, 2]):
         absent = [i for i in range(len(names)) if i not in chosen]
-        hidden = HiddenClearance(model, reference, known(reference, held))
+        hidden = ClearanceRegression(model, reference, known(reference, held))
         for crank, angles in read([part[-WINDOW:] for part in walk], 5, 1e-4, 5):
             angles[:, absent] = np.nan
             hidden.add(crank, angles)
-        seen = seen_clearances(hidden.fused(), reference.clearance_m)
-        shown = [k for k, one in enumerate(seen) if one.sight is Sight.SEEN]
+        seen = clearance_estimates(hidden.fused(), reference.clearance_m)
+        shown = [k for k, one in enumerate(seen) if one.observation is ClearanceObservation.SEEN]
         beyond = dict(zip(shown, beyond_others(reference.columns, chosen, shown), strict=True))
-        cells = [f"{beyond[k]:.2f}" if k in beyond else one.sight.value for k, one in enumerate(seen)]
-        cells = "  ".join(f"{joint} {cell}" for joint, cell in zip(leg.loose, cells, strict=True))
+        cells = [f"{beyond[k]:.2f}" if k in beyond else one.observation.value for k, one in enumerate(seen)]
+        cells = "  ".join(f"{joint} {cell}" for joint, cell in zip(leg.clearance_joints, cells, strict=True))
         print(f"  {'+'.join(names[i] for i in chosen):>14}: {cells}")
 
 
@@ -156,7 +156,7 @@ def show_convergence(leg, model, reference, held, walks, every, noise):
     for name, (clearance, *walk) in walks.items():
         if name == "all":
             continue
-        hidden = HiddenClearance(model, reference, known(reference, held), most=COUNTS[-1])
+        hidden = ClearanceRegression(model, reference, known(reference, held), most=COUNTS[-1])
         for count, cycle in enumerate(read([part[-COUNTS[-1] :] for part in walk], every, noise, 1), 1):
             hidden.add(*cycle)
             if count in COUNTS:
@@ -167,7 +167,7 @@ def show_convergence(leg, model, reference, held, walks, every, noise):
         off = 1e6 * np.sqrt(np.mean(np.square(errors[n]), axis=0))
         worst = 1e6 * np.abs(errors[n]).max(axis=0)
         said = 1e6 * np.mean(sigmas[n], axis=0)
-        rows = zip(leg.loose, off, worst, said, strict=True)
+        rows = zip(leg.clearance_joints, off, worst, said, strict=True)
         cells = "  ".join(f"{joint} {o:.0f} ({w:.0f}) {s:.0f}" for joint, o, w, s in rows)
         print(f"  {n:>4} cycles: {cells}")
 
@@ -178,13 +178,15 @@ def show_finding(leg, model, reference, held, walks, every, noise):
     for name, (_, *walk) in walks.items():
         if name == "all":
             continue
-        hidden = HiddenClearance(model, reference, known(reference, held), most=WINDOW)
+        hidden = ClearanceRegression(model, reference, known(reference, held), most=WINDOW)
         first, named = None, {}
         for cycle in read(new, every, noise, 2):
             hidden.add(*cycle)
         for count, cycle in enumerate(read([part[-200:] for part in walk], every, noise, 3), 1):
             hidden.add(*cycle)
-            for joint, one in zip(leg.loose, seen_clearances(hidden.fused(), np.full(5, FRESH)), strict=True):
+            for joint, one in zip(
+                leg.clearance_joints, clearance_estimates(hidden.fused(), np.full(5, FRESH)), strict=True
+            ):
                 if one.is_other:
                     first = first or count
                     named[joint] = named.get(joint, 0) + 1
@@ -199,7 +201,7 @@ def show_all_worn(leg, model, reference, held, walk):
     """A leg with all joints worn: by the reference of the new leg, then by one of what was found."""
     clearance, *walk = walk
     for again in range(3):
-        hidden = HiddenClearance(model, reference, known(reference, held))
+        hidden = ClearanceRegression(model, reference, known(reference, held))
         for cycle in read([part[:WINDOW] for part in walk], 5, 1e-4, 4):
             hidden.add(*cycle)
         found = hidden.fused()
@@ -213,14 +215,14 @@ def show_locally_worn(leg, model, reference, held):
     opened = depth.sum(axis=1).mean(axis=1)
     print("  worn by [um]", np.round(1e6 * opened), "deepest", np.round(1e6 * depth.sum(axis=1).max(axis=1)))
     walk = walked(leg, np.full(5, FRESH), WINDOW, depth)
-    for share in (0.0, 1.0, 0.5, 0.25):
-        if share:
-            reference, _ = referred(leg, model, FRESH + share * opened, share * depth)
-        hidden = HiddenClearance(model, reference, known(reference, held))
+    for fraction in (0.0, 1.0, 0.5, 0.25):
+        if fraction:
+            reference, _ = referred(leg, model, FRESH + fraction * opened, fraction * depth)
+        hidden = ClearanceRegression(model, reference, known(reference, held))
         for cycle in read(walk, 5, 1e-4, 4):
             hidden.add(*cycle)
         off = hidden.fused().clearance_m - FRESH - opened
-        print(f"  counted {share:g} of it: off [um]", np.round(1e6 * off))
+        print(f"  counted {fraction:g} of it: off [um]", np.round(1e6 * off))
 
 
 def main() -> None:

@@ -39,19 +39,19 @@ class HiddenLife:
 
 def hidden_life(leg: Mechanism, number: int) -> HiddenLife:
     """Life of a leg; the first is the nominal one, which the twin has."""
-    settings, k, seed = Forecasting(), len(leg.loose), number - 1
+    settings, k, seed = Forecasting(), len(leg.clearance_joints), number - 1
     clearances, factor = dict(leg.clearances), np.ones(k)
     if number:
         factor *= np.exp(
             settings.wear_coefficient_sigma * np.random.default_rng(1000 + seed).standard_normal(k)
         )
         off = settings.clearance_sigma_m * np.random.default_rng(5000 + seed).standard_normal(k)
-        for joint, more in zip(leg.loose, off.tolist(), strict=True):
+        for joint, more in zip(leg.clearance_joints, off.tolist(), strict=True):
             was = clearances[joint]
             clearances[joint] = attrs.evolve(was, radial_clearance=was.radial_clearance + more)
     own = attrs.evolve(leg, clearances=clearances)
     run = LifeRun(own, LifeSettings(seed=500 + 17 * seed), wear_factor=factor)
-    held = np.zeros(len(leg.loose), bool)
+    held = np.zeros(len(leg.clearance_joints), bool)
     while not held.all() and len(run.points) < MOST_JUMPS:
         run.jump()
         ended = (run.fresh_m + run.points[-1].opened_m >= LIMIT_M) & ~held

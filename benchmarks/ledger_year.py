@@ -40,7 +40,7 @@ def rises(leg, config):
         stamps = 10**18 + n * (10**9 // RATE_HZ)
         monitor.update(gait_samples(stamps, crank_angle_rad=angle % (2.0 * np.pi)))
         depths.append(monitor.wear_depth_m)
-    return np.diff(depths, axis=0), monitor.loose
+    return np.diff(depths, axis=0), monitor.clearance_joints
 
 
 def written():
@@ -52,8 +52,8 @@ def written():
 class Walk:
     """Entry after entry."""
 
-    def __init__(self, rise, loose):
-        self.rise, self.loose = rise, loose
+    def __init__(self, rise, clearance_joints):
+        self.rise, self.clearance_joints = rise, clearance_joints
         self.depth = np.zeros(rise.shape[1:])
         self.count, self.begin_ns = 0, 10**18
 
@@ -66,7 +66,7 @@ class Walk:
             stamp_ns=stamp_ns,
             joints=tuple(
                 JointWear(name, depth, round(moving_s), moving_s, 0)
-                for name, depth in zip(self.loose, self.depth, strict=True)
+                for name, depth in zip(self.clearance_joints, self.depth, strict=True)
             ),
             totals={"cycles": moving_s, "moving_s": moving_s, "standing_s": 0.0, "bridged_s": 0.1},
             spans=((self.begin_ns, stamp_ns),),
@@ -74,7 +74,7 @@ class Walk:
 
     def points(self, entry):
         """What the history takes each ten minutes."""
-        for joint in self.loose:
+        for joint in self.clearance_joints:
             yield ClearancePoint(entry.stamp_ns, round(entry.moving_s), joint, 3.1e-4, 3.2e-4)
             yield ForecastPoint(entry.stamp_ns, round(entry.moving_s), joint, 1e8, 2e8, 3e8)
 

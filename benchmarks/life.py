@@ -13,13 +13,13 @@ from leg_wear_monitor import load_mechanism
 from leg_wear_monitor.dynamics.clearance.run import ClearanceStepper
 from leg_wear_monitor.dynamics.run.drive import steady_drive
 from leg_wear_monitor.dynamics.run.protocol import DONE
-from leg_wear_monitor.dynamics.run.run_statistics import new_tally
+from leg_wear_monitor.dynamics.run.run_statistics import new_run_statistics
 from leg_wear_monitor.dynamics.simulation import prepare
 from leg_wear_monitor.life.life import LifeRun, LifeSettings, simulate_life
 from leg_wear_monitor.life.result import Life
 from leg_wear_monitor.mechanism.spec import Mechanism
 from leg_wear_monitor.monitor.config.forecast import Forecasting
-from leg_wear_monitor.monitor.forecast.forecast import JointNow, forecast
+from leg_wear_monitor.monitor.forecast.forecast import JointCondition, forecast
 from leg_wear_monitor.monitor.forecast.growth_law import left_over
 from leg_wear_monitor.monitor.forecast.life_file import law_of, read_lives
 from leg_wear_monitor.monitor.forecast.wear_coefficients import believe
@@ -36,11 +36,11 @@ def every_cycle(leg: Mechanism, cycles: int) -> tuple[np.ndarray, float]:
     """Depth (k, 2, N) after so many cycles, and the processor's time."""
     setup = prepare(leg, wear=True)
     setup.contacts.wear_coefficient[:] *= HASTE
-    stepper, tally = ClearanceStepper(setup), new_tally(len(leg.joints))
+    stepper, statistics = ClearanceStepper(setup), new_run_statistics(len(leg.joints))
     stepper.init(0.3, setup.speed)
     began = time.process_time()
     for cycle in range(1, cycles + 1):
-        status, _ = stepper.advance(steady_drive(0.3, setup.speed), float(cycle), tally)
+        status, _ = stepper.advance(steady_drive(0.3, setup.speed), float(cycle), statistics)
         if status != DONE:
             raise SystemExit(f"stopped in cycle {cycle}")
     return setup.surfaces.depth, time.process_time() - began
@@ -55,7 +55,7 @@ def against_every_cycle(leg: Mechanism, cycles: int) -> None:
     truth, spent = every_cycle(leg, cycles)
     opened = truth.mean(axis=2).sum(axis=1)
     print(f"{cycles} cycles one by one, coefficients x {HASTE:g}: {spent:.0f} s; opened by, um:")
-    print("  " + " ".join(f"{j} {1e6 * o:.1f}" for j, o in zip(leg.loose, opened, strict=True)))
+    print("  " + " ".join(f"{j} {1e6 * o:.1f}" for j, o in zip(leg.clearance_joints, opened, strict=True)))
     print(
         f"jump um  jumps  s     faster | wear off, mean of {len(SEEDS)} starts, %; and of the worst of them:"
     )
@@ -86,16 +86,16 @@ def ten_million(leg: Mechanism) -> None:
     settings, growth = Forecasting(), life.growth_m_per_cycle[:3].mean(axis=0)
     law = law_of(leg, "", settings.model_sigma)
     now = [
-        JointNow(
+        JointCondition(
             joint=joint, fresh_m=3e-4, wear_m=0.0, limit_m=LIMIT_M, growth_m=float(growth[k]),
             growth_error_m=0.0,
         )
-        for k, joint in enumerate(leg.loose)
+        for k, joint in enumerate(leg.clearance_joints)
     ]  # fmt: skip
-    beliefs = [believe(settings, 3e-4) for _ in now]
+    coefficient_estimates = [believe(settings, 3e-4) for _ in now]
     for _ in range(2):  # the first makes the draws
         began = time.process_time()
-        told = forecast(now, beliefs, settings, law, cycle_s=1.0, valid=True)
+        told = forecast(now, coefficient_estimates, settings, law, cycle_s=1.0, valid=True)
     print(f"a forecast of all joints and the leg: {time.process_time() - began:.4f} s")
     print(f"A {told.joints[0].cycles}, leg {told.leg.cycles}")
 

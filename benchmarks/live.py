@@ -123,7 +123,7 @@ def used(pid: int) -> tuple[float, float]:
 def monitors(legs: int, joints: str) -> list["subprocess.Popen[bytes]"]:
     """A monitor a leg."""
     command = [sys.executable, "-m", "leg_wear_monitor", "monitor", "--ros-args", "--log-level", "warn"]
-    loose = ",".join(f"'{joint}'" for joint in joints.split(","))
+    clearance_joints = ",".join(f"'{joint}'" for joint in joints.split(","))
     return [
         subprocess.Popen(
             [
@@ -133,7 +133,7 @@ def monitors(legs: int, joints: str) -> list["subprocess.Popen[bytes]"]:
                 "-p",
                 f"hardware_id:=leg{leg}",
                 "-p",
-                f"loose_joints:=[{loose}]",
+                f"clearance_joints:=[{clearance_joints}]",
             ]
         )
         for leg in range(legs)
@@ -189,11 +189,11 @@ def main() -> None:
 def report(leg: int, sent: int, rows: list[tuple[float, ...]], listener: Listener) -> None:
     told, delays = listener.told[leg], np.array(listener.delays_s[leg])
     clock, busy, memory = np.array(rows).T
-    share = (busy[-2] - busy[0]) / (clock[-2] - clock[0])
+    fraction = (busy[-2] - busy[0]) / (clock[-2] - clock[0])
     median, p99 = 1e3 * np.percentile(delays, [50, 99])
     print(
         f"leg {leg}: sent {sent}, received {told['received']:.0f}, shed {told['shed_messages']:.0f}; "
-        f"{share:.1%} of a core; memory {memory[0]:.0f} to {memory[-1]:.0f} MB; "
+        f"{fraction:.1%} of a core; memory {memory[0]:.0f} to {memory[-1]:.0f} MB; "
         f"stamp to report: median {median:.0f} ms, p99 {p99:.0f} ms of {len(delays)}"
     )
 

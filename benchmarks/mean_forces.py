@@ -14,7 +14,7 @@ from scipy_leg import METHODS, ScipyLeg
 from leg_wear_monitor.dynamics.clearance.run import ClearanceRun
 from leg_wear_monitor.dynamics.full.run import FullRun
 from leg_wear_monitor.dynamics.run.protocol import Setup
-from leg_wear_monitor.dynamics.run.run_statistics import FORCE, Tally, new_tally
+from leg_wear_monitor.dynamics.run.run_statistics import FORCE, RunStatistics, new_run_statistics
 
 ALLOWED = 0.02
 IMPLICIT = tuple(Scheme(1.0e-6 * us) for us in (1280.0, 640.0, 320.0, 160.0, 80.0, 20.0))
@@ -44,15 +44,15 @@ class Forces:
         return bool((np.abs(self.off(other)) <= np.maximum(ALLOWED, chance)).all())
 
 
-def own_forces(run: ClearanceRun | FullRun, setup: Setup, cycles: int) -> tuple[Forces, Tally]:
+def own_forces(run: ClearanceRun | FullRun, setup: Setup, cycles: int) -> tuple[Forces, RunStatistics]:
     """Forces of the package's own models in the cycles after the first; and the tally over them all."""
     joints = len(setup.linkage.mechanism.joints)
-    run.advance(1.0, new_tally(joints))
-    tally, sums = new_tally(joints), [np.zeros(len(setup.loose))]
+    run.advance(1.0, new_run_statistics(joints))
+    statistics, sums = new_run_statistics(joints), [np.zeros(len(setup.clearance_joints))]
     for cycle in range(cycles):
-        run.advance(2.0 + cycle, tally)
-        sums.append(tally.integral[setup.contacts.joint, FORCE].copy())
-    return Forces(np.diff(sums, axis=0)), tally
+        run.advance(2.0 + cycle, statistics)
+        sums.append(statistics.integral[setup.contacts.joint, FORCE].copy())
+    return Forces(np.diff(sums, axis=0)), statistics
 
 
 def exudyn_forces(setup: Setup, scheme: Scheme, cycles: int) -> tuple[Forces, float]:
@@ -71,8 +71,8 @@ def scipy_forces(leg: ScipyLeg, method: str, tolerance: float, cycles: int) -> t
     return forces, cycles / sum(turn[0][1] for turn in turns), evaluations
 
 
-def print_heading(what: str, loose: Sequence[str]) -> None:
-    names = "".join(f"{joint + ' [N]':>18}" for joint in loose)
+def print_heading(what: str, clearance_joints: Sequence[str]) -> None:
+    names = "".join(f"{joint + ' [N]':>18}" for joint in clearance_joints)
     print(f"\n{what}\n  {'':42}{'factor':>8} {'cycles':>6} {names}   fits")
 
 
@@ -86,7 +86,7 @@ def print_forces(what: str, factor: float, cycles: int, forces: Forces, referenc
 
 def sweep_exudyn(setup: Setup, reference: Forces, cycles: int) -> list[Scheme]:
     """Forces over Exudyn's step; the fastest scheme that keeps them, with ideal joints and with springs."""
-    print_heading("Exudyn (recording the forces, which costs it some of its speed)", setup.loose)
+    print_heading("Exudyn (recording the forces, which costs it some of its speed)", setup.clearance_joints)
     best = []
     for schemes in (IMPLICIT, EXPLICIT):
         fit = []
@@ -101,7 +101,7 @@ def sweep_exudyn(setup: Setup, reference: Forces, cycles: int) -> list[Scheme]:
 
 def sweep_scipy(leg: ScipyLeg, setup: Setup, reference: Forces, cycles: int) -> tuple[str, float]:
     """Forces over SciPy's methods and tolerances; the fastest pair that keeps them."""
-    print_heading(f"SciPy ({1e6 * leg.evaluation_time():.1f} us an evaluation)", setup.loose)
+    print_heading(f"SciPy ({1e6 * leg.evaluation_time():.1f} us an evaluation)", setup.clearance_joints)
     fit = []
     for method in METHODS:
         count = FEW if method == "Radau" else cycles

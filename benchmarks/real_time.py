@@ -5,7 +5,7 @@
 
 One core, one thread, everything in one run; contestants take turns, and medians over the turns are printed,
 by the wall clock and by the processor's time: where they differ, others used the core too.
-With one (G), two (A, B) and five (A, B, G, I, J) loose joints at 60 rpm:
+With one (G), two (A, B) and five (A, B, G, I, J) clearance joints at 60 rpm:
 
 - the clearance model and full coordinates, with their defaults;
 - Exudyn with ideal joints, and with stiff springs for them (`exudyn_leg.py` says how it is set up);
@@ -47,7 +47,7 @@ from leg_wear_monitor import load_mechanism
 from leg_wear_monitor.dynamics.clearance.run import ClearanceRun
 from leg_wear_monitor.dynamics.full.run import FullRun
 from leg_wear_monitor.dynamics.run.protocol import Setup
-from leg_wear_monitor.dynamics.run.run_statistics import Tally, new_tally
+from leg_wear_monitor.dynamics.run.run_statistics import RunStatistics, new_run_statistics
 from leg_wear_monitor.dynamics.simulation import prepare
 
 LEG = load_mechanism("bionic_leg")
@@ -58,45 +58,47 @@ Factors = tuple[float, float]
 Contestant = Callable[[], Factors]
 
 
-def compare_own(setup: Setup, cycles: int) -> tuple[Forces, FullRun, Tally]:
+def compare_own(setup: Setup, cycles: int) -> tuple[Forces, FullRun, RunStatistics]:
     """Forces of the package's two models; the reference, and the run and the tally it comes from."""
     full, clearance, watch = FullRun(setup), ClearanceRun(setup), Watch()
-    reference, tally = own_forces(full, setup, 3 * cycles)
+    reference, statistics = own_forces(full, setup, 3 * cycles)
     factor = 3 * cycles / watch.processor
-    print_heading("Mean contact forces of five loose joints, off full coordinates by", setup.loose)
+    print_heading(
+        "Mean contact forces of five clearance joints, off full coordinates by", setup.clearance_joints
+    )
     print_forces("full coordinates", factor, 3 * cycles, reference, reference)
     print(f"  {'  their standard error':57} " + "".join(f"{e:9.2f}{'':9}" for e in reference.error))
     watch = Watch()
     forces, _ = own_forces(clearance, setup, 10 * cycles)
     print_forces("clearance model", 10 * cycles / watch.processor, 10 * cycles, forces, reference)
-    return reference, full, tally
+    return reference, full, statistics
 
 
 def check_others(
-    loose: Sequence[str], schemes: Sequence[Scheme], method: str, tolerance: float, cycles: int
+    clearance_joints: Sequence[str], schemes: Sequence[Scheme], method: str, tolerance: float, cycles: int
 ) -> None:
-    """Forces of the others with fewer loose joints, as they were found best with five."""
-    setup = prepare(LEG, clearances=loose)
+    """Forces of the others with fewer clearance joints, as they were found best with five."""
+    setup = prepare(LEG, clearances=clearance_joints)
     full = FullRun(setup)
-    reference, tally = own_forces(full, setup, 3 * cycles)
-    print_heading(f"The same settings with {','.join(loose)} loose", loose)
+    reference, statistics = own_forces(full, setup, 3 * cycles)
+    print_heading(f"The same settings with clearance in {','.join(clearance_joints)}", clearance_joints)
     for scheme in schemes:
         forces, factor = exudyn_forces(setup, scheme, cycles)
         print_forces(f"Exudyn, {scheme.name}", factor, cycles, forces, reference)
-    leg = ScipyLeg(setup, full, impact_speeds(setup, tally))
+    leg = ScipyLeg(setup, full, impact_speeds(setup, statistics))
     forces, factor, _ = scipy_forces(leg, method, tolerance, cycles)
     print_forces(f"SciPy, {method}", factor, cycles, forces, reference)
 
 
-def own_contestant(run: ClearanceRun | FullRun, cycles: float, tally: Tally) -> Contestant:
+def own_contestant(run: ClearanceRun | FullRun, cycles: float, statistics: RunStatistics) -> Contestant:
     """A model of the package, after its first cycle."""
 
     def turn() -> Factors:
         watch = Watch()
-        run.advance(run.time + cycles, tally)
+        run.advance(run.time + cycles, statistics)
         return factors(cycles, watch.read())
 
-    run.advance(1.0, tally)
+    run.advance(1.0, statistics)
     return turn
 
 
@@ -113,22 +115,22 @@ def contestants(
     def exudyn(scheme: Scheme) -> Contestant:
         return lambda: factors(2.0, ExudynLeg(setup, scheme.penalty).solve(scheme, 2.0))
 
-    tally, full = new_tally(len(LEG.joints)), FullRun(setup)
+    statistics, full = new_run_statistics(len(LEG.joints)), FullRun(setup)
     entries = {
-        "clearance model": own_contestant(ClearanceRun(setup), 10.0, new_tally(len(LEG.joints))),
-        "full coordinates": own_contestant(full, 3.0, tally),
+        "clearance model": own_contestant(ClearanceRun(setup), 10.0, new_run_statistics(len(LEG.joints))),
+        "full coordinates": own_contestant(full, 3.0, statistics),
     }
     entries["full coordinates"]()
     entries |= {f"Exudyn, {scheme.name}": exudyn(scheme) for scheme in schemes}
-    leg = ScipyLeg(setup, full, impact_speeds(setup, tally))
+    leg = ScipyLeg(setup, full, impact_speeds(setup, statistics))
     return entries | {f"SciPy, {method}": lambda: factors(1.0, leg.advance(method, tolerance, 1.0)[0])}
 
 
 def race(schemes: Sequence[Scheme], method: str, tolerance: float, repeats: int) -> None:
-    """Let them take turns with every set of loose joints, and print the medians."""
+    """Let them take turns with every set of clearance joints, and print the medians."""
     medians: list[dict[str, Factors]] = []
-    for loose in SETS:
-        entries = contestants(prepare(LEG, clearances=loose), schemes, method, tolerance)
+    for clearance_joints in SETS:
+        entries = contestants(prepare(LEG, clearances=clearance_joints), schemes, method, tolerance)
         turns: dict[str, list[Factors]] = {name: [] for name in entries}
         for _ in range(repeats):
             for name, turn in entries.items():
@@ -138,7 +140,10 @@ def race(schemes: Sequence[Scheme], method: str, tolerance: float, repeats: int)
         )
     for by, clock in enumerate(("wall clock", "processor's time")):
         print(f"\nReal-time factor by the {clock}, medians of {repeats} turns (over the clearance model's)")
-        print(f"  {'loose joints':42}" + "".join(f"{','.join(loose):>20}" for loose in SETS))
+        print(
+            f"  {'clearance joints':42}"
+            + "".join(f"{','.join(clearance_joints):>20}" for clearance_joints in SETS)
+        )
         for name in medians[0]:
             cells = (
                 f"{m[name][by]:10.2f} (1/{m['clearance model'][by] / m[name][by]:5.1f})" for m in medians
@@ -150,7 +155,7 @@ def where_time_goes(repeats: int) -> None:
     """Print the cost of the clearance model's steps and intervals, of its parts, and the floor."""
     setup = prepare(LEG, clearances=FIVE)
     rows, trial, interval = clearance_cost.regression(setup, repeats)
-    print("\nThe clearance model with five loose joints, over the number of its intervals in a cycle")
+    print("\nThe clearance model with five clearance joints, over the number of its intervals in a cycle")
     print(f"  {'intervals':>10} {'trials':>8} {'taken':>8} {'ms/cycle':>10} {'factor':>8}")
     for row in rows:
         cost = f"{1e3 * row.seconds:10.3f} {1.0 / row.seconds:8.1f}"
@@ -167,7 +172,7 @@ def where_time_goes(repeats: int) -> None:
 def print_parts(parts: Sequence[clearance_cost.Part], now: clearance_cost.Fineness) -> None:
     """Print what each part costs alone, and in a cycle."""
     print("\nIts parts alone, all five joints in contact")
-    print(f"  {'':34}{'ns':>8} {'times':>6} {'':9}{'ms/cycle':>9} {'share':>7}")
+    print(f"  {'':34}{'ns':>8} {'times':>6} {'':9}{'ms/cycle':>9} {'fraction':>7}")
     counts, explained = {"trial": now.trials, "taken": now.taken, "interval": now.intervals, "": 0.0}, 0.0
     for part in parts:
         spent = part.seconds * part.times * counts[part.per]
@@ -189,12 +194,12 @@ def main() -> None:
     print(f"Python {platform.python_version()}, " + ", ".join(f"{name} {version(name)}" for name in names))
     print(f"{platform.system()} {platform.machine()}, one of {len(one_core.CORES) or '?'} cores")
     setup = prepare(LEG, clearances=FIVE)
-    reference, full, tally = compare_own(setup, options.cycles)
+    reference, full, statistics = compare_own(setup, options.cycles)
     schemes = sweep_exudyn(setup, reference, options.cycles)
-    leg = ScipyLeg(setup, full, impact_speeds(setup, tally))
+    leg = ScipyLeg(setup, full, impact_speeds(setup, statistics))
     method, tolerance = sweep_scipy(leg, setup, reference, options.cycles)
-    for loose in SETS[:2]:
-        check_others(loose, schemes, method, tolerance, options.cycles)
+    for clearance_joints in SETS[:2]:
+        check_others(clearance_joints, schemes, method, tolerance, options.cycles)
     race(schemes, method, tolerance, options.repeats)
     where_time_goes(options.repeats)
 

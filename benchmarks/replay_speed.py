@@ -1,4 +1,4 @@
-"""A replay end to end: 1 kHz each of joint states and torque, five loose joints; where its time goes."""
+"""A replay end to end: 1 kHz each of joint states and torque, five clearance joints; where its time goes."""
 
 import argparse
 import tempfile

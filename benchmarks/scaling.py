@@ -1,4 +1,4 @@
-"""How the clearance model's cost grows: with loose joints, wear fed back, legs and cores, and with time.
+"""How the clearance model's cost grows: with clearance joints, wear fed back, legs and cores, and with time.
 
     python benchmarks/scaling.py
 
@@ -9,9 +9,9 @@ About five minutes.
 
 import argparse
 import os
-import statistics
 from collections.abc import Sequence
 from pathlib import Path
+from statistics import median
 
 import one_core  # before numpy
 
@@ -21,7 +21,7 @@ from watch import Watch
 from leg_wear_monitor import load_mechanism
 from leg_wear_monitor.dynamics.batch.batch import Leg, simulate_batch
 from leg_wear_monitor.dynamics.clearance.run import ClearanceRun
-from leg_wear_monitor.dynamics.run.run_statistics import new_tally
+from leg_wear_monitor.dynamics.run.run_statistics import new_run_statistics
 from leg_wear_monitor.dynamics.simulation import prepare
 
 LEG = load_mechanism("bionic_leg")
@@ -33,47 +33,49 @@ TURN = 5.0  # cycles
 
 def take_turns(runs: Sequence[ClearanceRun], repeats: int) -> tuple[list[float], list[float]]:
     """Seconds of a cycle, medians, and trial steps in a cycle of each run."""
-    tallies = [new_tally(len(JOINTS)) for _ in runs]
+    statistics_of_all = [new_run_statistics(len(JOINTS)) for _ in runs]
     spent: list[list[float]] = [[] for _ in runs]
     for run in runs:
-        run.advance(1.0, new_tally(len(JOINTS)))
+        run.advance(1.0, new_run_statistics(len(JOINTS)))
     for turn in range(repeats):
-        for run, tally, seconds in zip(runs, tallies, spent, strict=True):
+        for run, statistics, seconds in zip(runs, statistics_of_all, spent, strict=True):
             watch = Watch()
-            run.advance(1.0 + (turn + 1) * TURN, tally)
+            run.advance(1.0 + (turn + 1) * TURN, statistics)
             seconds.append(watch.processor / TURN)
-    trials = [float(tally.steps[0]) / (repeats * TURN) for tally in tallies]
-    return [statistics.median(seconds) for seconds in spent], trials
+    trials = [float(statistics.steps[0]) / (repeats * TURN) for statistics in statistics_of_all]
+    return [median(seconds) for seconds in spent], trials
 
 
-def loose_joints(repeats: int) -> None:
-    """Print the cost with one to all joints loose."""
+def clearance_joints(repeats: int) -> None:
+    """Print the cost with one to all clearance joints."""
     sets = [JOINTS[: n + 1] for n in range(len(JOINTS))]
-    runs = [ClearanceRun(prepare(LEG, clearances=loose)) for loose in sets]
+    runs = [ClearanceRun(prepare(LEG, clearances=clearance_joints)) for clearance_joints in sets]
     seconds, trials = take_turns(runs, repeats)
     print(
-        "Loose joints: real-time factor, trial steps in a cycle, cost of one, cost of a cycle over that of A"
+        "Clearance joints: real-time factor, trial steps a cycle, cost of one, cost of a cycle over that of A"
     )
     print(f"  {'':22}{'factor':>8} {'trials':>8} {'us/trial':>9} {'cost':>7}")
-    for loose, spent, tried in zip(sets, seconds, trials, strict=True):
+    for clearance_joints, spent, tried in zip(sets, seconds, trials, strict=True):
         row = f"{1.0 / spent:8.1f} {tried:8.0f} {1.0e6 * spent / tried:9.2f} {spent / seconds[0]:7.1f}"
-        print(f"  {','.join(loose):22}{row}")
+        print(f"  {','.join(clearance_joints):22}{row}")
 
 
 def wear_fed_back(repeats: int) -> None:
     """Print the cost of wear that opens the clearances as it goes."""
     runs = [
-        ClearanceRun(prepare(LEG, clearances=loose, wear=wear)) for loose in SETS for wear in (False, True)
+        ClearanceRun(prepare(LEG, clearances=clearance_joints, wear=wear))
+        for clearance_joints in SETS
+        for wear in (False, True)
     ]
     seconds, trials = take_turns(runs, repeats)
     print(
         "\nWear, counted always, fed back into the clearances: real-time factor without and with, and more of"
     )
     print(f"  {'':22}{'without':>8} {'with':>8} {'time':>9} {'trials':>9}")
-    for i, loose in enumerate(SETS):
+    for i, clearance_joints in enumerate(SETS):
         (without, fed), (few, many) = seconds[2 * i : 2 * i + 2], trials[2 * i : 2 * i + 2]
         more = f"{100.0 * (fed / without - 1.0):+7.1f} % {100.0 * (many / few - 1.0):+7.1f} %"
-        print(f"  {','.join(loose):22}{1.0 / without:8.1f} {1.0 / fed:8.1f} {more}")
+        print(f"  {','.join(clearance_joints):22}{1.0 / without:8.1f} {1.0 / fed:8.1f} {more}")
 
 
 def batches(sizes: Sequence[int], cores: int, repeats: int) -> None:
@@ -88,8 +90,8 @@ def batches(sizes: Sequence[int], cores: int, repeats: int) -> None:
         for _ in range(1 if size > 100 else repeats):
             for count in range(1, cores + 1):
                 factors.setdefault((size, count), []).append(batch_factor(size, count))
-        medians = [statistics.median(factors[size, count]) for count in range(1, cores + 1)]
-        one = statistics.median(factors[sizes[0], 1])
+        medians = [median(factors[size, count]) for count in range(1, cores + 1)]
+        one = median(factors[sizes[0], 1])
         print(f"  {size:22d}" + "".join(f"{m:11.1f} ({m / one:6.2f})" for m in medians), flush=True)
 
 
@@ -105,14 +107,14 @@ def batch_factor(size: int, cores: int) -> float:
 
 
 def memory(cycles: int) -> None:
-    """Print the resident set over a long run with five loose joints and wear fed back."""
-    run, tally = ClearanceRun(prepare(LEG, clearances=FIVE, wear=True)), new_tally(len(JOINTS))
-    print(f"\nMemory over {cycles} cycles with five loose joints, wear fed back")
+    """Print the resident set over a long run with five clearance joints and wear fed back."""
+    run, statistics = ClearanceRun(prepare(LEG, clearances=FIVE, wear=True)), new_run_statistics(len(JOINTS))
+    print(f"\nMemory over {cycles} cycles with five clearance joints, wear fed back")
     print(f"  {'cycle':>8} {'resident MB':>12} {'factor':>8}")
     sizes, watch = [], Watch()
     for tenth in range(1, 11):
         done = tenth * cycles / 10.0
-        run.advance(done, tally)
+        run.advance(done, statistics)
         sizes.append(resident_bytes())
         factor = done / watch.processor
         print(f"  {done:8.0f} {1.0e-6 * sizes[-1]:12.2f} {factor:8.1f}", flush=True)
@@ -133,7 +135,7 @@ def main() -> None:
     parser.add_argument("--cycles", type=int, default=10_000, help="cycles of the memory run")
     parser.add_argument("--legs", type=int, nargs="+", default=[1, 10, 100, 1000], help="sizes of batches")
     options = parser.parse_args()
-    loose_joints(options.repeats)
+    clearance_joints(options.repeats)
     wear_fed_back(options.repeats)
     batches(options.legs, min(2, len(one_core.CORES) or 1), options.repeats)
     memory(options.cycles)

@@ -17,7 +17,7 @@ from watch import Watch
 from leg_wear_monitor.dynamics.full.model import FullScratch, accelerate, full_scratch
 from leg_wear_monitor.dynamics.full.run import TOLERANCE_RATE, FullRun
 from leg_wear_monitor.dynamics.run.protocol import Setup
-from leg_wear_monitor.dynamics.run.run_statistics import DRIVE_RATES, FORCE, JOINT_RATES, SPEED, Tally
+from leg_wear_monitor.dynamics.run.run_statistics import DRIVE_RATES, FORCE, JOINT_RATES, SPEED, RunStatistics
 from leg_wear_monitor.mechanism.arrays import Floats
 
 METHODS = ("LSODA", "Radau", "DOP853", "RK45")
@@ -25,18 +25,18 @@ METHODS = ("LSODA", "Radau", "DOP853", "RK45")
 RightHandSide = Callable[[float, Floats], Floats]
 
 
-def impact_speeds(setup: Setup, tally: Tally) -> Floats:
-    """Root mean square (k,) of the approach speeds of the impacts in each loose joint [m/s]."""
-    counts = np.minimum(tally.impacts, tally.impact.shape[1])
+def impact_speeds(setup: Setup, statistics: RunStatistics) -> Floats:
+    """Root mean square (k,) of the approach speeds of the impacts in each clearance joint [m/s]."""
+    counts = np.minimum(statistics.impacts, statistics.impact.shape[1])
     joints = setup.contacts.joint
-    speeds = (tally.impact[joint, : counts[joint], SPEED] for joint in joints)
+    speeds = (statistics.impact[joint, : counts[joint], SPEED] for joint in joints)
     return np.array([np.sqrt(np.mean(of_joint**2)) for of_joint in speeds])
 
 
 def right_hand_side(setup: Setup, run: FullRun, approach: Floats) -> RightHandSide:
     """Compile dy/dt for y (6 b + k,): coordinates, velocities, integrals of the contact forces."""
     model, surfaces, polynomial, joints = run.model, setup.surfaces, run.polynomial, setup.contacts.joint
-    n, half, k = len(model.arrays.mass), 3 * len(model.arrays.mass) - 3, len(setup.loose)
+    n, half, k = len(model.arrays.mass), 3 * len(model.arrays.mass) - 3, len(setup.clearance_joints)
     rates = (len(model.arrays.joint_kind), JOINT_RATES)
     cs, force, phi, jac, gamma, schur, lam, drive, contact = (part.shape for part in full_scratch(model))
 
@@ -73,8 +73,8 @@ class ScipyLeg:
 
     def __init__(self, setup: Setup, run: FullRun, approach: Floats) -> None:
         self._derivative = right_hand_side(setup, run, approach)
-        self._loose = len(setup.loose)
-        self._start = np.concatenate([run.q[1:].ravel(), run.v[1:].ravel(), np.zeros(self._loose)])
+        self._clearance_joints = len(setup.clearance_joints)
+        self._start = np.concatenate([run.q[1:].ravel(), run.v[1:].ravel(), np.zeros(self._clearance_joints)])
         self._y, self._since, self.time = self._start.copy(), run.time, run.time
         self._derivative(self.time, self._y)  # compiles
 
@@ -96,9 +96,11 @@ class ScipyLeg:
 
         Returns what that took, as a watch reads it, the mean forces (k,) [N], and the evaluations.
         """
-        half = (len(self._y) - self._loose) // 2
+        half = (len(self._y) - self._clearance_joints) // 2
         at_most = np.concatenate([np.full(half, tolerance_m), np.full(half, tolerance_m * TOLERANCE_RATE)])
-        at_most = np.append(at_most, np.full(self._loose, 1.0e9))  # the integrals do not choose the step
+        at_most = np.append(
+            at_most, np.full(self._clearance_joints, 1.0e9)
+        )  # the integrals do not choose the step
         self._y[2 * half :] = 0.0
         end, watch = self.time + seconds, Watch()
         with np.errstate(all="ignore"):  # a trial step may go too far, and is then taken back

@@ -1,4 +1,4 @@
-"""Ten thousand cycles with five loose joints and accelerated wear, until clearances have doubled.
+"""Ten thousand cycles with five clearance joints and accelerated wear, until clearances have doubled.
 
 Says how well energy adds up, and whether the worn volume is what the contacts took:
 `python benchmarks/stress.py`.
@@ -12,8 +12,8 @@ import numpy as np
 
 from leg_wear_monitor import load_mechanism
 from leg_wear_monitor.dynamics.clearance.run import ClearanceRun
-from leg_wear_monitor.dynamics.result import energy_balance, joint_figures
-from leg_wear_monitor.dynamics.run.run_statistics import ARCHARD, new_tally
+from leg_wear_monitor.dynamics.result import energy_balance, joint_statistics
+from leg_wear_monitor.dynamics.run.run_statistics import ARCHARD, new_run_statistics
 from leg_wear_monitor.dynamics.simulation import prepare
 from leg_wear_monitor.mechanism.spec import Mechanism
 from leg_wear_monitor.wear.surfaces import worn_volume
@@ -24,9 +24,9 @@ JOINTS = ("A", "B", "G", "I", "J")
 def hastened(leg: Mechanism, cycles: int) -> Mechanism:
     """The leg with wear coefficients that would double the clearance of each joint in so many cycles."""
     setup = prepare(leg, clearances=JOINTS)
-    run, tally = ClearanceRun(setup), new_tally(len(leg.joints))
-    run.advance(20.0, tally)
-    figures = joint_figures(setup, tally, setup.surfaces.depth, 20.0)
+    run, statistics = ClearanceRun(setup), new_run_statistics(len(leg.joints))
+    run.advance(20.0, statistics)
+    figures = joint_statistics(setup, statistics, setup.surfaces.depth, 20.0)
     clearances = dict(leg.clearances)
     for name in JOINTS:
         depth = figures[name]["wear_depth_m_per_cycle"]
@@ -48,11 +48,11 @@ def main() -> None:
     heads = "".join(f"{name + ' max mm':>10}" for name in JOINTS)
     print(f"{'cycles':>7}  {heads}   energy residual / losses")
     for done in range(0, cycles, chunk):
-        tally, stored = new_tally(len(leg.joints)), run.stored_energy
-        run.advance(float(done + chunk), tally)
-        balance = energy_balance(tally, stored, run.stored_energy)
+        statistics, stored = new_run_statistics(len(leg.joints)), run.stored_energy
+        run.advance(float(done + chunk), statistics)
+        balance = energy_balance(statistics, stored, run.stored_energy)
         residuals.append(balance["residual"] / (balance["friction_loss"] + balance["contact_loss"]))
-        total += tally.integral[:, ARCHARD]
+        total += statistics.integral[:, ARCHARD]
         if (done // chunk) % 10 == 9:
             largest = setup.contacts.clearance + setup.surfaces.depth.sum(axis=1).max(axis=1)
             sizes = "".join(f"{1e3 * c:10.3f}" for c in largest)

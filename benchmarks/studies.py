@@ -134,8 +134,8 @@ def scaling(points: int, repeats: int) -> None:
             print(f"  {way:>22} {min(seconds):7.1f} ({one / min(seconds):.2f})")
         print(f"  the same to the bit: {all(files == results[0] for files in results)}")
 
-        def kill_one_midway(share: float) -> None:
-            if share >= 0.5 and workers[0].poll() is None:
+        def kill_one_midway(fraction: float) -> None:
+            if fraction >= 0.5 and workers[0].poll() is None:
                 os.kill(workers[0].pid, signal.SIGKILL)
 
         out = Path(scratch) / "killed"

@@ -43,9 +43,9 @@ def installed(monkeypatch):
 
 def test_the_docs_that_help_names_are_installed(installed):
     files = {f"{place}/{Path(name).name}" for place, names in installed["data_files"] for name in names}
-    share = "share/leg_wear_monitor"
-    assert {f"{share}/docs/parameters.md", f"{share}/docs/decisions/0001-packaging.md"} <= files
-    assert {f"{share}/SECURITY.md", f"{share}/README.md", f"{share}/launch/demo.launch.xml"} <= files
+    fraction = "share/leg_wear_monitor"
+    assert {f"{fraction}/docs/parameters.md", f"{fraction}/docs/decisions/0001-packaging.md"} <= files
+    assert {f"{fraction}/SECURITY.md", f"{fraction}/README.md", f"{fraction}/launch/demo.launch.xml"} <= files
 
 
 def test_ros2_launch_is_among_the_dependencies():

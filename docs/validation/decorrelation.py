@@ -11,7 +11,7 @@ import numpy as np
 from leg_wear_monitor import load_mechanism
 from leg_wear_monitor.dynamics.clearance.run import ClearanceRun
 from leg_wear_monitor.dynamics.run.protocol import Run
-from leg_wear_monitor.dynamics.run.run_statistics import BEGIN, new_tally
+from leg_wear_monitor.dynamics.run.run_statistics import BEGIN, new_run_statistics
 from leg_wear_monitor.dynamics.simulation import MODELS, prepare
 from leg_wear_monitor.mechanism.ideal import turned
 from leg_wear_monitor.report.figures import figure as drawing
@@ -25,15 +25,15 @@ PICTURE = Path(__file__).parents[1] / "decorrelation.png"
 class Watched:
     """A run of either model, looked at from time to time."""
 
-    def __init__(self, name: str, loose: str, model: str, clearance_m: float = CLEARANCE) -> None:
+    def __init__(self, name: str, clearance_joints: str, model: str, clearance_m: float = CLEARANCE) -> None:
         mechanism = load_mechanism(name)
-        self.setup = prepare(mechanism, clearances=tuple(loose), clearance_m=clearance_m)
-        self.joints, self.tally = self.setup.contacts.joint, new_tally(len(mechanism.joints))
+        self.setup = prepare(mechanism, clearances=tuple(clearance_joints), clearance_m=clearance_m)
+        self.joints, self.statistics = self.setup.contacts.joint, new_run_statistics(len(mechanism.joints))
         self.run: Run = MODELS[model](self.setup, 10_000)  # both can be looked at every 0.1 ms
 
     def advance(self, t: float) -> np.ndarray:
         """Eccentricities (k, 2) at a time [m]."""
-        self.run.advance(t, self.tally)
+        self.run.advance(t, self.statistics)
         if isinstance(self.run, ClearanceRun):
             return self.run.stepper.state.e.reshape(-1, 2).copy()
         arrays, q = self.setup.linkage.arrays, self.run.q
@@ -46,7 +46,7 @@ class Watched:
 
     def begun(self) -> np.ndarray:
         """Times at which impacts have begun in any joint [s]."""
-        begins = [self.tally.impact[j, : self.tally.impacts[j], BEGIN] for j in self.joints]
+        begins = [self.statistics.impact[j, : self.statistics.impacts[j], BEGIN] for j in self.joints]
         return np.sort(np.concatenate(begins))
 
 
@@ -65,15 +65,16 @@ def first_far(one: Watched, other: Watched, seconds: float) -> float:
 
 def decorrelation(seconds: float) -> None:
     print(
-        "| leg | loose | first impact [ms] | models apart after [ms] | impacts by then | chaos alone [ms] |"
+        "| leg | clearance joints | first impact [ms] | models apart after [ms] | impacts by then "
+        "| chaos alone [ms] |"
     )
     print("| --- | --- | --- | --- | --- | --- |")
     for name in LEGS:
-        for loose in SETS:
-            full = Watched(name, loose, "full")
-            after = first_far(full, Watched(name, loose, "clearance"), seconds)
+        for clearance_joints in SETS:
+            full = Watched(name, clearance_joints, "full")
+            after = first_far(full, Watched(name, clearance_joints, "clearance"), seconds)
             begun = full.begun()
-            pair = (Watched(name, loose, "full", CLEARANCE + i * APART) for i in range(2))
+            pair = (Watched(name, clearance_joints, "full", CLEARANCE + i * APART) for i in range(2))
             chaos = first_far(*pair, seconds)
             cells = (
                 f"{1e3 * begun[0]:.1f}",
@@ -81,25 +82,28 @@ def decorrelation(seconds: float) -> None:
                 str((begun < after).sum()),
                 f"{1e3 * chaos:.0f}",
             )
-            print(f"| {name} | {', '.join(loose)} | {' | '.join(cells)} |", flush=True)
+            print(f"| {name} | {', '.join(clearance_joints)} | {' | '.join(cells)} |", flush=True)
 
 
 def picture(path: Path) -> None:
     """Contact force in A from both models, and how far apart their journals are."""
     times = np.arange(1, 801) * 1.0e-4
-    name, loose = LEGS[0], "ABGIJ"
+    name, clearance_joints = LEGS[0], "ABGIJ"
     figure = drawing.new_figure(7.0, 4.6)
     top, bottom = figure.subplots(2, sharex=True)
     for model, colour, width in (("full", drawing.ORANGE, 1.8), ("clearance", drawing.BLUE, 0.9)):
-        watched, force = Watched(name, loose, model), []
+        watched, force = Watched(name, clearance_joints, model), []
         for t in times:
             watched.advance(t)
             force.append(watched.run.sample().force[watched.joints[0]])
         top.plot(1e3 * times, force, color=colour, linewidth=width, label=f"{model} coordinates")
     pairs = {
-        "full and clearance coordinates": (Watched(name, loose, "full"), Watched(name, loose, "clearance")),
+        "full and clearance coordinates": (
+            Watched(name, clearance_joints, "full"),
+            Watched(name, clearance_joints, "clearance"),
+        ),
         "full coordinates, clearances 1 nm apart": [
-            Watched(name, loose, "full", CLEARANCE + i * APART) for i in range(2)
+            Watched(name, clearance_joints, "full", CLEARANCE + i * APART) for i in range(2)
         ],
     }
     for (label, pair), colour in zip(pairs.items(), (drawing.INK, drawing.VERMILION), strict=True):

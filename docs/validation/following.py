@@ -17,7 +17,7 @@ from leg_wear_monitor.twin.sample import Samples, gait_samples
 from leg_wear_monitor.twin.settings import TwinSettings
 
 START_NS, CYCLES, RATE_HZ = 1_700_000_000_000_000_000, 40, 1000
-# noise of the encoder [rad], rate [Hz], share of samples lost
+# noise of the encoder [rad], rate [Hz], fraction of samples lost
 CASES = (
     (0.0, 1000, 0.0), (1.0e-3, 200, 0.0), (3.0e-3, 200, 0.0), (1.0e-2, 200, 0.0), (1.0e-3, 50, 0.0),
     (1.0e-3, 100, 0.0), (1.0e-3, 1000, 0.0), (1.0e-3, 200, 0.1), (1.0e-3, 200, 0.3), (1.0e-3, 200, 0.6),
@@ -28,7 +28,7 @@ def walk(cycles: int, load: LoadConfig) -> tuple[Floats, Floats, Floats]:
     """Angle (n,), torque impulse (n,) every millisecond, and growth (cycles - 1, k) of the clearances [m]."""
     leg = SyntheticLeg(GaitConfig(load=load))
     instants = [leg.advance(i / RATE_HZ) for i in range((cycles + 1) * RATE_HZ)]
-    clearance = np.array([leg.truth()["clearance_m"][name] for name in leg.loose])
+    clearance = np.array([leg.truth()["clearance_m"][name] for name in leg.clearance_joints])
     angle, impulse = (
         np.array([i.crank.angle for i in instants]),
         np.array([i.torque_impulse for i in instants]),
@@ -54,7 +54,9 @@ def main() -> None:
     angle, impulse, growth = walk(CYCLES, LoadConfig())
     scatter = growth.std(axis=0) / growth.mean(axis=0) * np.sqrt(2.0 / len(growth))
     mechanism = load_mechanism("bionic_leg")
-    print(f"joints {mechanism.loose}; scatter of each difference [%]: {(100.0 * scatter).round(1)}")
+    print(
+        f"joints {mechanism.clearance_joints}; scatter of each difference [%]: {(100.0 * scatter).round(1)}"
+    )
     for noise, rate, lost in CASES:
         twin = DigitalTwin(mechanism, TwinSettings())
         update = twin.update(seen(angle, impulse, noise, rate, lost))
@@ -63,7 +65,9 @@ def main() -> None:
         unexplained = np.mean([cycle.torque.unexplained_rms_nm for cycle in update.cycles])
         print(
             f"{noise:6.4f} rad {rate:5d} Hz {lost:4.0%} lost: "
-            + " ".join(f"{name} {value:+5.1f}" for name, value in zip(twin.loose, error, strict=True))
+            + " ".join(
+                f"{name} {value:+5.1f}" for name, value in zip(twin.clearance_joints, error, strict=True)
+            )
             + f" %; torque unexplained {unexplained:.2f} N m; {len(update.cycles)} cycles",
             flush=True,
         )

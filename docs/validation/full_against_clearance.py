@@ -23,7 +23,7 @@ SETS = ("AB", "G", "IJ", "ABGIJ")
 SKIPPED = 2.0  # cycles of each run before counting begins
 WORKERS = 2
 APART = 1.0e-9  # m: what the clearances of two runs differ by, enough to make them two samples of the chaos
-SHARE, ERRORS = 0.02, 3.0  # what is wanted: within 2 %, or within three standard errors
+FRACTION, ERRORS = 0.02, 3.0  # what is wanted: within 2 %, or within three standard errors
 FIGURES = {
     "mean_force_n": "mean force [N]",
     "rms_force_n": "RMS force [N]",
@@ -43,22 +43,22 @@ class Samples(NamedTuple):
 
 
 class Comparison(NamedTuple):
-    """A figure in full coordinates, and the other model's difference as a share and in standard errors."""
+    """A figure in full coordinates, and the other model's difference as a fraction and in standard errors."""
 
     value: float
-    share: float
+    fraction: float
     errors: float
 
     @property
     def beyond(self) -> bool:
-        return abs(self.share) > SHARE and abs(self.errors) > ERRORS
+        return abs(self.fraction) > FRACTION and abs(self.errors) > ERRORS
 
 
 class Case(NamedTuple):
-    """A leg with some joints loose at a speed."""
+    """A leg with some clearance joints at a speed."""
 
     mechanism: Mechanism
-    loose: str
+    clearance_joints: str
     rpm: float
     clearance_m: float = 3.0e-4
 
@@ -68,7 +68,7 @@ class Case(NamedTuple):
         def run(i: int) -> SimulationResult:
             return simulate(
                 self.mechanism,
-                clearances=self.loose,
+                clearances=self.clearance_joints,
                 clearance_m=self.clearance_m + i * APART,
                 speed_rpm=self.rpm,
                 cycles=cycles,
@@ -83,7 +83,7 @@ class Case(NamedTuple):
         """Runs whose journals start elsewhere by up to a micrometre."""
         leg = Leg(
             mechanism=self.mechanism,
-            clearances=self.loose,
+            clearances=self.clearance_joints,
             clearance_m=self.clearance_m,
             speed_rpm=self.rpm,
             perturb_m=1.0e-6,
@@ -93,9 +93,12 @@ class Case(NamedTuple):
 
     def _samples(self, results: list[SimulationResult]) -> Samples:
         joints = [
-            [[result.joints[name][key] for key in FIGURES] for name in self.loose] for result in results
+            [[result.joints[name][key] for key in FIGURES] for name in self.clearance_joints]
+            for result in results
         ]
-        zones = [[result.joints[name]["wear_zone_deg"] for name in self.loose] for result in results]
+        zones = [
+            [result.joints[name]["wear_zone_deg"] for name in self.clearance_joints] for result in results
+        ]
         return Samples(
             np.array(joints), np.array(zones), np.array([r.drive_torque_nm["rms"] for r in results])
         )
@@ -112,7 +115,7 @@ def table(*columns: str) -> None:
 
 
 def compare(full: np.ndarray, other: np.ndarray, whole: float | None = None) -> Comparison:
-    """Samples (n,) of both models; the difference as a share of the value, or of ``whole``."""
+    """Samples (n,) of both models; the difference as a fraction of the value, or of ``whole``."""
     difference = other.mean() - full.mean()
     error = math.hypot(*(one.std(ddof=1) / math.sqrt(len(one)) for one in (full, other)))
     errors = difference / error if error else math.copysign(math.inf, difference) if difference else 0.0
@@ -130,13 +133,13 @@ def in_errors(one: Comparison) -> str:
 
 
 def cell(one: Comparison, digits: int) -> str:
-    text = f"{one.value:.{digits}f} {100.0 * one.share:+.1f} % ({in_errors(one)})"
+    text = f"{one.value:.{digits}f} {100.0 * one.fraction:+.1f} % ({in_errors(one)})"
     return f"**{text}**" if one.beyond else text
 
 
 def zone_cell(ends: list[Comparison]) -> str:
     zone = " to ".join(f"{end.value:.0f}" for end in ends)
-    text = f"{zone}; {', '.join(f'{360.0 * end.share:+.1f} ({in_errors(end)})' for end in ends)}"
+    text = f"{zone}; {', '.join(f'{360.0 * end.fraction:+.1f} ({in_errors(end)})' for end in ends)}"
     return f"**{text}**" if any(end.beyond for end in ends) else text
 
 
@@ -144,37 +147,40 @@ def sets_of(name: str, runs: int, cycles: int) -> Iterator[Comparison]:
     """Tables of one leg; yields every comparison."""
     mechanism, torques = load_mechanism(name), {}
     print(f"\n### {mechanism.name}\n")
-    table("loose", "rpm", "joint", *FIGURES.values(), ZONE)
-    for loose, rpm in product(SETS, SPEEDS_RPM):
-        case = Case(mechanism, loose, rpm)
+    table("clearance_joints", "rpm", "joint", *FIGURES.values(), ZONE)
+    for clearance_joints, rpm in product(SETS, SPEEDS_RPM):
+        case = Case(mechanism, clearance_joints, rpm)
         full, other = case.full(runs, cycles), case.clearance(runs, cycles)
-        torques[loose, rpm] = compare(full.torque, other.torque)
-        for k, joint in enumerate(loose):
+        torques[clearance_joints, rpm] = compare(full.torque, other.torque)
+        for k, joint in enumerate(clearance_joints):
             figures = [compare(full.joints[:, k, i], other.joints[:, k, i]) for i in range(len(FIGURES))]
             ends = compare_ends(full.zone[:, k], other.zone[:, k])
             cells = map(cell, figures, (2, 2, 0, 3, 4))
-            row(", ".join(loose), f"{rpm:.0f}", joint, *cells, zone_cell(ends))
+            row(", ".join(clearance_joints), f"{rpm:.0f}", joint, *cells, zone_cell(ends))
             yield from [*figures, *ends]
     print(f"\nRMS of the drive torque [N m], {mechanism.name}:\n")
-    table("loose", *(f"{rpm:.0f} rpm" for rpm in SPEEDS_RPM))
-    for loose in SETS:
-        row(", ".join(loose), *(cell(torques[loose, rpm], 3) for rpm in SPEEDS_RPM))
+    table("clearance_joints", *(f"{rpm:.0f} rpm" for rpm in SPEEDS_RPM))
+    for clearance_joints in SETS:
+        row(", ".join(clearance_joints), *(cell(torques[clearance_joints, rpm], 3) for rpm in SPEEDS_RPM))
     yield from torques.values()
 
 
 def summary(comparisons: list[Comparison]) -> None:
-    share, errors = np.abs([one.share for one in comparisons]), np.abs([one.errors for one in comparisons])
+    fraction, errors = (
+        np.abs([one.fraction for one in comparisons]),
+        np.abs([one.errors for one in comparisons]),
+    )
     beyond = sum(one.beyond for one in comparisons)
     print("\n### All comparisons\n")
     table("comparisons", "beyond 2 %", "beyond 3 standard errors", "beyond both", "median difference",
           "median in standard errors")  # fmt: skip
-    row(str(len(comparisons)), str((share > SHARE).sum()), str((errors > ERRORS).sum()), str(beyond),
-        f"{100.0 * np.median(share):.2f} %", f"{np.median(errors):.2f}")  # fmt: skip
+    row(str(len(comparisons)), str((fraction > FRACTION).sum()), str((errors > ERRORS).sum()), str(beyond),
+        f"{100.0 * np.median(fraction):.2f} %", f"{np.median(errors):.2f}")  # fmt: skip
 
 
 def by_clearance(runs: int, cycles: int) -> None:
     """The case that differs most, as its clearance shrinks."""
-    print("\n### By clearance: jansen_leg, I and J loose, 30 rpm\n")
+    print("\n### By clearance: jansen_leg, clearance in I and J, 30 rpm\n")
     table("clearance [mm]", "joint", *FIGURES.values())
     for clearance_m in (1.0e-4, 2.0e-4, 2.9e-4, 3.0e-4, 3.1e-4, 4.0e-4):
         case = Case(load_mechanism("jansen_leg"), "IJ", 30.0, clearance_m)

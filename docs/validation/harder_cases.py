@@ -78,7 +78,7 @@ def results(case: Case, model: str, runs: int, cycles: int) -> list[SimulationRe
     def run(i: int) -> SimulationResult:
         return simulate(
             case.mechanism,
-            clearances=case.loose,
+            clearances=case.clearance_joints,
             clearance_m=case.clearance_m + i * APART,
             speed_rpm=case.rpm,
             cycles=cycles,
@@ -103,7 +103,7 @@ def compare_all(names: Iterable[str], runs: int, cycles: int) -> list[Comparison
     for name in names:
         full, other = (results(CASES[name], model, runs, cycles) for model in ("full", "clearance"))
         balances[name] = [np.array([losses(one) for one in each]).T for each in (full, other)]
-        for joint in CASES[name].loose:
+        for joint in CASES[name].clearance_joints:
             figures = [
                 compare(*(np.array([one.joints[joint][key] for one in each]) for each in (full, other)))
                 for key in FIGURES
@@ -114,7 +114,7 @@ def compare_all(names: Iterable[str], runs: int, cycles: int) -> list[Comparison
     table("case", "losses, full [J/cycle]", "clearance", "residual over losses, largest, full", "clearance")
     for name, (full, other) in balances.items():
         lost = compare(full[0], other[0])
-        row(name, f"{lost.value:.4f}", f"{100.0 * lost.share:+.1f} % ({abs(lost.errors):.1f})",
+        row(name, f"{lost.value:.4f}", f"{100.0 * lost.fraction:+.1f} % ({abs(lost.errors):.1f})",
             f"{full[1].max():.1e}", f"{other[1].max():.1e}")  # fmt: skip
     return comparisons
 

@@ -8,7 +8,7 @@ import numpy as np
 from leg_wear_monitor import load_mechanism
 from leg_wear_monitor.dynamics.clearance.run import ClearanceStepper
 from leg_wear_monitor.dynamics.run.protocol import DONE
-from leg_wear_monitor.dynamics.run.run_statistics import ARCHARD, new_tally
+from leg_wear_monitor.dynamics.run.run_statistics import ARCHARD, new_run_statistics
 from leg_wear_monitor.dynamics.simulation import prepare
 from leg_wear_monitor.mechanism.arrays import Floats
 from leg_wear_monitor.mechanism.ideal import TURN, ideal_motion
@@ -60,16 +60,16 @@ def wear_of_the_leg() -> Floats:
     t, h = 0.0, 0.01
     polynomial = np.zeros(7)
     for cycle in range(CYCLES + SKIPPED):
-        tally = new_tally(len(setup.linkage.mechanism.joints))
+        statistics = new_run_statistics(len(setup.linkage.mechanism.joints))
         for _ in range(100):
             polynomial[0] = t
             before, after = crank(np.array([t, t + h]), RIPPLE).T
             join_smoothly(before, after, h, polynomial[1:])
             t += h
-            if stepper.advance(polynomial, t, tally)[0] != DONE:
+            if stepper.advance(polynomial, t, statistics)[0] != DONE:
                 raise RuntimeError("the leg's motion could not be resolved")
         if cycle >= SKIPPED:
-            cycles.append(tally.integral[joints, ARCHARD])
+            cycles.append(statistics.integral[joints, ARCHARD])
     return np.array(cycles)
 
 

@@ -9,7 +9,7 @@ from typing import Any
 
 import attrs
 
-from leg_wear_monitor.bags.findings import DamageError, Finding, RecordingError, Weight
+from leg_wear_monitor.bags.findings import DamageError, Finding, RecordingError, Severity
 from leg_wear_monitor.bags.metadata import METADATA, read_metadata
 from leg_wear_monitor.bags.regular_file import kind_of
 
@@ -114,7 +114,7 @@ def _recordings(path: Path, findings: list[Finding]) -> list[str]:
     for file in named:
         what = kind_of(_mode(file) or 0)
         if what:
-            findings.append(Finding(file, f"is {what}, expected a file: it is not read", Weight.NOTE))
+            findings.append(Finding(file, f"is {what}, expected a file: it is not read", Severity.NOTE))
         else:
             names.append(file.name)
     return names
@@ -127,12 +127,12 @@ def _metadata(path: Path, findings: list[Finding]) -> tuple[list[str], dict[str,
     try:
         metadata = read_metadata(path)
     except DamageError as error:
-        findings.append(Finding(path, f"{error}: the directory's files are taken instead", Weight.NOTE))
+        findings.append(Finding(path, f"{error}: the directory's files are taken instead", Severity.NOTE))
         return [], {}
     names = [name for name in metadata.files if _NAME.fullmatch(name)]
     if names != metadata.files:
         findings.append(
-            Finding(path, "names other files than .mcap and .db3: they are not read", Weight.NOTE)
+            Finding(path, "names other files than .mcap and .db3: they are not read", Severity.NOTE)
         )
     return names, {"by_message": metadata.by_message, "types": metadata.types}
 

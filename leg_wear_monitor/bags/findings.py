@@ -18,7 +18,7 @@ class RecordingError(ConfigError):
         super().__init__(printable(source), printable(key), printable(fault))
 
 
-class Weight(Enum):
+class Severity(Enum):
     """What a finding means for the result."""
 
     NOTE = "note"
@@ -36,12 +36,12 @@ class Finding:
     file : pathlib.Path
     text : str
         One line: what, and where in bytes; it is made printable.
-    weight : Weight
+    weight : Severity
     """
 
     file: Path
     text: str = attrs.field(converter=printable)
-    weight: Weight = Weight.LOSS
+    weight: Severity = Severity.LOSS
 
     def __str__(self) -> str:
         return f"{printable(str(self.file))}: {self.text}"

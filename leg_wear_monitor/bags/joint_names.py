@@ -7,7 +7,7 @@ import attrs
 import numpy as np
 from numpy.typing import NDArray
 
-from leg_wear_monitor.bags.findings import Finding, RecordingError, Weight
+from leg_wear_monitor.bags.findings import Finding, RecordingError, Severity
 from leg_wear_monitor.bags.topics import listed
 from leg_wear_monitor.messages.cdr import ENCAPSULATION, JOINT_STATE
 from leg_wear_monitor.twin.sample import MISSING_JOINT, NO_FAULT, NOT_FINITE, ZERO_STAMP, Samples
@@ -17,7 +17,7 @@ _NAMED = (NO_FAULT, NOT_FINITE, ZERO_STAMP)
 
 
 @attrs.define
-class _Tally:
+class _Counts:
     """Messages of a file that have the crank, and that do not; names in the latter."""
 
     found: int = 0
@@ -35,18 +35,18 @@ class JointNames:
 
     def __init__(self, crank_joint: str) -> None:
         self._crank = crank_joint
-        self._files: dict[Path, _Tally] = {}
+        self._files: dict[Path, _Counts] = {}
 
     def see(self, path: Path, data: NDArray[np.uint8], messages: NDArray[np.void], samples: Samples) -> None:
         """Take account of messages of a file and of what was decoded from them."""
-        tally = self._files.setdefault(path, _Tally())
+        counts = self._files.setdefault(path, _Counts())
         cranks = messages["type"] == JOINT_STATE
-        tally.found += int(np.count_nonzero(cranks & np.isin(samples["fault"], _NAMED)))
+        counts.found += int(np.count_nonzero(cranks & np.isin(samples["fault"], _NAMED)))
         missing = np.flatnonzero(samples["fault"] == MISSING_JOINT)
-        tally.missing += len(missing)
-        if len(missing) and len(tally.names) < _MOST:
+        counts.missing += len(missing)
+        if len(missing) and len(counts.names) < _MOST:
             message = messages[missing[0]]
-            tally.names |= set(names_in(data[message["begin"] : message["end"]].tobytes())[:_MOST])
+            counts.names |= set(names_in(data[message["begin"] : message["end"]].tobytes())[:_MOST])
 
     def findings(self) -> list[Finding]:
         """What to say when all was read.
@@ -56,19 +56,19 @@ class JointNames:
         RecordingError
             If messages have joints, but none of them the crank; or none of a file's while another's have it.
         """
-        found = sum(tally.found for tally in self._files.values())
+        found = sum(counts.found for counts in self._files.values())
         findings = []
-        for path, tally in self._files.items():
-            if not tally.missing:
+        for path, counts in self._files.items():
+            if not counts.missing:
                 continue
-            text = f"is not among the joints of {tally.missing} messages, they have {listed(tally.names)}"
-            if not tally.found:
+            text = f"is not among the joints of {counts.missing} messages, they have {listed(counts.names)}"
+            if not counts.found:
                 told = "say which is the crank by --crank-joint (crank_joint in the parameters)"
                 if found:
                     told = "the other files have it: give the recordings of one leg at a time"
                 raise RecordingError(str(path), self._crank, f"{text}; {told}")
-            text = f"joint {self._crank} {text}; {tally.found} have it"
-            findings.append(Finding(path, text, Weight.NOTE))
+            text = f"joint {self._crank} {text}; {counts.found} have it"
+            findings.append(Finding(path, text, Severity.NOTE))
         return findings
 
 

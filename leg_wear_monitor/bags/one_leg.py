@@ -8,7 +8,7 @@ import attrs
 import numpy as np
 from numpy.typing import NDArray
 
-from leg_wear_monitor.bags.findings import Finding, RecordingError, Weight
+from leg_wear_monitor.bags.findings import Finding, RecordingError, Severity
 from leg_wear_monitor.bags.sources import Source
 from leg_wear_monitor.bags.topics import listed
 from leg_wear_monitor.mechanism.arrays import Floats
@@ -49,7 +49,7 @@ def check_topics(
             text = f"has {listed(others)}, where other files have {listed([topic])}: {_ADVICE}"
             raise RecordingError(str(source.bag_file.path), "joint_states", text)
         text = f"has no topic {topic}: no crank is read from it"
-        findings.append(Finding(source.bag_file.path, text, Weight.NOTE))
+        findings.append(Finding(source.bag_file.path, text, Severity.NOTE))
     return findings
 
 

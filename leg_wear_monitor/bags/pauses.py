@@ -7,7 +7,7 @@ import attrs
 import numpy as np
 from numpy.typing import NDArray
 
-from leg_wear_monitor.bags.findings import Finding, Weight
+from leg_wear_monitor.bags.findings import Finding, Severity
 from leg_wear_monitor.twin.sample import Samples
 
 
@@ -19,7 +19,7 @@ class Block:
     ----------
     samples : (n,) array of GAIT_SAMPLE
     log_time_ns : (n,) array of int
-    share : float
+    fraction : float
         Part of the recording's bytes read so far, 0 to 1.
     source : (n,) array of int
         Index of the file that each sample is from.
@@ -29,13 +29,15 @@ class Block:
 
     samples: Samples
     log_time_ns: NDArray[np.int64]
-    share: float
+    fraction: float
     source: NDArray[np.int64]
     pause_ns: int = 0
 
     def part(self, which: slice, pause_ns: int = 0) -> "Block":
         """Some of its samples."""
-        return Block(self.samples[which], self.log_time_ns[which], self.share, self.source[which], pause_ns)
+        return Block(
+            self.samples[which], self.log_time_ns[which], self.fraction, self.source[which], pause_ns
+        )
 
 
 class Pauses:
@@ -84,4 +86,4 @@ class Pauses:
             f"begins {pause_ns * 1.0e-9:.4g} s after the recording before it ended; the leg was not "
             "monitored during this pause, which is no fault of the input"
         )
-        self.findings.append(Finding(self._files[source], text, Weight.NOTE))
+        self.findings.append(Finding(self._files[source], text, Severity.NOTE))

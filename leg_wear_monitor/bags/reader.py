@@ -12,7 +12,7 @@ from numpy.typing import NDArray
 
 from leg_wear_monitor.bags.bag import find_files
 from leg_wear_monitor.bags.budget import DEFAULT_MB, Budget
-from leg_wear_monitor.bags.findings import Finding, RecordingError, Weight
+from leg_wear_monitor.bags.findings import Finding, RecordingError, Severity
 from leg_wear_monitor.bags.joint_names import JointNames
 from leg_wear_monitor.bags.mcap.file import Piece
 from leg_wear_monitor.bags.one_leg import OneLeg, check_topics
@@ -111,7 +111,7 @@ class Recording:
     @property
     def is_partial(self) -> bool:
         """Whether something that was recorded is lost, or may be wrong."""
-        return any(finding.weight is Weight.LOSS for finding in self.findings)
+        return any(finding.weight is Severity.LOSS for finding in self.findings)
 
     def blocks(self) -> Iterator[Block]:
         """Samples of the whole recording; once.
@@ -125,7 +125,7 @@ class Recording:
             yield from self._pauses.cut(block)
         self._findings += self._joints.findings()
         notes = self._clocks.notes()
-        self._findings += [Finding(self.files[0], text, Weight.NOTE) for text in notes]
+        self._findings += [Finding(self.files[0], text, Severity.NOTE) for text in notes]
 
     def _joined(self) -> Iterator[Block]:
         """Samples of all files in order of log time."""
@@ -148,7 +148,7 @@ class Recording:
             new = Block(self._samples(path, piece), times, min(read / total, 1.0), source)
             waiting = _merged(waiting, new)
         if len(waiting.samples):
-            yield attrs.evolve(waiting, share=1.0)
+            yield attrs.evolve(waiting, fraction=1.0)
 
     def _pieces(self) -> Iterator[tuple[int, Piece]]:
         """Pieces of all files as they begin, with their file's index; each is loaded when it is due."""
@@ -189,4 +189,4 @@ def _merged(block: Block, new: Block) -> Block:
     if np.any(times[1:] < times[:-1]):
         order = np.argsort(times, kind="stable")
         times, samples, source = times[order], samples[order], source[order]
-    return Block(samples, times, new.share, source)
+    return Block(samples, times, new.fraction, source)

@@ -12,7 +12,7 @@ import numpy as np
 
 from leg_wear_monitor.bags.bag import MCAP, BagFile
 from leg_wear_monitor.bags.budget import Budget
-from leg_wear_monitor.bags.findings import DamageError, Finding, RecordingError, Weight
+from leg_wear_monitor.bags.findings import DamageError, Finding, RecordingError, Severity
 from leg_wear_monitor.bags.mcap.compression import ZSTD_MAGIC, expand_message, expanded
 from leg_wear_monitor.bags.mcap.file import Due, McapFile, Piece
 from leg_wear_monitor.bags.mcap.layout import Channel
@@ -112,7 +112,7 @@ def assign(sources: list[Source], wanted: Iterable[Role]) -> tuple[dict[str, str
         text = f"is no topic of the recording, it has {listed(there)}"
         if role.needed:
             raise RecordingError(str(first), role.name, text)
-        findings.append(Finding(first, f"{role.name}: {text}", Weight.NOTE))
+        findings.append(Finding(first, f"{role.name}: {text}", Severity.NOTE))
     return topics, findings
 
 

@@ -27,7 +27,8 @@ def print_replay(result: "ReplayResult", wall_s: float) -> None:
     monitor = result.monitor
     console.print(
         f"\n[bold]{monitor.config.hardware}[/bold]: {monitor.mechanism.name}, "
-        f"{', '.join(monitor.loose)} loose; {result.crank_samples} crank and {result.torque_samples} torque "
+        f"clearance joints {', '.join(monitor.clearance_joints)}; "
+        f"{result.crank_samples} crank and {result.torque_samples} torque "
         f"samples, {len(result.history)} gait cycles\n"
     )
     if result.evidence.doubtful:
@@ -100,8 +101,8 @@ def _lifetime_table(told: "Mapping[str, JointForecast | LegForecast]") -> Table:
     table = Table(box=None, pad_edge=False, padding=(0, 1), header_style="bold")
     table.add_column("\nlasts", min_width=5)
     for unit in ("h", "days"):
-        for share in ("p10", "p50", "p90"):
-            table.add_column(f"{share}\n{unit}", justify="right", no_wrap=True)
+        for fraction in ("p10", "p50", "p90"):
+            table.add_column(f"{fraction}\n{unit}", justify="right", no_wrap=True)
     for name, each in told.items():
         table.add_row(name, *_lifetime(each))
     return table
@@ -111,7 +112,7 @@ def _lifetime(told: "JointForecast | LegForecast") -> list[str]:
     from leg_wear_monitor.monitor.forecast.words import lifetime_values, three_digits
 
     values = lifetime_values(told)
-    keys = (f"{share}_{unit}" for unit in ("hours", "days") for share in ("p10", "p50", "p90"))
+    keys = (f"{fraction}_{unit}" for unit in ("hours", "days") for fraction in ("p10", "p50", "p90"))
     return [three_digits(values[key]) if key in values else "-" for key in keys]
 
 

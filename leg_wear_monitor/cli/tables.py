@@ -67,9 +67,13 @@ def _wear_cells(figures: dict[str, Any]) -> list[str]:
 
 
 def _settings(record: dict[str, Any], result: "SimulationResult") -> str:
-    loose = f"{', '.join(result.loose)} loose" if result.loose else "no joint loose"
+    clearance_joints = (
+        f"clearance joints {', '.join(result.clearance_joints)}"
+        if result.clearance_joints
+        else "no clearance joint"
+    )
     model = _MODELS.get(record["model"], record["model"])
-    return f"{loose}, {model}, {record['speed_rpm']:g} rpm, {_cycles(record['cycles'])} counted"
+    return f"{clearance_joints}, {model}, {record['speed_rpm']:g} rpm, {_cycles(record['cycles'])} counted"
 
 
 def _cycles(number: float) -> str:
@@ -79,18 +83,18 @@ def _cycles(number: float) -> str:
 def _summary(record: dict[str, Any], result: "SimulationResult") -> Iterator[tuple[str, str]]:
     """Rows of a label and a text."""
     torque = record["drive_torque_nm"]
-    if result.loose:
+    if result.clearance_joints:
         yield "wear", "greatest depth; 1 pm a cycle makes 1 um in a million cycles"
         yield "zone", "holds 90 % of the bushing's wear, in angles of its own body"
     names = ("mean", "rms", "min", "max", "p99")
     signed = ", ".join(f"{name} {figure(torque[name])}" for name in names)
     yield "drive torque", f"{signed} N m; largest magnitude {figure(torque['max_abs'])} N m"
-    if result.loose and record["toe"] is not None:
+    if result.clearance_joints and record["toe"] is not None:
         yield "off the ideal", f"at most {_response(record['toe'], torque)}"
     if record["energy_j"] is not None:
         yield "energy", _energy(record["energy_j"])
     if result.surfaces is not None and result.surfaces.feeds_back:
-        yield "opened by", f"{_opened(result.surfaces, result.loose)} pm, mean (greatest)"
+        yield "opened by", f"{_opened(result.surfaces, result.clearance_joints)} pm, mean (greatest)"
     yield (
         "speed",
         f"{record['simulated_s']:.4g} s of motion in {record['wall_s']:.3g} s: "

@@ -46,7 +46,7 @@ def compilation(kernels: str, how_long: str = "about half a minute") -> Iterator
 def progress_bar(what: str) -> Iterator[Callable[[float], None]]:
     """Give a function that takes the share done: it shows a bar on a terminal, and nothing in a pipe."""
     if not sys.stderr.isatty():
-        yield lambda _share: None
+        yield lambda _fraction: None
         return
     from rich.console import Console
     from rich.progress import BarColumn, Progress, TaskProgressColumn, TextColumn, TimeRemainingColumn
@@ -55,4 +55,4 @@ def progress_bar(what: str) -> Iterator[Callable[[float], None]]:
     with Progress(*columns, console=Console(stderr=True), transient=True) as bar:
         task = bar.add_task(what, total=1.0)
         with closed_at_the_end(bar.stop):  # it hides the cursor
-            yield lambda share: bar.update(task, completed=share)
+            yield lambda fraction: bar.update(task, completed=fraction)

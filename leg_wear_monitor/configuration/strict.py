@@ -12,6 +12,7 @@ from cattrs.gen import make_dict_structure_fn
 
 from leg_wear_monitor.configuration.nearest import nearest
 from leg_wear_monitor.configuration.quantity import FieldError
+from leg_wear_monitor.configuration.renamed import new_name
 from leg_wear_monitor.errors import ConfigError
 
 MOST = 1.0e30  # in SI units: squares, and ratios to the smallest, stay finite
@@ -84,6 +85,9 @@ def _field_error(error: BaseException) -> FieldError:
 
 
 def _unknown(key: str, known: list[str]) -> FieldError:
+    renamed = new_name(key)
+    if renamed in known:
+        return FieldError(key, f"is called {renamed} now")
     near = nearest(key, known)
     expected = f"did you mean {near}?" if near else f"expected one of {', '.join(known)}"
     return FieldError(key, f"unknown key, {expected}")

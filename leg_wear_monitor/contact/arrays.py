@@ -20,7 +20,7 @@ NEARLY_ELASTIC, LEAST_RESTITUTION = ("hunt-crossley", "lankarani-nikravesh"), 0.
 
 
 class ContactArrays(NamedTuple):
-    """Settings of k loose joints, SI.
+    """Settings of k clearance joints, SI.
 
     ``joint`` (k,) index in the mechanism; ``bushing_radius``, ``clearance``, ``width`` (k,);
     ``modulus`` (k,) [Pa]; ``stiffness`` (k,) [N/m^1.5] where given, 0 where it follows from the modulus
@@ -96,7 +96,7 @@ def _warn_of_restitution(source: str, settings: dict[str, Clearance]) -> None:
 def compile_contacts(
     mechanism: Mechanism, joints: Sequence[str], settings: Sequence[Clearance]
 ) -> ContactArrays:
-    """Arrays of the loose joints with their settings, in the given order."""
+    """Arrays of the clearance joints with their settings, in the given order."""
     order = list(mechanism.joints)
     moduli = [
         contact_modulus(c.youngs_modulus[0], c.poissons_ratio[0], c.youngs_modulus[1], c.poissons_ratio[1])

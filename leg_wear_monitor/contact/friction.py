@@ -27,9 +27,9 @@ def friction_force(law, coefficient, v0, v1, f_n, slip):
     """Force [N] along the tangent on the journal, against the slip speed [m/s]."""
     speed = abs(slip)
     if law == AMBROSIO:
-        share = ambrosio_ramp(speed, v0, v1)
+        fraction = ambrosio_ramp(speed, v0, v1)
     elif law == THRELFALL:
-        share = threlfall_ramp(speed, v1)
+        fraction = threlfall_ramp(speed, v1)
     else:
-        share = 0.0
-    return -math.copysign(coefficient * share * f_n, slip)
+        fraction = 0.0
+    return -math.copysign(coefficient * fraction * f_n, slip)

@@ -44,10 +44,10 @@ def given_joints(names: Sequence[str], mechanism: Mechanism) -> tuple[str, ...]:
     if isinstance(names, str):
         raise ConfigError("clearances", "", f"{shown(names)} is a text, expected a list of names")
     try:
-        loose = tuple(names)
+        clearance_joints = tuple(names)
     except TypeError as error:
         raise ConfigError("clearances", "", f"{shown(names)} is not a list of names") from error
-    for name in loose:
+    for name in clearance_joints:
         if not isinstance(name, str):
             raise ConfigError("clearances", "", f"{shown(name)} is not the name of a joint")
         if name not in mechanism.clearances:
@@ -58,9 +58,9 @@ def given_joints(names: Sequence[str], mechanism: Mechanism) -> tuple[str, ...]:
                 f"{name!r} has no clearance settings in {mechanism.source}, expected some of: {ready}"
                 + did_you_mean(name, mechanism.clearances),
             )
-    if len(set(loose)) < len(loose):
-        raise ConfigError("clearances", "", f"{','.join(loose)!r} names a joint twice")
-    return loose
+    if len(set(clearance_joints)) < len(clearance_joints):
+        raise ConfigError("clearances", "", f"{','.join(clearance_joints)!r} names a joint twice")
+    return clearance_joints
 
 
 def check_kinds(**values: object) -> None:

@@ -4,7 +4,7 @@ import numpy as np
 
 from leg_wear_monitor.dynamics.result import JsonObject, SimulationResult, toe_errors
 from leg_wear_monitor.dynamics.run.protocol import Setup
-from leg_wear_monitor.dynamics.run.run_statistics import new_tally
+from leg_wear_monitor.dynamics.run.run_statistics import new_run_statistics
 from leg_wear_monitor.mechanism.ideal import TURN, IdealMotion, one_cycle, point_motion
 
 _POINTS = 1440
@@ -18,7 +18,7 @@ def ideal_result(setup: Setup, cycles: float, trace: int) -> SimulationResult:
     force = np.linalg.norm(motion.joint_force, axis=2)
     toe = None
     if mechanism.toe is not None:
-        toe = toe_errors(new_tally(0))
+        toe = toe_errors(new_run_statistics(0))
     return SimulationResult(
         mechanism=mechanism.name,
         model="ideal",

@@ -17,7 +17,7 @@ from leg_wear_monitor.dynamics.run.run_statistics import (
     POWER,
     TORQUE,
     TORQUE_SQUARED,
-    Tally,
+    RunStatistics,
     percentile,
     signed_percentile,
 )
@@ -42,9 +42,9 @@ class SimulationResult:
         None without a point called ``toe`` or without an ideal motion to compare with.
     joints, impacts : dict of str
     trace : dict or None
-    loose : tuple of str
+    clearance_joints : tuple of str
     surfaces : Surfaces or None
-        Worn surfaces at the end, in the order of ``loose``.
+        Worn surfaces at the end, in the order of ``clearance_joints``.
     """
 
     mechanism: str
@@ -58,7 +58,7 @@ class SimulationResult:
     joints: dict[str, JsonObject]
     impacts: dict[str, list[dict[str, float | None]]]
     trace: JsonObject | None
-    loose: tuple[str, ...] = ()
+    clearance_joints: tuple[str, ...] = ()
     surfaces: Surfaces | None = None
 
     def to_dict(self) -> JsonObject:
@@ -80,38 +80,38 @@ class SimulationResult:
         return result
 
 
-def drive_torque(tally: Tally) -> dict[str, float]:
+def drive_torque(statistics: RunStatistics) -> dict[str, float]:
     """Mean, RMS, range and 99th percentile of the drive torque, its largest magnitude, and its largest error.
 
     ``p99`` is of the signed torque, as ``min`` and ``max`` are; ``max_error`` is against the ideal linkage.
     """
-    mean, square = tally.drive_integral[[TORQUE, TORQUE_SQUARED]] / tally.time[0]
+    mean, square = statistics.drive_integral[[TORQUE, TORQUE_SQUARED]] / statistics.time[0]
     return {
         "mean": float(mean),
         "rms": float(np.sqrt(square)),
-        "min": float(tally.drive_range[0]),
-        "max": float(tally.drive_range[1]),
-        "p99": signed_percentile(tally.torque_time, 0.99),
-        "max_abs": float(np.abs(tally.drive_range).max()),
-        "max_error": float(tally.response[3]),
+        "min": float(statistics.drive_range[0]),
+        "max": float(statistics.drive_range[1]),
+        "p99": signed_percentile(statistics.torque_time, 0.99),
+        "max_abs": float(np.abs(statistics.drive_range).max()),
+        "max_error": float(statistics.response[3]),
     }
 
 
-def toe_errors(tally: Tally) -> dict[str, float]:
+def toe_errors(statistics: RunStatistics) -> dict[str, float]:
     """Largest deviations of the toe from the ideal linkage at the same crank angle."""
     names = ("max_position_error_m", "max_velocity_error_mps", "max_acceleration_error_mps2")
-    return {name: float(value) for name, value in zip(names, tally.response, strict=False)}
+    return {name: float(value) for name, value in zip(names, statistics.response, strict=False)}
 
 
-def energy_balance(tally: Tally, stored_before: float, stored_after: float) -> dict[str, float]:
+def energy_balance(statistics: RunStatistics, stored_before: float, stored_after: float) -> dict[str, float]:
     """Work from outside, change of stored energy, losses, and what does not add up [J].
 
     ``wear_loss`` is what contacts had stored in walls that wore away: next to nothing at the pace of real
     wear, a thousandth of the losses where clearances double in some thousand cycles.
     """
-    work = float(tally.drive_integral[POWER])
-    friction, contact = (float(tally.integral[:, i].sum()) for i in (FRICTION, DISSIPATION))
-    wear = float(tally.worn_energy[0])
+    work = float(statistics.drive_integral[POWER])
+    friction, contact = (float(statistics.integral[:, i].sum()) for i in (FRICTION, DISSIPATION))
+    wear = float(statistics.worn_energy[0])
     stored = stored_after - stored_before
     return {
         "work_in": work,
@@ -123,28 +123,32 @@ def energy_balance(tally: Tally, stored_before: float, stored_after: float) -> d
     }
 
 
-def joint_figures(setup: Setup, tally: Tally, worn: Floats, cycles: float) -> dict[str, JsonObject]:
+def joint_statistics(
+    setup: Setup, statistics: RunStatistics, worn: Floats, cycles: float
+) -> dict[str, JsonObject]:
     """Forces in every joint, contact and wear of the loose ones; worn (k, 2, N) while counted [m]."""
     figures = {}
     for joint, name in enumerate(setup.linkage.mechanism.joints):
-        mean, square, contact = tally.integral[joint, [FORCE, FORCE_SQUARED, CONTACT]] / tally.time[0]
+        mean, square, contact = (
+            statistics.integral[joint, [FORCE, FORCE_SQUARED, CONTACT]] / statistics.time[0]
+        )
         figure: JsonObject = {
             "mean_force_n": float(mean),
             "rms_force_n": float(np.sqrt(square)),
-            "p99_force_n": percentile(tally.force_time[joint], 0.99),
-            "max_force_n": float(tally.peak[joint]),
+            "p99_force_n": percentile(statistics.force_time[joint], 0.99),
+            "max_force_n": float(statistics.peak[joint]),
         }
-        if name in setup.loose:
-            k = setup.loose.index(name)
+        if name in setup.clearance_joints:
+            k = setup.clearance_joints.index(name)
             figure["contact_fraction"] = float(contact)
-            figure["friction_work_j_per_cycle"] = float(tally.integral[joint, FRICTION] / cycles)
-            figure["archard_integral_j_per_cycle"] = float(tally.integral[joint, ARCHARD] / cycles)
-            figure |= _wear_figures(setup, k, worn[k], cycles)
+            figure["friction_work_j_per_cycle"] = float(statistics.integral[joint, FRICTION] / cycles)
+            figure["archard_integral_j_per_cycle"] = float(statistics.integral[joint, ARCHARD] / cycles)
+            figure |= _wear_statistics(setup, k, worn[k], cycles)
         figures[name] = figure
     return figures
 
 
-def _wear_figures(setup: Setup, k: int, worn: Floats, cycles: float) -> JsonObject:
+def _wear_statistics(setup: Setup, k: int, worn: Floats, cycles: float) -> JsonObject:
     zone = wear_zone(worn[BUSHING])
     opened = setup.surfaces.depth[k].sum(axis=0) if setup.surfaces.feeds_back else np.zeros(1)
     clearance = float(setup.contacts.clearance[k])
@@ -160,13 +164,13 @@ def _wear_figures(setup: Setup, k: int, worn: Floats, cycles: float) -> JsonObje
     }
 
 
-def impact_lists(setup: Setup, tally: Tally) -> dict[str, list[dict[str, float | None]]]:
-    """The first thousand impacts of each loose joint; one that still lasts has no end."""
+def impact_lists(setup: Setup, statistics: RunStatistics) -> dict[str, list[dict[str, float | None]]]:
+    """The first thousand impacts of each clearance joint; one that still lasts has no end."""
     names = list(setup.linkage.mechanism.joints)
     result = {}
-    for name in setup.loose:
+    for name in setup.clearance_joints:
         joint = names.index(name)
-        rows = tally.impact[joint, : min(IMPACTS, int(tally.impacts[joint]))]
+        rows = statistics.impact[joint, : min(IMPACTS, int(statistics.impacts[joint]))]
         result[name] = [
             {
                 "begin_s": float(begin),

@@ -15,12 +15,12 @@ from leg_wear_monitor.dynamics.result import (
     drive_torque,
     energy_balance,
     impact_lists,
-    joint_figures,
+    joint_statistics,
     toe_errors,
     trace_columns,
 )
 from leg_wear_monitor.dynamics.run.protocol import Setup
-from leg_wear_monitor.dynamics.run.run_statistics import new_tally
+from leg_wear_monitor.dynamics.run.run_statistics import new_run_statistics
 from leg_wear_monitor.dynamics.run.tracer import Traceable, Tracer
 from leg_wear_monitor.errors import AssemblyError, ConfigError, SimulationError
 from leg_wear_monitor.mechanism.ideal import TURN, check_cycle
@@ -58,16 +58,22 @@ def prepare(
     ConfigError, AssemblyError
     """
     check_kinds(clearance_m=clearance_m, speed_rpm=speed_rpm)
-    loose = mechanism.loose if clearances is None else given_joints(clearances, mechanism)
+    clearance_joints = (
+        mechanism.clearance_joints if clearances is None else given_joints(clearances, mechanism)
+    )
     linkage = build_linkage(mechanism)
     try:
         check_cycle(linkage)
     except AssemblyError as error:
         raise AssemblyError(f"{error}{suspects(mechanism)}") from error
-    settings = clearance_settings(mechanism, loose, clearance_m, normal_law)
-    contacts = compile_contacts(mechanism, loose, settings)
+    settings = clearance_settings(mechanism, clearance_joints, clearance_m, normal_law)
+    contacts = compile_contacts(mechanism, clearance_joints, settings)
     return Setup(
-        linkage, loose, contacts, fresh_surfaces(contacts, wear, sectors), _speed(mechanism, speed_rpm)
+        linkage,
+        clearance_joints,
+        contacts,
+        fresh_surfaces(contacts, wear, sectors),
+        _speed(mechanism, speed_rpm),
     )
 
 
@@ -93,9 +99,9 @@ def simulate(
     mechanism : Mechanism, str or pathlib.Path
         A mechanism, the name of one that comes with the package, or its file.
     clearances : sequence of str, optional
-        Names of the loose joints; empty for the ideal leg; the mechanism's own if not given.
+        Names of the clearance joints; empty for the ideal leg; the mechanism's own if not given.
     clearance_m : float, optional
-        Radial clearance of all loose joints [m] instead of the mechanism's own.
+        Radial clearance of all clearance joints [m] instead of the mechanism's own.
     speed_rpm : float, optional
         Crank speed instead of the mechanism's own, negative for clockwise.
     cycles, duration_s : float
@@ -108,11 +114,11 @@ def simulate(
     wear : bool
         Whether wear opens the clearance as it goes; it is counted either way.
     normal_law : str, optional
-        Normal contact law of all loose joints.
+        Normal contact law of all clearance joints.
     trace : int
         Samples a cycle to keep, the first at crank angle 0; 0 for none.
     progress : callable, optional
-        Called with the share of the run that is done.
+        Called with the fraction of the run that is done.
 
     Raises
     ------
@@ -137,7 +143,7 @@ def simulate(
     if not isinstance(model, str) or model not in MODELS:
         raise ConfigError("model", "", f"{shown(model)} is not one of {', '.join(MODELS)}")
     skipped, counted = _spans(setup, cycles, duration_s, skip_cycles, trace)
-    if not setup.loose and isinstance(mechanism.drive, SpeedDrive):
+    if not setup.clearance_joints and isinstance(mechanism.drive, SpeedDrive):
         return ideal_result(setup, counted * abs(setup.speed) / TURN, trace)
     try:
         return _run(setup, MODELS[model](setup), model, skipped, counted, trace, progress)
@@ -196,20 +202,20 @@ def _run(
     mechanism = setup.linkage.mechanism
     joints = len(mechanism.joints)
     period = TURN / abs(setup.speed) if setup.speed else counted
-    report = progress or (lambda _share: None)
+    report = progress or (lambda _fraction: None)
     for t in _instants(0.0, skipped, period / _REPORTS_A_CYCLE):
-        run.advance(t, new_tally(joints))
+        run.advance(t, new_run_statistics(joints))
         report(t / (skipped + counted))
-    tally = new_tally(joints)
+    statistics = new_run_statistics(joints)
     tracer = Tracer(run, joints, skipped, skipped + counted, period / trace if trace else math.inf)
     angle = run.sample().crank_angle
     stored, depth = run.stored_energy, setup.surfaces.depth.copy()
     # the run goes to the same instants with and without a trace, which only looks ahead: so it is the same
     for t in _instants(skipped, skipped + counted, period / _REPORTS_A_CYCLE):
         tracer.look_ahead(t)
-        run.advance(t, tally)
+        run.advance(t, statistics)
         report(t / (skipped + counted))
-    if not tally.time[0] > 0.0:
+    if not statistics.time[0] > 0.0:
         raise ConfigError(
             "duration", "", f"{counted:g} s is too short for this model; expected more, or model full"
         )
@@ -222,13 +228,13 @@ def _run(
         speed_rpm=60.0 * turned / counted * math.copysign(1.0, setup.speed),
         cycles=turned,
         simulated_s=skipped + counted,
-        drive_torque_nm=drive_torque(tally),
-        energy_j=energy_balance(tally, stored, run.stored_energy),
-        toe=toe_errors(tally) if mechanism.toe and isinstance(mechanism.drive, SpeedDrive) else None,
-        joints=joint_figures(setup, tally, setup.surfaces.depth - depth, turned),
-        impacts=impact_lists(setup, tally),
+        drive_torque_nm=drive_torque(statistics),
+        energy_j=energy_balance(statistics, stored, run.stored_energy),
+        toe=toe_errors(statistics) if mechanism.toe and isinstance(mechanism.drive, SpeedDrive) else None,
+        joints=joint_statistics(setup, statistics, setup.surfaces.depth - depth, turned),
+        impacts=impact_lists(setup, statistics),
         trace=trace_columns(setup, tracer.samples) if trace else None,
-        loose=setup.loose,
+        clearance_joints=setup.clearance_joints,
         surfaces=setup.surfaces,
     )
 

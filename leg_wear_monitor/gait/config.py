@@ -11,9 +11,9 @@ WRENCH, EFFORT, FLOAT64 = TORQUE_SOURCES = ("wrench", "effort", "float64")
 AVERAGE, INSTANT = SAMPLINGS = ("average", "instant")
 
 
-def _share(doc: str) -> float:
-    share: float = quantity("", doc, at_least=0.0, at_most=1.0, default=0.0)
-    return share
+def _fraction(doc: str) -> float:
+    fraction: float = quantity("", doc, at_least=0.0, at_most=1.0, default=0.0)
+    return fraction
 
 
 def _at_most_four(names: tuple[str, ...]) -> str | None:
@@ -38,7 +38,7 @@ class PaceConfig:
     )
     ramp_s: float = quantity("s", "time that a change of speed takes", above=0.0, default=0.5)
     ripple: float = quantity(
-        "", "speed ripple, as a share of the speed", at_least=0.0, at_most=0.9, default=0.0
+        "", "speed ripple, as a fraction of the speed", at_least=0.0, at_most=0.9, default=0.0
     )
     ripple_per_turn: float = quantity("", "waves of the ripple in a turn", above=0.0, default=2.0)
 
@@ -82,7 +82,7 @@ class JointEncodersConfig:
     offsets_rad: tuple[float, ...] = quantity(
         "rad", "what each reads more than the angle; 0 if empty", default=()
     )
-    scale_errors: tuple[float, ...] = quantity("", "by what share each reads more; 0 if empty", default=())
+    scale_errors: tuple[float, ...] = quantity("", "by what fraction each reads more; 0 if empty", default=())
 
     def __attrs_post_init__(self) -> None:
         for key in ("joints", "offsets_rad", "scale_errors"):
@@ -119,11 +119,11 @@ class TransportConfig:
     jitter_s: float = quantity(
         "s", "when it is taken, about its turn: standard deviation", at_least=0.0, default=1.0e-4
     )
-    drop_share: float = _share("share that is lost")
-    duplicate_share: float = _share("share that arrives twice")
-    late_share: float = _share("share that arrives late, overtaken by others")
+    drop_fraction: float = _fraction("fraction that is lost")
+    duplicate_fraction: float = _fraction("fraction that arrives twice")
+    late_fraction: float = _fraction("fraction that arrives late, overtaken by others")
     late_s: float = quantity("s", "how late", at_least=0.0, default=0.02)
-    fault_share: float = _share("share of messages that are malformed, every way in turn")
+    fault_fraction: float = _fraction("fraction of messages that are malformed, every way in turn")
     gaps_s: tuple[float, ...] = quantity("s", "when nothing is heard for a while", at_least=0.0, default=())
     gap_s: float = quantity("s", "how long that lasts", at_least=0.0, default=0.5)
 
@@ -144,7 +144,7 @@ class LoadConfig:
 class KnockConfig:
     """A bushing that breaks out at once."""
 
-    joint: str = described("the loose joint, none if empty", default="")
+    joint: str = described("the clearance joint, none if empty", default="")
     at_s: float = quantity("s", "when", at_least=0.0, default=5.0)
     clearance_m: float = quantity("m", "its radial clearance from then on", above=0.0, default=1.0e-3)
 
@@ -158,9 +158,11 @@ class GaitConfig:
     )
     seed: int = quantity("", "of all noise; equal seeds, equal data", at_least=0, default=0)
     duration_s: float = quantity("s", "time to walk, 0 without end", at_least=0.0, default=0.0)
-    loose_joints: tuple[str, ...] = described("loose joints; the mechanism's own if empty", default=())
+    clearance_joints: tuple[str, ...] = described(
+        "clearance joints; the mechanism's own if empty", default=()
+    )
     clearances_m: tuple[float, ...] = quantity(
-        "m", "radial clearances of the loose joints; the mechanism's own if empty", above=0.0, default=()
+        "m", "radial clearances of the clearance joints; the mechanism's own if empty", above=0.0, default=()
     )
     wear_acceleration: float = quantity("", "wear coefficients, times this", at_least=0.0, default=1.0)
     pace: PaceConfig = described("how the crank turns", factory=PaceConfig)

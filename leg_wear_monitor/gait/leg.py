@@ -9,7 +9,7 @@ import numpy as np
 
 from leg_wear_monitor.dynamics.full.run import FullRun
 from leg_wear_monitor.dynamics.run.protocol import Setup
-from leg_wear_monitor.dynamics.run.run_statistics import TORQUE, Tally, new_tally
+from leg_wear_monitor.dynamics.run.run_statistics import TORQUE, RunStatistics, new_run_statistics
 from leg_wear_monitor.dynamics.simulation import prepare
 from leg_wear_monitor.errors import ConfigError
 from leg_wear_monitor.gait.config import GaitConfig, KnockConfig
@@ -47,8 +47,8 @@ class SyntheticLeg:
 
     Attributes
     ----------
-    loose : tuple of str
-        Names of the loose joints.
+    clearance_joints : tuple of str
+        Names of the clearance joints.
 
     Raises
     ------
@@ -61,11 +61,11 @@ class SyntheticLeg:
             raise ConfigError(mechanism.source, "drive", "is a torque; a gait needs a crank driven by speed")
         self._pace = Pace(config.pace)
         setup = _setup(mechanism, config, self._pace.at(0.0).speed)
-        self.loose = setup.loose
+        self.clearance_joints = setup.clearance_joints
         self._setup, self._run = setup, FullRun(setup)
         self._knock, self._friction = _checked(config.knock, setup), config.load.friction_nm
         self._sides = _sides(mechanism, config.joint_encoders.joints)
-        self._tally: Tally = new_tally(len(mechanism.joints))
+        self._statistics: RunStatistics = new_run_statistics(len(mechanism.joints))
         self._friction_impulse = 0.0
         self._cycles: list[tuple[float, Floats]] = [(0.0, self.clearance_m())]
 
@@ -75,7 +75,7 @@ class SyntheticLeg:
         return self._run.time
 
     def clearance_m(self) -> Floats:
-        """Mean radial clearance (k,) of each loose joint [m]."""
+        """Mean radial clearance (k,) of each clearance joint [m]."""
         opened = self._setup.surfaces.depth.sum(axis=1).mean(axis=1)
         return np.asarray(self._setup.contacts.clearance + opened)
 
@@ -89,7 +89,7 @@ class SyntheticLeg:
         pieces = max(1, math.ceil((t - self.time) / _LONGEST_PIECE_S))
         for piece in range(pieces, 0, -1):
             self._step(t if piece == 1 else self.time + (t - self.time) / piece)
-        impulse = float(self._tally.drive_integral[TORQUE]) + self._friction_impulse
+        impulse = float(self._statistics.drive_integral[TORQUE]) + self._friction_impulse
         turned = tuple(float(self._run.q[j, 2] - self._run.q[b, 2]) for b, j in self._sides)
         now = self._pace.at(t)
         torque_nm = self._run.sample().drive_torque + self._friction_torque(now.speed)
@@ -107,20 +107,22 @@ class SyntheticLeg:
             "cycle_end_s": [time for time, _ in self._cycles],
             "clearance_m": {
                 name: [*column, now]
-                for name, column, now in zip(self.loose, columns, self.clearance_m().tolist(), strict=True)
+                for name, column, now in zip(
+                    self.clearance_joints, columns, self.clearance_m().tolist(), strict=True
+                )
             },
         }
 
     def _step(self, t: float) -> None:
         before = self.time
         if self._knock and before <= self._knock.at_s < t:
-            k = self.loose.index(self._knock.joint)
+            k = self.clearance_joints.index(self._knock.joint)
             self._setup.contacts.clearance[k] = self._knock.clearance_m
         if t <= before:
             return
         start, end = self._pace.at(before), self._pace.at(t)
         self._run.polynomial[:] = quintic(before, start, t - before, end)
-        self._run.advance(t, self._tally)
+        self._run.advance(t, self._statistics)
         self._friction_impulse += self._friction_torque(end.speed) * (t - before)
         if math.floor(start.angle / TURN) != math.floor(end.angle / TURN):
             self._cycles.append((t, self.clearance_m()))
@@ -129,13 +131,11 @@ class SyntheticLeg:
 def _setup(mechanism: Mechanism, config: GaitConfig, speed: float) -> Setup:
     """The leg ready to run: its own joints, clearances, wear and load."""
     leg = _loaded(mechanism, config.load.toe_force_n)
-    setup = prepare(leg, clearances=config.loose_joints or None, wear=True)
+    setup = prepare(leg, clearances=config.clearance_joints or None, wear=True)
     contacts = setup.contacts
     clearance = np.array(config.clearances_m) if config.clearances_m else contacts.clearance
-    if len(clearance) != len(setup.loose):
-        fault = (
-            f"has {len(clearance)} values for the loose joints {', '.join(setup.loose)}, expected one each"
-        )
+    if len(clearance) != len(setup.clearance_joints):
+        fault = f"has {len(clearance)} values, expected one each for {', '.join(setup.clearance_joints)}"
         raise ConfigError("gait", "clearances_m", fault)
     wear = contacts.wear_coefficient * config.wear_acceleration
     return attrs.evolve(
@@ -175,6 +175,8 @@ def _sides(mechanism: Mechanism, joints: Sequence[str]) -> list[list[int]]:
 def _checked(knock: KnockConfig, setup: Setup) -> KnockConfig | None:
     if not knock.joint:
         return None
-    if knock.joint not in setup.loose:
-        raise ConfigError("gait", "knock.joint", f"{knock.joint!r} is none of {', '.join(setup.loose)}")
+    if knock.joint not in setup.clearance_joints:
+        raise ConfigError(
+            "gait", "knock.joint", f"{knock.joint!r} is none of {', '.join(setup.clearance_joints)}"
+        )
     return knock

@@ -161,12 +161,12 @@ def _arriving(taken: Iterable[Reading], config: TransportConfig, noise: Noise) -
         while under_way and under_way[0][0] <= reading.taken_s:
             yield heapq.heappop(under_way)[2]
         chance = [noise.uniform() for _ in range(4)]
-        if chance[0] < config.drop_share or _in_gap(reading.taken_s, config):
+        if chance[0] < config.drop_fraction or _in_gap(reading.taken_s, config):
             continue
-        late = config.late_s if chance[1] < config.late_share else 0.0
-        fault = next(faults) if chance[2] < config.fault_share else reading.fault
+        late = config.late_s if chance[1] < config.late_fraction else 0.0
+        fault = next(faults) if chance[2] < config.fault_fraction else reading.fault
         sent = reading._replace(arrival_s=reading.taken_s + late, fault=fault)
-        for _ in range(2 if chance[3] < config.duplicate_share else 1):
+        for _ in range(2 if chance[3] < config.duplicate_fraction else 1):
             heapq.heappush(under_way, (sent.arrival_s, next(order), sent))
     while under_way:
         yield heapq.heappop(under_way)[2]

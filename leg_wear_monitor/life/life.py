@@ -24,7 +24,7 @@ from leg_wear_monitor.dynamics.clearance.run import ClearanceStepper
 from leg_wear_monitor.dynamics.clearance.tables import build_tables
 from leg_wear_monitor.dynamics.run.drive import steady_drive
 from leg_wear_monitor.dynamics.run.protocol import DONE, Setup, stop
-from leg_wear_monitor.dynamics.run.run_statistics import ARCHARD, Tally, new_tally
+from leg_wear_monitor.dynamics.run.run_statistics import ARCHARD, RunStatistics, new_run_statistics
 from leg_wear_monitor.errors import ConfigError, SimulationError
 from leg_wear_monitor.life.limits import MOST_JUMPS, check_life
 from leg_wear_monitor.life.result import Life, LifePoint, life_of
@@ -53,9 +53,9 @@ class LifeSettings:
     settle_cycles: int = quantity(
         "", "gait cycles before those, since the surfaces have changed", at_least=0, default=1
     )
-    perturb_share: float = quantity(
+    perturb_fraction: float = quantity(
         "",
-        "journals start up to this share of the smallest clearance from the centre",
+        "journals start up to this fraction of the smallest clearance from the centre",
         at_least=0.0,
         at_most=1.0,
         default=0.5,
@@ -81,11 +81,11 @@ class LifeRun:
     mechanism : Mechanism
     settings : LifeSettings, optional
     clearances : sequence of str, optional
-        Names of the loose joints; the mechanism's own if not given.
+        Names of the clearance joints; the mechanism's own if not given.
     clearance_m, speed_rpm : float, optional
         The mechanism's own if not given.
     wear_factor : float or (k,) array
-        On the wear coefficients of the loose joints.
+        On the wear coefficients of the clearance joints.
     depth : (k, 2, N) array, optional
         Wear to begin with [m]; none if not given.
     workers : int
@@ -93,7 +93,7 @@ class LifeRun:
 
     Attributes
     ----------
-    loose : tuple of str
+    clearance_joints : tuple of str
     fresh_m, radius_m : (k,) arrays
         Radial clearances without wear, and radii of the bushings.
     settings : LifeSettings
@@ -129,14 +129,16 @@ class LifeRun:
         legs = _spread_out(alike, self.settings)
         self._setups = _setups(legs, wear_factor)
         first = self._setups[0]
-        if not first.loose:
-            raise ConfigError(mechanism.source, "clearances.joints", "no joint is loose, nothing can wear")
-        self.loose, self.fresh_m = first.loose, first.contacts.clearance
+        if not first.clearance_joints:
+            raise ConfigError(
+                mechanism.source, "clearances.joints", "no joint has clearance, nothing can wear"
+            )
+        self.clearance_joints, self.fresh_m = first.clearance_joints, first.contacts.clearance
         self.radius_m = first.contacts.bushing_radius
         tables = build_tables(first.linkage, first.contacts)
         self._steppers = [ClearanceStepper(setup, tables=tables) for setup in self._setups]
         self._polynomials = []
-        perturb_m = self.settings.perturb_share * float(self.fresh_m.min())
+        perturb_m = self.settings.perturb_fraction * float(self.fresh_m.min())
         for leg, stepper in zip(legs, self._steppers, strict=True):
             attrs.evolve(leg, perturb_m=perturb_m).start(stepper)
             self._polynomials.append(steady_drive(leg.crank_angle_rad, first.speed))
@@ -181,7 +183,7 @@ class LifeRun:
     @property
     def life(self) -> Life:
         """The life so far."""
-        return life_of(self.loose, self.fresh_m, self.points)
+        return life_of(self.clearance_joints, self.fresh_m, self.points)
 
     def _probe(self, depth: Floats) -> _Probe:
         """Simulate a few cycles with surfaces (k, 2, N) [m]."""
@@ -191,26 +193,26 @@ class LifeRun:
         worn, archard, peak, toe = [], [], [], []
         for _ in range(self.settings.cycles):
             before = [setup.surfaces.depth.copy() for setup in self._setups]
-            tallies = self._advance(1)
+            statistics_of_all = self._advance(1)
             joints = self._setups[0].contacts.joint
             worn += [setup.surfaces.depth - was for setup, was in zip(self._setups, before, strict=True)]
-            archard += [tally.integral[joints, ARCHARD] for tally in tallies]
-            peak += [tally.peak[joints] for tally in tallies]
-            toe += [tally.response[0] for tally in tallies]
+            archard += [statistics.integral[joints, ARCHARD] for statistics in statistics_of_all]
+            peak += [statistics.peak[joints] for statistics in statistics_of_all]
+            toe += [statistics.response[0] for statistics in statistics_of_all]
         rate = wear_rate(np.array(worn), self.settings.jump.smooth_deg)
         return _Probe(rate, np.mean(archard, axis=0), np.mean(peak, axis=0), float(np.mean(toe)))
 
-    def _advance(self, cycles: int) -> list[Tally]:
+    def _advance(self, cycles: int) -> list[RunStatistics]:
         joints = len(self._setups[0].linkage.mechanism.joints)
-        tallies = [new_tally(joints) for _ in self._steppers]
+        statistics_of_all = [new_run_statistics(joints) for _ in self._steppers]
         period = TURN / abs(self._setups[0].speed)
         ends = [(round(stepper.time / period) + cycles) * period for stepper in self._steppers]
-        outcomes = advance_batch(self._steppers, self._polynomials, ends, tallies, self._workers)
+        outcomes = advance_batch(self._steppers, self._polynomials, ends, statistics_of_all, self._workers)
         for (status, k), setup, stepper in zip(outcomes, self._setups, self._steppers, strict=True):
             if status != DONE:
                 stopped = stop(setup, status, k, stepper.time)
                 raise SimulationError(f"{stopped}{suspects(setup.linkage.mechanism)}")
-        return tallies
+        return statistics_of_all
 
 
 def simulate_life(
@@ -227,11 +229,11 @@ def simulate_life(
     run : LifeRun
         Goes on from where it is.
     limit_m : float or (k,) array
-        Of the mean radial clearance of each loose joint.
+        Of the mean radial clearance of each clearance joint.
     horizon_cycles : float
         Gait cycles at most, since the run began.
     progress : callable, optional
-        Called with the share that is done.
+        Called with the fraction that is done.
 
     Raises
     ------
@@ -241,8 +243,8 @@ def simulate_life(
     SimulationError
         Where the motion diverges, or if the life takes more than `MOST_JUMPS` jumps.
     """
-    limits = np.broadcast_to(np.asarray(limit_m, dtype=float), len(run.loose))
-    check_life(run.loose, run.fresh_m, run.radius_m, limits, run.settings.jump)
+    limits = np.broadcast_to(np.asarray(limit_m, dtype=float), len(run.clearance_joints))
+    check_life(run.clearance_joints, run.fresh_m, run.radius_m, limits, run.settings.jump)
     while run.points[-1].cycles < horizon_cycles:
         if len(run.points) > MOST_JUMPS:
             raise SimulationError(
@@ -250,14 +252,14 @@ def simulate_life(
                 f"of {horizon_cycles:.3g} gait cycles; try longer jumps or a nearer limit"
             )
         opened = run.points[-1].opened_m
-        shares = opened / (limits - run.fresh_m)
-        if (shares >= 1.0).any():
+        fractions = opened / (limits - run.fresh_m)
+        if (fractions >= 1.0).any():
             break
         if not run.points[-1].rate.clearance.max() > 0.0:
             break
         run.jump(horizon_cycles - run.points[-1].cycles)
         if progress:
-            progress(float(min(1.0, max(shares.max(), run.points[-1].cycles / horizon_cycles))))
+            progress(float(min(1.0, max(fractions.max(), run.points[-1].cycles / horizon_cycles))))
     return run.life
 
 
@@ -274,7 +276,7 @@ def _setups(legs: Sequence[Leg], wear_factor: ArrayLike) -> list[Setup]:
     for setup in prepare_legs(legs):
         if not isinstance(setup, Setup):
             raise setup
-        factor = np.broadcast_to(np.asarray(wear_factor, dtype=float), len(setup.loose))
+        factor = np.broadcast_to(np.asarray(wear_factor, dtype=float), len(setup.clearance_joints))
         coefficient = setup.contacts.wear_coefficient * factor[:, None]
         setups.append(attrs.evolve(setup, contacts=setup.contacts._replace(wear_coefficient=coefficient)))
     return setups

@@ -14,13 +14,13 @@ MOST_JUMPS = 10_000  # of a life: with the default length of a jump, one takes s
 
 
 def check_life(
-    loose: Sequence[str], fresh_m: Floats, radius_m: Floats, limit_m: ArrayLike, jump: JumpControl
+    clearance_joints: Sequence[str], fresh_m: Floats, radius_m: Floats, limit_m: ArrayLike, jump: JumpControl
 ) -> None:
     """Make sure that a life can end.
 
     Parameters
     ----------
-    loose : sequence of str
+    clearance_joints : sequence of str
     fresh_m, radius_m : (k,) arrays
         Clearances when new, and radii of the bushings.
     limit_m : float or (k,) array
@@ -31,8 +31,8 @@ def check_life(
     ConfigError
         For what `simulate_life` refuses.
     """
-    limits = np.broadcast_to(np.asarray(limit_m, dtype=float), len(loose))
-    for joint, fresh, radius, limit in zip(loose, fresh_m, radius_m, limits, strict=True):
+    limits = np.broadcast_to(np.asarray(limit_m, dtype=float), len(clearance_joints))
+    for joint, fresh, radius, limit in zip(clearance_joints, fresh_m, radius_m, limits, strict=True):
         fault = limit_fault(joint, float(fresh), float(radius), float(limit))
         if fault:
             raise ConfigError("limit-m", "", fault)

@@ -12,7 +12,7 @@ from leg_wear_monitor.life.result import Life
 from leg_wear_monitor.mechanism.arrays import Floats
 from leg_wear_monitor.mechanism.spec import Mechanism
 
-LEAST_SHARE = 0.05  # of the way to its limit that a joint opens in every life
+LEAST_FRACTION = 0.05  # of the way to its limit that a joint opens in every life
 LEAST_OPENING = 1.0e-3  # of the first joint's: one that hardly wears is not hurried without bound
 _DIGITS = 6
 
@@ -42,7 +42,7 @@ def simulate_lives(
         On all wear coefficients.
     speed_rpm : float, optional
     progress : callable
-        Called with the share of all lives that is done.
+        Called with the fraction of all lives that is done.
 
     Raises
     ------
@@ -56,11 +56,11 @@ def simulate_lives(
             run,
             limit_m=limit_m,
             horizon_cycles=horizon_cycles,
-            progress=lambda share: progress((index + share) / number),
+            progress=lambda fraction: progress((index + fraction) / number),
         )
         return factor, done
 
-    first = life(0, np.full(len(mechanism.loose), wear_factor))
+    first = life(0, np.full(len(mechanism.clearance_joints), wear_factor))
     yield first
     for index, factor in enumerate(islice(spread_factors(first[1]), number - 1), start=1):
         yield life(index, wear_factor * factor)
@@ -70,7 +70,7 @@ def spread_factors(nominal: Life) -> Iterator[Floats]:
     """Factors (k,) on the wear coefficients, life by life, without end.
 
     Where lives end, clearances are to be spread evenly: in each the first joint opens all the way, and the
-    others by shares of an evenly spread sequence (Roberts's additive recurrence), if they grow as in the
+    others by fractions of an evenly spread sequence (Roberts's additive recurrence), if they grow as in the
     nominal life.
 
     Parameters
@@ -84,8 +84,8 @@ def spread_factors(nominal: Life) -> Iterator[Floats]:
     number = 0
     while True:
         number += 1
-        share = LEAST_SHARE + (1.0 - LEAST_SHARE) * ((0.5 + number * step) % 1.0)
-        yield np.asarray(share / share.max() * opened.max() / opened)
+        fraction = LEAST_FRACTION + (1.0 - LEAST_FRACTION) * ((0.5 + number * step) % 1.0)
+        yield np.asarray(fraction / fraction.max() * opened.max() / opened)
 
 
 def lives_document(lives: list[tuple[Floats, Life]]) -> dict[str, Any]:
@@ -101,7 +101,7 @@ def lives_document(lives: list[tuple[Floats, Life]]) -> dict[str, Any]:
 def _short(factor: Floats, life: Life) -> dict[str, Any]:
     names = ("clearance_m", "growth_m_per_cycle")
     columns = {name: _by_joint(life, getattr(life, name).T) for name in names}
-    joints = {joint: {name: columns[name][joint] for name in names} for joint in life.loose}
+    joints = {joint: {name: columns[name][joint] for name in names} for joint in life.clearance_joints}
     return {
         "wear_factor": _by_joint(life, factor),
         "cycles": _rounded(life.cycles),
@@ -110,7 +110,7 @@ def _short(factor: Floats, life: Life) -> dict[str, Any]:
 
 
 def _by_joint(life: Life, values: Floats) -> dict[str, Any]:
-    return dict(zip(life.loose, map(_rounded, values), strict=True))
+    return dict(zip(life.clearance_joints, map(_rounded, values), strict=True))
 
 
 def _rounded(values: Floats) -> Any:

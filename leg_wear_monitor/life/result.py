@@ -12,7 +12,7 @@ from leg_wear_monitor.wear.cycle_jump import WearRate
 
 @attrs.frozen(eq=False)
 class LifePoint:
-    """A leg at one time of its life; k loose joints.
+    """A leg at one time of its life; k clearance joints.
 
     Attributes
     ----------
@@ -48,11 +48,11 @@ class LifePoint:
 
 @attrs.frozen(eq=False)
 class Life:
-    """A life as arrays over p points and k loose joints.
+    """A life as arrays over p points and k clearance joints.
 
     Attributes
     ----------
-    loose : tuple of str
+    clearance_joints : tuple of str
     cycles : (p,) array
     clearance_m, clearance_max_m : (p, k) arrays
         Mean around the bushing; largest, both surfaces' profiles one upon the other.
@@ -64,7 +64,7 @@ class Life:
     depth : (p, k, 2, N) array, m
     """
 
-    loose: tuple[str, ...]
+    clearance_joints: tuple[str, ...]
     cycles: Floats
     clearance_m: Floats
     clearance_max_m: Floats
@@ -93,7 +93,7 @@ class Life:
         names = ("clearance_m", "clearance_max_m", "worst_sector_deg", "peak_force_n", "growth_m_per_cycle")
         joints = {
             joint: {name: [_plain(v) for v in getattr(self, name)[:, k].tolist()] for name in names}
-            for k, joint in enumerate(self.loose)
+            for k, joint in enumerate(self.clearance_joints)
         }
         return {"cycles": self.cycles.tolist(), "error_m": self.error_m.tolist(), "joints": joints}
 
@@ -102,13 +102,13 @@ def _plain(value: float) -> float | None:
     return None if np.isnan(value) else value
 
 
-def life_of(loose: tuple[str, ...], fresh_m: Floats, points: Sequence[LifePoint]) -> Life:
+def life_of(clearance_joints: tuple[str, ...], fresh_m: Floats, points: Sequence[LifePoint]) -> Life:
     """The life that points make."""
     depth = np.array([point.depth for point in points])
     both, sectors = depth.sum(axis=2), depth.shape[-1]
     deepest = (depth[:, :, 0].argmax(axis=2) + 0.5) * (360.0 / sectors)
     return Life(
-        loose=loose,
+        clearance_joints=clearance_joints,
         cycles=np.array([point.cycles for point in points]),
         clearance_m=fresh_m + both.mean(axis=2),
         clearance_max_m=fresh_m + both.max(axis=2),

@@ -1,4 +1,4 @@
-"""What makes a revolute joint loose: geometry, material, contact laws and wear of its pin and hole."""
+"""What makes a revolute clearance joint: geometry, material, contact laws and wear of its pin and hole."""
 
 from typing import Annotated, Any
 
@@ -35,7 +35,7 @@ class Friction:
 
 @attrs.frozen(kw_only=True)
 class Clearance:
-    """Everything that makes a revolute joint loose; pairs are (bushing, journal)."""
+    """Everything that makes a revolute clearance joint; pairs are (bushing, journal)."""
 
     bushing_radius: float = quantity("m", "radius of the bushing", above=0.0, at_most=1.0)
     width: float = quantity("m", "axial contact width", above=0.0, at_most=1.0)
@@ -72,5 +72,5 @@ class ClearanceSection:
 
     defaults: dict[str, Any] = described("settings of all joints, a mapping of the keys below", factory=dict)
     joints: tuple[str, ...] | dict[str, Any] = described(
-        "the loose joints: a list of names, or a mapping from each name to its own settings", default=()
+        "the clearance joints: a list of names, or a mapping from each name to its own settings", default=()
     )

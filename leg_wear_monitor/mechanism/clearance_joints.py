@@ -14,7 +14,7 @@ from leg_wear_monitor.mechanism.spec import PrismaticJoint, RevoluteJoint
 _REQUIRED = {field.name for field in attrs.fields(Clearance) if field.default is attrs.NOTHING}
 
 
-def loose_joints(
+def clearance_joints(
     section: ClearanceSection, joints: Mapping[str, RevoluteJoint | PrismaticJoint], source: str
 ) -> tuple[dict[str, Clearance], tuple[str, ...]]:
     """Settings of every revolute joint that has a full set, and the names of those that are loose.
@@ -32,7 +32,7 @@ def loose_joints(
             raise ConfigError(
                 source,
                 f"clearances.joints.{name}",
-                f"{what}, only a revolute one can be loose: {', '.join(revolute)}",
+                f"{what}, only a revolute joint can have clearance: {', '.join(revolute)}",
             )
     # Defaults that are complete serve a joint that is named only on the command line.
     named = revolute if set(section.defaults) >= _REQUIRED or (section.defaults and not own) else own

@@ -12,7 +12,7 @@ from leg_wear_monitor.configuration.yaml_file import read_document
 from leg_wear_monitor.errors import ConfigError
 from leg_wear_monitor.mechanism import spec
 from leg_wear_monitor.mechanism.clearance import ClearanceSection
-from leg_wear_monitor.mechanism.clearance_joints import loose_joints
+from leg_wear_monitor.mechanism.clearance_joints import clearance_joints
 from leg_wear_monitor.mechanism.references import check_references
 from leg_wear_monitor.share import share_directory
 
@@ -77,7 +77,7 @@ def parse_mechanism(document: Any, source: str) -> spec.Mechanism:
     """Types from the plain mapping that a YAML file holds; see `load_mechanism`."""
     file = structure(document, _File, source, "")
     values = {key: getattr(file, key) for key in _KEYS}
-    values["clearances"], values["loose"] = loose_joints(file.clearances, file.joints, source)
+    values["clearances"], values["clearance_joints"] = clearance_joints(file.clearances, file.joints, source)
     mechanism = spec.Mechanism(**values, source=source)
     check_references(mechanism)
     return mechanism

@@ -163,7 +163,7 @@ class PhaseLoad:
     body: str = described("body that is pushed")
     point: str = described("its point")
     phase: tuple[float, ...] = quantity(
-        "", "shares of the gait cycle, 0 at crank angle 0", at_least=0.0, check=_rises_below_one
+        "", "fractions of the gait cycle, 0 at crank angle 0", at_least=0.0, check=_rises_below_one
     )
     force: tuple[Vector, ...] = quantity("N", "a force [x, y] for each of them, in the ground's frame")
 
@@ -191,9 +191,9 @@ class Mechanism:
     Attributes
     ----------
     clearances : dict of str to Clearance
-        Settings of every revolute joint that may be loose: defaults merged with its own.
-    loose : tuple of str
-        Joints that are loose unless a caller says otherwise.
+        Settings of every revolute joint that may have clearance: defaults merged with its own.
+    clearance_joints : tuple of str
+        Joints with clearance unless a caller says otherwise.
     source : str
         Where it was read from, for messages.
     """
@@ -209,8 +209,8 @@ class Mechanism:
     assembly: Assembly = described("where to start looking: crank angle and each body's pose")
     springs: dict[str, Spring] = described("springs by name", factory=dict)
     loads: dict[str, ConstantLoad | PhaseLoad] = described("forces on points by name", factory=dict)
-    clearances: dict[str, Clearance] = described("which joints are loose, and how", factory=dict)
-    loose: tuple[str, ...] = ()
+    clearances: dict[str, Clearance] = described("the joints with clearance and their settings", factory=dict)
+    clearance_joints: tuple[str, ...] = ()
     source: str
 
     def sides(self, joint: str) -> tuple[str, str]:

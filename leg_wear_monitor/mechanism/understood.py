@@ -40,11 +40,11 @@ def _drive(mechanism: Mechanism) -> str:
 
 
 def _clearances(mechanism: Mechanism) -> Iterator[str]:
-    """Young's moduli and clearances of the loose joints, each value once."""
-    loose = [mechanism.clearances[joint] for joint in mechanism.loose]
-    moduli = sorted({modulus for c in loose for modulus in c.youngs_modulus})
+    """Young's moduli and clearances of the clearance joints, each value once."""
+    clearance_joints = [mechanism.clearances[joint] for joint in mechanism.clearance_joints]
+    moduli = sorted({modulus for c in clearance_joints for modulus in c.youngs_modulus})
     if moduli:
         yield "E " + " and ".join(f"{1.0e-9 * modulus:.4g}" for modulus in moduli) + " GPa"
-    for fresh, radius in sorted({(c.radial_clearance, c.bushing_radius) for c in loose}):
+    for fresh, radius in sorted({(c.radial_clearance, c.bushing_radius) for c in clearance_joints}):
         ratio = 100.0 * fresh / radius
         yield f"clearance {1.0e3 * fresh:.4g} mm in a radius of {1.0e3 * radius:.4g} mm ({ratio:.2g} %)"

@@ -6,7 +6,7 @@ from numpy.typing import NDArray
 from leg_wear_monitor.messages.cdr import FLOAT64, JOINT_STATE
 from leg_wear_monitor.twin.sample import NO_FAULT, Samples
 
-_SHARE, _LEAST_NS = 0.05, 1_000_000_000
+_FRACTION, _LEAST_NS = 0.05, 1_000_000_000
 _NAMES = {JOINT_STATE: "joint_states", 2: "drive_torque"}
 
 
@@ -49,7 +49,7 @@ class Clocks:
             return None
         first, first_log, last, last_log = self._ends[kind]
         span, span_log = last - first, last_log - first_log
-        if abs(span - span_log) <= max(_LEAST_NS, _SHARE * abs(span_log)):
+        if abs(span - span_log) <= max(_LEAST_NS, _FRACTION * abs(span_log)):
             return None
         return (
             f"{name}: header stamps span {span / 1e9:.6g} s, log times {span_log / 1e9:.6g} s; header stamps "

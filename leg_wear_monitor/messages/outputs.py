@@ -71,16 +71,16 @@ class Messages:
     Parameters
     ----------
     config : MonitorConfig
-    loose : sequence of str
-        The loose joints, in the order of the reports.
+    clearance_joints : sequence of str
+        The clearance joints, in the order of the reports.
     node : str
         Full name of the node. It stands before the names in diagnostics, without the leading slash.
     """
 
-    def __init__(self, config: MonitorConfig, loose: Sequence[str], node: str = NODE) -> None:
+    def __init__(self, config: MonitorConfig, clearance_joints: Sequence[str], node: str = NODE) -> None:
         self.config, self._node = config, node.lstrip("/")
-        self._clearances = [f"{joint}_clearance" for joint in loose]
-        self._impacts = [f"{joint}_impact" for joint in loose]
+        self._clearances = [f"{joint}_clearance" for joint in clearance_joints]
+        self._impacts = [f"{joint}_impact" for joint in clearance_joints]
 
     def of(self, reports: Reports) -> Iterator[Outgoing]:
         """All messages that reports make: of samples, of gait cycles, of alarms."""
@@ -190,7 +190,7 @@ def _lifetime(joint: JointReport) -> Status:
         words = "if it goes on as it does" if values else "too little growth or data to say"
         return Status(name, Level.OK, words, values)
     values |= lifetime_values(told)
-    values |= {f"clearance_{share}_m": value for share, value in attrs.asdict(told.clearance_m).items()}
+    values |= {f"clearance_{fraction}_m": value for fraction, value in attrs.asdict(told.clearance_m).items()}
     values["measurements"] = float(told.measurements)
     return Status(name, Level.OK, told.answer.value, values)
 

@@ -25,7 +25,7 @@ from leg_wear_monitor.monitor.reports import AlarmList, CycleReport
 from leg_wear_monitor.monitor.spans import NEIGHBOURS_NS, Spans, is_within, with_span
 from leg_wear_monitor.twin.digital_twin import DigitalTwin
 from leg_wear_monitor.twin.sample import Samples
-from leg_wear_monitor.twin.statistics import SampleFigures
+from leg_wear_monitor.twin.statistics import SampleStatistics
 
 POINT_S = 600.0  # of walking, between two points of the clearances' history
 
@@ -42,7 +42,7 @@ class PartLife:
 
 
 @attrs.define
-class BookState:
+class AccountingState:
     """What changes; every value is immutable, so a shallow copy is a snapshot.
 
     Attributes
@@ -89,7 +89,7 @@ def _is_apart(step_ns: Ints) -> NDArray[np.bool_]:
     return np.asarray((step_ns < 0) | (step_ns > NEIGHBOURS_NS))
 
 
-class Book:
+class Accounting:
     """Counts for the ledger, and writes to it when it is time.
 
     Parameters
@@ -109,9 +109,9 @@ class Book:
         entry = ledger.entry if ledger else None
         self._before = entry.totals if entry else {}
         self._kept_s = self._before.get("moving_s", 0.0)
-        self.state = BookState(
+        self.state = AccountingState(
             int(self._before.get("cycles", 0)),
-            (PartLife(),) * len(twin.loose),
+            (PartLife(),) * len(twin.clearance_joints),
             cut_off_s=ledger.cut_off_s if ledger else None,
         )
         if entry:
@@ -122,7 +122,7 @@ class Book:
             self._take_over({joint.name: joint for joint in entry.joints})
 
     def _take_over(self, joints: dict[str, JointWear]) -> None:
-        own = [joints[name] for name in self._twin.loose]
+        own = [joints[name] for name in self._twin.clearance_joints]
         self._twin.set_depth(np.stack([joint.depth for joint in own]))
         self.state.parts = tuple(
             PartLife(
@@ -189,7 +189,7 @@ class Book:
         """Wear of joint k as it is now; depth (loose, 2, N) of the twin."""
         part, totals = self.state.parts[k], self.totals
         return JointWear(
-            self._twin.loose[k],
+            self._twin.clearance_joints[k],
             depth[k],
             self.state.cycles - part.cycles,
             totals["moving_s"] - part.moving_s,
@@ -201,9 +201,11 @@ class Book:
         return self.joint_wear(self._index(joint), self._twin.depth)
 
     def _index(self, joint: str) -> int:
-        if joint not in self._twin.loose:
-            raise LegWearError(f"{joint}: no loose joint, expected one of {', '.join(self._twin.loose)}")
-        return self._twin.loose.index(joint)
+        if joint not in self._twin.clearance_joints:
+            raise LegWearError(
+                f"{joint}: no clearance joint, expected one of {', '.join(self._twin.clearance_joints)}"
+            )
+        return self._twin.clearance_joints.index(joint)
 
     def replace(self, joint: str, stamp_ns: int) -> JointWear:
         """Fresh surfaces for a joint; its wear as it was."""
@@ -227,7 +229,7 @@ class Book:
     def _set_part(self, k: int, part: PartLife) -> None:
         self.state.parts = (*self.state.parts[:k], part, *self.state.parts[k + 1 :])
 
-    def followed(self, samples: SampleFigures) -> None:
+    def followed(self, samples: SampleStatistics) -> None:
         """Take down the time in which the leg was followed."""
         stamp = samples.stamp_ns[np.isfinite(samples.crank_angle_rad)]
         if len(stamp):
@@ -289,7 +291,7 @@ class Book:
         spans = (*self.state.past, *((*span, epoch) for span in self.state.spans))
         return Entry(
             stamp_ns=self._twin.intake.followed_stamp_ns or (self.ledger.kept_ns if self.ledger else 0),
-            joints=tuple(self.joint_wear(k, depth) for k in range(len(self._twin.loose))),
+            joints=tuple(self.joint_wear(k, depth) for k in range(len(self._twin.clearance_joints))),
             totals=self.totals | self.state.commissioned,
             alarms=tuple(alarm for alarm in alarms if alarm.level is not Level.OK),
             spans=tuple((begin, end) for begin, end, _ in spans),

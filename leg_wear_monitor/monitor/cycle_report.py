@@ -5,34 +5,34 @@ from collections.abc import Sequence
 
 import attrs
 
-from leg_wear_monitor.monitor.encoders.clearance_estimate import SeenClearance
+from leg_wear_monitor.monitor.encoders.clearance_estimate import ClearanceEstimate
 from leg_wear_monitor.monitor.forecast.forecast import Forecast, JointForecast
 from leg_wear_monitor.monitor.forecast.growth import GrowthWindow, growth_rate
 from leg_wear_monitor.monitor.reports import CycleReport, JointReport, Remaining
-from leg_wear_monitor.twin.statistics import CycleFigures, TorqueFigures
+from leg_wear_monitor.twin.statistics import CycleStatistics, TorqueStatistics
 
 
 def cycle_report(
-    figures: CycleFigures,
+    figures: CycleStatistics,
     cycle: int,
-    loose: Sequence[str],
+    clearance_joints: Sequence[str],
     growth: Sequence[GrowthWindow],
     forecast: Forecast,
-    seen: Sequence[SeenClearance] | None = None,
+    seen: Sequence[ClearanceEstimate] | None = None,
 ) -> CycleReport:
     """Report of a gait cycle.
 
     Parameters
     ----------
-    figures : CycleFigures
+    figures : CycleStatistics
     cycle : int
         Its number over all runs.
-    loose : sequence of str
-        Names of the loose joints.
+    clearance_joints : sequence of str
+        Names of the clearance joints.
     growth : sequence of GrowthWindow
         Of each of them, this cycle included.
     forecast : Forecast
-    seen : sequence of SeenClearance, optional
+    seen : sequence of ClearanceEstimate, optional
     """
     torque = figures.torque
     return CycleReport(
@@ -44,7 +44,7 @@ def cycle_report(
         bridged_s=figures.bridged_s,
         joints=tuple(
             _joint_report(figures, k, joint, growth[k], forecast.joints[k], seen[k] if seen else None)
-            for k, joint in enumerate(loose)
+            for k, joint in enumerate(clearance_joints)
         ),
         torque_samples=torque.samples,
         measured_torque_rms_nm=float(torque.measured_rms_nm),
@@ -62,8 +62,8 @@ def cycle_report(
     )
 
 
-def _mismatch(torque: TorqueFigures) -> float:
-    """What load, friction and lag do not explain, as a share of what was predicted; NaN if not known."""
+def _mismatch(torque: TorqueStatistics) -> float:
+    """What load, friction and lag do not explain, as a fraction of what was predicted; NaN if not known."""
     left = torque.residual_rms_nm if math.isnan(torque.unexplained_rms_nm) else torque.unexplained_rms_nm
     return float(left / torque.predicted_rms_nm) if torque.predicted_rms_nm > 0.0 else math.nan
 
@@ -83,12 +83,12 @@ def _remaining(forecast: JointForecast) -> Remaining | None:
 
 
 def _joint_report(
-    figures: CycleFigures,
+    figures: CycleStatistics,
     k: int,
     joint: str,
     window: GrowthWindow,
     forecast: JointForecast,
-    seen: SeenClearance | None,
+    seen: ClearanceEstimate | None,
 ) -> JointReport:
     rate = growth_rate(window)
     return JointReport(

@@ -5,28 +5,28 @@ from collections.abc import Sequence
 import attrs
 
 from leg_wear_monitor.mechanism.arrays import Floats
-from leg_wear_monitor.monitor.encoders.clearance_estimate import SeenClearance, Sight
-from leg_wear_monitor.monitor.encoders.observer import EncoderWatch
+from leg_wear_monitor.monitor.encoders.clearance_estimate import ClearanceEstimate, ClearanceObservation
+from leg_wear_monitor.monitor.encoders.observer import EncoderObserver
 from leg_wear_monitor.monitor.forecast.forecaster import RENEWED_NS, Forecaster
 from leg_wear_monitor.monitor.forecast.wear_coefficients import Look
-from leg_wear_monitor.twin.statistics import CycleFigures
+from leg_wear_monitor.twin.statistics import CycleStatistics
 
 
-def hand_over(
-    watch: EncoderWatch,
+def update_forecast(
+    watch: EncoderObserver,
     forecaster: Forecaster,
-    figures: CycleFigures,
+    figures: CycleStatistics,
     worn_m: Floats,
     replaced_ns: Sequence[int],
-) -> tuple[SeenClearance, ...]:
+) -> tuple[ClearanceEstimate, ...]:
     """Clearances as seen after a gait cycle, and whether the forecast believes them.
 
     Parameters
     ----------
-    watch : EncoderWatch
+    watch : EncoderObserver
     forecaster : Forecaster
         Takes them in, if that is due.
-    figures : CycleFigures
+    figures : CycleStatistics
     worn_m : (k,) array
         What the twin has counted for each part.
     replaced_ns : sequence of int
@@ -34,19 +34,20 @@ def hand_over(
     """
     state, seen = watch.state, watch.seen(figures.clearance_mean_m)
     other = tuple(one.is_other for one in seen)
-    is_due = other != state.other or not 0 <= figures.stamp_ns - state.handed_ns < RENEWED_NS
-    if is_due and any(one.sight is Sight.SEEN for one in seen):
-        state.handed_ns, state.other = figures.stamp_ns, other
+    is_due = other != state.other or not 0 <= figures.stamp_ns - state.updated_ns < RENEWED_NS
+    if is_due and any(one.observation is ClearanceObservation.SEEN for one in seen):
+        state.updated_ns, state.other = figures.stamp_ns, other
         state.believed = tuple(
-            one.sight is Sight.SEEN and forecaster.seen(k, _look(one, float(worn_m[k])), replaced_ns[k])
+            one.observation is ClearanceObservation.SEEN
+            and forecaster.seen(k, _look(one, float(worn_m[k])), replaced_ns[k])
             for k, one in enumerate(seen)
         )
     believed = state.believed or (False,) * len(seen)
     return tuple(
-        attrs.evolve(one, believed=yes and one.sight is Sight.SEEN)
+        attrs.evolve(one, believed=yes and one.observation is ClearanceObservation.SEEN)
         for one, yes in zip(seen, believed, strict=True)
     )
 
 
-def _look(seen: SeenClearance, wear_m: float) -> Look:
+def _look(seen: ClearanceEstimate, wear_m: float) -> Look:
     return Look(seen.clearance_m, seen.sigma_m, wear_m)

@@ -5,13 +5,13 @@ import math
 import attrs
 
 from leg_wear_monitor.monitor.alarms.alarm import Alarm, Level
-from leg_wear_monitor.monitor.encoders.clearance_estimate import SeenClearance
+from leg_wear_monitor.monitor.encoders.clearance_estimate import ClearanceEstimate
 from leg_wear_monitor.monitor.forecast.forecast import JointForecast, LegForecast
 from leg_wear_monitor.monitor.inputs.guard import InputGuard
 from leg_wear_monitor.monitor.inputs.pauses import Pauses
-from leg_wear_monitor.twin.statistics import Intake, SampleFigures
+from leg_wear_monitor.twin.statistics import Intake, SampleStatistics
 
-SampleReports = SampleFigures
+SampleReports = SampleStatistics
 """The leg at each sample that was passed now; NaN while it is not followed."""
 
 
@@ -31,7 +31,7 @@ class Remaining:
 
 @attrs.frozen(kw_only=True)
 class JointReport:
-    """A loose joint over a gait cycle.
+    """A clearance joint over a gait cycle.
 
     Attributes
     ----------
@@ -50,7 +50,7 @@ class JointReport:
     impacts : int
     forecast : JointForecast or None
         Renewed once a minute, and when more is known.
-    seen : SeenClearance or None
+    seen : ClearanceEstimate or None
         The clearance that further encoders show; None without such.
     """
 
@@ -66,7 +66,7 @@ class JointReport:
     mean_force_n: float
     impacts: int
     forecast: JointForecast | None = None
-    seen: SeenClearance | None = None
+    seen: ClearanceEstimate | None = None
 
 
 @attrs.frozen(kw_only=True)
@@ -84,12 +84,12 @@ class CycleReport:
     moving_s, bridged_s : float
         Time in motion, and of it the time bridged in gaps.
     joints : tuple of JointReport
-        In the order of `WearMonitor.loose`.
+        In the order of `WearMonitor.clearance_joints`.
     torque_samples : int
         The torque figures are NaN without any.
     measured_torque_rms_nm, predicted_torque_rms_nm, residual_torque_rms_nm : float
     torque_mismatch : float
-        RMS of what foot load, friction and lag do not explain, as a share of the predicted RMS.
+        RMS of what foot load, friction and lag do not explain, as a fraction of the predicted RMS.
     load_n, load_sigma_n : float
         Foot load, up positive, that the measured torque shows, and its standard deviation.
     load_acting_n : float

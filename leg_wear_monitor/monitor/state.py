@@ -3,10 +3,10 @@
 import attrs
 
 from leg_wear_monitor.mechanism.arrays import Ints
-from leg_wear_monitor.monitor.accounting import BookState
+from leg_wear_monitor.monitor.accounting import AccountingState
 from leg_wear_monitor.monitor.alarms.alarm import Alarm
 from leg_wear_monitor.monitor.encoders.observer import EncoderSnapshot
-from leg_wear_monitor.monitor.evaluation.evaluation import JudgeState
+from leg_wear_monitor.monitor.evaluation.evaluation import AlarmEvaluationState
 from leg_wear_monitor.monitor.evaluation.torque_record import TorqueRecord
 from leg_wear_monitor.monitor.forecast.forecaster import ForecastState
 from leg_wear_monitor.monitor.forecast.growth import GrowthWindow
@@ -32,10 +32,10 @@ class MonitorSnapshot:
 
     twin: TwinSnapshot
     state: MonitorState
-    book: BookState
-    judge: JudgeState
+    accounting: AccountingState
+    evaluate: AlarmEvaluationState
     forecast: ForecastState
     alarms: dict[str, Alarm]
-    beats: Ints
+    evaluation_periods: Ints
     guard: GuardSnapshot
     encoders: EncoderSnapshot | None = None

@@ -5,13 +5,13 @@ from collections.abc import Sequence
 
 import attrs
 
-from leg_wear_monitor.monitor.accounting import Book
+from leg_wear_monitor.monitor.accounting import Accounting
 from leg_wear_monitor.monitor.alarms.alarm import Level
-from leg_wear_monitor.monitor.encoders.clearance_estimate import Sight
-from leg_wear_monitor.monitor.encoders.observer import EncoderWatch
+from leg_wear_monitor.monitor.encoders.clearance_estimate import ClearanceObservation
+from leg_wear_monitor.monitor.encoders.observer import EncoderObserver
 from leg_wear_monitor.monitor.encoders.state import faults
 from leg_wear_monitor.monitor.evaluation import board as names
-from leg_wear_monitor.monitor.evaluation.evaluation import Judge
+from leg_wear_monitor.monitor.evaluation.evaluation import AlarmEvaluation
 from leg_wear_monitor.monitor.evaluation.torque_checks import (
     BIAS,
     DRIFT,
@@ -34,66 +34,70 @@ _INPUT = (*_RATES, names.BAD_SAMPLES, names.LOST_TIME, names.STUCK_TORQUE, names
 
 def statuses(
     twin: DigitalTwin,
-    judge: Judge,
-    book: Book,
+    evaluate: AlarmEvaluation,
+    accounting: Accounting,
     last: CycleReport | None,
     happened: Sequence[Event],
     record: TorqueRecord,
-    encoders: EncoderWatch | None = None,
+    encoders: EncoderObserver | None = None,
 ) -> tuple[Status, ...]:
     """All of it: gait, input, torque, each joint, further encoders if there are any, alarms, ledger."""
-    joints = [_joint(k, name, twin, judge, last) for k, name in enumerate(twin.loose)]
+    joints = [_joint(k, name, twin, evaluate, last) for k, name in enumerate(twin.clearance_joints)]
     return (
-        _gait(twin, judge, book, last, happened),
-        _input(twin, judge, book),
-        _torque(judge, last, record),
+        _gait(twin, evaluate, accounting, last, happened),
+        _input(twin, evaluate, accounting),
+        _torque(evaluate, last, record),
         *joints,
-        *((_encoders(encoders, judge, last),) if encoders else ()),
-        _alarms(judge),
-        _ledger(book),
+        *((_encoders(encoders, evaluate, last),) if encoders else ()),
+        _alarms(evaluate),
+        _ledger(accounting),
     )
 
 
 def _gait(
-    twin: DigitalTwin, judge: Judge, book: Book, last: CycleReport | None, happened: Sequence[Event]
+    twin: DigitalTwin,
+    evaluate: AlarmEvaluation,
+    accounting: Accounting,
+    last: CycleReport | None,
+    happened: Sequence[Event],
 ) -> Status:
     tracking = twin.tracking
-    message, level = tracking.name.lower().replace("_", " "), judge.board.level(names.CADENCE)
-    if judge.guard.cause:
+    message, level = tracking.name.lower().replace("_", " "), evaluate.board.level(names.CADENCE)
+    if evaluate.guard.cause:
         message, level = "not monitored: see input", Level.ERROR
     elif happened and tracking in (Tracking.STARTING, Tracking.OUT_OF_STEP):
         message += f", last {happened[-1].what.value.replace('_', ' ')}"
-    if judge.config.wear_acceleration != 1.0:
+    if evaluate.config.wear_acceleration != 1.0:
         message += "; wear is accelerated, this is a demonstration"
     values = {
         "cadence_rpm": twin.speed_radps * 30.0 / math.pi,
-        "commanded_rpm": judge.config.cadence.commanded_rpm,
-        "wear_acceleration": judge.config.wear_acceleration,
-        **book.totals,
+        "commanded_rpm": evaluate.config.cadence.commanded_rpm,
+        "wear_acceleration": evaluate.config.wear_acceleration,
+        **accounting.totals,
         "cycle_moving_s": last.moving_s if last else math.nan,
     }
     return Status("gait", level, message, values)
 
 
-def _input(twin: DigitalTwin, judge: Judge, book: Book) -> Status:
-    counts = attrs.asdict(twin.intake) | {"already_counted": book.state.skipped}
+def _input(twin: DigitalTwin, evaluate: AlarmEvaluation, accounting: Accounting) -> Status:
+    counts = attrs.asdict(twin.intake) | {"already_counted": accounting.state.skipped}
     faulty = counts.pop("faulty")
     for stamp in ("newest_stamp_ns", "followed_stamp_ns"):
         counts.pop(stamp)
-    health = attrs.asdict(judge.state.health) if judge.state.health else {}
-    counts |= {"conflicting": judge.guard.conflicting, "implausible": judge.guard.implausible}
+    health = attrs.asdict(evaluate.state.health) if evaluate.state.health else {}
+    counts |= {"conflicting": evaluate.guard.conflicting, "implausible": evaluate.guard.implausible}
     values = {**health, **counts, **{f"faulty_{name}": count for name, count in faulty.items()}}
-    level = judge.board.level(*_INPUT)
-    bad = [name for name in _INPUT if judge.board.alarms[name].level is not Level.OK]
-    told = [*judge.causes, *([f"look at: {', '.join(bad)}"] if bad else [])]
+    level = evaluate.board.level(*_INPUT)
+    bad = [name for name in _INPUT if evaluate.board.alarms[name].level is not Level.OK]
+    told = [*evaluate.causes, *([f"look at: {', '.join(bad)}"] if bad else [])]
     message = "; ".join(told) or "in order"
-    if judge.guard.cause:
+    if evaluate.guard.cause:
         level = Level.ERROR
     return Status("input", level, message, {name: float(value) for name, value in values.items()})
 
 
-def _torque(judge: Judge, last: CycleReport | None, record: TorqueRecord) -> Status:
-    level = judge.board.level(*_TORQUE)
+def _torque(evaluate: AlarmEvaluation, last: CycleReport | None, record: TorqueRecord) -> Status:
+    level = evaluate.board.level(*_TORQUE)
     if last is None or not last.torque_samples:
         return Status("torque", level, "not compared: no drive torque in the last gait cycle", {})
     values = {
@@ -112,21 +116,23 @@ def _torque(judge: Judge, last: CycleReport | None, record: TorqueRecord) -> Sta
         "torque_lag_sigma_s": last.torque_lag_sigma_s,
         "crank_offset_error_rad": offset_error_rad(last, record),
     }
-    raised = {name for name in _TORQUE if judge.board.alarms[name].level is not Level.OK}
+    raised = {name for name in _TORQUE if evaluate.board.alarms[name].level is not Level.OK}
     told = ["measured is not what was predicted"] if names.MISMATCH in raised else []
-    told += torque_causes(raised, last, record, judge.torque_bounds)
+    told += torque_causes(raised, last, record, evaluate.torque_bounds)
     if not told and math.isnan(last.torque_mismatch):
         told = ["instants are compared over several gait cycles, not enough yet"]
     return Status("torque", level, "; ".join(told or ["measured as predicted"]), values)
 
 
-def _joint(k: int, name: str, twin: DigitalTwin, judge: Judge, last: CycleReport | None) -> Status:
+def _joint(
+    k: int, name: str, twin: DigitalTwin, evaluate: AlarmEvaluation, last: CycleReport | None
+) -> Status:
     kinds = (names.IMPACT, names.CLEARANCE, names.GROWTH)
-    level = judge.board.level(*(f"{kind} {name}" for kind in kinds))
+    level = evaluate.board.level(*(f"{kind} {name}" for kind in kinds))
     values = {
         "clearance_m": float(twin.clearance_mean_m[k]),
         "clearance_max_m": float(twin.clearance_max_m[k]),
-        "clearance_limit_m": judge.board.clearance_limits_m[k],
+        "clearance_limit_m": evaluate.board.clearance_limits_m[k],
     }
     report = last.joints[k] if last else None
     if report is None:
@@ -147,10 +153,12 @@ def _joint(k: int, name: str, twin: DigitalTwin, judge: Judge, last: CycleReport
     return Status(f"joint {name}", level, report.forecast.answer.value, values)
 
 
-def _encoders(encoders: EncoderWatch, judge: Judge, last: CycleReport | None) -> Status:
+def _encoders(encoders: EncoderObserver, evaluate: AlarmEvaluation, last: CycleReport | None) -> Status:
     """Further encoders: what is wrong with them, how they are off, and the clearances that they show."""
-    settings, state = judge.config.encoders, encoders.state
-    level = judge.board.level(*(name for name in judge.board.alarms if name.startswith(names.DEPARTURE)))
+    settings, state = evaluate.config.encoders, encoders.state
+    level = evaluate.board.level(
+        *(name for name in evaluate.board.alarms if name.startswith(names.DEPARTURE))
+    )
     values = {"cycles": float(encoders.cycles)}
     for i, name in enumerate(settings.names):
         kept = state.samples
@@ -181,34 +189,38 @@ def _shown(last: CycleReport | None) -> list[str]:
         for joint, one in seen
         if one.is_other
     ]
-    hidden = [joint for joint, one in seen if one.sight is Sight.NOT_OBSERVABLE]
-    waiting = {one.sight.value for _, one in seen if one.sight in (Sight.WAITING, Sight.COMMISSIONING)}
+    hidden = [joint for joint, one in seen if one.observation is ClearanceObservation.NOT_OBSERVABLE]
+    waiting = {
+        one.observation.value
+        for _, one in seen
+        if one.observation in (ClearanceObservation.WAITING, ClearanceObservation.COMMISSIONING)
+    }
     if not told and not waiting and len(hidden) < len(seen):
         told = ["clearances are as counted"]
-    return [*told, *(f"{joint} {Sight.NOT_OBSERVABLE.value}" for joint in hidden), *waiting]
+    return [*told, *(f"{joint} {ClearanceObservation.NOT_OBSERVABLE.value}" for joint in hidden), *waiting]
 
 
 def _or_nan(value: float | None) -> float:
     return math.nan if value is None else value
 
 
-def _alarms(judge: Judge) -> Status:
-    raised = [alarm for alarm in judge.board.alarms.values() if alarm.level is not Level.OK]
+def _alarms(evaluate: AlarmEvaluation) -> Status:
+    raised = [alarm for alarm in evaluate.board.alarms.values() if alarm.level is not Level.OK]
     waiting = sum(not alarm.acknowledged for alarm in raised)
     level = max((alarm.level for alarm in raised), default=Level.OK)
     message = f"raised: {', '.join(alarm.name for alarm in raised)}" if raised else f"none; {ADVICE}"
     return Status("alarms", level, message, {"raised": float(len(raised)), "unacknowledged": float(waiting)})
 
 
-def _ledger(book: Book) -> Status:
-    ledger = book.ledger
+def _ledger(accounting: Accounting) -> Status:
+    ledger = accounting.ledger
     if ledger is None:
         return Status("ledger", Level.OK, "none is kept, wear is lost at the end", {})
-    values = {"not_kept_s": book.not_kept_s}
+    values = {"not_kept_s": accounting.not_kept_s}
     if ledger.fault:
         return Status("ledger", Level.ERROR, f"not written: {ledger.fault}; trying again", values)
-    if book.state.cut_off_s is not None:
-        values["cut_off_s"] = book.state.cut_off_s
+    if accounting.state.cut_off_s is not None:
+        values["cut_off_s"] = accounting.state.cut_off_s
         message = ledger.told or "the run before was cut off, the wear of its last seconds is lost"
         return Status("ledger", Level.WARN, message, values)
     message = "is written at the end of the recording" if ledger.at_end else "kept"

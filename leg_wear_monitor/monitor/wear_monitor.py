@@ -7,20 +7,20 @@ from numpy.typing import NDArray
 from leg_wear_monitor.errors import LegWearError
 from leg_wear_monitor.mechanism.arrays import Floats
 from leg_wear_monitor.mechanism.spec import Mechanism
-from leg_wear_monitor.monitor.accounting import Book
+from leg_wear_monitor.monitor.accounting import Accounting
 from leg_wear_monitor.monitor.alarms.alarm import Alarm
 from leg_wear_monitor.monitor.config.fitting import check_limits, fitted, twin_settings
 from leg_wear_monitor.monitor.config.settings import MonitorConfig
 from leg_wear_monitor.monitor.cycle_report import cycle_report, with_forecast
-from leg_wear_monitor.monitor.encoders.clearance_estimate import SeenClearance
-from leg_wear_monitor.monitor.encoders.observer import EncoderWatch
-from leg_wear_monitor.monitor.evaluation.evaluation import Judge
-from leg_wear_monitor.monitor.evaluation.evaluation_period import A_CYCLE, Beats
+from leg_wear_monitor.monitor.encoders.clearance_estimate import ClearanceEstimate
+from leg_wear_monitor.monitor.encoders.observer import EncoderObserver
+from leg_wear_monitor.monitor.evaluation.evaluation import AlarmEvaluation
+from leg_wear_monitor.monitor.evaluation.evaluation_period import A_CYCLE, EvaluationPeriods
 from leg_wear_monitor.monitor.evaluation.torque_record import TorqueRecord
 from leg_wear_monitor.monitor.forecast.forecaster import Forecaster
 from leg_wear_monitor.monitor.forecast.growth import GrowthWindow, extended
 from leg_wear_monitor.monitor.forecast.measurement import Finding
-from leg_wear_monitor.monitor.forecast_update import hand_over
+from leg_wear_monitor.monitor.forecast_update import update_forecast
 from leg_wear_monitor.monitor.inputs.guard import InputGuard
 from leg_wear_monitor.monitor.ledger.entry import Audit, JointWear, Measurement
 from leg_wear_monitor.monitor.ledger.file import LedgerError
@@ -39,7 +39,7 @@ from leg_wear_monitor.monitor.state import MonitorSnapshot, MonitorState
 from leg_wear_monitor.monitor.status import statuses
 from leg_wear_monitor.twin.digital_twin import DigitalTwin
 from leg_wear_monitor.twin.sample import GAIT_SAMPLE, Samples
-from leg_wear_monitor.twin.statistics import CycleFigures, joined
+from leg_wear_monitor.twin.statistics import CycleStatistics, joined
 
 _KEPT_EVENTS = 1
 
@@ -52,7 +52,7 @@ class WearMonitor:
     Parameters
     ----------
     mechanism : Mechanism
-        As its file has it; the configuration says what is loose.
+        As its file has it; the configuration names the clearance joints.
     config : MonitorConfig, optional
     ledger : Ledger, optional
         See `open_ledger`; its wear is continued. Without one, wear begins at 0 and ends with the monitor.
@@ -62,8 +62,8 @@ class WearMonitor:
     mechanism : Mechanism
         As the configuration wants it.
     config : MonitorConfig
-    loose : tuple of str
-        The loose joints, in the order of all figures.
+    clearance_joints : tuple of str
+        The clearance joints, in the order of all figures.
 
     Raises
     ------
@@ -76,34 +76,34 @@ class WearMonitor:
     ) -> None:
         self.config = config or MonitorConfig()
         self.mechanism = fitted(mechanism, self.config)
-        self.loose = self.mechanism.loose
+        self.clearance_joints = self.mechanism.clearance_joints
         self._twin = DigitalTwin(self.mechanism, twin_settings(self.config))
         self._guard = InputGuard(self._twin.settings.tracker)
-        self._book = Book(self._twin, ledger, self.config.ledger)
+        self._accounting = Accounting(self._twin, ledger, self.config.ledger)
         cycle_ns = round(60.0e9 / abs(self.config.cadence.commanded_rpm))
-        self._judge = Judge(self._twin, self.config, cycle_ns, self._guard)
+        self._evaluate = AlarmEvaluation(self._twin, self.config, cycle_ns, self._guard)
         self._forecaster = Forecaster(
             self.mechanism,
             self.config.forecast,
             ledger.measurements if ledger else (),
-            [part.replaced_ns for part in self._book.state.parts],
+            [part.replaced_ns for part in self._accounting.state.parts],
         )
         self._encoders = (
-            EncoderWatch(self.mechanism, self.config, ledger.commissioned if ledger else None)
+            EncoderObserver(self.mechanism, self.config, ledger.commissioned if ledger else None)
             if self.config.encoders.names
             else None
         )
         if ledger and ledger.entry:
-            self._judge.board.restore(ledger.entry.alarms)
-        self._beats = Beats(cycle_ns // A_CYCLE)
-        kept = TorqueRecord.of(self._book.state.commissioned)
-        self._state = MonitorState(tuple(GrowthWindow() for _ in self.loose), kept)
+            self._evaluate.board.restore(ledger.entry.alarms)
+        self._evaluation_periods = EvaluationPeriods(cycle_ns // A_CYCLE)
+        kept = TorqueRecord.of(self._accounting.state.commissioned)
+        self._state = MonitorState(tuple(GrowthWindow() for _ in self.clearance_joints), kept)
 
     def warm_up(self) -> None:
         """Compile all that `update` needs, before the first sample; takes about a minute once."""
         self._twin.warm_up()
         self._guard.warm_up()
-        list(Beats(1).pieces(np.zeros(1, GAIT_SAMPLE)))
+        list(EvaluationPeriods(1).pieces(np.zeros(1, GAIT_SAMPLE)))
 
     def update(self, samples: Samples) -> Reports:
         """Take in a block of samples.
@@ -122,15 +122,15 @@ class WearMonitor:
         looks: list[SampleReports] = []
         cycles: list[CycleReport] = []
         changes: list[AlarmList] = []
-        for piece, ends_beat in self._beats.pieces(samples):
+        for piece, ends_beat in self._evaluation_periods.pieces(samples):
             seen, ended = self._take(piece, changes)
             looks.append(seen)
             cycles += ended
             if ends_beat:
-                self._tell(self._judge.end_beat(self._book.state.skipped), changes)
-                self._look_at_encoders()
-            self._book.keep_if_due(self._judge.board.alarms.values())
-        return Reports(joined(looks, len(self.loose)), tuple(cycles), tuple(changes), self.lost)
+                self._tell(self._evaluate.end_beat(self._accounting.state.skipped), changes)
+                self._observe_encoders()
+            self._accounting.keep_if_due(self._evaluate.board.alarms.values())
+        return Reports(joined(looks, len(self.clearance_joints)), tuple(cycles), tuple(changes), self.lost)
 
     def pause(self, pause_s: float) -> None:
         """Between the samples so far and the next ones nobody recorded: no fault of the input.
@@ -140,19 +140,25 @@ class WearMonitor:
         pause_s : float
             From the newest stamp to the next.
         """
-        self._judge.pause()
-        self._book.pause(pause_s)
+        self._evaluate.pause()
+        self._accounting.pause(pause_s)
 
     @property
     def alarms(self) -> AlarmList:
         """All alarms as they stand."""
-        return AlarmList(self._twin.intake.followed_stamp_ns, tuple(self._judge.board.alarms.values()))
+        return AlarmList(self._twin.intake.followed_stamp_ns, tuple(self._evaluate.board.alarms.values()))
 
     @property
     def lost(self) -> Lost:
         """What was not integrated so far."""
-        book = self._book.state
-        return lost(self._twin.intake, book.skipped, self._book.unmonitored_s, self._guard, book.pauses)
+        accounting = self._accounting.state
+        return lost(
+            self._twin.intake,
+            accounting.skipped,
+            self._accounting.unmonitored_s,
+            self._guard,
+            accounting.pauses,
+        )
 
     @property
     def used(self) -> tuple[int, int]:
@@ -172,11 +178,11 @@ class WearMonitor:
 
     def wear_of(self, joint: str) -> JointWear:
         """Wear of a joint's part as it is now; raises LegWearError for one that is not loose."""
-        return self._book.wear_of(joint)
+        return self._accounting.wear_of(joint)
 
     def begin_run(self, boot_id: str) -> bool:
         """Note which start of the computer this is; whether the last run is known to be of another."""
-        ledger = self._book.ledger
+        ledger = self._accounting.ledger
         if ledger is None:
             return False
         ledger.boot_id = boot_id
@@ -184,19 +190,25 @@ class WearMonitor:
 
     def counted(self, samples: Samples) -> NDArray[np.bool_]:
         """Which samples `update` would leave out, since the ledger has the wear of their time."""
-        return self._book.counted(samples)
+        return self._accounting.counted(samples)
 
     def begin_epoch(self, stamp_ns: int, who: str) -> None:
         """The clock of the samples has begun anew at a stamp: what comes is counted."""
-        self._book.begin_epoch()
-        self._book.note(Audit(stamp_ns, who, "new_epoch"))
+        self._accounting.begin_epoch()
+        self._accounting.note(Audit(stamp_ns, who, "new_epoch"))
         self._keep()
 
     def status(self) -> tuple[Status, ...]:
         """What /diagnostics shows; names and their order stay the same."""
         state = self._state
         return statuses(
-            self._twin, self._judge, self._book, state.last, state.happened, state.torque, self._encoders
+            self._twin,
+            self._evaluate,
+            self._accounting,
+            state.last,
+            state.happened,
+            state.torque,
+            self._encoders,
         )
 
     def configure(self, config: MonitorConfig) -> None:
@@ -209,7 +221,7 @@ class WearMonitor:
         """
         check_limits(config, self.mechanism)
         self.config = config
-        self._judge.configure(config)
+        self._evaluate.configure(config)
         if self._encoders:
             self._encoders.config = config
 
@@ -221,9 +233,9 @@ class WearMonitor:
         cleared, kept : tuple of Alarm
             Those that had returned to normal, and those that stay until they do.
         """
-        cleared, kept = self._judge.board.acknowledge()
-        self._book.state.cut_off_s = None
-        self._book.note_alarms(AlarmList(stamp_ns, self.alarms.alarms))
+        cleared, kept = self._evaluate.board.acknowledge()
+        self._accounting.state.cut_off_s = None
+        self._accounting.note_alarms(AlarmList(stamp_ns, self.alarms.alarms))
         if cleared or kept:
             self._keep()
         return cleared, kept
@@ -234,11 +246,11 @@ class WearMonitor:
         Raises
         ------
         LegWearError
-            For a joint that is not loose.
+            For a joint without clearance.
         """
-        was = self._book.replace(joint, stamp_ns)
+        was = self._accounting.replace(joint, stamp_ns)
         self._part_changed(joint, stamp_ns)
-        self._book.note(Audit(stamp_ns, who, "reset_wear", was))
+        self._accounting.note(Audit(stamp_ns, who, "reset_wear", was))
         self._keep()
 
     def undo_reset(self, joint: str, stamp_ns: int, who: str) -> JointWear:
@@ -252,18 +264,18 @@ class WearMonitor:
         Raises
         ------
         LegWearError
-            For a joint that is not loose, or if no reset is kept that can be taken back.
+            For a joint without clearance, or if no reset is kept that can be taken back.
         """
-        reset = last_reset(self._book.ledger, joint, self._book.wear_of(joint))
-        since = self._book.put_back(joint, reset.before)
+        reset = last_reset(self._accounting.ledger, joint, self._accounting.wear_of(joint))
+        since = self._accounting.put_back(joint, reset.before)
         self._part_changed(joint, reset.before.replaced_ns)
-        self._book.note(Audit(stamp_ns, who, "undo_reset", since, undoes=reset.id))
+        self._accounting.note(Audit(stamp_ns, who, "undo_reset", since, undoes=reset.id))
         self._keep()
-        return self._book.wear_of(joint)
+        return self._accounting.wear_of(joint)
 
     def _part_changed(self, joint: str, replaced_ns: int) -> None:
         """What was found of the growth of another part does not hold for this one."""
-        k, growth = self.loose.index(joint), self._state.growth
+        k, growth = self.clearance_joints.index(joint), self._state.growth
         self._state.growth = (*growth[:k], GrowthWindow(), *growth[k + 1 :])
         self._forecaster.replaced(joint, replaced_ns)
         if self._encoders:
@@ -287,10 +299,10 @@ class WearMonitor:
         Raises
         ------
         LegWearError
-            For a joint that is not loose, or figures that cannot be.
+            For a joint without clearance, or figures that cannot be.
         """
-        wear = self._book.wear_of(joint)
-        kept_ns = self._book.ledger.kept_ns if self._book.ledger else 0
+        wear = self._accounting.wear_of(joint)
+        kept_ns = self._accounting.ledger.kept_ns if self._accounting.ledger else 0
         found = self._forecaster.measured(
             wear,
             clearance_m=clearance_m,
@@ -300,9 +312,9 @@ class WearMonitor:
             kept_ns=kept_ns,
             accept=accept,
         )
-        self._book.note(found.measurement)
+        self._accounting.note(found.measurement)
         if self._encoders:
-            self._encoders.state.handed_ns = 0  # what they show counts beside it
+            self._encoders.state.updated_ns = 0  # what they show counts beside it
         self._keep()
         return found
 
@@ -317,10 +329,12 @@ class WearMonitor:
         last = self._state.last
         if last is None:
             return None
-        fresh = [self.mechanism.clearances[joint].radial_clearance for joint in self.loose]
+        fresh = [self.mechanism.clearances[joint].radial_clearance for joint in self.clearance_joints]
         worn_m = np.asarray(self._twin.clearance_mean_m - fresh)
-        limits = self._judge.board.clearance_limits_m
-        self._state.last = with_forecast(last, self._forecaster.renewed(worn_m, limits, self._judge.holds()))
+        limits = self._evaluate.board.clearance_limits_m
+        self._state.last = with_forecast(
+            last, self._forecaster.renewed(worn_m, limits, self._evaluate.holds())
+        )
         return self._state.last
 
     def save(self) -> None:
@@ -331,7 +345,7 @@ class WearMonitor:
         LegWearError
             If there is none, or it could not be written.
         """
-        ledger = self._book.ledger
+        ledger = self._accounting.ledger
         if ledger is None:
             raise LegWearError("no ledger is kept; set ledger.path")
         if not self._keep():
@@ -345,7 +359,7 @@ class WearMonitor:
         LedgerError
             If a ledger that is written at the end alone could not be: then nothing is kept.
         """
-        ledger = self._book.ledger
+        ledger = self._accounting.ledger
         if ledger is None:
             return
         kept = self._keep(closed=True)
@@ -355,29 +369,29 @@ class WearMonitor:
 
     def abandon(self) -> None:
         """Let go of the ledger without a further entry."""
-        if self._book.ledger:
-            self._book.ledger.close()
+        if self._accounting.ledger:
+            self._accounting.ledger.close()
 
     @property
     def ledger_told(self) -> str:
         """What was wrong with the ledger as it was found, and may be lost with it; empty if nothing was."""
-        return self._book.ledger.told if self._book.ledger else ""
+        return self._accounting.ledger.told if self._accounting.ledger else ""
 
     @property
     def is_all_counted(self) -> bool:
         """Whether samples came, and the wear of all of them was in the ledger already."""
-        return self._book.state.skipped > 0 and not self._book.state.spans
+        return self._accounting.state.skipped > 0 and not self._accounting.state.spans
 
     def snapshot(self) -> MonitorSnapshot:
         """A copy of the whole state but the ledger's."""
         return MonitorSnapshot(
             self._twin.snapshot(),
             attrs.evolve(self._state),
-            attrs.evolve(self._book.state),
-            attrs.evolve(self._judge.state),
+            attrs.evolve(self._accounting.state),
+            attrs.evolve(self._evaluate.state),
             attrs.evolve(self._forecaster.state),
-            self._judge.board.alarms,
-            self._beats.state.copy(),
+            self._evaluate.board.alarms,
+            self._evaluation_periods.state.copy(),
             self._guard.snapshot(),
             self._encoders.snapshot() if self._encoders else None,
         )
@@ -386,76 +400,78 @@ class WearMonitor:
         """Go back to a snapshot of a monitor of the same mechanism and parameters; it goes on bit for bit."""
         self._twin.restore(snapshot.twin)
         self._state = attrs.evolve(snapshot.state)
-        self._book.state = attrs.evolve(snapshot.book)
-        self._judge.state = attrs.evolve(snapshot.judge)
+        self._accounting.state = attrs.evolve(snapshot.accounting)
+        self._evaluate.state = attrs.evolve(snapshot.evaluate)
         self._forecaster.state = attrs.evolve(snapshot.forecast)
-        self._judge.board.alarms = snapshot.alarms
-        self._beats.state[:] = snapshot.beats
+        self._evaluate.board.alarms = snapshot.alarms
+        self._evaluation_periods.state[:] = snapshot.evaluation_periods
         self._guard.restore(snapshot.guard)
         if self._encoders and snapshot.encoders:
             self._encoders.restore(snapshot.encoders)
 
     def _keep(self, closed: bool = False) -> bool:
-        return self._book.keep(self._judge.board.alarms.values(), closed)
+        return self._accounting.keep(self._evaluate.board.alarms.values(), closed)
 
     def _take(self, piece: Samples, changes: list[AlarmList]) -> tuple[SampleReports, list[CycleReport]]:
         """Follow a piece of a beat, and judge the gait cycles that it ends."""
-        piece = self._guard.checked(self._book.not_counted(piece))
+        piece = self._guard.checked(self._accounting.not_counted(piece))
         update = self._twin.update(piece)
-        self._judge.see(piece)
+        self._evaluate.see(piece)
         if self._encoders:
             self._encoders.see(piece)
-        self._book.followed(update.samples)
+        self._accounting.followed(update.samples)
         self._state.happened = (*self._state.happened, *update.events)[-_KEPT_EVENTS:]
         cycles: list[CycleReport] = []
         for figures in update.cycles:
             if self._encoders:
                 self._encoders.ended(figures)
             cycles.append(self._report(figures))
-            self._tell(self._judge.end_cycle(cycles[-1], self._state.torque), changes)
+            self._tell(self._evaluate.end_cycle(cycles[-1], self._state.torque), changes)
             self._keep_torque(figures, cycles[-1])
         return update.samples, cycles
 
-    def _report(self, figures: CycleFigures) -> CycleReport:
+    def _report(self, figures: CycleStatistics) -> CycleReport:
         """Report a gait cycle."""
-        state, book = self._state, self._book
-        book.state.cycles += 1
+        state, accounting = self._state, self._accounting
+        accounting.state.cycles += 1
         state.growth = tuple(
             extended(window, float(growth), figures.moving_s, self.config.growth.window_cycles)
             for window, growth in zip(state.growth, figures.growth_mean_m, strict=True)
         )
         seen = self._seen(figures)
-        limits = self._judge.board.clearance_limits_m
-        forecast = self._forecaster.after(figures, self._worn_m(figures), limits, self._judge.holds)
-        state.last = cycle_report(figures, book.state.cycles, self.loose, state.growth, forecast, seen)
-        book.note_clearances(state.last)
+        limits = self._evaluate.board.clearance_limits_m
+        forecast = self._forecaster.after(figures, self._worn_m(figures), limits, self._evaluate.holds)
+        state.last = cycle_report(
+            figures, accounting.state.cycles, self.clearance_joints, state.growth, forecast, seen
+        )
+        accounting.note_clearances(state.last)
         return state.last
 
-    def _keep_torque(self, figures: CycleFigures, report: CycleReport) -> None:
+    def _keep_torque(self, figures: CycleStatistics, report: CycleReport) -> None:
         """Take down what the torque was like, while it is as predicted."""
-        is_sound = self._judge.is_torque_sound(report)
+        is_sound = self._evaluate.is_torque_sound(report)
         self._state.torque = self._state.torque.with_cycle(figures, report, is_sound)
-        self._book.state.commissioned = self._state.torque.totals
+        self._accounting.state.commissioned = self._state.torque.totals
 
-    def _look_at_encoders(self) -> None:
+    def _observe_encoders(self) -> None:
         if self._encoders:
             new = self._encoders.end_beat(self._twin.clearance_mean_m, self._twin.depth)
             if new:
-                self._book.note(new)
+                self._accounting.note(new)
 
-    def _seen(self, figures: CycleFigures) -> tuple[SeenClearance, ...] | None:
+    def _seen(self, figures: CycleStatistics) -> tuple[ClearanceEstimate, ...] | None:
         """Clearances as encoders show them, which the forecast learns from."""
         if not self._encoders:
             return None
-        replaced_ns = [part.replaced_ns for part in self._book.state.parts]
-        return hand_over(self._encoders, self._forecaster, figures, self._worn_m(figures), replaced_ns)
+        replaced_ns = [part.replaced_ns for part in self._accounting.state.parts]
+        return update_forecast(self._encoders, self._forecaster, figures, self._worn_m(figures), replaced_ns)
 
-    def _worn_m(self, figures: CycleFigures) -> Floats:
+    def _worn_m(self, figures: CycleStatistics) -> Floats:
         """Wear of each part at the end of a gait cycle; the twin itself may be further on."""
-        fresh = [self.mechanism.clearances[joint].radial_clearance for joint in self.loose]
+        fresh = [self.mechanism.clearances[joint].radial_clearance for joint in self.clearance_joints]
         return np.asarray(figures.clearance_mean_m - fresh)
 
     def _tell(self, changed: tuple[AlarmList, ...], changes: list[AlarmList]) -> None:
         for change in changed:
             changes.append(change)
-            self._book.note_alarms(change)
+            self._accounting.note_alarms(change)

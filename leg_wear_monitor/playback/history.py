@@ -37,8 +37,8 @@ class History:
 
     Parameters
     ----------
-    loose : tuple of str
-        The loose joints, in the order of the reports.
+    clearance_joints : tuple of str
+        The clearance joints, in the order of the reports.
 
     Attributes
     ----------
@@ -50,8 +50,8 @@ class History:
         The last gait cycle.
     """
 
-    def __init__(self, loose: tuple[str, ...]) -> None:
-        self.loose = loose
+    def __init__(self, clearance_joints: tuple[str, ...]) -> None:
+        self.clearance_joints = clearance_joints
         self.changes: list[tuple[int, Alarm]] = []
         self.worst: dict[str, Level] = {}
         self.last: CycleReport | None = None
@@ -94,7 +94,7 @@ class History:
 
     def joint_column(self, name: str) -> Floats:
         """One of `JOINT_COLUMNS`, shape (cycles, loose); NaN where it was not known."""
-        table = np.array(self._joints).reshape(len(self), len(self.loose), len(JOINT_COLUMNS))
+        table = np.array(self._joints).reshape(len(self), len(self.clearance_joints), len(JOINT_COLUMNS))
         return table[:, :, JOINT_COLUMNS.index(name)]
 
 

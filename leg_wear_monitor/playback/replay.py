@@ -8,7 +8,7 @@ import attrs
 import numpy as np
 
 from leg_wear_monitor.bags.budget import DEFAULT_MB
-from leg_wear_monitor.bags.findings import Finding, RecordingError, Weight
+from leg_wear_monitor.bags.findings import Finding, RecordingError, Severity
 from leg_wear_monitor.bags.pauses import Block
 from leg_wear_monitor.bags.reader import Recording
 from leg_wear_monitor.errors import printable
@@ -140,7 +140,7 @@ def replay(
     ready : callable, optional
         Given the monitor before the first sample.
     progress : callable, optional
-        Told the share of the recording that is done, 0 to 1.
+        Told the fraction of the recording that is done, 0 to 1.
     finish : callable, optional
         Given the result before the ledger is written: what has to be on the disk first.
 
@@ -169,7 +169,7 @@ def replay(
         mechanism = load_mechanism(config.mechanism)
         monitor = open_monitor(mechanism, config, at_end=True)
         stack.callback(monitor.abandon)
-        history, evidence = History(monitor.loose), GaitEvidence(config)
+        history, evidence = History(monitor.clearance_joints), GaitEvidence(config)
         result = ReplayResult(monitor, history, recording.files, recording.topics, time, evidence)
         with nullcontext() if out is None else _sink(Path(out), monitor, node, recording.files) as sink:
             if ready:
@@ -198,11 +198,11 @@ def _run(
         result.logged_s = max(result.logged_s, (int(block.log_time_ns[-1]) - first_ns) / 1e9)
         if block.pause_ns:
             monitor.pause(_stamps_apart_s(result, block))
-        for samples in _beats(block, monitor.config):
+        for samples in _evaluation_periods(block, monitor.config):
             result.count(samples)
             _take(result, samples, sink)
         if progress:
-            progress(block.share)
+            progress(block.fraction)
     result.history.last = monitor.renew_forecast()
 
 
@@ -217,12 +217,12 @@ def _about_the_ledger(result: ReplayResult) -> list[Finding]:
     found = []
     if result.monitor.ledger_told:
         path = Path(result.monitor.config.ledger.path)
-        found.append(Finding(path, result.monitor.ledger_told, Weight.NOTE))
+        found.append(Finding(path, result.monitor.ledger_told, Severity.NOTE))
     if result.monitor.is_all_counted:
-        found.append(Finding(result.files[0], "all of it is in the ledger already", Weight.NOTE))
+        found.append(Finding(result.files[0], "all of it is in the ledger already", Severity.NOTE))
     if result.monitor.config.ledger.path and result.is_unusable:
         path = Path(result.monitor.config.ledger.path)
-        found.append(Finding(path, "nothing of this recording is written into the ledger", Weight.NOTE))
+        found.append(Finding(path, "nothing of this recording is written into the ledger", Severity.NOTE))
     return found
 
 
@@ -254,7 +254,7 @@ def _sink(directory: Path, monitor: WearMonitor, node: str, files: list[Path]) -
     return Sink(path, monitor, node)
 
 
-def _beats(block: Block, config: MonitorConfig) -> Iterator[Samples]:
+def _evaluation_periods(block: Block, config: MonitorConfig) -> Iterator[Samples]:
     """Samples of a block, cut where diagnostics are due."""
     period_ns = round(config.diagnostics.period_s * 1e9)
     yield from np.split(block.samples, np.flatnonzero(np.diff(block.log_time_ns // period_ns)) + 1)

@@ -33,7 +33,7 @@ class Sink:
 
     def __init__(self, path: Path, monitor: WearMonitor, node: str = NODE) -> None:
         self._monitor = monitor
-        self._messages = Messages(monitor.config, monitor.loose, node)
+        self._messages = Messages(monitor.config, monitor.clearance_joints, node)
         self._writer = McapWriter(path, chunk_bytes=_CHUNK_BYTES)
         self._channels = {
             output: self._writer.channel(topic_of(output, node), output.type, output.qos)

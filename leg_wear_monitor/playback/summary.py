@@ -10,7 +10,7 @@ from leg_wear_monitor.errors import printable
 from leg_wear_monitor.mechanism.arrays import Floats
 from leg_wear_monitor.monitor.alarms.alarm import Alarm
 from leg_wear_monitor.monitor.alarms.words import state_of
-from leg_wear_monitor.monitor.encoders.clearance_estimate import SeenClearance
+from leg_wear_monitor.monitor.encoders.clearance_estimate import ClearanceEstimate
 from leg_wear_monitor.monitor.forecast.forecast import JointForecast, LegForecast
 from leg_wear_monitor.playback.history import CYCLE_COLUMNS, JOINT_COLUMNS, History
 from leg_wear_monitor.playback.replay import ReplayResult
@@ -85,11 +85,12 @@ def _monitor(result: ReplayResult) -> dict[str, Any]:
     return {
         "mechanism": result.monitor.mechanism.name,
         "hardware_id": config.hardware,
-        "loose": list(result.monitor.loose),
+        "clearance_joints": list(result.monitor.clearance_joints),
         "commanded_rpm": config.cadence.commanded_rpm,
         "wear_acceleration": config.wear_acceleration,
         "bushing_radius_m": {
-            joint: result.monitor.mechanism.clearances[joint].bushing_radius for joint in result.monitor.loose
+            joint: result.monitor.mechanism.clearances[joint].bushing_radius
+            for joint in result.monitor.clearance_joints
         },
         "limits": attrs.asdict(config.limits),
         "duty_hours_per_day": config.forecast.duty_hours_per_day,
@@ -119,8 +120,8 @@ def _joints(result: ReplayResult) -> dict[str, Any]:
     return joints
 
 
-def _seen(seen: SeenClearance) -> dict[str, Any]:
-    return {**attrs.asdict(seen), "sight": seen.sight.value, "is_other": seen.is_other}
+def _seen(seen: ClearanceEstimate) -> dict[str, Any]:
+    return {**attrs.asdict(seen), "observation": seen.observation.value, "is_other": seen.is_other}
 
 
 def _leg(result: ReplayResult) -> dict[str, Any] | None:
@@ -163,7 +164,7 @@ def _history(history: History) -> dict[str, Any]:
             thinned = np.add.reduceat(column, begins)
         else:
             thinned = column[last]
-        record[name] = {joint: thinned[:, k].tolist() for k, joint in enumerate(history.loose)}
+        record[name] = {joint: thinned[:, k].tolist() for k, joint in enumerate(history.clearance_joints)}
     return record
 
 
@@ -177,7 +178,7 @@ def _wear(result: ReplayResult) -> dict[str, Any]:
     depth: Floats = result.monitor.wear_depth_m
     return {
         joint: {"bushing": depth[k, BUSHING].tolist(), "journal": depth[k, JOURNAL].tolist()}
-        for k, joint in enumerate(result.monitor.loose)
+        for k, joint in enumerate(result.monitor.clearance_joints)
     }
 
 

@@ -72,7 +72,7 @@ class MonitorNode(ClosingNode):
         self._inbox = Inbox(decoder, _HELD)
         self._load = Load()
         self._epochs = Epochs(self._monitor, boot_id(), self._ros_now_ns, self._say)
-        self._messages = Messages(config, self._monitor.loose, self.get_fully_qualified_name())
+        self._messages = Messages(config, self._monitor.clearance_joints, self.get_fully_qualified_name())
         self._black_box = BlackBox(config.record.path)
         self._outlets = Outlets(self, outputs.OUTPUTS, self._black_box)
         self._forecasts = ForecastTimes()
@@ -94,7 +94,7 @@ class MonitorNode(ClosingNode):
         steady = Clock(clock_type=ClockType.STEADY_TIME)
         self.create_timer(_WORK_S, self._work, clock=steady)
         self.create_timer(config.diagnostics.period_s, self._diagnose, clock=steady)
-        joints, leg = ", ".join(self._monitor.loose), self._monitor.mechanism.name
+        joints, leg = ", ".join(self._monitor.clearance_joints), self._monitor.mechanism.name
         self.get_logger().info(f"monitoring joints {joints} of {leg}")
 
     @property
@@ -189,7 +189,7 @@ class MonitorNode(ClosingNode):
     def _serve(self) -> None:
         self._offer("~/acknowledge_alarms", self._acknowledge)
         self._offer("~/save_state", self._save)
-        for joint in self._monitor.loose:
+        for joint in self._monitor.clearance_joints:
             self._offer(f"~/reset_wear/{joint}", partial(self._reset_wear, joint))
             self._offer(f"~/undo_reset/{joint}", partial(self._undo_reset, joint))
 

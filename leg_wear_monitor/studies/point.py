@@ -30,7 +30,7 @@ class Point:
     settings : dict
         Plain values, seed included.
     cost : float
-        Roughly how long it takes, as cycles of one loose joint.
+        Roughly how long it takes, as cycles of one clearance joint.
     """
 
     label: str

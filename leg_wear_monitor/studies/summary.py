@@ -39,15 +39,15 @@ def largest_error(arrays: Arrays, name: str) -> Spread:
     return spread(arrays[f"error_{name}"])
 
 
-def share_of_range(arrays: Arrays, name: str) -> float:
+def fraction_of_range(arrays: Arrays, name: str) -> float:
     """Mean largest error in a cycle over the range of the ideal curve, the larger one of x and y."""
     ideal = arrays[RANGES[name]]
     return largest_error(arrays, name).mean / float(np.ptp(ideal, axis=0).max())
 
 
-def loose_of(arrays: Arrays) -> list[str]:
-    """Names of the loose joints."""
-    return [str(name) for name in arrays["loose"]]
+def clearance_joints_of(arrays: Arrays) -> list[str]:
+    """Names of the clearance joints."""
+    return [str(name) for name in arrays["clearance_joints"]]
 
 
 def peak_force(arrays: Arrays, joint: str) -> Spread:
@@ -60,26 +60,28 @@ def joint_force(arrays: Arrays, name: str, joint: str) -> Spread:
     return spread(arrays[name][:, [str(other) for other in arrays["joints"]].index(joint)])
 
 
-def of_loose(arrays: Arrays, name: str, joint: str) -> Spread:
-    """An array whose last axis are the loose joints, for one of them, over the rest."""
-    return spread(arrays[name][..., loose_of(arrays).index(joint)])
+def of_clearance_joints(arrays: Arrays, name: str, joint: str) -> Spread:
+    """An array whose last axis are the clearance joints, for one of them, over the rest."""
+    return spread(arrays[name][..., clearance_joints_of(arrays).index(joint)])
 
 
 def depth_per_cycle(arrays: Arrays, joint: str) -> Spread:
     """Greatest depth that a cycle wears off the bushing [m], over runs."""
-    return spread(arrays["wear_depth_m_per_cycle"][:, loose_of(arrays).index(joint), BUSHING].max(axis=1))
+    return spread(
+        arrays["wear_depth_m_per_cycle"][:, clearance_joints_of(arrays).index(joint), BUSHING].max(axis=1)
+    )
 
 
 def mean_profile(arrays: Arrays, joint: str, surface: int = BUSHING) -> Floats:
     """Mean wear of a cycle (N,) [m] of a joint's bushing or journal."""
     return np.asarray(
-        arrays["wear_depth_m_per_cycle"][:, loose_of(arrays).index(joint), surface].mean(axis=0)
+        arrays["wear_depth_m_per_cycle"][:, clearance_joints_of(arrays).index(joint), surface].mean(axis=0)
     )
 
 
-def worst_zone(arrays: Arrays, joint: str, share: float = 0.9) -> tuple[float, float] | None:
-    """Narrowest zone [deg] with a share of the bushing's mean wear; None without wear."""
-    return wear_zone(mean_profile(arrays, joint), share)
+def worst_zone(arrays: Arrays, joint: str, fraction: float = 0.9) -> tuple[float, float] | None:
+    """Narrowest zone [deg] with a fraction of the bushing's mean wear; None without wear."""
+    return wear_zone(mean_profile(arrays, joint), fraction)
 
 
 def power_law(values: ArrayLike, errors: ArrayLike) -> tuple[float, float]:

@@ -29,10 +29,10 @@ from leg_wear_monitor.twin.intake import intake
 from leg_wear_monitor.twin.sample import Samples, gait_samples
 from leg_wear_monitor.twin.settings import TwinSettings
 from leg_wear_monitor.twin.statistics import (
-    CycleFigures,
+    CycleStatistics,
     Event,
     Intake,
-    SampleFigures,
+    SampleStatistics,
     Tracking,
     TwinUpdate,
     joined,
@@ -60,8 +60,8 @@ class DigitalTwin:
     Attributes
     ----------
     settings : TwinSettings
-    loose : tuple of str
-        The loose joints, in the order of all figures.
+    clearance_joints : tuple of str
+        The clearance joints, in the order of all figures.
 
     Raises
     ------
@@ -73,11 +73,13 @@ class DigitalTwin:
         self.settings = settings or TwinSettings()
         commanded = self.settings.tracker.commanded_speed_radps
         setup = prepare(
-            mechanism, clearances=self.settings.loose, speed_rpm=60.0 * commanded / TURN, wear=True
+            mechanism, clearances=self.settings.clearance_joints, speed_rpm=60.0 * commanded / TURN, wear=True
         )
-        if not setup.loose:
-            raise ConfigError(mechanism.source, "clearances.joints", "no joint is loose, nothing can wear")
-        self.loose = setup.loose
+        if not setup.clearance_joints:
+            raise ConfigError(
+                mechanism.source, "clearances.joints", "no joint has clearance, nothing can wear"
+            )
+        self.clearance_joints = setup.clearance_joints
         self._setup = setup
         self._nominal = setup.contacts.wear_coefficient.copy()
         self._follower = LegFollower(setup, self.settings)
@@ -103,18 +105,18 @@ class DigitalTwin:
 
     @property
     def clearance_mean_m(self) -> Floats:
-        """Mean radial clearance (loose,) [m]."""
+        """Mean radial clearance (k,) [m]."""
         return np.asarray(self._follower.clearances[0])
 
     @property
     def clearance_max_m(self) -> Floats:
-        """Largest radial clearance (loose,) [m]."""
+        """Largest radial clearance (k,) [m]."""
         return np.asarray(self._follower.clearances[1])
 
     @property
     def peak_force_n(self) -> Floats:
-        """Largest contact force (loose,) [N] since the gait cycle began."""
-        return np.asarray(self._follower.tally.peak[self._setup.contacts.joint])
+        """Largest contact force (k,) [N] since the gait cycle began."""
+        return np.asarray(self._follower.statistics.peak[self._setup.contacts.joint])
 
     @property
     def torque_size_nm(self) -> float:
@@ -155,12 +157,14 @@ class DigitalTwin:
         Raises
         ------
         LegWearError
-            For a joint that is not loose.
+            For a joint without clearance.
         """
-        if joint not in self.loose:
-            raise LegWearError(f"{joint}: no loose joint, expected one of {', '.join(self.loose)}")
+        if joint not in self.clearance_joints:
+            raise LegWearError(
+                f"{joint}: no clearance joint, expected one of {', '.join(self.clearance_joints)}"
+            )
         depth = self.depth
-        depth[self.loose.index(joint)] = 0.0
+        depth[self.clearance_joints.index(joint)] = 0.0
         self.set_depth(depth)
 
     def warm_up(self) -> None:
@@ -173,13 +177,13 @@ class DigitalTwin:
 
     def update(self, samples: Samples) -> TwinUpdate:
         """Take in a block (n,) of `GAIT_SAMPLE` in order of arrival, and follow as far as can be."""
-        looks: list[SampleFigures] = []
-        cycles: list[CycleFigures] = []
+        looks: list[SampleStatistics] = []
+        cycles: list[CycleStatistics] = []
         events: list[Event] = []
         for steps, n in self._tracker.update(samples):
             if n:
                 looks.append(self._follower.follow(steps, n, cycles, events))
-        return TwinUpdate(joined(looks, len(self.loose)), tuple(cycles), tuple(events))
+        return TwinUpdate(joined(looks, len(self.clearance_joints)), tuple(cycles), tuple(events))
 
     def snapshot(self) -> TwinSnapshot:
         """A copy of the whole state."""

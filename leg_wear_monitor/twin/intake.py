@@ -31,5 +31,5 @@ def intake(tracker: t.TrackerState, leg: LegState) -> Intake:
         unmonitored_s=float(count[t.UNMONITORED_NS] + mark[FAILED_NS]) * 1.0e-9,
         out_s=float(clock[t.RELEASED] - clock[t.OUT_SINCE]) * 1.0e-9 if out else 0.0,
         newest_stamp_ns=int(clock[t.NEWEST]),
-        followed_stamp_ns=int(clock[t.LAST_KNOT]),
+        followed_stamp_ns=int(clock[t.LAST_SPLINE_NODE]),
     )

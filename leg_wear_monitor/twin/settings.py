@@ -104,8 +104,8 @@ class TwinSettings:
     Attributes
     ----------
     tracker : TrackerSettings
-    loose : tuple of str, optional
-        The loose joints; the mechanism's own if not given (A, B, G, I, J of the bionic leg).
+    clearance_joints : tuple of str, optional
+        The clearance joints; the mechanism's own if not given (A, B, G, I, J of the bionic leg).
     wear_acceleration : float
         Factor on all wear coefficients, for demonstrations; 1 is the material's own.
     torque_bandwidth_hz : float
@@ -122,7 +122,7 @@ class TwinSettings:
     """
 
     tracker: TrackerSettings = attrs.field(factory=TrackerSettings)
-    loose: tuple[str, ...] | None = None
+    clearance_joints: tuple[str, ...] | None = None
     wear_acceleration: float = 1.0
     torque_bandwidth_hz: float = 10.0
     estimate_load: bool = True

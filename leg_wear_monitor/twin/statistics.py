@@ -19,7 +19,7 @@ class Tracking(Enum):
     OUT_OF_STEP = 3
 
 
-class Happening(Enum):
+class TwinEventKind(Enum):
     """What may happen to the twin; the value is fit for a key."""
 
     ACQUIRED = "acquired"  # the leg is (again) set in motion, wear as it was
@@ -40,12 +40,12 @@ class Event:
     """Something that happened at a stamp, in a joint if it concerns one."""
 
     stamp_ns: int
-    what: Happening
+    what: TwinEventKind
     joint: str | None = None
 
 
 @attrs.frozen(eq=False)
-class SampleFigures:
+class SampleStatistics:
     """The leg at each of n samples that were passed now; NaN while the leg is not followed.
 
     Attributes
@@ -57,7 +57,7 @@ class SampleFigures:
         Of the leg, in [0, 2 pi).
     predicted_torque_nm : (n,) array
         Mean of the drive torque since the sample before.
-    contact_force_n : (n, loose) array
+    contact_force_n : (n, k) array
         At the sample.
     """
 
@@ -72,7 +72,7 @@ class SampleFigures:
 
 
 @attrs.frozen
-class TorqueFigures:
+class TorqueStatistics:
     """Measured against predicted drive torque over a gait cycle, both through the same low-pass.
 
     Attributes
@@ -117,10 +117,10 @@ class TorqueFigures:
 
 
 @attrs.frozen(eq=False)
-class CycleFigures:
+class CycleStatistics:
     """One whole gait cycle, from crank angle 0 to the next 0.
 
-    Arrays are (loose,) in the order of `DigitalTwin.loose`.
+    Arrays are (k,) in the order of `DigitalTwin.clearance_joints`.
 
     Attributes
     ----------
@@ -143,9 +143,9 @@ class CycleFigures:
         At its end.
     growth_mean_m, growth_max_m : array
         Of the two over the cycle.
-    depth_max_m : (loose, 2) array
+    depth_max_m : (k, 2) array
         Deepest wear of bushing and journal.
-    torque : TorqueFigures
+    torque : TorqueStatistics
     """
 
     cycle: int
@@ -165,7 +165,7 @@ class CycleFigures:
     growth_mean_m: Floats
     growth_max_m: Floats
     depth_max_m: Floats
-    torque: TorqueFigures
+    torque: TorqueStatistics
 
     @property
     def duration_s(self) -> float:
@@ -177,8 +177,8 @@ class CycleFigures:
 class TwinUpdate:
     """What an update of the twin brought."""
 
-    samples: SampleFigures
-    cycles: tuple[CycleFigures, ...]
+    samples: SampleStatistics
+    cycles: tuple[CycleStatistics, ...]
     events: tuple[Event, ...]
 
 
@@ -197,7 +197,7 @@ class Intake:
     outliers, velocity_outliers : int
         Dropped by the gates; of the latter only the velocity.
     gaps_bridged, lost, backward_jumps, reversals, failures : int
-        ``failures`` of the leg's motion: see `Happening`.
+        ``failures`` of the leg's motion: see `TwinEventKind`.
     bridged_s, moving_s, standing_s : float
         Monitored time, bridged time is a part of moving time.
     unmonitored_s : float
@@ -231,15 +231,15 @@ class Intake:
     followed_stamp_ns: int
 
 
-def joined(parts: Sequence[SampleFigures], loose: int) -> SampleFigures:
+def joined(parts: Sequence[SampleStatistics], clearance_joints: int) -> SampleStatistics:
     """Figures of one stretch after the other."""
     if len(parts) < 2:
-        return parts[0] if parts else no_samples(loose)
-    names = [field.name for field in attrs.fields(SampleFigures)]
-    return SampleFigures(*(np.concatenate([getattr(part, name) for part in parts]) for name in names))
+        return parts[0] if parts else no_samples(clearance_joints)
+    names = [field.name for field in attrs.fields(SampleStatistics)]
+    return SampleStatistics(*(np.concatenate([getattr(part, name) for part in parts]) for name in names))
 
 
-def no_samples(loose: int) -> SampleFigures:
+def no_samples(clearance_joints: int) -> SampleStatistics:
     """Figures of no sample."""
     stamps: NDArray[np.int64] = np.zeros(0, dtype=np.int64)
-    return SampleFigures(stamps, stamps, np.zeros(0), np.zeros(0), np.zeros((0, loose)))
+    return SampleStatistics(stamps, stamps, np.zeros(0), np.zeros(0), np.zeros((0, clearance_joints)))

@@ -128,9 +128,9 @@ def deposit_wear(contacts, surfaces, k, ex, ey, angle_b, angle_j, integral, out_
     w = shift - floor
     first = centre - count_left + 1
     for i in range(first, centre + count_right):
-        share = depth * out_weight[i % n]
-        surfaces.depth[k, BUSHING, i % n] += contacts.wear_coefficient[k, BUSHING] * share
-        worn = contacts.wear_coefficient[k, JOURNAL] * share
+        fraction = depth * out_weight[i % n]
+        surfaces.depth[k, BUSHING, i % n] += contacts.wear_coefficient[k, BUSHING] * fraction
+        worn = contacts.wear_coefficient[k, JOURNAL] * fraction
         surfaces.depth[k, JOURNAL, (i + int(floor)) % n] += (1.0 - w) * worn
         surfaces.depth[k, JOURNAL, (i + int(floor) + 1) % n] += w * worn
 
@@ -142,13 +142,13 @@ def worn_volume(contacts: ContactArrays, surfaces: Surfaces) -> Floats:
     return np.asarray(surfaces.depth.sum(axis=2) * area[:, None])
 
 
-def wear_zone(depth: Floats, share: float = 0.9) -> tuple[float, float] | None:
-    """Narrowest zone [deg] of the surface's frame that holds a share of the wear; None without wear.
+def wear_zone(depth: Floats, fraction: float = 0.9) -> tuple[float, float] | None:
+    """Narrowest zone [deg] of the surface's frame that holds a fraction of the wear; None without wear.
 
     Parameters
     ----------
     depth : (N,) array, m
-    share : float
+    fraction : float
 
     Returns
     -------
@@ -160,6 +160,6 @@ def wear_zone(depth: Floats, share: float = 0.9) -> tuple[float, float] | None:
         return None
     sums = np.concatenate([[0.0], np.cumsum(np.concatenate([depth, depth]))])
     # the first end that holds the share, for every start
-    ends = np.searchsorted(sums, sums[:n] + share * total * (1.0 - 1.0e-12))
+    ends = np.searchsorted(sums, sums[:n] + fraction * total * (1.0 - 1.0e-12))
     start = int(np.argmin(ends - np.arange(n)))
     return 360.0 * start / n, 360.0 * int(ends[start]) / n

@@ -6,7 +6,7 @@ from typing import Any
 import numpy as np
 import pytest
 
-from leg_wear_monitor.bags.findings import Finding, RecordingError, Weight
+from leg_wear_monitor.bags.findings import Finding, RecordingError, Severity
 from leg_wear_monitor.bags.mcap.writer import McapWriter
 from leg_wear_monitor.errors import printable
 from leg_wear_monitor.messages import encode
@@ -110,7 +110,7 @@ def test_what_is_shown_can_be_shown(text: str, shown: str) -> None:
     assert printable(text) == shown
     assert printable(text).isprintable()
     assert str(RecordingError(text, text, text)) == f"{shown}: {shown}: {shown}"
-    assert str(Finding(Path("x"), text, Weight.NOTE)) == f"x: {shown}"
+    assert str(Finding(Path("x"), text, Severity.NOTE)) == f"x: {shown}"
 
 
 def test_names_in_a_file_obey_nobody(tmp_path: Path, read: Any) -> None:

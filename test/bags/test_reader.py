@@ -8,7 +8,7 @@ import attrs
 import numpy as np
 import pytest
 
-from leg_wear_monitor.bags.findings import RecordingError, Weight
+from leg_wear_monitor.bags.findings import RecordingError, Severity
 from leg_wear_monitor.messages import encode
 from leg_wear_monitor.monitor.config.inputs import DriveTorque
 from leg_wear_monitor.monitor.config.settings import MonitorConfig
@@ -18,7 +18,7 @@ Read = Callable[..., Any]
 
 
 def losses(recording: Any) -> list[str]:
-    return [finding.text for finding in recording.findings if finding.weight is Weight.LOSS]
+    return [finding.text for finding in recording.findings if finding.weight is Severity.LOSS]
 
 
 @pytest.fixture(scope="module")
@@ -319,7 +319,9 @@ def test_memory_stays_flat(tmp_path: Path, write_bag: Any, traffic: Any) -> None
 
     path = write_bag(tmp_path / "a.mcap", traffic(40.0))
     with Recording([path], MonitorConfig()) as recording:
-        shares, sizes = zip(*((block.share, len(block.samples)) for block in recording.blocks()), strict=True)
+        fractions, sizes = zip(
+            *((block.fraction, len(block.samples)) for block in recording.blocks()), strict=True
+        )
     assert sum(sizes) == 16000
     assert max(sizes) < 5000
-    assert list(shares) == sorted(shares) and shares[-1] == 1.0
+    assert list(fractions) == sorted(fractions) and fractions[-1] == 1.0

@@ -90,7 +90,7 @@ class Case:
     codes: frozenset[int] = frozenset({0, 1, 2})
 
 
-def judged(case: Case, ran: Ran) -> tuple[Outcome, str]:
+def evaluated(case: Case, ran: Ran) -> tuple[Outcome, str]:
     """What came of a case, and why it is called so."""
     if ran.is_late:
         return Outcome.HANG, f"not done after {case.seconds:g} s"

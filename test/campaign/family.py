@@ -12,7 +12,7 @@ from typing import Protocol, cast
 import attrs
 
 from campaign import families
-from campaign.case import Case, Outcome, judged
+from campaign.case import Case, Outcome, evaluated
 from campaign.child import idle_mb, ran
 
 COLUMNS = ("family", "cases", *(outcome.value for outcome in Outcome), "worst memory [MB]", "worst time [s]")
@@ -79,7 +79,7 @@ def run(name: str, seeds: Iterable[int], keep: Path | None = None) -> Iterator[R
         with tempfile.TemporaryDirectory(prefix=f"{name}_{seed}_", ignore_cleanup_errors=True) as place:
             directory = keep or Path(place)
             left = ran(case, directory, idle)
-            outcome, why = judged(case, left)
+            outcome, why = evaluated(case, left)
         yield Result(name, seed, case.description, outcome, why, left.memory_mb, left.seconds)
 
 
@@ -120,8 +120,8 @@ def row(name: str, results: list[Result]) -> tuple[str, ...]:
     counts = Counter(result.outcome for result in results)
     memory = max((result.memory_mb for result in results), default=0.0)
     seconds = max((result.seconds for result in results), default=0.0)
-    tally = [str(counts[outcome]) for outcome in Outcome]
-    return (name, str(len(results)), *tally, f"{memory:.0f}", f"{seconds:.1f}")
+    statistics = [str(counts[outcome]) for outcome in Outcome]
+    return (name, str(len(results)), *statistics, f"{memory:.0f}", f"{seconds:.1f}")
 
 
 def table(rows: list[tuple[str, ...]]) -> str:

@@ -108,7 +108,7 @@ def test_check_names_every_bad_file_and_describes_the_good(run, complaints, ship
     assert one == "error: one.yaml: bodies.crank.mass: 0.0 is not above 0 kg"
     assert two == "error: two.yaml: gravitas: unknown key, did you mean gravity?"
     assert result.stdout.startswith("good.yaml")
-    for part in ("3 moving bodies", "4 joints", "B, C loose", "mobility 1", "turns through"):
+    for part in ("3 moving bodies", "4 joints", "clearance joints B, C", "mobility 1", "turns through"):
         assert part in result.stdout
 
 

@@ -27,8 +27,8 @@ def test_life_tells_when_each_joint_reaches_its_limit(run, tmp_path):
     assert nominal.factor.tolist() == [1.0, 1.0]
     # the others open the joints in other proportions
     assert len(others) == 2
-    shares = [life.clearance_m[-1] - life.clearance_m[0] for life in (nominal, *others)]
-    assert len({round(share[0] / share[1], 2) for share in shares}) == 3
+    fractions = [life.clearance_m[-1] - life.clearance_m[0] for life in (nominal, *others)]
+    assert len({round(fraction[0] / fraction[1], 2) for fraction in fractions}) == 3
 
 
 def test_life_refuses_what_cannot_be(run):

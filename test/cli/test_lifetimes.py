@@ -15,7 +15,7 @@ from leg_wear_monitor.bags.mcap.writer import McapWriter
 from leg_wear_monitor.messages import encode
 
 SECONDS, RATE_HZ = 14, 200
-SHARES = ("p10", "p50", "p90")
+FRACTIONS = ("p10", "p50", "p90")
 
 
 @pytest.fixture(scope="module")
@@ -42,12 +42,14 @@ def test_terminal_page_summary_and_status_agree(run, bag, tmp_path):
     for name, joint in record["joints"].items():
         told = joint["forecast"]
         assert told["answer"].startswith("from growth as it is")
-        words = [three_digits(told[unit][share]) for unit in ("hours", "days") for share in SHARES]
+        words = [three_digits(told[unit][fraction]) for unit in ("hours", "days") for fraction in FRACTIONS]
         assert [line.split()[1:] for line in lasting if line.startswith(f"{name} ")] == [words]
         assert re.search(r"\s*".join(f"<td[^>]*>{re.escape(word)}</td>" for word in words), page)
         assert joint["remaining"]["hours"] == told["hours"]["p50"]
         assert status[f"joint {name}"]["remaining_hours"] == told["hours"]["p50"]
-        assert [status[f"joint {name}"][f"{share}_days"] for share in SHARES] == list(told["days"].values())
+        assert [status[f"joint {name}"][f"{fraction}_days"] for fraction in FRACTIONS] == list(
+            told["days"].values()
+        )
         assert rows[name][0] == name
     assert [line.split()[0] for line in lasting if line.startswith("leg ")] == ["leg"]
     table = lasting[: next(i for i, line in enumerate(lasting) if line.startswith("hours of walking")) + 1]

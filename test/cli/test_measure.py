@@ -21,7 +21,7 @@ def ledger(tmp_path):
     path = tmp_path / "wear.ledger"
     leg, config = load_mechanism("bionic_leg"), MonitorConfig()
     kept = open_ledger(leg, attrs.evolve(config, ledger=attrs.evolve(config.ledger, path=str(path))))
-    joints = tuple(JointWear(name, np.full((2, 720), 3e-5), 4000, 4000.0) for name in leg.loose)
+    joints = tuple(JointWear(name, np.full((2, 720), 3e-5), 4000, 4000.0) for name in leg.clearance_joints)
     kept.keep(Entry(stamp_ns=10**9, joints=joints, totals={"cycles": 4e3, "moving_s": 4e3}), closed=True)
     kept.close()
     return path
@@ -54,12 +54,12 @@ def test_a_contradiction_ends_with_findings_and_leaves_wear_as_it_is(run, ledger
 @pytest.mark.parametrize(
     ("arguments", "fault"),
     [
-        (("Z", "0.4", "--sigma", "0.01"), "'Z' is no loose joint, expected one of A, B, G, I, J"),
+        (("Z", "0.4", "--sigma", "0.01"), "'Z' is no clearance joint, expected one of A, B, G, I, J"),
         (("A", "-1", "--sigma", "0.01"), "No such option"),
         (("A", "0.4", "--sigma", "0"), "0 is not above 0 mm"),
         (
             ("a", "0.4", "--sigma", "0.01"),
-            "'a' is no loose joint, expected one of A, B, G, I, J; did you mean A?",
+            "'a' is no clearance joint, expected one of A, B, G, I, J; did you mean A?",
         ),
         (
             ("A", "0.00042", "--sigma", "0.005"),

@@ -10,7 +10,7 @@ BROKEN = [
     ("limits: {clearence_m: 0.1}", ["limits.clearence_m", "did you mean limits.clearance_m?"]),
     ("limits: {clearance_m: 0.03}", ["limits.clearance_m: 0.03 m", "0.01 m, the radius of its bushing"]),
     ("limits: {joint_clearance_m: [6.0e-4, 6.0e-4, 0.06, 6.0e-4, 6.0e-4]}", ["joint G", "the radius"]),
-    ("loose_joints: [A, Q]", ["loose_joints", "'Q'", "bionic_leg.yaml", "A, B, C"]),
+    ("clearance_joints: [A, Q]", ["clearance_joints", "'Q'", "bionic_leg.yaml", "A, B, C"]),
     ("mechanism: bionic_log", ["bionic_log", "no mechanism of this name"]),
     ("mechanism: andrews", ["mechanism", "'andrews'", "driven by a torque"]),
     ("tracker: {reorder_window_s: 0.4, gap_limit_s: 0.3}", ["tracker.reorder_window_s", "0.4 s", "0.3 s"]),
@@ -34,11 +34,11 @@ def test_a_broken_parameter_file_is_one_line(run, complaints, tmp_path, text, sa
 @pytest.mark.plain
 def test_a_parameter_file_in_order_is_told_in_one_line(run, tmp_path):
     (tmp_path / "mine.yaml").write_text(
-        BEGIN + "{hardware_id: leg-7, loose_joints: [G], cadence.commanded_rpm: -30.0}"
+        BEGIN + "{hardware_id: leg-7, clearance_joints: [G], cadence.commanded_rpm: -30.0}"
     )
     result = run("check", "mine.yaml")
     assert (result.exit_code, result.stderr) == (0, "")
     (line,) = result.stdout.splitlines()
     assert line.startswith("mine.yaml")
-    for part in ("bionic_leg, G loose", "-30 rpm", "leg-7"):
+    for part in ("bionic_leg, clearance joints G", "-30 rpm", "leg-7"):
         assert part in line

@@ -16,7 +16,7 @@ TOP = [
 TORQUE = {"mean", "rms", "min", "max", "p99", "max_abs", "max_error"}
 TOE = {"max_position_error_m", "max_velocity_error_mps", "max_acceleration_error_mps2"}
 ANY_JOINT = {"mean_force_n", "rms_force_n", "p99_force_n", "max_force_n"}
-LOOSE_JOINT = ANY_JOINT | {
+CLEARANCE_JOINT = ANY_JOINT | {
     "contact_fraction", "friction_work_j_per_cycle", "archard_integral_j_per_cycle", "wear_depth_m_per_cycle",
     "wear_zone_deg", "clearance_m",
 }  # fmt: skip
@@ -50,7 +50,7 @@ def test_json_has_the_keys_of_the_contract_and_the_library_s_numbers(run):
     assert set(record["drive_torque_nm"]) == TORQUE
     assert set(record["toe"]) == TOE
     assert {name: set(joint) for name, joint in record["joints"].items()} == {
-        "A": ANY_JOINT, "B": LOOSE_JOINT, "C": LOOSE_JOINT, "D": ANY_JOINT
+        "A": ANY_JOINT, "B": CLEARANCE_JOINT, "C": CLEARANCE_JOINT, "D": ANY_JOINT
     }  # fmt: skip
     assert set(record["joints"]["B"]["wear_depth_m_per_cycle"]) == DEPTH
     assert set(record["joints"]["B"]["clearance_m"]) == {"mean", "max"}

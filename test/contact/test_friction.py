@@ -46,14 +46,14 @@ def test_ramps_rise_with_speed(law, load, slip, more):
 
 @given(slip=slips)
 def test_a_ramp_of_no_width_is_coulomb(slip):
-    share = ambrosio_ramp(abs(slip), V0, V0)
-    assert share == (0.0 if abs(slip) <= V0 else 1.0)
+    fraction = ambrosio_ramp(abs(slip), V0, V0)
+    assert fraction == (0.0 if abs(slip) <= V0 else 1.0)
 
 
 def test_published_points_of_the_ramps():
     """Ambrosio's is 0 up to v0, 1 from v1, half way half; Threlfall's reaches 95 % at v1."""
-    shares = [ambrosio_ramp(v, V0, V1) for v in (0.0, V0, 0.5 * (V0 + V1), V1, 1.0)]
-    assert shares == pytest.approx([0.0, 0.0, 0.5, 1.0, 1.0])
+    fractions = [ambrosio_ramp(v, V0, V1) for v in (0.0, V0, 0.5 * (V0 + V1), V1, 1.0)]
+    assert fractions == pytest.approx([0.0, 0.0, 0.5, 1.0, 1.0])
     assert threlfall_ramp(V1, V1) == pytest.approx(1.0 - math.exp(-3.0))
     assert threlfall_ramp(0.0, V1) == 0.0
 

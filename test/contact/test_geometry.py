@@ -33,10 +33,10 @@ def test_no_arc_without_contact(gap, clearance):
     assert contact_half_angle(gap * clearance * (1.0 - 1.0e-9), 0.01, 0.01 - clearance) == 0.0
 
 
-@given(share=st.floats(1.0e-6, 1.0), clearance=st.floats(1.0e-5, 1.0e-3))
-def test_the_two_circles_meet_at_the_ends_of_the_arc(share, clearance):
+@given(fraction=st.floats(1.0e-6, 1.0), clearance=st.floats(1.0e-5, 1.0e-3))
+def test_the_two_circles_meet_at_the_ends_of_the_arc(fraction, clearance):
     bushing, journal = 0.01, 0.01 - clearance
-    e = clearance * (1.0 + share)
+    e = clearance * (1.0 + fraction)
     psi = contact_half_angle(e, bushing, journal)
     distance = math.hypot(bushing * math.cos(psi) - e, bushing * math.sin(psi))
     assert distance == pytest.approx(journal, rel=1.0e-9)

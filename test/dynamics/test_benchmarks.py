@@ -1,11 +1,11 @@
-"""Published motions: Andrews' squeezing mechanism, and a slider-crank with a loose pin."""
+"""Published motions: Andrews' squeezing mechanism, and a slider-crank with clearance in the pin."""
 
 import numpy as np
 import pytest
 
 from leg_wear_monitor import load_mechanism
 from leg_wear_monitor.dynamics.full.run import FullRun
-from leg_wear_monitor.dynamics.run.run_statistics import POWER, new_tally
+from leg_wear_monitor.dynamics.run.run_statistics import POWER, new_run_statistics
 from leg_wear_monitor.dynamics.simulation import prepare
 from leg_wear_monitor.mechanism.ideal import one_cycle
 
@@ -35,10 +35,10 @@ ROTATION = 5000.0 * 2.0 * np.pi / 60.0
 @pytest.fixture(scope="module")
 def andrews():
     """The run at its end, and what it added up."""
-    run, tally = FullRun(prepare(load_mechanism("andrews")), tolerance_m=1.0e-11), new_tally(10)
+    run, statistics = FullRun(prepare(load_mechanism("andrews")), tolerance_m=1.0e-11), new_run_statistics(10)
     start = run.stored_energy
-    run.advance(0.03, tally)
-    return run, tally.drive_integral[POWER], run.stored_energy - start
+    run.advance(0.03, statistics)
+    return run, statistics.drive_integral[POWER], run.stored_energy - start
 
 
 def test_andrews_angles(andrews):
@@ -78,10 +78,13 @@ def test_slider_crank_without_clearance(linkage_of):
 
 
 def test_slider_crank_impacts():
-    run, tally = FullRun(prepare(load_mechanism("slider_crank")), tolerance_m=1.0e-12), new_tally(4)
-    run.advance(1.5e-3, tally)
-    assert tally.impacts[2] == len(IMPACTS)
-    for got, (begin, speed, end, peak) in zip(tally.impact[2], IMPACTS, strict=False):
+    run, statistics = (
+        FullRun(prepare(load_mechanism("slider_crank")), tolerance_m=1.0e-12),
+        new_run_statistics(4),
+    )
+    run.advance(1.5e-3, statistics)
+    assert statistics.impacts[2] == len(IMPACTS)
+    for got, (begin, speed, end, peak) in zip(statistics.impact[2], IMPACTS, strict=False):
         assert 1.0e3 * got[0] == pytest.approx(begin, abs=1.0e-3)
         assert got[1] == pytest.approx(speed, abs=1.0e-3)
         assert 1.0e3 * got[2] == pytest.approx(end, abs=1.0e-3)

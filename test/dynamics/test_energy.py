@@ -7,17 +7,17 @@ import pytest
 from leg_wear_monitor.dynamics.clearance.run import ClearanceRun
 from leg_wear_monitor.dynamics.full.run import FullRun
 from leg_wear_monitor.dynamics.result import energy_balance
-from leg_wear_monitor.dynamics.run.run_statistics import DISSIPATION, FRICTION, POWER, new_tally
+from leg_wear_monitor.dynamics.run.run_statistics import DISSIPATION, FRICTION, POWER, new_run_statistics
 from leg_wear_monitor.dynamics.simulation import prepare
 from leg_wear_monitor.mechanism.ideal import TURN, one_cycle
 from leg_wear_monitor.mechanism.loader import parse_mechanism
 from leg_wear_monitor.mechanism.spec import ConstantLoad, PhaseLoad
 
 
-@pytest.mark.parametrize("loose", ["G", "AB", "IJ", "ABGIJ"])
-def test_energy_with_clearances(leg_cycles, loose):
+@pytest.mark.parametrize("clearance_joints", ["G", "AB", "IJ", "ABGIJ"])
+def test_energy_with_clearances(leg_cycles, clearance_joints):
     """Every cycle, to a thousandth of what is lost in it: friction and contact together."""
-    for cycle in leg_cycles(loose, 20).cycles:
+    for cycle in leg_cycles(clearance_joints, 20).cycles:
         energy = cycle.energy
         assert energy["friction_loss"] > 0.0
         assert energy["contact_loss"] > 0.0
@@ -32,10 +32,10 @@ def test_walls_that_wear_away_take_energy_along(leg, model, cycles, bound):
         for name, c in leg.clearances.items()
     }
     run = model(prepare(attrs.evolve(leg, clearances=fast), clearances=tuple("ABGIJ"), wear=True))
-    run.advance(1.0, new_tally(len(leg.joints)))
-    tally, start = new_tally(len(leg.joints)), run.stored_energy
-    run.advance(1.0 + cycles, tally)
-    energy = energy_balance(tally, start, run.stored_energy)
+    run.advance(1.0, new_run_statistics(len(leg.joints)))
+    statistics, start = new_run_statistics(len(leg.joints)), run.stored_energy
+    run.advance(1.0 + cycles, statistics)
+    energy = energy_balance(statistics, start, run.stored_energy)
     losses = energy["friction_loss"] + energy["contact_loss"]
     assert energy["wear_loss"] > 4.0e-3 * losses
     assert abs(energy["residual"]) < bound * losses
@@ -49,28 +49,28 @@ LOADS = {
 }
 
 
-@pytest.mark.parametrize("loose", ["AB", "ABGIJ"])
+@pytest.mark.parametrize("clearance_joints", ["AB", "ABGIJ"])
 @pytest.mark.parametrize("load", LOADS)
-def test_energy_of_the_clearance_model_under_a_foot_load(leg, loose, load):
+def test_energy_of_the_clearance_model_under_a_foot_load(leg, clearance_joints, load):
     """The load does its work where the toe is, which the eccentricities move."""
     kind = PhaseLoad if load == "stance" else ConstantLoad
     pushed = attrs.evolve(leg, loads={"ground": kind(body="foot", point="toe", **LOADS[load])})
-    run = ClearanceRun(prepare(pushed, clearances=tuple(loose)))
-    run.advance(1.0, new_tally(len(leg.joints)))
-    tally, start = new_tally(len(leg.joints)), run.stored_energy
-    run.advance(7.0, tally)
-    energy = energy_balance(tally, start, run.stored_energy)
+    run = ClearanceRun(prepare(pushed, clearances=tuple(clearance_joints)))
+    run.advance(1.0, new_run_statistics(len(leg.joints)))
+    statistics, start = new_run_statistics(len(leg.joints)), run.stored_energy
+    run.advance(7.0, statistics)
+    energy = energy_balance(statistics, start, run.stored_energy)
     assert abs(energy["residual"]) < 3.0e-3 * (energy["friction_loss"] + energy["contact_loss"])
 
 
 def test_energy_of_the_ideal_leg(leg):
     """Over a cycle nothing is lost; 1e-9 of the work that goes in and out again at the drive."""
     setup = prepare(leg, clearances=())
-    run, tally = FullRun(setup, tolerance_m=1.0e-11), new_tally(len(leg.joints))
+    run, statistics = FullRun(setup, tolerance_m=1.0e-11), new_run_statistics(len(leg.joints))
     start = run.stored_energy
-    run.advance(1.0, tally)
+    run.advance(1.0, statistics)
     turned_over = TURN * np.abs(one_cycle(setup.linkage, 360, TURN).drive_torque).mean()
-    assert abs(tally.drive_integral[POWER] - (run.stored_energy - start)) < 1.0e-9 * turned_over
+    assert abs(statistics.drive_integral[POWER] - (run.stored_energy - start)) < 1.0e-9 * turned_over
 
 
 @pytest.mark.parametrize("clearances", [(), ("B",)])
@@ -84,12 +84,12 @@ def test_energy_of_a_torque_from_rest(document, clearances):
         "tip": {"body": "coupler", "point": "toe", "phase": [0.0, 0.5], "force": [[0, 4], [2, -6]]}
     }
     setup = prepare(parse_mechanism(four_bar, "four_bar"), clearances=clearances)
-    run, tally = FullRun(setup, tolerance_m=1.0e-10), new_tally(4)
+    run, statistics = FullRun(setup, tolerance_m=1.0e-10), new_run_statistics(4)
     start = run.stored_energy
-    run.advance(0.5, tally)
+    run.advance(0.5, statistics)
     assert run.q[1, 2] > TURN  # it has turned
-    stored, lost = run.stored_energy - start, tally.integral[:, [FRICTION, DISSIPATION]].sum()
-    assert tally.drive_integral[POWER] == pytest.approx(
+    stored, lost = run.stored_energy - start, statistics.integral[:, [FRICTION, DISSIPATION]].sum()
+    assert statistics.drive_integral[POWER] == pytest.approx(
         stored + lost, rel=1.0e-9 if not clearances else 1.0e-4
     )
 
@@ -102,6 +102,6 @@ def test_a_torque_speeds_up_a_crank_by_its_work(document):
     run = FullRun(prepare(parse_mechanism(four_bar, "four_bar"), clearances=()), tolerance_m=1.0e-11)
     assert not run.v.any()
     assert run.stored_energy == 0.0
-    run.advance(0.6, new_tally(4))
+    run.advance(0.6, new_run_statistics(4))
     assert run.q[1, 2] < -TURN
     assert run.stored_energy == pytest.approx(-0.4 * run.q[1, 2], rel=1.0e-9)

@@ -55,7 +55,7 @@ def test_what_is_counted(worn_leg):
 
 
 def test_impacts_follow_one_another(worn_leg):
-    for name in worn_leg.loose:
+    for name in worn_leg.clearance_joints:
         impacts = worn_leg.impacts[name]
         assert impacts
         ends = [impact["end_s"] for impact in impacts[:-1]]
@@ -66,7 +66,7 @@ def test_impacts_follow_one_another(worn_leg):
 
 
 def test_wear_is_archards_and_opens_the_clearance(leg, worn_leg):
-    for name in worn_leg.loose:
+    for name in worn_leg.clearance_joints:
         figures, settings = worn_leg.joints[name], leg.clearances[name]
         area = TURN * settings.bushing_radius * settings.width
         for side, k in zip(("bushing", "journal"), settings.wear_coefficient, strict=True):

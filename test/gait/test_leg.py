@@ -11,7 +11,7 @@ STOP = PaceConfig(times_s=(0.0, 0.3), speeds_rpm=(60.0, 0.0), ramp_s=0.3)
 
 
 def test_one_loose_joint_wears_as_in_the_simulation() -> None:
-    leg = SyntheticLeg(GaitConfig(loose_joints=("A",), wear_acceleration=1.0e4))
+    leg = SyntheticLeg(GaitConfig(clearance_joints=("A",), wear_acceleration=1.0e4))
     leg.advance(2.0)
     figures = simulate(load_mechanism("bionic_leg"), clearances=["A"], model="full", skip_cycles=0, cycles=2)
     depth = figures.joints["A"]["wear_depth_m_per_cycle"]
@@ -49,7 +49,7 @@ def test_the_truth_has_an_entry_a_cycle() -> None:
     leg.advance(2.5)
     truth = leg.truth()
     assert truth["cycle_end_s"] == pytest.approx([0.0, 1.0, 2.0], abs=0.01)
-    for name in leg.loose:
+    for name in leg.clearance_joints:
         column = truth["clearance_m"][name]
         assert len(column) == 4
         assert (np.diff(column) > 0.0).all()
@@ -76,13 +76,16 @@ def test_a_knock_opens_one_joint_at_its_time() -> None:
     leg.advance(0.24)
     assert leg.clearance_m() == pytest.approx(3.0e-4, rel=1e-3)
     leg.advance(0.26)
-    assert leg.clearance_m()[leg.loose.index("G")] == pytest.approx(1.0e-3, rel=1e-3)
+    assert leg.clearance_m()[leg.clearance_joints.index("G")] == pytest.approx(1.0e-3, rel=1e-3)
 
 
 @pytest.mark.parametrize(
     ("changes", "line"),
     [
-        ({"clearances_m": (1e-4,)}, "gait: clearances_m: has 1 values for the loose joints A, B, G, I, J"),
+        (
+            {"clearances_m": (1e-4,)},
+            "gait: clearances_m: has 1 values for the clearance joints A, B, G, I, J",
+        ),
         ({"knock": KnockConfig(joint="C")}, "gait: knock.joint: 'C' is none of A, B, G, I, J"),
         ({"mechanism": "no_leg"}, "no_leg: no mechanism of this name"),
         ({"mechanism": "slider_crank", "load": LoadConfig(toe_force_n=1.0)}, "gait: load.toe_force_n: slid"),

@@ -23,7 +23,7 @@ CLEAN = GaitConfig(
     torque_sensor=TorqueSensorConfig(noise_nm=0.0, resolution_nm=0.0),
     transport=TransportConfig(jitter_s=0.0),
 )
-SHARE = st.floats(0.0, 0.5)
+FRACTION = st.floats(0.0, 0.5)
 
 
 class EvenLeg:
@@ -77,17 +77,17 @@ def test_noise_has_the_deviation_asked_for() -> None:
 
 
 def test_equal_seeds_give_equal_readings_and_others_do_not() -> None:
-    noisy = GaitConfig(duration_s=0.5, transport=TransportConfig(drop_share=0.1, late_share=0.1))
+    noisy = GaitConfig(duration_s=0.5, transport=TransportConfig(drop_fraction=0.1, late_fraction=0.1))
     assert repr(heard(noisy)) == repr(heard(noisy))
     assert repr(heard(noisy)) != repr(heard(attrs.evolve(noisy, seed=1)))
 
 
-@given(SHARE, SHARE, SHARE, st.floats(0.0, 0.05))
+@given(FRACTION, FRACTION, FRACTION, st.floats(0.0, 0.05))
 @settings(max_examples=20)
 def test_they_arrive_in_order_and_none_is_made_up(
     drop: float, twice: float, late: float, late_s: float
 ) -> None:
-    got = heard(drop_share=drop, duplicate_share=twice, late_share=late, late_s=late_s)
+    got = heard(drop_fraction=drop, duplicate_fraction=twice, late_fraction=late, late_s=late_s)
     arrival = np.array([reading.arrival_s for reading in got])
     delay = arrival - np.array([reading.taken_s for reading in got])
     assert (np.diff(arrival) >= 0.0).all()
@@ -99,9 +99,9 @@ def test_they_arrive_in_order_and_none_is_made_up(
 
 def test_shares_are_met() -> None:
     whole = len(heard())
-    assert len(heard(drop_share=0.2)) == pytest.approx(0.8 * whole, rel=0.1)
-    assert len(heard(duplicate_share=0.2)) == pytest.approx(1.2 * whole, rel=0.1)
-    faulty = [reading.fault for reading in heard(fault_share=0.2) if reading.fault != NO_FAULT]
+    assert len(heard(drop_fraction=0.2)) == pytest.approx(0.8 * whole, rel=0.1)
+    assert len(heard(duplicate_fraction=0.2)) == pytest.approx(1.2 * whole, rel=0.1)
+    faulty = [reading.fault for reading in heard(fault_fraction=0.2) if reading.fault != NO_FAULT]
     assert len(faulty) == pytest.approx(0.2 * whole, rel=0.25)
     assert len(set(faulty)) > 5
 

@@ -12,7 +12,7 @@ from leg_wear_monitor.dynamics.batch.leg import Leg
 from leg_wear_monitor.dynamics.clearance.run import ClearanceStepper
 from leg_wear_monitor.dynamics.run.drive import steady_drive
 from leg_wear_monitor.dynamics.run.protocol import DONE
-from leg_wear_monitor.dynamics.run.run_statistics import new_tally
+from leg_wear_monitor.dynamics.run.run_statistics import new_run_statistics
 from leg_wear_monitor.dynamics.simulation import prepare
 from leg_wear_monitor.life import life as life_module
 from leg_wear_monitor.life.life import LifeRun, LifeSettings, simulate_life
@@ -89,7 +89,9 @@ def test_jumps_meet_every_single_cycle(leg):
     start = Leg(mechanism=leg, clearances=("A", "B"), crank_angle_rad=1.0)
     start.start(stepper)
     for cycle in range(1, cycles + 1):
-        status = stepper.advance(steady_drive(1.0, setup.speed), float(cycle), new_tally(len(leg.joints)))
+        status = stepper.advance(
+            steady_drive(1.0, setup.speed), float(cycle), new_run_statistics(len(leg.joints))
+        )
         assert status[0] == DONE
     every = setup.surfaces.depth.mean(axis=2).sum(axis=1)
     settings = LifeSettings(legs=2, cycles=5, jump=JumpControl(opens_m=2e-5))
@@ -140,5 +142,5 @@ def test_a_life_that_takes_too_many_jumps_says_so(lived, monkeypatch):
 
 
 def test_a_leg_without_loose_joints_has_no_life(leg):
-    with pytest.raises(ConfigError, match="no joint is loose"):
+    with pytest.raises(ConfigError, match="no joint has clearance"):
         LifeRun(leg, clearances=())

@@ -6,7 +6,7 @@ import pytest
 
 from leg_wear_monitor.dynamics.full.model import BAUMGARTE
 from leg_wear_monitor.dynamics.full.run import TOLERANCE_M, FullRun
-from leg_wear_monitor.dynamics.run.run_statistics import new_tally
+from leg_wear_monitor.dynamics.run.run_statistics import new_run_statistics
 from leg_wear_monitor.dynamics.simulation import prepare
 from leg_wear_monitor.mechanism.constraints import closures_at
 from leg_wear_monitor.mechanism.ideal import TURN, one_cycle
@@ -58,7 +58,7 @@ def test_a_mirrored_leg_moves_and_wears_mirrored(leg):
     for mechanism in (leg, _mirrored(leg)):
         setup = prepare(mechanism)
         run = FullRun(setup)
-        run.advance(0.3, new_tally(len(leg.joints)))
+        run.advance(0.3, new_run_statistics(len(leg.joints)))
         runs.append(run)
         surfaces.append(setup.surfaces.depth)
     flip = np.array([-1.0, 1.0, -1.0])
@@ -69,16 +69,16 @@ def test_a_mirrored_leg_moves_and_wears_mirrored(leg):
     np.testing.assert_allclose(surfaces[1][:, :, sector], surfaces[0], atol=1.0e-6 * surfaces[0].max())
 
 
-def _drift(leg, loose, seconds, baumgarte, tolerance_m=TOLERANCE_M):
+def _drift(leg, clearance_joints, seconds, baumgarte, tolerance_m=TOLERANCE_M):
     """Largest residual [m, rad] and its rate in each second of a run, looked at 100 times."""
-    setup = prepare(leg, clearances=loose)
-    run, tally = FullRun(setup, tolerance_m=tolerance_m), new_tally(len(leg.joints))
+    setup = prepare(leg, clearances=clearance_joints)
+    run, statistics = FullRun(setup, tolerance_m=tolerance_m), new_run_statistics(len(leg.joints))
     run.model = run.model._replace(baumgarte=baumgarte)
     rows, n = run.model.rows, len(run.q)
     phi, blocks, gamma = np.empty(len(rows.body)), np.zeros((len(rows.body), 2, 3)), np.empty(len(rows.body))
     cs, drift = np.empty((n, 2)), np.zeros((seconds, 2))
     for i in range(100 * seconds):
-        run.advance((i + 1) / 100.0, tally)
+        run.advance((i + 1) / 100.0, statistics)
         drive = np.array([TURN * run.time, TURN, 0.0])
         closures_at(run.model.arrays, rows, run.q, run.v, drive, cs, phi, blocks, gamma)
         phi_dot = dense_jacobian(rows, blocks, n) @ run.v[1:].ravel()
@@ -87,10 +87,10 @@ def _drift(leg, loose, seconds, baumgarte, tolerance_m=TOLERANCE_M):
     return drift
 
 
-@pytest.mark.parametrize("loose", ["", "ABGIJ"])
-def test_closures_stay_closed(leg, loose):
+@pytest.mark.parametrize("clearance_joints", ["", "ABGIJ"])
+def test_closures_stay_closed(leg, clearance_joints):
     """Below 1e-8 m and 1e-6 m/s over several cycles, without a trend."""
-    drift = _drift(leg, tuple(loose), 4, BAUMGARTE)
+    drift = _drift(leg, tuple(clearance_joints), 4, BAUMGARTE)
     assert (drift < [1.0e-8, 1.0e-6]).all()
     assert drift[-1, 0] < 3.0 * drift[0, 0]
 

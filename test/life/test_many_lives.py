@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 from leg_wear_monitor.life.life import LifeRun, LifeSettings
-from leg_wear_monitor.life.many_lives import LEAST_SHARE, spread_factors
+from leg_wear_monitor.life.many_lives import LEAST_FRACTION, spread_factors
 from leg_wear_monitor.life.result import life_of
 
 
@@ -23,11 +23,11 @@ def test_factors_make_up_for_what_joints_grow(begun):
     factors = np.array(list(islice(spread_factors(begun.life), 200)))
     ends = factors * opened / opened.max()
     np.testing.assert_allclose(ends.max(axis=1), 1.0)
-    assert ends.min() >= LEAST_SHARE
+    assert ends.min() >= LEAST_FRACTION
     # each joint is the first as often as the other, and the other's shares are spread evenly
     assert 0.45 < (ends[:, 0] == 1.0).mean() < 0.55
     others = np.sort(ends.min(axis=1))
-    assert np.abs(others - np.linspace(LEAST_SHARE, 1.0, 200)).max() < 0.05
+    assert np.abs(others - np.linspace(LEAST_FRACTION, 1.0, 200)).max() < 0.05
 
 
 def test_a_joint_that_is_held_wears_no_further_and_the_other_goes_on(begun):
@@ -36,4 +36,4 @@ def test_a_joint_that_is_held_wears_no_further_and_the_other_goes_on(begun):
     now = begun.jump().opened_m
     assert now[0] == was[0]
     assert now[1] > was[1]
-    assert life_of(begun.loose, begun.fresh_m, begun.points).growth_m_per_cycle[-1, 0] == 0.0
+    assert life_of(begun.clearance_joints, begun.fresh_m, begun.points).growth_m_per_cycle[-1, 0] == 0.0

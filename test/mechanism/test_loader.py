@@ -75,7 +75,7 @@ def test_all_that_come_with_the_package_load():
 def test_the_default_leg_is_the_bionic_one():
     leg = load_mechanism()
     assert leg.source == "bionic_leg.yaml"
-    assert leg.loose == ("A", "B", "G", "I", "J")
+    assert leg.clearance_joints == ("A", "B", "G", "I", "J")
     assert leg.sides("B") == ("thigh", "ground")
     assert leg.toe == ("foot", "toe")
     assert leg.clearances["A"] == Clearance(
@@ -117,7 +117,7 @@ def test_one_number_stands_for_bushing_and_journal(document):
 def test_a_joint_s_own_settings_go_over_the_defaults_friction_key_by_key(document):
     own = {"G": {"restitution": 0.8, "friction": {"coefficient": 0.2}}, "H": None}
     leg = parse_mechanism(changed(document("bionic_leg"), ("clearances", "joints"), own), "leg.yaml")
-    assert leg.loose == ("G", "H")
+    assert leg.clearance_joints == ("G", "H")
     assert leg.clearances["G"].restitution == 0.8
     assert leg.clearances["G"].friction == Friction(law="ambrosio", coefficient=0.2, ramp=(0.001, 0.01))
     assert leg.clearances["H"] == leg.clearances["A"]
@@ -125,7 +125,7 @@ def test_a_joint_s_own_settings_go_over_the_defaults_friction_key_by_key(documen
 
 def test_complete_defaults_serve_all_revolute_joints_and_only_those():
     crank = load_mechanism("slider_crank")
-    assert crank.loose == ("B",)
+    assert crank.clearance_joints == ("B",)
     assert list(crank.clearances) == ["O", "A", "B"]
     assert (crank.clearances["A"].stiffness, crank.clearances["B"].stiffness) == (None, 6.6102e10)
     assert isinstance(crank.joints["S"], PrismaticJoint)

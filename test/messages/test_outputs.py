@@ -41,7 +41,7 @@ from leg_wear_monitor.twin.sample import TORQUE as TORQUE_SAMPLE
 
 pytestmark = pytest.mark.plain
 
-LOOSE = ("A", "G")
+CLEARANCE_JOINTS = ("A", "G")
 
 
 @pytest.fixture(scope="module")
@@ -74,7 +74,7 @@ def reports() -> Reports:
 def sent(store: Any, reports: Reports) -> dict[str, list[Any]]:
     """Messages by the name of their topic, as rosbags reads them."""
     messages: dict[str, list[Any]] = {}
-    for outgoing in Messages(MonitorConfig(), LOOSE).of(reports):
+    for outgoing in Messages(MonitorConfig(), CLEARANCE_JOINTS).of(reports):
         assert len(outgoing.stamp_ns) == len(outgoing.messages)
         for stamp, row in zip(outgoing.stamp_ns.tolist(), outgoing.messages, strict=True):
             message = store.deserialize_cdr(row.tobytes(), outgoing.output.type)
@@ -97,7 +97,7 @@ def test_torque_is_of_all_samples_that_were_followed(sent: dict[str, list[Any]])
 
 def test_torque_is_about_the_axis_of_the_parameters(store: Any, reports: Reports) -> None:
     config = MonitorConfig(drive_torque=DriveTorque(axis="x"), publish_impact_forces=False)
-    (outgoing,) = Messages(config, LOOSE).of_samples(reports.samples)
+    (outgoing,) = Messages(config, CLEARANCE_JOINTS).of_samples(reports.samples)
     message = store.deserialize_cdr(outgoing.messages[0].tobytes(), outgoing.output.type)
     assert (message.wrench.torque.x, message.wrench.torque.z) == (1.5, 0.0)
 
@@ -127,7 +127,9 @@ def test_a_forecast_says_what_is_known(store: Any, reports: Reports) -> None:
     )
     cycle = reports.cycles[0]
     third = attrs.evolve(cycle.joints[1], joint="J", forecast=forecast)
-    raw = Messages(MonitorConfig(), LOOSE).forecast(attrs.evolve(cycle, joints=(*cycle.joints, third)))
+    raw = Messages(MonitorConfig(), CLEARANCE_JOINTS).forecast(
+        attrs.evolve(cycle, joints=(*cycle.joints, third))
+    )
     known, unknown, told = store.deserialize_cdr(raw, FORECAST.type).status
     assert {pair.key: pair.value for pair in known.values} == {
         "remaining_cycles": "1000000",
@@ -136,7 +138,7 @@ def test_a_forecast_says_what_is_known(store: Any, reports: Reports) -> None:
     assert not unknown.values
     assert told.message == Answer.KNOWN.value
     values = {pair.key: pair.value for pair in told.values}
-    assert [values[f"{share}_hours"] for share in ("p10", "p50", "p90")] == ["1", "2", "3"]
+    assert [values[f"{fraction}_hours"] for fraction in ("p10", "p50", "p90")] == ["1", "2", "3"]
     assert (values["clearance_p90_m"], values["measurements"]) == ("3", "2")
 
 
@@ -150,18 +152,18 @@ def test_the_leg_s_forecast_is_a_status_after_those_of_the_joints(store: Any, re
         first_probability={"A": 0.75, "G": 0.25},
         simulated_lives=9,
     )
-    raw = Messages(MonitorConfig(), LOOSE).forecast(attrs.evolve(reports.cycles[0], forecast=leg))
+    raw = Messages(MonitorConfig(), CLEARANCE_JOINTS).forecast(attrs.evolve(reports.cycles[0], forecast=leg))
     *joints, told = store.deserialize_cdr(raw, FORECAST.type).status
     assert [status.name.split(": ")[1] for status in joints] == ["forecast A", "forecast G"]
     assert (told.name, told.message) == ("leg_wear_monitor: forecast leg", Answer.KNOWN.value)
     values = {pair.key: pair.value for pair in told.values}
-    assert [values[f"{share}_cycles"] for share in ("p10", "p50", "p90")] == ["1", "2", "3"]
+    assert [values[f"{fraction}_cycles"] for fraction in ("p10", "p50", "p90")] == ["1", "2", "3"]
     assert (values["A_first_probability"], values["simulated_lives"]) == ("0.75", "9")
 
 
 def test_diagnostics_are_the_monitors_status(store: Any) -> None:
     told = (Status("input", Level.WARN, "look at: input_gaps", {"crank_rate_hz": 199.5}),)
-    raw = Messages(MonitorConfig(hardware_id="left"), LOOSE, node="monitor").diagnostics(7, told)
+    raw = Messages(MonitorConfig(hardware_id="left"), CLEARANCE_JOINTS, node="monitor").diagnostics(7, told)
     (status,) = store.deserialize_cdr(raw, DIAGNOSTICS.type).status
     assert (status.name, status.level, status.hardware_id) == ("monitor: input", 1, "left")
     assert [(pair.key, pair.value) for pair in status.values] == [("crank_rate_hz", "199.5")]
@@ -209,7 +211,7 @@ def test_a_replay_stands_in_for_the_node_beside_the_topic_of_the_crank(
 ) -> None:
     assert node_beside(topic) == node
     config = MonitorConfig().on_node(node)
-    raw = Messages(config, LOOSE, node).diagnostics(7, [Status("input", Level.OK, "", {})])
+    raw = Messages(config, CLEARANCE_JOINTS, node).diagnostics(7, [Status("input", Level.OK, "", {})])
     (status,) = store.deserialize_cdr(raw, DIAGNOSTICS.type).status
     assert status.name == f"{node[1:]}: input"
     assert status.hardware_id == (node[1:].rpartition("/")[0] or "leg")

@@ -13,7 +13,7 @@ from leg_wear_monitor.monitor.config.parameters import config_from
 @pytest.fixture
 def begin(leg, tmp_path):
     """Begin a run of a monitor on the ledger of this test."""
-    config = config_from({"ledger.path": str(tmp_path / "wear.ledger"), "loose_joints": ["G"]})
+    config = config_from({"ledger.path": str(tmp_path / "wear.ledger"), "clearance_joints": ["G"]})
     return lambda: WearMonitor(leg, config, open_ledger(leg, config))
 
 

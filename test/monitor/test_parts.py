@@ -8,7 +8,7 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from leg_wear_monitor.monitor.evaluation.evaluation_period import IDLE_LIMIT, Beats
+from leg_wear_monitor.monitor.evaluation.evaluation_period import IDLE_LIMIT, EvaluationPeriods
 from leg_wear_monitor.monitor.inputs.health import TorqueRange, with_torques
 from leg_wear_monitor.monitor.spans import NEIGHBOURS_NS, is_within, with_span
 from leg_wear_monitor.twin.sample import EMPTY, GAIT_SAMPLE, TORQUE, gait_samples
@@ -24,11 +24,11 @@ def stream(stamps):
     return samples
 
 
-def ends(beats, blocks):
+def ends(evaluation_periods, blocks):
     """Indices after which beats end."""
     found, at = [], 0
     for block in blocks:
-        for piece, is_end in beats.pieces(block):
+        for piece, is_end in evaluation_periods.pieces(block):
             at += len(piece)
             if is_end:
                 found.append(at)
@@ -38,14 +38,17 @@ def ends(beats, blocks):
 @given(st.lists(st.integers(-5, 20_000), max_size=400), st.lists(st.integers(0, 400), max_size=8))
 def test_beats_are_where_they_are_however_blocks_are_cut(stamps, cuts):
     samples = stream(stamps)
-    whole = ends(Beats(LENGTH), [samples])
-    assert ends(Beats(LENGTH), np.split(samples, sorted(min(cut, len(samples)) for cut in cuts))) == whole
+    whole = ends(EvaluationPeriods(LENGTH), [samples])
+    assert (
+        ends(EvaluationPeriods(LENGTH), np.split(samples, sorted(min(cut, len(samples)) for cut in cuts)))
+        == whole
+    )
 
 
 @given(st.integers(1, 10**15), st.integers(1, LENGTH))
 def test_an_even_stream_has_even_beats(begin, step):
     samples = stream(begin + step * np.arange(5 * LENGTH // step + 10))
-    found = np.diff([0, *ends(Beats(LENGTH), [samples])])
+    found = np.diff([0, *ends(EvaluationPeriods(LENGTH), [samples])])
     assert len(found) >= 2
     assert np.ptp(found[1:]) == 0
     assert abs(found[1] * step - LENGTH) <= 2 * step
@@ -56,12 +59,12 @@ def test_one_stray_stamp_ends_no_beat(at, off):
     even = stream(10**16 + 10 * np.arange(400))
     strayed = even.copy()
     strayed["stamp_ns"][at] += off
-    assert ends(Beats(LENGTH), [strayed]) == ends(Beats(LENGTH), [even])
+    assert ends(EvaluationPeriods(LENGTH), [strayed]) == ends(EvaluationPeriods(LENGTH), [even])
 
 
 @pytest.mark.parametrize("stamps", [[0] * 500, [-1] * 500, [10**9] * 500, [2**63 - 1] * 500])
 def test_a_stream_without_time_has_beats_too(stamps):
-    assert len(ends(Beats(LENGTH), [stream(stamps)])) >= len(stamps) // IDLE_LIMIT - 1
+    assert len(ends(EvaluationPeriods(LENGTH), [stream(stamps)])) >= len(stamps) // IDLE_LIMIT - 1
 
 
 pairs = st.tuples(st.integers(0, 10**12), st.integers(0, 10**11)).map(lambda pair: (pair[0], sum(pair)))
@@ -124,9 +127,9 @@ def test_torques_are_counted_the_same_however_they_are_cut(values, cuts):
 
 
 def test_how_much_torque_is_stuck():
-    assert torque_range([3.0] * 20).stuck_share == 1.0
-    assert torque_range(np.arange(20.0)).stuck_share == 0.0
-    assert torque_range(np.clip(np.arange(20.0), 4.5, 100.0)).stuck_share == 5 / 20
-    assert torque_range(np.arange(20.0), saturation_nm=15.0).stuck_share == 5 / 20
-    assert math.isnan(torque_range([3.0] * 5).stuck_share)
+    assert torque_range([3.0] * 20).stuck_fraction == 1.0
+    assert torque_range(np.arange(20.0)).stuck_fraction == 0.0
+    assert torque_range(np.clip(np.arange(20.0), 4.5, 100.0)).stuck_fraction == 5 / 20
+    assert torque_range(np.arange(20.0), saturation_nm=15.0).stuck_fraction == 5 / 20
+    assert math.isnan(torque_range([3.0] * 5).stuck_fraction)
     assert with_torques(TorqueRange(), gait_samples([1], TORQUE, torque_nm=1.0, fault=EMPTY), 0.0).number == 0

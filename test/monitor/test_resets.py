@@ -16,7 +16,7 @@ START_NS = 1_700_000_000_123_456_789
 @pytest.fixture
 def begin(leg, tmp_path):
     """Begin a run of a monitor on the ledger of this test."""
-    config = config_from({"ledger.path": str(tmp_path / "wear.ledger"), "loose_joints": ["A", "G"]})
+    config = config_from({"ledger.path": str(tmp_path / "wear.ledger"), "clearance_joints": ["A", "G"]})
     return lambda: WearMonitor(leg, config, open_ledger(leg, config))
 
 
@@ -29,13 +29,15 @@ def test_wear_before_and_since_a_reset_is_of_one_part_once_it_is_taken_back(begi
     since = monitor.wear_of("G")
     assert since.replaced_ns == START_NS
     assert (since.depth > 0.0).any()
-    others = np.delete(monitor.wear_depth_m, monitor.loose.index("G"), axis=0)
+    others = np.delete(monitor.wear_depth_m, monitor.clearance_joints.index("G"), axis=0)
     now = monitor.undo_reset("G", START_NS + 7, "bob")
     assert np.array_equal(now.depth, worn.depth + since.depth)
     assert now.cycles == worn.cycles + since.cycles
     assert now.moving_s == pytest.approx(worn.moving_s + since.moving_s, abs=1e-9)
     assert now.replaced_ns == worn.replaced_ns == 0
-    assert np.array_equal(np.delete(monitor.wear_depth_m, monitor.loose.index("G"), axis=0), others)
+    assert np.array_equal(
+        np.delete(monitor.wear_depth_m, monitor.clearance_joints.index("G"), axis=0), others
+    )
     with pytest.raises(LegWearError, match="joint G: the ledger has no reset that was not taken back"):
         monitor.undo_reset("G", START_NS + 8, "bob")
     monitor.close()
@@ -49,7 +51,7 @@ def test_wear_before_and_since_a_reset_is_of_one_part_once_it_is_taken_back(begi
 
 
 def test_without_a_ledger_there_is_nothing_to_take_back(leg) -> None:
-    monitor = WearMonitor(leg, config_from({"loose_joints": ["G"]}))
+    monitor = WearMonitor(leg, config_from({"clearance_joints": ["G"]}))
     monitor.reset_wear("G", START_NS, "ann")
     with pytest.raises(LegWearError, match="no ledger is kept"):
         monitor.undo_reset("G", START_NS, "ann")

@@ -74,7 +74,9 @@ def test_a_gait_cycle_is_reported_as_the_twin_saw_it(monitor, gait):
     assert [cycle.cycle for cycle in reports.cycles] == list(range(1, 14))
     last = reports.cycles[-1]
     assert last.cadence_rpm == pytest.approx(60.0, abs=0.1)
-    assert [joint.joint for joint in last.joints] == list(monitor.loose) == ["A", "B", "G", "I", "J"]
+    assert (
+        [joint.joint for joint in last.joints] == list(monitor.clearance_joints) == ["A", "B", "G", "I", "J"]
+    )
     for joint in last.joints:
         assert joint.clearance_m > 3.0e-4
         assert joint.growth_m_per_cycle > 0.0
@@ -166,7 +168,7 @@ def test_a_reset_gives_fresh_surfaces_to_one_joint(monitor, gait):
     growth = {joint.joint: joint.growth_m_per_cycle for joint in cycle.joints}
     assert growth["G"] is None  # of the new part there is not enough data
     assert growth["A"] is not None
-    with pytest.raises(LegWearError, match=r"C: no loose joint, expected one of A, B, G, I, J"):
+    with pytest.raises(LegWearError, match=r"C: no clearance joint, expected one of A, B, G, I, J"):
         monitor.reset_wear("C", START, "ann")
 
 
@@ -196,7 +198,7 @@ def test_limits_change_while_it_runs(monitor, gait):
     reports = monitor.update(gait(2.0, begin_s=3.0))
     assert {
         alarm.subject for alarm in reports.alarms[-1].alarms if alarm.kind == "clearance" and alarm.level
-    } == {*monitor.loose}
+    } == {*monitor.clearance_joints}
 
 
 def test_limits_that_are_not_one_a_joint_change_nothing(monitor):

@@ -93,7 +93,7 @@ def test_a_replay_reports_bit_for_bit_what_the_monitor_reported_live(
 ) -> None:
     config = lw.MonitorConfig()
     monitor, decoder = lw.WearMonitor(leg, config), Decoder(config)
-    messages = Messages(config, monitor.loose)
+    messages = Messages(config, monitor.clearance_joints)
     live: dict[str, list[bytes]] = {}
     forecasts: list[bytes] = []
     times = ForecastTimes()
@@ -145,7 +145,7 @@ def test_the_summary_is_plain_json_and_tells_of_every_joint(out: tuple[Path, Any
     assert record["cycles"] == len(result.history) >= CYCLES
     assert record["recording"]["crank_samples"] == record["recording"]["torque_samples"] == SECONDS * RATE_HZ
     assert not record["recording"]["is_partial"] and not record["recording"]["findings"]
-    assert set(record["joints"]) == set(result.monitor.loose) == set(record["wear_depth_m"])
+    assert set(record["joints"]) == set(result.monitor.clearance_joints) == set(record["wear_depth_m"])
     for name, joint in record["joints"].items():
         opened = joint["clearance_m"]["last"] - joint["clearance_m"]["first"]
         assert 0.0 < opened < 1.0e-6
@@ -189,7 +189,7 @@ def test_the_page_says_how_long_the_leg_lasts(out: tuple[Path, Any]) -> None:
     record = {**summary(out[1], 2.0), "made_with": {}}
     life = {"p10": 700.0, "p50": 1000.0, "p90": 17532.0}
     first = dict.fromkeys(record["joints"], 0.1) | {"G": 0.6}
-    days = {share: hours / 8.0 for share, hours in life.items()}
+    days = {fraction: hours / 8.0 for fraction, hours in life.items()}
     leg = {**record["forecast"], "hours": life, "days": days, "first_probability": first, "first": "G"}
     html = page_html(replay_page({**record, "forecast": leg}))
     assert "The leg lasts 1000 hours of walking or 125 days (p10 700 hours of walking or 87.5 days, " in html
@@ -202,7 +202,7 @@ def test_the_page_shows_where_measured_clearances_lay_in_what_was_expected(out: 
     from leg_wear_monitor.report.page import page_html
     from leg_wear_monitor.report.replay.page import replay_page
 
-    looked = [Measurement(7, "A", "ann", 3e-4, 1e-6, 0.0, 9, 0, share, True) for share in (0.2, 0.6)]
+    looked = [Measurement(7, "A", "ann", 3e-4, 1e-6, 0.0, 9, 0, fraction, True) for fraction in (0.2, 0.6)]
     record = {**summary(out[1], 2.0), "made_with": {}}
     without = page_html(replay_page(record))
     html = page_html(replay_page({**record, "measurements": [attrs.asdict(each) for each in looked]}))
@@ -257,8 +257,8 @@ def test_a_replay_that_is_cut_off_is_not_in_the_ledger_and_comes_out_the_same_wh
     class CutError(Exception):
         pass
 
-    def cut(share: float) -> None:
-        if share > 0.6:
+    def cut(fraction: float) -> None:
+        if fraction > 0.6:
             raise CutError
 
     whole = lw.replay(bag, lw.MonitorConfig(), ledger=tmp_path / "whole.db", out=tmp_path / "whole")
@@ -299,9 +299,9 @@ def test_a_recording_is_not_written_over_by_its_own_reports(bag: Path, tmp_path:
 
 
 def test_progress_goes_from_little_to_all(bag: Path) -> None:
-    shares: list[float] = []
-    lw.replay(bag, lw.MonitorConfig(), progress=shares.append)
-    assert shares == sorted(shares) and shares[-1] == 1.0
+    fractions: list[float] = []
+    lw.replay(bag, lw.MonitorConfig(), progress=fractions.append)
+    assert fractions == sorted(fractions) and fractions[-1] == 1.0
 
 
 def test_a_recording_of_another_crank_is_refused(bag: Path) -> None:

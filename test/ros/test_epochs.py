@@ -103,7 +103,7 @@ def walked(ledger: Path, monkeypatch: pytest.MonkeyPatch, now_ns: int) -> tuple[
     monkeypatch.setattr(MonitorNode, "_ros_now_ns", lambda self: now_ns)
     context = rclpy.Context()
     rclpy.init(args=["--ros-args", "--log-level", "fatal"], context=context)
-    parameters = {"ledger.path": str(ledger), "loose_joints": ["G"], "clearances_m": [3.0e-4]}
+    parameters = {"ledger.path": str(ledger), "clearance_joints": ["G"], "clearances_m": [3.0e-4]}
     overrides = [Parameter(name, value=value) for name, value in parameters.items()]
     try:
         node = MonitorNode(context=context, parameter_overrides=overrides)

@@ -102,7 +102,7 @@ def are_one_number_a_value(diagnostics: list[DiagnosticArray]) -> None:
 
 
 def draws_the_leg(drawn: MarkerArray) -> None:
-    """Seven bodies and five loose joints, A and B on the hip's axis."""
+    """Seven bodies and five clearance joints, A and B on the hip's axis."""
     lines, *joints = drawn.markers
     assert len(lines.points) == 2 * (1 + 2 + 2 + 1 + 2 + 2 + 1)
     assert [marker.id for marker in joints] == [0, 1, 2, 3, 4]
@@ -195,7 +195,9 @@ def test_an_impact_beyond_the_limit_raises_its_alarm_within_a_gait_cycle(stage) 
     pace = PaceConfig(times_s=(0.0, 3.0), speeds_rpm=(60.0, 80.0))
     walk = stage.walk(PublisherConfig(duration_s=5.5, pace=pace))
     limit = 7000.0
-    monitor = stage.monitor(limits__impact_force_n=limit, limits__warn_share=1.0, cadence__tolerance_rpm=50.0)
+    monitor = stage.monitor(
+        limits__impact_force_n=limit, limits__warn_fraction=1.0, cadence__tolerance_rpm=50.0
+    )
     alarms = stage.listen(f"{ME}/alarms", DiagnosticArray, latched=True)
     peaks = stage.listen(f"{ME}/clearance_states", JointState)
     stage.legs().play(walk, monitor)
@@ -240,7 +242,7 @@ def groups_of(status: str) -> list[str]:
 
 
 def test_malformed_messages_are_counted_and_harm_nothing(stage) -> None:
-    walk = stage.walk(PublisherConfig(duration_s=3.0, transport=TransportConfig(fault_share=0.2)))
+    walk = stage.walk(PublisherConfig(duration_s=3.0, transport=TransportConfig(fault_fraction=0.2)))
     monitor = stage.monitor(alarms__on_delay_cycles=1)
     stage.legs().play(walk, monitor)
     lost = monitor.node.monitor.lost
@@ -265,7 +267,7 @@ def published(path: Path) -> dict[str, list[bytes]]:
 
 def replayed_from(path: Path, monitor: WearMonitor) -> dict[str, list[bytes]]:
     config = monitor.config
-    messages = Messages(config, monitor.loose)
+    messages = Messages(config, monitor.clearance_joints)
     found: dict[str, list[bytes]] = {}
     with Recording([path], config) as recording:
         blocks = (block.samples for block in recording.blocks())

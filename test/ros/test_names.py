@@ -20,7 +20,7 @@ def hardware(namespace: str, **parameters: Any) -> str:
     """Hardware id of a node that is made and taken down."""
     context = rclpy.Context()
     rclpy.init(args=["--ros-args", "--log-level", "fatal"], context=context)
-    parameters |= {"loose_joints": ["G"]}  # one is made sooner than five
+    parameters |= {"clearance_joints": ["G"]}  # one is made sooner than five
     overrides = [Parameter(name.replace("__", "."), value=value) for name, value in parameters.items()]
     try:
         node = MonitorNode(context=context, namespace=namespace, parameter_overrides=overrides)

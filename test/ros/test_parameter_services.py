@@ -95,7 +95,7 @@ def test_a_dump_starts_the_same_monitor_and_is_read_by_replay(
     shared_stage, node, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     tree = dumped(shared_stage)
-    assert tree["loose_joints"] == []
+    assert tree["clearance_joints"] == []
     assert tree["encoders"]["names"] == ["knee"]
     tree["limits"]["clearance_m"] = 5.0e-4
     path = written(tree, tmp_path / "dump.yaml")
@@ -157,7 +157,7 @@ def test_the_clock_is_kept_while_the_node_runs(shared_stage, node) -> None:
     assert not node.get_clock().ros_time_is_active
 
 
-@pytest.mark.parametrize("text", ["loose_joints:=[]", "limits.joint_clearance_m:=[]", "clearances_m:=[]"])
+@pytest.mark.parametrize("text", ["clearance_joints:=[]", "limits.joint_clearance_m:=[]", "clearances_m:=[]"])
 def test_an_empty_list_on_the_command_line_is_an_empty_list(text: str) -> None:
     context = rclpy.Context()
     rclpy.init(args=["--ros-args", "-p", text], context=context)

@@ -32,7 +32,7 @@ def test_without_a_clock_nothing_is_reset(monkeypatch: pytest.MonkeyPatch) -> No
     context = rclpy.Context()
     rclpy.init(args=["--ros-args", "--log-level", "fatal"], context=context)
     try:
-        overrides = [Parameter("use_sim_time", value=True), Parameter("loose_joints", value=["G"])]
+        overrides = [Parameter("use_sim_time", value=True), Parameter("clearance_joints", value=["G"])]
         node = MonitorNode(context=context, parameter_overrides=overrides)
         for act in (node._reset_wear, node._reset_wear, node._undo_reset):
             with pytest.raises(LegWearError, match="no time to note in the ledger: use_sim_time"):

@@ -35,7 +35,7 @@ def test_a_node_may_do_what_it_does_and_nothing_else(
     monkeypatch.setattr(MonitorNode, "_compile", lambda self, decoder: None)
     context = rclpy.Context()
     rclpy.init(args=["--ros-args", "--log-level", "fatal"], context=context)
-    overrides = [Parameter("use_sim_time", value=True), Parameter("loose_joints", value=["G"])]
+    overrides = [Parameter("use_sim_time", value=True), Parameter("clearance_joints", value=["G"])]
     try:
         node = make(context=context, parameter_overrides=overrides)
         name = node.get_name()

@@ -21,7 +21,7 @@ from leg_wear_monitor.messages.decode import Decoder
 from leg_wear_monitor.monitor.alarms.alarm import Alarm, Level
 from leg_wear_monitor.monitor.config.settings import MonitorConfig
 from leg_wear_monitor.monitor.reports import AlarmList, Status
-from leg_wear_monitor.ros.health.clock_watch import ClockWatch, both_clocks
+from leg_wear_monitor.ros.health.clock_monitor import ClockMonitor, both_clocks
 from leg_wear_monitor.ros.health.node_alarms import NodeAlarms
 from leg_wear_monitor.ros.health.node_log import AlarmLog, StatusLog
 from leg_wear_monitor.ros.health.silence import CRANK, TORQUE, Silence
@@ -180,20 +180,20 @@ def test_a_fault_of_the_node_is_logged_once_and_its_end_too() -> None:
 def test_alarms_of_the_node_are_listed_while_they_are_raised_and_acknowledged_like_others() -> None:
     node, monitors = NodeAlarms((CRANK, TORQUE)), listed(Alarm(kind="input_sources"))
     assert node.beside(monitors) is monitors
-    assert node.judge({"input_silence crank": 2.5, "input_sources": 2.0}, NOON_NS)
-    assert not node.judge({"input_silence crank": 3.5, "input_sources": 2.0}, NOON_NS)
+    assert node.evaluate({"input_silence crank": 2.5, "input_sources": 2.0}, NOON_NS)
+    assert not node.evaluate({"input_silence crank": 3.5, "input_sources": 2.0}, NOON_NS)
     shown = {alarm.name: alarm for alarm in node.beside(monitors).alarms}
     assert set(shown) == {"input_sources", "input_silence crank"}
     assert (shown["input_silence crank"].level, shown["input_silence crank"].value) == (Level.ERROR, 3.5)
     assert (shown["input_sources"].level, shown["input_sources"].value) == (Level.ERROR, 2.0)
-    node.judge({"input_silence crank": 0.0, "input_sources": 2.0}, NOON_NS)
+    node.evaluate({"input_silence crank": 0.0, "input_sources": 2.0}, NOON_NS)
     cleared, kept = node.acknowledge()
     assert [alarm.name for alarm in cleared] == ["input_silence crank"]
     assert [alarm.name for alarm in kept] == ["input_sources"]
 
 
 def test_a_clock_that_stands_or_is_set_back_is_told() -> None:
-    watch = ClockWatch()
+    watch = ClockMonitor()
     assert watch.status(0, SECOND, True).message == "use_sim_time is set and nobody publishes /clock"
     assert watch.status(7, 2 * SECOND, True).level is Level.OK
     stands = watch.status(7, 4 * SECOND, True)

@@ -20,7 +20,10 @@ pytestmark = pytest.mark.plain
 
 def result(_task, _mechanism, settings, _code):
     """In place of a computation: something that depends on the settings."""
-    return {"clearance_m": np.array([settings["clearance_m"]]), "loose": np.array(settings["loose"])}
+    return {
+        "clearance_m": np.array([settings["clearance_m"]]),
+        "clearance_joints": np.array(settings["clearance_joints"]),
+    }
 
 
 @pytest.fixture(scope="module")
@@ -82,7 +85,7 @@ ALTERED = {
     "copied": (lambda first, second: shutil.copy(second, first), "is the result of another point"),
     "a value": (lambda first, _: rewritten(first, grow), "was altered after it was computed"),
     "its settings": (lambda first, _: rewritten(first, add_to_about), "was altered after it was computed"),
-    "an array less": (lambda first, _: rewritten(first, lambda a: a.pop("loose")), "was altered"),
+    "an array less": (lambda first, _: rewritten(first, lambda a: a.pop("clearance_joints")), "was altered"),
     "nothing about it": (lambda first, _: rewritten(first, lambda a: a.pop("about")), "cannot be read"),
     "no object": (lambda first, _: rewritten(first, lambda a: a.update(about=np.array("[]"))), "cannot be"),
     "cut": (lambda first, _: first.write_bytes(first.read_bytes()[:-40]), "cannot be read"),

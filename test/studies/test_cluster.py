@@ -45,8 +45,8 @@ def test_a_cluster_gives_the_same_results_though_a_worker_is_killed(tiny, tmp_pa
     assert run_study("size", settings, here) == 6
     with cluster(tmp_path) as (address, workers):
 
-        def kill_one_midway(share):
-            if share > 0.3 and workers[0].poll() is None:
+        def kill_one_midway(fraction):
+            if fraction > 0.3 and workers[0].poll() is None:
                 os.kill(workers[0].pid, signal.SIGKILL)
 
         computed = run_study("size", settings, there, scheduler=address, progress=kill_one_midway)

@@ -9,19 +9,20 @@ from hypothesis import strategies as st
 from leg_wear_monitor import load_mechanism
 from leg_wear_monitor.errors import SimulationError
 from leg_wear_monitor.life.life import LifeRun, LifeSettings, simulate_life
-from leg_wear_monitor.studies.tasks.life import STATES, between, live
+from leg_wear_monitor.studies.tasks.life import STATES, between, wear_life
 from leg_wear_monitor.wear.cycle_jump import JumpControl
 from leg_wear_monitor.wear.surfaces import BUSHING
 
 SETTINGS = {
-    "loose": ["I", "J"], "clearance_m": 3.0e-4, "speed_rpm": 60.0, "perturb_share": 0.3, "seed": 1,
+    "clearance_joints": ["I", "J"], "clearance_m": 3.0e-4, "speed_rpm": 60.0, "perturb_fraction": 0.3,
+    "seed": 1,
     "opens_m": 1.0e-5, "jump_m": 1.0e-5, "cycles": 2, "runs": 2,
 }  # fmt: skip
 
 
 @pytest.fixture(scope="module")
 def lives():
-    return live(load_mechanism(), SETTINGS)
+    return wear_life(load_mechanism(), SETTINGS)
 
 
 def test_the_fastest_joint_opens_by_equal_steps_to_the_end_that_was_asked_for(lives):
@@ -46,7 +47,7 @@ def test_what_has_worn_is_the_wear_of_a_cycle_repeated(lives):
 def test_runs_are_lives_that_differ_in_where_they_start(lives):
     """The first is the one that anybody simulates with its settings."""
     control = JumpControl(opens_m=1.0e-5, tolerance_m=1.0e-6)
-    settings = LifeSettings(legs=1, cycles=2, perturb_share=0.3, jump=control, seed=1)
+    settings = LifeSettings(legs=1, cycles=2, perturb_fraction=0.3, jump=control, seed=1)
     run = LifeRun(load_mechanism(), settings, clearances=("I", "J"), clearance_m=3.0e-4, speed_rpm=60.0)
     life = simulate_life(run, limit_m=3.1e-4, horizon_cycles=1.0e12)
     ends = [life.cycles_to(k, 3.1e-4) for k in range(2)]
@@ -67,7 +68,7 @@ def test_joints_that_do_not_wear_have_no_life():
         name: attrs.evolve(own, wear_coefficient=(0.0, 0.0)) for name, own in leg.clearances.items()
     }
     with pytest.raises(SimulationError, match="none of I, J wears"):
-        live(attrs.evolve(leg, clearances=clearances), SETTINGS)
+        wear_life(attrs.evolve(leg, clearances=clearances), SETTINGS)
 
 
 @pytest.mark.plain

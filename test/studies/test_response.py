@@ -7,30 +7,36 @@ from leg_wear_monitor import load_mechanism
 from leg_wear_monitor.dynamics.clearance.run import ClearanceStepper
 from leg_wear_monitor.dynamics.full.run import FullRun
 from leg_wear_monitor.dynamics.run.drive import steady_drive
-from leg_wear_monitor.dynamics.run.run_statistics import TORQUE_ERROR, new_tally
+from leg_wear_monitor.dynamics.run.run_statistics import TORQUE_ERROR, new_run_statistics
 from leg_wear_monitor.dynamics.simulation import prepare
 from leg_wear_monitor.mechanism.ideal import TURN
-from leg_wear_monitor.studies.summary import RANGES, share_of_range
+from leg_wear_monitor.studies.summary import RANGES, fraction_of_range
 from leg_wear_monitor.studies.tasks.ensemble import ensemble, start_angles, watch
 from leg_wear_monitor.studies.tasks.grid import SAMPLES
-from leg_wear_monitor.studies.tasks.response import ERRORS, respond
+from leg_wear_monitor.studies.tasks.response import ERRORS, run_ensemble
 from leg_wear_monitor.wear.surfaces import BUSHING
 
-PLACE = {"loose": ["G"], "clearance_m": 3.0e-4, "speed_rpm": 60.0, "perturb_share": 0.3, "seed": 1}
+PLACE = {
+    "clearance_joints": ["G"],
+    "clearance_m": 3.0e-4,
+    "speed_rpm": 60.0,
+    "perturb_fraction": 0.3,
+    "seed": 1,
+}
 SHORT = {"runs": 3, "cycles": 3, "skip_cycles": 1, "traced_cycles": 2}
 
 
 @pytest.fixture(scope="module")
 def response():
-    return respond(load_mechanism(), PLACE | SHORT)
+    return run_ensemble(load_mechanism(), PLACE | SHORT)
 
 
 def test_without_clearance_the_curves_are_the_ideal_ones():
     """Every error falls with the clearance, down to a ten-thousandth of a millimetre and the step's error."""
     errors, forces = [], []
     for clearance in (1.0e-5, 1.0e-6, 1.0e-7):
-        arrays = respond(load_mechanism(), PLACE | SHORT | {"clearance_m": clearance})
-        errors.append([share_of_range(arrays, name) for name in RANGES])
+        arrays = run_ensemble(load_mechanism(), PLACE | SHORT | {"clearance_m": clearance})
+        errors.append([fraction_of_range(arrays, name) for name in RANGES])
         force = np.linalg.norm(arrays["example_contact_force_n"][:, 0], axis=1)
         ideal = arrays["ideal_joint_force_n"][:, 6]
         forces.append(np.sqrt(np.mean((force - ideal) ** 2) / np.mean(ideal**2)))
@@ -56,16 +62,16 @@ def test_curves_stay_within_the_largest_errors(response):
 def test_a_fine_curve_reaches_the_largest_torque():
     """Looked at every 30 us, the drive torque departs from the ideal leg's as far as the tally says."""
     (leg,) = watch(ensemble(load_mechanism(), PLACE | {"runs": 1}))
-    turn, drive, tally = 2**15, steady_drive(0.0, TURN), new_tally(10)
+    turn, drive, statistics = 2**15, steady_drive(0.0, TURN), new_run_statistics(10)
     leg.stepper = ClearanceStepper(leg.setup, interval_s=1.0 / turn)
     leg.stepper.init(0.0, TURN)
-    leg.stepper.advance(drive, 0.02, new_tally(10))
+    leg.stepper.advance(drive, 0.02, new_run_statistics(10))
     begin, errors = round(leg.stepper.time * turn), []
     for i in range(begin, begin + turn // 8):
         errors.append(abs(leg.look().torque - leg.stepper.work.now.torque_0[0]))
-        leg.stepper.advance(drive, (i + 1) / turn, tally)
-    assert tally.impacts.sum() > 0
-    assert 0.99 < max(errors) / tally.response[TORQUE_ERROR] < 1.001
+        leg.stepper.advance(drive, (i + 1) / turn, statistics)
+    assert statistics.impacts.sum() > 0
+    assert 0.99 < max(errors) / statistics.response[TORQUE_ERROR] < 1.001
 
 
 def test_toe_moves_as_its_deviations_say(response):
@@ -107,14 +113,14 @@ def test_wear_is_what_the_archard_integral_wears_off(response):
 def test_errors_are_those_of_the_full_coordinates():
     """One set, both models, many cycles: means of the largest errors in a cycle within their scatter."""
     runs = {"runs": 4, "cycles": 8, "skip_cycles": 2, "traced_cycles": 1}
-    ours = respond(load_mechanism(), PLACE | runs)
+    ours = run_ensemble(load_mechanism(), PLACE | runs)
     setup = prepare(load_mechanism(), clearances=["G"], clearance_m=3.0e-4, speed_rpm=60.0)
-    full, tally, errors, peaks = FullRun(setup), new_tally(10), [], []
+    full, statistics, errors, peaks = FullRun(setup), new_run_statistics(10), [], []
     for cycle in range(10):
-        full.advance(cycle + 1.0, tally)
-        errors.append(tally.response.copy())
-        peaks.append(tally.peak[6])
-        tally.response[:], tally.peak[:] = 0.0, 0.0
+        full.advance(cycle + 1.0, statistics)
+        errors.append(statistics.response.copy())
+        peaks.append(statistics.peak[6])
+        statistics.response[:], statistics.peak[:] = 0.0, 0.0
     errors, peaks = np.array(errors[2:]), np.array(peaks[2:])
     for i, name in enumerate(ERRORS):
         mine = ours[f"error_{name}"]

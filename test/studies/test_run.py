@@ -60,11 +60,11 @@ def test_finished_points_are_kept_and_others_computed(sweep, uninterrupted, tmp_
 
 
 def test_processes_give_the_same_results_to_the_bit(sweep, uninterrupted, tmp_path):
-    shares = []
-    assert run_study("size", sweep, tmp_path, workers=2, progress=shares.append) == 4
+    fractions = []
+    assert run_study("size", sweep, tmp_path, workers=2, progress=fractions.append) == 4
     assert files(tmp_path) == files(uninterrupted)
-    assert shares == sorted(shares)
-    assert (shares[0], shares[-1]) == (0.0, pytest.approx(1.0))
+    assert fractions == sorted(fractions)
+    assert (fractions[0], fractions[-1]) == (0.0, pytest.approx(1.0))
 
 
 def test_another_leg_or_setting_is_another_point(sweep, uninterrupted, tmp_path):
@@ -116,7 +116,7 @@ def test_a_motion_that_diverges_is_a_result_with_its_fault(tiny, tmp_path, monke
     def diverge(mechanism, settings):
         raise SimulationError("joint G at t = 1 s: pushed through")
 
-    monkeypatch.setattr(response, "respond", diverge)
+    monkeypatch.setattr(response, "run_ensemble", diverge)
     settings = tiny("size", joints=["G"], clearances_m=[1.0e-4])
     assert run_study("size", settings, tmp_path) == 1
     assert load_results(tmp_path).faults == [("0.1 mm", "joint G at t = 1 s: pushed through")]

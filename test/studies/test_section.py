@@ -7,17 +7,17 @@ from hypothesis import strategies as st
 
 from leg_wear_monitor import load_mechanism
 from leg_wear_monitor.studies.tasks.grid import SAMPLES
-from leg_wear_monitor.studies.tasks.section import intersect, period_of
+from leg_wear_monitor.studies.tasks.section import period_of, poincare_section
 
 SETTINGS = {
-    "loose": ["G"], "clearance_m": 3.0e-4, "perturb_share": 0.3, "seed": 1, "skip_cycles": 4,
+    "clearance_joints": ["G"], "clearance_m": 3.0e-4, "perturb_fraction": 0.3, "seed": 1, "skip_cycles": 4,
     "runs": 1, "cycles": 6, "portrait_cycles": 1, "crank_angle_deg": 90.0,
 }  # fmt: skip
 
 
 def test_a_motion_that_repeats_itself_has_one_point():
     """At 20 rpm the knee stays in contact, so that each cycle is like the last."""
-    arrays = intersect(load_mechanism(), SETTINGS | {"speed_rpm": 20.0})
+    arrays = poincare_section(load_mechanism(), SETTINGS | {"speed_rpm": 20.0})
     section = np.concatenate([arrays["section_eccentricity_m"] / 3.0e-4], axis=1)
     assert section.shape == (6, 1, 2)
     assert period_of(section[:, 0], 3, 1.0e-3) == 1
@@ -29,14 +29,16 @@ def test_a_motion_that_repeats_itself_has_one_point():
 
 
 def test_a_section_at_another_angle_is_another_one():
-    one = intersect(load_mechanism(), SETTINGS | {"speed_rpm": 20.0})["section_eccentricity_m"]
+    one = poincare_section(load_mechanism(), SETTINGS | {"speed_rpm": 20.0})["section_eccentricity_m"]
     place = SETTINGS | {"speed_rpm": 20.0, "crank_angle_deg": 0.0}
-    other = intersect(load_mechanism(), place)["section_eccentricity_m"]
+    other = poincare_section(load_mechanism(), place)["section_eccentricity_m"]
     assert np.abs(one[-1] - other[-1]).max() > 1.0e-6
 
 
 def test_a_bouncing_joint_has_no_period():
-    arrays = intersect(load_mechanism(), SETTINGS | {"loose": ["A", "B"], "speed_rpm": 60.0, "cycles": 12})
+    arrays = poincare_section(
+        load_mechanism(), SETTINGS | {"clearance_joints": ["A", "B"], "speed_rpm": 60.0, "cycles": 12}
+    )
     for k in range(2):
         assert period_of(arrays["section_rate_mps"][:, k], 4, 1.0e-6) is None
 

@@ -38,13 +38,13 @@ def test_studies_cover_what_was_asked():
     assert chaos.section_cycles >= 500
     for name in ("location", "multi"):
         assert load_settings(name).sets == (("A", "B"), ("G",), ("I", "J"))
-    assert points_of(load_settings("multi"))[-1].settings["loose"] == ["A", "B", "G", "I", "J"]
+    assert points_of(load_settings("multi"))[-1].settings["clearance_joints"] == ["A", "B", "G", "I", "J"]
 
 
 @pytest.mark.parametrize(
     ("study", "keys", "fault"),
     [
-        ("size", {"clearances_m": [0.1]}, "size.yaml: joints: is missing, expected: joints that are loose"),
+        ("size", {"clearances_m": [0.1]}, "size.yaml: joints: is missing, expected: joints with clearance"),
         (
             "size",
             {"joints": ["G"], "clearances_m": []},

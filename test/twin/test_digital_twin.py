@@ -14,7 +14,13 @@ from leg_wear_monitor.mechanism.ideal import TURN
 from leg_wear_monitor.twin.digital_twin import DigitalTwin
 from leg_wear_monitor.twin.sample import TORQUE, Samples, gait_samples
 from leg_wear_monitor.twin.settings import TrackerSettings, TwinSettings
-from leg_wear_monitor.twin.statistics import CycleFigures, Happening, SampleFigures, Tracking, TwinUpdate
+from leg_wear_monitor.twin.statistics import (
+    CycleStatistics,
+    SampleStatistics,
+    Tracking,
+    TwinEventKind,
+    TwinUpdate,
+)
 
 S = 1_000_000_000
 
@@ -42,21 +48,21 @@ def eventful(gait) -> Samples:
 def run(twin: DigitalTwin, blocks: list[Samples]) -> TwinUpdate:
     """All that the blocks brought."""
     updates = [twin.update(block) for block in blocks]
-    names = [field.name for field in attrs.fields(SampleFigures)]
+    names = [field.name for field in attrs.fields(SampleStatistics)]
     samples = [np.concatenate([getattr(update.samples, name) for update in updates]) for name in names]
     cycles = [cycle for update in updates for cycle in update.cycles]
     return TwinUpdate(
-        SampleFigures(*samples), tuple(cycles), tuple(e for update in updates for e in update.events)
+        SampleStatistics(*samples), tuple(cycles), tuple(e for update in updates for e in update.events)
     )
 
 
 def assert_same(one: TwinUpdate, other: TwinUpdate) -> None:
     """Bit for bit."""
-    for field in attrs.fields(SampleFigures):
+    for field in attrs.fields(SampleStatistics):
         np.testing.assert_array_equal(getattr(one.samples, field.name), getattr(other.samples, field.name))
     assert len(one.cycles) == len(other.cycles)
     for cycle, expected in zip(one.cycles, other.cycles, strict=True):
-        for field in attrs.fields(CycleFigures):
+        for field in attrs.fields(CycleStatistics):
             mine, wanted = getattr(cycle, field.name), getattr(expected, field.name)
             if field.name == "torque":
                 mine, wanted = attrs.astuple(mine), attrs.astuple(wanted)
@@ -100,15 +106,15 @@ def test_restored_it_goes_on_bit_for_bit(_made, gait, eventful, in_one_go, where
     after = run(twin, [eventful[where:]])
     parts = [
         np.concatenate([getattr(before.samples, field.name), getattr(after.samples, field.name)])
-        for field in attrs.fields(SampleFigures)
+        for field in attrs.fields(SampleStatistics)
     ]
-    whole = TwinUpdate(SampleFigures(*parts), before.cycles + after.cycles, before.events + after.events)
+    whole = TwinUpdate(SampleStatistics(*parts), before.cycles + after.cycles, before.events + after.events)
     assert_same(whole, in_one_go[0])
     np.testing.assert_array_equal(twin.depth, in_one_go[1])
 
 
 def test_what_happens_is_told(in_one_go):
-    what = Happening
+    what = TwinEventKind
     assert [event.what for event in in_one_go[0].events] == [
         what.ACQUIRED, what.STOPPED, what.MOVING, what.REVERSED, what.STOPPED,
         what.BACKWARD_JUMP, what.ACQUIRED, what.LOST_IN_GAP, what.ACQUIRED,
@@ -137,13 +143,13 @@ def test_a_steady_gait_wears_as_a_steady_simulation(leg, twin, gait):
     update = twin.update(gait(12.0))
     archard = np.array([cycle.archard_j for cycle in update.cycles])
     result = lw.simulate(leg, cycles=12, wear=True)
-    wanted = [result.joints[name]["archard_integral_j_per_cycle"] for name in twin.loose]
+    wanted = [result.joints[name]["archard_integral_j_per_cycle"] for name in twin.clearance_joints]
     scatter = archard.std(axis=0, ddof=1) * math.sqrt(2.0 / len(archard))
     wrong = (archard.mean(axis=0) - wanted) / (0.02 * np.array(wanted) + 4.0 * scatter)
     assert (np.abs(wrong) < 1.0).all(), wrong
     assert twin.tracking is Tracking.IN_STEP
     assert twin.speed_radps == pytest.approx(TURN, rel=0.01)
-    assert [event.what for event in update.events] == [Happening.ACQUIRED]
+    assert [event.what for event in update.events] == [TwinEventKind.ACQUIRED]
     for cycle in update.cycles:
         assert cycle.duration_s == pytest.approx(1.0, abs=1.0e-3)
         assert cycle.moving_s == pytest.approx(cycle.duration_s, abs=2.0e-4)
@@ -222,7 +228,7 @@ def test_a_gap_costs_its_time_and_keeps_the_wear(twin, gait):
     twin.update(samples[:500])
     depth = twin.depth
     update = twin.update(samples[700:])
-    assert [event.what for event in update.events] == [Happening.LOST_IN_GAP, Happening.ACQUIRED]
+    assert [event.what for event in update.events] == [TwinEventKind.LOST_IN_GAP, TwinEventKind.ACQUIRED]
     assert (twin.depth >= depth).all()
     intake = twin.intake
     assert intake.lost == 1
@@ -243,7 +249,7 @@ def test_a_leg_that_is_lost_is_told_to_be_out(twin, gait):
 @pytest.mark.plain
 def test_a_moment_of_a_leg_with_one_loose_joint(leg, gait):
     """From a little before crank angle 0 to a little after, with a torque that is compared."""
-    twin = DigitalTwin(leg, TwinSettings(loose=("A",)))
+    twin = DigitalTwin(leg, TwinSettings(clearance_joints=("A",)))
     samples = gait(0.38, angle=lambda t: TURN * (t + 0.82), noise_rad=0.0)
     samples["torque_nm"] = 1.0
     update = twin.update(samples)
@@ -274,10 +280,10 @@ def test_a_new_part_has_fresh_surfaces(twin, gait):
     twin.update(gait(2.0))
     before = twin.depth
     twin.reset_wear("G")
-    k = twin.loose.index("G")
+    k = twin.clearance_joints.index("G")
     assert not twin.depth[k].any()
     np.testing.assert_array_equal(np.delete(twin.depth, k, axis=0), np.delete(before, k, axis=0))
-    with pytest.raises(LegWearError, match="X: no loose joint, expected one of A, B, G, I, J"):
+    with pytest.raises(LegWearError, match="X: no clearance joint, expected one of A, B, G, I, J"):
         twin.reset_wear("X")
     with pytest.raises(LegWearError, match="depth: expected finite depths from 0 m up"):
         twin.set_depth(-before)
@@ -286,9 +292,9 @@ def test_a_new_part_has_fresh_surfaces(twin, gait):
 def test_a_leg_that_cannot_be_resolved_is_told_and_goes_on(leg, gait):
     """Bushings like jelly: journals go through them; the wear stays, the time counts as unmonitored."""
     soft = {name: attrs.evolve(c, stiffness=10.0) for name, c in leg.clearances.items()}
-    twin = DigitalTwin(attrs.evolve(leg, clearances=soft), TwinSettings(loose=("A", "G")))
+    twin = DigitalTwin(attrs.evolve(leg, clearances=soft), TwinSettings(clearance_joints=("A", "G")))
     update = twin.update(gait(1.0))
-    failed = [event for event in update.events if event.what is Happening.PUSHED_THROUGH]
+    failed = [event for event in update.events if event.what is TwinEventKind.PUSHED_THROUGH]
     assert failed
     assert failed[0].joint in ("A", "G")
     intake = twin.intake
@@ -298,12 +304,14 @@ def test_a_leg_that_cannot_be_resolved_is_told_and_goes_on(leg, gait):
 
 
 def test_a_leg_without_loose_joints_is_refused(leg):
-    with pytest.raises(ConfigError, match="no joint is loose"):
-        DigitalTwin(leg, TwinSettings(loose=()))
+    with pytest.raises(ConfigError, match="no joint has clearance"):
+        DigitalTwin(leg, TwinSettings(clearance_joints=()))
 
 
 def test_it_can_walk_backwards_as_commanded(leg, gait):
-    twin = DigitalTwin(leg, TwinSettings(tracker=TrackerSettings(commanded_speed_radps=-TURN), loose=("A",)))
+    twin = DigitalTwin(
+        leg, TwinSettings(tracker=TrackerSettings(commanded_speed_radps=-TURN), clearance_joints=("A",))
+    )
     update = twin.update(gait(5.0, angle=lambda t: 1.0 - TURN * t))
     assert {cycle.direction for cycle in update.cycles} == {-1}
     assert len(update.cycles) in (3, 4)

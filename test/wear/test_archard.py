@@ -30,7 +30,7 @@ PUBLISHED = [
 
 @pytest.fixture(scope="module")
 def contacts(bushing):
-    """One loose joint of which only the bushing wears."""
+    """One clearance joint of which only the bushing wears."""
     return bushing((WEAR, 0.0))
 
 

@@ -32,7 +32,7 @@ touches = st.floats(1.0e-8, 1.0e-5)  # penetration, m
 
 @pytest.fixture(scope="module")
 def joint(bushing):
-    """One loose joint whose bushing wears four times as fast as its journal."""
+    """One clearance joint whose bushing wears four times as fast as its journal."""
     return bushing(WEAR)
 
 

@@ -1,4 +1,4 @@
-"""The wear zone: the narrowest part of the circle that holds a share of the wear."""
+"""The wear zone: the narrowest part of the circle that holds a fraction of the wear."""
 
 import numpy as np
 import pytest
@@ -13,7 +13,7 @@ pytestmark = pytest.mark.plain
 N = 72
 
 profiles = arrays(float, N, elements=st.floats(0.0, 1.0).map(lambda x: round(x, 3))).filter(np.any)
-shares = st.floats(0.05, 1.0)
+fractions = st.floats(0.05, 1.0)
 
 
 def _sectors(zone):
@@ -21,20 +21,20 @@ def _sectors(zone):
     return np.arange(round(start), round(end)) % N
 
 
-@given(depth=profiles, share=shares)
-def test_it_holds_the_share_and_nothing_narrower_does(depth, share):
-    zone = wear_zone(depth, share)
+@given(depth=profiles, fraction=fractions)
+def test_it_holds_the_share_and_nothing_narrower_does(depth, fraction):
+    zone = wear_zone(depth, fraction)
     held = _sectors(zone)
     assert 0.0 <= zone[0] < 360.0
     assert zone[0] < zone[1] <= zone[0] + 360.0
-    assert depth[held].sum() >= share * depth.sum() * (1.0 - 1.0e-9)
+    assert depth[held].sum() >= fraction * depth.sum() * (1.0 - 1.0e-9)
     narrower = [np.roll(depth, -start)[: len(held) - 1].sum() for start in range(N)]
-    assert max(narrower) < share * depth.sum()
+    assert max(narrower) < fraction * depth.sum()
 
 
-@given(depth=profiles, share=shares, turn=st.integers(0, N - 1))
-def test_its_width_does_not_depend_on_the_frame(depth, share, turn):
-    here, there = wear_zone(depth, share), wear_zone(np.roll(depth, turn), share)
+@given(depth=profiles, fraction=fractions, turn=st.integers(0, N - 1))
+def test_its_width_does_not_depend_on_the_frame(depth, fraction, turn):
+    here, there = wear_zone(depth, fraction), wear_zone(np.roll(depth, turn), fraction)
     assert there[1] - there[0] == pytest.approx(here[1] - here[0])
 
 

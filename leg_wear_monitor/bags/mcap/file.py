@@ -11,11 +11,11 @@ import numpy as np
 from numpy.typing import NDArray
 
 from leg_wear_monitor.bags.budget import Budget
-from leg_wear_monitor.bags.findings import DamageError, Finding, RecordingError, Weight
+from leg_wear_monitor.bags.findings import DamageError, Finding, RecordingError, Severity
 from leg_wear_monitor.bags.mcap import records
 from leg_wear_monitor.bags.mcap.compression import check
 from leg_wear_monitor.bags.mcap.layout import MAGIC, Channel, Segment, by_index, chunk_head
-from leg_wear_monitor.bags.mcap.records import TALLY
+from leg_wear_monitor.bags.mcap.records import COUNTS
 from leg_wear_monitor.bags.mcap.salvage import by_scan, content
 from leg_wear_monitor.messages.cdr import MESSAGE
 
@@ -93,7 +93,7 @@ class McapFile:
         for text in self.layout.losses:
             self._find(text)
         if not (self.is_indexed or self.layout.losses):
-            self._find("has no index, or a damaged one: read from start to end", Weight.NOTE)
+            self._find("has no index, or a damaged one: read from start to end", Severity.NOTE)
         self._check_data()
 
     @property
@@ -150,19 +150,19 @@ class McapFile:
     def _messages(
         self, segment: Segment, data: NDArray[np.uint8], roles: NDArray[np.uint8]
     ) -> NDArray[np.void]:
-        tally = np.zeros(1, TALLY)
-        records.walk(data, roles, _NO_MESSAGES, _NO_POSITIONS, tally)
-        wanted = int(tally["wanted"][0])
+        counts = np.zeros(1, COUNTS)
+        records.walk(data, roles, _NO_MESSAGES, _NO_POSITIONS, counts)
+        wanted = int(counts["wanted"][0])
         self.budget.check(segment.stored + len(data) + _OF_A_MESSAGE * wanted)
         messages = np.zeros(wanted, MESSAGE)
         if len(messages):
-            records.walk(data, roles, messages, _NO_POSITIONS, tally)
-        rest = len(data) - int(tally["read"][0])
+            records.walk(data, roles, messages, _NO_POSITIONS, counts)
+        rest = len(data) - int(counts["read"][0])
         if rest and not segment.cut:
             self._find(f"chunk at byte {segment.at} holds {rest} bytes that are no records: they are lost")
         for name, what in (("unknown_channel", "messages of no channel"), ("foreign", "records of no kind")):
-            if tally[name][0]:
-                self._find(f"chunk at byte {segment.at} holds {tally[name][0]} {what}: they are lost")
+            if counts[name][0]:
+                self._find(f"chunk at byte {segment.at} holds {counts[name][0]} {what}: they are lost")
         return messages
 
     def _account(self, types: dict[int, int], found: int) -> None:
@@ -175,7 +175,7 @@ class McapFile:
             self._find(
                 f"has no checksum for {self.without_checksum} of {len(self.layout.segments)} chunks: "
                 "a damaged number in them would not be seen",
-                Weight.NOTE,
+                Severity.NOTE,
             )
 
     def _check_magic(self) -> None:
@@ -199,7 +199,7 @@ class McapFile:
         if crc != self.layout.data_crc:
             self._find("does not match the checksum of its data: something in it is damaged")
 
-    def _find(self, text: str, weight: Weight = Weight.LOSS) -> None:
+    def _find(self, text: str, weight: Severity = Severity.LOSS) -> None:
         if len(self.findings) < _MOST_FINDINGS:
             self.findings.append(Finding(self.path, text, weight))
         elif len(self.findings) == _MOST_FINDINGS:

@@ -11,7 +11,7 @@ _MESSAGE_HEAD = 22  # channel, sequence, log time, publish time
 UNKNOWN, IGNORED = 0, 255
 """Roles of a channel beside the codes of `cdr.TYPES`: not defined in the file, and not asked for."""
 
-TALLY = np.dtype(
+COUNTS = np.dtype(
     [
         ("wanted", "i8"),
         ("definitions", "i8"),
@@ -39,7 +39,7 @@ def unsigned(data, at, size):
 
 
 @entry
-def walk(data, roles, out_messages, out_definitions, out_tally):
+def walk(data, roles, out_messages, out_definitions, out_counts):
     """Find messages and definitions among records; give what was met.
 
     Parameters
@@ -51,7 +51,7 @@ def walk(data, roles, out_messages, out_definitions, out_tally):
         Messages asked for, as many as fit; empty to count them only.
     out_definitions : (any,) array of int64
         Positions of schemas and channels, as many as fit.
-    out_tally : (1,) array of TALLY
+    out_counts : (1,) array of COUNTS
     """
     at, end = np.int64(0), np.int64(data.shape[0])
     wanted, definitions, unknown, foreign = np.int64(0), np.int64(0), np.int64(0), np.int64(0)
@@ -82,10 +82,10 @@ def walk(data, roles, out_messages, out_definitions, out_tally):
         elif opcode < 0x80:  # above are private records, which may stand anywhere
             foreign += 1
         at = body + length
-    out_tally[0]["wanted"] = wanted
-    out_tally[0]["definitions"] = definitions
-    out_tally[0]["unknown_channel"] = unknown
-    out_tally[0]["foreign"] = foreign
-    out_tally[0]["first_log_time_ns"] = first
-    out_tally[0]["last_log_time_ns"] = last
-    out_tally[0]["read"] = at
+    out_counts[0]["wanted"] = wanted
+    out_counts[0]["definitions"] = definitions
+    out_counts[0]["unknown_channel"] = unknown
+    out_counts[0]["foreign"] = foreign
+    out_counts[0]["first_log_time_ns"] = first
+    out_counts[0]["last_log_time_ns"] = last
+    out_counts[0]["read"] = at

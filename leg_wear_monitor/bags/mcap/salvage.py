@@ -19,7 +19,7 @@ from leg_wear_monitor.bags.mcap.layout import (
     chunk_head,
     definitions,
 )
-from leg_wear_monitor.bags.mcap.records import RECORD_HEAD, TALLY
+from leg_wear_monitor.bags.mcap.records import COUNTS, RECORD_HEAD
 from leg_wear_monitor.messages.cdr import MESSAGE
 
 _WINDOW = 2**20  # bytes looked at together outside of chunks
@@ -117,14 +117,14 @@ class _Scan:
         except DamageError:
             self.layout.segments.append(segment)  # whoever reads it says what is wrong
             return
-        tally, positions = np.zeros(1, TALLY), np.zeros(_MOST_DEFINITIONS, np.int64)
-        records.walk(np.frombuffer(data, np.uint8), _ALL_IGNORED, np.zeros(0, MESSAGE), positions, tally)
-        self._define(data, positions[: int(tally["definitions"][0])].tolist())
-        if tally["last_log_time_ns"][0] >= 0:
-            first, last = int(tally["first_log_time_ns"][0]), int(tally["last_log_time_ns"][0])
+        counts, positions = np.zeros(1, COUNTS), np.zeros(_MOST_DEFINITIONS, np.int64)
+        records.walk(np.frombuffer(data, np.uint8), _ALL_IGNORED, np.zeros(0, MESSAGE), positions, counts)
+        self._define(data, positions[: int(counts["definitions"][0])].tolist())
+        if counts["last_log_time_ns"][0] >= 0:
+            first, last = int(counts["first_log_time_ns"][0]), int(counts["last_log_time_ns"][0])
             segment = attrs.evolve(segment, start_ns=first, end_ns=last)
         if segment.data_at == segment.at:
-            read = int(tally["read"][0])
+            read = int(counts["read"][0])
             segment = attrs.evolve(segment, stored=read, size=read)
         self.layout.segments.append(segment)
 

@@ -10,7 +10,7 @@ from pathlib import Path
 import numpy as np
 
 from leg_wear_monitor.bags.budget import Budget
-from leg_wear_monitor.bags.findings import Finding, RecordingError, Weight
+from leg_wear_monitor.bags.findings import Finding, RecordingError, Severity
 from leg_wear_monitor.bags.mcap.file import Due, Piece
 from leg_wear_monitor.bags.mcap.layout import Channel
 from leg_wear_monitor.bags.sqlite.database import UNREADABLE, one_line, open_database
@@ -43,9 +43,9 @@ class SqliteFile:
 
     def __init__(self, path: Path, file: Path, budget: Budget, stack: ExitStack) -> None:
         self.path, self.budget = path, budget
-        self.findings: list[Finding] = [Finding(path, _NO_CHECKSUMS, Weight.NOTE)]
+        self.findings: list[Finding] = [Finding(path, _NO_CHECKSUMS, Severity.NOTE)]
         self._database, notes = open_database(path, file, budget, stack)
-        self.findings += [Finding(path, note, Weight.NOTE) for note in notes]
+        self.findings += [Finding(path, note, Severity.NOTE) for note in notes]
         try:
             self.size = file.stat().st_size
             self.channels = _channels(self._database)

@@ -113,7 +113,7 @@ def _parameters(path: str) -> str:
     twin_settings(config, path)
     warn_of(path, parameter_doubts(config, leg))
     return (
-        f"parameters of the monitor: {config.mechanism}, {', '.join(leg.loose)} loose, "
+        f"parameters of the monitor: {config.mechanism}, clearance joints {', '.join(leg.clearance_joints)}, "
         f"{config.cadence.commanded_rpm:g} rpm, hardware {config.hardware}"
     )
 
@@ -134,9 +134,13 @@ def _mechanism(name: str) -> str:
 
         linkage = prepare(leg).linkage
     warn_of(leg.source, doubts(leg))
-    loose = f"{', '.join(leg.loose)} loose" if leg.loose else "none loose"
+    clearance_joints = (
+        f"clearance joints {', '.join(leg.clearance_joints)}"
+        if leg.clearance_joints
+        else "no clearance joint"
+    )
     what = (
-        f"{len(leg.bodies)} moving bodies, {len(leg.joints)} joints ({loose}), mobility 1, "
+        f"{len(leg.bodies)} moving bodies, {len(leg.joints)} joints ({clearance_joints}), mobility 1, "
         "closes, and the crank turns through"
     )
     return "\n".join([what, *(f"{'':13} {statement}" for statement in understood(linkage))])

@@ -21,7 +21,7 @@ from leg_wear_monitor.interrupt import closed_at_the_end
 from leg_wear_monitor.share import share_directory
 
 if TYPE_CHECKING:
-    from leg_wear_monitor.ros.witness import Witness
+    from leg_wear_monitor.ros.demo_listener import DemoListener
 
 DONE, WITH_FINDINGS = 0, 1
 _NAMESPACE = "/demo"
@@ -49,11 +49,11 @@ def demo(out: Path) -> int:
     check_directory("--out", out)
     out.mkdir(parents=True, exist_ok=True)
     _compile()
-    witness = _live(out)
+    demo_listener = _live(out)
     same = _replay(out)
-    _compare_with_truth(out, witness)
+    _compare_with_truth(out, demo_listener)
     click.echo(f"report: {(out / 'report.html').resolve()}")
-    if not same or not any(name.startswith("impact_force") for name in witness.acknowledged):
+    if not same or not any(name.startswith("impact_force") for name in demo_listener.acknowledged):
         click.echo("error: the demo did not go as it should; see the logs beside the report", err=True)
         return WITH_FINDINGS
     return DONE
@@ -73,9 +73,9 @@ def _compile() -> None:
         SyntheticLeg(GaitConfig()).advance(1.0e-3)
 
 
-def _live(out: Path) -> "Witness":
+def _live(out: Path) -> "DemoListener":
     """The two nodes, and what could be heard of them."""
-    from leg_wear_monitor.ros.witness import Witness
+    from leg_wear_monitor.ros.demo_listener import DemoListener
 
     domain = int(os.environ.get("ROS_DOMAIN_ID") or 5 + os.getpid() % 90)
     first: list[int] = []
@@ -88,18 +88,18 @@ def _live(out: Path) -> "Witness":
     for path in (*paths.values(), out / "wear.db-log"):  # a ledger is not begun beside the log of another
         path.unlink(missing_ok=True)
     click.echo(f"starting the monitor and the leg in ROS domain {domain}")
-    witness = Witness(_NAMESPACE, domain, say)
+    demo_listener = DemoListener(_NAMESPACE, domain, say)
     try:
         with (
             _process("monitor", out, domain, record=paths["record"], ledger=paths["ledger"]) as monitor,
             _process("gait-publisher", out, domain, truth=paths["truth"]) as leg,
         ):
-            witness.attend(lambda: leg.poll() is None and monitor.poll() is None)
+            demo_listener.attend(lambda: leg.poll() is None and monitor.poll() is None)
             _check_ended(leg, out / "gait-publisher.log")
     finally:
-        witness.leave()
+        demo_listener.leave()
     _check_ended(monitor, out / "monitor.log")
-    return witness
+    return demo_listener
 
 
 @contextmanager
@@ -160,13 +160,13 @@ def _messages(path: Path) -> dict[str, list[bytes]]:
     return dict(found)
 
 
-def _compare_with_truth(out: Path, witness: "Witness") -> None:
+def _compare_with_truth(out: Path, demo_listener: "DemoListener") -> None:
     """What the leg really lost, beside what the monitor found from crank and torque."""
     import numpy as np
 
     truth: dict[str, Any] = json.loads((out / "truth.json").read_text())
-    at_s = (witness.stamp_ns - truth["start_ns"]) / 1e9
+    at_s = (demo_listener.stamp_ns - truth["start_ns"]) / 1e9
     for joint, column in truth["clearance_m"].items():
         grown = float(np.interp(at_s, truth["cycle_end_s"], column[:-1])) - column[0]
-        found = witness.clearances_m[joint] - column[0]
+        found = demo_listener.clearances_m[joint] - column[0]
         click.echo(f"joint {joint}: worn {1e9 * grown:.0f} nm, monitor says {1e9 * found:.0f} nm")

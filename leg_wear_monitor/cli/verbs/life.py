@@ -23,7 +23,7 @@ _ROWS = 12  # of the table
 
 @click.command(short_help="A leg's wear over its life, by cycle jumps.")
 @click.option("--mechanism", metavar="FILE", default="bionic_leg", show_default=True, help="The leg.")
-@click.option("--clearances", metavar="A,B", help="The loose joints.  [default: the mechanism's own]")
+@click.option("--clearances", metavar="A,B", help="The clearance joints.  [default: the mechanism's own]")
 @click.option(
     "--speed-rpm", type=float, callback=bounded("rpm"), metavar="RPM", help="Crank speed.  [default: its own]"
 )
@@ -92,7 +92,7 @@ def life(mechanism: str, json_file: Path | None, out: Path | None, **options: An
     from leg_wear_monitor.mechanism.plausible import doubts
 
     names = options.pop("clearances")
-    leg = _with_loose(load_mechanism(mechanism), names)
+    leg = _with_clearance_joints(load_mechanism(mechanism), names)
     if json_file is not None:
         check_file("--json", json_file)
     if out is not None:
@@ -114,11 +114,13 @@ def life(mechanism: str, json_file: Path | None, out: Path | None, **options: An
             click.echo(f"written: {path}")
 
 
-def _with_loose(leg: "Mechanism", names: str | None) -> "Mechanism":
-    """The leg with these loose joints, of comma-separated names."""
+def _with_clearance_joints(leg: "Mechanism", names: str | None) -> "Mechanism":
+    """The leg with these clearance joints, of comma-separated names."""
     import attrs
 
-    return attrs.evolve(leg, loose=tuple(name.strip() for name in names.split(","))) if names else leg
+    return (
+        attrs.evolve(leg, clearance_joints=tuple(name.strip() for name in names.split(","))) if names else leg
+    )
 
 
 def _lives(leg: "Mechanism", lives: int, opens_m: float | None, **options: Any) -> "Lives":
@@ -135,9 +137,9 @@ def _lives(leg: "Mechanism", lives: int, opens_m: float | None, **options: Any) 
     settings = LifeSettings(**given)
     if opens_m is not None:
         settings = attrs.evolve(settings, jump=JumpControl.of(opens_m))
-    own = clearance_settings(leg, leg.loose)
+    own = clearance_settings(leg, leg.clearance_joints)
     fresh_m, radius_m = np.array([[c.radial_clearance, c.bushing_radius] for c in own]).reshape(-1, 2).T
-    check_life(leg.loose, fresh_m, radius_m, options["limit_m"], settings.jump)
+    check_life(leg.clearance_joints, fresh_m, radius_m, options["limit_m"], settings.jump)
     with compilation("clearance"), progress_bar("life") as progress:
         return list(simulate_lives(leg, settings, lives, progress=progress, **options))
 
@@ -154,17 +156,20 @@ def lines(result: "Life", limit_m: float) -> list[str]:
     """The life as a table, and when each joint reaches the limit."""
     points = len(result.cycles)
     shown = sorted({round(i * (points - 1) / max(1, _ROWS - 1)) for i in range(min(_ROWS, points))})
-    head = "".join(f"{joint:>22}" for joint in result.loose)
-    table = [f"{'cycles':>10}{head}", f"{'':10}" + f"{'mean µm  deg  peak N':>22}" * len(result.loose)]
+    head = "".join(f"{joint:>22}" for joint in result.clearance_joints)
+    table = [
+        f"{'cycles':>10}{head}",
+        f"{'':10}" + f"{'mean µm  deg  peak N':>22}" * len(result.clearance_joints),
+    ]
     for i in shown:
         cells = "".join(
             f"{1e6 * result.clearance_m[i, k]:11.1f}{result.worst_sector_deg[i, k]:5.0f}"
             f"{result.peak_force_n[i, k]:6.0f}"
-            for k in range(len(result.loose))
+            for k in range(len(result.clearance_joints))
         )
         table.append(f"{result.cycles[i]:10.3g}{cells}")
     table.append(f"jumps: {points - 1}; greatest error seen in one: {1e6 * result.error_m.max():.2g} µm")
-    for k, joint in enumerate(result.loose):
+    for k, joint in enumerate(result.clearance_joints):
         cycles = result.cycles_to(k, limit_m)
         held = "" if cycles <= result.cycles[-1] else ", if it goes on at its last rate"
         table.append(f"{joint} reaches {1e6 * limit_m:g} µm after {cycles:.3g} gait cycles{held}")

@@ -92,17 +92,17 @@ def _measured(
     dry_run: bool,
 ) -> tuple["Finding", str]:
     """What a measurement says, and what all of the ledger's together do."""
-    from leg_wear_monitor.monitor.forecast.measurement import measure as judge
+    from leg_wear_monitor.monitor.forecast.measurement import measure as evaluate
     from leg_wear_monitor.monitor.forecast.validity import validity
     from leg_wear_monitor.monitor.ledger.entry import new_part
 
     settings, leg = leg_of(config, ledger)
-    if joint not in leg.loose:
-        fault = f"{joint!r} is no loose joint, expected one of {', '.join(leg.loose)}"
-        raise ConfigError("JOINT", "", fault + did_you_mean(joint, leg.loose))
+    if joint not in leg.clearance_joints:
+        fault = f"{joint!r} is no clearance joint, expected one of {', '.join(leg.clearance_joints)}"
+        raise ConfigError("JOINT", "", fault + did_you_mean(joint, leg.clearance_joints))
     with opened(leg, settings, dry_run) as kept:
         parts = {wear.name: wear for wear in kept.entry.joints} if kept.entry else {}
-        found = judge(
+        found = evaluate(
             settings.forecast,
             leg.clearances[joint],
             parts.get(joint) or new_part(joint),

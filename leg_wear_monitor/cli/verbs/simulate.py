@@ -32,7 +32,9 @@ _WARM_UP_CYCLES, _WARM_UP_S = 1.0 / 256.0, 1.0e-9
     show_default=True,
     help="A mechanism file, or the name of one that comes with the package.",
 )
-@click.option("--clearances", metavar="A,B|none", help="The loose joints.  [default: the mechanism's own]")
+@click.option(
+    "--clearances", metavar="A,B|none", help="The clearance joints.  [default: the mechanism's own]"
+)
 @click.option(
     "--clearance-m",
     type=float,
@@ -82,7 +84,7 @@ _WARM_UP_CYCLES, _WARM_UP_S = 1.0 / 256.0, 1.0e-9
     "--normal-law",
     type=click.Choice(NORMAL_LAWS),
     metavar="NAME",
-    help=f"Normal contact law of all loose joints: {', '.join(NORMAL_LAWS)}.",
+    help=f"Normal contact law of all clearance joints: {', '.join(NORMAL_LAWS)}.",
 )
 @click.option(
     "--trace",
@@ -150,8 +152,8 @@ def _run(leg: "Mechanism", keywords: dict[str, Any]) -> tuple["SimulationResult"
         short |= {"cycles": _WARM_UP_CYCLES, "skip_cycles": 0.0}
     else:
         short["duration_s"] = _WARM_UP_S
-    loose = keywords.get("clearances", leg.loose)
-    with compilation(keywords.get("model") or default_model(leg) if loose else "ideal"):
+    clearance_joints = keywords.get("clearances", leg.clearance_joints)
+    with compilation(keywords.get("model") or default_model(leg) if clearance_joints else "ideal"):
         simulate(leg, **short)
     with progress_bar("simulating") as progress:
         began = time.perf_counter()

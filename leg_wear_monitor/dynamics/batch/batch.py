@@ -16,10 +16,10 @@ from numpy.typing import ArrayLike
 from leg_wear_monitor.dynamics.batch.leg import Leg, SharedTables, prepare_legs, share_tables
 from leg_wear_monitor.dynamics.clearance.run import ClearanceStepper
 from leg_wear_monitor.dynamics.ideal_result import ideal_result
-from leg_wear_monitor.dynamics.result import SimulationResult, drive_torque, joint_figures, toe_errors
+from leg_wear_monitor.dynamics.result import SimulationResult, drive_torque, joint_statistics, toe_errors
 from leg_wear_monitor.dynamics.run.drive import steady_drive
 from leg_wear_monitor.dynamics.run.protocol import DONE, Setup, stop
-from leg_wear_monitor.dynamics.run.run_statistics import Tally, new_tally
+from leg_wear_monitor.dynamics.run.run_statistics import RunStatistics, new_run_statistics
 from leg_wear_monitor.errors import AssemblyError, ConfigError, SimulationError
 from leg_wear_monitor.mechanism.arrays import Floats
 from leg_wear_monitor.mechanism.ideal import TURN
@@ -31,7 +31,7 @@ def advance_batch(
     steppers: Sequence[ClearanceStepper],
     polynomials: Sequence[Floats],
     t_end: ArrayLike,
-    tallies: Sequence[Tally],
+    statistics_of_all: Sequence[RunStatistics],
     workers: int | None = None,
 ) -> list[tuple[int, int]]:
     """Advance many steppers, each to its own time, and add to its own tally.
@@ -43,7 +43,7 @@ def advance_batch(
     polynomials : sequence of n arrays (7,)
         Motions of their cranks, as `ClearanceStepper.advance` takes them.
     t_end : float or (n,) array, s
-    tallies : sequence of n Tally
+    statistics_of_all : sequence of n RunStatistics
     workers : int, optional
         Threads; as many as there are cores if not given.
 
@@ -57,11 +57,14 @@ def advance_batch(
     ValueError
         If the lengths differ, or a state or a tally is there twice.
     """
-    for what in ([stepper.state.depth for stepper in steppers], [tally.time for tally in tallies]):
+    for what in (
+        [stepper.state.depth for stepper in steppers],
+        [statistics.time for statistics in statistics_of_all],
+    ):
         if len({id(array) for array in what}) < len(what):
             raise ValueError("two legs of a batch share their surfaces or their tally")
     times = np.broadcast_to(np.asarray(t_end, dtype=float), len(steppers)).tolist()
-    jobs = list(zip(steppers, polynomials, times, tallies, strict=True))
+    jobs = list(zip(steppers, polynomials, times, statistics_of_all, strict=True))
     with ThreadPoolExecutor(workers or os.cpu_count()) as pool:
         return list(pool.map(lambda job: job[0].advance(*job[1:]), jobs))
 
@@ -84,7 +87,7 @@ def simulate_batch(
     workers : int, optional
         Threads; as many as there are cores if not given. Results do not depend on it.
     progress : callable, optional
-        Called with the share of the legs that are done.
+        Called with the fraction of the legs that are done.
 
     Returns
     -------
@@ -131,39 +134,44 @@ def _simulate(
     leg: Leg, setup: Setup, tables: SharedTables, cycles: float, skip_cycles: float, stopped: Event
 ) -> SimulationResult:
     """One leg from its start to its figures."""
-    if not setup.loose:
+    if not setup.clearance_joints:
         return ideal_result(setup, cycles, 0)
     stepper = ClearanceStepper(setup, tables=tables.get())
     leg.start(stepper)
     joints = len(setup.linkage.mechanism.joints)
-    _turn(leg, setup, stepper, skip_cycles, new_tally(joints), stopped)
-    tally, depth = new_tally(joints), setup.surfaces.depth.copy()
-    _turn(leg, setup, stepper, skip_cycles + cycles, tally, stopped)
+    _turn(leg, setup, stepper, skip_cycles, new_run_statistics(joints), stopped)
+    statistics, depth = new_run_statistics(joints), setup.surfaces.depth.copy()
+    _turn(leg, setup, stepper, skip_cycles + cycles, statistics, stopped)
     return SimulationResult(
         mechanism=setup.linkage.mechanism.name,
         model="clearance",
         speed_rpm=60.0 * setup.speed / TURN,
         cycles=cycles,
         simulated_s=(skip_cycles + cycles) * TURN / abs(setup.speed),
-        drive_torque_nm=drive_torque(tally),
+        drive_torque_nm=drive_torque(statistics),
         energy_j=None,
-        toe=toe_errors(tally) if setup.linkage.mechanism.toe else None,
-        joints=joint_figures(setup, tally, setup.surfaces.depth - depth, cycles),
+        toe=toe_errors(statistics) if setup.linkage.mechanism.toe else None,
+        joints=joint_statistics(setup, statistics, setup.surfaces.depth - depth, cycles),
         impacts={},
         trace=None,
-        loose=setup.loose,
+        clearance_joints=setup.clearance_joints,
         surfaces=setup.surfaces,
     )
 
 
 def _turn(
-    leg: Leg, setup: Setup, stepper: ClearanceStepper, cycles: float, tally: Tally, stopped: Event
+    leg: Leg,
+    setup: Setup,
+    stepper: ClearanceStepper,
+    cycles: float,
+    statistics: RunStatistics,
+    stopped: Event,
 ) -> None:
     """Turn the crank until so many cycles since the start are done, or others have asked to stop."""
     polynomial, period = steady_drive(leg.crank_angle_rad, setup.speed), TURN / abs(setup.speed)
     for cycle in [*np.arange(stepper.time / period + 1.0, cycles), cycles]:
         if stopped.is_set():
             return
-        status, k = stepper.advance(polynomial, cycle * period, tally)
+        status, k = stepper.advance(polynomial, cycle * period, statistics)
         if status != DONE:
             raise stop(setup, status, k, stepper.time)

@@ -132,8 +132,13 @@ def share_tables(setups: Sequence[Setup | AssemblyError]) -> Iterator[tuple[int,
     for i, setup in enumerate(setups):
         if isinstance(setup, Setup):
             mechanism, contacts = setup.linkage.mechanism, setup.contacts
-            bare = repr(attrs.evolve(mechanism, clearances={}, loose=()))
-            key = bare, setup.loose, contacts.bushing_radius.tobytes(), contacts.clearance.tobytes()
+            bare = repr(attrs.evolve(mechanism, clearances={}, clearance_joints=()))
+            key = (
+                bare,
+                setup.clearance_joints,
+                contacts.bushing_radius.tobytes(),
+                contacts.clearance.tobytes(),
+            )
             groups.setdefault(key, []).append((i, setup))
     for group in groups.values():
         tables = SharedTables(group[0][1])

@@ -30,7 +30,7 @@ from leg_wear_monitor.dynamics.joint.contact_event import (
     DELTA,
     F_N,
     NEVER,
-    first_touch,
+    first_contact_event,
     update_contacts,
 )
 from leg_wear_monitor.dynamics.joint.joint_contact import contact_energy
@@ -62,7 +62,7 @@ _FASTEST = 1.0e4  # rad/s, and its change over an interval: a crank beyond is no
 
 
 @entry
-def advance_clearances(model, feeds_back, state, polynomial, t_end, tally, work):
+def advance_clearances(model, feeds_back, state, polynomial, t_end, statistics, work):
     """Advance the state by all whole intervals up to t_end [s] and add to the tally.
 
     ``polynomial`` (7,) is the crank's motion from the last time reached to t_end.
@@ -70,13 +70,13 @@ def advance_clearances(model, feeds_back, state, polynomial, t_end, tally, work)
     Returns
     -------
     status, k
-        DONE, or why it stopped and the loose joint concerned (-1 if none). The state is then that of the
+        DONE, or why it stopped and the clearance joint concerned (-1 if none). The state is then that of the
         last whole interval, finite and good to go on from.
     """
     surfaces = Surfaces(state.depth, feeds_back)
     while (state.intervals[0] + 1.0) * model.interval <= t_end * (1.0 + 1.0e-12) + 1.0e-15:
         copy_array(state.motion, work.backup)
-        status, k = _interval(model, surfaces, state, polynomial, tally, work)
+        status, k = _interval(model, surfaces, state, polynomial, statistics, work)
         if status != DONE:
             copy_array(state.pending, work.pending)  # what has worn off already must not be pending again
             copy_array(work.backup, state.motion)
@@ -86,24 +86,24 @@ def advance_clearances(model, feeds_back, state, polynomial, t_end, tally, work)
 
 
 @kernel
-def _interval(model, surfaces, state, polynomial, tally, work):
+def _interval(model, surfaces, state, polynomial, statistics, work):
     """One interval, from whole instant to whole instant; in parts where the linkage moves fast."""
     i, _ = blend(model.tables.parts.shape[0], state.drive[ANGLE])
     parts = model.tables.parts[i]
     for part in range(parts):
         begin, end = state.intervals[0] + part / parts, state.intervals[0] + (part + 1.0) / parts
         status, k = _part(
-            model, surfaces, state, polynomial, begin * model.interval, end * model.interval, tally, work
+            model, surfaces, state, polynomial, begin * model.interval, end * model.interval, statistics, work
         )
         if status != DONE:
             return status, k
     state.intervals[0] += 1.0
-    _finish(model, surfaces, state, tally, work)
+    _finish(model, surfaces, state, statistics, work)
     return DONE, -1
 
 
 @kernel
-def _part(model, surfaces, state, polynomial, begin, end, tally, work):
+def _part(model, surfaces, state, polynomial, begin, end, statistics, work):
     """A part of an interval [s] under tables that are held."""
     length = end - begin
     copy_array(state.drive, work.crank)
@@ -113,8 +113,8 @@ def _part(model, surfaces, state, polynomial, begin, end, tally, work):
         return INVALID_DRIVE, -1
     load_state(model, surfaces, state, angle, speed, acceleration, 0.5 * length, work)
     turned = -0.5 * length * speed  # the tables are those of the middle
-    sample_start(model, surfaces, state, turned, begin, tally, work)
-    status, k = _steps(model, surfaces, state, begin, length, tally, work)
+    sample_start(model, surfaces, state, turned, begin, statistics, work)
+    status, k = _steps(model, surfaces, state, begin, length, statistics, work)
     if status == DONE:
         for i in range(state.e.shape[0]):
             state.e[i], state.v[i] = work.x[E0, i], work.x[V0, i]
@@ -122,13 +122,13 @@ def _part(model, surfaces, state, polynomial, begin, end, tally, work):
 
 
 @kernel
-def _steps(model, surfaces, state, begin, length, tally, work):
+def _steps(model, surfaces, state, begin, length, statistics, work):
     """All steps of a part."""
     x, now, start, end, approach = work.x, work.now, work.start, work.end, state.approach
     contacts = model.contacts
     done, trials, cut = 0.0, 0, NEVER
     speed = now.speed[0]
-    _look_at_drive(now, x, start, work.drive_start, tally)
+    _look_at_drive(now, x, start, work.drive_start, statistics)
     while done < length:
         left = length - done
         h = min(state.step[0], left)
@@ -139,16 +139,16 @@ def _steps(model, surfaces, state, begin, length, tally, work):
         turned = speed * (done + h - 0.5 * length)
         error = try_step(model, surfaces, approach, h, turned, now, work.system, x, start, end)
         trials += 1
-        tally.steps[0] += 1
+        statistics.steps[0] += 1
         if not error <= 1.0:
             state.step[0] = h * max(0.2, 0.9 * error ** (-1.0 / 3.0)) if error < 1.0e9 else 0.1 * h
             cut = NEVER
             if state.step[0] < _SHORTEST_STEP or trials > MOST_TRIALS:
                 return STEP_TOO_SMALL, _pushed_through(contacts.bushing_radius, end)
             continue
-        share = first_touch(approach, h, start, end)
-        if share < 1.0 and share * h > _SHORTEST_STEP and trials <= MOST_TRIALS:
-            cut = share * h
+        fraction = first_contact_event(approach, h, start, end)
+        if fraction < 1.0 and fraction * h > _SHORTEST_STEP and trials <= MOST_TRIALS:
+            cut = fraction * h
             continue
         pushed = _pushed_through(contacts.bushing_radius, end)
         if pushed >= 0:
@@ -156,56 +156,56 @@ def _steps(model, surfaces, state, begin, length, tally, work):
         if cut == NEVER:
             state.step[0] = h * min(3.0, 0.9 * max(error, 1.0e-6) ** (-1.0 / 3.0))
         cut = NEVER
-        _take(model, surfaces, state, begin + done, h, turned, tally, work)
+        _take(model, surfaces, state, begin + done, h, turned, statistics, work)
         done = length if h >= left * (1.0 - 1.0e-9) else done + h
     return DONE, -1
 
 
 @kernel
-def _take(model, surfaces, state, t, h, turned, tally, work):
+def _take(model, surfaces, state, t, h, turned, statistics, work):
     """Take the trial step of length h [s] from time t: sums, wear, contacts; make its end the next start.
 
     ``turned`` [rad] is by how much the crank is then beyond the angle of the tables.
     """
     x, now, start, end, contacts = work.x, work.now, work.start, work.end, model.contacts
-    tally.steps[1] += 1
+    statistics.steps[1] += 1
     integrate_joints(model.law, state.approach, h, start, end, work.added)
     gather_wear(work.added, start, end, state.pending)
     for k in range(work.added.shape[0]):
         for r in range(JOINT_RATES):
-            tally.integral[contacts.joint[k], r] += work.added[k, r]
+            statistics.integral[contacts.joint[k], r] += work.added[k, r]
     update_contacts(
         contacts.joint, contacts.speed_floor, t, h, start, end,
-        state.approach, state.recent, tally.peak, tally.impact, tally.impacts,
+        state.approach, state.recent, statistics.peak, statistics.impact, statistics.impacts,
     )  # fmt: skip
     shift_start(now, x)
     copy_array(end, start)
-    tally.worn_energy[0] += wear_what_turned(
+    statistics.worn_energy[0] += wear_what_turned(
         contacts, surfaces, state.approach, start, now, turned, state.pending, work.weight
     )
-    _look_at_drive(now, x, start, work.drive_end, tally)
-    toe_deviation(now, x, tally.response)
+    _look_at_drive(now, x, start, work.drive_end, statistics)
+    toe_deviation(now, x, statistics.response)
     first, last = work.drive_start, work.drive_end
     impulse = 0.5 * h * (first[SMOOTH] + last[SMOOTH]) + sudden_impulse(now, x)
-    tally.drive_integral[TORQUE] += impulse
-    tally.drive_integral[TORQUE_SQUARED] += 0.5 * h * (first[WHOLE] ** 2 + last[WHOLE] ** 2)
-    tally.drive_integral[POWER] += impulse * now.speed[0] + 0.5 * h * (first[OUTSIDE] + last[OUTSIDE])
+    statistics.drive_integral[TORQUE] += impulse
+    statistics.drive_integral[TORQUE_SQUARED] += 0.5 * h * (first[WHOLE] ** 2 + last[WHOLE] ** 2)
+    statistics.drive_integral[POWER] += impulse * now.speed[0] + 0.5 * h * (first[OUTSIDE] + last[OUTSIDE])
     copy_array(last, first)
 
 
 @kernel
-def _look_at_drive(now, x, sample, out_drive, tally):
+def _look_at_drive(now, x, sample, out_drive, statistics):
     """Drive torque, its part without the eccentricities' accelerations, and the power of loads, (3,)."""
     torque, sudden = drive_torque(now, x, sample)
     out_drive[WHOLE], out_drive[SMOOTH], out_drive[OUTSIDE] = torque, torque - sudden, outside_power(now, x)
-    tally.drive_range[0] = min(tally.drive_range[0], torque)
-    tally.drive_range[1] = max(tally.drive_range[1], torque)
-    tally.response[TORQUE_ERROR] = max(tally.response[TORQUE_ERROR], abs(torque - now.torque_0[0]))
+    statistics.drive_range[0] = min(statistics.drive_range[0], torque)
+    statistics.drive_range[1] = max(statistics.drive_range[1], torque)
+    statistics.response[TORQUE_ERROR] = max(statistics.response[TORQUE_ERROR], abs(torque - now.torque_0[0]))
 
 
 @kernel
 def _pushed_through(bushing_radius, sample):
-    """First loose joint whose journal is pushed further than a tenth of the bushing's radius, else -1."""
+    """First clearance joint whose journal is pushed further than a tenth of the bushing's radius, else -1."""
     for k in range(sample.shape[0]):
         if not sample[k, DELTA] < 0.1 * bushing_radius[k]:
             return k
@@ -213,39 +213,39 @@ def _pushed_through(bushing_radius, sample):
 
 
 @kernel
-def _finish(model, surfaces, state, tally, work):
+def _finish(model, surfaces, state, statistics, work):
     """At the end of an interval: wear, distributions, and the reactions of the ideal joints."""
     joint, now, sample, interval = model.contacts.joint, work.now, work.start, model.interval
     count = int(state.intervals[0])
     here = 0.5 * interval * now.speed[0]
     amid = (1 - WEARING) * here
-    tally.time[0] += interval
+    statistics.time[0] += interval
     for k in range(state.approach.shape[0]):
         if (count + k) % WEARING == 0:
-            tally.worn_energy[0] += wear_off(
+            statistics.worn_energy[0] += wear_off(
                 model.contacts, surfaces, k, sample, now, here, amid, state.pending, work.weight
             )
         force = math.sqrt(sample[k, F_N] ** 2 + sample[k, F_T] ** 2)
-        tally.force_time[joint[k], bin_of(force)] += interval
+        statistics.force_time[joint[k], bin_of(force)] += interval
     torque = work.drive_start[WHOLE]
-    tally.torque_time[1 if torque > 0.0 else 0, bin_of(abs(torque))] += interval
+    statistics.torque_time[1 if torque > 0.0 else 0, bin_of(abs(torque))] += interval
     if count % RENEWAL == 0:
         reactions(model.tables, state.drive[ANGLE], now, work.x, sample, work.by, work.reaction)
-        _add_reactions(model.tables.reaction_joint, work.reaction, RENEWAL * interval, tally)
+        _add_reactions(model.tables.reaction_joint, work.reaction, RENEWAL * interval, statistics)
 
 
 @kernel
-def _add_reactions(joints, reaction, weight, tally):
+def _add_reactions(joints, reaction, weight, statistics):
     """Add the reactions of the ideal joints, which stand for a time ``weight`` [s]; rows as in the tables."""
     row = 1
     while row < joints.shape[0]:
         joint = joints[row]
         squared = reaction[row] ** 2 + reaction[row + 1] ** 2
         force = math.sqrt(squared)
-        tally.integral[joint, FORCE] += weight * force
-        tally.integral[joint, FORCE_SQUARED] += weight * squared
-        tally.peak[joint] = max(tally.peak[joint], force)
-        tally.force_time[joint, bin_of(force)] += weight
+        statistics.integral[joint, FORCE] += weight * force
+        statistics.integral[joint, FORCE_SQUARED] += weight * squared
+        statistics.peak[joint] = max(statistics.peak[joint], force)
+        statistics.force_time[joint, bin_of(force)] += weight
         row += 2
 
 

@@ -19,7 +19,7 @@ class Basis:
     x : (N, 3 b, 3 b) array
         Inverse Jacobian of all closures and the drive.
     rows : list of int
-        Rows of the loose joints.
+        Rows of the clearance joints.
     mass : (3 b,) array
     s, s_t : (N, 3 b, d) arrays
         S and its derivative by the crank angle.

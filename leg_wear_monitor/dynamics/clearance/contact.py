@@ -1,4 +1,4 @@
-"""Contact forces in the loose joints, and the acceleration they make, in clearance coordinates.
+"""Contact forces in the clearance joints, and the acceleration they make, in clearance coordinates.
 
 The hot path: plain arrays indexed in place, since views and calls per joint would cost more than the laws.
 """
@@ -16,8 +16,8 @@ from leg_wear_monitor.dynamics.joint.joint_contact import penetration, stiffness
 from leg_wear_monitor.kernel import kernel
 from leg_wear_monitor.mechanism.arrays import Floats
 
-# a sample of a loose joint goes on with: unit normal, friction force [N], slip speed [m/s], derivative of
-# the normal force by the penetration's rate [N s/m], its elastic part [N], the share of the penetration's
+# a sample of a clearance joint goes on with: unit normal, friction force [N], slip speed [m/s], derivative of
+# the normal force by the penetration's rate [N s/m], its elastic part [N], the fraction of the penetration's
 # rate that the bodies' turning makes, by the crank's speed [m/rad], and the contact stiffness
 # there [N/m^1.5]
 NX, NY, F_T, SLIP, DAMPING, ELASTIC, CAM, HERTZ = range(SAMPLE, SAMPLE + 8)
@@ -40,7 +40,7 @@ _NEAR = 0.1  # sine of an angle for which the arc sine's series is good to 3e-11
 
 
 def contact_laws(contacts: ContactArrays) -> Floats:
-    """Laws of the loose joints (k, 6) in one array."""
+    """Laws of the clearance joints (k, 6) in one array."""
     stiffness = [
         stiffness_at(contacts, k, radius, radius - contacts.clearance[k])
         for k, radius in enumerate(contacts.bushing_radius)

@@ -11,7 +11,7 @@ Shapes = dict[str, tuple[int, ...]]
 
 
 def motion_shapes(k: int, damped: bool) -> Shapes:
-    """Parts of a row that moves k loose joints, d = 2 k eccentricities e.
+    """Parts of a row that moves k clearance joints, d = 2 k eccentricities e.
 
     What changes with e comes first, as `changing_shapes` says: ``inverse_mass`` of e; forces on e
     without contact, ``free`` by 1, w' and w^2; slip of each joint by w, ``lever_drive``, which is also what

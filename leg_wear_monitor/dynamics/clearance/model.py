@@ -57,7 +57,7 @@ class ClearanceState(NamedTuple):
     pending: Floats
 
 
-class Now(NamedTuple):
+class StepTables(NamedTuple):
     """Tables at the present crank angle: ``row`` (w,) of the table ``motion`` and its parts, `motion_shapes`.
 
     Those that change with e are at the eccentricities in the middle of the part of an interval. ``speed``
@@ -107,7 +107,7 @@ class ClearanceWork(NamedTuple):
     at the interval's start.
     """
 
-    now: Now
+    now: StepTables
     system: ContactSystem
     start: Floats
     end: Floats
@@ -140,33 +140,33 @@ def clearance_state(depth: Floats, angle: float, speed: float) -> ClearanceState
 
 def clearance_work(model: ClearanceModel, state: ClearanceState) -> ClearanceWork:
     """Work arrays for a model and a state."""
-    loose, d = len(state.approach), len(state.e)
+    clearance_joints, d = len(state.approach), len(state.e)
     row = np.zeros(model.tables.motion.shape[1])
-    parts = views(row, motion_shapes(loose, model.damped > 0))
-    now = Now(
+    parts = views(row, motion_shapes(clearance_joints, model.damped > 0))
+    now = StepTables(
         row=row,
         speed=np.zeros(2),
         force=np.zeros(d),
         bare=np.zeros(d),
         drift=np.zeros((d, d)),
-        lever_response=np.zeros((loose, d)),
+        lever_response=np.zeros((clearance_joints, d)),
         torque_0=np.zeros(1),
         torque_by_v=np.zeros(d),
         torque_by_e=np.zeros(d),
-        toward=np.zeros((loose, TO_ANGLE + 1)),
+        toward=np.zeros((clearance_joints, TO_ANGLE + 1)),
         **parts,
     )
     return ClearanceWork(
         now=now,
-        system=contact_system(loose),
-        start=np.zeros((loose, COLUMNS)),
-        end=np.zeros((loose, COLUMNS)),
+        system=contact_system(clearance_joints),
+        start=np.zeros((clearance_joints, COLUMNS)),
+        end=np.zeros((clearance_joints, COLUMNS)),
         x=np.zeros((VECTORS, d)),
         weight=np.zeros(state.depth.shape[2]),
         by=np.zeros(model.tables.reaction.shape[1]),
         reaction=np.zeros(len(model.tables.reaction_joint)),
         toe=np.zeros(2),
-        added=np.zeros((loose, JOINT_RATES)),
+        added=np.zeros((clearance_joints, JOINT_RATES)),
         drive_start=np.zeros(3),
         drive_end=np.zeros(3),
         backup=np.zeros_like(state.motion),
@@ -177,7 +177,7 @@ def clearance_work(model: ClearanceModel, state: ClearanceState) -> ClearanceWor
 
 @kernel
 def blend(points, angle):
-    """Row of a table (points a turn) before a crank angle, and the share of the way to the next."""
+    """Row of a table (points a turn) before a crank angle, and the fraction of the way to the next."""
     u = angle * (points / (2.0 * math.pi))
     u -= points * math.floor(u / points)
     i = min(points - 1, int(u))
@@ -185,13 +185,13 @@ def blend(points, angle):
 
 
 @kernel
-def take_tables(tables, angle, speed, acceleration, out_now):
+def take_tables(tables, angle, speed, acceleration, out_step_tables):
     """Tables at a crank angle [rad], speed [rad/s] and acceleration [rad/s^2]."""
-    motion, row = tables.motion, out_now.row
+    motion, row = tables.motion, out_step_tables.row
     i, w = blend(motion.shape[0] - 1, angle)
     for j in range(row.shape[0]):
         row[j] = motion[i, j] + w * (motion[i + 1, j] - motion[i, j])
-    out_now.speed[0], out_now.speed[1] = speed, acceleration
+    out_step_tables.speed[0], out_step_tables.speed[1] = speed, acceleration
 
 
 @kernel

@@ -24,10 +24,10 @@ GAMMA = 1.0 - math.sqrt(0.5)
 
 
 class ContactSystem(NamedTuple):
-    """The factored system of m contacts among k loose joints.
+    """The factored system of m contacts among k clearance joints.
 
     ``active`` (k,) their joints, ``normal`` (k, 2), ``response`` B^T (k, d), ``factor`` (k, k) L with 1 / D
-    of L D L^T on its diagonal, ``ratio`` (k,) gamma h K / D, ``cam`` (k,) the share of the
+    of L D L^T on its diagonal, ``ratio`` (k,) gamma h K / D, ``cam`` (k,) the fraction of the
     penetration's rate that does not come from e', ``p`` (k,).
     """
 
@@ -41,7 +41,7 @@ class ContactSystem(NamedTuple):
 
 
 def contact_system(k: int) -> ContactSystem:
-    """Room for k loose joints."""
+    """Room for k clearance joints."""
     return ContactSystem(
         active=np.zeros(k, dtype=np.int64),
         normal=np.zeros((k, 2)),

@@ -21,7 +21,7 @@ from leg_wear_monitor.dynamics.clearance.tables import ClearanceTables, build_ta
 from leg_wear_monitor.dynamics.joint.contact_event import F_N
 from leg_wear_monitor.dynamics.run.drive import steady_drive
 from leg_wear_monitor.dynamics.run.protocol import DONE, Sample, Setup, stop
-from leg_wear_monitor.dynamics.run.run_statistics import Tally, new_tally
+from leg_wear_monitor.dynamics.run.run_statistics import RunStatistics, new_run_statistics
 from leg_wear_monitor.errors import ConfigError
 from leg_wear_monitor.mechanism.arrays import Floats
 from leg_wear_monitor.mechanism.ideal import TURN
@@ -93,7 +93,7 @@ class ClearanceStepper:
         start = clearance_state(self.state.depth, crank_angle, speed)
         self.state.motion[:] = start.motion
 
-    def advance(self, polynomial: Floats, t_end: float, tally: Tally) -> tuple[int, int]:
+    def advance(self, polynomial: Floats, t_end: float, statistics: RunStatistics) -> tuple[int, int]:
         """Advance by all whole intervals up to a time, and add to a tally.
 
         Parameters
@@ -101,16 +101,16 @@ class ClearanceStepper:
         polynomial : (7,) array
             Crank angle [rad]: reference time [s], then six coefficients; it holds since the last call.
         t_end : float, s
-        tally : Tally
+        statistics : RunStatistics
 
         Returns
         -------
         status, k : int
-            `DONE`, or why it stopped and the loose joint concerned (-1 if none); the state is then that of
+            `DONE`, or why it stopped and the clearance joint concerned (-1: none); the state is then that of
             the last whole interval.
         """
         status, k = advance_clearances(
-            self.model, self._setup.surfaces.feeds_back, self.state, polynomial, t_end, tally, self.work
+            self.model, self._setup.surfaces.feeds_back, self.state, polynomial, t_end, statistics, self.work
         )
         return int(status), int(k)
 
@@ -166,7 +166,7 @@ class ClearanceRun:
         resting = at["potential"][0] - at["push"] @ e - 0.5 * e @ at["push_e"] @ e
         return float(moving + resting) + self._observe()
 
-    def advance(self, t_end: float, tally: Tally) -> None:
+    def advance(self, t_end: float, statistics: RunStatistics) -> None:
         """Go on to the last whole interval before a time [s] and add to a tally.
 
         Raises
@@ -174,7 +174,7 @@ class ClearanceRun:
         SimulationError
             Naming the joint, the time and what to try.
         """
-        status, k = self.stepper.advance(self._polynomial, t_end, tally)
+        status, k = self.stepper.advance(self._polynomial, t_end, statistics)
         if status != DONE:
             raise stop(self._setup, status, k, self.time)
 
@@ -209,7 +209,7 @@ class ClearanceRun:
         run.stepper.state.intervals[0] = 0.0
         angle, speed, _ = stepper.state.drive
         run._polynomial = steady_drive(angle, speed)
-        run.advance(rest, new_tally(len(self._setup.linkage.mechanism.joints)))
+        run.advance(rest, new_run_statistics(len(self._setup.linkage.mechanism.joints)))
         return run.sample()
 
     def _observe(self) -> float:

@@ -21,7 +21,7 @@ def load_state(model, surfaces, state, angle, speed, acceleration, ahead, work):
 
 
 @kernel
-def sample_start(model, surfaces, state, turned, t, tally, work):
+def sample_start(model, surfaces, state, turned, t, statistics, work):
     """Sample the joints where a step starts; contact begins where worn flanks have closed in."""
     x, start, now, approach, contacts = work.x, work.start, work.now, state.approach, model.contacts
     accelerate_clearances(model, surfaces, approach, now, turned, x, E0, V0, A0, start)
@@ -30,7 +30,7 @@ def sample_start(model, surfaces, state, turned, t, tally, work):
         if approach[k] == 0.0 and start[k, DELTA] > 0.0 and start[k, DELTA_DOT] > 0.0:
             begin_contact(
                 k, contacts.joint, contacts.speed_floor, t, start[k, DELTA_DOT],
-                approach, state.recent, tally.impact, tally.impacts,
+                approach, state.recent, statistics.impact, statistics.impacts,
             )  # fmt: skip
             closed = True
     if closed:

@@ -120,7 +120,7 @@ def shift_start(now, x):
 
 @kernel
 def integrate_joints(law, approach, h, start, end, out_added):
-    """Integrals of the loose joints over a step of length h [s]; (k, JOINT_RATES).
+    """Integrals of the clearance joints over a step of length h [s]; (k, JOINT_RATES).
 
     Simpson's rule where a force changes much, with the contact law at the middle of the penetration's
     cubic: an impact takes few steps. The trapezium elsewhere.

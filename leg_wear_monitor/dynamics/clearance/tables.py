@@ -1,7 +1,7 @@
 """Everything of the leg but its contacts, as tables over the crank angle (physics.md section 7).
 
 With X = J^-1 at centred journals, J the Jacobian of all closures and the drive, the columns of X that
-belong to the loose joints are S and the drive's is s. In the eccentricities e and the crank angle th, w its
+belong to the clearance joints are S, the drive's is s. In the eccentricities e and the crank angle th, w its
 speed, the Lagrangian to the first order of e / L beside w, and to the second beside w^2 and gravity, is
 
     1/2 e' A e' + w e' (B + B_e e) + 1/2 w^2 (c + c_e e + 1/2 e c_ee e) - V,
@@ -34,7 +34,7 @@ _MOST_PARTS = 8
 
 
 class ClearanceTables(NamedTuple):
-    """Tables at N equal steps of the crank, the first repeated at the end; k loose joints, d = 2 k.
+    """Tables at N equal steps of the crank, the first repeated at the end; k clearance joints, d = 2 k.
 
     ``motion`` (N + 1, w) the rows that `motion_shapes` names; ``reaction`` (N + 1, 4 + 3 d + k, r) the
     drive torque and the reactions of the ideal joints by (1, w', w^2, w, e'', w e', e', F_t), and

@@ -17,7 +17,7 @@ from leg_wear_monitor.dynamics.joint.contact_event import (
     EY,
     NEVER,
     SAMPLE,
-    first_touch,
+    first_contact_event,
     update_contacts,
 )
 from leg_wear_monitor.dynamics.joint.joint_contact import wear_joint
@@ -43,7 +43,7 @@ class FullState(NamedTuple):
     """All that a continuation needs.
 
     ``y`` (6 n,) coordinates, then velocities, of n bodies; ``clock`` (2,) time [s] and the next step to
-    try [s]; ``approach`` (k,) approach speed of each loose joint in contact, 0 for the others [m/s];
+    try [s]; ``approach`` (k,) approach speed of each clearance joint in contact, 0 for the others [m/s];
     ``recent`` (k, 4) its last two samples of time and normal force.
     """
 
@@ -66,10 +66,10 @@ class FullWork(NamedTuple):
     scratch: FullScratch
 
 
-def full_state(q: Floats, v: Floats, loose: int, t: float = 0.0) -> FullState:
+def full_state(q: Floats, v: Floats, clearance_joints: int, t: float = 0.0) -> FullState:
     """State at rest in all contacts: coordinates q (n, 3) and velocities v (n, 3)."""
     y = np.concatenate([q.ravel(), v.ravel()])
-    return FullState(y, np.array([t, 1.0e-6]), np.zeros(loose), np.zeros((loose, 4)))
+    return FullState(y, np.array([t, 1.0e-6]), np.zeros(clearance_joints), np.zeros((clearance_joints, 4)))
 
 
 def full_work(model: FullModel, tolerance_m: float, tolerance_mps: float, sectors: int) -> FullWork:
@@ -121,17 +121,17 @@ def slope_here(model, surfaces, state, polynomial, work):
 
 
 @kernel
-def _accept(model, surfaces, state, h, toe, tally, work):
+def _accept(model, surfaces, state, h, toe, statistics, work):
     """Take the trial step: sums, wear, contacts. Returns whether a contact began or ended."""
     arrays, contacts, scratch = model.arrays, model.contacts, work.scratch
     half = state.y.shape[0] // 2
     q, v = work.trial[:half].reshape(-1, 3), work.trial[half:].reshape(-1, 3)
     last = STAGES - 1
-    tally.steps[1] += 1
-    add_step(tally, h, WEIGHTS, work.rates, work.drive_rates)
+    statistics.steps[1] += 1
+    add_step(statistics, h, WEIGHTS, work.rates, work.drive_rates)
     a = work.slope[last, half:].reshape(-1, 3)
     torque = work.drive_rates[last, TORQUE]
-    compare_toe(toe, q[arrays.drive_body, 2], scratch.cs, q, v, a, torque, tally.response)
+    compare_toe(toe, q[arrays.drive_body, 2], scratch.cs, q, v, a, torque, statistics.response)
     for k in range(contacts.joint.shape[0]):
         if state.approach[k] > 0.0:
             joint = contacts.joint[k]
@@ -141,12 +141,12 @@ def _accept(model, surfaces, state, h, toe, tally, work):
             b, j = arrays.joint_body[joint, 0], arrays.joint_body[joint, 1]
             ex, ey = scratch.contact[k, EX], scratch.contact[k, EY]
             here = (ex, ey, q[b, 2], q[j, 2])
-            tally.worn_energy[0] += wear_joint(
+            statistics.worn_energy[0] += wear_joint(
                 contacts, surfaces, k, ex, ey, q[b, 2], q[j, 2], here, integral, work.weight
             )
     changed = update_contacts(
         contacts.joint, contacts.speed_floor, state.clock[0], h, work.start, scratch.contact,
-        state.approach, state.recent, tally.peak, tally.impact, tally.impacts,
+        state.approach, state.recent, statistics.peak, statistics.impact, statistics.impacts,
     )  # fmt: skip
     copy_array(work.trial, state.y)
     state.clock[0] += h
@@ -159,7 +159,7 @@ def _accept(model, surfaces, state, h, toe, tally, work):
 
 @kernel
 def _pushed_through(model, scratch):
-    """First loose joint whose journal is pushed further than a tenth of the bushing's radius, else -1."""
+    """First clearance joint whose journal is pushed further than a tenth of the bushing's radius, else -1."""
     for k in range(model.contacts.joint.shape[0]):
         if not scratch.contact[k, DELTA] < 0.1 * model.contacts.bushing_radius[k]:
             return k
@@ -167,19 +167,19 @@ def _pushed_through(model, scratch):
 
 
 @entry
-def advance_full(model, surfaces, state, polynomial, t_end, toe, tally, work):
+def advance_full(model, surfaces, state, polynomial, t_end, toe, statistics, work):
     """Advance the state to t_end [s] and add to the tally.
 
     Returns
     -------
     status, k
-        DONE, or why it stopped and the loose joint concerned (-1 if none). The state is then the last
+        DONE, or why it stopped and the clearance joint concerned (-1 if none). The state is then the last
         accepted one.
     """
     scratch = work.scratch
     if not slope_here(model, surfaces, state, polynomial, work):
         return SINGULAR, -1
-    cut = NEVER  # share of the last trial after which a joint touched
+    cut = NEVER  # fraction of the last trial after which a joint touched
     while state.clock[0] < t_end:
         h = state.clock[1]
         left = t_end - state.clock[0]
@@ -188,7 +188,7 @@ def advance_full(model, surfaces, state, polynomial, t_end, toe, tally, work):
         ends = h >= left * (1.0 - 1.0e-12)
         if ends:
             h = left
-        tally.steps[0] += 1
+        statistics.steps[0] += 1
         error = _try_step(model, surfaces, state, polynomial, h, work)
         if not error <= 1.0:
             state.clock[1] = next_step(h, error, 1.0)
@@ -196,9 +196,9 @@ def advance_full(model, surfaces, state, polynomial, t_end, toe, tally, work):
             if state.clock[1] < _SHORTEST_STEP:
                 return STEP_TOO_SMALL, _pushed_through(model, scratch)
             continue
-        share = first_touch(state.approach, h, work.start, scratch.contact)
-        if share < 1.0 and share * h > _SHORTEST_STEP:
-            cut = share * h / state.clock[1]
+        fraction = first_contact_event(state.approach, h, work.start, scratch.contact)
+        if fraction < 1.0 and fraction * h > _SHORTEST_STEP:
+            cut = fraction * h / state.clock[1]
             continue
         pushed = _pushed_through(model, scratch)
         if pushed >= 0:
@@ -206,7 +206,7 @@ def advance_full(model, surfaces, state, polynomial, t_end, toe, tally, work):
         if not ends and cut == NEVER:
             state.clock[1] = min(LONGEST_STEP, next_step(h, error, 5.0))
         cut = NEVER
-        changed = _accept(model, surfaces, state, h, toe, tally, work)
+        changed = _accept(model, surfaces, state, h, toe, statistics, work)
         if changed and not slope_here(model, surfaces, state, polynomial, work):
             return SINGULAR, -1
         if ends:

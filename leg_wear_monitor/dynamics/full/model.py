@@ -44,7 +44,7 @@ BAUMGARTE = 200.0  # alpha = beta [1/s]: drift decays within 5 ms, far slower th
 class FullModel(NamedTuple):
     """What does not change during a run.
 
-    ``rows`` are those of the ideal joints and of a drive by speed; ``contacts`` the loose joints;
+    ``rows`` are those of the ideal joints and of a drive by speed; ``contacts`` the clearance joints;
     ``baumgarte`` alpha = beta [1/s].
     """
 
@@ -57,7 +57,7 @@ class FullModel(NamedTuple):
 class FullScratch(NamedTuple):
     """Room for one evaluation, so that the step allocates nothing.
 
-    After it: ``lam`` (m,) multipliers, ``contact`` (k, SAMPLE) the loose joints as `touch` wants them.
+    After it: ``lam`` (m,) multipliers, ``contact`` (k, SAMPLE) the clearance joints as `touch` wants them.
     """
 
     cs: Floats
@@ -97,7 +97,7 @@ def full_scratch(model: FullModel) -> FullScratch:
 
 @kernel
 def eccentricity(model, k, q, v, cs):
-    """Eccentricity [m] of loose joint k, its rate [m/s], and the bodies of bushing and journal."""
+    """Eccentricity [m] of clearance joint k, its rate [m/s], and the bodies of bushing and journal."""
     joint = model.contacts.joint[k]
     b, j = model.arrays.joint_body[joint, 0], model.arrays.joint_body[joint, 1]
     sbx, sby = arm(cs, b, model.arrays.joint_point[joint, 0])
@@ -110,7 +110,7 @@ def eccentricity(model, k, q, v, cs):
 
 @kernel
 def add_contacts(model, surfaces, approach, q, v, scratch, out_rate):
-    """Add the contact forces of the loose joints; sample them and note the rates of their integrals."""
+    """Add the contact forces of the clearance joints; sample them and note the rates of their integrals."""
     contacts = model.contacts
     for k in range(contacts.joint.shape[0]):
         ex, ey, vx, vy, b, j, sbx, sby = eccentricity(model, k, q, v, scratch.cs)
@@ -157,7 +157,7 @@ def assemble_schur(rows, arrays, jac, out_schur):
 def accelerate(model, surfaces, approach, polynomial, t, q, v, scratch, out_a, out_rate, out_drive_rate):
     """Accelerations (n, 3) and multipliers at time t; the rates of all integrals beside.
 
-    ``approach`` (k,) holds the approach speed of each loose joint that is in contact, 0 for the others.
+    ``approach`` (k,) holds the approach speed of each clearance joint that is in contact, 0 for the others.
     Returns False where the closures are singular.
     """
     arrays, rows = model.arrays, model.rows

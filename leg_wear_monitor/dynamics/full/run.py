@@ -9,7 +9,7 @@ from leg_wear_monitor.dynamics.full.advance import FullState, advance_full, full
 from leg_wear_monitor.dynamics.full.model import full_model, total_energy
 from leg_wear_monitor.dynamics.run.drive import steady_drive
 from leg_wear_monitor.dynamics.run.protocol import DONE, Sample, Setup, stop
-from leg_wear_monitor.dynamics.run.run_statistics import FORCE, TORQUE, Tally, new_tally
+from leg_wear_monitor.dynamics.run.run_statistics import FORCE, TORQUE, RunStatistics, new_run_statistics
 from leg_wear_monitor.dynamics.run.toe_deviation import NO_TOE, Toe, ideal_toe
 from leg_wear_monitor.mechanism.arrays import Floats
 from leg_wear_monitor.mechanism.ideal import ideal_motion, turned
@@ -48,7 +48,7 @@ class FullRun:
         sectors = setup.surfaces.depth.shape[2]
         self._tolerances = tolerance_m, tolerance_m * TOLERANCE_RATE
         self._work = full_work(self.model, *self._tolerances, sectors)
-        self.advance(0.0, new_tally(0))  # evaluates the start, so that it can be sampled
+        self.advance(0.0, new_run_statistics(0))  # evaluates the start, so that it can be sampled
 
     @property
     def time(self) -> float:
@@ -76,7 +76,7 @@ class FullRun:
         energy = total_energy(self.model, self._setup.surfaces, self.q, self.v, self._work.scratch)
         return float(energy)
 
-    def advance(self, t_end: float, tally: Tally) -> None:
+    def advance(self, t_end: float, statistics: RunStatistics) -> None:
         """Go on to a time [s] and add to a tally.
 
         Raises
@@ -85,7 +85,14 @@ class FullRun:
             Naming the joint, the time and what to try.
         """
         status, k = advance_full(
-            self.model, self._setup.surfaces, self.state, self.polynomial, t_end, self.toe, tally, self._work
+            self.model,
+            self._setup.surfaces,
+            self.state,
+            self.polynomial,
+            t_end,
+            self.toe,
+            statistics,
+            self._work,
         )
         if status != DONE:
             raise stop(self._setup, status, k, self.time)
@@ -119,7 +126,7 @@ def _start(setup: Setup) -> FullState:
     linkage = setup.linkage
     if not isinstance(linkage.mechanism.drive, TorqueDrive):
         motion = ideal_motion(linkage, [0.0], setup.speed)
-        return full_state(motion.q[0], motion.v[0], len(setup.loose))
+        return full_state(motion.q[0], motion.v[0], len(setup.clearance_joints))
     angle = linkage.mechanism.assembly.crank_angle
     velocity = ideal_motion(linkage, [angle], setup.speed).v[0]
-    return full_state(assemble(linkage), velocity, len(setup.loose))
+    return full_state(assemble(linkage), velocity, len(setup.clearance_joints))

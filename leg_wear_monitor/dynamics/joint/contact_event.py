@@ -1,20 +1,20 @@
 """Contacts that begin and end inside a step, found on the cubic of the penetration through its ends.
 
-Both formulations hand over the loose joints as rows of `SAMPLE` columns at a step's start and end.
+Both formulations hand over the clearance joints as rows of `SAMPLE` columns at a step's start and end.
 """
 
 from leg_wear_monitor.dynamics.run.dormand_prince import hermite
 from leg_wear_monitor.dynamics.run.run_statistics import begin_impact, end_impact, parabola_peak, raise_peak
 from leg_wear_monitor.kernel import kernel
 
-# a sample of a loose joint: eccentricity [m] and its rate, normal force [N], penetration [m] and its rate
+# a sample of a clearance joint: eccentricity [m] and its rate, normal force [N], penetration [m] and its rate
 EX, EY, VX, VY, F_N, DELTA, DELTA_DOT = 0, 1, 2, 3, 4, 5, 6
 SAMPLE = 7
 
-TOUCH = 1.0e-11  # penetration [m] at which a contact counts as just begun
+CONTACT_EVENT = 1.0e-11  # penetration [m] at which a contact counts as just begun
 NEVER = 2.0
 
-_CLOSE = 1.0e-14  # share of a step to which a crossing is found
+_CLOSE = 1.0e-14  # fraction of a step to which a crossing is found
 
 
 @kernel
@@ -45,7 +45,7 @@ def _delta_at(u, h, k, start, end):
 
 
 @kernel
-def first_touch(approach, h, start, end):
+def first_contact_event(approach, h, start, end):
     """Share of a step after which the first of the open joints touches; NEVER if none does.
 
     ``approach`` (k,) is 0 for open joints; ``start`` and ``end`` (k, columns) are samples. The middle of
@@ -53,17 +53,17 @@ def first_touch(approach, h, start, end):
     """
     earliest = NEVER
     for k in range(approach.shape[0]):
-        if approach[k] == 0.0 and start[k, DELTA] <= TOUCH:
-            if start[k, DELTA_DOT] > 0.0 and _delta_at(0.5, h, k, start, end) > TOUCH:
+        if approach[k] == 0.0 and start[k, DELTA] <= CONTACT_EVENT:
+            if start[k, DELTA_DOT] > 0.0 and _delta_at(0.5, h, k, start, end) > CONTACT_EVENT:
                 earliest = min(earliest, _crossing(0.0, 0.5, True, h, k, start, end))
-            elif end[k, DELTA] > TOUCH:
+            elif end[k, DELTA] > CONTACT_EVENT:
                 earliest = min(earliest, _crossing(0.5, 1.0, True, h, k, start, end))
     return earliest
 
 
 @kernel
 def begin_contact(k, joint, speed_floor, t, rate, approach, recent, impact, impacts):
-    """Contact begins in loose joint k at time t [s] with the penetration growing at a rate [m/s]."""
+    """Contact begins in clearance joint k at time t [s] with the penetration growing at a rate [m/s]."""
     approach[k] = max(rate, speed_floor[k])
     begin_impact(impact, impacts, joint[k], t, rate)
     recent[k, 0], recent[k, 1], recent[k, 2], recent[k, 3] = t, 0.0, t, 0.0
@@ -82,7 +82,7 @@ def update_contacts(joint, speed_floor, t, h, start, end, approach, recent, peak
         if approach[k] == 0.0:
             # a worn profile can close in on a journal that does not move towards it
             nearer = rate > 0.0 or end[k, DELTA] > start[k, DELTA]
-            if end[k, DELTA] >= -TOUCH and nearer:
+            if end[k, DELTA] >= -CONTACT_EVENT and nearer:
                 begin_contact(k, joint, speed_floor, t + h, rate, approach, recent, impact, impacts)
                 changed = True
             continue

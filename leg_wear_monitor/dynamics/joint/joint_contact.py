@@ -1,4 +1,4 @@
-"""One loose joint, from eccentricity to force: the law that both formulations share.
+"""One clearance joint, from eccentricity to force: the law that both formulations share.
 
 physics.md sections 3 to 6.
 """
@@ -14,10 +14,10 @@ from leg_wear_monitor.wear.surfaces import deposit_wear, local_surfaces
 
 @kernel
 def penetration(contacts, surfaces, k, ex, ey, direction, angle_b, angle_j):
-    """Penetration [m], normal and local radii of bushing and journal [m] of loose joint k.
+    """Penetration [m], normal and local radii of bushing and journal [m] of clearance joint k.
 
     ``direction`` [rad] is that of the eccentricity, and only asked for where wear feeds back. Last come the
-    shares of the penetration's rate that the turning of bushing and journal make, by their speeds [m/rad].
+    fractions of the penetration's rate that the turning of bushing and journal make, by their speeds [m/rad].
     The normal is a unit vector on fresh surfaces, see `worn_contact` for worn ones: the normal force times
     it is the gradient of the contact's energy, to which the stiffness that changes from place to place adds.
     """
@@ -42,7 +42,7 @@ def penetration(contacts, surfaces, k, ex, ey, direction, angle_b, angle_j):
 
 @kernel
 def stiffness_at(contacts, k, bushing, journal):
-    """Contact stiffness [N/m^1.5] of loose joint k at the local radii [m]."""
+    """Contact stiffness [N/m^1.5] of clearance joint k at the local radii [m]."""
     if contacts.stiffness[k] > 0.0:
         return contacts.stiffness[k]
     return contact_stiffness(contacts.modulus[k], bushing, journal)
@@ -50,7 +50,7 @@ def stiffness_at(contacts, k, bushing, journal):
 
 @kernel
 def joint_force(contacts, surfaces, k, ex, ey, vx, vy, angle_b, angle_j, speed_b, speed_j, approach_speed):
-    """Forces in loose joint k; none while its ``approach_speed`` is 0, which marks it as open.
+    """Forces in clearance joint k; none while its ``approach_speed`` is 0, which marks it as open.
 
     Eccentricity (ex, ey) [m] and its rate [m/s]; angles [rad] and speeds [rad/s] of the bushing's and the
     journal's body. Both forces act at the bushing's surface point P_b + R_b n, so action equals reaction
@@ -81,7 +81,7 @@ def joint_force(contacts, surfaces, k, ex, ey, vx, vy, angle_b, angle_j, speed_b
 
 @kernel
 def contact_energy(contacts, surfaces, k, ex, ey, angle_b, angle_j):
-    """Elastic energy [J] in loose joint k."""
+    """Elastic energy [J] in clearance joint k."""
     direction = math.atan2(ey, ex) if surfaces.feeds_back else 0.0
     delta, _, _, bushing, journal, _, _ = penetration(
         contacts, surfaces, k, ex, ey, direction, angle_b, angle_j
@@ -91,7 +91,7 @@ def contact_energy(contacts, surfaces, k, ex, ey, angle_b, angle_j):
 
 @kernel
 def wear_joint(contacts, surfaces, k, ex, ey, angle_b, angle_j, acted, integral, out_weight):
-    """Wear loose joint k by the increment ``integral`` of F_N |v_t| dt [J]; returns the energy that goes [J].
+    """Wear clearance joint k by the increment ``integral`` of F_N |v_t| dt [J]; returns the lost energy [J].
 
     The journal is at (ex, ey) [m], and the wall that goes from under it takes what it stored along.
     ``acted`` is where the increment acted: eccentricity [m], and angles of bushing and journal [rad].

@@ -5,7 +5,7 @@ from typing import NamedTuple, Protocol
 import attrs
 
 from leg_wear_monitor.contact.arrays import ContactArrays
-from leg_wear_monitor.dynamics.run.run_statistics import Tally
+from leg_wear_monitor.dynamics.run.run_statistics import RunStatistics
 from leg_wear_monitor.errors import SimulationError
 from leg_wear_monitor.mechanism.arrays import Floats
 from leg_wear_monitor.mechanism.position import Linkage
@@ -34,8 +34,8 @@ class Setup:
     Attributes
     ----------
     linkage : Linkage
-    loose : tuple of str
-        Names of the loose joints, in the order of ``contacts``.
+    clearance_joints : tuple of str
+        Names of the clearance joints, in the order of ``contacts``.
     contacts : ContactArrays
     surfaces : Surfaces
         Changed as the run goes.
@@ -44,7 +44,7 @@ class Setup:
     """
 
     linkage: Linkage
-    loose: tuple[str, ...]
+    clearance_joints: tuple[str, ...]
     contacts: ContactArrays
     surfaces: Surfaces
     speed: float
@@ -70,7 +70,7 @@ class Run(Protocol):
     def stored_energy(self) -> float:
         """Kinetic and potential energy, that of gravity, springs and contacts [J]."""
 
-    def advance(self, t_end: float, tally: Tally) -> None:
+    def advance(self, t_end: float, statistics: RunStatistics) -> None:
         """Go on to a time [s] and add to a tally; raises SimulationError where the motion diverges."""
 
     def sample(self) -> Sample:
@@ -78,8 +78,8 @@ class Run(Protocol):
 
 
 def stop(setup: Setup, status: int, k: int, time: float) -> SimulationError:
-    """Error of a run that had to stop: loose joint k (-1 if none) at a time [s]."""
-    where = f"joint {setup.loose[k]} " if k >= 0 else ""
+    """Error of a run that had to stop: clearance joint k (-1 if none) at a time [s]."""
+    where = f"joint {setup.clearance_joints[k]} " if k >= 0 else ""
     return SimulationError(
         f"{setup.linkage.mechanism.source}: {where}at t = {time:.6g} s: {_REASONS[status]}"
     )

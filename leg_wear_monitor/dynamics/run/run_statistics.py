@@ -30,7 +30,7 @@ _FIRST_OCTAVE, _OCTAVES, _IN_OCTAVE = -20, 50, 128
 _BINS = _OCTAVES * _IN_OCTAVE
 
 
-class Tally(NamedTuple):
+class RunStatistics(NamedTuple):
     """Sums over counted time, for j joints and the drive.
 
     ``time`` (1,) counted [s]; ``integral`` (j, 6); ``drive_integral`` (3,); ``peak`` (j,) largest force;
@@ -55,9 +55,9 @@ class Tally(NamedTuple):
     steps: Ints
 
 
-def new_tally(joints: int) -> Tally:
+def new_run_statistics(joints: int) -> RunStatistics:
     """An empty tally."""
-    return Tally(
+    return RunStatistics(
         time=np.zeros(1),
         integral=np.zeros((joints, JOINT_RATES)),
         drive_integral=np.zeros(DRIVE_RATES),
@@ -89,58 +89,58 @@ def bin_edge(i: float) -> float:
     return float(2.0 ** (octave + _FIRST_OCTAVE) * (1.0 + inside / _IN_OCTAVE))
 
 
-def percentile(seconds: Floats, share: float) -> float:
-    """Magnitude below which a share of the time was spent, to the width of a bin (at most 0.8 %).
+def percentile(seconds: Floats, fraction: float) -> float:
+    """Magnitude below which a fraction of the time was spent, to the width of a bin (at most 0.8 %).
 
     Parameters
     ----------
     seconds : (bins,) array
-    share : float
+    fraction : float
         In [0, 1].
     """
     reached = np.cumsum(seconds)
     if not reached[-1] > 0.0:
         return 0.0
-    i = int(np.searchsorted(reached, share * reached[-1]))
+    i = int(np.searchsorted(reached, fraction * reached[-1]))
     if i == 0:
         return 0.0
-    return bin_edge(i + (share * reached[-1] - reached[i - 1]) / seconds[i])
+    return bin_edge(i + (fraction * reached[-1] - reached[i - 1]) / seconds[i])
 
 
-def signed_percentile(seconds: Floats, share: float) -> float:
+def signed_percentile(seconds: Floats, fraction: float) -> float:
     """As `percentile`, for a signed quantity: seconds (2, bins) at negative and at positive values."""
     below, total = seconds[0].sum(), seconds.sum()
     if not total > 0.0:
         return 0.0
-    if share * total < below:
-        return -percentile(seconds[0], 1.0 - share * total / below)
-    return percentile(seconds[1], (share * total - below) / (total - below))
+    if fraction * total < below:
+        return -percentile(seconds[0], 1.0 - fraction * total / below)
+    return percentile(seconds[1], (fraction * total - below) / (total - below))
 
 
 @kernel
-def add_step(tally, h, weights, rates, drive_rates):
+def add_step(statistics, h, weights, rates, drive_rates):
     """Add a step of length h [s] by the quadrature weights of its stages (s,).
 
     ``rates`` (s, j, 6) and ``drive_rates`` (s, 3) at the stages; the last stage is the step's end.
     """
-    tally.time[0] += h
+    statistics.time[0] += h
     for s in range(weights.shape[0]):
         w = h * weights[s]
         if w != 0.0:
             for j in range(rates.shape[1]):
                 for r in range(JOINT_RATES):
-                    tally.integral[j, r] += w * rates[s, j, r]
+                    statistics.integral[j, r] += w * rates[s, j, r]
             for r in range(DRIVE_RATES):
-                tally.drive_integral[r] += w * drive_rates[s, r]
+                statistics.drive_integral[r] += w * drive_rates[s, r]
     end = weights.shape[0] - 1
     for j in range(rates.shape[1]):
         force = rates[end, j, FORCE]
-        tally.peak[j] = max(tally.peak[j], force)
-        tally.force_time[j, bin_of(force)] += h
+        statistics.peak[j] = max(statistics.peak[j], force)
+        statistics.force_time[j, bin_of(force)] += h
     torque = drive_rates[end, TORQUE]
-    tally.drive_range[0] = min(tally.drive_range[0], torque)
-    tally.drive_range[1] = max(tally.drive_range[1], torque)
-    tally.torque_time[1 if torque > 0.0 else 0, bin_of(abs(torque))] += h
+    statistics.drive_range[0] = min(statistics.drive_range[0], torque)
+    statistics.drive_range[1] = max(statistics.drive_range[1], torque)
+    statistics.torque_time[1 if torque > 0.0 else 0, bin_of(abs(torque))] += h
 
 
 @kernel

@@ -4,7 +4,7 @@ import math
 from typing import Protocol, Self
 
 from leg_wear_monitor.dynamics.run.protocol import Run, Sample
-from leg_wear_monitor.dynamics.run.run_statistics import new_tally
+from leg_wear_monitor.dynamics.run.run_statistics import new_run_statistics
 
 _ROUNDING = 1.0e-9  # of a step: what a sum of steps is off
 
@@ -44,11 +44,11 @@ class Tracer:
 
     def look_ahead(self, t: float) -> None:
         """Take the samples before a time [s] that the run is about to go to."""
-        branch, tally = None, new_tally(self._joints)
+        branch, statistics = None, new_run_statistics(self._joints)
         while len(self.samples) < self._count:
             due = self._begin + len(self.samples) * self._step
             if due >= t - _ROUNDING * self._step:
                 break
             branch = branch or self._run.branch()
-            branch.advance(due, tally)
+            branch.advance(due, statistics)
             self.samples.append(branch.sample_at(due))

@@ -130,7 +130,7 @@ def next_level(
     return Level.OK, beyond
 
 
-def judged(alarm: Alarm, value: float, limit: Limit, stamp_ns: int, cycles: int = 1) -> Alarm:
+def evaluated(alarm: Alarm, value: float, limit: Limit, stamp_ns: int, cycles: int = 1) -> Alarm:
     """Alarm after a value; one that is NaN says nothing and leaves the alarm as it is.
 
     Parameters

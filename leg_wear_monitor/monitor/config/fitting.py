@@ -19,7 +19,7 @@ _KEYS = {"radial_clearance": "clearances_m", "wear_coefficient": "wear_coefficie
 
 
 def fitted(mechanism: Mechanism, config: MonitorConfig, source: str = "parameters") -> Mechanism:
-    """Mechanism with the loose joints, clearances, wear and speed of a configuration.
+    """Mechanism with the clearance joints, clearances, wear and speed of a configuration.
 
     Parameters
     ----------
@@ -38,13 +38,16 @@ def fitted(mechanism: Mechanism, config: MonitorConfig, source: str = "parameter
         raise ConfigError(
             source, "mechanism", f"{config.mechanism!r} is driven by a torque, expected one with drive.speed"
         )
-    loose = config.loose_joints or mechanism.loose
-    _check_joints(loose, mechanism, source)
+    clearance_joints = config.clearance_joints or mechanism.clearance_joints
+    _check_joints(clearance_joints, mechanism, source)
     speed = 2.0 * math.pi * (config.cadence.commanded_rpm / 60.0)
-    settings = {name: _settings(mechanism, config, loose, k, source) for k, name in enumerate(loose)}
+    settings = {
+        name: _settings(mechanism, config, clearance_joints, k, source)
+        for k, name in enumerate(clearance_joints)
+    }
     leg = attrs.evolve(
         mechanism,
-        loose=loose,
+        clearance_joints=clearance_joints,
         clearances=mechanism.clearances | settings,
         drive=attrs.evolve(mechanism.drive, speed=speed),
     )
@@ -61,14 +64,14 @@ def check_limits(config: MonitorConfig, mechanism: Mechanism, source: str = "par
         If limits that are given one a joint are not one each, or if the limit of a clearance is beyond the
         bushing's radius, which no clearance reaches.
     """
-    loose, limits = mechanism.loose, config.limits
+    clearance_joints, limits = mechanism.clearance_joints, config.limits
     for name in ("joint_impact_force_n", "joint_clearance_m"):
         given = getattr(limits, name)
-        if given and len(given) != len(loose):
-            raise _wrong_length(source, f"limits.{name}", given, loose, "")
+        if given and len(given) != len(clearance_joints):
+            raise _wrong_length(source, f"limits.{name}", given, clearance_joints, "")
     key = "limits.joint_clearance_m" if limits.joint_clearance_m else "limits.clearance_m"
-    each = limits.joint_clearance_m or (limits.clearance_m,) * len(loose)
-    for joint, limit in zip(loose, each, strict=True):
+    each = limits.joint_clearance_m or (limits.clearance_m,) * len(clearance_joints)
+    for joint, limit in zip(clearance_joints, each, strict=True):
         clearance = mechanism.clearances[joint]
         fault = limit_fault(joint, clearance.radial_clearance, clearance.bushing_radius, limit)
         # a limit below the new clearance is not silent: it raises its alarm at once
@@ -104,23 +107,23 @@ def twin_settings(config: MonitorConfig, source: str = "parameters") -> TwinSett
     )
 
 
-def _check_joints(loose: Sequence[str], mechanism: Mechanism, source: str) -> None:
-    if not loose:
+def _check_joints(clearance_joints: Sequence[str], mechanism: Mechanism, source: str) -> None:
+    if not clearance_joints:
         raise ConfigError(
             source,
-            "loose_joints",
+            "clearance_joints",
             f"none, and {mechanism.source} has none either; expected some of: {_ready(mechanism)}",
         )
-    for name in loose:
+    for name in clearance_joints:
         if name not in mechanism.clearances:
             raise ConfigError(
                 source,
-                "loose_joints",
+                "clearance_joints",
                 f"{name!r} has no clearance settings in {mechanism.source}, expected some of: "
                 f"{_ready(mechanism)}{did_you_mean(name, mechanism.clearances)}",
             )
-    if len(set(loose)) < len(loose):
-        raise ConfigError(source, "loose_joints", f"{list(loose)} names a joint twice")
+    if len(set(clearance_joints)) < len(clearance_joints):
+        raise ConfigError(source, "clearance_joints", f"{list(clearance_joints)} names a joint twice")
 
 
 def _ready(mechanism: Mechanism) -> str:
@@ -128,32 +131,36 @@ def _ready(mechanism: Mechanism) -> str:
 
 
 def _settings(
-    mechanism: Mechanism, config: MonitorConfig, loose: Sequence[str], k: int, source: str
+    mechanism: Mechanism, config: MonitorConfig, clearance_joints: Sequence[str], k: int, source: str
 ) -> Clearance:
-    settings = mechanism.clearances[loose[k]]
+    settings = mechanism.clearances[clearance_joints[k]]
     changes: dict[str, Any] = {}
-    wear = _own(config.wear_coefficients_per_pa, loose, k, source, _KEYS["wear_coefficient"])
+    wear = _own(config.wear_coefficients_per_pa, clearance_joints, k, source, _KEYS["wear_coefficient"])
     if wear is not None:
         changes["wear_coefficient"] = (wear, wear)
-    clearance = _own(config.clearances_m, loose, k, source, _KEYS["radial_clearance"])
+    clearance = _own(config.clearances_m, clearance_joints, k, source, _KEYS["radial_clearance"])
     if clearance is not None:
         changes["radial_clearance"] = clearance
     try:
         return attrs.evolve(settings, **changes)
     except FieldError as error:
-        raise ConfigError(source, _KEYS[error.key], f"joint {loose[k]}: {error.fault}") from error
+        raise ConfigError(source, _KEYS[error.key], f"joint {clearance_joints[k]}: {error.fault}") from error
 
 
-def _own(given: Sequence[float], loose: Sequence[str], k: int, source: str, key: str) -> float | None:
+def _own(
+    given: Sequence[float], clearance_joints: Sequence[str], k: int, source: str, key: str
+) -> float | None:
     """A joint's own value of a list that has one for all or one each, None of an empty one."""
-    if len(given) not in (0, 1, len(loose)):
-        raise _wrong_length(source, key, given, loose, "one for all or ")
+    if len(given) not in (0, 1, len(clearance_joints)):
+        raise _wrong_length(source, key, given, clearance_joints, "one for all or ")
     return given[k if len(given) > 1 else 0] if given else None
 
 
 def _wrong_length(
-    source: str, key: str, given: Sequence[float], loose: Sequence[str], other: str
+    source: str, key: str, given: Sequence[float], clearance_joints: Sequence[str], other: str
 ) -> ConfigError:
     return ConfigError(
-        source, key, f"{list(given)} has {len(given)} values, expected {other}one each for {', '.join(loose)}"
+        source,
+        key,
+        f"{list(given)} has {len(given)} values, expected {other}one each for {', '.join(clearance_joints)}",
     )

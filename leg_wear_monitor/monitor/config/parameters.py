@@ -7,6 +7,7 @@ from typing import Any, TypeVar
 import attrs
 
 from leg_wear_monitor.configuration.nearest import nearest
+from leg_wear_monitor.configuration.renamed import new_name
 from leg_wear_monitor.configuration.strict import shown, structure
 from leg_wear_monitor.errors import ConfigError
 from leg_wear_monitor.monitor.config.settings import MonitorConfig
@@ -165,6 +166,9 @@ def changed(config: _Config, changes: Mapping[str, Any], source: str = "paramete
 def _check_known(name: str, known: Mapping[str, Parameter], source: str) -> None:
     if name in known:
         return
+    renamed = new_name(name)
+    if renamed in known:
+        raise ConfigError(source, name, f"is called {renamed} now")
     near = nearest(name, known)
     expected = f"did you mean {near}?" if near else "docs/parameters.md lists all there are"
     raise ConfigError(source, name, f"unknown parameter, {expected}")

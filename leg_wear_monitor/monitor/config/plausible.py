@@ -27,8 +27,8 @@ def _gait(config: MonitorConfig) -> Iterator[Doubt]:
 def _limits(config: MonitorConfig, leg: Mechanism) -> Iterator[Doubt]:
     limits = config.limits
     key = "limits.joint_clearance_m" if limits.joint_clearance_m else "limits.clearance_m"
-    each = limits.joint_clearance_m or (limits.clearance_m,) * len(leg.loose)
-    for joint, limit in zip(leg.loose, each, strict=True):
+    each = limits.joint_clearance_m or (limits.clearance_m,) * len(leg.clearance_joints)
+    for joint, limit in zip(leg.clearance_joints, each, strict=True):
         fresh = leg.clearances[joint].radial_clearance
         if limit <= fresh:
             yield Doubt(key, f"{limit:g} m is no more than the new clearance of joint {joint}, {fresh:g} m")
@@ -42,10 +42,10 @@ def _limits(config: MonitorConfig, leg: Mechanism) -> Iterator[Doubt]:
 def _clearances(config: MonitorConfig, leg: Mechanism) -> Iterator[Doubt]:
     if not config.clearances_m:
         return
-    for joint in leg.loose:
+    for joint in leg.clearance_joints:
         c = leg.clearances[joint]
         ratio = 100.0 * c.radial_clearance / c.bushing_radius
         if not 1.0e-3 <= ratio <= 25.0:
-            share = f"{c.radial_clearance:g} m is {ratio:.3g} % of the bushing's radius of joint {joint}"
-            yield Doubt("clearances_m", f"{share}; mm for m, or m for mm?")
+            fraction = f"{c.radial_clearance:g} m is {ratio:.3g} % of the bushing's radius of joint {joint}"
+            yield Doubt("clearances_m", f"{fraction}; mm for m, or m for mm?")
             return

@@ -17,11 +17,11 @@ def _filled(text: str) -> str | None:
 
 @attrs.frozen(kw_only=True)
 class Limits:
-    """Where alarms begin: ERROR at the limit, WARN at a share of it."""
+    """Where alarms begin: ERROR at the limit, WARN at a fraction of it."""
 
-    warn_share: float = quantity(
+    warn_fraction: float = quantity(
         "",
-        "share of a limit from which on there is a warning",
+        "fraction of a limit from which on there is a warning",
         above=0.0,
         at_most=1.0,
         default=0.8,
@@ -37,7 +37,7 @@ class Limits:
     )
     joint_impact_force_n: tuple[float, ...] = quantity(
         "N",
-        "the same, one a loose joint, instead of the one for all",
+        "the same, one a clearance joint, instead of the one for all",
         above=0.0,
         at_most=1.0e7,
         default=(),
@@ -48,7 +48,7 @@ class Limits:
     )
     joint_clearance_m: tuple[float, ...] = quantity(
         "m",
-        "the same, one a loose joint, instead of the one for all",
+        "the same, one a clearance joint, instead of the one for all",
         above=0.0,
         at_most=0.1,
         default=(),
@@ -67,7 +67,7 @@ class Limits:
     )
     torque_mismatch: float = quantity(
         "",
-        "RMS of the drive torque that load, friction and lag do not explain, as a share of the predicted RMS",
+        "RMS of the drive torque that load, friction and lag do not explain, fraction of the predicted RMS",
         above=0.0,
         at_most=100.0,
         default=0.1,
@@ -92,19 +92,19 @@ class Limits:
     min_rate_hz: float = quantity(
         "Hz", "least rate of crank samples", above=0.0, at_most=1.0e5, default=40.0, metadata=LIVE
     )
-    bad_sample_share: float = quantity(
-        "", "share of samples that cannot be used", above=0.0, at_most=1.0, default=0.05, metadata=LIVE
+    bad_sample_fraction: float = quantity(
+        "", "fraction of samples that cannot be used", above=0.0, at_most=1.0, default=0.05, metadata=LIVE
     )
-    stuck_torque_share: float = quantity(
+    stuck_torque_fraction: float = quantity(
         "",
-        "share of torque samples that are saturated, or repeat the largest or the smallest",
+        "fraction of torque samples that are saturated, or repeat the largest or the smallest",
         above=0.0,
         at_most=1.0,
         default=0.3,
         metadata=LIVE,
     )
-    lost_time_share: float = quantity(
-        "", "share of the time that was not monitored", above=0.0, at_most=1.0, default=0.05, metadata=LIVE
+    lost_time_fraction: float = quantity(
+        "", "fraction of the time that was not monitored", above=0.0, at_most=1.0, default=0.05, metadata=LIVE
     )
 
 
@@ -114,7 +114,7 @@ class Alarms:
 
     deadband: float = quantity(
         "",
-        "share of a limit by which a value must fall below it before the level falls",
+        "fraction of a limit by which a value must fall below it before the level falls",
         at_least=0.0,
         at_most=0.9,
         default=0.05,
@@ -191,19 +191,19 @@ class MonitorConfig:
         "which leg this is, for diagnostics and the ledger; empty: namespace of the node, or leg",
         default="",
     )
-    loose_joints: tuple[str, ...] = described(
+    clearance_joints: tuple[str, ...] = described(
         "joints with clearance; empty: those of the mechanism's file", default=()
     )
     clearances_m: tuple[float, ...] = quantity(
         "m",
-        "radial clearances when new, one for all loose joints or one each; empty: those of the file",
+        "radial clearances when new, one for all clearance joints or one each; empty: those of the file",
         at_least=1.0e-6,
         at_most=0.1,
         default=(),
     )
     wear_coefficients_per_pa: tuple[float, ...] = quantity(
         "1/Pa",
-        "K/H of both surfaces, one for all loose joints or one each; empty: those of the file",
+        "K/H of both surfaces, one for all clearance joints or one each; empty: those of the file",
         at_least=0.0,
         at_most=1.0e-6,
         default=(),

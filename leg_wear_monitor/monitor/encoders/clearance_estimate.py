@@ -8,12 +8,12 @@ import attrs
 from leg_wear_monitor.mechanism.arrays import Floats
 from leg_wear_monitor.monitor.encoders.angle_regression import Estimate
 
-SEEN_M = 1.0e-4  # standard deviation of a clearance that is seen, at most
+ESTIMATED_M = 1.0e-4  # standard deviation of a clearance that is seen, at most
 SURE_SIGMAS = 4.0
 LEAST_M = 5.0e-5  # a departure that is worth telling
 
 
-class Sight(Enum):
+class ClearanceObservation(Enum):
     """Whether encoders show a clearance; the value is fit for people."""
 
     WAITING = "not enough gait cycles with encoders yet"
@@ -23,12 +23,12 @@ class Sight(Enum):
 
 
 @attrs.frozen(kw_only=True)
-class SeenClearance:
+class ClearanceEstimate:
     """A clearance as encoders show it.
 
     Attributes
     ----------
-    sight : Sight
+    observation : ClearanceObservation
     clearance_m, sigma_m : float
         And its standard deviation; NaN unless it is seen.
     departure_m : float
@@ -37,7 +37,7 @@ class SeenClearance:
         Whether the forecast takes it in: not, if that holds it next to impossible.
     """
 
-    sight: Sight
+    observation: ClearanceObservation
     clearance_m: float = math.nan
     sigma_m: float = math.nan
     departure_m: float = math.nan
@@ -54,7 +54,7 @@ class SeenClearance:
         return abs(self.departure_m) if self.is_other else 0.0 * self.departure_m
 
 
-def seen_clearances(found: Estimate, counted_m: Floats) -> tuple[SeenClearance, ...]:
+def clearance_estimates(found: Estimate, counted_m: Floats) -> tuple[ClearanceEstimate, ...]:
     """What an estimate says of each joint, beside the clearances (k,) that are counted [m]."""
     return tuple(
         _seen(float(clearance), float(sigma), float(counted))
@@ -62,9 +62,12 @@ def seen_clearances(found: Estimate, counted_m: Floats) -> tuple[SeenClearance, 
     )
 
 
-def _seen(clearance_m: float, sigma_m: float, counted_m: float) -> SeenClearance:
-    if sigma_m > SEEN_M:
-        return SeenClearance(sight=Sight.NOT_OBSERVABLE)
-    return SeenClearance(
-        sight=Sight.SEEN, clearance_m=clearance_m, sigma_m=sigma_m, departure_m=clearance_m - counted_m
+def _seen(clearance_m: float, sigma_m: float, counted_m: float) -> ClearanceEstimate:
+    if sigma_m > ESTIMATED_M:
+        return ClearanceEstimate(observation=ClearanceObservation.NOT_OBSERVABLE)
+    return ClearanceEstimate(
+        observation=ClearanceObservation.SEEN,
+        clearance_m=clearance_m,
+        sigma_m=sigma_m,
+        departure_m=clearance_m - counted_m,
     )

@@ -24,8 +24,8 @@ _BATCH = 2  # cycles: neighbours hang together
 _NO_NEWS = 1.0e6  # of the variance before
 
 
-class HiddenSnapshot(NamedTuple):
-    """All of a `HiddenClearance`; nothing in it changes."""
+class ClearanceRegressionSnapshot(NamedTuple):
+    """All of a `ClearanceRegression`; nothing in it changes."""
 
     reference: Reference | None
     before: Estimate | None
@@ -33,7 +33,7 @@ class HiddenSnapshot(NamedTuple):
     each: tuple[Floats, ...]
 
 
-class HiddenClearance:
+class ClearanceRegression:
     """Estimates clearances from encoders, cycle by cycle.
 
     Parameters
@@ -156,11 +156,13 @@ class HiddenClearance:
         covariance = rest @ prior @ rest.T + gain @ noise @ gain.T
         return Estimate(mean, covariance * np.outer(scale, scale), before.joints)
 
-    def snapshot(self) -> HiddenSnapshot:
+    def snapshot(self) -> ClearanceRegressionSnapshot:
         """The whole state."""
-        return HiddenSnapshot(self._reference, self._before, tuple(self._seen), tuple(self._each))
+        return ClearanceRegressionSnapshot(
+            self._reference, self._before, tuple(self._seen), tuple(self._each)
+        )
 
-    def restore(self, snapshot: HiddenSnapshot) -> None:
+    def restore(self, snapshot: ClearanceRegressionSnapshot) -> None:
         """Go back to a snapshot."""
         self._reference, self._before = snapshot.reference, snapshot.before
         self._seen, self._each = list(snapshot.seen), list(snapshot.each)

@@ -13,8 +13,16 @@ from leg_wear_monitor.mechanism.arrays import Floats
 from leg_wear_monitor.mechanism.spec import Mechanism
 from leg_wear_monitor.monitor.config.settings import MonitorConfig
 from leg_wear_monitor.monitor.encoders.angle_regression import Estimate, binned
-from leg_wear_monitor.monitor.encoders.clearance_estimate import SEEN_M, SeenClearance, Sight, seen_clearances
-from leg_wear_monitor.monitor.encoders.clearance_regression import HiddenClearance, HiddenSnapshot
+from leg_wear_monitor.monitor.encoders.clearance_estimate import (
+    ESTIMATED_M,
+    ClearanceEstimate,
+    ClearanceObservation,
+    clearance_estimates,
+)
+from leg_wear_monitor.monitor.encoders.clearance_regression import (
+    ClearanceRegression,
+    ClearanceRegressionSnapshot,
+)
 from leg_wear_monitor.monitor.encoders.commissioning import commissioned, errors_of, held, known_with
 from leg_wear_monitor.monitor.encoders.samples import after, extended, no_encoder_samples, within
 from leg_wear_monitor.monitor.encoders.state import LEAST_PHASES, EncoderState, fault_of
@@ -22,7 +30,7 @@ from leg_wear_monitor.monitor.ledger.entry import Commissioned
 from leg_wear_monitor.twin.reference.joint_angles import angle_model
 from leg_wear_monitor.twin.reference.reference import ReferenceRun, ReferenceSnapshot
 from leg_wear_monitor.twin.sample import Samples
-from leg_wear_monitor.twin.statistics import CycleFigures
+from leg_wear_monitor.twin.statistics import CycleStatistics
 
 OTHERWISE_CYCLES = 20  # in a row with other encoders than before, until those are believed to be the ones
 
@@ -33,14 +41,14 @@ _AGAIN_CYCLES = 100  # between two references
 
 
 class EncoderSnapshot(NamedTuple):
-    """All of an `EncoderWatch`."""
+    """All of an `EncoderObserver`."""
 
     state: EncoderState
-    hidden: HiddenSnapshot
+    hidden: ClearanceRegressionSnapshot
     reference: ReferenceSnapshot
 
 
-class EncoderWatch:
+class EncoderObserver:
     """Estimates clearances from further encoders, and the encoders' errors while they are new.
 
     Parameters
@@ -58,17 +66,19 @@ class EncoderWatch:
 
     def __init__(self, mechanism: Mechanism, config: MonitorConfig, known: Commissioned | None) -> None:
         self._settings, self.config = config.encoders, config
-        self._fresh = np.array([mechanism.clearances[joint].radial_clearance for joint in mechanism.loose])
+        self._fresh = np.array(
+            [mechanism.clearances[joint].radial_clearance for joint in mechanism.clearance_joints]
+        )
         self._model = angle_model(mechanism, self._settings.joints)
         self._reference = ReferenceRun(mechanism, self._model)
-        self._hidden = HiddenClearance(self._model)
+        self._clearance_regression = ClearanceRegression(self._model)
         errors = errors_of(self._settings, known)
         self.state = EncoderState(no_encoder_samples(len(self._settings.names)), errors)
 
     @property
     def cycles(self) -> int:
         """Gait cycles that the estimate is of."""
-        return self._hidden.cycles
+        return self._clearance_regression.cycles
 
     @property
     def commissions(self) -> bool:
@@ -81,13 +91,15 @@ class EncoderWatch:
     @property
     def has_failed(self) -> bool:
         """Whether there is no reference, since the leg could not be simulated for one."""
-        return self.state.asked and not self._reference.is_busy and self._hidden.reference is None
+        return (
+            self.state.asked and not self._reference.is_busy and self._clearance_regression.reference is None
+        )
 
     def see(self, piece: Samples) -> None:
         """Take in samples as they arrive."""
         self.state.samples = extended(self.state.samples, piece)
 
-    def ended(self, figures: CycleFigures) -> None:
+    def ended(self, figures: CycleStatistics) -> None:
         """A gait cycle is over; it counts if the leg walked as commanded."""
         cadence = self.config.cadence
         rpm = 60.0 * figures.direction / figures.moving_s
@@ -113,7 +125,7 @@ class EncoderWatch:
         state, new = self.state, None
         for begin_ns, end_ns in state.due:
             self._look(begin_ns, end_ns)
-            new = self._judge(end_ns) or new
+            new = self._evaluate(end_ns) or new
         state.samples = after(state.samples, state.due[-1][1] if state.due else 0)
         state.due = ()
         self._refer(clearance_m, depth)
@@ -121,25 +133,29 @@ class EncoderWatch:
 
     def replaced(self) -> None:
         """A part is new: the leg is another one."""
-        self._hidden.forget()
-        self.state.found, self.state.asked, self.state.handed_ns = None, False, 0
+        self._clearance_regression.forget()
+        self.state.found, self.state.asked, self.state.updated_ns = None, False, 0
 
-    def seen(self, counted_m: Floats) -> tuple[SeenClearance, ...]:
+    def seen(self, counted_m: Floats) -> tuple[ClearanceEstimate, ...]:
         """What the encoders show of each joint, beside the clearances (k,) that are counted [m]."""
         found = self.state.found
         if found is None:
-            sight = Sight.COMMISSIONING if self.commissions else Sight.WAITING
-            return (SeenClearance(sight=sight),) * len(counted_m)
-        return seen_clearances(found, counted_m)
+            observation = (
+                ClearanceObservation.COMMISSIONING if self.commissions else ClearanceObservation.WAITING
+            )
+            return (ClearanceEstimate(observation=observation),) * len(counted_m)
+        return clearance_estimates(found, counted_m)
 
     def snapshot(self) -> EncoderSnapshot:
         """A copy of the whole state."""
-        return EncoderSnapshot(attrs.evolve(self.state), self._hidden.snapshot(), self._reference.snapshot())
+        return EncoderSnapshot(
+            attrs.evolve(self.state), self._clearance_regression.snapshot(), self._reference.snapshot()
+        )
 
     def restore(self, snapshot: EncoderSnapshot) -> None:
         """Go back to a snapshot of a watch of the same mechanism and parameters; it goes on bit for bit."""
         self.state = attrs.evolve(snapshot.state)
-        self._hidden.restore(snapshot.hidden)
+        self._clearance_regression.restore(snapshot.hidden)
         self._reference.restore(snapshot.reference)
 
     def _look(self, begin_ns: int, end_ns: int) -> None:
@@ -159,8 +175,10 @@ class EncoderWatch:
         deviation[:, absent], counts[:, absent] = np.nan, 0.0
         if any(present):
             settings = self._settings
-            self._hidden.most = settings.commissioning_cycles if self.commissions else settings.window_cycles
-            self._hidden.add_binned(deviation, counts)
+            self._clearance_regression.most = (
+                settings.commissioning_cycles if self.commissions else settings.window_cycles
+            )
+            self._clearance_regression.add_binned(deviation, counts)
             state.since_reference += 1
 
     def _is_changed(self, present: tuple[bool, ...]) -> bool:
@@ -172,7 +190,7 @@ class EncoderWatch:
             return False
         state.present, state.otherwise, state.otherwise_cycles = present, (), 0
         state.found = None
-        self._hidden.forget()
+        self._clearance_regression.forget()
         self._look_anew()
         return True
 
@@ -187,9 +205,9 @@ class EncoderWatch:
         first = np.isnan(errors.centre_rad) & there
         self.state.errors = attrs.evolve(errors, centre_rad=np.where(first, mean, errors.centre_rad))
 
-    def _judge(self, stamp_ns: int) -> Commissioned | None:
+    def _evaluate(self, stamp_ns: int) -> Commissioned | None:
         """Estimate anew; hold the encoders' errors if there are cycles enough."""
-        state, hidden = self.state, self._hidden
+        state, hidden = self.state, self._clearance_regression
         if hidden.reference is None or not any(state.present):
             return None
         if not self.commissions:
@@ -208,7 +226,7 @@ class EncoderWatch:
         reference = self._reference.advance()
         if reference is not None:
             state.since_reference = 0
-            self._hidden.refer(reference, self._before(reference.clearance_m))
+            self._clearance_regression.refer(reference, self._before(reference.clearance_m))
         if self._reference.is_busy or not any(state.present):
             return
         if not state.asked:
@@ -219,24 +237,24 @@ class EncoderWatch:
             self._reference.begin(self._best(clearance_m), depth)
 
     def _is_far(self) -> bool:
-        found, reference = self.state.found, self._hidden.reference
+        found, reference = self.state.found, self._clearance_regression.reference
         if found is None or reference is None or self.state.since_reference < _AGAIN_CYCLES:
             return False
         off = np.abs(found.clearance_m - reference.clearance_m)
-        return bool((off[found.sigma_m <= SEEN_M] > _FAR_M).any())
+        return bool((off[found.sigma_m <= ESTIMATED_M] > _FAR_M).any())
 
     def _best(self, counted_m: Floats) -> Floats:
         """Clearances as seen, where they are; else as counted."""
         found = self.state.found
         if found is None:
             return counted_m
-        return np.where(found.sigma_m <= SEEN_M, found.clearance_m, counted_m)
+        return np.where(found.sigma_m <= ESTIMATED_M, found.clearance_m, counted_m)
 
     def _look_anew(self) -> None:
         """Look at the kept cycles with what is known of the encoders now."""
-        reference = self._hidden.reference
+        reference = self._clearance_regression.reference
         if reference is not None:
-            self._hidden.refer(reference, self._before(reference.clearance_m))
+            self._clearance_regression.refer(reference, self._before(reference.clearance_m))
 
     def _before(self, clearance_m: Floats) -> Estimate:
         """What is known without the cycles; of the clearances only while they commission the encoders."""

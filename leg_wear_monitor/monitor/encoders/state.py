@@ -39,7 +39,7 @@ class EncoderState:
     since_reference : int
         Cycles since the last reference was ready.
     found : Estimate or None
-    handed_ns : int
+    updated_ns : int
         When it was handed to the forecast, 0 if that is due.
     other, believed : tuple of bool
         Which clearances were then surely other than counted, and which the forecast believed.
@@ -55,7 +55,7 @@ class EncoderState:
     asked: bool = False
     since_reference: int = 0
     found: Estimate | None = None
-    handed_ns: int = 0
+    updated_ns: int = 0
     other: tuple[bool, ...] = ()
     believed: tuple[bool, ...] = ()
 

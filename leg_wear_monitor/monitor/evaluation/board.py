@@ -4,7 +4,7 @@ from collections.abc import Iterable, Mapping
 
 import attrs
 
-from leg_wear_monitor.monitor.alarms.alarm import Alarm, Level, Limit, acknowledged, has_changed, judged
+from leg_wear_monitor.monitor.alarms.alarm import Alarm, Level, Limit, acknowledged, evaluated, has_changed
 from leg_wear_monitor.monitor.config.settings import MonitorConfig
 from leg_wear_monitor.monitor.evaluation.torque_checks import BIAS, DRIFT, LAG, torque_bounds
 from leg_wear_monitor.monitor.reports import AlarmList
@@ -19,11 +19,13 @@ SOURCES = "input_sources"
 TWO_SOURCES = Limit(2.0, 2.0)  # of one crank
 
 
-def limits_of(config: MonitorConfig, loose: tuple[str, ...], torque_size_nm: float = 1.0) -> dict[str, Limit]:
+def limits_of(
+    config: MonitorConfig, clearance_joints: tuple[str, ...], torque_size_nm: float = 1.0
+) -> dict[str, Limit]:
     """Limit of every alarm by its name; ``torque_size_nm`` RMS of the drive torque as predicted."""
     limits = config.limits
     found: dict[str, Limit] = {}
-    for k, joint in enumerate(loose):
+    for k, joint in enumerate(clearance_joints):
         impact = limits.joint_impact_force_n[k] if limits.joint_impact_force_n else limits.impact_force_n
         clearance = limits.joint_clearance_m[k] if limits.joint_clearance_m else limits.clearance_m
         found[f"{IMPACT} {joint}"] = _limit(config, impact, config.alarms.knock_on_delay_cycles)
@@ -38,22 +40,24 @@ def limits_of(config: MonitorConfig, loose: tuple[str, ...], torque_size_nm: flo
     found[CADENCE] = _limit(config, config.cadence.tolerance_rpm)
     for rate in (CRANK_RATE, TORQUE_RATE):
         found[rate] = _least(config, limits.min_rate_hz)
-    found[BAD_SAMPLES] = _limit(config, limits.bad_sample_share)
-    found[LOST_TIME] = _limit(config, limits.lost_time_share)
-    found[STUCK_TORQUE] = _limit(config, limits.stuck_torque_share)
+    found[BAD_SAMPLES] = _limit(config, limits.bad_sample_fraction)
+    found[LOST_TIME] = _limit(config, limits.lost_time_fraction)
+    found[STUCK_TORQUE] = _limit(config, limits.stuck_torque_fraction)
     found[SOURCES] = TWO_SOURCES
     return found
 
 
 def _limit(config: MonitorConfig, error: float, on_delay: int | None = None) -> Limit:
     alarms = config.alarms
-    return Limit(config.limits.warn_share * error, error, alarms.deadband, on_delay or alarms.on_delay_cycles)
+    return Limit(
+        config.limits.warn_fraction * error, error, alarms.deadband, on_delay or alarms.on_delay_cycles
+    )
 
 
 def _least(config: MonitorConfig, error: float) -> Limit:
     alarms = config.alarms
     return Limit(
-        error / config.limits.warn_share, error, alarms.deadband, alarms.on_delay_cycles, is_least=True
+        error / config.limits.warn_fraction, error, alarms.deadband, alarms.on_delay_cycles, is_least=True
     )
 
 
@@ -69,7 +73,7 @@ class AlarmBoard:
     Parameters
     ----------
     config : MonitorConfig
-    loose : tuple of str
+    clearance_joints : tuple of str
     torque_size_nm : float
         RMS of the drive torque as predicted.
 
@@ -79,22 +83,24 @@ class AlarmBoard:
         By name, always the same ones in the same order.
     """
 
-    def __init__(self, config: MonitorConfig, loose: tuple[str, ...], torque_size_nm: float = 1.0) -> None:
-        self._loose, self._torque_size_nm = loose, torque_size_nm
-        self._limits = limits_of(config, loose, torque_size_nm)
+    def __init__(
+        self, config: MonitorConfig, clearance_joints: tuple[str, ...], torque_size_nm: float = 1.0
+    ) -> None:
+        self._clearance_joints, self._torque_size_nm = clearance_joints, torque_size_nm
+        self._limits = limits_of(config, clearance_joints, torque_size_nm)
         self.alarms = {name: _new(name) for name in self._limits}
 
     def configure(self, config: MonitorConfig) -> None:
-        """Judge by other limits from now on."""
-        self._limits = limits_of(config, self._loose, self._torque_size_nm)
+        """Evaluate by other limits from now on."""
+        self._limits = limits_of(config, self._clearance_joints, self._torque_size_nm)
 
     @property
     def clearance_limits_m(self) -> tuple[float, ...]:
-        """Limit of each loose joint's clearance."""
-        return tuple(self._limits[f"{CLEARANCE} {joint}"].error for joint in self._loose)
+        """Limit of each clearance joint's clearance."""
+        return tuple(self._limits[f"{CLEARANCE} {joint}"].error for joint in self._clearance_joints)
 
-    def judge(self, values: Mapping[str, float], stamp_ns: int, cycles: int = 1) -> tuple[AlarmList, ...]:
-        """Judge values by the names of their alarms; one list of all alarms if what people see has changed.
+    def evaluate(self, values: Mapping[str, float], stamp_ns: int, cycles: int = 1) -> tuple[AlarmList, ...]:
+        """Evaluate values by the names of their alarms; one list of all alarms if an operator sees a change.
 
         Parameters
         ----------
@@ -104,17 +110,17 @@ class AlarmBoard:
             Gait cycles that the values stand for.
         """
         found = [
-            judged(self.alarms[name], value, self._limits[name], stamp_ns, cycles)
+            evaluated(self.alarms[name], value, self._limits[name], stamp_ns, cycles)
             for name, value in values.items()
         ]
         return self._set(found, stamp_ns)
 
-    def judge_early(self, values: Mapping[str, float], stamp_ns: int) -> tuple[AlarmList, ...]:
-        """Judge what may still rise until the gait cycle ends: it raises its alarm, or says nothing yet."""
+    def evaluate_early(self, values: Mapping[str, float], stamp_ns: int) -> tuple[AlarmList, ...]:
+        """Evaluate values that may still rise until the gait cycle ends: they can only raise their alarms."""
         found = []
         for name, value in values.items():
             before, limit = self.alarms[name], self._limits[name]
-            after = judged(before, value, limit, stamp_ns)
+            after = evaluated(before, value, limit, stamp_ns)
             if limit.on_delay == 1 and after.present > before.present:
                 found.append(after)
         return self._set(found, stamp_ns)

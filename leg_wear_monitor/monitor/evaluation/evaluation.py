@@ -21,7 +21,7 @@ from leg_wear_monitor.twin.statistics import Intake, Tracking
 
 
 @attrs.define
-class JudgeState:
+class AlarmEvaluationState:
     """What changes; every value is immutable, so a shallow copy is a snapshot.
 
     Attributes
@@ -32,8 +32,8 @@ class JudgeState:
         Samples skipped by then, and by the time before.
     torque : TorqueRange
         Torques since then.
-    beats, cycles : int
-        Beats and whole gait cycles since then.
+    evaluation_periods, cycles : int
+        Evaluation periods and whole gait cycles since then.
     health : InputHealth or None
         As last judged.
     withheld : int
@@ -46,14 +46,14 @@ class JudgeState:
     skipped: int = 0
     skipped_before: int = 0
     torque: TorqueRange = TorqueRange()
-    beats: int = 0
+    evaluation_periods: int = 0
     cycles: int = 0
     health: InputHealth | None = None
     withheld: int = 0
     causes: tuple[str, ...] | None = None
 
 
-class Judge:
+class AlarmEvaluation:
     """Judges a twin's gait cycles and its input.
 
     Parameters
@@ -70,11 +70,11 @@ class Judge:
         self.guard = guard
         self._cycle_ns = cycle_ns
         self.config = config
-        self.board = AlarmBoard(config, twin.loose, twin.torque_size_nm)
-        self.state = JudgeState(twin.intake)
+        self.board = AlarmBoard(config, twin.clearance_joints, twin.torque_size_nm)
+        self.state = AlarmEvaluationState(twin.intake)
 
     def configure(self, config: MonitorConfig) -> None:
-        """Judge by other limits from now on."""
+        """Evaluate by other limits from now on."""
         self.config = config
         self.board.configure(config)
 
@@ -108,10 +108,10 @@ class Judge:
 
     def is_torque_sound(self, report: CycleReport) -> bool:
         """Whether a gait cycle's torque is as predicted, so that what it needs is this leg's own."""
-        return report.torque_mismatch < self.config.limits.warn_share * self.config.limits.torque_mismatch
+        return report.torque_mismatch < self.config.limits.warn_fraction * self.config.limits.torque_mismatch
 
     def end_cycle(self, report: CycleReport, record: TorqueRecord) -> tuple[AlarmList, ...]:
-        """Judge a whole gait cycle, its torque beside its record; all alarms, if one has changed."""
+        """Evaluate a whole gait cycle, its torque beside its record; all alarms, if one has changed."""
         self.state.cycles += 1
         values = {
             names.MISMATCH: report.torque_mismatch,
@@ -125,10 +125,10 @@ class Judge:
             values[f"{names.GROWTH} {joint.joint}"] = per_hour
             if joint.seen:
                 values[f"{names.DEPARTURE} {joint.joint}"] = joint.seen.surely_m
-        return self.board.judge(values, report.stamp_ns)
+        return self.board.evaluate(values, report.stamp_ns)
 
     def end_beat(self, skipped: int = 0) -> tuple[AlarmList, ...]:
-        """Judge impacts of the gait cycle that runs, and once in a cycle's time the input.
+        """Evaluate impacts of the gait cycle that runs, and once in a cycle's time the input.
 
         Parameters
         ----------
@@ -137,35 +137,35 @@ class Judge:
         """
         peaks = {
             f"{names.IMPACT} {joint}": float(peak)
-            for joint, peak in zip(self._twin.loose, self._twin.peak_force_n, strict=True)
+            for joint, peak in zip(self._twin.clearance_joints, self._twin.peak_force_n, strict=True)
         }
-        early = self.board.judge_early(peaks, self._twin.intake.followed_stamp_ns)
-        early += self.board.judge({names.SOURCES: float(self.guard.sources)}, self.guard.stamp_ns)
-        self.state.beats += 1
-        if self.state.beats < A_CYCLE:
+        early = self.board.evaluate_early(peaks, self._twin.intake.followed_stamp_ns)
+        early += self.board.evaluate({names.SOURCES: float(self.guard.sources)}, self.guard.stamp_ns)
+        self.state.evaluation_periods += 1
+        if self.state.evaluation_periods < A_CYCLE:
             return early
-        return early + self._judge_input(skipped)
+        return early + self._evaluate_input(skipped)
 
     def pause(self) -> None:
         """Nobody records for a while: the input is judged afresh from the next sample on, as at the start."""
         intake = attrs.evolve(self._twin.intake, newest_stamp_ns=0)
-        self.state = JudgeState(intake, self.state.skipped, self.state.skipped_before)
+        self.state = AlarmEvaluationState(intake, self.state.skipped, self.state.skipped_before)
 
-    def _judge_input(self, skipped: int) -> tuple[AlarmList, ...]:
+    def _evaluate_input(self, skipped: int) -> tuple[AlarmList, ...]:
         state, intake, config = self.state, self._twin.intake, self.config
         is_whole = skipped == state.skipped == state.skipped_before
         health = input_health(state.before, intake, state.torque, is_whole)
         values = {
             names.CRANK_RATE: health.crank_rate_hz,
             names.TORQUE_RATE: health.torque_rate_hz,
-            names.BAD_SAMPLES: health.bad_share,
-            names.LOST_TIME: health.lost_share,
-            names.STUCK_TORQUE: health.stuck_torque_share,
+            names.BAD_SAMPLES: health.bad_fraction,
+            names.LOST_TIME: health.lost_fraction,
+            names.STUCK_TORQUE: health.stuck_torque_fraction,
         }
         if state.cycles == 0 and self._twin.tracking is Tracking.OUT_OF_STEP:
             speed_rpm = self._twin.speed_radps * 30.0 / math.pi
             values[names.CADENCE] = abs(speed_rpm - config.cadence.commanded_rpm)
-        self.state = JudgeState(
+        self.state = AlarmEvaluationState(
             intake,
             skipped,
             state.skipped,
@@ -174,4 +174,4 @@ class Judge:
             causes=self._causes(),
         )
         cycles = 1 if math.isnan(health.duration_s) else round(1.0e9 * health.duration_s / self._cycle_ns)
-        return self.board.judge(values, intake.newest_stamp_ns, max(1, cycles))
+        return self.board.evaluate(values, intake.newest_stamp_ns, max(1, cycles))

@@ -1,4 +1,4 @@
-"""Beats: instants, a quarter of the commanded gait cycle apart, at which the monitor looks at what has come.
+"""Evaluation periods: a quarter of the commanded gait cycle each, at whose end alarms are evaluated.
 
 They follow from the samples in their order of arrival alone: however those are cut into blocks, the monitor
 looks at the same instants. A beat ends when two samples in a row lie outside of it; one alone may have a
@@ -49,7 +49,7 @@ def find_beat(stamp, first, length, state):  # type: ignore[no-untyped-def]
     return -1
 
 
-class Beats:
+class EvaluationPeriods:
     """Cuts a stream of samples at its beats.
 
     Parameters

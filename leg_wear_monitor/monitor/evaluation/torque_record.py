@@ -5,7 +5,7 @@ import math
 import attrs
 
 from leg_wear_monitor.monitor.reports import CycleReport
-from leg_wear_monitor.twin.statistics import CycleFigures
+from leg_wear_monitor.twin.statistics import CycleStatistics
 
 COMMISSIONING_CYCLES = 20  # in a row with the torque as predicted, then its friction is that of this leg
 FRICTION_KEY, SIGMA_KEY = "friction_commissioned_nm", "friction_commissioned_sigma_nm"
@@ -26,7 +26,7 @@ class LagBySpeed:
 
     sums: tuple[float, float, float, float, float] = (0.0,) * 5
 
-    def with_cycle(self, figures: CycleFigures) -> "LagBySpeed":
+    def with_cycle(self, figures: CycleStatistics) -> "LagBySpeed":
         """With one more gait cycle; as it is without a lag."""
         lag_s, sigma_s = figures.torque.cycle_lag_s, figures.torque.cycle_lag_sigma_s
         if not (math.isfinite(lag_s) and sigma_s > 0.0):
@@ -79,7 +79,7 @@ class TorqueRecord:
             return {}
         return {FRICTION_KEY: self.friction_nm, SIGMA_KEY: self.sigma_nm}
 
-    def with_cycle(self, figures: CycleFigures, report: CycleReport, is_sound: bool) -> "TorqueRecord":
+    def with_cycle(self, figures: CycleStatistics, report: CycleReport, is_sound: bool) -> "TorqueRecord":
         """With one more gait cycle, whose torque was as predicted or not."""
         if not report.torque_samples:
             return self

@@ -13,7 +13,7 @@ _TURN = 631  # shifts each dimension by another amount, so that no member lies i
 
 
 @cache
-def even_shares(dimensions: int) -> Floats:
+def even_fractions(dimensions: int) -> Floats:
     """Numbers in (0, 1), shape (dimensions, MEMBERS): a lattice of Korobov's.
 
     Each dimension has the same evenly spaced numbers, in another order. By this multiplier every two of 17
@@ -22,15 +22,15 @@ def even_shares(dimensions: int) -> Floats:
     """
     member = np.arange(MEMBERS)
     rows = [(member * pow(_MULTIPLIER, axis, MEMBERS) + axis * _TURN) % MEMBERS for axis in range(dimensions)]
-    shares = (np.array(rows) + 0.5) / MEMBERS
-    shares.flags.writeable = False
-    return shares
+    fractions = (np.array(rows) + 0.5) / MEMBERS
+    fractions.flags.writeable = False
+    return fractions
 
 
 @cache
 def even_normals(dimensions: int) -> Floats:
     """The same as standard normal numbers."""
     inverse = np.array([NormalDist().inv_cdf((i + 0.5) / MEMBERS) for i in range(MEMBERS)])
-    normals = inverse[np.floor(even_shares(dimensions) * MEMBERS).astype(int)]
+    normals = inverse[np.floor(even_fractions(dimensions) * MEMBERS).astype(int)]
     normals.flags.writeable = False
     return np.asarray(normals)

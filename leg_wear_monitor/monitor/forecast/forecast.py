@@ -13,9 +13,9 @@ import numpy as np
 
 from leg_wear_monitor.mechanism.arrays import Floats
 from leg_wear_monitor.monitor.config.forecast import Forecasting
-from leg_wear_monitor.monitor.forecast.even_draws import MEMBERS, even_normals, even_shares
+from leg_wear_monitor.monitor.forecast.even_draws import MEMBERS, even_fractions, even_normals
 from leg_wear_monitor.monitor.forecast.growth_law import GrowthLaw, cycles_to
-from leg_wear_monitor.monitor.forecast.wear_coefficients import Belief
+from leg_wear_monitor.monitor.forecast.wear_coefficients import CoefficientEstimate
 
 
 class Answer(Enum):
@@ -92,14 +92,14 @@ class LegForecast:
 
 @attrs.frozen(kw_only=True)
 class Forecast:
-    """All joints', in the order of the loose joints, and the leg's."""
+    """All joints', in the order of the clearance joints, and the leg's."""
 
     joints: tuple[JointForecast, ...]
     leg: LegForecast
 
 
 @attrs.frozen(kw_only=True)
-class JointNow:
+class JointCondition:
     """A joint as the twin has it, with the nominal wear coefficient.
 
     Attributes
@@ -151,20 +151,20 @@ class _Legs:
 
 
 def forecast(
-    now: Sequence[JointNow],
-    beliefs: Sequence[Belief],
+    now: Sequence[JointCondition],
+    coefficient_estimates: Sequence[CoefficientEstimate],
     settings: Forecasting,
     law: GrowthLaw,
     *,
     cycle_s: float,
     valid: bool,
 ) -> Forecast:
-    """Remaining life of all loose joints, and of the leg.
+    """Remaining life of all clearance joints, and of the leg.
 
     Parameters
     ----------
-    now : sequence of JointNow
-    beliefs : sequence of Belief
+    now : sequence of JointCondition
+    coefficient_estimates : sequence of CoefficientEstimate
         Of their wear coefficients.
     settings : Forecasting
     law : GrowthLaw
@@ -174,7 +174,7 @@ def forecast(
     valid : bool
         Whether the model holds for what the leg does.
     """
-    legs = _legs(now, beliefs, settings, law)
+    legs = _legs(now, coefficient_estimates, settings, law)
     seen = [quantiles(row) for row in legs.clearance_m]
     answers = [each.answer(q.p50, valid) for each, q in zip(now, seen, strict=True)]
     limit = np.array([each.limit_m for each in now])
@@ -182,26 +182,41 @@ def forecast(
     ends = cycles_to(law, np.where(ended, limit[:, None], legs.clearance_m), legs.base_m, limit)
     day = cycle_s / 3600.0 / legs.duty_h
     joints = tuple(
-        JointForecast(answer=a, **_life(a, end, cycle_s, day), clearance_m=q, measurements=belief.looks)
-        for a, end, q, belief in zip(answers, ends, seen, beliefs, strict=True)
+        JointForecast(
+            answer=a, **_life(a, end, cycle_s, day), clearance_m=q, measurements=coefficient_estimate.looks
+        )
+        for a, end, q, coefficient_estimate in zip(answers, ends, seen, coefficient_estimates, strict=True)
     )
     answer = _leg_answer(answers)
     life, first = _life(answer, ends.min(axis=0), cycle_s, day), {}
     if life["cycles"] is not None:
-        share = np.bincount(ends.argmin(axis=0), minlength=len(now)) / MEMBERS
-        first = {each.joint: float(p) for each, p in zip(now, share, strict=True)}
+        fraction = np.bincount(ends.argmin(axis=0), minlength=len(now)) / MEMBERS
+        first = {each.joint: float(p) for each, p in zip(now, fraction, strict=True)}
     leg = LegForecast(answer=answer, **life, first_probability=first, simulated_lives=law.lives)
     return Forecast(joints=joints, leg=leg)
 
 
-def _legs(now: Sequence[JointNow], beliefs: Sequence[Belief], settings: Forecasting, law: GrowthLaw) -> _Legs:
+def _legs(
+    now: Sequence[JointCondition],
+    coefficient_estimates: Sequence[CoefficientEstimate],
+    settings: Forecasting,
+    law: GrowthLaw,
+) -> _Legs:
     k = len(now)
-    shares, normals = even_shares(3 * k + 2), even_normals(3 * k + 2)
-    log_factor = np.array([belief.log_factors(row) for belief, row in zip(beliefs, shares, strict=False)])
+    fractions, normals = even_fractions(3 * k + 2), even_normals(3 * k + 2)
+    log_factor = np.array(
+        [
+            coefficient_estimate.log_factors(row)
+            for coefficient_estimate, row in zip(coefficient_estimates, fractions, strict=False)
+        ]
+    )
     excess = np.array(
         [
-            np.interp(own, belief.log_factor, belief.excess_m) + belief.excess_sigma_m * row
-            for own, belief, row in zip(log_factor, beliefs, normals[k:], strict=False)
+            np.interp(own, coefficient_estimate.log_factor, coefficient_estimate.excess_m)
+            + coefficient_estimate.excess_sigma_m * row
+            for own, coefficient_estimate, row in zip(
+                log_factor, coefficient_estimates, normals[k:], strict=False
+            )
         ]
     )
     fresh, wear, growth, error = (

@@ -8,13 +8,13 @@ import numpy as np
 from leg_wear_monitor.mechanism.arrays import Floats
 from leg_wear_monitor.mechanism.spec import Mechanism
 from leg_wear_monitor.monitor.config.forecast import Forecasting
-from leg_wear_monitor.monitor.forecast.forecast import Forecast, JointNow, forecast
+from leg_wear_monitor.monitor.forecast.forecast import Forecast, JointCondition, forecast
 from leg_wear_monitor.monitor.forecast.growth import GrowthRate, GrowthWindow, extended, growth_rate
 from leg_wear_monitor.monitor.forecast.life_file import law_of
-from leg_wear_monitor.monitor.forecast.measurement import CONTRADICTS, Finding, looks_of, measure
-from leg_wear_monitor.monitor.forecast.wear_coefficients import Belief, Look, believe
+from leg_wear_monitor.monitor.forecast.measurement import CONTRADICTS, Finding, measure, observations_of
+from leg_wear_monitor.monitor.forecast.wear_coefficients import CoefficientEstimate, Look, believe
 from leg_wear_monitor.monitor.ledger.entry import JointWear, Measurement
-from leg_wear_monitor.twin.statistics import CycleFigures
+from leg_wear_monitor.twin.statistics import CycleStatistics
 
 RENEWED_NS = 60_000_000_000
 
@@ -26,7 +26,7 @@ class ForecastState:
     Attributes
     ----------
     growth : tuple of GrowthWindow
-    beliefs : tuple of Belief
+    coefficient_estimates : tuple of CoefficientEstimate
     last : Forecast or None
         None before the first, and when something is new.
     stamp_ns : int
@@ -36,14 +36,14 @@ class ForecastState:
     """
 
     growth: tuple[GrowthWindow, ...]
-    beliefs: tuple[Belief, ...]
+    coefficient_estimates: tuple[CoefficientEstimate, ...]
     last: Forecast | None = None
     stamp_ns: int = 0
     known: int = 0
 
 
 class Forecaster:
-    """Forecasts all loose joints, and the leg.
+    """Forecasts all clearance joints, and the leg.
 
     Parameters
     ----------
@@ -68,25 +68,32 @@ class Forecaster:
         measurements: Sequence[Measurement],
         replaced_ns: Sequence[int],
     ) -> None:
-        self._settings, self._loose = settings, mechanism.loose
-        self._clearances = [mechanism.clearances[joint] for joint in mechanism.loose]
+        self._settings, self._clearance_joints = settings, mechanism.clearance_joints
+        self._clearances = [mechanism.clearances[joint] for joint in mechanism.clearance_joints]
         self._fresh_m = [clearance.radial_clearance for clearance in self._clearances]
         self._law = law_of(mechanism, settings.life, settings.model_sigma)
         self._measurements = list(measurements)
-        joints = zip(self._loose, self._fresh_m, replaced_ns, strict=True)
-        beliefs = tuple(
-            believe(settings, fresh, looks_of(measurements, joint, when)) for joint, fresh, when in joints
+        joints = zip(self._clearance_joints, self._fresh_m, replaced_ns, strict=True)
+        coefficient_estimates = tuple(
+            believe(settings, fresh, observations_of(measurements, joint, when))
+            for joint, fresh, when in joints
         )
-        self.state = ForecastState(tuple(GrowthWindow() for _ in self._loose), beliefs)
+        self.state = ForecastState(
+            tuple(GrowthWindow() for _ in self._clearance_joints), coefficient_estimates
+        )
 
     def after(
-        self, figures: CycleFigures, wear_m: Floats, limits_m: Sequence[float], is_valid: Callable[[], bool]
+        self,
+        figures: CycleStatistics,
+        wear_m: Floats,
+        limits_m: Sequence[float],
+        is_valid: Callable[[], bool],
     ) -> Forecast:
         """Forecast after a gait cycle: a new one if it is time, else the last.
 
         Parameters
         ----------
-        figures : CycleFigures
+        figures : CycleStatistics
         wear_m : (k,) array
             What the twin has counted for each part.
         limits_m : sequence of float
@@ -120,10 +127,10 @@ class Forecaster:
 
     def replaced(self, joint: str, replaced_ns: int) -> None:
         """A joint has another part: known of it is what was measured on it, on a new one nothing."""
-        k, state = self._loose.index(joint), self.state
-        looks = looks_of(self._measurements, joint, replaced_ns)
+        k, state = self._clearance_joints.index(joint), self.state
+        looks = observations_of(self._measurements, joint, replaced_ns)
         state.growth = (*state.growth[:k], GrowthWindow(), *state.growth[k + 1 :])
-        self._believe(k, believe(self._settings, self._fresh_m[k], looks))
+        self._update_coefficients(k, believe(self._settings, self._fresh_m[k], looks))
 
     def measured(
         self,
@@ -137,7 +144,7 @@ class Forecaster:
         accept: bool = False,
     ) -> Finding:
         """Take in a measured clearance; parameters as in `measure`."""
-        k = self._loose.index(wear.name)
+        k = self._clearance_joints.index(wear.name)
         found = measure(
             self._settings,
             self._clearances[k],
@@ -151,7 +158,7 @@ class Forecaster:
             accept=accept,
         )
         self._measurements.append(found.measurement)
-        self._believe(k, found.after)
+        self._update_coefficients(k, found.after)
         return found
 
     def seen(self, k: int, look: Look, replaced_ns: int) -> bool:
@@ -160,7 +167,7 @@ class Forecaster:
         Parameters
         ----------
         k : int
-            Of the loose joint.
+            Of the clearance joint.
         look : Look
             Its error does not average out, so the newest says all there is.
         replaced_ns : int
@@ -171,15 +178,21 @@ class Forecaster:
         bool
             Whether it is believed: not, if the model holds it next to impossible.
         """
-        looks = looks_of(self._measurements, self._loose[k], replaced_ns)
+        looks = observations_of(self._measurements, self._clearance_joints[k], replaced_ns)
         below = believe(self._settings, self._fresh_m[k], looks).probability_below(self._fresh_m[k], look)
         believed = CONTRADICTS <= below <= 1.0 - CONTRADICTS
-        self._believe(k, believe(self._settings, self._fresh_m[k], [*looks, look] if believed else looks))
+        self._update_coefficients(
+            k, believe(self._settings, self._fresh_m[k], [*looks, look] if believed else looks)
+        )
         return believed
 
-    def _believe(self, k: int, belief: Belief) -> None:
-        beliefs = self.state.beliefs
-        self.state.beliefs = (*beliefs[:k], belief, *beliefs[k + 1 :])
+    def _update_coefficients(self, k: int, coefficient_estimate: CoefficientEstimate) -> None:
+        coefficient_estimates = self.state.coefficient_estimates
+        self.state.coefficient_estimates = (
+            *coefficient_estimates[:k],
+            coefficient_estimate,
+            *coefficient_estimates[k + 1 :],
+        )
         self.state.last = None
 
     def _forecast(
@@ -187,7 +200,7 @@ class Forecaster:
     ) -> Forecast:
         state = self.state
         now = [
-            JointNow(
+            JointCondition(
                 joint=joint,
                 fresh_m=self._fresh_m[k],
                 wear_m=float(wear_m[k]),
@@ -195,12 +208,17 @@ class Forecaster:
                 growth_m=rate.per_cycle_m if rate else None,
                 growth_error_m=rate.error_m if rate else 0.0,
             )
-            for k, (joint, rate) in enumerate(zip(self._loose, rates, strict=True))
+            for k, (joint, rate) in enumerate(zip(self._clearance_joints, rates, strict=True))
         ]
         # a new part's window is shorter than the others'
         walked = max((window.moving_s for window in state.growth), key=len)
         return forecast(
-            now, state.beliefs, self._settings, self._law, cycle_s=float(np.mean(walked)), valid=valid
+            now,
+            state.coefficient_estimates,
+            self._settings,
+            self._law,
+            cycle_s=float(np.mean(walked)),
+            valid=valid,
         )
 
 

@@ -34,7 +34,7 @@ def law_of(mechanism: Mechanism, path: str, sigma: float) -> GrowthLaw:
     """
     lives = read_lives(path, mechanism) if path else _shipped_lives(mechanism)
     if not lives:
-        fresh = [mechanism.clearances[joint].radial_clearance for joint in mechanism.loose]
+        fresh = [mechanism.clearances[joint].radial_clearance for joint in mechanism.clearance_joints]
         return no_law(np.array(fresh), sigma)
     return fitted_law(lives, sigma)
 
@@ -71,9 +71,9 @@ def _shipped_lives(mechanism: Mechanism) -> Sequence[SimulatedLife]:
 
 def _lives_in(document: dict[str, Any], path: str, mechanism: Mechanism) -> Sequence[SimulatedLife]:
     try:
-        return [_life(each, mechanism.loose) for each in (document, *document["further"])]
+        return [_life(each, mechanism.clearance_joints) for each in (document, *document["further"])]
     except (ValueError, KeyError, TypeError, OverflowError) as error:
-        joints = ", ".join(mechanism.loose)
+        joints = ", ".join(mechanism.clearance_joints)
         raise ConfigError(
             path, "", f"is no life of the joints {joints}, expected what `life --json` writes"
         ) from error
@@ -91,12 +91,14 @@ def _document(path: str) -> dict[str, Any]:
     return document
 
 
-def _life(record: dict[str, Any], loose: Sequence[str]) -> SimulatedLife:
+def _life(record: dict[str, Any], clearance_joints: Sequence[str]) -> SimulatedLife:
     def columns(name: str) -> Any:
-        return np.array([_numbers(record["joints"][joint][name]) for joint in loose], dtype=float).T
+        return np.array(
+            [_numbers(record["joints"][joint][name]) for joint in clearance_joints], dtype=float
+        ).T
 
     life = SimulatedLife(
-        factor=np.array(_numbers([record["wear_factor"][joint] for joint in loose]), dtype=float),
+        factor=np.array(_numbers([record["wear_factor"][joint] for joint in clearance_joints]), dtype=float),
         cycles=np.array(_numbers(record["cycles"]), dtype=float),
         clearance_m=columns("clearance_m"),
         growth_m_per_cycle=columns("growth_m_per_cycle"),

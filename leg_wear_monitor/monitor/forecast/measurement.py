@@ -9,7 +9,7 @@ from leg_wear_monitor.errors import ConfigError
 from leg_wear_monitor.mechanism.clearance import Clearance
 from leg_wear_monitor.mechanism.clearance_range import measured_fault, sigma_fault
 from leg_wear_monitor.monitor.config.forecast import Forecasting
-from leg_wear_monitor.monitor.forecast.wear_coefficients import Belief, Look, believe
+from leg_wear_monitor.monitor.forecast.wear_coefficients import CoefficientEstimate, Look, believe
 from leg_wear_monitor.monitor.ledger.entry import JointWear, Measurement
 
 CONTRADICTS = 0.00135  # probability of a tail: three standard deviations of a normal one
@@ -25,7 +25,7 @@ class Finding:
     ----------
     measurement : Measurement
         To be noted in the ledger.
-    before, after : Belief
+    before, after : CoefficientEstimate
         Of the joint's wear coefficient.
     contradicts : bool
         Whether the model holds it next to impossible.
@@ -34,13 +34,13 @@ class Finding:
     """
 
     measurement: Measurement
-    before: Belief
-    after: Belief
+    before: CoefficientEstimate
+    after: CoefficientEstimate
     contradicts: bool
     words: tuple[str, ...]
 
 
-def looks_of(measurements: Sequence[Measurement], joint: str, replaced_ns: int) -> list[Look]:
+def observations_of(measurements: Sequence[Measurement], joint: str, replaced_ns: int) -> list[Look]:
     """Measurements of a joint's present part that count."""
     return [
         Look(m.clearance_m, m.sigma_m, m.wear_m)
@@ -62,7 +62,7 @@ def measure(
     kept_ns: int = 0,
     accept: bool = False,
 ) -> Finding:
-    """Judge a measured clearance.
+    """Evaluate a measured clearance.
 
     Parameters
     ----------
@@ -95,7 +95,7 @@ def measure(
     ):
         if fault:
             raise ConfigError(name, "", fault)
-    looks = looks_of(earlier, wear.name, wear.replaced_ns)
+    looks = observations_of(earlier, wear.name, wear.replaced_ns)
     look = Look(clearance_m, sigma_m, float(wear.depth.sum(axis=0).mean()))
     before = believe(settings, fresh_m, looks)
     below = before.probability_below(fresh_m, look)
@@ -139,7 +139,7 @@ def _contradiction(accept: bool, below: float, joint: str) -> list[str]:
     ]
 
 
-def _change(before: Belief, after: Belief) -> str:
+def _change(before: CoefficientEstimate, after: CoefficientEstimate) -> str:
     if after.looks == before.looks:
         return "the wear coefficient is believed as before"
     if after.sigma > _SAYS_SOMETHING * before.sigma:

@@ -43,7 +43,7 @@ class Look:
 
 
 @attrs.frozen(eq=False)
-class Belief:
+class CoefficientEstimate:
     """What is known of a joint: weights over its factor's logarithm, and its excess given the factor.
 
     Attributes
@@ -74,10 +74,10 @@ class Belief:
         """Standard deviation of the factor's logarithm."""
         return math.sqrt(float(self.weight @ np.square(self.log_factor - self.mean)))
 
-    def log_factors(self, shares: ArrayLike) -> Floats:
+    def log_factors(self, fractions: ArrayLike) -> Floats:
         """Quantiles of the factor's logarithm at shares in (0, 1)."""
         reached = np.cumsum(self.weight) - 0.5 * self.weight
-        return np.asarray(np.interp(np.asarray(shares), reached, self.log_factor))
+        return np.asarray(np.interp(np.asarray(fractions), reached, self.log_factor))
 
     def probability_below(self, fresh_m: float, look: Look) -> float:
         """Probability that a measurement of such accuracy would have come out smaller than this one did."""
@@ -87,8 +87,8 @@ class Belief:
         return float(self.weight @ below)
 
 
-def believe(settings: Forecasting, fresh_m: float, looks: Sequence[Look] = ()) -> Belief:
-    """Belief after measurements of the same part, in any order.
+def believe(settings: Forecasting, fresh_m: float, looks: Sequence[Look] = ()) -> CoefficientEstimate:
+    """Coefficient estimate after measurements of the same part, in any order.
 
     Parameters
     ----------
@@ -104,7 +104,9 @@ def believe(settings: Forecasting, fresh_m: float, looks: Sequence[Look] = ()) -
     pull = np.zeros(GRID)
     for look in looks:
         pull += (look.clearance_m - fresh_m - np.exp(log_factor) * look.wear_m) / look.sigma_m**2
-    return Belief(log_factor, weight / weight.sum(), pull / precision, precision**-0.5, len(looks))
+    return CoefficientEstimate(
+        log_factor, weight / weight.sum(), pull / precision, precision**-0.5, len(looks)
+    )
 
 
 def _says(settings: Forecasting, fresh_m: float, looks: Sequence[Look]) -> tuple[float, float]:

@@ -7,7 +7,7 @@ import attrs
 from leg_wear_monitor.monitor.forecast.forecast import JointForecast, LegForecast
 
 UNKNOWN = {
-    f"{share}_{key}": math.nan for key in ("cycles", "hours", "days") for share in ("p10", "p50", "p90")
+    f"{fraction}_{key}": math.nan for key in ("cycles", "hours", "days") for fraction in ("p10", "p50", "p90")
 }
 """What `lifetime_values` gives, not known."""
 
@@ -20,7 +20,7 @@ def lifetime_values(told: JointForecast | LegForecast) -> dict[str, float]:
     for key in ("cycles", "hours", "days"):
         quantiles = getattr(told, key)
         if quantiles is not None:
-            values |= {f"{share}_{key}": value for share, value in attrs.asdict(quantiles).items()}
+            values |= {f"{fraction}_{key}": value for fraction, value in attrs.asdict(quantiles).items()}
     return values
 
 

@@ -5,7 +5,7 @@ from collections.abc import Mapping
 from leg_wear_monitor.monitor.config.settings import MonitorConfig
 from leg_wear_monitor.twin.statistics import Intake
 
-_WORTH_TELLING = 0.01  # share of the samples; below it, the counters say it
+_WORTH_TELLING = 0.01  # fraction of the samples; below it, the counters say it
 
 _DROPPED = ("duplicates", "late", "stray_stamps", "outliers")
 

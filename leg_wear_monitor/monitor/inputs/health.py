@@ -23,7 +23,7 @@ class TorqueRange:
     saturated: int = 0
 
     @property
-    def stuck_share(self) -> float:
+    def stuck_fraction(self) -> float:
         """Share of those that are saturated, or repeat an end; NaN while there are few."""
         if self.number < _LEAST_TORQUES:
             return math.nan
@@ -59,11 +59,11 @@ class InputHealth:
         NaN if that is not known, or stamps did not advance.
     crank_rate_hz, torque_rate_hz : float
         Of samples that were used.
-    bad_share : float
+    bad_fraction : float
         Share of the samples that were not: faulty, repeated, late, with a stray stamp, far off.
-    lost_share : float
+    lost_fraction : float
         Share of the time in which the leg was not followed.
-    stuck_torque_share : float
+    stuck_torque_fraction : float
         Share of the torque samples that are saturated or repeat the largest or the smallest one; 1 if all
         are the same.
     """
@@ -71,9 +71,9 @@ class InputHealth:
     duration_s: float
     crank_rate_hz: float
     torque_rate_hz: float
-    bad_share: float
-    lost_share: float
-    stuck_torque_share: float
+    bad_fraction: float
+    lost_fraction: float
+    stuck_torque_fraction: float
 
 
 def input_health(before: Intake, after: Intake, torque: TorqueRange, is_whole: bool = True) -> InputHealth:
@@ -96,9 +96,9 @@ def input_health(before: Intake, after: Intake, torque: TorqueRange, is_whole: b
         duration_s=duration_s,
         crank_rate_hz=(after.crank_used - before.crank_used) / duration_s,
         torque_rate_hz=(after.torque_used - before.torque_used) / duration_s,
-        bad_share=(unused(after) - unused(before)) / received if received else math.nan,
-        lost_share=min(1.0, max(0.0, 1.0 - monitored_s / duration_s)) if is_known else math.nan,
-        stuck_torque_share=torque.stuck_share,
+        bad_fraction=(unused(after) - unused(before)) / received if received else math.nan,
+        lost_fraction=min(1.0, max(0.0, 1.0 - monitored_s / duration_s)) if is_known else math.nan,
+        stuck_torque_fraction=torque.stuck_fraction,
     )
 
 

@@ -11,19 +11,19 @@ from leg_wear_monitor.monitor.config.settings import MonitorConfig
 from leg_wear_monitor.wear.surfaces import SECTORS
 
 # of a mechanism, what may change without its worn parts being others
-_FREE = ("name", "source", "drive", "loads", "loose", "clearances")
+_FREE = ("name", "source", "drive", "loads", "clearance_joints", "clearances")
 _FREE_OF_CLEARANCE = ("wear_coefficient",)
 
 
 def fingerprint(mechanism: Mechanism) -> str:
-    """Hash of the bodies, joints, springs and loose joints of a mechanism, 16 hexadecimal digits.
+    """Hash of the bodies, joints, springs and clearance joints of a mechanism, 16 hexadecimal digits.
 
     Neither names and comments of its file count, nor what drives and loads it, nor wear coefficients: a
     better value of those continues the same wear.
     """
     fields = {field.name: getattr(mechanism, field.name) for field in attrs.fields(Mechanism)}
     parts = {name: _plain(value) for name, value in fields.items() if name not in _FREE}
-    for joint in mechanism.loose:
+    for joint in mechanism.clearance_joints:
         settings = attrs.asdict(mechanism.clearances[joint])
         parts[f"clearance {joint}"] = {
             name: _plain(value) for name, value in settings.items() if name not in _FREE_OF_CLEARANCE
@@ -51,7 +51,7 @@ class Binding:
         Its name, for messages.
     fingerprint : str
     joints : tuple of str
-        The loose ones.
+        The clearance joints.
     wear_acceleration : float
     sectors : int
         Of each surface.
@@ -76,6 +76,6 @@ def binding_of(mechanism: Mechanism, config: MonitorConfig) -> Binding:
         hardware_id=config.hardware,
         mechanism=mechanism.name,
         fingerprint=fingerprint(mechanism),
-        joints=mechanism.loose,
+        joints=mechanism.clearance_joints,
         wear_acceleration=config.wear_acceleration,
     )

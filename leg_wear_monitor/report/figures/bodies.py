@@ -24,9 +24,9 @@ def outline(points: Points) -> Floats:
     return np.asarray(corners[np.argsort(np.arctan2(around[:, 1], around[:, 0]))])
 
 
-def lighter(colour: str, share: float) -> tuple[float, float, float]:
-    """A colour mixed with a share of white."""
-    red, green, blue = (share + (1.0 - share) * part for part in to_rgb(colour))
+def lighter(colour: str, fraction: float) -> tuple[float, float, float]:
+    """A colour mixed with a fraction of white."""
+    red, green, blue = (fraction + (1.0 - fraction) * part for part in to_rgb(colour))
     return red, green, blue
 
 
@@ -54,10 +54,10 @@ def draw_support(axes: Axes, place: Floats, away: Floats) -> None:
 def draw_spring(axes: Axes, ends: tuple[Floats, Floats], layer: float) -> None:
     """A zigzag between two places."""
     start, end = ends
-    share = np.array([0.0, 0.15, *np.linspace(0.2, 0.8, 11), 0.85, 1.0])
+    fraction = np.array([0.0, 0.15, *np.linspace(0.2, 0.8, 11), 0.85, 1.0])
     side = np.array([0.0, 0.0, *(1.0 if i % 2 else -1.0 for i in range(11)), 0.0, 0.0])
     across = 0.04 * np.array([start[1] - end[1], end[0] - start[0]])
-    line = start + share[:, None] * (end - start) + side[:, None] * across
+    line = start + fraction[:, None] * (end - start) + side[:, None] * across
     axes.plot(*line.T, color=INK, linewidth=1.0, zorder=layer)
 
 
@@ -67,9 +67,9 @@ def draw_joint(axes: Axes, place: Floats, names: Mapping[str, bool], away: Float
     dx, dy = 13.0 * away / (np.hypot(*away) or 1.0)
     wide = [6.0 * len(name) + 5.0 for name in names]
     start = dx - 0.5 * sum(wide) + 0.5 * np.sign(dx) * (abs(dx) > 8.0) * (sum(wide) - wide[0])
-    for i, (name, loose) in enumerate(names.items()):  # side by side, each in its own colour
+    for i, (name, clearance_joints) in enumerate(names.items()):  # side by side, each in its own colour
         along = start + sum(wide[:i]) + 0.5 * wide[i]
-        write_beside(axes, place, name, (along, dy), VERMILION if loose else INK)
+        write_beside(axes, place, name, (along, dy), VERMILION if clearance_joints else INK)
 
 
 def write_beside(axes: Axes, place: Floats, text: str, offset: tuple[float, float], colour: str) -> None:
@@ -89,16 +89,16 @@ def write_beside(axes: Axes, place: Floats, text: str, offset: tuple[float, floa
     )
 
 
-def joint_mark(loose: bool, place: Floats | tuple[float, float] = (0.0, 0.0)) -> Line2D:
+def joint_mark(clearance_joints: bool, place: Floats | tuple[float, float] = (0.0, 0.0)) -> Line2D:
     """The mark of a joint, also for a legend."""
     return Line2D(
         [place[0]],
         [place[1]],
         linestyle="none",
         marker="o",
-        markersize=8.5 if loose else 5.5,
+        markersize=8.5 if clearance_joints else 5.5,
         markerfacecolor=PAPER,
-        markeredgecolor=VERMILION if loose else INK,
-        markeredgewidth=2.4 if loose else 1.2,
+        markeredgecolor=VERMILION if clearance_joints else INK,
+        markeredgewidth=2.4 if clearance_joints else 1.2,
         zorder=20.0,
     )

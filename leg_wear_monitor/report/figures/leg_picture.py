@@ -26,22 +26,22 @@ from leg_wear_monitor.report.figures.figure import BODY_COLOURS, INK, SMALL, USU
 
 _PATH_POINTS = 360
 _TOE_EVERY, _BODIES_EVERY = 30, 60
-_NEAR_M = 1.0e-3  # joints closer than this share a place
+_NEAR_M = 1.0e-3  # joints closer than this fraction a place
 _PANEL_IN, _KEY_IN = 4.4, 1.2
 
 Paths = dict[str, dict[str, Floats]]
 
 
 def leg_picture(
-    mechanism: Mechanism, loose: Collection[str] | None = None, crank_angle_rad: float = 0.0
+    mechanism: Mechanism, clearance_joints: Collection[str] | None = None, crank_angle_rad: float = 0.0
 ) -> Figure:
     """The mechanism at a crank angle, and beside it through one cycle, both ideal and to one scale.
 
     Parameters
     ----------
     mechanism : Mechanism
-    loose : collection of str, optional
-        Joints to mark as loose; the mechanism's own if not given.
+    clearance_joints : collection of str, optional
+        Clearance joints to mark; the mechanism's own if not given.
     crank_angle_rad : float
 
     Raises
@@ -56,7 +56,13 @@ def leg_picture(
     height = (_PANEL_IN - 0.5) * (high[1] - low[1]) / (high[0] - low[0]) + 0.75
     figure = new_figure(2.0 * _PANEL_IN + _KEY_IN, float(np.clip(height, 2.8, 6.4)))
     still, moving, key = figure.subplots(1, 3, width_ratios=(_PANEL_IN, _PANEL_IN, _KEY_IN))
-    _draw_still(still, mechanism, here, paths, mechanism.loose if loose is None else loose)
+    _draw_still(
+        still,
+        mechanism,
+        here,
+        paths,
+        mechanism.clearance_joints if clearance_joints is None else clearance_joints,
+    )
     _draw_cycle(moving, mechanism, paths)
     _draw_key(key, mechanism)
     still.set_title(
@@ -97,7 +103,9 @@ def _outline_at(paths: Paths, body: str, i: int) -> Floats:
     return outline({name: path[i] for name, path in paths[body].items()})
 
 
-def _draw_still(axes: Axes, mechanism: Mechanism, here: Paths, paths: Paths, loose: Collection[str]) -> None:
+def _draw_still(
+    axes: Axes, mechanism: Mechanism, here: Paths, paths: Paths, clearance_joints: Collection[str]
+) -> None:
     shapes = {body: _outline_at(here, body, 0) for body in mechanism.bodies}
     colours = _colours(mechanism)
     largest_first = sorted(shapes, key=lambda name: -float(np.ptp(shapes[name], axis=0).sum()))
@@ -113,7 +121,7 @@ def _draw_still(axes: Axes, mechanism: Mechanism, here: Paths, paths: Paths, loo
             elif GROUND in mechanism.sides(name):
                 draw_support(axes, place, away)
                 away = np.array([-1.0, 0.3 * np.sign(away[1])])
-        draw_joint(axes, place, {name: name in loose for name in names}, away)
+        draw_joint(axes, place, {name: name in clearance_joints for name in names}, away)
     for spring in mechanism.springs.values():
         a, b = (here[body][point][0] for body, point in zip(spring.bodies, spring.points, strict=True))
         draw_spring(axes, (a, b), 15.0)
@@ -164,7 +172,7 @@ def _draw_key(axes: Axes, mechanism: Mechanism) -> None:
         body: Line2D([], [], color=lighter(colour, 0.4), linewidth=7.0, solid_capstyle="round")
         for body, colour in _colours(mechanism).items()
     }
-    entries |= {"loose joint": joint_mark(True), "ideal joint": joint_mark(False)}
+    entries |= {"clearance joint": joint_mark(True), "ideal joint": joint_mark(False)}
     if mechanism.toe is not None:
         entries["path of the toe"] = Line2D([], [], color=INK, linewidth=2.0, marker="o", markersize=4.0)
     axes.legend(

@@ -11,11 +11,11 @@ _PROFILES = 5
 
 def life_picture(life: Life) -> bytes:
     """PNG: mean (and dashed, largest) clearance, peak force, and the bushings' profiles at five times."""
-    joints = len(life.loose)
+    joints = len(life.clearance_joints)
     figure = new_figure(max(7.0, 2.2 * joints), 6.0)
     grid = figure.add_gridspec(2, 2 * joints, height_ratios=(1.2, 1.0))
     clearance, peak = figure.add_subplot(grid[0, :joints]), figure.add_subplot(grid[0, joints:])
-    for k, joint in enumerate(life.loose):
+    for k, joint in enumerate(life.clearance_joints):
         colour = BODY_COLOURS[k % len(BODY_COLOURS)]
         clearance.plot(life.cycles, 1e6 * life.clearance_m[:, k], color=colour, label=joint)
         clearance.plot(life.cycles, 1e6 * life.clearance_max_m[:, k], color=colour, ls="--", lw=0.7)
@@ -38,5 +38,5 @@ def _profiles(axes: Axes, life: Life, k: int, colour: str) -> None:
         at = int(np.abs(life.cycles - time).argmin())
         axes.plot(angle, 1e6 * life.depth[at, k, 0], color=colour, alpha=shade / _PROFILES, lw=0.9)
     axes.set(xlim=(0.0, 360.0), xticks=(0.0, 180.0, 360.0))
-    axes.set_title(f"{life.loose[k]}: bushing [µm] by angle [°]", fontsize=SMALL, color=INK)
+    axes.set_title(f"{life.clearance_joints[k]}: bushing [µm] by angle [°]", fontsize=SMALL, color=INK)
     tidy(axes)

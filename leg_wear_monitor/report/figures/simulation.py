@@ -11,14 +11,16 @@ from leg_wear_monitor.report.figures.worn_bushings import worn_bushings
 def pictures(mechanism: Mechanism, result: SimulationResult) -> dict[str, bytes | None]:
     """PNG files by name; None for one that this result has nothing to show in."""
     files: dict[str, bytes | None] = {
-        "leg.png": png(leg_picture(mechanism, result.loose)),
+        "leg.png": png(leg_picture(mechanism, result.clearance_joints)),
         "wear.png": None,
         "forces.png": None,
     }
     if result.trace is not None:
-        files["forces.png"] = png(force_traces(result.trace, result.loose or tuple(mechanism.joints)))
-    if result.surfaces is not None and result.loose:
-        radii = tuple(mechanism.clearances[name].bushing_radius for name in result.loose)
+        files["forces.png"] = png(
+            force_traces(result.trace, result.clearance_joints or tuple(mechanism.joints))
+        )
+    if result.surfaces is not None and result.clearance_joints:
+        radii = tuple(mechanism.clearances[name].bushing_radius for name in result.clearance_joints)
         cycles = abs(result.speed_rpm) / 60.0 * result.simulated_s
-        files["wear.png"] = png(worn_bushings(result.surfaces, result.loose, radii, cycles))
+        files["wear.png"] = png(worn_bushings(result.surfaces, result.clearance_joints, radii, cycles))
     return files

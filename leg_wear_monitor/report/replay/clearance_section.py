@@ -5,7 +5,7 @@ from typing import Any
 from leg_wear_monitor.report.page import Section, Table
 
 
-def seen_sentences(record: dict[str, Any]) -> list[str]:
+def clearance_sentences(record: dict[str, Any]) -> list[str]:
     """Joints that surely are not as counted, a sentence each."""
     sentences = []
     for name, joint in record["joints"].items():
@@ -18,7 +18,7 @@ def seen_sentences(record: dict[str, Any]) -> list[str]:
     return sentences
 
 
-def seen_sections(record: dict[str, Any]) -> list[Section]:
+def clearance_sections(record: dict[str, Any]) -> list[Section]:
     """Clearances as further encoders show them, if there are such."""
     shown = {name: joint for name, joint in record["joints"].items() if "seen" in joint}
     if not shown:
@@ -29,7 +29,7 @@ def seen_sections(record: dict[str, Any]) -> list[Section]:
             f"{1.0e3 * joint['clearance_m']['last']:.4f}",
             _millimetres(joint["seen"]["clearance_m"]),
             _millimetres(joint["seen"]["sigma_m"]),
-            "other than counted" if joint["seen"]["is_other"] else joint["seen"]["sight"],
+            "other than counted" if joint["seen"]["is_other"] else joint["seen"]["observation"],
         )
         for name, joint in shown.items()
     ]

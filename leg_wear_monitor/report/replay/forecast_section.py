@@ -18,7 +18,7 @@ def forecast_section(record: dict[str, Any]) -> Section:
     ]
     if leg is not None:
         rows.append(("leg", "", *_lasts(leg), "", leg["answer"]))
-    quantiles = [f"{share} [{unit}]" for unit in ("h", "days") for share in ("p10", "p50", "p90")]
+    quantiles = [f"{fraction} [{unit}]" for unit in ("h", "days") for fraction in ("p10", "p50", "p90")]
     head = ("", "clearance [mm]", *quantiles, "first [%]", "")
     parts: list[Part] = [
         Table(
@@ -43,7 +43,7 @@ def leg_sentence(record: dict[str, Any]) -> list[str]:
     leg = record["forecast"]
     if leg is None or leg["hours"] is None:
         return []
-    p10, p50, p90 = (_life(leg, share) for share in ("p10", "p50", "p90"))
+    p10, p50, p90 = (_life(leg, fraction) for fraction in ("p10", "p50", "p90"))
     probability = 100.0 * leg["first_probability"][leg["first"]]
     return [
         f"The leg lasts {p50} (p10 {p10}, p90 {p90}); {leg['first']} is the first joint at its "
@@ -59,9 +59,9 @@ def counted_mm(joint: dict[str, Any]) -> str:
     return clearance_mm(counted, told["clearance_m"]["p10"], told["clearance_m"]["p90"])
 
 
-def _life(told: dict[str, Any], share: str) -> str:
-    days = f" or {three_digits(told['days'][share])} days" if told["days"] else ""
-    return f"{three_digits(told['hours'][share])} hours of walking{days}"
+def _life(told: dict[str, Any], fraction: str) -> str:
+    days = f" or {three_digits(told['days'][fraction])} days" if told["days"] else ""
+    return f"{three_digits(told['hours'][fraction])} hours of walking{days}"
 
 
 def _duty(record: dict[str, Any]) -> str:
@@ -85,9 +85,9 @@ def _clearance(told: dict[str, Any]) -> tuple[str]:
 
 
 def _lasts(told: dict[str, Any]) -> tuple[str, ...]:
-    shares = ("p10", "p50", "p90")
+    fractions = ("p10", "p50", "p90")
     units = (told["hours"], told["days"])
-    return tuple(three_digits(unit[share]) if unit else "-" for unit in units for share in shares)
+    return tuple(three_digits(unit[fraction]) if unit else "-" for unit in units for fraction in fractions)
 
 
 def _first(leg: dict[str, Any] | None, joint: str) -> str:

@@ -9,7 +9,7 @@ from leg_wear_monitor.report.figures.figure import png
 from leg_wear_monitor.report.figures.worn_bushings import worn_bushings
 from leg_wear_monitor.report.page import Findings, Page, Part, Picture, Section, Table, Text
 from leg_wear_monitor.report.replay.charts import alarm_chart, clearance_chart, force_chart, health_chart
-from leg_wear_monitor.report.replay.clearance_section import seen_sections, seen_sentences
+from leg_wear_monitor.report.replay.clearance_section import clearance_sections, clearance_sentences
 from leg_wear_monitor.report.replay.forecast_section import counted_mm, forecast_section, leg_sentence
 from leg_wear_monitor.wear.surfaces import Surfaces
 
@@ -26,12 +26,13 @@ def replay_page(record: dict[str, Any]) -> Page:
     """
     recording, monitor = record["recording"], record["monitor"]
     summary = (
-        f"{monitor['mechanism']}, {', '.join(monitor['loose'])} loose: {_time(recording['duration_s'])} from "
+        f"{monitor['mechanism']}, clearance joints {', '.join(monitor['clearance_joints'])}: "
+        f"{_time(recording['duration_s'])} from "
         f"{time_words(recording['begin_ns'])}, {record['cycles']} gait cycles. {record['advice']}"
     )
     sections = [Section("What was found", [Findings(_sentences(record))]), _recording(recording)]
     if _is_believable(record):
-        sections += [_clearance(record), *seen_sections(record), forecast_section(record)]
+        sections += [_clearance(record), *clearance_sections(record), forecast_section(record)]
         sections += [_forces(record), _wear(record)]
     sections += [_alarms(record), _health(record)]
     title = f"Joint wear of {monitor['hardware_id']}"
@@ -64,7 +65,7 @@ def _sentences(record: dict[str, Any]) -> list[str]:
         fastest = max(growing, key=lambda name: growing[name])
         sentences.append(f"{fastest} wears fastest: {1.0e12 * growing[fastest]:.3g} pm a gait cycle.")
     sentences += leg_sentence(record)
-    sentences += seen_sentences(record)
+    sentences += clearance_sentences(record)
     if record["monitor"]["wear_acceleration"] != 1.0:
         factor = record["monitor"]["wear_acceleration"]
         sentences.append(f"All wear is multiplied by {factor:g}: a demonstration, not a measurement.")
@@ -207,7 +208,7 @@ def _health(record: dict[str, Any]) -> Section:
             image=png(health_chart(record)),
             alt="Cadence, drive torque and torque mismatch over time",
             caption="Cadence with the commanded one dashed; drive torque as measured and predicted; what of "
-            "it neither load nor friction explains, as a share, with its limit.",
+            "it neither load nor friction explains, as a fraction, with its limit.",
             wide=True,
         )
         parts.append(chart)

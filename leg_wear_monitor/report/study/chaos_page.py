@@ -19,7 +19,7 @@ from leg_wear_monitor.report.study.text import Labelled, joined, number
 from leg_wear_monitor.studies.plan.plan import PORTRAIT_CYCLES
 from leg_wear_monitor.studies.point import Arrays, Point
 from leg_wear_monitor.studies.storage.store import StudyResults
-from leg_wear_monitor.studies.summary import loose_of
+from leg_wear_monitor.studies.summary import clearance_joints_of
 from leg_wear_monitor.studies.tasks.lyapunov import Estimate, exponent
 from leg_wear_monitor.studies.tasks.section import period_of
 
@@ -91,10 +91,10 @@ def _foretold(label: str, estimate: Estimate) -> str:
             "error grows a "
             f"thousandfold in {number(thousand)} cycles."
         )
-    judged = (
+    evaluated = (
         "below 0: small errors die out" if estimate.value < -_SURE * estimate.error else "not distinct from 0"
     )
-    return f"{label}: the largest Lyapunov exponent is {value}, {judged}."
+    return f"{label}: the largest Lyapunov exponent is {value}, {evaluated}."
 
 
 def scatter(point: Point, arrays: Arrays) -> list[float]:
@@ -111,7 +111,7 @@ def _periods(point: Point, arrays: Arrays) -> list[int | None]:
 def _disorder(pair: _Pair) -> list[str]:
     """How far sections scatter, and whether any repeats."""
     point, arrays = pair
-    joints, spread = loose_of(arrays), scatter(point, arrays)
+    joints, spread = clearance_joints_of(arrays), scatter(point, arrays)
     ranked = sorted(zip(joints, spread, strict=True), key=lambda one: one[1])
     periods = dict(zip(joints, _periods(point, arrays), strict=True))
     known = [f"{joint} every {period} cycles" for joint, period in periods.items() if period]
@@ -152,7 +152,7 @@ def _exponent_table(labelled: Labelled, estimates: Sequence[Estimate]) -> Table:
         rows.append([label, *each, time, f"{runs} × {cycles - _FORGET}"])
     return Table(
         caption="Largest Lyapunov exponent",
-        head=("loose", "[1/cycle]", "[1/s]", "cycles for a tenfold error", "pairs × cycles"),
+        head=("clearance_joints", "[1/cycle]", "[1/s]", "cycles for a tenfold error", "pairs × cycles"),
         rows=rows,
         note="Mean and standard error over pairs of neighbours (Benettin and others 1980).",
     )

@@ -11,7 +11,7 @@ from leg_wear_monitor.report.page import Gallery, Picture
 from leg_wear_monitor.report.study.text import Labelled
 from leg_wear_monitor.report.study.trends import MARKS
 from leg_wear_monitor.studies.point import Arrays
-from leg_wear_monitor.studies.summary import loose_of
+from leg_wear_monitor.studies.summary import clearance_joints_of
 from leg_wear_monitor.studies.tasks.lyapunov import Estimate
 
 _DENSE = 110.0  # dots an inch
@@ -25,7 +25,7 @@ def portrait_gallery(section: Arrays, clearance_m: float, cycles: int) -> Galler
         "against its "
         "rate, in x and y. Places are in clearances; beyond 1 and -1 the journal presses into the bushing."
     )
-    return _planes(loose_of(section), e, v, caption, "phase portrait", "-")
+    return _planes(clearance_joints_of(section), e, v, caption, "phase portrait", "-")
 
 
 def section_gallery(section: Arrays, clearance_m: float, crank_angle_deg: float) -> Gallery:
@@ -36,7 +36,7 @@ def section_gallery(section: Arrays, clearance_m: float, crank_angle_deg: float)
         "cycle. A motion "
         "that repeats itself would be a single point, or as many as its period has cycles."
     )
-    return _planes(loose_of(section), e, v, caption, "Poincaré map", ".")
+    return _planes(clearance_joints_of(section), e, v, caption, "Poincaré map", ".")
 
 
 def _planes(joints: Sequence[str], e: Floats, v: Floats, caption: str, what: str, style: str) -> Gallery:
@@ -115,7 +115,7 @@ def bifurcation_gallery(
 ) -> Gallery:
     """Sections over a parameter, a picture for each joint."""
     pictures = []
-    for k, joint in enumerate(loose_of(sections[0])):
+    for k, joint in enumerate(clearance_joints_of(sections[0])):
         figure = new_figure(4.8, 3.2)
         panels = list(figure.subplots(2, 1, sharex=True))
         for i, axes in enumerate(panels):

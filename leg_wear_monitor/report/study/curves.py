@@ -10,7 +10,7 @@ from leg_wear_monitor.report.figures.figure import BLUE, INK, SKY, SMALL, new_fi
 from leg_wear_monitor.report.page import Gallery, Picture
 from leg_wear_monitor.report.study.text import QUANTITIES, Labelled, Quantity
 from leg_wear_monitor.studies.point import Arrays
-from leg_wear_monitor.studies.summary import loose_of
+from leg_wear_monitor.studies.summary import clearance_joints_of
 
 PANEL_IN = 4.6
 _AXES_IN, _REST_IN = 1.35, 0.75
@@ -68,7 +68,7 @@ def _components(arrays: Arrays, quantity: Quantity, apart: bool) -> dict[str, _L
 
 
 def _limits(parts: Sequence[dict[str, _Line]], cut: float) -> tuple[float, float]:
-    """One range for all panels; a share of the examples' samples may lie outside."""
+    """One range for all panels; a fraction of the examples' samples may lie outside."""
     lines = [line for part in parts for line in part.values()]
     insides = [np.quantile(example, (cut / 2.0, 1.0 - cut / 2.0)) for _, _, example in lines]
     every = [*insides, *(ideal for ideal, _, _ in lines), *(band.ravel() for _, band, _ in lines if not cut)]
@@ -115,11 +115,11 @@ def _force_gallery(labelled: Labelled) -> Gallery:
 
 
 def _draw_forces(label: str, arrays: Arrays) -> bytes:
-    loose, joints = loose_of(arrays), [str(name) for name in arrays["joints"]]
+    clearance_joints, joints = clearance_joints_of(arrays), [str(name) for name in arrays["joints"]]
     example = np.linalg.norm(arrays["example_contact_force_n"], axis=-1)
-    figure = new_figure(PANEL_IN, 1.05 * len(loose) + _REST_IN)
-    panels = list(np.atleast_1d(figure.subplots(len(loose), 1, sharex=True)))
-    for k, (axes, name) in enumerate(zip(panels, loose, strict=True)):
+    figure = new_figure(PANEL_IN, 1.05 * len(clearance_joints) + _REST_IN)
+    panels = list(np.atleast_1d(figure.subplots(len(clearance_joints), 1, sharex=True)))
+    for k, (axes, name) in enumerate(zip(panels, clearance_joints, strict=True)):
         ideal = arrays["ideal_joint_force_n"][:, joints.index(name)]
         lines = ideal, arrays["band_contact_force_n"][..., k], example[:, k]
         _draw_line(axes, *(np.maximum(line, _LEAST_N) for line in lines))

@@ -19,13 +19,13 @@ from leg_wear_monitor.report.study.text import (
 from leg_wear_monitor.studies.point import Arrays
 from leg_wear_monitor.studies.summary import (
     Spread,
+    clearance_joints_of,
     depth_per_cycle,
+    fraction_of_range,
     largest_error,
-    loose_of,
-    of_loose,
+    of_clearance_joints,
     peak_force,
     power_law,
-    share_of_range,
     worst_zone,
 )
 
@@ -42,17 +42,21 @@ def disturbance(labelled: Labelled) -> list[str]:
     known = [quantity for quantity in _known(labelled[0][1]) if quantity.name.startswith("toe")]
     if len(known) < 3:
         return []
-    shares = {each.title: [share_of_range(arrays, each.name) for _, arrays in labelled] for each in known}
-    texts = [f"{percent(min(share))} to {percent(max(share))}" if len(share) > 1 and min(share) < max(share)
-             else percent(share[0]) for share in shares.values()]  # fmt: skip
-    rises = all(a < b < c for a, b, c in zip(*shares.values(), strict=True))
-    judged = (
+    fractions = {
+        each.title: [fraction_of_range(arrays, each.name) for _, arrays in labelled] for each in known
+    }
+    texts = [
+        f"{percent(min(each))} to {percent(max(each))}" if min(each) < max(each) else percent(each[0])
+        for each in fractions.values()
+    ]
+    rises = all(a < b < c for a, b, c in zip(*fractions.values(), strict=True))
+    evaluated = (
         "the higher the derivative, the more it is disturbed"
         if rises
         else "the order displacement, velocity, acceleration does not hold everywhere"
     )
-    parts = [f"{title} {text}" for title, text in zip(shares, texts, strict=True)]
-    return [f"Largest errors in a cycle, of the ideal curve's range: {joined(parts)}; {judged}."]
+    parts = [f"{title} {text}" for title, text in zip(fractions, texts, strict=True)]
+    return [f"Largest errors in a cycle, of the ideal curve's range: {joined(parts)}; {evaluated}."]
 
 
 def growth(values: Sequence[float], labelled: Labelled, what: str) -> list[str]:
@@ -64,7 +68,7 @@ def growth(values: Sequence[float], labelled: Labelled, what: str) -> list[str]:
             f"The largest {each.title} error goes from {with_spread(spreads[0], each.factor)} to "
             f"{with_spread(spreads[-1], each.factor)} {each.unit}{_as_power(values, spreads, what)}."
         )
-    for joint in loose_of(labelled[0][1]):
+    for joint in clearance_joints_of(labelled[0][1]):
         forces = [peak_force(arrays, joint) for _, arrays in labelled]
         wear = [depth_per_cycle(arrays, joint) for _, arrays in labelled]
         sentences.append(
@@ -79,11 +83,16 @@ def growth(values: Sequence[float], labelled: Labelled, what: str) -> list[str]:
 def regular_where(labelled: Labelled) -> list[str]:
     """How far the contact force repeats itself from cycle to cycle, over what is varied."""
     sentences = []
-    for joint in loose_of(labelled[0][1]):
-        shares = [of_loose(arrays, "repeats_contact_force", joint).mean for _, arrays in labelled]
-        parts = [f"{label} {100.0 * share:.0f}" for (label, _), share in zip(labelled, shares, strict=True)]
+    for joint in clearance_joints_of(labelled[0][1]):
+        fractions = [
+            of_clearance_joints(arrays, "repeats_contact_force", joint).mean for _, arrays in labelled
+        ]
+        parts = [
+            f"{label} {100.0 * fraction:.0f}"
+            for (label, _), fraction in zip(labelled, fractions, strict=True)
+        ]
         sentences.append(
-            f"Joint {joint}: share of the contact force's variance that repeats from cycle to cycle [%] "
+            f"Joint {joint}: fraction of the contact force's variance that repeats from cycle to cycle [%] "
             f"(100 is periodic): {'; '.join(parts)}."
         )
     return sentences
@@ -115,12 +124,12 @@ def places(labelled: Labelled) -> list[str]:
 
 
 def _joints(labelled: Labelled) -> list[tuple[str, str, Arrays]]:
-    """Every loose joint of every point with a name that tells it from the others."""
+    """Every clearance joint of every point with a name that tells it from the others."""
     several = len(labelled) > 1
     return [
         (f"{joint} of {{{label}}}" if several and label != joint else joint, joint, arrays)
         for label, arrays in labelled
-        for joint in loose_of(arrays)
+        for joint in clearance_joints_of(arrays)
     ]
 
 
@@ -138,32 +147,35 @@ def wear(labelled: Labelled) -> list[str]:
 
 def impacts(labelled: Labelled) -> list[str]:
     """Which joint is hit most often."""
-    counts = [(name, of_loose(arrays, "impacts", joint)) for name, joint, arrays in _joints(labelled)]
+    counts = [
+        (name, of_clearance_joints(arrays, "impacts", joint)) for name, joint, arrays in _joints(labelled)
+    ]
     return [f"Impacts a cycle, the most first: {_ranked(counts)}."]
 
 
 def regularity(labelled: Labelled) -> list[str]:
     """Whose contact repeats itself from cycle to cycle."""
-    shares = [
-        (name, of_loose(arrays, "repeats_contact_force", joint)) for name, joint, arrays in _joints(labelled)
+    fractions = [
+        (name, of_clearance_joints(arrays, "repeats_contact_force", joint))
+        for name, joint, arrays in _joints(labelled)
     ]
     return [
         "Share of the contact force's variance that repeats from cycle to cycle [%] (100 is periodic), "
-        f"the most regular first: {_ranked(shares, 100.0)}."
+        f"the most regular first: {_ranked(fractions, 100.0)}."
     ]
 
 
 def zones(labelled: Labelled) -> list[str]:
     """Whose wear is concentrated in a zone."""
     sentences = []
-    for share in (0.5, 0.9):
+    for fraction in (0.5, 0.9):
         known = [
-            (name, zone) for name, joint, a in _joints(labelled) if (zone := worst_zone(a, joint, share))
+            (name, zone) for name, joint, a in _joints(labelled) if (zone := worst_zone(a, joint, fraction))
         ]
         ranked = sorted(known, key=lambda one: one[1][1] - one[1][0])
         texts = "; ".join(f"{name} {zone_text(zone)}" for name, zone in ranked)
         if texts:
-            head = f"Zone that holds {percent(share)} of the bushing's wear"
+            head = f"Zone that holds {percent(fraction)} of the bushing's wear"
             sentences.append(f"{head}, the narrowest first: {texts}.")
     return sentences
 
@@ -178,9 +190,9 @@ def superposition(parts: Labelled, whole: Arrays) -> list[str]:
         summed = f"{number(each.factor * total)} {each.unit}"
         texts.append(f"{each.title} {with_spread(together, each.factor)} against {summed}")
     verdict = "is" if all(abs(ratio - 1.0) < _SUM_WITHIN for ratio in ratios) else "is not"
-    shares = joined([percent(ratio) for ratio in ratios])
+    fractions = joined([percent(ratio) for ratio in ratios])
     return [
-        f"All at once {verdict} the sum of the places alone: largest errors are {shares} of the sum "
+        f"All at once {verdict} the sum of the places alone: largest errors are {fractions} of the sum "
         f"({joined(texts)}).",
         *(_against_alone(joint, arrays, whole) for _, joint, arrays in _joints(parts)),
     ]
@@ -189,8 +201,8 @@ def superposition(parts: Labelled, whole: Arrays) -> list[str]:
 def _against_alone(joint: str, alone: Arrays, whole: Arrays) -> str:
     force = peak_force(whole, joint).mean / peak_force(alone, joint).mean
     depth = depth_per_cycle(whole, joint).mean / depth_per_cycle(alone, joint).mean
-    volume = of_loose(whole, "archard_integral_j_per_cycle", joint).mean
-    volume /= of_loose(alone, "archard_integral_j_per_cycle", joint).mean
+    volume = of_clearance_joints(whole, "archard_integral_j_per_cycle", joint).mean
+    volume /= of_clearance_joints(alone, "archard_integral_j_per_cycle", joint).mean
     return (
         f"Joint {joint}, all at once against its place alone: largest contact force × {number(force)}, "
         f"worn volume × {number(volume)}, greatest depth × {number(depth)}."
@@ -199,12 +211,14 @@ def _against_alone(joint: str, alone: Arrays, whole: Arrays) -> str:
 
 def worst_joint(whole: Arrays) -> list[str]:
     """Joints by their wear."""
-    names = loose_of(whole)
+    names = clearance_joints_of(whole)
     depth = sorted(names, key=lambda joint: -depth_per_cycle(whole, joint).mean)
-    volume = sorted(names, key=lambda joint: -of_loose(whole, "archard_integral_j_per_cycle", joint).mean)
+    volume = sorted(
+        names, key=lambda joint: -of_clearance_joints(whole, "archard_integral_j_per_cycle", joint).mean
+    )
     return [
-        f"With all of them loose, worn volume falls in the order {' > '.join(volume)}, greatest depth in the "
-        f"order {' > '.join(depth)}: {volume[0]} wears most, {volume[-1]} least."
+        f"With clearance in all of them, worn volume falls in the order {' > '.join(volume)}, "
+        f"greatest depth in the order {' > '.join(depth)}: {volume[0]} wears most, {volume[-1]} least."
     ]
 
 
@@ -215,8 +229,10 @@ def laws(labelled: Labelled) -> list[str]:
     friction = [one for one in labelled if one[0] not in NORMAL_LAWS]
     groups = (("The normal laws", normal), ("Those with a loss", lossy), ("Friction", friction))
     sentences = [_law_sentence(what, group) for what, group in groups if len(group) > 1]
-    for joint in loose_of(labelled[0][1]):
-        volumes = [of_loose(arrays, "archard_integral_j_per_cycle", joint) for _, arrays in labelled]
+    for joint in clearance_joints_of(labelled[0][1]):
+        volumes = [
+            of_clearance_joints(arrays, "archard_integral_j_per_cycle", joint) for _, arrays in labelled
+        ]
         low, high = _ends(volumes)
         sentences.append(
             f"Wear of {joint}, ∫ F |v| dt [J a cycle]: from {with_spread(volumes[low])} ({labelled[low][0]}) "
@@ -236,8 +252,8 @@ def _law_sentence(what: str, group: Labelled) -> str:
     parts = []
     for each in _known(group[0][1]):
         parts.append((each.title, [largest_error(arrays, each.name) for _, arrays in group]))
-    for joint in loose_of(group[0][1]):
-        volumes = [of_loose(arrays, "archard_integral_j_per_cycle", joint) for _, arrays in group]
+    for joint in clearance_joints_of(group[0][1]):
+        volumes = [of_clearance_joints(arrays, "archard_integral_j_per_cycle", joint) for _, arrays in group]
         parts.append((f"wear of {joint}", volumes))
     texts = [f"{name} {percent(_span(spreads))}" for name, spreads in parts]
     names = joined([label.removeprefix("friction ") for label, _ in group])

@@ -15,10 +15,10 @@ from leg_wear_monitor.report.figures.figure import BODY_COLOURS
 from leg_wear_monitor.report.page import Live, render, template_text
 from leg_wear_monitor.report.study.text import Labelled
 from leg_wear_monitor.studies.point import Arrays
-from leg_wear_monitor.studies.summary import loose_of
+from leg_wear_monitor.studies.summary import clearance_joints_of
 
-CLEARANCE_SHARE = 0.3  # of the bushing's radius: how wide a clearance is drawn
-_ARROW_SHARE = 0.3  # of the leg's height: the longest arrow
+CLEARANCE_FRACTION = 0.3  # of the bushing's radius: how wide a clearance is drawn
+_ARROW_FRACTION = 0.3  # of the leg's height: the longest arrow
 
 
 def leg_slider(mechanism: Mechanism, runs: Labelled, clearances_m: Sequence[float], speed_rpm: float) -> Live:
@@ -28,7 +28,7 @@ def leg_slider(mechanism: Mechanism, runs: Labelled, clearances_m: Sequence[floa
     ----------
     mechanism : Mechanism
     runs : sequence of (label, arrays)
-        Results of `leg_wear_monitor.studies.tasks.response.respond`.
+        Results of `leg_wear_monitor.studies.tasks.response.run_ensemble`.
     clearances_m : sequence of float
         Of the runs.
     speed_rpm : float
@@ -43,9 +43,9 @@ def leg_slider(mechanism: Mechanism, runs: Labelled, clearances_m: Sequence[floa
         for (label, arrays), clearance in zip(runs, clearances_m, strict=True)
     ]
     data["longest_n"] = max(float(np.abs(run["largest_n"])) for run in data["runs"])
-    data["arrow_mm"] = round(_ARROW_SHARE * data["box"][3], 1)
+    data["arrow_mm"] = round(_ARROW_FRACTION * data["box"][3], 1)
     radius = _bushing_radius(mechanism, data["runs"])
-    factors = [CLEARANCE_SHARE * radius / clearance for clearance in clearances_m]
+    factors = [CLEARANCE_FRACTION * radius / clearance for clearance in clearances_m]
     return Live(
         markup=render("leg_slider.html", data=data, names=[run["label"] for run in data["runs"]]),
         script=template_text("leg_slider.js"),
@@ -123,14 +123,14 @@ def _run_data(label: str, arrays: Arrays, clearance_m: float) -> dict[str, Any]:
             "e": (e[:, k] * flip).round(3).tolist(),
             "f": (force[:, k] * flip).round(1).tolist(),
         }
-        for k, name in enumerate(loose_of(arrays))
+        for k, name in enumerate(clearance_joints_of(arrays))
     }
     largest = float(np.linalg.norm(force, axis=-1).max())
     return {"label": label, "clearance_mm": round(1.0e3 * clearance_m, 4), "pins": pins, "largest_n": largest}
 
 
 def _bushing_radius(mechanism: Mechanism, runs: Sequence[dict[str, Any]]) -> float:
-    """Bushing radius [m] that the exaggeration is told for: the first loose joint's."""
+    """Bushing radius [m] that the exaggeration is told for: the first clearance joint's."""
     return mechanism.clearances[next(iter(runs[0]["pins"]))].bushing_radius
 
 

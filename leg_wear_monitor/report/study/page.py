@@ -125,7 +125,9 @@ def _compared(results: StudyResults, labelled: Labelled, sentences: list[str], h
 
 
 def _location(results: StudyResults, labelled: Labelled) -> Sections:
-    return _compared(results, labelled, findings.disturbance(labelled) + findings.places(labelled), "loose")
+    return _compared(
+        results, labelled, findings.disturbance(labelled) + findings.places(labelled), "clearance_joints"
+    )
 
 
 def _multi(results: StudyResults, labelled: Labelled) -> Sections:
@@ -138,7 +140,7 @@ def _multi(results: StudyResults, labelled: Labelled) -> Sections:
         *findings.regularity(labelled[-1:]),
         *findings.zones(labelled[-1:]),
     ]
-    return _compared(results, labelled, sentences, "loose")
+    return _compared(results, labelled, sentences, "clearance_joints")
 
 
 def _laws(results: StudyResults, labelled: Labelled) -> Sections:

@@ -11,7 +11,7 @@ from leg_wear_monitor.report.study.text import Labelled, error_table, joined, jo
 from leg_wear_monitor.report.study.wear_pictures import wear_gallery
 from leg_wear_monitor.studies.point import Point
 from leg_wear_monitor.studies.storage.store import StudyResults
-from leg_wear_monitor.studies.summary import loose_of
+from leg_wear_monitor.studies.summary import clearance_joints_of
 
 Sections = list[Section]
 
@@ -25,12 +25,14 @@ def asked(results: StudyResults) -> Section:
         f"{ensemble['skip_cycles']} that are not. Motion with clearance is chaotic: a single run is an "
         "example."
     )
-    loose = list(dict.fromkeys(name for point in results.points for name in point.settings["loose"]))
+    clearance_joints = list(
+        dict.fromkeys(name for point in results.points for name in point.settings["clearance_joints"])
+    )
     names = ", ".join(results.mechanism.joints)
     leg = Picture(
-        image=png(leg_picture(results.mechanism, loose)),
-        alt=f"The leg to scale with its joints {names}; {joined(loose)} are loose; and the path of its toe",
-        caption=f"The leg to scale. Loose in this study: {joined(loose)}.",
+        image=png(leg_picture(results.mechanism, clearance_joints)),
+        alt=f"The leg to scale, joints {names}, clearance in {joined(clearance_joints)}, path of its toe",
+        caption=f"The leg to scale. Clearance joints of this study: {joined(clearance_joints)}.",
         wide=True,
     )
     return Section("What was asked", [Text(text), leg])
@@ -71,7 +73,7 @@ def wear(results: StudyResults, labelled: Labelled) -> Section:
     worn = [
         (label, joint, 1.0e6 * arrays["wear_depth_m_per_cycle"][:, k])
         for label, arrays in labelled
-        for k, joint in enumerate(loose_of(arrays))
+        for k, joint in enumerate(clearance_joints_of(arrays))
     ]
     what = "Wear of a million cycles of new joints, as a million times the mean wear of a cycle"
     return Section("Wear", [wear_gallery(results.mechanism, worn, what)])

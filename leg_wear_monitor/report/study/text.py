@@ -8,13 +8,13 @@ from leg_wear_monitor.report.page import Table
 from leg_wear_monitor.studies.point import Arrays
 from leg_wear_monitor.studies.summary import (
     Spread,
+    clearance_joints_of,
     depth_per_cycle,
+    fraction_of_range,
     joint_force,
     largest_error,
-    loose_of,
-    of_loose,
+    of_clearance_joints,
     peak_force,
-    share_of_range,
     worst_zone,
 )
 
@@ -62,9 +62,9 @@ def with_spread(value: Spread, factor: float = 1.0) -> str:
     return f"{mean:.{digits}f} ± {around}"
 
 
-def percent(share: float) -> str:
+def percent(fraction: float) -> str:
     """A share for people."""
-    text = number(100.0 * share)
+    text = number(100.0 * fraction)
     return f"{text.rstrip('0').rstrip('.') if text.endswith('.0') else text} %"
 
 
@@ -86,7 +86,7 @@ def error_table(labelled: Labelled, head: str) -> Table:
     rows = [
         [label]
         + [with_spread(largest_error(arrays, each.name), each.factor) for each in known]
-        + [percent(share_of_range(arrays, each.name)) for each in known]
+        + [percent(fraction_of_range(arrays, each.name)) for each in known]
         for label, arrays in labelled
     ]
     return Table(
@@ -107,22 +107,22 @@ def _has(labelled: Labelled, quantity: Quantity) -> bool:
 
 
 def joint_table(labelled: Labelled, head: str) -> Table:
-    """Forces, impacts and contact of every loose joint of every point."""
+    """Forces, impacts and contact of every clearance joint of every point."""
     rows = [
         [
-            f"{label}: {joint}" if len(loose_of(arrays)) > 1 else label,
+            f"{label}: {joint}" if len(clearance_joints_of(arrays)) > 1 else label,
             with_spread(peak_force(arrays, joint)),
             with_spread(joint_force(arrays, "p99_force_n", joint)),
             with_spread(joint_force(arrays, "mean_force_n", joint)),
-            with_spread(of_loose(arrays, "impacts", joint)),
-            with_spread(of_loose(arrays, "impact_speed_mps", joint), 1.0e3),
-            with_spread(of_loose(arrays, "contact_fraction", joint), 100.0),
+            with_spread(of_clearance_joints(arrays, "impacts", joint)),
+            with_spread(of_clearance_joints(arrays, "impact_speed_mps", joint), 1.0e3),
+            with_spread(of_clearance_joints(arrays, "contact_fraction", joint), 100.0),
         ]
         for label, arrays in labelled
-        for joint in loose_of(arrays)
+        for joint in clearance_joints_of(arrays)
     ]
     return Table(
-        caption="Contact forces and impacts of the loose joints",
+        caption="Contact forces and impacts of the clearance joints",
         head=[
             f"{head}, joint",
             "largest force in a cycle [N]",
@@ -139,17 +139,17 @@ def joint_table(labelled: Labelled, head: str) -> Table:
 
 
 def wear_table(labelled: Labelled, head: str) -> Table:
-    """Wear of every loose joint of every point."""
+    """Wear of every clearance joint of every point."""
     rows = [
         [
-            f"{label}: {joint}" if len(loose_of(arrays)) > 1 else label,
+            f"{label}: {joint}" if len(clearance_joints_of(arrays)) > 1 else label,
             with_spread(depth_per_cycle(arrays, joint), PICO),
-            with_spread(of_loose(arrays, "archard_integral_j_per_cycle", joint)),
+            with_spread(of_clearance_joints(arrays, "archard_integral_j_per_cycle", joint)),
             zone_text(worst_zone(arrays, joint, 0.5)),
             zone_text(worst_zone(arrays, joint)),
         ]
         for label, arrays in labelled
-        for joint in loose_of(arrays)
+        for joint in clearance_joints_of(arrays)
     ]
     return Table(
         caption="Wear of the bushings",

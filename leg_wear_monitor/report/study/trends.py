@@ -23,10 +23,10 @@ from leg_wear_monitor.report.study.text import PICO, QUANTITIES, Labelled
 from leg_wear_monitor.studies.point import Arrays
 from leg_wear_monitor.studies.summary import (
     Spread,
+    clearance_joints_of,
     depth_per_cycle,
     joint_force,
     largest_error,
-    loose_of,
     peak_force,
 )
 
@@ -47,11 +47,11 @@ class Panel(NamedTuple):
 
 def panels_of(arrays: Sequence[Arrays]) -> list[Panel]:
     """Pictures of a study's points."""
-    joints = list(dict.fromkeys(name for each in arrays for name in loose_of(each)))
+    joints = list(dict.fromkeys(name for each in arrays for name in clearance_joints_of(each)))
 
     def by_joint(figure: Callable[[Arrays, str], Spread]) -> dict[str, list[Spread | None]]:
         return {
-            name: [figure(each, name) if name in loose_of(each) else None for each in arrays]
+            name: [figure(each, name) if name in clearance_joints_of(each) else None for each in arrays]
             for name in joints
         }
 

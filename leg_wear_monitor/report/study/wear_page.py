@@ -21,7 +21,7 @@ from leg_wear_monitor.report.study.trends import MARKS
 from leg_wear_monitor.report.study.wear_pictures import wear_gallery
 from leg_wear_monitor.studies.point import Arrays
 from leg_wear_monitor.studies.storage.store import StudyResults
-from leg_wear_monitor.studies.summary import loose_of, spread
+from leg_wear_monitor.studies.summary import clearance_joints_of, spread
 from leg_wear_monitor.wear.surfaces import BUSHING, wear_zone
 
 _NEW, _END = 0, 1  # of rates; of depths, halfway and end
@@ -38,7 +38,7 @@ def life(results: StudyResults, labelled: Labelled) -> Sections:
     if lives:
         sections += [_clearances(lives), _worn_surfaces(results, lives)]
     sections.append(cycle(results, results.of("response")))
-    tables = [wear_table(labelled, "loose"), joint_table(labelled, "loose")]
+    tables = [wear_table(labelled, "clearance_joints"), joint_table(labelled, "clearance_joints")]
     return [*sections, Section("Tables", tables + ([_life_table(lives)] if lives else []))]
 
 
@@ -46,13 +46,15 @@ def _of_a_life(label: str, arrays: Arrays, several: bool) -> list[str]:
     """How long it took, whether wear slowed, and where it went."""
     cycles, mean = arrays["cycles"][:, -1], arrays["clearance_mean_m"]
     opened = 1.0e3 * (mean[:, -1] - mean[:, 0]).mean(axis=0)
-    first = loose_of(arrays)[int(opened.argmax())]
-    parts = [f"{joint} {number(each)} mm" for joint, each in zip(loose_of(arrays), opened, strict=True)]
+    first = clearance_joints_of(arrays)[int(opened.argmax())]
+    parts = [
+        f"{joint} {number(each)} mm" for joint, each in zip(clearance_joints_of(arrays), opened, strict=True)
+    ]
     rates = [
         f"{joint} × {number(_rate(arrays, k, _END) / _rate(arrays, k, _NEW))}"
-        for k, joint in enumerate(loose_of(arrays))
+        for k, joint in enumerate(clearance_joints_of(arrays))
     ]
-    sets = f"With {label} loose, " if several else ""
+    sets = f"With clearance in {label}, " if several else ""
     toe = arrays["toe_position_m"]
     return [
         f"{sets}{first} opens first, after {with_spread(spread(cycles), _MILLION)} million cycles; opened "
@@ -77,7 +79,7 @@ def _clearances(lives: Labelled) -> Section:
     for label, arrays in lives:
         figure = new_figure(4.6, 3.0)
         axes = figure.subplots()
-        for k, ((colour, mark), joint) in enumerate(zip(MARKS, loose_of(arrays), strict=False)):
+        for k, ((colour, mark), joint) in enumerate(zip(MARKS, clearance_joints_of(arrays), strict=False)):
             for run in range(len(arrays["cycles"])):
                 cycles = _MILLION * arrays["cycles"][run]
                 mean, largest = (1.0e3 * arrays[f"clearance_{kind}_m"][run, :, k] for kind in ("mean", "max"))
@@ -103,7 +105,10 @@ def _clearances(lives: Labelled) -> Section:
 
 def _ends(arrays: Arrays) -> str:
     mean = 1.0e3 * arrays["clearance_mean_m"].mean(axis=0)
-    parts = [f"{joint} {mean[0, k]:.3f} to {mean[-1, k]:.3f} mm" for k, joint in enumerate(loose_of(arrays))]
+    parts = [
+        f"{joint} {mean[0, k]:.3f} to {mean[-1, k]:.3f} mm"
+        for k, joint in enumerate(clearance_joints_of(arrays))
+    ]
     return ", ".join(parts)
 
 
@@ -111,7 +116,7 @@ def _worn_surfaces(results: StudyResults, lives: Labelled) -> Section:
     worn = [
         (label, joint, np.asarray(arrays["depth_m"][:, _END, k], dtype=float))
         for label, arrays in lives
-        for k, joint in enumerate(loose_of(arrays))
+        for k, joint in enumerate(clearance_joints_of(arrays))
     ]
     return Section(
         "Worn surfaces", [wear_gallery(results.mechanism, worn, "Surfaces at the end of the life")]
@@ -121,7 +126,7 @@ def _worn_surfaces(results: StudyResults, lives: Labelled) -> Section:
 def _life_table(lives: Labelled) -> Table:
     rows: list[Sequence[str]] = []
     for label, arrays in lives:
-        for k, joint in enumerate(loose_of(arrays)):
+        for k, joint in enumerate(clearance_joints_of(arrays)):
             depth = arrays["depth_m"][:, _END, k, BUSHING].astype(float)
             rate = arrays["rate_m_per_cycle"][:, :, k, BUSHING].astype(float)
             rows.append([
@@ -136,7 +141,7 @@ def _life_table(lives: Labelled) -> Table:
     return Table(
         caption="A life with wear fed back",
         head=(
-            "loose, joint",
+            "clearance joints, joint",
             "cycles [millions]",
             "mean clearance at the end [mm]",
             "greatest depth of the bushing [µm]",

@@ -4,7 +4,7 @@ from collections.abc import Mapping
 
 import attrs
 
-from leg_wear_monitor.monitor.alarms.alarm import Alarm, Level, Limit, acknowledged, has_changed, judged
+from leg_wear_monitor.monitor.alarms.alarm import Alarm, Level, Limit, acknowledged, evaluated, has_changed
 from leg_wear_monitor.monitor.evaluation.board import SOURCES, TWO_SOURCES
 from leg_wear_monitor.monitor.reports import AlarmList
 from leg_wear_monitor.ros.health.silence import SILENT_FROM_S, TORQUE
@@ -31,12 +31,12 @@ class NodeAlarms:
         alarms += [Alarm(kind=SOURCES, subject=kind if kind == TORQUE else "") for kind in kinds]
         self._alarms = {alarm.name: alarm for alarm in alarms}
 
-    def judge(self, values: Mapping[str, float], stamp_ns: int) -> bool:
-        """Judge values by the names of their alarms; whether what people see has changed."""
+    def evaluate(self, values: Mapping[str, float], stamp_ns: int) -> bool:
+        """Evaluate values by the names of their alarms; whether what people see has changed."""
         changed = False
         for name, value in values.items():
             before = self._alarms[name]
-            after = judged(before, value, _LIMITS[before.kind], stamp_ns)
+            after = evaluated(before, value, _LIMITS[before.kind], stamp_ns)
             changed |= has_changed(before, after)
             self._alarms[name] = after
         return changed

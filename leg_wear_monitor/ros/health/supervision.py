@@ -11,7 +11,7 @@ from leg_wear_monitor.monitor.alarms.alarm import Alarm, Level
 from leg_wear_monitor.monitor.config.settings import MonitorConfig
 from leg_wear_monitor.monitor.evaluation.board import SOURCES
 from leg_wear_monitor.monitor.reports import AlarmList, Status
-from leg_wear_monitor.ros.health.clock_watch import ClockWatch, both_clocks
+from leg_wear_monitor.ros.health.clock_monitor import ClockMonitor, both_clocks
 from leg_wear_monitor.ros.health.node_alarms import SILENCE, NodeAlarms
 from leg_wear_monitor.ros.health.node_health import topics_status
 from leg_wear_monitor.ros.health.node_log import AlarmLog, StatusLog
@@ -46,7 +46,7 @@ class Supervision:
         kinds = (CRANK,) if config.drive_torque.source == "effort" else (CRANK, TORQUE)
         self._silence = Silence(kinds, self._started_ns, time.time_ns())
         self._names = CrankNames(config.crank_joint)
-        self._alarms, self._clock = NodeAlarms(kinds), ClockWatch()
+        self._alarms, self._clock = NodeAlarms(kinds), ClockMonitor()
         self._alarm_log, self._status_log = AlarmLog(node.get_logger()), StatusLog(node.get_logger())
         self._several_since: dict[str, int] = {}
         self.inputs: Sequence[InputTopic] = ()
@@ -88,7 +88,7 @@ class Supervision:
         for kind in self._silence.kinds:
             is_silent = self._silence.level(kind, now_ns) is Level.ERROR
             values[f"{SILENCE} {kind}"] = self._silence.silent_s(kind, now_ns) if is_silent else 0.0
-        return self._alarms.judge(values, time.time_ns())
+        return self._alarms.evaluate(values, time.time_ns())
 
     def statuses(self, statuses: Iterable[Status]) -> tuple[Status, ...]:
         """Statuses with those of topics and clock, each with what it has no current data of."""

@@ -1,4 +1,4 @@
-"""The leg as RViz and Foxglove draw it: its bodies, and its loose joints in the colour of their alarms."""
+"""The leg for RViz and Foxglove: its bodies, and its clearance joints in the colour of their alarms."""
 
 from collections.abc import Callable
 
@@ -38,13 +38,13 @@ class LegMarkers:
     def __init__(self, mechanism: Mechanism, frame_id: str) -> None:
         linkage = build_linkage(mechanism)
         motion = ideal_motion(linkage, TURN / _STEPS * np.arange(_STEPS), TURN)
-        self._frame_id, self._loose = frame_id, mechanism.loose
+        self._frame_id, self._clearance_joints = frame_id, mechanism.clearance_joints
         self._points: dict[tuple[str, str], Floats] = {
             (body, point): point_motion(motion, linkage, body, point)[0]
             for body in (GROUND, *mechanism.bodies)
             for point in mechanism.points_of(body)
         }
-        self._joints = {name: (mechanism.sides(name)[0], name) for name in mechanism.loose}
+        self._joints = {name: (mechanism.sides(name)[0], name) for name in mechanism.clearance_joints}
 
     def at(self, crank_angle: float, levels: dict[str, Level] | None, stamp: Time) -> MarkerArray:
         """The leg at a crank angle [rad], its joints by their levels; grey where there are none."""
@@ -54,7 +54,9 @@ class LegMarkers:
         bodies.pose.orientation.w = 1.0
         bodies.scale.x = _LINE_M
         bodies.points = self._lines(i)
-        return MarkerArray(markers=[bodies, *(self._joint(name, i, levels, header) for name in self._loose)])
+        return MarkerArray(
+            markers=[bodies, *(self._joint(name, i, levels, header) for name in self._clearance_joints)]
+        )
 
     def _lines(self, i: int) -> list[Point]:
         """From each body's first point to its others, as pairs."""
@@ -68,7 +70,7 @@ class LegMarkers:
         return pairs
 
     def _joint(self, name: str, i: int, levels: dict[str, Level] | None, header: Header) -> Marker:
-        marker = Marker(header=header, ns="joints", id=self._loose.index(name), type=Marker.SPHERE)
+        marker = Marker(header=header, ns="joints", id=self._clearance_joints.index(name), type=Marker.SPHERE)
         marker.pose.position = _point(self._points[self._joints[name]][i])
         marker.pose.orientation.w = 1.0
         marker.scale = Vector3(x=_JOINT_M, y=_JOINT_M, z=_JOINT_M)

@@ -47,7 +47,7 @@ def run_study(
     scheduler : str, optional
         Address of a Dask scheduler whose workers do it instead.
     progress : callable, optional
-        Called with the share of the work that is done.
+        Called with the fraction of the work that is done.
 
     Returns
     -------

@@ -47,14 +47,16 @@ def count_field(doc: str, least: int, default: int) -> Any:
 
 
 def clearance_field() -> Any:
-    """The clearance of all loose joints."""
-    return quantity("m", "radial clearance of the loose joints", at_least=1.0e-6, at_most=0.1, default=3.0e-4)
+    """The clearance of all clearance joints."""
+    return quantity(
+        "m", "radial clearance of the clearance joints", at_least=1.0e-6, at_most=0.1, default=3.0e-4
+    )
 
 
 def clearances_field() -> Any:
     """Clearances, one a point."""
     return quantity(
-        "m", "radial clearances of the loose joints", at_least=1.0e-6, at_most=0.1, check=check_rising
+        "m", "radial clearances of the clearance joints", at_least=1.0e-6, at_most=0.1, check=check_rising
     )
 
 
@@ -68,6 +70,6 @@ def speeds_field() -> Any:
     return quantity("rpm", "speeds of the crank", at_least=0.1, at_most=10_000.0, check=check_rising)
 
 
-def loose_field() -> Any:
-    """Loose joints by name."""
-    return described("joints that are loose", check=check_joints)
+def clearance_joints_field() -> Any:
+    """Clearance joints by name."""
+    return described("joints with clearance", check=check_joints)

@@ -24,14 +24,14 @@ _Place = dict[str, Any]
 
 PORTRAIT_CYCLES = 6
 
-_EACH_JOINT = 0.7  # cost of a further loose joint, in that of the first
+_EACH_JOINT = 0.7  # cost of a further clearance joint, in that of the first
 _LIKELY_JUMPS = 2.7  # of a life, for each time that the longest one is in the mean opening
-_MOMENTS = 20.0  # cost of watching a cycle, in that of a cycle of one loose joint
+_MOMENTS = 20.0  # cost of watching a cycle, in that of a cycle of one clearance joint
 
 
-def set_name(loose: Sequence[str]) -> str:
-    """Name of a set of loose joints."""
-    return ", ".join(loose)
+def set_name(clearance_joints: Sequence[str]) -> str:
+    """Name of a set of clearance joints."""
+    return ", ".join(clearance_joints)
 
 
 def millimetres(clearance_m: float) -> str:
@@ -44,17 +44,25 @@ def points_of(settings: Study) -> list[Point]:
     return _PLANS[type(settings)](settings)
 
 
-def _place(loose: Sequence[str], clearance_m: float, speed_rpm: float, **more: Any) -> _Place:
-    return {"loose": list(loose), "clearance_m": clearance_m, "speed_rpm": speed_rpm, **more}
+def _place(clearance_joints: Sequence[str], clearance_m: float, speed_rpm: float, **more: Any) -> _Place:
+    return {
+        "clearance_joints": list(clearance_joints),
+        "clearance_m": clearance_m,
+        "speed_rpm": speed_rpm,
+        **more,
+    }
 
 
-def _cycle_cost(loose: Sequence[str], speed_rpm: float) -> float:
-    return (1.0 + _EACH_JOINT * (len(loose) - 1)) * math.sqrt(60.0 / speed_rpm)
+def _cycle_cost(clearance_joints: Sequence[str], speed_rpm: float) -> float:
+    return (1.0 + _EACH_JOINT * (len(clearance_joints) - 1)) * math.sqrt(60.0 / speed_rpm)
 
 
 def _response(label: str, place: _Place, ensemble: Ensemble) -> Point:
     cycles = ensemble.cycles + ensemble.skip_cycles
-    each = cycles * _cycle_cost(place["loose"], place["speed_rpm"]) + _MOMENTS * ensemble.traced_cycles
+    each = (
+        cycles * _cycle_cost(place["clearance_joints"], place["speed_rpm"])
+        + _MOMENTS * ensemble.traced_cycles
+    )
     settings = place | attrs.asdict(ensemble)
     return Point(label=label, task="response", settings=settings, cost=ensemble.runs * each)
 
@@ -75,14 +83,18 @@ def _speed(study: Speed) -> list[Point]:
 
 def _location(study: Location) -> list[Point]:
     return [
-        _response(set_name(loose), _place(loose, study.clearance_m, study.speed_rpm), study.ensemble)
-        for loose in study.sets
+        _response(
+            set_name(clearance_joints),
+            _place(clearance_joints, study.clearance_m, study.speed_rpm),
+            study.ensemble,
+        )
+        for clearance_joints in study.sets
     ]
 
 
 def _multi(study: Multi) -> list[Point]:
     """The sets, and last all of their joints at once."""
-    everything = list(dict.fromkeys(joint for loose in study.sets for joint in loose))
+    everything = list(dict.fromkeys(joint for clearance_joints in study.sets for joint in clearance_joints))
     place = _place(everything, study.clearance_m, study.speed_rpm)
     return [*_location(study), _response(set_name(everything), place, study.ensemble)]
 
@@ -90,14 +102,14 @@ def _multi(study: Multi) -> list[Point]:
 def _wear(study: Wear) -> list[Point]:
     """The response of every set, and its life."""
     lives = []
-    for loose in study.sets:
+    for clearance_joints in study.sets:
         settings = _place(
-            loose, study.clearance_m, study.speed_rpm, **attrs.asdict(study.life),
-            perturb_share=study.ensemble.perturb_share, seed=study.ensemble.seed,
+            clearance_joints, study.clearance_m, study.speed_rpm, **attrs.asdict(study.life),
+            perturb_fraction=study.ensemble.perturb_fraction, seed=study.ensemble.seed,
         )  # fmt: skip
         cycles = _LIKELY_JUMPS * study.life.opens_m / study.life.jump_m * (study.life.cycles + 1)
-        cost = study.life.runs * cycles * _cycle_cost(loose, study.speed_rpm)
-        lives.append(Point(label=set_name(loose), task="life", settings=settings, cost=cost))
+        cost = study.life.runs * cycles * _cycle_cost(clearance_joints, study.speed_rpm)
+        lives.append(Point(label=set_name(clearance_joints), task="life", settings=settings, cost=cost))
     return _location(study) + lives
 
 
@@ -115,15 +127,23 @@ def _laws(study: Laws) -> list[Point]:
 
 
 def _chaos(study: Chaos) -> list[Point]:
-    start = {"perturb_share": study.ensemble.perturb_share, "seed": study.ensemble.seed}
+    start = {"perturb_fraction": study.ensemble.perturb_fraction, "seed": study.ensemble.seed}
     whole = _place(study.joints, study.clearance_m, study.speed_rpm)
     points = [_response(set_name(study.joints), whole, study.ensemble)]
     points.append(_section("section", whole | start, study, study.section_cycles, PORTRAIT_CYCLES))
-    for loose in (study.joints, *study.others):
-        place = _place(loose, study.clearance_m, study.speed_rpm) | start | attrs.asdict(study.exponent)
+    for clearance_joints in (study.joints, *study.others):
+        place = (
+            _place(clearance_joints, study.clearance_m, study.speed_rpm)
+            | start
+            | attrs.asdict(study.exponent)
+        )
         place["skip_cycles"] = study.ensemble.skip_cycles
-        cost = 2.0 * study.exponent.runs * study.exponent.cycles * _cycle_cost(loose, study.speed_rpm)
-        points.append(Point(label=set_name(loose), task="exponent", settings=place, cost=3.0 * cost))
+        cost = (
+            2.0 * study.exponent.runs * study.exponent.cycles * _cycle_cost(clearance_joints, study.speed_rpm)
+        )
+        points.append(
+            Point(label=set_name(clearance_joints), task="exponent", settings=place, cost=3.0 * cost)
+        )
     return points + _bifurcation(study, study.bifurcation, start)
 
 
@@ -135,7 +155,9 @@ def _section(label: str, place: _Place, study: Chaos, cycles: int, portrait_cycl
         "crank_angle_deg": study.section_crank_angle_deg,
         "runs": 1,
     }
-    cost = (cycles + study.bifurcation.skip_cycles) * _cycle_cost(place["loose"], place["speed_rpm"])
+    cost = (cycles + study.bifurcation.skip_cycles) * _cycle_cost(
+        place["clearance_joints"], place["speed_rpm"]
+    )
     return Point(label=label, task="section", settings=settings, cost=cost)
 
 

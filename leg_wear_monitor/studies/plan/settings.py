@@ -15,9 +15,9 @@ from leg_wear_monitor.studies.plan.keys import (
     Names,
     check_sets,
     clearance_field,
+    clearance_joints_field,
     clearances_field,
     count_field,
-    loose_field,
     some_of,
     speed_field,
     speeds_field,
@@ -33,9 +33,9 @@ class Ensemble:
     cycles: int = count_field("gait cycles counted in each run", 2, 20)
     skip_cycles: int = count_field("gait cycles before them", 0, 3)
     traced_cycles: int = count_field("counted cycles of each run whose curves are kept", 1, 5)
-    perturb_share: float = quantity(
+    perturb_fraction: float = quantity(
         "",
-        "journals start up to this share of the clearance from the centre",
+        "journals start up to this fraction of the clearance from the centre",
         at_least=0.0,
         at_most=1.0,
         default=0.3,
@@ -61,7 +61,7 @@ class Study:
 class Size(Study):
     """Clearance size at chosen joints."""
 
-    joints: Names = loose_field()
+    joints: Names = clearance_joints_field()
     clearances_m: tuple[float, ...] = clearances_field()
     speed_rpm: float = speed_field()
 
@@ -70,7 +70,7 @@ class Size(Study):
 class Speed(Study):
     """Crank speed with clearance at chosen joints."""
 
-    joints: Names = loose_field()
+    joints: Names = clearance_joints_field()
     speeds_rpm: tuple[float, ...] = speeds_field()
     clearance_m: float = clearance_field()
 
@@ -79,7 +79,7 @@ class Speed(Study):
 class Location(Study):
     """Clearance in one place or another."""
 
-    sets: tuple[Names, ...] = described("joints that are loose together, a list of lists", check=check_sets)
+    sets: tuple[Names, ...] = described("clearance joints of one run, a list of lists", check=check_sets)
     clearance_m: float = clearance_field()
     speed_rpm: float = speed_field()
 
@@ -158,7 +158,7 @@ class Bifurcation:
 class Chaos(Study):
     """How far the motion can be foretold."""
 
-    joints: Names = loose_field()
+    joints: Names = clearance_joints_field()
     others: tuple[Names, ...] = described("other sets whose exponents are compared", default=())
     clearance_m: float = clearance_field()
     speed_rpm: float = speed_field()
@@ -174,7 +174,7 @@ class Chaos(Study):
 class Laws(Study):
     """The normal force and friction laws against each other."""
 
-    joints: Names = loose_field()
+    joints: Names = clearance_joints_field()
     clearance_m: float = clearance_field()
     speed_rpm: float = speed_field()
     normal_laws: Names = described(

@@ -13,10 +13,10 @@ from leg_wear_monitor.studies.point import Arrays, code_digest
 Task = Callable[[Mechanism, dict[str, Any]], Arrays]
 
 TASKS = {
-    "response": "response.respond",
-    "life": "life.live",
-    "section": "section.intersect",
-    "exponent": "exponent.expand",
+    "response": "response.run_ensemble",
+    "life": "life.wear_life",
+    "section": "section.poincare_section",
+    "exponent": "exponent.lyapunov_exponent",
 }
 
 

@@ -13,14 +13,14 @@ from leg_wear_monitor.dynamics.clearance.tables import ClearanceTables
 from leg_wear_monitor.dynamics.joint.contact_event import F_N
 from leg_wear_monitor.dynamics.run.drive import steady_drive
 from leg_wear_monitor.dynamics.run.protocol import DONE, Setup, stop
-from leg_wear_monitor.dynamics.run.run_statistics import Tally
+from leg_wear_monitor.dynamics.run.run_statistics import RunStatistics
 from leg_wear_monitor.mechanism.arrays import Floats
 from leg_wear_monitor.mechanism.ideal import TURN
 from leg_wear_monitor.studies.tasks.grid import SAMPLES
 
 
 class Moment(NamedTuple):
-    """One instant of k loose joints, in the ground's frame.
+    """One instant of k clearance joints, in the ground's frame.
 
     ``deviation`` (3, 2) of the toe from the ideal linkage: position [m], velocity, acceleration;
     ``torque`` of the drive [N m]; ``e`` and ``rate`` (k, 2) of the journals' centres [m, m/s];
@@ -34,7 +34,7 @@ class Moment(NamedTuple):
     force: Floats
 
 
-class WatchedLeg:
+class ObservedLeg:
     """A leg under a steady crank, advanced by whole steps of which `SAMPLES` make a cycle.
 
     Parameters
@@ -62,10 +62,10 @@ class WatchedLeg:
         self._polynomial = steady_drive(leg.crank_angle_rad, setup.speed)
         self._step = TURN / abs(setup.speed) / SAMPLES
 
-    def advance(self, steps: int, tally: Tally) -> None:
+    def advance(self, steps: int, statistics: RunStatistics) -> None:
         """Go on by so many steps and add to a tally; raises SimulationError where the motion diverges."""
         done = round(self.stepper.time / self._step)
-        status, k = self.stepper.advance(self._polynomial, (done + steps) * self._step, tally)
+        status, k = self.stepper.advance(self._polynomial, (done + steps) * self._step, statistics)
         if status != DONE:
             raise stop(self.setup, status, k, self.stepper.time)
 
@@ -86,11 +86,11 @@ class WatchedLeg:
             force=-normal * n + friction * t,
         )
 
-    def moments(self, tally: Tally) -> Iterator[Moment]:
+    def moments(self, statistics: RunStatistics) -> Iterator[Moment]:
         """Moments of the cycle to come, from now on at every step; the tally is added to meanwhile."""
         for _ in range(SAMPLES):
             yield self.look()
-            self.advance(1, tally)
+            self.advance(1, statistics)
 
 
 def toe_deviations(toe: Floats, speed: float, e: Floats, v: Floats, a: Floats) -> Floats:

@@ -12,7 +12,7 @@ from leg_wear_monitor.dynamics.run.protocol import Setup
 from leg_wear_monitor.errors import ConfigError
 from leg_wear_monitor.mechanism.ideal import TURN
 from leg_wear_monitor.mechanism.spec import Mechanism
-from leg_wear_monitor.studies.tasks.contact_watch import WatchedLeg
+from leg_wear_monitor.studies.tasks.contact_watch import ObservedLeg
 from leg_wear_monitor.studies.tasks.grid import SAMPLES
 
 
@@ -39,29 +39,29 @@ def ensemble(mechanism: Mechanism, settings: dict[str, Any]) -> list[Leg]:
     ----------
     mechanism : Mechanism
     settings : dict
-        ``loose``, ``clearance_m``, ``speed_rpm``, ``runs``, ``seed``, ``perturb_share``; may have
-        ``normal_law`` and ``friction``.
+        ``clearance_joints``, ``clearance_m``, ``speed_rpm``, ``runs``, ``seed``, ``perturb_fraction``;
+        optional ``normal_law`` and ``friction``.
     """
     if settings.get("friction"):
         mechanism = with_friction(mechanism, settings["friction"])
-    loose, clearance_m = settings["loose"], settings["clearance_m"]
-    smallest = min(c.radial_clearance for c in clearance_settings(mechanism, loose, clearance_m))
+    clearance_joints, clearance_m = settings["clearance_joints"], settings["clearance_m"]
+    smallest = min(c.radial_clearance for c in clearance_settings(mechanism, clearance_joints, clearance_m))
     return [
         Leg(
             mechanism=mechanism,
-            clearances=loose,
+            clearances=clearance_joints,
             clearance_m=clearance_m,
             speed_rpm=settings["speed_rpm"],
             normal_law=settings.get("normal_law"),
             crank_angle_rad=angle,
-            perturb_m=settings["perturb_share"] * smallest,
+            perturb_m=settings["perturb_fraction"] * smallest,
             seed=settings["seed"] + member,
         )
         for member, angle in enumerate(start_angles(settings["runs"], settings["seed"]))
     ]
 
 
-def watch(legs: list[Leg], tolerance_m: float | None = None) -> list[WatchedLeg]:
+def watch(legs: list[Leg], tolerance_m: float | None = None) -> list[ObservedLeg]:
     """Every leg where it starts; they share their tables.
 
     Raises
@@ -75,7 +75,7 @@ def watch(legs: list[Leg], tolerance_m: float | None = None) -> list[WatchedLeg]
             raise setup
         setups.append(setup)
     tables = build_tables(setups[0].linkage, setups[0].contacts)
-    return [WatchedLeg(leg, setup, tables, tolerance_m) for leg, setup in zip(legs, setups, strict=True)]
+    return [ObservedLeg(leg, setup, tables, tolerance_m) for leg, setup in zip(legs, setups, strict=True)]
 
 
 def check_points(mechanism: Mechanism, settings: list[dict[str, Any]]) -> None:

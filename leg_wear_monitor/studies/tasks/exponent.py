@@ -11,18 +11,18 @@ from typing import Any
 import numpy as np
 
 from leg_wear_monitor.dynamics.clearance.run import ClearanceStepper, Snapshot
-from leg_wear_monitor.dynamics.run.run_statistics import new_tally
+from leg_wear_monitor.dynamics.run.run_statistics import new_run_statistics
 from leg_wear_monitor.mechanism.arrays import Floats
 from leg_wear_monitor.mechanism.ideal import TURN
 from leg_wear_monitor.mechanism.spec import Mechanism
 from leg_wear_monitor.studies.point import Arrays
-from leg_wear_monitor.studies.tasks.contact_watch import WatchedLeg
+from leg_wear_monitor.studies.tasks.contact_watch import ObservedLeg
 from leg_wear_monitor.studies.tasks.ensemble import ensemble, watch
 from leg_wear_monitor.studies.tasks.grid import SAMPLES
 from leg_wear_monitor.studies.tasks.lyapunov import Flags, stretches
 
 
-def expand(mechanism: Mechanism, settings: dict[str, Any]) -> Arrays:
+def lyapunov_exponent(mechanism: Mechanism, settings: dict[str, Any]) -> Arrays:
     """Growth of small distances between neighbouring motions.
 
     Returns
@@ -35,21 +35,21 @@ def expand(mechanism: Mechanism, settings: dict[str, Any]) -> Arrays:
     logs = np.array([_follow(leg, settings) for leg in legs])
     runs, cycles = settings["runs"], settings["cycles"]
     return {
-        "loose": np.array(legs[0].setup.loose),
+        "clearance_joints": np.array(legs[0].setup.clearance_joints),
         "stretch_per_cycle": logs.reshape(runs, cycles, settings["renewals"]).sum(axis=2),
         "period_s": np.array(TURN / abs(legs[0].setup.speed)),
     }
 
 
-def _follow(leg: WatchedLeg, settings: dict[str, Any]) -> Floats:
+def _follow(leg: ObservedLeg, settings: dict[str, Any]) -> Floats:
     """Stretches of one run."""
-    stepper, tally = leg.stepper, new_tally(len(leg.setup.linkage.mechanism.joints))
-    leg.advance(settings["skip_cycles"] * SAMPLES, tally)
+    stepper, statistics = leg.stepper, new_run_statistics(len(leg.setup.linkage.mechanism.joints))
+    leg.advance(settings["skip_cycles"] * SAMPLES, statistics)
     steps, depth = SAMPLES // settings["renewals"], stepper.state.depth.copy()
 
     def advance(motion: Floats) -> Floats:
         stepper.restore(Snapshot(motion, depth))
-        leg.advance(steps, tally)
+        leg.advance(steps, statistics)
         return stepper.state.motion.copy()
 
     scale, approach = _scale(leg), _marks(stepper, "approach")
@@ -75,7 +75,7 @@ def _marks(stepper: ClearanceStepper, name: str) -> Flags:
     return marks
 
 
-def _scale(leg: WatchedLeg) -> Floats:
+def _scale(leg: ObservedLeg) -> Floats:
     """Unit of each number of the state: the clearance, and the clearance a radian of the crank for rates."""
     clearance = float(leg.setup.contacts.clearance.min())
     rate = clearance * abs(leg.setup.speed)

@@ -4,18 +4,24 @@ from typing import Any
 
 import numpy as np
 
-from leg_wear_monitor.dynamics.result import drive_torque, joint_figures
-from leg_wear_monitor.dynamics.run.run_statistics import BEGIN, IMPACTS, SPEED, Tally, new_tally
+from leg_wear_monitor.dynamics.result import drive_torque, joint_statistics
+from leg_wear_monitor.dynamics.run.run_statistics import (
+    BEGIN,
+    IMPACTS,
+    SPEED,
+    RunStatistics,
+    new_run_statistics,
+)
 from leg_wear_monitor.mechanism.arrays import Floats
 from leg_wear_monitor.mechanism.ideal import one_cycle, point_motion
 from leg_wear_monitor.mechanism.position import Linkage
 from leg_wear_monitor.mechanism.spec import Mechanism
 from leg_wear_monitor.studies.point import Arrays
-from leg_wear_monitor.studies.tasks.contact_watch import Moment, WatchedLeg
+from leg_wear_monitor.studies.tasks.contact_watch import Moment, ObservedLeg
 from leg_wear_monitor.studies.tasks.ensemble import ensemble, watch
 from leg_wear_monitor.studies.tasks.grid import SAMPLES
 
-BAND = (0.05, 0.5, 0.95)  # shares of an ensemble's cycles below its band, its middle, and its top
+BAND = (0.05, 0.5, 0.95)  # fractions of an ensemble's cycles below its band, its middle, and its top
 ERRORS = ("toe_position_m", "toe_velocity_mps", "toe_acceleration_mps2", "drive_torque_nm")
 
 _FIGURES = (
@@ -24,72 +30,75 @@ _FIGURES = (
 )  # fmt: skip
 
 
-def respond(mechanism: Mechanism, settings: dict[str, Any]) -> Arrays:
+def run_ensemble(mechanism: Mechanism, settings: dict[str, Any]) -> Arrays:
     """Response of a leg with clearances against the ideal one.
 
     Returns
     -------
     dict of arrays
-        Over runs r, cycles c, joints j, loose joints k and samples s of a cycle from crank angle 0:
+        Over runs r, cycles c, joints j, clearance joints k and samples s of a cycle from crank angle 0:
         ``error_<name>`` (r, c) the largest errors of `ERRORS` in each cycle; ``peak_force_n`` (r, c, j);
         ``impacts`` (r, c, k); ``mean_force_n``, ``rms_force_n``, ``p99_force_n`` (r, j);
         ``contact_fraction``, ``friction_work_j_per_cycle``, ``archard_integral_j_per_cycle``,
         ``impact_speed_mps`` (the mean of approaches) (r, k); ``rms_torque_nm`` (r,);
         ``wear_depth_m_per_cycle`` (r, k, 2, N); ``band_<name>`` (3, s, ...) the quantiles `BAND` of the
         curves, ``example_<name>`` (s, ...) the first cycle of the first run, ``ideal_<name>`` (s, ...) the
-        ideal linkage's; ``repeats_<name>`` (k,) the share of a curve's variance that its mean cycle has.
+        ideal linkage's; ``repeats_<name>`` (k,) the fraction of a curve's variance that its mean cycle has.
     """
     legs = watch(ensemble(mechanism, settings))
     members = [_follow(leg, settings) for leg in legs]
-    linkage, loose = legs[0].setup.linkage, legs[0].setup.loose
+    linkage, clearance_joints = legs[0].setup.linkage, legs[0].setup.clearance_joints
     result = {name: np.array([member[name] for member in members]) for name in members[0] if name != "curves"}
     curves = {
         name: np.concatenate([member["curves"][name] for member in members]) for name in members[0]["curves"]
     }
     result |= _bands(curves) | _ideal(linkage, legs[0].setup.speed)
-    result["joints"], result["loose"] = np.array(list(mechanism.joints)), np.array(loose)
+    result["joints"], result["clearance_joints"] = (
+        np.array(list(mechanism.joints)),
+        np.array(clearance_joints),
+    )
     return result
 
 
-def _follow(leg: WatchedLeg, settings: dict[str, Any]) -> dict[str, Any]:
+def _follow(leg: ObservedLeg, settings: dict[str, Any]) -> dict[str, Any]:
     """Figures of one run."""
     setup = leg.setup
-    joints, loose = len(setup.linkage.mechanism.joints), list(setup.contacts.joint)
-    leg.advance(settings["skip_cycles"] * SAMPLES, new_tally(joints))
-    tally, depth = new_tally(joints), setup.surfaces.depth.copy()
+    joints, clearance_joints = len(setup.linkage.mechanism.joints), list(setup.contacts.joint)
+    leg.advance(settings["skip_cycles"] * SAMPLES, new_run_statistics(joints))
+    statistics, depth = new_run_statistics(joints), setup.surfaces.depth.copy()
     shift = round(leg.stepper.state.drive[0] / (2.0 * np.pi) * SAMPLES) % SAMPLES
     largest: list[Floats] = []
     peaks: list[Floats] = []
-    impacts = [tally.impacts.copy()]
+    impacts = [statistics.impacts.copy()]
     cycles: list[dict[str, Floats]] = []
     for cycle in range(settings["cycles"]):
         if cycle < settings["traced_cycles"]:
-            cycles.append(_curves(list(leg.moments(tally)), shift))
+            cycles.append(_curves(list(leg.moments(statistics)), shift))
         else:
-            leg.advance(SAMPLES, tally)
-        largest.append(tally.response.copy())
-        peaks.append(tally.peak.copy())
-        impacts.append(tally.impacts.copy())
-        tally.response[:], tally.peak[:] = 0.0, 0.0
-    figures = joint_figures(setup, tally, setup.surfaces.depth - depth, settings["cycles"])
+            leg.advance(SAMPLES, statistics)
+        largest.append(statistics.response.copy())
+        peaks.append(statistics.peak.copy())
+        impacts.append(statistics.impacts.copy())
+        statistics.response[:], statistics.peak[:] = 0.0, 0.0
+    figures = joint_statistics(setup, statistics, setup.surfaces.depth - depth, settings["cycles"])
     member = {f"error_{name}": np.array(largest)[:, i] for i, name in enumerate(ERRORS)}
     member |= {
         name: np.array([figure[name] for figure in figures.values() if name in figure]) for name in _FIGURES
     }
     return member | {
         "peak_force_n": np.array(peaks),
-        "impacts": np.diff(np.array(impacts), axis=0)[:, loose],
-        "impact_speed_mps": _impact_speed(tally, loose),
-        "rms_torque_nm": drive_torque(tally)["rms"],
+        "impacts": np.diff(np.array(impacts), axis=0)[:, clearance_joints],
+        "impact_speed_mps": _impact_speed(statistics, clearance_joints),
+        "rms_torque_nm": drive_torque(statistics)["rms"],
         "wear_depth_m_per_cycle": (setup.surfaces.depth - depth) / settings["cycles"],
         "curves": {name: np.array([one[name] for one in cycles]) for name in cycles[0]},
     }
 
 
-def _impact_speed(tally: Tally, loose: list[int]) -> Floats:
+def _impact_speed(statistics: RunStatistics, clearance_joints: list[int]) -> Floats:
     """Mean approach speed (k,) [m/s] of the impacts that were noted; 0 where there were none."""
-    counts = [min(IMPACTS, int(tally.impacts[joint])) for joint in loose]
-    rows = [tally.impact[joint, :count] for joint, count in zip(loose, counts, strict=True)]
+    counts = [min(IMPACTS, int(statistics.impacts[joint])) for joint in clearance_joints]
+    rows = [statistics.impact[joint, :count] for joint, count in zip(clearance_joints, counts, strict=True)]
     return np.array([row[row[:, BEGIN] >= 0.0, SPEED].mean() if len(row) else 0.0 for row in rows])
 
 

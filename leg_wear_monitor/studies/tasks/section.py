@@ -5,7 +5,7 @@ from typing import Any
 import attrs
 import numpy as np
 
-from leg_wear_monitor.dynamics.run.run_statistics import new_tally
+from leg_wear_monitor.dynamics.run.run_statistics import new_run_statistics
 from leg_wear_monitor.mechanism.arrays import Floats
 from leg_wear_monitor.mechanism.ideal import TURN
 from leg_wear_monitor.mechanism.spec import Mechanism
@@ -14,28 +14,28 @@ from leg_wear_monitor.studies.tasks.ensemble import ensemble, watch
 from leg_wear_monitor.studies.tasks.grid import SAMPLES
 
 
-def intersect(mechanism: Mechanism, settings: dict[str, Any]) -> Arrays:
+def poincare_section(mechanism: Mechanism, settings: dict[str, Any]) -> Arrays:
     """Eccentricities and their rates whenever the crank passes an angle.
 
     Returns
     -------
     dict of arrays
-        Over cycles c, loose joints k and samples s of ``portrait_cycles``: ``section_eccentricity_m`` and
+        Over cycles c, clearance joints k and samples s of ``portrait_cycles``: ``section_eccentricity_m`` and
         ``section_rate_mps`` (c, k, 2), ``portrait_eccentricity_m`` and ``portrait_rate_mps`` (s, k, 2).
     """
     start = round(settings["crank_angle_deg"] / 360.0 * SAMPLES) % SAMPLES * (TURN / SAMPLES)
     first = ensemble(mechanism, settings)[0]
     (leg,) = watch([attrs.evolve(first, crank_angle_rad=start)])
-    tally = new_tally(len(mechanism.joints))
-    leg.advance(settings["skip_cycles"] * SAMPLES, tally)
-    portrait = [moment for _ in range(settings["portrait_cycles"]) for moment in leg.moments(tally)]
+    statistics = new_run_statistics(len(mechanism.joints))
+    leg.advance(settings["skip_cycles"] * SAMPLES, statistics)
+    portrait = [moment for _ in range(settings["portrait_cycles"]) for moment in leg.moments(statistics)]
     section = []
     for _ in range(settings["cycles"]):
-        leg.advance(SAMPLES, tally)
+        leg.advance(SAMPLES, statistics)
         section.append(leg.look())
-    shape = (-1, len(leg.setup.loose), 2)
+    shape = (-1, len(leg.setup.clearance_joints), 2)
     return {
-        "loose": np.array(leg.setup.loose),
+        "clearance_joints": np.array(leg.setup.clearance_joints),
         "section_eccentricity_m": np.array([moment.e for moment in section]),
         "section_rate_mps": np.array([moment.rate for moment in section]),
         "portrait_eccentricity_m": np.array([moment.e for moment in portrait]).reshape(shape),

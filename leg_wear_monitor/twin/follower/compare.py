@@ -70,12 +70,12 @@ def compare(sensor, signature, leg, stepper, measured):
             p = value[LAST_PREDICTED]
             _add_up(p + r, p, by, leg.sums, leg.gram, leg.along)
         return
-    fresh, share = mark[FILTERING] == 1, 1.0 - math.exp(-cutoff * dt)
+    fresh, fraction = mark[FILTERING] == 1, 1.0 - math.exp(-cutoff * dt)
     mark[FILTERING] = 2
-    m = pass_low(share, fresh, low_pass, MEASURED, measured)
-    p = pass_low(share, fresh, low_pass, PREDICTED, mean / seen)
-    by[LOAD] = pass_low(share, fresh, low_pass, OF_LOAD, 0.5 * (before + lever))
-    by[FRICTION] = pass_low(share, fresh, low_pass, OF_FRICTION, direction)
+    m = pass_low(fraction, fresh, low_pass, MEASURED, measured)
+    p = pass_low(fraction, fresh, low_pass, PREDICTED, mean / seen)
+    by[LOAD] = pass_low(fraction, fresh, low_pass, OF_LOAD, 0.5 * (before + lever))
+    by[FRICTION] = pass_low(fraction, fresh, low_pass, OF_FRICTION, direction)
     by[LAG] = 0.0 if fresh else (value[LAST_PREDICTED] - p) / dt
     value[LAST_PREDICTED] = p
     _add_up(m, p, by, leg.sums, leg.gram, leg.along)

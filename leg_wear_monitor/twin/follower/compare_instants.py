@@ -59,20 +59,20 @@ def take_instant(cutoff, size, leg, measured, mean, variance, lever, direction, 
 def _compare_waiting(cutoff, size, leg, variance):
     """Compare the instant that waits; its residual after the low-pass [N m]."""
     w, by, low_pass, value = leg.waiting, leg.regressor, leg.low_pass, leg.value
-    fresh, share = leg.mark[FILTERING] == 1, 1.0 - math.exp(-cutoff * w[W_TIME])
+    fresh, fraction = leg.mark[FILTERING] == 1, 1.0 - math.exp(-cutoff * w[W_TIME])
     leg.mark[FILTERING] = 2
     weight = 1.0 / (1.0 + variance / (_VARIES * size) ** 2)
     furthest = _FURTHEST * size
     off = min(max(w[W_MEASURED] - w[W_MEAN], -furthest), furthest)
-    value[LAST_PREDICTED] = pass_low(share, fresh, low_pass, PREDICTED, w[W_MEAN])
-    of_all = pass_low(share, fresh, low_pass, WEIGHT, weight)
+    value[LAST_PREDICTED] = pass_low(fraction, fresh, low_pass, PREDICTED, w[W_MEAN])
+    of_all = pass_low(fraction, fresh, low_pass, WEIGHT, weight)
     turns = w[W_ANGLE] / _TURN
     phase = min(int((turns - math.floor(turns)) * PHASES), PHASES - 1)
     leg.by_phase[0, phase] += of_all
-    residual = pass_low(share, fresh, low_pass, WEIGHTED_RESIDUAL, weight * off)
+    residual = pass_low(fraction, fresh, low_pass, WEIGHTED_RESIDUAL, weight * off)
     leg.by_phase[1, phase] += residual
     for i, what in enumerate((W_SIGNATURE, W_DIRECTION, W_LAG)):
-        weighted = pass_low(share, fresh, low_pass, WEIGHTED_RESIDUAL + 1 + i, weight * w[what])
+        weighted = pass_low(fraction, fresh, low_pass, WEIGHTED_RESIDUAL + 1 + i, weight * w[what])
         leg.by_phase[2 + i, phase] += weighted
         by[i] = weighted / of_all
     return residual / of_all

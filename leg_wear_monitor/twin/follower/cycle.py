@@ -3,7 +3,7 @@
 import numpy as np
 
 from leg_wear_monitor.contact.arrays import ContactArrays
-from leg_wear_monitor.dynamics.run.run_statistics import ARCHARD, CONTACT, FORCE, Tally, percentile
+from leg_wear_monitor.dynamics.run.run_statistics import ARCHARD, CONTACT, FORCE, RunStatistics, percentile
 from leg_wear_monitor.mechanism.arrays import Floats
 from leg_wear_monitor.twin.follower.state import (
     CUT_RISES,
@@ -18,14 +18,14 @@ from leg_wear_monitor.twin.follower.state import (
     LegState,
 )
 from leg_wear_monitor.twin.follower.torque_estimate import FRICTION, LAG, LOAD, Finding, LoadEstimate
-from leg_wear_monitor.twin.statistics import CycleFigures, TorqueFigures
+from leg_wear_monitor.twin.statistics import CycleStatistics, TorqueStatistics
 
 
-def clear_tally(tally: Tally) -> None:
+def clear_run_statistics(statistics: RunStatistics) -> None:
     """Empty a tally in place."""
-    for part in tally:
+    for part in statistics:
         part[...] = 0
-    tally.drive_range[:] = np.inf, -np.inf
+    statistics.drive_range[:] = np.inf, -np.inf
 
 
 def clearances(contacts: ContactArrays, depth: Floats) -> Floats:
@@ -34,9 +34,9 @@ def clearances(contacts: ContactArrays, depth: Floats) -> Floats:
     return np.stack([contacts.clearance + opened.mean(axis=1), contacts.clearance + opened.max(axis=1)])
 
 
-def torque_figures(
+def torque_statistics(
     sums: Floats, found: Finding | None, settled: LoadEstimate, unexplained_nm: float
-) -> TorqueFigures:
+) -> TorqueStatistics:
     """Of the sums (SUMS,) of a cycle, what it alone says, and what has settled."""
     n = int(sums[NUMBER])
 
@@ -44,7 +44,7 @@ def torque_figures(
         return float(np.sqrt(sums[i] / n)) if n else np.nan
 
     load, friction, lag = settled.values.tolist()
-    return TorqueFigures(
+    return TorqueStatistics(
         samples=n,
         measured_rms_nm=rms(MEASURED_2),
         predicted_rms_nm=rms(PREDICTED_2),
@@ -64,26 +64,26 @@ def torque_figures(
     )
 
 
-def cycle_figures(
-    leg: LegState, stamp: int, contacts: ContactArrays, depth: Floats, before: Floats, tally: Tally,
-    torque: TorqueFigures,
-) -> CycleFigures:  # fmt: skip
+def cycle_statistics(
+    leg: LegState, stamp: int, contacts: ContactArrays, depth: Floats, before: Floats,
+    statistics: RunStatistics, torque: TorqueStatistics,
+) -> CycleStatistics:  # fmt: skip
     """Figures of the cycle that ends at a stamp; ``before`` (2, k) the clearances at its begin."""
     joint, mark, now = contacts.joint, leg.mark, clearances(contacts, depth)
-    moving = float(tally.time[0])
-    return CycleFigures(
+    moving = float(statistics.time[0])
+    return CycleStatistics(
         cycle=int(mark[CYCLES]),
         begin_ns=int(mark[CYCLE_BEGIN]),
         stamp_ns=stamp,
         direction=1 if mark[CUT_RISES] else -1,
         moving_s=moving,
         bridged_s=float(mark[CYCLE_BRIDGED]) * 1.0e-9,
-        peak_force_n=tally.peak[joint],
-        p99_force_n=np.array([percentile(tally.force_time[j], 0.99) for j in joint]),
-        mean_force_n=tally.integral[joint, FORCE] / moving,
-        impacts=tally.impacts[joint],
-        contact_fraction=tally.integral[joint, CONTACT] / moving,
-        archard_j=tally.integral[joint, ARCHARD],
+        peak_force_n=statistics.peak[joint],
+        p99_force_n=np.array([percentile(statistics.force_time[j], 0.99) for j in joint]),
+        mean_force_n=statistics.integral[joint, FORCE] / moving,
+        impacts=statistics.impacts[joint],
+        contact_fraction=statistics.integral[joint, CONTACT] / moving,
+        archard_j=statistics.integral[joint, ARCHARD],
         clearance_mean_m=now[0],
         clearance_max_m=now[1],
         growth_mean_m=now[0] - before[0],

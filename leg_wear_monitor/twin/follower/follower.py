@@ -10,11 +10,16 @@ from leg_wear_monitor.dynamics.clearance.run import Snapshot as StepperSnapshot
 from leg_wear_monitor.dynamics.joint.contact_event import F_N
 from leg_wear_monitor.dynamics.run.drive import steady_drive
 from leg_wear_monitor.dynamics.run.protocol import DONE, INVALID_DRIVE, PUSHED_THROUGH, STEP_TOO_SMALL, Setup
-from leg_wear_monitor.dynamics.run.run_statistics import TORQUE, new_tally
+from leg_wear_monitor.dynamics.run.run_statistics import TORQUE, new_run_statistics
 from leg_wear_monitor.mechanism.arrays import Floats
 from leg_wear_monitor.mechanism.ideal import TURN
 from leg_wear_monitor.twin import steps as told
-from leg_wear_monitor.twin.follower.cycle import clear_tally, clearances, cycle_figures, torque_figures
+from leg_wear_monitor.twin.follower.cycle import (
+    clear_run_statistics,
+    clearances,
+    cycle_statistics,
+    torque_statistics,
+)
 from leg_wear_monitor.twin.follower.following import CYCLE, LEFT, NEEDS_START, TOLD, follow
 from leg_wear_monitor.twin.follower.load import FootLoad, torque_size
 from leg_wear_monitor.twin.follower.repeating import RepeatingResidual
@@ -44,25 +49,25 @@ from leg_wear_monitor.twin.follower.state import (
 )
 from leg_wear_monitor.twin.follower.torque_estimate import Finding, LoadEstimate, find
 from leg_wear_monitor.twin.settings import INSTANT, STANCE, TwinSettings
-from leg_wear_monitor.twin.statistics import CycleFigures, Event, Happening, SampleFigures
+from leg_wear_monitor.twin.statistics import CycleStatistics, Event, SampleStatistics, TwinEventKind
 from leg_wear_monitor.twin.steps import BEGIN, CODE, EXTRA, MOVE, TURNS, Steps
 
 _RUN_IN_S = 0.2
 _LEAST_TORQUE_NM = 1.0e-6  # of a leg that needs none
 
-_HAPPENINGS = {
-    told.LOST_IN_GAP: Happening.LOST_IN_GAP,
-    told.LOST_BY_OUTLIERS: Happening.LOST_BY_OUTLIERS,
-    told.LOST_BY_OVERFLOW: Happening.LOST_BY_OVERFLOW,
-    told.LOST_BY_JUMP: Happening.BACKWARD_JUMP,
-    told.STOPPED: Happening.STOPPED,
-    told.MOVING: Happening.MOVING,
-    told.REVERSED: Happening.REVERSED,
+_EVENT_KINDS = {
+    told.LOST_IN_GAP: TwinEventKind.LOST_IN_GAP,
+    told.LOST_BY_OUTLIERS: TwinEventKind.LOST_BY_OUTLIERS,
+    told.LOST_BY_OVERFLOW: TwinEventKind.LOST_BY_OVERFLOW,
+    told.LOST_BY_JUMP: TwinEventKind.BACKWARD_JUMP,
+    told.STOPPED: TwinEventKind.STOPPED,
+    told.MOVING: TwinEventKind.MOVING,
+    told.REVERSED: TwinEventKind.REVERSED,
 }
 _FAILURES = {
-    STEP_TOO_SMALL: Happening.STEP_TOO_SMALL,
-    PUSHED_THROUGH: Happening.PUSHED_THROUGH,
-    INVALID_DRIVE: Happening.INVALID_DRIVE,
+    STEP_TOO_SMALL: TwinEventKind.STEP_TOO_SMALL,
+    PUSHED_THROUGH: TwinEventKind.PUSHED_THROUGH,
+    INVALID_DRIVE: TwinEventKind.INVALID_DRIVE,
 }
 
 
@@ -71,7 +76,7 @@ class FollowerSnapshot(NamedTuple):
 
     stepper: StepperSnapshot
     leg: tuple[np.ndarray, ...]
-    tally: tuple[np.ndarray, ...]
+    statistics: tuple[np.ndarray, ...]
     before: Floats
     estimate: Floats
     repeating: tuple[Floats, ...]
@@ -89,7 +94,7 @@ class LegFollower:
     Attributes
     ----------
     state : LegState
-    tally : Tally
+    statistics : RunStatistics
         Of the present gait cycle.
     estimate : LoadEstimate
     torque_size_nm : float
@@ -102,8 +107,8 @@ class LegFollower:
         # a whole number of nanoseconds, so that stamps and the stepper's time cannot drift apart
         interval = round(1.0e9 * TURN / abs(setup.speed) / INTERVALS) * 1.0e-9
         self._stepper = ClearanceStepper(setup, interval, tables=self._load.tables)
-        self.state: LegState = leg_state(len(setup.loose))
-        self.tally = new_tally(len(setup.linkage.mechanism.joints))
+        self.state: LegState = leg_state(len(setup.clearance_joints))
+        self.statistics = new_run_statistics(len(setup.linkage.mechanism.joints))
         # the ground only pushes
         self.estimate = LoadEstimate(
             settings.load_limit_n, 0.0 if settings.load_shape == STANCE else -settings.load_limit_n
@@ -128,14 +133,16 @@ class LegFollower:
         state.pending[changed] = 0.0
         self._before[:, changed] = self.clearances[:, changed]
 
-    def follow(self, steps: Steps, n: int, cycles: list[CycleFigures], events: list[Event]) -> SampleFigures:
+    def follow(
+        self, steps: Steps, n: int, cycles: list[CycleStatistics], events: list[Event]
+    ) -> SampleStatistics:
         """Follow n steps; adds gait cycles that end and what happens, returns the samples passed."""
         mark, i = self.state.mark, 0
-        seen = room_for_looks(n, len(self._setup.loose))
+        seen = room_for_looks(n, len(self._setup.clearance_joints))
         mark[LOOKS] = 0
         while i < n:
             reason, i, k = follow(
-                self._stepper.model, self._setup.surfaces.feeds_back, self._stepper.state, self.tally,
+                self._stepper.model, self._setup.surfaces.feeds_back, self._stepper.state, self.statistics,
                 self._stepper.work, self._sensor, self._load.signature, self.state, steps, i, n, seen,
             )  # fmt: skip
             if reason == CYCLE:
@@ -146,14 +153,14 @@ class LegFollower:
             elif reason in (LEFT, TOLD):
                 if reason == LEFT:
                     mark[RUNNING], mark[AFRESH] = 0, 0
-                events.append(Event(int(steps.what[i, BEGIN]), _HAPPENINGS[int(steps.what[i, EXTRA])]))
+                events.append(Event(int(steps.what[i, BEGIN]), _EVENT_KINDS[int(steps.what[i, EXTRA])]))
                 i += 1
             elif reason != DONE:
-                joint = self._setup.loose[k] if k >= 0 else None
+                joint = self._setup.clearance_joints[k] if k >= 0 else None
                 events.append(Event(int(mark[FAILED_AT]), _FAILURES[reason], joint))
         m = int(mark[LOOKS])
         stamp, kind, (angle, torque) = seen.stamp[:m, 0], seen.stamp[:m, 1], seen.figure[:m].T
-        return SampleFigures(stamp, kind, angle, torque, seen.force[:m])
+        return SampleStatistics(stamp, kind, angle, torque, seen.force[:m])
 
     def _start(self, steps: Steps, i: int) -> Event:
         """Set the leg in motion where step i begins, wear as it was."""
@@ -169,8 +176,8 @@ class LegFollower:
         mark[RUNNING], mark[TURNS_BEFORE] = 1, steps.what[i, TURNS]
         self.state.polynomial[:] = 0.0, angle, speed, 0.0, 0.0, 0.0, 0.0
         clear_sums(self.state)
-        clear_tally(self.tally)
-        return Event(stamp, Happening.ACQUIRED)
+        clear_run_statistics(self.statistics)
+        return Event(stamp, TwinEventKind.ACQUIRED)
 
     def _run_in(self, angle: float, speed: float) -> int:
         """Bring the leg to a crank angle [rad] at a speed [rad/s] from a little before, without wear.
@@ -188,10 +195,10 @@ class LegFollower:
         worn, time = depth.copy(), intervals * stepper.model.interval
         polynomial = steady_drive(angle - speed * time, speed)
         stepper.init(polynomial[1], speed)
-        reached = stepper.advance(polynomial, 0.9 * time, self.tally)[0]
-        clear_tally(self.tally)
+        reached = stepper.advance(polynomial, 0.9 * time, self.statistics)[0]
+        clear_run_statistics(self.statistics)
         if reached == DONE:
-            reached = stepper.advance(polynomial, time, self.tally)[0]
+            reached = stepper.advance(polynomial, time, self.statistics)[0]
         depth[:] = worn
         stepper.state.pending[:] = 0.0
         if reached != DONE:  # so it goes on from centred journals, and says itself why it cannot
@@ -200,31 +207,31 @@ class LegFollower:
             return 0
         sample = stepper.work.start
         self.state.force[:] = np.hypot(sample[:, F_N], sample[:, F_T])
-        self.state.value[MEAN_TORQUE] = self.tally.drive_integral[TORQUE] / self.tally.time[0]
+        self.state.value[MEAN_TORQUE] = self.statistics.drive_integral[TORQUE] / self.statistics.time[0]
         return round(1.0e9 * time)
 
-    def _end_cycle(self, stamp: int, cycles: list[CycleFigures]) -> None:
+    def _end_cycle(self, stamp: int, cycles: list[CycleStatistics]) -> None:
         """Report the gait cycle that ends at a stamp, if it is a whole one; begin the next."""
         mark, depth = self.state.mark, self._setup.surfaces.depth
         if mark[WHOLE]:
             mark[CYCLES] += 1
             # two like stages of a low-pass leave noise of so many independent samples
-            independent = max(0.25 * self._cutoff * self.tally.time[0], 1.0)
+            independent = max(0.25 * self._cutoff * self.statistics.time[0], 1.0)
             sums = self.state.sums
             correlated = sums[NUMBER] / independent
             found = find(sums, self.state.gram, self.state.along, correlated, self.estimate.room)
             if found is not None:
                 self.estimate.take(found, self._acts)
                 self._load.set(self.estimate.acting)
-            torque = torque_figures(sums, found, self.estimate, self._unexplained_nm(found))
+            torque = torque_statistics(sums, found, self.estimate, self._unexplained_nm(found))
             cycles.append(
-                cycle_figures(
-                    self.state, stamp, self._setup.contacts, depth, self._before, self.tally, torque
+                cycle_statistics(
+                    self.state, stamp, self._setup.contacts, depth, self._before, self.statistics, torque
                 )
             )
         mark[CYCLE_BEGIN], mark[CYCLE_BRIDGED] = stamp, 0
         clear_sums(self.state)
-        clear_tally(self.tally)
+        clear_run_statistics(self.statistics)
         self._before = self.clearances
 
     def _unexplained_nm(self, found: Finding | None) -> float:
@@ -241,7 +248,7 @@ class LegFollower:
         return FollowerSnapshot(
             self._stepper.snapshot(),
             tuple(part.copy() for part in self.state),
-            tuple(part.copy() for part in self.tally),
+            tuple(part.copy() for part in self.statistics),
             self._before.copy(),
             self.estimate.state.copy(),
             self._repeating.cycles,
@@ -250,7 +257,7 @@ class LegFollower:
     def restore(self, snapshot: FollowerSnapshot) -> None:
         """Go back to a snapshot of a follower of the same setup and settings."""
         self._stepper.restore(snapshot.stepper)
-        for own, saved in ((self.state, snapshot.leg), (self.tally, snapshot.tally)):
+        for own, saved in ((self.state, snapshot.leg), (self.statistics, snapshot.statistics)):
             for part, values in zip(own, saved, strict=True):
                 part[...] = values
         self._before = snapshot.before.copy()

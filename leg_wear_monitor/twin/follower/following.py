@@ -140,13 +140,13 @@ def _look(sensor, signature, leg, stepper, what, measured, looks):
 
 
 @entry
-def follow(model, feeds_back, stepper, tally, work, sensor, signature, leg, steps, first, n, looks):
+def follow(model, feeds_back, stepper, statistics, work, sensor, signature, leg, steps, first, n, looks):
     """Follow steps from index ``first`` to n; ``stepper`` is the ClearanceState.
 
     Returns
     -------
     reason, i, k
-        DONE, or why somebody else has to act before going on at step i; k is the loose joint concerned, -1
+        DONE, or why the caller has to act before going on at step i; k is the clearance joint concerned, -1
         if none.
     """
     mark, value, i = leg.mark, leg.value, first
@@ -157,18 +157,22 @@ def follow(model, feeds_back, stepper, tally, work, sensor, signature, leg, step
             cuts = mark[CUT] != 0 and mark[CUT] <= until
             if cuts:
                 until = mark[CUT]
-            impulse, time, before = tally.drive_integral[TORQUE], tally.time[0], stepper.intervals[0]
-            squares = tally.drive_integral[TORQUE_SQUARED]
+            impulse, time, before = (
+                statistics.drive_integral[TORQUE],
+                statistics.time[0],
+                stepper.intervals[0],
+            )
+            squares = statistics.drive_integral[TORQUE_SQUARED]
             status, k = advance_clearances(
-                model, feeds_back, stepper, leg.polynomial, 1.0e-9 * (until - mark[BASE]), tally, work
+                model, feeds_back, stepper, leg.polynomial, 1.0e-9 * (until - mark[BASE]), statistics, work
             )
             if stepper.intervals[0] > before:
-                impulse, time = tally.drive_integral[TORQUE] - impulse, tally.time[0] - time
+                impulse, time = statistics.drive_integral[TORQUE] - impulse, statistics.time[0] - time
                 value[IMPULSE] += impulse
                 value[TIME] += time
                 value[TORQUE_IMPULSE] += impulse
                 value[TORQUE_TIME] += time
-                value[TORQUE_SQUARES] += tally.drive_integral[TORQUE_SQUARED] - squares
+                value[TORQUE_SQUARES] += statistics.drive_integral[TORQUE_SQUARED] - squares
                 for j in range(leg.force.shape[0]):
                     leg.force[j] = math.hypot(work.start[j, F_N], work.start[j, F_T])
             if status != DONE:

@@ -49,12 +49,12 @@ class FootLoad:
         if mechanism.toe is not None:
             up = _up(mechanism)
             position, velocity, _ = point_motion(one_cycle(linkage, POINTS, 1.0), linkage, *mechanism.toe)
-            share = _share(position @ up, shape)
+            fraction = _share(position @ up, shape)
             phases = np.arange(POINTS + 1) / POINTS * _PHASES
-            along = np.interp(phases, np.arange(_PHASES + 1), np.append(share, share[0]))
+            along = np.interp(phases, np.arange(_PHASES + 1), np.append(fraction, fraction[0]))
             self.signature[:-1] = -along[:-1] * (velocity @ up)
             self.signature[-1] = self.signature[0]
-            loaded = build_linkage(_loaded(mechanism, _TRIAL_N * share[:, None] * up))
+            loaded = build_linkage(_loaded(mechanism, _TRIAL_N * fraction[:, None] * up))
             self._find_parts(build_tables(loaded, contacts))
 
     def _find_parts(self, loaded: ClearanceTables) -> None:

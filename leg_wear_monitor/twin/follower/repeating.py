@@ -44,7 +44,7 @@ class RepeatingResidual:
         columns = columns[:, np.abs(columns).max(axis=0) > 0.0]
         size = np.linalg.norm(columns, axis=0)
         explained = columns @ (np.linalg.lstsq(columns / size, mean, rcond=None)[0] / size)
-        share = weight / total[0]
-        scatter = (share**2 * (sums[:, 1] / weight - mean) ** 2).sum(axis=0) * CYCLES / (CYCLES - 1)
+        fraction = weight / total[0]
+        scatter = (fraction**2 * (sums[:, 1] / weight - mean) ** 2).sum(axis=0) * CYCLES / (CYCLES - 1)
         square = ((mean - explained) ** 2).mean() - scatter.mean()
         return float(np.sqrt(max(square, 0.0)))

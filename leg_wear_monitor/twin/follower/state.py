@@ -81,11 +81,11 @@ class Looks(NamedTuple):
     force: Floats
 
 
-def leg_state(loose: int) -> LegState:
+def leg_state(clearance_joints: int) -> LegState:
     """State before the first step."""
     return LegState(
         np.zeros(MARKS, dtype=np.int64), np.zeros(VALUES), np.zeros(7), np.zeros((2, CHANNELS)),
-        np.zeros(SUMS), np.zeros((3, 3)), np.zeros(3), np.zeros(3), np.zeros(loose),
+        np.zeros(SUMS), np.zeros((3, 3)), np.zeros(3), np.zeros(3), np.zeros(clearance_joints),
         np.zeros(WAITING_VALUES), np.zeros((BY_PHASE, PHASES)),
     )  # fmt: skip
 
@@ -96,6 +96,6 @@ def clear_sums(leg: LegState) -> None:
         part[...] = 0.0
 
 
-def room_for_looks(m: int, loose: int) -> Looks:
+def room_for_looks(m: int, clearance_joints: int) -> Looks:
     """Room for m samples."""
-    return Looks(np.zeros((m, 2), dtype=np.int64), np.zeros((m, 2)), np.zeros((m, loose)))
+    return Looks(np.zeros((m, 2), dtype=np.int64), np.zeros((m, 2)), np.zeros((m, clearance_joints)))

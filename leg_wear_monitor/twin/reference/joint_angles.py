@@ -31,8 +31,8 @@ class AngleModel:
 
     Attributes
     ----------
-    sensors, loose : tuple of str
-        Joints with an encoder; loose joints.
+    sensors, clearance_joints : tuple of str
+        Joints with an encoder; clearance joints.
     angle : (P _FINE, m) array, rad
         Of the ideal linkage at equal steps of the crank from 0.
     by_crank : (P, m) array
@@ -42,7 +42,7 @@ class AngleModel:
     """
 
     sensors: tuple[str, ...]
-    loose: tuple[str, ...]
+    clearance_joints: tuple[str, ...]
     angle: Floats
     by_crank: Floats
     by_e: Floats
@@ -73,7 +73,9 @@ def angle_model(mechanism: Mechanism, sensors: Sequence[str]) -> AngleModel:
                 f"{name!r} is no revolute joint, expected some of {', '.join(ready)}",
             )
     linkage = build_linkage(mechanism)
-    contacts = compile_contacts(mechanism, mechanism.loose, clearance_settings(mechanism, mechanism.loose))
+    contacts = compile_contacts(
+        mechanism, mechanism.clearance_joints, clearance_settings(mechanism, mechanism.clearance_joints)
+    )
     motion = one_cycle(linkage, 2 * PHASES, 1.0)
     turns = _differences(mechanism, sensors, motion.q[:, :, 2])
     by_crank = _differences(mechanism, sensors, motion.v[:, :, 2])
@@ -82,7 +84,7 @@ def angle_model(mechanism: Mechanism, sensors: Sequence[str]) -> AngleModel:
     by_e = _differences(mechanism, sensors, rotation).reshape(2 * PHASES, len(sensors), -1, 2)
     by_e[np.abs(by_e) < _ROUNDING] = 0.0
     return AngleModel(
-        tuple(sensors), mechanism.loose, _finer(turns, PHASES * _FINE), by_crank[1::2], by_e[1::2]
+        tuple(sensors), mechanism.clearance_joints, _finer(turns, PHASES * _FINE), by_crank[1::2], by_e[1::2]
     )
 
 

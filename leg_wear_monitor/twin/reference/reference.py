@@ -14,7 +14,7 @@ import numpy as np
 from leg_wear_monitor.dynamics.clearance.run import ClearanceStepper, Snapshot
 from leg_wear_monitor.dynamics.run.drive import steady_drive
 from leg_wear_monitor.dynamics.run.protocol import DONE
-from leg_wear_monitor.dynamics.run.run_statistics import new_tally
+from leg_wear_monitor.dynamics.run.run_statistics import new_run_statistics
 from leg_wear_monitor.dynamics.simulation import prepare
 from leg_wear_monitor.mechanism.arrays import Floats
 from leg_wear_monitor.mechanism.ideal import TURN
@@ -77,7 +77,7 @@ class ReferenceRun:
         self._setup.contacts.wear_coefficient[:] = 0.0
         self._fresh = self._setup.contacts.clearance.copy()
         self._tables = ClearanceStepper(self._setup).model.tables
-        self._tally = new_tally(len(mechanism.joints))
+        self._statistics = new_run_statistics(len(mechanism.joints))
         self._stepper: ClearanceStepper | None = None
         self._target, self._depth = self._fresh, self._setup.surfaces.depth.copy()
         self._total, self._cycle = np.zeros(0), 0
@@ -105,7 +105,7 @@ class ReferenceRun:
         speed = self._setup.speed
         polynomial, period = steady_drive(at, speed), TURN / abs(speed)
         for step in range(self._cycle * PHASES, (self._cycle + 1) * PHASES):
-            status, _ = self._stepper.advance(polynomial, step * period / PHASES, self._tally)
+            status, _ = self._stepper.advance(polynomial, step * period / PHASES, self._statistics)
             if status != DONE:
                 self._stepper = None
                 return None

@@ -135,20 +135,20 @@ def _adjoin(i, row, at, l0, l1, l2):
 
 
 @kernel
-def smooth(queue_kind, queue, knot, tail, out_target):
-    """Angle, speed and acceleration at index ``knot`` of the queue, by all samples up to ``tail``."""
+def smooth(queue_kind, queue, spline_node, tail, out_target):
+    """Angle, speed and acceleration at index ``spline_node`` of the queue, by all samples up to ``tail``."""
     l0, l1, l2 = 0.0, 0.0, 0.0
-    for j in range(tail - 1, knot - 1, -1):
+    for j in range(tail - 1, spline_node - 1, -1):
         if queue_kind[j] != 0:
             continue
         row = queue[j]
         l0, l1, l2 = _adjoin(1, row, BY_VELOCITY, l0, l1, l2)
         l0, l1, l2 = _adjoin(0, row, BY_ANGLE, l0, l1, l2)
-        if j > knot:
+        if j > spline_node:
             h = row[STEP]
             l2 += h * (l1 + 0.5 * h * l0)
             l1 += h * l0
-    row = queue[knot]
+    row = queue[spline_node]
     out_target[0] = row[X] - (row[P] * l0 + row[P + 1] * l1 + row[P + 2] * l2)
     out_target[1] = row[X + 1] - (row[P + 1] * l0 + row[P + 3] * l1 + row[P + 4] * l2)
     out_target[2] = row[X + 2] - (row[P + 2] * l0 + row[P + 4] * l1 + row[P + 5] * l2)

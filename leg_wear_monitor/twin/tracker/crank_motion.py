@@ -34,11 +34,10 @@ from leg_wear_monitor.twin.tracker.state import (
     FASTEST,
     FOLLOWED,
     HEAD,
-    KNOT,
     LAG,
     LARGEST_SPEED,
     LAST_CRANK,
-    LAST_KNOT,
+    LAST_SPLINE_NODE,
     LOST_TIMES,
     OUT_SINCE,
     RESTED,
@@ -49,6 +48,7 @@ from leg_wear_monitor.twin.tracker.state import (
     SINCE,
     SLOW_SINCE,
     SLOWEST,
+    SPLINE_NODE,
     STANDING_NS,
     STEP,
     STOP_HOLD,
@@ -70,14 +70,14 @@ IS_STOPPED, IS_STARTING, IS_IN_STEP, IS_OUT_OF_STEP = range(4)
 
 
 @kernel
-def look_up_to(state, knot, steps, n):
-    """Look at all queued samples before index ``knot``, and drop them."""
+def look_up_to(state, spline_node, steps, n):
+    """Look at all queued samples before index ``spline_node``, and drop them."""
     clock = state.clock
-    for j in range(clock[HEAD], knot):
+    for j in range(clock[HEAD], spline_node):
         i, stamp = n, state.queue_stamp[j]
         n = add_step(steps, n, LOOK, stamp, stamp, state.queue_kind[j])
         steps.motion[i, 0] = state.queue[j, TORQUE_VALUE]
-    clock[HEAD] = knot
+    clock[HEAD] = spline_node
     return n
 
 
@@ -90,7 +90,7 @@ def lose(state, stamp, reason, steps, n):
     n = add_step(steps, n, LEAVE, stamp, stamp, reason)
     n = look_up_to(state, clock[TAIL], steps, n)
     if clock[FOLLOWED] != 0:
-        clock[OUT_SINCE] = clock[LAST_KNOT]
+        clock[OUT_SINCE] = clock[LAST_SPLINE_NODE]
     clock[HEAD], clock[TAIL], clock[LAST_CRANK] = 0, 0, 0
     clock[FOLLOWED], clock[RESTS], clock[SLOW_SINCE], clock[SINCE] = 0, 0, 0, 0
     clock[TRACKING], clock[WITHIN], clock[DIRECTION] = IS_STARTING, 0, 0
@@ -98,10 +98,12 @@ def lose(state, stamp, reason, steps, n):
 
 
 @kernel
-def _next_knot(model, state):
+def _next_spline_node(model, state):
     """Index of the next knot in the queue, -1 where it or what must come after it is not there yet."""
     clock, ns = state.clock, model.ns
-    due = clock[LAST_KNOT] + ns[KNOT] if clock[FOLLOWED] != 0 else clock[ACQUIRING] + ns[ACQUIRE]
+    due = (
+        clock[LAST_SPLINE_NODE] + ns[SPLINE_NODE] if clock[FOLLOWED] != 0 else clock[ACQUIRING] + ns[ACQUIRE]
+    )
     newest = clock[LAST_CRANK]
     if newest == 0 or newest - due < ns[LAG]:
         return -1
@@ -126,7 +128,7 @@ def _drop_turns(state, out_target):
 
 
 @kernel
-def _judge(model, clock, stamp, speed):
+def _evaluate(model, clock, stamp, speed):
     """Starting, in step or out of it, by how long the speed has been within tolerance or beyond."""
     within = 1 if model.real[SLOWEST] <= abs(speed) <= model.real[FASTEST] else 0
     if clock[SINCE] == 0 or within != clock[WITHIN]:
@@ -168,23 +170,23 @@ def _tell_direction(model, state, stamp, speed, steps, n):
 
 
 @kernel
-def _bridged(state, knot):
+def _bridged(state, spline_node):
     """Time [ns] of bridged gaps up to a knot."""
     total = 0
-    for j in range(state.clock[HEAD], knot + 1):
+    for j in range(state.clock[HEAD], spline_node + 1):
         if state.queue_kind[j] == CRANK and state.queue[j, BRIDGED] > 0.0:
             total += round(1.0e9 * state.queue[j, STEP])
     return total
 
 
 @kernel
-def _move(model, state, knot, stamp, out_target, steps, n):
+def _move(model, state, spline_node, stamp, out_target, steps, n):
     """Steps that bring the leg from the last knot to the next: it moves, or it rests."""
     clock, rested = state.clock, state.clock[RESTS] != 0
     rests = _stops(model, state, stamp, out_target)
     if rests:
         out_target[1], out_target[2] = 0.0, 0.0
-    begin = clock[LAST_KNOT]
+    begin = clock[LAST_SPLINE_NODE]
     if rested:
         # a rest is told only up to a while before now, which is time for a smooth start
         begin = max(clock[RESTED], stamp - model.ns[RUN_UP])
@@ -197,7 +199,7 @@ def _move(model, state, knot, stamp, out_target, steps, n):
             return n
         n = add_step(steps, n, TELL, begin, begin, MOVING)
         clock[RESTS] = 0
-    bridged = _bridged(state, knot)
+    bridged = _bridged(state, spline_node)
     state.counts[BRIDGED_NS] += bridged
     i = n
     n = add_step(steps, n, MOVE, begin, stamp, 0)
@@ -210,21 +212,21 @@ def _move(model, state, knot, stamp, out_target, steps, n):
 
 
 @kernel
-def reach_knots(model, state, out_target, steps, n):
+def reach_spline_nodes(model, state, out_target, steps, n):
     """Go on to all knots that can be reached; steps from index n on, returns their number."""
     clock = state.clock
     while True:
-        knot = _next_knot(model, state)
-        if knot < 0:
+        spline_node = _next_spline_node(model, state)
+        if spline_node < 0:
             return n
-        stamp = state.queue_stamp[knot]
-        smooth(state.queue_kind, state.queue, knot, clock[TAIL], out_target)
+        stamp = state.queue_stamp[spline_node]
+        smooth(state.queue_kind, state.queue, spline_node, clock[TAIL], out_target)
         largest = model.real[LARGEST_SPEED]
         if not (abs(out_target[1]) <= largest and abs(out_target[2]) <= largest**2):
             return lose(state, stamp, LOST_BY_OUTLIERS, steps, n)
         _drop_turns(state, out_target)
         if clock[FOLLOWED] == 0:
-            n = look_up_to(state, knot, steps, n)
+            n = look_up_to(state, spline_node, steps, n)
             i = n
             n = add_step(steps, n, START, stamp, stamp, 0)
             for c in range(3):
@@ -233,11 +235,11 @@ def reach_knots(model, state, out_target, steps, n):
             state.counts[UNMONITORED_NS] += max(0, stamp - clock[OUT_SINCE])
             clock[FOLLOWED] = 1
         else:
-            n = _move(model, state, knot, stamp, out_target, steps, n)
+            n = _move(model, state, spline_node, stamp, out_target, steps, n)
         if clock[RESTS] == 0:
             n = _tell_direction(model, state, stamp, out_target[1], steps, n)
-            _judge(model, clock, stamp, out_target[1])
+            _evaluate(model, clock, stamp, out_target[1])
         for i in range(3):
             state.target[i] = out_target[i]
-        clock[LAST_KNOT] = stamp
-        n = look_up_to(state, knot + 1, steps, n)
+        clock[LAST_SPLINE_NODE] = stamp
+        n = look_up_to(state, spline_node + 1, steps, n)

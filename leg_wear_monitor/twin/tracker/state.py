@@ -11,7 +11,7 @@ from leg_wear_monitor.twin.settings import TrackerSettings
 ARRIVALS, QUEUE = 2048, 4096  # samples that may wait for their order, and for the leg
 
 # settings in ns
-WINDOW, LAG, BRIDGE, MARK, JUMP, ACQUIRE, STOP_HOLD, SETTLE, KNOT, RUN_UP = range(10)
+WINDOW, LAG, BRIDGE, MARK, JUMP, ACQUIRE, STOP_HOLD, SETTLE, SPLINE_NODE, RUN_UP = range(10)
 # other settings: power of the jerk [rad^2/s^5], noise of angle [rad^2 s] and of velocity [rad^2/s], longest
 # time a sample's noise is spread over [s], gates [rad, rad/s], least speed of a moving crank [rad/s], speeds
 # between which a gait is in step [rad/s], commanded speed and largest speed believed [rad/s]
@@ -37,7 +37,7 @@ COUNTS = FAULTY + len(FAULTS)
 # time between crank samples lately; youngest stamp of each kind
 (
     NEWEST, RELEASED, RELEASED_KINDS, CANDIDATE, CANDIDATE_KIND, WAITING, HEAD, TAIL, LAST_CRANK, REFUSED,
-    FILTER_TIME, ACQUIRING, LAST_KNOT, OUT_SINCE, FOLLOWED, RESTS, RESTED, SLOW_SINCE, TRACKING, SINCE,
+    FILTER_TIME, ACQUIRING, LAST_SPLINE_NODE, OUT_SINCE, FOLLOWED, RESTS, RESTED, SLOW_SINCE, TRACKING, SINCE,
     WITHIN, DIRECTION, TURN_COUNT, CREDIT, PERIOD, NEWEST_OF,
 ) = range(26)  # fmt: skip
 CLOCKS = NEWEST_OF + len(KINDS)

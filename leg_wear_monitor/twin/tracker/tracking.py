@@ -27,7 +27,7 @@ from leg_wear_monitor.twin.tracker.arrival import (
     insert,
 )
 from leg_wear_monitor.twin.tracker.crank_filter import begin_filter, update
-from leg_wear_monitor.twin.tracker.crank_motion import lose, reach_knots
+from leg_wear_monitor.twin.tracker.crank_motion import lose, reach_spline_nodes
 from leg_wear_monitor.twin.tracker.state import (
     ACQUIRE,
     ACQUIRING,
@@ -170,7 +170,7 @@ def _follow(model, state, stamp, kind, values, out_target, steps, n):
     state.queue_stamp[clock[TAIL]], state.queue_kind[clock[TAIL]] = stamp, kind
     clock[TAIL] += 1
     if kind == CRANK:
-        n = reach_knots(model, state, out_target, steps, n)
+        n = reach_spline_nodes(model, state, out_target, steps, n)
     return n
 
 

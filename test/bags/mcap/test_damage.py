@@ -9,7 +9,7 @@ from typing import Any
 import numpy as np
 import pytest
 
-from leg_wear_monitor.bags.findings import RecordingError, Weight
+from leg_wear_monitor.bags.findings import RecordingError, Severity
 
 # every one of these is a file of its own; benchmarks/damaged_bags.py does many more
 TRUNCATIONS, FLIPS = 8, 40
@@ -147,7 +147,7 @@ def test_a_part_that_cannot_be_opened_is_a_loss(
     (tmp_path / "a_1.mcap").write_bytes(b"")
     samples, recording = read(tmp_path)
     assert samples.tobytes() == expected(sent).tobytes()
-    losses = [str(each) for each in recording.findings if each.weight is Weight.LOSS]
+    losses = [str(each) for each in recording.findings if each.weight is Severity.LOSS]
     assert losses == [f"{tmp_path / 'a_1.mcap'}: is empty, expected an MCAP file: it is lost"]
 
 
@@ -177,7 +177,7 @@ def test_rows_of_another_kind_are_lost_and_counted(
         database.execute("UPDATE messages SET data = 'text' WHERE id = 7")
     samples, recording = read(path)
     assert len(samples) == len(expected(sent)) - 2
-    losses = [str(each) for each in recording.findings if each.weight is Weight.LOSS]
+    losses = [str(each) for each in recording.findings if each.weight is Severity.LOSS]
     assert losses == [
         f"{path}: {len(samples)} messages could be read of the {len(samples) + 2} that it counts"
     ]

@@ -7,7 +7,7 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from leg_wear_monitor.bags.mcap.records import IGNORED, TALLY, walk
+from leg_wear_monitor.bags.mcap.records import COUNTS, IGNORED, walk
 from leg_wear_monitor.messages.cdr import JOINT_STATE, MESSAGE, WRENCH_STAMPED
 
 mcap_records = pytest.importorskip("mcap.records")
@@ -48,12 +48,12 @@ def written(record: Any) -> bytes:
 
 def walked(data: bytes) -> tuple[list[tuple[int, ...]], list[int], Any]:
     """Messages, positions of definitions, tally."""
-    bytes_, tally = np.frombuffer(data, np.uint8), np.zeros(1, TALLY)
-    walk(bytes_, ROLES, np.zeros(0, MESSAGE), np.zeros(0, np.int64), tally)
-    found = np.zeros(int(tally["wanted"][0]), MESSAGE)
-    definitions = np.zeros(int(tally["definitions"][0]), np.int64)
-    walk(bytes_, ROLES, found, definitions, tally)
-    return [tuple(row) for row in found.tolist()], definitions.tolist(), tally[0]
+    bytes_, counts = np.frombuffer(data, np.uint8), np.zeros(1, COUNTS)
+    walk(bytes_, ROLES, np.zeros(0, MESSAGE), np.zeros(0, np.int64), counts)
+    found = np.zeros(int(counts["wanted"][0]), MESSAGE)
+    definitions = np.zeros(int(counts["definitions"][0]), np.int64)
+    walk(bytes_, ROLES, found, definitions, counts)
+    return [tuple(row) for row in found.tolist()], definitions.tolist(), counts[0]
 
 
 @given(records=st.lists(messages | schemas, max_size=8), data=st.data())
@@ -62,7 +62,7 @@ def test_messages_are_found_where_they_were_written(records: list[Any], data: st
     ends = np.cumsum([0, *map(len, parts)]).tolist()
     cut = data.draw(st.integers(0, ends[-1]))
     whole = [i for i, end in enumerate(ends[1:]) if end <= cut]
-    found, definitions, tally = walked(b"".join(parts)[:cut])
+    found, definitions, counts = walked(b"".join(parts)[:cut])
     sent = [(records[i], ends[i + 1]) for i in whole if isinstance(records[i], mcap_records.Message)]
     assert found == [
         (end - len(one.data), end, one.log_time, one.publish_time, int(ROLES[one.channel_id]))
@@ -70,11 +70,11 @@ def test_messages_are_found_where_they_were_written(records: list[Any], data: st
         if one.channel_id in (1, 2)
     ]
     assert definitions == [ends[i] for i in whole if isinstance(records[i], mcap_records.Schema)]
-    assert tally["unknown_channel"] == sum(one.channel_id == UNKNOWN_CHANNEL for one, _ in sent)
-    assert tally["read"] == ends[len(whole)]
+    assert counts["unknown_channel"] == sum(one.channel_id == UNKNOWN_CHANNEL for one, _ in sent)
+    assert counts["read"] == ends[len(whole)]
     if sent:
         logged = [one.log_time for one, _ in sent]
-        assert (tally["first_log_time_ns"], tally["last_log_time_ns"]) == (min(logged), max(logged))
+        assert (counts["first_log_time_ns"], counts["last_log_time_ns"]) == (min(logged), max(logged))
 
 
 @given(before=st.lists(messages, max_size=3), record=others, after=st.lists(messages, max_size=3))
@@ -83,15 +83,15 @@ def test_other_records_are_counted_and_the_end_of_data_is_the_end(
 ) -> None:
     head = b"".join(map(written, before))
     tail = b"".join(map(written, after))
-    _, _, tally = walked(head + written(record) + tail)
+    _, _, counts = walked(head + written(record) + tail)
     if isinstance(record, mcap_records.DataEnd):
-        assert tally["read"] == len(head)
+        assert counts["read"] == len(head)
     else:
-        assert tally["foreign"] == 1
-        assert tally["read"] == len(head + written(record) + tail)
+        assert counts["foreign"] == 1
+        assert counts["read"] == len(head + written(record) + tail)
 
 
 @given(data=st.binary(max_size=300))
 def test_any_bytes_are_walked_to_an_end(data: bytes) -> None:
-    _, _, tally = walked(data)
-    assert 0 <= tally["read"] <= len(data)
+    _, _, counts = walked(data)
+    assert 0 <= counts["read"] <= len(data)

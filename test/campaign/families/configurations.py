@@ -84,8 +84,13 @@ def _parameters(path: Path) -> str:
     leg = fitted(load_mechanism(config.mechanism), config)
     settings = twin_settings(config)
     parameter_doubts(config, leg)
-    belief = believe(config.forecast, 3e-4, [Look(3.5e-4, 1e-5, 4e-5)])
-    numbers = [settings.tracker.lag, settings.tracker.largest_speed, belief.mean, belief.sigma]
+    coefficient_estimate = believe(config.forecast, 3e-4, [Look(3.5e-4, 1e-5, 4e-5)])
+    numbers = [
+        settings.tracker.lag,
+        settings.tracker.largest_speed,
+        coefficient_estimate.mean,
+        coefficient_estimate.sigma,
+    ]
     numbers += [config.forecast.duty_hours_per_day**-1, 1.0 / config.crank.gear_ratio]
     if not all(map(math.isfinite, numbers)):
         return f"what follows from it is not finite: {numbers}"
@@ -168,14 +173,16 @@ def _life_text() -> str:
         leg = load_mechanism("four_bar")
         lives = []
         for i in range(5):
-            growth = {joint: [1e-12 * (1.0 + 0.1 * p) for p in range(4)] for joint in leg.loose}
+            growth = {joint: [1e-12 * (1.0 + 0.1 * p) for p in range(4)] for joint in leg.clearance_joints}
             lives.append(
                 {
-                    "wear_factor": {joint: 1.0 + 0.2 * i * (k + 1) for k, joint in enumerate(leg.loose)},
+                    "wear_factor": {
+                        joint: 1.0 + 0.2 * i * (k + 1) for k, joint in enumerate(leg.clearance_joints)
+                    },
                     "cycles": [0.0, 1e8, 2e8, 3e8],
                     "joints": {
                         joint: {"clearance_m": [2e-4, 3e-4, 4e-4, 5e-4], "growth_m_per_cycle": growth[joint]}
-                        for joint in leg.loose
+                        for joint in leg.clearance_joints
                     },
                 }
             )

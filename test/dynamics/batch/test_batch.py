@@ -14,7 +14,7 @@ from leg_wear_monitor.dynamics.clearance.run import ClearanceStepper
 from leg_wear_monitor.dynamics.clearance.tables import build_tables
 from leg_wear_monitor.dynamics.run.drive import steady_drive
 from leg_wear_monitor.dynamics.run.protocol import DONE, INVALID_DRIVE
-from leg_wear_monitor.dynamics.run.run_statistics import new_tally
+from leg_wear_monitor.dynamics.run.run_statistics import new_run_statistics
 from leg_wear_monitor.dynamics.simulation import prepare
 from leg_wear_monitor.mechanism.ideal import TURN
 
@@ -136,16 +136,16 @@ def test_tables_are_made_once_for_legs_that_share_them(leg, monkeypatch):
 
 
 def test_progress_is_the_share_of_the_legs_that_are_done(leg):
-    shares = []
+    fractions = []
     legs = [Leg(mechanism=leg, clearances=("G",), seed=i) for i in range(4)]
-    simulate_batch(legs, cycles=0.01, skip_cycles=0.0, progress=shares.append)
-    assert shares == [0.25, 0.5, 0.75, 1.0]
+    simulate_batch(legs, cycles=0.01, skip_cycles=0.0, progress=fractions.append)
+    assert fractions == [0.25, 0.5, 0.75, 1.0]
 
 
 def test_an_interrupt_ends_the_whole_batch(leg):
     """A hundred thousand cycles would take a quarter of an hour: those that run stop at their next one."""
 
-    def interrupt(share):
+    def interrupt(fraction):
         raise KeyboardInterrupt
 
     short = Leg(mechanism=leg, clearances=())
@@ -210,30 +210,36 @@ def test_advancing_a_batch_is_advancing_each(new_stepper):
     times = [0.1, 0.2, 0.3]
     for steppers in (alone, together):
         steppers[2].init(1.0, -TURN)
-    tallies, tallies_alone = ([new_tally(10) for _ in range(3)] for _ in range(2))
+    statistics_of_all, statistics_alone = ([new_run_statistics(10) for _ in range(3)] for _ in range(2))
     statuses = [
-        stepper.advance(*job) for stepper, *job in zip(alone, polynomials, times, tallies_alone, strict=True)
+        stepper.advance(*job)
+        for stepper, *job in zip(alone, polynomials, times, statistics_alone, strict=True)
     ]
-    assert advance_batch(together, polynomials, times, tallies, workers=3) == statuses
+    assert advance_batch(together, polynomials, times, statistics_of_all, workers=3) == statuses
     assert [status for status, _ in statuses] == [DONE, INVALID_DRIVE, DONE]
-    for one, other, tally, wanted in zip(alone, together, tallies, tallies_alone, strict=True):
+    for one, other, statistics, wanted in zip(
+        alone, together, statistics_of_all, statistics_alone, strict=True
+    ):
         np.testing.assert_array_equal(one.state.motion, other.state.motion)
         np.testing.assert_array_equal(one.state.depth, other.state.depth)
-        np.testing.assert_array_equal(tally.integral, wanted.integral)
+        np.testing.assert_array_equal(statistics.integral, wanted.integral)
 
 
 @pytest.mark.plain
 @pytest.mark.parametrize("shared", ["tally", "stepper", "setup", "length"])
 def test_what_two_threads_would_write_is_refused(leg, new_stepper, shared):
-    steppers, tallies = [new_stepper(), new_stepper()], [new_tally(10), new_tally(10)]
+    steppers, statistics_of_all = (
+        [new_stepper(), new_stepper()],
+        [new_run_statistics(10), new_run_statistics(10)],
+    )
     if shared == "tally":
-        tallies[1] = tallies[0]
+        statistics_of_all[1] = statistics_of_all[0]
     elif shared == "stepper":
         steppers[1] = steppers[0]
     elif shared == "setup":
         setup = prepare(leg, clearances=("G",))
         steppers = [ClearanceStepper(setup), ClearanceStepper(setup)]
     else:
-        tallies.append(new_tally(10))
+        statistics_of_all.append(new_run_statistics(10))
     with pytest.raises(ValueError, match=r"share|zip|shorter|longer"):
-        advance_batch(steppers, [steady_drive(0.0, TURN)] * 2, 0.1, tallies)
+        advance_batch(steppers, [steady_drive(0.0, TURN)] * 2, 0.1, statistics_of_all)

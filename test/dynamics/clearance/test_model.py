@@ -23,7 +23,7 @@ LEGS = ("bionic_leg", "jansen_leg", "four_bar")
 
 @attrs.frozen(eq=False)
 class Case:
-    """A linkage, its loose joints and their tables."""
+    """A linkage, its clearance joints and their tables."""
 
     linkage: Linkage
     contacts: ContactArrays
@@ -32,7 +32,7 @@ class Case:
 
     @property
     def rows(self) -> list[int]:
-        """Rows of the loose joints among all closures."""
+        """Rows of the clearance joints among all closures."""
         start = dict(zip(self.linkage.rows.closure.tolist(), self.linkage.rows.row.tolist(), strict=True))
         return [start[int(joint)] + i for joint in self.contacts.joint for i in range(2)]
 
@@ -47,7 +47,7 @@ class Case:
 
 @pytest.fixture(scope="module")
 def cases(document):
-    """Both legs with five loose joints, and a four-bar with one, a spring, a damper and loads."""
+    """Both legs with five clearance joints, and a four-bar with one, a spring, a damper and loads."""
     four_bar = document("four_bar")
     spring = {"bodies": ["ground", "rocker"], "points": ["A", "C"], "stiffness": 200.0, "free_length": 0.1}
     four_bar["springs"] = {"back": spring | {"damping": 3.0}}
@@ -58,8 +58,8 @@ def cases(document):
     }
     mechanisms = [load_mechanism(name) for name in LEGS[:2]] + [parse_mechanism(four_bar, "four_bar")]
     result = {}
-    for name, mechanism, loose in zip(LEGS, mechanisms, ("ABGIJ", "ABGIJ", "B"), strict=True):
-        setup = prepare(mechanism, clearances=tuple(loose))
+    for name, mechanism, clearance_joints in zip(LEGS, mechanisms, ("ABGIJ", "ABGIJ", "B"), strict=True):
+        setup = prepare(mechanism, clearances=tuple(clearance_joints))
         tables = build_tables(setup.linkage, setup.contacts, POINTS)
         result[name] = Case(setup.linkage, setup.contacts, tables, name == "four_bar")
     return result
@@ -233,7 +233,7 @@ def test_the_power_of_loads_holds_to_the_first_order_in_the_eccentricities(leg, 
         setup.linkage, setup.contacts, build_tables(setup.linkage, setup.contacts, POINTS), damped=False
     )
     random = np.random.default_rng(i)
-    direction, rates = random.normal(size=(2, 2 * len(setup.loose)))
+    direction, rates = random.normal(size=(2, 2 * len(setup.clearance_joints)))
     errors, changes = [], []
     for size in (3.0e-4, 1.5e-4):
         e = size * direction / np.abs(direction).max()

@@ -11,7 +11,7 @@ from leg_wear_monitor.wear.surfaces import BUSHING
 
 CYCLES = 20
 
-# mean contact force [N] of each loose joint, and its rounding
+# mean contact force [N] of each clearance joint, and its rounding
 PUBLISHED = {
     "G": [(67.7, 67.7, 0.05)],
     "AB": [(168.0, 168.0, 0.5), (103.0, 103.0, 0.5)],
@@ -25,20 +25,20 @@ PUBLISHED = {
 }
 
 
-@pytest.mark.parametrize("loose", PUBLISHED)
-def test_mean_contact_forces_are_in_the_published_range(leg_cycles, loose):
-    force = leg_cycles(loose, CYCLES).force
+@pytest.mark.parametrize("clearance_joints", PUBLISHED)
+def test_mean_contact_forces_are_in_the_published_range(leg_cycles, clearance_joints):
+    force = leg_cycles(clearance_joints, CYCLES).force
     mean, scatter = force.mean(axis=0), force.std(axis=0, ddof=1)
     assert (scatter / np.sqrt(CYCLES) < 0.02 * mean).all()  # else the comparison would say nothing
-    for k, (low, high, rounding) in enumerate(PUBLISHED[loose]):
+    for k, (low, high, rounding) in enumerate(PUBLISHED[clearance_joints]):
         slack = rounding + 3.0 * scatter[k]
-        assert low - slack <= mean[k] <= high + slack, loose[k]
+        assert low - slack <= mean[k] <= high + slack, clearance_joints[k]
 
 
-@pytest.mark.parametrize("loose", ["G", "AB", "IJ", "ABGIJ"])
-def test_every_loose_joint_rattles_and_rubs(leg_cycles, loose):
+@pytest.mark.parametrize("clearance_joints", ["G", "AB", "IJ", "ABGIJ"])
+def test_every_loose_joint_rattles_and_rubs(leg_cycles, clearance_joints):
     """Most of the time in contact, never always."""
-    cycles = leg_cycles(loose, CYCLES)
+    cycles = leg_cycles(clearance_joints, CYCLES)
     contact = cycles.contact.mean(axis=0)
     assert ((contact > 0.5) & (contact < 1.0)).all()
     assert (cycles.archard > 0.0).all()
@@ -56,7 +56,10 @@ def test_wear_comes_in_the_papers_order(leg_cycles):
 
 def test_a_wears_deeper_with_all_five_loose_than_with_a_and_b(leg_cycles):
     """By the deepest sector of its bushing; the volumes differ too, but by less than such runs scatter."""
-    five, two = (leg_cycles(loose, CYCLES).cycles[-1].depth[0, BUSHING] for loose in ("ABGIJ", "AB"))
+    five, two = (
+        leg_cycles(clearance_joints, CYCLES).cycles[-1].depth[0, BUSHING]
+        for clearance_joints in ("ABGIJ", "AB")
+    )
     assert five > two
 
 

@@ -23,8 +23,8 @@ from leg_wear_monitor.dynamics.run.run_statistics import (
     FORCE,
     PEAK,
     SPEED,
-    Tally,
-    new_tally,
+    RunStatistics,
+    new_run_statistics,
 )
 from leg_wear_monitor.dynamics.simulation import prepare
 from leg_wear_monitor.mechanism.ideal import TURN, ideal_motion
@@ -73,7 +73,7 @@ def tables(leg: Mechanism) -> ClearanceTables:
 
 @pytest.fixture(scope="module")
 def new_stepper(worn_leg, tables):
-    """Makes steppers of the soft leg with five loose joints, all at the ideal start; wear feeds back."""
+    """Makes steppers of the soft leg with five clearance joints, all at the ideal start; wear feeds back."""
     setup = prepare(worn_leg, wear=True)
 
     def make() -> ClearanceStepper:
@@ -84,12 +84,12 @@ def new_stepper(worn_leg, tables):
 
 
 def drive(
-    stepper: ClearanceStepper, pieces: list[Piece], tally: Tally, cuts: list[float] | None = None
+    stepper: ClearanceStepper, pieces: list[Piece], statistics: RunStatistics, cuts: list[float] | None = None
 ) -> None:
     """Take a stepper through pieces of motion, stopping at times [s] in between too."""
     for polynomial, end in pieces:
         for t in [*sorted(cut for cut in cuts or () if stepper.time < cut < end), end]:
-            assert stepper.advance(polynomial, t, tally) == (DONE, -1)
+            assert stepper.advance(polynomial, t, statistics) == (DONE, -1)
 
 
 def assert_same(one: ClearanceStepper, other: ClearanceStepper) -> None:
@@ -98,17 +98,17 @@ def assert_same(one: ClearanceStepper, other: ClearanceStepper) -> None:
     np.testing.assert_array_equal(one.state.depth, other.state.depth)
 
 
-def assert_same_tally(one: Tally, other: Tally) -> None:
-    for name, values, others in zip(Tally._fields, one, other, strict=True):
+def assert_same_statistics(one: RunStatistics, other: RunStatistics) -> None:
+    for name, values, others in zip(RunStatistics._fields, one, other, strict=True):
         np.testing.assert_array_equal(values, others, err_msg=name)
 
 
 @pytest.fixture(scope="module")
 def in_one_go(new_stepper):
     """The whole motion with starts, stops and reversals, one call a piece."""
-    stepper, tally = new_stepper(), new_tally(10)
-    drive(stepper, START_STOP_REVERSE, tally)
-    return stepper, tally
+    stepper, statistics = new_stepper(), new_run_statistics(10)
+    drive(stepper, START_STOP_REVERSE, statistics)
+    return stepper, statistics
 
 
 @settings(max_examples=20)
@@ -117,34 +117,34 @@ def in_one_go(new_stepper):
 @example(cuts=(np.arange(1, 600) * 0.0005).tolist())
 def test_any_split_of_the_time_axis_gives_the_same(new_stepper, in_one_go, cuts):
     """State and sums bit for bit, through starts, stops and reversals with wear fed back."""
-    stepper, tally = new_stepper(), new_tally(10)
-    drive(stepper, START_STOP_REVERSE, tally, cuts)
+    stepper, statistics = new_stepper(), new_run_statistics(10)
+    drive(stepper, START_STOP_REVERSE, statistics, cuts)
     assert_same(stepper, in_one_go[0])
-    assert_same_tally(tally, in_one_go[1])
+    assert_same_statistics(statistics, in_one_go[1])
 
 
 @settings(max_examples=20)
 @given(at=st.floats(0.0, SHORT), astray=st.floats(-20.0, 20.0))
 def test_restored_it_goes_on_bit_for_bit(new_stepper, in_one_go, at, astray):
     """Also in another stepper of the same setup, whatever either has done meanwhile."""
-    stepper, tally = new_stepper(), new_tally(10)
+    stepper, statistics = new_stepper(), new_run_statistics(10)
     before = [Piece(polynomial, min(end, at)) for polynomial, end in START_STOP_REVERSE if end - 0.05 < at]
     after = [piece for piece in START_STOP_REVERSE if piece.end >= at]
-    drive(stepper, before, tally)
+    drive(stepper, before, statistics)
     snapshot = stepper.snapshot()
     away = steady_drive(stepper.state.drive[0], astray, stepper.time)
-    drive(stepper, [Piece(away, stepper.time + 0.02)], new_tally(10))
+    drive(stepper, [Piece(away, stepper.time + 0.02)], new_run_statistics(10))
     another = new_stepper()
     for restored in (stepper, another):
         restored.restore(snapshot)
-        drive(restored, after, new_tally(10))
+        drive(restored, after, new_run_statistics(10))
         assert_same(restored, in_one_go[0])
 
 
 def test_a_snapshot_is_a_copy(new_stepper):
     stepper = new_stepper()
     snapshot = stepper.snapshot()
-    drive(stepper, START_STOP_REVERSE, new_tally(10))
+    drive(stepper, START_STOP_REVERSE, new_run_statistics(10))
     assert not np.array_equal(snapshot.motion, stepper.state.motion)
     assert not snapshot.depth.any()
 
@@ -153,7 +153,7 @@ def test_a_new_start_keeps_the_wear_only(new_stepper, in_one_go):
     stepper, other = new_stepper(), new_stepper()
     for one in (stepper, other):
         one.state.depth[:] = in_one_go[0].state.depth
-    drive(stepper, START_STOP_REVERSE[:2], new_tally(10))
+    drive(stepper, START_STOP_REVERSE[:2], new_run_statistics(10))
     depth = stepper.state.depth.copy()
     stepper.init(1.0, TURN)
     np.testing.assert_array_equal(stepper.state.depth, depth)
@@ -161,7 +161,7 @@ def test_a_new_start_keeps_the_wear_only(new_stepper, in_one_go):
     other.init(1.0, TURN)
     assert stepper.time == 0.0
     for one in (stepper, other):
-        drive(one, [Piece(steady_drive(1.0, TURN), 0.1)], new_tally(10))
+        drive(one, [Piece(steady_drive(1.0, TURN), 0.1)], new_run_statistics(10))
     assert_same(stepper, other)
 
 
@@ -171,12 +171,12 @@ def test_a_new_start_keeps_the_wear_only(new_stepper, in_one_go):
 @example(speeds=[20.0, -20.0, 20.0])
 def test_no_motion_of_the_crank_leaves_the_finite(new_stepper, speeds):
     """From any speed to any other within a twentieth of a second, from rest too."""
-    stepper, tally = new_stepper(), new_tally(10)
+    stepper, statistics = new_stepper(), new_run_statistics(10)
     stepper.init(0.0, speeds[0])
-    drive(stepper, motion_of(speeds, 0.05), tally)
+    drive(stepper, motion_of(speeds, 0.05), statistics)
     assert np.isfinite(stepper.state.motion).all()
-    assert np.isfinite(tally.integral).all()
-    assert np.isfinite(tally.drive_integral).all()
+    assert np.isfinite(statistics.integral).all()
+    assert np.isfinite(statistics.drive_integral).all()
     eccentricity = np.hypot(*stepper.state.e.reshape(-1, 2).T)
     assert (eccentricity < 1.2 * 3.0e-4).all()
 
@@ -189,35 +189,35 @@ def test_no_motion_of_the_crank_leaves_the_finite(new_stepper, speeds):
 )
 def test_a_senseless_drive_is_refused_and_forgotten(new_stepper, in_one_go, i, value, steps):
     """State and sums as if it had never come, for however long it would have lasted."""
-    stepper, tally = new_stepper(), new_tally(10)
-    drive(stepper, START_STOP_REVERSE[:3], tally)
+    stepper, statistics = new_stepper(), new_run_statistics(10)
+    drive(stepper, START_STOP_REVERSE[:3], statistics)
     senseless = START_STOP_REVERSE[3].polynomial.copy()
     senseless[i] = value
-    status = stepper.advance(senseless, stepper.time + steps * stepper.model.interval, tally)
+    status = stepper.advance(senseless, stepper.time + steps * stepper.model.interval, statistics)
     assert status == (INVALID_DRIVE, -1)
     assert np.isfinite(stepper.state.e).all()
-    drive(stepper, START_STOP_REVERSE[3:], tally)
+    drive(stepper, START_STOP_REVERSE[3:], statistics)
     assert_same(stepper, in_one_go[0])
-    assert_same_tally(tally, in_one_go[1])
+    assert_same_statistics(statistics, in_one_go[1])
 
 
 @pytest.mark.plain
 @pytest.mark.parametrize("t_end", [np.nan, -1.0, -np.inf])
 def test_an_end_that_is_not_ahead_changes_nothing(new_stepper, t_end):
-    stepper, tally = new_stepper(), new_tally(10)
+    stepper, statistics = new_stepper(), new_run_statistics(10)
     before = stepper.snapshot()
-    assert stepper.advance(steady_drive(0.0, TURN), t_end, tally) == (DONE, -1)
+    assert stepper.advance(steady_drive(0.0, TURN), t_end, statistics) == (DONE, -1)
     np.testing.assert_array_equal(stepper.state.motion, before.motion)
-    assert not tally.time[0]
+    assert not statistics.time[0]
 
 
 def test_a_drive_that_tears_the_leg_apart_is_stopped(new_stepper):
     """Thousands of radians a second: a status and the last good state; with new bushings it goes as new."""
-    stepper, tally = new_stepper(), new_tally(10)
-    drive(stepper, START_STOP_REVERSE[:1], tally)
+    stepper, statistics = new_stepper(), new_run_statistics(10)
+    drive(stepper, START_STOP_REVERSE[:1], statistics)
     mad = motion_of([2.0 * TURN, 9.0e3], 0.05)[0].polynomial
     mad[:2] = 0.05, stepper.state.drive[0]
-    status, k = stepper.advance(mad, 0.1, new_tally(10))
+    status, k = stepper.advance(mad, 0.1, new_run_statistics(10))
     assert status != DONE
     assert -1 <= k < 5
     assert np.isfinite(stepper.state.e).all()
@@ -226,7 +226,7 @@ def test_a_drive_that_tears_the_leg_apart_is_stopped(new_stepper):
     stepper.init(0.0, TURN)
     another = new_stepper()
     for one in (stepper, another):
-        drive(one, START_STOP_REVERSE[:2], new_tally(10))
+        drive(one, START_STOP_REVERSE[:2], new_run_statistics(10))
     assert_same(stepper, another)
 
 
@@ -236,16 +236,16 @@ def test_at_rest_the_contacts_carry_the_weight(leg, tables):
     Journals go on rocking, since friction begins at 1 mm/s only; and the leg hangs a little elsewhere.
     """
     setup = prepare(leg)
-    stepper, tally = ClearanceStepper(setup, tables=tables), new_tally(10)
+    stepper, statistics = ClearanceStepper(setup, tables=tables), new_run_statistics(10)
     pieces = motion_of([TURN, TURN, 0.0], 0.2)
-    drive(stepper, pieces, new_tally(10))
+    drive(stepper, pieces, new_run_statistics(10))
     angle = stepper.state.drive[0]
     rest = steady_drive(angle, 0.0)
-    drive(stepper, [Piece(rest, 2.4)], new_tally(10))
-    drive(stepper, [Piece(rest, 3.4)], tally)
+    drive(stepper, [Piece(rest, 2.4)], new_run_statistics(10))
+    drive(stepper, [Piece(rest, 3.4)], statistics)
     static = ideal_motion(setup.linkage, [angle], 0.0).joint_force[0]
     wanted = np.linalg.norm(static, axis=1)
-    np.testing.assert_allclose(tally.integral[:, FORCE] / tally.time[0], wanted, rtol=0.01)
+    np.testing.assert_allclose(statistics.integral[:, FORCE] / statistics.time[0], wanted, rtol=0.01)
 
 
 def _mirrored(mechanism: Mechanism) -> Mechanism:
@@ -279,7 +279,7 @@ def test_a_mirrored_leg_moves_and_wears_mirrored(worn_leg):
     steppers = []
     for mechanism, speed in ((worn_leg, TURN), (_mirrored(worn_leg), -TURN)):
         stepper = ClearanceStepper(prepare(mechanism, clearances=("A", "B"), wear=True))
-        drive(stepper, [Piece(steady_drive(0.0, speed), 0.1)], new_tally(10))
+        drive(stepper, [Piece(steady_drive(0.0, speed), 0.1)], new_run_statistics(10))
         steppers.append(stepper)
     seen, mirrored = steppers
     assert np.abs(seen.state.e).max() > 2.9e-4
@@ -296,27 +296,27 @@ def test_a_mirrored_leg_moves_and_wears_mirrored(worn_leg):
 @given(t=st.floats(0.01, 1.0))
 def test_no_wear_is_lost(new_stepper, t):
     """Depth x arc x width over all sectors, with what is pending, is k times the Archard integral."""
-    stepper, tally = new_stepper(), new_tally(10)
-    drive(stepper, [Piece(steady_drive(0.0, TURN), t)], tally)
+    stepper, statistics = new_stepper(), new_run_statistics(10)
+    drive(stepper, [Piece(steady_drive(0.0, TURN), t)], statistics)
     contacts, pending = stepper.model.contacts, stepper.state.pending[:, :1]
     volume = worn_volume(contacts, Surfaces(stepper.state.depth, 1)) + contacts.wear_coefficient * pending
-    wanted = contacts.wear_coefficient * tally.integral[contacts.joint, ARCHARD][:, None]
+    wanted = contacts.wear_coefficient * statistics.integral[contacts.joint, ARCHARD][:, None]
     np.testing.assert_allclose(volume, wanted, rtol=1.0e-11)
 
 
-def run_figures(new: Callable[[], ClearanceStepper], runs: int, count: int) -> np.ndarray:
+def run_statistics_of(new: Callable[[], ClearanceStepper], runs: int, count: int) -> np.ndarray:
     """Means of independent runs at 60 rpm (runs, 3, k), the first second dropped: force, Archard, contact.
 
     The journals start elsewhere in each, since regimes of the motion last for more than a few cycles.
     """
     polynomial, figures = steady_drive(0.0, TURN), []
     for run in range(runs):
-        stepper, tally = new(), new_tally(10)
+        stepper, statistics = new(), new_run_statistics(10)
         stepper.state.e[:] = np.random.default_rng(run).uniform(-1.0e-4, 1.0e-4, len(stepper.state.e))
-        drive(stepper, [Piece(polynomial, 1.0)], new_tally(10))
-        drive(stepper, [Piece(polynomial, 1.0 + count)], tally)
+        drive(stepper, [Piece(polynomial, 1.0)], new_run_statistics(10))
+        drive(stepper, [Piece(polynomial, 1.0 + count)], statistics)
         joints = stepper.model.contacts.joint
-        figures.append(tally.integral[joints][:, [FORCE, ARCHARD, CONTACT]].T / count)
+        figures.append(statistics.integral[joints][:, [FORCE, ARCHARD, CONTACT]].T / count)
     return np.array(figures)
 
 
@@ -324,8 +324,8 @@ def assert_means_agree(one: np.ndarray, other: np.ndarray) -> None:
     """Within three standard errors of samples (n, 3, k), or within 2 %; 5 % for wear, which varies most."""
     difference = np.abs(one.mean(axis=0) - other.mean(axis=0))
     error = np.hypot(*(samples.std(axis=0, ddof=1) / np.sqrt(len(samples)) for samples in (one, other)))
-    share = np.array([[0.02], [0.05], [0.02]]) * one.mean(axis=0)
-    assert (difference < np.maximum(3.0 * error, share)).all(), difference / one.mean(axis=0)
+    fraction = np.array([[0.02], [0.05], [0.02]]) * one.mean(axis=0)
+    assert (difference < np.maximum(3.0 * error, fraction)).all(), difference / one.mean(axis=0)
 
 
 @pytest.mark.parametrize(
@@ -334,20 +334,24 @@ def assert_means_agree(one: np.ndarray, other: np.ndarray) -> None:
 def test_means_hold_at_half_the_interval_and_a_tenth_of_the_tolerance(leg, tables, finer):
     """All five joints' figures, over twenty-four runs of five cycles."""
     usual, fine = (
-        run_figures(lambda options=options: ClearanceStepper(prepare(leg), tables=tables, **options), 24, 5)
+        run_statistics_of(
+            lambda options=options: ClearanceStepper(prepare(leg), tables=tables, **options), 24, 5
+        )
         for options in ({}, finer)
     )
     assert_means_agree(fine, usual)
 
 
-@pytest.mark.parametrize("loose", ["G", "AB", "IJ", "ABGIJ"])
-def test_means_are_those_of_full_coordinates(leg, leg_cycles, loose):
+@pytest.mark.parametrize("clearance_joints", ["G", "AB", "IJ", "ABGIJ"])
+def test_means_are_those_of_full_coordinates(leg, leg_cycles, clearance_joints):
     """Over twenty cycles; docs/validation.md has more of them, and more figures."""
-    cycles, setup = leg_cycles(loose, 20), prepare(leg, clearances=tuple(loose))
+    cycles, setup = leg_cycles(clearance_joints, 20), prepare(leg, clearances=tuple(clearance_joints))
     known = build_tables(setup.linkage, setup.contacts)
     full = np.stack([cycles.force, cycles.archard, cycles.contact], axis=1)
-    runs = run_figures(
-        lambda: ClearanceStepper(prepare(leg, clearances=tuple(loose)), tables=known), runs=8, count=5
+    runs = run_statistics_of(
+        lambda: ClearanceStepper(prepare(leg, clearances=tuple(clearance_joints)), tables=known),
+        runs=8,
+        count=5,
     )
     assert_means_agree(full, runs)
 
@@ -356,12 +360,12 @@ def test_means_are_those_of_full_coordinates(leg, leg_cycles, loose):
 def test_it_is_the_full_motion_until_impacts_decorrelate(name):
     """Every joint's first impact: when, how fast, how hard; the models differ by e / L from the start on."""
     mechanism = load_mechanism(name)
-    setup, tallies = prepare(mechanism), [new_tally(10), new_tally(10)]
+    setup, statistics_of_all = prepare(mechanism), [new_run_statistics(10), new_run_statistics(10)]
     stepper = ClearanceStepper(prepare(mechanism), interval_s=1.0e-4)
-    drive(stepper, [Piece(steady_drive(0.0, setup.speed), 0.025)], tallies[0])
-    FullRun(setup).advance(0.025, tallies[1])
-    first, wanted = (tally.impact[setup.contacts.joint, 0] for tally in tallies)
-    assert all((tally.impacts[setup.contacts.joint] > 0).all() for tally in tallies)
+    drive(stepper, [Piece(steady_drive(0.0, setup.speed), 0.025)], statistics_of_all[0])
+    FullRun(setup).advance(0.025, statistics_of_all[1])
+    first, wanted = (statistics.impact[setup.contacts.joint, 0] for statistics in statistics_of_all)
+    assert all((statistics.impacts[setup.contacts.joint] > 0).all() for statistics in statistics_of_all)
     np.testing.assert_allclose(first[:, BEGIN], wanted[:, BEGIN], atol=2.0e-5)
     np.testing.assert_allclose(first[:, SPEED], wanted[:, SPEED], rtol=0.01)
     np.testing.assert_allclose(first[:, PEAK], wanted[:, PEAK], rtol=0.02)

@@ -27,8 +27,8 @@ from leg_wear_monitor.wear.surfaces import SECTORS, Surfaces
 
 pytestmark = pytest.mark.plain
 
-LOOSE = ("A", "B", "G", "I", "J")
-APPROACH = np.full(len(LOOSE), 0.2)
+CLEARANCE_JOINTS = ("A", "B", "G", "I", "J")
+APPROACH = np.full(len(CLEARANCE_JOINTS), 0.2)
 
 phases = st.integers(0, 35)
 # m and rad: enough to bring journals into contact and others out of it
@@ -43,7 +43,7 @@ def cycle(linkage_of):
 
 @pytest.fixture(scope="module")
 def model(leg, linkage_of):
-    contacts = compile_contacts(leg, LOOSE, clearance_settings(leg, LOOSE))
+    contacts = compile_contacts(leg, CLEARANCE_JOINTS, clearance_settings(leg, CLEARANCE_JOINTS))
     return full_model(linkage_of("bionic_leg").arrays, contacts, driven=True)
 
 
@@ -71,7 +71,7 @@ def _contacts(model, surfaces, q, v):
 
 
 def _forces(model, surfaces, k, q, v, cs):
-    """Normal and tangential force, delta_dot, slip, normal, contact point and bodies of loose joint k."""
+    """Normal and tangential force, delta_dot, slip, normal, contact point and bodies of clearance joint k."""
     ex, ey, vx, vy, b, j, sbx, sby = eccentricity(model, k, q, v, cs)
     f_n, f_t, _, delta_dot, slip, nx, ny, _, _ = joint_force(
         model.contacts, surfaces, k, ex, ey, vx, vy, q[b, 2], q[j, 2], v[b, 2], v[j, 2], APPROACH[k]
@@ -118,7 +118,7 @@ def test_slip_is_that_of_the_two_bodies_where_they_touch(model, worn, cycle, pha
     q, v = _state(cycle, phase, offset, velocity)
     cs = np.empty((len(q), 2))
     rotations(q, cs)
-    for k in range(len(LOOSE)):
+    for k in range(len(CLEARANCE_JOINTS)):
         _, _, delta_dot, slip, n, point, b, j = _forces(model, worn, k, q, v, cs)
         at = [v[i, :2] + v[i, 2] * np.array([q[i, 1] - point[1], point[0] - q[i, 0]]) for i in (b, j)]
         relative = at[1] - at[0]

@@ -6,7 +6,13 @@ import numpy as np
 import pytest
 
 from leg_wear_monitor.dynamics.full.run import FullRun
-from leg_wear_monitor.dynamics.run.run_statistics import DISSIPATION, FRICTION, POWER, TORQUE, new_tally
+from leg_wear_monitor.dynamics.run.run_statistics import (
+    DISSIPATION,
+    FRICTION,
+    POWER,
+    TORQUE,
+    new_run_statistics,
+)
 from leg_wear_monitor.dynamics.simulation import prepare, simulate
 from leg_wear_monitor.errors import ConfigError
 from leg_wear_monitor.mechanism.ideal import TURN, one_cycle
@@ -43,9 +49,9 @@ def _rotor(**track):
 
 def _advance(mechanism, t_end, **options):
     run = FullRun(prepare(mechanism, clearances=options.pop("clearances", ())), **options)
-    tally, stored = new_tally(len(mechanism.joints)), run.stored_energy
-    run.advance(t_end, tally)
-    return run, tally, stored
+    statistics, stored = new_run_statistics(len(mechanism.joints)), run.stored_energy
+    run.advance(t_end, statistics)
+    return run, statistics, stored
 
 
 @pytest.mark.parametrize("t_end", [0.1, 0.35, 0.8])
@@ -66,18 +72,18 @@ def test_a_rotor_settles_as_the_closed_form_says(t_end):
 
 @pytest.mark.parametrize("asked", [7.0, -7.0])
 def test_the_drive_gives_no_more_than_its_largest_torque(asked):
-    run, tally, _ = _advance(_rotor(feed_forward_nm=asked, max_torque_nm=0.4), 0.5, tolerance_m=1.0e-12)
+    run, statistics, _ = _advance(_rotor(feed_forward_nm=asked, max_torque_nm=0.4), 0.5, tolerance_m=1.0e-12)
     torque = math.copysign(0.4, asked)
     assert run.v[1, 2] == pytest.approx(SPEED + torque / INERTIA * 0.5, rel=1.0e-9)
-    assert tally.drive_integral[TORQUE] == pytest.approx(0.5 * torque, rel=1.0e-12)
+    assert statistics.drive_integral[TORQUE] == pytest.approx(0.5 * torque, rel=1.0e-12)
 
 
 def test_the_feed_forward_follows_the_phase_of_the_wanted_motion():
     """Linear between its phases, and from the last on to the first: over a turn its mean is the table's."""
     table = {"feed_forward_nm": [1.0, -2.0, 0.5], "feed_forward_phase": [0.0, 0.25, 0.75]}
-    _, tally, _ = _advance(_rotor(**table), TURN / SPEED, tolerance_m=1.0e-10)
+    _, statistics, _ = _advance(_rotor(**table), TURN / SPEED, tolerance_m=1.0e-10)
     mean = 0.25 * (1.0 - 2.0) / 2.0 + 0.5 * (-2.0 + 0.5) / 2.0 + 0.25 * (0.5 + 1.0) / 2.0
-    assert tally.drive_integral[TORQUE] * SPEED / TURN == pytest.approx(mean, rel=1.0e-6)
+    assert statistics.drive_integral[TORQUE] * SPEED / TURN == pytest.approx(mean, rel=1.0e-6)
 
 
 def test_without_gains_it_is_a_constant_torque(document):
@@ -128,12 +134,12 @@ def test_the_work_of_the_drive_is_in_the_energy(document, clearances):
     four_bar = _tracked(
         document, "four_bar", kp_nm_per_rad=8.0, kd_nm_s_per_rad=1.0, feed_forward_nm=0.1, max_torque_nm=0.2
     )
-    run, tally, stored = _advance(
+    run, statistics, stored = _advance(
         parse_mechanism(four_bar, "four_bar"), 0.5, clearances=clearances, tolerance_m=1.0e-11
     )
-    lost = tally.integral[:, [FRICTION, DISSIPATION]].sum()
-    assert tally.drive_range[1] == 0.2
-    assert tally.drive_integral[POWER] == pytest.approx(
+    lost = statistics.integral[:, [FRICTION, DISSIPATION]].sum()
+    assert statistics.drive_range[1] == 0.2
+    assert statistics.drive_integral[POWER] == pytest.approx(
         run.stored_energy - stored + lost, rel=1.0e-8 if not clearances else 1.0e-4
     )
 

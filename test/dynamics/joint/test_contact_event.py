@@ -8,7 +8,7 @@ from hypothesis import assume, given
 from hypothesis import strategies as st
 
 from leg_wear_monitor.contact.geometry import journal_contact
-from leg_wear_monitor.dynamics.joint.contact_event import DELTA, DELTA_DOT, NEVER, SAMPLE, first_touch
+from leg_wear_monitor.dynamics.joint.contact_event import DELTA, DELTA_DOT, NEVER, SAMPLE, first_contact_event
 
 pytestmark = pytest.mark.plain
 
@@ -24,27 +24,27 @@ def _sample(ex, ey, vx, vy):
 
 
 flights = {
-    "share": st.floats(0.0, 0.9), "angle": st.floats(-4.0, 4.0), "heading": st.floats(-1.2, 1.2),
+    "fraction": st.floats(0.0, 0.9), "angle": st.floats(-4.0, 4.0), "heading": st.floats(-1.2, 1.2),
     "speed": st.floats(0.01, 5.0), "reach": st.floats(0.0, 0.3),
 }  # fmt: skip
 
 
-def _fly(share, angle, heading, speed, reach):
-    """Position at a share of the clearance, velocity outwards, and a step that moves it by about reach c."""
-    ex, ey = share * CLEARANCE * math.cos(angle), share * CLEARANCE * math.sin(angle)
+def _fly(fraction, angle, heading, speed, reach):
+    """Position at a fraction of the clearance, velocity outwards, a step that moves it by about reach c."""
+    ex, ey = fraction * CLEARANCE * math.cos(angle), fraction * CLEARANCE * math.sin(angle)
     vx, vy = speed * math.cos(angle + heading), speed * math.sin(angle + heading)
     return ex, ey, vx, vy, (reach + 1.0e-3) * CLEARANCE / speed
 
 
 @given(**flights)
-def test_a_free_flight_touches_where_the_circle_is_met(share, angle, heading, speed, reach):
+def test_a_free_flight_touches_where_the_circle_is_met(fraction, angle, heading, speed, reach):
     """|e + v t| = c, a quadratic; the cubic through a short step's ends finds it."""
-    ex, ey, vx, vy, h = _fly(share, angle, heading, speed, reach)
+    ex, ey, vx, vy, h = _fly(fraction, angle, heading, speed, reach)
     along, square = ex * vx + ey * vy, ex * ex + ey * ey - CLEARANCE**2
     time = (-along + math.sqrt(along**2 - speed**2 * square)) / speed**2
     assume(abs(time / h - 1.0) > 1.0e-6)
     start, end = _sample(ex, ey, vx, vy), _sample(ex + vx * h, ey + vy * h, vx, vy)
-    got = first_touch(np.zeros(1), h, start, end)
+    got = first_contact_event(np.zeros(1), h, start, end)
     if time > h:
         assert got == NEVER
     else:
@@ -52,18 +52,18 @@ def test_a_free_flight_touches_where_the_circle_is_met(share, angle, heading, sp
 
 
 @given(**flights)
-def test_a_joint_that_is_in_contact_cannot_touch(share, angle, heading, speed, reach):
-    ex, ey, vx, vy, h = _fly(share, angle, heading, speed, reach)
+def test_a_joint_that_is_in_contact_cannot_touch(fraction, angle, heading, speed, reach):
+    ex, ey, vx, vy, h = _fly(fraction, angle, heading, speed, reach)
     start, end = _sample(ex, ey, vx, vy), _sample(ex + vx * h, ey + vy * h, vx, vy)
-    assert first_touch(np.full(1, 0.5), h, start, end) == NEVER
+    assert first_contact_event(np.full(1, 0.5), h, start, end) == NEVER
 
 
 def test_the_first_of_several_counts():
-    start = np.vstack([_sample(share * CLEARANCE, 0.0, 1.0, 0.0) for share in (0.5, 0.9, 0.7)])
+    start = np.vstack([_sample(fraction * CLEARANCE, 0.0, 1.0, 0.0) for fraction in (0.5, 0.9, 0.7)])
     h = 0.6 * CLEARANCE
-    end = np.vstack([_sample((share + 0.6) * CLEARANCE, 0.0, 1.0, 0.0) for share in (0.5, 0.9, 0.7)])
-    assert first_touch(np.zeros(3), h, start, end) == pytest.approx(0.1 / 0.6, rel=1.0e-6)
-    assert first_touch(np.array([0.0, 1.0, 0.0]), h, start, end) == pytest.approx(0.5, rel=1.0e-6)
+    end = np.vstack([_sample((fraction + 0.6) * CLEARANCE, 0.0, 1.0, 0.0) for fraction in (0.5, 0.9, 0.7)])
+    assert first_contact_event(np.zeros(3), h, start, end) == pytest.approx(0.1 / 0.6, rel=1.0e-6)
+    assert first_contact_event(np.array([0.0, 1.0, 0.0]), h, start, end) == pytest.approx(0.5, rel=1.0e-6)
 
 
 def test_a_touch_and_parting_inside_one_step_is_seen():
@@ -71,5 +71,5 @@ def test_a_touch_and_parting_inside_one_step_is_seen():
     start, end = np.zeros((1, SAMPLE)), np.zeros((1, SAMPLE))
     start[0, DELTA], start[0, DELTA_DOT] = -1.0e-6, 6.0
     end[0, DELTA], end[0, DELTA_DOT] = -1.0e-6, -6.0
-    share = first_touch(np.zeros(1), 1.0e-6, start, end)
-    assert 6.0 * share * (1.0 - share) == pytest.approx(1.0, rel=1.0e-9)
+    fraction = first_contact_event(np.zeros(1), 1.0e-6, start, end)
+    assert 6.0 * fraction * (1.0 - fraction) == pytest.approx(1.0, rel=1.0e-9)

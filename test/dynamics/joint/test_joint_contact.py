@@ -1,4 +1,4 @@
-"""One loose joint with worn surfaces: its normal force has a potential, bodies' turning included."""
+"""One clearance joint with worn surfaces: its normal force has a potential, bodies' turning included."""
 
 import math
 

@@ -15,7 +15,7 @@ from leg_wear_monitor.dynamics.run.run_statistics import (
     begin_impact,
     bin_of,
     end_impact,
-    new_tally,
+    new_run_statistics,
     parabola_peak,
     percentile,
     raise_peak,
@@ -28,38 +28,38 @@ BIN = 1.0085  # ratio of two bins' magnitudes
 
 magnitudes = arrays(float, st.integers(1, 200), elements=st.floats(1.0e-3, 1.0e5))
 signed = st.tuples(st.sampled_from([-1.0, 1.0]), st.floats(1.0e-3, 1.0e5)).map(np.prod)
-shares = st.floats(0.0, 1.0, exclude_min=True)
+fractions = st.floats(0.0, 1.0, exclude_min=True)
 
 
 def _histogram(samples):
     """Equal time at each sample."""
-    seconds = np.zeros(new_tally(1).force_time.shape[1])
+    seconds = np.zeros(new_run_statistics(1).force_time.shape[1])
     for sample in samples:
         seconds[bin_of(sample)] += 0.001
     return seconds
 
 
-@given(samples=magnitudes, share=shares)
-def test_percentile_divides_the_time_to_the_width_of_a_bin(samples, share):
-    got = percentile(_histogram(samples), share)
-    assert np.mean(samples <= got * BIN) >= share - 1.0e-9
-    assert np.mean(samples < got / BIN) <= share + 1.0e-9
+@given(samples=magnitudes, fraction=fractions)
+def test_percentile_divides_the_time_to_the_width_of_a_bin(samples, fraction):
+    got = percentile(_histogram(samples), fraction)
+    assert np.mean(samples <= got * BIN) >= fraction - 1.0e-9
+    assert np.mean(samples < got / BIN) <= fraction + 1.0e-9
 
 
-@given(samples=st.lists(signed, min_size=2, max_size=60).map(np.array), share=shares)
-def test_signed_percentile_divides_the_time_too(samples, share):
+@given(samples=st.lists(signed, min_size=2, max_size=60).map(np.array), fraction=fractions)
+def test_signed_percentile_divides_the_time_too(samples, fraction):
     below, above = -samples[samples < 0.0], samples[samples > 0.0]
-    got = signed_percentile(np.array([_histogram(below), _histogram(above)]), share)
+    got = signed_percentile(np.array([_histogram(below), _histogram(above)]), fraction)
     slack = (BIN - 1.0) * abs(got)
-    assert np.mean(samples <= got + slack) >= share - 1.0e-9
-    assert np.mean(samples < got - slack) <= share + 1.0e-9
+    assert np.mean(samples <= got + slack) >= fraction - 1.0e-9
+    assert np.mean(samples < got - slack) <= fraction + 1.0e-9
 
 
-@pytest.mark.parametrize("share", [0.01, 0.5, 0.9, 0.99])
-def test_percentile_of_many_samples_is_numpys(share):
+@pytest.mark.parametrize("fraction", [0.01, 0.5, 0.9, 0.99])
+def test_percentile_of_many_samples_is_numpys(fraction):
     samples = np.random.default_rng(2).lognormal(3.0, 2.0, 20_000)
-    wanted = np.percentile(samples, 100.0 * share)
-    assert percentile(_histogram(samples), share) == pytest.approx(wanted, rel=BIN - 1.0)
+    wanted = np.percentile(samples, 100.0 * fraction)
+    assert percentile(_histogram(samples), fraction) == pytest.approx(wanted, rel=BIN - 1.0)
 
 
 def test_percentile_of_nothing_is_nothing():
@@ -69,27 +69,27 @@ def test_percentile_of_nothing_is_nothing():
 
 @given(rates=arrays(float, (4, 2, JOINT_RATES), elements=st.floats(0.0, 1.0e3)), h=st.floats(1.0e-9, 1.0e-3))
 def test_a_step_adds_its_quadrature_and_its_end(rates, h):
-    tally, weights = new_tally(2), np.array([0.5, 0.0, 0.3, 0.2])
+    statistics, weights = new_run_statistics(2), np.array([0.5, 0.0, 0.3, 0.2])
     drive = -rates[:, 0, :DRIVE_RATES]
     for _ in range(2):
-        add_step(tally, h, weights, rates, drive)
-    assert tally.time[0] == pytest.approx(2.0 * h)
+        add_step(statistics, h, weights, rates, drive)
+    assert statistics.time[0] == pytest.approx(2.0 * h)
     mean = np.tensordot(weights, rates, axes=1)
-    np.testing.assert_allclose(tally.integral, 2.0 * h * mean, atol=1.0e-15)
-    np.testing.assert_allclose(tally.drive_integral, 2.0 * h * (weights @ drive), atol=1.0e-15)
-    np.testing.assert_array_equal(tally.peak, rates[-1, :, FORCE])
-    np.testing.assert_array_equal(tally.drive_range, drive[-1, TORQUE])
-    assert tally.force_time.sum(axis=1) == pytest.approx(2.0 * h)
-    assert tally.torque_time.sum() == pytest.approx(2.0 * h)
+    np.testing.assert_allclose(statistics.integral, 2.0 * h * mean, atol=1.0e-15)
+    np.testing.assert_allclose(statistics.drive_integral, 2.0 * h * (weights @ drive), atol=1.0e-15)
+    np.testing.assert_array_equal(statistics.peak, rates[-1, :, FORCE])
+    np.testing.assert_array_equal(statistics.drive_range, drive[-1, TORQUE])
+    assert statistics.force_time.sum(axis=1) == pytest.approx(2.0 * h)
+    assert statistics.torque_time.sum() == pytest.approx(2.0 * h)
 
 
 @given(
     apex=st.floats(-1.0, 1.0), top=st.floats(-1.0e4, 1.0e4), sharp=st.floats(0.1, 1.0e4),
-    before=st.floats(0.01, 1.0), gap=st.floats(0.01, 1.0), share=st.floats(0.0, 1.0),
+    before=st.floats(0.01, 1.0), gap=st.floats(0.01, 1.0), fraction=st.floats(0.0, 1.0),
 )  # fmt: skip
-def test_peak_of_a_parabola_is_exact(apex, top, sharp, before, gap, share):
+def test_peak_of_a_parabola_is_exact(apex, top, sharp, before, gap, fraction):
     """Three samples of which the middle one is largest, wherever the apex lies among them."""
-    middle = apex + (share - 0.5) * min(before, gap)
+    middle = apex + (fraction - 0.5) * min(before, gap)
     t = np.array([middle - before, middle, middle + gap])
     f = top - sharp * (t - apex) ** 2
     got = parabola_peak(t[0], f[0], t[1], f[1], t[2], f[2])
@@ -101,24 +101,24 @@ def test_three_samples_in_a_line_have_no_other_peak():
 
 
 def test_an_impact_is_noted_from_begin_to_end():
-    tally = new_tally(2)
-    impact, impacts = tally.impact, tally.impacts
+    statistics = new_run_statistics(2)
+    impact, impacts = statistics.impact, statistics.impacts
     begin_impact(impact, impacts, 1, 0.1, 0.5)
-    raise_peak(tally.peak, impact, impacts, 1, 30.0)
-    raise_peak(tally.peak, impact, impacts, 1, 20.0)
+    raise_peak(statistics.peak, impact, impacts, 1, 30.0)
+    raise_peak(statistics.peak, impact, impacts, 1, 20.0)
     assert np.isnan(impact[1, 0, 2])
     end_impact(impact, impacts, 1, 0.2)
-    raise_peak(tally.peak, impact, impacts, 1, 99.0)  # no contact any more: the impact keeps its peak
+    raise_peak(statistics.peak, impact, impacts, 1, 99.0)  # no contact any more: the impact keeps its peak
     end_impact(impact, impacts, 1, 0.3)
     np.testing.assert_array_equal(impact[1, 0], [0.1, 0.5, 0.2, 30.0])
     assert list(impacts) == [0, 1]
 
 
 def test_impacts_beyond_the_room_are_counted():
-    tally = new_tally(1)
-    room = tally.impact.shape[1]
+    statistics = new_run_statistics(1)
+    room = statistics.impact.shape[1]
     for i in range(room + 5):
-        begin_impact(tally.impact, tally.impacts, 0, float(i), 1.0)
-        end_impact(tally.impact, tally.impacts, 0, i + 0.5)
-    assert tally.impacts[0] == room + 5
-    assert tally.impact[0, -1, 0] == room - 1.0
+        begin_impact(statistics.impact, statistics.impacts, 0, float(i), 1.0)
+        end_impact(statistics.impact, statistics.impacts, 0, i + 0.5)
+    assert statistics.impacts[0] == room + 5
+    assert statistics.impact[0, -1, 0] == room - 1.0

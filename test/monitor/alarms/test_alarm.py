@@ -7,7 +7,7 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from leg_wear_monitor.monitor.alarms.alarm import Alarm, Level, Limit, acknowledged, has_changed, judged
+from leg_wear_monitor.monitor.alarms.alarm import Alarm, Level, Limit, acknowledged, evaluated, has_changed
 
 pytestmark = pytest.mark.plain
 
@@ -19,7 +19,7 @@ ALARM = Alarm(kind="clearance", subject="A", unit="m")
 def course(values, limit=LIMIT, alarm=ALARM):
     """The alarm after each value, a second apart."""
     for second, value in enumerate(values):
-        alarm = judged(alarm, value, limit, second * 10**9)
+        alarm = evaluated(alarm, value, limit, second * 10**9)
         yield alarm
 
 
@@ -57,8 +57,8 @@ def test_levels_rise_after_the_on_delay_and_not_before(values, levels):
 
 def test_a_value_may_stand_for_several_cycles():
     limit = attrs.evolve(LIMIT, on_delay=3)
-    assert judged(ALARM, 9.0, limit, 0, cycles=2).present is OK
-    assert judged(ALARM, 9.0, limit, 0, cycles=3).present is WARN
+    assert evaluated(ALARM, 9.0, limit, 0, cycles=2).present is OK
+    assert evaluated(ALARM, 9.0, limit, 0, cycles=3).present is WARN
 
 
 def test_a_least_value_has_its_bad_side_below():
@@ -106,7 +106,7 @@ limits = st.builds(
 
 
 def what_is_done(alarm, step, limit):
-    return acknowledged(alarm) if step is None else judged(alarm, step, limit, 1)
+    return acknowledged(alarm) if step is None else evaluated(alarm, step, limit, 1)
 
 
 @given(st.lists(numbers), limits)
@@ -153,7 +153,7 @@ def test_no_value_changes_nothing(steps, limit):
     alarm = ALARM
     for step in steps:
         alarm = what_is_done(alarm, step, limit)
-        assert judged(alarm, math.nan, limit, 99) is alarm
+        assert evaluated(alarm, math.nan, limit, 99) is alarm
 
 
 @given(st.lists(st.floats(-20.0, 20.0)), limits)

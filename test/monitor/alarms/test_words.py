@@ -5,7 +5,7 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from leg_wear_monitor.monitor.alarms.alarm import Alarm, Level, Limit, acknowledged, judged
+from leg_wear_monitor.monitor.alarms.alarm import Alarm, Level, Limit, acknowledged, evaluated
 from leg_wear_monitor.monitor.alarms.words import raised_words, state_of
 
 pytestmark = pytest.mark.plain
@@ -17,7 +17,7 @@ LEAST = Limit(warn=10.0, error=8.0, deadband=0.1, is_least=True)
 def after(values: list[float], limit: Limit = LIMIT) -> Alarm:
     alarm = Alarm(kind="input_gaps")
     for second, value in enumerate(values, 1):
-        alarm = judged(alarm, value, limit, second * 10**9)
+        alarm = evaluated(alarm, value, limit, second * 10**9)
     return alarm
 
 

@@ -30,7 +30,7 @@ WRONG = [
     ("clearances_m", [3.0e-4, 5.0], ["5.0", "at most 0.1 m"]),
     ("clearances_m", [3.0e-4, 1], ["whole number", "expected 1.0 [m]"]),
     ("clearances_m", 3.0e-4, ["0.0003", "not a list of numbers [m]"]),
-    ("loose_joints", ["A", 3], ["3", "not a text"]),
+    ("clearance_joints", ["A", 3], ["3", "not a text"]),
     ("cadence.commanded_rpm", 0.0, ["0.0 rpm", "does not turn the crank"]),
     ("crank.sign", 2, ["2", "not one of 1, -1"]),
     ("crank.sign", 1.0, ["1.0", "not a whole number"]),
@@ -70,8 +70,16 @@ FILES = [
     ("/gait_publisher: {ros__parameters: {}}", ["nothing for the node /leg_wear_monitor", "/gait_publisher"]),
     ("/**: {ros__parameters: {7: 1}}", ["the key 7", "not a text"]),
     ("/**: {ros__parameters: {limits: {9: 1}}}", ["limits", "the key 9", "not a text"]),
-    ("/**: {ros__parameters: {limits: {warn_share: 0.7}, limits.warn_share: 0.6}}", ["warn_share", "twice"]),
-    ("/**: {ros__parameters: {limits: {warn: 0.7}}}", ["limits.warn", "unknown parameter", "warn_share"]),
+    (
+        "/**: {ros__parameters: {limits: {warn_fraction: 0.7}, limits.warn_fraction: 0.6}}",
+        ["warn_fraction", "twice"],
+    ),
+    (
+        "/**: {ros__parameters: {limits: {warn_share: 0.7}}}",
+        ["limits.warn_share", "limits.warn_fraction now"],
+    ),
+    ("/**: {ros__parameters: {loose_joints: [A]}}", ["loose_joints", "is called clearance_joints now"]),
+    ("/**: {ros__parameters: {limits: {warn: 0.7}}}", ["limits.warn", "unknown parameter", "warn_fraction"]),
 ]
 
 
@@ -153,8 +161,8 @@ def test_only_some_parameters_may_change_while_it_runs():
 
 
 UNFIT = [
-    ({"loose_joints": ["A", "Q"]}, ["loose_joints", "'Q'", "A, B, C"]),
-    ({"loose_joints": ["A", "A"]}, ["loose_joints", "twice"]),
+    ({"clearance_joints": ["A", "Q"]}, ["clearance_joints", "'Q'", "A, B, C"]),
+    ({"clearance_joints": ["A", "A"]}, ["clearance_joints", "twice"]),
     ({"clearances_m": [3.0e-4, 3.0e-4]}, ["clearances_m", "2 values", "one each for A, B, G, I, J"]),
     ({"clearances_m": [0.02]}, ["clearances_m", "joint A", "0.02", "bushing_radius"]),
     ({"limits.joint_clearance_m": [6.0e-4]}, ["limits.joint_clearance_m", "1 values", "one each"]),
@@ -177,16 +185,16 @@ def test_a_leg_driven_by_a_torque_is_refused():
 
 def test_parameters_make_the_leg_what_they_say(leg):
     same = fitted(leg, MonitorConfig())
-    assert (same.loose, same.clearances) == (leg.loose, leg.clearances)
+    assert (same.clearance_joints, same.clearances) == (leg.clearance_joints, leg.clearances)
     assert same.drive.speed == pytest.approx(leg.drive.speed, rel=1e-15)
     values = {
-        "loose_joints": ["G", "A"],
+        "clearance_joints": ["G", "A"],
         "clearances_m": [1.0e-4, 2.0e-4],
         "wear_coefficients_per_pa": [4.0e-15],
         "cadence.commanded_rpm": -30.0,
     }
     other = fitted(leg, config_from(values))
-    assert other.loose == ("G", "A")
+    assert other.clearance_joints == ("G", "A")
     assert other.clearances["A"].radial_clearance == 2.0e-4
     assert other.clearances["G"].wear_coefficient == (4.0e-15, 4.0e-15)
     assert other.clearances["B"] == leg.clearances["B"]

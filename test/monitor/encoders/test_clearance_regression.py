@@ -5,13 +5,13 @@ import pytest
 
 from leg_wear_monitor import ConfigError
 from leg_wear_monitor.dynamics.full.run import FullRun
-from leg_wear_monitor.dynamics.run.run_statistics import new_tally
+from leg_wear_monitor.dynamics.run.run_statistics import new_run_statistics
 from leg_wear_monitor.dynamics.simulation import prepare
 from leg_wear_monitor.mechanism.arrays import body_names
 from leg_wear_monitor.mechanism.ideal import TURN
 from leg_wear_monitor.monitor.config.inputs import Encoders
-from leg_wear_monitor.monitor.encoders.clearance_estimate import Sight, seen_clearances
-from leg_wear_monitor.monitor.encoders.clearance_regression import HiddenClearance
+from leg_wear_monitor.monitor.encoders.clearance_estimate import ClearanceObservation, clearance_estimates
+from leg_wear_monitor.monitor.encoders.clearance_regression import ClearanceRegression
 from leg_wear_monitor.monitor.encoders.commissioning import commissioned, errors_of, known_with
 from leg_wear_monitor.twin.reference.joint_angles import PHASES, angle_model, design
 from leg_wear_monitor.twin.reference.reference import Reference, ReferenceRun, worn_to
@@ -64,19 +64,19 @@ def read(model, shape, clearance, errors=ERRORS, noise=0.0, seed=0, scatter=0.05
 
 def watched(model, shape, reference, before, clearance, cycles=40, **more):
     """Encoders watched over cycles."""
-    hidden = HiddenClearance(model, reference, before)
+    hidden = ClearanceRegression(model, reference, before)
     for seed in range(cycles):
         hidden.add(*read(model, shape, clearance, seed=seed, **more))
     return hidden
 
 
-def sights(found):
-    return [one.sight for one in seen_clearances(found, FRESH)]
+def observations(found):
+    return [one.observation for one in clearance_estimates(found, FRESH)]
 
 
 def others(found):
     """Joints that are told to be other than new."""
-    return [k for k, one in enumerate(seen_clearances(found, FRESH)) if one.is_other]
+    return [k for k, one in enumerate(clearance_estimates(found, FRESH)) if one.is_other]
 
 
 WORN = [3e-4, 3.3e-4, 4.5e-4, 3e-4, 3.1e-4]
@@ -93,7 +93,7 @@ def test_clearances_and_the_encoders_errors_are_found_at_once(model, shape, refe
 
 @pytest.mark.plain
 def test_outliers_do_no_harm(model, shape, reference):
-    hidden = HiddenClearance(model, reference, known_with(UNKNOWN, FRESH, 3e-4))
+    hidden = ClearanceRegression(model, reference, known_with(UNKNOWN, FRESH, 3e-4))
     for seed in range(30):
         crank, angles = read(model, shape, WORN, seed=seed, noise=1e-4)
         angles[seed::20] += 0.5
@@ -121,14 +121,17 @@ def test_the_hip_alone_says_nothing_of_the_ankle(model, shape, reference):
     """What was known before stays, mean and deviation."""
 
     def by_hip(sigma_m):
-        hidden = HiddenClearance(model, reference, known_with(UNKNOWN, FRESH, sigma_m))
+        hidden = ClearanceRegression(model, reference, known_with(UNKNOWN, FRESH, sigma_m))
         for seed in range(30):
             crank, angles = read(model, shape, WORN, seed=seed)
             angles[:, 1:] = np.nan
             hidden.add(crank, angles)
         return hidden.fused()
 
-    assert sights(by_hip(1e-3)) == [Sight.SEEN] * 3 + [Sight.NOT_OBSERVABLE] * 2
+    assert (
+        observations(by_hip(1e-3))
+        == [ClearanceObservation.SEEN] * 3 + [ClearanceObservation.NOT_OBSERVABLE] * 2
+    )
     found = by_hip(2e-5)
     np.testing.assert_allclose(found.clearance_m[3:], FRESH[3:], atol=1e-9)
     np.testing.assert_allclose(found.sigma_m[3:], 2e-5, rtol=1e-3)
@@ -137,12 +140,12 @@ def test_the_hip_alone_says_nothing_of_the_ankle(model, shape, reference):
 @pytest.mark.plain
 def test_all_three_sensors_show_all_joints(model, shape, reference):
     found = watched(model, shape, reference, known_with(UNKNOWN, FRESH, 1e-3), WORN).fused()
-    assert sights(found) == [Sight.SEEN] * 5
+    assert observations(found) == [ClearanceObservation.SEEN] * 5
 
 
 @pytest.mark.plain
 def test_a_sensor_that_is_added_later_is_commissioned_by_what_is_known_then(model, shape, reference):
-    hidden = HiddenClearance(model, reference, known_with(UNKNOWN, FRESH, 2e-4))
+    hidden = ClearanceRegression(model, reference, known_with(UNKNOWN, FRESH, 2e-4))
     for seed in range(30):
         crank, angles = read(model, shape, WORN, seed=seed)
         angles[:, 2] = np.nan  # no ankle yet
@@ -176,21 +179,21 @@ def test_fusion_weighs_by_covariance(model, shape, reference):
 def test_a_leg_in_full_coordinates_shows_its_worn_knee(leg, model, simulated):
     """Its angles come from its own equations of motion, not from the model that looks at them."""
     setup, names = prepare(leg), body_names(leg)
-    setup.contacts.clearance[setup.loose.index("G")] = 4.5e-4
-    run, tally = FullRun(setup, tolerance_m=1e-9), new_tally(len(leg.joints))
-    run.advance(1.0, tally)
-    hidden = HiddenClearance(model, simulated, known_with(UNKNOWN, FRESH, 1e-3))
+    setup.contacts.clearance[setup.clearance_joints.index("G")] = 4.5e-4
+    run, statistics = FullRun(setup, tolerance_m=1e-9), new_run_statistics(len(leg.joints))
+    run.advance(1.0, statistics)
+    hidden = ClearanceRegression(model, simulated, known_with(UNKNOWN, FRESH, 1e-3))
     random, pairs = np.random.default_rng(1), [[names.index(b) for b in leg.sides(j)] for j in SENSORS]
     for cycle in range(20):
         turned = []
         for sample in range(200):
-            run.advance(1.0 + cycle + (sample + 1) / 200.0, tally)
+            run.advance(1.0 + cycle + (sample + 1) / 200.0, statistics)
             turned.append(run.q[:, 2].copy())
         angle = np.array(turned)
         seen = np.stack([angle[:, j] - angle[:, b] for b, j in pairs], axis=1)
         hidden.add(angle[:, 1], seen + 1e-4 * random.standard_normal(seen.shape))
     found = hidden.fused()
-    assert others(found) == [setup.loose.index("G")]
+    assert others(found) == [setup.clearance_joints.index("G")]
     np.testing.assert_allclose(found.clearance_m, [3e-4, 3e-4, 4.5e-4, 3e-4, 3e-4], atol=5e-5)
 
 
@@ -199,15 +202,15 @@ def test_an_encoder_that_is_absent_is_as_one_that_was_never_there(leg, model, si
     hip, own = angle_model(leg, ("B",)), [*range(7), 9]
     reference = Reference(FRESH, simulated.deviation[:, :1], simulated.columns[:, :1, own], simulated.cycles)
     errors = errors_of(Encoders(names=("hip",), joints=("B",)), None)
-    alone = HiddenClearance(hip, reference, known_with(errors, FRESH, 1e-3))
-    absent = HiddenClearance(model, simulated, known_with(UNKNOWN, FRESH, 1e-3))
+    alone = ClearanceRegression(hip, reference, known_with(errors, FRESH, 1e-3))
+    absent = ClearanceRegression(model, simulated, known_with(UNKNOWN, FRESH, 1e-3))
     for seed in range(30):
         crank, angles = read(model, shape, WORN, seed=seed, noise=1e-4)
         alone.add(crank, angles[:, :1])
         angles[:, 1:] = np.nan
         absent.add(crank, angles)
     found, expected = absent.fused(), alone.fused()
-    assert sights(found)[3:] == sights(expected)[3:] == [Sight.NOT_OBSERVABLE] * 2
+    assert observations(found)[3:] == observations(expected)[3:] == [ClearanceObservation.NOT_OBSERVABLE] * 2
     np.testing.assert_allclose(found.mean[own], expected.mean, rtol=1e-3, atol=1e-7)
     np.testing.assert_allclose(found.sigma_m, expected.sigma_m, rtol=1e-2)
 

@@ -13,7 +13,7 @@ from leg_wear_monitor import ConfigError, WearMonitor, open_ledger
 from leg_wear_monitor.mechanism.ideal import TURN
 from leg_wear_monitor.monitor.alarms.alarm import Level
 from leg_wear_monitor.monitor.config.parameters import config_from
-from leg_wear_monitor.monitor.encoders.clearance_estimate import Sight
+from leg_wear_monitor.monitor.encoders.clearance_estimate import ClearanceObservation
 from leg_wear_monitor.monitor.encoders.commissioning import errors_of
 from leg_wear_monitor.monitor.ledger.ledger import LedgerError
 from leg_wear_monitor.monitor.ledger.rows import read_commissioned
@@ -86,7 +86,9 @@ def commissioned(new_watch, read):
     """A snapshot of a monitor whose encoders are commissioned."""
     monitor = new_watch()
     reports = monitor.update(read(24.0, shift=(0.0, 2.9, -1.0)))
-    assert {joint.seen.sight for joint in reports.cycles[15].joints} == {Sight.COMMISSIONING}
+    assert {joint.seen.observation for joint in reports.cycles[15].joints} == {
+        ClearanceObservation.COMMISSIONING
+    }
     return monitor.snapshot()
 
 
@@ -107,7 +109,7 @@ def test_encoders_are_commissioned_and_show_what_is_there(new_watch, commissione
     assert values["knee_offset_rad"] == pytest.approx(2.88, abs=2e-3)
     reports = monitor.update(read(10.0, 24.0, shift=(0.0, 2.9, -1.0)))
     for one in seen(reports).values():
-        assert one.sight is Sight.SEEN
+        assert one.observation is ClearanceObservation.SEEN
         assert one.clearance_m == pytest.approx(3.0e-4, abs=8e-6)
         assert one.believed
         assert not one.is_other
@@ -238,14 +240,16 @@ def begin(leg, tmp_path):
 def test_a_sensor_added_later_is_commissioned_then_and_all_is_held(begin, read, tmp_path):
     first = begin({"encoders.names": ["hip"], "encoders.joints": ["B"]})
     reports = first.update(read(24.0))
-    assert [one.sight for one in seen(reports).values()][3:] == [Sight.NOT_OBSERVABLE] * 2
+    assert [one.observation for one in seen(reports).values()][3:] == [
+        ClearanceObservation.NOT_OBSERVABLE
+    ] * 2
     offset = status(first).values["hip_offset_rad"]
     first.close()
     second = begin({})
     assert status(second).values["hip_offset_rad"] == offset
     assert "knee_offset_rad" not in status(second).values
     reports = second.update(read(25.0, 24.0))
-    assert {one.sight for one in seen(reports).values()} == {Sight.SEEN}
+    assert {one.observation for one in seen(reports).values()} == {ClearanceObservation.SEEN}
     assert status(second).values["ankle_offset_rad"] == pytest.approx(ERRORS[3], abs=2e-3)
     second.close()
     assert errors_of(config_from(WATCHED).encoders, kept(tmp_path)).known == (True, True, True)

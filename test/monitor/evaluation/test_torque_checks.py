@@ -44,7 +44,7 @@ def levels(said, record=NEW):
     """Levels of the torque's alarms after as many gait cycles as they need."""
     board = AlarmBoard(CONFIG, ("A",), SIZE_NM)
     for second in range(CONFIG.alarms.on_delay_cycles):
-        board.judge(torque_values(said, record, BOUNDS), second)
+        board.evaluate(torque_values(said, record, BOUNDS), second)
     return {name: board.alarms[name].level for name in (BIAS, DRIFT, LAG) if board.alarms[name].level}
 
 

@@ -10,7 +10,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from leg_wear_monitor.monitor.config.forecast import Forecasting
-from leg_wear_monitor.monitor.forecast.forecast import Answer, JointNow, forecast
+from leg_wear_monitor.monitor.forecast.forecast import Answer, JointCondition, forecast
 from leg_wear_monitor.monitor.forecast.growth_law import GrowthLaw, no_law
 from leg_wear_monitor.monitor.forecast.wear_coefficients import Look, believe
 
@@ -18,7 +18,7 @@ pytestmark = pytest.mark.plain
 
 SETTINGS = Forecasting(model_sigma=0.05)
 SURE = Forecasting(load_sigma=0.0, model_sigma=0.0, clearance_sigma_m=1e-9, duty_sigma=0.0)
-NOW = JointNow(joint="A", fresh_m=3e-4, wear_m=0.0, limit_m=6e-4, growth_m=1.5e-11, growth_error_m=0.0)
+NOW = JointCondition(joint="A", fresh_m=3e-4, wear_m=0.0, limit_m=6e-4, growth_m=1.5e-11, growth_error_m=0.0)
 B = attrs.evolve(NOW, joint="B", growth_m=5e-12)
 Z = statistics.NormalDist().inv_cdf(0.9)
 
@@ -27,9 +27,9 @@ def whole(joints, settings=SETTINGS, looks=(), law=None, valid=True):
     """Forecast of joints; ``looks`` (joint's number, Look)."""
     fresh = np.array([each.fresh_m for each in joints])
     own = [[look for at, look in looks if at == k] for k in range(len(joints))]
-    beliefs = [believe(settings, each.fresh_m, o) for each, o in zip(joints, own, strict=True)]
+    coefficient_estimates = [believe(settings, each.fresh_m, o) for each, o in zip(joints, own, strict=True)]
     law = law or no_law(fresh, settings.model_sigma)
-    return forecast(joints, beliefs, settings, law, cycle_s=1.0, valid=valid)
+    return forecast(joints, coefficient_estimates, settings, law, cycle_s=1.0, valid=valid)
 
 
 def alone(now=NOW, settings=SETTINGS, looks=(), **more):

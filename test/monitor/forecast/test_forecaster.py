@@ -9,7 +9,7 @@ from leg_wear_monitor.monitor.config.forecast import Forecasting
 from leg_wear_monitor.monitor.forecast.forecast import Answer
 from leg_wear_monitor.monitor.forecast.forecaster import Forecaster
 from leg_wear_monitor.monitor.forecast.wear_coefficients import Look
-from leg_wear_monitor.twin.statistics import CycleFigures
+from leg_wear_monitor.twin.statistics import CycleStatistics
 
 SECOND = 10**9
 LIMITS = [6e-4] * 5
@@ -17,9 +17,11 @@ LIMITS = [6e-4] * 5
 
 def cycle(second, growth=2e-11):
     """A gait cycle's figures that end at a second, as far as the forecast looks at them."""
-    zeros = {field.name: 0 for field in attrs.fields(CycleFigures)}
+    zeros = {field.name: 0 for field in attrs.fields(CycleStatistics)}
     wobble = growth * (1.0 + 0.1 * np.sin(1.7 * second + np.arange(5.0)))
-    return CycleFigures(**(zeros | {"stamp_ns": second * SECOND, "moving_s": 1.0, "growth_mean_m": wobble}))
+    return CycleStatistics(
+        **(zeros | {"stamp_ns": second * SECOND, "moving_s": 1.0, "growth_mean_m": wobble})
+    )
 
 
 def walked(forecaster, seconds, worn=0.0, valid=True):
@@ -100,5 +102,5 @@ def test_the_monitor_forecasts_and_learns(leg, new_monitor, gait):
     monitor.restore(snapshot)
     again = monitor.update(gait(3.0, begin_s=14.0)).cycles[-1].joints[0].forecast
     assert again == first
-    with pytest.raises(LegWearError, match="Z: no loose joint"):
+    with pytest.raises(LegWearError, match="Z: no clearance joint"):
         monitor.measure("Z", 3e-4, 1e-6, 0, "ann")

@@ -41,7 +41,7 @@ def test_another_leg_has_none_and_growth_stays_as_it_is(leg):
 
 @pytest.mark.plain
 def test_a_file_of_another_leg_is_refused(leg):
-    fewer = attrs.evolve(leg, loose=("A", "B"))
+    fewer = attrs.evolve(leg, clearance_joints=("A", "B"))
     with pytest.raises(ConfigError, match="is of another leg than this one") as refused:
         law_of(fewer, str(SHIPPED), 0.5)
     assert fingerprint(fewer) in str(refused.value)
@@ -49,7 +49,7 @@ def test_a_file_of_another_leg_is_refused(leg):
 
 @pytest.mark.plain
 def test_joints_in_another_order_have_the_same_law(leg):
-    turned = attrs.evolve(leg, loose=leg.loose[::-1])
+    turned = attrs.evolve(leg, clearance_joints=leg.clearance_joints[::-1])
     np.testing.assert_allclose(
         law_of(turned, str(SHIPPED), 0.5).coupling, law_of(leg, "", 0.5).coupling[::-1, ::-1]
     )

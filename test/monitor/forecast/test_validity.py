@@ -13,9 +13,9 @@ def measured(below):
     return [
         Measurement(
             stamp_ns=i, joint="A", who="ann", clearance_m=3e-4, sigma_m=1e-6, wear_m=0.0, cycles=i,
-            replaced_ns=0, expected_below=float(share), counts=True,
+            replaced_ns=0, expected_below=float(fraction), counts=True,
         )
-        for i, share in enumerate(below)
+        for i, fraction in enumerate(below)
     ]  # fmt: skip
 
 

@@ -34,20 +34,20 @@ def found(wear, mm, earlier=(), **more):
 
 
 def test_without_a_measurement_the_belief_is_the_lognormal_prior():
-    belief = believe(PRIOR, FRESH)
-    assert belief.mean == pytest.approx(0.0, abs=1e-12)
-    assert belief.sigma == pytest.approx(PRIOR.wear_coefficient_sigma, rel=1e-3)
+    coefficient_estimate = believe(PRIOR, FRESH)
+    assert coefficient_estimate.mean == pytest.approx(0.0, abs=1e-12)
+    assert coefficient_estimate.sigma == pytest.approx(PRIOR.wear_coefficient_sigma, rel=1e-3)
     z = statistics.NormalDist().inv_cdf(0.9)
-    assert belief.log_factors(0.9) == pytest.approx(PRIOR.wear_coefficient_sigma * z, rel=1e-3)
+    assert coefficient_estimate.log_factors(0.9) == pytest.approx(PRIOR.wear_coefficient_sigma * z, rel=1e-3)
 
 
 @given(st.floats(0.3, 3.0))
 def test_an_accurate_measurement_of_much_wear_tells_the_factor(factor):
     exact = attrs.evolve(PRIOR, clearance_sigma_m=1e-7)
     wear = 1e-4
-    belief = believe(exact, FRESH, [Look(FRESH + factor * wear, 5e-6, wear)])
-    assert math.exp(belief.mean) == pytest.approx(factor, rel=0.02 / factor + 0.01)
-    assert belief.sigma == pytest.approx(5e-6 / (factor * wear), rel=0.2)
+    coefficient_estimate = believe(exact, FRESH, [Look(FRESH + factor * wear, 5e-6, wear)])
+    assert math.exp(coefficient_estimate.mean) == pytest.approx(factor, rel=0.02 / factor + 0.01)
+    assert coefficient_estimate.sigma == pytest.approx(5e-6 / (factor * wear), rel=0.2)
 
 
 @given(st.floats(-3.0, 3.0), st.floats(-7.0, -4.0))
@@ -55,12 +55,12 @@ def test_exact_measurements_are_believed_however_far_they_are_from_the_prior(pow
     """Two measurements of one part: their difference is the factor times the wear between them."""
     factor, sigma = 10.0**power, 10.0**sigma_power * 10.0**power * 1e-3
     looks = [Look(FRESH, sigma, 0.0), Look(FRESH + factor * 1e-4, sigma, 1e-4)]
-    belief = believe(attrs.evolve(PRIOR, clearance_sigma_m=1e-3), FRESH, looks)
+    coefficient_estimate = believe(attrs.evolve(PRIOR, clearance_sigma_m=1e-3), FRESH, looks)
     spread = sigma * math.sqrt(2.0) / (factor * 1e-4)
-    p10, p50, p90 = np.exp(belief.log_factors((0.1, 0.5, 0.9)))
+    p10, p50, p90 = np.exp(coefficient_estimate.log_factors((0.1, 0.5, 0.9)))
     # the prior's pull is its slope times the variance of what was measured
     assert math.log(p50 / factor) == pytest.approx(0.0, abs=spread + 40.0 * spread**2)
-    assert belief.sigma == pytest.approx(spread, rel=0.05)
+    assert coefficient_estimate.sigma == pytest.approx(spread, rel=0.05)
     z = statistics.NormalDist().inv_cdf(0.9)
     assert math.log(p90 / p50) == pytest.approx(z * spread, rel=0.1)
     assert math.log(p50 / p10) == pytest.approx(z * spread, rel=0.1)
@@ -83,14 +83,16 @@ def test_an_accepted_measurement_moves_the_belief_as_far_as_it_says(factor):
 def test_the_belief_is_prior_times_likelihood(mean, own, sigma):
     """Against a plain sum over a grid that is wide and fine, for a measurement that is not exact."""
     prior = attrs.evolve(PRIOR, wear_coefficient_sigma=sigma, clearance_sigma_m=1e-9)
-    belief = believe(prior, FRESH, [Look(FRESH + mean * 1e-5, own * 1e-5, 1e-5)])
+    coefficient_estimate = believe(prior, FRESH, [Look(FRESH + mean * 1e-5, own * 1e-5, 1e-5)])
     u = np.linspace(-12.0 * sigma - 5.0, 12.0 * sigma + 5.0, 200_001)
     log_weight = -0.5 * (u / sigma) ** 2 - 0.5 * ((np.exp(u) - mean) / own) ** 2
     weight = np.exp(log_weight - log_weight.max())
     weight /= weight.sum()
-    assert belief.mean == pytest.approx(weight @ u, abs=0.01 * belief.sigma + 2e-4)
-    assert belief.sigma == pytest.approx(np.sqrt(weight @ (u - weight @ u) ** 2), rel=0.02)
-    assert belief.weight[[0, -1]].max() < 1e-6
+    assert coefficient_estimate.mean == pytest.approx(
+        weight @ u, abs=0.01 * coefficient_estimate.sigma + 2e-4
+    )
+    assert coefficient_estimate.sigma == pytest.approx(np.sqrt(weight @ (u - weight @ u) ** 2), rel=0.02)
+    assert coefficient_estimate.weight[[0, -1]].max() < 1e-6
 
 
 @given(st.permutations(range(4)))
@@ -101,11 +103,11 @@ def test_the_order_of_measurements_does_not_matter(order):
 
 
 def test_a_new_part_s_measurement_tells_its_clearance_and_nothing_of_the_coefficient():
-    belief = believe(PRIOR, FRESH, [Look(3.05e-4, 5e-6, 0.0)])
-    assert belief.sigma == pytest.approx(PRIOR.wear_coefficient_sigma, rel=1e-3)
+    coefficient_estimate = believe(PRIOR, FRESH, [Look(3.05e-4, 5e-6, 0.0)])
+    assert coefficient_estimate.sigma == pytest.approx(PRIOR.wear_coefficient_sigma, rel=1e-3)
     # equal sigmas: half of what was found, and 1 / sqrt 2 of the spread
-    np.testing.assert_allclose(belief.excess_m, 2.5e-6)
-    assert belief.excess_sigma_m == pytest.approx(5e-6 / math.sqrt(2.0))
+    np.testing.assert_allclose(coefficient_estimate.excess_m, 2.5e-6)
+    assert coefficient_estimate.excess_sigma_m == pytest.approx(5e-6 / math.sqrt(2.0))
 
 
 def test_a_later_measurement_knows_the_clearance_when_new():
@@ -117,11 +119,11 @@ def test_a_later_measurement_knows_the_clearance_when_new():
 def test_measurements_that_repeat_the_same_model_are_expected_evenly():
     """Probability integral transform: figures drawn from the belief fall evenly into it."""
     random, wear = np.random.default_rng(3), 6e-5
-    belief = believe(PRIOR, FRESH)
+    coefficient_estimate = believe(PRIOR, FRESH)
     drawn = FRESH + PRIOR.clearance_sigma_m * random.standard_normal(400)
     drawn += wear * np.exp(PRIOR.wear_coefficient_sigma * random.standard_normal(400))
     drawn += 5e-6 * random.standard_normal(400)
-    below = [belief.probability_below(FRESH, Look(c, 5e-6, wear)) for c in drawn]
+    below = [coefficient_estimate.probability_below(FRESH, Look(c, 5e-6, wear)) for c in drawn]
     assert 0.75 <= np.mean((np.array(below) > 0.1) & (np.array(below) < 0.9)) <= 0.85
     assert np.mean(below) == pytest.approx(0.5, abs=0.05)
 

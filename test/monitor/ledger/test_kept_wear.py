@@ -23,7 +23,7 @@ def begin(leg, tmp_path):
 
     def begin(values=None):
         config = config_from(
-            {"ledger.path": str(tmp_path / "wear.ledger"), "loose_joints": ["A", "G"]} | (values or {})
+            {"ledger.path": str(tmp_path / "wear.ledger"), "clearance_joints": ["A", "G"]} | (values or {})
         )
         ledger = open_ledger(leg, config)
         monitor = WearMonitor(leg, config, ledger)
@@ -47,9 +47,9 @@ def rows(tmp_path, query):
 def test_wear_goes_on_where_it_ended(begin, gait, tmp_path):
     first, _ = begin()
     first.update(gait(4.5))
-    worn, cycles = first._twin.depth, first._book.totals["cycles"]
+    worn, cycles = first._twin.depth, first._accounting.totals["cycles"]
     first.close()
-    second, ledger = begin({"loose_joints": ["G", "A"]})  # in another order
+    second, ledger = begin({"clearance_joints": ["G", "A"]})  # in another order
     assert ledger.cut_off_s is None
     np.testing.assert_array_equal(second._twin.depth, worn[::-1])
     reports = second.update(gait(4.0, begin_s=10.0))
@@ -64,13 +64,13 @@ def test_wear_goes_on_where_it_ended(begin, gait, tmp_path):
 def test_time_that_is_counted_is_not_counted_again(begin, gait):
     first, _ = begin()
     first.update(gait(4.0))
-    totals, worn = first._book.totals, first._twin.depth
+    totals, worn = first._accounting.totals, first._twin.depth
     first.close()
     again, _ = begin()
     samples = gait(4.0)
     reports = again.update(samples)
     np.testing.assert_array_equal(again._twin.depth, worn)
-    assert again._book.totals["moving_s"] == totals["moving_s"]
+    assert again._accounting.totals["moving_s"] == totals["moving_s"]
     assert reports.lost.already_counted > 750  # but for the tracker's lag at the end
     (status,) = [status for status in again.status() if status.name == "input"]
     assert status.values["already_counted"] == reports.lost.already_counted
@@ -168,7 +168,7 @@ def test_a_replaced_part_has_its_history(begin, gait, tmp_path):
     assert life["A"][0] == life["G"][0] + cycles_before
     assert (life["A"][1], life["G"][1]) == (0, START_NS)
     again, _ = begin()
-    assert again._book.joint_wear(1, again._twin.depth).cycles == life["G"][0]
+    assert again._accounting.joint_wear(1, again._twin.depth).cycles == life["G"][0]
 
 
 def test_a_ledger_that_cannot_be_written_stops_nothing(begin, gait):

@@ -277,10 +277,10 @@ SAME = [
 ]
 OTHER = [
     {"clearances_m": [2.0e-4]},
-    {"loose_joints": ["A"]},
+    {"clearance_joints": ["A"]},
     {"hardware_id": "other"},
     {"wear_acceleration": 2.0},
-    {"mechanism": "jansen_leg", "loose_joints": ["A", "B"]},
+    {"mechanism": "jansen_leg", "clearance_joints": ["A", "B"]},
 ]
 
 

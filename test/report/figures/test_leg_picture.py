@@ -27,13 +27,15 @@ def test_every_joint_is_lettered_and_the_loose_ones_in_their_colour(name):
     still, moving, _key = leg_picture(mechanism).axes
     marked = letters(still)
     assert set(marked) - {"toe"} == set(mechanism.joints)
-    assert {joint for joint in mechanism.joints if marked[joint] == VERMILION} == set(mechanism.loose)
+    assert {joint for joint in mechanism.joints if marked[joint] == VERMILION} == set(
+        mechanism.clearance_joints
+    )
     for axes in (still, moving):
         assert axes.get_aspect() == 1.0
 
 
 def test_the_caller_says_which_joints_are_loose():
-    still = leg_picture(load_mechanism("bionic_leg"), loose=["C"]).axes[0]
+    still = leg_picture(load_mechanism("bionic_leg"), clearance_joints=["C"]).axes[0]
     assert [joint for joint, colour in letters(still).items() if colour == VERMILION] == ["C"]
 
 

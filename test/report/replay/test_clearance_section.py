@@ -2,8 +2,8 @@
 
 import pytest
 
-from leg_wear_monitor.monitor.encoders.clearance_estimate import Sight
-from leg_wear_monitor.report.replay.clearance_section import seen_sections, seen_sentences
+from leg_wear_monitor.monitor.encoders.clearance_estimate import ClearanceObservation
+from leg_wear_monitor.report.replay.clearance_section import clearance_sections, clearance_sentences
 
 pytestmark = pytest.mark.plain
 
@@ -12,32 +12,36 @@ def joint(**seen):
     return {"clearance_m": {"last": 3.0e-4}, **({"seen": seen} if seen else {})}
 
 
-def shown(sight, clearance_m=None, departure_m=None, is_other=False):
+def shown(observation, clearance_m=None, departure_m=None, is_other=False):
     return joint(
-        sight=sight.value, clearance_m=clearance_m, sigma_m=2e-5, departure_m=departure_m, is_other=is_other
+        observation=observation.value,
+        clearance_m=clearance_m,
+        sigma_m=2e-5,
+        departure_m=departure_m,
+        is_other=is_other,
     )
 
 
 def test_without_encoders_there_is_nothing_to_say():
     record = {"joints": {"A": joint()}}
-    assert seen_sections(record) == []
-    assert seen_sentences(record) == []
+    assert clearance_sections(record) == []
+    assert clearance_sentences(record) == []
 
 
 def test_a_worn_joint_is_named_and_what_is_not_seen_is_said():
     joints = {
-        "G": shown(Sight.SEEN, 4.5e-4, 1.5e-4, True),
-        "A": shown(Sight.SEEN, 3.01e-4, 1e-6),
-        "J": shown(Sight.NOT_OBSERVABLE),
+        "G": shown(ClearanceObservation.SEEN, 4.5e-4, 1.5e-4, True),
+        "A": shown(ClearanceObservation.SEEN, 3.01e-4, 1e-6),
+        "J": shown(ClearanceObservation.NOT_OBSERVABLE),
     }
     record = {"joints": joints}
-    assert seen_sentences(record) == ["Encoders show that G is 150 µm wider than counted."]
-    (section,) = seen_sections(record)
+    assert clearance_sentences(record) == ["Encoders show that G is 150 µm wider than counted."]
+    (section,) = clearance_sections(record)
     (table,) = section.parts
     assert [row[0] for row in table.rows] == ["G", "A", "J"]
     assert [row[2] for row in table.rows] == ["0.4500", "0.3010", "-"]
     assert [row[4] for row in table.rows] == [
         "other than counted",
         "seen by encoders",
-        Sight.NOT_OBSERVABLE.value,
+        ClearanceObservation.NOT_OBSERVABLE.value,
     ]

@@ -6,7 +6,7 @@ import pytest
 
 from leg_wear_monitor import Mechanism
 from leg_wear_monitor.dynamics.clearance.run import ClearanceRun
-from leg_wear_monitor.dynamics.run.run_statistics import new_tally
+from leg_wear_monitor.dynamics.run.run_statistics import new_run_statistics
 from leg_wear_monitor.dynamics.simulation import prepare
 from leg_wear_monitor.mechanism.ideal import TURN
 from leg_wear_monitor.twin.digital_twin import DigitalTwin
@@ -20,16 +20,16 @@ WARN, ERROR = 0.08, 0.1  # of the alarm, by default
 
 def sampled_at_instants(leg: Mechanism) -> Samples:
     """Crank samples with the torque at their instants, which scatter by a quarter of a millisecond."""
-    run, tally, chance = (
+    run, statistics, chance = (
         ClearanceRun(prepare(leg), 11 * RATE),
-        new_tally(10),
+        new_run_statistics(10),
         np.random.default_rng(3),
     )
     n = SECONDS * RATE
     t = np.arange(1, n + 1) / RATE + 2.5e-4 * chance.uniform(-1.0, 1.0, n)
     torque = np.zeros(n)
     for i in range(n):
-        run.advance(t[i], tally)
+        run.advance(t[i], statistics)
         torque[i] = run.sample_at(t[i]).drive_torque
     stamps = START_NS + np.round(1.0e9 * t).astype(np.int64)
     angle = TURN * t + 1.0e-3 * chance.standard_normal(n)

@@ -9,7 +9,7 @@ from hypothesis import strategies as st
 from leg_wear_monitor import Mechanism
 from leg_wear_monitor.dynamics.clearance.run import ClearanceRun
 from leg_wear_monitor.dynamics.clearance.tables import build_tables
-from leg_wear_monitor.dynamics.run.run_statistics import FORCE, TORQUE, new_tally
+from leg_wear_monitor.dynamics.run.run_statistics import FORCE, TORQUE, new_run_statistics
 from leg_wear_monitor.dynamics.simulation import prepare
 from leg_wear_monitor.mechanism.ideal import TURN, one_cycle, point_motion
 from leg_wear_monitor.mechanism.position import build_linkage
@@ -35,17 +35,17 @@ def measured(
 ) -> tuple[Samples, np.ndarray]:
     """Samples of a leg at 60 rpm whose torque sensor gives means between samples; its mean contact forces."""
     setup = prepare(leg)
-    run, tally, chance = ClearanceRun(setup, 11 * RATE), new_tally(10), np.random.default_rng(1)
+    run, statistics, chance = ClearanceRun(setup, 11 * RATE), new_run_statistics(10), np.random.default_rng(1)
     impulse = np.zeros(seconds * RATE + 1)
     for i in range(1, len(impulse)):
-        run.advance(i / RATE, tally)
-        impulse[i] = tally.drive_integral[TORQUE]
+        run.advance(i / RATE, statistics)
+        impulse[i] = statistics.drive_integral[TORQUE]
     n = len(impulse) - 1
     t = np.arange(1, n + 1) / RATE
     torque = np.diff(impulse) * RATE + friction + noise * chance.standard_normal(n)
     angle = TURN * t + 1.0e-3 * chance.standard_normal(n)
     stamps = START_NS + np.arange(n) * (10**9 // RATE)
-    force = tally.integral[setup.contacts.joint, FORCE] / tally.time[0]
+    force = statistics.integral[setup.contacts.joint, FORCE] / statistics.time[0]
     return gait_samples(stamps, crank_angle_rad=angle % TURN, torque_nm=torque), force
 
 

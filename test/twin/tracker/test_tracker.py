@@ -92,11 +92,11 @@ def test_blocks_of_one_give_the_same(gait):
 
 
 @settings(max_examples=30)
-@given(seed=st.integers(0, 2**32 - 1), late_s=st.floats(0.0, 0.0199), share=st.floats(0.0, 1.0))
-def test_order_and_duplicates_within_the_window_change_nothing(gait, seed, late_s, share):
+@given(seed=st.integers(0, 2**32 - 1), late_s=st.floats(0.0, 0.0199), fraction=st.floats(0.0, 1.0))
+def test_order_and_duplicates_within_the_window_change_nothing(gait, seed, late_s, fraction):
     """Samples come up to 20 ms later than younger ones, some of them twice."""
     samples, chance = with_torque(gait(3.0)), np.random.default_rng(seed)
-    twice = np.concatenate([samples, samples[chance.random(len(samples)) < share]])
+    twice = np.concatenate([samples, samples[chance.random(len(samples)) < fraction]])
     arrival = twice["stamp_ns"] + 1.0e9 * late_s * chance.random(len(twice))
     shuffled = twice[np.argsort(arrival, kind="stable")]
     tracker = CrankTracker(TrackerSettings())

@@ -18,7 +18,7 @@ from leg_wear_monitor.ros.running import WAKE_S
 _MONITOR = "leg_wear_monitor"
 
 
-class Witness:
+class DemoListener:
     """Listens to a monitor in a namespace.
 
     Parameters

@@ -14,7 +14,7 @@ def both_clocks(one: Status, other: Status) -> Status:
     return Status(one.name, max(one.level, other.level), message, one.values | other.values)
 
 
-class ClockWatch:
+class ClockMonitor:
     """Watches the node's clock by one that only goes forward."""
 
     def __init__(self) -> None:

@@ -2,7 +2,6 @@
 
 import attrs
 
-from leg_wear_monitor.mechanism.arrays import Ints
 from leg_wear_monitor.monitor.accounting import AccountingState
 from leg_wear_monitor.monitor.alarms.alarm import Alarm
 from leg_wear_monitor.monitor.encoders.observer import EncoderSnapshot
@@ -10,8 +9,8 @@ from leg_wear_monitor.monitor.evaluation.evaluation import AlarmEvaluationState
 from leg_wear_monitor.monitor.evaluation.torque_record import TorqueRecord
 from leg_wear_monitor.monitor.forecast.forecaster import ForecastState
 from leg_wear_monitor.monitor.forecast.growth import GrowthWindow
-from leg_wear_monitor.monitor.inputs.guard import GuardSnapshot
 from leg_wear_monitor.monitor.reports import CycleReport
+from leg_wear_monitor.record import Record
 from leg_wear_monitor.twin.digital_twin import TwinSnapshot
 from leg_wear_monitor.twin.statistics import Event
 
@@ -36,6 +35,6 @@ class MonitorSnapshot:
     evaluate: AlarmEvaluationState
     forecast: ForecastState
     alarms: dict[str, Alarm]
-    evaluation_periods: Ints
-    guard: GuardSnapshot
+    evaluation_periods: Record
+    guard: Record
     encoders: EncoderSnapshot | None = None

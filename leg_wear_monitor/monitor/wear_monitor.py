@@ -37,6 +37,7 @@ from leg_wear_monitor.monitor.reports import (
 from leg_wear_monitor.monitor.resets import last_reset
 from leg_wear_monitor.monitor.state import MonitorSnapshot, MonitorState
 from leg_wear_monitor.monitor.status import statuses
+from leg_wear_monitor.record import copy_record
 from leg_wear_monitor.twin.digital_twin import DigitalTwin
 from leg_wear_monitor.twin.sample import GAIT_SAMPLE, Samples
 from leg_wear_monitor.twin.statistics import CycleStatistics, joined
@@ -122,11 +123,11 @@ class WearMonitor:
         looks: list[SampleReports] = []
         cycles: list[CycleReport] = []
         changes: list[AlarmList] = []
-        for piece, ends_beat in self._evaluation_periods.pieces(samples):
+        for piece, ends_period in self._evaluation_periods.pieces(samples):
             seen, ended = self._take(piece, changes)
             looks.append(seen)
             cycles += ended
-            if ends_beat:
+            if ends_period:
                 self._tell(self._evaluate.end_beat(self._accounting.state.skipped), changes)
                 self._observe_encoders()
             self._accounting.keep_if_due(self._evaluate.board.alarms.values())
@@ -404,7 +405,7 @@ class WearMonitor:
         self._evaluate.state = attrs.evolve(snapshot.evaluate)
         self._forecaster.state = attrs.evolve(snapshot.forecast)
         self._evaluate.board.alarms = snapshot.alarms
-        self._evaluation_periods.state[:] = snapshot.evaluation_periods
+        copy_record(snapshot.evaluation_periods, self._evaluation_periods.state)
         self._guard.restore(snapshot.guard)
         if self._encoders and snapshot.encoders:
             self._encoders.restore(snapshot.encoders)

@@ -9,29 +9,47 @@ not wrapped to a turn, runs beyond the largest speed that is believed, evenly an
 
 import math
 
+import numpy as np
+
 from leg_wear_monitor.kernel import entry, kernel
 from leg_wear_monitor.twin.sample import CRANK, NO_FAULT, OUT_OF_RANGE
 from leg_wear_monitor.twin.tracker.arrival import LARGEST_ANGLE
 
 _TURN = 2.0 * math.pi
 
-# settings: gate of an angle [rad]; largest speed that is believed [rad/s]; longest gap within a series [s];
-# for how long one series must be alone before the other is forgotten [s]; commanded speed [rad/s]
-GATE, LARGEST, GAP, ALONE, COMMANDED = range(5)
-
-# integers of the state: of both series, how many samples each has, its last stamp; which of them had the last
-# sample, how often that has changed since the younger began, stamp since when it has not; whether two sources
-# send; then of the unit: stamp of the anchor, fast steps in a row, whether the unit is another; counts of
-# samples that were withheld for either reason
-NUMBER, STAMP, LAST, SWITCHES, SINCE, TWO, ANCHOR, FAST, OTHER_UNIT, CONFLICTING, IMPLAUSIBLE = (
-    0, 2, 4, 5, 6, 7, 8, 9, 10, 11, 12,
-)  # fmt: skip
-INTEGERS = 13
-
-# numbers of the state: of both series, angle and speed; the anchor's angle, the speed of the last step, that
-# of fast steps, averaged, and for how long the angle has moved as a leg's does
-ANGLE, SPEED, ANCHOR_ANGLE, STEP_SPEED, FAST_SPEED, PLAUSIBLE = 0, 2, 4, 5, 6, 7
-NUMBERS = 8
+SETTINGS = np.dtype(
+    [
+        ("gate", "f8"),  # of an angle [rad]
+        ("largest", "f8"),  # speed that is believed [rad/s]
+        ("gap", "f8"),  # longest within a series [s]
+        ("alone", "f8"),  # for how long one series must be alone before the other is forgotten [s]
+        ("commanded", "f8"),  # speed [rad/s]
+    ]
+)
+STATE = np.dtype(
+    [
+        # of both series
+        ("number", "i8", (2,)),  # samples
+        ("stamp", "i8", (2,)),  # of the last one [ns]
+        ("angle", "f8", (2,)),  # [rad]
+        ("speed", "f8", (2,)),  # [rad/s]
+        ("last", "i8"),  # which of them had the last sample
+        ("switches", "i8"),  # how often that has changed since the younger one began
+        ("since", "i8"),  # stamp of the last such change [ns]
+        ("two", "i8"),  # 1 where two sources send
+        # of the unit
+        ("anchor", "i8"),  # stamp of the last step's end [ns]
+        ("anchor_angle", "f8"),  # [rad]
+        ("step_speed", "f8"),  # of the last step [rad/s]
+        ("fast", "i8"),  # fast steps in a row
+        ("fast_speed", "f8"),  # of fast steps, averaged [rad/s]
+        ("plausible", "f8"),  # for how long the angle has moved as a leg's does [s]
+        ("other_unit", "i8"),  # 1 where the unit is another
+        # samples withheld
+        ("conflicting", "i8"),  # since two sources send
+        ("implausible", "i8"),  # since the unit is another
+    ]
+)
 
 # Samples that make a series, and changes from one to the other. Glitches at random angles continue each other
 # by chance in one of twelve (2 * _WIDEST of a turn): eight in a row are one in thirty million.
@@ -48,121 +66,121 @@ def _wrapped(angle):
 
 
 @kernel
-def _guess_speed(settings, integers, numbers, k, stamp, angle):
+def _guess_speed(settings, state, k, stamp, angle):
     """Speed of a series of one sample: at rest, as commanded, or that of the other, what fits best."""
-    if integers[NUMBER + k] != 1:
+    if state.number[k] != 1:
         return
-    h = 1.0e-9 * (stamp - integers[STAMP + k])
-    moved, least = _wrapped(angle - numbers[ANGLE + k]), math.inf
-    for speed in (0.0, settings[COMMANDED], numbers[SPEED + 1 - k]):
+    h = 1.0e-9 * (stamp - state.stamp[k])
+    moved, least = _wrapped(angle - state.angle[k]), math.inf
+    for speed in (0.0, settings.commanded, state.speed[1 - k]):
         off = abs(_wrapped(moved - speed * h))
         if off < least:
-            least, numbers[SPEED + k] = off, speed
+            least, state.speed[k] = off, speed
 
 
 @kernel
-def _distance(settings, integers, numbers, k, stamp, angle):
+def _distance(settings, state, k, stamp, angle):
     """How far an angle is from where series k would be; infinite where it cannot belong to it."""
-    if integers[NUMBER + k] == 0:
+    if state.number[k] == 0:
         return math.inf
-    h = 1.0e-9 * (stamp - integers[STAMP + k])
-    if abs(h) > settings[GAP]:
+    h = 1.0e-9 * (stamp - state.stamp[k])
+    if abs(h) > settings.gap:
         return math.inf
-    off = abs(_wrapped(angle - numbers[ANGLE + k] - numbers[SPEED + k] * h))
+    off = abs(_wrapped(angle - state.angle[k] - state.speed[k] * h))
     # by how much the crank's greatest acceleration may have moved it
-    widest = min(_WIDEST, settings[GATE] + 0.5 * (settings[LARGEST] * h) ** 2)
+    widest = min(_WIDEST, settings.gate + 0.5 * (settings.largest * h) ** 2)
     return off if off <= widest else math.inf
 
 
 @kernel
-def _extend(integers, numbers, k, stamp, angle):
+def _extend(state, k, stamp, angle):
     """One more sample of series k; a late or repeated one tells nothing new."""
-    h = 1.0e-9 * (stamp - integers[STAMP + k])
+    h = 1.0e-9 * (stamp - state.stamp[k])
     if h <= 0.0:
         return
-    off = _wrapped(angle - numbers[ANGLE + k] - numbers[SPEED + k] * h)
-    numbers[SPEED + k] += off / (h + _SETTLING)
-    numbers[ANGLE + k], integers[STAMP + k] = angle, stamp
-    integers[NUMBER + k] += 1
+    off = _wrapped(angle - state.angle[k] - state.speed[k] * h)
+    state.speed[k] += off / (h + _SETTLING)
+    state.angle[k], state.stamp[k] = angle, stamp
+    state.number[k] += 1
 
 
 @kernel
-def _begin(integers, numbers, k, stamp, angle):
+def _begin(state, k, stamp, angle):
     """A new series takes the place of series k."""
-    integers[NUMBER + k], integers[STAMP + k], integers[SWITCHES] = 1, stamp, 0
-    numbers[ANGLE + k], numbers[SPEED + k] = angle, 0.0
+    state.number[k], state.stamp[k], state.switches = 1, stamp, 0
+    state.angle[k], state.speed[k] = angle, 0.0
 
 
 @kernel
-def _are_two(settings, integers, numbers, stamp, angle):
+def _are_two(settings, state, stamp, angle):
     """Whether two series go on side by side, after one more sample."""
     for k in range(2):
-        _guess_speed(settings, integers, numbers, k, stamp, angle)
-    near = _distance(settings, integers, numbers, 0, stamp, angle)
-    far = _distance(settings, integers, numbers, 1, stamp, angle)
+        _guess_speed(settings, state, k, stamp, angle)
+    near = _distance(settings, state, 0, stamp, angle)
+    far = _distance(settings, state, 1, stamp, angle)
     k = 0 if near <= far else 1
-    strong = 0 if integers[NUMBER] >= integers[NUMBER + 1] else 1
-    if max(near, far) < math.inf and integers[NUMBER + 1 - strong] < _SERIES:
+    strong = 0 if state.number[0] >= state.number[1] else 1
+    if max(near, far) < math.inf and state.number[1 - strong] < _SERIES:
         k = strong  # a series must show itself by samples that the other does not explain
     if min(near, far) < math.inf:
-        _extend(integers, numbers, k, stamp, angle)
+        _extend(state, k, stamp, angle)
     else:
-        k = 0 if integers[NUMBER] < integers[NUMBER + 1] else 1
-        _begin(integers, numbers, k, stamp, angle)
-    if k != integers[LAST]:
-        integers[LAST], integers[SINCE] = k, stamp
-        integers[SWITCHES] += 1
-    if min(integers[NUMBER], integers[NUMBER + 1]) >= _SERIES and integers[SWITCHES] >= _INTERLEAVED:
-        integers[TWO] = 1
-    if abs(stamp - integers[SINCE]) > 1.0e9 * settings[ALONE]:
+        k = 0 if state.number[0] < state.number[1] else 1
+        _begin(state, k, stamp, angle)
+    if k != state.last:
+        state.last, state.since = k, stamp
+        state.switches += 1
+    if min(state.number[0], state.number[1]) >= _SERIES and state.switches >= _INTERLEAVED:
+        state.two = 1
+    if abs(stamp - state.since) > 1.0e9 * settings.alone:
         # the other has gone; what begins anew must show itself again
-        integers[TWO], integers[NUMBER + 1 - k], integers[SWITCHES], integers[SINCE] = 0, 0, 0, stamp
-    return integers[TWO] == 1
+        state.two, state.number[1 - k], state.switches, state.since = 0, 0, 0, stamp
+    return state.two == 1
 
 
 @kernel
-def _is_other_unit(settings, integers, numbers, stamp, angle):
+def _is_other_unit(settings, state, stamp, angle):
     """Whether the angle runs as none of a leg's does, after one more sample."""
-    step = stamp - integers[ANCHOR]
-    if integers[ANCHOR] == 0 or abs(step) > 1.0e9 * settings[GAP]:
-        integers[ANCHOR], numbers[ANCHOR_ANGLE], integers[FAST] = stamp, angle, 0
+    step = stamp - state.anchor
+    if state.anchor == 0 or abs(step) > 1.0e9 * settings.gap:
+        state.anchor, state.anchor_angle, state.fast = stamp, angle, 0
     elif step >= _STEP_NS:
-        h, before = 1.0e-9 * step, numbers[STEP_SPEED]
-        speed = (angle - numbers[ANCHOR_ANGLE]) / h
-        integers[ANCHOR], numbers[ANCHOR_ANGLE], numbers[STEP_SPEED] = stamp, angle, speed
-        if abs(speed) > settings[LARGEST]:
+        h, before = 1.0e-9 * step, state.step_speed
+        speed = (angle - state.anchor_angle) / h
+        state.anchor, state.anchor_angle, state.step_speed = stamp, angle, speed
+        if abs(speed) > settings.largest:
             along = speed * math.copysign(1.0, before)
             is_even = 0.5 * abs(before) < along < 2.0 * abs(before)
-            integers[FAST] = integers[FAST] + 1 if is_even else 1
+            state.fast = state.fast + 1 if is_even else 1
             if is_even:  # and not the jump of an angle that wraps
-                numbers[PLAUSIBLE], numbers[FAST_SPEED] = 0.0, 0.5 * (numbers[FAST_SPEED] + abs(speed))
+                state.plausible, state.fast_speed = 0.0, 0.5 * (state.fast_speed + abs(speed))
         else:
-            integers[FAST] = 0
+            state.fast = 0
             # at rest every unit is the same
-            if abs(speed) > 0.1 * abs(settings[COMMANDED]):
-                numbers[PLAUSIBLE] += h
-    if integers[FAST] >= _STEPS:
-        integers[OTHER_UNIT] = 1
-    elif numbers[PLAUSIBLE] * abs(settings[COMMANDED]) >= _TURN:  # a gait cycle's time
-        integers[OTHER_UNIT] = 0
-    return integers[OTHER_UNIT] == 1
+            if abs(speed) > 0.1 * abs(settings.commanded):
+                state.plausible += h
+    if state.fast >= _STEPS:
+        state.other_unit = 1
+    elif state.plausible * abs(settings.commanded) >= _TURN:  # a gait cycle's time
+        state.other_unit = 0
+    return state.other_unit == 1
 
 
 @entry
-def check_angles(settings, integers, numbers, stamp, kind, angle, out_fault):
+def check_angles(settings, state, stamp, kind, angle, out_fault):
     """Mark crank samples (n,) that cannot be used, as long as two sources send or the unit is another.
 
-    ``out_fault`` (n,) are the faults that are known; the state in ``integers`` and ``numbers`` is changed.
+    ``out_fault`` (n,) are the faults that are known; ``state`` is changed.
     """
     for i in range(stamp.shape[0]):
         is_usable = kind[i] == CRANK and out_fault[i] == NO_FAULT and stamp[i] > 0
         if not is_usable or not abs(angle[i]) <= LARGEST_ANGLE:
             continue
-        if _is_other_unit(settings, integers, numbers, stamp[i], angle[i]):
+        if _is_other_unit(settings, state, stamp[i], angle[i]):
             # its series mean nothing
-            integers[NUMBER], integers[NUMBER + 1], integers[TWO] = 0, 0, 0
-            integers[IMPLAUSIBLE] += 1
+            state.number[0], state.number[1], state.two = 0, 0, 0
+            state.implausible += 1
             out_fault[i] = OUT_OF_RANGE
-        elif _are_two(settings, integers, numbers, stamp[i], angle[i]):
-            integers[CONFLICTING] += 1
+        elif _are_two(settings, state, stamp[i], angle[i]):
+            state.conflicting += 1
             out_fault[i] = OUT_OF_RANGE

@@ -4,15 +4,13 @@ import math
 
 import numpy as np
 
-from leg_wear_monitor.mechanism.arrays import Floats, Ints
 from leg_wear_monitor.monitor.inputs import angle_check as check
+from leg_wear_monitor.record import Record, copy_record, new_record
 from leg_wear_monitor.twin.sample import GAIT_SAMPLE, Samples
 from leg_wear_monitor.twin.settings import TrackerSettings
 
 _ALONE_S = 1.0
 _DEGREES, _NEAR = 180.0 / math.pi, 1.5  # a leg that runs up to so much faster or slower than commanded
-
-GuardSnapshot = tuple[Ints, Floats]
 
 
 class InputGuard:
@@ -30,20 +28,21 @@ class InputGuard:
         self._commanded = abs(settings.commanded_speed_radps)
         gap, speed = settings.bridge_limit_s, settings.commanded_speed_radps
         alone = max(_ALONE_S, gap)
-        self._settings = np.array([settings.gate_rad, settings.largest_speed, gap, alone, speed])
-        self._integers = np.zeros(check.INTEGERS, np.int64)
-        self._numbers = np.zeros(check.NUMBERS)
+        self._settings = new_record(check.SETTINGS)
+        self._settings.gate, self._settings.largest = settings.gate_rad, settings.largest_speed
+        self._settings.gap, self._settings.alone, self._settings.commanded = gap, alone, speed
+        self._state = new_record(check.STATE)
 
     def warm_up(self) -> None:
         """Compile, before the first sample."""
         self.checked(np.zeros(1, GAIT_SAMPLE))
-        self._integers[:], self._numbers[:] = 0, 0.0
+        self.restore(new_record(check.STATE))
 
     def checked(self, samples: Samples) -> Samples:
         """The same samples; a copy with faults where some cannot be used."""
         fault = np.array(samples["fault"])
         stamp, kind, angle = (np.array(samples[name]) for name in ("stamp_ns", "kind", "crank_angle_rad"))
-        check.check_angles(self._settings, self._integers, self._numbers, stamp, kind, angle, fault)
+        check.check_angles(self._settings, self._state, stamp, kind, angle, fault)
         if np.array_equal(fault, samples["fault"]):
             return samples
         samples = samples.copy()
@@ -53,29 +52,29 @@ class InputGuard:
     @property
     def stamp_ns(self) -> int:
         """Stamp of the last crank sample that was checked; 0 before."""
-        return int(self._integers[check.STAMP + self._integers[check.LAST]])
+        return int(self._state.stamp[self._state.last])
 
     @property
     def sources(self) -> int:
         """How many series of crank angles come at present: 2 where two interleave that disagree."""
-        return 1 + int(self._integers[check.TWO])
+        return 1 + int(self._state.two)
 
     @property
     def conflicting(self) -> int:
         """Samples withheld since two sources sent them."""
-        return int(self._integers[check.CONFLICTING])
+        return int(self._state.conflicting)
 
     @property
     def implausible(self) -> int:
         """Samples withheld since their angle runs as no leg's does."""
-        return int(self._integers[check.IMPLAUSIBLE])
+        return int(self._state.implausible)
 
     @property
     def speed_ratio(self) -> float:
         """How many times as fast as commanded the angle runs, where that is beyond belief; else NaN."""
-        if not self._integers[check.OTHER_UNIT]:
+        if not self._state.other_unit:
             return math.nan
-        return float(self._numbers[check.FAST_SPEED]) / self._commanded
+        return float(self._state.fast_speed) / self._commanded
 
     @property
     def cause(self) -> str:
@@ -93,10 +92,10 @@ class InputGuard:
             return told + "it seems to be in degrees, radians are expected"
         return told + "check its unit (radians), crank.gear_ratio and cadence.commanded_rpm"
 
-    def snapshot(self) -> GuardSnapshot:
+    def snapshot(self) -> Record:
         """A copy of the whole state."""
-        return self._integers.copy(), self._numbers.copy()
+        return self._state.copy()
 
-    def restore(self, snapshot: GuardSnapshot) -> None:
+    def restore(self, snapshot: Record) -> None:
         """Go back to a snapshot of a guard of the same settings."""
-        self._integers[:], self._numbers[:] = snapshot
+        copy_record(snapshot, self._state)

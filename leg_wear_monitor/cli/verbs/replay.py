@@ -24,16 +24,18 @@ SUMMARY, PAGE = "summary.json", "report.html"
 
 # Spelled out, for --help shall not wait for numba; the tests compare them with the library's.
 TIMES = ("header", "log", "publish")
+INPUT_KINDS = ("input_rate", "input_samples", "input_gaps", "input_torque", "input_sources")
 ALARM_KINDS = (
     "impact_force",
     "clearance",
     "growth",
+    "clearance_departure",
     "torque_mismatch",
     "torque_bias",
     "torque_drift",
     "torque_lag",
     "cadence",
-    "input",
+    *INPUT_KINDS,
 )
 _MOST_LINES = 20
 
@@ -85,11 +87,11 @@ _MOST_LINES = 20
 @click.option("--allow-partial", is_flag=True, help="Exit with 0 also if parts of the recording are lost.")
 @click.option(
     "--fail-on",
-    type=click.Choice(("alarm", "warning", *ALARM_KINDS)),
+    type=click.Choice(("alarm", "warning", "input", *ALARM_KINDS)),
     multiple=True,
     metavar="WHAT",
-    help=f"Exit with 1 if any alarm was raised, any warning, or one of a kind: {', '.join(ALARM_KINDS)}. "
-    "May be repeated.",
+    help="Exit with 1 if any alarm was raised, any warning, any alarm of the input, or one of a kind: "
+    f"{', '.join(ALARM_KINDS)}. May be repeated.",
 )
 @click.option(
     "--json",
@@ -198,7 +200,8 @@ def is_raised(result: "ReplayResult", fail_on: tuple[str, ...]) -> bool:
     highest = max(worst.values(), default=Level.OK)
     if ("alarm" in fail_on and highest is Level.ERROR) or ("warning" in fail_on and highest > Level.OK):
         return True
-    return any(level is Level.ERROR and kind.startswith(fail_on) for kind, level in worst.items())
+    asked = {*fail_on, *(INPUT_KINDS if "input" in fail_on else ())}
+    return any(level is Level.ERROR and kind in asked for kind, level in worst.items())
 
 
 def _write(result: "ReplayResult", wall_s: float, out: Path | None, json_file: Path | None) -> list[Path]:

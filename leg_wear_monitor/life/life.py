@@ -1,10 +1,11 @@
 """A leg's life: a few gait cycles of a few legs are simulated, their mean wear jumps over many.
 
-::
-
-    run = LifeRun(mechanism, LifeSettings())
-    run.jump()                                  # as often as wanted: one jump, a fraction of a second
-    life = simulate_life(mechanism, limit_m=6.0e-4, horizon_cycles=1.0e8)
+>>> from leg_wear_monitor import load_mechanism
+>>> run = LifeRun(load_mechanism("bionic_leg"), LifeSettings(legs=1, cycles=2), clearances=["A"])
+>>> point = run.jump()  # one jump, as often as wanted
+>>> life = simulate_life(run, limit_m=3.6e-4, horizon_cycles=1.0e8)
+>>> bool(life.cycles[1] == point.cycles < life.cycles_to(0, 3.6e-4) <= life.cycles[-1])
+True
 
 A life under wear coefficients that are all larger by one factor is the same life, run through that much
 faster: wear enters by coefficient times cycles only. See `monitor.forecast` for coefficients that differ.

@@ -1,5 +1,6 @@
 """A life by cycle jumps: what it keeps, what it repeats, and that it meets the wear it jumps over."""
 
+import doctest
 import math
 from itertools import pairwise
 
@@ -27,6 +28,11 @@ def lived(leg):
     """Two joints' life to where the first has opened by a fifth."""
     run = LifeRun(leg, SHORT, clearances=("A", "B"))
     return run, simulate_life(run, limit_m=3.6e-4, horizon_cycles=1e9)
+
+
+def test_the_example_in_the_documentation_runs():
+    done = doctest.testmod(life_module)
+    assert (done.attempted, done.failed) == (5, 0)
 
 
 def test_volume_worn_is_coefficient_times_archard_integral(leg, lived):

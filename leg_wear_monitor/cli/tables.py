@@ -24,7 +24,7 @@ def print_result(record: dict[str, Any], result: "SimulationResult") -> None:
     Parameters
     ----------
     record : dict
-        The object of interfaces.md.
+        What ``--json`` writes.
     result : SimulationResult
     """
     console = Console(highlight=False)

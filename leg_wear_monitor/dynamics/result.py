@@ -1,4 +1,4 @@
-"""What a simulation found, in the words of interfaces.md."""
+"""What a simulation found: the object that ``simulate --json`` writes."""
 
 from typing import Any
 
@@ -30,7 +30,7 @@ JsonObject = dict[str, Any]
 
 @attrs.frozen(eq=False)
 class SimulationResult:
-    """Figures over the counted cycles; see interfaces.md for the names and units of the parts.
+    """Statistics of the counted cycles; units are in the names, SI throughout.
 
     Attributes
     ----------

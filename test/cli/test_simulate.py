@@ -8,7 +8,7 @@ import pytest
 import leg_wear_monitor as lw
 from leg_wear_monitor.dynamics import simulation
 
-# interfaces.md, and two additions: the energy balance and the torque's greatest deviation from the ideal
+# names are a contract: other programs read them
 TOP = [
     "mechanism", "model", "speed_rpm", "cycles", "wall_s", "simulated_s", "real_time_factor",
     "drive_torque_nm", "energy_j", "toe", "joints", "impacts", "trace",

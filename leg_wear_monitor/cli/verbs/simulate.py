@@ -162,7 +162,7 @@ def _run(leg: "Mechanism", keywords: dict[str, Any]) -> tuple["SimulationResult"
 
 
 def _record(result: "SimulationResult", wall_s: float) -> dict[str, Any]:
-    """The object of interfaces.md: the result with the clock's figures before its parts."""
+    """What ``--json`` writes: the result, with the clock's values before its parts."""
     record = result.to_dict()
     head = {name: record.pop(name) for name in ("mechanism", "model", "speed_rpm", "cycles")}
     clock = {

@@ -1,4 +1,6 @@
-"""Many independent legs in one call, across cores: what studies and forecasts are made of.
+"""Many independent legs in one call, across cores: lives advance theirs by `advance_batch`.
+
+`simulate_batch` gives each leg's whole result; validation and the scaling benchmark use it.
 
 A leg has a state and a tally of its own, and its compiled motion runs without the interpreter's lock. So
 threads are enough: they share the tables, start at once, and results do not depend on how many there are.

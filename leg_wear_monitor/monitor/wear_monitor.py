@@ -19,7 +19,7 @@ from leg_wear_monitor.monitor.evaluation.evaluation_period import A_CYCLE, Evalu
 from leg_wear_monitor.monitor.evaluation.torque_record import TorqueRecord
 from leg_wear_monitor.monitor.forecast.forecaster import Forecaster
 from leg_wear_monitor.monitor.forecast.growth import GrowthWindow, extended
-from leg_wear_monitor.monitor.forecast.measurement import Finding
+from leg_wear_monitor.monitor.forecast.measurement import MeasurementResult
 from leg_wear_monitor.monitor.forecast_update import update_forecast
 from leg_wear_monitor.monitor.inputs.guard import InputGuard
 from leg_wear_monitor.monitor.ledger.entry import Audit, JointWear, Measurement
@@ -284,7 +284,7 @@ class WearMonitor:
 
     def measure(
         self, joint: str, clearance_m: float, sigma_m: float, stamp_ns: int, who: str, accept: bool = False
-    ) -> Finding:
+    ) -> MeasurementResult:
         """Somebody has measured a clearance: the forecast learns from it, and it is kept in the ledger.
 
         Parameters

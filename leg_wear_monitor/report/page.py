@@ -1,4 +1,4 @@
-"""One self-contained HTML page: sections of text, pictures, tables and findings, and what made them.
+"""One self-contained HTML page: sections of text, pictures, tables and sentences, and what made them.
 
 A page needs no network and no other file: pictures and style are inside it, and its content security
 policy forbids the rest. It prints, it fits a phone, and every picture has a text that stands for it.
@@ -87,11 +87,11 @@ class Text:
 
 
 @attrs.frozen
-class Findings:
+class Sentences:
     """What to conclude, or another list of sentences."""
 
     sentences: Sequence[str]
-    kind: str = attrs.field(default="findings", init=False)
+    kind: str = attrs.field(default="sentences", init=False)
 
 
 @attrs.frozen(kw_only=True)
@@ -121,7 +121,7 @@ class Live:
     kind: str = attrs.field(default="live", init=False)
 
 
-Part = Text | Findings | Picture | Gallery | Table | Listing | Live
+Part = Text | Sentences | Picture | Gallery | Table | Listing | Live
 
 
 @attrs.frozen

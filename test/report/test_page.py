@@ -8,13 +8,13 @@ from hypothesis import strategies as st
 
 from leg_wear_monitor.report.figures.figure import new_figure, png, svg
 from leg_wear_monitor.report.page import (
-    Findings,
     Gallery,
     Listing,
     Live,
     Page,
     Picture,
     Section,
+    Sentences,
     Table,
     Text,
     page_html,
@@ -69,7 +69,7 @@ def full_page():
         title="A page",
         summary="What was asked.",
         sections=[
-            Section("What to conclude", [Findings(["first", "second"])]),
+            Section("What to conclude", [Sentences(["first", "second"])]),
             Section("Pictures", [one, Gallery(pictures=[one, other], caption="both"), live, live]),
             Section("Tables & texts", [table, Text("some text"), Listing(text="key: value")]),
         ],
@@ -114,7 +114,7 @@ def test_a_script_runs_once_however_often_it_is_needed():
 def test_whatever_a_text_holds_it_stays_a_text(text):
     table = Table(caption=text, head=(text,), rows=[(text,)], note=text)
     picture = Picture(image=b"<svg/>", alt=text, caption=text)
-    parts = [Text(text), Findings([text]), table, picture, Listing(text=text)]
+    parts = [Text(text), Sentences([text]), table, picture, Listing(text=text)]
     plain = Page(title="t", summary="s", sections=[Section("x", [])])
     page = Page(title=text, summary=text, sections=[Section("x", parts)], versions={text: text})
     known = {tag for tag, _ in read(page_html(full_page())).elements}

@@ -13,7 +13,7 @@ from leg_wear_monitor.configuration.nearest import did_you_mean
 from leg_wear_monitor.errors import ConfigError
 
 if TYPE_CHECKING:
-    from leg_wear_monitor.monitor.forecast.measurement import Finding
+    from leg_wear_monitor.monitor.forecast.measurement import MeasurementResult
 
 CONTRADICTS = 1
 
@@ -90,7 +90,7 @@ def _measured(
     ledger: Path | None,
     accept: bool,
     dry_run: bool,
-) -> tuple["Finding", str]:
+) -> tuple["MeasurementResult", str]:
     """What a measurement says, and what all of the ledger's together do."""
     from leg_wear_monitor.monitor.forecast.measurement import measure as evaluate
     from leg_wear_monitor.monitor.forecast.validity import validity

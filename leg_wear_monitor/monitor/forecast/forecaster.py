@@ -11,7 +11,12 @@ from leg_wear_monitor.monitor.config.forecast import Forecasting
 from leg_wear_monitor.monitor.forecast.forecast import Forecast, JointCondition, forecast
 from leg_wear_monitor.monitor.forecast.growth import GrowthRate, GrowthWindow, extended, growth_rate
 from leg_wear_monitor.monitor.forecast.life_file import law_of
-from leg_wear_monitor.monitor.forecast.measurement import CONTRADICTS, Finding, measure, observations_of
+from leg_wear_monitor.monitor.forecast.measurement import (
+    CONTRADICTS,
+    MeasurementResult,
+    measure,
+    observations_of,
+)
 from leg_wear_monitor.monitor.forecast.wear_coefficients import CoefficientEstimate, Look, believe
 from leg_wear_monitor.monitor.ledger.entry import JointWear, Measurement
 from leg_wear_monitor.twin.statistics import CycleStatistics
@@ -142,7 +147,7 @@ class Forecaster:
         who: str,
         kept_ns: int = 0,
         accept: bool = False,
-    ) -> Finding:
+    ) -> MeasurementResult:
         """Take in a measured clearance; parameters as in `measure`."""
         k = self._clearance_joints.index(wear.name)
         found = measure(

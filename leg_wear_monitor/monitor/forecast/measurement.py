@@ -18,7 +18,7 @@ _SAYS_SOMETHING = 0.9  # of the spread before: what is left after a measurement 
 
 
 @attrs.frozen(eq=False)
-class Finding:
+class MeasurementResult:
     """What a measurement says.
 
     Attributes
@@ -61,7 +61,7 @@ def measure(
     who: str,
     kept_ns: int = 0,
     accept: bool = False,
-) -> Finding:
+) -> MeasurementResult:
     """Evaluate a measured clearance.
 
     Parameters
@@ -117,7 +117,7 @@ def measure(
     words = _clock(stamp_ns, kept_ns)
     if contradicts:
         words += _contradiction(accept, below, wear.name)
-    return Finding(measurement, before, after, contradicts, (*words, _change(before, after)))
+    return MeasurementResult(measurement, before, after, contradicts, (*words, _change(before, after)))
 
 
 def _clock(stamp_ns: int, kept_ns: int) -> list[str]:

@@ -7,7 +7,7 @@ import numpy as np
 from leg_wear_monitor.monitor.alarms.words import raised_words, time_words
 from leg_wear_monitor.report.figures.figure import png
 from leg_wear_monitor.report.figures.worn_bushings import worn_bushings
-from leg_wear_monitor.report.page import Findings, Page, Part, Picture, Section, Table, Text
+from leg_wear_monitor.report.page import Page, Part, Picture, Section, Sentences, Table, Text
 from leg_wear_monitor.report.replay.charts import alarm_chart, clearance_chart, force_chart, health_chart
 from leg_wear_monitor.report.replay.clearance_section import clearance_sections, clearance_sentences
 from leg_wear_monitor.report.replay.forecast_section import counted_mm, forecast_section, leg_sentence
@@ -30,7 +30,7 @@ def replay_page(record: dict[str, Any]) -> Page:
         f"{_time(recording['duration_s'])} from "
         f"{time_words(recording['begin_ns'])}, {record['cycles']} gait cycles. {record['advice']}"
     )
-    sections = [Section("What was found", [Findings(_sentences(record))]), _recording(recording)]
+    sections = [Section("What was found", [Sentences(_sentences(record))]), _recording(recording)]
     if _is_believable(record):
         sections += [_clearance(record), *clearance_sections(record), forecast_section(record)]
         sections += [_forces(record), _wear(record)]
@@ -94,7 +94,7 @@ def _recording(recording: dict[str, Any]) -> Section:
     findings = [f"{each['file']}: {each['text']}" for each in recording["findings"]]
     if findings:
         more = len(findings) - _MOST_ROWS
-        parts.append(Findings(findings[:_MOST_ROWS] + ([f"and {more} more"] if more > 0 else [])))
+        parts.append(Sentences(findings[:_MOST_ROWS] + ([f"and {more} more"] if more > 0 else [])))
     else:
         parts.append(Text("All of it could be read, and every checksum in it holds."))
     return Section("The recording", parts)

@@ -6,7 +6,7 @@ from typing import Any
 
 from ruamel.yaml import YAML
 
-from leg_wear_monitor.report.page import Findings, Page, Section
+from leg_wear_monitor.report.page import Page, Section, Sentences
 from leg_wear_monitor.report.study import findings
 from leg_wear_monitor.report.study.chaos_page import chaos
 from leg_wear_monitor.report.study.sections import (
@@ -77,7 +77,7 @@ def _notice(results: StudyResults) -> Sections:
     lines = [f"{label}: {fault}" for label, fault in results.faults]
     if results.missing:
         lines.append(f"Not computed yet: {joined(results.missing)}.")
-    return [Section("What is missing", [Findings(lines)])] if lines else []
+    return [Section("What is missing", [Sentences(lines)])] if lines else []
 
 
 def _sweep(results: StudyResults, labelled: Labelled, axis: str, what: str, values: list[float]) -> Sections:

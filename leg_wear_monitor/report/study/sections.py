@@ -4,7 +4,7 @@ from typing import Any
 
 from leg_wear_monitor.report.figures.figure import png
 from leg_wear_monitor.report.figures.leg_picture import leg_picture
-from leg_wear_monitor.report.page import Findings, Picture, Section, Text
+from leg_wear_monitor.report.page import Picture, Section, Sentences, Text
 from leg_wear_monitor.report.study.curves import curve_galleries
 from leg_wear_monitor.report.study.leg_slider import leg_slider
 from leg_wear_monitor.report.study.text import Labelled, error_table, joined, joint_table, wear_table
@@ -40,7 +40,7 @@ def asked(results: StudyResults) -> Section:
 
 def conclude(sentences: list[str]) -> Section:
     """What to conclude."""
-    return Section("What to conclude", [Findings(sentences)])
+    return Section("What to conclude", [Sentences(sentences)])
 
 
 def cycle(results: StudyResults, chosen: list[tuple[Point, Any]]) -> Section:

@@ -17,7 +17,7 @@ from leg_wear_monitor.twin.follower.state import (
     RESIDUAL_2,
     LegState,
 )
-from leg_wear_monitor.twin.follower.torque_estimate import FRICTION, LAG, LOAD, Finding, LoadEstimate
+from leg_wear_monitor.twin.follower.torque_estimate import FRICTION, LAG, LOAD, CycleEstimate, LoadEstimate
 from leg_wear_monitor.twin.statistics import CycleStatistics, TorqueStatistics
 
 
@@ -35,7 +35,7 @@ def clearances(contacts: ContactArrays, depth: Floats) -> Floats:
 
 
 def torque_statistics(
-    sums: Floats, found: Finding | None, settled: LoadEstimate, unexplained_nm: float
+    sums: Floats, found: CycleEstimate | None, settled: LoadEstimate, unexplained_nm: float
 ) -> TorqueStatistics:
     """Of the sums (SUMS,) of a cycle, what it alone says, and what has settled."""
     n = int(sums[NUMBER])

@@ -47,7 +47,7 @@ from leg_wear_monitor.twin.follower.state import (
     leg_state,
     room_for_looks,
 )
-from leg_wear_monitor.twin.follower.torque_estimate import Finding, LoadEstimate, find
+from leg_wear_monitor.twin.follower.torque_estimate import CycleEstimate, LoadEstimate, find
 from leg_wear_monitor.twin.settings import INSTANT, STANCE, TwinSettings
 from leg_wear_monitor.twin.statistics import CycleStatistics, Event, SampleStatistics, TwinEventKind
 from leg_wear_monitor.twin.steps import BEGIN, CODE, EXTRA, MOVE, TURNS, Steps
@@ -234,7 +234,7 @@ class LegFollower:
         clear_run_statistics(self.statistics)
         self._before = self.clearances
 
-    def _unexplained_nm(self, found: Finding | None) -> float:
+    def _unexplained_nm(self, found: CycleEstimate | None) -> float:
         """RMS of what is left of the residual [N m], of this cycle or over cycles; NaN if not known."""
         if not self._instants:
             return found.left if found else np.nan

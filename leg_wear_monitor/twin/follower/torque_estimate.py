@@ -27,7 +27,7 @@ _BELIEVED, _DOUBTED = 3.0, 2.0  # standard deviations from 0 at which a load beg
 
 
 @attrs.frozen(eq=False)
-class Finding:
+class CycleEstimate:
     """What a cycle says: values (3,), their standard deviations, condition number, RMS of the rest [N m].
 
     The rest is that for a load within its bounds; the values are what the torque says, bounded or not.
@@ -45,7 +45,7 @@ def find(
     along: Floats,
     correlated: float,
     loads: tuple[float, float] = (-np.inf, np.inf),
-) -> Finding | None:
+) -> CycleEstimate | None:
     """Least squares from the sums of a cycle; None without enough samples.
 
     Parameters
@@ -59,7 +59,7 @@ def find(
 
     Returns
     -------
-    Finding
+    CycleEstimate
         Without a load's signature (a mechanism without toe), 0 for the load, known exactly. The condition
         number is that of the torques scaled to one size: 1 where none looks like another.
     """
@@ -78,7 +78,7 @@ def find(
     square = float(sums[RESIDUAL_2] - 2.0 * bounded @ along + bounded @ gram @ bounded)
     left = max(square, 0.0) / sums[NUMBER]
     sigma[seen] = np.sqrt(left * max(correlated, 1.0) * np.diag(inverse))
-    return Finding(values, sigma, condition, float(left**0.5))
+    return CycleEstimate(values, sigma, condition, float(left**0.5))
 
 
 def _bounded(
@@ -135,8 +135,8 @@ class LoadEstimate:
         """Least and largest load that there may be beside the one that acts [N]."""
         return self._least - self.acting, self._limit - self.acting
 
-    def take(self, found: Finding, acts: bool) -> None:
-        """Take in a cycle's finding; ``acts`` whether a load that is believed shall act on the leg."""
+    def take(self, found: CycleEstimate, acts: bool) -> None:
+        """Take in a cycle's estimate; ``acts`` whether a load that is believed shall act on the leg."""
         values, variance = self.state[:3], self.state[3:6]
         measured = found.values + np.array([self.acting, 0.0, 0.0])
         variance += _DRIFT**2

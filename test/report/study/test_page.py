@@ -6,7 +6,7 @@ import attrs
 import numpy as np
 import pytest
 
-from leg_wear_monitor.report.page import Findings, Table
+from leg_wear_monitor.report.page import Sentences, Table
 from leg_wear_monitor.report.study import findings
 from leg_wear_monitor.report.study.page import study_page
 from leg_wear_monitor.report.study.text import number, with_spread, zone_text
@@ -18,14 +18,14 @@ def parts(page, kind):
 
 
 def conclusions(page):
-    return "\n".join(parts(page, Findings)[0].sentences)
+    return "\n".join(parts(page, Sentences)[0].sentences)
 
 
 def test_every_page_has_configuration_versions_conclusions_and_units(drawn):
     for name, page in drawn.items():
         assert "mechanism: bionic_leg" in page.configuration
         assert {"leg_wear_monitor", "code", "seed"} <= set(page.versions)
-        assert parts(page, Findings), name
+        assert parts(page, Sentences), name
         for table in parts(page, Table):
             assert any("[" in cell for cell in table.head), table.caption
             assert all(len(row) == len(table.head) for row in table.rows)

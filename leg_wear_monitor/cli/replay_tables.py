@@ -7,6 +7,7 @@ from rich.console import Console
 from rich.table import Table
 
 from leg_wear_monitor.cli.tables import figure
+from leg_wear_monitor.monitor.alarms.words import ADVICE
 
 if TYPE_CHECKING:
     from leg_wear_monitor.monitor.forecast.forecast import JointForecast, LegForecast
@@ -49,7 +50,7 @@ def print_replay(result: "ReplayResult", wall_s: float) -> None:
     if result.is_believable:
         factor = result.duration_s / wall_s
         console.print(f"speed  {result.duration_s:.4g} s in {wall_s:.3g} s: {figure(factor)} times real time")
-    console.print("The monitor advises; no alarm is no proof of health.")
+    console.print(ADVICE)
 
 
 def _joints(result: "ReplayResult") -> Table:

@@ -7,6 +7,7 @@ import attrs
 
 from leg_wear_monitor.monitor.accounting import Accounting
 from leg_wear_monitor.monitor.alarms.alarm import Level
+from leg_wear_monitor.monitor.alarms.words import ADVICE
 from leg_wear_monitor.monitor.encoders.clearance_estimate import ClearanceObservation
 from leg_wear_monitor.monitor.encoders.observer import EncoderObserver
 from leg_wear_monitor.monitor.encoders.state import faults
@@ -24,8 +25,6 @@ from leg_wear_monitor.monitor.forecast.words import UNKNOWN, lifetime_values
 from leg_wear_monitor.monitor.reports import CycleReport, Status
 from leg_wear_monitor.twin.digital_twin import DigitalTwin
 from leg_wear_monitor.twin.statistics import Event, Tracking
-
-ADVICE = "the monitor advises; no alarm is no proof of health"
 
 _RATES = (names.CRANK_RATE, names.TORQUE_RATE)
 _TORQUE = (names.MISMATCH, BIAS, DRIFT, LAG)

@@ -48,7 +48,7 @@ _KEPT_EVENTS = 1
 class WearMonitor:
     """Watches a leg's joints wear, by its crank's motion and its drive torque.
 
-    It advises: no alarm is no proof of health.
+    It advises: the absence of an alarm does not mean the joints are healthy.
 
     Parameters
     ----------

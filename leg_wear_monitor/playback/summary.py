@@ -9,7 +9,7 @@ import numpy as np
 from leg_wear_monitor.errors import printable
 from leg_wear_monitor.mechanism.arrays import Floats
 from leg_wear_monitor.monitor.alarms.alarm import Alarm
-from leg_wear_monitor.monitor.alarms.words import state_of
+from leg_wear_monitor.monitor.alarms.words import ADVICE, state_of
 from leg_wear_monitor.monitor.encoders.clearance_estimate import ClearanceEstimate
 from leg_wear_monitor.monitor.forecast.forecast import JointForecast, LegForecast
 from leg_wear_monitor.playback.history import CYCLE_COLUMNS, JOINT_COLUMNS, History
@@ -18,8 +18,6 @@ from leg_wear_monitor.wear.surfaces import BUSHING, JOURNAL
 
 POINTS = 1000
 """Points that a history is thinned to; the peaks of forces are kept."""
-
-ADVICE = "The monitor advises; no alarm is no proof of health."
 
 
 def summary(result: ReplayResult, wall_s: float) -> dict[str, Any]:

@@ -20,6 +20,7 @@ from leg_wear_monitor.messages.forecast_times import ForecastTimes
 from leg_wear_monitor.messages.outputs import Messages
 from leg_wear_monitor.messages.qos import SENSOR_DATA
 from leg_wear_monitor.monitor.alarms.alarm import Alarm
+from leg_wear_monitor.monitor.alarms.words import ADVICE
 from leg_wear_monitor.monitor.config.fitting import check_limits
 from leg_wear_monitor.monitor.config.settings import MonitorConfig
 from leg_wear_monitor.monitor.opening import open_monitor
@@ -37,9 +38,7 @@ from leg_wear_monitor.ros.parameters.parameters import Parameters
 from leg_wear_monitor.ros.running import ClosingNode, run, spin
 from leg_wear_monitor.ros.services import Confirmation, asked_once, audit_time, undone
 
-ADVICE = (
-    "this monitor advises: it commands nothing, no alarm is no proof of health, keep it out of safety paths"
-)
+NO_COMMANDS = "It publishes no commands and must not be part of a safety function."
 
 _WORK_S = 0.01  # the monitor takes what has come, this often
 _AT_ONCE = 500  # messages, so that services and parameters get their turn, too
@@ -52,7 +51,7 @@ class MonitorNode(ClosingNode):
 
     def __init__(self, **options: Any) -> None:
         super().__init__("leg_wear_monitor", **options)
-        self.get_logger().info(ADVICE)
+        self.get_logger().info(f"{ADVICE} {NO_COMMANDS}")
         namespace = self.get_namespace().strip("/")
         parameters = Parameters(self, MonitorConfig, empty={"hardware_id": namespace or "leg"})
         config = parameters.config

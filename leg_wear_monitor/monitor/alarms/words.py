@@ -7,6 +7,8 @@ from leg_wear_monitor.monitor.alarms.alarm import Alarm, Level
 
 _FIRST_DATE_S = 1.0e8  # a stamp below is of a clock that began at zero
 
+ADVICE = "The monitor advises. The absence of an alarm does not mean the joints are healthy."
+
 
 def state_of(alarm: Alarm) -> str:
     """An alarm's state, free of values."""

@@ -25,8 +25,8 @@ from watch import Watch
 
 from leg_wear_monitor import load_mechanism
 from leg_wear_monitor.studies.execution.run import run_study
-from leg_wear_monitor.studies.plan.plan import points_of
-from leg_wear_monitor.studies.plan.settings import STUDIES, Study, load_settings, parse_settings
+from leg_wear_monitor.studies.plan.settings import STUDIES, load_settings, parse_settings
+from leg_wear_monitor.studies.plan.study import Study
 from leg_wear_monitor.studies.point import code_digest
 from leg_wear_monitor.studies.storage.store import load_results
 from leg_wear_monitor.studies.tasks.compute import compute
@@ -38,12 +38,12 @@ def costs() -> dict[str, float]:
     """Processor seconds of every study that comes with the package: one point of each task, scaled by its "
     "cost."""
     leg, found = load_mechanism(), {}
-    for point in points_of(work(1)):  # compiled before anything is measured
+    for point in work(1).points():  # compiled before anything is measured
         compute(point.task, leg, point.settings, code_digest())
     print("Cost of the studies as they come, by the processor's time")
     print(f"  {'study':>10} {'points':>7} {'seconds':>9}   of which")
     for name in STUDIES:
-        points = points_of(load_settings(name))
+        points = load_settings(name).points()
         total: dict[str, float] = {}
         for task in dict.fromkeys(point.task for point in points):
             alike = [point for point in points if point.task == task]

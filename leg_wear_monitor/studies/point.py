@@ -12,6 +12,7 @@ import numpy as np
 from leg_wear_monitor.mechanism.spec import Mechanism
 
 Arrays = dict[str, np.ndarray[Any, Any]]
+Settings = dict[str, Any]
 
 # what a result depends on; of studies only what computes
 _ROOMS = ("configuration", "mechanism", "contact", "wear", "dynamics", "life", "studies/tasks")

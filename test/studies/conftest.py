@@ -5,7 +5,8 @@ from typing import Any
 
 import pytest
 
-from leg_wear_monitor.studies.plan.settings import Study, parse_settings
+from leg_wear_monitor.studies.plan.settings import parse_settings
+from leg_wear_monitor.studies.plan.study import Study
 
 ENSEMBLE = {"runs": 2, "cycles": 2, "skip_cycles": 1, "traced_cycles": 1}
 

@@ -6,7 +6,6 @@ import pytest
 from leg_wear_monitor import load_mechanism
 from leg_wear_monitor.cli.verbs.study import NAMES
 from leg_wear_monitor.errors import ConfigError
-from leg_wear_monitor.studies.plan.plan import points_of
 from leg_wear_monitor.studies.plan.settings import STUDIES, load_settings, parse_settings
 from leg_wear_monitor.studies.tasks.compute import TASKS
 from leg_wear_monitor.studies.tasks.ensemble import check_points
@@ -21,7 +20,7 @@ def test_the_names_that_help_shows_are_the_library_s():
 @pytest.mark.parametrize("name", NAMES)
 def test_every_study_that_comes_with_the_package_has_points_that_can_be(name):
     settings = load_settings(name)
-    points, leg = points_of(settings), load_mechanism(settings.mechanism)
+    points, leg = settings.points(), load_mechanism(settings.mechanism)
     check_points(leg, [point.settings for point in points])
     keys = {point.key(leg) for point in points}
     assert len({point.label for point in points}) >= 3
@@ -38,7 +37,7 @@ def test_studies_cover_what_was_asked():
     assert chaos.section_cycles >= 500
     for name in ("location", "multi"):
         assert load_settings(name).sets == (("A", "B"), ("G",), ("I", "J"))
-    assert points_of(load_settings("multi"))[-1].settings["clearance_joints"] == ["A", "B", "G", "I", "J"]
+    assert load_settings("multi").points()[-1].settings["clearance_joints"] == ["A", "B", "G", "I", "J"]
 
 
 @pytest.mark.parametrize(
@@ -93,12 +92,12 @@ def test_what_cannot_be_is_told_with_its_key(study, keys, fault):
 def test_joints_that_the_leg_does_not_have_are_told_before_anything_runs(tiny):
     settings = tiny("size", joints=["Q"], clearances_m=[1.0e-4])
     with pytest.raises(ConfigError, match="'Q' has no clearance settings in bionic_leg"):
-        check_points(load_mechanism(), [point.settings for point in points_of(settings)])
+        check_points(load_mechanism(), [point.settings for point in settings.points()])
 
 
 def test_a_key_depends_on_all_that_the_result_depends_on_and_nothing_else(tiny):
     leg, other = load_mechanism("bionic_leg"), load_mechanism("jansen_leg")
-    (point,) = points_of(tiny("location", sets=[["G"]]))
+    (point,) = tiny("location", sets=[["G"]]).points()
     key = point.key(leg)
     assert attrs.evolve(point, label="another", cost=7.0).key(leg) == key
     assert point.key(attrs.evolve(leg, source="elsewhere.yaml")) == key

@@ -9,7 +9,7 @@ from leg_wear_monitor.cli.output import check_directory
 from leg_wear_monitor.cli.waiting import compilation, progress_bar
 
 if TYPE_CHECKING:
-    from leg_wear_monitor.studies.plan.settings import Study
+    from leg_wear_monitor.studies.plan.study import Study
 
 # spelled out, for --help shall not wait for numpy; the tests compare it with the library's
 NAMES = ("size", "speed", "location", "wear", "multi", "chaos", "laws")
@@ -76,7 +76,6 @@ def _compute(
     from leg_wear_monitor.dynamics.simulation import simulate
     from leg_wear_monitor.mechanism.loader import load_mechanism
     from leg_wear_monitor.studies.execution.run import run_study
-    from leg_wear_monitor.studies.plan.plan import points_of
 
     leg = load_mechanism(settings.mechanism)
     with compilation("clearance"):  # once, and not in every worker at the same time
@@ -91,7 +90,7 @@ def _compute(
             scheduler=scheduler,
             progress=progress,
         )
-    return computed, len(points_of(settings))
+    return computed, len(settings.points())
 
 
 def write_study_page(path: Path) -> int:

@@ -16,7 +16,7 @@ from leg_wear_monitor.report.study.chaos_pictures import (
 )
 from leg_wear_monitor.report.study.sections import Sections, asked, conclude, curves, cycle
 from leg_wear_monitor.report.study.text import Labelled, joined, number
-from leg_wear_monitor.studies.plan.plan import PORTRAIT_CYCLES
+from leg_wear_monitor.studies.plan.kinds.chaos import PORTRAIT_CYCLES
 from leg_wear_monitor.studies.point import Arrays, Point
 from leg_wear_monitor.studies.storage.store import StudyResults
 from leg_wear_monitor.studies.summary import clearance_joints_of
@@ -152,7 +152,7 @@ def _exponent_table(labelled: Labelled, estimates: Sequence[Estimate]) -> Table:
         rows.append([label, *each, time, f"{runs} × {cycles - _FORGET}"])
     return Table(
         caption="Largest Lyapunov exponent",
-        head=("clearance_joints", "[1/cycle]", "[1/s]", "cycles for a tenfold error", "pairs × cycles"),
+        head=("clearance joints", "[1/cycle]", "[1/s]", "cycles for a tenfold error", "pairs × cycles"),
         rows=rows,
         note="Mean and standard error over pairs of neighbours (Benettin and others 1980).",
     )

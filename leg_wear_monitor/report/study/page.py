@@ -22,26 +22,9 @@ from leg_wear_monitor.report.study.sections import (
 from leg_wear_monitor.report.study.text import Labelled, joined
 from leg_wear_monitor.report.study.trends import compare_gallery, trend_gallery
 from leg_wear_monitor.report.study.wear_page import life
+from leg_wear_monitor.studies.plan.settings import STUDIES
+from leg_wear_monitor.studies.plan.study import Sweep
 from leg_wear_monitor.studies.storage.store import StudyResults
-
-_TITLES = {
-    "size": "Clearance size",
-    "speed": "Crank speed",
-    "location": "Where the clearance is",
-    "wear": "Where the joints wear",
-    "multi": "Several clearances at once",
-    "chaos": "How far the motion can be foretold",
-    "laws": "Contact and friction laws",
-}
-_ASKED = {
-    "size": "What does the size of a clearance do to the leg's motion, its impacts, its drive and its wear?",
-    "speed": "What does the crank's speed do to a leg with clearance?",
-    "location": "What does the same clearance do in the hip, at the knee and in the foot?",
-    "wear": "Where on bushing and journal does each joint wear, and what becomes of it over a life?",
-    "multi": "Do clearances in all these joints do what each does alone, added up, and which joint is worst?",
-    "chaos": "How disordered is the motion with clearance, and how soon is a small error a large one?",
-    "laws": "How much do results depend on the laws of normal force and friction?",
-}
 
 
 def study_page(results: StudyResults) -> Page:
@@ -53,12 +36,13 @@ def study_page(results: StudyResults) -> Page:
         For a study that this version has no page of.
     """
     labelled = [(point.label, arrays) for point, arrays in results.of("response")]
-    sections = _PAGES[results.study](results, labelled) if labelled else []
+    study = STUDIES[results.study]
+    sections = _sections(study.sweep, results, labelled) if labelled else []
     buffer = io.StringIO()
     YAML().dump(_plain(results.settings), buffer)
     return Page(
-        title=f"{_TITLES[results.study]}: {results.mechanism.name}",
-        summary=_ASKED[results.study],
+        title=f"{study.title}: {results.mechanism.name}",
+        summary=study.question,
         sections=[*_notice(results), *sections],
         configuration=buffer.getvalue(),
         versions={**results.versions, "seed": str(results.settings["ensemble"]["seed"])},
@@ -80,34 +64,29 @@ def _notice(results: StudyResults) -> Sections:
     return [Section("What is missing", [Sentences(lines)])] if lines else []
 
 
-def _sweep(results: StudyResults, labelled: Labelled, axis: str, what: str, values: list[float]) -> Sections:
+def _sections(sweep: Sweep | None, results: StudyResults, labelled: Labelled) -> Sections:
+    return _PAGES[results.study](results, labelled) if sweep is None else _swept(sweep, results, labelled)
+
+
+def _swept(sweep: Sweep, results: StudyResults, labelled: Labelled) -> Sections:
+    values = [sweep.value(point.settings) for point, _ in results.of("response")]
     chosen = ends_and_middle(results.of("response"))
     shown = [(point.label, arrays) for point, arrays in chosen]
     sentences = [
         *findings.disturbance(labelled),
-        *findings.growth(values, labelled, what),
+        *findings.growth(values, labelled, sweep.quantity),
         *findings.regular_where(labelled),
     ]
     arrays = [each for _, each in labelled]
     return [
         asked(results),
         conclude(sentences),
-        Section(f"Over the {what}", [trend_gallery(values, axis, arrays)]),
+        Section(f"Over the {sweep.quantity}", [trend_gallery(values, sweep.axis, arrays)]),
         cycle(results, chosen),
         curves(shown),
         wear(results, shown),
-        tables(labelled, what),
+        tables(labelled, sweep.quantity),
     ]
-
-
-def _size(results: StudyResults, labelled: Labelled) -> Sections:
-    values = [1.0e3 * point.settings["clearance_m"] for point, _ in results.of("response")]
-    return _sweep(results, labelled, "radial clearance [mm]", "clearance", values)
-
-
-def _speed(results: StudyResults, labelled: Labelled) -> Sections:
-    values = [point.settings["speed_rpm"] for point, _ in results.of("response")]
-    return _sweep(results, labelled, "crank speed [rpm]", "speed", values)
 
 
 def _compared(results: StudyResults, labelled: Labelled, sentences: list[str], head: str) -> Sections:
@@ -126,7 +105,7 @@ def _compared(results: StudyResults, labelled: Labelled, sentences: list[str], h
 
 def _location(results: StudyResults, labelled: Labelled) -> Sections:
     return _compared(
-        results, labelled, findings.disturbance(labelled) + findings.places(labelled), "clearance_joints"
+        results, labelled, findings.disturbance(labelled) + findings.places(labelled), "clearance joints"
     )
 
 
@@ -140,7 +119,7 @@ def _multi(results: StudyResults, labelled: Labelled) -> Sections:
         *findings.regularity(labelled[-1:]),
         *findings.zones(labelled[-1:]),
     ]
-    return _compared(results, labelled, sentences, "clearance_joints")
+    return _compared(results, labelled, sentences, "clearance joints")
 
 
 def _laws(results: StudyResults, labelled: Labelled) -> Sections:
@@ -148,8 +127,6 @@ def _laws(results: StudyResults, labelled: Labelled) -> Sections:
 
 
 _PAGES: dict[str, Callable[[StudyResults, Labelled], Sections]] = {
-    "size": _size,
-    "speed": _speed,
     "location": _location,
     "multi": _multi,
     "laws": _laws,

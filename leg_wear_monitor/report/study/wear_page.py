@@ -38,7 +38,7 @@ def life(results: StudyResults, labelled: Labelled) -> Sections:
     if lives:
         sections += [_clearances(lives), _worn_surfaces(results, lives)]
     sections.append(cycle(results, results.of("response")))
-    tables = [wear_table(labelled, "clearance_joints"), joint_table(labelled, "clearance_joints")]
+    tables = [wear_table(labelled, "clearance joints"), joint_table(labelled, "clearance joints")]
     return [*sections, Section("Tables", tables + ([_life_table(lives)] if lives else []))]
 
 

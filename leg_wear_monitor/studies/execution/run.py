@@ -14,8 +14,7 @@ from leg_wear_monitor.mechanism.loader import is_file_name, load_mechanism, ship
 from leg_wear_monitor.share import share_directory
 from leg_wear_monitor.studies.execution.cluster import run_on_cluster
 from leg_wear_monitor.studies.execution.processes import Job, run_here, run_in_processes
-from leg_wear_monitor.studies.plan.plan import points_of
-from leg_wear_monitor.studies.plan.settings import Study
+from leg_wear_monitor.studies.plan.study import Study
 from leg_wear_monitor.studies.point import Arrays, Point, code_digest
 from leg_wear_monitor.studies.storage.store import StudyDirectory
 from leg_wear_monitor.studies.tasks.ensemble import check_points
@@ -64,7 +63,7 @@ def run_study(
     ConfigWarning
         For each point that is there but was altered, exchanged or damaged; it is computed again.
     """
-    mechanism, points = load_mechanism(settings.mechanism), points_of(settings)
+    mechanism, points = load_mechanism(settings.mechanism), settings.points()
     check_points(mechanism, [point.settings for point in points])
     about = versions()
     keys = [point.key(mechanism) for point in points]

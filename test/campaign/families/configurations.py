@@ -32,7 +32,7 @@ def warm() -> None:
     """Import and compile all that reading and a short run need."""
     from leg_wear_monitor.dynamics.simulation import simulate
 
-    for module in ("monitor.forecast.forecaster", "monitor.config.plausible", "studies.plan.plan"):
+    for module in ("monitor.forecast.forecaster", "monitor.config.plausible", "studies.plan.settings"):
         import_module(f"leg_wear_monitor.{module}")
     simulate("four_bar", cycles=1.0 / 64.0, skip_cycles=0.0)
     _life_text()
@@ -127,10 +127,9 @@ def _mechanism(path: Path) -> str:
 
 
 def _study(path: Path) -> str:
-    from leg_wear_monitor.studies.plan.plan import points_of
     from leg_wear_monitor.studies.plan.settings import load_settings
 
-    points = points_of(load_settings("wear", path))
+    points = load_settings("wear", path).points()
     wrong = [point.label for point in points if not (math.isfinite(point.cost) and point.cost > 0.0)]
     return f"points without a cost: {wrong}" if wrong or not points else ""
 

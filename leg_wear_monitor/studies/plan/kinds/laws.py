@@ -1,0 +1,58 @@
+"""Study ``laws``: the laws of normal force and friction against each other."""
+
+from typing import Any
+
+import attrs
+
+from leg_wear_monitor.configuration.quantity import described, quantity
+from leg_wear_monitor.mechanism.clearance import FRICTION_LAWS, NORMAL_LAWS
+from leg_wear_monitor.studies.plan.keys import (
+    Names,
+    clearance_field,
+    clearance_joints_field,
+    some_of,
+    speed_field,
+)
+from leg_wear_monitor.studies.plan.responses import place, response
+from leg_wear_monitor.studies.plan.study import Study
+from leg_wear_monitor.studies.point import Point
+
+
+@attrs.frozen(kw_only=True)
+class Laws(Study):
+    """The normal force and friction laws against each other."""
+
+    title = "Contact and friction laws"
+    question = "How much do results depend on the laws of normal force and friction?"
+
+    joints: Names = clearance_joints_field()
+    clearance_m: float = clearance_field()
+    speed_rpm: float = speed_field()
+    normal_laws: Names = described(
+        "laws of the normal force", default=NORMAL_LAWS, check=some_of(NORMAL_LAWS)
+    )
+    friction_laws: Names = described(
+        "ramps of friction, each with the mechanism's own normal law",
+        default=FRICTION_LAWS,
+        check=some_of(FRICTION_LAWS),
+    )
+    friction_coefficients: tuple[float, ...] = quantity(
+        "",
+        "friction coefficients, each with the mechanism's own laws",
+        at_least=0.0,
+        at_most=2.0,
+        default=(0.02, 0.05, 0.1),
+    )
+
+    def points(self) -> list[Point]:
+        """Responses by the normal laws, the friction ramps and the friction coefficients."""
+        points = [self._response(law, normal_law=law) for law in self.normal_laws]
+        points += [self._response(f"friction {law}", friction={"law": law}) for law in self.friction_laws]
+        return points + [
+            self._response(f"friction coefficient {value:g}", friction={"coefficient": value})
+            for value in self.friction_coefficients
+        ]
+
+    def _response(self, label: str, **more: Any) -> Point:
+        where = place(self.joints, self.clearance_m, self.speed_rpm, **more)
+        return response(label, where, self.ensemble)

@@ -9,9 +9,13 @@ from typing import TypeVar
 
 import numba
 
+from leg_wear_monitor import whole_program
 from leg_wear_monitor.code_cache import code_directory
 
 _Function = TypeVar("_Function", bound=Callable[..., object])
+
+_ENTRY: dict[str, object] = {"error_model": "numpy", "_nrt": False, "no_cfunc_wrapper": True}
+_KERNEL = {**_ENTRY, "forceinline": True}
 
 _IMPORT = re.compile(r"^\s*(?:from|import)\s+(leg_wear_monitor(?:\.\w+)+)", re.MULTILINE)
 
@@ -77,7 +81,9 @@ def kernel(function: _Function) -> _Function:
     than the physics where many small arrays are passed around. It is compiled into the entry that calls
     it and not cached by itself: what comes out of a cache cannot be inlined.
     """
-    return numba.njit(error_model="numpy", _nrt=False, forceinline=True)(function)  # type: ignore[no-any-return]
+    if whole_program.AVAILABLE and not numba.config.DISABLE_JIT:
+        return whole_program.KernelDispatcher(function, _KERNEL)
+    return numba.njit(**_KERNEL)(function)  # type: ignore[no-any-return]
 
 
 def entry(function: _Function) -> _Function:
@@ -85,7 +91,7 @@ def entry(function: _Function) -> _Function:
     home, previous = cache_directory(Path(function.__code__.co_filename)), numba.config.CACHE_DIR
     numba.config.CACHE_DIR = str(home or previous)
     try:
-        compiled = numba.njit(cache=home is not None, error_model="numpy", _nrt=False, nogil=True)(function)
+        compiled = numba.njit(cache=home is not None, nogil=True, **_ENTRY)(function)
     finally:
         numba.config.CACHE_DIR = previous
     return compiled  # type: ignore[no-any-return]

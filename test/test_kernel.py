@@ -6,11 +6,13 @@ import subprocess
 import sys
 from pathlib import Path
 
+import numba
 import numpy as np
 import pytest
 from numba.core.errors import NumbaError
 
 import leg_wear_monitor
+from leg_wear_monitor import whole_program
 from leg_wear_monitor.kernel import kernel
 
 LEAF = "from leg_wear_monitor.kernel import kernel\n@kernel\ndef slope(x):\n    return {factor} * x\n"
@@ -32,7 +34,7 @@ class Package:
         self.directory = directory / "leg_wear_monitor"
         self.directory.mkdir()
         (self.directory / "__init__.py").write_text("")
-        for name in ("code_cache", "errors", "kernel"):
+        for name in ("code_cache", "errors", "kernel", "whole_program"):
             shutil.copy(Path(leg_wear_monitor.__file__).with_name(f"{name}.py"), self.directory)
         (self.directory / "root.py").write_text(ROOT)
         self.write(2.0)
@@ -131,3 +133,44 @@ def test_a_kernel_that_allocates_is_refused():
 
     with pytest.raises(NumbaError):
         greedy(3)
+
+
+def test_numba_has_the_switches_for_a_quick_start():
+    """Without them all works, and a start takes three times as long: whole_program.py wants another look."""
+    assert whole_program.AVAILABLE
+
+
+@pytest.mark.parametrize("available", [True, False])
+def test_kernels_give_the_same_with_plain_numba(monkeypatch, available):
+    monkeypatch.setattr(whole_program, "AVAILABLE", available)
+
+    @kernel
+    def power(x, n):
+        result = 1.0
+        for _ in range(n):
+            result *= x
+        return result
+
+    @kernel
+    def polynomial(x):
+        return power(x, 3) + power(x, n=2)
+
+    @numba.njit
+    def entry_of_another(x):
+        return polynomial(x)
+
+    assert (power(2.0, 3), polynomial(2.0), entry_of_another(2.0)) == (8.0, 12.0, 12.0)
+
+
+def test_a_kernel_is_compiled_once_whatever_constants_it_is_called_with():
+    @kernel
+    def scaled(x, by):
+        return by * x
+
+    @kernel
+    def both(x):
+        return scaled(x, 2) + scaled(x, 3)
+
+    assert both(1.5) == 7.5
+    assert len(scaled._part.overloads) == 1
+    assert not scaled.overloads  # Python has not called it, so it was made no machine code of

@@ -1,0 +1,119 @@
+"""numba's compiler, told to optimise an entry once and as a whole: all that is private in numba is here.
+
+By itself numba compiles every function as a program of its own: it writes the wrappers that Python and C
+would call it by, optimises it with all that it calls, and makes machine code of it. A chain of kernels pays
+that at every level, for code that is inlined into the next level and thrown away. Here a kernel is typed and
+lowered and no more; the entry links the kernels that it needs, and is optimised once.
+
+Where numba's internals are not as expected, `AVAILABLE` is False and plain numba compiles: the same results,
+later.
+"""
+
+from collections.abc import Callable
+from typing import Any
+
+_LIBRARY = (
+    "_finalized", "_linking_libraries", "add_linking_library", "finalize", "get_pointer_to_function",
+)  # fmt: skip
+_FLAGS = ("no_cfunc_wrapper", "no_compile", "no_cpython_wrapper")
+_DISPATCHER = ("add_overload", "get_call_template", "get_overload")
+
+
+def _unliteral(one: Any) -> Any:
+    """The type of a constant; another type as it is."""
+    from numba.core.types.misc import unliteral
+
+    return unliteral(one)
+
+
+def _internals() -> tuple[Any, Any, Any] | None:
+    """Numba's classes for a library, a compiler and a dispatcher, if all that is used here is there."""
+    try:
+        from numba.core.codegen import CodeLibrary, JITCodeLibrary
+        from numba.core.compiler import Compiler, CompileResult, Flags
+        from numba.core.registry import CPUDispatcher
+
+        _unliteral(None)
+        attributes = {*dir(JITCodeLibrary), *JITCodeLibrary.__init__.__code__.co_names}
+        attributes.update(CodeLibrary.__init__.__code__.co_names)
+        used = (
+            *((Flags, name) for name in _FLAGS),
+            *((CPUDispatcher, name) for name in _DISPATCHER),
+            (Compiler, "compile_extra"),
+            (CompileResult, "_replace"),
+        )
+        complete = attributes.issuperset(_LIBRARY) and all(hasattr(owner, name) for owner, name in used)
+    except (AttributeError, ImportError):
+        return None
+    return (JITCodeLibrary, Compiler, CPUDispatcher) if complete else None
+
+
+_FOUND = _internals()
+
+AVAILABLE = _FOUND is not None
+
+_Library: Any
+_Compiler: Any
+_Dispatcher: Any
+_Library, _Compiler, _Dispatcher = _FOUND or (object, object, object)
+
+
+class _Part(_Library):  # type: ignore[misc]
+    """Code of a kernel: only ever linked into an entry, so neither optimised nor made machine code of."""
+
+    def finalize(self) -> None:
+        """Leave it as it was lowered; what it calls is linked beside it, not into it."""
+        self._finalized = True
+
+    def get_pointer_to_function(self, name: str) -> int:
+        """No address: it has no machine code."""
+        return 0
+
+
+class _PartCompiler(_Compiler):  # type: ignore[misc]
+    """The usual pipeline up to lowering."""
+
+    def compile_extra(self, func: Callable[..., object]) -> Any:
+        """Type and lower a kernel for the types of this pipeline."""
+        state = self.state
+        state.library = library = _Part(state.targetctx.codegen(), func.__qualname__)
+        state.flags.no_compile = state.flags.no_cpython_wrapper = state.flags.no_cfunc_wrapper = True
+        result = super().compile_extra(func)
+        # who calls it links it and all below it: a kernel that it calls has handed on its own list
+        below = library._linking_libraries = list(dict.fromkeys(library._linking_libraries))
+        key = object()  # stands for the function that Python would call
+        state.targetctx.insert_user_function(key, result.fndesc, [library, *below])
+        return result._replace(entry_point=key)
+
+
+class _PartDispatcher(_Dispatcher):  # type: ignore[misc]
+    """A kernel as other kernels and entries see it."""
+
+    def add_overload(self, cres: Any) -> None:
+        """Note a compiled kernel, without an address that Python could call."""
+        self.overloads[tuple(cres.signature.args)] = cres
+
+
+class KernelDispatcher(_Dispatcher):  # type: ignore[misc]
+    """A kernel: compiled like an entry if Python calls it, a part of what calls it in compiled code.
+
+    Parameters
+    ----------
+    py_func : callable
+    targetoptions : dict
+        As those of `numba.njit`.
+    """
+
+    def __init__(self, py_func: Callable[..., object], targetoptions: dict[str, object]) -> None:
+        options = {"nopython": True, **targetoptions}
+        super().__init__(py_func, targetoptions=options)
+        self._part = _PartDispatcher(py_func, targetoptions=options, pipeline_class=_PartCompiler)
+
+    def get_call_template(self, args: Any, kws: Any) -> Any:
+        """Compile the part for a call; a constant argument makes no other part, as it is inlined anyway."""
+        general = {name: _unliteral(one) for name, one in kws.items()}
+        return self._part.get_call_template([_unliteral(one) for one in args], general)
+
+    def get_overload(self, sig: Any) -> Any:
+        """What stands for the part with a signature."""
+        return self._part.get_overload(sig)

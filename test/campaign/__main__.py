@@ -11,7 +11,7 @@ from campaign import family
 def main() -> int:
     parser = argparse.ArgumentParser(prog="python -m campaign", description=__doc__)
     parser.add_argument("families", nargs="*", metavar="FAMILY", help=f"of {', '.join(family.names())}")
-    parser.add_argument("--short", action="store_true", help="only the cases that the tests run")
+    parser.add_argument("--short", action="store_true", help="only the first cases, some of each kind")
     parser.add_argument("--number", type=int, help="so many cases of each")
     parser.add_argument("--begin", type=int, default=0, metavar="SEED", help="leave out the seeds before")
     parser.add_argument("--case", type=int, metavar="SEED", help="one case of one family; its files are kept")

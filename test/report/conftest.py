@@ -1,10 +1,12 @@
 """Pages of studies small enough for tests."""
 
+from collections.abc import Callable
+from functools import cache
 from pathlib import Path
 
 import pytest
 
-from leg_wear_monitor.report.page import Page, page_html
+from leg_wear_monitor.report.page import Page
 from leg_wear_monitor.report.study.page import study_page
 from leg_wear_monitor.studies.execution.run import run_study
 from leg_wear_monitor.studies.plan.settings import parse_settings
@@ -34,23 +36,18 @@ TINY = {
 
 
 @pytest.fixture(scope="session")
-def studies(tmp_path_factory) -> dict[str, StudyResults]:
-    """Results of a tiny study of each name."""
-    found = {}
-    for name, keys in TINY.items():
+def study(tmp_path_factory) -> Callable[[str], StudyResults]:
+    """Results of a tiny study, by its name; computed when first asked for."""
+
+    def results(name: str) -> StudyResults:
         out: Path = tmp_path_factory.mktemp(name)
-        run_study(name, parse_settings(name, {"ensemble": ENSEMBLE, **keys}, name), out)
-        found[name] = load_results(out)
-    return found
+        run_study(name, parse_settings(name, {"ensemble": ENSEMBLE, **TINY[name]}, name), out)
+        return load_results(out)
+
+    return cache(results)
 
 
 @pytest.fixture(scope="session")
-def drawn(studies) -> dict[str, Page]:
-    """Their pages."""
-    return {name: study_page(results) for name, results in studies.items()}
-
-
-@pytest.fixture(scope="session")
-def pages(drawn) -> dict[str, str]:
-    """Their pages as HTML."""
-    return {name: page_html(page) for name, page in drawn.items()}
+def drawn(study) -> Callable[[str], Page]:
+    """Its page."""
+    return cache(lambda name: study_page(study(name)))

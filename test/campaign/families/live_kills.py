@@ -30,7 +30,7 @@ def case(seed: int) -> Case:
 
 
 def _killed(path: Path, choose: random.Random) -> tuple[Outcome, str]:
-    from monitor.test_kill import check, kept
+    from monitor.ledger.test_kill import check, kept
 
     lost_s = []
     for _ in range(KILLS):
@@ -60,8 +60,8 @@ def _walk(path: Path) -> Iterator[tuple[int, Iterator[str]]]:
         try:
             os.dup2(writing, 1)
             os.close(reading)
-            from monitor.test_kill import CHECKPOINT_S
-            from monitor.walker import walk
+            from monitor.ledger.test_kill import CHECKPOINT_S
+            from monitor.ledger.walker import walk
 
             walk(str(path), CHECKPOINT_S, 0.0, 10_000.0)
         finally:

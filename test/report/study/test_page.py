@@ -10,6 +10,7 @@ from leg_wear_monitor.report.page import Sentences, Table
 from leg_wear_monitor.report.study import findings
 from leg_wear_monitor.report.study.page import study_page
 from leg_wear_monitor.report.study.text import number, with_spread, zone_text
+from leg_wear_monitor.studies.plan.settings import STUDIES
 from leg_wear_monitor.studies.summary import Spread, power_law, spread
 
 
@@ -21,23 +22,22 @@ def conclusions(page):
     return "\n".join(parts(page, Sentences)[0].sentences)
 
 
-def test_every_page_has_configuration_versions_conclusions_and_units(drawn):
-    for name, page in drawn.items():
-        assert "mechanism: bionic_leg" in page.configuration
-        assert {"leg_wear_monitor", "code", "seed"} <= set(page.versions)
-        assert parts(page, Sentences), name
-        for table in parts(page, Table):
-            assert any("[" in cell for cell in table.head), table.caption
-            assert all(len(row) == len(table.head) for row in table.rows)
-        assert "nan" not in "".join(
-            cell for table in parts(page, Table) for row in table.rows for cell in row
-        )
+@pytest.mark.parametrize("name", STUDIES)
+def test_every_page_has_configuration_versions_conclusions_and_units(drawn, name):
+    page = drawn(name)
+    assert "mechanism: bionic_leg" in page.configuration
+    assert {"leg_wear_monitor", "code", "seed"} <= set(page.versions)
+    assert parts(page, Sentences)
+    for table in parts(page, Table):
+        assert any("[" in cell for cell in table.head), table.caption
+        assert all(len(row) == len(table.head) for row in table.rows)
+    assert "nan" not in "".join(cell for table in parts(page, Table) for row in table.rows for cell in row)
 
 
-def test_conclusions_are_computed_from_the_data(studies, drawn):
+def test_conclusions_are_computed_from_the_data(study, drawn):
     """Doubling an error doubles what is said of it, whatever that is."""
-    results = studies["size"]
-    text = conclusions(drawn["size"])
+    results = study("size")
+    text = conclusions(drawn("size"))
     before = float(re.search(r"toe displacement error goes from ([\d.]+)", text).group(1))
     doubled = tuple(
         {**arrays, "error_toe_position_m": 2.0 * arrays["error_toe_position_m"]} for arrays in results.arrays
@@ -47,8 +47,8 @@ def test_conclusions_are_computed_from_the_data(studies, drawn):
     assert after == pytest.approx(2.0 * before, rel=0.02)
 
 
-def test_a_superposition_is_called_one_only_where_it_is(studies):
-    parts_of = [(point.label, arrays) for point, arrays in studies["multi"].of("response")]
+def test_a_superposition_is_called_one_only_where_it_is(study):
+    parts_of = [(point.label, arrays) for point, arrays in study("multi").of("response")]
     *alone, (_, whole) = parts_of
     summed = {
         **whole,
@@ -63,8 +63,8 @@ def test_a_superposition_is_called_one_only_where_it_is(studies):
     assert findings.superposition(alone, halved)[0].startswith("All at once is not the sum")
 
 
-def test_points_that_failed_or_are_missing_come_first(studies):
-    results = studies["size"]
+def test_points_that_failed_or_are_missing_come_first(study):
+    results = study("size")
     arrays = ({"fault": np.array("pushed through")}, {}, *results.arrays[2:])
     page = study_page(attrs.evolve(results, arrays=arrays))
     assert page.sections[0].title == "What is missing"

@@ -33,7 +33,7 @@ function look(frame) {
     images: images.length,
     unnamed: images.filter((image) => !image.alt).length,
     tables: page.querySelectorAll("table").length,
-    findings: page.querySelectorAll(".findings li").length,
+    findings: page.querySelectorAll(".sentences li").length,
     small: Array.from(page.querySelectorAll("button, select"))
       .filter((part) => part.getBoundingClientRect().height < 24).length,
     slider: null

@@ -1,5 +1,5 @@
 # `make test` and `make demo` do all the set-up themselves, once: Python 3.11 to 3.13 with venv and a C compiler are enough.
-.PHONY: test test-slow demo campaign test-oldest lock sbom clean
+.PHONY: test test-slow test-oldest test-oldest-quick package colcon docs-check demo campaign lock sbom clean
 .DELETE_ON_ERROR:
 
 # Percent of lines and branches that the two runs of the tests reach together.
@@ -51,6 +51,34 @@ campaign: .venv/installed
 test-oldest: .venv-oldest/installed
 	.venv-oldest/bin/python -m pytest $(TWO) -W default
 
+# A wheel in an empty environment, without ROS and away from the checkout. What setuptools built before may be out of date.
+package: .venv/installed
+	rm -rf build/lib build/bdist.* build/wheel build/package
+	.venv/bin/python -m pip wheel --quiet --no-deps --no-build-isolation --wheel-dir build/wheel .
+	.venv/bin/python -m venv build/package
+	build/package/bin/python -m pip install --quiet --only-binary :all: --constraint constraints.txt build/wheel/*.whl
+	cd build/package && unset AMENT_PREFIX_PATH && bin/leg-wear-monitor --help && bin/leg-wear-monitor check \
+		&& bin/leg-wear-monitor simulate --clearances none && bin/python -c 'import leg_wear_monitor'
+
+# As in a ROS 2 workspace, with a selection of the tests. colcon runs the Python that runs it: the one that has our libraries.
+COLCON = PYTHONPATH=$(wildcard .venv-tools/lib/python3*/site-packages) .venv/bin/python .venv-tools/bin/colcon --log-base build/colcon/log
+COLCON_BASES := --base-paths . --build-base build/colcon/build
+colcon: .venv/installed .venv-tools/installed
+	rm -rf build/colcon
+	$(COLCON) build $(COLCON_BASES) --install-base build/colcon/install
+	$(COLCON) test $(COLCON_BASES) --install-base build/colcon/install --pytest-args test/test_packaging.py test/monitor/alarms/test_words.py
+	$(COLCON) test-result --test-result-base build/colcon/build --verbose
+
+# Spelling, and links from one document to another.
+docs-check: .venv/installed .venv-tools/installed
+	.venv-tools/bin/codespell *.md *.rst Makefile docs benchmarks config launch security leg_wear_monitor test
+	.venv/bin/python -m pytest --quiet test/test_docs_links.py
+
+# The part of it that CI has time for: uncompiled, where it is quick.
+test-oldest-quick: .venv-oldest/installed
+	NUMBA_DISABLE_JIT=1 .venv-oldest/bin/python -m pytest $(TWO) -W default -m "plain and not slow" \
+		test/contact test/messages test/monitor
+
 clean:
 	rm -rf .venv .venv-oldest .venv-tools build dist *.egg-info .coverage .hypothesis .import_linter_cache .*_cache
 
@@ -69,8 +97,9 @@ clean:
 	$(@D)/bin/python -m pip install --quiet --constraint constraints-oldest.txt --no-build-isolation --editable ".[bags,test]"
 	@touch $@
 
-.venv-tools/installed: requirements-tools.lock
+.venv-tools/installed: requirements-build.lock requirements-tools.lock
 	$(call environment,python3.13 python3.12 python3.11 python3)
+	$(call locked,requirements-build.lock)
 	$(call locked,requirements-tools.lock)
 	@touch $@
 
@@ -79,13 +108,16 @@ lock: .venv-tools/installed
 	$(LOCK) --constraint constraints.txt --extra ros --extra bags --extra test --extra lint --extra dask \
 		--output-file requirements.lock setup.py
 	printf 'setuptools\nwheel\n' | $(LOCK) --constraint constraints.txt --output-file requirements-build.lock -
-	printf 'cyclonedx-bom[validation]\nuv\n' | $(LOCK) --output-file requirements-tools.lock -
+	printf '%s\n' $(TOOLS) | $(LOCK) --output-file requirements-tools.lock -
 
 # A bill of materials in CycloneDX's format: all that is in the environment of `make test`, this package included.
 sbom: .venv/installed .venv-tools/installed
 	@mkdir -p build
 	.venv-tools/bin/cyclonedx-py environment --spec-version 1.6 --output-format JSON --output-reproducible --validate \
 		--output-file build/sbom.cdx.json .venv/bin/python
+
+TOOLS := codespell colcon-core colcon-package-selection colcon-python-setup-py colcon-recursive-crawl colcon-ros \
+	colcon-test-result 'cyclonedx-bom[validation]' uv
 
 LOCK := .venv-tools/bin/uv pip compile --quiet --universal --python-version 3.11 --generate-hashes --no-annotate --no-header \
 	--no-emit-index-url --no-emit-find-links

@@ -12,6 +12,7 @@ from leg_wear_monitor.bags.findings import Finding, RecordingError, Severity
 from leg_wear_monitor.bags.sources import Source
 from leg_wear_monitor.bags.topics import listed
 from leg_wear_monitor.mechanism.arrays import Floats
+from leg_wear_monitor.mechanism.ideal import TURN
 from leg_wear_monitor.twin.sample import CRANK, NO_FAULT, Samples
 
 _KEPT = 8192  # samples of each file that others are compared with
@@ -113,4 +114,4 @@ def _motion(samples: Samples) -> _Motion:
 
 def _wrapped(angle: Floats) -> Floats:
     """The same angle within half a turn of 0 [rad]."""
-    return np.asarray((angle + math.pi) % (2.0 * math.pi) - math.pi)
+    return np.asarray((angle + math.pi) % TURN - math.pi)

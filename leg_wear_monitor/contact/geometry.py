@@ -9,7 +9,10 @@ _SHARPEST = 1.0  # largest part of the gradient across e that the bend makes, wh
 
 @kernel
 def journal_contact(ex, ey, clearance):
-    """Penetration [m] and unit normal of a journal at eccentricity (ex, ey) [m]; negative when apart."""
+    """Penetration [m] and unit normal of a journal at eccentricity (ex, ey) [m]; negative when apart.
+
+    physics.md section 3.
+    """
     e = math.sqrt(ex * ex + ey * ey)
     if e == 0.0:
         return -clearance, 1.0, 0.0
@@ -52,6 +55,7 @@ def contact_half_angle(eccentricity, bushing_radius, journal_radius):
     """Half angle of the arc [rad] in which two circles with centres this far apart overlap.
 
     The circles cross where cos psi = (R_b^2 + e^2 - R_j^2) / (2 R_b e); 0 when they do not.
+    physics.md section 5.
     """
     if eccentricity <= bushing_radius - journal_radius:
         return 0.0
@@ -67,5 +71,8 @@ def contact_modulus(youngs_b: float, poisson_b: float, youngs_j: float, poisson_
 
 @kernel
 def contact_stiffness(modulus, bushing_radius, journal_radius):
-    """Hertz stiffness K [N/m^1.5] of a pin inside a bushing: modulus sqrt(R_b R_j / (R_b - R_j))."""
+    """Hertz stiffness K [N/m^1.5] of a pin inside a bushing: modulus sqrt(R_b R_j / (R_b - R_j)).
+
+    physics.md section 4.
+    """
     return modulus * math.sqrt(bushing_radius * journal_radius / (bushing_radius - journal_radius))

@@ -136,7 +136,7 @@ def jacobians_at(arrays, rows, q, v, drive, cs, phi, gamma, out_jac):
 
 @kernel
 def _revolute(arrays, joint, r, q, v, cs, out_phi, out_jac, out_gamma):
-    """The two points coincide: phi = P_journal - P_bushing."""
+    """The two points coincide: phi = P_journal - P_bushing; physics.md section 1."""
     b, j = arrays.joint_body[joint, 0], arrays.joint_body[joint, 1]
     sbx, sby = arm(cs, b, arrays.joint_point[joint, 0])
     sjx, sjy = arm(cs, j, arrays.joint_point[joint, 1])

@@ -1,4 +1,7 @@
-"""Applied forces: gravity, springs, loads over the gait phase; the energy they store; a drive's torque."""
+"""Applied forces: gravity, springs, loads over the gait phase; the energy they store; a drive's torque.
+
+The generalised forces Q of physics.md section 2.
+"""
 
 import math
 

@@ -10,9 +10,9 @@ from itertools import islice
 import attrs
 
 from leg_wear_monitor.mechanism.clearance import Clearance
+from leg_wear_monitor.mechanism.ideal import TURN
 from leg_wear_monitor.mechanism.spec import Body, Mechanism, PhaseLoad, SpeedDrive, TorqueDrive, Vector
 
-TURN = 2.0 * math.pi
 _USUAL_LENGTH = 5.0e-3, 5.0  # m, of the largest link
 _ROUND = 1.0e-3  # rpm: how near a speed in rad/s is to a whole number of rpm when it was converted
 

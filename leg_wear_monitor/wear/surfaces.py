@@ -14,6 +14,7 @@ import numpy as np
 from leg_wear_monitor.contact.arrays import ContactArrays
 from leg_wear_monitor.kernel import kernel
 from leg_wear_monitor.mechanism.arrays import Floats
+from leg_wear_monitor.mechanism.ideal import TURN
 
 SECTORS = 720
 
@@ -39,7 +40,7 @@ def fresh_surfaces(contacts: ContactArrays, feeds_back: bool, sectors: int = SEC
 def profile_at(profile, angle):
     """Depth [m] at an angle of the surface's own frame [rad], and its first and second derivative by it.
 
-    Those of the quadratic spline over the sectors: the slope has no jumps.
+    Those of the quadratic spline over the sectors: the slope has no jumps. physics.md section 6.
     """
     n = profile.shape[0]
     turns = angle * _TURNS_PER_RAD
@@ -58,7 +59,7 @@ def local_surfaces(contacts, surfaces, k, direction, angle_b, angle_j):
     """Radii [m] of bushing and journal in a direction [rad] of the ground's frame, and how depths change.
 
     First and second derivatives of the depths by the direction: slopes of both [m/rad], then bends [m/rad^2];
-    0 unless wear feeds back.
+    0 unless wear feeds back. physics.md section 6.
     """
     bushing = contacts.bushing_radius[k]
     journal = bushing - contacts.clearance[k]
@@ -73,10 +74,10 @@ def local_surfaces(contacts, surfaces, k, direction, angle_b, angle_j):
 def _weigh_arc(contacts, surfaces, k, ex, ey, angle_b, angle_j, centre, side, out_weight):
     """Overlap [m] of the sectors from the centre to one side; returns its sum and how many there are.
 
-    The cosine is stepped from sector to sector by rotation.
+    The cosine is stepped from sector to sector by rotation. physics.md section 6.
     """
     n = surfaces.depth.shape[2]
-    width = 2.0 * math.pi / n
+    width = TURN / n
     along = angle_b + (centre + 0.5) * width
     cos_step, sin_step = math.cos(width), side * math.sin(width)
     c, s = math.cos(along), math.sin(along)
@@ -103,9 +104,10 @@ def deposit_wear(contacts, surfaces, k, ex, ey, angle_b, angle_j, integral, out_
 
     The removed volumes are k_b and k_j times the integral: the sum over sectors of depth x R_b x sector x
     width. Both surfaces have the contact's own area, so equal coefficients wear equally deep.
+    physics.md sections 5 and 6.
     """
     n = surfaces.depth.shape[2]
-    sector = 2.0 * math.pi / n
+    sector = TURN / n
     towards = math.floor((math.atan2(ey, ex) - angle_b) / sector) % n
     for beside in range(
         2 * _BESIDE + 1
@@ -137,7 +139,7 @@ def deposit_wear(contacts, surfaces, k, ex, ey, angle_b, angle_j, integral, out_
 
 def worn_volume(contacts: ContactArrays, surfaces: Surfaces) -> Floats:
     """Volume (k, 2) [m^3] gone from bushing and journal."""
-    sector = 2.0 * math.pi / surfaces.depth.shape[2]
+    sector = TURN / surfaces.depth.shape[2]
     area = contacts.bushing_radius * contacts.width * sector
     return np.asarray(surfaces.depth.sum(axis=2) * area[:, None])
 

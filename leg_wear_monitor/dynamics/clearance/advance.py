@@ -27,10 +27,10 @@ from leg_wear_monitor.dynamics.clearance.step import (
     wear_what_turned,
 )
 from leg_wear_monitor.dynamics.joint.contact_event import (
-    DELTA,
     F_N,
     NEVER,
     first_contact_event,
+    pushed_through,
     update_contacts,
 )
 from leg_wear_monitor.dynamics.joint.joint_contact import contact_energy
@@ -144,13 +144,13 @@ def _steps(model, surfaces, state, begin, length, statistics, work):
             state.step[0] = h * max(0.2, 0.9 * error ** (-1.0 / 3.0)) if error < 1.0e9 else 0.1 * h
             cut = NEVER
             if state.step[0] < _SHORTEST_STEP or trials > MOST_TRIALS:
-                return STEP_TOO_SMALL, _pushed_through(contacts.bushing_radius, end)
+                return STEP_TOO_SMALL, pushed_through(contacts.bushing_radius, end)
             continue
         fraction = first_contact_event(approach, h, start, end)
         if fraction < 1.0 and fraction * h > _SHORTEST_STEP and trials <= MOST_TRIALS:
             cut = fraction * h
             continue
-        pushed = _pushed_through(contacts.bushing_radius, end)
+        pushed = pushed_through(contacts.bushing_radius, end)
         if pushed >= 0:
             return PUSHED_THROUGH, pushed
         if cut == NEVER:
@@ -201,15 +201,6 @@ def _look_at_drive(now, x, sample, out_drive, statistics):
     statistics.drive_range[0] = min(statistics.drive_range[0], torque)
     statistics.drive_range[1] = max(statistics.drive_range[1], torque)
     statistics.response[TORQUE_ERROR] = max(statistics.response[TORQUE_ERROR], abs(torque - now.torque_0[0]))
-
-
-@kernel
-def _pushed_through(bushing_radius, sample):
-    """First clearance joint whose journal is pushed further than a tenth of the bushing's radius, else -1."""
-    for k in range(sample.shape[0]):
-        if not sample[k, DELTA] < 0.1 * bushing_radius[k]:
-            return k
-    return -1
 
 
 @kernel

@@ -12,12 +12,12 @@ import numpy as np
 
 from leg_wear_monitor.dynamics.full.model import FullModel, FullScratch, accelerate, full_scratch
 from leg_wear_monitor.dynamics.joint.contact_event import (
-    DELTA,
     EX,
     EY,
     NEVER,
     SAMPLE,
     first_contact_event,
+    pushed_through,
     update_contacts,
 )
 from leg_wear_monitor.dynamics.joint.joint_contact import wear_joint
@@ -157,15 +157,6 @@ def _accept(model, surfaces, state, h, toe, statistics, work):
     return changed
 
 
-@kernel
-def _pushed_through(model, scratch):
-    """First clearance joint whose journal is pushed further than a tenth of the bushing's radius, else -1."""
-    for k in range(model.contacts.joint.shape[0]):
-        if not scratch.contact[k, DELTA] < 0.1 * model.contacts.bushing_radius[k]:
-            return k
-    return -1
-
-
 @entry
 def advance_full(model, surfaces, state, polynomial, t_end, toe, statistics, work):
     """Advance the state to t_end [s] and add to the tally.
@@ -194,13 +185,13 @@ def advance_full(model, surfaces, state, polynomial, t_end, toe, statistics, wor
             state.clock[1] = next_step(h, error, 1.0)
             cut = NEVER
             if state.clock[1] < _SHORTEST_STEP:
-                return STEP_TOO_SMALL, _pushed_through(model, scratch)
+                return STEP_TOO_SMALL, pushed_through(model.contacts.bushing_radius, scratch.contact)
             continue
         fraction = first_contact_event(state.approach, h, work.start, scratch.contact)
         if fraction < 1.0 and fraction * h > _SHORTEST_STEP:
             cut = fraction * h / state.clock[1]
             continue
-        pushed = _pushed_through(model, scratch)
+        pushed = pushed_through(model.contacts.bushing_radius, scratch.contact)
         if pushed >= 0:
             return PUSHED_THROUGH, pushed
         if not ends and cut == NEVER:

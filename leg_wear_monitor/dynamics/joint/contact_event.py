@@ -96,3 +96,12 @@ def update_contacts(joint, speed_floor, t, h, start, end, approach, recent, peak
             approach[k] = 0.0
             changed = True
     return changed
+
+
+@kernel
+def pushed_through(bushing_radius, sample):
+    """First clearance joint whose journal is pushed further than a tenth of the bushing's radius, else -1."""
+    for k in range(sample.shape[0]):
+        if not sample[k, DELTA] < 0.1 * bushing_radius[k]:
+            return k
+    return -1

@@ -20,6 +20,7 @@ def penetration(contacts, surfaces, k, ex, ey, direction, angle_b, angle_j):
     fractions of the penetration's rate that the turning of bushing and journal make, by their speeds [m/rad].
     The normal is a unit vector on fresh surfaces, see `worn_contact` for worn ones: the normal force times
     it is the gradient of the contact's energy, to which the stiffness that changes from place to place adds.
+    physics.md section 3.
     """
     bushing, journal, slope_b, slope_j, bend_b, bend_j = local_surfaces(
         contacts, surfaces, k, direction, angle_b, angle_j
@@ -42,7 +43,7 @@ def penetration(contacts, surfaces, k, ex, ey, direction, angle_b, angle_j):
 
 @kernel
 def stiffness_at(contacts, k, bushing, journal):
-    """Contact stiffness [N/m^1.5] of clearance joint k at the local radii [m]."""
+    """Contact stiffness [N/m^1.5] of clearance joint k at the local radii [m]; physics.md section 4."""
     if contacts.stiffness[k] > 0.0:
         return contacts.stiffness[k]
     return contact_stiffness(contacts.modulus[k], bushing, journal)
@@ -56,7 +57,7 @@ def joint_force(contacts, surfaces, k, ex, ey, vx, vy, angle_b, angle_j, speed_b
     journal's body. Both forces act at the bushing's surface point P_b + R_b n, so action equals reaction
     in moments too; the slip is that of the two bodies there. A worn bushing that turns lifts the journal
     like a cam, by the couple ``moment`` between the bodies. The work of all is F_N delta_dot and F_t v_t
-    exactly.
+    exactly. physics.md sections 3 and 4.
 
     Returns
     -------
@@ -81,7 +82,7 @@ def joint_force(contacts, surfaces, k, ex, ey, vx, vy, angle_b, angle_j, speed_b
 
 @kernel
 def contact_energy(contacts, surfaces, k, ex, ey, angle_b, angle_j):
-    """Elastic energy [J] in clearance joint k."""
+    """Elastic energy [J] in clearance joint k; physics.md section 3."""
     direction = math.atan2(ey, ex) if surfaces.feeds_back else 0.0
     delta, _, _, bushing, journal, _, _ = penetration(
         contacts, surfaces, k, ex, ey, direction, angle_b, angle_j

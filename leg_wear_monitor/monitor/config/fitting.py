@@ -1,6 +1,5 @@
 """The mechanism as the parameters want it: which joints are loose, how far, and how fast they wear."""
 
-import math
 from collections.abc import Sequence
 from typing import Any
 
@@ -11,6 +10,7 @@ from leg_wear_monitor.configuration.quantity import FieldError
 from leg_wear_monitor.errors import ConfigError
 from leg_wear_monitor.mechanism.clearance import Clearance
 from leg_wear_monitor.mechanism.clearance_range import limit_fault
+from leg_wear_monitor.mechanism.ideal import TURN
 from leg_wear_monitor.mechanism.spec import Mechanism, SpeedDrive
 from leg_wear_monitor.monitor.config.settings import MonitorConfig
 from leg_wear_monitor.twin.settings import TrackerSettings, TwinSettings
@@ -40,7 +40,7 @@ def fitted(mechanism: Mechanism, config: MonitorConfig, source: str = "parameter
         )
     clearance_joints = config.clearance_joints or mechanism.clearance_joints
     _check_joints(clearance_joints, mechanism, source)
-    speed = 2.0 * math.pi * (config.cadence.commanded_rpm / 60.0)
+    speed = TURN * (config.cadence.commanded_rpm / 60.0)
     settings = {
         name: _settings(mechanism, config, clearance_joints, k, source)
         for k, name in enumerate(clearance_joints)
@@ -96,7 +96,7 @@ def twin_settings(config: MonitorConfig, source: str = "parameters") -> TwinSett
         )
     return TwinSettings(
         tracker=TrackerSettings(
-            commanded_speed_radps=2.0 * math.pi * (cadence.commanded_rpm / 60.0),
+            commanded_speed_radps=TURN * (cadence.commanded_rpm / 60.0),
             bandwidth_hz=tracker.bandwidth_hz,
             reorder_window_s=tracker.reorder_window_s,
             bridge_limit_s=tracker.gap_limit_s,

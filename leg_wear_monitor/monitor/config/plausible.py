@@ -3,6 +3,7 @@
 import math
 from collections.abc import Iterator
 
+from leg_wear_monitor.mechanism.ideal import TURN
 from leg_wear_monitor.mechanism.plausible import Doubt
 from leg_wear_monitor.mechanism.spec import Mechanism
 from leg_wear_monitor.monitor.config.settings import MonitorConfig
@@ -20,7 +21,7 @@ def _gait(config: MonitorConfig) -> Iterator[Doubt]:
         cycle = f"{rpm:g} rpm is {60.0 / abs(rpm):.3g} s a gait cycle"
         hint = f"rad/s for rpm? {rpm:g} rad/s is {meant:.4g} rpm"
         yield Doubt("cadence.commanded_rpm", f"{cycle}; {hint}")
-    if abs(offset) > 2.0 * math.pi:
+    if abs(offset) > TURN:
         yield Doubt("crank.offset_rad", f"{offset:g} rad is more than a turn; degrees for rad?")
 
 

@@ -6,6 +6,7 @@ from collections import Counter
 import attrs
 import numpy as np
 
+from leg_wear_monitor.mechanism.ideal import TURN
 from leg_wear_monitor.monitor.config.settings import MonitorConfig
 from leg_wear_monitor.monitor.reports import CycleReport
 from leg_wear_monitor.twin.sample import CRANK, FAULTS, NO_FAULT, Samples
@@ -83,7 +84,7 @@ class GaitEvidence:
         steps = np.diff(stamps.astype(float)) / 1e9
         ahead = (steps > 0.0) & (steps <= self.config.tracker.gap_limit_s)
         with np.errstate(over="ignore", invalid="ignore"):  # an angle may be anything that is finite
-            turned = (np.diff(angles)[ahead] + math.pi) % (2.0 * math.pi) - math.pi
+            turned = (np.diff(angles)[ahead] + math.pi) % TURN - math.pi
         self._turned_rad += abs(float(np.nansum(turned)))
         self._passed_s += float(steps[ahead].sum())
 
@@ -110,7 +111,7 @@ class GaitEvidence:
         gap, commanded = self.config.tracker.gap_limit_s, self.config.cadence.commanded_rpm
         if not self._passed_s:
             return f"no two of {self._sound} crank samples follow each other within {gap:g} s"
-        turns, rate = self._turned_rad / (2.0 * math.pi), self._sound / self._passed_s
+        turns, rate = self._turned_rad / TURN, self._sound / self._passed_s
         rpm, needed = 60.0 * turns / self._passed_s, _SAMPLES_A_TURN * abs(commanded) / 60.0
         if rate < needed:
             return f"crank samples come at {rate:.3g} Hz, too few: {commanded:.3g} rpm need {needed:.3g} Hz"

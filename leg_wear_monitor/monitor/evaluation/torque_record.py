@@ -4,6 +4,7 @@ import math
 
 import attrs
 
+from leg_wear_monitor.mechanism.ideal import TURN
 from leg_wear_monitor.monitor.reports import CycleReport
 from leg_wear_monitor.twin.statistics import CycleStatistics
 
@@ -31,7 +32,7 @@ class LagBySpeed:
         lag_s, sigma_s = figures.torque.cycle_lag_s, figures.torque.cycle_lag_sigma_s
         if not (math.isfinite(lag_s) and sigma_s > 0.0):
             return self
-        x, w = figures.direction * figures.moving_s / (2.0 * math.pi), 1.0 / sigma_s**2
+        x, w = figures.direction * figures.moving_s / TURN, 1.0 / sigma_s**2
         new = (w, w * x, w * x * x, w * lag_s, w * x * lag_s)
         w0, w1, w2, wy, wxy = (_FORGETTING * a + b for a, b in zip(self.sums, new, strict=True))
         return LagBySpeed((w0, w1, w2, wy, wxy))

@@ -8,6 +8,7 @@ from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 
 from leg_wear_monitor.mechanism.arrays import Floats
+from leg_wear_monitor.mechanism.ideal import TURN
 from leg_wear_monitor.report.figures.figure import BLUE, INK, SMALL, USUAL, VERMILION, new_figure, tidy
 
 _LEAST_N = 0.1  # of a logarithmic axis; a journal in free flight bears nothing
@@ -23,7 +24,7 @@ def force_traces(trace: dict[str, Any], joints: Sequence[str]) -> Figure:
     joints : sequence of str
         Joints to show.
     """
-    turns = np.array(trace["crank_angle_rad"]) / (2.0 * np.pi)
+    turns = np.array(trace["crank_angle_rad"]) / TURN
     figure = new_figure(9.0, 1.1 * (1 + len(joints)) + 0.6)
     panels = np.atleast_1d(figure.subplots(1 + len(joints), 1, sharex=True))
     _draw(panels[0], turns, np.array(trace["drive_torque_nm"]), "drive\n[N m]", VERMILION)

@@ -8,6 +8,7 @@ from matplotlib.figure import Figure
 from matplotlib.lines import Line2D
 
 from leg_wear_monitor.mechanism.arrays import Floats
+from leg_wear_monitor.mechanism.ideal import TURN
 from leg_wear_monitor.report.figures.figure import BLUE, INK, PALE, SMALL, USUAL, VERMILION, new_figure, tidy
 from leg_wear_monitor.wear.surfaces import BUSHING, JOURNAL, Surfaces, wear_zone
 
@@ -71,7 +72,7 @@ def unit_of(greatest: float) -> tuple[float, str]:
 def draw_section(axes: Axes, depth: Floats, zone: tuple[float, float] | None, radius: float) -> str:
     """Bushing and journal with their wear, and by what factor its depth is drawn too large."""
     n, greatest = depth.shape[1], float(depth.max())
-    angle = (np.arange(n + 1) + 0.5) * (2.0 * math.pi / n)
+    angle = (np.arange(n + 1) + 0.5) * (TURN / n)
     drawn = np.concatenate([depth, depth[:, :1]], axis=1) * (_DEEPEST / greatest if greatest > 0.0 else 0.0)
     axes.fill_between(angle, _BUSHING + drawn[BUSHING], _RIM, color=BLUE, alpha=0.3, linewidth=0.0)
     axes.plot(angle, _BUSHING + drawn[BUSHING], color=BLUE, linewidth=1.4)

@@ -13,7 +13,7 @@ from leg_wear_monitor.dynamics.run.run_statistics import (
     new_run_statistics,
 )
 from leg_wear_monitor.mechanism.arrays import Floats
-from leg_wear_monitor.mechanism.ideal import one_cycle, point_motion
+from leg_wear_monitor.mechanism.ideal import TURN, one_cycle, point_motion
 from leg_wear_monitor.mechanism.position import Linkage
 from leg_wear_monitor.mechanism.spec import Mechanism
 from leg_wear_monitor.studies.point import Arrays
@@ -66,7 +66,7 @@ def _follow(leg: ObservedLeg, settings: dict[str, Any]) -> dict[str, Any]:
     joints, clearance_joints = len(setup.linkage.mechanism.joints), list(setup.contacts.joint)
     leg.advance(settings["skip_cycles"] * SAMPLES, new_run_statistics(joints))
     statistics, depth = new_run_statistics(joints), setup.surfaces.depth.copy()
-    shift = round(leg.stepper.state.drive[0] / (2.0 * np.pi) * SAMPLES) % SAMPLES
+    shift = round(leg.stepper.state.drive[0] / TURN * SAMPLES) % SAMPLES
     largest: list[Floats] = []
     peaks: list[Floats] = []
     impacts = [statistics.impacts.copy()]

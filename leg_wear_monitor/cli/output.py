@@ -4,7 +4,11 @@ import os
 from collections.abc import Mapping
 from pathlib import Path
 
+import click
+
 from leg_wear_monitor.errors import ConfigError
+
+STDOUT = Path("-")
 
 
 def check_file(option: str, path: Path) -> None:
@@ -40,6 +44,31 @@ def check_directory(option: str, path: Path) -> None:
     if not above.is_dir():
         raise ConfigError(option, str(path), f"{above} is a file, expected a directory")
     _try(option, path, above)
+
+
+def check_outputs(json_file: Path | None, out: Path | None) -> None:
+    """Make sure that the places of ``--json`` and ``--out`` can be written, as far as they are asked for.
+
+    Raises
+    ------
+    ConfigError
+        Naming the option, the path and why not.
+    """
+    if json_file is not None and json_file != STDOUT:
+        check_file("--json", json_file)
+    if out is not None:
+        check_directory("--out", out)
+
+
+def write_json(path: Path | None, text: str) -> list[Path]:
+    """Write JSON to the place of ``--json``, and give the files written: none for stdout."""
+    if path is None:
+        return []
+    if path == STDOUT:
+        click.echo(text, nl=False)
+        return []
+    write_file(path, text.encode())
+    return [path]
 
 
 def write_file(path: Path, content: bytes) -> None:

@@ -1,6 +1,5 @@
 """``leg-wear-monitor life``: a leg from new until a clearance reaches its limit, by cycle jumps."""
 
-import json
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
@@ -8,8 +7,16 @@ import click
 
 from leg_wear_monitor.cli.doubts import warn_of
 from leg_wear_monitor.cli.number import bounded, options_named
-from leg_wear_monitor.cli.output import check_directory, check_file, write_directory, write_file
+from leg_wear_monitor.cli.options import (
+    clearances_option,
+    json_option,
+    mechanism_option,
+    out_option,
+    speed_option,
+)
+from leg_wear_monitor.cli.output import STDOUT, check_outputs, write_directory, write_json
 from leg_wear_monitor.cli.waiting import compilation, progress_bar
+from leg_wear_monitor.json_text import json_text
 
 if TYPE_CHECKING:
     from leg_wear_monitor.life.result import Life
@@ -22,11 +29,9 @@ _ROWS = 12  # of the table
 
 
 @click.command(short_help="A leg's wear over its life, by cycle jumps.")
-@click.option("--mechanism", metavar="FILE", default="bionic_leg", show_default=True, help="The leg.")
-@click.option("--clearances", metavar="A,B", help="The clearance joints.  [default: the mechanism's own]")
-@click.option(
-    "--speed-rpm", type=float, callback=bounded("rpm"), metavar="RPM", help="Crank speed.  [default: its own]"
-)
+@mechanism_option
+@clearances_option("A,B")
+@speed_option
 @click.option(
     "--limit-m",
     type=float,
@@ -74,14 +79,8 @@ _ROWS = 12  # of the table
     help="Lives for --json: further ones have coefficients that differ, to show the forecast how joints act "
     "upon each other.",
 )
-@click.option(
-    "--json",
-    "json_file",
-    type=click.Path(path_type=Path),
-    metavar="FILE",
-    help="Write the life as JSON.",
-)
-@click.option("--out", type=click.Path(path_type=Path), metavar="DIR", help="Write life.json and life.png.")
+@json_option("the life")
+@out_option("Write life.json and life.png.")
 def life(mechanism: str, json_file: Path | None, out: Path | None, **options: Any) -> None:
     """Let a leg wear from new until a clearance reaches its limit.
 
@@ -93,25 +92,21 @@ def life(mechanism: str, json_file: Path | None, out: Path | None, **options: An
 
     names = options.pop("clearances")
     leg = _with_clearance_joints(load_mechanism(mechanism), names)
-    if json_file is not None:
-        check_file("--json", json_file)
-    if out is not None:
-        check_directory("--out", out)
+    check_outputs(json_file, out)
     with options_named():
         lives = _lives(leg, **options)
     warn_of(leg.source, doubts(leg))  # what fails names them itself, in its one line
     result = lives[0][1]
-    for line in lines(result, options["limit_m"]):
-        click.echo(line)
-    text = (json.dumps(_document(leg, lives), indent=1, allow_nan=False) + "\n").encode()
-    if json_file is not None:
-        write_file(json_file, text)
-        click.echo(f"written: {json_file}")
+    text = json_text(_document(leg, lives))
+    written = write_json(json_file, text)
     if out is not None:
         from leg_wear_monitor.report.figures.life_picture import life_picture
 
-        for path in write_directory(out, {"life.json": text, "life.png": life_picture(result)}):
-            click.echo(f"written: {path}")
+        files = {"life.json": text.encode(), "life.png": life_picture(result)}
+        written += write_directory(out, files)
+    if json_file != STDOUT:
+        for line in [*lines(result, options["limit_m"]), *(f"written: {path}" for path in written)]:
+            click.echo(line)
 
 
 def _with_clearance_joints(leg: "Mechanism", names: str | None) -> "Mechanism":

@@ -1,6 +1,5 @@
 """``leg-wear-monitor replay``: a recording through the same monitor that runs live."""
 
-import json
 import time
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
@@ -8,10 +7,12 @@ from typing import TYPE_CHECKING, Any
 import click
 
 from leg_wear_monitor.cli.main import version
-from leg_wear_monitor.cli.output import check_directory, check_file, write_directory, write_file
+from leg_wear_monitor.cli.options import json_option, out_option
+from leg_wear_monitor.cli.output import STDOUT, check_outputs, write_directory, write_json
 from leg_wear_monitor.cli.waiting import compilation, progress_bar
 from leg_wear_monitor.errors import LegWearError
 from leg_wear_monitor.interrupt import closed_at_the_end
+from leg_wear_monitor.json_text import json_text
 
 if TYPE_CHECKING:
     from collections.abc import Callable
@@ -42,12 +43,7 @@ _MOST_LINES = 20
 
 @click.command(short_help="A recording through the same monitor that runs live.")
 @click.argument("bags", nargs=-1, required=True, type=click.Path(path_type=Path), metavar="BAG...")
-@click.option(
-    "--out",
-    type=click.Path(path_type=Path),
-    metavar="DIR",
-    help="Write reports.mcap (for rosbag2 and Foxglove), summary.json and report.html.",
-)
+@out_option("Write reports.mcap (for rosbag2 and Foxglove), summary.json and report.html.")
 @click.option(
     "--config",
     type=click.Path(path_type=Path),
@@ -93,13 +89,7 @@ _MOST_LINES = 20
     help="Exit with 1 if any alarm was raised, any warning, any alarm of the input, or one of a kind: "
     f"{', '.join(ALARM_KINDS)}. May be repeated.",
 )
-@click.option(
-    "--json",
-    "json_file",
-    type=click.Path(allow_dash=True, path_type=Path),
-    metavar="FILE",
-    help="Write the summary as JSON; - for stdout, which then holds nothing else.",
-)
+@json_option("the summary")
 def replay(
     bags: tuple[Path, ...],
     out: Path | None,
@@ -113,11 +103,7 @@ def replay(
     Exits with 1 if parts of a recording were lost, if no gait cycle in it can be this leg's, or for an alarm
     asked for with --fail-on.
     """
-    to_stdout = json_file == Path("-")
-    if json_file is not None and not to_stdout:
-        check_file("--json", json_file)
-    if out is not None:
-        check_directory("--out", out)
+    check_outputs(json_file, out)
     written: list[Path] = []
 
     def write(result: "ReplayResult", wall_s: float) -> None:
@@ -131,7 +117,7 @@ def replay(
     if result.is_unusable:
         missing = result.evidence.missing()
         click.echo(f"warning: no gait cycle can be this leg's, so no forces are given: {missing}", err=True)
-    if not to_stdout:
+    if json_file != STDOUT:
         from leg_wear_monitor.cli.replay_tables import print_replay
 
         print_replay(result, wall_s)
@@ -212,17 +198,12 @@ def _write(result: "ReplayResult", wall_s: float, out: Path | None, json_file: P
     from leg_wear_monitor.playback.summary import summary
 
     record = {**summary(result, wall_s), "made_with": {"leg_wear_monitor": version()}}
-    text = json.dumps(record, indent=1, allow_nan=False) + "\n"
+    text = json_text(record)
     written: list[Path] = []
     if out is not None:
         files = {SUMMARY: text.encode(), PAGE: page_of(record)}
         written = [out / REPORTS_FILE, *write_directory(out, files)]
-    if json_file == Path("-"):
-        click.echo(text, nl=False)
-    elif json_file is not None:
-        write_file(json_file, text.encode())
-        written.append(json_file)
-    return written
+    return written + write_json(json_file, text)
 
 
 def page_of(record: dict[str, Any]) -> bytes:

@@ -1,6 +1,5 @@
 """``leg-wear-monitor simulate``: the leg offline, ideal or with clearances."""
 
-import json
 import time
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
@@ -9,8 +8,16 @@ import click
 
 from leg_wear_monitor.cli.doubts import warn_of
 from leg_wear_monitor.cli.number import bounded, options_named
-from leg_wear_monitor.cli.output import check_directory, check_file, write_directory, write_file
+from leg_wear_monitor.cli.options import (
+    clearances_option,
+    json_option,
+    mechanism_option,
+    out_option,
+    speed_option,
+)
+from leg_wear_monitor.cli.output import STDOUT, check_outputs, write_directory, write_json
 from leg_wear_monitor.cli.waiting import compilation, progress_bar
+from leg_wear_monitor.json_text import json_text
 
 if TYPE_CHECKING:
     from leg_wear_monitor.dynamics.result import SimulationResult
@@ -25,16 +32,8 @@ _WARM_UP_CYCLES, _WARM_UP_S = 1.0 / 256.0, 1.0e-9
 
 
 @click.command(short_help="The leg offline, ideal or with clearances.")
-@click.option(
-    "--mechanism",
-    metavar="FILE",
-    default="bionic_leg",
-    show_default=True,
-    help="A mechanism file, or the name of one that comes with the package.",
-)
-@click.option(
-    "--clearances", metavar="A,B|none", help="The clearance joints.  [default: the mechanism's own]"
-)
+@mechanism_option
+@clearances_option("A,B|none")
 @click.option(
     "--clearance-m",
     type=float,
@@ -42,13 +41,7 @@ _WARM_UP_CYCLES, _WARM_UP_S = 1.0 / 256.0, 1.0e-9
     metavar="M",
     help="Radial clearance in metres.  [default: the mechanism's own]",
 )
-@click.option(
-    "--speed-rpm",
-    type=float,
-    callback=bounded("rpm"),
-    metavar="RPM",
-    help="Crank speed, negative for clockwise.  [default: the mechanism's own]",
-)
+@speed_option
 @click.option(
     "--cycles",
     type=float,
@@ -93,19 +86,8 @@ _WARM_UP_CYCLES, _WARM_UP_S = 1.0 / 256.0, 1.0e-9
     default=0,
     help="Keep N samples a cycle, for --json and, as a picture too, for --out.",
 )
-@click.option(
-    "--json",
-    "json_file",
-    type=click.Path(allow_dash=True, path_type=Path),
-    metavar="FILE",
-    help="Write the result as JSON; - for stdout, which then holds nothing else.",
-)
-@click.option(
-    "--out",
-    type=click.Path(path_type=Path),
-    metavar="DIR",
-    help="Write result.json and pictures of the leg and its worn bushings.",
-)
+@json_option("the result")
+@out_option("Write result.json and pictures of the leg and its worn bushings.")
 def simulate(mechanism: str, json_file: Path | None, out: Path | None, **options: Any) -> None:
     """Move the leg, ideal or with clearances, and say what forces and wear that makes."""
     if options["cycles"] is not None and options["duration"] is not None:
@@ -114,17 +96,13 @@ def simulate(mechanism: str, json_file: Path | None, out: Path | None, **options
     from leg_wear_monitor.mechanism.plausible import doubts
 
     leg = load_mechanism(mechanism)
-    to_stdout = json_file == Path("-")
-    if json_file is not None and not to_stdout:
-        check_file("--json", json_file)
-    if out is not None:
-        check_directory("--out", out)
+    check_outputs(json_file, out)
     with options_named():
         result, wall_s = _run(leg, _keywords(**options))
     warn_of(leg.source, doubts(leg))  # what fails names them itself, in its one line
     record = _record(result, wall_s)
     written = _write(record, leg, result, json_file, out)
-    if not to_stdout:
+    if json_file != STDOUT:
         from leg_wear_monitor.cli.tables import print_result
 
         print_result(record, result)
@@ -184,14 +162,9 @@ def _write(
     if json_file is None and out is None:
         return []
     written: list[Path] = []
-    text = json.dumps(record, indent=1, allow_nan=False) + "\n"
+    text = json_text(record)
     if out is not None:
         from leg_wear_monitor.report.figures.simulation import pictures
 
         written += write_directory(out, {**pictures(leg, result), "result.json": text.encode()})
-    if json_file == Path("-"):
-        click.echo(text, nl=False)
-    elif json_file is not None:
-        write_file(json_file, text.encode())
-        written.append(json_file)
-    return written
+    return written + write_json(json_file, text)

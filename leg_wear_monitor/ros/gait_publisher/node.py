@@ -1,7 +1,6 @@
 """Node ``gait_publisher``: a synthetic leg that publishes what its sensors say."""
 
 import itertools
-import json
 import queue
 import threading
 import time
@@ -18,6 +17,7 @@ from leg_wear_monitor.errors import ConfigError, LegWearError
 from leg_wear_monitor.gait.config import EFFORT
 from leg_wear_monitor.gait.leg import SyntheticLeg
 from leg_wear_monitor.gait.sensors import Reading, readings
+from leg_wear_monitor.json_text import json_text
 from leg_wear_monitor.ros.gait_publisher.config import PublisherConfig
 from leg_wear_monitor.ros.gait_publisher.sensor_messages import DRIVE_TORQUE_TYPES, sensor_message
 from leg_wear_monitor.ros.parameters.parameters import Parameters
@@ -87,7 +87,7 @@ class GaitPublisher(ClosingNode):
             return
         try:
             truth = {"start_ns": self._start_ns, **self._leg.truth()}
-            Path(path).write_text(json.dumps(truth, indent=1) + "\n")
+            Path(path).write_text(json_text(truth))
         except OSError as error:
             raise LegWearError(f"truth.path: {path}: cannot be written: {error.strerror}") from error
 

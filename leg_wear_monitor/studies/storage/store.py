@@ -14,6 +14,7 @@ from typing import Any
 import attrs
 
 from leg_wear_monitor.errors import ConfigError
+from leg_wear_monitor.json_text import json_text
 from leg_wear_monitor.mechanism.loader import parse_mechanism, read_yaml
 from leg_wear_monitor.mechanism.spec import Mechanism
 from leg_wear_monitor.studies.plan.settings import STUDIES
@@ -62,7 +63,7 @@ class StudyDirectory:
         self._write(MECHANISM, mechanism_text.encode())
         whole = {"format": _FORMAT, **manifest}
         whole["checksum"] = text_checksum(canonical(whole), mechanism_text)
-        self._write(MANIFEST, (json.dumps(whole, indent=1, allow_nan=False) + "\n").encode())
+        self._write(MANIFEST, json_text(whole).encode())
 
     def has(self, key: str) -> bool:
         """Whether the result of a point is there, whole or not."""

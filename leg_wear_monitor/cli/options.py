@@ -1,0 +1,49 @@
+"""Options that several verbs share."""
+
+from collections.abc import Callable
+from pathlib import Path
+from typing import Any
+
+import click
+
+from leg_wear_monitor.cli.number import bounded
+
+Option = Callable[[Callable[..., Any]], Callable[..., Any]]
+
+mechanism_option: Option = click.option(
+    "--mechanism",
+    metavar="FILE",
+    default="bionic_leg",
+    show_default=True,
+    help="A mechanism file, or the name of one that comes with the package.",
+)
+
+speed_option: Option = click.option(
+    "--speed-rpm",
+    type=float,
+    callback=bounded("rpm"),
+    metavar="RPM",
+    help="Crank speed, negative for clockwise.  [default: the mechanism's own]",
+)
+
+
+def clearances_option(metavar: str) -> Option:
+    """``--clearances``: names of the clearance joints, separated by commas."""
+    text = "The clearance joints.  [default: the mechanism's own]"
+    return click.option("--clearances", metavar=metavar, help=text)
+
+
+def json_option(what: str) -> Option:
+    """``--json FILE`` for an object, such as ``the result``; ``-`` is standard output."""
+    return click.option(
+        "--json",
+        "json_file",
+        type=click.Path(allow_dash=True, path_type=Path),
+        metavar="FILE",
+        help=f"Write {what} as JSON; - for stdout, which then holds nothing else.",
+    )
+
+
+def out_option(text: str) -> Option:
+    """``--out DIR``."""
+    return click.option("--out", type=click.Path(path_type=Path), metavar="DIR", help=text)

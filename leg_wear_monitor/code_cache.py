@@ -6,6 +6,7 @@ import shutil
 import stat
 import tempfile
 import warnings
+from contextlib import suppress
 from functools import cache
 from pathlib import Path
 
@@ -15,6 +16,7 @@ PACKAGE, VARIABLE = "leg_wear_monitor", "NUMBA_CACHE_DIR"
 
 _ASKED = (VARIABLE, "XDG_CACHE_HOME")
 _NOT_KEPT = "compiled code is not kept, so every start compiles anew"
+_KEPT, _A_DAY_S = 2, 86400.0  # versions of the same code, and the age [s] at which more of them go
 _MOST_LINKS = 40  # as the kernel follows
 _OTHERS_WRITE, _OTHERS_ENTER, _OTHERS = 0o022, 0o011, 0o077
 
@@ -124,7 +126,34 @@ def code_directory(name: str) -> Path | None:
     if fault:
         _warn([fault], _NOT_KEPT)
         return None
+    with suppress(OSError):
+        os.utime(leaf)  # used now
+        _remove_old(leaf)
     return leaf
+
+
+def _remove_old(leaf: Path) -> None:
+    """Remove directories that a newer version of the same code has replaced.
+
+    The two that were used last stay, and what was used within a day: who works on several copies compiles
+    none of them anew.
+    """
+    group, _, _ = leaf.name.rpartition("-")
+    now = leaf.stat().st_mtime
+    found = [(each.stat().st_mtime, each) for each in kept_directories(leaf.parent)]
+    rivals = [(used, each) for used, each in found if each.name.rpartition("-")[0] == group]
+    nameless = [(used, each) for used, each in found if "-" not in each.name]  # as older versions left them
+    for used, each in [*sorted(rivals, reverse=True)[_KEPT:], *nameless]:
+        if now - used > _A_DAY_S and each != leaf:
+            shutil.rmtree(each, ignore_errors=True)
+
+
+def kept_directories(place: Path) -> list[Path]:
+    """Directories with compiled code below a place; symbolic links are none."""
+    try:
+        return sorted(each for each in place.iterdir() if each.is_dir() and not each.is_symlink())
+    except OSError:
+        return []
 
 
 @cache

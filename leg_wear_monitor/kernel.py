@@ -1,7 +1,7 @@
 """The two ways to compile: ``@kernel`` a formula, ``@entry`` what Python calls, cached and never stale."""
 
+import ast
 import hashlib
-import re
 from collections.abc import Callable, Iterable
 from functools import cache
 from pathlib import Path
@@ -10,30 +10,43 @@ from typing import TypeVar
 import numba
 
 from leg_wear_monitor import whole_program
-from leg_wear_monitor.code_cache import code_directory
+from leg_wear_monitor.code_cache import PACKAGE, code_directory
 
 _Function = TypeVar("_Function", bound=Callable[..., object])
 
 _ENTRY: dict[str, object] = {"error_model": "numpy", "_nrt": False, "no_cfunc_wrapper": True}
 _KERNEL = {**_ENTRY, "forceinline": True}
 
-_IMPORT = re.compile(r"^\s*(?:from|import)\s+(leg_wear_monitor(?:\.\w+)+)", re.MULTILINE)
+_HOME = Path(__file__).parent
+
+
+def _module(parts: Iterable[str]) -> Path | None:
+    """File of a module of this package; the parts of its name below the package."""
+    place = _HOME.joinpath(*parts)
+    files = (place.with_suffix(".py"), place / "__init__.py")
+    return next((file for file in files if file.is_file()), None)
 
 
 @cache
 def _imported(source: Path) -> frozenset[Path]:
-    """Files of this package that a file of it imports; all of a room, where that is what it names."""
-    home = Path(__file__).parent
-    found: set[Path] = set()
-    for name in _IMPORT.findall(source.read_text()):
-        place = home.joinpath(*name.split(".")[1:])
-        found.update(place.rglob("*.py") if place.is_dir() else [place.with_suffix(".py")])
-    return frozenset(found)
+    """Files of this package that a file of it imports by their full names."""
+    found: set[Path | None] = set()
+    for node in ast.walk(ast.parse(source.read_bytes())):
+        if isinstance(node, ast.Import):
+            names = [alias.name.split(".") for alias in node.names]
+            found.update(_module(name) for package, *name in names if package == PACKAGE)
+        elif isinstance(node, ast.ImportFrom) and node.module:
+            package, *name = node.module.split(".")
+            if package == PACKAGE:
+                # what is imported is a module itself, or something that stands in one
+                found.update(_module([*name, alias.name]) or _module(name) for alias in node.names)
+    return frozenset(file for file in found if file)
 
 
-def _sources(root: Path) -> set[Path]:
-    """A file and all of this package that it imports, directly or not."""
-    known, new = set(), {root}
+def _sources(roots: Iterable[Path]) -> set[Path]:
+    """Files, and all of this package that they import, directly or not."""
+    known: set[Path] = set()
+    new = set(roots)
     while new:
         known |= new
         new = {source for known_one in new for source in _imported(known_one)} - known
@@ -41,14 +54,12 @@ def _sources(root: Path) -> set[Path]:
 
 
 def _digest(sources: Iterable[Path]) -> str:
-    """What all sources with kernels say, and where they lie."""
+    """What sources say, and where they lie."""
     digest = hashlib.sha256(numba.__version__.encode())
     for source in sorted(sources):
-        text = source.read_bytes()
-        if b"leg_wear_monitor.kernel" in text or b"NamedTuple" in text:
-            digest.update(text)
-            # numba compiles again for a file that lies elsewhere or is newer
-            digest.update(f"{source} {source.stat().st_mtime_ns}".encode())
+        digest.update(source.read_bytes())
+        # numba compiles again for a file that lies elsewhere or is newer
+        digest.update(f"{source} {source.stat().st_mtime_ns}".encode())
     return digest.hexdigest()[:16]
 
 
@@ -71,7 +82,11 @@ def cache_directory(root: Path | None = None) -> Path | None:
         Below ``$NUMBA_CACHE_DIR`` if set, else ``$XDG_CACHE_HOME`` or ``~/.cache``, else the temporary
         directory: the first that is private (`leg_wear_monitor.code_cache`). None if none is.
     """
-    return code_directory(_digest(_sources(root) if root else Path(__file__).parent.rglob("*.py")))
+    if root is None:
+        compiled = (file for file in _HOME.rglob("*.py") if b"leg_wear_monitor.kernel" in file.read_bytes())
+        return code_directory(f"all-{_digest(_sources(compiled))}")
+    below = root.relative_to(_HOME) if root.is_relative_to(_HOME) else Path(root.name)
+    return code_directory(f"{'.'.join(below.with_suffix('').parts)}-{_digest(_sources([root]))}")
 
 
 def kernel(function: _Function) -> _Function:

@@ -8,6 +8,7 @@ from pathlib import Path
 
 import pytest
 
+from leg_wear_monitor import code_cache
 from leg_wear_monitor.code_cache import code_directory, fault_of, make_private
 from leg_wear_monitor.errors import ConfigWarning
 
@@ -188,10 +189,46 @@ def test_where_no_place_is_safe_nothing_is_kept(shared):
 @pytest.mark.plain
 def test_the_usual_place_is_taken_without_a_word(tmp_path, monkeypatch):
     monkeypatch.setenv("NUMBA_CACHE_DIR", str(tmp_path))
-    from leg_wear_monitor import code_cache
-
     code_cache._home.cache_clear()
     with warnings.catch_warnings():
         warnings.simplefilter("error", ConfigWarning)
         assert code_directory("a leaf of this test") == tmp_path / "leg_wear_monitor" / "a leaf of this test"
     code_cache._home.cache_clear()
+
+
+@pytest.fixture
+def place(tmp_path, monkeypatch):
+    """An empty cache, in a process that has not looked for one."""
+
+    def forget():
+        code_cache._home.cache_clear()
+        code_directory.cache_clear()
+
+    monkeypatch.setenv("NUMBA_CACHE_DIR", str(tmp_path / "cache"))
+    forget()
+    yield tmp_path / "cache" / "leg_wear_monitor"
+    forget()
+
+
+@pytest.mark.plain
+def test_of_old_versions_the_two_used_last_are_kept(tmp_path, place):
+    """Others go once they have not been used for a day; so do those that versions before named otherwise."""
+    now = tmp_path.stat().st_mtime
+    days = {
+        "a.b-1": 3.0, "a.b-2": 2.0, "a.b-3": 5.0, "a.b-4": 4.0, "a.c-1": 9.0, "a-1": 9.0,
+        "0123456789abcdef": 9.0, "fedcba9876543210": 0.5,
+    }  # fmt: skip
+    for name, age in days.items():
+        (place / name).mkdir(parents=True, mode=0o700)
+        os.utime(place / name, (now - 86400.0 * age,) * 2)
+    assert code_directory("a.b-new") == place / "a.b-new"
+    left = {each.name for each in place.iterdir()}
+    assert left == {"a.b-new", "a.b-2", "a.c-1", "a-1", "fedcba9876543210"}
+
+
+@pytest.mark.plain
+def test_what_was_used_within_a_day_stays(place):
+    for k in range(5):
+        (place / f"a.b-{k}").mkdir(parents=True, mode=0o700)
+    code_directory("a.b-new")
+    assert len(list(place.iterdir())) == 6

@@ -108,6 +108,34 @@ def test_an_entry_follows_a_change_in_the_kernel_it_calls(package, home):
     assert package.run(**home)[:2] == ["7.0", "0"]
 
 
+@pytest.mark.parametrize(
+    "line",
+    [
+        "import leg_wear_monitor.leaf",
+        "from leg_wear_monitor import (\n    leaf,\n)",
+        "if True: from leg_wear_monitor.leaf import slope",
+    ],
+)
+def test_an_entry_follows_however_a_kernel_is_imported(package, home, line):
+    root = ROOT.replace("from leg_wear_monitor.leaf import slope", line)
+    if "import slope" not in line:
+        package_name = "leg_wear_monitor.leaf" if line.startswith("import") else "leaf"
+        root = root.replace("@entry", f"slope = {package_name}.slope\n@entry")
+    (package.directory / "root.py").write_text(root)
+    assert package.run(**home)[0] == "5.0"
+    package.write(3.0)
+    assert package.run(**home)[:2] == ["7.0", "0"]
+
+
+def test_an_entry_follows_a_constant_that_a_kernel_froze(package, home):
+    (package.directory / "numbers.py").write_text("FACTOR = 2.0\n")
+    text = "from leg_wear_monitor.numbers import FACTOR\n" + LEAF.format(factor="FACTOR")
+    (package.directory / "leaf.py").write_text(text)
+    assert package.run(**home)[0] == "5.0"
+    (package.directory / "numbers.py").write_text("FACTOR = 3.0\n")
+    assert package.run(**home)[:2] == ["7.0", "0"]
+
+
 def test_an_entry_does_not_follow_what_it_does_not_import(package, home):
     """Compiling takes a minute: only what a change can reach is compiled again."""
     package.run(**home)

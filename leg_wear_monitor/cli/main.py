@@ -17,7 +17,8 @@ from leg_wear_monitor.share import share_directory
 COULD_NOT, INTERRUPTED = 2, 130
 
 _VERBS = (
-    "check", "demo", "gait-publisher", "life", "measure", "monitor", "replay", "report", "simulate", "study"
+    "cache", "check", "demo", "gait-publisher", "life", "measure", "monitor", "replay", "report", "simulate",
+    "study",
 )  # fmt: skip
 
 

@@ -1,0 +1,52 @@
+"""``leg-wear-monitor cache``: compiled code on this machine."""
+
+import shutil
+from datetime import datetime
+from pathlib import Path
+
+import click
+
+from leg_wear_monitor.errors import LegWearError
+
+
+@click.command(short_help="Compiled code on this machine.")
+@click.option("--clear", is_flag=True, help="Remove it; the next start compiles again.")
+def cache(clear: bool) -> None:
+    """Print where compiled code is kept and how much of it, by version; or remove it.
+
+    Each change of the sources makes a version. Of each part of the code the two versions that were used last
+    are kept, and all that were used within a day.
+    """
+    from leg_wear_monitor.code_cache import kept_directories
+    from leg_wear_monitor.kernel import cache_directory
+
+    here = cache_directory()
+    if here is None:
+        raise LegWearError("no directory is safe for compiled code, so none is kept")
+    kept = kept_directories(here.parent)
+    click.echo(f"place: {here.parent}")
+    if clear:
+        size = sum(map(_size, kept))
+        for directory in kept:
+            shutil.rmtree(directory, ignore_errors=True)
+        left = [each for each in kept if each.exists()]
+        if left:
+            raise LegWearError(f"{left[0]} could not be removed, nor {len(left) - 1} more")
+        click.echo(f"removed: {_in_mb(size)} in {len(kept)} directories")
+        return
+    click.echo(f"total: {_in_mb(sum(map(_size, kept)))} in {len(kept)} directories")
+    for directory in sorted(kept, key=_used, reverse=True):
+        used = datetime.fromtimestamp(_used(directory)).strftime("%Y-%m-%d %H:%M")
+        click.echo(f"  {_in_mb(_size(directory)):>9}  used {used}  {directory.name}")
+
+
+def _used(directory: Path) -> float:
+    return directory.stat().st_mtime
+
+
+def _size(directory: Path) -> int:
+    return sum(file.stat().st_size for file in directory.rglob("*") if file.is_file())
+
+
+def _in_mb(size: int) -> str:
+    return f"{size / 1e6:.1f} MB"

@@ -1,0 +1,51 @@
+"""``leg-wear-monitor cache``: what is kept, and nothing of it afterwards."""
+
+import pytest
+
+from leg_wear_monitor import code_cache, kernel
+
+pytestmark = pytest.mark.plain
+
+
+@pytest.fixture
+def place(tmp_path, monkeypatch):
+    """An empty cache of its own, as a new process would find it."""
+
+    def forget():
+        for cached in (code_cache._home, code_cache.code_directory, kernel.cache_directory):
+            cached.cache_clear()
+
+    monkeypatch.setenv("NUMBA_CACHE_DIR", str(tmp_path / "cache"))
+    forget()
+    yield tmp_path / "cache" / "leg_wear_monitor"
+    monkeypatch.undo()
+    forget()
+
+
+def test_it_prints_where_and_how_much(run, place):
+    old = place / "dynamics.full.model-0123456789abcdef"
+    old.mkdir(parents=True, mode=0o700)
+    (old / "code").write_bytes(bytes(2_300_000))
+    lines = run("cache").stdout.splitlines()
+    assert lines[:2] == [f"place: {place}", "total: 2.3 MB in 2 directories"]  # one is the verb's own
+    assert [line for line in lines[2:] if line.split()[0] == "2.3" and line.endswith(old.name)]
+
+
+def test_clear_removes_all_of_it_and_nothing_beside(run, place):
+    for name in ("dynamics.full.model-0123456789abcdef", "0123456789abcdef"):
+        (place / name / "deep").mkdir(parents=True)
+        (place / name / "deep" / "code").write_bytes(bytes(1_000_000))
+    (place.parent / "beside").write_text("")
+    (place / "link").symlink_to(place.parent)
+    result = run("cache", "--clear")
+    assert result.exit_code == 0
+    assert result.stdout.splitlines()[1] == "removed: 2.0 MB in 3 directories"
+    assert [each.name for each in place.iterdir()] == ["link"]
+    assert (place.parent / "beside").exists()
+
+
+def test_nothing_is_removed_where_no_place_is_safe(run, monkeypatch):
+    monkeypatch.setattr(kernel, "cache_directory", lambda: None)
+    result = run("cache", "--clear")
+    assert result.exit_code == 2
+    assert result.stderr == "error: no directory is safe for compiled code, so none is kept\n"

@@ -89,7 +89,7 @@ def _number(kept: "Ledger", joint: str | None, which: str) -> int:
 
 
 def _line(m: "Measurement") -> str:
-    """A measurement for people."""
+    """A measurement for operators."""
     state = "counts" if m.counts else "does not count"
     if m.is_withdrawn:
         state = f"withdrawn {_date(m.withdrawn_ns)} by {m.withdrawn_by}"

@@ -1,4 +1,4 @@
-"""A replay's figures as text for people."""
+"""A replay's statistics as text."""
 
 from collections.abc import Mapping
 from typing import TYPE_CHECKING

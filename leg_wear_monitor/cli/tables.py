@@ -1,4 +1,4 @@
-"""A simulation's figures as text for people: 80 columns, on a terminal and in a pipe."""
+"""A simulation's statistics as text: 80 columns, on a terminal and in a pipe."""
 
 import math
 from collections.abc import Iterator
@@ -42,24 +42,24 @@ def joint_table(record: dict[str, Any]) -> Table:
     table = Table(box=None, pad_edge=False, padding=(0, 1), header_style="bold")
     table.add_column("\njoint")
     columns = ["mean\nN", "p99\nN", "max\nN"]
-    worn = any("wear_depth_m_per_cycle" in figures for figures in record["joints"].values())
+    worn = any("wear_depth_m_per_cycle" in statistics for statistics in record["joints"].values())
     if worn:
         columns += ["contact\n%", "Archard\nJ/cycle", "bushing\npm/cycle", "journal\npm/cycle", "zone\ndeg"]
     for column in columns:
         table.add_column(column, justify="right")
-    for name, figures in record["joints"].items():
-        cells = [figure(figures[f"{key}_force_n"]) for key in ("mean", "p99", "max")]
-        table.add_row(name, *cells, *_wear_cells(figures))
+    for name, statistics in record["joints"].items():
+        cells = [figure(statistics[f"{key}_force_n"]) for key in ("mean", "p99", "max")]
+        table.add_row(name, *cells, *_wear_cells(statistics))
     return table
 
 
-def _wear_cells(figures: dict[str, Any]) -> list[str]:
-    if "wear_depth_m_per_cycle" not in figures:
+def _wear_cells(statistics: dict[str, Any]) -> list[str]:
+    if "wear_depth_m_per_cycle" not in statistics:
         return []
-    depth, zone = figures["wear_depth_m_per_cycle"], figures["wear_zone_deg"]
+    depth, zone = statistics["wear_depth_m_per_cycle"], statistics["wear_zone_deg"]
     return [
-        f"{100.0 * figures['contact_fraction']:.1f}",
-        figure(figures["archard_integral_j_per_cycle"]),
+        f"{100.0 * statistics['contact_fraction']:.1f}",
+        figure(statistics["archard_integral_j_per_cycle"]),
         figure(1.0e12 * depth["bushing_max"]),
         figure(1.0e12 * depth["journal_max"]),
         "-" if zone is None else f"{zone[0] % 360.0:.0f} to {zone[1] % 360.0:.0f}",

@@ -11,7 +11,7 @@ _POINTS = 1440
 
 
 def ideal_result(setup: Setup, cycles: float, trace: int) -> SimulationResult:
-    """Figures of one cycle of the ideal motion, which is each cycle."""
+    """Statistics of one cycle of the ideal motion, which is each cycle."""
     mechanism = setup.linkage.mechanism
     motion = one_cycle(setup.linkage, _POINTS, setup.speed)
     torque = motion.drive_torque

@@ -1,4 +1,4 @@
-"""A gait cycle's figures from the twin, as a report with growth and remaining life."""
+"""A gait cycle's statistics from the twin, as a report with growth and remaining life."""
 
 import math
 from collections.abc import Sequence
@@ -13,7 +13,7 @@ from leg_wear_monitor.twin.statistics import CycleStatistics, TorqueStatistics
 
 
 def cycle_report(
-    figures: CycleStatistics,
+    statistics: CycleStatistics,
     cycle: int,
     clearance_joints: Sequence[str],
     growth: Sequence[GrowthWindow],
@@ -24,7 +24,7 @@ def cycle_report(
 
     Parameters
     ----------
-    figures : CycleStatistics
+    statistics : CycleStatistics
     cycle : int
         Its number over all runs.
     clearance_joints : sequence of str
@@ -34,16 +34,16 @@ def cycle_report(
     forecast : Forecast
     seen : sequence of ClearanceEstimate, optional
     """
-    torque = figures.torque
+    torque = statistics.torque
     return CycleReport(
         cycle=cycle,
-        begin_ns=figures.begin_ns,
-        stamp_ns=figures.stamp_ns,
-        cadence_rpm=60.0 * figures.direction / figures.moving_s,
-        moving_s=figures.moving_s,
-        bridged_s=figures.bridged_s,
+        begin_ns=statistics.begin_ns,
+        stamp_ns=statistics.stamp_ns,
+        cadence_rpm=60.0 * statistics.direction / statistics.moving_s,
+        moving_s=statistics.moving_s,
+        bridged_s=statistics.bridged_s,
         joints=tuple(
-            _joint_report(figures, k, joint, growth[k], forecast.joints[k], seen[k] if seen else None)
+            _joint_report(statistics, k, joint, growth[k], forecast.joints[k], seen[k] if seen else None)
             for k, joint in enumerate(clearance_joints)
         ),
         torque_samples=torque.samples,
@@ -83,7 +83,7 @@ def _remaining(forecast: JointForecast) -> Remaining | None:
 
 
 def _joint_report(
-    figures: CycleStatistics,
+    statistics: CycleStatistics,
     k: int,
     joint: str,
     window: GrowthWindow,
@@ -93,16 +93,16 @@ def _joint_report(
     rate = growth_rate(window)
     return JointReport(
         joint=joint,
-        clearance_m=float(figures.clearance_mean_m[k]),
-        clearance_max_m=float(figures.clearance_max_m[k]),
+        clearance_m=float(statistics.clearance_mean_m[k]),
+        clearance_max_m=float(statistics.clearance_max_m[k]),
         growth_m_per_cycle=rate.per_cycle_m if rate else None,
         growth_mps=rate.per_second_m if rate else None,
         growth_error_m_per_cycle=rate.error_m if rate else None,
         remaining=_remaining(forecast),
         forecast=forecast,
         seen=seen,
-        peak_force_n=float(figures.peak_force_n[k]),
-        p99_force_n=float(figures.p99_force_n[k]),
-        mean_force_n=float(figures.mean_force_n[k]),
-        impacts=int(figures.impacts[k]),
+        peak_force_n=float(statistics.peak_force_n[k]),
+        p99_force_n=float(statistics.p99_force_n[k]),
+        mean_force_n=float(statistics.mean_force_n[k]),
+        impacts=int(statistics.impacts[k]),
     )

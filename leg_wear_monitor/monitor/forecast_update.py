@@ -15,7 +15,7 @@ from leg_wear_monitor.twin.statistics import CycleStatistics
 def update_forecast(
     watch: EncoderObserver,
     forecaster: Forecaster,
-    figures: CycleStatistics,
+    statistics: CycleStatistics,
     worn_m: Floats,
     replaced_ns: Sequence[int],
 ) -> tuple[ClearanceEstimate, ...]:
@@ -26,17 +26,17 @@ def update_forecast(
     watch : EncoderObserver
     forecaster : Forecaster
         Takes them in, if that is due.
-    figures : CycleStatistics
+    statistics : CycleStatistics
     worn_m : (k,) array
         What the twin has counted for each part.
     replaced_ns : sequence of int
         When each part was replaced, 0 if it never was.
     """
-    state, seen = watch.state, watch.seen(figures.clearance_mean_m)
+    state, seen = watch.state, watch.seen(statistics.clearance_mean_m)
     other = tuple(one.is_other for one in seen)
-    is_due = other != state.other or not 0 <= figures.stamp_ns - state.updated_ns < RENEWED_NS
+    is_due = other != state.other or not 0 <= statistics.stamp_ns - state.updated_ns < RENEWED_NS
     if is_due and any(one.observation is ClearanceObservation.SEEN for one in seen):
-        state.updated_ns, state.other = figures.stamp_ns, other
+        state.updated_ns, state.other = statistics.stamp_ns, other
         state.believed = tuple(
             one.observation is ClearanceObservation.SEEN
             and forecaster.seen(k, _look(one, float(worn_m[k])), replaced_ns[k])

@@ -82,7 +82,7 @@ class WearMonitor:
         self._guard = InputGuard(self._twin.settings.tracker)
         self._accounting = Accounting(self._twin, ledger, self.config.ledger)
         cycle_ns = round(60.0e9 / abs(self.config.cadence.commanded_rpm))
-        self._evaluate = AlarmEvaluation(self._twin, self.config, cycle_ns, self._guard)
+        self._evaluation = AlarmEvaluation(self._twin, self.config, cycle_ns, self._guard)
         self._forecaster = Forecaster(
             self.mechanism,
             self.config.forecast,
@@ -95,7 +95,7 @@ class WearMonitor:
             else None
         )
         if ledger and ledger.entry:
-            self._evaluate.board.restore(ledger.entry.alarms)
+            self._evaluation.board.restore(ledger.entry.alarms)
         self._evaluation_periods = EvaluationPeriods(cycle_ns // A_CYCLE)
         kept = TorqueRecord.of(self._accounting.state.commissioned)
         self._state = MonitorState(tuple(GrowthWindow() for _ in self.clearance_joints), kept)
@@ -128,9 +128,9 @@ class WearMonitor:
             looks.append(seen)
             cycles += ended
             if ends_period:
-                self._tell(self._evaluate.end_beat(self._accounting.state.skipped), changes)
+                self._tell(self._evaluation.end_period(self._accounting.state.skipped), changes)
                 self._observe_encoders()
-            self._accounting.keep_if_due(self._evaluate.board.alarms.values())
+            self._accounting.keep_if_due(self._evaluation.board.alarms.values())
         return Reports(joined(looks, len(self.clearance_joints)), tuple(cycles), tuple(changes), self.lost)
 
     def pause(self, pause_s: float) -> None:
@@ -141,13 +141,13 @@ class WearMonitor:
         pause_s : float
             From the newest stamp to the next.
         """
-        self._evaluate.pause()
+        self._evaluation.pause()
         self._accounting.pause(pause_s)
 
     @property
     def alarms(self) -> AlarmList:
         """All alarms as they stand."""
-        return AlarmList(self._twin.intake.followed_stamp_ns, tuple(self._evaluate.board.alarms.values()))
+        return AlarmList(self._twin.intake.followed_stamp_ns, tuple(self._evaluation.board.alarms.values()))
 
     @property
     def lost(self) -> Lost:
@@ -204,7 +204,7 @@ class WearMonitor:
         state = self._state
         return statuses(
             self._twin,
-            self._evaluate,
+            self._evaluation,
             self._accounting,
             state.last,
             state.happened,
@@ -222,7 +222,7 @@ class WearMonitor:
         """
         check_limits(config, self.mechanism)
         self.config = config
-        self._evaluate.configure(config)
+        self._evaluation.configure(config)
         if self._encoders:
             self._encoders.config = config
 
@@ -234,7 +234,7 @@ class WearMonitor:
         cleared, kept : tuple of Alarm
             Those that had returned to normal, and those that stay until they do.
         """
-        cleared, kept = self._evaluate.board.acknowledge()
+        cleared, kept = self._evaluation.board.acknowledge()
         self._accounting.state.cut_off_s = None
         self._accounting.note_alarms(AlarmList(stamp_ns, self.alarms.alarms))
         if cleared or kept:
@@ -332,9 +332,9 @@ class WearMonitor:
             return None
         fresh = [self.mechanism.clearances[joint].radial_clearance for joint in self.clearance_joints]
         worn_m = np.asarray(self._twin.clearance_mean_m - fresh)
-        limits = self._evaluate.board.clearance_limits_m
+        limits = self._evaluation.board.clearance_limits_m
         self._state.last = with_forecast(
-            last, self._forecaster.renewed(worn_m, limits, self._evaluate.holds())
+            last, self._forecaster.renewed(worn_m, limits, self._evaluation.holds())
         )
         return self._state.last
 
@@ -389,9 +389,9 @@ class WearMonitor:
             self._twin.snapshot(),
             attrs.evolve(self._state),
             attrs.evolve(self._accounting.state),
-            attrs.evolve(self._evaluate.state),
+            attrs.evolve(self._evaluation.state),
             attrs.evolve(self._forecaster.state),
-            self._evaluate.board.alarms,
+            self._evaluation.board.alarms,
             self._evaluation_periods.state.copy(),
             self._guard.snapshot(),
             self._encoders.snapshot() if self._encoders else None,
@@ -402,75 +402,79 @@ class WearMonitor:
         self._twin.restore(snapshot.twin)
         self._state = attrs.evolve(snapshot.state)
         self._accounting.state = attrs.evolve(snapshot.accounting)
-        self._evaluate.state = attrs.evolve(snapshot.evaluate)
+        self._evaluation.state = attrs.evolve(snapshot.evaluate)
         self._forecaster.state = attrs.evolve(snapshot.forecast)
-        self._evaluate.board.alarms = snapshot.alarms
+        self._evaluation.board.alarms = snapshot.alarms
         copy_record(snapshot.evaluation_periods, self._evaluation_periods.state)
         self._guard.restore(snapshot.guard)
         if self._encoders and snapshot.encoders:
             self._encoders.restore(snapshot.encoders)
 
     def _keep(self, closed: bool = False) -> bool:
-        return self._accounting.keep(self._evaluate.board.alarms.values(), closed)
+        return self._accounting.keep(self._evaluation.board.alarms.values(), closed)
 
     def _take(self, piece: Samples, changes: list[AlarmList]) -> tuple[SampleReports, list[CycleReport]]:
-        """Follow a piece of a beat, and judge the gait cycles that it ends."""
+        """Follow a piece of an evaluation period, and judge the gait cycles that it ends."""
         piece = self._guard.checked(self._accounting.not_counted(piece))
         update = self._twin.update(piece)
-        self._evaluate.see(piece)
+        self._evaluation.see(piece)
         if self._encoders:
             self._encoders.see(piece)
         self._accounting.followed(update.samples)
         self._state.happened = (*self._state.happened, *update.events)[-_KEPT_EVENTS:]
         cycles: list[CycleReport] = []
-        for figures in update.cycles:
+        for statistics in update.cycles:
             if self._encoders:
-                self._encoders.ended(figures)
-            cycles.append(self._report(figures))
-            self._tell(self._evaluate.end_cycle(cycles[-1], self._state.torque), changes)
-            self._keep_torque(figures, cycles[-1])
+                self._encoders.ended(statistics)
+            cycles.append(self._report(statistics))
+            self._tell(self._evaluation.end_cycle(cycles[-1], self._state.torque), changes)
+            self._keep_torque(statistics, cycles[-1])
         return update.samples, cycles
 
-    def _report(self, figures: CycleStatistics) -> CycleReport:
+    def _report(self, statistics: CycleStatistics) -> CycleReport:
         """Report a gait cycle."""
         state, accounting = self._state, self._accounting
         accounting.state.cycles += 1
         state.growth = tuple(
-            extended(window, float(growth), figures.moving_s, self.config.growth.window_cycles)
-            for window, growth in zip(state.growth, figures.growth_mean_m, strict=True)
+            extended(window, float(growth), statistics.moving_s, self.config.growth.window_cycles)
+            for window, growth in zip(state.growth, statistics.growth_mean_m, strict=True)
         )
-        seen = self._seen(figures)
-        limits = self._evaluate.board.clearance_limits_m
-        forecast = self._forecaster.after(figures, self._worn_m(figures), limits, self._evaluate.holds)
+        seen = self._seen(statistics)
+        limits = self._evaluation.board.clearance_limits_m
+        forecast = self._forecaster.after(
+            statistics, self._worn_m(statistics), limits, self._evaluation.holds
+        )
         state.last = cycle_report(
-            figures, accounting.state.cycles, self.clearance_joints, state.growth, forecast, seen
+            statistics, accounting.state.cycles, self.clearance_joints, state.growth, forecast, seen
         )
         accounting.note_clearances(state.last)
         return state.last
 
-    def _keep_torque(self, figures: CycleStatistics, report: CycleReport) -> None:
+    def _keep_torque(self, statistics: CycleStatistics, report: CycleReport) -> None:
         """Take down what the torque was like, while it is as predicted."""
-        is_sound = self._evaluate.is_torque_sound(report)
-        self._state.torque = self._state.torque.with_cycle(figures, report, is_sound)
+        is_sound = self._evaluation.is_torque_sound(report)
+        self._state.torque = self._state.torque.with_cycle(statistics, report, is_sound)
         self._accounting.state.commissioned = self._state.torque.totals
 
     def _observe_encoders(self) -> None:
         if self._encoders:
-            new = self._encoders.end_beat(self._twin.clearance_mean_m, self._twin.depth)
+            new = self._encoders.end_period(self._twin.clearance_mean_m, self._twin.depth)
             if new:
                 self._accounting.note(new)
 
-    def _seen(self, figures: CycleStatistics) -> tuple[ClearanceEstimate, ...] | None:
+    def _seen(self, statistics: CycleStatistics) -> tuple[ClearanceEstimate, ...] | None:
         """Clearances as encoders show them, which the forecast learns from."""
         if not self._encoders:
             return None
         replaced_ns = [part.replaced_ns for part in self._accounting.state.parts]
-        return update_forecast(self._encoders, self._forecaster, figures, self._worn_m(figures), replaced_ns)
+        return update_forecast(
+            self._encoders, self._forecaster, statistics, self._worn_m(statistics), replaced_ns
+        )
 
-    def _worn_m(self, figures: CycleStatistics) -> Floats:
+    def _worn_m(self, statistics: CycleStatistics) -> Floats:
         """Wear of each part at the end of a gait cycle; the twin itself may be further on."""
         fresh = [self.mechanism.clearances[joint].radial_clearance for joint in self.clearance_joints]
-        return np.asarray(figures.clearance_mean_m - fresh)
+        return np.asarray(statistics.clearance_mean_m - fresh)
 
     def _tell(self, changed: tuple[AlarmList, ...], changes: list[AlarmList]) -> None:
         for change in changed:

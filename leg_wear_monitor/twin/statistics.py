@@ -232,7 +232,7 @@ class Intake:
 
 
 def joined(parts: Sequence[SampleStatistics], clearance_joints: int) -> SampleStatistics:
-    """Figures of one stretch after the other."""
+    """Statistics of one stretch after the other."""
     if len(parts) < 2:
         return parts[0] if parts else no_samples(clearance_joints)
     names = [field.name for field in attrs.fields(SampleStatistics)]
@@ -240,6 +240,6 @@ def joined(parts: Sequence[SampleStatistics], clearance_joints: int) -> SampleSt
 
 
 def no_samples(clearance_joints: int) -> SampleStatistics:
-    """Figures of no sample."""
+    """Statistics of no sample."""
     stamps: NDArray[np.int64] = np.zeros(0, dtype=np.int64)
     return SampleStatistics(stamps, stamps, np.zeros(0), np.zeros(0), np.zeros((0, clearance_joints)))

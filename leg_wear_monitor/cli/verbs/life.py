@@ -85,7 +85,7 @@ def life(mechanism: str, json_file: Path | None, out: Path | None, **options: An
     """Let a leg wear from new until a clearance reaches its limit.
 
     A few gait cycles are simulated, and their mean wear is applied over many; single cycles are chaotic, so
-    the figures have scatter, which is told.
+    the values scatter, and the scatter is reported.
     """
     from leg_wear_monitor.mechanism.loader import load_mechanism
     from leg_wear_monitor.mechanism.plausible import doubts

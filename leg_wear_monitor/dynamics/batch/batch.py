@@ -2,7 +2,7 @@
 
 `simulate_batch` gives each leg's whole result; validation and the scaling benchmark use it.
 
-A leg has a state and a tally of its own, and its compiled motion runs without the interpreter's lock. So
+A leg has its own state and run statistics, and its compiled motion runs without the interpreter's lock. So
 threads are enough: they share the tables, start at once, and results do not depend on how many there are.
 """
 
@@ -36,7 +36,7 @@ def advance_batch(
     statistics_of_all: Sequence[RunStatistics],
     workers: int | None = None,
 ) -> list[tuple[int, int]]:
-    """Advance many steppers, each to its own time, and add to its own tally.
+    """Advance many steppers, each to its own time, and add to its own run statistics.
 
     Parameters
     ----------
@@ -57,7 +57,7 @@ def advance_batch(
     Raises
     ------
     ValueError
-        If the lengths differ, or a state or a tally is there twice.
+        If the lengths differ, or a state or run statistics occur twice.
     """
     for what in (
         [stepper.state.depth for stepper in steppers],
@@ -135,7 +135,7 @@ def _outcome(future: Future[SimulationResult]) -> SimulationResult | SimulationE
 def _simulate(
     leg: Leg, setup: Setup, tables: SharedTables, cycles: float, skip_cycles: float, stopped: Event
 ) -> SimulationResult:
-    """One leg from its start to its figures."""
+    """One leg from its start to its statistics."""
     if not setup.clearance_joints:
         return ideal_result(setup, cycles, 0)
     stepper = ClearanceStepper(setup, tables=tables.get())

@@ -63,7 +63,7 @@ _FASTEST = 1.0e4  # rad/s, and its change over an interval: a crank beyond is no
 
 @entry
 def advance_clearances(model, feeds_back, state, polynomial, t_end, statistics, work):
-    """Advance the state by all whole intervals up to t_end [s] and add to the tally.
+    """Advance the state by all whole intervals up to t_end [s] and add to the run statistics.
 
     ``polynomial`` (7,) is the crank's motion from the last time reached to t_end.
 

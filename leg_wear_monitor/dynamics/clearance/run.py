@@ -94,7 +94,7 @@ class ClearanceStepper:
         self.state.motion[:] = start.motion
 
     def advance(self, polynomial: Floats, t_end: float, statistics: RunStatistics) -> tuple[int, int]:
-        """Advance by all whole intervals up to a time, and add to a tally.
+        """Advance by all whole intervals up to a time, and add to run statistics.
 
         Parameters
         ----------
@@ -167,7 +167,7 @@ class ClearanceRun:
         return float(moving + resting) + self._observe()
 
     def advance(self, t_end: float, statistics: RunStatistics) -> None:
-        """Go on to the last whole interval before a time [s] and add to a tally.
+        """Go on to the last whole interval before a time [s] and add to run statistics.
 
         Raises
         ------

@@ -159,7 +159,7 @@ def _accept(model, surfaces, state, h, toe, statistics, work):
 
 @entry
 def advance_full(model, surfaces, state, polynomial, t_end, toe, statistics, work):
-    """Advance the state to t_end [s] and add to the tally.
+    """Advance the state to t_end [s] and add to the run statistics.
 
     Returns
     -------

@@ -77,7 +77,7 @@ class FullRun:
         return float(energy)
 
     def advance(self, t_end: float, statistics: RunStatistics) -> None:
-        """Go on to a time [s] and add to a tally.
+        """Go on to a time [s] and add to run statistics.
 
         Raises
         ------

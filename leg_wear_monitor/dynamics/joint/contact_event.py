@@ -74,7 +74,7 @@ def update_contacts(joint, speed_floor, t, h, start, end, approach, recent, peak
     """After a step from t to t + h: contacts that begin or end, and the peaks of those that go on.
 
     Changes approach (k,) and recent (k, 4), the last two samples of time and normal force of each joint,
-    and the tally's peak, impact and impacts. Returns whether a contact began or ended.
+    and the run statistics' peak, impact and impacts. Returns whether a contact began or ended.
     """
     changed = False
     for k in range(approach.shape[0]):

@@ -71,7 +71,7 @@ class Run(Protocol):
         """Kinetic and potential energy, that of gravity, springs and contacts [J]."""
 
     def advance(self, t_end: float, statistics: RunStatistics) -> None:
-        """Go on to a time [s] and add to a tally; raises SimulationError where the motion diverges."""
+        """Go on to a time [s] and add to run statistics; raises SimulationError where the motion diverges."""
 
     def sample(self) -> Sample:
         """The leg as it is now."""

@@ -56,7 +56,7 @@ class RunStatistics(NamedTuple):
 
 
 def new_run_statistics(joints: int) -> RunStatistics:
-    """An empty tally."""
+    """Run statistics of no time."""
     return RunStatistics(
         time=np.zeros(1),
         integral=np.zeros((joints, JOINT_RATES)),

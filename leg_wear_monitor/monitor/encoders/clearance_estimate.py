@@ -14,7 +14,7 @@ LEAST_M = 5.0e-5  # a departure that is worth telling
 
 
 class ClearanceObservation(Enum):
-    """Whether encoders show a clearance; the value is fit for people."""
+    """Whether encoders show a clearance; the value is human-readable."""
 
     WAITING = "not enough gait cycles with encoders yet"
     COMMISSIONING = "the encoders are being commissioned"

@@ -1,7 +1,7 @@
 """Further encoders in the monitor: from their samples to the clearances that they show.
 
-All of it happens at the ends of beats, which follow from the order of arrival alone. A gait cycle is looked
-at when it is over, one more is simulated for the reference, and no beat does more than that.
+All of it happens at the ends of evaluation periods, which follow from the order of arrival alone. A cycle
+is evaluated when it is over; one more is simulated for the reference, and no period does more than that.
 """
 
 from typing import NamedTuple
@@ -99,15 +99,15 @@ class EncoderObserver:
         """Take in samples as they arrive."""
         self.state.samples = extended(self.state.samples, piece)
 
-    def ended(self, figures: CycleStatistics) -> None:
+    def ended(self, statistics: CycleStatistics) -> None:
         """A gait cycle is over; it counts if the leg walked as commanded."""
         cadence = self.config.cadence
-        rpm = 60.0 * figures.direction / figures.moving_s
-        steady = figures.bridged_s == 0.0 and figures.duration_s <= _LONGEST * figures.moving_s
+        rpm = 60.0 * statistics.direction / statistics.moving_s
+        steady = statistics.bridged_s == 0.0 and statistics.duration_s <= _LONGEST * statistics.moving_s
         if steady and abs(rpm - cadence.commanded_rpm) <= cadence.tolerance_rpm:
-            self.state.due = (*self.state.due, (figures.begin_ns, figures.stamp_ns))
+            self.state.due = (*self.state.due, (statistics.begin_ns, statistics.stamp_ns))
 
-    def end_beat(self, clearance_m: Floats, depth: Floats) -> Commissioned | None:
+    def end_period(self, clearance_m: Floats, depth: Floats) -> Commissioned | None:
         """Look at the gait cycles that are over, and simulate one more for the reference.
 
         Parameters

@@ -71,5 +71,5 @@ def fault_of(raw: Floats, deviation: Floats, joint: str) -> str:
 
 
 def faults(names: Sequence[str], state: EncoderState) -> list[str]:
-    """What is wrong with encoders, for people."""
+    """What is wrong with encoders, for operators."""
     return [f"{name} {fault}" for name, fault in zip(names, state.faults, strict=False) if fault]

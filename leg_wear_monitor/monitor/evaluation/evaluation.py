@@ -127,7 +127,7 @@ class AlarmEvaluation:
                 values[f"{names.DEPARTURE} {joint.joint}"] = joint.seen.surely_m
         return self.board.evaluate(values, report.stamp_ns)
 
-    def end_beat(self, skipped: int = 0) -> tuple[AlarmList, ...]:
+    def end_period(self, skipped: int = 0) -> tuple[AlarmList, ...]:
         """Evaluate impacts of the gait cycle that runs, and once in a cycle's time the input.
 
         Parameters

@@ -27,12 +27,12 @@ class LagBySpeed:
 
     sums: tuple[float, float, float, float, float] = (0.0,) * 5
 
-    def with_cycle(self, figures: CycleStatistics) -> "LagBySpeed":
+    def with_cycle(self, statistics: CycleStatistics) -> "LagBySpeed":
         """With one more gait cycle; as it is without a lag."""
-        lag_s, sigma_s = figures.torque.cycle_lag_s, figures.torque.cycle_lag_sigma_s
+        lag_s, sigma_s = statistics.torque.cycle_lag_s, statistics.torque.cycle_lag_sigma_s
         if not (math.isfinite(lag_s) and sigma_s > 0.0):
             return self
-        x, w = figures.direction * figures.moving_s / TURN, 1.0 / sigma_s**2
+        x, w = statistics.direction * statistics.moving_s / TURN, 1.0 / sigma_s**2
         new = (w, w * x, w * x * x, w * lag_s, w * x * lag_s)
         w0, w1, w2, wy, wxy = (_FORGETTING * a + b for a, b in zip(self.sums, new, strict=True))
         return LagBySpeed((w0, w1, w2, wy, wxy))
@@ -80,11 +80,11 @@ class TorqueRecord:
             return {}
         return {FRICTION_KEY: self.friction_nm, SIGMA_KEY: self.sigma_nm}
 
-    def with_cycle(self, figures: CycleStatistics, report: CycleReport, is_sound: bool) -> "TorqueRecord":
+    def with_cycle(self, statistics: CycleStatistics, report: CycleReport, is_sound: bool) -> "TorqueRecord":
         """With one more gait cycle, whose torque was as predicted or not."""
         if not report.torque_samples:
             return self
-        lags = self.lags.with_cycle(figures)
+        lags = self.lags.with_cycle(statistics)
         if not math.isnan(self.friction_nm):
             return attrs.evolve(self, lags=lags)
         cycles = self.cycles + 1 if is_sound else 0

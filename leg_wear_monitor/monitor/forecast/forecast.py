@@ -19,7 +19,7 @@ from leg_wear_monitor.monitor.forecast.wear_coefficients import CoefficientEstim
 
 
 class Answer(Enum):
-    """What the forecast can say; the value is fit for people."""
+    """What the forecast can say; the value is human-readable."""
 
     KNOWN = "from growth as it is, and what is not known of it"
     PARTLY_KNOWN = "of the joints whose growth is known; that of others is not"

@@ -89,7 +89,7 @@ class Forecaster:
 
     def after(
         self,
-        figures: CycleStatistics,
+        statistics: CycleStatistics,
         wear_m: Floats,
         limits_m: Sequence[float],
         is_valid: Callable[[], bool],
@@ -98,7 +98,7 @@ class Forecaster:
 
         Parameters
         ----------
-        figures : CycleStatistics
+        statistics : CycleStatistics
         wear_m : (k,) array
             What the twin has counted for each part.
         limits_m : sequence of float
@@ -108,13 +108,13 @@ class Forecaster:
         """
         state = self.state
         state.growth = tuple(
-            extended(window, float(growth), figures.moving_s, self._settings.window_cycles)
-            for window, growth in zip(state.growth, figures.growth_mean_m, strict=True)
+            extended(window, float(growth), statistics.moving_s, self._settings.window_cycles)
+            for window, growth in zip(state.growth, statistics.growth_mean_m, strict=True)
         )
         rates = [growth_rate(window) for window in state.growth]
-        is_recent = 0 <= figures.stamp_ns - state.stamp_ns < RENEWED_NS
+        is_recent = 0 <= statistics.stamp_ns - state.stamp_ns < RENEWED_NS
         if state.last is None or not is_recent or _known(rates) > state.known:
-            state.stamp_ns = figures.stamp_ns
+            state.stamp_ns = statistics.stamp_ns
             return self.renewed(wear_m, limits_m, is_valid())
         return state.last
 

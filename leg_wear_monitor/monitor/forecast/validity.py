@@ -30,7 +30,7 @@ class Validity:
 
     @property
     def words(self) -> str:
-        """In a line, for people."""
+        """In a line, for operators."""
         told = f"{self.within} of {self.measurements} measured clearances were between expected p10 and p90"
         if self.measurements < LEAST:
             return f"{told}; too few to judge the forecast by"

@@ -3,7 +3,7 @@
 The clearance is c = c_0 + d + x w: c_0 the nominal one when new, d what the part is off it, w the wear that
 the twin has counted with the nominal coefficient, x the joint's factor on it. x is lognormal and d normal
 beforehand; measured clearances have normal errors. d drops out in closed form, x stays on a grid that is
-laid where the belief is: a measurement that counts moves it as far as it says, however far that is.
+laid where the estimate is: a measurement that counts moves it as far as it says, however far that is.
 """
 
 import math

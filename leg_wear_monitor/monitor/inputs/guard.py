@@ -71,7 +71,7 @@ class InputGuard:
 
     @property
     def speed_ratio(self) -> float:
-        """How many times as fast as commanded the angle runs, where that is beyond belief; else NaN."""
+        """How many times as fast as commanded the angle runs, where no leg moves so fast; else NaN."""
         if not self._state.other_unit:
             return math.nan
         return float(self._state.fast_speed) / self._commanded

@@ -22,7 +22,7 @@ Labelled = Sequence[tuple[str, Arrays]]
 
 
 class Quantity(NamedTuple):
-    """A largest error: its name in the data and for people, unit, and factor from SI."""
+    """A largest error: its name in the data and for operators, unit, and factor from SI."""
 
     name: str
     title: str
@@ -63,7 +63,7 @@ def with_spread(value: Spread, factor: float = 1.0) -> str:
 
 
 def percent(fraction: float) -> str:
-    """A share for people."""
+    """A share for operators."""
     text = number(100.0 * fraction)
     return f"{text.rstrip('0').rstrip('.') if text.endswith('.0') else text} %"
 

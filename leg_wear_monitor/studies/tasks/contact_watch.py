@@ -63,7 +63,7 @@ class ObservedLeg:
         self._step = TURN / abs(setup.speed) / SAMPLES
 
     def advance(self, steps: int, statistics: RunStatistics) -> None:
-        """Go on by so many steps and add to a tally; raises SimulationError where the motion diverges."""
+        """Advance by some steps, adding to the statistics; raises SimulationError if the motion diverges."""
         done = round(self.stepper.time / self._step)
         status, k = self.stepper.advance(self._polynomial, (done + steps) * self._step, statistics)
         if status != DONE:
@@ -87,7 +87,7 @@ class ObservedLeg:
         )
 
     def moments(self, statistics: RunStatistics) -> Iterator[Moment]:
-        """Moments of the cycle to come, from now on at every step; the tally is added to meanwhile."""
+        """Moments of the next cycle, from now on at every step; adds to the run statistics meanwhile."""
         for _ in range(SAMPLES):
             yield self.look()
             self.advance(1, statistics)

@@ -61,7 +61,7 @@ def run_ensemble(mechanism: Mechanism, settings: dict[str, Any]) -> Arrays:
 
 
 def _follow(leg: ObservedLeg, settings: dict[str, Any]) -> dict[str, Any]:
-    """Figures of one run."""
+    """Statistics of one run."""
     setup = leg.setup
     joints, clearance_joints = len(setup.linkage.mechanism.joints), list(setup.contacts.joint)
     leg.advance(settings["skip_cycles"] * SAMPLES, new_run_statistics(joints))

@@ -1,4 +1,4 @@
-"""A gait cycle's figures from what was added up over it."""
+"""A gait cycle's statistics from what was added up over it."""
 
 import numpy as np
 
@@ -22,7 +22,7 @@ from leg_wear_monitor.twin.statistics import CycleStatistics, TorqueStatistics
 
 
 def clear_run_statistics(statistics: RunStatistics) -> None:
-    """Empty a tally in place."""
+    """Empty run statistics in place."""
     for part in statistics:
         part[...] = 0
     statistics.drive_range[:] = np.inf, -np.inf
@@ -68,7 +68,7 @@ def cycle_statistics(
     leg: LegState, stamp: int, contacts: ContactArrays, depth: Floats, before: Floats,
     statistics: RunStatistics, torque: TorqueStatistics,
 ) -> CycleStatistics:  # fmt: skip
-    """Figures of the cycle that ends at a stamp; ``before`` (2, k) the clearances at its begin."""
+    """Statistics of the cycle that ends at a stamp; ``before`` (2, k) the clearances at its begin."""
     joint, mark, now = contacts.joint, leg.mark, clearances(contacts, depth)
     moving = float(statistics.time[0])
     return CycleStatistics(

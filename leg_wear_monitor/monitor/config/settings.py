@@ -154,7 +154,7 @@ class LedgerFile:
     path: str = described("file of the ledger; empty: none is kept, wear is lost at the end", default="")
     checkpoint_s: float = quantity(
         "s",
-        "longest time between two entries while the leg moves, and an evaluation period (a quarter of a gait cycle)",
+        "longest time between two entries while the leg moves, plus an evaluation period of a quarter cycle",
         at_least=0.01,
         at_most=600.0,
         default=5.0,

@@ -2,7 +2,7 @@
 
 import sys
 from collections.abc import Callable, Iterator
-from contextlib import contextmanager
+from contextlib import contextmanager, suppress
 from pathlib import Path
 
 import click
@@ -39,7 +39,8 @@ def compilation(kernels: str, how_long: str = "about half a minute") -> Iterator
     yield
     mark = _mark(kernels)
     if mark is not None:
-        mark.touch()
+        with suppress(FileNotFoundError):  # `cache --clear` meanwhile: then it is to be compiled again
+            mark.touch()
 
 
 @contextmanager

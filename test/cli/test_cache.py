@@ -3,6 +3,7 @@
 import pytest
 
 from leg_wear_monitor import code_cache, kernel
+from leg_wear_monitor.cli.waiting import compilation
 
 pytestmark = pytest.mark.plain
 
@@ -49,3 +50,9 @@ def test_nothing_is_removed_where_no_place_is_safe(run, monkeypatch):
     result = run("cache", "--clear")
     assert result.exit_code == 2
     assert result.stderr == "error: no directory is safe for compiled code, so none is kept\n"
+
+
+def test_a_run_ends_well_while_the_cache_is_cleared(place, run):
+    with compilation("clearance"):
+        run("cache", "--clear")
+    assert list(place.iterdir()) == []

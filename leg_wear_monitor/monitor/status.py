@@ -11,24 +11,17 @@ from leg_wear_monitor.monitor.alarms.words import ADVICE
 from leg_wear_monitor.monitor.encoders.clearance_estimate import ClearanceObservation
 from leg_wear_monitor.monitor.encoders.observer import EncoderObserver
 from leg_wear_monitor.monitor.encoders.state import faults
-from leg_wear_monitor.monitor.evaluation import board as names
+from leg_wear_monitor.monitor.evaluation import specs
 from leg_wear_monitor.monitor.evaluation.evaluation import AlarmEvaluation
-from leg_wear_monitor.monitor.evaluation.torque_checks import (
-    BIAS,
-    DRIFT,
-    LAG,
-    offset_error_rad,
-    torque_causes,
-)
+from leg_wear_monitor.monitor.evaluation.torque_checks import offset_error_rad, torque_causes
 from leg_wear_monitor.monitor.evaluation.torque_record import TorqueRecord
 from leg_wear_monitor.monitor.forecast.words import UNKNOWN, lifetime_values
 from leg_wear_monitor.monitor.reports import CycleReport, Status
 from leg_wear_monitor.twin.digital_twin import DigitalTwin
 from leg_wear_monitor.twin.statistics import Event, Tracking
 
-_RATES = (names.CRANK_RATE, names.TORQUE_RATE)
-_TORQUE = (names.MISMATCH, BIAS, DRIFT, LAG)
-_INPUT = (*_RATES, names.BAD_SAMPLES, names.LOST_TIME, names.STUCK_TORQUE, names.SOURCES)
+_TORQUE = tuple(spec.name() for spec in specs.TORQUE)
+_INPUT = tuple(spec.name() for spec in specs.OF_INPUT)
 
 
 def statuses(
@@ -61,7 +54,7 @@ def _gait(
     happened: Sequence[Event],
 ) -> Status:
     tracking = twin.tracking
-    message, level = tracking.name.lower().replace("_", " "), evaluate.board.level(names.CADENCE)
+    message, level = tracking.name.lower().replace("_", " "), evaluate.board.level(specs.CADENCE.name())
     if evaluate.guard.cause:
         message, level = "not monitored: see input", Level.ERROR
     elif happened and tracking in (Tracking.STARTING, Tracking.OUT_OF_STEP):
@@ -116,7 +109,7 @@ def _torque(evaluate: AlarmEvaluation, last: CycleReport | None, record: TorqueR
         "crank_offset_error_rad": offset_error_rad(last, record),
     }
     raised = {name for name in _TORQUE if evaluate.board.alarms[name].level is not Level.OK}
-    told = ["measured is not what was predicted"] if names.MISMATCH in raised else []
+    told = ["measured is not what was predicted"] if specs.MISMATCH.name() in raised else []
     told += torque_causes(raised, last, record, evaluate.torque_bounds)
     if not told and math.isnan(last.torque_mismatch):
         told = ["instants are compared over several gait cycles, not enough yet"]
@@ -126,8 +119,7 @@ def _torque(evaluate: AlarmEvaluation, last: CycleReport | None, record: TorqueR
 def _joint(
     k: int, name: str, twin: DigitalTwin, evaluate: AlarmEvaluation, last: CycleReport | None
 ) -> Status:
-    kinds = (names.IMPACT, names.CLEARANCE, names.GROWTH)
-    level = evaluate.board.level(*(f"{kind} {name}" for kind in kinds))
+    level = evaluate.board.level(*(spec.name(name) for spec in specs.JOINT))
     values = {
         "clearance_m": float(twin.clearance_mean_m[k]),
         "clearance_max_m": float(twin.clearance_max_m[k]),
@@ -155,9 +147,8 @@ def _joint(
 def _encoders(encoders: EncoderObserver, evaluate: AlarmEvaluation, last: CycleReport | None) -> Status:
     """Further encoders: what is wrong with them, how they are off, and the clearances that they show."""
     settings, state = evaluate.config.encoders, encoders.state
-    level = evaluate.board.level(
-        *(name for name in evaluate.board.alarms if name.startswith(names.DEPARTURE))
-    )
+    kinds = {spec.kind for spec in specs.ENCODERS}
+    level = max(alarm.level for alarm in evaluate.board.alarms.values() if alarm.kind in kinds)
     values = {"cycles": float(encoders.cycles)}
     for i, name in enumerate(settings.names):
         kept = state.samples

@@ -11,8 +11,6 @@ import pytest
 
 from leg_wear_monitor.cli.verbs import replay as verb
 from leg_wear_monitor.monitor.alarms.alarm import Level
-from leg_wear_monitor.monitor.config.parameters import config_from
-from leg_wear_monitor.monitor.evaluation.board import AlarmBoard
 
 pytest.importorskip("mcap")
 pytest.importorskip("rosbags")
@@ -52,8 +50,6 @@ def cut(bag, tmp_path):
 
 def test_the_lists_of_the_verb_are_the_librarys():
     assert verb.TIMES == TIMES
-    board = AlarmBoard(config_from({"encoders.names": ["knee"], "encoders.joints": ["G"]}), ("A",))
-    assert set(verb.ALARM_KINDS) == {alarm.kind for alarm in board.alarms.values()}
 
 
 def test_a_whole_recording(run, bag, complaints, tmp_path):

@@ -16,7 +16,14 @@ HEAVY = {"numba", "numpy", "matplotlib", "rich", "cattrs", "ruamel.yaml"}
 @pytest.mark.plain
 @pytest.mark.parametrize(
     "arguments",
-    [["--help"], ["--version"], ["simulate", "--help"], ["study", "--help"], ["report", "--help"]],
+    [
+        ["--help"],
+        ["--version"],
+        ["simulate", "--help"],
+        ["study", "--help"],
+        ["report", "--help"],
+        ["replay", "--help"],
+    ],
 )
 def test_help_loads_nothing_heavy(arguments):
     code = (

@@ -13,6 +13,7 @@ from leg_wear_monitor.cli.waiting import compilation, progress_bar
 from leg_wear_monitor.errors import LegWearError
 from leg_wear_monitor.interrupt import closed_at_the_end
 from leg_wear_monitor.json_text import json_text
+from leg_wear_monitor.monitor.evaluation.specs import INPUT_KINDS, KINDS
 
 if TYPE_CHECKING:
     from collections.abc import Callable
@@ -25,19 +26,6 @@ SUMMARY, PAGE = "summary.json", "report.html"
 
 # Spelled out, for --help shall not wait for numba; the tests compare them with the library's.
 TIMES = ("header", "log", "publish")
-INPUT_KINDS = ("input_rate", "input_samples", "input_gaps", "input_torque", "input_sources")
-ALARM_KINDS = (
-    "impact_force",
-    "clearance",
-    "growth",
-    "clearance_departure",
-    "torque_mismatch",
-    "torque_bias",
-    "torque_drift",
-    "torque_lag",
-    "cadence",
-    *INPUT_KINDS,
-)
 _MOST_LINES = 20
 
 
@@ -83,11 +71,11 @@ _MOST_LINES = 20
 @click.option("--allow-partial", is_flag=True, help="Exit with 0 also if parts of the recording are lost.")
 @click.option(
     "--fail-on",
-    type=click.Choice(("alarm", "warning", "input", *ALARM_KINDS)),
+    type=click.Choice(("alarm", "warning", "input", *KINDS)),
     multiple=True,
     metavar="WHAT",
     help="Exit with 1 if any alarm was raised, any warning, any alarm of the input, or one of a kind: "
-    f"{', '.join(ALARM_KINDS)}. May be repeated.",
+    f"{', '.join(KINDS)}. May be repeated.",
 )
 @json_option("the summary")
 def replay(

@@ -1,70 +1,42 @@
 """All alarms of a monitor, and the limits that its parameters set for them."""
 
-from collections.abc import Iterable, Mapping
+from collections.abc import Iterable, Iterator, Mapping
+from typing import Any
 
 import attrs
 
 from leg_wear_monitor.monitor.alarms.alarm import Alarm, Level, Limit, acknowledged, evaluated, has_changed
 from leg_wear_monitor.monitor.config.settings import MonitorConfig
-from leg_wear_monitor.monitor.evaluation.torque_checks import BIAS, DRIFT, LAG, torque_bounds
-from leg_wear_monitor.monitor.reports import AlarmList
+from leg_wear_monitor.monitor.evaluation import specs
+from leg_wear_monitor.monitor.evaluation.specs import AlarmSpec, LimitSource
+from leg_wear_monitor.monitor.evaluation.torque_checks import torque_bounds
+from leg_wear_monitor.monitor.reports import AlarmList, JointReport
 
-IMPACT, CLEARANCE, GROWTH = "impact_force", "clearance", "growth"
-DEPARTURE = "clearance_departure"
-MISMATCH, CADENCE = "torque_mismatch", "cadence"
-CRANK_RATE, TORQUE_RATE = "input_rate crank", "input_rate torque"
-BAD_SAMPLES, LOST_TIME, STUCK_TORQUE = "input_samples", "input_gaps", "input_torque"
-SOURCES = "input_sources"
 
-TWO_SOURCES = Limit(2.0, 2.0)  # of one crank
+def joint_specs(config: MonitorConfig) -> tuple[AlarmSpec[JointReport], ...]:
+    """Specs of the alarms that each clearance joint has."""
+    return (*specs.JOINT, *(specs.ENCODERS if config.encoders.names else ()))
+
+
+def specs_of(
+    config: MonitorConfig, clearance_joints: tuple[str, ...]
+) -> Iterator[tuple[AlarmSpec[Any], int, Alarm]]:
+    """Specs of all alarms in their order, each with the number of its joint, and the alarm when it is new."""
+    for k, joint in enumerate(clearance_joints):
+        yield from ((spec, k, spec.new(joint)) for spec in joint_specs(config))
+    of_leg: tuple[AlarmSpec[Any], ...] = (*specs.TORQUE, *specs.GAIT, *specs.OF_INPUT)
+    yield from ((spec, 0, spec.new()) for spec in of_leg)
 
 
 def limits_of(
     config: MonitorConfig, clearance_joints: tuple[str, ...], torque_size_nm: float = 1.0
 ) -> dict[str, Limit]:
     """Limit of every alarm by its name; ``torque_size_nm`` RMS of the drive torque as predicted."""
-    limits = config.limits
-    found: dict[str, Limit] = {}
-    for k, joint in enumerate(clearance_joints):
-        impact = limits.joint_impact_force_n[k] if limits.joint_impact_force_n else limits.impact_force_n
-        clearance = limits.joint_clearance_m[k] if limits.joint_clearance_m else limits.clearance_m
-        found[f"{IMPACT} {joint}"] = _limit(config, impact, config.alarms.knock_on_delay_cycles)
-        found[f"{CLEARANCE} {joint}"] = _limit(config, clearance)
-        found[f"{GROWTH} {joint}"] = _limit(config, limits.growth_m_per_hour)
-        if config.encoders.names:
-            found[f"{DEPARTURE} {joint}"] = _limit(config, limits.clearance_departure_m)
-    found[MISMATCH] = _limit(config, limits.torque_mismatch, config.alarms.knock_on_delay_cycles)
     bounds = torque_bounds(config, torque_size_nm)
-    for name, error in ((BIAS, bounds.bias_nm), (DRIFT, bounds.drift_nm), (LAG, bounds.max_lag_s)):
-        found[name] = _limit(config, error)
-    found[CADENCE] = _limit(config, config.cadence.tolerance_rpm)
-    for rate in (CRANK_RATE, TORQUE_RATE):
-        found[rate] = _least(config, limits.min_rate_hz)
-    found[BAD_SAMPLES] = _limit(config, limits.bad_sample_fraction)
-    found[LOST_TIME] = _limit(config, limits.lost_time_fraction)
-    found[STUCK_TORQUE] = _limit(config, limits.stuck_torque_fraction)
-    found[SOURCES] = TWO_SOURCES
-    return found
-
-
-def _limit(config: MonitorConfig, error: float, on_delay: int | None = None) -> Limit:
-    alarms = config.alarms
-    return Limit(
-        config.limits.warn_fraction * error, error, alarms.deadband, on_delay or alarms.on_delay_cycles
-    )
-
-
-def _least(config: MonitorConfig, error: float) -> Limit:
-    alarms = config.alarms
-    return Limit(
-        error / config.limits.warn_fraction, error, alarms.deadband, alarms.on_delay_cycles, is_least=True
-    )
-
-
-_UNITS = {
-    BIAS: "N m", DRIFT: "N m", LAG: "s", IMPACT: "N", CLEARANCE: "m", DEPARTURE: "m",
-    GROWTH: "m/h", CADENCE: "rpm", CRANK_RATE: "Hz", TORQUE_RATE: "Hz",
-}  # fmt: skip
+    return {
+        alarm.name: spec.limits(LimitSource(config, bounds, k))
+        for spec, k, alarm in specs_of(config, clearance_joints)
+    }
 
 
 class AlarmBoard:
@@ -88,7 +60,7 @@ class AlarmBoard:
     ) -> None:
         self._clearance_joints, self._torque_size_nm = clearance_joints, torque_size_nm
         self._limits = limits_of(config, clearance_joints, torque_size_nm)
-        self.alarms = {name: _new(name) for name in self._limits}
+        self.alarms = {alarm.name: alarm for _, _, alarm in specs_of(config, clearance_joints)}
 
     def configure(self, config: MonitorConfig) -> None:
         """Evaluate by other limits from now on."""
@@ -97,7 +69,7 @@ class AlarmBoard:
     @property
     def clearance_limits_m(self) -> tuple[float, ...]:
         """Limit of each clearance joint's clearance."""
-        return tuple(self._limits[f"{CLEARANCE} {joint}"].error for joint in self._clearance_joints)
+        return tuple(self._limits[specs.CLEARANCE.name(joint)].error for joint in self._clearance_joints)
 
     def evaluate(self, values: Mapping[str, float], stamp_ns: int, cycles: int = 1) -> tuple[AlarmList, ...]:
         """Evaluate values by the names of their alarms; one list of all alarms if an operator sees a change.
@@ -149,8 +121,3 @@ class AlarmBoard:
         if any(has_changed(before[name], alarm) for name, alarm in self.alarms.items()):
             return (AlarmList(stamp_ns, tuple(self.alarms.values())),)
         return ()
-
-
-def _new(name: str) -> Alarm:
-    kind, _, subject = name.partition(" ")
-    return Alarm(kind=kind, subject=subject, unit=_UNITS.get(kind, _UNITS.get(name, "")))

@@ -6,9 +6,10 @@ import attrs
 
 from leg_wear_monitor.monitor.alarms.alarm import Level
 from leg_wear_monitor.monitor.config.settings import MonitorConfig
-from leg_wear_monitor.monitor.evaluation import board as names
-from leg_wear_monitor.monitor.evaluation.board import AlarmBoard
+from leg_wear_monitor.monitor.evaluation import specs
+from leg_wear_monitor.monitor.evaluation.board import AlarmBoard, joint_specs
 from leg_wear_monitor.monitor.evaluation.evaluation_period import A_CYCLE
+from leg_wear_monitor.monitor.evaluation.specs import CycleEvidence
 from leg_wear_monitor.monitor.evaluation.torque_checks import TorqueBounds, torque_bounds, torque_values
 from leg_wear_monitor.monitor.evaluation.torque_record import TorqueRecord
 from leg_wear_monitor.monitor.inputs.causes import causes
@@ -80,7 +81,7 @@ class AlarmEvaluation:
 
     def holds(self) -> bool:
         """Whether the leg does what the model holds for: in cadence, and with the torque that is expected."""
-        return self.board.level(names.CADENCE, names.MISMATCH) is not Level.ERROR
+        return self.board.level(specs.CADENCE.name(), specs.MISMATCH.name()) is not Level.ERROR
 
     def see(self, piece: Samples) -> None:
         """Take down samples that came."""
@@ -113,18 +114,11 @@ class AlarmEvaluation:
     def end_cycle(self, report: CycleReport, record: TorqueRecord) -> tuple[AlarmList, ...]:
         """Evaluate a whole gait cycle, its torque beside its record; all alarms, if one has changed."""
         self.state.cycles += 1
-        values = {
-            names.MISMATCH: report.torque_mismatch,
-            names.CADENCE: abs(report.cadence_rpm - self.config.cadence.commanded_rpm),
-        }
-        values |= torque_values(report, record, self.torque_bounds)
+        torque = torque_values(report, record, self.torque_bounds)
+        cycle = CycleEvidence(report, torque, self.config.cadence.commanded_rpm)
+        values = {spec.name(): spec.value(cycle) for spec in (*specs.TORQUE, *specs.GAIT)}
         for joint in report.joints:
-            per_hour = math.nan if joint.growth_mps is None else 3600.0 * joint.growth_mps
-            values[f"{names.IMPACT} {joint.joint}"] = joint.peak_force_n
-            values[f"{names.CLEARANCE} {joint.joint}"] = joint.clearance_m
-            values[f"{names.GROWTH} {joint.joint}"] = per_hour
-            if joint.seen:
-                values[f"{names.DEPARTURE} {joint.joint}"] = joint.seen.surely_m
+            values |= {spec.name(joint.joint): spec.value(joint) for spec in joint_specs(self.config)}
         return self.board.evaluate(values, report.stamp_ns)
 
     def end_period(self, skipped: int = 0) -> tuple[AlarmList, ...]:
@@ -136,11 +130,12 @@ class AlarmEvaluation:
             Samples that were not handed on so far, their wear is counted already.
         """
         peaks = {
-            f"{names.IMPACT} {joint}": float(peak)
+            specs.IMPACT.name(joint): float(peak)
             for joint, peak in zip(self._twin.clearance_joints, self._twin.peak_force_n, strict=True)
         }
         early = self.board.evaluate_early(peaks, self._twin.intake.followed_stamp_ns)
-        early += self.board.evaluate({names.SOURCES: float(self.guard.sources)}, self.guard.stamp_ns)
+        sources = {specs.SOURCES.name(): specs.SOURCES.value(self.guard)}
+        early += self.board.evaluate(sources, self.guard.stamp_ns)
         self.state.evaluation_periods += 1
         if self.state.evaluation_periods < A_CYCLE:
             return early
@@ -155,16 +150,10 @@ class AlarmEvaluation:
         state, intake, config = self.state, self._twin.intake, self.config
         is_whole = skipped == state.skipped == state.skipped_before
         health = input_health(state.before, intake, state.torque, is_whole)
-        values = {
-            names.CRANK_RATE: health.crank_rate_hz,
-            names.TORQUE_RATE: health.torque_rate_hz,
-            names.BAD_SAMPLES: health.bad_fraction,
-            names.LOST_TIME: health.lost_fraction,
-            names.STUCK_TORQUE: health.stuck_torque_fraction,
-        }
+        values = {spec.name(): spec.value(health) for spec in specs.INPUT}
         if state.cycles == 0 and self._twin.tracking is Tracking.OUT_OF_STEP:
             speed_rpm = self._twin.speed_radps * 30.0 / math.pi
-            values[names.CADENCE] = abs(speed_rpm - config.cadence.commanded_rpm)
+            values[specs.CADENCE.name()] = abs(speed_rpm - config.cadence.commanded_rpm)
         self.state = AlarmEvaluationState(
             intake,
             skipped,

@@ -1,12 +1,14 @@
 """What of the measured torque no drive can do: a bias, a drift, a lag; bounds, values and sentences."""
 
 import math
+from typing import TYPE_CHECKING
 
 import attrs
 
-from leg_wear_monitor.monitor.config.settings import MonitorConfig
-from leg_wear_monitor.monitor.evaluation.torque_record import TorqueRecord
-from leg_wear_monitor.monitor.reports import CycleReport
+if TYPE_CHECKING:
+    from leg_wear_monitor.monitor.config.settings import MonitorConfig
+    from leg_wear_monitor.monitor.evaluation.torque_record import TorqueRecord
+    from leg_wear_monitor.monitor.reports import CycleReport
 
 BIAS, DRIFT, LAG = "torque_bias", "torque_drift", "torque_lag"
 
@@ -26,7 +28,7 @@ class TorqueBounds:
     drift_nm: float
 
 
-def torque_bounds(config: MonitorConfig, size_nm: float) -> TorqueBounds:
+def torque_bounds(config: "MonitorConfig", size_nm: float) -> TorqueBounds:
     """Bounds by the parameters; those that are not given follow from the torque's RMS as predicted [N m]."""
     return TorqueBounds(
         max_friction_nm=config.drive_torque.max_friction_nm or _FRICTION * size_nm,
@@ -36,7 +38,7 @@ def torque_bounds(config: MonitorConfig, size_nm: float) -> TorqueBounds:
     )
 
 
-def torque_values(report: CycleReport, record: TorqueRecord, bounds: TorqueBounds) -> dict[str, float]:
+def torque_values(report: "CycleReport", record: "TorqueRecord", bounds: TorqueBounds) -> dict[str, float]:
     """Values of the alarms: what is surely beyond, in their units; none without a torque."""
     if not report.torque_samples:
         return {}
@@ -51,14 +53,14 @@ def torque_values(report: CycleReport, record: TorqueRecord, bounds: TorqueBound
     }
 
 
-def bias_of(report: CycleReport, bounds: TorqueBounds) -> float:
+def bias_of(report: "CycleReport", bounds: TorqueBounds) -> float:
     """What of the constant torque is no friction [N m]: it would drive, or is more than friction may be."""
     friction_nm = report.friction_nm
     return min(friction_nm, 0.0) + max(friction_nm - bounds.max_friction_nm, 0.0)
 
 
 def torque_causes(
-    raised: set[str], report: CycleReport, record: TorqueRecord, bounds: TorqueBounds
+    raised: set[str], report: "CycleReport", record: "TorqueRecord", bounds: TorqueBounds
 ) -> list[str]:
     """Sentences on what raised alarms of the torque may come from, free of values."""
     told = []
@@ -82,7 +84,7 @@ def torque_causes(
     return told
 
 
-def _lag_cause(record: TorqueRecord, bounds: TorqueBounds) -> str:
+def _lag_cause(record: "TorqueRecord", bounds: TorqueBounds) -> str:
     split = record.lags.split
     if split is None:
         return (
@@ -94,7 +96,7 @@ def _lag_cause(record: TorqueRecord, bounds: TorqueBounds) -> str:
     return "crank.offset_rad is off: the torque's lag goes with the time that the crank takes for an angle"
 
 
-def offset_error_rad(report: CycleReport, record: TorqueRecord) -> float:
+def offset_error_rad(report: "CycleReport", record: "TorqueRecord") -> float:
     """By how much crank.offset_rad is off, if all of the lag that is not known to be one comes from there."""
     split = record.lags.split
     return split[1] if split else report.torque_lag_s * report.cadence_rpm * math.pi / 30.0

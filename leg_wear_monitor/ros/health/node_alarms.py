@@ -5,13 +5,15 @@ from collections.abc import Mapping
 import attrs
 
 from leg_wear_monitor.monitor.alarms.alarm import Alarm, Level, Limit, acknowledged, evaluated, has_changed
-from leg_wear_monitor.monitor.evaluation.board import SOURCES, TWO_SOURCES
+from leg_wear_monitor.monitor.evaluation import specs
 from leg_wear_monitor.monitor.reports import AlarmList
 from leg_wear_monitor.ros.health.silence import SILENT_FROM_S, TORQUE
 
 SILENCE = "input_silence"
 _SILENT = Limit(SILENT_FROM_S, SILENT_FROM_S)
-_LIMITS = {SILENCE: _SILENT, SOURCES: TWO_SOURCES}
+SOURCES = specs.SOURCES.kind
+_TWO_SOURCES = Limit(2.0, 2.0)
+_LIMITS = {SILENCE: _SILENT, SOURCES: _TWO_SOURCES}
 
 
 class NodeAlarms:

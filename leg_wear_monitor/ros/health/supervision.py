@@ -9,10 +9,9 @@ from rclpy.node import Node
 from leg_wear_monitor.messages import cdr
 from leg_wear_monitor.monitor.alarms.alarm import Alarm, Level
 from leg_wear_monitor.monitor.config.settings import MonitorConfig
-from leg_wear_monitor.monitor.evaluation.board import SOURCES
 from leg_wear_monitor.monitor.reports import AlarmList, Status
 from leg_wear_monitor.ros.health.clock_monitor import ClockMonitor, both_clocks
-from leg_wear_monitor.ros.health.node_alarms import SILENCE, NodeAlarms
+from leg_wear_monitor.ros.health.node_alarms import SILENCE, SOURCES, NodeAlarms
 from leg_wear_monitor.ros.health.node_health import topics_status
 from leg_wear_monitor.ros.health.node_log import AlarmLog, StatusLog
 from leg_wear_monitor.ros.health.silence import CRANK, TORQUE, Silence

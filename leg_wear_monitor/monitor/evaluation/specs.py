@@ -1,0 +1,247 @@
+"""The monitor's alarms, one entry each: board, units, status, command line and docs follow from it.
+
+A value that is NaN is not known and leaves its alarm as it is. Nothing heavy is imported, for ``--help`` asks
+for the kinds.
+"""
+
+import math
+from collections.abc import Callable, Mapping
+from typing import TYPE_CHECKING, Any, Generic, TypeVar
+
+import attrs
+
+from leg_wear_monitor.monitor.alarms.alarm import Alarm, Limit
+from leg_wear_monitor.monitor.evaluation.torque_checks import BIAS, DRIFT, LAG
+
+if TYPE_CHECKING:
+    from leg_wear_monitor.monitor.config.settings import Alarms, MonitorConfig
+    from leg_wear_monitor.monitor.evaluation.torque_checks import TorqueBounds
+    from leg_wear_monitor.monitor.inputs.guard import InputGuard
+    from leg_wear_monitor.monitor.inputs.health import InputHealth
+    from leg_wear_monitor.monitor.reports import CycleReport, JointReport
+
+_E = TypeVar("_E")
+
+
+@attrs.frozen
+class LimitSource:
+    """What limits follow from: parameters, bounds of the drive torque, and which clearance joint it is."""
+
+    config: "MonitorConfig"
+    bounds: "TorqueBounds"
+    joint: int = 0
+
+    def by_joint(self, own: tuple[float, ...], of_all: float) -> float:
+        """The joint's own limit where such are given, else that of all."""
+        return own[self.joint] if own else of_all
+
+
+@attrs.frozen
+class CycleEvidence:
+    """A gait cycle, the values of its torque by their alarms, and the cadence [rpm] that is commanded."""
+
+    report: "CycleReport"
+    torque: Mapping[str, float]
+    commanded_rpm: float
+
+
+def _usual(alarms: "Alarms") -> int:
+    return alarms.on_delay_cycles
+
+
+def _knock(alarms: "Alarms") -> int:
+    return alarms.knock_on_delay_cycles
+
+
+@attrs.frozen(kw_only=True)
+class AlarmSpec(Generic[_E]):
+    """An alarm.
+
+    Attributes
+    ----------
+    kind, subject : str
+        The subject of an alarm of a clearance joint is the joint.
+    unit : str
+        Of value and limit.
+    meaning, limit_words : str
+        For operators: what the value is, and the parameters that limit it.
+    value : callable
+        Value from the evidence: a joint's report, a gait cycle, the input's health or its guard.
+    limit : callable
+        Limit of ERROR.
+    on_delay : callable
+        Gait cycles in a row for which a value must be beyond before the level rises.
+    is_least : bool
+        Whether values below the limit are the bad ones.
+    is_count : bool
+        Whether the limit is a number of things: it holds at once, without WARN and deadband.
+    """
+
+    kind: str
+    subject: str = ""
+    unit: str = ""
+    meaning: str
+    limit_words: str
+    value: Callable[[_E], float]
+    limit: Callable[[LimitSource], float]
+    on_delay: Callable[["Alarms"], int] = _usual
+    is_least: bool = False
+    is_count: bool = False
+
+    def new(self, joint: str = "") -> Alarm:
+        """The alarm before anything is known."""
+        return Alarm(kind=self.kind, subject=self.subject or joint, unit=self.unit)
+
+    def name(self, joint: str = "") -> str:
+        """Name of the alarm, such as ``clearance A``."""
+        return self.new(joint).name
+
+    def limits(self, source: LimitSource) -> Limit:
+        """Where its levels begin."""
+        error, alarms, warn = self.limit(source), source.config.alarms, source.config.limits.warn_fraction
+        if self.is_count:
+            return Limit(error, error)
+        first = error / warn if self.is_least else warn * error
+        return Limit(first, error, alarms.deadband, self.on_delay(alarms), self.is_least)
+
+
+IMPACT: "AlarmSpec[JointReport]" = AlarmSpec(
+    kind="impact_force",
+    unit="N",
+    meaning="peak contact force of the gait cycle, N",
+    limit_words="`limits.impact_force_n`, `limits.joint_impact_force_n`",
+    value=lambda joint: joint.peak_force_n,
+    limit=lambda of: of.by_joint(of.config.limits.joint_impact_force_n, of.config.limits.impact_force_n),
+    on_delay=_knock,
+)
+CLEARANCE: "AlarmSpec[JointReport]" = AlarmSpec(
+    kind="clearance",
+    unit="m",
+    meaning="mean radial clearance, m",
+    limit_words="`limits.clearance_m`, `limits.joint_clearance_m`",
+    value=lambda joint: joint.clearance_m,
+    limit=lambda of: of.by_joint(of.config.limits.joint_clearance_m, of.config.limits.clearance_m),
+)
+GROWTH: "AlarmSpec[JointReport]" = AlarmSpec(
+    kind="growth",
+    unit="m/h",
+    meaning="growth of it, m/h",
+    limit_words="`limits.growth_m_per_hour`",
+    value=lambda joint: math.nan if joint.growth_mps is None else 3600.0 * joint.growth_mps,
+    limit=lambda of: of.config.limits.growth_m_per_hour,
+)
+DEPARTURE: "AlarmSpec[JointReport]" = AlarmSpec(
+    kind="clearance_departure",
+    unit="m",
+    meaning="how far the clearance that further encoders show is from it, m; 0 below four standard "
+    "deviations. Only with `encoders.names`",
+    limit_words="`limits.clearance_departure_m`",
+    value=lambda joint: joint.seen.surely_m if joint.seen else math.nan,
+    limit=lambda of: of.config.limits.clearance_departure_m,
+)
+MISMATCH: "AlarmSpec[CycleEvidence]" = AlarmSpec(
+    kind="torque_mismatch",
+    meaning="RMS of the torque that foot load, friction and lag do not explain, as a fraction of the "
+    "predicted RMS",
+    limit_words="`limits.torque_mismatch`",
+    value=lambda cycle: cycle.report.torque_mismatch,
+    limit=lambda of: of.config.limits.torque_mismatch,
+    on_delay=_knock,
+)
+CADENCE: "AlarmSpec[CycleEvidence]" = AlarmSpec(
+    kind="cadence",
+    unit="rpm",
+    meaning="departure from the commanded cadence, rpm",
+    limit_words="`cadence.tolerance_rpm`",
+    value=lambda cycle: abs(cycle.report.cadence_rpm - cycle.commanded_rpm),
+    limit=lambda of: of.config.cadence.tolerance_rpm,
+)
+SOURCES: "AlarmSpec[InputGuard]" = AlarmSpec(
+    kind="input_sources",
+    meaning="number of sources of the crank's angle",
+    limit_words="2, at once",
+    value=lambda guard: float(guard.sources),
+    limit=lambda _: 2.0,
+    is_count=True,
+)
+
+JOINT = (IMPACT, CLEARANCE, GROWTH)
+ENCODERS = (DEPARTURE,)
+TORQUE: "tuple[AlarmSpec[CycleEvidence], ...]" = (
+    MISMATCH,
+    AlarmSpec(
+        kind=BIAS,
+        unit="N m",
+        meaning="constant drive torque that friction cannot be, N m: one that drives, or more than "
+        "`drive_torque.max_friction_nm`",
+        limit_words="`limits.torque_bias_nm`",
+        value=lambda cycle: cycle.torque.get(BIAS, math.nan),
+        limit=lambda of: of.bounds.bias_nm,
+    ),
+    AlarmSpec(
+        kind=DRIFT,
+        unit="N m",
+        meaning="change of the constant drive torque since this leg was commissioned, N m",
+        limit_words="`limits.torque_drift_nm`",
+        value=lambda cycle: cycle.torque.get(DRIFT, math.nan),
+        limit=lambda of: of.bounds.drift_nm,
+    ),
+    AlarmSpec(
+        kind=LAG,
+        unit="s",
+        meaning="time by which the measured torque is late or early, s",
+        limit_words="`drive_torque.max_lag_s`",
+        value=lambda cycle: cycle.torque.get(LAG, math.nan),
+        limit=lambda of: of.bounds.max_lag_s,
+    ),
+)
+GAIT = (CADENCE,)
+INPUT: "tuple[AlarmSpec[InputHealth], ...]" = (
+    AlarmSpec(
+        kind="input_rate",
+        subject="crank",
+        unit="Hz",
+        meaning="crank samples used a second, Hz",
+        limit_words="`limits.min_rate_hz`",
+        value=lambda health: health.crank_rate_hz,
+        limit=lambda of: of.config.limits.min_rate_hz,
+        is_least=True,
+    ),
+    AlarmSpec(
+        kind="input_rate",
+        subject="torque",
+        unit="Hz",
+        meaning="torque samples used a second, Hz",
+        limit_words="`limits.min_rate_hz`",
+        value=lambda health: health.torque_rate_hz,
+        limit=lambda of: of.config.limits.min_rate_hz,
+        is_least=True,
+    ),
+    AlarmSpec(
+        kind="input_samples",
+        meaning="fraction of samples that could not be used: faulty, repeated, late, stray stamp, far off",
+        limit_words="`limits.bad_sample_fraction`",
+        value=lambda health: health.bad_fraction,
+        limit=lambda of: of.config.limits.bad_sample_fraction,
+    ),
+    AlarmSpec(
+        kind="input_gaps",
+        meaning="fraction of the time that was not monitored",
+        limit_words="`limits.lost_time_fraction`",
+        value=lambda health: health.lost_fraction,
+        limit=lambda of: of.config.limits.lost_time_fraction,
+    ),
+    AlarmSpec(
+        kind="input_torque",
+        meaning="fraction of torques that are saturated, or repeat the largest or the smallest",
+        limit_words="`limits.stuck_torque_fraction`",
+        value=lambda health: health.stuck_torque_fraction,
+        limit=lambda of: of.config.limits.stuck_torque_fraction,
+    ),
+)
+
+OF_INPUT: "tuple[AlarmSpec[Any], ...]" = (*INPUT, SOURCES)
+ALL: "tuple[AlarmSpec[Any], ...]" = (*JOINT, *ENCODERS, *TORQUE, *GAIT, *OF_INPUT)
+
+INPUT_KINDS = tuple(dict.fromkeys(spec.kind for spec in OF_INPUT))
+KINDS = tuple(dict.fromkeys(spec.kind for spec in ALL))

@@ -1,0 +1,69 @@
+"""The table of alarms is what docs/monitor.md lists and a board holds; a script renews the page's table."""
+
+import re
+from pathlib import Path
+
+import pytest
+
+from leg_wear_monitor.monitor.config.parameters import config_from
+from leg_wear_monitor.monitor.config.settings import MonitorConfig
+from leg_wear_monitor.monitor.evaluation import specs
+from leg_wear_monitor.monitor.evaluation.board import AlarmBoard, limits_of
+
+pytestmark = pytest.mark.plain
+
+PAGE = Path(__file__).parents[3] / "docs" / "monitor.md"
+TABLE = re.compile(r"(<!-- alarms -->\n).*?(<!-- end -->)", re.DOTALL)
+ENCODERS = {"encoders.names": ["knee"], "encoders.joints": ["G"]}
+
+
+def renewed(page):
+    rows = ["| alarm | value | limit |", "|---|---|---|"]
+    for group in (specs.JOINT, specs.ENCODERS, specs.TORQUE, specs.GAIT, specs.INPUT, (specs.SOURCES,)):
+        joint = "<joint>" if group in (specs.JOINT, specs.ENCODERS) else ""
+        rows += [f"| `{spec.name(joint)}` | {spec.meaning} | {spec.limit_words} |" for spec in group]
+    table = "\n".join([*rows, ""])
+    return TABLE.sub(lambda found: found[1] + table + found[2], page)
+
+
+def test_the_page_lists_every_alarm_as_it_is_declared():
+    page = PAGE.read_text(encoding="utf-8")
+    assert "<!-- alarms -->" in page
+    assert renewed(page) == page
+
+
+def test_kinds_are_those_of_the_board():
+    board = AlarmBoard(config_from(ENCODERS), ("A", "B"))
+    assert set(specs.KINDS) == {alarm.kind for alarm in board.alarms.values()}
+    assert len(set(specs.KINDS)) == len(specs.KINDS)
+    assert set(specs.INPUT_KINDS) == {kind for kind in specs.KINDS if kind.startswith("input_")}
+
+
+def test_names_and_their_order_are_a_contract():
+    joint = ("impact_force {}", "clearance {}", "growth {}", "clearance_departure {}")
+    of_leg = (
+        "torque_mismatch", "torque_bias", "torque_drift", "torque_lag", "cadence", "input_rate crank",
+        "input_rate torque", "input_samples", "input_gaps", "input_torque", "input_sources",
+    )  # fmt: skip
+    expected = [*(name.format(each) for each in "AB" for name in joint), *of_leg]
+    assert list(AlarmBoard(config_from(ENCODERS), ("A", "B")).alarms) == expected
+    without = [name for name in expected if "departure" not in name]
+    assert list(AlarmBoard(MonitorConfig(), ("A", "B")).alarms) == without
+
+
+def test_limits_follow_from_the_parameters():
+    config = config_from({"limits.joint_clearance_m": [4.0e-4, 5.0e-4], "limits.min_rate_hz": 90.0})
+    limits, warn, alarms = limits_of(config, ("A", "B"), 8.0), config.limits.warn_fraction, config.alarms
+    assert (limits["clearance B"].warn, limits["clearance B"].error) == (warn * 5.0e-4, 5.0e-4)
+    assert limits["impact_force B"].error == config.limits.impact_force_n
+    assert limits["impact_force A"].on_delay == alarms.knock_on_delay_cycles
+    assert limits["growth A"].on_delay == alarms.on_delay_cycles
+    least = limits["input_rate crank"]
+    assert (least.warn, least.error, least.is_least) == (90.0 / warn, 90.0, True)
+    assert limits["torque_bias"].error == pytest.approx(0.1 * 8.0)
+    sources = limits["input_sources"]
+    assert (sources.warn, sources.error, sources.deadband, sources.on_delay) == (2.0, 2.0, 0.0, 1)
+
+
+if __name__ == "__main__":
+    PAGE.write_text(renewed(PAGE.read_text(encoding="utf-8")), encoding="utf-8")

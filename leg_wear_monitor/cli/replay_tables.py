@@ -50,7 +50,7 @@ def print_replay(result: "ReplayResult", wall_s: float) -> None:
     if result.is_believable:
         factor = result.duration_s / wall_s
         console.print(f"speed  {result.duration_s:.4g} s in {wall_s:.3g} s: {figure(factor)} times real time")
-    console.print(ADVICE)
+    console.print(ADVICE, soft_wrap=True)
 
 
 def _joints(result: "ReplayResult") -> Table:

@@ -182,14 +182,10 @@ def _alarm(alarm: Alarm) -> Status:
 
 
 def _lifetime(joint: JointReport) -> Status:
-    values: dict[str, float] = {}
-    if joint.remaining is not None:
-        values = {"remaining_cycles": joint.remaining.cycles, "remaining_hours": joint.remaining.hours}
     name, told = f"forecast {joint.joint}", joint.forecast
     if told is None:
-        words = "if it goes on as it does" if values else "too little growth or data to say"
-        return Status(name, Level.OK, words, values)
-    values |= lifetime_values(told)
+        return Status(name, Level.OK, "too little growth or data to say", {})
+    values = lifetime_values(told)
     values |= {f"clearance_{fraction}_m": value for fraction, value in attrs.asdict(told.clearance_m).items()}
     values["measurements"] = float(told.measurements)
     return Status(name, Level.OK, told.answer.value, values)

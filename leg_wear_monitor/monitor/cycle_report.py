@@ -8,7 +8,7 @@ import attrs
 from leg_wear_monitor.monitor.encoders.clearance_estimate import ClearanceEstimate
 from leg_wear_monitor.monitor.forecast.forecast import Forecast, JointForecast
 from leg_wear_monitor.monitor.forecast.growth import GrowthWindow, growth_rate
-from leg_wear_monitor.monitor.reports import CycleReport, JointReport, Remaining
+from leg_wear_monitor.monitor.reports import CycleReport, JointReport
 from leg_wear_monitor.twin.statistics import CycleStatistics, TorqueStatistics
 
 
@@ -71,15 +71,8 @@ def _mismatch(torque: TorqueStatistics) -> float:
 def with_forecast(report: CycleReport, forecast: Forecast) -> CycleReport:
     """The same gait cycle with a newer forecast."""
     joints = zip(report.joints, forecast.joints, strict=True)
-    renewed = tuple(attrs.evolve(joint, forecast=new, remaining=_remaining(new)) for joint, new in joints)
+    renewed = tuple(attrs.evolve(joint, forecast=new) for joint, new in joints)
     return attrs.evolve(report, joints=renewed, forecast=forecast.leg)
-
-
-def _remaining(forecast: JointForecast) -> Remaining | None:
-    """The forecast's median; None where it does not know."""
-    if forecast.cycles is None or forecast.hours is None:
-        return None
-    return Remaining(cycles=forecast.cycles.p50, hours=forecast.hours.p50)
 
 
 def _joint_report(
@@ -98,7 +91,6 @@ def _joint_report(
         growth_m_per_cycle=rate.per_cycle_m if rate else None,
         growth_mps=rate.per_second_m if rate else None,
         growth_error_m_per_cycle=rate.error_m if rate else None,
-        remaining=_remaining(forecast),
         forecast=forecast,
         seen=seen,
         peak_force_n=float(statistics.peak_force_n[k]),

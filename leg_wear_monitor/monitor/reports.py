@@ -16,20 +16,6 @@ SampleReports = SampleStatistics
 
 
 @attrs.frozen(kw_only=True)
-class Remaining:
-    """How long a joint lasts: the median (p50) of its forecast.
-
-    Attributes
-    ----------
-    cycles, hours : float
-        Gait cycles and hours of walking until the mean clearance reaches its limit; 0 if it has.
-    """
-
-    cycles: float
-    hours: float
-
-
-@attrs.frozen(kw_only=True)
 class JointReport:
     """A clearance joint over a gait cycle.
 
@@ -43,8 +29,6 @@ class JointReport:
         is not enough data.
     growth_error_m_per_cycle : float or None
         Standard error of that average.
-    remaining : Remaining or None
-        None while the forecast does not know.
     peak_force_n, p99_force_n, mean_force_n : float
         Of the contact force in this cycle; the peak is a sample of a heavy tail.
     impacts : int
@@ -60,7 +44,6 @@ class JointReport:
     growth_m_per_cycle: float | None
     growth_mps: float | None
     growth_error_m_per_cycle: float | None
-    remaining: Remaining | None
     peak_force_n: float
     p99_force_n: float
     mean_force_n: float

@@ -131,8 +131,6 @@ def _joint(
     values |= {
         "growth_m_per_cycle": _or_nan(report.growth_m_per_cycle),
         "growth_mps": _or_nan(report.growth_mps),
-        "remaining_cycles": report.remaining.cycles if report.remaining else math.nan,
-        "remaining_hours": report.remaining.hours if report.remaining else math.nan,
         "peak_force_n": report.peak_force_n,
         "p99_force_n": report.p99_force_n,
         "mean_force_n": report.mean_force_n,

@@ -14,6 +14,7 @@ from leg_wear_monitor.monitor.encoders.clearance_estimate import ClearanceEstima
 from leg_wear_monitor.monitor.forecast.forecast import JointForecast, LegForecast
 from leg_wear_monitor.playback.history import CYCLE_COLUMNS, JOINT_COLUMNS, History
 from leg_wear_monitor.playback.replay import ReplayResult
+from leg_wear_monitor.playback.schema import SCHEMA_VERSION
 from leg_wear_monitor.wear.surfaces import BUSHING, JOURNAL
 
 POINTS = 1000
@@ -30,6 +31,7 @@ def summary(result: ReplayResult, wall_s: float) -> dict[str, Any]:
         What it took [s].
     """
     record = {
+        "schema_version": SCHEMA_VERSION,
         "recording": _recording(result),
         "monitor": _monitor(result),
         "wall_s": wall_s,
@@ -108,7 +110,6 @@ def _joints(result: ReplayResult) -> dict[str, Any]:
             "growth_m_per_cycle": joint.growth_m_per_cycle,
             "growth_error_m_per_cycle": joint.growth_error_m_per_cycle,
             "growth_mps": joint.growth_mps,
-            "remaining": None if joint.remaining is None else attrs.asdict(joint.remaining),
             "forecast": None if joint.forecast is None else _forecast(joint.forecast),
             "peak_force_n": history.joint_column("peak_force_n")[:, k].max(),
             "mean_force_n": history.joint_column("mean_force_n")[:, k].mean(),

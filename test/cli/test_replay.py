@@ -99,8 +99,22 @@ def test_a_summary_changed_anywhere_gives_a_page_or_one_line(run, bag, tmp_path,
         assert (result.exit_code, len(told)) in {(0, 0), (2, 1)}, text
         if told:
             refused += 1
-            assert told[0].startswith("error: out/summary.json: is not what a replay of this version writes")
+            expected = ("is not what a replay of this version writes", "schema_version: ")
+            assert told[0].startswith(tuple(f"error: out/summary.json: {fault}" for fault in expected))
     assert refused >= 7
+
+
+@pytest.mark.parametrize(("version", "shown"), [(1, "1"), (None, "1"), ("x" * 999, "'xxx")])
+def test_a_summary_of_another_version_is_refused(run, complaints, tmp_path, version, shown):
+    (tmp_path / "out").mkdir()
+    record = {} if version is None else {"schema_version": version}
+    (tmp_path / "out" / "summary.json").write_text(json.dumps(record))
+    result = run("report", "out")
+    assert result.exit_code == 2
+    (line,) = complaints(result)
+    assert line.startswith(f"error: out/summary.json: schema_version: {shown}")
+    assert "is not 2" in line and line.endswith("replay the recording again")
+    assert len(line) < 200
 
 
 def test_json_on_stdout_is_all_that_is_there(run, bag):

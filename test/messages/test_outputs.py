@@ -30,7 +30,6 @@ from leg_wear_monitor.monitor.reports import (
     CycleReport,
     JointReport,
     Lost,
-    Remaining,
     Reports,
     SampleReports,
     Status,
@@ -57,8 +56,8 @@ def reports() -> Reports:
     blank = {field.name: 0 for field in attrs.fields(JointReport)}
     known = {**blank, "forecast": None, "clearance_m": 3e-4, "growth_mps": 1e-15, "peak_force_n": 50.0}
     joints = (
-        JointReport(**{**known, "joint": "A", "remaining": Remaining(cycles=1e6, hours=277.5)}),
-        JointReport(**{**known, "joint": "G", "growth_mps": None, "remaining": None}),
+        JointReport(**{**known, "joint": "A"}),
+        JointReport(**{**known, "joint": "G", "growth_mps": None}),
     )
     blank = {field.name: 0 for field in attrs.fields(CycleReport)}
     cycle = CycleReport(**{**blank, "stamp_ns": 35, "joints": joints, "forecast": None})
@@ -130,12 +129,10 @@ def test_a_forecast_says_what_is_known(store: Any, reports: Reports) -> None:
     raw = Messages(MonitorConfig(), CLEARANCE_JOINTS).forecast(
         attrs.evolve(cycle, joints=(*cycle.joints, third))
     )
-    known, unknown, told = store.deserialize_cdr(raw, FORECAST.type).status
-    assert {pair.key: pair.value for pair in known.values} == {
-        "remaining_cycles": "1000000",
-        "remaining_hours": "277.5",
-    }
-    assert not unknown.values
+    *unknown, told = store.deserialize_cdr(raw, FORECAST.type).status
+    assert [(status.message, status.values) for status in unknown] == 2 * [
+        ("too little growth or data to say", [])
+    ]
     assert told.message == Answer.KNOWN.value
     values = {pair.key: pair.value for pair in told.values}
     assert [values[f"{fraction}_hours"] for fraction in ("p10", "p50", "p90")] == ["1", "2", "3"]

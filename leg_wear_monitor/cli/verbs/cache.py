@@ -8,6 +8,8 @@ import click
 
 from leg_wear_monitor.errors import LegWearError
 
+_MOST = 20  # directories that are listed: one version has about ten
+
 
 @click.command(short_help="Compiled code on this machine.")
 @click.option("--clear", is_flag=True, help="Remove it; the next start compiles again.")
@@ -35,9 +37,11 @@ def cache(clear: bool) -> None:
         click.echo(f"removed: {_in_mb(size)} in {len(kept)} directories")
         return
     click.echo(f"total: {_in_mb(sum(map(_size, kept)))} in {len(kept)} directories")
-    for directory in sorted(kept, key=_used, reverse=True):
+    for directory in sorted(kept, key=_used, reverse=True)[:_MOST]:
         used = datetime.fromtimestamp(_used(directory)).strftime("%Y-%m-%d %H:%M")
         click.echo(f"  {_in_mb(_size(directory)):>9}  used {used}  {directory.name}")
+    if len(kept) > _MOST:
+        click.echo(f"  and {len(kept) - _MOST} that were used before")
 
 
 def _used(directory: Path) -> float:

@@ -1,6 +1,7 @@
 """``leg-wear-monitor report``: the page of a run again, from its data."""
 
 import json
+import reprlib
 import warnings
 from collections.abc import Iterator
 from contextlib import contextmanager
@@ -11,6 +12,7 @@ import click
 from leg_wear_monitor.cli.output import write_directory
 from leg_wear_monitor.cli.verbs.replay import PAGE, SUMMARY, page_of
 from leg_wear_monitor.errors import ConfigError
+from leg_wear_monitor.playback.schema import SCHEMA_VERSION
 
 _MISMADE = (
     ArithmeticError, AttributeError, LookupError, MemoryError, OSError, RuntimeError, RuntimeWarning,
@@ -39,10 +41,18 @@ def report(directory: Path) -> int:
 def _replay(directory: Path) -> int:
     source = directory / SUMMARY
     with _as_one_line(source, "replay"):
-        page = page_of(json.loads(source.read_text(encoding="utf-8"), parse_constant=_refuse))
+        record = json.loads(source.read_text(encoding="utf-8"), parse_constant=_refuse)
+        _check_version(record.get("schema_version", 1), source)
+        page = page_of(record)
     for path in write_directory(directory, {PAGE: page}):
         click.echo(f"written: {path}")
     return 0
+
+
+def _check_version(version: object, source: Path) -> None:
+    if version != SCHEMA_VERSION:
+        fault = f"{reprlib.repr(version)} is not {SCHEMA_VERSION}, the version that this command reads"
+        raise ConfigError(str(source), "schema_version", f"{fault}; replay the recording again")
 
 
 def _refuse(name: str) -> None:

@@ -41,7 +41,7 @@ def test_sigterm_ends_both_nodes_in_order(stage, tmp_path: Path, monkeypatch: py
     with sqlite3.connect(ledger) as db:
         assert db.execute("SELECT closed FROM run").fetchall() == [(1,)]
     db.close()
-    assert b"this monitor advises" in logs["monitor"].read_bytes()
+    assert b"The monitor advises." in logs["monitor"].read_bytes()
     assert all(b"Traceback" not in log.read_bytes() for log in logs.values())
 
 

@@ -319,7 +319,7 @@ def test_two_publishers_of_one_crank_are_named_even_if_they_agree(stage, walk) -
 
 
 def test_alarms_reach_the_log_of_the_node(stage, walk) -> None:
-    heard = stage.listen("/rosout", Log, matched=False)
+    heard = stage.listen("/rosout", Log, latched=True, matched=False)  # as ROS publishes it
     monitor = stage.monitor(limits__clearance_m=3.05e-4, alarms__on_delay_cycles=1, diagnostics__period_s=0.1)
     stage.legs().play(walk, monitor, end_s=3.0)
     stage.wait_for(

@@ -7,10 +7,11 @@ from typing import Any
 import attrs
 from ruamel.yaml import YAML
 from ruamel.yaml.error import YAMLError
-from ruamel.yaml.events import AliasEvent, CollectionEndEvent, CollectionStartEvent
+from ruamel.yaml.events import AliasEvent
 
 from leg_wear_monitor.bags.findings import DamageError
 from leg_wear_monitor.bags.regular_file import open_regular
+from leg_wear_monitor.configuration.yaml_file import events_with_depth
 
 METADATA = "metadata.yaml"
 _LARGEST = 2**20  # bytes; a bag of 200 topics and 1000 files has some 250 kB
@@ -59,9 +60,7 @@ def read_metadata(path: Path) -> Metadata:
 
 def _check_simple(text: str) -> None:
     """Refuse what a few lines can blow up beyond any bound: aliases, and brackets without end."""
-    depth = 0
-    for event in YAML(typ="safe", pure=True).parse(text):
-        depth += isinstance(event, CollectionStartEvent) - isinstance(event, CollectionEndEvent)
+    for event, depth in events_with_depth(text):
         if isinstance(event, AliasEvent):
             raise DamageError("holds aliases, which no bag's has")
         if depth > _DEEPEST:

@@ -38,7 +38,7 @@ def print_result(record: dict[str, Any], result: "SimulationResult") -> None:
 
 
 def joint_table(record: dict[str, Any]) -> Table:
-    """Forces of every joint; contact and wear of the loose ones."""
+    """Forces of every joint; contact and wear of the clearance joints."""
     table = Table(box=None, pad_edge=False, padding=(0, 1), header_style="bold")
     table.add_column("\njoint")
     columns = ["mean\nN", "p99\nN", "max\nN"]

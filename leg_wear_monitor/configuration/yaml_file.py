@@ -1,13 +1,14 @@
 """A YAML file read within bounds, whatever it holds: its size, its depth, and what its aliases stand for."""
 
 import stat
+from collections.abc import Iterator
 from pathlib import Path
 from typing import Any
 
 from ruamel.yaml import YAML
 from ruamel.yaml.constructor import DuplicateKeyError
 from ruamel.yaml.error import MarkedYAMLError, YAMLError
-from ruamel.yaml.events import CollectionEndEvent, CollectionStartEvent
+from ruamel.yaml.events import CollectionEndEvent, CollectionStartEvent, Event
 
 from leg_wear_monitor.errors import ConfigError
 
@@ -63,14 +64,19 @@ def _text(path: Path, source: str) -> str:
 
 def _check_depth(text: str, source: str) -> None:
     """Stop where the text first goes too deep: to compose thousands of levels takes seconds."""
-    depth = 0
     try:
-        for event in YAML(typ="safe", pure=True).parse(text):
-            depth += isinstance(event, CollectionStartEvent) - isinstance(event, CollectionEndEvent)
-            if depth > DEEPEST:
-                raise ConfigError(source, "", f"is nested more than {DEEPEST} deep")
+        if any(depth > DEEPEST for _, depth in events_with_depth(text)):
+            raise ConfigError(source, "", f"is nested more than {DEEPEST} deep")
     except YAMLError:
         return  # to be reported by who composes, after what is wrong before it
+
+
+def events_with_depth(text: str) -> Iterator[tuple[Event, int]]:
+    """Events of a YAML text as it is parsed, each with the number of collections that are open."""
+    depth = 0
+    for event in YAML(typ="safe", pure=True).parse(text):
+        depth += isinstance(event, CollectionStartEvent) - isinstance(event, CollectionEndEvent)
+        yield event, depth
 
 
 def _check_size(document: Any, source: str) -> None:

@@ -63,7 +63,7 @@ def with_spread(value: Spread, factor: float = 1.0) -> str:
 
 
 def percent(fraction: float) -> str:
-    """A share for operators."""
+    """A fraction as text."""
     text = number(100.0 * fraction)
     return f"{text.rstrip('0').rstrip('.') if text.endswith('.0') else text} %"
 

@@ -24,6 +24,7 @@ os.environ["ROS_AUTOMATIC_DISCOVERY_RANGE"] = "LOCALHOST"
 if find_spec("rclpy"):
     import rclpy
     from rclpy.context import Context
+    from rclpy.logging import LoggingSeverity
     from rclpy.node import Node
     from rclpy.parameter import Parameter
     from rclpy.qos import DurabilityPolicy, QoSProfile, ReliabilityPolicy
@@ -118,7 +119,7 @@ class Monitor:
 
     def __init__(self, domain: int, namespace: str, parameters: dict[str, Any]) -> None:
         self._context = Context()
-        rclpy.init(args=["--ros-args", "--log-level", "error"], context=self._context, domain_id=domain)
+        rclpy.init(args=[], context=self._context, domain_id=domain)
         overrides = [Parameter(name, value=value) for name, value in parameters.items()]
         self.node = MonitorNode(context=self._context, namespace=namespace, parameter_overrides=overrides)
         self._running = threading.Event()
@@ -151,6 +152,8 @@ class Stage:
         self.domain = next(_domains) % 100
         self._context = Context()
         rclpy.init(args=[], context=self._context, domain_id=self.domain)
+        # the level is that of the whole process: a test before may have said `--log-level fatal`
+        rclpy.logging.set_logger_level("", LoggingSeverity.INFO)
         self.node = Node("stage", context=self._context)
         self._monitors: list[Monitor] = []
         self._thread = threading.Thread(target=spin, args=(self.node,))

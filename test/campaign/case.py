@@ -13,7 +13,7 @@ class Outcome(Enum):
     """What came of a case; the last four are faults."""
 
     REFUSED = "refused"
-    TOLD = "told"
+    REPORTED = "reported"
     SOUND = "sound"
     SILENT = "silent"
     CRASH = "crash"
@@ -107,7 +107,7 @@ def evaluated(case: Case, ran: Ran) -> tuple[Outcome, str]:
             return Outcome.REFUSED, lines[0]
         return Outcome.CRASH, f"refused in {len(lines)} lines, expected one"
     if case.is_told(ran):
-        return Outcome.TOLD, lines[0] if lines else ""
+        return Outcome.REPORTED, lines[0] if lines else ""
     why = case.unsound(ran)
     return (Outcome.SILENT, why) if why else (Outcome.SOUND, "")
 

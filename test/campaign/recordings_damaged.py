@@ -100,11 +100,11 @@ def compared(*paths: Path) -> tuple[Outcome, str]:
         return Outcome.CRASH, f"findings that are not one line each: {texts}"
     true = recordings_stored.expected()
     if recording.is_partial:
-        return Outcome.TOLD, texts[0]
+        return Outcome.REPORTED, texts[0]
     if samples.tobytes() == true.tobytes():
         return Outcome.SOUND, ""
     known = {bytes(sample) for sample in true}
     wrong = sum(bytes(each) not in known for each in samples[samples["fault"] == NO_FAULT])
     if any("checksum" in text or "not read" in text for text in texts):
-        return Outcome.TOLD, f"could not be checked; {wrong} values are other ones"
+        return Outcome.REPORTED, f"could not be checked; {wrong} values are other ones"
     return Outcome.SILENT, f"{len(samples)} samples for {len(true)}, {wrong} of them other ones: {texts}"

@@ -47,7 +47,7 @@ def _run(name: str, seed: int, _directory: Path) -> tuple[Outcome, str]:
     counts = f"{sent} sent, {received} received, {lost} lost by DDS; then {gait}; {told}"
     if unsaid or sentence not in told or gait != "in step":
         return Outcome.SILENT, f"{unsaid}; expected {sentence!r}; {counts}"
-    return Outcome.TOLD if sentence else Outcome.SOUND, counts
+    return Outcome.REPORTED if sentence else Outcome.SOUND, counts
 
 
 def _crank(stage: Stage, messages: Iterable[object], together: int = 20) -> int:

@@ -84,7 +84,7 @@ def _opened(directory: Path, state: str) -> tuple[Outcome, str]:
             return Outcome.SILENT, "a state that never was kept"
         lost_s = made.moving_s[last] - made.moving_s[found]
         if ledger.told and lost_s <= (ledger.cut_off_s or 0.0):
-            return Outcome.TOLD, ledger.told
+            return Outcome.REPORTED, ledger.told
         if found != last:
             return Outcome.SILENT, f"{lost_s:g} s lost, said: {ledger.cut_off_s} {ledger.told!r}"
         return Outcome.SOUND, ""

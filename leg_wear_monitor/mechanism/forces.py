@@ -126,13 +126,15 @@ def external_power(arrays, q, v, cs):
 
 @entry
 def applied_forces_at(arrays, q, v, cs, out_force):
-    """`applied_forces` from Python; fills cs (n, 2) too."""
-    rotations(q, cs)
-    applied_forces(arrays, q, v, cs, out_force)
+    """`applied_forces` (p, n, 3) at p positions and velocities (p, n, 3); cs (n, 2) is room."""
+    for p in range(q.shape[0]):
+        rotations(q[p], cs)
+        applied_forces(arrays, q[p], v[p], cs, out_force[p])
 
 
 @entry
-def stored_energy_at(arrays, q, v, cs):
-    """`stored_energy` from Python; fills cs (n, 2) too."""
-    rotations(q, cs)
-    return stored_energy(arrays, q, v, cs)
+def stored_energy_at(arrays, q, v, cs, out_energy):
+    """`stored_energy` (p,) at p positions and velocities (p, n, 3); cs (n, 2) is room."""
+    for p in range(q.shape[0]):
+        rotations(q[p], cs)
+        out_energy[p] = stored_energy(arrays, q[p], v[p], cs)

@@ -1,5 +1,6 @@
 """Ideal motion: all joints without clearance, over crank angles (physics.md sections 1 and 2)."""
 
+import functools
 import math
 from collections.abc import Iterable
 
@@ -7,10 +8,18 @@ import attrs
 import numpy as np
 from numpy.typing import ArrayLike
 
-from leg_wear_monitor.mechanism.arrays import Floats, body_names, point_from_com
+from leg_wear_monitor.mechanism.arrays import Floats, body_names, com_poses, point_from_com
 from leg_wear_monitor.mechanism.constraints import DRIVE
 from leg_wear_monitor.mechanism.forces import applied_forces_at
-from leg_wear_monitor.mechanism.position import Linkage, assemble, drive_column, evaluate, follow
+from leg_wear_monitor.mechanism.position import (
+    Linkage,
+    assemble,
+    drive_column,
+    follow,
+    gammas,
+    jacobians,
+    positions,
+)
 
 TURN = 2.0 * math.pi
 
@@ -56,18 +65,12 @@ def ideal_motion(
         If the linkage does not close at its start or meets a dead point on the way.
     """
     angles = np.array(list(crank_angles), dtype=float)
-    q, at = assemble(linkage), linkage.mechanism.assembly.crank_angle
-    states = []
-    for angle in angles:
-        q, at = follow(linkage, q, at, angle), angle
-        states.append(_state(linkage, q, (angle, speed, acceleration)))
-    columns = [np.array(column) for column in zip(*states, strict=True)]
-    return IdealMotion(angles, *columns)
+    return _motion(linkage, angles, positions(linkage, angles), speed, acceleration)
 
 
 def one_cycle(linkage: Linkage, points: int, speed: float) -> IdealMotion:
     """Ideal motion at ``points`` equal steps of one turn of the crank, from crank angle 0."""
-    return ideal_motion(linkage, np.arange(points) * (TURN / points), speed)
+    return _motion(linkage, _even_angles(points), _one_cycle_positions(linkage, points), speed, 0.0)
 
 
 def check_cycle(linkage: Linkage) -> None:
@@ -82,20 +85,60 @@ def check_cycle(linkage: Linkage) -> None:
     follow(linkage, assemble(linkage), start, start + TURN)
 
 
-def _state(
-    linkage: Linkage, q: Floats, drive: tuple[float, float, float]
-) -> tuple[Floats, Floats, Floats, Floats, float]:
-    """Velocity, acceleration and reactions at one position."""
-    v, a = np.zeros_like(q), np.zeros_like(q)
-    jacobian = evaluate(linkage, q, v, drive).jacobian
-    v[1:] = np.linalg.solve(jacobian, drive_column(linkage) * drive[1]).reshape(-1, 3)
-    a[1:] = np.linalg.solve(jacobian, evaluate(linkage, q, v, drive).gamma).reshape(-1, 3)
-    cs, force = np.empty((len(q), 2)), np.empty_like(q)
-    applied_forces_at(linkage.arrays, q, v, cs, force)
+@attrs.frozen
+class _Geometry:
+    """A linkage, equal to others that move alike: those with other masses, springs and loads."""
+
+    linkage: Linkage = attrs.field(eq=False)
+    key: bytes
+
+
+def _one_cycle_positions(linkage: Linkage, points: int) -> Floats:
+    """Coordinates (points, n, 3) over one turn."""
+    arrays = linkage.arrays
+    shape = (
+        arrays.joint_kind,
+        arrays.joint_body,
+        arrays.joint_point,
+        arrays.joint_normal,
+        arrays.joint_angle,
+    )
+    start = np.append(
+        com_poses(linkage.mechanism), [linkage.mechanism.assembly.crank_angle, arrays.drive_body]
+    )
+    key = b"".join(array.tobytes() for array in (*shape, start))
+    return _solved_positions(_Geometry(linkage, key), points).copy()
+
+
+# a twin asks several times for one linkage, with other loads and speeds; tests and studies for the same again
+@functools.lru_cache(maxsize=16)
+def _solved_positions(geometry: _Geometry, points: int) -> Floats:
+    return positions(geometry.linkage, _even_angles(points))
+
+
+def _even_angles(points: int) -> Floats:
+    return np.asarray(np.arange(points) * (TURN / points), dtype=np.float64)
+
+
+def _motion(linkage: Linkage, angles: Floats, q: Floats, speed: float, acceleration: float) -> IdealMotion:
+    """Velocities, accelerations and reactions at positions q (N, n, 3)."""
+    v, a, jacobian = np.zeros_like(q), np.zeros_like(q), jacobians(linkage, q)
+    column = drive_column(linkage) * speed
+    v[:, 1:] = _solve(jacobian, np.broadcast_to(column, jacobian.shape[:2])).reshape(len(q), -1, 3)
+    a[:, 1:] = _solve(jacobian, gammas(linkage, q, v, acceleration)).reshape(len(q), -1, 3)
+    force = np.empty_like(q)
+    applied_forces_at(linkage.arrays, q, v, np.empty((q.shape[1], 2)), force)
     # M a + phi_q^T lambda = Q; the force that a row exerts is -phi_q^T lambda
     inertial: Floats = force - linkage.arrays.mass * a
-    lam: Floats = np.asarray(np.linalg.solve(jacobian.T, inertial[1:].ravel()), dtype=np.float64)
-    return q, v, a, reactions(linkage, q, lam), float(-lam[linkage.rows.drive_row])
+    lam = _solve(jacobian.transpose(0, 2, 1), inertial[:, 1:].reshape(len(q), -1))
+    joint_force = np.array([reactions(linkage, *one) for one in zip(q, lam, strict=True)])
+    joint_force = joint_force.reshape(len(q), len(linkage.mechanism.joints), 2)
+    return IdealMotion(angles, q, v, a, joint_force, -lam[:, linkage.rows.drive_row])
+
+
+def _solve(matrices: Floats, columns: Floats) -> Floats:
+    """Solutions (N, m) of N systems."""
+    return np.asarray(np.linalg.solve(matrices, columns[..., None]), dtype=np.float64)[..., 0]
 
 
 def reactions(linkage: Linkage, q: Floats, lam: Floats) -> Floats:

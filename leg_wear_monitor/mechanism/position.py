@@ -75,6 +75,16 @@ def jacobians(linkage: Linkage, q: Floats) -> Floats:
     return dense_jacobian(linkage.rows, blocks, n)
 
 
+def gammas(linkage: Linkage, q: Floats, v: Floats, acceleration: float) -> Floats:
+    """Gamma (p, m) of all closures and the drive at p positions and velocities (p, n, 3)."""
+    m, n = len(linkage.rows.body), q.shape[1]
+    drive = np.array([0.0, 0.0, acceleration])
+    cs, phi, blocks, gamma = np.empty((n, 2)), np.empty(m), np.zeros((m, 2, 3)), np.empty((len(q), m))
+    for here, rate, out in zip(q, v, gamma, strict=True):
+        closures_at(linkage.arrays, linkage.rows, here, rate, drive, cs, phi, blocks, out)
+    return gamma
+
+
 def dense_jacobian(rows: Rows, blocks: Floats, bodies: int) -> Floats:
     """Jacobian (..., m, 3 (n - 1)) of the moving bodies from its blocks (..., m, 2, 3)."""
     m = len(rows.body)
@@ -109,6 +119,16 @@ def assemble(linkage: Linkage) -> Floats:
             f"by {moved.max():.2g} (rad or link lengths), expected at most {_FAR}"
         )
     return q
+
+
+def positions(linkage: Linkage, crank_angles: Floats) -> Floats:
+    """Coordinates (p, n, 3) at p crank angles, visited in this order; see `follow`."""
+    q, angle = assemble(linkage), linkage.mechanism.assembly.crank_angle
+    found = np.empty((len(crank_angles), *q.shape))
+    for i, target in enumerate(crank_angles):
+        q, angle = follow(linkage, q, angle, target), target
+        found[i] = q
+    return found
 
 
 def follow(linkage: Linkage, q: Floats, angle: float, target: float) -> Floats:

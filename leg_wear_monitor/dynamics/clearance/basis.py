@@ -122,29 +122,30 @@ def _forces(linkage: Linkage, q: Floats) -> tuple[Floats, Floats, Floats]:
     """Applied forces at rest (N, 3 b), the loads among them, and the potential energy (N,)."""
     arrays = linkage.arrays
     unloaded = arrays._replace(load_body=arrays.load_body[:0])
-    rest, cs = np.zeros_like(q[0]), np.empty((q.shape[1], 2))
-    force = np.array([_force_at(arrays, one, rest) for one in q])
-    bare = np.array([_force_at(unloaded, one, rest) for one in q]) if len(arrays.load_body) else force
-    return force, force - bare, np.array([stored_energy_at(arrays, one, rest, cs) for one in q])
+    rest, energy = np.zeros_like(q), np.empty(len(q))
+    force = _forces_at(arrays, q, rest)
+    bare = _forces_at(unloaded, q, rest) if len(arrays.load_body) else force
+    stored_energy_at(arrays, q, rest, np.empty((q.shape[1], 2)), energy)
+    return force, force - bare, energy
 
 
 def _drag(arrays: MechanismArrays, q: Floats, columns: Floats) -> Floats:
     """Force (N, 3 b, m) of the springs' dampers against velocities (N, 3 b, m)."""
     drag = np.zeros_like(columns)
     if is_damped(arrays):
-        for i, one in enumerate(q):
-            at_rest = _force_at(arrays, one, np.zeros_like(one))
-            for j in range(columns.shape[2]):
-                v = np.concatenate([np.zeros(3), columns[i, :, j]]).reshape(one.shape)
-                drag[i, :, j] = at_rest - _force_at(arrays, one, v)
+        at_rest = _forces_at(arrays, q, np.zeros_like(q))
+        for j in range(columns.shape[2]):
+            v = np.zeros_like(q)
+            v[:, 1:] = columns[:, :, j].reshape(len(q), -1, 3)
+            drag[:, :, j] = at_rest - _forces_at(arrays, q, v)
     return drag
 
 
-def _force_at(arrays: MechanismArrays, q: Floats, v: Floats) -> Floats:
-    """Applied forces (3 b,) on the moving bodies."""
-    cs, force = np.empty((len(q), 2)), np.empty_like(q)
-    applied_forces_at(arrays, q, v, cs, force)
-    return force[1:].ravel()
+def _forces_at(arrays: MechanismArrays, q: Floats, v: Floats) -> Floats:
+    """Applied forces (N, 3 b) on the moving bodies at N positions and velocities (N, n, 3)."""
+    force = np.empty_like(q)
+    applied_forces_at(arrays, q, v, np.empty((q.shape[1], 2)), force)
+    return force[:, 1:].reshape(len(q), -1)
 
 
 def _friction_levers(arrays: MechanismArrays, contacts: ContactArrays) -> Floats:

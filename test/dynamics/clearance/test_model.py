@@ -156,7 +156,7 @@ def _generalised_force(case, angle, speed, e):
     q, v, jacobian = _displaced(case, angle, speed, e)
     gamma = evaluate(case.linkage, q, v, (angle, speed, 0.0)).gamma
     force = np.empty_like(q)
-    applied_forces_at(case.linkage.arrays, q, v, np.empty((len(q), 2)), force)
+    applied_forces_at(case.linkage.arrays, q[None], v[None], np.empty((len(q), 2)), force[None])
     bodies = np.linalg.solve(jacobian, gamma)
     s = np.linalg.inv(jacobian)[:, case.rows]
     return s.T @ (force[1:].ravel() - case.linkage.arrays.mass[1:].ravel() * bodies)

@@ -72,7 +72,7 @@ def clearance_sets(runs: int, count: int) -> None:
             row(", ".join(clearance_joints), joint, *cells, deep)
     print("\n### Energy balance of each cycle\n")
     table(
-        "clearance_joints",
+        "clearance joints",
         "friction [J/cycle]",
         "contact [J/cycle]",
         "residual, largest [J]",
@@ -95,7 +95,7 @@ def _spread(samples: np.ndarray, digits: int) -> str:
 def chaos() -> None:
     """When two runs whose clearances differ by APART have nothing to do with each other any more."""
     print("\n### Chaos\n")
-    table("clearance joints", "some body elsewhere by a tenth of the clearance after [ms]")
+    table("clearance joints", "time until some body deviates by a tenth of the clearance [ms]")
     for clearance_joints in SETS:
         pair = [
             FullRun(prepare(LEG, clearances=tuple(clearance_joints), clearance_m=3.0e-4 + i * APART))

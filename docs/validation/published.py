@@ -94,9 +94,9 @@ def slider_crank() -> None:
 
 def restitution() -> None:
     dropped = case("contact/test_restitution.py")["dropped"]
-    print("\n### Restitution delivered for one asked\n")
+    print("\n### Delivered restitution for a requested one\n")
     laws = [law for law in HYSTERESIS if law != "hertz"]
-    table("asked", *laws)
+    table("requested", *laws)
     worst = 0.0
     for asked in np.arange(0.05, 0.951, 0.05):
         closed = [delivered_restitution(HYSTERESIS[law](asked)) for law in laws]

@@ -4,34 +4,47 @@ import numpy as np
 import pytest
 
 from leg_wear_monitor.kernel import entry
-from leg_wear_monitor.record import copy_record, new_record
+from leg_wear_monitor.record import new_records, record_of
 
 pytestmark = pytest.mark.plain
 
-DTYPE = np.dtype([("count", "i8"), ("speed", "f8", (2,))])
+INNER = np.dtype([("angle", "f8")])
+DTYPE = np.dtype([("count", "i8"), ("speed", "f8", (2,)), ("inner", INNER)])
 
 
 @entry
-def _step(state, k):
+def _step(states, k):
+    state = states[0]
     state.count += 1
     state.speed[k] = 0.5 * state.count
+    inner = state.inner
+    inner.angle -= 1.0
 
 
 def test_compiled_code_writes_to_the_record_that_python_holds():
-    state = new_record(DTYPE)
-    _step(state, 0)
-    _step(state, 1)
-    assert state.count == 2
-    assert state.speed.tolist() == [0.5, 1.0]
+    states = new_records(1, DTYPE)
+    state = record_of(states)
+    _step(states, 0)
+    state.count += 1
+    _step(states, 1)
+    assert state.count == 3
+    assert state.speed.tolist() == [0.5, 1.5]
+    assert state.inner.angle == -2.0
 
 
 def test_a_snapshot_is_a_copy_and_can_be_restored():
-    state = new_record(DTYPE)
-    _step(state, 1)
-    snapshot = state.copy()
-    _step(state, 0)
-    copy_record(snapshot, state)
+    states = new_records(1, DTYPE)
+    state = record_of(states)
+    _step(states, 1)
+    snapshot = states.copy()
+    _step(states, 0)
+    states[:] = snapshot
     assert state.count == 1
     assert state.speed.tolist() == [0.0, 0.5]
-    _step(state, 0)
-    assert snapshot.count == 1
+    _step(states, 0)
+    assert record_of(snapshot).count == 1
+
+
+def test_one_of_many_is_not_the_only_one():
+    with pytest.raises(ValueError, match="too many"):
+        record_of(new_records(2, DTYPE))

@@ -12,10 +12,11 @@ from leg_wear_monitor.dynamics.run.run_statistics import ARCHARD, new_run_statis
 from leg_wear_monitor.dynamics.simulation import prepare
 from leg_wear_monitor.mechanism.arrays import Floats
 from leg_wear_monitor.mechanism.ideal import TURN, ideal_motion
+from leg_wear_monitor.record import new_records
 from leg_wear_monitor.twin.digital_twin import DigitalTwin
 from leg_wear_monitor.twin.sample import Samples, gait_samples
 from leg_wear_monitor.twin.settings import TrackerSettings, TwinSettings
-from leg_wear_monitor.twin.steps import BEGIN, CODE, END, MOVE, join_smoothly
+from leg_wear_monitor.twin.steps import MOVE, SPLINE_NODE, join_smoothly
 from leg_wear_monitor.twin.tracker.tracker import CrankTracker
 
 BANDWIDTHS_HZ, RATES_HZ = (3.0, 5.0, 8.0, 12.0, 20.0), (50.0, 200.0, 1000.0)
@@ -45,11 +46,12 @@ def acceleration_error(bandwidth: float, rate: float, ripple: float, noise: floa
     for steps, n in CrankTracker(TrackerSettings(bandwidth_hz=bandwidth)).update(
         seen(20.0, rate, ripple, noise)
     ):
-        for what, motion in zip(steps.what[:n], steps.motion[:n], strict=True):
-            if what[CODE] == MOVE and what[BEGIN] > START_NS + 1_000_000_000:
-                tau = np.linspace(0.0, 1.0e-9 * (what[END] - what[BEGIN]), 9)[:-1]
-                found = np.polynomial.Polynomial(motion).deriv(2)(tau)
-                errors.append(found - crank(1.0e-9 * (what[BEGIN] - START_NS) + tau, ripple)[2])
+        for step in steps[:n]:
+            begin, end = step["begin_ns"], step["end_ns"]
+            if step["code"] == MOVE and begin > START_NS + 1_000_000_000:
+                tau = np.linspace(0.0, 1.0e-9 * (end - begin), 9)[:-1]
+                found = np.polynomial.Polynomial(step["motion"]).deriv(2)(tau)
+                errors.append(found - crank(1.0e-9 * (begin - START_NS) + tau, ripple)[2])
     return float(np.sqrt(np.mean(np.concatenate(errors) ** 2)))
 
 
@@ -58,13 +60,13 @@ def wear_of_the_leg() -> Floats:
     setup = prepare(load_mechanism("bionic_leg"), wear=True)
     stepper, joints, cycles = ClearanceStepper(setup), setup.contacts.joint, []
     t, h = 0.0, 0.01
-    polynomial = np.zeros(7)
+    polynomial, nodes = np.zeros(7), new_records(2, SPLINE_NODE)
     for cycle in range(CYCLES + SKIPPED):
         statistics = new_run_statistics(len(setup.linkage.mechanism.joints))
         for _ in range(100):
             polynomial[0] = t
-            before, after = crank(np.array([t, t + h]), RIPPLE).T
-            join_smoothly(before, after, h, polynomial[1:])
+            nodes["angle"], nodes["speed"], nodes["acceleration"] = crank(np.array([t, t + h]), RIPPLE)
+            join_smoothly(nodes[0], nodes[1], h, polynomial[1:])
             t += h
             if stepper.advance(polynomial, t, statistics)[0] != DONE:
                 raise RuntimeError("the leg's motion could not be resolved")

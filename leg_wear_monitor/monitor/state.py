@@ -10,7 +10,7 @@ from leg_wear_monitor.monitor.evaluation.torque_record import TorqueRecord
 from leg_wear_monitor.monitor.forecast.forecaster import ForecastState
 from leg_wear_monitor.monitor.forecast.growth import GrowthWindow
 from leg_wear_monitor.monitor.reports import CycleReport
-from leg_wear_monitor.record import Record
+from leg_wear_monitor.record import Records
 from leg_wear_monitor.twin.digital_twin import TwinSnapshot
 from leg_wear_monitor.twin.statistics import Event
 
@@ -35,6 +35,6 @@ class MonitorSnapshot:
     evaluate: AlarmEvaluationState
     forecast: ForecastState
     alarms: dict[str, Alarm]
-    evaluation_periods: Record
-    guard: Record
+    evaluation_periods: Records
+    guard: Records
     encoders: EncoderSnapshot | None = None

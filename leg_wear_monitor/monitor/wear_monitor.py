@@ -37,7 +37,6 @@ from leg_wear_monitor.monitor.reports import (
 from leg_wear_monitor.monitor.resets import last_reset
 from leg_wear_monitor.monitor.state import MonitorSnapshot, MonitorState
 from leg_wear_monitor.monitor.status import statuses
-from leg_wear_monitor.record import copy_record
 from leg_wear_monitor.twin.digital_twin import DigitalTwin
 from leg_wear_monitor.twin.sample import GAIT_SAMPLE, Samples
 from leg_wear_monitor.twin.statistics import CycleStatistics, joined
@@ -405,7 +404,7 @@ class WearMonitor:
         self._evaluation.state = attrs.evolve(snapshot.evaluate)
         self._forecaster.state = attrs.evolve(snapshot.forecast)
         self._evaluation.board.alarms = snapshot.alarms
-        copy_record(snapshot.evaluation_periods, self._evaluation_periods.state)
+        self._evaluation_periods.state[:] = snapshot.evaluation_periods
         self._guard.restore(snapshot.guard)
         if self._encoders and snapshot.encoders:
             self._encoders.restore(snapshot.encoders)

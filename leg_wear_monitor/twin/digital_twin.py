@@ -37,7 +37,6 @@ from leg_wear_monitor.twin.statistics import (
     TwinUpdate,
     joined,
 )
-from leg_wear_monitor.twin.tracker.state import TRACKING
 from leg_wear_monitor.twin.tracker.tracker import CrankTracker, TrackerSnapshot
 
 
@@ -126,12 +125,12 @@ class DigitalTwin:
     @property
     def tracking(self) -> Tracking:
         """How the crank is followed."""
-        return Tracking(int(self._tracker.state.clock[TRACKING]))
+        return Tracking(int(self._tracker.state.clock.tracking))
 
     @property
     def speed_radps(self) -> float:
-        """Speed of the crank at the last knot [rad/s]."""
-        return float(self._tracker.state.target[1])
+        """Speed of the crank at the last spline node [rad/s]."""
+        return float(self._tracker.state.node.speed)
 
     @property
     def intake(self) -> Intake:

@@ -1,53 +1,67 @@
-"""What the tracker tells the leg to do, step by step, in the order of stamps."""
-
-from typing import NamedTuple
+"""What the tracker reports to the leg, step by step, in the order of stamps."""
 
 import numpy as np
 
 from leg_wear_monitor.kernel import kernel
-from leg_wear_monitor.mechanism.arrays import Floats, Ints
+from leg_wear_monitor.record import Records, new_records
 
-# A step's code: set the leg in motion; move it along a polynomial; let it rest; look at it for a sample;
-# leave it; and what is only told. EXTRA is the sample's kind, the reason for leaving it, or a happening.
-START, MOVE, REST, LOOK, LEAVE, TELL = range(6)
-# columns: begin and end [ns]; turns of the crank before the angle that the polynomial counts from; how much
-# of the time bridges a gap [ns]
-CODE, BEGIN, END, EXTRA, TURNS, BRIDGE_NS = range(6)
+# A step's code: set the leg in motion; move it along a polynomial; let it rest; evaluate it at a sample;
+# leave it; and what is only reported.
+START, MOVE, REST, EVALUATE, LEAVE, REPORT = range(6)
 
+# Reasons for leaving the leg, and what is reported.
 LOST_IN_GAP, LOST_BY_OUTLIERS, LOST_BY_OVERFLOW, LOST_BY_JUMP = range(4)
 STOPPED, MOVING, REVERSED = range(4, 7)
 
+STEP = np.dtype(
+    [
+        ("code", "i8"),  # of the above
+        ("begin_ns", "i8"),  # stamp at which it begins
+        ("end_ns", "i8"),  # stamp at which it ends
+        ("detail", "i8"),  # kind of the sample, reason for leaving the leg, or what is reported
+        ("turns", "i8"),  # turns of the crank before the angle that the motion counts from
+        ("bridged_ns", "i8"),  # how much of the time bridges a gap
+        ("torque", "f8"),  # drive torque measured at a sample [N m]
+        ("motion", "f8", (6,)),  # START: angle [rad], speed, acceleration; MOVE: coefficients over time [s]
+    ]
+)
 
-class Steps(NamedTuple):
-    """Steps: ``what`` (m, 6) as above; ``motion`` (m, 6) a polynomial, or angle and speed, or torque."""
+SPLINE_NODE = np.dtype(
+    [
+        ("angle", "f8"),  # of the crank [rad]
+        ("speed", "f8"),  # of the crank [rad/s]
+        ("acceleration", "f8"),  # of the crank [rad/s^2]
+    ]
+)
 
-    what: Ints
-    motion: Floats
+Steps = Records
+"""Records of `STEP`, shape (m,)."""
 
 
 def room_for_steps(m: int) -> Steps:
     """Room for m steps."""
-    return Steps(np.zeros((m, 6), dtype=np.int64), np.zeros((m, 6)))
+    return new_records(m, STEP)
 
 
 @kernel
-def add_step(steps, n, code, begin, end, extra):
+def add_step(steps, n, code, begin_ns, end_ns, detail):
     """Write step n; returns n + 1."""
-    what = steps.what
-    what[n, CODE], what[n, BEGIN], what[n, END], what[n, EXTRA] = code, begin, end, extra
-    what[n, TURNS], what[n, BRIDGE_NS] = 0, 0
+    step = steps[n]
+    step.code, step.begin_ns, step.end_ns, step.detail = code, begin_ns, end_ns, detail
+    step.turns, step.bridged_ns, step.torque = 0, 0, 0.0
     for i in range(6):
-        steps.motion[n, i] = 0.0
+        step.motion[i] = 0.0
     return n + 1
 
 
 @kernel
 def join_smoothly(before, after, h, out_polynomial):
-    """Quintic over a time h [s] from angle, speed and acceleration ``before`` to those ``after``."""
-    far = after[0] - (before[0] + h * (before[1] + 0.5 * h * before[2]))
-    fast = h * (after[1] - (before[1] + h * before[2]))
-    bent = 0.5 * h * h * (after[2] - before[2])
-    out_polynomial[0], out_polynomial[1], out_polynomial[2] = before[0], before[1], 0.5 * before[2]
+    """Quintic over a time h [s] from one spline node to the next."""
+    far = after.angle - (before.angle + h * (before.speed + 0.5 * h * before.acceleration))
+    fast = h * (after.speed - (before.speed + h * before.acceleration))
+    bent = 0.5 * h * h * (after.acceleration - before.acceleration)
+    out_polynomial[0], out_polynomial[1] = before.angle, before.speed
+    out_polynomial[2] = 0.5 * before.acceleration
     out_polynomial[3] = (10.0 * far - 4.0 * fast + bent) / h**3
     out_polynomial[4] = (-15.0 * far + 7.0 * fast - 2.0 * bent) / h**4
     out_polynomial[5] = (6.0 * far - 3.0 * fast + bent) / h**5

@@ -11,7 +11,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from leg_wear_monitor.kernel import entry
-from leg_wear_monitor.record import Record, new_record
+from leg_wear_monitor.record import Records, new_records
 from leg_wear_monitor.twin.sample import Samples
 
 A_CYCLE = 4
@@ -29,12 +29,13 @@ PERIOD_STATE = np.dtype(
 
 
 @entry
-def find_period_end(stamp, first, length, state):  # type: ignore[no-untyped-def]
+def find_period_end(stamp, first, length, states):  # type: ignore[no-untyped-def]
     """Index after the sample, from ``first`` on, that ends the period; -1 if none does.
 
-    ``stamp`` (n,) [ns], not above 0 where a sample has none; ``length`` of a period [ns]; ``state`` is
-    changed.
+    ``stamp`` (n,) [ns], not above 0 where a sample has none; ``length`` of a period [ns]; the only one of
+    ``states`` is changed.
     """
+    state = states[0]
     for i in range(first, stamp.shape[0]):
         at = stamp[i]
         state.idle += 1
@@ -68,7 +69,7 @@ class EvaluationPeriods:
 
     def __init__(self, length_ns: int) -> None:
         self._length = length_ns
-        self.state: Record = new_record(PERIOD_STATE)
+        self.state: Records = new_records(1, PERIOD_STATE)
 
     def pieces(self, samples: Samples) -> Iterator[tuple[Samples, bool]]:
         """Pieces of a block, and whether a period ends with each."""

@@ -167,11 +167,13 @@ def _is_other_unit(settings, state, stamp, angle):
 
 
 @entry
-def check_angles(settings, state, stamp, kind, angle, out_fault):
+def check_angles(all_settings, states, stamp, kind, angle, out_fault):
     """Mark crank samples (n,) that cannot be used, as long as two sources send or the unit is another.
 
-    ``out_fault`` (n,) are the faults that are known; ``state`` is changed.
+    ``out_fault`` (n,) are the faults that are known. Of settings and states there is one each; the state is
+    changed.
     """
+    settings, state = all_settings[0], states[0]
     for i in range(stamp.shape[0]):
         is_usable = kind[i] == CRANK and out_fault[i] == NO_FAULT and stamp[i] > 0
         if not is_usable or not abs(angle[i]) <= LARGEST_ANGLE:

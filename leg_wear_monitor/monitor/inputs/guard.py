@@ -5,7 +5,7 @@ import math
 import numpy as np
 
 from leg_wear_monitor.monitor.inputs import angle_check as check
-from leg_wear_monitor.record import Record, copy_record, new_record
+from leg_wear_monitor.record import Record, Records, new_records, record_of
 from leg_wear_monitor.twin.sample import GAIT_SAMPLE, Samples
 from leg_wear_monitor.twin.settings import TrackerSettings
 
@@ -28,21 +28,21 @@ class InputGuard:
         self._commanded = abs(settings.commanded_speed_radps)
         gap, speed = settings.bridge_limit_s, settings.commanded_speed_radps
         alone = max(_ALONE_S, gap)
-        self._settings = new_record(check.SETTINGS)
-        self._settings.gate, self._settings.largest = settings.gate_rad, settings.largest_speed
-        self._settings.gap, self._settings.alone, self._settings.commanded = gap, alone, speed
-        self._state = new_record(check.STATE)
+        self._settings = new_records(1, check.SETTINGS)
+        self._settings[0] = settings.gate_rad, settings.largest_speed, gap, alone, speed
+        self._states = new_records(1, check.STATE)
+        self._state: Record = record_of(self._states)
 
     def warm_up(self) -> None:
         """Compile, before the first sample."""
         self.checked(np.zeros(1, GAIT_SAMPLE))
-        self.restore(new_record(check.STATE))
+        self.restore(new_records(1, check.STATE))
 
     def checked(self, samples: Samples) -> Samples:
         """The same samples; a copy with faults where some cannot be used."""
         fault = np.array(samples["fault"])
         stamp, kind, angle = (np.array(samples[name]) for name in ("stamp_ns", "kind", "crank_angle_rad"))
-        check.check_angles(self._settings, self._state, stamp, kind, angle, fault)
+        check.check_angles(self._settings, self._states, stamp, kind, angle, fault)
         if np.array_equal(fault, samples["fault"]):
             return samples
         samples = samples.copy()
@@ -92,10 +92,10 @@ class InputGuard:
             return told + "it seems to be in degrees, radians are expected"
         return told + "check its unit (radians), crank.gear_ratio and cadence.commanded_rpm"
 
-    def snapshot(self) -> Record:
+    def snapshot(self) -> Records:
         """A copy of the whole state."""
-        return self._state.copy()
+        return self._states.copy()
 
-    def restore(self, snapshot: Record) -> None:
+    def restore(self, snapshot: Records) -> None:
         """Go back to a snapshot of a guard of the same settings."""
-        copy_record(snapshot, self._state)
+        self._states[:] = snapshot

@@ -50,7 +50,7 @@ from leg_wear_monitor.twin.follower.state import (
 from leg_wear_monitor.twin.follower.torque_estimate import CycleEstimate, LoadEstimate, find
 from leg_wear_monitor.twin.settings import INSTANT, STANCE, TwinSettings
 from leg_wear_monitor.twin.statistics import CycleStatistics, Event, SampleStatistics, TwinEventKind
-from leg_wear_monitor.twin.steps import BEGIN, CODE, EXTRA, MOVE, TURNS, Steps
+from leg_wear_monitor.twin.steps import MOVE, Steps
 
 _RUN_IN_S = 0.2
 _LEAST_TORQUE_NM = 1.0e-6  # of a leg that needs none
@@ -149,11 +149,11 @@ class LegFollower:
                 self._end_cycle(k, cycles)
             elif reason == NEEDS_START:
                 events.append(self._start(steps, i))
-                i += int(steps.what[i, CODE] != MOVE)
+                i += int(steps["code"][i] != MOVE)
             elif reason in (LEFT, TOLD):
                 if reason == LEFT:
                     mark[RUNNING], mark[AFRESH] = 0, 0
-                events.append(Event(int(steps.what[i, BEGIN]), _EVENT_KINDS[int(steps.what[i, EXTRA])]))
+                events.append(Event(int(steps["begin_ns"][i]), _EVENT_KINDS[int(steps["detail"][i])]))
                 i += 1
             elif reason != DONE:
                 joint = self._setup.clearance_joints[k] if k >= 0 else None
@@ -164,8 +164,8 @@ class LegFollower:
 
     def _start(self, steps: Steps, i: int) -> Event:
         """Set the leg in motion where step i begins, wear as it was."""
-        mark, stamp = self.state.mark, int(steps.what[i, BEGIN])
-        angle, speed = steps.motion[i, :2]
+        mark, step = self.state.mark, steps[i]
+        stamp, (angle, speed) = int(step["begin_ns"]), step["motion"][:2]
         self.state.value[:] = 0.0
         mark[BASE] = stamp - self._run_in(float(angle), float(speed))
         if mark[AFRESH]:
@@ -173,7 +173,7 @@ class LegFollower:
         mark[PIECE_BEGIN] = mark[PIECE_END] = stamp
         for where in (AFRESH, ANCHORED, CUT, FILTERING, CYCLE_BEGIN, CYCLE_BRIDGED):
             mark[where] = 0
-        mark[RUNNING], mark[TURNS_BEFORE] = 1, steps.what[i, TURNS]
+        mark[RUNNING], mark[TURNS_BEFORE] = 1, step["turns"]
         self.state.polynomial[:] = 0.0, angle, speed, 0.0, 0.0, 0.0, 0.0
         clear_sums(self.state)
         clear_run_statistics(self.statistics)

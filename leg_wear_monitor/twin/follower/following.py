@@ -36,19 +36,7 @@ from leg_wear_monitor.twin.follower.state import (
     TURNS_BEFORE,
     WHOLE,
 )
-from leg_wear_monitor.twin.steps import (
-    BEGIN,
-    BRIDGE_NS,
-    CODE,
-    END,
-    EXTRA,
-    LEAVE,
-    LOOK,
-    MOVE,
-    START,
-    TELL,
-    TURNS,
-)
+from leg_wear_monitor.twin.steps import EVALUATE, LEAVE, MOVE, REPORT, START
 
 # why the leg's kernel returns before the last step: a cycle has ended; somebody must start the leg, leave it,
 # or take note of a happening. Other values are those of dynamics.run.
@@ -92,7 +80,7 @@ def _find_cut(leg, begin):
 
 
 @kernel
-def _load_piece(model, stepper, leg, what, motion):
+def _load_piece(model, stepper, leg, step):
     """Take up the next piece of the crank's motion; times and angles are kept small."""
     mark = leg.mark
     if stepper.intervals[0] >= _REBASE:
@@ -101,42 +89,42 @@ def _load_piece(model, stepper, leg, what, motion):
         for k in range(stepper.recent.shape[0]):
             stepper.recent[k, 0] -= _REBASE * model.interval
             stepper.recent[k, 2] -= _REBASE * model.interval
-    if what[BEGIN] != mark[PIECE_END]:  # it rested meanwhile
-        mark[BASE] += what[BEGIN] - mark[PIECE_END]
+    if step.begin_ns != mark[PIECE_END]:  # it rested meanwhile
+        mark[BASE] += step.begin_ns - mark[PIECE_END]
         mark[FILTERING] = 0
-    turns = what[TURNS] - mark[TURNS_BEFORE]
+    turns = step.turns - mark[TURNS_BEFORE]
     if turns != 0:
         stepper.drive[ANGLE] -= turns * _TURN
-    mark[PIECE_BEGIN], mark[PIECE_END], mark[TURNS_BEFORE] = what[BEGIN], what[END], what[TURNS]
-    mark[CYCLE_BRIDGED] += what[BRIDGE_NS]
-    mark[MOVING_NS] += what[END] - what[BEGIN]
-    leg.polynomial[0] = 1.0e-9 * (what[BEGIN] - mark[BASE])
+    mark[PIECE_BEGIN], mark[PIECE_END], mark[TURNS_BEFORE] = step.begin_ns, step.end_ns, step.turns
+    mark[CYCLE_BRIDGED] += step.bridged_ns
+    mark[MOVING_NS] += step.end_ns - step.begin_ns
+    leg.polynomial[0] = 1.0e-9 * (step.begin_ns - mark[BASE])
     for i in range(6):
-        leg.polynomial[1 + i] = motion[i]
-    _find_cut(leg, what[BEGIN])
+        leg.polynomial[1 + i] = step.motion[i]
+    _find_cut(leg, step.begin_ns)
 
 
 @kernel
-def _look(sensor, signature, leg, stepper, what, measured, looks):
+def _look(sensor, signature, leg, stepper, step, looks):
     """Note the leg at a sample, NaN where it does not run."""
     mark, value, m = leg.mark, leg.value, leg.mark[LOOKS]
     mark[LOOKS] += 1
-    looks.stamp[m, 0], looks.stamp[m, 1] = what[END], what[EXTRA]
+    looks.stamp[m, 0], looks.stamp[m, 1] = step.end_ns, step.detail
     running = mark[RUNNING] != 0
     if running and value[TIME] > 0.0:
         value[MEAN_TORQUE] = value[IMPULSE] / value[TIME]
         value[IMPULSE], value[TIME] = 0.0, 0.0
     angle = math.nan
     if running:
-        at = min(max(what[END], mark[PIECE_BEGIN]), mark[PIECE_END])
+        at = min(max(step.end_ns, mark[PIECE_BEGIN]), mark[PIECE_END])
         angle = _angle_at(leg.polynomial, 1.0e-9 * (at - mark[PIECE_BEGIN]))
         angle -= _TURN * math.floor(angle / _TURN)
     looks.figure[m, 0] = angle
     looks.figure[m, 1] = value[MEAN_TORQUE] if running else math.nan
     for k in range(leg.force.shape[0]):
         looks.force[m, k] = leg.force[k] if running else math.nan
-    if running and mark[PIECE_BEGIN] <= what[END] <= mark[PIECE_END] and math.isfinite(measured):
-        compare(sensor, signature, leg, stepper, measured)
+    if running and mark[PIECE_BEGIN] <= step.end_ns <= mark[PIECE_END] and math.isfinite(step.torque):
+        compare(sensor, signature, leg, stepper, step.torque)
 
 
 @entry
@@ -151,9 +139,9 @@ def follow(model, feeds_back, stepper, statistics, work, sensor, signature, leg,
     """
     mark, value, i = leg.mark, leg.value, first
     while i < n:
-        what, code = steps.what[i], steps.what[i, CODE]
+        step, code = steps[i], steps[i].code
         if mark[RUNNING] != 0:
-            until = min(what[END], mark[PIECE_END]) if code == LOOK else mark[PIECE_END]
+            until = min(step.end_ns, mark[PIECE_END]) if code == EVALUATE else mark[PIECE_END]
             cuts = mark[CUT] != 0 and mark[CUT] <= until
             if cuts:
                 until = mark[CUT]
@@ -189,14 +177,14 @@ def follow(model, feeds_back, stepper, statistics, work, sensor, signature, leg,
         if code == MOVE:
             if mark[RUNNING] == 0:
                 return NEEDS_START, i, -1
-            _load_piece(model, stepper, leg, what, steps.motion[i])
-        elif code == LOOK:
-            _look(sensor, signature, leg, stepper, what, steps.motion[i, 0], looks)
+            _load_piece(model, stepper, leg, step)
+        elif code == EVALUATE:
+            _look(sensor, signature, leg, stepper, step, looks)
         elif code == START:
             return NEEDS_START, i, -1
         elif code == LEAVE:
             return LEFT, i, -1
-        elif code == TELL:
+        elif code == REPORT:
             return TOLD, i, -1
         i += 1
     return DONE, i, -1

@@ -12,52 +12,53 @@ from leg_wear_monitor.twin.sample import (
     WRONG_TYPE,
     ZERO_STAMP,
 )
-from leg_wear_monitor.twin.tracker.state import (
-    BRIDGE,
-    CANDIDATE,
-    CANDIDATE_KIND,
-    DUPLICATES,
-    JUMP,
-    LATE,
-    NEWEST,
-    NEWEST_OF,
-    RELEASED,
-    RELEASED_KINDS,
-    STRAY,
-    TAIL,
-    WAITING,
-    WINDOW,
-)
 
 LARGEST_ANGLE, LARGEST_RATE, LARGEST_TORQUE = 1.0e6, 1.0e3, 1.0e6  # rad, rad/s, N m: beyond is no leg's
 
 
 @kernel
-def find_fault(stamp, kind, fault, angle, torque):
-    """What is wrong with a sample, if it is not said already."""
-    if fault != NO_FAULT:
-        return min(fault, OUT_OF_RANGE)
-    if not CRANK <= kind <= TORQUE:
+def find_fault(sample):
+    """What is wrong with a sample, if it has no fault already."""
+    if sample.fault != NO_FAULT:
+        return min(sample.fault, OUT_OF_RANGE)
+    if not CRANK <= sample.kind <= TORQUE:
         return WRONG_TYPE
-    if stamp <= 0:
+    if sample.stamp_ns <= 0:
         return ZERO_STAMP
-    value, largest = (angle, LARGEST_ANGLE) if kind == CRANK else (torque, LARGEST_TORQUE)
+    value, largest = (
+        (sample.crank_angle_rad, LARGEST_ANGLE)
+        if sample.kind == CRANK
+        else (sample.torque_nm, LARGEST_TORQUE)
+    )
     if not math.isfinite(value):
         return NOT_FINITE
     return OUT_OF_RANGE if abs(value) > largest else NO_FAULT
 
 
 @kernel
-def _was_released(state, stamp, kind):
+def _was_released(state, sample):
     """Whether a sample that comes too late is one that has been here before."""
-    clock, j = state.clock, state.clock[TAIL] - 1
-    if stamp == clock[RELEASED]:
-        return (clock[RELEASED_KINDS] >> kind) & 1 == 1
-    while j >= 0 and state.queue_stamp[j] >= stamp:
-        if state.queue_stamp[j] == stamp and state.queue_kind[j] == kind:
+    clock, queue, stamp, kind = state.clock, state.queue, sample.stamp_ns, sample.kind
+    if stamp == clock.released_ns:
+        return (clock.released_kinds >> kind) & 1 == 1
+    j = clock.tail - 1
+    while j >= 0 and queue[j].stamp_ns >= stamp:
+        if queue[j].stamp_ns == stamp and queue[j].kind == kind:
             return True
         j -= 1
     return False
+
+
+@kernel
+def _copy_measured(source, out):
+    """Copy what the tracker needs of a sample."""
+    out.stamp_ns, out.kind, out.fault, out.torque_nm = (
+        source.stamp_ns,
+        source.kind,
+        source.fault,
+        source.torque_nm,
+    )
+    out.crank_angle_rad, out.crank_velocity_radps = source.crank_angle_rad, source.crank_velocity_radps
 
 
 # what to do with an arrival: nothing, or put it in order, or that after a jump of the stamps
@@ -65,33 +66,36 @@ DROP_IT, KEEP_IT, AFTER_JUMP = range(3)
 
 
 @kernel
-def arrive(model, state, stamp, kind, values):
+def arrive(model, state, sample):
     """What to do with a sample, by its stamp and those before it.
 
     A stamp far from the others is believed only if another follows it: one bad clock reading must not cost
     the track.
     """
-    clock, count, ns = state.clock, state.counts, model.ns
-    ahead, candidate = stamp - clock[NEWEST], clock[CANDIDATE]
-    if clock[NEWEST] != 0 and (ahead > ns[BRIDGE] or ahead < -ns[JUMP]):
-        after = stamp - candidate
-        if candidate != 0 and -ns[WINDOW] <= after <= ns[BRIDGE]:
-            if after == 0 and kind == clock[CANDIDATE_KIND]:
-                count[DUPLICATES] += 1
+    clock, count, candidate = state.clock, state.counts, state.candidate
+    stamp, kind = sample.stamp_ns, sample.kind
+    ahead = stamp - clock.newest_ns
+    if clock.newest_ns != 0 and (ahead > model.bridge_limit_ns or ahead < -model.backward_jump_ns):
+        after = stamp - candidate.stamp_ns
+        if candidate.stamp_ns != 0 and -model.reorder_window_ns <= after <= model.bridge_limit_ns:
+            if after == 0 and kind == candidate.kind:
+                count.duplicates += 1
                 return DROP_IT
             return AFTER_JUMP
-        if candidate != 0:
-            count[STRAY] += 1
-        clock[CANDIDATE], clock[CANDIDATE_KIND] = stamp, kind
-        for c in range(3):
-            state.candidate[c] = values[c]
+        if candidate.stamp_ns != 0:
+            count.stray_stamps += 1
+        _copy_measured(sample, candidate)
         return DROP_IT
-    if candidate != 0:
-        count[STRAY] += 1
-        clock[CANDIDATE] = 0
-    if stamp < clock[RELEASED] or (stamp == clock[RELEASED] and _was_released(state, stamp, kind)):
-        count[DUPLICATES if _was_released(state, stamp, kind) else LATE] += 1
-        clock[NEWEST_OF + kind] = max(clock[NEWEST_OF + kind], stamp)  # from now on it is waited for
+    if candidate.stamp_ns != 0:
+        count.stray_stamps += 1
+        candidate.stamp_ns = 0
+    known = stamp <= clock.released_ns and _was_released(state, sample)
+    if known or stamp < clock.released_ns:
+        if known:
+            count.duplicates += 1
+        else:
+            count.late += 1
+        clock.newest_of_ns[kind] = max(clock.newest_of_ns[kind], stamp)  # from now on it is waited for
         return DROP_IT
     return KEEP_IT
 
@@ -103,31 +107,30 @@ def horizon_of(model, clock):
     One kind waits for the other as long as gaps are bridged: what one topic brings late, or after a burst of
     the other, is not lost.
     """
-    newest = clock[NEWEST]
+    newest = clock.newest_ns
     horizon = newest
     for kind in range(CRANK, TORQUE + 1):
-        if newest - clock[NEWEST_OF + kind] <= model.ns[BRIDGE]:
-            horizon = min(horizon, clock[NEWEST_OF + kind])
-    return horizon - model.ns[WINDOW]
+        if newest - clock.newest_of_ns[kind] <= model.bridge_limit_ns:
+            horizon = min(horizon, clock.newest_of_ns[kind])
+    return horizon - model.reorder_window_ns
 
 
 @kernel
-def insert(state, stamp, kind, values):
+def insert(state, sample):
     """Put a sample where it belongs among those that wait; False for one that waits already."""
-    clock, stamps, kinds = state.clock, state.arrival_stamp, state.arrival_kind
-    i = clock[WAITING]
-    while i > 0 and (stamps[i - 1] > stamp or (stamps[i - 1] == stamp and kinds[i - 1] > kind)):
+    clock, arrivals, stamp, kind = state.clock, state.arrivals, sample.stamp_ns, sample.kind
+    i = clock.waiting
+    while i > 0 and (
+        arrivals[i - 1].stamp_ns > stamp
+        or (arrivals[i - 1].stamp_ns == stamp and arrivals[i - 1].kind > kind)
+    ):
         i -= 1
-    if i > 0 and stamps[i - 1] == stamp and kinds[i - 1] == kind:
+    if i > 0 and arrivals[i - 1].stamp_ns == stamp and arrivals[i - 1].kind == kind:
         return False
-    for j in range(clock[WAITING], i, -1):
-        stamps[j], kinds[j] = stamps[j - 1], kinds[j - 1]
-        for c in range(3):
-            state.arrival[j, c] = state.arrival[j - 1, c]
-    stamps[i], kinds[i] = stamp, kind
-    for c in range(3):
-        state.arrival[i, c] = values[c]
-    clock[WAITING] += 1
-    clock[NEWEST] = max(clock[NEWEST], stamp)
-    clock[NEWEST_OF + kind] = max(clock[NEWEST_OF + kind], stamp)
+    for j in range(clock.waiting, i, -1):
+        arrivals[j] = arrivals[j - 1]
+    arrivals[i] = sample
+    clock.waiting += 1
+    clock.newest_ns = max(clock.newest_ns, stamp)
+    clock.newest_of_ns[kind] = max(clock.newest_of_ns[kind], stamp)
     return True

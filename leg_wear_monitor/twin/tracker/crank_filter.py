@@ -9,20 +9,7 @@ over the samples after, and needs no inverse.
 import math
 
 from leg_wear_monitor.kernel import kernel
-from leg_wear_monitor.twin.tracker.state import (
-    ANGLE_NOISE,
-    BY_ANGLE,
-    BY_VELOCITY,
-    COMMANDED,
-    GATE,
-    JERK,
-    LONGEST,
-    STEP,
-    VELOCITY_GATE,
-    VELOCITY_NOISE,
-    P,
-    X,
-)
+from leg_wear_monitor.twin.sample import CRANK
 
 _TURN = 2.0 * math.pi
 _WIDEST_GATE = 2.5  # rad: further off, an angle might as well be the other way round
@@ -30,63 +17,66 @@ _SIGMAS = 5.0
 
 
 @kernel
-def begin_filter(real, angle, out_filtered):
+def begin_filter(model, angle, out_estimate):
     """First sample: its angle in [0, 2 pi), the commanded speed as a first guess."""
-    speed = real[COMMANDED]
-    for i in range(9):
-        out_filtered[i] = 0.0
-    out_filtered[0], out_filtered[1] = angle - _TURN * math.floor(angle / _TURN), speed
-    out_filtered[3] = real[ANGLE_NOISE] / real[LONGEST]
-    out_filtered[6], out_filtered[8] = speed**2, (speed / real[LONGEST]) ** 2
+    e, speed = out_estimate, model.commanded_speed
+    e.angle, e.speed, e.acceleration = angle - _TURN * math.floor(angle / _TURN), speed, 0.0
+    e.p00, e.p01, e.p02 = model.angle_noise / model.longest_spread, 0.0, 0.0
+    e.p11, e.p12, e.p22 = speed**2, 0.0, (speed / model.longest_spread) ** 2
 
 
 @kernel
-def predict(real, h, filtered):
+def predict(model, h, estimate):
     """The filter's state and covariance a time h [s] later."""
-    x, v, a = filtered[0], filtered[1], filtered[2]
-    filtered[0], filtered[1] = x + h * (v + 0.5 * h * a), v + h * a
-    p00, p01, p02, p11, p12, p22 = (
-        filtered[3],
-        filtered[4],
-        filtered[5],
-        filtered[6],
-        filtered[7],
-        filtered[8],
-    )
-    q, g = real[JERK] * h, 0.5 * h * h
+    e, x, v, a = estimate, estimate.angle, estimate.speed, estimate.acceleration
+    e.angle, e.speed = x + h * (v + 0.5 * h * a), v + h * a
+    p00, p01, p02, p11, p12, p22 = e.p00, e.p01, e.p02, e.p11, e.p12, e.p22
+    q, g = model.jerk * h, 0.5 * h * h
     # rows of F P, F = [1 h g; 0 1 h; 0 0 1]
     a00, a01, a02 = p00 + h * p01 + g * p02, p01 + h * p11 + g * p12, p02 + h * p12 + g * p22
     a11, a12 = p11 + h * p12, p12 + h * p22
-    filtered[3] = a00 + h * a01 + g * a02 + q * h**4 / 20.0
-    filtered[4] = a01 + h * a02 + q * h**3 / 8.0
-    filtered[5] = a02 + q * h**2 / 6.0
-    filtered[6] = a11 + h * a12 + q * h**2 / 3.0
-    filtered[7] = a12 + 0.5 * q * h
-    filtered[8] = p22 + q
+    e.p00 = a00 + h * a01 + g * a02 + q * h**4 / 20.0
+    e.p01 = a01 + h * a02 + q * h**3 / 8.0
+    e.p02 = a02 + q * h**2 / 6.0
+    e.p11 = a11 + h * a12 + q * h**2 / 3.0
+    e.p12 = a12 + 0.5 * q * h
+    e.p22 = p22 + q
 
 
 @kernel
-def _correct(i, variance, innovation, filtered, row, at):
-    """Take in a measurement of state i; what the smoother needs of it goes to ``row`` from ``at`` on."""
-    b0 = filtered[3 + i]  # column i of P, i < 2
-    b1 = filtered[4] if i == 0 else filtered[6]
-    b2 = filtered[5] if i == 0 else filtered[7]
+def note_prediction(estimate, step, out_row):
+    """Begin the row of a crank sample ``step`` [s] after the last one: what is known before it is used."""
+    e, row = estimate, out_row
+    row.step, row.bridged = step, 0
+    row.angle, row.speed, row.acceleration = e.angle, e.speed, e.acceleration
+    row.p00, row.p01, row.p02, row.p11, row.p12, row.p22 = e.p00, e.p01, e.p02, e.p11, e.p12, e.p22
+    row.innovation_variance[0], row.innovation_variance[1] = 0.0, 0.0
+
+
+@kernel
+def _correct(i, variance, innovation, estimate, row):
+    """Take in a measurement of state i (0 angle, 1 speed); the row notes what the smoother needs of it."""
+    e = estimate
+    b0 = e.p00 if i == 0 else e.p01  # column i of P
+    b1 = e.p01 if i == 0 else e.p11
+    b2 = e.p02 if i == 0 else e.p12
     s = (b0 if i == 0 else b1) + variance
     k0, k1, k2 = b0 / s, b1 / s, b2 / s
-    filtered[0] += k0 * innovation
-    filtered[1] += k1 * innovation
-    filtered[2] += k2 * innovation
-    filtered[3] -= k0 * b0
-    filtered[4] -= k0 * b1
-    filtered[5] -= k0 * b2
-    filtered[6] -= k1 * b1
-    filtered[7] -= k1 * b2
-    filtered[8] -= k2 * b2
-    row[at], row[at + 1], row[at + 2], row[at + 3], row[at + 4] = s, innovation, k0, k1, k2
+    e.angle += k0 * innovation
+    e.speed += k1 * innovation
+    e.acceleration += k2 * innovation
+    e.p00 -= k0 * b0
+    e.p01 -= k0 * b1
+    e.p02 -= k0 * b2
+    e.p11 -= k1 * b1
+    e.p12 -= k1 * b2
+    e.p22 -= k2 * b2
+    row.innovation_variance[i], row.innovation[i] = s, innovation
+    row.gain[i, 0], row.gain[i, 1], row.gain[i, 2] = k0, k1, k2
 
 
 @kernel
-def update(real, h, step, angle, velocity, trusted, filtered, row):
+def update(model, h, step, angle, velocity, trusted, estimate, row):
     """Take in a crank sample; fills its row of the queue.
 
     It is h [s] after the filter's time and ``step`` [s] after the last sample used. Its velocity is used
@@ -98,35 +88,30 @@ def update(real, h, step, angle, velocity, trusted, filtered, row):
         Whether the sample passed its gate (the filter is that of the prediction otherwise); 1 for a velocity
         that agrees with the angles, -1 for one that does not, 0 for none.
     """
-    predict(real, h, filtered)
-    row[STEP] = step
-    for i in range(3):
-        row[X + i] = filtered[i]
-    for i in range(6):
-        row[P + i] = filtered[3 + i]
-    row[BY_ANGLE], row[BY_VELOCITY] = 0.0, 0.0
-    innovation = angle - filtered[0]
+    predict(model, h, estimate)
+    note_prediction(estimate, step, row)
+    innovation = angle - estimate.angle
     innovation -= _TURN * math.floor(innovation / _TURN + 0.5)
-    if not abs(innovation) < min(_WIDEST_GATE, real[GATE] + _SIGMAS * math.sqrt(filtered[3])):
+    if not abs(innovation) < min(_WIDEST_GATE, model.gate + _SIGMAS * math.sqrt(estimate.p00)):
         return False, 0
-    spread = min(max(step, 1.0e-6), real[LONGEST])
-    _correct(0, real[ANGLE_NOISE] / spread, innovation, filtered, row, BY_ANGLE)
+    spread = min(max(step, 1.0e-6), model.longest_spread)
+    _correct(0, model.angle_noise / spread, innovation, estimate, row)
     if not math.isfinite(velocity):
         return True, 0
-    innovation = velocity - filtered[1]
-    if not abs(innovation) < real[VELOCITY_GATE] + _SIGMAS * math.sqrt(filtered[6]):
+    innovation = velocity - estimate.speed
+    if not abs(innovation) < model.velocity_gate + _SIGMAS * math.sqrt(estimate.p11):
         return True, -1
     if trusted:
-        _correct(1, real[VELOCITY_NOISE] / spread, innovation, filtered, row, BY_VELOCITY)
+        _correct(1, model.velocity_noise / spread, innovation, estimate, row)
     return True, 1
 
 
 @kernel
-def _adjoin(i, row, at, l0, l1, l2):
+def _adjoin(i, row, l0, l1, l2):
     """The adjoint vector before a measurement of state i, from that after it."""
-    s, innovation = row[at], row[at + 1]
+    s, gain = row.innovation_variance[i], row.gain
     if s > 0.0:
-        along = row[at + 2] * l0 + row[at + 3] * l1 + row[at + 4] * l2 + innovation / s
+        along = gain[i, 0] * l0 + gain[i, 1] * l1 + gain[i, 2] * l2 + row.innovation[i] / s
         if i == 0:
             l0 -= along
         else:
@@ -135,20 +120,20 @@ def _adjoin(i, row, at, l0, l1, l2):
 
 
 @kernel
-def smooth(queue_kind, queue, spline_node, tail, out_target):
-    """Angle, speed and acceleration at index ``spline_node`` of the queue, by all samples up to ``tail``."""
+def smooth(queue, spline_node, tail, out_node):
+    """Crank motion at index ``spline_node`` of the queue, by all samples up to ``tail``."""
     l0, l1, l2 = 0.0, 0.0, 0.0
     for j in range(tail - 1, spline_node - 1, -1):
-        if queue_kind[j] != 0:
-            continue
         row = queue[j]
-        l0, l1, l2 = _adjoin(1, row, BY_VELOCITY, l0, l1, l2)
-        l0, l1, l2 = _adjoin(0, row, BY_ANGLE, l0, l1, l2)
+        if row.kind != CRANK:
+            continue
+        l0, l1, l2 = _adjoin(1, row, l0, l1, l2)
+        l0, l1, l2 = _adjoin(0, row, l0, l1, l2)
         if j > spline_node:
-            h = row[STEP]
+            h = row.step
             l2 += h * (l1 + 0.5 * h * l0)
             l1 += h * l0
     row = queue[spline_node]
-    out_target[0] = row[X] - (row[P] * l0 + row[P + 1] * l1 + row[P + 2] * l2)
-    out_target[1] = row[X + 1] - (row[P + 1] * l0 + row[P + 3] * l1 + row[P + 4] * l2)
-    out_target[2] = row[X + 2] - (row[P + 2] * l0 + row[P + 4] * l1 + row[P + 5] * l2)
+    out_node.angle = row.angle - (row.p00 * l0 + row.p01 * l1 + row.p02 * l2)
+    out_node.speed = row.speed - (row.p01 * l0 + row.p11 * l1 + row.p12 * l2)
+    out_node.acceleration = row.acceleration - (row.p02 * l0 + row.p12 * l1 + row.p22 * l2)

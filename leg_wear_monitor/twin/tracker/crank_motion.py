@@ -1,7 +1,7 @@
-"""From filtered samples to the crank's motion: smooth pieces between knots, rest, and how the gait goes.
+"""From filtered samples to the crank's motion: smooth pieces between spline nodes, rest, how the gait goes.
 
-A knot is a crank sample some time after the knot before; once enough samples after it are there it is
-smoothed, and the leg can go there. All samples up to it are looked at on the way.
+A spline node is a crank sample some time after the node before; once enough samples after it are there it is
+smoothed, and the leg can go there. The leg is evaluated at all samples up to it on the way.
 """
 
 import math
@@ -9,58 +9,20 @@ import math
 from leg_wear_monitor.kernel import kernel
 from leg_wear_monitor.twin.sample import CRANK
 from leg_wear_monitor.twin.steps import (
-    BRIDGE_NS,
+    EVALUATE,
     LEAVE,
-    LOOK,
     LOST_BY_OUTLIERS,
     MOVE,
     MOVING,
+    REPORT,
     REST,
     REVERSED,
     START,
     STOPPED,
-    TELL,
-    TURNS,
     add_step,
     join_smoothly,
 )
 from leg_wear_monitor.twin.tracker.crank_filter import smooth
-from leg_wear_monitor.twin.tracker.state import (
-    ACQUIRE,
-    ACQUIRING,
-    BRIDGED,
-    BRIDGED_NS,
-    DIRECTION,
-    FASTEST,
-    FOLLOWED,
-    HEAD,
-    LAG,
-    LARGEST_SPEED,
-    LAST_CRANK,
-    LAST_SPLINE_NODE,
-    LOST_TIMES,
-    OUT_SINCE,
-    RESTED,
-    RESTS,
-    REVERSALS,
-    RUN_UP,
-    SETTLE,
-    SINCE,
-    SLOW_SINCE,
-    SLOWEST,
-    SPLINE_NODE,
-    STANDING_NS,
-    STEP,
-    STOP_HOLD,
-    STOP_SPEED,
-    TAIL,
-    TORQUE_VALUE,
-    TRACKING,
-    TURN_COUNT,
-    UNMONITORED_NS,
-    WITHIN,
-    X,
-)
 
 _TURN = 2.0 * math.pi
 _RESTING = 0.02  # rad that a crank at rest may creep before it moves again
@@ -70,176 +32,176 @@ IS_STOPPED, IS_STARTING, IS_IN_STEP, IS_OUT_OF_STEP = range(4)
 
 
 @kernel
-def look_up_to(state, spline_node, steps, n):
-    """Look at all queued samples before index ``spline_node``, and drop them."""
+def evaluate_up_to(state, spline_node, steps, n):
+    """Evaluate the leg at all queued samples before index ``spline_node``, and drop them."""
     clock = state.clock
-    for j in range(clock[HEAD], spline_node):
-        i, stamp = n, state.queue_stamp[j]
-        n = add_step(steps, n, LOOK, stamp, stamp, state.queue_kind[j])
-        steps.motion[i, 0] = state.queue[j, TORQUE_VALUE]
-    clock[HEAD] = spline_node
+    for j in range(clock.head, spline_node):
+        row = state.queue[j]
+        n = add_step(steps, n, EVALUATE, row.stamp_ns, row.stamp_ns, row.kind)
+        steps[n - 1].torque = row.torque
+    clock.head = spline_node
     return n
 
 
 @kernel
 def lose(state, stamp, reason, steps, n):
-    """Lose the crank: what waits is looked at without the leg, and the next crank sample starts afresh."""
+    """Lose the crank: samples that wait go out without the leg, and the next crank sample starts afresh."""
     clock = state.clock
-    if clock[LAST_CRANK] != 0:
-        state.counts[LOST_TIMES] += 1
+    if clock.last_crank_ns != 0:
+        state.counts.lost += 1
     n = add_step(steps, n, LEAVE, stamp, stamp, reason)
-    n = look_up_to(state, clock[TAIL], steps, n)
-    if clock[FOLLOWED] != 0:
-        clock[OUT_SINCE] = clock[LAST_SPLINE_NODE]
-    clock[HEAD], clock[TAIL], clock[LAST_CRANK] = 0, 0, 0
-    clock[FOLLOWED], clock[RESTS], clock[SLOW_SINCE], clock[SINCE] = 0, 0, 0, 0
-    clock[TRACKING], clock[WITHIN], clock[DIRECTION] = IS_STARTING, 0, 0
+    n = evaluate_up_to(state, clock.tail, steps, n)
+    if clock.followed != 0:
+        clock.out_since_ns = clock.last_node_ns
+    clock.head, clock.tail, clock.last_crank_ns = 0, 0, 0
+    clock.followed, clock.at_rest, clock.slow_since_ns, clock.tolerance_since_ns = 0, 0, 0, 0
+    clock.tracking, clock.in_tolerance, clock.direction = IS_STARTING, 0, 0
     return n
 
 
 @kernel
 def _next_spline_node(model, state):
-    """Index of the next knot in the queue, -1 where it or what must come after it is not there yet."""
-    clock, ns = state.clock, model.ns
-    due = (
-        clock[LAST_SPLINE_NODE] + ns[SPLINE_NODE] if clock[FOLLOWED] != 0 else clock[ACQUIRING] + ns[ACQUIRE]
-    )
-    newest = clock[LAST_CRANK]
-    if newest == 0 or newest - due < ns[LAG]:
+    """Index of the next spline node in the queue, -1 where it, or a sample it needs, is not there yet."""
+    clock = state.clock
+    due = clock.acquiring_ns + model.acquire_ns
+    if clock.followed != 0:
+        due = clock.last_node_ns + model.node_interval_ns
+    newest = clock.last_crank_ns
+    if newest == 0 or newest - due < model.lag_ns:
         return -1
-    for j in range(clock[HEAD], clock[TAIL]):
-        if state.queue_kind[j] == CRANK and state.queue_stamp[j] >= due:
-            return j if newest - state.queue_stamp[j] >= ns[LAG] else -1
+    for j in range(clock.head, clock.tail):
+        row = state.queue[j]
+        if row.kind == CRANK and row.stamp_ns >= due:
+            return j if newest - row.stamp_ns >= model.lag_ns else -1
     return -1
 
 
 @kernel
-def _drop_turns(state, out_target):
+def _drop_turns(state):
     """Count whole turns apart, so that angles stay small and exact however long it goes on."""
-    turns = math.floor(out_target[0] / _TURN)
+    turns = math.floor(state.ahead.angle / _TURN)
     if turns != 0.0:
         shift = turns * _TURN
-        state.clock[TURN_COUNT] += int(turns)
-        out_target[0] -= shift
-        state.target[0] -= shift
-        state.filtered[0] -= shift
-        for j in range(state.clock[HEAD], state.clock[TAIL]):
-            state.queue[j, X] -= shift
+        state.clock.turns += int(turns)
+        state.ahead.angle -= shift
+        state.node.angle -= shift
+        state.estimate.angle -= shift
+        for j in range(state.clock.head, state.clock.tail):
+            state.queue[j].angle -= shift
 
 
 @kernel
-def _evaluate(model, clock, stamp, speed):
+def _evaluate_speed(model, clock, stamp, speed):
     """Starting, in step or out of it, by how long the speed has been within tolerance or beyond."""
-    within = 1 if model.real[SLOWEST] <= abs(speed) <= model.real[FASTEST] else 0
-    if clock[SINCE] == 0 or within != clock[WITHIN]:
-        clock[SINCE], clock[WITHIN] = stamp, within
-    patience = model.ns[SETTLE]
-    if within == 0 and clock[TRACKING] == IS_STARTING:
+    within = 1 if model.slowest <= abs(speed) <= model.fastest else 0
+    if clock.tolerance_since_ns == 0 or within != clock.in_tolerance:
+        clock.tolerance_since_ns, clock.in_tolerance = stamp, within
+    patience = model.settle_ns
+    if within == 0 and clock.tracking == IS_STARTING:
         patience *= _PATIENCE
-    if stamp - clock[SINCE] >= patience:
-        clock[TRACKING] = IS_IN_STEP if within != 0 else IS_OUT_OF_STEP
+    if stamp - clock.tolerance_since_ns >= patience:
+        clock.tracking = IS_IN_STEP if within != 0 else IS_OUT_OF_STEP
 
 
 @kernel
-def _stops(model, state, stamp, target):
-    """Whether the crank is at rest at a knot; changes what was known of that."""
-    clock, least = state.clock, model.real[STOP_SPEED]
-    if clock[RESTS] != 0:
-        if abs(target[1]) > 2.0 * least or abs(target[0] - state.target[0]) > _RESTING:
-            clock[SLOW_SINCE], clock[SINCE], clock[TRACKING] = 0, 0, IS_STARTING
+def _stops(model, state, stamp, node):
+    """Whether the crank is at rest at a spline node; changes what was known of that."""
+    clock, least = state.clock, model.stop_speed
+    if clock.at_rest != 0:
+        if abs(node.speed) > 2.0 * least or abs(node.angle - state.node.angle) > _RESTING:
+            clock.slow_since_ns, clock.tolerance_since_ns, clock.tracking = 0, 0, IS_STARTING
             return False
         return True
-    if abs(target[1]) > least:
-        clock[SLOW_SINCE] = 0
-    elif clock[SLOW_SINCE] == 0:
-        clock[SLOW_SINCE] = stamp
-    return clock[SLOW_SINCE] != 0 and stamp - clock[SLOW_SINCE] >= model.ns[STOP_HOLD]
+    if abs(node.speed) > least:
+        clock.slow_since_ns = 0
+    elif clock.slow_since_ns == 0:
+        clock.slow_since_ns = stamp
+    return clock.slow_since_ns != 0 and stamp - clock.slow_since_ns >= model.stop_hold_ns
 
 
 @kernel
-def _tell_direction(model, state, stamp, speed, steps, n):
-    """Note which way the crank turns, and tell where that changes."""
+def _report_direction(model, state, stamp, speed, steps, n):
+    """Note which way the crank turns, and report where that changes."""
     clock = state.clock
-    if abs(speed) > model.real[STOP_SPEED]:
+    if abs(speed) > model.stop_speed:
         direction = 1 if speed > 0.0 else -1
-        if clock[DIRECTION] == -direction:
-            state.counts[REVERSALS] += 1
-            n = add_step(steps, n, TELL, stamp, stamp, REVERSED)
-        clock[DIRECTION] = direction
+        if clock.direction == -direction:
+            state.counts.reversals += 1
+            n = add_step(steps, n, REPORT, stamp, stamp, REVERSED)
+        clock.direction = direction
     return n
 
 
 @kernel
 def _bridged(state, spline_node):
-    """Time [ns] of bridged gaps up to a knot."""
+    """Time [ns] of bridged gaps up to a spline node."""
     total = 0
-    for j in range(state.clock[HEAD], spline_node + 1):
-        if state.queue_kind[j] == CRANK and state.queue[j, BRIDGED] > 0.0:
-            total += round(1.0e9 * state.queue[j, STEP])
+    for j in range(state.clock.head, spline_node + 1):
+        row = state.queue[j]
+        if row.kind == CRANK and row.bridged != 0:
+            total += round(1.0e9 * row.step)
     return total
 
 
 @kernel
-def _move(model, state, spline_node, stamp, out_target, steps, n):
-    """Steps that bring the leg from the last knot to the next: it moves, or it rests."""
-    clock, rested = state.clock, state.clock[RESTS] != 0
-    rests = _stops(model, state, stamp, out_target)
+def _move(model, state, spline_node, stamp, steps, n):
+    """Steps that bring the leg from the last spline node to the next: it moves, or it rests."""
+    clock, ahead, rested = state.clock, state.ahead, state.clock.at_rest != 0
+    rests = _stops(model, state, stamp, ahead)
     if rests:
-        out_target[1], out_target[2] = 0.0, 0.0
-    begin = clock[LAST_SPLINE_NODE]
+        ahead.speed, ahead.acceleration = 0.0, 0.0
+    begin = clock.last_node_ns
     if rested:
-        # a rest is told only up to a while before now, which is time for a smooth start
-        begin = max(clock[RESTED], stamp - model.ns[RUN_UP])
-        if begin > clock[RESTED]:
-            state.counts[STANDING_NS] += begin - clock[RESTED]
-            n = add_step(steps, n, REST, clock[RESTED], begin, 0)
-            clock[RESTED] = begin
+        # a rest is reported only up to a while before now, which is time for a smooth start
+        begin = max(clock.rested_ns, stamp - model.run_up_ns)
+        if begin > clock.rested_ns:
+            state.counts.standing_ns += begin - clock.rested_ns
+            n = add_step(steps, n, REST, clock.rested_ns, begin, 0)
+            clock.rested_ns = begin
         if rests:
-            out_target[0] = state.target[0]
+            ahead.angle = state.node.angle
             return n
-        n = add_step(steps, n, TELL, begin, begin, MOVING)
-        clock[RESTS] = 0
+        n = add_step(steps, n, REPORT, begin, begin, MOVING)
+        clock.at_rest = 0
     bridged = _bridged(state, spline_node)
-    state.counts[BRIDGED_NS] += bridged
-    i = n
+    state.counts.bridged_ns += bridged
+    move = steps[n]
     n = add_step(steps, n, MOVE, begin, stamp, 0)
-    steps.what[i, TURNS], steps.what[i, BRIDGE_NS] = clock[TURN_COUNT], bridged
-    join_smoothly(state.target, out_target, 1.0e-9 * (stamp - begin), steps.motion[i])
+    move.turns, move.bridged_ns = clock.turns, bridged
+    join_smoothly(state.node, ahead, 1.0e-9 * (stamp - begin), move.motion)
     if rests:
-        clock[RESTS], clock[RESTED], clock[TRACKING] = 1, stamp, IS_STOPPED
-        n = add_step(steps, n, TELL, stamp, stamp, STOPPED)
+        clock.at_rest, clock.rested_ns, clock.tracking = 1, stamp, IS_STOPPED
+        n = add_step(steps, n, REPORT, stamp, stamp, STOPPED)
     return n
 
 
 @kernel
-def reach_spline_nodes(model, state, out_target, steps, n):
-    """Go on to all knots that can be reached; steps from index n on, returns their number."""
-    clock = state.clock
+def reach_spline_nodes(model, state, steps, n):
+    """Go on to all spline nodes that can be reached; steps from index n on, returns their number."""
+    clock, node, ahead, largest = state.clock, state.node, state.ahead, model.largest_speed
     while True:
         spline_node = _next_spline_node(model, state)
         if spline_node < 0:
             return n
-        stamp = state.queue_stamp[spline_node]
-        smooth(state.queue_kind, state.queue, spline_node, clock[TAIL], out_target)
-        largest = model.real[LARGEST_SPEED]
-        if not (abs(out_target[1]) <= largest and abs(out_target[2]) <= largest**2):
+        stamp = state.queue[spline_node].stamp_ns
+        smooth(state.queue, spline_node, clock.tail, ahead)
+        if not (abs(ahead.speed) <= largest and abs(ahead.acceleration) <= largest**2):
             return lose(state, stamp, LOST_BY_OUTLIERS, steps, n)
-        _drop_turns(state, out_target)
-        if clock[FOLLOWED] == 0:
-            n = look_up_to(state, spline_node, steps, n)
-            i = n
+        _drop_turns(state)
+        if clock.followed == 0:
+            n = evaluate_up_to(state, spline_node, steps, n)
+            start = steps[n]
             n = add_step(steps, n, START, stamp, stamp, 0)
-            for c in range(3):
-                steps.motion[i, c] = out_target[c]
-            steps.what[i, TURNS] = clock[TURN_COUNT]
-            state.counts[UNMONITORED_NS] += max(0, stamp - clock[OUT_SINCE])
-            clock[FOLLOWED] = 1
+            start.motion[0], start.motion[1] = ahead.angle, ahead.speed
+            start.motion[2] = ahead.acceleration
+            start.turns = clock.turns
+            state.counts.unmonitored_ns += max(0, stamp - clock.out_since_ns)
+            clock.followed = 1
         else:
-            n = _move(model, state, spline_node, stamp, out_target, steps, n)
-        if clock[RESTS] == 0:
-            n = _tell_direction(model, state, stamp, out_target[1], steps, n)
-            _evaluate(model, clock, stamp, out_target[1])
-        for i in range(3):
-            state.target[i] = out_target[i]
-        clock[LAST_SPLINE_NODE] = stamp
-        n = look_up_to(state, spline_node + 1, steps, n)
+            n = _move(model, state, spline_node, stamp, steps, n)
+        if clock.at_rest == 0:
+            n = _report_direction(model, state, stamp, ahead.speed, steps, n)
+            _evaluate_speed(model, clock, stamp, ahead.speed)
+        node.angle, node.speed, node.acceleration = ahead.angle, ahead.speed, ahead.acceleration
+        clock.last_node_ns = stamp
+        n = evaluate_up_to(state, spline_node + 1, steps, n)

@@ -10,53 +10,63 @@ from hypothesis import strategies as st
 from numpy.polynomial import Polynomial
 
 from leg_wear_monitor.mechanism.ideal import TURN
-from leg_wear_monitor.twin import steps as told
 from leg_wear_monitor.twin.sample import CRANK, TORQUE, Samples, gait_samples
 from leg_wear_monitor.twin.settings import TrackerSettings
-from leg_wear_monitor.twin.steps import BEGIN, CODE, END, EXTRA, LEAVE, LOOK, MOVE, REST, START, TELL, TURNS
-from leg_wear_monitor.twin.tracker import state as at
+from leg_wear_monitor.twin.steps import (
+    EVALUATE,
+    LEAVE,
+    LOST_BY_JUMP,
+    LOST_BY_OUTLIERS,
+    LOST_IN_GAP,
+    MOVE,
+    MOVING,
+    REPORT,
+    REST,
+    REVERSED,
+    START,
+    STEP,
+    STOPPED,
+    Steps,
+)
 from leg_wear_monitor.twin.tracker.tracker import CrankTracker
 
 START_NS = 1_700_000_000_123_456_789
 S = 1_000_000_000
 
 
-class Told(NamedTuple):
-    """All steps of a tracker: what (m, 6) and motion (m, 6)."""
+class Reported(NamedTuple):
+    """All steps of a tracker, (m,) records of `STEP`."""
 
-    what: np.ndarray
-    motion: np.ndarray
+    steps: Steps
 
-    def of(self, code: int) -> np.ndarray:
-        return self.what[self.what[:, CODE] == code]
+    def of(self, code: int) -> Steps:
+        return self.steps[self.steps["code"] == code]
 
     def motion_at(self, moments: int = 5) -> np.ndarray:
         """Time since START_NS [s], angle, speed, acceleration (4, n) at some moments of every piece."""
         rows = []
-        for what, motion in zip(self.what, self.motion, strict=True):
-            if what[CODE] == MOVE:
-                piece = Polynomial(motion)
-                for tau in np.linspace(0.0, 1.0e-9 * (what[END] - what[BEGIN]), moments):
-                    since = 1.0e-9 * (what[BEGIN] - START_NS) + tau
-                    angle = TURN * what[TURNS] + piece(tau)
-                    rows.append((since, angle, piece.deriv()(tau), piece.deriv(2)(tau)))
+        for step in self.of(MOVE):
+            piece = Polynomial(step["motion"])
+            for tau in np.linspace(0.0, 1.0e-9 * (step["end_ns"] - step["begin_ns"]), moments):
+                since = 1.0e-9 * (step["begin_ns"] - START_NS) + tau
+                angle = TURN * step["turns"] + piece(tau)
+                rows.append((since, angle, piece.deriv()(tau), piece.deriv(2)(tau)))
         return np.array(rows).T
 
 
-def track(blocks: Iterable[Samples], tracker: CrankTracker | None = None) -> Told:
+def track(blocks: Iterable[Samples], tracker: CrankTracker | None = None) -> Reported:
     tracker = tracker or CrankTracker(TrackerSettings())
-    what, motion = [np.zeros((0, 6), dtype=np.int64)], [np.zeros((0, 6))]
+    found = [np.zeros(0, STEP)]
     for block in blocks:
         for steps, n in tracker.update(block):
-            what.append(steps.what[:n].copy())
-            motion.append(steps.motion[:n].copy())
-    return Told(np.concatenate(what), np.concatenate(motion))
+            found.append(steps[:n].copy())
+    return Reported(np.concatenate(found))
 
 
-def assert_same(one: Told, other: Told) -> None:
+def assert_same(one: Reported, other: Reported) -> None:
     """Bit for bit."""
-    np.testing.assert_array_equal(one.what, other.what)
-    np.testing.assert_array_equal(one.motion, other.motion)
+    for name in STEP.names or ():
+        np.testing.assert_array_equal(one.steps[name], other.steps[name], err_msg=name)
 
 
 def cut(samples: Samples, at: Iterable[int]) -> list[Samples]:
@@ -101,18 +111,20 @@ def test_order_and_duplicates_within_the_window_change_nothing(gait, seed, late_
     shuffled = twice[np.argsort(arrival, kind="stable")]
     tracker = CrankTracker(TrackerSettings())
     assert_same(track([shuffled], tracker), track([samples]))
-    assert tracker.state.counts[at.DUPLICATES] == len(twice) - len(samples)
-    assert tracker.state.counts[at.LATE] == 0
+    assert tracker.state.counts.duplicates == len(twice) - len(samples)
+    assert tracker.state.counts.late == 0
 
 
-def assert_all_but_the_first_are_used(steps: Told, tracker: CrankTracker, whole: Told, late_s: float) -> None:
+def assert_all_but_the_first_are_used(
+    steps: Reported, tracker: CrankTracker, whole: Reported, late_s: float
+) -> None:
     """The motion is the same as far as it goes; torques are late until it is known that they come late."""
-    late = tracker.state.counts[at.LATE]
+    late = tracker.state.counts.late
     assert late <= 200.0 * late_s + 1
     moves = steps.of(MOVE)
     np.testing.assert_array_equal(moves, whole.of(MOVE)[: len(moves)])
-    looked = len(steps.of(LOOK)) + late
-    assert looked >= len(whole.of(LOOK)) - 2 * 200.0 * late_s - 2
+    looked = len(steps.of(EVALUATE)) + late
+    assert looked >= len(whole.of(EVALUATE)) - 2 * 200.0 * late_s - 2
 
 
 @pytest.mark.parametrize("late_s", [0.05, 0.3])
@@ -144,7 +156,7 @@ def test_restored_it_goes_on_bit_for_bit(gait, where):
     for one in (tracker, other):
         one.restore(snapshot)
         after = track([samples[where:]], one)
-        assert_same(Told(*(np.concatenate(pair) for pair in zip(before, after, strict=True))), whole)
+        assert_same(Reported(np.concatenate([before.steps, after.steps])), whole)
 
 
 @settings(max_examples=20)
@@ -201,15 +213,15 @@ def test_a_crank_at_rest_stays_put(gait):
     """It rests from its stop to its next start, and no noise moves it meanwhile."""
     tracker = CrankTracker(TrackerSettings())
     steps = track([gait(10.0, angle=start_stop_reverse)], tracker)
-    happened = [(row[EXTRA], round(1.0e-9 * (row[BEGIN] - START_NS), 1)) for row in steps.of(TELL)]
-    assert [what for what, _ in happened] == [told.STOPPED, told.MOVING, told.REVERSED, told.STOPPED]
+    happened = [(row["detail"], round(1.0e-9 * (row["begin_ns"] - START_NS), 1)) for row in steps.of(REPORT)]
+    assert [what for what, _ in happened] == [STOPPED, MOVING, REVERSED, STOPPED]
     assert happened[0][1] == pytest.approx(3.3, abs=0.15)
     assert happened[1][1] == pytest.approx(5.0, abs=0.15)
-    rested = (steps.of(REST)[:, END] - steps.of(REST)[:, BEGIN]).sum()
-    assert rested == tracker.state.counts[at.STANDING_NS]
+    rested = (steps.of(REST)["end_ns"] - steps.of(REST)["begin_ns"]).sum()
+    assert rested == tracker.state.counts.standing_ns
     assert 3.0 * S < rested < 3.5 * S
     moves = steps.of(MOVE)
-    resting = (moves[:, BEGIN] > START_NS + 3.6 * S) & (moves[:, END] < START_NS + 4.8 * S)
+    resting = (moves["begin_ns"] > START_NS + 3.6 * S) & (moves["end_ns"] < START_NS + 4.8 * S)
     assert not resting.any()
 
 
@@ -221,8 +233,8 @@ def test_gaps_are_bridged_and_marked(gait, gap_s):
     steps = track([samples[(since < 2.0) | (since >= 2.0 + gap_s)]], tracker)
     time, angle, _, _ = steps.motion_at()
     np.testing.assert_allclose(angle, TURN * time + 0.5, atol=0.02 + 0.3 * gap_s**3)
-    assert tracker.state.counts[at.GAPS] == 1
-    assert tracker.state.counts[at.BRIDGED_NS] == pytest.approx(S * gap_s, abs=0.011 * S)
+    assert tracker.state.counts.gaps_bridged == 1
+    assert tracker.state.counts.bridged_ns == pytest.approx(S * gap_s, abs=0.011 * S)
     assert not len(steps.of(LEAVE))
 
 
@@ -231,7 +243,7 @@ def test_slow_samples_are_no_gaps(gait, rate_hz):
     tracker = CrankTracker(TrackerSettings())
     time, angle, _, _ = track([gait(10.0, rate_hz)], tracker).motion_at()
     np.testing.assert_allclose(angle, TURN * time + 0.5, atol=0.01)
-    assert tracker.state.counts[at.GAPS] == 0
+    assert tracker.state.counts.gaps_bridged == 0
 
 
 @given(shift_ns=st.integers(-START_NS + 1, 7_000_000_000_000_000_000))
@@ -241,8 +253,8 @@ def test_the_motion_does_not_depend_on_when_it_is(gait, shift_ns):
     moved = samples.copy()
     moved["stamp_ns"] += shift_ns
     here, there = track([samples]), track([moved])
-    np.testing.assert_array_equal(there.motion, here.motion)
-    np.testing.assert_array_equal(there.of(MOVE)[:, BEGIN], here.of(MOVE)[:, BEGIN] + shift_ns)
+    np.testing.assert_array_equal(there.steps["motion"], here.steps["motion"])
+    np.testing.assert_array_equal(there.of(MOVE)["begin_ns"], here.of(MOVE)["begin_ns"] + shift_ns)
 
 
 def test_longer_gaps_are_not_made_up(gait):
@@ -252,11 +264,11 @@ def test_longer_gaps_are_not_made_up(gait):
     tracker = CrankTracker(TrackerSettings())
     steps = track([samples[(since < 2.0) | (since >= 4.0)]], tracker)
     assert len(steps.of(START)) == 2
-    assert list(steps.of(LEAVE)[:, EXTRA]) == [told.LOST_IN_GAP]
+    assert list(steps.of(LEAVE)["detail"]) == [LOST_IN_GAP]
     moves = steps.of(MOVE)
-    moved = (moves[:, END] - moves[:, BEGIN]).sum()
-    first, last = steps.of(START)[0, BEGIN], moves[-1, END]
-    unmonitored = tracker.state.counts[at.UNMONITORED_NS]
+    moved = (moves["end_ns"] - moves["begin_ns"]).sum()
+    first, last = steps.of(START)[0]["begin_ns"], moves[-1]["end_ns"]
+    unmonitored = tracker.state.counts.unmonitored_ns
     assert moved + unmonitored - (first - START_NS) == last - first
     assert unmonitored == pytest.approx(2.3 * S, abs=0.1 * S)
 
@@ -268,21 +280,21 @@ def test_a_gap_of_the_crank_alone_is_one_too(gait):
     since = 1.0e-9 * (samples["stamp_ns"] - START_NS)
     steps = track([samples[(samples["kind"] == TORQUE) | (since < 2.0) | (since >= 4.0)]])
     assert len(steps.of(START)) == 2
-    assert list(steps.of(LEAVE)[:, EXTRA]) == [told.LOST_IN_GAP]
-    looked = steps.of(LOOK)
-    assert (np.diff(looked[:, BEGIN]) >= 0).all()
-    assert ((looked[:, BEGIN] > START_NS + 2.6 * S) & (looked[:, BEGIN] < START_NS + 3.9 * S)).sum() > 200
+    assert list(steps.of(LEAVE)["detail"]) == [LOST_IN_GAP]
+    looked = steps.of(EVALUATE)
+    assert (np.diff(looked["begin_ns"]) >= 0).all()
+    assert ((looked["begin_ns"] > START_NS + 2.6 * S) & (looked["begin_ns"] < START_NS + 3.9 * S)).sum() > 200
 
 
 @pytest.mark.plain
 def test_stamps_that_jump_back_start_a_new_time_base(gait):
     tracker = CrankTracker(TrackerSettings())
     steps = track([gait(3.0), gait(3.0, start_ns=START_NS - 1000 * S)], tracker)
-    assert tracker.state.counts[at.JUMPS] == 1
-    assert list(steps.of(LEAVE)[:, EXTRA]) == [told.LOST_BY_JUMP]
+    assert tracker.state.counts.backward_jumps == 1
+    assert list(steps.of(LEAVE)["detail"]) == [LOST_BY_JUMP]
     assert len(steps.of(START)) == 2
-    assert tracker.state.counts[at.UNMONITORED_NS] == pytest.approx(0.2 * S, abs=0.05 * S)
-    assert steps.of(MOVE)[-1, END] > START_NS - 997.3 * S
+    assert tracker.state.counts.unmonitored_ns == pytest.approx(0.2 * S, abs=0.05 * S)
+    assert steps.of(MOVE)[-1]["end_ns"] > START_NS - 997.3 * S
 
 
 @settings(max_examples=30)
@@ -295,7 +307,7 @@ def test_single_stray_stamps_change_nothing(gait, where, stamp):
     stray = np.insert(samples, where, gait_samples([stamp], crank_angle_rad=1.0)[0])
     tracker = CrankTracker(TrackerSettings())
     assert_same(track([stray], tracker), track([samples]))
-    assert tracker.state.counts[at.STRAY] + tracker.state.counts[at.DUPLICATES] == len(where)
+    assert tracker.state.counts.stray_stamps + tracker.state.counts.duplicates == len(where)
 
 
 @pytest.mark.plain
@@ -306,11 +318,11 @@ def test_outliers_change_little_and_a_crank_that_is_elsewhere_is_found_again(gai
     tracker = CrankTracker(TrackerSettings())
     time, angle, _, _ = track([jumped], tracker).motion_at()
     np.testing.assert_allclose(angle, TURN * time + 0.5, atol=2.0e-3)
-    assert tracker.state.counts[at.OUTLIERS] == len(samples[100::50])
+    assert tracker.state.counts.outliers == len(samples[100::50])
     jumped = samples.copy()
     jumped["crank_angle_rad"][600:] += 1.5
     steps = track([jumped])
-    assert list(steps.of(LEAVE)[:, EXTRA]) == [told.LOST_BY_OUTLIERS]
+    assert list(steps.of(LEAVE)["detail"]) == [LOST_BY_OUTLIERS]
     assert len(steps.of(START)) == 2
 
 
@@ -327,7 +339,7 @@ def test_velocity_helps_where_it_is_right_and_is_dropped_where_it_is_not(gait):
     ]
     assert scatter[1] < 0.8 * scatter[0]
     assert scatter[2] == pytest.approx(scatter[0], rel=1.0e-9)
-    assert tracker.state.counts[at.VELOCITY_OUTLIERS] > 990
+    assert tracker.state.counts.velocity_outliers > 990
 
 
 @pytest.mark.parametrize("what", ["random", "coarse noise", "ten times too fast", "steps"])
@@ -343,7 +355,7 @@ def test_what_is_no_gait_moves_no_leg(gait, what):
     }[what]
     steps = track([samples])
     moves = steps.of(MOVE)
-    assert (moves[:, END] - moves[:, BEGIN]).sum() < 0.1 * S
+    assert (moves["end_ns"] - moves["begin_ns"]).sum() < 0.1 * S
 
 
 def test_a_fifth_of_the_samples_may_be_nonsense(gait):
@@ -384,17 +396,18 @@ def test_no_sequence_of_samples_breaks_it(rows):
         sample["crank_angle_rad"], sample["crank_velocity_radps"], sample["torque_nm"] = values
     tracker = CrankTracker(TrackerSettings())
     steps = track([samples], tracker)
-    assert np.isfinite(steps.motion[steps.what[:, CODE] != LOOK]).all()
+    assert np.isfinite(steps.steps["motion"]).all()
     moves = steps.of(MOVE)
-    assert (moves[:, BEGIN] < moves[:, END]).all()
+    assert (moves["begin_ns"] < moves["end_ns"]).all()
     counts, clock = tracker.state.counts, tracker.state.clock
-    dropped = [at.DUPLICATES, at.LATE, at.STRAY, at.OUTLIERS]
-    settled = counts[[at.CRANKS, *dropped]].sum() + counts[at.FAULTY :].sum()
-    assert counts[at.RECEIVED] == len(rows)
-    torques = len(rows) - (settled + clock[at.WAITING] + (clock[at.CANDIDATE] != 0))
+    dropped = counts.duplicates + counts.late + counts.stray_stamps + counts.outliers
+    settled = counts.crank_used + dropped + counts.faults.sum()
+    assert counts.received == len(rows)
+    waiting = clock.waiting + (tracker.state.candidate.stamp_ns != 0)
+    torques = len(rows) - (settled + waiting)
     # a crank sample may bring a torque, which counts as one, too
     brought = np.isfinite(samples["torque_nm"]) & (samples["kind"] == CRANK)
-    assert 0 <= torques <= counts[at.TORQUES] <= torques + min(counts[at.CRANKS], brought.sum())
+    assert 0 <= torques <= counts.torque_used <= torques + min(counts.crank_used, brought.sum())
 
 
 @pytest.mark.parametrize(

@@ -21,8 +21,8 @@ def write_walk(path: Path, seconds: int) -> None:
     """A steady gait with an encoder's noise, and the ideal leg's torque."""
     rng = np.random.default_rng(1)
     ideal = lw.simulate(lw.load_mechanism("bionic_leg"), clearances=[], cycles=1, trace=720).trace
-    order = np.argsort(ideal["crank_angle_rad"])
-    angles, torques = (np.asarray(ideal[name])[order] for name in ("crank_angle_rad", "drive_torque_nm"))
+    order = np.argsort(ideal.crank_angle_rad)
+    angles, torques = ideal.crank_angle_rad[order], ideal.drive_torque_nm[order]
     with McapWriter(path, chunk_bytes=CHUNK_BYTES) as writer:
         joints = writer.channel("/joint_states", encode.JOINT_STATE)
         torque = writer.channel("/drive_torque", encode.WRENCH_STAMPED)

@@ -12,7 +12,7 @@ import numpy as np
 
 from leg_wear_monitor import load_mechanism
 from leg_wear_monitor.dynamics.clearance.run import ClearanceRun
-from leg_wear_monitor.dynamics.result import energy_balance, joint_statistics
+from leg_wear_monitor.dynamics.result.statistics import energy_balance, joint_statistics
 from leg_wear_monitor.dynamics.run.run_statistics import ARCHARD, new_run_statistics
 from leg_wear_monitor.dynamics.simulation import prepare
 from leg_wear_monitor.mechanism.spec import Mechanism
@@ -29,8 +29,8 @@ def hastened(leg: Mechanism, cycles: int) -> Mechanism:
     figures = joint_statistics(setup, statistics, setup.surfaces.depth, 20.0)
     clearances = dict(leg.clearances)
     for name in JOINTS:
-        depth = figures[name]["wear_depth_m_per_cycle"]
-        rate = (depth["bushing_max"] + depth["journal_max"]) / leg.clearances[name].wear_coefficient[0]
+        depth = figures[name].wear_depth_m_per_cycle
+        rate = (depth.bushing_max + depth.journal_max) / leg.clearances[name].wear_coefficient[0]
         hasty = leg.clearances[name].radial_clearance / cycles / rate
         clearances[name] = attrs.evolve(leg.clearances[name], wear_coefficient=(hasty, hasty))
     return attrs.evolve(leg, clearances=clearances)
@@ -51,7 +51,7 @@ def main() -> None:
         statistics, stored = new_run_statistics(len(leg.joints)), run.stored_energy
         run.advance(float(done + chunk), statistics)
         balance = energy_balance(statistics, stored, run.stored_energy)
-        residuals.append(balance["residual"] / (balance["friction_loss"] + balance["contact_loss"]))
+        residuals.append(balance.residual / (balance.friction_loss + balance.contact_loss))
         total += statistics.integral[:, ARCHARD]
         if (done // chunk) % 10 == 9:
             largest = setup.contacts.clearance + setup.surfaces.depth.sum(axis=1).max(axis=1)

@@ -11,7 +11,15 @@ TYPE_CHECKING = False  # as typing has it, without the time to import that
 if TYPE_CHECKING:
     from typing import Any
 
-    from leg_wear_monitor.dynamics.result import SimulationResult
+    from leg_wear_monitor.dynamics.result.parts import (
+        EnergyBalance,
+        Impact,
+        JointResult,
+        ToeResult,
+        TorqueResult,
+        Trace,
+    )
+    from leg_wear_monitor.dynamics.result.simulation_result import SimulationResult
     from leg_wear_monitor.dynamics.simulation import simulate
     from leg_wear_monitor.mechanism.loader import load_mechanism
     from leg_wear_monitor.mechanism.spec import Mechanism
@@ -22,10 +30,16 @@ if TYPE_CHECKING:
     from leg_wear_monitor.playback.replay import ReplayResult, replay
 
 _HOME = {
+    "EnergyBalance": "dynamics.result.parts",
+    "Impact": "dynamics.result.parts",
+    "JointResult": "dynamics.result.parts",
     "Mechanism": "mechanism.spec",
     "MonitorConfig": "monitor.config.settings",
     "ReplayResult": "playback.replay",
-    "SimulationResult": "dynamics.result",
+    "SimulationResult": "dynamics.result.simulation_result",
+    "ToeResult": "dynamics.result.parts",
+    "TorqueResult": "dynamics.result.parts",
+    "Trace": "dynamics.result.parts",
     "WearMonitor": "monitor.wear_monitor",
     "load_config": "monitor.config.parameter_file",
     "load_mechanism": "mechanism.loader",
@@ -37,12 +51,18 @@ _HOME = {
 __all__ = [
     "AssemblyError",
     "ConfigError",
+    "EnergyBalance",
+    "Impact",
+    "JointResult",
     "LegWearError",
     "Mechanism",
     "MonitorConfig",
     "ReplayResult",
     "SimulationError",
     "SimulationResult",
+    "ToeResult",
+    "TorqueResult",
+    "Trace",
     "WearMonitor",
     "load_config",
     "load_mechanism",

@@ -7,7 +7,7 @@ import numpy as np
 from leg_wear_monitor import load_mechanism
 from leg_wear_monitor.dynamics.full.model import BAUMGARTE
 from leg_wear_monitor.dynamics.full.run import TOLERANCE_M, FullRun
-from leg_wear_monitor.dynamics.result import energy_balance
+from leg_wear_monitor.dynamics.result.statistics import energy_balance
 from leg_wear_monitor.dynamics.run.run_statistics import (
     ARCHARD,
     CONTACT,
@@ -80,7 +80,9 @@ def clearance_sets(runs: int, count: int) -> None:
     )
     for clearance_joints, energies in balances.items():
         keys = ("friction_loss", "contact_loss", "residual")
-        friction, contact, residual = (np.array([energy[key] for energy in energies]) for key in keys)
+        friction, contact, residual = (
+            np.array([getattr(energy, key) for energy in energies]) for key in keys
+        )
         largest, fraction = np.abs(residual).max(), (np.abs(residual) / (friction + contact)).max()
         cells = f"{friction.mean():.4f}", f"{contact.mean():.4f}", f"{largest:.1e}", f"{fraction:.1e}"
         row(", ".join(clearance_joints), *cells)

@@ -93,15 +93,11 @@ class Case(NamedTuple):
 
     def _samples(self, results: list[SimulationResult]) -> Samples:
         joints = [
-            [[result.joints[name][key] for key in FIGURES] for name in self.clearance_joints]
+            [[getattr(result.joints[name], key) for key in FIGURES] for name in self.clearance_joints]
             for result in results
         ]
-        zones = [
-            [result.joints[name]["wear_zone_deg"] for name in self.clearance_joints] for result in results
-        ]
-        return Samples(
-            np.array(joints), np.array(zones), np.array([r.drive_torque_nm["rms"] for r in results])
-        )
+        zones = [[result.joints[name].wear_zone_deg for name in self.clearance_joints] for result in results]
+        return Samples(np.array(joints), np.array(zones), np.array([r.drive_torque_nm.rms for r in results]))
 
 
 def row(*cells: str) -> None:

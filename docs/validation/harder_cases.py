@@ -92,8 +92,8 @@ def results(case: Case, model: str, runs: int, cycles: int) -> list[SimulationRe
 
 def losses(result: SimulationResult) -> tuple[float, float]:
     """Losses [J/cycle], and what does not add up over them."""
-    lost = result.energy_j["friction_loss"] + result.energy_j["contact_loss"]
-    return lost / result.cycles, abs(result.energy_j["residual"]) / lost
+    lost = result.energy_j.friction_loss + result.energy_j.contact_loss
+    return lost / result.cycles, abs(result.energy_j.residual) / lost
 
 
 def compare_all(names: Iterable[str], runs: int, cycles: int) -> list[Comparison]:
@@ -105,7 +105,9 @@ def compare_all(names: Iterable[str], runs: int, cycles: int) -> list[Comparison
         balances[name] = [np.array([losses(one) for one in each]).T for each in (full, other)]
         for joint in CASES[name].clearance_joints:
             figures = [
-                compare(*(np.array([one.joints[joint][key] for one in each]) for each in (full, other)))
+                compare(
+                    *(np.array([getattr(one.joints[joint], key) for one in each]) for each in (full, other))
+                )
                 for key in FIGURES
             ]
             row(name, joint, *map(cell, figures, DIGITS))

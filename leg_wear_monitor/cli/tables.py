@@ -2,13 +2,14 @@
 
 import math
 from collections.abc import Iterator
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING
 
 from rich.console import Console
 from rich.table import Table
 
 if TYPE_CHECKING:
-    from leg_wear_monitor.dynamics.result import SimulationResult
+    from leg_wear_monitor.dynamics.result.parts import EnergyBalance, JointResult, ToeResult, TorqueResult
+    from leg_wear_monitor.dynamics.result.simulation_result import SimulationResult
     from leg_wear_monitor.wear.surfaces import Surfaces
 
 _MODELS = {
@@ -18,103 +19,102 @@ _MODELS = {
 }
 
 
-def print_result(record: dict[str, Any], result: "SimulationResult") -> None:
+def print_result(result: "SimulationResult", wall_s: float) -> None:
     """Print the result of a simulation.
 
     Parameters
     ----------
-    record : dict
-        What ``--json`` writes.
     result : SimulationResult
+    wall_s : float
+        What it took [s].
     """
     console = Console(highlight=False)
-    console.print(f"\n[bold]{record['mechanism']}[/bold]: {_settings(record, result)}\n")
-    console.print(joint_table(record))
+    console.print(f"\n[bold]{result.mechanism}[/bold]: {_settings(result)}\n")
+    console.print(joint_table(result))
     summary = Table.grid(padding=(0, 2), pad_edge=False)
-    for label, text in _summary(record, result):
+    for label, text in _summary(result, wall_s):
         summary.add_row(label, text)
     console.print()
     console.print(summary)
 
 
-def joint_table(record: dict[str, Any]) -> Table:
+def joint_table(result: "SimulationResult") -> Table:
     """Forces of every joint; contact and wear of the clearance joints."""
     table = Table(box=None, pad_edge=False, padding=(0, 1), header_style="bold")
     table.add_column("\njoint")
     columns = ["mean\nN", "p99\nN", "max\nN"]
-    worn = any("wear_depth_m_per_cycle" in statistics for statistics in record["joints"].values())
-    if worn:
+    if any(joint.has_clearance for joint in result.joints.values()):
         columns += ["contact\n%", "Archard\nJ/cycle", "bushing\npm/cycle", "journal\npm/cycle", "zone\ndeg"]
     for column in columns:
         table.add_column(column, justify="right")
-    for name, statistics in record["joints"].items():
-        cells = [figure(statistics[f"{key}_force_n"]) for key in ("mean", "p99", "max")]
-        table.add_row(name, *cells, *_wear_cells(statistics))
+    for name, joint in result.joints.items():
+        forces = (joint.mean_force_n, joint.p99_force_n, joint.max_force_n)
+        table.add_row(name, *map(figure, forces), *_wear_cells(joint))
     return table
 
 
-def _wear_cells(statistics: dict[str, Any]) -> list[str]:
-    if "wear_depth_m_per_cycle" not in statistics:
+def _wear_cells(joint: "JointResult") -> list[str]:
+    depth, zone = joint.wear_depth_m_per_cycle, joint.wear_zone_deg
+    if depth is None or joint.contact_fraction is None or joint.archard_integral_j_per_cycle is None:
         return []
-    depth, zone = statistics["wear_depth_m_per_cycle"], statistics["wear_zone_deg"]
     return [
-        f"{100.0 * statistics['contact_fraction']:.1f}",
-        figure(statistics["archard_integral_j_per_cycle"]),
-        figure(1.0e12 * depth["bushing_max"]),
-        figure(1.0e12 * depth["journal_max"]),
+        f"{100.0 * joint.contact_fraction:.1f}",
+        figure(joint.archard_integral_j_per_cycle),
+        figure(1.0e12 * depth.bushing_max),
+        figure(1.0e12 * depth.journal_max),
         "-" if zone is None else f"{zone[0] % 360.0:.0f} to {zone[1] % 360.0:.0f}",
     ]
 
 
-def _settings(record: dict[str, Any], result: "SimulationResult") -> str:
+def _settings(result: "SimulationResult") -> str:
     clearance_joints = (
         f"clearance joints {', '.join(result.clearance_joints)}"
         if result.clearance_joints
         else "no clearance joint"
     )
-    model = _MODELS.get(record["model"], record["model"])
-    return f"{clearance_joints}, {model}, {record['speed_rpm']:g} rpm, {_cycles(record['cycles'])} counted"
+    model = _MODELS.get(result.model, result.model)
+    return f"{clearance_joints}, {model}, {result.speed_rpm:g} rpm, {_cycles(result.cycles)} counted"
 
 
 def _cycles(number: float) -> str:
     return "1 cycle" if number == 1.0 else f"{number:.4g} cycles"
 
 
-def _summary(record: dict[str, Any], result: "SimulationResult") -> Iterator[tuple[str, str]]:
+def _summary(result: "SimulationResult", wall_s: float) -> Iterator[tuple[str, str]]:
     """Rows of a label and a text."""
-    torque = record["drive_torque_nm"]
+    torque = result.drive_torque_nm
     if result.clearance_joints:
         yield "wear", "greatest depth; 1 pm a cycle makes 1 um in a million cycles"
         yield "zone", "holds 90 % of the bushing's wear, in angles of its own body"
-    names = ("mean", "rms", "min", "max", "p99")
-    signed = ", ".join(f"{name} {figure(torque[name])}" for name in names)
-    yield "drive torque", f"{signed} N m; largest magnitude {figure(torque['max_abs'])} N m"
-    if result.clearance_joints and record["toe"] is not None:
-        yield "off the ideal", f"at most {_response(record['toe'], torque)}"
-    if record["energy_j"] is not None:
-        yield "energy", _energy(record["energy_j"])
+    values = {name: getattr(torque, name) for name in ("mean", "rms", "min", "max", "p99")}
+    signed = ", ".join(f"{name} {figure(value)}" for name, value in values.items())
+    yield "drive torque", f"{signed} N m; largest magnitude {figure(torque.max_abs)} N m"
+    if result.clearance_joints and result.toe is not None:
+        yield "off the ideal", f"at most {_response(result.toe, torque)}"
+    if result.energy_j is not None:
+        yield "energy", _energy(result.energy_j)
     if result.surfaces is not None and result.surfaces.feeds_back:
         yield "opened by", f"{_opened(result.surfaces, result.clearance_joints)} pm, mean (greatest)"
     yield (
         "speed",
-        f"{record['simulated_s']:.4g} s of motion in {record['wall_s']:.3g} s: "
-        f"{figure(record['real_time_factor'])} times real time",
+        f"{result.simulated_s:.4g} s of motion in {wall_s:.3g} s: "
+        f"{figure(result.simulated_s / wall_s)} times real time",
     )
 
 
-def _response(toe: dict[str, float], torque: dict[str, float]) -> str:
+def _response(toe: "ToeResult", torque: "TorqueResult") -> str:
     return (
-        f"{figure(1e3 * toe['max_position_error_m'])} mm, {figure(toe['max_velocity_error_mps'])} m/s, "
-        f"{figure(toe['max_acceleration_error_mps2'])} m/s^2 at the toe, "
-        f"{figure(torque['max_error'])} N m at the drive"
+        f"{figure(1e3 * toe.max_position_error_m)} mm, {figure(toe.max_velocity_error_mps)} m/s, "
+        f"{figure(toe.max_acceleration_error_mps2)} m/s^2 at the toe, "
+        f"{figure(torque.max_error)} N m at the drive"
     )
 
 
-def _energy(energy: dict[str, float]) -> str:
+def _energy(energy: "EnergyBalance") -> str:
     return (
-        f"work in {figure(energy['work_in'])} = stored {figure(energy['stored'])} + friction "
-        f"{figure(energy['friction_loss'])} + impacts {figure(energy['contact_loss'])} J, "
-        f"but for {figure(energy['residual'])} J"
+        f"work in {figure(energy.work_in)} = stored {figure(energy.stored)} + friction "
+        f"{figure(energy.friction_loss)} + impacts {figure(energy.contact_loss)} J, "
+        f"but for {figure(energy.residual)} J"
     )
 
 

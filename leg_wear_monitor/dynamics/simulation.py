@@ -10,14 +10,14 @@ from leg_wear_monitor.dynamics.arguments import check_kinds, given_joints, given
 from leg_wear_monitor.dynamics.clearance.run import ClearanceRun
 from leg_wear_monitor.dynamics.full.run import FullRun
 from leg_wear_monitor.dynamics.ideal_result import ideal_result
-from leg_wear_monitor.dynamics.result import (
-    SimulationResult,
+from leg_wear_monitor.dynamics.result.simulation_result import SimulationResult
+from leg_wear_monitor.dynamics.result.statistics import (
     drive_torque,
     energy_balance,
-    impact_lists,
+    first_impacts,
     joint_statistics,
     toe_errors,
-    trace_columns,
+    trace_of,
 )
 from leg_wear_monitor.dynamics.run.protocol import Setup
 from leg_wear_monitor.dynamics.run.run_statistics import new_run_statistics
@@ -92,7 +92,11 @@ def simulate(
     trace: int = 0,
     progress: Callable[[float], None] | None = None,
 ) -> SimulationResult:
-    """Move the leg and say what its clearances do.
+    """Simulate the leg: forces, drive torque and toe, and the impacts and wear in its clearance joints.
+
+    >>> result = simulate("four_bar", cycles=0.25, skip_cycles=0.0)
+    >>> wear = result.joints["B"].archard_integral_j_per_cycle
+    >>> torque = result.drive_torque_nm.rms
 
     Parameters
     ----------
@@ -119,6 +123,13 @@ def simulate(
         Samples a cycle to keep, the first at crank angle 0; 0 for none.
     progress : callable, optional
         Called with the fraction of the run that is done.
+
+    Returns
+    -------
+    SimulationResult
+        ``joints["A"]`` is a `JointResult`: forces, contact, Archard integral, wear and clearance of joint A.
+        ``drive_torque_nm``, ``energy_j``, ``toe``, ``impacts["A"]`` and ``trace`` hold the rest;
+        ``to_dict()`` gives the fields for JSON, ``to_pandas()`` tables.
 
     Raises
     ------
@@ -232,8 +243,8 @@ def _run(
         energy_j=energy_balance(statistics, stored, run.stored_energy),
         toe=toe_errors(statistics) if mechanism.toe and isinstance(mechanism.drive, SpeedDrive) else None,
         joints=joint_statistics(setup, statistics, setup.surfaces.depth - depth, turned),
-        impacts=impact_lists(setup, statistics),
-        trace=trace_columns(setup, tracer.samples) if trace else None,
+        impacts=first_impacts(setup, statistics),
+        trace=trace_of(setup, tracer.samples) if trace else None,
         clearance_joints=setup.clearance_joints,
         surfaces=setup.surfaces,
     )

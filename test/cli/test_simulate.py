@@ -10,7 +10,8 @@ from leg_wear_monitor.dynamics import simulation
 
 # names are a contract: other programs read them
 TOP = [
-    "mechanism", "model", "speed_rpm", "cycles", "wall_s", "simulated_s", "real_time_factor",
+    "schema_version", "mechanism", "model", "speed_rpm", "cycles",
+    "wall_s", "simulated_s", "real_time_factor",
     "drive_torque_nm", "energy_j", "toe", "joints", "impacts", "trace",
 ]  # fmt: skip
 TORQUE = {"mean", "rms", "min", "max", "p99", "max_abs", "max_error"}

@@ -9,7 +9,8 @@ import pytest
 
 from leg_wear_monitor import Mechanism
 from leg_wear_monitor.dynamics.full.run import TOLERANCE_M, FullRun
-from leg_wear_monitor.dynamics.result import energy_balance
+from leg_wear_monitor.dynamics.result.parts import EnergyBalance
+from leg_wear_monitor.dynamics.result.statistics import energy_balance
 from leg_wear_monitor.dynamics.run.run_statistics import (
     ARCHARD,
     CONTACT,
@@ -27,14 +28,14 @@ class Cycle:
     Attributes
     ----------
     statistics : RunStatistics
-    energy : dict of str to float
+    energy : EnergyBalance
         Balance over the cycle [J].
     depth : (k, 2) array
         Largest wear on bushing and journal of the clearance joints since the start of counting [m].
     """
 
     statistics: RunStatistics
-    energy: dict[str, float]
+    energy: EnergyBalance
     depth: np.ndarray
 
 

@@ -6,7 +6,7 @@ import pytest
 
 from leg_wear_monitor.dynamics.clearance.run import ClearanceRun
 from leg_wear_monitor.dynamics.full.run import FullRun
-from leg_wear_monitor.dynamics.result import energy_balance
+from leg_wear_monitor.dynamics.result.statistics import energy_balance
 from leg_wear_monitor.dynamics.run.run_statistics import DISSIPATION, FRICTION, POWER, new_run_statistics
 from leg_wear_monitor.dynamics.simulation import prepare
 from leg_wear_monitor.mechanism.ideal import TURN, one_cycle
@@ -19,9 +19,9 @@ def test_energy_with_clearances(leg_cycles, clearance_joints):
     """Every cycle, to a thousandth of what is lost in it: friction and contact together."""
     for cycle in leg_cycles(clearance_joints, 20).cycles:
         energy = cycle.energy
-        assert energy["friction_loss"] > 0.0
-        assert energy["contact_loss"] > 0.0
-        assert abs(energy["residual"]) < 1.0e-3 * (energy["friction_loss"] + energy["contact_loss"])
+        assert energy.friction_loss > 0.0
+        assert energy.contact_loss > 0.0
+        assert abs(energy.residual) < 1.0e-3 * (energy.friction_loss + energy.contact_loss)
 
 
 @pytest.mark.parametrize("model, cycles, bound", [(FullRun, 2, 1.0e-4), (ClearanceRun, 8, 1.0e-3)])
@@ -36,9 +36,9 @@ def test_walls_that_wear_away_take_energy_along(leg, model, cycles, bound):
     statistics, start = new_run_statistics(len(leg.joints)), run.stored_energy
     run.advance(1.0 + cycles, statistics)
     energy = energy_balance(statistics, start, run.stored_energy)
-    losses = energy["friction_loss"] + energy["contact_loss"]
-    assert energy["wear_loss"] > 4.0e-3 * losses
-    assert abs(energy["residual"]) < bound * losses
+    losses = energy.friction_loss + energy.contact_loss
+    assert energy.wear_loss > 4.0e-3 * losses
+    assert abs(energy.residual) < bound * losses
 
 
 PUSH = 290.0  # N
@@ -60,7 +60,7 @@ def test_energy_of_the_clearance_model_under_a_foot_load(leg, clearance_joints, 
     statistics, start = new_run_statistics(len(leg.joints)), run.stored_energy
     run.advance(7.0, statistics)
     energy = energy_balance(statistics, start, run.stored_energy)
-    assert abs(energy["residual"]) < 3.0e-3 * (energy["friction_loss"] + energy["contact_loss"])
+    assert abs(energy.residual) < 3.0e-3 * (energy.friction_loss + energy.contact_loss)
 
 
 def test_energy_of_the_ideal_leg(leg):

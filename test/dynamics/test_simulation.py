@@ -2,6 +2,7 @@
 
 import math
 
+import attrs
 import numpy as np
 import pytest
 
@@ -22,47 +23,45 @@ def test_without_clearances_it_is_the_ideal_cycle(leg, linkage_of):
     result = simulate(leg, clearances=(), cycles=2, trace=36)
     motion = one_cycle(linkage_of("bionic_leg"), 36, TURN)
     assert result.model == "ideal"
-    np.testing.assert_allclose(result.trace["drive_torque_nm"], np.tile(motion.drive_torque, 2), atol=1.0e-9)
+    np.testing.assert_allclose(result.trace.drive_torque_nm, np.tile(motion.drive_torque, 2), atol=1.0e-9)
     for i, name in enumerate(leg.joints):
         force = np.linalg.norm(motion.joint_force[:, i], axis=1)
-        np.testing.assert_allclose(result.trace["force_n"][name][:36], force, atol=1.0e-9)
-        assert result.joints[name]["mean_force_n"] == pytest.approx(force.mean(), rel=0.01)
-    assert result.trace["crank_angle_rad"] == pytest.approx(np.arange(72) * TURN / 36)
+        np.testing.assert_allclose(result.trace.force_n[name][:36], force, atol=1.0e-9)
+        assert result.joints[name].mean_force_n == pytest.approx(force.mean(), rel=0.01)
+    assert result.trace.crank_angle_rad == pytest.approx(np.arange(72) * TURN / 36)
 
 
 def test_backwards_the_ideal_trace_runs_backwards(leg):
     forth, back = (simulate(leg, clearances=(), cycles=1, trace=8, speed_rpm=rpm) for rpm in (60.0, -60.0))
     assert back.speed_rpm == pytest.approx(-60.0)
-    assert back.trace["crank_angle_rad"] == pytest.approx(
-        [-angle for angle in forth.trace["crank_angle_rad"]]
-    )
-    assert back.trace["toe_x_m"][1:] == pytest.approx(forth.trace["toe_x_m"][:0:-1])
+    assert back.trace.crank_angle_rad == pytest.approx(-forth.trace.crank_angle_rad)
+    assert back.trace.toe_x_m[1:] == pytest.approx(forth.trace.toe_x_m[:0:-1])
 
 
 def test_backwards_with_clearances(leg):
     result = simulate(leg, clearances=("G",), cycles=0.25, skip_cycles=0.0, speed_rpm=-60.0, trace=16, **FULL)
     assert result.speed_rpm == pytest.approx(-60.0)
-    assert result.trace["crank_angle_rad"] == pytest.approx(np.arange(4) * -TURN / 16, abs=1.0e-6)
-    assert result.joints["G"]["mean_force_n"] > 10.0
+    assert result.trace.crank_angle_rad == pytest.approx(np.arange(4) * -TURN / 16, abs=1.0e-6)
+    assert result.joints["G"].mean_force_n > 10.0
 
 
 def test_what_is_counted(worn_leg):
     assert worn_leg.cycles == pytest.approx(0.5)
     assert worn_leg.simulated_s == pytest.approx(0.75)
     assert worn_leg.speed_rpm == pytest.approx(60.0)
-    assert len(worn_leg.trace["crank_angle_rad"]) == 20
-    assert worn_leg.trace["crank_angle_rad"] == pytest.approx(TURN * np.arange(10, 30) / 40, abs=1.0e-6)
+    assert len(worn_leg.trace.crank_angle_rad) == 20
+    assert worn_leg.trace.crank_angle_rad == pytest.approx(TURN * np.arange(10, 30) / 40, abs=1.0e-6)
 
 
 def test_impacts_follow_one_another(worn_leg):
     for name in worn_leg.clearance_joints:
         impacts = worn_leg.impacts[name]
         assert impacts
-        ends = [impact["end_s"] for impact in impacts[:-1]]
-        assert all(0.0 < impact["speed_mps"] < 10.0 for impact in impacts)
-        assert all(impact["begin_s"] < impact["end_s"] for impact in impacts[:-1])
-        assert all(end <= after["begin_s"] for end, after in zip(ends, impacts[1:], strict=True))
-        assert worn_leg.joints[name]["max_force_n"] >= max(impact["peak_n"] for impact in impacts) > 0.0
+        ends = [impact.end_s for impact in impacts[:-1]]
+        assert all(0.0 < impact.speed_mps < 10.0 for impact in impacts)
+        assert all(impact.begin_s < impact.end_s for impact in impacts[:-1])
+        assert all(end <= after.begin_s for end, after in zip(ends, impacts[1:], strict=True))
+        assert worn_leg.joints[name].max_force_n >= max(impact.peak_n for impact in impacts) > 0.0
 
 
 def test_wear_is_archards_and_opens_the_clearance(leg, worn_leg):
@@ -70,26 +69,26 @@ def test_wear_is_archards_and_opens_the_clearance(leg, worn_leg):
         figures, settings = worn_leg.joints[name], leg.clearances[name]
         area = TURN * settings.bushing_radius * settings.width
         for side, k in zip(("bushing", "journal"), settings.wear_coefficient, strict=True):
-            mean = figures["wear_depth_m_per_cycle"][f"{side}_mean"]
-            assert mean * area == pytest.approx(k * figures["archard_integral_j_per_cycle"], rel=1.0e-9)
-        opened = np.array(list(figures["clearance_m"].values())) - settings.radial_clearance
+            mean = getattr(figures.wear_depth_m_per_cycle, f"{side}_mean")
+            assert mean * area == pytest.approx(k * figures.archard_integral_j_per_cycle, rel=1.0e-9)
+        opened = np.array(attrs.astuple(figures.clearance_m)) - settings.radial_clearance
         assert 0.0 < opened[0] < opened[1] < 1.0e-9
 
 
 def test_statistics_hang_together(worn_leg):
     for figures in worn_leg.joints.values():
-        mean, rms, p99, peak = (figures[f"{key}_force_n"] for key in ("mean", "rms", "p99", "max"))
+        mean, rms, p99, peak = (getattr(figures, f"{key}_force_n") for key in ("mean", "rms", "p99", "max"))
         assert 0.0 < mean <= rms <= peak
         assert mean < p99 <= peak * 1.01
     torque = worn_leg.drive_torque_nm
-    assert torque["min"] < torque["mean"] < torque["p99"] <= torque["max"] * 1.01
+    assert torque.min < torque.mean < torque.p99 <= torque.max * 1.01
 
 
 def test_an_impact_of_the_first_cycle_can_be_counted():
     """With a duration nothing is skipped: the slider-crank's first impact is there."""
     result = simulate(load_mechanism("slider_crank"), duration_s=3.0e-4, **FULL)
     assert len(result.impacts["B"]) == 1
-    assert result.impacts["B"][0]["begin_s"] == pytest.approx(2.2729e-4, abs=1.0e-8)
+    assert result.impacts["B"][0].begin_s == pytest.approx(2.2729e-4, abs=1.0e-8)
 
 
 def test_a_torque_drive_has_no_cycles():
@@ -136,14 +135,14 @@ def test_a_trace_lies_on_the_motion(leg):
     span = {"clearances": ("G",), "cycles": 0.25, "skip_cycles": 0.0}
     few, many = (simulate(leg, **span, trace=n).trace for n in (24, 72))
     for name in ("toe_x_m", "toe_y_m", "drive_torque_nm"):
-        np.testing.assert_allclose(few[name], many[name][::3], rtol=1e-6, atol=1e-9)
+        np.testing.assert_allclose(getattr(few, name), getattr(many, name)[::3], rtol=1e-6, atol=1e-9)
 
 
 def test_the_largest_magnitude_of_the_torque_stands_beside_its_signed_percentile(leg):
     for clearances in ((), ("G",)):
         torque = simulate(leg, clearances=clearances, cycles=0.5, skip_cycles=0.0).drive_torque_nm
-        assert torque["max_abs"] == max(-torque["min"], torque["max"]) > 0.0
-        assert torque["p99"] <= torque["max"]
+        assert torque.max_abs == max(-torque.min, torque.max) > 0.0
+        assert torque.p99 <= torque.max
 
 
 def test_a_mechanism_can_be_given_by_name_and_by_path(leg, document, tmp_path):

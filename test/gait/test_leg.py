@@ -14,8 +14,8 @@ def test_one_loose_joint_wears_as_in_the_simulation() -> None:
     leg = SyntheticLeg(GaitConfig(clearance_joints=("A",), wear_acceleration=1.0e4))
     leg.advance(2.0)
     figures = simulate(load_mechanism("bionic_leg"), clearances=["A"], model="full", skip_cycles=0, cycles=2)
-    depth = figures.joints["A"]["wear_depth_m_per_cycle"]
-    expected = 2.0 * 1.0e4 * (depth["bushing_mean"] + depth["journal_mean"])
+    depth = figures.joints["A"].wear_depth_m_per_cycle
+    expected = 2.0 * 1.0e4 * (depth.bushing_mean + depth.journal_mean)
     # wear, ten thousand times as fast here, has opened the joint by a thousandth: impacts differ a little
     assert leg.clearance_m()[0] - 3.0e-4 == pytest.approx(expected, rel=0.03)
 

@@ -38,11 +38,11 @@ def walk(leg: lw.Mechanism) -> Messages_:
     ideal = lw.simulate(leg, clearances=[], cycles=1, trace=360).trace
     angle = 2.0 * np.pi * np.arange(n) / RATE_HZ
     angle += np.random.default_rng(1).normal(0.0, 2.0e-4, n)
-    order = np.argsort(ideal["crank_angle_rad"])
+    order = np.argsort(ideal.crank_angle_rad)
     torque = np.interp(
         angle % (2.0 * np.pi),
-        np.asarray(ideal["crank_angle_rad"])[order],
-        np.asarray(ideal["drive_torque_nm"])[order],
+        ideal.crank_angle_rad[order],
+        ideal.drive_torque_nm[order],
         period=2.0 * np.pi,
     )
     stamps = 1_700_000_000 * 10**9 + np.arange(n, dtype=np.int64) * (10**9 // RATE_HZ)

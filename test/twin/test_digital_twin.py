@@ -143,7 +143,7 @@ def test_a_steady_gait_wears_as_a_steady_simulation(leg, twin, gait):
     update = twin.update(gait(12.0))
     archard = np.array([cycle.archard_j for cycle in update.cycles])
     result = lw.simulate(leg, cycles=12, wear=True)
-    wanted = [result.joints[name]["archard_integral_j_per_cycle"] for name in twin.clearance_joints]
+    wanted = [result.joints[name].archard_integral_j_per_cycle for name in twin.clearance_joints]
     scatter = archard.std(axis=0, ddof=1) * math.sqrt(2.0 / len(archard))
     wrong = (archard.mean(axis=0) - wanted) / (0.02 * np.array(wanted) + 4.0 * scatter)
     assert (np.abs(wrong) < 1.0).all(), wrong

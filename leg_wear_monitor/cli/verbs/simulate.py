@@ -20,7 +20,7 @@ from leg_wear_monitor.cli.waiting import compilation, progress_bar
 from leg_wear_monitor.json_text import json_text
 
 if TYPE_CHECKING:
-    from leg_wear_monitor.dynamics.result import SimulationResult
+    from leg_wear_monitor.dynamics.result.simulation_result import SimulationResult
     from leg_wear_monitor.mechanism.spec import Mechanism
 
 # Spelled out, for --help shall not wait for numba; the tests compare them with the library's.
@@ -105,7 +105,7 @@ def simulate(mechanism: str, json_file: Path | None, out: Path | None, **options
     if json_file != STDOUT:
         from leg_wear_monitor.cli.tables import print_result
 
-        print_result(record, result)
+        print_result(result, wall_s)
         for path in written:
             click.echo(f"written: {path}")
 
@@ -142,7 +142,9 @@ def _run(leg: "Mechanism", keywords: dict[str, Any]) -> tuple["SimulationResult"
 def _record(result: "SimulationResult", wall_s: float) -> dict[str, Any]:
     """What ``--json`` writes: the result, with the clock's values before its parts."""
     record = result.to_dict()
-    head = {name: record.pop(name) for name in ("mechanism", "model", "speed_rpm", "cycles")}
+    head = {
+        name: record.pop(name) for name in ("schema_version", "mechanism", "model", "speed_rpm", "cycles")
+    }
     clock = {
         "wall_s": wall_s,
         "simulated_s": record.pop("simulated_s"),

@@ -18,7 +18,8 @@ from numpy.typing import ArrayLike
 from leg_wear_monitor.dynamics.batch.leg import Leg, SharedTables, prepare_legs, share_tables
 from leg_wear_monitor.dynamics.clearance.run import ClearanceStepper
 from leg_wear_monitor.dynamics.ideal_result import ideal_result
-from leg_wear_monitor.dynamics.result import SimulationResult, drive_torque, joint_statistics, toe_errors
+from leg_wear_monitor.dynamics.result.simulation_result import SimulationResult
+from leg_wear_monitor.dynamics.result.statistics import drive_torque, joint_statistics, toe_errors
 from leg_wear_monitor.dynamics.run.drive import steady_drive
 from leg_wear_monitor.dynamics.run.protocol import DONE, Setup, stop
 from leg_wear_monitor.dynamics.run.run_statistics import RunStatistics, new_run_statistics
@@ -154,8 +155,6 @@ def _simulate(
         energy_j=None,
         toe=toe_errors(statistics) if setup.linkage.mechanism.toe else None,
         joints=joint_statistics(setup, statistics, setup.surfaces.depth - depth, cycles),
-        impacts={},
-        trace=None,
         clearance_joints=setup.clearance_joints,
         surfaces=setup.surfaces,
     )

@@ -1,12 +1,12 @@
 """Drive torque and joint forces over the crank angle, from a trace."""
 
 from collections.abc import Sequence
-from typing import Any
 
 import numpy as np
 from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 
+from leg_wear_monitor.dynamics.result.parts import Trace
 from leg_wear_monitor.mechanism.arrays import Floats
 from leg_wear_monitor.mechanism.ideal import TURN
 from leg_wear_monitor.report.figures.figure import BLUE, INK, SMALL, USUAL, VERMILION, new_figure, tidy
@@ -14,22 +14,21 @@ from leg_wear_monitor.report.figures.figure import BLUE, INK, SMALL, USUAL, VERM
 _LEAST_N = 0.1  # of a logarithmic axis; a journal in free flight bears nothing
 
 
-def force_traces(trace: dict[str, Any], joints: Sequence[str]) -> Figure:
+def force_traces(trace: Trace, joints: Sequence[str]) -> Figure:
     """The trace of a simulation, one panel for the drive torque and one for each joint.
 
     Parameters
     ----------
-    trace : dict
-        As `SimulationResult.trace` has it: the crank angle [rad], torque [N m] and forces [N].
+    trace : Trace
     joints : sequence of str
         Joints to show.
     """
-    turns = np.array(trace["crank_angle_rad"]) / TURN
+    turns = trace.crank_angle_rad / TURN
     figure = new_figure(9.0, 1.1 * (1 + len(joints)) + 0.6)
     panels = np.atleast_1d(figure.subplots(1 + len(joints), 1, sharex=True))
-    _draw(panels[0], turns, np.array(trace["drive_torque_nm"]), "drive\n[N m]", VERMILION)
+    _draw(panels[0], turns, trace.drive_torque_nm, "drive\n[N m]", VERMILION)
     for axes, name in zip(panels[1:], joints, strict=True):
-        _draw(axes, turns, np.maximum(np.array(trace["force_n"][name]), _LEAST_N), f"{name}\n[N]", BLUE)
+        _draw(axes, turns, np.maximum(trace.force_n[name], _LEAST_N), f"{name}\n[N]", BLUE)
         axes.set_yscale("log")
     panels[-1].set_xlabel("turns of the crank, from the first one counted", fontsize=SMALL)
     panels[0].set_xlim(turns.min(), turns.max())

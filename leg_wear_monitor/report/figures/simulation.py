@@ -1,6 +1,6 @@
 """The pictures of a simulation, as files."""
 
-from leg_wear_monitor.dynamics.result import SimulationResult
+from leg_wear_monitor.dynamics.result.simulation_result import SimulationResult
 from leg_wear_monitor.mechanism.spec import Mechanism
 from leg_wear_monitor.report.figures.figure import png
 from leg_wear_monitor.report.figures.force_traces import force_traces

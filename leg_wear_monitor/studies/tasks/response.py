@@ -1,10 +1,12 @@
 """What clearance does to the leg: an ensemble's largest errors, forces, wear, and curves of a cycle."""
 
+from collections.abc import Iterable
 from typing import Any
 
 import numpy as np
 
-from leg_wear_monitor.dynamics.result import drive_torque, joint_statistics
+from leg_wear_monitor.dynamics.result.parts import JointResult
+from leg_wear_monitor.dynamics.result.statistics import drive_torque, joint_statistics
 from leg_wear_monitor.dynamics.run.run_statistics import (
     BEGIN,
     IMPACTS,
@@ -80,19 +82,23 @@ def _follow(leg: ObservedLeg, settings: dict[str, Any]) -> dict[str, Any]:
         peaks.append(statistics.peak.copy())
         impacts.append(statistics.impacts.copy())
         statistics.response[:], statistics.peak[:] = 0.0, 0.0
-    figures = joint_statistics(setup, statistics, setup.surfaces.depth - depth, settings["cycles"])
+    found = joint_statistics(setup, statistics, setup.surfaces.depth - depth, settings["cycles"])
     member = {f"error_{name}": np.array(largest)[:, i] for i, name in enumerate(ERRORS)}
-    member |= {
-        name: np.array([figure[name] for figure in figures.values() if name in figure]) for name in _FIGURES
-    }
+    member |= {name: _known(found.values(), name) for name in _FIGURES}
     return member | {
         "peak_force_n": np.array(peaks),
         "impacts": np.diff(np.array(impacts), axis=0)[:, clearance_joints],
         "impact_speed_mps": _impact_speed(statistics, clearance_joints),
-        "rms_torque_nm": drive_torque(statistics)["rms"],
+        "rms_torque_nm": drive_torque(statistics).rms,
         "wear_depth_m_per_cycle": (setup.surfaces.depth - depth) / settings["cycles"],
         "curves": {name: np.array([one[name] for one in cycles]) for name in cycles[0]},
     }
+
+
+def _known(joints: Iterable[JointResult], name: str) -> Floats:
+    """A value of those joints that have it: contact is known of clearance joints only."""
+    values = [getattr(joint, name) for joint in joints]
+    return np.array([value for value in values if value is not None])
 
 
 def _impact_speed(statistics: RunStatistics, clearance_joints: list[int]) -> Floats:

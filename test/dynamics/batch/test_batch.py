@@ -188,7 +188,7 @@ def test_starts_fill_the_disc_evenly(leg, new_stepper):
 
 def test_other_seeds_are_other_motions_of_the_same_leg(leg):
     legs = [Leg(mechanism=leg, perturb_m=1.0e-6, seed=i) for i in range(4)]
-    forces = [result.joints["A"]["mean_force_n"] for result in simulate_batch(legs, cycles=3)]
+    forces = [result.joints["A"].mean_force_n for result in simulate_batch(legs, cycles=3)]
     assert len(set(forces)) == 4
     assert np.ptp(forces) < 0.03 * np.mean(forces)
 
@@ -197,7 +197,7 @@ def test_the_starting_phase_is_forgotten(leg):
     """Means of a few cycles from four crank angles."""
     legs = [Leg(mechanism=leg, crank_angle_rad=angle, perturb_m=1.0e-4) for angle in (0.0, 1.5, 3.0, 4.5)]
     forces = np.array([
-        [result.joints[name]["mean_force_n"] for name in "ABG"] for result in simulate_batch(legs, cycles=5)
+        [result.joints[name].mean_force_n for name in "ABG"] for result in simulate_batch(legs, cycles=5)
     ])  # fmt: skip
     np.testing.assert_allclose(forces, np.tile(forces.mean(axis=0), (4, 1)), rtol=0.03)
 

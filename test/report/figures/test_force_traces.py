@@ -3,6 +3,7 @@
 import numpy as np
 import pytest
 
+from leg_wear_monitor import Trace
 from leg_wear_monitor.report.figures.force_traces import force_traces
 
 pytestmark = pytest.mark.plain
@@ -10,11 +11,13 @@ pytestmark = pytest.mark.plain
 
 def test_every_panel_shows_its_samples_over_the_turns():
     turns = np.linspace(0.0, 2.0, 9)
-    trace = {
-        "crank_angle_rad": (2.0 * np.pi * turns).tolist(),
-        "drive_torque_nm": list(range(9)),
-        "force_n": {"A": [10.0] * 9, "B": [0.0, 5.0] * 4 + [0.0]},
-    }
+    trace = Trace(
+        crank_angle_rad=2.0 * np.pi * turns,
+        toe_x_m=None,
+        toe_y_m=None,
+        drive_torque_nm=np.arange(9.0),
+        force_n={"A": np.full(9, 10.0), "B": np.array([0.0, 5.0] * 4 + [0.0])},
+    )
     torque, free, flying = force_traces(trace, ["A", "B"]).axes
     assert [axes.get_ylabel() for axes in (torque, free, flying)] == ["drive\n[N m]", "A\n[N]", "B\n[N]"]
     assert torque.lines[0].get_xdata() == pytest.approx(turns)

@@ -1,0 +1,1 @@
+"""What a simulation found: classes, how they come from run statistics, and how they go out."""

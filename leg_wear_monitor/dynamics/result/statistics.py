@@ -1,0 +1,141 @@
+"""Parts of a simulation's result, from run statistics."""
+
+import attrs
+import numpy as np
+
+from leg_wear_monitor.dynamics.result.parts import (
+    ClearanceResult,
+    EnergyBalance,
+    Impact,
+    JointResult,
+    ToeResult,
+    TorqueResult,
+    Trace,
+    WearDepth,
+)
+from leg_wear_monitor.dynamics.run.protocol import Sample, Setup
+from leg_wear_monitor.dynamics.run.run_statistics import (
+    ARCHARD,
+    CONTACT,
+    DISSIPATION,
+    FORCE,
+    FORCE_SQUARED,
+    FRICTION,
+    IMPACTS,
+    POWER,
+    TORQUE,
+    TORQUE_SQUARED,
+    RunStatistics,
+    percentile,
+    signed_percentile,
+)
+from leg_wear_monitor.mechanism.arrays import Floats
+from leg_wear_monitor.mechanism.ideal import TURN
+from leg_wear_monitor.wear.surfaces import BUSHING, JOURNAL, wear_zone
+
+
+def drive_torque(statistics: RunStatistics) -> TorqueResult:
+    """Drive torque of the time counted."""
+    mean, square = statistics.drive_integral[[TORQUE, TORQUE_SQUARED]] / statistics.time[0]
+    return TorqueResult(
+        mean=float(mean),
+        rms=float(np.sqrt(square)),
+        min=float(statistics.drive_range[0]),
+        max=float(statistics.drive_range[1]),
+        p99=signed_percentile(statistics.torque_time, 0.99),
+        max_abs=float(np.abs(statistics.drive_range).max()),
+        max_error=float(statistics.response[3]),
+    )
+
+
+def toe_errors(statistics: RunStatistics) -> ToeResult:
+    """Largest deviations of the toe."""
+    return ToeResult(*(float(value) for value in statistics.response[:3]))
+
+
+def energy_balance(statistics: RunStatistics, stored_before: float, stored_after: float) -> EnergyBalance:
+    """Energy of the time counted, from the stored energy [J] before and after it."""
+    work = float(statistics.drive_integral[POWER])
+    friction, contact = (float(statistics.integral[:, i].sum()) for i in (FRICTION, DISSIPATION))
+    wear = float(statistics.worn_energy[0])
+    stored = stored_after - stored_before
+    return EnergyBalance(
+        work_in=work,
+        stored=stored,
+        friction_loss=friction,
+        contact_loss=contact,
+        wear_loss=wear,
+        residual=work - stored - friction - contact - wear,
+    )
+
+
+def joint_statistics(
+    setup: Setup, statistics: RunStatistics, worn: Floats, cycles: float
+) -> dict[str, JointResult]:
+    """Forces in every joint, contact and wear of clearance joints; worn (k, 2, N) while counted [m]."""
+    return {
+        name: _joint(setup, statistics, joint, worn, cycles)
+        for joint, name in enumerate(setup.linkage.mechanism.joints)
+    }
+
+
+def _joint(setup: Setup, statistics: RunStatistics, joint: int, worn: Floats, cycles: float) -> JointResult:
+    mean, square, contact = statistics.integral[joint, [FORCE, FORCE_SQUARED, CONTACT]] / statistics.time[0]
+    forces = JointResult(
+        mean_force_n=float(mean),
+        rms_force_n=float(np.sqrt(square)),
+        p99_force_n=percentile(statistics.force_time[joint], 0.99),
+        max_force_n=float(statistics.peak[joint]),
+    )
+    name = list(setup.linkage.mechanism.joints)[joint]
+    if name not in setup.clearance_joints:
+        return forces
+    k = setup.clearance_joints.index(name)
+    return attrs.evolve(
+        forces,
+        contact_fraction=float(contact),
+        friction_work_j_per_cycle=float(statistics.integral[joint, FRICTION] / cycles),
+        archard_integral_j_per_cycle=float(statistics.integral[joint, ARCHARD] / cycles),
+        wear_depth_m_per_cycle=WearDepth(
+            bushing_max=float(worn[k, BUSHING].max() / cycles),
+            bushing_mean=float(worn[k, BUSHING].mean() / cycles),
+            journal_max=float(worn[k, JOURNAL].max() / cycles),
+            journal_mean=float(worn[k, JOURNAL].mean() / cycles),
+        ),
+        wear_zone_deg=wear_zone(worn[k, BUSHING]),
+        clearance_m=_clearance(setup, k),
+    )
+
+
+def _clearance(setup: Setup, k: int) -> ClearanceResult:
+    opened = setup.surfaces.depth[k].sum(axis=0) if setup.surfaces.feeds_back else np.zeros(1)
+    clearance = float(setup.contacts.clearance[k])
+    return ClearanceResult(clearance + float(opened.mean()), clearance + float(opened.max()))
+
+
+def first_impacts(setup: Setup, statistics: RunStatistics) -> dict[str, tuple[Impact, ...]]:
+    """The first thousand impacts of each clearance joint."""
+    names = list(setup.linkage.mechanism.joints)
+    result = {}
+    for name in setup.clearance_joints:
+        joint = names.index(name)
+        rows = statistics.impact[joint, : min(IMPACTS, int(statistics.impacts[joint]))]
+        result[name] = tuple(
+            Impact(float(begin), float(speed), None if np.isnan(end) else float(end), float(peak))
+            for begin, speed, end, peak in rows
+        )
+    return result
+
+
+def trace_of(setup: Setup, samples: list[Sample]) -> Trace:
+    """Samples as columns; the crank angle counts on from its value in the first turn."""
+    angles = np.array([sample.crank_angle for sample in samples])
+    forces = np.array([sample.force for sample in samples])
+    toe = None if samples[0].toe is None else np.array([sample.toe for sample in samples])
+    return Trace(
+        crank_angle_rad=angles - TURN * np.floor(angles[0] / TURN + 1.0e-9),
+        toe_x_m=None if toe is None else toe[:, 0],
+        toe_y_m=None if toe is None else toe[:, 1],
+        drive_torque_nm=np.array([sample.drive_torque for sample in samples]),
+        force_n={name: forces[:, i] for i, name in enumerate(setup.linkage.mechanism.joints)},
+    )

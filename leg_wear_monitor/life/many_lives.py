@@ -92,8 +92,8 @@ def lives_document(lives: list[tuple[Floats, Life]]) -> dict[str, Any]:
     """Plain object for JSON: the nominal life, and of the further ones what the forecast needs."""
     (factor, nominal), *further = lives
     return {
-        "wear_factor": _by_joint(nominal, factor),
         **nominal.to_dict(),
+        "wear_factor": _by_joint(nominal, factor),
         "further": [_short(factor, life) for factor, life in further],
     }
 

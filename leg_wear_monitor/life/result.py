@@ -1,13 +1,22 @@
 """What a life is made of: states of wear over gait cycles, and when a clearance reaches its limit."""
 
 from collections.abc import Sequence
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 import attrs
 import numpy as np
 
+from leg_wear_monitor.data_frame import data_frame
 from leg_wear_monitor.mechanism.arrays import Floats
 from leg_wear_monitor.wear.cycle_jump import WearRate
+
+if TYPE_CHECKING:
+    import pandas as pd
+
+SCHEMA_VERSION = 1
+"""Of the JSON; counts up when a field is renamed, removed or means something else."""
+
+_OF_JOINTS = ("clearance_m", "clearance_max_m", "worst_sector_deg", "peak_force_n", "growth_m_per_cycle")
 
 
 @attrs.frozen(eq=False)
@@ -89,13 +98,37 @@ class Life:
         return float(self.cycles[-1] + (clearance_m - seen[-1]) / rate) if rate > 0.0 else np.inf
 
     def to_dict(self) -> dict[str, Any]:
-        """Plain object for JSON, joints by name."""
-        names = ("clearance_m", "clearance_max_m", "worst_sector_deg", "peak_force_n", "growth_m_per_cycle")
+        """Plain object for JSON, joints by name; null for a sector that is not known."""
         joints = {
-            joint: {name: [_plain(v) for v in getattr(self, name)[:, k].tolist()] for name in names}
+            joint: {name: [_plain(v) for v in getattr(self, name)[:, k].tolist()] for name in _OF_JOINTS}
             for k, joint in enumerate(self.clearance_joints)
         }
-        return {"cycles": self.cycles.tolist(), "error_m": self.error_m.tolist(), "joints": joints}
+        return {
+            "schema_version": SCHEMA_VERSION,
+            "cycles": self.cycles.tolist(),
+            "error_m": self.error_m.tolist(),
+            "joints": joints,
+        }
+
+    def columns(self) -> dict[str, list[Any]]:
+        """Columns of a table with a row for each joint at each point, joint by joint."""
+        points, joints = self.clearance_m.shape
+        return {
+            "joint": [joint for joint in self.clearance_joints for _ in range(points)],
+            "cycles": self.cycles.tolist() * joints,
+            "error_m": self.error_m.tolist() * joints,
+            **{name: getattr(self, name).T.ravel().tolist() for name in _OF_JOINTS},
+        }
+
+    def to_pandas(self) -> "pd.DataFrame":
+        """Table of `columns`, by joint and gait cycles; this needs pandas.
+
+        Raises
+        ------
+        LegWearError
+            If pandas is not installed.
+        """
+        return data_frame(self.columns(), index=["joint", "cycles"])
 
 
 def _plain(value: float) -> float | None:

@@ -30,6 +30,15 @@ def test_factors_make_up_for_what_joints_grow(begun):
     assert np.abs(others - np.linspace(LEAST_FRACTION, 1.0, 200)).max() < 0.05
 
 
+def test_a_life_as_a_table_is_its_json_row_by_row(begun):
+    life = begun.life
+    columns, record = life.columns(), life.to_dict()
+    assert columns["joint"] == ["A", "A", "J", "J"]
+    assert columns["cycles"] == record["cycles"] * 2
+    for name, values in record["joints"]["J"].items():
+        np.testing.assert_array_equal(columns[name][2:], np.array(values, dtype=float))
+
+
 def test_a_joint_that_is_held_wears_no_further_and_the_other_goes_on(begun):
     was = begun.points[-1].opened_m
     begun.hold(0)

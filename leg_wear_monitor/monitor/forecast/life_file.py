@@ -1,6 +1,7 @@
 """Lives from files of ``leg-wear-monitor life --json``, each bound to the leg it was simulated for."""
 
 import json
+import reprlib
 from collections.abc import Sequence
 from pathlib import Path
 from typing import Any
@@ -8,6 +9,7 @@ from typing import Any
 import numpy as np
 
 from leg_wear_monitor.errors import ConfigError
+from leg_wear_monitor.life.result import SCHEMA_VERSION
 from leg_wear_monitor.mechanism.spec import Mechanism
 from leg_wear_monitor.monitor.forecast.growth_law import GrowthLaw, SimulatedLife, fitted_law, no_law
 from leg_wear_monitor.monitor.ledger.binding import fingerprint
@@ -88,6 +90,10 @@ def _document(path: str) -> dict[str, Any]:
         raise ConfigError(path, "", f"is no JSON: {' '.join(str(error).split())}") from error
     if not isinstance(document, dict):
         raise ConfigError(path, "", "is no life, expected what `life --json` writes")
+    version = document.get("schema_version", 1)
+    if version != SCHEMA_VERSION:
+        fault = f"{reprlib.repr(version)} is not {SCHEMA_VERSION}, the version that this program reads"
+        raise ConfigError(path, "schema_version", f"{fault}; simulate the lives again")
     return document
 
 

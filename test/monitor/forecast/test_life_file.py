@@ -68,6 +68,16 @@ def test_a_file_that_cannot_be_used_is_refused(leg, tmp_path):
             law_of(leg, changed(tmp_path, **changes), 0.5)
 
 
+@pytest.mark.plain
+def test_another_version_is_refused(leg, tmp_path):
+    with pytest.raises(ConfigError, match=r"schema_version: 2 is not 1, .*; simulate the lives again"):
+        law_of(leg, changed(tmp_path, schema_version=2), 0.5)
+    older = json.loads(SHIPPED.read_text())
+    del older["schema_version"]
+    (tmp_path / "older.json").write_text(json.dumps(older))
+    assert law_of(leg, str(tmp_path / "older.json"), 0.5).lives == law_of(leg, "", 0.5).lives
+
+
 def test_the_shipped_lives_are_of_this_model(leg):
     """Their growth when all is new is what is simulated now, within its scatter: stale lives fail here."""
     run = LifeRun(leg, LifeSettings(legs=2, cycles=6, seed=90))

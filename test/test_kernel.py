@@ -9,7 +9,9 @@ from pathlib import Path
 import numba
 import numpy as np
 import pytest
+from numba.core.compiler import Flags
 from numba.core.errors import NumbaError
+from numba.core.targetconfig import TargetConfig
 
 import leg_wear_monitor
 from leg_wear_monitor import whole_program
@@ -166,6 +168,16 @@ def test_a_kernel_that_allocates_is_refused():
 def test_numba_has_the_switches_for_a_quick_start():
     """Without them all works, and a start takes three times as long: whole_program.py wants another look."""
     assert whole_program.AVAILABLE
+    assert whole_program.QUICK_FLAGS
+
+
+def test_flags_read_quickly_are_those_of_numba():
+    flags = Flags()
+    flags.nrt, flags.error_model = True, "numpy"
+    assert (
+        flags.values() == TargetConfig.values(flags) == {name: getattr(flags, name) for name in Flags.options}
+    )
+    assert flags == flags.copy() and hash(flags) == hash(flags.copy()) and flags != Flags()
 
 
 @pytest.mark.parametrize("available", [True, False])

@@ -5,8 +5,6 @@ from collections.abc import Callable, Iterator
 from contextlib import contextmanager, suppress
 from pathlib import Path
 
-import click
-
 from leg_wear_monitor.interrupt import closed_at_the_end
 
 
@@ -27,20 +25,35 @@ def is_compiled(kernels: str) -> bool:
 
 @contextmanager
 def compilation(kernels: str, how_long: str = "about half a minute") -> Iterator[None]:
-    """Say so before the work inside compiles a set of kernels for the first time; note when it is done.
+    """Show the time that passes while the work inside compiles a set of kernels for the first time.
 
-    Only a terminal is told: in a pipe, stderr is for what programs must see.
+    Only a terminal shows it: in a pipe, stderr is for what programs must see.
     """
     if is_compiled(kernels):
         yield
         return
-    if sys.stderr.isatty():
-        click.echo(f"compiling for this machine, once: {how_long}", err=True)
-    yield
+    with _stopwatch(f"compiling for this machine, once: {how_long}"):
+        yield
     mark = _mark(kernels)
     if mark is not None:
         with suppress(FileNotFoundError):  # `cache --clear` meanwhile: then it is to be compiled again
             mark.touch()
+
+
+@contextmanager
+def _stopwatch(what: str) -> Iterator[None]:
+    """Show on a terminal what takes long, and for how long it has done so."""
+    if not sys.stderr.isatty():
+        yield
+        return
+    from rich.console import Console
+    from rich.progress import Progress, SpinnerColumn, TextColumn, TimeElapsedColumn
+
+    columns = (SpinnerColumn(), TextColumn(what), TimeElapsedColumn())
+    with Progress(*columns, console=Console(stderr=True), transient=True) as bar:
+        bar.add_task(what, total=None)
+        with closed_at_the_end(bar.stop):  # it hides the cursor
+            yield
 
 
 @contextmanager

@@ -37,6 +37,7 @@ from leg_wear_monitor.ros.outputs.outlets import Outlets
 from leg_wear_monitor.ros.parameters.parameters import Parameters
 from leg_wear_monitor.ros.running import ClosingNode, run, spin
 from leg_wear_monitor.ros.services import Confirmation, asked_once, audit_time, undone
+from leg_wear_monitor.ros.waiting import repeated
 
 NO_COMMANDS = "It publishes no commands and must not be part of a safety function."
 
@@ -112,8 +113,10 @@ class MonitorNode(ClosingNode):
 
     def _compile(self, decoder: Decoder) -> None:
         """Pay for compilation before the first sample."""
-        self.get_logger().info("getting ready; the first time this compiles for a minute")
-        self._monitor.warm_up()
+        log = self.get_logger()
+        log.info("getting ready; the first time this compiles for a minute")
+        with repeated(lambda passed_s: log.info(f"getting ready: {passed_s:.0f} s")):
+            self._monitor.warm_up()
         for kind in TYPES.values():
             decoder.one(b"", kind)
 

@@ -68,7 +68,7 @@ def _compile() -> None:
     from leg_wear_monitor.mechanism.loader import load_mechanism
     from leg_wear_monitor.monitor.wear_monitor import WearMonitor
 
-    with compilation("monitor", "about two minutes"), compilation("gait", "another half a minute"):
+    with compilation("monitor", "about a minute"), compilation("gait", "another half a minute"):
         WearMonitor(load_mechanism()).warm_up()
         SyntheticLeg(GaitConfig()).advance(1.0e-3)
 

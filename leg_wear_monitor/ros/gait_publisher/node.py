@@ -22,6 +22,7 @@ from leg_wear_monitor.ros.gait_publisher.config import PublisherConfig
 from leg_wear_monitor.ros.gait_publisher.sensor_messages import DRIVE_TORQUE_TYPES, sensor_message
 from leg_wear_monitor.ros.parameters.parameters import Parameters
 from leg_wear_monitor.ros.running import WAKE_S, ClosingNode, run, spin, until_down
+from leg_wear_monitor.ros.waiting import repeated
 from leg_wear_monitor.twin.sample import CRANK, TORQUE
 
 _BLOCK_S = 0.05  # of walking, computed at a time
@@ -42,11 +43,13 @@ class GaitPublisher(ClosingNode):
         self.config = Parameters(self, PublisherConfig).config
         if self.config.precompute and not self.config.duration_s:
             raise ConfigError(self.get_fully_qualified_name(), "precompute", "needs a duration_s above 0 s")
-        self.get_logger().info("making the leg ready; the first time this compiles for a minute")
-        self._leg = SyntheticLeg(self.config)
-        self._blocks = self._walk()
-        if self.config.precompute:
-            self._blocks = iter(list(self._blocks))
+        log = self.get_logger()
+        log.info("making the leg ready; the first time this compiles for a minute")
+        with repeated(lambda passed_s: log.info(f"making the leg ready: {passed_s:.0f} s")):
+            self._leg = SyntheticLeg(self.config)
+            self._blocks = self._walk()
+            if self.config.precompute:
+                self._blocks = iter(list(self._blocks))
         qos = QoSProfile(depth=200, reliability=self._reliability())
         self._by_kind: dict[int, Publisher] = {CRANK: self._publisher(JointState, "joint_states", qos)}
         if self.config.torque_sensor.source != EFFORT:

@@ -28,6 +28,15 @@ def new_records(n: int, dtype: np.dtype[Any]) -> Records:
 
 
 def record_of(records: Records) -> Record:
-    """The only record of an array, to read and write by names; it is the array's own."""
+    """The only record of an array, to read and write by names; it is the array's own.
+
+    Each name takes Python some microseconds; where many are read often, `values_of` is for.
+    """
     (record,) = records.view(np.recarray)
     return record
+
+
+def values_of(records: Records) -> dict[str, Any]:
+    """Fields of the only record of an array, as Python's own numbers."""
+    (values,) = records.tolist()
+    return dict(zip(records.dtype.names or (), values, strict=True))

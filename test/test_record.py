@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 
 from leg_wear_monitor.kernel import entry
-from leg_wear_monitor.record import new_records, record_of
+from leg_wear_monitor.record import new_records, record_of, values_of
 
 pytestmark = pytest.mark.plain
 
@@ -48,3 +48,12 @@ def test_a_snapshot_is_a_copy_and_can_be_restored():
 def test_one_of_many_is_not_the_only_one():
     with pytest.raises(ValueError, match="too many"):
         record_of(new_records(2, DTYPE))
+
+
+def test_values_are_those_of_the_record():
+    states = new_records(1, DTYPE)
+    _step(states, 1)
+    values = values_of(states)
+    assert values["count"] == 1
+    assert type(values["count"]) is int
+    assert list(values["speed"]) == [0.0, 0.5]

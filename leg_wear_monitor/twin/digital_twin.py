@@ -135,7 +135,7 @@ class DigitalTwin:
     @property
     def intake(self) -> Intake:
         """Counts since the twin was made."""
-        return intake(self._tracker.state, self._follower.state)
+        return intake(self._tracker.records, self._follower.records)
 
     def set_depth(self, depth: Floats) -> None:
         """Take over wear depths (loose, 2, sectors) [m], as from a ledger.

@@ -6,27 +6,7 @@ from leg_wear_monitor.dynamics.clearance.model import ANGLE, SPEED, blend
 from leg_wear_monitor.kernel import kernel
 from leg_wear_monitor.twin.follower.compare_instants import take_instant
 from leg_wear_monitor.twin.follower.low_pass import pass_low
-from leg_wear_monitor.twin.follower.state import (
-    FILTERING,
-    LAST_PREDICTED,
-    LAST_SIGNATURE,
-    MEASURED,
-    MEASURED_2,
-    NUMBER,
-    OF_FRICTION,
-    OF_LOAD,
-    PERIOD,
-    PREDICTED,
-    PREDICTED_2,
-    RESIDUAL,
-    RESIDUAL_2,
-    TORQUE_IMPULSE,
-    TORQUE_SQUARES,
-    TORQUE_TIME,
-    UNFILTERED,
-    W_TIME,
-)
-from leg_wear_monitor.twin.follower.torque_estimate import FRICTION, LAG, LOAD
+from leg_wear_monitor.twin.follower.state import FRICTION, LAG, LOAD
 
 # the sensor's period is a running mean of the times between its samples, each with so much weight; a time of
 # more periods than so many has lost samples in it, and counts as that many
@@ -37,60 +17,58 @@ _WEIGHT, _LONGEST_PERIOD = 0.05, 1.5
 def compare(sensor, signature, leg, stepper, measured):
     """Compare a measured torque [N m] with the mean of the predicted one since the torque sample before.
 
-    ``sensor`` (3,) cut-off of the low-pass [rad/s], the size of the torque [N m], and 1 where the sensor
-    samples instants; ``signature`` (N + 1,) drive torque by a unit foot load [N m/N]. Where some were lost,
-    that mean is over more than the sensor saw, and the sample is left out.
+    ``signature`` (N + 1,) is the drive torque by a unit foot load [N m/N]. Where some were lost, that mean is
+    over more than the sensor saw, and the sample is left out.
     """
-    cutoff, size, instants = sensor[0], sensor[1], sensor[2] != 0.0
-    mark, value, by, low_pass = leg.mark, leg.value, leg.regressor, leg.low_pass
+    torque, by, low_pass = leg.torque, leg.regressor, leg.low_pass
     i, w = blend(signature.shape[0] - 1, stepper.drive[ANGLE])
     lever = signature[i] + w * (signature[i + 1] - signature[i])
-    mean, seen = value[TORQUE_IMPULSE], value[TORQUE_TIME]
-    squares = value[TORQUE_SQUARES]
-    value[TORQUE_IMPULSE], value[TORQUE_TIME], value[TORQUE_SQUARES] = 0.0, 0.0, 0.0
-    before, value[LAST_SIGNATURE] = value[LAST_SIGNATURE], lever
-    if mark[FILTERING] == 0 or not seen > 0.0:  # the first since the leg moves
-        mark[FILTERING] = max(mark[FILTERING], 1)
-        value[UNFILTERED], leg.waiting[W_TIME] = 0.0, 0.0
+    mean, seen = torque.sensed_impulse, torque.sensed_time
+    squares = torque.sensed_squares
+    torque.sensed_impulse, torque.sensed_time, torque.sensed_squares = 0.0, 0.0, 0.0
+    before, torque.last_lever = torque.last_lever, lever
+    if low_pass.fill == 0 or not seen > 0.0:  # the first since the leg moves
+        low_pass.fill = max(low_pass.fill, 1)
+        torque.unfiltered, leg.waiting.time = 0.0, 0.0
         return
-    dt = value[UNFILTERED] + seen
-    value[UNFILTERED] = dt
-    longest = value[PERIOD] * _LONGEST_PERIOD
-    value[PERIOD] += _WEIGHT * (min(seen, longest) - value[PERIOD]) if longest > 0.0 else seen
+    dt = torque.unfiltered + seen
+    torque.unfiltered = dt
+    longest = torque.period * _LONGEST_PERIOD
+    torque.period += _WEIGHT * (min(seen, longest) - torque.period) if longest > 0.0 else seen
     if 0.0 < longest < seen:
         return
-    value[UNFILTERED] = 0.0
+    torque.unfiltered = 0.0
     direction = 1.0 if stepper.drive[SPEED] > 0.0 else -1.0
-    if instants:
+    if sensor.instants != 0:
         mean /= seen
         variance = max(squares / seen - mean * mean, 0.0)
         angle = stepper.drive[ANGLE]
-        r = take_instant(cutoff, size, leg, measured, mean, variance, lever, direction, dt, angle)
+        r = take_instant(sensor, leg, measured, mean, variance, lever, direction, dt, angle)
         if math.isfinite(r):
-            p = value[LAST_PREDICTED]
-            _add_up(p + r, p, by, leg.sums, leg.gram, leg.along)
+            p = torque.last_predicted
+            _add_up(p + r, p, by, leg.sums)
         return
-    fresh, fraction = mark[FILTERING] == 1, 1.0 - math.exp(-cutoff * dt)
-    mark[FILTERING] = 2
-    m = pass_low(fraction, fresh, low_pass, MEASURED, measured)
-    p = pass_low(fraction, fresh, low_pass, PREDICTED, mean / seen)
-    by[LOAD] = pass_low(fraction, fresh, low_pass, OF_LOAD, 0.5 * (before + lever))
-    by[FRICTION] = pass_low(fraction, fresh, low_pass, OF_FRICTION, direction)
-    by[LAG] = 0.0 if fresh else (value[LAST_PREDICTED] - p) / dt
-    value[LAST_PREDICTED] = p
-    _add_up(m, p, by, leg.sums, leg.gram, leg.along)
+    fresh, fraction = low_pass.fill == 1, 1.0 - math.exp(-sensor.cutoff * dt)
+    low_pass.fill = 2
+    m = pass_low(fraction, fresh, measured, low_pass.measured)
+    p = pass_low(fraction, fresh, mean / seen, low_pass.predicted)
+    by[LOAD] = pass_low(fraction, fresh, 0.5 * (before + lever), low_pass.of_load)
+    by[FRICTION] = pass_low(fraction, fresh, direction, low_pass.of_friction)
+    by[LAG] = 0.0 if fresh else (torque.last_predicted - p) / dt
+    torque.last_predicted = p
+    _add_up(m, p, by, leg.sums)
 
 
 @kernel
-def _add_up(m, p, by, sums, gram, along):
+def _add_up(m, p, by, sums):
     """Add measured and predicted torque, and what may explain their difference, to a cycle's sums."""
     r = m - p
-    sums[NUMBER] += 1.0
-    sums[RESIDUAL] += r
-    sums[RESIDUAL_2] += r * r
-    sums[MEASURED_2] += m * m
-    sums[PREDICTED_2] += p * p
+    sums.number += 1.0
+    sums.residual += r
+    sums.residual_squares += r * r
+    sums.measured_squares += m * m
+    sums.predicted_squares += p * p
     for a in range(3):
-        along[a] += by[a] * r
+        sums.along[a] += by[a] * r
         for b in range(3):
-            gram[a, b] += by[a] * by[b]
+            sums.gram[a, b] += by[a] * by[b]

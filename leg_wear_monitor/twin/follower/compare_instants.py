@@ -10,22 +10,7 @@ import math
 
 from leg_wear_monitor.kernel import kernel
 from leg_wear_monitor.twin.follower.low_pass import pass_low
-from leg_wear_monitor.twin.follower.state import (
-    FILTERING,
-    LAST_PREDICTED,
-    PHASES,
-    PREDICTED,
-    W_ANGLE,
-    W_DIRECTION,
-    W_LAG,
-    W_MEAN,
-    W_MEASURED,
-    W_SIGNATURE,
-    W_TIME,
-    W_VARIANCE,
-    WEIGHT,
-    WEIGHTED_RESIDUAL,
-)
+from leg_wear_monitor.twin.follower.state import FRICTION, LAG, LOAD, PHASES
 
 _TURN = 2.0 * math.pi
 # fractions of the torque's size: its variation around an instant that halves the instant's weight, and how
@@ -34,7 +19,7 @@ _VARIES, _FURTHEST = 0.5, 4.0
 
 
 @kernel
-def take_instant(cutoff, size, leg, measured, mean, variance, lever, direction, dt, angle):
+def take_instant(sensor, leg, measured, mean, variance, lever, direction, dt, angle):
     """Take in an instant, and compare the one before, whose both sides are known now.
 
     ``mean`` and ``variance`` of the predicted torque since the instant before, ``dt`` [s]; ``lever`` is the
@@ -47,32 +32,32 @@ def take_instant(cutoff, size, leg, measured, mean, variance, lever, direction, 
     """
     w = leg.waiting
     residual = math.nan
-    if w[W_TIME] > 0.0:
-        residual = _compare_waiting(cutoff, size, leg, max(variance, w[W_VARIANCE]))
-    rate = (mean - w[W_MEAN]) / dt if w[W_TIME] > 0.0 else 0.0
-    w[W_MEASURED], w[W_MEAN], w[W_VARIANCE], w[W_SIGNATURE] = measured, mean, variance, lever
-    w[W_DIRECTION], w[W_LAG], w[W_TIME], w[W_ANGLE] = direction, -rate, dt, angle
+    if w.time > 0.0:
+        residual = _compare_waiting(sensor, leg, max(variance, w.variance))
+    rate = (mean - w.mean) / dt if w.time > 0.0 else 0.0
+    w.measured, w.mean, w.variance, w.time, w.angle = measured, mean, variance, dt, angle
+    w.regressor[LOAD], w.regressor[FRICTION], w.regressor[LAG] = lever, direction, -rate
     return residual
 
 
 @kernel
-def _compare_waiting(cutoff, size, leg, variance):
+def _compare_waiting(sensor, leg, variance):
     """Compare the instant that waits; its residual after the low-pass [N m]."""
-    w, by, low_pass, value = leg.waiting, leg.regressor, leg.low_pass, leg.value
-    fresh, fraction = leg.mark[FILTERING] == 1, 1.0 - math.exp(-cutoff * w[W_TIME])
-    leg.mark[FILTERING] = 2
-    weight = 1.0 / (1.0 + variance / (_VARIES * size) ** 2)
-    furthest = _FURTHEST * size
-    off = min(max(w[W_MEASURED] - w[W_MEAN], -furthest), furthest)
-    value[LAST_PREDICTED] = pass_low(fraction, fresh, low_pass, PREDICTED, w[W_MEAN])
-    of_all = pass_low(fraction, fresh, low_pass, WEIGHT, weight)
-    turns = w[W_ANGLE] / _TURN
+    w, low_pass, by_phase = leg.waiting, leg.low_pass, leg.sums.by_phase
+    fresh, fraction = low_pass.fill == 1, 1.0 - math.exp(-sensor.cutoff * w.time)
+    low_pass.fill = 2
+    weight = 1.0 / (1.0 + variance / (_VARIES * sensor.size) ** 2)
+    furthest = _FURTHEST * sensor.size
+    off = min(max(w.measured - w.mean, -furthest), furthest)
+    leg.torque.last_predicted = pass_low(fraction, fresh, w.mean, low_pass.predicted)
+    of_all = pass_low(fraction, fresh, weight, low_pass.weight)
+    turns = w.angle / _TURN
     phase = min(int((turns - math.floor(turns)) * PHASES), PHASES - 1)
-    leg.by_phase[0, phase] += of_all
-    residual = pass_low(fraction, fresh, low_pass, WEIGHTED_RESIDUAL, weight * off)
-    leg.by_phase[1, phase] += residual
-    for i, what in enumerate((W_SIGNATURE, W_DIRECTION, W_LAG)):
-        weighted = pass_low(fraction, fresh, low_pass, WEIGHTED_RESIDUAL + 1 + i, weight * w[what])
-        leg.by_phase[2 + i, phase] += weighted
-        by[i] = weighted / of_all
+    by_phase[0, phase] += of_all
+    residual = pass_low(fraction, fresh, weight * off, low_pass.weighted_residual)
+    by_phase[1, phase] += residual
+    for i in range(3):
+        weighted = pass_low(fraction, fresh, weight * w.regressor[i], low_pass.weighted_regressor[i])
+        by_phase[2 + i, phase] += weighted
+        leg.regressor[i] = weighted / of_all
     return residual / of_all

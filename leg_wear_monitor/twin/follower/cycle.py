@@ -5,19 +5,9 @@ import numpy as np
 from leg_wear_monitor.contact.arrays import ContactArrays
 from leg_wear_monitor.dynamics.run.run_statistics import ARCHARD, CONTACT, FORCE, RunStatistics, percentile
 from leg_wear_monitor.mechanism.arrays import Floats
-from leg_wear_monitor.twin.follower.state import (
-    CUT_RISES,
-    CYCLE_BEGIN,
-    CYCLE_BRIDGED,
-    CYCLES,
-    MEASURED_2,
-    NUMBER,
-    PREDICTED_2,
-    RESIDUAL,
-    RESIDUAL_2,
-    LegState,
-)
-from leg_wear_monitor.twin.follower.torque_estimate import FRICTION, LAG, LOAD, CycleEstimate, LoadEstimate
+from leg_wear_monitor.record import Record
+from leg_wear_monitor.twin.follower.state import FRICTION, LAG, LOAD
+from leg_wear_monitor.twin.follower.torque_estimate import CycleEstimate, LoadEstimate
 from leg_wear_monitor.twin.statistics import CycleStatistics, TorqueStatistics
 
 
@@ -35,21 +25,21 @@ def clearances(contacts: ContactArrays, depth: Floats) -> Floats:
 
 
 def torque_statistics(
-    sums: Floats, found: CycleEstimate | None, settled: LoadEstimate, unexplained_nm: float
+    sums: Record, found: CycleEstimate | None, settled: LoadEstimate, unexplained_nm: float
 ) -> TorqueStatistics:
-    """Of the sums (SUMS,) of a cycle, what it alone says, and what has settled."""
-    n = int(sums[NUMBER])
+    """Of the sums of a cycle, `TORQUE_SUMS`, what it alone says, and what has settled."""
+    n = int(sums.number)
 
-    def rms(i: int) -> float:
-        return float(np.sqrt(sums[i] / n)) if n else np.nan
+    def rms(squares: float) -> float:
+        return float(np.sqrt(squares / n)) if n else np.nan
 
     load, friction, lag = settled.values.tolist()
     return TorqueStatistics(
         samples=n,
-        measured_rms_nm=rms(MEASURED_2),
-        predicted_rms_nm=rms(PREDICTED_2),
-        residual_mean_nm=float(sums[RESIDUAL] / n) if n else np.nan,
-        residual_rms_nm=rms(RESIDUAL_2),
+        measured_rms_nm=rms(sums.measured_squares),
+        predicted_rms_nm=rms(sums.predicted_squares),
+        residual_mean_nm=float(sums.residual / n) if n else np.nan,
+        residual_rms_nm=rms(sums.residual_squares),
         unexplained_rms_nm=unexplained_nm,
         condition=found.condition if found else np.nan,
         load_n=load,
@@ -65,19 +55,19 @@ def torque_statistics(
 
 
 def cycle_statistics(
-    leg: LegState, stamp: int, contacts: ContactArrays, depth: Floats, before: Floats,
+    leg: Record, stamp: int, contacts: ContactArrays, depth: Floats, before: Floats,
     statistics: RunStatistics, torque: TorqueStatistics,
 ) -> CycleStatistics:  # fmt: skip
-    """Statistics of the cycle that ends at a stamp; ``before`` (2, k) the clearances at its begin."""
-    joint, mark, now = contacts.joint, leg.mark, clearances(contacts, depth)
+    """Statistics of the cycle of a `LEG_STATE` at its end; ``before`` (2, k) the clearances at its begin."""
+    joint, motion, now = contacts.joint, leg.motion, clearances(contacts, depth)
     moving = float(statistics.time[0])
     return CycleStatistics(
-        cycle=int(mark[CYCLES]),
-        begin_ns=int(mark[CYCLE_BEGIN]),
+        cycle=int(motion.cycles),
+        begin_ns=int(motion.cycle_begin_ns),
         stamp_ns=stamp,
-        direction=1 if mark[CUT_RISES] else -1,
+        direction=1 if motion.cut_rises else -1,
         moving_s=moving,
-        bridged_s=float(mark[CYCLE_BRIDGED]) * 1.0e-9,
+        bridged_s=float(motion.cycle_bridged_ns) * 1.0e-9,
         peak_force_n=statistics.peak[joint],
         p99_force_n=np.array([percentile(statistics.force_time[j], 0.99) for j in joint]),
         mean_force_n=statistics.integral[joint, FORCE] / moving,

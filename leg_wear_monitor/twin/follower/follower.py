@@ -13,6 +13,7 @@ from leg_wear_monitor.dynamics.run.protocol import DONE, INVALID_DRIVE, PUSHED_T
 from leg_wear_monitor.dynamics.run.run_statistics import TORQUE, new_run_statistics
 from leg_wear_monitor.mechanism.arrays import Floats
 from leg_wear_monitor.mechanism.ideal import TURN
+from leg_wear_monitor.record import Record, new_records, record_of
 from leg_wear_monitor.twin import steps as told
 from leg_wear_monitor.twin.follower.cycle import (
     clear_run_statistics,
@@ -23,30 +24,7 @@ from leg_wear_monitor.twin.follower.cycle import (
 from leg_wear_monitor.twin.follower.following import CYCLE, LEFT, NEEDS_START, TOLD, follow
 from leg_wear_monitor.twin.follower.load import FootLoad, torque_size
 from leg_wear_monitor.twin.follower.repeating import RepeatingResidual
-from leg_wear_monitor.twin.follower.state import (
-    AFRESH,
-    ANCHORED,
-    BASE,
-    CUT,
-    CYCLE_BEGIN,
-    CYCLE_BRIDGED,
-    CYCLES,
-    FAILED_AT,
-    FAILED_NS,
-    FILTERING,
-    LOOKS,
-    MEAN_TORQUE,
-    NUMBER,
-    PIECE_BEGIN,
-    PIECE_END,
-    RUNNING,
-    TURNS_BEFORE,
-    WHOLE,
-    LegState,
-    clear_sums,
-    leg_state,
-    room_for_looks,
-)
+from leg_wear_monitor.twin.follower.state import EVALUATED, TORQUE_SENSOR, LegState, leg_state
 from leg_wear_monitor.twin.follower.torque_estimate import CycleEstimate, LoadEstimate, find
 from leg_wear_monitor.twin.settings import INSTANT, STANCE, TwinSettings
 from leg_wear_monitor.twin.statistics import CycleStatistics, Event, SampleStatistics, TwinEventKind
@@ -93,7 +71,10 @@ class LegFollower:
 
     Attributes
     ----------
-    state : LegState
+    records : Records
+        The one `LEG_STATE`.
+    state : Record
+        The same by names.
     statistics : RunStatistics
         Of the present gait cycle.
     estimate : LoadEstimate
@@ -107,17 +88,20 @@ class LegFollower:
         # a whole number of nanoseconds, so that stamps and the stepper's time cannot drift apart
         interval = round(1.0e9 * TURN / abs(setup.speed) / INTERVALS) * 1.0e-9
         self._stepper = ClearanceStepper(setup, interval, tables=self._load.tables)
-        self.state: LegState = leg_state(len(setup.clearance_joints))
+        self._leg: LegState = leg_state(len(setup.clearance_joints))
+        self.records = self._leg.records
+        self.state: Record = record_of(self.records)
         self.statistics = new_run_statistics(len(setup.linkage.mechanism.joints))
         # the ground only pushes
         self.estimate = LoadEstimate(
             settings.load_limit_n, 0.0 if settings.load_shape == STANCE else -settings.load_limit_n
         )
         self._cutoff = TURN * settings.torque_bandwidth_hz
-        self._instants = settings.torque_sampling == INSTANT
         self._repeating = RepeatingResidual()
         self.torque_size_nm = max(torque_size(setup.linkage, setup.speed), _LEAST_TORQUE_NM)
-        self._sensor = np.array([self._cutoff, self.torque_size_nm, float(self._instants)])
+        self._instants = settings.torque_sampling == INSTANT
+        self._sensor = new_records(1, TORQUE_SENSOR)
+        self._sensor[0] = self._cutoff, self.torque_size_nm, self._instants
         self._before = self.clearances
 
     @property
@@ -137,13 +121,13 @@ class LegFollower:
         self, steps: Steps, n: int, cycles: list[CycleStatistics], events: list[Event]
     ) -> SampleStatistics:
         """Follow n steps; adds gait cycles that end and what happens, returns the samples passed."""
-        mark, i = self.state.mark, 0
-        seen = room_for_looks(n, len(self._setup.clearance_joints))
-        mark[LOOKS] = 0
+        i, m = 0, 0
+        evaluated, forces = new_records(n, EVALUATED), np.zeros((n, len(self._setup.clearance_joints)))
         while i < n:
-            reason, i, k = follow(
+            reason, i, k, m = follow(
                 self._stepper.model, self._setup.surfaces.feeds_back, self._stepper.state, self.statistics,
-                self._stepper.work, self._sensor, self._load.signature, self.state, steps, i, n, seen,
+                self._stepper.work, self._sensor, self._load.signature, self._leg, steps, i, n, m,
+                evaluated, forces,
             )  # fmt: skip
             if reason == CYCLE:
                 self._end_cycle(k, cycles)
@@ -152,30 +136,28 @@ class LegFollower:
                 i += int(steps["code"][i] != MOVE)
             elif reason in (LEFT, TOLD):
                 if reason == LEFT:
-                    mark[RUNNING], mark[AFRESH] = 0, 0
+                    self.state.motion.runs, self.state.motion.lost = 0, 0
                 events.append(Event(int(steps["begin_ns"][i]), _EVENT_KINDS[int(steps["detail"][i])]))
                 i += 1
             elif reason != DONE:
                 joint = self._setup.clearance_joints[k] if k >= 0 else None
-                events.append(Event(int(mark[FAILED_AT]), _FAILURES[reason], joint))
-        m = int(mark[LOOKS])
-        stamp, kind, (angle, torque) = seen.stamp[:m, 0], seen.stamp[:m, 1], seen.figure[:m].T
-        return SampleStatistics(stamp, kind, angle, torque, seen.force[:m])
+                events.append(Event(int(self.state.motion.failed_at_ns), _FAILURES[reason], joint))
+        stamp, kind, angle, torque = (evaluated[name][:m] for name in EVALUATED.names or ())
+        return SampleStatistics(stamp, kind, angle, torque, forces[:m])
 
     def _start(self, steps: Steps, i: int) -> Event:
         """Set the leg in motion where step i begins, wear as it was."""
-        mark, step = self.state.mark, steps[i]
+        motion, step = self.state.motion, steps[i]
         stamp, (angle, speed) = int(step["begin_ns"]), step["motion"][:2]
-        self.state.value[:] = 0.0
-        mark[BASE] = stamp - self._run_in(float(angle), float(speed))
-        if mark[AFRESH]:
-            mark[FAILED_NS] += stamp - mark[FAILED_AT]
-        mark[PIECE_BEGIN] = mark[PIECE_END] = stamp
-        for where in (AFRESH, ANCHORED, CUT, FILTERING, CYCLE_BEGIN, CYCLE_BRIDGED):
-            mark[where] = 0
-        mark[RUNNING], mark[TURNS_BEFORE] = 1, step["turns"]
-        self.state.polynomial[:] = 0.0, angle, speed, 0.0, 0.0, 0.0, 0.0
-        clear_sums(self.state)
+        for part in ("torque", "sums"):
+            self.records[part] = 0
+        motion.base_ns = stamp - self._run_in(float(angle), float(speed))
+        if motion.lost:
+            motion.failed_ns += stamp - motion.failed_at_ns
+        motion.piece_begin_ns = motion.piece_end_ns = stamp
+        motion.lost = motion.anchored = motion.cut_ns = motion.cycle_begin_ns = motion.cycle_bridged_ns = 0
+        motion.runs, motion.turns_before, self.state.low_pass.fill = 1, step["turns"], 0
+        self._leg.polynomial[:] = 0.0, angle, speed, 0.0, 0.0, 0.0, 0.0
         clear_run_statistics(self.statistics)
         return Event(stamp, TwinEventKind.ACQUIRED)
 
@@ -203,23 +185,22 @@ class LegFollower:
         stepper.state.pending[:] = 0.0
         if reached != DONE:  # so it goes on from centred journals, and says itself why it cannot
             stepper.init(angle, speed)
-            self.state.force[:] = 0.0
+            self._leg.force[:] = 0.0
             return 0
         sample = stepper.work.start
-        self.state.force[:] = np.hypot(sample[:, F_N], sample[:, F_T])
-        self.state.value[MEAN_TORQUE] = self.statistics.drive_integral[TORQUE] / self.statistics.time[0]
+        self._leg.force[:] = np.hypot(sample[:, F_N], sample[:, F_T])
+        self.state.torque.mean = self.statistics.drive_integral[TORQUE] / self.statistics.time[0]
         return round(1.0e9 * time)
 
     def _end_cycle(self, stamp: int, cycles: list[CycleStatistics]) -> None:
         """Report the gait cycle that ends at a stamp, if it is a whole one; begin the next."""
-        mark, depth = self.state.mark, self._setup.surfaces.depth
-        if mark[WHOLE]:
-            mark[CYCLES] += 1
+        motion, depth = self.state.motion, self._setup.surfaces.depth
+        if motion.cycle_is_whole:
+            motion.cycles += 1
             # two like stages of a low-pass leave noise of so many independent samples
             independent = max(0.25 * self._cutoff * self.statistics.time[0], 1.0)
             sums = self.state.sums
-            correlated = sums[NUMBER] / independent
-            found = find(sums, self.state.gram, self.state.along, correlated, self.estimate.room)
+            found = find(sums, sums.number / independent, self.estimate.room)
             if found is not None:
                 self.estimate.take(found, self._acts)
                 self._load.set(self.estimate.acting)
@@ -229,8 +210,8 @@ class LegFollower:
                     self.state, stamp, self._setup.contacts, depth, self._before, self.statistics, torque
                 )
             )
-        mark[CYCLE_BEGIN], mark[CYCLE_BRIDGED] = stamp, 0
-        clear_sums(self.state)
+        motion.cycle_begin_ns, motion.cycle_bridged_ns = stamp, 0
+        self.records["sums"] = 0
         clear_run_statistics(self.statistics)
         self._before = self.clearances
 
@@ -240,14 +221,14 @@ class LegFollower:
             return found.left if found else np.nan
         if found is None:
             return np.nan
-        self._repeating.take(self.state.by_phase)
+        self._repeating.take(self.state.sums.by_phase)
         return self._repeating.rms_nm
 
     def snapshot(self) -> FollowerSnapshot:
         """A copy of the whole state, surfaces included."""
         return FollowerSnapshot(
             self._stepper.snapshot(),
-            tuple(part.copy() for part in self.state),
+            tuple(part.copy() for part in self._leg),
             tuple(part.copy() for part in self.statistics),
             self._before.copy(),
             self.estimate.state.copy(),
@@ -257,7 +238,7 @@ class LegFollower:
     def restore(self, snapshot: FollowerSnapshot) -> None:
         """Go back to a snapshot of a follower of the same setup and settings."""
         self._stepper.restore(snapshot.stepper)
-        for own, saved in ((self.state, snapshot.leg), (self.statistics, snapshot.statistics)):
+        for own, saved in ((self._leg, snapshot.leg), (self.statistics, snapshot.statistics)):
             for part, values in zip(own, saved, strict=True):
                 part[...] = values
         self._before = snapshot.before.copy()

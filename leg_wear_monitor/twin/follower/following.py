@@ -10,32 +10,6 @@ from leg_wear_monitor.dynamics.run.protocol import DONE
 from leg_wear_monitor.dynamics.run.run_statistics import TORQUE, TORQUE_SQUARED
 from leg_wear_monitor.kernel import entry, kernel
 from leg_wear_monitor.twin.follower.compare import compare
-from leg_wear_monitor.twin.follower.state import (
-    AFRESH,
-    ANCHOR,
-    ANCHORED,
-    BASE,
-    CUT,
-    CUT_RISES,
-    CUT_TURN,
-    CYCLE_BRIDGED,
-    FAILED_AT,
-    FAILURES,
-    FILTERING,
-    IMPULSE,
-    LOOKS,
-    MEAN_TORQUE,
-    MOVING_NS,
-    PIECE_BEGIN,
-    PIECE_END,
-    RUNNING,
-    TIME,
-    TORQUE_IMPULSE,
-    TORQUE_SQUARES,
-    TORQUE_TIME,
-    TURNS_BEFORE,
-    WHOLE,
-)
 from leg_wear_monitor.twin.steps import EVALUATE, LEAVE, MOVE, REPORT, START
 
 # why the leg's kernel returns before the last step: a cycle has ended; somebody must start the leg, leave it,
@@ -56,12 +30,11 @@ def _angle_at(polynomial, tau):
 
 
 @kernel
-def _find_cut(leg, begin):
+def _find_cut(motion, polynomial, begin):
     """Where in its piece, from a stamp on, the crank passes the next 0, either way: a gait cycle may end."""
-    mark, polynomial = leg.mark, leg.polynomial
-    mark[CUT] = 0
-    origin = mark[PIECE_BEGIN]
-    low, high = 1.0e-9 * (begin - origin), 1.0e-9 * (mark[PIECE_END] - origin)
+    motion.cut_ns = 0
+    origin = motion.piece_begin_ns
+    low, high = 1.0e-9 * (begin - origin), 1.0e-9 * (motion.piece_end_ns - origin)
     first, last = _angle_at(polynomial, low) / _TURN, _angle_at(polynomial, high) / _TURN
     up, down = math.floor(first) + 1.0, math.ceil(first) - 1.0
     rising = first < up <= last
@@ -74,117 +47,137 @@ def _find_cut(leg, begin):
             high = middle
         else:
             low = middle
-    mark[CUT] = min(origin + math.ceil(1.0e9 * high), mark[PIECE_END])
-    mark[CUT_TURN] = mark[TURNS_BEFORE] + int(up if rising else down)
-    mark[CUT_RISES] = 1 if rising else 0
+    motion.cut_ns = min(origin + math.ceil(1.0e9 * high), motion.piece_end_ns)
+    motion.cut_turn = motion.turns_before + int(up if rising else down)
+    motion.cut_rises = 1 if rising else 0
 
 
 @kernel
-def _load_piece(model, stepper, leg, step):
+def _load_piece(model, stepper, leg, polynomial, step):
     """Take up the next piece of the crank's motion; times and angles are kept small."""
-    mark = leg.mark
+    motion = leg.motion
     if stepper.intervals[0] >= _REBASE:
         stepper.intervals[0] -= _REBASE
-        mark[BASE] += round(_REBASE * model.interval * 1.0e9)
+        motion.base_ns += round(_REBASE * model.interval * 1.0e9)
         for k in range(stepper.recent.shape[0]):
             stepper.recent[k, 0] -= _REBASE * model.interval
             stepper.recent[k, 2] -= _REBASE * model.interval
-    if step.begin_ns != mark[PIECE_END]:  # it rested meanwhile
-        mark[BASE] += step.begin_ns - mark[PIECE_END]
-        mark[FILTERING] = 0
-    turns = step.turns - mark[TURNS_BEFORE]
+    if step.begin_ns != motion.piece_end_ns:  # it rested meanwhile
+        motion.base_ns += step.begin_ns - motion.piece_end_ns
+        leg.low_pass.fill = 0
+    turns = step.turns - motion.turns_before
     if turns != 0:
         stepper.drive[ANGLE] -= turns * _TURN
-    mark[PIECE_BEGIN], mark[PIECE_END], mark[TURNS_BEFORE] = step.begin_ns, step.end_ns, step.turns
-    mark[CYCLE_BRIDGED] += step.bridged_ns
-    mark[MOVING_NS] += step.end_ns - step.begin_ns
-    leg.polynomial[0] = 1.0e-9 * (step.begin_ns - mark[BASE])
+    motion.piece_begin_ns, motion.piece_end_ns, motion.turns_before = step.begin_ns, step.end_ns, step.turns
+    motion.cycle_bridged_ns += step.bridged_ns
+    motion.moving_ns += step.end_ns - step.begin_ns
+    polynomial[0] = 1.0e-9 * (step.begin_ns - motion.base_ns)
     for i in range(6):
-        leg.polynomial[1 + i] = step.motion[i]
-    _find_cut(leg, step.begin_ns)
+        polynomial[1 + i] = step.motion[i]
+    _find_cut(motion, polynomial, step.begin_ns)
 
 
 @kernel
-def _look(sensor, signature, leg, stepper, step, looks):
-    """Note the leg at a sample, NaN where it does not run."""
-    mark, value, m = leg.mark, leg.value, leg.mark[LOOKS]
-    mark[LOOKS] += 1
-    looks.stamp[m, 0], looks.stamp[m, 1] = step.end_ns, step.detail
-    running = mark[RUNNING] != 0
-    if running and value[TIME] > 0.0:
-        value[MEAN_TORQUE] = value[IMPULSE] / value[TIME]
-        value[IMPULSE], value[TIME] = 0.0, 0.0
-    angle = math.nan
-    if running:
-        at = min(max(step.end_ns, mark[PIECE_BEGIN]), mark[PIECE_END])
-        angle = _angle_at(leg.polynomial, 1.0e-9 * (at - mark[PIECE_BEGIN]))
-        angle -= _TURN * math.floor(angle / _TURN)
-    looks.figure[m, 0] = angle
-    looks.figure[m, 1] = value[MEAN_TORQUE] if running else math.nan
-    for k in range(leg.force.shape[0]):
-        looks.force[m, k] = leg.force[k] if running else math.nan
-    if running and mark[PIECE_BEGIN] <= step.end_ns <= mark[PIECE_END] and math.isfinite(step.torque):
+def _evaluate(sensor, signature, leg, polynomial, stepper, step, out):
+    """Note the leg, which runs, at a sample."""
+    motion, torque = leg.motion, leg.torque
+    if torque.time > 0.0:
+        torque.mean = torque.impulse / torque.time
+        torque.impulse, torque.time = 0.0, 0.0
+    at = min(max(step.end_ns, motion.piece_begin_ns), motion.piece_end_ns)
+    angle = _angle_at(polynomial, 1.0e-9 * (at - motion.piece_begin_ns))
+    out.angle, out.torque = angle - _TURN * math.floor(angle / _TURN), torque.mean
+    if motion.piece_begin_ns <= step.end_ns <= motion.piece_end_ns and math.isfinite(step.torque):
         compare(sensor, signature, leg, stepper, step.torque)
 
 
+@kernel
+def _add_torque(torque, impulse, squares, time):
+    """Add what a step integrated: drive torque [N m s], its square [N^2 m^2 s], and time [s]."""
+    torque.impulse += impulse
+    torque.time += time
+    torque.sensed_impulse += impulse
+    torque.sensed_time += time
+    torque.sensed_squares += squares
+
+
 @entry
-def follow(model, feeds_back, stepper, statistics, work, sensor, signature, leg, steps, first, n, looks):
-    """Follow steps from index ``first`` to n; ``stepper`` is the ClearanceState.
+def follow(
+    model,
+    feeds_back,
+    stepper,
+    statistics,
+    work,
+    sensors,
+    signature,
+    state,
+    steps,
+    first,
+    n,
+    m,
+    evaluated,
+    forces,
+):
+    """Follow steps from index ``first`` to n; ``stepper`` is the ClearanceState, ``state`` the LegState.
+
+    There is one torque sensor. The leg at samples goes to ``evaluated`` (n,) from index m on, and its contact
+    forces [N] to ``forces`` (n, k), NaN where it does not run.
 
     Returns
     -------
-    reason, i, k
+    reason, i, k, m
         DONE, or why the caller has to act before going on at step i; k is the clearance joint concerned, -1
-        if none.
+        if none; m is the number of samples evaluated.
     """
-    mark, value, i = leg.mark, leg.value, first
+    sensor, leg, polynomial, force = sensors[0], state.records[0], state.polynomial, state.force
+    motion, i = leg.motion, first
     while i < n:
         step, code = steps[i], steps[i].code
-        if mark[RUNNING] != 0:
-            until = min(step.end_ns, mark[PIECE_END]) if code == EVALUATE else mark[PIECE_END]
-            cuts = mark[CUT] != 0 and mark[CUT] <= until
+        if motion.runs != 0:
+            until = min(step.end_ns, motion.piece_end_ns) if code == EVALUATE else motion.piece_end_ns
+            cuts = motion.cut_ns != 0 and motion.cut_ns <= until
             if cuts:
-                until = mark[CUT]
-            impulse, time, before = (
-                statistics.drive_integral[TORQUE],
-                statistics.time[0],
-                stepper.intervals[0],
-            )
-            squares = statistics.drive_integral[TORQUE_SQUARED]
+                until = motion.cut_ns
+            impulse, squares = statistics.drive_integral[TORQUE], statistics.drive_integral[TORQUE_SQUARED]
+            time, before = statistics.time[0], stepper.intervals[0]
             status, k = advance_clearances(
-                model, feeds_back, stepper, leg.polynomial, 1.0e-9 * (until - mark[BASE]), statistics, work
+                model, feeds_back, stepper, polynomial, 1.0e-9 * (until - motion.base_ns), statistics, work
             )
             if stepper.intervals[0] > before:
-                impulse, time = statistics.drive_integral[TORQUE] - impulse, statistics.time[0] - time
-                value[IMPULSE] += impulse
-                value[TIME] += time
-                value[TORQUE_IMPULSE] += impulse
-                value[TORQUE_TIME] += time
-                value[TORQUE_SQUARES] += statistics.drive_integral[TORQUE_SQUARED] - squares
-                for j in range(leg.force.shape[0]):
-                    leg.force[j] = math.hypot(work.start[j, F_N], work.start[j, F_T])
+                impulse = statistics.drive_integral[TORQUE] - impulse
+                squares = statistics.drive_integral[TORQUE_SQUARED] - squares
+                _add_torque(leg.torque, impulse, squares, statistics.time[0] - time)
+                for j in range(force.shape[0]):
+                    force[j] = math.hypot(work.start[j, F_N], work.start[j, F_T])
             if status != DONE:
-                mark[RUNNING], mark[AFRESH] = 0, 1
-                mark[FAILURES] += 1
-                mark[FAILED_AT] = mark[BASE] + round(1.0e9 * stepper.intervals[0] * model.interval)
-                return status, i, k
+                motion.runs, motion.lost = 0, 1
+                motion.failures += 1
+                motion.failed_at_ns = motion.base_ns + round(1.0e9 * stepper.intervals[0] * model.interval)
+                return status, i, k, m
             if cuts:
                 # back at the 0 where it began, a cycle is none
-                mark[WHOLE] = 1 if mark[ANCHORED] != 0 and mark[ANCHOR] != mark[CUT_TURN] else 0
-                mark[ANCHORED], mark[ANCHOR] = 1, mark[CUT_TURN]
-                _find_cut(leg, until)
-                return CYCLE, i, until
+                is_whole = motion.anchored != 0 and motion.anchor_turn != motion.cut_turn
+                motion.cycle_is_whole = 1 if is_whole else 0
+                motion.anchored, motion.anchor_turn = 1, motion.cut_turn
+                _find_cut(motion, polynomial, until)
+                return CYCLE, i, until, m
         if code == MOVE:
-            if mark[RUNNING] == 0:
-                return NEEDS_START, i, -1
-            _load_piece(model, stepper, leg, step)
+            if motion.runs == 0:
+                return NEEDS_START, i, -1, m
+            _load_piece(model, stepper, leg, polynomial, step)
         elif code == EVALUATE:
-            _look(sensor, signature, leg, stepper, step, looks)
+            out = evaluated[m]
+            out.stamp_ns, out.kind, out.angle, out.torque = step.end_ns, step.detail, math.nan, math.nan
+            if motion.runs != 0:
+                _evaluate(sensor, signature, leg, polynomial, stepper, step, out)
+            for j in range(force.shape[0]):
+                forces[m, j] = force[j] if motion.runs != 0 else math.nan
+            m += 1
         elif code == START:
-            return NEEDS_START, i, -1
+            return NEEDS_START, i, -1, m
         elif code == LEAVE:
-            return LEFT, i, -1
+            return LEFT, i, -1, m
         elif code == REPORT:
-            return TOLD, i, -1
+            return TOLD, i, -1, m
         i += 1
-    return DONE, i, -1
+    return DONE, i, -1, m

@@ -4,11 +4,11 @@ from leg_wear_monitor.kernel import kernel
 
 
 @kernel
-def pass_low(fraction, fresh, low_pass, i, value):
-    """Value of channel i after the two stages of the low-pass; a fresh filter starts at its first value."""
+def pass_low(fraction, fresh, value, stages):
+    """Value after the two stages (2,) of the low-pass; a fresh filter starts at its first value."""
     for stage in range(2):
         if fresh:
-            low_pass[stage, i] = value
-        low_pass[stage, i] += fraction * (value - low_pass[stage, i])
-        value = low_pass[stage, i]
+            stages[stage] = value
+        stages[stage] += fraction * (value - stages[stage])
+        value = stages[stage]
     return value

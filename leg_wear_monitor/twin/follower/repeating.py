@@ -13,8 +13,8 @@ class RepeatingResidual:
 
     Attributes
     ----------
-    cycles : tuple of (BY_PHASE, PHASES) arrays
-        Of each gait cycle, the newest last, as in `leg_state`.
+    cycles : tuple of (5, PHASES) arrays
+        Of each gait cycle, the newest last, as in `TORQUE_SUMS`.
     """
 
     def __init__(self) -> None:

@@ -4,98 +4,145 @@ from typing import NamedTuple
 
 import numpy as np
 
-from leg_wear_monitor.mechanism.arrays import Floats, Ints
-
-# stamps and counts: stamp of the stepper's time 0; 1 where the leg runs, 1 where it must start afresh; the
-# piece's begin and end; turns before the leg's angle; 1 where a cycle's begin was passed, and its turn; stamp
-# at which the next is passed, 0 if not in this piece, its turn, and 1 if forward;
-# when it began; time bridged in it; samples looked at in this call; how full the torque filters are;
-# number of cycles and of failures; when it last failed; time lost by that; time in motion; 1 where the
-# cycle that has ended is a whole one
-(
-    BASE, RUNNING, AFRESH, PIECE_BEGIN, PIECE_END, TURNS_BEFORE, ANCHORED, ANCHOR, CUT, CUT_TURN, CUT_RISES,
-    CYCLE_BEGIN, CYCLE_BRIDGED, LOOKS, FILTERING, CYCLES, FAILURES, FAILED_AT, FAILED_NS, MOVING_NS, WHOLE,
-) = range(21)  # fmt: skip
-MARKS = 21
-
-# values: drive torque's impulse and time since the last sample, and since the last torque; mean torque before
-# the last sample; last load signature; predicted torque after the low-pass, as it was last; period of the
-# torque sensor; time since what was last filtered; integral of the squared drive torque since the last torque
-(
-    IMPULSE, TIME, TORQUE_IMPULSE, TORQUE_TIME, MEAN_TORQUE, LAST_SIGNATURE, LAST_PREDICTED, PERIOD,
-    UNFILTERED, TORQUE_SQUARES,
-) = range(10)  # fmt: skip
-VALUES = 10
-
-# what goes through the low-pass: torque measured, predicted, of a unit foot load, and of unit friction; of a
-# sensor that samples instants the weight, and times the weight the residual and what may explain it
-(
-    MEASURED, PREDICTED, OF_LOAD, OF_FRICTION, WEIGHT, WEIGHTED_RESIDUAL, WEIGHTED_LOAD, WEIGHTED_FRICTION,
-    WEIGHTED_LAG,
-) = range(9)  # fmt: skip
-CHANNELS = 9
-
-# an instant that waits for the next one: measured torque, mean and variance of the predicted one since the
-# instant before, load signature, direction, minus the rate of the predicted torque, time, crank angle
-(
-    W_MEASURED, W_MEAN, W_VARIANCE, W_SIGNATURE, W_DIRECTION, W_LAG, W_TIME, W_ANGLE,
-) = range(8)  # fmt: skip
-WAITING_VALUES = 8
+from leg_wear_monitor.mechanism.arrays import Floats
+from leg_wear_monitor.record import Records, new_records
 
 PHASES = 32  # of the crank's turn, for what repeats from one gait cycle to the next
-BY_PHASE = 5  # rows: weight, and times the weight the residual and what load, friction and lag make
 
-# sums over a cycle: number; of the residual and its square; squares of measured and predicted
-NUMBER, RESIDUAL, RESIDUAL_2, MEASURED_2, PREDICTED_2 = range(5)
-SUMS = 5
+# what may explain a torque that is off: its index in vectors that least squares work on
+LOAD, FRICTION, LAG = 0, 1, 2
+
+LEG_MOTION = np.dtype(
+    [
+        ("base_ns", "i8"),  # stamp of the stepper's time 0
+        ("runs", "i8"),  # 1 where the leg runs
+        ("lost", "i8"),  # 1 where it has failed and was not started since
+        # the present piece of the crank's motion
+        ("piece_begin_ns", "i8"),  # stamp
+        ("piece_end_ns", "i8"),  # stamp
+        ("turns_before", "i8"),  # turns of the crank before the leg's angle
+        # where the crank passes 0 next, which ends a gait cycle
+        ("cut_ns", "i8"),  # stamp, 0 if not in this piece
+        ("cut_turn", "i8"),  # turns of the crank there
+        ("cut_rises", "i8"),  # 1 if forward
+        # where it passed 0 last
+        ("anchored", "i8"),  # 1 if it has
+        ("anchor_turn", "i8"),  # turns of the crank there
+        # the gait cycle
+        ("cycle_begin_ns", "i8"),  # stamp
+        ("cycle_bridged_ns", "i8"),  # time bridged in it
+        ("cycle_is_whole", "i8"),  # 1 where the one that has ended is a whole one
+        # counts
+        ("cycles", "i8"),  # whole gait cycles
+        ("failures", "i8"),  # how often the leg could not go on
+        ("failed_at_ns", "i8"),  # when it failed last
+        ("failed_ns", "i8"),  # time lost by failures
+        ("moving_ns", "i8"),  # time in motion
+    ]
+)
+
+LEG_TORQUE = np.dtype(
+    [
+        # of the drive torque since the last sample
+        ("impulse", "f8"),  # integral [N m s]
+        ("time", "f8"),  # time [s]
+        ("mean", "f8"),  # mean before that sample [N m]
+        # of the drive torque since the last torque sample
+        ("sensed_impulse", "f8"),  # integral [N m s]
+        ("sensed_squares", "f8"),  # integral of the square [N^2 m^2 s]
+        ("sensed_time", "f8"),  # time [s]
+        # of the comparison
+        ("last_lever", "f8"),  # drive torque by a unit foot load at the last torque sample [N m/N]
+        ("last_predicted", "f8"),  # predicted torque after the low-pass [N m]
+        ("period", "f8"),  # of the torque sensor [s]
+        ("unfiltered", "f8"),  # time since what was last filtered [s]
+    ]
+)
+
+LOW_PASS = np.dtype(
+    [
+        ("fill", "i8"),  # 0 empty, 1 a sample has come, 2 filtered since
+        # its two stages, for each torque
+        ("measured", "f8", (2,)),  # [N m]
+        ("predicted", "f8", (2,)),  # [N m]
+        ("of_load", "f8", (2,)),  # of a unit foot load [N m/N]
+        ("of_friction", "f8", (2,)),  # of unit friction
+        # of a sensor that samples instants
+        ("weight", "f8", (2,)),  # of an instant
+        ("weighted_residual", "f8", (2,)),  # weight times residual [N m]
+        ("weighted_regressor", "f8", (3, 2)),  # weight times what may explain it
+    ]
+)
+
+WAITING_INSTANT = np.dtype(
+    [
+        ("measured", "f8"),  # torque [N m]
+        ("mean", "f8"),  # of the predicted torque since the instant before [N m]
+        ("variance", "f8"),  # of that torque [N^2 m^2]
+        ("regressor", "f8", (3,)),  # what a unit load, unit friction and unit lag make [N m/N, -, N m/s]
+        ("time", "f8"),  # since the instant before [s], 0 if none waits
+        ("angle", "f8"),  # of the crank [rad]
+    ]
+)
+"""An instant that waits for the next one."""
+
+TORQUE_SUMS = np.dtype(
+    [
+        ("number", "f8"),  # of torques compared
+        ("residual", "f8"),  # [N m]
+        ("residual_squares", "f8"),  # [N^2 m^2]
+        ("measured_squares", "f8"),  # [N^2 m^2]
+        ("predicted_squares", "f8"),  # [N^2 m^2]
+        ("gram", "f8", (3, 3)),  # products of the torques by load, friction and lag with each other
+        ("along", "f8", (3,)),  # and with the residual
+        # of a sensor that samples instants: rows of weight, and of residual, load, friction, lag times that
+        ("by_phase", "f8", (5, PHASES)),
+    ]
+)
+"""Sums over a gait cycle."""
+
+LEG_STATE = np.dtype(
+    [
+        ("motion", LEG_MOTION),
+        ("torque", LEG_TORQUE),
+        ("low_pass", LOW_PASS),
+        ("waiting", WAITING_INSTANT),
+        ("regressor", "f8", (3,)),  # torques by a unit load, unit friction and unit lag [N m/N, -, N m/s]
+        ("sums", TORQUE_SUMS),
+    ]
+)
+
+TORQUE_SENSOR = np.dtype(
+    [
+        ("cutoff", "f8"),  # of the low-pass [rad/s]
+        ("size", "f8"),  # of the torque [N m]
+        ("instants", "i8"),  # 1 where it samples instants instead of averages
+    ]
+)
+
+EVALUATED = np.dtype(
+    [
+        ("stamp_ns", "i8"),  # of the sample
+        ("kind", "i8"),  # of `twin.sample`
+        ("angle", "f8"),  # of the crank [rad], NaN where the leg does not run
+        ("torque", "f8"),  # mean drive torque since the sample before [N m], NaN where the leg does not run
+    ]
+)
+"""The leg at a sample."""
 
 
 class LegState(NamedTuple):
-    """``mark`` and ``value`` as above.
+    """All that changes in the leg along its way, beside the stepper.
 
-    ``polynomial`` (7,) the piece; ``low_pass`` (2, CHANNELS) its two stages; ``sums`` (SUMS,),
-    and ``gram`` (3, 3) and ``along`` (3,) of the products of the torques by load, friction and lag,
-    ``regressor`` (3,), with each other and with the residual; ``force`` (k,) contact forces [N] at the last
-    look. ``waiting`` (WAITING_VALUES,) an instant as above, and ``by_phase`` (BY_PHASE, PHASES) the sums of a
-    cycle; both are of sensors that sample instants alone.
+    ``records`` (1,) of `LEG_STATE`; ``polynomial`` (7,) the piece; ``force`` (k,) contact forces [N] at the
+    end of the last step.
     """
 
-    mark: Ints
-    value: Floats
+    records: Records
     polynomial: Floats
-    low_pass: Floats
-    sums: Floats
-    gram: Floats
-    along: Floats
-    regressor: Floats
-    force: Floats
-    waiting: Floats
-    by_phase: Floats
-
-
-class Looks(NamedTuple):
-    """What was seen at m samples: stamp and kind (m, 2), angle and torque (m, 2), forces (m, k)."""
-
-    stamp: Ints
-    figure: Floats
     force: Floats
 
 
 def leg_state(clearance_joints: int) -> LegState:
     """State before the first step."""
-    return LegState(
-        np.zeros(MARKS, dtype=np.int64), np.zeros(VALUES), np.zeros(7), np.zeros((2, CHANNELS)),
-        np.zeros(SUMS), np.zeros((3, 3)), np.zeros(3), np.zeros(3), np.zeros(clearance_joints),
-        np.zeros(WAITING_VALUES), np.zeros((BY_PHASE, PHASES)),
-    )  # fmt: skip
-
-
-def clear_sums(leg: LegState) -> None:
-    """Start to compare torques afresh."""
-    for part in (leg.sums, leg.gram, leg.along, leg.by_phase):
-        part[...] = 0.0
-
-
-def room_for_looks(m: int, clearance_joints: int) -> Looks:
-    """Room for m samples."""
-    return Looks(np.zeros((m, 2), dtype=np.int64), np.zeros((m, 2)), np.zeros((m, clearance_joints)))
+    return LegState(new_records(1, LEG_STATE), np.zeros(7), np.zeros(clearance_joints))

@@ -12,9 +12,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from leg_wear_monitor.mechanism.arrays import Floats
-from leg_wear_monitor.twin.follower.state import NUMBER, RESIDUAL_2
-
-LOAD, FRICTION, LAG = 0, 1, 2
+from leg_wear_monitor.record import Record
+from leg_wear_monitor.twin.follower.state import FRICTION, LOAD
 
 _LEAST_SAMPLES = 8
 _SMALL = 1.0e-9
@@ -40,18 +39,14 @@ class CycleEstimate:
 
 
 def find(
-    sums: Floats,
-    gram: Floats,
-    along: Floats,
-    correlated: float,
-    loads: tuple[float, float] = (-np.inf, np.inf),
+    sums: Record, correlated: float, loads: tuple[float, float] = (-np.inf, np.inf)
 ) -> CycleEstimate | None:
     """Least squares from the sums of a cycle; None without enough samples.
 
     Parameters
     ----------
-    sums, gram, along : (SUMS,), (3, 3), (3,) arrays
-        As in `leg_state`.
+    sums : Record
+        `TORQUE_SUMS` of the cycle.
     correlated : float
         How many samples count as one, since all went through a low-pass.
     loads : (float, float)
@@ -63,9 +58,10 @@ def find(
         Without a load's signature (a mechanism without toe), 0 for the load, known exactly. The condition
         number is that of the torques scaled to one size: 1 where none looks like another.
     """
+    gram, along = sums.gram, sums.along
     scale = np.sqrt(np.diag(gram))
     seen = scale > _SMALL * max(scale.max(), _SMALL)
-    if sums[NUMBER] < _LEAST_SAMPLES or not seen[FRICTION]:
+    if sums.number < _LEAST_SAMPLES or not seen[FRICTION]:
         return None
     scaled = gram[np.ix_(seen, seen)] / np.outer(scale[seen], scale[seen])
     condition = float(np.linalg.cond(scaled)) ** 0.5
@@ -75,8 +71,8 @@ def find(
     values, sigma = np.zeros(3), np.zeros(3)
     values[seen] = inverse @ along[seen]
     bounded = _bounded(values, gram, along, seen, loads)
-    square = float(sums[RESIDUAL_2] - 2.0 * bounded @ along + bounded @ gram @ bounded)
-    left = max(square, 0.0) / sums[NUMBER]
+    square = float(sums.residual_squares - 2.0 * bounded @ along + bounded @ gram @ bounded)
+    left = max(square, 0.0) / sums.number
     sigma[seen] = np.sqrt(left * max(correlated, 1.0) * np.diag(inverse))
     return CycleEstimate(values, sigma, condition, float(left**0.5))
 

@@ -38,15 +38,17 @@ class CrankTracker:
 
     Attributes
     ----------
+    records : Records
+        The one `TRACKER_STATE`; what waits is apart.
     state : Record
-        `TRACKER_STATE`; what waits is apart.
+        The same by names.
     """
 
     def __init__(self, settings: TrackerSettings) -> None:
         self._model = tracker_model(settings)
-        self._state, self._block = new_records(1, TRACKER_STATE), new_records(_CHUNK, GAIT_SAMPLE)
+        self.records, self._block = new_records(1, TRACKER_STATE), new_records(_CHUNK, GAIT_SAMPLE)
         self._arrivals, self._queue = new_records(ARRIVALS, GAIT_SAMPLE), new_records(QUEUE, QUEUED)
-        self.state: Record = record_of(self._state)
+        self.state: Record = record_of(self.records)
         self.state.clock.tracking = IS_STARTING
         self._steps = room_for_steps(_STEPS_A_SAMPLE * (QUEUE + ARRIVALS + _CHUNK))
 
@@ -64,21 +66,21 @@ class CrankTracker:
             block = samples[start : start + _CHUNK]
             own = self._block[: len(block)]
             own[:] = block  # no other layout reaches compiled code, and what is changed is not the caller's
-            n = track(self._model, self._state, self._arrivals, self._queue, own, self._steps)
+            n = track(self._model, self.records, self._arrivals, self._queue, own, self._steps)
             yield self._steps, int(n)
 
     def snapshot(self) -> TrackerSnapshot:
         """A copy of the whole state."""
         clock = self.state.clock
         return TrackerSnapshot(
-            self._state.copy(),
+            self.records.copy(),
             self._arrivals[: clock.waiting].copy(),
             self._queue[clock.head : clock.tail].copy(),
         )
 
     def restore(self, snapshot: TrackerSnapshot) -> None:
         """Go back to a snapshot of a tracker of the same settings."""
-        self._state[:] = snapshot.state
+        self.records[:] = snapshot.state
         clock = self.state.clock
         self._arrivals[: clock.waiting] = snapshot.arrivals
         self._queue[clock.head : clock.tail] = snapshot.queue

@@ -14,10 +14,11 @@ from leg_wear_monitor.dynamics.simulation import prepare
 from leg_wear_monitor.mechanism.ideal import TURN, one_cycle, point_motion
 from leg_wear_monitor.mechanism.position import build_linkage
 from leg_wear_monitor.mechanism.spec import ConstantLoad
+from leg_wear_monitor.record import Record, new_records, record_of
 from leg_wear_monitor.twin.digital_twin import DigitalTwin
 from leg_wear_monitor.twin.follower.load import FootLoad
-from leg_wear_monitor.twin.follower.state import NUMBER, RESIDUAL_2
-from leg_wear_monitor.twin.follower.torque_estimate import FRICTION, LAG, LOAD, LoadEstimate, find
+from leg_wear_monitor.twin.follower.state import FRICTION, LAG, LOAD, TORQUE_SUMS
+from leg_wear_monitor.twin.follower.torque_estimate import LoadEstimate, find
 from leg_wear_monitor.twin.sample import Samples, gait_samples
 from leg_wear_monitor.twin.settings import CONSTANT, STANCE, TwinSettings
 
@@ -76,10 +77,11 @@ def test_the_signature_is_virtual_work_without_mean(leg, shape):
         np.testing.assert_allclose(signature, -velocity[:, 1], atol=1.0e-9)
 
 
-def sums_of(columns: np.ndarray, residual: np.ndarray) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
-    sums = np.zeros(5)
-    sums[NUMBER], sums[RESIDUAL_2] = len(residual), residual @ residual
-    return sums, columns.T @ columns, columns.T @ residual
+def sums_of(columns: np.ndarray, residual: np.ndarray) -> Record:
+    sums = record_of(new_records(1, TORQUE_SUMS))
+    sums.number, sums.residual_squares = len(residual), residual @ residual
+    sums.gram[:], sums.along[:] = columns.T @ columns, columns.T @ residual
+    return sums
 
 
 @given(
@@ -89,7 +91,7 @@ def sums_of(columns: np.ndarray, residual: np.ndarray) -> tuple[np.ndarray, np.n
 def test_load_friction_and_lag_are_told_apart(load, friction, lag, phase):
     angle = np.linspace(0.0, TURN, 200, endpoint=False)
     columns = np.stack([0.1 * np.sin(angle + phase), np.ones(200), 40.0 * np.cos(3.0 * angle)], axis=1)
-    found = find(*sums_of(columns, columns @ [load, friction, lag]), 10.0)
+    found = find(sums_of(columns, columns @ [load, friction, lag]), 10.0)
     np.testing.assert_allclose(found.values, [load, friction, lag], atol=1.0e-9 * 500.0)
     assert found.condition == pytest.approx(1.0)
     assert found.left < 1.0e-4
@@ -98,7 +100,7 @@ def test_load_friction_and_lag_are_told_apart(load, friction, lag, phase):
 def test_without_a_toe_only_friction_and_lag_are_sought():
     angle = np.linspace(0.0, TURN, 50, endpoint=False)
     columns = np.stack([np.zeros(50), np.ones(50), np.cos(angle)], axis=1)
-    found = find(*sums_of(columns, columns @ [0.0, 2.0, 0.1]), 1.0)
+    found = find(sums_of(columns, columns @ [0.0, 2.0, 0.1]), 1.0)
     np.testing.assert_allclose(found.values, [0.0, 2.0, 0.1])
     estimate = LoadEstimate(100.0)
     estimate.take(found, True)
@@ -107,8 +109,8 @@ def test_without_a_toe_only_friction_and_lag_are_sought():
 
 def test_what_cannot_be_told_apart_is_not_guessed():
     columns = np.ones((50, 3))
-    assert find(*sums_of(columns, np.ones(50)), 1.0) is None
-    assert find(*sums_of(columns[:3], np.ones(3)), 1.0) is None
+    assert find(sums_of(columns, np.ones(50)), 1.0) is None
+    assert find(sums_of(columns[:3], np.ones(3)), 1.0) is None
 
 
 @pytest.mark.parametrize("force, friction", [(0.0, 0.0), (-60.0, 1.5), (100.0, 0.0)])
@@ -146,7 +148,7 @@ def test_a_sudden_load_is_believed_soon_and_a_doubtful_one_not():
         columns[:, LOAD] = 0.1 * np.sin(np.arange(200) * TURN / 200)
         columns[:, FRICTION], columns[:, LAG] = 1.0, np.cos(np.arange(200) * 3.0 * TURN / 200)
         residual = columns @ [load - estimate.acting, 0.0, 0.0] + sigma * chance.standard_normal(200)
-        estimate.take(find(*sums_of(columns, residual), 10.0), True)
+        estimate.take(find(sums_of(columns, residual), 10.0), True)
 
     for _ in range(20):
         take(quiet["load"], 1.0)

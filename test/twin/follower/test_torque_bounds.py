@@ -6,8 +6,9 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from leg_wear_monitor.mechanism.ideal import TURN
+from leg_wear_monitor.record import new_records, record_of
 from leg_wear_monitor.twin.follower.repeating import CYCLES, RepeatingResidual
-from leg_wear_monitor.twin.follower.state import BY_PHASE, NUMBER, PHASES, RESIDUAL_2
+from leg_wear_monitor.twin.follower.state import PHASES, TORQUE_SUMS
 from leg_wear_monitor.twin.follower.torque_estimate import LoadEstimate, find
 
 pytestmark = pytest.mark.plain
@@ -17,15 +18,16 @@ COLUMNS = np.stack([0.1 * np.sin(ANGLE), np.ones(200), 40.0 * np.cos(3.0 * ANGLE
 
 
 def sums_of(residual):
-    sums = np.zeros(5)
-    sums[NUMBER], sums[RESIDUAL_2] = len(residual), residual @ residual
-    return sums, COLUMNS.T @ COLUMNS, COLUMNS.T @ residual
+    sums = record_of(new_records(1, TORQUE_SUMS))
+    sums.number, sums.residual_squares = len(residual), residual @ residual
+    sums.gram[:], sums.along[:] = COLUMNS.T @ COLUMNS, COLUMNS.T @ residual
+    return sums
 
 
 def test_a_foot_that_pulls_is_not_explained_by_a_load():
     """What a load below 0 would explain is left in the mismatch; the friction beside it is still found."""
     residual = COLUMNS @ [-50.0, 1.5, 0.001]
-    free, bounded = find(*sums_of(residual), 10.0), find(*sums_of(residual), 10.0, (0.0, 1000.0))
+    free, bounded = find(sums_of(residual), 10.0), find(sums_of(residual), 10.0, (0.0, 1000.0))
     assert free.left == pytest.approx(0.0, abs=1e-4)
     assert bounded.left == pytest.approx(5.0 / np.sqrt(2.0), rel=1e-6)
     np.testing.assert_allclose(bounded.values, [-50.0, 1.5, 0.001], rtol=1e-9)
@@ -37,7 +39,7 @@ def test_a_foot_that_pulls_is_not_explained_by_a_load():
 
 @given(st.floats(0.0, 500.0))
 def test_a_load_within_its_bounds_is_explained(load):
-    found = find(*sums_of(COLUMNS @ [load, 0.0, 0.0]), 10.0, (0.0, 1000.0))
+    found = find(sums_of(COLUMNS @ [load, 0.0, 0.0]), 10.0, (0.0, 1000.0))
     assert found.left == pytest.approx(0.0, abs=1e-3)
 
 
@@ -46,7 +48,7 @@ def instants(repeats: float, scatter: float, seed: int = 0):
     found, chance = RepeatingResidual(), np.random.default_rng(seed)
     phase = (np.arange(PHASES) + 0.5) / PHASES * TURN
     for _ in range(CYCLES):
-        sums = np.ones((BY_PHASE, PHASES))
+        sums = np.ones((5, PHASES))
         wave = np.sqrt(2.0) * repeats * np.sin(5.0 * phase)
         sums[1] = 2.0 + wave + scatter * chance.standard_normal(PHASES)
         sums[2], sums[4] = 0.1 * np.sin(phase), np.cos(2.0 * phase)

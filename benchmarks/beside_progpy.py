@@ -98,7 +98,7 @@ def ours() -> tuple[np.ndarray, float]:
     from leg_wear_monitor.monitor.config.forecast import Forecasting
     from leg_wear_monitor.monitor.forecast.forecast import JointCondition, forecast
     from leg_wear_monitor.monitor.forecast.growth_law import GrowthLaw
-    from leg_wear_monitor.monitor.forecast.wear_coefficients import believe
+    from leg_wear_monitor.monitor.forecast.wear_coefficients import estimate_coefficient
 
     law = GrowthLaw(np.array([[POWER]]), np.array([FRESH]), np.array([1.0]), np.zeros(1))
     now = JointCondition(
@@ -106,7 +106,9 @@ def ours() -> tuple[np.ndarray, float]:
     )
     settings = Forecasting(wear_coefficient_sigma=SIGMA, load_sigma=LOAD_SIGMA, clearance_sigma_m=FRESH_SIGMA)
     began = time.perf_counter()
-    told = forecast([now], [believe(settings, FRESH)], settings, law, cycle_s=1.0, valid=True).leg.cycles
+    told = forecast(
+        [now], [estimate_coefficient(settings, FRESH)], settings, law, cycle_s=1.0, valid=True
+    ).leg.cycles
     return np.array([told.p10, told.p50, told.p90]), time.perf_counter() - began
 
 

@@ -19,7 +19,7 @@ from leg_wear_monitor.monitor.config.forecast import Forecasting
 from leg_wear_monitor.monitor.forecast.forecast import Forecast, JointCondition, forecast
 from leg_wear_monitor.monitor.forecast.growth_law import GrowthLaw
 from leg_wear_monitor.monitor.forecast.life_file import law_of
-from leg_wear_monitor.monitor.forecast.wear_coefficients import Look, believe
+from leg_wear_monitor.monitor.forecast.wear_coefficients import MeasuredClearance, estimate_coefficient
 
 FRESH_M, MEASURED_M, GROWTH_NOISE = 3.0e-4, 5.0e-6, 0.03
 STEPS = 100  # of a joint's way to its limit, in the truth by a law
@@ -104,9 +104,10 @@ def case_of(life: HiddenLife, now: float, twin: HiddenLife, joints: str, random:
     return Case(state, clearance, (life.ends() - now) / later)
 
 
-def told(case: Case, law: GrowthLaw, measured: dict[int, Look]) -> Forecast:
+def told(case: Case, law: GrowthLaw, measured: dict[int, MeasuredClearance]) -> Forecast:
     coefficient_estimates = [
-        believe(SETTINGS, FRESH_M, [measured[k]] if k in measured else []) for k in range(len(case.now))
+        estimate_coefficient(SETTINGS, FRESH_M, [measured[k]] if k in measured else [])
+        for k in range(len(case.now))
     ]
     return forecast(case.now, coefficient_estimates, SETTINGS, law, cycle_s=1.0, valid=True)
 
@@ -114,16 +115,16 @@ def told(case: Case, law: GrowthLaw, measured: dict[int, Look]) -> Forecast:
 def evaluated(case: Case, law: GrowthLaw, random: np.random.Generator) -> np.ndarray:
     """p10, p50 and p90 over truth: (without, one, all) x (joints and the leg) x 3."""
     noise = MEASURED_M * random.standard_normal(len(case.now))
-    looks = {
-        k: Look(float(case.clearance_m[k] + noise[k]), MEASURED_M, each.wear_m)
+    observations = {
+        k: MeasuredClearance(float(case.clearance_m[k] + noise[k]), MEASURED_M, each.wear_m)
         for k, each in enumerate(case.now)
     }
     without = told(case, law, {})
-    singly = [told(case, law, {k: look}) for k, look in looks.items()]
+    singly = [told(case, law, {k: observation}) for k, observation in observations.items()]
     first = [each.joint for each in case.now].index(str(without.leg.first))
     one = Forecast(joints=tuple(f.joints[k] for k, f in enumerate(singly)), leg=singly[first].leg)
     truth = np.append(case.remain, case.remain.min())
-    rows = [[*f.joints, f.leg] for f in (without, one, told(case, law, looks))]
+    rows = [[*f.joints, f.leg] for f in (without, one, told(case, law, observations))]
     bands = np.array([[attrs.astuple(each.cycles) for each in row] for row in rows])
     return np.asarray(bands / truth[:, None])
 

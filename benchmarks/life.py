@@ -22,7 +22,7 @@ from leg_wear_monitor.monitor.config.forecast import Forecasting
 from leg_wear_monitor.monitor.forecast.forecast import JointCondition, forecast
 from leg_wear_monitor.monitor.forecast.growth_law import left_over
 from leg_wear_monitor.monitor.forecast.life_file import law_of, read_lives
-from leg_wear_monitor.monitor.forecast.wear_coefficients import believe
+from leg_wear_monitor.monitor.forecast.wear_coefficients import estimate_coefficient
 from leg_wear_monitor.share import share_directory
 from leg_wear_monitor.wear.cycle_jump import JumpControl
 
@@ -92,7 +92,7 @@ def ten_million(leg: Mechanism) -> None:
         )
         for k, joint in enumerate(leg.clearance_joints)
     ]  # fmt: skip
-    coefficient_estimates = [believe(settings, 3e-4) for _ in now]
+    coefficient_estimates = [estimate_coefficient(settings, 3e-4) for _ in now]
     for _ in range(2):  # the first makes the draws
         began = time.process_time()
         told = forecast(now, coefficient_estimates, settings, law, cycle_s=1.0, valid=True)

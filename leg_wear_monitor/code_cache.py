@@ -15,7 +15,7 @@ from leg_wear_monitor.errors import ConfigWarning
 PACKAGE, VARIABLE = "leg_wear_monitor", "NUMBA_CACHE_DIR"
 
 _ASKED = (VARIABLE, "XDG_CACHE_HOME")
-_NOT_KEPT = "compiled code is not kept, so every start compiles anew"
+_NOT_KEPT = "compiled code is not stored, so every start compiles again"
 _KEPT, _A_DAY_S = 2, 86400.0  # versions of the same code, and the age [s] at which more of them go
 _MOST_LINKS = 40  # as the kernel follows
 _OTHERS_WRITE, _OTHERS_ENTER, _OTHERS = 0o022, 0o011, 0o077

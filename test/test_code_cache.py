@@ -137,7 +137,7 @@ def test_a_directory_laid_in_advance_by_another_user_is_not_used(shared, tmp_pat
     assert Path(place).parents[1].parent == shared
     assert not Path(place).is_relative_to(laid.parent)
     assert f"{laid.parent} belongs to another user (uid {NOBODY})" in told
-    assert "compiled code is not kept" in told
+    assert "compiled code is not stored" in told
     assert not Path(place).exists()  # gone with the process
 
 
@@ -174,7 +174,7 @@ def test_child_processes_share_what_goes_with_their_parent(shared):
     shared.joinpath(f"leg_wear_monitor-{os.geteuid()}").write_text("in the way")
     places, told = where(TWICE, TMPDIR=str(shared), HOME="/dev/null")
     assert places[0] == places[1]
-    assert told.count("compiled code is not kept") == 1
+    assert told.count("compiled code is not stored") == 1
     assert [path.name for path in shared.iterdir()] == [f"leg_wear_monitor-{os.geteuid()}"]
 
 

@@ -62,11 +62,11 @@ def find_files(paths: Iterable[str | Path]) -> tuple[list[BagFile], list[Finding
     for number, path in enumerate(map(Path, paths)):
         mode = _mode(path)
         if mode is None:
-            raise RecordingError(str(path), "", "is not there, expected a bag directory, .mcap or .db3")
+            raise RecordingError(str(path), "", "does not exist, expected a bag directory, .mcap or .db3")
         found = _directory(path, findings) if stat.S_ISDIR(mode) else [_file(path, mode)]
         files += [attrs.evolve(file, recording=number) for file in found]
     if not files:
-        raise RecordingError("", "", "no recording is named, expected bag directories or .mcap or .db3 files")
+        raise RecordingError("", "", "no recording given, expected bag directories or .mcap or .db3 files")
     return files, findings
 
 
@@ -97,10 +97,10 @@ def _directory(path: Path, findings: list[Finding]) -> list[BagFile]:
     if named:
         missing = [name for name in named if name not in there]
         for name in missing:
-            findings.append(Finding(path / METADATA, f"names {name}, which is not there: it is lost"))
+            findings.append(Finding(path / METADATA, f"names {name}, which does not exist: it is lost"))
         there = [name for name in named if name not in missing]
     if not there:
-        raise RecordingError(str(path), "", "holds no .mcap or .db3 file")
+        raise RecordingError(str(path), "", "contains no .mcap or .db3 file")
     return [_file(path / name, stat.S_IFREG, **parts) for name in there]
 
 

@@ -63,7 +63,7 @@ class JointNames:
                 continue
             text = f"is not among the joints of {counts.missing} messages, they have {listed(counts.names)}"
             if not counts.found:
-                told = "say which is the crank by --crank-joint (crank_joint in the parameters)"
+                told = "set the crank with --crank-joint (crank_joint in the parameters)"
                 if found:
                     told = "the other files have it: give the recordings of one leg at a time"
                 raise RecordingError(str(path), self._crank, f"{text}; {told}")

@@ -47,7 +47,7 @@ def read_metadata(path: Path) -> Metadata:
     """
     try:
         if not stat.S_ISREG(path.stat().st_mode):
-            raise DamageError("is no file")
+            raise DamageError("is not a file")
         if path.stat().st_size > _LARGEST:
             raise DamageError(f"has {path.stat().st_size} bytes, expected at most {_LARGEST}")
         with open_regular(path) as file:
@@ -62,7 +62,7 @@ def _check_simple(text: str) -> None:
     """Refuse what a few lines can blow up beyond any bound: aliases, and brackets without end."""
     for event, depth in events_with_depth(text):
         if isinstance(event, AliasEvent):
-            raise DamageError("holds aliases, which no bag's has")
+            raise DamageError("contains aliases, which no bag's metadata has")
         if depth > _DEEPEST:
             raise DamageError(f"is nested more than {_DEEPEST} deep")
 

@@ -19,7 +19,7 @@ _KEPT = 8192  # samples of each file that others are compared with
 _ENOUGH = 20  # samples in common that say something
 _APART_RAD = 0.1  # more than clocks and noise of one crank's two recordings make
 _LONGEST_NS = 100_000_000  # between two samples that are interpolated
-_ADVICE = "are these two legs? Give one leg at a time, or say whose joints by --joint-states"
+_ADVICE = "are these two legs? Give one leg at a time, or select its topic with --joint-states"
 
 
 def check_topics(

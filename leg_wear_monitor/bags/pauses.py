@@ -84,6 +84,6 @@ class Pauses:
     def _tell(self, source: int, pause_ns: int) -> None:
         text = (
             f"begins {pause_ns * 1.0e-9:.4g} s after the recording before it ended; the leg was not "
-            "monitored during this pause, which is no fault of the input"
+            "monitored during this pause, which is not a fault of the input"
         )
         self.findings.append(Finding(self._files[source], text, Severity.NOTE))

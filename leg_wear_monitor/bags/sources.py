@@ -109,7 +109,7 @@ def assign(sources: list[Source], wanted: Iterable[Role]) -> tuple[dict[str, str
             for source in sources:
                 source.types |= _types(source, role, topic)
             continue
-        text = f"is no topic of the recording, it has {listed(there)}"
+        text = f"is not a topic of the recording, it has {listed(there)}"
         if role.needed:
             raise RecordingError(str(first), role.name, text)
         findings.append(Finding(first, f"{role.name}: {text}", Severity.NOTE))
@@ -146,13 +146,13 @@ def _expanded_file(bag_file: BagFile, budget: Budget, stack: ExitStack) -> Path:
     path = Path(stack.enter_context(tempfile.TemporaryDirectory())) / f"content{bag_file.storage}"
     with open_regular(bag_file.path) as file, path.open("wb") as content:
         if file.read(len(ZSTD_MAGIC)) != ZSTD_MAGIC:
-            raise DamageError("is no zstd file, as its name says")
+            raise DamageError("is not a zstd file, although its name says so")
         file.seek(0)
         for part in expanded(file):
             budget.take(len(part))
             content.write(part)
         if not content.tell():
-            raise DamageError("holds nothing that can be decompressed")
+            raise DamageError("contains nothing that can be decompressed")
     return path
 
 

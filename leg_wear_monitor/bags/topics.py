@@ -71,14 +71,14 @@ def find_topic(role: Role, topics: Iterable[str], where: str) -> str | None:
     if role.topic is not None:
         topic = "/" + role.topic.lstrip("/")
         if topic not in there:
-            raise RecordingError(where, topic, f"is no topic of the recording, it has {listed(there)}")
+            raise RecordingError(where, topic, f"is not a topic of the recording, it has {listed(there)}")
         return topic
     if f"/{role.name}" in there:
         return f"/{role.name}"
     near = [topic for topic in there if topic.endswith(f"/{role.name}")]
     if len(near) > 1:
         option = f"--{role.name}".replace("_", "-")
-        raise RecordingError(where, role.name, f"could be {listed(near)}, say which by {option}")
+        raise RecordingError(where, role.name, f"could be {listed(near)}, select one with {option}")
     return near[0] if near else None
 
 

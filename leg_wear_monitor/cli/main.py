@@ -32,7 +32,7 @@ class Verbs(click.Group):
     def get_command(self, ctx: click.Context, cmd_name: str) -> click.Command | None:
         """Import a verb's module and give its command."""
         if cmd_name.replace("_", "-") not in _VERBS:
-            fault = f"{cmd_name!r} is no verb, expected one of {', '.join(_VERBS)}"
+            fault = f"{cmd_name!r} is not a verb, expected one of {', '.join(_VERBS)}"
             raise click.UsageError(fault + did_you_mean(cmd_name, _VERBS), ctx)
         name = cmd_name.replace("-", "_")
         verb: click.Command = getattr(import_module(f"leg_wear_monitor.cli.verbs.{name}"), name)

@@ -32,7 +32,7 @@ def leg_of(config: Path | None, ledger: Path | None) -> tuple["MonitorConfig", "
     if ledger is not None:
         settings = attrs.evolve(settings, ledger=attrs.evolve(settings.ledger, path=str(ledger)))
     if not settings.ledger.path:
-        raise ConfigError("--ledger", "", "no ledger is named, neither here nor by ledger.path")
+        raise ConfigError("--ledger", "", "no ledger given, neither by --ledger nor by ledger.path")
     return settings, fitted(load_mechanism(settings.mechanism), settings)
 
 
@@ -47,7 +47,7 @@ def opened(leg: "Mechanism", settings: "MonitorConfig", dry_run: bool) -> Iterat
     with copy_of(settings.ledger.path) if dry_run else nullcontext(settings.ledger.path) as path:
         kept = open_ledger(leg, attrs.evolve(settings, ledger=attrs.evolve(settings.ledger, path=str(path))))
         if kept is None:
-            raise ConfigError("--ledger", "", "no ledger is named, neither here nor by ledger.path")
+            raise ConfigError("--ledger", "", "no ledger given, neither by --ledger nor by ledger.path")
         with closing(kept):
             yield kept
 
@@ -80,7 +80,7 @@ def _number(kept: "Ledger", joint: str | None, which: str) -> int:
     if which == LAST:
         open_ones = [each.id for each in own if not each.is_withdrawn]
         if not open_ones:
-            raise ConfigError("--withdraw", "", f"no measurement {whose}is there to be withdrawn")
+            raise ConfigError("--withdraw", "", f"no measurement {whose}can be withdrawn")
         return open_ones[-1]
     if not which.isascii() or not which.isdecimal() or int(which) not in {each.id for each in own}:
         known = ", ".join(str(each.id) for each in own) or "none"

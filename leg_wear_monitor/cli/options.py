@@ -40,7 +40,7 @@ def json_option(what: str) -> Option:
         "json_file",
         type=click.Path(allow_dash=True, path_type=Path),
         metavar="FILE",
-        help=f"Write {what} as JSON; - for stdout, which then holds nothing else.",
+        help=f"Write {what} as JSON; - for stdout, without other output there.",
     )
 
 

@@ -33,7 +33,7 @@ def print_replay(result: "ReplayResult", wall_s: float) -> None:
         f"samples, {len(result.history)} gait cycles\n"
     )
     if result.evidence.doubtful:
-        console.print(f"{result.evidence.doubtful} of the gait cycles can hardly be this leg's\n")
+        console.print(f"{result.evidence.doubtful} of the gait cycles do not fit this leg\n")
     last = result.history.last
     if result.is_believable and last is not None:
         console.print(_joints(result))
@@ -46,7 +46,7 @@ def print_replay(result: "ReplayResult", wall_s: float) -> None:
         words = raised_words(state_of(alarm), alarm.worst, alarm.limit, alarm.unit, alarm.raised_ns)
         console.print(f"{alarm.level.name:<6} {alarm.name}: {words}", soft_wrap=True)
     if not raised:
-        console.print("no alarm stands at the end")
+        console.print("no alarm is raised at the end")
     if result.is_believable:
         factor = result.duration_s / wall_s
         console.print(f"speed  {result.duration_s:.4g} s in {wall_s:.3g} s: {figure(factor)} times real time")

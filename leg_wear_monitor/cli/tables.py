@@ -85,12 +85,12 @@ def _summary(result: "SimulationResult", wall_s: float) -> Iterator[tuple[str, s
     torque = result.drive_torque_nm
     if result.clearance_joints:
         yield "wear", "greatest depth; 1 pm a cycle makes 1 um in a million cycles"
-        yield "zone", "holds 90 % of the bushing's wear, in angles of its own body"
+        yield "zone", "contains 90 % of the bushing's wear, in angles of its own body"
     values = {name: getattr(torque, name) for name in ("mean", "rms", "min", "max", "p99")}
     signed = ", ".join(f"{name} {figure(value)}" for name, value in values.items())
     yield "drive torque", f"{signed} N m; largest magnitude {figure(torque.max_abs)} N m"
     if result.clearance_joints and result.toe is not None:
-        yield "off the ideal", f"at most {_response(result.toe, torque)}"
+        yield "largest errors", _response(result.toe, torque)
     if result.energy_j is not None:
         yield "energy", _energy(result.energy_j)
     if result.surfaces is not None and result.surfaces.feeds_back:

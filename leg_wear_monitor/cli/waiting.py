@@ -32,7 +32,7 @@ def compilation(kernels: str, how_long: str = "about half a minute") -> Iterator
     if is_compiled(kernels):
         yield
         return
-    with _stopwatch(f"compiling for this machine, once: {how_long}"):
+    with _stopwatch(f"compiling numerical kernels (once per installation, {how_long})"):
         yield
     mark = _mark(kernels)
     if mark is not None:

@@ -87,7 +87,7 @@ def _field_error(error: BaseException) -> FieldError:
 def _unknown(key: str, known: list[str]) -> FieldError:
     renamed = new_name(key)
     if renamed in known:
-        return FieldError(key, f"is called {renamed} now")
+        return FieldError(key, f"is now called {renamed}")
     near = nearest(key, known)
     expected = f"did you mean {near}?" if near else f"expected one of {', '.join(known)}"
     return FieldError(key, f"unknown key, {expected}")
@@ -116,7 +116,7 @@ def _number(value: Any, _kind: Any) -> float:
     if not math.isfinite(number):
         raise FieldError("", f"{shown(value)} is not a finite number")
     if abs(number) > MOST:
-        raise FieldError("", f"{shown(value)} is larger than anything that is built, {MOST:g}")
+        raise FieldError("", f"{shown(value)} is too large, expected at most {MOST:g}")
     return number
 
 

@@ -58,7 +58,7 @@ def _text(path: Path, source: str) -> str:
         reason = error.strerror if isinstance(error, OSError) else str(error)
         raise ConfigError(source, "", f"cannot be read: {reason}") from error
     if len(content) > MOST_BYTES:
-        raise ConfigError(source, "", f"has more than {MOST_BYTES} bytes, it is no configuration")
+        raise ConfigError(source, "", f"has more than {MOST_BYTES} bytes, it is not a configuration")
     return content.decode("utf-8")
 
 
@@ -83,9 +83,9 @@ def _check_size(document: Any, source: str) -> None:
     """Measure a document with its aliases written out, but looking at each part only once."""
     values, levels = _extent(document, {}, frozenset())
     if levels > DEEPEST:
-        raise ConfigError(source, "", f"is nested more than {DEEPEST} deep, or holds itself")
+        raise ConfigError(source, "", f"is nested more than {DEEPEST} deep, or contains itself")
     if values > MOST_VALUES:
-        raise ConfigError(source, "", f"its aliases stand for more than {MOST_VALUES} values")
+        raise ConfigError(source, "", f"its aliases expand to more than {MOST_VALUES} values")
 
 
 def _extent(value: Any, known: dict[int, tuple[int, int]], above: frozenset[int]) -> tuple[int, int]:

@@ -30,7 +30,7 @@ def given_mechanism(mechanism: Mechanism | str | Path) -> Mechanism:
         return mechanism
     if isinstance(mechanism, str | Path):
         return load_mechanism(mechanism)
-    raise ConfigError("mechanism", "", f"{shown(mechanism)} is no Mechanism, nor a name or a file of one")
+    raise ConfigError("mechanism", "", f"{shown(mechanism)} is not a Mechanism, a name or a file")
 
 
 def given_joints(names: Sequence[str], mechanism: Mechanism) -> tuple[str, ...]:

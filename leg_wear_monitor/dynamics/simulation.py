@@ -191,7 +191,7 @@ def _spans(
         raise ConfigError(
             setup.linkage.mechanism.source,
             "drive.torque",
-            "has no even cycles; expected --duration, and neither --skip-cycles nor --trace",
+            "has no constant cycle time; expected --duration, and neither --skip-cycles nor --trace",
         )
     period = TURN / abs(setup.speed) if setup.speed else math.inf
     counted = cycles * period if duration_s is None else duration_s

@@ -62,8 +62,8 @@ class EncoderConfig:
     counts_per_turn: float = quantity(
         "", "steps of the angle in a turn, 0 for none", at_least=0.0, default=16384.0
     )
-    offset_rad: float = quantity("rad", "what it reads at crank angle 0", default=0.0)
-    wrapped: bool = described("angle wrapped to a turn; else it counts on", default=False)
+    offset_rad: float = quantity("rad", "reading at crank angle 0", default=0.0)
+    wrapped: bool = described("wrap the angle to a turn; otherwise it is continuous", default=False)
 
 
 @attrs.frozen(kw_only=True)
@@ -74,15 +74,13 @@ class JointEncodersConfig:
         "their names in joint_states, four at most; none if empty", default=(), check=_at_most_four
     )
     joints: tuple[str, ...] = described(
-        "the revolute joint that each is on; it reads from the bushing's body to the journal's", default=()
+        "revolute joint of each; the angle is from the bushing's body to the journal's", default=()
     )
     noise_rad: float = quantity(
         "rad", "noise of the angles, standard deviation", at_least=0.0, default=1.0e-4
     )
-    offsets_rad: tuple[float, ...] = quantity(
-        "rad", "what each reads more than the angle; 0 if empty", default=()
-    )
-    scale_errors: tuple[float, ...] = quantity("", "by what fraction each reads more; 0 if empty", default=())
+    offsets_rad: tuple[float, ...] = quantity("rad", "offset of each reading; 0 if empty", default=())
+    scale_errors: tuple[float, ...] = quantity("", "relative scale error of each; 0 if empty", default=())
 
     def __attrs_post_init__(self) -> None:
         for key in ("joints", "offsets_rad", "scale_errors"):
@@ -109,7 +107,7 @@ class TorqueSensorConfig:
     )
     noise_nm: float = quantity("N m", "noise, standard deviation", at_least=0.0, default=0.05)
     resolution_nm: float = quantity("N m", "step of the reading, 0 for none", at_least=0.0, default=0.01)
-    offset_nm: float = quantity("N m", "what it reads without torque", default=0.0)
+    offset_nm: float = quantity("N m", "reading without torque", default=0.0)
 
 
 @attrs.frozen(kw_only=True)
@@ -117,15 +115,17 @@ class TransportConfig:
     """What happens to a reading on its way."""
 
     jitter_s: float = quantity(
-        "s", "when it is taken, about its turn: standard deviation", at_least=0.0, default=1.0e-4
+        "s", "jitter of the sampling time, standard deviation", at_least=0.0, default=1.0e-4
     )
     drop_fraction: float = _fraction("fraction that is lost")
     duplicate_fraction: float = _fraction("fraction that arrives twice")
     late_fraction: float = _fraction("fraction that arrives late, overtaken by others")
-    late_s: float = quantity("s", "how late", at_least=0.0, default=0.02)
+    late_s: float = quantity("s", "delay of late messages", at_least=0.0, default=0.02)
     fault_fraction: float = _fraction("fraction of messages that are malformed, every way in turn")
-    gaps_s: tuple[float, ...] = quantity("s", "when nothing is heard for a while", at_least=0.0, default=())
-    gap_s: float = quantity("s", "how long that lasts", at_least=0.0, default=0.5)
+    gaps_s: tuple[float, ...] = quantity(
+        "s", "start times of gaps without messages", at_least=0.0, default=()
+    )
+    gap_s: float = quantity("s", "length of a gap", at_least=0.0, default=0.5)
 
 
 @attrs.frozen(kw_only=True)
@@ -156,15 +156,15 @@ class GaitConfig:
     mechanism: str = described(
         "mechanism file, or the name of one that comes with the package", default="bionic_leg"
     )
-    seed: int = quantity("", "of all noise; equal seeds, equal data", at_least=0, default=0)
-    duration_s: float = quantity("s", "time to walk, 0 without end", at_least=0.0, default=0.0)
+    seed: int = quantity("", "seed of all noise; equal seeds give equal data", at_least=0, default=0)
+    duration_s: float = quantity("s", "duration of the gait, 0 for no end", at_least=0.0, default=0.0)
     clearance_joints: tuple[str, ...] = described(
         "clearance joints; the mechanism's own if empty", default=()
     )
     clearances_m: tuple[float, ...] = quantity(
         "m", "radial clearances of the clearance joints; the mechanism's own if empty", above=0.0, default=()
     )
-    wear_acceleration: float = quantity("", "wear coefficients, times this", at_least=0.0, default=1.0)
+    wear_acceleration: float = quantity("", "factor on all wear coefficients", at_least=0.0, default=1.0)
     pace: PaceConfig = described("how the crank turns", factory=PaceConfig)
     encoder: EncoderConfig = described("the crank's encoder", factory=EncoderConfig)
     joint_encoders: JointEncodersConfig = described("encoders on further joints", factory=JointEncodersConfig)

@@ -168,7 +168,7 @@ def _sides(mechanism: Mechanism, joints: Sequence[str]) -> list[list[int]]:
     names = body_names(mechanism)
     for name in joints:
         if not isinstance(mechanism.joints.get(name), RevoluteJoint):
-            raise ConfigError("gait", "joint_encoders.joints", f"{name!r} is no revolute joint")
+            raise ConfigError("gait", "joint_encoders.joints", f"{name!r} is not a revolute joint")
     return [[names.index(body) for body in mechanism.sides(joint)] for joint in joints]
 
 

@@ -39,7 +39,7 @@ def simulate_lives(
     limit_m, horizon_cycles : float
         As in `simulate_life`.
     wear_factor : float
-        On all wear coefficients.
+        Factor on all wear coefficients.
     speed_rpm : float, optional
     progress : callable
         Called with the fraction of all lives that is done.

@@ -28,7 +28,7 @@ def clearance_joints(
     revolute = [name for name, joint in joints.items() if isinstance(joint, RevoluteJoint)]
     for name in own:
         if name not in revolute:
-            what = "is a prismatic joint" if name in joints else "is no joint"
+            what = "is a prismatic joint" if name in joints else "is not a joint"
             raise ConfigError(
                 source,
                 f"clearances.joints.{name}",

@@ -151,7 +151,7 @@ class Spring:
 class ConstantLoad:
     """A constant force on a point of a body."""
 
-    body: str = described("body that is pushed")
+    body: str = described("body that the force acts on")
     point: str = described("its point")
     force: Vector = quantity("N", "force in the ground's frame, [x, y]")
 
@@ -160,7 +160,7 @@ class ConstantLoad:
 class PhaseLoad:
     """A force on a point of a body as a table over the gait phase, linear between its entries, periodic."""
 
-    body: str = described("body that is pushed")
+    body: str = described("body that the force acts on")
     point: str = described("its point")
     phase: tuple[float, ...] = quantity(
         "", "fractions of the gait cycle, 0 at crank angle 0", at_least=0.0, check=_rises_below_one
@@ -198,15 +198,15 @@ class Mechanism:
         Where it was read from, for messages.
     """
 
-    name: str = described("what it is called in results")
+    name: str = described("name in results")
     gravity: Vector = quantity("m/s^2", "acceleration of free fall, [x, y]")
     ground: Ground = described("the fixed frame")
     bodies: dict[str, Body] = described("moving bodies by name")
     joints: dict[str, RevoluteJoint | PrismaticJoint] = described(
         "joints by name, which is also the name of their point on both bodies"
     )
-    drive: Drive = described("what turns the crank")
-    assembly: Assembly = described("where to start looking: crank angle and each body's pose")
+    drive: Drive = described("drive of the crank")
+    assembly: Assembly = described("initial guess: crank angle and each body's pose")
     springs: dict[str, Spring] = described("springs by name", factory=dict)
     loads: dict[str, ConstantLoad | PhaseLoad] = described("forces on points by name", factory=dict)
     clearances: dict[str, Clearance] = described("the joints with clearance and their settings", factory=dict)

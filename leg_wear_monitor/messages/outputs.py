@@ -184,7 +184,7 @@ def _alarm(alarm: Alarm) -> Status:
 def _lifetime(joint: JointReport) -> Status:
     name, told = f"forecast {joint.joint}", joint.forecast
     if told is None:
-        return Status(name, Level.OK, "too little growth or data to say", {})
+        return Status(name, Level.OK, "not enough growth or data", {})
     values = lifetime_values(told)
     values |= {f"clearance_{fraction}_m": value for fraction, value in attrs.asdict(told.clearance_m).items()}
     values["measurements"] = float(told.measurements)

@@ -8,7 +8,7 @@ from leg_wear_monitor.mechanism.arrays import Floats
 from leg_wear_monitor.monitor.encoders.clearance_estimate import ClearanceEstimate, ClearanceObservation
 from leg_wear_monitor.monitor.encoders.observer import EncoderObserver
 from leg_wear_monitor.monitor.forecast.forecaster import RENEWED_NS, Forecaster
-from leg_wear_monitor.monitor.forecast.wear_coefficients import Look
+from leg_wear_monitor.monitor.forecast.wear_coefficients import MeasuredClearance
 from leg_wear_monitor.twin.statistics import CycleStatistics
 
 
@@ -39,7 +39,7 @@ def update_forecast(
         state.updated_ns, state.other = statistics.stamp_ns, other
         state.believed = tuple(
             one.observation is ClearanceObservation.SEEN
-            and forecaster.seen(k, _look(one, float(worn_m[k])), replaced_ns[k])
+            and forecaster.seen(k, _measured(one, float(worn_m[k])), replaced_ns[k])
             for k, one in enumerate(seen)
         )
     believed = state.believed or (False,) * len(seen)
@@ -49,5 +49,5 @@ def update_forecast(
     )
 
 
-def _look(seen: ClearanceEstimate, wear_m: float) -> Look:
-    return Look(seen.clearance_m, seen.sigma_m, wear_m)
+def _measured(seen: ClearanceEstimate, wear_m: float) -> MeasuredClearance:
+    return MeasuredClearance(seen.clearance_m, seen.sigma_m, wear_m)

@@ -31,14 +31,14 @@ def last_reset(ledger: Ledger | None, joint: str, now: JointWear) -> Reset:
         If there is none, or what was before is not kept.
     """
     if ledger is None:
-        raise LegWearError(f"joint {joint}: no ledger is kept, so neither is the wear before a reset")
+        raise LegWearError(f"joint {joint}: no ledger is used, so the wear before a reset is not stored")
     if ledger.fault:
         raise LegWearError(f"joint {joint}: the ledger was not written: {ledger.fault}; try again when it is")
     found = ledger.last_reset(joint)
     if found is None:
-        raise LegWearError(f"joint {joint}: the ledger has no reset that was not taken back")
+        raise LegWearError(f"joint {joint}: the ledger has no reset to undo")
     if found.joint is None:
-        raise LegWearError(f"joint {joint}: was reset by an older version, which kept no more than its depth")
+        raise LegWearError(f"joint {joint}: was reset by an older version, which stored only its depth")
     if found.joint.depth.shape != now.depth.shape:
         raise LegWearError(f"joint {joint}: had {found.joint.depth.shape[1]} sectors when it was reset")
     return Reset(found.id, found.joint)

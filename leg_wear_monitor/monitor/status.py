@@ -26,7 +26,7 @@ _INPUT = tuple(spec.name() for spec in specs.OF_INPUT)
 
 def statuses(
     twin: DigitalTwin,
-    evaluate: AlarmEvaluation,
+    evaluation: AlarmEvaluation,
     accounting: Accounting,
     last: CycleReport | None,
     happened: Sequence[Event],
@@ -34,62 +34,62 @@ def statuses(
     encoders: EncoderObserver | None = None,
 ) -> tuple[Status, ...]:
     """All of it: gait, input, torque, each joint, further encoders if there are any, alarms, ledger."""
-    joints = [_joint(k, name, twin, evaluate, last) for k, name in enumerate(twin.clearance_joints)]
+    joints = [_joint(k, name, twin, evaluation, last) for k, name in enumerate(twin.clearance_joints)]
     return (
-        _gait(twin, evaluate, accounting, last, happened),
-        _input(twin, evaluate, accounting),
-        _torque(evaluate, last, record),
+        _gait(twin, evaluation, accounting, last, happened),
+        _input(twin, evaluation, accounting),
+        _torque(evaluation, last, record),
         *joints,
-        *((_encoders(encoders, evaluate, last),) if encoders else ()),
-        _alarms(evaluate),
+        *((_encoders(encoders, evaluation, last),) if encoders else ()),
+        _alarms(evaluation),
         _ledger(accounting),
     )
 
 
 def _gait(
     twin: DigitalTwin,
-    evaluate: AlarmEvaluation,
+    evaluation: AlarmEvaluation,
     accounting: Accounting,
     last: CycleReport | None,
     happened: Sequence[Event],
 ) -> Status:
     tracking = twin.tracking
-    message, level = tracking.name.lower().replace("_", " "), evaluate.board.level(specs.CADENCE.name())
-    if evaluate.guard.cause:
+    message, level = tracking.name.lower().replace("_", " "), evaluation.board.level(specs.CADENCE.name())
+    if evaluation.guard.cause:
         message, level = "not monitored: see input", Level.ERROR
     elif happened and tracking in (Tracking.STARTING, Tracking.OUT_OF_STEP):
         message += f", last {happened[-1].what.value.replace('_', ' ')}"
-    if evaluate.config.wear_acceleration != 1.0:
+    if evaluation.config.wear_acceleration != 1.0:
         message += "; wear is accelerated, this is a demonstration"
     values = {
         "cadence_rpm": twin.speed_radps * 30.0 / math.pi,
-        "commanded_rpm": evaluate.config.cadence.commanded_rpm,
-        "wear_acceleration": evaluate.config.wear_acceleration,
+        "commanded_rpm": evaluation.config.cadence.commanded_rpm,
+        "wear_acceleration": evaluation.config.wear_acceleration,
         **accounting.totals,
         "cycle_moving_s": last.moving_s if last else math.nan,
     }
     return Status("gait", level, message, values)
 
 
-def _input(twin: DigitalTwin, evaluate: AlarmEvaluation, accounting: Accounting) -> Status:
+def _input(twin: DigitalTwin, evaluation: AlarmEvaluation, accounting: Accounting) -> Status:
     counts = attrs.asdict(twin.intake) | {"already_counted": accounting.state.skipped}
     faulty = counts.pop("faulty")
     for stamp in ("newest_stamp_ns", "followed_stamp_ns"):
         counts.pop(stamp)
-    health = attrs.asdict(evaluate.state.health) if evaluate.state.health else {}
-    counts |= {"conflicting": evaluate.guard.conflicting, "implausible": evaluate.guard.implausible}
+    health = attrs.asdict(evaluation.state.health) if evaluation.state.health else {}
+    counts |= {"conflicting": evaluation.guard.conflicting, "implausible": evaluation.guard.implausible}
     values = {**health, **counts, **{f"faulty_{name}": count for name, count in faulty.items()}}
-    level = evaluate.board.level(*_INPUT)
-    bad = [name for name in _INPUT if evaluate.board.alarms[name].level is not Level.OK]
-    told = [*evaluate.causes, *([f"look at: {', '.join(bad)}"] if bad else [])]
-    message = "; ".join(told) or "in order"
-    if evaluate.guard.cause:
+    level = evaluation.board.level(*_INPUT)
+    bad = [name for name in _INPUT if evaluation.board.alarms[name].level is not Level.OK]
+    messages = [*evaluation.causes, *([f"see: {', '.join(bad)}"] if bad else [])]
+    message = "; ".join(messages) or "in order"
+    if evaluation.guard.cause:
         level = Level.ERROR
     return Status("input", level, message, {name: float(value) for name, value in values.items()})
 
 
-def _torque(evaluate: AlarmEvaluation, last: CycleReport | None, record: TorqueRecord) -> Status:
-    level = evaluate.board.level(*_TORQUE)
+def _torque(evaluation: AlarmEvaluation, last: CycleReport | None, record: TorqueRecord) -> Status:
+    level = evaluation.board.level(*_TORQUE)
     if last is None or not last.torque_samples:
         return Status("torque", level, "not compared: no drive torque in the last gait cycle", {})
     values = {
@@ -108,22 +108,24 @@ def _torque(evaluate: AlarmEvaluation, last: CycleReport | None, record: TorqueR
         "torque_lag_sigma_s": last.torque_lag_sigma_s,
         "crank_offset_error_rad": offset_error_rad(last, record),
     }
-    raised = {name for name in _TORQUE if evaluate.board.alarms[name].level is not Level.OK}
-    told = ["measured is not what was predicted"] if specs.MISMATCH.name() in raised else []
-    told += torque_causes(raised, last, record, evaluate.torque_bounds)
-    if not told and math.isnan(last.torque_mismatch):
-        told = ["instants are compared over several gait cycles, not enough yet"]
-    return Status("torque", level, "; ".join(told or ["measured as predicted"]), values)
+    raised = {name for name in _TORQUE if evaluation.board.alarms[name].level is not Level.OK}
+    messages = (
+        ["the measured torque differs from the predicted one"] if specs.MISMATCH.name() in raised else []
+    )
+    messages += torque_causes(raised, last, record, evaluation.torque_bounds)
+    if not messages and math.isnan(last.torque_mismatch):
+        messages = ["not enough gait cycles yet to compare instants"]
+    return Status("torque", level, "; ".join(messages or ["measured as predicted"]), values)
 
 
 def _joint(
-    k: int, name: str, twin: DigitalTwin, evaluate: AlarmEvaluation, last: CycleReport | None
+    k: int, name: str, twin: DigitalTwin, evaluation: AlarmEvaluation, last: CycleReport | None
 ) -> Status:
-    level = evaluate.board.level(*(spec.name(name) for spec in specs.JOINT))
+    level = evaluation.board.level(*(spec.name(name) for spec in specs.JOINT))
     values = {
         "clearance_m": float(twin.clearance_mean_m[k]),
         "clearance_max_m": float(twin.clearance_max_m[k]),
-        "clearance_limit_m": evaluate.board.clearance_limits_m[k],
+        "clearance_limit_m": evaluation.board.clearance_limits_m[k],
     }
     report = last.joints[k] if last else None
     if report is None:
@@ -142,11 +144,11 @@ def _joint(
     return Status(f"joint {name}", level, report.forecast.answer.value, values)
 
 
-def _encoders(encoders: EncoderObserver, evaluate: AlarmEvaluation, last: CycleReport | None) -> Status:
+def _encoders(encoders: EncoderObserver, evaluation: AlarmEvaluation, last: CycleReport | None) -> Status:
     """Further encoders: what is wrong with them, how they are off, and the clearances that they show."""
-    settings, state = evaluate.config.encoders, encoders.state
+    settings, state = evaluation.config.encoders, encoders.state
     kinds = {spec.kind for spec in specs.ENCODERS}
-    level = max(alarm.level for alarm in evaluate.board.alarms.values() if alarm.kind in kinds)
+    level = max(alarm.level for alarm in evaluation.board.alarms.values() if alarm.kind in kinds)
     values = {"cycles": float(encoders.cycles)}
     for i, name in enumerate(settings.names):
         kept = state.samples
@@ -162,9 +164,9 @@ def _encoders(encoders: EncoderObserver, evaluate: AlarmEvaluation, last: CycleR
             values[f"{joint.joint}_departure_m"] = joint.seen.departure_m
     wrong = faults(settings.names, state)
     if encoders.has_failed:
-        wrong.append("nothing to compare with: the leg could not be simulated with its clearances")
-    told = [*wrong, *_shown(last)]
-    return Status("encoders", max(level, Level.WARN) if wrong else level, "; ".join(told), values)
+        wrong.append("no reference: the leg could not be simulated with its clearances")
+    messages = [*wrong, *_shown(last)]
+    return Status("encoders", max(level, Level.WARN) if wrong else level, "; ".join(messages), values)
 
 
 def _shown(last: CycleReport | None) -> list[str]:
@@ -172,7 +174,7 @@ def _shown(last: CycleReport | None) -> list[str]:
     seen = [(joint.joint, joint.seen) for joint in last.joints if joint.seen] if last else []
     if not seen:
         return ["no whole gait cycle yet"]
-    told = [
+    messages = [
         f"joint {joint} is {'wider' if one.departure_m > 0.0 else 'narrower'} than counted"
         for joint, one in seen
         if one.is_other
@@ -183,17 +185,21 @@ def _shown(last: CycleReport | None) -> list[str]:
         for _, one in seen
         if one.observation in (ClearanceObservation.WAITING, ClearanceObservation.COMMISSIONING)
     }
-    if not told and not waiting and len(hidden) < len(seen):
-        told = ["clearances are as counted"]
-    return [*told, *(f"{joint} {ClearanceObservation.NOT_OBSERVABLE.value}" for joint in hidden), *waiting]
+    if not messages and not waiting and len(hidden) < len(seen):
+        messages = ["clearances agree with the counted ones"]
+    return [
+        *messages,
+        *(f"{joint} {ClearanceObservation.NOT_OBSERVABLE.value}" for joint in hidden),
+        *waiting,
+    ]
 
 
 def _or_nan(value: float | None) -> float:
     return math.nan if value is None else value
 
 
-def _alarms(evaluate: AlarmEvaluation) -> Status:
-    raised = [alarm for alarm in evaluate.board.alarms.values() if alarm.level is not Level.OK]
+def _alarms(evaluation: AlarmEvaluation) -> Status:
+    raised = [alarm for alarm in evaluation.board.alarms.values() if alarm.level is not Level.OK]
     waiting = sum(not alarm.acknowledged for alarm in raised)
     level = max((alarm.level for alarm in raised), default=Level.OK)
     message = f"raised: {', '.join(alarm.name for alarm in raised)}" if raised else f"none; {ADVICE}"
@@ -203,13 +209,13 @@ def _alarms(evaluate: AlarmEvaluation) -> Status:
 def _ledger(accounting: Accounting) -> Status:
     ledger = accounting.ledger
     if ledger is None:
-        return Status("ledger", Level.OK, "none is kept, wear is lost at the end", {})
+        return Status("ledger", Level.OK, "no ledger: wear is lost at the end", {})
     values = {"not_kept_s": accounting.not_kept_s}
     if ledger.fault:
         return Status("ledger", Level.ERROR, f"not written: {ledger.fault}; trying again", values)
     if accounting.state.cut_off_s is not None:
         values["cut_off_s"] = accounting.state.cut_off_s
-        message = ledger.told or "the run before was cut off, the wear of its last seconds is lost"
+        message = ledger.loss or "the previous run was interrupted, the wear of its last seconds is lost"
         return Status("ledger", Level.WARN, message, values)
     message = "is written at the end of the recording" if ledger.at_end else "kept"
     return Status("ledger", Level.OK, message, values)

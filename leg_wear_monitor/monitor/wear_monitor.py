@@ -373,9 +373,9 @@ class WearMonitor:
             self._accounting.ledger.close()
 
     @property
-    def ledger_told(self) -> str:
+    def ledger_loss(self) -> str:
         """What was wrong with the ledger as it was found, and may be lost with it; empty if nothing was."""
-        return self._accounting.ledger.told if self._accounting.ledger else ""
+        return self._accounting.ledger.loss if self._accounting.ledger else ""
 
     @property
     def is_all_counted(self) -> bool:

@@ -215,9 +215,9 @@ def _stamps_apart_s(result: ReplayResult, block: Block) -> float:
 def _about_the_ledger(result: ReplayResult) -> list[Finding]:
     """What is to be told of the ledger as it was found, and as it is left."""
     found = []
-    if result.monitor.ledger_told:
+    if result.monitor.ledger_loss:
         path = Path(result.monitor.config.ledger.path)
-        found.append(Finding(path, result.monitor.ledger_told, Severity.NOTE))
+        found.append(Finding(path, result.monitor.ledger_loss, Severity.NOTE))
     if result.monitor.is_all_counted:
         found.append(Finding(result.files[0], "all of it is in the ledger already", Severity.NOTE))
     if result.monitor.config.ledger.path and result.is_unusable:

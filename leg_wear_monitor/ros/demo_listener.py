@@ -26,7 +26,7 @@ class DemoListener:
     namespace : str
     domain : int
         ROS domain.
-    say : callable
+    report : callable
         Told a stamp [ns] and a line.
 
     Attributes
@@ -39,8 +39,8 @@ class DemoListener:
         Alarms that were raised, and those that were cleared by an acknowledgement.
     """
 
-    def __init__(self, namespace: str, domain: int, say: Callable[[int, str], None]) -> None:
-        self._say = say
+    def __init__(self, namespace: str, domain: int, report: Callable[[int, str], None]) -> None:
+        self._report = report
         self._context = Context()
         self._context.init(args=[], domain_id=domain)
         self._node = Node("witness", context=self._context, namespace=namespace)
@@ -72,7 +72,9 @@ class DemoListener:
         names = [name.removesuffix("_clearance") for name in message.name]
         self.clearances_m = dict(zip(names, message.position, strict=True))
         clearances = "  ".join(f"{name} {1e6 * c:.3f}" for name, c in self.clearances_m.items())
-        self._say(self.stamp_ns, f"clearance [um]  {clearances}   hardest impact {max(message.effort):.0f} N")
+        self._report(
+            self.stamp_ns, f"clearance [um]  {clearances}   hardest impact {max(message.effort):.0f} N"
+        )
 
     def _hear_alarms(self, message: DiagnosticArray) -> None:
         alarms = {status.name.split(": ", 1)[-1]: status for status in message.status}
@@ -80,7 +82,7 @@ class DemoListener:
         for name, status in up.items():
             if name not in self.raised:
                 self.raised.append(name)
-                self._say(_stamp_ns(message.header.stamp), f"ALARM {name}: {_told(status)}")
+                self._report(_stamp_ns(message.header.stamp), f"ALARM {name}: {_alarm_text(status)}")
         if up and all(status.message.startswith("latched") for status in up.values()) and not self._asked:
             self._asked = self._service.call_async(Trigger.Request())
             self._asked.add_done_callback(lambda future: self._hear_answer(future, list(up)))
@@ -88,10 +90,10 @@ class DemoListener:
     def _hear_answer(self, future: Future, names: list[str]) -> None:
         self._asked = None
         self.acknowledged += names
-        self._say(self.stamp_ns, f"alarms acknowledged: {future.result().message}")
+        self._report(self.stamp_ns, f"alarms acknowledged: {future.result().message}")
 
 
-def _told(status: DiagnosticStatus) -> str:
+def _alarm_text(status: DiagnosticStatus) -> str:
     values = {value.key: value.value for value in status.values}
     unit = next((key.removeprefix("value_") for key in values if key.startswith("value_")), "")
     suffix = f"_{unit}" if unit else ""

@@ -20,12 +20,12 @@ NOW_NS = 10 * 10**9  # samples of now are no farther from it; the inbox holds no
 NO_DATE_NS = 10**17  # stamps below are of 1970 to 1973: they count from the start of something
 
 UNDECIDED = (
-    "samples of a time that is in the ledger already are left out: nothing is monitored. "
+    "samples of a time that is in the ledger already are skipped: nothing is monitored. "
     "If they are simulated, set use_sim_time: true; "
-    "if their clock begins anew with each start, ledger.skip_counted: false; "
+    "if their clock restarts with each start, ledger.skip_counted: false; "
     "if a recording is played, use replay or no ledger"
 )
-BEGUN = "the clock of the samples has begun anew: they are counted as a new epoch"
+BEGUN = "the clock of the samples has restarted: they are counted as a new epoch"
 
 _BOOT_ID = Path("/proc/sys/kernel/random/boot_id")
 
@@ -48,14 +48,14 @@ class Epochs:
         See `boot_id`.
     now_ns : callable
         The node's clock [ns].
-    say : callable
+    report : callable
         Told once of each, whether it is an error and a line.
     """
 
     def __init__(
-        self, monitor: WearMonitor, boot: str, now_ns: Callable[[], int], say: Callable[[bool, str], None]
+        self, monitor: WearMonitor, boot: str, now_ns: Callable[[], int], report: Callable[[bool, str], None]
     ) -> None:
-        self._monitor, self._now_ns, self._say = monitor, now_ns, say
+        self._monitor, self._now_ns, self._report = monitor, now_ns, report
         self._is_other_boot = monitor.begin_run(boot)
         self._begun, self._left_out, self._told = 0, 0, 0
 
@@ -69,10 +69,10 @@ class Epochs:
         if is_now or (self._is_other_boot and stamp_ns < NO_DATE_NS):
             self._monitor.begin_epoch(stamp_ns, "clock")
             self._begun += 1
-            self._say(False, BEGUN)
+            self._report(False, BEGUN)
             return
         if not self._left_out:
-            self._say(True, UNDECIDED)
+            self._report(True, UNDECIDED)
         self._left_out += int(np.count_nonzero(known))
 
     def status(self) -> Status:
@@ -81,4 +81,4 @@ class Epochs:
         is_undecided, self._told = self._left_out > self._told, self._left_out
         if is_undecided:
             return Status("clock", Level.ERROR, UNDECIDED, values)
-        return Status("clock", Level.OK, BEGUN if self._begun else "goes on from what is counted", values)
+        return Status("clock", Level.OK, BEGUN if self._begun else "continues", values)

@@ -114,8 +114,8 @@ class MonitorNode(ClosingNode):
     def _compile(self, decoder: Decoder) -> None:
         """Pay for compilation before the first sample."""
         log = self.get_logger()
-        log.info("getting ready; the first time this compiles for a minute")
-        with repeated(lambda passed_s: log.info(f"getting ready: {passed_s:.0f} s")):
+        log.info("preparing; the first start compiles numerical kernels for a minute")
+        with repeated(lambda passed_s: log.info(f"preparing: {passed_s:.0f} s")):
             self._monitor.warm_up()
         for kind in TYPES.values():
             decoder.one(b"", kind)
@@ -170,7 +170,7 @@ class MonitorNode(ClosingNode):
 
     def _diagnose(self) -> None:
         now_ns = time.time_ns()
-        if self._supervision.look():
+        if self._supervision.check():
             self._send_alarms()
         status = (
             *self._monitor.status(),
@@ -224,7 +224,7 @@ class MonitorNode(ClosingNode):
         if not self._confirmation.is_confirmed(joint):
             raise LegWearError(asked_once(joint, self._monitor.wear_of(joint)))
         self._monitor.reset_wear(joint, stamp_ns, "service ~/reset_wear")
-        return f"joint {joint}: fresh surfaces, history kept; ~/undo_reset/{joint} takes it back"
+        return f"joint {joint}: new surfaces, history kept; ~/undo_reset/{joint} reverts it"
 
     def _undo_reset(self, joint: str) -> str:
         stamp_ns = audit_time(self._ros_now_ns())

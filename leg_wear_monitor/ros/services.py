@@ -42,7 +42,7 @@ def audit_time(now_ns: int) -> int:
     """
     if now_ns <= 0:
         raise LegWearError(
-            "there is no time to note in the ledger: use_sim_time is set and nothing came on /clock; "
+            "there is no time for the ledger: use_sim_time is set and no message came on /clock; "
             "publish /clock or start the node without use_sim_time"
         )
     return now_ns
@@ -51,16 +51,18 @@ def audit_time(now_ns: int) -> int:
 def asked_once(joint: str, wear: JointWear) -> str:
     """What a reset would wipe, and how to mean it."""
     return (
-        f"joint {joint}: not reset yet; this would set {_told(wear)} to 0; "
+        f"joint {joint}: not reset yet; this would set {_wear_text(wear)} to 0; "
         f"call again within {CONFIRM_S:g} s if the part was replaced"
     )
 
 
 def undone(joint: str, wear: JointWear) -> str:
     """What a joint has worn after a reset was taken back."""
-    return f"joint {joint}: the reset is taken back, {_told(wear)} are counted, those since the reset too"
+    return (
+        f"joint {joint}: the reset is undone, {_wear_text(wear)} are counted, including those since the reset"
+    )
 
 
-def _told(wear: JointWear) -> str:
+def _wear_text(wear: JointWear) -> str:
     """Mean wear of the two surfaces together, and in how many gait cycles."""
     return f"{1e6 * float(wear.depth.sum(axis=0).mean()):.4g} um of wear from {wear.cycles} gait cycles"

@@ -107,7 +107,7 @@ LAUGHS = "a: &a [x, x]\n" + "".join(
 @pytest.mark.parametrize(
     ("text", "why"),
     [
-        (f"{LAUGHS}{METADATA}[x.mcap]\n  compression_mode: *y\n", "holds aliases"),
+        (f"{LAUGHS}{METADATA}[x.mcap]\n  compression_mode: *y\n", "contains aliases"),
         (f"{METADATA}{'[' * 5000}", "is nested more than 20 deep"),
         (f"{METADATA}[x.mcap]\n#{'x' * 2**20}", "expected at most 1048576"),
     ],
@@ -132,7 +132,7 @@ def test_a_pipe_is_refused_without_a_wait(tmp_path: Path, read: Any, name: str, 
     home = tmp_path / "bag" if in_a_bag else tmp_path
     home.mkdir(exist_ok=True)
     os.mkfifo(home / name)
-    with pytest.raises(RecordingError, match=r"is a pipe, expected a file|holds no \.mcap or \.db3 file"):
+    with pytest.raises(RecordingError, match=r"is a pipe, expected a file|contains no \.mcap or \.db3 file"):
         read(home if in_a_bag else home / name)
 
 

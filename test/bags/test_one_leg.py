@@ -12,7 +12,7 @@ from leg_wear_monitor.errors import printable
 from leg_wear_monitor.messages import encode
 
 START_NS, RATE_HZ = 1_700_000_000 * 10**9, 200
-ADVICE = "Give one leg at a time, or say whose joints by --joint-states"
+ADVICE = "Give one leg at a time, or select its topic with --joint-states"
 
 
 def write(
@@ -78,7 +78,9 @@ def test_messages_without_the_crank_among_others_are_a_finding(tmp_path: Path, r
     """As where two drivers publish their joints on one topic."""
     arm = write(tmp_path / "arm.mcap", names=("elbow", "wrist\x1b[2J"))
     both = tmp_path / "both.mcap"
-    with pytest.raises(RecordingError, match=r"of 400 messages, they have elbow, wrist\\x1b\[2J; say which"):
+    with pytest.raises(
+        RecordingError, match=r"of 400 messages, they have elbow, wrist\\x1b\[2J; set the crank"
+    ):
         read(arm)
     stamps = START_NS + np.arange(400, dtype=np.int64) * 5_000_000
     with McapWriter(both) as writer:

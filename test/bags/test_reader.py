@@ -114,7 +114,7 @@ def test_a_file_compressed_as_a_whole_and_cut_short(
     assert recording.is_partial
     assert 0 < len(samples) < len(expected(sent))
     assert samples.tobytes() == expected(sent)[: len(samples)].tobytes()
-    for content, text in ((whole[:1000], "holds nothing that can be"), (b"PK\3\4", "is no zstd file")):
+    for content, text in ((whole[:1000], "contains nothing that can be"), (b"PK\3\4", "is not a zstd file")):
         packed.write_bytes(content)
         with pytest.raises(RecordingError, match=text):
             read(packed)
@@ -212,11 +212,11 @@ def test_topics_in_a_namespace_are_found_and_several_must_be_named(
     assert recording.topics["joint_states"] == "/left/joint_states"
     assert samples.tobytes() == expected(sent).tobytes()
     both = write_bag(tmp_path / "two.mcap", renamed(sent, "/left") + renamed(sent, "/right"))
-    with pytest.raises(RecordingError, match="could be /left/joint_states, /right/joint_states, say"):
+    with pytest.raises(RecordingError, match="could be /left/joint_states, /right/joint_states, select"):
         read(both)
     named = {"joint_states": "right/joint_states", "drive_torque": "/right/drive_torque"}
     assert read(both, **named)[0].tobytes() == expected(sent).tobytes()
-    with pytest.raises(RecordingError, match="/up/joint_states: is no topic of the recording"):
+    with pytest.raises(RecordingError, match="/up/joint_states: is not a topic of the recording"):
         read(both, joint_states="/up/joint_states")
 
 
@@ -224,11 +224,11 @@ def test_what_cannot_be_used_is_refused_by_name(
     tmp_path: Path, sent: Any, write_bag: Any, read: Read
 ) -> None:
     torque_only = [each for each in sent if each.topic == "/drive_torque"]
-    with pytest.raises(RecordingError, match=r"a.mcap: joint_states: is no topic .* it has /drive_torque"):
+    with pytest.raises(RecordingError, match=r"a.mcap: joint_states: is not a topic .* it has /drive_torque"):
         read(write_bag(tmp_path / "a.mcap", torque_only))
     joints_only = [each for each in sent if each.topic == "/joint_states"]
     _, recording = read(write_bag(tmp_path / "b.mcap", joints_only))
-    assert any("drive_torque: is no topic" in str(finding) for finding in recording.findings)
+    assert any("drive_torque: is not a topic" in str(finding) for finding in recording.findings)
     config = MonitorConfig(drive_torque=DriveTorque(source="float64"))
     expected = "/drive_torque: is of type geometry_msgs/msg/WrenchStamped, expected std_msgs/msg/Float64"
     with pytest.raises(RecordingError, match=expected):
@@ -310,7 +310,7 @@ def test_a_missing_part_of_a_bag_is_a_loss(tmp_path: Path, sent: Any, write_bag:
         "rosbag2_bagfile_information: {relative_file_paths: [a_0.mcap, a_1.mcap]}"
     )
     _, recording = read(tmp_path)
-    assert losses(recording) == ["names a_1.mcap, which is not there: it is lost"]
+    assert losses(recording) == ["names a_1.mcap, which does not exist: it is lost"]
 
 
 def test_memory_stays_flat(tmp_path: Path, write_bag: Any, traffic: Any) -> None:

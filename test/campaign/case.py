@@ -42,7 +42,7 @@ class Ran:
     def complaints(self) -> list[str]:
         """Lines on stderr, but for the one that says why the very first run takes long."""
         lines = self.stderr.splitlines()
-        return [line for line in lines if not line.startswith("compiling for this machine")]
+        return [line for line in lines if not line.startswith("compiling numerical kernels")]
 
 
 def never(_ran: Ran) -> str:

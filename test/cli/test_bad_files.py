@@ -60,7 +60,7 @@ BROKEN = [
     ("speed: 6.28", "torque: 1, speed: 6.28", ["drive", "speed and torque", "expected one of"]),
     (CRANK_POSE, "", ["assembly.crank", "missing", "[m, m, rad]"]),
     (CRANK_POSE, CRANK_POSE + "  arm: [0, 0, 0]\n", ["assembly.arm", "'arm'", "not a moving body"]),
-    ("[A, B, G, I, J]", "[A, Q]", ["clearances.joints.Q", "no joint", "A, B, C"]),
+    ("[A, B, G, I, J]", "[A, Q]", ["clearances.joints.Q", "not a joint", "A, B, C"]),
     ("[A, B, G, I, J]", "[A, B, A]", ["clearances.joints", "['A', 'B', 'A']", "twice"]),
     (
         DRIVE,

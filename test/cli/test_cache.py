@@ -49,7 +49,7 @@ def test_nothing_is_removed_where_no_place_is_safe(run, monkeypatch):
     monkeypatch.setattr(kernel, "cache_directory", lambda: None)
     result = run("cache", "--clear")
     assert result.exit_code == 2
-    assert result.stderr == "error: no directory is safe for compiled code, so none is kept\n"
+    assert result.stderr == "error: no directory is safe for compiled code, so it is not stored\n"
 
 
 def test_a_run_ends_well_while_the_cache_is_cleared(place, run):

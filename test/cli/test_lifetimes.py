@@ -41,7 +41,7 @@ def test_terminal_page_summary_and_status_agree(run, bag, tmp_path):
     lasting = result.stdout.split("lasts", 1)[1].splitlines()
     for name, joint in record["joints"].items():
         told = joint["forecast"]
-        assert told["answer"].startswith("from growth as it is")
+        assert told["answer"].startswith("from the growth so far")
         words = [three_digits(told[unit][fraction]) for unit in ("hours", "days") for fraction in FRACTIONS]
         assert [line.split()[1:] for line in lasting if line.startswith(f"{name} ")] == [words]
         assert re.search(r"\s*".join(f"<td[^>]*>{re.escape(word)}</td>" for word in words), page)

@@ -164,9 +164,9 @@ def test_what_counts_as_an_alarm_asked_for(worst, asked, raised):
 @pytest.mark.parametrize(
     ("arguments", "line"),
     [
-        (["nowhere.mcap"], "error: nowhere.mcap: is not there, expected a bag directory"),
+        (["nowhere.mcap"], "error: nowhere.mcap: does not exist, expected a bag directory"),
         ([], "error: Missing argument 'BAG...'. (see leg-wear-monitor replay --help)"),
-        (["{bag}", "--joint-states", "/x"], "error: {bag}: /x: is no topic of the recording, it has"),
+        (["{bag}", "--joint-states", "/x"], "error: {bag}: /x: is not a topic of the recording, it has"),
         (["{bag}", "--config", "nowhere.yaml"], "error: nowhere.yaml: "),
         (["{bag}", "--time", "wall"], "error: Invalid value for '--time'"),
         (["{bag}", "--fail-on", "wear"], "error: Invalid value for '--fail-on'"),
@@ -224,7 +224,7 @@ TURNING = 2.0 * np.pi * np.arange(N) / RATE_HZ
 def test_without_a_believable_gait_cycle_there_are_no_forces(run, tmp_path, stamps, angle, why, complaints):
     result = run("replay", str(write(tmp_path / "x.mcap", stamps, angle)), "--out", "out")
     assert result.exit_code == 1
-    assert f"warning: no gait cycle can be this leg's, so no forces are given: {why}" in complaints(result)
+    assert f"warning: no gait cycle fits this leg, so no forces are given: {why}" in complaints(result)
     assert "pm/cycle" not in result.stdout
     assert "speed" not in result.stdout
     record = json.loads((tmp_path / "out" / "summary.json").read_text())
@@ -235,7 +235,7 @@ def test_without_a_believable_gait_cycle_there_are_no_forces(run, tmp_path, stam
         "missing": why,
         "is_counted": False,
     }
-    assert f"What is missing: {why}" in html.unescape((tmp_path / "out" / "report.html").read_text())
+    assert f"Missing: {why}" in html.unescape((tmp_path / "out" / "report.html").read_text())
 
 
 def test_a_clock_that_goes_back_makes_no_negative_time(run, tmp_path):

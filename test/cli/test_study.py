@@ -63,7 +63,7 @@ def test_points_that_are_missing_are_told_and_the_rest_is_shown(run, done, tmp_p
         (["study", "size"], "Missing option '--out'"),
         (["study", "size", "--config", "no.yaml", "--out", "o"], "no.yaml: cannot be read: No such file"),
         (["study", "size", "--mechanism", "frog", "--out", "o"], "frog: no mechanism of this name"),
-        (["report", "nowhere"], "nowhere: holds no study.json, expected the --out of a study"),
+        (["report", "nowhere"], "nowhere: contains no study.json, expected the --out of a study"),
     ],
 )
 def test_what_cannot_be_is_one_line(run, line, fault):

@@ -13,9 +13,9 @@ LAUGHS = "a0: &a0 {x: 1, y: 2}\n" + "".join(
 CHAIN = "a0: &a0 {x: 1}\n" + "".join(f"a{i + 1}: &a{i + 1} {{x: *a{i}}}\n" for i in range(3000))
 
 HOSTILE = {
-    "holds itself": ("/**: &x {ros__parameters: *x}", "holds itself"),
-    "a list in itself": ("name: &x [*x]", "holds itself"),
-    "aliases of aliases": (LAUGHS, "its aliases stand for more than 100000 values"),
+    "contains itself": ("/**: &x {ros__parameters: *x}", "contains itself"),
+    "a list in itself": ("name: &x [*x]", "contains itself"),
+    "aliases of aliases": (LAUGHS, "its aliases expand to more than 100000 values"),
     "a chain of aliases": (CHAIN, "nested more than 50 deep"),
     "brackets": ("a: " + 5000 * "[", "nested more than 50 deep"),
     "braces in brackets": ("a: " + 60 * "[" + 60 * "]", "nested more than 50 deep"),
@@ -36,7 +36,7 @@ def test_hostile_yaml_is_one_line(tmp_path, what):
         with pytest.raises(ConfigError) as told:
             load(tmp_path / "x.yaml")
         assert "\n" not in str(told.value)
-        assert said in str(told.value) or "is no ROS parameter file" in str(told.value)
+        assert said in str(told.value) or "is not a ROS parameter file" in str(told.value)
     assert not (tmp_path / "pwned").exists()
 
 

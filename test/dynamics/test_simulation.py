@@ -158,7 +158,7 @@ def test_a_mechanism_can_be_given_by_name_and_by_path(leg, document, tmp_path):
     ("given", "said"),
     [
         ({"mechanism": "bionik_leg"}, "did you mean bionic_leg?"),
-        ({"mechanism": 7}, "mechanism: 7 is no Mechanism, nor a name or a file of one"),
+        ({"mechanism": 7}, "mechanism: 7 is not a Mechanism, a name or a file"),
         ({"clearances": "AB"}, "clearances: 'AB' is a text, expected a list of names"),
         ({"clearances": 5}, "clearances: 5 is not a list of names"),
         ({"clearances": [1]}, "clearances: 1 is not the name of a joint"),

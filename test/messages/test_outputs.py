@@ -130,9 +130,7 @@ def test_a_forecast_says_what_is_known(store: Any, reports: Reports) -> None:
         attrs.evolve(cycle, joints=(*cycle.joints, third))
     )
     *unknown, told = store.deserialize_cdr(raw, FORECAST.type).status
-    assert [(status.message, status.values) for status in unknown] == 2 * [
-        ("too little growth or data to say", [])
-    ]
+    assert [(status.message, status.values) for status in unknown] == 2 * [("not enough growth or data", [])]
     assert told.message == Answer.KNOWN.value
     values = {pair.key: pair.value for pair in told.values}
     assert [values[f"{fraction}_hours"] for fraction in ("p10", "p50", "p90")] == ["1", "2", "3"]

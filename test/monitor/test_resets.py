@@ -38,7 +38,7 @@ def test_wear_before_and_since_a_reset_is_of_one_part_once_it_is_taken_back(begi
     assert np.array_equal(
         np.delete(monitor.wear_depth_m, monitor.clearance_joints.index("G"), axis=0), others
     )
-    with pytest.raises(LegWearError, match="joint G: the ledger has no reset that was not taken back"):
+    with pytest.raises(LegWearError, match="joint G: the ledger has no reset to undo"):
         monitor.undo_reset("G", START_NS + 8, "bob")
     monitor.close()
     with closing(sqlite3.connect(tmp_path / "wear.ledger")) as db:
@@ -53,5 +53,5 @@ def test_wear_before_and_since_a_reset_is_of_one_part_once_it_is_taken_back(begi
 def test_without_a_ledger_there_is_nothing_to_take_back(leg) -> None:
     monitor = WearMonitor(leg, config_from({"clearance_joints": ["G"]}))
     monitor.reset_wear("G", START_NS, "ann")
-    with pytest.raises(LegWearError, match="no ledger is kept"):
+    with pytest.raises(LegWearError, match="no ledger is used"):
         monitor.undo_reset("G", START_NS, "ann")

@@ -69,7 +69,7 @@ def full_page():
         title="A page",
         summary="What was asked.",
         sections=[
-            Section("What to conclude", [Sentences(["first", "second"])]),
+            Section("Conclusions", [Sentences(["first", "second"])]),
             Section("Pictures", [one, Gallery(pictures=[one, other], caption="both"), live, live]),
             Section("Tables & texts", [table, Text("some text"), Listing(text="key: value")]),
         ],

@@ -115,12 +115,12 @@ def test_a_part_is_replaced_and_the_ledger_saved(shared_stage, monitor, ledger: 
     assert ledger.exists()
     answer = trigger(shared_stage, "undo_reset/A")
     assert answer.success
-    assert "taken back" in answer.message
+    assert "undone" in answer.message
     joints = {one.name: one.values["clearance_m"] for one in wear_monitor.status() if "joint" in one.name}
     assert joints == before
     answer = trigger(shared_stage, "undo_reset/A")
     assert not answer.success
-    assert "has no reset that was not taken back" in answer.message
+    assert "has no reset to undo" in answer.message
 
 
 def test_saving_without_a_ledger_says_so(stage) -> None:

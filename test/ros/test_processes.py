@@ -52,7 +52,7 @@ def test_a_monitor_stopped_while_it_gets_ready_leaves_an_ordered_ledger(
     ledger, log = tmp_path / "wear.db", tmp_path / "monitor.log"
     node = started("monitor", log, "-p", f"ledger.path:={ledger}")
     try:
-        stage.wait_for(lambda: b"getting ready" in log.read_bytes(), f"getting ready in {log}")
+        stage.wait_for(lambda: b"preparing" in log.read_bytes(), f"preparing in {log}")
         node.send_signal(signal.SIGTERM)
         assert node.wait(60) == 0
     finally:

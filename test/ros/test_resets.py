@@ -35,7 +35,7 @@ def test_without_a_clock_nothing_is_reset(monkeypatch: pytest.MonkeyPatch) -> No
         overrides = [Parameter("use_sim_time", value=True), Parameter("clearance_joints", value=["G"])]
         node = MonitorNode(context=context, parameter_overrides=overrides)
         for act in (node._reset_wear, node._reset_wear, node._undo_reset):
-            with pytest.raises(LegWearError, match="no time to note in the ledger: use_sim_time"):
+            with pytest.raises(LegWearError, match="no time for the ledger: use_sim_time"):
                 act("G")
         node.close()
         node.destroy_node()

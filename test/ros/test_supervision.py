@@ -71,8 +71,8 @@ def used(crank: int, torque: int) -> dict[str, int]:
 def test_after_a_silence_every_status_says_since_when_it_has_no_data() -> None:
     one = silence()
     one.note(used(10, 10), 6 * SECOND, NOON_NS + SECOND)
-    assert one.told(STATUSES, 7 * SECOND) == STATUSES
-    told = one.told(STATUSES, 9 * SECOND)
+    assert one.marked(STATUSES, 7 * SECOND) == STATUSES
+    told = one.marked(STATUSES, 9 * SECOND)
     assert [status.name for status in told] == [status.name for status in STATUSES]
     for status in told:
         assert status.level is Level.ERROR
@@ -93,7 +93,7 @@ def test_messages_that_cannot_be_used_are_silence_and_their_cause_stays() -> Non
     one.note(used(10, 10), 6 * SECOND, NOON_NS)
     one.note(used(10, 10), 8 * SECOND, NOON_NS)
     faulty = Status("input", Level.WARN, "9 of 9 samples have a zero stamp: set header.stamp", {})
-    (told,) = one.told([faulty], 9 * SECOND)
+    (told,) = one.marked([faulty], 9 * SECOND)
     assert told.message.endswith("; 9 of 9 samples have a zero stamp: set header.stamp")
     assert told.message.startswith("no current data since")
 
@@ -102,12 +102,12 @@ def test_silence_is_over_with_the_next_sample() -> None:
     one = silence()
     one.note(used(10, 10), 6 * SECOND, NOON_NS)
     one.note(used(11, 11), 9 * SECOND, NOON_NS)
-    assert one.told(STATUSES, 9 * SECOND) == STATUSES
+    assert one.marked(STATUSES, 9 * SECOND) == STATUSES
 
 
 @pytest.mark.parametrize(("after_s", "level"), [(0, Level.WARN), (9, Level.WARN), (10, Level.ERROR)])
 def test_no_data_from_the_start_is_an_error_after_ten_seconds(after_s: int, level: Level) -> None:
-    told = silence().told(STATUSES, (5 + after_s) * SECOND)
+    told = silence().marked(STATUSES, (5 + after_s) * SECOND)
     assert {status.level for status in told} == {level}
     assert all("since the start at 2023-11-14T22:13:20.000Z" in status.message for status in told)
 
@@ -116,7 +116,7 @@ def test_a_silent_torque_concerns_the_torque() -> None:
     one = silence()
     one.note(used(10, 10), 6 * SECOND, NOON_NS)
     one.note(used(20, 10), 9 * SECOND, NOON_NS + 3 * SECOND)
-    told = {status.name: status for status in one.told(STATUSES, 9 * SECOND)}
+    told = {status.name: status for status in one.marked(STATUSES, 9 * SECOND)}
     assert told["torque"].message == "no current data since 2023-11-14T22:13:20.000Z"
     assert told["gait"].message == "in step"
 
@@ -160,7 +160,7 @@ def test_a_fault_of_the_node_is_logged_once_and_its_end_too() -> None:
     lines = Lines()
     log = StatusLog(lines)
     full = Status("recording", Level.ERROR, "stopped: no space left", {})
-    behind = Status("load", Level.WARN, "falls behind", {"waiting": 7.0})
+    behind = Status("load", Level.WARN, "overloaded: forces and torques", {"waiting": 7.0})
     fine = Status("recording", Level.OK, "on", {})
     for statuses in (
         [fine],
@@ -171,7 +171,7 @@ def test_a_fault_of_the_node_is_logged_once_and_its_end_too() -> None:
         log.note(statuses)
     assert lines.lines == [
         (Level.ERROR, "recording: stopped: no space left"),
-        (Level.WARN, "load: falls behind"),
+        (Level.WARN, "load: overloaded: forces and torques"),
         (Level.OK, "recording: on"),
         (Level.OK, "load: keeps up"),
     ]
@@ -204,9 +204,9 @@ def test_a_clock_that_stands_or_is_set_back_is_told() -> None:
 
 
 def test_two_statuses_of_the_clock_are_one() -> None:
-    counted = Status("clock", Level.OK, "goes on from what is counted", {"epochs_begun": 0.0})
+    counted = Status("clock", Level.OK, "continues", {"epochs_begun": 0.0})
     fine, stands = Status("clock", Level.OK, "goes on", {}), Status("clock", Level.ERROR, "stands still", {})
-    assert both_clocks(counted, fine).message == "goes on from what is counted"
+    assert both_clocks(counted, fine).message == "continues"
     told = both_clocks(counted, stands)
     assert (told.level, told.message, told.values) == (Level.ERROR, "stands still", {"epochs_begun": 0.0})
 

@@ -68,7 +68,7 @@ def test_a_fine_curve_reaches_the_largest_torque():
     leg.stepper.advance(drive, 0.02, new_run_statistics(10))
     begin, errors = round(leg.stepper.time * turn), []
     for i in range(begin, begin + turn // 8):
-        errors.append(abs(leg.look().torque - leg.stepper.work.now.torque_0[0]))
+        errors.append(abs(leg.observe().torque - leg.stepper.work.now.torque_0[0]))
         leg.stepper.advance(drive, (i + 1) / turn, statistics)
     assert statistics.impacts.sum() > 0
     assert 0.99 < max(errors) / statistics.response[TORQUE_ERROR] < 1.001

@@ -99,7 +99,7 @@ def test_a_directory_of_another_study_or_a_damaged_one_is_told(tiny, tmp_path):
     with pytest.raises(ConfigError, match=r"k\.npz: cannot be read"):
         StudyDirectory(tmp_path).read("k", "response", {})
     (tmp_path / "study.json").write_text("{}")
-    with pytest.raises(ConfigError, match="is no study of format"):
+    with pytest.raises(ConfigError, match="is not a study of format"):
         load_results(tmp_path)
     (tmp_path / "study.json").write_text("{")
     with pytest.raises(ConfigError, match="is not JSON"):

@@ -140,7 +140,7 @@ class McapFile:
             segment.size,
             segment.compression,
         ):
-            raise DamageError("is not what the index says")
+            raise DamageError("differs from the index")
         data = content(self.file, segment, self.budget)
         if not segment.cut:
             check(data, head.crc)
@@ -159,7 +159,7 @@ class McapFile:
             records.walk(data, roles, messages, _NO_POSITIONS, counts)
         rest = len(data) - int(counts["read"][0])
         if rest and not segment.cut:
-            self._find(f"chunk at byte {segment.at} holds {rest} bytes that are no records: they are lost")
+            self._find(f"chunk at byte {segment.at} holds {rest} bytes that are not records: they are lost")
         for name, what in (("unknown_channel", "messages of no channel"), ("foreign", "records of no kind")):
             if counts[name][0]:
                 self._find(f"chunk at byte {segment.at} holds {counts[name][0]} {what}: they are lost")
@@ -174,7 +174,7 @@ class McapFile:
         if self.without_checksum and not self.layout.data_crc:
             self._find(
                 f"has no checksum for {self.without_checksum} of {len(self.layout.segments)} chunks: "
-                "a damaged number in them would not be seen",
+                "a damaged number in them would not be detected",
                 Severity.NOTE,
             )
 
@@ -185,7 +185,7 @@ class McapFile:
             raise RecordingError(str(self.path), "", "is empty, expected an MCAP file")
         if start != MAGIC:
             raise RecordingError(
-                str(self.path), "", f"begins with {start!r}, expected {MAGIC!r}: is no MCAP file"
+                str(self.path), "", f"begins with {start!r}, expected {MAGIC!r}: is not an MCAP file"
             )
 
     def _check_data(self) -> None:
@@ -203,4 +203,4 @@ class McapFile:
         if len(self.findings) < _MOST_FINDINGS:
             self.findings.append(Finding(self.path, text, weight))
         elif len(self.findings) == _MOST_FINDINGS:
-            self.findings.append(Finding(self.path, "has more findings than these; they are not listed"))
+            self.findings.append(Finding(self.path, "has more findings that are not listed"))

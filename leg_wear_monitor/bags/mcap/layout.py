@@ -180,7 +180,7 @@ def chunk_head(file: IO[bytes], at: int, size: int) -> Segment:
     Raises
     ------
     DamageError
-        If there is no chunk.
+        If it is not a chunk.
     """
     file.seek(at)
     head = file.read(RECORD_HEAD + _CHUNK_HEAD.size + 4 + 16 + 8)
@@ -190,11 +190,11 @@ def chunk_head(file: IO[bytes], at: int, size: int) -> Segment:
         text_at = RECORD_HEAD + _CHUNK_HEAD.size + 4
         (text,) = struct.unpack_from("<I", head, text_at - 4)
         if opcode != CHUNK or text > 16:
-            raise DamageError("is no chunk")
+            raise DamageError("is not a chunk")
         compression = head[text_at : text_at + text].decode("ascii")
         (stored,) = struct.unpack_from("<Q", head, text_at + text)
     except (struct.error, UnicodeDecodeError) as error:
-        raise DamageError("is no chunk") from error
+        raise DamageError("is not a chunk") from error
     data_at = at + text_at + text + 8
     if stored != length - (data_at - at - RECORD_HEAD):
         raise DamageError("has lengths that contradict each other")

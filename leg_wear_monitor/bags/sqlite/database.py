@@ -62,9 +62,9 @@ def open_database(
     except DamageError as error:
         raise RecordingError(str(path), "", str(error)) from error
     except (*UNREADABLE, OSError) as error:
-        raise RecordingError(str(path), "", f"is no readable .db3 file: {one_line(error)}") from error
+        raise RecordingError(str(path), "", f"is not a readable .db3 file: {one_line(error)}") from error
     names = " and ".join(each.name for each in beside)
-    return database, [f"was not closed: what stands in {names} beside it is read, too"] if beside else []
+    return database, [f"was not closed: the content of {names} beside it is read, too"] if beside else []
 
 
 def one_line(error: Exception) -> str:
@@ -98,7 +98,7 @@ def _check_tables(database: sqlite3.Connection) -> None:
     for table, needed in _NEEDED.items():
         kind, text = there.get(table, ("", ""))
         if kind != "table" or text[:20].upper().startswith("CREATE VIRTUAL"):
-            raise DamageError(f"is no readable .db3 file: it has no table {table}")
+            raise DamageError(f"is not a readable .db3 file: it has no table {table}")
         plain = {row[1] for row in database.execute(f"PRAGMA table_xinfo({table})") if not row[6]}
         if missing := sorted(needed - plain):
-            raise DamageError(f"is no readable .db3 file: its table {table} has no {', '.join(missing)}")
+            raise DamageError(f"is not a readable .db3 file: its table {table} has no {', '.join(missing)}")

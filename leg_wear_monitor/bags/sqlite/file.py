@@ -19,7 +19,7 @@ from leg_wear_monitor.messages.cdr import MESSAGE
 _Row = tuple[int, int, int]  # id, time, topic
 _TOGETHER = 4096
 _MOST_TOPICS = 65536
-_NO_CHECKSUMS = "has no checksums, as no .db3 has: a damaged number would not be seen"
+_NO_CHECKSUMS = "has no checksums, like all .db3 files: a damaged number would not be detected"
 
 
 class SqliteFile:
@@ -55,7 +55,7 @@ class SqliteFile:
                 )
             )
         except (*UNREADABLE, OSError) as error:
-            raise RecordingError(str(path), "", f"is no readable .db3 file: {one_line(error)}") from error
+            raise RecordingError(str(path), "", f"is not a readable .db3 file: {one_line(error)}") from error
         self._found = 0
         self._tell_strangers()
 
@@ -89,7 +89,7 @@ class SqliteFile:
             while rows := cursor.fetchmany(_TOGETHER):
                 yield deque(rows)
         except UNREADABLE as error:
-            self.findings.append(Finding(self.path, f"breaks off: {one_line(error)}"))
+            self.findings.append(Finding(self.path, f"ends early: {one_line(error)}"))
 
     def _piece(self, rows: deque[_Row], types: dict[int, int], stored: int) -> Piece:
         """Messages of the next rows, as many as there is room for; those rows are taken away."""

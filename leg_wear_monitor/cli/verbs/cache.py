@@ -11,7 +11,7 @@ from leg_wear_monitor.errors import LegWearError
 _MOST = 20  # directories that are listed: one version has about ten
 
 
-@click.command(short_help="Compiled code on this machine.")
+@click.command(short_help="List or remove the compiled code on this machine.")
 @click.option("--clear", is_flag=True, help="Remove it; the next start compiles again.")
 def cache(clear: bool) -> None:
     """Print where compiled code is kept and how much of it, by version; or remove it.
@@ -24,7 +24,7 @@ def cache(clear: bool) -> None:
 
     here = cache_directory()
     if here is None:
-        raise LegWearError("no directory is safe for compiled code, so none is kept")
+        raise LegWearError("no directory is safe for compiled code, so it is not stored")
     kept = kept_directories(here.parent)
     click.echo(f"place: {here.parent}")
     if clear:

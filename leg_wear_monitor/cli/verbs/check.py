@@ -22,7 +22,7 @@ DOUBTED = 1
 _LIBRARIES = ("attrs", "cattrs", "click", "jinja2", "matplotlib", "numba", "numpy", "rich", "ruamel.yaml")
 
 
-@click.command(short_help="Say what is wrong with a configuration or an installation.")
+@click.command(short_help="Check a configuration or the installation.")
 @click.argument("configs", nargs=-1, metavar="[CONFIG]...")
 def check(configs: tuple[str, ...]) -> int:
     """Check files of mechanisms and of parameters, or, without any, the installation and its own files.
@@ -81,7 +81,7 @@ def _kernels() -> str:
 
     place = cache_directory()
     if place is None:
-        return "compiled anew at every start: no place for compiled code is private"
+        return "compiled at every start: no place for compiled code is private"
     check_directory("NUMBA_CACHE_DIR", place)
     state = "compiled" if is_compiled(DEFAULT_MODEL) else "to be compiled by the first simulation"
     return f"{state}, in {place}"

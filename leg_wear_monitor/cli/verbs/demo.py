@@ -30,14 +30,14 @@ _PATIENCE_S = 60.0
 _COMPARED = ("clearance_states", "impact_forces", "predicted_torque")
 
 
-@click.command(short_help="The whole story, on this machine, in about half a minute.")
+@click.command(short_help="A demonstration on this machine in about half a minute.")
 @click.option(
     "--out",
     type=click.Path(path_type=Path),
     default="leg_wear_demo",
     show_default=True,
     metavar="DIR",
-    help="Where recording, report and logs go.",
+    help="Directory of recording, report and logs.",
 )
 def demo(out: Path) -> int:
     """Run the monitor and a synthetic leg as two ROS processes; record, replay and report what they did.
@@ -54,7 +54,7 @@ def demo(out: Path) -> int:
     _compare_with_truth(out, demo_listener)
     click.echo(f"report: {(out / 'report.html').resolve()}")
     if not same or not any(name.startswith("impact_force") for name in demo_listener.acknowledged):
-        click.echo("error: the demo did not go as it should; see the logs beside the report", err=True)
+        click.echo("error: the demo failed; see the logs beside the report", err=True)
         return WITH_FINDINGS
     return DONE
 
@@ -169,4 +169,4 @@ def _compare_with_truth(out: Path, demo_listener: "DemoListener") -> None:
     for joint, column in truth["clearance_m"].items():
         grown = float(np.interp(at_s, truth["cycle_end_s"], column[:-1])) - column[0]
         found = demo_listener.clearances_m[joint] - column[0]
-        click.echo(f"joint {joint}: worn {1e9 * grown:.0f} nm, monitor says {1e9 * found:.0f} nm")
+        click.echo(f"joint {joint}: true wear {1e9 * grown:.0f} nm, monitor {1e9 * found:.0f} nm")

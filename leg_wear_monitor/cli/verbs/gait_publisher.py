@@ -6,10 +6,10 @@ gait_publisher = node_verb(
     "gait-publisher",
     "gait_publisher.node",
     "The synthetic leg as a ROS 2 node.",
-    """Publish what the sensors of a synthetic leg say: joint_states and drive_torque.
+    """Publish the sensor signals of a synthetic leg: joint_states and drive_torque.
 
-    The leg walks in full coordinates with clearances and wear of its own; noise, loss, load, speed and a
+    The leg is simulated in full coordinates with its own clearances and wear; noise, loss, load, speed and a
     knocking joint are parameters: --ros-args -p NAME:=VALUE, or --params-file FILE. `ros2 param describe`
-    tells them. What `ros2 run leg_wear_monitor gait_publisher` starts.
+    explains them. `ros2 run leg_wear_monitor gait_publisher` starts the same node.
     """,
 )

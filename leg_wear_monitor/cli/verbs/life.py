@@ -48,7 +48,7 @@ _ROWS = 12  # of the table
     show_default=True,
     callback=bounded(above=0.0),
     metavar="N",
-    help="Gait cycles at most.",
+    help="Largest number of gait cycles.",
 )
 @click.option(
     "--wear-factor",
@@ -57,7 +57,7 @@ _ROWS = 12  # of the table
     show_default=True,
     callback=bounded(above=0.0),
     metavar="X",
-    help="On all wear coefficients.",
+    help="Factor on all wear coefficients.",
 )
 @click.option(
     "--opens-m",
@@ -66,9 +66,14 @@ _ROWS = 12  # of the table
     metavar="M",
     help="Deepest change of a surface in a jump.  [default: 3e-05]",
 )
-@click.option("--legs", type=click.IntRange(min=1), metavar="N", help="Legs averaged.  [default: 2]")
 @click.option(
-    "--cycles", type=click.IntRange(min=2), metavar="N", help="Cycles of each averaged.  [default: 4]"
+    "--legs", type=click.IntRange(min=1), metavar="N", help="Number of legs averaged.  [default: 2]"
+)
+@click.option(
+    "--cycles",
+    type=click.IntRange(min=2),
+    metavar="N",
+    help="Gait cycles of each leg averaged.  [default: 4]",
 )
 @click.option(
     "--lives",
@@ -76,8 +81,8 @@ _ROWS = 12  # of the table
     default=1,
     show_default=True,
     metavar="N",
-    help="Lives for --json: further ones have coefficients that differ, to show the forecast how joints act "
-    "upon each other.",
+    help="Number of lives for --json; lives after the first have different wear coefficients, from which the "
+    "forecast finds the effect of joints on each other.",
 )
 @json_option("the life")
 @out_option("Write life.json and life.png.")
@@ -163,9 +168,9 @@ def lines(result: "Life", limit_m: float) -> list[str]:
             for k in range(len(result.clearance_joints))
         )
         table.append(f"{result.cycles[i]:10.3g}{cells}")
-    table.append(f"jumps: {points - 1}; greatest error seen in one: {1e6 * result.error_m.max():.2g} µm")
+    table.append(f"jumps: {points - 1}; largest error of one: {1e6 * result.error_m.max():.2g} µm")
     for k, joint in enumerate(result.clearance_joints):
         cycles = result.cycles_to(k, limit_m)
-        held = "" if cycles <= result.cycles[-1] else ", if it goes on at its last rate"
+        held = "" if cycles <= result.cycles[-1] else ", extrapolated at its last rate"
         table.append(f"{joint} reaches {1e6 * limit_m:g} µm after {cycles:.3g} gait cycles{held}")
     return table

@@ -18,7 +18,7 @@ if TYPE_CHECKING:
 CONTRADICTS = 1
 
 
-@click.command(short_help="A measured clearance, for the forecast to learn from.")
+@click.command(short_help="A measured clearance, which updates the forecast.")
 @click.argument("joint", required=False)
 @click.argument("mm", type=float, required=False, callback=bounded("mm", above=0.0))
 @click.option(
@@ -40,8 +40,8 @@ CONTRADICTS = 1
     metavar="FILE",
     help="Ledger to write into.  [default: the one in the parameters]",
 )
-@click.option("--accept", is_flag=True, help="Let it count even if it contradicts the model.")
-@click.option("--dry-run", is_flag=True, help="Print what it says, and write nothing.")
+@click.option("--accept", is_flag=True, help="Use it even if it contradicts the model.")
+@click.option("--dry-run", is_flag=True, help="Print the result and write nothing.")
 @click.option("--list", "listed", is_flag=True, help="Print the ledger's measurements with their numbers.")
 @click.option(
     "--withdraw",
@@ -98,7 +98,7 @@ def _measured(
 
     settings, leg = leg_of(config, ledger)
     if joint not in leg.clearance_joints:
-        fault = f"{joint!r} is no clearance joint, expected one of {', '.join(leg.clearance_joints)}"
+        fault = f"{joint!r} is not a clearance joint, expected one of {', '.join(leg.clearance_joints)}"
         raise ConfigError("JOINT", "", fault + did_you_mean(joint, leg.clearance_joints))
     with opened(leg, settings, dry_run) as kept:
         parts = {wear.name: wear for wear in kept.entry.joints} if kept.entry else {}

@@ -6,9 +6,9 @@ monitor = node_verb(
     "monitor",
     "monitor_node",
     "The monitor as a ROS 2 node.",
-    """Follow a leg by joint_states and drive_torque, and say how its joints wear.
+    """Monitor the joint wear of a leg from joint_states and drive_torque.
 
     It monitors as soon as it runs. Parameters: --ros-args --params-file FILE, or -p NAME:=VALUE;
-    docs/parameters.md lists them. What `ros2 run leg_wear_monitor monitor` starts.
+    docs/parameters.md lists them. `ros2 run leg_wear_monitor monitor` starts the same node.
     """,
 )

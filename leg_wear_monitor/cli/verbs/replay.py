@@ -29,7 +29,7 @@ TIMES = ("header", "log", "publish")
 _MOST_LINES = 20
 
 
-@click.command(short_help="A recording through the same monitor that runs live.")
+@click.command(short_help="Replay a recording through the monitor that runs live.")
 @click.argument("bags", nargs=-1, required=True, type=click.Path(path_type=Path), metavar="BAG...")
 @out_option("Write reports.mcap (for rosbag2 and Foxglove), summary.json and report.html.")
 @click.option(
@@ -44,23 +44,25 @@ _MOST_LINES = 20
     type=click.Choice(TIMES),
     default="header",
     show_default=True,
-    help="Which time stamps the samples.",
+    help="Source of the samples' stamps.",
 )
 @click.option("--joint-states", metavar="TOPIC", help="Topic of the crank.  [default: */joint_states]")
 @click.option("--drive-torque", metavar="TOPIC", help="Topic of the torque.  [default: */drive_torque]")
 @click.option(
     "--node",
     metavar="NAME",
-    help="Full name of the node to be in the stead of.  [default: leg_wear_monitor beside the crank's topic]",
+    help="Full name of the node to replace.  [default: leg_wear_monitor beside the crank's topic]",
 )
-@click.option("--crank-joint", metavar="NAME", help="The crank's name.  [default: as the parameters say]")
+@click.option(
+    "--crank-joint", metavar="NAME", help="The crank's name.  [default: crank_joint of the parameters]"
+)
 @click.option(
     "--memory-mb",
     type=click.FloatRange(min=16.0),
     default=512.0,
     show_default=True,
     metavar="MB",
-    help="Memory that reading may take, temporary files included.",
+    help="Memory limit of reading, temporary files included.",
 )
 @click.option(
     "--ledger",
@@ -101,10 +103,10 @@ def replay(
     for finding in result.findings[:_MOST_LINES]:
         click.echo(f"warning: {finding}", err=True)
     if len(result.findings) > _MOST_LINES:
-        click.echo(f"warning: and {len(result.findings) - _MOST_LINES} findings more", err=True)
+        click.echo(f"warning: {len(result.findings) - _MOST_LINES} more findings", err=True)
     if result.is_unusable:
         missing = result.evidence.missing()
-        click.echo(f"warning: no gait cycle can be this leg's, so no forces are given: {missing}", err=True)
+        click.echo(f"warning: no gait cycle fits this leg, so no forces are given: {missing}", err=True)
     if json_file != STDOUT:
         from leg_wear_monitor.cli.replay_tables import print_replay
 

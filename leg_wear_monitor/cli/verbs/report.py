@@ -20,7 +20,7 @@ _MISMADE = (
 )  # fmt: skip
 
 
-@click.command(short_help="The page of a run again, from its data.")
+@click.command(short_help="Write the HTML page of a run again, from its data.")
 @click.argument("directory", type=click.Path(path_type=Path), metavar="DIR")
 def report(directory: Path) -> int:
     """Draw the page of a study or a replay again from what lies in DIR; nothing is computed."""
@@ -30,7 +30,7 @@ def report(directory: Path) -> int:
         raise ConfigError(
             str(directory),
             "",
-            "holds no study.json, expected the --out of a study or of a replay",
+            "contains no study.json, expected the --out of a study or of a replay",
         )
     from leg_wear_monitor.cli.verbs.study import write_study_page
 
@@ -56,7 +56,7 @@ def _check_version(version: object, source: Path) -> None:
 
 
 def _refuse(name: str) -> None:
-    raise ValueError(f"{name} is no JSON")
+    raise ValueError(f"{name} is not JSON")
 
 
 @contextmanager

@@ -19,12 +19,12 @@ FAULTS_FOUND = 1
 
 @click.command(short_help="The paper's parameter studies.")
 @click.argument("name", type=click.Choice(NAMES), metavar="NAME")
-@click.option("--mechanism", metavar="FILE", help="Another leg than the description's.")
+@click.option("--mechanism", metavar="FILE", help="Another leg than that of the study file.")
 @click.option(
     "--config",
     type=click.Path(path_type=Path),
     metavar="FILE",
-    help="Description of the study.  [default: config/studies/NAME.yaml of the package]",
+    help="Study file.  [default: config/studies/NAME.yaml of the package]",
 )
 @click.option(
     "--out",
@@ -37,7 +37,7 @@ FAULTS_FOUND = 1
     "--workers",
     type=click.IntRange(min=1),
     metavar="N",
-    help="Processes here.  [default: cores]",
+    help="Number of local processes.  [default: cores]",
 )
 @click.option(
     "--scheduler", metavar="ADDRESS", help="Dask scheduler whose workers compute instead, tcp://HOST:PORT."

@@ -65,7 +65,7 @@ def advance_batch(
         [statistics.time for statistics in statistics_of_all],
     ):
         if len({id(array) for array in what}) < len(what):
-            raise ValueError("two legs of a batch share their surfaces or their tally")
+            raise ValueError("two legs of a batch share their surfaces or their run statistics")
     times = np.broadcast_to(np.asarray(t_end, dtype=float), len(steppers)).tolist()
     jobs = list(zip(steppers, polynomials, times, statistics_of_all, strict=True))
     with ThreadPoolExecutor(workers or os.cpu_count()) as pool:

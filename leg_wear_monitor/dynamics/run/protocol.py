@@ -15,15 +15,14 @@ DONE, STEP_TOO_SMALL, SINGULAR, PUSHED_THROUGH, INVALID_DRIVE = 0, 1, 2, 3, 4
 
 _REASONS = {
     STEP_TOO_SMALL: (
-        "the step that resolves the motion fell to nothing; "
-        "look for a mass, inertia or stiffness far out of range"
+        "the integration step became too small; check for a mass, inertia or stiffness far out of range"
     ),
-    SINGULAR: "the closures became singular; look for a dead point, or try smaller clearances",
+    SINGULAR: "the closures became singular; check for a dead point, or try smaller clearances",
     PUSHED_THROUGH: (
         "the journal was pushed through a tenth of the bushing's radius; "
         "try a lower speed, a smaller clearance or a higher stiffness"
     ),
-    INVALID_DRIVE: "the crank's motion is not finite or far too fast; look at its speed and acceleration",
+    INVALID_DRIVE: "the crank's motion is not finite or far too fast; check its speed and acceleration",
 }
 
 

@@ -22,15 +22,15 @@ class Forecasting:
     )
     load_sigma: float = quantity(
         "",
-        "the same of the wear a cycle to come about that so far, for load and pace vary",
+        "standard deviation of the logarithm of future wear per cycle, because load and pace vary",
         at_least=0.0,
         at_most=3.0,
         default=0.1,
     )
     model_sigma: float = quantity(
         "",
-        "the same of what growth is off that is supposed to stay as it is, where no lives tell how it "
-        "changes (docs/forecast.md)",
+        "standard deviation of the logarithm of the growth, which is assumed constant without simulated "
+        "lives (docs/forecast.md)",
         at_least=0.0,
         at_most=3.0,
         default=0.4,
@@ -38,10 +38,10 @@ class Forecasting:
     clearance_sigma_m: float = quantity(
         "m", "standard deviation of a new joint's clearance", at_least=1.0e-9, at_most=1.0e-3, default=5.0e-6
     )
-    duty_hours_per_day: float = quantity("h", "walking a day", at_least=0.01, at_most=24.0, default=8.0)
+    duty_hours_per_day: float = quantity("h", "walking per day", at_least=0.01, at_most=24.0, default=8.0)
     duty_sigma: float = quantity(
         "",
-        "standard deviation of the logarithm of the walking a day",
+        "standard deviation of the logarithm of the walking per day",
         at_least=0.0,
         at_most=3.0,
         default=0.2,

@@ -34,13 +34,13 @@ def _sign(doc: str) -> Any:
 class Crank:
     """From a joint's position to the mechanism's crank angle: sign * position / gear_ratio + offset."""
 
-    sign: int = _sign("1 if the joint counts as the mechanism's crank does, -1 if it counts the other way")
+    sign: int = _sign("1 if the joint turns in the direction of the mechanism's crank angle, else -1")
     offset_rad: float = quantity(
-        "rad", "angle of the crank where the joint stands at 0", at_least=-100.0, at_most=100.0, default=0.0
+        "rad", "crank angle at joint position 0", at_least=-100.0, at_most=100.0, default=0.0
     )
     gear_ratio: float = quantity(
         "",
-        "turns of the joint for one of the crank; other than 1, its position must count on and not wrap",
+        "turns of the joint per turn of the crank; if not 1, the position must be continuous, not wrapped",
         at_least=1.0e-4,
         at_most=1.0e4,
         default=1.0,
@@ -50,7 +50,7 @@ class Crank:
 def _few_and_different(names: tuple[str, ...]) -> str | None:
     if len(names) > ENCODERS:
         return f"{list(names)} are {len(names)}, expected at most {ENCODERS}"
-    return None if len(set(names)) == len(names) and all(names) else f"{list(names)} are no different names"
+    return None if len(set(names)) == len(names) and all(names) else f"{list(names)} are not different names"
 
 
 def _signs(signs: tuple[float, ...]) -> str | None:
@@ -67,14 +67,14 @@ class Encoders:
         check=_few_and_different,
     )
     joints: tuple[str, ...] = described(
-        "the mechanism's revolute joint that each is on; its angle is that from the bushing's body to the "
-        "journal's, but for an offset that is found",
+        "the mechanism's revolute joint of each; its angle is from the bushing's body to the journal's, with "
+        "an offset that is estimated",
         default=(),
         check=_few_and_different,
     )
     signs: tuple[float, ...] = quantity(
         "",
-        "1.0 if an encoder counts as the mechanism's angles do, -1.0 if the other way; empty: all 1.0",
+        "1.0 if an encoder turns in the direction of the mechanism's angles, else -1.0; empty: all 1.0",
         at_least=-1.0,
         at_most=1.0,
         default=(),
@@ -82,7 +82,7 @@ class Encoders:
     )
     commissioning_cycles: int = quantity(
         "",
-        "gait cycles from which an encoder's offset and scale are found when it is new; then they are held",
+        "gait cycles for the estimate of a new encoder's offset and scale; then both are fixed",
         at_least=20,
         at_most=10000,
         default=100,
@@ -116,18 +116,18 @@ class DriveTorque:
         "what a torque sample is: the average since the one before, or the torque at its instant",
         default=AVERAGE,
     )
-    axis: str = choice(("x", "y", "z"), "axis of the wrench that the drive turns about", default="z")
-    sign: int = _sign("1 if the torque drives the crank the way its angle counts, -1 if against")
+    axis: str = choice(("x", "y", "z"), "component of the wrench about the drive's axis", default="z")
+    sign: int = _sign("1 if a positive torque drives the crank in its positive direction, else -1")
     scale: float = quantity(
         "",
-        "factor on the torque, its unit's and the gear's efficiency",
+        "factor on the torque, for its unit and the gear's efficiency",
         at_least=1.0e-6,
         at_most=1.0e6,
         default=1.0,
     )
     gear_ratio: float = quantity(
         "",
-        "turns of the shaft with the sensor for one of the crank",
+        "turns of the sensor's shaft per turn of the crank",
         at_least=1.0e-4,
         at_most=1.0e4,
         default=1.0,
@@ -173,7 +173,7 @@ class Cadence:
     )
     tolerance_rpm: float = quantity(
         "rpm",
-        "departure from it up to which predictions are valid",
+        "departure from the commanded speed up to which predictions are valid",
         above=0.0,
         at_most=1200.0,
         default=6.0,
@@ -193,7 +193,7 @@ class Tracker:
     )
     gap_limit_s: float = quantity(
         "s",
-        "longest gap that is bridged at the tracked speed; what is longer is not monitored",
+        "longest gap that is bridged at the tracked speed; longer gaps are not monitored",
         above=0.0,
         at_most=10.0,
         default=0.5,

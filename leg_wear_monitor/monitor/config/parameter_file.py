@@ -57,7 +57,7 @@ def parse_config(document: Any, source: str, node: str | None = None) -> Monitor
     Sections that are for the node are taken in their order, so that later ones prevail.
     """
     if not is_parameter_file(document):
-        raise ConfigError(source, "", f"is no ROS parameter file, expected '/**: {{{MARK}: ...}}'")
+        raise ConfigError(source, "", f"is not a ROS parameter file, expected '/**: {{{MARK}: ...}}'")
     values: dict[str, Any] = {}
     node, taken = node or _node_of(document), False
     for pattern, entry in document.items():

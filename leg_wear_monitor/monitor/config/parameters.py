@@ -158,7 +158,7 @@ def changed(config: _Config, changes: Mapping[str, Any], source: str = "paramete
     for name in changes:
         if parameters_of(type(config))[name].read_only and after[name] != values[name]:
             raise ConfigError(
-                source, name, f"{shown(changes[name])} comes too late, it is read at the start and then kept"
+                source, name, f"{shown(changes[name])} cannot change now, it is read only at the start"
             )
     return wanted
 
@@ -168,9 +168,9 @@ def _check_known(name: str, known: Mapping[str, Parameter], source: str) -> None
         return
     renamed = new_name(name)
     if renamed in known:
-        raise ConfigError(source, name, f"is called {renamed} now")
+        raise ConfigError(source, name, f"is now called {renamed}")
     near = nearest(name, known)
-    expected = f"did you mean {near}?" if near else "docs/parameters.md lists all there are"
+    expected = f"did you mean {near}?" if near else "docs/parameters.md lists all"
     raise ConfigError(source, name, f"unknown parameter, {expected}")
 
 

@@ -32,7 +32,7 @@ def _limits(config: MonitorConfig, leg: Mechanism) -> Iterator[Doubt]:
     for joint, limit in zip(leg.clearance_joints, each, strict=True):
         fresh = leg.clearances[joint].radial_clearance
         if limit <= fresh:
-            yield Doubt(key, f"{limit:g} m is no more than the new clearance of joint {joint}, {fresh:g} m")
+            yield Doubt(key, f"{limit:g} m is not above the new clearance of joint {joint}, {fresh:g} m")
             return
     for force in limits.joint_impact_force_n or (limits.impact_force_n,):
         if force < 10.0:

@@ -37,7 +37,7 @@ class Limits:
     )
     joint_impact_force_n: tuple[float, ...] = quantity(
         "N",
-        "the same, one a clearance joint, instead of the one for all",
+        "impact-force limit of each clearance joint, instead of the common one",
         above=0.0,
         at_most=1.0e7,
         default=(),
@@ -48,7 +48,7 @@ class Limits:
     )
     joint_clearance_m: tuple[float, ...] = quantity(
         "m",
-        "the same, one a clearance joint, instead of the one for all",
+        "clearance limit of each clearance joint, instead of the common one",
         above=0.0,
         at_most=0.1,
         default=(),
@@ -56,7 +56,7 @@ class Limits:
     )
     clearance_departure_m: float = quantity(
         "m",
-        "departure of a clearance that further encoders show from the one that is counted",
+        "difference between the clearance from further encoders and the counted one",
         above=0.0,
         at_most=0.1,
         default=0.0001,
@@ -130,7 +130,7 @@ class Alarms:
     )
     knock_on_delay_cycles: int = quantity(
         "",
-        "the same for what shows a knock at once: impact forces and torque mismatch",
+        "on-delay of the alarms that show a knock at once: impact forces and torque mismatch",
         at_least=1,
         at_most=1000,
         default=1,
@@ -151,7 +151,7 @@ class Growth:
 class LedgerFile:
     """Where the wear is kept."""
 
-    path: str = described("file of the ledger; empty: none is kept, wear is lost at the end", default="")
+    path: str = described("file of the ledger; empty: none, wear is lost at the end", default="")
     checkpoint_s: float = quantity(
         "s",
         "longest time between two entries while the leg moves, plus an evaluation period of a quarter cycle",
@@ -175,7 +175,9 @@ class Record:
 class Diagnostics:
     """What goes to /diagnostics."""
 
-    period_s: float = quantity("s", "time between two messages", at_least=0.1, at_most=2.0, default=1.0)
+    period_s: float = quantity(
+        "s", "time between two messages on /diagnostics", at_least=0.1, at_most=2.0, default=1.0
+    )
 
 
 @attrs.frozen(kw_only=True)

@@ -33,12 +33,12 @@ def doubts(cycle: CycleReport, config: MonitorConfig) -> list[str]:
         predicted, measured = cycle.predicted_torque_rms_nm, cycle.measured_torque_rms_nm
         if measured < _FLAT * predicted:
             found.append(
-                f"the drive torque of {measured:.3g} N m RMS is none, {predicted:.3g} N m are predicted"
+                f"the drive torque is only {measured:.3g} N m RMS, {predicted:.3g} N m are predicted"
             )
         elif not cycle.torque_mismatch < _UNLIKE:
             found.append(
-                "the drive torque has nothing of the predicted one: they differ by "
-                f"{cycle.torque_mismatch:.2g} times what is predicted"
+                "the drive torque does not resemble the predicted one: they differ by "
+                f"{cycle.torque_mismatch:.2g} times the predicted torque"
             )
     return found
 
@@ -116,7 +116,9 @@ class GaitEvidence:
         if rate < needed:
             return f"crank samples come at {rate:.3g} Hz, too few: {commanded:.3g} rpm need {needed:.3g} Hz"
         if turns < 2.0:
-            return f"the crank turns {turns:.2g} times in {self._passed_s:.3g} s: that is no whole gait cycle"
+            return (
+                f"the crank turns {turns:.2g} times in {self._passed_s:.3g} s: less than a whole gait cycle"
+            )
         if not _SLOWEST <= rpm / abs(commanded) <= _FASTEST:
             return f"the crank turns at {rpm:.3g} rpm, commanded are {abs(commanded):.3g} rpm"
         return f"the crank turns {turns:.3g} times, but its motion cannot be followed over a whole gait cycle"

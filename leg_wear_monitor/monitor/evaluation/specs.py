@@ -125,7 +125,7 @@ CLEARANCE: "AlarmSpec[JointReport]" = AlarmSpec(
 GROWTH: "AlarmSpec[JointReport]" = AlarmSpec(
     kind="growth",
     unit="m/h",
-    meaning="growth of it, m/h",
+    meaning="growth of the mean radial clearance, m/h",
     limit_words="`limits.growth_m_per_hour`",
     value=lambda joint: math.nan if joint.growth_mps is None else 3600.0 * joint.growth_mps,
     limit=lambda of: of.config.limits.growth_m_per_hour,
@@ -133,8 +133,8 @@ GROWTH: "AlarmSpec[JointReport]" = AlarmSpec(
 DEPARTURE: "AlarmSpec[JointReport]" = AlarmSpec(
     kind="clearance_departure",
     unit="m",
-    meaning="how far the clearance that further encoders show is from it, m; 0 below four standard "
-    "deviations. Only with `encoders.names`",
+    meaning="difference between the clearance from further encoders and the counted one, m; 0 below four "
+    "standard deviations. Only with `encoders.names`",
     limit_words="`limits.clearance_departure_m`",
     value=lambda joint: joint.seen.surely_m if joint.seen else math.nan,
     limit=lambda of: of.config.limits.clearance_departure_m,
@@ -172,7 +172,7 @@ TORQUE: "tuple[AlarmSpec[CycleEvidence], ...]" = (
     AlarmSpec(
         kind=BIAS,
         unit="N m",
-        meaning="constant drive torque that friction cannot be, N m: one that drives, or more than "
+        meaning="constant drive torque outside the bounds of friction, N m: it drives, or exceeds "
         "`drive_torque.max_friction_nm`",
         limit_words="`limits.torque_bias_nm`",
         value=lambda cycle: cycle.torque.get(BIAS, math.nan),
@@ -189,7 +189,7 @@ TORQUE: "tuple[AlarmSpec[CycleEvidence], ...]" = (
     AlarmSpec(
         kind=LAG,
         unit="s",
-        meaning="time by which the measured torque is late or early, s",
+        meaning="delay of the measured torque, late or early, s",
         limit_words="`drive_torque.max_lag_s`",
         value=lambda cycle: cycle.torque.get(LAG, math.nan),
         limit=lambda of: of.bounds.max_lag_s,
@@ -201,7 +201,7 @@ INPUT: "tuple[AlarmSpec[InputHealth], ...]" = (
         kind="input_rate",
         subject="crank",
         unit="Hz",
-        meaning="crank samples used a second, Hz",
+        meaning="rate of usable crank samples, Hz",
         limit_words="`limits.min_rate_hz`",
         value=lambda health: health.crank_rate_hz,
         limit=lambda of: of.config.limits.min_rate_hz,
@@ -211,7 +211,7 @@ INPUT: "tuple[AlarmSpec[InputHealth], ...]" = (
         kind="input_rate",
         subject="torque",
         unit="Hz",
-        meaning="torque samples used a second, Hz",
+        meaning="rate of usable torque samples, Hz",
         limit_words="`limits.min_rate_hz`",
         value=lambda health: health.torque_rate_hz,
         limit=lambda of: of.config.limits.min_rate_hz,

@@ -66,18 +66,18 @@ def torque_causes(
     told = []
     if BIAS in raised and report.friction_nm < 0.0:
         told.append(
-            "a constant torque drives the crank, which friction cannot: the sensor's offset is not zeroed, "
+            "a constant torque drives the crank, friction cannot do this: the sensor's offset is not zeroed, "
             "or drive_torque.sign is wrong"
         )
     elif BIAS in raised:
         told.append(
-            "a constant torque is more than the drive's friction may be: the sensor's offset is not zeroed, "
-            "drive_torque.sign, scale or gear_ratio is wrong, or friction has risen"
+            "a constant torque exceeds the largest friction of the drive: the sensor's offset is not zeroed, "
+            "drive_torque.sign, scale or gear_ratio is wrong, or friction has increased"
         )
     if DRIFT in raised:
         told.append(
-            "the constant torque is not what it was when this leg was commissioned: the drive's friction has "
-            "changed, or the sensor's offset"
+            "the constant torque has changed since this leg was commissioned: so has the drive's friction, "
+            "or the sensor's offset"
         )
     if LAG in raised:
         told.append(_lag_cause(record, bounds))
@@ -88,12 +88,12 @@ def _lag_cause(record: "TorqueRecord", bounds: TorqueBounds) -> str:
     split = record.lags.split
     if split is None:
         return (
-            "the torque comes later or earlier than drive_torque.max_lag_s, or crank.offset_rad is off: at "
-            "one speed these look alike"
+            "the torque is late or early by more than drive_torque.max_lag_s, or crank.offset_rad is wrong: "
+            "at one speed the two cannot be distinguished"
         )
     if abs(split[0]) > bounds.max_lag_s:
-        return "the torque comes later or earlier than drive_torque.max_lag_s, at every speed"
-    return "crank.offset_rad is off: the torque's lag goes with the time that the crank takes for an angle"
+        return "the torque is late or early by more than drive_torque.max_lag_s, at every speed"
+    return "crank.offset_rad is wrong: the lag of the torque corresponds to a constant crank angle"
 
 
 def offset_error_rad(report: "CycleReport", record: "TorqueRecord") -> float:

@@ -21,11 +21,11 @@ from leg_wear_monitor.monitor.forecast.wear_coefficients import CoefficientEstim
 class Answer(Enum):
     """What the forecast can say; the value is human-readable."""
 
-    KNOWN = "from growth as it is, and what is not known of it"
-    PARTLY_KNOWN = "of the joints whose growth is known; that of others is not"
+    KNOWN = "from the growth so far and its uncertainty"
+    PARTLY_KNOWN = "of the joints whose growth is known; the others are not included"
     AT_LIMIT = "at its limit"
     NOT_ENOUGH_DATA = "not enough data for a growth rate yet"
-    OUTSIDE_VALIDITY = "outside validity: the leg does not do what the model holds for"
+    OUTSIDE_VALIDITY = "outside validity: cadence or torque is outside the range of the model"
     NO_GROWTH = "clearance does not grow"
 
 
@@ -183,7 +183,10 @@ def forecast(
     day = cycle_s / 3600.0 / legs.duty_h
     joints = tuple(
         JointForecast(
-            answer=a, **_life(a, end, cycle_s, day), clearance_m=q, measurements=coefficient_estimate.looks
+            answer=a,
+            **_life(a, end, cycle_s, day),
+            clearance_m=q,
+            measurements=coefficient_estimate.observations,
         )
         for a, end, q, coefficient_estimate in zip(answers, ends, seen, coefficient_estimates, strict=True)
     )

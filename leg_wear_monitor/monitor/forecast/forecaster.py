@@ -17,7 +17,11 @@ from leg_wear_monitor.monitor.forecast.measurement import (
     measure,
     observations_of,
 )
-from leg_wear_monitor.monitor.forecast.wear_coefficients import CoefficientEstimate, Look, believe
+from leg_wear_monitor.monitor.forecast.wear_coefficients import (
+    CoefficientEstimate,
+    MeasuredClearance,
+    estimate_coefficient,
+)
 from leg_wear_monitor.monitor.ledger.entry import JointWear, Measurement
 from leg_wear_monitor.twin.statistics import CycleStatistics
 
@@ -80,7 +84,7 @@ class Forecaster:
         self._measurements = list(measurements)
         joints = zip(self._clearance_joints, self._fresh_m, replaced_ns, strict=True)
         coefficient_estimates = tuple(
-            believe(settings, fresh, observations_of(measurements, joint, when))
+            estimate_coefficient(settings, fresh, observations_of(measurements, joint, when))
             for joint, fresh, when in joints
         )
         self.state = ForecastState(
@@ -133,9 +137,9 @@ class Forecaster:
     def replaced(self, joint: str, replaced_ns: int) -> None:
         """A joint has another part: known of it is what was measured on it, on a new one nothing."""
         k, state = self._clearance_joints.index(joint), self.state
-        looks = observations_of(self._measurements, joint, replaced_ns)
+        observations = observations_of(self._measurements, joint, replaced_ns)
         state.growth = (*state.growth[:k], GrowthWindow(), *state.growth[k + 1 :])
-        self._update_coefficients(k, believe(self._settings, self._fresh_m[k], looks))
+        self._update_coefficients(k, estimate_coefficient(self._settings, self._fresh_m[k], observations))
 
     def measured(
         self,
@@ -166,14 +170,14 @@ class Forecaster:
         self._update_coefficients(k, found.after)
         return found
 
-    def seen(self, k: int, look: Look, replaced_ns: int) -> bool:
+    def seen(self, k: int, observation: MeasuredClearance, replaced_ns: int) -> bool:
         """Take in a clearance that encoders show, instead of the last such one.
 
         Parameters
         ----------
         k : int
             Of the clearance joint.
-        look : Look
+        observation : MeasuredClearance
             Its error does not average out, so the newest says all there is.
         replaced_ns : int
             When its part was replaced, 0 if it never was.
@@ -183,11 +187,16 @@ class Forecaster:
         bool
             Whether it is believed: not, if the model holds it next to impossible.
         """
-        looks = observations_of(self._measurements, self._clearance_joints[k], replaced_ns)
-        below = believe(self._settings, self._fresh_m[k], looks).probability_below(self._fresh_m[k], look)
+        observations = observations_of(self._measurements, self._clearance_joints[k], replaced_ns)
+        below = estimate_coefficient(self._settings, self._fresh_m[k], observations).probability_below(
+            self._fresh_m[k], observation
+        )
         believed = CONTRADICTS <= below <= 1.0 - CONTRADICTS
         self._update_coefficients(
-            k, believe(self._settings, self._fresh_m[k], [*looks, look] if believed else looks)
+            k,
+            estimate_coefficient(
+                self._settings, self._fresh_m[k], [*observations, observation] if believed else observations
+            ),
         )
         return believed
 

@@ -77,7 +77,7 @@ def _lives_in(document: dict[str, Any], path: str, mechanism: Mechanism) -> Sequ
     except (ValueError, KeyError, TypeError, OverflowError) as error:
         joints = ", ".join(mechanism.clearance_joints)
         raise ConfigError(
-            path, "", f"is no life of the joints {joints}, expected what `life --json` writes"
+            path, "", f"is not a life of the joints {joints}, expected the output of `life --json`"
         ) from error
 
 
@@ -87,9 +87,9 @@ def _document(path: str) -> dict[str, Any]:
     except OSError as error:
         raise ConfigError(path, "", f"cannot be read: {error.strerror}") from error
     except (ValueError, RecursionError) as error:
-        raise ConfigError(path, "", f"is no JSON: {' '.join(str(error).split())}") from error
+        raise ConfigError(path, "", f"is not JSON: {' '.join(str(error).split())}") from error
     if not isinstance(document, dict):
-        raise ConfigError(path, "", "is no life, expected what `life --json` writes")
+        raise ConfigError(path, "", "is not a life, expected the output of `life --json`")
     version = document.get("schema_version", 1)
     if version != SCHEMA_VERSION:
         fault = f"{reprlib.repr(version)} is not {SCHEMA_VERSION}, the version that this program reads"

@@ -9,7 +9,11 @@ from leg_wear_monitor.errors import ConfigError
 from leg_wear_monitor.mechanism.clearance import Clearance
 from leg_wear_monitor.mechanism.clearance_range import measured_fault, sigma_fault
 from leg_wear_monitor.monitor.config.forecast import Forecasting
-from leg_wear_monitor.monitor.forecast.wear_coefficients import CoefficientEstimate, Look, believe
+from leg_wear_monitor.monitor.forecast.wear_coefficients import (
+    CoefficientEstimate,
+    MeasuredClearance,
+    estimate_coefficient,
+)
 from leg_wear_monitor.monitor.ledger.entry import JointWear, Measurement
 
 CONTRADICTS = 0.00135  # probability of a tail: three standard deviations of a normal one
@@ -40,10 +44,12 @@ class MeasurementResult:
     words: tuple[str, ...]
 
 
-def observations_of(measurements: Sequence[Measurement], joint: str, replaced_ns: int) -> list[Look]:
+def observations_of(
+    measurements: Sequence[Measurement], joint: str, replaced_ns: int
+) -> list[MeasuredClearance]:
     """Measurements of a joint's present part that count."""
     return [
-        Look(m.clearance_m, m.sigma_m, m.wear_m)
+        MeasuredClearance(m.clearance_m, m.sigma_m, m.wear_m)
         for m in measurements
         if m.joint == joint and m.replaced_ns == replaced_ns and m.counts and not m.is_withdrawn
     ]
@@ -95,20 +101,20 @@ def measure(
     ):
         if fault:
             raise ConfigError(name, "", fault)
-    looks = observations_of(earlier, wear.name, wear.replaced_ns)
-    look = Look(clearance_m, sigma_m, float(wear.depth.sum(axis=0).mean()))
-    before = believe(settings, fresh_m, looks)
-    below = before.probability_below(fresh_m, look)
+    observations = observations_of(earlier, wear.name, wear.replaced_ns)
+    observation = MeasuredClearance(clearance_m, sigma_m, float(wear.depth.sum(axis=0).mean()))
+    before = estimate_coefficient(settings, fresh_m, observations)
+    below = before.probability_below(fresh_m, observation)
     contradicts = not CONTRADICTS <= below <= 1.0 - CONTRADICTS
     counts = accept or not contradicts
-    after = believe(settings, fresh_m, [*looks, look]) if counts else before
+    after = estimate_coefficient(settings, fresh_m, [*observations, observation]) if counts else before
     measurement = Measurement(
         stamp_ns=stamp_ns,
         joint=wear.name,
         who=who,
         clearance_m=clearance_m,
         sigma_m=sigma_m,
-        wear_m=look.wear_m,
+        wear_m=observation.wear_m,
         cycles=wear.cycles,
         replaced_ns=wear.replaced_ns,
         expected_below=below,
@@ -124,28 +130,28 @@ def _clock(stamp_ns: int, kept_ns: int) -> list[str]:
     if not kept_ns or stamp_ns >= kept_ns:
         return []
     return [
-        f"the clock stands {(kept_ns - stamp_ns) / 3.6e12:.3g} h before the ledger's last entry, it has "
-        "jumped; the measurement counts for the wear that is in the ledger now"
+        f"the clock is {(kept_ns - stamp_ns) / 3.6e12:.3g} h before the ledger's last entry; "
+        "the measurement counts for the wear that is in the ledger now"
     ]
 
 
 def _contradiction(accept: bool, below: float, joint: str) -> list[str]:
     more = "larger" if below > 0.5 else "smaller"
-    done = "it counts, as asked for" if accept else "it is kept in the ledger, but does not count"
+    done = "it counts, as requested" if accept else "it is kept in the ledger, but does not count"
     return [
-        f"this contradicts the model: the clearance of {joint} is far {more} than it can be; {done}",
+        f"this contradicts the model: the clearance of {joint} is far {more} than possible; {done}",
         "measure again; if the part was replaced, reset its wear first; if load or clearance when new are "
-        "other than configured, correct that; if it is right all the same, --accept",
+        "other than configured, correct that; if the measurement is correct, use --accept",
     ]
 
 
 def _change(before: CoefficientEstimate, after: CoefficientEstimate) -> str:
-    if after.looks == before.looks:
-        return "the wear coefficient is believed as before"
+    if after.observations == before.observations:
+        return "the estimate of the wear coefficient is unchanged"
     if after.sigma > _SAYS_SOMETHING * before.sigma:
-        return "it says little of the wear coefficient: too little has worn yet for its accuracy"
+        return "it adds little: the wear is still too small for its accuracy"
     low, middle, high = (float(x) for x in np.exp(after.log_factors((0.1, 0.5, 0.9))))
     return (
         f"the wear coefficient is {middle:.3g} times the nominal one, {low:.3g} to {high:.3g} (p10 to p90); "
-        f"the forecast is {before.sigma / after.sigma:.3g} times as sure of it as before"
+        f"its uncertainty is {before.sigma / after.sigma:.3g} times smaller than before"
     )

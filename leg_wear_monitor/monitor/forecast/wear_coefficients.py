@@ -26,7 +26,7 @@ _phi = np.frompyfunc(NormalDist().cdf, 1, 1)
 
 
 @attrs.frozen
-class Look:
+class MeasuredClearance:
     """A measured clearance.
 
     Attributes
@@ -54,7 +54,7 @@ class CoefficientEstimate:
         Mean of d given the factor.
     excess_sigma_m : float
         Its standard deviation.
-    looks : int
+    observations : int
         Measurements in it.
     """
 
@@ -62,7 +62,7 @@ class CoefficientEstimate:
     weight: Floats
     excess_m: Floats
     excess_sigma_m: float
-    looks: int
+    observations: int
 
     @property
     def mean(self) -> float:
@@ -79,15 +79,17 @@ class CoefficientEstimate:
         reached = np.cumsum(self.weight) - 0.5 * self.weight
         return np.asarray(np.interp(np.asarray(fractions), reached, self.log_factor))
 
-    def probability_below(self, fresh_m: float, look: Look) -> float:
+    def probability_below(self, fresh_m: float, observation: MeasuredClearance) -> float:
         """Probability that a measurement of such accuracy would have come out smaller than this one did."""
-        expected = fresh_m + self.excess_m + np.exp(self.log_factor) * look.wear_m
-        spread = math.hypot(look.sigma_m, self.excess_sigma_m)
-        below = np.asarray(_phi((look.clearance_m - expected) / spread), dtype=float)
+        expected = fresh_m + self.excess_m + np.exp(self.log_factor) * observation.wear_m
+        spread = math.hypot(observation.sigma_m, self.excess_sigma_m)
+        below = np.asarray(_phi((observation.clearance_m - expected) / spread), dtype=float)
         return float(self.weight @ below)
 
 
-def believe(settings: Forecasting, fresh_m: float, looks: Sequence[Look] = ()) -> CoefficientEstimate:
+def estimate_coefficient(
+    settings: Forecasting, fresh_m: float, observations: Sequence[MeasuredClearance] = ()
+) -> CoefficientEstimate:
     """Coefficient estimate after measurements of the same part, in any order.
 
     Parameters
@@ -95,28 +97,36 @@ def believe(settings: Forecasting, fresh_m: float, looks: Sequence[Look] = ()) -
     settings : Forecasting
     fresh_m : float
         Nominal clearance when new.
-    looks : sequence of Look
+    observations : sequence of MeasuredClearance
     """
-    says = _says(settings, fresh_m, looks)
-    log_factor, log_weight = _laid_out(settings.wear_coefficient_sigma, *says)
+    own_estimate = _own_estimate(settings, fresh_m, observations)
+    log_factor, log_weight = _laid_out(settings.wear_coefficient_sigma, *own_estimate)
     weight = np.exp(log_weight - log_weight.max())
-    precision = 1.0 / settings.clearance_sigma_m**2 + sum(look.sigma_m**-2 for look in looks)
+    precision = 1.0 / settings.clearance_sigma_m**2 + sum(
+        observation.sigma_m**-2 for observation in observations
+    )
     pull = np.zeros(GRID)
-    for look in looks:
-        pull += (look.clearance_m - fresh_m - np.exp(log_factor) * look.wear_m) / look.sigma_m**2
+    for observation in observations:
+        pull += (
+            observation.clearance_m - fresh_m - np.exp(log_factor) * observation.wear_m
+        ) / observation.sigma_m**2
     return CoefficientEstimate(
-        log_factor, weight / weight.sum(), pull / precision, precision**-0.5, len(looks)
+        log_factor, weight / weight.sum(), pull / precision, precision**-0.5, len(observations)
     )
 
 
-def _says(settings: Forecasting, fresh_m: float, looks: Sequence[Look]) -> tuple[float, float]:
+def _own_estimate(
+    settings: Forecasting, fresh_m: float, observations: Sequence[MeasuredClearance]
+) -> tuple[float, float]:
     """What measurements say of the factor by themselves: its mean and its precision, 0 if they say nothing.
 
     The clearance when new drops out: it makes their errors hang together.
     """
-    if not any(look.wear_m for look in looks):
+    if not any(observation.wear_m for observation in observations):
         return 0.0, 0.0
-    opened, wear, sigma = np.array([(one.clearance_m - fresh_m, one.wear_m, one.sigma_m) for one in looks]).T
+    opened, wear, sigma = np.array(
+        [(one.clearance_m - fresh_m, one.wear_m, one.sigma_m) for one in observations]
+    ).T
     own, new = sigma**-2.0, settings.clearance_sigma_m**-2.0
     # about what is common to all of them, so that nothing large cancels
     common_wear, common = (float(own @ values) / (float(own.sum()) + new) for values in (wear, opened))

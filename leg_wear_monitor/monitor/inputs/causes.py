@@ -17,11 +17,11 @@ _SENTENCES = {
     "not_finite": "have a value that is NaN or infinite",
     "undecodable": "cannot be decoded: another type or another encoding",
     "wrong_type": "are of a type that is not read",
-    "out_of_range": "have a value that no leg has: angles are in radians, torques in N m",
+    "out_of_range": "have an impossible value: angles are in radians, torques in N m",
     "duplicates": "repeat a stamp: two publishers, or a header.stamp that is not renewed",
-    "late": "come later than tracker.reorder_window_s after younger ones",
+    "late": "arrive more than tracker.reorder_window_s after newer ones",
     "stray_stamps": "have a stamp far from the others: see the clock of the sender",
-    "outliers": "have an angle far from the motion that the others show",
+    "outliers": "have an angle far from the motion of the others",
 }
 
 

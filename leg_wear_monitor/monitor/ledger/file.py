@@ -148,13 +148,13 @@ def _look(path: Path) -> int:
     """The format that a file says it has, before SQLite reads it."""
     status = path.stat()
     if not stat.S_ISREG(status.st_mode):
-        raise LedgerError(f"{path}: cannot be opened: is no file")
+        raise LedgerError(f"{path}: cannot be opened: it is not a file")
     if status.st_size == 0:
         raise LedgerError(f"{path}: is empty, not a ledger; {MOVE}")
     with path.open("rb") as file:
         header = file.read(_HEADER)
     if not header.startswith(_MAGIC) or len(header) < _HEADER:
-        raise LedgerError(f"{path}: is damaged or not a ledger: it is no SQLite file; {MOVE}")
+        raise LedgerError(f"{path}: is damaged or not a ledger: it is not an SQLite file; {MOVE}")
     if int.from_bytes(header[68:72], "big") != APPLICATION_ID:
         raise LedgerError(f"{path}: is an SQLite file, but not a ledger; {MOVE}")
     found = int.from_bytes(header[60:64], "big")
@@ -165,7 +165,7 @@ def _look(path: Path) -> int:
     if found >= SEALED_FROM:
         log = beside(path, "-wal")
         if _has_content(log):
-            raise LedgerError(f"{path}: {log.name} beside it is not its own; move that away")
+            raise LedgerError(f"{path}: {log.name} beside it belongs to another ledger; move it away")
         if header[18:20] != _ROLLBACK:
             raise LedgerError(f"{path}: is damaged: its header is not what was written; {MOVE}")
     return found
@@ -254,7 +254,7 @@ def _refusal(path: Path, error: Exception) -> LedgerError:
         return LedgerError(f"{path}: {_IN_USE}")
     if code & 0xFF in (sqlite3.SQLITE_CORRUPT, sqlite3.SQLITE_NOTADB, sqlite3.SQLITE_ERROR):
         return LedgerError(f"{path}: is damaged or not a ledger: {_reason(error)}; {MOVE}")
-    return LedgerError(f"{path}: cannot be read: {_reason(error)}; expected a disk that can be written")
+    return LedgerError(f"{path}: cannot be read: {_reason(error)}; expected a writable disk")
 
 
 def _has_content(path: Path) -> bool:

@@ -60,7 +60,7 @@ class Ledger:
         If the last run was cut off: the longest time of walking whose wear was lost with it.
     kept_ns : int
         Stamp of the last entry on the disk, 0 before.
-    told : str
+    loss : str
         What is wrong with what was found, and may be lost with it; empty if nothing is.
     fault : str
         Why the last write failed; empty if it did not.
@@ -77,7 +77,7 @@ class Ledger:
         self._events: list[Event] = []
         self._store = LedgerStore(self.path, binding)
         found = self._store.found
-        self.entry, self.last_run, self.told = found.entry, found.run, found.told
+        self.entry, self.last_run, self.loss = found.entry, found.run, found.loss
         self.epoch, self.boot_id = found.run.epoch, found.run.boot_id
         self.cut_off_s = found.lost_s
         self._interval_s = interval_s

@@ -145,7 +145,7 @@ def read_log(ledger: Path) -> LogContent | None:
     if not os.path.lexists(path):
         return None
     if not path.is_file() or path.stat().st_size > _MOST:
-        raise ValueError("is no log")
+        raise ValueError("is not a log")
     data = path.read_bytes()
     if len(data) < _BEGIN or not data.startswith(_MAGIC):
         raise ValueError("does not begin as a log does")

@@ -36,7 +36,7 @@ class Recovered:
         Whether the entry is newer than the tables.
     lost_s : float or None
         Longest time in motion whose wear is lost; None if the last run ended in order.
-    told : str
+    loss : str
         What is wrong with the log; empty if nothing is.
     """
 
@@ -47,7 +47,7 @@ class Recovered:
     entry: Entry | None = None
     is_newer: bool = False
     lost_s: float | None = None
-    told: str = ""
+    loss: str = ""
 
 
 def recover(db: sqlite3.Connection, path: Path) -> Recovered:
@@ -76,7 +76,7 @@ def recover(db: sqlite3.Connection, path: Path) -> Recovered:
         return there
     if content is None or fault:
         lost_s = WHOLE_S + 2.0 * run.interval_s
-        return attrs.evolve(there, lost_s=lost_s, told=_told(log.name, fault or "is missing", lost_s))
+        return attrs.evolve(there, lost_s=lost_s, loss=_loss_text(log.name, fault or "is missing", lost_s))
     if content.digest == head.previous:
         return attrs.evolve(there, lost_s=run.interval_s)
     return _applied(there, content, log.name)
@@ -109,11 +109,11 @@ def _applied(there: Recovered, content: LogContent, name: str) -> Recovered:
         if entry is None:
             raise LedgerError(f"{name}: follows a ledger that has no entry; {MOVE}")
         run, entry = decode(record, entry)
-    lost_s, told = run.interval_s, ""
+    lost_s, loss = run.interval_s, ""
     if content.left or content.missing:
         most_s = max(0.0, WHOLE_S - _moved_s(there.entry, entry)) + 2.0 * run.interval_s
         lost_s = min(most_s, (content.missing + 1) * run.interval_s) if content.is_torn else most_s
-        told = _told(name, "is not whole", lost_s)
+        loss = _loss_text(name, "is not whole", lost_s)
     return attrs.evolve(
         there,
         digest=content.digest,
@@ -122,7 +122,7 @@ def _applied(there: Recovered, content: LogContent, name: str) -> Recovered:
         entry=entry,
         is_newer=bool(content.records),
         lost_s=lost_s,
-        told=told,
+        loss=loss,
     )
 
 
@@ -130,5 +130,5 @@ def _moved_s(first: Entry | None, last: Entry | None) -> float:
     return last.moving_s - first.moving_s if first and last else 0.0
 
 
-def _told(name: str, fault: str, lost_s: float) -> str:
+def _loss_text(name: str, fault: str, lost_s: float) -> str:
     return f"{name} {fault}: the wear of at most {lost_s:.3g} s of walking is lost"

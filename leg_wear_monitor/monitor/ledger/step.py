@@ -97,7 +97,7 @@ def _rise(kept: Floats, now: Floats) -> tuple[Floats, Floats]:
     """Size of a step [m] for each surface (joints, 2, 1), and how many steps each sector has risen."""
     rise = now - kept
     if not np.isfinite(rise).all():
-        raise ValueError("a surface has a depth that is no number")
+        raise ValueError("a surface has a depth that is not a number")
     scale = (np.abs(rise).max(axis=2, keepdims=True) / STEPS).astype("<f4")
     steps = np.divide(rise, scale, out=np.zeros_like(rise), where=scale > 0.0)
     return scale, np.clip(np.rint(steps), -2 * STEPS + 1, 2 * STEPS - 1).astype("i1")

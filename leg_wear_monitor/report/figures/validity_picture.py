@@ -23,7 +23,7 @@ def validity_picture(measurements: Sequence[Measurement]) -> bytes:
             axes.annotate(m.joint, (m.cycles, m.expected_below), xytext=(4, 4), textcoords="offset points")
     axes.set(ylim=(-0.02, 1.02), yticks=np.array([0.0, 0.1, 0.5, 0.9, 1.0]))
     axes.set_xlabel("gait cycles since the part was new", fontsize=SMALL, color=INK)
-    axes.set_ylabel("less was expected with probability", fontsize=SMALL, color=INK)
+    axes.set_ylabel("predicted probability of a smaller value", fontsize=SMALL, color=INK)
     axes.set_title(validity(measurements).words, fontsize=SMALL, color=INK, wrap=True)
     axes.legend(fontsize=SMALL, frameon=False)
     tidy(axes)

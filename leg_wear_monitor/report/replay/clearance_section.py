@@ -34,13 +34,13 @@ def clearance_sections(record: dict[str, Any]) -> list[Section]:
         for name, joint in shown.items()
     ]
     table = Table(
-        caption="Clearances that encoders show",
-        head=("joint", "counted [mm]", "seen [mm]", "± [mm]", ""),
+        caption="Clearances estimated from encoders",
+        head=("joint", "counted [mm]", "estimated [mm]", "± [mm]", ""),
         rows=rows,
-        note="Counted: by the law of wear with the nominal coefficient. Seen: from the angles of further "
-        "encoders over the last gait cycles; what the model is off is in the standard deviation.",
+        note="Counted: by the law of wear with the nominal coefficient. Estimated: from the angles of "
+        "further encoders over the last gait cycles; the standard deviation includes the model error.",
     )
-    return [Section("Clearances seen by encoders", [table])]
+    return [Section("Clearances estimated from encoders", [table])]
 
 
 def _millimetres(metres: float | None) -> str:

@@ -26,15 +26,15 @@ def forecast_section(record: dict[str, Any]) -> Section:
             head=head,
             rows=rows,
             note="p10, p50 and p90 are not exceeded with a probability of 10, 50 and 90 %. "
-            f"{_duty(record)}Clearance: p10 to p90 of what it may be now. First: probability of this joint "
-            "to be the first at its limit, which ends the leg's life.",
+            f"{_duty(record)}Clearance: p10 to p90 of the present clearance. First: probability of this "
+            "joint to be the first at its limit, which ends the leg's life.",
         )
     ]
     measurements = [Measurement(**each) for each in record["measurements"]]
     if measurements:
         parts.append(_validity(measurements))
     else:
-        parts.append(Text("No clearance was measured yet; one measurement makes the forecast much surer."))
+        parts.append(Text("No clearance was measured yet; one measurement makes the forecast much narrower."))
     return Section("Forecast", parts)
 
 
@@ -72,9 +72,9 @@ def _duty(record: dict[str, Any]) -> str:
 def _validity(measurements: list[Measurement]) -> Picture:
     return Picture(
         image=validity_picture(measurements),
-        alt="Where each measured clearance lay in what was expected of it",
-        caption="Measured clearances of the ledger in what was expected of each before. In the long run 80 % "
-        "lie in the shaded band.",
+        alt="Each measured clearance in its predicted distribution",
+        caption="Measured clearances of the ledger in the distribution predicted before each. In the long "
+        "run 80 % lie in the shaded band.",
         wide=True,
     )
 

@@ -30,7 +30,7 @@ def replay_page(record: dict[str, Any]) -> Page:
         f"{_time(recording['duration_s'])} from "
         f"{time_words(recording['begin_ns'])}, {record['cycles']} gait cycles. {record['advice']}"
     )
-    sections = [Section("What was found", [Sentences(_sentences(record))]), _recording(recording)]
+    sections = [Section("Results", [Sentences(_sentences(record))]), _recording(recording)]
     if _is_believable(record):
         sections += [_clearance(record), *clearance_sections(record), forecast_section(record)]
         sections += [_forces(record), _wear(record)]
@@ -43,19 +43,19 @@ def _sentences(record: dict[str, Any]) -> list[str]:
     """What to know first."""
     sentences = []
     if record["recording"]["is_partial"]:
-        sentences.append("The recording is damaged or incomplete: what follows is of what could be read.")
+        sentences.append("The recording is damaged or incomplete: the results are from its readable part.")
     if record.get("gait", {}).get("is_counted"):
-        sentences.append("All of it is in the ledger already, so nothing of it was followed again.")
+        sentences.append("All of it is in the ledger already, so no gait cycle was processed again.")
     elif not _is_believable(record):
-        sentences.append("No gait cycle can be this leg's, so there is nothing to say about forces and wear.")
+        sentences.append("No gait cycle fits this leg, so forces and wear are not reported.")
         if missing := record.get("gait", {}).get("missing"):
-            sentences.append(f"What is missing: {missing}.")
+            sentences.append(f"Missing: {missing}.")
     raised = [alarm for alarm in record["alarms"]["now"] if alarm["level"] != "OK"]
     for alarm in raised:
         values = (alarm.get(key) for key in ("state", "worst", "limit", "unit", "raised_ns"))
         sentences.append(f"{alarm['name']}: {alarm['level']}, {raised_words(*values)}.")
     if not raised:
-        sentences.append("No alarm stands at the end.")
+        sentences.append("No alarm is raised at the end.")
     growing = {
         name: joint["growth_m_per_cycle"]
         for name, joint in record["joints"].items()
@@ -90,13 +90,13 @@ def _recording(recording: dict[str, Any]) -> Section:
         ("begin", time_words(recording["begin_ns"])),
         ("end", time_words(recording["end_ns"])),
     ]
-    parts: list[Part] = [Table(caption="What was read", head=("", ""), rows=rows)]
+    parts: list[Part] = [Table(caption="Topics, time and samples", head=("", ""), rows=rows)]
     findings = [f"{each['file']}: {each['text']}" for each in recording["findings"]]
     if findings:
         more = len(findings) - _MOST_ROWS
         parts.append(Sentences(findings[:_MOST_ROWS] + ([f"and {more} more"] if more > 0 else [])))
     else:
-        parts.append(Text("All of it could be read, and every checksum in it holds."))
+        parts.append(Text("It was read completely, and all of its checksums are valid."))
     return Section("The recording", parts)
 
 
@@ -104,7 +104,7 @@ def _clearance(record: dict[str, Any]) -> Section:
     picture = Picture(
         image=png(clearance_chart(record)),
         alt="Opening of each joint's mean radial clearance over time",
-        caption="Mean radial clearance of each joint, less what it was after the first gait cycle.",
+        caption="Mean radial clearance of each joint, minus its value after the first gait cycle.",
         wide=True,
     )
     head = ("joint", "counted clearance [mm]", "opened [nm]", "growth [pm/cycle]", "± [pm/cycle]")
@@ -124,8 +124,8 @@ def _clearance(record: dict[str, Any]) -> Section:
         caption="Clearances at the end",
         head=head,
         rows=rows,
-        note="Counted: the clearance when new plus the wear that the model has counted since, in the digits "
-        "that are known of it. ± is the standard error of the growth; single gait cycles of a chaotic "
+        note="Counted: the clearance when new plus the wear counted by the model since, in its "
+        "significant digits. ± is the standard error of the growth; single gait cycles of a chaotic "
         "motion scatter.",
     )
     return Section("Clearance over time", [picture, table])
@@ -136,7 +136,7 @@ def _forces(record: dict[str, Any]) -> Section:
         image=png(force_chart(record)),
         alt="Peak and mean contact force of each joint over time",
         caption="Contact force in each gait cycle: peak (blue) and mean (black). Dashed: the limit, where it "
-        "is near. Peaks are of a heavy tail; their scatter is no change of the joint.",
+        "is near. Peaks are of a heavy tail; their scatter does not mean that the joint changes.",
         wide=True,
     )
     rows = [
@@ -161,7 +161,7 @@ def _wear(record: dict[str, Any]) -> Section:
         image=png(worn_bushings(Surfaces(depth, 1), tuple(wear), radii, cycles)),
         alt="Wear depth around bushing and journal of each joint",
         caption="Wear around each bushing and journal, from the start of the ledger, or of the replay if "
-        "none was continued. The depth is drawn too large by the factor above; angles in each body's own "
+        "none was continued. The depth is magnified by the factor above; angles in each body's own "
         "frame.",
         wide=True,
     )
@@ -207,12 +207,12 @@ def _health(record: dict[str, Any]) -> Section:
         chart = Picture(
             image=png(health_chart(record)),
             alt="Cadence, drive torque and torque mismatch over time",
-            caption="Cadence with the commanded one dashed; drive torque as measured and predicted; what of "
-            "it neither load nor friction explains, as a fraction, with its limit.",
+            caption="Cadence with the commanded one dashed; measured and predicted drive torque; the "
+            "fraction that load, friction and lag do not explain, with its limit.",
             wide=True,
         )
         parts.append(chart)
-    parts.append(Table(caption="What was not used, or not followed", head=("", "number"), rows=rows))
+    parts.append(Table(caption="Unused samples and lost time", head=("", "number"), rows=rows))
     status = [(each["name"], each["level"], each["message"]) for each in record["status"]]
     parts.append(Table(caption="State at the end", head=("", "level", "message"), rows=status))
     return Section("Input health", parts)

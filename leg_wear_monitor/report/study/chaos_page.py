@@ -115,12 +115,12 @@ def _disorder(pair: _Pair) -> list[str]:
     ranked = sorted(zip(joints, spread, strict=True), key=lambda one: one[1])
     periods = dict(zip(joints, _periods(point, arrays), strict=True))
     known = [f"{joint} every {period} cycles" for joint, period in periods.items() if period]
-    repeated = f"it repeats itself for {joined(known)}" if known else "no joint repeats itself"
+    repeated = f"periodic are {joined(known)}" if known else "no joint is periodic"
     return [
         f"Poincaré map over {len(arrays['section_rate_mps'])} cycles: {repeated} (periods to {_LONGEST} "
         "cycles, "
-        f"{_SAME:g} of a clearance). Scatter of the journals' places, RMS in clearances, from order to "
-        "disorder: "
+        f"{_SAME:g} of a clearance). Scatter of the journals' places, RMS in clearances, from smallest to "
+        "largest: "
         f"{', '.join(f'{joint} {number(value)}' for joint, value in ranked)}."
     ]
 
@@ -131,14 +131,14 @@ def _over(axis: str, values: Sequence[float], pairs: Sequence[_Pair]) -> str:
     repeating = [f"{value:g}" for value, pair in zip(values, pairs, strict=True) if all(_periods(*pair))]
     low, high = int(np.argmin(worst)), int(np.argmax(worst))
     calm = (
-        f"at {joined(repeating)} all joints repeat themselves"
+        f"at {joined(repeating)} all joints are periodic"
         if repeating
-        else "nowhere do all joints repeat"
+        else "at no value are all joints periodic"
     )
     return (
-        f"Over the {axis}: {calm}; the most disordered joint scatters least, by {number(worst[low])} "
+        f"Over the {axis}: {calm}; the largest scatter of a joint is smallest, {number(worst[low])} "
         "clearances, at "
-        f"{values[low]:g} and most, by {number(worst[high])}, at {values[high]:g}."
+        f"{values[low]:g} and largest, {number(worst[high])}, at {values[high]:g}."
     )
 
 

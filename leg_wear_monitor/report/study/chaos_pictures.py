@@ -33,8 +33,8 @@ def section_gallery(section: Arrays, clearance_m: float, crank_angle_deg: float)
     e, v = section["section_eccentricity_m"] / clearance_m, section["section_rate_mps"]
     caption = (
         f"Poincaré maps: the same at crank angle {crank_angle_deg:g}° of {len(e)} cycles, one point a "
-        "cycle. A motion "
-        "that repeats itself would be a single point, or as many as its period has cycles."
+        "cycle. A periodic "
+        "motion is a single point, or as many as its period has cycles."
     )
     return _planes(clearance_joints_of(section), e, v, caption, "Poincaré map", ".")
 

@@ -160,7 +160,7 @@ def regularity(labelled: Labelled) -> list[str]:
         for name, joint, arrays in _joints(labelled)
     ]
     return [
-        "Share of the contact force's variance that repeats from cycle to cycle [%] (100 is periodic), "
+        "Fraction of the contact force's variance that repeats from cycle to cycle [%] (100 is periodic), "
         f"the most regular first: {_ranked(fractions, 100.0)}."
     ]
 
@@ -227,7 +227,7 @@ def laws(labelled: Labelled) -> list[str]:
     normal = [one for one in labelled if one[0] in NORMAL_LAWS]
     lossy = [one for one in normal if one[0] != "hertz"]
     friction = [one for one in labelled if one[0] not in NORMAL_LAWS]
-    groups = (("The normal laws", normal), ("Those with a loss", lossy), ("Friction", friction))
+    groups = (("The normal laws", normal), ("The dissipative ones", lossy), ("Friction", friction))
     sentences = [_law_sentence(what, group) for what, group in groups if len(group) > 1]
     for joint in clearance_joints_of(labelled[0][1]):
         volumes = [
@@ -257,7 +257,7 @@ def _law_sentence(what: str, group: Labelled) -> str:
         parts.append((f"wear of {joint}", volumes))
     texts = [f"{name} {percent(_span(spreads))}" for name, spreads in parts]
     names = joined([label.removeprefix("friction ") for label, _ in group])
-    return f"{what} ({names}): greatest less least mean, of the mean: {', '.join(texts)}."
+    return f"{what} ({names}): largest minus smallest mean, relative to the mean: {', '.join(texts)}."
 
 
 def _span(spreads: Sequence[Spread]) -> float:

@@ -60,8 +60,7 @@ def _caption(factors: Sequence[float], longest_n: float) -> str:
         "One gait cycle of one run, an example. The leg is to scale, its bodies in ideal positions: "
         "clearance moves them by millimetres. Arrows: force of the bushing on the pin; their length grows "
         f"with the root of the force, up to {longest_n:.0f} N. Circles: each pin in its bushing, the "
-        f"clearance drawn {factor} times too large for its bushing, with the way of the pin's centre over "
-        "the cycle."
+        f"clearance magnified {factor} times, with the path of the pin's centre over the cycle."
     )
 
 

@@ -61,7 +61,7 @@ def _notice(results: StudyResults) -> Sections:
     lines = [f"{label}: {fault}" for label, fault in results.faults]
     if results.missing:
         lines.append(f"Not computed yet: {joined(results.missing)}.")
-    return [Section("What is missing", [Sentences(lines)])] if lines else []
+    return [Section("Missing points", [Sentences(lines)])] if lines else []
 
 
 def _sections(sweep: Sweep | None, results: StudyResults, labelled: Labelled) -> Sections:

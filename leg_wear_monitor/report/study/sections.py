@@ -35,12 +35,12 @@ def asked(results: StudyResults) -> Section:
         caption=f"The leg to scale. Clearance joints of this study: {joined(clearance_joints)}.",
         wide=True,
     )
-    return Section("What was asked", [Text(text), leg])
+    return Section("Question", [Text(text), leg])
 
 
 def conclude(sentences: list[str]) -> Section:
     """What to conclude."""
-    return Section("What to conclude", [Sentences(sentences)])
+    return Section("Conclusions", [Sentences(sentences)])
 
 
 def cycle(results: StudyResults, chosen: list[tuple[Point, Any]]) -> Section:

@@ -30,10 +30,10 @@ def wear_gallery(mechanism: Mechanism, worn: Sequence[tuple[str, str, Floats]], 
     """
     pictures = [_picture(mechanism, *each) for each in worn]
     caption = (
-        f"{what}. Left: bushing (blue) and journal (vermilion) as a section, the depth drawn too large by "
-        "the factor that stands above. Right: the worst zone enlarged. Below: unrolled. Lines: means over "
-        "runs; shaded: from the least to the greatest of the runs. The black arc, and the grey ground, hold "
-        "90 % of the bushing's wear. Angles in each body's own frame."
+        f"{what}. Left: bushing (blue) and journal (vermilion) as a section, the depth magnified by the "
+        "factor above. Right: the worst zone enlarged. Below: unrolled. Lines: means over "
+        "runs; shaded: from the least to the greatest of the runs. The black arc, and the grey ground, "
+        "contain 90 % of the bushing's wear. Angles in each body's own frame."
     )
     return Gallery(pictures=pictures, caption=caption)
 

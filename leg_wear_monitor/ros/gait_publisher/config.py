@@ -23,11 +23,13 @@ class PublisherConfig(GaitConfig):
     )
     frame_id: str = described("frame of the torque", default="pelvis")
     reliable: bool = described("publish reliably, else with best effort", default=False)
-    time_scale: float = quantity("", "seconds of walking a second", above=0.0, at_most=1000.0, default=1.0)
-    precompute: bool = described(
-        "walk first and publish then, which needs a duration; else both at once", default=False
-    )
+    time_scale: float = quantity("", "simulated seconds per second", above=0.0, at_most=1000.0, default=1.0)
+    precompute: bool = described("simulate the whole gait before publishing; needs a duration", default=False)
     wait_for_subscribers: int = quantity(
-        "", "start when so many listen to each topic", at_least=0, at_most=100, default=0
+        "",
+        "number of subscribers of each topic to wait for before the start",
+        at_least=0,
+        at_most=100,
+        default=0,
     )
     truth: TruthConfig = described("what is known of the leg", factory=TruthConfig)

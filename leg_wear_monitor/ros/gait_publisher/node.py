@@ -44,8 +44,8 @@ class GaitPublisher(ClosingNode):
         if self.config.precompute and not self.config.duration_s:
             raise ConfigError(self.get_fully_qualified_name(), "precompute", "needs a duration_s above 0 s")
         log = self.get_logger()
-        log.info("making the leg ready; the first time this compiles for a minute")
-        with repeated(lambda passed_s: log.info(f"making the leg ready: {passed_s:.0f} s")):
+        log.info("preparing the leg; the first start compiles numerical kernels for a minute")
+        with repeated(lambda passed_s: log.info(f"preparing the leg: {passed_s:.0f} s")):
             self._leg = SyntheticLeg(self.config)
             self._blocks = self._walk()
             if self.config.precompute:
@@ -76,7 +76,7 @@ class GaitPublisher(ClosingNode):
                 return
             if wait < -_LATE_S:
                 self.get_logger().warning(
-                    "cannot walk in step with the clock; lower rates or time_scale, or precompute",
+                    "the simulation is slower than the clock; lower rates or time_scale, or set precompute",
                     throttle_duration_sec=5.0,
                 )
             message = sensor_message(reading, self._start_ns, self.config)

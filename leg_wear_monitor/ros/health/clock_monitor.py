@@ -40,5 +40,5 @@ class ClockMonitor:
         if stands_s > _STANDS_FROM_S:
             return Status("clock", Level.ERROR, "stands still: /clock has stopped", values)
         if before and since_ns < -1.0e9 * _TURNED_BACK_S:
-            return Status("clock", Level.WARN, "was set back; samples go by their own stamps", values)
+            return Status("clock", Level.WARN, "was set back; samples keep their own stamps", values)
         return Status("clock", Level.OK, "goes on", values)

@@ -47,9 +47,9 @@ def load_status(load: Load, inbox: Inbox) -> Status:
     shed = inbox.shed - load.shed_told
     level, message = Level.OK, "keeps up"
     if shed:
-        level, message = Level.ERROR, "cannot keep up: samples were shed and their wear is not counted"
+        level, message = Level.ERROR, "overloaded: samples were dropped and their wear is not counted"
     elif load.worst_delay_s > COARSE_FROM_S:
-        level, message = Level.WARN, "falls behind: forces and torques of samples are left out to catch up"
+        level, message = Level.WARN, "overloaded: forces and torques of samples are not published"
     values = {
         "received": float(inbox.received),
         "waiting": float(len(inbox)),

@@ -84,7 +84,7 @@ class Silence:
         kind = self._kinds[name]
         return f"since {utc(kind.wall_ns)}" if kind.used else f"since the start at {utc(kind.wall_ns)}"
 
-    def told(self, statuses: Iterable[Status], steady_ns: int) -> tuple[Status, ...]:
+    def marked(self, statuses: Iterable[Status], steady_ns: int) -> tuple[Status, ...]:
         """Statuses, each with what it has no current data of."""
         crank = self.level(CRANK, steady_ns)
         torque = self.level(TORQUE, steady_ns)

@@ -71,7 +71,7 @@ class Supervision:
         """Acknowledge the node's own alarms: those that were cleared and those that stay."""
         return self._alarms.acknowledge()
 
-    def look(self) -> bool:
+    def check(self) -> bool:
         """Look at topics and graph; whether the node's alarms have changed."""
         now_ns, lack = time.monotonic_ns(), self._names.some_lack_it
         without = self._names.told()
@@ -101,7 +101,7 @@ class Supervision:
         # what is given of the clock was logged where it was found
         self._status_log.note((*(one for name, one in given.items() if name != clock.name), topics, clock))
         given[clock.name] = both_clocks(given[clock.name], clock) if clock.name in given else clock
-        return self._silence.told((*given.values(), topics), now_ns)
+        return self._silence.marked((*given.values(), topics), now_ns)
 
     def _sources(self, topic: InputTopic, now_ns: int) -> int:
         """How many publishers a topic has for certain."""

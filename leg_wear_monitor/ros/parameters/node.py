@@ -44,7 +44,7 @@ class ParameterNode(Node):
         if wanted and not changes:
             return SetParametersResult(successful=True)
         if any(one.name == _CLOCK for one in changes):
-            reason = f"{_CLOCK}: is read at the start and then kept; start the node again with it"
+            reason = f"{_CLOCK}: is read only at the start; start the node again with it"
             return SetParametersResult(successful=False, reason=reason)
         return super().set_parameters_atomically(changes)
 

@@ -14,7 +14,7 @@ from leg_wear_monitor.studies.point import Point, Settings
 class Ensemble:
     """The runs behind each number: motion with clearance is chaotic, so one run says little."""
 
-    runs: int = count_field("runs that differ in where they start", 2, 12)
+    runs: int = count_field("runs with different initial conditions", 2, 12)
     cycles: int = count_field("gait cycles counted in each run", 2, 20)
     skip_cycles: int = count_field("gait cycles before them", 0, 3)
     traced_cycles: int = count_field("counted cycles of each run whose curves are kept", 1, 5)
@@ -25,7 +25,7 @@ class Ensemble:
         at_most=1.0,
         default=0.3,
     )
-    seed: int = count_field("of where the runs start", 0, 1)
+    seed: int = count_field("seed of the initial conditions", 0, 1)
 
     def __attrs_post_init__(self) -> None:
         if self.traced_cycles > self.cycles:
@@ -71,7 +71,7 @@ class Study:
     sweep: ClassVar[Sweep | None] = None
 
     mechanism: str = described("a mechanism that comes with the package, or a file", default="bionic_leg")
-    ensemble: Ensemble = described("the runs behind each number", factory=Ensemble)
+    ensemble: Ensemble = described("the runs of each point", factory=Ensemble)
 
     def points(self) -> list[Point]:
         """Points to compute, in the order in which they are shown; two may be one and the same."""

@@ -65,9 +65,9 @@ def read_archive(path: Path, key: str, task: str, settings: dict[str, Any]) -> A
         fault = " ".join(str(error).split()) or type(error).__name__
         raise ConfigError(source, "", f"cannot be read: {fault}") from error
     except AttributeError as error:  # JSON, but no object
-        raise ConfigError(source, "", "does not say what it is the result of") from error
+        raise ConfigError(source, "", "does not name its point") from error
     if not is_whole:
-        raise ConfigError(source, "", "was altered after it was computed (its checksum does not hold)")
+        raise ConfigError(source, "", "was altered after it was computed (its checksum differs)")
     if canonical([about[name] for name in ("key", "task", "settings")]) != canonical([key, task, settings]):
         raise ConfigError(source, "", "is the result of another point")
     return arrays

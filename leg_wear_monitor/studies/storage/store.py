@@ -116,17 +116,17 @@ def read_manifest(path: Path) -> dict[str, Any]:
     except (ValueError, RecursionError) as error:
         raise ConfigError(str(source), "", f"is not JSON: {error}") from error
     if not isinstance(manifest, dict) or manifest.get("format") != _FORMAT:
-        raise ConfigError(str(source), "", f"is no study of format {_FORMAT}")
+        raise ConfigError(str(source), "", f"is not a study of format {_FORMAT}")
     checksum = manifest.pop("checksum", None)
     try:
         is_whole = checksum == text_checksum(canonical(manifest), text)
     except (ValueError, RecursionError):  # a number or a text that JSON has not
         is_whole = False
     if not is_whole:
-        altered = f"it or {MECHANISM} beside it was altered (the checksum does not hold); {_REMOVE}"
+        altered = f"it or {MECHANISM} beside it was altered (the checksum differs); {_REMOVE}"
         raise ConfigError(str(source), "", altered)
     if not _is_study(manifest):
-        raise ConfigError(str(source), "", f"holds no study of this version; {_REMOVE}")
+        raise ConfigError(str(source), "", f"contains no study of this version; {_REMOVE}")
     return manifest
 
 

@@ -69,7 +69,7 @@ class ObservedLeg:
         if status != DONE:
             raise stop(self.setup, status, k, self.stepper.time)
 
-    def look(self) -> Moment:
+    def observe(self) -> Moment:
         """The leg as it is now."""
         stepper = self.stepper
         observe(stepper.model, self.setup.surfaces.feeds_back, stepper.state, stepper.work)
@@ -89,7 +89,7 @@ class ObservedLeg:
     def moments(self, statistics: RunStatistics) -> Iterator[Moment]:
         """Moments of the next cycle, from now on at every step; adds to the run statistics meanwhile."""
         for _ in range(SAMPLES):
-            yield self.look()
+            yield self.observe()
             self.advance(1, statistics)
 
 

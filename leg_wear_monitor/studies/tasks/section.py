@@ -32,7 +32,7 @@ def poincare_section(mechanism: Mechanism, settings: dict[str, Any]) -> Arrays:
     section = []
     for _ in range(settings["cycles"]):
         leg.advance(SAMPLES, statistics)
-        section.append(leg.look())
+        section.append(leg.observe())
     shape = (-1, len(leg.setup.clearance_joints), 2)
     return {
         "clearance_joints": np.array(leg.setup.clearance_joints),

@@ -61,7 +61,7 @@ def angle_model(mechanism: Mechanism, sensors: Sequence[str]) -> AngleModel:
     Raises
     ------
     ConfigError
-        For a sensor on what is no revolute joint.
+        For a sensor on what is not a revolute joint.
     AssemblyError
     """
     for name in sensors:
@@ -70,7 +70,7 @@ def angle_model(mechanism: Mechanism, sensors: Sequence[str]) -> AngleModel:
             raise ConfigError(
                 mechanism.source,
                 "joints",
-                f"{name!r} is no revolute joint, expected some of {', '.join(ready)}",
+                f"{name!r} is not a revolute joint, expected some of {', '.join(ready)}",
             )
     linkage = build_linkage(mechanism)
     contacts = compile_contacts(

@@ -100,12 +100,12 @@ def test_without_checksums_a_damage_may_pass_but_never_unsaid(
     ("content", "text"),
     [
         (b"", "is empty, expected an MCAP file"),
-        (b"#ROSBAG V2.0\n" + bytes(100), "is no MCAP file"),
-        (b"\x89MCAP0\r\n", "joint_states: is no topic of the recording, it has none"),
-        (b"\x89MCAP0\r\n" * 20, "joint_states: is no topic of the recording, it has none"),
-        (b"\x89MCAP0\r\n\x06" + b"\xff" * 200, "is no topic"),
-        (b"\x89MCAP0\r\n\x05" + b"\xff" * 200, "is no topic"),
-        (b"\x89MCAP0\r\n\x03" + bytes(200), "is no topic"),
+        (b"#ROSBAG V2.0\n" + bytes(100), "is not an MCAP file"),
+        (b"\x89MCAP0\r\n", "joint_states: is not a topic of the recording, it has none"),
+        (b"\x89MCAP0\r\n" * 20, "joint_states: is not a topic of the recording, it has none"),
+        (b"\x89MCAP0\r\n\x06" + b"\xff" * 200, "is not a topic"),
+        (b"\x89MCAP0\r\n\x05" + b"\xff" * 200, "is not a topic"),
+        (b"\x89MCAP0\r\n\x03" + bytes(200), "is not a topic"),
     ],
     ids=["empty", "ROS 1", "magic", "magics", "chunk", "message", "schema"],
 )
@@ -126,17 +126,21 @@ def test_what_is_no_recording_is_refused_in_a_line(
 def test_what_is_no_database_is_refused_in_a_line(tmp_path: Path, read: Any, content: bytes) -> None:
     path = tmp_path / "a.db3"
     path.write_bytes(content)
-    with pytest.raises(RecordingError, match=r"a\.db3: is no readable \.db3 file"):
+    with pytest.raises(RecordingError, match=r"a\.db3: is not a readable \.db3 file"):
         read(path)
 
 
 def test_names_that_are_no_recordings_are_refused(tmp_path: Path, read: Any) -> None:
     (tmp_path / "empty").mkdir()
     (tmp_path / "notes.txt").write_text("")
-    for name, text in (("nowhere", "is not there"), ("empty", "holds no .mcap"), ("notes.txt", "is neither")):
+    for name, text in (
+        ("nowhere", "does not exist"),
+        ("empty", "contains no .mcap"),
+        ("notes.txt", "is neither"),
+    ):
         with pytest.raises(RecordingError, match=text):
             read(tmp_path / name)
-    with pytest.raises(RecordingError, match="no recording is named"):
+    with pytest.raises(RecordingError, match="no recording given"):
         read()
 
 

@@ -94,7 +94,7 @@ def test_messages_of_no_topic_are_told(path: Path, read: Any) -> None:
 def test_another_schema_is_refused_and_not_carried_out(path: Path, read: Any, statements: str) -> None:
     with closing(sqlite3.connect(path)) as database, database:
         database.executescript(statements)
-    with pytest.raises(RecordingError, match=r"x\.db3: is no readable \.db3 file: it(s| has)"):
+    with pytest.raises(RecordingError, match=r"x\.db3: is not a readable \.db3 file: it(s| has)"):
         read(path)
 
 
@@ -114,6 +114,6 @@ def test_a_complaint_that_is_no_text_is_one(path: Path, read: Any) -> None:
     content = path.read_bytes()
     assert b"CREATE TABLE messages(" in content
     path.write_bytes(content.replace(b"CREATE TABLE messages(", b"CR\x89ATE TABLE messages("))
-    with pytest.raises(RecordingError, match=r"x\.db3: is no readable \.db3 file: ") as caught:
+    with pytest.raises(RecordingError, match=r"x\.db3: is not a readable \.db3 file: ") as caught:
         read(path)
     assert str(caught.value).isprintable()

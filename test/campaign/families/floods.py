@@ -155,7 +155,7 @@ def _nameless(stage: Stage, rng: np.random.Generator) -> int:
 _KINDS: dict[str, tuple[Callable[[Stage, np.random.Generator], int], str]] = {
     "garbage bytes": (_garbage, "samples cannot be decoded"),
     "huge messages": (_huge, "do not name the crank 'crank': set crank_joint"),
-    "a burst": (_burst, "cannot keep up: samples were shed"),
+    "a burst": (_burst, "overloaded: samples were dropped"),
     "two publishers": (_two, "two series of crank angles interleave"),
     "another type": (_other_type, "expected sensor_msgs/msg/JointState; nothing comes from it"),
     "damaged messages": (_damaged, "samples "),

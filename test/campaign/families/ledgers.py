@@ -83,10 +83,10 @@ def _opened(directory: Path, state: str) -> tuple[Outcome, str]:
         if found not in made.moving_s:
             return Outcome.SILENT, "a state that never was kept"
         lost_s = made.moving_s[last] - made.moving_s[found]
-        if ledger.told and lost_s <= (ledger.cut_off_s or 0.0):
-            return Outcome.REPORTED, ledger.told
+        if ledger.loss and lost_s <= (ledger.cut_off_s or 0.0):
+            return Outcome.REPORTED, ledger.loss
         if found != last:
-            return Outcome.SILENT, f"{lost_s:g} s lost, said: {ledger.cut_off_s} {ledger.told!r}"
+            return Outcome.SILENT, f"{lost_s:g} s lost, said: {ledger.cut_off_s} {ledger.loss!r}"
         return Outcome.SOUND, ""
     finally:
         ledger.close()

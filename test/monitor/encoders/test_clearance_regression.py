@@ -245,5 +245,5 @@ def test_a_worn_joint_is_worn_more_where_it_is_worn():
 
 @pytest.mark.plain
 def test_a_sensor_has_to_sit_on_a_revolute_joint(leg):
-    with pytest.raises(ConfigError, match="'Z' is no revolute joint"):
+    with pytest.raises(ConfigError, match="'Z' is not a revolute joint"):
         angle_model(leg, ("Z",))

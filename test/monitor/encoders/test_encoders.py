@@ -113,7 +113,7 @@ def test_encoders_are_commissioned_and_show_what_is_there(new_watch, commissione
         assert one.clearance_m == pytest.approx(3.0e-4, abs=8e-6)
         assert one.believed
         assert not one.is_other
-    assert status(monitor).message == "clearances are as counted"
+    assert status(monitor).message == "clearances agree with the counted ones"
     assert reports.cycles[-1].joints[0].forecast.measurements == 1
 
 
@@ -270,7 +270,7 @@ def kept(tmp_path):
     "values, fault",
     [
         ({"encoders.names": ["hip"]}, "encoders.joints: has 0 values for 1 encoders"),
-        ({"encoders.names": ["a", "a"], "encoders.joints": ["B", "G"]}, "no different names"),
+        ({"encoders.names": ["a", "a"], "encoders.joints": ["B", "G"]}, "not different names"),
         ({"encoders.names": list("abcde"), "encoders.joints": list("ABGIJ")}, "at most 4"),
         (
             {"encoders.names": ["a"], "encoders.joints": ["B"], "encoders.signs": [0.5]},
@@ -284,7 +284,7 @@ def test_parameters_that_cannot_be_are_refused(values, fault):
 
 
 def test_an_encoder_has_to_sit_on_a_joint_of_the_leg(leg):
-    with pytest.raises(ConfigError, match="'Z' is no revolute joint"):
+    with pytest.raises(ConfigError, match="'Z' is not a revolute joint"):
         WearMonitor(leg, config_from({"encoders.names": ["hip"], "encoders.joints": ["Z"]}))
 
 

@@ -58,7 +58,7 @@ def test_what_is_no_friction_is_a_bias(friction):
     assert levels(report(friction)) == {BIAS: Level.ERROR}
     (cause,) = torque_causes({BIAS}, report(friction), TorqueRecord(), BOUNDS)
     assert "offset is not zeroed" in cause and "sign" in cause
-    assert ("drives" in cause) == (friction < 0.0) and ("friction has risen" in cause) == (friction > 0.0)
+    assert ("drives" in cause) == (friction < 0.0) and ("friction has increased" in cause) == (friction > 0.0)
 
 
 @given(st.floats(-50.0, 50.0), st.floats(0.01, 2.0))

@@ -24,7 +24,7 @@ def healthy():
 @pytest.mark.parametrize(
     ("bias_nm", "offset_rad", "alarm", "cause"),
     [
-        (20.0, 0.0, "torque_bias", "more than the drive's friction may be"),
+        (20.0, 0.0, "torque_bias", "exceeds the largest friction of the drive"),
         (-5.0, 0.0, "torque_bias", "friction cannot"),
         (0.0, 0.05, "torque_lag", "crank.offset_rad"),
         (1.5, 0.0, None, "measured as predicted"),

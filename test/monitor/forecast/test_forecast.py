@@ -12,7 +12,7 @@ from hypothesis import strategies as st
 from leg_wear_monitor.monitor.config.forecast import Forecasting
 from leg_wear_monitor.monitor.forecast.forecast import Answer, JointCondition, forecast
 from leg_wear_monitor.monitor.forecast.growth_law import GrowthLaw, no_law
-from leg_wear_monitor.monitor.forecast.wear_coefficients import Look, believe
+from leg_wear_monitor.monitor.forecast.wear_coefficients import MeasuredClearance, estimate_coefficient
 
 pytestmark = pytest.mark.plain
 
@@ -23,17 +23,19 @@ B = attrs.evolve(NOW, joint="B", growth_m=5e-12)
 Z = statistics.NormalDist().inv_cdf(0.9)
 
 
-def whole(joints, settings=SETTINGS, looks=(), law=None, valid=True):
-    """Forecast of joints; ``looks`` (joint's number, Look)."""
+def whole(joints, settings=SETTINGS, observations=(), law=None, valid=True):
+    """Forecast of joints; ``observations`` (joint's number, MeasuredClearance)."""
     fresh = np.array([each.fresh_m for each in joints])
-    own = [[look for at, look in looks if at == k] for k in range(len(joints))]
-    coefficient_estimates = [believe(settings, each.fresh_m, o) for each, o in zip(joints, own, strict=True)]
+    own = [[observation for at, observation in observations if at == k] for k in range(len(joints))]
+    coefficient_estimates = [
+        estimate_coefficient(settings, each.fresh_m, o) for each, o in zip(joints, own, strict=True)
+    ]
     law = law or no_law(fresh, settings.model_sigma)
     return forecast(joints, coefficient_estimates, settings, law, cycle_s=1.0, valid=valid)
 
 
-def alone(now=NOW, settings=SETTINGS, looks=(), **more):
-    return whole([now], settings, [(0, look) for look in looks], **more).joints[0]
+def alone(now=NOW, settings=SETTINGS, observations=(), **more):
+    return whole([now], settings, [(0, observation) for observation in observations], **more).joints[0]
 
 
 def test_with_the_coefficient_alone_unknown_life_is_lognormal():
@@ -64,7 +66,7 @@ def test_all_wear_faster_by_a_factor_is_life_shorter_by_it(factor):
 def test_a_measurement_narrows_and_moves_the_forecast():
     now = attrs.evolve(NOW, wear_m=6e-5)
     before = alone(now)
-    after = alone(now, looks=[Look(3e-4 + 1.5 * 6e-5, 5e-6, 6e-5)])
+    after = alone(now, observations=[MeasuredClearance(3e-4 + 1.5 * 6e-5, 5e-6, 6e-5)])
     assert after.cycles.p50 < 0.75 * before.cycles.p50
     assert (
         math.log(after.cycles.p90 / after.cycles.p10) < math.log(before.cycles.p90 / before.cycles.p10) / 3.0
@@ -139,7 +141,7 @@ def test_a_measured_joint_tells_of_one_that_it_acts_upon(coupling):
     """A is half as much wider again than the twin has it, and stays so: half of that is in B's past."""
     law = GrowthLaw(np.array([[0.0, 0.0], [coupling, 0.0]]), np.full(2, 3e-4), np.full(2, 1e-3), np.zeros(2))
     worn = attrs.evolve(NOW, wear_m=1e-4, growth_m=0.0)
-    told = whole([worn, B], SURE, [(0, Look(4.5e-4, 1e-8, 1e-4))], law).joints[1].cycles
+    told = whole([worn, B], SURE, [(0, MeasuredClearance(4.5e-4, 1e-8, 1e-4))], law).joints[1].cycles
     expected = alone(B, SURE, law=no_law(np.array([3e-4]), 0.0)).cycles
     apart = math.log(4.5e-4 / 4e-4)
     assert math.log(expected.p50 / told.p50) == pytest.approx(0.5 * coupling * apart, abs=1e-3)

@@ -59,12 +59,12 @@ def test_joints_in_another_order_have_the_same_law(leg):
 def test_a_file_that_cannot_be_used_is_refused(leg, tmp_path):
     with pytest.raises(ConfigError, match="cannot be read"):
         law_of(leg, str(tmp_path / "none.json"), 0.5)
-    for content, words in (("{", "is no JSON"), ("[1]", "is no life"), ("{}", "of another leg")):
+    for content, words in (("{", "is not JSON"), ("[1]", "is not a life"), ("{}", "of another leg")):
         (tmp_path / "odd.json").write_text(content)
         with pytest.raises(ConfigError, match=words):
             law_of(leg, str(tmp_path / "odd.json"), 0.5)
     for changes in ({"cycles": [0.0, 1.0]}, {"further": 3}, {"joints": {}}, {"wear_factor": {"A": 1.0}}):
-        with pytest.raises(ConfigError, match="is no life of the joints A, B, G, I, J"):
+        with pytest.raises(ConfigError, match="is not a life of the joints A, B, G, I, J"):
             law_of(leg, changed(tmp_path, **changes), 0.5)
 
 

@@ -23,7 +23,7 @@ def test_a_true_forecast_holds_four_fifths_and_has_no_bias():
     told = validity(measured(np.random.default_rng(1).random(400)))
     assert told.within / told.measurements == pytest.approx(0.8, abs=0.06)
     assert told.bias == pytest.approx(0.0, abs=0.03)
-    assert told.words.endswith("no bias to be seen")
+    assert told.words.endswith("no bias found")
 
 
 @pytest.mark.parametrize(("power", "word"), [(0.3, "faster"), (3.0, "slower")])

@@ -104,7 +104,7 @@ def test_a_log_of_sqlite_put_beside_it_is_refused(open_ledger, full, tmp_path):
         db.execute("PRAGMA journal_mode = WAL")
         db.execute("DELETE FROM span")
         shutil.copy(f"{other}-wal", f"{full}-wal")
-    assert_refused(open_ledger, full, "wear.ledger-wal beside it is not its own; move that away")
+    assert_refused(open_ledger, full, "wear.ledger-wal beside it belongs to another ledger; move it away")
 
 
 def in_a_transaction(path, target):
@@ -143,5 +143,5 @@ def test_a_journal_of_another_time_is_refused_and_nothing_is_undone_with_it(
 
 def test_what_is_no_file_is_refused_at_once(open_ledger, tmp_path):
     os.mkfifo(tmp_path / "wear.ledger")
-    with pytest.raises(LedgerError, match="cannot be opened: is no file"):
+    with pytest.raises(LedgerError, match="cannot be opened: it is not a file"):
         open_ledger()

@@ -60,7 +60,7 @@ def kept(path):
         earlier = db.execute(
             "SELECT begin_ns, end_ns FROM span WHERE run != ?", (found.entry_run,)
         ).fetchall()
-    assert found.told == "", "the log does not fit"
+    assert found.loss == "", "the log does not fit"
     if found.entry is None:
         return 0, {}, earlier
     return found.entry.stamp_ns, found.entry.totals, sorted([*earlier, *found.entry.spans])

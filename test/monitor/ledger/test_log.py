@@ -84,7 +84,7 @@ def test_an_entry_costs_some_kilobytes_and_the_tables_stay_as_they_are(open_ledg
 def test_after_a_kill_the_last_entry_is_there_and_errors_do_not_add_up(open_ledger, killed, walk):
     found = open_ledger()
     assert_is(found.entry, walk[-1], walk[-2])
-    assert (found.cut_off_s, found.told, found.kept_ns) == (5.0, "", walk[-1].stamp_ns)
+    assert (found.cut_off_s, found.loss, found.kept_ns) == (5.0, "", walk[-1].stamp_ns)
     assert found.counted_ns.tolist() == [[0, walk[-1].stamp_ns]]
     found.close()
     again = open_ledger()  # what was in the log is in the tables now
@@ -119,7 +119,7 @@ def test_a_record_cut_off_by_a_power_cut_is_not_there_and_the_one_before_is(open
     found = open_ledger()
     assert_is(found.entry, walk[-2], walk[-3])
     assert found.cut_off_s == 10.0  # of that record, and since
-    assert "wear.ledger-log is not whole: the wear of at most 10 s of walking is lost" in found.told
+    assert "wear.ledger-log is not whole: the wear of at most 10 s of walking is lost" in found.loss
 
 
 def test_records_that_are_missing_at_the_end_are_missed(open_ledger, killed, walk):
@@ -129,7 +129,7 @@ def test_records_that_are_missing_at_the_end_are_missed(open_ledger, killed, wal
     found = open_ledger()
     assert_is(found.entry, walk[-4], walk[-5])
     assert found.cut_off_s == 20.0
-    assert "is not whole: the wear of at most 20 s of walking is lost" in found.told
+    assert "is not whole: the wear of at most 20 s of walking is lost" in found.loss
 
 
 def test_a_flipped_bit_in_the_log_is_told_with_what_may_be_lost(open_ledger, killed, walk):
@@ -140,8 +140,8 @@ def test_a_flipped_bit_in_the_log_is_told_with_what_may_be_lost(open_ledger, kil
     found = open_ledger()
     assert_is(found.entry, walk[4], walk[3])
     assert found.cut_off_s == pytest.approx(WHOLE_S - 20.0 + 10.0)
-    assert "wear.ledger-log is not whole" in found.told
-    assert "at most 590 s of walking is lost" in found.told
+    assert "wear.ledger-log is not whole" in found.loss
+    assert "at most 590 s of walking is lost" in found.loss
 
 
 @pytest.mark.parametrize("damage", ["missing", "empty", "of another time", "something else"])
@@ -162,7 +162,7 @@ def test_a_log_that_is_not_there_or_another_is_told_with_what_may_be_lost(
     before = killed.read_bytes()
     found = open_ledger()
     assert found.cut_off_s == WHOLE_S + 10.0
-    assert "the wear of at most 610 s of walking is lost" in found.told
+    assert "the wear of at most 610 s of walking is lost" in found.loss
     assert before != killed.read_bytes()  # it goes on
     last = walk[-1] if damage == "of another time" else walk[0]
     assert found.entry.stamp_ns == last.stamp_ns

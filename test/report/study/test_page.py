@@ -67,11 +67,11 @@ def test_points_that_failed_or_are_missing_come_first(study):
     results = study("size")
     arrays = ({"fault": np.array("pushed through")}, {}, *results.arrays[2:])
     page = study_page(attrs.evolve(results, arrays=arrays))
-    assert page.sections[0].title == "What is missing"
+    assert page.sections[0].title == "Missing points"
     assert "0.1 mm: pushed through" in conclusions(page)
     assert "Not computed yet: 0.2 mm." in conclusions(page)
     nothing = study_page(attrs.evolve(results, arrays=({},) * len(results.arrays)))
-    assert [section.title for section in nothing.sections] == ["What is missing"]
+    assert [section.title for section in nothing.sections] == ["Missing points"]
 
 
 @pytest.mark.plain

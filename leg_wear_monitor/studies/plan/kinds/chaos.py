@@ -24,22 +24,22 @@ PORTRAIT_CYCLES = 6
 class Exponent:
     """How the largest Lyapunov exponent is measured."""
 
-    runs: int = count_field("pairs of neighbours that differ in where they start", 2, 4)
+    runs: int = count_field("pairs of neighbours with different initial conditions", 2, 4)
     cycles: int = count_field("gait cycles over which neighbours are followed", 10, 100)
     renewals: int = quantity(
         "",
-        "times in a cycle that the neighbour is brought back, a power of 2",
+        "renormalisations of the distance per cycle, a power of 2",
         at_least=1,
         at_most=SAMPLES,
         default=64,
         check=lambda times: None if SAMPLES % times == 0 else f"{times} does not divide {SAMPLES}",
     )
     distance: float = quantity(
-        "", "distance it is brought back to, in clearances", at_least=1.0e-12, at_most=1.0e-3, default=1.0e-8
+        "", "distance after renormalisation, in clearances", at_least=1.0e-12, at_most=1.0e-3, default=1.0e-8
     )
     tolerance_m: float = quantity(
         "m",
-        "local error allowed in a step: errors of the usual size add to the growth",
+        "local error allowed in a step; larger errors, as of simulate, add to the growth",
         at_least=1.0e-15,
         at_most=1.0e-6,
         default=1.0e-10,
@@ -58,10 +58,10 @@ class Bifurcation:
 
 @attrs.frozen(kw_only=True)
 class Chaos(Study):
-    """How far the motion can be foretold."""
+    """Predictability of the motion."""
 
-    title = "How far the motion can be foretold"
-    question = "How disordered is the motion with clearance, and how soon is a small error a large one?"
+    title = "Predictability of the motion"
+    question = "How chaotic is the motion with clearance, and how fast do small errors grow?"
 
     joints: Names = clearance_joints_field()
     others: tuple[Names, ...] = described("other sets whose exponents are compared", default=())

@@ -13,8 +13,8 @@ from leg_wear_monitor.studies.point import Point
 class Location(Study):
     """Clearance in one place or another."""
 
-    title = "Where the clearance is"
-    question = "What does the same clearance do in the hip, at the knee and in the foot?"
+    title = "Clearance location"
+    question = "How do the effects of the same clearance differ between hip, knee and foot?"
 
     sets: tuple[Names, ...] = described("clearance joints of one run, a list of lists", check=check_sets)
     clearance_m: float = clearance_field()

@@ -12,7 +12,8 @@ class Multi(Location):
 
     title = "Several clearances at once"
     question = (
-        "Do clearances in all these joints do what each does alone, added up, and which joint is worst?"
+        "Is the effect of clearances in all these joints the sum of the effects of each alone, and which "
+        "joint is worst?"
     )
 
     def points(self) -> list[Point]:

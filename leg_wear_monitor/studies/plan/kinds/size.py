@@ -14,7 +14,7 @@ class Size(Study):
 
     title = "Clearance size"
     question = (
-        "What does the size of a clearance do to the motion, the impacts, the drive and the wear of the leg?"
+        "How does the size of a clearance affect the motion, the impacts, the drive and the wear of the leg?"
     )
     sweep = Sweep(
         "clearance", "radial clearance [mm]", lambda settings: 1.0e3 * float(settings["clearance_m"])

@@ -13,7 +13,7 @@ class Speed(Study):
     """Crank speed with clearance at chosen joints."""
 
     title = "Crank speed"
-    question = "What does the crank's speed do to a leg with clearance?"
+    question = "How does the crank's speed affect a leg with clearance?"
     sweep = Sweep("speed", "crank speed [rpm]", lambda settings: float(settings["speed_rpm"]))
 
     joints: Names = clearance_joints_field()

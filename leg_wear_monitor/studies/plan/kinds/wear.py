@@ -30,15 +30,15 @@ class Life:
         default=1.0e-5,
     )
     cycles: int = count_field("gait cycles simulated and averaged before each jump", 2, 6)
-    runs: int = count_field("lives that differ in where they start", 2, 4)
+    runs: int = count_field("lives with different initial conditions", 2, 4)
 
 
 @attrs.frozen(kw_only=True)
 class Wear(Location):
     """Where bushings and journals wear, fresh and after wear has fed back over a life."""
 
-    title = "Where the joints wear"
-    question = "Where on bushing and journal does each joint wear, and what becomes of it over a life?"
+    title = "Wear zones"
+    question = "Where do bushing and journal of each joint wear, and how does the wear develop over a life?"
 
     life: Life = described("how far wear is followed", factory=Life)
 

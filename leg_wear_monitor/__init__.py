@@ -1,4 +1,4 @@
-"""Wear of the joints of a crank-driven leg: its mechanism, its motion with clearances, what that wears away.
+"""Joint wear of a crank-driven leg: mechanism, motion with clearances, wear, monitor and forecast.
 
 Names are imported when they are first used, so that the command line can answer before numba is loaded.
 """

@@ -109,18 +109,18 @@ def simulate(
     speed_rpm : float, optional
         Crank speed instead of the mechanism's own, negative for clockwise.
     cycles, duration_s : float
-        How long to count, as gait cycles or as time [s].
+        Counted length of the run, in gait cycles or as time [s].
     skip_cycles : float, optional
         Gait cycles simulated before counting starts; 1, or 0 with ``duration_s``.
     model : str, optional
         A key of `MODELS`: ``clearance``, the default, or ``full``, the default for a drive by torque or a
         controller.
     wear : bool
-        Whether wear opens the clearance as it goes; it is counted either way.
+        Whether wear opens the clearances during the run; it is counted either way.
     normal_law : str, optional
         Normal contact law of all clearance joints.
     trace : int
-        Samples a cycle to keep, the first at crank angle 0; 0 for none.
+        Stored samples per cycle, the first at crank angle 0; 0 for none.
     progress : callable, optional
         Called with the fraction of the run that is done.
 
@@ -134,7 +134,7 @@ def simulate(
     Raises
     ------
     ConfigError
-        For values that cannot be.
+        For impossible values.
     AssemblyError
         For a linkage that does not close or cannot turn.
     SimulationError

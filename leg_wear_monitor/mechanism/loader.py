@@ -50,7 +50,7 @@ def load_mechanism(name_or_path: str | Path = "bionic_leg") -> spec.Mechanism:
     Parameters
     ----------
     name_or_path : str or pathlib.Path
-        The name of a mechanism that comes with the package, or a path: whatever has a suffix or a
+        The name of a mechanism that comes with the package, or a path: anything with a suffix or a
         directory. Relative paths start at the current directory.
 
     Raises

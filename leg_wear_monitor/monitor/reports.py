@@ -1,4 +1,4 @@
-"""What the monitor says: at each sample, of each gait cycle, when an alarm changes, and of its own state."""
+"""Reports of the monitor: at each sample, each gait cycle and each change of an alarm, and its own status."""
 
 import math
 
@@ -12,7 +12,7 @@ from leg_wear_monitor.monitor.inputs.pauses import Pauses
 from leg_wear_monitor.twin.statistics import Intake, SampleStatistics
 
 SampleReports = SampleStatistics
-"""The leg at each sample that was passed now; NaN while it is not followed."""
+"""The leg at each processed sample; NaN while it is not followed."""
 
 
 @attrs.frozen(kw_only=True)
@@ -25,8 +25,8 @@ class JointReport:
     clearance_m, clearance_max_m : float
         Mean and largest radial clearance around the bushing at the cycle's end.
     growth_m_per_cycle, growth_mps : float or None
-        Of the mean clearance, averaged over gait cycles, a cycle and a second of walking; None while there
-        is not enough data.
+        Growth of the mean clearance per cycle and per second of walking, averaged over gait cycles; None
+        while there is not enough data.
     growth_error_m_per_cycle : float or None
         Standard error of that average.
     peak_force_n, p99_force_n, mean_force_n : float
@@ -35,7 +35,7 @@ class JointReport:
     forecast : JointForecast or None
         Renewed once a minute, and when more is known.
     seen : ClearanceEstimate or None
-        The clearance that further encoders show; None without such.
+        The clearance estimated from further encoders; None without encoders.
     """
 
     joint: str
@@ -69,17 +69,17 @@ class CycleReport:
     joints : tuple of JointReport
         In the order of `WearMonitor.clearance_joints`.
     torque_samples : int
-        The torque figures are NaN without any.
+        Torque samples in it; the torque values are NaN without any.
     measured_torque_rms_nm, predicted_torque_rms_nm, residual_torque_rms_nm : float
     torque_mismatch : float
-        RMS of what foot load, friction and lag do not explain, as a fraction of the predicted RMS.
+        RMS of the torque that foot load, friction and lag do not explain, as a fraction of the predicted RMS.
     load_n, load_sigma_n : float
-        Foot load, up positive, that the measured torque shows, and its standard deviation.
+        Foot load estimated from the measured torque, up positive, and its standard deviation.
     load_acting_n : float
-        Foot load at work in the model: that above where it is believed, else 0.
+        Foot load that acts in the model: `load_n` if it is accepted, else 0.
     friction_nm, torque_lag_s : float
-        Friction in the drive, and by how much the measured torque comes late, as the torque says; values that
-        no drive has raise ``torque_bias`` and ``torque_lag``.
+        Friction of the drive and delay of the measured torque, as estimated; implausible values raise
+        ``torque_bias`` and ``torque_lag``.
     friction_sigma_nm, torque_lag_sigma_s : float
         Their standard deviations.
     forecast : LegForecast or None
@@ -110,7 +110,7 @@ class CycleReport:
 
 @attrs.frozen
 class AlarmList:
-    """All alarms as they stand after a change.
+    """State of all alarms after a change.
 
     Attributes
     ----------
@@ -125,30 +125,30 @@ class AlarmList:
 
     @property
     def level(self) -> Level:
-        """The highest level shown."""
+        """The highest displayed level."""
         return max((alarm.level for alarm in self.alarms), default=Level.OK)
 
 
 @attrs.frozen(kw_only=True)
 class Lost:
-    """What was not integrated, since the monitor was made; figures only grow.
+    """Samples and time that were not integrated since the monitor was created; the values only grow.
 
     Attributes
     ----------
     unmonitored_s : float
-        Time in which the leg was not followed.
+        Time during which the leg was not followed.
     already_counted : int
         Samples of a time whose wear is in the ledger from an earlier run.
     faulty : dict of str to int
-        Samples that came with a fault, by its name.
+        Faulty samples, by the name of the fault.
     conflicting, implausible : int
-        Of those out of range, samples of a crank angle that two sources sent, and of one in another unit.
+        Of those out of range: crank samples from two sources, and crank samples in another unit.
     duplicates, late, stray_stamps, outliers : int
-        Samples dropped: seen before, later than the window, a stamp far off, a value far off.
+        Dropped samples: repeated, later than the window, with a stamp far off, with a value far off.
     gaps_bridged, gaps_lost, backward_jumps, failures : int
-        Gaps bridged and not; new time bases; motions that the model could not resolve.
+        Bridged gaps and others; new time bases; motions that the model could not resolve.
     paused_s : float
-        Time between recordings that were given together; it is in none of the others.
+        Time between recordings that were replayed together; it is not in the other values.
     """
 
     unmonitored_s: float
@@ -170,7 +170,7 @@ class Lost:
 def lost(
     intake: Intake, already_counted: int, unmonitored_s: float, guard: InputGuard, pauses: Pauses
 ) -> Lost:
-    """What was not integrated, from the counts of a twin and of what guards its input."""
+    """Samples and time not integrated, from the counts of a twin and of its input guard."""
     return Lost(
         unmonitored_s=unmonitored_s,
         already_counted=already_counted,
@@ -191,16 +191,16 @@ def lost(
 
 @attrs.frozen(eq=False)
 class Reports:
-    """What an update brought.
+    """Reports of an update.
 
     Attributes
     ----------
     samples : SampleReports
-        Samples passed now; they lie some time back, see `WearMonitor.update`.
+        Samples processed now; they are delayed, see `WearMonitor.update`.
     cycles : tuple of CycleReport
-        Gait cycles finished now.
+        Gait cycles completed now.
     alarms : tuple of AlarmList
-        One for each time that an alarm changed.
+        One for each change of an alarm.
     lost : Lost
     """
 

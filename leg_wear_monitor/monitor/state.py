@@ -1,4 +1,4 @@
-"""All that changes in a monitor, but for its ledger."""
+"""The changing state of a monitor, without its ledger."""
 
 import attrs
 
@@ -17,7 +17,7 @@ from leg_wear_monitor.twin.statistics import Event
 
 @attrs.define
 class MonitorState:
-    """What changes, beside twin, alarms and books; every value is immutable."""
+    """State beside twin, alarms and accounting; every value is immutable."""
 
     growth: tuple[GrowthWindow, ...]
     torque: TorqueRecord
@@ -27,12 +27,12 @@ class MonitorState:
 
 @attrs.frozen(eq=False)
 class MonitorSnapshot:
-    """All of a monitor but its ledger."""
+    """Snapshot of a monitor without its ledger."""
 
     twin: TwinSnapshot
     state: MonitorState
     accounting: AccountingState
-    evaluate: AlarmEvaluationState
+    evaluation: AlarmEvaluationState
     forecast: ForecastState
     alarms: dict[str, Alarm]
     evaluation_periods: Records

@@ -1,4 +1,4 @@
-"""The monitor: samples in, reports out. The same below the live node and below replay."""
+"""The monitor: samples in, reports out; the live node and replay use the same code."""
 
 import attrs
 import numpy as np
@@ -45,30 +45,30 @@ _KEPT_EVENTS = 1
 
 
 class WearMonitor:
-    """Watches a leg's joints wear, by its crank's motion and its drive torque.
+    """Monitors the joint wear of a leg from its crank's motion and its drive torque.
 
     It advises: the absence of an alarm does not mean the joints are healthy.
 
     Parameters
     ----------
     mechanism : Mechanism
-        As its file has it; the configuration names the clearance joints.
+        As loaded from its file; the configuration names the clearance joints.
     config : MonitorConfig, optional
     ledger : Ledger, optional
-        See `open_ledger`; its wear is continued. Without one, wear begins at 0 and ends with the monitor.
+        See `open_ledger`; its wear is continued. Without one, wear begins at 0 and is lost at the end.
 
     Attributes
     ----------
     mechanism : Mechanism
-        As the configuration wants it.
+        With the clearance joints and clearances of the configuration.
     config : MonitorConfig
     clearance_joints : tuple of str
-        The clearance joints, in the order of all figures.
+        The clearance joints, in the order of all values.
 
     Raises
     ------
     ConfigError, AssemblyError
-        For a mechanism or parameters that cannot be.
+        For an invalid mechanism or invalid parameters.
     """
 
     def __init__(
@@ -100,40 +100,39 @@ class WearMonitor:
         self._state = MonitorState(tuple(GrowthWindow() for _ in self.clearance_joints), kept)
 
     def warm_up(self) -> None:
-        """Compile all that `update` needs, before the first sample; takes about a minute once."""
+        """Compile all kernels that `update` needs, before the first sample; takes about a minute once."""
         self._twin.warm_up()
         self._guard.warm_up()
         list(EvaluationPeriods(1).pieces(np.zeros(1, GAIT_SAMPLE)))
 
     def update(self, samples: Samples) -> Reports:
-        """Take in a block of samples.
+        """Process a block of samples.
 
         Parameters
         ----------
         samples : (n,) array of GAIT_SAMPLE
-            In order of arrival. However a stream is cut into blocks, the reports are the same, one after the
-            other.
+            In order of arrival. The reports do not depend on how the stream is cut into blocks.
 
         Returns
         -------
         Reports
-            The leg follows some way behind the newest sample, by the tracker's lag: that is where they end.
+            They end before the newest sample by the tracker's lag.
         """
-        looks: list[SampleReports] = []
+        sampled: list[SampleReports] = []
         cycles: list[CycleReport] = []
         changes: list[AlarmList] = []
         for piece, ends_period in self._evaluation_periods.pieces(samples):
-            seen, ended = self._take(piece, changes)
-            looks.append(seen)
+            reports, ended = self._take(piece, changes)
+            sampled.append(reports)
             cycles += ended
             if ends_period:
-                self._tell(self._evaluation.end_period(self._accounting.state.skipped), changes)
+                self._add_changes(self._evaluation.end_period(self._accounting.state.skipped), changes)
                 self._observe_encoders()
             self._accounting.keep_if_due(self._evaluation.board.alarms.values())
-        return Reports(joined(looks, len(self.clearance_joints)), tuple(cycles), tuple(changes), self.lost)
+        return Reports(joined(sampled, len(self.clearance_joints)), tuple(cycles), tuple(changes), self.lost)
 
     def pause(self, pause_s: float) -> None:
-        """Between the samples so far and the next ones nobody recorded: no fault of the input.
+        """Mark a pause between the previous and the next samples, which is not a fault of the input.
 
         Parameters
         ----------
@@ -145,12 +144,12 @@ class WearMonitor:
 
     @property
     def alarms(self) -> AlarmList:
-        """All alarms as they stand."""
+        """State of all alarms."""
         return AlarmList(self._twin.intake.followed_stamp_ns, tuple(self._evaluation.board.alarms.values()))
 
     @property
     def lost(self) -> Lost:
-        """What was not integrated so far."""
+        """Samples and time that were not integrated so far."""
         accounting = self._accounting.state
         return lost(
             self._twin.intake,
@@ -162,7 +161,7 @@ class WearMonitor:
 
     @property
     def used(self) -> tuple[int, int]:
-        """How many crank and torque samples were used so far."""
+        """Numbers of crank and torque samples used so far."""
         intake = self._twin.intake
         return intake.crank_used, intake.torque_used
 
@@ -173,15 +172,15 @@ class WearMonitor:
 
     @property
     def wear_depth_m(self) -> Floats:
-        """Wear depth (loose, 2, sectors) of bushings and journals; a copy."""
+        """Wear depth (clearance joints, 2, sectors) of bushings and journals [m]; a copy."""
         return self._twin.depth
 
     def wear_of(self, joint: str) -> JointWear:
-        """Wear of a joint's part as it is now; raises LegWearError for one that is not loose."""
+        """Present wear of a joint's part; raises LegWearError for a joint without clearance."""
         return self._accounting.wear_of(joint)
 
     def begin_run(self, boot_id: str) -> bool:
-        """Note which start of the computer this is; whether the last run is known to be of another."""
+        """Store the boot id of the computer; return whether the last run is known to have another one."""
         ledger = self._accounting.ledger
         if ledger is None:
             return False
@@ -189,17 +188,17 @@ class WearMonitor:
         return bool(boot_id and ledger.last_run.boot_id) and boot_id != ledger.last_run.boot_id
 
     def counted(self, samples: Samples) -> NDArray[np.bool_]:
-        """Which samples `update` would leave out, since the ledger has the wear of their time."""
+        """Samples that `update` would skip, because the ledger contains the wear of their time."""
         return self._accounting.counted(samples)
 
     def begin_epoch(self, stamp_ns: int, who: str) -> None:
-        """The clock of the samples has begun anew at a stamp: what comes is counted."""
+        """Begin an epoch: the clock of the samples has restarted, and the following samples are counted."""
         self._accounting.begin_epoch()
         self._accounting.note(Audit(stamp_ns, who, "new_epoch"))
         self._keep()
 
     def status(self) -> tuple[Status, ...]:
-        """What /diagnostics shows; names and their order stay the same."""
+        """Statuses for /diagnostics; their names and order are constant."""
         state = self._state
         return statuses(
             self._twin,
@@ -212,12 +211,12 @@ class WearMonitor:
         )
 
     def configure(self, config: MonitorConfig) -> None:
-        """Take over parameters that may change while it runs; see `parameters.changed`.
+        """Apply parameters that may change while the monitor runs; see `parameters.changed`.
 
         Raises
         ------
         ConfigError
-            For limits that do not fit the mechanism; nothing has changed then.
+            For limits that do not fit the mechanism; then nothing changes.
         """
         check_limits(config, self.mechanism)
         self.config = config
@@ -226,12 +225,12 @@ class WearMonitor:
             self._encoders.config = config
 
     def acknowledge(self, stamp_ns: int) -> tuple[tuple[Alarm, ...], tuple[Alarm, ...]]:
-        """Acknowledge all alarms, and that the run before was cut off.
+        """Acknowledge all alarms, and the interruption of the previous run.
 
         Returns
         -------
         cleared, kept : tuple of Alarm
-            Those that had returned to normal, and those that stay until they do.
+            Alarms that had returned to normal, and alarms that stay until they do.
         """
         cleared, kept = self._evaluation.board.acknowledge()
         self._accounting.state.cut_off_s = None
@@ -241,7 +240,7 @@ class WearMonitor:
         return cleared, kept
 
     def reset_wear(self, joint: str, stamp_ns: int, who: str) -> None:
-        """A part was replaced: fresh surfaces for a joint; its history stays in the ledger.
+        """Reset the wear of a joint whose part was replaced; its history stays in the ledger.
 
         Raises
         ------
@@ -254,17 +253,17 @@ class WearMonitor:
         self._keep()
 
     def undo_reset(self, joint: str, stamp_ns: int, who: str) -> JointWear:
-        """Take the last `reset_wear` of a joint back: its part was not replaced, and has worn on since.
+        """Undo the last `reset_wear` of a joint whose part was not replaced.
 
         Returns
         -------
         JointWear
-            As it is now: the wear before the reset and the wear since.
+            Sum of the wear before the reset and since.
 
         Raises
         ------
         LegWearError
-            For a joint without clearance, or if no reset is kept that can be taken back.
+            For a joint without clearance, or if the ledger has no reset to undo.
         """
         reset = last_reset(self._accounting.ledger, joint, self._accounting.wear_of(joint))
         since = self._accounting.put_back(joint, reset.before)
@@ -274,7 +273,7 @@ class WearMonitor:
         return self._accounting.wear_of(joint)
 
     def _part_changed(self, joint: str, replaced_ns: int) -> None:
-        """What was found of the growth of another part does not hold for this one."""
+        """Discard the growth and the estimates of the former part."""
         k, growth = self.clearance_joints.index(joint), self._state.growth
         self._state.growth = (*growth[:k], GrowthWindow(), *growth[k + 1 :])
         self._forecaster.replaced(joint, replaced_ns)
@@ -284,7 +283,7 @@ class WearMonitor:
     def measure(
         self, joint: str, clearance_m: float, sigma_m: float, stamp_ns: int, who: str, accept: bool = False
     ) -> MeasurementResult:
-        """Somebody has measured a clearance: the forecast learns from it, and it is kept in the ledger.
+        """Add a measured clearance to the ledger and update the forecast with it.
 
         Parameters
         ----------
@@ -294,12 +293,12 @@ class WearMonitor:
         stamp_ns : int
         who : str
         accept : bool
-            Whether it counts even if it contradicts the model.
+            Whether the measurement counts even if it contradicts the model.
 
         Raises
         ------
         LegWearError
-            For a joint without clearance, or figures that cannot be.
+            For a joint without clearance, or impossible values.
         """
         wear = self._accounting.wear_of(joint)
         kept_ns = self._accounting.ledger.kept_ns if self._accounting.ledger else 0
@@ -314,17 +313,17 @@ class WearMonitor:
         )
         self._accounting.note(found.measurement)
         if self._encoders:
-            self._encoders.state.updated_ns = 0  # what they show counts beside it
+            self._encoders.state.updated_ns = 0  # the next estimate updates the forecast again
         self._keep()
         return found
 
     def renew_forecast(self) -> CycleReport | None:
-        """Forecast from all that is known now, instead of up to a minute ago.
+        """Renew the forecast now; otherwise it may be a minute old.
 
         Returns
         -------
         CycleReport or None
-            The last gait cycle with this forecast; None before the first.
+            The last gait cycle with the new forecast; None before the first.
         """
         last = self._state.last
         if last is None:
@@ -343,7 +342,7 @@ class WearMonitor:
         Raises
         ------
         LegWearError
-            If there is none, or it could not be written.
+            If there is no ledger, or it could not be written.
         """
         ledger = self._accounting.ledger
         if ledger is None:
@@ -352,12 +351,12 @@ class WearMonitor:
             raise LegWearError(ledger.fault or "the ledger is written at the end of the recording")
 
     def close(self) -> None:
-        """End in order: write the last entry and let go of the ledger.
+        """Write the last entry and close the ledger.
 
         Raises
         ------
         LedgerError
-            If a ledger that is written at the end alone could not be: then nothing is kept.
+            If a ledger that is written only at the end could not be written; then nothing is stored.
         """
         ledger = self._accounting.ledger
         if ledger is None:
@@ -368,22 +367,22 @@ class WearMonitor:
             raise LedgerError(f"{ledger.path}: {ledger.fault}; nothing of this run is in it")
 
     def abandon(self) -> None:
-        """Let go of the ledger without a further entry."""
+        """Close the ledger without a further entry."""
         if self._accounting.ledger:
             self._accounting.ledger.close()
 
     @property
     def ledger_loss(self) -> str:
-        """What was wrong with the ledger as it was found, and may be lost with it; empty if nothing was."""
+        """Fault of the ledger when it was opened, and the possible loss; empty if there was none."""
         return self._accounting.ledger.loss if self._accounting.ledger else ""
 
     @property
     def is_all_counted(self) -> bool:
-        """Whether samples came, and the wear of all of them was in the ledger already."""
+        """Whether there were samples, and the ledger already contained the wear of all of them."""
         return self._accounting.state.skipped > 0 and not self._accounting.state.spans
 
     def snapshot(self) -> MonitorSnapshot:
-        """A copy of the whole state but the ledger's."""
+        """A copy of the whole state, except for the ledger's."""
         return MonitorSnapshot(
             self._twin.snapshot(),
             attrs.evolve(self._state),
@@ -397,11 +396,11 @@ class WearMonitor:
         )
 
     def restore(self, snapshot: MonitorSnapshot) -> None:
-        """Go back to a snapshot of a monitor of the same mechanism and parameters; it goes on bit for bit."""
+        """Restore a snapshot of a monitor with the same mechanism and parameters, bit for bit."""
         self._twin.restore(snapshot.twin)
         self._state = attrs.evolve(snapshot.state)
         self._accounting.state = attrs.evolve(snapshot.accounting)
-        self._evaluation.state = attrs.evolve(snapshot.evaluate)
+        self._evaluation.state = attrs.evolve(snapshot.evaluation)
         self._forecaster.state = attrs.evolve(snapshot.forecast)
         self._evaluation.board.alarms = snapshot.alarms
         self._evaluation_periods.state[:] = snapshot.evaluation_periods
@@ -413,7 +412,7 @@ class WearMonitor:
         return self._accounting.keep(self._evaluation.board.alarms.values(), closed)
 
     def _take(self, piece: Samples, changes: list[AlarmList]) -> tuple[SampleReports, list[CycleReport]]:
-        """Follow a piece of an evaluation period, and judge the gait cycles that it ends."""
+        """Process a piece of an evaluation period, and evaluate the gait cycles that end in it."""
         piece = self._guard.checked(self._accounting.not_counted(piece))
         update = self._twin.update(piece)
         self._evaluation.see(piece)
@@ -426,12 +425,12 @@ class WearMonitor:
             if self._encoders:
                 self._encoders.ended(statistics)
             cycles.append(self._report(statistics))
-            self._tell(self._evaluation.end_cycle(cycles[-1], self._state.torque), changes)
+            self._add_changes(self._evaluation.end_cycle(cycles[-1], self._state.torque), changes)
             self._keep_torque(statistics, cycles[-1])
         return update.samples, cycles
 
     def _report(self, statistics: CycleStatistics) -> CycleReport:
-        """Report a gait cycle."""
+        """Report of a gait cycle."""
         state, accounting = self._state, self._accounting
         accounting.state.cycles += 1
         state.growth = tuple(
@@ -450,7 +449,7 @@ class WearMonitor:
         return state.last
 
     def _keep_torque(self, statistics: CycleStatistics, report: CycleReport) -> None:
-        """Take down what the torque was like, while it is as predicted."""
+        """Record the torque of a gait cycle if it is as predicted."""
         is_sound = self._evaluation.is_torque_sound(report)
         self._state.torque = self._state.torque.with_cycle(statistics, report, is_sound)
         self._accounting.state.commissioned = self._state.torque.totals
@@ -462,7 +461,7 @@ class WearMonitor:
                 self._accounting.note(new)
 
     def _seen(self, statistics: CycleStatistics) -> tuple[ClearanceEstimate, ...] | None:
-        """Clearances as encoders show them, which the forecast learns from."""
+        """Clearances estimated from encoders; they update the forecast."""
         if not self._encoders:
             return None
         replaced_ns = [part.replaced_ns for part in self._accounting.state.parts]
@@ -471,11 +470,11 @@ class WearMonitor:
         )
 
     def _worn_m(self, statistics: CycleStatistics) -> Floats:
-        """Wear of each part at the end of a gait cycle; the twin itself may be further on."""
+        """Wear of each part at the end of a gait cycle; the twin itself may be ahead."""
         fresh = [self.mechanism.clearances[joint].radial_clearance for joint in self.clearance_joints]
         return np.asarray(statistics.clearance_mean_m - fresh)
 
-    def _tell(self, changed: tuple[AlarmList, ...], changes: list[AlarmList]) -> None:
+    def _add_changes(self, changed: tuple[AlarmList, ...], changes: list[AlarmList]) -> None:
         for change in changed:
             changes.append(change)
             self._accounting.note_alarms(change)

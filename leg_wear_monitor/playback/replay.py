@@ -70,12 +70,12 @@ class ReplayResult:
 
     @property
     def is_believable(self) -> bool:
-        """Whether a gait cycle was found that can be this leg's: without one, no figure means anything."""
+        """Whether a gait cycle fits this leg; without one, no value is meaningful."""
         return self.evidence.believable > 0
 
     @property
     def is_unusable(self) -> bool:
-        """Whether nothing of it can be this leg's gait; what is left beside counted time may be no cycle."""
+        """Whether no gait cycle fits this leg; a rest beside counted time may have no cycle."""
         is_rest = self.monitor.lost.already_counted > 0 and not self.evidence.doubtful
         return not self.is_believable and not is_rest
 
@@ -113,23 +113,23 @@ def replay(
     progress: Callable[[float], None] | None = None,
     finish: Callable[[ReplayResult], None] | None = None,
 ) -> ReplayResult:
-    """Put a recording through the monitor.
+    """Replay a recording through the monitor.
 
-    The ledger is written last, all of it or nothing: a replay that was cut off is not in it, and one that is
-    repeated gives what it would have given.
+    The ledger is written last, completely or not at all: an interrupted replay is not in it, and a repeated
+    one gives the same result.
 
     Parameters
     ----------
     paths : path, or iterable of paths
         MCAP and .db3 files, bag directories; several are one recording.
     config : MonitorConfig or path, optional
-        Parameters, or the parameter file of the node; the one that comes with the package if not given.
+        Parameters, or the parameter file of the node; default: the file of the package.
     out : path, optional
         Directory for ``reports.mcap``, the messages that the node would have published.
     ledger : path, optional
-        Ledger to continue; one that the parameters name is left alone.
+        Ledger to continue; the ledger named in the parameters is not touched.
     time : str
-        Which time stamps the samples: ``header``, ``log`` or ``publish``.
+        Source of the samples' stamps: ``header``, ``log`` or ``publish``.
     joint_states, drive_torque : str, optional
         Topics; found by their relative names if not given.
     node : str, optional
@@ -213,7 +213,7 @@ def _stamps_apart_s(result: ReplayResult, block: Block) -> float:
 
 
 def _about_the_ledger(result: ReplayResult) -> list[Finding]:
-    """What is to be told of the ledger as it was found, and as it is left."""
+    """Findings about the ledger: its state when opened, and after the replay."""
     found = []
     if result.monitor.ledger_loss:
         path = Path(result.monitor.config.ledger.path)

@@ -29,10 +29,10 @@ def load_config(path: str | Path | None = None, node: str | None = None) -> Moni
     Parameters
     ----------
     path : str or pathlib.Path, optional
-        The one that comes with the package if not given.
+        Default: the file of the package.
     node : str, optional
-        Full name of the node whose parameters are wanted, such as ``/robot/leg_wear_monitor``; if not given,
-        the one in the root, or the one node that the file is of.
+        Full name of the node whose parameters are read, such as ``/robot/leg_wear_monitor``; default: the
+        node in the root namespace, or the only node of the file.
 
     Raises
     ------
@@ -45,16 +45,16 @@ def load_config(path: str | Path | None = None, node: str | None = None) -> Moni
 
 
 def is_parameter_file(document: Any) -> bool:
-    """Whether what a YAML file holds is meant as ROS parameters."""
+    """Whether the content of a YAML file is ROS parameters."""
     return isinstance(document, dict) and any(
         isinstance(entry, dict) and MARK in entry for entry in document.values()
     )
 
 
 def parse_config(document: Any, source: str, node: str | None = None) -> MonitorConfig:
-    """Configuration from the plain mapping that a parameter file holds; see `load_config`.
+    """Configuration from the plain mapping of a parameter file; see `load_config`.
 
-    Sections that are for the node are taken in their order, so that later ones prevail.
+    Sections for the node are applied in their order, so that later ones prevail.
     """
     if not is_parameter_file(document):
         raise ConfigError(source, "", f"is not a ROS parameter file, expected '/**: {{{MARK}: ...}}'")

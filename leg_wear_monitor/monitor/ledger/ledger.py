@@ -31,44 +31,44 @@ from leg_wear_monitor.monitor.ledger.store import LedgerStore
 
 
 class Ledger:
-    """An open ledger, ours alone.
+    """An open ledger, locked for this process.
 
     Parameters
     ----------
     path : pathlib.Path or str
-        Created if it is not there.
+        Created if it does not exist.
     binding : Binding
-        What its wear must belong to.
+        Leg that its wear must belong to.
     interval_s : float
-        Longest time between two entries that is intended.
+        Intended longest time between two entries.
     at_end : bool
-        Whether only the end of the run is written, all of it or nothing, as for a recording.
+        Whether the run is written only at its end, completely or not at all, as for a recording.
 
     Attributes
     ----------
     entry : Entry or None
-        The last one of earlier runs; None in a new ledger.
+        Last entry of earlier runs; None in a new ledger.
     measurements : tuple of Measurement
-        Clearances measured by hand, of earlier runs, withdrawn ones with them.
+        Manually measured clearances of earlier runs, including withdrawn ones.
     commissioned : Commissioned or None
-        Errors of further encoders, of earlier runs.
+        Errors of further encoders from earlier runs.
     last_run : Run
-        The run before this one.
+        The previous run.
     epoch, boot_id : int, str
-        Of this run's clock and computer, as each entry keeps them; as in the run before until they are set.
+        Of this run's clock and computer, stored with each entry; until set, those of the previous run.
     cut_off_s : float or None
-        If the last run was cut off: the longest time of walking whose wear was lost with it.
+        If the last run was interrupted: the longest time of walking whose wear was lost.
     kept_ns : int
         Stamp of the last entry on the disk, 0 before.
     loss : str
-        What is wrong with what was found, and may be lost with it; empty if nothing is.
+        Fault found at the opening, and the possible loss; empty if there is none.
     fault : str
-        Why the last write failed; empty if it did not.
+        Reason of the last failed write; empty if it succeeded.
 
     Raises
     ------
     LedgerError
-        If it cannot be read, or must not be continued; it is left as it is.
+        If it cannot be read, or must not be continued; it is left unchanged.
     """
 
     def __init__(self, path: Path | str, binding: Binding, interval_s: float, at_end: bool = False) -> None:
@@ -93,10 +93,10 @@ class Ledger:
             raise
 
     def _begin(self, found: Recovered) -> None:
-        """Have in the tables what was in the log alone, and that this run has begun."""
+        """Write the entry of the log into the tables, and the begin of this run."""
         newer = found.entry if found.is_newer else None
-        told_s = max(found.run.interval_s, found.lost_s or 0.0)
-        run = attrs.evolve(found.run, interval_s=told_s) if self.at_end else self._run(closed=False)
+        reported_s = max(found.run.interval_s, found.lost_s or 0.0)
+        run = attrs.evolve(found.run, interval_s=reported_s) if self.at_end else self._run(closed=False)
         if newer or not self.at_end:
             self._try(lambda: self._store.write(run, newer, entry_run=found.entry_run))
         if self.at_end:
@@ -117,7 +117,7 @@ class Ledger:
         return self._spans[:, :2]
 
     def counted_in(self, epoch: int) -> Ints:
-        """Those (n, 2) of an epoch of the clock."""
+        """The same (n, 2) [ns] of one epoch of the clock."""
         return self._spans[self._spans[:, 2] == epoch, :2]
 
     @property
@@ -126,7 +126,7 @@ class Ledger:
         return len(self._events)
 
     def note(self, event: Event) -> None:
-        """Take an event down; it is written with the next entry."""
+        """Queue an event; it is written with the next entry."""
         self._events.append(event)
 
     def withdraw(self, measurement: int, stamp_ns: int, who: str) -> Measurement:
@@ -207,7 +207,7 @@ class Ledger:
         LedgerError
             If they could not be written.
         """
-        self._interval_s = max(self._interval_s, self.cut_off_s or 0.0)  # as long as nobody was told
+        self._interval_s = max(self._interval_s, self.cut_off_s or 0.0)  # until it is acknowledged
         run = self._run(closed=self.cut_off_s is None)
         if not self._try(lambda: self._store.write(run, None, self._events)):
             raise LedgerError(f"{self.path}: {self.fault}")
@@ -253,7 +253,7 @@ def open_ledger(mechanism: Mechanism, config: MonitorConfig, at_end: bool = Fals
     mechanism : Mechanism
     config : MonitorConfig
     at_end : bool
-        Whether only the end of the run is written, all of it or nothing, as for a recording.
+        Whether the run is written only at its end, completely or not at all, as for a recording.
 
     Raises
     ------

@@ -34,7 +34,7 @@ def given_mechanism(mechanism: Mechanism | str | Path) -> Mechanism:
 
 
 def given_joints(names: Sequence[str], mechanism: Mechanism) -> tuple[str, ...]:
-    """Names of joints that shall be loose, each once.
+    """Names of the clearance joints, each once.
 
     Raises
     ------

@@ -68,7 +68,7 @@ class Clearance:
 
 @attrs.frozen(kw_only=True)
 class ClearanceSection:
-    """The part of a mechanism file that says which joints are loose."""
+    """The clearance joints in a mechanism file."""
 
     defaults: dict[str, Any] = described("settings of all joints, a mapping of the keys below", factory=dict)
     joints: tuple[str, ...] | dict[str, Any] = described(

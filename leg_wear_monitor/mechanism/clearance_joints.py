@@ -17,7 +17,7 @@ _REQUIRED = {field.name for field in attrs.fields(Clearance) if field.default is
 def clearance_joints(
     section: ClearanceSection, joints: Mapping[str, RevoluteJoint | PrismaticJoint], source: str
 ) -> tuple[dict[str, Clearance], tuple[str, ...]]:
-    """Settings of every revolute joint that has a full set, and the names of those that are loose.
+    """Settings of every revolute joint that has a full set, and the names of the clearance joints.
 
     Raises
     ------

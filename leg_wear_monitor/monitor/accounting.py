@@ -1,4 +1,4 @@
-"""The books: counters over all runs of the monitor, what time is counted, and the entries of the ledger."""
+"""Accounting: counters over all runs of the monitor, time coverage, and the entries of the ledger."""
 
 from collections.abc import Iterable, Mapping
 
@@ -186,7 +186,7 @@ class Accounting:
         return self.totals["moving_s"] - self._kept_s
 
     def joint_wear(self, k: int, depth: Floats) -> JointWear:
-        """Wear of joint k as it is now; depth (loose, 2, N) of the twin."""
+        """Present wear of joint k; depth (clearance joints, 2, N) of the twin."""
         part, totals = self.state.parts[k], self.totals
         return JointWear(
             self._twin.clearance_joints[k],
@@ -197,7 +197,7 @@ class Accounting:
         )
 
     def wear_of(self, joint: str) -> JointWear:
-        """Wear of a joint as it is now; raises LegWearError for one that is not loose."""
+        """Present wear of a joint; raises LegWearError for a joint without clearance."""
         return self.joint_wear(self._index(joint), self._twin.depth)
 
     def _index(self, joint: str) -> int:

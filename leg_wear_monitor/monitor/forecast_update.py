@@ -1,4 +1,4 @@
-"""What encoders show goes into the forecast, once a minute of the stamps, or on a finding."""
+"""Update of the forecast with clearance estimates from encoders: each minute of stamps, or on a finding."""
 
 from collections.abc import Sequence
 
@@ -19,16 +19,16 @@ def update_forecast(
     worn_m: Floats,
     replaced_ns: Sequence[int],
 ) -> tuple[ClearanceEstimate, ...]:
-    """Clearances as seen after a gait cycle, and whether the forecast believes them.
+    """Clearance estimates after a gait cycle, and whether the forecast uses them.
 
     Parameters
     ----------
     watch : EncoderObserver
     forecaster : Forecaster
-        Takes them in, if that is due.
+        Updated if that is due.
     statistics : CycleStatistics
     worn_m : (k,) array
-        What the twin has counted for each part.
+        Wear counted by the twin for each part.
     replaced_ns : sequence of int
         When each part was replaced, 0 if it never was.
     """

@@ -33,7 +33,7 @@ def statuses(
     record: TorqueRecord,
     encoders: EncoderObserver | None = None,
 ) -> tuple[Status, ...]:
-    """All of it: gait, input, torque, each joint, further encoders if there are any, alarms, ledger."""
+    """All statuses: gait, input, torque, each joint, further encoders if there are any, alarms, ledger."""
     joints = [_joint(k, name, twin, evaluation, last) for k, name in enumerate(twin.clearance_joints)]
     return (
         _gait(twin, evaluation, accounting, last, happened),
@@ -145,7 +145,7 @@ def _joint(
 
 
 def _encoders(encoders: EncoderObserver, evaluation: AlarmEvaluation, last: CycleReport | None) -> Status:
-    """Further encoders: what is wrong with them, how they are off, and the clearances that they show."""
+    """Further encoders: their faults, their errors, and the clearances estimated from them."""
     settings, state = evaluation.config.encoders, encoders.state
     kinds = {spec.kind for spec in specs.ENCODERS}
     level = max(alarm.level for alarm in evaluation.board.alarms.values() if alarm.kind in kinds)
@@ -170,7 +170,7 @@ def _encoders(encoders: EncoderObserver, evaluation: AlarmEvaluation, last: Cycl
 
 
 def _shown(last: CycleReport | None) -> list[str]:
-    """What encoders show, in words: the joints that are not as counted, or why nothing can be said."""
+    """Result of the encoders in words: joints that differ from the counted ones, or why there is none."""
     seen = [(joint.joint, joint.seen) for joint in last.joints if joint.seen] if last else []
     if not seen:
         return ["no whole gait cycle yet"]

@@ -93,7 +93,7 @@ class History:
         return table[:, CYCLE_COLUMNS.index(name)]
 
     def joint_column(self, name: str) -> Floats:
-        """One of `JOINT_COLUMNS`, shape (cycles, loose); NaN where it was not known."""
+        """One of `JOINT_COLUMNS`, shape (cycles, clearance joints); NaN where it is unknown."""
         table = np.array(self._joints).reshape(len(self), len(self.clearance_joints), len(JOINT_COLUMNS))
         return table[:, :, JOINT_COLUMNS.index(name)]
 

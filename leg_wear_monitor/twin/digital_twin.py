@@ -99,7 +99,7 @@ class DigitalTwin:
 
     @property
     def depth(self) -> Floats:
-        """Wear depth (loose, 2, sectors) [m] of bushing and journal; a copy."""
+        """Wear depth (clearance joints, 2, sectors) [m] of bushing and journal; a copy."""
         return self._setup.surfaces.depth.copy()
 
     @property
@@ -138,7 +138,7 @@ class DigitalTwin:
         return intake(self._tracker.records, self._follower.records)
 
     def set_depth(self, depth: Floats) -> None:
-        """Take over wear depths (loose, 2, sectors) [m], as from a ledger.
+        """Set wear depths (clearance joints, 2, sectors) [m], as from a ledger.
 
         Raises
         ------

@@ -1,4 +1,4 @@
-"""The mechanism as the parameters want it: which joints are loose, how far, and how fast they wear."""
+"""The mechanism with the parameters applied: clearance joints, clearances and wear coefficients."""
 
 from collections.abc import Sequence
 from typing import Any

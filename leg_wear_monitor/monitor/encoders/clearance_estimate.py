@@ -1,4 +1,4 @@
-"""What further encoders say of a joint's clearance."""
+"""Estimate of a joint's clearance from further encoders."""
 
 import math
 from enum import Enum
@@ -8,13 +8,13 @@ import attrs
 from leg_wear_monitor.mechanism.arrays import Floats
 from leg_wear_monitor.monitor.encoders.angle_regression import Estimate
 
-ESTIMATED_M = 1.0e-4  # standard deviation of a clearance that is seen, at most
+ESTIMATED_M = 1.0e-4  # largest standard deviation of an observable clearance
 SURE_SIGMAS = 4.0
-LEAST_M = 5.0e-5  # a departure that is worth telling
+LEAST_M = 5.0e-5  # smallest departure that is reported
 
 
 class ClearanceObservation(Enum):
-    """Whether encoders show a clearance; the value is human-readable."""
+    """Observability of a clearance; the value is human-readable."""
 
     WAITING = "not enough gait cycles with encoders yet"
     COMMISSIONING = "the encoders are being commissioned"
@@ -24,17 +24,17 @@ class ClearanceObservation(Enum):
 
 @attrs.frozen(kw_only=True)
 class ClearanceEstimate:
-    """A clearance as encoders show it.
+    """A clearance estimated from encoders.
 
     Attributes
     ----------
     observation : ClearanceObservation
     clearance_m, sigma_m : float
-        And its standard deviation; NaN unless it is seen.
+        Clearance and its standard deviation; NaN unless it is estimated.
     departure_m : float
-        By how much it is larger than the one that is counted; NaN unless it is seen.
+        Estimated minus counted clearance; NaN unless it is estimated.
     believed : bool
-        Whether the forecast takes it in: not, if that holds it next to impossible.
+        Whether the forecast uses it: not if the model gives it a tail probability below 0.135 %.
     """
 
     observation: ClearanceObservation
@@ -45,17 +45,17 @@ class ClearanceEstimate:
 
     @property
     def is_other(self) -> bool:
-        """Whether the clearance surely is another than the one that is counted."""
+        """Whether the clearance differs significantly from the counted one."""
         return abs(self.departure_m) >= max(LEAST_M, SURE_SIGMAS * self.sigma_m)
 
     @property
     def surely_m(self) -> float:
-        """Size of a sure departure, 0 if there is none; NaN unless it is seen."""
+        """Size of a significant departure, 0 if there is none; NaN unless it is estimated."""
         return abs(self.departure_m) if self.is_other else 0.0 * self.departure_m
 
 
 def clearance_estimates(found: Estimate, counted_m: Floats) -> tuple[ClearanceEstimate, ...]:
-    """What an estimate says of each joint, beside the clearances (k,) that are counted [m]."""
+    """Estimates of each joint, compared with the counted clearances (k,) [m]."""
     return tuple(
         _seen(float(clearance), float(sigma), float(counted))
         for clearance, sigma, counted in zip(found.clearance_m, found.sigma_m, counted_m, strict=True)

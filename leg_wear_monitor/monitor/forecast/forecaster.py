@@ -98,17 +98,17 @@ class Forecaster:
         limits_m: Sequence[float],
         is_valid: Callable[[], bool],
     ) -> Forecast:
-        """Forecast after a gait cycle: a new one if it is time, else the last.
+        """Forecast after a gait cycle: a new one if it is due, else the last.
 
         Parameters
         ----------
         statistics : CycleStatistics
         wear_m : (k,) array
-            What the twin has counted for each part.
+            Wear counted by the twin for each part [m].
         limits_m : sequence of float
             Of the mean clearances.
         is_valid : callable
-            Whether the model holds for what the leg does.
+            Whether the leg is in the range of the model.
         """
         state = self.state
         state.growth = tuple(
@@ -123,7 +123,7 @@ class Forecaster:
         return state.last
 
     def renewed(self, wear_m: Floats, limits_m: Sequence[float], is_valid: bool) -> Forecast:
-        """A new forecast from all that is known now; parameters as in `after`."""
+        """A new forecast from the present state; parameters as in `after`."""
         rates = [growth_rate(window) for window in self.state.growth]
         self.state.known = _known(rates)
         self.state.last = self._forecast(rates, wear_m, limits_m, is_valid)
@@ -135,7 +135,7 @@ class Forecaster:
         return tuple(self._measurements)
 
     def replaced(self, joint: str, replaced_ns: int) -> None:
-        """A joint has another part: known of it is what was measured on it, on a new one nothing."""
+        """Reset the estimate of a joint whose part changed to the measurements of this part."""
         k, state = self._clearance_joints.index(joint), self.state
         observations = observations_of(self._measurements, joint, replaced_ns)
         state.growth = (*state.growth[:k], GrowthWindow(), *state.growth[k + 1 :])
@@ -152,7 +152,7 @@ class Forecaster:
         kept_ns: int = 0,
         accept: bool = False,
     ) -> MeasurementResult:
-        """Take in a measured clearance; parameters as in `measure`."""
+        """Update with a measured clearance; parameters as in `measure`."""
         k = self._clearance_joints.index(wear.name)
         found = measure(
             self._settings,
@@ -171,21 +171,21 @@ class Forecaster:
         return found
 
     def seen(self, k: int, observation: MeasuredClearance, replaced_ns: int) -> bool:
-        """Take in a clearance that encoders show, instead of the last such one.
+        """Update with a clearance estimated from encoders, instead of the previous one.
 
         Parameters
         ----------
         k : int
             Of the clearance joint.
         observation : MeasuredClearance
-            Its error does not average out, so the newest says all there is.
+            Its error does not average out, so only the newest counts.
         replaced_ns : int
             When its part was replaced, 0 if it never was.
 
         Returns
         -------
         bool
-            Whether it is believed: not, if the model holds it next to impossible.
+            Whether it is used: not if its tail probability is below `CONTRADICTS`.
         """
         observations = observations_of(self._measurements, self._clearance_joints[k], replaced_ns)
         below = estimate_coefficient(self._settings, self._fresh_m[k], observations).probability_below(

@@ -7,7 +7,7 @@ import numpy as np
 
 from leg_wear_monitor.monitor.ledger.entry import Measurement
 
-LEAST = 5  # measurements, below which shares say nothing
+LEAST = 5  # measurements, below which fractions have no meaning
 
 
 @attrs.frozen

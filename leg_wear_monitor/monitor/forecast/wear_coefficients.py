@@ -1,9 +1,9 @@
-"""What is believed of a joint's wear coefficient, and how a measured clearance changes it (Bayes).
+"""Estimate of a joint's wear coefficient, and its Bayes update with measured clearances.
 
-The clearance is c = c_0 + d + x w: c_0 the nominal one when new, d what the part is off it, w the wear that
-the twin has counted with the nominal coefficient, x the joint's factor on it. x is lognormal and d normal
-beforehand; measured clearances have normal errors. d drops out in closed form, x stays on a grid that is
-laid where the estimate is: a measurement that counts moves it as far as it says, however far that is.
+The clearance is c = c_0 + d + x w: c_0 the nominal one when new, d the deviation of the part, w the wear that
+the twin has counted with the nominal coefficient, x the joint's factor on it. The priors are lognormal for
+x and normal for d; measured clearances have normal errors. d is eliminated in closed form, x is on a grid
+around the estimate: an accepted measurement moves it as far as the data require.
 """
 
 import math
@@ -18,7 +18,7 @@ from leg_wear_monitor.mechanism.arrays import Floats
 from leg_wear_monitor.monitor.config.forecast import Forecasting
 
 GRID = 801
-_WIDTH = 8.0  # standard deviations on both sides, of the prior and of what measurements say
+_WIDTH = 8.0  # standard deviations on both sides, of the prior and of the measurements
 _DEEP = 25.0  # below the highest, of log density: what is left out weighs less than 1e-9
 _ZOOMS = 12  # each at least halves the grid's extent
 
@@ -44,7 +44,7 @@ class MeasuredClearance:
 
 @attrs.frozen(eq=False)
 class CoefficientEstimate:
-    """What is known of a joint: weights over its factor's logarithm, and its excess given the factor.
+    """Estimate for a joint: weights over its factor's logarithm, and its excess given the factor.
 
     Attributes
     ----------
@@ -75,12 +75,12 @@ class CoefficientEstimate:
         return math.sqrt(float(self.weight @ np.square(self.log_factor - self.mean)))
 
     def log_factors(self, fractions: ArrayLike) -> Floats:
-        """Quantiles of the factor's logarithm at shares in (0, 1)."""
+        """Quantiles of the factor's logarithm at fractions in (0, 1)."""
         reached = np.cumsum(self.weight) - 0.5 * self.weight
         return np.asarray(np.interp(np.asarray(fractions), reached, self.log_factor))
 
     def probability_below(self, fresh_m: float, observation: MeasuredClearance) -> float:
-        """Probability that a measurement of such accuracy would have come out smaller than this one did."""
+        """Predicted probability that a measurement of this accuracy is smaller than this one."""
         expected = fresh_m + self.excess_m + np.exp(self.log_factor) * observation.wear_m
         spread = math.hypot(observation.sigma_m, self.excess_sigma_m)
         below = np.asarray(_phi((observation.clearance_m - expected) / spread), dtype=float)
@@ -118,9 +118,9 @@ def estimate_coefficient(
 def _own_estimate(
     settings: Forecasting, fresh_m: float, observations: Sequence[MeasuredClearance]
 ) -> tuple[float, float]:
-    """What measurements say of the factor by themselves: its mean and its precision, 0 if they say nothing.
+    """Mean and precision of the factor from the measurements alone; 0 if they have no information.
 
-    The clearance when new drops out: it makes their errors hang together.
+    The clearance when new is eliminated: it correlates their errors.
     """
     if not any(observation.wear_m for observation in observations):
         return 0.0, 0.0
@@ -128,7 +128,7 @@ def _own_estimate(
         [(one.clearance_m - fresh_m, one.wear_m, one.sigma_m) for one in observations]
     ).T
     own, new = sigma**-2.0, settings.clearance_sigma_m**-2.0
-    # about what is common to all of them, so that nothing large cancels
+    # about their common mean, so that nothing large cancels
     common_wear, common = (float(own @ values) / (float(own.sum()) + new) for values in (wear, opened))
     precision = float(own @ np.square(wear - common_wear)) + new * common_wear**2
     product = float(own @ ((wear - common_wear) * (opened - common))) + new * common_wear * common

@@ -62,7 +62,7 @@ def draw_spring(axes: Axes, ends: tuple[Floats, Floats], layer: float) -> None:
 
 
 def draw_joint(axes: Axes, place: Floats, names: Mapping[str, bool], away: Floats) -> None:
-    """Pins at one place, by name and whether they are loose; names stand on the side of ``away`` (2,)."""
+    """Pins at one place, by name and whether they have clearance; names are on the side of ``away`` (2,)."""
     axes.add_line(joint_mark(any(names.values()), place))
     dx, dy = 13.0 * away / (np.hypot(*away) or 1.0)
     wide = [6.0 * len(name) + 5.0 for name in names]

@@ -4,8 +4,12 @@ import sys
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager, suppress
 from pathlib import Path
+from typing import TYPE_CHECKING
 
 from leg_wear_monitor.interrupt import closed_at_the_end
+
+if TYPE_CHECKING:
+    from rich.progress import Progress
 
 
 def _mark(kernels: str) -> Path | None:
@@ -24,49 +28,68 @@ def is_compiled(kernels: str) -> bool:
 
 
 @contextmanager
-def compilation(kernels: str, how_long: str = "about half a minute") -> Iterator[None]:
-    """Show the time that passes while the work inside compiles a set of kernels for the first time.
+def compilation(*kernels: str, how_long: str = "about half a minute") -> Iterator[None]:
+    """Show the time that passes while the work inside compiles sets of kernels for the first time.
 
     Only a terminal shows it: in a pipe, stderr is for what programs must see.
     """
-    if is_compiled(kernels):
+    if all(is_compiled(one) for one in kernels):
         yield
         return
-    with _stopwatch(f"compiling numerical kernels (once per installation, {how_long})"):
+    with _shown(f"compiling for this machine, once: {how_long}"):
         yield
-    mark = _mark(kernels)
-    if mark is not None:
-        with suppress(FileNotFoundError):  # `cache --clear` meanwhile: then it is to be compiled again
-            mark.touch()
-
-
-@contextmanager
-def _stopwatch(what: str) -> Iterator[None]:
-    """Show on a terminal what takes long, and for how long it has done so."""
-    if not sys.stderr.isatty():
-        yield
-        return
-    from rich.console import Console
-    from rich.progress import Progress, SpinnerColumn, TextColumn, TimeElapsedColumn
-
-    columns = (SpinnerColumn(), TextColumn(what), TimeElapsedColumn())
-    with Progress(*columns, console=Console(stderr=True), transient=True) as bar:
-        bar.add_task(what, total=None)
-        with closed_at_the_end(bar.stop):  # it hides the cursor
-            yield
+    for mark in map(_mark, kernels):
+        if mark is not None:
+            with suppress(FileNotFoundError):  # `cache --clear` meanwhile: then it is to be compiled again
+                mark.touch()
 
 
 @contextmanager
 def progress_bar(what: str) -> Iterator[Callable[[float], None]]:
-    """Give a function that takes the share done: it shows a bar on a terminal, and nothing in a pipe."""
+    """Give a function that takes the fraction done: it shows a bar on a terminal, and nothing in a pipe."""
+    with _shown(what, total=1.0) as show:
+        yield show
+
+
+# what shows progress on the terminal; rich shows one at a time, so what begins inside is a line of its own
+_display: list["Progress"] = []
+
+
+@contextmanager
+def _shown(what: str, total: float | None = None) -> Iterator[Callable[[float], None]]:
+    """Show a line on a terminal, with the time passed and, where there is a total, how much is done."""
     if not sys.stderr.isatty():
         yield lambda _fraction: None
         return
-    from rich.console import Console
-    from rich.progress import BarColumn, Progress, TaskProgressColumn, TextColumn, TimeRemainingColumn
-
-    columns = (TextColumn(what), BarColumn(), TaskProgressColumn(), TimeRemainingColumn())
-    with Progress(*columns, console=Console(stderr=True), transient=True) as bar:
-        task = bar.add_task(what, total=1.0)
-        with closed_at_the_end(bar.stop):  # it hides the cursor
+    with _progress() as bar:
+        task = bar.add_task(what, total=total)
+        try:
             yield lambda fraction: bar.update(task, completed=fraction)
+        finally:
+            bar.remove_task(task)
+
+
+@contextmanager
+def _progress() -> Iterator["Progress"]:
+    if _display:
+        yield _display[0]
+        return
+    from rich.console import Console
+    from rich.progress import (
+        BarColumn,
+        Progress,
+        SpinnerColumn,
+        TaskProgressColumn,
+        TextColumn,
+        TimeElapsedColumn,
+    )
+
+    words = TextColumn("{task.description}")
+    columns = SpinnerColumn(), words, BarColumn(), TaskProgressColumn(), TimeElapsedColumn()
+    with Progress(*columns, console=Console(stderr=True), transient=True) as bar:
+        _display.append(bar)
+        try:
+            with closed_at_the_end(bar.stop):  # it hides the cursor
+                yield bar
+        finally:
+            _display.clear()

@@ -129,7 +129,7 @@ def _mechanism(name: str) -> str:
     from leg_wear_monitor.mechanism.understood import understood
 
     leg = load_mechanism(name)
-    with compilation("mechanism", "a few seconds"):
+    with compilation("mechanism", how_long="a few seconds"):
         from leg_wear_monitor.dynamics.simulation import prepare
 
         linkage = prepare(leg).linkage

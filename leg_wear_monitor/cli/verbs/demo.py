@@ -48,7 +48,7 @@ def demo(out: Path) -> int:
     need_rclpy()
     check_directory("--out", out)
     out.mkdir(parents=True, exist_ok=True)
-    _compile()
+    _compile(out)
     demo_listener = _live(out)
     same = _replay(out)
     _compare_with_truth(out, demo_listener)
@@ -59,18 +59,36 @@ def demo(out: Path) -> int:
     return DONE
 
 
-def _compile() -> None:
-    """Compile in one process what both nodes need, or both would."""
+def _compile(out: Path) -> None:
+    """Compile what the nodes need: the monitor's kernels here, those of the leg in a process beside."""
     if is_compiled("monitor") and is_compiled("gait"):
         return
-    from leg_wear_monitor.gait.config import GaitConfig
-    from leg_wear_monitor.gait.leg import SyntheticLeg
     from leg_wear_monitor.mechanism.loader import load_mechanism
     from leg_wear_monitor.monitor.wear_monitor import WearMonitor
 
-    with compilation("monitor", "about a minute"), compilation("gait", "another half a minute"):
-        WearMonitor(load_mechanism()).warm_up()
-        SyntheticLeg(GaitConfig()).advance(1.0e-3)
+    command = [sys.executable, "-c", f"from {__name__} import compile_leg; compile_leg()"]
+    log_path = out / "compilation.log"
+    with (
+        compilation("monitor", "gait", how_long="about a minute"),
+        log_path.open("wb") as log,
+        # a group of its own: Ctrl-C reaches it by us, once
+        subprocess.Popen(command, stdout=log, stderr=log, start_new_session=True) as leg,
+        closed_at_the_end(leg.kill),
+    ):
+        try:
+            WearMonitor(load_mechanism()).warm_up()
+            leg.wait()
+        finally:
+            leg.kill()
+    _check_ended(leg, log_path)
+
+
+def compile_leg() -> None:
+    """Compile what the synthetic leg needs."""
+    from leg_wear_monitor.gait.config import GaitConfig
+    from leg_wear_monitor.gait.leg import SyntheticLeg
+
+    SyntheticLeg(GaitConfig()).advance(1.0e-3)
 
 
 def _live(out: Path) -> "DemoListener":

@@ -136,7 +136,7 @@ def _run(
     began, took = [0.0], [0.0]
 
     def ready(monitor: Any) -> None:
-        with compilation("monitor", "about a minute"), closed_at_the_end(monitor.abandon):
+        with compilation("monitor", how_long="about a minute"), closed_at_the_end(monitor.abandon):
             monitor.warm_up()
         began[0] = time.perf_counter()
 

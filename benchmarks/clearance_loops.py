@@ -7,16 +7,17 @@ The chain is 0, which the compiler does not know.
 import math
 
 from leg_wear_monitor.contact.friction import friction_force
-from leg_wear_monitor.contact.normal import damped_force, elastic_force
+from leg_wear_monitor.contact.normal.laws import normal_force
 from leg_wear_monitor.dynamics.clearance.contact import (
     A0,
     E0,
-    FRESH_STIFFNESS,
+    FRESH_COEFFICIENT,
     FRICTION_COEFFICIENT,
     FRICTION_LAW,
     HYSTERESIS_FACTOR,
     K1E,
     K1V,
+    NORMAL_FORM,
     RAMP_0,
     RAMP_1,
     V0,
@@ -43,8 +44,10 @@ def floors(count, chain, law, clearance, e, v, inverse_mass, force, out_a):
             ex, ey, vx, vy = e[2 * k], e[2 * k + 1], v[2 * k], v[2 * k + 1]
             length = math.sqrt(ex * ex + ey * ey)
             nx, ny = ex / length, ey / length
-            elastic = elastic_force(law[k, FRESH_STIFFNESS], length - clearance[k])
-            f_n = damped_force(elastic, law[k, HYSTERESIS_FACTOR], nx * vx + ny * vy)
+            f_n, _, _, _ = normal_force(
+                law[k, NORMAL_FORM], law[k, FRESH_COEFFICIENT], clearance[k], law[k, HYSTERESIS_FACTOR],
+                length - clearance[k], nx * vx + ny * vy,
+            )  # fmt: skip
             mu, code, slip = law[k, FRICTION_COEFFICIENT], law[k, FRICTION_LAW], nx * vy - ny * vx
             f_t = friction_force(code, mu, law[k, RAMP_0], law[k, RAMP_1], f_n, slip)
             force[2 * k], force[2 * k + 1] = -f_n * nx - f_t * ny, -f_n * ny + f_t * nx

@@ -14,7 +14,9 @@ import numpy as np
 
 from leg_wear_monitor import load_mechanism
 from leg_wear_monitor.contact.arrays import compile_contacts
-from leg_wear_monitor.contact.normal import HYSTERESIS, delivered_restitution
+from leg_wear_monitor.contact.normal.hertz import HERTZ
+from leg_wear_monitor.contact.normal.hysteresis import delivered_restitution
+from leg_wear_monitor.contact.normal.laws import LAWS
 from leg_wear_monitor.dynamics.full.run import TOLERANCE_M, FullRun
 from leg_wear_monitor.dynamics.run.run_statistics import POWER, new_run_statistics
 from leg_wear_monitor.dynamics.simulation import prepare
@@ -93,14 +95,14 @@ def slider_crank() -> None:
 
 
 def restitution() -> None:
-    dropped = case("contact/test_restitution.py")["dropped"]
+    dropped = case("contact/normal/test_hysteresis.py")["dropped"]
     print("\n### Delivered restitution for a requested one\n")
-    laws = [law for law in HYSTERESIS if law != "hertz"]
+    laws = [name for name, law in LAWS.items() if law.form is HERTZ and name != "hertz"]
     table("requested", *laws)
     worst = 0.0
     for asked in np.arange(0.05, 0.951, 0.05):
-        closed = [delivered_restitution(HYSTERESIS[law](asked)) for law in laws]
-        integrated = [dropped(HYSTERESIS[law](asked)) for law in laws]
+        closed = [delivered_restitution(LAWS[law].hysteresis(asked)) for law in laws]
+        integrated = [dropped(LAWS[law].hysteresis(asked)) for law in laws]
         worst = max(worst, *(abs(a - b) for a, b in zip(closed, integrated, strict=True)))
         row(f"{asked:.2f}", *(f"{e:.4f}" for e in integrated))
     print(f"\nLargest difference between the dropped mass and the closed form: {worst:.1e}.")

@@ -10,7 +10,8 @@ import numpy as np
 from leg_wear_monitor.configuration.quantity import FieldError
 from leg_wear_monitor.contact.friction import FRICTION_CODES
 from leg_wear_monitor.contact.geometry import contact_modulus
-from leg_wear_monitor.contact.normal import HYSTERESIS, delivered_restitution
+from leg_wear_monitor.contact.normal.hysteresis import delivered_restitution
+from leg_wear_monitor.contact.normal.laws import LAWS
 from leg_wear_monitor.errors import ConfigError, ConfigWarning
 from leg_wear_monitor.mechanism.arrays import Floats, Ints
 from leg_wear_monitor.mechanism.clearance import Clearance
@@ -23,9 +24,10 @@ class ContactArrays(NamedTuple):
     """Settings of k clearance joints, SI.
 
     ``joint`` (k,) index in the mechanism; ``bushing_radius``, ``clearance``, ``width`` (k,);
-    ``modulus`` (k,) [Pa]; ``stiffness`` (k,) [N/m^1.5] where given, 0 where it follows from the modulus
-    and the local radii; ``hysteresis``, ``speed_floor`` (k,); ``friction_law`` (k,), ``friction`` (k, 3) as
-    coefficient, v0, v1; ``wear_coefficient`` (k, 2) of bushing and journal [1/Pa].
+    ``modulus`` (k,) [Pa]; ``normal_form`` (k,) number of the normal law's form; ``stiffness`` (k,) [N/m^1.5]
+    where given, 0 where the law's coefficient follows from the modulus and the local radii; ``hysteresis``,
+    ``speed_floor`` (k,); ``friction_law`` (k,), ``friction`` (k, 3) as coefficient, v0, v1;
+    ``wear_coefficient`` (k, 2) of bushing and journal [1/Pa].
     """
 
     joint: Ints
@@ -33,6 +35,7 @@ class ContactArrays(NamedTuple):
     clearance: Floats
     width: Floats
     modulus: Floats
+    normal_form: Ints
     stiffness: Floats
     hysteresis: Floats
     speed_floor: Floats
@@ -73,8 +76,20 @@ def clearance_settings(
         except FieldError as error:
             option = {"radial_clearance": "clearance-m", "normal_law": "normal-law"}[error.key]
             raise ConfigError(option, "", f"{error.fault} (joint {name})") from error
+        _refuse_stiffness(mechanism.source, name, settings[name])
     _warn_of_restitution(mechanism.source, settings)
     return list(settings.values())
+
+
+def _refuse_stiffness(source: str, name: str, settings: Clearance) -> None:
+    """A stiffness in N/m^1.5 means nothing to a law of another form than Hertz's."""
+    if settings.stiffness is not None and not LAWS[settings.normal_law].form.takes_stiffness:
+        raise ConfigError(
+            source,
+            f"clearances.joints.{name}.stiffness",
+            f"{settings.stiffness:g} N/m^1.5 is for Hertz's force, normal_law {settings.normal_law!r} has "
+            "another; leave the key out or choose another law",
+        )
 
 
 def _warn_of_restitution(source: str, settings: dict[str, Clearance]) -> None:
@@ -84,7 +99,7 @@ def _warn_of_restitution(source: str, settings: dict[str, Clearance]) -> None:
         if c.normal_law in NEARLY_ELASTIC and c.restitution < LEAST_RESTITUTION:
             asked.setdefault((c.normal_law, c.restitution), []).append(name)
     for (law, restitution), names in asked.items():
-        returned = delivered_restitution(HYSTERESIS[law](restitution))
+        returned = delivered_restitution(LAWS[law].hysteresis(restitution))
         warnings.warn(
             f"{source}: joint {', '.join(names)}: {law} asked for a restitution of {restitution:g} returns "
             f"{returned:.3g}, it holds from {LEAST_RESTITUTION:g} on; try flores or hu-guo",
@@ -108,8 +123,9 @@ def compile_contacts(
         clearance=np.array([c.radial_clearance for c in settings]),
         width=np.array([c.width for c in settings]),
         modulus=np.array(moduli),
+        normal_form=np.array([LAWS[c.normal_law].number for c in settings], dtype=np.int64),
         stiffness=np.array([c.stiffness or 0.0 for c in settings]),
-        hysteresis=np.array([HYSTERESIS[c.normal_law](c.restitution) for c in settings]),
+        hysteresis=np.array([LAWS[c.normal_law].hysteresis(c.restitution) for c in settings]),
         speed_floor=np.array([c.approach_speed_floor for c in settings]),
         friction_law=np.array([FRICTION_CODES[c.friction.law] for c in settings], dtype=np.int64),
         friction=np.array([[c.friction.coefficient, *c.friction.ramp] for c in settings]).reshape(-1, 3),

@@ -1,4 +1,4 @@
-"""Where a journal touches its bushing, and how stiff that contact is (physics.md sections 3 to 5)."""
+"""Where a journal touches its bushing, and the modulus of that contact (physics.md sections 3 to 5)."""
 
 import math
 
@@ -67,12 +67,3 @@ def contact_modulus(youngs_b: float, poisson_b: float, youngs_j: float, poisson_
     """4 / (3 (sigma_b + sigma_j)) [Pa] with sigma = (1 - nu^2) / E; Lankarani and Nikravesh 1990."""
     sigma = (1.0 - poisson_b * poisson_b) / youngs_b + (1.0 - poisson_j * poisson_j) / youngs_j
     return 4.0 / (3.0 * sigma)
-
-
-@kernel
-def contact_stiffness(modulus, bushing_radius, journal_radius):
-    """Hertz stiffness K [N/m^1.5] of a pin inside a bushing: modulus sqrt(R_b R_j / (R_b - R_j)).
-
-    physics.md section 4.
-    """
-    return modulus * math.sqrt(bushing_radius * journal_radius / (bushing_radius - journal_radius))

@@ -5,11 +5,9 @@ from typing import Annotated, Any
 import attrs
 
 from leg_wear_monitor.configuration.quantity import FieldError, choice, described, quantity
+from leg_wear_monitor.mechanism.law_names import FRICTION_LAWS, NORMAL_LAWS
 
 Pair = Annotated[tuple[float, float], "bushing, journal"]  # in a file, one number stands for both
-
-NORMAL_LAWS = ("hertz", "hunt-crossley", "lankarani-nikravesh", "gonthier", "flores", "hu-guo")
-FRICTION_LAWS = ("ambrosio", "threlfall", "none")
 
 
 def _rises(ramp: tuple[float, float]) -> str | None:

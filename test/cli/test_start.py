@@ -8,7 +8,6 @@ import pytest
 from leg_wear_monitor import load_mechanism
 from leg_wear_monitor.cli.verbs import simulate as verb
 from leg_wear_monitor.dynamics.simulation import MODELS, default_model
-from leg_wear_monitor.mechanism.clearance import NORMAL_LAWS
 
 HEAVY = {"numba", "numpy", "matplotlib", "rich", "cattrs", "ruamel.yaml"}
 
@@ -58,7 +57,6 @@ def test_an_error_leaves_one_line_on_the_real_stderr():
 
 @pytest.mark.plain
 def test_names_that_help_shows_are_the_library_s():
-    assert verb.NORMAL_LAWS == NORMAL_LAWS
     assert set(MODELS) <= set(verb.MODELS)
     assert default_model(load_mechanism("bionic_leg")) == verb.DEFAULT_MODEL
     assert default_model(load_mechanism("andrews")) == "full"

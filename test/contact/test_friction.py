@@ -15,7 +15,7 @@ from leg_wear_monitor.contact.friction import (
     friction_force,
     threlfall_ramp,
 )
-from leg_wear_monitor.mechanism.clearance import FRICTION_LAWS
+from leg_wear_monitor.mechanism.law_names import FRICTION_LAWS
 
 pytestmark = pytest.mark.plain
 

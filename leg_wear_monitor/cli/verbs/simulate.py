@@ -18,6 +18,7 @@ from leg_wear_monitor.cli.options import (
 from leg_wear_monitor.cli.output import STDOUT, check_outputs, write_directory, write_json
 from leg_wear_monitor.cli.waiting import compilation, progress_bar
 from leg_wear_monitor.json_text import json_text
+from leg_wear_monitor.mechanism.law_names import NORMAL_LAWS
 
 if TYPE_CHECKING:
     from leg_wear_monitor.dynamics.result.simulation_result import SimulationResult
@@ -25,7 +26,6 @@ if TYPE_CHECKING:
 
 # Spelled out, for --help shall not wait for numba; the tests compare them with the library's.
 MODELS, DEFAULT_MODEL = ("clearance", "full"), "clearance"
-NORMAL_LAWS = ("hertz", "hunt-crossley", "lankarani-nikravesh", "gonthier", "flores", "hu-guo")
 
 # a motion too short to take time, but through all of the code
 _WARM_UP_CYCLES, _WARM_UP_S = 1.0 / 256.0, 1.0e-9

@@ -10,25 +10,26 @@ import numpy as np
 from leg_wear_monitor.contact.arrays import ContactArrays
 from leg_wear_monitor.contact.friction import friction_force
 from leg_wear_monitor.contact.geometry import journal_contact
-from leg_wear_monitor.contact.normal import damped_force, elastic_force
+from leg_wear_monitor.contact.normal.laws import normal_force
 from leg_wear_monitor.dynamics.joint.contact_event import DELTA, DELTA_DOT, EX, EY, F_N, SAMPLE, VX, VY
-from leg_wear_monitor.dynamics.joint.joint_contact import penetration, stiffness_at
+from leg_wear_monitor.dynamics.joint.joint_contact import coefficient_at, penetration
 from leg_wear_monitor.kernel import kernel
 from leg_wear_monitor.mechanism.arrays import Floats
 
-# a sample of a clearance joint goes on with: unit normal, friction force [N], slip speed [m/s], derivative of
-# the normal force by the penetration's rate [N s/m], its elastic part [N], the fraction of the penetration's
-# rate that the bodies' turning makes, by the crank's speed [m/rad], and the contact stiffness
-# there [N/m^1.5]
-NX, NY, F_T, SLIP, DAMPING, ELASTIC, CAM, HERTZ = range(SAMPLE, SAMPLE + 8)
-COLUMNS = SAMPLE + 8
+# a sample of a clearance joint goes on with: unit normal, friction force [N], slip speed [m/s], derivatives
+# of the normal force by the penetration [N/m] and by its rate [N s/m], its elastic part [N], the fraction of
+# the penetration's rate that the bodies' turning makes, by the crank's speed [m/rad], and what the normal law
+# takes from the local radii: its coefficient, in the law's own unit, and the clearance [m]
+NX, NY, F_T, SLIP, STIFFNESS, DAMPING, ELASTIC, CAM, COEFFICIENT, CLEARANCE = range(SAMPLE, SAMPLE + 10)
+COLUMNS = SAMPLE + 10
 
 # a direction near which angles need no arc tangent: its cosine, sine and angle [rad]
 TO_X, TO_Y, TO_ANGLE = range(3)
 
-# the laws of a joint: hysteresis factor, friction coefficient, ramp, code of the friction law, and the
-# contact stiffness of fresh surfaces [N/m^1.5]
-HYSTERESIS_FACTOR, FRICTION_COEFFICIENT, RAMP_0, RAMP_1, FRICTION_LAW, FRESH_STIFFNESS = range(6)
+# the laws of a joint: number of the normal law's form, its hysteresis factor and its coefficient on fresh
+# surfaces; friction coefficient, ramp, and code of the friction law
+NORMAL_FORM, HYSTERESIS_FACTOR, FRESH_COEFFICIENT = range(3)
+FRICTION_COEFFICIENT, RAMP_0, RAMP_1, FRICTION_LAW = range(3, 7)
 
 # rows of the step's vectors (d,): eccentricities, rates and accelerations at its start (0), between its
 # stages (M) and at its end (1); the acceleration that is not contact; the stages' slopes; right-hand sides;
@@ -40,12 +41,13 @@ _NEAR = 0.1  # sine of an angle for which the arc sine's series is good to 3e-11
 
 
 def contact_laws(contacts: ContactArrays) -> Floats:
-    """Laws of the clearance joints (k, 6) in one array."""
-    stiffness = [
-        stiffness_at(contacts, k, radius, radius - contacts.clearance[k])
+    """Laws of the clearance joints (k, 7) in one array."""
+    fresh = [
+        float(coefficient_at(contacts, k, radius, radius - contacts.clearance[k]))
         for k, radius in enumerate(contacts.bushing_radius)
     ]
-    return np.column_stack([contacts.hysteresis, contacts.friction, contacts.friction_law, stiffness])
+    normal = np.column_stack([contacts.normal_form, contacts.hysteresis, fresh])
+    return np.column_stack([normal, contacts.friction, contacts.friction_law])
 
 
 @kernel
@@ -87,7 +89,7 @@ def accelerate_clearances(model, surfaces, approach, now, turned, x, at_e, at_v,
         x[out_a, i] = x[DRIFT, i]
     for k in range(approach.shape[0]):
         ex, ey, vx, vy = x[at_e, 2 * k], x[at_e, 2 * k + 1], x[at_v, 2 * k], x[at_v, 2 * k + 1]
-        cam, hertz = 0.0, law[k, FRESH_STIFFNESS]
+        cam, coefficient, clearance = 0.0, law[k, FRESH_COEFFICIENT], contacts.clearance[k]
         if surfaces.feeds_back:
             turn_b, turn_j = now.turn[k, 0], now.turn[k, 1]
             angle_b, angle_j = now.angle[k, 0] + turn_b * turned, now.angle[k, 1] + turn_j * turned
@@ -96,18 +98,19 @@ def accelerate_clearances(model, surfaces, approach, now, turned, x, at_e, at_v,
                 contacts, surfaces, k, ex, ey, direction, angle_b, angle_j
             )
             cam = slope_b * turn_b + slope_j * turn_j
+            clearance = bushing - journal
             if delta > 0.0:
-                hertz = stiffness_at(contacts, k, bushing, journal)
+                coefficient = coefficient_at(contacts, k, bushing, journal)
         else:
-            delta, nx, ny = journal_contact(ex, ey, contacts.clearance[k])
+            delta, nx, ny = journal_contact(ex, ey, clearance)
         delta_dot = nx * vx + ny * vy + cam * speed
-        f_n, f_t, slip, elastic, damping = 0.0, 0.0, 0.0, 0.0, 0.0
+        f_n, stiffness, damping, elastic, f_t, slip = 0.0, 0.0, 0.0, 0.0, 0.0, 0.0
         if delta > 0.0 and approach[k] > 0.0:
-            elastic = elastic_force(hertz, delta)
             loss = law[k, HYSTERESIS_FACTOR] / approach[k]
-            f_n = damped_force(elastic, loss, delta_dot)
+            f_n, stiffness, damping, elastic = normal_force(
+                law[k, NORMAL_FORM], coefficient, clearance, loss, delta, delta_dot
+            )
             if f_n > 0.0:
-                damping = elastic * loss
                 slip = nx * vy - ny * vx + now.lever_drive[k] * speed
                 for i in range(d):
                     slip += lever[k, i] * x[at_v, i]
@@ -121,5 +124,5 @@ def accelerate_clearances(model, surfaces, approach, now, turned, x, at_e, at_v,
         out_sample[k, EX], out_sample[k, EY], out_sample[k, VX], out_sample[k, VY] = ex, ey, vx, vy
         out_sample[k, F_N], out_sample[k, DELTA], out_sample[k, DELTA_DOT] = f_n, delta, delta_dot
         out_sample[k, NX], out_sample[k, NY], out_sample[k, F_T], out_sample[k, SLIP] = nx, ny, f_t, slip
-        out_sample[k, DAMPING], out_sample[k, ELASTIC] = damping, elastic
-        out_sample[k, CAM], out_sample[k, HERTZ] = cam, hertz
+        out_sample[k, STIFFNESS], out_sample[k, DAMPING], out_sample[k, ELASTIC] = stiffness, damping, elastic
+        out_sample[k, CAM], out_sample[k, COEFFICIENT], out_sample[k, CLEARANCE] = cam, coefficient, clearance

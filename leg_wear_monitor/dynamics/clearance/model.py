@@ -22,7 +22,7 @@ class ClearanceModel(NamedTuple):
 
     ``interval`` [s] between the instants at which the tables are taken and the drive is asked: the state
     exists at whole numbers of them. ``tolerance`` (2,) local error allowed in a step, of eccentricities
-    [m] and of their rates [m/s]; ``law`` (k, 6) as `contact_laws` gives them; ``damped`` 1 with dampers.
+    [m] and of their rates [m/s]; ``law`` (k, 7) as `contact_laws` gives them; ``damped`` 1 with dampers.
     """
 
     contacts: ContactArrays

@@ -15,8 +15,8 @@ from typing import NamedTuple
 
 import numpy as np
 
-from leg_wear_monitor.dynamics.clearance.contact import CAM, DAMPING, NX, NY
-from leg_wear_monitor.dynamics.joint.contact_event import DELTA, F_N
+from leg_wear_monitor.dynamics.clearance.contact import CAM, DAMPING, NX, NY, STIFFNESS
+from leg_wear_monitor.dynamics.joint.contact_event import F_N
 from leg_wear_monitor.kernel import kernel
 from leg_wear_monitor.mechanism.arrays import Floats, Ints
 
@@ -60,8 +60,7 @@ def factorise_contacts(h, inverse_mass, speed, sample, out_system):
     response, factor = out_system.response, out_system.factor
     for k in range(sample.shape[0]):
         if sample[k, F_N] > 0.0:
-            stiffness = 1.5 * sample[k, F_N] / sample[k, DELTA]
-            nx, ny = sample[k, NX], sample[k, NY]
+            stiffness, nx, ny = sample[k, STIFFNESS], sample[k, NX], sample[k, NY]
             for i in range(inverse_mass.shape[0]):
                 response[m, i] = nx * inverse_mass[2 * k, i] + ny * inverse_mass[2 * k + 1, i]
             compliance = 1.0 / (g * (sample[k, DAMPING] + g * stiffness))

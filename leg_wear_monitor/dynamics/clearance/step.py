@@ -3,11 +3,13 @@
 import math
 
 from leg_wear_monitor.contact.friction import friction_force
-from leg_wear_monitor.contact.normal import damped_force, elastic_force
+from leg_wear_monitor.contact.normal.laws import normal_force
 from leg_wear_monitor.dynamics.clearance.contact import (
     A0,
     A1,
     BY_V,
+    CLEARANCE,
+    COEFFICIENT,
     DRIFT,
     DV,
     E0,
@@ -17,12 +19,12 @@ from leg_wear_monitor.dynamics.clearance.contact import (
     F_T,
     FRICTION_COEFFICIENT,
     FRICTION_LAW,
-    HERTZ,
     HYSTERESIS_FACTOR,
     K1E,
     K1V,
     K2E,
     K2V,
+    NORMAL_FORM,
     RAMP_0,
     RAMP_1,
     RE,
@@ -136,8 +138,12 @@ def integrate_joints(law, approach, h, start, end, out_added):
                     0.5, h, start[k, DELTA], start[k, DELTA_DOT], end[k, DELTA], end[k, DELTA_DOT]
                 )
                 slip = 0.5 * (start[k, SLIP] + end[k, SLIP])
-                elastic = elastic_force(0.5 * (start[k, HERTZ] + end[k, HERTZ]), delta)
-                f_n = damped_force(elastic, law[k, HYSTERESIS_FACTOR] / approach[k], rate)
+                coefficient = 0.5 * (start[k, COEFFICIENT] + end[k, COEFFICIENT])
+                clearance = 0.5 * (start[k, CLEARANCE] + end[k, CLEARANCE])
+                loss = law[k, HYSTERESIS_FACTOR] / approach[k]
+                f_n, _, _, elastic = normal_force(
+                    law[k, NORMAL_FORM], coefficient, clearance, loss, delta, rate
+                )
                 mu, code = law[k, FRICTION_COEFFICIENT], law[k, FRICTION_LAW]
                 f_t = friction_force(code, mu, law[k, RAMP_0], law[k, RAMP_1], f_n, slip)
                 _add_rates(k, 4.0 * weight, f_n, f_t, elastic, rate, slip, out_added)

@@ -11,7 +11,6 @@ from typing import NamedTuple
 import numpy as np
 
 from leg_wear_monitor.contact.arrays import ContactArrays
-from leg_wear_monitor.contact.normal import elastic_force
 from leg_wear_monitor.dynamics.joint.contact_event import DELTA, DELTA_DOT, EX, EY, F_N, SAMPLE, VX, VY
 from leg_wear_monitor.dynamics.joint.joint_contact import contact_energy, joint_force
 from leg_wear_monitor.dynamics.run.cholesky import factorise, substitute
@@ -114,7 +113,7 @@ def add_contacts(model, surfaces, approach, q, v, scratch, out_rate):
     contacts = model.contacts
     for k in range(contacts.joint.shape[0]):
         ex, ey, vx, vy, b, j, sbx, sby = eccentricity(model, k, q, v, scratch.cs)
-        f_n, f_t, delta, delta_dot, slip, nx, ny, stiffness, moment = joint_force(
+        f_n, f_t, delta, delta_dot, slip, nx, ny, elastic, moment = joint_force(
             contacts, surfaces, k, ex, ey, vx, vy, q[b, 2], q[j, 2], v[b, 2], v[j, 2], approach[k]
         )
         sample = scratch.contact[k]
@@ -134,7 +133,7 @@ def add_contacts(model, surfaces, approach, q, v, scratch, out_rate):
             rate[CONTACT] = 1.0
             rate[FRICTION] = -f_t * slip
             rate[ARCHARD] = f_n * abs(slip)
-        rate[DISSIPATION] = (f_n - elastic_force(stiffness, delta)) * delta_dot
+        rate[DISSIPATION] = (f_n - elastic) * delta_dot
 
 
 @kernel

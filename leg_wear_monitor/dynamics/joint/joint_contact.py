@@ -6,8 +6,8 @@ physics.md sections 3 to 6.
 import math
 
 from leg_wear_monitor.contact.friction import friction_force
-from leg_wear_monitor.contact.geometry import contact_stiffness, journal_contact, worn_contact
-from leg_wear_monitor.contact.normal import elastic_energy, normal_force
+from leg_wear_monitor.contact.geometry import journal_contact, worn_contact
+from leg_wear_monitor.contact.normal.laws import elastic_energy, law_coefficient, normal_force, softening
 from leg_wear_monitor.kernel import kernel
 from leg_wear_monitor.wear.surfaces import deposit_wear, local_surfaces
 
@@ -19,7 +19,7 @@ def penetration(contacts, surfaces, k, ex, ey, direction, angle_b, angle_j):
     ``direction`` [rad] is that of the eccentricity, and only asked for where wear feeds back. Last come the
     fractions of the penetration's rate that the turning of bushing and journal make, by their speeds [m/rad].
     The normal is a unit vector on fresh surfaces, see `worn_contact` for worn ones: the normal force times
-    it is the gradient of the contact's energy, to which the stiffness that changes from place to place adds.
+    it is the gradient of the contact's energy, to which the local radii add that change from place to place.
     physics.md section 3.
     """
     bushing, journal, slope_b, slope_j, bend_b, bend_j = local_surfaces(
@@ -31,10 +31,10 @@ def penetration(contacts, surfaces, k, ex, ey, direction, angle_b, angle_j):
     clearance = bushing - journal
     delta, nx, ny, scale, turned = worn_contact(ex, ey, clearance, slope_b + slope_j, bend_b + bend_j)
     cam_b, cam_j = slope_b * scale + turned * bend_b, slope_j * scale + turned * bend_j
-    if delta > 0.0 and contacts.stiffness[k] == 0.0:  # the stiffness is the local radii's
-        # d(2/5 K delta^2.5) = K delta^1.5 (d delta + 2/5 delta dK / K)
-        softer = 0.2 * delta / (clearance * bushing * journal)
-        softer_b, softer_j = softer * slope_b * journal * journal, softer * slope_j * bushing * bushing
+    if delta > 0.0:
+        softer_b, softer_j = softening(
+            contacts.normal_form[k], contacts.stiffness[k], delta, bushing, journal, slope_b, slope_j
+        )
         along = (softer_b + softer_j) / (ex * ex + ey * ey)
         nx, ny = nx + along * ey, ny - along * ex
         cam_b, cam_j = cam_b + softer_b, cam_j + softer_j
@@ -42,11 +42,10 @@ def penetration(contacts, surfaces, k, ex, ey, direction, angle_b, angle_j):
 
 
 @kernel
-def stiffness_at(contacts, k, bushing, journal):
-    """Contact stiffness [N/m^1.5] of clearance joint k at the local radii [m]; physics.md section 4."""
-    if contacts.stiffness[k] > 0.0:
-        return contacts.stiffness[k]
-    return contact_stiffness(contacts.modulus[k], bushing, journal)
+def coefficient_at(contacts, k, bushing, journal):
+    """Coefficient of the normal law of clearance joint k at the local radii [m]; physics.md section 4."""
+    form, given = contacts.normal_form[k], contacts.stiffness[k]
+    return law_coefficient(form, given, contacts.modulus[k], contacts.width[k], bushing, journal)
 
 
 @kernel
@@ -61,8 +60,9 @@ def joint_force(contacts, surfaces, k, ex, ey, vx, vy, angle_b, angle_j, speed_b
 
     Returns
     -------
-    f_n, f_t, delta, delta_dot, slip, nx, ny, stiffness, moment
-        The force on the journal is -f_n n + f_t t with t = (-n_y, n_x), the couple on it ``moment`` [N m].
+    f_n, f_t, delta, delta_dot, slip, nx, ny, elastic, moment
+        The force on the journal is -f_n n + f_t t with t = (-n_y, n_x), the couple on it ``moment`` [N m];
+        ``elastic`` [N] is the part of f_n that stores energy.
     """
     direction = math.atan2(ey, ex) if surfaces.feeds_back else 0.0
     delta, nx, ny, bushing, journal, slope_b, slope_j = penetration(
@@ -73,11 +73,13 @@ def joint_force(contacts, surfaces, k, ex, ey, vx, vy, angle_b, angle_j, speed_b
     slip = nx * vy - ny * vx + speed_j * (arm - ex * nx - ey * ny) - speed_b * arm
     if delta <= 0.0 or approach_speed == 0.0:
         return 0.0, 0.0, delta, delta_dot, slip, nx, ny, 0.0, 0.0
-    stiffness = stiffness_at(contacts, k, bushing, journal)
-    f_n = normal_force(stiffness, contacts.hysteresis[k], delta, delta_dot, approach_speed)
+    coefficient, loss = coefficient_at(contacts, k, bushing, journal), contacts.hysteresis[k] / approach_speed
+    f_n, _, _, elastic = normal_force(
+        contacts.normal_form[k], coefficient, bushing - journal, loss, delta, delta_dot
+    )
     mu, v0, v1 = contacts.friction[k, 0], contacts.friction[k, 1], contacts.friction[k, 2]
     f_t = friction_force(contacts.friction_law[k], mu, v0, v1, f_n, slip)
-    return f_n, f_t, delta, delta_dot, slip, nx, ny, stiffness, f_n * slope_b
+    return f_n, f_t, delta, delta_dot, slip, nx, ny, elastic, f_n * slope_b
 
 
 @kernel
@@ -87,7 +89,8 @@ def contact_energy(contacts, surfaces, k, ex, ey, angle_b, angle_j):
     delta, _, _, bushing, journal, _, _ = penetration(
         contacts, surfaces, k, ex, ey, direction, angle_b, angle_j
     )
-    return elastic_energy(stiffness_at(contacts, k, bushing, journal), delta)
+    coefficient = coefficient_at(contacts, k, bushing, journal)
+    return elastic_energy(contacts.normal_form[k], coefficient, bushing - journal, delta)
 
 
 @kernel

@@ -4,7 +4,7 @@ from collections.abc import Sequence
 
 import numpy as np
 
-from leg_wear_monitor.mechanism.clearance import NORMAL_LAWS
+from leg_wear_monitor.mechanism.law_names import NORMAL_LAWS
 from leg_wear_monitor.report.study.text import (
     PICO,
     QUANTITIES,

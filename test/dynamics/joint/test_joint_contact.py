@@ -8,6 +8,7 @@ from hypothesis import assume, given
 from hypothesis import strategies as st
 
 from leg_wear_monitor.contact.arrays import ContactArrays, clearance_settings, compile_contacts
+from leg_wear_monitor.contact.normal.laws import LAWS
 from leg_wear_monitor.dynamics.joint.joint_contact import contact_energy, joint_force, penetration
 from leg_wear_monitor.wear.surfaces import SECTORS, Surfaces, local_surfaces
 
@@ -17,11 +18,19 @@ TURN = 2.0 * math.pi
 angles = st.floats(-3.0, 3.0)
 
 
-@pytest.fixture(scope="module", params=[1.0e10, 0.0], ids=["given stiffness", "Hertz"])
+# one law of each form, and a stiffness given where that can be
+CASES = {law.number: (name, 0.0) for name, law in LAWS.items()}
+CASES[-1] = ("hertz", 1.0e10)
+
+
+@pytest.fixture(scope="module", params=CASES.values(), ids=str)
 def elastic(leg, request) -> ContactArrays:
     """Joint G without loss or friction: what is left has a potential."""
-    contacts = compile_contacts(leg, ["G"], clearance_settings(leg, ["G"], normal_law="hertz"))
-    return contacts._replace(friction=np.zeros((1, 3)), stiffness=np.array([request.param]))
+    law, stiffness = request.param
+    contacts = compile_contacts(leg, ["G"], clearance_settings(leg, ["G"], normal_law=law))
+    return contacts._replace(
+        friction=np.zeros((1, 3)), hysteresis=np.zeros(1), stiffness=np.array([stiffness])
+    )
 
 
 def _grooved(seed: int) -> Surfaces:

@@ -5,7 +5,7 @@ from typing import Any
 import attrs
 
 from leg_wear_monitor.configuration.quantity import described, quantity
-from leg_wear_monitor.mechanism.clearance import FRICTION_LAWS, NORMAL_LAWS
+from leg_wear_monitor.mechanism.law_names import FRICTION_LAWS, NORMAL_LAWS
 from leg_wear_monitor.studies.plan.keys import (
     Names,
     clearance_field,

@@ -1,15 +1,14 @@
-"""Normal contact laws F = K delta^1.5 (1 + chi delta_dot / approach_speed) (physics.md section 4).
+"""Loss in normal contact: F = F_elastic (1 + chi delta_dot / approach_speed) (physics.md section 4).
 
-The laws differ in how the hysteresis factor chi follows from the coefficient of restitution asked for.
+The factors chi by the coefficient of restitution asked for, and what they return of it, whatever F_elastic.
 """
 
 import math
-from collections.abc import Callable
 
 from leg_wear_monitor.kernel import kernel
 
 
-def hertz(restitution: float) -> float:
+def no_loss(restitution: float) -> float:
     """No loss (Hertz 1882)."""
     return 0.0
 
@@ -39,45 +38,26 @@ def hu_guo(restitution: float) -> float:
     return 1.5 * (1.0 - restitution) / restitution
 
 
-HYSTERESIS: dict[str, Callable[[float], float]] = {
-    "hertz": hertz,
-    "hunt-crossley": hunt_crossley,
-    "lankarani-nikravesh": lankarani_nikravesh,
-    "gonthier": gonthier,
-    "flores": flores,
-    "hu-guo": hu_guo,
-}
-
-
 @kernel
-def elastic_force(stiffness, delta):
-    """Hertz's part of the force, K delta^1.5 [N]; 0 when apart."""
-    return stiffness * delta * math.sqrt(delta) if delta > 0.0 else 0.0
+def with_hysteresis(elastic, exponent, loss, delta, delta_dot):
+    """Force with a loss in proportion to its elastic part [N]; never negative: surfaces do not pull.
 
+    ``exponent`` [-] is that of the elastic part at delta [m], d ln F / d ln delta; ``loss`` [s/m] is chi over
+    the approach speed.
 
-@kernel
-def damped_force(elastic, loss, delta_dot):
-    """Force [N] that pushes apart, never negative: elastic part [N], loss chi / approach speed [s/m]."""
-    return max(0.0, elastic * (1.0 + loss * delta_dot))
-
-
-@kernel
-def normal_force(stiffness, hysteresis, delta, delta_dot, approach_speed):
-    """Force [N] that pushes the surfaces apart, never negative.
-
-    stiffness [N/m^1.5], hysteresis chi [-], delta [m], delta_dot and approach_speed [m/s].
+    Returns
+    -------
+    f_n, stiffness, damping, elastic
+        Force [N], its derivatives by delta [N/m] and by delta_dot [N s/m], and its elastic part [N].
     """
-    return damped_force(elastic_force(stiffness, delta), hysteresis / approach_speed, delta_dot)
-
-
-@kernel
-def elastic_energy(stiffness, delta):
-    """Energy stored in the contact, 2/5 K delta^2.5 [J]."""
-    return 0.4 * elastic_force(stiffness, delta) * max(delta, 0.0)
+    f_n = max(0.0, elastic * (1.0 + loss * delta_dot))
+    if f_n > 0.0:
+        return f_n, exponent * f_n / delta, elastic * loss, elastic
+    return 0.0, 0.0, 0.0, elastic
 
 
 def delivered_restitution(hysteresis: float) -> float:
-    """What a law returns for its factor chi, whatever K, mass and speed.
+    """What a law returns for its factor chi, whatever elastic force, mass and speed.
 
     Parameters
     ----------

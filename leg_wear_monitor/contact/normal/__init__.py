@@ -1,0 +1,1 @@
+"""Normal contact laws: a file for each form of force, `laws` the list of all by name."""

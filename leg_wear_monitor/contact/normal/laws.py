@@ -17,6 +17,7 @@ from leg_wear_monitor.contact.normal.hysteresis import (
     lankarani_nikravesh,
     no_loss,
 )
+from leg_wear_monitor.contact.normal.winkler import WINKLER
 from leg_wear_monitor.kernel import kernel
 
 
@@ -39,6 +40,7 @@ LAWS: dict[str, NormalLaw] = {
     "gonthier": NormalLaw(HERTZ, gonthier),
     "flores": NormalLaw(HERTZ, flores),
     "hu-guo": NormalLaw(HERTZ, hu_guo),
+    "winkler": NormalLaw(WINKLER, hu_guo),
 }
 
 _FORMS = tuple(dict.fromkeys(law.form for law in LAWS.values()))

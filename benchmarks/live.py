@@ -30,7 +30,7 @@ from leg_wear_monitor.gait.sensors import readings
 from leg_wear_monitor.ros.gait_publisher.config import PublisherConfig
 from leg_wear_monitor.ros.gait_publisher.sensor_messages import sensor_message
 from leg_wear_monitor.ros.running import spin
-from leg_wear_monitor.twin.sample import CRANK
+from leg_wear_monitor.twin.kinds import CRANK
 
 LOOP_S = 8  # of walking that is sent again and again; whole gait cycles, with an angle that wraps
 STAMP = slice(4, 12)  # of a header in CDR

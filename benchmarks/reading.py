@@ -17,7 +17,7 @@ from leg_wear_monitor.bags.reader import Recording
 from leg_wear_monitor.messages import encode
 from leg_wear_monitor.messages.definitions import definition
 from leg_wear_monitor.monitor.config.settings import MonitorConfig
-from leg_wear_monitor.twin.sample import CRANK
+from leg_wear_monitor.twin.kinds import CRANK
 
 NAMES = ["hip", "knee", "ankle", "crank", "toe", "pelvis", "spare"]
 TOPICS = {"/joint_states": encode.JOINT_STATE, "/drive_torque": encode.WRENCH_STAMPED}

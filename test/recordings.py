@@ -10,9 +10,9 @@ import pytest
 
 from leg_wear_monitor.bags.reader import Recording
 from leg_wear_monitor.messages import encode
-from leg_wear_monitor.messages.cdr import JOINT_STATE, TYPES, WRENCH_STAMPED
 from leg_wear_monitor.messages.decode import Decoder
 from leg_wear_monitor.messages.definitions import definition
+from leg_wear_monitor.messages.streams import JOINT_STATE, STREAMS, WRENCH_STAMPED
 from leg_wear_monitor.monitor.config.settings import MonitorConfig
 from leg_wear_monitor.twin.sample import GAIT_SAMPLE
 
@@ -67,10 +67,12 @@ def foreign(store: Any) -> Callable[[str, bytes], Any]:
 
     def read(name: str, raw: bytes) -> Any:
         text, _ = store.generate_msgdef(name, ros_version=2)
-        return decoder.decoder_for("cdr", schema(TYPES[name], text.encode(), "ros2msg", name))(raw)
+        return decoder.decoder_for("cdr", schema(CODES[name], text.encode(), "ros2msg", name))(raw)
 
     return read
 
+
+CODES = {stream.type: stream.code for stream in STREAMS}
 
 START_NS = 1_700_000_000 * 10**9
 
@@ -124,7 +126,7 @@ def write_bag() -> Callable[..., Path]:
             channels: dict[str, int] = {}
             for each in sent:
                 if each.topic not in channels:
-                    known = definitions and each.type in TYPES
+                    known = definitions and each.type in CODES
                     text = definition(each.type).text.encode() if known else b""
                     schema = writer.register_schema(each.type, "ros2msg", text)
                     channels[each.topic] = writer.register_channel(each.topic, "cdr", schema)

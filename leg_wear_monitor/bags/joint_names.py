@@ -9,7 +9,8 @@ from numpy.typing import NDArray
 
 from leg_wear_monitor.bags.findings import Finding, RecordingError, Severity
 from leg_wear_monitor.bags.topics import listed
-from leg_wear_monitor.messages.cdr import ENCAPSULATION, JOINT_STATE
+from leg_wear_monitor.messages.cdr import ENCAPSULATION
+from leg_wear_monitor.messages.streams import JOINT_STATE
 from leg_wear_monitor.twin.sample import MISSING_JOINT, NO_FAULT, NOT_FINITE, ZERO_STAMP, Samples
 
 _MOST = 1000

@@ -13,7 +13,8 @@ from leg_wear_monitor.bags.sources import Source
 from leg_wear_monitor.bags.topics import listed
 from leg_wear_monitor.mechanism.arrays import Floats
 from leg_wear_monitor.mechanism.ideal import TURN
-from leg_wear_monitor.twin.sample import CRANK, NO_FAULT, Samples
+from leg_wear_monitor.twin.kinds import CRANK
+from leg_wear_monitor.twin.sample import NO_FAULT, Samples
 
 _KEPT = 8192  # samples of each file that others are compared with
 _ENOUGH = 20  # samples in common that say something

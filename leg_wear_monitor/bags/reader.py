@@ -80,7 +80,8 @@ class Recording:
         bag_files, self._findings = find_files(paths)
         with ExitStack() as stack:
             self._sources, lost = open_sources(bag_files, self._budget, stack)
-            wanted = roles(config.drive_torque.source, joint_states, drive_torque)
+            given = {"joint_states": joint_states, "drive_torque": drive_torque}
+            wanted = roles(config.drive_torque.source, given)
             self.topics, missing = assign(self._sources, wanted)
             self._findings += lost + missing + check_topics(self._sources, self.topics, joint_states)
             self._close = stack.pop_all()

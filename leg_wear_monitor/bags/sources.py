@@ -110,7 +110,7 @@ def assign(sources: list[Source], wanted: Iterable[Role]) -> tuple[dict[str, str
                 source.types |= _types(source, role, topic)
             continue
         text = f"is not a topic of the recording, it has {listed(there)}"
-        if role.needed:
+        if role.stream.is_needed:
             raise RecordingError(str(first), role.name, text)
         findings.append(Finding(first, f"{role.name}: {text}", Severity.NOTE))
     return topics, findings

@@ -1,57 +1,31 @@
 """Which topics of a recording are the crank's and the torque's, and whether they hold what they should."""
 
-from collections.abc import Iterable
+from collections.abc import Iterable, Mapping
 
 import attrs
 
 from leg_wear_monitor.bags.findings import RecordingError
 from leg_wear_monitor.bags.mcap.layout import Channel
 from leg_wear_monitor.errors import printable
-from leg_wear_monitor.messages.cdr import TYPES
-
-# Fields of the types' own definitions; names of nested types without their package.
-_FIELDS = {
-    "sensor_msgs/msg/JointState": (
-        "Header header",
-        "string[] name",
-        "float64[] position",
-        "float64[] velocity",
-        "float64[] effort",
-    ),
-    "geometry_msgs/msg/WrenchStamped": ("Header header", "Wrench wrench"),
-    "std_msgs/msg/Float64": ("float64 data",),
-}
-_TORQUE_TYPES = {"wrench": "geometry_msgs/msg/WrenchStamped", "float64": "std_msgs/msg/Float64"}
+from leg_wear_monitor.messages.streams import Stream, streams_read
 
 
 @attrs.frozen
 class Role:
-    """What is looked for in a recording.
+    """What is looked for in a recording: a stream, and the topic where a user says that it is."""
 
-    Attributes
-    ----------
-    name : str
-        As it is in the node: a relative name.
-    type : str
-        Type its messages must have.
-    topic : str, optional
-        Where a user says it is.
-    needed : bool
-        Whether nothing can be done without.
-    """
-
-    name: str
-    type: str
+    stream: Stream
     topic: str | None = None
-    needed: bool = False
+
+    @property
+    def name(self) -> str:
+        """As it is in the node: a relative name."""
+        return self.stream.topic
 
 
-def roles(source: str, joint_states: str | None, drive_torque: str | None) -> list[Role]:
+def roles(source: str, given: Mapping[str, str | None]) -> list[Role]:
     """What a monitor with a source of torque needs: a key of `drive_torque.source`, and topics if given."""
-    wanted = [Role("joint_states", "sensor_msgs/msg/JointState", joint_states, needed=True)]
-    if source in _TORQUE_TYPES:
-        wanted.append(Role("drive_torque", _TORQUE_TYPES[source], drive_torque))
-    return wanted
+    return [Role(stream, given.get(stream.topic)) for stream in streams_read(source)]
 
 
 def find_topic(role: Role, topics: Iterable[str], where: str) -> str | None:
@@ -83,7 +57,7 @@ def find_topic(role: Role, topics: Iterable[str], where: str) -> str | None:
 
 
 def check_channel(role: Role, channel: Channel, known_type: str, where: str) -> int:
-    """Code of a channel's type, once it is sure that its messages can be read as such.
+    """Code of a channel's stream, once it is sure that its messages can be read as such.
 
     Parameters
     ----------
@@ -99,17 +73,18 @@ def check_channel(role: Role, channel: Channel, known_type: str, where: str) -> 
     RecordingError
         Naming file, topic, and what it should be.
     """
-    kind = channel.type or known_type or role.type
-    if kind != role.type:
-        raise RecordingError(where, channel.topic, f"is of type {kind}, expected {role.type}")
+    stream = role.stream
+    kind = channel.type or known_type or stream.type
+    if kind != stream.type:
+        raise RecordingError(where, channel.topic, f"is of type {kind}, expected {stream.type}")
     if channel.encoding != "cdr":
         raise RecordingError(where, channel.topic, f"is encoded as {channel.encoding!r}, expected 'cdr'")
     if channel.definition_encoding == "ros2msg" and channel.definition:
         fields = _fields(channel.definition)
-        if fields != _FIELDS[kind]:
-            text = f"defines {kind} by {'; '.join(fields)}, expected {'; '.join(_FIELDS[kind])}"
+        if fields != stream.fields:
+            text = f"defines {kind} by {'; '.join(fields)}, expected {'; '.join(stream.fields)}"
             raise RecordingError(where, channel.topic, text)
-    return TYPES[kind]
+    return stream.code
 
 
 def _fields(definition: str) -> tuple[str, ...]:

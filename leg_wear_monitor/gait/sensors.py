@@ -20,14 +20,13 @@ from leg_wear_monitor.gait.config import (
 from leg_wear_monitor.gait.leg import SyntheticLeg
 from leg_wear_monitor.gait.pace import CrankMotion
 from leg_wear_monitor.mechanism.ideal import TURN
+from leg_wear_monitor.twin.kinds import CRANK, TORQUE
 from leg_wear_monitor.twin.sample import (
-    CRANK,
     ENCODERS,
     FAULTS,
     GAIT_SAMPLE,
     NO_FAULT,
     OUT_OF_RANGE,
-    TORQUE,
     WRONG_TYPE,
     Samples,
 )

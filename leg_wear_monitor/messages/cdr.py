@@ -10,24 +10,8 @@ import math
 import numpy as np
 
 from leg_wear_monitor.kernel import entry, kernel
-from leg_wear_monitor.twin.sample import (
-    CRANK,
-    EMPTY,
-    MISSING_JOINT,
-    NO_FAULT,
-    NOT_FINITE,
-    TORQUE,
-    UNDECODABLE,
-    WRONG_LENGTH,
-)
-
-JOINT_STATE, WRENCH_STAMPED, FLOAT64 = 1, 2, 3
-TYPES = {
-    "sensor_msgs/msg/JointState": JOINT_STATE,
-    "geometry_msgs/msg/WrenchStamped": WRENCH_STAMPED,
-    "std_msgs/msg/Float64": FLOAT64,
-}
-"""Types that can be read, and their codes."""
+from leg_wear_monitor.messages.streams import FLOAT64, JOINT_STATE, STREAMS, WRENCH_STAMPED
+from leg_wear_monitor.twin.sample import EMPTY, MISSING_JOINT, NO_FAULT, NOT_FINITE, UNDECODABLE, WRONG_LENGTH
 
 MESSAGE = np.dtype(
     [
@@ -38,7 +22,11 @@ MESSAGE = np.dtype(
         ("type", "i8"),
     ]
 )
-"""One message among bytes: from where to where, when it was recorded and sent, and a code of `TYPES`."""
+"""One message among bytes: from where to where, when it was recorded and sent, and its stream's code."""
+
+_KIND = np.full(1 + max(stream.code for stream in STREAMS), -1)
+_KIND[[stream.code for stream in STREAMS]] = [stream.kind for stream in STREAMS]
+"""Kinds of samples by the codes of streams."""
 
 ENCAPSULATION = 4
 # Bytes that may follow a message: up to 3 where a middleware fills up to a multiple of four, and 4 more for
@@ -251,17 +239,19 @@ def decode(data, messages, crank, encoders, ends_at, axis, use_effort, out, out_
             big = data[begin + 1] == 0
             if kind == JOINT_STATE:
                 fault, stamp, position, velocity, torque = joint_state(data, begin, end, big, crank)
+                if not use_effort:
+                    torque = math.nan
             elif kind == WRENCH_STAMPED:
                 fault, stamp, torque = wrench_stamped(data, begin, end, big, axis)
-            else:
+            elif kind == FLOAT64:
                 fault, torque = float64_message(data, begin, end, big)
                 stamp = messages[i]["log_time_ns"]
         out[i]["stamp_ns"] = stamp
-        out[i]["kind"] = CRANK if kind == JOINT_STATE else TORQUE
+        out[i]["kind"] = _KIND[kind]
         out[i]["fault"] = fault
         out[i]["crank_angle_rad"] = position
         out[i]["crank_velocity_radps"] = velocity
-        out[i]["torque_nm"] = torque if kind != JOINT_STATE or use_effort else math.nan
+        out[i]["torque_nm"] = torque
         first = 0
         for j in range(ends_at.shape[0]):
             out_angles[i, j] = math.nan

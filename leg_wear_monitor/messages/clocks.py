@@ -3,11 +3,10 @@
 import numpy as np
 from numpy.typing import NDArray
 
-from leg_wear_monitor.messages.cdr import FLOAT64, JOINT_STATE
+from leg_wear_monitor.messages.streams import JOINT_STATE, STREAMS, Stream
 from leg_wear_monitor.twin.sample import NO_FAULT, Samples
 
 _FRACTION, _LEAST_NS = 0.05, 1_000_000_000
-_NAMES = {JOINT_STATE: "joint_states", 2: "drive_torque"}
 
 
 class Clocks:
@@ -34,15 +33,20 @@ class Clocks:
 
     def notes(self) -> list[str]:
         """What does not agree, one line each."""
-        notes = [note for kind, name in _NAMES.items() if (note := self._rate(kind, name))]
-        joints, torque = self._ends.get(JOINT_STATE), self._ends.get(FLOAT64)
-        if joints and torque and abs(joints[1] - joints[0]) > _LEAST_NS:
-            apart = (joints[1] - joints[0]) / 1e9
-            notes.append(
-                f"drive_torque has no header and takes its log time, which is {apart:.6g} s after the header "
-                "stamps of joint_states: they do not meet, try --time log"
-            )
-        return notes
+        stamped = (self._rate(each.code, each.topic) for each in STREAMS if each.has_stamp)
+        unstamped = (self._apart(each) for each in STREAMS if not each.has_stamp)
+        return [note for note in (*stamped, *unstamped) if note]
+
+    def _apart(self, stream: Stream) -> str | None:
+        """Whether the log times that stamp a stream are far from the crank's stamps."""
+        crank = self._ends.get(JOINT_STATE)
+        if stream.code not in self._ends or crank is None or abs(crank[1] - crank[0]) <= _LEAST_NS:
+            return None
+        apart = (crank[1] - crank[0]) / 1e9
+        return (
+            f"{stream.topic} has no header and takes its log time, which is {apart:.6g} s after the header "
+            "stamps of joint_states: they do not meet, try --time log"
+        )
 
     def _rate(self, kind: int, name: str) -> str | None:
         if kind not in self._ends:

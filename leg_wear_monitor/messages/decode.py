@@ -64,7 +64,7 @@ class Decoder:
         ----------
         raw : bytes
         kind : int
-            A code of `cdr.TYPES`.
+            Code of its stream.
         log_time_ns : int
             Time it came, which stamps a type without a header [ns].
 

@@ -23,7 +23,7 @@ from leg_wear_monitor.monitor.reports import (
     SampleReports,
     Status,
 )
-from leg_wear_monitor.twin.sample import CRANK
+from leg_wear_monitor.twin.kinds import CRANK
 
 
 @attrs.frozen

@@ -16,6 +16,7 @@ from leg_wear_monitor.monitor.evaluation.evaluation import AlarmEvaluation
 from leg_wear_monitor.monitor.evaluation.torque_checks import offset_error_rad, torque_causes
 from leg_wear_monitor.monitor.evaluation.torque_record import TorqueRecord
 from leg_wear_monitor.monitor.forecast.words import UNKNOWN, lifetime_values
+from leg_wear_monitor.monitor.inputs.health import InputHealth
 from leg_wear_monitor.monitor.reports import CycleReport, Status
 from leg_wear_monitor.twin.digital_twin import DigitalTwin
 from leg_wear_monitor.twin.statistics import Event, Tracking
@@ -72,13 +73,15 @@ def _gait(
 
 
 def _input(twin: DigitalTwin, evaluation: AlarmEvaluation, accounting: Accounting) -> Status:
-    counts = attrs.asdict(twin.intake) | {"already_counted": accounting.state.skipped}
-    faulty = counts.pop("faulty")
+    counts = attrs.asdict(twin.intake)
+    faulty, used = counts.pop("faulty"), counts.pop("used")
     for stamp in ("newest_stamp_ns", "followed_stamp_ns"):
         counts.pop(stamp)
-    health = attrs.asdict(evaluation.state.health) if evaluation.state.health else {}
-    counts |= {"conflicting": evaluation.guard.conflicting, "implausible": evaluation.guard.implausible}
-    values = {**health, **counts, **{f"faulty_{name}": count for name, count in faulty.items()}}
+    values = _health_values(evaluation.state.health) if evaluation.state.health else {}
+    values |= {"received": counts.pop("received")} | {f"{name}_used": count for name, count in used.items()}
+    values |= counts | {"already_counted": accounting.state.skipped}
+    values |= {"conflicting": evaluation.guard.conflicting, "implausible": evaluation.guard.implausible}
+    values |= {f"faulty_{name}": count for name, count in faulty.items()}
     level = evaluation.board.level(*_INPUT)
     bad = [name for name in _INPUT if evaluation.board.alarms[name].level is not Level.OK]
     messages = [*evaluation.causes, *([f"see: {', '.join(bad)}"] if bad else [])]
@@ -86,6 +89,12 @@ def _input(twin: DigitalTwin, evaluation: AlarmEvaluation, accounting: Accountin
     if evaluation.guard.cause:
         level = Level.ERROR
     return Status("input", level, message, {name: float(value) for name, value in values.items()})
+
+
+def _health_values(health: InputHealth) -> dict[str, float]:
+    values = attrs.asdict(health)
+    rates = {f"{name}_rate_hz": rate for name, rate in values.pop("rate_hz").items()}
+    return {"duration_s": values.pop("duration_s"), **rates, **values}
 
 
 def _torque(evaluation: AlarmEvaluation, last: CycleReport | None, record: TorqueRecord) -> Status:

@@ -160,10 +160,9 @@ class WearMonitor:
         )
 
     @property
-    def used(self) -> tuple[int, int]:
-        """Numbers of crank and torque samples used so far."""
-        intake = self._twin.intake
-        return intake.crank_used, intake.torque_used
+    def used(self) -> dict[str, int]:
+        """How many samples of each kind were used so far, by the names of `twin.kinds.KINDS`."""
+        return self._twin.intake.used
 
     @property
     def measurements(self) -> tuple[Measurement, ...]:

@@ -20,7 +20,8 @@ from leg_wear_monitor.monitor.opening import open_monitor
 from leg_wear_monitor.monitor.wear_monitor import WearMonitor
 from leg_wear_monitor.playback.history import History
 from leg_wear_monitor.playback.sink import Sink
-from leg_wear_monitor.twin.sample import CRANK, Samples
+from leg_wear_monitor.twin.kinds import CRANK, TORQUE
+from leg_wear_monitor.twin.sample import Samples, brings
 
 REPORTS_FILE = "reports.mcap"
 _LONGER, _LONGER_S = 1.05, 1.0  # what stamps may span beyond the time in which they came
@@ -89,9 +90,8 @@ class ReplayResult:
     def count(self, samples: Samples) -> None:
         """Take account of samples that go to the monitor."""
         self.evidence.see(samples)
-        is_crank = samples["kind"] == CRANK
-        self.crank_samples += int(np.count_nonzero(is_crank))
-        self.torque_samples += int(np.count_nonzero(~is_crank | np.isfinite(samples["torque_nm"])))
+        self.crank_samples += int(np.count_nonzero(brings(samples, CRANK)))
+        self.torque_samples += int(np.count_nonzero(brings(samples, TORQUE)))
         stamps = samples["stamp_ns"][samples["fault"] == 0]
         if len(stamps):
             self.begin_ns = self.begin_ns or int(stamps[0])

@@ -14,11 +14,11 @@ from leg_wear_monitor.errors import LegWearError
 from leg_wear_monitor.interrupt import closed_at_the_end
 from leg_wear_monitor.mechanism.loader import load_mechanism
 from leg_wear_monitor.messages import outputs
-from leg_wear_monitor.messages.cdr import TYPES
 from leg_wear_monitor.messages.decode import Decoder
 from leg_wear_monitor.messages.forecast_times import ForecastTimes
 from leg_wear_monitor.messages.outputs import Messages
 from leg_wear_monitor.messages.qos import SENSOR_DATA
+from leg_wear_monitor.messages.streams import STREAMS
 from leg_wear_monitor.monitor.alarms.alarm import Alarm
 from leg_wear_monitor.monitor.alarms.words import ADVICE
 from leg_wear_monitor.monitor.config.fitting import check_limits
@@ -89,7 +89,7 @@ class MonitorNode(ClosingNode):
         self._inputs = subscribe(self, config, self._receive)
         self._supervision.inputs = [topic for topic, _ in self._inputs]
         for topic in self._supervision.inputs:
-            self._black_box.add_topic(topic.name, topic.type, SENSOR_DATA)
+            self._black_box.add_topic(topic.name, topic.stream.type, SENSOR_DATA)
         # work and diagnostics go on where simulated time stands still
         steady = Clock(clock_type=ClockType.STEADY_TIME)
         self.create_timer(_WORK_S, self._work, clock=steady)
@@ -117,8 +117,8 @@ class MonitorNode(ClosingNode):
         log.info("preparing; the first start compiles numerical kernels for a minute")
         with repeated(lambda passed_s: log.info(f"preparing: {passed_s:.0f} s")):
             self._monitor.warm_up()
-        for kind in TYPES.values():
-            decoder.one(b"", kind)
+        for stream in STREAMS:
+            decoder.one(b"", stream.code)
 
     # --- in ---
 
@@ -132,7 +132,7 @@ class MonitorNode(ClosingNode):
 
     def _receive(self, topic: InputTopic, raw: bytes) -> None:
         topic.heard_ns, topic.heard_wall_ns = time.monotonic_ns(), time.time_ns()
-        self._inbox.add(topic.kind, raw, topic.heard_wall_ns)
+        self._inbox.add(topic.stream.code, raw, topic.heard_wall_ns)
 
     def _work(self) -> None:
         """Pass on what has come, a bounded part at a time."""
@@ -141,7 +141,7 @@ class MonitorNode(ClosingNode):
         coarse = self._load.note(self._inbox.delay_s(time.time_ns()))
         arrivals = self._inbox.take(_AT_ONCE)
         if self._black_box.on:
-            names = {topic.kind: topic.name for topic, _ in self._inputs}
+            names = {topic.stream.code: topic.name for topic, _ in self._inputs}
             for arrival in arrivals:
                 self._black_box.write(names[arrival.kind], arrival.log_time_ns, arrival.raw)
         samples = self._inbox.decoded(arrivals)

@@ -1,6 +1,7 @@
 """What was taken in, as counts with names."""
 
 from leg_wear_monitor.record import Records, values_of
+from leg_wear_monitor.twin.kinds import KINDS
 from leg_wear_monitor.twin.sample import FAULTS, NO_FAULT
 from leg_wear_monitor.twin.statistics import Intake
 
@@ -13,8 +14,7 @@ def intake(tracker: Records, leg: Records) -> Intake:
     return Intake(
         received=count["received"],
         faulty={name: int(count["faults"][fault]) for fault, name in FAULTS.items() if fault != NO_FAULT},
-        crank_used=count["crank_used"],
-        torque_used=count["torque_used"],
+        used={kind.name: int(count["used"][code]) for code, kind in KINDS.items()},
         duplicates=count["duplicates"],
         late=count["late"],
         stray_stamps=count["stray_stamps"],

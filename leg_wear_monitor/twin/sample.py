@@ -6,6 +6,7 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from leg_wear_monitor.errors import LegWearError
+from leg_wear_monitor.twin.kinds import CRANK, KINDS
 
 Samples = NDArray[Any]
 """Records of `GAIT_SAMPLE`, shape (n,), in order of arrival."""
@@ -30,9 +31,6 @@ be wrapped to a turn or count on. A crank sample may bring a torque too (``effor
 further encoders, in the order of ``encoders.names``, signs applied: NaN where absent, infinite where what
 came is no angle. What is wrong with those is no fault of the sample.
 """
-
-CRANK, TORQUE = 0, 1
-KINDS = {CRANK: "crank", TORQUE: "torque"}
 
 # What the conversion found wrong with a message. Such a sample is counted and never used.
 NO_FAULT, EMPTY, WRONG_LENGTH, MISSING_JOINT, NOT_FINITE, ZERO_STAMP, UNDECODABLE, WRONG_TYPE = range(8)
@@ -69,7 +67,7 @@ def gait_samples(
     stamp_ns : (n,) array of int
         Times of the headers [ns].
     kind : (n,) array or int
-        `CRANK` or `TORQUE`.
+        A key of `KINDS`.
     crank_angle_rad, crank_velocity_radps, torque_nm : (n,) array or float
         NaN where absent.
     encoder_rad : (n, m) array or float
@@ -90,7 +88,8 @@ def gait_samples(
     if stamps.dtype.kind not in "iu":
         raise LegWearError(f"stamp_ns: {stamps.dtype} is no integer type, expected nanoseconds as int64")
     block = np.empty(len(stamps), GAIT_SAMPLE)
-    for name, value, known in (("kind", kind, KINDS), ("fault", fault, FAULTS)):
+    kinds = {code: each.name for code, each in KINDS.items()}
+    for name, value, known in (("kind", kind, kinds), ("fault", fault, FAULTS)):
         codes = np.asarray(value)
         if not np.isin(codes, list(known)).all():
             raise LegWearError(f"{name}: {codes[~np.isin(codes, list(known))].flat[0]} is none of {known}")
@@ -103,3 +102,8 @@ def gait_samples(
     block["encoder_rad"] = np.nan
     block["encoder_rad"][:, : angles.shape[-1] if angles.ndim else None] = angles
     return block
+
+
+def brings(samples: Samples, kind: int) -> NDArray[np.bool_]:
+    """Which samples bring what a kind measures: those of the kind, and others that have its value too."""
+    return np.asarray((samples["kind"] == kind) | np.isfinite(samples[KINDS[kind].value]))

@@ -191,7 +191,8 @@ class Intake:
     received : int
     faulty : dict of str to int
         Counts by the names of `sample.FAULTS`, without ``none``.
-    crank_used, torque_used : int
+    used : dict of str to int
+        Samples that were used, by the names of `KINDS`; a crank sample with a torque counts for both.
     duplicates, late, stray_stamps : int
         Dropped: seen before; later than the window; a stamp far off that no other followed.
     outliers, velocity_outliers : int
@@ -210,8 +211,7 @@ class Intake:
 
     received: int
     faulty: dict[str, int]
-    crank_used: int
-    torque_used: int
+    used: dict[str, int]
     duplicates: int
     late: int
     stray_stamps: int

@@ -13,7 +13,8 @@ from leg_wear_monitor.gait.config import EncoderConfig, GaitConfig, TorqueSensor
 from leg_wear_monitor.gait.leg import Instant
 from leg_wear_monitor.gait.pace import CrankMotion
 from leg_wear_monitor.gait.sensors import Reading, readings, samples
-from leg_wear_monitor.twin.sample import CRANK, NO_FAULT, TORQUE
+from leg_wear_monitor.twin.kinds import CRANK, TORQUE
+from leg_wear_monitor.twin.sample import NO_FAULT
 
 pytestmark = pytest.mark.plain
 

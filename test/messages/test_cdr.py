@@ -9,18 +9,18 @@ import pytest
 from hypothesis import example, given
 from hypothesis import strategies as st
 
-from leg_wear_monitor.messages.cdr import FLOAT64, JOINT_STATE, MESSAGE, TYPES, WRENCH_STAMPED
+from leg_wear_monitor.messages.cdr import MESSAGE
 from leg_wear_monitor.messages.decode import Decoder
+from leg_wear_monitor.messages.streams import FLOAT64, JOINT_STATE, STREAMS, WRENCH_STAMPED
 from leg_wear_monitor.monitor.config.inputs import Crank, DriveTorque, Encoders
 from leg_wear_monitor.monitor.config.settings import MonitorConfig
+from leg_wear_monitor.twin.kinds import CRANK, TORQUE
 from leg_wear_monitor.twin.sample import (
-    CRANK,
     EMPTY,
     FAULTS,
     MISSING_JOINT,
     NO_FAULT,
     NOT_FINITE,
-    TORQUE,
     UNDECODABLE,
     WRONG_LENGTH,
     ZERO_STAMP,
@@ -28,7 +28,7 @@ from leg_wear_monitor.twin.sample import (
 
 pytestmark = pytest.mark.plain
 
-NAME = {code: name for name, code in TYPES.items()}
+NAME = {stream.code: stream.type for stream in STREAMS}
 CRANK_NAME = "ζ_crank"
 BY_EFFORT = MonitorConfig(crank_joint=CRANK_NAME, drive_torque=DriveTorque(source="effort"))
 

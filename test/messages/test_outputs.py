@@ -35,8 +35,8 @@ from leg_wear_monitor.monitor.reports import (
     Status,
 )
 from leg_wear_monitor.playback.replay import node_beside
-from leg_wear_monitor.twin.sample import CRANK
-from leg_wear_monitor.twin.sample import TORQUE as TORQUE_SAMPLE
+from leg_wear_monitor.twin.kinds import CRANK
+from leg_wear_monitor.twin.kinds import TORQUE as TORQUE_SAMPLE
 
 pytestmark = pytest.mark.plain
 

@@ -17,7 +17,8 @@ from leg_wear_monitor.monitor.config.fitting import twin_settings
 from leg_wear_monitor.monitor.config.parameters import changed, config_from
 from leg_wear_monitor.monitor.config.settings import MonitorConfig
 from leg_wear_monitor.monitor.forecast.forecast import Answer
-from leg_wear_monitor.twin.sample import EMPTY, TORQUE, gait_samples
+from leg_wear_monitor.twin.kinds import TORQUE
+from leg_wear_monitor.twin.sample import EMPTY, gait_samples
 from leg_wear_monitor.twin.settings import TwinSettings
 
 SECOND = 10**9

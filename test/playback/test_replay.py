@@ -14,10 +14,10 @@ import leg_wear_monitor as lw
 from leg_wear_monitor.bags.findings import RecordingError
 from leg_wear_monitor.bags.mcap.writer import McapWriter
 from leg_wear_monitor.messages import encode
-from leg_wear_monitor.messages.cdr import JOINT_STATE, WRENCH_STAMPED
 from leg_wear_monitor.messages.decode import Decoder
 from leg_wear_monitor.messages.forecast_times import ForecastTimes
 from leg_wear_monitor.messages.outputs import Messages, topic_of
+from leg_wear_monitor.messages.streams import JOINT_STATE, WRENCH_STAMPED
 from leg_wear_monitor.monitor.config.inputs import Cadence
 from leg_wear_monitor.monitor.config.settings import LedgerFile
 from leg_wear_monitor.monitor.forecast.forecast import Answer

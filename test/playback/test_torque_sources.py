@@ -15,7 +15,8 @@ from leg_wear_monitor.messages import encode
 from leg_wear_monitor.monitor.alarms.alarm import Level
 from leg_wear_monitor.monitor.config.inputs import TORQUE_SOURCES, DriveTorque
 from leg_wear_monitor.share import share_directory
-from leg_wear_monitor.twin.sample import CRANK, Samples
+from leg_wear_monitor.twin.kinds import CRANK
+from leg_wear_monitor.twin.sample import Samples
 
 HEALTHY = share_directory() / "bags" / "healthy.mcap"
 SECONDS = 6

@@ -29,16 +29,16 @@ if find_spec("rclpy"):
     from rclpy.parameter import Parameter
     from rclpy.qos import DurabilityPolicy, QoSProfile, ReliabilityPolicy
     from rclpy.utilities import try_shutdown
-    from sensor_msgs.msg import JointState
 
     from leg_wear_monitor.gait.config import JointEncodersConfig
     from leg_wear_monitor.gait.leg import SyntheticLeg
     from leg_wear_monitor.gait.sensors import readings
+    from leg_wear_monitor.messages.streams import streams_read
     from leg_wear_monitor.ros.gait_publisher.config import PublisherConfig
-    from leg_wear_monitor.ros.gait_publisher.sensor_messages import DRIVE_TORQUE_TYPES, sensor_message
+    from leg_wear_monitor.ros.gait_publisher.sensor_messages import sensor_message
+    from leg_wear_monitor.ros.inputs.message_class import message_class
     from leg_wear_monitor.ros.monitor_node import MonitorNode
     from leg_wear_monitor.ros.running import spin
-    from leg_wear_monitor.twin.sample import CRANK, TORQUE
 
 START_NS = 1_700_000_000_000_000_000
 PATIENCE_S = 300.0  # before a test that waits in vain is given up; compilation takes its time
@@ -73,10 +73,10 @@ class Legs:
         self._node = node
         reliability = ReliabilityPolicy.RELIABLE if reliable else ReliabilityPolicy.BEST_EFFORT
         qos = QoSProfile(depth=200, reliability=reliability)
-        self._publishers = {CRANK: node.create_publisher(JointState, f"{namespace}/joint_states", qos)}
-        if source in DRIVE_TORQUE_TYPES:
-            kind = DRIVE_TORQUE_TYPES[source]
-            self._publishers[TORQUE] = node.create_publisher(kind, f"{namespace}/drive_torque", qos)
+        self._publishers = {
+            stream.kind: node.create_publisher(message_class(stream.type), f"{namespace}/{stream.topic}", qos)
+            for stream in streams_read(source)
+        }
 
     def listeners(self) -> int:
         """How many listen to the topic that fewest listen to."""

@@ -13,7 +13,7 @@ from rclpy.serialization import serialize_message
 from rclpy.utilities import try_shutdown
 from sensor_msgs.msg import JointState
 
-from leg_wear_monitor.messages.cdr import JOINT_STATE
+from leg_wear_monitor.messages.streams import JOINT_STATE
 from leg_wear_monitor.monitor.alarms.alarm import Level
 from leg_wear_monitor.monitor.ledger.entry import JointWear
 from leg_wear_monitor.ros.epochs import BEGUN, UNDECIDED, Epochs

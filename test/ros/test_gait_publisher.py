@@ -20,7 +20,7 @@ from leg_wear_monitor.gait.leg import SyntheticLeg
 from leg_wear_monitor.gait.sensors import readings
 from leg_wear_monitor.ros.gait_publisher.config import PublisherConfig
 from leg_wear_monitor.ros.gait_publisher.node import GaitPublisher
-from leg_wear_monitor.twin.sample import CRANK
+from leg_wear_monitor.twin.kinds import CRANK
 
 
 @pytest.mark.parametrize("precompute", [True, False])

@@ -13,9 +13,9 @@ from mcap.reader import make_reader
 from rclpy.serialization import serialize_message
 
 from leg_wear_monitor.gait.sensors import Reading, samples
-from leg_wear_monitor.messages import cdr
 from leg_wear_monitor.messages.decode import Decoder
 from leg_wear_monitor.messages.qos import SENSOR_DATA
+from leg_wear_monitor.messages.streams import JOINT_STATE, STREAMS, WRENCH_STAMPED
 from leg_wear_monitor.monitor.alarms.alarm import Level
 from leg_wear_monitor.monitor.config.settings import MonitorConfig
 from leg_wear_monitor.ros.gait_publisher.config import PublisherConfig
@@ -25,12 +25,13 @@ from leg_wear_monitor.ros.inputs.inbox import Inbox
 from leg_wear_monitor.ros.inputs.inputs import InputTopic
 from leg_wear_monitor.ros.inputs.publishers import Publishers
 from leg_wear_monitor.ros.outputs.black_box import BlackBox
-from leg_wear_monitor.twin.sample import CRANK, FAULTS, NO_FAULT, OUT_OF_RANGE, TORQUE, WRONG_TYPE
+from leg_wear_monitor.twin.kinds import CRANK, TORQUE
+from leg_wear_monitor.twin.sample import FAULTS, NO_FAULT, OUT_OF_RANGE, WRONG_TYPE
 
 START_NS = 1_700_000_000_000_000_000
 SECOND = 1_000_000_000
-JOINT_STATE = "sensor_msgs/msg/JointState"
-CODES = {CRANK: cdr.JOINT_STATE, TORQUE: cdr.WRENCH_STAMPED}
+ALL = [stream.code for stream in STREAMS]
+CODES = {CRANK: JOINT_STATE, TORQUE: WRENCH_STAMPED}
 CRANK_FAULTS = [fault for fault in FAULTS if fault not in (NO_FAULT, OUT_OF_RANGE, WRONG_TYPE)]
 
 
@@ -61,7 +62,7 @@ def test_readings_come_out_of_the_inbox_as_the_samples_they_were() -> None:
 @pytest.mark.parametrize("fault", CRANK_FAULTS)
 def test_a_malformed_crank_message_is_found_to_be_what_it_is(fault: int) -> None:
     box = inbox()
-    box.add(cdr.JOINT_STATE, raw_of(crank(0.5, fault)), 1)
+    box.add(JOINT_STATE, raw_of(crank(0.5, fault)), 1)
     assert FAULTS[int(box.decoded(box.take(1))["fault"][0])] == FAULTS[fault]
 
 
@@ -69,11 +70,11 @@ def test_a_malformed_crank_message_is_found_to_be_what_it_is(fault: int) -> None
 def test_a_malformed_torque_is_a_fault_of_some_kind(fault: int) -> None:
     box = inbox()
     reading = Reading(0.5, 0.5, TORQUE, fault, float("nan"), float("nan"), 1.0)
-    box.add(cdr.WRENCH_STAMPED, raw_of(reading), 1)
+    box.add(WRENCH_STAMPED, raw_of(reading), 1)
     assert box.decoded(box.take(1))["fault"][0] != NO_FAULT
 
 
-@given(st.lists(st.tuples(st.sampled_from(sorted(cdr.TYPES.values())), st.binary(max_size=200)), max_size=5))
+@given(st.lists(st.tuples(st.sampled_from(ALL), st.binary(max_size=200)), max_size=5))
 def test_no_bytes_harm_the_inbox(messages: list[tuple[int, bytes]]) -> None:
     box = inbox()
     for kind, raw in messages:
@@ -85,7 +86,7 @@ def test_no_bytes_harm_the_inbox(messages: list[tuple[int, bytes]]) -> None:
 def test_log_times_rise_whatever_the_clock_does(clock: list[int]) -> None:
     box = inbox()
     for now in clock:
-        box.add(cdr.JOINT_STATE, b"", now)
+        box.add(JOINT_STATE, b"", now)
     times = [arrival.log_time_ns for arrival in box.take(100)]
     assert (np.diff(times) > 0).all()
     assert all(time >= now for time, now in zip(times, clock, strict=True))
@@ -95,7 +96,7 @@ def test_log_times_rise_whatever_the_clock_does(clock: list[int]) -> None:
 def test_an_inbox_holds_its_limit_and_loses_nothing_unsaid(limit: int, sent: int) -> None:
     box = inbox(limit)
     for number in range(sent):
-        box.add(cdr.JOINT_STATE, str(number).encode(), number)
+        box.add(JOINT_STATE, str(number).encode(), number)
         assert len(box) <= limit
     left = [int(arrival.raw) for arrival in box.take(1000)]
     assert box.received == sent == box.shed + len(left)
@@ -106,7 +107,7 @@ def test_an_inbox_holds_its_limit_and_loses_nothing_unsaid(limit: int, sent: int
 def test_a_bounded_part_is_taken_oldest_first() -> None:
     box = inbox()
     for number in range(5):
-        box.add(cdr.JOINT_STATE, str(number).encode(), 1_000_000_000 + number)
+        box.add(JOINT_STATE, str(number).encode(), 1_000_000_000 + number)
     assert box.delay_s(2_000_000_000) == 1.0
     assert [int(one.raw) for one in box.take(3)] == [0, 1, 2]
     assert [int(one.raw) for one in box.take(3)] == [3, 4]
@@ -121,7 +122,7 @@ def test_falling_behind_is_told_and_then_over() -> None:
     load.note(0.0)
     assert load_status(load, box).level is Level.WARN
     for number in range(5):
-        box.add(cdr.JOINT_STATE, b"", number)
+        box.add(JOINT_STATE, b"", number)
     told = load_status(load, box)
     assert (told.level, told.values["shed_messages"]) == (Level.ERROR, 2.0)
     assert load_status(load, box).level is Level.OK
@@ -130,7 +131,7 @@ def test_falling_behind_is_told_and_then_over() -> None:
 def topic(**fields) -> InputTopic:
     publishers = Publishers(("/driver",))
     known = {"publishers": publishers, "heard_ns": 10 * SECOND, "heard_wall_ns": START_NS}
-    return InputTopic("/left/joint_states", JOINT_STATE, cdr.JOINT_STATE, **(known | fields))
+    return InputTopic("/left/joint_states", STREAMS[0], **(known | fields))
 
 
 def test_a_topic_with_a_publisher_is_connected() -> None:
@@ -185,10 +186,10 @@ def test_a_topic_that_falls_silent_is_an_error() -> None:
 def test_an_inbox_holds_its_bytes_and_counts_what_it_sheds() -> None:
     box = Inbox(Decoder(MonitorConfig()), 1000, limit_bytes=100)
     for number in range(50):
-        box.add(cdr.JOINT_STATE, bytes([number]) * 30, number)
+        box.add(JOINT_STATE, bytes([number]) * 30, number)
         assert len(box) <= 3
-    box.add(cdr.JOINT_STATE, bytes(101), 50)  # alone too large
-    box.add(cdr.JOINT_STATE, bytes([51]) * 60, 51)
+    box.add(JOINT_STATE, bytes(101), 50)  # alone too large
+    box.add(JOINT_STATE, bytes([51]) * 60, 51)
     left = [arrival.raw for arrival in box.take(1000)]
     assert box.received == 52 == box.shed + len(left)
     assert left[-1] == bytes([51]) * 60
@@ -198,7 +199,7 @@ def test_an_inbox_holds_its_bytes_and_counts_what_it_sheds() -> None:
 def test_no_more_bytes_are_taken_than_asked_for_but_one_message_always() -> None:
     box = inbox()
     for size in (50, 10, 10, 10):
-        box.add(cdr.JOINT_STATE, bytes(size), 1)
+        box.add(JOINT_STATE, bytes(size), 1)
     assert [len(one.raw) for one in box.take(100, 20)] == [50]
     assert [len(one.raw) for one in box.take(100, 20)] == [10, 10]
     assert [len(one.raw) for one in box.take(100, 20)] == [10]

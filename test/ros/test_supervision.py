@@ -16,17 +16,18 @@ from std_msgs.msg import Float64
 from std_srvs.srv import Trigger
 from visualization_msgs.msg import MarkerArray
 
-from leg_wear_monitor.messages import cdr
 from leg_wear_monitor.messages.decode import Decoder
+from leg_wear_monitor.messages.streams import JOINT_STATE
 from leg_wear_monitor.monitor.alarms.alarm import Alarm, Level
 from leg_wear_monitor.monitor.config.settings import MonitorConfig
 from leg_wear_monitor.monitor.reports import AlarmList, Status
 from leg_wear_monitor.ros.health.clock_monitor import ClockMonitor, both_clocks
 from leg_wear_monitor.ros.health.node_alarms import NodeAlarms
 from leg_wear_monitor.ros.health.node_log import AlarmLog, StatusLog
-from leg_wear_monitor.ros.health.silence import CRANK, TORQUE, Silence
+from leg_wear_monitor.ros.health.silence import Silence
 from leg_wear_monitor.ros.inputs.crank_names import CrankNames
 from leg_wear_monitor.ros.inputs.inbox import Inbox
+from leg_wear_monitor.twin.kinds import KINDS
 
 ME = "/leg_wear_monitor"
 SECOND = 10**9
@@ -51,6 +52,7 @@ class Lines:
 
 # --- silence ---
 
+CRANK, TORQUE = (kind.name for kind in KINDS.values())
 STATUSES = (
     Status("gait", Level.OK, "in step", {"cadence_rpm": 60.0, "cycles": 5.0}),
     Status("input", Level.OK, "in order", {"crank_rate_hz": 200.0, "torque_rate_hz": 200.0}),
@@ -216,7 +218,7 @@ def noted(names: CrankNames, *messages: list[str]) -> str:
     for joints in messages:
         message = JointState(name=joints, position=[0.0] * len(joints))
         message.header.stamp.sec = 5
-        box.add(cdr.JOINT_STATE, serialize_message(message), 1)
+        box.add(JOINT_STATE, serialize_message(message), 1)
     arrivals = box.take(100)
     names.note(arrivals, box.decoded(arrivals))
     return names.told()

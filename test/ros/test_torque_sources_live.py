@@ -16,7 +16,8 @@ from leg_wear_monitor.gait.sensors import Reading
 from leg_wear_monitor.monitor.config.settings import MonitorConfig
 from leg_wear_monitor.ros.gait_publisher.config import PublisherConfig
 from leg_wear_monitor.share import share_directory
-from leg_wear_monitor.twin.sample import CRANK, NO_FAULT, TORQUE
+from leg_wear_monitor.twin.kinds import CRANK, TORQUE
+from leg_wear_monitor.twin.sample import NO_FAULT
 
 ME = "/leg_wear_monitor"
 START_NS = 1_700_000_000_000_000_000

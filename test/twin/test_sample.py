@@ -4,7 +4,8 @@ import numpy as np
 import pytest
 
 from leg_wear_monitor.errors import LegWearError
-from leg_wear_monitor.twin.sample import FAULTS, GAIT_SAMPLE, TORQUE, gait_samples
+from leg_wear_monitor.twin.kinds import TORQUE
+from leg_wear_monitor.twin.sample import FAULTS, GAIT_SAMPLE, gait_samples
 
 
 def test_a_block_holds_what_was_given_and_nan_elsewhere() -> None:

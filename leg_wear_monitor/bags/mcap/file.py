@@ -107,7 +107,7 @@ class McapFile:
         Parameters
         ----------
         types : dict
-            Codes of `cdr.TYPES` by number of the channel.
+            Codes of streams by number of the channel.
         """
         roles = np.zeros(2**16, np.uint8)
         roles[list(self.channels)] = records.IGNORED

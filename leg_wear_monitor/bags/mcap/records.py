@@ -9,7 +9,7 @@ RECORD_HEAD = 9  # opcode and length
 _MESSAGE_HEAD = 22  # channel, sequence, log time, publish time
 
 UNKNOWN, IGNORED = 0, 255
-"""Roles of a channel beside the codes of `cdr.TYPES`: not defined in the file, and not asked for."""
+"""Roles of a channel beside the codes of streams: not defined in the file, and not asked for."""
 
 COUNTS = np.dtype(
     [
@@ -46,7 +46,7 @@ def walk(data, roles, out_messages, out_definitions, out_counts):
     ----------
     data : (bytes,) array of uint8
     roles : (65536,) array of uint8
-        What a channel's messages are, by its number: `UNKNOWN`, `IGNORED` or a code of `cdr.TYPES`.
+        What a channel's messages are, by its number: `UNKNOWN`, `IGNORED` or a stream's code.
     out_messages : (any,) array of MESSAGE
         Messages asked for, as many as fit; empty to count them only.
     out_definitions : (any,) array of int64

@@ -65,7 +65,7 @@ class SqliteFile:
         Parameters
         ----------
         types : dict
-            Codes of `cdr.TYPES` by number of the channel.
+            Codes of streams by number of the channel.
         """
         expected = sum(self._counts.get(number, 0) for number in types)
         for rows in self._pages(types):

@@ -4,7 +4,8 @@ import attrs
 import numpy as np
 
 from leg_wear_monitor.mechanism.arrays import Floats, Ints
-from leg_wear_monitor.twin.sample import CRANK, NO_FAULT, Samples
+from leg_wear_monitor.twin.kinds import CRANK
+from leg_wear_monitor.twin.sample import NO_FAULT, Samples
 
 MOST = 20_000  # samples that are kept: ten seconds at 2 kHz
 

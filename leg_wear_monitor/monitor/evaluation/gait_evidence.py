@@ -9,7 +9,8 @@ import numpy as np
 from leg_wear_monitor.mechanism.ideal import TURN
 from leg_wear_monitor.monitor.config.settings import MonitorConfig
 from leg_wear_monitor.monitor.reports import CycleReport
-from leg_wear_monitor.twin.sample import CRANK, FAULTS, NO_FAULT, Samples
+from leg_wear_monitor.twin.kinds import CRANK
+from leg_wear_monitor.twin.sample import FAULTS, NO_FAULT, Samples
 
 _SLOWEST, _FASTEST = 0.5, 2.0  # cadence, of the commanded one
 _UNLIKE = 0.8  # torque that the model does not explain, of the predicted one

@@ -12,6 +12,7 @@ import attrs
 
 from leg_wear_monitor.monitor.alarms.alarm import Alarm, Limit
 from leg_wear_monitor.monitor.evaluation.torque_checks import BIAS, DRIFT, LAG
+from leg_wear_monitor.twin.kinds import KINDS as SAMPLE_KINDS
 
 if TYPE_CHECKING:
     from leg_wear_monitor.monitor.config.settings import Alarms, MonitorConfig
@@ -196,27 +197,24 @@ TORQUE: "tuple[AlarmSpec[CycleEvidence], ...]" = (
     ),
 )
 GAIT = (CADENCE,)
+
+
+def _rate(name: str) -> "AlarmSpec[InputHealth]":
+    """Rate of samples of a kind that were used, by the kind's name."""
+    return AlarmSpec(
+        kind="input_rate",
+        subject=name,
+        unit="Hz",
+        meaning=f"rate of usable {name} samples, Hz",
+        limit_words="`limits.min_rate_hz`",
+        value=lambda health: health.rate_hz[name],
+        limit=lambda of: of.config.limits.min_rate_hz,
+        is_least=True,
+    )
+
+
 INPUT: "tuple[AlarmSpec[InputHealth], ...]" = (
-    AlarmSpec(
-        kind="input_rate",
-        subject="crank",
-        unit="Hz",
-        meaning="rate of usable crank samples, Hz",
-        limit_words="`limits.min_rate_hz`",
-        value=lambda health: health.crank_rate_hz,
-        limit=lambda of: of.config.limits.min_rate_hz,
-        is_least=True,
-    ),
-    AlarmSpec(
-        kind="input_rate",
-        subject="torque",
-        unit="Hz",
-        meaning="rate of usable torque samples, Hz",
-        limit_words="`limits.min_rate_hz`",
-        value=lambda health: health.torque_rate_hz,
-        limit=lambda of: of.config.limits.min_rate_hz,
-        is_least=True,
-    ),
+    *(_rate(kind.name) for kind in SAMPLE_KINDS.values()),
     AlarmSpec(
         kind="input_samples",
         meaning="fraction of samples that could not be used: faulty, repeated, late, stray stamp, far off",

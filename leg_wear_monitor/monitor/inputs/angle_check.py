@@ -12,7 +12,8 @@ import math
 import numpy as np
 
 from leg_wear_monitor.kernel import entry, kernel
-from leg_wear_monitor.twin.sample import CRANK, NO_FAULT, OUT_OF_RANGE
+from leg_wear_monitor.twin.kinds import CRANK
+from leg_wear_monitor.twin.sample import NO_FAULT, OUT_OF_RANGE
 from leg_wear_monitor.twin.tracker.arrival import LARGEST_ANGLE
 
 _TURN = 2.0 * math.pi

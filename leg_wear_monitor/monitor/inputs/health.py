@@ -57,8 +57,8 @@ class InputHealth:
     ----------
     duration_s : float
         NaN if that is not known, or stamps did not advance.
-    crank_rate_hz, torque_rate_hz : float
-        Of samples that were used.
+    rate_hz : dict of str to float
+        Samples used a second, by the names of `KINDS`.
     bad_fraction : float
         Share of the samples that were not: faulty, repeated, late, with a stray stamp, far off.
     lost_fraction : float
@@ -69,8 +69,7 @@ class InputHealth:
     """
 
     duration_s: float
-    crank_rate_hz: float
-    torque_rate_hz: float
+    rate_hz: dict[str, float]
     bad_fraction: float
     lost_fraction: float
     stuck_torque_fraction: float
@@ -94,8 +93,7 @@ def input_health(before: Intake, after: Intake, torque: TorqueRange, is_whole: b
     received = after.received - before.received
     return InputHealth(
         duration_s=duration_s,
-        crank_rate_hz=(after.crank_used - before.crank_used) / duration_s,
-        torque_rate_hz=(after.torque_used - before.torque_used) / duration_s,
+        rate_hz={name: (used - before.used[name]) / duration_s for name, used in after.used.items()},
         bad_fraction=(unused(after) - unused(before)) / received if received else math.nan,
         lost_fraction=min(1.0, max(0.0, 1.0 - monitored_s / duration_s)) if is_known else math.nan,
         stuck_torque_fraction=torque.stuck_fraction,

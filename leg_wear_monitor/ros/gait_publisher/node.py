@@ -11,19 +11,18 @@ from typing import Any
 from rclpy.publisher import Publisher
 from rclpy.qos import QoSProfile, ReliabilityPolicy
 from rclpy.qos_overriding_options import QoSOverridingOptions
-from sensor_msgs.msg import JointState
 
 from leg_wear_monitor.errors import ConfigError, LegWearError
-from leg_wear_monitor.gait.config import EFFORT
 from leg_wear_monitor.gait.leg import SyntheticLeg
 from leg_wear_monitor.gait.sensors import Reading, readings
 from leg_wear_monitor.json_text import json_text
+from leg_wear_monitor.messages.streams import streams_read
 from leg_wear_monitor.ros.gait_publisher.config import PublisherConfig
-from leg_wear_monitor.ros.gait_publisher.sensor_messages import DRIVE_TORQUE_TYPES, sensor_message
+from leg_wear_monitor.ros.gait_publisher.sensor_messages import sensor_message
+from leg_wear_monitor.ros.inputs.message_class import message_class
 from leg_wear_monitor.ros.parameters.parameters import Parameters
 from leg_wear_monitor.ros.running import WAKE_S, ClosingNode, run, spin, until_down
 from leg_wear_monitor.ros.waiting import repeated
-from leg_wear_monitor.twin.sample import CRANK, TORQUE
 
 _BLOCK_S = 0.05  # of walking, computed at a time
 _AHEAD = 20  # blocks
@@ -51,10 +50,10 @@ class GaitPublisher(ClosingNode):
             if self.config.precompute:
                 self._blocks = iter(list(self._blocks))
         qos = QoSProfile(depth=200, reliability=self._reliability())
-        self._by_kind: dict[int, Publisher] = {CRANK: self._publisher(JointState, "joint_states", qos)}
-        if self.config.torque_sensor.source != EFFORT:
-            kind = DRIVE_TORQUE_TYPES[self.config.torque_sensor.source]
-            self._by_kind[TORQUE] = self._publisher(kind, "drive_torque", qos)
+        self._by_kind: dict[int, Publisher] = {
+            stream.kind: self._publisher(message_class(stream.type), stream.topic, qos)
+            for stream in streams_read(self.config.torque_sensor.source)
+        }
         self.published, self._start_ns = 0, 0
 
     def walk(self, wanted: Callable[[], bool] = lambda: True) -> None:

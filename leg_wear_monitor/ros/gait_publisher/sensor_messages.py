@@ -9,11 +9,11 @@ from rclpy.serialization import serialize_message
 from sensor_msgs.msg import JointState
 from std_msgs.msg import Float64, Header
 
-from leg_wear_monitor.gait.config import FLOAT64, WRENCH
+from leg_wear_monitor.gait.config import FLOAT64
 from leg_wear_monitor.gait.sensors import Reading, stamp_ns
 from leg_wear_monitor.ros.gait_publisher.config import PublisherConfig
+from leg_wear_monitor.twin.kinds import CRANK
 from leg_wear_monitor.twin.sample import (
-    CRANK,
     EMPTY,
     MISSING_JOINT,
     NOT_FINITE,
@@ -23,8 +23,6 @@ from leg_wear_monitor.twin.sample import (
 )
 
 Message: TypeAlias = JointState | WrenchStamped | Float64
-
-DRIVE_TORQUE_TYPES = {WRENCH: WrenchStamped, FLOAT64: Float64}
 
 
 def time_message(stamp: int) -> Time:

@@ -7,13 +7,20 @@ import attrs
 from leg_wear_monitor.monitor.alarms.alarm import Alarm, Level, Limit, acknowledged, evaluated, has_changed
 from leg_wear_monitor.monitor.evaluation import specs
 from leg_wear_monitor.monitor.reports import AlarmList
-from leg_wear_monitor.ros.health.silence import SILENT_FROM_S, TORQUE
+from leg_wear_monitor.ros.health.silence import SILENT_FROM_S
+from leg_wear_monitor.twin.kinds import CRANK, KINDS
 
 SILENCE = "input_silence"
 _SILENT = Limit(SILENT_FROM_S, SILENT_FROM_S)
 SOURCES = specs.SOURCES.kind
 _TWO_SOURCES = Limit(2.0, 2.0)
+_CRANK = KINDS[CRANK].name
 _LIMITS = {SILENCE: _SILENT, SOURCES: _TWO_SOURCES}
+
+
+def sources_alarm(kind: str) -> Alarm:
+    """Alarm of several publishers; the crank's is that of the monitor, without a subject."""
+    return Alarm(kind=SOURCES, subject="" if kind == _CRANK else kind)
 
 
 class NodeAlarms:
@@ -25,12 +32,12 @@ class NodeAlarms:
     Parameters
     ----------
     kinds : tuple of str
-        Of the inputs.
+        Names of the inputs' kinds.
     """
 
     def __init__(self, kinds: tuple[str, ...]) -> None:
         alarms = [Alarm(kind=SILENCE, subject=kind, unit="s") for kind in kinds]
-        alarms += [Alarm(kind=SOURCES, subject=kind if kind == TORQUE else "") for kind in kinds]
+        alarms += [sources_alarm(kind) for kind in kinds]
         self._alarms = {alarm.name: alarm for alarm in alarms}
 
     def evaluate(self, values: Mapping[str, float], stamp_ns: int) -> bool:

@@ -87,7 +87,7 @@ def topics_status(topics: Iterable[InputTopic], now_ns: int, started_ns: int) ->
 
 def _faults(topic: InputTopic, silent_s: float, running_s: float) -> Iterator[tuple[Level, str]]:
     """What is wrong with a topic."""
-    if other := misfit(topic.publishers, topic.type):
+    if other := misfit(topic.publishers, topic.stream.type):
         yield Level.ERROR, other
     elif topic.incompatible:
         yield Level.ERROR, topic.incompatible

@@ -11,16 +11,15 @@ import attrs
 
 from leg_wear_monitor.monitor.alarms.alarm import Level
 from leg_wear_monitor.monitor.reports import Status
+from leg_wear_monitor.twin.kinds import CRANK, KINDS
 
-CRANK, TORQUE = "crank", "torque"
 SILENT_FROM_S = 1.0
 NOTHING_FROM_S = 10.0  # after the start; a leg may be switched on after its monitor
 
 # what of a status is a rate or a speed of samples that come no more
 _NOW = {
     "cadence_rpm": math.nan,
-    "crank_rate_hz": 0.0,
-    "torque_rate_hz": 0.0,
+    **{f"{kind.name}_rate_hz": 0.0 for kind in KINDS.values()},
 }
 # of the node itself, or of faults: what they say still holds
 _KEPT = ("input", "alarms", "ledger", "load", "topics", "recording", "clock")
@@ -48,7 +47,7 @@ class Silence:
     Parameters
     ----------
     kinds : iterable of str
-        `CRANK`, and `TORQUE` where it has samples of its own.
+        Names of those that have samples of their own.
     steady_ns, wall_ns : int
         Now, by a clock that only goes forward, and by the one that people read.
     """
@@ -85,17 +84,14 @@ class Silence:
         return f"since {utc(kind.wall_ns)}" if kind.used else f"since the start at {utc(kind.wall_ns)}"
 
     def marked(self, statuses: Iterable[Status], steady_ns: int) -> tuple[Status, ...]:
-        """Statuses, each with what it has no current data of."""
-        crank = self.level(CRANK, steady_ns)
-        torque = self.level(TORQUE, steady_ns)
-        if crank is not Level.OK:
-            return tuple(self._without(status, CRANK, crank, steady_ns) for status in statuses)
-        return tuple(
-            self._without(status, TORQUE, torque, steady_ns)
-            if status.name == TORQUE and torque is not Level.OK
-            else status
-            for status in statuses
-        )
+        """Statuses, each with what it has no current data of: without the crank, all of them."""
+        silent = {name: level for name in self._kinds if (level := self.level(name, steady_ns)) > Level.OK}
+        crank = KINDS[CRANK].name
+        marked = []
+        for status in statuses:
+            kind = crank if crank in silent else status.name
+            marked.append(self._without(status, kind, silent[kind], steady_ns) if kind in silent else status)
+        return tuple(marked)
 
     def _without(self, status: Status, kind: str, level: Level, steady_ns: int) -> Status:
         message = f"no current data {self.since(kind)}"

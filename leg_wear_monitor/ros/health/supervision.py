@@ -6,19 +6,20 @@ from typing import TYPE_CHECKING
 
 from rclpy.node import Node
 
-from leg_wear_monitor.messages import cdr
+from leg_wear_monitor.messages.streams import streams_read
 from leg_wear_monitor.monitor.alarms.alarm import Alarm, Level
 from leg_wear_monitor.monitor.config.settings import MonitorConfig
 from leg_wear_monitor.monitor.reports import AlarmList, Status
 from leg_wear_monitor.ros.health.clock_monitor import ClockMonitor, both_clocks
-from leg_wear_monitor.ros.health.node_alarms import SILENCE, SOURCES, NodeAlarms
+from leg_wear_monitor.ros.health.node_alarms import SILENCE, NodeAlarms, sources_alarm
 from leg_wear_monitor.ros.health.node_health import topics_status
 from leg_wear_monitor.ros.health.node_log import AlarmLog, StatusLog
-from leg_wear_monitor.ros.health.silence import CRANK, TORQUE, Silence
+from leg_wear_monitor.ros.health.silence import Silence
 from leg_wear_monitor.ros.inputs.crank_names import CrankNames
 from leg_wear_monitor.ros.inputs.inbox import Arrival
 from leg_wear_monitor.ros.inputs.inputs import InputTopic
 from leg_wear_monitor.ros.inputs.publishers import publishers_of
+from leg_wear_monitor.twin.kinds import CRANK, KINDS
 from leg_wear_monitor.twin.sample import Samples
 
 if TYPE_CHECKING:
@@ -42,7 +43,7 @@ class Supervision:
     def __init__(self, node: Node, monitor: "WearMonitor", config: MonitorConfig) -> None:
         self._node, self._monitor = node, monitor
         self._started_ns = time.monotonic_ns()
-        kinds = (CRANK,) if config.drive_torque.source == "effort" else (CRANK, TORQUE)
+        kinds = tuple(KINDS[stream.kind].name for stream in streams_read(config.drive_torque.source))
         self._silence = Silence(kinds, self._started_ns, time.time_ns())
         self._names = CrankNames(config.crank_joint)
         self._alarms, self._clock = NodeAlarms(kinds), ClockMonitor()
@@ -53,13 +54,12 @@ class Supervision:
     @property
     def is_current(self) -> bool:
         """Whether crank samples come that can be used."""
-        return self._silence.level(CRANK, time.monotonic_ns()) is Level.OK
+        return self._silence.level(KINDS[CRANK].name, time.monotonic_ns()) is Level.OK
 
     def note(self, arrivals: Sequence[Arrival], samples: Samples) -> None:
         """Take down messages that were followed, and their samples."""
         self._names.note(arrivals, samples)
-        used = dict(zip((CRANK, TORQUE), self._monitor.used, strict=True))
-        self._silence.note(used, time.monotonic_ns(), time.time_ns())
+        self._silence.note(self._monitor.used, time.monotonic_ns(), time.time_ns())
 
     def alarms(self, alarms: AlarmList) -> AlarmList:
         """The monitor's alarms with those of the node; the log is told of what rose and fell."""
@@ -77,13 +77,13 @@ class Supervision:
         without = self._names.told()
         values: dict[str, float] = {}
         for topic in self.inputs:
-            topic.publishers = publishers_of(self._node, topic.name, topic.type)
-            kind = CRANK if topic.kind == cdr.JOINT_STATE else TORQUE
-            if kind == CRANK:
+            topic.publishers = publishers_of(self._node, topic.name, topic.stream.type)
+            is_crank = topic.stream.kind == CRANK
+            if is_crank:
                 topic.without_crank = without
             # joints of one robot may come from several nodes: then messages lack the crank
-            topic.sources = 1 if kind == CRANK and lack else self._sources(topic, now_ns)
-            values[SOURCES if kind == CRANK else f"{SOURCES} {kind}"] = float(topic.sources)
+            topic.sources = 1 if is_crank and lack else self._sources(topic, now_ns)
+            values[sources_alarm(KINDS[topic.stream.kind].name).name] = float(topic.sources)
         for kind in self._silence.kinds:
             is_silent = self._silence.level(kind, now_ns) is Level.ERROR
             values[f"{SILENCE} {kind}"] = self._silence.silent_s(kind, now_ns) if is_silent else 0.0

@@ -6,7 +6,7 @@ import numpy as np
 from rclpy.serialization import deserialize_message
 from sensor_msgs.msg import JointState
 
-from leg_wear_monitor.messages import cdr
+from leg_wear_monitor.messages.streams import JOINT_STATE
 from leg_wear_monitor.ros.inputs.inbox import Arrival
 from leg_wear_monitor.twin.sample import MISSING_JOINT, NO_FAULT, Samples
 
@@ -32,7 +32,7 @@ class CrankNames:
         self._unnamed += len(missing)
         if len(missing):
             self._example = arrivals[missing[-1]].raw
-        joint_states = np.array([one.kind == cdr.JOINT_STATE for one in arrivals], bool)
+        joint_states = np.array([one.kind == JOINT_STATE for one in arrivals], bool)
         self._named += int(np.count_nonzero(joint_states & (samples["fault"] == NO_FAULT)))
 
     @property

@@ -16,7 +16,7 @@ TAKEN_BYTES = 8 * 2**20
 
 
 class Arrival(NamedTuple):
-    """A message as it came: a code of `recording.cdr.TYPES`, when it came [ns], its bytes."""
+    """A message as it came: its stream's code, when it came [ns], its bytes."""
 
     kind: int
     log_time_ns: int

@@ -4,22 +4,18 @@ from collections.abc import Callable
 from typing import Any
 
 import attrs
-from geometry_msgs.msg import WrenchStamped
 from rclpy.event_handler import SubscriptionEventCallbacks
 from rclpy.node import Node
 from rclpy.qos import QoSProfile, ReliabilityPolicy, qos_policy_name_from_kind
 from rclpy.qos_overriding_options import QoSOverridingOptions
 from rclpy.subscription import Subscription
-from sensor_msgs.msg import JointState
-from std_msgs.msg import Float64
 
-from leg_wear_monitor.messages import cdr
+from leg_wear_monitor.messages.streams import Stream, streams_read
 from leg_wear_monitor.monitor.config.settings import MonitorConfig
+from leg_wear_monitor.ros.inputs.message_class import message_class
 from leg_wear_monitor.ros.inputs.publishers import Publishers
 
 DEPTH = 200
-
-_TORQUE = {"wrench": (cdr.WRENCH_STAMPED, WrenchStamped), "float64": (cdr.FLOAT64, Float64)}
 
 
 @attrs.define
@@ -28,10 +24,10 @@ class InputTopic:
 
     Attributes
     ----------
-    name, type : str
-        Full name of the topic, and its type.
-    kind : int
-        A code of `recording.cdr.TYPES`.
+    name : str
+        Full name of the topic.
+    stream : Stream
+        What is expected on it.
     heard_ns, heard_wall_ns : int
         When its last message came, by a clock that only goes forward and by the one that people read;
         0 before the first.
@@ -49,8 +45,7 @@ class InputTopic:
     """
 
     name: str
-    type: str
-    kind: int
+    stream: Stream
     heard_ns: int = 0
     heard_wall_ns: int = 0
     lost: int = 0
@@ -65,17 +60,13 @@ def subscribe(
     node: Node, config: MonitorConfig, take: Callable[[InputTopic, bytes], None]
 ) -> list[tuple[InputTopic, Subscription]]:
     """Subscribe to what the configuration asks for; best effort hears reliable publishers, too."""
-    wanted: list[tuple[str, int, type]] = [("joint_states", cdr.JOINT_STATE, JointState)]
-    if config.drive_torque.source in _TORQUE:
-        wanted.append(("drive_torque", *_TORQUE[config.drive_torque.source]))
-    return [_subscribe(node, name, kind, message, take) for name, kind, message in wanted]
+    return [_subscribe(node, stream, take) for stream in streams_read(config.drive_torque.source)]
 
 
 def _subscribe(
-    node: Node, name: str, kind: int, message: type, take: Callable[[InputTopic, bytes], None]
+    node: Node, stream: Stream, take: Callable[[InputTopic, bytes], None]
 ) -> tuple[InputTopic, Subscription]:
-    type_name = next(known for known, code in cdr.TYPES.items() if code == kind)
-    topic = InputTopic(node.resolve_topic_name(name), type_name, kind)
+    topic = InputTopic(node.resolve_topic_name(stream.topic), stream)
 
     def lost(event: Any) -> None:
         topic.lost += event.total_count_change
@@ -90,7 +81,7 @@ def _subscribe(
 
     callbacks = SubscriptionEventCallbacks(
         incompatible_qos=quality,
-        incompatible_type=lambda _: misfit(f"its type is not {type_name}"),
+        incompatible_type=lambda _: misfit(f"its type is not {stream.type}"),
         message_lost=lost,
     )
 
@@ -98,8 +89,8 @@ def _subscribe(
         take(topic, raw)
 
     subscription = node.create_subscription(
-        message,
-        name,
+        message_class(stream.type),
+        stream.topic,
         come,
         QoSProfile(depth=DEPTH, reliability=ReliabilityPolicy.BEST_EFFORT),
         raw=True,

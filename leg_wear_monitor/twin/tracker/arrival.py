@@ -3,17 +3,11 @@
 import math
 
 from leg_wear_monitor.kernel import kernel
-from leg_wear_monitor.twin.sample import (
-    CRANK,
-    NO_FAULT,
-    NOT_FINITE,
-    OUT_OF_RANGE,
-    TORQUE,
-    WRONG_TYPE,
-    ZERO_STAMP,
-)
+from leg_wear_monitor.twin.kinds import CRANK, KINDS, TORQUE
+from leg_wear_monitor.twin.sample import NO_FAULT, NOT_FINITE, OUT_OF_RANGE, WRONG_TYPE, ZERO_STAMP
 
-LARGEST_ANGLE, LARGEST_RATE, LARGEST_TORQUE = 1.0e6, 1.0e3, 1.0e6  # rad, rad/s, N m: beyond is no leg's
+LARGEST_RATE = 1.0e3  # rad/s: beyond is no leg's
+LARGEST_ANGLE, LARGEST_TORQUE = KINDS[CRANK].largest, KINDS[TORQUE].largest
 
 
 @kernel
@@ -21,15 +15,14 @@ def find_fault(sample):
     """What is wrong with a sample, if it has no fault already."""
     if sample.fault != NO_FAULT:
         return min(sample.fault, OUT_OF_RANGE)
-    if not CRANK <= sample.kind <= TORQUE:
+    if sample.kind == CRANK:
+        value, largest = sample.crank_angle_rad, LARGEST_ANGLE
+    elif sample.kind == TORQUE:
+        value, largest = sample.torque_nm, LARGEST_TORQUE
+    else:
         return WRONG_TYPE
     if sample.stamp_ns <= 0:
         return ZERO_STAMP
-    value, largest = (
-        (sample.crank_angle_rad, LARGEST_ANGLE)
-        if sample.kind == CRANK
-        else (sample.torque_nm, LARGEST_TORQUE)
-    )
     if not math.isfinite(value):
         return NOT_FINITE
     return OUT_OF_RANGE if abs(value) > largest else NO_FAULT
@@ -109,7 +102,7 @@ def horizon_of(model, clock):
     """
     newest = clock.newest_ns
     horizon = newest
-    for kind in range(CRANK, TORQUE + 1):
+    for kind in range(clock.newest_of_ns.shape[0]):
         if newest - clock.newest_of_ns[kind] <= model.bridge_limit_ns:
             horizon = min(horizon, clock.newest_of_ns[kind])
     return horizon - model.reorder_window_ns

@@ -9,7 +9,7 @@ over the samples after, and needs no inverse.
 import math
 
 from leg_wear_monitor.kernel import kernel
-from leg_wear_monitor.twin.sample import CRANK
+from leg_wear_monitor.twin.kinds import CRANK
 
 _TURN = 2.0 * math.pi
 _WIDEST_GATE = 2.5  # rad: further off, an angle might as well be the other way round

@@ -7,7 +7,7 @@ smoothed, and the leg can go there. The leg is evaluated at all samples up to it
 import math
 
 from leg_wear_monitor.kernel import kernel
-from leg_wear_monitor.twin.sample import CRANK
+from leg_wear_monitor.twin.kinds import CRANK
 from leg_wear_monitor.twin.steps import (
     EVALUATE,
     LEAVE,

@@ -5,7 +5,8 @@ from typing import NamedTuple
 import numpy as np
 
 from leg_wear_monitor.record import Record, Records, new_records, record_of
-from leg_wear_monitor.twin.sample import FAULTS, GAIT_SAMPLE, KINDS
+from leg_wear_monitor.twin.kinds import KINDS
+from leg_wear_monitor.twin.sample import FAULTS, GAIT_SAMPLE
 from leg_wear_monitor.twin.settings import TrackerSettings
 from leg_wear_monitor.twin.steps import SPLINE_NODE
 
@@ -44,8 +45,7 @@ TRACKER_COUNTS = np.dtype(
     [
         # samples
         ("received", "i8"),  # all
-        ("crank_used", "i8"),  # with an angle that was used
-        ("torque_used", "i8"),  # with a torque that was used
+        ("used", "i8", (len(KINDS),)),  # with a value of each kind that was used
         ("duplicates", "i8"),  # that were there before
         ("late", "i8"),  # that came after their turn
         ("stray_stamps", "i8"),  # with a stamp that no other sample is near

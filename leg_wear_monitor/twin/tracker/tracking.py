@@ -3,7 +3,8 @@
 import math
 
 from leg_wear_monitor.kernel import entry, kernel
-from leg_wear_monitor.twin.sample import CRANK, NO_FAULT, TORQUE
+from leg_wear_monitor.twin.kinds import CRANK, TORQUE
+from leg_wear_monitor.twin.sample import NO_FAULT
 from leg_wear_monitor.twin.steps import (
     EVALUATE,
     LOST_BY_JUMP,
@@ -103,17 +104,17 @@ def _follow(model, state, sample, steps, n):
     row = state.queue[clock.tail]
     row.torque = sample.torque_nm if abs(sample.torque_nm) <= LARGEST_TORQUE else math.nan
     if kind == TORQUE:
-        count.torque_used += 1
+        count.used[TORQUE] += 1
         if clock.last_crank_ns == 0:  # nothing to compare it with
             return add_step(steps, n, EVALUATE, stamp, stamp, kind)
-    else:
+    elif kind == CRANK:
         if clock.last_crank_ns == 0:
             _begin(model, state, sample, row)
         elif not _filter(model, state, sample, row):
             return n
-        count.crank_used += 1
+        count.used[CRANK] += 1
         if math.isfinite(row.torque):  # the crank's effort
-            count.torque_used += 1
+            count.used[TORQUE] += 1
         clock.last_crank_ns, clock.filter_ns, clock.refused = stamp, stamp, 0
     row.stamp_ns, row.kind = stamp, kind
     clock.tail += 1
@@ -150,7 +151,7 @@ def _take_new_time_base(state, steps, n):
         n = lose(state, candidate.stamp_ns, LOST_BY_JUMP, steps, n)
         clock.released_ns, clock.released_kinds, clock.out_since_ns = 0, 0, 0
     clock.newest_ns = candidate.stamp_ns
-    for kind in range(CRANK, TORQUE + 1):
+    for kind in range(clock.newest_of_ns.shape[0]):
         clock.newest_of_ns[kind] = 0
     insert(state, candidate)
     candidate.stamp_ns = 0

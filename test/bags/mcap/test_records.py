@@ -8,7 +8,8 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from leg_wear_monitor.bags.mcap.records import COUNTS, IGNORED, walk
-from leg_wear_monitor.messages.cdr import JOINT_STATE, MESSAGE, WRENCH_STAMPED
+from leg_wear_monitor.messages.cdr import MESSAGE
+from leg_wear_monitor.messages.streams import JOINT_STATE, WRENCH_STAMPED
 
 mcap_records = pytest.importorskip("mcap.records")
 RecordBuilder = pytest.importorskip("mcap.data_stream").RecordBuilder

@@ -6,7 +6,8 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from leg_wear_monitor.monitor.alarms.alarm import Level
-from leg_wear_monitor.twin.sample import CRANK, ENCODERS, FAULTS, GAIT_SAMPLE, NO_FAULT, TORQUE
+from leg_wear_monitor.twin.kinds import CRANK, TORQUE
+from leg_wear_monitor.twin.sample import ENCODERS, FAULTS, GAIT_SAMPLE, NO_FAULT
 
 SECOND = 10**9
 START_NS = 1_700_000_000_123_456_789
@@ -35,7 +36,7 @@ def worn(monitor):
 def counted(monitor):
     counts = monitor._twin.intake
     dropped = counts.duplicates + counts.late + counts.stray_stamps + counts.outliers
-    return sum(counts.faulty.values()) + dropped + counts.crank_used + counts.torque_used
+    return sum(counts.faulty.values()) + dropped + sum(counts.used.values())
 
 
 @settings(max_examples=60)

@@ -10,7 +10,8 @@ from hypothesis import strategies as st
 from numpy.polynomial import Polynomial
 
 from leg_wear_monitor.mechanism.ideal import TURN
-from leg_wear_monitor.twin.sample import CRANK, TORQUE, Samples, gait_samples
+from leg_wear_monitor.twin.kinds import CRANK, TORQUE
+from leg_wear_monitor.twin.sample import Samples, gait_samples
 from leg_wear_monitor.twin.settings import TrackerSettings
 from leg_wear_monitor.twin.steps import (
     EVALUATE,
@@ -401,13 +402,13 @@ def test_no_sequence_of_samples_breaks_it(rows):
     assert (moves["begin_ns"] < moves["end_ns"]).all()
     counts, clock = tracker.state.counts, tracker.state.clock
     dropped = counts.duplicates + counts.late + counts.stray_stamps + counts.outliers
-    settled = counts.crank_used + dropped + counts.faults.sum()
+    settled = counts.used[CRANK] + dropped + counts.faults.sum()
     assert counts.received == len(rows)
     waiting = clock.waiting + (tracker.state.candidate.stamp_ns != 0)
     torques = len(rows) - (settled + waiting)
     # a crank sample may bring a torque, which counts as one, too
     brought = np.isfinite(samples["torque_nm"]) & (samples["kind"] == CRANK)
-    assert 0 <= torques <= counts.torque_used <= torques + min(counts.crank_used, brought.sum())
+    assert 0 <= torques <= counts.used[TORQUE] <= torques + min(counts.used[CRANK], brought.sum())
 
 
 @pytest.mark.parametrize(

@@ -1,0 +1,47 @@
+"""The table of streams: what it says of messages is what ROS and the decoder say."""
+
+import numpy as np
+import pytest
+
+from leg_wear_monitor.messages.decode import Decoder
+from leg_wear_monitor.messages.definitions import types
+from leg_wear_monitor.messages.streams import STREAMS, streams_read
+from leg_wear_monitor.monitor.config.inputs import TORQUE_SOURCES
+from leg_wear_monitor.monitor.config.settings import MonitorConfig
+from leg_wear_monitor.twin.kinds import KINDS
+from leg_wear_monitor.twin.sample import GAIT_SAMPLE, brings, gait_samples
+
+pytestmark = pytest.mark.plain
+
+
+@pytest.mark.parametrize("stream", STREAMS, ids=lambda stream: stream.type)
+def test_fields_are_those_of_ros(stream):
+    text, _ = types().generate_msgdef(stream.type, ros_version=2)
+    own = [line.split() for line in text.split("=====")[0].splitlines() if line.strip()]
+    assert tuple(f"{kind.split('/')[-1]} {name}" for kind, name in own) == stream.fields
+    assert (stream.fields[0] == "Header header") is stream.has_stamp
+
+
+def test_a_message_becomes_a_sample_of_its_stream_even_if_it_cannot_be_read():
+    for stream in STREAMS:
+        assert Decoder(MonitorConfig()).one(b"", stream.code)["kind"][0] == stream.kind
+
+
+@pytest.mark.parametrize("source", TORQUE_SOURCES)
+def test_each_source_of_torque_reads_the_crank_and_one_topic_a_stream(source):
+    read = streams_read(source)
+    assert len({stream.topic for stream in read}) == len(read) == (1 if source == "effort" else 2)
+    assert [stream.topic for stream in read if stream.is_needed] == ["joint_states"]
+
+
+def test_codes_differ():
+    assert len({stream.code for stream in STREAMS}) == len(STREAMS)
+
+
+def test_each_kind_has_a_value_that_others_may_bring():
+    for kind, of in KINDS.items():
+        assert GAIT_SAMPLE[of.value] == np.dtype("f8")
+        other = next(each for each in KINDS if each != kind)
+        samples = gait_samples([1, 2, 3], [kind, other, other])
+        samples[of.value][2] = 1.0
+        assert brings(samples, kind).tolist() == [True, False, True]

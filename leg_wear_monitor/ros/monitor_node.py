@@ -2,6 +2,7 @@
 
 import time
 from collections.abc import Callable, Sequence
+from contextlib import ExitStack
 from functools import partial
 from typing import Any
 
@@ -58,12 +59,15 @@ class MonitorNode(ClosingNode):
         config = parameters.config
         mechanism = load_mechanism(config.mechanism)
         self._monitor = open_monitor(mechanism, config)
-        with closed_at_the_end(self._monitor.close):
-            try:
-                self._get_ready(parameters)
-            except BaseException:  # a signal, too: the next start must not take the ledger for cut off
-                self._monitor.close()
-                raise
+        # until `close`: a signal may come before who makes this node has it in hand
+        self._in_order = ExitStack()
+        self._in_order.enter_context(closed_at_the_end(self._monitor.close))
+        try:
+            self._get_ready(parameters)
+        except BaseException:  # a signal, too: the next start must not take the ledger for cut off
+            self._monitor.close()
+            self._in_order.close()
+            raise
 
     def _get_ready(self, parameters: Parameters[MonitorConfig]) -> None:
         """All that comes after the ledger was opened; says so when done."""
@@ -109,6 +113,7 @@ class MonitorNode(ClosingNode):
                 self._work()
         finally:
             self._monitor.close()
+            self._in_order.close()
             self._black_box.close()
 
     def _compile(self, decoder: Decoder) -> None:

@@ -130,8 +130,9 @@ def run(
             serve(node, lambda: not asked.is_set())
         finally:
             node.close()
-    except KeyboardInterrupt:
-        return DONE  # asked to stop before it had begun
+    except KeyboardInterrupt:  # asked to stop before it had begun
+        put_in_order()  # the node may be complete and not in our hands yet
+        return DONE
     except LegWearError as error:
         _say(error)
         return COULD_NOT

@@ -152,7 +152,7 @@ def test_the_clock_is_kept_while_the_node_runs(shared_stage, node) -> None:
     request = SetParameters.Request(parameters=[Parameter("use_sim_time", value=True).to_parameter_msg()])
     (result,) = shared_stage.call(SetParameters, f"{ME}/set_parameters", request).results
     assert not result.successful
-    assert result.reason.startswith("use_sim_time: is read at the start")
+    assert result.reason.startswith("use_sim_time: is read only at the start")
     assert node.get_parameter("use_sim_time").value is False
     assert not node.get_clock().ros_time_is_active
 

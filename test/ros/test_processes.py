@@ -45,6 +45,32 @@ def test_sigterm_ends_both_nodes_in_order(stage, tmp_path: Path, monkeypatch: py
     assert all(b"Traceback" not in log.read_bytes() for log in logs.values())
 
 
+# a signal that comes when the node is complete and has not been handed over yet
+STOPPED_THERE = """
+import sys
+from leg_wear_monitor.ros.monitor_node import MonitorNode
+from leg_wear_monitor.ros.running import run
+
+def make():
+    MonitorNode()
+    raise KeyboardInterrupt
+
+sys.exit(run(make, lambda *_: None, sys.argv))
+"""
+
+
+def test_a_signal_between_the_making_and_the_serving_of_a_node_leaves_an_ordered_ledger(
+    stage, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setenv("ROS_DOMAIN_ID", str(stage.domain))
+    ledger = tmp_path / "wear.db"
+    command = [sys.executable, "-c", STOPPED_THERE, "--ros-args", "-p", f"ledger.path:={ledger}"]
+    assert subprocess.run(command, check=False, capture_output=True).returncode == 0
+    with sqlite3.connect(ledger) as db:
+        assert db.execute("SELECT closed FROM run").fetchall() == [(1,)]
+    db.close()
+
+
 def test_a_monitor_stopped_while_it_gets_ready_leaves_an_ordered_ledger(
     stage, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:

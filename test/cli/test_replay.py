@@ -194,8 +194,8 @@ def test_a_crank_that_is_in_no_message_is_refused_with_the_names_that_are_there(
     assert result.exit_code == 2
     assert result.stdout == ""
     assert complaints(result) == [
-        f"error: {bag}: wheel: is not among the joints of {SECONDS * RATE_HZ} messages, they have crank; say "
-        "which is the crank by --crank-joint (crank_joint in the parameters)"
+        f"error: {bag}: wheel: is not among the joints of {SECONDS * RATE_HZ} messages, they have crank; set "
+        "the crank with --crank-joint (crank_joint in the parameters)"
     ]
 
 

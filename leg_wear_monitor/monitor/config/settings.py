@@ -65,6 +65,14 @@ class Limits:
     growth_m_per_hour: float = quantity(
         "m/h", "growth of a joint's mean clearance", above=0.0, at_most=1.0, default=1.0e-6, metadata=LIVE
     )
+    remaining_life_h: float = quantity(
+        "h",
+        "least remaining life of a joint, the p10 of its forecast; 0: when that is over",
+        at_least=0.0,
+        at_most=1.0e6,
+        default=0.0,
+        metadata=LIVE,
+    )
     torque_mismatch: float = quantity(
         "",
         "RMS of the drive torque that load, friction and lag do not explain, fraction of the predicted RMS",

@@ -131,6 +131,15 @@ GROWTH: "AlarmSpec[JointReport]" = AlarmSpec(
     value=lambda joint: math.nan if joint.growth_mps is None else 3600.0 * joint.growth_mps,
     limit=lambda of: of.config.limits.growth_m_per_hour,
 )
+LIFE: "AlarmSpec[JointReport]" = AlarmSpec(
+    kind="remaining_life",
+    unit="h",
+    meaning="hours of walking that the joint exceeds with a probability of 90 %, h",
+    limit_words="`limits.remaining_life_h`",
+    value=lambda joint: joint.forecast.hours.p10 if joint.forecast and joint.forecast.hours else math.nan,
+    limit=lambda of: of.config.limits.remaining_life_h,
+    is_least=True,
+)
 DEPARTURE: "AlarmSpec[JointReport]" = AlarmSpec(
     kind="clearance_departure",
     unit="m",
@@ -166,7 +175,7 @@ SOURCES: "AlarmSpec[InputGuard]" = AlarmSpec(
     is_count=True,
 )
 
-JOINT = (IMPACT, CLEARANCE, GROWTH)
+JOINT = (IMPACT, CLEARANCE, GROWTH, LIFE)
 ENCODERS = (DEPARTURE,)
 TORQUE: "tuple[AlarmSpec[CycleEvidence], ...]" = (
     MISMATCH,

@@ -2,13 +2,16 @@
 
 import re
 from pathlib import Path
+from types import SimpleNamespace
 
 import pytest
 
+from leg_wear_monitor.monitor.alarms.alarm import Level
 from leg_wear_monitor.monitor.config.parameters import config_from
 from leg_wear_monitor.monitor.config.settings import MonitorConfig
 from leg_wear_monitor.monitor.evaluation import specs
 from leg_wear_monitor.monitor.evaluation.board import AlarmBoard, limits_of
+from leg_wear_monitor.monitor.forecast.forecast import Quantiles
 
 pytestmark = pytest.mark.plain
 
@@ -40,7 +43,7 @@ def test_kinds_are_those_of_the_board():
 
 
 def test_names_and_their_order_are_a_contract():
-    joint = ("impact_force {}", "clearance {}", "growth {}", "clearance_departure {}")
+    joint = ("impact_force {}", "clearance {}", "growth {}", "remaining_life {}", "clearance_departure {}")
     of_leg = (
         "torque_mismatch", "torque_bias", "torque_drift", "torque_lag", "cadence", "input_rate crank",
         "input_rate torque", "input_samples", "input_gaps", "input_torque", "input_sources",
@@ -63,6 +66,20 @@ def test_limits_follow_from_the_parameters():
     assert limits["torque_bias"].error == pytest.approx(0.1 * 8.0)
     sources = limits["input_sources"]
     assert (sources.warn, sources.error, sources.deadband, sources.on_delay) == (2.0, 2.0, 0.0, 1)
+
+
+@pytest.mark.parametrize(
+    ("hours", "level"),
+    [((40.0, 80.0, 160.0), Level.ERROR), ((60.0, 120.0, 240.0), Level.WARN), (None, Level.OK)],
+)
+def test_a_life_that_may_be_short_raises_its_alarm_and_one_that_is_not_known_does_not(hours, level):
+    config = config_from({"limits.remaining_life_h": 50.0})
+    forecast = SimpleNamespace(hours=None if hours is None else Quantiles(*hours))
+    value = specs.LIFE.value(SimpleNamespace(forecast=forecast))
+    board = AlarmBoard(config, ("A",))
+    for cycle in range(config.alarms.on_delay_cycles):
+        board.evaluate({"remaining_life A": value}, 10**9 * (1 + cycle))
+    assert board.alarms["remaining_life A"].level is level
 
 
 if __name__ == "__main__":

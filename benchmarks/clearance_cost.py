@@ -9,7 +9,7 @@ import clearance_loops as loops
 import numpy as np
 from watch import Watch
 
-from leg_wear_monitor.dynamics.clearance.run import INTERVALS, ClearanceStepper
+from leg_wear_monitor.dynamics.clearance.stepper import INTERVALS, ClearanceStepper
 from leg_wear_monitor.dynamics.run.drive import steady_drive
 from leg_wear_monitor.dynamics.run.protocol import Setup
 from leg_wear_monitor.dynamics.run.run_statistics import new_run_statistics

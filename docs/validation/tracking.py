@@ -6,7 +6,7 @@ The crank turns at 60 rpm with a ripple of 3 % twice a turn; an encoder of 1e-3 
 import numpy as np
 
 from leg_wear_monitor import load_mechanism
-from leg_wear_monitor.dynamics.clearance.run import ClearanceStepper
+from leg_wear_monitor.dynamics.clearance.stepper import ClearanceStepper
 from leg_wear_monitor.dynamics.run.protocol import DONE
 from leg_wear_monitor.dynamics.run.run_statistics import ARCHARD, new_run_statistics
 from leg_wear_monitor.dynamics.simulation import prepare

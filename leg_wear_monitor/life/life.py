@@ -21,7 +21,7 @@ from numpy.typing import ArrayLike
 from leg_wear_monitor.configuration.quantity import described, quantity
 from leg_wear_monitor.dynamics.batch.batch import advance_batch
 from leg_wear_monitor.dynamics.batch.leg import Leg, prepare_legs
-from leg_wear_monitor.dynamics.clearance.run import ClearanceStepper
+from leg_wear_monitor.dynamics.clearance.stepper import ClearanceStepper
 from leg_wear_monitor.dynamics.clearance.tables import build_tables
 from leg_wear_monitor.dynamics.run.drive import steady_drive
 from leg_wear_monitor.dynamics.run.protocol import DONE, Setup, stop

@@ -19,6 +19,7 @@ from leg_wear_monitor.mechanism.spec import (
 Floats = NDArray[np.float64]
 Singles = NDArray[np.float32]
 Ints = NDArray[np.int64]
+Flags = NDArray[np.bool_]
 
 REVOLUTE, PRISMATIC = 0, 1
 

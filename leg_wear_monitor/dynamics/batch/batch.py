@@ -16,7 +16,7 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from leg_wear_monitor.dynamics.batch.leg import Leg, SharedTables, prepare_legs, share_tables
-from leg_wear_monitor.dynamics.clearance.run import ClearanceStepper
+from leg_wear_monitor.dynamics.clearance.stepper import ClearanceStepper
 from leg_wear_monitor.dynamics.ideal_result import ideal_result
 from leg_wear_monitor.dynamics.result.simulation_result import SimulationResult
 from leg_wear_monitor.dynamics.result.statistics import drive_torque, joint_statistics, toe_errors

@@ -7,7 +7,7 @@ from threading import Lock
 import attrs
 import numpy as np
 
-from leg_wear_monitor.dynamics.clearance.run import ClearanceStepper, needs_speed
+from leg_wear_monitor.dynamics.clearance.stepper import ClearanceStepper, needs_speed
 from leg_wear_monitor.dynamics.clearance.tables import ClearanceTables, build_tables
 from leg_wear_monitor.dynamics.run.protocol import Setup
 from leg_wear_monitor.dynamics.simulation import prepare
@@ -67,13 +67,12 @@ class Leg:
 
     def start(self, stepper: ClearanceStepper) -> None:
         """Put a stepper of this leg where the leg starts."""
-        stepper.init(self.crank_angle_rad, stepper.state.drive[1])
+        stepper.init(self.crank_angle_rad, stepper.speed)
         chance = np.random.default_rng(self.seed)
-        joints = len(stepper.state.approach)
+        joints = len(stepper.eccentricity)
         away = self.perturb_m * np.sqrt(chance.random(joints))
         direction = TURN * chance.random(joints)
-        stepper.state.e[0::2] = away * np.cos(direction)
-        stepper.state.e[1::2] = away * np.sin(direction)
+        stepper.place(np.stack([away * np.cos(direction), away * np.sin(direction)], axis=1))
 
 
 def prepare_legs(legs: Sequence[Leg]) -> list[Setup | AssemblyError]:

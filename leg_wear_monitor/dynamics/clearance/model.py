@@ -124,13 +124,26 @@ class ClearanceWork(NamedTuple):
     crank: Floats
 
 
-def clearance_state(depth: Floats, angle: float, speed: float) -> ClearanceState:
-    """Ideal start at time 0: journals centred and at rest in their bushings; depth (k, 2, N) of wear."""
-    k = len(depth)
-    shapes = {
+def state_shapes(k: int) -> dict[str, tuple[int, ...]]:
+    """Shapes of the parts of ``ClearanceState.motion`` in their order, for k clearance joints."""
+    return {
         "intervals": (1,), "e": (2 * k,), "v": (2 * k,), "drive": (3,), "step": (1,),
         "approach": (k,), "recent": (k, 4), "pending": (k, 4),
     }  # fmt: skip
+
+
+@kernel
+def move_time_origin(state, interval, intervals):
+    """Count time from an even number of intervals [s] later: every other one, something is renewed."""
+    state.intervals[0] -= intervals
+    for k in range(state.recent.shape[0]):
+        for sample in range(2):  # time and normal force of each
+            state.recent[k, 2 * sample] -= intervals * interval
+
+
+def clearance_state(depth: Floats, angle: float, speed: float) -> ClearanceState:
+    """Ideal start at time 0: journals centred and at rest in their bushings; depth (k, 2, N) of wear."""
+    shapes = state_shapes(len(depth))
     motion = np.zeros(sum(math.prod(shape) for shape in shapes.values()))
     state = ClearanceState(depth, motion, **views(motion, shapes))
     state.drive[:] = angle, speed, 0.0

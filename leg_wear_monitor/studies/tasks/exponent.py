@@ -10,7 +10,7 @@ from typing import Any
 
 import numpy as np
 
-from leg_wear_monitor.dynamics.clearance.run import ClearanceStepper, Snapshot
+from leg_wear_monitor.dynamics.clearance.stepper import Snapshot
 from leg_wear_monitor.dynamics.run.run_statistics import new_run_statistics
 from leg_wear_monitor.mechanism.arrays import Floats
 from leg_wear_monitor.mechanism.ideal import TURN
@@ -19,7 +19,7 @@ from leg_wear_monitor.studies.point import Arrays
 from leg_wear_monitor.studies.tasks.contact_watch import ObservedLeg
 from leg_wear_monitor.studies.tasks.ensemble import ensemble, watch
 from leg_wear_monitor.studies.tasks.grid import SAMPLES
-from leg_wear_monitor.studies.tasks.lyapunov import Flags, stretches
+from leg_wear_monitor.studies.tasks.lyapunov import stretches
 
 
 def lyapunov_exponent(mechanism: Mechanism, settings: dict[str, Any]) -> Arrays:
@@ -45,14 +45,14 @@ def _follow(leg: ObservedLeg, settings: dict[str, Any]) -> Floats:
     """Stretches of one run."""
     stepper, statistics = leg.stepper, new_run_statistics(len(leg.setup.linkage.mechanism.joints))
     leg.advance(settings["skip_cycles"] * SAMPLES, statistics)
-    steps, depth = SAMPLES // settings["renewals"], stepper.state.depth.copy()
+    steps, depth = SAMPLES // settings["renewals"], stepper.snapshot().depth
 
     def advance(motion: Floats) -> Floats:
         stepper.restore(Snapshot(motion, depth))
         leg.advance(steps, statistics)
-        return stepper.state.motion.copy()
+        return stepper.snapshot().motion
 
-    scale, approach = _scale(leg), _marks(stepper, "approach")
+    scale, approach = _scale(leg), stepper.place_in_snapshot("approach")
 
     def same_contacts(one: Floats, other: Floats) -> bool:
         return bool(np.array_equal(one[approach] > 0.0, other[approach] > 0.0))
@@ -60,19 +60,9 @@ def _follow(leg: ObservedLeg, settings: dict[str, Any]) -> Floats:
     direction = np.random.default_rng([settings["seed"], 2]).normal(size=len(scale))
     direction[approach] = 0.0
     return stretches(
-        advance, stepper.state.motion.copy(), direction, scale,
+        advance, stepper.snapshot().motion, direction, scale,
         settings["distance"], settings["cycles"] * settings["renewals"], same_contacts,
     )  # fmt: skip
-
-
-def _marks(stepper: ClearanceStepper, name: str) -> Flags:
-    """Where a part of the state is in the flat vector of all of it."""
-    kept, part = stepper.state.motion.copy(), getattr(stepper.state, name)
-    values = part.copy()
-    part[:] = np.nan
-    marks: Flags = np.isnan(stepper.state.motion) & ~np.isnan(kept)
-    part[:] = values
-    return marks
 
 
 def _scale(leg: ObservedLeg) -> Floats:
@@ -80,7 +70,7 @@ def _scale(leg: ObservedLeg) -> Floats:
     clearance = float(leg.setup.contacts.clearance.min())
     rate = clearance * abs(leg.setup.speed)
     units = {"e": clearance, "v": rate, "approach": rate}
-    scale = np.zeros(len(leg.stepper.state.motion))
+    scale = np.zeros(len(leg.stepper.snapshot().motion))
     for name, unit in units.items():
-        scale[_marks(leg.stepper, name)] = unit
+        scale[leg.stepper.place_in_snapshot(name)] = unit
     return scale

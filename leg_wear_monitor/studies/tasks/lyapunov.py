@@ -8,11 +8,9 @@ from collections.abc import Callable
 from typing import NamedTuple
 
 import numpy as np
-import numpy.typing as npt
 
-from leg_wear_monitor.mechanism.arrays import Floats
+from leg_wear_monitor.mechanism.arrays import Flags, Floats
 
-Flags = npt.NDArray[np.bool_]
 Motion = Callable[[Floats], Floats]
 Comparable = Callable[[Floats, Floats], bool]
 

@@ -5,6 +5,7 @@ from typing import Any
 
 import numpy as np
 
+from leg_wear_monitor.dynamics.clearance.stepper import Moment
 from leg_wear_monitor.dynamics.result.parts import JointResult
 from leg_wear_monitor.dynamics.result.statistics import drive_torque, joint_statistics
 from leg_wear_monitor.dynamics.run.run_statistics import (
@@ -19,7 +20,7 @@ from leg_wear_monitor.mechanism.ideal import TURN, one_cycle, point_motion
 from leg_wear_monitor.mechanism.position import Linkage
 from leg_wear_monitor.mechanism.spec import Mechanism
 from leg_wear_monitor.studies.point import Arrays
-from leg_wear_monitor.studies.tasks.contact_watch import Moment, ObservedLeg
+from leg_wear_monitor.studies.tasks.contact_watch import ObservedLeg
 from leg_wear_monitor.studies.tasks.ensemble import ensemble, watch
 from leg_wear_monitor.studies.tasks.grid import SAMPLES
 
@@ -68,7 +69,7 @@ def _follow(leg: ObservedLeg, settings: dict[str, Any]) -> dict[str, Any]:
     joints, clearance_joints = len(setup.linkage.mechanism.joints), list(setup.contacts.joint)
     leg.advance(settings["skip_cycles"] * SAMPLES, new_run_statistics(joints))
     statistics, depth = new_run_statistics(joints), setup.surfaces.depth.copy()
-    shift = round(leg.stepper.state.drive[0] / TURN * SAMPLES) % SAMPLES
+    shift = round(leg.stepper.crank_angle / TURN * SAMPLES) % SAMPLES
     largest: list[Floats] = []
     peaks: list[Floats] = []
     impacts = [statistics.impacts.copy()]

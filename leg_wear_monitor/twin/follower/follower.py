@@ -4,10 +4,8 @@ from typing import NamedTuple
 
 import numpy as np
 
-from leg_wear_monitor.dynamics.clearance.contact import F_T
-from leg_wear_monitor.dynamics.clearance.run import INTERVALS, ClearanceStepper
-from leg_wear_monitor.dynamics.clearance.run import Snapshot as StepperSnapshot
-from leg_wear_monitor.dynamics.joint.contact_event import F_N
+from leg_wear_monitor.dynamics.clearance.stepper import INTERVALS, ClearanceStepper
+from leg_wear_monitor.dynamics.clearance.stepper import Snapshot as StepperSnapshot
 from leg_wear_monitor.dynamics.run.drive import steady_drive
 from leg_wear_monitor.dynamics.run.protocol import DONE, INVALID_DRIVE, PUSHED_THROUGH, STEP_TOO_SMALL, Setup
 from leg_wear_monitor.dynamics.run.run_statistics import TORQUE, new_run_statistics
@@ -182,13 +180,12 @@ class LegFollower:
         if reached == DONE:
             reached = stepper.advance(polynomial, time, self.statistics)[0]
         depth[:] = worn
-        stepper.state.pending[:] = 0.0
+        stepper.drop_pending_wear()
         if reached != DONE:  # so it goes on from centred journals, and says itself why it cannot
             stepper.init(angle, speed)
             self._leg.force[:] = 0.0
             return 0
-        sample = stepper.work.start
-        self._leg.force[:] = np.hypot(sample[:, F_N], sample[:, F_T])
+        self._leg.force[:] = stepper.last_force
         self.state.torque.mean = self.statistics.drive_integral[TORQUE] / self.statistics.time[0]
         return round(1.0e9 * time)
 

@@ -4,7 +4,7 @@ import math
 
 from leg_wear_monitor.dynamics.clearance.advance import advance_clearances
 from leg_wear_monitor.dynamics.clearance.contact import F_T
-from leg_wear_monitor.dynamics.clearance.model import ANGLE
+from leg_wear_monitor.dynamics.clearance.model import ANGLE, move_time_origin
 from leg_wear_monitor.dynamics.joint.contact_event import F_N
 from leg_wear_monitor.dynamics.run.protocol import DONE
 from leg_wear_monitor.dynamics.run.run_statistics import TORQUE, TORQUE_SQUARED
@@ -57,11 +57,8 @@ def _load_piece(model, stepper, leg, polynomial, step):
     """Take up the next piece of the crank's motion; times and angles are kept small."""
     motion = leg.motion
     if stepper.intervals[0] >= _REBASE:
-        stepper.intervals[0] -= _REBASE
+        move_time_origin(stepper, model.interval, _REBASE)
         motion.base_ns += round(_REBASE * model.interval * 1.0e9)
-        for k in range(stepper.recent.shape[0]):
-            stepper.recent[k, 0] -= _REBASE * model.interval
-            stepper.recent[k, 2] -= _REBASE * model.interval
     if step.begin_ns != motion.piece_end_ns:  # it rested meanwhile
         motion.base_ns += step.begin_ns - motion.piece_end_ns
         leg.low_pass.fill = 0

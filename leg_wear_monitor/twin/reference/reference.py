@@ -11,7 +11,7 @@ from typing import NamedTuple
 import attrs
 import numpy as np
 
-from leg_wear_monitor.dynamics.clearance.run import ClearanceStepper, Snapshot
+from leg_wear_monitor.dynamics.clearance.stepper import ClearanceStepper, Snapshot
 from leg_wear_monitor.dynamics.run.drive import steady_drive
 from leg_wear_monitor.dynamics.run.protocol import DONE
 from leg_wear_monitor.dynamics.run.run_statistics import new_run_statistics
@@ -110,7 +110,7 @@ class ReferenceRun:
                 self._stepper = None
                 return None
             if self._cycle:  # the first cycle settles
-                total[step % PHASES] += self._stepper.state.e
+                total[step % PHASES] += self._stepper.eccentricity.ravel()
         self._cycle += 1
         if self._cycle <= self._cycles:
             return None

@@ -10,7 +10,7 @@ from leg_wear_monitor import AssemblyError, ConfigError, SimulationError, load_m
 from leg_wear_monitor.dynamics.batch import leg as batch_leg
 from leg_wear_monitor.dynamics.batch.batch import advance_batch, simulate_batch
 from leg_wear_monitor.dynamics.batch.leg import Leg
-from leg_wear_monitor.dynamics.clearance.run import ClearanceStepper
+from leg_wear_monitor.dynamics.clearance.stepper import ClearanceStepper
 from leg_wear_monitor.dynamics.clearance.tables import build_tables
 from leg_wear_monitor.dynamics.run.drive import steady_drive
 from leg_wear_monitor.dynamics.run.protocol import DONE, INVALID_DRIVE

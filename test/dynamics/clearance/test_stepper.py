@@ -11,7 +11,7 @@ from hypothesis import example, given, settings
 from hypothesis import strategies as st
 
 from leg_wear_monitor import Mechanism, load_mechanism
-from leg_wear_monitor.dynamics.clearance.run import TOLERANCE_M, ClearanceStepper
+from leg_wear_monitor.dynamics.clearance.stepper import TOLERANCE_M, ClearanceStepper
 from leg_wear_monitor.dynamics.clearance.tables import ClearanceTables, build_tables
 from leg_wear_monitor.dynamics.full.run import FullRun
 from leg_wear_monitor.dynamics.run.drive import steady_drive
@@ -329,7 +329,11 @@ def assert_means_agree(one: np.ndarray, other: np.ndarray) -> None:
 
 
 @pytest.mark.parametrize(
-    "finer", [{"interval_s": 0.5 / 2048}, {"tolerance_m": 0.1 * TOLERANCE_M}], ids=["interval", "tolerance"]
+    "finer",
+    [
+        pytest.param({"interval_s": 0.5 / 2048}, id="interval"),
+        pytest.param({"tolerance_m": 0.1 * TOLERANCE_M}, id="tolerance", marks=pytest.mark.slow),
+    ],
 )
 def test_means_hold_at_half_the_interval_and_a_tenth_of_the_tolerance(leg, tables, finer):
     """All five joints' figures, over twenty-four runs of five cycles."""
@@ -342,7 +346,10 @@ def test_means_hold_at_half_the_interval_and_a_tenth_of_the_tolerance(leg, table
     assert_means_agree(fine, usual)
 
 
-@pytest.mark.parametrize("clearance_joints", ["G", "AB", "IJ", "ABGIJ"])
+@pytest.mark.parametrize(
+    "clearance_joints",
+    ["G", pytest.param("AB", marks=pytest.mark.slow), pytest.param("IJ", marks=pytest.mark.slow), "ABGIJ"],
+)
 def test_means_are_those_of_full_coordinates(leg, leg_cycles, clearance_joints):
     """Over twenty cycles; docs/validation.md has more of them, and more figures."""
     cycles, setup = leg_cycles(clearance_joints, 20), prepare(leg, clearances=tuple(clearance_joints))

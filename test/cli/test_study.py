@@ -1,6 +1,7 @@
 """The verbs study and report: data and a page from one command, and the page again from the data."""
 
 import json
+import shutil
 
 import pytest
 
@@ -14,10 +15,22 @@ ensemble: {runs: 2, cycles: 2, skip_cycles: 1, traced_cycles: 1}
 """
 
 
+@pytest.fixture(scope="module")
+def computed():
+    """What the command printed, and a copy of what it wrote, once a test has run it."""
+    return {}
+
+
 @pytest.fixture
-def done(run, tmp_path):
+def done(run, tmp_path, tmp_path_factory, computed):
     (tmp_path / "tiny.yaml").write_text(TINY)
-    return run("study", "size", "--config", "tiny.yaml", "--out", "out", "--workers", "1")
+    if computed:
+        shutil.copytree(computed["out"], tmp_path / "out")
+    else:
+        computed["result"] = run("study", "size", "--config", "tiny.yaml", "--out", "out", "--workers", "1")
+        computed["out"] = tmp_path_factory.mktemp("computed") / "out"
+        shutil.copytree(tmp_path / "out", computed["out"])
+    return computed["result"]
 
 
 def test_a_study_leaves_data_and_a_page_and_goes_on_where_it_was(run, done, tmp_path, complaints):

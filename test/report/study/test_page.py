@@ -22,7 +22,14 @@ def conclusions(page):
     return "\n".join(parts(page, Sentences)[0].sentences)
 
 
-@pytest.mark.parametrize("name", STUDIES)
+def slow_if(is_slow):
+    return [pytest.mark.slow] if is_slow else []
+
+
+# the points of these are computed as those of the study size are, and more of them
+@pytest.mark.parametrize(
+    "name", [pytest.param(name, marks=slow_if(name in {"laws", "location", "speed"})) for name in STUDIES]
+)
 def test_every_page_has_configuration_versions_conclusions_and_units(drawn, name):
     page = drawn(name)
     assert "mechanism: bionic_leg" in page.configuration

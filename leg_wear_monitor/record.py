@@ -4,6 +4,7 @@ An entry takes an array of records, of one where there is but one, and begins wi
 compiled code knows the type of such an array in half a microsecond, that of a `numpy.record` in ten.
 """
 
+from collections.abc import Iterator
 from typing import Any
 
 import numba
@@ -22,9 +23,25 @@ Records = NDArray[Any]
 
 
 def new_records(n: int, dtype: np.dtype[Any]) -> Records:
-    """Records for an entry, all fields 0; a copy is a snapshot, ``records[:] = snapshot`` goes back to it."""
+    """Records for an entry, all fields 0; a copy is a snapshot, ``records[:] = snapshot`` goes back to it.
+
+    Raises
+    ------
+    ValueError
+        For a field that plain Python would not find: numpy's records have an attribute of its name.
+    """
+    hidden = sorted(name for name in _names(dtype) if hasattr(np.record, name))
+    if hidden:
+        raise ValueError(f"fields {', '.join(hidden)}: numpy.record has attributes of these names")
     # what is not compiled needs elements that have attributes
     return np.zeros(n, np.dtype((np.record, dtype)) if numba.config.DISABLE_JIT else dtype)
+
+
+def _names(dtype: np.dtype[Any]) -> Iterator[str]:
+    """Names of all fields, those of records within records as well."""
+    for name, (inner, *_) in (dtype.fields or {}).items():
+        yield name
+        yield from _names(inner.base)
 
 
 def record_of(records: Records) -> Record:

@@ -57,3 +57,10 @@ def test_values_are_those_of_the_record():
     assert values["count"] == 1
     assert type(values["count"]) is int
     assert list(values["speed"]) == [0.0, 0.5]
+
+
+@pytest.mark.parametrize("dtype", [[("mean", "f8")], [("outer", [("angle", "f8"), ("fill", "i8")], (2,))]])
+def test_a_name_that_numpy_has_taken_is_refused(dtype):
+    """Plain Python would read numpy's method, or its number of elements, in place of the field."""
+    with pytest.raises(ValueError, match=r"^fields (mean|fill): "):
+        new_records(1, np.dtype(dtype))

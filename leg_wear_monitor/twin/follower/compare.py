@@ -27,8 +27,8 @@ def compare(sensor, signature, leg, stepper, measured):
     squares = torque.sensed_squares
     torque.sensed_impulse, torque.sensed_time, torque.sensed_squares = 0.0, 0.0, 0.0
     before, torque.last_lever = torque.last_lever, lever
-    if low_pass.fill == 0 or not seen > 0.0:  # the first since the leg moves
-        low_pass.fill = max(low_pass.fill, 1)
+    if low_pass.stage == 0 or not seen > 0.0:  # the first since the leg moves
+        low_pass.stage = max(low_pass.stage, 1)
         torque.unfiltered, leg.waiting.time = 0.0, 0.0
         return
     dt = torque.unfiltered + seen
@@ -48,8 +48,8 @@ def compare(sensor, signature, leg, stepper, measured):
             p = torque.last_predicted
             _add_up(p + r, p, by, leg.sums)
         return
-    fresh, fraction = low_pass.fill == 1, 1.0 - math.exp(-sensor.cutoff * dt)
-    low_pass.fill = 2
+    fresh, fraction = low_pass.stage == 1, 1.0 - math.exp(-sensor.cutoff * dt)
+    low_pass.stage = 2
     m = pass_low(fraction, fresh, measured, low_pass.measured)
     p = pass_low(fraction, fresh, mean / seen, low_pass.predicted)
     by[LOAD] = pass_low(fraction, fresh, 0.5 * (before + lever), low_pass.of_load)

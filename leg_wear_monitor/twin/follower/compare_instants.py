@@ -34,8 +34,8 @@ def take_instant(sensor, leg, measured, mean, variance, lever, direction, dt, an
     residual = math.nan
     if w.time > 0.0:
         residual = _compare_waiting(sensor, leg, max(variance, w.variance))
-    rate = (mean - w.mean) / dt if w.time > 0.0 else 0.0
-    w.measured, w.mean, w.variance, w.time, w.angle = measured, mean, variance, dt, angle
+    rate = (mean - w.mean_predicted) / dt if w.time > 0.0 else 0.0
+    w.measured, w.mean_predicted, w.variance, w.time, w.angle = measured, mean, variance, dt, angle
     w.regressor[LOAD], w.regressor[FRICTION], w.regressor[LAG] = lever, direction, -rate
     return residual
 
@@ -44,12 +44,12 @@ def take_instant(sensor, leg, measured, mean, variance, lever, direction, dt, an
 def _compare_waiting(sensor, leg, variance):
     """Compare the instant that waits; its residual after the low-pass [N m]."""
     w, low_pass, by_phase = leg.waiting, leg.low_pass, leg.sums.by_phase
-    fresh, fraction = low_pass.fill == 1, 1.0 - math.exp(-sensor.cutoff * w.time)
-    low_pass.fill = 2
-    weight = 1.0 / (1.0 + variance / (_VARIES * sensor.size) ** 2)
-    furthest = _FURTHEST * sensor.size
-    off = min(max(w.measured - w.mean, -furthest), furthest)
-    leg.torque.last_predicted = pass_low(fraction, fresh, w.mean, low_pass.predicted)
+    fresh, fraction = low_pass.stage == 1, 1.0 - math.exp(-sensor.cutoff * w.time)
+    low_pass.stage = 2
+    weight = 1.0 / (1.0 + variance / (_VARIES * sensor.usual) ** 2)
+    furthest = _FURTHEST * sensor.usual
+    off = min(max(w.measured - w.mean_predicted, -furthest), furthest)
+    leg.torque.last_predicted = pass_low(fraction, fresh, w.mean_predicted, low_pass.predicted)
     of_all = pass_low(fraction, fresh, weight, low_pass.weight)
     turns = w.angle / _TURN
     phase = min(int((turns - math.floor(turns)) * PHASES), PHASES - 1)

@@ -154,7 +154,7 @@ class LegFollower:
             motion.failed_ns += stamp - motion.failed_at_ns
         motion.piece_begin_ns = motion.piece_end_ns = stamp
         motion.lost = motion.anchored = motion.cut_ns = motion.cycle_begin_ns = motion.cycle_bridged_ns = 0
-        motion.runs, motion.turns_before, self.state.low_pass.fill = 1, step["turns"], 0
+        motion.runs, motion.turns_before, self.state.low_pass.stage = 1, step["turns"], 0
         self._leg.polynomial[:] = 0.0, angle, speed, 0.0, 0.0, 0.0, 0.0
         clear_run_statistics(self.statistics)
         return Event(stamp, TwinEventKind.ACQUIRED)
@@ -186,7 +186,7 @@ class LegFollower:
             self._leg.force[:] = 0.0
             return 0
         self._leg.force[:] = stepper.last_force
-        self.state.torque.mean = self.statistics.drive_integral[TORQUE] / self.statistics.time[0]
+        self.state.torque.mean_before = self.statistics.drive_integral[TORQUE] / self.statistics.time[0]
         return round(1.0e9 * time)
 
     def _end_cycle(self, stamp: int, cycles: list[CycleStatistics]) -> None:

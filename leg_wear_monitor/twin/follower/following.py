@@ -61,7 +61,7 @@ def _load_piece(model, stepper, leg, polynomial, step):
         motion.base_ns += round(_REBASE * model.interval * 1.0e9)
     if step.begin_ns != motion.piece_end_ns:  # it rested meanwhile
         motion.base_ns += step.begin_ns - motion.piece_end_ns
-        leg.low_pass.fill = 0
+        leg.low_pass.stage = 0
     turns = step.turns - motion.turns_before
     if turns != 0:
         stepper.drive[ANGLE] -= turns * _TURN
@@ -79,11 +79,11 @@ def _evaluate(sensor, signature, leg, polynomial, stepper, step, out):
     """Note the leg, which runs, at a sample."""
     motion, torque = leg.motion, leg.torque
     if torque.time > 0.0:
-        torque.mean = torque.impulse / torque.time
+        torque.mean_before = torque.impulse / torque.time
         torque.impulse, torque.time = 0.0, 0.0
     at = min(max(step.end_ns, motion.piece_begin_ns), motion.piece_end_ns)
     angle = _angle_at(polynomial, 1.0e-9 * (at - motion.piece_begin_ns))
-    out.angle, out.torque = angle - _TURN * math.floor(angle / _TURN), torque.mean
+    out.angle, out.torque = angle - _TURN * math.floor(angle / _TURN), torque.mean_before
     if motion.piece_begin_ns <= step.end_ns <= motion.piece_end_ns and math.isfinite(step.torque):
         compare(sensor, signature, leg, stepper, step.torque)
 

@@ -46,7 +46,7 @@ LEG_TORQUE = np.dtype(
         # of the drive torque since the last sample
         ("impulse", "f8"),  # integral [N m s]
         ("time", "f8"),  # time [s]
-        ("mean", "f8"),  # mean before that sample [N m]
+        ("mean_before", "f8"),  # mean before that sample [N m]
         # of the drive torque since the last torque sample
         ("sensed_impulse", "f8"),  # integral [N m s]
         ("sensed_squares", "f8"),  # integral of the square [N^2 m^2 s]
@@ -61,7 +61,7 @@ LEG_TORQUE = np.dtype(
 
 LOW_PASS = np.dtype(
     [
-        ("fill", "i8"),  # 0 empty, 1 a sample has come, 2 filtered since
+        ("stage", "i8"),  # 0 empty, 1 a sample has come, 2 filtered since
         # its two stages, for each torque
         ("measured", "f8", (2,)),  # [N m]
         ("predicted", "f8", (2,)),  # [N m]
@@ -77,7 +77,7 @@ LOW_PASS = np.dtype(
 WAITING_INSTANT = np.dtype(
     [
         ("measured", "f8"),  # torque [N m]
-        ("mean", "f8"),  # of the predicted torque since the instant before [N m]
+        ("mean_predicted", "f8"),  # of the predicted torque since the instant before [N m]
         ("variance", "f8"),  # of that torque [N^2 m^2]
         ("regressor", "f8", (3,)),  # what a unit load, unit friction and unit lag make [N m/N, -, N m/s]
         ("time", "f8"),  # since the instant before [s], 0 if none waits
@@ -115,7 +115,7 @@ LEG_STATE = np.dtype(
 TORQUE_SENSOR = np.dtype(
     [
         ("cutoff", "f8"),  # of the low-pass [rad/s]
-        ("size", "f8"),  # of the torque [N m]
+        ("usual", "f8"),  # size of the torque [N m]
         ("instants", "i8"),  # 1 where it samples instants instead of averages
     ]
 )

@@ -1,4 +1,4 @@
-"""From what a user names to files in their order: files, bag directories, split and compressed bags."""
+"""Resolve user paths to an ordered list of recording files (plain, split and compressed bags)."""
 
 import os
 import re
@@ -27,13 +27,13 @@ class BagFile:
     storage : str
         `MCAP` or `SQLITE`.
     compressed : bool
-        Whether the whole file is.
+        Whether the whole file is compressed.
     by_message : bool
-        Whether each message in it is.
+        Whether each message in the file is compressed on its own.
     types : dict
-        Types of topics that metadata.yaml names.
+        Message type by topic name, from metadata.yaml.
     recording : int
-        Which of the named recordings it belongs to.
+        Index of the given path that the file belongs to.
     """
 
     path: Path
@@ -45,7 +45,7 @@ class BagFile:
 
 
 def find_files(paths: Iterable[str | Path]) -> tuple[list[BagFile], list[Finding]]:
-    """Files of recordings, and what is wrong with their directories.
+    """Find the recording files of paths, and report findings about their directories.
 
     Parameters
     ----------
@@ -55,7 +55,7 @@ def find_files(paths: Iterable[str | Path]) -> tuple[list[BagFile], list[Finding
     Raises
     ------
     RecordingError
-        For what is not there or is no recording by its name.
+        If a path does not exist, or its name is not that of a recording.
     """
     files: list[BagFile] = []
     findings: list[Finding] = []
@@ -71,7 +71,7 @@ def find_files(paths: Iterable[str | Path]) -> tuple[list[BagFile], list[Finding
 
 
 def _mode(path: Path) -> int | None:
-    """What a path is, without opening it: opening a pipe would wait for ever; None if it is not there."""
+    """File mode of a path, or None if it does not exist; not opened, because a pipe would block forever."""
     try:
         return path.stat().st_mode
     except (FileNotFoundError, NotADirectoryError):
@@ -91,7 +91,7 @@ def _file(path: Path, mode: int, **parts: Any) -> BagFile:
 
 
 def _directory(path: Path, findings: list[Finding]) -> list[BagFile]:
-    """Files of a bag directory in the order of its metadata, else in the order of their numbers."""
+    """Files of a bag directory, ordered by its metadata; without metadata, ordered by file number."""
     there = _recordings(path, findings)
     named, parts = _metadata(path / METADATA, findings)
     if named:
@@ -105,7 +105,7 @@ def _directory(path: Path, findings: list[Finding]) -> list[BagFile]:
 
 
 def _recordings(path: Path, findings: list[Finding]) -> list[str]:
-    """Names of the files of a directory that are recordings by their names, in the order of their numbers."""
+    """Names of the recording files in a directory (recognized by name), ordered by file number."""
     try:
         named = sorted((file for file in path.iterdir() if _NAME.fullmatch(file.name)), key=_by_number)
     except OSError as error:
@@ -121,7 +121,7 @@ def _recordings(path: Path, findings: list[Finding]) -> list[str]:
 
 
 def _metadata(path: Path, findings: list[Finding]) -> tuple[list[str], dict[str, Any]]:
-    """Names of the files and what holds for all of them; nothing where there is no metadata to rely on."""
+    """File names and common attributes from the metadata; empty if there is no reliable metadata."""
     if not os.path.lexists(path):
         return [], {}
     try:
@@ -138,6 +138,6 @@ def _metadata(path: Path, findings: list[Finding]) -> tuple[list[str], dict[str,
 
 
 def _by_number(path: Path) -> tuple[list[tuple[int, str]], str]:
-    """Key that puts run_2.mcap before run_10.mcap."""
+    """Sort key that orders run_2.mcap before run_10.mcap."""
     parts = re.findall(r"\d+|\D+", path.name)
     return [(int(part), "") if part.isdecimal() else (-1, part) for part in parts], path.name

@@ -1,4 +1,4 @@
-"""How much memory a recording may take, whatever it claims: temporary files included."""
+"""Memory limit for reading a recording, independent of the sizes it declares; includes temporary files."""
 
 import attrs
 
@@ -12,17 +12,17 @@ _MB = 1_000_000
 
 @attrs.define
 class Budget:
-    """Bytes that reading may take, and what of them is taken for as long as the recording is open.
+    """Memory limit of a reader, and the bytes reserved until the recording is closed.
 
     Parameters
     ----------
     megabytes : float
-        Of 10⁶ bytes; at least 16.
+        Memory limit [10⁶ bytes]; at least 16.
 
     Raises
     ------
     ConfigError
-        For less.
+        If the limit is below 16 MB.
     """
 
     megabytes: float = DEFAULT_MB
@@ -35,21 +35,21 @@ class Budget:
 
     @property
     def left(self) -> int:
-        """Bytes that are not taken."""
+        """Bytes that are not reserved."""
         return max(0, int(min(self.megabytes, 1.0e12) * _MB) - self.taken)
 
     @property
     def at_once(self) -> int:
-        """Bytes that one part of a file may need while it is read; samples that wait need the rest."""
+        """Bytes that one part of a file may use while it is read; queued samples use the rest."""
         return self.left // 2
 
     def check(self, needed: int) -> None:
-        """See that a part of a file can be read.
+        """Check that a part of a file fits into memory.
 
         Raises
         ------
         DamageError
-            If it needs too much, in words that follow its name.
+            If it needs too much memory; the text is a predicate that follows the name of the part.
         """
         if needed > self.at_once:
             raise DamageError(
@@ -58,7 +58,7 @@ class Budget:
             )
 
     def take(self, needed: int) -> None:
-        """Take bytes until the recording is closed, as for a temporary file.
+        """Reserve bytes until the recording is closed, for example for a temporary file.
 
         Raises
         ------

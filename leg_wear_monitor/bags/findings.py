@@ -1,4 +1,4 @@
-"""What is wrong with a recording: told, and counted, while the rest of it is read."""
+"""Findings: faults of a recording, reported while the remainder of the recording is read."""
 
 from enum import Enum
 from pathlib import Path
@@ -9,9 +9,9 @@ from leg_wear_monitor.errors import ConfigError, printable
 
 
 class RecordingError(ConfigError):
-    """A recording of which nothing can be used: names the file, the topic where there is one, and why.
+    """The recording is unusable; the message names the file, the topic (if any) and the reason.
 
-    What a recording holds may stand in it: it is made printable.
+    The message may quote content of the recording; unprintable characters are replaced.
     """
 
     def __init__(self, source: str, key: str, fault: str) -> None:
@@ -19,7 +19,7 @@ class RecordingError(ConfigError):
 
 
 class Severity(Enum):
-    """What a finding means for the result."""
+    """Effect of a finding on the result."""
 
     NOTE = "note"
     """Worth knowing; all that was recorded is there."""
@@ -29,13 +29,13 @@ class Severity(Enum):
 
 @attrs.frozen
 class Finding:
-    """One thing found in one file.
+    """One fault or remark about one file.
 
     Attributes
     ----------
     file : pathlib.Path
     text : str
-        One line: what, and where in bytes; it is made printable.
+        One printable line: what was found, and at which byte.
     weight : Severity
     """
 
@@ -48,4 +48,4 @@ class Finding:
 
 
 class DamageError(Exception):
-    """A part of a file that cannot be used; its reader makes a finding of it and goes on."""
+    """A part of a file is unusable; the reader records a finding and continues."""

@@ -1,4 +1,4 @@
-"""Whether the crank is among the joints of a recording's messages, and what is there instead."""
+"""Check that a recording's messages contain the crank joint; otherwise report the joints they contain."""
 
 import struct
 from pathlib import Path
@@ -19,7 +19,7 @@ _NAMED = (NO_FAULT, NOT_FINITE, ZERO_STAMP)
 
 @attrs.define
 class _Counts:
-    """Messages of a file that have the crank, and that do not; names in the latter."""
+    """Numbers of a file's messages with and without the crank; joint names of those without it."""
 
     found: int = 0
     missing: int = 0
@@ -27,7 +27,7 @@ class _Counts:
 
 
 class JointNames:
-    """Looks for the crank's name in the messages of each file.
+    """Searches the messages of each file for the crank joint.
 
     Parameters
     ----------
@@ -39,7 +39,7 @@ class JointNames:
         self._files: dict[Path, _Counts] = {}
 
     def see(self, path: Path, data: NDArray[np.uint8], messages: NDArray[np.void], samples: Samples) -> None:
-        """Take account of messages of a file and of what was decoded from them."""
+        """Count messages of a file, using the samples decoded from them."""
         counts = self._files.setdefault(path, _Counts())
         cranks = messages["type"] == JOINT_STATE
         counts.found += int(np.count_nonzero(cranks & np.isin(samples["fault"], _NAMED)))
@@ -50,12 +50,12 @@ class JointNames:
             counts.names |= set(names_in(data[message["begin"] : message["end"]].tobytes())[:_MOST])
 
     def findings(self) -> list[Finding]:
-        """What to say when all was read.
+        """Findings after all messages have been read.
 
         Raises
         ------
         RecordingError
-            If messages have joints, but none of them the crank; or none of a file's while another's have it.
+            If messages contain joints but never the crank, or if one file lacks the crank and another has it.
         """
         found = sum(counts.found for counts in self._files.values())
         findings = []
@@ -74,7 +74,7 @@ class JointNames:
 
 
 def names_in(raw: bytes) -> list[str]:
-    """Names of the joints in a sensor_msgs/JointState that could be decoded."""
+    """Joint names in a sensor_msgs/JointState message that has been decoded successfully."""
     order = "<" if raw[1] else ">"
     body, names = raw[ENCAPSULATION:], []
     _, at = _text(body, 8, order)

@@ -1,4 +1,4 @@
-"""metadata.yaml of a bag directory: files, topics and compression, and no more than a small file can say."""
+"""Reader of a bag directory's metadata.yaml (files, topics, compression), with limits on size and nesting."""
 
 import stat
 from pathlib import Path
@@ -20,16 +20,16 @@ _DEEPEST = 20
 
 @attrs.frozen
 class Metadata:
-    """What a bag directory says of itself.
+    """Contents of metadata.yaml.
 
     Attributes
     ----------
     files : list of str
-        Names of its files, in their order, each once.
+        File names in order, without duplicates.
     by_message : bool
-        Whether each message is compressed.
+        Whether each message is compressed on its own.
     types : dict
-        Types of topics.
+        Message type by topic name.
     """
 
     files: list[str]
@@ -43,7 +43,7 @@ def read_metadata(path: Path) -> Metadata:
     Raises
     ------
     DamageError
-        For one that cannot be relied on, in words that follow its name.
+        If the file is unreliable; the text is a predicate that follows the file name.
     """
     try:
         if not stat.S_ISREG(path.stat().st_mode):
@@ -59,7 +59,7 @@ def read_metadata(path: Path) -> Metadata:
 
 
 def _check_simple(text: str) -> None:
-    """Refuse what a few lines can blow up beyond any bound: aliases, and brackets without end."""
+    """Refuse YAML that can grow without limit from a few lines: aliases and deep nesting."""
     for event, depth in events_with_depth(text):
         if isinstance(event, AliasEvent):
             raise DamageError("contains aliases, which no bag's metadata has")

@@ -1,4 +1,4 @@
-"""Whether several files are recordings of one leg: the same topics, and never two angles at one time."""
+"""Check that several files record one leg: same topics, and equal crank angles at equal times."""
 
 import math
 from collections.abc import Iterable
@@ -16,30 +16,30 @@ from leg_wear_monitor.mechanism.ideal import TURN
 from leg_wear_monitor.twin.kinds import CRANK
 from leg_wear_monitor.twin.sample import NO_FAULT, Samples
 
-_KEPT = 8192  # samples of each file that others are compared with
-_ENOUGH = 20  # samples in common that say something
-_APART_RAD = 0.1  # more than clocks and noise of one crank's two recordings make
-_LONGEST_NS = 100_000_000  # between two samples that are interpolated
+_KEPT = 8192  # samples per file that are kept for comparison with other files
+_ENOUGH = 20  # smallest number of common samples for a conclusion
+_APART_RAD = 0.1  # exceeds the effect of clock offset and noise in two recordings of one crank
+_LONGEST_NS = 100_000_000  # longest gap between two samples for interpolation
 _ADVICE = "are these two legs? Give one leg at a time, or select its topic with --joint-states"
 
 
 def check_topics(
     sources: Iterable[Source], topics: dict[str, str], joint_states: str | None
 ) -> list[Finding]:
-    """See that each file has the crank's topic, or at least no other one that could be a crank's.
+    """Check that each file has the crank's topic, or has no other topic that could be a crank's.
 
     Parameters
     ----------
     sources : iterable of Source
     topics : dict
-        Topics that are read, by their roles.
+        Topic by role.
     joint_states : str, optional
-        The topic, if somebody named it.
+        The topic, if the user named it.
 
     Raises
     ------
     RecordingError
-        If a file has a crank's topic in another namespace, and nobody said which one is meant.
+        If a file has a crank's topic in another namespace and the user named no topic.
     """
     topic, findings = topics["joint_states"], []
     for source in sources:
@@ -57,13 +57,13 @@ def check_topics(
 
 @attrs.frozen(eq=False)
 class _Motion:
-    """Angles of a crank, in order of their stamps."""
+    """Crank angles in order of their stamps."""
 
     stamp_ns: NDArray[np.int64]
     angle_rad: Floats
 
     def apart(self, other: "_Motion") -> Floats:
-        """Differences [rad] to the angles of another that lie between close samples of this one."""
+        """Differences [rad] to the angles of `other`, where this motion can be interpolated."""
         after = np.searchsorted(self.stamp_ns, other.stamp_ns)
         inside = (after > 0) & (after < len(self.stamp_ns))
         after, stamps = after[inside], other.stamp_ns[inside]
@@ -77,18 +77,18 @@ class _Motion:
 
 
 class OneLeg:
-    """Compares what files say of the crank where they overlap in time."""
+    """Compares the crank angles of files that overlap in time."""
 
     def __init__(self) -> None:
         self._files: dict[Path, _Motion] = {}
 
     def see(self, path: Path, samples: Samples) -> None:
-        """Take account of samples of a file, stamped by their headers.
+        """Compare samples of a file with those of other files; stamps are those of the headers.
 
         Raises
         ------
         RecordingError
-            If another file has other angles at the same times.
+            If another file has different angles at the same times.
         """
         new = _motion(samples)
         if not len(new.stamp_ns):
@@ -114,5 +114,5 @@ def _motion(samples: Samples) -> _Motion:
 
 
 def _wrapped(angle: Floats) -> Floats:
-    """The same angle within half a turn of 0 [rad]."""
+    """Angle wrapped to half a turn around 0 [rad]."""
     return np.asarray((angle + math.pi) % TURN - math.pi)

@@ -1,4 +1,4 @@
-"""Pauses between recordings that are given together: time in which nobody recorded, no fault of the input."""
+"""Pauses between recordings that are replayed together: time without recording, not an input fault."""
 
 from collections.abc import Iterator, Sequence
 from pathlib import Path
@@ -20,11 +20,11 @@ class Block:
     samples : (n,) array of GAIT_SAMPLE
     log_time_ns : (n,) array of int
     fraction : float
-        Part of the recording's bytes read so far, 0 to 1.
+        Fraction of the recording's bytes read so far, 0 to 1.
     source : (n,) array of int
-        Index of the file that each sample is from.
+        File index of each sample.
     pause_ns : int
-        How long nobody recorded before this block, by log time; 0 if there was no pause.
+        Duration of the pause before this block, in log time [ns]; 0 if there was no pause.
     """
 
     samples: Samples
@@ -34,23 +34,23 @@ class Block:
     pause_ns: int = 0
 
     def part(self, which: slice, pause_ns: int = 0) -> "Block":
-        """Some of its samples."""
+        """Block of a subset of the samples."""
         return Block(
             self.samples[which], self.log_time_ns[which], self.fraction, self.source[which], pause_ns
         )
 
 
 class Pauses:
-    """Cuts blocks where one recording has ended and the next begins later.
+    """Splits blocks where one recording has ended and the next one begins later.
 
     Parameters
     ----------
     files : sequence of pathlib.Path
-        By the indices of sources.
+        File by source index.
     recordings : sequence of int
-        Which of the named recordings each file belongs to: the files of one bag have no pauses in between.
+        Recording index of each file; files of one bag have no pauses between them.
     shortest_ns : int
-        What is shorter is no pause.
+        Shortest gap that counts as a pause [ns].
 
     Attributes
     ----------
@@ -65,7 +65,7 @@ class Pauses:
         self.findings: list[Finding] = []
 
     def cut(self, block: Block) -> Iterator[Block]:
-        """Parts of a block, a new one after each pause."""
+        """Split a block at its pauses."""
         times = np.concatenate([[self._last_ns], block.log_time_ns])
         begin, pause_ns = 0, 0
         for at in np.flatnonzero(np.diff(times) > self._shortest_ns).tolist():

@@ -1,4 +1,4 @@
-"""A recording as blocks of gait samples: any files, any damage, in order of log time, in bounded memory."""
+"""Reads recordings, damaged ones too, as blocks of gait samples in log-time order, in bounded memory."""
 
 import heapq
 from collections.abc import Iterable, Iterator
@@ -25,38 +25,38 @@ from leg_wear_monitor.monitor.config.settings import MonitorConfig
 from leg_wear_monitor.twin.sample import GAIT_SAMPLE, NO_FAULT, ZERO_STAMP, Samples
 
 TIMES = ("header", "log", "publish")
-_TOGETHER = 4096  # samples that a block should have at least
-_OF_A_SAMPLE = 800  # bytes that one takes while it waits for its turn, its copies included
+_TOGETHER = 4096  # smallest intended number of samples in a block
+_OF_A_SAMPLE = 800  # memory of one queued sample, including copies [bytes]
 
 
 class Recording:
-    """Open recordings, several as one.
+    """One or more open recordings, read as one.
 
-    Messages come in order of their log time, and as they stand in the file where it is the same: the order
-    in which they were received.
+    Messages are ordered by log time, which is the order of reception. Messages of equal log time keep their
+    order in the file.
 
     Parameters
     ----------
     paths : iterable
         MCAP and .db3 files, bag directories; zstd-compressed or not.
     config : MonitorConfig
-        What the crank is called and where the torque comes from.
+        Provides the name of the crank joint and the source of the torque.
     joint_states, drive_torque : str, optional
-        Topics; found by their relative names if not given.
+        Topics; by default found by their relative names.
     time : str
-        One of `TIMES`: which time stamps the samples. Float64 has no header, it takes the log time.
+        Time that stamps the samples, one of `TIMES`. Float64 messages have no header and use the log time.
     memory_mb : float
-        Memory that reading may take, temporary files included [10⁶ bytes].
+        Memory limit for reading, including temporary files [10⁶ bytes].
 
     Attributes
     ----------
     topics : dict
-        Topics that are read, by what they are in the node.
+        Topics that are read, by their relative name in the node.
 
     Raises
     ------
     RecordingError
-        If there is nothing in them that can be used.
+        If the recordings contain nothing usable.
     """
 
     def __init__(
@@ -105,22 +105,22 @@ class Recording:
 
     @property
     def findings(self) -> list[Finding]:
-        """What was found so far; complete once all blocks are read."""
+        """Findings so far; complete after all blocks have been read."""
         found = [each for source in self._sources for each in source.file.findings]
         return self._findings + found + self._pauses.findings
 
     @property
     def is_partial(self) -> bool:
-        """Whether something that was recorded is lost, or may be wrong."""
+        """Whether recorded data are lost or may be wrong."""
         return any(finding.weight is Severity.LOSS for finding in self.findings)
 
     def blocks(self) -> Iterator[Block]:
-        """Samples of the whole recording; once.
+        """Iterate over the samples of the whole recording; possible once only.
 
         Raises
         ------
         RecordingError
-            At the end, if the crank is in no message; as soon as files are of two legs.
+            At the end, if no message contains the crank; immediately, if the files are of two legs.
         """
         for block in self._joined():
             yield from self._pauses.cut(block)
@@ -152,7 +152,7 @@ class Recording:
             yield attrs.evolve(waiting, fraction=1.0)
 
     def _pieces(self) -> Iterator[tuple[int, Piece]]:
-        """Pieces of all files as they begin, with their file's index; each is loaded when it is due."""
+        """Pieces of all files, with their file index, ordered by start time; loaded only when needed."""
         dues = (
             zip(repeat(number), source.pieces(), strict=False) for number, source in enumerate(self._sources)
         )
@@ -169,7 +169,7 @@ class Recording:
             self._findings.append(Finding(path, text))
 
     def _samples(self, path: Path, piece: Piece) -> Samples:
-        """Decode a piece, and stamp its samples as asked for."""
+        """Decode a piece, and stamp its samples with the selected time."""
         samples = self._decoder.many(piece.data, piece.messages)
         self._joints.see(path, piece.data, piece.messages, samples)
         if len(self._sources) > 1:
@@ -183,7 +183,7 @@ class Recording:
 
 
 def _merged(block: Block, new: Block) -> Block:
-    """Samples of two blocks in order of log time."""
+    """Merge two blocks in order of log time."""
     times = np.concatenate([block.log_time_ns, new.log_time_ns])
     samples = np.concatenate([block.samples, new.samples])
     source = np.concatenate([block.source, new.source])

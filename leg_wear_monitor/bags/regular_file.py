@@ -1,4 +1,4 @@
-"""Opening what strangers name: regular files only, and never a wait for whoever writes into a pipe."""
+"""Opening of untrusted paths: accepts regular files only, and never blocks on a pipe."""
 
 import os
 import stat
@@ -15,17 +15,17 @@ _KINDS = {
 
 
 def kind_of(mode: int) -> str:
-    """What a mode of `os.stat` says it is, with its article; empty for a regular file."""
+    """File kind of an `os.stat` mode, with its article; empty for a regular file."""
     return "" if stat.S_ISREG(mode) else _KINDS.get(stat.S_IFMT(mode), "no file")
 
 
 def open_regular(path: Path) -> IO[bytes]:
-    """Open a regular file to read.
+    """Open a regular file for reading.
 
     Raises
     ------
     OSError
-        If it cannot be opened, or is no regular file: something else may have taken its place by now.
+        If it cannot be opened or is not a regular file (it may have been replaced since an earlier check).
     """
     descriptor = os.open(path, os.O_RDONLY | os.O_CLOEXEC | getattr(os, "O_NONBLOCK", 0))
     what = kind_of(os.fstat(descriptor).st_mode)

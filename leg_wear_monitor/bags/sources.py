@@ -1,4 +1,4 @@
-"""The files of a recording, opened alike, and which of their channels are wanted."""
+"""Uniform access to the files of a recording, and selection of the channels to read."""
 
 import tempfile
 from collections.abc import Iterable, Iterator
@@ -21,7 +21,7 @@ from leg_wear_monitor.bags.topics import Role, check_channel, find_topic, listed
 
 
 class OpenFile(Protocol):
-    """What an MCAP and a .db3 file have in common."""
+    """Common interface of MCAP and .db3 files."""
 
     path: Path
     size: int
@@ -29,15 +29,15 @@ class OpenFile(Protocol):
 
     @property
     def channels(self) -> dict[int, Channel]:
-        """Channels of the file by their number."""
+        """Channels of the file by channel number."""
 
     def pieces(self, types: dict[int, int]) -> Iterator[Due]:
-        """Messages of channels, given with the codes of their types."""
+        """Pieces of the channels in `types` (stream code by channel number)."""
 
 
 @attrs.define(eq=False)
 class Source:
-    """An open file of a recording, and the channels to read with their types."""
+    """An open file of a recording, and the channels to read with their stream codes."""
 
     bag_file: BagFile
     file: OpenFile
@@ -45,12 +45,12 @@ class Source:
     types: dict[int, int] = attrs.Factory(dict)
 
     def pieces(self) -> Iterator[Due]:
-        """Messages that are wanted, in order of log time."""
+        """Pieces of the selected channels, in order of log time."""
         for due in self.file.pieces(self.types):
             yield attrs.evolve(due, load=partial(self._expanded, due)) if self.bag_file.by_message else due
 
     def _expanded(self, due: Due) -> Piece | None:
-        """The messages of a piece, each decompressed."""
+        """Load a piece and decompress each of its messages."""
         piece = due.load()
         return None if piece is None else _expanded(piece, self.budget.at_once // 2)
 
@@ -58,19 +58,19 @@ class Source:
 def open_sources(
     bag_files: Iterable[BagFile], budget: Budget, stack: ExitStack
 ) -> tuple[list[Source], list[Finding]]:
-    """Open what can be opened; a file that cannot be is lost if there are others.
+    """Open the files of a recording; an unreadable file becomes a finding if another one can be opened.
 
     Parameters
     ----------
     bag_files : iterable of BagFile
     budget : Budget
     stack : contextlib.ExitStack
-        Closes them.
+        Closes the files.
 
     Raises
     ------
     RecordingError
-        If none can be opened.
+        If no file can be opened.
     """
     sources: list[Source] = []
     failed: list[RecordingError] = []
@@ -85,18 +85,18 @@ def open_sources(
 
 
 def assign(sources: list[Source], wanted: Iterable[Role]) -> tuple[dict[str, str], list[Finding]]:
-    """Find the topics of roles, and set what to read from each source.
+    """Find the topics of roles, and select the channels to read from each source.
 
     Returns
     -------
     topics : dict
-        Topic of each role that is there, by its name.
+        Topic by role name, for each role that was found.
     findings : list of Finding
 
     Raises
     ------
     RecordingError
-        If the crank's topic is not there, or a topic holds what cannot be read.
+        If the crank's topic is missing, or the type of a topic cannot be read.
     """
     there = [channel.topic for source in sources for channel in source.file.channels.values()]
     first = sources[0].bag_file.path
@@ -142,7 +142,7 @@ def _open(bag_file: BagFile, budget: Budget, stack: ExitStack) -> OpenFile:
 
 
 def _expanded_file(bag_file: BagFile, budget: Budget, stack: ExitStack) -> Path:
-    """Temporary file with the content of a compressed one; it counts as memory."""
+    """Decompress a file to a temporary file; its size counts as memory."""
     path = Path(stack.enter_context(tempfile.TemporaryDirectory())) / f"content{bag_file.storage}"
     with open_regular(bag_file.path) as file, path.open("wb") as content:
         if file.read(len(ZSTD_MAGIC)) != ZSTD_MAGIC:
@@ -157,7 +157,7 @@ def _expanded_file(bag_file: BagFile, budget: Budget, stack: ExitStack) -> Path:
 
 
 def _expanded(piece: Piece, most: int) -> Piece:
-    """The same messages, each decompressed, and no more bytes of all of them than asked for."""
+    """Decompress each message of a piece, up to `most` bytes in total."""
     contents = []
     for begin, end in zip(piece.messages["begin"].tolist(), piece.messages["end"].tolist(), strict=True):
         contents.append(expand_message(piece.data[begin:end].tobytes(), most))

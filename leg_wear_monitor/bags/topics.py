@@ -1,4 +1,4 @@
-"""Which topics of a recording are the crank's and the torque's, and whether they hold what they should."""
+"""Selection of the crank and torque topics of a recording, and check of their types."""
 
 from collections.abc import Iterable, Mapping
 
@@ -12,34 +12,34 @@ from leg_wear_monitor.messages.streams import Stream, streams_read
 
 @attrs.frozen
 class Role:
-    """What is looked for in a recording: a stream, and the topic where a user says that it is."""
+    """Input required from a recording: its stream, and its topic if the user named one."""
 
     stream: Stream
     topic: str | None = None
 
     @property
     def name(self) -> str:
-        """As it is in the node: a relative name."""
+        """Relative topic name, as in the node."""
         return self.stream.topic
 
 
 def roles(source: str, given: Mapping[str, str | None]) -> list[Role]:
-    """What a monitor with a source of torque needs: a key of `drive_torque.source`, and topics if given."""
+    """Inputs that a monitor needs for a value of `drive_torque.source`; `given` holds the user's topics."""
     return [Role(stream, given.get(stream.topic)) for stream in streams_read(source)]
 
 
 def find_topic(role: Role, topics: Iterable[str], where: str) -> str | None:
-    """Topic of a role: the one given, else the relative name in the root, else in the one namespace it is in.
+    """Topic of a role: the given one, else the name in the root, else the name in its only namespace.
 
     Returns
     -------
     str or None
-        None where nothing was given and nothing is there.
+        None if no topic was given and none was found.
 
     Raises
     ------
     RecordingError
-        If the given topic is not there, or several namespaces have the name.
+        If the given topic does not exist, or several namespaces contain the name.
     """
     there = sorted(set(topics))
     if role.topic is not None:
@@ -57,21 +57,21 @@ def find_topic(role: Role, topics: Iterable[str], where: str) -> str | None:
 
 
 def check_channel(role: Role, channel: Channel, known_type: str, where: str) -> int:
-    """Code of a channel's stream, once it is sure that its messages can be read as such.
+    """Stream code of a channel, after a check that its messages can be decoded.
 
     Parameters
     ----------
     role : Role
     channel : Channel
     known_type : str
-        What else is known of the topic's type, from metadata.yaml; empty if nothing.
+        Type of the topic from metadata.yaml; empty if unknown.
     where : str
-        File, for messages.
+        File name in errors.
 
     Raises
     ------
     RecordingError
-        Naming file, topic, and what it should be.
+        If they cannot; the message names the file, the topic and the expected type.
     """
     stream = role.stream
     kind = channel.type or known_type or stream.type
@@ -88,7 +88,7 @@ def check_channel(role: Role, channel: Channel, known_type: str, where: str) -> 
 
 
 def _fields(definition: str) -> tuple[str, ...]:
-    """Type and name of each field of a definition's own part, without constants and comments."""
+    """Type and name of each field in a definition's main part, without constants and comments."""
     fields = []
     for line in definition.splitlines():
         if line.startswith("====="):
@@ -100,7 +100,7 @@ def _fields(definition: str) -> tuple[str, ...]:
 
 
 def listed(names: Iterable[str]) -> str:
-    """Names in order, not too many."""
+    """Sorted names as text, shortened if there are many."""
     names = sorted(set(names))
     more = f" and {len(names) - 20} more" if len(names) > 20 else ""
     return (", ".join(printable(name, 100) for name in names[:20]) or "none") + more

@@ -1,4 +1,4 @@
-"""A chunk of an MCAP file while it is filled, and its records when it is full."""
+"""An MCAP chunk under construction, and its serialization as records."""
 
 import struct
 import zlib
@@ -30,7 +30,7 @@ _HEAD_OF_MESSAGE = _MESSAGE.size - HEAD.size
 
 @attrs.define(eq=False)
 class Chunk:
-    """Records that wait to be written, and where in them each channel's messages are."""
+    """Buffered message records, and the offset of each channel's messages within them."""
 
     content: bytearray = attrs.Factory(bytearray)
     indexes: dict[int, list[NDArray[Any]]] = attrs.Factory(dict)
@@ -43,7 +43,7 @@ class Chunk:
         self.content += raw
 
     def add_many(self, channel: int, log_time_ns: NDArray[np.int64], messages: NDArray[np.uint8]) -> None:
-        """Add messages of one length, one a row."""
+        """Add messages of equal length, one per row."""
         n, size = messages.shape
         heads = np.zeros(n, _MESSAGE_TYPE)
         heads["opcode"], heads["length"], heads["channel"] = Opcode.MESSAGE, _HEAD_OF_MESSAGE + size, channel
@@ -55,19 +55,19 @@ class Chunk:
         self.content += records.tobytes()
 
     def _note(self, channel: int, log_time_ns: ArrayLike, offset: ArrayLike) -> None:
-        """Keep where messages of a channel lie, and their times."""
+        """Index messages of a channel: their offsets and log times."""
         times = np.atleast_1d(np.asarray(log_time_ns))
         index = np.empty(len(times), _INDEX)
         index["log_time_ns"], index["offset"] = times, offset
         self.indexes.setdefault(channel, []).append(index)
 
     def records(self, at: int, compressor: zstandard.ZstdCompressor) -> tuple[ChunkIndex, bytes]:
-        """Records of the chunk and of its messages' index, and its entry in the summary.
+        """Serialize the chunk and its message indexes; also return its chunk index for the summary.
 
         Parameters
         ----------
         at : int
-            Byte of the file where it will begin.
+            File offset of the chunk [bytes].
         compressor : zstandard.ZstdCompressor
         """
         content = bytes(self.content)

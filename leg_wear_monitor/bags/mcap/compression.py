@@ -1,4 +1,4 @@
-"""Decompression that trusts no length and no checksum before it has seen it hold."""
+"""Decompression of untrusted data: declared lengths and checksums are verified, sizes are bounded."""
 
 import zlib
 from collections.abc import Iterator
@@ -9,25 +9,25 @@ from leg_wear_monitor.bags.findings import DamageError
 
 ZSTD_MAGIC = b"\x28\xb5\x2f\xfd"
 _LARGEST_MESSAGE = 2**24
-_PART = 2**18  # bytes that are read together
-_BLOCK = 2**17  # bytes that are expanded together: zstd's own blocks have no more
-_LARGEST_WINDOW = 2**27  # bytes a zstd frame may look back; what zstd itself expands unless told otherwise
+_PART = 2**18  # bytes per read
+_BLOCK = 2**17  # bytes per decompression step: the size limit of a zstd block
+_LARGEST_WINDOW = 2**27  # largest accepted window of a zstd frame [bytes]: the default limit of zstd
 
 
 def expand(data: bytes, compression: str, size: int) -> bytes:
-    """Content of a chunk.
+    """Decompress the content of a chunk.
 
     Parameters
     ----------
     data : bytes
     compression : str
     size : int
-        Bytes that it should have; no more are expanded, whatever the data claim.
+        Expected size [bytes]; decompression stops there, whatever size the data declare.
 
     Raises
     ------
     DamageError
-        Where the data are not what their head says.
+        If the data do not match the chunk header.
     """
     if compression == "zstd":
         content = _zstd(data, size)
@@ -43,7 +43,7 @@ def expand(data: bytes, compression: str, size: int) -> bytes:
 
 
 def expand_part(data: bytes, compression: str, size: int) -> bytes:
-    """As much of a chunk's content as can be had from its first bytes; empty where that is nothing."""
+    """Decompress as much as possible of a truncated chunk; empty if nothing can be recovered."""
     import lz4.frame
 
     if compression == "":
@@ -60,7 +60,7 @@ def expand_part(data: bytes, compression: str, size: int) -> bytes:
 
 
 def expanded(file: IO[bytes]) -> Iterator[bytes]:
-    """Content of a zstd file in parts of bounded size, until it ends or is damaged."""
+    """Decompress a zstd file in parts of bounded size, up to its end or the first damage."""
     import zstandard
 
     expander = zstandard.ZstdDecompressor(max_window_size=_LARGEST_WINDOW)
@@ -69,14 +69,14 @@ def expanded(file: IO[bytes]) -> Iterator[bytes]:
         try:
             part = next(parts, b"")
         except zstandard.ZstdError:
-            return  # whoever reads the content finds that it ends early
+            return  # the reader of the content detects the truncation
         if not part:
             return
         yield part
 
 
 def check(content: bytes, crc: int) -> None:
-    """Compare a chunk's content with its checksum; 0 stands for none.
+    """Verify the checksum of a chunk's content; 0 means that there is no checksum.
 
     Raises
     ------
@@ -87,13 +87,13 @@ def check(content: bytes, crc: int) -> None:
 
 
 def expand_message(data: bytes, most: int) -> bytes:
-    """Content of a message that was compressed by itself, other messages as they are; empty where none is.
+    """Decompress a message; uncompressed messages are returned unchanged, unusable ones as empty bytes.
 
     Parameters
     ----------
     data : bytes
     most : int
-        Bytes that it may have.
+        Size limit of the content [bytes].
     """
     import zstandard
 
@@ -109,7 +109,7 @@ def expand_message(data: bytes, most: int) -> bytes:
 
 
 def _join(parts: Iterator[bytes], most: int) -> bytes:
-    """Parts in one, as many bytes as asked for."""
+    """Concatenate parts up to a number of bytes."""
     content = bytearray()
     for part in parts:
         content += part[: most - len(content)]

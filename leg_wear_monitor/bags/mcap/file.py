@@ -1,4 +1,4 @@
-"""One MCAP file: its topics, and their messages piece by piece in order of log time."""
+"""Reader of one MCAP file: its topics, and its messages in pieces ordered by log time."""
 
 import zlib
 from collections.abc import Callable, Iterator
@@ -23,22 +23,22 @@ _NO_POSITIONS = np.zeros(0, np.int64)
 _NO_MESSAGES = np.zeros(0, MESSAGE)
 
 
-_OF_A_MESSAGE = 400  # bytes that it takes on its way to a sample, beside its own
+_OF_A_MESSAGE = 400  # memory overhead of decoding one message into a sample [bytes]
 _MOST_FINDINGS = 1000
 
 
 @attrs.frozen(eq=False)
 class Piece:
-    """Messages that were read together.
+    """Messages that are read in one step.
 
     Attributes
     ----------
     start_ns : int
-        No message of this piece or a later one of the same file was logged before [ns].
+        Lower bound of the log times in this piece and all later pieces of the file [ns].
     data : (bytes,) array of uint8
     messages : (n,) array of MESSAGE
     stored : int
-        Bytes of the file that it came from.
+        Bytes that the piece occupies in the file.
     """
 
     start_ns: int
@@ -49,14 +49,14 @@ class Piece:
 
 @attrs.frozen(eq=False)
 class Due:
-    """A piece that is not loaded yet, so that many files wait for their turn without taking memory.
+    """A piece that is not loaded yet; a merge of many files thus holds few pieces in memory.
 
     Attributes
     ----------
     start_ns : int
-        As in the piece [ns].
+        `Piece.start_ns` of the piece [ns].
     load : callable
-        Gives the piece, or None where it is damaged. To be called before the next one is asked for.
+        Returns the piece, or None if it is damaged. Call it before requesting the next piece.
     """
 
     start_ns: int
@@ -64,20 +64,20 @@ class Due:
 
 
 class McapFile:
-    """An MCAP file, open; what is wrong with it is in `findings`.
+    """An open MCAP file; its faults are listed in `findings`.
 
     Parameters
     ----------
     path : pathlib.Path
-        Name for messages.
+        Name of the file in findings and errors.
     file : binary file
-        From which can be read anywhere.
+        Seekable.
     budget : Budget
 
     Raises
     ------
     RecordingError
-        If it is empty or no MCAP file.
+        If the file is empty or is not an MCAP file.
     """
 
     def __init__(self, path: Path, file: IO[bytes], budget: Budget) -> None:
@@ -98,16 +98,16 @@ class McapFile:
 
     @property
     def channels(self) -> dict[int, Channel]:
-        """Channels of the file by their number."""
+        """Channels of the file by channel number."""
         return self.layout.channels
 
     def pieces(self, types: dict[int, int]) -> Iterator[Due]:
-        """Messages of the channels asked for, to be loaded in turn; damaged parts are left out and found.
+        """Pieces of the requested channels, for lazy loading; damaged parts are skipped and become findings.
 
         Parameters
         ----------
         types : dict
-            Codes of streams by number of the channel.
+            Stream code by channel number.
         """
         roles = np.zeros(2**16, np.uint8)
         roles[list(self.channels)] = records.IGNORED
@@ -118,7 +118,7 @@ class McapFile:
         self._account(types, self._found)
 
     def _piece(self, segment: Segment, roles: NDArray[np.uint8]) -> Piece | None:
-        """Messages of a segment; None where it is damaged."""
+        """Messages of a segment; None if it is damaged."""
         try:
             data = np.frombuffer(self._load(segment), np.uint8)
             messages = self._messages(segment, data, roles)
@@ -129,7 +129,7 @@ class McapFile:
         return Piece(segment.start_ns, data, messages, segment.stored)
 
     def _load(self, segment: Segment) -> bytes:
-        """Records of a segment, whose checksum holds where there is one."""
+        """Records of a segment, after verification of its checksum (if there is one)."""
         if segment.data_at == segment.at:
             self.without_checksum += 1
             return content(self.file, segment, self.budget)
@@ -166,7 +166,7 @@ class McapFile:
         return messages
 
     def _account(self, types: dict[int, int], found: int) -> None:
-        """Say at the end how many messages are missing, and what could not be checked."""
+        """Report, after the last piece, how many messages are missing and what could not be checked."""
         counts = self.layout.counts
         expected = sum(counts.get(number, 0) for number in types) if counts is not None else found
         if expected != found:
@@ -189,7 +189,7 @@ class McapFile:
             )
 
     def _check_data(self) -> None:
-        """Compare all data with their checksum, where the file has one."""
+        """Verify the checksum of the data section, if the file has one."""
         if not self.layout.data_crc:
             return
         self.file.seek(0)

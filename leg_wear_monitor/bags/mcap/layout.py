@@ -1,4 +1,4 @@
-"""Where in an MCAP file the messages lie, by its index; `salvage` finds it where there is no sound one."""
+"""Locations of the messages in an MCAP file, from its index; without a sound index, see `salvage`."""
 
 import struct
 import zlib
@@ -23,7 +23,7 @@ HEAD = struct.Struct("<BQ")
 UNREADABLE = (McapError, struct.error, UnicodeDecodeError, ValueError, KeyError, OverflowError, MemoryError)
 """What the library raises over records that are damaged."""
 
-_OF_A_SUMMARY = 16  # its records take so many times its bytes
+_OF_A_SUMMARY = 16  # memory of the parsed summary records per byte of the summary
 _OF_USE = (ChannelRecord, ChunkIndex, Schema, Statistics)
 _CHUNK_HEAD = struct.Struct("<QQQI")
 _FOOTER = struct.Struct("<BQQQI")
@@ -32,7 +32,7 @@ _DATA_END = struct.Struct("<BQI")
 
 @attrs.frozen
 class Channel:
-    """What a topic carries in one file; texts are empty where the file does not say."""
+    """Topic, type and schema of a channel in one file; unknown texts are empty."""
 
     topic: str
     type: str
@@ -43,18 +43,18 @@ class Channel:
 
 @attrs.frozen
 class Segment:
-    """Records that lie together: a chunk, or messages outside of chunks.
+    """Contiguous records: a chunk, or messages outside of chunks.
 
     Attributes
     ----------
     at, data_at, stored : int
-        Byte where it begins, byte where its content begins, bytes of that content in the file.
+        File offset of the segment, file offset of its content, stored size of its content [bytes].
     size, compression, crc : int, str, int
-        What the content expands to; 0 is no checksum.
+        Uncompressed size [bytes], compression and checksum of the content; 0 means no checksum.
     start_ns, end_ns : int
-        Log times, as the file says [ns].
+        First and last log time declared by the file [ns].
     cut : bool
-        Whether the file ends inside of it.
+        Whether the file ends inside the segment.
     """
 
     at: int
@@ -70,18 +70,18 @@ class Segment:
 
 @attrs.define
 class Layout:
-    """What a file holds and where.
+    """Contents of a file and their locations.
 
     Attributes
     ----------
     segments : list of Segment
         In order of log time.
     channels : dict
-        Channels by their number.
+        Channels by channel number.
     counts : dict, optional
-        Messages each channel should have, None where the file does not say.
+        Expected number of messages by channel; None if the file does not declare it.
     data_end, data_crc : int
-        End of the data, and their checksum, 0 if there is none.
+        End of the data section [bytes], and its checksum; 0 if there is none.
     losses, notes : list of str
     """
 
@@ -95,7 +95,7 @@ class Layout:
 
 
 def by_index(file: IO[bytes], size: int, budget: Budget) -> Layout | None:
-    """Layout from a file's summary; None where there is none that can be relied on."""
+    """Layout from the summary of a file; None if there is no reliable summary."""
     records = _summary(file, size, budget.at_once // _OF_A_SUMMARY)
     if records is None:
         return None
@@ -120,7 +120,7 @@ def by_index(file: IO[bytes], size: int, budget: Budget) -> Layout | None:
 
 
 def _overlap(indexes: list[ChunkIndex]) -> bool:
-    """Whether chunks lie one in another: an index could name one a million times."""
+    """Whether chunks overlap; a malicious index could list one chunk a million times."""
     spans = sorted((index.chunk_start_offset, index.chunk_length) for index in indexes)
     return any(at + length > after for (at, length), (after, _) in pairwise(spans))
 
@@ -138,7 +138,7 @@ def _indexed(index: ChunkIndex, data_at: int) -> Segment:
 
 
 def _footer(file: IO[bytes], size: int) -> tuple[int, int]:
-    """Start of the summary, 0 if there is none, and its checksum."""
+    """Start of the summary (0 if there is none) and its checksum."""
     file.seek(max(0, size - _FOOTER.size - len(MAGIC)))
     end = file.read()
     if len(end) != _FOOTER.size + len(MAGIC) or not end.endswith(MAGIC):
@@ -148,7 +148,7 @@ def _footer(file: IO[bytes], size: int) -> tuple[int, int]:
 
 
 def _summary(file: IO[bytes], size: int, most: int) -> list[Any] | None:
-    """Records of the summary that are of use; None where it is absent, damaged or larger than that."""
+    """Relevant records of the summary; None if it is absent, damaged or larger than `most` bytes."""
     start, crc = _footer(file, size)
     if not start or size - start > most:
         return None
@@ -157,7 +157,7 @@ def _summary(file: IO[bytes], size: int, most: int) -> list[Any] | None:
     if crc and zlib.crc32(data[: -len(MAGIC) - 4]) != crc:
         return None
     try:
-        # emit_chunks: what stands there as a chunk would be expanded without a bound
+        # without emit_chunks, a chunk record in the summary would be decompressed without a size limit
         reader = StreamReader(BytesIO(data), skip_magic=True, record_size_limit=len(data), emit_chunks=True)
         return [record for record in reader.records if isinstance(record, _OF_USE)]
     except UNREADABLE:
@@ -165,7 +165,7 @@ def _summary(file: IO[bytes], size: int, most: int) -> list[Any] | None:
 
 
 def _data_end(file: IO[bytes], summary_start: int) -> tuple[int, int]:
-    """Where the data end, and their checksum; zeros if that does not stand before the summary."""
+    """End and checksum of the data section; zeros if no data-end record precedes the summary."""
     at = summary_start - _DATA_END.size
     if at < len(MAGIC):
         return 0, 0
@@ -175,12 +175,12 @@ def _data_end(file: IO[bytes], summary_start: int) -> tuple[int, int]:
 
 
 def chunk_head(file: IO[bytes], at: int, size: int) -> Segment:
-    """What a chunk says of itself.
+    """Segment described by a chunk header.
 
     Raises
     ------
     DamageError
-        If it is not a chunk.
+        If there is no chunk at this offset.
     """
     file.seek(at)
     head = file.read(RECORD_HEAD + _CHUNK_HEAD.size + 4 + 16 + 8)
@@ -199,14 +199,14 @@ def chunk_head(file: IO[bytes], at: int, size: int) -> Segment:
     if stored != length - (data_at - at - RECORD_HEAD):
         raise DamageError("has lengths that contradict each other")
     there = max(0, min(stored, size - data_at))
-    limit = 2**63 - 1  # a damaged time must not leave the range of a stamp
+    limit = 2**63 - 1  # keeps a damaged time within the range of a stamp
     return Segment(
         at, data_at, there, expanded, compression, crc, min(start, limit), min(end, limit), there < stored
     )
 
 
 def channels_of(records: Iterable[Any]) -> dict[int, Channel]:
-    """Channels by their number, with their schemas' names and definitions."""
+    """Channels by channel number, with the names and definitions of their schemas."""
     records = list(records)
     schemas = {record.id: record for record in records if isinstance(record, Schema)}
     channels = {}
@@ -221,7 +221,7 @@ def channels_of(records: Iterable[Any]) -> dict[int, Channel]:
 
 
 def definitions(data: bytes, positions: Iterable[int]) -> Iterator[Any]:
-    """Schemas and channels that stand at positions in a segment; damaged ones are left out."""
+    """Schemas and channels at given positions of a segment; damaged ones are skipped."""
     for at in positions:
         opcode, length = HEAD.unpack_from(data, at)
         stream = ReadDataStream(BytesIO(data[at + RECORD_HEAD : at + RECORD_HEAD + length]))

@@ -1,4 +1,4 @@
-"""A file without an index, or with a damaged one: walked from start to end, as far as it can be read."""
+"""Sequential scan of a file whose index is missing or damaged, up to the last readable record."""
 
 from typing import IO, Any
 
@@ -22,21 +22,21 @@ from leg_wear_monitor.bags.mcap.layout import (
 from leg_wear_monitor.bags.mcap.records import COUNTS, RECORD_HEAD
 from leg_wear_monitor.messages.cdr import MESSAGE
 
-_WINDOW = 2**20  # bytes looked at together outside of chunks
-_OF_A_SEGMENT = 400  # bytes in memory
+_WINDOW = 2**20  # bytes scanned per step outside of chunks
+_OF_A_SEGMENT = 400  # memory of one segment [bytes]
 _LAST_OPCODE, _PRIVATE = 0x0F, 0x80
 _MOST_DEFINITIONS = 4096
 _ALL_IGNORED = np.full(2**16, records.IGNORED, np.uint8)
 
 
 def by_scan(file: IO[bytes], size: int, budget: Budget) -> Layout:
-    """Layout from the records themselves: chunks are expanded for their channels and their true times.
+    """Layout from the records; each chunk is decompressed to find its channels and actual log times.
 
     Parameters
     ----------
-    file : binary file, from which can be read anywhere
+    file : seekable binary file
     size : int
-        Its bytes.
+        Size of the file [bytes].
     budget : Budget
     """
     scan = _Scan(file, size, budget)
@@ -48,7 +48,7 @@ def by_scan(file: IO[bytes], size: int, budget: Budget) -> Layout:
 
 
 class _Scan:
-    """Where the walk is, and what it has found."""
+    """State and results of a scan."""
 
     def __init__(self, file: IO[bytes], size: int, budget: Budget) -> None:
         self.file, self.size, self.at = file, size, len(MAGIC)
@@ -58,7 +58,7 @@ class _Scan:
         self.defined = 0  # bytes
 
     def run(self) -> None:
-        """Go from record to record until the data end, or can no longer be followed."""
+        """Read record by record until the data section ends or the records become unreadable."""
         while True:
             self.file.seek(self.at)
             head = self.file.read(RECORD_HEAD)
@@ -77,7 +77,7 @@ class _Scan:
                 return
 
     def _step(self, opcode: int, length: int) -> bool:
-        """Take one record, or many outside of chunks; False where the walk has to end."""
+        """Process one record, or several messages outside of chunks; False ends the scan."""
         end = self.at + RECORD_HEAD + length
         if opcode == records.CHUNK:
             try:
@@ -105,17 +105,17 @@ class _Scan:
         return True
 
     def _outside(self, end: int) -> int:
-        """Take the messages that lie here outside of chunks, and give where they end."""
+        """Process the messages outside of chunks at this offset; return the offset of their end."""
         window = min(max(end - self.at, _WINDOW), self.size - self.at)
         self._take(Segment(self.at, self.at, window, window))
         return self.at + self.layout.segments[-1].stored
 
     def _take(self, segment: Segment) -> None:
-        """Keep a segment with its true times, and the definitions in it."""
+        """Add a segment with its actual log times, and the definitions it contains."""
         try:
             data = content(self.file, segment, self.budget)
         except DamageError:
-            self.layout.segments.append(segment)  # whoever reads it says what is wrong
+            self.layout.segments.append(segment)  # the reader reports the damage
             return
         counts, positions = np.zeros(1, COUNTS), np.zeros(_MOST_DEFINITIONS, np.int64)
         records.walk(np.frombuffer(data, np.uint8), _ALL_IGNORED, np.zeros(0, MESSAGE), positions, counts)
@@ -129,7 +129,7 @@ class _Scan:
         self.layout.segments.append(segment)
 
     def _define(self, data: bytes, positions: list[int]) -> None:
-        """Keep schemas and channels, the last of each number, as long as there is room for them."""
+        """Store schemas and channels, the last of each number, while memory permits."""
         for record in definitions(data, positions):
             self.defined += len(record.data) if isinstance(record, Schema) else len(record.topic)
             if self.defined <= self.budget.at_once // 4:
@@ -148,12 +148,12 @@ class _Scan:
 
 
 def content(file: IO[bytes], segment: Segment, budget: Budget) -> bytes:
-    """Records of a segment, without a look at its checksum; what can be had of one that is cut.
+    """Records of a segment, without verification of its checksum; the readable part of a truncated one.
 
     Raises
     ------
     DamageError
-        Also if it needs more than the budget leaves.
+        If the segment is damaged, or needs more memory than is left in the budget.
     """
     budget.check(segment.size + (segment.stored if segment.data_at != segment.at else 0))
     file.seek(segment.data_at)

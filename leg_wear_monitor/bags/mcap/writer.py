@@ -1,8 +1,8 @@
-"""MCAP of ROS 2 messages: chunk by chunk, each on its way to the disk before the next is begun.
+"""Writer of MCAP files with ROS 2 messages; each chunk is written to disk before the next one begins.
 
-The library's own writer takes one message at a time, slower than a replay can wait for, and holds a chunk
-back until it is full. Here messages of one topic go in together, and a chunk can be closed at any time; all
-records but messages, chunks and their indexes are the library's.
+The writer of the mcap library adds one message at a time, which is too slow for a replay, and writes a chunk
+only when it is full. This writer adds many messages of a topic at once and can close a chunk at any time.
+All records other than messages, chunks and their indexes are written with the mcap library.
 """
 
 import zlib
@@ -28,20 +28,20 @@ PROFILE, LIBRARY = "ros2", "leg_wear_monitor"
 
 
 class McapWriter:
-    """An MCAP file of the ros2 profile. What was flushed can be read if the process dies.
+    """An MCAP file of the ros2 profile. Flushed messages stay readable if the process dies.
 
     Parameters
     ----------
     path : str or pathlib.Path
-        Overwritten if there.
+        An existing file is overwritten.
     chunk_bytes : int
-        Size from which on a chunk is written.
+        Size at which a chunk is written [bytes].
 
     Raises
     ------
     RecordingError
-        Here and in every method that writes, if the disk does not take it. What was written before stays
-        readable, and writing may be tried again; the chunk that did not fit is gone.
+        If writing to the disk fails, here and in every method that writes. Earlier chunks stay readable and
+        writing may be retried; the chunk that could not be written is lost.
     """
 
     def __init__(self, path: str | Path, *, chunk_bytes: int = 2**17) -> None:
@@ -73,16 +73,16 @@ class McapWriter:
         self.close()
 
     def channel(self, topic: str, type_name: str, qos: Qos = RELIABLE) -> int:
-        """Number of a new channel.
+        """Add a channel and return its number.
 
         Parameters
         ----------
         topic : str
-            Full name, with its slash.
+            Full name, with the leading slash.
         type_name : str
             Such as ``sensor_msgs/msg/JointState``.
         qos : Qos
-            What its publisher offers.
+            Quality of service offered by the publisher.
         """
         known = definition(type_name)
         if type_name not in self._schemas:
@@ -98,17 +98,17 @@ class McapWriter:
         return number
 
     def write(self, channel: int, log_time_ns: int, raw: bytes, publish_time_ns: int | None = None) -> None:
-        """Add one message as it is on the wire.
+        """Add one serialized message.
 
         Parameters
         ----------
         channel : int
         log_time_ns : int
-            When it was received [ns].
+            Time of reception [ns].
         raw : bytes
-            CDR with its encapsulation.
+            CDR with its encapsulation header.
         publish_time_ns : int, optional
-            When it was sent, the log time if not known [ns].
+            Time of sending [ns]; default: the log time.
         """
         sent = log_time_ns if publish_time_ns is None else publish_time_ns
         self._chunk.add(channel, log_time_ns, sent, raw)
@@ -117,15 +117,15 @@ class McapWriter:
             self.flush()
 
     def write_many(self, channel: int, log_time_ns: NDArray[np.int64], messages: NDArray[np.uint8]) -> None:
-        """Add messages of one length.
+        """Add messages of equal length.
 
         Parameters
         ----------
         channel : int
         log_time_ns : (n,) array of int
-            Taken for the time of sending, too [ns].
+            Time of reception; also used as the time of sending [ns].
         messages : (n, bytes) array of uint8
-            A message a row.
+            One message per row.
         """
         self._chunk.add_many(channel, log_time_ns, messages)
         self._counts[channel] += len(messages)
@@ -133,7 +133,7 @@ class McapWriter:
             self.flush()
 
     def flush(self) -> None:
-        """Write the chunk begun; after that a reader finds all messages so far."""
+        """Write the current chunk, so that all messages added so far can be read."""
         chunk, self._chunk = self._chunk, Chunk()
         if not chunk.content:
             return
@@ -142,7 +142,7 @@ class McapWriter:
         self._indexes.append(index)
 
     def close(self) -> None:
-        """Write what is left, and the summary; nothing if it is closed already."""
+        """Write the remaining messages and the summary; no effect if the file is already closed."""
         if self._file.closed:
             return
         try:
@@ -153,7 +153,7 @@ class McapWriter:
             self._file.close()
 
     def _summary(self) -> bytes:
-        """All that a reader needs to find its way, the footer, and the magic."""
+        """Summary section, footer and closing magic bytes."""
         builder, offsets = RecordBuilder(), []
         groups: list[list[Any]] = [
             list(self._schemas.values()),
@@ -190,13 +190,13 @@ class McapWriter:
         )
 
     def _write(self, data: bytes) -> None:
-        """Write all of it, or nothing."""
+        """Write all data; on failure, remove the part that was written."""
         left = memoryview(data)
         try:
             while left:
                 left = left[self._file.write(left) :]
         except OSError as error:
-            with suppress(OSError):  # a device cannot be shortened
+            with suppress(OSError):  # a device cannot be truncated
                 self._file.truncate(self._at)
                 self._file.seek(self._at)
             raise RecordingError(str(self.path), "", f"cannot be written: {error.strerror}") from error

@@ -1,4 +1,4 @@
-"""An SQLite file of a stranger: opened so that nothing is written to it and nothing in it is carried out."""
+"""Safe opening of untrusted SQLite files: nothing is written to the file and no code in it is executed."""
 
 import shutil
 import sqlite3
@@ -21,31 +21,31 @@ UNREADABLE = (sqlite3.Error, UnicodeDecodeError)
 def open_database(
     path: Path, file: Path, budget: Budget, stack: ExitStack
 ) -> tuple[sqlite3.Connection, list[str]]:
-    """Open a database of rosbag2 to read, with all that was committed to it.
+    """Open a rosbag2 database for reading, including all committed transactions.
 
-    What stands in a ``-wal`` or ``-journal`` beside it is part of it. SQLite itself recovers that, in a
-    private copy, for it writes when it does.
+    A ``-wal`` or ``-journal`` file beside the database is part of it. SQLite recovers such a file by writing,
+    so the recovery takes place in a private copy.
 
     Parameters
     ----------
     path : pathlib.Path
-        Name for messages.
+        Name of the file in notes and errors.
     file : pathlib.Path
-        What is opened.
+        File that is opened.
     budget : Budget
     stack : contextlib.ExitStack
-        Closes it.
+        Closes the database.
 
     Returns
     -------
     database : sqlite3.Connection
     notes : list of str
-        What to say of it.
+        Remarks for the user.
 
     Raises
     ------
     RecordingError
-        If it cannot be read, or is no database of rosbag2.
+        If the file cannot be read or is not a rosbag2 database.
     """
     beside = [each for end in _JOURNALS if _size(each := file.with_name(file.name + end))]
     try:
@@ -68,12 +68,12 @@ def open_database(
 
 
 def one_line(error: Exception) -> str:
-    """What an error says, on one line."""
+    """Text of an error on one line."""
     return " ".join(str(error).split()) or type(error).__name__
 
 
 def _size(file: Path) -> int:
-    """Bytes of a file; 0 where there is none."""
+    """Size of a file [bytes]; 0 if it does not exist."""
     try:
         return file.stat().st_size
     except FileNotFoundError:
@@ -81,7 +81,7 @@ def _size(file: Path) -> int:
 
 
 def _copied(file: Path, beside: list[Path], budget: Budget, stack: ExitStack) -> Path:
-    """A private copy of a database and of what lies beside it."""
+    """Make a private copy of a database and of its journal files."""
     budget.take(sum(_size(each) for each in (file, *beside)))
     copy = Path(stack.enter_context(tempfile.TemporaryDirectory())) / "content.db3"
     for each in (file, *beside):
@@ -92,7 +92,7 @@ def _copied(file: Path, beside: list[Path], budget: Budget, stack: ExitStack) ->
 
 
 def _check_tables(database: sqlite3.Connection) -> None:
-    """See that what is read is plain tables: a view or a virtual table would be carried out, not read."""
+    """Check that the tables are plain: a view or a virtual table would execute code when it is read."""
     query = "SELECT name, type, sql FROM sqlite_master WHERE name IN ('topics', 'messages')"
     there = {name: (kind, str(text)) for name, kind, text in database.execute(query)}
     for table, needed in _NEEDED.items():

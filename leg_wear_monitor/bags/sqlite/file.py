@@ -1,4 +1,4 @@
-"""One .db3 file of rosbag2: its topics, and their messages piece by piece in order of log time."""
+"""Reader of one rosbag2 .db3 file: its topics, and its messages in pieces ordered by log time."""
 
 import sqlite3
 from collections import deque
@@ -23,22 +23,22 @@ _NO_CHECKSUMS = "has no checksums, like all .db3 files: a damaged number would n
 
 
 class SqliteFile:
-    """A .db3 file, open; what is wrong with it is in `findings`.
+    """An open .db3 file; its faults are listed in `findings`.
 
     Parameters
     ----------
     path : pathlib.Path
-        Name for messages.
+        Name of the file in findings and errors.
     file : pathlib.Path
-        What is opened; it is not written to.
+        File that is opened; nothing is written to it.
     budget : Budget
     stack : contextlib.ExitStack
-        Closes it.
+        Closes the file.
 
     Raises
     ------
     RecordingError
-        If it is no such file.
+        If the file is not a rosbag2 database.
     """
 
     def __init__(self, path: Path, file: Path, budget: Budget, stack: ExitStack) -> None:
@@ -60,12 +60,12 @@ class SqliteFile:
         self._tell_strangers()
 
     def pieces(self, types: dict[int, int]) -> Iterator[Due]:
-        """Messages of the channels asked for, as far as they can be read.
+        """Pieces of the requested channels; unreadable messages are skipped.
 
         Parameters
         ----------
         types : dict
-            Codes of streams by number of the channel.
+            Stream code by channel number.
         """
         expected = sum(self._counts.get(number, 0) for number in types)
         for rows in self._pages(types):
@@ -76,7 +76,7 @@ class SqliteFile:
             self.findings.append(Finding(self.path, text))
 
     def _pages(self, types: dict[int, int]) -> Iterator[deque[_Row]]:
-        """Which messages there are, in order of their time: many at a time, without what is in them."""
+        """Message rows without content, in order of log time, many at a time."""
         if not types:
             return
         places = ", ".join("?" * len(types))
@@ -92,7 +92,7 @@ class SqliteFile:
             self.findings.append(Finding(self.path, f"ends early: {one_line(error)}"))
 
     def _piece(self, rows: deque[_Row], types: dict[int, int], stored: int) -> Piece:
-        """Messages of the next rows, as many as there is room for; those rows are taken away."""
+        """Read the messages of the next rows, as memory permits; these rows are removed from `rows`."""
         contents: list[bytes] = []
         kept: list[_Row] = []
         start_ns, room, number = rows[0][1], self.budget.at_once // 4, len(rows)
@@ -113,18 +113,18 @@ class SqliteFile:
         return Piece(start_ns, data, messages, stored * (number - len(rows)))
 
     def _content(self, number: int) -> bytes | None:
-        """What one message holds; None where it cannot be read or is too large."""
+        """Content of one message; None if it is unreadable or too large."""
         try:
             row = self._database.execute(
                 "SELECT data FROM messages WHERE id = ? AND length(data) <= ?",
                 (number, self.budget.at_once // 8),
             ).fetchone()
         except UNREADABLE:
-            return None  # counted as one that could not be read
+            return None  # counted as unreadable
         return row[0] if row and isinstance(row[0], bytes) else None
 
     def _tell_strangers(self) -> None:
-        """Say how many messages belong to no topic that it lists."""
+        """Report the number of messages that belong to no listed topic."""
         count = sum(count for topic, count in self._counts.items() if topic not in self.channels)
         if count:
             text = f"holds {count} messages of topics that it does not list: they are lost"
@@ -132,7 +132,7 @@ class SqliteFile:
 
 
 def _channels(database: sqlite3.Connection) -> dict[int, Channel]:
-    """Topics by their number, with the definitions of their types where it has them."""
+    """Channels by topic number, with the definitions of their types if the file has them."""
     tables = {name for (name,) in database.execute("SELECT name FROM sqlite_master WHERE type = 'table'")}
     texts: dict[str, tuple[str, str]] = {}
     if "message_definitions" in tables:

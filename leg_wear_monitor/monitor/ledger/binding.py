@@ -1,4 +1,4 @@
-"""What a ledger's wear belongs to: this hardware, this mechanism, this rate of wear."""
+"""Binding of a ledger to its hardware, mechanism and rate of wear."""
 
 import hashlib
 import json
@@ -10,7 +10,7 @@ from leg_wear_monitor.mechanism.spec import Mechanism
 from leg_wear_monitor.monitor.config.settings import MonitorConfig
 from leg_wear_monitor.wear.surfaces import SECTORS
 
-# of a mechanism, what may change without its worn parts being others
+# fields of a mechanism that may change without a change of the worn parts
 _FREE = ("name", "source", "drive", "loads", "clearance_joints", "clearances")
 _FREE_OF_CLEARANCE = ("wear_coefficient",)
 
@@ -18,8 +18,8 @@ _FREE_OF_CLEARANCE = ("wear_coefficient",)
 def fingerprint(mechanism: Mechanism) -> str:
     """Hash of the bodies, joints, springs and clearance joints of a mechanism, 16 hexadecimal digits.
 
-    Neither names and comments of its file count, nor what drives and loads it, nor wear coefficients: a
-    better value of those continues the same wear.
+    The hash excludes names and comments of the file, drive, loads and wear coefficients: with a better value
+    of these, the same wear is continued.
     """
     fields = {field.name: getattr(mechanism, field.name) for field in attrs.fields(Mechanism)}
     parts = {name: _plain(value) for name, value in fields.items() if name not in _FREE}
@@ -42,19 +42,19 @@ def _plain(value: Any) -> Any:
 
 @attrs.frozen(kw_only=True)
 class Binding:
-    """What must be the same for a ledger to be continued.
+    """Properties that must be equal for a ledger to be continued.
 
     Attributes
     ----------
     hardware_id : str
     mechanism : str
-        Its name, for messages.
+        Name of the mechanism, for messages.
     fingerprint : str
     joints : tuple of str
         The clearance joints.
     wear_acceleration : float
     sectors : int
-        Of each surface.
+        Number of sectors of each surface.
     """
 
     hardware_id: str
@@ -71,7 +71,7 @@ class Binding:
 
 
 def binding_of(mechanism: Mechanism, config: MonitorConfig) -> Binding:
-    """Binding of a mechanism as `fitted` gives it."""
+    """Binding of a mechanism that `fitted` returned."""
     return Binding(
         hardware_id=config.hardware,
         mechanism=mechanism.name,

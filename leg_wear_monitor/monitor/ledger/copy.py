@@ -1,4 +1,4 @@
-"""A ledger to try something on: a copy in a private place, thrown away afterwards."""
+"""Temporary private copy of a ledger, for trial runs."""
 
 import shutil
 import tempfile
@@ -13,12 +13,12 @@ _PARTS = ("", "-wal")  # SQLite keeps the last entries beside the file
 
 @contextmanager
 def copy_of(path: str | Path) -> Iterator[Path]:
-    """A copy of a ledger, its last entries included; none where there is no ledger yet.
+    """Copy a ledger, including its last entries; without a ledger, no file is created.
 
     Raises
     ------
     LedgerError
-        If it cannot be read, and in place of one of the copy: it names the ledger itself.
+        If the ledger cannot be read; errors of the copy are raised again with the name of the ledger itself.
     """
     original = Path(path)
     with tempfile.TemporaryDirectory(prefix="leg_wear_") as place:

@@ -1,4 +1,4 @@
-"""What the ledger keeps: the wear and all that belongs to it at one instant, and what happened on the way."""
+"""Content of the ledger: the wear and related state at one instant (entry), and events between entries."""
 
 import hashlib
 import struct
@@ -13,13 +13,13 @@ from leg_wear_monitor.wear.surfaces import SECTORS
 
 @attrs.frozen(eq=False)
 class JointWear:
-    """A joint's worn surfaces and what they have seen since the part was new.
+    """A joint's worn surfaces, and their gait cycles and time in motion since the part was new.
 
     Attributes
     ----------
     name : str
     depth : (2, N) array, m
-        Of bushing and journal.
+        Wear depth of bushing and journal, by sector.
     cycles : int
     moving_s : float
     replaced_ns : int
@@ -45,16 +45,16 @@ class Entry:
     Attributes
     ----------
     stamp_ns : int
-        Up to where it is counted.
+        Stamp up to which the wear is counted.
     joints : tuple of JointWear
     totals : dict of str to float
-        Counters over all runs, by names that end in their unit.
+        Counters over all runs; each name ends in the unit.
     alarms : tuple of Alarm
         Those that are not OK.
     spans : tuple of (int, int)
-        Begin and end [ns] of the stretches of this run that are counted.
+        Begin and end [ns] of the time spans of this run whose wear is counted.
     span_epochs : tuple of int
-        Epoch of the clock of each span; none if all are of epoch 0.
+        Clock epoch of each span; empty if all spans are in epoch 0.
     """
 
     stamp_ns: int
@@ -66,11 +66,11 @@ class Entry:
 
     @property
     def moving_s(self) -> float:
-        """Time in motion that is counted, over all runs."""
+        """Counted time in motion, over all runs [s]."""
         return self.totals.get("moving_s", 0.0)
 
     def digest(self) -> bytes:
-        """Checksum of everything but epochs, as ledgers up to format 3 keep it."""
+        """Checksum of everything except epochs, as stored in ledgers up to format 3."""
         sum_ = hashlib.sha256(struct.pack("<q", self.stamp_ns))
         for joint in sorted(self.joints, key=lambda joint: joint.name):
             sum_.update(repr((joint.name, joint.cycles, joint.moving_s, joint.replaced_ns)).encode())
@@ -85,18 +85,18 @@ class Entry:
 
 @attrs.frozen(eq=False)
 class Audit:
-    """Somebody did something to the wear.
+    """An operator's change of the counted wear, such as a reset.
 
     Attributes
     ----------
     stamp_ns : int
     who, what : str
     joint : JointWear or None
-        As it was before.
+        State of the joint before the change.
     undoes : int or None
-        The `id` of what this undid.
+        The `id` of the change that this one reverts.
     id : int
-        Of its row, 0 before it is written.
+        Number of its row in the ledger, 0 before it is written.
     """
 
     stamp_ns: int
@@ -133,22 +133,22 @@ class Measurement:
     Attributes
     ----------
     stamp_ns : int
-        By the clock; nothing follows from it.
+        Time of the clock, for information only.
     joint, who : str
     clearance_m, sigma_m : float
         Mean radial clearance and its standard deviation.
     wear_m : float
-        What the twin had counted for this part then.
+        Wear that the twin had counted for this part at that time.
     cycles, replaced_ns : int
-        Of the part, as in `JointWear`.
+        Values of the part, as in `JointWear`.
     expected_below : float
-        Probability with which a smaller one was expected.
+        Predicted probability of a smaller clearance.
     counts : bool
-        Whether the forecast believes it, unless it was withdrawn.
+        Whether the forecast uses it, unless it was withdrawn.
     withdrawn_ns, withdrawn_by : int, str
         When and by whom it was withdrawn; 0 and empty if it was not.
     id : int
-        Of its row in the ledger, 0 before it is written.
+        Number of its row in the ledger, 0 before it is written.
     """
 
     stamp_ns: int
@@ -167,13 +167,13 @@ class Measurement:
 
     @property
     def is_withdrawn(self) -> bool:
-        """Whether it was; it stays in the ledger, and does not count."""
+        """Whether the measurement was withdrawn; it stays in the ledger, but is not used."""
         return self.withdrawn_ns != 0
 
 
 @attrs.frozen
 class Withdrawal:
-    """A measurement, by the `id` of its row, does not count any more."""
+    """Withdrawal of a measurement, given by the `id` of its row: it is no longer used."""
 
     stamp_ns: int
     who: str
@@ -194,14 +194,14 @@ class ForecastPoint:
 
 @attrs.frozen(eq=False)
 class Commissioned:
-    """Errors of further encoders, as found while the clearances were known.
+    """Errors of further encoders, estimated while the clearances were known.
 
     Attributes
     ----------
     stamp_ns : int
-        End of the last gait cycle that they were found from.
+        End of the last gait cycle of the estimate.
     encoders : tuple of str
-        What tells the m encoders from one another.
+        Identification of the m encoders: name, joint and sign.
     centre_rad : (m,) array
     mean : (1 + 2 m,) array
     covariance : array
@@ -215,7 +215,7 @@ class Commissioned:
     covariance: Floats
 
     def digest(self) -> bytes:
-        """Checksum of everything, as ledgers of format 3 keep it."""
+        """Checksum of all fields, as stored in ledgers of format 3."""
         sum_ = hashlib.sha256(repr((self.stamp_ns, self.encoders)).encode())
         for part in (self.centre_rad, self.mean, self.covariance):
             sum_.update(np.ascontiguousarray(part, dtype="<f8").tobytes())

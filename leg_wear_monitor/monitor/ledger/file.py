@@ -1,4 +1,4 @@
-"""The ledger's file: created whole or not at all, checked before it is believed, written in transactions."""
+"""The ledger's file: created completely or not at all, checked before use, written in transactions."""
 
 import fcntl
 import os
@@ -25,9 +25,9 @@ from leg_wear_monitor.monitor.ledger.schema import (
 from leg_wear_monitor.monitor.ledger.seal import verify, write_head
 
 MOVE = "move it away (and its -log) to begin with new parts, or put a copy of it back"
-MODE = 0o640  # of new files, less what the umask takes away
+MODE = 0o640  # mode of new files, reduced by the umask
 
-_PAGE = 512  # bytes: most of what a whole entry changes beside the surfaces is a row here and a row there
+_PAGE = 512  # bytes: besides the surfaces, a whole entry changes mostly single rows
 _HEADER = 100
 _MAGIC = b"SQLite format 3\0"
 _IN_USE = "is in use by another monitor; end that one, or set another ledger.path"
@@ -36,16 +36,16 @@ _ROLLBACK = b"\1\1"  # versions of writing and reading: journal, not WAL
 
 
 class LedgerError(LegWearError):
-    """A ledger that cannot be continued; it is left as it is."""
+    """A ledger cannot be continued; the file is left unchanged."""
 
 
 def beside(path: Path, ending: str) -> Path:
-    """A file that belongs to a ledger."""
+    """Path of a file beside a ledger, with the given ending."""
     return path.with_name(path.name + ending)
 
 
 def create(path: Path, binding: Binding) -> None:
-    """Create a ledger; at any instant there is none at the path or a whole one.
+    """Create a ledger; at any instant the path has no ledger or a complete one.
 
     Raises
     ------
@@ -67,7 +67,7 @@ def create(path: Path, binding: Binding) -> None:
 
 
 def _fill(db: sqlite3.Connection, binding: Binding) -> None:
-    """Make a new file's tables."""
+    """Create the tables of a new file."""
     with transaction(db):
         db.execute(f"PRAGMA application_id = {APPLICATION_ID}")
         migrate(db, 0)
@@ -76,14 +76,14 @@ def _fill(db: sqlite3.Connection, binding: Binding) -> None:
 
 
 def connect(path: Path, binding: Binding) -> sqlite3.Connection:
-    """Open a ledger for this hardware and mechanism alone; nobody else can while it is open.
+    """Open a ledger for this hardware and mechanism, with an exclusive lock while it is open.
 
-    On a disk that is read-only it can be read, and every write fails.
+    On a read-only disk the ledger can be read, and every write fails.
 
     Raises
     ------
     LedgerError
-        If it is damaged, none, of a newer format, of something else, or in use.
+        If the file is damaged, not a ledger, of a newer format, of another leg, or in use.
     """
     try:
         found = _look(path)
@@ -105,7 +105,7 @@ def connect(path: Path, binding: Binding) -> sqlite3.Connection:
 
 @contextmanager
 def transaction(db: sqlite3.Connection) -> Iterator[None]:
-    """All of it or nothing; on the disk when it is left."""
+    """Write completely or not at all; the data is on the disk when the context ends."""
     db.execute("BEGIN EXCLUSIVE")
     try:
         yield
@@ -117,7 +117,7 @@ def transaction(db: sqlite3.Connection) -> Iterator[None]:
 
 
 def sync_directory(path: Path) -> None:
-    """Have the name of a file on the disk, or that it is gone."""
+    """Write the creation or removal of a file's name to the disk."""
     handle = os.open(path.parent, os.O_RDONLY)
     try:
         os.fsync(handle)
@@ -134,18 +134,18 @@ def _connect(path: Path, mode: str) -> sqlite3.Connection:
         isolation_level=None,
         check_same_thread=False,
     )
-    db.execute("PRAGMA trusted_schema = OFF")  # nothing that somebody put into the file is run
+    db.execute("PRAGMA trusted_schema = OFF")  # SQL functions in a manipulated schema must not run
     db.execute("PRAGMA cell_size_check = ON")
-    db.execute("PRAGMA secure_delete = OFF")  # it would write zeros over pages that the next entry takes
+    db.execute("PRAGMA secure_delete = OFF")  # it would write zeros over freed pages before their reuse
     db.execute("PRAGMA temp_store = MEMORY")
     db.execute("PRAGMA synchronous = EXTRA")
-    # Held until it is closed, by the system even after a kill.
+    # The lock lasts until the connection is closed; after a kill, the system releases it.
     db.execute("PRAGMA locking_mode = EXCLUSIVE")
     return db
 
 
 def _look(path: Path) -> int:
-    """The format that a file says it has, before SQLite reads it."""
+    """Format number in the file's header, read before SQLite opens the file."""
     status = path.stat()
     if not stat.S_ISREG(status.st_mode):
         raise LedgerError(f"{path}: cannot be opened: it is not a file")
@@ -172,7 +172,7 @@ def _look(path: Path) -> int:
 
 
 def _rehearse(path: Path, found: int, binding: Binding) -> None:
-    """Undo a transaction that was cut off in a copy first: its journal may be of another file or time."""
+    """Undo an interrupted transaction in a copy first: its journal may be of another file or time."""
     with tempfile.TemporaryDirectory() as directory, _locked(path):
         copy = Path(directory) / path.name
         for ending in ("", "-journal"):
@@ -191,7 +191,7 @@ def _rehearse(path: Path, found: int, binding: Binding) -> None:
 
 @contextmanager
 def _locked(path: Path) -> Iterator[None]:
-    """Keep others out as SQLite does: https://sqlite.org/src/file?name=src/os.h."""
+    """Lock the file for others as SQLite does: https://sqlite.org/src/file?name=src/os.h."""
     with path.open("r+b") as file:
         try:
             fcntl.lockf(file, fcntl.LOCK_EX | fcntl.LOCK_NB, _SHARED_SIZE, _SHARED_FIRST)
@@ -201,7 +201,7 @@ def _locked(path: Path) -> Iterator[None]:
 
 
 def _begin(db: sqlite3.Connection, path: Path, found: int, binding: Binding, writable: bool) -> None:
-    """Take hold of a file, check all of it, and bring it up to date."""
+    """Lock a file, check its whole content, and migrate it to the present format."""
     try:
         db.execute("BEGIN EXCLUSIVE" if writable else "BEGIN")
         _check(db, path, found)
@@ -219,7 +219,7 @@ def _begin(db: sqlite3.Connection, path: Path, found: int, binding: Binding, wri
 
 
 def _check(db: sqlite3.Connection, path: Path, found: int) -> None:
-    """Whether the file is whole, and holds what was written and nothing else."""
+    """Check that the file is complete and contains only what was written."""
     if tuple(definitions(db)) != expected_definitions(found):
         raise LedgerError(
             f"{path}: is damaged: it has other tables or triggers than a ledger of format {found}; {MOVE}"
@@ -246,10 +246,10 @@ def _check_binding(db: sqlite3.Connection, path: Path, binding: Binding) -> None
 
 
 def _refusal(path: Path, error: Exception) -> LedgerError:
-    """Why a file cannot be used; ValueError and TypeError come of damage, also out of SQLite's messages."""
+    """Error for a file that cannot be used; damage causes ValueError and TypeError, also within sqlite3."""
     if not isinstance(error, sqlite3.Error):
         return LedgerError(f"{path}: is damaged: {_reason(error)}; {MOVE}")
-    code = getattr(error, "sqlite_errorcode", sqlite3.SQLITE_CORRUPT)  # some are of Python's, not of SQLite's
+    code = getattr(error, "sqlite_errorcode", sqlite3.SQLITE_CORRUPT)  # Python's own errors have no code
     if code == sqlite3.SQLITE_BUSY:
         return LedgerError(f"{path}: {_IN_USE}")
     if code & 0xFF in (sqlite3.SQLITE_CORRUPT, sqlite3.SQLITE_NOTADB, sqlite3.SQLITE_ERROR):
@@ -262,7 +262,7 @@ def _has_content(path: Path) -> bool:
 
 
 def _is_hot(journal: Path) -> bool:
-    """Whether a transaction was cut off: else SQLite leaves the file empty, or its first bytes 0."""
+    """Whether a transaction was interrupted: otherwise the journal is empty, or its first bytes are 0."""
     if not journal.exists():
         return False
     with journal.open("rb") as file:
@@ -270,7 +270,7 @@ def _is_hot(journal: Path) -> bool:
 
 
 def _is_writable(path: Path) -> bool:
-    """Whether it is, or must be since the last entries are still beside it."""
+    """Whether the file is writable, or has to be because an interrupted transaction is beside it."""
     places = (path, path.parent)
     cut_off = any(_has_content(beside(path, ending)) for ending in ("-wal", "-journal"))
     return cut_off or all(os.access(place, os.W_OK) for place in places)

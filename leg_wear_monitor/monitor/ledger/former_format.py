@@ -1,4 +1,4 @@
-"""What of a ledger up to format 3 can be checked: its entry and its encoders' errors have checksums."""
+"""Checks of ledgers up to format 3: only their entry and their encoders' errors have checksums."""
 
 import sqlite3
 
@@ -9,12 +9,12 @@ from leg_wear_monitor.monitor.ledger.entry import Commissioned, Entry, JointWear
 
 
 def verify_former(db: sqlite3.Connection, found: int) -> None:
-    """Compare what has a checksum with it, before a file is migrated.
+    """Verify the existing checksums before a file is migrated.
 
     Raises
     ------
     ValueError
-        If it is not what was written.
+        If the content differs from what was written.
     """
     row = db.execute("SELECT run, stamp_ns, digest FROM entry").fetchone()
     if row is not None and _entry(db, *row[:2]).digest() != row[2]:

@@ -1,8 +1,8 @@
-"""Wear is months of work: the ledger keeps it in an SQLite file, over a kill, a full disk, a wrong leg.
+"""The ledger keeps the counted wear in an SQLite file that survives kills, full disks and a wrong leg.
 
-An entry is on the disk when `keep` returns. A write that fails is said in `Ledger.fault`, the monitor goes
-on, and the next entry tries again with all that has happened since. What is not an entry yet is lost with the
-process: at most the time between two entries, and the next start says how much that was.
+An entry is on the disk when `keep` returns. If a write fails, `Ledger.fault` gives the reason, the monitor
+continues, and the next entry includes all events since the last successful one. If the process is killed,
+the wear since the last entry is lost: at most the time between two entries, which the next start reports.
 """
 
 import sqlite3
@@ -93,7 +93,7 @@ class Ledger:
             raise
 
     def _begin(self, found: Recovered) -> None:
-        """Write the entry of the log into the tables, and the begin of this run."""
+        """Write the last entry of the log and the begin of this run into the tables."""
         newer = found.entry if found.is_newer else None
         reported_s = max(found.run.interval_s, found.lost_s or 0.0)
         run = attrs.evolve(found.run, interval_s=reported_s) if self.at_end else self._run(closed=False)
@@ -104,7 +104,7 @@ class Ledger:
 
     def _read(self) -> None:
         spans = self._store.ask(read_spans)
-        if self.entry:  # also where the tables could not be written
+        if self.entry:  # also if the tables could not be written
             own = self.entry.span_epochs or (0,) * len(self.entry.spans)
             spans += [(*span, epoch) for span, epoch in zip(self.entry.spans, own, strict=True)]
         self._spans = np.array(sorted(set(spans)), dtype=np.int64).reshape(-1, 3)
@@ -113,16 +113,16 @@ class Ledger:
 
     @property
     def counted_ns(self) -> Ints:
-        """Begin and end (n, 2) [ns] of the time whose wear is in it, of earlier runs, of all epochs."""
+        """Begin and end (n, 2) [ns] of the time spans counted in earlier runs, in all epochs."""
         return self._spans[:, :2]
 
     def counted_in(self, epoch: int) -> Ints:
-        """The same (n, 2) [ns] of one epoch of the clock."""
+        """Begin and end (n, 2) [ns] of the counted time spans in one epoch of the clock."""
         return self._spans[self._spans[:, 2] == epoch, :2]
 
     @property
     def waiting(self) -> int:
-        """Events that are not written yet."""
+        """Number of events that are not written yet."""
         return len(self._events)
 
     def note(self, event: Event) -> None:
@@ -130,7 +130,7 @@ class Ledger:
         self._events.append(event)
 
     def withdraw(self, measurement: int, stamp_ns: int, who: str) -> Measurement:
-        """Withdraw a measurement of an earlier run: it is kept, and does not count; written as events are.
+        """Withdraw a measurement of an earlier run; the withdrawal is an event, the measurement stays.
 
         Parameters
         ----------
@@ -143,12 +143,12 @@ class Ledger:
         Returns
         -------
         Measurement
-            As it is now.
+            The withdrawn measurement.
 
         Raises
         ------
         LedgerError
-            If there is none of that `id`, or it is withdrawn already.
+            If no measurement has this `id`, or it is already withdrawn.
         """
         found = {each.id: each for each in self.measurements}
         if measurement not in found:
@@ -162,28 +162,29 @@ class Ledger:
         return now
 
     def last_reset(self, joint: str) -> Audit | None:
-        """The last `reset_wear` of a joint that is kept and was not undone, None if there is none.
+        """The last stored `reset_wear` of a joint that was not undone, None if there is none.
 
-        Its `joint` is None in a row of a format before 4, which does not hold all of it.
+        Its `joint` is None in rows of formats before 4, which do not contain the whole state of the joint.
 
         Raises
         ------
         LedgerError
-            If it cannot be read now.
+            If the ledger cannot be read now.
         """
         return self._store.ask(lambda db: read_last_reset(db, joint))
 
     def keep(self, entry: Entry, closed: bool = False, *, whole: bool = True) -> bool:
-        """Write an entry and all events since the last; False, and `fault` says why, if that failed.
+        """Write an entry and all events since the last; False if that failed, with the reason in `fault`.
 
         Parameters
         ----------
         entry : Entry
         closed : bool
-            Whether the run ends here in order.
+            Whether the run ends normally with this entry.
         whole : bool
-            False: of the surfaces, what they have risen will do, to the 36th part of the largest rise since
-            the entry before. A whole one is written all the same each ten minutes of motion, or with events.
+            Whether the surfaces must be stored bit for bit. If False, their rise since the previous entry
+            may be stored in the log, with an error of at most a 36th part of its largest value; an entry is
+            still written whole every ten minutes of motion, or with events.
         """
         if self.at_end and not closed:
             return False
@@ -200,21 +201,21 @@ class Ledger:
         return kept
 
     def record(self) -> None:
-        """Write the events since the last entry, and leave that in force; for a run that monitors nothing.
+        """Write the events since the last entry, which stays in force; for a run that monitors nothing.
 
         Raises
         ------
         LedgerError
             If they could not be written.
         """
-        self._interval_s = max(self._interval_s, self.cut_off_s or 0.0)  # until it is acknowledged
+        self._interval_s = max(self._interval_s, self.cut_off_s or 0.0)  # until the loss is acknowledged
         run = self._run(closed=self.cut_off_s is None)
         if not self._try(lambda: self._store.write(run, None, self._events)):
             raise LedgerError(f"{self.path}: {self.fault}")
         self._events.clear()
 
     def abandon(self) -> None:
-        """End a run that monitored nothing, or of which nothing shall be kept, and let go of the file.
+        """End a run that monitored nothing or is to be discarded, and close the file.
 
         Raises
         ------
@@ -228,14 +229,14 @@ class Ledger:
             self.close()
 
     def close(self) -> None:
-        """Let go of the file; entries are written by `keep`."""
+        """Close the file; entries are written by `keep`."""
         self._store.close()
 
     def _run(self, closed: bool) -> Run:
         return Run(self._number, closed, self._interval_s, self.epoch, self.boot_id)
 
     def _try(self, write: Callable[[], None]) -> bool:
-        """Whether it could be written; `fault` says why not."""
+        """Whether the write succeeded; if not, `fault` gives the reason."""
         try:
             write()
         except (sqlite3.Error, OSError, ValueError, LedgerError) as error:
@@ -246,7 +247,7 @@ class Ledger:
 
 
 def open_ledger(mechanism: Mechanism, config: MonitorConfig, at_end: bool = False) -> Ledger | None:
-    """The ledger that a configuration names, None if it names none.
+    """Open the ledger that a configuration names; None if it names none.
 
     Parameters
     ----------
@@ -260,7 +261,7 @@ def open_ledger(mechanism: Mechanism, config: MonitorConfig, at_end: bool = Fals
     ConfigError
         For parameters that do not fit the mechanism.
     LedgerError
-        If it must not be continued.
+        If the ledger must not be continued.
     """
     if not config.ledger.path:
         return None

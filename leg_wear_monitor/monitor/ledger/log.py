@@ -1,8 +1,8 @@
-"""The log beside a ledger's file: records of the entries since the one that the tables hold.
+"""The log beside a ledger's file: records of the entries since the one in the tables.
 
-It begins with the number and checksum of the file's head. Each record has a checksum over its content and the
-checksum before: a record that was not written whole, a log that was put back from another time, or one of
-another file does not fit.
+The log begins with the number and checksum of the file's head. Each record has a checksum over its content
+and the previous checksum. These checksums detect an incompletely written record, a log restored from another
+time, and a log of another file.
 """
 
 import hashlib
@@ -17,32 +17,32 @@ from leg_wear_monitor.monitor.ledger.seal import Head
 
 ENDING = "-log"
 
-_HEADER = struct.Struct("<8sq32s")  # what it is, number and checksum of the head
+_HEADER = struct.Struct("<8sq32s")  # magic bytes, number and checksum of the head
 _MAGIC = b"LWMLOG1\n"
-_COUNT = struct.Struct("<Q")  # behind that: of records, written after each, so that none is missing unseen
+_COUNT = struct.Struct("<Q")  # number of records, updated after each one, to detect missing ones
 _BEGIN = _HEADER.size + _COUNT.size
 _RECORD = struct.Struct("<I32s")  # bytes of the content, checksum
-_MOST = 2**28  # bytes that a log may have: it begins anew each ten minutes
+_MOST = 2**28  # bytes that a log may have: a new log begins every ten minutes
 
 
 @attrs.frozen
 class LogContent:
-    """What a log holds.
+    """Content of a log.
 
     Attributes
     ----------
     number, head : int, bytes
-        Number and checksum of the head that it follows.
+        Number and checksum of the head that the log follows.
     records : tuple of bytes
-        Contents, up to the first one that does not fit.
+        Contents of the records before the first one with a wrong checksum.
     digest : bytes
-        Checksum of the last of them, or of the head.
+        Checksum of the last of these records, or of the head.
     missing : int
-        How many more there were.
+        Number of further records, by the log's count.
     left : int
-        Bytes after them, 0 in a whole log.
+        Bytes after the valid records, 0 in an intact log.
     is_torn : bool
-        Whether those are the begin of one record, as a power cut may leave it.
+        Whether these bytes are the begin of one record, as after a power cut.
     """
 
     number: int
@@ -55,7 +55,7 @@ class LogContent:
 
 
 class EntryLog:
-    """A log that is written."""
+    """A log open for writing."""
 
     def __init__(self, ledger: Path) -> None:
         self.path = beside(ledger, ENDING)
@@ -70,7 +70,7 @@ class EntryLog:
         return self._handle is not None
 
     def begin(self, head: Head, mode: int) -> None:
-        """Begin anew after a head, with the permissions of a mode; raises OSError."""
+        """Begin a new log after a head, with the permissions of a mode; raises OSError."""
         self.close()
         new = beside(self.path, ".new")
         new.unlink(missing_ok=True)
@@ -87,12 +87,12 @@ class EntryLog:
         self._handle, self._size, self._digest, self._count = handle, _BEGIN, head.digest, 0
 
     def append(self, content: bytes) -> bytes:
-        """Have a record on the disk; its checksum.
+        """Write a record to the disk and return its checksum.
 
         Raises
         ------
         OSError
-            If it is not; the log is as before, and closed.
+            If the write fails; the log is then unchanged and closed.
         LedgerError
             If the log was moved away.
         """
@@ -119,27 +119,27 @@ class EntryLog:
         return digest
 
     def remove(self) -> None:
-        """Close it and take it away, since the tables hold all of it; raises OSError."""
+        """Close and delete the log, whose content is now in the tables; raises OSError."""
         self.close()
         self.path.unlink(missing_ok=True)
         sync_directory(self.path)
 
     def close(self) -> None:
-        """Let go of the file."""
+        """Close the file."""
         if self._handle is not None:
             os.close(self._handle)
             self._handle = None
 
 
 def read_log(ledger: Path) -> LogContent | None:
-    """What the log beside a ledger holds, None if there is none.
+    """Read the log beside a ledger; None if there is none.
 
     Raises
     ------
     ValueError
-        If it is no log.
+        If the file is not a log.
     OSError
-        If it cannot be read.
+        If the file cannot be read.
     """
     path = beside(ledger, ENDING)
     if not os.path.lexists(path):
@@ -165,7 +165,7 @@ def read_log(ledger: Path) -> LogContent | None:
 
 
 def _is_torn(rest: bytes) -> bool:
-    """Whether bytes are the begin of one record."""
+    """Whether the bytes are the begin of one record."""
     return len(rest) < _RECORD.size or len(rest) < _RECORD.size + _RECORD.unpack_from(rest)[0]
 
 

@@ -1,4 +1,4 @@
-"""From what the tables and the log hold to the last entry, and what was lost on the way."""
+"""Recovery of the last entry from the tables and the log, with the possible loss."""
 
 import sqlite3
 from pathlib import Path
@@ -24,20 +24,20 @@ class Recovered:
     Attributes
     ----------
     head : Head
-        Of the tables.
+        Head of the tables.
     digest : bytes
-        Checksum of the last record or head, which the next one follows.
+        Checksum of the last record, or of the head; the next record follows it.
     run : Run
-        The last one.
+        The last run.
     entry_run : int
-        Number of the run that the entry's spans are of.
+        Number of the run of the entry's spans.
     entry : Entry or None
     is_newer : bool
         Whether the entry is newer than the tables.
     lost_s : float or None
         Longest time in motion whose wear is lost; None if the last run ended in order.
     loss : str
-        What is wrong with the log; empty if nothing is.
+        Fault of the log; empty if there is none.
     """
 
     head: Head
@@ -51,7 +51,7 @@ class Recovered:
 
 
 def recover(db: sqlite3.Connection, path: Path) -> Recovered:
-    """The last entry of a ledger whose tables were checked.
+    """Find the last entry of a ledger whose tables were checked.
 
     Raises
     ------
@@ -83,7 +83,7 @@ def recover(db: sqlite3.Connection, path: Path) -> Recovered:
 
 
 def check_absent(path: Path) -> None:
-    """Refuse to begin a ledger where only the log of one is left."""
+    """Refuse to create a ledger if only the log of a former one exists."""
     log = beside(path, ENDING)
     if log.exists():
         raise LedgerError(
@@ -93,17 +93,17 @@ def check_absent(path: Path) -> None:
 
 
 def _misfit(content: LogContent | None, there: Recovered) -> str:
-    """Why a log does not belong to the tables; empty if it does."""
+    """Reason why a log does not belong to the tables; empty if it does."""
     if content is None:
         return ""
     follows = (content.number, content.head) == (there.head.number, there.head.digest)
-    # a kill between the tables' commit and a new log leaves the one that led to them
+    # a kill between the commit of the tables and the new log leaves the log that led to these tables
     is_before = content.number < there.head.number and content.digest == there.head.previous
     return "" if follows or is_before else "is of another time"
 
 
 def _applied(there: Recovered, content: LogContent, name: str) -> Recovered:
-    """The entry of the last record that fits."""
+    """Apply the records of a log up to the last valid one."""
     run, entry = there.run, there.entry
     for record in content.records:
         if entry is None:

@@ -23,7 +23,7 @@ from leg_wear_monitor.monitor.ledger.run import Run
 
 
 def write_run(db: sqlite3.Connection, run: Run) -> None:
-    """Write a run anew; to be called within a transaction."""
+    """Insert or replace a run; to be called within a transaction."""
     values = (run.number, int(run.closed), run.interval_s, run.epoch, run.boot_id)
     db.execute("INSERT OR REPLACE INTO run VALUES (?, ?, ?, ?, ?)", values)
 
@@ -35,7 +35,7 @@ def write_entry(db: sqlite3.Connection, run: int, head: int, entry: Entry) -> No
     ----------
     db : sqlite3.Connection
     run : int
-        The one whose spans it has.
+        Run of the entry's spans.
     head : int
         Number of the transaction.
     entry : Entry
@@ -53,7 +53,7 @@ def write_entry(db: sqlite3.Connection, run: int, head: int, entry: Entry) -> No
         [
             (
                 *(a.kind, a.subject, int(a.level), int(a.present), int(a.acknowledged), a.raised_ns),
-                *(a.worst, a.limit),  # SQLite makes NULL of NaN
+                *(a.worst, a.limit),  # SQLite stores NaN as NULL
             )
             for a in entry.alarms
         ],
@@ -109,7 +109,7 @@ def write_event(db: sqlite3.Connection, event: Event) -> None:
 
 
 def _append(db: sqlite3.Connection, event: Measurement | ForecastPoint) -> None:
-    """A row of the table whose columns are the event's fields."""
+    """Append a row to the table whose columns are the event's fields."""
     table = "measurement" if isinstance(event, Measurement) else "forecast"
     values = attrs.asdict(event, filter=lambda field, _: field.name != "id")
     places = ", ".join("?" * len(values))
@@ -117,7 +117,7 @@ def _append(db: sqlite3.Connection, event: Measurement | ForecastPoint) -> None:
 
 
 def read_measurements(db: sqlite3.Connection) -> tuple[Measurement, ...]:
-    """All measured clearances, in the order in which they were noted, withdrawn ones with them."""
+    """All measured clearances in the order of their entry, including withdrawn ones."""
     names = [field.name for field in attrs.fields(Measurement)]
     rows = db.execute(f"SELECT {', '.join(names)} FROM measurement ORDER BY id")
     found = (Measurement(**dict(zip(names, row, strict=True))) for row in rows)
@@ -125,7 +125,7 @@ def read_measurements(db: sqlite3.Connection) -> tuple[Measurement, ...]:
 
 
 def read_commissioned(db: sqlite3.Connection) -> Commissioned | None:
-    """Errors of further encoders as they are held, None if none were commissioned."""
+    """Stored errors of further encoders, None if none were commissioned."""
     row = db.execute(
         "SELECT stamp_ns, encoders, errors FROM commissioning ORDER BY id DESC LIMIT 1"
     ).fetchone()
@@ -140,7 +140,7 @@ def read_commissioned(db: sqlite3.Connection) -> Commissioned | None:
 def read_last_reset(db: sqlite3.Connection, joint: str) -> Audit | None:
     """The last `reset_wear` of a joint that was not undone, None if there is none.
 
-    A row of an older format does not hold the whole joint: its `joint` is None then.
+    Rows of older formats do not contain the whole state of the joint: `joint` is then None.
     """
     row = db.execute(
         "SELECT id, stamp_ns, who, what, joint, depth, cycles, moving_s, replaced_ns FROM audit AS a "
@@ -156,7 +156,7 @@ def read_last_reset(db: sqlite3.Connection, joint: str) -> Audit | None:
 
 
 def read_entry(db: sqlite3.Connection) -> tuple[int, Entry] | None:
-    """Run and content of the entry that the tables hold, None in a new ledger."""
+    """Run and content of the entry in the tables, None in a new ledger."""
     found = db.execute("SELECT run, stamp_ns FROM entry").fetchone()
     if found is None:
         return None
@@ -176,7 +176,7 @@ def read_entry(db: sqlite3.Connection) -> tuple[int, Entry] | None:
 
 
 def read_spans(db: sqlite3.Connection) -> list[tuple[int, int, int]]:
-    """Begin, end [ns] and epoch of all time whose wear is counted."""
+    """Begin, end [ns] and epoch of all counted time spans."""
     return db.execute("SELECT begin_ns, end_ns, epoch FROM span").fetchall()
 
 

@@ -1,24 +1,24 @@
-"""A start of the monitor, as the ledger keeps it."""
+"""A run of the monitor, as stored in the ledger."""
 
 import attrs
 
 
 @attrs.frozen
 class Run:
-    """A start of the monitor.
+    """A run of the monitor.
 
     Attributes
     ----------
     number : int
-        0 before the first.
+        Number of the run, 0 before the first.
     closed : bool
-        Whether it ended in order.
+        Whether the run ended normally.
     interval_s : float
         Longest time in motion between two of its entries.
     epoch : int
-        Of its clock, at its end.
+        Epoch of the clock at the end of the run.
     boot_id : str
-        Of the computer; empty if not known.
+        Boot of the computer; empty if unknown.
     """
 
     number: int = 0

@@ -1,8 +1,9 @@
-"""The ledger's tables. This file alone says what is in one, and how an older one becomes a newer one.
+"""The ledger's tables and their migrations; no other file defines them.
 
-`PRAGMA user_version` is the format: the number of steps of `MIGRATIONS` that a file has seen. A new file sees
-all of them; an older one sees those it lacks, in one transaction, when it is opened. A step is never changed
-once it was released: what comes later is a further step. A file of a newer format is refused.
+`PRAGMA user_version` is the format: the number of steps of `MIGRATIONS` that were applied to a file. A new
+file is created by all steps; to an older file the missing steps are applied in one transaction when it is
+opened. A released step is never changed: later changes are further steps. A file of a newer format is
+refused.
 """
 
 import sqlite3
@@ -88,7 +89,7 @@ CREATE TABLE commissioning (
 ) STRICT;
 """
 
-# Tables are made anew, not altered: the text of each is then the one here, and can be compared with it.
+# Tables are created again, not altered: their stored definition then equals this text and can be compared.
 _FOURTH = """
 CREATE TEMP TABLE former AS SELECT * FROM run;
 DROP TABLE run;
@@ -202,16 +203,16 @@ CREATE TABLE head (
 MIGRATIONS = (_FIRST, _SECOND, _THIRD, _FOURTH)
 
 FORMAT = len(MIGRATIONS)
-SEALED_FROM = 4  # the first format whose content has checksums all over
+SEALED_FROM = 4  # first format with checksums over the whole content
 
-GROWING = ("alarm_history", "audit", "commissioning", "forecast", "history")  # rows come, none changes
+GROWING = ("alarm_history", "audit", "commissioning", "forecast", "history")  # append only
 CHANGING = ("alarm", "binding", "entry", "joint", "measurement", "run", "span", "total")
 
 Definitions = list[tuple[str, str, str, str | None]]
 
 
 def migrate(db: sqlite3.Connection, found: int) -> None:
-    """Bring a file of a format to ours; to be called within a transaction."""
+    """Migrate a file to the present format; to be called within a transaction."""
     for step in MIGRATIONS[found:]:
         run_step(db, step)
     db.execute(f"PRAGMA user_version = {FORMAT}")
@@ -225,13 +226,13 @@ def run_step(db: sqlite3.Connection, step: str) -> None:
 
 
 def definitions(db: sqlite3.Connection) -> Definitions:
-    """All that a file defines: tables and indexes, and triggers and views if anybody put some in."""
+    """All definitions in a file: tables and indexes, and added triggers and views."""
     return db.execute("SELECT type, name, tbl_name, sql FROM sqlite_master ORDER BY type, name").fetchall()
 
 
 @cache
 def expected_definitions(number: int) -> tuple[tuple[str, str, str, str | None], ...]:
-    """What a file of a format defines."""
+    """Expected definitions in a file of a format."""
     with closing(sqlite3.connect(":memory:", isolation_level=None)) as db:
         for step in MIGRATIONS[:number]:
             run_step(db, step)

@@ -1,8 +1,8 @@
-"""Checksums over all that a ledger holds: SQLite has none over its pages.
+"""Checksums over the whole content of a ledger, since SQLite has none over its pages.
 
 Each table has a seal: a checksum over its rows. The head is a checksum over the seals, the tables'
-definitions and the checksum before it, so that all entries are one chain. It guards against damage and
-mix-ups, not against somebody who computes it anew.
+definitions and the previous head, so that all entries form one chain. The checksums protect against damage
+and mix-ups, not against somebody who computes them again.
 """
 
 import hashlib
@@ -22,9 +22,9 @@ class Head:
     Attributes
     ----------
     number : int
-        The how many-th it was.
+        Number of the transaction.
     previous, digest : bytes
-        Checksum that it follows, and its own.
+        Checksum of the previous head, and of this one.
     """
 
     number: int
@@ -33,20 +33,20 @@ class Head:
 
 
 def read_head(db: sqlite3.Connection) -> Head:
-    """The head of a file that was verified."""
+    """Read the head of a verified file."""
     return Head(*db.execute("SELECT number, previous, digest FROM head").fetchone())
 
 
 def write_head(db: sqlite3.Connection, number: int, previous: bytes) -> Head:
-    """Seal what a transaction wrote, at its end.
+    """Write the checksums at the end of a transaction.
 
     Parameters
     ----------
     db : sqlite3.Connection
     number : int
-        One more than that of the head before.
+        Number of the previous head plus one.
     previous : bytes
-        Checksum that it follows.
+        Checksum of the previous head.
     """
     seals = _seals(db, {name: (last, digest) for name, last, digest in db.execute("SELECT * FROM seal")})
     head = Head(number, previous, _digest(db, number, previous, seals))
@@ -62,7 +62,7 @@ def verify(db: sqlite3.Connection) -> None:
     Raises
     ------
     ValueError
-        If they are not what was written.
+        If a checksum does not match.
     """
     kept = {name: (last, digest) for name, last, digest in db.execute("SELECT * FROM seal")}
     found = _seals(db, {})
@@ -78,7 +78,7 @@ def verify(db: sqlite3.Connection) -> None:
 
 
 def _seals(db: sqlite3.Connection, kept: _Seals) -> _Seals:
-    """Seals of all tables; those of tables that grow go on from where they were."""
+    """Seals of all tables; those of tables that only grow are continued from the kept ones."""
     seals = {name: _sealed(db, name, "", 0, b"") for name in CHANGING}
     for name in GROWING:
         last, digest = kept.get(name, (0, b""))

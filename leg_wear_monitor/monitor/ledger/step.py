@@ -1,9 +1,9 @@
-"""An entry as what it changes of the one before: some kB instead of all surfaces to the last bit.
+"""Encoding of an entry as its difference from the previous one: some kB instead of all surfaces bit for bit.
 
-Five seconds of walking change nearly all sectors of all surfaces, by numbers of 40 random bits: exact, that
-cannot be made smaller. So a surface's rise is kept in whole steps of the 20th part of its largest, and what
-that leaves out is in the next rise: errors do not add up, none is larger than the 36th part of the largest
-rise between two entries, what a sector wears in 0.14 s of 5.
+Five seconds of walking change nearly all sectors of all surfaces by numbers of 40 random bits, which cannot
+be compressed without loss. So the rise of a surface is quantised in steps of the 20th part of its largest
+rise. The remainder is added to the next rise, so errors do not accumulate: an error is at most a 36th part of
+the largest rise between two entries, which is the wear of a sector in 0.14 s of 5 s.
 """
 
 import json
@@ -19,28 +19,28 @@ from leg_wear_monitor.monitor.alarms.alarm import Alarm, Level
 from leg_wear_monitor.monitor.ledger.entry import Entry, JointWear
 from leg_wear_monitor.monitor.ledger.run import Run
 
-STEPS = 20  # of a surface's largest rise
+STEPS = 20  # quantisation steps of a surface's largest rise
 
-_MOST = 200_000_000  # bytes that a record may hold, however small it is compressed
+_MOST = 200_000_000  # bytes of a decompressed record, as a limit against damaged ones
 
 
 def encode(entry: Entry, run: Run, before: Entry, shared: int) -> tuple[bytes, Entry]:
-    """A record of an entry, and the entry as it will be read from that.
+    """Encode an entry; returns the record, and the entry as it will be decoded from the record.
 
     Parameters
     ----------
     entry : Entry
     run : Run
-        The one it is of.
+        Run of the entry.
     before : Entry
-        The one before it, as it will be read.
+        The previous entry, as it will be decoded.
     shared : int
-        How many of the first spans of `before` are of the same run; those that are equal are not repeated.
+        Number of the first spans of `before` that belong to the same run; equal ones are not repeated.
 
     Raises
     ------
     ValueError
-        If it has other joints than the one before, or surfaces that are no numbers.
+        If the joints differ from those of the previous entry, or depths are not finite numbers.
     """
     if [joint.name for joint in entry.joints] != [joint.name for joint in before.joints]:
         raise ValueError("the entry has other joints than the one before")
@@ -66,12 +66,12 @@ def encode(entry: Entry, run: Run, before: Entry, shared: int) -> tuple[bytes, E
 
 
 def decode(record: bytes, before: Entry) -> tuple[Run, Entry]:
-    """Run and entry of a record, given the entry before it.
+    """Decode run and entry of a record, given the previous entry.
 
     Raises
     ------
     ValueError
-        If it is no record.
+        If the bytes are not a valid record.
     """
     unpacked = zlib.decompressobj()
     try:
@@ -94,7 +94,7 @@ def _depth(entry: Entry) -> Floats:
 
 
 def _rise(kept: Floats, now: Floats) -> tuple[Floats, Floats]:
-    """Size of a step [m] for each surface (joints, 2, 1), and how many steps each sector has risen."""
+    """Quantisation step [m] of each surface (joints, 2, 1), and the rise of each sector in steps."""
     rise = now - kept
     if not np.isfinite(rise).all():
         raise ValueError("a surface has a depth that is not a number")
@@ -104,7 +104,7 @@ def _rise(kept: Floats, now: Floats) -> tuple[Floats, Floats]:
 
 
 def _risen(kept: Floats, scale: Floats, steps: Floats) -> Floats:
-    """Depths after a rise, the same to the last bit when written and when read."""
+    """Depths after a rise, bit for bit the same in encoding and decoding."""
     return np.asarray(np.maximum(kept + steps * scale.astype(float), 0.0))
 
 

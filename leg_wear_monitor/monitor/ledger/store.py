@@ -1,4 +1,4 @@
-"""A ledger's tables and its log as one: entries whole into the tables, those between as records."""
+"""Storage of a ledger: whole entries in the tables, entries between them as records in the log."""
 
 import os
 import sqlite3
@@ -20,24 +20,24 @@ _Answer = TypeVar("_Answer")
 
 
 class LedgerStore:
-    """What is on the disk; ours alone.
+    """The tables and the log on the disk, locked for this process.
 
     Parameters
     ----------
     path : pathlib.Path
-        Created if it is not there.
+        Created if it does not exist.
     binding : Binding
-        What its wear must belong to.
+        Leg that the wear must belong to.
 
     Attributes
     ----------
     found : Recovered
-        What was there when it was opened.
+        Content when the ledger was opened.
 
     Raises
     ------
     LedgerError
-        If it cannot be read, or must not be continued; it is left as it is.
+        If the ledger cannot be read, or must not be continued; it is left unchanged.
     """
 
     def __init__(self, path: Path, binding: Binding) -> None:
@@ -57,12 +57,12 @@ class LedgerStore:
         self._number, self._digest = self.found.head.number, self.found.digest
         self._log = EntryLog(path)
         self._run = self.found.run.number
-        self._whole: Entry | None = None  # the last one in the tables,
-        self._last: Entry | None = None  # the last one as it will be read,
-        self._spans = 0  # and how many of its spans are of this run
+        self._whole: Entry | None = None  # last entry in the tables
+        self._last: Entry | None = None  # last entry, as it will be decoded
+        self._spans = 0  # number of its spans that belong to this run
 
     def is_due(self, entry: Entry) -> bool:
-        """Whether an entry has to be written whole: else it can be a record."""
+        """Whether an entry has to be written whole; otherwise a record is sufficient."""
         if self._whole is None or self._last is None or not self._log.is_open:
             return True
         return not 0.0 <= entry.moving_s - self._whole.moving_s < WHOLE_S
@@ -75,17 +75,17 @@ class LedgerStore:
         Parameters
         ----------
         run : Run
-            This one, or as it shall be from now on.
+            State of the present run to be written.
         entry : Entry or None
-            None leaves the one in force.
+            With None, the previous entry stays in force.
         events : sequence of Event
         entry_run : int, optional
-            The run that the entry's spans are of; this one if not given.
+            Run of the entry's spans; the present one if not given.
 
         Raises
         ------
         sqlite3.Error, OSError, LedgerError
-            If nothing was written; a later call begins anew.
+            If nothing was written; a later call tries again.
         """
         try:
             db = self._connection()
@@ -106,7 +106,7 @@ class LedgerStore:
         self._renew_log(head, run.closed)
 
     def _renew_log(self, head: Head, closed: bool) -> None:
-        """Take the log away, or begin it anew; where that fails, the next entry is whole again."""
+        """Delete the log, or begin a new one; if that fails, the next entry is written whole again."""
         try:
             if closed:
                 self._log.remove()
@@ -116,12 +116,12 @@ class LedgerStore:
             self._log.close()
 
     def append(self, run: Run, entry: Entry) -> None:
-        """Write an entry as a record; only if it need not be whole.
+        """Write an entry as a record in the log; only if it does not have to be whole.
 
         Raises
         ------
         sqlite3.Error, OSError, LedgerError, ValueError
-            If it was not written; the next one has to be whole.
+            If the record was not written; the next entry has to be whole.
         """
         if self._last is None:
             raise LedgerError(f"{self.path}: has no entry yet")
@@ -135,7 +135,7 @@ class LedgerStore:
         self._last, self._spans = read, len(read.spans)
 
     def check_writable(self) -> None:
-        """Raise LedgerError where nothing could be written later."""
+        """Raise LedgerError if later writes would fail."""
         db = self._connection()
         try:
             db.execute("BEGIN EXCLUSIVE")
@@ -145,12 +145,12 @@ class LedgerStore:
             raise LedgerError(f"{self.path}: cannot be written: {error}") from error
 
     def ask(self, ask: Callable[[sqlite3.Connection], _Answer]) -> _Answer:
-        """What a question to the tables gives.
+        """Result of a query to the tables.
 
         Raises
         ------
         LedgerError
-            If they cannot be read now.
+            If the tables cannot be read now.
         """
         try:
             return ask(self._connection())
@@ -158,7 +158,7 @@ class LedgerStore:
             raise LedgerError(f"{self.path}: cannot be read: {error}") from error
 
     def close(self) -> None:
-        """Let go of the files."""
+        """Close the files."""
         self._log.close()
         if self._db is not None:
             self._db.close()
@@ -170,7 +170,7 @@ class LedgerStore:
             raise LedgerError(f"{self.path}: was moved away or replaced while in use; put it back")
 
     def _connection(self) -> sqlite3.Connection:
-        """The open file; it is opened again after a write has failed."""
+        """The open connection; it is opened again after a failed write."""
         self._check_place()
         if self._db is None:
             self._db = connect(self.path, self._binding)
@@ -180,7 +180,7 @@ class LedgerStore:
 
 
 def _place(path: Path) -> tuple[int, int] | None:
-    """What tells a file from another one of the same name."""
+    """Identity of a file (device and inode), None if there is none."""
     try:
         found = path.stat()
     except OSError:

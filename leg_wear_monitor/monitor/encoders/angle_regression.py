@@ -10,7 +10,7 @@ from leg_wear_monitor.twin.reference.joint_angles import PHASES, AngleModel
 _RIDGE = 1.0e-9
 _HUBER = 1.5  # standard deviations beyond which a bin loses weight
 _ROUNDS = 4
-_BLIND = 1.0e-3  # of the largest singular value: less is not shown
+_BLIND = 1.0e-3  # fraction of the largest singular value: smaller ones are unobservable
 
 
 @attrs.frozen(eq=False)
@@ -23,7 +23,7 @@ class Estimate:
         Clearances [m], offset of the crank's encoder [rad], offsets [rad] and scale errors of the others.
     covariance : array
     joints : int
-        k.
+        Number k of clearance joints.
     """
 
     mean: Floats
@@ -56,16 +56,16 @@ def binned(model: AngleModel, crank_angle: Floats, angles: Floats) -> tuple[Floa
 def regress(columns: Floats, deviation: Floats, counts: Floats, before: Estimate) -> Floats:
     """Clearances and encoder errors (k + 1 + 2 m,) of one cycle, by Huber's M-estimate.
 
-    What no sensor shows stays as it was before.
+    Unobservable directions keep their prior values.
 
     Parameters
     ----------
     columns : (P, m, k + 1 + 2 m) array
         As `design` gives them.
     deviation, counts : (P, m) arrays
-        Of `binned`.
+        Results of `binned`.
     before : Estimate
-        Keeps apart, very weakly, what sensors cannot.
+        Prior, which separates with a very small weight what the sensors cannot.
     """
     p = columns.shape[-1]
     used = (counts > 0.0).ravel()
@@ -87,7 +87,7 @@ def regress(columns: Floats, deviation: Floats, counts: Floats, before: Estimate
 
 
 def blind_directions(columns: Floats, counts: Floats) -> Floats:
-    """Changes (n, p) of the parameters that sensors do not show; ``counts`` (P, m) samples in each bin."""
+    """Unobservable changes (n, p) of the parameters; ``counts`` (P, m) are the samples in each bin."""
     a = columns.reshape(-1, columns.shape[-1])[(counts > 0.0).ravel()]
     length = np.linalg.norm(a, axis=0)
     length[length == 0.0] = 1.0

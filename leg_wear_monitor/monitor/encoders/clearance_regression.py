@@ -1,9 +1,9 @@
-"""Clearances seen in the joint states: a regression on the angles of further joints, cycle by cycle.
+"""Clearance estimates from the joint states: a regression on the angles of further joints, cycle by cycle.
 
 Each gait cycle gives an estimate of all clearances and of the encoders' own errors, robust against outliers.
-Single cycles are chaotic, so how far cycles scatter, and nothing else, says how good their mean is. That mean
-is fused with what was known before: the clearances that are expected, and the encoders' errors as held since
-commissioning. A sensor that comes later starts with errors that are not known.
+Single cycles are chaotic, so the uncertainty of their mean is computed from the scatter of the cycles alone.
+The mean is fused with the prior: the expected clearances, and the encoders' errors as fixed at commissioning.
+A sensor that is added later starts with unknown errors.
 """
 
 from typing import NamedTuple
@@ -17,11 +17,11 @@ from leg_wear_monitor.twin.reference.joint_angles import AngleModel
 from leg_wear_monitor.twin.reference.reference import Reference
 
 LEAST_CYCLES = 20
-# what the linear model and its reference are off against full coordinates (benchmarks/hidden.py)
+# error of the linear model and its reference against full coordinates (benchmarks/hidden.py)
 MODEL_SIGMA_M = 2.0e-5
 
-_BATCH = 2  # cycles: neighbours hang together
-_NO_NEWS = 1.0e6  # of the variance before
+_BATCH = 2  # cycles per batch: neighbouring cycles are correlated
+_NO_NEWS = 1.0e6  # times the prior variance: no information
 
 
 class ClearanceRegressionSnapshot(NamedTuple):
@@ -40,16 +40,16 @@ class ClearanceRegression:
     ----------
     model : AngleModel
     reference : Reference, optional
-        What is to be expected; cycles wait for it.
+        Expected angles; cycles are kept without evaluation until it is given.
     before : Estimate, optional
-        What is known without these cycles; given with the reference.
+        Prior knowledge without these cycles; given with the reference.
     most : int
-        Cycles that are kept: the estimate is of these last ones.
+        Number of cycles that are kept; the estimate uses the last ones.
 
     Attributes
     ----------
     most : int
-        It may change.
+        As above; may be changed.
     """
 
     def __init__(
@@ -65,37 +65,38 @@ class ClearanceRegression:
         self._each: list[Floats] = []
 
     def add(self, crank_angle: Floats, angles: Floats) -> None:
-        """Take in a gait cycle's samples: crank angles (n,) [rad], encoders (n, m) [rad], NaN where none."""
+        """Add the samples of a gait cycle: crank (n,) and encoder angles (n, m) [rad], NaN where absent."""
         self.add_binned(*binned(self._model, crank_angle, angles))
 
     def add_binned(self, deviation: Floats, counts: Floats) -> None:
-        """Take in a gait cycle as `binned` gives it."""
+        """Add a gait cycle as returned by `binned`."""
         self._seen.append((deviation, counts))
         if self._reference is not None:
             self._each.append(self._regressed(deviation, counts))
         del self._seen[: -self.most], self._each[: -self.most]
 
     def refer(self, reference: Reference, before: Estimate) -> None:
-        """Look at the kept cycles (again) with another reference, and other things known before."""
+        """Evaluate the kept cycles with a new reference and a new prior."""
         self._reference, self._before = reference, before
         self._each = [self._regressed(*seen) for seen in self._seen]
 
     def forget(self) -> None:
-        """Let go of the kept cycles: the leg is another one now."""
+        """Drop the kept cycles, because the leg has changed."""
         self._seen, self._each = [], []
 
     def _regressed(self, deviation: Floats, counts: Floats) -> Floats:
         reference, before = self._given()
         joints = before.joints
         columns = self._columns(counts)
-        # the regression has what is expected at its own linear point: at the reference's clearances
+        # the prior is expressed at the linearisation point: at the clearances of the reference
         shift = reference.deviation - columns[:, :, :joints] @ reference.clearance_m
         return regress(columns, deviation - shift, counts, before)
 
     def _columns(self, counts: Floats) -> Floats:
-        """Columns of the regression for the encoders that are there, by their samples' counts (P, m).
+        """Columns of the regression for the available encoders, given the counts (P, m) of their samples.
 
-        What a joint does by way of others alone is not proportional to its clearance: it would be mistaken.
+        Joints without a direct effect are excluded: an effect through other joints alone is not
+        proportional to the clearance and would give wrong estimates.
         """
         reference, before = self._given()
         there = counts.any(axis=0)
@@ -111,40 +112,40 @@ class ClearanceRegression:
 
     @property
     def reference(self) -> Reference | None:
-        """What the cycles are compared with."""
+        """Reference that the cycles are compared with."""
         return self._reference
 
     @property
     def cycles(self) -> int:
-        """Cycles that are kept."""
+        """Number of kept cycles."""
         return len(self._seen)
 
     def alone(self) -> Estimate | None:
-        """What the cycles say by themselves; None while there are not enough."""
+        """Estimate from the cycles alone, without the prior; None while there are not enough."""
         if len(self._each) < LEAST_CYCLES:
             return None
         reference, before = self._given()
         each = np.array(self._each)
         size = len(each) // _BATCH
         batches = each[len(each) - _BATCH * size :].reshape(size, _BATCH, -1).mean(axis=1)
-        # by differences of neighbours: a change within the kept cycles is no scatter
+        # from differences of neighbouring cycles, so that a slow change does not count as scatter
         steps = np.diff(batches, axis=0)
         scatter = steps.T @ steps / (2.0 * len(steps))
-        # a reference has the scatter of the cycles that it was simulated from
+        # the reference adds the scatter of the cycles that it was simulated from
         covariance = scatter * (1.0 / size + _BATCH / reference.cycles)
         floor = 1.0e-6 * np.diagonal(before.covariance)
         floor[: before.joints] += MODEL_SIGMA_M**2
         return Estimate(np.median(batches, axis=0), covariance + np.diag(floor), before.joints)
 
     def fused(self) -> Estimate | None:
-        """The cycles and what was known before, weighted by their covariances (a Kalman filter's update)."""
+        """Cycles and prior, weighted by their covariances (update step of a Kalman filter)."""
         seen = self.alone()
         if seen is None:
             return None
         _, before = self._given()
         counts = np.sum([counts for _, counts in self._seen], axis=0)
         blind = blind_directions(self._columns(counts), counts)
-        # along what the sensors do not show, each cycle repeats what was known before: that is no news
+        # in unobservable directions, each cycle repeats the prior and adds no information
         scale = np.sqrt(np.diagonal(before.covariance))
         across = blind / scale
         across /= np.linalg.norm(across, axis=1, keepdims=True)

@@ -1,4 +1,4 @@
-"""The encoders' own errors: not known at first, found while the clearances are known, then held."""
+"""The encoders' own errors: unknown at first, estimated while the clearances are known, then fixed."""
 
 from collections.abc import Sequence
 
@@ -10,19 +10,18 @@ from leg_wear_monitor.monitor.config.inputs import Encoders
 from leg_wear_monitor.monitor.encoders.angle_regression import Estimate
 from leg_wear_monitor.monitor.ledger.entry import Commissioned
 
-_OFFSET_SIGMA_RAD = 0.05  # of an encoder that is not commissioned
+_OFFSET_SIGMA_RAD = 0.05  # standard deviation of an encoder's offset before commissioning
 _SCALE_SIGMA = 0.01
 
 
 @attrs.frozen(eq=False)
 class EncoderErrors:
-    """What is known of m encoders' errors.
+    """Estimated errors of m encoders.
 
     Attributes
     ----------
     centre_rad : (m,) array
-        Angle that an encoder's deviation is counted from, NaN before the first gait cycle: encoders may count
-        from anywhere.
+        Zero of an encoder's deviation, NaN before the first gait cycle: the zero of an encoder is arbitrary.
     mean : (1 + 2 m,) array
         Offset of the crank's encoder, offsets from the centres [rad] and scale errors of the others.
     covariance : array
@@ -37,7 +36,7 @@ class EncoderErrors:
 
 
 def names_of(encoders: Encoders) -> tuple[str, ...]:
-    """What tells encoders from one another: name, joint and sign."""
+    """Identification of each encoder: name, joint and sign."""
     signs = encoders.signs or (1.0,) * len(encoders.names)
     return tuple(
         f"{name} on {joint} {sign:+.0f}"
@@ -46,7 +45,7 @@ def names_of(encoders: Encoders) -> tuple[str, ...]:
 
 
 def errors_of(encoders: Encoders, held: Commissioned | None) -> EncoderErrors:
-    """Errors as they are held, of encoders that were commissioned; the others' are not known."""
+    """Stored errors of commissioned encoders; the errors of the others are unknown."""
     names = names_of(encoders)
     m = len(names)
     centre, mean = np.full(m, np.nan), np.zeros(1 + 2 * m)
@@ -63,12 +62,12 @@ def errors_of(encoders: Encoders, held: Commissioned | None) -> EncoderErrors:
 
 
 def _rows(which: Sequence[int], m: int) -> list[int]:
-    """Rows of the crank's offset, and of some encoders' offsets and scale errors."""
+    """Rows of the crank's offset, and of the offsets and scale errors of some encoders."""
     return [0, *(1 + i for i in which), *(1 + m + i for i in which)]
 
 
 def held(errors: EncoderErrors, encoders: Encoders, stamp_ns: int) -> Commissioned:
-    """What the ledger keeps of the errors: those of encoders that were commissioned."""
+    """Errors of the commissioned encoders, as stored in the ledger."""
     which = [i for i, known in enumerate(errors.known) if known]
     rows = _rows(which, len(errors.known))
     return Commissioned(
@@ -81,7 +80,7 @@ def held(errors: EncoderErrors, encoders: Encoders, stamp_ns: int) -> Commission
 
 
 def known_with(errors: EncoderErrors, clearance_m: Floats, sigma_m: Floats | float) -> Estimate:
-    """The encoders' errors as known, and clearances (k,) with their standard deviation."""
+    """Estimate of the encoders' errors and of clearances (k,) with the given standard deviation."""
     k, p = len(clearance_m), len(errors.mean)
     covariance = np.zeros((k + p, k + p))
     covariance[:k, :k] = np.diag(np.square(np.broadcast_to(sigma_m, k)))
@@ -90,7 +89,7 @@ def known_with(errors: EncoderErrors, clearance_m: Floats, sigma_m: Floats | flo
 
 
 def commissioned(errors: EncoderErrors, found: Estimate, present: Sequence[bool]) -> EncoderErrors:
-    """The errors as found, held from now on."""
+    """Errors fixed at the given estimate."""
     k = found.joints
     known = tuple(was or is_ for was, is_ in zip(errors.known, present, strict=True))
     return EncoderErrors(errors.centre_rad, found.mean[k:], found.covariance[k:, k:], known)

@@ -1,7 +1,7 @@
-"""Further encoders in the monitor: from their samples to the clearances that they show.
+"""Further encoders in the monitor: from their samples to clearance estimates.
 
-All of it happens at the ends of evaluation periods, which follow from the order of arrival alone. A cycle
-is evaluated when it is over; one more is simulated for the reference, and no period does more than that.
+All evaluation takes place at the ends of evaluation periods, which depend on the order of arrival only. Each
+period evaluates the gait cycles that ended, and simulates at most one cycle for the reference.
 """
 
 from typing import NamedTuple
@@ -32,16 +32,16 @@ from leg_wear_monitor.twin.reference.reference import ReferenceRun, ReferenceSna
 from leg_wear_monitor.twin.sample import Samples
 from leg_wear_monitor.twin.statistics import CycleStatistics
 
-OTHERWISE_CYCLES = 20  # in a row with other encoders than before, until those are believed to be the ones
+OTHERWISE_CYCLES = 20  # in a row with other encoders than before, until the change is accepted
 
-_UNKNOWN_M = 1.0e-3  # standard deviation of a clearance of which nothing is to be supposed
-_FAR_M = 1.0e-4  # from the reference: then it is made again
-_LONGEST = 1.5  # of a cycle's time in motion: with more standing in it, it is none of a steady gait
-_AGAIN_CYCLES = 100  # between two references
+_UNKNOWN_M = 1.0e-3  # prior standard deviation of a clearance without prior knowledge
+_FAR_M = 1.0e-4  # difference of a clearance from the reference at which the reference is renewed
+_LONGEST = 1.5  # times the time in motion: a longer cycle contains standstill, no steady gait
+_AGAIN_CYCLES = 100  # least number of cycles between two references
 
 
 class EncoderSnapshot(NamedTuple):
-    """All of an `EncoderObserver`."""
+    """Whole state of an `EncoderObserver`."""
 
     state: EncoderState
     hidden: ClearanceRegressionSnapshot
@@ -54,10 +54,10 @@ class EncoderObserver:
     Parameters
     ----------
     mechanism : Mechanism
-        As the configuration wants it.
+        With the parameters of the configuration applied.
     config : MonitorConfig
     known : Commissioned or None
-        Of the ledger.
+        Stored encoder errors of the ledger.
 
     Raises
     ------
@@ -77,12 +77,12 @@ class EncoderObserver:
 
     @property
     def cycles(self) -> int:
-        """Gait cycles that the estimate is of."""
+        """Number of gait cycles in the estimate."""
         return self._clearance_regression.cycles
 
     @property
     def commissions(self) -> bool:
-        """Whether encoders are there whose errors are not known."""
+        """Whether the errors of some available encoder are unknown."""
         return any(
             here and not known
             for here, known in zip(self.state.present, self.state.errors.known, strict=False)
@@ -96,11 +96,11 @@ class EncoderObserver:
         )
 
     def see(self, piece: Samples) -> None:
-        """Take in samples as they arrive."""
+        """Add samples in the order of arrival."""
         self.state.samples = extended(self.state.samples, piece)
 
     def ended(self, statistics: CycleStatistics) -> None:
-        """A gait cycle is over; it counts if the leg walked as commanded."""
+        """Note the end of a gait cycle, which is used if the leg walked as commanded."""
         cadence = self.config.cadence
         rpm = 60.0 * statistics.direction / statistics.moving_s
         steady = statistics.bridged_s == 0.0 and statistics.duration_s <= _LONGEST * statistics.moving_s
@@ -108,19 +108,19 @@ class EncoderObserver:
             self.state.due = (*self.state.due, (statistics.begin_ns, statistics.stamp_ns))
 
     def end_period(self, clearance_m: Floats, depth: Floats) -> Commissioned | None:
-        """Look at the gait cycles that are over, and simulate one more for the reference.
+        """Evaluate the gait cycles that ended, and simulate one more for the reference.
 
         Parameters
         ----------
         clearance_m : (k,) array
-            Mean clearances as they are counted.
+            Counted mean clearances.
         depth : (k, 2, N) array
-            Wear as it is counted [m].
+            Counted wear [m].
 
         Returns
         -------
         Commissioned or None
-            If the encoders' errors are known from now on.
+            Errors of the encoders, if this period completed their commissioning.
         """
         state, new = self.state, None
         for begin_ns, end_ns in state.due:
@@ -132,12 +132,12 @@ class EncoderObserver:
         return new
 
     def replaced(self) -> None:
-        """A part is new: the leg is another one."""
+        """Start again after the replacement of a part."""
         self._clearance_regression.forget()
         self.state.found, self.state.asked, self.state.updated_ns = None, False, 0
 
     def seen(self, counted_m: Floats) -> tuple[ClearanceEstimate, ...]:
-        """What the encoders show of each joint, beside the clearances (k,) that are counted [m]."""
+        """Clearance estimate of each joint, compared with the counted clearances (k,) [m]."""
         found = self.state.found
         if found is None:
             observation = (
@@ -153,13 +153,13 @@ class EncoderObserver:
         )
 
     def restore(self, snapshot: EncoderSnapshot) -> None:
-        """Go back to a snapshot of a watch of the same mechanism and parameters; it goes on bit for bit."""
+        """Restore a snapshot of the same mechanism and parameters; results are then bit for bit the same."""
         self.state = attrs.evolve(snapshot.state)
         self._clearance_regression.restore(snapshot.hidden)
         self._reference.restore(snapshot.reference)
 
     def _look(self, begin_ns: int, end_ns: int) -> None:
-        """Take in a gait cycle, if its encoders are those of the cycles before."""
+        """Add a gait cycle if its encoders are those of the previous cycles."""
         state = self.state
         crank, raw = within(state.samples, begin_ns, end_ns)
         angles = np.where(np.isfinite(raw), raw, np.nan)
@@ -182,7 +182,7 @@ class EncoderObserver:
             state.since_reference += 1
 
     def _is_changed(self, present: tuple[bool, ...]) -> bool:
-        """Whether the encoders are others now, and not for a moment only."""
+        """Whether the set of available encoders has changed for more than a few cycles."""
         state = self.state
         state.otherwise_cycles = state.otherwise_cycles + 1 if present == state.otherwise else 1
         state.otherwise = present
@@ -195,7 +195,7 @@ class EncoderObserver:
         return True
 
     def _centre(self, crank: Floats, angles: Floats) -> None:
-        """Find the angle that an encoder counts from, in its first cycle."""
+        """Set the zero of an encoder's deviation from its first cycle."""
         errors = self.state.errors
         if not np.isnan(errors.centre_rad).any() or not len(crank):
             return
@@ -206,7 +206,7 @@ class EncoderObserver:
         self.state.errors = attrs.evolve(errors, centre_rad=np.where(first, mean, errors.centre_rad))
 
     def _evaluate(self, stamp_ns: int) -> Commissioned | None:
-        """Estimate anew; hold the encoders' errors if there are cycles enough."""
+        """Renew the estimate; fix the encoders' errors if there are enough cycles."""
         state, hidden = self.state, self._clearance_regression
         if hidden.reference is None or not any(state.present):
             return None
@@ -221,7 +221,7 @@ class EncoderObserver:
         return held(state.errors, self._settings, stamp_ns)
 
     def _refer(self, clearance_m: Floats, depth: Floats) -> None:
-        """Simulate for a reference, and begin one where it is wanted."""
+        """Continue the simulation of a reference, or begin a new one if required."""
         state = self.state
         reference = self._reference.advance()
         if reference is not None:
@@ -244,20 +244,20 @@ class EncoderObserver:
         return bool((off[found.sigma_m <= ESTIMATED_M] > _FAR_M).any())
 
     def _best(self, counted_m: Floats) -> Floats:
-        """Clearances as seen, where they are; else as counted."""
+        """Estimated clearances where available, otherwise the counted ones."""
         found = self.state.found
         if found is None:
             return counted_m
         return np.where(found.sigma_m <= ESTIMATED_M, found.clearance_m, counted_m)
 
     def _look_anew(self) -> None:
-        """Look at the kept cycles with what is known of the encoders now."""
+        """Evaluate the kept cycles with the present errors of the encoders."""
         reference = self._clearance_regression.reference
         if reference is not None:
             self._clearance_regression.refer(reference, self._before(reference.clearance_m))
 
     def _before(self, clearance_m: Floats) -> Estimate:
-        """What is known without the cycles; of the clearances only while they commission the encoders."""
+        """Prior without the cycles; includes the clearances only during commissioning of the encoders."""
         forecast = self.config.forecast
         if not self.commissions:
             return known_with(self.state.errors, clearance_m, _UNKNOWN_M)

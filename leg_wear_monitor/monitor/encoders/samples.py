@@ -1,4 +1,4 @@
-"""Samples of further encoders, kept until the gait cycle that they belong to is over."""
+"""Samples of further encoders, kept until their gait cycle ends."""
 
 import attrs
 import numpy as np
@@ -12,14 +12,14 @@ MOST = 20_000  # samples that are kept: ten seconds at 2 kHz
 
 @attrs.frozen(eq=False)
 class EncoderSamples:
-    """Crank and encoder angles in the order of their arrival, and what was wrong with those that came.
+    """Crank and encoder angles in the order of their arrival, with counts of unusable ones.
 
     Attributes
     ----------
     stamp_ns : (n,) array of int
     crank_rad : (n,) array
     encoder_rad : (n, m) array
-        NaN where absent, infinite where what came is no angle.
+        NaN where absent, infinite where the received value is not an angle.
     samples, absent, no_angle : (m,) arrays of int
         Counts since the start.
     """
@@ -33,13 +33,13 @@ class EncoderSamples:
 
 
 def no_encoder_samples(encoders: int) -> EncoderSamples:
-    """None yet."""
+    """Empty samples of a number of encoders."""
     none = np.zeros(encoders, np.int64)
     return EncoderSamples(np.zeros(0, np.int64), np.zeros(0), np.zeros((0, encoders)), none, none, none)
 
 
 def extended(kept: EncoderSamples, piece: Samples) -> EncoderSamples:
-    """With the sound crank samples of a piece."""
+    """Samples extended by the valid crank samples of a piece."""
     piece = piece[(piece["kind"] == CRANK) & (piece["fault"] == NO_FAULT) & (piece["stamp_ns"] > 0)]
     piece = piece[np.isfinite(piece["crank_angle_rad"])]
     if not len(piece):
@@ -56,14 +56,14 @@ def extended(kept: EncoderSamples, piece: Samples) -> EncoderSamples:
 
 
 def within(kept: EncoderSamples, begin_ns: int, end_ns: int) -> tuple[Floats, Floats]:
-    """Crank (n,) and encoder angles (n, m) [rad] between two stamps, each stamp once: what came first."""
+    """Crank (n,) and encoder angles (n, m) [rad] between two stamps; of equal stamps the first sample."""
     _, first = np.unique(kept.stamp_ns, return_index=True)
     first = first[(kept.stamp_ns[first] >= begin_ns) & (kept.stamp_ns[first] < end_ns)]
     return kept.crank_rad[first], kept.encoder_rad[first]
 
 
 def after(kept: EncoderSamples, stamp_ns: int) -> EncoderSamples:
-    """Without what is before a stamp, or too much."""
+    """Samples from a stamp on, at most `MOST`."""
     which = np.flatnonzero(kept.stamp_ns >= stamp_ns)[-MOST:]
     return attrs.evolve(
         kept,

@@ -1,4 +1,4 @@
-"""What changes while further encoders are watched, and what may be wrong with one."""
+"""State of the encoder observer, and possible faults of an encoder."""
 
 from collections.abc import Sequence
 
@@ -13,36 +13,36 @@ from leg_wear_monitor.twin.reference.joint_angles import PHASES
 
 LEAST_PHASES = PHASES // 4  # with samples: at 60 rpm a rate of 32 Hz
 
-_STRANGE_RAD = 0.1  # of deviation within a cycle: many times what clearances and scale errors make
+_STRANGE_RAD = 0.1  # deviation within a cycle: many times the effect of clearances and scale errors
 
 
 @attrs.define
 class EncoderState:
-    """What changes, beside the regression and the reference; every value is immutable.
+    """State besides the regression and the reference; every value is immutable.
 
     Attributes
     ----------
     samples : EncoderSamples
     errors : EncoderErrors
     due : tuple of (int, int)
-        Begin and end [ns] of gait cycles that are over and not looked at yet.
+        Begin and end [ns] of ended gait cycles that are not evaluated yet.
     present : tuple of bool
         Which encoders the kept cycles have; empty before the first.
     otherwise : tuple of bool
-        Which ones the last cycles had, if that is something else.
+        Encoders of the last cycles, if they differ from `present`.
     otherwise_cycles : int
-        How many of them.
+        Number of these cycles.
     faults : tuple of str
-        What was wrong with each encoder in the last cycle; empty before the first.
+        Fault of each encoder in the last cycle; empty before the first.
     asked : bool
-        Whether a reference was asked for since the leg was last another one.
+        Whether a reference was requested since the last change of the leg.
     since_reference : int
         Cycles since the last reference was ready.
     found : Estimate or None
     updated_ns : int
-        When it was handed to the forecast, 0 if that is due.
+        Stamp of the last forecast update with it, 0 if an update is due.
     other, believed : tuple of bool
-        Which clearances were then surely other than counted, and which the forecast believed.
+        Clearances that then differed significantly from the counted ones, and those that the forecast used.
     """
 
     samples: EncoderSamples
@@ -61,7 +61,7 @@ class EncoderState:
 
 
 def fault_of(raw: Floats, deviation: Floats, joint: str) -> str:
-    """What is wrong with an encoder in a cycle; empty if nothing."""
+    """Fault of an encoder in a cycle; empty if there is none."""
     seen = deviation[np.isfinite(deviation)]
     if len(seen) < LEAST_PHASES:
         return "gives no angle" if np.isinf(raw).any() else "is not in joint_states with the crank"
@@ -71,5 +71,5 @@ def fault_of(raw: Floats, deviation: Floats, joint: str) -> str:
 
 
 def faults(names: Sequence[str], state: EncoderState) -> list[str]:
-    """What is wrong with encoders, for operators."""
+    """Faults of the encoders, for operators."""
     return [f"{name} {fault}" for name, fault in zip(names, state.faults, strict=False) if fault]

@@ -11,7 +11,7 @@ from leg_wear_monitor.errors import ConfigError, printable
 class RecordingError(ConfigError):
     """The recording is unusable; the message names the file, the topic (if any) and the reason.
 
-    The message may quote content of the recording; unprintable characters are replaced.
+    The message may quote content of the recording; unprintable characters are escaped.
     """
 
     def __init__(self, source: str, key: str, fault: str) -> None:

@@ -1,1 +1,1 @@
-"""A recording through the monitor."""
+"""Replay of recordings through the monitor."""

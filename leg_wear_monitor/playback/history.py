@@ -1,4 +1,4 @@
-"""What a replay brought, gait cycle after gait cycle: columns of numbers that stay small over days."""
+"""Replay results per gait cycle, stored as compact columns so that days of walking fit into memory."""
 
 from array import array
 from typing import Any
@@ -33,7 +33,7 @@ _MOST_CHANGES = 10_000
 
 
 class History:
-    """Gait cycles and changes of alarms, as they came.
+    """Gait cycles and alarm changes, in order of arrival.
 
     Parameters
     ----------
@@ -43,9 +43,9 @@ class History:
     Attributes
     ----------
     changes : list of tuples
-        Stamp [ns] and alarm as it then stood; the first ten thousand.
+        Stamp [ns] and state of the alarm after the change; the first ten thousand changes.
     worst : dict
-        Highest level that each kind of alarm has shown.
+        Highest level of each alarm kind.
     last : CycleReport or None
         The last gait cycle.
     """
@@ -72,7 +72,7 @@ class History:
             self._joints.extend(_number(joint, name) for name in JOINT_COLUMNS)
 
     def add_alarms(self, alarms: AlarmList) -> None:
-        """Add those alarms of a list that are not as they were."""
+        """Add the alarms of a list that have changed."""
         for alarm in alarms.alarms:
             before = self._before.get(alarm.name, Alarm(kind=alarm.kind, subject=alarm.subject))
             shown = (alarm.level, alarm.present, alarm.acknowledged)
@@ -84,7 +84,7 @@ class History:
 
     @property
     def stamp_ns(self) -> np.ndarray[Any, np.dtype[np.int64]]:
-        """Ends of the gait cycles, shape (cycles,)."""
+        """End times of the gait cycles [ns], shape (cycles,)."""
         return np.array(self._stamps, np.int64)
 
     def column(self, name: str) -> Floats:

@@ -1,4 +1,4 @@
-"""A recording through the monitor: the reports that it would have given live."""
+"""Replay of a recording through the monitor; the reports equal those of a live run."""
 
 from collections.abc import Callable, Iterable, Iterator
 from contextlib import ExitStack, nullcontext
@@ -24,33 +24,33 @@ from leg_wear_monitor.twin.kinds import CRANK, TORQUE
 from leg_wear_monitor.twin.sample import Samples, brings
 
 REPORTS_FILE = "reports.mcap"
-_LONGER, _LONGER_S = 1.05, 1.0  # what stamps may span beyond the time in which they came
+_LONGER, _LONGER_S = 1.05, 1.0  # stamps may span this factor times, plus these seconds, the logged time
 
 
 @attrs.define(eq=False)
 class ReplayResult:
-    """What a replay found.
+    """Result of a replay.
 
     Attributes
     ----------
     monitor : WearMonitor
-        As it stands at the end; its ledger is closed.
+        Monitor in its final state, with a closed ledger.
     history : History
     files : list of pathlib.Path
     topics : dict
-        Topics that were read, by what they are in the node.
+        Topics that were read, by their relative name in the node.
     time : str
-        Which time stamped the samples.
+        Time that stamped the samples.
     findings : list of Finding
-        What is wrong with the recording.
+        Faults of the recording.
     is_partial : bool
-        Whether something that was recorded is lost, or may be wrong.
+        Whether recorded data are lost or may be wrong.
     evidence : GaitEvidence
-        Whether what was followed can be this leg's gait.
+        Evidence on whether the tracked motion is a gait of this leg.
     crank_samples, torque_samples : int
-        A crank sample with an effort is both.
+        Numbers of samples; a crank sample with an effort counts as both.
     begin_ns, end_ns : int
-        First and last stamp of sound samples; 0 without any.
+        First and last stamp of valid samples [ns]; 0 if there are none.
     logged_s : float
         Time between the first and the last message [s].
     """
@@ -71,24 +71,24 @@ class ReplayResult:
 
     @property
     def is_believable(self) -> bool:
-        """Whether a gait cycle fits this leg; without one, no value is meaningful."""
+        """Whether at least one gait cycle fits this leg; otherwise no value is meaningful."""
         return self.evidence.believable > 0
 
     @property
     def is_unusable(self) -> bool:
-        """Whether no gait cycle fits this leg; a rest beside counted time may have no cycle."""
+        """Whether no gait cycle fits this leg; a remainder next to counted time may have no cycle."""
         is_rest = self.monitor.lost.already_counted > 0 and not self.evidence.doubtful
         return not self.is_believable and not is_rest
 
     @property
     def duration_s(self) -> float:
-        """Time between the first and the last stamp, of the messages' arrival where stamps jump [s]."""
+        """Time between the first and the last stamp [s]; if stamps jump, time of arrival instead."""
         stamped_s = (self.end_ns - self.begin_ns) / 1e9
         jumps = not 0.0 <= stamped_s <= _LONGER * self.logged_s + _LONGER_S
         return self.logged_s if jumps else stamped_s
 
     def count(self, samples: Samples) -> None:
-        """Take account of samples that go to the monitor."""
+        """Count samples that are passed to the monitor."""
         self.evidence.see(samples)
         self.crank_samples += int(np.count_nonzero(brings(samples, CRANK)))
         self.torque_samples += int(np.count_nonzero(brings(samples, TORQUE)))
@@ -115,34 +115,34 @@ def replay(
 ) -> ReplayResult:
     """Replay a recording through the monitor.
 
-    The ledger is written last, completely or not at all: an interrupted replay is not in it, and a repeated
-    one gives the same result.
+    The ledger is written last and atomically. An interrupted replay leaves the ledger unchanged, so repeating
+    the replay gives the same result.
 
     Parameters
     ----------
     paths : path, or iterable of paths
-        MCAP and .db3 files, bag directories; several are one recording.
+        MCAP and .db3 files, bag directories; several paths are read as one recording.
     config : MonitorConfig or path, optional
-        Parameters, or the parameter file of the node; default: the file of the package.
+        Parameters, or the parameter file of the node; default: the file shipped with the package.
     out : path, optional
         Directory for ``reports.mcap``, the messages that the node would have published.
     ledger : path, optional
-        Ledger to continue; the ledger named in the parameters is not touched.
+        Ledger to continue; the ledger named in the parameters is not modified.
     time : str
         Source of the samples' stamps: ``header``, ``log`` or ``publish``.
     joint_states, drive_torque : str, optional
-        Topics; found by their relative names if not given.
+        Topics; by default found by their relative names.
     node : str, optional
-        Full name of the node whose parameters, names and messages are wanted; if not given, the one beside
-        the topic of the crank, such as ``/left/leg_wear_monitor`` for ``/left/joint_states``.
+        Full name of the node whose parameters, names and messages are used; by default the node in the
+        namespace of the crank topic, such as ``/left/leg_wear_monitor`` for ``/left/joint_states``.
     memory_mb : float
-        Memory that reading the recording may take, temporary files included [10⁶ bytes].
+        Memory limit for reading the recording, including temporary files [10⁶ bytes].
     ready : callable, optional
-        Given the monitor before the first sample.
+        Called with the monitor before the first sample.
     progress : callable, optional
-        Told the fraction of the recording that is done, 0 to 1.
+        Called with the fraction of the recording that has been processed, 0 to 1.
     finish : callable, optional
-        Given the result before the ledger is written: what has to be on the disk first.
+        Called with the result before the ledger is written, to write files that must precede the ledger.
 
     Returns
     -------
@@ -151,9 +151,9 @@ def replay(
     Raises
     ------
     RecordingError
-        If nothing in the recording can be used, or the disk does not take the reports.
+        If the recording contains nothing usable, or the reports cannot be written.
     ConfigError, LedgerError
-        For parameters or a ledger that cannot be used.
+        If the parameters or the ledger are unusable.
     """
     config = config if isinstance(config, MonitorConfig) else load_config(config, node)
     kept = attrs.evolve(config.ledger, path="" if ledger is None else str(ledger))
@@ -179,7 +179,7 @@ def replay(
         result.is_partial = recording.is_partial
         if finish:
             finish(result)
-        if not result.is_unusable:  # wear of another machine would stay in the ledger for ever
+        if not result.is_unusable:  # otherwise the wear of another machine would remain in the ledger
             monitor.close()
     return result
 
@@ -190,7 +190,7 @@ def _run(
     sink: Sink | None,
     progress: Callable[[float], None] | None,
 ) -> None:
-    """Put all blocks of a recording through the monitor."""
+    """Process all blocks of a recording."""
     monitor = result.monitor
     first_ns: int | None = None
     for block in recording.blocks():
@@ -207,7 +207,7 @@ def _run(
 
 
 def _stamps_apart_s(result: ReplayResult, block: Block) -> float:
-    """From the last stamp so far to the first of a block [s]; 0 where stamps do not go on."""
+    """Time from the last stamp so far to the first stamp of a block [s]; 0 if stamps do not increase."""
     stamps = block.samples["stamp_ns"][block.samples["fault"] == 0]
     return max(0.0, (int(stamps[0]) - result.end_ns) * 1.0e-9) if len(stamps) and result.end_ns else 0.0
 
@@ -227,7 +227,7 @@ def _about_the_ledger(result: ReplayResult) -> list[Finding]:
 
 
 def _take(result: ReplayResult, samples: Samples, sink: Sink | None) -> None:
-    """Put samples through the monitor, and keep what comes out."""
+    """Process samples with the monitor, and store the reports."""
     reports = result.monitor.update(samples)
     for cycle in reports.cycles:
         result.history.add_cycle(cycle)
@@ -255,6 +255,6 @@ def _sink(directory: Path, monitor: WearMonitor, node: str, files: list[Path]) -
 
 
 def _evaluation_periods(block: Block, config: MonitorConfig) -> Iterator[Samples]:
-    """Samples of a block, cut where diagnostics are due."""
+    """Split the samples of a block at the times when diagnostics are due."""
     period_ns = round(config.diagnostics.period_s * 1e9)
     yield from np.split(block.samples, np.flatnonzero(np.diff(block.log_time_ns // period_ns)) + 1)

@@ -1,4 +1,4 @@
-"""Reports into an MCAP file: what the node would have published."""
+"""Writes reports to an MCAP file, as the messages that a live node would have published."""
 
 from contextlib import suppress
 from pathlib import Path
@@ -16,19 +16,19 @@ _CHUNK_BYTES = 2**20
 
 
 class Sink:
-    """An MCAP file of the monitor's topics; all are there, used or not.
+    """An MCAP file with all topics of the monitor, including those without messages.
 
     Parameters
     ----------
     path : pathlib.Path
     monitor : WearMonitor
     node : str
-        Full name of the node that would have published.
+        Full name of the publishing node.
 
     Raises
     ------
     RecordingError
-        If the disk does not take it.
+        If writing to the disk fails.
     """
 
     def __init__(self, path: Path, monitor: WearMonitor, node: str = NODE) -> None:
@@ -51,20 +51,20 @@ class Sink:
         if kind is None:
             self._writer.close()
             return
-        with suppress(RecordingError):  # the error on its way is the one to tell
+        with suppress(RecordingError):  # report the original error, not one from closing the file
             self._writer.close()
 
     def take(self, reports: Reports, stamp_ns: int) -> None:
-        """Write what was reported, and how the monitor then stood.
+        """Write reports and the status of the monitor after them.
 
         Parameters
         ----------
         reports : Reports
         stamp_ns : int
-            Of the status; 0 before there is any time.
+            Stamp of the status [ns]; 0 if no time is known yet.
         """
         if stamp_ns > 0 and not self._has_begun:
-            self._has_begun = True  # as the node begins: with all alarms as they stand
+            self._has_begun = True  # like the node, begin with the state of all alarms
             self._writer.write(self._channels[ALARMS], stamp_ns, self._messages.alarms(self._start))
         for outgoing in self._messages.of(reports):
             self._writer.write_many(self._channels[outgoing.output], outgoing.stamp_ns, outgoing.messages)

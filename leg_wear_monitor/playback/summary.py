@@ -1,4 +1,4 @@
-"""What a replay found, as plain data: summary.json, from which its page can be made again."""
+"""Results of a replay as plain data (summary.json), from which its page can be generated again."""
 
 import math
 from typing import Any
@@ -22,13 +22,13 @@ POINTS = 1000
 
 
 def summary(result: ReplayResult, wall_s: float) -> dict[str, Any]:
-    """The whole of a replay in SI; null where a figure is not known.
+    """Results of a replay in SI units; unknown values are null.
 
     Parameters
     ----------
     result : ReplayResult
     wall_s : float
-        What it took [s].
+        Wall-clock duration of the replay [s].
     """
     record = {
         "schema_version": SCHEMA_VERSION,
@@ -98,7 +98,7 @@ def _monitor(result: ReplayResult) -> dict[str, Any]:
 
 
 def _joints(result: ReplayResult) -> dict[str, Any]:
-    """Last figures of each joint, and the greatest and the mean of its forces."""
+    """Last values of each joint, and the maximum and the mean of its forces."""
     history, last = result.history, result.history.last
     if last is None:
         return {}
@@ -124,7 +124,7 @@ def _seen(seen: ClearanceEstimate) -> dict[str, Any]:
 
 
 def _leg(result: ReplayResult) -> dict[str, Any] | None:
-    """Forecast of the leg's own end: its first joint's."""
+    """Forecast of the leg's end of life: the first joint to reach its limit."""
     last = result.history.last
     if last is None or last.forecast is None:
         return None
@@ -149,7 +149,7 @@ def _alarm(alarm: Alarm) -> dict[str, Any]:
 
 
 def _history(history: History) -> dict[str, Any]:
-    """Columns over gait cycles, thinned: of some cycles the last, of peaks and impacts what counts of all."""
+    """Columns over groups of gait cycles: last value of each; maximum of peaks, sum of impacts."""
     stamps = history.stamp_ns
     last = _ends(len(stamps))
     begins = np.concatenate([[0], last[:-1] + 1]) if len(last) else last
@@ -182,7 +182,7 @@ def _wear(result: ReplayResult) -> dict[str, Any]:
 
 
 def _known(value: Any) -> Any:
-    """The same without numbers that JSON has not: null for them."""
+    """Replace numbers that JSON lacks (NaN, infinity) by null."""
     if isinstance(value, dict):
         return {key: _known(entry) for key, entry in value.items()}
     if isinstance(value, list | tuple):

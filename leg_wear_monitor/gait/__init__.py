@@ -1,1 +1,1 @@
-"""A made-up leg to be monitored: its motion in full coordinates, and the sensors on it."""
+"""A synthetic leg for tests of the monitor: motion in full coordinates, and its sensors."""

@@ -1,4 +1,4 @@
-"""The leg itself: full coordinates, clearances and wear of its own, all of it known."""
+"""Ground truth of the synthetic leg: full coordinates, with its own clearances and wear."""
 
 import math
 from collections.abc import Sequence
@@ -20,16 +20,16 @@ from leg_wear_monitor.mechanism.loader import load_mechanism
 from leg_wear_monitor.mechanism.position import build_linkage
 from leg_wear_monitor.mechanism.spec import Mechanism, PhaseLoad, RevoluteJoint, SpeedDrive
 
-_LONGEST_PIECE_S = 2.0e-3  # of the drive's polynomial: it then follows a ripple of 50 Hz to 1e-9 rad
+_LONGEST_PIECE_S = 2.0e-3  # longest drive polynomial: follows a ripple of 50 Hz to 1e-9 rad
 _LOAD_PHASES = 72
 _FRICTION_RAMP_RADPS = 0.05
 
 
 class Instant(NamedTuple):
-    """The crank at a time, and what sensors see of it.
+    """State of the crank at one time, and the ideal sensor values.
 
-    ``torque_impulse`` is the integral of the drive torque over all time before [N m s]; ``encoder_rad`` what
-    further encoders would read without an error; ``torque_nm`` the drive torque at the time.
+    ``torque_impulse`` is the time integral of the drive torque since the start [N m s]; ``encoder_rad`` are
+    the error-free angles of further encoders [rad]; ``torque_nm`` is the present drive torque [N m].
     """
 
     crank: CrankMotion
@@ -80,7 +80,7 @@ class SyntheticLeg:
         return np.asarray(self._setup.contacts.clearance + opened)
 
     def advance(self, t: float) -> Instant:
-        """Walk on to a time [s].
+        """Advance the leg to a time [s].
 
         Raises
         ------
@@ -99,7 +99,7 @@ class SyntheticLeg:
         return self._friction * math.tanh(speed / _FRICTION_RAMP_RADPS)
 
     def truth(self) -> dict[str, Any]:
-        """What is known of the leg: each joint's clearance at the start, after each cycle, and now [m]."""
+        """Ground truth: clearance of each joint at the start, after each cycle, and now [m]."""
         columns = zip(*(clearance.tolist() for _, clearance in self._cycles), strict=True)
         return {
             "mechanism": self._setup.linkage.mechanism.name,
@@ -129,7 +129,7 @@ class SyntheticLeg:
 
 
 def _setup(mechanism: Mechanism, config: GaitConfig, speed: float) -> Setup:
-    """The leg ready to run: its own joints, clearances, wear and load."""
+    """Simulation setup of the leg, with its own clearance joints, clearances, wear and load."""
     leg = _loaded(mechanism, config.load.toe_force_n)
     setup = prepare(leg, clearances=config.clearance_joints or None, wear=True)
     contacts = setup.contacts
@@ -144,7 +144,7 @@ def _setup(mechanism: Mechanism, config: GaitConfig, speed: float) -> Setup:
 
 
 def _loaded(mechanism: Mechanism, force_n: float) -> Mechanism:
-    """The mechanism with the ground's push on its toe, in proportion to its depth below its mean height."""
+    """Mechanism with a ground force on its toe, proportional to the toe's depth below its mean height."""
     if force_n == 0.0:
         return mechanism
     if mechanism.toe is None:
@@ -164,7 +164,7 @@ def _loaded(mechanism: Mechanism, force_n: float) -> Mechanism:
 
 
 def _sides(mechanism: Mechanism, joints: Sequence[str]) -> list[list[int]]:
-    """Rows of the bushing's and the journal's body of revolute joints."""
+    """Row indices of the bushing body and the journal body of each revolute joint."""
     names = body_names(mechanism)
     for name in joints:
         if not isinstance(mechanism.joints.get(name), RevoluteJoint):

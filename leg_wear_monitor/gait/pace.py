@@ -1,4 +1,4 @@
-"""How the crank turns: speeds that follow one another over smooth ramps, with a ripple by phase."""
+"""Crank motion: a sequence of speeds joined by smooth ramps, with a phase-dependent ripple."""
 
 import math
 from itertools import pairwise
@@ -20,7 +20,7 @@ class CrankMotion(NamedTuple):
 
 
 class _Stretch(NamedTuple):
-    """From a time [s] and an even angle [rad] on, from one speed to another [rad/s]."""
+    """Speed transition: start time [s], ripple-free start angle [rad], start and end speed [rad/s]."""
 
     since: float
     angle: float
@@ -31,8 +31,8 @@ class _Stretch(NamedTuple):
 class Pace:
     """Motion of the crank over time, from angle 0.
 
-    The even motion phi is what the ramps give; the ripple is added by phase, theta = phi + r / h sin(h phi),
-    so that it is r of the speed at any speed and stops with the crank.
+    The ramps define the ripple-free angle phi. The crank angle is theta = phi + r / h sin(h phi): the ripple
+    amplitude is the fraction r of any speed, and the ripple stops with the crank.
     """
 
     def __init__(self, config: PaceConfig) -> None:
@@ -44,7 +44,7 @@ class Pace:
             self._stretches.append(_Stretch(end, self._even(end).angle, before, after))
 
     def at(self, t: float) -> CrankMotion:
-        """The crank at a time [s]."""
+        """Crank motion at a time [s]."""
         angle, speed, acceleration = self._even(t)
         r, h = self._ripple, self._waves
         sine, factor = math.sin(h * angle), 1.0 + r * math.cos(h * angle)
@@ -53,7 +53,7 @@ class Pace:
         )
 
     def _even(self, t: float) -> CrankMotion:
-        """The motion without ripple: a smooth step of the speed, 10 u^3 - 15 u^4 + 6 u^5, then none."""
+        """Ripple-free motion: a smooth speed step 10 u^3 - 15 u^4 + 6 u^5, then constant speed."""
         last = next(last for last in reversed(self._stretches) if last.since <= t)
         tau, step = t - last.since, last.after - last.before
         if tau >= self._ramp:
@@ -73,7 +73,7 @@ class Pace:
 def quintic(since: float, start: CrankMotion, span: float, end: CrankMotion) -> Floats:
     """Drive polynomial (7,) through two states of the crank, ``span`` seconds apart.
 
-    Pieces of it join with continuous acceleration.
+    Consecutive polynomials join with continuous acceleration.
     """
     a0, v0, w0 = start.angle, start.speed, start.acceleration
     gap = end.angle - a0 - span * (v0 + 0.5 * span * w0)

@@ -1,4 +1,4 @@
-"""What the sensors on the leg say of it, and what of that arrives."""
+"""Sensor readings of the synthetic leg, and their transport (delay, loss, faults)."""
 
 import heapq
 import itertools
@@ -31,12 +31,12 @@ from leg_wear_monitor.twin.sample import (
     Samples,
 )
 
-# what a message can be made to suffer from
+# faults that can be injected into messages
 _MADE = tuple(fault for fault in FAULTS if fault not in (NO_FAULT, WRONG_TYPE, OUT_OF_RANGE))
 
 
 class Reading(NamedTuple):
-    """A message of a sensor: when it arrives and was taken [s since the start], and what it says."""
+    """A sensor message: times of arrival and of measurement [s since the start], and its content."""
 
     arrival_s: float
     taken_s: float
@@ -49,7 +49,7 @@ class Reading(NamedTuple):
 
 
 class Noise:
-    """Normal and uniform numbers, one after the other; drawn in blocks, for that is ten times as fast."""
+    """Sequences of normal and uniform random numbers; drawn in blocks, which is ten times as fast."""
 
     def __init__(self, seed: list[int]) -> None:
         self._rng = np.random.default_rng(seed)
@@ -57,14 +57,14 @@ class Noise:
         self._uniform: Iterator[float] = iter(())
 
     def normal(self) -> float:
-        """Next number of standard deviation 1."""
+        """Next normally distributed number, with standard deviation 1."""
         for value in self._normal:
             return value
         self._normal = iter(self._rng.standard_normal(1024).tolist())
         return next(self._normal)
 
     def uniform(self) -> float:
-        """Next number in [0, 1)."""
+        """Next uniformly distributed number in [0, 1)."""
         for value in self._uniform:
             return value
         self._uniform = iter(self._rng.random(1024).tolist())
@@ -72,12 +72,12 @@ class Noise:
 
 
 def readings(leg: SyntheticLeg, config: GaitConfig) -> Iterator[Reading]:
-    """Readings of the leg in order of arrival, without end unless the configuration has one."""
+    """Readings of the leg in order of arrival; endless unless the configuration sets a duration."""
     return _arriving(_taken(leg, config), config.transport, Noise([config.seed, 3]))
 
 
 def samples(block: Iterable[Reading], start_ns: int) -> Samples:
-    """Readings as samples that a monitor takes, (n,) of GAIT_SAMPLE; time 0 is ``start_ns``."""
+    """Convert readings to input samples of a monitor, (n,) of GAIT_SAMPLE; time 0 is ``start_ns``."""
     rows = [
         (stamp_ns(reading, start_ns), reading.kind, reading.fault, *reading[4:7], _four(reading.encoder_rad))
         for reading in block
@@ -95,7 +95,7 @@ def stamp_ns(reading: Reading, start_ns: int) -> int:
 
 
 def _taken(leg: SyntheticLeg, config: GaitConfig) -> Iterator[Reading]:
-    """Readings in the order in which they are taken."""
+    """Readings in order of measurement."""
     jitter = config.transport.jitter_s
     encoder, torque = Noise([config.seed, 1]), Noise([config.seed, 2])
     further = Noise([config.seed, 4])
@@ -121,7 +121,7 @@ def _taken(leg: SyntheticLeg, config: GaitConfig) -> Iterator[Reading]:
 
 
 def _times(rate_hz: float, jitter_s: float, noise: Noise, kind: int) -> Iterator[tuple[float, int]]:
-    """When a sensor's readings are taken [s]: even, but for the jitter, which never swaps two."""
+    """Measurement times of a sensor [s]: equal intervals with jitter, which never swaps two readings."""
     most = 0.45 / rate_hz
     for i in itertools.count(1):
         yield i / rate_hz + min(most, max(-most, jitter_s * noise.normal())), kind
@@ -152,7 +152,7 @@ def _torque(config: TorqueSensorConfig, torque_nm: float, noise: Noise) -> float
 
 
 def _arriving(taken: Iterable[Reading], config: TransportConfig, noise: Noise) -> Iterator[Reading]:
-    """What of the readings arrives, in the order in which it does."""
+    """Readings that arrive, in order of arrival."""
     order = itertools.count()
     faults = itertools.cycle(_MADE)
     under_way: list[tuple[float, int, Reading]] = []

@@ -1,4 +1,4 @@
-"""Whether the times of a recording agree: stamps in headers, and when messages were logged."""
+"""Check that the clocks of a recording agree: header stamps against log times."""
 
 import numpy as np
 from numpy.typing import NDArray
@@ -10,13 +10,13 @@ _FRACTION, _LEAST_NS = 0.05, 1_000_000_000
 
 
 class Clocks:
-    """First and last stamps and log times of each type of message."""
+    """First and last stamps and log times of each message type."""
 
     def __init__(self) -> None:
         self._ends: dict[int, tuple[int, int, int, int]] = {}
 
     def compare(self, samples: Samples, messages: NDArray[np.void]) -> None:
-        """Take account of messages and what was decoded from them.
+        """Update the times from messages and the samples decoded from them.
 
         Parameters
         ----------
@@ -32,13 +32,13 @@ class Clocks:
             self._ends[kind] = (*first, int(stamps[-1]), int(times[-1]))
 
     def notes(self) -> list[str]:
-        """What does not agree, one line each."""
+        """Disagreements of the clocks, one line each."""
         stamped = (self._rate(each.code, each.topic) for each in STREAMS if each.has_stamp)
         unstamped = (self._apart(each) for each in STREAMS if not each.has_stamp)
         return [note for note in (*stamped, *unstamped) if note]
 
     def _apart(self, stream: Stream) -> str | None:
-        """Whether the log times that stamp a stream are far from the crank's stamps."""
+        """Remark if the log times that stamp a stream are far from the crank's stamps; otherwise None."""
         crank = self._ends.get(JOINT_STATE)
         if stream.code not in self._ends or crank is None or abs(crank[1] - crank[0]) <= _LEAST_NS:
             return None

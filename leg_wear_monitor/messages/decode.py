@@ -1,4 +1,4 @@
-"""From messages to gait samples: which joint is the crank, where the torque comes from, signs and scales."""
+"""Decoding of messages to gait samples: selects crank and torque, and applies signs and scales."""
 
 import numpy as np
 from numpy.typing import NDArray
@@ -11,12 +11,12 @@ _AXES = {"x": 0, "y": 1, "z": 2}
 
 
 class Decoder:
-    """Samples from messages, one by one or many at a time, with the same numbers; live and in replay.
+    """Decodes messages to samples, singly or in bulk, with identical results; used live and in replay.
 
     Parameters
     ----------
     config : MonitorConfig
-        Of which `crank_joint`, `crank`, `encoders` and `drive_torque` are used.
+        The decoder uses `crank_joint`, `crank`, `encoders` and `drive_torque`.
     """
 
     def __init__(self, config: MonitorConfig) -> None:
@@ -33,7 +33,7 @@ class Decoder:
         self._signs = np.array(config.encoders.signs or (1.0,) * len(names))
 
     def many(self, data: NDArray[np.uint8], messages: NDArray[np.void]) -> Samples:
-        """Samples of messages, in their order; one that cannot be used becomes a sample with a fault.
+        """Decode messages in order; an unusable message becomes a sample with a fault.
 
         Parameters
         ----------
@@ -58,15 +58,15 @@ class Decoder:
         return mark_zero_stamps(samples)
 
     def one(self, raw: bytes, kind: int, log_time_ns: int = 0) -> Samples:
-        """Sample of one message as it came.
+        """Decode one serialized message.
 
         Parameters
         ----------
         raw : bytes
         kind : int
-            Code of its stream.
+            Code of the message's stream.
         log_time_ns : int
-            Time it came, which stamps a type without a header [ns].
+            Time of arrival [ns]; stamps messages without a header.
 
         Returns
         -------
@@ -78,7 +78,7 @@ class Decoder:
 
 
 def mark_zero_stamps(samples: Samples) -> Samples:
-    """Mark, in place, samples that are well but for a stamp of zero: a clock that had not started."""
+    """Mark, in place, otherwise valid samples with a stamp of zero: their clock had not started."""
     zero = (samples["stamp_ns"] == 0) & (samples["fault"] == NO_FAULT)
     if zero.any():
         samples["fault"][zero] = ZERO_STAMP

@@ -1,4 +1,4 @@
-"""What a recording must say of the types in it, so that other tools can read it."""
+"""Message definitions and type hashes, which a recording needs so that other tools can read it."""
 
 from functools import cache
 
@@ -16,9 +16,9 @@ class Definition:
     name : str
         Such as ``sensor_msgs/msg/JointState``.
     text : str
-        Its definition and those of all types in it, as ros2msg.
+        Definition in ros2msg format, including those of all nested types.
     digest : str
-        Its hash of REP-2011, ``RIHS01_...``.
+        Type hash of REP-2011, ``RIHS01_...``.
     """
 
     name: str

@@ -1,4 +1,4 @@
-"""Messages as CDR, many at once where all have one layout: little endian, XCDR1."""
+"""CDR encoding (little endian, XCDR1); messages of equal layout are encoded in bulk."""
 
 import struct
 from collections.abc import Mapping, Sequence
@@ -16,7 +16,7 @@ _SECOND = 1_000_000_000
 
 
 class _Layout:
-    """A message that is written part by part; columns of numbers are noted and filled later."""
+    """Message layout, built part by part; number columns are registered first and filled in later."""
 
     def __init__(self) -> None:
         self.body = bytearray()
@@ -35,7 +35,7 @@ class _Layout:
         self.body += content
 
     def column(self, values: NDArray[Any]) -> None:
-        """Numbers that differ from message to message, shape (n, any)."""
+        """Add numbers that differ between messages, shape (n, any)."""
         self.align(values.dtype.itemsize)
         self.columns.append((len(self.body), values))
         self.body += bytes(values.dtype.itemsize * values.shape[1])
@@ -47,7 +47,7 @@ class _Layout:
         self.text(frame_id)
 
     def messages(self, n: int) -> NDArray[np.uint8]:
-        """All messages, one a row."""
+        """All messages, one per row."""
         rows = np.empty((n, len(_LITTLE) + len(self.body)), np.uint8)
         rows[:] = np.frombuffer(_LITTLE + bytes(self.body), np.uint8)
         for at, values in self.columns:
@@ -72,9 +72,9 @@ def joint_states(
     stamp_ns : (n,) array of int
         Stamps of the headers [ns].
     names : sequence of str
-        Joints, the same in all messages.
+        Joint names, the same in all messages.
     position, velocity, effort : (n, joints) array, optional
-        Left empty in the messages if not given.
+        Empty in the messages if not given.
     frame_id : str
 
     Returns
@@ -109,7 +109,7 @@ def wrenches(
     stamp_ns : (n,) array of int
         Stamps of the headers [ns].
     force, torque : (n, 3) array, optional
-        Zero if not given [N, N m].
+        Force [N] and torque [N m]; zero if not given.
     frame_id : str
 
     Returns
@@ -136,7 +136,7 @@ def diagnostic_array(
     stamp_ns : int
         Stamp of the header [ns].
     statuses : sequence of tuples
-        Name, level (0 OK, 1 WARN, 2 ERROR, 3 STALE), message, hardware id, values by their keys.
+        Name, level (0 OK, 1 WARN, 2 ERROR, 3 STALE), message, hardware id, values by key.
     frame_id : str
     """
     layout = _Layout()

@@ -1,4 +1,4 @@
-"""When a forecast is told: with a minute's first gait cycle, after an alarm's change, with a new answer."""
+"""Times of forecast messages: a minute after the last one, after an alarm change, on a new answer."""
 
 from collections.abc import Iterator
 
@@ -9,7 +9,7 @@ _MINUTE_NS = 60 * 10**9
 
 
 class ForecastTimes:
-    """Picks gait cycles by stamps alone: however reports are joined, the same ones."""
+    """Selects gait cycles by their stamps only, independent of how reports are grouped."""
 
     def __init__(self) -> None:
         self._told_ns: int | None = None
@@ -17,7 +17,7 @@ class ForecastTimes:
         self._answers: list[Answer] = []
 
     def due(self, reports: Reports) -> Iterator[CycleReport]:
-        """Gait cycles of reports after which a forecast is due."""
+        """Gait cycles after which a forecast is due."""
         self._changes_ns += [change.stamp_ns for change in reports.alarms]
         for cycle in reports.cycles:
             seen = [stamp for stamp in self._changes_ns if stamp <= cycle.stamp_ns]
@@ -30,5 +30,5 @@ class ForecastTimes:
                 yield cycle
 
     def _is_minute(self, stamp_ns: int) -> bool:
-        """Whether the last was a minute ago, or of another time base, or is still to come."""
+        """Whether no forecast was published yet, or the last is a minute old or of another time base."""
         return self._told_ns is None or not 0 <= stamp_ns - self._told_ns < _MINUTE_NS

@@ -1,4 +1,4 @@
-"""From reports to the messages on the monitor's topics, as bytes: the same live and in replay."""
+"""Conversion of reports to serialized output messages, byte-identical live and in replay."""
 
 import math
 from collections.abc import Iterable, Iterator, Sequence
@@ -28,7 +28,7 @@ from leg_wear_monitor.twin.kinds import CRANK
 
 @attrs.frozen
 class Output:
-    """A topic of the monitor: its name seen from the node, its type and what it offers."""
+    """An output topic of the monitor: name relative to the node, type and offered quality of service."""
 
     name: str
     type: str
@@ -57,7 +57,7 @@ class Outgoing:
     output : Output
     stamp_ns : (n,) array of int
     messages : (n, bytes) array of uint8
-        A message a row.
+        One message per row.
     """
 
     output: Output
@@ -66,7 +66,7 @@ class Outgoing:
 
 
 class Messages:
-    """Makes messages of reports.
+    """Converts reports to messages.
 
     Parameters
     ----------
@@ -74,7 +74,7 @@ class Messages:
     clearance_joints : sequence of str
         The clearance joints, in the order of the reports.
     node : str
-        Full name of the node. It stands before the names in diagnostics, without the leading slash.
+        Full name of the node; without its leading slash, it prefixes the names in diagnostics.
     """
 
     def __init__(self, config: MonitorConfig, clearance_joints: Sequence[str], node: str = NODE) -> None:
@@ -83,7 +83,7 @@ class Messages:
         self._impacts = [f"{joint}_impact" for joint in clearance_joints]
 
     def of(self, reports: Reports) -> Iterator[Outgoing]:
-        """All messages that reports make: of samples, of gait cycles, of alarms."""
+        """All messages for reports: those of samples, of gait cycles and of alarms."""
         yield from self.of_samples(reports.samples)
         for cycle in reports.cycles:
             yield _single(CLEARANCES, cycle.stamp_ns, self.clearances(cycle))
@@ -91,7 +91,7 @@ class Messages:
             yield _single(ALARMS, alarms.stamp_ns, self.alarms(alarms))
 
     def of_samples(self, samples: SampleReports) -> Iterator[Outgoing]:
-        """Torque at each sample that was followed, contact forces at each of the crank."""
+        """Torque at each tracked sample, and contact forces at each crank sample."""
         followed = np.isfinite(samples.predicted_torque_nm)
         if followed.any():
             yield self._torques(samples, followed)
@@ -126,12 +126,12 @@ class Messages:
         return raw
 
     def forecast(self, cycle: CycleReport) -> bytes:
-        """The message of `FORECAST` after a gait cycle: how long each joint lasts, and the leg."""
+        """The message of `FORECAST` after a gait cycle: remaining life of each joint and of the leg."""
         leg = [] if cycle.forecast is None else [_leg_lifetime(cycle.forecast)]
         return self._array(cycle.stamp_ns, [*map(_lifetime, cycle.joints), *leg])
 
     def alarms(self, alarms: AlarmList) -> bytes:
-        """The message of `ALARMS`: all of them, as they stand."""
+        """The message of `ALARMS`: the present state of all alarms."""
         return self._array(alarms.stamp_ns, map(_alarm, alarms.alarms))
 
     def diagnostics(self, stamp_ns: int, statuses: Iterable[Status]) -> bytes:
@@ -163,7 +163,7 @@ def topic_of(output: Output, node: str) -> str:
 
 
 def plain(value: float) -> str:
-    """A number as text: whole ones without a point, others with fifteen digits."""
+    """A number as text: integers without a decimal point, other numbers with fifteen digits."""
     return str(int(value)) if float(value).is_integer() else f"{value:.{_DIGITS}g}"
 
 
@@ -192,7 +192,7 @@ def _lifetime(joint: JointReport) -> Status:
 
 
 def _leg_lifetime(told: LegForecast) -> Status:
-    """Until the first joint reaches its limit; the probability of each to be the first."""
+    """Life until the first joint reaches its limit, and each joint's probability of being the first."""
     values = lifetime_values(told)
     values |= {f"{joint}_first_probability": value for joint, value in told.first_probability.items()}
     values["simulated_lives"] = float(told.simulated_lives)

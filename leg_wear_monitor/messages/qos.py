@@ -1,4 +1,4 @@
-"""Quality of service as rosbag2 stores it (metadata version 9): a recording plays as it was published."""
+"""Quality of service in the format of rosbag2 (metadata version 9), so that playback uses the original."""
 
 import attrs
 
@@ -7,14 +7,14 @@ _FOREVER = {"sec": 9223372036, "nsec": 854775807}
 
 @attrs.frozen
 class Qos:
-    """What a publisher offered."""
+    """Quality of service offered by a publisher."""
 
     reliability: str = "reliable"
     durability: str = "volatile"
     depth: int = 10
 
     def profile(self) -> dict[str, object]:
-        """Mapping of metadata.yaml."""
+        """Mapping as in metadata.yaml."""
         return {
             "history": "keep_last",
             "depth": self.depth,
@@ -28,7 +28,7 @@ class Qos:
         }
 
     def text(self) -> str:
-        """YAML of a channel's metadata."""
+        """YAML text for a channel's metadata."""
         lines = []
         for key, value in self.profile().items():
             if isinstance(value, dict):

@@ -1,6 +1,6 @@
-"""What comes in, one entry each: subscriptions, topics of recordings, decoding and checks follow from it.
+"""Table of input streams, from which subscriptions, recording topics, decoding and checks are derived.
 
-How the messages of a stream are read stands in `cdr`, what its samples feed in `twin.kinds`.
+`cdr` parses the messages of a stream; `twin.kinds` defines the use of its samples.
 """
 
 import attrs
@@ -17,21 +17,21 @@ class Stream:
     Attributes
     ----------
     code : int
-        Of its messages among others, in `cdr.MESSAGE`.
+        Identifies messages of the stream in `cdr.MESSAGE`.
     topic : str
-        Relative name.
+        Relative topic name.
     type : str
-        Such as ``sensor_msgs/msg/JointState``.
+        Message type, such as ``sensor_msgs/msg/JointState``.
     fields : tuple of str
-        Fields of the type's own definition; names of nested types without their package.
+        Fields of the type's main definition; names of nested types without their package.
     kind : int
         Kind of its samples, a key of `twin.kinds.KINDS`.
     torque_source : str
-        Value of `drive_torque.source` for which it is read; empty if always.
+        Value of `drive_torque.source` for which the stream is read; empty if it is always read.
     has_stamp : bool
         Whether the type has a header; without one, the time of arrival stamps its samples.
     is_needed : bool
-        Whether nothing can be done without it.
+        Whether the stream is required.
     """
 
     code: int
@@ -56,7 +56,7 @@ STREAMS = (
             "float64[] velocity",
             "float64[] effort",
         ),
-        kind=CRANK,  # the angles of further encoders come with it, and the torque where that is its effort
+        kind=CRANK,  # also carries the angles of further encoders, and the torque if its source is the effort
         is_needed=True,
     ),
     Stream(

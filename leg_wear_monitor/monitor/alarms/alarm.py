@@ -1,6 +1,6 @@
 """Alarms as a state machine: levels with a deadband and an on-delay, latched until acknowledged.
 
-Everything here is a pure function of (alarm, value, limit). A value is judged once a gait cycle, so the
+Everything here is a pure function of (alarm, value, limit). A value is evaluated once per gait cycle, so the
 on-delay counts gait cycles.
 """
 
@@ -11,7 +11,7 @@ import attrs
 
 
 class Level(IntEnum):
-    """How bad it is; numbers as in diagnostic_msgs/DiagnosticStatus."""
+    """Level of an alarm; numbers as in diagnostic_msgs/DiagnosticStatus."""
 
     OK = 0
     WARN = 1
@@ -20,18 +20,18 @@ class Level(IntEnum):
 
 @attrs.frozen
 class Limit:
-    """Where the levels of an alarm begin.
+    """Limits of the levels of an alarm.
 
     Attributes
     ----------
     warn, error : float
-        A value at one of them or beyond has reached its level.
+        A value at a limit or beyond has reached its level.
     deadband : float
-        Share of a limit by which a value must have come back before the level falls.
+        Fraction of a limit by which a value must have returned before the level falls.
     on_delay : int
         Gait cycles in a row for which a value must be beyond before the level rises; 1: at once.
     is_least : bool
-        Whether values below the limits are the bad ones.
+        Whether the limits are lower bounds: values below them are faults.
     """
 
     warn: float
@@ -55,32 +55,32 @@ class Limit:
 
 @attrs.frozen(kw_only=True)
 class Alarm:
-    """An alarm as it stands.
+    """State of an alarm.
 
     Attributes
     ----------
     kind : str
-        What it is about, such as ``clearance``.
+        Monitored quantity, such as ``clearance``.
     subject : str
-        Which joint or which input; empty where there is only one.
+        Joint or input; empty if there is only one.
     unit : str
-        Of value and limit.
+        Unit of value and limit.
     present : Level
-        What the value is now, deadband and on-delay considered.
+        Level of the present value, with deadband and on-delay.
     level : Level
-        What is shown: the highest that was present since it was last acknowledged.
+        Shown level: the highest present level since the last acknowledgement.
     acknowledged : bool
-        Whether somebody has seen it at this level.
+        Whether an operator has acknowledged it at this level.
     value : float
-        As it was last judged; NaN before.
+        Last evaluated value; NaN before.
     limit : float
-        The limit of ERROR it was judged against; NaN before.
+        Limit of ERROR in the last evaluation; NaN before.
     raised_ns : int
-        When the level was last raised; 0 before.
+        Stamp at which the level last rose; 0 before.
     worst : float
         The worst value since it was raised; NaN while its level is OK.
     beyond : tuple of int
-        For how many gait cycles in a row the value has been beyond the limits of WARN and ERROR.
+        Number of gait cycles in a row with the value beyond the limits of WARN and ERROR.
     """
 
     kind: str
@@ -97,24 +97,24 @@ class Alarm:
 
     @property
     def name(self) -> str:
-        """Stable and free of values, such as ``clearance A``."""
+        """Stable name without values, such as ``clearance A``."""
         return f"{self.kind} {self.subject}".rstrip()
 
 
 def next_level(
     level: Level, value: float, limit: Limit, beyond: tuple[int, int], cycles: int = 1
 ) -> tuple[Level, tuple[int, int]]:
-    """Level after a value, and for how many gait cycles it has been beyond WARN and ERROR.
+    """Level after a value, and the numbers of gait cycles with values beyond WARN and ERROR.
 
     Parameters
     ----------
     level : Level
-        Before.
+        Previous level.
     value : float
         Not NaN.
     limit : Limit
     beyond : tuple of int
-        As returned the last time, (0, 0) at first.
+        As returned by the previous call, (0, 0) at first.
     cycles : int
         Gait cycles the value stands for.
     """
@@ -131,7 +131,7 @@ def next_level(
 
 
 def evaluated(alarm: Alarm, value: float, limit: Limit, stamp_ns: int, cycles: int = 1) -> Alarm:
-    """Alarm after a value; one that is NaN says nothing and leaves the alarm as it is.
+    """Alarm after a value; NaN leaves the alarm unchanged.
 
     Parameters
     ----------
@@ -140,7 +140,7 @@ def evaluated(alarm: Alarm, value: float, limit: Limit, stamp_ns: int, cycles: i
         In the alarm's unit.
     limit : Limit
     stamp_ns : int
-        When it was so.
+        Stamp of the value.
     cycles : int
         Gait cycles the value stands for.
     """
@@ -165,7 +165,7 @@ def _worst(alarm: Alarm, value: float, limit: Limit) -> float:
 
 
 def acknowledged(alarm: Alarm) -> Alarm:
-    """Alarm after somebody has seen it: cleared if it has returned to normal, marked if not."""
+    """Alarm after an acknowledgement: cleared if it has returned to normal, marked if not."""
     if alarm.level is Level.OK:
         return alarm
     if alarm.present is Level.OK:
@@ -174,7 +174,7 @@ def acknowledged(alarm: Alarm) -> Alarm:
 
 
 def has_changed(before: Alarm, after: Alarm) -> bool:
-    """Whether what people see of an alarm has changed: its level, presence or acknowledgement."""
+    """Whether the state shown to operators has changed: level, presence or acknowledgement."""
     return (before.level, before.present, before.acknowledged) != (
         after.level,
         after.present,

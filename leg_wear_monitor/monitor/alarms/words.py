@@ -1,17 +1,17 @@
-"""An alarm in words: its state, how bad it was, since when."""
+"""Human-readable texts of an alarm: its state, its worst value, its start."""
 
 import math
 from datetime import UTC, datetime
 
 from leg_wear_monitor.monitor.alarms.alarm import Alarm, Level
 
-_FIRST_DATE_S = 1.0e8  # a stamp below is of a clock that began at zero
+_FIRST_DATE_S = 1.0e8  # a smaller stamp is from a clock that began at zero
 
 ADVICE = "The monitor advises. The absence of an alarm does not mean the joints are healthy."
 
 
 def state_of(alarm: Alarm) -> str:
-    """An alarm's state, free of values."""
+    """An alarm's state, without values."""
     if alarm.level is Level.OK:
         return "OK"
     present = "present" if alarm.present is alarm.level else "latched"
@@ -19,14 +19,14 @@ def state_of(alarm: Alarm) -> str:
 
 
 def raised_words(state: str, worst: float | None, limit: float | None, unit: str, raised_ns: int) -> str:
-    """What to know of an alarm that is raised, such as ``latched, worst 0.42, limit 0.05, since ...``.
+    """Description of a raised alarm, such as ``latched, worst 0.42, limit 0.05, since ...``.
 
     Parameters
     ----------
     state : str
-        As `state_of` gives it.
+        As returned by `state_of`.
     worst, limit : float or None
-        None or NaN where it is not known: of an alarm that an older ledger kept.
+        None or NaN if unknown, as for an alarm from an older ledger.
     unit : str
     raised_ns : int
         Stamp at which it was raised.
@@ -39,7 +39,7 @@ def raised_words(state: str, worst: float | None, limit: float | None, unit: str
 
 
 def time_words(stamp_ns: int) -> str:
-    """A stamp as date and time, or as seconds where it is of a clock that began at zero."""
+    """A stamp as date and time, or as seconds if its clock began at zero."""
     seconds = stamp_ns / 1.0e9
     if seconds < _FIRST_DATE_S:
         return f"{seconds:.3f} s"

@@ -26,13 +26,13 @@ def fitted(mechanism: Mechanism, config: MonitorConfig, source: str = "parameter
     mechanism : Mechanism
     config : MonitorConfig
     source : str
-        Where the configuration comes from, for messages.
+        Origin of the configuration, for messages.
 
     Raises
     ------
     ConfigError
         For joints that the mechanism does not have, lists of a wrong length, a clearance that does not fit,
-        or a mechanism that a torque drives.
+        or a mechanism with a torque as its drive.
     """
     if not isinstance(mechanism.drive, SpeedDrive):
         raise ConfigError(
@@ -56,13 +56,13 @@ def fitted(mechanism: Mechanism, config: MonitorConfig, source: str = "parameter
 
 
 def check_limits(config: MonitorConfig, mechanism: Mechanism, source: str = "parameters") -> None:
-    """Whether limits fit a mechanism as `fitted` gives it.
+    """Check the limits against a mechanism that `fitted` returned.
 
     Raises
     ------
     ConfigError
-        If limits that are given one a joint are not one each, or if the limit of a clearance is beyond the
-        bushing's radius, which no clearance reaches.
+        If a list of limits per joint does not have one value for each joint, or if the limit of a clearance
+        is above the bushing's radius, which no clearance reaches.
     """
     clearance_joints, limits = mechanism.clearance_joints, config.limits
     for name in ("joint_impact_force_n", "joint_clearance_m"):
@@ -74,18 +74,18 @@ def check_limits(config: MonitorConfig, mechanism: Mechanism, source: str = "par
     for joint, limit in zip(clearance_joints, each, strict=True):
         clearance = mechanism.clearances[joint]
         fault = limit_fault(joint, clearance.radial_clearance, clearance.bushing_radius, limit)
-        # a limit below the new clearance is not silent: it raises its alarm at once
+        # a limit below the new clearance needs no check: it raises its alarm at once
         if fault and limit > clearance.radial_clearance:
             raise ConfigError(source, key, fault)
 
 
 def twin_settings(config: MonitorConfig, source: str = "parameters") -> TwinSettings:
-    """Settings of the twin as a configuration has them.
+    """Settings of the twin from a configuration.
 
     Raises
     ------
     ConfigError
-        For a reorder window that is not shorter than the gaps that are bridged.
+        If the reorder window is not shorter than the bridged gaps.
     """
     tracker, cadence = config.tracker, config.cadence
     if not tracker.reorder_window_s < tracker.gap_limit_s:
@@ -150,7 +150,7 @@ def _settings(
 def _own(
     given: Sequence[float], clearance_joints: Sequence[str], k: int, source: str, key: str
 ) -> float | None:
-    """A joint's own value of a list that has one for all or one each, None of an empty one."""
+    """Value for one joint from a list of one value for all or one per joint; None for an empty list."""
     if len(given) not in (0, 1, len(clearance_joints)):
         raise _wrong_length(source, key, given, clearance_joints, "one for all or ")
     return given[k if len(given) > 1 else 0] if given else None

@@ -1,4 +1,4 @@
-"""Parameters of the forecast: what is uncertain, and by how much."""
+"""Parameters of the forecast: uncertain quantities and their standard deviations."""
 
 import attrs
 
@@ -7,10 +7,10 @@ from leg_wear_monitor.configuration.quantity import described, quantity
 
 @attrs.frozen(kw_only=True)
 class Forecasting:
-    """What the forecast does not know; standard deviations, those of factors in their natural logarithm.
+    """Uncertainties of the forecast as standard deviations; those of factors are of the natural logarithm.
 
-    That of the wear coefficient is a factor of two either way: reported wear rates scatter by that much and
-    more (Schmitz and others, Journal of Tribology 126 (2004) 802). It is a judgement, not a measurement.
+    The one of the wear coefficient is a factor of two up or down: reported wear rates scatter by that much
+    and more (Schmitz and others, Journal of Tribology 126 (2004) 802). It is a judgement, not a measurement.
     """
 
     wear_coefficient_sigma: float = quantity(

@@ -1,4 +1,4 @@
-"""Parameters of what comes in: the crank, further encoders, the drive torque, the gait, the tracker."""
+"""Parameters of the inputs: crank, further encoders, drive torque, gait, tracker."""
 
 from typing import Any
 
@@ -161,7 +161,7 @@ class DriveTorque:
 
 @attrs.frozen(kw_only=True)
 class Cadence:
-    """The gait as commanded."""
+    """The commanded gait."""
 
     commanded_rpm: float = quantity(
         "rpm",
@@ -183,7 +183,7 @@ class Cadence:
 
 @attrs.frozen(kw_only=True)
 class Tracker:
-    """How the crank's motion is taken from its samples."""
+    """How the crank's motion is estimated from its samples."""
 
     bandwidth_hz: float = quantity(
         "Hz", "bandwidth of the crank's tracker", at_least=1.0, at_most=100.0, default=8.0

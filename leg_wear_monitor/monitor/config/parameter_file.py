@@ -1,4 +1,4 @@
-"""A ROS 2 parameter file read without ROS: for replay and check, as the node takes it by --params-file."""
+"""Reads a ROS 2 parameter file without ROS, for replay and check, as the node reads it by --params-file."""
 
 import re
 from pathlib import Path
@@ -74,7 +74,7 @@ def parse_config(document: Any, source: str, node: str | None = None) -> Monitor
 
 
 def _node_of(document: dict[Any, Any]) -> str:
-    """The node in the root, or the one monitor that all of a file, such as a dump, is of."""
+    """The node in the root namespace, or the only monitor node of a file such as a dump."""
     only = str(next(iter(document)))
     is_one = len(document) == 1 and "*" not in only and only.endswith(NODE)
     return "/" + only.strip("/") if is_one else NODE

@@ -27,7 +27,7 @@ _TYPES = {
 
 @attrs.frozen(kw_only=True)
 class Parameter:
-    """A parameter as it is declared.
+    """Declaration of a parameter.
 
     Attributes
     ----------
@@ -44,7 +44,7 @@ class Parameter:
     above, at_least, at_most : float or None
         Bounds of a number, or of each in an array; the first exclusive.
     names : tuple of str
-        What a text may be; empty for any.
+        Allowed texts; empty if any text is allowed.
     """
 
     name: str
@@ -87,7 +87,7 @@ def _walk(kind: type, prefix: str) -> Iterator[Parameter]:
 
 
 def parameters_of(kind: type) -> Mapping[str, Parameter]:
-    """All parameters that a class of sections declares, by name, in the order of their declaration."""
+    """All parameters of a class of sections, by name, in the order of their declaration."""
     return MappingProxyType({parameter.name: parameter for parameter in _walk(kind, "")})
 
 
@@ -101,7 +101,7 @@ def config_from(values: Mapping[str, Any], source: str = "parameters") -> Monito
 
 
 def structured(kind: type[_Config], values: Mapping[str, Any], source: str) -> _Config:
-    """Configuration from values by dotted name; what is not given has its default.
+    """Configuration from values by dotted name; other parameters have their defaults.
 
     Parameters
     ----------
@@ -114,7 +114,7 @@ def structured(kind: type[_Config], values: Mapping[str, Any], source: str) -> _
     Raises
     ------
     ConfigError
-        Naming source, parameter, value, unit and bounds of what cannot be used.
+        Naming source, parameter, value, unit and bounds of an unusable value.
     """
     nested: dict[str, Any] = {}
     known = parameters_of(kind)
@@ -175,7 +175,7 @@ def _check_known(name: str, known: Mapping[str, Parameter], source: str) -> None
 
 
 def _check_type(parameter: Parameter, value: Any, source: str) -> None:
-    """ROS tells 60 from 60.0; so do we, or the same file would work here and not there."""
+    """Distinguish 60 from 60.0 as ROS does; otherwise a file could work in replay but not in the node."""
     if parameter.type not in ("double", "double_array"):
         return
     for entry in value if isinstance(value, list | tuple) else (value,):
@@ -189,7 +189,7 @@ def _check_type(parameter: Parameter, value: Any, source: str) -> None:
 
 
 def _with_bounds(error: ConfigError, known: Mapping[str, Parameter]) -> str:
-    """The fault, and the bounds, unless it speaks of them."""
+    """The fault with the bounds, unless it already names them."""
     parameter = known.get(error.key)
     if (
         parameter is None

@@ -1,4 +1,4 @@
-"""Parameters that can be used but are likely meant in another unit; see also `mechanism.plausible`."""
+"""Usable parameters that are likely meant in another unit; see also `mechanism.plausible`."""
 
 import math
 from collections.abc import Iterator
@@ -10,7 +10,7 @@ from leg_wear_monitor.monitor.config.settings import MonitorConfig
 
 
 def parameter_doubts(config: MonitorConfig, leg: Mechanism) -> tuple[Doubt, ...]:
-    """All doubtful values of a configuration, for the mechanism as `fitted` gives it."""
+    """All doubtful values of a configuration, for the mechanism that `fitted` returned."""
     return (*_gait(config), *_limits(config, leg), *_clearances(config, leg))
 
 

@@ -1,11 +1,11 @@
-"""Why samples could not be used, in sentences: how many of how many, what is wrong, what to do."""
+"""Sentences on unused samples: how many of how many, the fault, and what to do."""
 
 from collections.abc import Mapping
 
 from leg_wear_monitor.monitor.config.settings import MonitorConfig
 from leg_wear_monitor.twin.statistics import Intake
 
-_WORTH_TELLING = 0.01  # fraction of the samples; below it, the counters say it
+_WORTH_TELLING = 0.01  # fraction of the samples; smaller ones are visible in the counters only
 
 _DROPPED = ("duplicates", "late", "stray_stamps", "outliers")
 
@@ -26,15 +26,15 @@ _SENTENCES = {
 
 
 def causes(before: Intake, after: Intake, withheld: int, config: MonitorConfig) -> list[str]:
-    """Sentences about samples that came between two counts and could not be used, the most frequent first.
+    """Sentences on the unused samples between two counts, the most frequent cause first.
 
     Parameters
     ----------
     before, after : Intake
     withheld : int
-        Of those out of range, how many another sentence tells of.
+        Number of out-of-range samples that another sentence reports.
     config : MonitorConfig
-        What the crank is called.
+        Gives the name of the crank.
     """
     received = after.received - before.received
     lost = _unused(after, before, withheld)

@@ -1,4 +1,4 @@
-"""Keeps from the twin what no one leg's crank can send: angles of two sources, angles in another unit."""
+"""Withholds crank angles from the twin that no single leg can send: from two sources, or in another unit."""
 
 import math
 
@@ -10,14 +10,14 @@ from leg_wear_monitor.twin.sample import GAIT_SAMPLE, Samples
 from leg_wear_monitor.twin.settings import TrackerSettings
 
 _ALONE_S = 1.0
-_DEGREES, _NEAR = 180.0 / math.pi, 1.5  # a leg that runs up to so much faster or slower than commanded
+_DEGREES, _NEAR = 180.0 / math.pi, 1.5  # factor by which a leg may be faster or slower than commanded
 
 
 class InputGuard:
-    """Checks crank samples before they are followed.
+    """Checks crank samples before the twin follows them.
 
-    A sample that cannot be used becomes one with the fault ``out_of_range``: it is counted, makes the time
-    unmonitored and wears nothing.
+    An unusable sample gets the fault ``out_of_range``: it is counted, its time is unmonitored, and it adds no
+    wear.
 
     Parameters
     ----------
@@ -51,34 +51,34 @@ class InputGuard:
 
     @property
     def stamp_ns(self) -> int:
-        """Stamp of the last crank sample that was checked; 0 before."""
+        """Stamp of the last checked crank sample; 0 before the first."""
         return int(self._state.stamp[self._state.last])
 
     @property
     def sources(self) -> int:
-        """How many series of crank angles come at present: 2 where two interleave that disagree."""
+        """Present number of series of crank angles: 2 if two different ones interleave."""
         return 1 + int(self._state.two)
 
     @property
     def conflicting(self) -> int:
-        """Samples withheld since two sources sent them."""
+        """Number of samples withheld because two sources sent them."""
         return int(self._state.conflicting)
 
     @property
     def implausible(self) -> int:
-        """Samples withheld since their angle runs as no leg's does."""
+        """Number of samples withheld because their angle changes as that of no leg."""
         return int(self._state.implausible)
 
     @property
     def speed_ratio(self) -> float:
-        """How many times as fast as commanded the angle runs, where no leg moves so fast; else NaN."""
+        """Speed of the angle over the commanded speed if no leg moves so fast; otherwise NaN."""
         if not self._state.other_unit:
             return math.nan
         return float(self._state.fast_speed) / self._commanded
 
     @property
     def cause(self) -> str:
-        """Why crank samples are withheld at present, and what to do; empty if they are not."""
+        """Reason why crank samples are withheld at present, and what to do; empty if none are."""
         if self.sources > 1:
             return (
                 "two series of crank angles interleave and disagree: two publishers of one crank, or an "
@@ -97,5 +97,5 @@ class InputGuard:
         return self._states.copy()
 
     def restore(self, snapshot: Records) -> None:
-        """Go back to a snapshot of a guard of the same settings."""
+        """Restore a snapshot of a guard with the same settings."""
         self._states[:] = snapshot

@@ -1,4 +1,4 @@
-"""How good the input was for a while: rates, samples that could not be used, time lost, stuck torque."""
+"""Health of the input over a time: rates, unused samples, lost time, stuck torque."""
 
 import math
 
@@ -13,7 +13,7 @@ _LEAST_TORQUES = 10
 
 @attrs.frozen
 class TorqueRange:
-    """Torques that came without a fault: how many, their ends, how many lie at each end or are saturated."""
+    """Torques without a fault: their number, extremes, and how many are at each extreme or saturated."""
 
     number: int = 0
     least_nm: float = math.inf
@@ -24,7 +24,7 @@ class TorqueRange:
 
     @property
     def stuck_fraction(self) -> float:
-        """Share of those that are saturated, or repeat an end; NaN while there are few."""
+        """Fraction of the torques that are saturated, or repeat an extreme; NaN while there are few."""
         if self.number < _LEAST_TORQUES:
             return math.nan
         repeated = max(count for count in (self.at_least, self.at_largest, 1))
@@ -32,7 +32,7 @@ class TorqueRange:
 
 
 def with_torques(before: TorqueRange, samples: Samples, saturation_nm: float) -> TorqueRange:
-    """Range with the torques of more samples, the crank's efforts among them."""
+    """Range extended by the torques of more samples, including efforts in crank samples."""
     found = samples["torque_nm"][samples["fault"] == NO_FAULT]
     found = found[np.isfinite(found)]
     if not len(found):
@@ -51,21 +51,21 @@ def with_torques(before: TorqueRange, samples: Samples, saturation_nm: float) ->
 
 @attrs.frozen(kw_only=True)
 class InputHealth:
-    """The input over a stretch of time; a figure that cannot be known is NaN.
+    """Input statistics over a time; an unknown value is NaN.
 
     Attributes
     ----------
     duration_s : float
-        NaN if that is not known, or stamps did not advance.
+        Length of this time; NaN if it is unknown, or stamps did not advance.
     rate_hz : dict of str to float
-        Samples used a second, by the names of `KINDS`.
+        Used samples per second, by the names of `KINDS`.
     bad_fraction : float
-        Share of the samples that were not: faulty, repeated, late, with a stray stamp, far off.
+        Fraction of the samples that were not used: faulty, repeated, late, with a stray stamp, or outliers.
     lost_fraction : float
-        Share of the time in which the leg was not followed.
+        Fraction of the time in which the leg was not followed.
     stuck_torque_fraction : float
-        Share of the torque samples that are saturated or repeat the largest or the smallest one; 1 if all
-        are the same.
+        Fraction of the torque samples that are saturated or repeat the largest or the smallest one; 1 if all
+        are equal.
     """
 
     duration_s: float
@@ -76,15 +76,15 @@ class InputHealth:
 
 
 def input_health(before: Intake, after: Intake, torque: TorqueRange, is_whole: bool = True) -> InputHealth:
-    """Health of what came between two counts.
+    """Health of the input between two counts.
 
     Parameters
     ----------
     before, after : Intake
     torque : TorqueRange
-        Of what came meanwhile.
+        Range of the torques between the two counts.
     is_whole : bool
-        Whether all that came was counted; else nothing is known of time.
+        Whether all received samples were counted; otherwise the values over time are unknown.
     """
     span_s = (after.newest_stamp_ns - before.newest_stamp_ns) * 1.0e-9
     is_known = is_whole and span_s > 0.0 and before.newest_stamp_ns > 0
@@ -101,6 +101,6 @@ def input_health(before: Intake, after: Intake, torque: TorqueRange, is_whole: b
 
 
 def unused(counts: Intake) -> int:
-    """Samples that were not used."""
+    """Number of unused samples."""
     faulty = sum(counts.faulty.values())
     return faulty + counts.duplicates + counts.late + counts.stray_stamps + counts.outliers

@@ -1,4 +1,4 @@
-"""Pauses in a stream of samples: times in which nobody recorded, apart from times that the input lost."""
+"""Pauses in a stream of samples: times without a recording, as opposed to faults of the input."""
 
 import attrs
 
@@ -12,11 +12,11 @@ class Pauses:
     number : int
     total_s : float
     passed_before_s : float
-        What of the pauses before the last is in the twin's time without a leg.
+        Part of the pauses before the last one that the twin's unmonitored time includes.
     last_s : float
-        The last pause.
+        Length of the last pause.
     unmonitored_s : float
-        The twin's time without a leg when the last pause began; the pause is in it once the leg is found
+        The twin's unmonitored time when the last pause began; it includes the pause once the leg is followed
         again.
     """
 
@@ -27,11 +27,11 @@ class Pauses:
     unmonitored_s: float = 0.0
 
     def passed_s(self, unmonitored_s: float) -> float:
-        """What of the pauses is in the twin's time without a leg [s]."""
+        """Part of the pauses that the twin's unmonitored time includes [s]."""
         return self.passed_before_s + min(self.last_s, max(0.0, unmonitored_s - self.unmonitored_s))
 
     def with_pause(self, pause_s: float, unmonitored_s: float) -> "Pauses":
-        """One more, at a value of the twin's time without a leg [s]."""
+        """Pauses with one more, at a value of the twin's unmonitored time [s]."""
         return Pauses(
             self.number + 1, self.total_s + pause_s, self.passed_s(unmonitored_s), pause_s, unmonitored_s
         )

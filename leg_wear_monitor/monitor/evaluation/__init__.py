@@ -1,1 +1,1 @@
-"""What the cycles mean: alarms evaluated period by period, checks of the torque, evidence of the gait."""
+"""Evaluation of gait cycles: alarms in each evaluation period, checks of the torque, evidence of the gait."""

@@ -14,14 +14,14 @@ from leg_wear_monitor.monitor.reports import AlarmList, JointReport
 
 
 def joint_specs(config: MonitorConfig) -> tuple[AlarmSpec[JointReport], ...]:
-    """Specs of the alarms that each clearance joint has."""
+    """Specs of the alarms of each clearance joint."""
     return (*specs.JOINT, *(specs.ENCODERS if config.encoders.names else ()))
 
 
 def specs_of(
     config: MonitorConfig, clearance_joints: tuple[str, ...]
 ) -> Iterator[tuple[AlarmSpec[Any], int, Alarm]]:
-    """Specs of all alarms in their order, each with the number of its joint, and the alarm when it is new."""
+    """Specs of all alarms in their order, each with the number of its joint and its initial alarm."""
     for k, joint in enumerate(clearance_joints):
         yield from ((spec, k, spec.new(joint)) for spec in joint_specs(config))
     of_leg: tuple[AlarmSpec[Any], ...] = (*specs.TORQUE, *specs.GAIT, *specs.OF_INPUT)
@@ -31,7 +31,7 @@ def specs_of(
 def limits_of(
     config: MonitorConfig, clearance_joints: tuple[str, ...], torque_size_nm: float = 1.0
 ) -> dict[str, Limit]:
-    """Limit of every alarm by its name; ``torque_size_nm`` RMS of the drive torque as predicted."""
+    """Limit of every alarm by its name; ``torque_size_nm`` is the RMS of the predicted drive torque."""
     bounds = torque_bounds(config, torque_size_nm)
     return {
         alarm.name: spec.limits(LimitSource(config, bounds, k))
@@ -40,19 +40,19 @@ def limits_of(
 
 
 class AlarmBoard:
-    """All alarms as they stand.
+    """Present state of all alarms.
 
     Parameters
     ----------
     config : MonitorConfig
     clearance_joints : tuple of str
     torque_size_nm : float
-        RMS of the drive torque as predicted.
+        RMS of the predicted drive torque.
 
     Attributes
     ----------
     alarms : dict of str to Alarm
-        By name, always the same ones in the same order.
+        By name, always in the same order.
     """
 
     def __init__(
@@ -63,7 +63,7 @@ class AlarmBoard:
         self.alarms = {alarm.name: alarm for _, _, alarm in specs_of(config, clearance_joints)}
 
     def configure(self, config: MonitorConfig) -> None:
-        """Evaluate by other limits from now on."""
+        """Use other limits from now on."""
         self._limits = limits_of(config, self._clearance_joints, self._torque_size_nm)
 
     @property
@@ -72,14 +72,14 @@ class AlarmBoard:
         return tuple(self._limits[specs.CLEARANCE.name(joint)].error for joint in self._clearance_joints)
 
     def evaluate(self, values: Mapping[str, float], stamp_ns: int, cycles: int = 1) -> tuple[AlarmList, ...]:
-        """Evaluate values by the names of their alarms; one list of all alarms if an operator sees a change.
+        """Evaluate values by alarm name; returns one list of all alarms if the shown state has changed.
 
         Parameters
         ----------
         values : mapping of str to float
         stamp_ns : int
         cycles : int
-            Gait cycles that the values stand for.
+            Number of gait cycles that the values represent.
         """
         found = [
             evaluated(self.alarms[name], value, self._limits[name], stamp_ns, cycles)
@@ -98,21 +98,21 @@ class AlarmBoard:
         return self._set(found, stamp_ns)
 
     def acknowledge(self) -> tuple[tuple[Alarm, ...], tuple[Alarm, ...]]:
-        """Acknowledge all: those that were cleared and those that stay, as they are now."""
+        """Acknowledge all alarms; returns the cleared ones and the remaining ones in their new state."""
         now = [acknowledged(alarm) for alarm in self.alarms.values() if alarm.level is not Level.OK]
         self.alarms |= {alarm.name: alarm for alarm in now}
         cleared = tuple(alarm for alarm in now if alarm.level is Level.OK)
         return cleared, tuple(alarm for alarm in now if alarm.level is not Level.OK)
 
     def restore(self, alarms: Iterable[Alarm]) -> None:
-        """Take over alarms as they were in another run."""
+        """Restore alarms from another run."""
         for alarm in alarms:
             if alarm.name in self.alarms:
                 own = self.alarms[alarm.name]
                 self.alarms[alarm.name] = attrs.evolve(alarm, unit=own.unit)
 
     def level(self, *names: str) -> Level:
-        """The highest level that is shown of some alarms."""
+        """Highest shown level of some alarms."""
         return max(self.alarms[name].level for name in names)
 
     def _set(self, found: Iterable[Alarm], stamp_ns: int) -> tuple[AlarmList, ...]:

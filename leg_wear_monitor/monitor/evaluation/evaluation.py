@@ -1,4 +1,4 @@
-"""What gait cycles and input are judged by, and when."""
+"""Alarm evaluation of gait cycles and input, once in each evaluation period."""
 
 import math
 
@@ -23,24 +23,24 @@ from leg_wear_monitor.twin.statistics import Intake, Tracking
 
 @attrs.define
 class AlarmEvaluationState:
-    """What changes; every value is immutable, so a shallow copy is a snapshot.
+    """State of the evaluation; every value is immutable, so a shallow copy is a snapshot.
 
     Attributes
     ----------
     before : Intake
-        Counts when the input was last judged.
+        Counts at the last evaluation of the input.
     skipped, skipped_before : int
-        Samples skipped by then, and by the time before.
+        Samples skipped up to the last evaluation, and up to the one before.
     torque : TorqueRange
-        Torques since then.
+        Range of the torques since the last evaluation.
     evaluation_periods, cycles : int
-        Evaluation periods and whole gait cycles since then.
+        Evaluation periods and whole gait cycles since the last evaluation.
     health : InputHealth or None
-        As last judged.
+        Health of the input at the last evaluation.
     withheld : int
-        Samples that the guard had withheld when the input was last judged.
+        Samples that the guard had withheld at the last evaluation.
     causes : tuple of str or None
-        Why samples could not be used, as last judged.
+        Causes of unused samples at the last evaluation.
     """
 
     before: Intake
@@ -55,14 +55,14 @@ class AlarmEvaluationState:
 
 
 class AlarmEvaluation:
-    """Judges a twin's gait cycles and its input.
+    """Evaluates a twin's gait cycles and its input.
 
     Parameters
     ----------
     twin : DigitalTwin
     config : MonitorConfig
     cycle_ns : int
-        A gait cycle as commanded.
+        Duration of a commanded gait cycle.
     guard : InputGuard
     """
 
@@ -75,22 +75,22 @@ class AlarmEvaluation:
         self.state = AlarmEvaluationState(twin.intake)
 
     def configure(self, config: MonitorConfig) -> None:
-        """Evaluate by other limits from now on."""
+        """Use other limits from now on."""
         self.config = config
         self.board.configure(config)
 
     def holds(self) -> bool:
-        """Whether the leg does what the model holds for: in cadence, and with the torque that is expected."""
+        """Whether the model is valid for the present motion: cadence and torque are as expected."""
         return self.board.level(specs.CADENCE.name(), specs.MISMATCH.name()) is not Level.ERROR
 
     def see(self, piece: Samples) -> None:
-        """Take down samples that came."""
+        """Add received samples."""
         saturation_nm = self.config.drive_torque.saturation_nm
         self.state.torque = with_torques(self.state.torque, piece, saturation_nm)
 
     @property
     def causes(self) -> tuple[str, ...]:
-        """Why samples cannot be used: at present, and over the last gait cycle's time."""
+        """Causes of unused samples, at present and over the duration of the last gait cycle."""
         now = (self.guard.cause,) if self.guard.cause else ()
         return now + (self._causes() if self.state.causes is None else self.state.causes)
 
@@ -104,15 +104,15 @@ class AlarmEvaluation:
 
     @property
     def torque_bounds(self) -> TorqueBounds:
-        """What the drive may do."""
+        """Bounds of the drive torque."""
         return torque_bounds(self.config, self._twin.torque_size_nm)
 
     def is_torque_sound(self, report: CycleReport) -> bool:
-        """Whether a gait cycle's torque is as predicted, so that what it needs is this leg's own."""
+        """Whether a gait cycle's torque is as predicted, so that its friction is that of this leg."""
         return report.torque_mismatch < self.config.limits.warn_fraction * self.config.limits.torque_mismatch
 
     def end_cycle(self, report: CycleReport, record: TorqueRecord) -> tuple[AlarmList, ...]:
-        """Evaluate a whole gait cycle, its torque beside its record; all alarms, if one has changed."""
+        """Evaluate a whole gait cycle, with its torque and the record; returns all alarms if one changed."""
         self.state.cycles += 1
         torque = torque_values(report, record, self.torque_bounds)
         cycle = CycleEvidence(report, torque, self.config.cadence.commanded_rpm)
@@ -122,12 +122,12 @@ class AlarmEvaluation:
         return self.board.evaluate(values, report.stamp_ns)
 
     def end_period(self, skipped: int = 0) -> tuple[AlarmList, ...]:
-        """Evaluate impacts of the gait cycle that runs, and once in a cycle's time the input.
+        """Evaluate impacts of the running gait cycle, and once per duration of a cycle the input.
 
         Parameters
         ----------
         skipped : int
-            Samples that were not handed on so far, their wear is counted already.
+            Number of samples skipped so far because their wear is already counted.
         """
         peaks = {
             specs.IMPACT.name(joint): float(peak)
@@ -142,7 +142,7 @@ class AlarmEvaluation:
         return early + self._evaluate_input(skipped)
 
     def pause(self) -> None:
-        """Nobody records for a while: the input is judged afresh from the next sample on, as at the start."""
+        """Note a pause of the recording: the evaluation of the input starts again with the next sample."""
         intake = attrs.evolve(self._twin.intake, newest_stamp_ns=0)
         self.state = AlarmEvaluationState(intake, self.state.skipped, self.state.skipped_before)
 

@@ -1,4 +1,4 @@
-"""Whether what was followed can be this leg's gait: without one cycle that can be, forces mean nothing."""
+"""Evidence that the followed motion is a gait of this leg; without one such cycle, forces are meaningless."""
 
 import math
 from collections import Counter
@@ -12,20 +12,20 @@ from leg_wear_monitor.monitor.reports import CycleReport
 from leg_wear_monitor.twin.kinds import CRANK
 from leg_wear_monitor.twin.sample import FAULTS, NO_FAULT, Samples
 
-_SLOWEST, _FASTEST = 0.5, 2.0  # cadence, of the commanded one
-_UNLIKE = 0.8  # torque that the model does not explain, of the predicted one
-_FLAT = 0.05  # measured torque, of the predicted one
+_SLOWEST, _FASTEST = 0.5, 2.0  # cadence over the commanded one
+_UNLIKE = 0.8  # unexplained torque over the predicted one
+_FLAT = 0.05  # measured torque over the predicted one
 _SAMPLES_A_TURN = 12
 
 
 def doubts(cycle: CycleReport, config: MonitorConfig) -> list[str]:
-    """Why a gait cycle can hardly be one of this leg; empty if it can.
+    """Reasons why a gait cycle is unlikely to be one of this leg; empty if there are none.
 
     Parameters
     ----------
     cycle : CycleReport
     config : MonitorConfig
-        Of which the commanded cadence is used.
+        Gives the commanded cadence.
     """
     commanded, found = config.cadence.commanded_rpm, []
     if not _SLOWEST <= cycle.cadence_rpm / commanded <= _FASTEST:
@@ -46,7 +46,7 @@ def doubts(cycle: CycleReport, config: MonitorConfig) -> list[str]:
 
 @attrs.define
 class GaitEvidence:
-    """Counts what speaks for a gait of this leg, and says what is missing.
+    """Counts gait cycles that fit this leg, and reports what is missing.
 
     Parameters
     ----------
@@ -55,7 +55,7 @@ class GaitEvidence:
     Attributes
     ----------
     believable, doubtful : int
-        Gait cycles that can be this leg's, and that can hardly be.
+        Numbers of gait cycles that fit this leg, and that do not.
     """
 
     config: MonitorConfig
@@ -69,7 +69,7 @@ class GaitEvidence:
     _last: tuple[int, float] | None = attrs.field(default=None, init=False)
 
     def see(self, samples: Samples) -> None:
-        """Take account of samples, in order of arrival."""
+        """Add samples in the order of arrival."""
         cranks = samples[samples["kind"] == CRANK]
         for fault, number in zip(*np.unique(cranks["fault"], return_counts=True), strict=True):
             if fault != NO_FAULT:
@@ -84,20 +84,20 @@ class GaitEvidence:
         self._last = int(stamps[-1]), float(angles[-1])
         steps = np.diff(stamps.astype(float)) / 1e9
         ahead = (steps > 0.0) & (steps <= self.config.tracker.gap_limit_s)
-        with np.errstate(over="ignore", invalid="ignore"):  # an angle may be anything that is finite
+        with np.errstate(over="ignore", invalid="ignore"):  # an angle may be any finite number
             turned = (np.diff(angles)[ahead] + math.pi) % TURN - math.pi
         self._turned_rad += abs(float(np.nansum(turned)))
         self._passed_s += float(steps[ahead].sum())
 
     def add(self, cycle: CycleReport) -> None:
-        """Take account of a gait cycle."""
+        """Add a gait cycle."""
         found = doubts(cycle, self.config)
         self.believable += not found
         self.doubtful += bool(found)
         self._doubts = self._doubts or found
 
     def missing(self) -> str:
-        """What is missing for one believable gait cycle; empty if there is one."""
+        """What is missing for one gait cycle that fits this leg; empty if there is one."""
         if self.believable:
             return ""
         if self.doubtful:
@@ -108,7 +108,7 @@ class GaitEvidence:
         return self._why_none()
 
     def _why_none(self) -> str:
-        """Why sound samples make no gait cycle."""
+        """Reason why valid samples form no gait cycle."""
         gap, commanded = self.config.tracker.gap_limit_s, self.config.cadence.commanded_rpm
         if not self._passed_s:
             return f"no two of {self._sound} crank samples follow each other within {gap:g} s"

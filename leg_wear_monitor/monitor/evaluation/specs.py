@@ -1,7 +1,7 @@
-"""The monitor's alarms, one entry each: board, units, status, command line and docs follow from it.
+"""The monitor's alarms, one entry each: board, units, status, command line and docs are derived from it.
 
-A value that is NaN is not known and leaves its alarm as it is. Nothing heavy is imported, for ``--help`` asks
-for the kinds.
+NaN is an unknown value and leaves its alarm unchanged. No slow import is allowed here, because ``--help``
+lists the kinds.
 """
 
 import math
@@ -26,20 +26,20 @@ _E = TypeVar("_E")
 
 @attrs.frozen
 class LimitSource:
-    """What limits follow from: parameters, bounds of the drive torque, and which clearance joint it is."""
+    """Inputs of the limits: parameters, bounds of the drive torque, and the clearance joint."""
 
     config: "MonitorConfig"
     bounds: "TorqueBounds"
     joint: int = 0
 
     def by_joint(self, own: tuple[float, ...], of_all: float) -> float:
-        """The joint's own limit where such are given, else that of all."""
+        """The joint's own limit if there are limits per joint, otherwise the common one."""
         return own[self.joint] if own else of_all
 
 
 @attrs.frozen
 class CycleEvidence:
-    """A gait cycle, the values of its torque by their alarms, and the cadence [rpm] that is commanded."""
+    """A gait cycle, the values of its torque alarms, and the commanded cadence [rpm]."""
 
     report: "CycleReport"
     torque: Mapping[str, float]
@@ -63,9 +63,9 @@ class AlarmSpec(Generic[_E]):
     kind, subject : str
         The subject of an alarm of a clearance joint is the joint.
     unit : str
-        Of value and limit.
+        Unit of value and limit.
     meaning, limit_words : str
-        For operators: what the value is, and the parameters that limit it.
+        For operators: meaning of the value, and the parameters of its limit.
     value : callable
         Value from the evidence: a joint's report, a gait cycle, the input's health or its guard.
     limit : callable
@@ -73,9 +73,9 @@ class AlarmSpec(Generic[_E]):
     on_delay : callable
         Gait cycles in a row for which a value must be beyond before the level rises.
     is_least : bool
-        Whether values below the limit are the bad ones.
+        Whether the limit is a lower bound: values below it are faults.
     is_count : bool
-        Whether the limit is a number of things: it holds at once, without WARN and deadband.
+        Whether the value is a count: ERROR begins at the limit, without WARN and deadband.
     """
 
     kind: str
@@ -90,7 +90,7 @@ class AlarmSpec(Generic[_E]):
     is_count: bool = False
 
     def new(self, joint: str = "") -> Alarm:
-        """The alarm before anything is known."""
+        """The alarm in its initial state."""
         return Alarm(kind=self.kind, subject=self.subject or joint, unit=self.unit)
 
     def name(self, joint: str = "") -> str:
@@ -98,7 +98,7 @@ class AlarmSpec(Generic[_E]):
         return self.new(joint).name
 
     def limits(self, source: LimitSource) -> Limit:
-        """Where its levels begin."""
+        """Limits of its levels."""
         error, alarms, warn = self.limit(source), source.config.alarms, source.config.limits.warn_fraction
         if self.is_count:
             return Limit(error, error)
@@ -209,7 +209,7 @@ GAIT = (CADENCE,)
 
 
 def _rate(name: str) -> "AlarmSpec[InputHealth]":
-    """Rate of samples of a kind that were used, by the kind's name."""
+    """Rate of the used samples of a kind, by the kind's name."""
     return AlarmSpec(
         kind="input_rate",
         subject=name,

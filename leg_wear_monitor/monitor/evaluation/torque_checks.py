@@ -1,4 +1,4 @@
-"""What of the measured torque no drive can do: a bias, a drift, a lag; bounds, values and sentences."""
+"""Checks of the measured torque for an impossible bias, drift or lag; bounds, values and sentences."""
 
 import math
 from typing import TYPE_CHECKING
@@ -12,15 +12,15 @@ if TYPE_CHECKING:
 
 BIAS, DRIFT, LAG = "torque_bias", "torque_drift", "torque_lag"
 
-# fractions of the predicted torque's RMS, where the parameters are 0: joints and gears lose some tenths of
-# what they pass on; a tenth is the limit of the mismatch, too
+# fractions of the predicted torque's RMS, if the parameters are 0: joints and gears lose some tenths of the
+# transmitted torque; a tenth is also the limit of the mismatch
 _FRICTION, _BIAS, _DRIFT = 0.3, 0.1, 0.15
 _SURE = 3.0  # standard deviations
 
 
 @attrs.frozen
 class TorqueBounds:
-    """What a drive may do: largest friction and lag, and limits of what is beyond and of a drift."""
+    """Bounds of a drive: largest friction and lag, and limits of the excess and of a drift."""
 
     max_friction_nm: float
     max_lag_s: float
@@ -29,7 +29,7 @@ class TorqueBounds:
 
 
 def torque_bounds(config: "MonitorConfig", size_nm: float) -> TorqueBounds:
-    """Bounds by the parameters; those that are not given follow from the torque's RMS as predicted [N m]."""
+    """Bounds from the parameters; missing ones follow from the RMS of the predicted torque [N m]."""
     return TorqueBounds(
         max_friction_nm=config.drive_torque.max_friction_nm or _FRICTION * size_nm,
         max_lag_s=config.drive_torque.max_lag_s,
@@ -39,13 +39,13 @@ def torque_bounds(config: "MonitorConfig", size_nm: float) -> TorqueBounds:
 
 
 def torque_values(report: "CycleReport", record: "TorqueRecord", bounds: TorqueBounds) -> dict[str, float]:
-    """Values of the alarms: what is surely beyond, in their units; none without a torque."""
+    """Values of the alarms in their units, 0 unless significant (three sigma); empty without a torque."""
     if not report.torque_samples:
         return {}
     bias, sigma = bias_of(report, bounds), _SURE * report.friction_sigma_nm
     change, either = report.friction_nm - record.friction_nm, math.hypot(sigma, _SURE * record.sigma_nm)
     lag_s = abs(report.torque_lag_s) - _SURE * report.torque_lag_sigma_s
-    # NaN stays NaN: not known
+    # NaN (unknown) stays NaN
     return {
         BIAS: abs(bias) - sigma if abs(bias) > sigma else 0.0 * sigma,
         DRIFT: abs(change) - either if abs(change) > either else 0.0 * (change + either),
@@ -54,7 +54,7 @@ def torque_values(report: "CycleReport", record: "TorqueRecord", bounds: TorqueB
 
 
 def bias_of(report: "CycleReport", bounds: TorqueBounds) -> float:
-    """What of the constant torque is no friction [N m]: it would drive, or is more than friction may be."""
+    """Part of the constant torque that cannot be friction [N m]: negative, or above the largest friction."""
     friction_nm = report.friction_nm
     return min(friction_nm, 0.0) + max(friction_nm - bounds.max_friction_nm, 0.0)
 
@@ -62,7 +62,7 @@ def bias_of(report: "CycleReport", bounds: TorqueBounds) -> float:
 def torque_causes(
     raised: set[str], report: "CycleReport", record: "TorqueRecord", bounds: TorqueBounds
 ) -> list[str]:
-    """Sentences on what raised alarms of the torque may come from, free of values."""
+    """Sentences on possible causes of raised torque alarms, without values."""
     told = []
     if BIAS in raised and report.friction_nm < 0.0:
         told.append(
@@ -97,6 +97,6 @@ def _lag_cause(record: "TorqueRecord", bounds: TorqueBounds) -> str:
 
 
 def offset_error_rad(report: "CycleReport", record: "TorqueRecord") -> float:
-    """By how much crank.offset_rad is off, if all of the lag that is not known to be one comes from there."""
+    """Error of crank.offset_rad [rad], if it causes all of the lag that is not known to be a time lag."""
     split = record.lags.split
     return split[1] if split else report.torque_lag_s * report.cadence_rpm * math.pi / 30.0

@@ -1,4 +1,4 @@
-"""What a leg's drive torque was like before: friction when it was commissioned, lag at other speeds."""
+"""History of a leg's drive torque: friction at commissioning, lag at other speeds."""
 
 import math
 
@@ -8,27 +8,27 @@ from leg_wear_monitor.mechanism.ideal import TURN
 from leg_wear_monitor.monitor.reports import CycleReport
 from leg_wear_monitor.twin.statistics import CycleStatistics
 
-COMMISSIONING_CYCLES = 20  # in a row with the torque as predicted, then its friction is that of this leg
+COMMISSIONING_CYCLES = 20  # in a row with the torque as predicted, to store their friction as this leg's
 FRICTION_KEY, SIGMA_KEY = "friction_commissioned_nm", "friction_commissioned_sigma_nm"
 
-_FORGETTING = 0.99  # a gait cycle
-_RESOLVED_RAD = 0.005  # standard deviation of an offset that is known
+_FORGETTING = 0.99  # per gait cycle
+_RESOLVED_RAD = 0.005  # largest standard deviation of a known offset
 
 
 @attrs.frozen
 class LagBySpeed:
-    """Apparent lags over the inverse of the crank's speed: a lag is the same at all speeds, an offset is not.
+    """Regression of apparent lags on 1/speed of the crank: a lag is equal at all speeds, an offset is not.
 
     Attributes
     ----------
     sums : tuple of float
-        Of weights, and weights times 1/speed, its square, the lag, and 1/speed times the lag.
+        Sums of weights, and of weights times 1/speed, its square, the lag, and 1/speed times the lag.
     """
 
     sums: tuple[float, float, float, float, float] = (0.0,) * 5
 
     def with_cycle(self, statistics: CycleStatistics) -> "LagBySpeed":
-        """With one more gait cycle; as it is without a lag."""
+        """Regression with one more gait cycle; unchanged if the cycle has no lag."""
         lag_s, sigma_s = statistics.torque.cycle_lag_s, statistics.torque.cycle_lag_sigma_s
         if not (math.isfinite(lag_s) and sigma_s > 0.0):
             return self
@@ -39,7 +39,7 @@ class LagBySpeed:
 
     @property
     def split(self) -> tuple[float, float] | None:
-        """Lag [s] and offset of the crank [rad]; None while the speeds are too much alike to tell."""
+        """Lag [s] and offset of the crank [rad]; None while the speeds are too similar to separate them."""
         w, x, xx, y, xy = self.sums
         if not w > 0.0:
             return None
@@ -52,14 +52,14 @@ class LagBySpeed:
 
 @attrs.frozen
 class TorqueRecord:
-    """What is kept of a leg's drive torque.
+    """Stored properties of a leg's drive torque.
 
     Attributes
     ----------
     cycles : int
-        In a row with the torque as predicted, before commissioning.
+        Gait cycles in a row with the torque as predicted, before commissioning.
     friction_nm, sigma_nm : float
-        The constant torque when this leg was commissioned, and its standard deviation; NaN before.
+        Constant torque at the commissioning of this leg, and its standard deviation; NaN before.
     lags : LagBySpeed
     """
 
@@ -70,18 +70,18 @@ class TorqueRecord:
 
     @classmethod
     def of(cls, totals: dict[str, float]) -> "TorqueRecord":
-        """From what a ledger keeps."""
+        """Record from the totals in a ledger."""
         return cls(0, totals.get(FRICTION_KEY, math.nan), totals.get(SIGMA_KEY, math.nan))
 
     @property
     def totals(self) -> dict[str, float]:
-        """What a ledger keeps; nothing before commissioning."""
+        """Totals for the ledger; empty before commissioning."""
         if math.isnan(self.friction_nm):
             return {}
         return {FRICTION_KEY: self.friction_nm, SIGMA_KEY: self.sigma_nm}
 
     def with_cycle(self, statistics: CycleStatistics, report: CycleReport, is_sound: bool) -> "TorqueRecord":
-        """With one more gait cycle, whose torque was as predicted or not."""
+        """Record with one more gait cycle; ``is_sound``: its torque was as predicted."""
         if not report.torque_samples:
             return self
         lags = self.lags.with_cycle(statistics)

@@ -1,4 +1,4 @@
-"""A leg's life: a few gait cycles of a few legs are simulated, their mean wear jumps over many.
+"""Wear over a leg's life by cycle jumps: the mean wear of a few simulated gait cycles is applied to many.
 
 >>> from leg_wear_monitor import load_mechanism
 >>> run = LifeRun(load_mechanism("bionic_leg"), LifeSettings(legs=1, cycles=2), clearances=["A"])
@@ -7,8 +7,8 @@
 >>> bool(life.cycles[1] == point.cycles < life.cycles_to(0, 3.6e-4) <= life.cycles[-1])
 True
 
-A life under wear coefficients that are all larger by one factor is the same life, run through that much
-faster: wear enters by coefficient times cycles only. See `monitor.forecast` for coefficients that differ.
+If all wear coefficients are larger by one factor, the life is the same but shorter by this factor: wear
+depends on coefficient times cycles only. See `monitor.forecast` for different coefficients.
 """
 
 from collections.abc import Callable, Sequence
@@ -42,7 +42,7 @@ from leg_wear_monitor.wear.cycle_jump import (
     wear_rate,
 )
 
-_TRIALS = 4  # of a jump whose error is too large, before it is taken all the same, and says so
+_TRIALS = 4  # of a jump with too large an error, before it is accepted and reported
 
 
 @attrs.frozen(kw_only=True)
@@ -66,7 +66,7 @@ class LifeSettings:
 
 
 class _Probe(NamedTuple):
-    """Mean of the cycles simulated at one state of wear: what `LifePoint` has of them."""
+    """Mean of the cycles simulated at one state of wear, for `LifePoint`."""
 
     rate: WearRate
     archard_j: Floats
@@ -75,7 +75,7 @@ class _Probe(NamedTuple):
 
 
 class LifeRun:
-    """A leg somewhere in its life, that goes on jump by jump.
+    """A leg at some time of its life, advanced by cycle jumps.
 
     Parameters
     ----------
@@ -86,11 +86,11 @@ class LifeRun:
     clearance_m, speed_rpm : float, optional
         The mechanism's own if not given.
     wear_factor : float or (k,) array
-        On the wear coefficients of the clearance joints.
+        Factor on the wear coefficients of the clearance joints.
     depth : (k, 2, N) array, optional
-        Wear to begin with [m]; none if not given.
+        Initial wear [m]; none if not given.
     workers : int
-        Threads.
+        Number of threads.
 
     Attributes
     ----------
@@ -99,7 +99,7 @@ class LifeRun:
         Radial clearances without wear, and radii of the bushings.
     settings : LifeSettings
     points : list of LifePoint
-        The life so far; the first is where it began.
+        The life so far; the first point is its begin.
 
     Raises
     ------
@@ -150,12 +150,12 @@ class LifeRun:
         self.points = [LifePoint(0.0, start, now.rate, now.peak_force_n, now.toe_position_m, none, 0.0)]
 
     def jump(self, most_cycles: float = np.inf) -> LifePoint:
-        """Go on by one jump, of at most so many gait cycles.
+        """Advance by one jump of at most so many gait cycles.
 
         Raises
         ------
         SimulationError
-            Where the motion diverges.
+            If the motion diverges.
         """
         control, last, now = self.settings.jump, self.points[-1], self._now
         cycles = min(self._wish, longest_jump(now.rate, control), most_cycles)
@@ -174,7 +174,7 @@ class LifeRun:
         return self.points[-1]
 
     def hold(self, k: int) -> None:
-        """Let joint k wear no further, as if its part were replaced before its clearance opens more."""
+        """Stop the wear of joint k, as if its part were replaced before its clearance grows further."""
         depth = self._now.rate.depth.copy()
         depth[k] = 0.0
         self._now = self._now._replace(rate=attrs.evolve(self._now.rate, depth=depth))
@@ -223,24 +223,24 @@ def simulate_life(
     horizon_cycles: float,
     progress: Callable[[float], None] | None = None,
 ) -> Life:
-    """Go on until a mean clearance reaches its limit, or to a horizon.
+    """Advance until a mean clearance reaches its limit, or to a horizon.
 
     Parameters
     ----------
     run : LifeRun
-        Goes on from where it is.
+        Continued from its present state.
     limit_m : float or (k,) array
-        Of the mean radial clearance of each clearance joint.
+        Limit of the mean radial clearance of each clearance joint.
     horizon_cycles : float
-        Gait cycles at most, since the run began.
+        Largest number of gait cycles since the run began.
     progress : callable, optional
-        Called with the fraction that is done.
+        Called with the completed fraction.
 
     Raises
     ------
     ConfigError
         If a limit does not lie between a joint's new clearance and the radius of its bushing, or if the run's
-        jumps are too short to get there.
+        jumps are too short to reach it.
     SimulationError
         Where the motion diverges, or if the life takes more than `MOST_JUMPS` jumps.
     """
@@ -265,7 +265,7 @@ def simulate_life(
 
 
 def _spread_out(leg: Leg, settings: LifeSettings) -> list[Leg]:
-    """Legs alike, but for where they start."""
+    """Equal legs with different initial states."""
     return [
         attrs.evolve(leg, crank_angle_rad=TURN * (i + 0.5) / settings.legs, seed=settings.seed + i)
         for i in range(settings.legs)

@@ -1,4 +1,4 @@
-"""What a life by cycle jumps must be given so that it ends."""
+"""Checks that a life by cycle jumps ends."""
 
 from collections.abc import Sequence
 
@@ -10,13 +10,13 @@ from leg_wear_monitor.mechanism.arrays import Floats
 from leg_wear_monitor.mechanism.clearance_range import limit_fault
 from leg_wear_monitor.wear.cycle_jump import JumpControl
 
-MOST_JUMPS = 10_000  # of a life: with the default length of a jump, one takes some 15
+MOST_JUMPS = 10_000  # per life; with the default length of a jump, a life takes some 15
 
 
 def check_life(
     clearance_joints: Sequence[str], fresh_m: Floats, radius_m: Floats, limit_m: ArrayLike, jump: JumpControl
 ) -> None:
-    """Make sure that a life can end.
+    """Check that a life can end.
 
     Parameters
     ----------
@@ -29,7 +29,7 @@ def check_life(
     Raises
     ------
     ConfigError
-        For what `simulate_life` refuses.
+        For limits and jumps that `simulate_life` refuses.
     """
     limits = np.broadcast_to(np.asarray(limit_m, dtype=float), len(clearance_joints))
     for joint, fresh, radius, limit in zip(clearance_joints, fresh_m, radius_m, limits, strict=True):

@@ -1,4 +1,4 @@
-"""Lives whose wear coefficients differ, so that together they show how the joints act upon each other."""
+"""Lives with different wear coefficients, which together show the effect of joints on each other."""
 
 from collections.abc import Callable, Iterator
 from itertools import islice
@@ -12,8 +12,8 @@ from leg_wear_monitor.life.result import Life
 from leg_wear_monitor.mechanism.arrays import Floats
 from leg_wear_monitor.mechanism.spec import Mechanism
 
-LEAST_FRACTION = 0.05  # of the way to its limit that a joint opens in every life
-LEAST_OPENING = 1.0e-3  # of the first joint's: one that hardly wears is not hurried without bound
+LEAST_FRACTION = 0.05  # least fraction of the growth to its limit that a joint reaches in every life
+LEAST_OPENING = 1.0e-3  # of the first joint's opening: bounds the factor of a joint that hardly wears
 _DIGITS = 6
 
 
@@ -28,21 +28,21 @@ def simulate_lives(
     speed_rpm: float | None = None,
     progress: Callable[[float], None] = lambda _share: None,
 ) -> Iterator[tuple[Floats, Life]]:
-    """Lives one by one, each with the factors (k,) on its wear coefficients: the nominal one, then others.
+    """Simulate lives, each with factors (k,) on its wear coefficients: the nominal life first, then others.
 
     Parameters
     ----------
     mechanism : Mechanism
     settings : LifeSettings
     number : int
-        Of lives.
+        Number of lives.
     limit_m, horizon_cycles : float
         As in `simulate_life`.
     wear_factor : float
         Factor on all wear coefficients.
     speed_rpm : float, optional
     progress : callable
-        Called with the fraction of all lives that is done.
+        Called with the completed fraction of all lives.
 
     Raises
     ------
@@ -67,16 +67,16 @@ def simulate_lives(
 
 
 def spread_factors(nominal: Life) -> Iterator[Floats]:
-    """Factors (k,) on the wear coefficients, life by life, without end.
+    """Factors (k,) on the wear coefficients, life by life, as an endless sequence.
 
-    Where lives end, clearances are to be spread evenly: in each the first joint opens all the way, and the
-    others by fractions of an evenly spread sequence (Roberts's additive recurrence), if they grow as in the
-    nominal life.
+    The clearances at the ends of the lives should be evenly distributed. In each life the first joint reaches
+    its full growth, and the others reach fractions from an evenly distributed sequence (Roberts's additive
+    recurrence), if they grow as in the nominal life.
 
     Parameters
     ----------
     nominal : Life
-        With factors of 1.
+        The life with factors of 1.
     """
     opened = nominal.clearance_m[-1] - nominal.clearance_m[0]
     opened = np.maximum(opened, LEAST_OPENING * opened.max())
@@ -89,7 +89,7 @@ def spread_factors(nominal: Life) -> Iterator[Floats]:
 
 
 def lives_document(lives: list[tuple[Floats, Life]]) -> dict[str, Any]:
-    """Plain object for JSON: the nominal life, and of the further ones what the forecast needs."""
+    """Plain object for JSON: the nominal life, and the data of the others that the forecast needs."""
     (factor, nominal), *further = lives
     return {
         **nominal.to_dict(),
@@ -118,7 +118,7 @@ def _rounded(values: Floats) -> Any:
 
 
 def _root(dimension: int) -> float:
-    """The number that is by one less than its power of dimension + 1."""
+    """The root x > 1 of x^(dimension + 1) = x + 1."""
     x = 1.5
     for _ in range(60):
         x = (1.0 + x) ** (1.0 / (dimension + 1))

@@ -1,4 +1,4 @@
-"""What a life is made of: states of wear over gait cycles, and when a clearance reaches its limit."""
+"""Result of a life: states of wear over gait cycles, and when a clearance reaches its limit."""
 
 from collections.abc import Sequence
 from typing import TYPE_CHECKING, Any
@@ -30,15 +30,16 @@ class LifePoint:
     depth : (k, 2, N) array, m
         Wear of bushing and journal.
     rate : WearRate
-        Mean wear of a cycle about then.
+        Mean wear per cycle around this time.
     peak_force_n : (k,) array
-        Largest contact force of a cycle, mean of those simulated.
+        Largest contact force of a cycle, mean over the simulated cycles.
     toe_position_m : float
-        Largest departure of the toe from the ideal linkage's in a cycle, likewise; 0 without a toe.
+        Largest distance of the toe from that of the ideal linkage in a cycle, mean over the simulated cycles;
+        0 without a toe.
     archard_j : (k,) array
         Integral of F_N |v_t| dt since the life began.
     error_m : float
-        Error of the mean clearance that could be seen in the jump to here.
+        Estimated error of the mean clearance in the jump to this point.
     """
 
     cycles: float
@@ -51,7 +52,7 @@ class LifePoint:
 
     @property
     def opened_m(self) -> Floats:
-        """By how much the mean clearances (k,) have grown since new."""
+        """Growth of the mean clearances (k,) since new [m]."""
         return np.asarray(self.depth.mean(axis=2).sum(axis=1))
 
 
@@ -64,12 +65,12 @@ class Life:
     clearance_joints : tuple of str
     cycles : (p,) array
     clearance_m, clearance_max_m : (p, k) arrays
-        Mean around the bushing; largest, both surfaces' profiles one upon the other.
+        Mean around the bushing; largest value of the profiles of both surfaces combined.
     worst_sector_deg : (p, k) array
-        Where the bushing is deepest, in its own frame; NaN without wear.
+        Angle of the deepest wear of the bushing, in its own frame; NaN without wear.
     peak_force_n, growth_m_per_cycle, growth_error_m_per_cycle : (p, k) arrays
     error_m : (p,) array
-        Seen in the jump to each point.
+        Estimated error of the mean clearance in the jump to each point.
     depth : (p, k, 2, N) array, m
     """
 
@@ -85,9 +86,9 @@ class Life:
     depth: Floats
 
     def cycles_to(self, k: int, clearance_m: float) -> float:
-        """Gait cycles at which joint k's mean clearance reaches a value; beyond the end at its last rate.
+        """Gait cycles at which joint k's mean clearance reaches a value; extrapolated at its last rate.
 
-        Infinite if it does not grow, 0 if it was there from the start.
+        Infinite if it does not grow, 0 if it was reached from the start.
         """
         seen = self.clearance_m[:, k]
         if clearance_m <= seen[0]:
@@ -98,7 +99,7 @@ class Life:
         return float(self.cycles[-1] + (clearance_m - seen[-1]) / rate) if rate > 0.0 else np.inf
 
     def to_dict(self) -> dict[str, Any]:
-        """Plain object for JSON, joints by name; null for a sector that is not known."""
+        """Plain object for JSON, joints by name; null for an unknown sector."""
         joints = {
             joint: {name: [_plain(v) for v in getattr(self, name)[:, k].tolist()] for name in _OF_JOINTS}
             for k, joint in enumerate(self.clearance_joints)
@@ -121,7 +122,7 @@ class Life:
         }
 
     def to_pandas(self) -> "pd.DataFrame":
-        """Table of `columns`, by joint and gait cycles; this needs pandas.
+        """Table of `columns`, by joint and gait cycles; requires pandas.
 
         Raises
         ------
@@ -136,7 +137,7 @@ def _plain(value: float) -> float | None:
 
 
 def life_of(clearance_joints: tuple[str, ...], fresh_m: Floats, points: Sequence[LifePoint]) -> Life:
-    """The life that points make."""
+    """The life that consists of the given points."""
     depth = np.array([point.depth for point in points])
     both, sectors = depth.sum(axis=2), depth.shape[-1]
     deepest = (depth[:, :, 0].argmax(axis=2) + 0.5) * (360.0 / sectors)

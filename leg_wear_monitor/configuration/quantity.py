@@ -1,15 +1,15 @@
-"""A key of a file with its unit, bounds and meaning, declared once: for checks and documentation alike."""
+"""A key of a file with its unit, bounds and meaning, declared once for checks and documentation."""
 
 from collections.abc import Callable, Mapping
 from typing import Any
 
 import attrs
 
-LEAST = 1.0e-30  # of what must be above 0: in SI units, its square and its inverse stay finite
+LEAST = 1.0e-30  # least positive value: in SI units, its square and its inverse stay finite
 
 
 class FieldError(ValueError):
-    """A value that its key cannot take.
+    """The value of a key is not allowed.
 
     Parameters
     ----------
@@ -33,7 +33,7 @@ def described(
     check: Callable[[Any], str | None] | None = None,
     metadata: Mapping[str, Any] | None = None,
 ) -> Any:
-    """Attrs field that says what it is.
+    """Attrs field with its unit and a description.
 
     Parameters
     ----------
@@ -44,9 +44,9 @@ def described(
     default, factory : optional
         Value when the key is absent; without either the key is required.
     check : callable, optional
-        Gives what is wrong with a value, None if nothing.
+        Returns the fault of a value, None if there is none.
     metadata : mapping, optional
-        Kept beside unit and doc.
+        Further metadata, stored with unit and doc.
 
     Raises
     ------
@@ -90,9 +90,9 @@ def quantity(
     default : optional
         Value when the key is absent; without it the key is required.
     check : callable, optional
-        Gives what else is wrong with a value that is within its bounds, None if nothing.
+        Returns another fault of a value within its bounds, None if there is none.
     metadata : mapping, optional
-        Kept beside unit, doc and bounds.
+        Further metadata, stored with unit, doc and bounds.
 
     Raises
     ------

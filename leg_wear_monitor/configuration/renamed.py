@@ -1,4 +1,4 @@
-"""Keys of configurations that have another name since version 0.1.0 (CHANGELOG.rst)."""
+"""Renamed keys of configurations (CHANGELOG.rst)."""
 
 RENAMED = {
     "drop_share": "drop_fraction",
@@ -15,6 +15,6 @@ RENAMED = {
 
 
 def new_name(name: str) -> str | None:
-    """Name that a key has now, sections before it included; None for one that was not renamed."""
+    """Present name of a renamed key, including its sections; None for a key that was not renamed."""
     section, dot, key = name.rpartition(".")
     return f"{section}{dot}{RENAMED[key]}" if key in RENAMED else None

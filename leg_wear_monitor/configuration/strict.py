@@ -1,4 +1,4 @@
-"""cattrs, made strict: a number is a number, a text a text, an unknown key an error; each fault one line."""
+"""Strict conversion with cattrs: no conversion between numbers and texts, unknown keys are errors."""
 
 import math
 import reprlib
@@ -22,7 +22,7 @@ _FAULTS = (ClassValidationError, FieldError)
 
 
 def structure(value: Any, kind: Any, source: str, key: str) -> Any:
-    """Type ``kind`` from what a file holds under a key.
+    """Convert the value of a key in a file to the type ``kind``.
 
     Raises
     ------
@@ -36,7 +36,7 @@ def structure(value: Any, kind: Any, source: str, key: str) -> Any:
 
 
 def choose(kind: Any, pick: Callable[[Any], tuple[Any, Any]]) -> None:
-    """Structure a kind as another one: for a value, ``pick`` gives that one and the value it takes."""
+    """Structure a type as another one: for a value, ``pick`` returns that type and its value."""
 
     def hook(value: Any, _kind: Any) -> Any:
         chosen, taken = pick(value)
@@ -61,7 +61,7 @@ def shown(value: Any) -> str:
 
 
 def _part(step: str, value: Any, kind: Any) -> Any:
-    """Structure a part of a file; whatever is wrong in it is told under its name."""
+    """Structure a part of a file; faults in it are reported under its name."""
     try:
         return _converter.structure(value, kind)
     except _FAULTS as error:
@@ -70,7 +70,7 @@ def _part(step: str, value: Any, kind: Any) -> Any:
 
 
 def _field_error(error: BaseException) -> FieldError:
-    """The first thing that is wrong; unknown keys come first, they may explain missing ones."""
+    """The first fault; unknown keys come first, since they may explain missing ones."""
     if isinstance(error, FieldError):
         return error
     if isinstance(error, ForbiddenExtraKeysError):
@@ -94,7 +94,7 @@ def _unknown(key: str, known: list[str]) -> FieldError:
 
 
 def _of_attribute(error: BaseException, attribute: "attrs.Attribute[Any]") -> FieldError:
-    """What is wrong with one attribute of a class, with its unit."""
+    """Fault of one attribute of a class, with its unit."""
     unit = f" [{attribute.metadata['unit']}]" if attribute.metadata.get("unit") else ""
     if isinstance(error, KeyError):
         return FieldError(attribute.name, f"is missing, expected: {attribute.metadata['doc']}{unit}")
@@ -103,7 +103,7 @@ def _of_attribute(error: BaseException, attribute: "attrs.Attribute[Any]") -> Fi
     return FieldError(".".join(filter(None, (name, inner.key))), inner.fault + unit)
 
 
-# --- what is taken for what ---
+# --- conversions by type ---
 
 
 def _number(value: Any, _kind: Any) -> float:
@@ -149,7 +149,7 @@ def _strict_class(kind: type) -> _Hook:
 
     def hook(value: Any, _kind: Any) -> Any:
         given = mapping(value)
-        if flat:  # one attribute takes all keys that are no other's
+        if flat:  # one attribute takes all remaining keys
             rest = {key: entry for key, entry in given.items() if key not in own}
             given = {key: entry for key, entry in given.items() if key in own} | {flat: rest}
         return inner(given, kind)

@@ -1,4 +1,4 @@
-"""A YAML file read within bounds, whatever it holds: its size, its depth, and what its aliases stand for."""
+"""Reads a YAML file within bounds of its size, its depth and its expanded aliases."""
 
 import stat
 from collections.abc import Iterator
@@ -12,12 +12,12 @@ from ruamel.yaml.events import CollectionEndEvent, CollectionStartEvent, Event
 
 from leg_wear_monitor.errors import ConfigError
 
-MOST_BYTES = 1_000_000  # the largest that comes with the package has 3000
-MOST_VALUES, DEEPEST = 100_000, 50  # with all aliases written out
+MOST_BYTES = 1_000_000  # the largest file of the package has 3000
+MOST_VALUES, DEEPEST = 100_000, 50  # with all aliases expanded
 
 
 def read_document(path: Path, source: str) -> Any:
-    """What a YAML 1.2 file holds, as plain values.
+    """Read a YAML 1.2 file as plain values.
 
     Parameters
     ----------
@@ -29,7 +29,7 @@ def read_document(path: Path, source: str) -> Any:
     ------
     FileNotFoundError
     ConfigError
-        Naming the line at fault, or the bound that is passed.
+        Naming the line at fault, or the exceeded bound.
     """
     try:
         text = _text(path, source)
@@ -37,7 +37,7 @@ def read_document(path: Path, source: str) -> Any:
         document = YAML(typ="safe", pure=True).load(text)
     except UnicodeDecodeError as error:
         raise ConfigError(source, "", f"is not UTF-8 text: byte {error.start}") from error
-    # a date or a number too odd; a tag that does not fit its value; recursion
+    # an invalid date or number; a tag that does not fit its value; recursion
     except (YAMLError, ValueError, TypeError, AttributeError, LookupError, RecursionError) as error:
         raise ConfigError(source, "", f"is not YAML: {_fault(error)}") from error
     _check_size(document, source)
@@ -45,7 +45,7 @@ def read_document(path: Path, source: str) -> Any:
 
 
 def _text(path: Path, source: str) -> str:
-    """The file's text; a device has no end, so it is not read."""
+    """The file's text; devices are not read, since they may have no end."""
     try:
         kind = path.stat().st_mode
         if stat.S_ISCHR(kind) or stat.S_ISBLK(kind) or stat.S_ISSOCK(kind):
@@ -63,16 +63,16 @@ def _text(path: Path, source: str) -> str:
 
 
 def _check_depth(text: str, source: str) -> None:
-    """Stop where the text first goes too deep: to compose thousands of levels takes seconds."""
+    """Stop at the first place that is too deep: to compose thousands of levels takes seconds."""
     try:
         if any(depth > DEEPEST for _, depth in events_with_depth(text)):
             raise ConfigError(source, "", f"is nested more than {DEEPEST} deep")
     except YAMLError:
-        return  # to be reported by who composes, after what is wrong before it
+        return  # reported when the document is composed, after earlier faults
 
 
 def events_with_depth(text: str) -> Iterator[tuple[Event, int]]:
-    """Events of a YAML text as it is parsed, each with the number of collections that are open."""
+    """Events of a YAML text during parsing, each with the number of open collections."""
     depth = 0
     for event in YAML(typ="safe", pure=True).parse(text):
         depth += isinstance(event, CollectionStartEvent) - isinstance(event, CollectionEndEvent)
@@ -80,7 +80,7 @@ def events_with_depth(text: str) -> Iterator[tuple[Event, int]]:
 
 
 def _check_size(document: Any, source: str) -> None:
-    """Measure a document with its aliases written out, but looking at each part only once."""
+    """Check the size of a document with its aliases expanded, visiting each part only once."""
     values, levels = _extent(document, {}, frozenset())
     if levels > DEEPEST:
         raise ConfigError(source, "", f"is nested more than {DEEPEST} deep, or contains itself")
@@ -89,7 +89,7 @@ def _check_size(document: Any, source: str) -> None:
 
 
 def _extent(value: Any, known: dict[int, tuple[int, int]], above: frozenset[int]) -> tuple[int, int]:
-    """Number of values in a value, itself with them, and their levels; one that holds itself has too many."""
+    """Number of values in a value, including itself, and their depth; a recursive value has too many."""
     if not isinstance(value, dict | list | tuple | set):
         return 1, 0
     if id(value) in above or len(above) > DEEPEST:
@@ -103,7 +103,7 @@ def _extent(value: Any, known: dict[int, tuple[int, int]], above: frozenset[int]
 
 
 def _fault(error: Exception) -> str:
-    """What is wrong, and in which line, without the excerpt that ruamel.yaml prints below."""
+    """The fault and its line, without the excerpt that ruamel.yaml prints below."""
     mark = error.problem_mark if isinstance(error, MarkedYAMLError) else None
     text = error.problem if isinstance(error, MarkedYAMLError) and error.problem else str(error)
     text = next(iter(text.splitlines()), type(error).__name__)

@@ -1,1 +1,1 @@
-"""The nodes; ROS is spoken here and nowhere else."""
+"""The ROS 2 nodes; no other sub-package imports rclpy."""

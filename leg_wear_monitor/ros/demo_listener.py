@@ -1,4 +1,4 @@
-"""Who stands beside the demo: tells what the monitor publishes, and acknowledges its alarms."""
+"""Listener of the demo: reports what the monitor publishes, and acknowledges its alarms."""
 
 from collections.abc import Callable
 from typing import Any
@@ -19,7 +19,7 @@ _MONITOR = "leg_wear_monitor"
 
 
 class DemoListener:
-    """Listens to a monitor in a namespace.
+    """Subscribes to the monitor in a namespace.
 
     Parameters
     ----------
@@ -27,14 +27,14 @@ class DemoListener:
     domain : int
         ROS domain.
     report : callable
-        Told a stamp [ns] and a line.
+        Called with a stamp [ns] and a line of text.
 
     Attributes
     ----------
     clearances_m : dict
-        Per joint, as last heard.
+        Last received clearance of each joint [m].
     stamp_ns : int
-        When that was.
+        Stamp of these clearances [ns].
     raised, acknowledged : list of str
         Alarms that were raised, and those that were cleared by an acknowledgement.
     """
@@ -57,12 +57,12 @@ class DemoListener:
         self._node.create_subscription(DiagnosticArray, f"{_MONITOR}/alarms", self._hear_alarms, latched)
 
     def attend(self, going_on: Callable[[], bool]) -> None:
-        """Listen as long as it goes on."""
+        """Process messages while `going_on` returns true."""
         while going_on():
             self._executor.spin_once(timeout_sec=WAKE_S)
 
     def leave(self) -> None:
-        """Take it down."""
+        """Shut down the executor."""
         self._executor.shutdown()
         self._node.destroy_node()
         try_shutdown(context=self._context)

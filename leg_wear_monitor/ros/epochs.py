@@ -1,9 +1,9 @@
-"""Samples whose time is in the ledger already: a clock that began anew, or something that is played back.
+"""Samples whose time is already in the ledger: the clock was reset, or a recording is played back.
 
-A live leg never walks the same time twice. If stamps agree with the node's own clock, samples are of now, and
-it is the clock that stands where it stood before: simulated time that began anew, a board without a clock of
-its own, a clock that was set back. The same holds for stamps that are no dates after the computer was started
-again. Anything else may be a recording that is played, whose wear is counted: that cannot be decided here.
+A live leg cannot walk through the same time twice. If stamps agree with the node's own clock, the samples are
+live and the clock was reset: simulation time restarted, the board has no hardware clock, or the clock was
+set back. After a reboot, the same holds for stamps that are not calendar dates. Any other samples may
+come from playback of a recording whose wear is already counted; this case is undecidable here.
 """
 
 from collections.abc import Callable
@@ -16,7 +16,7 @@ from leg_wear_monitor.monitor.reports import Status
 from leg_wear_monitor.monitor.wear_monitor import WearMonitor
 from leg_wear_monitor.twin.sample import NO_FAULT, Samples
 
-NOW_NS = 10 * 10**9  # samples of now are no farther from it; the inbox holds no more
+NOW_NS = 10 * 10**9  # live samples are within this time of the node's clock; the inbox holds no more
 NO_DATE_NS = 10**17  # stamps below are of 1970 to 1973: they count from the start of something
 
 UNDECIDED = (
@@ -31,7 +31,7 @@ _BOOT_ID = Path("/proc/sys/kernel/random/boot_id")
 
 
 def boot_id() -> str:
-    """What tells this start of the computer from others; empty where that is not known."""
+    """Identifier of the computer's current boot; empty if unknown."""
     try:
         return _BOOT_ID.read_text(encoding="ascii").strip()
     except (OSError, UnicodeDecodeError):
@@ -39,7 +39,7 @@ def boot_id() -> str:
 
 
 class Epochs:
-    """Decides whether the clock has begun anew, and says what it could not decide.
+    """Detects clock resets, and reports samples for which a reset is undecidable.
 
     Parameters
     ----------
@@ -49,7 +49,7 @@ class Epochs:
     now_ns : callable
         The node's clock [ns].
     report : callable
-        Told once of each, whether it is an error and a line.
+        Called with whether it is an error, and a line: at each clock reset, and at the first undecidable one.
     """
 
     def __init__(
@@ -60,7 +60,7 @@ class Epochs:
         self._begun, self._left_out, self._told = 0, 0, 0
 
     def see(self, samples: Samples) -> None:
-        """Look at samples before the monitor does."""
+        """Check samples before they are passed to the monitor."""
         known = self._monitor.counted(samples) & (samples["fault"] == NO_FAULT)
         if not known.any():
             return
@@ -76,7 +76,7 @@ class Epochs:
         self._left_out += int(np.count_nonzero(known))
 
     def status(self) -> Status:
-        """Whether samples are left out since the last time that this was asked."""
+        """Clock status: an error if samples were left out since the last call."""
         values = {"left_out_samples": float(self._left_out), "epochs_begun": float(self._begun)}
         is_undecided, self._told = self._left_out > self._told, self._left_out
         if is_undecided:

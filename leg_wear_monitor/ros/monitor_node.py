@@ -1,4 +1,4 @@
-"""Node ``leg_wear_monitor``: samples from topics to the monitor, its reports to topics."""
+"""Node ``leg_wear_monitor``: passes samples from topics to the monitor, and publishes its reports."""
 
 import time
 from collections.abc import Callable, Sequence
@@ -42,14 +42,14 @@ from leg_wear_monitor.ros.waiting import repeated
 
 NO_COMMANDS = "It publishes no commands and must not be part of a safety function."
 
-_WORK_S = 0.01  # the monitor takes what has come, this often
-_AT_ONCE = 500  # messages, so that services and parameters get their turn, too
-_HELD = 20_000  # messages, ten seconds at 1 kHz on both topics
+_WORK_S = 0.01  # period at which the monitor processes received messages
+_AT_ONCE = 500  # messages per period, so that services and parameters are also served
+_HELD = 20_000  # capacity in messages: ten seconds at 1 kHz on both topics
 _A_SAMPLE = (outputs.TORQUE, outputs.IMPACTS)
 
 
 class MonitorNode(ClosingNode):
-    """The monitor, live."""
+    """The live monitor node."""
 
     def __init__(self, **options: Any) -> None:
         super().__init__("leg_wear_monitor", **options)
@@ -59,18 +59,18 @@ class MonitorNode(ClosingNode):
         config = parameters.config
         mechanism = load_mechanism(config.mechanism)
         self._monitor = open_monitor(mechanism, config)
-        # until `close`: a signal may come before who makes this node has it in hand
+        # until `close`: a signal may arrive before the caller of the constructor holds this node
         self._in_order = ExitStack()
         self._in_order.enter_context(closed_at_the_end(self._monitor.close))
         try:
             self._get_ready(parameters)
-        except BaseException:  # a signal, too: the next start must not take the ledger for cut off
+        except BaseException:  # signals included: the next start must not consider the ledger truncated
             self._monitor.close()
             self._in_order.close()
             raise
 
     def _get_ready(self, parameters: Parameters[MonitorConfig]) -> None:
-        """All that comes after the ledger was opened; says so when done."""
+        """Set up everything after the ledger is open, and log when the node is ready."""
         config = parameters.config
         decoder = Decoder(config)
         self._inbox = Inbox(decoder, _HELD)
@@ -94,7 +94,7 @@ class MonitorNode(ClosingNode):
         self._supervision.inputs = [topic for topic, _ in self._inputs]
         for topic in self._supervision.inputs:
             self._black_box.add_topic(topic.name, topic.stream.type, SENSOR_DATA)
-        # work and diagnostics go on where simulated time stands still
+        # work and diagnostics continue while simulation time stands still
         steady = Clock(clock_type=ClockType.STEADY_TIME)
         self.create_timer(_WORK_S, self._work, clock=steady)
         self.create_timer(config.diagnostics.period_s, self._diagnose, clock=steady)
@@ -103,11 +103,11 @@ class MonitorNode(ClosingNode):
 
     @property
     def monitor(self) -> WearMonitor:
-        """What it all goes to."""
+        """The monitor that processes the samples."""
         return self._monitor
 
     def close(self) -> None:
-        """Take what has come, save the ledger, end the recording."""
+        """Process the received messages, save the ledger, finish the recording."""
         try:
             while len(self._inbox):
                 self._work()
@@ -117,7 +117,7 @@ class MonitorNode(ClosingNode):
             self._black_box.close()
 
     def _compile(self, decoder: Decoder) -> None:
-        """Pay for compilation before the first sample."""
+        """Compile the kernels before the first sample."""
         log = self.get_logger()
         log.info("preparing; the first start compiles numerical kernels for a minute")
         with repeated(lambda passed_s: log.info(f"preparing: {passed_s:.0f} s")):
@@ -125,10 +125,10 @@ class MonitorNode(ClosingNode):
         for stream in STREAMS:
             decoder.one(b"", stream.code)
 
-    # --- in ---
+    # --- inputs ---
 
     def _ros_now_ns(self) -> int:
-        """Now, as people and other nodes see it [ns]."""
+        """Present ROS time [ns]."""
         return self.get_clock().now().nanoseconds
 
     def _say(self, is_error: bool, line: str) -> None:
@@ -140,7 +140,7 @@ class MonitorNode(ClosingNode):
         self._inbox.add(topic.stream.code, raw, topic.heard_wall_ns)
 
     def _work(self) -> None:
-        """Pass on what has come, a bounded part at a time."""
+        """Process received messages, a bounded number at a time."""
         if not len(self._inbox):
             return
         coarse = self._load.note(self._inbox.delay_s(time.time_ns()))
@@ -155,7 +155,7 @@ class MonitorNode(ClosingNode):
         self._supervision.note(arrivals, samples)
         self._publish(reports, coarse)
 
-    # --- out ---
+    # --- outputs ---
 
     def _publish(self, reports: Reports, coarse: bool) -> None:
         now_ns = time.time_ns()
@@ -187,7 +187,7 @@ class MonitorNode(ClosingNode):
         self._outlets.send(outputs.DIAGNOSTICS, now_ns, message)
         self._black_box.flush()
 
-    # --- people ---
+    # --- operators ---
 
     def _configure(self, config: MonitorConfig) -> None:
         self._monitor.configure(config)
@@ -201,7 +201,7 @@ class MonitorNode(ClosingNode):
             self._offer(f"~/undo_reset/{joint}", partial(self._undo_reset, joint))
 
     def _offer(self, name: str, act: Callable[[], str]) -> None:
-        """A service that acts and says in a line what it did, or why it could not."""
+        """Create a service that performs an action and returns its result or error in one line."""
 
         def answer(_request: Trigger.Request, response: Trigger.Response) -> Trigger.Response:
             try:

@@ -1,4 +1,4 @@
-"""From a shell to a running node and back: arguments, signals, executor, exit code."""
+"""Life cycle of a node process: arguments, signals, executor, exit code."""
 
 import os
 import signal
@@ -26,16 +26,16 @@ DONE, COULD_NOT = 0, 2
 
 _SIGNALS = (signal.SIGINT, signal.SIGTERM)
 
-# An executor of events took a sixth of the default one's time (docs/decisions/0008-live-node.md). Its spin()
-# without a timeout hangs at full load in the Jazzy wheels, so it is called with one, again and again.
+# The events executor needs a sixth of the default executor's time (docs/decisions/0008-live-node.md). Its
+# spin() without a timeout hangs at full load in the Jazzy wheels, so it is called repeatedly with a timeout.
 WAKE_S = 0.2
 
 
 class ClosingNode(ParameterNode):
-    """A node that has something to put in order before it goes."""
+    """A node that must save its state before it exits."""
 
     def close(self) -> None:
-        """Save what there is to save; the context may be down already."""
+        """Save the state; the context may already be shut down."""
 
 
 _Node = TypeVar("_Node", bound=ClosingNode)
@@ -43,7 +43,7 @@ _Node = TypeVar("_Node", bound=ClosingNode)
 
 @contextmanager
 def until_down(context: Context) -> Iterator[None]:
-    """Let pass what rclpy raises when the context goes down: a signal may do that between any two calls."""
+    """Suppress exceptions that rclpy raises on context shutdown; a signal can cause one at any call."""
     try:
         yield
     except (ExternalShutdownException, RuntimeError):
@@ -52,7 +52,7 @@ def until_down(context: Context) -> Iterator[None]:
 
 
 def spin(node: Node, wanted: Callable[[], bool] = lambda: True) -> None:
-    """Serve a node until its context goes down, or it is not wanted any more."""
+    """Spin a node until its context shuts down or `wanted` returns false."""
     executor = EventsExecutor(context=node.context)
     try:
         with until_down(node.context):
@@ -64,7 +64,7 @@ def spin(node: Node, wanted: Callable[[], bool] = lambda: True) -> None:
 
 
 def _init(argv: list[str]) -> None:
-    """Start ROS with the arguments; refuse what it would not look at."""
+    """Initialize rclpy with the arguments; reject arguments that it would ignore."""
     try:
         stray = remove_ros_args(argv)[1:]
         if not stray:
@@ -76,9 +76,9 @@ def _init(argv: list[str]) -> None:
 
 
 def _stop_making(_number: int, frame: FrameType | None) -> None:
-    """Give up a node that is being made: by an exception, or, where that would be lost, here and now."""
+    """Abort the construction of a node: by an exception or, where Python would discard it, by exit."""
     for number in _SIGNALS:
-        signal.signal(number, signal.SIG_IGN)  # once; a launch file sends more of them
+        signal.signal(number, signal.SIG_IGN)  # once only; a launch file sends several signals
     if not would_be_lost(frame):
         raise KeyboardInterrupt
     code = COULD_NOT
@@ -98,7 +98,7 @@ def _say(error: LegWearError) -> None:
 def run(
     make: Callable[[], _Node], serve: Callable[[_Node, Callable[[], bool]], None], argv: Sequence[str] | None
 ) -> int:
-    """Make a node, serve it until a signal or its own end, and take it down.
+    """Create a node, run it until a signal or its own end, and shut it down.
 
     Signals are ours and not rclpy's: its handlers take the context down at once, between any two calls, and
     with it the way to publish what was taken in last.
@@ -106,16 +106,16 @@ def run(
     Parameters
     ----------
     make : callable
-        Gives the node.
+        Creates the node.
     serve : callable
-        Given the node, and whether it is still wanted; returns when it is done or not wanted any more.
+        Called with the node and a function that returns whether to continue; returns when it is finished.
     argv : sequence of str, optional
-        As of ``sys.argv``, ROS arguments included.
+        Arguments like ``sys.argv``, including ROS arguments.
 
     Returns
     -------
     int
-        Exit code: 0 done, 2 could not, with one line on stderr.
+        Exit code: 0 on success, 2 on failure, with one line on stderr.
     """
     node: _Node | None = None
     asked = threading.Event()
@@ -130,8 +130,8 @@ def run(
             serve(node, lambda: not asked.is_set())
         finally:
             node.close()
-    except KeyboardInterrupt:  # asked to stop before it had begun
-        put_in_order()  # the node may be complete and not in our hands yet
+    except KeyboardInterrupt:  # interrupted before the node started
+        put_in_order()  # the node may be complete but not yet assigned
         return DONE
     except LegWearError as error:
         _say(error)

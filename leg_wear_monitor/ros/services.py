@@ -1,4 +1,4 @@
-"""What people ask of the node by services, and what it needs to know before it does it."""
+"""Helpers of the operator services: confirmation, audit time, reply texts."""
 
 import time
 from collections.abc import Callable
@@ -10,12 +10,12 @@ CONFIRM_S = 30.0
 
 
 class Confirmation:
-    """What wipes a count is asked for twice: any node in the domain can call a service once by mistake.
+    """Two-step confirmation of a wear reset: any node in the domain can call a service once by mistake.
 
     Parameters
     ----------
     now_s : callable
-        Time that nobody sets [s].
+        Returns the time of a monotonic clock [s].
     """
 
     def __init__(self, now_s: Callable[[], float] = time.monotonic) -> None:
@@ -23,7 +23,7 @@ class Confirmation:
         self._asked_s: dict[str, float] = {}
 
     def is_confirmed(self, what: str) -> bool:
-        """Whether the same was asked for less than `CONFIRM_S` ago; if not, it is asked for now."""
+        """Whether the same request came less than `CONFIRM_S` ago; if not, register it as the first."""
         now_s = self._now_s()
         asked_s = self._asked_s.pop(what, None)
         if asked_s is not None and now_s - asked_s <= CONFIRM_S:
@@ -33,12 +33,12 @@ class Confirmation:
 
 
 def audit_time(now_ns: int) -> int:
-    """Time for what is kept for ever [ns].
+    """Time for permanent audit records [ns].
 
     Raises
     ------
     LegWearError
-        If there is none.
+        If no valid time is available.
     """
     if now_ns <= 0:
         raise LegWearError(
@@ -49,7 +49,7 @@ def audit_time(now_ns: int) -> int:
 
 
 def asked_once(joint: str, wear: JointWear) -> str:
-    """What a reset would wipe, and how to mean it."""
+    """Reply to a first reset request: the wear that a reset would delete, and how to confirm."""
     return (
         f"joint {joint}: not reset yet; this would set {_wear_text(wear)} to 0; "
         f"call again within {CONFIRM_S:g} s if the part was replaced"
@@ -57,12 +57,12 @@ def asked_once(joint: str, wear: JointWear) -> str:
 
 
 def undone(joint: str, wear: JointWear) -> str:
-    """What a joint has worn after a reset was taken back."""
+    """Reply to an undone reset: the joint's wear, including the wear since the reset."""
     return (
         f"joint {joint}: the reset is undone, {_wear_text(wear)} are counted, including those since the reset"
     )
 
 
 def _wear_text(wear: JointWear) -> str:
-    """Mean wear of the two surfaces together, and in how many gait cycles."""
+    """Text with the mean total wear of both surfaces, and its number of gait cycles."""
     return f"{1e6 * float(wear.depth.sum(axis=0).mean()):.4g} um of wear from {wear.cycles} gait cycles"

@@ -1,4 +1,4 @@
-"""What the log of a node says while something takes long."""
+"""Progress messages in a node's log during long operations."""
 
 import threading
 from collections.abc import Callable, Iterator
@@ -9,12 +9,12 @@ EVERY_S = 10.0
 
 @contextmanager
 def repeated(say: Callable[[float], None], every_s: float = EVERY_S) -> Iterator[None]:
-    """Call a function with the seconds passed, again and again, while the work inside lasts.
+    """Call a function periodically with the elapsed seconds while the body of the context runs.
 
     Parameters
     ----------
     say : callable
-        Is called in a thread of its own.
+        Called in a separate thread with the elapsed time [s].
     every_s : float, s
     """
     done = threading.Event()

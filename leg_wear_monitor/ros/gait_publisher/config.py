@@ -1,4 +1,4 @@
-"""Parameters of the gait publisher: those of the synthetic leg, and how it is published."""
+"""Parameters of the gait publisher: those of the synthetic leg, and those of publication."""
 
 import attrs
 

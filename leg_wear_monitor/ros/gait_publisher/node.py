@@ -1,4 +1,4 @@
-"""Node ``gait_publisher``: a synthetic leg that publishes what its sensors say."""
+"""Node ``gait_publisher``: publishes the sensor readings of a synthetic leg."""
 
 import itertools
 import queue
@@ -24,7 +24,7 @@ from leg_wear_monitor.ros.parameters.parameters import Parameters
 from leg_wear_monitor.ros.running import WAKE_S, ClosingNode, run, spin, until_down
 from leg_wear_monitor.ros.waiting import repeated
 
-_BLOCK_S = 0.05  # of walking, computed at a time
+_BLOCK_S = 0.05  # walking time per computed block
 _AHEAD = 20  # blocks
 _LATE_S = 0.2
 
@@ -57,7 +57,7 @@ class GaitPublisher(ClosingNode):
         self.published, self._start_ns = 0, 0
 
     def walk(self, wanted: Callable[[], bool] = lambda: True) -> None:
-        """Publish in step with the clock until the walk ends or is not wanted any more."""
+        """Publish in step with the clock until the walk ends or `wanted` returns false."""
         with until_down(self.context):
             self._walk_on(wanted)
 
@@ -83,7 +83,7 @@ class GaitPublisher(ClosingNode):
             self.published += 1
 
     def close(self) -> None:
-        """Write the truth, if it is wanted."""
+        """Write the ground truth, if a file is configured."""
         path = self.config.truth.path
         if not path:
             return
@@ -106,14 +106,14 @@ class GaitPublisher(ClosingNode):
         return all(one.get_subscription_count() >= wanted for one in self._by_kind.values())
 
     def _walk(self) -> Iterator[list[Reading]]:
-        """Readings in blocks of an even length in time."""
+        """Readings in blocks of equal duration."""
         for _, block in itertools.groupby(
             readings(self._leg, self.config), lambda reading: int(reading.arrival_s / _BLOCK_S)
         ):
             yield list(block)
 
     def _computed_ahead(self) -> Iterator[list[Reading]]:
-        """The walk, computed in a thread of its own; kernels let this one run meanwhile."""
+        """The walk, computed in a separate thread; its kernels release the GIL."""
         ready: queue.Queue[list[Reading] | LegWearError | None] = queue.Queue(_AHEAD)
 
         def compute() -> None:
@@ -132,7 +132,7 @@ class GaitPublisher(ClosingNode):
 
 
 def _serve(node: GaitPublisher, wanted: Callable[[], bool]) -> None:
-    """Walk, while a thread answers to parameter requests."""
+    """Walk, while a thread answers parameter requests."""
     walking = threading.Event()
     walking.set()
     server = threading.Thread(target=spin, args=(node, walking.is_set))

@@ -1,4 +1,4 @@
-"""Readings of the synthetic leg as messages, malformed where they shall be."""
+"""Conversion of the synthetic leg's readings to messages, with injected faults."""
 
 import math
 from typing import TypeAlias
@@ -31,7 +31,7 @@ def time_message(stamp: int) -> Time:
 
 
 def sensor_message(reading: Reading, start_ns: int, config: PublisherConfig) -> Message | bytes:
-    """Message of a reading; bytes where it shall not be one."""
+    """Message of a reading; raw bytes for a fault that makes it undecodable."""
     message = _whole(reading, start_ns, config)
     if reading.fault == UNDECODABLE:
         data: bytes = serialize_message(message)
@@ -52,7 +52,7 @@ def _whole(reading: Reading, start_ns: int, config: PublisherConfig) -> Message:
 
 
 def _joint_state(reading: Reading, stamp: Time, config: PublisherConfig) -> JointState:
-    """The crank stands last, so that nobody may count on its place."""
+    """Joint state with the crank last, so that no receiver can rely on its position in the list."""
     further = [*config.further_joints, *config.joint_encoders.names]
     still = [0.0] * len(config.further_joints)
     unmeasured = [*still, *(math.nan,) * len(config.joint_encoders.names)]
@@ -67,7 +67,7 @@ def _joint_state(reading: Reading, stamp: Time, config: PublisherConfig) -> Join
 
 
 def _break(message: Message, fault: int) -> None:
-    """Make a message faulty; a torque can only have no stamp or no finite value."""
+    """Inject a fault into a message; a torque message can only lack its stamp or a finite value."""
     if fault == ZERO_STAMP and not isinstance(message, Float64):
         message.header.stamp = Time()
     elif isinstance(message, JointState):

@@ -1,1 +1,1 @@
-"""Silence, clocks, node status, node alarms, the log."""
+"""Health of the node: input silence, clocks, node status, node alarms, log."""

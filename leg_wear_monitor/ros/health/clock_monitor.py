@@ -1,4 +1,4 @@
-"""Whether the time that ROS has goes on."""
+"""Check that ROS time advances."""
 
 from leg_wear_monitor.monitor.alarms.alarm import Level
 from leg_wear_monitor.monitor.reports import Status
@@ -8,25 +8,25 @@ _TURNED_BACK_S = 1.0
 
 
 def both_clocks(one: Status, other: Status) -> Status:
-    """One status of two that tell of the clock: what is wrong with either."""
+    """Combine two statuses of the clock into one with the faults of either."""
     faults = [status.message for status in (one, other) if status.level is not Level.OK]
     message = "; ".join(faults) or one.message
     return Status(one.name, max(one.level, other.level), message, one.values | other.values)
 
 
 class ClockMonitor:
-    """Watches the node's clock by one that only goes forward."""
+    """Compares the node's clock with a monotonic clock."""
 
     def __init__(self) -> None:
         self._ros_ns = self._changed_ns = 0
 
     def status(self, ros_ns: int, steady_ns: int, is_simulated: bool) -> Status:
-        """The clock's status now.
+        """Present status of the clock.
 
         Parameters
         ----------
         ros_ns, steady_ns : int
-            Now, as the node's clock has it, and by a clock that only goes forward.
+            Present time of the node's clock and of a monotonic clock [ns].
         is_simulated : bool
             Whether the node follows ``/clock``.
         """

@@ -1,4 +1,4 @@
-"""Alarms that need a clock or the graph: an input that is silent, several publishers of one input."""
+"""Alarms that need a clock or the ROS graph: a silent input, several publishers of one input."""
 
 from collections.abc import Mapping
 
@@ -19,20 +19,20 @@ _LIMITS = {SILENCE: _SILENT, SOURCES: _TWO_SOURCES}
 
 
 def sources_alarm(kind: str) -> Alarm:
-    """Alarm of several publishers; the crank's is that of the monitor, without a subject."""
+    """Name of the alarm for several publishers; for the crank, the monitor's alarm without a subject."""
     return Alarm(kind=SOURCES, subject="" if kind == _CRANK else kind)
 
 
 class NodeAlarms:
-    """Alarms of the node, beside those of the monitor.
+    """Alarms of the node, in addition to those of the monitor.
 
-    In the list of alarms they stand only while they are raised, so that without them live and replay give
-    the same bytes. ``input_sources`` is an alarm of the monitor, too: the higher of both is shown.
+    The list of alarms contains them only while they are raised; otherwise live runs and replays publish the
+    same bytes. ``input_sources`` is also an alarm of the monitor; the higher level of both is published.
 
     Parameters
     ----------
     kinds : tuple of str
-        Names of the inputs' kinds.
+        Names of the input kinds.
     """
 
     def __init__(self, kinds: tuple[str, ...]) -> None:
@@ -41,7 +41,7 @@ class NodeAlarms:
         self._alarms = {alarm.name: alarm for alarm in alarms}
 
     def evaluate(self, values: Mapping[str, float], stamp_ns: int) -> bool:
-        """Evaluate values by the names of their alarms; whether what people see has changed."""
+        """Evaluate values by alarm name; return whether the published state has changed."""
         changed = False
         for name, value in values.items():
             before = self._alarms[name]
@@ -51,7 +51,7 @@ class NodeAlarms:
         return changed
 
     def acknowledge(self) -> tuple[tuple[Alarm, ...], tuple[Alarm, ...]]:
-        """Acknowledge all: those that were cleared and those that stay."""
+        """Acknowledge all raised alarms; return the cleared ones and the remaining ones."""
         now = [acknowledged(alarm) for alarm in self.raised]
         self._alarms |= {alarm.name: alarm for alarm in now}
         cleared = tuple(alarm for alarm in now if alarm.level is Level.OK)
@@ -59,11 +59,11 @@ class NodeAlarms:
 
     @property
     def raised(self) -> tuple[Alarm, ...]:
-        """Those that are shown."""
+        """Alarms that are published."""
         return tuple(alarm for alarm in self._alarms.values() if alarm.level is not Level.OK)
 
     def beside(self, alarms: AlarmList) -> AlarmList:
-        """The monitor's alarms with these."""
+        """Merge the monitor's alarms with those of the node."""
         if not self.raised:
             return alarms
         named = {alarm.name: alarm for alarm in alarms.alarms}

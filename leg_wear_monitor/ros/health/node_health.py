@@ -1,4 +1,4 @@
-"""How the node itself does, for /diagnostics: can it keep up, what got lost on the way, is it recording."""
+"""Status of the node itself for /diagnostics: load, message loss, recording."""
 
 import math
 from collections.abc import Iterable, Iterator
@@ -13,22 +13,22 @@ from leg_wear_monitor.ros.inputs.inputs import InputTopic
 from leg_wear_monitor.ros.inputs.publishers import misfit, several
 from leg_wear_monitor.ros.outputs.black_box import BlackBox
 
-# From here on, the topics that have a message a sample are left out, so that the monitor can catch up.
+# Above this delay, topics with one message per sample are not published, so that the monitor can catch up.
 COARSE_FROM_S = 0.25
 
 
 @attrs.define
 class Load:
-    """How the node keeps up.
+    """Load of the node.
 
     Attributes
     ----------
     delay_s, worst_delay_s : float
-        For how long the oldest message has waited, now and at worst since it was last told.
+        Waiting time of the oldest message: present, and maximum since the last report [s].
     unpublished : int
-        Samples whose torque and forces were left out to catch up.
+        Samples whose torque and forces were not published in order to catch up.
     shed_told : int
-        Messages shed until it was last told.
+        Messages shed up to the last report.
     """
 
     delay_s: float = 0.0
@@ -37,13 +37,13 @@ class Load:
     shed_told: int = 0
 
     def note(self, delay_s: float) -> bool:
-        """Note a delay; whether it is too long to publish every sample."""
+        """Record a delay; return whether it is too long to publish every sample."""
         self.delay_s, self.worst_delay_s = delay_s, max(self.worst_delay_s, delay_s)
         return delay_s > COARSE_FROM_S
 
 
 def load_status(load: Load, inbox: Inbox) -> Status:
-    """How the node keeps up, and begin anew."""
+    """Status of the load; starts a new reporting interval."""
     shed = inbox.shed - load.shed_told
     level, message = Level.OK, "keeps up"
     if shed:
@@ -62,15 +62,15 @@ def load_status(load: Load, inbox: Inbox) -> Status:
 
 
 def topics_status(topics: Iterable[InputTopic], now_ns: int, started_ns: int) -> Status:
-    """The input topics: who publishes them, and what is wrong with that.
+    """Status of the input topics: their publishers and faults.
 
-    The monitor below has no clock and does not see that nothing comes; here is one.
+    The monitor core has no clock and cannot detect missing messages, so the node does.
 
     Parameters
     ----------
     topics : iterable of InputTopic
     now_ns, started_ns : int
-        By a clock that only goes forward.
+        Present time and start time on a monotonic clock [ns].
     """
     messages, values, level = [], {}, Level.OK
     for topic in topics:
@@ -86,7 +86,7 @@ def topics_status(topics: Iterable[InputTopic], now_ns: int, started_ns: int) ->
 
 
 def _faults(topic: InputTopic, silent_s: float, running_s: float) -> Iterator[tuple[Level, str]]:
-    """What is wrong with a topic."""
+    """Faults of a topic with their levels."""
     if other := misfit(topic.publishers, topic.stream.type):
         yield Level.ERROR, other
     elif topic.incompatible:
@@ -107,7 +107,7 @@ def _faults(topic: InputTopic, silent_s: float, running_s: float) -> Iterator[tu
 
 
 def recording_status(black_box: BlackBox) -> Status:
-    """Whether it is recorded."""
+    """Status of the recording."""
     values = {"recorded_messages": float(black_box.recorded)}
     if black_box.fault:
         return Status("recording", Level.ERROR, f"stopped: {black_box.fault}", values)

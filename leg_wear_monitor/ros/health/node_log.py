@@ -1,4 +1,4 @@
-"""What goes to the node's log, each once: alarms that rise and fall, statuses that become a fault."""
+"""Log of the node: alarm changes and new faults, each logged once."""
 
 import math
 from collections.abc import Iterable
@@ -9,12 +9,12 @@ from leg_wear_monitor.monitor.alarms.alarm import Alarm, Level
 from leg_wear_monitor.monitor.reports import AlarmList, Status
 from leg_wear_monitor.ros.health.silence import utc
 
-# Of these statuses the log tells; the others follow from alarms, which it tells of anyway.
+# Statuses that are logged; the others follow from alarms, which are logged already.
 STATUSES = ("topics", "load", "recording", "ledger", "clock")
 
 
 def _write(logger: RcutilsLogger, level: Level, text: str) -> None:
-    # not by name: rclpy refuses a call at one place that changes its severity
+    # separate calls: rclpy rejects one call site that changes its severity
     if level is Level.ERROR:
         logger.error(text)
     elif level is Level.WARN:
@@ -24,7 +24,7 @@ def _write(logger: RcutilsLogger, level: Level, text: str) -> None:
 
 
 class AlarmLog:
-    """Writes a line for each alarm whose present level changes.
+    """Logs a line for each alarm whose present level changes.
 
     Parameters
     ----------
@@ -36,7 +36,7 @@ class AlarmLog:
         self._present: dict[str, Level] = {}
 
     def note(self, alarms: AlarmList) -> None:
-        """Take a list of all alarms as they stand."""
+        """Log the changes in a list of the present state of all alarms."""
         for alarm in alarms.alarms:
             before = self._present.get(alarm.name, Level.OK)
             if alarm.present is not before:
@@ -45,7 +45,7 @@ class AlarmLog:
 
 
 def line_of(alarm: Alarm, before: Level, stamp_ns: int) -> str:
-    """An alarm's rise or fall in a line: name, levels, value, limit, time."""
+    """Log line for an alarm's change of level: name, levels, value, limit, time."""
     unit = f" {alarm.unit}" if alarm.unit else ""
     verb = "rises" if alarm.present > before else "falls"
     latched = ", shown until it is acknowledged" if alarm.level > alarm.present else ""
@@ -58,7 +58,7 @@ def line_of(alarm: Alarm, before: Level, stamp_ns: int) -> str:
 
 
 class StatusLog:
-    """Writes a line when a status becomes a fault, becomes another one, or is over.
+    """Logs a line when a status becomes a fault, changes to another fault, or recovers.
 
     Parameters
     ----------
@@ -70,7 +70,7 @@ class StatusLog:
         self._before: dict[str, tuple[Level, str]] = {}
 
     def note(self, statuses: Iterable[Status]) -> None:
-        """Take the statuses as they are; those of `STATUSES` are looked at."""
+        """Log the changes of present statuses; only those in `STATUSES` are logged."""
         for status in statuses:
             if status.name not in STATUSES:
                 continue

@@ -1,6 +1,6 @@
-"""Since when no sample comes that can be used: only the node has a clock to see it by.
+"""Detection of silent inputs (no usable samples), which only the node can do because it has a clock.
 
-Messages that come and cannot be used are silence, too: the leg is not monitored.
+Unusable messages count as silence, because the leg is not monitored.
 """
 
 import math
@@ -14,27 +14,27 @@ from leg_wear_monitor.monitor.reports import Status
 from leg_wear_monitor.twin.kinds import CRANK, KINDS
 
 SILENT_FROM_S = 1.0
-NOTHING_FROM_S = 10.0  # after the start; a leg may be switched on after its monitor
+NOTHING_FROM_S = 10.0  # grace period after the start; a leg may be switched on after its monitor
 
-# what of a status is a rate or a speed of samples that come no more
+# status values that are rates or speeds, and their values during silence
 _NOW = {
     "cadence_rpm": math.nan,
     **{f"{kind.name}_rate_hz": 0.0 for kind in KINDS.values()},
 }
-# of the node itself, or of faults: what they say still holds
+# statuses of the node itself or of faults; they remain valid during silence
 _KEPT = ("input", "alarms", "ledger", "load", "topics", "recording", "clock")
 _NOTHING_WRONG = "in order"
 
 
 def utc(time_ns: int) -> str:
-    """A time as people write it, such as 2026-11-21T22:13:05.250Z."""
+    """A time in ISO 8601 format, such as 2026-11-21T22:13:05.250Z."""
     time = datetime.fromtimestamp(time_ns / 1e9, UTC).isoformat(timespec="milliseconds")
     return time.replace("+00:00", "Z")
 
 
 @attrs.define
 class _Kind:
-    """Samples of a kind: how many were used, and when that last grew, by both clocks."""
+    """Number of used samples of a kind, and time of its last increase on both clocks."""
 
     steady_ns: int
     wall_ns: int
@@ -42,14 +42,14 @@ class _Kind:
 
 
 class Silence:
-    """Knows since when samples of a kind have not come.
+    """Measures how long samples of each kind have been missing.
 
     Parameters
     ----------
     kinds : iterable of str
-        Names of those that have samples of their own.
+        Names of the kinds that have samples of their own.
     steady_ns, wall_ns : int
-        Now, by a clock that only goes forward, and by the one that people read.
+        Present time on a monotonic clock and on the wall clock [ns].
     """
 
     def __init__(self, kinds: Iterable[str], steady_ns: int, wall_ns: int) -> None:
@@ -57,34 +57,34 @@ class Silence:
 
     @property
     def kinds(self) -> tuple[str, ...]:
-        """The kinds that are waited for."""
+        """The expected kinds."""
         return tuple(self._kinds)
 
     def note(self, used: Mapping[str, int], steady_ns: int, wall_ns: int) -> None:
-        """Take down how many samples of each kind were used so far."""
+        """Record the number of samples of each kind used so far."""
         for name, kind in self._kinds.items():
             if used[name] != kind.used:
                 kind.used, kind.steady_ns, kind.wall_ns = used[name], steady_ns, wall_ns
 
     def silent_s(self, name: str, steady_ns: int) -> float:
-        """For how long none of a kind came [s], since the start if none ever did; 0 if none is awaited."""
+        """Time since the last used sample of a kind, or since the start [s]; 0 if none is expected."""
         kind = self._kinds.get(name)
         return 0.0 if kind is None else (steady_ns - kind.steady_ns) * 1.0e-9
 
     def level(self, name: str, steady_ns: int) -> Level:
-        """How bad that is: ERROR for a silence; a warning for the first seconds after the start."""
+        """Level of the silence: ERROR; WARN before the first sample during the seconds after the start."""
         kind, silent_s = self._kinds.get(name), self.silent_s(name, steady_ns)
         if kind is None or (kind.used and silent_s <= SILENT_FROM_S):
             return Level.OK
         return Level.ERROR if kind.used or silent_s >= NOTHING_FROM_S else Level.WARN
 
     def since(self, name: str) -> str:
-        """Since when, in words."""
+        """Start of the silence as text."""
         kind = self._kinds[name]
         return f"since {utc(kind.wall_ns)}" if kind.used else f"since the start at {utc(kind.wall_ns)}"
 
     def marked(self, statuses: Iterable[Status], steady_ns: int) -> tuple[Status, ...]:
-        """Statuses, each with what it has no current data of: without the crank, all of them."""
+        """Mark statuses without current data; if the crank is silent, this concerns every status."""
         silent = {name: level for name in self._kinds if (level := self.level(name, steady_ns)) > Level.OK}
         crank = KINDS[CRANK].name
         marked = []

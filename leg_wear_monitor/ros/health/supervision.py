@@ -1,4 +1,4 @@
-"""What only the node can see: silence, publishers, names, its clock; for statuses, alarms and the log."""
+"""Checks that need the node (silence, publishers, joint names, clock), for statuses, alarms and the log."""
 
 import time
 from collections.abc import Iterable, Sequence
@@ -25,13 +25,13 @@ from leg_wear_monitor.twin.sample import Samples
 if TYPE_CHECKING:
     from leg_wear_monitor.monitor.wear_monitor import WearMonitor
 
-# A publisher that was killed stays in the graph until its lease runs out, 20 s by default: two of one name
-# may be one that was started again.
+# A killed publisher stays in the graph until its lease expires (20 s by default): two publishers of one name
+# may be one that was restarted.
 _SAME_NAME_S = 30.0
 
 
 class Supervision:
-    """Watches what comes to a node and what goes out.
+    """Supervises the inputs and outputs of a node.
 
     Parameters
     ----------
@@ -53,26 +53,26 @@ class Supervision:
 
     @property
     def is_current(self) -> bool:
-        """Whether crank samples come that can be used."""
+        """Whether usable crank samples are arriving."""
         return self._silence.level(KINDS[CRANK].name, time.monotonic_ns()) is Level.OK
 
     def note(self, arrivals: Sequence[Arrival], samples: Samples) -> None:
-        """Take down messages that were followed, and their samples."""
+        """Record processed messages and their samples."""
         self._names.note(arrivals, samples)
         self._silence.note(self._monitor.used, time.monotonic_ns(), time.time_ns())
 
     def alarms(self, alarms: AlarmList) -> AlarmList:
-        """The monitor's alarms with those of the node; the log is told of what rose and fell."""
+        """Merge the monitor's alarms with those of the node, and log the changes."""
         shown = self._alarms.beside(alarms)
         self._alarm_log.note(shown)
         return shown
 
     def acknowledge(self) -> tuple[tuple[Alarm, ...], tuple[Alarm, ...]]:
-        """Acknowledge the node's own alarms: those that were cleared and those that stay."""
+        """Acknowledge the node's own alarms; return the cleared ones and the remaining ones."""
         return self._alarms.acknowledge()
 
     def check(self) -> bool:
-        """Look at topics and graph; whether the node's alarms have changed."""
+        """Check topics and graph; return whether the node's alarms have changed."""
         now_ns, lack = time.monotonic_ns(), self._names.some_lack_it
         without = self._names.told()
         values: dict[str, float] = {}
@@ -81,7 +81,7 @@ class Supervision:
             is_crank = topic.stream.kind == CRANK
             if is_crank:
                 topic.without_crank = without
-            # joints of one robot may come from several nodes: then messages lack the crank
+            # several nodes may publish joints of one robot; then some messages lack the crank
             topic.sources = 1 if is_crank and lack else self._sources(topic, now_ns)
             values[sources_alarm(KINDS[topic.stream.kind].name).name] = float(topic.sources)
         for kind in self._silence.kinds:
@@ -90,7 +90,7 @@ class Supervision:
         return self._alarms.evaluate(values, time.time_ns())
 
     def statuses(self, statuses: Iterable[Status]) -> tuple[Status, ...]:
-        """Statuses with those of topics and clock, each with what it has no current data of."""
+        """Add the statuses of topics and clock, and mark statuses without current data."""
         now_ns, ros_ns = time.monotonic_ns(), self._node.get_clock().now().nanoseconds
         is_simulated = bool(self._node.get_parameter("use_sim_time").value)
         topics = topics_status(self.inputs, now_ns, self._started_ns)
@@ -98,13 +98,13 @@ class Supervision:
             topic.lost_told = topic.lost
         clock = self._clock.status(ros_ns, now_ns, is_simulated)
         given = {status.name: status for status in statuses}
-        # what is given of the clock was logged where it was found
+        # the given clock status has already been logged at its source
         self._status_log.note((*(one for name, one in given.items() if name != clock.name), topics, clock))
         given[clock.name] = both_clocks(given[clock.name], clock) if clock.name in given else clock
         return self._silence.marked((*given.values(), topics), now_ns)
 
     def _sources(self, topic: InputTopic, now_ns: int) -> int:
-        """How many publishers a topic has for certain."""
+        """Number of publishers that a topic certainly has."""
         names = topic.publishers.fitting
         if len(names) < 2:
             self._several_since.pop(topic.name, None)

@@ -1,1 +1,1 @@
-"""Subscriptions: topics, publishers, names, the inbox."""
+"""Inputs of the node: subscriptions, publishers, joint names, inbox."""

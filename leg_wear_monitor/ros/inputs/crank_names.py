@@ -1,4 +1,4 @@
-"""Whether messages name the crank, and which joints they name where they do not."""
+"""Check that messages contain the crank joint; otherwise report the joints they contain."""
 
 from collections.abc import Sequence
 
@@ -14,7 +14,7 @@ _MOST_NAMES, _MOST_LETTERS, _MOST_BYTES = 12, 40, 100_000
 
 
 class CrankNames:
-    """Looks for the crank's name in messages.
+    """Searches messages for the name of the crank joint.
 
     Parameters
     ----------
@@ -27,7 +27,7 @@ class CrankNames:
         self._example, self._told = b"", ""
 
     def note(self, arrivals: Sequence[Arrival], samples: Samples) -> None:
-        """Take messages, and the samples that were made of them."""
+        """Record messages and the samples decoded from them."""
         missing = np.flatnonzero(samples["fault"] == MISSING_JOINT)
         self._unnamed += len(missing)
         if len(missing):
@@ -41,7 +41,7 @@ class CrankNames:
         return self._unnamed > 0
 
     def told(self) -> str:
-        """That no message names the crank, and what they name instead; empty once one has named it."""
+        """Report that no message names the crank, and which joints they name; empty if one names it."""
         unnamed, named, raw = self._unnamed, self._named, self._example
         self._named = self._unnamed = 0
         if named:
@@ -53,7 +53,7 @@ class CrankNames:
 
 
 def _names_in(raw: bytes) -> str:
-    """Names of a message in order, as text that a terminal can take."""
+    """Joint names of a message in order, as printable text."""
     if len(raw) > _MOST_BYTES:
         return "too many to name"
     names = sorted(set(deserialize_message(raw, JointState).name))

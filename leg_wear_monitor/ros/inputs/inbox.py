@@ -1,4 +1,4 @@
-"""What has arrived and waits for the monitor: cheap to add to, and never more than it can hold."""
+"""Bounded queue of received messages that wait for the monitor; adding a message is cheap."""
 
 import itertools
 from typing import NamedTuple
@@ -9,14 +9,14 @@ from leg_wear_monitor.messages.cdr import MESSAGE
 from leg_wear_monitor.messages.decode import Decoder
 from leg_wear_monitor.twin.sample import Samples
 
-# A message of seven joints has some 300 bytes; one of a hundred thousand has 2.5 MB, and what is taken at
-# once is copied for decoding.
+# A message of seven joints has about 300 bytes, one of a hundred thousand joints 2.5 MB; messages taken
+# together are copied for decoding.
 HELD_BYTES = 64 * 2**20
 TAKEN_BYTES = 8 * 2**20
 
 
 class Arrival(NamedTuple):
-    """A message as it came: its stream's code, when it came [ns], its bytes."""
+    """A received message: stream code, time of arrival [ns], serialized bytes."""
 
     kind: int
     log_time_ns: int
@@ -30,14 +30,14 @@ class Inbox:
     ----------
     decoder : Decoder
     limit : int
-        Messages it holds; where one more comes, the older half is shed, so that what remains is one piece.
+        Maximum number of messages. On overflow the older half is shed, so that the rest has no gaps.
     limit_bytes : int
-        Bytes it holds, likewise; a message of more is shed itself.
+        Maximum number of bytes, likewise; a larger single message is itself shed.
 
     Attributes
     ----------
     received, shed : int
-        Messages since the start.
+        Numbers of messages since the start.
     """
 
     def __init__(self, decoder: Decoder, limit: int, limit_bytes: int = HELD_BYTES) -> None:
@@ -51,10 +51,10 @@ class Inbox:
         return len(self._waiting)
 
     def add(self, kind: int, raw: bytes, now_ns: int) -> None:
-        """Take in a message.
+        """Add a message.
 
-        No two have one log time, and none is before another: a recording, read in the order of log time,
-        has then the order of arrival.
+        Log times strictly increase. A recording that is read in the order of log time thus keeps the order
+        of arrival.
         """
         self._last_ns = max(now_ns, self._last_ns + 1)
         self.received += 1
@@ -72,11 +72,11 @@ class Inbox:
         self.shed += number
 
     def delay_s(self, now_ns: int) -> float:
-        """For how long the oldest message has waited [s]."""
+        """Waiting time of the oldest message [s]."""
         return max(0, now_ns - self._waiting[0].log_time_ns) * 1.0e-9 if self._waiting else 0.0
 
     def take(self, most: int, most_bytes: int = TAKEN_BYTES) -> list[Arrival]:
-        """The oldest messages, at most so many, and no more bytes unless the first alone has more."""
+        """Remove and return the oldest messages within both limits; the first one may exceed `most_bytes`."""
         ends = itertools.accumulate(len(one.raw) for one in self._waiting[:most])
         number = max(1, sum(1 for end in ends if end <= most_bytes))
         taken, self._waiting = self._waiting[:number], self._waiting[number:]
@@ -84,7 +84,7 @@ class Inbox:
         return taken
 
     def decoded(self, arrivals: list[Arrival]) -> Samples:
-        """Samples of messages, in their order."""
+        """Decode messages to samples in the same order."""
         messages = np.zeros(len(arrivals), MESSAGE)
         messages["type"] = [arrival.kind for arrival in arrivals]
         messages["log_time_ns"] = messages["publish_time_ns"] = [one.log_time_ns for one in arrivals]

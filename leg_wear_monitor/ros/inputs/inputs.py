@@ -1,4 +1,4 @@
-"""The monitor's subscriptions: bytes as they come, and what the middleware says of them."""
+"""Subscriptions of the monitor: serialized messages, and the middleware's events about them."""
 
 from collections.abc import Callable
 from typing import Any
@@ -20,28 +20,27 @@ DEPTH = 200
 
 @attrs.define
 class InputTopic:
-    """A subscription, and what went wrong with it.
+    """A subscription and its faults.
 
     Attributes
     ----------
     name : str
         Full name of the topic.
     stream : Stream
-        What is expected on it.
+        Expected stream.
     heard_ns, heard_wall_ns : int
-        When its last message came, by a clock that only goes forward and by the one that people read;
-        0 before the first.
+        Arrival time of the last message on a monotonic clock and on the wall clock [ns]; 0 before the first.
     lost, lost_told : int
-        Messages that were sent and did not come through, as the middleware says; and how many of them had
-        been reported before.
+        Messages lost in transport according to the middleware, and how many of them have already been
+        reported.
     incompatible : str
-        What of a publisher's quality of service or type does not fit; empty if nothing.
+        Incompatibility of a publisher's quality of service or type; empty if there is none.
     publishers : Publishers
-        As the graph last had them.
+        Publishers at the last query of the graph.
     sources : int
-        How many of them certainly send what this topic is for; 1 while that is not known.
+        Number of publishers that certainly send the expected data; 1 while this is unknown.
     without_crank : str
-        What is known of messages in which the crank is missing; empty if it is in all of them.
+        Report on messages without the crank; empty if there are none.
     """
 
     name: str
@@ -59,7 +58,7 @@ class InputTopic:
 def subscribe(
     node: Node, config: MonitorConfig, take: Callable[[InputTopic, bytes], None]
 ) -> list[tuple[InputTopic, Subscription]]:
-    """Subscribe to what the configuration asks for; best effort hears reliable publishers, too."""
+    """Subscribe to the configured inputs; best effort, which is compatible with reliable publishers."""
     return [_subscribe(node, stream, take) for stream in streams_read(config.drive_torque.source)]
 
 
@@ -85,7 +84,7 @@ def _subscribe(
         message_lost=lost,
     )
 
-    def come(raw: Any) -> None:  # bytes, for `raw` says so; rclpy's types do not know
+    def come(raw: Any) -> None:  # bytes, because of `raw`; rclpy's type hints omit this
         take(topic, raw)
 
     subscription = node.create_subscription(

@@ -1,4 +1,4 @@
-"""Who publishes an input: nodes by their names, those of another type, several of one crank."""
+"""Publishers of an input: node names, publishers of another type, several publishers of one crank."""
 
 from collections.abc import Iterable
 
@@ -10,14 +10,14 @@ _UNKNOWN = ("", "_NODE_NAME_UNKNOWN_", "_CREATED_BY_BARE_DDS_APP_")
 
 @attrs.frozen
 class Publishers:
-    """Publishers of a topic as the graph has them.
+    """Publishers of a topic according to the ROS graph.
 
     Attributes
     ----------
     fitting : tuple of str
-        Full names of the nodes whose messages are of the expected type.
+        Full names of the nodes that publish the expected type.
     other : tuple of (str, str)
-        Full names of the others, and their types.
+        Full names of the other nodes, and their message types.
     """
 
     fitting: tuple[str, ...] = ()
@@ -25,15 +25,15 @@ class Publishers:
 
 
 def publishers_of(node: Node, topic: str, expected: str) -> Publishers:
-    """Publishers of a topic; the middleware's event of another type comes from few of them.
+    """Publishers of a topic, from the graph: few middlewares raise an event for an incompatible type.
 
     Parameters
     ----------
     node : rclpy.node.Node
     topic : str
-        Full name.
+        Full name of the topic.
     expected : str
-        Type, such as ``sensor_msgs/msg/JointState``.
+        Expected type, such as ``sensor_msgs/msg/JointState``.
     """
     found = [(_full_name(one), one.topic_type) for one in node.get_publishers_info_by_topic(topic)]
     return Publishers(
@@ -48,13 +48,13 @@ def _full_name(info: object) -> str:
 
 
 def misfit(publishers: Publishers, expected: str) -> str:
-    """What is wrong with publishers of another type; empty if nothing is."""
+    """Fault text for publishers of another type; empty if there are none."""
     told = _listed(f"{name} publishes {kind}" for name, kind in publishers.other)
     return f"{told}, expected {expected}; nothing comes from it" if told else ""
 
 
 def several(publishers: Publishers) -> str:
-    """That there are several publishers; empty if there are not."""
+    """Fault text for several publishers; empty if there is at most one."""
     number = len(publishers.fitting)
     return f"{number} publishers: {_listed(publishers.fitting)}" if number > 1 else ""
 

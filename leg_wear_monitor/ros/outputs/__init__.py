@@ -1,1 +1,1 @@
-"""Publishers, markers, the recording of the node."""
+"""Outputs of the node: publishers, markers, recording."""

@@ -1,4 +1,4 @@
-"""What the node receives and publishes, as bytes, in an MCAP file: a replay of it is the live run."""
+"""MCAP recording of all messages the node receives and publishes; its replay reproduces the live run."""
 
 from contextlib import suppress
 from typing import TYPE_CHECKING
@@ -14,24 +14,24 @@ if TYPE_CHECKING:
 
 
 class BlackBox:
-    """A recording, or none: without a path, and after the disk has failed, it keeps nothing.
+    """Optional recording: without a path, or after a disk failure, nothing is recorded.
 
     Parameters
     ----------
     path : str
-        MCAP file; none if empty.
+        MCAP file; empty disables the recording.
 
     Attributes
     ----------
     fault : str
-        Why it stopped; empty if it did not.
+        Why the recording stopped; empty if it did not.
     recorded : int
-        Messages.
+        Number of recorded messages.
 
     Raises
     ------
     LegWearError
-        If the file cannot be begun.
+        If the file cannot be created.
     """
 
     def __init__(self, path: str) -> None:
@@ -41,16 +41,16 @@ class BlackBox:
 
     @property
     def on(self) -> bool:
-        """Whether anything is kept."""
+        """Whether messages are recorded."""
         return self._writer is not None
 
     def add_topic(self, topic: str, kind: str, qos: "Qos") -> None:
-        """Make a topic known by its full name and type."""
+        """Register a topic by its full name and type."""
         if self._writer is not None:
             self._channels[topic] = self._writer.channel(topic, kind, qos)
 
     def write(self, topic: str, log_time_ns: int, raw: bytes) -> None:
-        """Keep a message."""
+        """Record a message."""
         if self._writer is None:
             return
         try:
@@ -60,7 +60,7 @@ class BlackBox:
             self._fail(error)
 
     def write_many(self, topic: str, log_time_ns: int, rows: NDArray[np.uint8]) -> None:
-        """Keep messages of one length, (n, bytes)."""
+        """Record messages of equal length, (n, bytes)."""
         if self._writer is None:
             return
         try:
@@ -71,7 +71,7 @@ class BlackBox:
             self._fail(error)
 
     def flush(self) -> None:
-        """Put it on the disk."""
+        """Write buffered messages to the disk."""
         if self._writer is not None:
             try:
                 self._writer.flush()
@@ -79,7 +79,7 @@ class BlackBox:
                 self._fail(error)
 
     def close(self) -> None:
-        """End the file in order."""
+        """Finish the file."""
         if self._writer is not None:
             try:
                 self._writer.close()
@@ -88,10 +88,10 @@ class BlackBox:
             self._writer = None
 
     def _fail(self, error: LegWearError) -> None:
-        """Go on without: what is on the disk stays readable, and the monitor must not end with the disk."""
+        """Stop recording: written data stay readable, and a disk failure must not stop the monitor."""
         self.fault, writer, self._writer = str(error), self._writer, None
         if writer is not None:
-            with suppress(LegWearError):  # said already
+            with suppress(LegWearError):  # already reported
                 writer.close()
 
 

@@ -1,4 +1,4 @@
-"""The leg for RViz and Foxglove: its bodies, and its clearance joints in the colour of their alarms."""
+"""Markers of the leg for RViz and Foxglove: bodies, and clearance joints in the colour of their alarms."""
 
 from collections.abc import Callable
 
@@ -19,20 +19,20 @@ from leg_wear_monitor.monitor.wear_monitor import WearMonitor
 
 PERIOD_S = 0.1
 
-_STEPS = 180  # of a turn; between them the nearest one is drawn
+_STEPS = 180  # positions per turn; the nearest one is drawn
 _NO_DATA = (0.55, 0.55, 0.55)
 _COLOURS = {Level.OK: (0.2, 0.7, 0.3), Level.WARN: (0.95, 0.7, 0.1), Level.ERROR: (0.85, 0.15, 0.15)}
 _LINE_M, _JOINT_M = 0.006, 0.03
 
 
 class LegMarkers:
-    """Markers of an ideal leg, for its clearances are too small to be seen.
+    """Markers of the ideal leg, because the clearances are too small to be visible.
 
     Parameters
     ----------
     mechanism : Mechanism
     frame_id : str
-        The pelvis.
+        Frame of the pelvis.
     """
 
     def __init__(self, mechanism: Mechanism, frame_id: str) -> None:
@@ -47,7 +47,7 @@ class LegMarkers:
         self._joints = {name: (mechanism.sides(name)[0], name) for name in mechanism.clearance_joints}
 
     def at(self, crank_angle: float, levels: dict[str, Level] | None, stamp: Time) -> MarkerArray:
-        """The leg at a crank angle [rad], its joints by their levels; grey where there are none."""
+        """The leg at a crank angle [rad], with joints coloured by alarm level; grey without levels."""
         i = round(crank_angle / TURN * _STEPS) % _STEPS
         header = Header(stamp=stamp, frame_id=self._frame_id)
         bodies = Marker(header=header, ns="bodies", type=Marker.LINE_LIST, color=_colour((0.6, 0.6, 0.65)))
@@ -59,7 +59,7 @@ class LegMarkers:
         )
 
     def _lines(self, i: int) -> list[Point]:
-        """From each body's first point to its others, as pairs."""
+        """Lines from each body's first point to its other points, as pairs of points."""
         first: dict[str, Point] = {}
         pairs: list[Point] = []
         for (body, _), positions in self._points.items():
@@ -79,14 +79,14 @@ class LegMarkers:
 
 
 class MarkerTopic:
-    """``~/markers``, ten times a second while the parameter wants it and somebody listens.
+    """``~/markers``, published at 10 Hz while its parameter is on and the topic has a subscriber.
 
     Parameters
     ----------
     node : rclpy.node.Node
     monitor : WearMonitor
     is_current : callable
-        Whether there is data now; if not, joints are grey.
+        Returns whether there are current data; otherwise joints are grey.
     """
 
     def __init__(self, node: Node, monitor: WearMonitor, is_current: Callable[[], bool]) -> None:
@@ -97,7 +97,7 @@ class MarkerTopic:
         node.create_timer(PERIOD_S, self._publish)
 
     def note(self, samples: SampleReports) -> None:
-        """Remember where the crank is."""
+        """Store the crank angle."""
         followed = np.flatnonzero(np.isfinite(samples.crank_angle_rad))
         if len(followed):
             self._crank_angle = float(samples.crank_angle_rad[followed[-1]])

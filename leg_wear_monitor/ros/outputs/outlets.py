@@ -1,4 +1,4 @@
-"""The monitor's topics: raw bytes to whoever listens, and into the black box."""
+"""Output topics of the monitor: serialized messages are published and recorded."""
 
 from collections.abc import Iterable
 
@@ -27,7 +27,7 @@ _KINDS = {
 
 
 def qos_profile(qos: Qos) -> QoSProfile:
-    """Profile of rclpy for one of ours."""
+    """Convert to a quality-of-service profile of rclpy."""
     return QoSProfile(
         depth=qos.depth,
         reliability=ReliabilityPolicy[qos.reliability.upper()],
@@ -50,7 +50,7 @@ class Outlets:
         self._topics: dict[Output, str] = {}
         self._publishers: dict[Output, Publisher] = {}
         for output in outputs:
-            # what does not begin with a slash lies in the node's namespace, and may be remapped
+            # names without a leading slash are in the node's namespace; names may be remapped
             self._publishers[output] = publisher = node.create_publisher(
                 _KINDS[output.type],
                 output.name,
@@ -61,7 +61,7 @@ class Outlets:
             black_box.add_topic(publisher.topic_name, output.type, output.qos)
 
     def wanted(self, output: Output) -> bool:
-        """Whether anyone listens, now or later, or it is recorded."""
+        """Whether a message is needed: for a subscriber, for a late one (latched), or for the recording."""
         if self._black_box.on or output.qos.durability != VOLATILE:
             return True
         with until_down(self._context):
@@ -69,13 +69,13 @@ class Outlets:
         return False
 
     def send(self, output: Output, now_ns: int, raw: bytes) -> None:
-        """Publish and keep a message; only keep it where the context is down already."""
+        """Record and publish a message; only record it after the context has shut down."""
         self._black_box.write(self._topics[output], now_ns, raw)
         with until_down(self._context):
             self._publishers[output].publish(raw)
 
     def send_many(self, output: Output, now_ns: int, rows: NDArray[np.uint8]) -> None:
-        """Publish and keep messages of one length, (n, bytes)."""
+        """Record and publish messages of equal length, (n, bytes)."""
         self._black_box.write_many(self._topics[output], now_ns, rows)
         publish = self._publishers[output].publish
         with until_down(self._context):

@@ -1,1 +1,1 @@
-"""ROS parameters from declared ones."""
+"""ROS parameters, generated from configuration classes."""

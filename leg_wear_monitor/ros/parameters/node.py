@@ -1,4 +1,4 @@
-"""A node whose parameters can be given, dumped, edited and loaded again, empty lists among them."""
+"""A node whose parameters, including empty lists, can be set, dumped, edited and loaded again."""
 
 import re
 from typing import Any
@@ -17,27 +17,27 @@ _ARRAYS = (
 
 
 _CLOCK = "use_sim_time"
-_NO_DOT = re.compile(r"[+-]?\d+e[+-]?\d+")  # to YAML 1.1 a text, to Python what 0.000001 is printed as
+_NO_DOT = re.compile(r"[+-]?\d+e[+-]?\d+")  # YAML 1.1 reads it as text; Python prints 0.000001 like this
 
 
 class ParameterNode(Node):
-    """A node that takes what ``ros2 param`` sends for what the parameter is declared as.
+    """A node that converts values sent by ``ros2 param`` to the declared parameter type.
 
-    An empty list has no type in YAML: rcl gives it as a parameter that is not set, ``ros2 param`` sends it as
-    an array of booleans. rclpy raises for the first and refuses the second. ``ros2 param load`` sends 1e-06
-    as text.
+    An empty list has no type in YAML: rcl passes it as an unset parameter, ``ros2 param`` sends it as a
+    boolean array. rclpy raises an exception for the first and rejects the second. ``ros2 param load`` sends
+    1e-06 as text.
     """
 
     @property
     def given(self) -> dict[str, Any]:
-        """What the node was given by files, arguments and its maker, by name; unknown names too."""
+        """Parameter overrides by name, from files, arguments and the constructor; includes unknown names."""
         return {name: plain(one) for name, one in self._parameter_overrides.items()}
 
     def set_parameters_atomically(self, parameter_list: list[Parameter]) -> SetParametersResult:
         """Set parameters, all or none.
 
-        Read-only ones may be set to what they are, so that a dump loads. The clock is kept, too: what is
-        counted and audited by one clock must not go on by another.
+        Read-only parameters may be set to their present value, so that a dump can be loaded. The clock cannot
+        be changed either: accounting and audit must not continue with another clock.
         """
         wanted = [self._typed(one) for one in parameter_list]
         changes = [one for one in wanted if not self._stands(one)]
@@ -49,7 +49,7 @@ class ParameterNode(Node):
         return super().set_parameters_atomically(changes)
 
     def _typed(self, one: Parameter) -> Parameter:
-        """The parameter, with the type that is declared where the sender could not know better."""
+        """The parameter, converted to the declared type where the sender could not know that type."""
         if not self.has_parameter(one.name):
             return one
         declared = Parameter.Type(self.describe_parameter(one.name).type)
@@ -60,7 +60,7 @@ class ParameterNode(Node):
         return one
 
     def _stands(self, one: Parameter) -> bool:
-        """Whether a parameter cannot be changed, and has this value."""
+        """Whether a parameter is read-only and already has this value."""
         if not self.has_parameter(one.name):
             return False
         if not self.describe_parameter(one.name).read_only and one.name != _CLOCK:
@@ -70,7 +70,7 @@ class ParameterNode(Node):
 
 
 def plain(parameter: Parameter) -> Any:
-    """Value as a file would hold it; ROS gives arrays of several kinds, and an empty list as not set."""
+    """Value as in a parameter file; ROS uses several array types, and passes an empty list as unset."""
     value = parameter.value
     if parameter.type_ is Parameter.Type.NOT_SET:
         return []

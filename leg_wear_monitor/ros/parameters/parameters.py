@@ -1,4 +1,4 @@
-"""A node's parameters from the class that declares them: read, refused, described, changed."""
+"""Parameters of a node from a configuration class: reading, validation, description, changes."""
 
 from collections.abc import Callable, Mapping
 from typing import Any, Generic, TypeVar
@@ -18,32 +18,32 @@ from leg_wear_monitor.ros.parameters.node import ParameterNode, plain
 
 Config = TypeVar("Config")
 
-# what every node has, and rclpy itself looks after
+# parameters of every node, handled by rclpy itself
 _OF_ROS = ("use_sim_time", "start_type_description_service", "qos_overrides.")
 
 
 class Parameters(Generic[Config]):
     """Parameters of a node.
 
-    Unknown names that the node was given are refused; rclpy would ignore them.
+    Unknown parameter names are rejected; rclpy would ignore them.
 
     Parameters
     ----------
     node : ParameterNode
     kind : type
-        Class of sections, such as ``MonitorConfig``.
+        Configuration class, such as ``MonitorConfig``.
     empty : mapping of str to str, optional
-        What parameters are set to whose text is not given or empty.
+        Values of text parameters that are missing or empty, by name.
 
     Attributes
     ----------
     config
-        An instance of ``kind``, as it stands now.
+        Present configuration, an instance of ``kind``.
 
     Raises
     ------
     ConfigError
-        Naming node, parameter, value, unit and what was expected.
+        If a value is invalid; the message names node, parameter, value, unit and expectation.
     """
 
     def __init__(
@@ -62,14 +62,14 @@ class Parameters(Generic[Config]):
         changed_to: Callable[[Config], None],
         check_fit: Callable[[Config], None] = lambda _: None,
     ) -> None:
-        """Let parameters change while the node runs, and tell of each change that was accepted.
+        """Allow parameter changes while the node runs, and report each accepted change.
 
         Parameters
         ----------
         node : ParameterNode
         changed_to : callable
         check_fit : callable, optional
-            Raises ConfigError for values that are good by themselves but do not fit the rest.
+            Raises ConfigError for values that are valid on their own but inconsistent with the node's state.
         """
 
         def check(parameters: list[RosParameter]) -> SetParametersResult:
@@ -100,7 +100,7 @@ def _declare(node: ParameterNode, parameter: Parameter, value: Any) -> None:
         read_only=parameter.read_only,
     )
     if isinstance(value, tuple) and not value:
-        # rclpy takes an empty array for one of bytes; unset it would break every answer that it is in
+        # rclpy treats an empty array as one of bytes; an unset parameter breaks every reply that contains it
         kind = RosParameter.Type[parameter.type.upper()]
         node.declare_parameter(parameter.name, kind, ParameterDescriptor(), ignore_override=True)
         node.set_parameters_atomically([RosParameter(parameter.name, kind, [])])

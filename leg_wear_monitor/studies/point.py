@@ -1,4 +1,4 @@
-"""One point of a study: what is computed, from what, and the key under which its result is kept."""
+"""One point of a study: its task, its settings, and the key under which its result is stored."""
 
 import hashlib
 import json
@@ -14,7 +14,7 @@ from leg_wear_monitor.mechanism.spec import Mechanism
 Arrays = dict[str, np.ndarray[Any, Any]]
 Settings = dict[str, Any]
 
-# what a result depends on; of studies only what computes
+# sources that a result depends on; from `studies`, only the tasks
 _ROOMS = ("configuration", "mechanism", "contact", "wear", "dynamics", "life", "studies/tasks")
 
 
@@ -25,13 +25,13 @@ class Point:
     Attributes
     ----------
     label : str
-        Its name in figures and tables; the result does not depend on it.
+        Name of the point in figures and tables; the result does not depend on it.
     task : str
-        What is computed, a key of `leg_wear_monitor.studies.tasks.compute.TASKS`.
+        Computation, a key of `leg_wear_monitor.studies.tasks.compute.TASKS`.
     settings : dict
-        Plain values, seed included.
+        Plain values, including the seed.
     cost : float
-        Roughly how long it takes, as cycles of one clearance joint.
+        Approximate cost, in cycles of one clearance joint.
     """
 
     label: str
@@ -40,7 +40,7 @@ class Point:
     cost: float = 1.0
 
     def key(self, mechanism: Mechanism) -> str:
-        """Digest of all that the result depends on: task, settings, mechanism and code."""
+        """Digest of everything the result depends on: task, settings, mechanism and code."""
         plain = json.dumps([self.task, self.settings], sort_keys=True, allow_nan=False)
         leg = repr(attrs.evolve(mechanism, source=""))
         return hashlib.sha256("\n".join((plain, leg, code_digest())).encode()).hexdigest()[:20]
@@ -48,7 +48,7 @@ class Point:
 
 @cache
 def code_digest() -> str:
-    """Digest of the sources that results come from: the physics, and the tasks of studies."""
+    """Digest of the sources that produce results: the physics, and the tasks of studies."""
     home = Path(__file__).parents[1]
     sources = [source for room in _ROOMS for source in (home / room).rglob("*.py")]
     digest = hashlib.sha256()

@@ -1,4 +1,4 @@
-"""What an ensemble says in numbers: means with their spread, and how sets of joints compare."""
+"""Statistics of an ensemble: means with their spread, and comparisons between sets of joints."""
 
 import math
 from typing import NamedTuple
@@ -10,7 +10,7 @@ from leg_wear_monitor.mechanism.arrays import Floats
 from leg_wear_monitor.studies.point import Arrays
 from leg_wear_monitor.wear.surfaces import BUSHING, wear_zone
 
-RANGES = {  # largest errors, and the ideal curve whose range they are held against
+RANGES = {  # largest errors, and the ideal curve whose range they are compared with
     "toe_position_m": "ideal_toe_position_m",
     "toe_velocity_mps": "ideal_toe_velocity_mps",
     "toe_acceleration_mps2": "ideal_toe_acceleration_mps2",
@@ -35,12 +35,12 @@ def spread(values: ArrayLike) -> Spread:
 
 
 def largest_error(arrays: Arrays, name: str) -> Spread:
-    """Largest error in a cycle, over the cycles of all runs; a name of `RANGES`."""
+    """Spread of the largest error per cycle, over the cycles of all runs; `name` is a key of `RANGES`."""
     return spread(arrays[f"error_{name}"])
 
 
 def fraction_of_range(arrays: Arrays, name: str) -> float:
-    """Mean largest error in a cycle over the range of the ideal curve, the larger one of x and y."""
+    """Mean largest error per cycle divided by the range of the ideal curve (larger one of x and y)."""
     ideal = arrays[RANGES[name]]
     return largest_error(arrays, name).mean / float(np.ptp(ideal, axis=0).max())
 
@@ -51,7 +51,7 @@ def clearance_joints_of(arrays: Arrays) -> list[str]:
 
 
 def peak_force(arrays: Arrays, joint: str) -> Spread:
-    """Largest force of a joint in a cycle, over the cycles of all runs."""
+    """Spread of the largest force of a joint per cycle, over the cycles of all runs."""
     return spread(arrays["peak_force_n"][..., [str(name) for name in arrays["joints"]].index(joint)])
 
 
@@ -61,26 +61,26 @@ def joint_force(arrays: Arrays, name: str, joint: str) -> Spread:
 
 
 def of_clearance_joints(arrays: Arrays, name: str, joint: str) -> Spread:
-    """An array whose last axis are the clearance joints, for one of them, over the rest."""
+    """Spread of an array for one clearance joint (index of the last axis), over all other axes."""
     return spread(arrays[name][..., clearance_joints_of(arrays).index(joint)])
 
 
 def depth_per_cycle(arrays: Arrays, joint: str) -> Spread:
-    """Greatest depth that a cycle wears off the bushing [m], over runs."""
+    """Spread of the greatest bushing wear depth per cycle [m], over runs."""
     return spread(
         arrays["wear_depth_m_per_cycle"][:, clearance_joints_of(arrays).index(joint), BUSHING].max(axis=1)
     )
 
 
 def mean_profile(arrays: Arrays, joint: str, surface: int = BUSHING) -> Floats:
-    """Mean wear of a cycle (N,) [m] of a joint's bushing or journal."""
+    """Mean wear depth per cycle (N,) [m] of a joint's bushing or journal."""
     return np.asarray(
         arrays["wear_depth_m_per_cycle"][:, clearance_joints_of(arrays).index(joint), surface].mean(axis=0)
     )
 
 
 def worst_zone(arrays: Arrays, joint: str, fraction: float = 0.9) -> tuple[float, float] | None:
-    """Narrowest zone [deg] with a fraction of the bushing's mean wear; None without wear."""
+    """Narrowest zone [deg] that contains a fraction of the bushing's mean wear; None without wear."""
     return wear_zone(mean_profile(arrays, joint), fraction)
 
 

@@ -1,4 +1,4 @@
-"""Points on a Dask cluster: the same points and results; a lost worker loses what it was at, no more."""
+"""Computation of points on a Dask cluster. If a worker dies, only the points it was computing are lost."""
 
 from collections.abc import Sequence
 
@@ -6,7 +6,7 @@ from leg_wear_monitor.errors import ConfigError, LegWearError
 from leg_wear_monitor.studies.execution.processes import TRIES, Done, Job
 from leg_wear_monitor.studies.tasks.compute import compute
 
-PATIENCE_S = 10.0  # for a scheduler to answer
+PATIENCE_S = 10.0  # timeout for the scheduler's answer
 
 
 def run_on_cluster(jobs: Sequence[Job], address: str, done: Done) -> None:
@@ -16,16 +16,16 @@ def run_on_cluster(jobs: Sequence[Job], address: str, done: Done) -> None:
     ----------
     jobs : sequence of Job
     address : str
-        Of the scheduler, such as ``tcp://127.0.0.1:8786``.
+        Address of the scheduler, such as ``tcp://127.0.0.1:8786``.
     done : callable
-        Called in this process with each job and its result, in the order in which they end.
+        Called in this process with each job and its result, in order of completion.
 
     Raises
     ------
     ConfigError
-        If dask.distributed is not installed, or nobody answers.
+        If dask.distributed is not installed, or the scheduler does not answer.
     LegWearError
-        When workers keep dying over a point.
+        If workers die repeatedly while computing a point.
     """
     try:
         from distributed import Client, as_completed

@@ -1,4 +1,4 @@
-"""Points on this machine's cores, in processes of one thread; one that dies costs what was at work then."""
+"""Computation of points in local single-thread processes; if one dies, only points in progress are lost."""
 
 import os
 import signal
@@ -18,7 +18,7 @@ from leg_wear_monitor.studies.tasks.compute import compute
 if TYPE_CHECKING:
     from loky import ProcessPoolExecutor
 
-TRIES = 3  # of a point whose worker dies
+TRIES = 3  # attempts per point if its worker dies
 
 _THREADS = ("OMP_NUM_THREADS", "OPENBLAS_NUM_THREADS", "MKL_NUM_THREADS", "NUMBA_NUM_THREADS")
 
@@ -51,14 +51,14 @@ def run_in_processes(jobs: Sequence[Job], workers: int, done: Done) -> None:
     jobs : sequence of Job
     workers : int
     done : callable
-        Called in this process with each job and its result, in the order in which they end.
+        Called in this process with each job and its result, in order of completion.
 
     Raises
     ------
     ConfigError
         If loky is not installed.
     LegWearError
-        When workers keep dying.
+        If workers die repeatedly.
     """
     open_jobs = {job.key: job for job in sorted(jobs, key=lambda job: -job.cost)}
     for _ in range(TRIES):
@@ -83,10 +83,10 @@ def _compute(job: Job) -> Arrays:
 
 @contextmanager
 def _pool(workers: int) -> Iterator["ProcessPoolExecutor"]:
-    """A pool of workers with one thread each, which does not outlive what it is used for.
+    """A pool of single-thread workers, which is shut down at the end of the context.
 
-    It is loky's: in that of Python 3.11 a worker that dies while points are still being handed in ends
-    the thread that watches the workers, or raises OSError (both seen).
+    The pool is that of loky. In the pool of Python 3.11, a worker that dies while points are being submitted
+    ends the thread that manages the workers, or raises OSError (both were observed).
     """
     try:
         from loky import ProcessPoolExecutor
@@ -117,7 +117,7 @@ def _environment(changes: dict[str, str]) -> Iterator[None]:
 
 
 def _begin_worker() -> None:
-    """An interrupt is for the parent to answer; without a parent there is nothing to work for."""
+    """Set up a worker: it ignores interrupts, which the parent handles, and ends with its parent."""
     signal.signal(signal.SIGINT, signal.SIG_IGN)
     parent = parent_process()
     if parent is not None:

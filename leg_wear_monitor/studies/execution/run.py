@@ -1,4 +1,4 @@
-"""A study run: points that are not there yet are computed and kept, each as soon as it is there."""
+"""Execution of a study: missing points are computed, and each result is stored immediately."""
 
 import warnings
 from collections.abc import Callable
@@ -31,7 +31,7 @@ def run_study(
     scheduler: str | None = None,
     progress: Callable[[float], None] | None = None,
 ) -> int:
-    """Compute all points of a study that its directory does not hold yet.
+    """Compute all points of a study whose results are not yet in its directory.
 
     Parameters
     ----------
@@ -39,29 +39,29 @@ def run_study(
         A key of `leg_wear_monitor.studies.plan.settings.STUDIES`.
     settings : Study
     out : pathlib.Path
-        Its directory; points that are there for this mechanism, settings and code are kept, if their
-        checksums hold.
+        Directory of the study. Existing results for this mechanism, settings and code are reused if their
+        checksums are correct.
     workers : int
-        Processes on this machine; 1 for this one alone. Results do not depend on it.
+        Number of local processes; 1 uses this process only. Results do not depend on it.
     scheduler : str, optional
-        Address of a Dask scheduler whose workers do it instead.
+        Address of a Dask scheduler whose workers compute the points instead.
     progress : callable, optional
-        Called with the fraction of the work that is done.
+        Called with the completed fraction of the work, 0 to 1.
 
     Returns
     -------
     int
-        How many points were computed.
+        Number of computed points.
 
     Raises
     ------
     ConfigError, AssemblyError
-        For values that cannot be, before anything is computed.
+        For invalid values, before any point is computed.
 
     Warns
     -----
     ConfigWarning
-        For each point that is there but was altered, exchanged or damaged; it is computed again.
+        For each existing result that was altered, exchanged or damaged; it is computed again.
     """
     mechanism, points = load_mechanism(settings.mechanism), settings.points()
     check_points(mechanism, [point.settings for point in points])
@@ -94,7 +94,7 @@ def run_study(
 
 
 def _is_kept(directory: StudyDirectory, job: Job) -> bool:
-    """Whether the directory holds a point's result; warns of one that cannot be taken for it."""
+    """Whether the directory contains a valid result of a point; warns about an invalid one."""
     if not directory.has(job.key):
         return False
     try:
@@ -106,7 +106,7 @@ def _is_kept(directory: StudyDirectory, job: Job) -> bool:
 
 
 def versions() -> dict[str, str]:
-    """What results come from: this package, its code, and the libraries that compute."""
+    """Versions that results depend on: this package, its code digest, and the numerical libraries."""
     package = ElementTree.parse(share_directory() / "package.xml").findtext("version") or "unknown"
     libraries = {library: metadata.version(library) for library in _LIBRARIES}
     return {"leg_wear_monitor": package, "code": code_digest(), **libraries}
@@ -127,7 +127,7 @@ def _manifest(
 
 
 def _text(mechanism: str) -> str:
-    """Text of a mechanism's file."""
+    """Text of a mechanism file."""
     path = Path(mechanism) if is_file_name(Path(mechanism)) else shipped_mechanisms()[mechanism]
     try:
         return path.read_text(encoding="utf-8")

@@ -1,4 +1,4 @@
-"""Keys that several studies have, and what they can be."""
+"""Settings that several studies share, and their validation."""
 
 from collections.abc import Callable
 from itertools import pairwise
@@ -11,28 +11,28 @@ MOST = 1_000_000
 
 
 def check_rising(values: tuple[float, ...]) -> str | None:
-    """What is wrong with values that do not rise."""
+    """Error text if values do not increase."""
     if values and all(a < b for a, b in pairwise(values)):
         return None
     return f"{list(values)} does not rise from value to value"
 
 
 def check_joints(names: Names) -> str | None:
-    """What is wrong with a list of joints."""
+    """Error text for an invalid list of joints."""
     if names and len(set(names)) == len(names):
         return None
     return f"{list(names)} is not a list of at least one joint, each once"
 
 
 def check_sets(sets: tuple[Names, ...]) -> str | None:
-    """What is wrong with a list of lists of joints."""
+    """Error text for an invalid list of lists of joints."""
     if not sets:
         return "is empty, expected at least one list of joints"
     return next((fault for fault in map(check_joints, sets) if fault), None)
 
 
 def some_of(known: Names) -> Callable[[Names], str | None]:
-    """Check of names that are some of those known."""
+    """Validator that accepts only known names."""
 
     def check(names: Names) -> str | None:
         strange = [name for name in names if name not in known]
@@ -42,7 +42,7 @@ def some_of(known: Names) -> Callable[[Names], str | None]:
 
 
 def count_field(doc: str, least: int, default: int) -> Any:
-    """A whole number."""
+    """An integer."""
     return quantity("", doc, at_least=least, at_most=MOST, default=default)
 
 
@@ -54,7 +54,7 @@ def clearance_field() -> Any:
 
 
 def clearances_field() -> Any:
-    """Clearances, one a point."""
+    """Clearances, one per point."""
     return quantity(
         "m", "radial clearances of the clearance joints", at_least=1.0e-6, at_most=0.1, check=check_rising
     )
@@ -66,7 +66,7 @@ def speed_field() -> Any:
 
 
 def speeds_field() -> Any:
-    """Speeds, one a point."""
+    """Speeds, one per point."""
     return quantity("rpm", "speeds of the crank", at_least=0.1, at_most=10_000.0, check=check_rising)
 
 

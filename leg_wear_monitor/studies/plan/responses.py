@@ -1,4 +1,4 @@
-"""Points of studies: what is run where, and about how long it takes."""
+"""Points of studies: settings of the runs, and their estimated cost."""
 
 import math
 from collections.abc import Sequence
@@ -9,8 +9,8 @@ import attrs
 from leg_wear_monitor.studies.plan.study import Ensemble
 from leg_wear_monitor.studies.point import Point, Settings
 
-_EACH_JOINT = 0.7  # cost of a further clearance joint, in that of the first
-_MOMENTS = 20.0  # cost of observing a cycle, in that of a cycle of one clearance joint
+_EACH_JOINT = 0.7  # cost of each further clearance joint, relative to the first
+_MOMENTS = 20.0  # cost of observing a cycle, relative to a cycle of one clearance joint
 
 
 def set_name(clearance_joints: Sequence[str]) -> str:
@@ -24,7 +24,7 @@ def millimetres(clearance_m: float) -> str:
 
 
 def place(clearance_joints: Sequence[str], clearance_m: float, speed_rpm: float, **more: Any) -> Settings:
-    """Settings of a run: which joints have what clearance at what speed."""
+    """Settings of a run: clearance joints, clearance and speed."""
     return {
         "clearance_joints": list(clearance_joints),
         "clearance_m": clearance_m,
@@ -34,13 +34,13 @@ def place(clearance_joints: Sequence[str], clearance_m: float, speed_rpm: float,
 
 
 def cycle_cost(where: Settings) -> float:
-    """Cost of a gait cycle at a place, in that of one clearance joint at 60 rpm."""
+    """Cost of a gait cycle with given settings, relative to one clearance joint at 60 rpm."""
     joints = len(where["clearance_joints"])
     return (1.0 + _EACH_JOINT * (joints - 1)) * math.sqrt(60.0 / where["speed_rpm"])
 
 
 def response(label: str, where: Settings, ensemble: Ensemble) -> Point:
-    """Point of the response at a place."""
+    """Response point for given run settings."""
     cycles = ensemble.cycles + ensemble.skip_cycles
     each = cycles * cycle_cost(where) + _MOMENTS * ensemble.traced_cycles
     settings = where | attrs.asdict(ensemble)

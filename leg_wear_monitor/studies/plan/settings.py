@@ -40,12 +40,12 @@ def load_settings(name: str, path: str | Path | None = None) -> Study:
     name : str
         A key of `STUDIES`.
     path : str or pathlib.Path, optional
-        The one that comes with the package if not given.
+        File of the description; default: the one shipped with the package.
 
     Raises
     ------
     ConfigError
-        Naming file, key, value, unit and what was expected.
+        If a value is invalid; the message names file, key, value, unit and expectation.
     """
     if name not in STUDIES:
         raise ConfigError("study", "", f"{name!r} is not one of {', '.join(STUDIES)}")
@@ -55,6 +55,6 @@ def load_settings(name: str, path: str | Path | None = None) -> Study:
 
 
 def parse_settings(name: str, document: Any, source: str) -> Study:
-    """Types from the plain mapping that a study's file holds; see `load_settings`."""
+    """Convert the plain mapping of a study's file to typed settings; see `load_settings`."""
     settings: Study = structure(document, STUDIES[name], source, "")
     return settings

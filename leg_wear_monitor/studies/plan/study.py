@@ -1,4 +1,4 @@
-"""What every study has: its question, its settings, its points."""
+"""Base classes of studies: question, settings, points."""
 
 from collections.abc import Callable
 from typing import ClassVar
@@ -41,7 +41,7 @@ class Sweep:
     Attributes
     ----------
     quantity : str
-        In sentences and tables.
+        Name of the quantity in sentences and tables.
     axis : str
         Label of the axis, with unit.
     value : callable
@@ -74,5 +74,5 @@ class Study:
     ensemble: Ensemble = described("the runs of each point", factory=Ensemble)
 
     def points(self) -> list[Point]:
-        """Points to compute, in the order in which they are shown; two may be one and the same."""
+        """Points to compute, in display order; duplicates are allowed."""
         raise NotImplementedError

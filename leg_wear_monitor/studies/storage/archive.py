@@ -1,4 +1,4 @@
-"""The file of one point: its arrays, and what they are the result of, under one checksum."""
+"""File of one point: result arrays and their origin, protected by one checksum."""
 
 import io
 import json
@@ -14,7 +14,7 @@ from leg_wear_monitor.studies.point import Arrays
 from leg_wear_monitor.studies.storage.checksum import canonical, result_checksum
 
 _ABOUT = "about"
-_MOST_BYTES = 2**29  # uncompressed; a small archive can claim any size
+_MOST_BYTES = 2**29  # limit of the uncompressed size; a small archive can declare any size
 
 _UNREADABLE = (
     ArithmeticError, EOFError, KeyError, MemoryError, OSError, RuntimeError, TypeError, ValueError,
@@ -23,13 +23,13 @@ _UNREADABLE = (
 
 
 def archive(arrays: Arrays, about: dict[str, Any]) -> bytes:
-    """Content of the file.
+    """Serialize a result to the content of its file.
 
     Parameters
     ----------
     arrays : dict of arrays
     about : dict
-        Plain: the point's key, task and settings, and versions.
+        Plain values: the point's key, task and settings, and versions.
     """
     buffer = io.BytesIO()
     text = np.array(canonical({**about, "checksum": result_checksum(about, arrays)}))
@@ -38,18 +38,18 @@ def archive(arrays: Arrays, about: dict[str, Any]) -> bytes:
 
 
 def read_archive(path: Path, key: str, task: str, settings: dict[str, Any]) -> Arrays:
-    """Arrays in the file of a point.
+    """Read the arrays in the file of a point.
 
     Parameters
     ----------
     path : pathlib.Path
     key, task, settings
-        Of the point that it must be the result of.
+        Key, task and settings of the expected point.
 
     Raises
     ------
     ConfigError
-        If it cannot be read, was altered, or is the result of another point.
+        If the file is unreadable, was altered, or is the result of another point.
     """
     source = str(path)
     try:

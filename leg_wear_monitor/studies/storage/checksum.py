@@ -1,4 +1,4 @@
-"""Checksums that bind a stored result to what it is the result of."""
+"""Checksums that bind a stored result to its origin."""
 
 import hashlib
 import json
@@ -10,12 +10,12 @@ from leg_wear_monitor.studies.point import Arrays
 
 
 def canonical(value: Any) -> str:
-    """JSON of plain values, the same for equal ones."""
+    """Canonical JSON of plain values: equal values give equal text."""
     return json.dumps(value, sort_keys=True, allow_nan=False)
 
 
 def text_checksum(*texts: str) -> str:
-    """SHA-256 over texts, each for itself."""
+    """SHA-256 over a sequence of texts, with their boundaries."""
     digest = hashlib.sha256()
     for text in texts:
         raw = text.encode()
@@ -24,12 +24,12 @@ def text_checksum(*texts: str) -> str:
 
 
 def result_checksum(about: dict[str, Any], arrays: Arrays) -> str:
-    """SHA-256 over a result and all that it is said to be the result of.
+    """SHA-256 over a result and its declared origin.
 
     Parameters
     ----------
     about : dict
-        Plain: the point's key, task and settings, and versions.
+        Plain values: the point's key, task and settings, and versions.
     arrays : dict of arrays
     """
     digest = hashlib.sha256(text_checksum(canonical(about)).encode())

@@ -1,7 +1,7 @@
-"""A study's directory: what was asked, and the result of every point, each file written whole or not at all.
+"""Directory of a study: its settings, and the result of each point; every file is written atomically.
 
 study.json       name, settings, points with their keys, versions; a checksum of these and of the leg
-mechanism.yaml   the leg, as its file was
+mechanism.yaml   copy of the leg's mechanism file
 points/KEY.npz   arrays of a point; its settings, seed, versions and a checksum are in them as ``about``, JSON
 """
 
@@ -41,12 +41,12 @@ class StudyDirectory:
         self.path = path
 
     def open(self, manifest: dict[str, Any], mechanism_text: str) -> None:
-        """Make the directory, or take up one that holds the same study, whatever its settings were.
+        """Create the directory, or open an existing one of the same study, whatever its settings were.
 
         Raises
         ------
         ConfigError
-            If it holds another study, or cannot be written.
+            If the directory contains another study, or is not writable.
         """
         if (self.path / MANIFEST).exists():
             there = read_manifest(self.path)["study"]
@@ -66,11 +66,11 @@ class StudyDirectory:
         self._write(MANIFEST, json_text(whole).encode())
 
     def has(self, key: str) -> bool:
-        """Whether the result of a point is there, whole or not."""
+        """Whether a result file of a point exists, valid or not."""
         return self._file(key).is_file()
 
     def write(self, key: str, arrays: Arrays, about: dict[str, Any]) -> None:
-        """Keep the result of a point, with its task, settings and versions."""
+        """Store the result of a point, with its task, settings and versions."""
         self._write(f"{POINTS}/{key}.npz", archive(arrays, {"key": key, **about}))
 
     def read(self, key: str, task: str, settings: dict[str, Any]) -> Arrays:
@@ -79,7 +79,7 @@ class StudyDirectory:
         Raises
         ------
         ConfigError
-            If it is not there, damaged, altered, or of another point.
+            If the result is missing, damaged, altered, or of another point.
         """
         return read_archive(self._file(key), key, task, settings)
 
@@ -87,7 +87,7 @@ class StudyDirectory:
         return self.path / POINTS / f"{key}.npz"
 
     def _write(self, name: str, content: bytes) -> None:
-        """Beside it first, then in its place: whoever looks sees all of it or nothing."""
+        """Write to a temporary file and rename it, so that readers see the whole file or none."""
         target = self.path / name
         part = target.with_name(f".{target.name}.{os.getpid()}.part")
         try:
@@ -103,12 +103,12 @@ class StudyDirectory:
 
 
 def read_manifest(path: Path) -> dict[str, Any]:
-    """What ``study.json`` in a directory says.
+    """Read ``study.json`` in a directory.
 
     Raises
     ------
     ConfigError
-        If it is not one of ours, or if it or the mechanism beside it was altered.
+        If it is not a manifest of this package, or if it or the mechanism file was altered.
     """
     source, text = path / MANIFEST, _text(path / MECHANISM)
     try:
@@ -120,7 +120,7 @@ def read_manifest(path: Path) -> dict[str, Any]:
     checksum = manifest.pop("checksum", None)
     try:
         is_whole = checksum == text_checksum(canonical(manifest), text)
-    except (ValueError, RecursionError):  # a number or a text that JSON has not
+    except (ValueError, RecursionError):  # a number or a text that JSON cannot represent
         is_whole = False
     if not is_whole:
         altered = f"it or {MECHANISM} beside it was altered (the checksum differs); {_REMOVE}"
@@ -140,7 +140,7 @@ def _text(path: Path) -> str:
 
 
 def _is_study(manifest: dict[str, Any]) -> bool:
-    """Whether all parts are there, each of its type; a key is a file's name, so it must be nothing else."""
+    """Whether all parts exist with the right type; a key is used as a file name, so its form is checked."""
     types = {"study": str, "settings": dict, "points": list, "versions": dict}
     return (
         all(isinstance(manifest.get(name), kind) for name, kind in types.items())
@@ -161,17 +161,17 @@ def _is_point(entry: dict[str, Any]) -> bool:
 
 @attrs.frozen(kw_only=True, eq=False)
 class StudyResults:
-    """A study as it lies in its directory, for figures and tables.
+    """Contents of a study's directory, for figures and tables.
 
     Attributes
     ----------
     study : str
     settings : dict
-        As `leg_wear_monitor.studies.plan.settings` has them, plain.
+        Plain form of the settings in `leg_wear_monitor.studies.plan.settings`.
     mechanism : Mechanism
     points : tuple of Point
     arrays : tuple of dict
-        The result of each point that has one, the others are empty.
+        Result of each point; empty for points without a result.
     versions : dict of str
     """
 
@@ -183,7 +183,7 @@ class StudyResults:
     versions: dict[str, str]
 
     def of(self, task: str) -> list[tuple[Point, Arrays]]:
-        """Points of a task that have a result, with it."""
+        """Points of a task that have a result, and their results."""
         pairs = zip(self.points, self.arrays, strict=True)
         return [
             (point, arrays)
@@ -209,7 +209,7 @@ def load_results(path: Path) -> StudyResults:
     Raises
     ------
     ConfigError
-        If it is not one, or a part of it was altered, exchanged or damaged.
+        If it is not a study's directory, or a part of it was altered, exchanged or damaged.
     """
     manifest, directory = read_manifest(path), StudyDirectory(path)
     source = str(path / MECHANISM)

@@ -7,8 +7,10 @@ from contextlib import contextmanager
 from pathlib import Path
 
 from leg_wear_monitor.monitor.ledger.file import LedgerError
+from leg_wear_monitor.monitor.ledger.log import ENDING
 
-_PARTS = ("", "-wal")  # SQLite keeps the last entries beside the file
+# the last entries are in the log; what SQLite left beside the file decides whether it can be used
+_PARTS = ("", ENDING, "-journal", "-wal")
 
 
 @contextmanager

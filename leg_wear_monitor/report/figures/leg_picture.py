@@ -26,7 +26,7 @@ from leg_wear_monitor.report.figures.figure import BODY_COLOURS, INK, SMALL, USU
 
 _PATH_POINTS = 360
 _TOE_EVERY, _BODIES_EVERY = 30, 60
-_NEAR_M = 1.0e-3  # joints closer than this fraction a place
+_NEAR_M = 1.0e-3  # joints closer than this share a place
 _PANEL_IN, _KEY_IN = 4.4, 1.2
 
 Paths = dict[str, dict[str, Floats]]

@@ -9,6 +9,7 @@ import numpy as np
 import pytest
 
 from leg_wear_monitor.monitor.alarms.alarm import Alarm, Level
+from leg_wear_monitor.monitor.ledger.copy import copy_of
 from leg_wear_monitor.monitor.ledger.file import LedgerError
 from leg_wear_monitor.monitor.ledger.log import read_log
 from leg_wear_monitor.monitor.ledger.recovery import WHOLE_S
@@ -55,6 +56,12 @@ def killed(open_ledger, walk):
 
 def log_of(path):
     return path.with_name(path.name + "-log")
+
+
+def test_a_copy_for_a_trial_has_the_last_entries(killed):
+    with copy_of(killed) as copy:
+        assert log_of(copy).read_bytes() == log_of(killed).read_bytes()
+        assert copy.read_bytes() == killed.read_bytes()
 
 
 def assert_is(found, entry, before):

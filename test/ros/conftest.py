@@ -45,7 +45,7 @@ PATIENCE_S = 300.0  # before a test that waits in vain is given up; compilation 
 
 # of two processes that test at a time, one takes the even domains, the other the odd ones
 _process = int(os.environ.get("PYTEST_XDIST_WORKER", "gw0")[2:])
-_domains = itertools.count(2 * (os.getpid() % 25) + _process % 2, 2)
+_domains = (domain % 100 for domain in itertools.count(2 * (os.getpid() % 25) + _process % 2, 2))
 
 
 def wait_for(there: Callable[[], bool], what: str) -> None:
@@ -148,8 +148,8 @@ class Monitor:
 class Stage:
     """A domain of its own, with monitors, legs and listeners."""
 
-    def __init__(self) -> None:
-        self.domain = next(_domains) % 100
+    def __init__(self, domain: int) -> None:
+        self.domain = domain
         self._context = Context()
         rclpy.init(args=[], context=self._context, domain_id=self.domain)
         # the level is that of the whole process: a test before may have said `--log-level fatal`
@@ -200,15 +200,28 @@ class Stage:
         self.node.destroy_node()
 
 
-def _stage() -> Iterator[Stage]:
-    stage = Stage()
+@pytest.fixture(autouse=True)
+def domain(monkeypatch: pytest.MonkeyPatch) -> int:
+    """A domain for each test: no node meets one of its name that another test left, half made, say."""
+    number = next(_domains)
+    monkeypatch.setenv("ROS_DOMAIN_ID", str(number))
+    return number
+
+
+@pytest.fixture
+def stage(domain: int) -> Iterator[Stage]:
+    """A stage for one test."""
+    stage = Stage(domain)
     yield stage
     stage.close()
 
 
-# for one test, and for all tests of a module
-stage = pytest.fixture(_stage, name="stage")
-shared_stage = pytest.fixture(_stage, name="shared_stage", scope="module")
+@pytest.fixture(scope="module")
+def shared_stage() -> Iterator[Stage]:
+    """A stage for all tests of a module."""
+    stage = Stage(next(_domains))
+    yield stage
+    stage.close()
 
 
 @pytest.fixture(scope="session")

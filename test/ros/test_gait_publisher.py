@@ -40,7 +40,7 @@ def test_a_walk_is_published_as_it_was_walked(stage, tmp_path: Path, precompute:
     cranks = stage.listen("/joint_states", JointState, matched=False)
     torques = stage.listen("/drive_torque", Float64, matched=False)
     context = rclpy.Context()
-    rclpy.init(args=["--ros-args", "--log-level", "error"], context=context, domain_id=stage.domain)
+    rclpy.init(args=["--ros-args", "--log-level", "error"], context=context)
     overrides = [Parameter(name, value=value) for name, value in parameters.items()]
     node = GaitPublisher(context=context, parameter_overrides=overrides)
     walking = threading.Thread(target=node.walk)

@@ -19,8 +19,7 @@ def started(verb: str, log: Path, *arguments: str) -> "subprocess.Popen[bytes]":
         return subprocess.Popen(command, stdout=stream, stderr=subprocess.STDOUT)
 
 
-def test_sigterm_ends_both_nodes_in_order(stage, tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setenv("ROS_DOMAIN_ID", str(stage.domain))
+def test_sigterm_ends_both_nodes_in_order(stage, tmp_path: Path) -> None:
     ledger, truth = tmp_path / "wear.db", tmp_path / "truth.json"
     logs = {"monitor": tmp_path / "monitor.log", "gait-publisher": tmp_path / "leg.log"}
     nodes = [
@@ -60,9 +59,8 @@ sys.exit(run(make, lambda *_: None, sys.argv))
 
 
 def test_a_signal_between_the_making_and_the_serving_of_a_node_leaves_an_ordered_ledger(
-    stage, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+    tmp_path: Path,
 ) -> None:
-    monkeypatch.setenv("ROS_DOMAIN_ID", str(stage.domain))
     ledger = tmp_path / "wear.db"
     command = [sys.executable, "-c", STOPPED_THERE, "--ros-args", "-p", f"ledger.path:={ledger}"]
     assert subprocess.run(command, check=False, capture_output=True).returncode == 0
@@ -71,10 +69,7 @@ def test_a_signal_between_the_making_and_the_serving_of_a_node_leaves_an_ordered
     db.close()
 
 
-def test_a_monitor_stopped_while_it_gets_ready_leaves_an_ordered_ledger(
-    stage, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
-) -> None:
-    monkeypatch.setenv("ROS_DOMAIN_ID", str(stage.domain))
+def test_a_monitor_stopped_while_it_gets_ready_leaves_an_ordered_ledger(stage, tmp_path: Path) -> None:
     ledger, log = tmp_path / "wear.db", tmp_path / "monitor.log"
     node = started("monitor", log, "-p", f"ledger.path:={ledger}")
     try:
@@ -90,9 +85,7 @@ def test_a_monitor_stopped_while_it_gets_ready_leaves_an_ordered_ledger(
 
 
 @pytest.mark.parametrize("name", ["SIGINT", "SIGTERM"])
-def test_a_monitor_stopped_while_it_compiles_leaves_an_ordered_ledger(
-    stage, tmp_path: Path, name: str
-) -> None:
+def test_a_monitor_stopped_while_it_compiles_leaves_an_ordered_ledger(tmp_path: Path, name: str) -> None:
     """In a callback of LLVM, where Python prints an exception and goes on: the node went on, too."""
     ledger = tmp_path / "wear.db"
     code = (
@@ -106,9 +99,7 @@ def test_a_monitor_stopped_while_it_compiles_leaves_an_ordered_ledger(
         "sys.setprofile(on_call)\n"
         "monitor()\n"
     )
-    environment = {
-        **os.environ, "ROS_DOMAIN_ID": str(stage.domain), "NUMBA_CACHE_DIR": str(tmp_path / "cache")
-    }  # fmt: skip
+    environment = {**os.environ, "NUMBA_CACHE_DIR": str(tmp_path / "cache")}
     line = [sys.executable, "-c", code]
     done = subprocess.run(line, env=environment, capture_output=True, text=True, check=False, timeout=300)
     assert done.returncode == 0, done.stderr
@@ -119,10 +110,9 @@ def test_a_monitor_stopped_while_it_compiles_leaves_an_ordered_ledger(
     db.close()
 
 
-def test_the_demo_tells_its_story(stage, tmp_path: Path) -> None:
-    environment = {**os.environ, "ROS_DOMAIN_ID": str(stage.domain)}
+def test_the_demo_tells_its_story(tmp_path: Path) -> None:
     command = [sys.executable, "-m", "leg_wear_monitor", "demo", "--out", str(tmp_path / "demo")]
-    done = subprocess.run(command, env=environment, capture_output=True, text=True, check=False)
+    done = subprocess.run(command, capture_output=True, text=True, check=False)
     assert done.returncode == 0, done.stdout + done.stderr
     alarm = done.stdout.index("ALARM impact_force")
     assert done.stdout.index("alarms acknowledged: cleared: impact_force", alarm) > alarm

@@ -1,0 +1,1 @@
+"""Diagnosis: the clearances that the drive torque shows, and what has changed in the leg."""

@@ -1,0 +1,89 @@
+"""What the measured drive torque shows of the clearances, compared with those that the monitor counts."""
+
+import math
+from enum import Enum
+
+import attrs
+
+
+class DiagnosisState(Enum):
+    """What the diagnosis can report; the value is the word that files contain."""
+
+    OFF = "off"
+    WAITING = "waiting"
+    AS_COUNTED = "as_counted"
+    CHANGED = "changed"
+
+
+class Cause(Enum):
+    """What explains a change of the drive torque; the value is human-readable."""
+
+    CLEARANCE = "clearance"
+    LOAD = "load at the foot"
+    FRICTION = "friction of the drive"
+    SCALE = "scale of the torque sensor"
+    LAG = "lag of the torque sensor"
+    CRANK_OFFSET = "offset of the crank encoder"
+    MASS = "mass of a body"
+    UNKNOWN = "unknown"
+
+
+@attrs.frozen(kw_only=True)
+class Change:
+    """A significant departure of the leg from the one that the monitor counts.
+
+    Attributes
+    ----------
+    cause : Cause
+    subject : str
+        The joint, or the body, concerned; empty where there is none.
+    since_ns : int
+        Stamp of the first gait cycle that belongs to the change.
+    value, sigma : float
+        Estimated value and its standard deviation: clearance [m], load [N], friction [N m], fraction of the
+        scale, lag [s], offset [rad], fraction of the mass.
+    counted : float
+        Value that the monitor supposes, in the same unit.
+    log_odds : float
+        Natural logarithm of the odds against the leg as counted.
+    runner_up : str
+        Next best explanation, human-readable; empty if there is none.
+    runner_up_log_odds : float
+        Natural logarithm of the odds against the runner-up.
+    """
+
+    cause: Cause
+    subject: str = ""
+    since_ns: int
+    value: float
+    sigma: float
+    counted: float
+    log_odds: float
+    runner_up: str = ""
+    runner_up_log_odds: float = math.inf
+
+
+@attrs.frozen(kw_only=True)
+class Diagnosis:
+    """Clearances estimated from the drive torque, and what has changed.
+
+    Attributes
+    ----------
+    state : DiagnosisState
+    reason : str
+        Why there is no estimate yet, or why it is not to be believed now; empty otherwise.
+    cycles : int
+        Gait cycles in the estimate.
+    clearance_m, sigma_m : tuple of float
+        Estimated clearance of each clearance joint and its standard deviation; NaN where it is not
+        observable.
+    changes : tuple of Change
+        Significant departures, the oldest first; empty unless the state is CHANGED.
+    """
+
+    state: DiagnosisState = DiagnosisState.OFF
+    reason: str = ""
+    cycles: int = 0
+    clearance_m: tuple[float, ...] = ()
+    sigma_m: tuple[float, ...] = ()
+    changes: tuple[Change, ...] = ()

@@ -1,1 +1,1 @@
-"""For people: figures."""
+"""HTML pages and figures of runs, studies and lives."""

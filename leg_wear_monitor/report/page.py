@@ -1,7 +1,7 @@
-"""One self-contained HTML page: sections of text, pictures, tables and sentences, and what made them.
+"""A self-contained HTML page: sections of text, pictures and tables, with the configuration and versions.
 
-A page needs no network and no other file: pictures and style are inside it, and its content security
-policy forbids the rest. It prints, it fits a phone, and every picture has a text that stands for it.
+A page needs no network and no other file: it embeds pictures, scripts and style, and its content security
+policy forbids everything else. It prints, fits a phone screen, and has an alternative text for every picture.
 """
 
 import base64
@@ -24,11 +24,11 @@ class Picture:
     image : bytes
         PNG or SVG.
     alt : str
-        What is to be seen, for those who do not see it.
+        Alternative text: describes the picture to readers who cannot see it.
     caption : str
-        Below the picture; none if empty.
+        Caption below the picture; no caption if empty.
     wide : bool
-        Whether it needs the page's width: on a phone it is then moved sideways instead of made small.
+        Whether it needs the width of the page: on a phone it then scrolls sideways instead of being shrunk.
     """
 
     image: bytes = attrs.field(repr=False)
@@ -39,14 +39,14 @@ class Picture:
 
     @property
     def address(self) -> str:
-        """The picture as a data address."""
+        """The picture as a ``data:`` URL."""
         media = "png" if self.image.startswith(b"\x89PNG") else "svg+xml"
         return f"data:image/{media};base64,{base64.b64encode(self.image).decode()}"
 
 
 @attrs.frozen(kw_only=True)
 class Gallery:
-    """Pictures of one kind side by side, as many in a row as there is room for; one caption for all."""
+    """Pictures of one kind side by side, as many in a row as fit, with a common caption."""
 
     pictures: Sequence[Picture]
     caption: str = ""
@@ -55,16 +55,22 @@ class Gallery:
 
 @attrs.frozen(kw_only=True)
 class Table:
-    """A table: the first column names its rows.
+    """A table; the first column contains the row names.
 
     Attributes
     ----------
     caption : str
     head : sequence of str
-        One text a column, with the unit.
+        Column titles with units.
     rows : sequence of sequences of str
+        Cells, as many per row as `head` has.
     note : str
-        Below it; none if empty.
+        Note below the table; no note if empty.
+
+    Raises
+    ------
+    ValueError
+        If a row has another number of cells than `head`.
     """
 
     caption: str
@@ -88,7 +94,7 @@ class Text:
 
 @attrs.frozen
 class Sentences:
-    """What to conclude, or another list of sentences."""
+    """A list of sentences, for instance conclusions."""
 
     sentences: Sequence[str]
     kind: str = attrs.field(default="sentences", init=False)
@@ -96,7 +102,7 @@ class Sentences:
 
 @attrs.frozen(kw_only=True)
 class Listing:
-    """Text as it stands in a file."""
+    """Preformatted text, for instance the contents of a file."""
 
     text: str
     kind: str = attrs.field(default="listing", init=False)
@@ -104,15 +110,16 @@ class Listing:
 
 @attrs.frozen(kw_only=True)
 class Live:
-    """Something that moves: markup of our own making, its data, and the script that brings it to life.
+    """An interactive element: markup with its data, and a script.
 
     Attributes
     ----------
     markup : str
-        HTML, put in as it is; its script finds it by an id of its own.
+        Trusted HTML, inserted without escaping; the script finds it by its id.
     script : str
-        JavaScript without a module or a network.
+        JavaScript that uses neither modules nor the network.
     caption : str
+        Caption below the element; no caption if empty.
     """
 
     markup: str = attrs.field(repr=False)
@@ -126,30 +133,30 @@ Part = Text | Sentences | Picture | Gallery | Table | Listing | Live
 
 @attrs.frozen
 class Section:
-    """A part of a page under a title of its own."""
+    """A titled section of a page."""
 
     title: str
     parts: Sequence[Part]
 
     @property
     def anchor(self) -> str:
-        """Where the table of contents leads."""
+        """The HTML id, to which the table of contents links."""
         return _SPACES.sub("-", self.title.lower()).strip("-")
 
 
 @attrs.frozen(kw_only=True)
 class Page:
-    """A whole page.
+    """A complete page.
 
     Attributes
     ----------
     title, summary : str
-        What it is, and what was asked, in a sentence or two.
+        Title, and a summary of one or two sentences.
     sections : sequence of Section
     configuration : str
-        The settings that it was made with, as text; none if empty.
+        The settings of the run as text; no section for them if empty.
     versions : mapping of str to str
-        Names and versions of what it was made with, seeds, and where its data came from.
+        Versions of the software, seeds and the origin of the data, by name.
     """
 
     title: str
@@ -160,20 +167,29 @@ class Page:
 
     @property
     def scripts(self) -> Iterator[str]:
-        """Each script once, in the order of the parts that need it."""
+        """The scripts of the interactive parts, each once, in the order of the parts."""
         parts = (part for section in self.sections for part in section.parts)
         return iter(dict.fromkeys(part.script for part in parts if isinstance(part, Live)))
 
 
 def render(name: str, **values: Any) -> str:
-    """Fill a template of this package; whatever is not declared safe there is escaped.
+    """Render a template of this package; values are escaped unless the template marks them as safe.
 
     Parameters
     ----------
     name : str
         File in ``report/templates``.
     **values
-        What the template asks for; asking for anything else is an error.
+        Variables of the template.
+
+    Returns
+    -------
+    str
+
+    Raises
+    ------
+    jinja2.UndefinedError
+        If the template uses a variable that is not given.
     """
     environment = jinja2.Environment(
         loader=jinja2.PackageLoader("leg_wear_monitor.report"),
@@ -187,12 +203,12 @@ def render(name: str, **values: Any) -> str:
 
 
 def page_html(page: Page) -> str:
-    """The page as one HTML text; the same page gives the same text."""
+    """The page as HTML text; equal pages give equal text."""
     return render("page.html", page=page)
 
 
 def template_text(name: str) -> str:
-    """A file of ``report/templates`` as it is: a script."""
+    """The text of a file in ``report/templates``, not rendered: a script."""
     loader = jinja2.PackageLoader("leg_wear_monitor.report")
     text: str = loader.get_source(jinja2.Environment(autoescape=True), name)[0]
     return text

@@ -1,1 +1,1 @@
-"""Figures of mechanisms, forces, wear and lives."""
+"""Figures of mechanisms, forces, wear and lives, drawn by matplotlib."""

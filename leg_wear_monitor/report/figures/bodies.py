@@ -1,4 +1,4 @@
-"""Bodies and joints of a mechanism as drawn things."""
+"""Drawing of bodies, joints, supports and springs of a mechanism."""
 
 from collections.abc import Mapping
 
@@ -18,20 +18,23 @@ _HALO = [patheffects.withStroke(linewidth=3.0, foreground=PAPER)]
 
 
 def outline(points: Points) -> Floats:
-    """Corners (n, 2) of a body's shape: its distinct points, in order around their middle."""
+    """Corners (n, 2) of a body's shape: its distinct points [m], ordered by angle around their mean."""
     corners = np.unique(np.array(list(points.values())).round(9), axis=0)
     around = corners - corners.mean(axis=0)
     return np.asarray(corners[np.argsort(np.arctan2(around[:, 1], around[:, 0]))])
 
 
 def lighter(colour: str, fraction: float) -> tuple[float, float, float]:
-    """A colour mixed with a fraction of white."""
+    """A colour (red, green, blue) mixed with a fraction of white, 0 to 1."""
     red, green, blue = (fraction + (1.0 - fraction) * part for part in to_rgb(colour))
     return red, green, blue
 
 
 def draw_body(axes: Axes, corners: Floats, colour: str, layer: float, width: float = 9.0) -> None:
-    """A plate or a bar with round ends around the corners (n, 2); width in points."""
+    """Draw a plate or a bar with round ends around the corners (n, 2) [m], a square for one corner.
+
+    ``width`` is that of the border [points].
+    """
     if len(corners) == 1:  # a slider
         axes.plot(*corners[0], marker="s", markersize=2.4 * width, color=lighter(colour, 0.55), zorder=layer)
         return
@@ -45,14 +48,14 @@ def draw_body(axes: Axes, corners: Floats, colour: str, layer: float, width: flo
 
 
 def draw_support(axes: Axes, place: Floats, away: Floats) -> None:
-    """A pivot on the ground: a triangle above or below it, on the side of ``away`` (2,)."""
+    """Draw a ground support: a triangle above or below the pivot, on the side of the vector ``away`` (2,)."""
     up = 1.6 if away[1] > 0.0 else -1.6
     triangle = [(0.0, 0.0), (-0.8, up), (0.8, up), (0.0, 0.0)]
     axes.plot(*place, marker=triangle, markersize=32.0, color=lighter(INK, 0.6), zorder=1.0, linewidth=0.0)
 
 
 def draw_spring(axes: Axes, ends: tuple[Floats, Floats], layer: float) -> None:
-    """A zigzag between two places."""
+    """Draw a spring as a zigzag between two points (2,) [m]."""
     start, end = ends
     fraction = np.array([0.0, 0.15, *np.linspace(0.2, 0.8, 11), 0.85, 1.0])
     side = np.array([0.0, 0.0, *(1.0 if i % 2 else -1.0 for i in range(11)), 0.0, 0.0])
@@ -62,7 +65,10 @@ def draw_spring(axes: Axes, ends: tuple[Floats, Floats], layer: float) -> None:
 
 
 def draw_joint(axes: Axes, place: Floats, names: Mapping[str, bool], away: Floats) -> None:
-    """Pins at one place, by name and whether they have clearance; names are on the side of ``away`` (2,)."""
+    """Draw the joints that share one place; ``names`` maps each name to whether the joint has clearance.
+
+    The names are written side by side on the side of the vector ``away`` (2,).
+    """
     axes.add_line(joint_mark(any(names.values()), place))
     dx, dy = 13.0 * away / (np.hypot(*away) or 1.0)
     wide = [6.0 * len(name) + 5.0 for name in names]
@@ -73,7 +79,7 @@ def draw_joint(axes: Axes, place: Floats, names: Mapping[str, bool], away: Float
 
 
 def write_beside(axes: Axes, place: Floats, text: str, offset: tuple[float, float], colour: str) -> None:
-    """Bold text at an offset [points] from a place."""
+    """Write bold text at an offset (2,) [points] from a place (2,) [m]."""
     axes.annotate(
         text,
         (float(place[0]), float(place[1])),
@@ -90,7 +96,7 @@ def write_beside(axes: Axes, place: Floats, text: str, offset: tuple[float, floa
 
 
 def joint_mark(clearance_joints: bool, place: Floats | tuple[float, float] = (0.0, 0.0)) -> Line2D:
-    """The mark of a joint, also for a legend."""
+    """The marker of a joint, for the picture or for its legend."""
     return Line2D(
         [place[0]],
         [place[1]],

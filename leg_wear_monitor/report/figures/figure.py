@@ -1,4 +1,4 @@
-"""How pictures look: matplotlib's objects without pyplot, colours that colour-blind people can tell apart."""
+"""Style of the figures: matplotlib without pyplot, in colours that colour-blind readers can distinguish."""
 
 import io
 
@@ -13,25 +13,25 @@ PURPLE, SKY, YELLOW = "#cc79a7", "#56b4e9", "#f0e442"
 BODY_COLOURS = (ORANGE, BLUE, GREEN, PURPLE, SKY, VERMILION, YELLOW)
 INK, PALE, PAPER = "#222222", "#d9d9d9", "#ffffff"
 
-SMALL, USUAL, LARGE = 8.0, 9.5, 12.0  # of letters, in points
+SMALL, USUAL, LARGE = 8.0, 9.5, 12.0  # font sizes in points
 
 
 def new_figure(width: float, height: float) -> Figure:
-    """An empty figure of a size in inches, drawn by Agg."""
+    """An empty figure of the given width and height [inch], with the Agg backend."""
     figure = Figure(figsize=(width, height), facecolor=PAPER, layout="constrained")
     FigureCanvasAgg(figure)
     return figure
 
 
 def png(figure: Figure, dots_per_inch: float = 100.0) -> bytes:
-    """Draw a figure; the same figure gives the same bytes with the same libraries."""
+    """The figure as PNG; with the same libraries, equal figures give equal bytes."""
     buffer = io.BytesIO()
     figure.savefig(buffer, format="png", dpi=dots_per_inch, metadata={"Software": None})
     return buffer.getvalue()
 
 
 def svg(figure: Figure) -> bytes:
-    """Draw a figure as lines, for those that stay small so; the same figure gives the same bytes, too."""
+    """The figure as SVG, for figures with few lines; equal figures give equal bytes."""
     buffer = io.BytesIO()
     with matplotlib.rc_context({"svg.hashsalt": "leg_wear_monitor"}):
         figure.savefig(buffer, format="svg", metadata={"Date": None, "Creator": None})
@@ -39,7 +39,7 @@ def svg(figure: Figure) -> bytes:
 
 
 def tidy(axes: Axes) -> None:
-    """A light frame: two sides, a pale grid below all else."""
+    """Format axes: left and bottom frame lines only, a pale grid below the data."""
     for side in ("top", "right"):
         axes.spines[side].set_visible(False)
     for side in ("left", "bottom"):

@@ -11,17 +11,21 @@ from leg_wear_monitor.mechanism.arrays import Floats
 from leg_wear_monitor.mechanism.ideal import TURN
 from leg_wear_monitor.report.figures.figure import BLUE, INK, SMALL, USUAL, VERMILION, new_figure, tidy
 
-_LEAST_N = 0.1  # of a logarithmic axis; a journal in free flight bears nothing
+_LEAST_N = 0.1  # lower end of the logarithmic axis [N]: the force of a journal in free flight is 0
 
 
 def force_traces(trace: Trace, joints: Sequence[str]) -> Figure:
-    """The trace of a simulation, one panel for the drive torque and one for each joint.
+    """Figure of a simulation's trace: a panel for the drive torque and one for each joint.
 
     Parameters
     ----------
     trace : Trace
     joints : sequence of str
-        Joints to show.
+        Joints to show, in this order.
+
+    Returns
+    -------
+    Figure
     """
     turns = trace.crank_angle_rad / TURN
     figure = new_figure(9.0, 1.1 * (1 + len(joints)) + 0.6)

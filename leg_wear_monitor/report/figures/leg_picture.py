@@ -26,7 +26,7 @@ from leg_wear_monitor.report.figures.figure import BODY_COLOURS, INK, SMALL, USU
 
 _PATH_POINTS = 360
 _TOE_EVERY, _BODIES_EVERY = 30, 60
-_NEAR_M = 1.0e-3  # joints closer than this share a place
+_NEAR_M = 1.0e-3  # joints closer than this are drawn at one place [m]
 _PANEL_IN, _KEY_IN = 4.4, 1.2
 
 Paths = dict[str, dict[str, Floats]]
@@ -35,19 +35,24 @@ Paths = dict[str, dict[str, Floats]]
 def leg_picture(
     mechanism: Mechanism, clearance_joints: Collection[str] | None = None, crank_angle_rad: float = 0.0
 ) -> Figure:
-    """The mechanism at a crank angle, and beside it through one cycle, both ideal and to one scale.
+    """Figure of the ideal mechanism at one crank angle (left) and over one gait cycle (right), to one scale.
 
     Parameters
     ----------
     mechanism : Mechanism
     clearance_joints : collection of str, optional
-        Clearance joints to mark; the mechanism's own if not given.
+        Joints to mark as clearance joints; default: ``mechanism.clearance_joints``.
     crank_angle_rad : float
+        Crank angle of the left panel [rad].
+
+    Returns
+    -------
+    Figure
 
     Raises
     ------
     AssemblyError
-        For a mechanism that does not close or cannot turn.
+        If the mechanism does not close or has a dead point.
     """
     linkage = build_linkage(mechanism)
     here = _paths(linkage, ideal_motion(linkage, [crank_angle_rad], 1.0))
@@ -79,7 +84,7 @@ def leg_picture(
 
 
 def _paths(linkage: Linkage, motion: IdealMotion) -> Paths:
-    """Every point (N, 2) of every body over the motion [m]."""
+    """Path (N, 2) [m] of every point over the motion, by body and point."""
     mechanism = linkage.mechanism
     return {
         body: {point: point_motion(motion, linkage, body, point)[0] for point in mechanism.points_of(body)}
@@ -88,7 +93,7 @@ def _paths(linkage: Linkage, motion: IdealMotion) -> Paths:
 
 
 def _extent(paths: Paths) -> tuple[Floats, Floats]:
-    """Lower left and upper right corner of all that is passed, with a margin."""
+    """Lower left and upper right corner (2,) [m] of the box around all paths, with a margin."""
     every = np.concatenate([path for body in paths.values() for path in body.values()])
     low, high = every.min(axis=0), every.max(axis=0)
     margin = 0.07 * float((high - low).max())
@@ -134,7 +139,7 @@ def _draw_still(
 
 
 def _places(mechanism: Mechanism, here: Paths) -> list[tuple[list[str], Floats]]:
-    """Names of the joints that stand at one place, and the place."""
+    """Groups of joints that share a place: their names, and the place (2,) [m]."""
     groups: list[tuple[list[str], Floats]] = []
     for name in mechanism.joints:
         place = here[mechanism.sides(name)[1]][name][0]

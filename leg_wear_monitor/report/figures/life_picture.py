@@ -1,4 +1,4 @@
-"""A leg's life as a picture: clearances, impacts and worn profiles over gait cycles."""
+"""Figure of a leg's wear life: clearances, peak forces and worn profiles over gait cycles."""
 
 import numpy as np
 from matplotlib.axes import Axes
@@ -10,7 +10,7 @@ _PROFILES = 5
 
 
 def life_picture(life: Life) -> bytes:
-    """PNG: mean (and dashed, largest) clearance, peak force, and the bushings' profiles at five times."""
+    """PNG: mean (solid) and largest (dashed) clearance, peak force, and bushing profiles at five times."""
     joints = len(life.clearance_joints)
     figure = new_figure(max(7.0, 2.2 * joints), 6.0)
     grid = figure.add_gridspec(2, 2 * joints, height_ratios=(1.2, 1.0))
@@ -30,7 +30,7 @@ def life_picture(life: Life) -> bytes:
 
 
 def _profiles(axes: Axes, life: Life, k: int, colour: str) -> None:
-    """Depth of the bushing of joint k, darker as it gets older."""
+    """Draw the wear depth of the bushing of clearance joint k over the angle, darker with age."""
     sectors = life.depth.shape[-1]
     angle = (np.arange(sectors) + 0.5) * (360.0 / sectors)
     times = np.linspace(0.0, life.cycles[-1], _PROFILES + 1)[1:]

@@ -1,4 +1,4 @@
-"""The pictures of a simulation, as files."""
+"""Figures of a simulation as PNG files."""
 
 from leg_wear_monitor.dynamics.result.simulation_result import SimulationResult
 from leg_wear_monitor.mechanism.spec import Mechanism
@@ -9,7 +9,7 @@ from leg_wear_monitor.report.figures.worn_bushings import worn_bushings
 
 
 def pictures(mechanism: Mechanism, result: SimulationResult) -> dict[str, bytes | None]:
-    """PNG files by name; None for one that this result has nothing to show in."""
+    """PNG files by file name; None for a figure that needs data which the result does not contain."""
     files: dict[str, bytes | None] = {
         "leg.png": png(leg_picture(mechanism, result.clearance_joints)),
         "wear.png": None,

@@ -1,4 +1,4 @@
-"""Forecasts against later reality, as a picture: where each measured clearance lay in what was expected."""
+"""Figure of forecast validity: the quantile of each measured clearance in its predicted distribution."""
 
 from collections.abc import Sequence
 
@@ -10,7 +10,7 @@ from leg_wear_monitor.report.figures.figure import BLUE, INK, PALE, SMALL, VERMI
 
 
 def validity_picture(measurements: Sequence[Measurement]) -> bytes:
-    """PNG: probability with which less was expected, over the gait cycles of the part; p10 to p90 shaded."""
+    """PNG: predicted probability of a smaller clearance over the part's gait cycles; p10 to p90 shaded."""
     figure = new_figure(6.0, 3.0)
     axes = figure.add_subplot()
     axes.axhspan(0.1, 0.9, color=PALE, alpha=0.6, linewidth=0.0)

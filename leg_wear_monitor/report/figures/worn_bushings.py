@@ -1,4 +1,4 @@
-"""What wear has taken off bushings and journals, joint by joint."""
+"""Figure of the worn profiles of bushings and journals, joint by joint."""
 
 import math
 
@@ -13,8 +13,8 @@ from leg_wear_monitor.report.figures.figure import BLUE, INK, PALE, SMALL, USUAL
 from leg_wear_monitor.wear.surfaces import BUSHING, JOURNAL, Surfaces, wear_zone
 
 _COLUMN_IN = 2.3
-_BUSHING, _JOURNAL, _RIM = 1.0, 0.86, 1.75  # radii as drawn, in radii of the bushing
-_DEEPEST = 0.5  # so deep is the deepest wear drawn
+_BUSHING, _JOURNAL, _RIM = 1.0, 0.86, 1.75  # drawn radii, as multiples of the bushing's radius
+_DEEPEST = 0.5  # drawn depth of the greatest wear depth, as a multiple of the bushing's radius
 _SUPERSCRIPT = str.maketrans("0123456789", "⁰¹²³⁴⁵⁶⁷⁸⁹")
 _UNITS = ((1.0e12, "pm"), (1.0e9, "nm"), (1.0e6, "µm"), (1.0e3, "mm"))
 
@@ -22,7 +22,7 @@ _UNITS = ((1.0e12, "pm"), (1.0e9, "nm"), (1.0e6, "µm"), (1.0e3, "mm"))
 def worn_bushings(
     surfaces: Surfaces, names: tuple[str, ...], radius_m: tuple[float, ...], cycles: float
 ) -> Figure:
-    """Each joint's worn surfaces, above as a section with the depth exaggerated, below as depth over angle.
+    """Figure of each joint's worn surfaces: a section with exaggerated depth, and the depth over the angle.
 
     Parameters
     ----------
@@ -30,9 +30,13 @@ def worn_bushings(
     names : tuple of str
         The joints, in the order of the surfaces.
     radius_m : tuple of float
-        Radii of their bushings, which the exaggeration is relative to.
+        Radii of their bushings [m]; the exaggeration factor refers to them.
     cycles : float
-        Gait cycles that the wear took.
+        Number of gait cycles of the run, for the title.
+
+    Returns
+    -------
+    Figure
     """
     figure = new_figure(max(2, len(names)) * _COLUMN_IN, 4.9)
     grid = figure.add_gridspec(3, len(names), height_ratios=(3.0, 2.0, 0.3))
@@ -65,12 +69,16 @@ def _draw_key(axes: Axes) -> None:
 
 
 def unit_of(greatest: float) -> tuple[float, str]:
-    """Factor and name of the unit in which a depth [m] is below a thousand."""
+    """Factor from metres, and name, of the smallest unit in which a depth [m] is below 1000."""
     return next(((scale, unit) for scale, unit in _UNITS if scale * greatest < 1000.0), _UNITS[-1])
 
 
 def draw_section(axes: Axes, depth: Floats, zone: tuple[float, float] | None, radius: float) -> str:
-    """Bushing and journal with their wear, and by what factor its depth is drawn too large."""
+    """Draw a section of bushing and journal with exaggerated wear depth (2, N) [m].
+
+    ``zone`` [deg] is marked by an arc at the rim; ``radius`` is that of the bushing [m]. Returns the
+    exaggeration factor as text, empty without wear.
+    """
     n, greatest = depth.shape[1], float(depth.max())
     angle = (np.arange(n + 1) + 0.5) * (TURN / n)
     drawn = np.concatenate([depth, depth[:, :1]], axis=1) * (_DEEPEST / greatest if greatest > 0.0 else 0.0)

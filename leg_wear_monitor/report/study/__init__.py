@@ -1,1 +1,1 @@
-"""The page of a study."""
+"""HTML pages of studies."""

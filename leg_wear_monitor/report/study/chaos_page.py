@@ -1,4 +1,4 @@
-"""The page of the chaos study."""
+"""HTML page of the chaos study."""
 
 import math
 from collections.abc import Sequence
@@ -23,15 +23,15 @@ from leg_wear_monitor.studies.summary import clearance_joints_of
 from leg_wear_monitor.studies.tasks.lyapunov import Estimate, exponent
 from leg_wear_monitor.studies.tasks.section import period_of
 
-_FORGET = 3  # cycles while the neighbour turns into the direction that grows most
-_LONGEST, _SAME = 16, 1.0e-3  # period looked for, and how near points must be to be one, in clearances
-_SURE = 3.0  # standard errors
+_FORGET = 3  # cycles left out, in which the separation turns into the fastest growing direction
+_LONGEST, _SAME = 16, 1.0e-3  # longest period searched [cycles]; tolerance for equal points [clearances]
+_SURE = 3.0  # an exponent this many standard errors away from 0 counts as non-zero
 
 _Pair = tuple[Point, Arrays]
 
 
 def chaos(results: StudyResults, labelled: Labelled) -> Sections:
-    """Sections of the chaos study."""
+    """Sections of the chaos study's page."""
     sections = results.of("section")
     whole = [pair for pair in sections if pair[0].settings["portrait_cycles"]]
     exponents = [(point.label, arrays) for point, arrays in results.of("exponent")]
@@ -63,7 +63,7 @@ def _apart(pairs: Sequence[_Pair]) -> tuple[list[Arrays], list[float]]:
 
 
 def _diagrams(results: StudyResults, pairs: Sequence[_Pair]) -> list[tuple[str, list[float], list[_Pair]]]:
-    """Axis, values and points of every diagram that has at least two points."""
+    """Axis label, parameter values and points of every bifurcation diagram with at least two points."""
     over: dict[str, Any] = results.settings["bifurcation"]
     diagrams = []
     for axis, values, key, factor in (
@@ -82,7 +82,7 @@ def _diagrams(results: StudyResults, pairs: Sequence[_Pair]) -> list[tuple[str, 
 
 
 def _foretold(label: str, estimate: Estimate) -> str:
-    """What an exponent means for foretelling."""
+    """Sentence on a Lyapunov exponent: its value, its sign, and the growth of a small error."""
     value = f"{estimate.value:.2f} ± {estimate.error:.2f} a cycle (mean and standard error)"
     if estimate.value > _SURE * estimate.error:
         thousand = math.log(1000.0) / estimate.value
@@ -98,7 +98,7 @@ def _foretold(label: str, estimate: Estimate) -> str:
 
 
 def scatter(point: Point, arrays: Arrays) -> list[float]:
-    """RMS distance of every joint's section from its mean, in clearances."""
+    """RMS distance (k,) of a Poincaré map's points from their mean, by clearance joint [clearances]."""
     e = arrays["section_eccentricity_m"] / point.settings["clearance_m"]
     return [float(value) for value in np.sqrt(np.square(e - e.mean(axis=0)).sum(axis=2).mean(axis=0))]
 
@@ -109,7 +109,7 @@ def _periods(point: Point, arrays: Arrays) -> list[int | None]:
 
 
 def _disorder(pair: _Pair) -> list[str]:
-    """How far sections scatter, and whether any repeats."""
+    """Sentence on the scatter and the periods of a Poincaré map."""
     point, arrays = pair
     joints, spread = clearance_joints_of(arrays), scatter(point, arrays)
     ranked = sorted(zip(joints, spread, strict=True), key=lambda one: one[1])
@@ -126,7 +126,7 @@ def _disorder(pair: _Pair) -> list[str]:
 
 
 def _over(axis: str, values: Sequence[float], pairs: Sequence[_Pair]) -> str:
-    """Where along a parameter the motion is calm."""
+    """Sentence on a bifurcation diagram: where the motion is periodic, least and most scattered."""
     worst = [max(scatter(point, arrays)) for point, arrays in pairs]
     repeating = [f"{value:g}" for value, pair in zip(values, pairs, strict=True) if all(_periods(*pair))]
     low, high = int(np.argmin(worst)), int(np.argmax(worst))

@@ -1,4 +1,4 @@
-"""Phase portraits, Poincaré maps, exponents and bifurcation diagrams."""
+"""Figures of phase portraits, Poincaré maps, Lyapunov exponents and bifurcation diagrams."""
 
 from collections.abc import Sequence
 
@@ -14,11 +14,11 @@ from leg_wear_monitor.studies.point import Arrays
 from leg_wear_monitor.studies.summary import clearance_joints_of
 from leg_wear_monitor.studies.tasks.lyapunov import Estimate
 
-_DENSE = 110.0  # dots an inch
+_DENSE = 110.0  # resolution of figures with many points [dots per inch]
 
 
 def portrait_gallery(section: Arrays, clearance_m: float, cycles: int) -> Gallery:
-    """Place and rate of every journal through some cycles."""
+    """Phase portraits: eccentricity and its rate of each clearance joint's journal over some cycles."""
     e, v = section["portrait_eccentricity_m"] / clearance_m, section["portrait_rate_mps"]
     caption = (
         f"Phase portraits of {cycles} cycles of one run, an example: the journal's place in its bushing "
@@ -29,7 +29,7 @@ def portrait_gallery(section: Arrays, clearance_m: float, cycles: int) -> Galler
 
 
 def section_gallery(section: Arrays, clearance_m: float, crank_angle_deg: float) -> Gallery:
-    """One point a cycle of every journal."""
+    """Poincaré maps: one point per cycle for each clearance joint."""
     e, v = section["section_eccentricity_m"] / clearance_m, section["section_rate_mps"]
     caption = (
         f"Poincaré maps: the same at crank angle {crank_angle_deg:g}° of {len(e)} cycles, one point a "
@@ -40,7 +40,7 @@ def section_gallery(section: Arrays, clearance_m: float, crank_angle_deg: float)
 
 
 def _planes(joints: Sequence[str], e: Floats, v: Floats, caption: str, what: str, style: str) -> Gallery:
-    """A picture for each joint, x and y side by side; e and v (n, k, 2)."""
+    """A picture for each joint, x and y side by side; e (n, k, 2) [clearances], v (n, k, 2) [m/s]."""
     pictures = []
     for k, joint in enumerate(joints):
         figure = new_figure(4.8, 2.5)
@@ -69,7 +69,7 @@ def _most(values: Floats) -> str:
 
 
 def exponent_gallery(labelled: Labelled, estimates: Sequence[Estimate]) -> Gallery:
-    """How the estimate settles, and the estimates side by side."""
+    """Convergence of the exponent over the cycles (left), and the exponents with error bars (right)."""
     figure = new_figure(4.6, 2.9)
     axes = figure.subplots()
     for (colour, _), (label, arrays) in zip(MARKS, labelled, strict=False):
@@ -113,7 +113,7 @@ def exponent_gallery(labelled: Labelled, estimates: Sequence[Estimate]) -> Galle
 def bifurcation_gallery(
     values: Sequence[float], sections: Sequence[Arrays], clearances_m: Sequence[float], axis: str
 ) -> Gallery:
-    """Sections over a parameter, a picture for each joint."""
+    """Bifurcation diagrams: eccentricities of Poincaré maps over a parameter, a picture for each joint."""
     pictures = []
     for k, joint in enumerate(clearance_joints_of(sections[0])):
         figure = new_figure(4.8, 3.2)

@@ -1,4 +1,4 @@
-"""Curves over a gait cycle: the ideal leg, an ensemble's band, and one run as an example."""
+"""Figures of curves over a gait cycle: the ideal leg, the ensemble's 90 % band, and one run as an example."""
 
 from collections.abc import Sequence
 
@@ -14,7 +14,7 @@ from leg_wear_monitor.studies.summary import clearance_joints_of
 
 PANEL_IN = 4.6
 _AXES_IN, _REST_IN = 1.35, 0.75
-_LEAST_N = 0.1  # foot of a logarithmic axis; a journal in flight bears nothing
+_LEAST_N = 0.1  # lower end of the logarithmic axis [N]: the force of a journal in free flight is 0
 _KEY = (
     "Shaded: where the middle 90 % of all runs' cycles lie. Blue: one cycle of one run, an example. "
     "Dashed: the ideal leg."
@@ -22,7 +22,7 @@ _KEY = (
 
 
 def curve_galleries(labelled: Labelled) -> list[Gallery]:
-    """A gallery for each quantity, a picture for each point."""
+    """A gallery for each quantity, with a picture for each point of the study."""
     galleries = []
     for quantity in QUANTITIES:
         if f"ideal_{quantity.name}" in labelled[0][1]:
@@ -31,7 +31,7 @@ def curve_galleries(labelled: Labelled) -> list[Gallery]:
 
 
 def _toe_gallery(labelled: Labelled, quantity: Quantity) -> Gallery:
-    """Displacements are shown as deviations: beside the toe's path they would not be seen."""
+    """Curves of one quantity; positions as deviations, which are too small to see beside the toe's path."""
     apart = quantity.name == "toe_position_m"
     what = f"{quantity.title}, deviation from the ideal" if apart else quantity.title
     parts = [_components(arrays, quantity, apart) for _, arrays in labelled]
@@ -53,7 +53,10 @@ _Line = tuple[Floats, Floats, Floats]  # ideal (s,), band (3, s), example (s,)
 
 
 def _components(arrays: Arrays, quantity: Quantity, apart: bool) -> dict[str, _Line]:
-    """Lines of x and y, or of the one there is."""
+    """Curves by component, x and y, or one curve without a name for a scalar; in the quantity's unit.
+
+    If ``apart``, they are deviations from the ideal curve.
+    """
     ideal, factor = arrays[f"ideal_{quantity.name}"], quantity.factor
     band, example = (arrays[f"{kind}_{quantity.name}"] for kind in ("band", "example"))
     if ideal.ndim == 1:
@@ -68,7 +71,7 @@ def _components(arrays: Arrays, quantity: Quantity, apart: bool) -> dict[str, _L
 
 
 def _limits(parts: Sequence[dict[str, _Line]], cut: float) -> tuple[float, float]:
-    """One range for all panels; a fraction of the examples' samples may lie outside."""
+    """Vertical range for all panels; the fraction ``cut`` of the examples' samples may lie outside."""
     lines = [line for part in parts for line in part.values()]
     insides = [np.quantile(example, (cut / 2.0, 1.0 - cut / 2.0)) for _, _, example in lines]
     every = [*insides, *(ideal for ideal, _, _ in lines), *(band.ravel() for _, band, _ in lines if not cut)]

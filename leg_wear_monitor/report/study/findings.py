@@ -1,4 +1,4 @@
-"""What to conclude from a study: sentences computed from its data, whatever they say."""
+"""Conclusions of a study as sentences computed from its data."""
 
 from collections.abc import Sequence
 
@@ -29,8 +29,8 @@ from leg_wear_monitor.studies.summary import (
     worst_zone,
 )
 
-_SUM_WITHIN = 0.1  # of the sum
-_NO_POWER = 0.1  # standard error of an exponent beyond which no one power describes the values
+_SUM_WITHIN = 0.1  # relative deviation up to which the combined effect counts as the sum of the single ones
+_NO_POWER = 0.1  # standard error of a power law's exponent above which the power law is not reported
 
 
 def _known(arrays: Arrays) -> list[Quantity]:
@@ -38,7 +38,7 @@ def _known(arrays: Arrays) -> list[Quantity]:
 
 
 def disturbance(labelled: Labelled) -> list[str]:
-    """Which part of the motion clearance disturbs most."""
+    """Largest errors of displacement, velocity and acceleration relative to the range of the ideal curves."""
     known = [quantity for quantity in _known(labelled[0][1]) if quantity.name.startswith("toe")]
     if len(known) < 3:
         return []
@@ -60,7 +60,17 @@ def disturbance(labelled: Labelled) -> list[str]:
 
 
 def growth(values: Sequence[float], labelled: Labelled, what: str) -> list[str]:
-    """How errors, forces and wear grow with a number."""
+    """Growth of errors, peak forces and wear with a parameter.
+
+    Parameters
+    ----------
+    values : sequence of float
+        Value of the parameter at each point.
+    labelled : sequence of (label, arrays)
+        Results of the points.
+    what : str
+        Name of the parameter.
+    """
     sentences = []
     for each in _known(labelled[0][1]):
         spreads = [largest_error(arrays, each.name) for _, arrays in labelled]
@@ -81,7 +91,7 @@ def growth(values: Sequence[float], labelled: Labelled, what: str) -> list[str]:
 
 
 def regular_where(labelled: Labelled) -> list[str]:
-    """How far the contact force repeats itself from cycle to cycle, over what is varied."""
+    """Periodicity of each joint's contact force over the varied parameter."""
     sentences = []
     for joint in clearance_joints_of(labelled[0][1]):
         fractions = [
@@ -109,7 +119,7 @@ def _as_power(values: Sequence[float], spreads: Sequence[Spread], what: str) -> 
 
 
 def places(labelled: Labelled) -> list[str]:
-    """Where clearance does most, and how impacts differ between joints."""
+    """Ranking of the clearance joints by errors, forces, wear, impacts and periodicity."""
     sentences = []
     for each in _known(labelled[0][1]):
         errors = [(label, largest_error(arrays, each.name)) for label, arrays in labelled]
@@ -124,7 +134,7 @@ def places(labelled: Labelled) -> list[str]:
 
 
 def _joints(labelled: Labelled) -> list[tuple[str, str, Arrays]]:
-    """Every clearance joint of every point with a name that tells it from the others."""
+    """A unique name, the joint and the arrays, for every clearance joint of every point."""
     several = len(labelled) > 1
     return [
         (f"{joint} of {{{label}}}" if several and label != joint else joint, joint, arrays)
@@ -139,14 +149,14 @@ def _ranked(values: Sequence[tuple[str, Spread]], factor: float = 1.0) -> str:
 
 
 def wear(labelled: Labelled) -> list[str]:
-    """Which joint wears most."""
+    """Ranking of the joints by wear depth."""
     joints = _joints(labelled)
     depths = [(name, depth_per_cycle(arrays, joint)) for name, joint, arrays in joints]
     return [f"Greatest wear depth [pm a cycle], the greatest first: {_ranked(depths, PICO)}."]
 
 
 def impacts(labelled: Labelled) -> list[str]:
-    """Which joint is hit most often."""
+    """Ranking of the joints by impacts per cycle."""
     counts = [
         (name, of_clearance_joints(arrays, "impacts", joint)) for name, joint, arrays in _joints(labelled)
     ]
@@ -154,7 +164,7 @@ def impacts(labelled: Labelled) -> list[str]:
 
 
 def regularity(labelled: Labelled) -> list[str]:
-    """Whose contact repeats itself from cycle to cycle."""
+    """Ranking of the joints by the periodicity of their contact force."""
     fractions = [
         (name, of_clearance_joints(arrays, "repeats_contact_force", joint))
         for name, joint, arrays in _joints(labelled)
@@ -166,7 +176,7 @@ def regularity(labelled: Labelled) -> list[str]:
 
 
 def zones(labelled: Labelled) -> list[str]:
-    """Whose wear is concentrated in a zone."""
+    """Ranking of the joints by the width of the zone that contains 50 % and 90 % of the bushing's wear."""
     sentences = []
     for fraction in (0.5, 0.9):
         known = [
@@ -181,7 +191,7 @@ def zones(labelled: Labelled) -> list[str]:
 
 
 def superposition(parts: Labelled, whole: Arrays) -> list[str]:
-    """Whether all clearances at once do what the places do one by one, added up."""
+    """Comparison of all clearances at once with the sum of the effects of single clearance joints."""
     ratios, texts = [], []
     for each in _known(whole):
         together = largest_error(whole, each.name)
@@ -210,7 +220,7 @@ def _against_alone(joint: str, alone: Arrays, whole: Arrays) -> str:
 
 
 def worst_joint(whole: Arrays) -> list[str]:
-    """Joints by their wear."""
+    """Ranking of the joints by worn volume and by depth, with clearance in all of them."""
     names = clearance_joints_of(whole)
     depth = sorted(names, key=lambda joint: -depth_per_cycle(whole, joint).mean)
     volume = sorted(
@@ -223,7 +233,7 @@ def worst_joint(whole: Arrays) -> list[str]:
 
 
 def laws(labelled: Labelled) -> list[str]:
-    """How much depends on the law of the normal force, and how much on friction."""
+    """Sensitivity of errors and wear to the normal law and to the friction law."""
     normal = [one for one in labelled if one[0] in NORMAL_LAWS]
     lossy = [one for one in normal if one[0] != "hertz"]
     friction = [one for one in labelled if one[0] not in NORMAL_LAWS]
@@ -242,13 +252,13 @@ def laws(labelled: Labelled) -> list[str]:
 
 
 def _ends(spreads: Sequence[Spread]) -> tuple[int, int]:
-    """Where the mean is least and greatest."""
+    """Indices of the smallest and of the largest mean."""
     means = [each.mean for each in spreads]
     return means.index(min(means)), means.index(max(means))
 
 
 def _law_sentence(what: str, group: Labelled) -> str:
-    """How far means of a group of laws lie apart."""
+    """Sentence on the relative range of the means within a group of laws."""
     parts = []
     for each in _known(group[0][1]):
         parts.append((each.title, [largest_error(arrays, each.name) for _, arrays in group]))

@@ -1,4 +1,4 @@
-"""The leg over its gait cycle, to be moved by hand: contact forces, and each pin in its bushing."""
+"""Interactive picture of the leg over a gait cycle: contact forces, and each journal in its bushing."""
 
 from collections.abc import Sequence
 from itertools import cycle
@@ -17,12 +17,12 @@ from leg_wear_monitor.report.study.text import Labelled
 from leg_wear_monitor.studies.point import Arrays
 from leg_wear_monitor.studies.summary import clearance_joints_of
 
-CLEARANCE_FRACTION = 0.3  # of the bushing's radius: how wide a clearance is drawn
-_ARROW_FRACTION = 0.3  # of the leg's height: the longest arrow
+CLEARANCE_FRACTION = 0.3  # drawn clearance, as a fraction of the bushing's radius
+_ARROW_FRACTION = 0.3  # length of the longest arrow, as a fraction of the leg's height
 
 
 def leg_slider(mechanism: Mechanism, runs: Labelled, clearances_m: Sequence[float], speed_rpm: float) -> Live:
-    """The leg with one cycle of an example run of each point.
+    """Interactive picture of the leg with one cycle of an example run of each point.
 
     Parameters
     ----------
@@ -30,9 +30,13 @@ def leg_slider(mechanism: Mechanism, runs: Labelled, clearances_m: Sequence[floa
     runs : sequence of (label, arrays)
         Results of `leg_wear_monitor.studies.tasks.response.run_ensemble`.
     clearances_m : sequence of float
-        Of the runs.
+        Radial clearance of each run [m].
     speed_rpm : float
-        Crank speed that the leg is drawn at; ideal positions do not depend on it.
+        Crank speed [rpm]; the drawn positions are ideal and depend on its sign only.
+
+    Returns
+    -------
+    Live
     """
     linkage = build_linkage(mechanism)
     frames = len(runs[0][1]["example_eccentricity_m"])
@@ -65,7 +69,7 @@ def _caption(factors: Sequence[float], longest_n: float) -> str:
 
 
 def _leg_data(linkage: Linkage, motion: IdealMotion) -> dict[str, Any]:
-    """Bodies, joints and the toe's path, in millimetres with y downwards as SVG has it."""
+    """Bodies, joints and the toe's path [mm], with y downwards as in SVG."""
     mechanism = linkage.mechanism
     colours = cycle(BODY_COLOURS)
     bodies, every = [], []
@@ -103,7 +107,7 @@ def _leg_data(linkage: Linkage, motion: IdealMotion) -> dict[str, Any]:
 
 
 def _pose(linkage: Linkage, motion: IdealMotion, body: str) -> tuple[Floats, Floats]:
-    """Where the frame of a body is [m], and its angle [rad], over the motion."""
+    """Origin (N, 2) [m] and angle (N,) [rad] of a body's frame over the motion."""
     mechanism = linkage.mechanism
     i = 0 if body == GROUND else 1 + list(mechanism.bodies).index(body)
     angle, first = motion.q[:, i, 2], next(iter(mechanism.points_of(body)))
@@ -114,7 +118,7 @@ def _pose(linkage: Linkage, motion: IdealMotion, body: str) -> tuple[Floats, Flo
 
 
 def _run_data(label: str, arrays: Arrays, clearance_m: float) -> dict[str, Any]:
-    """Journals and forces of an example, in clearances and newtons, y downwards."""
+    """Eccentricities [clearances] and contact forces [N] of an example cycle, with y downwards."""
     e, force = arrays["example_eccentricity_m"] / clearance_m, arrays["example_contact_force_n"]
     flip = np.array([1.0, -1.0])
     pins = {
@@ -129,7 +133,7 @@ def _run_data(label: str, arrays: Arrays, clearance_m: float) -> dict[str, Any]:
 
 
 def _bushing_radius(mechanism: Mechanism, runs: Sequence[dict[str, Any]]) -> float:
-    """Bushing radius [m] that the exaggeration is told for: the first clearance joint's."""
+    """Bushing radius [m] of the first clearance joint, to which the stated magnification refers."""
     return mechanism.clearances[next(iter(runs[0]["pins"]))].bushing_radius
 
 

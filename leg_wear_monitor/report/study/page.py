@@ -1,4 +1,4 @@
-"""The page of a study, from what lies in its directory."""
+"""HTML page of a study, from the results in its directory."""
 
 import io
 from collections.abc import Callable
@@ -33,7 +33,7 @@ def study_page(results: StudyResults) -> Page:
     Raises
     ------
     KeyError
-        For a study that this version has no page of.
+        If this version does not know the study.
     """
     labelled = [(point.label, arrays) for point, arrays in results.of("response")]
     study = STUDIES[results.study]
@@ -50,14 +50,14 @@ def study_page(results: StudyResults) -> Page:
 
 
 def _plain(value: Any) -> Any:
-    """Settings as YAML writes them."""
+    """Settings with lists in place of tuples, as the YAML writer needs them."""
     if isinstance(value, dict):
         return {key: _plain(entry) for key, entry in value.items()}
     return [_plain(entry) for entry in value] if isinstance(value, list | tuple) else value
 
 
 def _notice(results: StudyResults) -> Sections:
-    """What is not there: points that failed or are still to come."""
+    """Section on missing points: those that failed and those not computed yet; empty if none."""
     lines = [f"{label}: {fault}" for label, fault in results.faults]
     if results.missing:
         lines.append(f"Not computed yet: {joined(results.missing)}.")

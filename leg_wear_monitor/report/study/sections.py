@@ -1,4 +1,4 @@
-"""Sections that pages of studies are made of."""
+"""Sections that are common to the pages of several studies."""
 
 from typing import Any
 
@@ -17,7 +17,7 @@ Sections = list[Section]
 
 
 def asked(results: StudyResults) -> Section:
-    """The ensemble in words, and the leg."""
+    """Section that describes the ensemble and shows the leg."""
     ensemble = results.settings["ensemble"]
     text = (
         f"Each number is an ensemble of {ensemble['runs']} runs that start at different crank angles with "
@@ -39,12 +39,12 @@ def asked(results: StudyResults) -> Section:
 
 
 def conclude(sentences: list[str]) -> Section:
-    """What to conclude."""
+    """Section of conclusions."""
     return Section("Conclusions", [Sentences(sentences)])
 
 
 def cycle(results: StudyResults, chosen: list[tuple[Point, Any]]) -> Section:
-    """The leg to be moved by hand."""
+    """Section with the interactive leg, for the chosen points."""
     runs = [(point.label, arrays) for point, arrays in chosen]
     clearances = [_clearance(results, point) for point, _ in chosen]
     return Section(
@@ -58,18 +58,18 @@ def _clearance(results: StudyResults, point: Point) -> float:
 
 
 def curves(labelled: Labelled) -> Section:
-    """Curves of every point over a gait cycle."""
+    """Section with the curves over a gait cycle of every point."""
     return Section("Curves of a cycle", curve_galleries(labelled))
 
 
 def tables(labelled: Labelled, head: str) -> Section:
-    """Errors, forces and wear of every point; ``head`` says what tells points apart."""
+    """Section with tables of errors, forces and wear of every point; ``head`` titles the first column."""
     tables = [error_table(labelled, head), joint_table(labelled, head), wear_table(labelled, head)]
     return Section("Tables", tables)
 
 
 def wear(results: StudyResults, labelled: Labelled) -> Section:
-    """Wear of a cycle of every joint of every point."""
+    """Section with the wear per cycle of every clearance joint of every point."""
     worn = [
         (label, joint, 1.0e6 * arrays["wear_depth_m_per_cycle"][:, k])
         for label, arrays in labelled
@@ -80,5 +80,5 @@ def wear(results: StudyResults, labelled: Labelled) -> Section:
 
 
 def ends_and_middle(pairs: list[Any]) -> list[Any]:
-    """First, middle and last of many."""
+    """The first, middle and last entry of more than three, else all."""
     return pairs if len(pairs) <= 3 else [pairs[0], pairs[len(pairs) // 2], pairs[-1]]

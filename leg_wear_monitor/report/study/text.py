@@ -1,4 +1,4 @@
-"""Numbers of a study as texts, and its tables."""
+"""Text of a study's numbers, and its tables."""
 
 import math
 from collections.abc import Sequence
@@ -22,7 +22,7 @@ Labelled = Sequence[tuple[str, Arrays]]
 
 
 class Quantity(NamedTuple):
-    """A largest error: its name in the data and for operators, unit, and factor from SI."""
+    """A quantity compared with the ideal leg: name in the data, title for readers, unit, factor from SI."""
 
     name: str
     title: str
@@ -40,7 +40,7 @@ PICO = 1.0e12
 
 
 def number(value: float) -> str:
-    """Three significant digits, without exponent as far as that is readable."""
+    """A number with three significant digits; with an exponent below 0.001 and from a million on."""
     if not math.isfinite(value):
         return "–"
     if value == 0.0:
@@ -51,7 +51,7 @@ def number(value: float) -> str:
 
 
 def with_spread(value: Spread, factor: float = 1.0) -> str:
-    """Mean and standard deviation, to two digits of the latter and at most four of the former."""
+    """Mean and standard deviation, with two digits of the deviation and at most four of the mean."""
     mean, deviation = factor * value.mean, factor * value.deviation
     if not deviation > 0.0 or mean == 0.0:
         return number(mean)
@@ -63,25 +63,25 @@ def with_spread(value: Spread, factor: float = 1.0) -> str:
 
 
 def percent(fraction: float) -> str:
-    """A fraction as text."""
+    """A fraction as text in percent."""
     text = number(100.0 * fraction)
     return f"{text.rstrip('0').rstrip('.') if text.endswith('.0') else text} %"
 
 
 def zone_text(zone: tuple[float, float] | None) -> str:
-    """A zone of angles and its width."""
+    """A zone of angles (from, to) [deg] and its width as text."""
     if zone is None:
         return "–"
     return f"{zone[0] % 360.0:.0f}° to {zone[1] % 360.0:.0f}° ({zone[1] - zone[0]:.0f}° wide)"
 
 
 def joined(names: Sequence[str]) -> str:
-    """Names in a sentence."""
+    """Names joined by commas, the last by "and"."""
     return names[0] if len(names) == 1 else f"{', '.join(names[:-1])} and {names[-1]}"
 
 
 def error_table(labelled: Labelled, head: str) -> Table:
-    """Largest errors of the toe and the drive in a cycle, a row a point."""
+    """Table of the largest errors of toe and drive torque in a cycle, a row for each point."""
     known = [quantity for quantity in QUANTITIES if _has(labelled, quantity)]
     rows = [
         [label]
@@ -107,7 +107,7 @@ def _has(labelled: Labelled, quantity: Quantity) -> bool:
 
 
 def joint_table(labelled: Labelled, head: str) -> Table:
-    """Forces, impacts and contact of every clearance joint of every point."""
+    """Table of forces, impacts and contact time, a row for each clearance joint of every point."""
     rows = [
         [
             f"{label}: {joint}" if len(clearance_joints_of(arrays)) > 1 else label,
@@ -139,7 +139,7 @@ def joint_table(labelled: Labelled, head: str) -> Table:
 
 
 def wear_table(labelled: Labelled, head: str) -> Table:
-    """Wear of every clearance joint of every point."""
+    """Table of wear, a row for each clearance joint of every point."""
     rows = [
         [
             f"{label}: {joint}" if len(clearance_joints_of(arrays)) > 1 else label,

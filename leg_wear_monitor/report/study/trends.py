@@ -1,4 +1,4 @@
-"""Largest errors, forces and wear over what a study varies: a number on an axis, or names in rows."""
+"""Figures of errors, forces and wear over the varied parameter (trend) or over named points (comparison)."""
 
 from collections.abc import Callable, Sequence
 from typing import NamedTuple
@@ -38,7 +38,7 @@ _CAPTION = (
 
 
 class Panel(NamedTuple):
-    """What one picture shows: a line of spreads, one a point, for each name; None where a point has none."""
+    """Data of one picture: for each name, a spread at each point; None where the point has no value."""
 
     title: str
     lines: dict[str, list[Spread | None]]
@@ -46,7 +46,7 @@ class Panel(NamedTuple):
 
 
 def panels_of(arrays: Sequence[Arrays]) -> list[Panel]:
-    """Pictures of a study's points."""
+    """Data of all pictures of a study, from the arrays of its points."""
     joints = list(dict.fromkeys(name for each in arrays for name in clearance_joints_of(each)))
 
     def by_joint(figure: Callable[[Arrays, str], Spread]) -> dict[str, list[Spread | None]]:
@@ -77,7 +77,7 @@ def panels_of(arrays: Sequence[Arrays]) -> list[Panel]:
 
 
 def trend_gallery(values: Sequence[float], axis: str, arrays: Sequence[Arrays]) -> Gallery:
-    """Pictures over a number, such as the clearance."""
+    """Pictures over a numeric parameter, such as the clearance."""
     pictures = []
     for panel in panels_of(arrays):
         figure = new_figure(4.6, 2.9)
@@ -97,7 +97,7 @@ def trend_gallery(values: Sequence[float], axis: str, arrays: Sequence[Arrays]) 
 
 
 def compare_gallery(labelled: Labelled) -> Gallery:
-    """Pictures with a row a point."""
+    """Pictures with a row for each point."""
     labels, pictures = [label for label, _ in labelled], []
     for panel in panels_of([arrays for _, arrays in labelled]):
         lines = list(panel.lines.items())
@@ -120,7 +120,7 @@ def compare_gallery(labelled: Labelled) -> Gallery:
 
 
 def _bars(spreads: Sequence[Spread], factor: float) -> tuple[list[float], list[list[float]]]:
-    """Means, and how far bars reach below and above them."""
+    """Means, and the lengths of the bars below and above them."""
     below = [factor * max(0.0, one.mean - one.low) for one in spreads]
     above = [factor * max(0.0, one.high - one.mean) for one in spreads]
     return [factor * one.mean for one in spreads], [below, above]
@@ -134,7 +134,7 @@ def _finish(axes: Axes, panel: Panel) -> None:
 
 
 def _as_text(panel: Panel, labels: Sequence[str] = ()) -> str:
-    """Means from point to point, for those who do not see the picture."""
+    """Alternative text of the picture: the means of all points."""
     texts = []
     for name, spreads in panel.lines.items():
         means = [f"{panel.factor * one.mean:.3g}" if one else "none" for one in spreads]

@@ -1,4 +1,4 @@
-"""The page of the wear study: where new joints wear, and what becomes of them over a life."""
+"""HTML page of the wear study: wear of new joints, and its development over a life."""
 
 from collections.abc import Sequence
 
@@ -24,12 +24,12 @@ from leg_wear_monitor.studies.storage.store import StudyResults
 from leg_wear_monitor.studies.summary import clearance_joints_of, spread
 from leg_wear_monitor.wear.surfaces import BUSHING, wear_zone
 
-_NEW, _END = 0, 1  # of rates; of depths, halfway and end
+_NEW, _END = 0, 1  # indices of states: rates when new and at the end (depths: halfway and at the end)
 _MILLION = 1.0e-6
 
 
 def life(results: StudyResults, labelled: Labelled) -> Sections:
-    """Sections of the wear study."""
+    """Sections of the wear study's page."""
     lives = [(point.label, arrays) for point, arrays in results.of("life")]
     sentences = [*findings.wear(labelled), *findings.zones(labelled)]
     for label, arrays in lives:
@@ -43,7 +43,7 @@ def life(results: StudyResults, labelled: Labelled) -> Sections:
 
 
 def _of_a_life(label: str, arrays: Arrays, several: bool) -> list[str]:
-    """How long it took, whether wear slowed, and where it went."""
+    """Sentence on a life: its length, the opened joints, the change of the wear rate, the toe's error."""
     cycles, mean = arrays["cycles"][:, -1], arrays["clearance_mean_m"]
     opened = 1.0e3 * (mean[:, -1] - mean[:, 0]).mean(axis=0)
     first = clearance_joints_of(arrays)[int(opened.argmax())]
@@ -69,12 +69,12 @@ def _of_a_life(label: str, arrays: Arrays, several: bool) -> list[str]:
 
 
 def _rate(arrays: Arrays, k: int, when: int) -> float:
-    """Mean depth that a cycle takes off the bushing of a joint [m]."""
+    """Mean wear depth of a joint's bushing per cycle [m]."""
     return float(arrays["rate_m_per_cycle"][:, when, k, BUSHING].mean())
 
 
 def _clearances(lives: Labelled) -> Section:
-    """Mean and largest clearance of every joint over the cycles."""
+    """Section with the mean and the largest clearance of every joint over the cycles."""
     pictures = []
     for label, arrays in lives:
         figure = new_figure(4.6, 3.0)

@@ -1,4 +1,4 @@
-"""Where bushing and journal wear: as a section, exaggerated, and unrolled, with the worst zone enlarged."""
+"""Figures of worn profiles: an exaggerated section, depth over the angle, and the worst zone enlarged."""
 
 import math
 from collections.abc import Sequence
@@ -14,7 +14,7 @@ from leg_wear_monitor.report.page import Gallery, Picture
 from leg_wear_monitor.report.study.text import zone_text
 from leg_wear_monitor.wear.surfaces import BUSHING, JOURNAL, wear_zone
 
-_AROUND = 20.0  # degrees shown on both sides of the worst zone
+_AROUND = 20.0  # angle shown on both sides of the worst zone [deg]
 
 
 def wear_gallery(mechanism: Mechanism, worn: Sequence[tuple[str, str, Floats]], what: str) -> Gallery:
@@ -24,9 +24,9 @@ def wear_gallery(mechanism: Mechanism, worn: Sequence[tuple[str, str, Floats]], 
     ----------
     mechanism : Mechanism
     worn : sequence of (label, joint, depth)
-        ``depth`` (r, 2, N) [m] of bushing and journal in each run.
+        ``depth`` (r, 2, N) [m]: wear depth of bushing and journal in each of r runs, over N sectors.
     what : str
-        What the depths are, for the caption: "wear of a cycle".
+        Description of the depths for the caption, such as "Wear of a million cycles".
     """
     pictures = [_picture(mechanism, *each) for each in worn]
     caption = (
@@ -63,7 +63,7 @@ def _picture(mechanism: Mechanism, label: str, joint: str, depth: Floats) -> Pic
 
 
 def _unroll(axes: Axes, depth: Floats, zone: tuple[float, float] | None) -> None:
-    """Depth over the angle, a turn before and after too, so that a zone across 0 is whole."""
+    """Draw the depth (r, 2, N) over three turns of the angle, so that a zone across 0 is not cut."""
     n = depth.shape[2]
     angle = (np.arange(-n, 2 * n) + 0.5) * (360.0 / n)
     if zone is not None:
@@ -82,7 +82,7 @@ def _ends(runs: Floats) -> tuple[Floats, Floats]:
 
 
 def _enlarge(axes: Axes, depth: Floats) -> None:
-    """Show the narrowest zone that holds half of the wear, and a little around it."""
+    """Limit the axes to the narrowest zone that contains half of the wear, and a margin."""
     zone = wear_zone(depth, 0.5) or (0.0, 360.0)
     low, high = zone[0] - _AROUND, zone[1] + _AROUND
     axes.set_xlim(low, min(high, low + 360.0))

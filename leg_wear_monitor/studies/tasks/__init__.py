@@ -1,1 +1,1 @@
-"""What is computed for a point."""
+"""Numerical tasks of the studies: the computation of one point."""

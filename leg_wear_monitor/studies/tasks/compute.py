@@ -1,4 +1,4 @@
-"""What can be computed for a point, by name."""
+"""Tasks by name, and their execution in a worker."""
 
 from collections.abc import Callable
 from importlib import import_module
@@ -21,7 +21,7 @@ TASKS = {
 
 
 def compute(task: str, mechanism: Mechanism, settings: dict[str, Any], code: str) -> Arrays:
-    """Result of a point; what workers run.
+    """Compute the result of a point; runs in the workers.
 
     Parameters
     ----------
@@ -29,18 +29,20 @@ def compute(task: str, mechanism: Mechanism, settings: dict[str, Any], code: str
         A key of `TASKS`.
     mechanism : Mechanism
     settings : dict
+        Settings of the point.
     code : str
         The caller's `code_digest`.
 
     Returns
     -------
     dict of arrays
-        ``fault`` alone, a text, where the motion diverges: that is a result, too.
+        Result of the task. If the motion diverges, only ``fault`` (), the message: divergence is a valid
+        result.
 
     Raises
     ------
     RuntimeError
-        If this process has other code than the caller.
+        If the code version of this process differs from the caller's.
     """
     if code_digest() != code:
         raise RuntimeError("a worker has another version of leg_wear_monitor than the study that asks it")

@@ -1,4 +1,4 @@
-"""A leg watched over whole cycles: at equal steps of its crank, and by its extremes in each cycle."""
+"""A leg sampled at equal crank steps over whole gait cycles, with run statistics."""
 
 from collections.abc import Iterator
 
@@ -13,17 +13,17 @@ from leg_wear_monitor.studies.tasks.grid import SAMPLES
 
 
 class ObservedLeg:
-    """A leg under a steady crank, advanced by whole steps of which `SAMPLES` make a cycle.
+    """A leg with constant crank speed, advanced in steps of 1 / `SAMPLES` of a gait cycle.
 
     Parameters
     ----------
     leg : Leg
     setup : Setup
-        Of this leg, with surfaces of its own.
+        Setup of this leg; its surfaces must not be shared with other legs.
     tables : ClearanceTables, optional
-        Of this setup, if they are there already.
+        Tables of this setup, to reuse those built before.
     tolerance_m : float, optional
-        As `ClearanceStepper` takes it.
+        Integration tolerance of `ClearanceStepper` [m].
     """
 
     def __init__(
@@ -41,18 +41,24 @@ class ObservedLeg:
         self._step = TURN / abs(setup.speed) / SAMPLES
 
     def advance(self, steps: int, statistics: RunStatistics) -> None:
-        """Advance by some steps, adding to the statistics; raises SimulationError if the motion diverges."""
+        """Advance by a number of steps and add to the run statistics.
+
+        Raises
+        ------
+        SimulationError
+            If the motion diverges.
+        """
         done = round(self.stepper.time / self._step)
         status, k = self.stepper.advance(self._polynomial, (done + steps) * self._step, statistics)
         if status != DONE:
             raise stop(self.setup, status, k, self.stepper.time)
 
     def observe(self) -> Moment:
-        """The leg as it is now."""
+        """The present state of the leg."""
         return self.stepper.observe()
 
     def moments(self, statistics: RunStatistics) -> Iterator[Moment]:
-        """Moments of the next cycle, from now on at every step; adds to the run statistics meanwhile."""
+        """States at every step of the next cycle, from the present one on; adds to the run statistics."""
         for _ in range(SAMPLES):
             yield self.observe()
             self.advance(1, statistics)

@@ -1,4 +1,4 @@
-"""The legs of an ensemble: alike but for where crank and journals start, and the same for every point."""
+"""Ensembles: legs with equal parameters that differ in the initial positions of crank and journals."""
 
 from typing import Any
 
@@ -17,7 +17,7 @@ from leg_wear_monitor.studies.tasks.grid import SAMPLES
 
 
 def with_friction(mechanism: Mechanism, changes: dict[str, Any]) -> Mechanism:
-    """The mechanism with other friction in all its joints; fields of `mechanism.clearance.Friction`."""
+    """The mechanism with changed fields of `mechanism.clearance.Friction` in all its joints."""
     clearances = {
         name: attrs.evolve(own, friction=attrs.evolve(own.friction, **changes))
         for name, own in mechanism.clearances.items()
@@ -26,21 +26,26 @@ def with_friction(mechanism: Mechanism, changes: dict[str, Any]) -> Mechanism:
 
 
 def start_angles(runs: int, seed: int) -> list[float]:
-    """Crank angles [rad] at which runs start: on the grid of samples, one in each equal part of a turn."""
+    """Initial crank angles [rad] of the runs: on the sampling grid, one in each equal part of a turn."""
     chance = np.random.default_rng([seed, 1])
     steps = (SAMPLES * (np.arange(runs) + chance.random(runs)) / runs).astype(int)
     return [float(step) * (TURN / SAMPLES) for step in steps]
 
 
 def ensemble(mechanism: Mechanism, settings: dict[str, Any]) -> list[Leg]:
-    """Legs that differ in where they start.
+    """Legs that differ in their initial positions.
 
     Parameters
     ----------
     mechanism : Mechanism
     settings : dict
-        ``clearance_joints``, ``clearance_m``, ``speed_rpm``, ``runs``, ``seed``, ``perturb_fraction``;
-        optional ``normal_law`` and ``friction``.
+        ``clearance_joints``, ``clearance_m`` [m], ``speed_rpm``, ``runs``, ``seed``, ``perturb_fraction`` (of
+        the smallest clearance); optional ``normal_law`` and ``friction``.
+
+    Returns
+    -------
+    list of Leg
+        One for each run.
     """
     if settings.get("friction"):
         mechanism = with_friction(mechanism, settings["friction"])
@@ -62,12 +67,12 @@ def ensemble(mechanism: Mechanism, settings: dict[str, Any]) -> list[Leg]:
 
 
 def watch(legs: list[Leg], tolerance_m: float | None = None) -> list[ObservedLeg]:
-    """Every leg where it starts; they share their tables.
+    """Legs in their initial positions; they share one set of tables.
 
     Raises
     ------
     AssemblyError
-        For a leg that cannot turn.
+        If the linkage of a leg does not close or has a dead point.
     """
     setups: list[Setup] = []
     for setup in prepare_legs(legs):
@@ -79,7 +84,15 @@ def watch(legs: list[Leg], tolerance_m: float | None = None) -> list[ObservedLeg
 
 
 def check_points(mechanism: Mechanism, settings: list[dict[str, Any]]) -> None:
-    """Prepare every distinct leg, so that what cannot be is told before anything runs; raises ConfigError."""
+    """Prepare one leg of every setting, so that errors are reported before any computation.
+
+    Raises
+    ------
+    ConfigError
+        If a setting is invalid or names no joint.
+    AssemblyError
+        If a linkage does not close or has a dead point.
+    """
     for each in settings:
         leg = ensemble(mechanism, each | {"runs": 1})[0]
         if not leg.clearances:

@@ -1,9 +1,10 @@
 """The largest Lyapunov exponent of a leg.
 
-The motion is smooth between impacts and jumps nowhere in the journals' places, but their rates change within
-the time of an impact: a neighbour that touches a moment later is for that moment far off in its rate. So a
-neighbour is brought back only while both legs have the same joints in contact. Its state are places,
-rates, and the approach speed that a contact remembers; the crank's motion is given and the same for both.
+The eccentricities are continuous, but their rates change within the short duration of an impact: if the
+neighbour's impact begins a moment later, its rate differs strongly during that moment. Therefore the
+neighbour is rescaled only while both legs have the same joints in contact. The state consists of
+eccentricities, their rates and the approach speed of each contact; the crank's motion is prescribed and equal
+for both.
 """
 
 from typing import Any
@@ -23,13 +24,18 @@ from leg_wear_monitor.studies.tasks.lyapunov import stretches
 
 
 def lyapunov_exponent(mechanism: Mechanism, settings: dict[str, Any]) -> Arrays:
-    """Growth of small distances between neighbouring motions.
+    """Growth of the distance between neighbouring motions.
 
     Returns
     -------
     dict of arrays
-        ``stretch_per_cycle`` (r, c): the logarithm of the growth of a distance in each cycle of each run;
-        ``period_s`` () of a cycle.
+        ``stretch_per_cycle`` (r, c) [-]: logarithm of the growth factor in each cycle c of each run r;
+        ``period_s`` (): duration of a cycle [s]; ``clearance_joints`` (k,): names.
+
+    Raises
+    ------
+    SimulationError
+        If the motion diverges.
     """
     legs = watch(ensemble(mechanism, settings), settings["tolerance_m"])
     logs = np.array([_follow(leg, settings) for leg in legs])
@@ -42,7 +48,7 @@ def lyapunov_exponent(mechanism: Mechanism, settings: dict[str, Any]) -> Arrays:
 
 
 def _follow(leg: ObservedLeg, settings: dict[str, Any]) -> Floats:
-    """Stretches of one run."""
+    """Logarithmic growth factors (steps,) of one run."""
     stepper, statistics = leg.stepper, new_run_statistics(len(leg.setup.linkage.mechanism.joints))
     leg.advance(settings["skip_cycles"] * SAMPLES, statistics)
     steps, depth = SAMPLES // settings["renewals"], stepper.snapshot().depth
@@ -66,7 +72,7 @@ def _follow(leg: ObservedLeg, settings: dict[str, Any]) -> Floats:
 
 
 def _scale(leg: ObservedLeg) -> Floats:
-    """Unit of each number of the state: the clearance, and the clearance a radian of the crank for rates."""
+    """Scale of each number of the state: the clearance, and clearance times crank speed for rates."""
     clearance = float(leg.setup.contacts.clearance.min())
     rate = clearance * abs(leg.setup.speed)
     units = {"e": clearance, "v": rate, "approach": rate}

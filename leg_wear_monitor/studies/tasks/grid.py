@@ -1,3 +1,3 @@
-"""The instants at which a leg is looked at."""
+"""Sampling grid of the studies."""
 
-SAMPLES = 512  # of a gait cycle, equal steps of the crank from angle 0, at whole intervals of the stepper
+SAMPLES = 512  # samples per gait cycle: equal crank steps from angle 0, at whole intervals of the stepper

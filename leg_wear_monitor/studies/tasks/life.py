@@ -1,4 +1,4 @@
-"""Wear that feeds back over a life: lives by cycle jumps, each read off where a joint has opened so far."""
+"""Wear lives with wear feedback, by cycle jumps, sampled at equal increases of the largest clearance."""
 
 from typing import Any
 
@@ -11,24 +11,26 @@ from leg_wear_monitor.mechanism.spec import Mechanism
 from leg_wear_monitor.studies.point import Arrays
 from leg_wear_monitor.wear.cycle_jump import JumpControl
 
-STATES = 41  # of a life, from new to its end, by equal openings; an odd number
+STATES = 41  # states of a life at equal increases of clearance, new and end included; odd: one is halfway
 
 
 def wear_life(mechanism: Mechanism, settings: dict[str, Any]) -> Arrays:
-    """Lives of an ensemble.
+    """Wear lives of an ensemble.
 
     Returns
     -------
     dict of arrays
-        Runs r, states of wear w (the first without any), clearance joints k, sectors N: ``cycles`` (r, w)
-        since new; ``clearance_mean_m`` and ``clearance_max_m`` (r, w, k); ``depth_m`` (r, 2, k, 2, N) halfway
-        and at the end; ``rate_m_per_cycle`` (r, 2, k, 2, N) when new and at the end; ``peak_force_n``
-        (r, w, k) and ``toe_position_m`` (r, w) the largest of a cycle.
+        For runs r, states of wear w (the first is new), clearance joints k and sectors N:
+        ``cycles`` (r, w): gait cycles since new;
+        ``clearance_mean_m``, ``clearance_max_m`` (r, w, k): radial clearance;
+        ``depth_m`` (r, 2, k, 2, N): wear depth of bushing and journal, halfway and at the end;
+        ``rate_m_per_cycle`` (r, 2, k, 2, N): wear depth per cycle, when new and at the end;
+        ``peak_force_n`` (r, w, k), ``toe_position_m`` (r, w): largest contact force and toe error of a cycle.
 
     Raises
     ------
     SimulationError
-        Where the motion diverges, or nothing wears.
+        If the motion diverges, or no joint wears.
     """
     lives = [_life(mechanism, settings, run) for run in range(settings["runs"])]
     result = {name: np.array([life[name] for life in lives]) for name in lives[0]}
@@ -72,7 +74,7 @@ def _life(mechanism: Mechanism, settings: dict[str, Any], member: int) -> dict[s
 
 
 def between(cycles: Floats, values: Floats, at: Floats) -> Floats:
-    """Values (p, ...) at other cycles (w,) than those (p,) that they are known at, on straight lines."""
+    """Values (p, ...) at cycles (p,), interpolated linearly at the cycles ``at`` (w,); shape (w, ...)."""
     left = np.clip(np.searchsorted(cycles, at) - 1, 0, len(cycles) - 2)
     fraction = (at - cycles[left]) / np.diff(cycles)[left]
     fraction = fraction.reshape(-1, *[1] * (values.ndim - 1))

@@ -1,7 +1,7 @@
-"""The largest Lyapunov exponent by two neighbours (Benettin and others, Meccanica 15, 1980).
+"""The largest Lyapunov exponent from two neighbouring trajectories (Benettin et al., Meccanica 15, 1980).
 
-A neighbour is started a tiny way off, both are moved on, the growth of their distance is noted, and the
-neighbour is brought back to the first distance along the same direction.
+The neighbour starts at a small distance, both trajectories are advanced by a step, the growth of their
+distance is recorded, and the neighbour is rescaled to the initial distance in the present direction.
 """
 
 from collections.abc import Callable
@@ -36,21 +36,23 @@ def stretches(
     Parameters
     ----------
     advance : callable
-        Gives the state one step later; must not change what it is given.
+        Returns the state one step later; must not modify its argument.
     state, direction, scale : (n,) arrays
-        Where to start, where the neighbour stands from there, and the unit of each coordinate. A scale of 0
-        keeps a coordinate out of the distance: a neighbour that is brought back has it from the first.
+        Initial state, direction of the neighbour from it, and scale of each coordinate. A coordinate of scale
+        0 does not count in the distance; rescaling copies it from the first trajectory.
     distance : float
-        In units of the scale.
+        Initial distance, in units of the scale.
     steps : int
+        Number of steps.
     comparable : callable, optional
-        Whether the neighbour may be brought back now. Where motion jumps, the two are on different sides of
-        the jump for a moment; their distance is then no small one along a direction.
+        Whether the neighbour may be rescaled between these two states; default: always. Around an impact, the
+        two are on different sides of it for a moment and their distance is not small.
 
     Returns
     -------
     (steps,) array
-        Its mean over the time of a step is the exponent, once the start is forgotten.
+        Logarithmic growth factors [-]; their mean divided by the duration of a step is the exponent, without
+        the first steps.
     """
     counts = scale > 0.0
     unit = scale[counts]
@@ -60,7 +62,7 @@ def stretches(
         state, near = advance(state), advance(near)
         gap = (near[counts] - state[counts]) / unit
         size = float(np.linalg.norm(gap))
-        if size == 0.0:  # met to the last bit: as near as numbers are
+        if size == 0.0:  # equal in all bits: take the smallest distance that the numbers resolve
             gap, size = offset, np.finfo(float).eps
         logs[step] = np.log(size / last)
         last = size
@@ -76,16 +78,23 @@ def _beside(state: Floats, counts: Flags, offset: Floats) -> Floats:
 
 
 def exponent(logs: Floats, step_time: float, skip: int = 0) -> Estimate:
-    """Exponent from the stretches of independent runs, with its standard error.
+    """Lyapunov exponent from the growth factors of independent runs, with its standard error.
 
-    That is the larger one of the errors between runs and between steps: a few runs may agree by chance.
+    The standard error is the larger one of those over runs and over steps, because few runs may agree by
+    chance.
 
     Parameters
     ----------
     logs : (runs, steps) array
+        Logarithmic growth factors [-].
     step_time : float
+        Duration of a step, in the unit of time of the exponent.
     skip : int
-        First steps to leave out, while the neighbour turns into the direction that grows most.
+        Number of first steps to leave out, in which the separation turns into the fastest growing direction.
+
+    Returns
+    -------
+    Estimate
     """
     rates = logs[:, skip:] / step_time
     each = rates.mean(axis=1)

@@ -1,4 +1,4 @@
-"""What clearance does to the leg: an ensemble's largest errors, forces, wear, and curves of a cycle."""
+"""Response of the leg to clearance: errors, forces, wear and curves of a cycle over an ensemble."""
 
 from collections.abc import Iterable
 from typing import Any
@@ -24,7 +24,7 @@ from leg_wear_monitor.studies.tasks.contact_watch import ObservedLeg
 from leg_wear_monitor.studies.tasks.ensemble import ensemble, watch
 from leg_wear_monitor.studies.tasks.grid import SAMPLES
 
-BAND = (0.05, 0.5, 0.95)  # fractions of an ensemble's cycles below its band, its middle, and its top
+BAND = (0.05, 0.5, 0.95)  # quantiles of the ensemble's cycles: lower end of the band, median, upper end
 ERRORS = ("toe_position_m", "toe_velocity_mps", "toe_acceleration_mps2", "drive_torque_nm")
 
 _FIGURES = (
@@ -34,19 +34,27 @@ _FIGURES = (
 
 
 def run_ensemble(mechanism: Mechanism, settings: dict[str, Any]) -> Arrays:
-    """Response of a leg with clearances against the ideal one.
+    """Response of a leg with clearances, compared with the ideal leg.
 
     Returns
     -------
     dict of arrays
-        Over runs r, cycles c, joints j, clearance joints k and samples s of a cycle from crank angle 0:
-        ``error_<name>`` (r, c) the largest errors of `ERRORS` in each cycle; ``peak_force_n`` (r, c, j);
-        ``impacts`` (r, c, k); ``mean_force_n``, ``rms_force_n``, ``p99_force_n`` (r, j);
+        For runs r, cycles c, joints j, clearance joints k, sectors N and samples s of a cycle from crank
+        angle 0:
+        ``error_<name>`` (r, c): largest error in each cycle, for the names in `ERRORS`;
+        ``peak_force_n`` (r, c, j), ``impacts`` (r, c, k): of each cycle;
+        ``mean_force_n``, ``rms_force_n``, ``p99_force_n`` (r, j): over the run;
         ``contact_fraction``, ``friction_work_j_per_cycle``, ``archard_integral_j_per_cycle``,
-        ``impact_speed_mps`` (the mean of approaches) (r, k); ``rms_torque_nm`` (r,);
-        ``wear_depth_m_per_cycle`` (r, k, 2, N); ``band_<name>`` (3, s, ...) the quantiles `BAND` of the
-        curves, ``example_<name>`` (s, ...) the first cycle of the first run, ``ideal_<name>`` (s, ...) the
-        ideal linkage's; ``repeats_<name>`` (k,) the fraction of a curve's variance that its mean cycle has.
+        ``impact_speed_mps`` (mean approach speed) (r, k); ``rms_torque_nm`` (r,);
+        ``wear_depth_m_per_cycle`` (r, k, 2, N): of bushing and journal;
+        ``band_<name>`` (3, s, ...): quantiles `BAND` of the curves; ``example_<name>`` (s, ...): first cycle
+        of the first run; ``ideal_<name>`` (s, ...): curve of the ideal linkage;
+        ``repeats_<name>`` (k,): fraction of a curve's variance that its mean cycle explains.
+
+    Raises
+    ------
+    SimulationError
+        If the motion diverges.
     """
     legs = watch(ensemble(mechanism, settings))
     members = [_follow(leg, settings) for leg in legs]
@@ -64,7 +72,7 @@ def run_ensemble(mechanism: Mechanism, settings: dict[str, Any]) -> Arrays:
 
 
 def _follow(leg: ObservedLeg, settings: dict[str, Any]) -> dict[str, Any]:
-    """Statistics of one run."""
+    """Statistics and curves of one run, by the names of `run_ensemble` without the axis r."""
     setup = leg.setup
     joints, clearance_joints = len(setup.linkage.mechanism.joints), list(setup.contacts.joint)
     leg.advance(settings["skip_cycles"] * SAMPLES, new_run_statistics(joints))
@@ -97,20 +105,20 @@ def _follow(leg: ObservedLeg, settings: dict[str, Any]) -> dict[str, Any]:
 
 
 def _known(joints: Iterable[JointResult], name: str) -> Floats:
-    """A value of those joints that have it: contact is known of clearance joints only."""
+    """Values of the joints that have this statistic; those of contact exist for clearance joints only."""
     values = [getattr(joint, name) for joint in joints]
     return np.array([value for value in values if value is not None])
 
 
 def _impact_speed(statistics: RunStatistics, clearance_joints: list[int]) -> Floats:
-    """Mean approach speed (k,) [m/s] of the impacts that were noted; 0 where there were none."""
+    """Mean approach speed (k,) [m/s] of the recorded impacts; 0 without impacts."""
     counts = [min(IMPACTS, int(statistics.impacts[joint])) for joint in clearance_joints]
     rows = [statistics.impact[joint, :count] for joint, count in zip(clearance_joints, counts, strict=True)]
     return np.array([row[row[:, BEGIN] >= 0.0, SPEED].mean() if len(row) else 0.0 for row in rows])
 
 
 def _curves(moments: list[Moment], shift: int) -> dict[str, Floats]:
-    """Curves of one cycle, from crank angle 0 on; the cycle began at the sample ``shift``."""
+    """Curves (s, ...) of one cycle from crank angle 0 on; the states begin at the sample ``shift``."""
     deviation = np.array([moment.deviation for moment in moments])
     curves = {
         "toe_position_m": deviation[:, 0],
@@ -125,7 +133,7 @@ def _curves(moments: list[Moment], shift: int) -> dict[str, Floats]:
 
 
 def _bands(curves: dict[str, Floats]) -> Arrays:
-    """Quantiles, an example, and how much of each curve repeats itself; curves (r c, s, ...)."""
+    """Quantiles, an example and the periodicity of each curve; curves (r c, s, ...)."""
     result: Arrays = {f"example_{name}": curve[0] for name, curve in curves.items()}
     magnitude = np.linalg.norm(curves["contact_force_n"], axis=-1)
     bands = {name: curve for name, curve in curves.items() if name.startswith(("toe", "drive"))}
@@ -138,7 +146,7 @@ def _bands(curves: dict[str, Floats]) -> Arrays:
 
 
 def _repeats(curve: Floats) -> Floats:
-    """Share (k,) of the variance of curves (n, s, k, m) that their mean over n has: 1 if all are alike."""
+    """Fraction (k,) of the variance of curves (n, s, k, m) that their mean over n explains; 1 if equal."""
     middle = curve.mean(axis=0)
     whole = np.square(curve - middle.mean(axis=0)).sum(axis=-1).mean(axis=(0, 1))
     mean = np.square(middle - middle.mean(axis=0)).sum(axis=-1).mean(axis=0)
@@ -146,7 +154,7 @@ def _repeats(curve: Floats) -> Floats:
 
 
 def _ideal(linkage: Linkage, speed: float) -> Arrays:
-    """The ideal linkage's curves at the same samples."""
+    """Curves (s, ...) of the ideal linkage at the same samples."""
     motion = one_cycle(linkage, SAMPLES, speed)
     result: Arrays = {
         "ideal_drive_torque_nm": motion.drive_torque,

@@ -1,4 +1,4 @@
-"""Poincaré sections: the leg at one crank angle of every cycle; and phase portraits of a few cycles."""
+"""Poincaré sections at one crank angle, and phase portraits over a few cycles."""
 
 from typing import Any
 
@@ -15,13 +15,19 @@ from leg_wear_monitor.studies.tasks.grid import SAMPLES
 
 
 def poincare_section(mechanism: Mechanism, settings: dict[str, Any]) -> Arrays:
-    """Eccentricities and their rates whenever the crank passes an angle.
+    """Eccentricities and their rates at one crank angle of every cycle.
 
     Returns
     -------
     dict of arrays
-        Over cycles c, clearance joints k and samples s of ``portrait_cycles``: ``section_eccentricity_m`` and
-        ``section_rate_mps`` (c, k, 2), ``portrait_eccentricity_m`` and ``portrait_rate_mps`` (s, k, 2).
+        For cycles c, clearance joints k and samples s of ``portrait_cycles`` cycles:
+        ``section_eccentricity_m``, ``section_rate_mps`` (c, k, 2); ``portrait_eccentricity_m``,
+        ``portrait_rate_mps`` (s, k, 2); ``clearance_joints`` (k,): names.
+
+    Raises
+    ------
+    SimulationError
+        If the motion diverges.
     """
     start = round(settings["crank_angle_deg"] / 360.0 * SAMPLES) % SAMPLES * (TURN / SAMPLES)
     first = ensemble(mechanism, settings)[0]
@@ -44,15 +50,21 @@ def poincare_section(mechanism: Mechanism, settings: dict[str, Any]) -> Arrays:
 
 
 def period_of(points: Floats, longest: int, tolerance: float) -> int | None:
-    """After how many points a section repeats itself; None if it does not.
+    """Period of a Poincaré section.
 
     Parameters
     ----------
     points : (n, m) array
+        Points of the section.
     longest : int
-        Period up to which is looked.
+        Longest period to try.
     tolerance : float
-        How far apart points that repeat may be.
+        Largest difference between equal points, in the unit of the points.
+
+    Returns
+    -------
+    int or None
+        Number of points after which the section repeats; None if it does not.
     """
     for period in range(1, min(longest, len(points) - 1) + 1):
         if np.abs(points[period:] - points[:-period]).max() <= tolerance:

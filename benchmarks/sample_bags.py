@@ -10,8 +10,9 @@ import time
 from pathlib import Path
 from typing import Any
 
+import attrs
+
 import leg_wear_monitor as lw
-from leg_wear_monitor.playback.summary import summary
 
 ROOT = Path(__file__).parents[1]
 DOMAIN = "77"
@@ -63,18 +64,18 @@ def record(name: str, path: Path, parameters: Path) -> None:
 
 def expectation(path: Path, parameters: Path) -> dict[str, Any]:
     """What a replay must find: counts, alarms, and of chaotic figures those that repeat."""
-    record = summary(lw.replay(path, parameters), 1.0)
+    found = lw.replay(path, parameters).summary()
+    raised = {f"{change.alarm.name}: {change.alarm.level.name}" for change in found.alarms.changes}
     return {
-        "crank_samples": record["recording"]["crank_samples"],
-        "torque_samples": record["recording"]["torque_samples"],
-        "findings": [finding["text"] for finding in record["recording"]["findings"]],
-        "cycles": record["cycles"],
-        "lost": record["lost"],
-        "alarms": sorted({f"{each['name']}: {each['level']}" for each in record["alarms"]["changes"]}),
-        "mean_force_n": {name: joint["mean_force_n"] for name, joint in record["joints"].items()},
+        "crank_samples": found.recording.crank_samples,
+        "torque_samples": found.recording.torque_samples,
+        "findings": [finding.text for finding in found.recording.findings],
+        "cycles": found.cycles,
+        "lost": attrs.asdict(found.lost),
+        "alarms": sorted(raised),
+        "mean_force_n": {name: joint.mean_force_n for name, joint in found.joints.items()},
         "opened_m": {
-            name: joint["clearance_m"]["last"] - joint["clearance_m"]["first"]
-            for name, joint in record["joints"].items()
+            name: joint.clearance_m.last - joint.clearance_m.first for name, joint in found.joints.items()
         },
     }
 

@@ -28,6 +28,8 @@ if TYPE_CHECKING:
     from leg_wear_monitor.monitor.ledger.ledger import open_ledger
     from leg_wear_monitor.monitor.wear_monitor import WearMonitor
     from leg_wear_monitor.playback.replay import ReplayResult, replay
+    from leg_wear_monitor.playback.result.parts import ReplayJoint
+    from leg_wear_monitor.playback.result.replay_summary import ReplaySummary
 
 _HOME = {
     "EnergyBalance": "dynamics.result.parts",
@@ -35,7 +37,9 @@ _HOME = {
     "JointResult": "dynamics.result.parts",
     "Mechanism": "mechanism.spec",
     "MonitorConfig": "monitor.config.settings",
+    "ReplayJoint": "playback.result.parts",
     "ReplayResult": "playback.replay",
+    "ReplaySummary": "playback.result.replay_summary",
     "SimulationResult": "dynamics.result.simulation_result",
     "ToeResult": "dynamics.result.parts",
     "TorqueResult": "dynamics.result.parts",
@@ -57,7 +61,9 @@ __all__ = [
     "LegWearError",
     "Mechanism",
     "MonitorConfig",
+    "ReplayJoint",
     "ReplayResult",
+    "ReplaySummary",
     "SimulationError",
     "SimulationResult",
     "ToeResult",

@@ -3,10 +3,12 @@
 import math
 import reprlib
 from collections.abc import Callable
+from enum import Enum, IntEnum
 from typing import Any, get_args, get_origin
 
 import attrs
 import cattrs
+import numpy as np
 from cattrs.errors import ClassValidationError, ForbiddenExtraKeysError
 from cattrs.gen import make_dict_structure_fn
 
@@ -97,7 +99,8 @@ def _of_attribute(error: BaseException, attribute: "attrs.Attribute[Any]") -> Fi
     """Fault of one attribute of a class, with its unit."""
     unit = f" [{attribute.metadata['unit']}]" if attribute.metadata.get("unit") else ""
     if isinstance(error, KeyError):
-        return FieldError(attribute.name, f"is missing, expected: {attribute.metadata['doc']}{unit}")
+        doc = attribute.metadata.get("doc")
+        return FieldError(attribute.name, f"is missing, expected: {doc}{unit}" if doc else "is missing")
     inner = _field_error(error)
     name = "" if attribute.metadata.get("flat") else attribute.name
     return FieldError(".".join(filter(None, (name, inner.key))), inner.fault + unit)
@@ -138,6 +141,14 @@ def _text(value: Any, _kind: Any) -> str:
     return value
 
 
+def _member(value: Any, kind: type[Enum]) -> Enum:
+    """A member of an enumeration: of numbers by its name, of texts by its text."""
+    members = {one.name if isinstance(one, int) else one.value: one for one in kind}
+    if not isinstance(value, str) or value not in members:
+        raise FieldError("", f"{shown(value)} is not one of {', '.join(map(repr, members))}")
+    return members[value]
+
+
 def _optional_number(value: Any, kind: Any) -> float | None:
     return None if value is None else _number(value, kind)
 
@@ -164,13 +175,34 @@ def _strict_mapping(kind: Any) -> _Hook:
 
 def _strict_tuple(kind: Any) -> _Hook:
     items = get_args(kind)
-    what = {float: "numbers", str: "texts"}.get(items[0], "lists")
+    what = {float: "numbers", str: "texts"}.get(items[0], "mappings" if attrs.has(items[0]) else "lists")
     wanted = f"a list of {what}" if items[-1] is Ellipsis else f"a list of {len(items)} {what}"
 
     def hook(value: Any, _kind: Any) -> tuple[Any, ...]:
         if not isinstance(value, list) or (items[-1] is not Ellipsis and len(value) != len(items)):
             raise FieldError("", f"{shown(value)} is not {wanted}")
         return tuple(_converter.structure(entry, items[0]) for entry in value)
+
+    return hook
+
+
+def _array(kind: Any) -> _Hook:
+    """A list of numbers as an array; null stands for NaN among those that are not whole."""
+    (number,) = get_args(get_args(kind)[1])
+    is_whole = issubclass(number, np.integer)
+
+    def entry(value: Any) -> float:
+        if is_whole:
+            return _integer(value, int)
+        return math.nan if value is None else _number(value, float)
+
+    def hook(value: Any, _kind: Any) -> Any:
+        if not isinstance(value, list):
+            raise FieldError("", f"{shown(value)} is not a list of numbers")
+        try:
+            return np.array([entry(each) for each in value], number)
+        except OverflowError as error:
+            raise FieldError("", f"{shown(value)} has a number that is too large") from error
 
     return hook
 
@@ -184,7 +216,10 @@ _converter.register_structure_hook(float, _number)
 _converter.register_structure_hook(int, _integer)
 _converter.register_structure_hook(bool, _flag)
 _converter.register_structure_hook(str, _text)
+_converter.register_structure_hook(Enum, _member)
+_converter.register_structure_hook(IntEnum, _member)  # by itself, for it is an int as well
 _converter.register_structure_hook(float | None, _optional_number)
 _converter.register_structure_hook_factory(attrs.has, _strict_class)
 _converter.register_structure_hook_factory(_generic(dict), _strict_mapping)
 _converter.register_structure_hook_factory(_generic(tuple), _strict_tuple)
+_converter.register_structure_hook_factory(_generic(np.ndarray), _array)

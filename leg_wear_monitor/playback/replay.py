@@ -1,6 +1,6 @@
 """Replay of a recording through the monitor; the reports equal those of a live run."""
 
-from collections.abc import Callable, Iterable, Iterator
+from collections.abc import Callable, Iterable, Iterator, Mapping
 from contextlib import ExitStack, nullcontext
 from pathlib import Path
 
@@ -19,7 +19,9 @@ from leg_wear_monitor.monitor.evaluation.gait_evidence import GaitEvidence
 from leg_wear_monitor.monitor.opening import open_monitor
 from leg_wear_monitor.monitor.wear_monitor import WearMonitor
 from leg_wear_monitor.playback.history import History
+from leg_wear_monitor.playback.result.replay_summary import ReplaySummary
 from leg_wear_monitor.playback.sink import Sink
+from leg_wear_monitor.playback.summary import summary
 from leg_wear_monitor.twin.kinds import CRANK, TORQUE
 from leg_wear_monitor.twin.sample import Samples, brings
 
@@ -86,6 +88,12 @@ class ReplayResult:
         stamped_s = (self.end_ns - self.begin_ns) / 1e9
         jumps = not 0.0 <= stamped_s <= _LONGER * self.logged_s + _LONGER_S
         return self.logged_s if jumps else stamped_s
+
+    def summary(
+        self, wall_s: float | None = None, made_with: Mapping[str, str] | None = None
+    ) -> ReplaySummary:
+        """What the replay found, as classes that go out as JSON and as tables; see `playback.summary`."""
+        return summary(self, wall_s, made_with)
 
     def count(self, samples: Samples) -> None:
         """Count samples that are passed to the monitor."""

@@ -128,11 +128,10 @@ def _summary() -> dict[str, Any]:
     import tempfile
 
     from leg_wear_monitor.playback.replay import replay
-    from leg_wear_monitor.playback.summary import summary
 
     with tempfile.TemporaryDirectory() as place:
         (Path(place) / "x.mcap").write_bytes(_true())
-        record = json.loads(json.dumps(summary(replay(Path(place) / "x.mcap"), 1.0)))
+        record = json.loads(replay(Path(place) / "x.mcap").summary().to_json())
     return {key: record[key] for key in _COUNTED}
 
 

@@ -4,6 +4,7 @@ import html
 import json
 import math
 import random
+import re
 from types import SimpleNamespace
 
 import numpy as np
@@ -20,6 +21,11 @@ from leg_wear_monitor.bags.reader import TIMES
 from leg_wear_monitor.messages import encode
 
 SECONDS, RATE_HZ = 4, 200
+# what a changed summary is called: no mapping at all, or by the key at fault, or not fit for a page
+SPOILT = re.compile(
+    r"error: out/summary\.json: (.{1,60} is not a mapping of keys$|([\w ]+\.)*[\w ]+: .+"
+    r"|is not what a replay of this version writes)"
+)
 
 
 @pytest.fixture(scope="module")
@@ -99,8 +105,7 @@ def test_a_summary_changed_anywhere_gives_a_page_or_one_line(run, bag, tmp_path,
         assert (result.exit_code, len(told)) in {(0, 0), (2, 1)}, text
         if told:
             refused += 1
-            expected = ("is not what a replay of this version writes", "schema_version: ")
-            assert told[0].startswith(tuple(f"error: out/summary.json: {fault}" for fault in expected))
+            assert SPOILT.match(told[0])
     assert refused >= 7
 
 

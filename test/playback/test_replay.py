@@ -20,10 +20,10 @@ from leg_wear_monitor.messages.outputs import Messages, topic_of
 from leg_wear_monitor.messages.streams import JOINT_STATE, WRENCH_STAMPED
 from leg_wear_monitor.monitor.config.inputs import Cadence
 from leg_wear_monitor.monitor.config.settings import LedgerFile
-from leg_wear_monitor.monitor.forecast.forecast import Answer
+from leg_wear_monitor.monitor.forecast.forecast import Answer, Quantiles
 from leg_wear_monitor.monitor.ledger.entry import Measurement
 from leg_wear_monitor.monitor.ledger.ledger import open_ledger
-from leg_wear_monitor.playback.summary import summary
+from leg_wear_monitor.playback.result.replay_summary import summary_of
 
 SECONDS, RATE_HZ = 8, 200
 CYCLES = SECONDS - 2  # the first and the last are not whole
@@ -140,7 +140,9 @@ def test_what_a_replay_gives_does_not_depend_on_how_it_was_stored(
 
 def test_the_summary_is_plain_json_and_tells_of_every_joint(out: tuple[Path, Any]) -> None:
     result = out[1]
-    record = json.loads(json.dumps(summary(result, 2.0), allow_nan=False))
+    text = result.summary(2.0).to_json()
+    record = json.loads(text)
+    assert summary_of(record, "summary.json").to_json() == text
     assert record["real_time_factor"] == pytest.approx(result.duration_s / 2.0)
     assert record["cycles"] == len(result.history) >= CYCLES
     assert record["recording"]["crank_samples"] == record["recording"]["torque_samples"] == SECONDS * RATE_HZ
@@ -161,8 +163,8 @@ def test_the_page_is_whole_and_of_one_file(out: tuple[Path, Any]) -> None:
     from leg_wear_monitor.report.page import page_html
     from leg_wear_monitor.report.replay.page import replay_page
 
-    record = {**summary(out[1], 2.0), "made_with": {"leg_wear_monitor": "1"}}
-    html = page_html(replay_page(record))
+    summary = out[1].summary(2.0, {"leg_wear_monitor": "1"})
+    html = page_html(replay_page(summary))
     for title in (
         "Clearance over time",
         "Forecast",
@@ -174,10 +176,10 @@ def test_the_page_is_whole_and_of_one_file(out: tuple[Path, Any]) -> None:
         assert f"{title}</h2>" in html
     assert "http://" not in html and "https://" not in html
     assert html.count("<img") >= 4
-    assert page_html(replay_page(json.loads(json.dumps(record)))) == html
+    assert page_html(replay_page(summary_of(json.loads(summary.to_json()), "summary.json"))) == html
     assert "No clearance was measured yet" in html
     # this torque is that of an ideal leg, which is not what a leg with clearances needs
-    assert record["forecast"]["answer"] == Answer.OUTSIDE_VALIDITY.value
+    assert summary.forecast.answer is Answer.OUTSIDE_VALIDITY
     assert "The leg lasts" not in html
 
 
@@ -186,12 +188,12 @@ def test_the_page_says_how_long_the_leg_lasts(out: tuple[Path, Any]) -> None:
     from leg_wear_monitor.report.page import page_html
     from leg_wear_monitor.report.replay.page import replay_page
 
-    record = {**summary(out[1], 2.0), "made_with": {}}
-    life = {"p10": 700.0, "p50": 1000.0, "p90": 17532.0}
-    first = dict.fromkeys(record["joints"], 0.1) | {"G": 0.6}
-    days = {fraction: hours / 8.0 for fraction, hours in life.items()}
-    leg = {**record["forecast"], "hours": life, "days": days, "first_probability": first, "first": "G"}
-    html = page_html(replay_page({**record, "forecast": leg}))
+    summary = out[1].summary()
+    life = Quantiles(700.0, 1000.0, 17532.0)
+    first = dict.fromkeys(summary.joints, 0.1) | {"G": 0.6}
+    days = Quantiles(*(hours / 8.0 for hours in attrs.astuple(life)))
+    leg = attrs.evolve(summary.forecast, hours=life, days=days, first_probability=first, first="G")
+    html = page_html(replay_page(attrs.evolve(summary, forecast=leg)))
     assert "The leg lasts 1000 hours of walking or 125 days (p10 700 hours of walking or 87.5 days, " in html
     assert "p90 17500 hours of walking or 2190 days); G is the first" in html
     assert "with a probability of 60 %." in html
@@ -203,9 +205,9 @@ def test_the_page_shows_where_measured_clearances_lay_in_what_was_expected(out: 
     from leg_wear_monitor.report.replay.page import replay_page
 
     looked = [Measurement(7, "A", "ann", 3e-4, 1e-6, 0.0, 9, 0, fraction, True) for fraction in (0.2, 0.6)]
-    record = {**summary(out[1], 2.0), "made_with": {}}
-    without = page_html(replay_page(record))
-    html = page_html(replay_page({**record, "measurements": [attrs.asdict(each) for each in looked]}))
+    summary = out[1].summary()
+    without = page_html(replay_page(summary))
+    html = page_html(replay_page(attrs.evolve(summary, measurements=tuple(looked))))
     assert html.count("<img") == without.count("<img") + 1
     assert "lie in the shaded band" in html and "No clearance was measured yet" not in html
 
@@ -223,7 +225,7 @@ def test_the_ledger_of_the_parameters_is_left_alone_and_one_that_is_asked_for_is
     assert again.monitor.wear_depth_m.tobytes() == first.monitor.wear_depth_m.tobytes()
     assert not first.findings
     assert [str(finding) for finding in again.findings] == [f"{bag}: all of it is in the ledger already"]
-    assert summary(again, 1.0)["recording"]["findings"][0]["text"] == "all of it is in the ledger already"
+    assert again.summary().recording.findings[0].text == "all of it is in the ledger already"
 
 
 def test_what_is_counted_already_is_no_doubt_and_another_machine_is_not_counted(
@@ -233,7 +235,7 @@ def test_what_is_counted_already_is_no_doubt_and_another_machine_is_not_counted(
     lw.replay(bag, lw.MonitorConfig(), ledger=own)
     again = lw.replay(bag, lw.MonitorConfig(), ledger=own)
     assert not again.is_believable and not again.is_unusable
-    assert summary(again, 1.0)["gait"]["is_counted"] is True
+    assert again.summary().gait.is_counted
     fast = attrs.evolve(lw.MonitorConfig(), cadence=Cadence(commanded_rpm=240.0))
     other = lw.replay(bag, fast, ledger=tmp_path / "other.db")
     assert other.is_unusable and len(other.history) == CYCLES
@@ -271,7 +273,7 @@ def test_a_replay_that_is_cut_off_is_not_in_the_ledger_and_comes_out_the_same_wh
     assert {found.name for found in tmp_path.iterdir()} == {"whole.db", "own.db", "whole", "own"}
     reports = [(tmp_path / name / "reports.mcap").read_bytes() for name in ("whole", "own")]
     assert reports[0] == reports[1]
-    assert summary(again, 1.0) == summary(whole, 1.0)
+    assert again.summary().to_json() == whole.summary().to_json()
 
 
 def test_a_ledger_that_cannot_be_written_is_refused_before_the_work(
@@ -317,9 +319,9 @@ def test_a_crank_that_hardly_turns_gives_a_result_of_nothing(bag: Path) -> None:
 
     config = lw.MonitorConfig()
     result = lw.replay(bag, attrs.evolve(config, crank=attrs.evolve(config.crank, gear_ratio=100.0)))
-    record = {**summary(result, 1.0), "made_with": {}}
-    assert record["cycles"] == 0 and record["joints"] == {}
-    assert record["gait"]["missing"].startswith("the crank turns 0.08 times in 8 s")
-    page = page_html(replay_page(record))
+    summary = result.summary()
+    assert summary.cycles == 0 and summary.joints == {}
+    assert summary.gait.missing.startswith("the crank turns 0.08 times in 8 s")
+    page = page_html(replay_page(summary))
     assert "forces and wear are not reported" in page
     assert "the crank turns 0.08 times in 8 s" in page

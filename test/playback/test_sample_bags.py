@@ -7,7 +7,7 @@ from typing import Any
 import pytest
 
 import leg_wear_monitor as lw
-from leg_wear_monitor.playback.summary import summary
+from leg_wear_monitor.playback.result.replay_summary import ReplaySummary
 from leg_wear_monitor.share import share_directory
 
 BAGS = share_directory() / "bags"
@@ -16,36 +16,36 @@ SCATTER = 0.25
 
 
 @pytest.fixture(scope="module", params=["healthy", "knocking", "bad_input"])
-def bag(request: pytest.FixtureRequest) -> tuple[dict[str, Any], dict[str, Any]]:
+def bag(request: pytest.FixtureRequest) -> tuple[ReplaySummary, dict[str, Any]]:
     """What a replay finds, and what it should."""
     path: Path = BAGS / f"{request.param}.mcap"
     result = lw.replay(path, path.with_suffix(".yaml"))
-    return summary(result, 1.0), json.loads(path.with_suffix(".json").read_text())
+    return result.summary(), json.loads(path.with_suffix(".json").read_text())
 
 
-def test_every_message_is_taken_or_counted(bag: tuple[dict[str, Any], dict[str, Any]]) -> None:
+def test_every_message_is_taken_or_counted(bag: tuple[ReplaySummary, dict[str, Any]]) -> None:
     found, expected = bag
     for kind in ("crank_samples", "torque_samples"):
-        assert found["recording"][kind] == expected[kind]
-    assert [finding["text"] for finding in found["recording"]["findings"]] == expected["findings"]
+        assert getattr(found.recording, kind) == expected[kind]
+    assert [finding.text for finding in found.recording.findings] == expected["findings"]
     for count in ("faulty", "duplicates", "gaps_lost", "backward_jumps"):
-        assert found["lost"][count] == expected["lost"][count]
-    assert found["lost"]["unmonitored_s"] == pytest.approx(expected["lost"]["unmonitored_s"], abs=0.3)
+        assert getattr(found.lost, count) == expected["lost"][count]
+    assert found.lost.unmonitored_s == pytest.approx(expected["lost"]["unmonitored_s"], abs=0.3)
 
 
-def test_alarms_are_those_that_must_be_raised(bag: tuple[dict[str, Any], dict[str, Any]]) -> None:
+def test_alarms_are_those_that_must_be_raised(bag: tuple[ReplaySummary, dict[str, Any]]) -> None:
     found, expected = bag
-    raised = {f"{change['name']}: {change['level']}" for change in found["alarms"]["changes"]}
+    raised = {f"{change.alarm.name}: {change.alarm.level.name}" for change in found.alarms.changes}
     assert sorted(raised) == expected["alarms"]
 
 
 def test_forces_and_wear_are_the_same_within_their_scatter(
-    bag: tuple[dict[str, Any], dict[str, Any]],
+    bag: tuple[ReplaySummary, dict[str, Any]],
 ) -> None:
     found, expected = bag
-    assert found["cycles"] == expected["cycles"]
-    assert found["joints"].keys() == expected["opened_m"].keys()
-    for name, joint in found["joints"].items():
-        opened = joint["clearance_m"]["last"] - joint["clearance_m"]["first"]
+    assert found.cycles == expected["cycles"]
+    assert found.joints.keys() == expected["opened_m"].keys()
+    for name, joint in found.joints.items():
+        opened = joint.clearance_m.last - joint.clearance_m.first
         assert opened == pytest.approx(expected["opened_m"][name], rel=SCATTER)
-        assert joint["mean_force_n"] == pytest.approx(expected["mean_force_n"][name], rel=SCATTER)
+        assert joint.mean_force_n == pytest.approx(expected["mean_force_n"][name], rel=SCATTER)

@@ -12,7 +12,6 @@ from leg_wear_monitor.cli.output import STDOUT, check_outputs, write_directory, 
 from leg_wear_monitor.cli.waiting import compilation, progress_bar
 from leg_wear_monitor.errors import LegWearError
 from leg_wear_monitor.interrupt import closed_at_the_end
-from leg_wear_monitor.json_text import json_text
 from leg_wear_monitor.monitor.evaluation.specs import INPUT_KINDS, KINDS
 
 if TYPE_CHECKING:
@@ -20,6 +19,7 @@ if TYPE_CHECKING:
 
     from leg_wear_monitor.monitor.config.settings import MonitorConfig
     from leg_wear_monitor.playback.replay import ReplayResult
+    from leg_wear_monitor.playback.result.replay_summary import ReplaySummary
 
 WITH_FINDINGS = 1
 SUMMARY, PAGE = "summary.json", "report.html"
@@ -185,20 +185,19 @@ def _write(result: "ReplayResult", wall_s: float, out: Path | None, json_file: P
     if out is None and json_file is None:
         return []
     from leg_wear_monitor.playback.replay import REPORTS_FILE
-    from leg_wear_monitor.playback.summary import summary
 
-    record = {**summary(result, wall_s), "made_with": {"leg_wear_monitor": version()}}
-    text = json_text(record)
+    summary = result.summary(wall_s, made_with={"leg_wear_monitor": version()})
+    text = summary.to_json()
     written: list[Path] = []
     if out is not None:
-        files = {SUMMARY: text.encode(), PAGE: page_of(record)}
+        files = {SUMMARY: text.encode(), PAGE: page_of(summary)}
         written = [out / REPORTS_FILE, *write_directory(out, files)]
     return written + write_json(json_file, text)
 
 
-def page_of(record: dict[str, Any]) -> bytes:
-    """The page, from what summary.json holds."""
+def page_of(summary: "ReplaySummary") -> bytes:
+    """The page of a replay."""
     from leg_wear_monitor.report.page import page_html
     from leg_wear_monitor.report.replay.page import replay_page
 
-    return page_html(replay_page(record)).encode()
+    return page_html(replay_page(summary)).encode()

@@ -1,7 +1,6 @@
 """``leg-wear-monitor report``: the page of a run again, from its data."""
 
 import json
-import reprlib
 import warnings
 from collections.abc import Iterator
 from contextlib import contextmanager
@@ -12,7 +11,6 @@ import click
 from leg_wear_monitor.cli.output import write_directory
 from leg_wear_monitor.cli.verbs.replay import PAGE, SUMMARY, page_of
 from leg_wear_monitor.errors import ConfigError
-from leg_wear_monitor.playback.schema import SCHEMA_VERSION
 
 _MISMADE = (
     ArithmeticError, AttributeError, LookupError, MemoryError, OSError, RuntimeError, RuntimeWarning,
@@ -39,20 +37,15 @@ def report(directory: Path) -> int:
 
 
 def _replay(directory: Path) -> int:
+    from leg_wear_monitor.playback.result.replay_summary import summary_of
+
     source = directory / SUMMARY
     with _as_one_line(source, "replay"):
         record = json.loads(source.read_text(encoding="utf-8"), parse_constant=_refuse)
-        _check_version(record.get("schema_version", 1), source)
-        page = page_of(record)
+        page = page_of(summary_of(record, str(source)))
     for path in write_directory(directory, {PAGE: page}):
         click.echo(f"written: {path}")
     return 0
-
-
-def _check_version(version: object, source: Path) -> None:
-    if version != SCHEMA_VERSION:
-        fault = f"{reprlib.repr(version)} is not {SCHEMA_VERSION}, the version that this command reads"
-        raise ConfigError(str(source), "schema_version", f"{fault}; replay the recording again")
 
 
 def _refuse(name: str) -> None:

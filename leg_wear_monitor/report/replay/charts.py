@@ -1,13 +1,13 @@
 """What a replay found, over time: clearances, forces, input, alarms."""
 
-from typing import Any
-
 import numpy as np
 from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 from matplotlib.lines import Line2D
 
 from leg_wear_monitor.mechanism.arrays import Floats
+from leg_wear_monitor.monitor.alarms.alarm import Level
+from leg_wear_monitor.playback.result.replay_summary import ReplaySummary
 from leg_wear_monitor.report.figures.figure import (
     BLUE,
     GREEN,
@@ -23,33 +23,24 @@ from leg_wear_monitor.report.figures.figure import (
 )
 
 COLOURS = (BLUE, VERMILION, GREEN, ORANGE, PURPLE, SKY, INK)
-LEVEL_COLOURS = {"OK": GREEN, "WARN": ORANGE, "ERROR": VERMILION}
+LEVEL_COLOURS = {Level.OK: GREEN, Level.WARN: ORANGE, Level.ERROR: VERMILION}
 _WIDTH_IN, _PANEL_IN = 9.0, 2.3
 _UNITS = ((1.0e12, "pm"), (1.0e9, "nm"), (1.0e6, "µm"), (1.0e3, "mm"))
 
 
-def _numbers(values: list[Any]) -> Floats:
-    """Numbers, NaN for null."""
-    return np.array([np.nan if value is None else value for value in values], float)
-
-
-def time_axis(record: dict[str, Any]) -> tuple[Floats, str]:
+def time_axis(summary: ReplaySummary) -> tuple[Floats, str]:
     """Time of each entry of the history since the recording's begin, and its unit."""
-    recording = record["recording"]
-    seconds = (np.array(record["history"]["stamp_ns"], float) - recording["begin_ns"]) / 1.0e9
+    seconds = (summary.history.stamp_ns.astype(float) - summary.recording.begin_ns) / 1.0e9
     longest = float(seconds.max()) if len(seconds) else 0.0
     if longest > 3.0 * 3600.0:
         return seconds / 3600.0, "h"
     return (seconds / 60.0, "min") if longest > 300.0 else (seconds, "s")
 
 
-def clearance_chart(record: dict[str, Any]) -> Figure:
+def clearance_chart(summary: ReplaySummary) -> Figure:
     """How much each clearance has opened since the first gait cycle."""
-    time, unit = time_axis(record)
-    opened = {}
-    for joint, values in record["history"]["clearance_m"].items():
-        clearance = _numbers(values)
-        opened[joint] = clearance - clearance[0]
+    time, unit = time_axis(summary)
+    opened = {joint: values - values[0] for joint, values in summary.history.clearance_m.items()}
     greatest = max((float(np.nanmax(np.abs(values))) for values in opened.values()), default=0.0)
     scale, name = next(((s, n) for s, n in _UNITS if s * greatest < 1000.0), _UNITS[-1])
     figure = new_figure(_WIDTH_IN, 3.2)
@@ -62,20 +53,20 @@ def clearance_chart(record: dict[str, Any]) -> Figure:
     return figure
 
 
-def force_chart(record: dict[str, Any]) -> Figure:
+def force_chart(summary: ReplaySummary) -> Figure:
     """Peak and mean contact force of each joint in each gait cycle, a panel a joint."""
-    time, unit = time_axis(record)
-    history, limits = record["history"], record["monitor"]["limits"]
-    joints = list(history["peak_force_n"])
+    time, unit = time_axis(summary)
+    history, limits = summary.history, summary.monitor.limits
+    joints = list(history.peak_force_n)
     figure = new_figure(_WIDTH_IN, 0.6 + 1.25 * max(1, len(joints)))
     panels = list(np.atleast_1d(figure.subplots(max(1, len(joints)), 1, sharex=True)))
     for k, (axes, joint) in enumerate(zip(panels, joints, strict=False)):
-        peak, mean = (_numbers(history[name][joint]) for name in ("peak_force_n", "mean_force_n"))
+        peak, mean = history.peak_force_n[joint], history.mean_force_n[joint]
         axes.fill_between(time, mean, peak, color=SKY, alpha=0.4, linewidth=0.0)
         axes.plot(time, peak, color=BLUE, linewidth=0.9)
         axes.plot(time, mean, color=INK, linewidth=0.9)
-        own = limits["joint_impact_force_n"]
-        limit = own[k] if own else limits["impact_force_n"]
+        own = limits.joint_impact_force_n
+        limit = own[k] if own else limits.impact_force_n
         if limit < 3.0 * np.nanmax(peak):
             axes.axhline(limit, color=VERMILION, linewidth=1.0, linestyle=(0, (4, 2)))
         axes.set_ylim(bottom=0.0)
@@ -84,23 +75,25 @@ def force_chart(record: dict[str, Any]) -> Figure:
     return figure
 
 
-def health_chart(record: dict[str, Any]) -> Figure:
+def health_chart(summary: ReplaySummary) -> Figure:
     """Cadence, the torque's mismatch, and the load and friction that explain the rest."""
-    time, unit = time_axis(record)
-    history = record["history"]
+    time, unit = time_axis(summary)
+    history = summary.history
     figure = new_figure(_WIDTH_IN, 3.0 * _PANEL_IN * 0.75)
     panels = list(figure.subplots(3, 1, sharex=True))
-    panels[0].plot(time, _numbers(history["cadence_rpm"]), color=BLUE, linewidth=1.1)
-    panels[0].axhline(record["monitor"]["commanded_rpm"], color=INK, linewidth=0.8, linestyle=(0, (4, 2)))
+    panels[0].plot(time, history.cadence_rpm, color=BLUE, linewidth=1.1)
+    panels[0].axhline(summary.monitor.commanded_rpm, color=INK, linewidth=0.8, linestyle=(0, (4, 2)))
     panels[0].ticklabel_format(useOffset=False)
     panels[0].set_ylabel("cadence [rpm]", fontsize=SMALL)
-    for name, colour in (("measured_torque_rms_nm", VERMILION), ("predicted_torque_rms_nm", BLUE)):
-        label = name.split("_")[0]
-        panels[1].plot(time, _numbers(history[name]), color=colour, linewidth=1.1, label=label)
+    for label, torque, colour in (
+        ("measured", history.measured_torque_rms_nm, VERMILION),
+        ("predicted", history.predicted_torque_rms_nm, BLUE),
+    ):
+        panels[1].plot(time, torque, color=colour, linewidth=1.1, label=label)
     panels[1].set_ylabel("torque, RMS [N m]", fontsize=SMALL)
     panels[1].legend(fontsize=SMALL, frameon=False, loc="upper right", ncols=2)
-    panels[2].plot(time, _numbers(history["torque_mismatch"]), color=BLUE, linewidth=1.1)
-    limit = record["monitor"]["limits"]["torque_mismatch"]
+    panels[2].plot(time, history.torque_mismatch, color=BLUE, linewidth=1.1)
+    limit = summary.monitor.limits.torque_mismatch
     panels[2].axhline(limit, color=VERMILION, linewidth=1.0, linestyle=(0, (4, 2)))
     panels[2].set_ylabel("mismatch", fontsize=SMALL)
     panels[2].set_ylim(bottom=0.0)
@@ -108,20 +101,20 @@ def health_chart(record: dict[str, Any]) -> Figure:
     return figure
 
 
-def alarm_chart(record: dict[str, Any]) -> Figure:
+def alarm_chart(summary: ReplaySummary) -> Figure:
     """When each alarm that was ever raised was at which level."""
-    begin, end = record["recording"]["begin_ns"], record["recording"]["end_ns"]
-    changes = record["alarms"]["changes"]
-    names = list(dict.fromkeys(change["name"] for change in changes))
+    begin, end = summary.recording.begin_ns, summary.recording.end_ns
+    changes = summary.alarms.changes
+    names = list(dict.fromkeys(change.alarm.name for change in changes))
     span, unit = _span((end - begin) / 1.0e9)
     figure = new_figure(_WIDTH_IN, 0.9 + 0.28 * max(1, len(names)))
     axes = figure.add_subplot()
     for row, name in enumerate(reversed(names)):
-        own = [change for change in changes if change["name"] == name]
-        times = [(change["stamp_ns"] - begin) / 1.0e9 / span for change in own]
+        own = [change for change in changes if change.alarm.name == name]
+        times = [(change.stamp_ns - begin) / 1.0e9 / span for change in own]
         times.append((end - begin) / 1.0e9 / span)
         for k, change in enumerate(own):
-            colour = LEVEL_COLOURS[change["level"]]
+            colour = LEVEL_COLOURS[change.alarm.level]
             width = max(times[k + 1] - times[k], 0.0)
             axes.barh(row, width, left=times[k], height=0.7, color=colour, linewidth=0.0)
             axes.plot([times[k]] * 2, [row - 0.35, row + 0.35], color=colour, linewidth=1.2)
@@ -129,7 +122,9 @@ def alarm_chart(record: dict[str, Any]) -> Figure:
     axes.set_xlim(0.0, max((end - begin) / 1.0e9 / span, 1.0e-9))
     tidy(axes)
     axes.set_xlabel(f"time [{unit}]", fontsize=SMALL)
-    keys = {level: Line2D([], [], color=colour, linewidth=5.0) for level, colour in LEVEL_COLOURS.items()}
+    keys = {
+        level.name: Line2D([], [], color=colour, linewidth=5.0) for level, colour in LEVEL_COLOURS.items()
+    }
     axes.legend(
         list(keys.values()),
         list(keys),

@@ -1,10 +1,12 @@
 """The page of a replay, from its summary."""
 
-from typing import Any
-
+import attrs
 import numpy as np
 
+from leg_wear_monitor.monitor.alarms.alarm import Level
 from leg_wear_monitor.monitor.alarms.words import raised_words, time_words
+from leg_wear_monitor.playback.result.recording import ReplayGait, ReplayRecording
+from leg_wear_monitor.playback.result.replay_summary import ReplaySummary
 from leg_wear_monitor.report.figures.figure import png
 from leg_wear_monitor.report.figures.worn_bushings import worn_bushings
 from leg_wear_monitor.report.page import Page, Part, Picture, Section, Sentences, Table, Text
@@ -16,82 +18,75 @@ from leg_wear_monitor.wear.surfaces import Surfaces
 _MOST_ROWS = 50
 
 
-def replay_page(record: dict[str, Any]) -> Page:
-    """The page of a replay.
-
-    Parameters
-    ----------
-    record : dict
-        What summary.json holds.
-    """
-    recording, monitor = record["recording"], record["monitor"]
-    summary = (
-        f"{monitor['mechanism']}, clearance joints {', '.join(monitor['clearance_joints'])}: "
-        f"{_time(recording['duration_s'])} from "
-        f"{time_words(recording['begin_ns'])}, {record['cycles']} gait cycles. {record['advice']}"
+def replay_page(summary: ReplaySummary) -> Page:
+    """The page of a replay."""
+    recording, monitor = summary.recording, summary.monitor
+    what = (
+        f"{monitor.mechanism}, clearance joints {', '.join(monitor.clearance_joints)}: "
+        f"{_time(recording.duration_s)} from "
+        f"{time_words(recording.begin_ns)}, {summary.cycles} gait cycles. {summary.advice}"
     )
-    sections = [Section("Results", [Sentences(_sentences(record))]), _recording(recording)]
-    if _is_believable(record):
-        sections += [_clearance(record), *clearance_sections(record), forecast_section(record)]
-        sections += [_forces(record), _wear(record)]
-    sections += [_alarms(record), _health(record)]
-    title = f"Joint wear of {monitor['hardware_id']}"
-    return Page(title=title, summary=summary, sections=sections, versions=record["made_with"])
+    sections = [Section("Results", [Sentences(_sentences(summary))]), _recording(recording)]
+    if summary.gait.believable_cycles:
+        sections += [_clearance(summary), *clearance_sections(summary.joints), forecast_section(summary)]
+        sections += [_forces(summary), _wear(summary)]
+    sections += [_alarms(summary), _health(summary)]
+    title = f"Joint wear of {monitor.hardware_id}"
+    return Page(title=title, summary=what, sections=sections, versions=summary.made_with)
 
 
-def _sentences(record: dict[str, Any]) -> list[str]:
+def _sentences(summary: ReplaySummary) -> list[str]:
     """What to know first."""
     sentences = []
-    if record["recording"]["is_partial"]:
+    if summary.recording.is_partial:
         sentences.append("The recording is damaged or incomplete: the results are from its readable part.")
-    if record.get("gait", {}).get("is_counted"):
-        sentences.append("All of it is in the ledger already, so no gait cycle was processed again.")
-    elif not _is_believable(record):
-        sentences.append("No gait cycle fits this leg, so forces and wear are not reported.")
-        if missing := record.get("gait", {}).get("missing"):
-            sentences.append(f"Missing: {missing}.")
-    raised = [alarm for alarm in record["alarms"]["now"] if alarm["level"] != "OK"]
+    sentences += _gait_sentences(summary.gait)
+    raised = [alarm for alarm in summary.alarms.now if alarm.level is not Level.OK]
     for alarm in raised:
-        values = (alarm.get(key) for key in ("state", "worst", "limit", "unit", "raised_ns"))
-        sentences.append(f"{alarm['name']}: {alarm['level']}, {raised_words(*values)}.")
+        words = raised_words(alarm.state, alarm.worst, alarm.limit, alarm.unit, alarm.raised_ns)
+        sentences.append(f"{alarm.name}: {alarm.level.name}, {words}.")
     if not raised:
         sentences.append("No alarm is raised at the end.")
     growing = {
-        name: joint["growth_m_per_cycle"]
-        for name, joint in record["joints"].items()
-        if joint["growth_m_per_cycle"] is not None
+        name: joint.growth_m_per_cycle
+        for name, joint in summary.joints.items()
+        if joint.growth_m_per_cycle is not None
     }
     if growing:
         fastest = max(growing, key=lambda name: growing[name])
         sentences.append(f"{fastest} wears fastest: {1.0e12 * growing[fastest]:.3g} pm a gait cycle.")
-    sentences += leg_sentence(record)
-    sentences += clearance_sentences(record)
-    if record["monitor"]["wear_acceleration"] != 1.0:
-        factor = record["monitor"]["wear_acceleration"]
+    sentences += leg_sentence(summary)
+    sentences += clearance_sentences(summary.joints)
+    factor = summary.monitor.wear_acceleration
+    if factor != 1.0:
         sentences.append(f"All wear is multiplied by {factor:g}: a demonstration, not a measurement.")
-    lost_s = record["lost"]["unmonitored_s"]
-    if lost_s:
-        sentences.append(f"{_time(lost_s)} could not be followed and is not counted.")
+    if summary.lost.unmonitored_s:
+        sentences.append(f"{_time(summary.lost.unmonitored_s)} could not be followed and is not counted.")
     return sentences
 
 
-def _is_believable(record: dict[str, Any]) -> bool:
-    """Whether a gait cycle can be this leg's; a summary of an older version counts any."""
-    return bool(record["gait"]["believable_cycles"] if "gait" in record else record["cycles"])
+def _gait_sentences(gait: ReplayGait) -> list[str]:
+    """Why there are no forces, if there are none."""
+    if gait.is_counted:
+        return ["All of it is in the ledger already, so no gait cycle was processed again."]
+    if gait.believable_cycles:
+        return []
+    missing = [f"Missing: {gait.missing}."] if gait.missing else []
+    return ["No gait cycle fits this leg, so forces and wear are not reported.", *missing]
 
 
-def _recording(recording: dict[str, Any]) -> Section:
+def _recording(recording: ReplayRecording) -> Section:
     rows = [
-        ("files", ", ".join(recording["files"])),
-        ("topics", ", ".join(f"{name}: {topic}" for name, topic in recording["topics"].items())),
-        ("stamps", f"{recording['time']} time"),
-        ("crank samples", f"{recording['crank_samples']}"),
-        ("torque samples", f"{recording['torque_samples']}"),
-        ("begin", time_words(recording["begin_ns"])),
-        ("end", time_words(recording["end_ns"])),
+        ("files", ", ".join(recording.files)),
+        ("topics", ", ".join(f"{name}: {topic}" for name, topic in recording.topics.items())),
+        ("stamps", f"{recording.time} time"),
+        ("crank samples", f"{recording.crank_samples}"),
+        ("torque samples", f"{recording.torque_samples}"),
+        ("begin", time_words(recording.begin_ns)),
+        ("end", time_words(recording.end_ns)),
     ]
     parts: list[Part] = [Table(caption="Topics, time and samples", head=("", ""), rows=rows)]
-    findings = [f"{each['file']}: {each['text']}" for each in recording["findings"]]
+    findings = [f"{each.file}: {each.text}" for each in recording.findings]
     if findings:
         more = len(findings) - _MOST_ROWS
         parts.append(Sentences(findings[:_MOST_ROWS] + ([f"and {more} more"] if more > 0 else [])))
@@ -100,24 +95,24 @@ def _recording(recording: dict[str, Any]) -> Section:
     return Section("The recording", parts)
 
 
-def _clearance(record: dict[str, Any]) -> Section:
+def _clearance(summary: ReplaySummary) -> Section:
     picture = Picture(
-        image=png(clearance_chart(record)),
+        image=png(clearance_chart(summary)),
         alt="Opening of each joint's mean radial clearance over time",
         caption="Mean radial clearance of each joint, minus its value after the first gait cycle.",
         wide=True,
     )
     head = ("joint", "counted clearance [mm]", "opened [nm]", "growth [pm/cycle]", "± [pm/cycle]")
     rows = []
-    for name, joint in record["joints"].items():
-        clearance = joint["clearance_m"]
+    for name, joint in summary.joints.items():
+        clearance = joint.clearance_m
         rows.append(
             (
                 name,
                 counted_mm(joint),
-                _figure(1.0e9, clearance["last"] - clearance["first"]),
-                _figure(1.0e12, joint["growth_m_per_cycle"]),
-                _figure(1.0e12, joint["growth_error_m_per_cycle"]),
+                _figure(1.0e9, clearance.last - clearance.first),
+                _figure(1.0e12, joint.growth_m_per_cycle),
+                _figure(1.0e12, joint.growth_error_m_per_cycle),
             )
         )
     table = Table(
@@ -131,9 +126,9 @@ def _clearance(record: dict[str, Any]) -> Section:
     return Section("Clearance over time", [picture, table])
 
 
-def _forces(record: dict[str, Any]) -> Section:
+def _forces(summary: ReplaySummary) -> Section:
     picture = Picture(
-        image=png(force_chart(record)),
+        image=png(force_chart(summary)),
         alt="Peak and mean contact force of each joint over time",
         caption="Contact force in each gait cycle: peak (blue) and mean (black). Dashed: the limit, where it "
         "is near. Peaks are of a heavy tail; their scatter does not mean that the joint changes.",
@@ -142,21 +137,21 @@ def _forces(record: dict[str, Any]) -> Section:
     rows = [
         (
             name,
-            _figure(1.0, joint["peak_force_n"]),
-            _figure(1.0, joint["mean_force_n"]),
-            str(joint["impacts"]),
+            _figure(1.0, joint.peak_force_n),
+            _figure(1.0, joint.mean_force_n),
+            str(joint.impacts),
         )
-        for name, joint in record["joints"].items()
+        for name, joint in summary.joints.items()
     ]
     table = Table(caption="Contact forces", head=("joint", "peak [N]", "mean [N]", "impacts"), rows=rows)
     return Section("Impact forces", [picture, table])
 
 
-def _wear(record: dict[str, Any]) -> Section:
-    wear = record["wear_depth_m"]
-    depth = np.array([[joint["bushing"], joint["journal"]] for joint in wear.values()], float)
-    radii = tuple(record["monitor"]["bushing_radius_m"][name] for name in wear)
-    cycles = record["history"]["cycle"][-1]
+def _wear(summary: ReplaySummary) -> Section:
+    wear = summary.wear_depth_m
+    depth = np.array([[joint.bushing, joint.journal] for joint in wear.values()], float)
+    radii = tuple(summary.monitor.bushing_radius_m[name] for name in wear)
+    cycles = float(summary.history.cycle[-1])
     picture = Picture(
         image=png(worn_bushings(Surfaces(depth, 1), tuple(wear), radii, cycles)),
         alt="Wear depth around bushing and journal of each joint",
@@ -168,19 +163,19 @@ def _wear(record: dict[str, Any]) -> Section:
     return Section("Wear around each bushing", [picture])
 
 
-def _alarms(record: dict[str, Any]) -> Section:
-    changes = record["alarms"]["changes"]
+def _alarms(summary: ReplaySummary) -> Section:
+    changes = summary.alarms.changes
     if not changes:
         return Section("Alarms", [Text("No alarm was raised.")])
-    begin = record["recording"]["begin_ns"]
+    begin = summary.recording.begin_ns
     rows = [
         (
-            f"{(change['stamp_ns'] - begin) / 1.0e9:.2f}",
-            change["name"],
-            change["level"],
-            change["state"],
-            _figure(1.0, change["value"]),
-            f"{_figure(1.0, change['limit'])} {change['unit']}".strip(),
+            f"{(change.stamp_ns - begin) / 1.0e9:.2f}",
+            change.alarm.name,
+            change.alarm.level.name,
+            change.alarm.state,
+            _figure(1.0, change.alarm.value),
+            f"{_figure(1.0, change.alarm.limit)} {change.alarm.unit}".strip(),
         )
         for change in changes[:_MOST_ROWS]
     ]
@@ -191,21 +186,21 @@ def _alarms(record: dict[str, Any]) -> Section:
         rows=rows,
         note=f"{more} more are in summary.json." if more > 0 else "",
     )
-    picture = Picture(image=png(alarm_chart(record)), alt="Levels of alarms over time", wide=True)
+    picture = Picture(image=png(alarm_chart(summary)), alt="Levels of alarms over time", wide=True)
     return Section("Alarms", [picture, table])
 
 
-def _health(record: dict[str, Any]) -> Section:
-    lost = {**record["lost"], **record["lost"]["faulty"]}
+def _health(summary: ReplaySummary) -> Section:
+    lost = {**attrs.asdict(summary.lost), **summary.lost.faulty}
     rows = [
         (name.replace("_", " "), _figure(1.0, value))
         for name, value in lost.items()
         if not isinstance(value, dict)
     ]
     parts: list[Part] = []
-    if record["cycles"]:
+    if summary.cycles:
         chart = Picture(
-            image=png(health_chart(record)),
+            image=png(health_chart(summary)),
             alt="Cadence, drive torque and torque mismatch over time",
             caption="Cadence with the commanded one dashed; measured and predicted drive torque; the "
             "fraction that load, friction and lag do not explain, with its limit.",
@@ -213,7 +208,7 @@ def _health(record: dict[str, Any]) -> Section:
         )
         parts.append(chart)
     parts.append(Table(caption="Unused samples and lost time", head=("", "number"), rows=rows))
-    status = [(each["name"], each["level"], each["message"]) for each in record["status"]]
+    status = [(each.name, each.level.name, each.message) for each in summary.status]
     parts.append(Table(caption="State at the end", head=("", "level", "message"), rows=status))
     return Section("Input health", parts)
 

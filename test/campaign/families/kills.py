@@ -92,14 +92,13 @@ def _run(directory: Path, kill_after_s: float | None = None) -> bool:
 
 def _replay(directory: Path) -> int:
     import leg_wear_monitor as lw
-    from leg_wear_monitor.playback.summary import summary
 
     out = directory / "out"
     lw.replay(
         _BAG,
         ledger=directory / "wear.ledger",
         out=out,
-        finish=lambda result: (out / "summary.json").write_text(json.dumps(summary(result, 1.0))),
+        finish=lambda result: (out / "summary.json").write_text(result.summary().to_json()),
     )
     return 0
 

@@ -1,0 +1,96 @@
+"""What was replayed: the recording, the settings of the monitor, and whether both fit together."""
+
+import attrs
+
+from leg_wear_monitor.bags.findings import Severity
+from leg_wear_monitor.monitor.config.settings import Limits
+
+
+@attrs.frozen(kw_only=True)
+class ReplayFinding:
+    """A fault of the recording: ``file``, ``text`` on one line, and ``weight``, its effect on the result."""
+
+    file: str
+    text: str
+    weight: Severity
+
+
+@attrs.frozen(kw_only=True)
+class ReplayRecording:
+    """What was read.
+
+    Attributes
+    ----------
+    files : tuple of str
+    topics : dict of str to str
+        By their relative name in the node.
+    time : str
+        Source of the stamps: ``header``, ``log`` or ``publish``.
+    is_partial : bool
+        Whether recorded data are lost or may be wrong.
+    findings : tuple of ReplayFinding
+    crank_samples, torque_samples : int
+    begin_ns, end_ns : int
+        First and last stamp [ns]; 0 without samples.
+    duration_s : float
+    """
+
+    files: tuple[str, ...]
+    topics: dict[str, str]
+    time: str
+    is_partial: bool
+    findings: tuple[ReplayFinding, ...]
+    crank_samples: int
+    torque_samples: int
+    begin_ns: int
+    end_ns: int
+    duration_s: float
+
+
+@attrs.frozen(kw_only=True)
+class ReplayMonitor:
+    """Settings of the monitor that the results depend on.
+
+    Attributes
+    ----------
+    mechanism, hardware_id : str
+    clearance_joints : tuple of str
+    commanded_rpm : float
+        Cadence that the gait should have.
+    wear_acceleration : float
+        Factor on all wear.
+    bushing_radius_m : dict of str to float
+        Of each clearance joint.
+    limits : Limits
+    duty_hours_per_day : float
+        Usual walking a day.
+    """
+
+    mechanism: str
+    hardware_id: str
+    clearance_joints: tuple[str, ...]
+    commanded_rpm: float
+    wear_acceleration: float
+    bushing_radius_m: dict[str, float]
+    limits: Limits
+    duty_hours_per_day: float
+
+
+@attrs.frozen(kw_only=True)
+class ReplayGait:
+    """Whether the motion was a gait of this leg.
+
+    Attributes
+    ----------
+    believable_cycles, doubtful_cycles : int
+        Gait cycles that fit this leg, and that do not.
+    missing : str
+        Why none fits; empty if one does.
+    is_counted : bool
+        Whether all of the recording was in the ledger already.
+    """
+
+    believable_cycles: int
+    doubtful_cycles: int
+    missing: str
+    is_counted: bool

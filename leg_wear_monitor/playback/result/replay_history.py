@@ -1,0 +1,76 @@
+"""A replay over time: gait cycles as columns, thinned where they are many."""
+
+from typing import TYPE_CHECKING
+
+import attrs
+
+from leg_wear_monitor.data_frame import data_frame
+from leg_wear_monitor.mechanism.arrays import Floats, Ints
+
+if TYPE_CHECKING:
+    import pandas as pd
+
+
+@attrs.frozen(kw_only=True, eq=False)
+class ReplayHistory:
+    """Columns over n groups of gait cycles: last value of each; maximum of peaks, sum of impacts.
+
+    NaN where a value is not known. What a joint has is an array a joint, by its name.
+
+    Attributes
+    ----------
+    stamp_ns : (n,) array
+        End of the last gait cycle [ns].
+    cycle : (n,) array
+        Number of that gait cycle over the whole life in the ledger.
+    cadence_rpm, moving_s, bridged_s : (n,) arrays
+        Mean crank speed, time in motion and of it the time bridged in gaps.
+    measured_torque_rms_nm, predicted_torque_rms_nm, torque_mismatch : (n,) arrays
+        RMS of the drive torque, and the fraction that load, friction and lag do not explain.
+    load_n, friction_nm : (n,) arrays
+        Foot load and friction of the drive, as estimated.
+    clearance_m, clearance_max_m : dict of str to (n,) array
+        Mean and largest radial clearance around the bushing.
+    growth_m_per_cycle : dict of str to (n,) array
+    peak_force_n, p99_force_n, mean_force_n : dict of str to (n,) array
+        Of the contact force.
+    impacts : dict of str to (n,) array
+    """
+
+    stamp_ns: Ints
+    cycle: Floats
+    cadence_rpm: Floats
+    moving_s: Floats
+    bridged_s: Floats
+    measured_torque_rms_nm: Floats
+    predicted_torque_rms_nm: Floats
+    torque_mismatch: Floats
+    load_n: Floats
+    friction_nm: Floats
+    clearance_m: dict[str, Floats]
+    clearance_max_m: dict[str, Floats]
+    growth_m_per_cycle: dict[str, Floats]
+    peak_force_n: dict[str, Floats]
+    p99_force_n: dict[str, Floats]
+    mean_force_n: dict[str, Floats]
+    impacts: dict[str, Floats]
+
+    def columns(self) -> dict[str, Floats | Ints]:
+        """Columns of a table over time; a joint's value after a dot: ``clearance_m.A``."""
+        columns: dict[str, Floats | Ints] = {}
+        for name, value in attrs.asdict(self, recurse=False).items():
+            if isinstance(value, dict):
+                columns |= {f"{name}.{joint}": column for joint, column in value.items()}
+            else:
+                columns[name] = value
+        return columns
+
+    def to_pandas(self) -> "pd.DataFrame":
+        """Table of `columns` by stamp [ns]; requires pandas.
+
+        Raises
+        ------
+        LegWearError
+            If pandas is not installed.
+        """
+        return data_frame(self.columns(), index="stamp_ns")

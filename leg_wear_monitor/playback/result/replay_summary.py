@@ -1,0 +1,129 @@
+"""What a replay found, how it goes out as JSON and as tables, and how it comes back from a file."""
+
+import reprlib
+from typing import TYPE_CHECKING, Any
+
+import attrs
+
+from leg_wear_monitor.configuration.strict import structure
+from leg_wear_monitor.data_frame import data_frame
+from leg_wear_monitor.errors import ConfigError
+from leg_wear_monitor.json_text import json_text
+from leg_wear_monitor.monitor.ledger.entry import Measurement
+from leg_wear_monitor.monitor.reports import Lost
+from leg_wear_monitor.playback.result.document import alarms_document, joint_document, part_document
+from leg_wear_monitor.playback.result.parts import (
+    LegLife,
+    ReplayAlarms,
+    ReplayJoint,
+    ReplayStatus,
+    WornDepth,
+)
+from leg_wear_monitor.playback.result.recording import ReplayGait, ReplayMonitor, ReplayRecording
+from leg_wear_monitor.playback.result.replay_history import ReplayHistory
+from leg_wear_monitor.playback.result.tables import joint_columns
+
+if TYPE_CHECKING:
+    import pandas as pd
+
+SCHEMA_VERSION = 2
+"""Of the JSON; counts up when a field is renamed, removed or means something else."""
+
+
+@attrs.frozen(kw_only=True, eq=False)
+class ReplaySummary:
+    """What a replay found; its page is made of this alone.
+
+    Attributes
+    ----------
+    recording : ReplayRecording
+    monitor : ReplayMonitor
+    wall_s : float or None
+        Wall-clock duration of the replay [s]; None if nobody measured it.
+    real_time_factor : float or None
+        Duration of the recording, as a multiple of that.
+    cycles : int
+        Gait cycles.
+    gait : ReplayGait
+    joints : dict of str to ReplayJoint
+        Clearance joints; empty without one gait cycle that fits this leg.
+    forecast : LegLife or None
+        The leg's.
+    measurements : tuple of Measurement
+        Of the ledger.
+    alarms : ReplayAlarms
+    status : tuple of ReplayStatus
+    lost : Lost
+    history : ReplayHistory
+    wear_depth_m : dict of str to WornDepth
+        Since the start of the ledger, or of the replay without one.
+    advice : str
+    made_with : dict of str to str
+        Names and versions of what made it.
+    """
+
+    recording: ReplayRecording
+    monitor: ReplayMonitor
+    wall_s: float | None = None
+    real_time_factor: float | None = None
+    cycles: int
+    gait: ReplayGait
+    joints: dict[str, ReplayJoint]
+    forecast: LegLife | None
+    measurements: tuple[Measurement, ...]
+    alarms: ReplayAlarms
+    status: tuple[ReplayStatus, ...]
+    lost: Lost
+    history: ReplayHistory
+    wear_depth_m: dict[str, WornDepth]
+    advice: str
+    made_with: dict[str, str] = attrs.Factory(dict)
+
+    def to_dict(self) -> dict[str, Any]:
+        """Plain object: what ``replay --json`` writes; null for what is not known."""
+        record = {name: part_document(part) for name, part in attrs.asdict(self, recurse=False).items()}
+        record["joints"] = {name: joint_document(joint) for name, joint in self.joints.items()}
+        record["alarms"] = alarms_document(self.alarms)
+        return {"schema_version": SCHEMA_VERSION, **record}
+
+    def to_json(self) -> str:
+        """Text of ``summary.json``."""
+        return json_text(self.to_dict())
+
+    def to_pandas(self) -> "pd.DataFrame":
+        """Table with a row for each joint; requires pandas.
+
+        Columns are named as the fields are, parts of a field after a dot: ``forecast.hours.p50``. The table
+        over time is `ReplayHistory.to_pandas`.
+
+        Raises
+        ------
+        LegWearError
+            If pandas is not installed.
+        """
+        return data_frame(joint_columns(self.joints), index="joint")
+
+
+def summary_of(record: Any, source: str) -> ReplaySummary:
+    """The summary of a plain object, as `ReplaySummary.to_dict` gives it.
+
+    Parameters
+    ----------
+    record : object
+        What a file of JSON contains.
+    source : str
+        Name of the file, for messages.
+
+    Raises
+    ------
+    ConfigError
+        If the object has another version, or is no summary; it names the key at fault.
+    """
+    record = structure(record, dict[str, Any], source, "")
+    version = record.get("schema_version", 1)
+    if version != SCHEMA_VERSION:
+        fault = f"{reprlib.repr(version)} is not {SCHEMA_VERSION}, the version that this command reads"
+        raise ConfigError(source, "schema_version", f"{fault}; replay the recording again")
+    parts = {name: part for name, part in record.items() if name != "schema_version"}
+    summary: ReplaySummary = structure(parts, ReplaySummary, source, "")
+    return summary

@@ -1,12 +1,14 @@
 """Where compiled code may lie. Its index files are pickles, so nobody else may be able to write them."""
 
 import atexit
+import fcntl
 import os
 import shutil
 import stat
 import tempfile
 import warnings
-from contextlib import suppress
+from collections.abc import Iterator
+from contextlib import ExitStack, contextmanager, suppress
 from functools import cache
 from pathlib import Path
 
@@ -154,6 +156,22 @@ def kept_directories(place: Path) -> list[Path]:
         return sorted(each for each in place.iterdir() if each.is_dir() and not each.is_symlink())
     except OSError:
         return []
+
+
+@contextmanager
+def one_process_at_a_time(path: Path) -> Iterator[None]:
+    """Wait until no other process is inside with the same lock file; where there are no locks, do not wait.
+
+    A process that ends inside, however it does, lets the next one in.
+
+    Parameters
+    ----------
+    path : pathlib.Path
+    """
+    with ExitStack() as stack:
+        with suppress(OSError):
+            fcntl.flock(stack.enter_context(path.open("ab")), fcntl.LOCK_EX)
+        yield
 
 
 @cache

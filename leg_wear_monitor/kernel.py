@@ -5,12 +5,13 @@ import hashlib
 from collections.abc import Callable, Iterable
 from functools import cache
 from pathlib import Path
-from typing import TypeVar
+from typing import Any, TypeVar
 
 import numba
+from numba.core.compiler_lock import global_compiler_lock
 
 from leg_wear_monitor import whole_program
-from leg_wear_monitor.code_cache import PACKAGE, code_directory
+from leg_wear_monitor.code_cache import PACKAGE, code_directory, one_process_at_a_time
 
 _Function = TypeVar("_Function", bound=Callable[..., object])
 
@@ -102,14 +103,83 @@ def kernel(function: _Function) -> _Function:
 
 
 def entry(function: _Function) -> _Function:
-    """Compile what Python calls: a kernel with a cache of its own, that lets other threads run meanwhile."""
+    """Compile what Python calls: a kernel with a cache of its own, that lets other threads run meanwhile.
+
+    While another process compiles the same entry, this one waits for it, and loads what it has made.
+    """
     home, previous = cache_directory(Path(function.__code__.co_filename)), numba.config.CACHE_DIR
     numba.config.CACHE_DIR = str(home or previous)
     try:
         compiled = numba.njit(cache=home is not None, nogil=True, **_ENTRY)(function)
     finally:
         numba.config.CACHE_DIR = previous
+    if home is not None and not numba.config.DISABLE_JIT:
+        compiled.compile = _compiled_once(compiled.compile, home / f"{function.__name__}.lock")
     return compiled  # type: ignore[no-any-return]
+
+
+def _compiled_once(compile_or_load: Callable[..., object], lock: Path) -> Callable[..., object]:
+    """A dispatcher's method ``compile``, in one process at a time."""
+
+    def compile_in_turn(signature: object) -> object:
+        # numba's own lock first: two threads that each held one of the two would wait for ever
+        with global_compiler_lock, one_process_at_a_time(lock):
+            return compile_or_load(signature)
+
+    return compile_in_turn
+
+
+def compile_for(compiled: Callable[..., object], *arguments: object) -> None:
+    """Compile an entry for the types of arguments, or load it, without running it."""
+    if hasattr(compiled, "py_func"):
+        compiled.compile(tuple(map(numba.typeof, arguments)))  # type: ignore[attr-defined]
+
+
+def is_stored(compiled: Callable[..., object]) -> bool:
+    """Whether code of an entry is in the cache; always without a compiler, never without a cache."""
+    function = getattr(compiled, "py_func", None)
+    if function is None:
+        return True
+    home = cache_directory(Path(function.__code__.co_filename))
+    return home is not None and any(home.glob(f"**/*.{function.__name__}-*.nbi"))
+
+
+class ByAddress:
+    """An entry that other compiled code calls by its address, without being compiled again as a part of it.
+
+    Parameters
+    ----------
+    target : callable
+        The entry.
+    returns : numba type
+        What it returns.
+
+    Attributes
+    ----------
+    call : callable
+        For compiled code: takes the address and a tuple of the arguments.
+    """
+
+    def __init__(self, target: Callable[..., object], returns: object) -> None:
+        self._target, self._returns = target, returns
+        self._has_address = whole_program.AVAILABLE and not numba.config.DISABLE_JIT
+        call: Callable[..., Any]
+        call = whole_program.caller(returns) if self._has_address else _called_directly(target)
+        self.call = call
+
+    def address(self, *arguments: object) -> int:
+        """Address for arguments of the types that it will be called with; compiles it if need be."""
+        return whole_program.address_of(self._target, arguments, self._returns) if self._has_address else 0
+
+
+def _called_directly(target: Callable[..., object]) -> Callable[..., Any]:
+    """An entry as compiled with whoever calls it, or not compiled."""
+
+    @kernel
+    def call(_address, arguments):  # type: ignore[no-untyped-def]
+        return target(*arguments)
+
+    return call
 
 
 @kernel

@@ -9,7 +9,7 @@ Where numba's internals are not as expected, `AVAILABLE` is False and plain numb
 later.
 """
 
-from collections.abc import Callable
+from collections.abc import Callable, Iterable
 from typing import Any
 
 _LIBRARY = (
@@ -144,3 +144,55 @@ class KernelDispatcher(_Dispatcher):  # type: ignore[misc]
     def get_overload(self, sig: Any) -> Any:
         """What stands for the part with a signature."""
         return self._part.get_overload(sig)
+
+
+def address_of(entry: Any, arguments: Iterable[object], returns: Any) -> int:
+    """Address of an entry's machine code for arguments; compiles or loads it.
+
+    Parameters
+    ----------
+    entry : dispatcher
+    arguments : iterable
+        Any of the types that it will be called with.
+    returns : numba type
+        Expected type of what it returns.
+
+    Raises
+    ------
+    TypeError
+        If the entry returns another type.
+    """
+    types = tuple(map(entry.typeof_pyval, arguments))
+    entry.compile(types)
+    found = entry.overloads[types]
+    if found.signature.return_type != returns:
+        raise TypeError(f"{entry.py_func.__name__} returns {found.signature.return_type}, not {returns}")
+    return int(found.library.get_pointer_to_function(found.fndesc.llvm_func_name))
+
+
+def caller(returns: Any) -> Any:
+    """Function for compiled code that calls an address with a tuple of arguments.
+
+    Parameters
+    ----------
+    returns : numba type
+        What the code at the address returns.
+    """
+    from numba.core.cgutils import if_unlikely, unpack_tuple
+    from numba.extending import intrinsic
+
+    def generate(context: Any, builder: Any, signature: Any, values: Any) -> Any:
+        address, packed = values
+        types = signature.args[1].types
+        convention = context.call_conv
+        kind = convention.get_function_type(returns, types).as_pointer()
+        code, arguments = builder.inttoptr(address, kind), unpack_tuple(builder, packed, len(types))
+        status, result = convention.call_function(builder, code, returns, types, arguments)
+        with if_unlikely(builder, status.is_error):
+            convention.return_status_propagate(builder, status)
+        return result
+
+    def call(_context: Any, address: Any, arguments: Any) -> Any:
+        return returns(address, arguments), generate
+
+    return intrinsic(call)

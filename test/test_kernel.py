@@ -15,7 +15,7 @@ from numba.core.targetconfig import TargetConfig
 
 import leg_wear_monitor
 from leg_wear_monitor import whole_program
-from leg_wear_monitor.kernel import kernel
+from leg_wear_monitor.kernel import ByAddress, kernel
 
 LEAF = "from leg_wear_monitor.kernel import kernel\n@kernel\ndef slope(x):\n    return {factor} * x\n"
 ROOT = (
@@ -214,3 +214,32 @@ def test_a_kernel_is_compiled_once_whatever_constants_it_is_called_with():
     assert both(1.5) == 7.5
     assert len(scaled._part.overloads) == 1
     assert not scaled.overloads  # Python has not called it, so it was made no machine code of
+
+
+@pytest.mark.parametrize("available", [True, False])
+def test_an_entry_that_is_called_by_its_address(monkeypatch, available):
+    monkeypatch.setattr(whole_program, "AVAILABLE", available)
+
+    @numba.njit
+    def divided(values, by):
+        return values[0] / by, len(values)
+
+    target = ByAddress(divided, numba.types.Tuple((numba.types.float64, numba.types.int64)))
+    call = target.call
+
+    @numba.njit
+    def outer(address, values):
+        quotient, count = call(address, (values, 2.0))
+        return quotient + count
+
+    values = np.array([3.0, 4.0])
+    assert outer(target.address(values, 2.0), values) == 3.5
+
+
+def test_an_entry_that_returns_what_its_caller_does_not_expect_has_no_address():
+    @numba.njit
+    def twice(x):
+        return 2.0 * x
+
+    with pytest.raises(TypeError, match="twice returns float64, not int64"):
+        ByAddress(twice, numba.types.int64).address(1.0)

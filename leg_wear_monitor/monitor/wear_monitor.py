@@ -101,9 +101,9 @@ class WearMonitor:
 
     def warm_up(self) -> None:
         """Compile all kernels that `update` needs, before the first sample; takes about a minute once."""
-        self._twin.warm_up()
         self._guard.warm_up()
         list(EvaluationPeriods(1).pieces(np.zeros(1, GAIT_SAMPLE)))
+        self._twin.warm_up()
 
     def update(self, samples: Samples) -> Reports:
         """Process a block of samples.
@@ -162,7 +162,7 @@ class WearMonitor:
     @property
     def used(self) -> dict[str, int]:
         """How many samples of each kind were used so far, by the names of `twin.kinds.KINDS`."""
-        return self._twin.intake.used
+        return dict(self._twin.intake.used)
 
     @property
     def measurements(self) -> tuple[Measurement, ...]:

@@ -11,6 +11,7 @@ from rclpy.clock import Clock
 from rclpy.clock_type import ClockType
 from std_srvs.srv import Trigger
 
+from leg_wear_monitor.dynamics.clearance.beforehand import advance_beside
 from leg_wear_monitor.errors import LegWearError
 from leg_wear_monitor.interrupt import closed_at_the_end
 from leg_wear_monitor.mechanism.loader import load_mechanism
@@ -56,9 +57,12 @@ class MonitorNode(ClosingNode):
         self.get_logger().info(f"{ADVICE} {NO_COMMANDS}")
         namespace = self.get_namespace().strip("/")
         parameters = Parameters(self, MonitorConfig, empty={"hardware_id": namespace or "leg"})
-        config = parameters.config
-        mechanism = load_mechanism(config.mechanism)
-        self._monitor = open_monitor(mechanism, config)
+        with advance_beside():
+            self._open(parameters)
+
+    def _open(self, parameters: Parameters[MonitorConfig]) -> None:
+        """Open the ledger and set up everything else; close the ledger if that fails."""
+        self._monitor = open_monitor(load_mechanism(parameters.config.mechanism), parameters.config)
         # until `close`: a signal may arrive before the caller of the constructor holds this node
         self._in_order = ExitStack()
         self._in_order.enter_context(closed_at_the_end(self._monitor.close))
@@ -119,7 +123,7 @@ class MonitorNode(ClosingNode):
     def _compile(self, decoder: Decoder) -> None:
         """Compile the kernels before the first sample."""
         log = self.get_logger()
-        log.info("preparing; the first start compiles numerical kernels for a minute")
+        log.info("preparing; the first start compiles numerical kernels, half a minute on two processors")
         with repeated(lambda passed_s: log.info(f"preparing: {passed_s:.0f} s")):
             self._monitor.warm_up()
         for stream in STREAMS:

@@ -84,6 +84,7 @@ class DigitalTwin:
         self._follower = LegFollower(setup, self.settings)
         self._tracker = CrankTracker(self.settings.tracker)
         self.wear_acceleration = self.settings.wear_acceleration
+        self._intake: Intake | None = None
 
     @property
     def wear_acceleration(self) -> float:
@@ -135,7 +136,9 @@ class DigitalTwin:
     @property
     def intake(self) -> Intake:
         """Counts since the twin was made."""
-        return intake(self._tracker.records, self._follower.records)
+        if self._intake is None:  # it is asked for several times between two updates
+            self._intake = intake(self._tracker.records, self._follower.records)
+        return self._intake
 
     def set_depth(self, depth: Floats) -> None:
         """Set wear depths (clearance joints, 2, sectors) [m], as from a ledger.
@@ -167,8 +170,12 @@ class DigitalTwin:
         self.set_depth(depth)
 
     def warm_up(self) -> None:
-        """Compile all that `update` needs, before the first sample; takes about a minute once."""
+        """Compile all that `update` needs, before the first sample; takes about a minute once.
+
+        The motion comes last: a second process may be compiling it.
+        """
         now = self.snapshot()
+        self._follower.compile(self._tracker.steps)
         stamps = 1_000_000_000 + 5_000_000 * np.arange(150)
         angle = self.settings.tracker.commanded_speed_radps * 1.0e-9 * stamps
         self.update(gait_samples(stamps, crank_angle_rad=angle))
@@ -179,6 +186,7 @@ class DigitalTwin:
         looks: list[SampleStatistics] = []
         cycles: list[CycleStatistics] = []
         events: list[Event] = []
+        self._intake = None
         for steps, n in self._tracker.update(samples):
             if n:
                 looks.append(self._follower.follow(steps, n, cycles, events))
@@ -190,6 +198,7 @@ class DigitalTwin:
 
     def restore(self, snapshot: TwinSnapshot) -> None:
         """Go back to a snapshot of a twin of the same mechanism and settings."""
+        self._intake = None
         self._tracker.restore(snapshot.tracker)
         self._follower.restore(snapshot.follower)
         self.wear_acceleration = snapshot.wear_acceleration

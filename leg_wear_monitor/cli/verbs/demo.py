@@ -60,9 +60,10 @@ def demo(out: Path) -> int:
 
 
 def _compile(out: Path) -> None:
-    """Compile what the nodes need: the monitor's kernels here, those of the leg in a process beside."""
+    """Compile what the nodes need: the monitor's kernels here, the motion and the leg in processes beside."""
     if is_compiled("monitor") and is_compiled("gait"):
         return
+    from leg_wear_monitor.dynamics.clearance.beforehand import advance_beside
     from leg_wear_monitor.mechanism.loader import load_mechanism
     from leg_wear_monitor.monitor.wear_monitor import WearMonitor
 
@@ -74,6 +75,7 @@ def _compile(out: Path) -> None:
         # a group of its own: Ctrl-C reaches it by us, once
         subprocess.Popen(command, stdout=log, stderr=log, start_new_session=True) as leg,
         closed_at_the_end(leg.kill),
+        advance_beside(),
     ):
         try:
             WearMonitor(load_mechanism()).warm_up()

@@ -130,6 +130,7 @@ def _run(
 ) -> tuple["ReplayResult", float]:
     """The result, and the time [s] it took once all was compiled."""
     try:
+        from leg_wear_monitor.dynamics.clearance.beforehand import advance_beside
         from leg_wear_monitor.playback.replay import replay as run
     except ModuleNotFoundError as error:
         raise LegWearError(f"{error.name} is not installed; pip install 'leg_wear_monitor[bags]'") from error
@@ -144,7 +145,7 @@ def _run(
         took[0] = time.perf_counter() - began[0]
         write(result, took[0])
 
-    with progress_bar("replaying") as progress:
+    with progress_bar("replaying") as progress, advance_beside():
         result = run(
             bags,
             _config(config, crank_joint, node),

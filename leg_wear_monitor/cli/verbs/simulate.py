@@ -1,6 +1,7 @@
 """``leg-wear-monitor simulate``: the leg offline, ideal or with clearances."""
 
 import time
+from contextlib import nullcontext
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
@@ -121,6 +122,7 @@ def _keywords(clearances: str | None, wear: str, duration: float | None, **optio
 
 def _run(leg: "Mechanism", keywords: dict[str, Any]) -> tuple["SimulationResult", float]:
     """The result, and the time [s] it took once all was compiled."""
+    from leg_wear_monitor.dynamics.clearance.beforehand import motion_beside
     from leg_wear_monitor.dynamics.simulation import default_model, simulate
     from leg_wear_monitor.mechanism.spec import SpeedDrive
 
@@ -131,7 +133,9 @@ def _run(leg: "Mechanism", keywords: dict[str, Any]) -> tuple["SimulationResult"
     else:
         short["duration_s"] = _WARM_UP_S
     clearance_joints = keywords.get("clearances", leg.clearance_joints)
-    with compilation(keywords.get("model") or default_model(leg) if clearance_joints else "ideal"):
+    model = keywords.get("model") or default_model(leg)
+    kernels = model if clearance_joints else "ideal"
+    with compilation(kernels), motion_beside() if kernels == "clearance" else nullcontext():
         simulate(leg, **short)
     with progress_bar("simulating") as progress:
         began = time.perf_counter()

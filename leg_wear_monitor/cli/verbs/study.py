@@ -73,12 +73,13 @@ def _compute(
 ) -> tuple[int, int]:
     import os
 
+    from leg_wear_monitor.dynamics.clearance.beforehand import motion_beside
     from leg_wear_monitor.dynamics.simulation import simulate
     from leg_wear_monitor.mechanism.loader import load_mechanism
     from leg_wear_monitor.studies.execution.run import run_study
 
     leg = load_mechanism(settings.mechanism)
-    with compilation("clearance"):  # once, and not in every worker at the same time
+    with compilation("clearance"), motion_beside():  # once, and not in every worker at the same time
         if leg.clearances:
             simulate(leg, clearances=[next(iter(leg.clearances))], cycles=1.0 / 256.0, skip_cycles=0.0)
     with progress_bar(f"study {name}") as progress:

@@ -8,6 +8,8 @@ number of steps.
 
 import math
 
+from numba import types
+
 from leg_wear_monitor.dynamics.clearance.contact import A0, E0, F_T, V0, accelerate_clearances
 from leg_wear_monitor.dynamics.clearance.model import ACCELERATION, ANGLE, SPEED, blend, crank_between
 from leg_wear_monitor.dynamics.clearance.outputs import (
@@ -46,7 +48,7 @@ from leg_wear_monitor.dynamics.run.run_statistics import (
     TORQUE_SQUARED,
     bin_of,
 )
-from leg_wear_monitor.kernel import copy_array, entry, kernel
+from leg_wear_monitor.kernel import ByAddress, copy_array, entry, kernel
 from leg_wear_monitor.wear.surfaces import Surfaces
 
 RENEWAL = 2  # intervals between two looks at the reactions of the ideal joints
@@ -83,6 +85,10 @@ def advance_clearances(model, feeds_back, state, polynomial, t_end, statistics, 
             copy_array(work.pending, state.pending)
             return status, k
     return DONE, -1
+
+
+# for kernels along whose way it goes: they need not contain it, which would double what there is to compile
+ADVANCE = ByAddress(advance_clearances, types.UniTuple(types.int64, 2))
 
 
 @kernel

@@ -13,7 +13,7 @@ from leg_wear_monitor.contact.geometry import journal_contact
 from leg_wear_monitor.contact.normal.laws import normal_force
 from leg_wear_monitor.dynamics.joint.contact_event import DELTA, DELTA_DOT, EX, EY, F_N, SAMPLE, VX, VY
 from leg_wear_monitor.dynamics.joint.joint_contact import coefficient_at, penetration
-from leg_wear_monitor.kernel import kernel
+from leg_wear_monitor.kernel import entry, kernel
 from leg_wear_monitor.mechanism.arrays import Floats
 
 # a sample of a clearance joint goes on with: unit normal, friction force [N], slip speed [m/s], derivatives
@@ -42,12 +42,18 @@ _NEAR = 0.1  # sine of an angle for which the arc sine's series is good to 3e-11
 
 def contact_laws(contacts: ContactArrays) -> Floats:
     """Laws of the clearance joints (k, 7) in one array."""
-    fresh = [
-        float(coefficient_at(contacts, k, radius, radius - contacts.clearance[k]))
-        for k, radius in enumerate(contacts.bushing_radius)
-    ]
+    fresh = np.empty(len(contacts.joint))
+    _fresh_coefficients(contacts, fresh)
     normal = np.column_stack([contacts.normal_form, contacts.hysteresis, fresh])
     return np.column_stack([normal, contacts.friction, contacts.friction_law])
+
+
+@entry
+def _fresh_coefficients(contacts, out_coefficient):
+    """Coefficients (k,) of the normal laws on fresh surfaces, each in the law's own unit."""
+    for k in range(out_coefficient.shape[0]):
+        radius = contacts.bushing_radius[k]
+        out_coefficient[k] = coefficient_at(contacts, k, radius, radius - contacts.clearance[k])
 
 
 @kernel

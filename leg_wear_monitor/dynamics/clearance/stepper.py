@@ -4,7 +4,7 @@ from typing import NamedTuple
 
 import numpy as np
 
-from leg_wear_monitor.dynamics.clearance.advance import advance_clearances, observe
+from leg_wear_monitor.dynamics.clearance.advance import ADVANCE, advance_clearances, observe
 from leg_wear_monitor.dynamics.clearance.basis import is_damped
 from leg_wear_monitor.dynamics.clearance.contact import A0, E0, F_T, NX, NY, V0, contact_laws
 from leg_wear_monitor.dynamics.clearance.model import (
@@ -183,6 +183,11 @@ class ClearanceStepper:
             self.model, self._setup.surfaces.feeds_back, self.state, polynomial, t_end, statistics, self.work
         )
         return int(status), int(k)
+
+    def advance_address(self, polynomial: Floats, statistics: RunStatistics) -> int:
+        """Address by which compiled code calls `ADVANCE` with this stepper; compiles it if need be."""
+        feeds_back = self._setup.surfaces.feeds_back
+        return ADVANCE.address(self.model, feeds_back, self.state, polynomial, 0.0, statistics, self.work)
 
     def snapshot(self) -> Snapshot:
         """A copy of the whole state."""

@@ -1,5 +1,6 @@
 """The leg that follows the tracker's steps, and what is to be done where its kernel stops."""
 
+from functools import cached_property
 from typing import NamedTuple
 
 import numpy as np
@@ -9,9 +10,10 @@ from leg_wear_monitor.dynamics.clearance.stepper import Snapshot as StepperSnaps
 from leg_wear_monitor.dynamics.run.drive import steady_drive
 from leg_wear_monitor.dynamics.run.protocol import DONE, INVALID_DRIVE, PUSHED_THROUGH, STEP_TOO_SMALL, Setup
 from leg_wear_monitor.dynamics.run.run_statistics import TORQUE, new_run_statistics
+from leg_wear_monitor.kernel import compile_for
 from leg_wear_monitor.mechanism.arrays import Floats
 from leg_wear_monitor.mechanism.ideal import TURN
-from leg_wear_monitor.record import Record, new_records, record_of
+from leg_wear_monitor.record import Record, Records, new_records, record_of
 from leg_wear_monitor.twin import steps as told
 from leg_wear_monitor.twin.follower.cycle import (
     clear_run_statistics,
@@ -102,6 +104,10 @@ class LegFollower:
         self._sensor[0] = self._cutoff, self.torque_size_nm, self._instants
         self._before = self.clearances
 
+    @cached_property
+    def _advance_address(self) -> int:
+        return self._stepper.advance_address(self._leg.polynomial, self.statistics)
+
     @property
     def clearances(self) -> Floats:
         """Mean and largest radial clearance (2, loose) [m]."""
@@ -120,12 +126,12 @@ class LegFollower:
     ) -> SampleStatistics:
         """Follow n steps; adds gait cycles that end and what happens, returns the samples passed."""
         i, m = 0, 0
-        evaluated, forces = new_records(n, EVALUATED), np.zeros((n, len(self._setup.clearance_joints)))
+        evaluated, forces = self._room(n)
         while i < n:
             reason, i, k, m = follow(
-                self._stepper.model, self._setup.surfaces.feeds_back, self._stepper.state, self.statistics,
-                self._stepper.work, self._sensor, self._load.signature, self._leg, steps, i, n, m,
-                evaluated, forces,
+                self._advance_address, self._stepper.model, self._setup.surfaces.feeds_back,
+                self._stepper.state, self.statistics, self._stepper.work, self._sensor, self._load.signature,
+                self._leg, steps, i, n, m, evaluated, forces,
             )  # fmt: skip
             if reason == CYCLE:
                 self._end_cycle(k, cycles)
@@ -142,6 +148,18 @@ class LegFollower:
                 events.append(Event(int(self.state.motion.failed_at_ns), _FAILURES[reason], joint))
         stamp, kind, angle, torque = (evaluated[name][:m] for name in EVALUATED.names or ())
         return SampleStatistics(stamp, kind, angle, torque, forces[:m])
+
+    def _room(self, n: int) -> tuple[Records, Floats]:
+        """Room for n samples: `EVALUATED` and contact forces (n, k) [N]."""
+        return new_records(n, EVALUATED), np.zeros((n, len(self._setup.clearance_joints)))
+
+    def compile(self, steps: Steps) -> None:
+        """Compile what follows steps, but for the motion itself; the leg stays where it is."""
+        compile_for(
+            follow, 0, self._stepper.model, self._setup.surfaces.feeds_back, self._stepper.state,
+            self.statistics, self._stepper.work, self._sensor, self._load.signature, self._leg, steps,
+            0, 0, 0, *self._room(0),
+        )  # fmt: skip
 
     def _start(self, steps: Steps, i: int) -> Event:
         """Set the leg in motion where step i begins, wear as it was."""

@@ -2,7 +2,7 @@
 
 import math
 
-from leg_wear_monitor.dynamics.clearance.advance import advance_clearances
+from leg_wear_monitor.dynamics.clearance.advance import ADVANCE
 from leg_wear_monitor.dynamics.clearance.contact import F_T
 from leg_wear_monitor.dynamics.clearance.model import ANGLE, move_time_origin
 from leg_wear_monitor.dynamics.joint.contact_event import F_N
@@ -17,6 +17,7 @@ from leg_wear_monitor.twin.steps import EVALUATE, LEAVE, MOVE, REPORT, START
 CYCLE, NEEDS_START, LEFT, TOLD = range(100, 104)
 
 _TURN = 2.0 * math.pi
+_advance = ADVANCE.call
 _REBASE = 65536  # intervals: even, since the stepper renews things every other interval
 
 
@@ -100,6 +101,7 @@ def _add_torque(torque, impulse, squares, time):
 
 @entry
 def follow(
+    advance_address,
     model,
     feeds_back,
     stepper,
@@ -137,8 +139,9 @@ def follow(
                 until = motion.cut_ns
             impulse, squares = statistics.drive_integral[TORQUE], statistics.drive_integral[TORQUE_SQUARED]
             time, before = statistics.time[0], stepper.intervals[0]
-            status, k = advance_clearances(
-                model, feeds_back, stepper, polynomial, 1.0e-9 * (until - motion.base_ns), statistics, work
+            t_end = 1.0e-9 * (until - motion.base_ns)
+            status, k = _advance(
+                advance_address, (model, feeds_back, stepper, polynomial, t_end, statistics, work)
             )
             if stepper.intervals[0] > before:
                 impulse = statistics.drive_integral[TORQUE] - impulse

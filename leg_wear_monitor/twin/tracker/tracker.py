@@ -42,6 +42,8 @@ class CrankTracker:
         The one `TRACKER_STATE`; what waits is apart.
     state : Record
         The same by names.
+    steps : Steps
+        What the last samples became; room for more.
     """
 
     def __init__(self, settings: TrackerSettings) -> None:
@@ -50,7 +52,7 @@ class CrankTracker:
         self._arrivals, self._queue = new_records(ARRIVALS, GAIT_SAMPLE), new_records(QUEUE, QUEUED)
         self.state: Record = record_of(self.records)
         self.state.clock.tracking = IS_STARTING
-        self._steps = room_for_steps(_STEPS_A_SAMPLE * (QUEUE + ARRIVALS + _CHUNK))
+        self.steps = room_for_steps(_STEPS_A_SAMPLE * (QUEUE + ARRIVALS + _CHUNK))
 
     def update(self, samples: Samples) -> Iterator[tuple[Steps, int]]:
         """Take in a block (n,) of samples, in order of arrival.
@@ -66,8 +68,8 @@ class CrankTracker:
             block = samples[start : start + _CHUNK]
             own = self._block[: len(block)]
             own[:] = block  # no other layout reaches compiled code, and what is changed is not the caller's
-            n = track(self._model, self.records, self._arrivals, self._queue, own, self._steps)
-            yield self._steps, int(n)
+            n = track(self._model, self.records, self._arrivals, self._queue, own, self.steps)
+            yield self.steps, int(n)
 
     def snapshot(self) -> TrackerSnapshot:
         """A copy of the whole state."""

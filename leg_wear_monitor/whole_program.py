@@ -10,6 +10,7 @@ later.
 """
 
 from collections.abc import Callable, Iterable
+from functools import wraps
 from typing import Any
 
 _LIBRARY = (
@@ -83,6 +84,39 @@ def _read_flags_quickly() -> bool:
 
 
 QUICK_FLAGS = _read_flags_quickly()
+
+
+def _remember_calls() -> bool:
+    """Let numba find out once what it calls for numbers of some types; False if it changed.
+
+    It tries all that it has for an operator, arrays first, each time that one occurs: a tenth of its time.
+    """
+    try:
+        from numba.core.types import Boolean, Number
+        from numba.core.types.functions import BaseFunction
+
+        owner: Any = BaseFunction
+        find = owner.get_call_type
+        if find.__code__.co_varnames[:4] != ("self", "context", "args", "kws"):
+            return False
+        known: dict[Any, Any] = {}
+
+        @wraps(find)
+        def get_call_type(self: Any, context: Any, args: Any, kws: Any) -> Any:
+            if kws or not all(isinstance(one, Number | Boolean) for one in args):
+                return find(self, context, args, kws)
+            key = (self, context, self.templates, tuple(args))  # templates: more may be registered later
+            if key not in known:
+                known[key] = find(self, context, args, kws)
+            return known[key]
+
+        owner.get_call_type = get_call_type
+    except (AttributeError, ImportError):
+        return False
+    return True
+
+
+QUICK_CALLS = _remember_calls()
 
 
 class _Part(_Library):  # type: ignore[misc]

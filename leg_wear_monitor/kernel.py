@@ -1,4 +1,7 @@
-"""The two ways to compile: ``@kernel`` a formula, ``@entry`` what Python calls, cached and never stale."""
+"""The decorators for compiled code: ``@kernel`` for formulas, ``@entry`` for functions called from Python.
+
+Entries are cached on disk under a digest of all sources that they depend on.
+"""
 
 import ast
 import hashlib
@@ -22,7 +25,7 @@ _HOME = Path(__file__).parent
 
 
 def _module(parts: Iterable[str]) -> Path | None:
-    """File of a module of this package; the parts of its name below the package."""
+    """File of a module of this package, from the parts of its name; None if there is none."""
     place = _HOME.joinpath(*parts)
     files = (place.with_suffix(".py"), place / "__init__.py")
     return next((file for file in files if file.is_file()), None)
@@ -49,13 +52,13 @@ def _imported(source: Path) -> frozenset[Path]:
         elif isinstance(node, ast.ImportFrom) and node.module:
             package, *name = node.module.split(".")
             if package == PACKAGE:
-                # what is imported is a module itself, or something that stands in one
+                # the imported name is a module, or an object in a module
                 found.update(_module([*name, alias.name]) or _module(name) for alias in node.names)
     return frozenset(file for file in found if file)
 
 
 def _sources(roots: Iterable[Path]) -> set[Path]:
-    """Files, and all of this package that they import, directly or not."""
+    """The given files and all files of this package that they import, directly or indirectly."""
     known: set[Path] = set()
     new = set(roots)
     while new:
@@ -65,27 +68,27 @@ def _sources(roots: Iterable[Path]) -> set[Path]:
 
 
 def _digest(sources: Iterable[Path]) -> str:
-    """What sources say, and where they lie."""
+    """Digest of the contents, paths and times of sources, and of numba's version."""
     digest = hashlib.sha256(numba.__version__.encode())
     for source in sorted(sources):
         digest.update(source.read_bytes())
-        # numba compiles again for a file that lies elsewhere or is newer
+        # numba recompiles for a file with another path or time
         digest.update(f"{source} {source.stat().st_mtime_ns}".encode())
     return digest.hexdigest()[:16]
 
 
 @cache
 def cache_directory(root: Path | None = None) -> Path | None:
-    """Directory of the compiled code of a file, named after its sources: what they say and where they lie.
+    """Directory of the compiled code of a file, named by a digest of all its sources.
 
-    numba looks only at the file of the function it caches: a kernel that calls a kernel of another
-    file would go on running its old body. A digest over the file and all that it imports closes that hole,
-    and a home of its own makes the cache work where the package directory is read-only.
+    numba checks only the file of the cached function itself: after a change of a kernel in another file it
+    would use the old code. The digest covers the file and everything that it imports. A directory outside the
+    package also works if the package directory is read-only.
 
     Parameters
     ----------
     root : pathlib.Path, optional
-        File of this package; all of the package's kernels if not given.
+        File of this package; default: all kernels of the package.
 
     Returns
     -------
@@ -101,11 +104,11 @@ def cache_directory(root: Path | None = None) -> Path | None:
 
 
 def kernel(function: _Function) -> _Function:
-    """Compile a formula: numbers and arrays in, numbers out; division by zero gives inf, as in numpy.
+    """Compile a formula of numbers and arrays; division by zero gives inf, as in numpy.
 
-    A kernel cannot allocate: without numba's runtime it counts no references either, which would cost more
-    than the physics where many small arrays are passed around. It is compiled into the entry that calls
-    it and not cached by itself: what comes out of a cache cannot be inlined.
+    A kernel cannot allocate arrays: it is compiled without numba's runtime, because its reference counting
+    would cost more time than the physics where many small arrays are passed. A kernel is inlined into the
+    entry that calls it and is not cached by itself, because cached code cannot be inlined.
     """
     if whole_program.AVAILABLE and not numba.config.DISABLE_JIT:
         return whole_program.KernelDispatcher(function, _KERNEL)
@@ -113,9 +116,9 @@ def kernel(function: _Function) -> _Function:
 
 
 def entry(function: _Function) -> _Function:
-    """Compile what Python calls: a kernel with a cache of its own, that lets other threads run meanwhile.
+    """Compile a function for calls from Python: cached on disk, and without the interpreter's lock.
 
-    While another process compiles the same entry, this one waits for it, and loads what it has made.
+    While another process compiles the same entry, this one waits for it and loads the result.
     """
     home, previous = cache_directory(Path(function.__code__.co_filename)), numba.config.CACHE_DIR
     numba.config.CACHE_DIR = str(home or previous)

@@ -1,7 +1,7 @@
-"""Compiled state with names: records of a structured type, alike in compiled and in plain Python.
+"""Records of a structured dtype as state of compiled code, with the same access in compiled and plain Python.
 
-An entry takes an array of records, of one where there is but one, and begins with ``record = records[0]``:
-compiled code knows the type of such an array in half a microsecond, that of a `numpy.record` in ten.
+An entry takes an array of records, also for a single one, and begins with ``record = records[0]``: numba
+identifies the type of an array in half a microsecond, that of a `numpy.record` in ten.
 """
 
 from collections.abc import Iterator
@@ -14,8 +14,7 @@ from numpy.typing import NDArray
 Record = Any
 """One record: ``state.speed`` reads and writes a field, ``state.speed[k]`` a value of an array field.
 
-A `numpy.record` is one object for Python and a pointer for compiled code; neither has a type that says
-which fields there are.
+A `numpy.record` is an object for Python and a pointer for compiled code; no Python type describes its fields.
 """
 
 Records = NDArray[Any]
@@ -23,31 +22,31 @@ Records = NDArray[Any]
 
 
 def new_records(n: int, dtype: np.dtype[Any]) -> Records:
-    """Records for an entry, all fields 0; a copy is a snapshot, ``records[:] = snapshot`` goes back to it.
+    """Records (n,) for an entry, all fields 0; a copy is a snapshot, ``records[:] = snapshot`` restores it.
 
     Raises
     ------
     ValueError
-        For a field that plain Python would not find: numpy's records have an attribute of its name.
+        For a field with the name of an attribute of numpy's records, which would hide it.
     """
     hidden = sorted(name for name in _names(dtype) if hasattr(np.record, name))
     if hidden:
         raise ValueError(f"fields {', '.join(hidden)}: numpy.record has attributes of these names")
-    # what is not compiled needs elements that have attributes
+    # uncompiled code needs elements with attributes
     return np.zeros(n, np.dtype((np.record, dtype)) if numba.config.DISABLE_JIT else dtype)
 
 
 def _names(dtype: np.dtype[Any]) -> Iterator[str]:
-    """Names of all fields, those of records within records as well."""
+    """Names of all fields, including those of nested records."""
     for name, (inner, *_) in (dtype.fields or {}).items():
         yield name
         yield from _names(inner.base)
 
 
 def record_of(records: Records) -> Record:
-    """The only record of an array, to read and write by names; it is the array's own.
+    """The only record of an array, a view, to read and write by field names.
 
-    Each name takes Python some microseconds; where many are read often, `values_of` is for.
+    Each access takes Python some microseconds; use `values_of` to read many fields.
     """
     (record,) = records.view(np.recarray)
     return record

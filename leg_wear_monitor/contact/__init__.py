@@ -1,1 +1,1 @@
-"""A journal in a bushing: geometry, normal force, friction."""
+"""Contact of a journal in a bushing: geometry, normal force, friction."""

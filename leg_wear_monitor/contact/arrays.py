@@ -21,13 +21,14 @@ NEARLY_ELASTIC, LEAST_RESTITUTION = ("hunt-crossley", "lankarani-nikravesh"), 0.
 
 
 class ContactArrays(NamedTuple):
-    """Settings of k clearance joints, SI.
+    """Settings of k clearance joints, in SI units.
 
-    ``joint`` (k,) index in the mechanism; ``bushing_radius``, ``clearance``, ``width`` (k,);
-    ``modulus`` (k,) [Pa]; ``normal_form`` (k,) number of the normal law's form; ``stiffness`` (k,) [N/m^1.5]
-    where given, 0 where the law's coefficient follows from the modulus and the local radii; ``hysteresis``,
-    ``speed_floor`` (k,); ``friction_law`` (k,), ``friction`` (k, 3) as coefficient, v0, v1;
-    ``wear_coefficient`` (k, 2) of bushing and journal [1/Pa].
+    ``joint`` (k,): index in the mechanism; ``bushing_radius``, ``clearance``, ``width`` (k,) [m];
+    ``modulus`` (k,) [Pa]: of `contact_modulus`; ``normal_form`` (k,): number of the normal law's form;
+    ``stiffness`` (k,) [N/m^1.5]: the given one, or 0 if the law's coefficient follows from the modulus and
+    the local radii; ``hysteresis`` (k,) [-]: factor chi; ``speed_floor`` (k,) [m/s]: least approach speed;
+    ``friction_law`` (k,): code; ``friction`` (k, 3): coefficient [-], ramp v0 and v1 [m/s];
+    ``wear_coefficient`` (k, 2) [1/Pa]: of bushing and journal.
     """
 
     joint: Ints
@@ -50,12 +51,17 @@ def clearance_settings(
     clearance_m: float | None = None,
     normal_law: str | None = None,
 ) -> list[Clearance]:
-    """Settings of the joints that shall be loose, with a clearance and a normal law for all if given.
+    """Settings of the clearance joints, with a common clearance [m] and a common normal law if given.
+
+    Returns
+    -------
+    list of Clearance
+        In the order of ``joints``.
 
     Raises
     ------
     ConfigError
-        Naming the joint that has no settings, or the setting that cannot be.
+        Names the joint without settings, or the invalid setting.
     """
     changes: dict[str, Any] = {}
     if clearance_m is not None:
@@ -82,7 +88,7 @@ def clearance_settings(
 
 
 def _refuse_stiffness(source: str, name: str, settings: Clearance) -> None:
-    """A stiffness in N/m^1.5 means nothing to a law of another form than Hertz's."""
+    """Raise ConfigError for a stiffness [N/m^1.5] with a law that has no such coefficient."""
     if settings.stiffness is not None and not LAWS[settings.normal_law].form.takes_stiffness:
         raise ConfigError(
             source,
@@ -93,7 +99,7 @@ def _refuse_stiffness(source: str, name: str, settings: Clearance) -> None:
 
 
 def _warn_of_restitution(source: str, settings: dict[str, Clearance]) -> None:
-    """Two laws hold for a restitution near 1 only: far from it they return more than they are asked for."""
+    """Warn of a restitution far below 1 with the two laws that are valid near 1 only: they return more."""
     asked: dict[tuple[str, float], list[str]] = {}
     for name, c in settings.items():
         if c.normal_law in NEARLY_ELASTIC and c.restitution < LEAST_RESTITUTION:
@@ -111,7 +117,7 @@ def _warn_of_restitution(source: str, settings: dict[str, Clearance]) -> None:
 def compile_contacts(
     mechanism: Mechanism, joints: Sequence[str], settings: Sequence[Clearance]
 ) -> ContactArrays:
-    """Arrays of the clearance joints with their settings, in the given order."""
+    """Arrays of the clearance joints from their settings, in the given order."""
     order = list(mechanism.joints)
     moduli = [
         contact_modulus(c.youngs_modulus[0], c.poissons_ratio[0], c.youngs_modulus[1], c.poissons_ratio[1])

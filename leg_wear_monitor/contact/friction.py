@@ -1,4 +1,4 @@
-"""Friction of sliding surfaces, with a ramp around zero slip (physics.md section 4)."""
+"""Coulomb friction with a ramp around zero slip speed (physics.md section 4)."""
 
 import math
 
@@ -10,7 +10,7 @@ FRICTION_CODES = {"none": NONE, "ambrosio": AMBROSIO, "threlfall": THRELFALL}
 
 @kernel
 def ambrosio_ramp(speed, v0, v1):
-    """Share c_d of Coulomb's friction: 0 up to v0, 1 from v1, linear between (Ambrosio 2003)."""
+    """Fraction c_d [-] of Coulomb's friction: 0 up to v0, 1 from v1, linear between [m/s] (Ambrosio 2003)."""
     if speed <= v0:
         return 0.0
     return 1.0 if speed >= v1 else (speed - v0) / (v1 - v0)
@@ -18,13 +18,13 @@ def ambrosio_ramp(speed, v0, v1):
 
 @kernel
 def threlfall_ramp(speed, v1):
-    """Share of Coulomb's friction 1 - exp(-3 |v| / v1): 95 % at v1 (Threlfall 1978)."""
+    """Fraction [-] of Coulomb's friction, 1 - exp(-3 |v| / v1): 95 % at v1 [m/s] (Threlfall 1978)."""
     return 1.0 - math.exp(-3.0 * speed / v1)
 
 
 @kernel
 def friction_force(law, coefficient, v0, v1, f_n, slip):
-    """Force [N] along the tangent on the journal, against the slip speed [m/s]."""
+    """Tangential force [N] on the journal, opposite to the slip speed [m/s]; f_n the normal force [N]."""
     speed = abs(slip)
     if law == AMBROSIO:
         fraction = ambrosio_ramp(speed, v0, v1)

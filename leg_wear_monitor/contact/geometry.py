@@ -1,15 +1,15 @@
-"""Where a journal touches its bushing, and the modulus of that contact (physics.md sections 3 to 5)."""
+"""Geometry of the contact of journal and bushing, and its elastic modulus (physics.md sections 3 to 5)."""
 
 import math
 
 from leg_wear_monitor.kernel import kernel
 
-_SHARPEST = 1.0  # largest part of the gradient across e that the bend makes, where the wall's normal is 1
+_SHARPEST = 1.0  # bound of the gradient's part across e by the bend; the wall's unit normal has length 1
 
 
 @kernel
 def journal_contact(ex, ey, clearance):
-    """Penetration [m] and unit normal of a journal at eccentricity (ex, ey) [m]; negative when apart.
+    """Penetration [m], negative when apart, and unit normal of a journal at eccentricity (ex, ey) [m].
 
     physics.md section 3.
     """
@@ -22,23 +22,24 @@ def journal_contact(ex, ey, clearance):
 
 @kernel
 def worn_contact(ex, ey, clearance, slope, bend):
-    """Penetration [m] and its gradient where the clearance changes with direction.
+    """Penetration [m] and its gradient on worn surfaces, whose clearance depends on the direction.
 
-    By a slope [m/rad], that changes by a ``bend`` [m/rad^2]. The penetration is |e| - c, measured along the
-    worn wall's normal. So that the normal force has a potential, it acts along the penetration's whole
-    gradient (physics.md section 3): the wall's unit normal, but for parts of the order of penetration /
-    clearance, because the normal turns from place to place. The part that turns it aside is bounded: in
-    notches narrower than a journal can enter it would be many times the normal, and there is no potential.
+    ``slope`` [m/rad] and ``bend`` [m/rad^2] are the first and second derivative of the clearance by the
+    direction. The penetration is |e| - c along the worn wall's normal. The normal force acts along the whole
+    gradient of the penetration, so that it has a potential (physics.md section 3): the gradient is the wall's
+    unit normal plus parts of the order of penetration / clearance, because the normal changes along the wall.
+    The part by the bend is bounded: in notches too narrow for the journal it would be many times the normal,
+    and there the force has no potential.
 
     Returns
     -------
     delta, nx, ny, scale, turned
-        The clearance's own share in the gradient is ``scale`` times its change, and ``turned`` times that of
-        its slope.
+        Penetration [m], its gradient (nx, ny) by the eccentricity, and the factors of the clearance's change
+        [-] and of its slope's change [rad] in the change of the penetration.
     """
     delta, rx, ry = journal_contact(ex, ey, clearance)
     inside = max(delta, 0.0)
-    inverse = 1.0 / (clearance + inside)  # a journal that touches is at least that far out
+    inverse = 1.0 / (clearance + inside)  # in contact, 1 / |e|
     tilt = slope * inverse
     square = 1.0 / (1.0 + tilt * tilt)
     scale = math.sqrt(square)
@@ -52,9 +53,9 @@ def worn_contact(ex, ey, clearance, slope, bend):
 
 @kernel
 def contact_half_angle(eccentricity, bushing_radius, journal_radius):
-    """Half angle of the arc [rad] in which two circles with centres this far apart overlap.
+    """Half angle psi [rad] of the contact arc of bushing and journal at an eccentricity [m]; radii in m.
 
-    The circles cross where cos psi = (R_b^2 + e^2 - R_j^2) / (2 R_b e); 0 when they do not.
+    The two circles intersect at cos psi = (R_b^2 + e^2 - R_j^2) / (2 R_b e); 0 if they do not intersect.
     physics.md section 5.
     """
     if eccentricity <= bushing_radius - journal_radius:
@@ -64,6 +65,6 @@ def contact_half_angle(eccentricity, bushing_radius, journal_radius):
 
 
 def contact_modulus(youngs_b: float, poisson_b: float, youngs_j: float, poisson_j: float) -> float:
-    """4 / (3 (sigma_b + sigma_j)) [Pa] with sigma = (1 - nu^2) / E; Lankarani and Nikravesh 1990."""
+    """4 / (3 (sigma_b + sigma_j)) [Pa], sigma = (1 - nu^2) / E; Lankarani and Nikravesh 1990."""
     sigma = (1.0 - poisson_b * poisson_b) / youngs_b + (1.0 - poisson_j * poisson_j) / youngs_j
     return 4.0 / (3.0 * sigma)

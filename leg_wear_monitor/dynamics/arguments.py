@@ -1,4 +1,4 @@
-"""What callers of the library give: used as it is, or refused in one line."""
+"""Checks of the arguments of library functions; an invalid one raises an error of one line."""
 
 from collections.abc import Sequence
 from numbers import Integral, Real
@@ -20,11 +20,12 @@ _KINDS: dict[str, tuple[Any, str]] = {
 
 
 def given_mechanism(mechanism: Mechanism | str | Path) -> Mechanism:
-    """A mechanism, or the one of a name or a file.
+    """The given mechanism, or the one of a name or a file.
 
     Raises
     ------
     ConfigError
+        If the argument is of another type, or the file is invalid.
     """
     if isinstance(mechanism, Mechanism):
         return mechanism
@@ -34,12 +35,12 @@ def given_mechanism(mechanism: Mechanism | str | Path) -> Mechanism:
 
 
 def given_joints(names: Sequence[str], mechanism: Mechanism) -> tuple[str, ...]:
-    """Names of the clearance joints, each once.
+    """Names of the clearance joints as a tuple, checked.
 
     Raises
     ------
     ConfigError
-        A text is not a list of names: ``"AB"`` would be two joints.
+        If a name is unknown or occurs twice, or for a text in place of a list: ``"AB"`` would be two joints.
     """
     if isinstance(names, str):
         raise ConfigError("clearances", "", f"{shown(names)} is a text, expected a list of names")
@@ -64,12 +65,14 @@ def given_joints(names: Sequence[str], mechanism: Mechanism) -> tuple[str, ...]:
 
 
 def check_kinds(**values: object) -> None:
-    """Make sure that arguments are what they should be: ``trace`` whole, ``wear`` a flag, others numbers.
+    """Check the types of arguments: ``trace`` is an integer, ``wear`` a bool, all others are numbers.
+
+    None is allowed except for ``cycles``; it selects the default.
 
     Raises
     ------
     ConfigError
-        Naming the argument as the command line does. None stands for a default, but for ``cycles``.
+        Names the argument as the command line does.
     """
     for name, value in values.items():
         kinds, what = _KINDS.get(name, (Real, "a number"))

@@ -1,4 +1,4 @@
-"""The ideal linkage's cycle as a simulation result."""
+"""Simulation result of an ideal linkage."""
 
 import numpy as np
 
@@ -11,7 +11,7 @@ _POINTS = 1440
 
 
 def ideal_result(setup: Setup, cycles: float, trace: int) -> SimulationResult:
-    """Statistics of one cycle of the ideal motion, which is each cycle."""
+    """Result of the ideal motion, from the statistics of one cycle: all cycles are equal."""
     mechanism = setup.linkage.mechanism
     motion = one_cycle(setup.linkage, _POINTS, setup.speed)
     torque = motion.drive_torque
@@ -47,7 +47,7 @@ def ideal_result(setup: Setup, cycles: float, trace: int) -> SimulationResult:
 
 
 def _trace(setup: Setup, motion: IdealMotion, cycles: float) -> Trace:
-    """The samples of the cycle, repeated for all cycles, in the crank's direction of turning."""
+    """Trace of all cycles, from the samples of one cycle in the crank's direction of rotation."""
     mechanism = setup.linkage.mechanism
     points = len(motion.crank_angle)
     turns = np.arange(round(cycles * points))

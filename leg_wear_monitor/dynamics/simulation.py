@@ -1,4 +1,4 @@
-"""The leg offline: from a mechanism to what its clearances do."""
+"""Offline simulation of a leg with clearances."""
 
 import math
 from collections.abc import Callable, Iterator, Sequence
@@ -31,13 +31,13 @@ from leg_wear_monitor.wear.surfaces import SECTORS, fresh_surfaces
 
 MODELS: dict[str, Callable[[Setup], Traceable]] = {"clearance": ClearanceRun, "full": FullRun}
 
-LEAST_RPM = 0.01  # slower, a gait cycle takes hours
+LEAST_RPM = 0.01  # least crank speed: below it a gait cycle takes hours
 
 _REPORTS_A_CYCLE = 20
 
 
 def default_model(mechanism: Mechanism) -> str:
-    """Formulation for a mechanism: only the full one lets a torque, constant or not, drive the crank."""
+    """Default formulation: ``full`` for a mechanism driven by torque or controller, else ``clearance``."""
     return "clearance" if isinstance(mechanism.drive, SpeedDrive) else "full"
 
 
@@ -51,11 +51,18 @@ def prepare(
     normal_law: str | None = None,
     sectors: int = SECTORS,
 ) -> Setup:
-    """Check a mechanism as a moving thing and make it ready to run; parameters as in `simulate`.
+    """Check that a mechanism can move, and prepare it for a run; parameters as in `simulate`.
+
+    Returns
+    -------
+    Setup
 
     Raises
     ------
-    ConfigError, AssemblyError
+    ConfigError
+        For invalid values.
+    AssemblyError
+        If the linkage does not close or has a dead point.
     """
     check_kinds(clearance_m=clearance_m, speed_rpm=speed_rpm)
     clearance_joints = (
@@ -92,7 +99,7 @@ def simulate(
     trace: int = 0,
     progress: Callable[[float], None] | None = None,
 ) -> SimulationResult:
-    """Simulate the leg: forces, drive torque and toe, and the impacts and wear in its clearance joints.
+    """Simulate a leg: forces, drive torque and toe motion, impacts and wear of its clearance joints.
 
     >>> result = simulate("four_bar", cycles=0.25, skip_cycles=0.0)
     >>> wear = result.joints["B"].archard_integral_j_per_cycle
@@ -101,44 +108,43 @@ def simulate(
     Parameters
     ----------
     mechanism : Mechanism, str or pathlib.Path
-        A mechanism, the name of one that comes with the package, or its file.
+        A mechanism, the name of a shipped one, or a file.
     clearances : sequence of str, optional
-        Names of the clearance joints; empty for the ideal leg; the mechanism's own if not given.
+        Names of the clearance joints, empty for the ideal leg; default: those of the mechanism.
     clearance_m : float, optional
-        Radial clearance of all clearance joints [m] instead of the mechanism's own.
+        Radial clearance of all clearance joints [m]; default: those of the mechanism.
     speed_rpm : float, optional
-        Crank speed instead of the mechanism's own, negative for clockwise.
+        Crank speed, negative for clockwise; default: that of the mechanism.
     cycles, duration_s : float
         Counted length of the run, in gait cycles or as time [s].
     skip_cycles : float, optional
-        Gait cycles simulated before counting starts; 1, or 0 with ``duration_s``.
+        Gait cycles simulated before counting starts; default: 1, or 0 with ``duration_s``.
     model : str, optional
-        A key of `MODELS`: ``clearance``, the default, or ``full``, the default for a drive by torque or a
-        controller.
+        A key of `MODELS`; default: ``full`` for a drive by torque or controller, else ``clearance``.
     wear : bool
-        Whether wear opens the clearances during the run; it is counted either way.
+        Whether wear widens the clearances during the run; it is counted in any case.
     normal_law : str, optional
         Normal contact law of all clearance joints.
     trace : int
         Stored samples per cycle, the first at crank angle 0; 0 for none.
     progress : callable, optional
-        Called with the fraction of the run that is done.
+        Called with the completed fraction of the run.
 
     Returns
     -------
     SimulationResult
         ``joints["A"]`` is a `JointResult`: forces, contact, Archard integral, wear and clearance of joint A.
-        ``drive_torque_nm``, ``energy_j``, ``toe``, ``impacts["A"]`` and ``trace`` hold the rest;
-        ``to_dict()`` gives the fields for JSON, ``to_pandas()`` tables.
+        ``drive_torque_nm``, ``energy_j``, ``toe``, ``impacts["A"]`` and ``trace`` contain the rest;
+        ``to_dict()`` returns the fields for JSON, ``to_pandas()`` tables.
 
     Raises
     ------
     ConfigError
-        For impossible values.
+        For invalid values.
     AssemblyError
-        For a linkage that does not close or cannot turn.
+        If the linkage does not close or has a dead point.
     SimulationError
-        Where the motion diverges, naming joint, time and what to try.
+        If the motion diverges; names joint, time and what to try.
     """
     mechanism = given_mechanism(mechanism)
     check_kinds(cycles=cycles, duration_s=duration_s, skip_cycles=skip_cycles, trace=trace, wear=wear)
@@ -163,7 +169,7 @@ def simulate(
 
 
 def _speed(mechanism: Mechanism, speed_rpm: float | None) -> float:
-    """Crank speed at the start [rad/s]."""
+    """Initial crank speed [rad/s]."""
     drive = mechanism.drive
     if isinstance(drive, TorqueDrive):
         if speed_rpm is not None:
@@ -180,7 +186,7 @@ def _speed(mechanism: Mechanism, speed_rpm: float | None) -> float:
 def _spans(
     setup: Setup, cycles: float, duration_s: float | None, skip_cycles: float | None, trace: int
 ) -> tuple[float, float]:
-    """Time skipped and time counted [s]."""
+    """Skipped time and counted time [s]."""
     if trace < 0:
         raise ConfigError("trace", "", f"{trace} is below 0 points a cycle")
     skip = skip_cycles if skip_cycles is not None else (1.0 if duration_s is None else 0.0)
@@ -221,7 +227,7 @@ def _run(
     tracer = Tracer(run, joints, skipped, skipped + counted, period / trace if trace else math.inf)
     angle = run.sample().crank_angle
     stored, depth = run.stored_energy, setup.surfaces.depth.copy()
-    # the run goes to the same instants with and without a trace, which only looks ahead: so it is the same
+    # the run is advanced to the same instants with and without a trace, so its results are the same
     for t in _instants(skipped, skipped + counted, period / _REPORTS_A_CYCLE):
         tracer.look_ahead(t)
         run.advance(t, statistics)
@@ -251,6 +257,6 @@ def _run(
 
 
 def _instants(start: float, end: float, step: float) -> Iterator[float]:
-    """Times from start (excluded) to end (included) at equal steps; the last step may be shorter."""
+    """Times [s] from start (excluded) to end (included) at equal steps; the last step may be shorter."""
     count = max(1, math.ceil((end - start) / step - 1.0e-9)) if end > start else 0
     return (min(end, start + (i + 1) * step) if i + 1 < count else end for i in range(count))

@@ -1,1 +1,1 @@
-"""What the leg is: its description, its compiled arrays, its ideal motion."""
+"""The mechanism: its description, its arrays for the kernels, its ideal motion."""

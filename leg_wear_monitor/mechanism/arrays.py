@@ -25,16 +25,19 @@ REVOLUTE, PRISMATIC = 0, 1
 
 
 class MechanismArrays(NamedTuple):
-    """SI throughout; points are relative to the centre of mass, in the body's frame.
+    """Arrays of a mechanism in SI units; points are relative to the centre of mass, in the body's frame.
 
     Shapes, with n bodies (ground included), j joints, s springs, l loads and p phases:
-    ``mass`` and ``inverse_mass`` (n, 3), the diagonal of M; ``gravity`` (2,);
-    ``joint_kind`` (j,), ``joint_body`` (j, 2), ``joint_point`` (j, 2, 2), ``joint_normal`` (j, 2),
-    ``joint_angle`` (j,); ``spring_body`` (s, 2), ``spring_point`` (s, 2, 2), ``spring_law`` (s, 3) as
-    stiffness, free length, damping; ``load_body`` (l,), ``load_point`` (l, 2), ``load_phase`` (l, p),
-    ``load_force`` (l, p, 2); ``drive_body`` the crank; of a drive that is no constraint ``drive_gains`` (3,)
-    by the angle's error and the speed's, and the largest torque, ``drive_phase`` (p,) and ``drive_feed``
-    (p,) its torque without error.
+    ``mass``, ``inverse_mass`` (n, 3): diagonal of M and of its inverse; ``gravity`` (2,) [m/s^2];
+    ``joint_kind`` (j,): `REVOLUTE` or `PRISMATIC`; ``joint_body`` (j, 2): bushing and journal, or guide and
+    slider; ``joint_point`` (j, 2, 2) [m] on both; ``joint_normal`` (j, 2): unit normal of a guide;
+    ``joint_angle`` (j,): angle of a slider to its guide [rad];
+    ``spring_body`` (s, 2), ``spring_point`` (s, 2, 2) [m], ``spring_law`` (s, 3): stiffness [N/m], free
+    length [m], damping [N s/m];
+    ``load_body`` (l,), ``load_point`` (l, 2) [m], ``load_phase`` (l, p), ``load_force`` (l, p, 2) [N];
+    ``drive_body``: index of the crank; for a drive by torque or controller ``drive_gains`` (3,): gain on the
+    angle's error [N m/rad], on the speed's error [N m s/rad], largest torque [N m]; ``drive_phase`` (p,) and
+    ``drive_feed`` (p,) [N m]: table of its feed-forward torque.
     """
 
     mass: Floats
@@ -59,12 +62,12 @@ class MechanismArrays(NamedTuple):
 
 
 def body_names(mechanism: Mechanism) -> list[str]:
-    """Names in the order of the arrays, the ground first."""
+    """Names of the bodies in the order of the arrays, the ground first."""
     return [GROUND, *mechanism.bodies]
 
 
 def point_from_com(mechanism: Mechanism, body: str, point: str) -> Vector:
-    """A point relative to its body's centre of mass, in the body's frame [m]."""
+    """Position (2,) [m] of a point relative to its body's centre of mass, in the body's frame."""
     x, y = mechanism.points_of(body)[point]
     if body == GROUND:
         return x, y
@@ -105,7 +108,7 @@ def compile_arrays(mechanism: Mechanism) -> MechanismArrays:
 
 
 def _drive(drive: Drive) -> dict[str, np.ndarray]:
-    """A constant torque is a controller without gains; a drive by speed has neither."""
+    """Arrays of the drive; a constant torque is a controller without gains, a speed drive needs neither."""
     gains, phase, feed = (0.0, 0.0, np.inf), [0.0], [0.0]
     if isinstance(drive, TorqueDrive):
         feed = [drive.torque]
@@ -121,7 +124,7 @@ def _drive(drive: Drive) -> dict[str, np.ndarray]:
 
 
 def _joint_shapes(mechanism: Mechanism) -> tuple[Ints, Floats, Floats]:
-    """Kind of each joint, and for a prismatic one the guide's unit normal and the angle it holds."""
+    """Kind of each joint; for a prismatic one, the guide's unit normal and the relative angle [rad]."""
     kind = np.zeros(len(mechanism.joints), dtype=np.int64)
     normal = np.zeros((len(mechanism.joints), 2))
     angle = np.zeros(len(mechanism.joints))
@@ -151,7 +154,7 @@ def _springs(mechanism: Mechanism, index: dict[str, int]) -> dict[str, np.ndarra
 
 
 def _loads(mechanism: Mechanism, index: dict[str, int]) -> dict[str, np.ndarray]:
-    """Tables over the phase, closed periodically and padded to one length by repeating the last entry."""
+    """Arrays of the loads: tables over the phase, closed periodically, padded with their last entry."""
     loads = list(mechanism.loads.values())
     length = 2 + max((len(load.phase) if isinstance(load, PhaseLoad) else 1 for load in loads), default=0)
     phases, forces = np.zeros((len(loads), length)), np.zeros((len(loads), length, 2))

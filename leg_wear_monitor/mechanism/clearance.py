@@ -1,4 +1,4 @@
-"""What makes a revolute clearance joint: geometry, material, contact laws and wear of its pin and hole."""
+"""Settings of a revolute clearance joint: geometry, material, contact laws and wear."""
 
 from typing import Annotated, Any
 
@@ -33,7 +33,7 @@ class Friction:
 
 @attrs.frozen(kw_only=True)
 class Clearance:
-    """Everything that makes a revolute clearance joint; pairs are (bushing, journal)."""
+    """Settings of a revolute clearance joint; pairs are (bushing, journal)."""
 
     bushing_radius: float = quantity("m", "radius of the bushing", above=0.0, at_most=1.0)
     width: float = quantity("m", "axial contact width", above=0.0, at_most=1.0)
@@ -66,7 +66,7 @@ class Clearance:
 
 @attrs.frozen(kw_only=True)
 class ClearanceSection:
-    """The clearance joints in a mechanism file."""
+    """The section ``clearances`` of a mechanism file."""
 
     defaults: dict[str, Any] = described("settings of all joints, a mapping of the keys below", factory=dict)
     joints: tuple[str, ...] | dict[str, Any] = described(

@@ -1,4 +1,4 @@
-"""The section ``clearances`` of a mechanism file: defaults merged with each joint's own settings."""
+"""Settings of the clearance joints of a mechanism file: defaults merged with each joint's own settings."""
 
 from collections.abc import Mapping
 from typing import Any
@@ -17,12 +17,19 @@ _REQUIRED = {field.name for field in attrs.fields(Clearance) if field.default is
 def clearance_joints(
     section: ClearanceSection, joints: Mapping[str, RevoluteJoint | PrismaticJoint], source: str
 ) -> tuple[dict[str, Clearance], tuple[str, ...]]:
-    """Settings of every revolute joint that has a full set, and the names of the clearance joints.
+    """Settings of the revolute joints, and the names of the clearance joints.
+
+    Returns
+    -------
+    settings : dict of str to Clearance
+        For every revolute joint with a complete set of settings.
+    names : tuple of str
+        The clearance joints.
 
     Raises
     ------
     ConfigError
-        Naming the key, among the joint's own settings or the defaults, whichever holds the fault.
+        Names the invalid key, among the joint's own settings or among the defaults.
     """
     own = section.joints if isinstance(section.joints, dict) else {name: {} for name in section.joints}
     revolute = [name for name, joint in joints.items() if isinstance(joint, RevoluteJoint)]
@@ -34,7 +41,7 @@ def clearance_joints(
                 f"clearances.joints.{name}",
                 f"{what}, only a revolute joint can have clearance: {', '.join(revolute)}",
             )
-    # Defaults that are complete serve a joint that is named only on the command line.
+    # complete defaults also apply to joints that only the command line names
     named = revolute if set(section.defaults) >= _REQUIRED or (section.defaults and not own) else own
     settings = {
         name: _settings(section.defaults, own.get(name, {}), source, name)
@@ -45,7 +52,7 @@ def clearance_joints(
 
 
 def _settings(defaults: dict[str, Any], own: Any, source: str, name: str) -> Clearance:
-    """One joint's settings; what is wrong is told where it stands in the file."""
+    """Settings of one joint; an error names the place of the key in the file."""
     place = f"clearances.joints.{name}"
     own = structure({} if own is None else own, dict[str, Any], source, place)
     merged = defaults | own

@@ -1,26 +1,25 @@
-"""Between which bounds a clearance of a joint can lie, and what a value outside them likely means."""
+"""Valid ranges of clearances and their limits, with a hint at the likely wrong unit of an invalid value."""
 
-LEAST_FRACTION = 0.01  # of the new clearance: what is below it was not measured but mistyped
-LEAST_SIGMA_M = 1.0e-8  # no gauge is that good
+LEAST_FRACTION = 0.01  # least measured clearance over the new one: wear widens it, so less is a typing error
+LEAST_SIGMA_M = 1.0e-8  # least standard deviation: no clearance gauge resolves 10 nm
 
-_SLIPS = (1.0e-3, 1.0e3, 1.0e-6, 1.0e6)  # mm for m, m for mm, um for m, m for um
+_SLIPS = (1.0e-3, 1.0e3, 1.0e-6, 1.0e6)  # factors of wrong units: mm for m, m for mm, um for m, m for um
 
 
 def limit_fault(joint: str, fresh_m: float, radius_m: float, limit_m: float) -> str | None:
-    """What is wrong with a limit of a joint's mean radial clearance.
+    """Error message for an invalid limit of a joint's mean radial clearance.
 
     Parameters
     ----------
     joint : str
     fresh_m, radius_m : float
-        Clearance when new and radius of the bushing: the first is there from the start, the second is
-        never reached.
+        Clearance when new and radius of the bushing: the limit must lie between them.
     limit_m : float
 
     Returns
     -------
     str or None
-        None if nothing is wrong.
+        None if the limit is valid.
     """
     if fresh_m < limit_m < radius_m:
         return None
@@ -33,7 +32,7 @@ def limit_fault(joint: str, fresh_m: float, radius_m: float, limit_m: float) -> 
 
 
 def measured_fault(joint: str, fresh_m: float, radius_m: float, measured_m: float) -> str | None:
-    """What is wrong with a measured radial clearance [m]; parameters and return value as of `limit_fault`."""
+    """Error message for an invalid measured radial clearance [m]; otherwise as `limit_fault`."""
     least_m = LEAST_FRACTION * fresh_m
     if least_m <= measured_m <= radius_m:
         return None
@@ -46,7 +45,7 @@ def measured_fault(joint: str, fresh_m: float, radius_m: float, measured_m: floa
 
 
 def sigma_fault(radius_m: float, sigma_m: float) -> str | None:
-    """What is wrong with the standard deviation [m] of a measured clearance, None if nothing."""
+    """Error message for an invalid standard deviation [m] of a measured clearance; None if it is valid."""
     if LEAST_SIGMA_M <= sigma_m <= radius_m:
         return None
     bounds = f"from {1.0e3 * LEAST_SIGMA_M:g} mm to {1.0e3 * radius_m:g} mm, the bushing's radius"
@@ -54,5 +53,5 @@ def sigma_fault(radius_m: float, sigma_m: float) -> str | None:
 
 
 def _meant(value_m: float, above_m: float, below_m: float) -> float | None:
-    """The value in another unit of length that lies between the bounds, None if there is none."""
+    """The value [m] in another unit of length that lies between the bounds; None if there is none."""
     return next((value_m * slip for slip in _SLIPS if above_m < value_m * slip < below_m), None)

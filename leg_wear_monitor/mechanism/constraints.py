@@ -1,8 +1,8 @@
 """Closures of joints and drive: residual, Jacobian and right-hand side (physics.md sections 1 and 2).
 
-Each row touches two bodies, so a row of the Jacobian is kept as two blocks of three, for the bushing's
-(or guide's) and the journal's (or slider's) body. Formulas: Haug, Computer Aided Kinematics and Dynamics
-of Mechanical Systems, chapter 3; Nikravesh, Planar Multibody Dynamics.
+Each constraint row involves two bodies, so a row of the Jacobian is stored as two blocks of three, for the
+bushing's (or guide's) and the journal's (or slider's) body. Formulas: Haug, Computer Aided Kinematics and
+Dynamics of Mechanical Systems, chapter 3; Nikravesh, Planar Multibody Dynamics.
 """
 
 from collections.abc import Iterable
@@ -17,12 +17,12 @@ DRIVE = -1
 
 
 class Rows(NamedTuple):
-    """Which closures are enforced, two rows a joint and one for a driven crank.
+    """Rows of the enforced closures: two per joint and one for a driven crank.
 
-    ``closure`` (c,) joint of each closure or ``DRIVE``; ``row`` (c,) its first row; ``body`` (m, 2) the
-    bodies of each row; ``overlap`` (p, 5) the pairs of rows that share a moving body, as row, earlier or
-    equal row, their slots and the body; ``first`` (m,) the first column of each row inside the envelope
-    of Phi_q M^-1 Phi_q^T; ``drive_row`` the row of the drive, -1 without.
+    ``closure`` (c,): joint of each closure, or ``DRIVE``; ``row`` (c,): its first row; ``body`` (m, 2):
+    bodies of each row; ``overlap`` (p, 5): pairs of rows that share a moving body, as row, earlier or equal
+    row, the body's slot in each, and the body; ``first`` (m,): first column of each row within the envelope
+    of Phi_q M^-1 Phi_q^T; ``drive_row``: row of the drive, -1 without one.
     """
 
     closure: Ints
@@ -64,7 +64,7 @@ def select_rows(arrays: MechanismArrays, joints: Iterable[int], driven: bool) ->
 
 
 def _narrow(sides: dict[int, tuple[int, ...]]) -> list[int]:
-    """Cuthill-McKee: closures that share a body stand near each other, so the envelope stays small."""
+    """Order of the closures with a small envelope (Cuthill-McKee): those that share a body are neighbours."""
 
     def neighbours(closure: int) -> set[int]:
         moving = set(sides[closure]) - {0}
@@ -95,16 +95,16 @@ def rotations(q, out_cs):
 
 @kernel
 def arm(cs, body, point):
-    """A point of a body relative to its centre of mass, in the ground's frame [m]."""
+    """A point (2,) [m] of a body relative to its centre of mass, in the ground's frame; cs (n, 2)."""
     c, s = cs[body, 0], cs[body, 1]
     return c * point[0] - s * point[1], s * point[0] + c * point[1]
 
 
 @kernel
 def closures(arrays, rows, q, v, cs, drive, out_phi, out_jac, out_gamma):
-    """Residual (m,), Jacobian blocks (m, 2, 3) and gamma (m,) of every row.
+    """Residual (m,), Jacobian blocks (m, 2, 3) and gamma (m,) of every row, at q and v (n, 3).
 
-    ``drive`` (3,) is the angle, speed and acceleration of the crank.
+    ``drive`` (3,) is the angle [rad], speed [rad/s] and acceleration [rad/s^2] of the crank.
     """
     for k in range(rows.closure.shape[0]):
         joint, r = rows.closure[k], rows.row[k]
@@ -121,14 +121,14 @@ def closures(arrays, rows, q, v, cs, drive, out_phi, out_jac, out_gamma):
 
 @entry
 def closures_at(arrays, rows, q, v, drive, cs, out_phi, out_jac, out_gamma):
-    """`closures` from Python; fills cs (n, 2) too."""
+    """`closures` for calls from Python; also fills cs (n, 2)."""
     rotations(q, cs)
     closures(arrays, rows, q, v, cs, drive, out_phi, out_jac, out_gamma)
 
 
 @entry
 def jacobians_at(arrays, rows, q, v, drive, cs, phi, gamma, out_jac):
-    """Jacobian blocks (p, m, 2, 3) at p positions q (p, n, 3); v, drive, cs, phi and gamma are room."""
+    """Jacobian blocks (p, m, 2, 3) at positions q (p, n, 3); v, drive, cs, phi and gamma are work arrays."""
     for p in range(q.shape[0]):
         rotations(q[p], cs)
         closures(arrays, rows, q[p], v, cs, drive, phi, out_jac[p], gamma)
@@ -136,7 +136,7 @@ def jacobians_at(arrays, rows, q, v, drive, cs, phi, gamma, out_jac):
 
 @kernel
 def _revolute(arrays, joint, r, q, v, cs, out_phi, out_jac, out_gamma):
-    """The two points coincide: phi = P_journal - P_bushing; physics.md section 1."""
+    """Revolute joint, the two points coincide: phi = P_journal - P_bushing; physics.md section 1."""
     b, j = arrays.joint_body[joint, 0], arrays.joint_body[joint, 1]
     sbx, sby = arm(cs, b, arrays.joint_point[joint, 0])
     sjx, sjy = arm(cs, j, arrays.joint_point[joint, 1])
@@ -153,7 +153,7 @@ def _revolute(arrays, joint, r, q, v, cs, out_phi, out_jac, out_gamma):
 
 @kernel
 def _prismatic(arrays, joint, r, q, v, cs, out_phi, out_jac, out_gamma):
-    """The slider's point stays on the guide's line and its angle to the guide is held."""
+    """Prismatic joint: the slider's point stays on the guide's line, its angle to the guide is constant."""
     b, j = arrays.joint_body[joint, 0], arrays.joint_body[joint, 1]
     sbx, sby = arm(cs, b, arrays.joint_point[joint, 0])
     sjx, sjy = arm(cs, j, arrays.joint_point[joint, 1])

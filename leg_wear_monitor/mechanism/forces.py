@@ -1,7 +1,4 @@
-"""Applied forces: gravity, springs, loads over the gait phase; the energy they store; a drive's torque.
-
-The generalised forces Q of physics.md section 2.
-"""
+"""Generalised forces Q of gravity, springs, loads and drive, and energy (physics.md section 2)."""
 
 import math
 
@@ -11,7 +8,7 @@ from leg_wear_monitor.mechanism.constraints import arm, rotations
 
 @kernel
 def add_force(body, sx, sy, fx, fy, out_force):
-    """Force (fx, fy) [N] on a body at (sx, sy) from its centre of mass."""
+    """Add a force (fx, fy) [N] on a body at (sx, sy) [m] from its centre of mass to out_force (n, 3)."""
     out_force[body, 0] += fx
     out_force[body, 1] += fy
     out_force[body, 2] += sx * fy - sy * fx
@@ -19,7 +16,7 @@ def add_force(body, sx, sy, fx, fy, out_force):
 
 @kernel
 def applied_forces(arrays, q, v, cs, out_force):
-    """Generalised forces (n, 3) of all but contacts, constraints and the drive."""
+    """Generalised forces (n, 3) [N, N, N m] of gravity, springs and loads, at q and v (n, 3)."""
     for i in range(q.shape[0]):
         out_force[i, 0] = arrays.mass[i, 0] * arrays.gravity[0]
         out_force[i, 1] = arrays.mass[i, 1] * arrays.gravity[1]
@@ -35,7 +32,7 @@ def applied_forces(arrays, q, v, cs, out_force):
 
 @kernel
 def load_force(arrays, k, crank_angle):
-    """Force of load k [N] at a crank angle, linear between the entries of its table."""
+    """Force (2,) [N] of load k at a crank angle [rad], linear between the entries of its table."""
     i, w = _place(arrays.load_phase[k], crank_angle)
     before, after = arrays.load_force[k, i - 1], arrays.load_force[k, i]
     return before[0] + w * (after[0] - before[0]), before[1] + w * (after[1] - before[1])
@@ -43,7 +40,7 @@ def load_force(arrays, k, crank_angle):
 
 @kernel
 def _place(table, crank_angle):
-    """First entry of a table of phases that is not before a crank angle, and the way to it from the last."""
+    """Index of a table's first phase not before a crank angle [rad], and the fraction of the way to it."""
     phase = crank_angle / (2.0 * math.pi)
     phase -= math.floor(phase)
     i = 1
@@ -55,9 +52,9 @@ def _place(table, crank_angle):
 
 @kernel
 def controller_torque(arrays, wanted, angle, speed):
-    """Torque [N m] of a drive that is no constraint: feed-forward and gains on the errors, within its limit.
+    """Torque [N m] of a controller or a constant-torque drive: feed-forward and gains on the errors, limited.
 
-    ``wanted`` holds the angle [rad] and speed [rad/s] to follow; ``angle`` and ``speed`` are the crank's.
+    ``wanted`` contains the angle [rad] and speed [rad/s] to follow; ``angle`` and ``speed`` are the crank's.
     """
     i, w = _place(arrays.drive_phase, wanted[0])
     before, after = arrays.drive_feed[i - 1], arrays.drive_feed[i]
@@ -68,7 +65,7 @@ def controller_torque(arrays, wanted, angle, speed):
 
 @kernel
 def _spring_line(arrays, k, q, cs):
-    """Bodies, arms and the vector from the first point to the second of spring k."""
+    """Bodies, lever arms [m] and the vector [m] from the first to the second point of spring k."""
     a, b = arrays.spring_body[k, 0], arrays.spring_body[k, 1]
     sax, say = arm(cs, a, arrays.spring_point[k, 0])
     sbx, sby = arm(cs, b, arrays.spring_point[k, 1])
@@ -77,6 +74,7 @@ def _spring_line(arrays, k, q, cs):
 
 @kernel
 def _add_spring(arrays, k, q, v, cs, out_force):
+    """Add the force of spring and damper k on both bodies to out_force (n, 3)."""
     a, b, sax, say, sbx, sby, dx, dy = _spring_line(arrays, k, q, cs)
     length = math.hypot(dx, dy)
     if length == 0.0:
@@ -92,7 +90,7 @@ def _add_spring(arrays, k, q, v, cs, out_force):
 
 @kernel
 def stored_energy(arrays, q, v, cs):
-    """Kinetic energy, and that of gravity and springs [J]."""
+    """Kinetic energy plus the potential energy of gravity and springs [J]."""
     energy = 0.0
     for i in range(q.shape[0]):
         for d in range(3):
@@ -126,7 +124,7 @@ def external_power(arrays, q, v, cs):
 
 @entry
 def applied_forces_at(arrays, q, v, cs, out_force):
-    """`applied_forces` (p, n, 3) at p positions and velocities (p, n, 3); cs (n, 2) is room."""
+    """`applied_forces` (p, n, 3) at p positions and velocities (p, n, 3); cs (n, 2) is a work array."""
     for p in range(q.shape[0]):
         rotations(q[p], cs)
         applied_forces(arrays, q[p], v[p], cs, out_force[p])
@@ -134,7 +132,7 @@ def applied_forces_at(arrays, q, v, cs, out_force):
 
 @entry
 def stored_energy_at(arrays, q, v, cs, out_energy):
-    """`stored_energy` (p,) at p positions and velocities (p, n, 3); cs (n, 2) is room."""
+    """`stored_energy` (p,) at p positions and velocities (p, n, 3); cs (n, 2) is a work array."""
     for p in range(q.shape[0]):
         rotations(q[p], cs)
         out_energy[p] = stored_energy(arrays, q[p], v[p], cs)

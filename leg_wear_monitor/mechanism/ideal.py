@@ -32,7 +32,7 @@ class IdealMotion:
     ----------
     crank_angle : (N,) array, rad
     q, v, a : (N, n, 3) arrays
-        Centre of mass [m] and angle [rad] of every body, ground first, and their rates.
+        Centre of mass [m] and angle [rad] of every body, ground first; their velocities and accelerations.
     joint_force : (N, j, 2) array, N
         Force on the journal's (or slider's) body in each joint.
     drive_torque : (N,) array, N m
@@ -57,29 +57,33 @@ def ideal_motion(
     crank_angles : iterable of float, rad
         Visited in this order; neighbours may be any distance apart.
     speed, acceleration : float
-        Of the crank [rad/s, rad/s^2], the same at every angle.
+        Speed [rad/s] and acceleration [rad/s^2] of the crank, the same at every angle.
+
+    Returns
+    -------
+    IdealMotion
 
     Raises
     ------
     AssemblyError
-        If the linkage does not close at its start or meets a dead point on the way.
+        If the linkage does not close at the assembly's angle, or has a dead point between the angles.
     """
     angles = np.array(list(crank_angles), dtype=float)
     return _motion(linkage, angles, positions(linkage, angles), speed, acceleration)
 
 
 def one_cycle(linkage: Linkage, points: int, speed: float) -> IdealMotion:
-    """Ideal motion at ``points`` equal steps of one turn of the crank, from crank angle 0."""
+    """Ideal motion at ``points`` equal steps of one crank turn from angle 0, at a constant speed [rad/s]."""
     return _motion(linkage, _even_angles(points), _one_cycle_positions(linkage, points), speed, 0.0)
 
 
 def check_cycle(linkage: Linkage) -> None:
-    """Turn the crank once.
+    """Check that the crank can turn through a full cycle.
 
     Raises
     ------
     AssemblyError
-        At a dead point, naming its crank angle.
+        If there is a dead point; the message contains its crank angle.
     """
     start = linkage.mechanism.assembly.crank_angle
     follow(linkage, assemble(linkage), start, start + TURN)
@@ -87,14 +91,14 @@ def check_cycle(linkage: Linkage) -> None:
 
 @attrs.frozen
 class _Geometry:
-    """A linkage, equal to others that move alike: those with other masses, springs and loads."""
+    """A linkage as a cache key: equal for linkages that differ in masses, springs and loads only."""
 
     linkage: Linkage = attrs.field(eq=False)
     key: bytes
 
 
 def _one_cycle_positions(linkage: Linkage, points: int) -> Floats:
-    """Coordinates (points, n, 3) over one turn."""
+    """Coordinates q (points, n, 3) over one turn, cached by the linkage's geometry."""
     arrays = linkage.arrays
     shape = (
         arrays.joint_kind,
@@ -110,7 +114,7 @@ def _one_cycle_positions(linkage: Linkage, points: int) -> Floats:
     return _solved_positions(_Geometry(linkage, key), points).copy()
 
 
-# a twin asks several times for one linkage, with other loads and speeds; tests and studies for the same again
+# a twin, studies and tests need the positions of one linkage several times, with other loads and speeds
 @functools.lru_cache(maxsize=16)
 def _solved_positions(geometry: _Geometry, points: int) -> Floats:
     return positions(geometry.linkage, _even_angles(points))
@@ -137,12 +141,12 @@ def _motion(linkage: Linkage, angles: Floats, q: Floats, speed: float, accelerat
 
 
 def _solve(matrices: Floats, columns: Floats) -> Floats:
-    """Solutions (N, m) of N systems."""
+    """Solutions (N, m) of N linear systems, matrices (N, m, m) and right-hand sides (N, m)."""
     return np.asarray(np.linalg.solve(matrices, columns[..., None]), dtype=np.float64)[..., 0]
 
 
 def reactions(linkage: Linkage, q: Floats, lam: Floats) -> Floats:
-    """Force on the journal's or slider's body in every joint (j, 2) [N] from the multipliers."""
+    """Force (j, 2) [N] on the journal's or slider's body in every joint, from the multipliers (m,)."""
     arrays, force = linkage.arrays, np.zeros((len(linkage.mechanism.joints), 2))
     for closure, row in zip(linkage.rows.closure, linkage.rows.row, strict=True):
         if closure == DRIVE:
@@ -158,7 +162,7 @@ def reactions(linkage: Linkage, q: Floats, lam: Floats) -> Floats:
 def point_motion(
     motion: IdealMotion, linkage: Linkage, body: str, point: str
 ) -> tuple[Floats, Floats, Floats]:
-    """Position, velocity and acceleration (N, 2) of a point of a body."""
+    """Position [m], velocity [m/s] and acceleration [m/s^2] of a point of a body, (N, 2) each."""
     i = body_names(linkage.mechanism).index(body)
     q, v, a = motion.q[:, i], motion.v[:, i], motion.a[:, i]
     lever = turned(point_from_com(linkage.mechanism, body, point), q[:, 2])
@@ -168,7 +172,7 @@ def point_motion(
 
 
 def turned(vector: ArrayLike, angle: ArrayLike) -> Floats:
-    """A vector (2,) turned by an angle [rad], or by N angles (N, 2)."""
+    """A vector (2,) rotated by an angle [rad], or by N angles: (N, 2)."""
     x, y = np.asarray(vector, dtype=float)
     c, s = np.cos(angle), np.sin(angle)
     return np.stack([c * x - s * y, s * x + c * y], axis=-1)

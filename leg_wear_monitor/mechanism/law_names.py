@@ -1,4 +1,4 @@
-"""Names of the contact laws: apart from the laws, so that reading a name does not wait for numba."""
+"""Names of the contact laws; a module of its own, so that checking a name does not import numba."""
 
 NORMAL_LAWS = ("hertz", "hunt-crossley", "lankarani-nikravesh", "gonthier", "flores", "hu-guo", "winkler")
 FRICTION_LAWS = ("ambrosio", "threlfall", "none")

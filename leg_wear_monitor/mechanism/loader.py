@@ -1,4 +1,4 @@
-"""A mechanism file read, checked and turned into types."""
+"""Reading of mechanism files: YAML into checked types."""
 
 from pathlib import Path
 from typing import Any
@@ -18,7 +18,7 @@ from leg_wear_monitor.share import share_directory
 
 
 def _key(field: "attrs.Attribute[Any]") -> Any:
-    """A field of a mechanism as its file has it: clearances are not yet merged there."""
+    """A field of `spec.Mechanism` as a key of the file, where the clearances are not yet merged."""
     merged = field.name == "clearances"
     return attrs.field(
         type=ClearanceSection if merged else field.type,
@@ -28,35 +28,39 @@ def _key(field: "attrs.Attribute[Any]") -> Any:
     )
 
 
-# the fields that say what they are
+# keys of the file: the fields with a description
 _KEYS = {field.name: _key(field) for field in attrs.fields(spec.Mechanism) if "doc" in field.metadata}
 _File = attrs.make_class("MechanismFile", _KEYS, kw_only=True)
 
 
 def shipped_mechanisms() -> dict[str, Path]:
-    """Files of the mechanisms that come with the package, by name."""
+    """Files of the shipped mechanisms, by name."""
     return {path.stem: path for path in sorted((share_directory() / "config" / "mechanisms").glob("*.yaml"))}
 
 
 def is_file_name(name_or_path: str | Path) -> bool:
-    """Whether it is a path, and not the name of a mechanism that comes with the package."""
+    """Whether an argument is a path (has a suffix or a directory) instead of a shipped mechanism's name."""
     path = Path(name_or_path)
     return bool(path.suffix) or path.parent != Path()
 
 
 def load_mechanism(name_or_path: str | Path = "bionic_leg") -> spec.Mechanism:
-    """Read a mechanism from YAML and check all that can be checked without moving it.
+    """Read a mechanism from YAML and check everything that does not need its motion.
 
     Parameters
     ----------
     name_or_path : str or pathlib.Path
-        The name of a mechanism that comes with the package, or a path: anything with a suffix or a
-        directory. Relative paths start at the current directory.
+        Name of a shipped mechanism, or a path: anything with a suffix or a directory. Relative paths start
+        at the current directory.
+
+    Returns
+    -------
+    Mechanism
 
     Raises
     ------
     ConfigError
-        Naming file, key, value and what was expected.
+        Names file, key, value and what was expected.
     """
     path = Path(name_or_path)
     if is_file_name(path):
@@ -74,7 +78,7 @@ def load_mechanism(name_or_path: str | Path = "bionic_leg") -> spec.Mechanism:
 
 
 def parse_mechanism(document: Any, source: str) -> spec.Mechanism:
-    """Types from the plain mapping that a YAML file holds; see `load_mechanism`."""
+    """A mechanism from the contents of a YAML file, a plain mapping; see `load_mechanism`."""
     file = structure(document, _File, source, "")
     values = {key: getattr(file, key) for key in _KEYS}
     values["clearances"], values["clearance_joints"] = clearance_joints(file.clearances, file.joints, source)
@@ -84,7 +88,7 @@ def parse_mechanism(document: Any, source: str) -> spec.Mechanism:
 
 
 def read_yaml(path: Path, source: str) -> Any:
-    """What a YAML 1.2 file holds, as plain values; see `yaml_file.read_document`."""
+    """Contents of a YAML 1.2 file as plain values; see `yaml_file.read_document`."""
     try:
         return read_document(path, source)
     except FileNotFoundError as error:

@@ -1,6 +1,7 @@
-"""Values of a mechanism that can be used but are far from what such mechanisms have: likely another unit.
+"""Doubtful values of a mechanism: valid, but far outside the usual range, likely in a wrong unit.
 
-Ranges are wide: the shipped mechanisms, from Andrews' squeezer with links of 7 mm to a leg, lie well within.
+The ranges are wide: the shipped mechanisms, from Andrews' squeezer with links of 7 mm to a leg, lie well
+within.
 """
 
 import math
@@ -14,19 +15,19 @@ from leg_wear_monitor.mechanism.ideal import TURN
 from leg_wear_monitor.mechanism.spec import Body, Mechanism, PhaseLoad, SpeedDrive, TorqueDrive, Vector
 
 _USUAL_LENGTH = 5.0e-3, 5.0  # m, of the largest link
-_ROUND = 1.0e-3  # rpm: how near a speed in rad/s is to a whole number of rpm when it was converted
+_ROUND = 1.0e-3  # rpm: a converted speed in rad/s is within this of a whole number of rpm
 
 
 @attrs.frozen
 class Doubt:
-    """A value that is likely meant in another unit.
+    """A value that is likely given in a wrong unit.
 
     Attributes
     ----------
     key : str
         Dotted path in the file.
     fault : str
-        What the value comes to, what is usual, and the likely slip.
+        The value, the usual range, and the likely confusion of units.
     """
 
     key: str
@@ -37,13 +38,13 @@ class Doubt:
 
 
 def doubts(mechanism: Mechanism) -> tuple[Doubt, ...]:
-    """All doubtful values of a mechanism, those that explain most first."""
+    """All doubtful values of a mechanism, the most significant first."""
     parts = (_lengths, _angles, _speed, _masses, _gravity, _joints, _loads)
     return tuple(doubt for part in parts for doubt in part(mechanism))
 
 
 def suspects(mechanism: Mechanism) -> str:
-    """The end of a message about a mechanism that does not move: what to look at; empty without doubts."""
+    """End of an error message about a mechanism that cannot move: its doubtful values; empty without any."""
     found = [str(doubt) for doubt in doubts(mechanism)]
     return f"; look at {'; '.join(found)}" if found else ""
 
@@ -119,7 +120,7 @@ def _masses(mechanism: Mechanism) -> Iterator[Doubt]:
 
 
 def _inertia(name: str, body: Body, length: float) -> Iterator[Doubt]:
-    """A radius of gyration of some links is of no link; one of a thousandth of it, neither."""
+    """Doubt about an inertia whose radius of gyration is above 10 or below 0.001 times the largest link."""
     gyration = math.sqrt(body.inertia / body.mass)
     if _beyond(gyration, 1.0e-3 * length, 10.0 * length):
         slip = "kg mm^2 for kg m^2" if gyration > length else "t m^2 for kg m^2"
@@ -137,7 +138,7 @@ def _gravity(mechanism: Mechanism) -> Iterator[Doubt]:
 
 
 def _joints(mechanism: Mechanism) -> Iterator[Doubt]:
-    """Each doubt of the first joint that has it: they mostly come from the defaults."""
+    """Doubts about clearance settings, each for the first joint only: most come from the defaults."""
     told: set[str] = set()
     for joint, clearance in mechanism.clearances.items():
         for doubt in _clearance(clearance):

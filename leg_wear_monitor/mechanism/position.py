@@ -1,4 +1,4 @@
-"""Position analysis: the linkage put together, and carried along with its crank."""
+"""Position analysis: assembly, and continuation along the crank angle (physics.md section 1)."""
 
 from typing import NamedTuple
 
@@ -10,15 +10,15 @@ from leg_wear_monitor.mechanism.constraints import DRIVE, Rows, closures_at, jac
 from leg_wear_monitor.mechanism.spec import Mechanism
 
 _TOLERANCE = 1.0e-12  # residual of a closed joint [m, rad], near rounding for links of a metre
-_LONGEST_STEP = np.deg2rad(2.0)  # of the crank, for the continuation to stay on its branch
-_SHORTEST_STEP = np.deg2rad(1.0e-4)  # below it, the crank stands before a dead point
-_FAR = 0.5  # rad or link lengths: an assembly further from the given start is another one
+_LONGEST_STEP = np.deg2rad(2.0)  # crank step that keeps the continuation on its branch
+_SHORTEST_STEP = np.deg2rad(1.0e-4)  # crank step below which a dead point is reported
+_FAR = 0.5  # rad or link lengths: an assembly further from the initial guess is a different one
 
 
 class Linkage(NamedTuple):
-    """A mechanism made ready for the kernels, all joints ideal.
+    """A mechanism with its arrays for the kernels, all joints ideal.
 
-    ``rows`` holds every closure and the drive, so that their Jacobian is square.
+    ``rows`` contains every closure and the drive, so that their Jacobian is square.
     """
 
     mechanism: Mechanism
@@ -35,17 +35,17 @@ class Closures(NamedTuple):
 
 
 def mobility(mechanism: Mechanism) -> int:
-    """Degrees of freedom by Gruebler's count, the drive not locked."""
+    """Degrees of freedom by Gruebler's formula, with the crank free to turn."""
     return 3 * len(mechanism.bodies) - 2 * len(mechanism.joints)
 
 
 def build_linkage(mechanism: Mechanism) -> Linkage:
-    """Compile a mechanism; see `check_linkage` for what is checked.
+    """Linkage of a mechanism.
 
     Raises
     ------
     AssemblyError
-        When the linkage has not one degree of freedom.
+        If the linkage has another number of degrees of freedom than one.
     """
     freedom = mobility(mechanism)
     if freedom != 1:
@@ -59,7 +59,7 @@ def build_linkage(mechanism: Mechanism) -> Linkage:
 
 
 def evaluate(linkage: Linkage, q: Floats, v: Floats, drive: tuple[float, float, float]) -> Closures:
-    """All closures at coordinates q (n, 3), velocities v (n, 3) and drive (angle, speed, acceleration)."""
+    """All closures at coordinates q and velocities v (n, 3), drive (angle, speed, acceleration) [rad, s]."""
     m = len(linkage.rows.body)
     cs, phi, blocks, gamma = np.empty((len(q), 2)), np.empty(m), np.zeros((m, 2, 3)), np.empty(m)
     closures_at(linkage.arrays, linkage.rows, q, v, np.array(drive), cs, phi, blocks, gamma)
@@ -95,12 +95,13 @@ def dense_jacobian(rows: Rows, blocks: Floats, bodies: int) -> Floats:
 
 
 def assemble(linkage: Linkage) -> Floats:
-    """Coordinates (n, 3) closed to rounding at the assembly's crank angle, near the given start.
+    """Coordinates q (n, 3) of the assembly at its crank angle, near the file's initial guess.
 
     Raises
     ------
     AssemblyError
-        Naming the joint that stays open, and by how much; or a start that is nearer to no assembly.
+        If there is no assembly, naming the joint that does not close and its gap; or if the one found is far
+        from the initial guess.
     """
     mechanism = linkage.mechanism
     start = com_poses(mechanism)
@@ -122,7 +123,7 @@ def assemble(linkage: Linkage) -> Floats:
 
 
 def positions(linkage: Linkage, crank_angles: Floats) -> Floats:
-    """Coordinates (p, n, 3) at p crank angles, visited in this order; see `follow`."""
+    """Coordinates q (p, n, 3) at p crank angles [rad], visited in this order; see `follow`."""
     q, angle = assemble(linkage), linkage.mechanism.assembly.crank_angle
     found = np.empty((len(crank_angles), *q.shape))
     for i, target in enumerate(crank_angles):
@@ -132,12 +133,12 @@ def positions(linkage: Linkage, crank_angles: Floats) -> Floats:
 
 
 def follow(linkage: Linkage, q: Floats, angle: float, target: float) -> Floats:
-    """Carry an assembly from one crank angle to another without leaving its branch.
+    """Coordinates (n, 3) at the crank angle ``target``, continued on one branch from q at ``angle`` [rad].
 
     Raises
     ------
     AssemblyError
-        Naming the crank angle of the dead point that stands between.
+        If there is a dead point between the angles, naming its crank angle.
     """
     while angle != target:
         step = np.clip(target - angle, -_LONGEST_STEP, _LONGEST_STEP)
@@ -157,7 +158,7 @@ def follow(linkage: Linkage, q: Floats, angle: float, target: float) -> Floats:
 
 
 def _step(linkage: Linkage, q: Floats, angle: float, step: float) -> Floats | None:
-    """One continuation step along the tangent; None if it fails or passes a singular position."""
+    """One continuation step [rad] along the tangent; None if it fails or passes a singular position."""
     here = evaluate(linkage, q, np.zeros_like(q), (angle, 0.0, 0.0)).jacobian
     sign = np.linalg.slogdet(here)[0]
     if sign == 0.0:
@@ -172,14 +173,14 @@ def _step(linkage: Linkage, q: Floats, angle: float, step: float) -> Floats | No
 
 
 def drive_column(linkage: Linkage) -> Floats:
-    """Right-hand side that selects the drive's row (m,)."""
+    """Right-hand side (m,) with 1 in the drive's row."""
     column = np.zeros(len(linkage.rows.body))
     column[linkage.rows.drive_row] = 1.0
     return column
 
 
 def _newton(linkage: Linkage, start: Floats, angle: float) -> Floats | None:
-    """Newton's method from a start; None if it does not close."""
+    """Coordinates (n, 3) by Newton's method from an initial guess; None if it does not converge."""
     q = start.copy()
     for _ in range(30):
         system = evaluate(linkage, q, np.zeros_like(q), (angle, 0.0, 0.0))
@@ -196,7 +197,7 @@ def _newton(linkage: Linkage, start: Floats, angle: float) -> Floats | None:
 
 
 def _nearest(linkage: Linkage, start: Floats, angle: float, weight: Floats) -> Floats:
-    """Coordinates near a start at which the weighted closures (m,) are least open (Levenberg-Marquardt)."""
+    """Coordinates with the least weighted residual of the closures near a start, by Levenberg-Marquardt."""
 
     def weighted(q: Floats) -> tuple[Floats, Floats]:
         system = evaluate(linkage, q, np.zeros_like(q), (angle, 0.0, 0.0))
@@ -210,7 +211,7 @@ def _nearest(linkage: Linkage, start: Floats, angle: float, weight: Floats) -> F
         try:
             step = np.linalg.solve(normal + damping * np.diag(np.diag(normal)), -jacobian.T @ phi)
         except np.linalg.LinAlgError:
-            break  # lengths too far apart for the numbers that there are
+            break  # lengths differ by more than floating-point numbers resolve
         trial[1:] += step.reshape(-1, 3)
         residual, slope = weighted(trial)
         if residual @ residual < phi @ phi:
@@ -223,7 +224,7 @@ def _nearest(linkage: Linkage, start: Floats, angle: float, weight: Floats) -> F
 
 
 def _gap(linkage: Linkage, start: Floats, angle: float) -> str:
-    """The joint that stays open least when it alone may, all others being closed."""
+    """Text on the joint with the smallest gap when all other joints are closed."""
     rows, names = linkage.rows, list(linkage.mechanism.joints)
     gaps: dict[str, tuple[bool, float]] = {}
     for closure, row in zip(rows.closure, rows.row, strict=True):

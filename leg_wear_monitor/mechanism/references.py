@@ -1,16 +1,16 @@
-"""Every body and point that a mechanism speaks of is there."""
+"""Check that every body and point to which a mechanism refers exists."""
 
 from leg_wear_monitor.errors import ConfigError
 from leg_wear_monitor.mechanism.spec import GROUND, Mechanism, RevoluteJoint
 
 
 def check_references(mechanism: Mechanism) -> None:
-    """Look up every body and point that joints, drive, springs, loads and assembly name.
+    """Check every body and point that joints, drive, springs, loads and assembly name.
 
     Raises
     ------
     ConfigError
-        Naming the key that speaks of what is not there, and what is.
+        Names the key of the missing body or point, and the existing ones.
     """
     if GROUND in mechanism.bodies:
         raise ConfigError(

@@ -1,4 +1,4 @@
-"""A mechanism file as types: every key, its unit, its bounds and its meaning."""
+"""Types of a mechanism file: every key with its unit, bounds and meaning."""
 
 from itertools import pairwise
 from typing import Annotated, Literal
@@ -17,14 +17,14 @@ GROUND = "ground"
 
 @attrs.frozen(kw_only=True)
 class Ground:
-    """The fixed frame and the points it carries."""
+    """The fixed frame and its points."""
 
     points: dict[str, Vector] = described("points by name, [x, y]", unit="m", factory=dict)
 
 
 @attrs.frozen(kw_only=True)
 class Body:
-    """A rigid body; its points and centre of mass are written in its own frame."""
+    """A rigid body; points and centre of mass are given in its own frame."""
 
     mass: float = quantity("kg", "mass", above=0.0)
     inertia: float = quantity("kg m^2", "moment of inertia about the centre of mass", above=0.0)
@@ -34,7 +34,7 @@ class Body:
 
 @attrs.frozen(kw_only=True)
 class RevoluteJoint:
-    """A pin in a hole, at the point of its own name on both bodies."""
+    """A journal in a bushing, at the point of the joint's name on both bodies."""
 
     bushing: str = described("body that carries the bushing")
     journal: str = described("body that carries the pin")
@@ -43,7 +43,7 @@ class RevoluteJoint:
 
 @attrs.frozen(kw_only=True)
 class PrismaticJoint:
-    """A slider on a straight guide, through the point of its own name on both bodies."""
+    """A slider on a straight guide, through the point of the joint's name on both bodies."""
 
     guide: str = described("body that carries the guide")
     slider: str = described("body that slides")
@@ -176,7 +176,7 @@ class PhaseLoad:
 
 @attrs.frozen(kw_only=True)
 class Assembly:
-    """Where to start looking: the crank angle and each body's origin and angle."""
+    """Initial guess of the position analysis: crank angle, and each body's origin and angle."""
 
     crank_angle: float = quantity("rad", "crank angle of this assembly")
     poses: dict[str, Pose] = described(
@@ -186,16 +186,16 @@ class Assembly:
 
 @attrs.frozen(kw_only=True)
 class Mechanism:
-    """A planar linkage with one drive; fields that say what they are, are keys of the file.
+    """A planar linkage with one drive; the fields with a description are the keys of the file.
 
     Attributes
     ----------
     clearances : dict of str to Clearance
         Settings of every revolute joint that may have clearance: defaults merged with its own.
     clearance_joints : tuple of str
-        Joints with clearance unless a caller says otherwise.
+        Default clearance joints.
     source : str
-        Where it was read from, for messages.
+        Name of the file, for messages.
     """
 
     name: str = described("name in results")
@@ -224,7 +224,7 @@ class Mechanism:
 
     @property
     def toe(self) -> tuple[str, str] | None:
-        """Body and point called ``toe``, the point whose motion is reported, if there is one."""
+        """Body and point called ``toe``, whose motion is reported; None without such a point."""
         for body, spec in self.bodies.items():
             if "toe" in spec.points:
                 return body, "toe"

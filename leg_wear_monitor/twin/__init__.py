@@ -1,1 +1,1 @@
-"""The leg, in step with its gait: samples, crank tracker, digital twin, load from drive torque."""
+"""Digital twin: samples, crank tracker, leg model, load from drive torque (physics.md section 9)."""

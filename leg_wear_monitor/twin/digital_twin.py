@@ -1,18 +1,19 @@
-"""The leg, in step with a real one: samples in, forces and wear out.
+"""The digital twin: moves and wears like the real leg, from its samples (physics.md section 9).
 
 ::
 
     twin = DigitalTwin(mechanism, TwinSettings())       # builds tables; twin.warm_up() compiles
-    update = twin.update(samples)                       # a block, in order of arrival, any size
-    update.samples, update.cycles, update.events        # see figures
-    twin.tracking, twin.speed_radps, twin.intake        # how it goes
-    twin.clearance_mean_m, twin.depth                   # wear now
-    twin.set_depth(depth), twin.reset_wear("G")         # from a ledger; a part was replaced
+    update = twin.update(samples)                       # a block of any size, in order of arrival
+    update.samples, update.cycles, update.events        # see `statistics`
+    twin.tracking, twin.speed_radps, twin.intake        # state of tracking, counts of samples
+    twin.clearance_mean_m, twin.depth                   # present wear
+    twin.set_depth(depth), twin.reset_wear("G")         # from a ledger; after a replacement
     twin.wear_acceleration = 100.0                      # may change at any time
-    snapshot = twin.snapshot(); twin.restore(snapshot)  # goes on bit for bit
+    snapshot = twin.snapshot(); twin.restore(snapshot)  # continues bit-identically
 
-However the samples are cut into blocks, results are the same bit for bit. What the twin tells lags behind the
-newest sample by `TrackerSettings.lag` and a little more: it waits for samples on both sides of an instant.
+Results do not depend on the division of the samples into blocks, bit for bit. They lag behind the newest
+sample by slightly more than `TrackerSettings.lag`, because the twin needs samples before and after an
+instant.
 """
 
 from typing import NamedTuple
@@ -41,7 +42,7 @@ from leg_wear_monitor.twin.tracker.tracker import CrankTracker, TrackerSnapshot
 
 
 class TwinSnapshot(NamedTuple):
-    """All of a twin; plain arrays and numbers."""
+    """Complete state of a twin as plain arrays and numbers."""
 
     tracker: TrackerSnapshot
     follower: FollowerSnapshot
@@ -49,7 +50,7 @@ class TwinSnapshot(NamedTuple):
 
 
 class DigitalTwin:
-    """A leg with clearances that moves and wears in step with the samples it is given.
+    """A leg with clearances that moves and wears according to measured samples.
 
     Parameters
     ----------
@@ -60,12 +61,14 @@ class DigitalTwin:
     ----------
     settings : TwinSettings
     clearance_joints : tuple of str
-        The clearance joints, in the order of all figures.
+        The clearance joints, in the order of all arrays.
 
     Raises
     ------
-    ConfigError, AssemblyError
-        For a mechanism that cannot be followed.
+    ConfigError
+        For invalid settings, or a mechanism without clearance joints.
+    AssemblyError
+        If the linkage does not close or has a dead point.
     """
 
     def __init__(self, mechanism: Mechanism, settings: TwinSettings | None = None) -> None:
@@ -100,7 +103,7 @@ class DigitalTwin:
 
     @property
     def depth(self) -> Floats:
-        """Wear depth (clearance joints, 2, sectors) [m] of bushing and journal; a copy."""
+        """Wear depth (k, 2, N) [m] of bushing and journal; a copy."""
         return self._setup.surfaces.depth.copy()
 
     @property
@@ -115,38 +118,38 @@ class DigitalTwin:
 
     @property
     def peak_force_n(self) -> Floats:
-        """Largest contact force (k,) [N] since the gait cycle began."""
+        """Largest contact force (k,) [N] since the begin of the gait cycle."""
         return np.asarray(self._follower.statistics.peak[self._setup.contacts.joint])
 
     @property
     def torque_size_nm(self) -> float:
-        """RMS of the ideal drive torque at the commanded speed."""
+        """RMS of the ideal drive torque at the commanded speed [N m]."""
         return self._follower.torque_size_nm
 
     @property
     def tracking(self) -> Tracking:
-        """How the crank is followed."""
+        """State of the crank tracking."""
         return Tracking(int(self._tracker.state.clock.tracking))
 
     @property
     def speed_radps(self) -> float:
-        """Speed of the crank at the last spline node [rad/s]."""
+        """Crank speed at the last spline node [rad/s]."""
         return float(self._tracker.state.node.speed)
 
     @property
     def intake(self) -> Intake:
-        """Counts since the twin was made."""
+        """Counts of samples and times since the twin was created."""
         if self._intake is None:  # it is asked for several times between two updates
             self._intake = intake(self._tracker.records, self._follower.records)
         return self._intake
 
     def set_depth(self, depth: Floats) -> None:
-        """Set wear depths (clearance joints, 2, sectors) [m], as from a ledger.
+        """Set wear depths (k, 2, N) [m], for instance from a ledger.
 
         Raises
         ------
         LegWearError
-            For another shape, or for values that are no depths.
+            For another shape, or for values that are negative or not finite.
         """
         own = self._setup.surfaces.depth
         if depth.shape != own.shape or not (np.isfinite(depth).all() and (depth >= 0.0).all()):
@@ -154,7 +157,7 @@ class DigitalTwin:
         self._follower.take_surfaces(depth)
 
     def reset_wear(self, joint: str) -> None:
-        """Fresh surfaces for a joint whose part was replaced.
+        """Set the wear of a joint to 0 after a replacement of its parts.
 
         Raises
         ------
@@ -170,9 +173,9 @@ class DigitalTwin:
         self.set_depth(depth)
 
     def warm_up(self) -> None:
-        """Compile all that `update` needs, before the first sample; takes about a minute once.
+        """Compile everything that `update` needs, before the first sample; takes about a minute once.
 
-        The motion comes last: a second process may be compiling it.
+        The motion comes last, because a second process may be compiling it.
         """
         now = self.snapshot()
         self._follower.compile(self._tracker.steps)
@@ -182,7 +185,7 @@ class DigitalTwin:
         self.restore(now)
 
     def update(self, samples: Samples) -> TwinUpdate:
-        """Take in a block (n,) of `GAIT_SAMPLE` in order of arrival, and follow as far as can be."""
+        """Process a block (n,) of `GAIT_SAMPLE` in order of arrival, as far as the lag allows."""
         looks: list[SampleStatistics] = []
         cycles: list[CycleStatistics] = []
         events: list[Event] = []
@@ -197,7 +200,7 @@ class DigitalTwin:
         return TwinSnapshot(self._tracker.snapshot(), self._follower.snapshot(), self.wear_acceleration)
 
     def restore(self, snapshot: TwinSnapshot) -> None:
-        """Go back to a snapshot of a twin of the same mechanism and settings."""
+        """Restore a snapshot of a twin of the same mechanism and settings."""
         self._intake = None
         self._tracker.restore(snapshot.tracker)
         self._follower.restore(snapshot.follower)

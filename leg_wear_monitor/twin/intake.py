@@ -1,4 +1,4 @@
-"""What was taken in, as counts with names."""
+"""Counts of samples and times from the state of tracker and follower."""
 
 from leg_wear_monitor.record import Records, values_of
 from leg_wear_monitor.twin.kinds import KINDS
@@ -7,7 +7,7 @@ from leg_wear_monitor.twin.statistics import Intake
 
 
 def intake(tracker: Records, leg: Records) -> Intake:
-    """Counts of a tracker, `TRACKER_STATE`, and of the leg that follows it, `LEG_STATE`."""
+    """Counts of a tracker's `TRACKER_STATE` and a follower's `LEG_STATE`."""
     count, clock = values_of(tracker["counts"]), values_of(tracker["clock"])
     motion = values_of(leg["motion"])
     out = clock["out_since_ns"] != 0 and not clock["followed"]

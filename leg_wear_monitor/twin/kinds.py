@@ -1,6 +1,6 @@
-"""Kinds of samples, one entry each: order of arrival, counts, rates, their alarms and silence follow from it.
+"""Kinds of samples: order, counts, rates, alarms and silence detection follow from these entries.
 
-Which message becomes a sample of which kind stands in `messages.streams`. Nothing heavy is imported.
+`messages.streams` maps messages to kinds. This module imports neither numpy nor numba.
 """
 
 from collections.abc import Mapping
@@ -10,18 +10,18 @@ import attrs
 
 @attrs.frozen(kw_only=True)
 class SampleKind:
-    """What samples of a kind measure.
+    """A kind of samples.
 
     Attributes
     ----------
     name : str
-        In statuses (``crank_rate_hz``), alarms (``input_rate crank``) and counts; the status of this name,
-        if there is one, has no current data while no sample of the kind comes.
+        Name in statuses (``crank_rate_hz``), alarms (``input_rate crank``) and counts. A status of this name
+        has no current data while no sample of the kind arrives.
     value : str
-        Field of `GAIT_SAMPLE` that a sample of this kind must have, finite. A sample of another kind may
-        bring it too.
+        Field of `GAIT_SAMPLE` that must be finite in a sample of this kind. A sample of another kind may
+        contain it too.
     largest : float
-        Magnitude in the field's unit: no leg's value is beyond it.
+        Largest plausible magnitude, in the field's unit.
     """
 
     name: str
@@ -29,7 +29,7 @@ class SampleKind:
     largest: float
 
 
-CRANK, TORQUE = 0, 1  # at one stamp, samples are followed in this order
+CRANK, TORQUE = 0, 1  # samples with equal stamps are processed in this order
 KINDS: Mapping[int, SampleKind] = {
     CRANK: SampleKind(name="crank", value="crank_angle_rad", largest=1.0e6),
     TORQUE: SampleKind(name="torque", value="torque_nm", largest=1.0e6),

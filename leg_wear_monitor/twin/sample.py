@@ -1,4 +1,4 @@
-"""What comes in across the seam: records of one measurement each, live or from a recording."""
+"""Samples: records of one measurement each, from live topics or from a recording."""
 
 from typing import Any
 
@@ -11,7 +11,7 @@ from leg_wear_monitor.twin.kinds import CRANK, KINDS
 Samples = NDArray[Any]
 """Records of `GAIT_SAMPLE`, shape (n,), in order of arrival."""
 
-ENCODERS = 4  # beside the crank's, at most
+ENCODERS = 4  # largest number of further encoders, beside the crank's
 
 GAIT_SAMPLE = np.dtype(
     [
@@ -24,17 +24,17 @@ GAIT_SAMPLE = np.dtype(
         ("encoder_rad", "f8", (ENCODERS,)),
     ]
 )
-"""One sample: the header's stamp, its kind, what is wrong with it, and the values, NaN where absent.
+"""One sample: stamp of the header, kind, fault, and values, NaN where absent.
 
-The angle is that of the mechanism's crank: sign, offset and gear ratio are applied above the seam. It may
-be wrapped to a turn or count on. A crank sample may bring a torque too (``effort``), and the angles of
-further encoders, in the order of ``encoders.names``, signs applied: NaN where absent, infinite where what
-came is no angle. What is wrong with those is no fault of the sample.
+The angle is that of the mechanism's crank, after sign, offset and gear ratio; it may be wrapped to a turn or
+be continuous. A crank sample may also contain a torque (``effort``), and the angles of further encoders in
+the order of ``encoders.names``, after their signs: NaN where absent, infinite where the value is no angle. An
+invalid torque or encoder angle is not a fault of the sample.
 """
 
-# What the conversion found wrong with a message. Such a sample is counted and never used.
+# Faults of a message, found by the conversion. Such a sample is counted and never used.
 NO_FAULT, EMPTY, WRONG_LENGTH, MISSING_JOINT, NOT_FINITE, ZERO_STAMP, UNDECODABLE, WRONG_TYPE = range(8)
-# What the tracker itself finds in samples that came without a fault.
+# A further fault, found by the tracker.
 OUT_OF_RANGE = 8
 FAULTS = {
     NO_FAULT: "none",
@@ -47,7 +47,7 @@ FAULTS = {
     WRONG_TYPE: "wrong_type",
     OUT_OF_RANGE: "out_of_range",
 }
-"""Names of the faults, fit for keys of diagnostics."""
+"""Names of the faults, as used in keys of diagnostics."""
 
 
 def gait_samples(
@@ -71,7 +71,7 @@ def gait_samples(
     crank_angle_rad, crank_velocity_radps, torque_nm : (n,) array or float
         NaN where absent.
     encoder_rad : (n, m) array or float
-        Of at most `ENCODERS` further encoders.
+        Angles of m further encoders, at most `ENCODERS`.
     fault : (n,) array or int
         A key of `FAULTS`.
 
@@ -82,7 +82,7 @@ def gait_samples(
     Raises
     ------
     LegWearError
-        For a kind or a fault that is none, or for stamps that are no integers.
+        For an unknown kind or fault, or for stamps that are not integers.
     """
     stamps = np.atleast_1d(np.asarray(stamp_ns))
     if stamps.dtype.kind not in "iu":
@@ -105,5 +105,5 @@ def gait_samples(
 
 
 def brings(samples: Samples, kind: int) -> NDArray[np.bool_]:
-    """Which samples bring what a kind measures: those of the kind, and others that have its value too."""
+    """Mask (n,) of the samples with a kind's value: those of the kind, and others that contain it."""
     return np.asarray((samples["kind"] == kind) | np.isfinite(samples[KINDS[kind].value]))

@@ -1,4 +1,4 @@
-"""What can be set of the twin; the monitor declares them as parameters, with units and bounds."""
+"""Settings of the twin; `monitor.config` declares them as parameters with units and bounds."""
 
 import math
 
@@ -16,42 +16,43 @@ LOAD_SHAPES = STANCE, CONSTANT = "stance", "constant"
 
 @attrs.frozen(kw_only=True)
 class TrackerSettings:
-    """How the crank's motion is taken from samples.
+    """Settings of the crank tracker.
 
     Attributes
     ----------
     commanded_speed_radps : float
-        Of the commanded gait, 60 rpm by default: first guess of the speed, and what *in step* means.
+        Crank speed of the commanded gait, 60 rpm by default: initial guess of the speed, reference for
+        `speed_tolerance`.
     bandwidth_hz : float
-        Changes of the crank's motion up to about this frequency are followed, faster ones are noise.
+        Bandwidth of the tracked crank motion; faster changes are treated as noise.
     encoder_noise_rad, velocity_noise_radps : float
-        Standard deviations at 200 Hz; what counts is their ratio, and the first for the gate.
+        Standard deviations at 200 Hz; only their ratio and, for the gate, the first one have an effect.
     gate_rad, velocity_gate_radps : float
-        A sample further from what was predicted is an outlier, beyond five standard deviations of the
-        prediction.
+        A sample is an outlier if its deviation from the prediction exceeds this plus five standard deviations
+        of the prediction.
     reorder_window_s : float
-        How much later than younger samples of its kind a sample may arrive. A kind that comes later as a
-        whole is waited for, up to `bridge_limit_s`.
+        Largest delay of a sample behind younger samples of its kind. If a whole kind is late, the tracker
+        waits for it up to `bridge_limit_s`.
     lag_s : float
-        How far the leg follows behind the newest sample, so that samples on both sides say how the crank
-        moved; 0 means what the bandwidth asks for (0.8 / bandwidth_hz).
+        Delay of the leg behind the newest sample, for smoothing by later samples; 0 selects
+        0.8 / bandwidth_hz.
     bridge_limit_s : float
-        Gaps up to this are bridged, and counted if they are longer than `mark_gap_s` and two periods of the
-        samples; the crank is lost in longer ones.
+        Longest gap that is bridged; in a longer one, tracking is lost.
     mark_gap_s : float
+        Bridged gaps longer than this and than two periods of the samples are counted.
     backward_jump_s : float
-        Stamps that go back by more than this start a new time base.
+        A backward jump of the stamps by more than this starts a new time base.
     acquire_s : float
-        How long samples must agree before the leg is set in motion.
+        Time for which samples must agree before the leg is set in motion.
     largest_speed_radps : float
-        No leg's crank is faster; a crank that seems so, or to change as fast as that, is lost. 0 means three
+        Tracking is lost at a higher crank speed, or at an acceleration above its square; 0 selects three
         times the commanded speed.
     stop_speed_radps, stop_hold_s : float
-        A crank slower than this for so long has stopped.
+        A crank slower than this for this time has stopped.
     speed_tolerance : float
-        Share of the commanded speed by which a gait in step may be off.
+        Largest deviation of a speed in step, as a fraction of the commanded speed.
     settle_s : float
-        How long the speed must be within (or beyond) tolerance to be in step (or out of it).
+        Time for which the speed must be within (or beyond) the tolerance to be in (or out of) step.
     """
 
     commanded_speed_radps: float = 2.0 * math.pi
@@ -88,7 +89,7 @@ class TrackerSettings:
 
     @property
     def largest_speed(self) -> float:
-        """The largest speed believed [rad/s]."""
+        """The largest plausible crank speed [rad/s]."""
         return self.largest_speed_radps or 3.0 * abs(self.commanded_speed_radps)
 
     @property
@@ -99,26 +100,27 @@ class TrackerSettings:
 
 @attrs.frozen(kw_only=True)
 class TwinSettings:
-    """How the leg is followed.
+    """Settings of the twin.
 
     Attributes
     ----------
     tracker : TrackerSettings
     clearance_joints : tuple of str, optional
-        The clearance joints; the mechanism's own if not given (A, B, G, I, J of the bionic leg).
+        The clearance joints; default: those of the mechanism (A, B, G, I, J of the bionic leg).
     wear_acceleration : float
-        Factor on all wear coefficients, for demonstrations; 1 is the material's own.
+        Factor on all wear coefficients, for demonstrations; 1 for the material's own.
     torque_bandwidth_hz : float
-        Of the low-pass that measured and predicted torque both go through before they are compared.
+        Bandwidth of the low-pass filter of measured and predicted torque before their comparison.
     estimate_load : bool
-        Whether the foot load that measured torque shows acts on the leg; it is estimated in any case.
+        Whether the estimated foot load acts on the model; it is estimated in any case.
     load_shape : str
-        ``stance``: the ground's push, in proportion to the toe's depth below its mean height; ``constant``: a
-        weight that it carries.
+        ``stance``: ground force in proportion to the toe's depth below its mean height; ``constant``: a
+        constant weight.
     load_limit_n : float
-        Largest foot load believed [N].
+        Largest plausible foot load [N].
     torque_sampling : str
-        What a torque sample is: ``average``, the mean since the sample before; ``instant``, the value then.
+        Meaning of a torque sample: ``average``, the mean since the previous sample; ``instant``, the value at
+        the stamp.
     """
 
     tracker: TrackerSettings = attrs.field(factory=TrackerSettings)

@@ -1,4 +1,4 @@
-"""What the twin says: at each sample, of each gait cycle, and when something happens."""
+"""Outputs of the twin: values at each sample, statistics of each gait cycle, events, counts."""
 
 from collections.abc import Sequence
 from enum import Enum
@@ -11,7 +11,7 @@ from leg_wear_monitor.mechanism.arrays import Floats, Ints
 
 
 class Tracking(Enum):
-    """How the crank is followed."""
+    """State of the crank tracking."""
 
     STOPPED = 0
     STARTING = 1
@@ -20,9 +20,9 @@ class Tracking(Enum):
 
 
 class TwinEventKind(Enum):
-    """What may happen to the twin; the value is fit for a key."""
+    """Kind of an event of the twin; the value is used as a key."""
 
-    ACQUIRED = "acquired"  # the leg is (again) set in motion, wear as it was
+    ACQUIRED = "acquired"  # the leg is set in motion (again), its wear unchanged
     STOPPED = "stopped"
     MOVING = "moving"
     REVERSED = "reversed"
@@ -30,14 +30,15 @@ class TwinEventKind(Enum):
     LOST_BY_OUTLIERS = "lost_by_outliers"
     LOST_BY_OVERFLOW = "lost_by_overflow"
     BACKWARD_JUMP = "backward_jump"
-    STEP_TOO_SMALL = "step_too_small"  # the leg's motion could not be resolved; it starts afresh, wear kept
-    PUSHED_THROUGH = "pushed_through"  # a journal went through its bushing; likewise
-    INVALID_DRIVE = "invalid_drive"  # the crank's motion was none of a leg's; likewise
+    # failures of the leg's integration; it restarts with its wear unchanged
+    STEP_TOO_SMALL = "step_too_small"  # the step became too small
+    PUSHED_THROUGH = "pushed_through"  # a penetration became too large
+    INVALID_DRIVE = "invalid_drive"  # the crank's motion was implausible
 
 
 @attrs.frozen
 class Event:
-    """Something that happened at a stamp, in a joint if it concerns one."""
+    """An event at a stamp, in a joint if it concerns one."""
 
     stamp_ns: int
     what: TwinEventKind
@@ -46,7 +47,7 @@ class Event:
 
 @attrs.frozen(eq=False)
 class SampleStatistics:
-    """The leg at each of n samples that were passed now; NaN while the leg is not followed.
+    """The leg at each of the n samples that an update reached; NaN while tracking is lost.
 
     Attributes
     ----------
@@ -54,11 +55,11 @@ class SampleStatistics:
     kind : (n,) array of int
         As in `sample`.
     crank_angle_rad : (n,) array
-        Of the leg, in [0, 2 pi).
+        Crank angle of the model, in [0, 2 pi).
     predicted_torque_nm : (n,) array
-        Mean of the drive torque since the sample before.
+        Mean of the predicted drive torque since the previous sample.
     contact_force_n : (n, k) array
-        At the sample.
+        Contact forces at the sample.
     """
 
     stamp_ns: Ints
@@ -73,29 +74,29 @@ class SampleStatistics:
 
 @attrs.frozen
 class TorqueStatistics:
-    """Measured against predicted drive torque over a gait cycle, both through the same low-pass.
+    """Comparison of measured and predicted drive torque over a gait cycle, after the same low-pass filter.
 
     Attributes
     ----------
     samples : int
-        Torque samples compared; without any, all up to ``condition`` are NaN.
+        Number of compared torque samples; if 0, all values up to ``condition`` are NaN.
     measured_rms_nm, predicted_rms_nm, residual_mean_nm, residual_rms_nm : float
     unexplained_rms_nm : float
-        Of the residual once foot load, friction and lag are taken out: the mismatch of the model.
+        RMS of the residual without the parts of foot load, friction and lag: the mismatch of the model.
     condition : float
-        Condition number of this cycle's estimate of the three below, 1 at best.
+        Condition number of this cycle's estimate of the three parameters below, 1 at best.
     load_n, load_sigma_n : float
-        Vertical foot load, up positive, and its standard deviation.
+        Vertical foot load, positive upwards, and its standard deviation.
     load_acting_n : float
-        The load at work in the model from now on: that above where it is believed and asked for, else 0.
+        Load that acts in the model from now on: the estimate if it is significant and enabled, else 0.
     friction_nm : float
-        Torque of friction in the drive, against the motion; no force in the joints comes of it.
+        Friction torque of the drive, opposite to the motion; it does not load the joints.
     torque_lag_s : float
-        By how much the measured torque comes late.
+        Delay of the measured torque.
     friction_sigma_nm, torque_lag_sigma_s : float
         Standard deviations of these two.
     cycle_lag_s, cycle_lag_sigma_s : float
-        The lag by this cycle alone, and its standard deviation.
+        The delay estimated from this cycle alone, and its standard deviation.
     """
 
     samples: int
@@ -118,33 +119,33 @@ class TorqueStatistics:
 
 @attrs.frozen(eq=False)
 class CycleStatistics:
-    """One whole gait cycle, from crank angle 0 to the next 0.
+    """Statistics of one complete gait cycle, from crank angle 0 to the next 0.
 
     Arrays are (k,) in the order of `DigitalTwin.clearance_joints`.
 
     Attributes
     ----------
     cycle : int
-        Counted from 1 since the twin was made (or restored).
+        Number of the cycle, from 1 since the twin was created (or restored).
     begin_ns, stamp_ns : int
-        Its begin and end.
+        Stamps of its begin and end.
     direction : int
         1 forward, -1 backward.
     moving_s, bridged_s : float
-        Time in motion; time bridged in gaps.
+        Time in motion; time of bridged gaps.
     peak_force_n, p99_force_n, mean_force_n : array
-        Of the contact force; the peak is a sample of a heavy tail.
+        Statistics of the contact force; the peak is a sample of a heavy tail.
     impacts : array of int
     contact_fraction : array
-        Share of the time in contact.
+        Fraction of the time in contact.
     archard_j : array
         Integral of F_N |v_t| dt.
     clearance_mean_m, clearance_max_m : array
-        At its end.
+        Radial clearances at its end.
     growth_mean_m, growth_max_m : array
-        Of the two over the cycle.
+        Changes of these two over the cycle.
     depth_max_m : (k, 2) array
-        Deepest wear of bushing and journal.
+        Greatest wear depth of bushing and journal.
     torque : TorqueStatistics
     """
 
@@ -169,13 +170,13 @@ class CycleStatistics:
 
     @property
     def duration_s(self) -> float:
-        """From begin to end, standing included."""
+        """Time from begin to end [s], standstill included."""
         return (self.stamp_ns - self.begin_ns) * 1.0e-9
 
 
 @attrs.frozen(eq=False)
 class TwinUpdate:
-    """What an update of the twin brought."""
+    """Result of an update of the twin."""
 
     samples: SampleStatistics
     cycles: tuple[CycleStatistics, ...]
@@ -184,29 +185,31 @@ class TwinUpdate:
 
 @attrs.frozen
 class Intake:
-    """Counts since the twin was made, of samples and of time; they only grow.
+    """Counts of samples and times since the twin was created; they only increase.
 
     Attributes
     ----------
     received : int
+        All samples.
     faulty : dict of str to int
         Counts by the names of `sample.FAULTS`, without ``none``.
     used : dict of str to int
-        Samples that were used, by the names of `KINDS`; a crank sample with a torque counts for both.
+        Used samples by the names of `KINDS`; a crank sample with a torque counts for both.
     duplicates, late, stray_stamps : int
-        Dropped: seen before; later than the window; a stamp far off that no other followed.
+        Dropped samples: repeated; later than the window; with a stamp far from the others that no second
+        sample confirmed.
     outliers, velocity_outliers : int
-        Dropped by the gates; of the latter only the velocity.
+        Samples dropped by the angle's gate; velocities dropped by theirs.
     gaps_bridged, lost, backward_jumps, reversals, failures : int
-        ``failures`` of the leg's motion: see `TwinEventKind`.
+        Numbers of events; ``failures`` of the leg's integration, see `TwinEventKind`.
     bridged_s, moving_s, standing_s : float
-        Monitored time, bridged time is a part of moving time.
+        Monitored time; bridged time is a part of moving time.
     unmonitored_s : float
-        Time in which the leg was not followed, up to its last new start.
+        Time without tracking, up to its last restart.
     out_s : float
-        Since when it is not followed at present, 0 where it is; no count.
+        Duration of the present loss of tracking, 0 while the crank is tracked; not a count.
     newest_stamp_ns, followed_stamp_ns : int
-        The youngest stamp taken in, and up to where the leg has followed; 0 before.
+        Youngest stamp received, and stamp to which the leg was advanced; 0 before the first.
     """
 
     received: int
@@ -232,7 +235,7 @@ class Intake:
 
 
 def joined(parts: Sequence[SampleStatistics], clearance_joints: int) -> SampleStatistics:
-    """Statistics of one stretch after the other."""
+    """Concatenation of sample statistics."""
     if len(parts) < 2:
         return parts[0] if parts else no_samples(clearance_joints)
     names = [field.name for field in attrs.fields(SampleStatistics)]
@@ -240,6 +243,6 @@ def joined(parts: Sequence[SampleStatistics], clearance_joints: int) -> SampleSt
 
 
 def no_samples(clearance_joints: int) -> SampleStatistics:
-    """Statistics of no sample."""
+    """Empty sample statistics."""
     stamps: NDArray[np.int64] = np.zeros(0, dtype=np.int64)
     return SampleStatistics(stamps, stamps, np.zeros(0), np.zeros(0), np.zeros((0, clearance_joints)))

@@ -1,15 +1,15 @@
-"""What the tracker reports to the leg, step by step, in the order of stamps."""
+"""Steps: the tracker's instructions to the leg, in the order of stamps (physics.md section 9)."""
 
 import numpy as np
 
 from leg_wear_monitor.kernel import kernel
 from leg_wear_monitor.record import Records, new_records
 
-# A step's code: set the leg in motion; move it along a polynomial; let it rest; evaluate it at a sample;
-# leave it; and what is only reported.
+# Codes of steps: set the leg in motion; move it along a polynomial; rest; evaluate it at a sample; stop
+# following; report an event only.
 START, MOVE, REST, EVALUATE, LEAVE, REPORT = range(6)
 
-# Reasons for leaving the leg, and what is reported.
+# Reasons of LEAVE, then events of REPORT.
 LOST_IN_GAP, LOST_BY_OUTLIERS, LOST_BY_OVERFLOW, LOST_BY_JUMP = range(4)
 STOPPED, MOVING, REVERSED = range(4, 7)
 
@@ -18,9 +18,9 @@ STEP = np.dtype(
         ("code", "i8"),  # of the above
         ("begin_ns", "i8"),  # stamp at which it begins
         ("end_ns", "i8"),  # stamp at which it ends
-        ("detail", "i8"),  # kind of the sample, reason for leaving the leg, or what is reported
-        ("turns", "i8"),  # turns of the crank before the angle that the motion counts from
-        ("bridged_ns", "i8"),  # how much of the time bridges a gap
+        ("detail", "i8"),  # EVALUATE: kind of the sample; LEAVE: reason; REPORT: event
+        ("turns", "i8"),  # whole crank turns to add to the angle of the motion
+        ("bridged_ns", "i8"),  # part of its duration that bridges a gap
         ("torque", "f8"),  # drive torque measured at a sample [N m]
         ("motion", "f8", (6,)),  # START: angle [rad], speed, acceleration; MOVE: coefficients over time [s]
     ]
@@ -39,13 +39,13 @@ Steps = Records
 
 
 def room_for_steps(m: int) -> Steps:
-    """Room for m steps."""
+    """Empty records (m,) of steps."""
     return new_records(m, STEP)
 
 
 @kernel
 def add_step(steps, n, code, begin_ns, end_ns, detail):
-    """Write step n; returns n + 1."""
+    """Write step n with zero motion; returns n + 1."""
     step = steps[n]
     step.code, step.begin_ns, step.end_ns, step.detail = code, begin_ns, end_ns, detail
     step.turns, step.bridged_ns, step.torque = 0, 0, 0.0
@@ -56,7 +56,7 @@ def add_step(steps, n, code, begin_ns, end_ns, detail):
 
 @kernel
 def join_smoothly(before, after, h, out_polynomial):
-    """Quintic over a time h [s] from one spline node to the next."""
+    """Coefficients (6,) of the quintic over a time h [s] between two spline nodes; physics.md section 9."""
     far = after.angle - (before.angle + h * (before.speed + 0.5 * h * before.acceleration))
     fast = h * (after.speed - (before.speed + h * before.acceleration))
     bent = 0.5 * h * h * (after.acceleration - before.acceleration)

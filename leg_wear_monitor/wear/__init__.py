@@ -1,1 +1,1 @@
-"""What contact takes away: Archard's law on worn surfaces."""
+"""Wear: Archard's law on worn surfaces, cycle jumps."""

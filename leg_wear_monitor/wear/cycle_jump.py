@@ -1,8 +1,8 @@
-"""Cycle jumps: the mean wear of a few gait cycles, applied over many (physics.md section 10).
+"""Cycle jumps: the mean wear of a few gait cycles, applied to many (physics.md section 10).
 
-Depth over gait cycles is an ordinary differential equation whose right-hand side, the mean wear of a cycle,
-is known with scatter only: single cycles are chaotic. A jump is a step of Heun's method: Euler to the end,
-the mean of both ends' rates over the jump. What both ends differ by beyond their scatter is its error.
+Wear depth over gait cycles obeys an ordinary differential equation. Its right-hand side, the mean wear per
+cycle, has scatter, because single cycles are chaotic. A jump is a step of Heun's method: an Euler step to the
+end, then the mean of the rates at both ends. The difference of both rates beyond their scatter is the error.
 """
 
 import math
@@ -13,13 +13,14 @@ import numpy as np
 from leg_wear_monitor.configuration.quantity import quantity
 from leg_wear_monitor.mechanism.arrays import Floats
 
+# of step-size control: largest growth and shrinkage of a jump, and safety factor, as for ODE solvers
 _GROWS, _SHRINKS, _SAFETY = 2.0, 0.3, 0.8
-_TOLERATED = 0.1  # of the deepest change
+_TOLERATED = 0.1  # tolerated error of a jump as a fraction of its deepest change
 
 
 @attrs.frozen(kw_only=True)
 class JumpControl:
-    """How far a jump may go."""
+    """Limits on the length and the error of a jump."""
 
     opens_m: float = quantity(
         "m", "deepest change of a surface that a jump may make", above=0.0, default=3.0e-5
@@ -33,20 +34,20 @@ class JumpControl:
 
     @classmethod
     def of(cls, opens_m: float) -> "JumpControl":
-        """Jumps of a length, with an error in proportion to it."""
+        """Control with a deepest change per jump [m] and an error tolerance of 10 % of it."""
         return cls(opens_m=opens_m, tolerance_m=_TOLERATED * opens_m)
 
 
 @attrs.frozen(eq=False)
 class WearRate:
-    """Mean wear of a gait cycle over n simulated ones.
+    """Mean wear per gait cycle over n simulated cycles; k clearance joints, N sectors.
 
     Attributes
     ----------
     depth : (k, 2, N) array, m
-        Of bushing and journal, a cycle.
+        Wear depth of bushing and journal per cycle.
     scatter : (k,) array, m
-        Standard error of the growth of the mean clearance, a cycle.
+        Standard error of the growth of the mean clearance per cycle.
     """
 
     depth: Floats
@@ -54,19 +55,20 @@ class WearRate:
 
     @property
     def clearance(self) -> Floats:
-        """Growth (k,) of the mean clearance [m], a cycle."""
+        """Growth (k,) of the mean clearance per cycle [m]."""
         return np.asarray(self.depth.mean(axis=2).sum(axis=1))
 
 
 def wear_rate(worn: Floats, smooth_deg: float) -> WearRate:
-    """Mean wear of a cycle.
+    """Mean wear per cycle.
 
     Parameters
     ----------
     worn : (n, k, 2, N) array, m
-        Depth that each of n cycles took away.
+        Wear depth of each of n cycles.
     smooth_deg : float
-        A few cycles touch here and there; their mean is smoothed over the angle, volume kept.
+        Width of the smoothing window over the angle [deg]: few cycles have contact in few sectors only. The
+        worn volume is conserved.
     """
     growth = worn.mean(axis=3).sum(axis=2)
     scatter = growth.std(axis=0, ddof=1) / math.sqrt(len(worn)) if len(worn) > 1 else np.abs(growth[0])
@@ -74,7 +76,7 @@ def wear_rate(worn: Floats, smooth_deg: float) -> WearRate:
 
 
 def smoothed(profile: Floats, width_deg: float) -> Floats:
-    """Profiles (..., N) around a circle through a Gaussian window of a standard deviation; sums are kept."""
+    """Periodic profiles (..., N) smoothed by a Gaussian of a standard deviation [deg]; sums are conserved."""
     n = profile.shape[-1]
     order = np.arange(n // 2 + 1)
     window = np.exp(-0.5 * (order * math.radians(width_deg)) ** 2)
@@ -83,21 +85,21 @@ def smoothed(profile: Floats, width_deg: float) -> Floats:
 
 
 def _ratio(before: Floats, after: Floats) -> Floats:
-    """Factors that keep the sum of each profile, where cutting off what rounding made negative changed it."""
+    """Factors (..., 1) that restore the sum of each profile after negative rounding errors were cut off."""
     sums = after.sum(axis=-1, keepdims=True)
     return np.asarray(before.sum(axis=-1, keepdims=True) / np.where(sums > 0.0, sums, 1.0))
 
 
 def longest_jump(rate: WearRate, control: JumpControl) -> float:
-    """Gait cycles [] that a jump at a rate may last by its change of the surfaces; infinite without wear."""
+    """Largest number of gait cycles of a jump by the change of the surfaces; infinite without wear."""
     deepest = float(rate.depth.sum(axis=1).max(initial=0.0))
     return control.opens_m / deepest if deepest > 0.0 else math.inf
 
 
 def jump_error(first: WearRate, last: WearRate, cycles: float) -> Floats:
-    """Error (k,) [m] of Euler's step in the mean clearance, without what scatter alone makes of it.
+    """Error (k,) [m] of the Euler step in the mean clearance, minus the part that scatter explains.
 
-    Heun's own error is smaller; this one is what can be seen.
+    The error of Heun's method is smaller, but cannot be estimated from the two rates.
     """
     differ = np.square(last.clearance - first.clearance)
     scatter = np.square(first.scatter) + np.square(last.scatter)
@@ -105,7 +107,7 @@ def jump_error(first: WearRate, last: WearRate, cycles: float) -> Floats:
 
 
 def next_jump(cycles: float, error_m: float, control: JumpControl) -> float:
-    """Gait cycles of the next jump, or of the same again if its error was beyond the tolerance."""
+    """Gait cycles of the next jump, or of the repeated one if its error [m] is above the tolerance."""
     if error_m == 0.0:
         return _GROWS * cycles
     factor = _SAFETY * math.sqrt(control.tolerance_m / error_m)

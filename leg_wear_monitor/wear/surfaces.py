@@ -1,9 +1,10 @@
 """Worn surfaces: depth over angular sectors of bushing and journal (physics.md sections 5 and 6).
 
-Sector i spans the angles [i, i + 1] x 2 pi / N of its own body's frame. A contact wears the sectors in
-which the two circles overlap, each in proportion to its overlap. On fresh surfaces that is the arc
-cos psi = (R_b^2 + e^2 - R_j^2) / (2 R_b e); on worn ones it is where the journal meets the worn profile,
-so that a journal pressed one way wears its own shape into the bushing, as the closed form wants.
+Sector i spans the angles [i, i + 1] x 2 pi / N of its own body's frame. Wear is deposited in the sectors in
+which the two profiles overlap, in proportion to the overlap. On fresh surfaces these are the sectors of the
+arc cos psi = (R_b^2 + e^2 - R_j^2) / (2 R_b e); on worn surfaces, those where the journal overlaps the worn
+profile. A journal under a constant load therefore wears its own shape into the bushing, as in the closed-form
+solution.
 """
 
 import math
@@ -21,11 +22,11 @@ SECTORS = 720
 BUSHING, JOURNAL = 0, 1
 
 _TURNS_PER_RAD = 0.5 / math.pi
-_BESIDE = 16  # sectors to either side of an eccentricity's direction where its contact is looked for
+_BESIDE = 16  # sectors on either side of the eccentricity's direction that are searched for an overlap
 
 
 class Surfaces(NamedTuple):
-    """Wear depth (k, 2, N) [m] of bushing and journal; ``feeds_back`` 1 if it opens the clearances."""
+    """Wear ``depth`` (k, 2, N) [m] of bushing and journal; ``feeds_back``: 1 if wear widens clearances."""
 
     depth: Floats
     feeds_back: int
@@ -38,9 +39,9 @@ def fresh_surfaces(contacts: ContactArrays, feeds_back: bool, sectors: int = SEC
 
 @kernel
 def profile_at(profile, angle):
-    """Depth [m] at an angle of the surface's own frame [rad], and its first and second derivative by it.
+    """Depth [m] at an angle [rad] of the surface's own frame, and its derivatives [m/rad, m/rad^2].
 
-    Those of the quadratic spline over the sectors: the slope has no jumps. physics.md section 6.
+    The profile (N,) is interpolated by a quadratic spline, whose slope is continuous. physics.md section 6.
     """
     n = profile.shape[0]
     turns = angle * _TURNS_PER_RAD
@@ -56,10 +57,10 @@ def profile_at(profile, angle):
 
 @kernel
 def local_surfaces(contacts, surfaces, k, direction, angle_b, angle_j):
-    """Radii [m] of bushing and journal in a direction [rad] of the ground's frame, and how depths change.
+    """Local radii [m] of bushing and journal in a direction [rad] of the ground's frame, and derivatives.
 
-    First and second derivatives of the depths by the direction: slopes of both [m/rad], then bends [m/rad^2];
-    0 unless wear feeds back. physics.md section 6.
+    The derivatives are those of the depths by the direction: slopes of bushing and journal [m/rad], then
+    second derivatives [m/rad^2]; 0 without wear feedback. physics.md section 6.
     """
     bushing = contacts.bushing_radius[k]
     journal = bushing - contacts.clearance[k]
@@ -72,9 +73,9 @@ def local_surfaces(contacts, surfaces, k, direction, angle_b, angle_j):
 
 @kernel
 def _weigh_arc(contacts, surfaces, k, ex, ey, angle_b, angle_j, centre, side, out_weight):
-    """Overlap [m] of the sectors from the centre to one side; returns its sum and how many there are.
+    """Overlap [m] of the sectors from ``centre`` to one side (1 or -1); returns its sum [m] and their number.
 
-    The cosine is stepped from sector to sector by rotation. physics.md section 6.
+    The direction is advanced from sector to sector by rotation, without cosines. physics.md section 6.
     """
     n = surfaces.depth.shape[2]
     width = TURN / n
@@ -100,10 +101,11 @@ def _weigh_arc(contacts, surfaces, k, ex, ey, angle_b, angle_j, centre, side, ou
 
 @kernel
 def deposit_wear(contacts, surfaces, k, ex, ey, angle_b, angle_j, integral, out_weight):
-    """Wear both surfaces of joint k by the increment ``integral`` of F_N |v_t| dt [J].
+    """Deposit the wear of an increment ``integral`` of F_N |v_t| dt [J] on both surfaces of joint k.
 
-    The removed volumes are k_b and k_j times the integral: the sum over sectors of depth x R_b x sector x
-    width. Both surfaces have the contact's own area, so equal coefficients wear equally deep.
+    ``ex, ey`` [m] is the eccentricity, ``angle_b, angle_j`` [rad] the angles of the bodies, out_weight (N,) a
+    work array. The removed volumes are k_b and k_j times the integral: sums over sectors of depth x R_b x
+    sector angle x width. Both surfaces have the area of the contact, so equal coefficients give equal depths.
     physics.md sections 5 and 6.
     """
     n = surfaces.depth.shape[2]
@@ -111,7 +113,7 @@ def deposit_wear(contacts, surfaces, k, ex, ey, angle_b, angle_j, integral, out_
     towards = math.floor((math.atan2(ey, ex) - angle_b) / sector) % n
     for beside in range(
         2 * _BESIDE + 1
-    ):  # on a flank the overlap may begin some sectors up: 0, 1, -1, 2, ...
+    ):  # on a worn flank the overlap may begin some sectors beside; search order 0, 1, -1, 2, ...
         aside = (beside + 1) // 2
         centre = (towards + (aside if beside % 2 == 1 else -aside)) % n
         right, count_right = _weigh_arc(
@@ -120,7 +122,7 @@ def deposit_wear(contacts, surfaces, k, ex, ey, angle_b, angle_j, integral, out_
         if right > 0.0:
             break
     left, count_left = _weigh_arc(contacts, surfaces, k, ex, ey, angle_b, angle_j, centre, -1, out_weight)
-    if right <= 0.0:  # touch narrower than a sector
+    if right <= 0.0:  # contact narrower than a sector
         centre, count_right, count_left = towards, 1, 1
         out_weight[centre] = right = 1.0
         left = 0.0
@@ -138,14 +140,14 @@ def deposit_wear(contacts, surfaces, k, ex, ey, angle_b, angle_j, integral, out_
 
 
 def worn_volume(contacts: ContactArrays, surfaces: Surfaces) -> Floats:
-    """Volume (k, 2) [m^3] gone from bushing and journal."""
+    """Worn volume (k, 2) [m^3] of bushing and journal."""
     sector = TURN / surfaces.depth.shape[2]
     area = contacts.bushing_radius * contacts.width * sector
     return np.asarray(surfaces.depth.sum(axis=2) * area[:, None])
 
 
 def wear_zone(depth: Floats, fraction: float = 0.9) -> tuple[float, float] | None:
-    """Narrowest zone [deg] of the surface's frame that holds a fraction of the wear; None without wear.
+    """Narrowest zone of the surface that contains a fraction of the wear.
 
     Parameters
     ----------
@@ -154,14 +156,15 @@ def wear_zone(depth: Floats, fraction: float = 0.9) -> tuple[float, float] | Non
 
     Returns
     -------
-    (from, to) : tuple of float
-        ``from`` in [0, 360), ``to`` up to a turn further.
+    (from, to) : tuple of float, or None
+        Angles [deg] in the surface's own frame: ``from`` in [0, 360), ``to`` at most 360 above it. None
+        without wear.
     """
     n, total = len(depth), depth.sum()
     if not total > 0.0:
         return None
     sums = np.concatenate([[0.0], np.cumsum(np.concatenate([depth, depth]))])
-    # the first end that holds the share, for every start
+    # for every start, the first end that contains the fraction
     ends = np.searchsorted(sums, sums[:n] + fraction * total * (1.0 - 1.0e-12))
     start = int(np.argmin(ends - np.arange(n)))
     return 360.0 * start / n, 360.0 * int(ends[start]) / n

@@ -1,4 +1,4 @@
-"""Hertz's force K delta^1.5, as Hunt and Crossley and most after them take it (physics.md section 4)."""
+"""Hertz's force K delta^1.5, the elastic part of most laws (physics.md section 4)."""
 
 import math
 
@@ -11,7 +11,7 @@ _EXPONENT = 1.5
 
 @kernel
 def contact_stiffness(modulus, bushing_radius, journal_radius):
-    """Hertz stiffness K [N/m^1.5] of a pin inside a bushing: modulus sqrt(R_b R_j / (R_b - R_j)).
+    """Hertz stiffness K [N/m^1.5] of a journal in a bushing: modulus sqrt(R_b R_j / (R_b - R_j)); Pa, m.
 
     physics.md section 4.
     """
@@ -20,7 +20,7 @@ def contact_stiffness(modulus, bushing_radius, journal_radius):
 
 @kernel
 def _coefficient(given, modulus, width, bushing, journal):
-    """Contact stiffness K [N/m^1.5]: the one given if there is one, else that of the radii [m]."""
+    """Contact stiffness K [N/m^1.5]: the given one if above 0, else that of the radii [m]."""
     return given if given > 0.0 else contact_stiffness(modulus, bushing, journal)
 
 

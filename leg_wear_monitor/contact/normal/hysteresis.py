@@ -1,6 +1,6 @@
-"""Loss in normal contact: F = F_elastic (1 + chi delta_dot / approach_speed) (physics.md section 4).
+"""Hysteresis damping: F = F_elastic (1 + chi delta_dot / approach_speed) (physics.md section 4).
 
-The factors chi by the coefficient of restitution asked for, and what they return of it, whatever F_elastic.
+The factors chi by the nominal coefficient of restitution, and the restitution that results for any F_elastic.
 """
 
 import math
@@ -40,7 +40,7 @@ def hu_guo(restitution: float) -> float:
 
 @kernel
 def with_hysteresis(elastic, exponent, loss, delta, delta_dot):
-    """Force with a loss in proportion to its elastic part [N]; never negative: surfaces do not pull.
+    """Normal force with damping in proportion to its elastic part [N]; never negative: no adhesion.
 
     ``exponent`` [-] is that of the elastic part at delta [m], d ln F / d ln delta; ``loss`` [s/m] is chi over
     the approach speed.
@@ -57,7 +57,7 @@ def with_hysteresis(elastic, exponent, loss, delta, delta_dot):
 
 
 def delivered_restitution(hysteresis: float) -> float:
-    """What a law returns for its factor chi, whatever elastic force, mass and speed.
+    """Coefficient of restitution that results from a factor chi, for any elastic force, mass and speed.
 
     Parameters
     ----------

@@ -1,7 +1,7 @@
-"""The normal contact laws by name, and the kernels that call the one a joint has (physics.md section 4).
+"""The normal contact laws by name, and kernels that select a joint's law (physics.md section 4).
 
-A law of another form of force is a file beside this one and an entry of `LAWS`; its name goes into
-`mechanism.law_names`, where mechanism files and the command line look it up without waiting for numba.
+To add a law of another form, add a file beside this one, an entry to `LAWS`, and its name to
+`mechanism.law_names`, where mechanism files and the command line check it without importing numba.
 """
 
 from collections.abc import Callable
@@ -22,7 +22,7 @@ from leg_wear_monitor.kernel import kernel
 
 
 class NormalLaw(NamedTuple):
-    """A form of the force, and the hysteresis factor chi by the coefficient of restitution."""
+    """A form of the force, and its hysteresis factor chi as a function of the coefficient of restitution."""
 
     form: Form
     hysteresis: Callable[[float], float]
@@ -47,7 +47,7 @@ _FORMS = tuple(dict.fromkeys(law.form for law in LAWS.values()))
 
 
 def _only(this: Callable[..., Any]) -> Callable[..., Any]:
-    """Kernel that calls ``this`` whatever the form's number."""
+    """Kernel that calls ``this`` for any form's number."""
 
     @kernel
     def only(form, *arguments):
@@ -57,7 +57,7 @@ def _only(this: Callable[..., Any]) -> Callable[..., Any]:
 
 
 def _either(number: int, this: Callable[..., Any], others: Callable[..., Any]) -> Callable[..., Any]:
-    """Kernel that calls ``this`` for the form of a number, and the others for another."""
+    """Kernel that calls ``this`` for one form's number, and ``others`` for any other."""
 
     @kernel
     def either(form, *arguments):
@@ -69,9 +69,9 @@ def _either(number: int, this: Callable[..., Any], others: Callable[..., Any]) -
 
 
 def _of_form(part: str) -> Callable[..., Any]:
-    """Kernel that takes the number of a form, then the arguments of this part of it.
+    """Kernel that takes the number of a form, then the arguments of the form's kernel named ``part``.
 
-    A chain of branches, put together once: compiled code has no cheap way to call a function given to it.
+    It is a chain of branches, built once: compiled code cannot cheaply call a function that is an argument.
     """
     *others, last = (getattr(form, part) for form in _FORMS)
     chain = _only(last)

@@ -1,16 +1,16 @@
 """A conformal contact: pin and bushing on Winkler's elastic foundation (physics.md section 4).
 
-Pressure is in proportion to how far the two circles overlap, kappa E* (e cos phi - c) / (R sin psi): the
+The pressure is proportional to the overlap of the two circles, kappa E* (e cos phi - c) / (R sin psi): the
 depth of the foundation grows with the contact (Johnson, Contact Mechanics, 1985, section 4.3), and
-kappa = 3 pi / 8 is his 1.18, at which a narrow contact carries Hertz's line load at Hertz's width. Over the
-arc cos psi = c / (c + delta), of axial width w, that is
+kappa = 3 pi / 8 is his 1.18, at which a narrow contact has Hertz's line load at Hertz's width. The integral
+over the arc cos psi = c / (c + delta), of axial width w, is
 
     F = kappa E* w c (2 psi / sin 2 psi - 1),   E* = 1 / (sigma_b + sigma_j),  sigma = (1 - nu^2) / E.
 
-By half angle, F is below the exact load of a pin in a plate of its own material (Persson 1964, in the form of
-Ciavarella and Decuzzi 2001) by 0.2 % at 10 degrees, 2 % at 30, 5 % at 45, 11 % at 60 and 28 % at 75: good to
-60 degrees, where delta = c. The penetration is that of the circles; in plane elasticity it would depend on
-the size of the bodies by a logarithm.
+F is below the exact load of a pin in a plate of the same material (Persson 1964, in the form of Ciavarella
+and Decuzzi 2001) by 0.2 % at a half angle of 10 degrees, 2 % at 30, 5 % at 45, 11 % at 60 and 28 % at 75:
+valid up to 60 degrees, where delta = c. The penetration is that of the circles; in plane elasticity it would
+depend logarithmically on the size of the bodies.
 """
 
 import math
@@ -20,17 +20,17 @@ from leg_wear_monitor.contact.normal.hysteresis import with_hysteresis
 from leg_wear_monitor.kernel import kernel
 
 _KAPPA = 3.0 * math.pi / 8.0
-_E_STAR = 0.75  # E* over the modulus 4 / (3 (sigma_b + sigma_j)) of a joint
+_E_STAR = 0.75  # E* over the contact modulus 4 / (3 (sigma_b + sigma_j))
 
 _NARROW = 0.02  # tan^2 psi up to which eight terms of the series are exact to rounding
-# Gauss and Legendre's rule of eight points for an integral from 0 to 1: pairs about the middle
+# Gauss-Legendre rule with eight points on [0, 1]: offsets of the pairs of nodes from the middle, and weights
 _ASIDE = (0.09171732124782489, 0.26276620495816450, 0.39833323870681336, 0.48014492824876809)
 _WEIGHT = (0.18134189168918083, 0.15685332293894344, 0.11119051722668721, 0.05061426814518853)
 
 
 @kernel
 def arc_deficit(square):
-    """(1 - atan(T) / T) / T^2 of T^2 = tan^2 psi [-]; 1/3 of a point."""
+    """(1 - atan(T) / T) / T^2 [-] for T^2 = tan^2 psi; its limit at 0 is 1/3."""
     if square > _NARROW:
         tangent = math.sqrt(square)
         return (1.0 - math.atan(tangent) / tangent) / square
@@ -42,7 +42,7 @@ def arc_deficit(square):
 
 @kernel
 def load(x):
-    """2 psi / sin 2 psi - 1 of the penetration over the clearance x [-]."""
+    """2 psi / sin 2 psi - 1 [-] as a function of x, the penetration over the clearance [-]."""
     square = x * (2.0 + x)
     return square * (1.0 - (1.0 + square) * arc_deficit(square))
 
@@ -56,7 +56,7 @@ def load_slope(x):
 
 @kernel
 def load_integral(x):
-    """Integral of `load` from 0 to x: exact to rounding to 60 degrees (x = 1), to 3e-11 at 75 (x = 2.9)."""
+    """Integral of `load` from 0 to x: exact to rounding up to x = 1 (60 degrees), to 3e-11 at 2.9 (75)."""
     total = 0.0
     for i in range(4):
         total += _WEIGHT[i] * (load((0.5 - _ASIDE[i]) * x) + load((0.5 + _ASIDE[i]) * x))
@@ -65,7 +65,7 @@ def load_integral(x):
 
 @kernel
 def _coefficient(given, modulus, width, bushing, journal):
-    """Kappa E* w [N/m]; the same at all radii."""
+    """Coefficient kappa E* w [N/m], independent of the radii."""
     return _KAPPA * _E_STAR * modulus * width
 
 
@@ -88,7 +88,7 @@ def _energy(coefficient, clearance, delta):
 
 @kernel
 def _softening(given, delta, bushing, journal, slope_b, slope_j):
-    """As `Form.softening`: both depths widen the clearance, on which all but the coefficient depends."""
+    """As `Form.softening`: both depths widen the clearance, which only the coefficient does not depend on."""
     x = delta / (bushing - journal)
     softer = x - 2.0 * load_integral(x) / load(x)
     return softer * slope_b, softer * slope_j

@@ -1,9 +1,10 @@
-"""Many independent legs in one call, across cores: lives advance theirs by `advance_batch`.
+"""Many independent legs in parallel threads.
 
-`simulate_batch` gives each leg's whole result; validation and the scaling benchmark use it.
+`advance_batch` advances their steppers (used for lives), `simulate_batch` returns the complete result of each
+leg (used for validation and the scaling benchmark).
 
-A leg has its own state and run statistics, and its compiled motion runs without the interpreter's lock. So
-threads are enough: they share the tables, start at once, and results do not depend on how many there are.
+Every leg has its own state and run statistics, and the compiled code releases the interpreter's lock. Threads
+therefore run in parallel and share the tables; results do not depend on the number of threads.
 """
 
 import math
@@ -37,23 +38,23 @@ def advance_batch(
     statistics_of_all: Sequence[RunStatistics],
     workers: int | None = None,
 ) -> list[tuple[int, int]]:
-    """Advance many steppers, each to its own time, and add to its own run statistics.
+    """Advance many steppers, each to its own time, and add to their run statistics.
 
     Parameters
     ----------
     steppers : sequence of n ClearanceStepper
-        No two of one setup, whose surfaces they would both wear.
+        Each of its own setup: steppers of one setup would wear the same surfaces.
     polynomials : sequence of n arrays (7,)
-        Motions of their cranks, as `ClearanceStepper.advance` takes them.
+        Motions of the cranks, as in `ClearanceStepper.advance`.
     t_end : float or (n,) array, s
     statistics_of_all : sequence of n RunStatistics
     workers : int, optional
-        Threads; as many as there are cores if not given.
+        Number of threads; default: the number of cores.
 
     Returns
     -------
     list of (status, k)
-        Of each stepper; one that had to stop does not keep the others from going on.
+        Status of each stepper, as in `ClearanceStepper.advance`; a failed one does not stop the others.
 
     Raises
     ------
@@ -80,28 +81,28 @@ def simulate_batch(
     workers: int | None = None,
     progress: Callable[[float], None] | None = None,
 ) -> list[Outcome]:
-    """Move many legs in clearance coordinates and say what their clearances do.
+    """Simulate many legs in clearance coordinates.
 
     Parameters
     ----------
     legs : sequence of Leg
     cycles, skip_cycles : float
-        Gait cycles of each leg that are counted, and those before.
+        Counted gait cycles of each leg, and gait cycles before counting starts.
     workers : int, optional
-        Threads; as many as there are cores if not given. Results do not depend on it.
+        Number of threads; default: the number of cores. Results do not depend on it.
     progress : callable, optional
-        Called with the fraction of the legs that are done.
+        Called with the completed fraction of the legs.
 
     Returns
     -------
     list of SimulationResult, AssemblyError or SimulationError
-        In the order of the legs; the error of a leg that cannot turn or whose motion diverges stands in its
-        place. Results hold no energy balance, no single impacts and no trace.
+        In the order of the legs; an error in place of the result if a leg has a dead point or its motion
+        diverges. Results contain no energy balance, no single impacts and no trace.
 
     Raises
     ------
     ConfigError
-        For values that cannot be.
+        For invalid values.
     """
     if not (math.isfinite(cycles) and cycles > 0.0):
         raise ConfigError("cycles", "", f"{cycles:g} is not above 0")
@@ -115,10 +116,10 @@ def simulate_batch(
                 for i, setup, tables in share_tables(setups)
             }
             for done, future in enumerate(as_completed(futures.values()), 1):
-                _outcome(future)  # a fault that is not the leg's own is raised here, at once
+                _outcome(future)  # raises other errors than SimulationError at once
                 if progress:
                     progress(done / len(futures))
-        finally:  # an interrupt ends the legs that run, and not only the wait for them
+        finally:  # after an interrupt, also stop the legs that are running
             stopped.set()
             pool.shutdown(cancel_futures=True)
     return [
@@ -136,7 +137,7 @@ def _outcome(future: Future[SimulationResult]) -> SimulationResult | SimulationE
 def _simulate(
     leg: Leg, setup: Setup, tables: SharedTables, cycles: float, skip_cycles: float, stopped: Event
 ) -> SimulationResult:
-    """One leg from its start to its statistics."""
+    """Result of one leg."""
     if not setup.clearance_joints:
         return ideal_result(setup, cycles, 0)
     stepper = ClearanceStepper(setup, tables=tables.get())
@@ -168,7 +169,7 @@ def _turn(
     statistics: RunStatistics,
     stopped: Event,
 ) -> None:
-    """Turn the crank until so many cycles since the start are done, or others have asked to stop."""
+    """Advance to a number of cycles since the start, or until ``stopped`` is set; checked once per cycle."""
     polynomial, period = steady_drive(leg.crank_angle_rad, setup.speed), TURN / abs(setup.speed)
     for cycle in [*np.arange(stepper.time / period + 1.0, cycles), cycles]:
         if stopped.is_set():

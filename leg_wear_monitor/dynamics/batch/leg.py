@@ -1,4 +1,4 @@
-"""The legs of a batch, made ready: where each starts, and what it shares with others."""
+"""Preparation of the legs of a batch: initial states and shared tables."""
 
 import math
 from collections.abc import Iterator, Sequence
@@ -19,7 +19,7 @@ from leg_wear_monitor.wear.surfaces import fresh_surfaces
 
 @attrs.frozen(kw_only=True, eq=False)
 class Leg:
-    """One leg of a batch; the fields that `simulate` has too mean the same.
+    """One leg of a batch; fields in common with the parameters of `simulate` have the same meaning.
 
     Attributes
     ----------
@@ -29,11 +29,11 @@ class Leg:
     normal_law : str, optional
     wear : bool
     crank_angle_rad : float
-        Where the crank starts; cycles are counted from there.
+        Initial crank angle, from which cycles are counted.
     perturb_m : float
-        Journals start anywhere up to this far from their bushings' centres, uniformly over the disc.
+        Largest initial eccentricity; initial positions of the journals are uniform over this disc.
     seed : int
-        Of where they start.
+        Seed of the initial positions.
     """
 
     mechanism: Mechanism
@@ -47,7 +47,15 @@ class Leg:
     seed: int = 0
 
     def prepare(self) -> Setup:
-        """Make the leg ready to run; raises ConfigError for values that cannot be, AssemblyError."""
+        """Setup of the leg.
+
+        Raises
+        ------
+        ConfigError
+            For invalid values.
+        AssemblyError
+            If the linkage does not close or has a dead point.
+        """
         setup = prepare(
             self.mechanism,
             clearances=self.clearances,
@@ -66,7 +74,7 @@ class Leg:
         return setup
 
     def start(self, stepper: ClearanceStepper) -> None:
-        """Put a stepper of this leg where the leg starts."""
+        """Set a stepper of this leg to the leg's initial state."""
         stepper.init(self.crank_angle_rad, stepper.speed)
         chance = np.random.default_rng(self.seed)
         joints = len(stepper.eccentricity)
@@ -76,14 +84,14 @@ class Leg:
 
 
 def prepare_legs(legs: Sequence[Leg]) -> list[Setup | AssemblyError]:
-    """Every leg ready to run, or the error of one that cannot turn.
+    """Setups of the legs; an AssemblyError in place of the setup if a linkage does not close or turn.
 
-    Legs that differ only in where they start are prepared once; each has surfaces of its own.
+    Legs that differ only in their initial state are prepared once; each setup has its own surfaces.
 
     Raises
     ------
     ConfigError
-        For values that cannot be.
+        For invalid values.
     """
     known: dict[str, Setup | AssemblyError] = {}
     setups = []
@@ -102,12 +110,12 @@ def prepare_legs(legs: Sequence[Leg]) -> list[Setup | AssemblyError]:
 
 
 class SharedTables:
-    """Tables of legs that share them: made when the first of these legs runs, gone with the last.
+    """Tables of a group of legs, built when the first of them runs.
 
     Parameters
     ----------
     setup : Setup
-        Of any of these legs.
+        Setup of any leg of the group.
     """
 
     def __init__(self, setup: Setup) -> None:
@@ -115,7 +123,7 @@ class SharedTables:
         self._tables: ClearanceTables | None = None
 
     def get(self) -> ClearanceTables:
-        """The tables; whoever asks first makes them, and others wait."""
+        """The tables; the first call builds them, other threads wait meanwhile."""
         with self._lock:
             if self._tables is None:
                 self._tables = build_tables(self._setup.linkage, self._setup.contacts)
@@ -123,9 +131,9 @@ class SharedTables:
 
 
 def share_tables(setups: Sequence[Setup | AssemblyError]) -> Iterator[tuple[int, Setup, SharedTables]]:
-    """Legs that can run, with their index; those that share tables come one after the other.
+    """Index, setup and tables of the valid legs; legs with common tables follow each other.
 
-    So only as many tables exist at a time as there are legs that run.
+    Therefore no more tables exist at a time than legs are running.
     """
     groups: dict[object, list[tuple[int, Setup]]] = {}
     for i, setup in enumerate(setups):

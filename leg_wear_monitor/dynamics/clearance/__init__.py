@@ -1,1 +1,1 @@
-"""Clearance coordinates: the real-time formulation."""
+"""Clearance coordinates: the real-time formulation (physics.md section 7)."""

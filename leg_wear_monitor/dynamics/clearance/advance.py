@@ -1,9 +1,9 @@
-"""The real-time motion: interval by interval, sub-stepped inside, each impact met where it begins.
+"""Time integration in clearance coordinates: adaptive steps, contact events (physics.md section 7).
 
-The state exists at whole intervals of time. Inside one, or each of its parts where the linkage moves fast,
-the tables are held at its middle, and steps adapt to a local error (Rosenbrock, order 2); so the state does
-not depend on how the time axis was cut into calls, and a call costs at most its intervals times a bounded
-number of steps.
+The state exists at whole intervals of time. Within an interval, or within each of its parts where the linkage
+moves fast, the tables are those of the middle and the steps adapt to a local error (Rosenbrock, order 2). The
+result therefore does not depend on how the time is divided into calls, and the cost of a call is bounded by
+its number of intervals.
 """
 
 import math
@@ -51,36 +51,36 @@ from leg_wear_monitor.dynamics.run.run_statistics import (
 from leg_wear_monitor.kernel import ByAddress, copy_array, entry, kernel
 from leg_wear_monitor.wear.surfaces import Surfaces
 
-RENEWAL = 2  # intervals between two looks at the reactions of the ideal joints
-WEARING = 8  # intervals after which wear is taken off that has not been yet
+RENEWAL = 2  # intervals between two evaluations of the ideal joints' reactions, which change slowly
+WEARING = 8  # intervals after which pending wear is deposited, to spread its cost over many steps
 
-MOST_TRIALS = 20000  # steps tried in an interval before it is given up
+MOST_TRIALS = 20000  # trial steps in a part of an interval before the run stops
 
 _SHORTEST_STEP = 1.0e-13  # s
-# of the drive at one end of a step: torque [N m], its part without e'', power of loads [W]
+# of the drive at one end of a step: torque [N m], its part without e'' [N m], power of loads [W]
 WHOLE, SMOOTH, OUTSIDE = 0, 1, 2
 
-_FASTEST = 1.0e4  # rad/s, and its change over an interval: a crank beyond is not a leg's
+_FASTEST = 1.0e4  # largest crank speed, and largest change of it in an interval [rad/s]: far above any leg
 
 
 @entry
 def advance_clearances(model, feeds_back, state, polynomial, t_end, statistics, work):
     """Advance the state by all whole intervals up to t_end [s] and add to the run statistics.
 
-    ``polynomial`` (7,) is the crank's motion from the last time reached to t_end.
+    ``polynomial`` (7,) is the crank's motion from the present time to t_end, as in `run.drive`.
 
     Returns
     -------
     status, k
-        DONE, or why it stopped and the clearance joint concerned (-1 if none). The state is then that of the
-        last whole interval, finite and good to go on from.
+        DONE, or the reason for stopping and the clearance joint concerned (-1 if none). The state is then
+        that of the last whole interval; it is finite and can be continued.
     """
     surfaces = Surfaces(state.depth, feeds_back)
     while (state.intervals[0] + 1.0) * model.interval <= t_end * (1.0 + 1.0e-12) + 1.0e-15:
         copy_array(state.motion, work.backup)
         status, k = _interval(model, surfaces, state, polynomial, statistics, work)
         if status != DONE:
-            copy_array(state.pending, work.pending)  # what has worn off already must not be pending again
+            copy_array(state.pending, work.pending)  # deposited wear must not become pending again
             copy_array(work.backup, state.motion)
             copy_array(work.pending, state.pending)
             return status, k
@@ -93,7 +93,7 @@ ADVANCE = ByAddress(advance_clearances, types.UniTuple(types.int64, 2))
 
 @kernel
 def _interval(model, surfaces, state, polynomial, statistics, work):
-    """One interval, from whole instant to whole instant; in parts where the linkage moves fast."""
+    """Advance by one interval, in parts where the linkage moves fast; returns status and joint."""
     i, _ = blend(model.tables.parts.shape[0], state.drive[ANGLE])
     parts = model.tables.parts[i]
     for part in range(parts):
@@ -110,7 +110,7 @@ def _interval(model, surfaces, state, polynomial, statistics, work):
 
 @kernel
 def _part(model, surfaces, state, polynomial, begin, end, statistics, work):
-    """A part of an interval [s] under tables that are held."""
+    """Advance by a part of an interval, from begin to end [s], with the tables of its middle."""
     length = end - begin
     copy_array(state.drive, work.crank)
     drive_at(polynomial, end, state.drive)
@@ -118,7 +118,7 @@ def _part(model, surfaces, state, polynomial, begin, end, statistics, work):
     if not (abs(speed) < _FASTEST and abs(acceleration) * length < _FASTEST):
         return INVALID_DRIVE, -1
     load_state(model, surfaces, state, angle, speed, acceleration, 0.5 * length, work)
-    turned = -0.5 * length * speed  # the tables are those of the middle
+    turned = -0.5 * length * speed  # crank angle at the begin, relative to that of the tables
     sample_start(model, surfaces, state, turned, begin, statistics, work)
     status, k = _steps(model, surfaces, state, begin, length, statistics, work)
     if status == DONE:
@@ -129,7 +129,7 @@ def _part(model, surfaces, state, polynomial, begin, end, statistics, work):
 
 @kernel
 def _steps(model, surfaces, state, begin, length, statistics, work):
-    """All steps of a part."""
+    """All steps of a part of the given begin and length [s]; returns status and joint."""
     x, now, start, end, approach = work.x, work.now, work.start, work.end, state.approach
     contacts = model.contacts
     done, trials, cut = 0.0, 0, NEVER
@@ -169,9 +169,9 @@ def _steps(model, surfaces, state, begin, length, statistics, work):
 
 @kernel
 def _take(model, surfaces, state, t, h, turned, statistics, work):
-    """Take the trial step of length h [s] from time t: sums, wear, contacts; make its end the next start.
+    """Accept the trial step of length h [s] from time t [s]: statistics, wear, contact events.
 
-    ``turned`` [rad] is by how much the crank is then beyond the angle of the tables.
+    ``turned``: crank angle at the end of the step, relative to that of the tables [rad].
     """
     x, now, start, end, contacts = work.x, work.now, work.start, work.end, model.contacts
     statistics.steps[1] += 1
@@ -201,7 +201,7 @@ def _take(model, surfaces, state, t, h, turned, statistics, work):
 
 @kernel
 def _look_at_drive(now, x, sample, out_drive, statistics):
-    """Drive torque, its part without the eccentricities' accelerations, and the power of loads, (3,)."""
+    """Drive torque, its part without e'' [N m] and the power of loads [W], (3,); updates the extremes."""
     torque, sudden = drive_torque(now, x, sample)
     out_drive[WHOLE], out_drive[SMOOTH], out_drive[OUTSIDE] = torque, torque - sudden, outside_power(now, x)
     statistics.drive_range[0] = min(statistics.drive_range[0], torque)
@@ -211,7 +211,7 @@ def _look_at_drive(now, x, sample, out_drive, statistics):
 
 @kernel
 def _finish(model, surfaces, state, statistics, work):
-    """At the end of an interval: wear, distributions, and the reactions of the ideal joints."""
+    """Finish an interval: deposit wear; add to the distributions and to the ideal joints' reactions."""
     joint, now, sample, interval = model.contacts.joint, work.now, work.start, model.interval
     count = int(state.intervals[0])
     here = 0.5 * interval * now.speed[0]
@@ -233,7 +233,7 @@ def _finish(model, surfaces, state, statistics, work):
 
 @kernel
 def _add_reactions(joints, reaction, weight, statistics):
-    """Add the reactions of the ideal joints, which stand for a time ``weight`` [s]; rows as in the tables."""
+    """Add the ideal joints' reactions (r,) to the run statistics, for a time ``weight`` [s]."""
     row = 1
     while row < joints.shape[0]:
         joint = joints[row]
@@ -248,7 +248,7 @@ def _add_reactions(joints, reaction, weight, statistics):
 
 @entry
 def observe(model, feeds_back, state, work):
-    """Look at the leg where the state stands, and leave the state as it is.
+    """Evaluate the leg in its present state, without a change of the state.
 
     Fills the samples ``start``, ``reaction`` and ``toe`` of the work arrays; returns the elastic energy of
     the contacts [J].

@@ -1,4 +1,4 @@
-"""The linkage around its ideal motion: how its bodies follow the eccentricities, and the forces on them."""
+"""The linkage near its ideal motion: effects of the eccentricities (physics.md section 7)."""
 
 import numpy as np
 
@@ -8,7 +8,7 @@ from leg_wear_monitor.mechanism.forces import applied_forces_at, stored_energy_a
 from leg_wear_monitor.mechanism.ideal import IdealMotion
 from leg_wear_monitor.mechanism.position import Linkage, jacobians
 
-_NUDGE = 1.0e-5  # m or rad, of central differences of smooth functions of the coordinates
+_NUDGE = 1.0e-5  # m or rad: step of central differences of smooth functions of the coordinates
 
 
 class Basis:
@@ -30,10 +30,10 @@ class Basis:
     b_e, c_ee : (N, d, d) arrays
         B_e and c_ee of the Lagrangian.
     gamma : (N, d, d, d) array
-        Gamma = S^T M q_ee: force on e [i] that e' takes twice [j, k]; A changes by Gamma e and its transpose.
+        Gamma = S^T M q_ee: force on e (i) that is bilinear in e' (j, k); A changes by Gamma e plus transpose.
     c_e : (N, d) array
     force, load : (N, 3 b) arrays
-        Applied forces at rest, and the loads among them.
+        Applied forces at rest, and the part of the loads in them.
     force_e, load_e : (N, d, d) arrays
         Derivatives by e of their generalised forces on e.
     drive_force_e, drive_load_e : (N, d) arrays
@@ -62,7 +62,7 @@ class Basis:
         self._curve(linkage, motion.q)
 
     def _curve(self, linkage: Linkage, q: Floats) -> None:
-        """Quantities of the first order in e."""
+        """Set the quantities of first order in e."""
         d = len(self.rows)
         mass = self.mass[:, None]
         curvature = np.empty((*self.s.shape, d))
@@ -91,7 +91,7 @@ class Basis:
         self.drive_load_e = self._on_crank(self.load, load_s)
 
     def _on_crank(self, force: Floats, force_s: Floats) -> Floats:
-        """Derivative by e of the force on the crank of forces (N, 3 b) that change by force_s (N, 3 b, d)."""
+        """Derivative (N, d) by e of the crank's generalised force, of forces (N, 3 b) and force_s."""
         along = np.einsum("nr,nri->ni", force, self.s_t)
         return np.asarray(along + np.einsum("nr,nri->ni", self.drive, force_s))
 
@@ -119,7 +119,7 @@ def _rows(linkage: Linkage, joints: Ints) -> list[int]:
 
 
 def _forces(linkage: Linkage, q: Floats) -> tuple[Floats, Floats, Floats]:
-    """Applied forces at rest (N, 3 b), the loads among them, and the potential energy (N,)."""
+    """Applied forces at rest (N, 3 b), the part of the loads in them, and the potential energy (N,) [J]."""
     arrays = linkage.arrays
     unloaded = arrays._replace(load_body=arrays.load_body[:0])
     rest, energy = np.zeros_like(q), np.empty(len(q))
@@ -130,7 +130,7 @@ def _forces(linkage: Linkage, q: Floats) -> tuple[Floats, Floats, Floats]:
 
 
 def _drag(arrays: MechanismArrays, q: Floats, columns: Floats) -> Floats:
-    """Force (N, 3 b, m) of the springs' dampers against velocities (N, 3 b, m)."""
+    """Force (N, 3 b, m) of the springs' dampers, opposite to velocities (N, 3 b, m)."""
     drag = np.zeros_like(columns)
     if is_damped(arrays):
         at_rest = _forces_at(arrays, q, np.zeros_like(q))

@@ -1,6 +1,7 @@
-"""Contact forces in the clearance joints, and the acceleration they make, in clearance coordinates.
+"""Contact forces and accelerations in clearance coordinates (physics.md sections 3, 4 and 7).
 
-The hot path: plain arrays indexed in place, since views and calls per joint would cost more than the laws.
+This is the innermost loop: it indexes plain arrays, because views and calls for each joint would cost more
+time than the contact laws.
 """
 
 import math
@@ -16,14 +17,14 @@ from leg_wear_monitor.dynamics.joint.joint_contact import coefficient_at, penetr
 from leg_wear_monitor.kernel import entry, kernel
 from leg_wear_monitor.mechanism.arrays import Floats
 
-# a sample of a clearance joint goes on with: unit normal, friction force [N], slip speed [m/s], derivatives
-# of the normal force by the penetration [N/m] and by its rate [N s/m], its elastic part [N], the fraction of
-# the penetration's rate that the bodies' turning makes, by the crank's speed [m/rad], and what the normal law
-# takes from the local radii: its coefficient, in the law's own unit, and the clearance [m]
+# further columns of a sample: normal, friction force [N], slip speed [m/s], derivatives of the normal force
+# by the penetration [N/m] and by its rate [N s/m], its elastic part [N], derivative of the penetration by the
+# crank angle through the rotation of worn bodies [m/rad], the normal law's coefficient for the local radii
+# (unit of the law), and the local clearance [m]
 NX, NY, F_T, SLIP, STIFFNESS, DAMPING, ELASTIC, CAM, COEFFICIENT, CLEARANCE = range(SAMPLE, SAMPLE + 10)
 COLUMNS = SAMPLE + 10
 
-# a direction near which angles need no arc tangent: its cosine, sine and angle [rad]
+# a reference direction, near which angles are computed without an arc tangent: cosine, sine and angle [rad]
 TO_X, TO_Y, TO_ANGLE = range(3)
 
 # the laws of a joint: number of the normal law's form, its hysteresis factor and its coefficient on fresh
@@ -32,16 +33,16 @@ NORMAL_FORM, HYSTERESIS_FACTOR, FRESH_COEFFICIENT = range(3)
 FRICTION_COEFFICIENT, RAMP_0, RAMP_1, FRICTION_LAW = range(3, 7)
 
 # rows of the step's vectors (d,): eccentricities, rates and accelerations at its start (0), between its
-# stages (M) and at its end (1); the acceleration that is not contact; the stages' slopes; right-hand sides;
-# the change of the rates in the last step; what the rates have to be multiplied by in the drive torque
+# stages (M) and at its end (1); accelerations without contact; slopes of the stages; right-hand sides;
+# change of the rates in the last step; coefficients of the rates in the drive torque
 E0, V0, A0, EM, VM, E1, V1, A1, DRIFT, K1E, K1V, K2E, K2V, RE, RV, DV, BY_V = range(17)
 VECTORS = 17
 
-_NEAR = 0.1  # sine of an angle for which the arc sine's series is good to 3e-11 rad
+_NEAR = 0.1  # largest sine of an angle for the arc sine's series, whose error is then 3e-11 rad
 
 
 def contact_laws(contacts: ContactArrays) -> Floats:
-    """Laws of the clearance joints (k, 7) in one array."""
+    """Parameters of the contact laws of the clearance joints (k, 7), in the columns above."""
     fresh = np.empty(len(contacts.joint))
     _fresh_coefficients(contacts, fresh)
     normal = np.column_stack([contacts.normal_form, contacts.hysteresis, fresh])
@@ -58,7 +59,7 @@ def _fresh_coefficients(contacts, out_coefficient):
 
 @kernel
 def take_directions(x, out_toward):
-    """Directions (k, 3) of the eccentricities at row E0."""
+    """Reference directions (k, 3) of the eccentricities in row E0 of x."""
     for k in range(out_toward.shape[0]):
         ex, ey = x[E0, 2 * k], x[E0, 2 * k + 1]
         length = math.sqrt(ex * ex + ey * ey)
@@ -69,7 +70,7 @@ def take_directions(x, out_toward):
 
 @kernel
 def direction_of(ex, ey, k, toward):
-    """Angle [rad] of an eccentricity of joint k, by the direction it had lately if that is near."""
+    """Angle [rad] of an eccentricity (ex, ey) of joint k; from the reference direction if it is near."""
     to_x, to_y = toward[k, TO_X], toward[k, TO_Y]
     across, along = to_x * ey - to_y * ex, to_x * ex + to_y * ey
     if along > 0.0 and abs(across) < _NEAR * along:
@@ -83,11 +84,11 @@ def direction_of(ex, ey, k, toward):
 
 @kernel
 def accelerate_clearances(model, surfaces, approach, now, turned, x, at_e, at_v, out_a, out_sample):
-    """Accelerations of the eccentricities with all contact forces; samples the joints.
+    """Accelerations of the eccentricities [m/s^2] with all contact forces, and samples of the joints.
 
-    approach (k,); ``now`` the tables; ``turned`` [rad] by how much the crank is beyond their angle; x
-    (VECTORS, d) with eccentricities and rates in rows at_e and at_v, the result in row out_a; out_sample
-    (k, COLUMNS).
+    ``approach`` (k,): approach speeds [m/s], 0 for open joints; ``now``: the step's tables; ``turned``: crank
+    angle relative to that of the tables [rad]; x (VECTORS, d) with eccentricities [m] and rates [m/s] in rows
+    at_e and at_v, the result in row out_a; out_sample (k, COLUMNS).
     """
     contacts, law, d, speed = model.contacts, model.law, x.shape[1], now.speed[0]
     inverse_mass, lever, response = now.inverse_mass, now.lever, now.lever_response

@@ -1,6 +1,6 @@
-"""How the tables over the crank angle are laid out: named parts of flat rows.
+"""Layout of the tables over the crank angle: named parts of flat rows (physics.md section 7).
 
-One row is interpolated in one loop; names are views of it.
+A row is interpolated in one loop; the named parts are views of it.
 """
 
 import math
@@ -11,20 +11,23 @@ Shapes = dict[str, tuple[int, ...]]
 
 
 def motion_shapes(k: int, damped: bool) -> Shapes:
-    """Parts of a row that moves k clearance joints, d = 2 k eccentricities e.
+    """Shapes of the parts of a row for k clearance joints, with d = 2 k eccentricities e and crank speed w.
 
-    What changes with e comes first, as `changing_shapes` says: ``inverse_mass`` of e; forces on e
-    without contact, ``free`` by 1, w' and w^2; slip of each joint by w, ``lever_drive``, which is also what
-    its friction force takes from the drive torque; ``load_power`` the power of loads by (e', w); drive
-    torque, ``torque_a`` by e'', ``torque_v`` by w e' and (this row does not change) by e'.
+    The parts that depend on e come first, as in `changing_shapes`: ``inverse_mass`` of e; ``free``: forces on
+    e without contact, coefficients of 1, w' and w^2; ``lever_drive``: slip of each joint per w, which is also
+    the coefficient of its friction force in the drive torque; ``load_power``: power of loads, coefficients of
+    (e', w); ``torque_a``: drive torque, coefficient of e''; ``torque_v``: drive torque, coefficients of w e'
+    and of e' (the latter does not depend on e).
 
-    Acceleration of e: ``coriolis`` by w e'. Slip of each joint beyond t . e': ``lever`` by e'. Drive torque:
-    ``torque`` by (1, w', w^2, w), ``torque_e`` by e times (1, w', w^2), and the form ``torque_vv`` of
-    (e', e'). In square parts the second
-    index is the one that results (of the form the first vector's), so that loops run along rows. ``angle``
-    of the bushing's and the journal's bodies, ``turn`` its derivative; ``toe`` its position, by 1 and e, and
-    the derivative of the latter by the crank angle. With dampers, ``viscous`` accelerations and ``damper``
-    the power taken as a quadratic form, both by (e', w).
+    The other parts: ``coriolis``: accelerations of e, coefficient of w e'; ``lever``: slip of each joint
+    beyond t . e', coefficient of e'; ``torque``: drive torque, coefficients of (1, w', w^2, w); ``torque_e``:
+    coefficients of e (1, w', w^2); ``torque_vv``: quadratic form of e'; ``angle``: angles of the bushing's
+    and the journal's body [rad], ``turn``: their derivatives by the crank angle; ``toe``: position,
+    coefficients of 1 and e, and the derivative of the latter by the crank angle; with dampers, ``viscous``:
+    accelerations, and ``damper``: dissipated power as a quadratic form, both in (e', w).
+
+    In square parts the second index is that of the result (in a form, of the first vector), so that loops run
+    along rows.
     """
     d = 2 * k
     return {
@@ -48,7 +51,7 @@ def motion_shapes(k: int, damped: bool) -> Shapes:
 
 
 def changing_shapes(k: int) -> Shapes:
-    """Parts at the start of that row that change with e."""
+    """Shapes of the parts at the start of the row of `motion_shapes` that depend on e."""
     d = 2 * k
     return {
         "inverse_mass": (d, d),
@@ -61,9 +64,9 @@ def changing_shapes(k: int) -> Shapes:
 
 
 def stored_shapes(k: int) -> Shapes:
-    """Parts of the stored energy: the Lagrangian's A, B, B_e, c, c_e, c_ee, and the potential energy.
+    """Shapes of the parts of the stored energy: the Lagrangian's A, B, B_e, c, c_e, c_ee, and the potential.
 
-    ``push`` and ``push_e`` are minus the gradient of the potential energy by e and minus its curvature.
+    ``push`` and ``push_e`` are minus the first and second derivatives of the potential energy by e.
     """
     d = 2 * k
     square, line, one = (d, d), (d,), (1,)

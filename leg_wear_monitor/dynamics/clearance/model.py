@@ -1,4 +1,4 @@
-"""The leg in clearance coordinates: its model, its state, its tables at the present crank angle."""
+"""Model, state and step tables of the leg in clearance coordinates (physics.md section 7)."""
 
 import math
 from typing import NamedTuple
@@ -18,11 +18,11 @@ ANGLE, SPEED, ACCELERATION = 0, 1, 2
 
 
 class ClearanceModel(NamedTuple):
-    """What does not change during a run.
+    """Constants of a run.
 
-    ``interval`` [s] between the instants at which the tables are taken and the drive is asked: the state
-    exists at whole numbers of them. ``tolerance`` (2,) local error allowed in a step, of eccentricities
-    [m] and of their rates [m/s]; ``law`` (k, 7) as `contact_laws` gives them; ``damped`` 1 with dampers.
+    ``interval`` [s]: time between the instants at which the state exists; ``tolerance`` (2,): reciprocals of
+    the local error allowed in a step, of eccentricities [1/m] and of their rates [s/m]; ``law`` (k, 7): of
+    `contact_laws`; ``damped``: 1 with dampers, else 0.
     """
 
     contacts: ContactArrays
@@ -34,15 +34,15 @@ class ClearanceModel(NamedTuple):
 
 
 class ClearanceState(NamedTuple):
-    """All that a continuation needs; snapshot and restore are copies of ``motion`` and ``depth``.
+    """Complete state of a run; a snapshot consists of copies of ``motion`` and ``depth``.
 
-    ``motion`` (s,) holds all but the surfaces, the rest are named views of it: ``intervals`` (1,) done
-    since time 0; ``e`` and ``v`` (d,) eccentricities [m] and rates; ``drive`` (3,) angle, speed and
-    acceleration of the crank; ``step`` (1,) next step to try [s]; ``approach`` (k,) approach speed of each
-    joint in contact, 0 for the others; ``recent`` (k, 4) its last two samples of time and normal force;
-    ``pending`` (k, 4) the Archard integral not yet
-    worn off [J], and the same times the normal and the eccentricity it acted at. ``depth`` (k, 2, N) is
-    the wear of bushing and journal [m].
+    ``depth`` (k, 2, N) [m]: wear depth of bushing and journal; ``motion`` (s,): everything else, of which the
+    remaining fields are views: ``intervals`` (1,): number of intervals since time 0; ``e`` [m], ``v`` [m/s]
+    (d,): eccentricities and rates; ``drive`` (3,): angle [rad], speed and acceleration of the crank; ``step``
+    (1,) [s]: next trial step; ``approach`` (k,) [m/s]: approach speed of each joint in contact, 0 for the
+    others; ``recent`` (k, 4): its last two samples of time [s] and normal force [N]; ``pending`` (k, 4):
+    Archard integral that is not yet deposited as wear [J], and the integrals of its product with the
+    direction (x, y) [J] and the length [J m] of the eccentricity.
     """
 
     depth: Floats
@@ -58,14 +58,14 @@ class ClearanceState(NamedTuple):
 
 
 class StepTables(NamedTuple):
-    """Tables at the present crank angle: ``row`` (w,) of the table ``motion`` and its parts, `motion_shapes`.
+    """Tables at the present crank angle: ``row`` (w,) of the table ``motion``, and its parts.
 
-    Those that change with e are at the eccentricities in the middle of the part of an interval. ``speed``
-    (2,) and acceleration of the crank. At all these: ``force`` (d,) without contact at rest and ``bare``
-    (d,) its acceleration, ``drift`` (d, d) that by e', ``lever_response`` (k, d) that by the friction force
-    in each joint; the drive torque at rest is ``torque_0`` (1,), its part by e' is ``torque_by_v`` (d,),
-    that by e ``torque_by_e`` (d,). ``toward`` (k, 3) the directions of the eccentricities at the interval's
-    start.
+    Parts that depend on e are evaluated for the eccentricities in the middle of the part of an interval.
+    ``speed`` (2,): speed [rad/s] and acceleration [rad/s^2] of the crank. For these: ``force`` (d,) [N]: on e
+    at rest, without contact; ``bare`` (d,): its acceleration; ``drift`` (d, d): accelerations per e';
+    ``lever_response`` (k, d): accelerations per friction force in each joint; drive torque: ``torque_0`` (1,)
+    [N m] at rest, ``torque_by_v`` (d,) per e', ``torque_by_e`` (d,) per e. ``toward`` (k, 3): reference
+    directions of the eccentricities at the start of the interval.
     """
 
     row: Floats
@@ -97,14 +97,16 @@ class StepTables(NamedTuple):
 
 
 class ClearanceWork(NamedTuple):
-    """Room for an interval.
+    """Work arrays of an interval.
 
-    The tables ``now``; samples of the joints at a step's ``start`` and ``end`` (k, COLUMNS); ``x``
-    (VECTORS, d) the vectors of a step; ``weight`` (N,) of the wear on an arc; ``by`` (c,) what the reactions'
-    table is multiplied by; ``reaction`` (r,) and ``toe`` (2,) as observed; ``added`` (k, JOINT_RATES) to the
-    joints' integrals in a step; ``drive_start`` and ``drive_end`` (3,) the torque at its ends; ``backup`` the
-    motion that a failed interval falls back to, but for what it leaves ``pending``; ``crank`` (3,) the drive
-    at the interval's start.
+    ``now``: step tables; ``system``: contact system; ``start``, ``end`` (k, COLUMNS): samples of the joints
+    at a step's start and end; ``x`` (VECTORS, d): vectors of a step; ``weight`` (N,): of the wear on an arc;
+    ``by``
+    (c,): factors of the reactions' table; ``reaction`` (r,), ``toe`` (2,): observed values; ``added``
+    (k, JOINT_RATES): increments of the joints' integrals in a step; ``drive_start``, ``drive_end`` (3,): of
+    the drive at its ends; ``backup`` (s,): state to restore after a failed interval, except ``pending`` (k,
+    4);
+    ``crank`` (3,): drive at the start of the interval.
     """
 
     now: StepTables
@@ -134,7 +136,7 @@ def state_shapes(k: int) -> dict[str, tuple[int, ...]]:
 
 @kernel
 def move_time_origin(state, interval, intervals):
-    """Count time from an even number of intervals [s] later: every other one, something is renewed."""
+    """Move time 0 forward by a number of intervals of a length [s]; even, because of `RENEWAL`."""
     state.intervals[0] -= intervals
     for k in range(state.recent.shape[0]):
         for sample in range(2):  # time and normal force of each
@@ -142,7 +144,7 @@ def move_time_origin(state, interval, intervals):
 
 
 def clearance_state(depth: Floats, angle: float, speed: float) -> ClearanceState:
-    """Ideal start at time 0: journals centred and at rest in their bushings; depth (k, 2, N) of wear."""
+    """Initial state at time 0: journals centred and at rest in their bushings; wear depth (k, 2, N) [m]."""
     shapes = state_shapes(len(depth))
     motion = np.zeros(sum(math.prod(shape) for shape in shapes.values()))
     state = ClearanceState(depth, motion, **views(motion, shapes))
@@ -190,7 +192,7 @@ def clearance_work(model: ClearanceModel, state: ClearanceState) -> ClearanceWor
 
 @kernel
 def blend(points, angle):
-    """Row of a table (points a turn) before a crank angle, and the fraction of the way to the next."""
+    """Row before a crank angle [rad] in a table of ``points`` per turn, and the fraction to the next row."""
     u = angle * (points / (2.0 * math.pi))
     u -= points * math.floor(u / points)
     i = min(points - 1, int(u))
@@ -199,7 +201,7 @@ def blend(points, angle):
 
 @kernel
 def take_tables(tables, angle, speed, acceleration, out_step_tables):
-    """Tables at a crank angle [rad], speed [rad/s] and acceleration [rad/s^2]."""
+    """Interpolate the step tables at a crank angle [rad]; speed [rad/s] and acceleration [rad/s^2]."""
     motion, row = tables.motion, out_step_tables.row
     i, w = blend(motion.shape[0] - 1, angle)
     for j in range(row.shape[0]):
@@ -209,9 +211,10 @@ def take_tables(tables, angle, speed, acceleration, out_step_tables):
 
 @kernel
 def hold_eccentricities(tables, angle, e, v, ahead, now):
-    """Put what depends on the eccentricities little in the tables, as if they were e + ahead v all the time.
+    """Complete the step tables for constant eccentricities e + ahead v; ``ahead`` [s].
 
-    Inside a part of an interval it changes by a thousandth of e / L.
+    The eccentricities' effect on the tables is of the order e / L; within a part of an interval it changes by
+    a thousandth of that.
     """
     d, speed, acceleration = e.shape[0], now.speed[0], now.speed[1]
     square = speed * speed
@@ -235,7 +238,7 @@ def hold_eccentricities(tables, angle, e, v, ahead, now):
 
 @kernel
 def _follow_eccentricities(tables, angle, e, v, ahead, now):
-    """Take what changes with e to e + ahead v, and the forces by e' twice to Coriolis's."""
+    """Add the first order of e + ahead v to the tables, and the terms bilinear in e' to ``drift``."""
     by_e, bend, row, speed = tables.by_e, tables.bend, now.row, now.speed[0]
     drift, coriolis = now.drift.reshape(-1), now.coriolis.reshape(-1)
     n, w = blend(by_e.shape[0] - 1, angle)
@@ -253,7 +256,7 @@ def _follow_eccentricities(tables, angle, e, v, ahead, now):
 
 @kernel
 def crank_between(start, end, interval):
-    """Angle, speed and acceleration of the crank amid an interval, from those at its ends (3,)."""
+    """Angle, speed and acceleration of the crank in the middle of an interval [s], from its ends (3,)."""
     speed = 1.5 * (end[ANGLE] - start[ANGLE]) / interval - 0.25 * (start[SPEED] + end[SPEED])
     angle = 0.5 * (start[ANGLE] + end[ANGLE]) + 0.125 * interval * (start[SPEED] - end[SPEED])
     return angle, speed, (end[SPEED] - start[SPEED]) / interval

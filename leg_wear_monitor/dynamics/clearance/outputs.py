@@ -1,4 +1,4 @@
-"""What follows from the eccentricities' motion: drive torque, reactions of ideal joints, the toe."""
+"""Drive torque, reactions of ideal joints and toe motion from the eccentricities (physics.md section 7)."""
 
 import math
 
@@ -10,7 +10,7 @@ from leg_wear_monitor.kernel import kernel
 
 @kernel
 def drive_torque(now, x, sample):
-    """Torque of the drive [N m] at rows E0, V0, A0 and BY_V, and the part of it by e'' alone."""
+    """Drive torque [N m] from rows E0, V0, A0 and BY_V of x, and its part that is linear in e'' [N m]."""
     sudden, torque = 0.0, now.torque_0[0]
     for i in range(x.shape[1]):
         torque += x[BY_V, i] * x[V0, i] + now.torque_by_e[i] * x[E0, i]
@@ -22,9 +22,9 @@ def drive_torque(now, x, sample):
 
 @kernel
 def sudden_impulse(now, x):
-    """Integral over a step [N m s] of the drive torque's part by e''.
+    """Integral over a step [N m s] of the drive torque's part that is linear in e''.
 
-    By the change of the rates, row DV: exact where impacts make the torque spiky.
+    It is computed from the change of the rates, row DV, which is exact for the torque peaks of impacts.
     """
     total = 0.0
     for i in range(x.shape[1]):
@@ -34,9 +34,9 @@ def sudden_impulse(now, x):
 
 @kernel
 def reactions(tables, angle, now, x, sample, out_by, out_reaction):
-    """Drive torque and reactions (r,) of the ideal joints at a crank angle, in the order of the tables.
+    """Drive torque [N m] and reactions of the ideal joints [N] (r,) at a crank angle, in the tables' order.
 
-    ``out_by`` (4 + 3 d + k,) is what the table is multiplied by.
+    ``out_by`` (4 + 3 d + k,) contains the factors of the table's columns.
     """
     table, speed, d = tables.reaction, now.speed[0], x.shape[1]
     out_by[0], out_by[1], out_by[2], out_by[3] = 1.0, now.speed[1], speed * speed, speed
@@ -55,7 +55,7 @@ def reactions(tables, angle, now, x, sample, out_by, out_reaction):
 
 @kernel
 def outside_power(now, x):
-    """Power of loads and of the springs' dampers [W] at row V0."""
+    """Power of loads and of the springs' dampers [W] for the rates in row V0."""
     d, speed, damper = x.shape[1], now.speed[0], now.damper
     power = now.load_power[d] * speed
     for i in range(d):
@@ -69,7 +69,7 @@ def outside_power(now, x):
 
 @kernel
 def toe_deviation(now, x, out_response):
-    """Raise the largest deviations (position, velocity, acceleration) of the toe from the ideal linkage."""
+    """Update the toe's largest deviations from the ideal linkage: position, velocity, acceleration."""
     d, speed, toe = x.shape[1], now.speed[0], now.toe
     px, py, vx, vy, ax, ay = 0.0, 0.0, 0.0, 0.0, 0.0, 0.0
     for i in range(d):

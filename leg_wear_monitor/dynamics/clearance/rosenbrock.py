@@ -1,9 +1,9 @@
-"""One linearly implicit step of the eccentricities, stiff only along the contact normals.
+"""The linear system of a linearly implicit step, stiff only along the contact normals (physics.md section 7).
 
-ROS2 of Verwer et al. (A second-order Rosenbrock method applied to photochemical dispersion problems,
-1999): order 2 for any approximate Jacobian, L-stable for gamma = 1 - 1 / sqrt 2 with the exact one. The
-approximation keeps what is stiff, the normal forces' stiffness K and damping C: with B = M^-1 N, N the
-normals of the contacts, the linear system in d unknowns falls to one with as many as there are contacts,
+The method is ROS2 of Verwer et al. (A second-order Rosenbrock method applied to photochemical dispersion
+problems, 1999): order 2 for any approximate Jacobian, L-stable for gamma = 1 - 1 / sqrt 2 with the exact one.
+The approximation keeps the stiff terms only, the normal forces' stiffness K and damping C: with B = M^-1 N, N
+the normals of the contacts, the system in d unknowns reduces to one with a single unknown for each contact,
 
     (D^-1 + N^T B) p = N^T r_v + gamma h D^-1 K N^T r_e,    D = gamma h C + (gamma h)^2 K,
 
@@ -24,11 +24,11 @@ GAMMA = 1.0 - math.sqrt(0.5)
 
 
 class ContactSystem(NamedTuple):
-    """The factored system of m contacts among k clearance joints.
+    """The factored system of m contacts in k clearance joints; the first m rows of each array are used.
 
-    ``active`` (k,) their joints, ``normal`` (k, 2), ``response`` B^T (k, d), ``factor`` (k, k) L with 1 / D
-    of L D L^T on its diagonal, ``ratio`` (k,) gamma h K / D, ``cam`` (k,) the fraction of the
-    penetration's rate that does not come from e', ``p`` (k,).
+    ``active`` (k,): the contacts' joints; ``normal`` (k, 2); ``response`` (k, d): B^T; ``factor`` (k, k): L,
+    with 1 / D of L D L^T on its diagonal; ``ratio`` (k,): gamma h K / D; ``cam`` (k,) [m/s]: part of the
+    penetration's rate that does not depend on e'; ``p`` (k,): unknowns.
     """
 
     active: Ints
@@ -41,7 +41,7 @@ class ContactSystem(NamedTuple):
 
 
 def contact_system(k: int) -> ContactSystem:
-    """Room for k clearance joints."""
+    """Work arrays of the system for k clearance joints."""
     return ContactSystem(
         active=np.zeros(k, dtype=np.int64),
         normal=np.zeros((k, 2)),
@@ -55,7 +55,7 @@ def contact_system(k: int) -> ContactSystem:
 
 @kernel
 def factorise_contacts(h, inverse_mass, speed, sample, out_system):
-    """Prepare the system for a step of length h [s] from a sample (k, COLUMNS); returns how many touch."""
+    """Factorise the system of a step h [s] from a sample (k, COLUMNS); returns the number m of contacts."""
     m, g = 0, GAMMA * h
     response, factor = out_system.response, out_system.factor
     for k in range(sample.shape[0]):
@@ -86,9 +86,10 @@ def factorise_contacts(h, inverse_mass, speed, sample, out_system):
 
 @kernel
 def solve_contacts(h, system, m, stage, x, r_e, r_v, out_e, out_v):
-    """Solve (I - gamma h A) y = r: rows r_e, r_v of x (rows, d) are r, rows out_e, out_v become y.
+    """Solve (I - gamma h A) y = r: rows r_e and r_v of x (VECTORS, d) contain r, rows out_e and out_v get y.
 
-    ``stage`` is 1 in the first stage, -1 in the second (1 less twice the slope of time), 0 for an error.
+    ``stage`` is the coefficient of the explicit time derivative: 1 in the first stage, -1 in the second (1
+    minus twice the first), 0 for the error.
     """
     g, p, factor, response = GAMMA * h, system.p, system.factor, system.response
     for a in range(m):

@@ -1,4 +1,4 @@
-"""The leg in clearance coordinates as a run that a simulation can ask."""
+"""The clearance formulation as a `Run`."""
 
 from copy import copy
 
@@ -13,17 +13,22 @@ from leg_wear_monitor.dynamics.run.run_statistics import RunStatistics, new_run_
 from leg_wear_monitor.mechanism.ideal import TURN
 from leg_wear_monitor.mechanism.spec import SpeedDrive
 
-_ROUNDING = 1.0e-6  # of an interval: what is left to a time that falls on a whole one
+_ROUNDING = 1.0e-6  # tolerance for rounding of times at whole intervals, as a fraction of an interval
 
 
 class ClearanceRun:
-    """The stepper under a steady crank, as `simulate` wants it.
+    """A leg in clearance coordinates with constant crank speed.
 
     Parameters
     ----------
     setup : Setup
     intervals : int
-        Of a turn, as `INTERVALS`.
+        Number of intervals per turn, see `INTERVALS`.
+
+    Raises
+    ------
+    ConfigError
+        For a mechanism that is not driven by speed.
     """
 
     def __init__(self, setup: Setup, intervals: int = INTERVALS) -> None:
@@ -40,7 +45,7 @@ class ClearanceRun:
 
     @property
     def stored_energy(self) -> float:
-        """Kinetic and potential energy, that of gravity, springs and contacts [J], to the order of e / L."""
+        """Kinetic plus potential energy of gravity, springs and contacts [J], to the order of e / L."""
         state, tables = self.stepper.state, self.stepper.model.tables
         angle, speed, _ = state.drive
         u = angle / TURN % 1.0 * (len(tables.stored) - 1)
@@ -53,19 +58,19 @@ class ClearanceRun:
         return float(moving + resting) + self.stepper.observe().elastic_energy
 
     def advance(self, t_end: float, statistics: RunStatistics) -> None:
-        """Go on to the last whole interval before a time [s] and add to run statistics.
+        """Advance to the last whole interval before a time [s] and add to run statistics.
 
         Raises
         ------
         SimulationError
-            Naming the joint, the time and what to try.
+            If the motion diverges; names the joint, the time and what to try.
         """
         status, k = self.stepper.advance(self._polynomial, t_end, statistics)
         if status != DONE:
             raise stop(self._setup, status, k, self.time)
 
     def sample(self) -> Sample:
-        """The leg as it is now."""
+        """The present state of the leg."""
         moment, tables, contacts = self.stepper.observe(), self.stepper.model.tables, self._setup.contacts
         force = np.zeros(len(self._setup.linkage.mechanism.joints))
         force[contacts.joint] = self.stepper.last_force
@@ -76,7 +81,7 @@ class ClearanceRun:
         return Sample(self.stepper.crank_angle, toe, moment.torque, force)
 
     def branch(self) -> "ClearanceRun":
-        """A run of its own that goes on from here; this one stays as it is."""
+        """An independent copy of the run in its present state."""
         surfaces = self._setup.surfaces._replace(depth=self.stepper.state.depth.copy())
         run, model = copy(self), self.stepper.model
         run._setup = attrs.evolve(self._setup, surfaces=surfaces)
@@ -85,7 +90,7 @@ class ClearanceRun:
         return run
 
     def sample_at(self, t: float) -> Sample:
-        """The leg at a time [s] less than an interval from here; what is left to it is a shorter interval."""
+        """The leg at a time [s] less than one interval ahead, reached by one shorter interval."""
         stepper, rest = self.stepper, t - self.time
         if rest <= _ROUNDING * stepper.model.interval:
             return self.sample()

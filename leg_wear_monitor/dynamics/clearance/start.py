@@ -1,4 +1,4 @@
-"""What an interval in clearance coordinates starts from: its state, the tables, samples of the joints."""
+"""Start of a part of an interval: state, step tables, samples of the joints (physics.md section 7)."""
 
 from leg_wear_monitor.dynamics.clearance.contact import A0, E0, V0, accelerate_clearances, take_directions
 from leg_wear_monitor.dynamics.clearance.model import hold_eccentricities, take_tables
@@ -9,7 +9,7 @@ from leg_wear_monitor.kernel import kernel
 
 @kernel
 def load_state(model, surfaces, state, angle, speed, acceleration, ahead, work):
-    """Load the state, and the tables at a crank angle, with the eccentricities of ``ahead`` [s] later."""
+    """Load the state, and the tables at a crank angle [rad] for the eccentricities ``ahead`` [s] later."""
     x, now = work.x, work.now
     take_tables(model.tables, angle, speed, acceleration, now)
     hold_eccentricities(model.tables, angle, state.e, state.v, ahead, now)
@@ -22,7 +22,7 @@ def load_state(model, surfaces, state, angle, speed, acceleration, ahead, work):
 
 @kernel
 def sample_start(model, surfaces, state, turned, t, statistics, work):
-    """Sample the joints where a step starts; contact begins where worn flanks have closed in."""
+    """Sample the joints at the start of a step at t [s]; begin contacts that rotating worn walls caused."""
     x, start, now, approach, contacts = work.x, work.start, work.now, state.approach, model.contacts
     accelerate_clearances(model, surfaces, approach, now, turned, x, E0, V0, A0, start)
     closed = False

@@ -1,4 +1,4 @@
-"""One trial step in clearance coordinates, and what is added up when it is taken."""
+"""A trial step in clearance coordinates, and its integrals and wear when accepted (physics.md section 7)."""
 
 import math
 
@@ -53,10 +53,10 @@ from leg_wear_monitor.kernel import kernel
 
 @kernel
 def drift(now, x):
-    """What the rates at row V0 make.
+    """Terms that depend on the rates in row V0 of x (VECTORS, d).
 
-    Row DRIFT, the acceleration that is not contact: gravity, crank, Coriolis, dampers; row BY_V, what e'
-    has to be multiplied by in the drive torque.
+    Row DRIFT: acceleration without contact, by gravity, crank, Coriolis terms and dampers [m/s^2]; row BY_V:
+    coefficients of e' in the drive torque [N s].
     """
     by_v, torque, viscous, d = now.drift, now.torque_vv, now.viscous, x.shape[1]
     for i in range(d):
@@ -74,11 +74,11 @@ def drift(now, x):
 
 @kernel
 def try_step(model, surfaces, approach, h, turned, now, system, x, start, end):
-    """Step of length h [s] from rows E0, V0, A0 of x to E1, V1, A1 and sample ``end``; error over tolerance.
+    """Trial step of length h [s] from rows E0, V0, A0 of x to E1, V1, A1 and sample ``end`` (k, COLUMNS).
 
-    ``turned`` [rad] is by how much the crank is beyond the angle of the tables at the step's end.
-    The error is that of the second-order step against the cubic through the accelerations at both ends,
-    filtered like a stage so that stiff contacts do not exaggerate it (as Shampine does).
+    ``turned``: crank angle at the end of the step, relative to that of the tables [rad]. Returns the local
+    error over the tolerance: the difference of the second-order step and the cubic through the accelerations
+    at both ends, filtered like a stage so that stiff contacts do not exaggerate it (Shampine's filter).
     """
     d, tolerance = x.shape[1], model.tolerance
     m = factorise_contacts(h, now.inverse_mass, now.speed[0], start, system)
@@ -110,7 +110,7 @@ def try_step(model, surfaces, approach, h, turned, now, system, x, start, end):
 
 @kernel
 def shift_start(now, x):
-    """Make the end of the step the start of the next one, with the drift of its own rates; row DV."""
+    """Move the end of the step to the start of the next one, with its own DRIFT and BY_V; sets row DV."""
     for i in range(x.shape[1]):
         x[DV, i] = x[V1, i] - x[V0, i]
         x[E0, i], x[V0, i] = x[E1, i], x[V1, i]
@@ -122,10 +122,10 @@ def shift_start(now, x):
 
 @kernel
 def integrate_joints(law, approach, h, start, end, out_added):
-    """Integrals of the clearance joints over a step of length h [s]; (k, JOINT_RATES).
+    """Integrals of the clearance joints over a step of length h [s]; out_added (k, JOINT_RATES).
 
-    Simpson's rule where a force changes much, with the contact law at the middle of the penetration's
-    cubic: an impact takes few steps. The trapezium elsewhere.
+    Simpson's rule where the force changes by more than 10 %, with the contact law at the middle of the
+    penetration's cubic, because an impact takes few steps; the trapezoidal rule elsewhere.
     """
     for k in range(start.shape[0]):
         for r in range(JOINT_RATES):
@@ -164,7 +164,7 @@ def integrate_joints(law, approach, h, start, end, out_added):
 
 @kernel
 def _add_rates(k, weight, f_n, f_t, elastic, delta_dot, slip, out_added):
-    """Add the rates of joint k's integrals at one instant, by a weight [s]."""
+    """Add the rates of joint k's integrals at one instant, times a weight [s]."""
     if f_n > 0.0:
         squared = f_n * f_n + f_t * f_t
         out_added[k, FORCE] += weight * math.sqrt(squared)
@@ -177,7 +177,7 @@ def _add_rates(k, weight, f_n, f_t, elastic, delta_dot, slip, out_added):
 
 @kernel
 def gather_wear(added, start, end, pending):
-    """Gather what a step added to the Archard integrals, and where it acted; pending as in ClearanceState."""
+    """Add a step's Archard integrals, and the eccentricities at which they acted, to ``pending`` (k, 4)."""
     for k in range(pending.shape[0]):
         integral = added[k, ARCHARD]
         if integral > 0.0:
@@ -193,10 +193,10 @@ def gather_wear(added, start, end, pending):
 
 @kernel
 def wear_off(contacts, surfaces, k, start, now, turned, acted, pending, out_weight):
-    """Wear the surfaces of joint k by what is pending, at its mean normal and eccentricity.
+    """Deposit the pending wear of joint k at its mean direction and eccentricity.
 
-    By how much the crank is beyond the angle of the tables [rad] say ``turned``, and ``acted`` for when it
-    acted. Returns the energy that the contact loses with its wall [J].
+    ``turned``: crank angle relative to that of the tables [rad], ``acted``: the same at the time the wear
+    acted. Returns the contact energy lost with the removed material [J].
     """
     gone = 0.0
     integral = pending[k, 0]
@@ -217,9 +217,9 @@ def wear_off(contacts, surfaces, k, start, now, turned, acted, pending, out_weig
 
 @kernel
 def wear_what_turned(contacts, surfaces, approach, start, now, turned, pending, out_weight):
-    """Wear off what is pending where contact has ended or its normal has turned by two sectors.
+    """Deposit pending wear where the contact has ended or its normal has rotated by two sectors.
 
-    Returns the energy that contacts lose with their walls [J]; ``turned`` as in `wear_off`.
+    Returns the contact energy lost with the removed material [J]; ``turned`` as in `wear_off`.
     """
     limit, gone = 4.0 * math.pi / surfaces.depth.shape[2], 0.0
     for k in range(pending.shape[0]):

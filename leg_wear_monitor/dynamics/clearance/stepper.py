@@ -1,4 +1,4 @@
-"""The leg in clearance coordinates as a stepper: what advances it, and what is read of it."""
+"""Stepper of the leg in clearance coordinates: advance, observe, snapshot (physics.md section 7)."""
 
 from typing import NamedTuple
 
@@ -25,19 +25,20 @@ from leg_wear_monitor.mechanism.arrays import Flags, Floats
 from leg_wear_monitor.mechanism.ideal import TURN
 from leg_wear_monitor.mechanism.spec import Mechanism, SpeedDrive, TorqueDrive
 
-INTERVALS = 2048  # of a turn at the setup's speed
-TOLERANCE_M = 5.0e-9  # local error of a step in the eccentricities [m]: finer, the means stay as they are
-TOLERANCE_RATE = 1.0e4  # 1/s: the same for their rates, over the time a contact takes
+INTERVALS = 2048  # intervals per turn at the setup's speed
+TOLERANCE_M = 5.0e-9  # local error of a step in the eccentricities [m]; a smaller one does not change means
+TOLERANCE_RATE = 1.0e4  # 1/s: ratio of the rates' tolerance to it, the reciprocal duration of a contact
 
 
 class Moment(NamedTuple):
-    """One instant of k clearance joints, in the ground's frame.
+    """The leg at one instant, with k clearance joints, in the ground's frame.
 
-    ``deviation`` (3, 2) of the toe from the ideal linkage: position [m], velocity, acceleration;
-    ``torque`` of the drive [N m]; ``e`` and ``rate`` (k, 2) of the journals' centres [m, m/s];
-    ``force`` (k, 2) of the bushing on the journal [N]; ``reaction`` (r,) the torque again, then the two
-    components of the force in each ideal joint; ``toe`` (2,) its position [m], zeros without one;
-    ``elastic_energy`` of the contacts [J].
+    ``deviation`` (3, 2): of the toe from the ideal linkage, position [m], velocity [m/s], acceleration
+    [m/s^2];
+    ``torque``: of the drive [N m]; ``e`` [m], ``rate`` [m/s] (k, 2): eccentricities and their rates;
+    ``force`` (k, 2) [N]: of the bushing on the journal; ``reaction`` (r,): drive torque [N m], then the two
+    components of the force in each ideal joint [N]; ``toe`` (2,) [m]: position, zeros without a toe;
+    ``elastic_energy``: of the contacts [J].
     """
 
     deviation: Floats
@@ -51,7 +52,7 @@ class Moment(NamedTuple):
 
 
 class Snapshot(NamedTuple):
-    """All of a stepper's state; a stepper restored from it goes on bit for bit."""
+    """Complete state of a stepper; a restored stepper gives bit-identical results."""
 
     motion: Floats
     depth: Floats
@@ -63,19 +64,19 @@ class ClearanceStepper:
     Parameters
     ----------
     setup : Setup
-        Its surfaces are worn as the stepper goes.
+        The stepper wears its surfaces.
     interval_s : float, optional
-        Time between the instants at which the state exists; `INTERVALS` a turn at the setup's speed if not
-        given.
+        Time between the instants at which the state exists; default: `INTERVALS` per turn at the setup's
+        speed.
     tolerance_m : float
-        Local error allowed in a step; that of the rates is 1e4 times it per second.
+        Local error allowed in a step [m]; that of the rates is `TOLERANCE_RATE` times it [m/s].
     tables : ClearanceTables, optional
-        Tables of this setup, if they are there already.
+        Tables of this setup, to reuse those built before.
 
     Raises
     ------
     ConfigError
-        For a mechanism that a torque drives: these coordinates need the crank's motion.
+        For a mechanism driven by a torque: clearance coordinates need a given crank motion.
     """
 
     def __init__(
@@ -106,7 +107,7 @@ class ClearanceStepper:
         return float(self.state.intervals[0] * self.model.interval)
 
     def init(self, crank_angle: float, speed: float) -> None:
-        """Start afresh at a crank angle [rad] and speed [rad/s], time 0, journals centred; wear stays."""
+        """Reset to time 0, a crank angle [rad] and speed [rad/s], journals centred; the wear stays."""
         start = clearance_state(self.state.depth, crank_angle, speed)
         self.state.motion[:] = start.motion
 
@@ -132,21 +133,21 @@ class ClearanceStepper:
         return np.asarray(np.hypot(sample[:, F_N], sample[:, F_T]))
 
     def place(self, eccentricity: Floats) -> None:
-        """Put the journals' centres (k, 2) somewhere in their bushings [m]."""
+        """Set the eccentricities (k, 2) [m]."""
         self.state.e[:] = eccentricity.ravel()
 
     def drop_pending_wear(self) -> None:
-        """Forget the wear that has not been taken off the surfaces yet."""
+        """Discard the wear that is not yet deposited on the surfaces."""
         self.state.pending[:] = 0.0
 
     def place_in_snapshot(self, name: str) -> Flags:
-        """Where a part of the state (`ClearanceState`) is in a snapshot's ``motion``."""
+        """Mask (s,) of the entries of a snapshot's ``motion`` that belong to a field of `ClearanceState`."""
         shapes = state_shapes(len(self.state.approach))
         names = np.repeat(list(shapes), [int(np.prod(shape)) for shape in shapes.values()])
         return np.asarray(names == name)
 
     def observe(self) -> Moment:
-        """The leg as it is at that time; leaves the state as it is."""
+        """The leg at that time; does not change the state."""
         work, state = self.work, self.state
         energy = observe(self.model, self._setup.surfaces.feeds_back, state, work)
         x, now, start = work.x, work.now, work.start
@@ -169,15 +170,15 @@ class ClearanceStepper:
         Parameters
         ----------
         polynomial : (7,) array
-            Crank angle [rad]: reference time [s], then six coefficients; it holds since the last call.
+            Crank motion since the last call: reference time [s], then six coefficients of the angle [rad].
         t_end : float, s
         statistics : RunStatistics
 
         Returns
         -------
         status, k : int
-            `DONE`, or why it stopped and the clearance joint concerned (-1: none); the state is then that of
-            the last whole interval.
+            `DONE`, or the reason for stopping and the clearance joint concerned (-1: none); the state is then
+            that of the last whole interval.
         """
         status, k = advance_clearances(
             self.model, self._setup.surfaces.feeds_back, self.state, polynomial, t_end, statistics, self.work
@@ -194,13 +195,13 @@ class ClearanceStepper:
         return Snapshot(self.state.motion.copy(), self.state.depth.copy())
 
     def restore(self, snapshot: Snapshot) -> None:
-        """Go back to a snapshot of a stepper of the same setup."""
+        """Restore a snapshot of a stepper of the same setup."""
         self.state.motion[:] = snapshot.motion
         self.state.depth[:] = snapshot.depth
 
 
 def needs_speed(mechanism: Mechanism) -> ConfigError:
-    """Error for a mechanism that a torque drives, constant or a controller's."""
+    """Error for a mechanism that is driven by a constant torque or by a controller."""
     key = "drive.torque" if isinstance(mechanism.drive, TorqueDrive) else "drive.track"
     return ConfigError(mechanism.source, key, "the clearance model needs drive.speed; try --model full")
 
@@ -211,12 +212,13 @@ def _toe_deviations(toe: Floats, speed: float, e: Floats, v: Floats, a: Floats) 
     Parameters
     ----------
     toe : (2, 1 + 2 d) array
-        As the stepper's tables have it: position, its derivative by e, and of that by the crank angle.
+        Of the step tables: position, its derivative by e, and the derivative of the latter by the crank
+        angle.
     speed : float, rad/s
     e, v, a : (d,) arrays
         Eccentricities and their rates.
     """
     d = len(e)
     by, turning = toe[:, 1 : 1 + d], speed * toe[:, 1 + d :]
-    # as the stepper's own largest deviations: without the part by the second derivative, 1e-3 of it
+    # as in the run statistics, without the second derivative by the crank angle, whose part is 1e-3
     return np.stack([by @ e, by @ v + turning @ e, by @ a + 2.0 * (turning @ v)])

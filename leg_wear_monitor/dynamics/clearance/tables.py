@@ -1,17 +1,18 @@
-"""Everything of the leg but its contacts, as tables over the crank angle (physics.md section 7).
+"""Tables over the crank angle for the motion of the leg without contacts (physics.md section 7).
 
 With X = J^-1 at centred journals, J the Jacobian of all closures and the drive, the columns of X that
-belong to the clearance joints are S, the drive's is s. In the eccentricities e and the crank angle th, w its
-speed, the Lagrangian to the first order of e / L beside w, and to the second beside w^2 and gravity, is
+belong to the clearance joints are S, the drive's is s. In the eccentricities e and the crank angle th, with
+its speed w, the Lagrangian to the first order of e / L in terms with w, and to the second in those with w^2
+and gravity, is
 
     1/2 e' A e' + w e' (B + B_e e) + 1/2 w^2 (c + c_e e + 1/2 e c_ee e) - V,
 
     A = S M S,  B = S M s,  c = s M s,  B_e = q_ee M s + S M S_t,  c_e = 2 s M S_t,
     c_ee = 2 S_t M S_t + 2 s M q_ee_t,      q_ee = -X (dJ along S) S  the curvature of the linkage,
 
-with _t the derivative by the crank angle. Its equations of motion and its drive torque belong to one
-energy, so work in, losses and stored energy add up. Beside them A changes with e by Gamma e and its
-transpose, Gamma = S M q_ee, and Gamma e' e' acts against e''; torque and stored energy leave both out.
+with _t the derivative by the crank angle. The equations of motion and the drive torque follow from one
+energy, so the energy balance is closed. In addition, A changes with e by Gamma e and its transpose, Gamma = S
+M q_ee, and the term Gamma e' e' is added to A e''; the drive torque and the stored energy neglect both.
 """
 
 from typing import NamedTuple
@@ -26,25 +27,26 @@ from leg_wear_monitor.mechanism.constraints import DRIVE
 from leg_wear_monitor.mechanism.ideal import TURN, IdealMotion, one_cycle, turned
 from leg_wear_monitor.mechanism.position import Linkage
 
-POINTS = 1024  # of a turn; tables are linear between them
-COARSER = 2  # times as far apart as those are the points of what e and e' change
+POINTS = 1024  # table points per turn, with linear interpolation
+COARSER = 2  # ratio of the step of the tables of first order in e to that of the others
 
-_BENT = 10.0  # 1/rad^2: bend of the Coriolis terms over their root mean square that one interval follows
-_MOST_PARTS = 8
+# 1/rad^2: largest second derivative of the Coriolis terms over their RMS for an undivided interval
+_BENT = 10.0
+_MOST_PARTS = 8  # parts of an interval: bounds its cost
 
 
 class ClearanceTables(NamedTuple):
     """Tables at N equal steps of the crank, the first repeated at the end; k clearance joints, d = 2 k.
 
-    ``motion`` (N + 1, w) the rows that `motion_shapes` names; ``reaction`` (N + 1, 4 + 3 d + k, r) the
-    drive torque and the reactions of the ideal joints by (1, w', w^2, w, e'', w e', e', F_t), and
-    ``reaction_joint`` (r,) the joint of each, ``DRIVE`` first; ``stored`` (N + 1, u) the parts of the
-    stored energy that `stored_shapes` names; ``parts`` (N,) into how many an interval is to be cut for the
-    tables to be held in each.
+    ``motion`` (N + 1, w): rows of `motion_shapes`; ``reaction`` (N + 1, 4 + 3 d + k, r): drive torque and
+    reactions of the ideal joints, coefficients of (1, w', w^2, w, e'', w e', e', F_t); ``reaction_joint``
+    (r,): joint of each, ``DRIVE`` first; ``stored`` (N + 1, u): parts of the stored energy of
+    `stored_shapes`;
+    ``parts`` (N,): number of parts of an interval that starts there.
 
-    ``by_e`` (M + 1, d, u) is how the parts that `changing_shapes` names change with e, and ``bend``
-    (M + 1, d, d d) the acceleration A^-1 Gamma that e' takes twice. Both are small beside the above, and so
-    in single precision at every `COARSER`-th point: less to fetch for every interval.
+    ``by_e`` (M + 1, d, u): derivatives by e of the parts of `changing_shapes`; ``bend`` (M + 1, d, d d):
+    accelerations A^-1 Gamma, bilinear in e'. Both are small, and therefore stored in single precision at
+    every `COARSER`-th point, which reduces the memory traffic of an interval.
     """
 
     motion: Floats
@@ -57,19 +59,23 @@ class ClearanceTables(NamedTuple):
 
 
 def build_tables(linkage: Linkage, contacts: ContactArrays, points: int = POINTS) -> ClearanceTables:
-    """Tables of a linkage with the joints of ``contacts`` loose.
+    """Tables of a linkage with the clearance joints of ``contacts``.
 
     Parameters
     ----------
     linkage : Linkage
     contacts : ContactArrays
     points : int
-        Steps of the crank in a turn.
+        Crank steps per turn.
+
+    Returns
+    -------
+    ClearanceTables
 
     Raises
     ------
     AssemblyError
-        If the crank cannot turn.
+        If the linkage does not close or has a dead point.
     """
     motion = one_cycle(linkage, points, 1.0)
     basis = Basis(linkage, contacts, motion)
@@ -103,7 +109,7 @@ def build_tables(linkage: Linkage, contacts: ContactArrays, points: int = POINTS
 
 
 def _parts(table: Floats) -> Ints:
-    """How finely an interval is to be cut at each point, by the bend of a table (N, d, d) over the crank."""
+    """Number of parts of an interval at each point (N,), from the second derivative of a table (N, d, d)."""
     step = TURN / len(table)
     bend = np.roll(table, -1, axis=0) - 2.0 * table + np.roll(table, 1, axis=0)
     size = np.sqrt((table**2).mean(axis=0)).max()
@@ -114,12 +120,12 @@ def _parts(table: Floats) -> Ints:
 
 
 def _accelerations(basis: Basis) -> dict[str, Floats]:
-    """Parts that move the eccentricities."""
+    """Parts of `motion_shapes` for the accelerations of the eccentricities."""
     mass = basis.mass[:, None]
     inverse_mass: Floats = np.asarray(np.linalg.inv(project(basis.s, mass * basis.s)), dtype=np.float64)
 
     def respond(generalised: Floats) -> Floats:
-        """Accelerations (N, d, m) by forces (N, 3 b, m)."""
+        """Accelerations (N, d, m) of the eccentricities by generalised forces (N, 3 b, m) on the bodies."""
         return np.asarray(inverse_mass @ project(basis.s, generalised))
 
     free = np.stack([basis.force, -basis.mass * basis.drive, -basis.mass * basis.drive_t], axis=2)
@@ -132,7 +138,7 @@ def _accelerations(basis: Basis) -> dict[str, Floats]:
 
 
 def _first_order(basis: Basis, inverse_mass: Floats) -> dict[str, Singles]:
-    """Tables ``by_e`` and ``bend``, by the inverse mass (N, d, d) at e = 0.
+    """Tables ``by_e`` and ``bend``, from the inverse mass (N, d, d) at e = 0.
 
     The inverse of A + Gamma e + (Gamma e)^T is A^-1 - Q e - (Q e)^T with Q = A^-1 Gamma A^-1.
     """
@@ -159,7 +165,7 @@ def _first_order(basis: Basis, inverse_mass: Floats) -> dict[str, Singles]:
 
 
 def _torque(basis: Basis) -> dict[str, Floats]:
-    """Parts that give the drive torque."""
+    """Parts of `motion_shapes` for the drive torque."""
     mass = basis.mass[:, None]
     c, c_e = np.einsum("ni,i,ni->n", basis.drive, basis.mass, basis.drive), basis.c_e
     a_t = derivative(project(basis.s, mass * basis.s))
@@ -192,7 +198,7 @@ def _stored(basis: Basis) -> Floats:
 
 
 def _reactions(linkage: Linkage, basis: Basis) -> tuple[Floats, Ints]:
-    """Table ``reaction`` without its closing row, and the joint of each of its rows."""
+    """Table ``reaction`` (N, 4 + 3 d + k, r) without its closing row, and the joint (r,) of each reaction."""
     rows, joints = [linkage.rows.drive_row], [DRIVE]
     for closure, start in zip(linkage.rows.closure.tolist(), linkage.rows.row.tolist(), strict=True):
         if closure != DRIVE and start not in basis.rows:
@@ -207,7 +213,7 @@ def _reactions(linkage: Linkage, basis: Basis) -> tuple[Floats, Ints]:
 
 
 def _toe(linkage: Linkage, motion: IdealMotion, basis: Basis) -> Floats:
-    """Part ``toe``; zeros without a point of that name."""
+    """Part ``toe`` (N, 2, 1 + 2 d); zeros for a mechanism without a toe."""
     n, d = len(motion.q), basis.s.shape[2]
     toe = np.zeros((n, 2, 1 + 2 * d))
     if linkage.mechanism.toe is None:

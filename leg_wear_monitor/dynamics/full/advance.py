@@ -1,8 +1,7 @@
-"""The full-coordinate motion, step by step: adaptive, each impact met where it begins.
+"""Time integration in full coordinates: adaptive steps and contact events (physics.md section 2).
 
-The local error of every step stays below a tolerance in every coordinate and velocity (Dormand-Prince
-5(4)); an open joint is not allowed to pass into contact inside a step: the step is cut so that it ends
-where the surfaces touch, to 1e-11 m.
+The local error of every step is below a tolerance in every coordinate and velocity (Dormand-Prince 5(4)). A
+step in which a contact would begin is shortened so that it ends at the begin of the contact, to 1e-11 m.
 """
 
 import math
@@ -35,16 +34,16 @@ from leg_wear_monitor.dynamics.run.toe_deviation import compare_toe
 from leg_wear_monitor.kernel import copy_array, entry, kernel
 from leg_wear_monitor.mechanism.arrays import Floats
 
-LONGEST_STEP = 1.0e-3  # s: Baumgarte's alpha times it stays well inside the region of stability
+LONGEST_STEP = 1.0e-3  # s: its product with Baumgarte's alpha is well inside the region of stability
 _SHORTEST_STEP = 1.0e-14  # s
 
 
 class FullState(NamedTuple):
-    """All that a continuation needs.
+    """Complete state of a run, the surfaces aside.
 
-    ``y`` (6 n,) coordinates, then velocities, of n bodies; ``clock`` (2,) time [s] and the next step to
-    try [s]; ``approach`` (k,) approach speed of each clearance joint in contact, 0 for the others [m/s];
-    ``recent`` (k, 4) its last two samples of time and normal force.
+    ``y`` (6 n,): coordinates, then velocities, of n bodies [m, m, rad; per s]; ``clock`` (2,) [s]: time, and
+    the next trial step; ``approach`` (k,) [m/s]: approach speed of each clearance joint in contact, 0 for the
+    others; ``recent`` (k, 4): its last two samples of time [s] and normal force [N].
     """
 
     y: Floats
@@ -54,7 +53,12 @@ class FullState(NamedTuple):
 
 
 class FullWork(NamedTuple):
-    """Room for a step: slopes, trial state, rates at the stages, contacts at its start, error scale."""
+    """Work arrays of a step, for n bodies, j joints and k clearance joints.
+
+    ``slope`` (7, 6 n): slopes of the stages; ``trial`` (6 n,): trial state; ``rates`` (7, j, JOINT_RATES),
+    ``drive_rates`` (7, DRIVE_RATES): rates of the statistics' integrals; ``start`` (k, SAMPLE): samples at
+    its start; ``scale`` (6 n,): error tolerances; ``weight`` (N,): of the wear on an arc; ``scratch``.
+    """
 
     slope: Floats
     trial: Floats
@@ -67,13 +71,13 @@ class FullWork(NamedTuple):
 
 
 def full_state(q: Floats, v: Floats, clearance_joints: int, t: float = 0.0) -> FullState:
-    """State at rest in all contacts: coordinates q (n, 3) and velocities v (n, 3)."""
+    """Initial state with open joints at time t [s]: coordinates q (n, 3) and velocities v (n, 3)."""
     y = np.concatenate([q.ravel(), v.ravel()])
     return FullState(y, np.array([t, 1.0e-6]), np.zeros(clearance_joints), np.zeros((clearance_joints, 4)))
 
 
 def full_work(model: FullModel, tolerance_m: float, tolerance_mps: float, sectors: int) -> FullWork:
-    """Work arrays; the tolerances are the local error allowed in a step (m or rad, and per second)."""
+    """Work arrays; the tolerances are those of a step's local error, of coordinates and of velocities."""
     n, k = len(model.arrays.mass), len(model.contacts.joint)
     joints = len(model.arrays.joint_kind)
     return FullWork(
@@ -90,7 +94,7 @@ def full_work(model: FullModel, tolerance_m: float, tolerance_mps: float, sector
 
 @kernel
 def _slope(model, surfaces, approach, polynomial, t, y, s, work):
-    """Slope of stage s at state y (6 n,): velocities, then accelerations."""
+    """Slope of stage s for state y (6 n,) at t [s]: velocities, then accelerations; False if singular."""
     half = y.shape[0] // 2
     for i in range(half):
         work.slope[s, i] = y[half + i]
@@ -103,7 +107,7 @@ def _slope(model, surfaces, approach, polynomial, t, y, s, work):
 
 @kernel
 def _try_step(model, surfaces, state, polynomial, h, work):
-    """Stages of a step of length h; leaves its end in ``trial`` and the last slope; error over tolerance."""
+    """Trial step of length h [s]: its end in ``work.trial``; returns the local error over the tolerance."""
     t = state.clock[0]
     for s in range(1, STAGES):
         stage_state(s, h, state.y, work.slope, work.trial)
@@ -114,7 +118,7 @@ def _try_step(model, surfaces, state, polynomial, h, work):
 
 @kernel
 def slope_here(model, surfaces, state, polynomial, work):
-    """Slope and rates where the state stands, computed afresh: the first stage of the next step."""
+    """Evaluate the first stage of the next step at the present state; False if the closures are singular."""
     good = _slope(model, surfaces, state.approach, polynomial, state.clock[0], state.y, 0, work)
     copy_array(work.scratch.contact, work.start)
     return good
@@ -122,7 +126,10 @@ def slope_here(model, surfaces, state, polynomial, work):
 
 @kernel
 def _accept(model, surfaces, state, h, toe, statistics, work):
-    """Take the trial step: sums, wear, contacts. Returns whether a contact began or ended."""
+    """Accept the trial step of length h [s]: statistics, wear, contact events.
+
+    Returns whether a contact began or ended.
+    """
     arrays, contacts, scratch = model.arrays, model.contacts, work.scratch
     half = state.y.shape[0] // 2
     q, v = work.trial[:half].reshape(-1, 3), work.trial[half:].reshape(-1, 3)
@@ -164,13 +171,13 @@ def advance_full(model, surfaces, state, polynomial, t_end, toe, statistics, wor
     Returns
     -------
     status, k
-        DONE, or why it stopped and the clearance joint concerned (-1 if none). The state is then the last
-        accepted one.
+        DONE, or the reason for stopping and the clearance joint concerned (-1 if none). The state is then the
+        last accepted one.
     """
     scratch = work.scratch
     if not slope_here(model, surfaces, state, polynomial, work):
         return SINGULAR, -1
-    cut = NEVER  # fraction of the last trial after which a joint touched
+    cut = NEVER  # fraction of the last trial step after which a contact began
     while state.clock[0] < t_end:
         h = state.clock[1]
         left = t_end - state.clock[0]

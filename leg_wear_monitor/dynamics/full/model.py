@@ -1,8 +1,8 @@
 """Equations of motion in full coordinates (physics.md section 2).
 
-With M diagonal the multipliers come from the small symmetric system
-(phi_q M^-1 phi_q^T) lambda = phi_q M^-1 Q - gamma', whose rows overlap only where two closures share a
-body; gamma' = gamma - 2 alpha phi_dot - beta^2 phi is Baumgarte's stabilised right-hand side with
+Since M is diagonal, the multipliers follow from the small symmetric system
+(phi_q M^-1 phi_q^T) lambda = phi_q M^-1 Q - gamma', which is sparse because two closures are coupled only by
+a common body; gamma' = gamma - 2 alpha phi_dot - beta^2 phi is Baumgarte's stabilised right-hand side with
 alpha = beta.
 """
 
@@ -41,10 +41,10 @@ BAUMGARTE = 200.0  # alpha = beta [1/s]: drift decays within 5 ms, far slower th
 
 
 class FullModel(NamedTuple):
-    """What does not change during a run.
+    """Constants of a run.
 
-    ``rows`` are those of the ideal joints and of a drive by speed; ``contacts`` the clearance joints;
-    ``baumgarte`` alpha = beta [1/s].
+    ``rows``: of the ideal joints and of a drive by speed; ``contacts``: the clearance joints;
+    ``baumgarte``: alpha = beta [1/s].
     """
 
     arrays: MechanismArrays
@@ -54,9 +54,12 @@ class FullModel(NamedTuple):
 
 
 class FullScratch(NamedTuple):
-    """Room for one evaluation, so that the step allocates nothing.
+    """Work arrays of one evaluation, so that a step does not allocate; n bodies, m rows, k clearance joints.
 
-    After it: ``lam`` (m,) multipliers, ``contact`` (k, SAMPLE) the clearance joints as `touch` wants them.
+    ``cs`` (n, 2): cosines and sines; ``force`` (n, 3): generalised forces; ``phi``, ``gamma`` (m,) and
+    ``jac`` (m, 2, 3): closures; ``schur`` (m, m): phi_q M^-1 phi_q^T and its factor; ``lam`` (m,):
+    multipliers;
+    ``drive`` (3,): crank motion; ``contact`` (k, SAMPLE): samples of the clearance joints.
     """
 
     cs: Floats
@@ -73,13 +76,13 @@ class FullScratch(NamedTuple):
 def full_model(
     arrays: MechanismArrays, contacts: ContactArrays, driven: bool, baumgarte: float = BAUMGARTE
 ) -> FullModel:
-    """Model with the joints of ``contacts`` loose and all others ideal."""
+    """Model with the clearance joints of ``contacts`` and all other joints ideal."""
     ideal = [joint for joint in range(len(arrays.joint_kind)) if joint not in contacts.joint]
     return FullModel(arrays, select_rows(arrays, ideal, driven), contacts, baumgarte)
 
 
 def full_scratch(model: FullModel) -> FullScratch:
-    """Scratch arrays of the right size."""
+    """Work arrays for a model."""
     n, m, k = len(model.arrays.mass), len(model.rows.body), len(model.contacts.joint)
     return FullScratch(
         cs=np.zeros((n, 2)),
@@ -96,7 +99,14 @@ def full_scratch(model: FullModel) -> FullScratch:
 
 @kernel
 def eccentricity(model, k, q, v, cs):
-    """Eccentricity [m] of clearance joint k, its rate [m/s], and the bodies of bushing and journal."""
+    """Eccentricity of clearance joint k (physics.md section 3).
+
+    Returns
+    -------
+    ex, ey, vx, vy, b, j, sbx, sby
+        Eccentricity [m], its rate [m/s], bodies of bushing and journal, and the bushing's centre relative to
+        the centre of mass of its body [m].
+    """
     joint = model.contacts.joint[k]
     b, j = model.arrays.joint_body[joint, 0], model.arrays.joint_body[joint, 1]
     sbx, sby = arm(cs, b, model.arrays.joint_point[joint, 0])
@@ -109,7 +119,7 @@ def eccentricity(model, k, q, v, cs):
 
 @kernel
 def add_contacts(model, surfaces, approach, q, v, scratch, out_rate):
-    """Add the contact forces of the clearance joints; sample them and note the rates of their integrals."""
+    """Add the contact forces of the clearance joints; set their samples and rates (j, JOINT_RATES)."""
     contacts = model.contacts
     for k in range(contacts.joint.shape[0]):
         ex, ey, vx, vy, b, j, sbx, sby = eccentricity(model, k, q, v, scratch.cs)
@@ -138,7 +148,7 @@ def add_contacts(model, surfaces, approach, q, v, scratch, out_rate):
 
 @kernel
 def assemble_schur(rows, arrays, jac, out_schur):
-    """phi_q M^-1 phi_q^T, lower triangle, from the pairs of rows that share a body."""
+    """Lower triangle of phi_q M^-1 phi_q^T (m, m), from the pairs of rows that share a body."""
     for i in range(out_schur.shape[0]):
         for j in range(rows.first[i], i + 1):
             out_schur[i, j] = 0.0
@@ -154,10 +164,10 @@ def assemble_schur(rows, arrays, jac, out_schur):
 
 @kernel
 def accelerate(model, surfaces, approach, polynomial, t, q, v, scratch, out_a, out_rate, out_drive_rate):
-    """Accelerations (n, 3) and multipliers at time t; the rates of all integrals beside.
+    """Accelerations (n, 3) and multipliers at time t [s], and the rates of the statistics' integrals.
 
-    ``approach`` (k,) holds the approach speed of each clearance joint that is in contact, 0 for the others.
-    Returns False where the closures are singular.
+    ``approach`` (k,) [m/s] contains the approach speed of each clearance joint in contact, 0 for the others.
+    Returns False if the closures are singular.
     """
     arrays, rows = model.arrays, model.rows
     rotations(q, scratch.cs)
@@ -182,7 +192,7 @@ def accelerate(model, surfaces, approach, polynomial, t, q, v, scratch, out_a, o
 
 @kernel
 def _right_hand_side(model, v, scratch):
-    """phi_q M^-1 Q - gamma', left in ``lam``."""
+    """Right-hand side phi_q M^-1 Q - gamma' (m,), stored in ``scratch.lam``."""
     alpha = model.baumgarte
     for r in range(scratch.lam.shape[0]):
         phi_dot = -scratch.drive[1] if r == model.rows.drive_row else 0.0
@@ -197,7 +207,7 @@ def _right_hand_side(model, v, scratch):
 
 @kernel
 def _accelerations(model, scratch, out_a):
-    """Accelerations M^-1 (Q - phi_q^T lambda)."""
+    """Accelerations M^-1 (Q - phi_q^T lambda), out_a (n, 3)."""
     inverse_mass = model.arrays.inverse_mass
     for i in range(out_a.shape[0]):
         for d in range(3):
@@ -211,9 +221,9 @@ def _accelerations(model, scratch, out_a):
 
 @kernel
 def _ideal_rates(model, q, v, torque, scratch, out_rate, out_drive_rate):
-    """Rates of the integrals of ideal joints and of the drive; power from outside counts with the drive's.
+    """Rates of the integrals of ideal joints and of the drive; the drive's power includes that of the loads.
 
-    ``torque`` [N m] is that of a drive that is no constraint.
+    ``torque`` [N m] is that of a controller or constant-torque drive.
     """
     for c in range(model.rows.closure.shape[0]):
         joint, r = model.rows.closure[c], model.rows.row[c]
@@ -233,7 +243,7 @@ def _ideal_rates(model, q, v, torque, scratch, out_rate, out_drive_rate):
 
 @entry
 def total_energy(model, surfaces, q, v, scratch):
-    """Kinetic and potential energy, that of gravity, springs and contacts [J]."""
+    """Kinetic energy plus the potential energy of gravity, springs and contacts [J]."""
     rotations(q, scratch.cs)
     energy = stored_energy(model.arrays, q, v, scratch.cs)
     for k in range(model.contacts.joint.shape[0]):

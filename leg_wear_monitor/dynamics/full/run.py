@@ -1,4 +1,4 @@
-"""The full-coordinate formulation as a run."""
+"""The full-coordinate formulation as a `Run`."""
 
 from copy import copy
 
@@ -17,24 +17,24 @@ from leg_wear_monitor.mechanism.position import assemble
 from leg_wear_monitor.mechanism.spec import SpeedDrive, TorqueDrive
 
 TOLERANCE_M = (
-    1.0e-10  # local error of a step in every coordinate [m, rad]; energy adds up to 1e-3 of the losses
+    1.0e-10  # local error of a step in every coordinate [m, rad]; the energy residual is 1e-3 of the losses
 )
-TOLERANCE_RATE = 1.0e4  # 1/s: the same for velocities, over the time a contact takes
+TOLERANCE_RATE = 1.0e4  # 1/s: ratio of the velocities' tolerance to it, the reciprocal duration of a contact
 
 
 class FullRun:
-    """Motion in full coordinates from the ideal start, journals centred (physics.md section 2).
+    """A leg in full coordinates that starts from its ideal motion, journals centred (physics.md section 2).
 
     Parameters
     ----------
     setup : Setup
     tolerance_m : float
-        Local error allowed in a step [m or rad]; that of velocities is 1e4 times it per second.
+        Local error allowed in a step [m or rad]; that of velocities is `TOLERANCE_RATE` times it per second.
 
     Attributes
     ----------
     state : FullState
-        All that a continuation needs, the surfaces aside.
+        Complete state, the surfaces aside.
     """
 
     def __init__(self, setup: Setup, tolerance_m: float = TOLERANCE_M) -> None:
@@ -48,7 +48,7 @@ class FullRun:
         sectors = setup.surfaces.depth.shape[2]
         self._tolerances = tolerance_m, tolerance_m * TOLERANCE_RATE
         self._work = full_work(self.model, *self._tolerances, sectors)
-        self.advance(0.0, new_run_statistics(0))  # evaluates the start, so that it can be sampled
+        self.advance(0.0, new_run_statistics(0))  # evaluates the initial state for `sample`
 
     @property
     def time(self) -> float:
@@ -72,17 +72,17 @@ class FullRun:
 
     @property
     def stored_energy(self) -> float:
-        """Kinetic and potential energy, that of gravity, springs and contacts [J]."""
+        """Kinetic energy plus the potential energy of gravity, springs and contacts [J]."""
         energy = total_energy(self.model, self._setup.surfaces, self.q, self.v, self._work.scratch)
         return float(energy)
 
     def advance(self, t_end: float, statistics: RunStatistics) -> None:
-        """Go on to a time [s] and add to run statistics.
+        """Advance to a time [s] and add to run statistics.
 
         Raises
         ------
         SimulationError
-            Naming the joint, the time and what to try.
+            If the motion diverges; names the joint, the time and what to try.
         """
         status, k = advance_full(
             self.model,
@@ -98,7 +98,7 @@ class FullRun:
             raise stop(self._setup, status, k, self.time)
 
     def branch(self) -> "FullRun":
-        """A run of its own that goes on from here; this one stays as it is."""
+        """An independent copy of the run in its present state."""
         run = copy(self)
         surfaces = self._setup.surfaces._replace(depth=self._setup.surfaces.depth.copy())
         run._setup = attrs.evolve(self._setup, surfaces=surfaces)
@@ -107,11 +107,11 @@ class FullRun:
         return run
 
     def sample_at(self, _t: float) -> Sample:
-        """The leg as it is now: this formulation goes to any time."""
+        """The present state of the leg: this formulation can be advanced to any time."""
         return self.sample()
 
     def sample(self) -> Sample:
-        """The leg as it is now."""
+        """The present state of the leg."""
         crank_angle = float(self.q[self.model.arrays.drive_body, 2])
         toe = None
         if self.toe.body >= 0:
@@ -122,7 +122,7 @@ class FullRun:
 
 
 def _start(setup: Setup) -> FullState:
-    """The ideal motion at crank angle 0; under a constant torque, at the assembly's angle."""
+    """Initial state: the ideal motion at crank angle 0, or at the assembly's angle for a constant torque."""
     linkage = setup.linkage
     if not isinstance(linkage.mechanism.drive, TorqueDrive):
         motion = ideal_motion(linkage, [0.0], setup.speed)

@@ -1,1 +1,1 @@
-"""One clearance joint: its contact force and its contact events, for both formulations."""
+"""Contact force and contact events of a clearance joint, for both formulations."""

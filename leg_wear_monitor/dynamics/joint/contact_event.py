@@ -1,27 +1,29 @@
-"""Contacts that begin and end inside a step, found on the cubic of the penetration through its ends.
+"""Contact events: begin and end of contact inside a step, on the penetration's cubic Hermite interpolant.
 
-Both formulations hand over the clearance joints as rows of `SAMPLE` columns at a step's start and end.
+The kernels take samples (k, SAMPLE) of the clearance joints at the start and at the end of a step.
+The contact begins where the penetration of physics.md section 3 becomes positive.
 """
 
 from leg_wear_monitor.dynamics.run.dormand_prince import hermite
 from leg_wear_monitor.dynamics.run.run_statistics import begin_impact, end_impact, parabola_peak, raise_peak
 from leg_wear_monitor.kernel import kernel
 
-# a sample of a clearance joint: eccentricity [m] and its rate, normal force [N], penetration [m] and its rate
+# columns of a sample: eccentricity [m], its rate [m/s], normal force [N], penetration [m], its rate [m/s]
 EX, EY, VX, VY, F_N, DELTA, DELTA_DOT = 0, 1, 2, 3, 4, 5, 6
 SAMPLE = 7
 
 CONTACT_EVENT = 1.0e-11  # penetration [m] at which a contact counts as just begun
 NEVER = 2.0
 
-_CLOSE = 1.0e-14  # fraction of a step to which a crossing is found
+_CLOSE = 1.0e-14  # tolerance of a crossing, as a fraction of the step
 
 
 @kernel
 def _crossing(low, high, rising, h, k, start, end):
-    """Share of a step between low and high at which the penetration of joint k changes sign.
+    """Fraction of a step, between low and high, at which the penetration of joint k changes sign.
 
-    Newton's iteration, and bisection where that would leave what is known to hold the place.
+    Newton's iteration, with bisection where Newton's step leaves the bracket. h is the length of the step
+    [s].
     """
     u = 0.5 * (low + high)
     for _ in range(48):
@@ -40,16 +42,16 @@ def _crossing(low, high, rising, h, k, start, end):
 
 @kernel
 def _delta_at(u, h, k, start, end):
-    """Penetration [m] of joint k at the share u of a step."""
+    """Penetration [m] of joint k at the fraction u of a step of length h [s]."""
     return hermite(u, h, start[k, DELTA], start[k, DELTA_DOT], end[k, DELTA], end[k, DELTA_DOT])[0]
 
 
 @kernel
 def first_contact_event(approach, h, start, end):
-    """Share of a step after which the first of the open joints touches; NEVER if none does.
+    """Fraction of a step after which the first open joint comes into contact; NEVER if none does.
 
-    ``approach`` (k,) is 0 for open joints; ``start`` and ``end`` (k, columns) are samples. The middle of
-    the step is looked at too, for a touch and parting inside it.
+    ``approach`` (k,) [m/s] is 0 for open joints; ``start`` and ``end`` (k, SAMPLE) are samples. The middle of
+    the step is checked too, for a contact that begins and ends inside the step.
     """
     earliest = NEVER
     for k in range(approach.shape[0]):
@@ -63,7 +65,10 @@ def first_contact_event(approach, h, start, end):
 
 @kernel
 def begin_contact(k, joint, speed_floor, t, rate, approach, recent, impact, impacts):
-    """Contact begins in clearance joint k at time t [s] with the penetration growing at a rate [m/s]."""
+    """Begin a contact in clearance joint k at time t [s]; ``rate`` [m/s] is that of the penetration.
+
+    Changes approach (k,) [m/s], recent (k, 4) [s, N, s, N], and the run statistics' impact and impacts.
+    """
     approach[k] = max(rate, speed_floor[k])
     begin_impact(impact, impacts, joint[k], t, rate)
     recent[k, 0], recent[k, 1], recent[k, 2], recent[k, 3] = t, 0.0, t, 0.0
@@ -71,16 +76,16 @@ def begin_contact(k, joint, speed_floor, t, rate, approach, recent, impact, impa
 
 @kernel
 def update_contacts(joint, speed_floor, t, h, start, end, approach, recent, peak, impact, impacts):
-    """After a step from t to t + h: contacts that begin or end, and the peaks of those that go on.
+    """Process the contacts after a step from t to t + h [s]: beginnings, ends, and force peaks.
 
-    Changes approach (k,) and recent (k, 4), the last two samples of time and normal force of each joint,
-    and the run statistics' peak, impact and impacts. Returns whether a contact began or ended.
+    Changes approach (k,) [m/s] and recent (k, 4), the last two samples of time [s] and normal force [N] of
+    each joint, and the run statistics' peak, impact and impacts. Returns whether a contact began or ended.
     """
     changed = False
     for k in range(approach.shape[0]):
         rate, force = end[k, DELTA_DOT], end[k, F_N]
         if approach[k] == 0.0:
-            # a worn profile can close in on a journal that does not move towards it
+            # a rotating worn profile can come into contact with a journal that does not approach it
             nearer = rate > 0.0 or end[k, DELTA] > start[k, DELTA]
             if end[k, DELTA] >= -CONTACT_EVENT and nearer:
                 begin_contact(k, joint, speed_floor, t + h, rate, approach, recent, impact, impacts)
@@ -100,7 +105,7 @@ def update_contacts(joint, speed_floor, t, h, start, end, approach, recent, peak
 
 @kernel
 def pushed_through(bushing_radius, sample):
-    """First clearance joint whose journal is pushed further than a tenth of the bushing's radius, else -1."""
+    """First clearance joint with a penetration of more than a tenth of the bushing's radius, else -1."""
     for k in range(sample.shape[0]):
         if not sample[k, DELTA] < 0.1 * bushing_radius[k]:
             return k

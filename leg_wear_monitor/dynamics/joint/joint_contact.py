@@ -1,7 +1,4 @@
-"""One clearance joint, from eccentricity to force: the law that both formulations share.
-
-physics.md sections 3 to 6.
-"""
+"""Contact force of a clearance joint, for both formulations (physics.md sections 3 to 6)."""
 
 import math
 
@@ -14,13 +11,18 @@ from leg_wear_monitor.wear.surfaces import deposit_wear, local_surfaces
 
 @kernel
 def penetration(contacts, surfaces, k, ex, ey, direction, angle_b, angle_j):
-    """Penetration [m], normal and local radii of bushing and journal [m] of clearance joint k.
+    """Penetration, contact normal and local radii of clearance joint k.
 
-    ``direction`` [rad] is that of the eccentricity, and only asked for where wear feeds back. Last come the
-    fractions of the penetration's rate that the turning of bushing and journal make, by their speeds [m/rad].
-    The normal is a unit vector on fresh surfaces, see `worn_contact` for worn ones: the normal force times
-    it is the gradient of the contact's energy, to which the local radii add that change from place to place.
+    ``direction`` [rad] is that of the eccentricity (ex, ey) [m]; it is used only with wear feedback. The
+    normal is a unit vector on fresh surfaces, see `worn_contact` for worn ones: the normal force times the
+    normal is the gradient of the contact's energy, including the change of the local radii with direction.
     physics.md section 3.
+
+    Returns
+    -------
+    delta, nx, ny, bushing, journal, cam_b, cam_j
+        Penetration [m], normal, local radii [m], and the derivatives of the penetration by the rotation of
+        bushing and journal [m/rad].
     """
     bushing, journal, slope_b, slope_j, bend_b, bend_j = local_surfaces(
         contacts, surfaces, k, direction, angle_b, angle_j
@@ -43,26 +45,27 @@ def penetration(contacts, surfaces, k, ex, ey, direction, angle_b, angle_j):
 
 @kernel
 def coefficient_at(contacts, k, bushing, journal):
-    """Coefficient of the normal law of clearance joint k at the local radii [m]; physics.md section 4."""
+    """Coefficient of the normal law of clearance joint k for local radii [m]; physics.md section 4."""
     form, given = contacts.normal_form[k], contacts.stiffness[k]
     return law_coefficient(form, given, contacts.modulus[k], contacts.width[k], bushing, journal)
 
 
 @kernel
 def joint_force(contacts, surfaces, k, ex, ey, vx, vy, angle_b, angle_j, speed_b, speed_j, approach_speed):
-    """Forces in clearance joint k; none while its ``approach_speed`` is 0, which marks it as open.
+    """Forces in clearance joint k; 0 for an open joint, whose ``approach_speed`` [m/s] is 0.
 
     Eccentricity (ex, ey) [m] and its rate [m/s]; angles [rad] and speeds [rad/s] of the bushing's and the
     journal's body. Both forces act at the bushing's surface point P_b + R_b n, so action equals reaction
-    in moments too; the slip is that of the two bodies there. A worn bushing that turns lifts the journal
-    like a cam, by the couple ``moment`` between the bodies. The work of all is F_N delta_dot and F_t v_t
-    exactly. physics.md sections 3 and 4.
+    in moments too; the slip is that of the two bodies at this point. A rotating worn bushing lifts the
+    journal like a cam, by the couple ``moment`` between the bodies. The work of these forces is exactly F_N
+    delta_dot and F_t v_t. physics.md sections 3 and 4.
 
     Returns
     -------
     f_n, f_t, delta, delta_dot, slip, nx, ny, elastic, moment
-        The force on the journal is -f_n n + f_t t with t = (-n_y, n_x), the couple on it ``moment`` [N m];
-        ``elastic`` [N] is the part of f_n that stores energy.
+        The force on the journal is -f_n n + f_t t [N] with t = (-n_y, n_x), the couple on it ``moment``
+        [N m]; penetration [m], its rate [m/s], slip speed [m/s]; ``elastic`` [N] is the part of f_n that
+        stores energy.
     """
     direction = math.atan2(ey, ex) if surfaces.feeds_back else 0.0
     delta, nx, ny, bushing, journal, slope_b, slope_j = penetration(
@@ -84,7 +87,7 @@ def joint_force(contacts, surfaces, k, ex, ey, vx, vy, angle_b, angle_j, speed_b
 
 @kernel
 def contact_energy(contacts, surfaces, k, ex, ey, angle_b, angle_j):
-    """Elastic energy [J] in clearance joint k; physics.md section 3."""
+    """Elastic energy [J] of the contact in clearance joint k; physics.md section 3."""
     direction = math.atan2(ey, ex) if surfaces.feeds_back else 0.0
     delta, _, _, bushing, journal, _, _ = penetration(
         contacts, surfaces, k, ex, ey, direction, angle_b, angle_j
@@ -95,10 +98,11 @@ def contact_energy(contacts, surfaces, k, ex, ey, angle_b, angle_j):
 
 @kernel
 def wear_joint(contacts, surfaces, k, ex, ey, angle_b, angle_j, acted, integral, out_weight):
-    """Wear clearance joint k by the increment ``integral`` of F_N |v_t| dt [J]; returns the lost energy [J].
+    """Deposit the wear of an increment ``integral`` of F_N |v_t| dt [J]; returns the lost energy [J].
 
-    The journal is at (ex, ey) [m], and the wall that goes from under it takes what it stored along.
-    ``acted`` is where the increment acted: eccentricity [m], and angles of bushing and journal [rad].
+    The lost energy is the elastic energy of the contact that disappears with the removed material, for the
+    journal's present eccentricity (ex, ey) [m]. ``acted`` is the position at which the increment acted:
+    eccentricity [m, m], angles of bushing and journal [rad, rad]. physics.md sections 5 and 6.
     """
     stored = 0.0
     if surfaces.feeds_back:

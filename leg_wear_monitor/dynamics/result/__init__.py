@@ -1,1 +1,1 @@
-"""What a simulation found: classes, how they come from run statistics, and how they go out."""
+"""Results of a simulation: classes, their computation from run statistics, JSON and tables."""

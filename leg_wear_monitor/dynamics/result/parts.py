@@ -1,4 +1,4 @@
-"""Parts of what a simulation found; units are in the names, SI throughout."""
+"""Parts of a simulation's result, in SI units."""
 
 import attrs
 
@@ -13,7 +13,7 @@ class TorqueResult:
     ----------
     mean, rms, min, max : float
     p99 : float
-        99 % of the time the signed torque is below this.
+        99th percentile of the signed torque over time.
     max_abs : float
         Largest magnitude.
     max_error : float
@@ -31,7 +31,7 @@ class TorqueResult:
 
 @attrs.frozen
 class EnergyBalance:
-    """Where the work went [J].
+    """Energy balance over the counted cycles [J].
 
     Attributes
     ----------
@@ -40,12 +40,12 @@ class EnergyBalance:
     stored : float
         Change of kinetic and potential energy.
     friction_loss, contact_loss : float
-        Loss in the tangential and in the normal direction of the contacts.
+        Energy lost in the tangential and in the normal direction of the contacts.
     wear_loss : float
-        What contacts had stored in walls that wore away: next to nothing at the pace of real wear, a
-        thousandth of the losses where clearances double in some thousand cycles.
+        Elastic contact energy lost with removed material: negligible at real wear rates, a thousandth of the
+        losses if clearances double within some thousand cycles.
     residual : float
-        What does not add up: an error of integration.
+        Work minus stored energy and losses: the integration error.
     """
 
     work_in: float
@@ -74,7 +74,7 @@ class ToeResult:
 
 @attrs.frozen
 class WearDepth:
-    """Depth [m] that both surfaces of a joint lose a cycle: deepest sector and mean of all."""
+    """Wear depth per cycle of both surfaces of a joint [m]: deepest sector and mean over all sectors."""
 
     bushing_max: float
     bushing_mean: float
@@ -92,7 +92,7 @@ class ClearanceResult:
 
 @attrs.frozen
 class JointResult:
-    """Forces in a joint and, if it has clearance, its contact and its wear; None without clearance.
+    """Forces in a joint; for a clearance joint also contact and wear, which are None otherwise.
 
     Attributes
     ----------
@@ -101,13 +101,13 @@ class JointResult:
     contact_fraction : float or None
         Fraction of the time in contact, 0 to 1.
     friction_work_j_per_cycle : float or None
-        Work that friction takes [J a cycle].
+        Friction work per cycle [J].
     archard_integral_j_per_cycle : float or None
-        Integral of F_N |v_t| dt [J a cycle]: times a wear coefficient [1/Pa] the worn volume [m³].
+        Integral of F_N |v_t| dt per cycle [J]; times a wear coefficient [1/Pa] it is the worn volume [m³].
     wear_depth_m_per_cycle : WearDepth or None
     wear_zone_deg : tuple of two floats or None
-        From, to [deg]: the narrowest zone with 90 % of the bushing's wear, in angles of its own body; None
-        without wear.
+        Narrowest zone (from, to) [deg] with 90 % of the bushing's wear, in the frame of the bushing's body;
+        None without wear.
     clearance_m : ClearanceResult or None
     """
 
@@ -124,7 +124,7 @@ class JointResult:
 
     @property
     def has_clearance(self) -> bool:
-        """Whether contact and wear are known."""
+        """Whether the joint has clearance, and therefore contact and wear."""
         return self.clearance_m is not None
 
 
@@ -139,7 +139,7 @@ class Impact:
     speed_mps : float
         Approach speed [m/s].
     end_s : float or None
-        None for a contact that still lasts.
+        None for a contact that lasts beyond the end.
     peak_n : float
         Largest normal force [N].
     """
@@ -152,12 +152,12 @@ class Impact:
 
 @attrs.frozen(eq=False)
 class Trace:
-    """Samples at equal times, n of them.
+    """n samples at equal time steps.
 
     Attributes
     ----------
     crank_angle_rad : (n,) array
-        Counts on over the turns.
+        Continuous over the turns.
     toe_x_m, toe_y_m : (n,) array or None
         None for a mechanism without a point called ``toe``.
     drive_torque_nm : (n,) array

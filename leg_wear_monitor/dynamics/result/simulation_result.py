@@ -1,4 +1,4 @@
-"""What a simulation found, and how it goes out: as JSON and as tables."""
+"""The result of a simulation, with its conversion to JSON and to tables."""
 
 from typing import TYPE_CHECKING, Any
 
@@ -21,33 +21,33 @@ if TYPE_CHECKING:
     import pandas as pd
 
 SCHEMA_VERSION = 1
-"""Of the JSON; counts up when a field is renamed, removed or means something else."""
+"""Version of the JSON schema; incremented when a field is renamed, removed or changes its meaning."""
 
 
 @attrs.frozen(eq=False)
 class SimulationResult:
-    """What `simulate` found over the counted cycles.
+    """Result of `simulate` over the counted cycles.
 
     Attributes
     ----------
     mechanism, model : str
     speed_rpm : float
-        Mean speed of the crank, negative for clockwise.
+        Mean crank speed, negative for clockwise.
     cycles : float
-        Gait cycles counted.
+        Number of counted gait cycles.
     simulated_s : float
-        Time simulated [s], with the cycles skipped.
+        Simulated time [s], skipped cycles included.
     drive_torque_nm : TorqueResult
     energy_j : EnergyBalance or None
         None for an ideal leg and for a leg of a batch.
     toe : ToeResult or None
         None without a point called ``toe`` or without an ideal motion to compare with.
     joints : dict of str to JointResult
-        Every joint, those without clearance too.
+        All joints, ideal ones included.
     impacts : dict of str to tuple of Impact
-        The first thousand of each clearance joint.
+        The first thousand impacts of each clearance joint.
     trace : Trace or None
-        None unless it was asked for.
+        None if no trace was requested.
     clearance_joints : tuple of str
     surfaces : Surfaces or None
         Worn surfaces at the end, in the order of ``clearance_joints``; None for an ideal leg.
@@ -68,7 +68,7 @@ class SimulationResult:
     surfaces: Surfaces | None = None
 
     def to_dict(self) -> dict[str, Any]:
-        """Plain object: what ``simulate --json`` writes, but for the clock's values."""
+        """Plain object with the fields of ``simulate --json``, except the computing times."""
         record = {
             "schema_version": SCHEMA_VERSION,
             "mechanism": self.mechanism,
@@ -85,9 +85,9 @@ class SimulationResult:
         return record if self.trace is None else {**record, "trace": trace_document(self.trace)}
 
     def to_pandas(self) -> "dict[str, pd.DataFrame]":
-        """Tables ``joints``, ``impacts`` and, if there is a trace, ``trace``; this needs pandas.
+        """Tables ``joints``, ``impacts`` and, if there is a trace, ``trace``; requires pandas.
 
-        Columns are named as the fields are, parts of a field after a dot: ``clearance_m.mean``.
+        Columns have the names of the fields, parts of a field after a dot: ``clearance_m.mean``.
 
         Raises
         ------

@@ -1,4 +1,4 @@
-"""Parts of a simulation's result, from run statistics."""
+"""Computation of a simulation's result from run statistics."""
 
 import attrs
 import numpy as np
@@ -35,7 +35,7 @@ from leg_wear_monitor.wear.surfaces import BUSHING, JOURNAL, wear_zone
 
 
 def drive_torque(statistics: RunStatistics) -> TorqueResult:
-    """Drive torque of the time counted."""
+    """Drive torque over the counted time."""
     mean, square = statistics.drive_integral[[TORQUE, TORQUE_SQUARED]] / statistics.time[0]
     return TorqueResult(
         mean=float(mean),
@@ -49,12 +49,12 @@ def drive_torque(statistics: RunStatistics) -> TorqueResult:
 
 
 def toe_errors(statistics: RunStatistics) -> ToeResult:
-    """Largest deviations of the toe."""
+    """Largest deviations of the toe from the ideal linkage."""
     return ToeResult(*(float(value) for value in statistics.response[:3]))
 
 
 def energy_balance(statistics: RunStatistics, stored_before: float, stored_after: float) -> EnergyBalance:
-    """Energy of the time counted, from the stored energy [J] before and after it."""
+    """Energy balance over the counted time, from the stored energy [J] at its begin and end."""
     work = float(statistics.drive_integral[POWER])
     friction, contact = (float(statistics.integral[:, i].sum()) for i in (FRICTION, DISSIPATION))
     wear = float(statistics.worn_energy[0])
@@ -72,7 +72,7 @@ def energy_balance(statistics: RunStatistics, stored_before: float, stored_after
 def joint_statistics(
     setup: Setup, statistics: RunStatistics, worn: Floats, cycles: float
 ) -> dict[str, JointResult]:
-    """Forces in every joint, contact and wear of clearance joints; worn (k, 2, N) while counted [m]."""
+    """Results of all joints by name; ``worn`` (k, 2, N) [m] is the wear depth of the counted cycles."""
     return {
         name: _joint(setup, statistics, joint, worn, cycles)
         for joint, name in enumerate(setup.linkage.mechanism.joints)
@@ -128,7 +128,7 @@ def first_impacts(setup: Setup, statistics: RunStatistics) -> dict[str, tuple[Im
 
 
 def trace_of(setup: Setup, samples: list[Sample]) -> Trace:
-    """Samples as columns; the crank angle counts on from its value in the first turn."""
+    """Trace from samples; the crank angle is continuous and starts in [0, 2 pi)."""
     angles = np.array([sample.crank_angle for sample in samples])
     forces = np.array([sample.force for sample in samples])
     toe = None if samples[0].toe is None else np.array([sample.toe for sample in samples])

@@ -1,4 +1,4 @@
-"""A simulation's result as columns of tables: a value's name is its path, parts after a dot."""
+"""Tables of a simulation's result; a column's name is the path of the value, joined by dots."""
 
 from collections.abc import Mapping, Sequence
 from typing import Any
@@ -18,13 +18,13 @@ _PARTS = {
 
 
 def joint_columns(joints: Mapping[str, JointResult]) -> Columns:
-    """One row a joint; None for contact and wear of joints without clearance."""
+    """Columns with a row for each joint; None for contact and wear of joints without clearance."""
     rows = [{"joint": name, **_cells(joint)} for name, joint in joints.items()]
     return {name: [row[name] for row in rows] for name in rows[0]}
 
 
 def impact_columns(impacts: Mapping[str, Sequence[Impact]]) -> Columns:
-    """One row an impact, joint by joint."""
+    """Columns with a row for each impact, joint by joint."""
     rows = [(name, impact) for name, all_ in impacts.items() for impact in all_]
     columns: Columns = {"joint": [name for name, _ in rows]}
     for field in attrs.fields(Impact):
@@ -33,7 +33,7 @@ def impact_columns(impacts: Mapping[str, Sequence[Impact]]) -> Columns:
 
 
 def trace_columns(trace: Trace) -> Columns:
-    """One row a sample."""
+    """Columns with a row for each sample."""
     toe = {"toe_x_m": trace.toe_x_m, "toe_y_m": trace.toe_y_m}
     return {
         "crank_angle_rad": trace.crank_angle_rad,

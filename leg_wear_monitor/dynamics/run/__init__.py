@@ -1,1 +1,1 @@
-"""What every run needs: drive, run statistics, integrator formulas, the Run protocol."""
+"""Common parts of all runs: drive, run statistics, numerical methods, the Run protocol."""

@@ -7,10 +7,10 @@ from leg_wear_monitor.kernel import kernel
 
 @kernel
 def factorise(first, matrix):
-    """Cholesky factor L of the lower triangle, in place.
+    """Cholesky factor L of a matrix (m, m), in place in its lower triangle.
 
-    ``first`` (m,) is the first column of each row's envelope. The diagonal holds 1 / L_ii afterwards.
-    Returns False where the matrix is not positive definite.
+    ``first`` (m,) is the first column of each row's envelope. The diagonal then contains 1 / L_ii.
+    Returns False if the matrix is not positive definite.
     """
     for i in range(matrix.shape[0]):
         for j in range(first[i], i):
@@ -29,7 +29,7 @@ def factorise(first, matrix):
 
 @kernel
 def substitute(first, factor, out_x):
-    """Solve L L^T x = b in place, with the factor that `factorise` left."""
+    """Solve L L^T x = b (m,) in place, with the factor (m, m) of `factorise`."""
     m = factor.shape[0]
     for i in range(m):
         total = out_x[i]

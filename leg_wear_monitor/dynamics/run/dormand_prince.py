@@ -21,13 +21,13 @@ TABLEAU = np.array(
     ]
 )
 WEIGHTS = np.array([35 / 384, 0.0, 500 / 1113, 125 / 192, -2187 / 6784, 11 / 84, 0.0])
-# fifth-order less fourth-order solution
+# fifth-order minus fourth-order solution
 ERROR = np.array([71 / 57600, 0.0, -71 / 16695, 71 / 1920, -17253 / 339200, 22 / 525, -1 / 40])
 
 
 @kernel
 def stage_state(stage, h, y, k, out_y):
-    """State at a stage: y + h sum_i a_si k_i; y and out_y (d,), k (7, d)."""
+    """State at a stage: y + h sum_i a_si k_i; y and out_y (d,), slopes k (7, d), step h [s]."""
     for i in range(y.shape[0]):
         total = 0.0
         for s in range(stage):
@@ -37,7 +37,7 @@ def stage_state(stage, h, y, k, out_y):
 
 @kernel
 def error_norm(h, k, scale):
-    """Largest component of the local error over its scale (d,); infinite where something is not finite."""
+    """Largest component of the local error over its scale (d,) [-]; infinite if a component is not finite."""
     worst = 0.0
     for i in range(k.shape[1]):
         total = 0.0
@@ -52,7 +52,7 @@ def error_norm(h, k, scale):
 
 @kernel
 def next_step(h, error, growth):
-    """Step length after a local error, 1 being what is allowed; at most ``growth`` times longer."""
+    """Next step length [s] after a local error relative to the tolerance; at most ``growth`` times h."""
     if not error < 1.0e12:
         return 0.1 * h
     return h * min(growth, max(0.2, 0.9 * max(error, 1.0e-10) ** -0.2))
@@ -60,7 +60,7 @@ def next_step(h, error, growth):
 
 @kernel
 def hermite(u, h, y0, v0, y1, v1):
-    """Cubic through value and rate at both ends of a step, at the share u of it; and its rate."""
+    """Value and rate of the cubic Hermite interpolant at the fraction u of a step h [s], from both ends."""
     u2, u3 = u * u, u * u * u
     value = (
         (2 * u3 - 3 * u2 + 1) * y0 + (u3 - 2 * u2 + u) * h * v0 + (3 * u2 - 2 * u3) * y1 + (u3 - u2) * h * v1

@@ -1,4 +1,4 @@
-"""The crank's motion as a polynomial in time: what a steady drive, a ripple or a tracker hands over."""
+"""The crank's motion as a polynomial in time, for a steady drive, a ripple or a tracked crank."""
 
 import numpy as np
 
@@ -9,19 +9,24 @@ DEGREE = 5
 
 
 def steady_drive(angle: float, speed: float, since: float = 0.0) -> Floats:
-    """Polynomial (7,) of a crank that turns at a constant speed: reference time, then six coefficients.
+    """Polynomial of a crank with constant speed.
 
     Parameters
     ----------
     angle, speed : float
-        At time ``since`` [rad, rad/s].
+        Crank angle [rad] and speed [rad/s] at time ``since`` [s].
+
+    Returns
+    -------
+    (7,) array
+        Reference time [s], then six coefficients [rad/s^i] by ascending power.
     """
     return np.array([since, angle, speed, 0.0, 0.0, 0.0, 0.0])
 
 
 @kernel
 def drive_at(polynomial, t, out_drive):
-    """Angle [rad], speed [rad/s] and acceleration [rad/s^2] of the crank at time t."""
+    """Angle [rad], speed [rad/s] and acceleration [rad/s^2] (3,) of the crank at time t [s]."""
     tau = t - polynomial[0]
     angle, speed, acceleration = 0.0, 0.0, 0.0
     for i in range(DEGREE, -1, -1):

@@ -1,4 +1,4 @@
-"""What a simulation needs of a formulation, and what it is told."""
+"""Interface between a simulation and a formulation: setup, status codes, samples."""
 
 from typing import NamedTuple, Protocol
 
@@ -28,7 +28,7 @@ _REASONS = {
 
 @attrs.frozen(eq=False)
 class Setup:
-    """A leg ready to run.
+    """A leg prepared for a run.
 
     Attributes
     ----------
@@ -37,9 +37,9 @@ class Setup:
         Names of the clearance joints, in the order of ``contacts``.
     contacts : ContactArrays
     surfaces : Surfaces
-        Changed as the run goes.
+        Worn surfaces; the run changes them.
     speed : float
-        Of the crank at the start [rad/s].
+        Initial crank speed [rad/s].
     """
 
     linkage: Linkage
@@ -59,7 +59,7 @@ class Sample(NamedTuple):
 
 
 class Run(Protocol):
-    """A formulation of the leg's motion, somewhere in time."""
+    """A run of a leg in some formulation."""
 
     @property
     def time(self) -> float:
@@ -67,17 +67,17 @@ class Run(Protocol):
 
     @property
     def stored_energy(self) -> float:
-        """Kinetic and potential energy, that of gravity, springs and contacts [J]."""
+        """Kinetic energy plus the potential energy of gravity, springs and contacts [J]."""
 
     def advance(self, t_end: float, statistics: RunStatistics) -> None:
-        """Go on to a time [s] and add to run statistics; raises SimulationError where the motion diverges."""
+        """Advance to a time [s] and add to run statistics; raises SimulationError if the motion diverges."""
 
     def sample(self) -> Sample:
-        """The leg as it is now."""
+        """The present state of the leg."""
 
 
 def stop(setup: Setup, status: int, k: int, time: float) -> SimulationError:
-    """Error of a run that had to stop: clearance joint k (-1 if none) at a time [s]."""
+    """Error for a run that stopped with a status, in clearance joint k (-1 if none), at a time [s]."""
     where = f"joint {setup.clearance_joints[k]} " if k >= 0 else ""
     return SimulationError(
         f"{setup.linkage.mechanism.source}: {where}at t = {time:.6g} s: {_REASONS[status]}"

@@ -1,7 +1,7 @@
-"""What a run adds up: integrals, extremes, distributions and impacts of every joint and of the drive.
+"""Run statistics: integrals, extremes, distributions and impacts of every joint and of the drive.
 
-Memory does not grow with the run: a distribution is a histogram over time, and impacts beyond the first
-thousand are only counted.
+Memory does not grow with the length of the run: a distribution is a histogram of time, and impacts after the
+first thousand are only counted.
 """
 
 import math
@@ -25,20 +25,21 @@ IMPACTS = 1000
 # largest deviations from the ideal linkage: toe [m, m/s, m/s^2], drive torque [N m]
 POSITION, VELOCITY, ACCELERATION, TORQUE_ERROR = 0, 1, 2, 3
 
-# of a distribution: 128 bins an octave, at most 0.8 % wide, from 2^-20 to 2^30
+# bins of a histogram: 128 per octave, at most 0.8 % wide, from 2^-20 to 2^30
 _FIRST_OCTAVE, _OCTAVES, _IN_OCTAVE = -20, 50, 128
 _BINS = _OCTAVES * _IN_OCTAVE
 
 
 class RunStatistics(NamedTuple):
-    """Sums over counted time, for j joints and the drive.
+    """Statistics over the counted time, for j joints and the drive.
 
-    ``time`` (1,) counted [s]; ``integral`` (j, 6); ``drive_integral`` (3,); ``peak`` (j,) largest force;
-    ``drive_range`` (2,) least and largest torque; ``force_time`` (j, bins) and ``torque_time`` (2, bins)
-    seconds spent at each magnitude, the torque's by sign; ``impact`` (j, 1000, 4); ``impacts`` (j,) their
-    number; ``response`` (4,) largest deviation of the toe's position, velocity and acceleration and of the
-    drive torque from the ideal linkage; ``worn_energy`` (1,) elastic energy of the contacts that went with
-    the walls that wore away [J]; ``steps`` (2,) tried and taken.
+    ``time`` (1,) [s]: counted time; ``integral`` (j, 6), ``drive_integral`` (3,): columns and units above;
+    ``peak`` (j,) [N]: largest force; ``drive_range`` (2,) [N m]: least and largest torque;
+    ``force_time`` (j, bins), ``torque_time`` (2, bins) [s]: time at each magnitude, of negative and positive
+    torque; ``impact`` (j, 1000, 4): columns above; ``impacts`` (j,): number of impacts;
+    ``response`` (4,) [m, m/s, m/s^2, N m]: largest deviations from the ideal linkage, of the toe and of the
+    drive torque; ``worn_energy`` (1,) [J]: elastic contact energy lost with removed material;
+    ``steps`` (2,): number of trial steps and of accepted steps.
     """
 
     time: Floats
@@ -56,7 +57,7 @@ class RunStatistics(NamedTuple):
 
 
 def new_run_statistics(joints: int) -> RunStatistics:
-    """Run statistics of no time."""
+    """Empty run statistics."""
     return RunStatistics(
         time=np.zeros(1),
         integral=np.zeros((joints, JOINT_RATES)),
@@ -75,7 +76,7 @@ def new_run_statistics(joints: int) -> RunStatistics:
 
 @kernel
 def bin_of(magnitude):
-    """Bin of a magnitude, by its binary exponent and mantissa."""
+    """Index of a magnitude's bin, from its binary exponent and mantissa."""
     if not magnitude > 2.0**_FIRST_OCTAVE:
         return 0
     mantissa, exponent = math.frexp(magnitude)
@@ -84,19 +85,25 @@ def bin_of(magnitude):
 
 
 def bin_edge(i: float) -> float:
-    """Magnitude at the lower edge of bin i; within a bin, at its share."""
+    """Magnitude at the lower edge of bin i; for a fractional i, inside the bin."""
     octave, inside = divmod(i, _IN_OCTAVE)
     return float(2.0 ** (octave + _FIRST_OCTAVE) * (1.0 + inside / _IN_OCTAVE))
 
 
 def percentile(seconds: Floats, fraction: float) -> float:
-    """Magnitude below which a fraction of the time was spent, to the width of a bin (at most 0.8 %).
+    """Percentile of a histogram: the magnitude below which a fraction of the time was spent.
 
     Parameters
     ----------
     seconds : (bins,) array
+        Time in each bin [s].
     fraction : float
         In [0, 1].
+
+    Returns
+    -------
+    float
+        Exact to the width of a bin, at most 0.8 %; 0 for an empty histogram.
     """
     reached = np.cumsum(seconds)
     if not reached[-1] > 0.0:
@@ -108,7 +115,7 @@ def percentile(seconds: Floats, fraction: float) -> float:
 
 
 def signed_percentile(seconds: Floats, fraction: float) -> float:
-    """As `percentile`, for a signed quantity: seconds (2, bins) at negative and at positive values."""
+    """As `percentile`, for a signed quantity: time (2, bins) [s] at negative and at positive values."""
     below, total = seconds[0].sum(), seconds.sum()
     if not total > 0.0:
         return 0.0
@@ -145,7 +152,7 @@ def add_step(statistics, h, weights, rates, drive_rates):
 
 @kernel
 def begin_impact(impact, impacts, joint, t, speed):
-    """Note that contact began in a joint at time t [s] with an approach speed [m/s]."""
+    """Record that contact began in a joint at time t [s] with an approach speed [m/s]."""
     i = impacts[joint]
     impacts[joint] += 1
     if i < IMPACTS:
@@ -155,7 +162,7 @@ def begin_impact(impact, impacts, joint, t, speed):
 
 @kernel
 def raise_peak(peak, impact, impacts, joint, force):
-    """The normal force of the contact that goes on in a joint has reached a value [N]."""
+    """Update the peak of a joint, and of its present contact, by a normal force [N]."""
     i = impacts[joint] - 1
     peak[joint] = max(peak[joint], force)
     if 0 <= i < IMPACTS and math.isnan(impact[joint, i, END]):
@@ -164,7 +171,7 @@ def raise_peak(peak, impact, impacts, joint, force):
 
 @kernel
 def end_impact(impact, impacts, joint, t):
-    """Note that the contact in a joint ended at time t [s]."""
+    """Record that the contact in a joint ended at time t [s]."""
     i = impacts[joint] - 1
     if 0 <= i < IMPACTS and math.isnan(impact[joint, i, END]):
         impact[joint, i, END] = t
@@ -172,7 +179,7 @@ def end_impact(impact, impacts, joint, t):
 
 @kernel
 def parabola_peak(t0, f0, t1, f1, t2, f2):
-    """Value at the top of the parabola through three samples of which the middle one is largest."""
+    """Maximum of the parabola through three samples (t [s], f [N]), the middle one of which is largest."""
     a, b = t1 - t0, t2 - t1
     left, right = (f1 - f0) / a, (f2 - f1) / b
     curvature = (right - left) / (a + b)

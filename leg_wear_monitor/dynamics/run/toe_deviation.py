@@ -1,4 +1,4 @@
-"""How far the toe and the drive torque are from the ideal linkage at the same crank angle."""
+"""Deviation of the toe and of the drive torque from the ideal linkage at the same crank angle."""
 
 import math
 from typing import NamedTuple
@@ -12,14 +12,15 @@ from leg_wear_monitor.mechanism.constraints import arm
 from leg_wear_monitor.mechanism.ideal import TURN, one_cycle, point_motion
 from leg_wear_monitor.mechanism.position import Linkage
 
-POINTS = 1440  # of a cycle: cubic interpolation between them errs by 1e-9 of the curve's range
+POINTS = 1440  # table points per cycle: the error of cubic interpolation is 1e-9 of the curve's range
 
 
 class Toe(NamedTuple):
-    """The point whose motion is compared, and what it does in the ideal linkage.
+    """The toe and its ideal motion.
 
-    ``body`` its body, -1 if there is nothing to compare; ``point`` (2,) from the centre of mass;
-    ``ideal`` (N, 7) position, velocity, acceleration and drive torque at N equal steps of the crank.
+    ``body``: index of its body, -1 without a toe; ``point`` (2,) [m]: from the centre of mass, in the body's
+    frame; ``ideal`` (N, 7): position [m], velocity [m/s], acceleration [m/s^2] and drive torque [N m] at N
+    equal steps of the crank.
     """
 
     body: int
@@ -31,7 +32,7 @@ NO_TOE = Toe(-1, np.zeros(2), np.zeros((1, 7)))
 
 
 def ideal_toe(linkage: Linkage, speed: float) -> Toe:
-    """Table of the toe's ideal motion at a crank speed [rad/s]; nothing to compare without a toe."""
+    """The toe with its ideal motion at a crank speed [rad/s]; `NO_TOE` for a mechanism without a toe."""
     mechanism = linkage.mechanism
     if mechanism.toe is None:
         return NO_TOE
@@ -43,7 +44,7 @@ def ideal_toe(linkage: Linkage, speed: float) -> Toe:
 
 @kernel
 def interpolate(table, column, crank_angle):
-    """Value of a periodic table at a crank angle: the cubic through the four nearest points."""
+    """Value of a column of a periodic table (N, m) at a crank angle [rad], cubic through four points."""
     n = table.shape[0]
     u = crank_angle / TURN * n
     floor = math.floor(u)
@@ -56,7 +57,7 @@ def interpolate(table, column, crank_angle):
 
 @kernel
 def toe_motion(toe, cs, q, v, a):
-    """Position, velocity and acceleration of the toe."""
+    """Position [m], velocity [m/s] and acceleration [m/s^2] of the toe, x and y each; q, v, a (n, 3)."""
     i = toe.body
     sx, sy = arm(cs, i, toe.point)
     w, alpha = v[i, 2], a[i, 2]
@@ -72,7 +73,7 @@ def toe_motion(toe, cs, q, v, a):
 
 @kernel
 def compare_toe(toe, crank_angle, cs, q, v, a, torque, out_response):
-    """Raise the largest deviations (4,) seen so far; nothing without a toe."""
+    """Update the largest deviations out_response (4,) of toe and drive torque; no effect without a toe."""
     if toe.body < 0:
         return
     motion = toe_motion(toe, cs, q, v, a)

@@ -1,4 +1,4 @@
-"""A trace: samples at equal times, taken on branches of a run, which is the same with and without them."""
+"""Traces: samples at equal times, taken on branches of a run so that they do not change the run."""
 
 import math
 from typing import Protocol, Self
@@ -6,31 +6,31 @@ from typing import Protocol, Self
 from leg_wear_monitor.dynamics.run.protocol import Run, Sample
 from leg_wear_monitor.dynamics.run.run_statistics import new_run_statistics
 
-_ROUNDING = 1.0e-9  # of a step: what a sum of steps is off
+_ROUNDING = 1.0e-9  # tolerance for rounding of sums of steps, as a fraction of a step
 
 
 class Traceable(Run, Protocol):
-    """A run that can be left where it is while a copy of it goes on."""
+    """A run that can be branched."""
 
     def branch(self) -> Self:
-        """A run of its own that goes on from here; this one stays as it is."""
+        """An independent copy of the run in its present state."""
 
     def sample_at(self, t: float) -> Sample:
-        """The leg at the time [s] that the run was told to go to."""
+        """The leg at a time [s] to which the run was advanced, up to its own time step."""
 
 
 class Tracer:
-    """Takes the samples that fall between the run's own instants.
+    """Takes the samples between the instants to which a run is advanced.
 
     Parameters
     ----------
     run : Traceable
     joints : int
-        Of the mechanism.
+        Number of joints of the mechanism.
     begin, end : float, s
-        Of the trace; no sample is taken at the end.
+        Begin and end of the trace; no sample is taken at the end.
     step : float, s
-        Infinite for no samples.
+        Time between samples; infinite for no samples.
 
     Attributes
     ----------
@@ -43,7 +43,7 @@ class Tracer:
         self.samples: list[Sample] = []
 
     def look_ahead(self, t: float) -> None:
-        """Take the samples before a time [s] that the run is about to go to."""
+        """Take the samples up to a time [s], before the run is advanced to it."""
         branch, statistics = None, new_run_statistics(self._joints)
         while len(self.samples) < self._count:
             due = self._begin + len(self.samples) * self._step

@@ -1,1 +1,1 @@
-"""The leg model in step with the crank, and its comparison with the measured torque."""
+"""The leg model along the tracked crank motion, and its torque compared with the measured one."""

@@ -1,4 +1,4 @@
-"""Measured against predicted drive torque, through one low-pass, and what may explain their difference."""
+"""Comparison of measured and predicted drive torque after one low-pass filter (physics.md section 9)."""
 
 import math
 
@@ -8,17 +8,17 @@ from leg_wear_monitor.twin.follower.compare_instants import take_instant
 from leg_wear_monitor.twin.follower.low_pass import pass_low
 from leg_wear_monitor.twin.follower.state import FRICTION, LAG, LOAD
 
-# the sensor's period is a running mean of the times between its samples, each with so much weight; a time of
-# more periods than so many has lost samples in it, and counts as that many
+# weight of a time between samples in the running mean that estimates the sensor's period, and longest time in
+# periods: in a longer time samples were lost, and it counts as this many periods in the mean
 _WEIGHT, _LONGEST_PERIOD = 0.05, 1.5
 
 
 @kernel
 def compare(sensor, signature, leg, stepper, measured):
-    """Compare a measured torque [N m] with the mean of the predicted one since the torque sample before.
+    """Compare a measured torque [N m] with the mean of the predicted one since the previous torque sample.
 
-    ``signature`` (N + 1,) is the drive torque by a unit foot load [N m/N]. Where some were lost, that mean is
-    over more than the sensor saw, and the sample is left out.
+    ``signature`` (N + 1,) is the drive torque per foot load [N m/N]. After lost torque samples, the predicted
+    mean covers a longer time than the sensor's, and the sample is left out.
     """
     torque, by, low_pass = leg.torque, leg.regressor, leg.low_pass
     i, w = blend(signature.shape[0] - 1, stepper.drive[ANGLE])
@@ -27,7 +27,7 @@ def compare(sensor, signature, leg, stepper, measured):
     squares = torque.sensed_squares
     torque.sensed_impulse, torque.sensed_time, torque.sensed_squares = 0.0, 0.0, 0.0
     before, torque.last_lever = torque.last_lever, lever
-    if low_pass.stage == 0 or not seen > 0.0:  # the first since the leg moves
+    if low_pass.stage == 0 or not seen > 0.0:  # the first sample since the leg moves
         low_pass.stage = max(low_pass.stage, 1)
         torque.unfiltered, leg.waiting.time = 0.0, 0.0
         return
@@ -61,7 +61,7 @@ def compare(sensor, signature, leg, stepper, measured):
 
 @kernel
 def _add_up(m, p, by, sums):
-    """Add measured and predicted torque, and what may explain their difference, to a cycle's sums."""
+    """Add measured torque m, predicted torque p [N m] and regressors ``by`` (3,) to a cycle's sums."""
     r = m - p
     sums.number += 1.0
     sums.residual += r

@@ -1,9 +1,10 @@
-"""The comparison for a torque sensor that samples instants instead of averages.
+"""Torque comparison for a sensor that samples instants instead of averages (physics.md section 9).
 
-With clearances the drive torque is full of spikes, each shorter than the time between two samples. An instant
-may meet one or not: even a healthy leg's instants, through a low-pass, are a quarter of the torque off their
-mean. So an instant counts the less, the more the predicted torque varies around it, it counts as at most a
-few times the torque's size off, and what is judged is what repeats over gait cycles (`repeating`).
+With clearances the drive torque has peaks that are shorter than the time between two samples, so an instant
+may or may not contain one: even for a healthy leg, low-pass filtered instants deviate from the mean by a
+quarter of the torque. Therefore the weight of an instant decreases with the variance of the predicted torque
+around it, its deviation is bounded by a few times the RMS torque, and only the part of the residual that
+repeats over gait cycles is evaluated (`repeating`).
 """
 
 import math
@@ -13,22 +14,23 @@ from leg_wear_monitor.twin.follower.low_pass import pass_low
 from leg_wear_monitor.twin.follower.state import FRICTION, LAG, LOAD, PHASES
 
 _TURN = 2.0 * math.pi
-# fractions of the torque's size: its variation around an instant that halves the instant's weight, and how
-# far off an instant counts at most; with them a healthy leg and a knocking one are far apart
+# as fractions of the RMS torque: standard deviation that halves an instant's weight, bound of its deviation;
+# these values clearly separate a healthy leg from one with strong impacts
 _VARIES, _FURTHEST = 0.5, 4.0
 
 
 @kernel
 def take_instant(sensor, leg, measured, mean, variance, lever, direction, dt, angle):
-    """Take in an instant, and compare the one before, whose both sides are known now.
+    """Store an instant, and compare the previous one, whose predicted torque on both sides is now known.
 
-    ``mean`` and ``variance`` of the predicted torque since the instant before, ``dt`` [s]; ``lever`` is the
-    load's signature.
+    ``mean`` [N m] and ``variance`` [N^2 m^2] are those of the predicted torque since the previous instant,
+    ``dt`` [s] before; ``lever`` [N m/N] is the drive torque per foot load, ``angle`` [rad] the crank angle.
 
     Returns
     -------
     float
-        The residual after the low-pass [N m]; NaN where there is none yet. ``leg.regressor`` goes with it.
+        The residual after the low-pass filter [N m], NaN before the second instant. Its regressors are in
+        ``leg.regressor``.
     """
     w = leg.waiting
     residual = math.nan
@@ -42,7 +44,7 @@ def take_instant(sensor, leg, measured, mean, variance, lever, direction, dt, an
 
 @kernel
 def _compare_waiting(sensor, leg, variance):
-    """Compare the instant that waits; its residual after the low-pass [N m]."""
+    """Compare the stored instant; returns its residual after the low-pass filter [N m]."""
     w, low_pass, by_phase = leg.waiting, leg.low_pass, leg.sums.by_phase
     fresh, fraction = low_pass.stage == 1, 1.0 - math.exp(-sensor.cutoff * w.time)
     low_pass.stage = 2

@@ -1,4 +1,4 @@
-"""A gait cycle's statistics from what was added up over it."""
+"""Statistics of a gait cycle from its sums."""
 
 import numpy as np
 
@@ -27,7 +27,23 @@ def clearances(contacts: ContactArrays, depth: Floats) -> Floats:
 def torque_statistics(
     sums: Record, found: CycleEstimate | None, settled: LoadEstimate, unexplained_nm: float
 ) -> TorqueStatistics:
-    """Of the sums of a cycle, `TORQUE_SUMS`, what it alone says, and what has settled."""
+    """Torque statistics of one cycle.
+
+    Parameters
+    ----------
+    sums : Record
+        `TORQUE_SUMS` of the cycle.
+    found : CycleEstimate or None
+        Least-squares estimate of this cycle alone.
+    settled : LoadEstimate
+        Estimate filtered over cycles.
+    unexplained_nm : float
+        RMS of the unexplained residual.
+
+    Returns
+    -------
+    TorqueStatistics
+    """
     n = int(sums.number)
 
     def rms(squares: float) -> float:
@@ -58,7 +74,7 @@ def cycle_statistics(
     leg: Record, stamp: int, contacts: ContactArrays, depth: Floats, before: Floats,
     statistics: RunStatistics, torque: TorqueStatistics,
 ) -> CycleStatistics:  # fmt: skip
-    """Statistics of the cycle of a `LEG_STATE` at its end; ``before`` (2, k) the clearances at its begin."""
+    """Statistics of a cycle at its end from a `LEG_STATE`; ``before`` (2, k) [m]: initial clearances."""
     joint, motion, now = contacts.joint, leg.motion, clearances(contacts, depth)
     moving = float(statistics.time[0])
     return CycleStatistics(

@@ -1,4 +1,4 @@
-"""The leg that follows the tracker's steps, and what is to be done where its kernel stops."""
+"""The leg that follows the tracker's steps, and actions where its kernel returns (physics.md section 9)."""
 
 from functools import cached_property
 from typing import NamedTuple
@@ -31,7 +31,7 @@ from leg_wear_monitor.twin.statistics import CycleStatistics, Event, SampleStati
 from leg_wear_monitor.twin.steps import MOVE, Steps
 
 _RUN_IN_S = 0.2
-_LEAST_TORQUE_NM = 1.0e-6  # of a leg that needs none
+_LEAST_TORQUE_NM = 1.0e-6  # lower bound of the RMS torque, for a leg that needs no torque
 
 _EVENT_KINDS = {
     told.LOST_IN_GAP: TwinEventKind.LOST_IN_GAP,
@@ -50,7 +50,7 @@ _FAILURES = {
 
 
 class FollowerSnapshot(NamedTuple):
-    """All of a follower; plain arrays."""
+    """Complete state of a follower as plain arrays."""
 
     stepper: StepperSnapshot
     leg: tuple[np.ndarray, ...]
@@ -61,22 +61,22 @@ class FollowerSnapshot(NamedTuple):
 
 
 class LegFollower:
-    """A leg with clearances that goes where the tracker's steps say.
+    """A leg with clearances that follows the tracker's steps.
 
     Parameters
     ----------
     setup : Setup
-        Its surfaces are worn on the way.
+        The follower wears its surfaces.
     settings : TwinSettings
 
     Attributes
     ----------
     records : Records
-        The one `LEG_STATE`.
+        The `LEG_STATE`, (1,).
     state : Record
-        The same by names.
+        The same record, by names.
     statistics : RunStatistics
-        Of the present gait cycle.
+        Statistics of the present gait cycle.
     estimate : LoadEstimate
     torque_size_nm : float
         RMS of the ideal drive torque at the commanded speed.
@@ -85,14 +85,14 @@ class LegFollower:
     def __init__(self, setup: Setup, settings: TwinSettings) -> None:
         self._setup, self._acts = setup, settings.estimate_load
         self._load = FootLoad(setup.linkage, setup.contacts, settings.load_shape)
-        # a whole number of nanoseconds, so that stamps and the stepper's time cannot drift apart
+        # a whole number of nanoseconds, so that the stepper's time does not drift from the stamps
         interval = round(1.0e9 * TURN / abs(setup.speed) / INTERVALS) * 1.0e-9
         self._stepper = ClearanceStepper(setup, interval, tables=self._load.tables)
         self._leg: LegState = leg_state(len(setup.clearance_joints))
         self.records = self._leg.records
         self.state: Record = record_of(self.records)
         self.statistics = new_run_statistics(len(setup.linkage.mechanism.joints))
-        # the ground only pushes
+        # a ground force cannot pull
         self.estimate = LoadEstimate(
             settings.load_limit_n, 0.0 if settings.load_shape == STANCE else -settings.load_limit_n
         )
@@ -110,11 +110,11 @@ class LegFollower:
 
     @property
     def clearances(self) -> Floats:
-        """Mean and largest radial clearance (2, loose) [m]."""
+        """Mean and largest radial clearance (2, k) [m]."""
         return clearances(self._setup.contacts, self._setup.surfaces.depth)
 
     def take_surfaces(self, depth: Floats) -> None:
-        """Take over wear depths (loose, 2, N) [m]; growth counts from there for the joints that change."""
+        """Set wear depths (k, 2, N) [m]; for changed joints, the growth of the cycle counts from there."""
         own, state = self._setup.surfaces.depth, self._stepper.state
         changed = (own != depth).any(axis=(1, 2))
         own[:] = depth
@@ -124,7 +124,7 @@ class LegFollower:
     def follow(
         self, steps: Steps, n: int, cycles: list[CycleStatistics], events: list[Event]
     ) -> SampleStatistics:
-        """Follow n steps; adds gait cycles that end and what happens, returns the samples passed."""
+        """Follow n steps; append finished gait cycles and events; returns statistics of the samples."""
         i, m = 0, 0
         evaluated, forces = self._room(n)
         while i < n:
@@ -162,7 +162,7 @@ class LegFollower:
         )  # fmt: skip
 
     def _start(self, steps: Steps, i: int) -> Event:
-        """Set the leg in motion where step i begins, wear as it was."""
+        """Set the leg in motion at the begin of step i, with its wear unchanged; returns the event."""
         motion, step = self.state.motion, steps[i]
         stamp, (angle, speed) = int(step["begin_ns"]), step["motion"][:2]
         for part in ("torque", "sums"):
@@ -178,15 +178,15 @@ class LegFollower:
         return Event(stamp, TwinEventKind.ACQUIRED)
 
     def _run_in(self, angle: float, speed: float) -> int:
-        """Bring the leg to a crank angle [rad] at a speed [rad/s] from a little before, without wear.
+        """Run the leg in up to a crank angle [rad] and speed [rad/s], without wear.
 
-        Journals start centred, and their first impacts can be several times those of a gait: they must be
-        over when somebody looks.
+        Journals start centred, and their first impacts can be several times those of the gait: they must not
+        be reported.
 
         Returns
         -------
         int
-            How long that took [ns].
+            Duration of the run-in [ns].
         """
         stepper, depth = self._stepper, self._setup.surfaces.depth
         intervals = round(_RUN_IN_S / stepper.model.interval)
@@ -199,7 +199,7 @@ class LegFollower:
             reached = stepper.advance(polynomial, time, self.statistics)[0]
         depth[:] = worn
         stepper.drop_pending_wear()
-        if reached != DONE:  # so it goes on from centred journals, and says itself why it cannot
+        if reached != DONE:  # continue from centred journals; the next step reports the failure
             stepper.init(angle, speed)
             self._leg.force[:] = 0.0
             return 0
@@ -208,11 +208,11 @@ class LegFollower:
         return round(1.0e9 * time)
 
     def _end_cycle(self, stamp: int, cycles: list[CycleStatistics]) -> None:
-        """Report the gait cycle that ends at a stamp, if it is a whole one; begin the next."""
+        """Append the gait cycle that ends at a stamp [ns] if it is complete; begin the next one."""
         motion, depth = self.state.motion, self._setup.surfaces.depth
         if motion.cycle_is_whole:
             motion.cycles += 1
-            # two like stages of a low-pass leave noise of so many independent samples
+            # number of independent samples after two equal low-pass stages
             independent = max(0.25 * self._cutoff * self.statistics.time[0], 1.0)
             sums = self.state.sums
             found = find(sums, sums.number / independent, self.estimate.room)
@@ -231,7 +231,7 @@ class LegFollower:
         self._before = self.clearances
 
     def _unexplained_nm(self, found: CycleEstimate | None) -> float:
-        """RMS of what is left of the residual [N m], of this cycle or over cycles; NaN if not known."""
+        """RMS of the unexplained residual [N m], of this cycle or over cycles; NaN if unknown."""
         if not self._instants:
             return found.left if found else np.nan
         if found is None:
@@ -251,7 +251,7 @@ class LegFollower:
         )
 
     def restore(self, snapshot: FollowerSnapshot) -> None:
-        """Go back to a snapshot of a follower of the same setup and settings."""
+        """Restore a snapshot of a follower of the same setup and settings."""
         self._stepper.restore(snapshot.stepper)
         for own, saved in ((self._leg, snapshot.leg), (self.statistics, snapshot.statistics)):
             for part, values in zip(own, saved, strict=True):

@@ -1,4 +1,4 @@
-"""The leg along the tracker's steps: advanced from sample to sample, looked at, compared with the torque."""
+"""Kernel of the follower: advances along the steps, evaluates at samples (physics.md section 9)."""
 
 import math
 
@@ -12,18 +12,18 @@ from leg_wear_monitor.kernel import entry, kernel
 from leg_wear_monitor.twin.follower.compare import compare
 from leg_wear_monitor.twin.steps import EVALUATE, LEAVE, MOVE, REPORT, START
 
-# why the leg's kernel returns before the last step: a cycle has ended; somebody must start the leg, leave it,
-# or take note of a happening. Other values are those of dynamics.run.
+# reasons for which the kernel returns before the last step: a cycle has ended; the caller must start the leg,
+# stop following, or record an event. Other values are the status codes of dynamics.run.
 CYCLE, NEEDS_START, LEFT, TOLD = range(100, 104)
 
 _TURN = 2.0 * math.pi
 _advance = ADVANCE.call
-_REBASE = 65536  # intervals: even, since the stepper renews things every other interval
+_REBASE = 65536  # intervals after which time 0 is moved; even, because of the stepper's `RENEWAL`
 
 
 @kernel
 def _angle_at(polynomial, tau):
-    """Angle [rad] of a piece a time tau [s] after its begin."""
+    """Crank angle [rad] of a piece of motion, ``tau`` [s] after its begin; polynomial (7,)."""
     angle = 0.0
     for i in range(6, 0, -1):
         angle = angle * tau + polynomial[i]
@@ -32,7 +32,7 @@ def _angle_at(polynomial, tau):
 
 @kernel
 def _find_cut(motion, polynomial, begin):
-    """Where in its piece, from a stamp on, the crank passes the next 0, either way: a gait cycle may end."""
+    """Find the next passage of crank angle 0 in the present piece, from a stamp on: a cycle may end there."""
     motion.cut_ns = 0
     origin = motion.piece_begin_ns
     low, high = 1.0e-9 * (begin - origin), 1.0e-9 * (motion.piece_end_ns - origin)
@@ -55,12 +55,12 @@ def _find_cut(motion, polynomial, begin):
 
 @kernel
 def _load_piece(model, stepper, leg, polynomial, step):
-    """Take up the next piece of the crank's motion; times and angles are kept small."""
+    """Begin the next piece of the crank's motion; times and angles are kept small and thus exact."""
     motion = leg.motion
     if stepper.intervals[0] >= _REBASE:
         move_time_origin(stepper, model.interval, _REBASE)
         motion.base_ns += round(_REBASE * model.interval * 1.0e9)
-    if step.begin_ns != motion.piece_end_ns:  # it rested meanwhile
+    if step.begin_ns != motion.piece_end_ns:  # the leg rested in between
         motion.base_ns += step.begin_ns - motion.piece_end_ns
         leg.low_pass.stage = 0
     turns = step.turns - motion.turns_before
@@ -77,7 +77,7 @@ def _load_piece(model, stepper, leg, polynomial, step):
 
 @kernel
 def _evaluate(sensor, signature, leg, polynomial, stepper, step, out):
-    """Note the leg, which runs, at a sample."""
+    """Evaluate the running leg at a sample, into the record ``out`` of `EVALUATED`."""
     motion, torque = leg.motion, leg.torque
     if torque.time > 0.0:
         torque.mean_before = torque.impulse / torque.time
@@ -91,7 +91,7 @@ def _evaluate(sensor, signature, leg, polynomial, stepper, step, out):
 
 @kernel
 def _add_torque(torque, impulse, squares, time):
-    """Add what a step integrated: drive torque [N m s], its square [N^2 m^2 s], and time [s]."""
+    """Add a step's integrals: drive torque [N m s], its square [N^2 m^2 s], and time [s]."""
     torque.impulse += impulse
     torque.time += time
     torque.sensed_impulse += impulse
@@ -119,14 +119,14 @@ def follow(
 ):
     """Follow steps from index ``first`` to n; ``stepper`` is the ClearanceState, ``state`` the LegState.
 
-    There is one torque sensor. The leg at samples goes to ``evaluated`` (n,) from index m on, and its contact
-    forces [N] to ``forces`` (n, k), NaN where it does not run.
+    ``sensors`` (1,) contains the torque sensor. Values at samples are written to ``evaluated`` (n,) from
+    index m on, contact forces [N] to ``forces`` (n, k), NaN while the leg does not run.
 
     Returns
     -------
     reason, i, k, m
-        DONE, or why the caller has to act before going on at step i; k is the clearance joint concerned, -1
-        if none; m is the number of samples evaluated.
+        DONE, or the reason for which the caller must act before step i; k is the clearance joint concerned
+        (for CYCLE the stamp of its end [ns]), -1 if none; m is the number of evaluated samples.
     """
     sensor, leg, polynomial, force = sensors[0], state.records[0], state.polynomial, state.force
     motion, i = leg.motion, first
@@ -155,7 +155,7 @@ def follow(
                 motion.failed_at_ns = motion.base_ns + round(1.0e9 * stepper.intervals[0] * model.interval)
                 return status, i, k, m
             if cuts:
-                # back at the 0 where it began, a cycle is none
+                # a cycle that ends at the passage where it began is no gait cycle
                 is_whole = motion.anchored != 0 and motion.anchor_turn != motion.cut_turn
                 motion.cycle_is_whole = 1 if is_whole else 0
                 motion.anchored, motion.anchor_turn = 1, motion.cut_turn

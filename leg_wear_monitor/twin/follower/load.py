@@ -1,6 +1,7 @@
-"""A load at the foot that may change with every cycle: what it asks of the drive, its place in the tables.
+"""A foot load that may change with every cycle: drive torque, effect on the tables (physics.md section 9).
 
-All tables are linear in a load, so a load is a sum of two tables over the few columns that it changes.
+All tables are linear in the load, so a change of the load is a linear combination over the columns that it
+affects.
 """
 
 from collections.abc import Iterable
@@ -19,7 +20,7 @@ from leg_wear_monitor.mechanism.spec import Mechanism, PhaseLoad
 from leg_wear_monitor.twin.settings import STANCE
 
 _TRIAL_N = 100.0
-_PHASES = 128  # of a load's table, a divisor of the points of the leg's tables
+_PHASES = 128  # entries of the load's table; a divisor of the number of points of the leg's tables
 
 
 class FootLoad:
@@ -30,14 +31,14 @@ class FootLoad:
     linkage : Linkage
     contacts : ContactArrays
     shape : str
-        How the load goes over the gait cycle, one of `settings.LOAD_SHAPES`.
+        Shape of the load over the gait cycle, one of `settings.LOAD_SHAPES`.
 
     Attributes
     ----------
     tables : ClearanceTables
-        Those of the present load; changed in place.
+        Tables for the present load, changed in place.
     signature : (N + 1,) array
-        Drive torque by a unit load up [N m/N], zeros for a mechanism without a toe.
+        Drive torque per upward load [N m/N], zeros for a mechanism without a toe.
     """
 
     def __init__(self, linkage: Linkage, contacts: ContactArrays, shape: str = STANCE) -> None:
@@ -58,7 +59,7 @@ class FootLoad:
             self._find_parts(build_tables(loaded, contacts))
 
     def _find_parts(self, loaded: ClearanceTables) -> None:
-        """The columns that a load changes, their values without it, and by how much a newton changes them."""
+        """Find the columns that the load affects, their values without load and derivatives per newton."""
         pairs: Iterable[tuple[NDArray[Any], NDArray[Any]]] = zip(self.tables, loaded, strict=True)
         for table, other in pairs:
             flat = table.reshape(len(table), -1)  # a view
@@ -68,7 +69,7 @@ class FootLoad:
                 self._parts.append((flat, columns, flat[:, columns], slope[:, columns]))
 
     def set(self, load: float) -> None:
-        """Put a load [N], up positive, into the tables."""
+        """Set the tables to a load [N], positive upwards."""
         if load == self._load:
             return
         self._load = load
@@ -77,19 +78,19 @@ class FootLoad:
 
 
 def torque_size(linkage: Linkage, speed: float) -> float:
-    """RMS of the ideal linkage's drive torque [N m] over a turn at a speed [rad/s]."""
+    """RMS of the ideal linkage's drive torque [N m] over a turn, at a crank speed [rad/s]."""
     return float(np.sqrt(np.mean(one_cycle(linkage, POINTS, speed).drive_torque ** 2)))
 
 
 def _up(mechanism: Mechanism) -> Floats:
-    """Unit vector against gravity; y where there is none."""
+    """Unit vector (2,) opposite to gravity; the y axis without gravity."""
     gravity = np.array(mechanism.gravity)
     size = float(np.hypot(*gravity))
     return -gravity / size if size > 0.0 else np.array([0.0, 1.0])
 
 
 def _share(height: Floats, shape: str) -> Floats:
-    """Share of the full load at `_PHASES` equal steps of the crank, by the toe's height (POINTS,) [m]."""
+    """Fraction (_PHASES,) of the full load at equal crank steps, from the toe's height (POINTS,) [m]."""
     if shape != STANCE:
         return np.ones(_PHASES)
     depth = np.maximum(0.0, height.mean() - height)[:: POINTS // _PHASES]
@@ -97,7 +98,7 @@ def _share(height: Floats, shape: str) -> Floats:
 
 
 def _loaded(mechanism: Mechanism, force: Floats) -> Mechanism:
-    """The mechanism with a further force (_PHASES, 2) [N] at its toe."""
+    """The mechanism with an additional force (_PHASES, 2) [N] at its toe."""
     if mechanism.toe is None:
         return mechanism
     body, point = mechanism.toe

@@ -1,11 +1,11 @@
-"""The low-pass that measured and predicted drive torque both go through."""
+"""Low-pass filter of measured and predicted drive torque, two first-order stages (physics.md section 9)."""
 
 from leg_wear_monitor.kernel import kernel
 
 
 @kernel
 def pass_low(fraction, fresh, value, stages):
-    """Value after the two stages (2,) of the low-pass; a fresh filter starts at its first value."""
+    """Output of the filter with ``stages`` (2,), ``fraction`` 1 - exp(-w dt); if fresh, it is the input."""
     for stage in range(2):
         if fresh:
             stages[stage] = value

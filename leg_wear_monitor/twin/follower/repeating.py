@@ -1,35 +1,35 @@
-"""What of the torque's residual repeats over gait cycles, without the scatter of instants."""
+"""The part of the torque residual that repeats over gait cycles, without the scatter of instants."""
 
 import numpy as np
 
 from leg_wear_monitor.mechanism.arrays import Floats
 
-CYCLES = 8  # fewer scatter more, more tell later
+CYCLES = 8  # averaged gait cycles: fewer have more scatter, more have a longer delay
 _LEAST_PHASES = 8
 
 
 class RepeatingResidual:
-    """The residual by the crank's phase, over the last gait cycles.
+    """The torque residual by crank phase over the last gait cycles.
 
     Attributes
     ----------
     cycles : tuple of (5, PHASES) arrays
-        Of each gait cycle, the newest last, as in `TORQUE_SUMS`.
+        ``by_phase`` of `TORQUE_SUMS` for each gait cycle, the newest last.
     """
 
     def __init__(self) -> None:
         self.cycles: tuple[Floats, ...] = ()
 
     def take(self, by_phase: Floats) -> None:
-        """Take in a whole gait cycle."""
+        """Add the sums (5, PHASES) of a complete gait cycle."""
         self.cycles = (*self.cycles[1 - CYCLES :], by_phase.copy())
 
     @property
     def rms_nm(self) -> float:
-        """RMS of what repeats and neither load, friction nor lag explain; NaN before there are enough cycles.
+        """RMS [N m] of the repeating residual without load, friction and lag; NaN without enough cycles.
 
-        The mean over cycles has a standard error from their scatter, whose square is taken off: what scatters
-        alone has an expected value of 0.
+        The squared standard error of the mean over cycles is subtracted, so that pure scatter gives 0 on
+        average.
         """
         if len(self.cycles) < CYCLES:
             return float("nan")
@@ -40,7 +40,7 @@ class RepeatingResidual:
         weight = sums[:, 0]
         total = sums.sum(axis=0)
         mean, columns = total[1] / total[0], (total[2:] / total[0]).T
-        # a column that is nothing (no toe, no speed) takes no part
+        # leave out columns of zeros (no toe, no speed)
         columns = columns[:, np.abs(columns).max(axis=0) > 0.0]
         size = np.linalg.norm(columns, axis=0)
         explained = columns @ (np.linalg.lstsq(columns / size, mean, rcond=None)[0] / size)

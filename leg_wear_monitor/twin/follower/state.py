@@ -1,4 +1,4 @@
-"""Where the leg is on its way along the tracker's steps, and what was compared with the measured torque."""
+"""State of the follower: motion along the steps, torque comparison."""
 
 from typing import NamedTuple
 
@@ -7,35 +7,35 @@ import numpy as np
 from leg_wear_monitor.mechanism.arrays import Floats
 from leg_wear_monitor.record import Records, new_records
 
-PHASES = 32  # of the crank's turn, for what repeats from one gait cycle to the next
+PHASES = 32  # crank phases per turn, for the residual that repeats over gait cycles
 
-# what may explain a torque that is off: its index in vectors that least squares work on
+# indices of the regressors of a torque residual
 LOAD, FRICTION, LAG = 0, 1, 2
 
 LEG_MOTION = np.dtype(
     [
         ("base_ns", "i8"),  # stamp of the stepper's time 0
         ("runs", "i8"),  # 1 where the leg runs
-        ("lost", "i8"),  # 1 where it has failed and was not started since
+        ("lost", "i8"),  # 1 after a failure, until the next start
         # the present piece of the crank's motion
         ("piece_begin_ns", "i8"),  # stamp
         ("piece_end_ns", "i8"),  # stamp
-        ("turns_before", "i8"),  # turns of the crank before the leg's angle
-        # where the crank passes 0 next, which ends a gait cycle
+        ("turns_before", "i8"),  # whole crank turns to add to the leg's angle
+        # the next passage of crank angle 0, which ends a gait cycle
         ("cut_ns", "i8"),  # stamp, 0 if not in this piece
-        ("cut_turn", "i8"),  # turns of the crank there
+        ("cut_turn", "i8"),  # whole crank turns there
         ("cut_rises", "i8"),  # 1 if forward
-        # where it passed 0 last
-        ("anchored", "i8"),  # 1 if it has
-        ("anchor_turn", "i8"),  # turns of the crank there
+        # the last passage of crank angle 0
+        ("anchored", "i8"),  # 1 if there was one
+        ("anchor_turn", "i8"),  # whole crank turns there
         # the gait cycle
         ("cycle_begin_ns", "i8"),  # stamp
         ("cycle_bridged_ns", "i8"),  # time bridged in it
-        ("cycle_is_whole", "i8"),  # 1 where the one that has ended is a whole one
+        ("cycle_is_whole", "i8"),  # 1 if the cycle that has ended is complete
         # counts
-        ("cycles", "i8"),  # whole gait cycles
-        ("failures", "i8"),  # how often the leg could not go on
-        ("failed_at_ns", "i8"),  # when it failed last
+        ("cycles", "i8"),  # complete gait cycles
+        ("failures", "i8"),  # failures of the integration
+        ("failed_at_ns", "i8"),  # stamp of the last failure
         ("failed_ns", "i8"),  # time lost by failures
         ("moving_ns", "i8"),  # time in motion
     ]
@@ -43,59 +43,59 @@ LEG_MOTION = np.dtype(
 
 LEG_TORQUE = np.dtype(
     [
-        # of the drive torque since the last sample
+        # predicted drive torque since the last sample
         ("impulse", "f8"),  # integral [N m s]
         ("time", "f8"),  # time [s]
         ("mean_before", "f8"),  # mean before that sample [N m]
-        # of the drive torque since the last torque sample
+        # predicted drive torque since the last torque sample
         ("sensed_impulse", "f8"),  # integral [N m s]
         ("sensed_squares", "f8"),  # integral of the square [N^2 m^2 s]
         ("sensed_time", "f8"),  # time [s]
-        # of the comparison
-        ("last_lever", "f8"),  # drive torque by a unit foot load at the last torque sample [N m/N]
-        ("last_predicted", "f8"),  # predicted torque after the low-pass [N m]
+        # comparison
+        ("last_lever", "f8"),  # drive torque per foot load at the last torque sample [N m/N]
+        ("last_predicted", "f8"),  # predicted torque after the low-pass filter [N m]
         ("period", "f8"),  # of the torque sensor [s]
-        ("unfiltered", "f8"),  # time since what was last filtered [s]
+        ("unfiltered", "f8"),  # time since the last filtered sample [s]
     ]
 )
 
 LOW_PASS = np.dtype(
     [
-        ("stage", "i8"),  # 0 empty, 1 a sample has come, 2 filtered since
-        # its two stages, for each torque
+        ("stage", "i8"),  # 0 empty, 1 after the first sample, 2 after the first filtered one
+        # the filter's two stages, for each signal
         ("measured", "f8", (2,)),  # [N m]
         ("predicted", "f8", (2,)),  # [N m]
-        ("of_load", "f8", (2,)),  # of a unit foot load [N m/N]
-        ("of_friction", "f8", (2,)),  # of unit friction
-        # of a sensor that samples instants
+        ("of_load", "f8", (2,)),  # torque per foot load [N m/N]
+        ("of_friction", "f8", (2,)),  # torque per friction [-]
+        # for a sensor that samples instants
         ("weight", "f8", (2,)),  # of an instant
         ("weighted_residual", "f8", (2,)),  # weight times residual [N m]
-        ("weighted_regressor", "f8", (3, 2)),  # weight times what may explain it
+        ("weighted_regressor", "f8", (3, 2)),  # weight times regressors
     ]
 )
 
 WAITING_INSTANT = np.dtype(
     [
         ("measured", "f8"),  # torque [N m]
-        ("mean_predicted", "f8"),  # of the predicted torque since the instant before [N m]
+        ("mean_predicted", "f8"),  # of the predicted torque since the previous instant [N m]
         ("variance", "f8"),  # of that torque [N^2 m^2]
-        ("regressor", "f8", (3,)),  # what a unit load, unit friction and unit lag make [N m/N, -, N m/s]
-        ("time", "f8"),  # since the instant before [s], 0 if none waits
+        ("regressor", "f8", (3,)),  # torque per load, friction and lag [N m/N, -, N m/s]
+        ("time", "f8"),  # since the previous instant [s], 0 if none is stored
         ("angle", "f8"),  # of the crank [rad]
     ]
 )
-"""An instant that waits for the next one."""
+"""An instant that is stored until the next one."""
 
 TORQUE_SUMS = np.dtype(
     [
-        ("number", "f8"),  # of torques compared
+        ("number", "f8"),  # of compared torques
         ("residual", "f8"),  # [N m]
         ("residual_squares", "f8"),  # [N^2 m^2]
         ("measured_squares", "f8"),  # [N^2 m^2]
         ("predicted_squares", "f8"),  # [N^2 m^2]
-        ("gram", "f8", (3, 3)),  # products of the torques by load, friction and lag with each other
-        ("along", "f8", (3,)),  # and with the residual
-        # of a sensor that samples instants: rows of weight, and of residual, load, friction, lag times that
+        ("gram", "f8", (3, 3)),  # products of the regressors (load, friction, lag) with each other
+        ("along", "f8", (3,)),  # products of the regressors with the residual
+        # for a sensor that samples instants: rows of weight, then weight times residual, load, friction, lag
         ("by_phase", "f8", (5, PHASES)),
     ]
 )
@@ -107,16 +107,16 @@ LEG_STATE = np.dtype(
         ("torque", LEG_TORQUE),
         ("low_pass", LOW_PASS),
         ("waiting", WAITING_INSTANT),
-        ("regressor", "f8", (3,)),  # torques by a unit load, unit friction and unit lag [N m/N, -, N m/s]
+        ("regressor", "f8", (3,)),  # torque per load, friction and lag [N m/N, -, N m/s]
         ("sums", TORQUE_SUMS),
     ]
 )
 
 TORQUE_SENSOR = np.dtype(
     [
-        ("cutoff", "f8"),  # of the low-pass [rad/s]
-        ("usual", "f8"),  # size of the torque [N m]
-        ("instants", "i8"),  # 1 where it samples instants instead of averages
+        ("cutoff", "f8"),  # of the low-pass filter [rad/s]
+        ("usual", "f8"),  # RMS of the ideal torque [N m]
+        ("instants", "i8"),  # 1 if it samples instants instead of averages
     ]
 )
 
@@ -124,18 +124,18 @@ EVALUATED = np.dtype(
     [
         ("stamp_ns", "i8"),  # of the sample
         ("kind", "i8"),  # of `twin.sample`
-        ("angle", "f8"),  # of the crank [rad], NaN where the leg does not run
-        ("torque", "f8"),  # mean drive torque since the sample before [N m], NaN where the leg does not run
+        ("angle", "f8"),  # of the crank [rad], NaN while the leg does not run
+        ("torque", "f8"),  # mean drive torque since the previous sample [N m], NaN while the leg does not run
     ]
 )
 """The leg at a sample."""
 
 
 class LegState(NamedTuple):
-    """All that changes in the leg along its way, beside the stepper.
+    """State of the follower, beside the stepper's.
 
-    ``records`` (1,) of `LEG_STATE`; ``polynomial`` (7,) the piece; ``force`` (k,) contact forces [N] at the
-    end of the last step.
+    ``records`` (1,): of `LEG_STATE`; ``polynomial`` (7,): present piece of the crank's motion; ``force`` (k,)
+    [N]: contact forces at the end of the last step.
     """
 
     records: Records

@@ -1,10 +1,10 @@
-"""Foot load, friction and the sensor's lag from what measured and predicted drive torque differ by.
+"""Foot load, drive friction and sensor lag from the residual of the drive torque (physics.md section 9).
 
-By virtual work a load F at the toe asks the drive for -F dy/dtheta. Over a whole turn a load that depends on
-the toe's height alone has no mean in it, while a constant friction torque is nothing but mean: neither can be
-taken for the other. A torque that comes late looks like minus its own derivative. The three follow from one
-torque over a gait cycle by least squares, and settle over cycles as their scatter allows. Friction in the
-drive makes no force in the joints; the load does.
+By virtual work, a load F at the toe needs the drive torque -F dy/dtheta. If the load depends on the toe's
+height alone, this torque has no mean over a turn, while a constant friction torque has only a mean: the two
+are orthogonal. A lag tau changes the torque by -tau dT/dt. The three parameters are estimated by least
+squares over each gait cycle and filtered over cycles by their scatter. Drive friction does not load the
+joints; the foot load does.
 """
 
 import attrs
@@ -17,19 +17,18 @@ from leg_wear_monitor.twin.follower.state import FRICTION, LOAD
 
 _LEAST_SAMPLES = 8
 _SMALL = 1.0e-9
-# what the three are held to be before anything is measured: 0 give or take this [N, N m, s], and by how much
-# they may drift in a cycle
+# prior standard deviations of the three around 0 [N, N m, s], and random walk per cycle
 _UNKNOWN = np.array([1000.0, 10.0, 0.02])
 _DRIFT = np.array([1.0, 0.02, 1.0e-4])
-_SUDDEN = 3.0  # standard deviations beyond which something has changed
+_SUDDEN = 3.0  # a deviation of this many standard deviations counts as a sudden change
 _BELIEVED, _DOUBTED = 3.0, 2.0  # standard deviations from 0 at which a load begins and ceases to act
 
 
 @attrs.frozen(eq=False)
 class CycleEstimate:
-    """What a cycle says: values (3,), their standard deviations, condition number, RMS of the rest [N m].
+    """Estimate of one cycle: values (3,), standard deviations (3,), condition number, RMS residual [N m].
 
-    The rest is that for a load within its bounds; the values are what the torque says, bounded or not.
+    ``left`` is the residual for a load within its bounds; ``values`` are not bounded.
     """
 
     values: Floats
@@ -41,22 +40,22 @@ class CycleEstimate:
 def find(
     sums: Record, correlated: float, loads: tuple[float, float] = (-np.inf, np.inf)
 ) -> CycleEstimate | None:
-    """Least squares from the sums of a cycle; None without enough samples.
+    """Least-squares estimate from the sums of a cycle.
 
     Parameters
     ----------
     sums : Record
         `TORQUE_SUMS` of the cycle.
     correlated : float
-        How many samples count as one, since all went through a low-pass.
+        Number of samples per independent sample, because of the low-pass filter.
     loads : (float, float)
-        Least and largest load that there may be, less the load that acts [N].
+        Least and largest possible load minus the acting load [N].
 
     Returns
     -------
-    CycleEstimate
-        Without a load's signature (a mechanism without toe), 0 for the load, known exactly. The condition
-        number is that of the torques scaled to one size: 1 where none looks like another.
+    CycleEstimate or None
+        None without enough samples. For a mechanism without a toe, the load is 0 with a standard deviation of
+        0. The condition number is that of the normalised regressors, 1 if they are orthogonal.
     """
     gram, along = sums.gram, sums.along
     scale = np.sqrt(np.diag(gram))
@@ -80,7 +79,7 @@ def find(
 def _bounded(
     values: Floats, gram: Floats, along: Floats, seen: NDArray[np.bool_], loads: tuple[float, float]
 ) -> Floats:
-    """The best values with a load within bounds."""
+    """The least-squares values (3,) with the load within its bounds."""
     load = min(max(float(values[LOAD]), loads[0]), loads[1])
     if load == values[LOAD]:
         return values
@@ -92,14 +91,14 @@ def _bounded(
 
 
 class LoadEstimate:
-    """Load [N], friction [N m] and lag [s] as they settle over cycles; each a random walk.
+    """Load [N], friction [N m] and lag [s], filtered over cycles; each is modelled as a random walk.
 
     Parameters
     ----------
     limit : float
-        Largest load believed [N].
+        Largest possible load [N].
     least : float, optional
-        Least load that there may be [N]; minus the largest if not given.
+        Least possible load [N]; default: minus the largest.
 
     Attributes
     ----------
@@ -128,11 +127,11 @@ class LoadEstimate:
 
     @property
     def room(self) -> tuple[float, float]:
-        """Least and largest load that there may be beside the one that acts [N]."""
+        """Least and largest possible load minus the acting one [N]."""
         return self._least - self.acting, self._limit - self.acting
 
     def take(self, found: CycleEstimate, acts: bool) -> None:
-        """Take in a cycle's estimate; ``acts`` whether a load that is believed shall act on the leg."""
+        """Update by a cycle's estimate; ``acts``: whether a significant load acts on the leg."""
         values, variance = self.state[:3], self.state[3:6]
         measured = found.values + np.array([self.acting, 0.0, 0.0])
         variance += _DRIFT**2

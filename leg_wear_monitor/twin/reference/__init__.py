@@ -1,1 +1,1 @@
-"""The reference cycle of a leg, computed before the first sample."""
+"""References for the clearance regression: joint angles of a leg with given clearances, by simulation."""

@@ -1,9 +1,9 @@
-"""What clearances do to the angles of further joints: the model behind `monitor.hidden`.
+"""Effect of clearances on the angles of further joints: the linear model of `monitor.encoders`.
 
-An encoder on a revolute joint tells the angle from the bushing's body to the journal's. It departs from that
-of the ideal linkage by S_phi(theta) e, linear in the eccentricities e (physics.md section 7). In the mean
-over gait cycles e_k is c_k u_k: c_k the clearance and u_k(theta) a shape that simulation knows, near 1 long
-and along the contact's normal.
+An encoder on a revolute joint measures the angle from the bushing's body to the journal's. It deviates from
+that of the ideal linkage by S_phi(theta) e, linear in the eccentricities e (physics.md section 7). The mean
+of e_k over gait cycles is c_k u_k: c_k is the clearance, and u_k(theta) a shape from simulation, of a length
+near 1 and along the contact's normal.
 """
 
 from collections.abc import Sequence
@@ -19,26 +19,26 @@ from leg_wear_monitor.mechanism.ideal import TURN, one_cycle
 from leg_wear_monitor.mechanism.position import build_linkage
 from leg_wear_monitor.mechanism.spec import Mechanism, RevoluteJoint
 
-PHASES = 128  # of a turn: bins of samples, and points of all tables here
+PHASES = 128  # crank phases per turn: bins of samples, and points of the tables of this module
 
-_ROUNDING = 1.0e-9  # rad/m: a joint that an encoder cannot see
-_FINE = 64  # points of the ideal angles between two phases
+_ROUNDING = 1.0e-9  # rad/m: a smaller effect on an encoder's angle is rounding of 0
+_FINE = 64  # points of the ideal angles per phase
 
 
 @attrs.frozen(eq=False)
 class AngleModel:
-    """Angles of m encoders over P phases, and how k clearances change them.
+    """Angles of m encoders over P phases, and their derivatives by the eccentricities of k clearance joints.
 
     Attributes
     ----------
     sensors, clearance_joints : tuple of str
         Joints with an encoder; clearance joints.
     angle : (P _FINE, m) array, rad
-        Of the ideal linkage at equal steps of the crank from 0.
+        Angles of the ideal linkage at equal steps of the crank from 0.
     by_crank : (P, m) array
-        Its derivative by the crank angle, at the middle of each bin.
+        Their derivatives by the crank angle at the middle of each phase.
     by_e : (P, m, k, 2) array, rad/m
-        S_phi there; exactly 0 where an eccentricity does not turn an encoder's joint.
+        S_phi there; exactly 0 where an eccentricity has no effect on an encoder.
     """
 
     sensors: tuple[str, ...]
@@ -48,7 +48,7 @@ class AngleModel:
     by_e: Floats
 
     def deviation(self, crank_angle: Floats, angles: Floats) -> Floats:
-        """Departure (n, m) [rad] of measured angles (n, m) from the ideal linkage's at crank angles (n,)."""
+        """Deviation (n, m) [rad] of measured angles (n, m) from the ideal linkage's at crank angles (n,)."""
         points = len(self.angle)
         at = np.arange(points + 1) * (TURN / points)
         ideal = [np.interp(crank_angle % TURN, at, np.append(one, one[0])) for one in self.angle.T]
@@ -56,13 +56,14 @@ class AngleModel:
 
 
 def angle_model(mechanism: Mechanism, sensors: Sequence[str]) -> AngleModel:
-    """Model of encoders on joints of a mechanism.
+    """Model of encoders on the revolute joints ``sensors`` of a mechanism.
 
     Raises
     ------
     ConfigError
-        For a sensor on what is not a revolute joint.
+        If a sensor is not on a revolute joint.
     AssemblyError
+        If the linkage does not close or has a dead point.
     """
     for name in sensors:
         if not isinstance(mechanism.joints.get(name), RevoluteJoint):
@@ -89,22 +90,23 @@ def angle_model(mechanism: Mechanism, sensors: Sequence[str]) -> AngleModel:
 
 
 def _differences(mechanism: Mechanism, sensors: Sequence[str], of_bodies: Floats) -> Floats:
-    """What each sensor sees of a quantity (P, bodies, ...): the journal's body less the bushing's."""
+    """Values (P, m, ...) at the sensors of bodies' values (P, n, ...): journal's minus bushing's body."""
     names = body_names(mechanism)
     pairs = [[names.index(body) for body in mechanism.sides(joint)] for joint in sensors]
     return np.stack([of_bodies[:, j] - of_bodies[:, b] for b, j in pairs], axis=1)
 
 
 def _finer(table: Floats, points: int) -> Floats:
-    """A smooth periodic table (p, m) at more points, by its Fourier series."""
+    """A smooth periodic table (p, m), interpolated to more points by its Fourier series."""
     series = np.fft.rfft(table, axis=0)
     return np.asarray(np.fft.irfft(series, points, axis=0) * (points / len(table)))
 
 
 def design(model: AngleModel, shape: Floats) -> Floats:
-    """Columns (P, m, k + 1 + 2 m) of the deviations.
+    """Columns (P, m, k + 1 + 2 m) of the regression, for mean shapes (P, k, 2) of the eccentricities.
 
-    By the clearances, the crank encoder's offset, and each encoder's offset and scale error.
+    The parameters are the clearances [rad/m], the crank encoder's offset, and the offset and the scale error
+    of each encoder.
     """
     sensors = len(model.sensors)
     by_clearance = np.einsum("pmkd,pkd->pmk", model.by_e, shape)

@@ -1,9 +1,10 @@
-"""What encoders would show of a leg with given clearances, and how that changes with each: by simulation.
+"""Encoder angles of a leg with given clearances, and their derivatives by each clearance, from simulation.
 
-The linear model of `joint_angles` knows what an eccentricity does to an angle. But a wider clearance also
-changes where the other journals lie: a regression on it mistakes one joint for another. So the leg is
-simulated with the clearances that are expected, and with each of them wider in turn; the differences are the
-columns of the regression. That takes seconds, so it goes on a gait cycle at a time.
+The linear model of `joint_angles` contains the effect of an eccentricity on an angle. A wider clearance also
+changes the eccentricities of the other joints, so a regression on the linear model alone attributes the
+effect to wrong joints. Therefore the leg is simulated with the expected clearances, and with each of them
+widened in turn; the differences are the columns of the regression. This takes seconds and is therefore done
+one gait cycle at a time.
 """
 
 from typing import NamedTuple
@@ -21,11 +22,11 @@ from leg_wear_monitor.mechanism.ideal import TURN
 from leg_wear_monitor.mechanism.spec import Mechanism
 from leg_wear_monitor.twin.reference.joint_angles import PHASES, AngleModel, design
 
-CYCLES = 48  # simulated for each leg: its scatter is that of as many cycles seen
-OPENED_M = 1.5e-4  # by which each clearance is wider in turn
+CYCLES = 48  # simulated cycles of each leg: the scatter equals that of as many observed cycles
+OPENED_M = 1.5e-4  # increase of each clearance in turn [m]
 
 _LEAST_CLEARANCE_M = 5.0e-5
-_LEAST_WEAR_M = 5.0e-6  # from which on wear has a profile that more wear is supposed to follow
+_LEAST_WEAR_M = 5.0e-6  # least mean wear whose profile is scaled; with less, a joint is widened evenly
 
 
 @attrs.frozen(eq=False)
@@ -35,12 +36,13 @@ class Reference:
     Attributes
     ----------
     clearance_m : (k,) array
+        Mean radial clearances.
     deviation : (P, m) array, rad
-        With these clearances and encoders without an error.
+        Deviations for these clearances and encoders without errors.
     columns : (P, m, k + 1 + 2 m) array
         Derivatives by clearances [rad/m], the crank encoder's offset, each encoder's offset and scale error.
     cycles : int
-        That were simulated for it.
+        Number of simulated cycles of each leg.
     """
 
     clearance_m: Floats
@@ -50,7 +52,7 @@ class Reference:
 
 
 class ReferenceSnapshot(NamedTuple):
-    """All of a `ReferenceRun`; plain arrays and numbers."""
+    """Complete state of a `ReferenceRun` as plain arrays and numbers."""
 
     clearance_m: Floats
     depth: Floats
@@ -61,15 +63,15 @@ class ReferenceSnapshot(NamedTuple):
 
 
 class ReferenceRun:
-    """Simulates a reference, a gait cycle at a time.
+    """Computes a reference, one gait cycle at a time.
 
     Parameters
     ----------
     mechanism : Mechanism
-        Driven at the speed that encoders are looked at.
+        Driven at the speed of the observed gait.
     model : AngleModel
     cycles : int
-        That each of the legs is simulated for, after a first one that settles.
+        Averaged gait cycles of each leg, after a first one that is left out.
     """
 
     def __init__(self, mechanism: Mechanism, model: AngleModel, cycles: int = CYCLES) -> None:
@@ -85,19 +87,23 @@ class ReferenceRun:
 
     @property
     def is_busy(self) -> bool:
-        """Whether there is something to simulate."""
+        """Whether a reference is in progress."""
         return self._stepper is not None
 
     def begin(self, clearance_m: Floats, depth: Floats) -> None:
-        """Begin a reference of mean clearances (k,) [m]; depths (k, 2, N) [m] tell where joints are worn."""
+        """Begin a reference for mean clearances (k,) [m], with the shape of the wear depths (k, 2, N) [m]."""
         self._target, self._depth = np.maximum(clearance_m, _LEAST_CLEARANCE_M), depth.copy()
         self._means = ()
         self._begin_leg()
 
     def advance(self) -> Reference | None:
-        """Simulate one gait cycle; the reference, when that was the last one.
+        """Simulate one gait cycle.
 
-        A leg that cannot be simulated ends it without one.
+        Returns
+        -------
+        Reference or None
+            The reference after its last cycle, else None. If the motion of a leg diverges, the computation
+            ends without a reference.
         """
         if self._stepper is None:
             return None
@@ -109,7 +115,7 @@ class ReferenceRun:
             if status != DONE:
                 self._stepper = None
                 return None
-            if self._cycle:  # the first cycle settles
+            if self._cycle:  # the first cycle is left out
                 total[step % PHASES] += self._stepper.eccentricity.ravel()
         self._cycle += 1
         if self._cycle <= self._cycles:
@@ -129,7 +135,7 @@ class ReferenceRun:
         )
 
     def restore(self, snapshot: ReferenceSnapshot) -> None:
-        """Go back to a snapshot of a run of the same mechanism and model; it goes on bit for bit."""
+        """Restore a snapshot of a run of the same mechanism and model; it continues bit-identically."""
         self._target, self._depth, self._means = snapshot.clearance_m, snapshot.depth, snapshot.means
         self._stepper = None
         if snapshot.stepper is not None:
@@ -137,7 +143,7 @@ class ReferenceRun:
         self._total, self._cycle = snapshot.total.copy(), snapshot.cycle
 
     def _begin_leg(self) -> ClearanceStepper:
-        """Set the next leg in motion: the first as expected, then each joint wider in turn."""
+        """Start the next leg: first with the target clearances, then with each of them widened in turn."""
         target = self._opened(len(self._means))
         clearance, depth = worn_to(self._fresh, self._depth, target)
         self._setup.contacts.clearance[:] = clearance
@@ -148,7 +154,7 @@ class ReferenceRun:
         return self._stepper
 
     def _opened(self, leg: int) -> Floats:
-        """Clearances of leg 0 as wanted, of leg k + 1 with joint k wider."""
+        """Clearances (k,) [m]: those of the target for leg 0, with joint k widened for leg k + 1."""
         target = self._target.copy()
         target[leg - 1 : leg] += OPENED_M
         return target
@@ -164,16 +170,16 @@ class ReferenceRun:
 
 
 def _by_angle(mean: Floats, speed: float) -> Floats:
-    """Means (P, k, 2) with phases that count with the crank's angle, whichever way it turns."""
+    """Means (P, k, 2) in the order of the crank angle, for either direction of rotation."""
     if speed < 0.0:
         mean = np.roll(mean[::-1], 1, axis=0)
     return np.asarray(mean.reshape(PHASES, -1, 2))
 
 
 def worn_to(fresh: Floats, depth: Floats, target: Floats) -> tuple[Floats, Floats]:
-    """Clearances when new (k,) and depths (k, 2, N) of joints whose mean clearances are the target (k,) [m].
+    """Clearances when new (k,) and wear depths (k, 2, N) that give the target (k,) mean clearances [m].
 
-    A joint that is worn is supposed to be worn more, or less, where it is; what has no profile opens evenly.
+    The wear profile of a worn joint is scaled; a joint without a profile is widened evenly.
     """
     worn, wanted = depth.sum(axis=1).mean(axis=1), target - fresh
     scale = np.where((worn > _LEAST_WEAR_M) & (wanted > 0.0), wanted / np.maximum(worn, _LEAST_WEAR_M), 1.0)

@@ -1,1 +1,1 @@
-"""From samples to the motion of the crank: order, faults, filter, spline."""
+"""Crank tracker: order and faults of samples, filter, smoother, spline (physics.md section 9)."""

@@ -1,4 +1,4 @@
-"""Samples as they arrive: what is wrong with them, whether their stamps can be believed, their order."""
+"""Arriving samples: faults, plausibility of stamps, order (physics.md section 9)."""
 
 import math
 
@@ -6,13 +6,13 @@ from leg_wear_monitor.kernel import kernel
 from leg_wear_monitor.twin.kinds import CRANK, KINDS, TORQUE
 from leg_wear_monitor.twin.sample import NO_FAULT, NOT_FINITE, OUT_OF_RANGE, WRONG_TYPE, ZERO_STAMP
 
-LARGEST_RATE = 1.0e3  # rad/s: beyond is no leg's
+LARGEST_RATE = 1.0e3  # largest plausible crank speed [rad/s]
 LARGEST_ANGLE, LARGEST_TORQUE = KINDS[CRANK].largest, KINDS[TORQUE].largest
 
 
 @kernel
 def find_fault(sample):
-    """What is wrong with a sample, if it has no fault already."""
+    """Fault of a sample: the one that it arrived with, else the first one found."""
     if sample.fault != NO_FAULT:
         return min(sample.fault, OUT_OF_RANGE)
     if sample.kind == CRANK:
@@ -30,7 +30,7 @@ def find_fault(sample):
 
 @kernel
 def _was_released(state, sample):
-    """Whether a sample that comes too late is one that has been here before."""
+    """Whether a late sample repeats a released one."""
     clock, queue, stamp, kind = state.clock, state.queue, sample.stamp_ns, sample.kind
     if stamp == clock.released_ns:
         return (clock.released_kinds >> kind) & 1 == 1
@@ -44,7 +44,7 @@ def _was_released(state, sample):
 
 @kernel
 def _copy_measured(source, out):
-    """Copy what the tracker needs of a sample."""
+    """Copy the fields of a sample that the tracker needs."""
     out.stamp_ns, out.kind, out.fault, out.torque_nm = (
         source.stamp_ns,
         source.kind,
@@ -54,16 +54,16 @@ def _copy_measured(source, out):
     out.crank_angle_rad, out.crank_velocity_radps = source.crank_angle_rad, source.crank_velocity_radps
 
 
-# what to do with an arrival: nothing, or put it in order, or that after a jump of the stamps
+# decisions on an arriving sample: drop it; insert it in order; insert it after a new time base
 DROP_IT, KEEP_IT, AFTER_JUMP = range(3)
 
 
 @kernel
 def arrive(model, state, sample):
-    """What to do with a sample, by its stamp and those before it.
+    """Decision on a sample, by its stamp and the previous ones.
 
-    A stamp far from the others is believed only if another follows it: one bad clock reading must not cost
-    the track.
+    A stamp far from the others is accepted only after a second one follows it: one wrong clock reading must
+    not lose the track.
     """
     clock, count, candidate = state.clock, state.counts, state.candidate
     stamp, kind = sample.stamp_ns, sample.kind
@@ -88,17 +88,17 @@ def arrive(model, state, sample):
             count.duplicates += 1
         else:
             count.late += 1
-        clock.newest_of_ns[kind] = max(clock.newest_of_ns[kind], stamp)  # from now on it is waited for
+        clock.newest_of_ns[kind] = max(clock.newest_of_ns[kind], stamp)  # the horizon now waits for this kind
         return DROP_IT
     return KEEP_IT
 
 
 @kernel
 def horizon_of(model, clock):
-    """Stamp up to which samples have their order, a window behind the youngest.
+    """Stamp [ns] up to which the order of samples is final, one window behind the youngest.
 
-    One kind waits for the other as long as gaps are bridged: what one topic brings late, or after a burst of
-    the other, is not lost.
+    Kinds wait for each other up to the longest bridged gap: samples of a topic that is late, or that arrive
+    after a burst of the other topic, are not lost.
     """
     newest = clock.newest_ns
     horizon = newest
@@ -110,7 +110,7 @@ def horizon_of(model, clock):
 
 @kernel
 def insert(state, sample):
-    """Put a sample where it belongs among those that wait; False for one that waits already."""
+    """Insert a sample into the waiting ones in order; False for a repeated one."""
     clock, arrivals, stamp, kind = state.clock, state.arrivals, sample.stamp_ns, sample.kind
     i = clock.waiting
     while i > 0 and (

@@ -1,9 +1,9 @@
-"""Where the crank is, by samples before (Kalman) and after (modified Bryson-Frazier smoother).
+"""Kalman filter and modified Bryson-Frazier smoother of the crank's motion (physics.md section 9).
 
-The crank's angle, speed and acceleration change by a jerk that is white noise. With the sensor's noise spread
-over the time between samples, the filter's bandwidth is (jerk / noise)^(1/6) rad/s at any rate. The smoother
-is that of Bierman (1973, *Fixed interval smoothing with discrete measurements*): an adjoint vector runs back
-over the samples after, and needs no inverse.
+The crank's angle, speed and acceleration are driven by a jerk that is white noise. With the sensor's noise
+spread over the time between samples, the filter's bandwidth is (jerk / noise)^(1/6) rad/s at any rate. The
+smoother is that of Bierman (1973, *Fixed interval smoothing with discrete measurements*): an adjoint vector
+is propagated back over the later samples, without a matrix inverse.
 """
 
 import math
@@ -12,13 +12,13 @@ from leg_wear_monitor.kernel import kernel
 from leg_wear_monitor.twin.kinds import CRANK
 
 _TURN = 2.0 * math.pi
-_WIDEST_GATE = 2.5  # rad: further off, an angle might as well be the other way round
-_SIGMAS = 5.0
+_WIDEST_GATE = 2.5  # rad: above it, an innovation's direction is ambiguous (near half a turn)
+_SIGMAS = 5.0  # standard deviations of the prediction that are added to a gate
 
 
 @kernel
 def begin_filter(model, angle, out_estimate):
-    """First sample: its angle in [0, 2 pi), the commanded speed as a first guess."""
+    """Initialise the estimate by a first angle [rad], reduced to [0, 2 pi), and the commanded speed."""
     e, speed = out_estimate, model.commanded_speed
     e.angle, e.speed, e.acceleration = angle - _TURN * math.floor(angle / _TURN), speed, 0.0
     e.p00, e.p01, e.p02 = model.angle_noise / model.longest_spread, 0.0, 0.0
@@ -27,7 +27,7 @@ def begin_filter(model, angle, out_estimate):
 
 @kernel
 def predict(model, h, estimate):
-    """The filter's state and covariance a time h [s] later."""
+    """Propagate the filter's state and covariance by a time h [s], in place."""
     e, x, v, a = estimate, estimate.angle, estimate.speed, estimate.acceleration
     e.angle, e.speed = x + h * (v + 0.5 * h * a), v + h * a
     p00, p01, p02, p11, p12, p22 = e.p00, e.p01, e.p02, e.p11, e.p12, e.p22
@@ -45,7 +45,7 @@ def predict(model, h, estimate):
 
 @kernel
 def note_prediction(estimate, step, out_row):
-    """Begin the row of a crank sample ``step`` [s] after the last one: what is known before it is used."""
+    """Begin the queue's row of a crank sample ``step`` [s] after the last one: the predicted state."""
     e, row = estimate, out_row
     row.step, row.bridged = step, 0
     row.angle, row.speed, row.acceleration = e.angle, e.speed, e.acceleration
@@ -55,7 +55,7 @@ def note_prediction(estimate, step, out_row):
 
 @kernel
 def _correct(i, variance, innovation, estimate, row):
-    """Take in a measurement of state i (0 angle, 1 speed); the row notes what the smoother needs of it."""
+    """Correct by a measurement of state i (0 angle, 1 speed); store the smoother's data in the row."""
     e = estimate
     b0 = e.p00 if i == 0 else e.p01  # column i of P
     b1 = e.p01 if i == 0 else e.p11
@@ -77,16 +77,16 @@ def _correct(i, variance, innovation, estimate, row):
 
 @kernel
 def update(model, h, step, angle, velocity, trusted, estimate, row):
-    """Take in a crank sample; fills its row of the queue.
+    """Filter a crank sample (angle [rad], velocity [rad/s]) and fill its row of the queue.
 
-    It is h [s] after the filter's time and ``step`` [s] after the last sample used. Its velocity is used
-    where it is ``trusted``.
+    It is h [s] after the filter's time and ``step`` [s] after the last used sample. Its velocity is used if
+    ``trusted``.
 
     Returns
     -------
     used, verdict
-        Whether the sample passed its gate (the filter is that of the prediction otherwise); 1 for a velocity
-        that agrees with the angles, -1 for one that does not, 0 for none.
+        Whether the sample passed its gate (otherwise the filter contains the prediction); 1 for a velocity
+        that agrees with the angles, -1 for one that does not, 0 without velocity.
     """
     predict(model, h, estimate)
     note_prediction(estimate, step, row)
@@ -108,7 +108,7 @@ def update(model, h, step, angle, velocity, trusted, estimate, row):
 
 @kernel
 def _adjoin(i, row, l0, l1, l2):
-    """The adjoint vector before a measurement of state i, from that after it."""
+    """Adjoint vector (l0, l1, l2) before a measurement of state i, from that after it."""
     s, gain = row.innovation_variance[i], row.gain
     if s > 0.0:
         along = gain[i, 0] * l0 + gain[i, 1] * l1 + gain[i, 2] * l2 + row.innovation[i] / s
@@ -121,7 +121,7 @@ def _adjoin(i, row, l0, l1, l2):
 
 @kernel
 def smooth(queue, spline_node, tail, out_node):
-    """Crank motion at index ``spline_node`` of the queue, by all samples up to ``tail``."""
+    """Smoothed crank motion at index ``spline_node`` of the queue, from all samples before index ``tail``."""
     l0, l1, l2 = 0.0, 0.0, 0.0
     for j in range(tail - 1, spline_node - 1, -1):
         row = queue[j]

@@ -1,7 +1,7 @@
-"""From filtered samples to the crank's motion: smooth pieces between spline nodes, rest, how the gait goes.
+"""Crank motion from filtered samples: spline, rest, tracking state (physics.md section 9).
 
-A spline node is a crank sample some time after the node before; once enough samples after it are there it is
-smoothed, and the leg can go there. The leg is evaluated at all samples up to it on the way.
+A spline node is a crank sample at least a fixed time after the previous node. Once enough later samples have
+arrived, it is smoothed and the leg is advanced to it; the leg is evaluated at all samples up to it.
 """
 
 import math
@@ -25,15 +25,15 @@ from leg_wear_monitor.twin.steps import (
 from leg_wear_monitor.twin.tracker.crank_filter import smooth
 
 _TURN = 2.0 * math.pi
-_RESTING = 0.02  # rad that a crank at rest may creep before it moves again
-_PATIENCE = 10  # times the settling time that a start may take
+_RESTING = 0.02  # largest change of the angle of a resting crank [rad]
+_PATIENCE = 10  # largest duration of a start, in settling times
 
 IS_STOPPED, IS_STARTING, IS_IN_STEP, IS_OUT_OF_STEP = range(4)
 
 
 @kernel
 def evaluate_up_to(state, spline_node, steps, n):
-    """Evaluate the leg at all queued samples before index ``spline_node``, and drop them."""
+    """Add steps that evaluate the leg at all queued samples before an index, and drop these samples."""
     clock = state.clock
     for j in range(clock.head, spline_node):
         row = state.queue[j]
@@ -45,7 +45,7 @@ def evaluate_up_to(state, spline_node, steps, n):
 
 @kernel
 def lose(state, stamp, reason, steps, n):
-    """Lose the crank: samples that wait go out without the leg, and the next crank sample starts afresh."""
+    """End tracking at a stamp: release waiting samples without the leg; the next crank sample restarts."""
     clock = state.clock
     if clock.last_crank_ns != 0:
         state.counts.lost += 1
@@ -61,7 +61,7 @@ def lose(state, stamp, reason, steps, n):
 
 @kernel
 def _next_spline_node(model, state):
-    """Index of the next spline node in the queue, -1 where it, or a sample it needs, is not there yet."""
+    """Index of the next spline node in the queue; -1 if it, or a later sample that it needs, is missing."""
     clock = state.clock
     due = clock.acquiring_ns + model.acquire_ns
     if clock.followed != 0:
@@ -78,7 +78,7 @@ def _next_spline_node(model, state):
 
 @kernel
 def _drop_turns(state):
-    """Count whole turns apart, so that angles stay small and exact however long it goes on."""
+    """Count whole turns separately, so that angles stay small and exact."""
     turns = math.floor(state.ahead.angle / _TURN)
     if turns != 0.0:
         shift = turns * _TURN
@@ -92,7 +92,7 @@ def _drop_turns(state):
 
 @kernel
 def _evaluate_speed(model, clock, stamp, speed):
-    """Starting, in step or out of it, by how long the speed has been within tolerance or beyond."""
+    """Update the tracking state by the time for which the speed has been within tolerance or beyond."""
     within = 1 if model.slowest <= abs(speed) <= model.fastest else 0
     if clock.tolerance_since_ns == 0 or within != clock.in_tolerance:
         clock.tolerance_since_ns, clock.in_tolerance = stamp, within
@@ -105,7 +105,7 @@ def _evaluate_speed(model, clock, stamp, speed):
 
 @kernel
 def _stops(model, state, stamp, node):
-    """Whether the crank is at rest at a spline node; changes what was known of that."""
+    """Whether the crank is at rest at a spline node; updates the clock's fields of rest."""
     clock, least = state.clock, model.stop_speed
     if clock.at_rest != 0:
         if abs(node.speed) > 2.0 * least or abs(node.angle - state.node.angle) > _RESTING:
@@ -121,7 +121,7 @@ def _stops(model, state, stamp, node):
 
 @kernel
 def _report_direction(model, state, stamp, speed, steps, n):
-    """Note which way the crank turns, and report where that changes."""
+    """Update the direction of rotation; add a report of a reversal."""
     clock = state.clock
     if abs(speed) > model.stop_speed:
         direction = 1 if speed > 0.0 else -1
@@ -134,7 +134,7 @@ def _report_direction(model, state, stamp, speed, steps, n):
 
 @kernel
 def _bridged(state, spline_node):
-    """Time [ns] of bridged gaps up to a spline node."""
+    """Total time [ns] of bridged gaps up to a spline node."""
     total = 0
     for j in range(state.clock.head, spline_node + 1):
         row = state.queue[j]
@@ -145,14 +145,14 @@ def _bridged(state, spline_node):
 
 @kernel
 def _move(model, state, spline_node, stamp, steps, n):
-    """Steps that bring the leg from the last spline node to the next: it moves, or it rests."""
+    """Add the steps from the last spline node to the next: motion or rest."""
     clock, ahead, rested = state.clock, state.ahead, state.clock.at_rest != 0
     rests = _stops(model, state, stamp, ahead)
     if rests:
         ahead.speed, ahead.acceleration = 0.0, 0.0
     begin = clock.last_node_ns
     if rested:
-        # a rest is reported only up to a while before now, which is time for a smooth start
+        # a rest is reported up to a run-up time before the node, to leave time for a smooth start
         begin = max(clock.rested_ns, stamp - model.run_up_ns)
         if begin > clock.rested_ns:
             state.counts.standing_ns += begin - clock.rested_ns
@@ -177,7 +177,7 @@ def _move(model, state, spline_node, stamp, steps, n):
 
 @kernel
 def reach_spline_nodes(model, state, steps, n):
-    """Go on to all spline nodes that can be reached; steps from index n on, returns their number."""
+    """Advance to all spline nodes with enough later samples; add steps from index n; return their number."""
     clock, node, ahead, largest = state.clock, state.node, state.ahead, model.largest_speed
     while True:
         spline_node = _next_spline_node(model, state)

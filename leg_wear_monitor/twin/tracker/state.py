@@ -1,4 +1,4 @@
-"""The crank tracker's state: what waits, what has been filtered, what was counted."""
+"""State of the crank tracker: settings, counts, clocks, filter, queues."""
 
 from typing import NamedTuple
 
@@ -10,86 +10,86 @@ from leg_wear_monitor.twin.sample import FAULTS, GAIT_SAMPLE
 from leg_wear_monitor.twin.settings import TrackerSettings
 from leg_wear_monitor.twin.steps import SPLINE_NODE
 
-ARRIVALS, QUEUE = 2048, 4096  # samples that may wait for their order, and for the leg
+ARRIVALS, QUEUE = 2048, 4096  # capacities for samples that wait for their order, and for the leg
 
-_NODE_INTERVALS, _RUN_UPS = 0.2, 0.8  # of 1 / bandwidth
+_NODE_INTERVALS, _RUN_UPS = 0.2, 0.8  # interval of spline nodes, and run-up from rest, in 1 / bandwidth
 
 TRACKER_MODEL = np.dtype(
     [
-        ("reorder_window_ns", "i8"),  # how much later than a younger sample one may come
+        ("reorder_window_ns", "i8"),  # largest delay of a sample behind younger ones
         ("lag_ns", "i8"),  # time of samples after a spline node
         ("bridge_limit_ns", "i8"),  # longest gap that is bridged
         ("mark_gap_ns", "i8"),  # shortest gap that is counted
-        ("backward_jump_ns", "i8"),  # by how much stamps may go back
+        ("backward_jump_ns", "i8"),  # largest backward jump of stamps in one time base
         ("acquire_ns", "i8"),  # time of samples before the first spline node
-        ("stop_hold_ns", "i8"),  # how long a crank is slow before it is at rest
-        ("settle_ns", "i8"),  # how long a speed is within tolerance, or beyond, before that counts
+        ("stop_hold_ns", "i8"),  # time of slow motion before the crank is at rest
+        ("settle_ns", "i8"),  # time of a speed within tolerance, or beyond, before the state changes
         ("node_interval_ns", "i8"),  # least time between spline nodes
         ("run_up_ns", "i8"),  # time for a smooth start from rest
         ("jerk", "f8"),  # power density of the jerk [rad^2/s^5]
         ("angle_noise", "f8"),  # [rad^2 s]
         ("velocity_noise", "f8"),  # [rad^2/s]
         ("longest_spread", "f8"),  # longest time that a sample's noise is spread over [s]
-        ("gate", "f8"),  # how far off an angle may be [rad]
-        ("velocity_gate", "f8"),  # how far off a velocity may be [rad/s]
+        ("gate", "f8"),  # of the angle's innovation [rad]
+        ("velocity_gate", "f8"),  # of the velocity's innovation [rad/s]
         ("stop_speed", "f8"),  # least speed of a moving crank [rad/s]
         ("slowest", "f8"),  # least speed of a gait in step [rad/s]
         ("fastest", "f8"),  # largest speed of a gait in step [rad/s]
         ("commanded_speed", "f8"),  # of the gait [rad/s]
-        ("largest_speed", "f8"),  # largest speed believed [rad/s]
+        ("largest_speed", "f8"),  # largest plausible speed [rad/s]
     ]
 )
-"""What does not change: the settings, times in ns and the rest in SI."""
+"""Constants: the settings, with times in ns and everything else in SI units."""
 
 TRACKER_COUNTS = np.dtype(
     [
         # samples
         ("received", "i8"),  # all
-        ("used", "i8", (len(KINDS),)),  # with a value of each kind that was used
-        ("duplicates", "i8"),  # that were there before
-        ("late", "i8"),  # that came after their turn
-        ("stray_stamps", "i8"),  # with a stamp that no other sample is near
-        ("outliers", "i8"),  # with an angle too far off
-        ("velocity_outliers", "i8"),  # with a velocity too far off
-        # how often
-        ("gaps_bridged", "i8"),  # a gap was bridged
-        ("lost", "i8"),  # the crank was lost
-        ("backward_jumps", "i8"),  # stamps began anew further back
-        ("reversals", "i8"),  # the crank turned back
+        ("used", "i8", (len(KINDS),)),  # with a used value of each kind
+        ("duplicates", "i8"),  # repeated
+        ("late", "i8"),  # behind the released stamps
+        ("stray_stamps", "i8"),  # with a stamp far from all others
+        ("outliers", "i8"),  # with an angle beyond the gate
+        ("velocity_outliers", "i8"),  # with a velocity beyond the gate
+        # events
+        ("gaps_bridged", "i8"),  # bridged gaps
+        ("lost", "i8"),  # losses of tracking
+        ("backward_jumps", "i8"),  # backward jumps of stamps
+        ("reversals", "i8"),  # reversals of the crank
         # times
         ("bridged_ns", "i8"),  # in bridged gaps
         ("standing_ns", "i8"),  # at rest
-        ("unmonitored_ns", "i8"),  # without the leg
+        ("unmonitored_ns", "i8"),  # without tracking
         ("faults", "i8", (len(FAULTS),)),  # samples with each fault
     ]
 )
 
 TRACKER_CLOCK = np.dtype(
     [
-        ("newest_ns", "i8"),  # youngest stamp taken in
+        ("newest_ns", "i8"),  # youngest received stamp
         ("newest_of_ns", "i8", (len(KINDS),)),  # youngest stamp of each kind
         ("released_ns", "i8"),  # stamp up to which samples are released
-        ("released_kinds", "i8"),  # kinds released at that stamp, a bit each
-        ("waiting", "i8"),  # number of arrivals
+        ("released_kinds", "i8"),  # kinds released at that stamp, as bits
+        ("waiting", "i8"),  # number of waiting arrivals
         ("head", "i8"),  # begin of the queue
         ("tail", "i8"),  # end of the queue
-        ("last_crank_ns", "i8"),  # last crank sample used, 0 if none
-        ("refused", "i8"),  # crank samples refused since
-        ("filter_ns", "i8"),  # time of the estimate
-        ("acquiring_ns", "i8"),  # first crank sample of this acquisition
-        ("last_node_ns", "i8"),  # last spline node
-        ("out_since_ns", "i8"),  # since when the leg does not follow
-        ("followed", "i8"),  # 1 where the leg follows
+        ("last_crank_ns", "i8"),  # stamp of the last used crank sample, 0 if none
+        ("refused", "i8"),  # outliers since then
+        ("filter_ns", "i8"),  # stamp of the estimate
+        ("acquiring_ns", "i8"),  # stamp of the first crank sample since the last loss
+        ("last_node_ns", "i8"),  # stamp of the last spline node
+        ("out_since_ns", "i8"),  # stamp of the begin of the present loss of tracking
+        ("followed", "i8"),  # 1 while the leg is in motion or at rest
         ("at_rest", "i8"),  # 1 at rest
-        ("rested_ns", "i8"),  # up to when that rest is reported
-        ("slow_since_ns", "i8"),  # since when the crank is slow, 0 if it is not
+        ("rested_ns", "i8"),  # stamp up to which that rest is reported
+        ("slow_since_ns", "i8"),  # stamp of the begin of slow motion, 0 if not slow
         ("tracking", "i8"),  # IS_… of `crank_motion`
-        ("tolerance_since_ns", "i8"),  # since when the speed is within tolerance, or beyond
-        ("in_tolerance", "i8"),  # which of both: 1 within
-        ("direction", "i8"),  # 1 or -1, 0 if not known
-        ("turns", "i8"),  # whole turns of the crank, counted apart
-        ("velocity_credit", "i8"),  # velocities in a row that agreed with the angles
-        ("period_ns", "i8"),  # shortest time between crank samples lately
+        ("tolerance_since_ns", "i8"),  # stamp since which the speed is within tolerance, or beyond
+        ("in_tolerance", "i8"),  # 1 within tolerance
+        ("direction", "i8"),  # 1 or -1, 0 if unknown
+        ("turns", "i8"),  # whole crank turns, counted separately
+        ("velocity_credit", "i8"),  # successive velocities that agreed with the angles
+        ("period_ns", "i8"),  # shortest recent time between crank samples
     ]
 )
 
@@ -112,16 +112,16 @@ QUEUED = np.dtype(
         ("stamp_ns", "i8"),  # of its header
         ("kind", "i8"),  # of `twin.sample`
         ("torque", "f8"),  # of the drive [N m], NaN where absent
-        # of a crank sample only; arrays of two are those of its angle and of its velocity
-        ("step", "f8"),  # time since the crank sample before [s]
-        ("bridged", "i8"),  # 1 where that was a bridged gap
-        *_ESTIMATE,  # predicted from the samples before
-        ("innovation_variance", "f8", (2,)),  # [rad^2, rad^2/s^2]; 0 where it was not used
-        ("innovation", "f8", (2,)),  # measured less predicted [rad, rad/s]
-        ("gain", "f8", (2, 3)),  # of angle, speed and acceleration, in their units by that of the innovation
+        # of crank samples only; pairs are of angle and velocity
+        ("step", "f8"),  # time since the previous crank sample [s]
+        ("bridged", "i8"),  # 1 if that is a bridged gap
+        *_ESTIMATE,  # predicted from the previous samples
+        ("innovation_variance", "f8", (2,)),  # [rad^2, rad^2/s^2]; 0 for an unused value
+        ("innovation", "f8", (2,)),  # measured minus predicted [rad, rad/s]
+        ("gain", "f8", (2, 3)),  # of angle, speed and acceleration, in their units per that of the innovation
     ]
 )
-"""A sample that waits for the leg, with what the smoother needs of it."""
+"""A sample that waits for the leg, with the smoother's data."""
 
 
 TRACKER_STATE = np.dtype(
@@ -129,19 +129,20 @@ TRACKER_STATE = np.dtype(
         ("counts", TRACKER_COUNTS),
         ("clock", TRACKER_CLOCK),
         ("estimate", CRANK_ESTIMATE),  # after the last sample
-        ("node", SPLINE_NODE),  # where the leg's crank is
-        ("ahead", SPLINE_NODE),  # where it goes next, while that is worked out
+        ("node", SPLINE_NODE),  # the last spline node, which the leg has reached
+        ("ahead", SPLINE_NODE),  # the next one, during its computation
         ("candidate", GAIT_SAMPLE),  # sample that may begin a new time base, stamp 0 if there is none
     ]
 )
-"""What does not wait."""
+"""State of the tracker without its queues."""
 
 
 class TrackerState(NamedTuple):
-    """All of the tracker, as its kernels see it.
+    """Complete state of the tracker for its kernels.
 
-    The fields of `TRACKER_STATE`; ``arrivals`` (ARRIVALS,) of `GAIT_SAMPLE`, that wait for their order;
-    ``queue`` (QUEUE,) of `QUEUED`.
+    The fields of `TRACKER_STATE`; ``arrivals`` (ARRIVALS,): `GAIT_SAMPLE` that wait for their order;
+    ``queue``
+    (QUEUE,): `QUEUED` that wait for the leg.
     """
 
     counts: Record
@@ -159,7 +160,7 @@ def _nanoseconds(time_s: float) -> int:
 
 
 def tracker_model(settings: TrackerSettings) -> Records:
-    """The settings, one record; noise is that of 200 Hz, and so the bandwidth is one, at any rate."""
+    """The settings as a record; noise refers to 200 Hz, so the bandwidth is the same at any rate."""
     s, w, reference = settings, 2.0 * np.pi * settings.bandwidth_hz, 1.0 / 200.0
     models, speed = new_records(1, TRACKER_MODEL), abs(settings.commanded_speed_radps)
     model = record_of(models)

@@ -1,4 +1,4 @@
-"""The crank tracker: samples in order of arrival become steps for the leg in order of their stamps."""
+"""The crank tracker: converts samples in order of arrival to steps for the leg in order of stamps."""
 
 from collections.abc import Iterator
 from typing import NamedTuple
@@ -17,12 +17,12 @@ from leg_wear_monitor.twin.tracker.state import (
 )
 from leg_wear_monitor.twin.tracker.tracking import track
 
-_CHUNK = 256  # samples taken in at once
-_STEPS_A_SAMPLE = 7  # at most
+_CHUNK = 256  # samples per call of the kernel
+_STEPS_A_SAMPLE = 7  # largest number of steps per sample
 
 
 class TrackerSnapshot(NamedTuple):
-    """A tracker's state, of what waits only what is there."""
+    """State of a tracker; the queues contain the waiting samples only."""
 
     state: Records
     arrivals: Records
@@ -30,7 +30,7 @@ class TrackerSnapshot(NamedTuple):
 
 
 class CrankTracker:
-    """Follows the crank through noisy, late, repeated and missing samples.
+    """Tracks the crank's motion from noisy, late, repeated and missing samples.
 
     Parameters
     ----------
@@ -39,11 +39,11 @@ class CrankTracker:
     Attributes
     ----------
     records : Records
-        The one `TRACKER_STATE`; what waits is apart.
+        The `TRACKER_STATE`, (1,), without the queues.
     state : Record
-        The same by names.
+        The same record, by names.
     steps : Steps
-        What the last samples became; room for more.
+        Steps of the last block of samples, with room for more.
     """
 
     def __init__(self, settings: TrackerSettings) -> None:
@@ -55,19 +55,19 @@ class CrankTracker:
         self.steps = room_for_steps(_STEPS_A_SAMPLE * (QUEUE + ARRIVALS + _CHUNK))
 
     def update(self, samples: Samples) -> Iterator[tuple[Steps, int]]:
-        """Take in a block (n,) of samples, in order of arrival.
+        """Process a block (n,) of samples, in order of arrival.
 
         Yields
         ------
         steps : Steps
-            Valid until the next is asked for.
+            Valid until the next iteration.
         n : int
             Number of steps.
         """
         for start in range(0, len(samples), _CHUNK):
             block = samples[start : start + _CHUNK]
             own = self._block[: len(block)]
-            own[:] = block  # no other layout reaches compiled code, and what is changed is not the caller's
+            own[:] = block  # compiled code gets this layout only, and does not change the caller's array
             n = track(self._model, self.records, self._arrivals, self._queue, own, self.steps)
             yield self.steps, int(n)
 
@@ -81,7 +81,7 @@ class CrankTracker:
         )
 
     def restore(self, snapshot: TrackerSnapshot) -> None:
-        """Go back to a snapshot of a tracker of the same settings."""
+        """Restore a snapshot of a tracker of the same settings."""
         self.records[:] = snapshot.state
         clock = self.state.clock
         self._arrivals[: clock.waiting] = snapshot.arrivals

@@ -1,4 +1,4 @@
-"""Samples as they arrive: put in order, checked, filtered, and made into steps for the leg."""
+"""Kernel of the tracker: converts samples in order of arrival to steps (physics.md section 9)."""
 
 import math
 
@@ -27,17 +27,16 @@ from leg_wear_monitor.twin.tracker.crank_filter import begin_filter, note_predic
 from leg_wear_monitor.twin.tracker.crank_motion import lose, reach_spline_nodes
 from leg_wear_monitor.twin.tracker.state import ARRIVALS, QUEUE, TrackerState
 
-# velocities in a row that must agree with the angles of a moving crank before any is used: many drivers
-# send zeros, which are right at rest only
+# successive velocities that must agree with the angles of a moving crank before any is used: many drivers
+# send zeros, which are correct at rest only
 _ENOUGH_CREDIT = 20
-# of the crank's samples, shortest lately: a longer time between them is a gap, if it is long
-_GAP_PERIODS = 2
-_AT_LEAST_REFUSED = 5  # samples in a row, before the crank is held to be elsewhere
+_GAP_PERIODS = 2  # least duration of a gap, in periods of the crank samples
+_AT_LEAST_REFUSED = 5  # successive outliers after which tracking is lost
 
 
 @kernel
 def _make_room(state, steps, n):
-    """Room for one more sample in the queue: moved down, or all lost where it is full of waiting ones."""
+    """Make room in a full queue: move it down, or end tracking if it is full of waiting samples."""
     clock, queue = state.clock, state.queue
     if clock.tail == QUEUE:
         head, tail = clock.head, clock.tail
@@ -51,7 +50,7 @@ def _make_room(state, steps, n):
 
 @kernel
 def _begin(model, state, sample, row):
-    """First crank sample of an acquisition."""
+    """Start the filter with the first crank sample."""
     clock = state.clock
     begin_filter(model, sample.crank_angle_rad, state.estimate)
     clock.acquiring_ns = sample.stamp_ns
@@ -62,7 +61,7 @@ def _begin(model, state, sample, row):
 
 @kernel
 def _filter(model, state, sample, row):
-    """Take a crank sample into the filter; whether it passed the gate."""
+    """Filter a crank sample; returns whether it passed the gate."""
     clock, count = state.clock, state.counts
     gap = sample.stamp_ns - clock.last_crank_ns
     h, step = 1.0e-9 * (sample.stamp_ns - clock.filter_ns), 1.0e-9 * gap
@@ -90,7 +89,7 @@ def _filter(model, state, sample, row):
 
 @kernel
 def _follow(model, state, sample, steps, n):
-    """Take in a sample whose turn it is, and go on as far as can be."""
+    """Process a sample in order of stamps, and advance to all spline nodes that it completes."""
     clock, count, stamp, kind = state.clock, state.counts, sample.stamp_ns, sample.kind
     n = _make_room(state, steps, n)
     since = stamp - clock.last_crank_ns
@@ -125,7 +124,7 @@ def _follow(model, state, sample, steps, n):
 
 @kernel
 def _release(model, state, horizon, steps, n):
-    """Follow all waiting samples up to a stamp, and more where too many wait."""
+    """Process all waiting samples up to a stamp [ns], and more if too many wait."""
     clock, arrivals, done = state.clock, state.arrivals, 0
     while done < clock.waiting and (
         arrivals[done].stamp_ns <= horizon or clock.waiting - done >= ARRIVALS - 1
@@ -144,7 +143,7 @@ def _release(model, state, horizon, steps, n):
 
 @kernel
 def _take_new_time_base(state, steps, n):
-    """After a jump of the stamps, once all that waited has gone: start from the sample that began it."""
+    """Start a new time base with the candidate sample, after all waiting samples were released."""
     clock, candidate = state.clock, state.candidate
     if candidate.stamp_ns < clock.newest_ns:
         state.counts.backward_jumps += 1
@@ -160,7 +159,7 @@ def _take_new_time_base(state, steps, n):
 
 @entry
 def track(models, states, arrivals, queue, samples, steps):
-    """Take in samples (n,) of `GAIT_SAMPLE` in order of arrival; there is one model, and one state.
+    """Process samples (n,) of `GAIT_SAMPLE` in order of arrival; models and states are (1,).
 
     Returns
     -------
@@ -183,7 +182,7 @@ def track(models, states, arrivals, queue, samples, steps):
             sample.crank_velocity_radps = math.nan
         decision = arrive(model, state, sample)
         while decision != DROP_IT:
-            horizon = clock.newest_ns  # after a jump all that waits goes first
+            horizon = clock.newest_ns  # before a new time base, release all waiting samples
             if decision == KEEP_IT:
                 if not insert(state, sample):
                     count.duplicates += 1

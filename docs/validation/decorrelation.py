@@ -13,7 +13,7 @@ from leg_wear_monitor.dynamics.clearance.run import ClearanceRun
 from leg_wear_monitor.dynamics.run.protocol import Run
 from leg_wear_monitor.dynamics.run.run_statistics import BEGIN, new_run_statistics
 from leg_wear_monitor.dynamics.simulation import MODELS, prepare
-from leg_wear_monitor.mechanism.ideal import turned
+from leg_wear_monitor.mechanism.ideal import rotated
 from leg_wear_monitor.report.figures import figure as drawing
 
 LEGS, SETS = ("bionic_leg", "jansen_leg"), ("AB", "G", "IJ", "ABGIJ")
@@ -39,7 +39,7 @@ class Watched:
         arrays, q = self.setup.linkage.arrays, self.run.q
         bodies, points = arrays.joint_body[self.joints], arrays.joint_point[self.joints]
         bushing, journal = (
-            [q[b, :2] + turned(point, q[b, 2]) for b, point in zip(bodies[:, i], points[:, i], strict=True)]
+            [q[b, :2] + rotated(point, q[b, 2]) for b, point in zip(bodies[:, i], points[:, i], strict=True)]
             for i in range(2)
         )
         return np.array(journal) - np.array(bushing)

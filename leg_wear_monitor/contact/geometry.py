@@ -33,7 +33,7 @@ def worn_contact(ex, ey, clearance, slope, bend):
 
     Returns
     -------
-    delta, nx, ny, scale, turned
+    delta, nx, ny, scale, by_slope
         Penetration [m], its gradient (nx, ny) by the eccentricity, and the factors of the clearance's change
         [-] and of its slope's change [rad] in the change of the penetration.
     """
@@ -43,12 +43,12 @@ def worn_contact(ex, ey, clearance, slope, bend):
     tilt = slope * inverse
     square = 1.0 / (1.0 + tilt * tilt)
     scale = math.sqrt(square)
-    turned = inside * square * scale * tilt * inverse
-    bent = abs(turned * bend * inverse)
+    by_slope = inside * square * scale * tilt * inverse
+    bent = abs(by_slope * bend * inverse)
     if bent > _SHARPEST:
-        turned *= _SHARPEST / bent
-    outwards, back = scale + turned * tilt, scale * tilt + turned * bend * inverse
-    return delta * scale, outwards * rx + back * ry, outwards * ry - back * rx, scale, turned
+        by_slope *= _SHARPEST / bent
+    outwards, back = scale + by_slope * tilt, scale * tilt + by_slope * bend * inverse
+    return delta * scale, outwards * rx + back * ry, outwards * ry - back * rx, scale, by_slope
 
 
 @kernel

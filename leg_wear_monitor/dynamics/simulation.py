@@ -236,19 +236,19 @@ def _run(
         raise ConfigError(
             "duration", "", f"{counted:g} s is too short for this model; expected more, or model full"
         )
-    turned = counted / period
+    counted_cycles = counted / period
     if not isinstance(mechanism.drive, SpeedDrive):
-        turned = abs(run.sample().crank_angle - angle) / TURN
+        counted_cycles = abs(run.sample().crank_angle - angle) / TURN
     return SimulationResult(
         mechanism=mechanism.name,
         model=model,
-        speed_rpm=60.0 * turned / counted * math.copysign(1.0, setup.speed),
-        cycles=turned,
+        speed_rpm=60.0 * counted_cycles / counted * math.copysign(1.0, setup.speed),
+        cycles=counted_cycles,
         simulated_s=skipped + counted,
         drive_torque_nm=drive_torque(statistics),
         energy_j=energy_balance(statistics, stored, run.stored_energy),
         toe=toe_errors(statistics) if mechanism.toe and isinstance(mechanism.drive, SpeedDrive) else None,
-        joints=joint_statistics(setup, statistics, setup.surfaces.depth - depth, turned),
+        joints=joint_statistics(setup, statistics, setup.surfaces.depth - depth, counted_cycles),
         impacts=first_impacts(setup, statistics),
         trace=trace_of(setup, tracer.samples) if trace else None,
         clearance_joints=setup.clearance_joints,

@@ -26,7 +26,7 @@ def simulate_lives(
     horizon_cycles: float,
     wear_factor: float = 1.0,
     speed_rpm: float | None = None,
-    progress: Callable[[float], None] = lambda _share: None,
+    progress: Callable[[float], None] = lambda _fraction: None,
 ) -> Iterator[tuple[Floats, Life]]:
     """Simulate lives, each with factors (k,) on its wear coefficients: the nominal life first, then others.
 

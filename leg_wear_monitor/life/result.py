@@ -90,13 +90,13 @@ class Life:
 
         Infinite if it does not grow, 0 if it was reached from the start.
         """
-        seen = self.clearance_m[:, k]
-        if clearance_m <= seen[0]:
+        clearance = self.clearance_m[:, k]
+        if clearance_m <= clearance[0]:
             return 0.0
-        if clearance_m <= seen[-1]:
-            return float(np.interp(clearance_m, seen, self.cycles))
+        if clearance_m <= clearance[-1]:
+            return float(np.interp(clearance_m, clearance, self.cycles))
         rate = self.growth_m_per_cycle[-1, k]
-        return float(self.cycles[-1] + (clearance_m - seen[-1]) / rate) if rate > 0.0 else np.inf
+        return float(self.cycles[-1] + (clearance_m - clearance[-1]) / rate) if rate > 0.0 else np.inf
 
     def to_dict(self) -> dict[str, Any]:
         """Plain object for JSON, joints by name; null for an unknown sector."""

@@ -155,7 +155,7 @@ def reactions(linkage: Linkage, q: Floats, lam: Floats) -> Floats:
             force[closure] = -lam[row : row + 2]
         else:
             angle = q[arrays.joint_body[closure, 0], 2]
-            force[closure] = -lam[row] * turned(arrays.joint_normal[closure], angle)
+            force[closure] = -lam[row] * rotated(arrays.joint_normal[closure], angle)
     return force
 
 
@@ -165,13 +165,13 @@ def point_motion(
     """Position [m], velocity [m/s] and acceleration [m/s^2] of a point of a body, (N, 2) each."""
     i = body_names(linkage.mechanism).index(body)
     q, v, a = motion.q[:, i], motion.v[:, i], motion.a[:, i]
-    lever = turned(point_from_com(linkage.mechanism, body, point), q[:, 2])
+    lever = rotated(point_from_com(linkage.mechanism, body, point), q[:, 2])
     across = np.stack([-lever[:, 1], lever[:, 0]], axis=1)
     w, alpha = v[:, 2:], a[:, 2:]
     return q[:, :2] + lever, v[:, :2] + w * across, a[:, :2] + alpha * across - w * w * lever
 
 
-def turned(vector: ArrayLike, angle: ArrayLike) -> Floats:
+def rotated(vector: ArrayLike, angle: ArrayLike) -> Floats:
     """A vector (2,) rotated by an angle [rad], or by N angles: (N, 2)."""
     x, y = np.asarray(vector, dtype=float)
     c, s = np.cos(angle), np.sin(angle)

@@ -139,11 +139,11 @@ def _gravity(mechanism: Mechanism) -> Iterator[Doubt]:
 
 def _joints(mechanism: Mechanism) -> Iterator[Doubt]:
     """Doubts about clearance settings, each for the first joint only: most come from the defaults."""
-    told: set[str] = set()
+    reported: set[str] = set()
     for joint, clearance in mechanism.clearances.items():
         for doubt in _clearance(clearance):
-            if doubt.key not in told:
-                told.add(doubt.key)
+            if doubt.key not in reported:
+                reported.add(doubt.key)
                 yield attrs.evolve(doubt, key=f"clearances ({joint}): {doubt.key}")
 
 

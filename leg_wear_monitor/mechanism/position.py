@@ -168,8 +168,8 @@ def _step(linkage: Linkage, q: Floats, angle: float, step: float) -> Floats | No
     near = _newton(linkage, guess, angle + step)
     if near is None or np.abs(near - guess).max() > abs(step):
         return None
-    there = evaluate(linkage, near, np.zeros_like(q), (angle + step, 0.0, 0.0)).jacobian
-    return near if np.linalg.slogdet(there)[0] == sign else None
+    ahead = evaluate(linkage, near, np.zeros_like(q), (angle + step, 0.0, 0.0)).jacobian
+    return near if np.linalg.slogdet(ahead)[0] == sign else None
 
 
 def drive_column(linkage: Linkage) -> Floats:

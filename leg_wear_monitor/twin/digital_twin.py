@@ -186,14 +186,14 @@ class DigitalTwin:
 
     def update(self, samples: Samples) -> TwinUpdate:
         """Process a block (n,) of `GAIT_SAMPLE` in order of arrival, as far as the lag allows."""
-        looks: list[SampleStatistics] = []
+        evaluated: list[SampleStatistics] = []
         cycles: list[CycleStatistics] = []
         events: list[Event] = []
         self._intake = None
         for steps, n in self._tracker.update(samples):
             if n:
-                looks.append(self._follower.follow(steps, n, cycles, events))
-        return TwinUpdate(joined(looks, len(self.clearance_joints)), tuple(cycles), tuple(events))
+                evaluated.append(self._follower.follow(steps, n, cycles, events))
+        return TwinUpdate(joined(evaluated, len(self.clearance_joints)), tuple(cycles), tuple(events))
 
     def snapshot(self) -> TwinSnapshot:
         """A copy of the whole state."""

@@ -11,7 +11,7 @@ from leg_wear_monitor.dynamics.run.run_statistics import TORQUE_ERROR, new_run_s
 from leg_wear_monitor.dynamics.simulation import prepare
 from leg_wear_monitor.mechanism.ideal import TURN
 from leg_wear_monitor.studies.summary import RANGES, fraction_of_range
-from leg_wear_monitor.studies.tasks.ensemble import ensemble, start_angles, watch
+from leg_wear_monitor.studies.tasks.ensemble import ensemble, observed_legs, start_angles
 from leg_wear_monitor.studies.tasks.grid import SAMPLES
 from leg_wear_monitor.studies.tasks.response import ERRORS, run_ensemble
 from leg_wear_monitor.wear.surfaces import BUSHING
@@ -61,7 +61,7 @@ def test_curves_stay_within_the_largest_errors(response):
 
 def test_a_fine_curve_reaches_the_largest_torque():
     """Looked at every 30 us, the drive torque departs from the ideal leg's as far as the tally says."""
-    (leg,) = watch(ensemble(load_mechanism(), PLACE | {"runs": 1}))
+    (leg,) = observed_legs(ensemble(load_mechanism(), PLACE | {"runs": 1}))
     turn, drive, statistics = 2**15, steady_drive(0.0, TURN), new_run_statistics(10)
     leg.stepper = ClearanceStepper(leg.setup, interval_s=1.0 / turn)
     leg.stepper.init(0.0, TURN)
@@ -139,7 +139,7 @@ def test_runs_start_on_the_grid_one_in_each_part_of_a_turn():
 
 def test_friction_and_laws_reach_the_joints():
     settings = PLACE | {"runs": 2, "friction": {"coefficient": 0.0}, "normal_law": "hertz"}
-    (leg, other) = watch(ensemble(load_mechanism(), settings))
+    (leg, other) = observed_legs(ensemble(load_mechanism(), settings))
     assert leg.setup.contacts.friction[0, 0] == 0.0
     assert leg.setup.contacts.hysteresis[0] == 0.0
     assert leg.stepper.state.drive[0] != other.stepper.state.drive[0]

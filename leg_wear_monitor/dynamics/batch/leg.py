@@ -80,7 +80,7 @@ class Leg:
         joints = len(stepper.eccentricity)
         away = self.perturb_m * np.sqrt(chance.random(joints))
         direction = TURN * chance.random(joints)
-        stepper.place(np.stack([away * np.cos(direction), away * np.sin(direction)], axis=1))
+        stepper.set_eccentricities(np.stack([away * np.cos(direction), away * np.sin(direction)], axis=1))
 
 
 def prepare_legs(legs: Sequence[Leg]) -> list[Setup | AssemblyError]:

@@ -21,12 +21,12 @@ from leg_wear_monitor.dynamics.clearance.outputs import (
 )
 from leg_wear_monitor.dynamics.clearance.start import load_state, sample_start
 from leg_wear_monitor.dynamics.clearance.step import (
+    deposit_due,
+    deposit_pending,
     gather_wear,
     integrate_joints,
     shift_start,
     try_step,
-    wear_off,
-    wear_what_turned,
 )
 from leg_wear_monitor.dynamics.joint.contact_event import (
     F_N,
@@ -134,7 +134,7 @@ def _steps(model, surfaces, state, begin, length, statistics, work):
     contacts = model.contacts
     done, trials, cut = 0.0, 0, NEVER
     speed = now.speed[0]
-    _look_at_drive(now, x, start, work.drive_start, statistics)
+    _sample_drive(now, x, start, work.drive_start, statistics)
     while done < length:
         left = length - done
         h = min(state.step[0], left)
@@ -162,13 +162,13 @@ def _steps(model, surfaces, state, begin, length, statistics, work):
         if cut == NEVER:
             state.step[0] = h * min(3.0, 0.9 * max(error, 1.0e-6) ** (-1.0 / 3.0))
         cut = NEVER
-        _take(model, surfaces, state, begin + done, h, turned, statistics, work)
+        _accept(model, surfaces, state, begin + done, h, turned, statistics, work)
         done = length if h >= left * (1.0 - 1.0e-9) else done + h
     return DONE, -1
 
 
 @kernel
-def _take(model, surfaces, state, t, h, turned, statistics, work):
+def _accept(model, surfaces, state, t, h, turned, statistics, work):
     """Accept the trial step of length h [s] from time t [s]: statistics, wear, contact events.
 
     ``turned``: crank angle at the end of the step, relative to that of the tables [rad].
@@ -186,10 +186,10 @@ def _take(model, surfaces, state, t, h, turned, statistics, work):
     )  # fmt: skip
     shift_start(now, x)
     copy_array(end, start)
-    statistics.worn_energy[0] += wear_what_turned(
+    statistics.worn_energy[0] += deposit_due(
         contacts, surfaces, state.approach, start, now, turned, state.pending, work.weight
     )
-    _look_at_drive(now, x, start, work.drive_end, statistics)
+    _sample_drive(now, x, start, work.drive_end, statistics)
     toe_deviation(now, x, statistics.response)
     first, last = work.drive_start, work.drive_end
     impulse = 0.5 * h * (first[SMOOTH] + last[SMOOTH]) + sudden_impulse(now, x)
@@ -200,7 +200,7 @@ def _take(model, surfaces, state, t, h, turned, statistics, work):
 
 
 @kernel
-def _look_at_drive(now, x, sample, out_drive, statistics):
+def _sample_drive(now, x, sample, out_drive, statistics):
     """Drive torque, its part without e'' [N m] and the power of loads [W], (3,); updates the extremes."""
     torque, sudden = drive_torque(now, x, sample)
     out_drive[WHOLE], out_drive[SMOOTH], out_drive[OUTSIDE] = torque, torque - sudden, outside_power(now, x)
@@ -219,7 +219,7 @@ def _finish(model, surfaces, state, statistics, work):
     statistics.time[0] += interval
     for k in range(state.approach.shape[0]):
         if (count + k) % WEARING == 0:
-            statistics.worn_energy[0] += wear_off(
+            statistics.worn_energy[0] += deposit_pending(
                 model.contacts, surfaces, k, sample, now, here, amid, state.pending, work.weight
             )
         force = math.sqrt(sample[k, F_N] ** 2 + sample[k, F_T] ** 2)

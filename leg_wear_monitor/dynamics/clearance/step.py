@@ -192,38 +192,38 @@ def gather_wear(added, start, end, pending):
 
 
 @kernel
-def wear_off(contacts, surfaces, k, start, now, turned, acted, pending, out_weight):
+def deposit_pending(contacts, surfaces, k, start, now, turned, acted, pending, out_weight):
     """Deposit the pending wear of joint k at its mean direction and eccentricity.
 
     ``turned``: crank angle relative to that of the tables [rad], ``acted``: the same at the time the wear
     acted. Returns the contact energy lost with the removed material [J].
     """
-    gone = 0.0
+    lost = 0.0
     integral = pending[k, 0]
     if integral > 0.0:
         scale = pending[k, 3] / integral / math.hypot(pending[k, 1], pending[k, 2])
         ex, ey = scale * pending[k, 1], scale * pending[k, 2]
         angle_b, turn_b = now.angle[k, 0], now.turn[k, 0]
         angle_j, turn_j = now.angle[k, 1], now.turn[k, 1]
-        there = (ex, ey, angle_b + turn_b * acted, angle_j + turn_j * acted)
-        gone = wear_joint(
+        acted_at = (ex, ey, angle_b + turn_b * acted, angle_j + turn_j * acted)
+        lost = wear_joint(
             contacts, surfaces, k, start[k, EX], start[k, EY],
-            angle_b + turn_b * turned, angle_j + turn_j * turned, there, integral, out_weight,
+            angle_b + turn_b * turned, angle_j + turn_j * turned, acted_at, integral, out_weight,
         )  # fmt: skip
         for i in range(pending.shape[1]):
             pending[k, i] = 0.0
-    return gone
+    return lost
 
 
 @kernel
-def wear_what_turned(contacts, surfaces, approach, start, now, turned, pending, out_weight):
+def deposit_due(contacts, surfaces, approach, start, now, turned, pending, out_weight):
     """Deposit pending wear where the contact has ended or its normal has rotated by two sectors.
 
-    Returns the contact energy lost with the removed material [J]; ``turned`` as in `wear_off`.
+    Returns the contact energy lost with the removed material [J]; ``turned`` as in `deposit_pending`.
     """
-    limit, gone = 4.0 * math.pi / surfaces.depth.shape[2], 0.0
+    limit, lost = 4.0 * math.pi / surfaces.depth.shape[2], 0.0
     for k in range(pending.shape[0]):
         across = abs(pending[k, 1] * start[k, EY] - pending[k, 2] * start[k, EX])
         if approach[k] == 0.0 or across > limit * pending[k, 3]:
-            gone += wear_off(contacts, surfaces, k, start, now, turned, 0.0, pending, out_weight)
-    return gone
+            lost += deposit_pending(contacts, surfaces, k, start, now, turned, 0.0, pending, out_weight)
+    return lost

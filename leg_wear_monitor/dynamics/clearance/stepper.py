@@ -132,7 +132,7 @@ class ClearanceStepper:
         sample = self.work.start
         return np.asarray(np.hypot(sample[:, F_N], sample[:, F_T]))
 
-    def place(self, eccentricity: Floats) -> None:
+    def set_eccentricities(self, eccentricity: Floats) -> None:
         """Set the eccentricities (k, 2) [m]."""
         self.state.e[:] = eccentricity.ravel()
 
@@ -140,7 +140,7 @@ class ClearanceStepper:
         """Discard the wear that is not yet deposited on the surfaces."""
         self.state.pending[:] = 0.0
 
-    def place_in_snapshot(self, name: str) -> Flags:
+    def snapshot_mask(self, name: str) -> Flags:
         """Mask (s,) of the entries of a snapshot's ``motion`` that belong to a field of `ClearanceState`."""
         shapes = state_shapes(len(self.state.approach))
         names = np.repeat(list(shapes), [int(np.prod(shape)) for shape in shapes.values()])

@@ -24,7 +24,7 @@ from leg_wear_monitor.dynamics.clearance.basis import Basis, derivative, project
 from leg_wear_monitor.dynamics.clearance.layout import changing_shapes, motion_shapes, views
 from leg_wear_monitor.mechanism.arrays import Floats, Ints, Singles, body_names, point_from_com
 from leg_wear_monitor.mechanism.constraints import DRIVE
-from leg_wear_monitor.mechanism.ideal import TURN, IdealMotion, one_cycle, turned
+from leg_wear_monitor.mechanism.ideal import TURN, IdealMotion, one_cycle, rotated
 from leg_wear_monitor.mechanism.position import Linkage
 
 POINTS = 1024  # table points per turn, with linear interpolation
@@ -220,7 +220,7 @@ def _toe(linkage: Linkage, motion: IdealMotion, basis: Basis) -> Floats:
         return toe
     body, point = linkage.mechanism.toe
     i = body_names(linkage.mechanism).index(body)
-    lever = turned(point_from_com(linkage.mechanism, body, point), motion.q[:, i, 2])
+    lever = rotated(point_from_com(linkage.mechanism, body, point), motion.q[:, i, 2])
     across = np.stack([-lever[:, 1], lever[:, 0]], axis=1)[:, :, None]
     here, turn = slice(3 * (i - 1), 3 * i - 1), basis.s[:, 3 * i - 1, None]
     toe[:, :, 0] = motion.q[:, i, :2] + lever

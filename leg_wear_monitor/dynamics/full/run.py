@@ -12,7 +12,7 @@ from leg_wear_monitor.dynamics.run.protocol import DONE, Sample, Setup, stop
 from leg_wear_monitor.dynamics.run.run_statistics import FORCE, TORQUE, RunStatistics, new_run_statistics
 from leg_wear_monitor.dynamics.run.toe_deviation import NO_TOE, Toe, ideal_toe
 from leg_wear_monitor.mechanism.arrays import Floats
-from leg_wear_monitor.mechanism.ideal import ideal_motion, turned
+from leg_wear_monitor.mechanism.ideal import ideal_motion, rotated
 from leg_wear_monitor.mechanism.position import assemble
 from leg_wear_monitor.mechanism.spec import SpeedDrive, TorqueDrive
 
@@ -116,7 +116,7 @@ class FullRun:
         toe = None
         if self.toe.body >= 0:
             x, y, angle = self.q[self.toe.body]
-            toe = turned(self.toe.point, angle) + np.array([x, y])
+            toe = rotated(self.toe.point, angle) + np.array([x, y])
         force = self._work.rates[0, :, FORCE].copy()
         return Sample(crank_angle, toe, float(self._work.drive_rates[0, TORQUE]), force)
 

@@ -31,8 +31,8 @@ def penetration(contacts, surfaces, k, ex, ey, direction, angle_b, angle_j):
         delta, nx, ny = journal_contact(ex, ey, contacts.clearance[k])
         return delta, nx, ny, bushing, journal, 0.0, 0.0
     clearance = bushing - journal
-    delta, nx, ny, scale, turned = worn_contact(ex, ey, clearance, slope_b + slope_j, bend_b + bend_j)
-    cam_b, cam_j = slope_b * scale + turned * bend_b, slope_j * scale + turned * bend_j
+    delta, nx, ny, scale, by_slope = worn_contact(ex, ey, clearance, slope_b + slope_j, bend_b + bend_j)
+    cam_b, cam_j = slope_b * scale + by_slope * bend_b, slope_j * scale + by_slope * bend_j
     if delta > 0.0:
         softer_b, softer_j = softening(
             contacts.normal_form[k], contacts.stiffness[k], delta, bushing, journal, slope_b, slope_j

@@ -12,8 +12,8 @@ from leg_wear_monitor.dynamics.run.protocol import Setup
 from leg_wear_monitor.errors import ConfigError
 from leg_wear_monitor.mechanism.ideal import TURN
 from leg_wear_monitor.mechanism.spec import Mechanism
-from leg_wear_monitor.studies.tasks.contact_watch import ObservedLeg
 from leg_wear_monitor.studies.tasks.grid import SAMPLES
+from leg_wear_monitor.studies.tasks.observed_leg import ObservedLeg
 
 
 def with_friction(mechanism: Mechanism, changes: dict[str, Any]) -> Mechanism:
@@ -66,7 +66,7 @@ def ensemble(mechanism: Mechanism, settings: dict[str, Any]) -> list[Leg]:
     ]
 
 
-def watch(legs: list[Leg], tolerance_m: float | None = None) -> list[ObservedLeg]:
+def observed_legs(legs: list[Leg], tolerance_m: float | None = None) -> list[ObservedLeg]:
     """Legs in their initial positions; they share one set of tables.
 
     Raises

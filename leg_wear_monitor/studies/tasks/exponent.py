@@ -17,10 +17,10 @@ from leg_wear_monitor.mechanism.arrays import Floats
 from leg_wear_monitor.mechanism.ideal import TURN
 from leg_wear_monitor.mechanism.spec import Mechanism
 from leg_wear_monitor.studies.point import Arrays
-from leg_wear_monitor.studies.tasks.contact_watch import ObservedLeg
-from leg_wear_monitor.studies.tasks.ensemble import ensemble, watch
+from leg_wear_monitor.studies.tasks.ensemble import ensemble, observed_legs
 from leg_wear_monitor.studies.tasks.grid import SAMPLES
 from leg_wear_monitor.studies.tasks.lyapunov import stretches
+from leg_wear_monitor.studies.tasks.observed_leg import ObservedLeg
 
 
 def lyapunov_exponent(mechanism: Mechanism, settings: dict[str, Any]) -> Arrays:
@@ -37,7 +37,7 @@ def lyapunov_exponent(mechanism: Mechanism, settings: dict[str, Any]) -> Arrays:
     SimulationError
         If the motion diverges.
     """
-    legs = watch(ensemble(mechanism, settings), settings["tolerance_m"])
+    legs = observed_legs(ensemble(mechanism, settings), settings["tolerance_m"])
     logs = np.array([_follow(leg, settings) for leg in legs])
     runs, cycles = settings["runs"], settings["cycles"]
     return {
@@ -58,7 +58,7 @@ def _follow(leg: ObservedLeg, settings: dict[str, Any]) -> Floats:
         leg.advance(steps, statistics)
         return stepper.snapshot().motion
 
-    scale, approach = _scale(leg), stepper.place_in_snapshot("approach")
+    scale, approach = _scale(leg), stepper.snapshot_mask("approach")
 
     def same_contacts(one: Floats, other: Floats) -> bool:
         return bool(np.array_equal(one[approach] > 0.0, other[approach] > 0.0))
@@ -78,5 +78,5 @@ def _scale(leg: ObservedLeg) -> Floats:
     units = {"e": clearance, "v": rate, "approach": rate}
     scale = np.zeros(len(leg.stepper.snapshot().motion))
     for name, unit in units.items():
-        scale[leg.stepper.place_in_snapshot(name)] = unit
+        scale[leg.stepper.snapshot_mask(name)] = unit
     return scale

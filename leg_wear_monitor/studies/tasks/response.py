@@ -20,9 +20,9 @@ from leg_wear_monitor.mechanism.ideal import TURN, one_cycle, point_motion
 from leg_wear_monitor.mechanism.position import Linkage
 from leg_wear_monitor.mechanism.spec import Mechanism
 from leg_wear_monitor.studies.point import Arrays
-from leg_wear_monitor.studies.tasks.contact_watch import ObservedLeg
-from leg_wear_monitor.studies.tasks.ensemble import ensemble, watch
+from leg_wear_monitor.studies.tasks.ensemble import ensemble, observed_legs
 from leg_wear_monitor.studies.tasks.grid import SAMPLES
+from leg_wear_monitor.studies.tasks.observed_leg import ObservedLeg
 
 BAND = (0.05, 0.5, 0.95)  # quantiles of the ensemble's cycles: lower end of the band, median, upper end
 ERRORS = ("toe_position_m", "toe_velocity_mps", "toe_acceleration_mps2", "drive_torque_nm")
@@ -56,7 +56,7 @@ def run_ensemble(mechanism: Mechanism, settings: dict[str, Any]) -> Arrays:
     SimulationError
         If the motion diverges.
     """
-    legs = watch(ensemble(mechanism, settings))
+    legs = observed_legs(ensemble(mechanism, settings))
     members = [_follow(leg, settings) for leg in legs]
     linkage, clearance_joints = legs[0].setup.linkage, legs[0].setup.clearance_joints
     result = {name: np.array([member[name] for member in members]) for name in members[0] if name != "curves"}

@@ -10,7 +10,7 @@ from leg_wear_monitor.mechanism.arrays import Floats
 from leg_wear_monitor.mechanism.ideal import TURN
 from leg_wear_monitor.mechanism.spec import Mechanism
 from leg_wear_monitor.studies.point import Arrays
-from leg_wear_monitor.studies.tasks.ensemble import ensemble, watch
+from leg_wear_monitor.studies.tasks.ensemble import ensemble, observed_legs
 from leg_wear_monitor.studies.tasks.grid import SAMPLES
 
 
@@ -31,7 +31,7 @@ def poincare_section(mechanism: Mechanism, settings: dict[str, Any]) -> Arrays:
     """
     start = round(settings["crank_angle_deg"] / 360.0 * SAMPLES) % SAMPLES * (TURN / SAMPLES)
     first = ensemble(mechanism, settings)[0]
-    (leg,) = watch([attrs.evolve(first, crank_angle_rad=start)])
+    (leg,) = observed_legs([attrs.evolve(first, crank_angle_rad=start)])
     statistics = new_run_statistics(len(mechanism.joints))
     leg.advance(settings["skip_cycles"] * SAMPLES, statistics)
     portrait = [moment for _ in range(settings["portrait_cycles"]) for moment in leg.moments(statistics)]

@@ -23,25 +23,25 @@ def compare(sensor, signature, leg, stepper, measured):
     torque, by, low_pass = leg.torque, leg.regressor, leg.low_pass
     i, w = blend(signature.shape[0] - 1, stepper.drive[ANGLE])
     lever = signature[i] + w * (signature[i + 1] - signature[i])
-    mean, seen = torque.sensed_impulse, torque.sensed_time
+    mean, duration = torque.sensed_impulse, torque.sensed_time
     squares = torque.sensed_squares
     torque.sensed_impulse, torque.sensed_time, torque.sensed_squares = 0.0, 0.0, 0.0
     before, torque.last_lever = torque.last_lever, lever
-    if low_pass.stage == 0 or not seen > 0.0:  # the first sample since the leg moves
+    if low_pass.stage == 0 or not duration > 0.0:  # the first sample since the leg moves
         low_pass.stage = max(low_pass.stage, 1)
         torque.unfiltered, leg.waiting.time = 0.0, 0.0
         return
-    dt = torque.unfiltered + seen
+    dt = torque.unfiltered + duration
     torque.unfiltered = dt
     longest = torque.period * _LONGEST_PERIOD
-    torque.period += _WEIGHT * (min(seen, longest) - torque.period) if longest > 0.0 else seen
-    if 0.0 < longest < seen:
+    torque.period += _WEIGHT * (min(duration, longest) - torque.period) if longest > 0.0 else duration
+    if 0.0 < longest < duration:
         return
     torque.unfiltered = 0.0
     direction = 1.0 if stepper.drive[SPEED] > 0.0 else -1.0
     if sensor.instants != 0:
-        mean /= seen
-        variance = max(squares / seen - mean * mean, 0.0)
+        mean /= duration
+        variance = max(squares / duration - mean * mean, 0.0)
         angle = stepper.drive[ANGLE]
         r = take_instant(sensor, leg, measured, mean, variance, lever, direction, dt, angle)
         if math.isfinite(r):
@@ -51,7 +51,7 @@ def compare(sensor, signature, leg, stepper, measured):
     fresh, fraction = low_pass.stage == 1, 1.0 - math.exp(-sensor.cutoff * dt)
     low_pass.stage = 2
     m = pass_low(fraction, fresh, measured, low_pass.measured)
-    p = pass_low(fraction, fresh, mean / seen, low_pass.predicted)
+    p = pass_low(fraction, fresh, mean / duration, low_pass.predicted)
     by[LOAD] = pass_low(fraction, fresh, 0.5 * (before + lever), low_pass.of_load)
     by[FRICTION] = pass_low(fraction, fresh, direction, low_pass.of_friction)
     by[LAG] = 0.0 if fresh else (torque.last_predicted - p) / dt

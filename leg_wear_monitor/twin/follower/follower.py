@@ -14,14 +14,14 @@ from leg_wear_monitor.kernel import compile_for
 from leg_wear_monitor.mechanism.arrays import Floats
 from leg_wear_monitor.mechanism.ideal import TURN
 from leg_wear_monitor.record import Record, Records, new_records, record_of
-from leg_wear_monitor.twin import steps as told
+from leg_wear_monitor.twin import steps as step_codes
 from leg_wear_monitor.twin.follower.cycle import (
     clear_run_statistics,
     clearances,
     cycle_statistics,
     torque_statistics,
 )
-from leg_wear_monitor.twin.follower.following import CYCLE, LEFT, NEEDS_START, TOLD, follow
+from leg_wear_monitor.twin.follower.following import CYCLE, LEFT, NEEDS_START, REPORTED, follow
 from leg_wear_monitor.twin.follower.load import FootLoad, torque_size
 from leg_wear_monitor.twin.follower.repeating import RepeatingResidual
 from leg_wear_monitor.twin.follower.state import EVALUATED, TORQUE_SENSOR, LegState, leg_state
@@ -34,13 +34,13 @@ _RUN_IN_S = 0.2
 _LEAST_TORQUE_NM = 1.0e-6  # lower bound of the RMS torque, for a leg that needs no torque
 
 _EVENT_KINDS = {
-    told.LOST_IN_GAP: TwinEventKind.LOST_IN_GAP,
-    told.LOST_BY_OUTLIERS: TwinEventKind.LOST_BY_OUTLIERS,
-    told.LOST_BY_OVERFLOW: TwinEventKind.LOST_BY_OVERFLOW,
-    told.LOST_BY_JUMP: TwinEventKind.BACKWARD_JUMP,
-    told.STOPPED: TwinEventKind.STOPPED,
-    told.MOVING: TwinEventKind.MOVING,
-    told.REVERSED: TwinEventKind.REVERSED,
+    step_codes.LOST_IN_GAP: TwinEventKind.LOST_IN_GAP,
+    step_codes.LOST_BY_OUTLIERS: TwinEventKind.LOST_BY_OUTLIERS,
+    step_codes.LOST_BY_OVERFLOW: TwinEventKind.LOST_BY_OVERFLOW,
+    step_codes.LOST_BY_JUMP: TwinEventKind.BACKWARD_JUMP,
+    step_codes.STOPPED: TwinEventKind.STOPPED,
+    step_codes.MOVING: TwinEventKind.MOVING,
+    step_codes.REVERSED: TwinEventKind.REVERSED,
 }
 _FAILURES = {
     STEP_TOO_SMALL: TwinEventKind.STEP_TOO_SMALL,
@@ -138,7 +138,7 @@ class LegFollower:
             elif reason == NEEDS_START:
                 events.append(self._start(steps, i))
                 i += int(steps["code"][i] != MOVE)
-            elif reason in (LEFT, TOLD):
+            elif reason in (LEFT, REPORTED):
                 if reason == LEFT:
                     self.state.motion.runs, self.state.motion.lost = 0, 0
                 events.append(Event(int(steps["begin_ns"][i]), _EVENT_KINDS[int(steps["detail"][i])]))

@@ -14,7 +14,7 @@ from leg_wear_monitor.twin.steps import EVALUATE, LEAVE, MOVE, REPORT, START
 
 # reasons for which the kernel returns before the last step: a cycle has ended; the caller must start the leg,
 # stop following, or record an event. Other values are the status codes of dynamics.run.
-CYCLE, NEEDS_START, LEFT, TOLD = range(100, 104)
+CYCLE, NEEDS_START, LEFT, REPORTED = range(100, 104)
 
 _TURN = 2.0 * math.pi
 _advance = ADVANCE.call
@@ -178,6 +178,6 @@ def follow(
         elif code == LEAVE:
             return LEFT, i, -1, m
         elif code == REPORT:
-            return TOLD, i, -1, m
+            return REPORTED, i, -1, m
         i += 1
     return DONE, i, -1, m

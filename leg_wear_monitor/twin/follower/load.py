@@ -50,7 +50,7 @@ class FootLoad:
         if mechanism.toe is not None:
             up = _up(mechanism)
             position, velocity, _ = point_motion(one_cycle(linkage, POINTS, 1.0), linkage, *mechanism.toe)
-            fraction = _share(position @ up, shape)
+            fraction = _load_fraction(position @ up, shape)
             phases = np.arange(POINTS + 1) / POINTS * _PHASES
             along = np.interp(phases, np.arange(_PHASES + 1), np.append(fraction, fraction[0]))
             self.signature[:-1] = -along[:-1] * (velocity @ up)
@@ -89,7 +89,7 @@ def _up(mechanism: Mechanism) -> Floats:
     return -gravity / size if size > 0.0 else np.array([0.0, 1.0])
 
 
-def _share(height: Floats, shape: str) -> Floats:
+def _load_fraction(height: Floats, shape: str) -> Floats:
     """Fraction (_PHASES,) of the full load at equal crank steps, from the toe's height (POINTS,) [m]."""
     if shape != STANCE:
         return np.ones(_PHASES)

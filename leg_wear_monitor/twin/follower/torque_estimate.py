@@ -21,7 +21,7 @@ _SMALL = 1.0e-9
 _UNKNOWN = np.array([1000.0, 10.0, 0.02])
 _DRIFT = np.array([1.0, 0.02, 1.0e-4])
 _SUDDEN = 3.0  # a deviation of this many standard deviations counts as a sudden change
-_BELIEVED, _DOUBTED = 3.0, 2.0  # standard deviations from 0 at which a load begins and ceases to act
+_ACTS_ABOVE, _CEASES_BELOW = 3.0, 2.0  # standard deviations from 0 at which a load begins and ceases to act
 
 
 @attrs.frozen(eq=False)
@@ -59,31 +59,31 @@ def find(
     """
     gram, along = sums.gram, sums.along
     scale = np.sqrt(np.diag(gram))
-    seen = scale > _SMALL * max(scale.max(), _SMALL)
-    if sums.number < _LEAST_SAMPLES or not seen[FRICTION]:
+    active = scale > _SMALL * max(scale.max(), _SMALL)
+    if sums.number < _LEAST_SAMPLES or not active[FRICTION]:
         return None
-    scaled = gram[np.ix_(seen, seen)] / np.outer(scale[seen], scale[seen])
+    scaled = gram[np.ix_(active, active)] / np.outer(scale[active], scale[active])
     condition = float(np.linalg.cond(scaled)) ** 0.5
     if not condition < 1.0 / _SMALL:
         return None
-    inverse = np.linalg.inv(scaled) / np.outer(scale[seen], scale[seen])
+    inverse = np.linalg.inv(scaled) / np.outer(scale[active], scale[active])
     values, sigma = np.zeros(3), np.zeros(3)
-    values[seen] = inverse @ along[seen]
-    bounded = _bounded(values, gram, along, seen, loads)
+    values[active] = inverse @ along[active]
+    bounded = _bounded(values, gram, along, active, loads)
     square = float(sums.residual_squares - 2.0 * bounded @ along + bounded @ gram @ bounded)
     left = max(square, 0.0) / sums.number
-    sigma[seen] = np.sqrt(left * max(correlated, 1.0) * np.diag(inverse))
+    sigma[active] = np.sqrt(left * max(correlated, 1.0) * np.diag(inverse))
     return CycleEstimate(values, sigma, condition, float(left**0.5))
 
 
 def _bounded(
-    values: Floats, gram: Floats, along: Floats, seen: NDArray[np.bool_], loads: tuple[float, float]
+    values: Floats, gram: Floats, along: Floats, active: NDArray[np.bool_], loads: tuple[float, float]
 ) -> Floats:
     """The least-squares values (3,) with the load within its bounds."""
     load = min(max(float(values[LOAD]), loads[0]), loads[1])
     if load == values[LOAD]:
         return values
-    rest = seen & (np.arange(3) != LOAD)
+    rest = active & (np.arange(3) != LOAD)
     found = np.zeros(3)
     found[LOAD] = load
     found[rest] = np.linalg.solve(gram[np.ix_(rest, rest)], along[rest] - gram[rest, LOAD] * load)
@@ -142,5 +142,5 @@ class LoadEstimate:
         values += gain * surprise
         variance *= 1.0 - gain
         values[LOAD] = np.clip(values[LOAD], self._least, self._limit)
-        enough = (_DOUBTED if self.acting else _BELIEVED) * self.sigma[LOAD]
+        enough = (_CEASES_BELOW if self.acting else _ACTS_ABOVE) * self.sigma[LOAD]
         self.state[6] = values[LOAD] if acts and abs(values[LOAD]) > enough else 0.0

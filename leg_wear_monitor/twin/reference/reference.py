@@ -162,11 +162,11 @@ class ReferenceRun:
     def _reference(self) -> Reference:
         joints = len(self._fresh)
         by_e = self._model.by_e
-        seen = [np.einsum("pmkd,pkd->pm", by_e, mean) for mean in self._means]
+        deviations = [np.einsum("pmkd,pkd->pm", by_e, mean) for mean in self._means]
         columns = design(self._model, self._means[0] / self._target[:, None])
         for k in range(joints):
-            columns[:, :, k] = (seen[k + 1] - seen[0]) / OPENED_M
-        return Reference(self._target, seen[0], columns, self._cycles)
+            columns[:, :, k] = (deviations[k + 1] - deviations[0]) / OPENED_M
+        return Reference(self._target, deviations[0], columns, self._cycles)
 
 
 def _by_angle(mean: Floats, speed: float) -> Floats:

@@ -36,12 +36,12 @@ class Finding:
     file : pathlib.Path
     text : str
         One printable line: what was found, and at which byte.
-    weight : Severity
+    severity : Severity
     """
 
     file: Path
     text: str = attrs.field(converter=printable)
-    weight: Severity = Severity.LOSS
+    severity: Severity = Severity.LOSS
 
     def __str__(self) -> str:
         return f"{printable(str(self.file))}: {self.text}"

@@ -112,7 +112,7 @@ class Recording:
     @property
     def is_partial(self) -> bool:
         """Whether recorded data are lost or may be wrong."""
-        return any(finding.weight is Severity.LOSS for finding in self.findings)
+        return any(finding.severity is Severity.LOSS for finding in self.findings)
 
     def blocks(self) -> Iterator[Block]:
         """Iterate over the samples of the whole recording; possible once only.

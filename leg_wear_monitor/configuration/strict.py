@@ -12,9 +12,8 @@ import numpy as np
 from cattrs.errors import ClassValidationError, ForbiddenExtraKeysError
 from cattrs.gen import make_dict_structure_fn
 
-from leg_wear_monitor.configuration.nearest import nearest
 from leg_wear_monitor.configuration.quantity import FieldError
-from leg_wear_monitor.configuration.renamed import new_name
+from leg_wear_monitor.configuration.renamed import unknown_fault
 from leg_wear_monitor.errors import ConfigError
 
 MOST = 1.0e30  # in SI units: squares, and ratios to the smallest, stay finite
@@ -76,7 +75,8 @@ def _field_error(error: BaseException) -> FieldError:
     if isinstance(error, FieldError):
         return error
     if isinstance(error, ForbiddenExtraKeysError):
-        return _unknown(min(error.extra_fields), [attribute.name for attribute in attrs.fields(error.cl)])
+        key, known = min(error.extra_fields), [attribute.name for attribute in attrs.fields(error.cl)]
+        return FieldError(key, unknown_fault("key", key, known, f"expected one of {', '.join(known)}"))
     if not isinstance(error, ClassValidationError):
         raise error
     located, elsewhere = error.group_exceptions()
@@ -84,15 +84,6 @@ def _field_error(error: BaseException) -> FieldError:
         return _field_error(elsewhere[0])
     inner, note = located[0]
     return _of_attribute(inner, getattr(attrs.fields(error.cl), note.name))
-
-
-def _unknown(key: str, known: list[str]) -> FieldError:
-    renamed = new_name(key)
-    if renamed in known:
-        return FieldError(key, f"is now called {renamed}")
-    near = nearest(key, known)
-    expected = f"did you mean {near}?" if near else f"expected one of {', '.join(known)}"
-    return FieldError(key, f"unknown key, {expected}")
 
 
 def _of_attribute(error: BaseException, attribute: "attrs.Attribute[Any]") -> FieldError:

@@ -84,7 +84,7 @@ def _recording(result: "ReplayResult") -> ReplayRecording:
         time=result.time,
         is_partial=result.is_partial,
         findings=tuple(
-            ReplayFinding(file=printable(str(one.file)), text=one.text, weight=one.weight)
+            ReplayFinding(file=printable(str(one.file)), text=one.text, weight=one.severity)
             for one in result.findings
         ),
         crank_samples=result.crank_samples,

@@ -50,7 +50,7 @@ def test_a_pause_between_recordings_is_told_and_raises_no_alarm(record: Callable
     assert lost.paused_s == pytest.approx(PAUSE_S, abs=0.01)
     assert 0.0 < lost.unmonitored_s < 1.0
     (note,) = (each for each in result.findings if "begins" in each.text)
-    assert note.file == paths[1] and note.weight is Severity.NOTE
+    assert note.file == paths[1] and note.severity is Severity.NOTE
     assert "begins 3600 s after the recording before it ended" in note.text
     status = {each.name: each for each in result.monitor.status()}
     assert status["gait"].values["unmonitored_s"] == lost.unmonitored_s

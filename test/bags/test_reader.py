@@ -19,7 +19,7 @@ Read = Callable[..., Any]
 
 
 def losses(recording: Any) -> list[str]:
-    return [finding.text for finding in recording.findings if finding.weight is Severity.LOSS]
+    return [finding.text for finding in recording.findings if finding.severity is Severity.LOSS]
 
 
 @pytest.fixture(scope="module")

@@ -199,8 +199,8 @@ class McapFile:
         if crc != self.layout.data_crc:
             self._find("does not match the checksum of its data: something in it is damaged")
 
-    def _find(self, text: str, weight: Severity = Severity.LOSS) -> None:
+    def _find(self, text: str, severity: Severity = Severity.LOSS) -> None:
         if len(self.findings) < _MOST_FINDINGS:
-            self.findings.append(Finding(self.path, text, weight))
+            self.findings.append(Finding(self.path, text, severity))
         elif len(self.findings) == _MOST_FINDINGS:
             self.findings.append(Finding(self.path, "has more findings that are not listed"))

@@ -6,8 +6,7 @@ from typing import Any, TypeVar
 
 import attrs
 
-from leg_wear_monitor.configuration.nearest import nearest
-from leg_wear_monitor.configuration.renamed import new_name
+from leg_wear_monitor.configuration.renamed import unknown_fault
 from leg_wear_monitor.configuration.strict import shown, structure
 from leg_wear_monitor.errors import ConfigError
 from leg_wear_monitor.monitor.config.settings import MonitorConfig
@@ -119,7 +118,9 @@ def structured(kind: type[_Config], values: Mapping[str, Any], source: str) -> _
     nested: dict[str, Any] = {}
     known = parameters_of(kind)
     for name, value in values.items():
-        _check_known(name, known, source)
+        if name not in known:
+            fault = unknown_fault("parameter", name, known, "docs/parameters.md lists all")
+            raise ConfigError(source, name, fault)
         _check_type(known[name], value, source)
         *sections, last = name.split(".")
         place = nested
@@ -161,17 +162,6 @@ def changed(config: _Config, changes: Mapping[str, Any], source: str = "paramete
                 source, name, f"{shown(changes[name])} cannot change now, it is read only at the start"
             )
     return wanted
-
-
-def _check_known(name: str, known: Mapping[str, Parameter], source: str) -> None:
-    if name in known:
-        return
-    renamed = new_name(name)
-    if renamed in known:
-        raise ConfigError(source, name, f"is now called {renamed}")
-    near = nearest(name, known)
-    expected = f"did you mean {near}?" if near else "docs/parameters.md lists all"
-    raise ConfigError(source, name, f"unknown parameter, {expected}")
 
 
 def _check_type(parameter: Parameter, value: Any, source: str) -> None:

@@ -73,9 +73,9 @@ def draw_joint(axes: Axes, place: Floats, names: Mapping[str, bool], away: Float
     dx, dy = 13.0 * away / (np.hypot(*away) or 1.0)
     wide = [6.0 * len(name) + 5.0 for name in names]
     start = dx - 0.5 * sum(wide) + 0.5 * np.sign(dx) * (abs(dx) > 8.0) * (sum(wide) - wide[0])
-    for i, (name, clearance_joints) in enumerate(names.items()):  # side by side, each in its own colour
+    for i, (name, has_clearance) in enumerate(names.items()):  # side by side, each in its own colour
         along = start + sum(wide[:i]) + 0.5 * wide[i]
-        write_beside(axes, place, name, (along, dy), VERMILION if clearance_joints else INK)
+        write_beside(axes, place, name, (along, dy), VERMILION if has_clearance else INK)
 
 
 def write_beside(axes: Axes, place: Floats, text: str, offset: tuple[float, float], colour: str) -> None:
@@ -95,16 +95,16 @@ def write_beside(axes: Axes, place: Floats, text: str, offset: tuple[float, floa
     )
 
 
-def joint_mark(clearance_joints: bool, place: Floats | tuple[float, float] = (0.0, 0.0)) -> Line2D:
+def joint_mark(has_clearance: bool, place: Floats | tuple[float, float] = (0.0, 0.0)) -> Line2D:
     """The marker of a joint, for the picture or for its legend."""
     return Line2D(
         [place[0]],
         [place[1]],
         linestyle="none",
         marker="o",
-        markersize=8.5 if clearance_joints else 5.5,
+        markersize=8.5 if has_clearance else 5.5,
         markerfacecolor=PAPER,
-        markeredgecolor=VERMILION if clearance_joints else INK,
-        markeredgewidth=2.4 if clearance_joints else 1.2,
+        markeredgecolor=VERMILION if has_clearance else INK,
+        markeredgewidth=2.4 if has_clearance else 1.2,
         zorder=20.0,
     )

@@ -151,7 +151,7 @@ def test_a_part_that_cannot_be_opened_is_a_loss(
     (tmp_path / "a_1.mcap").write_bytes(b"")
     samples, recording = read(tmp_path)
     assert samples.tobytes() == expected(sent).tobytes()
-    losses = [str(each) for each in recording.findings if each.weight is Severity.LOSS]
+    losses = [str(each) for each in recording.findings if each.severity is Severity.LOSS]
     assert losses == [f"{tmp_path / 'a_1.mcap'}: is empty, expected an MCAP file: it is lost"]
 
 
@@ -181,7 +181,7 @@ def test_rows_of_another_kind_are_lost_and_counted(
         database.execute("UPDATE messages SET data = 'text' WHERE id = 7")
     samples, recording = read(path)
     assert len(samples) == len(expected(sent)) - 2
-    losses = [str(each) for each in recording.findings if each.weight is Severity.LOSS]
+    losses = [str(each) for each in recording.findings if each.severity is Severity.LOSS]
     assert losses == [
         f"{path}: {len(samples)} messages could be read of the {len(samples) + 2} that it counts"
     ]

@@ -24,7 +24,7 @@ def path(tmp_path: Path, sent: Any, write_database: Any) -> Path:
 
 
 def losses(recording: Any) -> list[str]:
-    return [finding.text for finding in recording.findings if finding.weight is Severity.LOSS]
+    return [finding.text for finding in recording.findings if finding.severity is Severity.LOSS]
 
 
 @pytest.mark.parametrize("name", ["a.db3", "a%41.db3", "a?mode=rwc.db3", "a#b.db3", "a b&c.db3"])

@@ -92,16 +92,16 @@ def _file(path: Path, mode: int, **parts: Any) -> BagFile:
 
 def _directory(path: Path, findings: list[Finding]) -> list[BagFile]:
     """Files of a bag directory, ordered by its metadata; without metadata, ordered by file number."""
-    there = _recordings(path, findings)
+    recordings = _recordings(path, findings)
     named, parts = _metadata(path / METADATA, findings)
     if named:
-        missing = [name for name in named if name not in there]
+        missing = [name for name in named if name not in recordings]
         for name in missing:
             findings.append(Finding(path / METADATA, f"names {name}, which does not exist: it is lost"))
-        there = [name for name in named if name not in missing]
-    if not there:
+        recordings = [name for name in named if name not in missing]
+    if not recordings:
         raise RecordingError(str(path), "", "contains no .mcap or .db3 file")
-    return [_file(path / name, stat.S_IFREG, **parts) for name in there]
+    return [_file(path / name, stat.S_IFREG, **parts) for name in recordings]
 
 
 def _recordings(path: Path, findings: list[Finding]) -> list[str]:

@@ -38,7 +38,9 @@ class JointNames:
         self._crank = crank_joint
         self._files: dict[Path, _Counts] = {}
 
-    def see(self, path: Path, data: NDArray[np.uint8], messages: NDArray[np.void], samples: Samples) -> None:
+    def add_samples(
+        self, path: Path, data: NDArray[np.uint8], messages: NDArray[np.void], samples: Samples
+    ) -> None:
         """Count messages of a file, using the samples decoded from them."""
         counts = self._files.setdefault(path, _Counts())
         cranks = messages["type"] == JOINT_STATE
@@ -64,10 +66,10 @@ class JointNames:
                 continue
             text = f"is not among the joints of {counts.missing} messages, they have {listed(counts.names)}"
             if not counts.found:
-                told = "set the crank with --crank-joint (crank_joint in the parameters)"
+                remedy = "set the crank with --crank-joint (crank_joint in the parameters)"
                 if found:
-                    told = "the other files have it: give the recordings of one leg at a time"
-                raise RecordingError(str(path), self._crank, f"{text}; {told}")
+                    remedy = "the other files have it: give the recordings of one leg at a time"
+                raise RecordingError(str(path), self._crank, f"{text}; {remedy}")
             text = f"joint {self._crank} {text}; {counts.found} have it"
             findings.append(Finding(path, text, Severity.NOTE))
         return findings

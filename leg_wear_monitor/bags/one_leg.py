@@ -43,10 +43,10 @@ def check_topics(
     """
     topic, findings = topics["joint_states"], []
     for source in sources:
-        there = {channel.topic for channel in source.file.channels.values()}
-        if topic in there:
+        recorded = {channel.topic for channel in source.file.channels.values()}
+        if topic in recorded:
             continue
-        others = [other for other in there if other.endswith("/joint_states")]
+        others = [other for other in recorded if other.endswith("/joint_states")]
         if others and joint_states is None:
             text = f"has {listed(others)}, where other files have {listed([topic])}: {_ADVICE}"
             raise RecordingError(str(source.bag_file.path), "joint_states", text)
@@ -82,7 +82,7 @@ class OneLeg:
     def __init__(self) -> None:
         self._files: dict[Path, _Motion] = {}
 
-    def see(self, path: Path, samples: Samples) -> None:
+    def add_samples(self, path: Path, samples: Samples) -> None:
         """Compare samples of a file with those of other files; stamps are those of the headers.
 
         Raises

@@ -75,13 +75,13 @@ class Pauses:
                 if at > begin:
                     yield block.part(slice(begin, at), pause_ns)
                 begin, pause_ns = at, int(times[at + 1] - times[at])
-                self._tell(block.source[at], pause_ns)
+                self._report(block.source[at], pause_ns)
         self._known.update(self._recordings[block.source].tolist())
         self._last_ns = int(times[-1])
         if begin < len(block.samples):
             yield block.part(slice(begin, None), pause_ns)
 
-    def _tell(self, source: int, pause_ns: int) -> None:
+    def _report(self, source: int, pause_ns: int) -> None:
         text = (
             f"begins {pause_ns * 1.0e-9:.4g} s after the recording before it ended; the leg was not "
             "monitored during this pause, which is not a fault of the input"

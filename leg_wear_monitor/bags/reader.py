@@ -171,9 +171,9 @@ class Recording:
     def _samples(self, path: Path, piece: Piece) -> Samples:
         """Decode a piece, and stamp its samples with the selected time."""
         samples = self._decoder.many(piece.data, piece.messages)
-        self._joints.see(path, piece.data, piece.messages, samples)
+        self._joints.add_samples(path, piece.data, piece.messages, samples)
         if len(self._sources) > 1:
-            self._one_leg.see(path, samples)
+            self._one_leg.add_samples(path, samples)
         self._clocks.compare(samples, piece.messages)
         if self.time != "header":
             samples["fault"][samples["fault"] == ZERO_STAMP] = NO_FAULT

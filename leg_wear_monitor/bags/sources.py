@@ -98,18 +98,18 @@ def assign(sources: list[Source], wanted: Iterable[Role]) -> tuple[dict[str, str
     RecordingError
         If the crank's topic is missing, or the type of a topic cannot be read.
     """
-    there = [channel.topic for source in sources for channel in source.file.channels.values()]
+    recorded = [channel.topic for source in sources for channel in source.file.channels.values()]
     first = sources[0].bag_file.path
     topics: dict[str, str] = {}
     findings: list[Finding] = []
     for role in wanted:
-        topic = find_topic(role, there, str(first))
+        topic = find_topic(role, recorded, str(first))
         if topic is not None:
             topics[role.name] = topic
             for source in sources:
                 source.types |= _types(source, role, topic)
             continue
-        text = f"is not a topic of the recording, it has {listed(there)}"
+        text = f"is not a topic of the recording, it has {listed(recorded)}"
         if role.stream.is_needed:
             raise RecordingError(str(first), role.name, text)
         findings.append(Finding(first, f"{role.name}: {text}", Severity.NOTE))

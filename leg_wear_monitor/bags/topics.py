@@ -41,15 +41,15 @@ def find_topic(role: Role, topics: Iterable[str], where: str) -> str | None:
     RecordingError
         If the given topic does not exist, or several namespaces contain the name.
     """
-    there = sorted(set(topics))
+    recorded = sorted(set(topics))
     if role.topic is not None:
         topic = "/" + role.topic.lstrip("/")
-        if topic not in there:
-            raise RecordingError(where, topic, f"is not a topic of the recording, it has {listed(there)}")
+        if topic not in recorded:
+            raise RecordingError(where, topic, f"is not a topic of the recording, it has {listed(recorded)}")
         return topic
-    if f"/{role.name}" in there:
+    if f"/{role.name}" in recorded:
         return f"/{role.name}"
-    near = [topic for topic in there if topic.endswith(f"/{role.name}")]
+    near = [topic for topic in recorded if topic.endswith(f"/{role.name}")]
     if len(near) > 1:
         option = f"--{role.name}".replace("_", "-")
         raise RecordingError(where, role.name, f"could be {listed(near)}, select one with {option}")

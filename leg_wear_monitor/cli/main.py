@@ -52,23 +52,23 @@ class Verbs(click.Group):
                 code = super().main(*args, **{**extra, "standalone_mode": False})
         except click.UsageError as error:
             path = error.ctx.command_path if error.ctx else self.name
-            _say_error(f"{error.format_message()} (see {path} --help)")
+            _print_error(f"{error.format_message()} (see {path} --help)")
             code = COULD_NOT
         except click.ClickException as error:
-            _say_error(error.format_message())
+            _print_error(error.format_message())
             code = COULD_NOT
         except LegWearError as error:
-            _say_error(str(error))
+            _print_error(str(error))
             code = COULD_NOT
         except click.Abort:
             if sys.stderr.isatty():
                 click.echo(err=True)  # below the terminal's own ^C
-            _say_error("interrupted")
+            _print_error("interrupted")
             code = INTERRUPTED
         sys.exit(code)
 
 
-def _say_error(text: str) -> None:
+def _print_error(text: str) -> None:
     click.echo(f"error: {printable(' '.join(text.split()), most=10_000)}", err=True)
 
 

@@ -182,18 +182,20 @@ def _alarm(alarm: Alarm) -> Status:
 
 
 def _lifetime(joint: JointReport) -> Status:
-    name, told = f"forecast {joint.joint}", joint.forecast
-    if told is None:
+    name, forecast = f"forecast {joint.joint}", joint.forecast
+    if forecast is None:
         return Status(name, Level.OK, "not enough growth or data", {})
-    values = lifetime_values(told)
-    values |= {f"clearance_{fraction}_m": value for fraction, value in attrs.asdict(told.clearance_m).items()}
-    values["measurements"] = float(told.measurements)
-    return Status(name, Level.OK, told.answer.value, values)
+    values = lifetime_values(forecast)
+    values |= {
+        f"clearance_{fraction}_m": value for fraction, value in attrs.asdict(forecast.clearance_m).items()
+    }
+    values["measurements"] = float(forecast.measurements)
+    return Status(name, Level.OK, forecast.answer.value, values)
 
 
-def _leg_lifetime(told: LegForecast) -> Status:
+def _leg_lifetime(forecast: LegForecast) -> Status:
     """Life until the first joint reaches its limit, and each joint's probability of being the first."""
-    values = lifetime_values(told)
-    values |= {f"{joint}_first_probability": value for joint, value in told.first_probability.items()}
-    values["simulated_lives"] = float(told.simulated_lives)
-    return Status("forecast leg", Level.OK, told.answer.value, values)
+    values = lifetime_values(forecast)
+    values |= {f"{joint}_first_probability": value for joint, value in forecast.first_probability.items()}
+    values["simulated_lives"] = float(forecast.simulated_lives)
+    return Status("forecast leg", Level.OK, forecast.answer.value, values)

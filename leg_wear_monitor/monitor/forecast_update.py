@@ -13,7 +13,7 @@ from leg_wear_monitor.twin.statistics import CycleStatistics
 
 
 def update_forecast(
-    watch: EncoderObserver,
+    observer: EncoderObserver,
     forecaster: Forecaster,
     statistics: CycleStatistics,
     worn_m: Floats,
@@ -32,22 +32,22 @@ def update_forecast(
     replaced_ns : sequence of int
         When each part was replaced, 0 if it never was.
     """
-    state, seen = watch.state, watch.seen(statistics.clearance_mean_m)
-    other = tuple(one.is_other for one in seen)
+    state, estimates = observer.state, observer.estimates(statistics.clearance_mean_m)
+    other = tuple(one.is_other for one in estimates)
     is_due = other != state.other or not 0 <= statistics.stamp_ns - state.updated_ns < RENEWED_NS
-    if is_due and any(one.observation is ClearanceObservation.SEEN for one in seen):
+    if is_due and any(one.observation is ClearanceObservation.SEEN for one in estimates):
         state.updated_ns, state.other = statistics.stamp_ns, other
         state.believed = tuple(
             one.observation is ClearanceObservation.SEEN
-            and forecaster.seen(k, _measured(one, float(worn_m[k])), replaced_ns[k])
-            for k, one in enumerate(seen)
+            and forecaster.use_estimate(k, _measured(one, float(worn_m[k])), replaced_ns[k])
+            for k, one in enumerate(estimates)
         )
-    believed = state.believed or (False,) * len(seen)
+    believed = state.believed or (False,) * len(estimates)
     return tuple(
         attrs.evolve(one, believed=yes and one.observation is ClearanceObservation.SEEN)
-        for one, yes in zip(seen, believed, strict=True)
+        for one, yes in zip(estimates, believed, strict=True)
     )
 
 
-def _measured(seen: ClearanceEstimate, wear_m: float) -> MeasuredClearance:
-    return MeasuredClearance(seen.clearance_m, seen.sigma_m, wear_m)
+def _measured(estimate: ClearanceEstimate, wear_m: float) -> MeasuredClearance:
+    return MeasuredClearance(estimate.clearance_m, estimate.sigma_m, wear_m)

@@ -414,9 +414,9 @@ class WearMonitor:
         """Process a piece of an evaluation period, and evaluate the gait cycles that end in it."""
         piece = self._guard.checked(self._accounting.not_counted(piece))
         update = self._twin.update(piece)
-        self._evaluation.see(piece)
+        self._evaluation.add_samples(piece)
         if self._encoders:
-            self._encoders.see(piece)
+            self._encoders.add_samples(piece)
         self._accounting.followed(update.samples)
         self._state.happened = (*self._state.happened, *update.events)[-_KEPT_EVENTS:]
         cycles: list[CycleReport] = []
@@ -436,13 +436,13 @@ class WearMonitor:
             extended(window, float(growth), statistics.moving_s, self.config.growth.window_cycles)
             for window, growth in zip(state.growth, statistics.growth_mean_m, strict=True)
         )
-        seen = self._seen(statistics)
+        estimates = self._clearance_estimates(statistics)
         limits = self._evaluation.board.clearance_limits_m
         forecast = self._forecaster.after(
             statistics, self._worn_m(statistics), limits, self._evaluation.holds
         )
         state.last = cycle_report(
-            statistics, accounting.state.cycles, self.clearance_joints, state.growth, forecast, seen
+            statistics, accounting.state.cycles, self.clearance_joints, state.growth, forecast, estimates
         )
         accounting.note_clearances(state.last)
         return state.last
@@ -459,7 +459,7 @@ class WearMonitor:
             if new:
                 self._accounting.note(new)
 
-    def _seen(self, statistics: CycleStatistics) -> tuple[ClearanceEstimate, ...] | None:
+    def _clearance_estimates(self, statistics: CycleStatistics) -> tuple[ClearanceEstimate, ...] | None:
         """Clearances estimated from encoders; they update the forecast."""
         if not self._encoders:
             return None

@@ -97,7 +97,7 @@ class ReplayResult:
 
     def count(self, samples: Samples) -> None:
         """Count samples that are passed to the monitor."""
-        self.evidence.see(samples)
+        self.evidence.add_samples(samples)
         self.crank_samples += int(np.count_nonzero(brings(samples, CRANK)))
         self.torque_samples += int(np.count_nonzero(brings(samples, TORQUE)))
         stamps = samples["stamp_ns"][samples["fault"] == 0]

@@ -57,9 +57,9 @@ class Epochs:
     ) -> None:
         self._monitor, self._now_ns, self._report = monitor, now_ns, report
         self._is_other_boot = monitor.begin_run(boot)
-        self._begun, self._left_out, self._told = 0, 0, 0
+        self._begun, self._left_out, self._reported = 0, 0, 0
 
-    def see(self, samples: Samples) -> None:
+    def check(self, samples: Samples) -> None:
         """Check samples before they are passed to the monitor."""
         known = self._monitor.counted(samples) & (samples["fault"] == NO_FAULT)
         if not known.any():
@@ -78,7 +78,7 @@ class Epochs:
     def status(self) -> Status:
         """Clock status: an error if samples were left out since the last call."""
         values = {"left_out_samples": float(self._left_out), "epochs_begun": float(self._begun)}
-        is_undecided, self._told = self._left_out > self._told, self._left_out
+        is_undecided, self._reported = self._left_out > self._reported, self._left_out
         if is_undecided:
             return Status("clock", Level.ERROR, UNDECIDED, values)
         return Status("clock", Level.OK, BEGUN if self._begun else "continues", values)

@@ -79,7 +79,7 @@ class MonitorNode(ClosingNode):
         decoder = Decoder(config)
         self._inbox = Inbox(decoder, _HELD)
         self._load = Load()
-        self._epochs = Epochs(self._monitor, boot_id(), self._ros_now_ns, self._say)
+        self._epochs = Epochs(self._monitor, boot_id(), self._ros_now_ns, self._report)
         self._messages = Messages(config, self._monitor.clearance_joints, self.get_fully_qualified_name())
         self._black_box = BlackBox(config.record.path)
         self._outlets = Outlets(self, outputs.OUTPUTS, self._black_box)
@@ -135,7 +135,7 @@ class MonitorNode(ClosingNode):
         """Present ROS time [ns]."""
         return self.get_clock().now().nanoseconds
 
-    def _say(self, is_error: bool, line: str) -> None:
+    def _report(self, is_error: bool, line: str) -> None:
         logger = self.get_logger()
         logger.error(line) if is_error else logger.warning(line)
 
@@ -154,7 +154,7 @@ class MonitorNode(ClosingNode):
             for arrival in arrivals:
                 self._black_box.write(names[arrival.kind], arrival.log_time_ns, arrival.raw)
         samples = self._inbox.decoded(arrivals)
-        self._epochs.see(samples)
+        self._epochs.check(samples)
         reports = self._monitor.update(samples)
         self._supervision.note(arrivals, samples)
         self._publish(reports, coarse)

@@ -86,12 +86,12 @@ def _stop_making(_number: int, frame: FrameType | None) -> None:
         put_in_order()
         code = DONE
     except LegWearError as error:
-        _say(error)
+        _print_error(error)
     finally:
         os._exit(code)
 
 
-def _say(error: LegWearError) -> None:
+def _print_error(error: LegWearError) -> None:
     print(f"error: {' '.join(str(error).split())}", file=sys.stderr, flush=True)
 
 
@@ -134,7 +134,7 @@ def run(
         put_in_order()  # the node may be complete but not yet assigned
         return DONE
     except LegWearError as error:
-        _say(error)
+        _print_error(error)
         return COULD_NOT
     finally:
         if node is not None:

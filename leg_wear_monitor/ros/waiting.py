@@ -8,7 +8,7 @@ EVERY_S = 10.0
 
 
 @contextmanager
-def repeated(say: Callable[[float], None], every_s: float = EVERY_S) -> Iterator[None]:
+def repeated(report: Callable[[float], None], every_s: float = EVERY_S) -> Iterator[None]:
     """Call a function periodically with the elapsed seconds while the body of the context runs.
 
     Parameters
@@ -22,7 +22,7 @@ def repeated(say: Callable[[float], None], every_s: float = EVERY_S) -> Iterator
     def repeat() -> None:
         passed_s = every_s
         while not done.wait(every_s):
-            say(passed_s)
+            report(passed_s)
             passed_s += every_s
 
     thread = threading.Thread(target=repeat, daemon=True)  # a signal may end the process meanwhile

@@ -49,7 +49,7 @@ def seen(monitor: Counted, from_ns: int, now_ns: int) -> tuple[Epochs, list[tupl
     epochs = Epochs(monitor, "boot", lambda: now_ns, lambda *line: said.append(line))
     for k in range(2):
         stamps = from_ns + (5 * k + np.arange(5)) * 5_000_000
-        epochs.see(gait_samples(stamps, crank_angle_rad=np.zeros(5)))
+        epochs.check(gait_samples(stamps, crank_angle_rad=np.zeros(5)))
     return epochs, said
 
 

@@ -164,7 +164,7 @@ def test_a_quality_of_service_that_does_not_fit_is_an_error() -> None:
 
 def test_messages_that_the_middleware_loses_are_a_warning_until_told() -> None:
     assert topics_status([topic(lost=7)], 11 * SECOND, SECOND).level is Level.WARN
-    assert topics_status([topic(lost=7, lost_told=7)], 11 * SECOND, SECOND).level is Level.OK
+    assert topics_status([topic(lost=7, lost_reported=7)], 11 * SECOND, SECOND).level is Level.OK
 
 
 @pytest.mark.parametrize(("sources", "level"), [(1, Level.WARN), (2, Level.ERROR)])

@@ -221,7 +221,7 @@ def noted(names: CrankNames, *messages: list[str]) -> str:
         box.add(JOINT_STATE, serialize_message(message), 1)
     arrivals = box.take(100)
     names.note(arrivals, box.decoded(arrivals))
-    return names.told()
+    return names.report()
 
 
 def test_a_crank_that_no_message_names_is_told_with_the_names_that_are_there() -> None:

@@ -198,10 +198,18 @@ def chunk_head(file: IO[bytes], at: int, size: int) -> Segment:
     data_at = at + text_at + text + 8
     if stored != length - (data_at - at - RECORD_HEAD):
         raise DamageError("has lengths that contradict each other")
-    there = max(0, min(stored, size - data_at))
+    available = max(0, min(stored, size - data_at))
     limit = 2**63 - 1  # keeps a damaged time within the range of a stamp
     return Segment(
-        at, data_at, there, expanded, compression, crc, min(start, limit), min(end, limit), there < stored
+        at,
+        data_at,
+        available,
+        expanded,
+        compression,
+        crc,
+        min(start, limit),
+        min(end, limit),
+        available < stored,
     )
 
 

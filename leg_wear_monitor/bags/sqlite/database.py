@@ -94,9 +94,9 @@ def _copied(file: Path, beside: list[Path], budget: Budget, stack: ExitStack) ->
 def _check_tables(database: sqlite3.Connection) -> None:
     """Check that the tables are plain: a view or a virtual table would execute code when it is read."""
     query = "SELECT name, type, sql FROM sqlite_master WHERE name IN ('topics', 'messages')"
-    there = {name: (kind, str(text)) for name, kind, text in database.execute(query)}
+    tables = {name: (kind, str(text)) for name, kind, text in database.execute(query)}
     for table, needed in _NEEDED.items():
-        kind, text = there.get(table, ("", ""))
+        kind, text = tables.get(table, ("", ""))
         if kind != "table" or text[:20].upper().startswith("CREATE VIRTUAL"):
             raise DamageError(f"is not a readable .db3 file: it has no table {table}")
         plain = {row[1] for row in database.execute(f"PRAGMA table_xinfo({table})") if not row[6]}

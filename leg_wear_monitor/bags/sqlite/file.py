@@ -57,7 +57,7 @@ class SqliteFile:
         except (*UNREADABLE, OSError) as error:
             raise RecordingError(str(path), "", f"is not a readable .db3 file: {one_line(error)}") from error
         self._found = 0
-        self._tell_strangers()
+        self._report_unknown()
 
     def pieces(self, types: dict[int, int]) -> Iterator[Due]:
         """Pieces of the requested channels; unreadable messages are skipped.
@@ -123,7 +123,7 @@ class SqliteFile:
             return None  # counted as unreadable
         return row[0] if row and isinstance(row[0], bytes) else None
 
-    def _tell_strangers(self) -> None:
+    def _report_unknown(self) -> None:
         """Report the number of messages that belong to no listed topic."""
         count = sum(count for topic, count in self._counts.items() if topic not in self.channels)
         if count:

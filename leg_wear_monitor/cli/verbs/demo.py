@@ -100,7 +100,7 @@ def _live(out: Path) -> "DemoListener":
     domain = int(os.environ.get("ROS_DOMAIN_ID") or 5 + os.getpid() % 90)
     first: list[int] = []
 
-    def say(stamp_ns: int, line: str) -> None:
+    def report(stamp_ns: int, line: str) -> None:
         first.append(stamp_ns)
         click.echo(f"{(stamp_ns - first[0]) / 1e9:6.2f} s  {line}")
 
@@ -108,7 +108,7 @@ def _live(out: Path) -> "DemoListener":
     for path in (*paths.values(), out / "wear.db-log"):  # a ledger is not begun beside the log of another
         path.unlink(missing_ok=True)
     click.echo(f"starting the monitor and the leg in ROS domain {domain}")
-    demo_listener = DemoListener(_NAMESPACE, domain, say)
+    demo_listener = DemoListener(_NAMESPACE, domain, report)
     try:
         with (
             _process("monitor", out, domain, record=paths["record"], ledger=paths["ledger"]) as monitor,

@@ -67,7 +67,7 @@ class Parameter:
 
 def _walk(kind: type, prefix: str) -> Iterator[Parameter]:
     for field in attrs.fields(kind):
-        name, told = f"{prefix}{field.name}", field.metadata
+        name, metadata = f"{prefix}{field.name}", field.metadata
         if attrs.has(field.type):
             yield from _walk(field.type, f"{name}.")
             continue
@@ -75,13 +75,13 @@ def _walk(kind: type, prefix: str) -> Iterator[Parameter]:
             name=name,
             type=_TYPES[field.type],
             default=field.default,
-            unit=told["unit"],
-            description=told["doc"],
-            read_only=not told.get("live", False),
-            above=told.get("above"),
-            at_least=told.get("at_least"),
-            at_most=told.get("at_most"),
-            names=told.get("names", ()),
+            unit=metadata["unit"],
+            description=metadata["doc"],
+            read_only=not metadata.get("live", False),
+            above=metadata.get("above"),
+            at_least=metadata.get("at_least"),
+            at_most=metadata.get("at_most"),
+            names=metadata.get("names", ()),
         )
 
 

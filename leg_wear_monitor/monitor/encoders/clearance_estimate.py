@@ -57,12 +57,12 @@ class ClearanceEstimate:
 def clearance_estimates(found: Estimate, counted_m: Floats) -> tuple[ClearanceEstimate, ...]:
     """Estimates of each joint, compared with the counted clearances (k,) [m]."""
     return tuple(
-        _seen(float(clearance), float(sigma), float(counted))
+        _estimate(float(clearance), float(sigma), float(counted))
         for clearance, sigma, counted in zip(found.clearance_m, found.sigma_m, counted_m, strict=True)
     )
 
 
-def _seen(clearance_m: float, sigma_m: float, counted_m: float) -> ClearanceEstimate:
+def _estimate(clearance_m: float, sigma_m: float, counted_m: float) -> ClearanceEstimate:
     if sigma_m > ESTIMATED_M:
         return ClearanceEstimate(observation=ClearanceObservation.NOT_OBSERVABLE)
     return ClearanceEstimate(

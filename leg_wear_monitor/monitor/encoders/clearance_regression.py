@@ -29,7 +29,7 @@ class ClearanceRegressionSnapshot(NamedTuple):
 
     reference: Reference | None
     before: Estimate | None
-    seen: tuple[tuple[Floats, Floats], ...]
+    cycles: tuple[tuple[Floats, Floats], ...]
     each: tuple[Floats, ...]
 
 
@@ -61,7 +61,7 @@ class ClearanceRegression:
     ) -> None:
         self._model, self.most = model, most
         self._reference, self._before = reference, before
-        self._seen: list[tuple[Floats, Floats]] = []
+        self._cycles: list[tuple[Floats, Floats]] = []
         self._each: list[Floats] = []
 
     def add(self, crank_angle: Floats, angles: Floats) -> None:
@@ -70,19 +70,19 @@ class ClearanceRegression:
 
     def add_binned(self, deviation: Floats, counts: Floats) -> None:
         """Add a gait cycle as returned by `binned`."""
-        self._seen.append((deviation, counts))
+        self._cycles.append((deviation, counts))
         if self._reference is not None:
             self._each.append(self._regressed(deviation, counts))
-        del self._seen[: -self.most], self._each[: -self.most]
+        del self._cycles[: -self.most], self._each[: -self.most]
 
     def refer(self, reference: Reference, before: Estimate) -> None:
         """Evaluate the kept cycles with a new reference and a new prior."""
         self._reference, self._before = reference, before
-        self._each = [self._regressed(*seen) for seen in self._seen]
+        self._each = [self._regressed(*cycle) for cycle in self._cycles]
 
     def forget(self) -> None:
         """Drop the kept cycles, because the leg has changed."""
-        self._seen, self._each = [], []
+        self._cycles, self._each = [], []
 
     def _regressed(self, deviation: Floats, counts: Floats) -> Floats:
         reference, before = self._given()
@@ -118,7 +118,7 @@ class ClearanceRegression:
     @property
     def cycles(self) -> int:
         """Number of kept cycles."""
-        return len(self._seen)
+        return len(self._cycles)
 
     def alone(self) -> Estimate | None:
         """Estimate from the cycles alone, without the prior; None while there are not enough."""
@@ -139,20 +139,20 @@ class ClearanceRegression:
 
     def fused(self) -> Estimate | None:
         """Cycles and prior, weighted by their covariances (update step of a Kalman filter)."""
-        seen = self.alone()
-        if seen is None:
+        alone = self.alone()
+        if alone is None:
             return None
         _, before = self._given()
-        counts = np.sum([counts for _, counts in self._seen], axis=0)
+        counts = np.sum([counts for _, counts in self._cycles], axis=0)
         blind = blind_directions(self._columns(counts), counts)
         # in unobservable directions, each cycle repeats the prior and adds no information
         scale = np.sqrt(np.diagonal(before.covariance))
         across = blind / scale
         across /= np.linalg.norm(across, axis=1, keepdims=True)
         prior = before.covariance / np.outer(scale, scale)
-        noise = seen.covariance / np.outer(scale, scale) + _NO_NEWS * across.T @ across
+        noise = alone.covariance / np.outer(scale, scale) + _NO_NEWS * across.T @ across
         gain = np.linalg.solve(prior + noise, prior).T
-        mean = before.mean + scale * (gain @ ((seen.mean - before.mean) / scale))
+        mean = before.mean + scale * (gain @ ((alone.mean - before.mean) / scale))
         rest = np.eye(len(mean)) - gain
         covariance = rest @ prior @ rest.T + gain @ noise @ gain.T
         return Estimate(mean, covariance * np.outer(scale, scale), before.joints)
@@ -160,10 +160,10 @@ class ClearanceRegression:
     def snapshot(self) -> ClearanceRegressionSnapshot:
         """The whole state."""
         return ClearanceRegressionSnapshot(
-            self._reference, self._before, tuple(self._seen), tuple(self._each)
+            self._reference, self._before, tuple(self._cycles), tuple(self._each)
         )
 
     def restore(self, snapshot: ClearanceRegressionSnapshot) -> None:
         """Go back to a snapshot."""
         self._reference, self._before = snapshot.reference, snapshot.before
-        self._seen, self._each = list(snapshot.seen), list(snapshot.each)
+        self._cycles, self._each = list(snapshot.cycles), list(snapshot.each)

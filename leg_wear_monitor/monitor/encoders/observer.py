@@ -44,7 +44,7 @@ class EncoderSnapshot(NamedTuple):
     """Whole state of an `EncoderObserver`."""
 
     state: EncoderState
-    hidden: ClearanceRegressionSnapshot
+    regression: ClearanceRegressionSnapshot
     reference: ReferenceSnapshot
 
 
@@ -95,7 +95,7 @@ class EncoderObserver:
             self.state.asked and not self._reference.is_busy and self._clearance_regression.reference is None
         )
 
-    def see(self, piece: Samples) -> None:
+    def add_samples(self, piece: Samples) -> None:
         """Add samples in the order of arrival."""
         self.state.samples = extended(self.state.samples, piece)
 
@@ -124,7 +124,7 @@ class EncoderObserver:
         """
         state, new = self.state, None
         for begin_ns, end_ns in state.due:
-            self._look(begin_ns, end_ns)
+            self._add_cycle(begin_ns, end_ns)
             new = self._evaluate(end_ns) or new
         state.samples = after(state.samples, state.due[-1][1] if state.due else 0)
         state.due = ()
@@ -136,7 +136,7 @@ class EncoderObserver:
         self._clearance_regression.forget()
         self.state.found, self.state.asked, self.state.updated_ns = None, False, 0
 
-    def seen(self, counted_m: Floats) -> tuple[ClearanceEstimate, ...]:
+    def estimates(self, counted_m: Floats) -> tuple[ClearanceEstimate, ...]:
         """Clearance estimate of each joint, compared with the counted clearances (k,) [m]."""
         found = self.state.found
         if found is None:
@@ -155,10 +155,10 @@ class EncoderObserver:
     def restore(self, snapshot: EncoderSnapshot) -> None:
         """Restore a snapshot of the same mechanism and parameters; results are then bit for bit the same."""
         self.state = attrs.evolve(snapshot.state)
-        self._clearance_regression.restore(snapshot.hidden)
+        self._clearance_regression.restore(snapshot.regression)
         self._reference.restore(snapshot.reference)
 
-    def _look(self, begin_ns: int, end_ns: int) -> None:
+    def _add_cycle(self, begin_ns: int, end_ns: int) -> None:
         """Add a gait cycle if its encoders are those of the previous cycles."""
         state = self.state
         crank, raw = within(state.samples, begin_ns, end_ns)
@@ -191,7 +191,7 @@ class EncoderObserver:
         state.present, state.otherwise, state.otherwise_cycles = present, (), 0
         state.found = None
         self._clearance_regression.forget()
-        self._look_anew()
+        self._re_evaluate()
         return True
 
     def _centre(self, crank: Floats, angles: Floats) -> None:
@@ -200,24 +200,24 @@ class EncoderObserver:
         if not np.isnan(errors.centre_rad).any() or not len(crank):
             return
         deviation = self._model.deviation(crank, angles)
-        there = np.isfinite(deviation).sum(axis=0) >= LEAST_PHASES
+        is_sufficient = np.isfinite(deviation).sum(axis=0) >= LEAST_PHASES
         mean = np.angle(np.nansum(np.exp(1j * deviation), axis=0))
-        first = np.isnan(errors.centre_rad) & there
+        first = np.isnan(errors.centre_rad) & is_sufficient
         self.state.errors = attrs.evolve(errors, centre_rad=np.where(first, mean, errors.centre_rad))
 
     def _evaluate(self, stamp_ns: int) -> Commissioned | None:
         """Renew the estimate; fix the encoders' errors if there are enough cycles."""
-        state, hidden = self.state, self._clearance_regression
-        if hidden.reference is None or not any(state.present):
+        state, regression = self.state, self._clearance_regression
+        if regression.reference is None or not any(state.present):
             return None
         if not self.commissions:
-            state.found = hidden.fused()
+            state.found = regression.fused()
             return None
-        found = hidden.fused() if hidden.cycles >= self._settings.commissioning_cycles else None
+        found = regression.fused() if regression.cycles >= self._settings.commissioning_cycles else None
         if found is None:
             return None
         state.errors = commissioned(state.errors, found, state.present)
-        self._look_anew()
+        self._re_evaluate()
         return held(state.errors, self._settings, stamp_ns)
 
     def _refer(self, clearance_m: Floats, depth: Floats) -> None:
@@ -250,7 +250,7 @@ class EncoderObserver:
             return counted_m
         return np.where(found.sigma_m <= ESTIMATED_M, found.clearance_m, counted_m)
 
-    def _look_anew(self) -> None:
+    def _re_evaluate(self) -> None:
         """Evaluate the kept cycles with the present errors of the encoders."""
         reference = self._clearance_regression.reference
         if reference is not None:

@@ -62,10 +62,10 @@ class EncoderState:
 
 def fault_of(raw: Floats, deviation: Floats, joint: str) -> str:
     """Fault of an encoder in a cycle; empty if there is none."""
-    seen = deviation[np.isfinite(deviation)]
-    if len(seen) < LEAST_PHASES:
+    finite = deviation[np.isfinite(deviation)]
+    if len(finite) < LEAST_PHASES:
         return "gives no angle" if np.isinf(raw).any() else "is not in joint_states with the crank"
-    if rms(seen - seen.mean()) > _STRANGE_RAD:
+    if rms(finite - finite.mean()) > _STRANGE_RAD:
         return f"does not turn as joint {joint} does, look at encoders.joints and encoders.signs"
     return ""
 

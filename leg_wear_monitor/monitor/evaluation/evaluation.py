@@ -83,7 +83,7 @@ class AlarmEvaluation:
         """Whether the model is valid for the present motion: cadence and torque are as expected."""
         return self.board.level(specs.CADENCE.name(), specs.MISMATCH.name()) is not Level.ERROR
 
-    def see(self, piece: Samples) -> None:
+    def add_samples(self, piece: Samples) -> None:
         """Add received samples."""
         saturation_nm = self.config.drive_torque.saturation_nm
         self.state.torque = with_torques(self.state.torque, piece, saturation_nm)

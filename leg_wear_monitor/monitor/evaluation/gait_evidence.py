@@ -68,7 +68,7 @@ class GaitEvidence:
     _passed_s: float = attrs.field(default=0.0, init=False)
     _last: tuple[int, float] | None = attrs.field(default=None, init=False)
 
-    def see(self, samples: Samples) -> None:
+    def add_samples(self, samples: Samples) -> None:
         """Add samples in the order of arrival."""
         cranks = samples[samples["kind"] == CRANK]
         for fault, number in zip(*np.unique(cranks["fault"], return_counts=True), strict=True):

@@ -63,25 +63,25 @@ def torque_causes(
     raised: set[str], report: "CycleReport", record: "TorqueRecord", bounds: TorqueBounds
 ) -> list[str]:
     """Sentences on possible causes of raised torque alarms, without values."""
-    told = []
+    causes = []
     if BIAS in raised and report.friction_nm < 0.0:
-        told.append(
+        causes.append(
             "a constant torque drives the crank, friction cannot do this: the sensor's offset is not zeroed, "
             "or drive_torque.sign is wrong"
         )
     elif BIAS in raised:
-        told.append(
+        causes.append(
             "a constant torque exceeds the largest friction of the drive: the sensor's offset is not zeroed, "
             "drive_torque.sign, scale or gear_ratio is wrong, or friction has increased"
         )
     if DRIFT in raised:
-        told.append(
+        causes.append(
             "the constant torque has changed since this leg was commissioned: so has the drive's friction, "
             "or the sensor's offset"
         )
     if LAG in raised:
-        told.append(_lag_cause(record, bounds))
-    return told
+        causes.append(_lag_cause(record, bounds))
+    return causes
 
 
 def _lag_cause(record: "TorqueRecord", bounds: TorqueBounds) -> str:

@@ -175,8 +175,8 @@ def forecast(
         Whether the model holds for what the leg does.
     """
     legs = _legs(now, coefficient_estimates, settings, law)
-    seen = [quantiles(row) for row in legs.clearance_m]
-    answers = [each.answer(q.p50, valid) for each, q in zip(now, seen, strict=True)]
+    clearances = [quantiles(row) for row in legs.clearance_m]
+    answers = [each.answer(q.p50, valid) for each, q in zip(now, clearances, strict=True)]
     limit = np.array([each.limit_m for each in now])
     ended = np.array([[answer is Answer.AT_LIMIT] for answer in answers])
     ends = cycles_to(law, np.where(ended, limit[:, None], legs.clearance_m), legs.base_m, limit)
@@ -188,7 +188,9 @@ def forecast(
             clearance_m=q,
             measurements=coefficient_estimate.observations,
         )
-        for a, end, q, coefficient_estimate in zip(answers, ends, seen, coefficient_estimates, strict=True)
+        for a, end, q, coefficient_estimate in zip(
+            answers, ends, clearances, coefficient_estimates, strict=True
+        )
     )
     answer = _leg_answer(answers)
     life, first = _life(answer, ends.min(axis=0), cycle_s, day), {}

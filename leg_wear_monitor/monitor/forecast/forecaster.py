@@ -170,7 +170,7 @@ class Forecaster:
         self._update_coefficients(k, found.after)
         return found
 
-    def seen(self, k: int, observation: MeasuredClearance, replaced_ns: int) -> bool:
+    def use_estimate(self, k: int, observation: MeasuredClearance, replaced_ns: int) -> bool:
         """Update with a clearance estimated from encoders, instead of the previous one.
 
         Parameters
@@ -191,14 +191,16 @@ class Forecaster:
         below = estimate_coefficient(self._settings, self._fresh_m[k], observations).probability_below(
             self._fresh_m[k], observation
         )
-        believed = CONTRADICTS <= below <= 1.0 - CONTRADICTS
+        is_plausible = CONTRADICTS <= below <= 1.0 - CONTRADICTS
         self._update_coefficients(
             k,
             estimate_coefficient(
-                self._settings, self._fresh_m[k], [*observations, observation] if believed else observations
+                self._settings,
+                self._fresh_m[k],
+                [*observations, observation] if is_plausible else observations,
             ),
         )
-        return believed
+        return is_plausible
 
     def _update_coefficients(self, k: int, coefficient_estimate: CoefficientEstimate) -> None:
         coefficient_estimates = self.state.coefficient_estimates

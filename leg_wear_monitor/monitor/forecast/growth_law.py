@@ -61,8 +61,8 @@ class GrowthLaw:
 
     def log_growth(self, clearance_m: Floats) -> Floats:
         """Logarithm of growth (k, n) at clearances (k, n), but for a_k."""
-        seen = np.clip(clearance_m, self.fresh_m[:, None], self.widest_m[:, None])
-        return np.asarray(self.coupling @ np.log(seen / self.fresh_m[:, None]))
+        in_range = np.clip(clearance_m, self.fresh_m[:, None], self.widest_m[:, None])
+        return np.asarray(self.coupling @ np.log(in_range / self.fresh_m[:, None]))
 
 
 def no_law(fresh_m: Floats, sigma: float) -> GrowthLaw:
@@ -91,9 +91,9 @@ def _sigma(lives: Sequence[SimulatedLife], unknown: float) -> Floats:
     if len(lives) < LEAST_LIVES:
         return np.full(len(lives[0].factor), unknown)
     off = left_over(lives)
-    told = np.isfinite(off)
-    square = np.square(off, where=told, out=np.zeros_like(off)).sum(axis=0)
-    return np.where(told.any(axis=0), np.sqrt(square / np.maximum(told.sum(axis=0), 1)), unknown)
+    is_known = np.isfinite(off)
+    square = np.square(off, where=is_known, out=np.zeros_like(off)).sum(axis=0)
+    return np.where(is_known.any(axis=0), np.sqrt(square / np.maximum(is_known.sum(axis=0), 1)), unknown)
 
 
 def left_over(lives: Sequence[SimulatedLife]) -> Floats:
@@ -106,9 +106,9 @@ def left_over(lives: Sequence[SimulatedLife]) -> Floats:
         coupling, level = _coefficients([*lives[:i], *lives[i + 1 :]], fresh)
         law = GrowthLaw(coupling, fresh, np.full(len(fresh), np.inf), np.zeros(len(fresh)))
         base = life.factor * np.exp(level)
-        told = cycles_to(law, fresh[:, None], base[:, None], life.clearance_m[-1])
-        opened = np.isfinite(told[:, 0]) & (told[:, 0] > 0.0)
-        off.append(np.log(np.where(opened, life.cycles[-1] / np.where(opened, told[:, 0], 1.0), np.nan)))
+        expected = cycles_to(law, fresh[:, None], base[:, None], life.clearance_m[-1])
+        opened = np.isfinite(expected[:, 0]) & (expected[:, 0] > 0.0)
+        off.append(np.log(np.where(opened, life.cycles[-1] / np.where(opened, expected[:, 0], 1.0), np.nan)))
     return np.array(off)
 
 

@@ -31,13 +31,13 @@ class Validity:
     @property
     def words(self) -> str:
         """In a line, for operators."""
-        told = f"{self.within} of {self.measurements} measured clearances were between expected p10 and p90"
+        text = f"{self.within} of {self.measurements} measured clearances were between expected p10 and p90"
         if self.measurements < LEAST:
-            return f"{told}; too few to judge the forecast"
+            return f"{text}; too few to judge the forecast"
         # a mean of n even numbers from 0 to 1 has a standard deviation of 1 / sqrt(12 n)
         if abs(self.bias) * np.sqrt(12.0 * self.measurements) < 2.0:
-            return f"{told}; no bias found"
-        return f"{told}; joints wear {'faster' if self.bias > 0.0 else 'slower'} than forecast"
+            return f"{text}; no bias found"
+        return f"{text}; joints wear {'faster' if self.bias > 0.0 else 'slower'} than forecast"
 
 
 def validity(measurements: Sequence[Measurement]) -> Validity:

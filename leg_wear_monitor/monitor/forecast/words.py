@@ -14,11 +14,11 @@ UNKNOWN = {
 _SIGMAS_APART = 2.5631  # p10 and p90 of a normal distribution
 
 
-def lifetime_values(told: JointForecast | LegForecast) -> dict[str, float]:
+def lifetime_values(forecast: JointForecast | LegForecast) -> dict[str, float]:
     """Quantiles of cycles, hours and days of duty by keys such as ``p50_hours``; none if not known."""
     values: dict[str, float] = {}
     for key in ("cycles", "hours", "days"):
-        quantiles = getattr(told, key)
+        quantiles = getattr(forecast, key)
         if quantiles is not None:
             values |= {f"{fraction}_{key}": value for fraction, value in attrs.asdict(quantiles).items()}
     return values

@@ -38,10 +38,10 @@ def causes(before: Intake, after: Intake, withheld: int, config: MonitorConfig) 
     """
     received = after.received - before.received
     lost = _unused(after, before, withheld)
-    told = [name for name, count in lost.items() if count > _WORTH_TELLING * received]
+    frequent = [name for name, count in lost.items() if count > _WORTH_TELLING * received]
     return [
         f"{lost[name]} of {received} samples {_SENTENCES[name].format(crank=config.crank_joint)}"
-        for name in sorted(told, key=lambda name: -lost[name])
+        for name in sorted(frequent, key=lambda name: -lost[name])
     ]
 
 

@@ -87,10 +87,10 @@ class InputGuard:
         ratio = self.speed_ratio
         if math.isnan(ratio):
             return ""
-        told = f"the crank's angle runs {ratio:.2g} times as fast as commanded, nothing is monitored: "
+        text = f"the crank's angle runs {ratio:.2g} times as fast as commanded, nothing is monitored: "
         if _DEGREES / _NEAR < ratio < _DEGREES * _NEAR:
-            return told + "it seems to be in degrees, radians are expected"
-        return told + "check its unit (radians), crank.gear_ratio and cadence.commanded_rpm"
+            return text + "it seems to be in degrees, radians are expected"
+        return text + "check its unit (radians), crank.gear_ratio and cadence.commanded_rpm"
 
     def snapshot(self) -> Records:
         """A copy of the whole state."""

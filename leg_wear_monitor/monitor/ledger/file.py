@@ -86,7 +86,7 @@ def connect(path: Path, binding: Binding) -> sqlite3.Connection:
         If the file is damaged, not a ledger, of a newer format, of another leg, or in use.
     """
     try:
-        found = _look(path)
+        found = _format_of(path)
         writable = _is_writable(path)
         if writable and _is_hot(beside(path, "-journal")):
             _rehearse(path, found, binding)
@@ -144,7 +144,7 @@ def _connect(path: Path, mode: str) -> sqlite3.Connection:
     return db
 
 
-def _look(path: Path) -> int:
+def _format_of(path: Path) -> int:
     """Format number in the file's header, read before SQLite opens the file."""
     status = path.stat()
     if not stat.S_ISREG(status.st_mode):

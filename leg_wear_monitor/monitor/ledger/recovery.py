@@ -60,11 +60,11 @@ def recover(db: sqlite3.Connection, path: Path) -> Recovered:
     """
     head, run = read_head(db), read_last_run(db)
     entry_run, entry = read_entry(db) or (0, None)
-    there = Recovered(head, head.digest, run, entry_run, entry)
+    recovered = Recovered(head, head.digest, run, entry_run, entry)
     log = beside(path, ENDING)
     try:
         content = read_log(path)
-        fault = _misfit(content, there)
+        fault = _misfit(content, recovered)
         if content and content.number > head.number:
             raise LedgerError(
                 f"{path}: is older than {log.name} beside it; put back the ledger that belongs to that, or "
@@ -73,13 +73,15 @@ def recover(db: sqlite3.Connection, path: Path) -> Recovered:
     except (OSError, ValueError) as error:
         content, fault = None, f"cannot be read: {error}"
     if run.closed:
-        return there
+        return recovered
     if content is None or fault:
         lost_s = WHOLE_S + 2.0 * run.interval_s
-        return attrs.evolve(there, lost_s=lost_s, loss=_loss_text(log.name, fault or "is missing", lost_s))
+        return attrs.evolve(
+            recovered, lost_s=lost_s, loss=_loss_text(log.name, fault or "is missing", lost_s)
+        )
     if content.digest == head.previous:
-        return attrs.evolve(there, lost_s=run.interval_s)
-    return _applied(there, content, log.name)
+        return attrs.evolve(recovered, lost_s=run.interval_s)
+    return _applied(recovered, content, log.name)
 
 
 def check_absent(path: Path) -> None:
@@ -92,33 +94,33 @@ def check_absent(path: Path) -> None:
         )
 
 
-def _misfit(content: LogContent | None, there: Recovered) -> str:
+def _misfit(content: LogContent | None, recovered: Recovered) -> str:
     """Reason why a log does not belong to the tables; empty if it does."""
     if content is None:
         return ""
-    follows = (content.number, content.head) == (there.head.number, there.head.digest)
+    follows = (content.number, content.head) == (recovered.head.number, recovered.head.digest)
     # a kill between the commit of the tables and the new log leaves the log that led to these tables
-    is_before = content.number < there.head.number and content.digest == there.head.previous
+    is_before = content.number < recovered.head.number and content.digest == recovered.head.previous
     return "" if follows or is_before else "is of another time"
 
 
-def _applied(there: Recovered, content: LogContent, name: str) -> Recovered:
+def _applied(recovered: Recovered, content: LogContent, name: str) -> Recovered:
     """Apply the records of a log up to the last valid one."""
-    run, entry = there.run, there.entry
+    run, entry = recovered.run, recovered.entry
     for record in content.records:
         if entry is None:
             raise LedgerError(f"{name}: follows a ledger that has no entry; {MOVE}")
         run, entry = decode(record, entry)
     lost_s, loss = run.interval_s, ""
     if content.left or content.missing:
-        most_s = max(0.0, WHOLE_S - _moved_s(there.entry, entry)) + 2.0 * run.interval_s
+        most_s = max(0.0, WHOLE_S - _moved_s(recovered.entry, entry)) + 2.0 * run.interval_s
         lost_s = min(most_s, (content.missing + 1) * run.interval_s) if content.is_torn else most_s
         loss = _loss_text(name, "is not whole", lost_s)
     return attrs.evolve(
-        there,
+        recovered,
         digest=content.digest,
         run=run,
-        entry_run=run.number if content.records else there.entry_run,
+        entry_run=run.number if content.records else recovered.entry_run,
         entry=entry,
         is_newer=bool(content.records),
         lost_s=lost_s,

@@ -27,14 +27,14 @@ class Load:
         Waiting time of the oldest message: present, and maximum since the last report [s].
     unpublished : int
         Samples whose torque and forces were not published in order to catch up.
-    shed_told : int
+    shed_reported : int
         Messages shed up to the last report.
     """
 
     delay_s: float = 0.0
     worst_delay_s: float = 0.0
     unpublished: int = 0
-    shed_told: int = 0
+    shed_reported: int = 0
 
     def note(self, delay_s: float) -> bool:
         """Record a delay; return whether it is too long to publish every sample."""
@@ -44,7 +44,7 @@ class Load:
 
 def load_status(load: Load, inbox: Inbox) -> Status:
     """Status of the load; starts a new reporting interval."""
-    shed = inbox.shed - load.shed_told
+    shed = inbox.shed - load.shed_reported
     level, message = Level.OK, "keeps up"
     if shed:
         level, message = Level.ERROR, "overloaded: samples were dropped and their wear is not counted"
@@ -57,7 +57,7 @@ def load_status(load: Load, inbox: Inbox) -> Status:
         "unpublished_samples": float(load.unpublished),
         "shed_messages": float(inbox.shed),
     }
-    load.worst_delay_s, load.shed_told = load.delay_s, inbox.shed
+    load.worst_delay_s, load.shed_reported = load.delay_s, inbox.shed
     return Status("load", level, message, values)
 
 
@@ -97,7 +97,7 @@ def _faults(topic: InputTopic, silent_s: float, running_s: float) -> Iterator[tu
         yield Level.ERROR if running_s >= NOTHING_FROM_S else Level.WARN, "nobody publishes it"
     elif math.isnan(silent_s) and running_s >= NOTHING_FROM_S:
         yield Level.ERROR, "has a publisher, but no message came yet"
-    if topic.lost > topic.lost_told:
+    if topic.lost > topic.lost_reported:
         yield Level.WARN, "messages are lost on the way to this node"
     if topic.without_crank:
         yield Level.ERROR, topic.without_crank

@@ -74,7 +74,7 @@ class Supervision:
     def check(self) -> bool:
         """Check topics and graph; return whether the node's alarms have changed."""
         now_ns, lack = time.monotonic_ns(), self._names.some_lack_it
-        without = self._names.told()
+        without = self._names.report()
         values: dict[str, float] = {}
         for topic in self.inputs:
             topic.publishers = publishers_of(self._node, topic.name, topic.stream.type)
@@ -95,7 +95,7 @@ class Supervision:
         is_simulated = bool(self._node.get_parameter("use_sim_time").value)
         topics = topics_status(self.inputs, now_ns, self._started_ns)
         for topic in self.inputs:
-            topic.lost_told = topic.lost
+            topic.lost_reported = topic.lost
         clock = self._clock.status(ros_ns, now_ns, is_simulated)
         given = {status.name: status for status in statuses}
         # the given clock status has already been logged at its source

@@ -24,7 +24,7 @@ class CrankNames:
     def __init__(self, crank_joint: str) -> None:
         self._crank = crank_joint
         self._named = self._unnamed = 0
-        self._example, self._told = b"", ""
+        self._example, self._report = b"", ""
 
     def note(self, arrivals: Sequence[Arrival], samples: Samples) -> None:
         """Record messages and the samples decoded from them."""
@@ -37,19 +37,21 @@ class CrankNames:
 
     @property
     def some_lack_it(self) -> bool:
-        """Whether a message lacked the crank since `told` was last called."""
+        """Whether a message lacked the crank since `report` was last called."""
         return self._unnamed > 0
 
-    def told(self) -> str:
+    def report(self) -> str:
         """Report that no message names the crank, and which joints they name; empty if one names it."""
         unnamed, named, raw = self._unnamed, self._named, self._example
         self._named = self._unnamed = 0
         if named:
-            self._told = ""
+            self._report = ""
         elif unnamed:
-            there = _names_in(raw)
-            self._told = f"no joint is named {self._crank!r}; there are {there}; set crank_joint to its name"
-        return self._told
+            names = _names_in(raw)
+            self._report = (
+                f"no joint is named {self._crank!r}; there are {names}; set crank_joint to its name"
+            )
+        return self._report
 
 
 def _names_in(raw: bytes) -> str:

@@ -30,7 +30,7 @@ class InputTopic:
         Expected stream.
     heard_ns, heard_wall_ns : int
         Arrival time of the last message on a monotonic clock and on the wall clock [ns]; 0 before the first.
-    lost, lost_told : int
+    lost, lost_reported : int
         Messages lost in transport according to the middleware, and how many of them have already been
         reported.
     incompatible : str
@@ -48,7 +48,7 @@ class InputTopic:
     heard_ns: int = 0
     heard_wall_ns: int = 0
     lost: int = 0
-    lost_told: int = 0
+    lost_reported: int = 0
     incompatible: str = ""
     publishers: Publishers = Publishers()
     sources: int = 1

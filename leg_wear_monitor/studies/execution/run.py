@@ -74,7 +74,7 @@ def run_study(
         for key, point in zip(keys, points, strict=True)
     }
     missing = [job for job in jobs.values() if not _is_kept(directory, job)]
-    report, total = progress or (lambda _share: None), sum(job.cost for job in jobs.values())
+    report, total = progress or (lambda _fraction: None), sum(job.cost for job in jobs.values())
     spent = total - sum(job.cost for job in missing)
 
     def done(job: Job, arrays: Arrays) -> None:

@@ -49,12 +49,12 @@ class StudyDirectory:
             If the directory contains another study, or is not writable.
         """
         if (self.path / MANIFEST).exists():
-            there = read_manifest(self.path)["study"]
-            if there != manifest["study"]:
+            present = read_manifest(self.path)["study"]
+            if present != manifest["study"]:
                 raise ConfigError(
                     str(self.path),
                     "",
-                    f"holds the study {there}, expected {manifest['study']} or a new directory",
+                    f"holds the study {present}, expected {manifest['study']} or a new directory",
                 )
         try:
             (self.path / POINTS).mkdir(parents=True, exist_ok=True)

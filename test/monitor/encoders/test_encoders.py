@@ -183,8 +183,8 @@ def test_a_restored_monitor_goes_on_bit_for_bit(new_watch, read):
     first = said(monitor, [monitor.update(rest)]), monitor._encoders.snapshot()
     monitor.restore(middle)
     assert said(monitor, [monitor.update(rest)]) == first[0]
-    again = monitor._encoders.snapshot().hidden.reference
-    np.testing.assert_array_equal(again.columns, first[1].hidden.reference.columns)
+    again = monitor._encoders.snapshot().regression.reference
+    np.testing.assert_array_equal(again.columns, first[1].regression.reference.columns)
 
 
 @pytest.mark.parametrize(

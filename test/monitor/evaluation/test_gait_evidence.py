@@ -67,7 +67,7 @@ def seen(rate_hz: float = 200.0, rpm: float = 60.0, seconds: float = 4.0, fault:
     )
     evidence = GaitEvidence(MonitorConfig())
     for block in np.array_split(samples, 3):
-        evidence.see(block)
+        evidence.add_samples(block)
     return evidence.missing()
 
 
@@ -84,5 +84,5 @@ def test_what_is_missing_is_named() -> None:
 def test_angles_without_end_are_no_error() -> None:
     samples = gait_samples(np.arange(4) * 10**7 + 10**18, crank_angle_rad=[1e308, -1e308, 1e308, 0.0])
     evidence = GaitEvidence(MonitorConfig())
-    evidence.see(samples)
+    evidence.add_samples(samples)
     assert evidence.missing()

@@ -8,6 +8,8 @@ from collections.abc import Callable
 from concurrent.futures import ProcessPoolExecutor
 
 import leg_wear_monitor as lw
+from leg_wear_monitor.bags.reader import Recording
+from leg_wear_monitor.share import share_directory
 
 
 def simulation() -> None:
@@ -21,9 +23,16 @@ def monitor() -> None:
     lw.WearMonitor(lw.load_mechanism()).warm_up()
 
 
+def reading() -> None:
+    """What reads a recording."""
+    healthy = share_directory() / "bags" / "healthy"
+    with Recording([healthy.with_suffix(".mcap")], lw.load_config(healthy.with_suffix(".yaml"))) as recording:
+        next(recording.blocks())
+
+
 def main() -> None:
-    jobs: tuple[Callable[[], None], ...] = (simulation, monitor)
-    with ProcessPoolExecutor(len(jobs)) as pool:
+    jobs: tuple[Callable[[], None], ...] = (simulation, monitor, reading)
+    with ProcessPoolExecutor(2) as pool:
         for done in [pool.submit(job) for job in jobs]:
             done.result()
 

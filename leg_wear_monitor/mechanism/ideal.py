@@ -135,9 +135,7 @@ def _motion(linkage: Linkage, angles: Floats, q: Floats, speed: float, accelerat
     # M a + phi_q^T lambda = Q; the force that a row exerts is -phi_q^T lambda
     inertial: Floats = force - linkage.arrays.mass * a
     lam = _solve(jacobian.transpose(0, 2, 1), inertial[:, 1:].reshape(len(q), -1))
-    joint_force = np.array([reactions(linkage, *one) for one in zip(q, lam, strict=True)])
-    joint_force = joint_force.reshape(len(q), len(linkage.mechanism.joints), 2)
-    return IdealMotion(angles, q, v, a, joint_force, -lam[:, linkage.rows.drive_row])
+    return IdealMotion(angles, q, v, a, reactions(linkage, q, lam), -lam[:, linkage.rows.drive_row])
 
 
 def _solve(matrices: Floats, columns: Floats) -> Floats:
@@ -146,16 +144,16 @@ def _solve(matrices: Floats, columns: Floats) -> Floats:
 
 
 def reactions(linkage: Linkage, q: Floats, lam: Floats) -> Floats:
-    """Force (j, 2) [N] on the journal's or slider's body in every joint, from the multipliers (m,)."""
-    arrays, force = linkage.arrays, np.zeros((len(linkage.mechanism.joints), 2))
+    """Force (N, j, 2) [N] on the journal's or slider's body in every joint, from the multipliers (N, m)."""
+    arrays, force = linkage.arrays, np.zeros((len(q), len(linkage.mechanism.joints), 2))
     for closure, row in zip(linkage.rows.closure, linkage.rows.row, strict=True):
         if closure == DRIVE:
             continue
         if arrays.joint_kind[closure] == 0:
-            force[closure] = -lam[row : row + 2]
+            force[:, closure] = -lam[:, row : row + 2]
         else:
-            angle = q[arrays.joint_body[closure, 0], 2]
-            force[closure] = -lam[row] * rotated(arrays.joint_normal[closure], angle)
+            angle = q[:, arrays.joint_body[closure, 0], 2]
+            force[:, closure] = -lam[:, row, None] * rotated(arrays.joint_normal[closure], angle)
     return force
 
 

@@ -1,5 +1,5 @@
 # `make test` and `make demo` do all the set-up themselves, once: Python 3.11 to 3.13 with venv and a C compiler are enough.
-.PHONY: test test-slow test-oldest test-oldest-quick package colcon docs-check demo campaign lock sbom clean
+.PHONY: test test-slow lint kernels test-oldest test-oldest-quick package colcon docs-check demo campaign lock sbom clean
 .DELETE_ON_ERROR:
 
 # Percent of lines and branches that the two runs of the tests reach together.
@@ -21,24 +21,32 @@ export MPLCONFIGDIR := $(CURDIR)/build/matplotlib
 # rclpy writes a float32 or an int into a float field as garbage unless told to look.
 export ROS_PYTHON_CHECK_FIELDS := 1
 export PIP_DISABLE_PIP_VERSION_CHECK := 1
+# Bytecode is left to the first import: most of what is installed is never imported, and pip takes half of its time for it.
+QUICKLY := --quiet --no-compile
 # A sourced ROS installation must not mix with the pinned one; the last is how its wheels mark a set library path.
 unexport PYTHONPATH LD_LIBRARY_PATH _ROS_WHEELS_BOOTSTRAP_COMPLETE
 
 test: .venv/installed
-	.venv/bin/ruff check
-	.venv/bin/ruff format --check
-	.venv/bin/mypy
-	.venv/bin/lint-imports --no-logo
-	.venv/bin/python test/compile_kernels.py
-	.venv/bin/python -m pytest $(TWO) $(IN_ORDER) -m "not slow" --cov --cov-report=
+	$(MAKE) --no-print-directory --jobs 2 --output-sync=target lint kernels
+	TRACED_LATER="$(WITH_KERNELS)" .venv/bin/python -m pytest $(TWO) $(IN_ORDER) -m "not slow and not uncompiled" \
+		--cov --cov-report=
 	@# Coverage cannot see into compiled kernels: once more, uncompiled, where there are kernels, and the sum of both is judged.
 	NUMBA_DISABLE_JIT=1 .venv/bin/python -m pytest $(TWO) $(IN_ORDER) -m "plain and not slow" $(WITH_KERNELS) \
 		--cov --cov-append --cov-fail-under=$(COVERAGE_MIN)
 
-# What `make test` leaves out: more of the same laws, at a length that finds what a short run does not (marker `slow`).
-test-slow: .venv/installed
+# What `make test` leaves out: more of the same laws, at a length that finds what a short run does not (marker `slow`),
+# and kernels compiled by themselves (marker `uncompiled`).
+test-slow: kernels
+	.venv/bin/python -m pytest $(TWO) $(IN_ORDER) -m "slow or uncompiled"
+
+lint: .venv/installed
+	.venv/bin/ruff check
+	.venv/bin/ruff format --check
+	.venv/bin/mypy
+	.venv/bin/lint-imports --no-logo
+
+kernels: .venv/installed
 	.venv/bin/python test/compile_kernels.py
-	.venv/bin/python -m pytest $(TWO) $(IN_ORDER) -m slow
 
 demo: .venv/installed
 	.venv/bin/leg-wear-monitor demo --out build/demo
@@ -55,18 +63,21 @@ test-oldest: .venv-oldest/installed
 package: .venv/installed
 	rm -rf build/lib build/bdist.* build/wheel build/package
 	.venv/bin/python -m pip wheel --quiet --no-deps --no-build-isolation --wheel-dir build/wheel .
-	.venv/bin/python -m venv build/package
-	build/package/bin/python -m pip install --quiet --only-binary :all: --constraint constraints.txt build/wheel/*.whl
+	.venv/bin/python -m venv --without-pip build/package
+	.venv/bin/python -m pip --python build/package/bin/python install $(QUICKLY) --only-binary :all: \
+		--constraint constraints.txt build/wheel/*.whl
 	cd build/package && unset AMENT_PREFIX_PATH && bin/leg-wear-monitor --help && bin/leg-wear-monitor check \
 		&& bin/leg-wear-monitor simulate --clearances none && bin/python -c 'import leg_wear_monitor'
 
 # As in a ROS 2 workspace, with a selection of the tests. colcon runs the Python that runs it: the one that has our libraries.
+# Where pytest-cov is installed, it writes a page of coverage for every file unless told not to.
 COLCON = PYTHONPATH=$(wildcard .venv-tools/lib/python3*/site-packages) .venv/bin/python .venv-tools/bin/colcon --log-base build/colcon/log
 COLCON_BASES := --base-paths . --build-base build/colcon/build
 colcon: .venv/installed .venv-tools/installed
 	rm -rf build/colcon
 	$(COLCON) build $(COLCON_BASES) --install-base build/colcon/install
-	$(COLCON) test $(COLCON_BASES) --install-base build/colcon/install --pytest-args test/test_packaging.py test/monitor/alarms/test_words.py
+	$(COLCON) test $(COLCON_BASES) --install-base build/colcon/install \
+		--pytest-args test/test_packaging.py test/monitor/alarms/test_words.py --no-cov
 	$(COLCON) test-result --test-result-base build/colcon/build --verbose
 
 # Spelling, and links from one document to another.
@@ -87,14 +98,14 @@ clean:
 	$(call environment,python3.13 python3.12 python3.11 python3)
 	$(call locked,requirements-build.lock)
 	$(call locked,requirements.lock)
-	$(@D)/bin/python -m pip install --quiet --no-deps --no-build-isolation --editable .
+	$(@D)/bin/python -m pip install $(QUICKLY) --no-deps --no-build-isolation --editable .
 	@touch $@
 
 # The oldest ones differ from Python to Python: pinned, without hashes.
 .venv-oldest/installed: setup.cfg setup.py package.xml constraints-oldest.txt
 	$(call environment,python3.12 python3.11 python3)
-	$(@D)/bin/python -m pip install --quiet --constraint constraints-oldest.txt setuptools wheel
-	$(@D)/bin/python -m pip install --quiet --constraint constraints-oldest.txt --no-build-isolation --editable ".[bags,test]"
+	$(@D)/bin/python -m pip install $(QUICKLY) --constraint constraints-oldest.txt setuptools wheel
+	$(@D)/bin/python -m pip install $(QUICKLY) --constraint constraints-oldest.txt --no-build-isolation --editable ".[bags,test]"
 	@touch $@
 
 .venv-tools/installed: requirements-build.lock requirements-tools.lock
@@ -123,7 +134,7 @@ LOCK := .venv-tools/bin/uv pip compile --quiet --universal --python-version 3.11
 	--no-emit-index-url --no-emit-find-links
 
 # $(call locked,LOCK): install what a lock names; of empy there is only the source.
-locked = $(@D)/bin/python -m pip install --quiet --require-hashes --no-deps --no-build-isolation \
+locked = $(@D)/bin/python -m pip install $(QUICKLY) --require-hashes --no-deps --no-build-isolation \
 	--only-binary :all: --no-binary empy --requirement $(1)
 
 # $(call environment,PYTHONS): a fresh environment in the target's directory, from the first Python that will do.

@@ -1,14 +1,18 @@
 """What all tests share: a search for counterexamples that repeats itself, and mechanisms made ready."""
 
+import os
+import sys
 from collections.abc import Callable
-from functools import cache
+from functools import cache, wraps
 from importlib.util import find_spec
 from pathlib import Path
 from typing import Any
 
 import pytest
 from hypothesis import settings
+from matplotlib.figure import Figure
 from ruamel.yaml import YAML
+from ruamel.yaml.parser import Parser
 
 from leg_wear_monitor import Mechanism, load_mechanism
 from leg_wear_monitor.mechanism.position import Linkage, build_linkage
@@ -22,6 +26,41 @@ else:  # the extra `bags` is not installed
 # the first example may wait for a compilation, so there is no deadline
 settings.register_profile("repeatable", derandomize=True, deadline=None, max_examples=50)
 settings.load_profile("repeatable")
+
+
+def untraced(call: Callable[..., Any]) -> Callable[..., Any]:
+    """A function of a library, run without the tracer: coverage slows what it does not measure, too."""
+
+    @wraps(call)
+    def without(*arguments: Any, **options: Any) -> Any:
+        tracer = sys.gettrace()
+        sys.settrace(None)
+        try:
+            return call(*arguments, **options)
+        finally:
+            sys.settrace(tracer)
+
+    return without
+
+
+# Pictures and YAML are pure Python, which takes two to three times as long when traced.
+if sys.gettrace() is not None:
+    for owner, name in ((Figure, "savefig"), (YAML, "load"), (Parser, "check_event")):
+        setattr(owner, name, untraced(getattr(owner, name)))
+
+
+def pytest_collection_modifyitems(items: list[pytest.Item]) -> None:
+    """Leave the tracing of tests that run again, uncompiled, to that run: it sees all of what they reach."""
+    below = tuple(os.environ.get("TRACED_LATER", "").split())
+    for item in items:
+        if item.nodeid.startswith(below) and item.get_closest_marker("plain"):
+            item.add_marker("no_cover")
+
+
+@pytest.fixture
+def unpainted(monkeypatch: pytest.MonkeyPatch) -> None:
+    """Pictures are made but not painted: that takes most of a page's time and changes none of its text."""
+    monkeypatch.setattr(Figure, "savefig", lambda *_, **__: None)
 
 
 @pytest.fixture(scope="session")

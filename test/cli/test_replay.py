@@ -91,9 +91,8 @@ def spoilt(document, draw):
     return document
 
 
-def test_a_summary_changed_anywhere_gives_a_page_or_one_line(run, bag, tmp_path, monkeypatch):
-    """Pictures are made but not painted: that takes most of the time and depends on nothing else."""
-    monkeypatch.setattr("leg_wear_monitor.report.replay.page.png", lambda figure: b"")
+@pytest.mark.no_cover
+def test_a_summary_changed_anywhere_gives_a_page_or_one_line(run, bag, tmp_path, unpainted):
     run("replay", str(bag), "--out", "out")
     file, draw, refused = tmp_path / "out" / "summary.json", random.Random(16), 0
     whole = json.loads(file.read_text())
@@ -122,12 +121,14 @@ def test_a_summary_of_another_version_is_refused(run, complaints, tmp_path, vers
     assert len(line) < 200
 
 
+@pytest.mark.no_cover
 def test_json_on_stdout_is_all_that_is_there(run, bag):
     record = json.loads(run("replay", str(bag), "--json", "-").stdout)
     assert record["cycles"] >= 1
     assert record["monitor"]["clearance_joints"]
 
 
+@pytest.mark.no_cover
 def test_a_partial_recording_is_said_and_fails_unless_allowed(run, cut, complaints):
     result = run("replay", str(cut))
     assert result.exit_code == 1
@@ -243,6 +244,7 @@ def test_without_a_believable_gait_cycle_there_are_no_forces(run, tmp_path, stam
     assert f"Missing: {why}" in html.unescape((tmp_path / "out" / "report.html").read_text())
 
 
+@pytest.mark.no_cover
 def test_a_clock_that_goes_back_makes_no_negative_time(run, tmp_path):
     stamps = np.where(np.arange(N) < N // 2, STAMPS, STAMPS - 1_600_000_000 * 10**9)
     result = run("replay", str(write(tmp_path / "x.mcap", stamps, TURNING)), "--json", "-")

@@ -52,14 +52,14 @@ def test_the_page_is_drawn_again_from_the_data_alone(run, done, tmp_path):
     assert page.read_bytes() == first
 
 
-def test_another_leg_is_an_option(run, tmp_path):
+def test_another_leg_is_an_option(run, tmp_path, unpainted):
     (tmp_path / "tiny.yaml").write_text(TINY.replace("0.0001, ", ""))
     result = run("study", "size", "--config", "tiny.yaml", "--mechanism", "jansen_leg", "--out", "out")
     assert result.exit_code == 0
     assert json.loads((tmp_path / "out" / "study.json").read_text())["settings"]["mechanism"] == "jansen_leg"
 
 
-def test_points_that_are_missing_are_told_and_the_rest_is_shown(run, done, tmp_path):
+def test_points_that_are_missing_are_told_and_the_rest_is_shown(run, done, tmp_path, unpainted):
     first = json.loads((tmp_path / "out" / "study.json").read_text())["points"][0]["key"]
     (tmp_path / "out" / "points" / f"{first}.npz").unlink()
     result = run("report", "out")

@@ -121,6 +121,7 @@ def test_a_replay_reports_bit_for_bit_what_the_monitor_reported_live(
     assert monitor.wear_depth_m.tobytes() == out[1].monitor.wear_depth_m.tobytes()
 
 
+@pytest.mark.no_cover
 def test_what_a_replay_gives_does_not_depend_on_how_it_was_stored(
     walk: Messages_, bag: Path, out: tuple[Path, Any], tmp_path: Path
 ) -> None:
@@ -183,7 +184,7 @@ def test_the_page_is_whole_and_of_one_file(out: tuple[Path, Any]) -> None:
     assert "The leg lasts" not in html
 
 
-def test_the_page_says_how_long_the_leg_lasts(out: tuple[Path, Any]) -> None:
+def test_the_page_says_how_long_the_leg_lasts(out: tuple[Path, Any], unpainted: None) -> None:
     pytest.importorskip("jinja2")
     from leg_wear_monitor.report.page import page_html
     from leg_wear_monitor.report.replay.page import replay_page
@@ -199,7 +200,9 @@ def test_the_page_says_how_long_the_leg_lasts(out: tuple[Path, Any]) -> None:
     assert "with a probability of 60 %." in html
 
 
-def test_the_page_shows_where_measured_clearances_lay_in_what_was_expected(out: tuple[Path, Any]) -> None:
+def test_the_page_shows_where_measured_clearances_lay_in_what_was_expected(
+    out: tuple[Path, Any], unpainted: None
+) -> None:
     pytest.importorskip("jinja2")
     from leg_wear_monitor.report.page import page_html
     from leg_wear_monitor.report.replay.page import replay_page
@@ -300,6 +303,7 @@ def test_a_recording_is_not_written_over_by_its_own_reports(bag: Path, tmp_path:
     assert path.read_bytes() == bag.read_bytes()
 
 
+@pytest.mark.no_cover
 def test_progress_goes_from_little_to_all(bag: Path) -> None:
     fractions: list[float] = []
     lw.replay(bag, lw.MonitorConfig(), progress=fractions.append)
@@ -311,7 +315,7 @@ def test_a_recording_of_another_crank_is_refused(bag: Path) -> None:
         lw.replay(bag, lw.MonitorConfig(crank_joint="wheel"))
 
 
-def test_a_crank_that_hardly_turns_gives_a_result_of_nothing(bag: Path) -> None:
+def test_a_crank_that_hardly_turns_gives_a_result_of_nothing(bag: Path, unpainted: None) -> None:
     """Nothing is made up, and the reason is said."""
     pytest.importorskip("jinja2")
     from leg_wear_monitor.report.page import page_html

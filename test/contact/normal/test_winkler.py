@@ -166,14 +166,14 @@ def moved(model, leg, clearance_joints, cycles, wear=False, pace=1.0):
     return np.array(integrals), energy, setup.surfaces.depth
 
 
-@pytest.mark.parametrize("model, bound", [(FullRun, 2.0e-4), (ClearanceRun, 2.0e-2)])
-def test_energy_adds_up_on_walls_that_wear(leg, model, bound):
+@pytest.mark.parametrize("model, cycles, bound", [(FullRun, 1, 2.0e-4), (ClearanceRun, 2, 2.0e-2)])
+def test_energy_adds_up_on_walls_that_wear(leg, model, cycles, bound):
     """At 3e4 times the pace of real wear.
 
     Penetrations are far below Hertz's, so the clearance model's local error makes more of them: 0.8 % of the
     losses here; on fresh walls 0.7 %, and 0.1 % at a tenth of the tolerance.
     """
-    _, energy, depth = moved(model, leg, "ABGIJ", 2, wear=True, pace=3.0e4)
+    _, energy, depth = moved(model, leg, "ABGIJ", cycles, wear=True, pace=3.0e4)
     losses = sum(cycle.friction_loss + cycle.contact_loss for cycle in energy)
     assert sum(cycle.wear_loss for cycle in energy) > 4.0e-3 * losses
     assert abs(sum(cycle.residual for cycle in energy)) < bound * losses

@@ -55,12 +55,14 @@ def by_one_worker(various):
     return figures(simulate_batch(various, workers=1, **SHORT))
 
 
-@pytest.mark.parametrize("workers", [2, 5, None])
+@pytest.mark.no_cover
+@pytest.mark.parametrize("workers", [pytest.param(2, marks=pytest.mark.slow), 5, None])
 def test_results_do_not_depend_on_the_number_of_workers(various, by_one_worker, workers):
     """Bit for bit."""
     assert figures(simulate_batch(various, workers=workers, **SHORT)) == by_one_worker
 
 
+@pytest.mark.no_cover
 def test_results_do_not_depend_on_the_others(various, by_one_worker):
     """Nor on the order."""
     backwards = figures(simulate_batch(various[::-1], **SHORT))
@@ -161,6 +163,7 @@ def new_stepper(leg):
     return lambda: ClearanceStepper(prepare(leg, clearances=("A", "G")), tables=tables)
 
 
+@pytest.mark.no_cover
 @settings(max_examples=25)
 @given(perturb_m=st.floats(0.0, 3.0e-4), seed=st.integers(0, 2**32), angle=st.floats(-10.0, 10.0))
 def test_a_start_is_inside_the_clearance_and_repeats_itself(leg, new_stepper, perturb_m, seed, angle):

@@ -1,6 +1,5 @@
 """The clearance stepper as a twin drives it: any motion of the crank, in any pieces, from any snapshot."""
 
-from collections.abc import Callable
 from itertools import pairwise
 from typing import NamedTuple
 
@@ -11,7 +10,7 @@ from hypothesis import example, given, settings
 from hypothesis import strategies as st
 
 from leg_wear_monitor import Mechanism, load_mechanism
-from leg_wear_monitor.dynamics.clearance.stepper import TOLERANCE_M, ClearanceStepper
+from leg_wear_monitor.dynamics.clearance.stepper import ClearanceStepper
 from leg_wear_monitor.dynamics.clearance.tables import ClearanceTables, build_tables
 from leg_wear_monitor.dynamics.full.run import FullRun
 from leg_wear_monitor.dynamics.run.drive import steady_drive
@@ -19,7 +18,6 @@ from leg_wear_monitor.dynamics.run.protocol import DONE, INVALID_DRIVE
 from leg_wear_monitor.dynamics.run.run_statistics import (
     ARCHARD,
     BEGIN,
-    CONTACT,
     FORCE,
     PEAK,
     SPEED,
@@ -302,65 +300,6 @@ def test_no_wear_is_lost(new_stepper, t):
     volume = worn_volume(contacts, Surfaces(stepper.state.depth, 1)) + contacts.wear_coefficient * pending
     wanted = contacts.wear_coefficient * statistics.integral[contacts.joint, ARCHARD][:, None]
     np.testing.assert_allclose(volume, wanted, rtol=1.0e-11)
-
-
-def run_statistics_of(new: Callable[[], ClearanceStepper], runs: int, count: int) -> np.ndarray:
-    """Means of independent runs at 60 rpm (runs, 3, k), the first second dropped: force, Archard, contact.
-
-    The journals start elsewhere in each, since regimes of the motion last for more than a few cycles.
-    """
-    polynomial, figures = steady_drive(0.0, TURN), []
-    for run in range(runs):
-        stepper, statistics = new(), new_run_statistics(10)
-        stepper.state.e[:] = np.random.default_rng(run).uniform(-1.0e-4, 1.0e-4, len(stepper.state.e))
-        drive(stepper, [Piece(polynomial, 1.0)], new_run_statistics(10))
-        drive(stepper, [Piece(polynomial, 1.0 + count)], statistics)
-        joints = stepper.model.contacts.joint
-        figures.append(statistics.integral[joints][:, [FORCE, ARCHARD, CONTACT]].T / count)
-    return np.array(figures)
-
-
-def assert_means_agree(one: np.ndarray, other: np.ndarray) -> None:
-    """Within three standard errors of samples (n, 3, k), or within 2 %; 5 % for wear, which varies most."""
-    difference = np.abs(one.mean(axis=0) - other.mean(axis=0))
-    error = np.hypot(*(samples.std(axis=0, ddof=1) / np.sqrt(len(samples)) for samples in (one, other)))
-    fraction = np.array([[0.02], [0.05], [0.02]]) * one.mean(axis=0)
-    assert (difference < np.maximum(3.0 * error, fraction)).all(), difference / one.mean(axis=0)
-
-
-@pytest.mark.parametrize(
-    "finer",
-    [
-        pytest.param({"interval_s": 0.5 / 2048}, id="interval"),
-        pytest.param({"tolerance_m": 0.1 * TOLERANCE_M}, id="tolerance", marks=pytest.mark.slow),
-    ],
-)
-def test_means_hold_at_half_the_interval_and_a_tenth_of_the_tolerance(leg, tables, finer):
-    """All five joints' figures, over twenty-four runs of five cycles."""
-    usual, fine = (
-        run_statistics_of(
-            lambda options=options: ClearanceStepper(prepare(leg), tables=tables, **options), 24, 5
-        )
-        for options in ({}, finer)
-    )
-    assert_means_agree(fine, usual)
-
-
-@pytest.mark.parametrize(
-    "clearance_joints",
-    ["G", pytest.param("AB", marks=pytest.mark.slow), pytest.param("IJ", marks=pytest.mark.slow), "ABGIJ"],
-)
-def test_means_are_those_of_full_coordinates(leg, leg_cycles, clearance_joints):
-    """Over twenty cycles; docs/validation.md has more of them, and more figures."""
-    cycles, setup = leg_cycles(clearance_joints, 20), prepare(leg, clearances=tuple(clearance_joints))
-    known = build_tables(setup.linkage, setup.contacts)
-    full = np.stack([cycles.force, cycles.archard, cycles.contact], axis=1)
-    runs = run_statistics_of(
-        lambda: ClearanceStepper(prepare(leg, clearances=tuple(clearance_joints)), tables=known),
-        runs=8,
-        count=5,
-    )
-    assert_means_agree(full, runs)
 
 
 @pytest.mark.parametrize("name", ["bionic_leg", "jansen_leg"])

@@ -25,7 +25,7 @@ from leg_wear_monitor.mechanism.ideal import TURN, one_cycle
 from leg_wear_monitor.mechanism.position import dense_jacobian
 from leg_wear_monitor.wear.surfaces import SECTORS, Surfaces
 
-pytestmark = pytest.mark.plain
+pytestmark = [pytest.mark.plain, pytest.mark.uncompiled]
 
 CLEARANCE_JOINTS = ("A", "B", "G", "I", "J")
 APPROACH = np.full(len(CLEARANCE_JOINTS), 0.2)

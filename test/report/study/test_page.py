@@ -41,10 +41,10 @@ def test_every_page_has_configuration_versions_conclusions_and_units(drawn, name
     assert "nan" not in "".join(cell for table in parts(page, Table) for row in table.rows for cell in row)
 
 
-def test_conclusions_are_computed_from_the_data(study, drawn):
+def test_conclusions_are_computed_from_the_data(study, unpainted):
     """Doubling an error doubles what is said of it, whatever that is."""
     results = study("size")
-    text = conclusions(drawn("size"))
+    text = conclusions(study_page(results))
     before = float(re.search(r"toe displacement error goes from ([\d.]+)", text).group(1))
     doubled = tuple(
         {**arrays, "error_toe_position_m": 2.0 * arrays["error_toe_position_m"]} for arrays in results.arrays
@@ -70,7 +70,7 @@ def test_a_superposition_is_called_one_only_where_it_is(study):
     assert findings.superposition(alone, halved)[0].startswith("All at once is not the sum")
 
 
-def test_points_that_failed_or_are_missing_come_first(study):
+def test_points_that_failed_or_are_missing_come_first(study, unpainted):
     results = study("size")
     arrays = ({"fault": np.array("pushed through")}, {}, *results.arrays[2:])
     page = study_page(attrs.evolve(results, arrays=arrays))

@@ -28,7 +28,7 @@ from leg_wear_monitor.studies.execution.run import run_study
 from leg_wear_monitor.studies.plan.settings import STUDIES, load_settings, parse_settings
 from leg_wear_monitor.studies.plan.study import Study
 from leg_wear_monitor.studies.point import code_digest
-from leg_wear_monitor.studies.storage.store import load_results
+from leg_wear_monitor.studies.results import load_results
 from leg_wear_monitor.studies.tasks.compute import compute
 
 CORES, LEGS = 100, 1000

@@ -30,6 +30,7 @@ if TYPE_CHECKING:
     from leg_wear_monitor.playback.replay import ReplayResult, replay
     from leg_wear_monitor.playback.result.parts import ReplayJoint
     from leg_wear_monitor.playback.result.replay_summary import ReplaySummary
+    from leg_wear_monitor.report.plot import plot
 
 _HOME = {
     "EnergyBalance": "dynamics.result.parts",
@@ -48,6 +49,7 @@ _HOME = {
     "load_config": "monitor.config.parameter_file",
     "load_mechanism": "mechanism.loader",
     "open_ledger": "monitor.ledger.ledger",
+    "plot": "report.plot",
     "replay": "playback.replay",
     "simulate": "dynamics.simulation",
 }
@@ -73,6 +75,7 @@ __all__ = [
     "load_config",
     "load_mechanism",
     "open_ledger",
+    "plot",
     "replay",
     "simulate",
 ]

@@ -135,7 +135,7 @@ def simulate(
     SimulationResult
         ``joints["A"]`` is a `JointResult`: forces, contact, Archard integral, wear and clearance of joint A.
         ``drive_torque_nm``, ``energy_j``, ``toe``, ``impacts["A"]`` and ``trace`` contain the rest;
-        ``to_dict()`` returns the fields for JSON, ``to_pandas()`` tables.
+        ``to_json()`` gives the text that ``simulate --json`` writes, ``to_pandas()`` tables.
 
     Raises
     ------

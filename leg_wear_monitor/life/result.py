@@ -7,6 +7,7 @@ import attrs
 import numpy as np
 
 from leg_wear_monitor.data_frame import data_frame
+from leg_wear_monitor.json_text import json_text
 from leg_wear_monitor.mechanism.arrays import Floats
 from leg_wear_monitor.wear.cycle_jump import WearRate
 
@@ -110,6 +111,10 @@ class Life:
             "error_m": self.error_m.tolist(),
             "joints": joints,
         }
+
+    def to_json(self) -> str:
+        """Text of `to_dict`; ``life --json`` writes the same fields, and what they belong to."""
+        return json_text(self.to_dict())
 
     def columns(self) -> dict[str, list[Any]]:
         """Columns of a table with a row for each joint at each point, joint by joint."""

@@ -39,6 +39,21 @@ class Point:
     settings: dict[str, Any]
     cost: float = 1.0
 
+    @property
+    def clearance_joints(self) -> list[str]:
+        """Clearance joints of its runs."""
+        return list(self.settings["clearance_joints"])
+
+    @property
+    def clearance_m(self) -> float:
+        """Radial clearance of these joints [m]."""
+        return float(self.settings["clearance_m"])
+
+    @property
+    def speed_rpm(self) -> float:
+        """Speed of the crank [rpm]."""
+        return float(self.settings["speed_rpm"])
+
     def key(self, mechanism: Mechanism) -> str:
         """Digest of everything the result depends on: task, settings, mechanism and code."""
         plain = json.dumps([self.task, self.settings], sort_keys=True, allow_nan=False)

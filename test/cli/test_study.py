@@ -6,7 +6,7 @@ import shutil
 import pytest
 
 from leg_wear_monitor.report.page import page_html
-from leg_wear_monitor.studies.storage.store import load_results
+from leg_wear_monitor.studies.results import load_results
 
 TINY = """\
 joints: [G]

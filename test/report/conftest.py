@@ -10,7 +10,7 @@ from leg_wear_monitor.report.page import Page
 from leg_wear_monitor.report.study.page import study_page
 from leg_wear_monitor.studies.execution.run import run_study
 from leg_wear_monitor.studies.plan.settings import parse_settings
-from leg_wear_monitor.studies.storage.store import StudyResults, load_results
+from leg_wear_monitor.studies.results import StudyResults, load_results
 
 ENSEMBLE = {"runs": 2, "cycles": 2, "skip_cycles": 1, "traced_cycles": 1}
 DIAGRAM = {"clearances_m": [2.0e-4, 3.0e-4], "speeds_rpm": [20, 60], "cycles": 4, "skip_cycles": 1}

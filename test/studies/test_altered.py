@@ -11,9 +11,9 @@ import pytest
 from leg_wear_monitor.errors import ConfigError, ConfigWarning, LegWearError
 from leg_wear_monitor.studies.execution import processes
 from leg_wear_monitor.studies.execution.run import run_study
+from leg_wear_monitor.studies.results import load_results
 from leg_wear_monitor.studies.storage import archive
 from leg_wear_monitor.studies.storage.checksum import canonical, text_checksum
-from leg_wear_monitor.studies.storage.store import load_results
 
 pytestmark = pytest.mark.plain
 

@@ -11,7 +11,7 @@ from contextlib import contextmanager
 import pytest
 
 from leg_wear_monitor.studies.execution.run import run_study
-from leg_wear_monitor.studies.storage.store import load_results
+from leg_wear_monitor.studies.results import load_results
 
 pytest.importorskip("distributed", reason="the extra 'dask' is not installed")
 

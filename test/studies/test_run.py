@@ -16,7 +16,8 @@ import pytest
 from leg_wear_monitor.errors import ConfigError, LegWearError
 from leg_wear_monitor.studies.execution import processes
 from leg_wear_monitor.studies.execution.run import run_study
-from leg_wear_monitor.studies.storage.store import StudyDirectory, load_results
+from leg_wear_monitor.studies.results import load_results
+from leg_wear_monitor.studies.storage.store import StudyDirectory
 from leg_wear_monitor.studies.tasks import compute as tasks
 
 

@@ -18,7 +18,6 @@ from leg_wear_monitor.cli.options import (
 )
 from leg_wear_monitor.cli.output import STDOUT, check_outputs, write_directory, write_json
 from leg_wear_monitor.cli.waiting import compilation, progress_bar
-from leg_wear_monitor.json_text import json_text
 from leg_wear_monitor.mechanism.law_names import NORMAL_LAWS
 
 if TYPE_CHECKING:
@@ -101,8 +100,7 @@ def simulate(mechanism: str, json_file: Path | None, out: Path | None, **options
     with options_named():
         result, wall_s = _run(leg, _keywords(**options))
     warn_of(leg.source, doubts(leg))  # what fails names them itself, in its one line
-    record = _record(result, wall_s)
-    written = _write(record, leg, result, json_file, out)
+    written = _write(leg, result, wall_s, json_file, out)
     if json_file != STDOUT:
         from leg_wear_monitor.cli.tables import print_result
 
@@ -143,24 +141,10 @@ def _run(leg: "Mechanism", keywords: dict[str, Any]) -> tuple["SimulationResult"
         return result, time.perf_counter() - began
 
 
-def _record(result: "SimulationResult", wall_s: float) -> dict[str, Any]:
-    """What ``--json`` writes: the result, with the clock's values before its parts."""
-    record = result.to_dict()
-    head = {
-        name: record.pop(name) for name in ("schema_version", "mechanism", "model", "speed_rpm", "cycles")
-    }
-    clock = {
-        "wall_s": wall_s,
-        "simulated_s": record.pop("simulated_s"),
-        "real_time_factor": result.simulated_s / wall_s,
-    }
-    return head | clock | record
-
-
 def _write(
-    record: dict[str, Any],
     leg: "Mechanism",
     result: "SimulationResult",
+    wall_s: float,
     json_file: Path | None,
     out: Path | None,
 ) -> list[Path]:
@@ -168,7 +152,7 @@ def _write(
     if json_file is None and out is None:
         return []
     written: list[Path] = []
-    text = json_text(record)
+    text = result.to_json(wall_s)
     if out is not None:
         from leg_wear_monitor.report.figures.simulation import pictures
 

@@ -99,7 +99,7 @@ def write_study_page(path: Path) -> int:
     from leg_wear_monitor.cli.output import write_directory
     from leg_wear_monitor.report.page import page_html
     from leg_wear_monitor.report.study.page import study_page
-    from leg_wear_monitor.studies.storage.store import load_results
+    from leg_wear_monitor.studies.results import load_results
 
     results = load_results(path)
     (page,) = write_directory(path, {"report.html": page_html(study_page(results)).encode()})

@@ -15,6 +15,7 @@ from leg_wear_monitor.dynamics.result.parts import (
     Trace,
 )
 from leg_wear_monitor.dynamics.result.tables import impact_columns, joint_columns, trace_columns
+from leg_wear_monitor.json_text import json_text
 from leg_wear_monitor.wear.surfaces import Surfaces
 
 if TYPE_CHECKING:
@@ -67,15 +68,25 @@ class SimulationResult:
     clearance_joints: tuple[str, ...] = ()
     surfaces: Surfaces | None = None
 
-    def to_dict(self) -> dict[str, Any]:
-        """Plain object with the fields of ``simulate --json``, except the computing times."""
+    def to_dict(self, wall_s: float | None = None) -> dict[str, Any]:
+        """Plain object: what ``simulate --json`` writes.
+
+        Parameters
+        ----------
+        wall_s : float, optional
+            Wall-clock duration of the simulation [s]; without it, what follows from it is left out.
+        """
+        clock = {} if wall_s is None else {"wall_s": wall_s}
+        factor = {} if wall_s is None else {"real_time_factor": self.simulated_s / wall_s}
         record = {
             "schema_version": SCHEMA_VERSION,
             "mechanism": self.mechanism,
             "model": self.model,
             "speed_rpm": self.speed_rpm,
             "cycles": self.cycles,
+            **clock,
             "simulated_s": self.simulated_s,
+            **factor,
             "drive_torque_nm": part_document(self.drive_torque_nm),
             "energy_j": part_document(self.energy_j),
             "toe": part_document(self.toe),
@@ -83,6 +94,19 @@ class SimulationResult:
             "impacts": {name: [part_document(one) for one in all_] for name, all_ in self.impacts.items()},
         }
         return record if self.trace is None else {**record, "trace": trace_document(self.trace)}
+
+    def to_json(self, wall_s: float | None = None) -> str:
+        """Text of `to_dict`: what ``simulate --json`` writes.
+
+        Examples
+        --------
+        >>> import json
+        >>> import leg_wear_monitor as lw
+        >>> result = lw.simulate("four_bar", clearances=[], cycles=1)
+        >>> json.loads(result.to_json())["model"]
+        'ideal'
+        """
+        return json_text(self.to_dict(wall_s))
 
     def to_pandas(self) -> "dict[str, pd.DataFrame]":
         """Tables ``joints``, ``impacts`` and, if there is a trace, ``trace``; requires pandas.

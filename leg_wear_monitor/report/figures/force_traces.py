@@ -11,7 +11,7 @@ from leg_wear_monitor.mechanism.arrays import Floats
 from leg_wear_monitor.mechanism.ideal import TURN
 from leg_wear_monitor.report.figures.figure import BLUE, INK, SMALL, USUAL, VERMILION, new_figure, tidy
 
-_LEAST_N = 0.1  # lower end of the logarithmic axis [N]: the force of a journal in free flight is 0
+LEAST_N = 0.1  # lower end of the logarithmic axis [N]: the force of a journal in free flight is 0
 
 
 def force_traces(trace: Trace, joints: Sequence[str]) -> Figure:
@@ -32,11 +32,11 @@ def force_traces(trace: Trace, joints: Sequence[str]) -> Figure:
     panels = np.atleast_1d(figure.subplots(1 + len(joints), 1, sharex=True))
     _draw(panels[0], turns, trace.drive_torque_nm, "drive\n[N m]", VERMILION)
     for axes, name in zip(panels[1:], joints, strict=True):
-        _draw(axes, turns, np.maximum(trace.force_n[name], _LEAST_N), f"{name}\n[N]", BLUE)
+        _draw(axes, turns, np.maximum(trace.force_n[name], LEAST_N), f"{name}\n[N]", BLUE)
         axes.set_yscale("log")
     panels[-1].set_xlabel("turns of the crank, from the first one counted", fontsize=SMALL)
     panels[0].set_xlim(turns.min(), turns.max())
-    title = f"Drive torque and joint forces; at {_LEAST_N} N the journal is free"
+    title = f"Drive torque and joint forces; at {LEAST_N} N the journal is free"
     figure.suptitle(title, fontsize=USUAL, fontweight="bold", color=INK)
     return figure
 

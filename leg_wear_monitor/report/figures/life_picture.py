@@ -15,18 +15,27 @@ def life_picture(life: Life) -> bytes:
     figure = new_figure(max(7.0, 2.2 * joints), 6.0)
     grid = figure.add_gridspec(2, 2 * joints, height_ratios=(1.2, 1.0))
     clearance, peak = figure.add_subplot(grid[0, :joints]), figure.add_subplot(grid[0, joints:])
-    for k, joint in enumerate(life.clearance_joints):
-        colour = BODY_COLOURS[k % len(BODY_COLOURS)]
-        clearance.plot(life.cycles, 1e6 * life.clearance_m[:, k], color=colour, label=joint)
-        clearance.plot(life.cycles, 1e6 * life.clearance_max_m[:, k], color=colour, ls="--", lw=0.7)
-        peak.plot(life.cycles, 1e-3 * life.peak_force_n[:, k], color=colour)
-        _profiles(figure.add_subplot(grid[1, 2 * k : 2 * k + 2]), life, k, colour)
+    draw_clearances(clearance, life)
+    for k in range(joints):
+        peak.plot(life.cycles, 1e-3 * life.peak_force_n[:, k], color=_colour(k))
+        _profiles(figure.add_subplot(grid[1, 2 * k : 2 * k + 2]), life, k, _colour(k))
     clearance.legend(fontsize=SMALL, frameon=False)
     for axes, name in ((clearance, "radial clearance [µm]"), (peak, "peak contact force [kN]")):
         axes.set_ylabel(name, fontsize=SMALL, color=INK)
         axes.set_xlabel("gait cycles", fontsize=SMALL, color=INK)
         tidy(axes)
     return png(figure)
+
+
+def draw_clearances(axes: Axes, life: Life) -> None:
+    """Mean (and dashed, largest) clearance [µm] of each joint over the gait cycles."""
+    for k, joint in enumerate(life.clearance_joints):
+        axes.plot(life.cycles, 1e6 * life.clearance_m[:, k], color=_colour(k), label=joint)
+        axes.plot(life.cycles, 1e6 * life.clearance_max_m[:, k], color=_colour(k), ls="--", lw=0.7)
+
+
+def _colour(k: int) -> str:
+    return BODY_COLOURS[k % len(BODY_COLOURS)]
 
 
 def _profiles(axes: Axes, life: Life, k: int, colour: str) -> None:

@@ -39,18 +39,25 @@ def time_axis(summary: ReplaySummary) -> tuple[Floats, str]:
 
 def clearance_chart(summary: ReplaySummary) -> Figure:
     """How much each clearance has opened since the first gait cycle."""
-    time, unit = time_axis(summary)
-    opened = {joint: values - values[0] for joint, values in summary.history.clearance_m.items()}
-    greatest = max((float(np.nanmax(np.abs(values))) for values in opened.values()), default=0.0)
-    scale, name = next(((s, n) for s, n in _UNITS if s * greatest < 1000.0), _UNITS[-1])
     figure = new_figure(_WIDTH_IN, 3.2)
     axes = figure.add_subplot()
+    unit = draw_openings(axes, summary)
+    _finish([axes], unit, len(summary.history.clearance_m))
+    return figure
+
+
+def draw_openings(axes: Axes, summary: ReplaySummary) -> str:
+    """Draw how much each clearance has opened since the first gait cycle; gives the unit of the time."""
+    time, unit = time_axis(summary)
+    clearances = summary.history.clearance_m if len(time) else {}
+    opened = {joint: values - values[0] for joint, values in clearances.items()}
+    greatest = max((float(np.nanmax(np.abs(values))) for values in opened.values()), default=0.0)
+    scale, name = next(((s, n) for s, n in _UNITS if s * greatest < 1000.0), _UNITS[-1])
     for colour, (joint, values) in zip(COLOURS, opened.items(), strict=False):
         axes.plot(time, scale * values, color=colour, label=joint, linewidth=1.3)
     axes.ticklabel_format(useOffset=False)
     axes.set_ylabel(f"opened by [{name}]", fontsize=SMALL)
-    _finish([axes], unit, len(opened))
-    return figure
+    return unit
 
 
 def force_chart(summary: ReplaySummary) -> Figure:

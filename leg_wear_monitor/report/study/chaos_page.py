@@ -2,7 +2,7 @@
 
 import math
 from collections.abc import Sequence
-from typing import Any
+from typing import cast
 
 import numpy as np
 
@@ -16,9 +16,9 @@ from leg_wear_monitor.report.study.chaos_pictures import (
 )
 from leg_wear_monitor.report.study.sections import Sections, asked, conclude, curves, cycle
 from leg_wear_monitor.report.study.text import Labelled, joined, number
-from leg_wear_monitor.studies.plan.kinds.chaos import PORTRAIT_CYCLES
+from leg_wear_monitor.studies.plan.kinds.chaos import PORTRAIT_CYCLES, Chaos
 from leg_wear_monitor.studies.point import Arrays, Point
-from leg_wear_monitor.studies.storage.store import StudyResults
+from leg_wear_monitor.studies.results import StudyResults
 from leg_wear_monitor.studies.summary import clearance_joints_of
 from leg_wear_monitor.studies.tasks.lyapunov import Estimate, exponent
 from leg_wear_monitor.studies.tasks.section import period_of
@@ -45,7 +45,7 @@ def chaos(results: StudyResults, labelled: Labelled) -> Sections:
         table = _exponent_table(exponents, estimates)
         parts.append(Section("Lyapunov exponents", [exponent_gallery(exponents, estimates), table]))
     for point, arrays in whole:
-        clearance = point.settings["clearance_m"]
+        clearance = point.clearance_m
         angle = point.settings["crank_angle_deg"]
         parts.append(Section("Poincaré maps", [section_gallery(arrays, clearance, angle)]))
         parts.append(Section("Phase portraits", [portrait_gallery(arrays, clearance, PORTRAIT_CYCLES)]))
@@ -59,25 +59,26 @@ def chaos(results: StudyResults, labelled: Labelled) -> Sections:
 
 
 def _apart(pairs: Sequence[_Pair]) -> tuple[list[Arrays], list[float]]:
-    return [arrays for _, arrays in pairs], [point.settings["clearance_m"] for point, _ in pairs]
+    return [arrays for _, arrays in pairs], [point.clearance_m for point, _ in pairs]
 
 
 def _diagrams(results: StudyResults, pairs: Sequence[_Pair]) -> list[tuple[str, list[float], list[_Pair]]]:
     """Axis label, parameter values and points of every bifurcation diagram with at least two points."""
-    over: dict[str, Any] = results.settings["bifurcation"]
+    study = cast("Chaos", results.settings)
+    at_speed = {
+        point.clearance_m: (point, arrays) for point, arrays in pairs if point.speed_rpm == study.speed_rpm
+    }
+    at_clearance = {
+        point.speed_rpm: (point, arrays) for point, arrays in pairs if point.clearance_m == study.clearance_m
+    }
     diagrams = []
-    for axis, values, key, factor in (
-        ("radial clearance [mm]", over["clearances_m"], "clearance_m", 1.0e3),
-        ("crank speed [rpm]", over["speeds_rpm"], "speed_rpm", 1.0),
+    for axis, values, found, factor in (
+        ("radial clearance [mm]", study.bifurcation.clearances_m, at_speed, 1.0e3),
+        ("crank speed [rpm]", study.bifurcation.speeds_rpm, at_clearance, 1.0),
     ):
-        other, own = ("speed_rpm", "clearance_m") if key == "clearance_m" else ("clearance_m", "speed_rpm")
-        usual = results.settings[other]
-        found = {
-            point.settings[own]: (point, arrays) for point, arrays in pairs if point.settings[other] == usual
-        }
-        chosen = [found[value] for value in values if value in found]
+        chosen = [value for value in values if value in found]
         if len(chosen) > 1:
-            diagrams.append((axis, [factor * pair[0].settings[own] for pair in chosen], chosen))
+            diagrams.append((axis, [factor * value for value in chosen], [found[value] for value in chosen]))
     return diagrams
 
 
@@ -99,12 +100,12 @@ def _foretold(label: str, estimate: Estimate) -> str:
 
 def scatter(point: Point, arrays: Arrays) -> list[float]:
     """RMS distance (k,) of a Poincaré map's points from their mean, by clearance joint [clearances]."""
-    e = arrays["section_eccentricity_m"] / point.settings["clearance_m"]
+    e = arrays["section_eccentricity_m"] / point.clearance_m
     return [float(value) for value in np.sqrt(np.square(e - e.mean(axis=0)).sum(axis=2).mean(axis=0))]
 
 
 def _periods(point: Point, arrays: Arrays) -> list[int | None]:
-    e = arrays["section_eccentricity_m"] / point.settings["clearance_m"]
+    e = arrays["section_eccentricity_m"] / point.clearance_m
     return [period_of(e[:, k], _LONGEST, _SAME) for k in range(e.shape[1])]
 
 

@@ -2,8 +2,8 @@
 
 import io
 from collections.abc import Callable
-from typing import Any
 
+import attrs
 from ruamel.yaml import YAML
 
 from leg_wear_monitor.report.page import Page, Section, Sentences
@@ -24,7 +24,7 @@ from leg_wear_monitor.report.study.trends import compare_gallery, trend_gallery
 from leg_wear_monitor.report.study.wear_page import life
 from leg_wear_monitor.studies.plan.settings import STUDIES
 from leg_wear_monitor.studies.plan.study import Sweep
-from leg_wear_monitor.studies.storage.store import StudyResults
+from leg_wear_monitor.studies.results import StudyResults
 
 
 def study_page(results: StudyResults) -> Page:
@@ -39,21 +39,14 @@ def study_page(results: StudyResults) -> Page:
     study = STUDIES[results.study]
     sections = _sections(study.sweep, results, labelled) if labelled else []
     buffer = io.StringIO()
-    YAML().dump(_plain(results.settings), buffer)
+    YAML().dump(attrs.asdict(results.settings), buffer)
     return Page(
         title=f"{study.title}: {results.mechanism.name}",
         summary=study.question,
         sections=[*_notice(results), *sections],
         configuration=buffer.getvalue(),
-        versions={**results.versions, "seed": str(results.settings["ensemble"]["seed"])},
+        versions={**results.versions, "seed": str(results.settings.ensemble.seed)},
     )
-
-
-def _plain(value: Any) -> Any:
-    """Settings with lists in place of tuples, as the YAML writer needs them."""
-    if isinstance(value, dict):
-        return {key: _plain(entry) for key, entry in value.items()}
-    return [_plain(entry) for entry in value] if isinstance(value, list | tuple) else value
 
 
 def _notice(results: StudyResults) -> Sections:
@@ -69,7 +62,7 @@ def _sections(sweep: Sweep | None, results: StudyResults, labelled: Labelled) ->
 
 
 def _swept(sweep: Sweep, results: StudyResults, labelled: Labelled) -> Sections:
-    values = [sweep.value(point.settings) for point, _ in results.of("response")]
+    values = [sweep.value(point) for point, _ in results.of("response")]
     chosen = ends_and_middle(results.of("response"))
     shown = [(point.label, arrays) for point, arrays in chosen]
     sentences = [

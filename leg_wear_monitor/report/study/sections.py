@@ -10,7 +10,7 @@ from leg_wear_monitor.report.study.leg_slider import leg_slider
 from leg_wear_monitor.report.study.text import Labelled, error_table, joined, joint_table, wear_table
 from leg_wear_monitor.report.study.wear_pictures import wear_gallery
 from leg_wear_monitor.studies.point import Point
-from leg_wear_monitor.studies.storage.store import StudyResults
+from leg_wear_monitor.studies.results import StudyResults
 from leg_wear_monitor.studies.summary import clearance_joints_of
 
 Sections = list[Section]
@@ -18,15 +18,15 @@ Sections = list[Section]
 
 def asked(results: StudyResults) -> Section:
     """Section that describes the ensemble and shows the leg."""
-    ensemble = results.settings["ensemble"]
+    ensemble = results.settings.ensemble
     text = (
-        f"Each number is an ensemble of {ensemble['runs']} runs that start at different crank angles with "
-        f"their journals in different places; {ensemble['cycles']} gait cycles of each are counted, after "
-        f"{ensemble['skip_cycles']} that are not. Motion with clearance is chaotic: a single run is an "
+        f"Each number is an ensemble of {ensemble.runs} runs that start at different crank angles with "
+        f"their journals in different places; {ensemble.cycles} gait cycles of each are counted, after "
+        f"{ensemble.skip_cycles} that are not. Motion with clearance is chaotic: a single run is an "
         "example."
     )
     clearance_joints = list(
-        dict.fromkeys(name for point in results.points for name in point.settings["clearance_joints"])
+        dict.fromkeys(name for point in results.points for name in point.clearance_joints)
     )
     names = ", ".join(results.mechanism.joints)
     leg = Picture(
@@ -46,15 +46,11 @@ def conclude(sentences: list[str]) -> Section:
 def cycle(results: StudyResults, chosen: list[tuple[Point, Any]]) -> Section:
     """Section with the interactive leg, for the chosen points."""
     runs = [(point.label, arrays) for point, arrays in chosen]
-    clearances = [_clearance(results, point) for point, _ in chosen]
+    clearances = [point.clearance_m for point, _ in chosen]
     return Section(
         "One gait cycle",
-        [leg_slider(results.mechanism, runs, clearances, chosen[0][0].settings["speed_rpm"])],
+        [leg_slider(results.mechanism, runs, clearances, chosen[0][0].speed_rpm)],
     )
-
-
-def _clearance(results: StudyResults, point: Point) -> float:
-    return float(point.settings["clearance_m"])
 
 
 def curves(labelled: Labelled) -> Section:

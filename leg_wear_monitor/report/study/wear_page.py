@@ -20,7 +20,7 @@ from leg_wear_monitor.report.study.text import (
 from leg_wear_monitor.report.study.trends import MARKS
 from leg_wear_monitor.report.study.wear_pictures import wear_gallery
 from leg_wear_monitor.studies.point import Arrays
-from leg_wear_monitor.studies.storage.store import StudyResults
+from leg_wear_monitor.studies.results import StudyResults
 from leg_wear_monitor.studies.summary import clearance_joints_of, spread
 from leg_wear_monitor.wear.surfaces import BUSHING, wear_zone
 

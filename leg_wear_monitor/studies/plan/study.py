@@ -7,7 +7,7 @@ import attrs
 
 from leg_wear_monitor.configuration.quantity import FieldError, described, quantity
 from leg_wear_monitor.studies.plan.keys import count_field
-from leg_wear_monitor.studies.point import Point, Settings
+from leg_wear_monitor.studies.point import Point
 
 
 @attrs.frozen(kw_only=True)
@@ -45,12 +45,12 @@ class Sweep:
     axis : str
         Label of the axis, with unit.
     value : callable
-        Value on that axis from the settings of a point.
+        Value of a point on that axis.
     """
 
     quantity: str
     axis: str
-    value: Callable[[Settings], float]
+    value: Callable[[Point], float]
 
 
 @attrs.frozen(kw_only=True)

@@ -11,14 +11,10 @@ import re
 from pathlib import Path
 from typing import Any
 
-import attrs
-
 from leg_wear_monitor.errors import ConfigError
 from leg_wear_monitor.json_text import json_text
-from leg_wear_monitor.mechanism.loader import parse_mechanism, read_yaml
-from leg_wear_monitor.mechanism.spec import Mechanism
 from leg_wear_monitor.studies.plan.settings import STUDIES
-from leg_wear_monitor.studies.point import Arrays, Point
+from leg_wear_monitor.studies.point import Arrays
 from leg_wear_monitor.studies.storage.archive import archive, read_archive
 from leg_wear_monitor.studies.storage.checksum import canonical, text_checksum
 from leg_wear_monitor.studies.tasks.compute import TASKS
@@ -156,76 +152,4 @@ def _is_point(entry: dict[str, Any]) -> bool:
         all(isinstance(entry.get(name), kind) for name, kind in types.items())
         and entry["task"] in TASKS
         and _KEY.fullmatch(entry["key"]) is not None
-    )
-
-
-@attrs.frozen(kw_only=True, eq=False)
-class StudyResults:
-    """Contents of a study's directory, for figures and tables.
-
-    Attributes
-    ----------
-    study : str
-    settings : dict
-        Plain form of the settings in `leg_wear_monitor.studies.plan.settings`.
-    mechanism : Mechanism
-    points : tuple of Point
-    arrays : tuple of dict
-        Result of each point; empty for points without a result.
-    versions : dict of str
-    """
-
-    study: str
-    settings: dict[str, Any]
-    mechanism: Mechanism
-    points: tuple[Point, ...]
-    arrays: tuple[Arrays, ...]
-    versions: dict[str, str]
-
-    def of(self, task: str) -> list[tuple[Point, Arrays]]:
-        """Points of a task that have a result, and their results."""
-        pairs = zip(self.points, self.arrays, strict=True)
-        return [
-            (point, arrays)
-            for point, arrays in pairs
-            if point.task == task and arrays and "fault" not in arrays
-        ]
-
-    @property
-    def faults(self) -> list[tuple[str, str]]:
-        """Label and fault of the points whose motion diverged."""
-        pairs = zip(self.points, self.arrays, strict=True)
-        return [(point.label, str(arrays["fault"])) for point, arrays in pairs if "fault" in arrays]
-
-    @property
-    def missing(self) -> list[str]:
-        """Labels of the points that have no result yet."""
-        return [point.label for point, arrays in zip(self.points, self.arrays, strict=True) if not arrays]
-
-
-def load_results(path: Path) -> StudyResults:
-    """Read a study's directory.
-
-    Raises
-    ------
-    ConfigError
-        If it is not a study's directory, or a part of it was altered, exchanged or damaged.
-    """
-    manifest, directory = read_manifest(path), StudyDirectory(path)
-    source = str(path / MECHANISM)
-    entries = manifest["points"]
-    return StudyResults(
-        study=manifest["study"],
-        settings=manifest["settings"],
-        mechanism=parse_mechanism(read_yaml(path / MECHANISM, source), source),
-        points=tuple(
-            Point(label=entry["label"], task=entry["task"], settings=entry["settings"]) for entry in entries
-        ),
-        arrays=tuple(
-            directory.read(entry["key"], entry["task"], entry["settings"])
-            if directory.has(entry["key"])
-            else {}
-            for entry in entries
-        ),
-        versions=manifest["versions"],
     )

@@ -16,9 +16,7 @@ class Size(Study):
     question = (
         "How does the size of a clearance affect the motion, the impacts, the drive and the wear of the leg?"
     )
-    sweep = Sweep(
-        "clearance", "radial clearance [mm]", lambda settings: 1.0e3 * float(settings["clearance_m"])
-    )
+    sweep = Sweep("clearance", "radial clearance [mm]", lambda point: 1.0e3 * point.clearance_m)
 
     joints: Names = clearance_joints_field()
     clearances_m: tuple[float, ...] = clearances_field()

@@ -14,7 +14,7 @@ class Speed(Study):
 
     title = "Crank speed"
     question = "How does the crank's speed affect a leg with clearance?"
-    sweep = Sweep("speed", "crank speed [rpm]", lambda settings: float(settings["speed_rpm"]))
+    sweep = Sweep("speed", "crank speed [rpm]", lambda point: point.speed_rpm)
 
     joints: Names = clearance_joints_field()
     speeds_rpm: tuple[float, ...] = speeds_field()

@@ -1,0 +1,103 @@
+"""A result on matplotlib's axes, for a notebook or a script to go on with."""
+
+from functools import singledispatch
+from typing import Any
+
+import numpy as np
+from matplotlib.axes import Axes
+
+from leg_wear_monitor.dynamics.result.simulation_result import SimulationResult
+from leg_wear_monitor.life.result import Life
+from leg_wear_monitor.mechanism.ideal import TURN
+from leg_wear_monitor.playback.result.replay_summary import ReplaySummary
+from leg_wear_monitor.report.figures.figure import BODY_COLOURS, SMALL, tidy
+from leg_wear_monitor.report.figures.force_traces import LEAST_N
+from leg_wear_monitor.report.figures.life_picture import draw_clearances
+from leg_wear_monitor.report.replay.charts import draw_openings
+
+
+@singledispatch
+def plot(result: Any, axes: Axes | None = None) -> Axes:
+    """Draw a result.
+
+    Parameters
+    ----------
+    result : SimulationResult, Life or ReplaySummary
+        Of a simulation, the force in each clearance joint over the turns of the crank, or without a trace the
+        mean, 99 % and largest force in every joint [N]; of a life, the clearance of each joint over the gait
+        cycles [µm]; of a replay, how much each clearance has opened over time.
+    axes : matplotlib.axes.Axes, optional
+        Where to draw; new axes of pyplot without.
+
+    Returns
+    -------
+    matplotlib.axes.Axes
+
+    Examples
+    --------
+    >>> import leg_wear_monitor as lw
+    >>> axes = lw.plot(lw.simulate("four_bar", clearances=[], cycles=1))
+    >>> axes.get_ylabel()
+    'force [N]'
+    """
+    raise TypeError(
+        f"{type(result).__name__} has no picture, expected SimulationResult, Life or ReplaySummary"
+    )
+
+
+@plot.register
+def _simulation(result: SimulationResult, axes: Axes | None = None) -> Axes:
+    axes = _new() if axes is None else axes
+    if result.trace is None:
+        _bars(axes, result)
+    else:
+        names = result.clearance_joints or tuple(result.joints)
+        for k, name in enumerate(names):
+            force = np.maximum(result.trace.force_n[name], LEAST_N)
+            colour = BODY_COLOURS[k % len(BODY_COLOURS)]
+            axes.plot(result.trace.crank_angle_rad / TURN, force, color=colour, linewidth=0.7, label=name)
+        axes.set_yscale("log")
+        axes.set_xlabel("turns of the crank", fontsize=SMALL)
+    axes.set_ylabel("force [N]", fontsize=SMALL)
+    return _finished(axes)
+
+
+def _bars(axes: Axes, result: SimulationResult) -> None:
+    """Mean, 99 % and largest force of every joint side by side."""
+    place = np.arange(len(result.joints))
+    for k, (label, field) in enumerate((("mean", "mean"), ("99 %", "p99"), ("max", "max"))):
+        forces = [getattr(joint, f"{field}_force_n") for joint in result.joints.values()]
+        axes.bar(place + 0.27 * (k - 1), forces, 0.25, color=BODY_COLOURS[k], label=label)
+    axes.set_xticks(place, list(result.joints))
+
+
+@plot.register
+def _life(result: Life, axes: Axes | None = None) -> Axes:
+    axes = _new() if axes is None else axes
+    draw_clearances(axes, result)
+    axes.set_xlabel("gait cycles", fontsize=SMALL)
+    axes.set_ylabel("radial clearance [µm]", fontsize=SMALL)
+    return _finished(axes)
+
+
+@plot.register
+def _replay(result: ReplaySummary, axes: Axes | None = None) -> Axes:
+    axes = _new() if axes is None else axes
+    unit = draw_openings(axes, result)
+    axes.set_xlabel(f"time since the recording's begin [{unit}]", fontsize=SMALL)
+    return _finished(axes)
+
+
+def _new() -> Axes:
+    """Axes of pyplot, which a notebook shows by itself and ``pyplot.show()`` in a window."""
+    from matplotlib import pyplot
+
+    axes: Axes = pyplot.subplots(layout="constrained")[1]
+    return axes
+
+
+def _finished(axes: Axes) -> Axes:
+    tidy(axes)
+    if axes.get_legend_handles_labels()[0]:
+        axes.legend(fontsize=SMALL, frameon=False)
+    return axes

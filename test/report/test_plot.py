@@ -1,0 +1,90 @@
+"""What `plot` draws of each kind of result, and where."""
+
+import doctest
+
+import attrs
+import numpy as np
+import pytest
+from made_up_summary import made_up_summary
+from matplotlib import pyplot
+
+import leg_wear_monitor as lw
+from leg_wear_monitor.life.result import Life
+from leg_wear_monitor.report import plot as module
+
+pytestmark = pytest.mark.plain
+
+
+@pytest.fixture(autouse=True)
+def closed():
+    """Pyplot keeps its figures until they are closed."""
+    yield
+    pyplot.close("all")
+
+
+def lines(axes):
+    """Data of the lines by label, those without one left out."""
+    found = {line.get_label(): line.get_xydata() for line in axes.get_lines()}
+    return {label: data for label, data in found.items() if not label.startswith("_")}
+
+
+@pytest.fixture
+def life():
+    depth = np.zeros((2, 1, 2, 4))
+    column = np.array([[3e-4], [5e-4]])
+    return Life(
+        clearance_joints=("A",), cycles=np.array([0.0, 1e6]), clearance_m=column,
+        clearance_max_m=2.0 * column, worst_sector_deg=column, peak_force_n=column, growth_m_per_cycle=column,
+        growth_error_m_per_cycle=column, error_m=np.zeros(2), depth=depth,
+    )  # fmt: skip
+
+
+def test_forces_over_the_turns_of_the_crank():
+    result = lw.simulate("four_bar", clearances=[], cycles=1, trace=8)
+    drawn = lines(lw.plot(result))
+    assert set(drawn) == set(result.joints)
+    assert drawn["B"][:, 1] == pytest.approx(np.maximum(result.trace.force_n["B"], 0.1))
+    assert drawn["B"][4, 0] - drawn["B"][0, 0] == pytest.approx(0.5)
+
+
+def test_forces_of_every_joint_without_a_trace():
+    result = lw.simulate("four_bar", clearances=[], cycles=1)
+    axes = lw.plot(result)
+    heights = [bar.get_height() for bar in axes.patches]
+    assert heights[: len(result.joints)] == [joint.mean_force_n for joint in result.joints.values()]
+    assert max(heights) == max(joint.max_force_n for joint in result.joints.values())
+    assert [text.get_text() for text in axes.get_xticklabels()] == list(result.joints)
+
+
+def test_clearances_of_a_life(life):
+    drawn = lines(lw.plot(life))
+    assert drawn["A"].tolist() == pytest.approx(np.array([[0.0, 300.0], [1e6, 500.0]]))
+
+
+def test_openings_of_a_replay():
+    summary = made_up_summary()
+    axes = lw.plot(summary)
+    assert lines(axes)["B"][:, 1].tolist() == [0.0, 1000.0]  # mm
+    assert axes.get_xlabel() == "time since the recording's begin [s]"
+
+
+def test_a_replay_without_a_gait_cycle_draws_nothing():
+    summary = made_up_summary()
+    none = {joint: np.zeros(0) for joint in ("A", "B")}
+    history = attrs.evolve(summary.history, stamp_ns=np.zeros(0, np.int64), clearance_m=none)
+    assert lines(lw.plot(attrs.evolve(summary, history=history))) == {}
+
+
+def test_axes_that_are_given_are_drawn_on(life):
+    _, axes = pyplot.subplots()
+    assert lw.plot(life, axes) is axes and len(axes.get_lines()) == 2
+
+
+def test_what_is_no_result_is_named():
+    with pytest.raises(TypeError, match=r"^dict has no picture, expected SimulationResult"):
+        lw.plot({})
+
+
+def test_the_example_runs():
+    done = doctest.testmod(module)
+    assert done.attempted and not done.failed

@@ -115,6 +115,21 @@ class AlarmEvent:
     alarm: Alarm
 
 
+@attrs.frozen(kw_only=True)
+class VerdictEvent:
+    """A changed verdict at a stamp; ``joints``, ``evidence`` and ``not_valid`` as JSON."""
+
+    stamp_ns: int
+    state: str
+    fault_code: str
+    joints: str
+    since_ns: int
+    why: str
+    to_do: str
+    evidence: str
+    not_valid: str
+
+
 @attrs.frozen
 class ClearancePoint:
     """A joint's clearance [m] after so many gait cycles."""
@@ -222,4 +237,13 @@ class Commissioned:
         return sum_.digest()
 
 
-Event = Audit | AlarmEvent | ClearancePoint | Measurement | Withdrawal | ForecastPoint | Commissioned
+Event = (
+    Audit
+    | AlarmEvent
+    | ClearancePoint
+    | Measurement
+    | Withdrawal
+    | ForecastPoint
+    | Commissioned
+    | VerdictEvent
+)

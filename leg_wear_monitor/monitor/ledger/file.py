@@ -201,13 +201,13 @@ def _locked(path: Path) -> Iterator[None]:
 
 
 def _begin(db: sqlite3.Connection, path: Path, found: int, binding: Binding, writable: bool) -> None:
-    """Lock a file, check its whole content, and migrate it to the present format."""
+    """Lock a file, check its whole content, and migrate it if its format has no log (see `recovery`)."""
     try:
         db.execute("BEGIN EXCLUSIVE" if writable else "BEGIN")
         _check(db, path, found)
         _check_binding(db, path, binding)
         db.execute("COMMIT")
-        if found < FORMAT:
+        if found < SEALED_FROM:
             db.execute("PRAGMA journal_mode = DELETE")
             with transaction(db):
                 migrate(db, found)

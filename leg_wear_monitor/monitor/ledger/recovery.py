@@ -6,11 +6,12 @@ from pathlib import Path
 import attrs
 
 from leg_wear_monitor.monitor.ledger.entry import Entry
-from leg_wear_monitor.monitor.ledger.file import MOVE, LedgerError, beside
+from leg_wear_monitor.monitor.ledger.file import MOVE, LedgerError, beside, transaction
 from leg_wear_monitor.monitor.ledger.log import ENDING, LogContent, read_log
-from leg_wear_monitor.monitor.ledger.rows import read_entry, read_last_run
+from leg_wear_monitor.monitor.ledger.rows import read_entry, read_last_run, write_entry, write_run
 from leg_wear_monitor.monitor.ledger.run import Run
-from leg_wear_monitor.monitor.ledger.seal import Head, read_head
+from leg_wear_monitor.monitor.ledger.schema import FORMAT, migrate
+from leg_wear_monitor.monitor.ledger.seal import Head, read_head, write_head
 from leg_wear_monitor.monitor.ledger.step import decode
 
 WHOLE_S = 600.0
@@ -82,6 +83,23 @@ def recover(db: sqlite3.Connection, path: Path) -> Recovered:
     if content.digest == head.previous:
         return attrs.evolve(recovered, lost_s=run.interval_s)
     return _applied(recovered, content, log.name)
+
+
+def migrated(db: sqlite3.Connection, found: Recovered) -> Recovered:
+    """Migrate tables that may have a log to the present format, together with the last entry of the log.
+
+    The new head follows the log's last record: a log that is still there counts as contained in the tables.
+    """
+    (number,) = db.execute("PRAGMA user_version").fetchone()
+    if number >= FORMAT:
+        return found
+    with transaction(db):
+        migrate(db, number)
+        write_run(db, found.run)
+        if found.is_newer and found.entry:
+            write_entry(db, found.entry_run, found.head.number + 1, found.entry)
+        head = write_head(db, found.head.number + 1, found.digest)
+    return attrs.evolve(found, head=head, digest=head.digest, is_newer=False)
 
 
 def check_absent(path: Path) -> None:

@@ -17,6 +17,7 @@ from leg_wear_monitor.monitor.ledger.entry import (
     ForecastPoint,
     JointWear,
     Measurement,
+    VerdictEvent,
     Withdrawal,
 )
 from leg_wear_monitor.monitor.ledger.run import Run
@@ -85,7 +86,7 @@ def write_event(db: sqlite3.Connection, event: Event) -> None:
                 "VALUES (?, ?, ?, ?, ?)",
                 (stamp_ns, cycle, joint, clearance_m, clearance_max_m),
             )
-        case Measurement() | ForecastPoint():
+        case Measurement() | ForecastPoint() | VerdictEvent():
             _append(db, event)
         case Withdrawal(stamp_ns, who, measurement):
             db.execute(
@@ -108,9 +109,12 @@ def write_event(db: sqlite3.Connection, event: Event) -> None:
             )
 
 
-def _append(db: sqlite3.Connection, event: Measurement | ForecastPoint) -> None:
+_TABLES = {Measurement: "measurement", ForecastPoint: "forecast", VerdictEvent: "verdict"}
+
+
+def _append(db: sqlite3.Connection, event: Measurement | ForecastPoint | VerdictEvent) -> None:
     """Append a row to the table whose columns are the event's fields."""
-    table = "measurement" if isinstance(event, Measurement) else "forecast"
+    table = _TABLES[type(event)]
     values = attrs.asdict(event, filter=lambda field, _: field.name != "id")
     places = ", ".join("?" * len(values))
     db.execute(f"INSERT INTO {table} ({', '.join(values)}) VALUES ({places})", tuple(values.values()))

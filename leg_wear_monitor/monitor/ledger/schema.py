@@ -200,12 +200,22 @@ CREATE TABLE head (
 ) STRICT;
 """
 
-MIGRATIONS = (_FIRST, _SECOND, _THIRD, _FOURTH)
+_FIFTH = """
+-- changes of the verdict: state and fault_code are stable names; joints, evidence (name, value, limit, unit)
+-- and not_valid (figures that do not hold meanwhile) are JSON arrays
+CREATE TABLE verdict (
+    id INTEGER PRIMARY KEY, stamp_ns INTEGER NOT NULL, state TEXT NOT NULL, fault_code TEXT NOT NULL,
+    joints TEXT NOT NULL, since_ns INTEGER NOT NULL, why TEXT NOT NULL, to_do TEXT NOT NULL,
+    evidence TEXT NOT NULL, not_valid TEXT NOT NULL
+) STRICT;
+"""
+
+MIGRATIONS = (_FIRST, _SECOND, _THIRD, _FOURTH, _FIFTH)
 
 FORMAT = len(MIGRATIONS)
 SEALED_FROM = 4  # first format with checksums over the whole content
 
-GROWING = ("alarm_history", "audit", "commissioning", "forecast", "history")  # append only
+GROWING = ("alarm_history", "audit", "commissioning", "forecast", "history", "verdict")  # append only
 CHANGING = ("alarm", "binding", "entry", "joint", "measurement", "run", "span", "total")
 
 Definitions = list[tuple[str, str, str, str | None]]

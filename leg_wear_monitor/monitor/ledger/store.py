@@ -10,7 +10,7 @@ from leg_wear_monitor.monitor.ledger.binding import Binding
 from leg_wear_monitor.monitor.ledger.entry import Entry, Event
 from leg_wear_monitor.monitor.ledger.file import MOVE, LedgerError, connect, create, transaction
 from leg_wear_monitor.monitor.ledger.log import EntryLog
-from leg_wear_monitor.monitor.ledger.recovery import WHOLE_S, check_absent, recover
+from leg_wear_monitor.monitor.ledger.recovery import WHOLE_S, check_absent, migrated, recover
 from leg_wear_monitor.monitor.ledger.rows import read_last_run, write_entry, write_event, write_run
 from leg_wear_monitor.monitor.ledger.run import Run
 from leg_wear_monitor.monitor.ledger.seal import Head, write_head
@@ -49,7 +49,7 @@ class LedgerStore:
         self._db: sqlite3.Connection | None = connect(path, binding)
         self._place = _place(path)
         try:
-            self.found = recover(self._db, path)
+            self.found = migrated(self._db, recover(self._db, path))
         except (sqlite3.Error, ValueError, TypeError, LedgerError) as error:
             self._db.close()
             text = str(error) if isinstance(error, LedgerError) else f"{path}: is damaged: {error}; {MOVE}"

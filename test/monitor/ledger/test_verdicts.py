@@ -1,0 +1,100 @@
+"""Verdicts in the ledger, and ledgers of the format before it, with the entries of their log."""
+
+import json
+import sqlite3
+from contextlib import closing
+
+import attrs
+import pytest
+
+from leg_wear_monitor.monitor.ledger import file, recovery, schema
+from leg_wear_monitor.monitor.ledger.entry import VerdictEvent
+
+pytestmark = pytest.mark.plain
+
+EVENT = VerdictEvent(
+    stamp_ns=7,
+    state="inspect",
+    fault_code="CLEARANCE_CHANGED_G",
+    joints='["G"]',
+    since_ns=5,
+    why="the drive torque shows a clearance",
+    to_do="rock joint G",
+    evidence='[{"name": "clearance G", "value": 1e-3, "limit": null, "unit": "m"}]',
+    not_valid='["forecast"]',
+)
+
+
+def test_a_verdict_is_a_row(open_ledger, entry_at):
+    ledger = open_ledger()
+    ledger.note(EVENT)
+    ledger.keep(entry_at(1), closed=True)
+    ledger.close()
+    assert rows(ledger.path) == [{"id": 1, **attrs.asdict(EVENT)}]
+    assert json.loads(rows(ledger.path)[0]["evidence"])[0]["limit"] is None
+
+
+def rows(path):
+    with closing(sqlite3.connect(path)) as db:
+        db.row_factory = sqlite3.Row
+        return [dict(row) for row in db.execute("SELECT * FROM verdict")]
+
+
+@pytest.fixture
+def in_format_4(monkeypatch):
+    """Calls of the ledger as a version of format 4 makes them, as long as this context lasts."""
+    with monkeypatch.context() as then:
+        then.setattr(schema, "MIGRATIONS", schema.MIGRATIONS[:4])
+        for module in (schema, file, recovery):
+            then.setattr(module, "FORMAT", 4)
+        schema.expected_definitions.cache_clear()
+        yield then
+    schema.expected_definitions.cache_clear()
+
+
+@pytest.mark.parametrize("closed", [True, False])
+def test_a_ledger_of_format_4_is_migrated_with_the_entries_of_its_log(
+    open_ledger, entry_at, in_format_4, closed
+):
+    ledger = open_ledger()
+    ledger.keep(entry_at(1))
+    for second in (2, 3):
+        ledger.keep(entry_at(second), whole=False)
+    if closed:
+        ledger.keep(entry_at(4), closed=True)
+    ledger.close()  # otherwise as after a kill: the last entries are in the log alone
+    last = ledger._store._last
+    assert (last.stamp_ns, version(ledger.path)) == (entry_at(4 if closed else 3).stamp_ns, 4)
+    in_format_4.undo()
+    schema.expected_definitions.cache_clear()
+    found = open_ledger()
+    assert found.entry.digest() == last.digest()
+    assert (found.cut_off_s is None) == closed
+    assert found.loss == ""
+    found.note(EVENT)
+    found.keep(entry_at(6), closed=True)
+    found.close()
+    assert version(ledger.path) == schema.FORMAT == 5
+    assert len(rows(ledger.path)) == 1
+    assert open_ledger().entry.digest() == entry_at(6).digest()
+
+
+def test_a_kill_right_after_the_migration_loses_no_entry(open_ledger, entry_at, binding, in_format_4):
+    ledger = open_ledger()
+    ledger.keep(entry_at(1))
+    ledger.keep(entry_at(2), whole=False)
+    ledger.close()
+    last = ledger._store._last
+    in_format_4.undo()
+    schema.expected_definitions.cache_clear()
+    with closing(file.connect(ledger.path, binding)) as db:
+        migrated = recovery.migrated(db, recovery.recover(db, ledger.path))
+    assert version(ledger.path) == 5
+    assert not migrated.is_newer
+    again = open_ledger()
+    assert (again.entry.digest(), again.loss) == (last.digest(), "")
+
+
+def version(path):
+    with closing(sqlite3.connect(path)) as db:
+        return db.execute("PRAGMA user_version").fetchone()[0]

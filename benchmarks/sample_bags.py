@@ -73,6 +73,11 @@ def expectation(path: Path, parameters: Path) -> dict[str, Any]:
         "cycles": found.cycles,
         "lost": attrs.asdict(found.lost),
         "alarms": sorted(raised),
+        "verdict": {
+            "state": found.verdict.state.value,
+            "fault_code": found.verdict.fault_code,
+            "not_valid": [figure.value for figure in found.verdict.not_valid],
+        },
         "mean_force_n": {name: joint.mean_force_n for name, joint in found.joints.items()},
         "opened_m": {
             name: joint.clearance_m.last - joint.clearance_m.first for name, joint in found.joints.items()

@@ -12,7 +12,9 @@ from leg_wear_monitor.monitor.encoders.clearance_estimate import ClearanceObserv
 from leg_wear_monitor.monitor.forecast.forecast import Answer, JointForecast, Quantiles
 from leg_wear_monitor.monitor.ledger.entry import Measurement
 from leg_wear_monitor.monitor.reports import Lost
+from leg_wear_monitor.monitor.verdict.verdict import Evidence, Figure, State, Verdict
 from leg_wear_monitor.playback.history import CYCLE_COLUMNS, JOINT_COLUMNS
+from leg_wear_monitor.playback.result.condition import JointClearance, LifeHours
 from leg_wear_monitor.playback.result.parts import (
     AlarmChange,
     ClearanceChange,
@@ -59,6 +61,10 @@ def made_up_summary() -> ReplaySummary:
     columns = dict.fromkeys(CYCLE_COLUMNS, over_time)
     columns |= {name: {"A": over_time, "B": np.array([3.0, 4.0])} for name in JOINT_COLUMNS}
     return ReplaySummary(
+        verdict=Verdict(
+            state=State.INSPECT, joints=("A",), why="why", since_ns=7, do="do", not_valid=(Figure.FORECAST,),
+            evidence=(Evidence("clearance A", 5e-4, math.nan, "m"),), fault_code="CLEARANCE_CHANGED_A",
+        ),
         recording=ReplayRecording(
             files=("a.mcap",), topics={"joint_states": "/joint_states"}, time="header", is_partial=True,
             findings=(ReplayFinding(file="a.mcap", text="ends at byte 7", weight=Severity.LOSS),),
@@ -75,6 +81,14 @@ def made_up_summary() -> ReplaySummary:
         cycles=2,
         gait=ReplayGait(believable_cycles=2, doubtful_cycles=0, missing="", is_counted=False),
         joints={"A": joint, "B": attrs.evolve(joint, forecast=None, seen=None, peak_force_n=math.inf)},
+        clearances={
+            "A": JointClearance(
+                counted_m=4e-4, seen_m=5e-4, seen_sigma_m=1e-5, seen_by=("encoders",), new_m=3e-4,
+                limit_m=6e-4,
+            ),
+            "B": JointClearance(counted_m=4e-4, new_m=3e-4, limit_m=6e-4),
+        },
+        life={"A": LifeHours(p10_h=1.0, p50_h=2.0, p90_h=3.0), "B": None},
         forecast=LegLife(
             answer=Answer.PARTLY_KNOWN, cycles=LIFE, hours=LIFE, days=LIFE, first_probability={"A": 1.0},
             simulated_lives=0, first="A",

@@ -12,7 +12,10 @@ from leg_wear_monitor.monitor.alarms.words import ADVICE
 if TYPE_CHECKING:
     from leg_wear_monitor.monitor.forecast.forecast import JointForecast, LegForecast
     from leg_wear_monitor.monitor.reports import CycleReport, JointReport
+    from leg_wear_monitor.monitor.verdict.verdict import Verdict
     from leg_wear_monitor.playback.replay import ReplayResult
+
+NOT_VALID = "not valid"
 
 
 def print_replay(result: "ReplayResult", wall_s: float) -> None:
@@ -24,8 +27,11 @@ def print_replay(result: "ReplayResult", wall_s: float) -> None:
     wall_s : float
         What it took [s].
     """
+    from leg_wear_monitor.monitor.verdict.verdict import Figure
+
     console = Console(highlight=False)
-    monitor = result.monitor
+    monitor, verdict = result.monitor, result.monitor.verdict.verdict
+    _print_verdict(console, verdict)
     console.print(
         f"\n[bold]{monitor.config.hardware}[/bold]: {monitor.mechanism.name}, "
         f"clearance joints {', '.join(monitor.clearance_joints)}; "
@@ -36,9 +42,15 @@ def print_replay(result: "ReplayResult", wall_s: float) -> None:
         console.print(f"{result.evidence.doubtful} of the gait cycles do not fit this leg\n")
     last = result.history.last
     if result.is_believable and last is not None:
-        console.print(_joints(result))
+        is_counted_leg = Figure.CLEARANCES not in verdict.not_valid
+        console.print(_joints(result, is_counted_leg))
+        if not is_counted_leg:
+            console.print(f"{NOT_VALID}: the clearances are not those of the leg, see the verdict")
         console.print()
-        _print_lifetimes(console, last, monitor.config.forecast.duty_hours_per_day)
+        if Figure.FORECAST in verdict.not_valid:
+            console.print(f"lasts  {NOT_VALID}: {verdict.why}\n", soft_wrap=True)
+        else:
+            _print_lifetimes(console, last, monitor.config.forecast.duty_hours_per_day)
     from leg_wear_monitor.monitor.alarms.words import raised_words, state_of
 
     raised = [alarm for alarm in monitor.alarms.alarms if alarm.level]
@@ -53,7 +65,21 @@ def print_replay(result: "ReplayResult", wall_s: float) -> None:
     console.print(ADVICE, soft_wrap=True)
 
 
-def _joints(result: "ReplayResult") -> Table:
+def _print_verdict(console: Console, verdict: "Verdict") -> None:
+    """State, joints and reason; what a person does next; which figures do not hold meanwhile."""
+    from leg_wear_monitor.monitor.alarms.words import time_words
+
+    whose = f" joint {', '.join(verdict.joints)}" if verdict.joints else ""
+    console.print(f"\n[bold]{verdict.state.words.upper()}{whose}[/bold]: {verdict.why}", soft_wrap=True)
+    console.print(f"to do      {verdict.do}", soft_wrap=True)
+    if verdict.not_valid:
+        console.print(f"{NOT_VALID}  {', '.join(figure.words for figure in verdict.not_valid)}")
+    if verdict.since_ns:
+        console.print(f"since      {time_words(verdict.since_ns)}")
+
+
+def _joints(result: "ReplayResult", is_counted_leg: bool) -> Table:
+    """Clearance, growth and peak force; none where the leg is not the one that is counted."""
     table = Table(box=None, pad_edge=False, padding=(0, 1), header_style="bold")
     columns = ("\njoint", "counted clearance\nmm", "growth\npm/cycle", "±\npm/cycle", "peak\nN")
     for column in columns:
@@ -61,13 +87,13 @@ def _joints(result: "ReplayResult") -> Table:
     peaks = result.history.joint_column("peak_force_n").max(axis=0)
     last = result.history.last
     for joint, peak in zip(last.joints if last else (), peaks, strict=True):
-        table.add_row(
-            joint.joint,
+        cells = (
             _counted(joint),
             _known(1.0e12, joint.growth_m_per_cycle),
             _known(1.0e12, joint.growth_error_m_per_cycle),
             figure(float(peak)),
         )
+        table.add_row(joint.joint, *(cells if is_counted_leg else (NOT_VALID,) * len(cells)))
     return table
 
 

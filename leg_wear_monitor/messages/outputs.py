@@ -22,7 +22,10 @@ from leg_wear_monitor.monitor.reports import (
     Reports,
     SampleReports,
     Status,
+    VerdictReport,
 )
+from leg_wear_monitor.monitor.status import verdict_status
+from leg_wear_monitor.monitor.verdict.words import with_unit
 from leg_wear_monitor.twin.kinds import CRANK
 
 
@@ -40,11 +43,11 @@ IMPACTS = Output("~/impact_forces", encode.JOINT_STATE, SENSOR_DATA)
 TORQUE = Output("~/predicted_torque", encode.WRENCH_STAMPED, SENSOR_DATA)
 FORECAST = Output("~/forecast", encode.DIAGNOSTIC_ARRAY)
 ALARMS = Output("~/alarms", encode.DIAGNOSTIC_ARRAY, LATCHED)
+VERDICT = Output("~/verdict", encode.DIAGNOSTIC_ARRAY, LATCHED)
 DIAGNOSTICS = Output("/diagnostics", encode.DIAGNOSTIC_ARRAY)
-OUTPUTS = (CLEARANCES, IMPACTS, TORQUE, FORECAST, ALARMS, DIAGNOSTICS)
+OUTPUTS = (CLEARANCES, IMPACTS, TORQUE, FORECAST, ALARMS, VERDICT, DIAGNOSTICS)
 
 _AXES = {"x": 0, "y": 1, "z": 2}
-_KEY_UNITS = {"m/h": "m_per_hour", "N m": "nm"}
 _DIGITS = 15
 
 
@@ -83,12 +86,14 @@ class Messages:
         self._impacts = [f"{joint}_impact" for joint in clearance_joints]
 
     def of(self, reports: Reports) -> Iterator[Outgoing]:
-        """All messages for reports: those of samples, of gait cycles and of alarms."""
+        """All messages for reports: those of samples, of gait cycles, of alarms and of the verdict."""
         yield from self.of_samples(reports.samples)
         for cycle in reports.cycles:
             yield _single(CLEARANCES, cycle.stamp_ns, self.clearances(cycle))
         for alarms in reports.alarms:
             yield _single(ALARMS, alarms.stamp_ns, self.alarms(alarms))
+        for verdict in reports.verdicts:
+            yield _single(VERDICT, verdict.stamp_ns, self.verdict(verdict))
 
     def of_samples(self, samples: SampleReports) -> Iterator[Outgoing]:
         """Torque at each tracked sample, and contact forces at each crank sample."""
@@ -134,6 +139,10 @@ class Messages:
         """The message of `ALARMS`: the present state of all alarms."""
         return self._array(alarms.stamp_ns, map(_alarm, alarms.alarms))
 
+    def verdict(self, report: VerdictReport) -> bytes:
+        """The message of `VERDICT`: one status, as the first one of `DIAGNOSTICS`."""
+        return self._array(report.stamp_ns, [verdict_status(report.verdict)])
+
     def diagnostics(self, stamp_ns: int, statuses: Iterable[Status]) -> bytes:
         """The message of `DIAGNOSTICS`."""
         return self._array(stamp_ns, statuses)
@@ -146,7 +155,10 @@ class Messages:
                 int(status.level),
                 status.message,
                 hardware,
-                {key: plain(value) for key, value in status.values.items()},
+                {
+                    **({"fault_code": status.fault_code} if status.fault_code else {}),
+                    **{key: plain(value) for key, value in status.values.items()},
+                },
             )
             for status in statuses
         ]
@@ -168,12 +180,10 @@ def plain(value: float) -> str:
 
 
 def _alarm(alarm: Alarm) -> Status:
-    key = _KEY_UNITS.get(alarm.unit, alarm.unit.lower())
-    suffix = f"_{key}" if key else ""
     values = {
-        f"value{suffix}": alarm.value,
-        f"limit{suffix}": alarm.limit,
-        f"worst{suffix}": alarm.worst,
+        with_unit("value", alarm.unit): alarm.value,
+        with_unit("limit", alarm.unit): alarm.limit,
+        with_unit("worst", alarm.unit): alarm.worst,
         "raised_s": alarm.raised_ns / 1e9,
         "acknowledged": float(alarm.acknowledged),
         "present_level": float(alarm.present),

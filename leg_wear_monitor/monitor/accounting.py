@@ -1,5 +1,6 @@
 """Accounting: counters over all runs of the monitor, time coverage, and the entries of the ledger."""
 
+import json
 from collections.abc import Iterable, Mapping
 
 import attrs
@@ -19,9 +20,10 @@ from leg_wear_monitor.monitor.ledger.entry import (
     Event,
     ForecastPoint,
     JointWear,
+    VerdictEvent,
 )
 from leg_wear_monitor.monitor.ledger.ledger import Ledger
-from leg_wear_monitor.monitor.reports import AlarmList, CycleReport
+from leg_wear_monitor.monitor.reports import AlarmList, CycleReport, VerdictReport
 from leg_wear_monitor.monitor.spans import NEIGHBOURS_NS, Spans, is_within, with_span
 from leg_wear_monitor.twin.digital_twin import DigitalTwin
 from leg_wear_monitor.twin.sample import Samples
@@ -248,6 +250,22 @@ class Accounting:
             if shown[alarm.name] != self.state.shown.get(alarm.name, (Level.OK, False)):
                 self.note(AlarmEvent(change.stamp_ns, alarm))
         self.state.shown = shown
+
+    def note_verdict(self, report: VerdictReport) -> None:
+        """Note a changed verdict for the ledger."""
+        told = report.verdict.to_dict()
+        texts = {key: json.dumps(told[key], allow_nan=False) for key in ("joints", "evidence", "not_valid")}
+        self.note(
+            VerdictEvent(
+                stamp_ns=report.stamp_ns,
+                state=told["state"],
+                fault_code=told["fault_code"],
+                since_ns=told["since_ns"],
+                why=told["why"],
+                to_do=told["do"],
+                **texts,
+            )
+        )
 
     def note_clearances(self, report: CycleReport) -> None:
         """Take the clearances down, now and then."""

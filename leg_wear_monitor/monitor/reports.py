@@ -1,4 +1,4 @@
-"""Reports of the monitor: at each sample, each gait cycle and each change of an alarm, and its own status."""
+"""Reports of the monitor: samples, gait cycles, changes of alarms and of the verdict, and its own status."""
 
 import math
 
@@ -9,6 +9,7 @@ from leg_wear_monitor.monitor.encoders.clearance_estimate import ClearanceEstima
 from leg_wear_monitor.monitor.forecast.forecast import JointForecast, LegForecast
 from leg_wear_monitor.monitor.inputs.guard import InputGuard
 from leg_wear_monitor.monitor.inputs.pauses import Pauses
+from leg_wear_monitor.monitor.verdict.verdict import Finding, Verdict, verdict_of
 from leg_wear_monitor.twin.statistics import Intake, SampleStatistics
 
 SampleReports = SampleStatistics
@@ -129,6 +130,27 @@ class AlarmList:
         return max((alarm.level for alarm in self.alarms), default=Level.OK)
 
 
+@attrs.frozen
+class VerdictReport:
+    """A changed verdict.
+
+    Attributes
+    ----------
+    stamp_ns : int
+        When it changed.
+    findings : tuple of Finding
+        What it is made of; at least one.
+    """
+
+    stamp_ns: int
+    findings: tuple[Finding, ...]
+
+    @property
+    def verdict(self) -> Verdict:
+        """The verdict of these findings."""
+        return verdict_of(self.findings)
+
+
 @attrs.frozen(kw_only=True)
 class Lost:
     """Samples and time that were not integrated since the monitor was created; the values only grow.
@@ -202,19 +224,26 @@ class Reports:
     alarms : tuple of AlarmList
         One for each change of an alarm.
     lost : Lost
+    verdicts : tuple of VerdictReport
+        One for each change of the verdict, and the first one of a monitor.
     """
 
     samples: SampleReports
     cycles: tuple[CycleReport, ...]
     alarms: tuple[AlarmList, ...]
     lost: Lost
+    verdicts: tuple[VerdictReport, ...] = ()
 
 
 @attrs.frozen
 class Status:
-    """A line of /diagnostics: ``name`` stable, numbers only in ``values``, by keys that end in their unit."""
+    """A line of /diagnostics: ``name`` stable, numbers only in ``values``, by keys that end in their unit.
+
+    ``fault_code`` is a stable name of what is wrong, as one further value; empty: the line has none.
+    """
 
     name: str
     level: Level
     message: str
     values: dict[str, float]
+    fault_code: str = ""

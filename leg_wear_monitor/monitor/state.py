@@ -10,6 +10,7 @@ from leg_wear_monitor.monitor.evaluation.torque_record import TorqueRecord
 from leg_wear_monitor.monitor.forecast.forecaster import ForecastState
 from leg_wear_monitor.monitor.forecast.growth import GrowthWindow
 from leg_wear_monitor.monitor.reports import CycleReport
+from leg_wear_monitor.monitor.verdict.verdict import Finding
 from leg_wear_monitor.record import Records
 from leg_wear_monitor.twin.digital_twin import TwinSnapshot
 from leg_wear_monitor.twin.statistics import Event
@@ -17,12 +18,16 @@ from leg_wear_monitor.twin.statistics import Event
 
 @attrs.define
 class MonitorState:
-    """State beside twin, alarms and accounting; every value is immutable."""
+    """State beside twin, alarms and accounting; every value is immutable.
+
+    ``findings`` are those of the last evaluation period; empty before the first.
+    """
 
     growth: tuple[GrowthWindow, ...]
     torque: TorqueRecord
     last: CycleReport | None = None
     happened: tuple[Event, ...] = ()
+    findings: tuple[Finding, ...] = ()
 
 
 @attrs.frozen(eq=False)

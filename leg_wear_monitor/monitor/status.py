@@ -18,6 +18,8 @@ from leg_wear_monitor.monitor.evaluation.torque_record import TorqueRecord
 from leg_wear_monitor.monitor.forecast.words import UNKNOWN, lifetime_values
 from leg_wear_monitor.monitor.inputs.health import InputHealth
 from leg_wear_monitor.monitor.reports import CycleReport, Status
+from leg_wear_monitor.monitor.verdict.verdict import Verdict
+from leg_wear_monitor.monitor.verdict.words import with_unit
 from leg_wear_monitor.twin.digital_twin import DigitalTwin
 from leg_wear_monitor.twin.statistics import Event, Tracking
 
@@ -32,11 +34,13 @@ def statuses(
     last: CycleReport | None,
     happened: Sequence[Event],
     record: TorqueRecord,
+    verdict: Verdict,
     encoders: EncoderObserver | None = None,
 ) -> tuple[Status, ...]:
-    """All statuses: gait, input, torque, each joint, further encoders if there are any, alarms, ledger."""
+    """All statuses: verdict, gait, input, torque, each joint, further encoders if any, alarms, ledger."""
     joints = [_joint(k, name, twin, evaluation, last) for k, name in enumerate(twin.clearance_joints)]
     return (
+        verdict_status(verdict),
         _gait(twin, evaluation, accounting, last, happened),
         _input(twin, evaluation, accounting),
         _torque(evaluation, last, record),
@@ -45,6 +49,18 @@ def statuses(
         _alarms(evaluation),
         _ledger(accounting),
     )
+
+
+def verdict_status(verdict: Verdict) -> Status:
+    """The verdict: its severity, since when it holds, joints and figures concerned as 1, and its evidence."""
+    values = {"severity": float(verdict.state.severity), "since_s": verdict.since_ns / 1e9}
+    values |= {f"joint_{joint}": 1.0 for joint in verdict.joints}
+    values |= {f"not_valid_{figure.value}": 1.0 for figure in verdict.not_valid}
+    for each in verdict.evidence:
+        name = each.name.replace(" ", "_")
+        values[with_unit(name, each.unit)] = _or_nan(each.value)
+        values[with_unit(f"{name}_limit", each.unit)] = _or_nan(each.limit)
+    return Status("verdict", verdict.level, verdict.words, values, verdict.fault_code)
 
 
 def _gait(

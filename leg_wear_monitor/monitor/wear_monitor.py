@@ -22,6 +22,7 @@ from leg_wear_monitor.monitor.forecast.growth import GrowthWindow, extended
 from leg_wear_monitor.monitor.forecast.measurement import MeasurementResult
 from leg_wear_monitor.monitor.forecast_update import update_forecast
 from leg_wear_monitor.monitor.inputs.guard import InputGuard
+from leg_wear_monitor.monitor.judgement import Judge
 from leg_wear_monitor.monitor.ledger.entry import Audit, JointWear, Measurement
 from leg_wear_monitor.monitor.ledger.file import LedgerError
 from leg_wear_monitor.monitor.ledger.ledger import Ledger
@@ -32,6 +33,7 @@ from leg_wear_monitor.monitor.reports import (
     Reports,
     SampleReports,
     Status,
+    VerdictReport,
     lost,
 )
 from leg_wear_monitor.monitor.resets import last_reset
@@ -93,6 +95,7 @@ class WearMonitor:
             if self.config.encoders.names
             else None
         )
+        self._judge = Judge(self._twin, self._evaluation, self._encoders, self._forecaster, self._accounting)
         if ledger and ledger.entry:
             self._evaluation.board.restore(ledger.entry.alarms)
         self._evaluation_periods = EvaluationPeriods(cycle_ns // A_CYCLE)
@@ -121,6 +124,7 @@ class WearMonitor:
         sampled: list[SampleReports] = []
         cycles: list[CycleReport] = []
         changes: list[AlarmList] = []
+        verdicts: list[VerdictReport] = []
         for piece, ends_period in self._evaluation_periods.pieces(samples):
             reports, ended = self._take(piece, changes)
             sampled.append(reports)
@@ -128,8 +132,10 @@ class WearMonitor:
             if ends_period:
                 self._add_changes(self._evaluation.end_period(self._accounting.state.skipped), changes)
                 self._observe_encoders()
+                verdicts += self._judge.changed(self._state)
             self._accounting.keep_if_due(self._evaluation.board.alarms.values())
-        return Reports(joined(sampled, len(self.clearance_joints)), tuple(cycles), tuple(changes), self.lost)
+        samples_ = joined(sampled, len(self.clearance_joints))
+        return Reports(samples_, tuple(cycles), tuple(changes), self.lost, tuple(verdicts))
 
     def pause(self, pause_s: float) -> None:
         """Mark a pause between the previous and the next samples, which is not a fault of the input.
@@ -146,6 +152,16 @@ class WearMonitor:
     def alarms(self) -> AlarmList:
         """State of all alarms."""
         return AlarmList(self._twin.intake.followed_stamp_ns, tuple(self._evaluation.board.alarms.values()))
+
+    @property
+    def verdict(self) -> VerdictReport:
+        """The verdict now; `update` reports its changes at the ends of evaluation periods."""
+        return self._judge.report(self._state)
+
+    @property
+    def clearance_limits_m(self) -> tuple[float, ...]:
+        """Limit of the mean clearance of each clearance joint."""
+        return self._evaluation.board.clearance_limits_m
 
     @property
     def lost(self) -> Lost:
@@ -206,6 +222,7 @@ class WearMonitor:
             state.last,
             state.happened,
             state.torque,
+            self.verdict.verdict,
             self._encoders,
         )
 
@@ -234,6 +251,7 @@ class WearMonitor:
         cleared, kept = self._evaluation.board.acknowledge()
         self._accounting.state.cut_off_s = None
         self._accounting.note_alarms(AlarmList(stamp_ns, self.alarms.alarms))
+        self._judge.changed(self._state)
         if cleared or kept:
             self._keep()
         return cleared, kept
@@ -331,7 +349,8 @@ class WearMonitor:
         worn_m = np.asarray(self._twin.clearance_mean_m - fresh)
         limits = self._evaluation.board.clearance_limits_m
         self._state.last = with_forecast(
-            last, self._forecaster.renewed(worn_m, limits, self._evaluation.holds())
+            last,
+            self._forecaster.renewed(worn_m, limits, self._judge.is_forecast_valid(self.verdict.findings)),
         )
         return self._state.last
 
@@ -360,6 +379,8 @@ class WearMonitor:
         ledger = self._accounting.ledger
         if ledger is None:
             return
+        if self._state.findings:
+            self._judge.changed(self._state)
         kept = self._keep(closed=True)
         ledger.close()
         if ledger.at_end and not kept:
@@ -439,7 +460,10 @@ class WearMonitor:
         estimates = self._clearance_estimates(statistics)
         limits = self._evaluation.board.clearance_limits_m
         forecast = self._forecaster.after(
-            statistics, self._worn_m(statistics), limits, self._evaluation.holds
+            statistics,
+            self._worn_m(statistics),
+            limits,
+            lambda: self._judge.is_forecast_valid(state.findings),
         )
         state.last = cycle_report(
             statistics, accounting.state.cycles, self.clearance_joints, state.growth, forecast, estimates

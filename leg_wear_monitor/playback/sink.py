@@ -7,7 +7,15 @@ from types import TracebackType
 from leg_wear_monitor.bags.findings import RecordingError
 from leg_wear_monitor.bags.mcap.writer import McapWriter
 from leg_wear_monitor.messages.forecast_times import ForecastTimes
-from leg_wear_monitor.messages.outputs import ALARMS, DIAGNOSTICS, FORECAST, OUTPUTS, Messages, topic_of
+from leg_wear_monitor.messages.outputs import (
+    ALARMS,
+    DIAGNOSTICS,
+    FORECAST,
+    OUTPUTS,
+    VERDICT,
+    Messages,
+    topic_of,
+)
 from leg_wear_monitor.monitor.config.parameter_file import NODE
 from leg_wear_monitor.monitor.reports import Reports
 from leg_wear_monitor.monitor.wear_monitor import WearMonitor
@@ -39,7 +47,7 @@ class Sink:
             output: self._writer.channel(topic_of(output, node), output.type, output.qos)
             for output in OUTPUTS
         }
-        self._start, self._has_begun = monitor.alarms, False
+        self._start, self._has_begun = (monitor.alarms, monitor.verdict), False
         self._forecasts = ForecastTimes()
 
     def __enter__(self) -> "Sink":
@@ -64,8 +72,10 @@ class Sink:
             Stamp of the status [ns]; 0 if no time is known yet.
         """
         if stamp_ns > 0 and not self._has_begun:
-            self._has_begun = True  # like the node, begin with the state of all alarms
-            self._writer.write(self._channels[ALARMS], stamp_ns, self._messages.alarms(self._start))
+            self._has_begun = True  # like the node, begin with the state of all alarms and the verdict
+            alarms, verdict = self._start
+            self._writer.write(self._channels[ALARMS], stamp_ns, self._messages.alarms(alarms))
+            self._writer.write(self._channels[VERDICT], stamp_ns, self._messages.verdict(verdict))
         for outgoing in self._messages.of(reports):
             self._writer.write_many(self._channels[outgoing.output], outgoing.stamp_ns, outgoing.messages)
         for cycle in self._forecasts.due(reports):

@@ -13,6 +13,8 @@ from leg_wear_monitor.monitor.alarms.words import ADVICE, state_of
 from leg_wear_monitor.monitor.encoders.clearance_estimate import ClearanceEstimate
 from leg_wear_monitor.monitor.forecast.forecast import LegForecast
 from leg_wear_monitor.monitor.reports import JointReport, Status
+from leg_wear_monitor.monitor.verdict.verdict import Verdict
+from leg_wear_monitor.playback.condition import clearances, joint_forecast, leg_forecast, life
 from leg_wear_monitor.playback.history import CYCLE_COLUMNS, JOINT_COLUMNS, History
 from leg_wear_monitor.playback.result.parts import (
     AlarmChange,
@@ -57,15 +59,20 @@ def summary(
     """
     last, monitor = result.history.last, result.monitor
     is_known = result.is_believable and last is not None
+    verdict = monitor.verdict.verdict
+    told = leg_forecast(last.forecast, verdict) if is_known and last else None
     return ReplaySummary(
+        verdict=verdict,
         recording=_recording(result),
         monitor=_monitor(result),
         wall_s=wall_s,
         real_time_factor=result.duration_s / wall_s if wall_s else None,
         cycles=len(result.history),
         gait=_gait(result),
-        joints=_joints(result.history) if is_known else {},
-        forecast=_leg(last.forecast) if is_known and last and last.forecast else None,
+        joints=_joints(result.history, verdict) if is_known else {},
+        clearances=clearances(result) if is_known else {},
+        life=life(result, verdict) if is_known else {},
+        forecast=_leg(told) if told else None,
         measurements=tuple(monitor.measurements),
         alarms=_alarms(result),
         status=tuple(map(_status, monitor.status())),
@@ -119,13 +126,13 @@ def _gait(result: "ReplayResult") -> ReplayGait:
     )
 
 
-def _joints(history: History) -> dict[str, ReplayJoint]:
+def _joints(history: History, verdict: Verdict) -> dict[str, ReplayJoint]:
     """Last values of each joint, and the maximum and the mean of its forces."""
     joints = history.last.joints if history.last else ()
-    return {joint.joint: _joint(history, k, joint) for k, joint in enumerate(joints)}
+    return {joint.joint: _joint(history, k, joint, verdict) for k, joint in enumerate(joints)}
 
 
-def _joint(history: History, k: int, joint: JointReport) -> ReplayJoint:
+def _joint(history: History, k: int, joint: JointReport, verdict: Verdict) -> ReplayJoint:
     clearance, peak, mean, impacts = (
         history.joint_column(name)[:, k]
         for name in ("clearance_m", "peak_force_n", "mean_force_n", "impacts")
@@ -135,7 +142,7 @@ def _joint(history: History, k: int, joint: JointReport) -> ReplayJoint:
         growth_m_per_cycle=joint.growth_m_per_cycle,
         growth_error_m_per_cycle=joint.growth_error_m_per_cycle,
         growth_mps=joint.growth_mps,
-        forecast=joint.forecast,
+        forecast=joint_forecast(joint.forecast, verdict),
         peak_force_n=peak.max(),
         mean_force_n=mean.mean(),
         seen=_seen(joint.seen) if joint.seen else None,
@@ -171,7 +178,7 @@ def _alarm(alarm: Alarm) -> ReplayAlarm:
 
 
 def _status(status: Status) -> ReplayStatus:
-    return ReplayStatus(name=status.name, level=status.level, message=status.message, values=status.values)
+    return ReplayStatus(**attrs.asdict(status, recurse=False))
 
 
 def _history(history: History) -> ReplayHistory:

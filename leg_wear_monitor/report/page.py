@@ -145,6 +145,24 @@ class Section:
 
 
 @attrs.frozen(kw_only=True)
+class Banner:
+    """One line at the head of a page; symbol and word say what its colour says.
+
+    Attributes
+    ----------
+    symbol, word : str
+    text : str
+    severity : str
+        Class of its colour: ``fine``, ``careful`` or ``bad``.
+    """
+
+    symbol: str
+    word: str
+    text: str
+    severity: str
+
+
+@attrs.frozen(kw_only=True)
 class Page:
     """A complete page.
 
@@ -157,6 +175,7 @@ class Page:
         The settings of the run as text; no section for them if empty.
     versions : mapping of str to str
         Versions of the software, seeds and the origin of the data, by name.
+    banner : Banner or None
     """
 
     title: str
@@ -164,6 +183,7 @@ class Page:
     sections: Sequence[Section]
     configuration: str = ""
     versions: Mapping[str, str] = attrs.field(factory=dict)
+    banner: Banner | None = None
 
     @property
     def scripts(self) -> Iterator[str]:

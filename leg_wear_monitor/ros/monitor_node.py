@@ -93,7 +93,7 @@ class MonitorNode(ClosingNode):
         self._serve()
         self._supervision = Supervision(self, self._monitor, config)
         self._markers = MarkerTopic(self, self._monitor, lambda: self._supervision.is_current)
-        self._send_alarms()
+        self._send_state()
         self._inputs = subscribe(self, config, self._receive)
         self._supervision.inputs = [topic for topic, _ in self._inputs]
         for topic in self._supervision.inputs:
@@ -164,7 +164,11 @@ class MonitorNode(ClosingNode):
     def _publish(self, reports: Reports, coarse: bool) -> None:
         now_ns = time.time_ns()
         self._markers.note(reports.samples)
-        reports = attrs.evolve(reports, alarms=tuple(map(self._supervision.alarms, reports.alarms)))
+        reports = attrs.evolve(
+            reports,
+            alarms=tuple(map(self._supervision.alarms, reports.alarms)),
+            verdicts=tuple(map(self._supervision.verdict, reports.verdicts)),
+        )
         for outgoing in self._messages.of(reports):
             if coarse and outgoing.output in _A_SAMPLE and not self._black_box.on:
                 self._load.unpublished += len(outgoing.stamp_ns)
@@ -173,14 +177,17 @@ class MonitorNode(ClosingNode):
         for cycle in self._forecasts.due(reports):
             self._outlets.send(outputs.FORECAST, now_ns, self._messages.forecast(cycle))
 
-    def _send_alarms(self) -> None:
+    def _send_state(self) -> None:
+        """Publish the present alarms and verdict."""
         alarms = self._supervision.alarms(self._monitor.alarms)
+        verdict = self._supervision.verdict(self._monitor.verdict)
         self._outlets.send(outputs.ALARMS, time.time_ns(), self._messages.alarms(alarms))
+        self._outlets.send(outputs.VERDICT, time.time_ns(), self._messages.verdict(verdict))
 
     def _diagnose(self) -> None:
         now_ns = time.time_ns()
         if self._supervision.check():
-            self._send_alarms()
+            self._send_state()
         status = (
             *self._monitor.status(),
             load_status(self._load, self._inbox),
@@ -221,7 +228,7 @@ class MonitorNode(ClosingNode):
         cleared, kept = self._monitor.acknowledge(self._ros_now_ns())
         own_cleared, own_kept = self._supervision.acknowledge()
         cleared, kept = (*cleared, *own_cleared), (*kept, *own_kept)
-        self._send_alarms()
+        self._send_state()
         return f"cleared: {_listed(cleared)}; still present: {_listed(kept)}"
 
     def _save(self) -> str:

@@ -32,7 +32,14 @@ def said(reports):
     ]
     cycles = [cycle for report in reports for cycle in report.cycles]
     alarms = [change for report in reports for change in report.alarms]
-    return [look.tobytes() for look in looks], repr(cycles), repr(alarms), repr(reports[-1].lost)
+    verdicts = [change for report in reports for change in report.verdicts]
+    return (
+        [look.tobytes() for look in looks],
+        repr(cycles),
+        repr(alarms),
+        repr(verdicts),
+        repr(reports[-1].lost),
+    )
 
 
 def messy(gait):

@@ -112,7 +112,12 @@ def test_a_replay_reports_bit_for_bit_what_the_monitor_reported_live(
     assert len(live["/leg_wear_monitor/clearance_states"]) >= CYCLES
     begun_with, *changes = replayed.pop("/leg_wear_monitor/alarms")
     assert changes == live.pop("/leg_wear_monitor/alarms", [])
-    assert begun_with == messages.alarms(lw.WearMonitor(leg, config).alarms)
+    new = lw.WearMonitor(leg, config)
+    assert begun_with == messages.alarms(new.alarms)
+    begun_with, *changes = replayed.pop("/leg_wear_monitor/verdict")
+    assert changes == live.pop("/leg_wear_monitor/verdict")
+    assert begun_with == messages.verdict(new.verdict)
+    assert len(changes) >= 2  # at first there is no gait cycle
     for topic, rows in live.items():
         assert replayed[topic] == rows
     assert set(replayed) - set(live) == {"/diagnostics", "/leg_wear_monitor/forecast"}

@@ -49,3 +49,13 @@ def test_forces_and_wear_are_the_same_within_their_scatter(
         opened = joint.clearance_m.last - joint.clearance_m.first
         assert opened == pytest.approx(expected["opened_m"][name], rel=SCATTER)
         assert joint.mean_force_n == pytest.approx(expected["mean_force_n"][name], rel=SCATTER)
+
+
+def test_the_verdict_is_the_one_that_is_written_beside(bag: tuple[ReplaySummary, dict[str, Any]]) -> None:
+    found, expected = bag
+    verdict = found.verdict
+    told = {"state": verdict.state.value, "fault_code": verdict.fault_code}
+    assert told | {"not_valid": [figure.value for figure in verdict.not_valid]} == expected["verdict"]
+    is_believed = "forecast" not in expected["verdict"]["not_valid"]
+    assert is_believed or not any(found.life.values())
+    assert all(0.99 * new.new_m < new.counted_m < new.limit_m for new in found.clearances.values())

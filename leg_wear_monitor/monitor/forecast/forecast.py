@@ -25,7 +25,7 @@ class Answer(Enum):
     PARTLY_KNOWN = "of the joints whose growth is known; the others are not included"
     AT_LIMIT = "at its limit"
     NOT_ENOUGH_DATA = "not enough data for a growth rate yet"
-    OUTSIDE_VALIDITY = "outside validity: cadence or torque is outside the range of the model"
+    OUTSIDE_VALIDITY = "not valid: cadence, torque or clearances are not those of the counted leg"
     NO_GROWTH = "clearance does not grow"
 
 

@@ -129,6 +129,10 @@ class Forecaster:
         self.state.last = self._forecast(rates, wear_m, limits_m, is_valid)
         return self.state.last
 
+    def expire(self) -> None:
+        """Make a new forecast after the next gait cycle: what it rests on has changed."""
+        self.state.last = None
+
     @property
     def measurements(self) -> tuple[Measurement, ...]:
         """Of the ledger, and since."""

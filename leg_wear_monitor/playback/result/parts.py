@@ -157,12 +157,16 @@ class ReplayAlarms:
 
 @attrs.frozen(kw_only=True)
 class ReplayStatus:
-    """A line of /diagnostics at the end; the keys of ``values`` end in their unit."""
+    """A line of /diagnostics at the end; the keys of ``values`` end in their unit.
+
+    ``fault_code`` is a stable name of what is wrong; empty if the line has none.
+    """
 
     name: str
     level: Level
     message: str
     values: dict[str, float | None] = attrs.field(converter=_known_values)
+    fault_code: str = ""
 
 
 @attrs.frozen(eq=False)

@@ -11,6 +11,8 @@ from leg_wear_monitor.errors import ConfigError
 from leg_wear_monitor.json_text import json_text
 from leg_wear_monitor.monitor.ledger.entry import Measurement
 from leg_wear_monitor.monitor.reports import Lost
+from leg_wear_monitor.monitor.verdict.verdict import Verdict
+from leg_wear_monitor.playback.result.condition import JointClearance, LifeHours
 from leg_wear_monitor.playback.result.document import alarms_document, joint_document, part_document
 from leg_wear_monitor.playback.result.parts import (
     LegLife,
@@ -36,6 +38,8 @@ class ReplaySummary:
 
     Attributes
     ----------
+    verdict : Verdict
+        At the end.
     recording : ReplayRecording
     monitor : ReplayMonitor
     wall_s : float or None
@@ -46,7 +50,11 @@ class ReplaySummary:
         Gait cycles.
     gait : ReplayGait
     joints : dict of str to ReplayJoint
-        Clearance joints; empty without one gait cycle that fits this leg.
+        Clearance joints; empty without one gait cycle that fits this leg, like the next two.
+    clearances : dict of str to JointClearance
+        Of each joint, as counted and as seen.
+    life : dict of str to LifeHours or None
+        Of each joint, and of the ``leg``; None where it is not known, or the verdict does not believe it.
     forecast : LegLife or None
         The leg's.
     measurements : tuple of Measurement
@@ -62,6 +70,7 @@ class ReplaySummary:
         Names and versions of what made it.
     """
 
+    verdict: Verdict
     recording: ReplayRecording
     monitor: ReplayMonitor
     wall_s: float | None = None
@@ -69,6 +78,8 @@ class ReplaySummary:
     cycles: int
     gait: ReplayGait
     joints: dict[str, ReplayJoint]
+    clearances: dict[str, JointClearance]
+    life: dict[str, LifeHours | None]
     forecast: LegLife | None
     measurements: tuple[Measurement, ...]
     alarms: ReplayAlarms

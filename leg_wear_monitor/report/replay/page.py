@@ -13,6 +13,7 @@ from leg_wear_monitor.report.page import Page, Part, Picture, Section, Sentences
 from leg_wear_monitor.report.replay.charts import alarm_chart, clearance_chart, force_chart, health_chart
 from leg_wear_monitor.report.replay.clearance_section import clearance_sections, clearance_sentences
 from leg_wear_monitor.report.replay.forecast_section import counted_mm, forecast_section, leg_sentence
+from leg_wear_monitor.report.replay.verdict_banner import verdict_banner
 from leg_wear_monitor.wear.surfaces import Surfaces
 
 _MOST_ROWS = 50
@@ -32,7 +33,13 @@ def replay_page(summary: ReplaySummary) -> Page:
         sections += [_forces(summary), _wear(summary)]
     sections += [_alarms(summary), _health(summary)]
     title = f"Joint wear of {monitor.hardware_id}"
-    return Page(title=title, summary=what, sections=sections, versions=summary.made_with)
+    return Page(
+        title=title,
+        summary=what,
+        sections=sections,
+        versions=summary.made_with,
+        banner=verdict_banner(summary.verdict),
+    )
 
 
 def _sentences(summary: ReplaySummary) -> list[str]:

@@ -22,7 +22,7 @@ _NOW = {
     **{f"{kind.name}_rate_hz": 0.0 for kind in KINDS.values()},
 }
 # statuses of the node itself or of faults; they remain valid during silence
-_KEPT = ("input", "alarms", "ledger", "load", "topics", "recording", "clock")
+_KEPT = ("verdict", "input", "alarms", "ledger", "load", "topics", "recording", "clock")
 _NOTHING_WRONG = "in order"
 
 
@@ -99,4 +99,4 @@ class Silence:
             message += f"; {status.message}"
         values = status.values | {key: now for key, now in _NOW.items() if key in status.values}
         values["no_data_s"] = self.silent_s(kind, steady_ns)
-        return Status(status.name, max(level, status.level), message, values)
+        return attrs.evolve(status, level=max(level, status.level), message=message, values=values)

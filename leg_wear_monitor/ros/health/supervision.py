@@ -4,12 +4,17 @@ import time
 from collections.abc import Iterable, Sequence
 from typing import TYPE_CHECKING
 
+import attrs
 from rclpy.node import Node
 
 from leg_wear_monitor.messages.streams import streams_read
 from leg_wear_monitor.monitor.alarms.alarm import Alarm, Level
 from leg_wear_monitor.monitor.config.settings import MonitorConfig
-from leg_wear_monitor.monitor.reports import AlarmList, Status
+from leg_wear_monitor.monitor.reports import AlarmList, Status, VerdictReport
+from leg_wear_monitor.monitor.status import verdict_status
+from leg_wear_monitor.monitor.verdict.rules import findings
+from leg_wear_monitor.monitor.verdict.situation import Situation
+from leg_wear_monitor.monitor.verdict.verdict import dated
 from leg_wear_monitor.ros.health.clock_monitor import ClockMonitor, both_clocks
 from leg_wear_monitor.ros.health.node_alarms import SILENCE, NodeAlarms, sources_alarm
 from leg_wear_monitor.ros.health.node_health import topics_status
@@ -67,6 +72,14 @@ class Supervision:
         self._alarm_log.note(shown)
         return shown
 
+    def verdict(self, report: VerdictReport) -> VerdictReport:
+        """Merge the monitor's verdict with what the node's own alarms say; without any, it is unchanged."""
+        own = self._alarms.raised
+        if not own:
+            return report
+        found = findings(Situation(alarms=own))
+        return attrs.evolve(report, findings=(*report.findings, *dated(found, (), report.stamp_ns)))
+
     def acknowledge(self) -> tuple[tuple[Alarm, ...], tuple[Alarm, ...]]:
         """Acknowledge the node's own alarms; return the cleared ones and the remaining ones."""
         return self._alarms.acknowledge()
@@ -98,6 +111,8 @@ class Supervision:
             topic.lost_reported = topic.lost
         clock = self._clock.status(ros_ns, now_ns, is_simulated)
         given = {status.name: status for status in statuses}
+        verdict = verdict_status(self.verdict(self._monitor.verdict).verdict)
+        given[verdict.name] = verdict
         # the given clock status has already been logged at its source
         self._status_log.note((*(one for name, one in given.items() if name != clock.name), topics, clock))
         given[clock.name] = both_clocks(given[clock.name], clock) if clock.name in given else clock

@@ -42,7 +42,7 @@ def _run(name: str, seed: int, _directory: Path) -> tuple[Outcome, str]:
     unsaid = stage.unsaid()
     # the walk lies an hour later: whatever stamps were believed, it is a time of its own
     stage.send(stage.publisher(JointState, "joint_states", "after"), live.walk(3600.0, 3602.0))
-    gait = stage.monitor.monitor.status()[0].message
+    gait = next(one for one in stage.monitor.monitor.status() if one.name == "gait").message
     lost = [topic.lost for topic in stage.monitor._supervision.inputs]
     counts = f"{sent} sent, {received} received, {lost} lost by DDS; then {gait}; {told}"
     if unsaid or sentence not in told or gait != "in step":

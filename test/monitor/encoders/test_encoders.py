@@ -200,7 +200,7 @@ def test_an_encoder_that_says_nothing_is_told_and_the_others_go_on(new_watch, re
     counted = {status(monitor).values[f"knee_{what}"] for what in ("absent", "no_angle")}
     assert counted == {0.0, float(len(samples))}
     assert monitor._encoders.state.present == (True, False, True)
-    assert len(monitor.status()[0].values) > 0 and monitor.lost.unmonitored_s < 0.2
+    assert len(monitor.status()[1].values) > 0 and monitor.lost.unmonitored_s < 0.2
 
 
 def test_a_leg_that_cannot_be_simulated_is_told_and_the_crank_goes_on(new_watch, read, monkeypatch):

@@ -171,7 +171,7 @@ def test_a_driver_that_changes_to_radians_is_followed_from_then_on(monitor, gait
     monitor.update(wrong)
     reports = monitor.update(gait(4.0, begin_s=2.0))
     assert len(reports.cycles) >= 1
-    assert not monitor.status()[0].message.startswith("not monitored")
+    assert not status_of(monitor, "gait").message.startswith("not monitored")
 
 
 def test_a_gear_that_is_not_set_is_named(monitor, gait):

@@ -25,6 +25,11 @@ def test_json_comes_back_as_it_went_out(summary):
     assert again.to_json() == text
     assert again.joints == summary.joints
     assert again.alarms == summary.alarms
+    assert (again.verdict, again.clearances, again.life) == (
+        summary.verdict,
+        summary.clearances,
+        summary.life,
+    )
     assert again.measurements[0].id == 3
     assert again.history.stamp_ns.tolist() == summary.history.stamp_ns.tolist()
     assert np.array_equal(again.history.cycle, summary.history.cycle, equal_nan=True)
@@ -32,8 +37,10 @@ def test_json_comes_back_as_it_went_out(summary):
 
 def test_json_has_a_version_and_null_for_what_is_not_known(summary):
     record = json.loads(summary.to_json())
-    assert list(record)[:2] == ["schema_version", "recording"] and list(record)[-1] == "made_with"
+    assert list(record)[:3] == ["schema_version", "verdict", "recording"] and list(record)[-1] == "made_with"
     assert record["joints"]["A"]["seen"]["sigma_m"] is None
+    assert record["verdict"]["evidence"][0]["limit"] is None
+    assert record["clearances"]["B"]["seen_m"] is None and record["life"]["B"] is None
     assert record["joints"]["A"]["seen"]["observation"] == "seen by encoders"
     assert record["joints"]["B"]["peak_force_n"] is None and "seen" not in record["joints"]["B"]
     assert list(record["alarms"]["changes"][0])[:3] == ["stamp_ns", "name", "level"]

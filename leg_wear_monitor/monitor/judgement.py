@@ -1,0 +1,175 @@
+"""The verdict of a monitor: what it depends on, collected from the monitor's parts, and its changes."""
+
+import math
+from collections.abc import Sequence
+
+from leg_wear_monitor.monitor.accounting import Accounting
+from leg_wear_monitor.monitor.diagnosis.diagnosis import Diagnosis
+from leg_wear_monitor.monitor.encoders.clearance_estimate import ClearanceEstimate, ClearanceObservation
+from leg_wear_monitor.monitor.encoders.observer import EncoderObserver
+from leg_wear_monitor.monitor.encoders.state import faults
+from leg_wear_monitor.monitor.evaluation import specs
+from leg_wear_monitor.monitor.evaluation.evaluation import AlarmEvaluation
+from leg_wear_monitor.monitor.evaluation.gait_evidence import doubts
+from leg_wear_monitor.monitor.evaluation.torque_checks import torque_causes
+from leg_wear_monitor.monitor.evaluation.torque_record import TorqueRecord
+from leg_wear_monitor.monitor.forecast.forecaster import Forecaster
+from leg_wear_monitor.monitor.reports import CycleReport, JointReport, VerdictReport
+from leg_wear_monitor.monitor.state import MonitorState
+from leg_wear_monitor.monitor.verdict.rules import findings
+from leg_wear_monitor.monitor.verdict.situation import JointSituation, SeenClearance, Situation
+from leg_wear_monitor.monitor.verdict.verdict import (
+    NO_GAIT_CYCLE,
+    Figure,
+    Finding,
+    dated,
+    has_changed,
+    verdict_of,
+)
+from leg_wear_monitor.twin.digital_twin import DigitalTwin
+from leg_wear_monitor.twin.statistics import Tracking
+
+
+class Judge:
+    """Evaluates the verdict.
+
+    Parameters
+    ----------
+    twin : DigitalTwin
+    evaluation : AlarmEvaluation
+    encoders : EncoderObserver or None
+    forecaster : Forecaster
+        Renewed if a verdict makes its forecast invalid or valid.
+    accounting : Accounting
+        Stores changes as events.
+    """
+
+    def __init__(
+        self,
+        twin: DigitalTwin,
+        evaluation: AlarmEvaluation,
+        encoders: EncoderObserver | None,
+        forecaster: Forecaster,
+        accounting: Accounting,
+    ) -> None:
+        self._twin, self._evaluation, self._encoders = twin, evaluation, encoders
+        self._forecaster, self._accounting = forecaster, accounting
+
+    def report(self, state: MonitorState) -> VerdictReport:
+        """The verdict now."""
+        intake = self._twin.intake
+        stamp_ns = intake.followed_stamp_ns or intake.newest_stamp_ns
+        situation = situation_of(self._twin, self._evaluation, state.last, state.torque, self._encoders)
+        return VerdictReport(stamp_ns, dated(findings(situation), state.findings, stamp_ns))
+
+    def changed(self, state: MonitorState) -> tuple[VerdictReport, ...]:
+        """The verdict if it has changed since the last call; it is then an event, too.
+
+        To be called where the state does not depend on how the samples are cut into blocks: at the end of an
+        evaluation period.
+        """
+        before = verdict_of(state.findings) if state.findings else None
+        report = self.report(state)
+        state.findings, now = report.findings, report.verdict
+        if not has_changed(before, now):
+            return ()
+        if before and (Figure.FORECAST in before.not_valid) != (Figure.FORECAST in now.not_valid):
+            self._forecaster.expire()
+        if before or now.fault_code != NO_GAIT_CYCLE:  # a run that monitored nothing has no verdict to store
+            self._accounting.note_verdict(report)
+        return (report,)
+
+    def is_forecast_valid(self, found: Sequence[Finding]) -> bool:
+        """Whether the leg is in the range of the model, and is the counted one by some findings."""
+        invalid = any(Figure.FORECAST in finding.not_valid for finding in found)
+        return self._evaluation.holds() and not invalid
+
+
+def situation_of(
+    twin: DigitalTwin,
+    evaluation: AlarmEvaluation,
+    last: CycleReport | None,
+    record: TorqueRecord,
+    encoders: EncoderObserver | None = None,
+    diagnosis: Diagnosis | None = None,
+) -> Situation:
+    """What the verdict depends on, at the end of an evaluation period.
+
+    Parameters
+    ----------
+    twin : DigitalTwin
+    evaluation : AlarmEvaluation
+    last : CycleReport or None
+        The last gait cycle of this run.
+    record : TorqueRecord
+    encoders : EncoderObserver, optional
+    diagnosis : Diagnosis, optional
+        What the drive torque shows.
+    """
+    alarms, config = evaluation.board.alarms, evaluation.config
+    return Situation(
+        joints=tuple(
+            _joint(k, name, float(twin.clearance_mean_m[k]), evaluation, last, diagnosis)
+            for k, name in enumerate(twin.clearance_joints)
+        ),
+        alarms=tuple(alarms.values()),
+        has_cycle=last is not None,
+        has_torque=last is not None and last.torque_samples > 0,
+        mismatch=last.torque_mismatch if last else math.nan,
+        mismatch_limit=config.limits.torque_mismatch,
+        torque_causes=_torque_causes(evaluation, last, record),
+        unfollowed=_unfollowed(twin, evaluation),
+        input_causes=tuple(evaluation.causes),
+        is_out_of_step=twin.tracking is Tracking.OUT_OF_STEP,
+        cadence_rpm=twin.speed_radps * 30.0 / math.pi,
+        commanded_rpm=config.cadence.commanded_rpm,
+        tolerance_rpm=config.cadence.tolerance_rpm,
+        doubts=tuple(doubts(last, config)) if last else (),
+        encoder_faults=tuple(faults(config.encoders.names, encoders.state)) if encoders else (),
+        diagnosis=diagnosis,
+    )
+
+
+def _joint(
+    k: int,
+    name: str,
+    counted_m: float,
+    evaluation: AlarmEvaluation,
+    last: CycleReport | None,
+    diagnosis: Diagnosis | None,
+) -> JointSituation:
+    report = last.joints[k] if last else None
+    by_encoders = _seen_by_encoders(report)
+    seen = [SeenClearance("encoders", by_encoders.clearance_m, by_encoders.sigma_m)] if by_encoders else []
+    if diagnosis and diagnosis.clearance_m and math.isfinite(diagnosis.clearance_m[k]):
+        seen.append(SeenClearance("torque", diagnosis.clearance_m[k], diagnosis.sigma_m[k]))
+    return JointSituation(
+        joint=name,
+        counted_m=counted_m,
+        limit_m=evaluation.board.clearance_limits_m[k],
+        believed_m=report.forecast.clearance_m.p50 if report and report.forecast else math.nan,
+        seen=tuple(seen),
+        is_used=bool(by_encoders and by_encoders.believed),
+    )
+
+
+def _seen_by_encoders(report: JointReport | None) -> ClearanceEstimate | None:
+    seen = report.seen if report else None
+    return seen if seen and seen.observation is ClearanceObservation.SEEN else None
+
+
+def _torque_causes(
+    evaluation: AlarmEvaluation, last: CycleReport | None, record: TorqueRecord
+) -> tuple[str, ...]:
+    if last is None:
+        return ()
+    raised = {spec.name() for spec in specs.TORQUE if evaluation.board.level(spec.name())}
+    return tuple(torque_causes(raised, last, record, evaluation.torque_bounds))
+
+
+def _unfollowed(twin: DigitalTwin, evaluation: AlarmEvaluation) -> str:
+    """Why the crank is not followed; a loss shorter than a commanded gait cycle is reported by its alarm."""
+    if evaluation.guard.cause:
+        return evaluation.guard.cause
+    out_s, cycle_s = twin.intake.out_s, 60.0 / abs(evaluation.config.cadence.commanded_rpm)
+    return f"the crank is not followed since {out_s:.3g} s" if out_s >= cycle_s else ""

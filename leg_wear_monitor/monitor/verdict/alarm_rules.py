@@ -1,0 +1,58 @@
+"""Conditions on alarms. A latched alarm counts like a present one until somebody acknowledges it."""
+
+import math
+from collections.abc import Callable, Sequence
+
+from leg_wear_monitor.monitor.alarms.alarm import Alarm, Level
+from leg_wear_monitor.monitor.alarms.words import time_words
+from leg_wear_monitor.monitor.verdict.rule import Hit
+from leg_wear_monitor.monitor.verdict.situation import Situation
+from leg_wear_monitor.monitor.verdict.verdict import Evidence
+from leg_wear_monitor.monitor.verdict.words import amount
+
+Condition = Callable[[Situation], Sequence[Hit]]
+
+OF_A_JOINT = ("impact_force", "clearance", "growth", "remaining_life", "clearance_departure")
+
+
+def raised(*kinds: str, least: Level = Level.WARN) -> Condition:
+    """Alarms of some kinds (all if none is given) at a level or above it."""
+
+    def hits(situation: Situation) -> Sequence[Hit]:
+        return [
+            hit_of(alarm)
+            for alarm in situation.alarms
+            if alarm.level >= least and (not kinds or alarm.kind in kinds)
+        ]
+
+    return hits
+
+
+def blinding(situation: Situation) -> Sequence[Hit]:
+    """Present faults of the input of the crank; those of the torque leave the counting of wear as it is."""
+    kinds = ("input_sources", "input_rate", "input_samples", "input_gaps", "input_silence")
+    causes = f": {situation.input_causes[0]}" if situation.input_causes else ""  # the most frequent
+    return [
+        hit_of(alarm, causes=causes)
+        for alarm in situation.alarms
+        if alarm.kind in kinds and alarm.subject != "torque" and alarm.present is Level.ERROR
+    ]
+
+
+def hit_of(alarm: Alarm, **words: str) -> Hit:
+    """An alarm as a case of a rule: its worst value if it is known, else its last one."""
+    is_present = alarm.present is not Level.OK
+    value = alarm.value if is_present or math.isnan(alarm.worst) else alarm.worst
+    told = {
+        "name": alarm.name,
+        "joint": alarm.subject,
+        "value": amount(value, alarm.unit),
+        "limit": amount(alarm.limit, alarm.unit),
+        "past": "" if is_present else f" (since {time_words(alarm.raised_ns)}; within its limit again now)",
+    }
+    return Hit(
+        words=told | words,
+        joint=alarm.subject if alarm.kind in OF_A_JOINT else "",
+        since_ns=alarm.raised_ns,
+        evidence=(Evidence(alarm.name, value, alarm.limit, alarm.unit),),
+    )

@@ -1,0 +1,132 @@
+"""Conditions on clearances: those that the forecast believes, and those that measurements show."""
+
+import math
+from collections.abc import Callable, Sequence
+
+from leg_wear_monitor.monitor.diagnosis.diagnosis import Cause, Change, DiagnosisState
+from leg_wear_monitor.monitor.verdict.alarm_rules import raised
+from leg_wear_monitor.monitor.verdict.rule import Hit
+from leg_wear_monitor.monitor.verdict.situation import Situation
+from leg_wear_monitor.monitor.verdict.verdict import Evidence, Figure
+from leg_wear_monitor.monitor.verdict.words import amount, estimate
+
+SURE_SIGMAS = 2.0  # by which a clearance that is seen must be beyond its limit
+CLOSE_ODDS = 3.0  # log odds below which the runner-up is named as well: 20 to 1
+
+_UNITS = {
+    Cause.CLEARANCE: "m",
+    Cause.LOAD: "N",
+    Cause.FRICTION: "N m",
+    Cause.SCALE: "",
+    Cause.LAG: "s",
+    Cause.CRANK_OFFSET: "rad",
+    Cause.MASS: "",
+    Cause.UNKNOWN: "",
+}
+_NAMES = {
+    Cause.LOAD: "load",
+    Cause.FRICTION: "friction",
+    Cause.SCALE: "torque_scale",
+    Cause.LAG: "torque_lag",
+    Cause.CRANK_OFFSET: "crank_offset",
+    Cause.MASS: "mass",
+    Cause.UNKNOWN: "unknown_change",
+}
+
+
+def believed_at_limit(situation: Situation) -> Sequence[Hit]:
+    """Joints whose clearance is at its limit by what the forecast believes, measurements included."""
+    return [
+        Hit(
+            words={
+                "joint": each.joint,
+                "value": amount(each.believed_m, "m"),
+                "limit": amount(each.limit_m, "m"),
+            },
+            joint=each.joint,
+            evidence=(Evidence(f"believed clearance {each.joint}", each.believed_m, each.limit_m, "m"),),
+        )
+        for each in situation.joints
+        if each.believed_m >= each.limit_m
+    ]
+
+
+def seen_at_limit(situation: Situation) -> Sequence[Hit]:
+    """Joints whose clearance is surely at its limit by what encoders or the drive torque show."""
+    return [
+        Hit(
+            words={
+                "joint": each.joint,
+                "by": seen.by,
+                "value": estimate(seen.clearance_m, seen.sigma_m, "m"),
+                "limit": amount(each.limit_m, "m"),
+            },
+            joint=each.joint,
+            evidence=(Evidence(f"clearance {each.joint} by {seen.by}", seen.clearance_m, each.limit_m, "m"),),
+        )
+        for each in situation.joints
+        for seen in each.seen
+        if seen.clearance_m - SURE_SIGMAS * seen.sigma_m >= each.limit_m
+    ]
+
+
+def departing(situation: Situation) -> Sequence[Hit]:
+    """Joints whose clearance by encoders differs from the counted one; the forecast may use it."""
+    used = {each.joint for each in situation.joints if each.is_used}
+    return [
+        hit if hit.joint in used else _with_forecast(hit) for hit in raised("clearance_departure")(situation)
+    ]
+
+
+def _with_forecast(hit: Hit) -> Hit:
+    return Hit(
+        words=hit.words,
+        joint=hit.joint,
+        since_ns=hit.since_ns,
+        evidence=hit.evidence,
+        not_valid=(Figure.FORECAST,),
+    )
+
+
+def diagnosed(*causes: Cause) -> Callable[[Situation], Sequence[Hit]]:
+    """Significant changes of the drive torque with one of some causes."""
+
+    def hits(situation: Situation) -> Sequence[Hit]:
+        return [_hit(change) for change in changes(situation) if change.cause in causes]
+
+    return hits
+
+
+def changes(situation: Situation) -> tuple[Change, ...]:
+    """What the drive torque shows that has changed; empty without an estimator."""
+    diagnosis = situation.diagnosis
+    if diagnosis is None or diagnosis.state is not DiagnosisState.CHANGED:
+        return ()
+    return diagnosis.changes
+
+
+def words_of(change: Change) -> str:
+    """A change in words, such as ``clearance of 0.62 mm ± 0.03 mm in joint G, 0.3 mm is counted``."""
+    unit = _UNITS[change.cause]
+    value, counted = estimate(change.value, change.sigma, unit), amount(change.counted, unit)
+    if change.cause is Cause.CLEARANCE:
+        words = f"clearance of {value} in joint {change.subject}, {counted} is counted"
+    elif change.cause is Cause.UNKNOWN:
+        words = "no single cause explains the change"
+    else:
+        subject = f" {change.subject}" if change.subject else ""
+        words = f"{change.cause.value}{subject}: {value}, {counted} is counted"
+    if change.runner_up and change.runner_up_log_odds < CLOSE_ODDS:
+        words += f" (or {change.runner_up})"
+    return words
+
+
+def _hit(change: Change) -> Hit:
+    is_joint = change.cause is Cause.CLEARANCE
+    name = f"clearance {change.subject} by torque" if is_joint else _NAMES[change.cause]
+    return Hit(
+        words={"change": words_of(change)},
+        joint=change.subject if is_joint else "",
+        since_ns=change.since_ns,
+        evidence=(Evidence(name, change.value, math.nan, _UNITS[change.cause]),),
+    )

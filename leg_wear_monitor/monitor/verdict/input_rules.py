@@ -1,0 +1,119 @@
+"""Conditions on the inputs: crank, drive torque, further encoders, cadence."""
+
+import math
+from collections.abc import Sequence
+
+from leg_wear_monitor.monitor.alarms.alarm import Level
+from leg_wear_monitor.monitor.verdict.alarm_rules import raised
+from leg_wear_monitor.monitor.verdict.clearance_rules import changes, words_of
+from leg_wear_monitor.monitor.verdict.rule import Hit
+from leg_wear_monitor.monitor.verdict.situation import Situation
+from leg_wear_monitor.monitor.verdict.verdict import Evidence
+from leg_wear_monitor.monitor.verdict.words import amount
+
+
+def mismatch(situation: Situation) -> Sequence[Hit]:
+    """The drive torque is not that of the counted leg; with what may cause it, as far as that is known."""
+    told = [*situation.torque_causes, *(words_of(change) for change in changes(situation))]
+    causes = f"; possible cause: {'; '.join(told)}" if told else ""
+    return [
+        Hit(
+            words={**hit.words, "causes": causes},
+            since_ns=hit.since_ns,
+            evidence=hit.evidence,
+        )
+        for hit in raised("torque_mismatch")(situation)
+    ]
+
+
+def impossible_torque(situation: Situation) -> Sequence[Hit]:
+    """The drive torque has a bias, a drift or a lag beyond its bounds; with their causes."""
+    causes = f": {'; '.join(situation.torque_causes)}" if situation.torque_causes else ""
+    found = raised("torque_bias", "torque_drift", "torque_lag", least=Level.ERROR)(situation)
+    return [
+        Hit(words={**hit.words, "causes": causes}, since_ns=hit.since_ns, evidence=hit.evidence)
+        for hit in found
+    ]
+
+
+def unfollowed(situation: Situation) -> Sequence[Hit]:
+    """The crank is not followed."""
+    return _said(situation.unfollowed)
+
+
+def doubtful(situation: Situation) -> Sequence[Hit]:
+    """The last gait cycle is unlikely to be one of this leg."""
+    return _said("; ".join(situation.doubts))
+
+
+def no_cycle(situation: Situation) -> Sequence[Hit]:
+    """No whole gait cycle was monitored in this run."""
+    return [] if situation.has_cycle else [Hit()]
+
+
+def no_torque(situation: Situation) -> Sequence[Hit]:
+    """Neither the drive torque nor encoders show the joints.
+
+    The state is `WATCH`: wear is counted from the motion alone, so the leg is monitored, and its alarms of
+    clearance, growth and forces hold for the counted leg. But no measurement can contradict the counting: a
+    bushing that breaks changes nothing that is received. So nobody may be told that the leg is healthy.
+    """
+    if not situation.has_cycle or not situation.unobserved:
+        return []
+    fault = _fault_of_torque(situation)
+    return [Hit(words={"joints": ", ".join(situation.unobserved), "cause": fault})] if fault else []
+
+
+def _fault_of_torque(situation: Situation) -> str:
+    if not situation.has_torque:
+        return "no drive torque"
+    stuck = [each for each in situation.alarms if each.kind == "input_torque" and each.present is Level.ERROR]
+    return "the drive torque is stuck or saturated" if stuck else ""
+
+
+def not_compared(situation: Situation) -> Sequence[Hit]:
+    """There is a drive torque, but not yet enough of it to be compared."""
+    is_known = not situation.has_torque or not math.isnan(situation.mismatch)
+    return [] if is_known or not situation.has_cycle or not situation.unobserved else [Hit()]
+
+
+def other_cadence(situation: Situation) -> Sequence[Hit]:
+    """The cadence is outside of its tolerance, or was for so long that its alarm is raised."""
+    alarms = raised("cadence", least=Level.ERROR)(situation)
+    if not situation.is_out_of_step and not alarms:
+        return []
+    words = {
+        "walks": f"walks at {amount(situation.cadence_rpm, 'rpm')}"
+        if situation.is_out_of_step
+        else "walked at another cadence",
+        "commanded": amount(situation.commanded_rpm, "rpm"),
+        "tolerance": amount(situation.tolerance_rpm, "rpm"),
+    }
+    evidence = Evidence("cadence_rpm", situation.cadence_rpm, situation.commanded_rpm, "rpm")
+    since_ns = alarms[0].since_ns if alarms else 0
+    return [
+        Hit(words=words, since_ns=since_ns, evidence=(evidence, *(e for a in alarms for e in a.evidence)))
+    ]
+
+
+def encoder_faults(situation: Situation) -> Sequence[Hit]:
+    """A further encoder gives nothing that can be used."""
+    return [Hit(words={"cause": fault}) for fault in situation.encoder_faults]
+
+
+def nothing_found(situation: Situation) -> Sequence[Hit]:
+    """Always holds; it counts where no other rule does."""
+    observed = "the encoders show the counted clearances"
+    evidence: tuple[Evidence, ...] = ()
+    if situation.has_torque and not math.isnan(situation.mismatch):
+        limit = situation.mismatch_limit
+        evidence = (Evidence("torque_mismatch", situation.mismatch, limit, ""),)
+        observed = (
+            f"the drive torque is that of the counted leg: {amount(situation.mismatch, '')} of its RMS is "
+            f"not explained, the limit is {amount(limit, '')}"
+        )
+    return [Hit(words={"observed": observed}, evidence=evidence)]
+
+
+def _said(cause: str) -> Sequence[Hit]:
+    return [Hit(words={"cause": cause})] if cause else []

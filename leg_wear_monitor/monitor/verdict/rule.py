@@ -1,0 +1,80 @@
+"""A rule of the verdict: condition, state and texts in one entry."""
+
+from collections.abc import Callable, Mapping, Sequence
+
+import attrs
+
+from leg_wear_monitor.monitor.verdict.situation import Situation
+from leg_wear_monitor.monitor.verdict.verdict import Evidence, Figure, Finding, State
+
+EVERYTHING = tuple(Figure)
+OF_THE_GAIT = (Figure.GROWTH, Figure.IMPACT_FORCES)
+OF_THE_MODEL = (Figure.GROWTH, Figure.IMPACT_FORCES, Figure.FORECAST)
+
+
+@attrs.frozen(kw_only=True)
+class Hit:
+    """One case for which the condition of a rule holds.
+
+    Attributes
+    ----------
+    words : mapping of str to str
+        What the rule's texts name in braces.
+    joint : str
+        The joint concerned, empty if it is none.
+    since_ns : int
+        Stamp since which it holds, 0 if it is not known.
+    evidence : tuple of Evidence
+    not_valid : tuple of Figure
+        In addition to the rule's.
+    """
+
+    words: Mapping[str, str] = attrs.field(factory=dict)
+    joint: str = ""
+    since_ns: int = 0
+    evidence: tuple[Evidence, ...] = ()
+    not_valid: tuple[Figure, ...] = ()
+
+
+@attrs.frozen(kw_only=True)
+class Rule:
+    """A rule.
+
+    Attributes
+    ----------
+    code : str
+        Stable name.
+    state : State
+    hits : callable
+        Its condition: the cases in a situation for which it holds.
+    why, do : str
+        Texts, with the words of a hit in braces; ``{joints}`` in ``do`` names all joints of the hits.
+    not_valid : tuple of Figure
+        The figures that do not hold while the rule does.
+    """
+
+    code: str
+    state: State
+    hits: Callable[[Situation], Sequence[Hit]]
+    why: str
+    do: str
+    not_valid: tuple[Figure, ...] = ()
+
+    def found(self, situation: Situation) -> Finding | None:
+        """The finding if the rule holds, with all of its cases."""
+        hits = self.hits(situation)
+        if not hits:
+            return None
+        joints = tuple(dict.fromkeys(hit.joint for hit in hits if hit.joint))
+        since = [hit.since_ns for hit in hits if hit.since_ns]
+        not_valid = {*self.not_valid, *(figure for hit in hits for figure in hit.not_valid)}
+        return Finding(
+            code=self.code,
+            state=self.state,
+            joints=joints,
+            why="; ".join(dict.fromkeys(self.why.format(**hit.words) for hit in hits)),
+            do=self.do.format(**{"joints": ", ".join(joints), **hits[0].words, "joint": hits[0].joint}),
+            since_ns=min(since, default=0),
+            evidence=tuple(each for hit in hits for each in hit.evidence),
+            not_valid=tuple(figure for figure in Figure if figure in not_valid),
+        )

@@ -1,0 +1,219 @@
+"""The rules of the verdict, one entry each; the most severe one that holds decides, the first of equals.
+
+docs/monitor.md lists them; a test compares the two.
+"""
+
+from leg_wear_monitor.monitor.alarms.alarm import Level
+from leg_wear_monitor.monitor.alarms.words import ADVICE
+from leg_wear_monitor.monitor.diagnosis.diagnosis import Cause
+from leg_wear_monitor.monitor.verdict import clearance_rules, input_rules
+from leg_wear_monitor.monitor.verdict.alarm_rules import blinding, raised
+from leg_wear_monitor.monitor.verdict.rule import EVERYTHING, OF_THE_GAIT, OF_THE_MODEL, Rule
+from leg_wear_monitor.monitor.verdict.situation import Situation
+from leg_wear_monitor.monitor.verdict.verdict import NO_GAIT_CYCLE, NONE, Figure, Finding, State
+
+_ACKNOWLEDGE = "then acknowledge the alarms"
+_ROCK = (
+    "stop when it is safe, block the drive and rock joint {joints}; measure its radial clearance, and enter "
+    "it: leg-wear-monitor measure {joint} MM --sigma MM"
+)
+_REPLACE = (
+    "take the leg out of service and replace the parts of joint {joints}; then call ~/reset_wear/{joint}"
+)
+_TORQUE_INPUT = (
+    "check the torque sensor (zero, scale, time stamps) and the parameters of drive_torque and crank"
+)
+
+RULES = (
+    Rule(
+        code="CLEARANCE",
+        state=State.STOP,
+        hits=raised("clearance", least=Level.ERROR),
+        why="the counted clearance of joint {joint} is {value}, the limit is {limit}{past}",
+        do=_REPLACE,
+    ),
+    Rule(
+        code="CLEARANCE_SEEN",
+        state=State.STOP,
+        hits=clearance_rules.seen_at_limit,
+        why="the clearance of joint {joint} is {value} by {by}, the limit is {limit}",
+        do=_REPLACE,
+        not_valid=EVERYTHING,
+    ),
+    Rule(
+        code="CLEARANCE_BELIEVED",
+        state=State.STOP,
+        hits=clearance_rules.believed_at_limit,
+        why="the clearance of joint {joint} is {value} by counting and measurements, the limit is {limit}",
+        do=_REPLACE,
+    ),
+    Rule(
+        code="CLEARANCE_CHANGED",
+        state=State.INSPECT,
+        hits=clearance_rules.diagnosed(Cause.CLEARANCE),
+        why="the drive torque shows a {change}",
+        do=_ROCK,
+        not_valid=EVERYTHING,
+    ),
+    Rule(
+        code="CLEARANCE_DEPARTURE",
+        state=State.INSPECT,
+        hits=clearance_rules.departing,
+        why="the encoders show a clearance of joint {joint} that differs from the counted one by {value}, "
+        "the limit is {limit}{past}",
+        do=f"{_ROCK}; {_ACKNOWLEDGE}",
+        not_valid=(Figure.CLEARANCES, *OF_THE_GAIT),
+    ),
+    Rule(
+        code="MECHANISM_CHANGED",
+        state=State.INSPECT,
+        hits=clearance_rules.diagnosed(Cause.MASS, Cause.UNKNOWN),
+        why="the drive torque is that of another leg than the counted one: {change}",
+        do="look for loose, bent or added parts, and rock each joint",
+        not_valid=EVERYTHING,
+    ),
+    Rule(
+        code="TORQUE_MISMATCH",
+        state=State.INSPECT,
+        hits=input_rules.mismatch,
+        why="the torque is not that of the counted leg, the forecast is not valid: {value} of the predicted "
+        "RMS is not explained, the limit is {limit}{past}{causes}",
+        do="stop when it is safe, block the drive and rock each joint; measure the one with play, and enter "
+        "it: leg-wear-monitor measure JOINT MM --sigma MM; if none has play, check the load at the foot and "
+        f"the torque sensor; {_ACKNOWLEDGE}",
+        not_valid=EVERYTHING,
+    ),
+    Rule(
+        code="TORQUE_SENSOR",
+        state=State.INSPECT,
+        hits=clearance_rules.diagnosed(Cause.SCALE, Cause.LAG, Cause.CRANK_OFFSET),
+        why="the drive torque shows a fault of a sensor: {change}",
+        do=_TORQUE_INPUT,
+    ),
+    Rule(
+        code="TORQUE_INPUT",
+        state=State.INSPECT,
+        hits=input_rules.impossible_torque,
+        why="{name} is {value}, the limit is {limit}{past}{causes}",
+        do=f"{_TORQUE_INPUT}; {_ACKNOWLEDGE}",
+    ),
+    Rule(
+        code="IMPACT_FORCE",
+        state=State.INSPECT,
+        hits=raised("impact_force", least=Level.ERROR),
+        why="the impact force in joint {joint} is {value}, the limit is {limit}{past}",
+        do=f"{_ROCK}; check its lubrication and the cadence; {_ACKNOWLEDGE}",
+    ),
+    Rule(
+        code="GROWTH",
+        state=State.INSPECT,
+        hits=raised("growth", least=Level.ERROR),
+        why="the clearance of joint {joint} grows by {value}, the limit is {limit}{past}",
+        do=f"{_ROCK}; check its lubrication and for dirt; {_ACKNOWLEDGE}",
+    ),
+    Rule(
+        code="REMAINING_LIFE",
+        state=State.INSPECT,
+        hits=raised("remaining_life", least=Level.ERROR),
+        why="joint {joint} reaches its limit within {value} with a probability of 10 %, the limit is "
+        "{limit}{past}",
+        do=f"{_ROCK}; plan its replacement; {_ACKNOWLEDGE}",
+    ),
+    Rule(
+        code="NOT_FOLLOWED",
+        state=State.NOT_MONITORED,
+        hits=input_rules.unfollowed,
+        why="{cause}",
+        do="repair the input of the crank; the status `input` counts what is wrong",
+        not_valid=OF_THE_GAIT,
+    ),
+    Rule(
+        code="BAD_INPUT",
+        state=State.NOT_MONITORED,
+        hits=blinding,
+        why="{name} is {value}, the limit is {limit}{causes}",
+        do="repair the input; the status `input` counts what is wrong",
+        not_valid=OF_THE_GAIT,
+    ),
+    Rule(
+        code="NOT_THIS_LEG",
+        state=State.NOT_MONITORED,
+        hits=input_rules.doubtful,
+        why="the gait does not fit this leg: {cause}",
+        do="compare the parameters with the leg: mechanism, cadence, crank and drive_torque",
+        not_valid=EVERYTHING,
+    ),
+    Rule(
+        code=NO_GAIT_CYCLE,
+        state=State.NOT_MONITORED,
+        hits=input_rules.no_cycle,
+        why="no whole gait cycle was monitored yet",
+        do="let the leg walk; if it does, see the status `input`",
+    ),
+    Rule(
+        code="NO_DRIVE_TORQUE",
+        state=State.WATCH,
+        hits=input_rules.no_torque,
+        why="joints cannot be observed ({joints}): {cause}",
+        do="provide the drive torque, see drive_torque.source; until then rock the joints by hand regularly",
+    ),
+    Rule(
+        code="TORQUE_NOT_COMPARED",
+        state=State.WATCH,
+        hits=input_rules.not_compared,
+        why="the drive torque is not compared yet: it needs more gait cycles",
+        do="let the leg walk on",
+    ),
+    Rule(
+        code="CADENCE",
+        state=State.WATCH,
+        hits=input_rules.other_cadence,
+        why="the leg {walks}, commanded are {commanded} ± {tolerance}",
+        do=f"walk at the commanded cadence, or set cadence.commanded_rpm; {_ACKNOWLEDGE}",
+        not_valid=(Figure.FORECAST,),
+    ),
+    Rule(
+        code="LOAD_CHANGED",
+        state=State.WATCH,
+        hits=clearance_rules.diagnosed(Cause.LOAD),
+        why="the drive torque shows a change: {change}",
+        do="check what the foot carries or meets",
+        not_valid=OF_THE_MODEL,
+    ),
+    Rule(
+        code="FRICTION_CHANGED",
+        state=State.WATCH,
+        hits=clearance_rules.diagnosed(Cause.FRICTION),
+        why="the drive torque shows a change: {change}",
+        do="check the lubrication and the temperature of the drive",
+    ),
+    Rule(
+        code="ENCODER",
+        state=State.WATCH,
+        hits=input_rules.encoder_faults,
+        why="encoder {cause}",
+        do="repair the encoder, or take it out of encoders.names",
+    ),
+    Rule(
+        code="ALARM",
+        state=State.WATCH,
+        hits=raised(),
+        why="alarm {name} is raised: {value}, the limit is {limit}{past}",
+        do=f"see the status of the joint or of the input; {_ACKNOWLEDGE}",
+    ),
+    Rule(
+        code=NONE,
+        state=State.HEALTHY,
+        hits=input_rules.nothing_found,
+        why="no alarm is raised, and {observed}",
+        do=f"nothing now. {ADVICE}",
+    ),
+)
+"""In the order of precedence among equal states."""
+
+
+def findings(situation: Situation) -> tuple[Finding, ...]:
+    """All rules that hold in a situation, in the order of the table; that of a healthy leg only alone."""
+    held = (rule.found(situation) for rule in RULES)
+    found = tuple(finding for finding in held if finding is not None)
+    return tuple(finding for finding in found if finding.code != NONE) or found

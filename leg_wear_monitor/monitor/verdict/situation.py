@@ -1,0 +1,105 @@
+"""What a verdict depends on, and nothing else; the defaults are those of a leg without a fault."""
+
+import math
+
+import attrs
+
+from leg_wear_monitor.monitor.alarms.alarm import Alarm
+from leg_wear_monitor.monitor.diagnosis.diagnosis import Diagnosis
+
+
+@attrs.frozen
+class SeenClearance:
+    """A clearance that measurements show.
+
+    Attributes
+    ----------
+    by : str
+        ``encoders`` or ``torque``.
+    clearance_m, sigma_m : float
+    """
+
+    by: str
+    clearance_m: float
+    sigma_m: float
+
+
+@attrs.frozen(kw_only=True)
+class JointSituation:
+    """A clearance joint.
+
+    Attributes
+    ----------
+    joint : str
+    counted_m, limit_m : float
+        Counted mean radial clearance, and its limit.
+    believed_m : float
+        Median of what the forecast believes of the clearance; NaN before the first forecast.
+    seen : tuple of SeenClearance
+        Estimates from measurements, as far as there are any.
+    is_used : bool
+        Whether the forecast rests on what encoders show of this joint.
+    """
+
+    joint: str
+    counted_m: float
+    limit_m: float
+    believed_m: float = math.nan
+    seen: tuple[SeenClearance, ...] = ()
+    is_used: bool = False
+
+
+@attrs.frozen(kw_only=True)
+class Situation:
+    """The monitor's results at one instant.
+
+    Attributes
+    ----------
+    joints : tuple of JointSituation
+    alarms : tuple of Alarm
+    has_cycle : bool
+        Whether a whole gait cycle was monitored in this run.
+    has_torque : bool
+        Whether the last gait cycle has samples of the drive torque.
+    mismatch, mismatch_limit : float
+        Part of the drive torque that is not explained, as a fraction of the predicted RMS; NaN if it is not
+        known.
+    torque_causes : tuple of str
+        Sentences on impossible bias, drift or lag of the torque.
+    unfollowed : str
+        Why the crank is not followed at present; empty if it is.
+    input_causes : tuple of str
+        Sentences on unused samples.
+    is_out_of_step : bool
+        Whether the cadence is outside of its tolerance.
+    cadence_rpm, commanded_rpm, tolerance_rpm : float
+    doubts : tuple of str
+        Why the last gait cycle is unlikely to be one of this leg.
+    encoder_faults : tuple of str
+    diagnosis : Diagnosis or None
+        What the drive torque shows; None without an estimator.
+    """
+
+    joints: tuple[JointSituation, ...] = ()
+    alarms: tuple[Alarm, ...] = ()
+    has_cycle: bool = True
+    has_torque: bool = True
+    mismatch: float = 0.0
+    mismatch_limit: float = math.nan
+    torque_causes: tuple[str, ...] = ()
+    unfollowed: str = ""
+    input_causes: tuple[str, ...] = ()
+    is_out_of_step: bool = False
+    cadence_rpm: float = math.nan
+    commanded_rpm: float = math.nan
+    tolerance_rpm: float = math.nan
+    doubts: tuple[str, ...] = ()
+    encoder_faults: tuple[str, ...] = ()
+    diagnosis: Diagnosis | None = None
+
+    @property
+    def unobserved(self) -> tuple[str, ...]:
+        """Clearance joints that no encoder shows."""
+        return tuple(
+            joint.joint for joint in self.joints if not any(seen.by == "encoders" for seen in joint.seen)
+        )

@@ -1,0 +1,56 @@
+"""Condition of the leg at the end of a replay; what the verdict does not believe has no remaining life."""
+
+from typing import TYPE_CHECKING
+
+import attrs
+
+from leg_wear_monitor.monitor.encoders.clearance_estimate import ClearanceObservation
+from leg_wear_monitor.monitor.forecast.forecast import JointForecast, LegForecast
+from leg_wear_monitor.monitor.verdict.verdict import Figure, Verdict
+from leg_wear_monitor.playback.result.condition import JointClearance, LifeHours, life_hours
+
+if TYPE_CHECKING:
+    from leg_wear_monitor.playback.replay import ReplayResult
+
+
+def joint_forecast(told: JointForecast | None, verdict: Verdict) -> JointForecast | None:
+    """A joint's forecast; without its remaining life if the verdict does not believe that."""
+    if told is None or Figure.FORECAST not in verdict.not_valid:
+        return told
+    return attrs.evolve(told, cycles=None, hours=None, days=None)
+
+
+def leg_forecast(told: LegForecast | None, verdict: Verdict) -> LegForecast | None:
+    """The leg's forecast; without its remaining life if the verdict does not believe that."""
+    if told is None or Figure.FORECAST not in verdict.not_valid:
+        return told
+    return attrs.evolve(told, cycles=None, hours=None, days=None, first_probability={})
+
+
+def clearances(result: "ReplayResult") -> dict[str, JointClearance]:
+    """Clearance of each joint, as counted and as encoders show it."""
+    monitor, last = result.monitor, result.history.last
+    limits = dict(zip(monitor.clearance_joints, monitor.clearance_limits_m, strict=True))
+    found = {}
+    for joint in last.joints if last else ():
+        seen = joint.seen if joint.seen and joint.seen.observation is ClearanceObservation.SEEN else None
+        found[joint.joint] = JointClearance(
+            counted_m=joint.clearance_m,
+            seen_m=seen.clearance_m if seen else None,
+            seen_sigma_m=seen.sigma_m if seen else None,
+            seen_by=("encoders",) if seen else (),
+            new_m=monitor.mechanism.clearances[joint.joint].radial_clearance,
+            limit_m=limits[joint.joint],
+        )
+    return found
+
+
+def life(result: "ReplayResult", verdict: Verdict) -> dict[str, LifeHours | None]:
+    """Remaining life of each joint and of the leg; None where it is not known or not believed."""
+    last = result.history.last
+    if last is None:
+        return {}
+    joints = {joint.joint: joint_forecast(joint.forecast, verdict) for joint in last.joints}
+    told: dict[str, JointForecast | LegForecast | None] = {**joints}
+    told["leg"] = leg_forecast(last.forecast, verdict)
+    return {name: life_hours(each.hours) if each else None for name, each in told.items()}

@@ -1,0 +1,43 @@
+"""Condition of the leg after a replay: clearance of each joint as counted and as seen, remaining life."""
+
+import attrs
+
+from leg_wear_monitor.monitor.forecast.forecast import Quantiles
+
+
+@attrs.frozen(kw_only=True)
+class JointClearance:
+    """Mean radial clearance of a joint [m]; None for what is not known.
+
+    Attributes
+    ----------
+    counted_m : float
+        Clearance when new, plus the wear counted since.
+    seen_m, seen_sigma_m : float or None
+        Clearance that measurements of the gait show, and its standard deviation.
+    seen_by : tuple of str
+        What shows it, such as ``encoders``.
+    new_m, limit_m : float
+        Clearance when new, and its limit.
+    """
+
+    counted_m: float
+    seen_m: float | None = None
+    seen_sigma_m: float | None = None
+    seen_by: tuple[str, ...] = ()
+    new_m: float
+    limit_m: float
+
+
+@attrs.frozen(kw_only=True)
+class LifeHours:
+    """Hours of walking that are not exceeded with a probability of 10, 50 and 90 %."""
+
+    p10_h: float
+    p50_h: float
+    p90_h: float
+
+
+def life_hours(hours: Quantiles | None) -> LifeHours | None:
+    """Quantiles of a remaining life; None if it is not known."""
+    return None if hours is None else LifeHours(p10_h=hours.p10, p50_h=hours.p50, p90_h=hours.p90)

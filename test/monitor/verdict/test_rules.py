@@ -1,0 +1,310 @@
+"""The verdict as a pure function: a list of cases, and laws over all alarms."""
+
+import math
+import re
+from pathlib import Path
+from typing import Any
+
+import attrs
+import pytest
+from hypothesis import given
+from hypothesis import strategies as st
+
+from leg_wear_monitor.monitor.alarms.alarm import Alarm, Level
+from leg_wear_monitor.monitor.alarms.words import ADVICE
+from leg_wear_monitor.monitor.config.parameters import config_from
+from leg_wear_monitor.monitor.diagnosis.diagnosis import Cause, Change, Diagnosis, DiagnosisState
+from leg_wear_monitor.monitor.evaluation import specs
+from leg_wear_monitor.monitor.evaluation.board import AlarmBoard
+from leg_wear_monitor.monitor.verdict.alarm_rules import OF_A_JOINT
+from leg_wear_monitor.monitor.verdict.rules import RULES, findings
+from leg_wear_monitor.monitor.verdict.situation import JointSituation, SeenClearance, Situation
+from leg_wear_monitor.monitor.verdict.verdict import (
+    Figure,
+    Finding,
+    State,
+    Verdict,
+    dated,
+    has_changed,
+    verdict_of,
+)
+
+pytestmark = pytest.mark.plain
+
+JOINTS = ("A", "G")
+NEW = tuple(JointSituation(joint=joint, counted_m=3.0e-4, limit_m=6.0e-4) for joint in JOINTS)
+HEALTHY = Situation(joints=NEW, mismatch=0.031, mismatch_limit=0.1)
+BOARD = AlarmBoard(config_from({"encoders.names": ["knee"], "encoders.joints": ["G"]}), JOINTS)
+
+
+def judged(**changed: Any) -> Verdict:
+    return verdict_of(findings(attrs.evolve(HEALTHY, **changed)))
+
+
+def alarm(name: str, level: Level = Level.ERROR, present: Level | None = None, **values: float) -> Alarm:
+    one = BOARD.alarms[name]
+    values = {"value": 2.0, "limit": 1.0, "worst": 2.0, "raised_ns": 77} | values
+    return attrs.evolve(one, level=level, present=level if present is None else present, **values)
+
+
+def change(cause: Cause, subject: str = "", **values: Any) -> Change:
+    values = {"value": 6.2e-4, "sigma": 3.0e-5, "counted": 3.0e-4, "since_ns": 55, "log_odds": 30.0} | values
+    return Change(cause=cause, subject=subject, **values)
+
+
+def diagnosis(*changes: Change) -> Diagnosis:
+    return Diagnosis(state=DiagnosisState.CHANGED, changes=changes)
+
+
+def seen(by: str, clearance_m: float, sigma_m: float, **more: Any) -> tuple[JointSituation, ...]:
+    return (NEW[0], attrs.evolve(NEW[1], seen=(SeenClearance(by, clearance_m, sigma_m),), **more))
+
+
+CASES = [
+    ({}, State.HEALTHY, "NONE", ()),
+    ({"alarms": (alarm("clearance G"),)}, State.STOP, "CLEARANCE_G", ()),
+    ({"alarms": (alarm("clearance G", Level.WARN),)}, State.WATCH, "ALARM_G", ()),
+    ({"alarms": (alarm("clearance A"), alarm("clearance G"))}, State.STOP, "CLEARANCE_A_G", ()),
+    ({"joints": seen("torque", 6.7e-4, 3.0e-5)}, State.STOP, "CLEARANCE_SEEN_G", tuple(Figure)),
+    ({"joints": seen("encoders", 6.2e-4, 3.0e-5)}, State.HEALTHY, "NONE", ()),  # not surely
+    ({"joints": (NEW[0], attrs.evolve(NEW[1], believed_m=6.1e-4))}, State.STOP, "CLEARANCE_BELIEVED_G", ()),
+    (
+        {"diagnosis": diagnosis(change(Cause.CLEARANCE, "G"))},
+        State.INSPECT,
+        "CLEARANCE_CHANGED_G",
+        tuple(Figure),
+    ),
+    ({"diagnosis": diagnosis(change(Cause.UNKNOWN))}, State.INSPECT, "MECHANISM_CHANGED", tuple(Figure)),
+    ({"diagnosis": diagnosis(change(Cause.MASS, "foot"))}, State.INSPECT, "MECHANISM_CHANGED", tuple(Figure)),
+    ({"diagnosis": diagnosis(change(Cause.SCALE))}, State.INSPECT, "TORQUE_SENSOR", ()),
+    ({"diagnosis": diagnosis(change(Cause.LAG))}, State.INSPECT, "TORQUE_SENSOR", ()),
+    ({"diagnosis": diagnosis(change(Cause.CRANK_OFFSET))}, State.INSPECT, "TORQUE_SENSOR", ()),
+    (
+        {"diagnosis": diagnosis(change(Cause.LOAD))},
+        State.WATCH,
+        "LOAD_CHANGED",
+        (Figure.GROWTH, Figure.IMPACT_FORCES, Figure.FORECAST),
+    ),
+    ({"diagnosis": diagnosis(change(Cause.FRICTION))}, State.WATCH, "FRICTION_CHANGED", ()),
+    ({"diagnosis": Diagnosis(state=DiagnosisState.AS_COUNTED)}, State.HEALTHY, "NONE", ()),
+    (
+        {"alarms": (alarm("clearance_departure G"),)},
+        State.INSPECT,
+        "CLEARANCE_DEPARTURE_G",
+        tuple(Figure),  # the forecast does not use what the encoders show
+    ),
+    (
+        {"alarms": (alarm("clearance_departure G"),), "joints": seen("encoders", 4.5e-4, 1e-5, is_used=True)},
+        State.INSPECT,
+        "CLEARANCE_DEPARTURE_G",
+        (Figure.CLEARANCES, Figure.GROWTH, Figure.IMPACT_FORCES),
+    ),
+    ({"alarms": (alarm("torque_mismatch", Level.WARN),)}, State.INSPECT, "TORQUE_MISMATCH", tuple(Figure)),
+    ({"alarms": (alarm("torque_mismatch"),)}, State.INSPECT, "TORQUE_MISMATCH", tuple(Figure)),
+    (
+        {"alarms": (alarm("torque_mismatch", present=Level.OK),)},  # latched
+        State.INSPECT,
+        "TORQUE_MISMATCH",
+        tuple(Figure),
+    ),
+    ({"alarms": (alarm("torque_bias"),)}, State.INSPECT, "TORQUE_INPUT", ()),
+    ({"alarms": (alarm("torque_lag", Level.WARN),)}, State.WATCH, "ALARM", ()),
+    ({"alarms": (alarm("impact_force A"),)}, State.INSPECT, "IMPACT_FORCE_A", ()),
+    ({"alarms": (alarm("growth A"),)}, State.INSPECT, "GROWTH_A", ()),
+    ({"alarms": (alarm("remaining_life A"),)}, State.INSPECT, "REMAINING_LIFE_A", ()),
+    (
+        {"unfollowed": "two series of crank angles"},
+        State.NOT_MONITORED,
+        "NOT_FOLLOWED",
+        (Figure.GROWTH, Figure.IMPACT_FORCES),
+    ),
+    (
+        {"alarms": (alarm("input_samples"),)},
+        State.NOT_MONITORED,
+        "BAD_INPUT",
+        (Figure.GROWTH, Figure.IMPACT_FORCES),
+    ),
+    ({"alarms": (alarm("input_samples", present=Level.OK),)}, State.WATCH, "ALARM", ()),
+    ({"alarms": (alarm("input_rate torque"),)}, State.WATCH, "ALARM", ()),
+    ({"doubts": ("the crank turns at 240 rpm",)}, State.NOT_MONITORED, "NOT_THIS_LEG", tuple(Figure)),
+    ({"has_cycle": False, "has_torque": False}, State.NOT_MONITORED, "NO_GAIT_CYCLE", ()),
+    ({"has_torque": False}, State.WATCH, "NO_DRIVE_TORQUE", ()),
+    ({"alarms": (alarm("input_torque"),)}, State.WATCH, "NO_DRIVE_TORQUE", ()),
+    ({"mismatch": math.nan}, State.WATCH, "TORQUE_NOT_COMPARED", ()),
+    ({"is_out_of_step": True, "cadence_rpm": 70.0}, State.WATCH, "CADENCE", (Figure.FORECAST,)),
+    ({"alarms": (alarm("cadence"),)}, State.WATCH, "CADENCE", (Figure.FORECAST,)),
+    ({"encoder_faults": ("knee gives no angle",)}, State.WATCH, "ENCODER", ()),
+]
+
+
+@pytest.mark.parametrize(
+    ("changed", "state", "code", "not_valid"), CASES, ids=[f"{i}-{c[2]}" for i, c in enumerate(CASES)]
+)
+def test_each_case_has_its_verdict(
+    changed: dict[str, Any], state: State, code: str, not_valid: tuple[Figure, ...]
+) -> None:
+    verdict = judged(**changed)
+    assert (verdict.state, verdict.fault_code, verdict.not_valid) == (state, code, not_valid)
+    assert verdict.why and verdict.do and "{" not in verdict.words
+    assert verdict.joints == tuple(part for part in code.split("_") if part in JOINTS)
+
+
+def test_every_rule_is_the_verdict_of_some_case() -> None:
+    reached = {re.sub("(_[AG])+$", "", code) for _, _, code, _ in CASES}
+    assert {rule.code for rule in RULES} == reached
+
+
+def test_a_mismatch_without_a_diagnosis_is_told_as_what_it_is() -> None:
+    verdict = judged(
+        alarms=(alarm("torque_mismatch", value=0.35, limit=0.1),),
+        torque_causes=("drive_torque.sign is wrong",),
+    )
+    assert "the torque is not that of the counted leg, the forecast is not valid" in verdict.why
+    assert "0.35 of the predicted RMS is not explained, the limit is 0.1" in verdict.why
+    assert verdict.why.endswith("possible cause: drive_torque.sign is wrong")
+    assert "rock each joint" in verdict.do and "leg-wear-monitor measure JOINT MM" in verdict.do
+    (evidence,) = (each for each in verdict.evidence if each.name == "torque_mismatch")
+    assert (evidence.value, evidence.limit, verdict.since_ns) == (0.35, 0.1, 77)
+
+
+def test_a_diagnosis_names_the_joint_that_a_mismatch_does_not() -> None:
+    found = change(Cause.CLEARANCE, "G", runner_up="B 0.5 mm", runner_up_log_odds=1.0)
+    verdict = judged(alarms=(alarm("torque_mismatch"),), diagnosis=diagnosis(found))
+    assert (verdict.fault_code, verdict.joints, verdict.since_ns) == ("CLEARANCE_CHANGED_G", ("G",), 55)
+    assert "shows a clearance of 0.62 mm ± 0.03 mm in joint G, 0.3 mm is counted (or B 0.5 mm)" in verdict.why
+    assert "rock joint G" in verdict.do and "leg-wear-monitor measure G MM --sigma MM" in verdict.do
+
+
+def test_a_reason_to_stop_is_not_hidden_by_an_input_that_fails() -> None:
+    verdict = judged(alarms=(alarm("clearance G"),), unfollowed="the crank is not followed since 4 s")
+    assert verdict.state is State.STOP
+    assert verdict.why.endswith("the leg is not monitored now: the crank is not followed since 4 s")
+    assert verdict.not_valid == (Figure.GROWTH, Figure.IMPACT_FORCES)
+
+
+def test_a_latched_alarm_is_told_with_its_worst_value_and_as_past() -> None:
+    verdict = judged(alarms=(alarm("impact_force A", present=Level.OK, value=3.0, worst=1234.5),))
+    assert "is 1234 N" in verdict.why and "(since 0.000 s; within its limit again now)" in verdict.why
+
+
+def test_encoders_on_all_joints_observe_the_leg_without_a_drive_torque() -> None:
+    eyes = (SeenClearance("encoders", 3.0e-4, 1.0e-5),)
+    verdict = judged(has_torque=False, joints=tuple(attrs.evolve(each, seen=eyes) for each in NEW))
+    assert (verdict.state, verdict.why) == (
+        State.HEALTHY,
+        "no alarm is raised, and the encoders show the counted clearances",
+    )
+    some = judged(has_torque=False, joints=(attrs.evolve(NEW[0], seen=eyes), NEW[1]))
+    assert (some.state, some.why) == (State.WATCH, "joints cannot be observed (G): no drive torque")
+
+
+def test_a_healthy_leg_is_told_that_no_alarm_is_no_proof() -> None:
+    verdict = judged()
+    assert ADVICE in verdict.do
+    assert "0.031 of its RMS is not explained, the limit is 0.1" in verdict.why
+
+
+def test_every_alarm_of_a_board_has_a_verdict_and_its_kind_is_known() -> None:
+    for name, one in BOARD.alarms.items():
+        verdict = judged(alarms=(alarm(name, Level.WARN),))
+        assert verdict.state is not State.HEALTHY, name
+        assert {one.subject} & set(JOINTS) == set(verdict.joints), name
+    assert {spec.kind for spec in (*specs.JOINT, *specs.ENCODERS)} == set(OF_A_JOINT)
+    for level in (Level.WARN, Level.ERROR):
+        raised = {judged(alarms=(alarm(name, level),)).fault_code for name in BOARD.alarms}
+        assert "NONE" not in raised
+
+
+levels = st.sampled_from(Level)
+raised_alarms = st.lists(
+    st.builds(
+        lambda name, level, present: alarm(name, level, min(level, present)),
+        st.sampled_from(sorted(BOARD.alarms)),
+        levels,
+        levels,
+    ),
+    max_size=6,
+    unique_by=lambda one: one.name,
+)
+situations = st.sampled_from([case[0] for case in CASES if "alarms" not in case[0]])
+
+
+@given(situations, raised_alarms)
+def test_a_further_alarm_never_makes_the_verdict_better(changed: dict[str, Any], alarms: list[Alarm]) -> None:
+    severity, not_valid = -1, set()
+    for count in range(len(alarms) + 1):
+        verdict = judged(**changed, alarms=tuple(alarms[:count]))
+        assert verdict.state.severity >= severity
+        assert set(verdict.not_valid) >= not_valid
+        severity, not_valid = verdict.state.severity, set(verdict.not_valid)
+
+
+@given(situations, raised_alarms)
+def test_the_verdict_is_the_worst_of_its_findings_and_holds_all_evidence(
+    changed: dict[str, Any], alarms: list[Alarm]
+) -> None:
+    found = findings(attrs.evolve(HEALTHY, **changed, alarms=tuple(alarms)))
+    verdict = verdict_of(found)
+    assert verdict.state.severity == max(finding.state.severity for finding in found)
+    assert set(verdict.not_valid) == {figure for finding in found for figure in finding.not_valid}
+    names = [each.name for each in verdict.evidence]
+    assert len(set(names)) == len(names)
+    assert set(names) == {each.name for finding in found for each in finding.evidence}
+    assert {each.name for each in alarms if each.level} <= set(names)
+    assert verdict_of(found[::-1]).state is verdict.state
+
+
+def test_a_finding_keeps_the_stamp_since_which_it_holds() -> None:
+    found = findings(attrs.evolve(HEALTHY, has_torque=False))
+    first = dated(found, (), 10)
+    assert [finding.since_ns for finding in first] == [10] * len(found)
+    assert dated(found, first, 20) == first
+    assert verdict_of(dated(findings(HEALTHY), first, 30)).since_ns == 30
+    own = dated([Finding(code="X", state=State.STOP, why="w", do="d", since_ns=3)], first, 30)
+    assert own[0].since_ns == 3
+
+
+def test_values_alone_are_no_change() -> None:
+    before = judged(alarms=(alarm("impact_force A"),))
+    assert not has_changed(before, judged(alarms=(alarm("impact_force A", value=9.0),)))
+    assert has_changed(before, judged(alarms=(alarm("impact_force G"),)))
+    assert has_changed(before, judged(alarms=(alarm("impact_force A"), alarm("cadence"))))  # no forecast
+    assert has_changed(None, before)
+
+
+def test_a_verdict_is_plain_data() -> None:
+    record = judged(diagnosis=diagnosis(change(Cause.CLEARANCE, "G"))).to_dict()
+    assert record["state"] == "inspect" and record["joints"] == ["G"]
+    assert record["evidence"][0] == {
+        "name": "clearance G by torque",
+        "value": 6.2e-4,
+        "limit": None,
+        "unit": "m",
+    }
+    assert record["not_valid"] == ["clearances", "growth", "impact_forces", "forecast"]
+
+
+# --- the page ---
+
+PAGE = Path(__file__).parents[3] / "docs" / "monitor.md"
+TABLE = re.compile(r"(<!-- verdicts -->\n).*?(<!-- end -->)", re.DOTALL)
+
+
+def renewed(page: str) -> str:
+    rows = ["| `fault_code` | state | reason | figures that do not hold |", "|---|---|---|---|"]
+    for rule in RULES:
+        figures = ", ".join(figure.value for figure in rule.not_valid)
+        why = re.sub(r"\{(\w+)\}", r"*\1*", rule.why.replace("{past}", "").replace("{causes}", ""))
+        rows.append(f"| `{rule.code}` | {rule.state.value} | {why} | {figures} |")
+    table = "\n".join([*rows, ""])
+    return TABLE.sub(lambda found: found[1] + table + found[2], page)
+
+
+def test_the_page_lists_every_rule_as_it_is_declared() -> None:
+    page = PAGE.read_text(encoding="utf-8")
+    assert "<!-- verdicts -->" in page
+    assert renewed(page) == page
+
+
+if __name__ == "__main__":
+    PAGE.write_text(renewed(PAGE.read_text(encoding="utf-8")), encoding="utf-8")

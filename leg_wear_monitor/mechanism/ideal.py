@@ -72,9 +72,12 @@ def ideal_motion(
     return _motion(linkage, angles, positions(linkage, angles), speed, acceleration)
 
 
-def one_cycle(linkage: Linkage, points: int, speed: float) -> IdealMotion:
-    """Ideal motion at ``points`` equal steps of one crank turn from angle 0, at a constant speed [rad/s]."""
-    return _motion(linkage, _even_angles(points), _one_cycle_positions(linkage, points), speed, 0.0)
+def one_cycle(linkage: Linkage, points: int, speed: float, acceleration: float = 0.0) -> IdealMotion:
+    """Ideal motion at ``points`` equal steps of one crank turn from angle 0.
+
+    The speed [rad/s] and the acceleration [rad/s^2] are the same at every step.
+    """
+    return _motion(linkage, _even_angles(points), _one_cycle_positions(linkage, points), speed, acceleration)
 
 
 def check_cycle(linkage: Linkage) -> None:

@@ -48,14 +48,8 @@ class FootLoad:
         self._parts: list[tuple[NDArray[Any], ...]] = []
         mechanism = linkage.mechanism
         if mechanism.toe is not None:
-            up = _up(mechanism)
-            position, velocity, _ = point_motion(one_cycle(linkage, POINTS, 1.0), linkage, *mechanism.toe)
-            fraction = _load_fraction(position @ up, shape)
-            phases = np.arange(POINTS + 1) / POINTS * _PHASES
-            along = np.interp(phases, np.arange(_PHASES + 1), np.append(fraction, fraction[0]))
-            self.signature[:-1] = -along[:-1] * (velocity @ up)
-            self.signature[-1] = self.signature[0]
-            loaded = build_linkage(_loaded(mechanism, _TRIAL_N * fraction[:, None] * up))
+            self.signature, fraction = load_signature(linkage, shape)
+            loaded = build_linkage(_loaded(mechanism, _TRIAL_N * fraction[:, None] * _up(mechanism)))
             self._find_parts(build_tables(loaded, contacts))
 
     def _find_parts(self, loaded: ClearanceTables) -> None:
@@ -75,6 +69,23 @@ class FootLoad:
         self._load = load
         for flat, columns, bare, slope in self._parts:
             flat[:, columns] = bare + load * slope
+
+
+def load_signature(linkage: Linkage, shape: str = STANCE) -> tuple[Floats, Floats]:
+    """Drive torque by a unit load up at the toe (POINTS + 1,) [N m/N], and the load's fraction (_PHASES,).
+
+    Zeros for a mechanism without a toe.
+    """
+    mechanism = linkage.mechanism
+    if mechanism.toe is None:
+        return np.zeros(POINTS + 1), np.zeros(_PHASES)
+    up = _up(mechanism)
+    position, velocity, _ = point_motion(one_cycle(linkage, POINTS, 1.0), linkage, *mechanism.toe)
+    fraction = _load_fraction(position @ up, shape)
+    phases = np.arange(POINTS) / POINTS * _PHASES
+    along = np.interp(phases, np.arange(_PHASES + 1), np.append(fraction, fraction[0]))
+    signature = -along * (velocity @ up)
+    return np.append(signature, signature[0]), fraction
 
 
 def torque_size(linkage: Linkage, speed: float) -> float:

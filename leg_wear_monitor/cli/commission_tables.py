@@ -1,0 +1,65 @@
+"""A proposal of parameters as text."""
+
+import math
+from typing import TYPE_CHECKING
+
+from rich.console import Console
+from rich.table import Table
+
+from leg_wear_monitor.cli.tables import figure
+from leg_wear_monitor.errors import printable
+
+if TYPE_CHECKING:
+    from leg_wear_monitor.commissioning.result import Commissioning, Item
+
+
+def print_commissioning(result: "Commissioning") -> None:
+    """Print what was found, what cannot be told, and what does not fit."""
+    console = Console(highlight=False, markup=False)
+    console.print(f"\nfrom {result.turns:.3g} turns of the crank\n")
+    console.print(_table(result))
+    console.print("\nmismatch: RMS of the torque that stays unexplained, as a fraction of the torque's\n")
+    texts = (
+        ("not enough to tell", result.not_told),
+        ("does not fit", result.findings),
+        ("note", result.notes),
+    )
+    for label, told in texts:
+        for text in told:
+            console.print(f"{label}: {printable(text)}", soft_wrap=True)
+    if result.config is None:
+        console.print("no parameters are proposed, since a choice between them is not sure")
+
+
+def _table(result: "Commissioning") -> Table:
+    table = Table(box=None, pad_edge=False, padding=(0, 1), header_style="bold")
+    table.add_column("\nparameter", no_wrap=True)
+    table.add_column("\nvalue", overflow="fold", min_width=12)
+    table.add_column("\n±", justify="right", no_wrap=True)
+    table.add_column("mis-\nmatch", justify="right", no_wrap=True)
+    table.add_column("\nrunner-up", overflow="fold", min_width=9)
+    table.add_column("mis-\nmatch", justify="right", no_wrap=True)
+    for item in result.items:
+        table.add_row(*_cells(item))
+    return table
+
+
+def _cells(item: "Item") -> list[str]:
+    return [
+        item.name,
+        f"{_shown(item.value)} {item.unit}".strip() if _is_known(item.value) else "-",
+        "" if item.sigma is None else figure(item.sigma),
+        "" if item.mismatch is None else f"{item.mismatch:.3f}",
+        "" if item.other is None else _shown(item.other),
+        "" if item.other_mismatch is None else f"{item.other_mismatch:.3f}",
+    ]
+
+
+def _is_known(value: str | int | float) -> bool:
+    return not isinstance(value, float) or math.isfinite(value)
+
+
+def _shown(value: str | int | float) -> str:
+    if isinstance(value, str):
+        return printable(value, 60)
+    return str(value) if isinstance(value, int) else f"{value:.5g}"

@@ -1,0 +1,1 @@
+"""Commissioning: the parameters of a robot from a recording of its healthy leg."""

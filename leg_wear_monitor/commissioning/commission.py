@@ -1,0 +1,163 @@
+"""Commissioning: recordings of a healthy leg in, proposed parameters out."""
+
+from collections.abc import Callable, Iterable
+from pathlib import Path
+
+import attrs
+
+from leg_wear_monitor.bags.findings import Finding
+from leg_wear_monitor.commissioning.choice import Choice, choose
+from leg_wear_monitor.commissioning.findings import findings, not_told, notes
+from leg_wear_monitor.commissioning.fit import Fit, fit
+from leg_wear_monitor.commissioning.misfit import Load, with_load
+from leg_wear_monitor.commissioning.motion import JointMotion, motion_of, why_not_a_crank
+from leg_wear_monitor.commissioning.proposal import Found, changes, items
+from leg_wear_monitor.commissioning.reading import read_signals
+from leg_wear_monitor.commissioning.regression import Terms
+from leg_wear_monitor.commissioning.result import Commissioning
+from leg_wear_monitor.commissioning.search import candidates
+from leg_wear_monitor.commissioning.signals import JointName, Series, Signals, TorqueSource
+from leg_wear_monitor.commissioning.timing import sampling_of, separates_lag
+from leg_wear_monitor.commissioning.torque_model import TorqueModel, torque_model
+from leg_wear_monitor.errors import LegWearError
+from leg_wear_monitor.mechanism.loader import load_mechanism
+from leg_wear_monitor.mechanism.spec import Mechanism
+from leg_wear_monitor.monitor.config.fitting import fitted
+from leg_wear_monitor.monitor.config.parameters import config_from, values_of
+from leg_wear_monitor.monitor.config.settings import MonitorConfig
+
+_LEAST_S = 10.0  # ten turns at 60 rpm
+
+
+def commission(
+    paths: Iterable[str | Path],
+    config: MonitorConfig | None = None,
+    *,
+    joint_states: str | None = None,
+    drive_torque: str | None = None,
+    crank_joint: str | None = None,
+    progress: Callable[[float], None] = lambda _fraction: None,
+) -> tuple[Commissioning, list[Finding]]:
+    """Propose the parameters of a robot from recordings of its healthy leg.
+
+    Parameters
+    ----------
+    paths : iterable
+        MCAP and .db3 files, bag directories.
+    config : MonitorConfig, optional
+        Names the mechanism; keeps what commissioning does not measure.
+    joint_states, drive_torque : str, optional
+        Topics; default: all are tried.
+    crank_joint : str, optional
+        Joint; default: all are tried.
+    progress : callable
+        Takes the fraction done.
+
+    Returns
+    -------
+    result : Commissioning
+    findings : list of Finding
+        Faults of the recordings.
+
+    Raises
+    ------
+    RecordingError
+        If a recording cannot be read.
+    LegWearError
+        If it has no torque, no joint that turns on and on, or is too short.
+    """
+    base = config or MonitorConfig()
+    mechanism = fitted(load_mechanism(base.mechanism), base)
+    signals, faults = read_signals(
+        paths, joint_states=joint_states, drive_torque=drive_torque, progress=lambda f: progress(0.5 * f)
+    )
+    result = propose(signals, mechanism, base, crank_joint, lambda f: progress(0.5 + 0.5 * f))
+    return result, faults
+
+
+def propose(
+    signals: Signals,
+    mechanism: Mechanism,
+    base: MonitorConfig,
+    crank_joint: str | None = None,
+    progress: Callable[[float], None] = lambda _fraction: None,
+) -> Commissioning:
+    """Propose parameters from what was recorded; see `commission`."""
+    motions = _cranks(signals.joints, crank_joint)
+    torques = _torques(signals.torques)
+    model = torque_model(mechanism)
+    found = candidates(motions, torques, model, progress)
+    if not found:
+        raise LegWearError(
+            "no torque was recorded while a joint turned steadily for five turns of a crank: record a minute "
+            "of walking at a steady cadence"
+        )
+    choice = choose(found)
+    one, load = _final(choice, model)
+    separated = separates_lag(one.pair)
+    facts = Found(choice, one, motions[choice.best.joint], sampling_of(one, separated), separated, base)
+    return _result(facts, load, mechanism)
+
+
+def _result(facts: Found, load: Load | None, mechanism: Mechanism) -> Commissioning:
+    told = items(facts)
+    proposed = None
+    if not facts.choice.doubts:
+        proposed = config_from({**values_of(facts.base), **changes(told)}, "commission")
+    return Commissioning(
+        items=tuple(told),
+        not_told=not_told(facts),
+        findings=findings(facts, load, mechanism),
+        notes=notes(facts),
+        config=proposed,
+        turns=facts.fit.turns,
+    )
+
+
+def _final(choice: Choice, model: TorqueModel) -> tuple[Fit, Load | None]:
+    """The chosen fit again, with the terms that the recording can tell."""
+    one = choice.best.fit
+    terms = Terms(bias=one.pair.walks_both_ways, lag=separates_lag(one.pair))
+    start = attrs.evolve(one.start, ratio=one.ratio, offset_rad=one.offset_rad[one.start.recording])
+    again = fit(one.pair, model, start, terms, with_errors=True)
+    return with_load(again, model, terms)
+
+
+def _cranks(joints: dict[JointName, Series], wanted: str | None) -> dict[JointName, JointMotion]:
+    """Motions of the joints that turn on and on."""
+    if wanted is not None and wanted not in {name.joint for name in joints}:
+        known = ", ".join(sorted({name.joint for name in joints})) or "none"
+        raise LegWearError(f"--crank-joint: {wanted!r} is not a joint of the recording, it has {known}")
+    reasons, motions = [], {}
+    for name, each in joints.items():
+        if wanted not in (None, name.joint):
+            continue
+        why = why_not_a_crank(each)
+        if why:
+            reasons.append(f"{name.joint} {why}")
+        elif each.time_s[-1] - each.time_s[0] < _LEAST_S:
+            duration = each.time_s[-1] - each.time_s[0]
+            reasons.append(
+                f"{name.joint} was recorded for {duration:.3g} s only, expected at least {_LEAST_S:g} s"
+            )
+        else:
+            motions[name] = motion_of(each)
+    if not motions:
+        raise LegWearError(
+            f"no joint turns on and on like a crank: {'; '.join(reasons) or 'there is no joint'}"
+        )
+    return motions
+
+
+def _torques(torques: dict[TorqueSource, Series]) -> dict[TorqueSource, Series]:
+    """Torques that are not constant."""
+    if not torques:
+        raise LegWearError(
+            "no torque was recorded: expected geometry_msgs/msg/WrenchStamped, std_msgs/msg/Float64, or the "
+            "effort of the crank in its sensor_msgs/msg/JointState"
+        )
+    varying = {name: each for name, each in torques.items() if float(each.value.std()) > 0.0}
+    if not varying:
+        constant = ", ".join(name.label for name in torques)
+        raise LegWearError(f"no torque changes while the leg walks: {constant}")
+    return varying

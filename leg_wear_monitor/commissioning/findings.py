@@ -1,0 +1,147 @@
+"""Sentences on what cannot be told, on what does not fit, and on what is worth knowing."""
+
+import math
+from collections.abc import Iterator
+
+from leg_wear_monitor.commissioning.misfit import Load, does_not_fit
+from leg_wear_monitor.commissioning.proposal import Found, gear, gear_error, offset_rad
+from leg_wear_monitor.commissioning.search import repeating
+from leg_wear_monitor.commissioning.signals import FLOAT64
+from leg_wear_monitor.commissioning.timing import cadences_rpm, lag_error_s
+from leg_wear_monitor.mechanism.ideal import TURN
+from leg_wear_monitor.mechanism.spec import Mechanism
+from leg_wear_monitor.twin.settings import AVERAGE
+
+_SURE = 3.0
+_ANEW_RAD = 0.1  # by which offsets of two recordings of one absolute encoder do not differ
+_IN_DEGREES = math.degrees(1.0)
+_ROUGH_SCALE = 0.05
+_ROUGH_REST = 0.15  # a repeating rest that may shift the scale by more than twice what clearances do
+_AT_ZERO_RAD = 0.02
+
+
+def not_told(found: Found) -> tuple[str, ...]:
+    """What the recording is not enough to tell, and why."""
+    told = list(found.choice.doubts)
+    if not found.sampling.value:
+        told.append(f"drive_torque.sampling and lag: {found.sampling.why}")
+    ratio, is_exact = gear(found)
+    if not is_exact:
+        error = found.fit.sigma["ratio"] / abs(found.fit.ratio)
+        away = error * abs(float(found.fit.crank()[1].mean())) * 3600.0
+        told.append(
+            f"crank.gear_ratio: {ratio:.7g} is known to ± {error * ratio:.2g}, by which the crank angle runs "
+            f"away by {away:.2g} rad in an hour; enter the ratio of the teeth"
+        )
+    scale, rest = found.fit.sigma["gain"] / abs(found.fit.gain), repeating(found.fit)
+    if scale > _ROUGH_SCALE:
+        told.append(f"drive_torque.scale: known to ± {100.0 * scale:.0f} % only; record longer")
+    elif rest > _ROUGH_REST:
+        told.append(
+            f"drive_torque.scale: {100.0 * rest:.0f} % of the torque repeats and does not fit, by as much "
+            "the scale may be wrong"
+        )
+    return tuple(told)
+
+
+def findings(found: Found, load: Load | None, mechanism: Mechanism) -> tuple[str, ...]:
+    """What does not fit, or cannot be used as it is."""
+    return tuple(
+        text
+        for text in (
+            _load(load),
+            "" if found.choice.doubts else does_not_fit(found.fit, mechanism),
+            _drives(found),
+            _late(found),
+            _anew(found),
+            _position(found),
+        )
+        if text
+    )
+
+
+def notes(found: Found) -> tuple[str, ...]:
+    """What is worth knowing."""
+    return tuple(_notes(found))
+
+
+def _load(load: Load | None) -> str:
+    if load is None:
+        return ""
+    return (
+        f"a foot load of {load.force_n:.3g} N ± {load.sigma_n:.2g} N explains {100.0 * load.explained:.0f} % "
+        "of what does not fit; the proposal allows for it, but record with the foot in the air"
+    )
+
+
+def _drives(found: Found) -> str:
+    one = found.fit
+    friction, sigma = one.linear["friction"] / one.gain, one.sigma["friction"] / abs(one.gain)
+    size = float(one.predicted.std()) / abs(one.gain)
+    if friction < -_SURE * sigma and abs(friction) > 0.02 * size:
+        return (
+            f"a constant torque of {abs(friction):.2g} N m drives the crank, which friction cannot: zero the "
+            "torque sensor"
+        )
+    return ""
+
+
+def _late(found: Found) -> str:
+    if not found.is_lag_separated:
+        return ""
+    one, most = found.fit, found.base.drive_torque.max_lag_s
+    late = one.lag_s - (0.5 * one.pair.interval_s if found.used_sampling == AVERAGE else 0.0)
+    if abs(late) - _SURE * lag_error_s(one) <= most:
+        return ""
+    return (
+        f"the torque is late by {1.0e3 * late:.3g} ms, more than drive_torque.max_lag_s, {1.0e3 * most:g} ms"
+    )
+
+
+def _anew(found: Found) -> str:
+    offsets = [offset_rad(found, number) for number in sorted(found.fit.offset_rad)]
+    apart = max(abs((each - offsets[0] + math.pi) % TURN - math.pi) for each in offsets)
+    if apart < _ANEW_RAD:
+        return ""
+    each = ", ".join(f"{offset:.3f}" for offset in offsets)
+    return (
+        f"the encoder starts anew in each recording: its offsets, found again from the torque's phase, are "
+        f"{each} rad; the proposed one is that of the last recording and holds until the next boot"
+    )
+
+
+def _position(found: Found) -> str:
+    measured = found.fit.gear_ratio
+    if abs(measured / _IN_DEGREES - 1.0) < 2.0 * gear_error(found.fit):
+        return "the joint's position looks like degrees, ROS expects radians: gear ratio 57.2958"
+    if found.motion.is_wrapped and gear(found)[0] != 1.0:
+        return (
+            f"the joint's position is wrapped to a turn, but its gear ratio is {measured:.6g}: the monitor "
+            "needs a continuous position"
+        )
+    return ""
+
+
+def _notes(found: Found) -> Iterator[str]:
+    yield from found.choice.also
+    ratio = gear(found)[0]
+    if ratio != 1.0 and len(found.fit.offset_rad) == 1:
+        is_zero = bool(abs(found.motion.first_rad[-1]) < _AT_ZERO_RAD)
+        seems = "its first reading is 0 as if it did" if is_zero else "a motor's often does"
+        yield (
+            f"the encoder turns {ratio:.6g} times in a turn of the crank; if it starts at zero at each boot "
+            f"({seems}), the offset, found here from the torque's phase, holds until the next boot; then run "
+            "commission again"
+        )
+    for topic, name in (
+        (found.best.joint.topic, "joint_states"),
+        (found.best.torque.topic, "drive_torque"),
+    ):
+        if topic != f"/{name}" and not (name == "drive_torque" and topic == found.best.joint.topic):
+            yield f"start the monitor with -r {name}:={topic}, replay with --{name.replace('_', '-')} {topic}"
+    if found.best.torque.source == FLOAT64:
+        yield "a Float64 has no stamp: the torque's time is that of its arrival, so its lag counts"
+    speeds = cadences_rpm(found.fit)
+    if len(speeds) > 1:
+        each = " and ".join(f"{speed:g}" for speed in speeds)
+        yield f"the leg walks at about {each} rpm; cadence.commanded_rpm is that of most of the time"

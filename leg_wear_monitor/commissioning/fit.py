@@ -1,0 +1,164 @@
+"""Least squares (Gauss-Newton) of gear ratio, offset, lag, scale, friction, bias and foot load."""
+
+import math
+
+import attrs
+import numpy as np
+
+from leg_wear_monitor.commissioning.blocks import Blocks, blocks_of
+from leg_wear_monitor.commissioning.gear_scan import Start
+from leg_wear_monitor.commissioning.pairing import Pair
+from leg_wear_monitor.commissioning.regression import State, Terms, begin, columns, jackknife, least_squares
+from leg_wear_monitor.commissioning.torque_model import TorqueModel
+from leg_wear_monitor.mechanism.arrays import Floats
+from leg_wear_monitor.mechanism.ideal import TURN
+
+_STEPS = 15
+_LONGEST_STEP_RAD = 0.2  # of the phase in one step, half a radian of the torque's third harmonic
+_DONE_RAD = 1.0e-6
+_NO_TERMS = Terms()
+
+
+@attrs.frozen(eq=False)
+class Fit:
+    """What fits best, near a start.
+
+    Attributes
+    ----------
+    ratio : float
+        Turns of the crank per turn of the joint, negative if it turns against it.
+    offset_rad : dict of int to float
+        Crank angle at joint position 0, of each recording, from -pi to pi.
+    linear : dict of str to float
+        By name: ``gain`` (measured torque per torque on the crank, negative for a negative sign),
+        ``friction`` and ``bias`` (constant along the motion, and constant) in the sensor's unit, ``load``
+        (``gain`` times the foot load [N]).
+    lag_s : float
+        Time by which the torque is late [s].
+    sigma : dict of str to float
+        Standard deviations of ``ratio``, ``offset_rad``, ``lag_s`` and the linear terms; empty if not asked
+        for.
+    measured, predicted, rest : (m,) arrays
+        Torques of the blocks, in the sensor's unit; the prediction is that of the leg alone.
+    """
+
+    ratio: float
+    offset_rad: dict[int, float]
+    linear: dict[str, float]
+    lag_s: float
+    sigma: dict[str, float]
+    measured: Floats
+    predicted: Floats
+    rest: Floats
+    blocks: Blocks
+    pair: Pair
+    start: Start
+
+    @property
+    def gain(self) -> float:
+        """Measured torque per torque on the crank."""
+        return self.linear["gain"]
+
+    @property
+    def mismatch(self) -> float:
+        """RMS of the rest as a fraction of the RMS of the measured torque about its mean."""
+        return float(np.sqrt(np.mean(self.rest**2)) / self.measured.std())
+
+    @property
+    def direction(self) -> int:
+        """1 if the joint turns in the direction of the crank angle, else -1."""
+        return 1 if self.ratio > 0.0 else -1
+
+    @property
+    def torque_sign(self) -> int:
+        """1 if a positive torque drives the crank in its positive direction, else -1."""
+        return 1 if self.gain > 0.0 else -1
+
+    @property
+    def gear_ratio(self) -> float:
+        """Turns of the joint per turn of the crank."""
+        return 1.0 / abs(self.ratio)
+
+    @property
+    def turns(self) -> float:
+        """Turns of the crank from first to last sample of each recording, the longest way round."""
+        pair = self.pair
+        reach = sum(float(np.ptp(pair.position_rad[pair.recording == i])) for i in self.offset_rad)
+        return abs(self.ratio) * reach / TURN
+
+    def crank(self) -> tuple[Floats, Floats, Floats]:
+        """Angle, speed and acceleration of the crank when the torque was made, for each sample."""
+        pair = self.pair
+        offset = np.array([self.offset_rad[number] for number in pair.recording.tolist()])
+        angle = self.ratio * (pair.position_rad - self.lag_s * pair.speed_radps) + offset
+        speed = self.ratio * (pair.speed_radps - self.lag_s * pair.acceleration_radps2)
+        return angle, speed, self.ratio * pair.acceleration_radps2
+
+
+def fit(
+    pair: Pair, model: TorqueModel, start: Start, terms: Terms = _NO_TERMS, with_errors: bool = False
+) -> Fit:
+    """Best fit near a start; its standard deviations only if asked for, since they take long."""
+    blocks = blocks_of(pair, start.ratio)
+    measured = blocks.mean(pair.torque)
+    state = begin(pair, model, start)
+    reach = 0.5 * float(np.ptp(pair.position_rad))
+    for _ in range(_STEPS):
+        by_linear, by_motion = columns(pair, model, state, terms, blocks)
+        by_motion *= least_squares(by_linear, measured)[0]
+        moved = least_squares(np.concatenate([by_linear, by_motion]), measured)[len(by_linear) :]
+        if not _move(state, moved, terms, reach):
+            break
+    return _fit(state, terms, measured, blocks, pair, model, start, with_errors)
+
+
+def _move(state: State, moved: Floats, terms: Terms, reach: float) -> bool:
+    """Go a step of bounded length; whether it was worth it."""
+    k = len(state.phase)
+    longest = max(float(np.abs(moved[:k]).max()), reach * abs(float(moved[k])))
+    moved = moved * min(1.0, _LONGEST_STEP_RAD / max(longest, _DONE_RAD))
+    state.phase += moved[:k]
+    state.ratio += float(moved[k])
+    if terms.lag:
+        state.lag_s += float(moved[k + 1])
+    return longest > _DONE_RAD
+
+
+def _fit(
+    state: State,
+    terms: Terms,
+    measured: Floats,
+    blocks: Blocks,
+    pair: Pair,
+    model: TorqueModel,
+    start: Start,
+    with_errors: bool,
+) -> Fit:
+    by_linear, by_motion = columns(pair, model, state, terms, blocks)
+    linear = least_squares(by_linear, measured)
+    rest = measured - linear @ by_linear
+    by = np.concatenate([by_linear, linear[0] * by_motion])
+    sigma = _errors(by, rest, state, terms) if with_errors else {}
+    offset = (state.phase - state.ratio * state.middle + math.pi) % TURN - math.pi
+    return Fit(
+        ratio=state.ratio,
+        offset_rad=dict(zip(np.unique(pair.recording).tolist(), offset.tolist(), strict=True)),
+        linear=dict(zip(terms.linear, linear.tolist(), strict=True)),
+        lag_s=state.lag_s,
+        sigma=sigma,
+        measured=measured,
+        predicted=linear[0] * by_linear[0],
+        rest=rest,
+        blocks=blocks,
+        pair=pair,
+        start=start,
+    )
+
+
+def _errors(by: Floats, rest: Floats, state: State, terms: Terms) -> dict[str, float]:
+    """Standard deviations by name."""
+    names = (*terms.linear, *(f"phase {i}" for i in range(len(state.phase))), "ratio", "lag_s")
+    sigma = dict(zip(names, jackknife(by, rest).tolist(), strict=False))
+    phase = max(sigma[f"phase {i}"] for i in range(len(state.phase)))
+    sigma["offset_rad"] = math.hypot(phase, sigma["ratio"] * float(np.abs(state.middle).max()))
+    return sigma

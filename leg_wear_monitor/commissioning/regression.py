@@ -1,0 +1,111 @@
+"""Regression of measured on predicted torque: its columns, their least squares, standard deviations."""
+
+import attrs
+import numpy as np
+from numpy.typing import NDArray
+
+from leg_wear_monitor.commissioning.blocks import Blocks, blocks_of
+from leg_wear_monitor.commissioning.gear_scan import Start
+from leg_wear_monitor.commissioning.pairing import Pair
+from leg_wear_monitor.commissioning.torque_model import TorqueModel
+from leg_wear_monitor.mechanism.arrays import Floats
+from leg_wear_monitor.mechanism.ideal import TURN
+
+_STARTS = 128  # offsets tried for a recording that the start does not come from
+_CHUNKS = 12  # stretches of time, each left out once
+_SMALL = 1.0e-9
+
+
+@attrs.frozen
+class Terms:
+    """Terms of the regression beside gain, friction, ratio and offset."""
+
+    bias: bool = False
+    load: bool = False
+    lag: bool = False
+
+    @property
+    def linear(self) -> tuple[str, ...]:
+        """Names of the linear terms."""
+        return ("gain", "friction", *(name for name in ("bias", "load") if getattr(self, name)))
+
+
+@attrs.define(eq=False)
+class State:
+    """Parameters under way.
+
+    Attributes
+    ----------
+    ratio : float
+        Turns of the crank per turn of the joint.
+    phase, middle : (recordings,) array
+        Crank angle at a position in the middle of each recording, and that position [rad].
+    row : (n,) array of int
+        Recording of each sample, as an index of `phase`.
+    lag_s : float
+    """
+
+    ratio: float
+    phase: Floats
+    middle: Floats
+    row: NDArray[np.int64]
+    lag_s: float = 0.0
+
+
+def begin(pair: Pair, model: TorqueModel, start: Start) -> State:
+    """State at a start; the phases of other recordings are those that explain most."""
+    numbers, row = np.unique(pair.recording, return_inverse=True)
+    middle = np.array([np.median(pair.position_rad[row == i]) for i in range(len(numbers))])
+    phase = start.ratio * middle + start.offset_rad
+    for i, number in enumerate(numbers.tolist()):
+        if number != start.recording:
+            phase[i] = _phase(pair.part(row == i), model, start, float(middle[i]))
+    return State(start.ratio, phase, middle, row)
+
+
+def _phase(pair: Pair, model: TorqueModel, start: Start, middle: float) -> float:
+    blocks = blocks_of(pair, start.ratio)
+    measured = blocks.mean(pair.torque)
+    speed, acceleration = start.ratio * pair.speed_radps, start.ratio * pair.acceleration_radps2
+    explained = []
+    for i in range(_STARTS):
+        angle = start.ratio * (pair.position_rad - middle) + i * TURN / _STARTS
+        torque = blocks.mean(model.torque(angle, speed, acceleration)[0])
+        torque -= torque.mean()
+        explained.append(start.torque_sign * float(torque @ measured) / float(np.linalg.norm(torque)))
+    return int(np.argmax(explained)) * TURN / _STARTS
+
+
+def columns(
+    pair: Pair, model: TorqueModel, state: State, terms: Terms, blocks: Blocks
+) -> tuple[Floats, Floats]:
+    """Columns of the linear terms, and at unit gain of small changes of phases, ratio and lag, by block."""
+    late = pair.position_rad - state.lag_s * pair.speed_radps - state.middle[state.row]
+    speed = state.ratio * (pair.speed_radps - state.lag_s * pair.acceleration_radps2)
+    acceleration = state.ratio * pair.acceleration_radps2
+    angle = state.ratio * late + state.phase[state.row]
+    torque, slope = model.torque(angle, speed, acceleration)
+    linear = [torque, np.sign(speed)]
+    if terms.bias:
+        linear.append(np.ones_like(torque))
+    if terms.load:
+        linear.append(model.load_torque(angle))
+    moving = [np.where(state.row == i, slope, 0.0) for i in range(len(state.phase))]
+    moving.append(slope * late)
+    if terms.lag:
+        moving.append(-slope * speed)
+    return blocks.mean(np.array(linear)), blocks.mean(np.array(moving))
+
+
+def least_squares(by: Floats, measured: Floats) -> Floats:
+    """Coefficients (k,) of columns (k, m) that may be of very different size."""
+    size = np.linalg.norm(by, axis=1)
+    size[size < _SMALL * max(float(size.max()), _SMALL)] = np.inf
+    return np.asarray(np.linalg.lstsq((by / size[:, None]).T, measured, rcond=_SMALL)[0] / size)
+
+
+def jackknife(by: Floats, rest: Floats) -> Floats:
+    """Standard deviations (k,) of the coefficients, from leaving out each twelfth of the time in turn."""
+    chunk = np.arange(len(rest)) * _CHUNKS // max(len(rest), 1)
+    left_out = np.array([least_squares(by[:, chunk != i], rest[chunk != i]) for i in range(_CHUNKS)])
+    return np.asarray(np.sqrt((_CHUNKS - 1) * left_out.var(axis=0)))

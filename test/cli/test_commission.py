@@ -1,0 +1,43 @@
+"""`commission` on the healthy sample recording."""
+
+import json
+from pathlib import Path
+
+from leg_wear_monitor.monitor.config.parameter_file import load_config
+from leg_wear_monitor.share import share_directory
+
+HEALTHY = share_directory() / "bags" / "healthy.mcap"
+
+
+def test_the_sample_recording_gives_a_file_that_check_accepts(run, tmp_path: Path) -> None:
+    result = run("commission", str(HEALTHY), "--out", "monitor.yaml", "--json", "found.json")
+    assert result.exit_code == 1  # one cadence does not tell a lag from an offset
+    assert "not enough to tell: drive_torque.sampling" in result.stdout
+    assert "drive_torque.sign" in result.stdout
+    config = load_config(tmp_path / "monitor.yaml")
+    assert config.crank_joint == "crank"
+    assert (config.crank.sign, config.crank.gear_ratio) == (1, 1.0)
+    assert abs(config.crank.offset_rad) < 0.03
+    assert (config.drive_torque.source, config.drive_torque.axis, config.drive_torque.sign) == (
+        "wrench",
+        "z",
+        1,
+    )
+    assert config.cadence.commanded_rpm == 60.0
+    assert run("check", "monitor.yaml").exit_code == 0
+    found = json.loads((tmp_path / "found.json").read_text())
+    signs = next(item for item in found["items"] if item["name"] == "crank.sign")
+    assert signs["mismatch"] < 0.1 < 0.5 < signs["other_mismatch"]
+
+
+def test_a_missing_recording_is_one_line(run) -> None:
+    result = run("commission", "nowhere.mcap")
+    assert result.exit_code == 2
+    assert result.stderr.startswith("error: nowhere.mcap")
+    assert len(result.stderr.splitlines()) == 1
+
+
+def test_an_unknown_crank_is_named_with_the_joints_that_there_are(run) -> None:
+    result = run("commission", str(HEALTHY), "--crank-joint", "knee")
+    assert result.exit_code == 2
+    assert "'knee' is not a joint of the recording, it has crank" in result.stderr

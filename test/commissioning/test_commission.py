@@ -1,0 +1,272 @@
+"""A robot's signs, gear, offset, source and scale come back from a recording, or are not enough to tell."""
+
+import math
+from collections.abc import Callable
+from pathlib import Path
+from typing import Any
+
+import attrs
+import numpy as np
+import pytest
+
+from leg_wear_monitor import LegWearError, Mechanism, MonitorConfig
+from leg_wear_monitor.commissioning.commission import commission, propose
+from leg_wear_monitor.commissioning.result import Commissioning
+from leg_wear_monitor.commissioning.signals import (
+    EFFORT,
+    FLOAT64,
+    WRENCH,
+    JointName,
+    Series,
+    Signals,
+    TorqueSource,
+)
+from leg_wear_monitor.mechanism.ideal import TURN
+from leg_wear_monitor.monitor.config.fitting import fitted
+
+from .conftest import Robot, Walk, columns_of
+
+CRANK = JointName("/joint_states", "crank")
+SENSOR = TorqueSource(WRENCH, "/drive_torque", "z")
+# What clearances of 0.3 mm in five joints do to phase and torque, at 60 rpm in ten turns
+PHASE_RAD, TORQUE = 0.03, 0.05
+
+
+def random_robot(seed: int) -> Robot:
+    rng = np.random.default_rng(seed)
+    gear = float(rng.choice([1.0, 1.0, 0.5, 6.25, 9.0, 27.5, 50.0, 100.0]))
+    return Robot(
+        sign=int(rng.choice([1, -1])),
+        gear_ratio=gear,
+        offset_rad=float(rng.uniform(-3.0, 3.0)),
+        source=str(rng.choice([WRENCH, EFFORT, FLOAT64])),
+        axis=str(rng.choice(list("xyz"))),
+        torque_sign=int(rng.choice([1, -1])),
+        scale=float(rng.choice([1.0, 0.8, 4.448, 1.0e-3])),
+        angle_noise_rad=float(rng.choice([1.0e-4, 1.0e-3, 3.0e-3])),
+        torque_noise_nm=float(rng.choice([0.05, 0.3, 1.0])),
+        is_wrapped=gear == 1.0 and bool(rng.integers(2)),
+        seed=seed,
+    )
+
+
+def angle_between(a: float, b: float) -> float:
+    return abs((a - b + math.pi) % TURN - math.pi)
+
+
+def check(robot: Robot, result: Commissioning, seconds: float) -> None:
+    """All parameters are those of the robot; gear, offset and scale within the model's error."""
+    assert result.config is not None, result.not_told
+    crank, torque = result.config.crank, result.config.drive_torque
+    assert result.config.crank_joint == "crank"
+    assert (crank.sign, torque.sign) == (robot.sign, robot.torque_sign)
+    assert torque.source == robot.source
+    assert torque.axis == robot.axis or robot.source != WRENCH
+    assert torque.scale * torque.gear_ratio == pytest.approx(robot.scale, rel=TORQUE)
+    told = " ".join(result.not_told)
+    if "crank.gear_ratio" in told:
+        turned = TURN * seconds  # at 60 rpm
+        assert abs(crank.gear_ratio / robot.gear_ratio - 1.0) * turned < 2.0 * PHASE_RAD
+        return
+    assert crank.gear_ratio == robot.gear_ratio
+    assert angle_between(crank.offset_rad, robot.offset_rad) < PHASE_RAD
+
+
+@pytest.mark.parametrize(
+    "seed", [*range(2), *(pytest.param(seed, marks=pytest.mark.slow) for seed in range(2, 10))]
+)
+def test_ten_robots(
+    seed: int, walked: Walk, record: Callable[[Path, Robot, Walk], Path], tmp_path: Path
+) -> None:
+    robot = random_robot(seed)
+    result, faults = commission([record(tmp_path / "robot.mcap", robot, walked)])
+    assert not faults
+    check(robot, result, walked.time_s[-1])
+    assert not result.findings
+
+
+def signals_of(robot: Robot, walk: Walk) -> Signals:
+    position, torque = columns_of(robot, walk)
+    recording = np.zeros(len(position), np.int64)
+    joints = {CRANK: Series(walk.time_s, position, recording)}
+    return Signals(joints, {SENSOR: Series(walk.time_s, torque, recording)})
+
+
+@pytest.fixture
+def proposed(leg: Mechanism) -> Callable[..., Commissioning]:
+    """Propose parameters from signals in memory."""
+
+    def run(signals: Signals, crank_joint: str | None = None, **changes: Any) -> Commissioning:
+        base = attrs.evolve(MonitorConfig(), **changes)
+        return propose(signals, fitted(leg, base), base, crank_joint)
+
+    return run
+
+
+@pytest.mark.parametrize(
+    ("sign", "torque_sign", "rpm"), [(1, 1, 70.0), (1, -1, -70.0), (-1, 1, -70.0), (-1, -1, 70.0)]
+)
+def test_an_ideal_leg_gives_back_what_it_was_made_with(
+    sign: int,
+    torque_sign: int,
+    rpm: float,
+    ideal_walk: Callable[..., Walk],
+    proposed: Callable[..., Commissioning],
+) -> None:
+    robot = Robot(sign=sign, torque_sign=torque_sign, gear_ratio=31.0, offset_rad=2.0, torque_noise_nm=1.0e-3)
+    result = proposed(signals_of(robot, ideal_walk(rpm, friction_nm=0.5)))
+    assert result.config is not None
+    assert (result.config.crank.sign, result.config.drive_torque.sign) == (sign, torque_sign)
+    assert result.config.crank.gear_ratio == 31.0
+    # one cadence: averages are assumed, which are late by half of 5 ms
+    shift = rpm * TURN / 60.0 * 0.0025
+    assert angle_between(result.config.crank.offset_rad, 2.0 + shift) < 2.0e-3
+    assert result.item("friction").value == pytest.approx(0.5, abs=0.02)
+    assert result.config.cadence.commanded_rpm == pytest.approx(rpm, abs=1.0)
+
+
+def test_another_unit_of_the_torque_changes_the_scale_alone(
+    walked: Walk, proposed: Callable[..., Commissioning]
+) -> None:
+    one, other = (proposed(signals_of(Robot(scale=scale), walked)) for scale in (4.0, 4.0e-3))
+    for name in ("crank.offset_rad", "crank.gear_ratio", "drive_torque.sign"):
+        assert one.item(name).value == other.item(name).value
+    assert one.item("crank.sign").mismatch == pytest.approx(other.item("crank.sign").mismatch, rel=1.0e-6)
+    scales = [each.item("drive_torque.scale").value for each in (one, other)]
+    assert scales[0] == pytest.approx(1000.0 * float(scales[1]), rel=1.0e-3)
+
+
+@pytest.mark.parametrize(("lag_s", "sampling"), [(0.0, "instant"), (0.0025, "average")])
+def test_two_cadences_tell_a_lag_from_an_offset(
+    lag_s: float, sampling: str, ideal_walk: Callable[..., Walk], proposed: Callable[..., Commissioning]
+) -> None:
+    robot = Robot(offset_rad=1.0, lag_s=lag_s, torque_noise_nm=0.01)
+    result = proposed(signals_of(robot, ideal_walk(30.0, 120.0)))
+    assert result.config is not None
+    assert result.config.drive_torque.sampling == sampling
+    assert result.config.crank.offset_rad == pytest.approx(1.0, abs=2.0e-3)
+    assert result.item("lag").value == pytest.approx(0.0, abs=2.0e-4)
+    assert result.is_sure
+
+
+def test_a_late_torque_is_reported(
+    ideal_walk: Callable[..., Walk], proposed: Callable[..., Commissioning]
+) -> None:
+    result = proposed(signals_of(Robot(lag_s=0.025, torque_noise_nm=0.01), ideal_walk(40.0, 120.0)))
+    assert result.item("lag").value == pytest.approx(0.0225, abs=3.0e-4)  # beside half a sampling interval
+    assert any("late by" in text for text in result.findings)
+
+
+def test_one_cadence_is_not_enough_to_tell_the_sampling(
+    ideal_walk: Callable[..., Walk], proposed: Callable[..., Commissioning]
+) -> None:
+    result = proposed(signals_of(Robot(torque_noise_nm=0.01), ideal_walk(60.0)))
+    assert math.isnan(float(result.item("lag").value))
+    (why,) = result.not_told
+    assert "sampling" in why
+    assert "two cadences" in why
+    assert result.to_dict()["items"][[i.name for i in result.items].index("lag")]["value"] is None
+
+
+def test_an_encoder_that_starts_anew_is_found_again_and_reported(
+    ideal_walk: Callable[..., Walk], proposed: Callable[..., Commissioning]
+) -> None:
+    walk = ideal_walk(60.0)
+    parts = []
+    for number, offset in enumerate((0.3, -1.9)):
+        robot = Robot(gear_ratio=20.0, offset_rad=offset, torque_noise_nm=0.01, seed=number)
+        parts.append(
+            (100.0 * number + walk.time_s, *columns_of(robot, walk), np.full(len(walk.time_s), number))
+        )
+    time_s, position, torque, recording = (np.concatenate(column) for column in zip(*parts, strict=True))
+    signals = Signals(
+        {CRANK: Series(time_s, position, recording)}, {SENSOR: Series(time_s, torque, recording)}
+    )
+    result = proposed(signals)
+    assert result.config is not None
+    assert result.config.crank.gear_ratio == 20.0
+    assert result.config.crank.offset_rad == pytest.approx(-1.9 + TURN * 0.0025, abs=2.0e-3)
+    (text,) = result.findings
+    assert "starts anew" in text
+    assert "0.316" in text
+
+
+def test_two_legs_in_one_recording_are_not_enough_to_tell(
+    walked: Walk, proposed: Callable[..., Commissioning]
+) -> None:
+    one = signals_of(Robot(), walked)
+    left, right = CRANK, JointName("/joint_states", "right_crank")
+    joints = {
+        left: one.joints[left],
+        right: attrs.evolve(one.joints[left], value=one.joints[left].value + 3.14),
+    }
+    result = proposed(Signals(joints, one.torques))
+    assert result.config is None
+    assert any("--crank-joint" in text for text in result.not_told)
+    assert proposed(Signals(joints, one.torques), "right_crank").config is not None
+
+
+def test_of_two_encoders_on_one_shaft_the_one_of_the_crank_is_taken(
+    walked: Walk, proposed: Callable[..., Commissioning]
+) -> None:
+    one, motor = signals_of(Robot(), walked), signals_of(Robot(gear_ratio=50.0, seed=1), walked)
+    joints = {JointName("/joint_states", "motor"): motor.joints[CRANK], **one.joints}
+    result = proposed(Signals(joints, one.torques))
+    assert result.config is not None
+    assert result.config.crank_joint == "crank"
+    assert any("motor turns with the crank" in text for text in result.notes)
+
+
+def test_a_leg_whose_torque_looks_the_same_mirrored_is_not_enough_to_tell(
+    ideal_walk: Callable[..., Walk], proposed: Callable[..., Commissioning]
+) -> None:
+    walk = ideal_walk(60.0)
+    symmetric = attrs.evolve(
+        walk, torque_nm=9.0 * np.cos(walk.angle_rad) + 4.0 * np.cos(2.0 * walk.angle_rad)
+    )
+    result = proposed(signals_of(Robot(), symmetric))
+    assert result.config is None
+    assert any("crank.sign" in text for text in result.not_told)
+
+
+def test_noise_is_no_torque(ideal_walk: Callable[..., Walk], proposed: Callable[..., Commissioning]) -> None:
+    walk = ideal_walk(60.0)
+    noise = np.random.default_rng(1).standard_normal(len(walk.time_s))
+    result = proposed(signals_of(Robot(), attrs.evolve(walk, torque_nm=noise)))
+    assert result.config is None
+
+
+def test_a_short_recording_is_refused(walked: Walk, proposed: Callable[..., Commissioning]) -> None:
+    short = Walk(walked.time_s[:800], walked.angle_rad[:800], walked.torque_nm[:800])
+    with pytest.raises(LegWearError, match=r"crank was recorded for \S+ s only, expected at least 10 s"):
+        proposed(signals_of(Robot(), short))
+
+
+def test_a_leg_that_stands_is_refused(walked: Walk, proposed: Callable[..., Commissioning]) -> None:
+    still = attrs.evolve(walked, angle_rad=0.0 * walked.angle_rad)
+    with pytest.raises(LegWearError, match=r"no joint turns on and on like a crank: crank moves by 0\.0"):
+        proposed(signals_of(Robot(), still))
+
+
+def test_a_joint_that_swings_is_no_crank(walked: Walk, proposed: Callable[..., Commissioning]) -> None:
+    swinging = attrs.evolve(walked, angle_rad=np.sin(walked.angle_rad))
+    with pytest.raises(LegWearError, match="crank swings to and fro"):
+        proposed(signals_of(Robot(), swinging))
+
+
+def test_a_missing_torque_is_refused(walked: Walk, proposed: Callable[..., Commissioning]) -> None:
+    with pytest.raises(LegWearError, match="no torque was recorded"):
+        proposed(attrs.evolve(signals_of(Robot(), walked), torques={}))
+
+
+def test_a_constant_torque_is_refused(walked: Walk, proposed: Callable[..., Commissioning]) -> None:
+    flat = attrs.evolve(walked, torque_nm=0.0 * walked.torque_nm)
+    with pytest.raises(LegWearError, match="no torque changes"):
+        proposed(signals_of(Robot(torque_noise_nm=0.0), flat))
+
+
+def test_an_unknown_joint_is_refused_with_those_that_there_are(
+    walked: Walk, proposed: Callable[..., Commissioning]
+) -> None:
+    with pytest.raises(LegWearError, match="'hip' is not a joint of the recording, it has crank"):
+        proposed(signals_of(Robot(), walked), "hip")

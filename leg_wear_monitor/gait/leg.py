@@ -8,12 +8,13 @@ import attrs
 import numpy as np
 
 from leg_wear_monitor.dynamics.full.run import FullRun
+from leg_wear_monitor.dynamics.run.drive import CrankMotion, quintic
 from leg_wear_monitor.dynamics.run.protocol import Setup
 from leg_wear_monitor.dynamics.run.run_statistics import TORQUE, RunStatistics, new_run_statistics
 from leg_wear_monitor.dynamics.simulation import prepare
 from leg_wear_monitor.errors import ConfigError
 from leg_wear_monitor.gait.config import GaitConfig, KnockConfig
-from leg_wear_monitor.gait.pace import CrankMotion, Pace, quintic
+from leg_wear_monitor.gait.pace import Pace
 from leg_wear_monitor.mechanism.arrays import Floats, body_names
 from leg_wear_monitor.mechanism.ideal import TURN, one_cycle, point_motion
 from leg_wear_monitor.mechanism.loader import load_mechanism

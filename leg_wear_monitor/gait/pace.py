@@ -4,19 +4,9 @@ import math
 from itertools import pairwise
 from typing import NamedTuple
 
-import numpy as np
-
+from leg_wear_monitor.dynamics.run.drive import CrankMotion
 from leg_wear_monitor.gait.config import PaceConfig
-from leg_wear_monitor.mechanism.arrays import Floats
 from leg_wear_monitor.mechanism.ideal import TURN
-
-
-class CrankMotion(NamedTuple):
-    """Angle [rad], speed [rad/s] and acceleration [rad/s^2] of the crank."""
-
-    angle: float
-    speed: float
-    acceleration: float
 
 
 class _Stretch(NamedTuple):
@@ -68,18 +58,3 @@ class Pace:
         return CrankMotion(
             last.angle + last.before * tau + step * area, last.before + step * risen, step * slope
         )
-
-
-def quintic(since: float, start: CrankMotion, span: float, end: CrankMotion) -> Floats:
-    """Drive polynomial (7,) through two states of the crank, ``span`` seconds apart.
-
-    Consecutive polynomials join with continuous acceleration.
-    """
-    a0, v0, w0 = start.angle, start.speed, start.acceleration
-    gap = end.angle - a0 - span * (v0 + 0.5 * span * w0)
-    slope = (end.speed - v0 - span * w0) * span
-    bend = (end.acceleration - w0) * span * span
-    cubic = 10.0 * gap - 4.0 * slope + 0.5 * bend
-    quartic = -15.0 * gap + 7.0 * slope - bend
-    fifth = 6.0 * gap - 3.0 * slope + 0.5 * bend
-    return np.array([since, a0, v0, 0.5 * w0, cubic / span**3, quartic / span**4, fifth / span**5])

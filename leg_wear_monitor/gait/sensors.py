@@ -8,6 +8,7 @@ from typing import NamedTuple
 
 import numpy as np
 
+from leg_wear_monitor.dynamics.run.drive import CrankMotion
 from leg_wear_monitor.gait.config import (
     EFFORT,
     INSTANT,
@@ -18,7 +19,6 @@ from leg_wear_monitor.gait.config import (
     TransportConfig,
 )
 from leg_wear_monitor.gait.leg import SyntheticLeg
-from leg_wear_monitor.gait.pace import CrankMotion
 from leg_wear_monitor.mechanism.ideal import TURN
 from leg_wear_monitor.twin.kinds import CRANK, TORQUE
 from leg_wear_monitor.twin.sample import (

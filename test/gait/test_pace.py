@@ -8,8 +8,9 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from leg_wear_monitor.configuration.quantity import FieldError
+from leg_wear_monitor.dynamics.run.drive import CrankMotion, quintic
 from leg_wear_monitor.gait.config import PaceConfig
-from leg_wear_monitor.gait.pace import CrankMotion, Pace, quintic
+from leg_wear_monitor.gait.pace import Pace
 
 pytestmark = pytest.mark.plain
 

@@ -1,11 +1,21 @@
 """The crank's motion as a polynomial in time, for a steady drive, a ripple or a tracked crank."""
 
+from typing import NamedTuple
+
 import numpy as np
 
 from leg_wear_monitor.kernel import kernel
 from leg_wear_monitor.mechanism.arrays import Floats
 
 DEGREE = 5
+
+
+class CrankMotion(NamedTuple):
+    """Angle [rad], speed [rad/s] and acceleration [rad/s^2] of the crank."""
+
+    angle: float
+    speed: float
+    acceleration: float
 
 
 def steady_drive(angle: float, speed: float, since: float = 0.0) -> Floats:
@@ -22,6 +32,21 @@ def steady_drive(angle: float, speed: float, since: float = 0.0) -> Floats:
         Reference time [s], then six coefficients [rad/s^i] by ascending power.
     """
     return np.array([since, angle, speed, 0.0, 0.0, 0.0, 0.0])
+
+
+def quintic(since: float, start: CrankMotion, span: float, end: CrankMotion) -> Floats:
+    """Drive polynomial (7,) through two states of the crank, ``span`` seconds apart.
+
+    Consecutive polynomials join with continuous acceleration.
+    """
+    a0, v0, w0 = start.angle, start.speed, start.acceleration
+    gap = end.angle - a0 - span * (v0 + 0.5 * span * w0)
+    slope = (end.speed - v0 - span * w0) * span
+    bend = (end.acceleration - w0) * span * span
+    cubic = 10.0 * gap - 4.0 * slope + 0.5 * bend
+    quartic = -15.0 * gap + 7.0 * slope - bend
+    fifth = 6.0 * gap - 3.0 * slope + 0.5 * bend
+    return np.array([since, a0, v0, 0.5 * w0, cubic / span**3, quartic / span**4, fifth / span**5])
 
 
 @kernel

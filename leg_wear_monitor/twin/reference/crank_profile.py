@@ -1,0 +1,94 @@
+"""How a crank turns in a gait cycle: its mean speed and its ripple, from samples of its angle."""
+
+from collections.abc import Sequence
+
+import attrs
+import numpy as np
+
+from leg_wear_monitor.dynamics.run.drive import CrankMotion
+from leg_wear_monitor.mechanism.arrays import Floats
+from leg_wear_monitor.mechanism.ideal import TURN
+
+HARMONICS = 8  # of a turn; what is faster is noise of the encoder more than motion of the crank
+
+
+@attrs.frozen(eq=False)
+class CrankProfile:
+    """Angle of a crank that turns in the same way in each gait cycle.
+
+    The angle is phi + sum over h of ``cosine[h - 1]`` cos(h phi) + ``sine[h - 1]`` sin(h phi), phi the angle
+    of a crank that turns at the mean speed.
+
+    Attributes
+    ----------
+    speed : float
+        Mean speed [rad/s], negative for a crank that turns clockwise.
+    cosine, sine : (HARMONICS,) arrays
+        Ripple [rad].
+    """
+
+    speed: float
+    cosine: Floats
+    sine: Floats
+
+    @classmethod
+    def steady(cls, speed: float) -> "CrankProfile":
+        """Profile of a crank that turns at a constant speed [rad/s]."""
+        return cls(speed, np.zeros(HARMONICS), np.zeros(HARMONICS))
+
+    def at(self, phi: float) -> CrankMotion:
+        """Motion at an angle phi [rad] of the evenly turning crank."""
+        h = np.arange(1.0, HARMONICS + 1.0)
+        c, s = np.cos(h * phi), np.sin(h * phi)
+        return CrankMotion(
+            float(phi + self.cosine @ c + self.sine @ s),
+            float(self.speed * (1.0 + h @ (self.sine * c - self.cosine * s))),
+            float(-(self.speed**2) * (h**2 @ (self.cosine * c + self.sine * s))),
+        )
+
+    def angles(self, phi: Floats) -> Floats:
+        """Crank angles (n,) [rad] at angles (n,) of the evenly turning crank."""
+        h = np.outer(phi, np.arange(1.0, HARMONICS + 1.0))
+        return np.asarray(phi + np.cos(h) @ self.cosine + np.sin(h) @ self.sine)
+
+    def departure(self, other: "CrankProfile") -> float:
+        """Largest difference of the speeds in a turn, as a fraction of the mean speed."""
+        own, others = self._speeds(), other._speeds()
+        return float(np.abs(own - others).max() / abs(other.speed))
+
+    def _speeds(self) -> Floats:
+        """Speeds [rad/s] at some phases of a turn."""
+        h = np.arange(1.0, HARMONICS + 1.0)
+        phases = np.outer(np.arange(8 * HARMONICS) * (TURN / (8 * HARMONICS)), h)
+        ripple = np.cos(phases) @ (h * self.sine) - np.sin(phases) @ (h * self.cosine)
+        return np.asarray(self.speed * (1.0 + ripple))
+
+
+def cycle_profile(time_s: Floats, angle: Floats, duration_s: float) -> CrankProfile:
+    """Profile of one gait cycle, by least squares.
+
+    Parameters
+    ----------
+    time_s, angle : (n,) arrays
+        Times since the crank passed its zero [s] and continuous crank angles [rad], in order.
+    duration_s : float
+        Time until the crank passes its zero again.
+    """
+    speed = float(np.copysign(TURN / duration_s, angle[-1] - angle[0]))
+    phi = speed * time_s
+    h = np.arange(1.0, HARMONICS + 1.0)
+    columns = np.hstack([np.ones((len(phi), 1)), np.cos(np.outer(phi, h)), np.sin(np.outer(phi, h))])
+    found = np.linalg.lstsq(columns, angle - phi, rcond=None)[0]
+    # ripple counts from angle 0 of the evenly turning crank, which is not where the crank passes its zero
+    turned = found[0] - TURN * np.round(found[0] / TURN)
+    ripple = (found[1 : 1 + HARMONICS] - 1j * found[1 + HARMONICS :]) * np.exp(-1j * h * turned)
+    return CrankProfile(speed, np.asarray(ripple.real), np.asarray(-ripple.imag))
+
+
+def mean_profile(profiles: Sequence[CrankProfile]) -> CrankProfile:
+    """Mean of the profiles of several gait cycles."""
+    return CrankProfile(
+        float(np.mean([one.speed for one in profiles])),
+        np.asarray(np.mean([one.cosine for one in profiles], axis=0)),
+        np.asarray(np.mean([one.sine for one in profiles], axis=0)),
+    )

@@ -28,6 +28,7 @@ from leg_wear_monitor.monitor.spans import NEIGHBOURS_NS, Spans, is_within, with
 from leg_wear_monitor.twin.digital_twin import DigitalTwin
 from leg_wear_monitor.twin.sample import Samples
 from leg_wear_monitor.twin.statistics import SampleStatistics
+from leg_wear_monitor.wear.surfaces import BUSHING
 
 POINT_S = 600.0  # of walking, between two points of the clearances' history
 
@@ -215,6 +216,15 @@ class Accounting:
         was = self.joint_wear(k, self._twin.depth)
         self._twin.reset_wear(joint)
         self._set_part(k, PartLife(self.state.cycles, self.totals["moving_s"], stamp_ns))
+        return was
+
+    def correct(self, joint: str, clearance_m: float) -> JointWear:
+        """Open a joint to a larger mean clearance [m], evenly, its wear profile kept; its wear as it was."""
+        k = self._index(joint)
+        depth = self._twin.depth
+        was = self.joint_wear(k, depth.copy())
+        depth[k, BUSHING] += max(clearance_m - float(self._twin.clearance_mean_m[k]), 0.0)
+        self._twin.set_depth(depth)
         return was
 
     def put_back(self, joint: str, before: JointWear) -> JointWear:

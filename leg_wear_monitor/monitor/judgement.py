@@ -1,7 +1,7 @@
 """The verdict of a monitor: what it depends on, collected from the monitor's parts, and its changes."""
 
 import math
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 
 from leg_wear_monitor.monitor.accounting import Accounting
 from leg_wear_monitor.monitor.diagnosis.diagnosis import Diagnosis
@@ -42,6 +42,8 @@ class Judge:
         Renewed if a verdict makes its forecast invalid or valid.
     accounting : Accounting
         Stores changes as events.
+    diagnosis : callable
+        What the drive torque shows now.
     """
 
     def __init__(
@@ -51,15 +53,18 @@ class Judge:
         encoders: EncoderObserver | None,
         forecaster: Forecaster,
         accounting: Accounting,
+        diagnosis: Callable[[], Diagnosis],
     ) -> None:
         self._twin, self._evaluation, self._encoders = twin, evaluation, encoders
-        self._forecaster, self._accounting = forecaster, accounting
+        self._forecaster, self._accounting, self._diagnosis = forecaster, accounting, diagnosis
 
     def report(self, state: MonitorState) -> VerdictReport:
         """The verdict now."""
         intake = self._twin.intake
         stamp_ns = intake.followed_stamp_ns or intake.newest_stamp_ns
-        situation = situation_of(self._twin, self._evaluation, state.last, state.torque, self._encoders)
+        situation = situation_of(
+            self._twin, self._evaluation, state.last, state.torque, self._encoders, self._diagnosis()
+        )
         return VerdictReport(stamp_ns, dated(findings(situation), state.findings, stamp_ns))
 
     def changed(self, state: MonitorState) -> tuple[VerdictReport, ...]:

@@ -4,6 +4,7 @@ import attrs
 
 from leg_wear_monitor.monitor.accounting import AccountingState
 from leg_wear_monitor.monitor.alarms.alarm import Alarm
+from leg_wear_monitor.monitor.diagnosis.observer import TorqueObserverSnapshot
 from leg_wear_monitor.monitor.encoders.observer import EncoderSnapshot
 from leg_wear_monitor.monitor.evaluation.evaluation import AlarmEvaluationState
 from leg_wear_monitor.monitor.evaluation.torque_record import TorqueRecord
@@ -43,3 +44,4 @@ class MonitorSnapshot:
     evaluation_periods: Records
     guard: Records
     encoders: EncoderSnapshot | None = None
+    torque: TorqueObserverSnapshot | None = None

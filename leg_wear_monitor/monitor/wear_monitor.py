@@ -12,6 +12,8 @@ from leg_wear_monitor.monitor.alarms.alarm import Alarm
 from leg_wear_monitor.monitor.config.fitting import check_limits, fitted, twin_settings
 from leg_wear_monitor.monitor.config.settings import MonitorConfig
 from leg_wear_monitor.monitor.cycle_report import cycle_report, with_forecast
+from leg_wear_monitor.monitor.diagnosis.diagnosis import Diagnosis
+from leg_wear_monitor.monitor.diagnosis.observer import TorqueObserver
 from leg_wear_monitor.monitor.encoders.clearance_estimate import ClearanceEstimate
 from leg_wear_monitor.monitor.encoders.observer import EncoderObserver
 from leg_wear_monitor.monitor.evaluation.evaluation import AlarmEvaluation
@@ -23,7 +25,7 @@ from leg_wear_monitor.monitor.forecast.measurement import MeasurementResult
 from leg_wear_monitor.monitor.forecast_update import update_forecast
 from leg_wear_monitor.monitor.inputs.guard import InputGuard
 from leg_wear_monitor.monitor.judgement import Judge
-from leg_wear_monitor.monitor.ledger.entry import Audit, JointWear, Measurement
+from leg_wear_monitor.monitor.ledger.entry import Audit, CommissionedTorque, JointWear, Measurement
 from leg_wear_monitor.monitor.ledger.file import LedgerError
 from leg_wear_monitor.monitor.ledger.ledger import Ledger
 from leg_wear_monitor.monitor.reports import (
@@ -43,6 +45,7 @@ from leg_wear_monitor.twin.digital_twin import DigitalTwin
 from leg_wear_monitor.twin.sample import GAIT_SAMPLE, Samples
 from leg_wear_monitor.twin.statistics import CycleStatistics, joined
 
+ACCELERATED = "wear is accelerated: clearances grow within the gait cycles that are compared"
 _KEPT_EVENTS = 1
 
 
@@ -95,7 +98,25 @@ class WearMonitor:
             if self.config.encoders.names
             else None
         )
-        self._judge = Judge(self._twin, self._evaluation, self._encoders, self._forecaster, self._accounting)
+        self._torque = (
+            TorqueObserver(
+                self.mechanism,
+                self.config,
+                self._twin.torque_size_nm,
+                self._twin.clearance_mean_m,
+                ledger.commissioned_torque if ledger else None,
+            )
+            if self.config.diagnosis.enabled and self.config.wear_acceleration == 1.0
+            else None
+        )
+        self._judge = Judge(
+            self._twin,
+            self._evaluation,
+            self._encoders,
+            self._forecaster,
+            self._accounting,
+            lambda: self.diagnosis,
+        )
         if ledger and ledger.entry:
             self._evaluation.board.restore(ledger.entry.alarms)
         self._evaluation_periods = EvaluationPeriods(cycle_ns // A_CYCLE)
@@ -132,6 +153,7 @@ class WearMonitor:
             if ends_period:
                 self._add_changes(self._evaluation.end_period(self._accounting.state.skipped), changes)
                 self._observe_encoders()
+                self._observe_torque()
                 verdicts += self._judge.changed(self._state)
             self._accounting.keep_if_due(self._evaluation.board.alarms.values())
         samples_ = joined(sampled, len(self.clearance_joints))
@@ -162,6 +184,15 @@ class WearMonitor:
     def clearance_limits_m(self) -> tuple[float, ...]:
         """Limit of the mean clearance of each clearance joint."""
         return self._evaluation.board.clearance_limits_m
+
+    @property
+    def diagnosis(self) -> Diagnosis:
+        """What the drive torque shows of the clearances."""
+        if self._torque:
+            return self._torque.diagnosis
+        return Diagnosis(
+            reason=ACCELERATED if self.config.diagnosis.enabled else "diagnosis.enabled is false"
+        )
 
     @property
     def lost(self) -> Lost:
@@ -209,6 +240,8 @@ class WearMonitor:
     def begin_epoch(self, stamp_ns: int, who: str) -> None:
         """Begin an epoch: the clock of the samples has restarted, and the following samples are counted."""
         self._accounting.begin_epoch()
+        if self._torque:
+            self._torque.begin_epoch()
         self._accounting.note(Audit(stamp_ns, who, "new_epoch"))
         self._keep()
 
@@ -239,6 +272,8 @@ class WearMonitor:
         self._evaluation.configure(config)
         if self._encoders:
             self._encoders.config = config
+        if self._torque:
+            self._torque.config = config
 
     def acknowledge(self, stamp_ns: int) -> tuple[tuple[Alarm, ...], tuple[Alarm, ...]]:
         """Acknowledge all alarms, and the interruption of the previous run.
@@ -296,6 +331,8 @@ class WearMonitor:
         self._forecaster.replaced(joint, replaced_ns)
         if self._encoders:
             self._encoders.replaced()
+        if self._torque:
+            self._torque.replaced(self._twin.clearance_mean_m)
 
     def measure(
         self, joint: str, clearance_m: float, sigma_m: float, stamp_ns: int, who: str, accept: bool = False
@@ -413,6 +450,7 @@ class WearMonitor:
             self._evaluation_periods.state.copy(),
             self._guard.snapshot(),
             self._encoders.snapshot() if self._encoders else None,
+            self._torque.snapshot() if self._torque else None,
         )
 
     def restore(self, snapshot: MonitorSnapshot) -> None:
@@ -427,6 +465,8 @@ class WearMonitor:
         self._guard.restore(snapshot.guard)
         if self._encoders and snapshot.encoders:
             self._encoders.restore(snapshot.encoders)
+        if self._torque and snapshot.torque:
+            self._torque.restore(snapshot.torque)
 
     def _keep(self, closed: bool = False) -> bool:
         return self._accounting.keep(self._evaluation.board.alarms.values(), closed)
@@ -438,12 +478,16 @@ class WearMonitor:
         self._evaluation.add_samples(piece)
         if self._encoders:
             self._encoders.add_samples(piece)
+        if self._torque:
+            self._torque.add_samples(piece)
         self._accounting.followed(update.samples)
         self._state.happened = (*self._state.happened, *update.events)[-_KEPT_EVENTS:]
         cycles: list[CycleReport] = []
         for statistics in update.cycles:
             if self._encoders:
                 self._encoders.ended(statistics)
+            if self._torque:
+                self._torque.ended(statistics)
             cycles.append(self._report(statistics))
             self._add_changes(self._evaluation.end_cycle(cycles[-1], self._state.torque), changes)
             self._keep_torque(statistics, cycles[-1])
@@ -482,6 +526,32 @@ class WearMonitor:
             new = self._encoders.end_period(self._twin.clearance_mean_m, self._twin.depth)
             if new:
                 self._accounting.note(new)
+
+    def _observe_torque(self) -> None:
+        """Compare the drive torque with that of the counted leg, and correct what is surely counted wrong."""
+        if not self._torque:
+            return
+        before = self._torque.state.commissioned
+        correction = self._torque.end_period(self._twin.clearance_mean_m, self._twin.depth)
+        if correction is None:
+            self._note_commissioned(before)
+            return
+        joint = self.clearance_joints[correction.joint]
+        was = self._accounting.correct(joint, correction.clearance_m)
+        self._torque.corrected(correction, self._twin.clearance_mean_m)
+        self._note_commissioned(before)
+        self._accounting.note(
+            Audit(self._twin.intake.followed_stamp_ns, "diagnosis", "correct_clearance", was)
+        )
+        growth, k = self._state.growth, correction.joint
+        self._state.growth = (*growth[:k], GrowthWindow(), *growth[k + 1 :])
+        self._keep()
+
+    def _note_commissioned(self, before: CommissionedTorque | None) -> None:
+        """Store the signature of the leg that was commissioned since."""
+        now = self._torque.state.commissioned if self._torque else None
+        if now is not None and now is not before:
+            self._accounting.note(now)
 
     def _clearance_estimates(self, statistics: CycleStatistics) -> tuple[ClearanceEstimate, ...] | None:
         """Clearances estimated from encoders; they update the forecast."""

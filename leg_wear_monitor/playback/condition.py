@@ -1,5 +1,6 @@
 """Condition of the leg at the end of a replay; what the verdict does not believe has no remaining life."""
 
+import math
 from typing import TYPE_CHECKING
 
 import attrs
@@ -28,17 +29,22 @@ def leg_forecast(told: LegForecast | None, verdict: Verdict) -> LegForecast | No
 
 
 def clearances(result: "ReplayResult") -> dict[str, JointClearance]:
-    """Clearance of each joint, as counted and as encoders show it."""
+    """Clearance of each joint, as counted and as encoders or the drive torque show it best."""
     monitor, last = result.monitor, result.history.last
     limits = dict(zip(monitor.clearance_joints, monitor.clearance_limits_m, strict=True))
-    found = {}
-    for joint in last.joints if last else ():
-        seen = joint.seen if joint.seen and joint.seen.observation is ClearanceObservation.SEEN else None
+    diagnosis, found = monitor.diagnosis, {}
+    for k, joint in enumerate(last.joints if last else ()):
+        seen = []
+        if joint.seen and joint.seen.observation is ClearanceObservation.SEEN:
+            seen.append((joint.seen.sigma_m, joint.seen.clearance_m, "encoders"))
+        if diagnosis.clearance_m and math.isfinite(diagnosis.clearance_m[k]):
+            seen.append((diagnosis.sigma_m[k], diagnosis.clearance_m[k], "torque"))
+        sigma_m, clearance_m, by = min(seen) if seen else (None, None, None)
         found[joint.joint] = JointClearance(
             counted_m=joint.clearance_m,
-            seen_m=seen.clearance_m if seen else None,
-            seen_sigma_m=seen.sigma_m if seen else None,
-            seen_by=("encoders",) if seen else (),
+            seen_m=clearance_m,
+            seen_sigma_m=sigma_m,
+            seen_by=(by,) if by else (),
             new_m=monitor.mechanism.clearances[joint.joint].radial_clearance,
             limit_m=limits[joint.joint],
         )

@@ -189,6 +189,24 @@ class Diagnostics:
 
 
 @attrs.frozen(kw_only=True)
+class TorqueDiagnosis:
+    """Clearances that the drive torque shows (docs/diagnosis.md)."""
+
+    enabled: bool = described("whether clearances are estimated from the drive torque", default=True)
+    correct: bool = described(
+        "whether a counted clearance is corrected where the drive torque surely shows another one",
+        default=True,
+    )
+    false_alarm_hours: float = quantity(
+        "h",
+        "mean time of walking between two false findings; longer: changes are found later",
+        at_least=1.0,
+        at_most=1.0e6,
+        default=240.0,
+    )
+
+
+@attrs.frozen(kw_only=True)
 class MonitorConfig:
     """All parameters; their dotted names are those of the ROS node and of config/monitor.yaml."""
 
@@ -235,6 +253,7 @@ class MonitorConfig:
     alarms: Alarms = described("", factory=Alarms)
     growth: Growth = described("", factory=Growth)
     forecast: Forecasting = described("", factory=Forecasting)
+    diagnosis: TorqueDiagnosis = described("", factory=TorqueDiagnosis)
     ledger: LedgerFile = described("", factory=LedgerFile)
     record: Record = described("", factory=Record)
     diagnostics: Diagnostics = described("", factory=Diagnostics)

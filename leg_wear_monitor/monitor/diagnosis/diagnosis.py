@@ -5,6 +5,8 @@ from enum import Enum
 
 import attrs
 
+_SURE_LOG_ODDS = 5.0  # 150 to 1
+
 
 class DiagnosisState(Enum):
     """What the diagnosis can report; the value is the word that files contain."""
@@ -50,6 +52,8 @@ class Change:
         Next best explanation, human-readable; empty if there is none.
     runner_up_log_odds : float
         Natural logarithm of the odds against the runner-up.
+    is_corrected : bool
+        Whether the counted clearance was corrected by it.
     """
 
     cause: Cause
@@ -61,6 +65,13 @@ class Change:
     log_odds: float
     runner_up: str = ""
     runner_up_log_odds: float = math.inf
+    is_corrected: bool = False
+
+    @property
+    def is_sure(self) -> bool:
+        """Whether a clearance has changed, much more probably than anything else."""
+        odds = min(self.log_odds, self.runner_up_log_odds)
+        return self.cause is Cause.CLEARANCE and odds >= _SURE_LOG_ODDS
 
 
 @attrs.frozen(kw_only=True)
@@ -78,7 +89,8 @@ class Diagnosis:
         Estimated clearance of each clearance joint and its standard deviation; NaN where it is not
         observable.
     changes : tuple of Change
-        Significant departures, the oldest first; empty unless the state is CHANGED.
+        Significant departures, the oldest first: those by which counted clearances were corrected, and, where
+        the state is CHANGED, the one that is not settled yet.
     """
 
     state: DiagnosisState = DiagnosisState.OFF

@@ -237,6 +237,27 @@ class Commissioned:
         return sum_.digest()
 
 
+@attrs.frozen(eq=False)
+class CommissionedTorque:
+    """Mean signature of the drive torque of a leg whose k clearances were known.
+
+    Attributes
+    ----------
+    stamp_ns : int
+        End of its last gait cycle.
+    cycles : int
+    clearance_m : (k,) array
+        Counted clearances then.
+    signature : (F,) array
+        As in `diagnosis.signature`.
+    """
+
+    stamp_ns: int
+    cycles: int
+    clearance_m: Floats
+    signature: Floats
+
+
 Event = (
     Audit
     | AlarmEvent
@@ -245,5 +266,6 @@ Event = (
     | Withdrawal
     | ForecastPoint
     | Commissioned
+    | CommissionedTorque
     | VerdictEvent
 )

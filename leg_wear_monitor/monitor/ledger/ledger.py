@@ -22,6 +22,7 @@ from leg_wear_monitor.monitor.ledger.file import LedgerError
 from leg_wear_monitor.monitor.ledger.recovery import Recovered
 from leg_wear_monitor.monitor.ledger.rows import (
     read_commissioned,
+    read_commissioned_torque,
     read_last_reset,
     read_measurements,
     read_spans,
@@ -51,6 +52,7 @@ class Ledger:
     measurements : tuple of Measurement
         Manually measured clearances of earlier runs, including withdrawn ones.
     commissioned : Commissioned or None
+    commissioned_torque : CommissionedTorque or None
         Errors of further encoders from earlier runs.
     last_run : Run
         The previous run.
@@ -110,6 +112,7 @@ class Ledger:
         self._spans = np.array(sorted(set(spans)), dtype=np.int64).reshape(-1, 3)
         self.measurements = self._store.ask(read_measurements)
         self.commissioned = self._store.ask(read_commissioned)
+        self.commissioned_torque = self._store.ask(read_commissioned_torque)
 
     @property
     def counted_ns(self) -> Ints:

@@ -208,6 +208,13 @@ CREATE TABLE verdict (
     joints TEXT NOT NULL, since_ns INTEGER NOT NULL, why TEXT NOT NULL, to_do TEXT NOT NULL,
     evidence TEXT NOT NULL, not_valid TEXT NOT NULL
 ) STRICT;
+
+-- mean signature of the drive torque while the clearances were known; the last row is in force. Both are
+-- float64, little endian: counted clearances of the clearance joints [m], and the signature
+CREATE TABLE torque_commissioning (
+    id INTEGER PRIMARY KEY, stamp_ns INTEGER NOT NULL, cycles INTEGER NOT NULL, clearance_m BLOB NOT NULL,
+    signature BLOB NOT NULL
+) STRICT;
 """
 
 MIGRATIONS = (_FIRST, _SECOND, _THIRD, _FOURTH, _FIFTH)
@@ -215,7 +222,9 @@ MIGRATIONS = (_FIRST, _SECOND, _THIRD, _FOURTH, _FIFTH)
 FORMAT = len(MIGRATIONS)
 SEALED_FROM = 4  # first format with checksums over the whole content
 
-GROWING = ("alarm_history", "audit", "commissioning", "forecast", "history", "verdict")  # append only
+GROWING = (  # append only
+    "alarm_history", "audit", "commissioning", "forecast", "history", "torque_commissioning", "verdict",
+)  # fmt: skip
 CHANGING = ("alarm", "binding", "entry", "joint", "measurement", "run", "span", "total")
 
 Definitions = list[tuple[str, str, str, str | None]]

@@ -102,7 +102,13 @@ def changes(situation: Situation) -> tuple[Change, ...]:
     diagnosis = situation.diagnosis
     if diagnosis is None or diagnosis.state is not DiagnosisState.CHANGED:
         return ()
-    return diagnosis.changes
+    return tuple(change for change in diagnosis.changes if not change.is_corrected)
+
+
+def corrected(situation: Situation) -> Sequence[Hit]:
+    """Changes by which counted clearances were corrected."""
+    found = situation.diagnosis.changes if situation.diagnosis else ()
+    return [_hit(change) for change in found if change.is_corrected]
 
 
 def words_of(change: Change) -> str:

@@ -56,6 +56,13 @@ RULES = (
         not_valid=EVERYTHING,
     ),
     Rule(
+        code="CLEARANCE_CORRECTED",
+        state=State.INSPECT,
+        hits=clearance_rules.corrected,
+        why="the drive torque showed a {change} until then; it is corrected",
+        do=_ROCK,
+    ),
+    Rule(
         code="CLEARANCE_DEPARTURE",
         state=State.INSPECT,
         hits=clearance_rules.departing,

@@ -74,6 +74,12 @@ CASES = [
         "CLEARANCE_CHANGED_G",
         tuple(Figure),
     ),
+    (
+        {"diagnosis": Diagnosis(changes=(change(Cause.CLEARANCE, "G", is_corrected=True),))},
+        State.INSPECT,
+        "CLEARANCE_CORRECTED_G",
+        (),
+    ),
     ({"diagnosis": diagnosis(change(Cause.UNKNOWN))}, State.INSPECT, "MECHANISM_CHANGED", tuple(Figure)),
     ({"diagnosis": diagnosis(change(Cause.MASS, "foot"))}, State.INSPECT, "MECHANISM_CHANGED", tuple(Figure)),
     ({"diagnosis": diagnosis(change(Cause.SCALE))}, State.INSPECT, "TORQUE_SENSOR", ()),

@@ -1,0 +1,265 @@
+"""Clearances from the drive torque alone, of legs in full coordinates whose masses are others.
+
+Each leg walks with the clearances when new, and with one joint or two opened; its crank has a ripple. Torques
+are means over a sample, with noise. Times to detection, names and clearances come out of the code that the
+monitor runs. `python benchmarks/diagnosis.py` takes about an hour, most of it for the legs; with
+`--keep DIRECTORY` those are walked once.
+"""
+
+import argparse
+import functools
+import pickle
+from collections.abc import Iterator
+from pathlib import Path
+from typing import NamedTuple
+
+import attrs
+import numpy as np
+
+from leg_wear_monitor import load_mechanism
+from leg_wear_monitor.dynamics.full.run import FullRun
+from leg_wear_monitor.dynamics.run.drive import quintic
+from leg_wear_monitor.dynamics.run.run_statistics import TORQUE, new_run_statistics
+from leg_wear_monitor.dynamics.simulation import prepare
+from leg_wear_monitor.gait.config import PaceConfig
+from leg_wear_monitor.gait.pace import Pace
+from leg_wear_monitor.mechanism.ideal import TURN
+from leg_wear_monitor.mechanism.position import build_linkage
+from leg_wear_monitor.mechanism.spec import Mechanism
+from leg_wear_monitor.monitor.diagnosis.change_detector import ChangeDetector
+from leg_wear_monitor.monitor.diagnosis.diagnosis import Cause
+from leg_wear_monitor.monitor.diagnosis.explanations import Explainer
+from leg_wear_monitor.monitor.diagnosis.leg_model import best_fit, explainer_of
+from leg_wear_monitor.monitor.diagnosis.signature import TorqueSensor, averaged, signatures
+from leg_wear_monitor.monitor.diagnosis.signature_model import with_noise_of
+from leg_wear_monitor.monitor.ledger.entry import CommissionedTorque
+from leg_wear_monitor.twin.follower.load import torque_size
+from leg_wear_monitor.twin.reference.crank_profile import CrankProfile, cycle_profile, mean_profile
+from leg_wear_monitor.twin.reference.torque_reference import TorqueReference, TorqueReferenceRun
+from leg_wear_monitor.wear.surfaces import SECTORS
+
+RATE = 1000  # steps of a gait cycle at which a walk is kept
+COMMISSIONING, AFTER, HEALTHY = 30, 60, 160
+NEW = np.full(5, 3.0e-4)
+SIZES = (3.6e-4, 4.5e-4, 6.0e-4, 1.0e-3)
+MONTH = 8.64e5  # gait cycles: eight hours a day at 60 rpm
+STARTS = 5  # gait cycles between two starts of a test
+
+HEAD = """
+| case | cycles to detection: median, worst | named rightly in 5 cycles | in 10 | mean clearances | sigma |
+|---|---|---|---|---|---|"""
+
+
+class Leg(NamedTuple):
+    """Factors on the masses of a leg, and the ripple of its crank."""
+
+    masses: dict[str, float]
+    ripple: float
+
+
+LEGS = {
+    "a": Leg({"thigh": 1.04, "shank": 0.97, "foot": 1.03}, 0.03),
+    "b": Leg({"thigh": 0.96, "shank": 1.05, "foot": 0.95, "coupler": 1.05, "rocker": 0.95}, 0.02),
+}
+
+
+def heavier(leg: Mechanism, masses: dict[str, float]) -> Mechanism:
+    """The mechanism with other masses and inertias."""
+    bodies = dict(leg.bodies)
+    for name, factor in masses.items():
+        body = bodies[name]
+        bodies[name] = attrs.evolve(body, mass=factor * body.mass, inertia=factor * body.inertia)
+    return attrs.evolve(leg, bodies=bodies)
+
+
+def walked(leg: Mechanism, clearance: np.ndarray, cycles: int, ripple: float) -> np.ndarray:
+    """Time [s], crank angle [rad] and impulse of the drive torque [N m s] (cycles RATE, 3)."""
+    setup, pace = prepare(leg), Pace(PaceConfig(ripple=ripple))
+    setup.contacts.clearance[:] = clearance
+    run = FullRun(attrs.evolve(setup, speed=pace.at(0.0).speed), tolerance_m=1e-9)
+    statistics, before = new_run_statistics(len(leg.joints)), 0.0
+    walk = np.empty((cycles * RATE, 3))
+    for i in range(len(walk)):
+        t = (i + 1) / RATE
+        run.polynomial[:] = quintic(before, pace.at(before), t - before, pace.at(t))
+        run.advance(t, statistics)
+        walk[i] = t, pace.at(t).angle, statistics.drive_integral[TORQUE]
+        before = t
+    return walk
+
+
+def cases(joints: tuple[str, ...]) -> Iterator[tuple[str, np.ndarray, int]]:
+    """Name, clearances and gait cycles of each walk."""
+    yield "new", NEW, HEALTHY
+    for k, joint in enumerate(joints):
+        for size in SIZES:
+            yield f"{joint} {1e3 * size:.2f}", np.where(np.arange(5) == k, size, NEW), AFTER
+    yield "A 0.45 G 0.45", np.array([4.5e-4, 3e-4, 4.5e-4, 3e-4, 3e-4]), AFTER
+    yield "B 0.60 J 0.60", np.array([3e-4, 6e-4, 3e-4, 3e-4, 6e-4]), AFTER
+    yield "a life", NEW + 1e-6 * np.array([150.0, 50.0, 45.0, 15.0, 10.0]), AFTER
+
+
+def kept(file: Path | None, make):
+    """What a file has; made and kept if it is not there."""
+    if file and file.exists():
+        return pickle.loads(file.read_bytes())
+    made = make()
+    if file:
+        file.write_bytes(pickle.dumps(made))
+    return made
+
+
+def profile_of(walk: np.ndarray, cycles: int = 20) -> CrankProfile:
+    """How the crank turns, from noisy angles at 200 Hz."""
+    random, profiles = np.random.default_rng(1), []
+    for k in range(1, cycles + 1):
+        begin, end = np.interp([k * TURN, (k + 1) * TURN], walk[:, 1], walk[:, 0])
+        inside = walk[(walk[:, 0] >= begin) & (walk[:, 0] < end)][::5]
+        angle = inside[:, 1] + 1e-3 * random.standard_normal(len(inside))
+        profiles.append(cycle_profile(inside[:, 0] - begin, angle, end - begin))
+    return mean_profile(profiles)
+
+
+def referred(leg: Mechanism, profile: CrankProfile) -> TorqueReference:
+    """A reference of the leg as it is on paper."""
+    run = TorqueReferenceRun(leg)
+    run.begin(NEW, np.zeros((5, 2, SECTORS)), profile)
+    while (found := run.advance()) is None:
+        if not run.is_busy:
+            raise SystemExit("the leg could not be simulated")
+    return found
+
+
+def measured(walk: np.ndarray, sensor: TorqueSensor, noise_nm: float, random) -> np.ndarray:
+    """Signatures (cycles, F) of whole gait cycles, the first two left out."""
+    every = max(1, round(sensor.period_s * RATE))
+    time, angle, impulse = walk[every - 1 :: every].T
+    torque = np.diff(impulse, prepend=0.0) / np.diff(time, prepend=0.0)
+    torque = averaged(torque + noise_nm * random.standard_normal(len(torque)), sensor.together)
+    angle = angle[sensor.together - 1 :: sensor.together][: len(torque)]
+    cycle = np.floor(angle / TURN - 1e-9).astype(np.int64)
+    return signatures(cycle, angle, torque, np.diff(torque, prepend=np.nan), sensor)[2:-1]
+
+
+def explained(
+    leg, reference, walk, sensor, noise_nm, random, commissioned=True
+) -> tuple[Explainer, np.ndarray]:
+    """The explainer of a leg, commissioned on its first cycles or not, and its further signatures."""
+    new = measured(walk, sensor, noise_nm, random)
+    mean = new[:COMMISSIONING].mean(axis=0)
+    known = CommissionedTorque(0, COMMISSIONING, NEW, mean) if commissioned else None
+    return explainer_of(leg, reference, with_noise_of(reference, sensor, mean), known), new[COMMISSIONING:]
+
+
+def detected(detector: ChangeDetector, cycles: np.ndarray) -> int | None:
+    """Gait cycles until a change is detected; None if it is not."""
+    state = detector.fresh()
+    for i, signature in enumerate(cycles):
+        state = detector.with_cycle(state, signature, i + 1)
+        if detector.detection(state):
+            return i + 1
+    return None
+
+
+def largest_sum(detector: ChangeDetector, cycles: np.ndarray) -> float:
+    """Largest sum of any test over a leg that is as counted."""
+    state, most = detector.fresh(), 0.0
+    for i, signature in enumerate(cycles):
+        state = detector.with_cycle(state, signature, i + 1)
+        most = max(most, float(state.sums.max()))
+    return most
+
+
+def named(explainer: Explainer, mean: np.ndarray, cycles: int) -> str:
+    """The best cause, in words."""
+    best = explainer.explanations(mean, cycles, NEW)[0]
+    return best.subject if best.cause is Cause.CLEARANCE else best.cause.value
+
+
+def fitted(explainer: Explainer, mean: np.ndarray, cycles: int):
+    """All clearances, from starts at each single cause."""
+    starts = [NEW]
+    for one in explainer.explanations(mean, cycles, NEW):
+        if one.cause is Cause.CLEARANCE:
+            starts.append(np.where(np.array(explainer.joints) == one.subject, one.value, NEW))
+    return best_fit(explainer, mean, cycles, NEW, starts)
+
+
+def delays(detector: ChangeDetector, cycles: np.ndarray) -> str:
+    """Median and worst number of cycles to detection from several starts, and how often it took over 30."""
+    found = [detected(detector, cycles[i : i + 30]) for i in range(0, len(cycles) - 29, STARTS)]
+    missed, late = found.count(None), [30 if delay is None else delay for delay in found]
+    return f"{np.median(late):g}, {max(late)}" + (f" ({missed} of {len(found)} not in 30)" if missed else "")
+
+
+def rightly(explainer: Explainer, cycles: np.ndarray, n: int, wide: list[str]) -> tuple[int, int]:
+    """How many windows of n cycles name a joint that is wide, and how many there are."""
+    parts = [cycles[i : i + n].mean(axis=0) for i in range(0, len(cycles) - n + 1, n)]
+    return sum(named(explainer, part, n) in wide for part in parts), len(parts)
+
+
+def of(found: tuple[int, int]) -> str:
+    """A share in words."""
+    return f"{found[0]} of {found[1]}"
+
+
+def at(explainer: Explainer, cycles: np.ndarray) -> list[str]:
+    """Mean of the clearances over windows of ten cycles, and of their standard deviations [mm]."""
+    windows = [cycles[i : i + 10].mean(axis=0) for i in range(0, len(cycles) - 9, 10)]
+    fits = [fitted(explainer, window, 10) for window in windows]
+    means = (np.mean([getattr(fit, name) for fit in fits], axis=0) for name in ("clearance_m", "sigma_m"))
+    return [" ".join(f"{1e3 * value:.3f}" for value in mean) for mean in means]
+
+
+def walks_of(name: str, leg: Mechanism, keep: Path | None) -> dict[str, np.ndarray]:
+    """Walks of a leg by case."""
+    truth, ripple, walks = heavier(leg, LEGS[name].masses), LEGS[name].ripple, {}
+    for case, clearance, cycles in cases(leg.clearance_joints):
+        make = functools.partial(walked, truth, clearance, cycles + 2, ripple)
+        walks[case] = kept(keep / f"{name} {case}.pkl" if keep else None, make)
+    return walks
+
+
+def main() -> None:
+    parser = argparse.ArgumentParser(description=__doc__)
+    parser.add_argument("--keep", type=Path)
+    parser.add_argument("--noise-nm", type=float, default=0.5)
+    parser.add_argument("--rate-hz", type=float, default=200.0)
+    parser.add_argument("--uncommissioned", action="store_true")
+    parser.add_argument("--legs", nargs="+", default=list(LEGS))
+    options = parser.parse_args()
+    leg, random = load_mechanism("bionic_leg"), np.random.default_rng(5)
+    size = torque_size(build_linkage(leg), TURN)
+    print(f"noise {options.noise_nm} N m, {options.rate_hz:g} Hz, RMS of the torque {size:.1f} N m")
+    rights = {}
+    for name in options.legs:
+        walks = walks_of(name, leg, options.keep)
+        profile = profile_of(walks["new"])
+        file = options.keep / f"{name} reference.pkl" if options.keep else None
+        reference = kept(file, functools.partial(referred, leg, profile))
+        sensor = TorqueSensor(1.0 / options.rate_hz, TURN / abs(profile.speed), size)
+        explainer, healthy = explained(
+            leg, reference, walks["new"], sensor, options.noise_nm, random, not options.uncommissioned
+        )
+        detector = ChangeDetector(explainer, NEW, MONTH)
+        most = largest_sum(detector, healthy)
+        print(
+            f"leg {name}: noise found {explainer.model.sensor.noise_nm:.3f} N m, threshold "
+            f"{detector.threshold:.1f}, largest sum in {len(healthy)} healthy cycles {most:.1f}"
+        )
+        print(HEAD)
+        for case, clearance, _ in cases(leg.clearance_joints):
+            cycles = measured(walks[case], sensor, options.noise_nm, random)
+            wide = [joint for joint, c in zip(leg.clearance_joints, clearance, strict=True) if c > 3.3e-4]
+            right = {n: rightly(explainer, cycles, n, wide) for n in (5, 10)}
+            for n, found in right.items():
+                key = ("none" if not wide else case.split()[-1] if len(wide) == 1 else "several", n)
+                rights[key] = tuple(np.add(rights.get(key, (0, 0)), found))
+            row = [case, delays(detector, cycles), *map(of, right.values()), *at(explainer, cycles)]
+            print(f"| {' | '.join(row)} |", flush=True)
+    for (size_mm, n), found in sorted(rights.items()):
+        print(f"{size_mm}, {n} cycles: {of(found)} named rightly")
+
+
+if __name__ == "__main__":
+    main()

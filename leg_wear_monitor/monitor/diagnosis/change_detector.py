@@ -1,0 +1,92 @@
+"""Detects when a leg departs from the one that is counted: one CUSUM test for each joint and size.
+
+A CUSUM adds up, gait cycle by gait cycle, by how much a changed leg explains the signature better, and
+starts again where it falls below zero. Where the likelihoods are what it supposes, the mean time between two
+false alarms of a test is at least exp(threshold) cycles (Lorden 1971).
+"""
+
+import math
+from typing import NamedTuple
+
+import numpy as np
+
+from leg_wear_monitor.mechanism.arrays import Floats, Ints
+from leg_wear_monitor.monitor.diagnosis.explanations import Explainer
+
+FACTORS = (1.2, 1.35, 1.5, 1.75, 2.0, 2.5, 3.3, 5.0, 8.0)  # on the counted clearance of one joint
+
+_MOST = 0.6  # of the threshold: what one gait cycle counts at most, so that one alone raises nothing
+
+
+class DetectorState(NamedTuple):
+    """Sums (tests,), the stamp (tests,) [ns] and the number of cycles (tests,) since each was 0."""
+
+    sums: Floats
+    since_ns: Ints
+    cycles: Ints
+
+
+class Detection(NamedTuple):
+    """A change: the test that raised it, the stamp since when, the cycles since then, and its sum."""
+
+    test: int
+    since_ns: int
+    cycles: int
+    log_odds: float
+
+
+def threshold(false_alarm_cycles: float, tests: int) -> float:
+    """Threshold of each of some tests for a mean number of gait cycles between two false alarms."""
+    return math.log(false_alarm_cycles * tests)
+
+
+class ChangeDetector:
+    """CUSUM tests of a leg against one with a wider joint.
+
+    Parameters
+    ----------
+    explainer : Explainer
+    counted_m : (k,) array
+        Counted clearances.
+    false_alarm_cycles : float
+        Mean number of gait cycles between two false alarms.
+    """
+
+    def __init__(self, explainer: Explainer, counted_m: Floats, false_alarm_cycles: float) -> None:
+        model = explainer.model
+        expected = model.at(counted_m)[0]
+        changes = []
+        for k in range(len(counted_m)):
+            for factor in FACTORS:
+                wider = counted_m.copy()
+                wider[k] *= factor
+                changes.append(model.at(wider)[0] - expected)
+        change = np.array(changes)
+        weighted = np.linalg.solve(explainer.covariance(1), change.T).T
+        self._expected = expected + explainer.baseline.offset
+        self._weighted = weighted
+        self._half = 0.5 * np.einsum("ij,ij->i", weighted, change)
+        self.threshold = threshold(false_alarm_cycles, len(change))
+
+    def fresh(self) -> DetectorState:
+        """State before the first gait cycle."""
+        tests = len(self._half)
+        return DetectorState(np.zeros(tests), np.zeros(tests, np.int64), np.zeros(tests, np.int64))
+
+    def with_cycle(self, state: DetectorState, signature: Floats, begin_ns: int) -> DetectorState:
+        """State after one more gait cycle, with its signature (F,) and the stamp of its begin."""
+        ratio = self._weighted @ (signature - self._expected) - self._half
+        ratio = np.minimum(ratio, _MOST * self.threshold)
+        since = np.where(state.cycles == 0, begin_ns, state.since_ns)
+        sums = state.sums + ratio
+        stays = sums > 0.0
+        return DetectorState(
+            np.where(stays, sums, 0.0), np.where(stays, since, 0), np.where(stays, state.cycles + 1, 0)
+        )
+
+    def detection(self, state: DetectorState) -> Detection | None:
+        """The change that is detected; None where no test exceeds the threshold."""
+        best = int(state.sums.argmax())
+        if not state.sums[best] > self.threshold:
+            return None
+        return Detection(best, int(state.since_ns[best]), int(state.cycles[best]), float(state.sums[best]))

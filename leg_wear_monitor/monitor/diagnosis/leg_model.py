@@ -1,0 +1,81 @@
+"""The expected leg: its signatures and its baseline, the fit of its clearances, and how a change is named."""
+
+from collections.abc import Sequence
+
+import numpy as np
+
+from leg_wear_monitor.mechanism.arrays import Floats
+from leg_wear_monitor.mechanism.spec import Mechanism
+from leg_wear_monitor.monitor.diagnosis.clearance_fit import ClearanceFit, fit_clearances
+from leg_wear_monitor.monitor.diagnosis.diagnosis import Cause, Change
+from leg_wear_monitor.monitor.diagnosis.explanations import Explainer, Explanation
+from leg_wear_monitor.monitor.diagnosis.nuisances import commissioned_baseline, nuisances, unknown_baseline
+from leg_wear_monitor.monitor.diagnosis.signature import TorqueSensor
+from leg_wear_monitor.monitor.diagnosis.signature_model import signature_model
+from leg_wear_monitor.monitor.ledger.entry import CommissionedTorque
+from leg_wear_monitor.twin.reference.torque_reference import TorqueReference
+
+
+def explainer_of(
+    mechanism: Mechanism,
+    reference: TorqueReference,
+    sensor: TorqueSensor,
+    commissioned: CommissionedTorque | None,
+) -> Explainer:
+    """What explains changes of a leg, measured by a sensor whose noise is known."""
+    model = signature_model(reference, sensor)
+    found = nuisances(mechanism, reference, sensor)
+    if commissioned is None:
+        baseline = unknown_baseline(found, sensor)
+    else:
+        offset = commissioned.signature - model.at(commissioned.clearance_m)[0]
+        baseline = commissioned_baseline(offset, model.covariance, commissioned.cycles, 2 * model.cycles)
+    return Explainer(model, mechanism.clearance_joints, baseline, found)
+
+
+def best_fit(
+    explainer: Explainer, mean: Floats, cycles: int, counted_m: Floats, starts: Sequence[Floats]
+) -> ClearanceFit:
+    """All clearances from a mean signature, from the best of several starts: there are several minima."""
+    fits = [fit_clearances(explainer, mean, cycles, start, counted_m) for start in starts]
+    return min(fits, key=lambda fit: fit.misfit)
+
+
+def start_of(change: Change | None, joints: Sequence[str], counted_m: Floats) -> Floats:
+    """Clearances (k,) [m] after a change."""
+    start = counted_m.copy()
+    if change is not None and change.cause is Cause.CLEARANCE:
+        start[joints.index(change.subject)] = change.value
+    return start
+
+
+def change_of(explanations: Sequence[Explanation], since_ns: int) -> Change | None:
+    """The change that explanations, the best first, amount to; None where the leg is as counted."""
+    best, second = explanations[:2]
+    nothing = next(one for one in explanations if one.cause is Cause.UNKNOWN)
+    if best is nothing:
+        return None
+    runner_up = f"{second.cause.value} {second.subject}".strip()
+    return Change(
+        cause=best.cause,
+        subject=best.subject,
+        since_ns=since_ns,
+        value=best.value,
+        sigma=best.sigma,
+        counted=best.counted,
+        log_odds=0.5 * (nothing.misfit - best.misfit),
+        runner_up="as counted" if second is nothing else runner_up,
+        runner_up_log_odds=0.5 * (second.misfit - best.misfit),
+    )
+
+
+def first_changed(explainer: Explainer, signatures: Floats, counted_m: Floats, changed_m: Floats) -> int:
+    """Index of the first of some gait cycles, signatures (n, F), that belongs to a change of clearances.
+
+    It is where the likelihood of the cycles before as counted, and of those after as changed, is largest.
+    """
+    before, after = (explainer.model.at(clearance)[0] for clearance in (counted_m, changed_m))
+    weighted = np.linalg.solve(explainer.covariance(1), after - before)
+    middle = 0.5 * (before + after) + explainer.baseline.offset
+    gain = (signatures - middle) @ weighted
+    return int(np.cumsum(gain[::-1])[::-1].argmax())

@@ -1,0 +1,94 @@
+"""What changes a torque's signature beside clearances: friction, scale, lag, load, masses."""
+
+import attrs
+import numpy as np
+
+from leg_wear_monitor.mechanism.arrays import Floats
+from leg_wear_monitor.mechanism.ideal import one_cycle
+from leg_wear_monitor.mechanism.position import build_linkage
+from leg_wear_monitor.mechanism.spec import Mechanism
+from leg_wear_monitor.monitor.diagnosis.diagnosis import Cause
+from leg_wear_monitor.monitor.diagnosis.explanations import Baseline, Nuisance
+from leg_wear_monitor.monitor.diagnosis.signature import TorqueSensor
+from leg_wear_monitor.monitor.diagnosis.signature_model import simulated_signatures
+from leg_wear_monitor.twin.follower.load import load_signature
+from leg_wear_monitor.twin.reference.torque_reference import TorqueReference
+
+# usual changes of a leg that is all right: friction warms up, sensors drift, the ground differs
+_FRICTION = 0.1  # of the torque's size
+_SCALE = 0.02
+_OFFSET_RAD = 0.01  # a lag of 1.6 ms at 60 rpm, or a crank offset: at one speed the two look alike
+_LOAD_N = 5.0
+
+# of a leg that was never commissioned: tolerance of masses, and what else the model may have wrong
+_MASS_TOLERANCE = 0.05
+_MEAN_ERROR = 0.05  # of the torque's size, in each phase
+_ROUGHNESS_ERROR = 0.15
+_SENSOR_TOLERANCE = 5.0  # times the usual changes of friction, scale and lag
+
+_IDEAL_POINTS = 160  # of a gait cycle, four in a phase
+_SCALE_STEP, _OFFSET_STEP_RAD, _MASS_STEP = 0.1, 0.03, 0.01
+
+
+def nuisances(mechanism: Mechanism, reference: TorqueReference, sensor: TorqueSensor) -> list[Nuisance]:
+    """Nuisances of a leg that walks as a reference does."""
+    phases, speed = sensor.phases, reference.profile.speed
+    constant = np.concatenate([np.full(phases, np.sign(speed)), np.zeros(phases)])
+    scaled = _difference(reference, sensor, "scale", 1.0, _SCALE_STEP)
+    shifted = _difference(reference, sensor, "offset_rad", 0.0, _OFFSET_STEP_RAD)
+    found = [
+        Nuisance(Cause.FRICTION, "", constant, _FRICTION * sensor.size_nm),
+        Nuisance(Cause.SCALE, "", scaled, _SCALE),
+        # the samples' angle is too large where the torque comes late
+        Nuisance(Cause.CRANK_OFFSET, "", shifted, _OFFSET_RAD),
+    ]
+    if mechanism.toe is not None:
+        lever, _ = load_signature(build_linkage(mechanism))
+        found.append(Nuisance(Cause.LOAD, "", _of_torque(lever[:-1], phases), _LOAD_N))
+    ideal = _ideal_torque(mechanism, speed)
+    for name, body in mechanism.bodies.items():
+        if body.mass > 0.0:
+            heavier = attrs.evolve(
+                body, mass=(1.0 + _MASS_STEP) * body.mass, inertia=(1.0 + _MASS_STEP) * body.inertia
+            )
+            changed = attrs.evolve(mechanism, bodies={**mechanism.bodies, name: heavier})
+            column = _of_torque((_ideal_torque(changed, speed) - ideal) / _MASS_STEP, phases)
+            found.append(Nuisance(Cause.MASS, name, column, 0.0))
+    return found
+
+
+def commissioned_baseline(offset: Floats, covariance: Floats, cycles: int, reference_cycles: int) -> Baseline:
+    """Baseline from the mean difference (F,) of so many cycles of the commissioned leg."""
+    return Baseline(offset, covariance * (1.0 / cycles + 1.0 / reference_cycles))
+
+
+def unknown_baseline(found: list[Nuisance], sensor: TorqueSensor) -> Baseline:
+    """Baseline of a leg that was never commissioned, with its tolerances."""
+    phases = sensor.phases
+    covariance = np.diag(np.repeat([_MEAN_ERROR * sensor.size_nm, _ROUGHNESS_ERROR], phases) ** 2)
+    for one in found:
+        spread = _MASS_TOLERANCE if one.cause is Cause.MASS else _SENSOR_TOLERANCE * one.spread
+        covariance += spread**2 * np.outer(one.column, one.column)
+    return Baseline(np.zeros(2 * phases), covariance)
+
+
+def _difference(
+    reference: TorqueReference, sensor: TorqueSensor, argument: str, middle: float, step: float
+) -> Floats:
+    """Derivative of the expected leg's signature by an argument of `simulated_signatures`."""
+    less, more = (
+        simulated_signatures(reference, 0, sensor, **{argument: middle + sign * step}).mean(axis=0)
+        for sign in (-1.0, 1.0)
+    )
+    return np.asarray((more - less) / (2.0 * step))
+
+
+def _ideal_torque(mechanism: Mechanism, speed: float) -> Floats:
+    return one_cycle(build_linkage(mechanism), _IDEAL_POINTS, speed).drive_torque
+
+
+def _of_torque(torque: Floats, phases: int) -> Floats:
+    """Signature's change by a torque that is added at equal steps of the crank angle, without roughness."""
+    at = np.minimum((np.arange(len(torque)) / len(torque) * phases).astype(np.int64), phases - 1)
+    mean = np.bincount(at, torque, phases) / np.bincount(at, minlength=phases)
+    return np.concatenate([mean, np.zeros(phases)])

@@ -1,0 +1,411 @@
+"""The drive torque in the monitor: from its samples to clearances, and to what has changed.
+
+All evaluation takes place at the ends of evaluation periods, which depend on the order of arrival only. Each
+period evaluates the gait cycles that ended; each second one simulates a cycle for the reference, if needed.
+"""
+
+import math
+from typing import NamedTuple
+
+import attrs
+import numpy as np
+
+from leg_wear_monitor.mechanism.arrays import Floats
+from leg_wear_monitor.mechanism.spec import Mechanism
+from leg_wear_monitor.monitor.config.settings import MonitorConfig
+from leg_wear_monitor.monitor.diagnosis.change_detector import ChangeDetector
+from leg_wear_monitor.monitor.diagnosis.diagnosis import Cause, Change, Diagnosis, DiagnosisState
+from leg_wear_monitor.monitor.diagnosis.explanations import Explainer
+from leg_wear_monitor.monitor.diagnosis.leg_model import (
+    best_fit,
+    change_of,
+    explainer_of,
+    first_changed,
+    start_of,
+)
+from leg_wear_monitor.monitor.diagnosis.reference_file import shipped_reference
+from leg_wear_monitor.monitor.diagnosis.signature import TorqueSensor, signatures
+from leg_wear_monitor.monitor.diagnosis.signature_model import with_noise_of
+from leg_wear_monitor.monitor.diagnosis.state import SignedCycle, TorqueState
+from leg_wear_monitor.monitor.diagnosis.torque_samples import (
+    NO_TORQUE_SAMPLES,
+    after,
+    cycle_torque,
+    extended,
+    sensor_period_s,
+)
+from leg_wear_monitor.monitor.ledger.entry import CommissionedTorque
+from leg_wear_monitor.twin.reference.crank_profile import CrankProfile, mean_profile
+from leg_wear_monitor.twin.reference.torque_reference import (
+    TorqueReference,
+    TorqueReferenceRun,
+    TorqueReferenceSnapshot,
+)
+from leg_wear_monitor.twin.sample import Samples
+from leg_wear_monitor.twin.settings import INSTANT
+from leg_wear_monitor.twin.statistics import CycleStatistics
+
+COMMISSIONING_CYCLES = 30
+WINDOW_CYCLES = 60  # that clearances are estimated from
+SETTLING_CYCLES = 10  # since a change, before the counted clearances are corrected by it
+
+_FIRST_CYCLES = 5  # before a reference is chosen
+_LEAST_CYCLES = 2  # since a change, before it is explained: the first contains the change itself
+_LONGEST = 1.5  # times the time in motion: a longer cycle contains standstill, no steady gait
+_UNLIKE = 0.015  # of the mean speed: a crank that turns otherwise than in the reference by more
+_UNLIKE_CYCLES = 20  # in a row, until a new reference is made
+_FAR = 0.1  # of a counted clearance: the reference is renewed where it was made for another one
+_ESTIMATED_M, _ESTIMATED = 1.0e-4, 0.2  # largest standard deviation of an observable clearance; of it
+_UNUSABLE_CYCLES = 3
+_FIT_EVERY = 10  # gait cycles, while nothing changes
+
+
+class TorqueObserverSnapshot(NamedTuple):
+    """Whole state of a `TorqueObserver`."""
+
+    state: TorqueState
+    reference: TorqueReferenceSnapshot | None
+
+
+class Correction(NamedTuple):
+    """A counted clearance that is surely wrong: joint index, its clearance [m], and the change behind it."""
+
+    joint: int
+    clearance_m: float
+    change: Change
+
+
+class TorqueObserver:
+    """Estimates clearances from the drive torque, and detects what changes.
+
+    Parameters
+    ----------
+    mechanism : Mechanism
+        With the parameters of the configuration applied.
+    config : MonitorConfig
+    size_nm : float
+        RMS of the leg's drive torque at the commanded speed.
+    counted_m : (k,) array
+        Counted clearances.
+    commissioned : CommissionedTorque or None
+        That of the ledger.
+
+    Raises
+    ------
+    ConfigError, AssemblyError
+    """
+
+    def __init__(
+        self,
+        mechanism: Mechanism,
+        config: MonitorConfig,
+        size_nm: float,
+        counted_m: Floats,
+        commissioned: CommissionedTorque | None = None,
+    ) -> None:
+        self._mechanism, self.config, self._size_nm = mechanism, config, size_nm
+        self._shipped = shipped_reference(mechanism)
+        self._run: TorqueReferenceRun | None = None
+        self._explainer: Explainer | None = None
+        self._detector: ChangeDetector | None = None
+        self.state = TorqueState(np.asarray(counted_m, float).copy(), commissioned=commissioned)
+
+    def add_samples(self, piece: Samples) -> None:
+        """Add samples in the order of arrival."""
+        self.state.samples = extended(self.state.samples, piece)
+
+    def ended(self, statistics: CycleStatistics) -> None:
+        """Note the end of a gait cycle, which is used if the leg walked as commanded."""
+        cadence = self.config.cadence
+        rpm = 60.0 * statistics.direction / statistics.moving_s
+        steady = statistics.bridged_s == 0.0 and statistics.duration_s <= _LONGEST * statistics.moving_s
+        if steady and abs(rpm - cadence.commanded_rpm) <= cadence.tolerance_rpm:
+            self.state.due = (*self.state.due, (statistics.begin_ns, statistics.stamp_ns))
+
+    def end_period(self, counted_m: Floats, depth: Floats) -> Correction | None:
+        """Evaluate the gait cycles that ended, and simulate one more for the reference.
+
+        Parameters
+        ----------
+        counted_m : (k,) array
+            Counted mean clearances.
+        depth : (k, 2, N) array
+            Counted wear [m].
+
+        Returns
+        -------
+        Correction or None
+            A counted clearance that is surely wrong, and shall be corrected before the next period.
+        """
+        state = self.state
+        self._follow_counted(counted_m)
+        for begin_ns, end_ns in state.due:
+            self._evaluate(begin_ns, end_ns)
+        state.samples = after(state.samples, state.due[-1][1] if state.due else 0)
+        ended, state.due = bool(state.due), ()
+        self._refer(counted_m, depth)
+        return self._correction() if ended else None
+
+    def corrected(self, correction: Correction, counted_m: Floats) -> None:
+        """Compare with the corrected clearances (k,) [m] from now on.
+
+        The gait cycles since the change become those of the commissioned leg: what the correction is off does
+        not look like a further change.
+        """
+        state, change = self.state, correction.change
+        cycles = [cycle for cycle in state.cycles if cycle.begin_ns >= change.since_ns]
+        counted_m = np.asarray(counted_m, float).copy()
+        mean = np.mean([cycle.signature for cycle in cycles], axis=0)
+        state.commissioned = CommissionedTorque(cycles[-1].end_ns, len(cycles), counted_m, mean)
+        state.settled = (*state.settled, attrs.evolve(change, is_corrected=True))
+        self._restart(counted_m)
+        self._explainer = None
+
+    def replaced(self, counted_m: Floats) -> None:
+        """Start again after the replacement of a part: the leg has to be commissioned again."""
+        self.state.settled, self.state.commissioned = (), None
+        self._restart(counted_m)
+
+    def begin_epoch(self) -> None:
+        """Forget kept samples and gait cycles, because stamps start again."""
+        self.state.samples, self.state.due = NO_TORQUE_SAMPLES, ()
+        self._restart(self.state.counted_m)
+
+    @property
+    def diagnosis(self) -> Diagnosis:
+        """What the drive torque shows now."""
+        state = self.state
+        if state.fit is None or state.detector is None:
+            return Diagnosis(state=DiagnosisState.WAITING, reason=self._missing(), changes=state.settled)
+        observable = state.fit.sigma_m <= np.maximum(_ESTIMATED_M, _ESTIMATED * state.fit.clearance_m)
+        unlike = "the crank turns otherwise than it did before; a new reference is being simulated"
+        return Diagnosis(
+            state=DiagnosisState.CHANGED if state.changes else DiagnosisState.AS_COUNTED,
+            reason=unlike if state.unlike >= _UNLIKE_CYCLES else "",
+            cycles=state.fit_cycles,
+            clearance_m=tuple(np.where(observable, state.fit.clearance_m, math.nan).tolist()),
+            sigma_m=tuple(np.where(observable, state.fit.sigma_m, math.nan).tolist()),
+            changes=state.settled + state.changes,
+        )
+
+    def snapshot(self) -> TorqueObserverSnapshot:
+        """A copy of the whole state."""
+        return TorqueObserverSnapshot(attrs.evolve(self.state), self._run.snapshot() if self._run else None)
+
+    def restore(self, snapshot: TorqueObserverSnapshot) -> None:
+        """Restore a snapshot of the same mechanism and parameters; results are then bit for bit the same."""
+        self.state = attrs.evolve(snapshot.state)
+        self._run = None
+        if snapshot.reference is not None:
+            self._run = TorqueReferenceRun(self._mechanism)
+            self._run.restore(snapshot.reference)
+        self._explainer, self._detector = None, None
+
+    def _missing(self) -> str:
+        """Why there is no estimate."""
+        state = self.state
+        if state.sensor is None or state.unusable >= _UNUSABLE_CYCLES:
+            return "no drive torque with enough samples in a gait cycle"
+        if not state.sensor.phases:
+            return "the drive torque has too few samples in a gait cycle"
+        if state.reference is None and self._run is not None and self._run.is_busy:
+            done = math.floor(100.0 * self._run.progress)
+            return f"the reference for this leg is being simulated: {done} %"
+        if state.has_failed:
+            return "the leg could not be simulated for a reference"
+        return f"gait cycles: {len(state.cycles)} of {_FIRST_CYCLES}"
+
+    def _evaluate(self, begin_ns: int, end_ns: int) -> None:
+        """Add a gait cycle to the evidence."""
+        state = self.state
+        cycle = self._signed(begin_ns, end_ns)
+        if cycle is None:
+            state.unusable += 1
+            return
+        state.unusable = 0
+        if state.reference is not None:
+            if cycle.profile.departure(state.reference.profile) > _UNLIKE:
+                state.unlike += 1
+                return
+            state.unlike = 0
+        state.cycles = (*state.cycles, cycle)[-WINDOW_CYCLES:]
+        if state.reference is not None:
+            self._take(cycle)
+            self._explain()
+            self._commission()
+
+    def _signed(self, begin_ns: int, end_ns: int) -> SignedCycle | None:
+        """A gait cycle with its signature; None where samples are too few."""
+        state = self.state
+        if state.sensor is None:
+            period_s = sensor_period_s(state.samples, begin_ns, end_ns)
+            if math.isnan(period_s):
+                return None
+            # as commanded: a reference, and all of its signatures, are for one cadence
+            cycle_s = 60.0 / abs(self.config.cadence.commanded_rpm)
+            instant = self.config.drive_torque.sampling == INSTANT
+            state.sensor = TorqueSensor(float(f"{period_s:.2g}"), cycle_s, self._size_nm, instant)
+        if not state.sensor.phases:
+            return None
+        torque = cycle_torque(state.samples, begin_ns, end_ns, state.sensor)
+        if torque is None:
+            return None
+        signature = signatures(
+            np.zeros(len(torque.angle), np.int64), torque.angle, torque.torque, torque.step, state.sensor
+        )[0]
+        if not np.isfinite(signature).all():
+            return None
+        return SignedCycle(begin_ns, end_ns, signature, torque.profile)
+
+    def _take(self, cycle: SignedCycle) -> None:
+        """Continue the test for changes."""
+        state, detector = self.state, self._tests
+        before = state.detector or detector.fresh()
+        state.detector = detector.with_cycle(before, cycle.signature, cycle.begin_ns)
+
+    def _explain(self) -> None:
+        """Renew the clearances, and the change if there is one."""
+        state, explainer = self.state, self._legs
+        found = self._tests.detection(state.detector) if state.detector else None
+        since_ns = state.changes[-1].since_ns if state.changes else found.since_ns if found else 0
+        cycles = [cycle for cycle in state.cycles if cycle.begin_ns >= since_ns]
+        if len(cycles) < _LEAST_CYCLES or not (since_ns or state.fit is None or state.fit_due <= 0):
+            state.fit_due -= 1
+            return
+        state.fit_due = _FIT_EVERY - 1
+        mean, counted_m = np.mean([cycle.signature for cycle in cycles], axis=0), state.counted_m
+        change = None
+        if since_ns and not _is_due(len(cycles)):
+            return
+        if since_ns:
+            change = change_of(explainer.explanations(mean, len(cycles), counted_m), since_ns)
+            if change is not None:
+                state.changes = (self._dated(change),)
+            elif len(cycles) >= SETTLING_CYCLES:  # what was detected does not last
+                state.changes, state.detector = (), self._tests.fresh()
+        starts = [counted_m, start_of(change, explainer.joints, counted_m)]
+        starts += [state.fit.clearance_m] if state.fit else []
+        state.fit = best_fit(explainer, mean, len(cycles), counted_m, starts)
+        state.fit_cycles = len(cycles)
+
+    def _dated(self, change: Change) -> Change:
+        """The change with its most probable begin; what is no clearance keeps that of its detection."""
+        if change.cause is not Cause.CLEARANCE:
+            return change
+        state, explainer = self.state, self._legs
+        signatures = np.array([cycle.signature for cycle in state.cycles])
+        changed_m = start_of(change, explainer.joints, state.counted_m)
+        first = first_changed(explainer, signatures, state.counted_m, changed_m)
+        return attrs.evolve(change, since_ns=state.cycles[first].begin_ns)
+
+    def _commission(self) -> None:
+        """Keep the mean signature of a leg that is as counted."""
+        state = self.state
+        if state.commissioned is not None or state.changes or len(state.cycles) < COMMISSIONING_CYCLES:
+            return
+        state.commissioned = CommissionedTorque(
+            state.cycles[-1].end_ns, len(state.cycles), state.counted_m, self._mean_signature()
+        )
+        self._review()
+
+    def _correction(self) -> Correction | None:
+        """A settled change of one clearance."""
+        state = self.state
+        if not self.config.diagnosis.correct or not state.changes or state.fit_cycles < SETTLING_CYCLES:
+            return None
+        change, joints = state.changes[-1], self._mechanism.clearance_joints
+        if change.subject not in joints or not change.is_sure or change.value <= change.counted:
+            return None
+        return Correction(joints.index(change.subject), change.value, change)
+
+    def _refer(self, counted_m: Floats, depth: Floats) -> None:
+        """Choose a reference, continue its simulation, or begin a new one if required."""
+        state = self.state
+        if self._run is not None and self._run.is_busy:
+            state.pause = not state.pause
+            found = None if state.pause else self._run.advance()
+            if found is not None:
+                self._install(found)
+            elif not self._run.is_busy:
+                state.has_failed = True
+            return
+        if len(state.cycles) < _FIRST_CYCLES or state.has_failed:
+            return
+        if state.reference is None:
+            profile = mean_profile([cycle.profile for cycle in state.cycles])
+            shipped = self._shipped
+            if shipped is not None and profile.departure(shipped.profile) <= _UNLIKE:
+                self._install(shipped)
+            else:
+                self._begin(counted_m, depth, profile)
+        elif state.unlike >= _UNLIKE_CYCLES:
+            state.cycles, state.reference, state.fit, state.unlike = (), None, None, 0
+            self._explainer, self._detector = None, None
+        elif (np.abs(state.reference.clearance_m[0] / counted_m - 1.0) > _FAR).any():
+            self._begin(counted_m, depth, mean_profile([cycle.profile for cycle in state.cycles]))
+
+    def _begin(self, counted_m: Floats, depth: Floats, profile: CrankProfile) -> None:
+        """Begin the simulation of a reference."""
+        if self._run is None:
+            self._run = TorqueReferenceRun(self._mechanism)
+        self._run.begin(counted_m, depth, profile)
+
+    def _install(self, reference: TorqueReference) -> None:
+        """Evaluate the kept cycles with a new reference."""
+        self.state.reference = reference
+        self._review()
+
+    def _review(self) -> None:
+        """Evaluate the kept cycles again."""
+        state, self._explainer, self._detector = self.state, None, None
+        if state.reference is not None and state.sensor is not None:
+            measured = state.commissioned.signature if state.commissioned else self._mean_signature()
+            state.sensor = with_noise_of(state.reference, state.sensor, measured)
+        state.detector, state.changes = None, ()
+        for cycle in state.cycles:
+            self._take(cycle)
+        self._explain()
+
+    def _restart(self, counted_m: Floats) -> None:
+        """Forget the kept cycles, because the leg, or what is counted of it, has changed."""
+        state = self.state
+        state.counted_m = np.asarray(counted_m, float).copy()
+        state.cycles, state.detector, state.changes, self._detector = (), None, (), None
+        state.has_failed = False
+
+    def _follow_counted(self, counted_m: Floats) -> None:
+        """Compare with the counted clearances as they grow."""
+        state = self.state
+        if (np.abs(counted_m / state.counted_m - 1.0) > 0.005).any():
+            state.counted_m, self._detector = np.asarray(counted_m, float).copy(), None
+
+    def _mean_signature(self) -> Floats:
+        """Mean (F,) over the kept cycles."""
+        return np.asarray(np.mean([cycle.signature for cycle in self.state.cycles], axis=0))
+
+    @property
+    def _legs(self) -> Explainer:
+        """Legs that may be the measured one; made anew where reference, sensor or baseline have changed."""
+        state = self.state
+        if self._explainer is None:
+            if state.reference is None or state.sensor is None:
+                raise RuntimeError("there is no reference yet")
+            self._explainer = explainer_of(self._mechanism, state.reference, state.sensor, state.commissioned)
+        return self._explainer
+
+    @property
+    def _false_alarm_cycles(self) -> float:
+        """Gait cycles between two false findings."""
+        return 60.0 * abs(self.config.cadence.commanded_rpm) * self.config.diagnosis.false_alarm_hours
+
+    @property
+    def _tests(self) -> ChangeDetector:
+        """Tests against the counted leg."""
+        if self._detector is None:
+            self._detector = ChangeDetector(self._legs, self.state.counted_m, self._false_alarm_cycles)
+        return self._detector
+
+
+def _is_due(cycles: int) -> bool:
+    """Whether a change is explained again after so many gait cycles: often at first."""
+    return cycles <= SETTLING_CYCLES or cycles % _FIT_EVERY == 0

@@ -1,0 +1,99 @@
+"""The signature of a gait cycle: what its drive torque is in each phase, and how rough."""
+
+import math
+
+import attrs
+import numpy as np
+
+from leg_wear_monitor.mechanism.arrays import Floats, Ints
+from leg_wear_monitor.mechanism.ideal import TURN
+
+SAMPLES = 200  # a gait cycle: what comes faster is averaged, since clearances show at these times already
+
+_PHASES = (40, 20, 10)
+_LEAST_IN_PHASE = 2.5  # samples on average
+_FLOOR = 1.0e-4  # of the torque's size, below which roughness is rounding
+_CLIP = 8.0  # times the torque's size: a peak counts as at most this
+
+
+@attrs.frozen
+class TorqueSensor:
+    """How a drive torque is measured.
+
+    Attributes
+    ----------
+    period_s : float
+        Time between two samples.
+    cycle_s : float
+        Duration of a gait cycle.
+    size_nm : float
+        RMS of the leg's drive torque.
+    is_instant : bool
+        Whether a sample is the torque at its instant, or else the mean since the one before.
+    noise_nm : float
+        Standard deviation of a sample.
+    """
+
+    period_s: float
+    cycle_s: float
+    size_nm: float
+    is_instant: bool = False
+    noise_nm: float = 0.0
+
+    @property
+    def together(self) -> int:
+        """Number of samples that are averaged into one."""
+        return max(1, round(self.cycle_s / SAMPLES / self.period_s))
+
+    @property
+    def phases(self) -> int:
+        """Number of phases of a signature; 0 where samples are too few for one."""
+        samples = self.cycle_s / (self.period_s * self.together)
+        return next((phases for phases in _PHASES if samples >= _LEAST_IN_PHASE * phases), 0)
+
+
+def averaged(values: Floats, together: int) -> Floats:
+    """Means (n // together,) of neighbouring values; what is left over at the end is dropped."""
+    whole = len(values) // together * together
+    return np.asarray(values[:whole].reshape(-1, together).mean(axis=1))
+
+
+def signatures(cycle: Ints, angle: Floats, torque: Floats, step: Floats, sensor: TorqueSensor) -> Floats:
+    """Signatures of gait cycles.
+
+    Parameters
+    ----------
+    cycle : (n,) array of int
+        Number of the gait cycle of each sample, from 0.
+    angle, torque : (n,) arrays
+        Crank angle [rad] and drive torque [N m] of each sample.
+    step : (n,) array
+        Torque less that of the sample before [N m]; NaN where that was lost.
+    sensor : TorqueSensor
+
+    Returns
+    -------
+    (cycles, 2 phases) array
+        Mean torque [N m] of each phase, then the logarithm of the mean size of the steps [log N m]; NaN for a
+        phase without samples.
+    """
+    phases, furthest = sensor.phases, _CLIP * sensor.size_nm
+    at = np.minimum(((angle / TURN) % 1.0 * phases).astype(np.int64), phases - 1)
+    cycles = int(cycle.max()) + 1 if len(cycle) else 0
+    sums, counts = np.zeros((2, cycles, 2 * phases))
+    known = np.isfinite(step)
+    for which, value, first in ((known | True, torque, 0), (known, np.abs(step), phases)):
+        place = (cycle[which] * 2 * phases + first + at[which]).astype(np.int64)
+        np.add.at(sums.ravel(), place, np.clip(value[which], -furthest, furthest))
+        np.add.at(counts.ravel(), place, 1.0)
+    with np.errstate(invalid="ignore"):
+        means = sums / counts
+    means[:, phases:] = np.log(means[:, phases:] + _FLOOR * sensor.size_nm)
+    return np.asarray(means)
+
+
+def quiet_phases(signature: Floats) -> Floats:
+    """Which entries (2 phases,) are the roughness of the calmest third of the phases, as booleans."""
+    phases = len(signature) // 2
+    limit = np.sort(signature[phases:])[math.ceil(phases / 3) - 1]
+    return np.concatenate([np.zeros(phases, bool), signature[phases:] <= limit])

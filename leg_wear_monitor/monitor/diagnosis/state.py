@@ -1,0 +1,80 @@
+"""State of the torque observer; every value is immutable, so a shallow copy is a snapshot."""
+
+from typing import NamedTuple
+
+import attrs
+
+from leg_wear_monitor.mechanism.arrays import Floats
+from leg_wear_monitor.monitor.diagnosis.change_detector import DetectorState
+from leg_wear_monitor.monitor.diagnosis.clearance_fit import ClearanceFit
+from leg_wear_monitor.monitor.diagnosis.diagnosis import Change
+from leg_wear_monitor.monitor.diagnosis.signature import TorqueSensor
+from leg_wear_monitor.monitor.diagnosis.torque_samples import NO_TORQUE_SAMPLES, TorqueSamples
+from leg_wear_monitor.monitor.ledger.entry import CommissionedTorque
+from leg_wear_monitor.twin.reference.crank_profile import CrankProfile
+from leg_wear_monitor.twin.reference.torque_reference import TorqueReference
+
+
+class SignedCycle(NamedTuple):
+    """A gait cycle: stamps of its begin and end [ns], its signature (F,), and how the crank turned."""
+
+    begin_ns: int
+    end_ns: int
+    signature: Floats
+    profile: CrankProfile
+
+
+@attrs.define
+class TorqueState:
+    """State of a `TorqueObserver`, its reference run aside.
+
+    Attributes
+    ----------
+    samples : TorqueSamples
+    due : tuple of (int, int)
+        Begin and end [ns] of ended gait cycles that are not evaluated yet.
+    sensor : TorqueSensor or None
+        As found in the first gait cycle with torques.
+    cycles : tuple of SignedCycle
+        The last gait cycles.
+    reference : TorqueReference or None
+    counted_m : (k,) array
+        Counted clearances that the detector compares with.
+    commissioned : CommissionedTorque or None
+    detector : DetectorState or None
+    fit : ClearanceFit or None
+    fit_cycles : int
+        Gait cycles in the fit.
+    fit_due : int
+        Gait cycles until the next fit.
+    changes : tuple of Change
+        Unsettled changes; the last one is being observed.
+    settled : tuple of Change
+        Changes by which the counted clearances were corrected.
+    unlike : int
+        Gait cycles in a row whose crank turned otherwise than in the reference.
+    unusable : int
+        Gait cycles in a row without a signature.
+    pause : bool
+        Whether the last period did not simulate; each second one does, so that a monitor has time for both.
+    has_failed : bool
+        Whether the leg could not be simulated for a reference.
+    """
+
+    counted_m: Floats
+    samples: TorqueSamples = NO_TORQUE_SAMPLES
+    due: tuple[tuple[int, int], ...] = ()
+    sensor: TorqueSensor | None = None
+    cycles: tuple[SignedCycle, ...] = ()
+    reference: TorqueReference | None = None
+    commissioned: CommissionedTorque | None = None
+    detector: DetectorState | None = None
+    fit: ClearanceFit | None = None
+    fit_cycles: int = 0
+    fit_due: int = 0
+    changes: tuple[Change, ...] = ()
+    settled: tuple[Change, ...] = ()
+    unlike: int = 0
+    unusable: int = 0
+    pause: bool = False
+    has_failed: bool = False

@@ -1,0 +1,104 @@
+"""Samples of the crank and of the drive torque, kept until their gait cycle ends."""
+
+from typing import NamedTuple
+
+import attrs
+import numpy as np
+
+from leg_wear_monitor.mechanism.arrays import Floats, Ints
+from leg_wear_monitor.mechanism.ideal import TURN
+from leg_wear_monitor.monitor.diagnosis.signature import TorqueSensor, averaged
+from leg_wear_monitor.twin.kinds import CRANK, TORQUE
+from leg_wear_monitor.twin.reference.crank_profile import CrankProfile, cycle_profile
+from leg_wear_monitor.twin.sample import NO_FAULT, Samples, brings
+
+MOST = 20_000  # samples of each kind that are kept: ten seconds at 2 kHz
+
+_LOST = 1.5  # periods of the sensor: in a longer time between two samples, some were lost
+_LEAST_CRANK_SAMPLES = 40  # in a gait cycle, for its profile
+
+
+@attrs.frozen(eq=False)
+class TorqueSamples:
+    """Stamps [ns] and crank angles [rad], stamps [ns] and drive torques [N m], in the order of arrival."""
+
+    crank_ns: Ints
+    crank_rad: Floats
+    torque_ns: Ints
+    torque_nm: Floats
+
+
+NO_TORQUE_SAMPLES = TorqueSamples(np.zeros(0, np.int64), np.zeros(0), np.zeros(0, np.int64), np.zeros(0))
+
+
+class CycleTorque(NamedTuple):
+    """Drive torque over a gait cycle.
+
+    ``angle`` (n,) crank angle [rad], ``torque`` (n,) [N m], ``step`` (n,) torque less that of the sample
+    before [N m], NaN where that was lost; ``profile`` how the crank turned; ``period_s`` of the sensor.
+    """
+
+    angle: Floats
+    torque: Floats
+    step: Floats
+    profile: CrankProfile
+    period_s: float
+
+
+def extended(kept: TorqueSamples, piece: Samples) -> TorqueSamples:
+    """Samples extended by the valid ones of a piece."""
+    piece = piece[(piece["fault"] == NO_FAULT) & (piece["stamp_ns"] > 0)]
+    crank = piece[(piece["kind"] == CRANK) & np.isfinite(piece["crank_angle_rad"])]
+    torque = piece[brings(piece, TORQUE) & np.isfinite(piece["torque_nm"])]
+    return TorqueSamples(
+        np.concatenate([kept.crank_ns, crank["stamp_ns"]]),
+        np.concatenate([kept.crank_rad, crank["crank_angle_rad"]]),
+        np.concatenate([kept.torque_ns, torque["stamp_ns"]]),
+        np.concatenate([kept.torque_nm, torque["torque_nm"]]),
+    )
+
+
+def after(kept: TorqueSamples, stamp_ns: int) -> TorqueSamples:
+    """Samples from a stamp on, at most `MOST` of each kind."""
+    crank = np.flatnonzero(kept.crank_ns >= stamp_ns)[-MOST:]
+    torque = np.flatnonzero(kept.torque_ns >= stamp_ns)[-MOST:]
+    return TorqueSamples(
+        kept.crank_ns[crank], kept.crank_rad[crank], kept.torque_ns[torque], kept.torque_nm[torque]
+    )
+
+
+def sensor_period_s(kept: TorqueSamples, begin_ns: int, end_ns: int) -> float:
+    """Median time between the torque samples of a gait cycle; NaN where there are fewer than three."""
+    stamps, _ = _between(kept.torque_ns, kept.torque_nm, begin_ns, end_ns)
+    return float(np.median(np.diff(stamps))) * 1.0e-9 if len(stamps) > 2 else float("nan")
+
+
+def cycle_torque(kept: TorqueSamples, begin_ns: int, end_ns: int, sensor: TorqueSensor) -> CycleTorque | None:
+    """Drive torque between two passages of the crank's zero; None where samples are too few.
+
+    Samples that come faster than signatures need are averaged.
+    """
+    crank_ns, crank = _between(kept.crank_ns, kept.crank_rad, begin_ns, end_ns)
+    torque_ns, torque = _between(kept.torque_ns, kept.torque_nm, begin_ns, end_ns)
+    if len(crank_ns) < _LEAST_CRANK_SAMPLES or len(torque_ns) < 2 * sensor.together:
+        return None
+    turned: Floats = np.asarray(np.unwrap(crank, period=TURN), dtype=np.float64)
+    since_s = np.asarray(1.0e-9 * (crank_ns - begin_ns), dtype=np.float64)
+    profile = cycle_profile(since_s, turned, 1.0e-9 * (end_ns - begin_ns))
+    gap = np.diff(torque_ns, prepend=torque_ns[0]) > _LOST * 1.0e9 * sensor.period_s
+    angle = np.interp(torque_ns, crank_ns, turned)
+    if sensor.together > 1:
+        angle = angle[sensor.together - 1 :: sensor.together]
+        torque = averaged(torque, sensor.together)
+        gap = averaged(gap.astype(float), sensor.together) > 0.0
+        angle = angle[: len(torque)]
+    step = np.diff(torque, prepend=np.nan)
+    step[gap] = np.nan
+    return CycleTorque(angle, torque, step, profile, sensor.period_s)
+
+
+def _between(stamps: Ints, values: Floats, begin_ns: int, end_ns: int) -> tuple[Ints, Floats]:
+    """Stamps and values of a time, in order; of equal stamps the first that arrived."""
+    there, first = np.unique(stamps, return_index=True)
+    inside = (there >= begin_ns) & (there < end_ns)
+    return there[inside], values[first[inside]]

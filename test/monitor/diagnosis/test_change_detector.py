@@ -1,0 +1,88 @@
+"""CUSUM tests on signatures of which the statistics are known."""
+
+import math
+
+import numpy as np
+import pytest
+
+from leg_wear_monitor.monitor.diagnosis.change_detector import FACTORS, ChangeDetector, threshold
+from leg_wear_monitor.monitor.diagnosis.explanations import Baseline, Explainer
+from leg_wear_monitor.monitor.diagnosis.signature import TorqueSensor
+from leg_wear_monitor.monitor.diagnosis.signature_model import SignatureModel
+
+NEW = np.array([3.0e-4, 3.0e-4])
+F = 12
+
+
+def model(scatter: float = 1.0) -> SignatureModel:
+    """Two joints whose signatures are linear in the logarithm of their clearances."""
+    random = np.random.default_rng(1)
+    grid = np.tile(NEW[0] * np.array([1.0, 2.0, 5.0]), (2, 1))
+    slopes = random.standard_normal((2, F))
+    change = np.log(grid / NEW[0])[:, :, None] * 4.0 * slopes[:, None, :]
+    sensor = TorqueSensor(0.005, 1.0, 10.0)
+    return SignatureModel(sensor, grid, random.standard_normal(F), change, scatter * np.eye(F), 10**9)
+
+
+def detector(hours: float = 240.0) -> ChangeDetector:
+    none = Baseline(np.zeros(F), np.zeros((F, F)))
+    return ChangeDetector(Explainer(model(), ("A", "B"), none, ()), NEW, 3600.0 * hours)
+
+
+def walked(tests, clearance, cycles, seed, begin=0):
+    """State after some cycles, and the cycles until a detection."""
+    random, state = np.random.default_rng(seed), tests.fresh()
+    mean = model().at(np.asarray(clearance))[0]
+    for i in range(cycles):
+        state = tests.with_cycle(state, mean + random.standard_normal(F), begin + 1 + i)
+        found = tests.detection(state)
+        if found:
+            return state, found, i + 1
+    return state, None, cycles
+
+
+def test_the_threshold_grows_with_the_time_between_false_alarms_and_with_the_tests() -> None:
+    assert threshold(math.e, 1) == pytest.approx(1.0)
+    assert threshold(1000.0, 20) == pytest.approx(math.log(20_000.0))
+
+
+def test_false_alarms_are_as_rare_as_chosen() -> None:
+    """With a chosen mean of 200 cycles, in 6000 cycles at most 30 are expected; the bound is conservative."""
+    tests, alarms = detector(200.0 / 3600.0), 0
+    random, state, mean = np.random.default_rng(5), tests.fresh(), model().mean
+    for i in range(6000):
+        state = tests.with_cycle(state, mean + random.standard_normal(F), i + 1)
+        if tests.detection(state):
+            alarms, state = alarms + 1, tests.fresh()
+    assert alarms <= 30
+
+
+@pytest.mark.parametrize("k", [0, 1])
+def test_a_wider_joint_is_detected_within_a_few_cycles_and_named(k: int) -> None:
+    for seed in range(20):
+        wide = NEW.copy()
+        wide[k] *= 1.5
+        _, found, cycles = walked(detector(), wide, 100, seed)
+        assert found is not None
+        assert cycles <= 20
+        assert found.test // len(FACTORS) == k
+
+
+def test_one_cycle_alone_raises_nothing() -> None:
+    tests = detector()
+    state = tests.with_cycle(tests.fresh(), model().at(5.0 * NEW)[0], 1)
+    assert tests.detection(state) is None
+    assert tests.detection(tests.with_cycle(state, model().at(5.0 * NEW)[0], 2)) is not None
+
+
+def test_since_is_the_begin_of_the_change() -> None:
+    tests, random = detector(), np.random.default_rng(2)
+    state, wide = tests.fresh(), model().at(np.array([6.0e-4, 3.0e-4]))[0]
+    for i in range(40):
+        mean = model().mean if i < 30 else wide
+        state = tests.with_cycle(state, mean + random.standard_normal(F), 1000 + i)
+        found = tests.detection(state)
+        if found:
+            break
+    assert found is not None
+    assert 1028 <= found.since_ns <= 1030

@@ -1,0 +1,119 @@
+"""Clearances and other causes from signatures of which the statistics are known."""
+
+import attrs
+import numpy as np
+import pytest
+
+from leg_wear_monitor.monitor.diagnosis.clearance_fit import fit_clearances
+from leg_wear_monitor.monitor.diagnosis.diagnosis import Cause
+from leg_wear_monitor.monitor.diagnosis.explanations import Baseline, Explainer, Nuisance
+from leg_wear_monitor.monitor.diagnosis.leg_model import change_of
+from leg_wear_monitor.monitor.diagnosis.signature import TorqueSensor
+from leg_wear_monitor.monitor.diagnosis.signature_model import SignatureModel
+
+JOINTS = ("A", "B", "G")
+NEW = np.full(3, 3.0e-4)
+F = 40
+GRID = NEW[0] * np.array([1.0, 1.2, 1.5, 2.0, 5.0])
+
+
+@pytest.fixture(scope="module")
+def explainer() -> Explainer:
+    """A model that is piecewise linear in logarithms, with friction and a heavier foot."""
+    random = np.random.default_rng(1234)
+    slopes = 3.0 * random.standard_normal((3, F))
+    change = np.log(GRID / NEW[0])[None, :, None] * slopes[:, None, :]
+    model = SignatureModel(
+        TorqueSensor(0.005, 1.0, 10.0), np.tile(GRID, (3, 1)), np.zeros(F), change, np.eye(F), 10**6
+    )
+    baseline = Baseline(0.1 * random.standard_normal(F), 1.0e-4 * np.eye(F))
+    friction = Nuisance(Cause.FRICTION, "", np.r_[np.ones(F // 2), np.zeros(F // 2)], 0.3)
+    foot = Nuisance(Cause.MASS, "foot", 10.0 * random.standard_normal(F), 0.0)
+    return Explainer(model, JOINTS, baseline, (friction, foot))
+
+
+def measured(explainer: Explainer, clearance, cycles: int, seed: int, extra=0.0):
+    """Mean signature of some cycles."""
+    random = np.random.default_rng(seed)
+    noise = random.standard_normal(F) / np.sqrt(cycles)
+    return explainer.model.at(np.asarray(clearance))[0] + explainer.baseline.offset + noise + extra
+
+
+def test_the_model_passes_through_its_grid(explainer: Explainer) -> None:
+    model = explainer.model
+    for i, clearance in enumerate(GRID):
+        found = model.at(np.array([NEW[0], clearance, NEW[0]]))[0]
+        np.testing.assert_allclose(found, model.change[1, i], atol=1e-12)
+
+
+def test_slopes_are_derivatives_by_the_logarithm(explainer: Explainer) -> None:
+    at = np.array([3.3e-4, 5.0e-4, 1.0e-3])
+    before, slopes = explainer.model.at(at)
+    for k in range(3):
+        more = at.copy()
+        more[k] *= 1.0 + 1.0e-6
+        np.testing.assert_allclose((explainer.model.at(more)[0] - before) / 1e-6, slopes[:, k], atol=1e-4)
+
+
+def test_all_clearances_are_found_within_their_standard_deviations(explainer: Explainer) -> None:
+    true = np.array([3.0e-4, 4.0e-4, 5.0e-4])
+    off = []
+    for seed in range(100):
+        fit = fit_clearances(explainer, measured(explainer, true, 10, seed), 10, NEW, NEW)
+        off.append((fit.clearance_m - true) / fit.sigma_m)
+    assert np.abs(off).max() < 5.0
+    assert 0.05 < np.std(off) < 1.3  # the model's own error is in the standard deviation, too
+
+
+def test_more_cycles_are_better(explainer: Explainer) -> None:
+    sigma = [
+        fit_clearances(explainer, measured(explainer, NEW, n, 1), n, NEW, NEW).sigma_m for n in (2, 10, 60)
+    ]
+    assert (sigma[0] > sigma[1]).all()
+    assert (sigma[1] > sigma[2]).all()
+
+
+@pytest.mark.parametrize("k", range(3))
+def test_one_wider_joint_is_named_with_its_clearance(explainer: Explainer, k: int) -> None:
+    true = NEW.copy()
+    true[k] *= 1.4
+    found = explainer.explanations(measured(explainer, true, 10, k), 10, NEW)
+    assert (found[0].cause, found[0].subject) == (Cause.CLEARANCE, JOINTS[k])
+    assert found[0].value == pytest.approx(true[k], abs=4.0 * found[0].sigma)
+    change = change_of(found, 5)
+    assert change is not None
+    assert change.is_sure
+    assert change.since_ns == 5
+
+
+def test_a_heavier_foot_is_a_mass_and_no_clearance(explainer: Explainer) -> None:
+    extra = 0.1 * explainer.nuisances[1].column
+    found = explainer.explanations(measured(explainer, NEW, 10, 1, extra), 10, NEW)
+    assert (found[0].cause, found[0].subject) == (Cause.MASS, "foot")
+    assert found[0].value == pytest.approx(0.1, abs=4.0 * found[0].sigma)
+    change = change_of(found, 5)
+    assert change is not None
+    assert not change.is_sure  # counted clearances are corrected by clearances alone
+
+
+def test_a_leg_as_counted_has_no_change(explainer: Explainer) -> None:
+    for seed in range(20):
+        found = explainer.explanations(measured(explainer, NEW, 30, seed), 30, NEW)
+        change = change_of(found, 5)
+        assert change is None or change.log_odds < 5.0
+
+
+def test_usual_friction_is_no_change_of_clearances(explainer: Explainer) -> None:
+    extra = 0.3 * explainer.nuisances[0].column
+    fit = fit_clearances(explainer, measured(explainer, NEW, 60, 1, extra), 60, NEW, NEW)
+    assert (np.abs(fit.clearance_m - NEW) < 4.0 * fit.sigma_m).all()
+
+
+def test_causes_do_not_depend_on_the_order_of_the_joints(explainer: Explainer) -> None:
+    model = explainer.model
+    turned = attrs.evolve(model, grid_m=model.grid_m[::-1], change=model.change[::-1])
+    other = Explainer(turned, JOINTS[::-1], explainer.baseline, explainer.nuisances)
+    mean = measured(explainer, [3.0e-4, 4.2e-4, 3.0e-4], 10, 4)
+    one, two = (each.explanations(mean, 10, NEW)[0] for each in (explainer, other))
+    assert one.subject == two.subject == "B"
+    assert one.value == pytest.approx(two.value, rel=1e-9)

@@ -1,0 +1,177 @@
+"""The torque observer on legs out of its own reference: plumbing, states, corrections; truth is elsewhere."""
+
+from types import SimpleNamespace
+
+import attrs
+import numpy as np
+import pytest
+
+from leg_wear_monitor.mechanism.ideal import TURN
+from leg_wear_monitor.monitor.config.settings import MonitorConfig
+from leg_wear_monitor.monitor.diagnosis.diagnosis import Cause, DiagnosisState
+from leg_wear_monitor.monitor.diagnosis.observer import COMMISSIONING_CYCLES, TorqueObserver
+from leg_wear_monitor.monitor.diagnosis.reference_file import shipped_reference
+from leg_wear_monitor.twin.kinds import CRANK, TORQUE
+from leg_wear_monitor.twin.reference.torque_reference import POINTS, WIDER
+from leg_wear_monitor.twin.sample import gait_samples
+from leg_wear_monitor.wear.surfaces import SECTORS
+
+NEW = np.full(5, 3.0e-4)
+SIZE_NM = 9.2
+START_NS = 1_700_000_000_000_000_000
+RATE = 200
+DEPTH = np.zeros((5, 2, SECTORS))
+
+
+@pytest.fixture(scope="module")
+def reference(leg):
+    return shipped_reference(leg)
+
+
+def leg_number(joint: int, factor: float) -> int:
+    """Leg of the reference with a joint wider by a factor."""
+    return 1 + len(WIDER) * joint + WIDER.index(factor)
+
+
+def samples(reference, numbers, seed=1, noise=0.3, angle_noise=1e-3):
+    """Crank and torque samples of gait cycles of legs of a reference, a leg number for each cycle."""
+    random = np.random.default_rng(seed)
+    cycles = [reference.torque_nm[n][random.integers(40)].astype(float) for n in numbers]
+    impulse = np.concatenate([[0.0], np.cumsum(np.concatenate(cycles))]) / POINTS
+    time = np.arange(len(cycles) * RATE + 1) / RATE
+    torque = np.diff(np.interp(time, np.arange(len(impulse)) / POINTS, impulse)) * RATE
+    torque += noise * random.standard_normal(len(torque))
+    stamp = START_NS + np.round(time[1:] * 1e9).astype(np.int64)
+    angle = TURN * time[1:] + angle_noise * random.standard_normal(len(torque))
+    both = [
+        gait_samples(stamp, CRANK, crank_angle_rad=angle),
+        gait_samples(stamp, TORQUE, torque_nm=torque),
+    ]
+    block = np.concatenate(both)
+    return block[np.argsort(block["stamp_ns"], kind="stable")]
+
+
+def walk(observer, block, counted=NEW, begin=0, end=None):
+    """Feed whole gait cycles; the corrections that come of it."""
+    last = int((block["stamp_ns"][-1] - START_NS) // 1_000_000_000)
+    corrections = []
+    for cycle in range(begin, end or last):
+        from_ns, to_ns = START_NS + cycle * 10**9, START_NS + (cycle + 1) * 10**9
+        observer.add_samples(block[(block["stamp_ns"] >= from_ns) & (block["stamp_ns"] < to_ns)])
+        observer.ended(
+            SimpleNamespace(
+                direction=1, moving_s=1.0, duration_s=1.0, bridged_s=0.0, begin_ns=from_ns, stamp_ns=to_ns
+            )
+        )
+        found = observer.end_period(counted, DEPTH)
+        if found:
+            corrections.append((cycle, found))
+    return corrections
+
+
+def observer_of(leg, **changes) -> TorqueObserver:
+    return TorqueObserver(leg, MonitorConfig(), SIZE_NM, NEW, **changes)
+
+
+def test_before_the_first_cycles_it_waits_and_reports_why(leg, reference) -> None:
+    observer = observer_of(leg)
+    assert observer.diagnosis.state is DiagnosisState.WAITING
+    assert "no drive torque" in observer.diagnosis.reason
+    walk(observer, samples(reference, [0] * 4))
+    assert observer.diagnosis.reason == "gait cycles: 4 of 5"
+
+
+def test_without_torques_it_reports_so(leg, reference) -> None:
+    observer = observer_of(leg)
+    block = samples(reference, [0] * 8)
+    walk(observer, block[block["kind"] == CRANK])
+    assert observer.diagnosis.state is DiagnosisState.WAITING
+    assert "no drive torque" in observer.diagnosis.reason
+
+
+def test_a_healthy_leg_is_as_counted_and_becomes_commissioned(leg, reference) -> None:
+    observer = observer_of(leg)
+    assert walk(observer, samples(reference, [0] * (COMMISSIONING_CYCLES + 20))) == []
+    found = observer.diagnosis
+    assert found.state is DiagnosisState.AS_COUNTED
+    assert found.changes == ()
+    assert observer.state.commissioned is not None
+    off = np.abs(np.array(found.clearance_m) - NEW)
+    assert (off < 4.0 * np.array(found.sigma_m)).all()
+
+
+@pytest.mark.parametrize("joint", [0, 3])
+def test_a_joint_that_opens_is_named_and_corrected(leg, reference, joint: int) -> None:
+    observer = observer_of(leg)
+    number = leg_number(joint, 1.5)
+    block = samples(reference, [0] * 35 + [number] * 25)
+    ((cycle, correction),) = walk(observer, block)[:1]
+    assert 43 <= cycle <= 57
+    assert correction.joint == joint
+    assert correction.clearance_m == pytest.approx(4.5e-4, rel=0.06)
+    change = correction.change
+    assert change.cause is Cause.CLEARANCE
+    assert abs(change.since_ns - START_NS - 35 * 10**9) <= 3 * 10**9
+    counted = NEW.copy()
+    counted[joint] = correction.clearance_m
+    observer.corrected(correction, counted)
+    assert observer.diagnosis.changes == (attrs.evolve(change, is_corrected=True),)
+    walk(observer, block, counted, cycle + 1)
+    assert observer.diagnosis.state is not DiagnosisState.CHANGED
+
+
+def test_a_leg_that_was_never_healthy_is_not_commissioned(leg, reference) -> None:
+    observer = observer_of(leg)
+    walk(observer, samples(reference, [leg_number(2, 3.0)] * 40))
+    assert observer.diagnosis.state is DiagnosisState.CHANGED
+    assert observer.diagnosis.changes[0].subject == "G"
+    assert observer.state.commissioned is None
+
+
+def test_one_strange_cycle_raises_nothing(leg, reference) -> None:
+    observer = observer_of(leg)
+    numbers = [0] * 40 + [leg_number(0, 8.0)] + [0] * 10
+    walk(observer, samples(reference, numbers))
+    assert observer.diagnosis.state is DiagnosisState.AS_COUNTED
+
+
+def test_a_restored_observer_continues_bit_for_bit(leg, reference) -> None:
+    block = samples(reference, [0] * 34 + [leg_number(4, 1.5)] * 12)
+    whole, half = observer_of(leg), observer_of(leg)
+    walk(whole, block)
+    walk(half, block, end=36)
+    snapshot, other = half.snapshot(), observer_of(leg)
+    other.restore(snapshot)
+    walk(half, block, begin=36)
+    walk(other, block, begin=36)
+    assert whole.diagnosis == half.diagnosis == other.diagnosis
+
+
+def test_a_crank_with_another_ripple_waits_for_a_reference_of_its_own(leg, reference) -> None:
+    observer = observer_of(leg)
+    block = samples(reference, [0] * 8)
+    crank = block["kind"] == CRANK
+    block["crank_angle_rad"][crank] += 0.03 * np.sin(2.0 * block["crank_angle_rad"][crank])
+    walk(observer, block)
+    found = observer.diagnosis
+    assert found.state is DiagnosisState.WAITING
+    assert "is being simulated" in found.reason
+
+
+def test_a_replaced_part_is_commissioned_again(leg, reference) -> None:
+    observer = observer_of(leg)
+    walk(observer, samples(reference, [0] * 40))
+    assert observer.state.commissioned is not None
+    observer.replaced(NEW)
+    assert observer.state.commissioned is None
+
+
+def test_a_stored_baseline_is_used_from_the_first_cycles_on(leg, reference) -> None:
+    first = observer_of(leg)
+    walk(first, samples(reference, [0] * 34))
+    known = first.state.commissioned
+    second = observer_of(leg, commissioned=known)
+    walk(second, samples(reference, [leg_number(4, 1.5)] * 14, seed=2))
+    assert second.state.commissioned is known
+    (change,) = second.diagnosis.changes
+    assert (change.cause, change.subject) == (Cause.CLEARANCE, "J")

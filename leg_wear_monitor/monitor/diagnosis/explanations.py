@@ -1,5 +1,6 @@
 """What may explain a change of the torque's signature: a clearance, or something else."""
 
+import math
 from collections.abc import Sequence
 
 import attrs
@@ -187,7 +188,7 @@ def _misfit(rest: Floats, covariance: Floats) -> float:
 def poorness(rest: Floats, covariance: Floats) -> float:
     """Birge's ratio, at least 1: by how much a standard deviation is too small where the best fit is poor."""
     ratio = float(rest @ np.linalg.solve(covariance, rest)) / len(rest)
-    return max(1.0, ratio) ** 0.5
+    return math.sqrt(max(1.0, ratio))
 
 
 def _vertex(x: Floats, y: Floats, best: int) -> tuple[float, float]:

@@ -39,7 +39,7 @@ from leg_wear_monitor.twin.reference.torque_reference import TorqueReference, To
 from leg_wear_monitor.wear.surfaces import SECTORS
 
 RATE = 1000  # steps of a gait cycle at which a walk is kept
-COMMISSIONING, AFTER, HEALTHY = 30, 60, 160
+COMMISSIONING, AFTER, HEALTHY = 60, 60, 160
 NEW = np.full(5, 3.0e-4)
 SIZES = (3.6e-4, 4.5e-4, 6.0e-4, 1.0e-3)
 MONTH = 8.64e5  # gait cycles: eight hours a day at 60 rpm
@@ -147,7 +147,7 @@ def explained(
     """The explainer of a leg, commissioned on its first cycles or not, and its further signatures."""
     new = measured(walk, sensor, noise_nm, random)
     mean = new[:COMMISSIONING].mean(axis=0)
-    known = CommissionedTorque(0, COMMISSIONING, NEW, mean) if commissioned else None
+    known = CommissionedTorque(0, NEW, new[:COMMISSIONING]) if commissioned else None
     return explainer_of(leg, reference, with_noise_of(reference, sensor, mean), known), new[COMMISSIONING:]
 
 

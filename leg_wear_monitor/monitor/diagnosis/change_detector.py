@@ -15,6 +15,7 @@ from leg_wear_monitor.monitor.diagnosis.explanations import Explainer
 
 FACTORS = (1.2, 1.35, 1.5, 1.75, 2.0, 2.5, 3.3, 5.0, 8.0)  # on the counted clearance of one joint
 
+_SIGMAS = 4.0  # by which the baseline may be off
 _MOST = 0.6  # of the threshold: what one gait cycle counts at most, so that one alone raises nothing
 
 
@@ -38,6 +39,24 @@ class Detection(NamedTuple):
 def threshold(false_alarm_cycles: float, tests: int) -> float:
     """Threshold of each of some tests for a mean number of gait cycles between two false alarms."""
     return math.log(false_alarm_cycles * tests)
+
+
+def excess(scatter: Floats, expected: Floats) -> Floats:
+    """By how much more than expected the statistics of some tests scatter, at least 1.
+
+    Parameters
+    ----------
+    scatter : (n, tests) array
+        Departures of the commissioned cycles' statistics from their mean.
+    expected : (tests,) array
+        Variances that the tests suppose.
+    """
+    pairs = len(scatter) // 2
+    if not pairs:
+        return np.ones(len(expected))
+    # means of two: neighbouring cycles are correlated
+    means = scatter[: 2 * pairs].reshape(pairs, 2, -1).mean(axis=1)
+    return np.asarray(np.maximum(1.0, 2.0 * np.square(means).mean(axis=0) / expected))
 
 
 class ChangeDetector:
@@ -65,7 +84,11 @@ class ChangeDetector:
         weighted = np.linalg.solve(explainer.covariance(1), change.T).T
         self._expected = expected + explainer.baseline.offset
         self._weighted = weighted
-        self._half = 0.5 * np.einsum("ij,ij->i", weighted, change)
+        # the baseline is off by the same in each cycle: that alone must not drive a test upwards
+        drift = np.sqrt(np.einsum("ij,jk,ik->i", weighted, explainer.baseline.covariance, weighted))
+        information = np.einsum("ij,ij->i", weighted, change)
+        self._half = 0.5 * information + _SIGMAS * drift
+        self._excess = excess(explainer.baseline.scatter @ weighted.T, information)
         self.threshold = threshold(false_alarm_cycles, len(change))
 
     def fresh(self) -> DetectorState:
@@ -75,7 +98,7 @@ class ChangeDetector:
 
     def with_cycle(self, state: DetectorState, signature: Floats, begin_ns: int) -> DetectorState:
         """State after one more gait cycle, with its signature (F,) and the stamp of its begin."""
-        ratio = self._weighted @ (signature - self._expected) - self._half
+        ratio = (self._weighted @ (signature - self._expected) - self._half) / self._excess
         ratio = np.minimum(ratio, _MOST * self.threshold)
         since = np.where(state.cycles == 0, begin_ns, state.since_ns)
         sums = state.sums + ratio

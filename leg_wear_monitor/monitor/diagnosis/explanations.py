@@ -48,10 +48,13 @@ class Baseline:
         Mean difference of the commissioned leg; zeros before.
     covariance : (F, F) array
         Its uncertainty.
+    scatter : (n, F) array
+        Departures of the commissioned leg's gait cycles from their mean; no rows before.
     """
 
     offset: Floats
     covariance: Floats
+    scatter: Floats
 
 
 @attrs.frozen(kw_only=True)

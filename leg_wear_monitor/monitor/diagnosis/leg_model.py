@@ -28,8 +28,8 @@ def explainer_of(
     if commissioned is None:
         baseline = unknown_baseline(found, sensor)
     else:
-        offset = commissioned.signature - model.at(commissioned.clearance_m)[0]
-        baseline = commissioned_baseline(offset, model.covariance, commissioned.cycles, 2 * model.cycles)
+        expected = model.at(commissioned.clearance_m)[0]
+        baseline = commissioned_baseline(commissioned, expected, model.covariance)
     return Explainer(model, mechanism.clearance_joints, baseline, found)
 
 

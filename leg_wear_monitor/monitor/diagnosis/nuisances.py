@@ -11,6 +11,7 @@ from leg_wear_monitor.monitor.diagnosis.diagnosis import Cause
 from leg_wear_monitor.monitor.diagnosis.explanations import Baseline, Nuisance
 from leg_wear_monitor.monitor.diagnosis.signature import TorqueSensor
 from leg_wear_monitor.monitor.diagnosis.signature_model import simulated_signatures
+from leg_wear_monitor.monitor.ledger.entry import CommissionedTorque
 from leg_wear_monitor.twin.follower.load import load_signature
 from leg_wear_monitor.twin.reference.torque_reference import TorqueReference
 
@@ -57,9 +58,13 @@ def nuisances(mechanism: Mechanism, reference: TorqueReference, sensor: TorqueSe
     return found
 
 
-def commissioned_baseline(offset: Floats, covariance: Floats, cycles: int, reference_cycles: int) -> Baseline:
-    """Baseline from the mean difference (F,) of so many cycles of the commissioned leg."""
-    return Baseline(offset, covariance * (1.0 / cycles + 1.0 / reference_cycles))
+def commissioned_baseline(commissioned: CommissionedTorque, expected: Floats, covariance: Floats) -> Baseline:
+    """Baseline of a commissioned leg; the signature (F,) that is expected, covariance (F, F) of a cycle.
+
+    What the reference of the expected leg is off is in that difference, and cancels.
+    """
+    mean = commissioned.mean
+    return Baseline(mean - expected, covariance / commissioned.cycles, commissioned.signatures - mean)
 
 
 def unknown_baseline(found: list[Nuisance], sensor: TorqueSensor) -> Baseline:
@@ -69,7 +74,7 @@ def unknown_baseline(found: list[Nuisance], sensor: TorqueSensor) -> Baseline:
     for one in found:
         spread = _MASS_TOLERANCE if one.cause is Cause.MASS else _SENSOR_TOLERANCE * one.spread
         covariance += spread**2 * np.outer(one.column, one.column)
-    return Baseline(np.zeros(2 * phases), covariance)
+    return Baseline(np.zeros(2 * phases), covariance, np.zeros((0, 2 * phases)))
 
 
 def _difference(

@@ -45,7 +45,7 @@ from leg_wear_monitor.twin.sample import Samples
 from leg_wear_monitor.twin.settings import INSTANT
 from leg_wear_monitor.twin.statistics import CycleStatistics
 
-COMMISSIONING_CYCLES = 30
+COMMISSIONING_CYCLES = 60
 WINDOW_CYCLES = 60  # that clearances are estimated from
 SETTLING_CYCLES = 10  # since a change, before the counted clearances are corrected by it
 
@@ -155,8 +155,8 @@ class TorqueObserver:
         state, change = self.state, correction.change
         cycles = [cycle for cycle in state.cycles if cycle.begin_ns >= change.since_ns]
         counted_m = np.asarray(counted_m, float).copy()
-        mean = np.mean([cycle.signature for cycle in cycles], axis=0)
-        state.commissioned = CommissionedTorque(cycles[-1].end_ns, len(cycles), counted_m, mean)
+        signatures = np.array([cycle.signature for cycle in cycles])
+        state.commissioned = CommissionedTorque(cycles[-1].end_ns, counted_m, signatures)
         state.settled = (*state.settled, attrs.evolve(change, is_corrected=True))
         self._restart(counted_m)
         self._explainer = None
@@ -293,7 +293,7 @@ class TorqueObserver:
         if change.cause is not Cause.CLEARANCE:
             return change
         state, explainer = self.state, self._legs
-        signatures = np.array([cycle.signature for cycle in state.cycles])
+        signatures = self._signatures()
         changed_m = start_of(change, explainer.joints, state.counted_m)
         first = first_changed(explainer, signatures, state.counted_m, changed_m)
         return attrs.evolve(change, since_ns=state.cycles[first].begin_ns)
@@ -303,9 +303,7 @@ class TorqueObserver:
         state = self.state
         if state.commissioned is not None or state.changes or len(state.cycles) < COMMISSIONING_CYCLES:
             return
-        state.commissioned = CommissionedTorque(
-            state.cycles[-1].end_ns, len(state.cycles), state.counted_m, self._mean_signature()
-        )
+        state.commissioned = CommissionedTorque(state.cycles[-1].end_ns, state.counted_m, self._signatures())
         self._review()
 
     def _correction(self) -> Correction | None:
@@ -359,7 +357,7 @@ class TorqueObserver:
         """Evaluate the kept cycles again."""
         state, self._explainer, self._detector = self.state, None, None
         if state.reference is not None and state.sensor is not None:
-            measured = state.commissioned.signature if state.commissioned else self._mean_signature()
+            measured = state.commissioned.mean if state.commissioned else self._signatures().mean(axis=0)
             state.sensor = with_noise_of(state.reference, state.sensor, measured)
         state.detector, state.changes = None, ()
         for cycle in state.cycles:
@@ -379,9 +377,9 @@ class TorqueObserver:
         if (np.abs(counted_m / state.counted_m - 1.0) > 0.005).any():
             state.counted_m, self._detector = np.asarray(counted_m, float).copy(), None
 
-    def _mean_signature(self) -> Floats:
-        """Mean (F,) over the kept cycles."""
-        return np.asarray(np.mean([cycle.signature for cycle in self.state.cycles], axis=0))
+    def _signatures(self) -> Floats:
+        """Signatures (n, F) of the kept cycles."""
+        return np.array([cycle.signature for cycle in self.state.cycles])
 
     @property
     def _legs(self) -> Explainer:

@@ -8,7 +8,9 @@ from leg_wear_monitor.mechanism.ideal import TURN
 from leg_wear_monitor.monitor.diagnosis.signature import TorqueSensor, averaged, quiet_phases, signatures
 from leg_wear_monitor.twin.reference.torque_reference import POINTS, TorqueReference
 
-_SEED = 20261122  # of the noise that is added to simulated torques: the same at each start
+# of the noise that is added to simulated torques: the same at each start, and another one for each leg, or
+# their covariance would be that of a single leg's cycles
+_SEED = 20261122
 _WEAKEST_NOISE, _STRONGEST_NOISE = 1.0e-4, 1.0  # of the torque's size
 _HALVINGS = 12  # of that range: the noise is found to 0.2 %
 
@@ -96,7 +98,7 @@ def simulated_signatures(
         sampled = np.diff(np.interp(place, np.arange(points + 1.0), impulse), prepend=0.0) / np.diff(
             place, prepend=0.0
         )
-    noise = np.random.default_rng(_SEED).standard_normal(len(sampled))
+    noise = np.random.default_rng([_SEED, leg]).standard_normal(len(sampled))
     sampled = averaged(scale * sampled + sensor.noise_nm * noise, sensor.together)
     place = place[sensor.together - 1 :: sensor.together][: len(sampled)]
     angle = np.interp(place % POINTS, np.arange(POINTS + 1.0), reference.angle)

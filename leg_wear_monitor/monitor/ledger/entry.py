@@ -239,23 +239,31 @@ class Commissioned:
 
 @attrs.frozen(eq=False)
 class CommissionedTorque:
-    """Mean signature of the drive torque of a leg whose k clearances were known.
+    """Signatures of the drive torque of a leg whose k clearances were known.
 
     Attributes
     ----------
     stamp_ns : int
         End of its last gait cycle.
-    cycles : int
     clearance_m : (k,) array
         Counted clearances then.
-    signature : (F,) array
-        As in `diagnosis.signature`.
+    signatures : (cycles, F) array
+        Of each gait cycle, as in `diagnosis.signature`.
     """
 
     stamp_ns: int
-    cycles: int
     clearance_m: Floats
-    signature: Floats
+    signatures: Floats
+
+    @property
+    def cycles(self) -> int:
+        """Number of gait cycles."""
+        return len(self.signatures)
+
+    @property
+    def mean(self) -> Floats:
+        """Mean signature (F,)."""
+        return np.asarray(self.signatures.mean(axis=0))
 
 
 Event = (

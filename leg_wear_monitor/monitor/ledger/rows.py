@@ -100,11 +100,12 @@ def write_event(db: sqlite3.Connection, event: Event) -> None:
                 "INSERT INTO commissioning (stamp_ns, encoders, errors) VALUES (?, ?, ?)",
                 (stamp_ns, "\n".join(encoders), errors.astype("<f8").tobytes()),
             )
-        case CommissionedTorque(stamp_ns, cycles, clearance_m, signature):
+        case CommissionedTorque():
+            known, signatures = event.clearance_m.astype("<f8"), event.signatures.astype("<f8")
             db.execute(
-                "INSERT INTO torque_commissioning (stamp_ns, cycles, clearance_m, signature) "
+                "INSERT INTO torque_commissioning (stamp_ns, cycles, clearance_m, signatures) "
                 "VALUES (?, ?, ?, ?)",
-                (stamp_ns, cycles, *(part.astype("<f8").tobytes() for part in (clearance_m, signature))),
+                (event.stamp_ns, event.cycles, known.tobytes(), signatures.tobytes()),
             )
         case Audit(stamp_ns, who, what, was, undoes):
             values = (was.name, was.cycles, _depth_bytes(was), was.moving_s, was.replaced_ns) if was else ()
@@ -151,12 +152,13 @@ def read_commissioned(db: sqlite3.Connection) -> Commissioned | None:
 def read_commissioned_torque(db: sqlite3.Connection) -> CommissionedTorque | None:
     """Stored signature of the drive torque, None if it was not commissioned since a part was replaced."""
     row = db.execute(
-        "SELECT stamp_ns, cycles, clearance_m, signature FROM torque_commissioning "
+        "SELECT stamp_ns, cycles, clearance_m, signatures FROM torque_commissioning "
         "WHERE stamp_ns > (SELECT coalesce(max(replaced_ns), 0) FROM joint) ORDER BY id DESC LIMIT 1"
     ).fetchone()
     if row is None:
         return None
-    return CommissionedTorque(*row[:2], *(np.frombuffer(part, "<f8").astype(float) for part in row[2:]))
+    clearance_m, signatures = (np.frombuffer(part, "<f8").astype(float) for part in row[2:])
+    return CommissionedTorque(row[0], clearance_m, signatures.reshape(row[1], -1))
 
 
 def read_last_reset(db: sqlite3.Connection, joint: str) -> Audit | None:

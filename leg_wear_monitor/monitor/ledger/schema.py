@@ -209,11 +209,11 @@ CREATE TABLE verdict (
     evidence TEXT NOT NULL, not_valid TEXT NOT NULL
 ) STRICT;
 
--- mean signature of the drive torque while the clearances were known; the last row is in force. Both are
--- float64, little endian: counted clearances of the clearance joints [m], and the signature
+-- signatures of the drive torque while the clearances were known; the last row is in force. Both are float64,
+-- little endian: counted clearances of the clearance joints [m], and the signature of each gait cycle
 CREATE TABLE torque_commissioning (
     id INTEGER PRIMARY KEY, stamp_ns INTEGER NOT NULL, cycles INTEGER NOT NULL, clearance_m BLOB NOT NULL,
-    signature BLOB NOT NULL
+    signatures BLOB NOT NULL
 ) STRICT;
 """
 

@@ -5,7 +5,7 @@ import math
 import numpy as np
 import pytest
 
-from leg_wear_monitor.monitor.diagnosis.change_detector import FACTORS, ChangeDetector, threshold
+from leg_wear_monitor.monitor.diagnosis.change_detector import FACTORS, ChangeDetector, excess, threshold
 from leg_wear_monitor.monitor.diagnosis.explanations import Baseline, Explainer
 from leg_wear_monitor.monitor.diagnosis.signature import TorqueSensor
 from leg_wear_monitor.monitor.diagnosis.signature_model import SignatureModel
@@ -25,7 +25,7 @@ def model(scatter: float = 1.0) -> SignatureModel:
 
 
 def detector(hours: float = 240.0) -> ChangeDetector:
-    none = Baseline(np.zeros(F), np.zeros((F, F)))
+    none = Baseline(np.zeros(F), np.zeros((F, F)), np.zeros((0, F)))
     return ChangeDetector(Explainer(model(), ("A", "B"), none, ()), NEW, 3600.0 * hours)
 
 
@@ -86,3 +86,12 @@ def test_since_is_the_begin_of_the_change() -> None:
             break
     assert found is not None
     assert 1028 <= found.since_ns <= 1030
+
+
+def test_a_leg_that_scatters_more_than_expected_counts_less() -> None:
+    random = np.random.default_rng(4)
+    found = excess(random.standard_normal((4000, 3)) * [0.5, 1.0, 2.0], np.ones(3))
+    assert found == pytest.approx([1.0, 1.0, 4.0], rel=0.1)
+    assert excess(np.zeros((0, 3)), np.ones(3)).tolist() == [1.0, 1.0, 1.0]
+    alternating = np.tile([[1.0], [-1.0]], (50, 1))  # neighbours that cancel add up to nothing
+    assert excess(alternating, np.ones(1)).tolist() == [1.0]

@@ -26,7 +26,7 @@ def explainer() -> Explainer:
     model = SignatureModel(
         TorqueSensor(0.005, 1.0, 10.0), np.tile(GRID, (3, 1)), np.zeros(F), change, np.eye(F), 10**6
     )
-    baseline = Baseline(0.1 * random.standard_normal(F), 1.0e-4 * np.eye(F))
+    baseline = Baseline(0.1 * random.standard_normal(F), 1.0e-4 * np.eye(F), np.zeros((0, F)))
     friction = Nuisance(Cause.FRICTION, "", np.r_[np.ones(F // 2), np.zeros(F // 2)], 0.3)
     foot = Nuisance(Cause.MASS, "foot", 10.0 * random.standard_normal(F), 0.0)
     return Explainer(model, JOINTS, baseline, (friction, foot))

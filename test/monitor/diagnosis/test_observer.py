@@ -91,7 +91,7 @@ def test_without_torques_it_reports_so(leg, reference) -> None:
 
 def test_a_healthy_leg_is_as_counted_and_becomes_commissioned(leg, reference) -> None:
     observer = observer_of(leg)
-    assert walk(observer, samples(reference, [0] * (COMMISSIONING_CYCLES + 20))) == []
+    assert walk(observer, samples(reference, [0] * (COMMISSIONING_CYCLES + 5))) == []
     found = observer.diagnosis
     assert found.state is DiagnosisState.AS_COUNTED
     assert found.changes == ()
@@ -104,14 +104,14 @@ def test_a_healthy_leg_is_as_counted_and_becomes_commissioned(leg, reference) ->
 def test_a_joint_that_opens_is_named_and_corrected(leg, reference, joint: int) -> None:
     observer = observer_of(leg)
     number = leg_number(joint, 1.5)
-    block = samples(reference, [0] * 35 + [number] * 25)
+    block = samples(reference, [0] * (COMMISSIONING_CYCLES + 2) + [number] * 25)
     ((cycle, correction),) = walk(observer, block)[:1]
-    assert 43 <= cycle <= 57
+    assert COMMISSIONING_CYCLES + 10 <= cycle <= COMMISSIONING_CYCLES + 24
     assert correction.joint == joint
     assert correction.clearance_m == pytest.approx(4.5e-4, rel=0.06)
     change = correction.change
     assert change.cause is Cause.CLEARANCE
-    assert abs(change.since_ns - START_NS - 35 * 10**9) <= 3 * 10**9
+    assert abs(change.since_ns - START_NS - (COMMISSIONING_CYCLES + 2) * 10**9) <= 3 * 10**9
     counted = NEW.copy()
     counted[joint] = correction.clearance_m
     observer.corrected(correction, counted)
@@ -122,7 +122,7 @@ def test_a_joint_that_opens_is_named_and_corrected(leg, reference, joint: int) -
 
 def test_a_leg_that_was_never_healthy_is_not_commissioned(leg, reference) -> None:
     observer = observer_of(leg)
-    walk(observer, samples(reference, [leg_number(2, 3.0)] * 40))
+    walk(observer, samples(reference, [leg_number(2, 3.0)] * (COMMISSIONING_CYCLES + 5)))
     assert observer.diagnosis.state is DiagnosisState.CHANGED
     assert observer.diagnosis.changes[0].subject == "G"
     assert observer.state.commissioned is None
@@ -130,20 +130,20 @@ def test_a_leg_that_was_never_healthy_is_not_commissioned(leg, reference) -> Non
 
 def test_one_strange_cycle_raises_nothing(leg, reference) -> None:
     observer = observer_of(leg)
-    numbers = [0] * 40 + [leg_number(0, 8.0)] + [0] * 10
+    numbers = [0] * 62 + [leg_number(0, 8.0)] + [0] * 8
     walk(observer, samples(reference, numbers))
     assert observer.diagnosis.state is DiagnosisState.AS_COUNTED
 
 
 def test_a_restored_observer_continues_bit_for_bit(leg, reference) -> None:
-    block = samples(reference, [0] * 34 + [leg_number(4, 1.5)] * 12)
+    block = samples(reference, [0] * 61 + [leg_number(4, 1.5)] * 12)
     whole, half = observer_of(leg), observer_of(leg)
     walk(whole, block)
-    walk(half, block, end=36)
+    walk(half, block, end=63)
     snapshot, other = half.snapshot(), observer_of(leg)
     other.restore(snapshot)
-    walk(half, block, begin=36)
-    walk(other, block, begin=36)
+    walk(half, block, begin=63)
+    walk(other, block, begin=63)
     assert whole.diagnosis == half.diagnosis == other.diagnosis
 
 
@@ -160,7 +160,7 @@ def test_a_crank_with_another_ripple_waits_for_a_reference_of_its_own(leg, refer
 
 def test_a_replaced_part_is_commissioned_again(leg, reference) -> None:
     observer = observer_of(leg)
-    walk(observer, samples(reference, [0] * 40))
+    walk(observer, samples(reference, [0] * COMMISSIONING_CYCLES))
     assert observer.state.commissioned is not None
     observer.replaced(NEW)
     assert observer.state.commissioned is None
@@ -168,7 +168,7 @@ def test_a_replaced_part_is_commissioned_again(leg, reference) -> None:
 
 def test_a_stored_baseline_is_used_from_the_first_cycles_on(leg, reference) -> None:
     first = observer_of(leg)
-    walk(first, samples(reference, [0] * 34))
+    walk(first, samples(reference, [0] * COMMISSIONING_CYCLES))
     known = first.state.commissioned
     second = observer_of(leg, commissioned=known)
     walk(second, samples(reference, [leg_number(4, 1.5)] * 14, seed=2))

@@ -46,6 +46,8 @@ from leg_wear_monitor.twin.settings import INSTANT
 from leg_wear_monitor.twin.statistics import CycleStatistics
 
 COMMISSIONING_CYCLES = 60
+# of the counted clearance: smaller openings are named wrongly where masses are 5 % off (docs/diagnosis.md)
+CORRECTED_FROM = 1.3
 WINDOW_CYCLES = 60  # that clearances are estimated from
 SETTLING_CYCLES = 10  # since a change, before the counted clearances are corrected by it
 
@@ -312,7 +314,8 @@ class TorqueObserver:
         if not self.config.diagnosis.correct or not state.changes or state.fit_cycles < SETTLING_CYCLES:
             return None
         change, joints = state.changes[-1], self._mechanism.clearance_joints
-        if change.subject not in joints or not change.is_sure or change.value <= change.counted:
+        is_wide = change.value >= CORRECTED_FROM * change.counted
+        if change.subject not in joints or not change.is_sure or not is_wide:
             return None
         return Correction(joints.index(change.subject), change.value, change)
 

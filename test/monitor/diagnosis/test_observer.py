@@ -175,3 +175,11 @@ def test_a_stored_baseline_is_used_from_the_first_cycles_on(leg, reference) -> N
     assert second.state.commissioned is known
     (change,) = second.diagnosis.changes
     assert (change.cause, change.subject) == (Cause.CLEARANCE, "J")
+
+
+def test_a_small_opening_is_reported_and_not_corrected(leg, reference) -> None:
+    observer = observer_of(leg)
+    block = samples(reference, [0] * COMMISSIONING_CYCLES + [leg_number(0, 1.2)] * 20)
+    assert walk(observer, block) == []
+    (change,) = observer.diagnosis.changes
+    assert (change.subject, change.is_corrected) == ("A", False)

@@ -199,7 +199,7 @@ def rightly(explainer: Explainer, cycles: np.ndarray, n: int, wide: list[str]) -
 
 
 def of(found: tuple[int, int]) -> str:
-    """A share in words."""
+    """A fraction, in words."""
     return f"{found[0]} of {found[1]}"
 
 

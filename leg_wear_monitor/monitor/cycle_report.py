@@ -39,7 +39,7 @@ def cycle_report(
         cycle=cycle,
         begin_ns=statistics.begin_ns,
         stamp_ns=statistics.stamp_ns,
-        cadence_rpm=60.0 * statistics.direction / statistics.moving_s,
+        cadence_rpm=statistics.cadence_rpm,
         moving_s=statistics.moving_s,
         bridged_s=statistics.bridged_s,
         joints=tuple(

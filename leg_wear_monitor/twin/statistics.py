@@ -9,6 +9,8 @@ from numpy.typing import NDArray
 
 from leg_wear_monitor.mechanism.arrays import Floats, Ints
 
+_LONGEST = 1.5  # times the time in motion: a longer cycle contains standstill, no steady gait
+
 
 class Tracking(Enum):
     """State of the crank tracking."""
@@ -172,6 +174,16 @@ class CycleStatistics:
     def duration_s(self) -> float:
         """Time from begin to end [s], standstill included."""
         return (self.stamp_ns - self.begin_ns) * 1.0e-9
+
+    @property
+    def cadence_rpm(self) -> float:
+        """Mean speed of the crank while it moved [rpm], negative backward."""
+        return 60.0 * self.direction / self.moving_s
+
+    @property
+    def is_steady(self) -> bool:
+        """Whether the leg walked all the time, with no gap bridged."""
+        return self.bridged_s == 0.0 and self.duration_s <= _LONGEST * self.moving_s
 
 
 @attrs.frozen(eq=False)

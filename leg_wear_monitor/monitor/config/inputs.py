@@ -180,6 +180,10 @@ class Cadence:
         metadata=LIVE,
     )
 
+    def allows(self, rpm: float) -> bool:
+        """Whether predictions are valid at a cadence [rpm]."""
+        return abs(rpm - self.commanded_rpm) <= self.tolerance_rpm
+
 
 @attrs.frozen(kw_only=True)
 class Tracker:

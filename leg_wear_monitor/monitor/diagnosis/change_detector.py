@@ -11,7 +11,7 @@ from typing import NamedTuple
 import numpy as np
 
 from leg_wear_monitor.mechanism.arrays import Floats, Ints
-from leg_wear_monitor.monitor.diagnosis.explanations import Explainer
+from leg_wear_monitor.monitor.diagnosis.explanations import Explainer, opened
 
 FACTORS = (1.2, 1.35, 1.5, 1.75, 2.0, 2.5, 3.3, 5.0, 8.0)  # on the counted clearance of one joint
 
@@ -77,8 +77,7 @@ class ChangeDetector:
         changes = []
         for k in range(len(counted_m)):
             for factor in FACTORS:
-                wider = counted_m.copy()
-                wider[k] *= factor
+                wider = opened(counted_m, k, factor * counted_m[k])
                 changes.append(model.at(wider)[0] - expected)
         change = np.array(changes)
         weighted = np.linalg.solve(explainer.covariance(1), change.T).T

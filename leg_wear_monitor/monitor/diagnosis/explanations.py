@@ -14,7 +14,6 @@ MODEL_ERROR = 0.1  # of what a clearance changes: another leg's masses and lengt
 
 _SIZES = 24  # clearances of a joint that are tried; between them a parabola finds the best
 _LEAST_FACTOR = 0.7  # of the counted clearance
-_FREE = 1.0e3  # times the usual spread of a quantity: nothing is known of it
 
 
 @attrs.frozen(eq=False)
@@ -101,16 +100,12 @@ class Explainer:
             tuple(nuisances),
         )
 
-    def covariance(self, cycles: int, free: Nuisance | None = None) -> Floats:
-        """Covariance (F, F) of the mean of some cycles' signatures in a leg as counted.
-
-        ``free`` is a nuisance of which nothing is known.
-        """
+    def covariance(self, cycles: int) -> Floats:
+        """Covariance (F, F) of the mean of some cycles' signatures in a leg as counted."""
         model = self.model
         found = model.covariance * (1.0 / cycles + 1.0 / model.cycles) + self.baseline.covariance
         for one in self.nuisances:
-            spread = _FREE * max(one.spread, 1.0e-3) if one is free else one.spread
-            found = found + spread**2 * np.outer(one.column, one.column)
+            found = found + one.spread**2 * np.outer(one.column, one.column)
         return np.asarray(found)
 
     def explanations(self, mean: Floats, cycles: int, counted_m: Floats) -> list[Explanation]:
@@ -141,12 +136,12 @@ class Explainer:
         sizes = np.geomspace(_LEAST_FACTOR * counted_m[k], max(widest, counted_m[k]), _SIZES)
         misfits = np.empty(_SIZES)
         for i, size in enumerate(sizes):
-            change = self.model.at(_with(counted_m, k, size))[0] - there
+            change = self.model.at(opened(counted_m, k, size))[0] - there
             misfits[i] = _misfit(rest - change, covariance + np.diag((MODEL_ERROR * change) ** 2))
         best = int(misfits.argmin())
         value, sigma = _vertex(np.log(sizes), misfits, best)
         size = float(np.exp(value))
-        change = self.model.at(_with(counted_m, k, size))[0] - there
+        change = self.model.at(opened(counted_m, k, size))[0] - there
         poor = poorness(rest - change, covariance + np.diag((MODEL_ERROR * change) ** 2))
         return Explanation(
             cause=Cause.CLEARANCE,
@@ -159,12 +154,11 @@ class Explainer:
 
     def _nuisance(self, one: Nuisance, rest: Floats, cycles: int) -> Explanation:
         """Best value of a nuisance, of which nothing was known."""
-        covariance = self.covariance(cycles)
-        weighted = np.linalg.solve(covariance - one.spread**2 * np.outer(one.column, one.column), one.column)
+        plain = self.covariance(cycles) - one.spread**2 * np.outer(one.column, one.column)
+        weighted = np.linalg.solve(plain, one.column)
         information = float(weighted @ one.column)
         value = float(weighted @ rest) / information
         change = value * one.column
-        plain = covariance - one.spread**2 * np.outer(one.column, one.column)
         misfit = _misfit(rest - change, plain + np.diag((MODEL_ERROR * change) ** 2))
         return Explanation(
             cause=one.cause,
@@ -176,7 +170,8 @@ class Explainer:
         )
 
 
-def _with(clearance_m: Floats, k: int, size: float) -> Floats:
+def opened(clearance_m: Floats, k: int, size: float) -> Floats:
+    """Clearances (k,) [m] with that of one joint replaced."""
     changed = clearance_m.copy()
     changed[k] = size
     return changed

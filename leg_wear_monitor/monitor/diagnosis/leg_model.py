@@ -8,7 +8,7 @@ from leg_wear_monitor.mechanism.arrays import Floats
 from leg_wear_monitor.mechanism.spec import Mechanism
 from leg_wear_monitor.monitor.diagnosis.clearance_fit import ClearanceFit, fit_clearances
 from leg_wear_monitor.monitor.diagnosis.diagnosis import Cause, Change
-from leg_wear_monitor.monitor.diagnosis.explanations import Explainer, Explanation
+from leg_wear_monitor.monitor.diagnosis.explanations import Explainer, Explanation, opened
 from leg_wear_monitor.monitor.diagnosis.nuisances import commissioned_baseline, nuisances, unknown_baseline
 from leg_wear_monitor.monitor.diagnosis.signature import TorqueSensor
 from leg_wear_monitor.monitor.diagnosis.signature_model import signature_model
@@ -43,10 +43,9 @@ def best_fit(
 
 def start_of(change: Change | None, joints: Sequence[str], counted_m: Floats) -> Floats:
     """Clearances (k,) [m] after a change."""
-    start = counted_m.copy()
-    if change is not None and change.cause is Cause.CLEARANCE:
-        start[joints.index(change.subject)] = change.value
-    return start
+    if change is None or change.cause is not Cause.CLEARANCE:
+        return counted_m
+    return opened(counted_m, joints.index(change.subject), change.value)
 
 
 def change_of(explanations: Sequence[Explanation], since_ns: int) -> Change | None:

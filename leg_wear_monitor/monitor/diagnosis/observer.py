@@ -53,7 +53,6 @@ SETTLING_CYCLES = 10  # since a change, before the counted clearances are correc
 
 _FIRST_CYCLES = 5  # before a reference is chosen
 _LEAST_CYCLES = 2  # since a change, before it is explained: the first contains the change itself
-_LONGEST = 1.5  # times the time in motion: a longer cycle contains standstill, no steady gait
 _UNLIKE = 0.015  # of the mean speed: a crank that turns otherwise than in the reference by more
 _UNLIKE_CYCLES = 20  # in a row, until a new reference is made
 _FAR = 0.1  # of a counted clearance: the reference is renewed where it was made for another one
@@ -118,10 +117,7 @@ class TorqueObserver:
 
     def ended(self, statistics: CycleStatistics) -> None:
         """Note the end of a gait cycle, which is used if the leg walked as commanded."""
-        cadence = self.config.cadence
-        rpm = 60.0 * statistics.direction / statistics.moving_s
-        steady = statistics.bridged_s == 0.0 and statistics.duration_s <= _LONGEST * statistics.moving_s
-        if steady and abs(rpm - cadence.commanded_rpm) <= cadence.tolerance_rpm:
+        if statistics.is_steady and self.config.cadence.allows(statistics.cadence_rpm):
             self.state.due = (*self.state.due, (statistics.begin_ns, statistics.stamp_ns))
 
     def end_period(self, counted_m: Floats, depth: Floats) -> Correction | None:

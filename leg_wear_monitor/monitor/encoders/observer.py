@@ -36,7 +36,6 @@ OTHERWISE_CYCLES = 20  # in a row with other encoders than before, until the cha
 
 _UNKNOWN_M = 1.0e-3  # prior standard deviation of a clearance without prior knowledge
 _FAR_M = 1.0e-4  # difference of a clearance from the reference at which the reference is renewed
-_LONGEST = 1.5  # times the time in motion: a longer cycle contains standstill, no steady gait
 _AGAIN_CYCLES = 100  # least number of cycles between two references
 
 
@@ -101,10 +100,7 @@ class EncoderObserver:
 
     def ended(self, statistics: CycleStatistics) -> None:
         """Note the end of a gait cycle, which is used if the leg walked as commanded."""
-        cadence = self.config.cadence
-        rpm = 60.0 * statistics.direction / statistics.moving_s
-        steady = statistics.bridged_s == 0.0 and statistics.duration_s <= _LONGEST * statistics.moving_s
-        if steady and abs(rpm - cadence.commanded_rpm) <= cadence.tolerance_rpm:
+        if statistics.is_steady and self.config.cadence.allows(statistics.cadence_rpm):
             self.state.due = (*self.state.due, (statistics.begin_ns, statistics.stamp_ns))
 
     def end_period(self, clearance_m: Floats, depth: Floats) -> Commissioned | None:

@@ -58,11 +58,7 @@ def walk(observer, block, counted=NEW, begin=0, end=None):
     for cycle in range(begin, end or last):
         from_ns, to_ns = START_NS + cycle * 10**9, START_NS + (cycle + 1) * 10**9
         observer.add_samples(block[(block["stamp_ns"] >= from_ns) & (block["stamp_ns"] < to_ns)])
-        observer.ended(
-            SimpleNamespace(
-                direction=1, moving_s=1.0, duration_s=1.0, bridged_s=0.0, begin_ns=from_ns, stamp_ns=to_ns
-            )
-        )
+        observer.ended(SimpleNamespace(is_steady=True, cadence_rpm=60.0, begin_ns=from_ns, stamp_ns=to_ns))
         found = observer.end_period(counted, DEPTH)
         if found:
             corrections.append((cycle, found))

@@ -15,6 +15,7 @@ from leg_wear_monitor.monitor.reports import Lost
 from leg_wear_monitor.monitor.verdict.verdict import Evidence, Figure, State, Verdict
 from leg_wear_monitor.playback.history import CYCLE_COLUMNS, JOINT_COLUMNS
 from leg_wear_monitor.playback.result.condition import JointClearance, LifeHours
+from leg_wear_monitor.playback.result.leg import LegJoint, ReplayLeg
 from leg_wear_monitor.playback.result.parts import (
     AlarmChange,
     ClearanceChange,
@@ -75,6 +76,14 @@ def made_up_summary() -> ReplaySummary:
             mechanism="leg", hardware_id="leg 1", clearance_joints=("A", "B"), commanded_rpm=60.0,
             wear_acceleration=1.0, bushing_radius_m={"A": 0.01, "B": 0.01},
             limits=Limits(joint_clearance_m=(5e-4, 6e-4)), duty_hours_per_day=8.0,
+        ),
+        leg=ReplayLeg(
+            bodies_m={"thigh": ((0.0, 0.0), (0.0, -0.4)), "shank": ((0.0, -0.4), (0.1, -0.8), (-0.1, -0.8))},
+            joints={
+                "A": LegJoint(label="", place_m=(0.0, 0.0), is_on_ground=True),
+                "B": LegJoint(label="knee", place_m=(0.0, -0.4), is_on_ground=False),
+            },
+            toe_path_m=((0.1, -0.8), (0.2, -0.7), (0.0, -0.75)),
         ),
         wall_s=0.5,
         real_time_factor=4e-9,

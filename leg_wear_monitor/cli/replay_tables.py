@@ -1,6 +1,6 @@
 """A replay's statistics as text."""
 
-from collections.abc import Mapping
+from collections.abc import Callable, Mapping
 from typing import TYPE_CHECKING
 
 from rich.console import Console
@@ -31,7 +31,7 @@ def print_replay(result: "ReplayResult", wall_s: float) -> None:
 
     console = Console(highlight=False)
     monitor, verdict = result.monitor, result.monitor.verdict.verdict
-    _print_verdict(console, verdict)
+    _print_verdict(console, verdict, monitor.mechanism.joint_words)
     console.print(
         f"\n[bold]{monitor.config.hardware}[/bold]: {monitor.mechanism.name}, "
         f"clearance joints {', '.join(monitor.clearance_joints)}; "
@@ -65,11 +65,11 @@ def print_replay(result: "ReplayResult", wall_s: float) -> None:
     console.print(ADVICE, soft_wrap=True)
 
 
-def _print_verdict(console: Console, verdict: "Verdict") -> None:
+def _print_verdict(console: Console, verdict: "Verdict", joint_words: Callable[[str], str]) -> None:
     """State, joints and reason; what a person does next; which figures do not hold meanwhile."""
     from leg_wear_monitor.monitor.alarms.words import time_words
 
-    whose = f" joint {', '.join(verdict.joints)}" if verdict.joints else ""
+    whose = f" joint {', '.join(map(joint_words, verdict.joints))}" if verdict.joints else ""
     console.print(f"\n[bold]{verdict.state.words.upper()}{whose}[/bold]: {verdict.why}", soft_wrap=True)
     console.print(f"to do      {verdict.do}", soft_wrap=True)
     if verdict.not_valid:
@@ -93,7 +93,8 @@ def _joints(result: "ReplayResult", is_counted_leg: bool) -> Table:
             _known(1.0e12, joint.growth_error_m_per_cycle),
             figure(float(peak)),
         )
-        table.add_row(joint.joint, *(cells if is_counted_leg else (NOT_VALID,) * len(cells)))
+        name = result.monitor.mechanism.joint_words(joint.joint)
+        table.add_row(name, *(cells if is_counted_leg else (NOT_VALID,) * len(cells)))
     return table
 
 

@@ -32,6 +32,7 @@ def described(
     factory: Callable[[], Any] | None = None,
     check: Callable[[Any], str | None] | None = None,
     metadata: Mapping[str, Any] | None = None,
+    in_repr: bool = True,
 ) -> Any:
     """Attrs field with its unit and a description.
 
@@ -47,6 +48,8 @@ def described(
         Returns the fault of a value, None if there is none.
     metadata : mapping, optional
         Further metadata, stored with unit and doc.
+    in_repr : bool
+        Whether it is in the object's repr; False for what no result depends on.
 
     Raises
     ------
@@ -62,6 +65,7 @@ def described(
     return attrs.field(
         default=default if factory is None else attrs.Factory(factory),
         validator=validate,
+        repr=in_repr,
         metadata={"doc": doc, "unit": unit, **(metadata or {})},
     )
 

@@ -130,7 +130,14 @@ def _torques(entry: Any) -> tuple[Any, Any]:
     return tuple[float, ...], entry if isinstance(entry, list) else [entry]
 
 
+def _label(entry: Any) -> tuple[Any, Any]:
+    if entry is None or entry == "":
+        raise FieldError("", "is empty, expected a name such as knee, or no label")
+    return str, entry
+
+
 choose(spec.RevoluteJoint | spec.PrismaticJoint, _joint_class)
 choose(spec.ConstantLoad | spec.PhaseLoad, _load_class)
 choose(spec.Drive, _drive_class)
 choose(spec.Torques, _torques)
+choose(spec.Label, _label)

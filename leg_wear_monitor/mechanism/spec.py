@@ -1,7 +1,7 @@
 """Types of a mechanism file: every key with its unit, bounds and meaning."""
 
 from itertools import pairwise
-from typing import Annotated, Literal
+from typing import Annotated, Any, Literal
 
 import attrs
 
@@ -11,6 +11,7 @@ from leg_wear_monitor.mechanism.clearance import Clearance
 Vector = tuple[float, float]
 Pose = tuple[float, float, float]
 Torques = Annotated[tuple[float, ...], "one for each phase"]  # in a file, one number is a constant torque
+Label = Annotated[str, "in a file, not empty"]
 
 GROUND = "ground"
 
@@ -32,6 +33,22 @@ class Body:
     points: dict[str, Vector] = described("points by name, [x, y]", unit="m")
 
 
+_LONGEST_LABEL = 30
+_IN_LABELS = " ',-./+"  # beside letters and digits: nothing that a page or a terminal could take for markup
+
+
+def _label_fault(label: str) -> str | None:
+    if len(label) > _LONGEST_LABEL:
+        return f"has {len(label)} characters, expected at most {_LONGEST_LABEL}"
+    if all(sign.isalnum() or sign in _IN_LABELS for sign in label) and label == label.strip():
+        return None
+    return f"{label!r} is not a plain name, expected letters, digits, spaces between and {_IN_LABELS.strip()}"
+
+
+def _label() -> Any:
+    return described("what people call it, such as knee", default="", check=_label_fault, in_repr=False)
+
+
 @attrs.frozen(kw_only=True)
 class RevoluteJoint:
     """A journal in a bushing, at the point of the joint's name on both bodies."""
@@ -39,6 +56,7 @@ class RevoluteJoint:
     bushing: str = described("body that carries the bushing")
     journal: str = described("body that carries the pin")
     kind: Literal["revolute"] = described("revolute, or prismatic", default="revolute")
+    label: Label = _label()
 
 
 @attrs.frozen(kw_only=True)
@@ -53,6 +71,7 @@ class PrismaticJoint:
         check=lambda axis: None if any(axis) else f"{list(axis)} has no direction",
     )
     kind: Literal["prismatic"] = described("prismatic")
+    label: Label = _label()
 
 
 def _turns(speed: float) -> str | None:
@@ -217,6 +236,11 @@ class Mechanism:
         """Bodies of a joint: bushing and journal, or guide and slider."""
         spec = self.joints[joint]
         return (spec.bushing, spec.journal) if isinstance(spec, RevoluteJoint) else (spec.guide, spec.slider)
+
+    def joint_words(self, joint: str) -> str:
+        """A joint by its name and its label, such as ``G (knee)``."""
+        label = self.joints[joint].label
+        return f"{joint} ({label})" if label else joint
 
     def points_of(self, body: str) -> dict[str, Vector]:
         """Points of a body, the ground included, in its own frame [m]."""

@@ -8,6 +8,8 @@ import numpy as np
 
 from leg_wear_monitor.errors import printable
 from leg_wear_monitor.mechanism.arrays import Floats
+from leg_wear_monitor.mechanism.outline import is_on_ground, outline_of
+from leg_wear_monitor.mechanism.spec import Mechanism
 from leg_wear_monitor.monitor.alarms.alarm import Alarm
 from leg_wear_monitor.monitor.alarms.words import ADVICE, state_of
 from leg_wear_monitor.monitor.encoders.clearance_estimate import ClearanceEstimate
@@ -16,6 +18,7 @@ from leg_wear_monitor.monitor.reports import JointReport, Status
 from leg_wear_monitor.monitor.verdict.verdict import Verdict
 from leg_wear_monitor.playback.condition import clearances, joint_forecast, leg_forecast, life
 from leg_wear_monitor.playback.history import CYCLE_COLUMNS, JOINT_COLUMNS, History
+from leg_wear_monitor.playback.result.leg import LegJoint, Place, ReplayLeg
 from leg_wear_monitor.playback.result.parts import (
     AlarmChange,
     ClearanceChange,
@@ -65,6 +68,7 @@ def summary(
         verdict=verdict,
         recording=_recording(result),
         monitor=_monitor(result),
+        leg=_leg_shape(monitor.mechanism),
         wall_s=wall_s,
         real_time_factor=result.duration_s / wall_s if wall_s else None,
         cycles=len(result.history),
@@ -115,6 +119,27 @@ def _monitor(result: "ReplayResult") -> ReplayMonitor:
         limits=config.limits,
         duty_hours_per_day=config.forecast.duty_hours_per_day,
     )
+
+
+def _leg_shape(mechanism: Mechanism) -> ReplayLeg:
+    outline = outline_of(mechanism)
+    return ReplayLeg(
+        bodies_m={body: _places(corners) for body, corners in outline.bodies.items()},
+        joints={
+            name: LegJoint(
+                label=mechanism.joints[name].label,
+                place_m=_places(place[None])[0],
+                is_on_ground=is_on_ground(mechanism, name),
+            )
+            for name, place in outline.joints.items()
+        },
+        toe_path_m=_places(outline.toe_path),
+    )
+
+
+def _places(points: Floats) -> tuple[Place, ...]:
+    """Points (n, 2) to the micrometre."""
+    return tuple((round(x, 6) + 0.0, round(y, 6) + 0.0) for x, y in points.tolist())
 
 
 def _gait(result: "ReplayResult") -> ReplayGait:

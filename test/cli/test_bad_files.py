@@ -37,6 +37,7 @@ BROKEN = [
     ("law: ambrosio", "law: coulomb", ["defaults.friction.law", "'coulomb'", "ambrosio, threlfall"]),
     ("ramp: [0.001, 0.01]", "ramp: [0.1, 0.01]", ["friction.ramp", "[0.1, 0.01] m/s", "rise"]),
     ("joints: [A, B, G, I, J]", "joints: {A: {width: -1}}", ["clearances.joints.A.width", "-1.0", "0 m"]),
+    ("label: knee", "label: <b>knee</b>", ["joints.G.label", "'<b>knee</b>'", "letters, digits"]),
     # keys
     ("mass: 3.5", "mas: 3.5", ["bodies.thigh.mas", "unknown key", "did you mean mass?"]),
     ("mass: 3.5, ", "", ["bodies.thigh.mass", "missing", "[kg]"]),
@@ -51,10 +52,22 @@ BROKEN = [
     ("  crank:   {mass", '  "cr\\nank": {mass', ["bodies", "'cr\\nank'", "text on one line"]),
     ("name: bionic_leg", 'name: "a\\nb"', ["name", "'a\\nb'", "text on one line"]),
     # what is spoken of is not there
-    ("journal: crank}      # hip", "journal: crnk}  #", ["joints.A.journal", "'crnk'", "ground, crank"]),
+    (
+        "A: {bushing: ground, journal: crank,",
+        "A: {bushing: ground, journal: crnk,",
+        ["joints.A.journal", "'crnk'", "ground, crank"],
+    ),
     ("G: [0.420, 0.0], ", "", ["joints.G.journal", "'thigh'", "'G'", "B, H"]),
-    ("journal: crank}      # hip", "journal: ground} #", ["joints.A", "'ground'", "itself"]),
-    ("journal: crank}      # hip", "kind: ball} #", ["joints.A.kind", "'ball'", "revolute, prismatic"]),
+    (
+        "A: {bushing: ground, journal: crank,",
+        "A: {bushing: ground, journal: ground,",
+        ["joints.A", "'ground'", "itself"],
+    ),
+    (
+        "A: {bushing: ground, journal: crank,",
+        "A: {bushing: ground, kind: ball,",
+        ["joints.A.kind", "'ball'", "revolute, prismatic"],
+    ),
     ("body: crank", "body: ground", ["drive.body", "'ground'", "not a moving body", "crank, thigh"]),
     ("speed: 6.283185307179586", "", ["drive", "speed [rad/s], torque [N m]"]),
     ("speed: 6.28", "torque: 1, speed: 6.28", ["drive", "speed and torque", "expected one of"]),

@@ -168,3 +168,30 @@ def test_a_load_is_constant_or_a_table_over_the_phase(document):
 
 def test_a_drive_is_a_speed_or_a_torque():
     assert load_mechanism("andrews").drive == TorqueDrive(body="k1", torque=0.033, initial_speed=0.0)
+
+
+def test_a_joint_is_called_by_its_name_and_its_label(document):
+    leg = load_mechanism("bionic_leg")
+    assert [leg.joint_words(joint) for joint in "GDIJ"] == ["G (knee)", "D", "I (ankle)", "J (heel)"]
+    other = parse_mechanism(changed(document("bionic_leg"), ("joints", "D", "label"), "Knie-Gelenk 2"), "x")
+    assert other.joint_words("D") == "D (Knie-Gelenk 2)"
+
+
+@pytest.mark.parametrize(
+    ("label", "fault"),
+    [
+        (None, "is empty, expected a name such as knee, or no label"),
+        ("", "is empty, expected a name such as knee, or no label"),
+        (7, "7 is not a text on one line"),
+        ("a\nb", r"'a\nb' is not a text on one line"),
+        (31 * "x", "has 31 characters, expected at most 30"),
+        *(
+            (label, f"{label!r} is not a plain name, expected letters, digits, spaces between and ',-./+")
+            for label in ("<b>knee</b>", "&amp;", "[red]knee", "{{ 7 }}", " knee", "`rm`", "=1")
+        ),
+    ],
+)
+def test_a_label_that_is_no_plain_name_is_refused_in_one_line(document, label, fault):
+    with pytest.raises(ConfigError) as caught:
+        parse_mechanism(changed(document("bionic_leg"), ("joints", "G", "label"), label), "leg.yaml")
+    assert str(caught.value) == f"leg.yaml: joints.G.label: {fault}"

@@ -13,13 +13,14 @@ from leg_wear_monitor.wear.surfaces import SECTORS
 # fields of a mechanism that may change without a change of the worn parts
 _FREE = ("name", "source", "drive", "loads", "clearance_joints", "clearances")
 _FREE_OF_CLEARANCE = ("wear_coefficient",)
+_FREE_OF_JOINTS = ("label",)
 
 
 def fingerprint(mechanism: Mechanism) -> str:
     """Hash of the bodies, joints, springs and clearance joints of a mechanism, 16 hexadecimal digits.
 
-    The hash excludes names and comments of the file, drive, loads and wear coefficients: with a better value
-    of these, the same wear is continued.
+    The hash excludes names, labels and comments of the file, drive, loads and wear coefficients: with a
+    better value of these, the same wear is continued.
     """
     fields = {field.name: getattr(mechanism, field.name) for field in attrs.fields(Mechanism)}
     parts = {name: _plain(value) for name, value in fields.items() if name not in _FREE}
@@ -34,7 +35,7 @@ def fingerprint(mechanism: Mechanism) -> str:
 
 def _plain(value: Any) -> Any:
     if attrs.has(type(value)):
-        return attrs.asdict(value)
+        return attrs.asdict(value, filter=lambda field, _: field.name not in _FREE_OF_JOINTS)
     if isinstance(value, dict):
         return {name: _plain(entry) for name, entry in value.items()}
     return value

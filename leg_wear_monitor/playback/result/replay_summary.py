@@ -14,6 +14,7 @@ from leg_wear_monitor.monitor.reports import Lost
 from leg_wear_monitor.monitor.verdict.verdict import Verdict
 from leg_wear_monitor.playback.result.condition import JointClearance, LifeHours
 from leg_wear_monitor.playback.result.document import alarms_document, joint_document, part_document
+from leg_wear_monitor.playback.result.leg import ReplayLeg
 from leg_wear_monitor.playback.result.parts import (
     LegLife,
     ReplayAlarms,
@@ -42,6 +43,8 @@ class ReplaySummary:
         At the end.
     recording : ReplayRecording
     monitor : ReplayMonitor
+    leg : ReplayLeg
+        Empty in a file of an older version.
     wall_s : float or None
         Wall-clock duration of the replay [s]; None if nobody measured it.
     real_time_factor : float or None
@@ -73,6 +76,7 @@ class ReplaySummary:
     verdict: Verdict
     recording: ReplayRecording
     monitor: ReplayMonitor
+    leg: ReplayLeg = attrs.Factory(ReplayLeg)
     wall_s: float | None = None
     real_time_factor: float | None = None
     cycles: int

@@ -12,16 +12,7 @@ from matplotlib.patches import Polygon
 from leg_wear_monitor.mechanism.arrays import Floats
 from leg_wear_monitor.report.figures.figure import INK, PAPER, USUAL, VERMILION
 
-Points = Mapping[str, Floats]
-
 _HALO = [patheffects.withStroke(linewidth=3.0, foreground=PAPER)]
-
-
-def outline(points: Points) -> Floats:
-    """Corners (n, 2) of a body's shape: its distinct points [m], ordered by angle around their mean."""
-    corners = np.unique(np.array(list(points.values())).round(9), axis=0)
-    around = corners - corners.mean(axis=0)
-    return np.asarray(corners[np.argsort(np.arctan2(around[:, 1], around[:, 0]))])
 
 
 def lighter(colour: str, fraction: float) -> tuple[float, float, float]:

@@ -10,6 +10,7 @@ from matplotlib.lines import Line2D
 
 from leg_wear_monitor.mechanism.arrays import Floats
 from leg_wear_monitor.mechanism.ideal import IdealMotion, ideal_motion, one_cycle, point_motion
+from leg_wear_monitor.mechanism.outline import corners as body_corners
 from leg_wear_monitor.mechanism.position import Linkage, build_linkage
 from leg_wear_monitor.mechanism.spec import GROUND, Mechanism, PrismaticJoint
 from leg_wear_monitor.report.figures.bodies import (
@@ -19,7 +20,6 @@ from leg_wear_monitor.report.figures.bodies import (
     draw_support,
     joint_mark,
     lighter,
-    outline,
     write_beside,
 )
 from leg_wear_monitor.report.figures.figure import BODY_COLOURS, INK, SMALL, USUAL, new_figure, tidy
@@ -105,7 +105,7 @@ def _colours(mechanism: Mechanism) -> dict[str, str]:
 
 
 def _outline_at(paths: Paths, body: str, i: int) -> Floats:
-    return outline({name: path[i] for name, path in paths[body].items()})
+    return body_corners({name: path[i] for name, path in paths[body].items()})
 
 
 def _draw_still(

@@ -8,9 +8,9 @@ import numpy as np
 
 from leg_wear_monitor.mechanism.arrays import Floats
 from leg_wear_monitor.mechanism.ideal import IdealMotion, one_cycle, point_motion
+from leg_wear_monitor.mechanism.outline import corners
 from leg_wear_monitor.mechanism.position import Linkage, build_linkage
 from leg_wear_monitor.mechanism.spec import GROUND, Mechanism
-from leg_wear_monitor.report.figures.bodies import outline
 from leg_wear_monitor.report.figures.figure import BODY_COLOURS
 from leg_wear_monitor.report.page import Live, render, template_text
 from leg_wear_monitor.report.study.text import Labelled
@@ -75,12 +75,12 @@ def _leg_data(linkage: Linkage, motion: IdealMotion) -> dict[str, Any]:
     bodies, every = [], []
     for body in mechanism.bodies:
         points = mechanism.points_of(body)
-        corners = outline({name: np.array([point])[0] for name, point in points.items()})
+        shape = corners({name: np.array([point])[0] for name, point in points.items()})
         origin, angle = _pose(linkage, motion, body)
         bodies.append({
             "name": body,
             "colour": next(colours),
-            "outline": _millimetres(corners),
+            "outline": _millimetres(shape),
             "poses": [
                 [round(1.0e3 * x, 1), round(-1.0e3 * y, 1), round(-float(turn), 2)]
                 for (x, y), turn in zip(origin, np.rad2deg(angle), strict=True)

@@ -30,9 +30,16 @@ def test_json_comes_back_as_it_went_out(summary):
         summary.clearances,
         summary.life,
     )
+    assert again.leg == summary.leg and again.leg.joint_words("B") == "B (knee)"
     assert again.measurements[0].id == 3
     assert again.history.stamp_ns.tolist() == summary.history.stamp_ns.tolist()
     assert np.array_equal(again.history.cycle, summary.history.cycle, equal_nan=True)
+
+
+def test_a_file_of_before_the_leg_was_in_it_is_read(summary):
+    record = json.loads(summary.to_json())
+    del record["leg"]
+    assert summary_of(record, "summary.json").leg.joint_words("B") == "B"
 
 
 def test_json_has_a_version_and_null_for_what_is_not_known(summary):

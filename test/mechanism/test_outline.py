@@ -1,0 +1,37 @@
+"""The outline of a mechanism: its joints lie on both of their bodies, the toe's path begins at the toe."""
+
+import numpy as np
+import pytest
+
+from leg_wear_monitor.mechanism.loader import load_mechanism, shipped_mechanisms
+from leg_wear_monitor.mechanism.outline import is_on_ground, outline_of
+
+pytestmark = pytest.mark.plain
+
+
+def distance(place, corners):
+    return float(np.hypot(*(corners - place).T).min())
+
+
+@pytest.mark.parametrize("name", shipped_mechanisms())
+def test_every_joint_is_a_corner_of_its_bodies(name):
+    mechanism = load_mechanism(name)
+    outline = outline_of(mechanism)
+    assert list(outline.joints) == list(mechanism.joints)
+    for joint, place in outline.joints.items():
+        bodies = [body for body in mechanism.sides(joint) if body != "ground"]
+        inside = [body for body in bodies if len(outline.bodies[body]) > 1]
+        assert all(distance(place, outline.bodies[body]) < 1e-9 for body in inside), joint
+        assert is_on_ground(mechanism, joint) is (len(bodies) == 1)
+
+
+def test_the_leg_hangs_below_its_hip_and_its_toe_goes_round():
+    outline = outline_of(load_mechanism("bionic_leg"))
+    assert outline.joints["A"] == pytest.approx([0.0, 0.0], abs=1e-12)
+    assert outline.joints["G"][1] < outline.joints["A"][1] > outline.joints["I"][1]
+    assert distance(outline.toe_path[0], outline.bodies["foot"]) < 1e-9
+    assert np.ptp(outline.toe_path[:, 0]) > 0.8 > 0.3 > np.ptp(outline.toe_path[:, 1])
+
+
+def test_without_a_toe_there_is_no_path():
+    assert outline_of(load_mechanism("slider_crank")).toe_path.shape == (0, 2)

@@ -8,6 +8,7 @@ import attrs
 from leg_wear_monitor.monitor.encoders.clearance_estimate import ClearanceEstimate
 from leg_wear_monitor.monitor.forecast.forecast import Forecast, JointForecast
 from leg_wear_monitor.monitor.forecast.growth import GrowthWindow, growth_rate
+from leg_wear_monitor.monitor.forecast.model_error import ModelError
 from leg_wear_monitor.monitor.reports import CycleReport, JointReport
 from leg_wear_monitor.twin.statistics import CycleStatistics, TorqueStatistics
 
@@ -17,6 +18,7 @@ def cycle_report(
     cycle: int,
     clearance_joints: Sequence[str],
     growth: Sequence[GrowthWindow],
+    model: ModelError,
     forecast: Forecast,
     seen: Sequence[ClearanceEstimate] | None = None,
 ) -> CycleReport:
@@ -31,6 +33,8 @@ def cycle_report(
         Names of the clearance joints.
     growth : sequence of GrowthWindow
         Of each of them, this cycle included.
+    model : ModelError
+        What the growth of each may be off beside its scatter.
     forecast : Forecast
     seen : sequence of ClearanceEstimate, optional
     """
@@ -43,7 +47,15 @@ def cycle_report(
         moving_s=statistics.moving_s,
         bridged_s=statistics.bridged_s,
         joints=tuple(
-            _joint_report(statistics, k, joint, growth[k], forecast.joints[k], seen[k] if seen else None)
+            _joint_report(
+                statistics,
+                k,
+                joint,
+                growth[k],
+                model,
+                forecast.joints[k],
+                seen[k] if seen else None,
+            )
             for k, joint in enumerate(clearance_joints)
         ),
         torque_samples=torque.samples,
@@ -80,6 +92,7 @@ def _joint_report(
     k: int,
     joint: str,
     window: GrowthWindow,
+    model: ModelError,
     forecast: JointForecast,
     seen: ClearanceEstimate | None,
 ) -> JointReport:
@@ -90,7 +103,7 @@ def _joint_report(
         clearance_max_m=float(statistics.clearance_max_m[k]),
         growth_m_per_cycle=rate.per_cycle_m if rate else None,
         growth_mps=rate.per_second_m if rate else None,
-        growth_error_m_per_cycle=rate.error_m if rate else None,
+        growth_error_m_per_cycle=rate.error_m(model.relative(k, rate.per_cycle_m)) if rate else None,
         forecast=forecast,
         seen=seen,
         peak_force_n=float(statistics.peak_force_n[k]),

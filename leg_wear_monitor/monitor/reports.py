@@ -29,7 +29,7 @@ class JointReport:
         Growth of the mean clearance per cycle and per second of walking, averaged over gait cycles; None
         while there is not enough data.
     growth_error_m_per_cycle : float or None
-        Standard error of that average.
+        Standard deviation of what it may be off: cycles scatter, and masses are not those on paper.
     peak_force_n, p99_force_n, mean_force_n : float
         Of the contact force in this cycle; the peak is a sample of a heavy tail.
     impacts : int

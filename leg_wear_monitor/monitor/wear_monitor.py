@@ -22,6 +22,7 @@ from leg_wear_monitor.monitor.evaluation.torque_record import TorqueRecord
 from leg_wear_monitor.monitor.forecast.forecaster import Forecaster
 from leg_wear_monitor.monitor.forecast.growth import GrowthWindow, extended
 from leg_wear_monitor.monitor.forecast.measurement import MeasurementResult
+from leg_wear_monitor.monitor.forecast.model_error import model_error
 from leg_wear_monitor.monitor.forecast_update import update_forecast
 from leg_wear_monitor.monitor.inputs.guard import InputGuard
 from leg_wear_monitor.monitor.judgement import Judge
@@ -119,6 +120,8 @@ class WearMonitor:
         )
         if ledger and ledger.entry:
             self._evaluation.board.restore(ledger.entry.alarms)
+        speed = self._twin.settings.tracker.commanded_speed_radps
+        self._model_error = model_error(self.mechanism, speed, self.config.wear_acceleration)
         self._evaluation_periods = EvaluationPeriods(cycle_ns // A_CYCLE)
         kept = TorqueRecord.of(self._accounting.state.commissioned)
         self._state = MonitorState(tuple(GrowthWindow() for _ in self.clearance_joints), kept)
@@ -510,7 +513,13 @@ class WearMonitor:
             lambda: self._judge.is_forecast_valid(state.findings),
         )
         state.last = cycle_report(
-            statistics, accounting.state.cycles, self.clearance_joints, state.growth, forecast, estimates
+            statistics,
+            accounting.state.cycles,
+            self.clearance_joints,
+            state.growth,
+            self._model_error,
+            forecast,
+            estimates,
         )
         accounting.note_clearances(state.last)
         return state.last

@@ -89,6 +89,8 @@ def test_a_gait_cycle_is_reported_as_the_twin_saw_it(monitor, gait):
         assert joint.clearance_m > 3.0e-4
         assert joint.growth_m_per_cycle > 0.0
         assert joint.growth_mps == pytest.approx(joint.growth_m_per_cycle, rel=1e-3)
+        # A's cycles hardly scatter, and yet its growth hangs on masses that are not known to 5 %
+        assert 0.025 < joint.growth_error_m_per_cycle / joint.growth_m_per_cycle < 0.3
         # the only answer to "how long": what remains is the forecast's median
         assert joint.forecast.answer is Answer.KNOWN
         assert joint.forecast.hours.p50 == pytest.approx(joint.forecast.cycles.p50 / 3600.0, rel=1e-2)

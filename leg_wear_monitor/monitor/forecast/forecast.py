@@ -110,7 +110,8 @@ class JointCondition:
     growth_m : float or None
         A cycle; None while there is not enough data.
     growth_error_m : float
-        Its standard error.
+        Uncertainty of this mean because cycles scatter. What the model is off is the same in all cycles of a
+        leg: it is in the factor of the wear coefficient, which a measured clearance corrects.
     """
 
     joint: str

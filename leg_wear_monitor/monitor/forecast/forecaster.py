@@ -226,7 +226,7 @@ class Forecaster:
                 wear_m=float(wear_m[k]),
                 limit_m=limits_m[k],
                 growth_m=rate.per_cycle_m if rate else None,
-                growth_error_m=rate.error_m if rate else 0.0,
+                growth_error_m=rate.sampling_m if rate else 0.0,
             )
             for k, (joint, rate) in enumerate(zip(self._clearance_joints, rates, strict=True))
         ]

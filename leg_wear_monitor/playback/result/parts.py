@@ -66,7 +66,8 @@ class ReplayJoint:
     clearance_m : ClearanceChange
         As counted: the clearance when new plus the wear counted since.
     growth_m_per_cycle, growth_error_m_per_cycle, growth_mps : float or None
-        Growth of the mean clearance a gait cycle, its standard error, and growth per second of walking.
+        Growth of the mean clearance a gait cycle, the standard deviation of what it may be off, and growth
+        per second of walking.
     forecast : JointForecast or None
     peak_force_n, mean_force_n : float or None
         Largest contact force, and the mean over all gait cycles.

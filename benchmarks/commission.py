@@ -21,38 +21,46 @@ from leg_wear_monitor.gait.leg import SyntheticLeg
 from leg_wear_monitor.mechanism.arrays import Floats
 from leg_wear_monitor.messages import encode
 
-RATE_HZ, START_NS = 200, 1_700_000_000 * 10**9
+START_NS = 1_700_000_000 * 10**9
 TURN = 2.0 * math.pi
-
-# how the legs walk: pace, load, time [s]
-WALKS: dict[str, tuple[PaceConfig, LoadConfig, int]] = {
-    "steady60": (PaceConfig(ripple=0.02), LoadConfig(), 60),
-    "two": (
-        PaceConfig(times_s=(0.0, 20.0), speeds_rpm=(45.0, 75.0), ripple=0.02),
-        LoadConfig(friction_nm=0.8),
-        40,
-    ),
-    "back60": (PaceConfig(speeds_rpm=(-60.0,), ripple=0.03), LoadConfig(friction_nm=1.0), 40),
-    "load90": (
-        PaceConfig(speeds_rpm=(90.0,), ripple=0.05),
-        LoadConfig(friction_nm=1.5, toe_force_n=100.0),
-        30,
-    ),
-    "slow30": (PaceConfig(speeds_rpm=(30.0,), ripple=0.02), LoadConfig(friction_nm=0.5), 60),
-}
+JOINTS, CLEARANCE_M, WALK_S = 5, 3.0e-4, 60
 
 
-def walked(name: str, cache: Path | None) -> Floats:
-    """Times, crank angles, speeds, impulses of the torque and torques (n, 5) of a walk."""
-    path = cache / f"{name}.npy" if cache else None
+def walk_of(seed: int) -> dict[str, Any]:
+    """How a leg walks: two of three follow the instructions, at two cadences and with the foot in the air."""
+    rng = np.random.default_rng([seed, 2])
+    slow, factor = float(rng.uniform(30.0, 50.0)), float(rng.uniform(1.6, 2.2))
+    way = float(rng.choice([1.0, 1.0, 1.0, -1.0]))
+    if rng.random() < 2.0 / 3.0:
+        speeds: tuple[float, ...] = (way * slow, way * slow * factor)
+    else:
+        speeds = (way * float(rng.uniform(35.0, 90.0)),)
+    return {
+        "speeds_rpm": speeds,
+        "ripple": float(rng.uniform(0.0, 0.05)),
+        "friction_nm": float(rng.uniform(0.0, 1.5)),
+        "toe_force_n": 100.0 if rng.random() < 0.2 else 0.0,
+        "clearances_m": tuple((CLEARANCE_M * rng.uniform(0.7, 1.3, JOINTS)).tolist()),
+        "rate_hz": int(rng.choice([100, 200, 200, 500])),
+    }
+
+
+def walked(seed: int, cache: Path | None) -> Floats:
+    """Times, crank angles, impulses of the torque and torques (n, 4) of a walk."""
+    path = cache / f"{seed}.npy" if cache else None
     if path is not None and path.exists():
         return np.asarray(np.load(path))
-    pace, load, seconds = WALKS[name]
-    leg, rng, rows = SyntheticLeg(GaitConfig(pace=pace, load=load)), np.random.default_rng(1), []
-    for i in range(1, seconds * RATE_HZ):
-        t = i / RATE_HZ + min(2.0e-3, max(-2.0e-3, 1.0e-4 * rng.standard_normal()))
+    walk, rng, rows = walk_of(seed), np.random.default_rng([seed, 3]), []
+    speeds = walk["speeds_rpm"]
+    times = tuple(WALK_S / len(speeds) * i for i in range(len(speeds)))
+    pace = PaceConfig(times_s=times, speeds_rpm=speeds, ripple=walk["ripple"])
+    load = LoadConfig(friction_nm=walk["friction_nm"], toe_force_n=walk["toe_force_n"])
+    leg = SyntheticLeg(GaitConfig(pace=pace, load=load, clearances_m=walk["clearances_m"]))
+    for i in range(1, WALK_S * walk["rate_hz"]):
+        jitter = 1.0e-4 * float(rng.standard_normal())
+        t = i / walk["rate_hz"] + min(5.0e-4, max(-5.0e-4, jitter))
         now = leg.advance(t)
-        rows.append((t, now.crank.angle, now.crank.speed, now.torque_impulse, now.torque_nm))
+        rows.append((t, now.crank.angle, now.torque_impulse, now.torque_nm))
     if path is not None:
         np.save(path, np.array(rows))
     return np.array(rows)
@@ -76,14 +84,13 @@ def robot(seed: int) -> dict[str, Any]:
         "sampling": str(rng.choice(["average", "instant"])),
         "angle_noise_rad": float(rng.choice([1.0e-4, 1.0e-3, 3.0e-3])),
         "torque_noise_nm": float(rng.choice([0.05, 0.3, 1.0])),
-        "walk": list(WALKS)[seed % len(WALKS)],
     }
 
 
 def record(path: Path, truth: dict[str, Any], walk: Floats, seed: int) -> None:
     """The robot's recording: its crank among other joints, its torque among others."""
     rng = np.random.default_rng([seed, 1])
-    times, angle, _, impulse, instant = walk.T
+    times, angle, impulse, instant = walk.T
     if truth["starts_at_zero"]:
         truth["offset_rad"] = float((angle[0] + math.pi) % TURN - math.pi)
         angle = angle - angle[0] + truth["offset_rad"]
@@ -122,7 +129,8 @@ def row(seed: int, truth: dict[str, Any], result: Commissioning, seconds: float)
     def value(name: str) -> Any:
         return found[name].value
 
-    apart = (float(value("crank.offset_rad")) - truth["offset_rad"] + math.pi) % TURN - math.pi
+    offset, lag = found["crank.offset_rad"], found["lag"]
+    apart = (float(offset.value) - truth["offset_rad"] + math.pi) % TURN - math.pi
     factor = float(value("drive_torque.scale")) * float(value("drive_torque.gear_ratio"))
     rival = min(
         (found[name].other_mismatch or math.inf)
@@ -131,14 +139,16 @@ def row(seed: int, truth: dict[str, Any], result: Commissioning, seconds: float)
     told = [text.split(":")[0].replace("drive_torque.", "") for text in result.not_told]
     cells = (
         f"{seed}",
-        truth["walk"],
+        " and ".join(f"{speed:.0f}" for speed in truth["speeds_rpm"]),
+        f"{truth['rate_hz']}",
         f"{truth['sign']} / {value('crank.sign')}",
         f"{truth['gear_ratio']:g} / {value('crank.gear_ratio'):.6g}",
-        f"{truth['offset_rad']:.3f} / {value('crank.offset_rad'):.3f} ({apart:+.3f})",
+        f"{truth['offset_rad']:.3f} / {offset.value:.3f} ({apart:+.3f} ± {offset.sigma:.3f})",
         f"{truth['source']} / {value('drive_torque.source')}",
         f"{truth['torque_sign']} / {value('drive_torque.sign')}",
         f"{truth['factor']:.4g} / {factor:.4g}",
         f"{truth['sampling']} / {found['drive_torque.sampling'].value}",
+        "-" if lag.sigma is None else f"0 / {1.0e3 * float(lag.value):.1f} ± {1.0e3 * lag.sigma:.1f}",
         f"{found['crank.sign'].mismatch:.3f}",
         f"{rival:.3f}",
         "; ".join([*told, *(text.split(" ± ")[0] for text in result.findings)]) or "-",
@@ -149,19 +159,20 @@ def row(seed: int, truth: dict[str, Any], result: Commissioning, seconds: float)
 
 def main() -> None:
     parser = argparse.ArgumentParser(description=__doc__)
-    parser.add_argument("--seeds", type=int, default=10, help="number of robots")
-    parser.add_argument("--cache", type=Path, help="directory of walks, which take minutes to make")
+    parser.add_argument("--first", type=int, default=0, help="seed of the first robot")
+    parser.add_argument("--number", type=int, default=10, help="number of robots")
+    parser.add_argument("--cache", type=Path, help="directory of walks, each of which takes half a minute")
     arguments = parser.parse_args()
     print(
-        "| robot | walk | sign | gear ratio | offset, rad | source | torque sign | scale × gear | sampling | "
-        "mismatch | of the runner-up | not enough to tell; does not fit | CPU s |"
+        "| seed | rpm | Hz | sign | gear ratio | offset, rad | source | torque sign | scale × gear | "
+        "sampling | lag, ms | mismatch | of the runner-up | not enough to tell; does not fit | CPU s |"
     )
-    print("|" + "---|" * 13)
-    for seed in range(arguments.seeds):
-        truth = robot(seed)
+    print("|" + "---|" * 15)
+    for seed in range(arguments.first, arguments.first + arguments.number):
+        truth = robot(seed) | walk_of(seed)
         with tempfile.TemporaryDirectory() as directory:
             path = Path(directory) / "robot.mcap"
-            record(path, truth, walked(truth["walk"], arguments.cache), seed)
+            record(path, truth, walked(seed, arguments.cache), seed)
             began = time.process_time()
             result, _ = commission([path])
             print(row(seed, truth, result, time.process_time() - began), flush=True)

@@ -6,6 +6,7 @@ itself; such means by a tenth of it or less.
 
 import attrs
 import numpy as np
+from numpy.lib.stride_tricks import sliding_window_view
 from numpy.typing import NDArray
 
 from leg_wear_monitor.commissioning.pairing import Pair
@@ -45,11 +46,10 @@ class Blocks:
         other.
         """
         means = (np.add.reduceat(values, self.first, axis=-1) / self.length)[..., self.kept]
-        total = np.zeros_like(means)
-        at = np.arange(means.shape[-1])
-        for shift, weight in enumerate(_WEIGHTS, start=-(len(_WEIGHTS) // 2)):
-            total += weight * means[..., np.clip(at + shift, 0, len(at) - 1)]
-        return np.asarray(total)
+        reach = len(_WEIGHTS) // 2
+        ends = [means[..., :1]] * reach, [means[..., -1:]] * reach
+        padded = np.concatenate([*ends[0], means, *ends[1]], axis=-1)
+        return np.asarray(sliding_window_view(padded, len(_WEIGHTS), axis=-1) @ _WEIGHTS)
 
     @property
     def bin(self) -> NDArray[np.int64]:

@@ -8,16 +8,17 @@ import attrs
 from leg_wear_monitor.bags.findings import Finding
 from leg_wear_monitor.commissioning.choice import Choice, choose
 from leg_wear_monitor.commissioning.findings import findings, not_told, notes
-from leg_wear_monitor.commissioning.fit import Fit, fit
+from leg_wear_monitor.commissioning.fit import fit
 from leg_wear_monitor.commissioning.misfit import Load, with_load
 from leg_wear_monitor.commissioning.motion import JointMotion, motion_of, why_not_a_crank
 from leg_wear_monitor.commissioning.proposal import Found, changes, items
 from leg_wear_monitor.commissioning.reading import read_signals
 from leg_wear_monitor.commissioning.regression import Terms
 from leg_wear_monitor.commissioning.result import Commissioning
+from leg_wear_monitor.commissioning.sampling import sampling_of
 from leg_wear_monitor.commissioning.search import candidates
 from leg_wear_monitor.commissioning.signals import JointName, Series, Signals, TorqueSource
-from leg_wear_monitor.commissioning.timing import sampling_of, separates_lag
+from leg_wear_monitor.commissioning.timing import separates_lag, timing_of
 from leg_wear_monitor.commissioning.torque_model import TorqueModel, torque_model
 from leg_wear_monitor.errors import LegWearError
 from leg_wear_monitor.mechanism.loader import load_mechanism
@@ -93,9 +94,7 @@ def propose(
             "of walking at a steady cadence"
         )
     choice = choose(found)
-    one, load = _final(choice, model)
-    separated = separates_lag(one.pair)
-    facts = Found(choice, one, motions[choice.best.joint], sampling_of(one, separated), separated, base)
+    facts, load = _final(choice, motions[choice.best.joint], model, base)
     return _result(facts, load, mechanism)
 
 
@@ -114,13 +113,22 @@ def _result(facts: Found, load: Load | None, mechanism: Mechanism) -> Commission
     )
 
 
-def _final(choice: Choice, model: TorqueModel) -> tuple[Fit, Load | None]:
-    """The chosen fit again, with the terms that the recording can tell."""
+def _final(
+    choice: Choice, motion: JointMotion, model: TorqueModel, base: MonitorConfig
+) -> tuple[Found, Load | None]:
+    """The chosen fit again, with the terms that the recording can tell, and the lag that it is late by."""
     one = choice.best.fit
     terms = Terms(bias=one.pair.walks_both_ways, lag=separates_lag(one.pair))
-    start = attrs.evolve(one.start, ratio=one.ratio, offset_rad=one.offset_rad[one.start.recording])
-    again = fit(one.pair, model, start, terms, with_errors=True)
-    return with_load(again, model, terms)
+    again = fit(one.pair, model, one.refined, terms, with_errors=True)
+    again, load = with_load(again, model, terms)
+    sampling = sampling_of(again, model)
+    timing = timing_of(again, sampling.value or base.drive_torque.sampling)
+    if timing.is_lag_separated and not timing.is_late:
+        # a lag that does not show would only make the offset uncertain
+        known = attrs.evolve(terms, lag=False, load=load is not None)
+        start = attrs.evolve(again.refined, lag_s=timing.lag_s)
+        again = fit(one.pair, model, start, known, with_errors=True)
+    return Found(choice, again, motion, sampling, timing, base), load
 
 
 def _cranks(joints: dict[JointName, Series], wanted: str | None) -> dict[JointName, JointMotion]:

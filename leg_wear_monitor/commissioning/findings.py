@@ -3,16 +3,18 @@
 import math
 from collections.abc import Iterator
 
+import numpy as np
+
 from leg_wear_monitor.commissioning.misfit import Load, does_not_fit
 from leg_wear_monitor.commissioning.proposal import Found, gear, gear_error, offset_rad
 from leg_wear_monitor.commissioning.search import repeating
 from leg_wear_monitor.commissioning.signals import FLOAT64
-from leg_wear_monitor.commissioning.timing import cadences_rpm, lag_error_s
+from leg_wear_monitor.commissioning.timing import cadences_rpm
 from leg_wear_monitor.mechanism.ideal import TURN
 from leg_wear_monitor.mechanism.spec import Mechanism
-from leg_wear_monitor.twin.settings import AVERAGE
 
 _SURE = 3.0
+_TOLD = 2.0
 _ANEW_RAD = 0.1  # by which offsets of two recordings of one absolute encoder do not differ
 _IN_DEGREES = math.degrees(1.0)
 _ROUGH_SCALE = 0.05
@@ -24,7 +26,8 @@ def not_told(found: Found) -> tuple[str, ...]:
     """What the recording is not enough to tell, and why."""
     told = list(found.choice.doubts)
     if not found.sampling.value:
-        told.append(f"drive_torque.sampling and lag: {found.sampling.why}")
+        told.append(f"drive_torque.sampling: {found.sampling.why}")
+    told += _lag(found)
     ratio, is_exact = gear(found)
     if not is_exact:
         error = found.fit.sigma["ratio"] / abs(found.fit.ratio)
@@ -65,6 +68,22 @@ def notes(found: Found) -> tuple[str, ...]:
     return tuple(_notes(found))
 
 
+def _lag(found: Found) -> Iterator[str]:
+    timing, most = found.timing, found.base.drive_torque.max_lag_s
+    if not timing.is_lag_separated:
+        turned = 1.0e-3 * abs(float(np.median(found.fit.crank()[1])))
+        yield (
+            f"lag: at one cadence, a torque that is late by 1 ms looks like {turned:.2g} rad of offset; "
+            "record two cadences"
+        )
+    elif _TOLD * timing.error_s > most:
+        yield (
+            f"lag: known to ± {1.0e3 * timing.error_s:.2g} ms only, more than drive_torque.max_lag_s, "
+            f"{1.0e3 * most:g} ms, since clearances shift the torque's phase from cadence to cadence; record "
+            "cadences further apart"
+        )
+
+
 def _load(load: Load | None) -> str:
     if load is None:
         return ""
@@ -87,11 +106,8 @@ def _drives(found: Found) -> str:
 
 
 def _late(found: Found) -> str:
-    if not found.is_lag_separated:
-        return ""
-    one, most = found.fit, found.base.drive_torque.max_lag_s
-    late = one.lag_s - (0.5 * one.pair.interval_s if found.used_sampling == AVERAGE else 0.0)
-    if abs(late) - _SURE * lag_error_s(one) <= most:
+    late, most = found.timing.late_s, found.base.drive_torque.max_lag_s
+    if not abs(late) - _SURE * found.timing.error_s > most:
         return ""
     return (
         f"the torque is late by {1.0e3 * late:.3g} ms, more than drive_torque.max_lag_s, {1.0e3 * most:g} ms"

@@ -15,7 +15,8 @@ from leg_wear_monitor.mechanism.ideal import TURN
 
 _STEPS = 15
 _LONGEST_STEP_RAD = 0.2  # of the phase in one step, half a radian of the torque's third harmonic
-_DONE_RAD = 1.0e-6
+_DONE_RAD = 1.0e-3  # a twentieth of what clearances shift the phase by
+_EXACT_RAD = 1.0e-6
 _NO_TERMS = Terms()
 
 
@@ -60,6 +61,13 @@ class Fit:
         return self.linear["gain"]
 
     @property
+    def refined(self) -> Start:
+        """Where a further fit starts."""
+        return attrs.evolve(
+            self.start, ratio=self.ratio, offset_rad=self.offset_rad[self.start.recording], lag_s=self.lag_s
+        )
+
+    @property
     def mismatch(self) -> float:
         """RMS of the rest as a fraction of the RMS of the measured torque about its mean."""
         return float(np.sqrt(np.mean(self.rest**2)) / self.measured.std())
@@ -98,7 +106,7 @@ class Fit:
 def fit(
     pair: Pair, model: TorqueModel, start: Start, terms: Terms = _NO_TERMS, with_errors: bool = False
 ) -> Fit:
-    """Best fit near a start; its standard deviations only if asked for, since they take long."""
+    """Best fit near a start; its standard deviations and last digits only if asked for: they take long."""
     blocks = blocks_of(pair, start.ratio)
     measured = blocks.mean(pair.torque)
     state = begin(pair, model, start)
@@ -107,21 +115,21 @@ def fit(
         by_linear, by_motion = columns(pair, model, state, terms, blocks)
         by_motion *= least_squares(by_linear, measured)[0]
         moved = least_squares(np.concatenate([by_linear, by_motion]), measured)[len(by_linear) :]
-        if not _move(state, moved, terms, reach):
+        if _move(state, moved, terms, reach) <= (_EXACT_RAD if with_errors else _DONE_RAD):
             break
     return _fit(state, terms, measured, blocks, pair, model, start, with_errors)
 
 
-def _move(state: State, moved: Floats, terms: Terms, reach: float) -> bool:
-    """Go a step of bounded length; whether it was worth it."""
+def _move(state: State, moved: Floats, terms: Terms, reach: float) -> float:
+    """Go a step of bounded length; its full length [rad]."""
     k = len(state.phase)
     longest = max(float(np.abs(moved[:k]).max()), reach * abs(float(moved[k])))
-    moved = moved * min(1.0, _LONGEST_STEP_RAD / max(longest, _DONE_RAD))
+    moved = moved * min(1.0, _LONGEST_STEP_RAD / max(longest, _EXACT_RAD))
     state.phase += moved[:k]
     state.ratio += float(moved[k])
     if terms.lag:
         state.lag_s += float(moved[k + 1])
-    return longest > _DONE_RAD
+    return longest
 
 
 def _fit(

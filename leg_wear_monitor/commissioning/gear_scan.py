@@ -40,6 +40,8 @@ class Start:
         Fraction of the torque's variance that the model explains.
     recording : int
         Recording whose torque was used.
+    lag_s : float
+        Time by which the torque is late [s]; it stays unless it is among the terms of the fit.
     """
 
     ratio: float
@@ -47,6 +49,7 @@ class Start:
     torque_sign: int
     explained: float
     recording: int
+    lag_s: float = 0.0
 
 
 def scan(pair: Pair, model: TorqueModel, count: int) -> list[Start]:

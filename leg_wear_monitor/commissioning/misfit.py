@@ -13,6 +13,9 @@ from leg_wear_monitor.mechanism.spec import Mechanism
 # Clearances of 0.3 mm in five joints of the default leg repeat with 0.03 to 0.17 of the torque, the most at
 # 30 rpm and of a sensor that samples instants, whose impacts do not average out
 _NOTABLE = 0.2
+_LEAST_LOAD = (
+    0.06  # repeating rest below which a load is not looked for: sensors that average have up to 0.05
+)
 _EXPLAINS = 0.5  # of the energy of the repeating rest, from which on a cause is named
 _SURE = 5.0  # standard deviations
 
@@ -36,11 +39,10 @@ class Load:
 
 def with_load(one: Fit, model: TorqueModel, terms: Terms) -> tuple[Fit, Load | None]:
     """The fit with a foot load, if that explains most of the rest that repeats; else the fit as it is."""
-    if not model.load.any():
-        return one, None
     before = repeating(one) ** 2
-    start = attrs.evolve(one.start, ratio=one.ratio, offset_rad=one.offset_rad[one.start.recording])
-    loaded = fit(one.pair, model, start, attrs.evolve(terms, load=True), with_errors=True)
+    if not model.load.any() or before < _LEAST_LOAD**2:
+        return one, None
+    loaded = fit(one.pair, model, one.refined, attrs.evolve(terms, load=True), with_errors=True)
     after = repeating(loaded) ** 2
     force, sigma = loaded.linear["load"] / loaded.gain, loaded.sigma["load"] / abs(loaded.gain)
     explained = 1.0 - after / before if before > 0.0 else 0.0

@@ -13,16 +13,17 @@ from leg_wear_monitor.commissioning.fit import Fit
 from leg_wear_monitor.commissioning.motion import JointMotion
 from leg_wear_monitor.commissioning.noise import scatter, sensor_noise
 from leg_wear_monitor.commissioning.result import Item
+from leg_wear_monitor.commissioning.sampling import Sampling
 from leg_wear_monitor.commissioning.search import SAME_GEAR, Candidate
 from leg_wear_monitor.commissioning.signals import WRENCH
-from leg_wear_monitor.commissioning.timing import Sampling, cadence_rpm, lag_error_s
+from leg_wear_monitor.commissioning.timing import Timing, cadence_rpm
 from leg_wear_monitor.mechanism.ideal import TURN
 from leg_wear_monitor.monitor.config.settings import MonitorConfig
-from leg_wear_monitor.twin.settings import AVERAGE
 
 _SURE = 3.0  # standard deviations
 _NEAR = 0.05  # relative error by which clearances shift the scale: a given one that near is kept
 _DRIFT_RAD = 0.05  # by which clearances may shift the phase over a recording
+_MODEL_PHASE_RAD = 0.02  # by which clearances of 0.3 mm in five joints shift the torque's phase
 _HALF_A_GEAR = 0.5, 1.5  # efficiencies with which a torque may be that of the motor's shaft
 
 
@@ -34,7 +35,7 @@ class Found:
     fit: Fit
     motion: JointMotion
     sampling: Sampling
-    is_lag_separated: bool
+    timing: Timing
     base: MonitorConfig
 
     @property
@@ -81,8 +82,8 @@ def offset_rad(found: Found, number: int) -> float:
     # the exact ratio instead of the measured one leaves the phase in the middle of the recording as it is
     middle = float(np.median(one.pair.position_rad[one.pair.recording == number]))
     offset += (one.ratio - one.direction / gear(found)[0]) * middle
-    if not found.is_lag_separated and found.used_sampling == AVERAGE:
-        offset += 0.5 * one.pair.interval_s * float(np.median(one.crank()[1]))
+    # at one cadence, a lag is a part of the phase
+    offset += (found.timing.lag_s - one.lag_s) * float(np.median(one.crank()[1]))
     return float((offset + math.pi) % TURN - math.pi)
 
 
@@ -126,7 +127,8 @@ def _crank(found: Found) -> Iterator[Item]:
         name="crank.offset_rad",
         value=round(offset_rad(found, last), 4),
         unit="rad",
-        sigma=one.sigma["offset_rad"],
+        sigma=math.hypot(one.sigma["offset_rad"], _MODEL_PHASE_RAD),
+        remark="clearances shift the torque's phase",
         mismatch=mismatch,
     )
 
@@ -174,20 +176,19 @@ def _scale(found: Found) -> tuple[float, float]:
 
 
 def _timing(found: Found) -> Iterator[Item]:
-    one = found.fit
+    one, timing = found.fit, found.timing
     yield Item(
         name="drive_torque.sampling",
         value=found.used_sampling,
-        remark="" if found.sampling.value else "as given: not enough to tell",
+        remark=found.sampling.why if found.sampling.value else "as given: not enough to tell",
     )
-    late = one.lag_s - (0.5 * one.pair.interval_s if found.used_sampling == AVERAGE else 0.0)
     yield Item(
         name="lag",
-        value=late if found.is_lag_separated else math.nan,
+        value=timing.late_s,
         unit="s",
-        sigma=lag_error_s(one) if found.is_lag_separated else None,
+        sigma=timing.error_s if timing.is_lag_separated else None,
         remark="of the torque, beside that of its sampling"
-        if found.is_lag_separated
+        if timing.is_lag_separated
         else "not enough to tell from an offset at one cadence",
     )
     cadence, tolerance = cadence_rpm(one)

@@ -60,7 +60,7 @@ def begin(pair: Pair, model: TorqueModel, start: Start) -> State:
     for i, number in enumerate(numbers.tolist()):
         if number != start.recording:
             phase[i] = _phase(pair.part(row == i), model, start, float(middle[i]))
-    return State(start.ratio, phase, middle, row)
+    return State(start.ratio, phase, middle, row, start.lag_s)
 
 
 def _phase(pair: Pair, model: TorqueModel, start: Start, middle: float) -> float:

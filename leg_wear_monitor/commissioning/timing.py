@@ -1,4 +1,4 @@
-"""What speeds tell apart: a lag of the torque from an offset, averages from instants; and the cadence."""
+"""What speeds tell: a lag of the torque from an offset of the crank; and the cadence."""
 
 import math
 
@@ -9,7 +9,7 @@ from leg_wear_monitor.commissioning.fit import Fit
 from leg_wear_monitor.commissioning.pairing import Pair, slow_speed
 from leg_wear_monitor.mechanism.arrays import Floats
 from leg_wear_monitor.mechanism.ideal import TURN
-from leg_wear_monitor.twin.settings import AVERAGE, INSTANT
+from leg_wear_monitor.twin.settings import AVERAGE
 
 _SPREAD = 0.15  # relative spread of the speed from which on a lag is separated from the offset
 _SURE = 3.0  # standard deviations
@@ -25,41 +25,42 @@ def separates_lag(pair: Pair) -> bool:
 
 
 @attrs.frozen
-class Sampling:
-    """What a torque sample is, as far as it can be told.
+class Timing:
+    """When a torque is measured, as far as it can be told.
 
     Attributes
     ----------
-    value : str
-        ``average``, ``instant``, or empty if it cannot be told.
-    why : str
-        Why it cannot.
+    is_lag_separated : bool
+        Whether the recording tells a lag from an offset.
+    late_s, error_s : float
+        Time by which the torque is late beside its sampling, and its standard deviation [s]; NaN if it is not
+        separated.
+    sampling_s : float
+        Lag of the sampling: half a sampling interval for averages.
     """
 
-    value: str
-    why: str = ""
+    is_lag_separated: bool
+    late_s: float
+    error_s: float
+    sampling_s: float
+
+    @property
+    def is_late(self) -> bool:
+        """Whether a lag shows for sure."""
+        return self.is_lag_separated and abs(self.late_s) > _SURE * self.error_s
+
+    @property
+    def lag_s(self) -> float:
+        """Lag to allow for: the measured one if it shows for sure, else that of the sampling [s]."""
+        return self.sampling_s + (self.late_s if self.is_late else 0.0)
 
 
-def sampling_of(one: Fit, is_separated: bool) -> Sampling:
-    """Averages are late by half a sampling interval; that shows only if a lag shows."""
-    half = 0.5 * one.pair.interval_s
-    speed = float(np.median(np.abs(one.crank()[1])))
-    if not is_separated:
-        shift = half * speed
-        why = (
-            f"averages are late by {1.0e3 * half:.3g} ms, which at one cadence looks like {shift:.2g} rad of "
-            "offset; record two cadences"
-        )
-        return Sampling("", why)
-    error = lag_error_s(one)
-    if error > 0.5 * half:
-        why = f"the lag is known to ± {1.0e3 * error:.2g} ms only, averages are late by {1.0e3 * half:.3g} ms"
-        return Sampling("", why)
-    near = {AVERAGE: abs(one.lag_s - half) <= 2.0 * error, INSTANT: abs(one.lag_s) <= 2.0 * error}
-    found = [name for name, is_near in near.items() if is_near]
-    if len(found) == 1:
-        return Sampling(found[0])
-    return Sampling("", f"a lag of {1.0e3 * one.lag_s:.2g} ms is that of neither averages nor instants")
+def timing_of(one: Fit, sampling: str) -> Timing:
+    """Timing of a torque with a sampling, from a fit whose lag is free if the recording separates it."""
+    half = 0.5 * one.pair.interval_s if sampling == AVERAGE else 0.0
+    if not separates_lag(one.pair):
+        return Timing(False, math.nan, math.nan, half)
+    return Timing(True, one.lag_s - half, lag_error_s(one), half)
 
 
 def lag_error_s(one: Fit) -> float:

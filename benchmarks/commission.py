@@ -15,7 +15,7 @@ import numpy as np
 
 from leg_wear_monitor.bags.mcap.writer import McapWriter
 from leg_wear_monitor.commissioning.commission import commission
-from leg_wear_monitor.commissioning.result import Commissioning
+from leg_wear_monitor.commissioning.result.commissioning_result import CommissioningResult
 from leg_wear_monitor.gait.config import GaitConfig, LoadConfig, PaceConfig
 from leg_wear_monitor.gait.leg import SyntheticLeg
 from leg_wear_monitor.mechanism.arrays import Floats
@@ -122,7 +122,7 @@ def record(path: Path, truth: dict[str, Any], walk: Floats, seed: int) -> None:
             writer.write_many(channel, stamps, np.concatenate([head, raw], axis=1))
 
 
-def row(seed: int, truth: dict[str, Any], result: Commissioning, seconds: float) -> str:
+def row(seed: int, truth: dict[str, Any], result: CommissioningResult, seconds: float) -> str:
     """A row of the table: each value as it was made, and as it was found."""
     found = {item.name: item for item in result.items}
 
@@ -174,7 +174,7 @@ def main() -> None:
             path = Path(directory) / "robot.mcap"
             record(path, truth, walked(seed, arguments.cache), seed)
             began = time.process_time()
-            result, _ = commission([path])
+            result = commission(path)
             print(row(seed, truth, result, time.process_time() - began), flush=True)
 
 

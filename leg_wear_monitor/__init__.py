@@ -11,6 +11,11 @@ TYPE_CHECKING = False  # as typing has it, without the time to import that
 if TYPE_CHECKING:
     from typing import Any
 
+    from leg_wear_monitor.commissioning.commission import commission
+    from leg_wear_monitor.commissioning.result.commissioning_result import (
+        CommissioningItem,
+        CommissioningResult,
+    )
     from leg_wear_monitor.dynamics.result.parts import (
         EnergyBalance,
         Impact,
@@ -33,6 +38,8 @@ if TYPE_CHECKING:
     from leg_wear_monitor.report.plot import plot
 
 _HOME = {
+    "CommissioningItem": "commissioning.result.commissioning_result",
+    "CommissioningResult": "commissioning.result.commissioning_result",
     "EnergyBalance": "dynamics.result.parts",
     "Impact": "dynamics.result.parts",
     "JointResult": "dynamics.result.parts",
@@ -46,6 +53,7 @@ _HOME = {
     "TorqueResult": "dynamics.result.parts",
     "Trace": "dynamics.result.parts",
     "WearMonitor": "monitor.wear_monitor",
+    "commission": "commissioning.commission",
     "load_config": "monitor.config.parameter_file",
     "load_mechanism": "mechanism.loader",
     "open_ledger": "monitor.ledger.ledger",
@@ -56,6 +64,8 @@ _HOME = {
 
 __all__ = [
     "AssemblyError",
+    "CommissioningItem",
+    "CommissioningResult",
     "ConfigError",
     "EnergyBalance",
     "Impact",
@@ -72,6 +82,7 @@ __all__ = [
     "TorqueResult",
     "Trace",
     "WearMonitor",
+    "commission",
     "load_config",
     "load_mechanism",
     "open_ledger",

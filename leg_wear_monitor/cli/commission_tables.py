@@ -10,10 +10,13 @@ from leg_wear_monitor.cli.tables import figure
 from leg_wear_monitor.errors import printable
 
 if TYPE_CHECKING:
-    from leg_wear_monitor.commissioning.result import Commissioning, Item
+    from leg_wear_monitor.commissioning.result.commissioning_result import (
+        CommissioningItem,
+        CommissioningResult,
+    )
 
 
-def print_commissioning(result: "Commissioning") -> None:
+def print_commissioning(result: "CommissioningResult") -> None:
     """Print what was found, what cannot be told, and what does not fit."""
     console = Console(highlight=False, markup=False)
     console.print(f"\nfrom {result.turns:.3g} turns of the crank\n")
@@ -31,7 +34,7 @@ def print_commissioning(result: "Commissioning") -> None:
         console.print("no parameters are proposed, since a choice between them is not sure")
 
 
-def _table(result: "Commissioning") -> Table:
+def _table(result: "CommissioningResult") -> Table:
     table = Table(box=None, pad_edge=False, padding=(0, 1), header_style="bold")
     table.add_column("\nparameter", no_wrap=True)
     table.add_column("\nvalue", overflow="fold", min_width=12)
@@ -44,7 +47,7 @@ def _table(result: "Commissioning") -> Table:
     return table
 
 
-def _cells(item: "Item") -> list[str]:
+def _cells(item: "CommissioningItem") -> list[str]:
     return [
         item.name,
         f"{_shown(item.value)} {item.unit}".strip() if _is_known(item.value) else "-",

@@ -5,25 +5,25 @@ from pathlib import Path
 
 import attrs
 
-from leg_wear_monitor.bags.findings import Finding
-from leg_wear_monitor.commissioning.choice import Choice, choose
-from leg_wear_monitor.commissioning.findings import findings, not_told, notes
-from leg_wear_monitor.commissioning.fit import fit
-from leg_wear_monitor.commissioning.misfit import Load, with_load
-from leg_wear_monitor.commissioning.motion import JointMotion, motion_of, why_not_a_crank
-from leg_wear_monitor.commissioning.proposal import Found, changes, items
-from leg_wear_monitor.commissioning.reading import read_signals
-from leg_wear_monitor.commissioning.regression import Terms
-from leg_wear_monitor.commissioning.result import Commissioning
-from leg_wear_monitor.commissioning.sampling import sampling_of
-from leg_wear_monitor.commissioning.search import candidates
-from leg_wear_monitor.commissioning.signals import JointName, Series, Signals, TorqueSource
-from leg_wear_monitor.commissioning.timing import separates_lag, timing_of
+from leg_wear_monitor.commissioning.evidence.misfit import Load, with_load
+from leg_wear_monitor.commissioning.evidence.sampling import sampling_of
+from leg_wear_monitor.commissioning.evidence.timing import separates_lag, timing_of
+from leg_wear_monitor.commissioning.fit.fit import fit
+from leg_wear_monitor.commissioning.fit.regression import Terms
+from leg_wear_monitor.commissioning.proposal.findings import findings, not_told, notes
+from leg_wear_monitor.commissioning.proposal.items import Found, changes, items
+from leg_wear_monitor.commissioning.result.commissioning_result import CommissioningResult
+from leg_wear_monitor.commissioning.search.candidates import candidates
+from leg_wear_monitor.commissioning.search.choice import Choice, choose
+from leg_wear_monitor.commissioning.series.motion import JointMotion, motion_of, why_not_a_crank
+from leg_wear_monitor.commissioning.series.reading import read_signals
+from leg_wear_monitor.commissioning.series.signals import JointName, Series, Signals, TorqueSource
 from leg_wear_monitor.commissioning.torque_model import TorqueModel, torque_model
 from leg_wear_monitor.errors import LegWearError
 from leg_wear_monitor.mechanism.loader import load_mechanism
 from leg_wear_monitor.mechanism.spec import Mechanism
 from leg_wear_monitor.monitor.config.fitting import fitted
+from leg_wear_monitor.monitor.config.parameter_file import load_config
 from leg_wear_monitor.monitor.config.parameters import config_from, values_of
 from leg_wear_monitor.monitor.config.settings import MonitorConfig
 
@@ -31,34 +31,35 @@ _LEAST_S = 10.0  # ten turns at 60 rpm
 
 
 def commission(
-    paths: Iterable[str | Path],
-    config: MonitorConfig | None = None,
+    paths: str | Path | Iterable[str | Path],
+    config: MonitorConfig | str | Path | None = None,
     *,
     joint_states: str | None = None,
     drive_torque: str | None = None,
     crank_joint: str | None = None,
     progress: Callable[[float], None] = lambda _fraction: None,
-) -> tuple[Commissioning, list[Finding]]:
+) -> CommissioningResult:
     """Propose the parameters of a robot from recordings of its healthy leg.
 
     Parameters
     ----------
-    paths : iterable
-        MCAP and .db3 files, bag directories.
-    config : MonitorConfig, optional
-        Names the mechanism; keeps what commissioning does not measure.
+    paths : path, or iterable of paths
+        MCAP and .db3 files, bag directories; an encoder may start anew in each.
+    config : MonitorConfig or path, optional
+        Parameters, or a parameter file: names the mechanism, and keeps what is not measured; default: the
+        file shipped with the package.
     joint_states, drive_torque : str, optional
         Topics; default: all are tried.
     crank_joint : str, optional
         Joint; default: all are tried.
     progress : callable
-        Takes the fraction done.
+        Called with the fraction that is done, 0 to 1.
 
     Returns
     -------
-    result : Commissioning
-    findings : list of Finding
-        Faults of the recordings.
+    CommissioningResult
+        ``config`` has the proposed parameters, ``to_yaml()`` is their file, ``to_json()`` the text that
+        ``commission --json`` writes, ``to_pandas()`` a table.
 
     Raises
     ------
@@ -67,13 +68,14 @@ def commission(
     LegWearError
         If it has no torque, no joint that turns on and on, or is too short.
     """
-    base = config or MonitorConfig()
+    base = config if isinstance(config, MonitorConfig) else load_config(config)
+    paths = [paths] if isinstance(paths, str | Path) else paths
     mechanism = fitted(load_mechanism(base.mechanism), base)
     signals, faults = read_signals(
         paths, joint_states=joint_states, drive_torque=drive_torque, progress=lambda f: progress(0.5 * f)
     )
     result = propose(signals, mechanism, base, crank_joint, lambda f: progress(0.5 + 0.5 * f))
-    return result, faults
+    return attrs.evolve(result, faults=tuple(faults))
 
 
 def propose(
@@ -82,7 +84,7 @@ def propose(
     base: MonitorConfig,
     crank_joint: str | None = None,
     progress: Callable[[float], None] = lambda _fraction: None,
-) -> Commissioning:
+) -> CommissioningResult:
     """Propose parameters from what was recorded; see `commission`."""
     motions = _cranks(signals.joints, crank_joint)
     torques = _torques(signals.torques)
@@ -98,12 +100,12 @@ def propose(
     return _result(facts, load, mechanism)
 
 
-def _result(facts: Found, load: Load | None, mechanism: Mechanism) -> Commissioning:
+def _result(facts: Found, load: Load | None, mechanism: Mechanism) -> CommissioningResult:
     told = items(facts)
     proposed = None
     if not facts.choice.doubts:
         proposed = config_from({**values_of(facts.base), **changes(told)}, "commission")
-    return Commissioning(
+    return CommissioningResult(
         items=tuple(told),
         not_told=not_told(facts),
         findings=findings(facts, load, mechanism),

@@ -1,5 +1,6 @@
 """A robot's signs, gear, offset, source and scale come back from a recording, or are not enough to tell."""
 
+import json
 import math
 from collections.abc import Callable
 from pathlib import Path
@@ -11,8 +12,8 @@ import pytest
 
 from leg_wear_monitor import LegWearError, Mechanism, MonitorConfig
 from leg_wear_monitor.commissioning.commission import commission, propose
-from leg_wear_monitor.commissioning.result import Commissioning
-from leg_wear_monitor.commissioning.signals import (
+from leg_wear_monitor.commissioning.result.commissioning_result import CommissioningResult
+from leg_wear_monitor.commissioning.series.signals import (
     EFFORT,
     FLOAT64,
     WRENCH,
@@ -23,6 +24,7 @@ from leg_wear_monitor.commissioning.signals import (
 )
 from leg_wear_monitor.mechanism.ideal import TURN
 from leg_wear_monitor.monitor.config.fitting import fitted
+from leg_wear_monitor.monitor.config.parameter_file import load_config
 
 from .conftest import Robot, Walk, columns_of
 
@@ -54,7 +56,7 @@ def angle_between(a: float, b: float) -> float:
     return abs((a - b + math.pi) % TURN - math.pi)
 
 
-def check(robot: Robot, result: Commissioning, seconds: float) -> None:
+def check(robot: Robot, result: CommissioningResult, seconds: float) -> None:
     """All parameters are those of the robot; gear, offset and scale within the model's error."""
     assert result.config is not None, result.not_told
     crank, torque = result.config.crank, result.config.drive_torque
@@ -79,8 +81,8 @@ def test_ten_robots(
     seed: int, walked: Walk, record: Callable[[Path, Robot, Walk], Path], tmp_path: Path
 ) -> None:
     robot = random_robot(seed)
-    result, faults = commission([record(tmp_path / "robot.mcap", robot, walked)])
-    assert not faults
+    result = commission(record(tmp_path / "robot.mcap", robot, walked))
+    assert not result.faults
     check(robot, result, walked.time_s[-1])
     assert not result.findings
 
@@ -93,10 +95,10 @@ def signals_of(robot: Robot, walk: Walk) -> Signals:
 
 
 @pytest.fixture
-def proposed(leg: Mechanism) -> Callable[..., Commissioning]:
+def proposed(leg: Mechanism) -> Callable[..., CommissioningResult]:
     """Propose parameters from signals in memory."""
 
-    def run(signals: Signals, crank_joint: str | None = None, **changes: Any) -> Commissioning:
+    def run(signals: Signals, crank_joint: str | None = None, **changes: Any) -> CommissioningResult:
         base = attrs.evolve(MonitorConfig(), **changes)
         return propose(signals, fitted(leg, base), base, crank_joint)
 
@@ -111,7 +113,7 @@ def test_an_ideal_leg_gives_back_what_it_was_made_with(
     torque_sign: int,
     rpm: float,
     ideal_walk: Callable[..., Walk],
-    proposed: Callable[..., Commissioning],
+    proposed: Callable[..., CommissioningResult],
 ) -> None:
     robot = Robot(sign=sign, torque_sign=torque_sign, gear_ratio=31.0, offset_rad=2.0, torque_noise_nm=1.0e-3)
     result = proposed(signals_of(robot, ideal_walk(rpm, friction_nm=0.5)))
@@ -126,7 +128,7 @@ def test_an_ideal_leg_gives_back_what_it_was_made_with(
 
 
 def test_another_unit_of_the_torque_changes_the_scale_alone(
-    walked: Walk, proposed: Callable[..., Commissioning]
+    walked: Walk, proposed: Callable[..., CommissioningResult]
 ) -> None:
     one, other = (proposed(signals_of(Robot(scale=scale), walked)) for scale in (4.0, 4.0e-3))
     for name in ("crank.offset_rad", "crank.gear_ratio", "drive_torque.sign"):
@@ -138,7 +140,7 @@ def test_another_unit_of_the_torque_changes_the_scale_alone(
 
 @pytest.mark.parametrize(("lag_s", "sampling"), [(0.0, "instant"), (0.0025, "average")])
 def test_two_cadences_tell_a_lag_from_an_offset(
-    lag_s: float, sampling: str, ideal_walk: Callable[..., Walk], proposed: Callable[..., Commissioning]
+    lag_s: float, sampling: str, ideal_walk: Callable[..., Walk], proposed: Callable[..., CommissioningResult]
 ) -> None:
     robot = Robot(offset_rad=1.0, lag_s=lag_s, torque_noise_nm=0.01)
     result = proposed(signals_of(robot, ideal_walk(30.0, 120.0)))
@@ -150,7 +152,7 @@ def test_two_cadences_tell_a_lag_from_an_offset(
 
 
 def test_a_late_torque_is_reported(
-    ideal_walk: Callable[..., Walk], proposed: Callable[..., Commissioning]
+    ideal_walk: Callable[..., Walk], proposed: Callable[..., CommissioningResult]
 ) -> None:
     result = proposed(signals_of(Robot(lag_s=0.025, torque_noise_nm=0.01), ideal_walk(40.0, 120.0)))
     assert result.item("lag").value == pytest.approx(0.0225, abs=3.0e-4)  # beside half a sampling interval
@@ -158,18 +160,18 @@ def test_a_late_torque_is_reported(
 
 
 def test_one_cadence_is_not_enough_to_tell_the_sampling(
-    ideal_walk: Callable[..., Walk], proposed: Callable[..., Commissioning]
+    ideal_walk: Callable[..., Walk], proposed: Callable[..., CommissioningResult]
 ) -> None:
     result = proposed(signals_of(Robot(torque_noise_nm=0.01), ideal_walk(60.0)))
     assert math.isnan(float(result.item("lag").value))
     sampling, lag = result.not_told
-    assert sampling.startswith("drive_torque.sampling: the torque shows no impacts")
+    assert sampling.startswith("drive_torque.sampling: the torque shows no strong impacts")
     assert "two cadences" in lag
     assert result.to_dict()["items"][[i.name for i in result.items].index("lag")]["value"] is None
 
 
 def test_an_encoder_that_starts_anew_is_found_again_and_reported(
-    ideal_walk: Callable[..., Walk], proposed: Callable[..., Commissioning]
+    ideal_walk: Callable[..., Walk], proposed: Callable[..., CommissioningResult]
 ) -> None:
     walk = ideal_walk(60.0)
     parts = []
@@ -192,7 +194,7 @@ def test_an_encoder_that_starts_anew_is_found_again_and_reported(
 
 
 def test_two_legs_in_one_recording_are_not_enough_to_tell(
-    walked: Walk, proposed: Callable[..., Commissioning]
+    walked: Walk, proposed: Callable[..., CommissioningResult]
 ) -> None:
     one = signals_of(Robot(), walked)
     left, right = CRANK, JointName("/joint_states", "right_crank")
@@ -207,7 +209,7 @@ def test_two_legs_in_one_recording_are_not_enough_to_tell(
 
 
 def test_of_two_encoders_on_one_shaft_the_one_of_the_crank_is_taken(
-    walked: Walk, proposed: Callable[..., Commissioning]
+    walked: Walk, proposed: Callable[..., CommissioningResult]
 ) -> None:
     one, motor = signals_of(Robot(), walked), signals_of(Robot(gear_ratio=50.0, seed=1), walked)
     joints = {JointName("/joint_states", "motor"): motor.joints[CRANK], **one.joints}
@@ -218,7 +220,7 @@ def test_of_two_encoders_on_one_shaft_the_one_of_the_crank_is_taken(
 
 
 def test_a_leg_whose_torque_looks_the_same_mirrored_is_not_enough_to_tell(
-    ideal_walk: Callable[..., Walk], proposed: Callable[..., Commissioning]
+    ideal_walk: Callable[..., Walk], proposed: Callable[..., CommissioningResult]
 ) -> None:
     walk = ideal_walk(60.0)
     symmetric = attrs.evolve(
@@ -229,44 +231,65 @@ def test_a_leg_whose_torque_looks_the_same_mirrored_is_not_enough_to_tell(
     assert any("crank.sign" in text for text in result.not_told)
 
 
-def test_noise_is_no_torque(ideal_walk: Callable[..., Walk], proposed: Callable[..., Commissioning]) -> None:
+def test_noise_is_no_torque(
+    ideal_walk: Callable[..., Walk], proposed: Callable[..., CommissioningResult]
+) -> None:
     walk = ideal_walk(60.0)
     noise = np.random.default_rng(1).standard_normal(len(walk.time_s))
     result = proposed(signals_of(Robot(), attrs.evolve(walk, torque_nm=noise)))
     assert result.config is None
 
 
-def test_a_short_recording_is_refused(walked: Walk, proposed: Callable[..., Commissioning]) -> None:
+def test_a_short_recording_is_refused(walked: Walk, proposed: Callable[..., CommissioningResult]) -> None:
     short = Walk(walked.time_s[:800], walked.angle_rad[:800], walked.torque_nm[:800])
     with pytest.raises(LegWearError, match=r"crank was recorded for \S+ s only, expected at least 10 s"):
         proposed(signals_of(Robot(), short))
 
 
-def test_a_leg_that_stands_is_refused(walked: Walk, proposed: Callable[..., Commissioning]) -> None:
+def test_a_leg_that_stands_is_refused(walked: Walk, proposed: Callable[..., CommissioningResult]) -> None:
     still = attrs.evolve(walked, angle_rad=0.0 * walked.angle_rad)
     with pytest.raises(LegWearError, match=r"no joint turns on and on like a crank: crank moves by 0\.0"):
         proposed(signals_of(Robot(), still))
 
 
-def test_a_joint_that_swings_is_no_crank(walked: Walk, proposed: Callable[..., Commissioning]) -> None:
+def test_a_joint_that_swings_is_no_crank(walked: Walk, proposed: Callable[..., CommissioningResult]) -> None:
     swinging = attrs.evolve(walked, angle_rad=np.sin(walked.angle_rad))
     with pytest.raises(LegWearError, match="crank swings to and fro"):
         proposed(signals_of(Robot(), swinging))
 
 
-def test_a_missing_torque_is_refused(walked: Walk, proposed: Callable[..., Commissioning]) -> None:
+def test_a_missing_torque_is_refused(walked: Walk, proposed: Callable[..., CommissioningResult]) -> None:
     with pytest.raises(LegWearError, match="no torque was recorded"):
         proposed(attrs.evolve(signals_of(Robot(), walked), torques={}))
 
 
-def test_a_constant_torque_is_refused(walked: Walk, proposed: Callable[..., Commissioning]) -> None:
+def test_a_constant_torque_is_refused(walked: Walk, proposed: Callable[..., CommissioningResult]) -> None:
     flat = attrs.evolve(walked, torque_nm=0.0 * walked.torque_nm)
     with pytest.raises(LegWearError, match="no torque changes"):
         proposed(signals_of(Robot(torque_noise_nm=0.0), flat))
 
 
 def test_an_unknown_joint_is_refused_with_those_that_there_are(
-    walked: Walk, proposed: Callable[..., Commissioning]
+    walked: Walk, proposed: Callable[..., CommissioningResult]
 ) -> None:
     with pytest.raises(LegWearError, match="'hip' is not a joint of the recording, it has crank"):
         proposed(signals_of(Robot(), walked), "hip")
+
+
+def test_the_result_goes_out_as_a_table(walked: Walk, proposed: Callable[..., CommissioningResult]) -> None:
+    pytest.importorskip("pandas")
+    result = proposed(signals_of(Robot(sign=-1), walked))
+    table = result.to_pandas()
+    assert table.loc["crank.sign", "value"] == -1
+    assert list(table.index) == [item.name for item in result.items]
+
+
+def test_the_result_goes_out_as_json_and_as_parameters(
+    walked: Walk, proposed: Callable[..., CommissioningResult], tmp_path: Path
+) -> None:
+    result = proposed(signals_of(Robot(sign=-1, offset_rad=1.0), walked))
+    assert json.loads(result.to_json()) == result.to_dict()
+    (tmp_path / "monitor.yaml").write_text(result.to_yaml())
+    assert load_config(tmp_path / "monitor.yaml") == result.config
+    with pytest.raises(LegWearError, match=r"no parameters are proposed: crank\.sign: why"):
+        attrs.evolve(result, config=None, not_told=("crank.sign: why",)).to_yaml()

@@ -9,11 +9,9 @@ from leg_wear_monitor.cli.options import json_option
 from leg_wear_monitor.cli.output import STDOUT, check_file, write_file, write_json
 from leg_wear_monitor.cli.waiting import compilation, progress_bar
 from leg_wear_monitor.errors import LegWearError
-from leg_wear_monitor.json_text import json_text
 
 if TYPE_CHECKING:
-    from leg_wear_monitor.commissioning.result import Commissioning
-    from leg_wear_monitor.monitor.config.settings import MonitorConfig
+    from leg_wear_monitor.commissioning.result.commissioning_result import CommissioningResult
 
 WITH_FINDINGS = 1
 
@@ -63,11 +61,9 @@ def commission(
         from leg_wear_monitor.cli.commission_tables import print_commissioning
 
         print_commissioning(result)
-    written = write_json(json_file, json_text(result.to_dict()) if json_file is not None else "")
+    written = write_json(json_file, result.to_json() if json_file is not None else "")
     if out is not None and result.config is not None:
-        from leg_wear_monitor.commissioning.parameter_text import parameter_text
-
-        write_file(out, parameter_text(result, result.config).encode())
+        write_file(out, result.to_yaml().encode())
         written.append(out)
     if json_file != STDOUT:
         for path in written:
@@ -75,19 +71,15 @@ def commission(
     return 0 if result.is_sure else WITH_FINDINGS
 
 
-def _run(recordings: tuple[Path, ...], path: Path | None, topics: dict[str, str | None]) -> "Commissioning":
+def _run(
+    recordings: tuple[Path, ...], path: Path | None, topics: dict[str, str | None]
+) -> "CommissioningResult":
     try:
         from leg_wear_monitor.commissioning.commission import commission as propose
     except ModuleNotFoundError as error:
         raise LegWearError(f"{error.name} is not installed; pip install 'leg_wear_monitor[bags]'") from error
     with compilation("commissioning"), progress_bar("commissioning") as progress:
-        result, faults = propose(recordings, _config(path), **topics, progress=progress)
-    for fault in faults:
+        result = propose(recordings, path, **topics, progress=progress)
+    for fault in result.faults:
         click.echo(f"warning: {fault}", err=True)
     return result
-
-
-def _config(path: Path | None) -> "MonitorConfig":
-    from leg_wear_monitor.monitor.config.parameter_file import load_config
-
-    return load_config(path)

@@ -5,8 +5,8 @@ import math
 import attrs
 import numpy as np
 
-from leg_wear_monitor.commissioning.fit import Fit
-from leg_wear_monitor.commissioning.pairing import Pair, slow_speed
+from leg_wear_monitor.commissioning.fit.fit import Fit
+from leg_wear_monitor.commissioning.series.pairing import Pair, slow_speed
 from leg_wear_monitor.mechanism.arrays import Floats
 from leg_wear_monitor.mechanism.ideal import TURN
 from leg_wear_monitor.twin.settings import AVERAGE

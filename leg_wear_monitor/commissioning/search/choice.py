@@ -5,7 +5,7 @@ from collections.abc import Callable
 
 import attrs
 
-from leg_wear_monitor.commissioning.search import (
+from leg_wear_monitor.commissioning.search.candidates import (
     Candidate,
     first,
     on_one_shaft,

@@ -5,10 +5,17 @@ import math
 import attrs
 import numpy as np
 
-from leg_wear_monitor.commissioning.blocks import Blocks, blocks_of
-from leg_wear_monitor.commissioning.gear_scan import Start
-from leg_wear_monitor.commissioning.pairing import Pair
-from leg_wear_monitor.commissioning.regression import State, Terms, begin, columns, jackknife, least_squares
+from leg_wear_monitor.commissioning.fit.blocks import Blocks, blocks_of
+from leg_wear_monitor.commissioning.fit.gear_scan import Start
+from leg_wear_monitor.commissioning.fit.regression import (
+    State,
+    Terms,
+    begin,
+    columns,
+    jackknife,
+    least_squares,
+)
+from leg_wear_monitor.commissioning.series.pairing import Pair
 from leg_wear_monitor.commissioning.torque_model import TorqueModel
 from leg_wear_monitor.mechanism.arrays import Floats
 from leg_wear_monitor.mechanism.ideal import TURN

@@ -10,11 +10,11 @@ import math
 import attrs
 import numpy as np
 
-from leg_wear_monitor.commissioning.fit import Fit
-from leg_wear_monitor.commissioning.noise import sensor_noise
-from leg_wear_monitor.commissioning.pairing import slow_speed
-from leg_wear_monitor.commissioning.regression import least_squares
-from leg_wear_monitor.commissioning.timing import lag_error_s, separates_lag
+from leg_wear_monitor.commissioning.evidence.noise import sensor_noise
+from leg_wear_monitor.commissioning.evidence.timing import lag_error_s, separates_lag
+from leg_wear_monitor.commissioning.fit.fit import Fit
+from leg_wear_monitor.commissioning.fit.regression import least_squares
+from leg_wear_monitor.commissioning.series.pairing import slow_speed
 from leg_wear_monitor.commissioning.torque_model import TorqueModel
 from leg_wear_monitor.mechanism.arrays import Floats
 from leg_wear_monitor.mechanism.ideal import TURN
@@ -32,9 +32,13 @@ _TYPICAL = {AVERAGE: 0.005, INSTANT: 0.65}
 _LEGS_DIFFER = 0.7
 _SURE_ODDS = 20.0
 _MOST_ODDS = 1000.0  # the typical values are not known so well that more could be said
-_STRANGE = 3.0  # standard deviations from both
+_SURE = 2.0  # standard deviations of the recording
+_STRANGE = 3.0  # what neither adds up to
+_LEAST = 1.0e-4  # below which it is rounding
 _NOISE_ERROR = 0.25  # relative error of the noise's variance
 _HIDDEN = 0.5  # of the rest's energy that is the sensor's noise, from which on nothing is told
+_LARGE = 0.3  # of the torque; smaller ones do not drown slow errors of 0.02, which add up; impacts: 0.5 to 2
+_NARROWER, _FLAT = 3.0, 0.5  # independent errors add up as much in narrow windows, slow ones less
 _ROUGH = 0.5  # energy of neighbours' steps as a fraction of that of independent ones; of impacts, 0.8 to 1.4
 
 
@@ -59,32 +63,42 @@ def sampling_of(one: Fit, model: TorqueModel) -> Sampling:
     rest, noise = _rest(one, model), sensor_noise(one)
     turn = TURN / max(float(np.median(np.abs(one.crank()[1]))), 1.0e-9) / one.pair.interval_s
     added, error = added_up(rest, noise, max(2, round(_WINDOW * turn)))
-    if not _shows_impacts(rest, noise) or not math.isfinite(added):
+    narrow = added_up(rest, noise, max(2, round(_WINDOW / _NARROWER * turn)))[0]
+    if not _shows_impacts(one, rest, noise) or not added + _SURE * error > 0.0:
         return _by_lag(one)
-    spread = math.hypot(_LEGS_DIFFER, error / added)
-    away = {name: abs(math.log(added / typical)) / spread for name, typical in _TYPICAL.items()}
-    near, far = sorted(away, key=lambda name: away[name])
-    odds = math.exp(min(0.5 * (away[far] ** 2 - away[near] ** 2), math.log(_MOST_ODDS)))
+    near = min(_TYPICAL, key=lambda name: abs(math.log(max(added, _LEAST) / _TYPICAL[name])))
+    odds = min(_odds(near, added - _SURE * error), _odds(near, added + _SURE * error))
     told = (
-        f"the errors of neighbouring samples add up to {added:.2g} of what independent ones do, averages' to "
-        f"about {_TYPICAL[AVERAGE]:g}, instants' to about {_TYPICAL[INSTANT]:g}"
+        f"the errors of neighbouring samples add up to {added:.2g} ± {error:.1g} of what independent ones "
+        f"do, averages' to about {_TYPICAL[AVERAGE]:g}, instants' to about {_TYPICAL[INSTANT]:g}"
     )
-    if away[near] > _STRANGE:
-        return Sampling("", f"{told}: does a load change from turn to turn?")
+    if added > _STRANGE or (near == INSTANT and narrow < _FLAT * added):
+        return Sampling("", f"{told}: does a load change slowly?")
     if odds < _SURE_ODDS:
-        return Sampling("", f"{told}: odds of {odds:.2g} to 1 only for {near}")
+        return Sampling("", f"{told}: odds of {odds:.2g} to 1 for {near}")
     return Sampling(near, f"odds {'at least ' if odds >= _MOST_ODDS else ''}{odds:.0f} to 1: {told}")
 
 
-def _shows_impacts(rest: Floats, noise: float) -> bool:
-    """Whether a rest is more than the sensor's noise, and rough, as errors of the motion are not."""
+def _odds(name: str, added: float) -> float:
+    """Odds of one sampling against the other, of legs that differ."""
+    x = math.log(max(added, _LEAST))
+    away = {each: (x - math.log(typical)) ** 2 for each, typical in _TYPICAL.items()}
+    other = INSTANT if name == AVERAGE else AVERAGE
+    exponent = 0.5 * (away[other] - away[name]) / _LEGS_DIFFER**2
+    return math.exp(min(exponent, math.log(_MOST_ODDS)))
+
+
+def _shows_impacts(one: Fit, rest: Floats, noise: float) -> bool:
+    """Whether a rest is large, more than the sensor's noise, and rough, as errors of the motion are not."""
+    if float(rest.std()) < _LARGE * float(one.measured.std()):
+        return False
     size, steps = float(rest.var()) - noise**2, 0.5 * float(np.mean(np.diff(rest) ** 2)) - noise**2
     return size > _HIDDEN * float(rest.var()) and steps > _ROUGH * size
 
 
 def _by_lag(one: Fit) -> Sampling:
     """Averages are late by half a sampling interval: it shows if no other lag does."""
-    why = "the torque shows no impacts beyond its noise, by which averages and instants differ"
+    why = "the torque shows no strong impacts beyond its noise, by which averages and instants differ"
     half, error = 0.5 * one.pair.interval_s, lag_error_s(one)
     if not separates_lag(one.pair) or error > 0.5 * half:
         return Sampling("", why)
@@ -100,7 +114,7 @@ def _by_lag(one: Fit) -> Sampling:
 def added_up(rest: Floats, noise: float, half: int) -> tuple[float, float]:
     """Energy of triangular windows of a rest, as a fraction of that of independent samples, and its error.
 
-    Not less than the error, so that its logarithm exists; NaN if there are too few samples, or only noise.
+    NaN if there are too few samples, or only noise.
 
     Parameters
     ----------
@@ -120,7 +134,7 @@ def added_up(rest: Floats, noise: float, half: int) -> tuple[float, float]:
     if not total > 0.0:
         return math.nan, math.nan
     error = math.hypot(float(parts.std()) / math.sqrt(_CHUNKS), _NOISE_ERROR * noise**2) / total
-    return max(float(together.mean()) / total, error), error
+    return float(together.mean()) / total, error
 
 
 def _rest(one: Fit, model: TorqueModel) -> Floats:

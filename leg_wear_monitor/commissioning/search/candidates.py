@@ -6,11 +6,11 @@ from collections.abc import Callable, Iterable
 import attrs
 import numpy as np
 
-from leg_wear_monitor.commissioning.fit import Fit, fit
-from leg_wear_monitor.commissioning.gear_scan import Start, scan
-from leg_wear_monitor.commissioning.motion import JointMotion
-from leg_wear_monitor.commissioning.pairing import Pair, paired, steady_stretch
-from leg_wear_monitor.commissioning.signals import EFFORT, JointName, Series, TorqueSource
+from leg_wear_monitor.commissioning.fit.fit import Fit, fit
+from leg_wear_monitor.commissioning.fit.gear_scan import Start, scan
+from leg_wear_monitor.commissioning.series.motion import JointMotion
+from leg_wear_monitor.commissioning.series.pairing import Pair, paired, steady_stretch
+from leg_wear_monitor.commissioning.series.signals import EFFORT, JointName, Series, TorqueSource
 from leg_wear_monitor.commissioning.torque_model import TorqueModel
 from leg_wear_monitor.mechanism.arrays import Floats
 

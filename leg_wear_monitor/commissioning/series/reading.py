@@ -15,7 +15,7 @@ from leg_wear_monitor.bags.joint_names import names_in
 from leg_wear_monitor.bags.mcap.layout import Channel
 from leg_wear_monitor.bags.sources import Source, open_sources
 from leg_wear_monitor.bags.topics import Role, check_channel
-from leg_wear_monitor.commissioning.signals import (
+from leg_wear_monitor.commissioning.series.signals import (
     EFFORT,
     FLOAT64,
     WRENCH,

@@ -4,8 +4,8 @@ import attrs
 import numpy as np
 from numpy.typing import NDArray
 
-from leg_wear_monitor.commissioning.motion import JointMotion
-from leg_wear_monitor.commissioning.signals import Series
+from leg_wear_monitor.commissioning.series.motion import JointMotion
+from leg_wear_monitor.commissioning.series.signals import Series
 from leg_wear_monitor.mechanism.arrays import Floats
 
 _MOVING = 0.2  # of the usual speed, below which the leg stands or starts

@@ -1,11 +1,11 @@
 """A ROS parameter file of what differs from the defaults, as `config/monitor.yaml` is one of the defaults."""
 
+from collections.abc import Sequence
 from io import StringIO
 from typing import Any
 
 from ruamel.yaml import YAML
 
-from leg_wear_monitor.commissioning.result import Commissioning
 from leg_wear_monitor.errors import printable
 from leg_wear_monitor.monitor.config.parameter_file import MARK
 from leg_wear_monitor.monitor.config.parameters import PARAMETERS, values_of
@@ -19,12 +19,9 @@ _HEAD = (
 _ALWAYS = ("mechanism", "crank_joint", "crank.", "drive_torque.", "cadence.")
 
 
-def parameter_text(result: Commissioning, config: MonitorConfig) -> str:
-    """Text of a parameter file, with what is not sure as comments at its head."""
-    told = [f"not enough to tell: {text}" for text in result.not_told]
-    told += [f"does not fit: {text}" for text in result.findings]
-    told += [f"note: {text}" for text in result.notes]
-    head = "".join(f"# {printable(line)}\n" for line in (*_HEAD, *told))
+def parameter_text(config: MonitorConfig, remarks: Sequence[str]) -> str:
+    """Text of a parameter file, with remarks as comments at its head."""
+    head = "".join(f"# {printable(line)}\n" for line in (*_HEAD, *remarks))
     tree: dict[str, Any] = {}
     for name, value in values_of(config).items():
         if value == () or (value == PARAMETERS[name].default and not name.startswith(_ALWAYS)):

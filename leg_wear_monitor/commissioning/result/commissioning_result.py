@@ -1,17 +1,25 @@
-"""What commissioning found, as classes."""
+"""What commissioning found: each parameter with its runner-up, what cannot be told, what does not fit."""
 
 import math
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 import attrs
 
+from leg_wear_monitor.bags.findings import Finding
+from leg_wear_monitor.commissioning.result.parameter_text import parameter_text
+from leg_wear_monitor.data_frame import data_frame
+from leg_wear_monitor.errors import LegWearError
+from leg_wear_monitor.json_text import json_text
 from leg_wear_monitor.monitor.config.settings import MonitorConfig
+
+if TYPE_CHECKING:
+    import pandas as pd
 
 SCHEMA_VERSION = 1
 
 
 @attrs.frozen(kw_only=True)
-class Item:
+class CommissioningItem:
     """One thing that was looked for.
 
     Attributes
@@ -43,12 +51,12 @@ class Item:
 
 
 @attrs.frozen(kw_only=True)
-class Commissioning:
+class CommissioningResult:
     """Result of commissioning.
 
     Attributes
     ----------
-    items : tuple of Item
+    items : tuple of CommissioningItem
     not_told : tuple of str
         What the recording is not enough to tell, and why.
     findings : tuple of str
@@ -59,21 +67,24 @@ class Commissioning:
         The proposed parameters; None if a choice between alternatives is not sure.
     turns : float
         Turns of the crank in the recording.
+    faults : tuple of Finding
+        Of the recordings, whose other parts were used.
     """
 
-    items: tuple[Item, ...]
+    items: tuple[CommissioningItem, ...]
     not_told: tuple[str, ...]
     findings: tuple[str, ...]
     notes: tuple[str, ...]
     config: MonitorConfig | None
     turns: float
+    faults: tuple[Finding, ...] = ()
 
     @property
     def is_sure(self) -> bool:
         """Whether everything could be told, and all fits."""
         return self.config is not None and not self.not_told and not self.findings
 
-    def item(self, name: str) -> Item:
+    def item(self, name: str) -> CommissioningItem:
         """The item of a name; raises KeyError if there is none."""
         return {each.name: each for each in self.items}[name]
 
@@ -90,6 +101,36 @@ class Commissioning:
             "findings": list(self.findings),
             "notes": list(self.notes),
         }
+
+    def to_json(self) -> str:
+        """Text of `to_dict`: what ``commission --json`` writes."""
+        return json_text(self.to_dict())
+
+    def to_pandas(self) -> "pd.DataFrame":
+        """Table of the items, a row each.
+
+        Raises
+        ------
+        LegWearError
+            If pandas is not installed.
+        """
+        rows = [attrs.asdict(item) for item in self.items]
+        columns = {key: [row[key] for row in rows] for key in rows[0]}
+        return data_frame(columns, index="name")
+
+    def to_yaml(self) -> str:
+        """Parameter file of the monitor; what is not sure stands as comments at its head.
+
+        Raises
+        ------
+        LegWearError
+            If no parameters are proposed.
+        """
+        if self.config is None:
+            raise LegWearError(f"no parameters are proposed: {'; '.join(self.not_told)}")
+        labels = {"not enough to tell": self.not_told, "does not fit": self.findings, "note": self.notes}
+        remarks = [f"{label}: {text}" for label, texts in labels.items() for text in texts]
+        return parameter_text(self.config, remarks)
 
 
 def _plain(value: Any) -> Any:

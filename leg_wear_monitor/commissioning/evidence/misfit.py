@@ -3,9 +3,9 @@
 import attrs
 import numpy as np
 
-from leg_wear_monitor.commissioning.fit import Fit, fit
-from leg_wear_monitor.commissioning.regression import Terms, least_squares
-from leg_wear_monitor.commissioning.search import repeating
+from leg_wear_monitor.commissioning.fit.fit import Fit, fit
+from leg_wear_monitor.commissioning.fit.regression import Terms, least_squares
+from leg_wear_monitor.commissioning.search.candidates import repeating
 from leg_wear_monitor.commissioning.torque_model import TorqueModel, body_torques
 from leg_wear_monitor.mechanism.arrays import Floats
 from leg_wear_monitor.mechanism.spec import Mechanism

@@ -7,16 +7,16 @@ from typing import Any
 import attrs
 import numpy as np
 
-from leg_wear_monitor.commissioning.choice import Choice, Rival
-from leg_wear_monitor.commissioning.exact_ratio import exact_ratio
-from leg_wear_monitor.commissioning.fit import Fit
-from leg_wear_monitor.commissioning.motion import JointMotion
-from leg_wear_monitor.commissioning.noise import scatter, sensor_noise
-from leg_wear_monitor.commissioning.result import Item
-from leg_wear_monitor.commissioning.sampling import Sampling
-from leg_wear_monitor.commissioning.search import SAME_GEAR, Candidate
-from leg_wear_monitor.commissioning.signals import WRENCH
-from leg_wear_monitor.commissioning.timing import Timing, cadence_rpm
+from leg_wear_monitor.commissioning.evidence.noise import scatter, sensor_noise
+from leg_wear_monitor.commissioning.evidence.sampling import Sampling
+from leg_wear_monitor.commissioning.evidence.timing import Timing, cadence_rpm
+from leg_wear_monitor.commissioning.fit.fit import Fit
+from leg_wear_monitor.commissioning.proposal.exact_ratio import exact_ratio
+from leg_wear_monitor.commissioning.result.commissioning_result import CommissioningItem as Item
+from leg_wear_monitor.commissioning.search.candidates import SAME_GEAR, Candidate
+from leg_wear_monitor.commissioning.search.choice import Choice, Rival
+from leg_wear_monitor.commissioning.series.motion import JointMotion
+from leg_wear_monitor.commissioning.series.signals import WRENCH
 from leg_wear_monitor.mechanism.ideal import TURN
 from leg_wear_monitor.monitor.config.settings import MonitorConfig
 

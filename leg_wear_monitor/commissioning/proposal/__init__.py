@@ -1,0 +1,1 @@
+"""The parameters that are proposed, and sentences about them."""

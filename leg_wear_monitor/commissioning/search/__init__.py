@@ -1,0 +1,1 @@
+"""All joints and torques tried, the best chosen, and its rivals."""

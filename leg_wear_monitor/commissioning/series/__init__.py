@@ -1,0 +1,1 @@
+"""Joint positions and torques of recordings as time series, and each pair of them."""

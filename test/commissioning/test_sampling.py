@@ -1,0 +1,98 @@
+"""Averages cancel over a part of a turn, instants do not; what shows no strong impacts tells neither."""
+
+from collections.abc import Callable
+
+import numpy as np
+import pytest
+
+from leg_wear_monitor.commissioning.evidence.sampling import Sampling, added_up, sampling_of
+from leg_wear_monitor.commissioning.fit.fit import fit
+from leg_wear_monitor.commissioning.fit.gear_scan import Start
+from leg_wear_monitor.commissioning.series.motion import motion_of
+from leg_wear_monitor.commissioning.series.pairing import paired
+from leg_wear_monitor.commissioning.series.signals import Series
+from leg_wear_monitor.commissioning.torque_model import TorqueModel
+from leg_wear_monitor.mechanism.arrays import Floats
+
+from .conftest import Robot, Walk, columns_of
+
+FINE = 25  # steps of impacts in a sampling interval of 5 ms
+
+
+def impacts(samples: int, size_nm: float, sampling: str, seed: int) -> Floats:
+    """Torques of flights of 4 ms to 20 ms, each with an impact after it that takes back its impulse."""
+    rng = np.random.default_rng(seed)
+    fine = np.zeros(samples * FINE)
+    at = 0
+    while True:
+        pause, flight, impact = rng.integers(20, 200), rng.integers(20, 100), rng.integers(4, 10)
+        at += pause + flight + impact
+        if at > len(fine):
+            break
+        fine[at - flight - impact : at - impact] = -size_nm
+        fine[at - impact : at] = size_nm * flight / impact
+    parts = fine.reshape(samples, FINE)
+    return np.asarray(parts.mean(axis=1) if sampling == "average" else parts[:, -1])
+
+
+@pytest.fixture
+def judged(model: TorqueModel) -> Callable[[Walk], Sampling]:
+    """Judge the samples of a walk that is known in all else."""
+
+    def judge(walk: Walk) -> Sampling:
+        position, torque = columns_of(Robot(), walk)
+        recording = np.zeros(len(position), np.int64)
+        motion = motion_of(Series(walk.time_s, position, recording))
+        pair = paired(motion, Series(walk.time_s, torque, recording))
+        return sampling_of(fit(pair, model, Start(1.0, 0.0, 1, 1.0, 0)), model)
+
+    return judge
+
+
+@pytest.mark.parametrize("sampling", ["average", "instant"])
+@pytest.mark.parametrize("seed", range(3))
+def test_impacts_tell_averages_from_instants_at_one_cadence(
+    sampling: str, seed: int, ideal_walk: Callable[..., Walk], judged: Callable[[Walk], Sampling]
+) -> None:
+    walk = ideal_walk(70.0, friction_nm=0.5)
+    hit = walk.torque_nm + impacts(len(walk.time_s), 5.0, sampling, seed)
+    found = judged(Walk(walk.time_s, walk.angle_rad, hit))
+    assert found.value == sampling
+    assert "odds" in found.why
+
+
+def test_the_sample_recording_has_averages(walked: Walk, judged: Callable[[Walk], Sampling]) -> None:
+    assert judged(walked).value == "average"
+
+
+def test_without_impacts_one_cadence_tells_neither(
+    ideal_walk: Callable[..., Walk], judged: Callable[[Walk], Sampling]
+) -> None:
+    found = judged(ideal_walk(70.0))
+    assert found.value == ""
+    assert "shows no strong impacts" in found.why
+
+
+@pytest.mark.parametrize(("sampling", "size_nm"), [("average", 3.0), ("instant", 1.0)])
+def test_noise_hides_impacts(
+    sampling: str, size_nm: float, ideal_walk: Callable[..., Walk], judged: Callable[[Walk], Sampling]
+) -> None:
+    walk = ideal_walk(70.0)
+    noise = 5.0 * np.random.default_rng(4).standard_normal(len(walk.time_s))
+    hit = walk.torque_nm + noise + impacts(len(walk.time_s), size_nm, sampling, 5)
+    assert judged(Walk(walk.time_s, walk.angle_rad, hit)).value == ""
+
+
+def test_independent_samples_add_up_and_steps_of_a_bounded_process_cancel() -> None:
+    rng = np.random.default_rng(6)
+    independent = rng.standard_normal(20000)
+    assert added_up(independent, 0.0, 25)[0] == pytest.approx(1.0, abs=0.1)
+    # the window is a triangle: steps of white noise have 2 / 25 of the energy that the window's slopes leave
+    wide, error = added_up(np.diff(independent), 0.0, 25)
+    slopes = np.diff(np.concatenate([[0.0], np.convolve(np.ones(25), np.ones(25)), [0.0]]))
+    window = np.convolve(np.ones(25), np.ones(25))
+    assert wide == pytest.approx(float(slopes @ slopes / (window @ window)) / 2.0, abs=5.0 * error)
+
+
+def test_too_few_samples_tell_nothing() -> None:
+    assert np.isnan(added_up(np.ones(100), 0.0, 25)[0])

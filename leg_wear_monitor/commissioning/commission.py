@@ -84,11 +84,26 @@ def propose(
     base: MonitorConfig,
     crank_joint: str | None = None,
     progress: Callable[[float], None] = lambda _fraction: None,
+    model: TorqueModel | None = None,
 ) -> CommissioningResult:
-    """Propose parameters from what was recorded; see `commission`."""
+    """Propose parameters from what was recorded; see `commission`.
+
+    Parameters
+    ----------
+    signals : Signals
+    mechanism : Mechanism
+    base : MonitorConfig
+        Keeps what is not measured.
+    crank_joint : str, optional
+        Joint; default: all are tried.
+    progress : callable
+        Called with the fraction that is done, 0 to 1.
+    model : TorqueModel, optional
+        The mechanism's, if it is there already.
+    """
     motions = _cranks(signals.joints, crank_joint)
     torques = _torques(signals.torques)
-    model = torque_model(mechanism)
+    model = model or torque_model(mechanism)
     found = candidates(motions, torques, model, progress)
     if not found:
         raise LegWearError(

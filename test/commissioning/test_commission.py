@@ -22,6 +22,7 @@ from leg_wear_monitor.commissioning.series.signals import (
     Signals,
     TorqueSource,
 )
+from leg_wear_monitor.commissioning.torque_model import TorqueModel
 from leg_wear_monitor.mechanism.ideal import TURN
 from leg_wear_monitor.monitor.config.fitting import fitted
 from leg_wear_monitor.monitor.config.parameter_file import load_config
@@ -95,12 +96,12 @@ def signals_of(robot: Robot, walk: Walk) -> Signals:
 
 
 @pytest.fixture
-def proposed(leg: Mechanism) -> Callable[..., CommissioningResult]:
+def proposed(leg: Mechanism, model: TorqueModel) -> Callable[..., CommissioningResult]:
     """Propose parameters from signals in memory."""
 
     def run(signals: Signals, crank_joint: str | None = None, **changes: Any) -> CommissioningResult:
         base = attrs.evolve(MonitorConfig(), **changes)
-        return propose(signals, fitted(leg, base), base, crank_joint)
+        return propose(signals, fitted(leg, base), base, crank_joint, model=model)
 
     return run
 

@@ -13,15 +13,19 @@ from leg_wear_monitor.commissioning.series.pairing import paired
 from leg_wear_monitor.commissioning.series.signals import Series
 from leg_wear_monitor.commissioning.torque_model import TorqueModel
 from leg_wear_monitor.mechanism.arrays import Floats
+from leg_wear_monitor.mechanism.ideal import TURN
 
 from .conftest import Robot, Walk, columns_of
 
 FINE = 25  # steps of impacts in a sampling interval of 5 ms
 
 
-def impacts(samples: int, size_nm: float, sampling: str, seed: int) -> Floats:
-    """Torques of flights of 4 ms to 20 ms, each with an impact after it that takes back its impulse."""
-    rng = np.random.default_rng(seed)
+def impacts(walk: Walk, size_nm: float, sampling: str, seed: int) -> Floats:
+    """Torques of flights of 4 ms to 20 ms, each with an impact after it that takes back its impulse.
+
+    A third of the turn is quiet, as that of a leg.
+    """
+    rng, samples = np.random.default_rng(seed), len(walk.time_s)
     fine = np.zeros(samples * FINE)
     at = 0
     while True:
@@ -29,6 +33,8 @@ def impacts(samples: int, size_nm: float, sampling: str, seed: int) -> Floats:
         at += pause + flight + impact
         if at > len(fine):
             break
+        if walk.angle_rad[at // FINE - 1] % TURN > TURN / 1.5:
+            continue
         fine[at - flight - impact : at - impact] = -size_nm
         fine[at - impact : at] = size_nm * flight / impact
     parts = fine.reshape(samples, FINE)
@@ -55,7 +61,7 @@ def test_impacts_tell_averages_from_instants_at_one_cadence(
     sampling: str, seed: int, ideal_walk: Callable[..., Walk], judged: Callable[[Walk], Sampling]
 ) -> None:
     walk = ideal_walk(70.0, friction_nm=0.5)
-    hit = walk.torque_nm + impacts(len(walk.time_s), 5.0, sampling, seed)
+    hit = walk.torque_nm + impacts(walk, 5.0, sampling, seed)
     found = judged(Walk(walk.time_s, walk.angle_rad, hit))
     assert found.value == sampling
     assert "odds" in found.why
@@ -79,7 +85,7 @@ def test_noise_hides_impacts(
 ) -> None:
     walk = ideal_walk(70.0)
     noise = 5.0 * np.random.default_rng(4).standard_normal(len(walk.time_s))
-    hit = walk.torque_nm + noise + impacts(len(walk.time_s), size_nm, sampling, 5)
+    hit = walk.torque_nm + noise + impacts(walk, size_nm, sampling, 5)
     assert judged(Walk(walk.time_s, walk.angle_rad, hit)).value == ""
 
 

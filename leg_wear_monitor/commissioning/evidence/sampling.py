@@ -13,7 +13,6 @@ import numpy as np
 from leg_wear_monitor.commissioning.evidence.noise import sensor_noise
 from leg_wear_monitor.commissioning.evidence.timing import lag_error_s, separates_lag
 from leg_wear_monitor.commissioning.fit.fit import Fit
-from leg_wear_monitor.commissioning.fit.regression import least_squares
 from leg_wear_monitor.commissioning.series.pairing import slow_speed
 from leg_wear_monitor.commissioning.torque_model import TorqueModel
 from leg_wear_monitor.mechanism.arrays import Floats
@@ -24,6 +23,7 @@ _WINDOW = 0.125  # of a turn, half of the window's width: some flights with thei
 # Of a turn: what repeats with it is of a load or of other masses, and does not cancel either. Not more, or
 # impacts that repeat would be taken out with it, and what is left of means would cancel no longer
 _HARMONICS = 8
+_SINGULAR = 1.0e-9
 _CHUNKS = 12
 # Energy of windows as a fraction of that of independent samples, typical of each, and how much legs differ
 # (natural logarithm): the default leg in full coordinates, five joints of 0.2 to 0.4 mm, 35 to 90 rpm,
@@ -145,4 +145,6 @@ def _rest(one: Fit, model: TorqueModel) -> Floats:
     still = np.concatenate([np.cos(waves), np.sin(waves[1:])])
     square = (slow_speed(one.pair) * one.ratio) ** 2
     by = np.concatenate([still, still * (square / square.mean())])
-    return np.asarray(rest - least_squares(by, rest) @ by)
+    # columns are alike at one cadence; few of them, so that the normal equations save most of the time
+    coefficients = np.linalg.pinv(by @ by.T, rcond=_SINGULAR, hermitian=True) @ (by @ rest)
+    return np.asarray(rest - coefficients @ by)

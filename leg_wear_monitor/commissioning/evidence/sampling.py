@@ -75,7 +75,7 @@ def sampling_of(one: Fit, model: TorqueModel) -> Sampling:
     if added > _STRANGE or (near == INSTANT and narrow < _FLAT * added):
         return Sampling("", f"{told}: does a load change slowly?")
     if odds < _SURE_ODDS:
-        return Sampling("", f"{told}: odds of {odds:.2g} to 1 for {near}")
+        return Sampling("", f"{told}: more like {near}, but not for sure")
     return Sampling(near, f"odds {'at least ' if odds >= _MOST_ODDS else ''}{odds:.0f} to 1: {told}")
 
 

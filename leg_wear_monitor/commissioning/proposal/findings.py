@@ -14,7 +14,7 @@ from leg_wear_monitor.mechanism.ideal import TURN
 from leg_wear_monitor.mechanism.spec import Mechanism
 
 _SURE = 3.0
-_TOLD = 2.0
+_TOLD = 2.0  # standard deviations that have to be less than what is asked for
 _ANEW_RAD = 0.1  # by which offsets of two recordings of one absolute encoder do not differ
 _IN_DEGREES = math.degrees(1.0)
 _ROUGH_SCALE = 0.05
@@ -77,10 +77,10 @@ def _lag(found: Found) -> Iterator[str]:
             "record two cadences"
         )
     elif _TOLD * timing.error_s > most:
+        error = 1.0e3 * _TOLD * timing.error_s
         yield (
-            f"lag: known to ± {1.0e3 * timing.error_s:.2g} ms only, more than drive_torque.max_lag_s, "
-            f"{1.0e3 * most:g} ms, since clearances shift the torque's phase from cadence to cadence; record "
-            "cadences further apart"
+            f"lag: known to ± {error:.2g} ms only, more than drive_torque.max_lag_s, {1.0e3 * most:g} ms, "
+            "since clearances shift the torque's phase from cadence to cadence; record cadences further apart"
         )
 
 

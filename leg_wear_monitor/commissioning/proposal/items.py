@@ -24,6 +24,7 @@ _SURE = 3.0  # standard deviations
 _NEAR = 0.05  # relative error by which clearances shift the scale: a given one that near is kept
 _DRIFT_RAD = 0.05  # by which clearances may shift the phase over a recording
 _MODEL_PHASE_RAD = 0.02  # by which clearances of 0.3 mm in five joints shift the torque's phase
+_MODEL_SCALE = 0.03  # by which they raise it
 _HALF_A_GEAR = 0.5, 1.5  # efficiencies with which a torque may be that of the motor's shaft
 
 
@@ -155,7 +156,7 @@ def _torque(found: Found) -> Iterator[Item]:
     yield Item(
         name="drive_torque.scale",
         value=scale,
-        sigma=total / turns * one.sigma["gain"] / abs(one.gain),
+        sigma=total / turns * math.hypot(one.sigma["gain"] / abs(one.gain), _MODEL_SCALE),
         mismatch=one.mismatch,
         remark=f"scale times gear ratio measured {total:.4g}",
     )

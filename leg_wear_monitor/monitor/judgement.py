@@ -3,6 +3,8 @@
 import math
 from collections.abc import Callable, Sequence
 
+import attrs
+
 from leg_wear_monitor.monitor.accounting import Accounting
 from leg_wear_monitor.monitor.diagnosis.diagnosis import Diagnosis
 from leg_wear_monitor.monitor.encoders.clearance_estimate import ClearanceEstimate, ClearanceObservation
@@ -16,6 +18,7 @@ from leg_wear_monitor.monitor.evaluation.torque_record import TorqueRecord
 from leg_wear_monitor.monitor.forecast.forecaster import Forecaster
 from leg_wear_monitor.monitor.reports import CycleReport, JointReport, VerdictReport
 from leg_wear_monitor.monitor.state import MonitorState
+from leg_wear_monitor.monitor.torque_causes.explanation import TorqueExplanation
 from leg_wear_monitor.monitor.verdict.rules import findings
 from leg_wear_monitor.monitor.verdict.situation import JointSituation, SeenClearance, Situation
 from leg_wear_monitor.monitor.verdict.verdict import (
@@ -63,7 +66,13 @@ class Judge:
         intake = self._twin.intake
         stamp_ns = intake.followed_stamp_ns or intake.newest_stamp_ns
         situation = situation_of(
-            self._twin, self._evaluation, state.last, state.torque, self._encoders, self._diagnosis()
+            self._twin,
+            self._evaluation,
+            state.last,
+            state.torque,
+            self._encoders,
+            self._diagnosis(),
+            state.mismatch.explanation,
         )
         return VerdictReport(stamp_ns, dated(findings(situation), state.findings, stamp_ns))
 
@@ -97,6 +106,7 @@ def situation_of(
     record: TorqueRecord,
     encoders: EncoderObserver | None = None,
     diagnosis: Diagnosis | None = None,
+    explained: TorqueExplanation | None = None,
 ) -> Situation:
     """What the verdict depends on, at the end of an evaluation period.
 
@@ -110,6 +120,8 @@ def situation_of(
     encoders : EncoderObserver, optional
     diagnosis : Diagnosis, optional
         What the drive torque shows.
+    explained : TorqueExplanation, optional
+        What explains a torque mismatch.
     """
     alarms, config = evaluation.board.alarms, evaluation.config
     return Situation(
@@ -129,10 +141,24 @@ def situation_of(
         cadence_rpm=twin.speed_radps * 30.0 / math.pi,
         commanded_rpm=config.cadence.commanded_rpm,
         tolerance_rpm=config.cadence.tolerance_rpm,
-        doubts=tuple(doubts(last, config)) if last else (),
+        doubts=_doubts(last, evaluation, explained),
         encoder_faults=tuple(faults(config.encoders.names, encoders.state)) if encoders else (),
         diagnosis=diagnosis,
+        explained=explained if evaluation.board.level(specs.MISMATCH.name()) else None,
+        crank=config.crank,
+        drive_torque=config.drive_torque,
     )
+
+
+def _doubts(
+    last: CycleReport | None, evaluation: AlarmEvaluation, explained: TorqueExplanation | None
+) -> tuple[str, ...]:
+    """Why the last gait cycle is unlikely to be one of this leg; a torque that is explained is no reason."""
+    if last is None:
+        return ()
+    if explained is not None and explained.is_input_fault:
+        last = attrs.evolve(last, torque_samples=0)
+    return tuple(doubts(last, evaluation.config))
 
 
 def _joint(

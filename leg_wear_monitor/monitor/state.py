@@ -11,6 +11,7 @@ from leg_wear_monitor.monitor.evaluation.torque_record import TorqueRecord
 from leg_wear_monitor.monitor.forecast.forecaster import ForecastState
 from leg_wear_monitor.monitor.forecast.growth import GrowthWindow
 from leg_wear_monitor.monitor.reports import CycleReport
+from leg_wear_monitor.monitor.torque_causes.window import NO_MISMATCH, MismatchWindow
 from leg_wear_monitor.monitor.verdict.verdict import Finding
 from leg_wear_monitor.record import Records
 from leg_wear_monitor.twin.digital_twin import TwinSnapshot
@@ -29,6 +30,7 @@ class MonitorState:
     last: CycleReport | None = None
     happened: tuple[Event, ...] = ()
     findings: tuple[Finding, ...] = ()
+    mismatch: MismatchWindow = NO_MISMATCH
 
 
 @attrs.frozen(eq=False)

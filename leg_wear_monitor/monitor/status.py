@@ -18,6 +18,8 @@ from leg_wear_monitor.monitor.evaluation.torque_record import TorqueRecord
 from leg_wear_monitor.monitor.forecast.words import UNKNOWN, lifetime_values
 from leg_wear_monitor.monitor.inputs.health import InputHealth
 from leg_wear_monitor.monitor.reports import CycleReport, Status
+from leg_wear_monitor.monitor.torque_causes.explanation import TorqueExplanation
+from leg_wear_monitor.monitor.verdict.torque_words import EVIDENCE, causes_in_words
 from leg_wear_monitor.monitor.verdict.verdict import Verdict
 from leg_wear_monitor.monitor.verdict.words import with_unit
 from leg_wear_monitor.twin.digital_twin import DigitalTwin
@@ -36,6 +38,7 @@ def statuses(
     record: TorqueRecord,
     verdict: Verdict,
     encoders: EncoderObserver | None = None,
+    explained: TorqueExplanation | None = None,
 ) -> tuple[Status, ...]:
     """All statuses: verdict, gait, input, torque, each joint, further encoders if any, alarms, ledger."""
     joints = [_joint(k, name, twin, evaluation, last) for k, name in enumerate(twin.clearance_joints)]
@@ -43,7 +46,7 @@ def statuses(
         verdict_status(verdict),
         _gait(twin, evaluation, accounting, last, happened),
         _input(twin, evaluation, accounting),
-        _torque(evaluation, last, record),
+        _torque(evaluation, last, record, explained),
         *joints,
         *((_encoders(encoders, evaluation, last),) if encoders else ()),
         _alarms(evaluation),
@@ -113,7 +116,12 @@ def _health_values(health: InputHealth) -> dict[str, float]:
     return {"duration_s": values.pop("duration_s"), **rates, **values}
 
 
-def _torque(evaluation: AlarmEvaluation, last: CycleReport | None, record: TorqueRecord) -> Status:
+def _torque(
+    evaluation: AlarmEvaluation,
+    last: CycleReport | None,
+    record: TorqueRecord,
+    explained: TorqueExplanation | None,
+) -> Status:
     level = evaluation.board.level(*_TORQUE)
     if last is None or not last.torque_samples:
         return Status("torque", level, "not compared: no drive torque in the last gait cycle", {})
@@ -134,13 +142,26 @@ def _torque(evaluation: AlarmEvaluation, last: CycleReport | None, record: Torqu
         "crank_offset_error_rad": offset_error_rad(last, record),
     }
     raised = {name for name in _TORQUE if evaluation.board.alarms[name].level is not Level.OK}
-    messages = (
-        ["the measured torque differs from the predicted one"] if specs.MISMATCH.name() in raised else []
-    )
+    messages = []
+    if specs.MISMATCH.name() in raised:
+        config = evaluation.config
+        causes = f": {causes_in_words(explained, config.crank, config.drive_torque)}" if explained else ""
+        messages = [f"the measured torque differs from the predicted one{causes}"]
+        values |= _explained_values(explained) if explained else {}
     messages += torque_causes(raised, last, record, evaluation.torque_bounds)
     if not messages and math.isnan(last.torque_mismatch):
         messages = ["not enough gait cycles yet to compare instants"]
     return Status("torque", level, "; ".join(messages or ["measured as predicted"]), values)
+
+
+def _explained_values(explained: TorqueExplanation) -> dict[str, float]:
+    """Values of the first explanation of a mismatch, and what it leaves."""
+    values = {"unexplained": explained.after, "unexplained_sigma": explained.after_sigma}
+    for one in explained.alternatives[0] if explained.alternatives else ():
+        name, unit = EVIDENCE[one.cause]
+        name = f"{name}_{one.subject}".rstrip("_")
+        values |= {with_unit(name, unit): one.value, with_unit(f"{name}_sigma", unit): one.sigma}
+    return values
 
 
 def _joint(

@@ -12,12 +12,13 @@ from leg_wear_monitor.monitor.alarms.alarm import Alarm
 from leg_wear_monitor.monitor.config.fitting import check_limits, fitted, twin_settings
 from leg_wear_monitor.monitor.config.settings import MonitorConfig
 from leg_wear_monitor.monitor.cycle_report import cycle_report, with_forecast
-from leg_wear_monitor.monitor.diagnosis.diagnosis import Diagnosis
+from leg_wear_monitor.monitor.diagnosis.diagnosis import Diagnosis, DiagnosisState
 from leg_wear_monitor.monitor.diagnosis.observer import TorqueObserver
 from leg_wear_monitor.monitor.encoders.clearance_estimate import ClearanceEstimate
 from leg_wear_monitor.monitor.encoders.observer import EncoderObserver
 from leg_wear_monitor.monitor.evaluation.evaluation import AlarmEvaluation
 from leg_wear_monitor.monitor.evaluation.evaluation_period import A_CYCLE, EvaluationPeriods
+from leg_wear_monitor.monitor.evaluation.specs import MISMATCH
 from leg_wear_monitor.monitor.evaluation.torque_record import TorqueRecord
 from leg_wear_monitor.monitor.forecast.forecaster import Forecaster
 from leg_wear_monitor.monitor.forecast.growth import GrowthWindow, extended
@@ -42,10 +43,12 @@ from leg_wear_monitor.monitor.reports import (
 from leg_wear_monitor.monitor.resets import last_reset
 from leg_wear_monitor.monitor.state import MonitorSnapshot, MonitorState
 from leg_wear_monitor.monitor.status import statuses
+from leg_wear_monitor.monitor.torque_causes.explainer import TorqueExplainer
 from leg_wear_monitor.twin.digital_twin import DigitalTwin
 from leg_wear_monitor.twin.sample import GAIT_SAMPLE, Samples
 from leg_wear_monitor.twin.statistics import CycleStatistics, joined
 
+WRONG_TORQUE = "the drive torque is wrong as received, see the status torque"
 ACCELERATED = "wear is accelerated: clearances grow within the gait cycles that are compared"
 _KEPT_EVENTS = 1
 
@@ -110,6 +113,7 @@ class WearMonitor:
             if self.config.diagnosis.enabled and self.config.wear_acceleration == 1.0
             else None
         )
+        self._explainer = TorqueExplainer(self.mechanism)
         self._judge = Judge(
             self._twin,
             self._evaluation,
@@ -190,9 +194,13 @@ class WearMonitor:
 
     @property
     def diagnosis(self) -> Diagnosis:
-        """What the drive torque shows of the clearances."""
+        """What the drive torque shows of the clearances; nothing while it is wrong as received."""
         if self._torque:
-            return self._torque.diagnosis
+            found = self._torque.diagnosis
+            if not self._is_torque_wrong:
+                return found
+            settled = tuple(change for change in found.changes if change.is_corrected)
+            return Diagnosis(state=DiagnosisState.WAITING, reason=WRONG_TORQUE, changes=settled)
         return Diagnosis(
             reason=ACCELERATED if self.config.diagnosis.enabled else "diagnosis.enabled is false"
         )
@@ -260,6 +268,7 @@ class WearMonitor:
             state.torque,
             self.verdict.verdict,
             self._encoders,
+            state.mismatch.explanation,
         )
 
     def configure(self, config: MonitorConfig) -> None:
@@ -493,6 +502,7 @@ class WearMonitor:
                 self._torque.ended(statistics)
             cycles.append(self._report(statistics))
             self._add_changes(self._evaluation.end_cycle(cycles[-1], self._state.torque), changes)
+            self._explain_mismatch(statistics)
             self._keep_torque(statistics, cycles[-1])
         return update.samples, cycles
 
@@ -524,6 +534,23 @@ class WearMonitor:
         accounting.note_clearances(state.last)
         return state.last
 
+    @property
+    def _is_torque_wrong(self) -> bool:
+        """Whether drive torque or crank angle are wrong as received, by what explains a mismatch."""
+        explained = self._state.mismatch.explanation
+        return explained is not None and explained.is_input_fault
+
+    def _explain_mismatch(self, statistics: CycleStatistics) -> None:
+        """Look for causes of a torque mismatch after a gait cycle."""
+        max_friction_nm = self._evaluation.torque_bounds.max_friction_nm
+        self._state.mismatch = self._state.mismatch.with_cycle(
+            statistics,
+            self._evaluation.board.alarms[MISMATCH.name()],
+            lambda cycles: self._explainer.explanation(
+                cycles, self.config, self._twin.settings, max_friction_nm
+            ),
+        )
+
     def _keep_torque(self, statistics: CycleStatistics, report: CycleReport) -> None:
         """Record the torque of a gait cycle if it is as predicted."""
         is_sound = self._evaluation.is_torque_sound(report)
@@ -542,7 +569,7 @@ class WearMonitor:
             return
         before = self._torque.state.commissioned
         correction = self._torque.end_period(self._twin.clearance_mean_m, self._twin.depth)
-        if correction is None:
+        if correction is None or self._is_torque_wrong:
             self._note_commissioned(before)
             return
         joint = self.clearance_joints[correction.joint]

@@ -120,6 +120,27 @@ class TorqueStatistics:
 
 
 @attrs.frozen(eq=False)
+class TorqueProfile:
+    """Sums over the torque samples of a gait cycle by crank phase, before the low-pass filter.
+
+    Attributes
+    ----------
+    number, angle_rad : (FINE_PHASES,) array
+        Samples in each phase, and the sum of their crank angles.
+    measured_nm, predicted_nm : (FINE_PHASES,) array
+        Measured torque, and that of the model without a foot load.
+    lever_m : (FINE_PHASES,) array
+        Drive torque per foot load [N m/N].
+    """
+
+    number: Floats
+    angle_rad: Floats
+    measured_nm: Floats
+    predicted_nm: Floats
+    lever_m: Floats
+
+
+@attrs.frozen(eq=False)
 class CycleStatistics:
     """Statistics of one complete gait cycle, from crank angle 0 to the next 0.
 
@@ -149,6 +170,7 @@ class CycleStatistics:
     depth_max_m : (k, 2) array
         Greatest wear depth of bushing and journal.
     torque : TorqueStatistics
+    torque_profile : TorqueProfile
     """
 
     cycle: int
@@ -169,6 +191,7 @@ class CycleStatistics:
     growth_max_m: Floats
     depth_max_m: Floats
     torque: TorqueStatistics
+    torque_profile: TorqueProfile
 
     @property
     def duration_s(self) -> float:

@@ -5,6 +5,8 @@ from typing import TYPE_CHECKING
 
 import attrs
 
+from leg_wear_monitor.monitor.verdict.words import amount, estimate
+
 if TYPE_CHECKING:
     from leg_wear_monitor.monitor.config.settings import MonitorConfig
     from leg_wear_monitor.monitor.evaluation.torque_record import TorqueRecord
@@ -62,22 +64,25 @@ def bias_of(report: "CycleReport", bounds: TorqueBounds) -> float:
 def torque_causes(
     raised: set[str], report: "CycleReport", record: "TorqueRecord", bounds: TorqueBounds
 ) -> list[str]:
-    """Sentences on possible causes of raised torque alarms, without values."""
+    """Sentences on possible causes of raised torque alarms."""
     causes = []
+    constant = f"a constant torque of {estimate(report.friction_nm, report.friction_sigma_nm, 'N m')}"
     if BIAS in raised and report.friction_nm < 0.0:
         causes.append(
-            "a constant torque drives the crank, friction cannot do this: the sensor's offset is not zeroed, "
+            f"{constant} drives the crank, friction cannot do this: the sensor's offset is not zeroed, "
             "or drive_torque.sign is wrong"
         )
     elif BIAS in raised:
         causes.append(
-            "a constant torque exceeds the largest friction of the drive: the sensor's offset is not zeroed, "
-            "drive_torque.sign, scale or gear_ratio is wrong, or friction has increased"
+            f"{constant} exceeds the largest friction of the drive, {amount(bounds.max_friction_nm, 'N m')}: "
+            "the sensor's offset is not zeroed, drive_torque.sign, scale or gear_ratio is wrong, or friction "
+            "has increased"
         )
     if DRIFT in raised:
         causes.append(
-            "the constant torque has changed since this leg was commissioned: so has the drive's friction, "
-            "or the sensor's offset"
+            f"the constant torque, {amount(record.friction_nm, 'N m')} when this leg was commissioned, is "
+            f"{estimate(report.friction_nm, report.friction_sigma_nm, 'N m')}: the drive's friction has "
+            "changed, or the sensor's offset"
         )
     if LAG in raised:
         causes.append(_lag_cause(record, bounds))

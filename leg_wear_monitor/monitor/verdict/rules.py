@@ -6,6 +6,7 @@ docs/monitor.md lists them; a test compares the two.
 from leg_wear_monitor.monitor.alarms.alarm import Level
 from leg_wear_monitor.monitor.alarms.words import ADVICE
 from leg_wear_monitor.monitor.diagnosis.diagnosis import Cause
+from leg_wear_monitor.monitor.torque_causes.explanation import TorqueCause
 from leg_wear_monitor.monitor.verdict import clearance_rules, input_rules
 from leg_wear_monitor.monitor.verdict.alarm_rules import blinding, raised
 from leg_wear_monitor.monitor.verdict.rule import EVERYTHING, OF_THE_GAIT, OF_THE_MODEL, Rule
@@ -23,6 +24,19 @@ _REPLACE = (
 _TORQUE_INPUT = (
     "check the torque sensor (zero, scale, time stamps) and the parameters of drive_torque and crank"
 )
+
+
+def _cause_of_mismatch(cause: TorqueCause, meaning: str) -> Rule:
+    """Rule of a torque mismatch whose cause is known."""
+    return Rule(
+        code=cause.value,
+        state=State.INSPECT,
+        hits=input_rules.explained(cause),
+        why=f"the drive torque is not as predicted, {meaning}{{causes}}",
+        do=f"{{remedy}}; {_ACKNOWLEDGE}",
+        not_valid=EVERYTHING,
+    )
+
 
 RULES = (
     Rule(
@@ -46,6 +60,14 @@ RULES = (
         hits=clearance_rules.believed_at_limit,
         why="the clearance of joint {joint} is {value} by counting and measurements, the limit is {limit}",
         do=_REPLACE,
+    ),
+    *(
+        _cause_of_mismatch(cause, meaning)
+        for cause, meaning in (
+            (TorqueCause.SIGN, "its sign is wrong"),
+            (TorqueCause.SCALE, "its size is wrong"),
+            (TorqueCause.TIMING, "it does not fit the crank angle in time"),
+        )
     ),
     Rule(
         code="CLEARANCE_CHANGED",
@@ -79,6 +101,8 @@ RULES = (
         do="look for loose, bent or added parts, and rock each joint",
         not_valid=EVERYTHING,
     ),
+    _cause_of_mismatch(TorqueCause.LOAD, "a load acts at the foot"),
+    _cause_of_mismatch(TorqueCause.MASS, "a body has another mass"),
     Rule(
         code="TORQUE_MISMATCH",
         state=State.INSPECT,

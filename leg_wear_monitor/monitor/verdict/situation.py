@@ -5,7 +5,9 @@ import math
 import attrs
 
 from leg_wear_monitor.monitor.alarms.alarm import Alarm
+from leg_wear_monitor.monitor.config.inputs import Crank, DriveTorque
 from leg_wear_monitor.monitor.diagnosis.diagnosis import Diagnosis
+from leg_wear_monitor.monitor.torque_causes.explanation import TorqueExplanation
 
 
 @attrs.frozen
@@ -78,6 +80,10 @@ class Situation:
     encoder_faults : tuple of str
     diagnosis : Diagnosis or None
         What the drive torque shows; None without an estimator.
+    explained : TorqueExplanation or None
+        What explains a torque mismatch; None without one, and in its first gait cycles.
+    crank, drive_torque : Crank, DriveTorque
+        Present parameters, which a remedy changes.
     """
 
     joints: tuple[JointSituation, ...] = ()
@@ -96,6 +102,9 @@ class Situation:
     doubts: tuple[str, ...] = ()
     encoder_faults: tuple[str, ...] = ()
     diagnosis: Diagnosis | None = None
+    explained: TorqueExplanation | None = None
+    crank: Crank = Crank()
+    drive_torque: DriveTorque = DriveTorque()
 
     @property
     def unobserved(self) -> tuple[str, ...]:

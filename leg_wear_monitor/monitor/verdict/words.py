@@ -26,4 +26,4 @@ def estimate(value: float, sigma: float, unit: str) -> str:
 def _digits(value: float) -> str:
     if math.isnan(value):
         return "unknown"
-    return f"{value:.0f}" if 1000.0 <= abs(value) < 1.0e6 else f"{value:.3g}"
+    return f"{value:.0f}" if 999.5 <= abs(value) < 1.0e6 else f"{value:.3g}"

@@ -6,6 +6,7 @@ from leg_wear_monitor.dynamics.clearance.model import ANGLE, SPEED, blend
 from leg_wear_monitor.kernel import kernel
 from leg_wear_monitor.twin.follower.compare_instants import take_instant
 from leg_wear_monitor.twin.follower.low_pass import pass_low
+from leg_wear_monitor.twin.follower.phase import in_turn, phase_of
 from leg_wear_monitor.twin.follower.state import FRICTION, LAG, LOAD
 
 # weight of a time between samples in the running mean that estimates the sensor's period, and longest time in
@@ -38,6 +39,7 @@ def compare(sensor, signature, leg, stepper, measured):
     if 0.0 < longest < duration:
         return
     torque.unfiltered = 0.0
+    _add_to_profile(leg.sums.profile, stepper.drive[ANGLE], measured, mean / duration, 0.5 * (before + lever))
     direction = 1.0 if stepper.drive[SPEED] > 0.0 else -1.0
     if sensor.instants != 0:
         mean /= duration
@@ -57,6 +59,17 @@ def compare(sensor, signature, leg, stepper, measured):
     by[LAG] = 0.0 if fresh else (torque.last_predicted - p) / dt
     torque.last_predicted = p
     _add_up(m, p, by, leg.sums)
+
+
+@kernel
+def _add_to_profile(profile, angle, measured, predicted, lever):
+    """Add a measured and a predicted torque [N m] and the torque per load [N m/N] to the sums of a phase."""
+    phase = phase_of(angle, profile.shape[1])
+    profile[0, phase] += 1.0
+    profile[1, phase] += in_turn(angle)
+    profile[2, phase] += measured
+    profile[3, phase] += predicted
+    profile[4, phase] += lever
 
 
 @kernel

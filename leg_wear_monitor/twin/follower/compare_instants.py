@@ -11,9 +11,9 @@ import math
 
 from leg_wear_monitor.kernel import kernel
 from leg_wear_monitor.twin.follower.low_pass import pass_low
+from leg_wear_monitor.twin.follower.phase import phase_of
 from leg_wear_monitor.twin.follower.state import FRICTION, LAG, LOAD, PHASES
 
-_TURN = 2.0 * math.pi
 # as fractions of the RMS torque: standard deviation that halves an instant's weight, bound of its deviation;
 # these values clearly separate a healthy leg from one with strong impacts
 _VARIES, _FURTHEST = 0.5, 4.0
@@ -53,8 +53,7 @@ def _compare_waiting(sensor, leg, variance):
     off = min(max(w.measured - w.mean_predicted, -furthest), furthest)
     leg.torque.last_predicted = pass_low(fraction, fresh, w.mean_predicted, low_pass.predicted)
     of_all = pass_low(fraction, fresh, weight, low_pass.weight)
-    turns = w.angle / _TURN
-    phase = min(int((turns - math.floor(turns)) * PHASES), PHASES - 1)
+    phase = phase_of(w.angle, PHASES)
     by_phase[0, phase] += of_all
     residual = pass_low(fraction, fresh, weight * off, low_pass.weighted_residual)
     by_phase[1, phase] += residual

@@ -8,7 +8,7 @@ from leg_wear_monitor.mechanism.arrays import Floats
 from leg_wear_monitor.record import Record
 from leg_wear_monitor.twin.follower.state import FRICTION, LAG, LOAD
 from leg_wear_monitor.twin.follower.torque_estimate import CycleEstimate, LoadEstimate
-from leg_wear_monitor.twin.statistics import CycleStatistics, TorqueStatistics
+from leg_wear_monitor.twin.statistics import CycleStatistics, TorqueProfile, TorqueStatistics
 
 
 def clear_run_statistics(statistics: RunStatistics) -> None:
@@ -70,9 +70,15 @@ def torque_statistics(
     )
 
 
+def torque_profile(sums: Record, acting_n: float) -> TorqueProfile:
+    """Torques of a cycle by phase; ``acting_n`` is the foot load that acted in the model [N]."""
+    number, angle, measured, predicted, lever = sums.profile.copy()
+    return TorqueProfile(number, angle, measured, predicted - acting_n * lever, lever)
+
+
 def cycle_statistics(
     leg: Record, stamp: int, contacts: ContactArrays, depth: Floats, before: Floats,
-    statistics: RunStatistics, torque: TorqueStatistics,
+    statistics: RunStatistics, torque: TorqueStatistics, profile: TorqueProfile,
 ) -> CycleStatistics:  # fmt: skip
     """Statistics of a cycle at its end from a `LEG_STATE`; ``before`` (2, k) [m]: initial clearances."""
     joint, motion, now = contacts.joint, leg.motion, clearances(contacts, depth)
@@ -96,4 +102,5 @@ def cycle_statistics(
         growth_max_m=now[1] - before[1],
         depth_max_m=depth.max(axis=2),
         torque=torque,
+        torque_profile=profile,
     )

@@ -19,6 +19,7 @@ from leg_wear_monitor.twin.follower.cycle import (
     clear_run_statistics,
     clearances,
     cycle_statistics,
+    torque_profile,
     torque_statistics,
 )
 from leg_wear_monitor.twin.follower.following import CYCLE, LEFT, NEEDS_START, REPORTED, follow
@@ -215,6 +216,7 @@ class LegFollower:
             # number of independent samples after two equal low-pass stages
             independent = max(0.25 * self._cutoff * self.statistics.time[0], 1.0)
             sums = self.state.sums
+            profile = torque_profile(sums, self.estimate.acting)
             found = find(sums, sums.number / independent, self.estimate.room)
             if found is not None:
                 self.estimate.take(found, self._acts)
@@ -222,9 +224,10 @@ class LegFollower:
             torque = torque_statistics(sums, found, self.estimate, self._unexplained_nm(found))
             cycles.append(
                 cycle_statistics(
-                    self.state, stamp, self._setup.contacts, depth, self._before, self.statistics, torque
+                    self.state, stamp, self._setup.contacts, depth, self._before, self.statistics, torque,
+                    profile,
                 )
-            )
+            )  # fmt: skip
         motion.cycle_begin_ns, motion.cycle_bridged_ns = stamp, 0
         self.records["sums"] = 0
         clear_run_statistics(self.statistics)

@@ -8,6 +8,7 @@ from leg_wear_monitor.mechanism.arrays import Floats
 from leg_wear_monitor.record import Records, new_records
 
 PHASES = 32  # crank phases per turn, for the residual that repeats over gait cycles
+FINE_PHASES = 128  # of the torque profile of a gait cycle
 
 # indices of the regressors of a torque residual
 LOAD, FRICTION, LAG = 0, 1, 2
@@ -97,6 +98,8 @@ TORQUE_SUMS = np.dtype(
         ("along", "f8", (3,)),  # products of the regressors with the residual
         # for a sensor that samples instants: rows of weight, then weight times residual, load, friction, lag
         ("by_phase", "f8", (5, PHASES)),
+        # before the low-pass filter: number, crank angle, measured torque, predicted torque, torque per load
+        ("profile", "f8", (5, FINE_PHASES)),
     ]
 )
 """Sums over a gait cycle."""

@@ -45,3 +45,41 @@ def test_it_is_told(monitor, healthy, bias_nm, offset_rad, alarm, cause):
     if offset_rad:
         assert status.values["crank_offset_error_rad"] == pytest.approx(offset_rad, rel=0.15)
     assert reports.cycles[-1].friction_nm == pytest.approx(bias_nm, abs=0.3)
+
+
+@pytest.mark.parametrize(
+    ("factor", "offset_rad", "code"),
+    [(-1.0, 0.0, "TORQUE_SIGN"), (1000.0, 0.0, "TORQUE_SCALE"), (1.0, 0.3, "TORQUE_TIMING")],
+)
+def test_a_torque_that_is_wrong_as_received_is_named_and_shows_nothing_of_the_leg(
+    monitor, healthy, factor, offset_rad, code
+):
+    samples = healthy.copy()
+    samples["torque_nm"] *= factor
+    samples["crank_angle_rad"] += offset_rad
+    monitor.update(samples)
+    verdict, status = monitor.verdict.verdict, {one.name: one for one in monitor.status()}["torque"]
+    assert verdict.fault_code == code
+    assert not any(change.is_corrected for change in monitor.diagnosis.changes)
+    assert monitor.diagnosis.clearance_m == () and "wrong as received" in monitor.diagnosis.reason
+    if offset_rad:
+        assert status.values["crank_angle_ahead_rad"] == pytest.approx(-offset_rad, abs=0.01)
+        assert "cannot be told apart" in status.message
+    else:
+        name = "torque_factor" if factor < 0.0 else "torque_factor_size"
+        assert status.values[name] == pytest.approx(factor, rel=0.02)
+    assert status.values["unexplained"] < 0.05
+
+
+def test_how_the_samples_are_cut_changes_no_cause(monitor, healthy):
+    samples = healthy.copy()
+    samples["torque_nm"] *= -1.0
+    new = monitor.snapshot()
+    monitor.update(samples)
+    whole = monitor.status()
+    monitor.restore(new)
+    for block in np.array_split(samples, 37):
+        monitor.update(block)
+        monitor.restore(monitor.snapshot())
+    for one, other in zip(monitor.status(), whole, strict=True):
+        assert (one.name, one.message, str(one.values)) == (other.name, other.message, str(other.values))

@@ -16,6 +16,7 @@ from leg_wear_monitor.monitor.config.parameters import config_from
 from leg_wear_monitor.monitor.diagnosis.diagnosis import Cause, Change, Diagnosis, DiagnosisState
 from leg_wear_monitor.monitor.evaluation import specs
 from leg_wear_monitor.monitor.evaluation.board import AlarmBoard
+from leg_wear_monitor.monitor.torque_causes.explanation import NamedCause, TorqueCause, TorqueExplanation
 from leg_wear_monitor.monitor.verdict.alarm_rules import OF_A_JOINT
 from leg_wear_monitor.monitor.verdict.rules import RULES, findings
 from leg_wear_monitor.monitor.verdict.situation import JointSituation, SeenClearance, Situation
@@ -54,6 +55,13 @@ def change(cause: Cause, subject: str = "", **values: Any) -> Change:
 
 def diagnosis(*changes: Change) -> Diagnosis:
     return Diagnosis(state=DiagnosisState.CHANGED, changes=changes)
+
+
+def explained(*causes: TorqueCause, **values: Any) -> TorqueExplanation:
+    """One explanation, with made-up values."""
+    named = tuple(NamedCause(cause, -0.5, 0.01, "foot" if cause.name == "MASS" else "") for cause in causes)
+    given = {"before": 2.0, "after": 0.03, "after_sigma": 0.01, "limit": 0.08, "speed_radps": 6.3} | values
+    return TorqueExplanation(alternatives=(named,), **given)
 
 
 def seen(by: str, clearance_m: float, sigma_m: float, **more: Any) -> tuple[JointSituation, ...]:
@@ -109,6 +117,21 @@ CASES = [
     ({"alarms": (alarm("torque_mismatch"),)}, State.INSPECT, "TORQUE_MISMATCH", tuple(Figure)),
     (
         {"alarms": (alarm("torque_mismatch", present=Level.OK),)},  # latched
+        State.INSPECT,
+        "TORQUE_MISMATCH",
+        tuple(Figure),
+    ),
+    *(
+        (
+            {"alarms": (alarm("torque_mismatch"),), "explained": explained(cause)},
+            State.INSPECT,
+            cause.value,
+            tuple(Figure),
+        )
+        for cause in TorqueCause
+    ),
+    (
+        {"alarms": (alarm("torque_mismatch"),), "explained": explained(TorqueCause.LOAD, after=0.9)},
         State.INSPECT,
         "TORQUE_MISMATCH",
         tuple(Figure),
@@ -171,6 +194,24 @@ def test_a_mismatch_without_a_diagnosis_is_told_as_what_it_is() -> None:
     assert "rock each joint" in verdict.do and "leg-wear-monitor measure JOINT MM" in verdict.do
     (evidence,) = (each for each in verdict.evidence if each.name == "torque_mismatch")
     assert (evidence.value, evidence.limit, verdict.since_ns) == (0.35, 0.1, 77)
+
+
+def test_a_mismatch_that_is_explained_says_by_what_and_by_how_much() -> None:
+    found = explained(TorqueCause.SIGN, TorqueCause.TIMING)
+    verdict = judged(alarms=(alarm("torque_mismatch"),), explained=found)
+    assert (verdict.fault_code, verdict.since_ns) == ("TORQUE_SIGN", 77)
+    assert "it is -0.5 ± 0.01 times the predicted one and the crank is 500 mrad ± 10 mrad" in verdict.why
+    assert verdict.do.startswith("set drive_torque.sign to -1 and turn the crank to a known angle")
+    assert verdict.evidence[0].name == "torque_factor" and verdict.evidence[1].unit == "rad"
+    partly = judged(alarms=(alarm("torque_mismatch"),), explained=attrs.evolve(found, after=0.2))
+    assert partly.fault_code == "TORQUE_SIGN" and "0.2 ± 0.01 of the predicted RMS stays" in partly.why
+
+
+def test_a_cause_of_an_input_comes_before_what_the_torque_shows_of_the_leg() -> None:
+    shown = diagnosis(change(Cause.CLEARANCE, "G"))
+    both = {"alarms": (alarm("torque_mismatch"),), "diagnosis": shown}
+    assert judged(**both, explained=explained(TorqueCause.SCALE)).fault_code == "TORQUE_SCALE"
+    assert judged(**both, explained=explained(TorqueCause.LOAD)).fault_code == "CLEARANCE_CHANGED_G"
 
 
 def test_a_diagnosis_names_the_joint_that_a_mismatch_does_not() -> None:

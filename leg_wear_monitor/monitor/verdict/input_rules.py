@@ -4,6 +4,7 @@ import math
 from collections.abc import Callable, Sequence
 
 from leg_wear_monitor.monitor.alarms.alarm import Level
+from leg_wear_monitor.monitor.diagnosis.diagnosis import DiagnosisState
 from leg_wear_monitor.monitor.torque_causes.explanation import NamedCause, TorqueCause
 from leg_wear_monitor.monitor.verdict.alarm_rules import raised
 from leg_wear_monitor.monitor.verdict.clearance_rules import changes, words_of
@@ -109,6 +110,23 @@ def not_compared(situation: Situation) -> Sequence[Hit]:
     return [] if is_known or not situation.has_cycle or not situation.unobserved else [Hit()]
 
 
+def not_observed(situation: Situation) -> Sequence[Hit]:
+    """The diagnosis does not show some joints yet, or not at all, and no encoder does.
+
+    The mismatch of the torque shows broken hip and knee joints, but not those of the foot
+    (docs/monitor.md), so a leg without a mismatch is not known to be healthy. A diagnosis that is off is the
+    choice of somebody, and does not raise this.
+    """
+    found = situation.diagnosis
+    if found is None or found.state not in (DiagnosisState.WAITING, DiagnosisState.AS_COUNTED):
+        return []
+    blind = [each.joint for each in situation.joints if not each.seen]
+    if not blind or not situation.has_cycle or not situation.has_torque:
+        return []
+    cause = f": {found.reason}" if found.reason else ""
+    return [Hit(words={"joints": ", ".join(blind), "causes": cause})]
+
+
 def other_cadence(situation: Situation) -> Sequence[Hit]:
     """The cadence is outside of its tolerance, or was for so long that its alarm is raised."""
     alarms = raised("cadence", least=Level.ERROR)(situation)
@@ -144,6 +162,8 @@ def nothing_found(situation: Situation) -> Sequence[Hit]:
             f"the drive torque is that of the counted leg: {amount(situation.mismatch, '')} of its RMS is "
             f"not explained, the limit is {amount(limit, '')}"
         )
+        if situation.diagnosis is not None and situation.diagnosis.state is DiagnosisState.OFF:
+            observed += f"; it is not compared with wider joints: {situation.diagnosis.reason}"
     return [Hit(words={"observed": observed}, evidence=evidence)]
 
 

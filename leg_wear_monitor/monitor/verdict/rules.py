@@ -196,6 +196,13 @@ RULES = (
         do="let the leg walk on",
     ),
     Rule(
+        code="NOT_OBSERVED",
+        state=State.WATCH,
+        hits=input_rules.not_observed,
+        why="the drive torque does not show the clearances of joints {joints} yet{causes}",
+        do="let the leg walk on at a steady cadence; until then rock these joints by hand regularly",
+    ),
+    Rule(
         code="CADENCE",
         state=State.WATCH,
         hits=input_rules.other_cadence,

@@ -100,7 +100,7 @@ CASES = [
         (Figure.GROWTH, Figure.IMPACT_FORCES, Figure.FORECAST),
     ),
     ({"diagnosis": diagnosis(change(Cause.FRICTION))}, State.WATCH, "FRICTION_CHANGED", ()),
-    ({"diagnosis": Diagnosis(state=DiagnosisState.AS_COUNTED)}, State.HEALTHY, "NONE", ()),
+    ({"diagnosis": Diagnosis(state=DiagnosisState.AS_COUNTED)}, State.WATCH, "NOT_OBSERVED", ()),
     (
         {"alarms": (alarm("clearance_departure G"),)},
         State.INSPECT,
@@ -160,6 +160,33 @@ CASES = [
     ({"has_torque": False}, State.WATCH, "NO_DRIVE_TORQUE", ()),
     ({"alarms": (alarm("input_torque"),)}, State.WATCH, "NO_DRIVE_TORQUE", ()),
     ({"mismatch": math.nan}, State.WATCH, "TORQUE_NOT_COMPARED", ()),
+    (
+        {"diagnosis": Diagnosis(state=DiagnosisState.WAITING, reason="gait cycles: 2 of 5")},
+        State.WATCH,
+        "NOT_OBSERVED",
+        (),
+    ),
+    ({"diagnosis": Diagnosis(reason="diagnosis.enabled is false")}, State.HEALTHY, "NONE", ()),
+    (
+        {
+            "diagnosis": Diagnosis(state=DiagnosisState.AS_COUNTED, clearance_m=(3e-4, math.nan)),
+            "joints": (attrs.evolve(NEW[0], seen=(SeenClearance("torque", 3.0e-4, 1.0e-5),)), NEW[1]),
+        },
+        State.WATCH,
+        "NOT_OBSERVED",
+        (),
+    ),
+    (
+        {
+            "diagnosis": Diagnosis(state=DiagnosisState.AS_COUNTED, clearance_m=(3e-4, 3e-4)),
+            "joints": tuple(
+                attrs.evolve(each, seen=(SeenClearance("torque", 3.0e-4, 1.0e-5),)) for each in NEW
+            ),
+        },
+        State.HEALTHY,
+        "NONE",
+        (),
+    ),
     ({"is_out_of_step": True, "cadence_rpm": 70.0}, State.WATCH, "CADENCE", (Figure.FORECAST,)),
     ({"alarms": (alarm("cadence"),)}, State.WATCH, "CADENCE", (Figure.FORECAST,)),
     ({"encoder_faults": ("knee gives no angle",)}, State.WATCH, "ENCODER", ()),
@@ -249,6 +276,20 @@ def test_a_healthy_leg_is_told_that_no_alarm_is_no_proof() -> None:
     verdict = judged()
     assert ADVICE in verdict.do
     assert "0.031 of its RMS is not explained, the limit is 0.1" in verdict.why
+
+
+def test_a_healthy_leg_is_told_that_the_diagnosis_is_off() -> None:
+    off = judged(diagnosis=Diagnosis(reason="diagnosis.enabled is false"))
+    assert off.why.endswith("it is not compared with wider joints: diagnosis.enabled is false")
+
+
+def test_joints_that_encoders_show_need_no_diagnosis() -> None:
+    eyes = (SeenClearance("encoders", 3.0e-4, 1.0e-5),)
+    waiting = Diagnosis(state=DiagnosisState.WAITING, reason="gait cycles: 2 of 5")
+    all_seen = judged(diagnosis=waiting, joints=tuple(attrs.evolve(each, seen=eyes) for each in NEW))
+    some_seen = judged(diagnosis=waiting, joints=(attrs.evolve(NEW[0], seen=eyes), NEW[1]))
+    assert (all_seen.state, some_seen.state) == (State.HEALTHY, State.WATCH)
+    assert "of joints G yet: gait cycles: 2 of 5" in some_seen.why
 
 
 def test_every_alarm_of_a_board_has_a_verdict_and_its_kind_is_known() -> None:

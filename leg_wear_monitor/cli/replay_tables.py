@@ -1,5 +1,6 @@
 """A replay's statistics as text."""
 
+import math
 from collections.abc import Callable, Mapping
 from typing import TYPE_CHECKING
 
@@ -46,6 +47,7 @@ def print_replay(result: "ReplayResult", wall_s: float) -> None:
         console.print(_joints(result, is_counted_leg))
         if not is_counted_leg:
             console.print(f"{NOT_VALID}: the clearances are not those of the leg, see the verdict")
+        console.print(f"torque {_by_torque(result)}", soft_wrap=True)
         console.print()
         if Figure.FORECAST in verdict.not_valid:
             console.print(f"lasts  {NOT_VALID}: {verdict.why}\n", soft_wrap=True)
@@ -96,6 +98,22 @@ def _joints(result: "ReplayResult", is_counted_leg: bool) -> Table:
         name = result.monitor.mechanism.joint_words(joint.joint)
         table.add_row(name, *(cells if is_counted_leg else (NOT_VALID,) * len(cells)))
     return table
+
+
+def _by_torque(result: "ReplayResult") -> str:
+    """What the drive torque shows: state of the diagnosis, and the clearances that it observes."""
+    from leg_wear_monitor.monitor.verdict.diagnosis_words import diagnosis_words
+    from leg_wear_monitor.monitor.verdict.words import estimate
+
+    diagnosis, joints = result.monitor.diagnosis, result.monitor.clearance_joints
+    words = diagnosis_words(diagnosis, joints)
+    if not diagnosis.clearance_m:
+        return words
+    seen = zip(joints, diagnosis.clearance_m, diagnosis.sigma_m, strict=True)
+    values = [
+        f"{joint} {estimate(value, sigma, 'm')}" for joint, value, sigma in seen if not math.isnan(value)
+    ]
+    return f"{words}; over {diagnosis.cycles} gait cycles: {', '.join(values)}"
 
 
 def _counted(joint: "JointReport") -> str:

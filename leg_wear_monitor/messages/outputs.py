@@ -10,6 +10,7 @@ from numpy.typing import NDArray
 from leg_wear_monitor.messages import encode
 from leg_wear_monitor.messages.qos import LATCHED, RELIABLE, SENSOR_DATA, Qos
 from leg_wear_monitor.monitor.alarms.alarm import Alarm, Level
+from leg_wear_monitor.monitor.alarms.fault_codes import code_of
 from leg_wear_monitor.monitor.alarms.words import state_of
 from leg_wear_monitor.monitor.config.parameter_file import NODE
 from leg_wear_monitor.monitor.config.settings import MonitorConfig
@@ -156,7 +157,7 @@ class Messages:
                 status.message,
                 hardware,
                 {
-                    **({"fault_code": status.fault_code} if status.fault_code else {}),
+                    "fault_code": status.fault_code,
                     **{key: plain(value) for key, value in status.values.items()},
                 },
             )
@@ -188,7 +189,7 @@ def _alarm(alarm: Alarm) -> Status:
         "acknowledged": float(alarm.acknowledged),
         "present_level": float(alarm.present),
     }
-    return Status(alarm.name, alarm.level, state_of(alarm), values)
+    return Status(alarm.name, alarm.level, state_of(alarm), values, code_of(alarm))
 
 
 def _lifetime(joint: JointReport) -> Status:

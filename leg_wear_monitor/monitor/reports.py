@@ -5,6 +5,7 @@ import math
 import attrs
 
 from leg_wear_monitor.monitor.alarms.alarm import Alarm, Level
+from leg_wear_monitor.monitor.alarms.fault_codes import NO_FAULT
 from leg_wear_monitor.monitor.encoders.clearance_estimate import ClearanceEstimate
 from leg_wear_monitor.monitor.forecast.forecast import JointForecast, LegForecast
 from leg_wear_monitor.monitor.inputs.guard import InputGuard
@@ -239,11 +240,11 @@ class Reports:
 class Status:
     """A line of /diagnostics: ``name`` stable, numbers only in ``values``, by keys that end in their unit.
 
-    ``fault_code`` is a stable name of what is wrong, as one further value; empty: the line has none.
+    ``fault_code`` is a stable name of what is wrong, one of `alarms.fault_codes`, an alarm or a verdict's.
     """
 
     name: str
     level: Level
     message: str
     values: dict[str, float]
-    fault_code: str = ""
+    fault_code: str = NO_FAULT

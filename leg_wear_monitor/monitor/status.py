@@ -1,13 +1,23 @@
 """The monitor's own state, as /diagnostics shows it: stable names, numbers only as values."""
 
 import math
-from collections.abc import Sequence
+from collections.abc import Iterable, Sequence
 
 import attrs
 
 from leg_wear_monitor.monitor.accounting import Accounting
 from leg_wear_monitor.monitor.alarms.alarm import Level
+from leg_wear_monitor.monitor.alarms.fault_codes import (
+    DIAGNOSIS,
+    ENCODERS,
+    LEDGER_INTERRUPTED,
+    LEDGER_NOT_WRITTEN,
+    NOT_FOLLOWED,
+    code_of,
+    worst_code,
+)
 from leg_wear_monitor.monitor.alarms.words import ADVICE
+from leg_wear_monitor.monitor.diagnosis.diagnosis import Diagnosis, DiagnosisState
 from leg_wear_monitor.monitor.encoders.clearance_estimate import ClearanceObservation
 from leg_wear_monitor.monitor.encoders.observer import EncoderObserver
 from leg_wear_monitor.monitor.encoders.state import faults
@@ -19,6 +29,7 @@ from leg_wear_monitor.monitor.forecast.words import UNKNOWN, lifetime_values
 from leg_wear_monitor.monitor.inputs.health import InputHealth
 from leg_wear_monitor.monitor.reports import CycleReport, Status
 from leg_wear_monitor.monitor.torque_causes.explanation import TorqueExplanation
+from leg_wear_monitor.monitor.verdict.diagnosis_words import diagnosis_words
 from leg_wear_monitor.monitor.verdict.torque_words import EVIDENCE, causes_in_words
 from leg_wear_monitor.monitor.verdict.verdict import Verdict
 from leg_wear_monitor.monitor.verdict.words import with_unit
@@ -37,16 +48,18 @@ def statuses(
     happened: Sequence[Event],
     record: TorqueRecord,
     verdict: Verdict,
+    diagnosis: Diagnosis,
     encoders: EncoderObserver | None = None,
     explained: TorqueExplanation | None = None,
 ) -> tuple[Status, ...]:
-    """All statuses: verdict, gait, input, torque, each joint, further encoders if any, alarms, ledger."""
+    """All statuses, verdict first, then gait, inputs, joints, alarms and ledger."""
     joints = [_joint(k, name, twin, evaluation, last) for k, name in enumerate(twin.clearance_joints)]
     return (
         verdict_status(verdict),
         _gait(twin, evaluation, accounting, last, happened),
         _input(twin, evaluation, accounting),
         _torque(evaluation, last, record, explained),
+        _diagnosis(twin.clearance_joints, diagnosis),
         *joints,
         *((_encoders(encoders, evaluation, last),) if encoders else ()),
         _alarms(evaluation),
@@ -74,9 +87,10 @@ def _gait(
     happened: Sequence[Event],
 ) -> Status:
     tracking = twin.tracking
-    message, level = tracking.name.lower().replace("_", " "), evaluation.board.level(specs.CADENCE.name())
+    cadence = evaluation.board.alarms[specs.CADENCE.name()]
+    message, level, code = tracking.name.lower().replace("_", " "), cadence.level, code_of(cadence)
     if evaluation.guard.cause:
-        message, level = "not monitored: see input", Level.ERROR
+        message, level, code = "not monitored: see input", Level.ERROR, NOT_FOLLOWED
     elif happened and tracking in (Tracking.STARTING, Tracking.OUT_OF_STEP):
         message += f", last {happened[-1].what.value.replace('_', ' ')}"
     if evaluation.config.wear_acceleration != 1.0:
@@ -88,7 +102,7 @@ def _gait(
         **accounting.totals,
         "cycle_moving_s": last.moving_s if last else math.nan,
     }
-    return Status("gait", level, message, values)
+    return Status("gait", level, message, values, code)
 
 
 def _input(twin: DigitalTwin, evaluation: AlarmEvaluation, accounting: Accounting) -> Status:
@@ -101,13 +115,18 @@ def _input(twin: DigitalTwin, evaluation: AlarmEvaluation, accounting: Accountin
     values |= counts | {"already_counted": accounting.state.skipped}
     values |= {"conflicting": evaluation.guard.conflicting, "implausible": evaluation.guard.implausible}
     values |= {f"faulty_{name}": count for name, count in faulty.items()}
-    level = evaluation.board.level(*_INPUT)
+    level, code = evaluation.board.level(*_INPUT), _code(evaluation, _INPUT)
     bad = [name for name in _INPUT if evaluation.board.alarms[name].level is not Level.OK]
     messages = [*evaluation.causes, *([f"see: {', '.join(bad)}"] if bad else [])]
     message = "; ".join(messages) or "in order"
     if evaluation.guard.cause:
-        level = Level.ERROR
-    return Status("input", level, message, {name: float(value) for name, value in values.items()})
+        level, code = Level.ERROR, NOT_FOLLOWED
+    return Status("input", level, message, {name: float(value) for name, value in values.items()}, code)
+
+
+def _code(evaluation: AlarmEvaluation, names: Iterable[str]) -> str:
+    """Code of the worst of some alarms."""
+    return worst_code(evaluation.board.alarms[name] for name in names)
 
 
 def _health_values(health: InputHealth) -> dict[str, float]:
@@ -122,9 +141,9 @@ def _torque(
     record: TorqueRecord,
     explained: TorqueExplanation | None,
 ) -> Status:
-    level = evaluation.board.level(*_TORQUE)
+    level, code = evaluation.board.level(*_TORQUE), _code(evaluation, _TORQUE)
     if last is None or not last.torque_samples:
-        return Status("torque", level, "not compared: no drive torque in the last gait cycle", {})
+        return Status("torque", level, "not compared: no drive torque in the last gait cycle", {}, code)
     values = {
         "measured_rms_nm": last.measured_torque_rms_nm,
         "predicted_rms_nm": last.predicted_torque_rms_nm,
@@ -148,10 +167,23 @@ def _torque(
         causes = f": {causes_in_words(explained, config.crank, config.drive_torque)}" if explained else ""
         messages = [f"the measured torque differs from the predicted one{causes}"]
         values |= _explained_values(explained) if explained else {}
+        code = explained.named[0].cause.value if explained and explained.named else code
     messages += torque_causes(raised, last, record, evaluation.torque_bounds)
     if not messages and math.isnan(last.torque_mismatch):
         messages = ["not enough gait cycles yet to compare instants"]
-    return Status("torque", level, "; ".join(messages or ["measured as predicted"]), values)
+    return Status("torque", level, "; ".join(messages or ["measured as predicted"]), values, code)
+
+
+def _diagnosis(joints: Sequence[str], diagnosis: Diagnosis) -> Status:
+    """What the drive torque shows of the clearances; NaN where a joint is not observable."""
+    values = {"cycles": float(diagnosis.cycles)}
+    for k, joint in enumerate(joints):
+        known = bool(diagnosis.clearance_m)
+        values[f"{joint}_clearance_m"] = diagnosis.clearance_m[k] if known else math.nan
+        values[f"{joint}_sigma_m"] = diagnosis.sigma_m[k] if known else math.nan
+    if diagnosis.state is DiagnosisState.CHANGED:
+        return Status("diagnosis", Level.WARN, diagnosis_words(diagnosis, joints), values, DIAGNOSIS)
+    return Status("diagnosis", Level.OK, diagnosis_words(diagnosis, joints), values)
 
 
 def _explained_values(explained: TorqueExplanation) -> dict[str, float]:
@@ -167,7 +199,8 @@ def _explained_values(explained: TorqueExplanation) -> dict[str, float]:
 def _joint(
     k: int, name: str, twin: DigitalTwin, evaluation: AlarmEvaluation, last: CycleReport | None
 ) -> Status:
-    level = evaluation.board.level(*(spec.name(name) for spec in specs.JOINT))
+    names = [spec.name(name) for spec in specs.JOINT]
+    level, code = evaluation.board.level(*names), _code(evaluation, names)
     values = {
         "clearance_m": float(twin.clearance_mean_m[k]),
         "clearance_max_m": float(twin.clearance_max_m[k]),
@@ -175,7 +208,7 @@ def _joint(
     }
     report = last.joints[k] if last else None
     if report is None:
-        return Status(f"joint {name}", level, "no whole gait cycle yet", values)
+        return Status(f"joint {name}", level, "no whole gait cycle yet", values, code)
     values |= {
         "growth_m_per_cycle": _or_nan(report.growth_m_per_cycle),
         "growth_mps": _or_nan(report.growth_mps),
@@ -185,16 +218,17 @@ def _joint(
         "impacts": float(report.impacts),
     }
     if report.forecast is None:
-        return Status(f"joint {name}", level, "no forecast yet", values)
+        return Status(f"joint {name}", level, "no forecast yet", values, code)
     values |= UNKNOWN | lifetime_values(report.forecast)
-    return Status(f"joint {name}", level, report.forecast.answer.value, values)
+    return Status(f"joint {name}", level, report.forecast.answer.value, values, code)
 
 
 def _encoders(encoders: EncoderObserver, evaluation: AlarmEvaluation, last: CycleReport | None) -> Status:
     """Further encoders: their faults, their errors, and the clearances estimated from them."""
     settings, state = evaluation.config.encoders, encoders.state
     kinds = {spec.kind for spec in specs.ENCODERS}
-    level = max(alarm.level for alarm in evaluation.board.alarms.values() if alarm.kind in kinds)
+    departures = [alarm for alarm in evaluation.board.alarms.values() if alarm.kind in kinds]
+    level, code = max(alarm.level for alarm in departures), worst_code(departures)
     values = {"cycles": float(encoders.cycles)}
     for i, name in enumerate(settings.names):
         kept = state.samples
@@ -212,7 +246,9 @@ def _encoders(encoders: EncoderObserver, evaluation: AlarmEvaluation, last: Cycl
     if encoders.has_failed:
         wrong.append("no reference: the leg could not be simulated with its clearances")
     messages = [*wrong, *_shown(last)]
-    return Status("encoders", max(level, Level.WARN) if wrong else level, "; ".join(messages), values)
+    if wrong and level is Level.OK:
+        level, code = Level.WARN, ENCODERS
+    return Status("encoders", level, "; ".join(messages), values, code)
 
 
 def _shown(last: CycleReport | None) -> list[str]:
@@ -249,7 +285,8 @@ def _alarms(evaluation: AlarmEvaluation) -> Status:
     waiting = sum(not alarm.acknowledged for alarm in raised)
     level = max((alarm.level for alarm in raised), default=Level.OK)
     message = f"raised: {', '.join(alarm.name for alarm in raised)}" if raised else f"none; {ADVICE}"
-    return Status("alarms", level, message, {"raised": float(len(raised)), "unacknowledged": float(waiting)})
+    values = {"raised": float(len(raised)), "unacknowledged": float(waiting)}
+    return Status("alarms", level, message, values, worst_code(raised))
 
 
 def _ledger(accounting: Accounting) -> Status:
@@ -258,10 +295,11 @@ def _ledger(accounting: Accounting) -> Status:
         return Status("ledger", Level.OK, "no ledger: wear is lost at the end", {})
     values = {"not_kept_s": accounting.not_kept_s}
     if ledger.fault:
-        return Status("ledger", Level.ERROR, f"not written: {ledger.fault}; trying again", values)
+        message = f"not written: {ledger.fault}; trying again"
+        return Status("ledger", Level.ERROR, message, values, LEDGER_NOT_WRITTEN)
     if accounting.state.cut_off_s is not None:
         values["cut_off_s"] = accounting.state.cut_off_s
         message = ledger.loss or "the previous run was interrupted, the wear of its last seconds is lost"
-        return Status("ledger", Level.WARN, message, values)
+        return Status("ledger", Level.WARN, message, values, LEDGER_INTERRUPTED)
     message = "is written at the end of the recording" if ledger.at_end else "kept"
     return Status("ledger", Level.OK, message, values)

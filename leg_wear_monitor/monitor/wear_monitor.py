@@ -267,6 +267,7 @@ class WearMonitor:
             state.happened,
             state.torque,
             self.verdict.verdict,
+            self.diagnosis,
             self._encoders,
             state.mismatch.explanation,
         )

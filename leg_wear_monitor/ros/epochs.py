@@ -12,6 +12,7 @@ from pathlib import Path
 import numpy as np
 
 from leg_wear_monitor.monitor.alarms.alarm import Level
+from leg_wear_monitor.monitor.alarms.fault_codes import ALREADY_COUNTED
 from leg_wear_monitor.monitor.reports import Status
 from leg_wear_monitor.monitor.wear_monitor import WearMonitor
 from leg_wear_monitor.twin.sample import NO_FAULT, Samples
@@ -80,5 +81,5 @@ class Epochs:
         values = {"left_out_samples": float(self._left_out), "epochs_begun": float(self._begun)}
         is_undecided, self._reported = self._left_out > self._reported, self._left_out
         if is_undecided:
-            return Status("clock", Level.ERROR, UNDECIDED, values)
+            return Status("clock", Level.ERROR, UNDECIDED, values, ALREADY_COUNTED)
         return Status("clock", Level.OK, BEGUN if self._begun else "continues", values)

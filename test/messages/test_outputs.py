@@ -130,7 +130,9 @@ def test_a_forecast_says_what_is_known(store: Any, reports: Reports) -> None:
         attrs.evolve(cycle, joints=(*cycle.joints, third))
     )
     *unknown, told = store.deserialize_cdr(raw, FORECAST.type).status
-    assert [(status.message, status.values) for status in unknown] == 2 * [("not enough growth or data", [])]
+    values = {pair.key: pair.value for status in unknown for pair in status.values}
+    assert [status.message for status in unknown] == 2 * ["not enough growth or data"]
+    assert values == {"fault_code": "NONE"}
     assert told.message == Answer.KNOWN.value
     values = {pair.key: pair.value for pair in told.values}
     assert [values[f"{fraction}_hours"] for fraction in ("p10", "p50", "p90")] == ["1", "2", "3"]
@@ -157,11 +159,12 @@ def test_the_leg_s_forecast_is_a_status_after_those_of_the_joints(store: Any, re
 
 
 def test_diagnostics_are_the_monitors_status(store: Any) -> None:
-    told = (Status("input", Level.WARN, "look at: input_gaps", {"crank_rate_hz": 199.5}),)
+    told = (Status("input", Level.WARN, "see: input_gaps", {"crank_rate_hz": 199.5}, "INPUT_GAPS"),)
     raw = Messages(MonitorConfig(hardware_id="left"), CLEARANCE_JOINTS, node="monitor").diagnostics(7, told)
     (status,) = store.deserialize_cdr(raw, DIAGNOSTICS.type).status
     assert (status.name, status.level, status.hardware_id) == ("monitor: input", 1, "left")
-    assert [(pair.key, pair.value) for pair in status.values] == [("crank_rate_hz", "199.5")]
+    values = [(pair.key, pair.value) for pair in status.values]
+    assert values == [("fault_code", "INPUT_GAPS"), ("crank_rate_hz", "199.5")]
 
 
 @pytest.mark.parametrize(

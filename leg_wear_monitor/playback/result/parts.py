@@ -160,7 +160,7 @@ class ReplayAlarms:
 class ReplayStatus:
     """A line of /diagnostics at the end; the keys of ``values`` end in their unit.
 
-    ``fault_code`` is a stable name of what is wrong; empty if the line has none.
+    ``fault_code`` is a stable name of what is wrong; empty in a file of an older version.
     """
 
     name: str

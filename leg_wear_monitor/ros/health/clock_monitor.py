@@ -1,5 +1,6 @@
 """Check that ROS time advances."""
 
+from leg_wear_monitor.monitor.alarms import fault_codes
 from leg_wear_monitor.monitor.alarms.alarm import Level
 from leg_wear_monitor.monitor.reports import Status
 
@@ -9,9 +10,10 @@ _TURNED_BACK_S = 1.0
 
 def both_clocks(one: Status, other: Status) -> Status:
     """Combine two statuses of the clock into one with the faults of either."""
-    faults = [status.message for status in (one, other) if status.level is not Level.OK]
-    message = "; ".join(faults) or one.message
-    return Status(one.name, max(one.level, other.level), message, one.values | other.values)
+    faults = [status for status in (one, other) if status.level is not Level.OK]
+    message = "; ".join(fault.message for fault in faults) or one.message
+    code = max(faults, key=lambda fault: fault.level).fault_code if faults else one.fault_code
+    return Status(one.name, max(one.level, other.level), message, one.values | other.values, code)
 
 
 class ClockMonitor:
@@ -36,9 +38,12 @@ class ClockMonitor:
         stands_s = (steady_ns - self._changed_ns) * 1.0e-9
         values = {"stands_s": stands_s, "is_simulated": float(is_simulated)}
         if is_simulated and not ros_ns:
-            return Status("clock", Level.ERROR, "use_sim_time is set and nobody publishes /clock", values)
+            message = "use_sim_time is set and nobody publishes /clock"
+            return Status("clock", Level.ERROR, message, values, fault_codes.CLOCK_MISSING)
         if stands_s > _STANDS_FROM_S:
-            return Status("clock", Level.ERROR, "stands still: /clock has stopped", values)
+            message = "stands still: /clock has stopped"
+            return Status("clock", Level.ERROR, message, values, fault_codes.CLOCK_STOPPED)
         if before and since_ns < -1.0e9 * _TURNED_BACK_S:
-            return Status("clock", Level.WARN, "was set back; samples keep their own stamps", values)
+            message = "was set back; samples keep their own stamps"
+            return Status("clock", Level.WARN, message, values, fault_codes.CLOCK_SET_BACK)
         return Status("clock", Level.OK, "goes on", values)

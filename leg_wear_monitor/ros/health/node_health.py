@@ -5,6 +5,7 @@ from collections.abc import Iterable, Iterator
 
 import attrs
 
+from leg_wear_monitor.monitor.alarms import fault_codes
 from leg_wear_monitor.monitor.alarms.alarm import Level
 from leg_wear_monitor.monitor.reports import Status
 from leg_wear_monitor.ros.health.silence import NOTHING_FROM_S, SILENT_FROM_S, utc
@@ -45,11 +46,13 @@ class Load:
 def load_status(load: Load, inbox: Inbox) -> Status:
     """Status of the load; starts a new reporting interval."""
     shed = inbox.shed - load.shed_reported
-    level, message = Level.OK, "keeps up"
+    level, message, code = Level.OK, "keeps up", fault_codes.NO_FAULT
     if shed:
         level, message = Level.ERROR, "overloaded: samples were dropped and their wear is not counted"
+        code = fault_codes.SAMPLES_DROPPED
     elif load.worst_delay_s > COARSE_FROM_S:
         level, message = Level.WARN, "overloaded: forces and torques of samples are not published"
+        code = fault_codes.SAMPLES_NOT_PUBLISHED
     values = {
         "received": float(inbox.received),
         "waiting": float(len(inbox)),
@@ -58,7 +61,7 @@ def load_status(load: Load, inbox: Inbox) -> Status:
         "shed_messages": float(inbox.shed),
     }
     load.worst_delay_s, load.shed_reported = load.delay_s, inbox.shed
-    return Status("load", level, message, values)
+    return Status("load", level, message, values, code)
 
 
 def topics_status(topics: Iterable[InputTopic], now_ns: int, started_ns: int) -> Status:
@@ -82,7 +85,8 @@ def topics_status(topics: Iterable[InputTopic], now_ns: int, started_ns: int) ->
         for at, fault in _faults(topic, silent_s, (now_ns - started_ns) * 1.0e-9):
             messages.append(f"{topic.name}: {fault}")
             level = max(level, at)
-    return Status("topics", level, "; ".join(messages) or "connected", values)
+    code = fault_codes.TOPICS if messages else fault_codes.NO_FAULT
+    return Status("topics", level, "; ".join(messages) or "connected", values, code)
 
 
 def _faults(topic: InputTopic, silent_s: float, running_s: float) -> Iterator[tuple[Level, str]]:
@@ -110,5 +114,6 @@ def recording_status(black_box: BlackBox) -> Status:
     """Status of the recording."""
     values = {"recorded_messages": float(black_box.recorded)}
     if black_box.fault:
-        return Status("recording", Level.ERROR, f"stopped: {black_box.fault}", values)
+        message = f"stopped: {black_box.fault}"
+        return Status("recording", Level.ERROR, message, values, fault_codes.RECORDING_STOPPED)
     return Status("recording", Level.OK, "on" if black_box.on else "off", values)

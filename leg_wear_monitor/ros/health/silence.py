@@ -10,6 +10,7 @@ from datetime import UTC, datetime
 import attrs
 
 from leg_wear_monitor.monitor.alarms.alarm import Level
+from leg_wear_monitor.monitor.alarms.fault_codes import INPUT_SILENCE
 from leg_wear_monitor.monitor.reports import Status
 from leg_wear_monitor.twin.kinds import CRANK, KINDS
 
@@ -99,4 +100,7 @@ class Silence:
             message += f"; {status.message}"
         values = status.values | {key: now for key, now in _NOW.items() if key in status.values}
         values["no_data_s"] = self.silent_s(kind, steady_ns)
-        return attrs.evolve(status, level=max(level, status.level), message=message, values=values)
+        code = status.fault_code if status.level > level else INPUT_SILENCE
+        return attrs.evolve(
+            status, level=max(level, status.level), message=message, values=values, fault_code=code
+        )

@@ -1,5 +1,7 @@
 """A torque that no drive has is told by its name, on a leg that is healthy otherwise."""
 
+import math
+
 import numpy as np
 import pytest
 
@@ -7,7 +9,10 @@ pytest.importorskip("mcap")
 
 from leg_wear_monitor.bags.reader import Recording
 from leg_wear_monitor.monitor.alarms.alarm import Level
+from leg_wear_monitor.monitor.alarms.fault_codes import FAULT_CODES
 from leg_wear_monitor.monitor.config.settings import MonitorConfig
+from leg_wear_monitor.monitor.evaluation import specs
+from leg_wear_monitor.monitor.verdict.rules import RULES
 from leg_wear_monitor.share import share_directory
 
 SECONDS = 8
@@ -83,3 +88,31 @@ def test_how_the_samples_are_cut_changes_no_cause(monitor, healthy):
         monitor.restore(monitor.snapshot())
     for one, other in zip(monitor.status(), whole, strict=True):
         assert (one.name, one.message, str(one.values)) == (other.name, other.message, str(other.values))
+
+
+def test_every_status_of_the_monitor_has_a_fault_code_that_the_pages_list(monitor, healthy):
+    codes = set()
+    for factor in (1.0, -1.0, 1.15):
+        samples = healthy.copy()
+        samples["torque_nm"] *= factor
+        new = monitor.snapshot()
+        monitor.update(samples)
+        for status in monitor.status():
+            assert (status.fault_code == "NONE") == (status.level is Level.OK), status
+            codes.add(status.fault_code)
+        monitor.restore(new)
+    known = {*FAULT_CODES, *(rule.code for rule in RULES), *(spec.name().upper() for spec in specs.TORQUE)}
+    assert {"NONE", "TORQUE_SIGN", "TORQUE_MISMATCH"} <= codes <= known
+
+
+def test_the_diagnosis_is_a_status_with_the_clearances_that_the_torque_shows(monitor, healthy):
+    before = {one.name: one for one in monitor.status()}["diagnosis"]
+    assert before.message.startswith("waiting; ") and math.isnan(before.values["A_clearance_m"])
+    monitor.update(healthy)
+    status, diagnosis = {one.name: one for one in monitor.status()}["diagnosis"], monitor.diagnosis
+    assert status.message.startswith("the drive torque shows the counted clearances")
+    assert status.values["cycles"] == diagnosis.cycles > 0
+    for k, joint in enumerate(monitor.clearance_joints):
+        assert status.values[f"{joint}_clearance_m"] == pytest.approx(diagnosis.clearance_m[k], nan_ok=True)
+        is_named = joint in status.message.partition("not observable: ")[2].split(", ")
+        assert is_named == math.isnan(status.values[f"{joint}_sigma_m"])

@@ -1,0 +1,47 @@
+"""Stable names of what is wrong, one with each status: those of alarms, and those of the parts of a monitor.
+
+A status of the verdict has the code of its rule (`verdict.rules`).
+"""
+
+from collections.abc import Iterable
+
+from leg_wear_monitor.monitor.alarms.alarm import Alarm, Level
+
+NO_FAULT = "NONE"
+INPUT_SILENCE, NOT_FOLLOWED = "INPUT_SILENCE", "NOT_FOLLOWED"
+ENCODERS, DIAGNOSIS = "ENCODERS", "DIAGNOSIS"
+LEDGER_NOT_WRITTEN, LEDGER_INTERRUPTED = "LEDGER_NOT_WRITTEN", "LEDGER_INTERRUPTED"
+SAMPLES_DROPPED, SAMPLES_NOT_PUBLISHED = "SAMPLES_DROPPED", "SAMPLES_NOT_PUBLISHED"
+TOPICS, RECORDING_STOPPED = "TOPICS", "RECORDING_STOPPED"
+CLOCK_MISSING, CLOCK_STOPPED, CLOCK_SET_BACK = "CLOCK_MISSING", "CLOCK_STOPPED", "CLOCK_SET_BACK"
+ALREADY_COUNTED = "ALREADY_COUNTED"
+
+FAULT_CODES = {
+    NO_FAULT: "nothing is wrong",
+    INPUT_SILENCE: "no samples come; each status that has no current data then has this code",
+    NOT_FOLLOWED: "the samples of the crank cannot be followed, see `input`",
+    ENCODERS: "a further encoder gives nothing that can be used",
+    DIAGNOSIS: "the drive torque shows a change; the code of the verdict says which",
+    LEDGER_NOT_WRITTEN: "the ledger cannot be written",
+    LEDGER_INTERRUPTED: "the previous run was interrupted",
+    SAMPLES_DROPPED: "the node is overloaded: samples were dropped",
+    SAMPLES_NOT_PUBLISHED: "the node is overloaded: values of samples are not published",
+    TOPICS: "an input topic has no publisher, several, another type, or messages are lost",
+    RECORDING_STOPPED: "the recording of the node has stopped",
+    CLOCK_MISSING: "`use_sim_time` is set and nobody publishes `/clock`",
+    CLOCK_STOPPED: "`/clock` has stopped",
+    CLOCK_SET_BACK: "the clock was set back",
+    ALREADY_COUNTED: "samples of a time that is in the ledger are skipped",
+}
+"""Codes that are not the name of an alarm, and their meaning."""
+
+
+def code_of(alarm: Alarm) -> str:
+    """Code of a raised alarm, such as ``CLEARANCE_A``; NONE for another."""
+    return alarm.name.upper().replace(" ", "_") if alarm.level is not Level.OK else NO_FAULT
+
+
+def worst_code(alarms: Iterable[Alarm]) -> str:
+    """Code of the first of the most severe alarms; NONE if none is raised."""
+    found = sorted(alarms, key=lambda alarm: -alarm.level)
+    return code_of(found[0]) if found else NO_FAULT

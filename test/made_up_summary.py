@@ -83,7 +83,6 @@ def made_up_summary() -> ReplaySummary:
                 "A": LegJoint(label="", place_m=(0.0, 0.0), is_on_ground=True),
                 "B": LegJoint(label="knee", place_m=(0.0, -0.4), is_on_ground=False),
             },
-            toe_path_m=((0.1, -0.8), (0.2, -0.7), (0.0, -0.75)),
         ),
         wall_s=0.5,
         real_time_factor=4e-9,

@@ -6,11 +6,9 @@ import attrs
 import numpy as np
 
 from leg_wear_monitor.mechanism.arrays import Floats
-from leg_wear_monitor.mechanism.ideal import one_cycle, point_motion
+from leg_wear_monitor.mechanism.ideal import ideal_motion, point_motion
 from leg_wear_monitor.mechanism.position import build_linkage
 from leg_wear_monitor.mechanism.spec import GROUND, Mechanism
-
-_POINTS = 72  # of the toe's path: every 5 degrees of the crank
 
 
 @attrs.frozen(eq=False)
@@ -22,13 +20,10 @@ class Outline:
     bodies : dict of str to (n, 2) array
         Corners of each moving body.
     joints : dict of str to (2,) array
-    toe_path : (n, 2) array
-        Over one turn of the crank; empty without a toe.
     """
 
     bodies: dict[str, Floats]
     joints: dict[str, Floats]
-    toe_path: Floats
 
 
 def outline_of(mechanism: Mechanism) -> Outline:
@@ -37,21 +32,19 @@ def outline_of(mechanism: Mechanism) -> Outline:
     Raises
     ------
     AssemblyError
-        If it does not close or has a dead point.
+        If it does not close.
     """
     linkage = build_linkage(mechanism)
-    motion = one_cycle(linkage, _POINTS, 1.0)
+    motion = ideal_motion(linkage, [0.0], 1.0)
 
-    def path(body: str, point: str) -> Floats:
-        return point_motion(motion, linkage, body, point)[0]
+    def place(body: str, point: str) -> Floats:
+        return np.asarray(point_motion(motion, linkage, body, point)[0][0], np.float64)
 
     bodies = {
-        body: corners({point: path(body, point)[0] for point in mechanism.points_of(body)})
+        body: corners({point: place(body, point) for point in mechanism.points_of(body)})
         for body in mechanism.bodies
     }
-    joints = {joint: path(mechanism.sides(joint)[1], joint)[0] for joint in mechanism.joints}
-    toe = path(*mechanism.toe) if mechanism.toe else np.empty((0, 2))
-    return Outline(bodies, joints, toe)
+    return Outline(bodies, {joint: place(mechanism.sides(joint)[1], joint) for joint in mechanism.joints})
 
 
 def is_on_ground(mechanism: Mechanism, joint: str) -> bool:

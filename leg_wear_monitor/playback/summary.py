@@ -133,7 +133,6 @@ def _leg_shape(mechanism: Mechanism) -> ReplayLeg:
             )
             for name, place in outline.joints.items()
         },
-        toe_path_m=_places(outline.toe_path),
     )
 
 

@@ -1,142 +1,30 @@
-"""A self-contained HTML page: sections of text, pictures and tables, with the configuration and versions.
+"""A self-contained HTML page: sections of parts, with the configuration and versions.
 
 A page needs no network and no other file: it embeds pictures, scripts and style, and its content security
 policy forbids everything else. It prints, fits a phone screen, and has an alternative text for every picture.
 """
 
 import base64
+import hashlib
 import re
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Mapping, Sequence
 from typing import Any
 
 import attrs
 import jinja2
 
+from leg_wear_monitor.report.parts import Live, Part
+
 _SPACES = re.compile(r"[^a-z0-9]+")
-
-
-@attrs.frozen(kw_only=True)
-class Picture:
-    """One picture.
-
-    Attributes
-    ----------
-    image : bytes
-        PNG or SVG.
-    alt : str
-        Alternative text: describes the picture to readers who cannot see it.
-    caption : str
-        Caption below the picture; no caption if empty.
-    wide : bool
-        Whether it needs the width of the page: on a phone it then scrolls sideways instead of being shrunk.
-    """
-
-    image: bytes = attrs.field(repr=False)
-    alt: str
-    caption: str = ""
-    wide: bool = False
-    kind: str = attrs.field(default="picture", init=False)
-
-    @property
-    def address(self) -> str:
-        """The picture as a ``data:`` URL."""
-        media = "png" if self.image.startswith(b"\x89PNG") else "svg+xml"
-        return f"data:image/{media};base64,{base64.b64encode(self.image).decode()}"
-
-
-@attrs.frozen(kw_only=True)
-class Gallery:
-    """Pictures of one kind side by side, as many in a row as fit, with a common caption."""
-
-    pictures: Sequence[Picture]
-    caption: str = ""
-    kind: str = attrs.field(default="gallery", init=False)
-
-
-@attrs.frozen(kw_only=True)
-class Table:
-    """A table; the first column contains the row names.
-
-    Attributes
-    ----------
-    caption : str
-    head : sequence of str
-        Column titles with units.
-    rows : sequence of sequences of str
-        Cells, as many per row as `head` has.
-    note : str
-        Note below the table; no note if empty.
-
-    Raises
-    ------
-    ValueError
-        If a row has another number of cells than `head`.
-    """
-
-    caption: str
-    head: Sequence[str]
-    rows: Sequence[Sequence[str]]
-    note: str = ""
-    kind: str = attrs.field(default="table", init=False)
-
-    def __attrs_post_init__(self) -> None:
-        if any(len(row) != len(self.head) for row in self.rows):
-            raise ValueError(f"a row of the table {self.caption!r} has not {len(self.head)} cells")
-
-
-@attrs.frozen
-class Text:
-    """A paragraph."""
-
-    text: str
-    kind: str = attrs.field(default="text", init=False)
-
-
-@attrs.frozen
-class Sentences:
-    """A list of sentences, for instance conclusions."""
-
-    sentences: Sequence[str]
-    kind: str = attrs.field(default="sentences", init=False)
-
-
-@attrs.frozen(kw_only=True)
-class Listing:
-    """Preformatted text, for instance the contents of a file."""
-
-    text: str
-    kind: str = attrs.field(default="listing", init=False)
-
-
-@attrs.frozen(kw_only=True)
-class Live:
-    """An interactive element: markup with its data, and a script.
-
-    Attributes
-    ----------
-    markup : str
-        Trusted HTML, inserted without escaping; the script finds it by its id.
-    script : str
-        JavaScript that uses neither modules nor the network.
-    caption : str
-        Caption below the element; no caption if empty.
-    """
-
-    markup: str = attrs.field(repr=False)
-    script: str = attrs.field(repr=False)
-    caption: str = ""
-    kind: str = attrs.field(default="live", init=False)
-
-
-Part = Text | Sentences | Picture | Gallery | Table | Listing | Live
 
 
 @attrs.frozen
 class Section:
-    """A titled section of a page."""
+    """A titled section of a page; a folded one shows its title alone until it is opened, or printed."""
 
     title: str
     parts: Sequence[Part]
+    is_folded: bool = False
 
     @property
     def anchor(self) -> str:
@@ -146,19 +34,25 @@ class Section:
 
 @attrs.frozen(kw_only=True)
 class Banner:
-    """One line at the head of a page; symbol and word say what its colour says.
+    """The head of a page; symbol and word say what its colour says.
 
     Attributes
     ----------
     symbol, word : str
+    subject : str
+        What the word concerns; may be empty.
     text : str
+    notes : sequence of pairs of str
+        Lines below the text, each with its title.
     severity : str
         Class of its colour: ``fine``, ``careful`` or ``bad``.
     """
 
     symbol: str
     word: str
+    subject: str = ""
     text: str
+    notes: Sequence[tuple[str, str]] = ()
     severity: str
 
 
@@ -176,6 +70,10 @@ class Page:
     versions : mapping of str to str
         Versions of the software, seeds and the origin of the data, by name.
     banner : Banner or None
+    styles, libraries : sequence of str
+        Further style sheets, and scripts that come before those of the interactive parts.
+    has_dark : bool
+        Whether it follows a reader who prefers dark colours; its pictures must follow as well.
     """
 
     title: str
@@ -184,12 +82,24 @@ class Page:
     configuration: str = ""
     versions: Mapping[str, str] = attrs.field(factory=dict)
     banner: Banner | None = None
+    styles: Sequence[str] = ()
+    libraries: Sequence[str] = ()
+    has_dark: bool = False
 
     @property
-    def scripts(self) -> Iterator[str]:
-        """The scripts of the interactive parts, each once, in the order of the parts."""
+    def scripts(self) -> tuple[str, ...]:
+        """The scripts, each once: the libraries, then those of the interactive parts."""
         parts = (part for section in self.sections for part in section.parts)
-        return iter(dict.fromkeys(part.script for part in parts if isinstance(part, Live)))
+        live = (part.script for part in parts if isinstance(part, Live))
+        return tuple(dict.fromkeys((*self.libraries, *live)))
+
+    @property
+    def policy(self) -> str:
+        """Content security policy: these scripts run, no others, and nothing is fetched."""
+        digests = (hashlib.sha256(script.encode()).digest() for script in self.scripts)
+        allowed = " ".join(f"'sha256-{base64.b64encode(digest).decode()}'" for digest in digests)
+        scripts = f"; script-src {allowed}" if allowed else ""
+        return f"default-src 'none'; img-src data:; style-src 'unsafe-inline'{scripts}"
 
 
 def render(name: str, **values: Any) -> str:

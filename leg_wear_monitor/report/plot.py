@@ -13,7 +13,7 @@ from leg_wear_monitor.playback.result.replay_summary import ReplaySummary
 from leg_wear_monitor.report.figures.figure import BODY_COLOURS, SMALL, tidy
 from leg_wear_monitor.report.figures.force_traces import LEAST_N
 from leg_wear_monitor.report.figures.life_picture import draw_clearances
-from leg_wear_monitor.report.replay.charts import draw_openings
+from leg_wear_monitor.report.figures.openings import draw_openings
 
 
 @singledispatch

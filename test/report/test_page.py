@@ -1,58 +1,18 @@
 """A page is whole: well formed, with nothing fetched from elsewhere, and a text for every picture."""
 
-from html.parser import HTMLParser
+import base64
+import hashlib
 
 import pytest
+from html_reader import read
 from hypothesis import given
 from hypothesis import strategies as st
 
 from leg_wear_monitor.report.figures.figure import new_figure, png, svg
-from leg_wear_monitor.report.page import (
-    Gallery,
-    Listing,
-    Live,
-    Page,
-    Picture,
-    Section,
-    Sentences,
-    Table,
-    Text,
-    page_html,
-)
+from leg_wear_monitor.report.page import Page, Section, page_html
+from leg_wear_monitor.report.parts import Gallery, Listing, Live, Picture, Sentences, Table, Text
 
 pytestmark = pytest.mark.plain
-
-VOID = {"meta", "link", "img", "input", "br"}
-
-
-class Reader(HTMLParser):
-    """Elements of a page, and a fault for whatever is not closed where it was opened."""
-
-    def __init__(self):
-        super().__init__()
-        self.open, self.elements, self.texts = [], [], []
-
-    def handle_starttag(self, tag, attrs):
-        self.elements.append((tag, dict(attrs)))
-        if tag not in VOID:
-            self.open.append(tag)
-
-    def handle_endtag(self, tag):
-        assert self.open.pop() == tag
-
-    def handle_data(self, data):
-        self.texts.append(data)
-
-    def of(self, tag):
-        return [attributes for name, attributes in self.elements if name == tag]
-
-
-def read(html):
-    reader = Reader()
-    reader.feed(html)
-    reader.close()
-    assert reader.open == []
-    return reader
 
 
 def full_page():
@@ -98,9 +58,11 @@ def test_every_picture_has_a_text_and_every_header_cell_a_scope():
 def test_nothing_comes_from_elsewhere():
     html = page_html(full_page())
     policy = [meta["content"] for meta in read(html).of("meta") if "http-equiv" in meta]
+    digest = base64.b64encode(hashlib.sha256(b"let a = 1 < 2;").digest()).decode()
     assert policy == [
-        "default-src 'none'; img-src data:; style-src 'unsafe-inline'; script-src 'unsafe-inline'"
+        f"default-src 'none'; img-src data:; style-src 'unsafe-inline'; script-src 'sha256-{digest}'"
     ]
+    assert "<script>let a = 1 < 2;</script>" in html
     for element, attributes in read(html).elements:
         for name in ("src", "href"):
             assert attributes.get(name, "data:").startswith(("data:", "#")), element
@@ -122,6 +84,15 @@ def test_whatever_a_text_holds_it_stays_a_text(text):
     assert {tag for tag, _ in found.elements} <= known
     assert found.of("img")[0]["alt"] == text
     assert len(found.of("section")) == len(read(page_html(plain)).of("section")) + 1
+
+
+def test_a_folded_section_and_what_is_not_valid():
+    section = Section("Forecast", [Text("not valid: x", is_not_valid=True)], is_folded=True)
+    table = Table(caption="t", head=("joint", "h", ""), rows=[("A", "not valid", "why")])
+    page = read(page_html(Page(title="t", summary="s", sections=[section, Section("T", [table])])))
+    assert [fold["id"] for fold in page.of("details")] == ["forecast"]
+    greyed = page.inside(lambda _, classes: "not-valid" in classes)
+    assert greyed == ["not valid: x", "not valid"]
 
 
 def test_a_row_has_a_cell_for_every_column():

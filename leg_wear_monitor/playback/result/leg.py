@@ -33,13 +33,10 @@ class ReplayLeg:
         Corners of each moving body.
     joints : dict of str to LegJoint
         All joints, those without clearance too.
-    toe_path_m : tuple of tuples
-        Over one turn of the crank; empty without a toe.
     """
 
     bodies_m: dict[str, tuple[Place, ...]] = attrs.Factory(dict)
     joints: dict[str, LegJoint] = attrs.Factory(dict)
-    toe_path_m: tuple[Place, ...] = ()
 
     def joint_words(self, joint: str) -> str:
         """A joint by its name and its label, such as ``G (knee)``."""

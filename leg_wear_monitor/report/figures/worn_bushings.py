@@ -10,13 +10,13 @@ from matplotlib.lines import Line2D
 from leg_wear_monitor.mechanism.arrays import Floats
 from leg_wear_monitor.mechanism.ideal import TURN
 from leg_wear_monitor.report.figures.figure import BLUE, INK, PALE, SMALL, USUAL, VERMILION, new_figure, tidy
+from leg_wear_monitor.report.figures.units import length_unit
 from leg_wear_monitor.wear.surfaces import BUSHING, JOURNAL, Surfaces, wear_zone
 
 _COLUMN_IN = 2.3
 _BUSHING, _JOURNAL, _RIM = 1.0, 0.86, 1.75  # drawn radii, as multiples of the bushing's radius
 _DEEPEST = 0.5  # drawn depth of the greatest wear depth, as a multiple of the bushing's radius
 _SUPERSCRIPT = str.maketrans("0123456789", "⁰¹²³⁴⁵⁶⁷⁸⁹")
-_UNITS = ((1.0e12, "pm"), (1.0e9, "nm"), (1.0e6, "µm"), (1.0e3, "mm"))
 
 
 def worn_bushings(
@@ -40,7 +40,7 @@ def worn_bushings(
     """
     figure = new_figure(max(2, len(names)) * _COLUMN_IN, 4.9)
     grid = figure.add_gridspec(3, len(names), height_ratios=(3.0, 2.0, 0.3))
-    scale, unit = unit_of(float(surfaces.depth.max()))
+    scale, unit = length_unit(float(surfaces.depth.max()))
     for k, name in enumerate(names):
         depth, zone = surfaces.depth[k], wear_zone(surfaces.depth[k, BUSHING])
         section = figure.add_subplot(grid[0, k], projection="polar")
@@ -66,11 +66,6 @@ def _draw_key(axes: Axes) -> None:
         "90 % of the bushing's wear": Line2D([], [], color=INK, linewidth=4.0, solid_capstyle="butt"),
     }
     axes.legend(list(entries.values()), list(entries), ncols=3, fontsize=SMALL, frameon=False, loc="center")
-
-
-def unit_of(greatest: float) -> tuple[float, str]:
-    """Factor from metres, and name, of the smallest unit in which a depth [m] is below 1000."""
-    return next(((scale, unit) for scale, unit in _UNITS if scale * greatest < 1000.0), _UNITS[-1])
 
 
 def draw_section(axes: Axes, depth: Floats, zone: tuple[float, float] | None, radius: float) -> str:

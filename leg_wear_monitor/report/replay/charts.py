@@ -1,159 +1,175 @@
-"""What a replay found, over time: clearances, forces, input, alarms."""
+"""Charts of a replay over time: clearances, forces, input, alarms."""
+
+import math
+from collections.abc import Iterable, Sequence
 
 import numpy as np
-from matplotlib.axes import Axes
-from matplotlib.figure import Figure
-from matplotlib.lines import Line2D
 
 from leg_wear_monitor.mechanism.arrays import Floats
-from leg_wear_monitor.monitor.alarms.alarm import Level
+from leg_wear_monitor.playback.result.parts import AlarmChange
 from leg_wear_monitor.playback.result.replay_summary import ReplaySummary
-from leg_wear_monitor.report.figures.figure import (
-    BLUE,
-    GREEN,
-    INK,
-    ORANGE,
-    PALE,
-    PURPLE,
-    SKY,
-    SMALL,
-    VERMILION,
-    new_figure,
-    tidy,
-)
+from leg_wear_monitor.report.chart import Chart, Panel, Series
+from leg_wear_monitor.report.figures.replay_series import opened, time_of
 
-COLOURS = (BLUE, VERMILION, GREEN, ORANGE, PURPLE, SKY, INK)
-LEVEL_COLOURS = {Level.OK: GREEN, Level.WARN: ORANGE, Level.ERROR: VERMILION}
-_WIDTH_IN, _PANEL_IN = 9.0, 2.3
-_UNITS = ((1.0e12, "pm"), (1.0e9, "nm"), (1.0e6, "µm"), (1.0e3, "mm"))
+SERIES_COLOURS = 7  # of the style sheet
+_GROUP = "time"
+_STEADY = 0.1  # of the commanded cadence to either side, less does not fill the picture
+_NEAR = 3.0  # a limit beyond so many times the largest value would only flatten the curve
 
 
-def time_axis(summary: ReplaySummary) -> tuple[Floats, str]:
-    """Time of each entry of the history since the recording's begin, and its unit."""
-    seconds = (summary.history.stamp_ns.astype(float) - summary.recording.begin_ns) / 1.0e9
-    longest = float(seconds.max()) if len(seconds) else 0.0
-    if longest > 3.0 * 3600.0:
-        return seconds / 3600.0, "h"
-    return (seconds / 60.0, "min") if longest > 300.0 else (seconds, "s")
-
-
-def clearance_chart(summary: ReplaySummary) -> Figure:
+def openings_chart(summary: ReplaySummary) -> Chart:
     """How much each clearance has opened since the first gait cycle."""
-    figure = new_figure(_WIDTH_IN, 3.2)
-    axes = figure.add_subplot()
-    unit = draw_openings(axes, summary)
-    _finish([axes], unit, len(summary.history.clearance_m))
-    return figure
-
-
-def draw_openings(axes: Axes, summary: ReplaySummary) -> str:
-    """Draw how much each clearance has opened since the first gait cycle; gives the unit of the time."""
-    time, unit = time_axis(summary)
-    clearances = summary.history.clearance_m if len(time) else {}
-    opened = {joint: values - values[0] for joint, values in clearances.items()}
-    greatest = max((float(np.nanmax(np.abs(values))) for values in opened.values()), default=0.0)
-    scale, name = next(((s, n) for s, n in _UNITS if s * greatest < 1000.0), _UNITS[-1])
-    for colour, (joint, values) in zip(COLOURS, opened.items(), strict=False):
-        axes.plot(time, scale * values, color=colour, label=joint, linewidth=1.3)
-    axes.ticklabel_format(useOffset=False)
-    axes.set_ylabel(f"opened by [{name}]", fontsize=SMALL)
-    return unit
-
-
-def force_chart(summary: ReplaySummary) -> Figure:
-    """Peak and mean contact force of each joint in each gait cycle, a panel a joint."""
-    time, unit = time_axis(summary)
-    history, limits = summary.history, summary.monitor.limits
-    joints = list(history.peak_force_n)
-    figure = new_figure(_WIDTH_IN, 0.6 + 1.25 * max(1, len(joints)))
-    panels = list(np.atleast_1d(figure.subplots(max(1, len(joints)), 1, sharex=True)))
-    for k, (axes, joint) in enumerate(zip(panels, joints, strict=False)):
-        peak, mean = history.peak_force_n[joint], history.mean_force_n[joint]
-        axes.fill_between(time, mean, peak, color=SKY, alpha=0.4, linewidth=0.0)
-        axes.plot(time, peak, color=BLUE, linewidth=0.9)
-        axes.plot(time, mean, color=INK, linewidth=0.9)
-        own = limits.joint_impact_force_n
-        limit = own[k] if own else limits.impact_force_n
-        if limit < 3.0 * np.nanmax(peak):
-            axes.axhline(limit, color=VERMILION, linewidth=1.0, linestyle=(0, (4, 2)))
-        axes.set_ylim(bottom=0.0)
-        axes.set_ylabel(f"{joint} [N]", fontsize=SMALL)
-    _finish(panels, unit, 0)
-    return figure
-
-
-def health_chart(summary: ReplaySummary) -> Figure:
-    """Cadence, the torque's mismatch, and the load and friction that explain the rest."""
-    time, unit = time_axis(summary)
-    history = summary.history
-    figure = new_figure(_WIDTH_IN, 3.0 * _PANEL_IN * 0.75)
-    panels = list(figure.subplots(3, 1, sharex=True))
-    panels[0].plot(time, history.cadence_rpm, color=BLUE, linewidth=1.1)
-    panels[0].axhline(summary.monitor.commanded_rpm, color=INK, linewidth=0.8, linestyle=(0, (4, 2)))
-    panels[0].ticklabel_format(useOffset=False)
-    panels[0].set_ylabel("cadence [rpm]", fontsize=SMALL)
-    for label, torque, colour in (
-        ("measured", history.measured_torque_rms_nm, VERMILION),
-        ("predicted", history.predicted_torque_rms_nm, BLUE),
-    ):
-        panels[1].plot(time, torque, color=colour, linewidth=1.1, label=label)
-    panels[1].set_ylabel("torque, RMS [N m]", fontsize=SMALL)
-    panels[1].legend(fontsize=SMALL, frameon=False, loc="upper right", ncols=2)
-    panels[2].plot(time, history.torque_mismatch, color=BLUE, linewidth=1.1)
-    limit = summary.monitor.limits.torque_mismatch
-    panels[2].axhline(limit, color=VERMILION, linewidth=1.0, linestyle=(0, (4, 2)))
-    panels[2].set_ylabel("mismatch", fontsize=SMALL)
-    panels[2].set_ylim(bottom=0.0)
-    _finish(panels, unit, 0)
-    return figure
-
-
-def alarm_chart(summary: ReplaySummary) -> Figure:
-    """When each alarm that was ever raised was at which level."""
-    begin, end = summary.recording.begin_ns, summary.recording.end_ns
-    changes = summary.alarms.changes
-    names = list(dict.fromkeys(change.alarm.name for change in changes))
-    span, unit = _span((end - begin) / 1.0e9)
-    figure = new_figure(_WIDTH_IN, 0.9 + 0.28 * max(1, len(names)))
-    axes = figure.add_subplot()
-    for row, name in enumerate(reversed(names)):
-        own = [change for change in changes if change.alarm.name == name]
-        times = [(change.stamp_ns - begin) / 1.0e9 / span for change in own]
-        times.append((end - begin) / 1.0e9 / span)
-        for k, change in enumerate(own):
-            colour = LEVEL_COLOURS[change.alarm.level]
-            width = max(times[k + 1] - times[k], 0.0)
-            axes.barh(row, width, left=times[k], height=0.7, color=colour, linewidth=0.0)
-            axes.plot([times[k]] * 2, [row - 0.35, row + 0.35], color=colour, linewidth=1.2)
-    axes.set_yticks(range(len(names)), list(reversed(names)), fontsize=SMALL)
-    axes.set_xlim(0.0, max((end - begin) / 1.0e9 / span, 1.0e-9))
-    tidy(axes)
-    axes.set_xlabel(f"time [{unit}]", fontsize=SMALL)
-    keys = {
-        level.name: Line2D([], [], color=colour, linewidth=5.0) for level, colour in LEVEL_COLOURS.items()
-    }
-    axes.legend(
-        list(keys.values()),
-        list(keys),
-        ncols=3,
-        fontsize=SMALL,
-        frameon=False,
-        loc="lower right",
-        bbox_to_anchor=(1.0, 1.0),
+    columns, unit = opened(summary)
+    series = [
+        Series(name=f"opened by {joint}", unit=unit, values=values, colour=_colour(k))
+        for k, (joint, values) in enumerate(columns.items())
+    ]
+    return Chart(
+        name="clearances",
+        alt="Opening of each joint's clearance over time",
+        caption="Mean radial clearance of each joint, minus its value after the first gait cycle.",
+        x=_time(summary),
+        ends=_ends(summary),
+        panels=[Panel(title="Opening of the clearances", series=series, height=260)],
+        group=_GROUP,
     )
-    return figure
 
 
-def _span(seconds: float) -> tuple[float, str]:
-    if seconds > 3.0 * 3600.0:
-        return 3600.0, "h"
-    return (60.0, "min") if seconds > 300.0 else (1.0, "s")
+def force_chart(summary: ReplaySummary) -> Chart:
+    """Peak and mean contact force of each joint in each gait cycle, a panel a joint, all on the same axis."""
+    history, limits = summary.history, summary.monitor.limits
+    own = limits.joint_impact_force_n
+    greatest = max((_greatest(values) for values in history.peak_force_n.values()), default=0.0)
+    panels = []
+    for k, (joint, peak) in enumerate(history.peak_force_n.items()):
+        mean, limit = history.mean_force_n[joint], own[k] if own else limits.impact_force_n
+        series = [
+            Series(name=f"peak force {joint}", unit="N", values=peak),
+            Series(name=f"mean force {joint}", unit="N", values=mean, colour="--ink"),
+        ]
+        if limit < _NEAR * greatest:
+            series.append(_limit(f"limit {joint}", "N", limit, peak))
+        panels.append(Panel(title=summary.leg.joint_words(joint), series=series, height=150))
+    high = 1.05 * max([greatest, *(_greatest(each.values) for panel in panels for each in panel.series)])
+    return Chart(
+        name="forces",
+        alt="Peak and mean contact force of each joint over time",
+        caption="Contact force in each gait cycle, on the same axis for all joints. Peaks are of a heavy "
+        "tail; their scatter does not mean that the joint changes.",
+        x=_time(summary),
+        ends=_ends(summary),
+        panels=[Panel(title=each.title, series=each.series, low=0.0, high=high or 1.0, height=each.height)
+                for each in panels],
+        group=_GROUP,
+    )  # fmt: skip
 
 
-def _finish(panels: list[Axes], unit: str, lines: int) -> None:
-    for axes in panels:
-        tidy(axes)
-        axes.spines["left"].set_color(PALE)
-    panels[-1].set_xlabel(f"time since the recording's begin [{unit}]", fontsize=SMALL)
-    if lines:
-        panels[0].legend(fontsize=SMALL, frameon=False, ncols=lines, loc="upper left")
+def health_chart(summary: ReplaySummary) -> Chart:
+    """Cadence, the torque and its mismatch, and the load and friction that explain the rest."""
+    history, limit = summary.history, summary.monitor.limits.torque_mismatch
+    cadence, mismatch = history.cadence_rpm, history.torque_mismatch
+    rpm = summary.monitor.commanded_rpm
+    commanded, steady = np.full_like(cadence, rpm), _STEADY * abs(rpm)
+    panels = [
+        Panel(
+            title="Cadence",
+            series=[
+                Series(name="cadence", unit="rpm", values=cadence),
+                Series(name="commanded", unit="rpm", values=commanded, colour="--ink", style="dashed"),
+            ],
+            low=min(_least(cadence), rpm - steady),
+            high=max(_greatest(cadence, rpm), rpm + steady),
+        ),
+        Panel(
+            title="Drive torque, RMS of each gait cycle",
+            series=[
+                Series(name="measured", unit="N m", values=history.measured_torque_rms_nm),
+                Series(
+                    name="predicted", unit="N m", values=history.predicted_torque_rms_nm, colour=_colour(1)
+                ),
+            ],
+            low=0.0,
+        ),
+        Panel(
+            title="Fraction of the torque that is not explained",
+            series=[Series(name="mismatch", unit="", values=mismatch), _limit("limit", "", limit, mismatch)],
+            low=0.0,
+            high=1.1 * max(_greatest(mismatch), limit),
+        ),
+        Panel(title="Load at the foot", series=[Series(name="load", unit="N", values=history.load_n)]),
+        Panel(
+            title="Friction of the drive",
+            series=[Series(name="friction", unit="N m", values=history.friction_nm)],
+        ),
+    ]
+    return Chart(
+        name="input",
+        alt="Cadence, drive torque, mismatch, load and friction over time",
+        caption="Cadence with the commanded one dashed; measured and predicted drive torque; the fraction "
+        "that load, friction and lag do not explain, with its limit dashed; load and friction as estimated.",
+        x=_time(summary),
+        ends=_ends(summary),
+        panels=[panel for panel in panels if np.isfinite(panel.series[0].values).any()],
+        group=_GROUP,
+    )
+
+
+def alarm_chart(summary: ReplaySummary, changes: Sequence[AlarmChange]) -> Chart:
+    """Level of each alarm that was ever raised; the first of a change holds until the next one."""
+    begin, end = summary.recording.begin_ns, summary.recording.end_ns
+    stamps = sorted({begin, end, *(change.stamp_ns for change in changes)})
+    names = dict.fromkeys(change.alarm.name for change in changes)
+    time, unit = time_of(summary, np.array(stamps, np.int64))
+    series = [
+        Series(name=name, unit="", values=_levels(stamps, changes, name), colour="--careful", style="steps")
+        for name in names
+    ]
+    return Chart(
+        name="alarms",
+        alt="Levels of alarms over time",
+        caption="Level of each alarm over time: 0 is OK, 1 WARN, 2 ERROR.",
+        x=Series(name="time", unit=unit, values=time),
+        ends=_ends(summary),
+        panels=[
+            Panel(title="Alarms", series=series, height=80 + 34 * len(series), lanes=("OK", "WARN", "ERROR"))
+        ],
+        group=_GROUP,
+    )
+
+
+def _levels(stamps: Iterable[int], changes: Sequence[AlarmChange], name: str) -> Floats:
+    own = {change.stamp_ns: float(change.alarm.level) for change in changes if change.alarm.name == name}
+    level, levels = 0.0, []
+    for stamp in stamps:
+        level = own.get(stamp, level)
+        levels.append(level)
+    return np.array(levels)
+
+
+def _time(summary: ReplaySummary) -> Series:
+    time, unit = time_of(summary, summary.history.stamp_ns)
+    return Series(name="time", unit=unit, values=time)
+
+
+def _ends(summary: ReplaySummary) -> tuple[float, float]:
+    """Those of the recording, for all charts over time."""
+    stamps = np.array([summary.recording.begin_ns, summary.recording.end_ns], np.int64)
+    begin, end = time_of(summary, stamps)[0].tolist()
+    return begin, max(end, begin + 1.0e-9)
+
+
+def _limit(name: str, unit: str, limit: float, beside: Floats) -> Series:
+    return Series(name=name, unit=unit, values=np.full(len(beside), limit), colour="--bad", style="dashed")
+
+
+def _colour(k: int) -> str:
+    return f"--series-{k % SERIES_COLOURS}"
+
+
+def _greatest(values: Floats, otherwise: float = 0.0) -> float:
+    known = values[np.isfinite(values)]
+    return float(known.max()) if len(known) else otherwise
+
+
+def _least(values: Floats) -> float:
+    return -_greatest(-values, -math.inf)

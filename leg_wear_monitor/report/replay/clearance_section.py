@@ -1,47 +1,89 @@
-"""Clearances as further encoders show them, on the page of a replay."""
+"""Clearances over time and at the end, as counted and as further encoders show them."""
 
-from collections.abc import Mapping
+from leg_wear_monitor.monitor.verdict.verdict import Figure
+from leg_wear_monitor.playback.result.replay_summary import ReplaySummary
+from leg_wear_monitor.report.page import Section
+from leg_wear_monitor.report.parts import Table, Text
+from leg_wear_monitor.report.replay.charts import openings_chart
+from leg_wear_monitor.report.replay.joint_view import counted_mm
+from leg_wear_monitor.report.replay.words import NOT_VALID, not_valid, value
 
-from leg_wear_monitor.playback.result.parts import ReplayJoint
-from leg_wear_monitor.report.page import Section, Table
+_TITLE = "Clearance over time"
 
 
-def clearance_sentences(joints: Mapping[str, ReplayJoint]) -> list[str]:
+def clearance_section(summary: ReplaySummary) -> Section:
+    """Counted clearances."""
+    doubt = not_valid(summary.verdict, Figure.CLEARANCES)
+    if doubt:
+        return Section(_TITLE, [Text(doubt, is_not_valid=True)], is_folded=True)
+    return Section(_TITLE, [openings_chart(summary), _table(summary)], is_folded=True)
+
+
+def _table(summary: ReplaySummary) -> Table:
+    has_growth = Figure.GROWTH not in summary.verdict.not_valid
+    rows = []
+    for name, joint in summary.joints.items():
+        clearance = joint.clearance_m
+        growth = (
+            value(1.0e12, joint.growth_m_per_cycle),
+            value(1.0e12, joint.growth_error_m_per_cycle),
+        )
+        rows.append(
+            (
+                summary.leg.joint_words(name),
+                counted_mm(summary, name),
+                value(1.0e9, clearance.last - clearance.first),
+                *(growth if has_growth else (NOT_VALID, NOT_VALID)),
+            )
+        )
+    return Table(
+        caption="Clearances at the end",
+        head=("joint", "counted clearance [mm]", "opened [nm]", "growth [pm/cycle]", "± [pm/cycle]"),
+        rows=rows,
+        note="Counted: the clearance when new plus the wear counted by the model since, in its "
+        "significant digits. ± is the standard error of the growth; single gait cycles of a chaotic "
+        "motion scatter.",
+    )
+
+
+def clearance_sentences(summary: ReplaySummary) -> list[str]:
     """Joints that surely are not as counted, a sentence each."""
     sentences = []
-    for name, joint in joints.items():
+    for name, joint in summary.joints.items():
         off = joint.seen.departure_m if joint.seen and joint.seen.is_other else None
         if off is not None:
             sentences.append(
-                f"Encoders show that {name} is {1.0e6 * abs(off):.0f} µm "
+                f"Encoders show that {summary.leg.joint_words(name)} is {1.0e6 * abs(off):.0f} µm "
                 f"{'wider' if off > 0.0 else 'narrower'} than counted."
             )
     return sentences
 
 
-def clearance_sections(joints: Mapping[str, ReplayJoint]) -> list[Section]:
+def encoder_sections(summary: ReplaySummary) -> list[Section]:
     """Clearances as further encoders show them, if there are such."""
+    is_counted_leg = Figure.CLEARANCES not in summary.verdict.not_valid
     rows = [
         (
-            name,
-            _millimetres(joint.clearance_m.last),
+            summary.leg.joint_words(name),
+            _millimetres(joint.clearance_m.last) if is_counted_leg else NOT_VALID,
             _millimetres(joint.seen.clearance_m),
             _millimetres(joint.seen.sigma_m),
             "other than counted" if joint.seen.is_other else joint.seen.observation.value,
         )
-        for name, joint in joints.items()
+        for name, joint in summary.joints.items()
         if joint.seen
     ]
     if not rows:
         return []
+    title = "Clearances estimated from encoders"
     table = Table(
-        caption="Clearances estimated from encoders",
+        caption=title,
         head=("joint", "counted [mm]", "estimated [mm]", "± [mm]", ""),
         rows=rows,
         note="Counted: by the law of wear with the nominal coefficient. Estimated: from the angles of "
         "further encoders over the last gait cycles; the standard deviation includes the model error.",
     )
-    return [Section("Clearances estimated from encoders", [table])]
+    return [Section(title, [table], is_folded=True)]
 
 
 def _millimetres(metres: float | None) -> str:

@@ -1,23 +1,42 @@
 """The forecast on the page of a replay: how long each joint and the leg last, and how past forecasts did."""
 
+import math
 from collections.abc import Sequence
 
+import numpy as np
+
 from leg_wear_monitor.monitor.forecast.forecast import JointForecast
-from leg_wear_monitor.monitor.forecast.words import clearance_mm, three_digits
+from leg_wear_monitor.monitor.forecast.validity import validity
+from leg_wear_monitor.monitor.forecast.words import three_digits
 from leg_wear_monitor.monitor.ledger.entry import Measurement
-from leg_wear_monitor.playback.result.parts import LegLife, ReplayJoint
+from leg_wear_monitor.monitor.verdict.verdict import Figure
+from leg_wear_monitor.playback.result.parts import LegLife
 from leg_wear_monitor.playback.result.replay_summary import ReplaySummary
-from leg_wear_monitor.report.figures.validity_picture import validity_picture
-from leg_wear_monitor.report.page import Part, Picture, Section, Table, Text
+from leg_wear_monitor.report.chart import Chart, Panel, Series
+from leg_wear_monitor.report.page import Section
+from leg_wear_monitor.report.parts import Part, Table, Text
+from leg_wear_monitor.report.replay.words import not_valid
 
 FRACTIONS = ("p10", "p50", "p90")
+_MEASURED = ((True, "measured", "--series-0"), (False, "contradicts, not used", "--bad"))
 
 
 def forecast_section(summary: ReplaySummary) -> Section:
     """Section of the page."""
+    doubt = not_valid(summary.verdict, Figure.FORECAST)
+    parts: list[Part] = [Text(sentence) for sentence in leg_sentence(summary)]
+    parts.append(Text(doubt, is_not_valid=True) if doubt else _table(summary))
+    if summary.measurements:
+        parts.append(_validity(summary.measurements))
+    else:
+        parts.append(Text("No clearance was measured yet; one measurement makes the forecast much narrower."))
+    return Section("Forecast", parts, is_folded=True)
+
+
+def _table(summary: ReplaySummary) -> Table:
     leg = summary.forecast
     rows = [
-        (name, _clearance(told), *_lasts(told), _first(leg, name), _answer(told))
+        (summary.leg.joint_words(name), _clearance(told), *_lasts(told), _first(leg, name), _answer(told))
         for name, joint in summary.joints.items()
         if (told := joint.forecast) is not None
     ]
@@ -25,44 +44,31 @@ def forecast_section(summary: ReplaySummary) -> Section:
         rows.append(("leg", "", *_lasts(leg), "", leg.answer.value))
     quantiles = [f"{fraction} [{unit}]" for unit in ("h", "days") for fraction in FRACTIONS]
     head = ("", "clearance [mm]", *quantiles, "first [%]", "")
-    parts: list[Part] = [
-        Table(
-            caption="Hours of walking, and days of duty, until the limit of the mean clearance",
-            head=head,
-            rows=rows,
-            note="p10, p50 and p90 are not exceeded with a probability of 10, 50 and 90 %. "
-            f"A day of duty has {summary.monitor.duty_hours_per_day:g} h of walking. "
-            "Clearance: p10 to p90 of the present clearance. First: probability of this "
-            "joint to be the first at its limit, which ends the leg's life.",
-        )
-    ]
-    if summary.measurements:
-        parts.append(_validity(summary.measurements))
-    else:
-        parts.append(Text("No clearance was measured yet; one measurement makes the forecast much narrower."))
-    return Section("Forecast", parts)
+    return Table(
+        caption="Hours of walking, and days of duty, until the limit of the mean clearance",
+        head=head,
+        rows=rows,
+        note="p10, p50 and p90 are not exceeded with a probability of 10, 50 and 90 %. "
+        f"A day of duty has {summary.monitor.duty_hours_per_day:g} h of walking. "
+        "Clearance: p10 to p90 of the present clearance. First: probability of this "
+        "joint to be the first at its limit, which ends the leg's life.",
+    )
 
 
 def leg_sentence(summary: ReplaySummary) -> list[str]:
     """How long the leg lasts, if that is known."""
     leg = summary.forecast
+    if not_valid(summary.verdict, Figure.FORECAST):
+        return []
     if leg is None or leg.hours is None or leg.first is None:
         return []
     p10, p50, p90 = (_life(leg, fraction) for fraction in FRACTIONS)
     probability = 100.0 * leg.first_probability[leg.first]
+    first = summary.leg.joint_words(leg.first)
     return [
-        f"The leg lasts {p50} (p10 {p10}, p90 {p90}); {leg.first} is the first joint at its "
+        f"The leg lasts {p50} (p10 {p10}, p90 {p90}); {first} is the first joint at its "
         f"limit with a probability of {probability:.0f} %."
     ]
-
-
-def counted_mm(joint: ReplayJoint) -> str:
-    """A joint's counted clearance [mm] in the digits that are known of it."""
-    counted = joint.clearance_m.last
-    if joint.forecast is None:
-        return f"{1.0e3 * counted:.3f}"
-    may_be = joint.forecast.clearance_m
-    return clearance_mm(counted, may_be.p10, may_be.p90)
 
 
 def _life(leg: LegLife, fraction: str) -> str:
@@ -70,14 +76,40 @@ def _life(leg: LegLife, fraction: str) -> str:
     return f"{three_digits(getattr(leg.hours, fraction))} hours of walking{days}"
 
 
-def _validity(measurements: Sequence[Measurement]) -> Picture:
-    return Picture(
-        image=validity_picture(measurements),
-        alt="Each measured clearance in its predicted distribution",
-        caption="Measured clearances of the ledger in the distribution predicted before each. In the long "
-        "run 80 % lie in the shaded band.",
-        wide=True,
+def _validity(measurements: Sequence[Measurement]) -> Chart:
+    """Each measured clearance in the distribution that was predicted before it."""
+    kept = [each for each in measurements if not each.is_withdrawn]
+    kept.sort(key=lambda each: each.cycles)
+    series = [
+        Series(
+            name=f"{joint} {words}",
+            unit="",
+            values=np.array([_below(each, joint, counts) for each in kept]),
+            colour=colour,
+            style="points",
+        )
+        for joint in dict.fromkeys(each.joint for each in kept)
+        for counts, words, colour in _MEASURED
+        if any(each.joint == joint and each.counts is counts for each in kept)
+    ]
+    low, high = (
+        Series(name=name, unit="", values=np.full(len(kept), end), colour="--ink", style="dashed")
+        for name, end in (("p10", 0.1), ("p90", 0.9))
     )
+    title = "Predicted probability of a smaller clearance"
+    return Chart(
+        name="measurements",
+        alt="Each measured clearance in its predicted distribution",
+        caption=f"{validity(measurements).words}. In the long run 80 % lie between p10 and p90.",
+        x=Series(name="gait cycles of the part", unit="", values=np.array([float(m.cycles) for m in kept])),
+        panels=[Panel(title=title, series=[*series, low, high], low=-0.02, high=1.02, height=240)],
+        group="measurements",
+    )
+
+
+def _below(measured: Measurement, joint: str, counts: bool) -> float:
+    is_this = measured.joint == joint and measured.counts is counts
+    return measured.expected_below if is_this else math.nan
 
 
 def _clearance(told: JointForecast) -> str:

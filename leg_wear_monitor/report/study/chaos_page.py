@@ -6,7 +6,8 @@ from typing import cast
 
 import numpy as np
 
-from leg_wear_monitor.report.page import Section, Table
+from leg_wear_monitor.report.page import Section
+from leg_wear_monitor.report.parts import Table
 from leg_wear_monitor.report.study import findings
 from leg_wear_monitor.report.study.chaos_pictures import (
     bifurcation_gallery,

@@ -7,7 +7,7 @@ from matplotlib.axes import Axes
 
 from leg_wear_monitor.mechanism.arrays import Floats
 from leg_wear_monitor.report.figures.figure import BLUE, INK, SMALL, new_figure, png, tidy
-from leg_wear_monitor.report.page import Gallery, Picture
+from leg_wear_monitor.report.parts import Gallery, Picture
 from leg_wear_monitor.report.study.text import Labelled
 from leg_wear_monitor.report.study.trends import MARKS
 from leg_wear_monitor.studies.point import Arrays

@@ -12,7 +12,8 @@ from leg_wear_monitor.mechanism.outline import corners
 from leg_wear_monitor.mechanism.position import Linkage, build_linkage
 from leg_wear_monitor.mechanism.spec import GROUND, Mechanism
 from leg_wear_monitor.report.figures.figure import BODY_COLOURS
-from leg_wear_monitor.report.page import Live, render, template_text
+from leg_wear_monitor.report.page import render, template_text
+from leg_wear_monitor.report.parts import Live
 from leg_wear_monitor.report.study.text import Labelled
 from leg_wear_monitor.studies.point import Arrays
 from leg_wear_monitor.studies.summary import clearance_joints_of

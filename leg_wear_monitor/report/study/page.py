@@ -6,7 +6,8 @@ from collections.abc import Callable
 import attrs
 from ruamel.yaml import YAML
 
-from leg_wear_monitor.report.page import Page, Section, Sentences
+from leg_wear_monitor.report.page import Page, Section
+from leg_wear_monitor.report.parts import Sentences
 from leg_wear_monitor.report.study import findings
 from leg_wear_monitor.report.study.chaos_page import chaos
 from leg_wear_monitor.report.study.sections import (

@@ -4,7 +4,8 @@ from typing import Any
 
 from leg_wear_monitor.report.figures.figure import png
 from leg_wear_monitor.report.figures.leg_picture import leg_picture
-from leg_wear_monitor.report.page import Picture, Section, Sentences, Text
+from leg_wear_monitor.report.page import Section
+from leg_wear_monitor.report.parts import Picture, Sentences, Text
 from leg_wear_monitor.report.study.curves import curve_galleries
 from leg_wear_monitor.report.study.leg_slider import leg_slider
 from leg_wear_monitor.report.study.text import Labelled, error_table, joined, joint_table, wear_table

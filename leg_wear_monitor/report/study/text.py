@@ -4,7 +4,7 @@ import math
 from collections.abc import Sequence
 from typing import NamedTuple
 
-from leg_wear_monitor.report.page import Table
+from leg_wear_monitor.report.parts import Table
 from leg_wear_monitor.studies.point import Arrays
 from leg_wear_monitor.studies.summary import (
     Spread,

@@ -18,7 +18,7 @@ from leg_wear_monitor.report.figures.figure import (
     png,
     tidy,
 )
-from leg_wear_monitor.report.page import Gallery, Picture
+from leg_wear_monitor.report.parts import Gallery, Picture
 from leg_wear_monitor.report.study.text import PICO, QUANTITIES, Labelled
 from leg_wear_monitor.studies.point import Arrays
 from leg_wear_monitor.studies.summary import (

@@ -5,7 +5,8 @@ from collections.abc import Sequence
 import numpy as np
 
 from leg_wear_monitor.report.figures.figure import INK, SMALL, new_figure, png, tidy
-from leg_wear_monitor.report.page import Gallery, Picture, Section, Table
+from leg_wear_monitor.report.page import Section
+from leg_wear_monitor.report.parts import Gallery, Picture, Table
 from leg_wear_monitor.report.study import findings
 from leg_wear_monitor.report.study.sections import Sections, asked, conclude, cycle, wear
 from leg_wear_monitor.report.study.text import (

@@ -9,8 +9,9 @@ from matplotlib.axes import Axes
 from leg_wear_monitor.mechanism.arrays import Floats
 from leg_wear_monitor.mechanism.spec import Mechanism
 from leg_wear_monitor.report.figures.figure import BLUE, INK, PALE, SMALL, VERMILION, new_figure, png, tidy
-from leg_wear_monitor.report.figures.worn_bushings import draw_section, unit_of
-from leg_wear_monitor.report.page import Gallery, Picture
+from leg_wear_monitor.report.figures.units import length_unit
+from leg_wear_monitor.report.figures.worn_bushings import draw_section
+from leg_wear_monitor.report.parts import Gallery, Picture
 from leg_wear_monitor.report.study.text import zone_text
 from leg_wear_monitor.wear.surfaces import BUSHING, JOURNAL, wear_zone
 
@@ -40,7 +41,7 @@ def wear_gallery(mechanism: Mechanism, worn: Sequence[tuple[str, str, Floats]], 
 
 def _picture(mechanism: Mechanism, label: str, joint: str, depth: Floats) -> Picture:
     mean, zone = depth.mean(axis=0), wear_zone(depth.mean(axis=0)[BUSHING])
-    factor, unit = unit_of(float(depth.max()))
+    factor, unit = length_unit(float(depth.max()))
     figure = new_figure(4.8, 4.6)
     grid = figure.add_gridspec(2, 2, height_ratios=(1.25, 1.0))
     section = figure.add_subplot(grid[0, 0], projection="polar")

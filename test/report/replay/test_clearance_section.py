@@ -1,60 +1,67 @@
 """What encoders show, on the page of a replay: a table and a sentence, or nothing at all."""
 
+import attrs
 import pytest
+from made_up_summary import made_up_summary
 
 from leg_wear_monitor.monitor.encoders.clearance_estimate import ClearanceObservation
-from leg_wear_monitor.playback.result.parts import ClearanceChange, ReplayJoint, SeenClearance
-from leg_wear_monitor.report.replay.clearance_section import clearance_sections, clearance_sentences
+from leg_wear_monitor.monitor.verdict.verdict import Figure
+from leg_wear_monitor.playback.result.parts import SeenClearance
+from leg_wear_monitor.report.replay.clearance_section import (
+    clearance_section,
+    clearance_sentences,
+    encoder_sections,
+)
 
 pytestmark = pytest.mark.plain
 
 
-def joint(seen=None):
-    return ReplayJoint(
-        clearance_m=ClearanceChange(3.0e-4, 3.0e-4, 3.0e-4),
-        growth_m_per_cycle=None,
-        growth_error_m_per_cycle=None,
-        growth_mps=None,
-        forecast=None,
-        peak_force_n=None,
-        mean_force_n=None,
-        seen=seen,
-        impacts=0,
-    )
+def summary_with(*figures, **seen):
+    """A summary whose verdict does not believe some figures, its joints A and B as encoders show them."""
+    summary = made_up_summary()
+    joints = {name: attrs.evolve(joint, seen=seen.get(name)) for name, joint in summary.joints.items()}
+    verdict = attrs.evolve(summary.verdict, not_valid=figures)
+    return attrs.evolve(summary, joints=joints, verdict=verdict)
 
 
 def shown(observation, clearance_m=None, departure_m=None, is_other=False):
-    return joint(
-        SeenClearance(
-            observation=observation,
-            clearance_m=clearance_m,
-            sigma_m=2e-5,
-            departure_m=departure_m,
-            believed=True,
-            is_other=is_other,
-        )
+    return SeenClearance(
+        observation=observation,
+        clearance_m=clearance_m,
+        sigma_m=2e-5,
+        departure_m=departure_m,
+        believed=True,
+        is_other=is_other,
     )
 
 
 def test_without_encoders_there_is_nothing_to_say():
-    joints = {"A": joint()}
-    assert clearance_sections(joints) == []
-    assert clearance_sentences(joints) == []
+    assert encoder_sections(summary_with()) == []
+    assert clearance_sentences(summary_with()) == []
 
 
 def test_a_worn_joint_is_named_and_what_is_not_seen_is_said():
-    joints = {
-        "G": shown(ClearanceObservation.SEEN, 4.5e-4, 1.5e-4, True),
-        "A": shown(ClearanceObservation.SEEN, 3.01e-4, 1e-6),
-        "J": shown(ClearanceObservation.NOT_OBSERVABLE),
-    }
-    assert clearance_sentences(joints) == ["Encoders show that G is 150 µm wider than counted."]
-    (section,) = clearance_sections(joints)
+    summary = summary_with(
+        B=shown(ClearanceObservation.SEEN, 4.5e-4, 1.5e-4, True), A=shown(ClearanceObservation.NOT_OBSERVABLE)
+    )
+    assert clearance_sentences(summary) == ["Encoders show that B (knee) is 150 µm wider than counted."]
+    (section,) = encoder_sections(summary)
     (table,) = section.parts
-    assert [row[0] for row in table.rows] == ["G", "A", "J"]
-    assert [row[2] for row in table.rows] == ["0.4500", "0.3010", "-"]
-    assert [row[4] for row in table.rows] == [
-        "other than counted",
-        "seen by encoders",
-        ClearanceObservation.NOT_OBSERVABLE.value,
+    assert table.rows == [
+        ("A", "0.4000", "-", "0.0200", ClearanceObservation.NOT_OBSERVABLE.value),
+        ("B (knee)", "0.4000", "0.4500", "0.0200", "other than counted"),
     ]
+
+
+def test_a_counted_clearance_that_is_not_believed_is_no_number():
+    summary = summary_with(Figure.CLEARANCES, B=shown(ClearanceObservation.SEEN, 4.5e-4))
+    ((table,),) = (section.parts for section in encoder_sections(summary))
+    assert [row[1] for row in table.rows] == ["not valid"]
+    (told,) = clearance_section(summary).parts
+    assert (told.text, told.is_not_valid) == ("not valid: leg differs from its model", True)
+
+
+def test_growth_alone_may_not_be_valid():
+    chart, table = clearance_section(summary_with(Figure.GROWTH)).parts
+    assert [row[3:] for row in table.rows] == [("not valid", "not valid")] * 2
+    assert chart.columns[1].name == "opened by A"

@@ -6,7 +6,7 @@ import attrs
 import numpy as np
 import pytest
 
-from leg_wear_monitor.report.page import Sentences, Table
+from leg_wear_monitor.report.parts import Sentences, Table
 from leg_wear_monitor.report.study import findings
 from leg_wear_monitor.report.study.page import study_page
 from leg_wear_monitor.report.study.text import number, with_spread, zone_text

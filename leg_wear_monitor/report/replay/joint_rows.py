@@ -1,0 +1,171 @@
+"""A row a joint: clearance against limit, remaining life and alarms, on common axes."""
+
+import math
+from collections.abc import Sequence
+
+import attrs
+
+from leg_wear_monitor.monitor.forecast.words import three_digits
+from leg_wear_monitor.monitor.verdict.verdict import Figure
+from leg_wear_monitor.playback.result.condition import LifeHours
+from leg_wear_monitor.playback.result.replay_summary import ReplaySummary
+from leg_wear_monitor.report.page import render
+from leg_wear_monitor.report.parts import Fragment
+from leg_wear_monitor.report.replay.alarm_words import alarm_line
+from leg_wear_monitor.report.replay.banner import LOOKS
+from leg_wear_monitor.report.replay.joint_view import JointView
+
+_SIGMAS = 2.0  # drawn to either side of a seen clearance
+_MOST_LIMITS = 4.0  # length of the clearance axis, in the greatest limit
+_WIDTH = 100.0  # of a bar
+
+
+@attrs.frozen
+class Span:
+    """A part of a bar, from ``x`` on and ``width`` long [% of the bar]."""
+
+    x: float
+    width: float
+
+
+@attrs.frozen
+class ClearanceBar:
+    """Limit, counted clearance, and the one that is seen with what is sure of it; None where not known."""
+
+    limit: Span
+    counted: Span | None = None
+    seen: Span | None = None
+    sure: Span | None = None
+
+
+@attrs.frozen
+class LifeBar:
+    """From p10 to p90, and p50."""
+
+    range: Span
+    median: Span
+
+
+def joint_rows(summary: ReplaySummary, views: Sequence[JointView]) -> Fragment:
+    """The rows as a table."""
+    leg = _leg_life(summary)
+    most_m, life = _most_m(views), _life_axis([*(view.life for view in views), leg])
+    rows = [
+        {
+            "view": view,
+            "clearance": _clearance(view, most_m),
+            "words": _clearance_words(view),
+            "life": _life(view.life, life),
+            "life_words": _hours_words(view.life) if view.life else view.life_words,
+            "findings": _findings(summary, view),
+        }
+        for view in views
+    ]
+    row = {"life": _life(leg, life), "words": _hours_words(leg), "first": _first(summary)} if leg else None
+    return Fragment(render("replay/joints.html", rows=rows, leg=row, note=_note(views, most_m, life)))
+
+
+def _leg_life(summary: ReplaySummary) -> LifeHours | None:
+    return None if Figure.FORECAST in summary.verdict.not_valid else summary.life.get("leg")
+
+
+def _first(summary: ReplaySummary) -> str:
+    """The joint that is probably the first at its limit; empty if that is not known."""
+    leg = summary.forecast
+    if leg is None or leg.first is None:
+        return ""
+    probability = 100.0 * leg.first_probability[leg.first]
+    return f"{summary.leg.joint_words(leg.first)} first at its limit with {probability:.0f} % probability"
+
+
+def _findings(summary: ReplaySummary, view: JointView) -> list[tuple[str, str, str]]:
+    """Symbol, class and words of the verdict if it names the joint, and of the joint's alarms."""
+    alarms = [alarm_line(summary, alarm) for alarm in view.alarms]
+    found = [(alarm.symbol, alarm.look, alarm.short) for alarm in alarms]
+    if view.joint in summary.verdict.joints:
+        symbol, look = LOOKS[summary.verdict.state]
+        found.insert(0, (symbol, look, summary.verdict.state.words.upper()))
+    return found
+
+
+def _most_m(views: Sequence[JointView]) -> float:
+    """End of the clearance axis [m]: all limits and what is seen, unless that is far beyond them."""
+    limits = [view.clearance.limit_m for view in views if view.clearance]
+    greatest = max(limits, default=1.0e-3)
+    ends = [_end_m(view) for view in views if view.clearance]
+    return min(max([1.1 * greatest, *ends]), _MOST_LIMITS * greatest)
+
+
+def _end_m(view: JointView) -> float:
+    counted, seen = view.counted_m or 0.0, view.seen_m or 0.0
+    return 1.02 * max(counted, seen + _SIGMAS * (view.seen_sigma_m or 0.0))
+
+
+def _clearance(view: JointView, most_m: float) -> ClearanceBar | None:
+    if view.clearance is None:
+        return None
+    limit = _span(view.clearance.limit_m, view.clearance.limit_m, most_m)
+    counted = None if view.counted_m is None else _span(0.0, view.counted_m, most_m)
+    if view.seen_m is None:
+        return ClearanceBar(limit, counted)
+    reach = _SIGMAS * (view.seen_sigma_m or 0.0)
+    seen = _span(view.seen_m, view.seen_m, most_m)
+    return ClearanceBar(limit, counted, seen, _span(view.seen_m - reach, view.seen_m + reach, most_m))
+
+
+def _span(low: float, high: float, most: float) -> Span:
+    begin, end = (_WIDTH * min(max(end / most, 0.0), 1.0) for end in (low, high))
+    return Span(round(begin, 2), round(end - begin, 2))
+
+
+def _clearance_words(view: JointView) -> list[tuple[str, str]]:
+    """What is counted and what is seen, each with the class of its words."""
+    counted = ("not-valid", view.doubt) if view.doubt else ("", f"counted {view.counted_words} mm")
+    if view.clearance is None:
+        return [counted]
+    seen = []
+    if view.seen_m is not None:
+        by = " and ".join(view.clearance.seen_by)
+        sigma = 1.0e3 * (view.seen_sigma_m or 0.0)
+        digits = 2 if sigma >= 0.1 else 3
+        seen.append(("", f"seen {1.0e3 * view.seen_m:.{digits}f} ± {sigma:.{digits}f} mm by {by}"))
+    limit = ("", f"limit {1.0e3 * view.clearance.limit_m:.3g} mm")
+    return [*seen, counted, limit] if view.doubt else [counted, *seen, limit]
+
+
+def _life_axis(lives: Sequence[LifeHours | None]) -> tuple[int, int] | None:
+    """Decades of hours from which and to which the life axis goes; None without any life."""
+    hours = [max(end, 1.0) for life in lives if life for end in (life.p10_h, life.p90_h)]
+    if not hours:
+        return None
+    low, high = math.floor(math.log10(min(hours))), math.ceil(math.log10(max(hours)))
+    return low, max(high, low + 1)
+
+
+def _life(hours: LifeHours | None, axis: tuple[int, int] | None) -> LifeBar | None:
+    if hours is None or axis is None:
+        return None
+    low, decades = axis[0], float(axis[1] - axis[0])
+    p10, p50, p90 = (math.log10(max(each, 1.0)) - low for each in attrs.astuple(hours))
+    return LifeBar(_span(p10, p90, decades), _span(p50, p50, decades))
+
+
+def _hours_words(life: LifeHours) -> str:
+    p10, p50, p90 = map(three_digits, attrs.astuple(life))
+    return f"{p50} h; {p10} to {p90} h"
+
+
+def _note(views: Sequence[JointView], most_m: float, life: tuple[int, int] | None) -> str:
+    """How to read the bars."""
+    if not any(view.clearance for view in views):
+        return ""
+    notes = [
+        f"Clearances are radial, all bars from 0 to {1.0e3 * most_m:.3g} mm: blue bar counted, mark seen by "
+        "measurement with two standard deviations, red line limit.",
+    ]
+    if life:
+        notes.append(
+            f"Remaining life in hours of walking, p50 and p10 to p90, on a logarithmic axis from "
+            f"{10 ** life[0]:,} to {10 ** life[1]:,} h."
+        )
+    return " ".join(notes)

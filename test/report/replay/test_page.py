@@ -1,0 +1,234 @@
+"""The page of a replay: the verdict, every alarm unfolded, and no number that is not believed."""
+
+import base64
+import hashlib
+import re
+
+import attrs
+import numpy as np
+import pytest
+from html_reader import read
+from made_up_summary import made_up_summary
+
+from leg_wear_monitor.monitor.alarms.alarm import Level
+from leg_wear_monitor.monitor.verdict.verdict import Figure, State
+from leg_wear_monitor.playback.result.leg import ReplayLeg
+from leg_wear_monitor.playback.result.parts import AlarmChange, WornDepth
+from leg_wear_monitor.report.page import page_html, template_text
+from leg_wear_monitor.report.replay.page import replay_page
+
+pytestmark = pytest.mark.plain
+
+MOST_BYTES = 2_000_000
+
+
+def html_of(summary):
+    return page_html(replay_page(summary))
+
+
+def page_of(summary):
+    return read(html_of(summary))
+
+
+def doubted(*figures, **changes):
+    summary = made_up_summary()
+    return attrs.evolve(summary, verdict=attrs.evolve(summary.verdict, not_valid=figures, **changes))
+
+
+def greyed(page):
+    return page.inside(lambda _, classes: "not-valid" in classes.split())
+
+
+def visible(page):
+    """Texts outside of what is folded, and of scripts and styles."""
+    hidden = {"details", "script", "style", "noscript"}
+    return " ".join(
+        data for places, data in page.places if not hidden & {tag for tag, _ in places} and data.strip()
+    )
+
+
+def test_the_first_screen_has_verdict_joints_belief_and_alarms():
+    text = visible(page_of(made_up_summary()))
+    for words in ("INSPECT", "joint A", "why", "Do", "do", "Can these figures be believed?", "clearance A"):
+        assert words in text
+    assert "Clearance over time" not in text
+
+
+@pytest.mark.parametrize("state", State)
+def test_every_state_has_a_symbol_a_word_and_a_colour(state):
+    page = page_of(doubted(state=state))
+    (banner,) = (place for place in page.of("div") if "banner" in place.get("class", "").split())
+    assert banner["class"].split()[1] in {"fine", "careful", "bad"}
+    (verdict,) = {
+        "".join(part for places, part in page.places if ("p", "verdict") in places).strip() for _ in "1"
+    }
+    assert state.words.upper() in verdict and verdict[0] in "✓◆?▲■"
+
+
+def test_every_raised_alarm_is_unfolded_with_its_level():
+    summary = made_up_summary()
+    alarm = summary.alarms.now[0]
+    names = ["impact_force A", "growth B", "torque_mismatch", "input_rate crank"]
+    raised = tuple(attrs.evolve(alarm, name=name, level=Level.ERROR) for name in names)
+    quiet = attrs.evolve(alarm, name="input_gaps", level=Level.OK)
+    text = visible(page_of(attrs.evolve(summary, alarms=attrs.evolve(summary.alarms, now=(*raised, quiet)))))
+    for name in ("impact_force A", "growth B (knee)", "torque_mismatch", "input_rate crank"):
+        assert f"ERROR {name}" in re.sub(r"\s+", " ", text)
+    assert "ERROR impact_force" in text and "ERROR growth" in text
+    assert "input_gaps" not in text
+
+
+def test_what_the_verdict_does_not_believe_is_greyed_and_no_number():
+    summary = doubted(*Figure, joints=())
+    seen = attrs.evolve(summary.clearances["A"], seen_by=("torque",))
+    clearances = {**summary.clearances, "A": seen}
+    joints = {name: attrs.evolve(joint, seen=None) for name, joint in summary.joints.items()}
+    page = page_of(attrs.evolve(summary, clearances=clearances, joints=joints))
+    told = [data for data in greyed(page) if data.strip()]
+    assert len(told) >= 8
+    assert all(text.strip().startswith("not valid") for text in told)
+    assert not any(character.isdigit() for text in told for character in text)
+    text = visible(page) + " ".join(page.inside(lambda tag, _: tag == "td"))
+    for number in ("0.400 mm", "0.500", "9.00", "1e-", "pm/cycle"):
+        assert number not in text
+    assert not [link for link in page.of("a") if link.get("download") in {"forces.csv", "clearances.csv"}]
+
+
+@pytest.mark.parametrize(
+    ("figure", "file"), [(Figure.CLEARANCES, "clearances.csv"), (Figure.IMPACT_FORCES, "forces.csv")]
+)
+def test_a_chart_of_what_is_believed_is_there_and_else_is_not(figure, file):
+    for invalid in ((), (figure,)):
+        files = [link.get("download") for link in page_of(doubted(*invalid)).of("a")]
+        assert (file in files) is not bool(invalid)
+
+
+def test_a_seen_clearance_is_given_where_the_counted_one_is_not():
+    text = visible(page_of(doubted(*Figure)))
+    assert "seen 0.500 ± 0.010 mm by encoders" in text
+    assert "counted" not in text.partition("Clearances are radial")[0]
+
+
+def test_the_marks_of_the_drawing_say_how_much_of_the_limit_is_used():
+    page = page_of(doubted())
+    (drawing,) = (svg for svg in page.of("svg") if svg.get("role") == "img")
+    assert drawing["aria-label"] == "The leg leg: joint A 33 % used; joint B (knee) 33 % used"
+    (drawing,) = (svg for svg in page_of(doubted(*Figure)).of("svg") if svg.get("role") == "img")
+    assert drawing["aria-label"] == "The leg leg: joint A 67 % used; joint B (knee) not valid"
+
+
+def test_a_summary_without_the_leg_s_shape_has_a_page():
+    page = page_of(attrs.evolve(made_up_summary(), leg=ReplayLeg()))
+    assert "does not contain the leg's shape" in visible(page)
+
+
+def test_whatever_the_names_are_they_stay_texts():
+    summary, evil = made_up_summary(), "</script><b onclick=x>&\"'"
+    joints = {name: attrs.evolve(joint, label=evil) for name, joint in summary.leg.joints.items()}
+    alarm = attrs.evolve(summary.alarms.now[0], name=f"clearance {evil}")
+    strange = attrs.evolve(
+        summary,
+        leg=attrs.evolve(summary.leg, joints=joints),
+        monitor=attrs.evolve(summary.monitor, hardware_id=evil, mechanism=evil),
+        verdict=attrs.evolve(summary.verdict, why=evil, do=evil, joints=(evil,), not_valid=()),
+        alarms=attrs.evolve(summary.alarms, now=(alarm,), changes=(AlarmChange(stamp_ns=4, alarm=alarm),)),
+    )
+    plain, page = page_of(doubted()), page_of(strange)
+    assert {tag for tag, _ in page.elements} == {tag for tag, _ in plain.elements}
+    assert not any("onclick" in attributes for _, attributes in page.elements)
+    assert len(page.of("script")) == len(plain.of("script"))
+
+
+def test_only_the_page_s_own_scripts_may_run_and_nothing_is_fetched():
+    html = html_of(doubted())
+    page = read(html)
+    (policy,) = (meta["content"] for meta in page.of("meta") if "http-equiv" in meta)
+    allowed = re.search(r"script-src (.*)$", policy)[1].split()
+    scripts = re.findall(r"<script>(.*?)</script>", html, re.DOTALL)
+    digests = (hashlib.sha256(script.encode()).digest() for script in scripts)
+    assert allowed == [f"'sha256-{base64.b64encode(digest).decode()}'" for digest in digests]
+    assert len(scripts) == 2 and policy.startswith("default-src 'none';")
+    for element, attributes in page.elements:
+        for name in ("src", "href"):
+            assert attributes.get(name, "data:").startswith(("data:", "#")), element
+        assert not any(name.startswith("on") for name in attributes), element
+    for library in ("uplot/uPlot.iife.min.js", "uplot/uPlot.min.css"):
+        html = html.replace(template_text(library), "")
+    assert "http:" not in html and "https:" not in html and "@import" not in html
+
+
+def test_the_longest_page_of_many_joints_is_small():
+    rows, joints = 1000, [f"J{k}" for k in range(12)]
+    summary, noise = doubted(), np.random.default_rng(5)
+    history = attrs.asdict(summary.history, recurse=False)
+    columns = {
+        name: {joint: noise.normal(size=rows) for joint in joints}
+        if isinstance(column, dict)
+        else noise.normal(size=rows)
+        for name, column in history.items()
+    } | {"stamp_ns": summary.recording.begin_ns + np.arange(rows) * 10**12}
+    alarm = summary.alarms.now[0]
+    changes = tuple(
+        AlarmChange(stamp_ns=10**15 * k, alarm=attrs.evolve(alarm, name=f"clearance {joints[k % 12]}"))
+        for k in range(10_000)
+    )
+    depths = {joint: WornDepth(noise.random(360), noise.random(360)) for joint in joints}
+    big = attrs.evolve(
+        summary,
+        monitor=attrs.evolve(summary.monitor, clearance_joints=tuple(joints)),
+        joints=dict.fromkeys(joints, summary.joints["A"]),
+        clearances=dict.fromkeys(joints, summary.clearances["A"]),
+        history=attrs.evolve(summary.history, **columns),
+        alarms=attrs.evolve(summary.alarms, changes=changes),
+        wear_depth_m=depths,
+    )
+    assert 500_000 < len(html_of(big).encode()) < MOST_BYTES
+
+
+def test_equal_summaries_give_equal_bytes():
+    assert html_of(made_up_summary()) == html_of(made_up_summary())
+
+
+# --- colours ---
+
+
+def palettes():
+    """Colours by their variables, light and dark."""
+    css = template_text("page.css").partition("@media")[0] + template_text("replay/replay.css")
+    light, _, rest = css.partition("@media screen and (prefers-color-scheme: dark)")
+    dark = rest[: rest.index("}")]
+    found = re.compile(r"--([a-z0-9-]+): (#[0-9a-f]{6})")
+    palette = dict(found.findall(light))
+    return {"light": palette, "dark": palette | dict(found.findall(dark))}
+
+
+def luminance(colour):
+    """Relative luminance, WCAG 2.2."""
+    parts = (int(colour[k : k + 2], 16) / 255.0 for k in (1, 3, 5))
+    linear = (part / 12.92 if part <= 0.04045 else ((part + 0.055) / 1.055) ** 2.4 for part in parts)
+    return sum(weight * part for weight, part in zip((0.2126, 0.7152, 0.0722), linear, strict=True))
+
+
+def contrast(one, other):
+    light, dark = sorted((luminance(one), luminance(other)), reverse=True)
+    return (light + 0.05) / (dark + 0.05)
+
+
+@pytest.mark.parametrize("name", ["light", "dark"])
+def test_texts_and_curves_stand_out_from_their_ground(name):
+    palette = palettes()[name]
+    assert luminance(palette["paper"]) > 0.9 or name == "dark"
+    for ground in ("paper", "wash"):
+        for text in ("ink", "soft", "fine", "careful", "bad", "grey", "blue"):
+            assert contrast(palette[text], palette[ground]) >= 4.5, (text, ground)
+    for k in range(7):
+        assert contrast(palette[f"series-{k}"], palette["paper"]) >= 3.0, k
+    for look in ("fine", "careful", "bad"):
+        fill = re.search(
+            rf"\.banner\.{look} {{[^}}]*--fill: (#[0-9a-f]{{6}})", template_text("replay/replay.css")
+        )
+        assert contrast(fill[1], "#ffffff") >= 4.5
+
+
+def test_black_on_white_has_the_greatest_contrast():
+    assert contrast("#000000", "#ffffff") == pytest.approx(21.0)

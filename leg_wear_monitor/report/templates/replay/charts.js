@@ -158,7 +158,12 @@
   const drawAll = () => document.querySelectorAll("figure.chart").forEach(draw);
   const resize = (width) => charts.forEach((chart) => chart.plots.forEach((plot) =>
     plot.setSize({ width: width || chart.box.clientWidth || plot.width, height: plot.height })));
-  const redraw = () => charts.forEach((chart) => chart.plots.forEach((plot) => plot.redraw(false)));
+  const redraw = () => charts.forEach((chart) => chart.plots.forEach((plot) => {
+    plot.root.querySelectorAll(".u-marker").forEach((marker, k) => {
+      if (k) marker.style.borderColor = plot.series[k].stroke(plot, k);
+    });
+    plot.redraw(false);
+  }));
 
   const folded = Array.from(document.querySelectorAll("details"));
   folded.forEach((details) => details.addEventListener("toggle", drawAll));

@@ -67,6 +67,16 @@ def test_impacts_tell_averages_from_instants_at_one_cadence(
     assert "odds" in found.why
 
 
+def test_a_change_of_cadence_between_averages_is_not_taken_for_instants(
+    ideal_walk: Callable[..., Walk], judged: Callable[[Walk], Sampling]
+) -> None:
+    walk = ideal_walk(40.0, 75.0)
+    # a smoothed motion lags behind a sudden change, and with it the leg's torque
+    change = 8.0 * np.exp(-(((walk.time_s - 15.0) / 0.15) ** 2))
+    hit = walk.torque_nm + change + impacts(walk, 5.0, "average", 7)
+    assert judged(Walk(walk.time_s, walk.angle_rad, hit)).value == "average"
+
+
 def test_the_sample_recording_has_averages(walked: Walk, judged: Callable[[Walk], Sampling]) -> None:
     assert judged(walked).value == "average"
 

@@ -13,7 +13,7 @@ import numpy as np
 from leg_wear_monitor.commissioning.evidence.noise import sensor_noise
 from leg_wear_monitor.commissioning.evidence.timing import lag_error_s, separates_lag
 from leg_wear_monitor.commissioning.fit.fit import Fit
-from leg_wear_monitor.commissioning.series.pairing import slow_speed
+from leg_wear_monitor.commissioning.series.pairing import is_steady, slow_speed
 from leg_wear_monitor.commissioning.torque_model import TorqueModel
 from leg_wear_monitor.mechanism.arrays import Floats
 from leg_wear_monitor.mechanism.ideal import TURN
@@ -138,13 +138,18 @@ def added_up(rest: Floats, noise: float, half: int) -> tuple[float, float]:
 
 
 def _rest(one: Fit, model: TorqueModel) -> Floats:
-    """What of each torque sample is neither the ideal leg's, nor slow and repeating (n,)."""
+    """What of each torque sample is neither the ideal leg's, nor slow and repeating (n,).
+
+    Without changes of the speed, at which the smoothed motion and so the leg's torque are off for a while.
+    """
     angle, speed, acceleration = one.crank()
     rest: Floats = one.pair.torque - one.gain * model.torque(angle, speed, acceleration)[0]
     waves = np.outer(np.arange(_HARMONICS + 1.0), angle)
     still = np.concatenate([np.cos(waves), np.sin(waves[1:])])
     square = (slow_speed(one.pair) * one.ratio) ** 2
     by = np.concatenate([still, still * (square / square.mean())])
+    steady = is_steady(one.pair)
+    by, rest = by[:, steady], rest[steady]
     # columns are alike at one cadence; few of them, so that the normal equations save most of the time
     coefficients = np.linalg.pinv(by @ by.T, rcond=_SINGULAR, hermitian=True) @ (by @ rest)
     return np.asarray(rest - coefficients @ by)

@@ -77,6 +77,14 @@ def slow_speed(pair: Pair) -> Floats:
     return np.asarray((total[after] - total[before]) / (after - before))
 
 
+def is_steady(pair: Pair) -> NDArray[np.bool_]:
+    """Where the speed without its ripple is about the same half a second before and after (n,)."""
+    speed, at = slow_speed(pair), np.arange(len(pair.time_s))
+    half = round(0.5 * _SLOW_S / max(pair.interval_s, 1.0e-6))
+    before, after = np.maximum(at - half, 0), np.minimum(at + half, len(at) - 1)
+    return np.asarray(np.abs(speed[after] - speed[before]) <= _STEADY * np.abs(speed))
+
+
 def steady_stretch(pair: Pair) -> Pair:
     """Longest stretch at one speed, in one direction, in one recording."""
     speed = slow_speed(pair)

@@ -1,35 +1,23 @@
 """The monitor: samples in, reports out; the live node and replay use the same code."""
 
-import attrs
 import numpy as np
 from numpy.typing import NDArray
 
 from leg_wear_monitor.errors import LegWearError
 from leg_wear_monitor.mechanism.arrays import Floats
 from leg_wear_monitor.mechanism.spec import Mechanism
-from leg_wear_monitor.monitor.accounting import Accounting
 from leg_wear_monitor.monitor.alarms.alarm import Alarm
-from leg_wear_monitor.monitor.config.fitting import check_limits, fitted, twin_settings
+from leg_wear_monitor.monitor.config.fitting import check_limits
 from leg_wear_monitor.monitor.config.settings import MonitorConfig
-from leg_wear_monitor.monitor.cycle_report import cycle_report, with_forecast
-from leg_wear_monitor.monitor.diagnosis.diagnosis import Diagnosis, DiagnosisState
-from leg_wear_monitor.monitor.diagnosis.observer import TorqueObserver
-from leg_wear_monitor.monitor.encoders.clearance_estimate import ClearanceEstimate
-from leg_wear_monitor.monitor.encoders.observer import EncoderObserver
-from leg_wear_monitor.monitor.evaluation.evaluation import AlarmEvaluation
-from leg_wear_monitor.monitor.evaluation.evaluation_period import A_CYCLE, EvaluationPeriods
-from leg_wear_monitor.monitor.evaluation.specs import MISMATCH
-from leg_wear_monitor.monitor.evaluation.torque_record import TorqueRecord
-from leg_wear_monitor.monitor.forecast.forecaster import Forecaster
-from leg_wear_monitor.monitor.forecast.growth import GrowthWindow, extended
+from leg_wear_monitor.monitor.cycle_report import with_forecast
+from leg_wear_monitor.monitor.diagnosis.diagnosis import Diagnosis
+from leg_wear_monitor.monitor.evaluation.evaluation_period import EvaluationPeriods
 from leg_wear_monitor.monitor.forecast.measurement import MeasurementResult
-from leg_wear_monitor.monitor.forecast.model_error import model_error
-from leg_wear_monitor.monitor.forecast_update import update_forecast
-from leg_wear_monitor.monitor.inputs.guard import InputGuard
-from leg_wear_monitor.monitor.judgement import Judge
-from leg_wear_monitor.monitor.ledger.entry import Audit, CommissionedTorque, JointWear, Measurement
+from leg_wear_monitor.monitor.ledger.entry import Audit, JointWear, Measurement
 from leg_wear_monitor.monitor.ledger.file import LedgerError
 from leg_wear_monitor.monitor.ledger.ledger import Ledger
+from leg_wear_monitor.monitor.parts import Parts
+from leg_wear_monitor.monitor.processing import Processing
 from leg_wear_monitor.monitor.reports import (
     AlarmList,
     CycleReport,
@@ -41,16 +29,10 @@ from leg_wear_monitor.monitor.reports import (
     lost,
 )
 from leg_wear_monitor.monitor.resets import last_reset
-from leg_wear_monitor.monitor.state import MonitorSnapshot, MonitorState
+from leg_wear_monitor.monitor.state import MonitorSnapshot
 from leg_wear_monitor.monitor.status import statuses
-from leg_wear_monitor.monitor.torque_causes.explainer import TorqueExplainer
-from leg_wear_monitor.twin.digital_twin import DigitalTwin
 from leg_wear_monitor.twin.sample import GAIT_SAMPLE, Samples
-from leg_wear_monitor.twin.statistics import CycleStatistics, joined
-
-WRONG_TORQUE = "the drive torque is wrong as received, see the status torque"
-ACCELERATED = "wear is accelerated: clearances grow within the gait cycles that are compared"
-_KEPT_EVENTS = 1
+from leg_wear_monitor.twin.statistics import joined
 
 
 class WearMonitor:
@@ -83,52 +65,17 @@ class WearMonitor:
     def __init__(
         self, mechanism: Mechanism, config: MonitorConfig | None = None, ledger: Ledger | None = None
     ) -> None:
-        self.config = config or MonitorConfig()
-        self.mechanism = fitted(mechanism, self.config)
-        self.clearance_joints = self.mechanism.clearance_joints
-        self._twin = DigitalTwin(self.mechanism, twin_settings(self.config))
-        self._guard = InputGuard(self._twin.settings.tracker)
-        self._accounting = Accounting(self._twin, ledger, self.config.ledger)
-        cycle_ns = round(60.0e9 / abs(self.config.cadence.commanded_rpm))
-        self._evaluation = AlarmEvaluation(self._twin, self.config, cycle_ns, self._guard)
-        self._forecaster = Forecaster(
-            self.mechanism,
-            self.config.forecast,
-            ledger.measurements if ledger else (),
-            [part.replaced_ns for part in self._accounting.state.parts],
-        )
-        self._encoders = (
-            EncoderObserver(self.mechanism, self.config, ledger.commissioned if ledger else None)
-            if self.config.encoders.names
-            else None
-        )
-        self._torque = (
-            TorqueObserver(
-                self.mechanism,
-                self.config,
-                self._twin.torque_size_nm,
-                self._twin.clearance_mean_m,
-                ledger.commissioned_torque if ledger else None,
-            )
-            if self.config.diagnosis.enabled and self.config.wear_acceleration == 1.0
-            else None
-        )
-        self._explainer = TorqueExplainer(self.mechanism)
-        self._judge = Judge(
-            self._twin,
-            self._evaluation,
-            self._encoders,
-            self._forecaster,
-            self._accounting,
-            lambda: self.diagnosis,
-        )
-        if ledger and ledger.entry:
-            self._evaluation.board.restore(ledger.entry.alarms)
-        speed = self._twin.settings.tracker.commanded_speed_radps
-        self._model_error = model_error(self.mechanism, speed, self.config.wear_acceleration)
-        self._evaluation_periods = EvaluationPeriods(cycle_ns // A_CYCLE)
-        kept = TorqueRecord.of(self._accounting.state.commissioned)
-        self._state = MonitorState(tuple(GrowthWindow() for _ in self.clearance_joints), kept)
+        self._parts = parts = Parts(mechanism, config or MonitorConfig(), ledger)
+        self._processing = Processing(parts)
+        self.mechanism, self.clearance_joints = parts.mechanism, parts.clearance_joints
+        self._twin, self._guard, self._accounting = parts.twin, parts.guard, parts.accounting
+        self._evaluation, self._forecaster = parts.evaluation, parts.forecaster
+        self._encoders, self._torque = parts.encoders, parts.torque
+
+    @property
+    def config(self) -> MonitorConfig:
+        """The present parameters."""
+        return self._parts.config
 
     def warm_up(self) -> None:
         """Compile all kernels that `update` needs, before the first sample; takes about a minute once."""
@@ -153,15 +100,12 @@ class WearMonitor:
         cycles: list[CycleReport] = []
         changes: list[AlarmList] = []
         verdicts: list[VerdictReport] = []
-        for piece, ends_period in self._evaluation_periods.pieces(samples):
-            reports, ended = self._take(piece, changes)
+        for piece, ends_period in self._parts.evaluation_periods.pieces(samples):
+            reports, ended = self._processing.take(piece, changes)
             sampled.append(reports)
             cycles += ended
             if ends_period:
-                self._add_changes(self._evaluation.end_period(self._accounting.state.skipped), changes)
-                self._observe_encoders()
-                self._observe_torque()
-                verdicts += self._judge.changed(self._state)
+                verdicts += self._processing.end_period(changes)
             self._accounting.keep_if_due(self._evaluation.board.alarms.values())
         samples_ = joined(sampled, len(self.clearance_joints))
         return Reports(samples_, tuple(cycles), tuple(changes), self.lost, tuple(verdicts))
@@ -185,7 +129,7 @@ class WearMonitor:
     @property
     def verdict(self) -> VerdictReport:
         """The verdict now; `update` reports its changes at the ends of evaluation periods."""
-        return self._judge.report(self._state)
+        return self._parts.judge.report(self._parts.state)
 
     @property
     def clearance_limits_m(self) -> tuple[float, ...]:
@@ -195,15 +139,7 @@ class WearMonitor:
     @property
     def diagnosis(self) -> Diagnosis:
         """What the drive torque shows of the clearances; nothing while it is wrong as received."""
-        if self._torque:
-            found = self._torque.diagnosis
-            if not self._is_torque_wrong:
-                return found
-            settled = tuple(change for change in found.changes if change.is_corrected)
-            return Diagnosis(state=DiagnosisState.WAITING, reason=WRONG_TORQUE, changes=settled)
-        return Diagnosis(
-            reason=ACCELERATED if self.config.diagnosis.enabled else "diagnosis.enabled is false"
-        )
+        return self._parts.diagnosis
 
     @property
     def lost(self) -> Lost:
@@ -254,11 +190,11 @@ class WearMonitor:
         if self._torque:
             self._torque.begin_epoch()
         self._accounting.note(Audit(stamp_ns, who, "new_epoch"))
-        self._keep()
+        self._parts.keep()
 
     def status(self) -> tuple[Status, ...]:
         """Statuses for /diagnostics; their names and order are constant."""
-        state = self._state
+        state = self._parts.state
         return statuses(
             self._twin,
             self._evaluation,
@@ -272,6 +208,14 @@ class WearMonitor:
             state.mismatch.explanation,
         )
 
+    def snapshot(self) -> MonitorSnapshot:
+        """A copy of the whole state, except for the ledger's."""
+        return self._parts.snapshot()
+
+    def restore(self, snapshot: MonitorSnapshot) -> None:
+        """Restore a snapshot of a monitor with the same mechanism and parameters, bit for bit."""
+        self._parts.restore(snapshot)
+
     def configure(self, config: MonitorConfig) -> None:
         """Apply parameters that may change while the monitor runs; see `parameters.changed`.
 
@@ -281,7 +225,7 @@ class WearMonitor:
             For limits that do not fit the mechanism; then nothing changes.
         """
         check_limits(config, self.mechanism)
-        self.config = config
+        self._parts.config = config
         self._evaluation.configure(config)
         if self._encoders:
             self._encoders.config = config
@@ -299,9 +243,9 @@ class WearMonitor:
         cleared, kept = self._evaluation.board.acknowledge()
         self._accounting.state.cut_off_s = None
         self._accounting.note_alarms(AlarmList(stamp_ns, self.alarms.alarms))
-        self._judge.changed(self._state)
+        self._parts.judge.changed(self._parts.state)
         if cleared or kept:
-            self._keep()
+            self._parts.keep()
         return cleared, kept
 
     def reset_wear(self, joint: str, stamp_ns: int, who: str) -> None:
@@ -313,9 +257,9 @@ class WearMonitor:
             For a joint without clearance.
         """
         was = self._accounting.replace(joint, stamp_ns)
-        self._part_changed(joint, stamp_ns)
+        self._processing.part_changed(joint, stamp_ns)
         self._accounting.note(Audit(stamp_ns, who, "reset_wear", was))
-        self._keep()
+        self._parts.keep()
 
     def undo_reset(self, joint: str, stamp_ns: int, who: str) -> JointWear:
         """Undo the last `reset_wear` of a joint whose part was not replaced.
@@ -332,20 +276,10 @@ class WearMonitor:
         """
         reset = last_reset(self._accounting.ledger, joint, self._accounting.wear_of(joint))
         since = self._accounting.put_back(joint, reset.before)
-        self._part_changed(joint, reset.before.replaced_ns)
+        self._processing.part_changed(joint, reset.before.replaced_ns)
         self._accounting.note(Audit(stamp_ns, who, "undo_reset", since, undoes=reset.id))
-        self._keep()
+        self._parts.keep()
         return self._accounting.wear_of(joint)
-
-    def _part_changed(self, joint: str, replaced_ns: int) -> None:
-        """Discard the growth and the estimates of the former part."""
-        k, growth = self.clearance_joints.index(joint), self._state.growth
-        self._state.growth = (*growth[:k], GrowthWindow(), *growth[k + 1 :])
-        self._forecaster.replaced(joint, replaced_ns)
-        if self._encoders:
-            self._encoders.replaced()
-        if self._torque:
-            self._torque.replaced(self._twin.clearance_mean_m)
 
     def measure(
         self, joint: str, clearance_m: float, sigma_m: float, stamp_ns: int, who: str, accept: bool = False
@@ -381,7 +315,7 @@ class WearMonitor:
         self._accounting.note(found.measurement)
         if self._encoders:
             self._encoders.state.updated_ns = 0  # the next estimate updates the forecast again
-        self._keep()
+        self._parts.keep()
         return found
 
     def renew_forecast(self) -> CycleReport | None:
@@ -392,17 +326,19 @@ class WearMonitor:
         CycleReport or None
             The last gait cycle with the new forecast; None before the first.
         """
-        last = self._state.last
+        last = self._parts.state.last
         if last is None:
             return None
         fresh = [self.mechanism.clearances[joint].radial_clearance for joint in self.clearance_joints]
         worn_m = np.asarray(self._twin.clearance_mean_m - fresh)
         limits = self._evaluation.board.clearance_limits_m
-        self._state.last = with_forecast(
+        self._parts.state.last = with_forecast(
             last,
-            self._forecaster.renewed(worn_m, limits, self._judge.is_forecast_valid(self.verdict.findings)),
+            self._forecaster.renewed(
+                worn_m, limits, self._parts.judge.is_forecast_valid(self.verdict.findings)
+            ),
         )
-        return self._state.last
+        return self._parts.state.last
 
     def save(self) -> None:
         """Write an entry into the ledger now.
@@ -415,7 +351,7 @@ class WearMonitor:
         ledger = self._accounting.ledger
         if ledger is None:
             raise LegWearError("no ledger is kept; set ledger.path")
-        if not self._keep():
+        if not self._parts.keep():
             raise LegWearError(ledger.fault or "the ledger is written at the end of the recording")
 
     def close(self) -> None:
@@ -429,9 +365,9 @@ class WearMonitor:
         ledger = self._accounting.ledger
         if ledger is None:
             return
-        if self._state.findings:
-            self._judge.changed(self._state)
-        kept = self._keep(closed=True)
+        if self._parts.state.findings:
+            self._parts.judge.changed(self._parts.state)
+        kept = self._parts.keep(closed=True)
         ledger.close()
         if ledger.at_end and not kept:
             raise LedgerError(f"{ledger.path}: {ledger.fault}; nothing of this run is in it")
@@ -450,161 +386,3 @@ class WearMonitor:
     def is_all_counted(self) -> bool:
         """Whether there were samples, and the ledger already contained the wear of all of them."""
         return self._accounting.state.skipped > 0 and not self._accounting.state.spans
-
-    def snapshot(self) -> MonitorSnapshot:
-        """A copy of the whole state, except for the ledger's."""
-        return MonitorSnapshot(
-            self._twin.snapshot(),
-            attrs.evolve(self._state),
-            attrs.evolve(self._accounting.state),
-            attrs.evolve(self._evaluation.state),
-            attrs.evolve(self._forecaster.state),
-            self._evaluation.board.alarms,
-            self._evaluation_periods.state.copy(),
-            self._guard.snapshot(),
-            self._encoders.snapshot() if self._encoders else None,
-            self._torque.snapshot() if self._torque else None,
-        )
-
-    def restore(self, snapshot: MonitorSnapshot) -> None:
-        """Restore a snapshot of a monitor with the same mechanism and parameters, bit for bit."""
-        self._twin.restore(snapshot.twin)
-        self._state = attrs.evolve(snapshot.state)
-        self._accounting.state = attrs.evolve(snapshot.accounting)
-        self._evaluation.state = attrs.evolve(snapshot.evaluation)
-        self._forecaster.state = attrs.evolve(snapshot.forecast)
-        self._evaluation.board.alarms = snapshot.alarms
-        self._evaluation_periods.state[:] = snapshot.evaluation_periods
-        self._guard.restore(snapshot.guard)
-        if self._encoders and snapshot.encoders:
-            self._encoders.restore(snapshot.encoders)
-        if self._torque and snapshot.torque:
-            self._torque.restore(snapshot.torque)
-
-    def _keep(self, closed: bool = False) -> bool:
-        return self._accounting.keep(self._evaluation.board.alarms.values(), closed)
-
-    def _take(self, piece: Samples, changes: list[AlarmList]) -> tuple[SampleReports, list[CycleReport]]:
-        """Process a piece of an evaluation period, and evaluate the gait cycles that end in it."""
-        piece = self._guard.checked(self._accounting.not_counted(piece))
-        update = self._twin.update(piece)
-        self._evaluation.add_samples(piece)
-        if self._encoders:
-            self._encoders.add_samples(piece)
-        if self._torque:
-            self._torque.add_samples(piece)
-        self._accounting.followed(update.samples)
-        self._state.happened = (*self._state.happened, *update.events)[-_KEPT_EVENTS:]
-        cycles: list[CycleReport] = []
-        for statistics in update.cycles:
-            if self._encoders:
-                self._encoders.ended(statistics)
-            if self._torque:
-                self._torque.ended(statistics)
-            cycles.append(self._report(statistics))
-            self._add_changes(self._evaluation.end_cycle(cycles[-1], self._state.torque), changes)
-            self._explain_mismatch(statistics)
-            self._keep_torque(statistics, cycles[-1])
-        return update.samples, cycles
-
-    def _report(self, statistics: CycleStatistics) -> CycleReport:
-        """Report of a gait cycle."""
-        state, accounting = self._state, self._accounting
-        accounting.state.cycles += 1
-        state.growth = tuple(
-            extended(window, float(growth), statistics.moving_s, self.config.growth.window_cycles)
-            for window, growth in zip(state.growth, statistics.growth_mean_m, strict=True)
-        )
-        estimates = self._clearance_estimates(statistics)
-        limits = self._evaluation.board.clearance_limits_m
-        forecast = self._forecaster.after(
-            statistics,
-            self._worn_m(statistics),
-            limits,
-            lambda: self._judge.is_forecast_valid(state.findings),
-        )
-        state.last = cycle_report(
-            statistics,
-            accounting.state.cycles,
-            self.clearance_joints,
-            state.growth,
-            self._model_error,
-            forecast,
-            estimates,
-        )
-        accounting.note_clearances(state.last)
-        return state.last
-
-    @property
-    def _is_torque_wrong(self) -> bool:
-        """Whether drive torque or crank angle are wrong as received, by what explains a mismatch."""
-        explained = self._state.mismatch.explanation
-        return explained is not None and explained.is_input_fault
-
-    def _explain_mismatch(self, statistics: CycleStatistics) -> None:
-        """Look for causes of a torque mismatch after a gait cycle."""
-        max_friction_nm = self._evaluation.torque_bounds.max_friction_nm
-        self._state.mismatch = self._state.mismatch.with_cycle(
-            statistics,
-            self._evaluation.board.alarms[MISMATCH.name()],
-            lambda cycles: self._explainer.explanation(
-                cycles, self.config, self._twin.settings, max_friction_nm
-            ),
-        )
-
-    def _keep_torque(self, statistics: CycleStatistics, report: CycleReport) -> None:
-        """Record the torque of a gait cycle if it is as predicted."""
-        is_sound = self._evaluation.is_torque_sound(report)
-        self._state.torque = self._state.torque.with_cycle(statistics, report, is_sound)
-        self._accounting.state.commissioned = self._state.torque.totals
-
-    def _observe_encoders(self) -> None:
-        if self._encoders:
-            new = self._encoders.end_period(self._twin.clearance_mean_m, self._twin.depth)
-            if new:
-                self._accounting.note(new)
-
-    def _observe_torque(self) -> None:
-        """Compare the drive torque with that of the counted leg, and correct what is surely counted wrong."""
-        if not self._torque:
-            return
-        before = self._torque.state.commissioned
-        correction = self._torque.end_period(self._twin.clearance_mean_m, self._twin.depth)
-        if correction is None or self._is_torque_wrong:
-            self._note_commissioned(before)
-            return
-        joint = self.clearance_joints[correction.joint]
-        was = self._accounting.correct(joint, correction.clearance_m)
-        self._torque.corrected(correction, self._twin.clearance_mean_m)
-        self._note_commissioned(before)
-        self._accounting.note(
-            Audit(self._twin.intake.followed_stamp_ns, "diagnosis", "correct_clearance", was)
-        )
-        growth, k = self._state.growth, correction.joint
-        self._state.growth = (*growth[:k], GrowthWindow(), *growth[k + 1 :])
-        self._keep()
-
-    def _note_commissioned(self, before: CommissionedTorque | None) -> None:
-        """Store the signature of the leg that was commissioned since."""
-        now = self._torque.state.commissioned if self._torque else None
-        if now is not None and now is not before:
-            self._accounting.note(now)
-
-    def _clearance_estimates(self, statistics: CycleStatistics) -> tuple[ClearanceEstimate, ...] | None:
-        """Clearances estimated from encoders; they update the forecast."""
-        if not self._encoders:
-            return None
-        replaced_ns = [part.replaced_ns for part in self._accounting.state.parts]
-        return update_forecast(
-            self._encoders, self._forecaster, statistics, self._worn_m(statistics), replaced_ns
-        )
-
-    def _worn_m(self, statistics: CycleStatistics) -> Floats:
-        """Wear of each part at the end of a gait cycle; the twin itself may be ahead."""
-        fresh = [self.mechanism.clearances[joint].radial_clearance for joint in self.clearance_joints]
-        return np.asarray(statistics.clearance_mean_m - fresh)
-
-    def _add_changes(self, changed: tuple[AlarmList, ...], changes: list[AlarmList]) -> None:
-        for change in changed:
-            changes.append(change)
-            self._accounting.note_alarms(change)

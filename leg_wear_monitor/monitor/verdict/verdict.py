@@ -10,7 +10,16 @@ import attrs
 from leg_wear_monitor.monitor.alarms.alarm import Level
 
 
-class State(Enum):
+class _Word(Enum):
+    """Members whose value is the word that files contain."""
+
+    @property
+    def words(self) -> str:
+        """The word as operators read it."""
+        return str(self.value).replace("_", " ")
+
+
+class State(_Word):
     """State of the leg, from the mildest to the most severe; the value is the word that files contain.
 
     A leg that is not monitored is worse than one to be watched, and milder than one to be inspected: a reason
@@ -28,24 +37,14 @@ class State(Enum):
         """Rank in the order above, from 0."""
         return list(State).index(self)
 
-    @property
-    def words(self) -> str:
-        """The state as operators read it."""
-        return self.value.replace("_", " ")
 
-
-class Figure(Enum):
+class Figure(_Word):
     """Values that may not hold; the value is the word that files contain."""
 
     CLEARANCES = "clearances"
     GROWTH = "growth"
     IMPACT_FORCES = "impact_forces"
     FORECAST = "forecast"
-
-    @property
-    def words(self) -> str:
-        """The figure as operators read it."""
-        return self.value.replace("_", " ")
 
 
 def _known(value: float | None) -> float | None:

@@ -1,0 +1,146 @@
+"""The parts of a monitor: their construction, their common state, and its snapshots."""
+
+import attrs
+
+from leg_wear_monitor.mechanism.spec import Mechanism
+from leg_wear_monitor.monitor.accounting import Accounting
+from leg_wear_monitor.monitor.config.fitting import fitted, twin_settings
+from leg_wear_monitor.monitor.config.settings import MonitorConfig
+from leg_wear_monitor.monitor.diagnosis.diagnosis import Diagnosis, DiagnosisState
+from leg_wear_monitor.monitor.diagnosis.observer import TorqueObserver
+from leg_wear_monitor.monitor.encoders.observer import EncoderObserver
+from leg_wear_monitor.monitor.evaluation.evaluation import AlarmEvaluation
+from leg_wear_monitor.monitor.evaluation.evaluation_period import A_CYCLE, EvaluationPeriods
+from leg_wear_monitor.monitor.evaluation.torque_record import TorqueRecord
+from leg_wear_monitor.monitor.forecast.forecaster import Forecaster
+from leg_wear_monitor.monitor.forecast.growth import GrowthWindow
+from leg_wear_monitor.monitor.forecast.model_error import model_error
+from leg_wear_monitor.monitor.inputs.guard import InputGuard
+from leg_wear_monitor.monitor.judgement import Judge
+from leg_wear_monitor.monitor.ledger.ledger import Ledger
+from leg_wear_monitor.monitor.state import MonitorSnapshot, MonitorState
+from leg_wear_monitor.monitor.torque_causes.explainer import TorqueExplainer
+from leg_wear_monitor.twin.digital_twin import DigitalTwin
+
+WRONG_TORQUE = "the drive torque is wrong as received, see the status torque"
+ACCELERATED = "wear is accelerated: clearances grow within the gait cycles that are compared"
+
+
+class Parts:
+    """Parts of a monitor.
+
+    Parameters
+    ----------
+    mechanism : Mechanism
+    config : MonitorConfig
+    ledger : Ledger or None
+
+    Attributes
+    ----------
+    mechanism : Mechanism
+        With the clearance joints and clearances of the configuration.
+    config : MonitorConfig
+        Replaced where parameters change.
+    state : MonitorState
+    """
+
+    def __init__(self, mechanism: Mechanism, config: MonitorConfig, ledger: Ledger | None) -> None:
+        self.config = config
+        self.mechanism = fitted(mechanism, config)
+        self.clearance_joints = self.mechanism.clearance_joints
+        self.twin = DigitalTwin(self.mechanism, twin_settings(self.config))
+        self.guard = InputGuard(self.twin.settings.tracker)
+        self.accounting = Accounting(self.twin, ledger, self.config.ledger)
+        cycle_ns = round(60.0e9 / abs(self.config.cadence.commanded_rpm))
+        self.evaluation = AlarmEvaluation(self.twin, self.config, cycle_ns, self.guard)
+        self.forecaster = Forecaster(
+            self.mechanism,
+            self.config.forecast,
+            ledger.measurements if ledger else (),
+            [part.replaced_ns for part in self.accounting.state.parts],
+        )
+        self.encoders = (
+            EncoderObserver(self.mechanism, self.config, ledger.commissioned if ledger else None)
+            if self.config.encoders.names
+            else None
+        )
+        self.torque = (
+            TorqueObserver(
+                self.mechanism,
+                self.config,
+                self.twin.torque_size_nm,
+                self.twin.clearance_mean_m,
+                ledger.commissioned_torque if ledger else None,
+            )
+            if self.config.diagnosis.enabled and self.config.wear_acceleration == 1.0
+            else None
+        )
+        self.explainer = TorqueExplainer(self.mechanism)
+        self.judge = Judge(
+            self.twin,
+            self.evaluation,
+            self.encoders,
+            self.forecaster,
+            self.accounting,
+            lambda: self.diagnosis,
+        )
+        if ledger and ledger.entry:
+            self.evaluation.board.restore(ledger.entry.alarms)
+        speed = self.twin.settings.tracker.commanded_speed_radps
+        self.model_error = model_error(self.mechanism, speed, self.config.wear_acceleration)
+        self.evaluation_periods = EvaluationPeriods(cycle_ns // A_CYCLE)
+        kept = TorqueRecord.of(self.accounting.state.commissioned)
+        self.state = MonitorState(tuple(GrowthWindow() for _ in self.clearance_joints), kept)
+
+    @property
+    def diagnosis(self) -> Diagnosis:
+        """What the drive torque shows of the clearances; nothing while it is wrong as received."""
+        if self.torque:
+            found = self.torque.diagnosis
+            if not self.is_torque_wrong:
+                return found
+            settled = tuple(change for change in found.changes if change.is_corrected)
+            return Diagnosis(state=DiagnosisState.WAITING, reason=WRONG_TORQUE, changes=settled)
+        return Diagnosis(
+            reason=ACCELERATED if self.config.diagnosis.enabled else "diagnosis.enabled is false"
+        )
+
+    @property
+    def is_torque_wrong(self) -> bool:
+        """Whether drive torque or crank angle are wrong as received, by what explains a mismatch."""
+        explained = self.state.mismatch.explanation
+        return explained is not None and explained.is_input_fault
+
+    def snapshot(self) -> MonitorSnapshot:
+        """A copy of the whole state, except for the ledger's."""
+        return MonitorSnapshot(
+            self.twin.snapshot(),
+            attrs.evolve(self.state),
+            attrs.evolve(self.accounting.state),
+            attrs.evolve(self.evaluation.state),
+            attrs.evolve(self.forecaster.state),
+            self.evaluation.board.alarms,
+            self.evaluation_periods.state.copy(),
+            self.guard.snapshot(),
+            self.encoders.snapshot() if self.encoders else None,
+            self.torque.snapshot() if self.torque else None,
+        )
+
+    def restore(self, snapshot: MonitorSnapshot) -> None:
+        """Restore a snapshot of a monitor with the same mechanism and parameters, bit for bit."""
+        self.twin.restore(snapshot.twin)
+        self.state = attrs.evolve(snapshot.state)
+        self.accounting.state = attrs.evolve(snapshot.accounting)
+        self.evaluation.state = attrs.evolve(snapshot.evaluation)
+        self.forecaster.state = attrs.evolve(snapshot.forecast)
+        self.evaluation.board.alarms = snapshot.alarms
+        self.evaluation_periods.state[:] = snapshot.evaluation_periods
+        self.guard.restore(snapshot.guard)
+        if self.encoders and snapshot.encoders:
+            self.encoders.restore(snapshot.encoders)
+        if self.torque and snapshot.torque:
+            self.torque.restore(snapshot.torque)
+
+    def keep(self, closed: bool = False) -> bool:
+        """Write an entry into the ledger; return whether it is on the disk."""
+        return self.accounting.keep(self.evaluation.board.alarms.values(), closed)

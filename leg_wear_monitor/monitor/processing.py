@@ -1,0 +1,173 @@
+"""Processing of the samples: gait cycles, their reports, what is observed at the ends of periods."""
+
+import numpy as np
+
+from leg_wear_monitor.mechanism.arrays import Floats
+from leg_wear_monitor.monitor.cycle_report import cycle_report
+from leg_wear_monitor.monitor.encoders.clearance_estimate import ClearanceEstimate
+from leg_wear_monitor.monitor.evaluation.specs import MISMATCH
+from leg_wear_monitor.monitor.forecast.growth import GrowthWindow, extended
+from leg_wear_monitor.monitor.forecast_update import update_forecast
+from leg_wear_monitor.monitor.ledger.entry import Audit, CommissionedTorque
+from leg_wear_monitor.monitor.parts import Parts
+from leg_wear_monitor.monitor.reports import (
+    AlarmList,
+    CycleReport,
+    SampleReports,
+    VerdictReport,
+)
+from leg_wear_monitor.twin.sample import Samples
+from leg_wear_monitor.twin.statistics import CycleStatistics
+
+_KEPT_EVENTS = 1
+
+
+class Processing:
+    """Passes samples to the parts of a monitor, and evaluates gait cycles and periods.
+
+    Parameters
+    ----------
+    parts : Parts
+    """
+
+    def __init__(self, parts: Parts) -> None:
+        self._parts, self._clearance_joints = parts, parts.clearance_joints
+        self._twin, self._guard, self._accounting = parts.twin, parts.guard, parts.accounting
+        self._evaluation, self._forecaster = parts.evaluation, parts.forecaster
+        self._encoders, self._torque = parts.encoders, parts.torque
+
+    def take(self, piece: Samples, changes: list[AlarmList]) -> tuple[SampleReports, list[CycleReport]]:
+        """Process a piece of an evaluation period, and evaluate the gait cycles that end in it."""
+        piece = self._guard.checked(self._accounting.not_counted(piece))
+        update = self._twin.update(piece)
+        self._evaluation.add_samples(piece)
+        if self._encoders:
+            self._encoders.add_samples(piece)
+        if self._torque:
+            self._torque.add_samples(piece)
+        self._accounting.followed(update.samples)
+        self._parts.state.happened = (*self._parts.state.happened, *update.events)[-_KEPT_EVENTS:]
+        cycles: list[CycleReport] = []
+        for statistics in update.cycles:
+            if self._encoders:
+                self._encoders.ended(statistics)
+            if self._torque and not self._parts.is_torque_wrong:  # or a wrong torque is commissioned
+                self._torque.ended(statistics)
+            cycles.append(self._report(statistics))
+            self._add_changes(self._evaluation.end_cycle(cycles[-1], self._parts.state.torque), changes)
+            self._explain_mismatch(statistics)
+            self._keep_torque(statistics, cycles[-1])
+        return update.samples, cycles
+
+    def end_period(self, changes: list[AlarmList]) -> tuple[VerdictReport, ...]:
+        """Evaluate what is due at the end of an evaluation period; returns changes of the verdict."""
+        self._add_changes(self._evaluation.end_period(self._accounting.state.skipped), changes)
+        self._observe_encoders()
+        self._observe_torque()
+        return self._parts.judge.changed(self._parts.state)
+
+    def part_changed(self, joint: str, replaced_ns: int) -> None:
+        """Discard the growth and the estimates of the former part."""
+        k, growth = self._clearance_joints.index(joint), self._parts.state.growth
+        self._parts.state.growth = (*growth[:k], GrowthWindow(), *growth[k + 1 :])
+        self._forecaster.replaced(joint, replaced_ns)
+        if self._encoders:
+            self._encoders.replaced()
+        if self._torque:
+            self._torque.replaced(self._twin.clearance_mean_m)
+
+    def _report(self, statistics: CycleStatistics) -> CycleReport:
+        """Report of a gait cycle."""
+        state, accounting = self._parts.state, self._accounting
+        accounting.state.cycles += 1
+        state.growth = tuple(
+            extended(window, float(growth), statistics.moving_s, self._parts.config.growth.window_cycles)
+            for window, growth in zip(state.growth, statistics.growth_mean_m, strict=True)
+        )
+        estimates = self._clearance_estimates(statistics)
+        limits = self._evaluation.board.clearance_limits_m
+        forecast = self._forecaster.after(
+            statistics,
+            self._worn_m(statistics),
+            limits,
+            lambda: self._parts.judge.is_forecast_valid(state.findings),
+        )
+        state.last = cycle_report(
+            statistics,
+            accounting.state.cycles,
+            self._clearance_joints,
+            state.growth,
+            self._parts.model_error,
+            forecast,
+            estimates,
+        )
+        accounting.note_clearances(state.last)
+        return state.last
+
+    def _explain_mismatch(self, statistics: CycleStatistics) -> None:
+        """Look for causes of a torque mismatch after a gait cycle."""
+        max_friction_nm = self._evaluation.torque_bounds.max_friction_nm
+        self._parts.state.mismatch = self._parts.state.mismatch.with_cycle(
+            statistics,
+            self._evaluation.board.alarms[MISMATCH.name()],
+            lambda cycles: self._parts.explainer.explanation(
+                cycles, self._parts.config, self._twin.settings, max_friction_nm
+            ),
+        )
+
+    def _keep_torque(self, statistics: CycleStatistics, report: CycleReport) -> None:
+        """Record the torque of a gait cycle if it is as predicted."""
+        is_sound = self._evaluation.is_torque_sound(report)
+        self._parts.state.torque = self._parts.state.torque.with_cycle(statistics, report, is_sound)
+        self._accounting.state.commissioned = self._parts.state.torque.totals
+
+    def _observe_encoders(self) -> None:
+        if self._encoders:
+            new = self._encoders.end_period(self._twin.clearance_mean_m, self._twin.depth)
+            if new:
+                self._accounting.note(new)
+
+    def _observe_torque(self) -> None:
+        """Compare the drive torque with that of the counted leg, and correct what is surely counted wrong."""
+        if not self._torque:
+            return
+        before = self._torque.state.commissioned
+        correction = self._torque.end_period(self._twin.clearance_mean_m, self._twin.depth)
+        if correction is None or self._parts.is_torque_wrong:
+            self._note_commissioned(before)
+            return
+        joint = self._clearance_joints[correction.joint]
+        was = self._accounting.correct(joint, correction.clearance_m)
+        self._torque.corrected(correction, self._twin.clearance_mean_m)
+        self._note_commissioned(before)
+        self._accounting.note(
+            Audit(self._twin.intake.followed_stamp_ns, "diagnosis", "correct_clearance", was)
+        )
+        growth, k = self._parts.state.growth, correction.joint
+        self._parts.state.growth = (*growth[:k], GrowthWindow(), *growth[k + 1 :])
+        self._parts.keep()
+
+    def _note_commissioned(self, before: CommissionedTorque | None) -> None:
+        """Store the signature of the leg that was commissioned since."""
+        now = self._torque.state.commissioned if self._torque else None
+        if now is not None and now is not before:
+            self._accounting.note(now)
+
+    def _clearance_estimates(self, statistics: CycleStatistics) -> tuple[ClearanceEstimate, ...] | None:
+        """Clearances estimated from encoders; they update the forecast."""
+        if not self._encoders:
+            return None
+        replaced_ns = [part.replaced_ns for part in self._accounting.state.parts]
+        return update_forecast(
+            self._encoders, self._forecaster, statistics, self._worn_m(statistics), replaced_ns
+        )
+
+    def _worn_m(self, statistics: CycleStatistics) -> Floats:
+        """Wear of each part at the end of a gait cycle; the twin itself may be ahead."""
+        fresh = [self._parts.mechanism.clearances[joint].radial_clearance for joint in self._clearance_joints]
+        return np.asarray(statistics.clearance_mean_m - fresh)
+
+    def _add_changes(self, changed: tuple[AlarmList, ...], changes: list[AlarmList]) -> None:
+        for change in changed:
+            changes.append(change)
+            self._accounting.note_alarms(change)

@@ -116,7 +116,11 @@ def words_of(change: Change) -> str:
     unit = _UNITS[change.cause]
     value, counted = estimate(change.value, change.sigma, unit), amount(change.counted, unit)
     if change.cause is Cause.CLEARANCE:
-        words = f"clearance of {value} in joint {change.subject}, {counted} is counted"
+        verb = "was" if change.is_corrected else "is"
+        words = f"clearance of {value} in joint {change.subject}, {counted} {verb} counted"
+    elif change.cause is Cause.MASS:
+        percent = estimate(100.0 * abs(change.value), 100.0 * change.sigma, "%")
+        words = f"body {change.subject} is {percent} {'heavier' if change.value > 0.0 else 'lighter'}"
     elif change.cause is Cause.UNKNOWN:
         words = "no single cause explains the change"
     else:

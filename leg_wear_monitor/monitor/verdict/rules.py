@@ -81,7 +81,7 @@ RULES = (
         code="CLEARANCE_CORRECTED",
         state=State.INSPECT,
         hits=clearance_rules.corrected,
-        why="the drive torque showed a {change} until then; it is corrected",
+        why="the drive torque showed a {change}; the counted clearance is corrected",
         do=_ROCK,
     ),
     Rule(
@@ -237,7 +237,7 @@ RULES = (
         state=State.WATCH,
         hits=raised(),
         why="alarm {name} is raised: {value}, the limit is {limit}{past}",
-        do=f"see the status of the joint or of the input; {_ACKNOWLEDGE}",
+        do=f"see the status of the joint or the input; {_ACKNOWLEDGE}",
     ),
     Rule(
         code=NONE,

@@ -249,6 +249,16 @@ def test_a_diagnosis_names_the_joint_that_a_mismatch_does_not() -> None:
     assert "rock joint G" in verdict.do and "leg-wear-monitor measure G MM --sigma MM" in verdict.do
 
 
+def test_a_changed_mass_is_told_as_a_fraction_of_the_body() -> None:
+    lighter = change(Cause.MASS, "shank", value=-0.2, sigma=0.03, counted=0.0)
+    assert judged(diagnosis=diagnosis(lighter)).why.endswith("body shank is 20 % ± 3 % lighter")
+
+
+def test_a_corrected_clearance_is_told_with_the_one_that_was_counted() -> None:
+    found = Diagnosis(changes=(change(Cause.CLEARANCE, "G", is_corrected=True),))
+    assert "in joint G, 0.3 mm was counted; the counted clearance is corrected" in judged(diagnosis=found).why
+
+
 def test_a_reason_to_stop_is_not_hidden_by_an_input_that_fails() -> None:
     verdict = judged(alarms=(alarm("clearance G"),), unfollowed="the crank is not followed since 4 s")
     assert verdict.state is State.STOP

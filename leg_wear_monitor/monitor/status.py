@@ -8,7 +8,6 @@ import attrs
 from leg_wear_monitor.monitor.accounting import Accounting
 from leg_wear_monitor.monitor.alarms.alarm import Level
 from leg_wear_monitor.monitor.alarms.fault_codes import (
-    DIAGNOSIS,
     ENCODERS,
     LEDGER_INTERRUPTED,
     LEDGER_NOT_WRITTEN,
@@ -17,26 +16,23 @@ from leg_wear_monitor.monitor.alarms.fault_codes import (
     worst_code,
 )
 from leg_wear_monitor.monitor.alarms.words import ADVICE
-from leg_wear_monitor.monitor.diagnosis.diagnosis import Diagnosis, DiagnosisState
+from leg_wear_monitor.monitor.diagnosis.diagnosis import Diagnosis
 from leg_wear_monitor.monitor.encoders.clearance_estimate import ClearanceObservation
 from leg_wear_monitor.monitor.encoders.observer import EncoderObserver
 from leg_wear_monitor.monitor.encoders.state import faults
 from leg_wear_monitor.monitor.evaluation import specs
 from leg_wear_monitor.monitor.evaluation.evaluation import AlarmEvaluation
-from leg_wear_monitor.monitor.evaluation.torque_checks import offset_error_rad, torque_causes
 from leg_wear_monitor.monitor.evaluation.torque_record import TorqueRecord
 from leg_wear_monitor.monitor.forecast.words import UNKNOWN, lifetime_values
 from leg_wear_monitor.monitor.inputs.health import InputHealth
 from leg_wear_monitor.monitor.reports import CycleReport, Status
 from leg_wear_monitor.monitor.torque_causes.explanation import TorqueExplanation
-from leg_wear_monitor.monitor.verdict.diagnosis_words import diagnosis_words
-from leg_wear_monitor.monitor.verdict.torque_words import EVIDENCE, causes_in_words
+from leg_wear_monitor.monitor.torque_status import diagnosis_status, torque_status
 from leg_wear_monitor.monitor.verdict.verdict import Verdict
 from leg_wear_monitor.monitor.verdict.words import with_unit
 from leg_wear_monitor.twin.digital_twin import DigitalTwin
 from leg_wear_monitor.twin.statistics import Event, Tracking
 
-_TORQUE = tuple(spec.name() for spec in specs.TORQUE)
 _INPUT = tuple(spec.name() for spec in specs.OF_INPUT)
 
 
@@ -58,8 +54,8 @@ def statuses(
         verdict_status(verdict),
         _gait(twin, evaluation, accounting, last, happened),
         _input(twin, evaluation, accounting),
-        _torque(evaluation, last, record, explained),
-        _diagnosis(twin.clearance_joints, diagnosis),
+        torque_status(evaluation, last, record, explained),
+        diagnosis_status(twin.clearance_joints, diagnosis),
         *joints,
         *((_encoders(encoders, evaluation, last),) if encoders else ()),
         _alarms(evaluation),
@@ -133,67 +129,6 @@ def _health_values(health: InputHealth) -> dict[str, float]:
     values = attrs.asdict(health)
     rates = {f"{name}_rate_hz": rate for name, rate in values.pop("rate_hz").items()}
     return {"duration_s": values.pop("duration_s"), **rates, **values}
-
-
-def _torque(
-    evaluation: AlarmEvaluation,
-    last: CycleReport | None,
-    record: TorqueRecord,
-    explained: TorqueExplanation | None,
-) -> Status:
-    level, code = evaluation.board.level(*_TORQUE), _code(evaluation, _TORQUE)
-    if last is None or not last.torque_samples:
-        return Status("torque", level, "not compared: no drive torque in the last gait cycle", {}, code)
-    values = {
-        "measured_rms_nm": last.measured_torque_rms_nm,
-        "predicted_rms_nm": last.predicted_torque_rms_nm,
-        "residual_rms_nm": last.residual_torque_rms_nm,
-        "mismatch": last.torque_mismatch,
-        "load_n": last.load_n,
-        "load_sigma_n": last.load_sigma_n,
-        "load_acting_n": last.load_acting_n,
-        "friction_nm": last.friction_nm,
-        "torque_lag_s": last.torque_lag_s,
-        "samples": float(last.torque_samples),
-        "friction_sigma_nm": last.friction_sigma_nm,
-        "friction_commissioned_nm": record.friction_nm,
-        "torque_lag_sigma_s": last.torque_lag_sigma_s,
-        "crank_offset_error_rad": offset_error_rad(last, record),
-    }
-    raised = {name for name in _TORQUE if evaluation.board.alarms[name].level is not Level.OK}
-    messages = []
-    if specs.MISMATCH.name() in raised:
-        config = evaluation.config
-        causes = f": {causes_in_words(explained, config.crank, config.drive_torque)}" if explained else ""
-        messages = [f"the measured torque differs from the predicted one{causes}"]
-        values |= _explained_values(explained) if explained else {}
-        code = explained.named[0].cause.value if explained and explained.named else code
-    messages += torque_causes(raised, last, record, evaluation.torque_bounds)
-    if not messages and math.isnan(last.torque_mismatch):
-        messages = ["not enough gait cycles yet to compare instants"]
-    return Status("torque", level, "; ".join(messages or ["measured as predicted"]), values, code)
-
-
-def _diagnosis(joints: Sequence[str], diagnosis: Diagnosis) -> Status:
-    """What the drive torque shows of the clearances; NaN where a joint is not observable."""
-    values = {"cycles": float(diagnosis.cycles)}
-    for k, joint in enumerate(joints):
-        known = bool(diagnosis.clearance_m)
-        values[f"{joint}_clearance_m"] = diagnosis.clearance_m[k] if known else math.nan
-        values[f"{joint}_sigma_m"] = diagnosis.sigma_m[k] if known else math.nan
-    if diagnosis.state is DiagnosisState.CHANGED:
-        return Status("diagnosis", Level.WARN, diagnosis_words(diagnosis, joints), values, DIAGNOSIS)
-    return Status("diagnosis", Level.OK, diagnosis_words(diagnosis, joints), values)
-
-
-def _explained_values(explained: TorqueExplanation) -> dict[str, float]:
-    """Values of the first explanation of a mismatch, and what it leaves."""
-    values = {"unexplained": explained.after, "unexplained_sigma": explained.after_sigma}
-    for one in explained.alternatives[0] if explained.alternatives else ():
-        name, unit = EVIDENCE[one.cause]
-        name = f"{name}_{one.subject}".rstrip("_")
-        values |= {with_unit(name, unit): one.value, with_unit(f"{name}_sigma", unit): one.sigma}
-    return values
 
 
 def _joint(

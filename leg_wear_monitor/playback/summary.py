@@ -44,7 +44,16 @@ if TYPE_CHECKING:
     from leg_wear_monitor.playback.replay import ReplayResult
 
 POINTS = 1000
-"""Points that a history is thinned to; the peaks of forces are kept."""
+"""Points that a history is thinned to; peaks of forces are kept, and the range of what has no peaks."""
+
+_RANGED = (
+    "cadence_rpm",
+    "measured_torque_rms_nm",
+    "predicted_torque_rms_nm",
+    "torque_mismatch",
+    "load_n",
+    "friction_nm",
+)
 
 
 def summary(
@@ -212,11 +221,20 @@ def _history(history: History) -> ReplayHistory:
     for name in JOINT_COLUMNS:
         thinned = _thinned(name, history.joint_column(name), last)
         columns[name] = {joint: thinned[:, k] for k, joint in enumerate(history.clearance_joints)}
+    if len(history) > len(last):
+        begins = _begins(last)
+        for name, reduced in (("lowest", np.fmin), ("highest", np.fmax)):  # of those that are known
+            columns[name] = {each: reduced.reduceat(history.column(each), begins) for each in _RANGED}
     return ReplayHistory(stamp_ns=history.stamp_ns[last], **columns)
 
 
+def _begins(last: np.ndarray[Any, np.dtype[np.int64]]) -> np.ndarray[Any, np.dtype[np.int64]]:
+    """First index of each group."""
+    return np.concatenate([[0], last[:-1] + 1]) if len(last) else last
+
+
 def _thinned(name: str, column: Floats, last: np.ndarray[Any, np.dtype[np.int64]]) -> Floats:
-    begins = np.concatenate([[0], last[:-1] + 1]) if len(last) else last
+    begins = _begins(last)
     if name == "peak_force_n" and len(last):
         return np.asarray(np.maximum.reduceat(column, begins))
     if name == "impacts" and len(last):

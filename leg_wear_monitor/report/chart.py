@@ -26,6 +26,8 @@ class Series:
         CSS variable of the page.
     style : str
         ``line``, ``dashed``, ``points`` or ``steps``.
+    width : float
+        Of a line [CSS pixels].
     """
 
     name: str
@@ -33,6 +35,7 @@ class Series:
     values: Floats
     colour: str = "--series-0"
     style: str = "line"
+    width: float = 1.5
 
     @property
     def head(self) -> str:
@@ -119,7 +122,13 @@ class Chart:
 
 def _settings(panel: Panel) -> dict[str, Any]:
     series = [
-        {"name": each.name, "unit": each.unit, "colour": each.colour, "style": each.style}
+        {
+            "name": each.name,
+            "unit": each.unit,
+            "colour": each.colour,
+            "style": each.style,
+            "width": each.width,
+        }
         for each in panel.series
     ]
     ends = {"low": panel.low, "high": panel.high, "height": panel.height, "lanes": list(panel.lanes)}

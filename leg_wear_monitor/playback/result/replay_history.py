@@ -35,6 +35,9 @@ class ReplayHistory:
     peak_force_n, p99_force_n, mean_force_n : dict of str to (n,) array
         Of the contact force.
     impacts : dict of str to (n,) array
+    lowest, highest : dict of str to (n,) array
+        Of cadence, torques, mismatch, load and friction, by their names: the smallest and the largest value
+        in each group; empty if each group is one gait cycle.
     """
 
     stamp_ns: Ints
@@ -54,6 +57,8 @@ class ReplayHistory:
     p99_force_n: dict[str, Floats]
     mean_force_n: dict[str, Floats]
     impacts: dict[str, Floats]
+    lowest: dict[str, Floats] = attrs.Factory(dict)
+    highest: dict[str, Floats] = attrs.Factory(dict)
 
     def columns(self) -> dict[str, Floats | Ints]:
         """Columns of a table over time; a joint's value after a dot: ``clearance_m.A``."""

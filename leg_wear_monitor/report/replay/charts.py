@@ -3,10 +3,12 @@
 import math
 from collections.abc import Iterable, Sequence
 
+import attrs
 import numpy as np
 
 from leg_wear_monitor.mechanism.arrays import Floats
 from leg_wear_monitor.playback.result.parts import AlarmChange
+from leg_wear_monitor.playback.result.replay_history import ReplayHistory
 from leg_wear_monitor.playback.result.replay_summary import ReplaySummary
 from leg_wear_monitor.report.chart import Chart, Panel, Series
 from leg_wear_monitor.report.figures.replay_series import opened, time_of
@@ -109,9 +111,37 @@ def health_chart(summary: ReplaySummary) -> Chart:
         "that load, friction and lag do not explain, with its limit dashed; load and friction as estimated.",
         x=_time(summary),
         ends=_ends(summary),
-        panels=[panel for panel in panels if np.isfinite(panel.series[0].values).any()],
+        panels=[_with_range(panel, history) for panel in panels if _is_known(panel)],
         group=_GROUP,
     )
+
+
+_COLUMNS = {
+    "cadence": "cadence_rpm",
+    "measured": "measured_torque_rms_nm",
+    "predicted": "predicted_torque_rms_nm",
+    "mismatch": "torque_mismatch",
+    "load": "load_n",
+    "friction": "friction_nm",
+}
+
+
+def _is_known(panel: Panel) -> bool:
+    return bool(np.isfinite(panel.series[0].values).any())
+
+
+def _with_range(panel: Panel, history: ReplayHistory) -> Panel:
+    """A panel with the smallest and the largest values, where its series are thinned."""
+    added = [
+        attrs.evolve(series, name=f"{series.name}, {words}", values=values[_COLUMNS[series.name]], width=0.7)
+        for series in panel.series
+        for words, values in (("lowest", history.lowest), ("highest", history.highest))
+        if _COLUMNS.get(series.name) in values
+    ]
+    ends = [_least(each.values) for each in added], [_greatest(each.values) for each in added]
+    low = None if panel.low is None else min([panel.low, *ends[0]])
+    high = None if panel.high is None else max([panel.high, *ends[1]])
+    return attrs.evolve(panel, series=[*panel.series, *added], low=low, high=high)
 
 
 def alarm_chart(summary: ReplaySummary, changes: Sequence[AlarmChange]) -> Chart:

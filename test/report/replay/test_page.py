@@ -185,6 +185,23 @@ def test_the_longest_page_of_many_joints_is_small():
     assert 500_000 < len(html_of(big).encode()) < MOST_BYTES
 
 
+def test_a_thinned_history_is_drawn_with_its_range():
+    summary = doubted()
+    history = summary.history
+    ends = {"torque_mismatch": np.array([0.1, 7.0])}
+    thin = attrs.evolve(history, lowest={"torque_mismatch": np.zeros(2)}, highest=ends)
+    (chart,) = (
+        part
+        for section in replay_page(attrs.evolve(summary, history=thin)).sections
+        for part in section.parts
+        if getattr(part, "name", "") == "input"
+    )
+    columns = {series.head: series.values.tolist() for series in chart.columns}
+    assert columns["mismatch, lowest"] == [0.0, 0.0] and columns["mismatch, highest"] == [0.1, 7.0]
+    (panel,) = (panel for panel in chart.panels if "not explained" in panel.title)
+    assert panel.low == 0.0 and panel.high == 7.0
+
+
 def test_equal_summaries_give_equal_bytes():
     assert html_of(made_up_summary()) == html_of(made_up_summary())
 

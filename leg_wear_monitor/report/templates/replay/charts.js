@@ -22,7 +22,7 @@
   function seriesOf(panel) {
     return panel.series.map((series, k) => {
       const points = series.style === "points", steps = series.style === "steps";
-      const drawn = { label: series.name, stroke: () => colour(series.colour), width: points ? 0 : 1.5 };
+      const drawn = { label: series.name, stroke: () => colour(series.colour), width: points ? 0 : series.width };
       if (series.style === "dashed") drawn.dash = [6, 4];
       if (points) drawn.paths = () => null;
       drawn.points = { show: points ? true : undefined, size: points ? 9 : 5 };

@@ -17,9 +17,9 @@ from leg_wear_monitor.mechanism.spec import Mechanism
 
 MASS_TOLERANCE = 0.05  # standard deviation of a body's mass, as where a leg was never commissioned
 
-# squared sensitivity of what impacts make: by regression over the joints of the default leg, simulated with
-# each mass 10 % up and down (`benchmarks/growth_coverage.py --sensitivities`)
-_OF_IMPACTS = 0.6
+# squared sensitivity of what impacts make: by regression over the joints of sixteen legs as built
+# (`benchmarks/growth_coverage.py --quick --legs 16`)
+_OF_IMPACTS = 1.6
 _POINTS = 160  # of a gait cycle
 _MASS_STEP = 0.01
 
@@ -42,8 +42,8 @@ class ModelError:
     def relative(self, k: int, growth_m: float) -> float:
         """Standard deviation of a joint's growth a gait cycle, as a fraction of it.
 
-        How impacts depend on each mass only a simulation can tell: their fraction of the growth adds to the
-        variance in proportion.
+        Impacts depend on masses, lengths and ripple in a rugged way, not by sensitivities: their fraction of
+        the growth adds to the variance in proportion.
         """
         impacts = min(1.0, abs(1.0 - self.ideal_m[k] / growth_m)) if growth_m > 0.0 else 0.0
         return MASS_TOLERANCE * math.sqrt(self.sensitivity[k] ** 2 + _OF_IMPACTS * impacts)

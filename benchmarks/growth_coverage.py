@@ -202,6 +202,8 @@ def main() -> None:
     parser.add_argument("--window", type=int, default=30)
     parser.add_argument("--torque", action="store_true")
     options = parser.parse_args()
+    if options.torque and options.cycles < options.window + SETTLING:
+        parser.error(f"--cycles: {options.cycles} walk no torque for a window of {options.window}")
     paper = load_mechanism("bionic_leg")
     options.keep.mkdir(parents=True, exist_ok=True)
     model, truth, own, windows = model_error(paper, paper.drive.speed), [], [], []

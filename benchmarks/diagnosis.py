@@ -43,6 +43,7 @@ COMMISSIONING, AFTER, HEALTHY = 60, 60, 160
 NEW = np.full(5, 3.0e-4)
 SIZES = (3.6e-4, 4.5e-4, 6.0e-4, 1.0e-3)
 MONTH = 8.64e5  # gait cycles: eight hours a day at 60 rpm
+CLOCK = 1.0021  # period of the sensor over what it says: its samples drift through the gait cycle
 STARTS = 5  # gait cycles between two starts of a test
 
 HEAD = """
@@ -132,9 +133,10 @@ def referred(leg: Mechanism, profile: CrankProfile) -> TorqueReference:
 
 def measured(walk: np.ndarray, sensor: TorqueSensor, noise_nm: float, random) -> np.ndarray:
     """Signatures (cycles, F) of whole gait cycles, the first two left out."""
-    every = max(1, round(sensor.period_s * RATE))
-    time, angle, impulse = walk[every - 1 :: every].T
-    torque = np.diff(impulse, prepend=0.0) / np.diff(time, prepend=0.0)
+    between = sensor.period_s * CLOCK
+    time = np.arange(between, walk[-1, 0], between)
+    angle, impulse = (np.interp(time, walk[:, 0], column) for column in walk[:, 1:].T)
+    torque = np.diff(impulse, prepend=0.0) / between
     torque = averaged(torque + noise_nm * random.standard_normal(len(torque)), sensor.together)
     angle = angle[sensor.together - 1 :: sensor.together][: len(torque)]
     cycle = np.floor(angle / TURN - 1e-9).astype(np.int64)

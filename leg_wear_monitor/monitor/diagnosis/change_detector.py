@@ -13,7 +13,7 @@ import numpy as np
 from leg_wear_monitor.mechanism.arrays import Floats, Ints
 from leg_wear_monitor.monitor.diagnosis.explanations import Explainer, opened
 
-FACTORS = (1.2, 1.35, 1.5, 1.75, 2.0, 2.5, 3.3, 5.0, 8.0)  # on the counted clearance of one joint
+FACTORS = (1.08, 1.2, 1.35, 1.5, 2.0, 2.5, 3.3, 5.0, 8.0)  # on the counted clearance of one joint
 
 _SIGMAS = 4.0  # by which the baseline may be off
 _MOST = 0.6  # of the threshold: what one gait cycle counts at most, so that one alone raises nothing

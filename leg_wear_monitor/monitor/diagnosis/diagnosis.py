@@ -27,6 +27,7 @@ class Cause(Enum):
     LAG = "lag of the torque sensor"
     CRANK_OFFSET = "offset of the crank encoder"
     MASS = "mass of a body"
+    LENGTH = "length of a body"
     UNKNOWN = "unknown"
 
 
@@ -43,7 +44,7 @@ class Change:
         Stamp of the first gait cycle that belongs to the change.
     value, sigma : float
         Estimated value and its standard deviation: clearance [m], load [N], friction [N m], fraction of the
-        scale, lag [s], offset [rad], fraction of the mass.
+        scale, lag [s], offset [rad], fraction of the mass or length.
     counted : float
         Value that the monitor supposes, in the same unit.
     log_odds : float

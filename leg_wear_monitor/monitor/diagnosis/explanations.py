@@ -99,14 +99,15 @@ class Explainer:
             baseline,
             tuple(nuisances),
         )
+        self._constant = baseline.covariance.copy()  # what does not become less over several cycles
+        for one in nuisances:
+            if one.spread:
+                self._constant += one.spread**2 * np.outer(one.column, one.column)
 
     def covariance(self, cycles: int) -> Floats:
         """Covariance (F, F) of the mean of some cycles' signatures in a leg as counted."""
         model = self.model
-        found = model.covariance * (1.0 / cycles + 1.0 / model.cycles) + self.baseline.covariance
-        for one in self.nuisances:
-            found = found + one.spread**2 * np.outer(one.column, one.column)
-        return np.asarray(found)
+        return np.asarray(model.covariance * (1.0 / cycles + 1.0 / model.cycles) + self._constant)
 
     def explanations(self, mean: Floats, cycles: int, counted_m: Floats) -> list[Explanation]:
         """Single causes of a change, the best first.
@@ -123,7 +124,7 @@ class Explainer:
         rest = mean - self.baseline.offset - there
         found = [self._as_counted(rest, cycles)]
         found += [self._clearance(k, rest, there, cycles, counted_m) for k in range(len(counted_m))]
-        found += [self._nuisance(one, rest, cycles) for one in self.nuisances]
+        found += [self._nuisance(one, rest, self.covariance(cycles)) for one in self.nuisances]
         return sorted(found, key=lambda one: one.misfit)
 
     def _as_counted(self, rest: Floats, cycles: int) -> Explanation:
@@ -152,9 +153,9 @@ class Explainer:
             misfit=float(misfits[best]),
         )
 
-    def _nuisance(self, one: Nuisance, rest: Floats, cycles: int) -> Explanation:
+    def _nuisance(self, one: Nuisance, rest: Floats, covariance: Floats) -> Explanation:
         """Best value of a nuisance, of which nothing was known."""
-        plain = self.covariance(cycles) - one.spread**2 * np.outer(one.column, one.column)
+        plain = covariance - one.spread**2 * np.outer(one.column, one.column)
         weighted = np.linalg.solve(plain, one.column)
         information = float(weighted @ one.column)
         value = float(weighted @ rest) / information

@@ -1,18 +1,19 @@
-"""What changes a torque's signature beside clearances: friction, scale, lag, load, masses."""
+"""What changes a torque's signature beside clearances: friction, scale, lag, load, bodies."""
 
 import attrs
 import numpy as np
 
 from leg_wear_monitor.mechanism.arrays import Floats
-from leg_wear_monitor.mechanism.ideal import one_cycle
+from leg_wear_monitor.mechanism.ideal import TURN, one_cycle
 from leg_wear_monitor.mechanism.position import build_linkage
 from leg_wear_monitor.mechanism.spec import Mechanism
 from leg_wear_monitor.monitor.diagnosis.diagnosis import Cause
 from leg_wear_monitor.monitor.diagnosis.explanations import Baseline, Nuisance
-from leg_wear_monitor.monitor.diagnosis.signature import TorqueSensor
+from leg_wear_monitor.monitor.diagnosis.signature import TorqueSensor, phase_means
 from leg_wear_monitor.monitor.diagnosis.signature_model import simulated_signatures
 from leg_wear_monitor.monitor.ledger.entry import CommissionedTorque
 from leg_wear_monitor.twin.follower.load import load_signature
+from leg_wear_monitor.twin.reference.body_factors import BodyFactors
 from leg_wear_monitor.twin.reference.torque_reference import TorqueReference
 
 # usual changes of a leg that is all right: friction warms up, sensors drift, the ground differs
@@ -21,14 +22,14 @@ _SCALE = 0.02
 _OFFSET_RAD = 0.01  # a lag of 1.6 ms at 60 rpm, or a crank offset: at one speed the two look alike
 _LOAD_N = 5.0
 
-# of a leg that was never commissioned: tolerance of masses, and what else the model may have wrong
-_MASS_TOLERANCE = 0.05
+# of a leg that was never commissioned: tolerances of bodies, and what else the model may have wrong
+_TOLERANCES = {Cause.MASS: 0.05, Cause.LENGTH: 0.005}
 _MEAN_ERROR = 0.05  # of the torque's size, in each phase
 _ROUGHNESS_ERROR = 0.15
 _SENSOR_TOLERANCE = 5.0  # times the usual changes of friction, scale and lag
 
-_IDEAL_POINTS = 160  # of a gait cycle, four in a phase
-_SCALE_STEP, _OFFSET_STEP_RAD, _MASS_STEP = 0.1, 0.03, 0.01
+_IDEAL_POINTS = 480  # of a gait cycle: six in each of 80 phases
+_SCALE_STEP, _OFFSET_STEP_RAD, _BODY_STEP = 0.1, 0.03, 0.002
 
 
 def nuisances(mechanism: Mechanism, reference: TorqueReference, sensor: TorqueSensor) -> list[Nuisance]:
@@ -46,15 +47,15 @@ def nuisances(mechanism: Mechanism, reference: TorqueReference, sensor: TorqueSe
     if mechanism.toe is not None:
         lever, _ = load_signature(build_linkage(mechanism))
         found.append(Nuisance(Cause.LOAD, "", _of_torque(lever[:-1], phases), _LOAD_N))
-    ideal = _ideal_torque(mechanism, speed)
-    for name, body in mechanism.bodies.items():
-        if body.mass > 0.0:
-            heavier = attrs.evolve(
-                body, mass=(1.0 + _MASS_STEP) * body.mass, inertia=(1.0 + _MASS_STEP) * body.inertia
-            )
-            changed = attrs.evolve(mechanism, bodies={**mechanism.bodies, name: heavier})
-            column = _of_torque((_ideal_torque(changed, speed) - ideal) / _MASS_STEP, phases)
-            found.append(Nuisance(Cause.MASS, name, column, 0.0))
+    ideal, whole = _ideal_torque(mechanism, speed), BodyFactors.none(mechanism)
+    for i, name in enumerate(mechanism.bodies):
+        one = np.arange(len(whole.mass)) == i
+        for cause, changed in (
+            (Cause.MASS, attrs.evolve(whole, mass=whole.mass + _BODY_STEP * one)),
+            (Cause.LENGTH, attrs.evolve(whole, length=whole.length + _BODY_STEP * one)),
+        ):
+            change = _ideal_torque(changed.applied(mechanism), speed) - ideal
+            found.append(Nuisance(cause, name, _of_torque(change / _BODY_STEP, phases), 0.0))
     return found
 
 
@@ -72,7 +73,7 @@ def unknown_baseline(found: list[Nuisance], sensor: TorqueSensor) -> Baseline:
     phases = sensor.phases
     covariance = np.diag(np.repeat([_MEAN_ERROR * sensor.size_nm, _ROUGHNESS_ERROR], phases) ** 2)
     for one in found:
-        spread = _MASS_TOLERANCE if one.cause is Cause.MASS else _SENSOR_TOLERANCE * one.spread
+        spread = _TOLERANCES.get(one.cause, _SENSOR_TOLERANCE * one.spread)
         covariance += spread**2 * np.outer(one.column, one.column)
     return Baseline(np.zeros(2 * phases), covariance, np.zeros((0, 2 * phases)))
 
@@ -94,6 +95,6 @@ def _ideal_torque(mechanism: Mechanism, speed: float) -> Floats:
 
 def _of_torque(torque: Floats, phases: int) -> Floats:
     """Signature's change by a torque that is added at equal steps of the crank angle, without roughness."""
-    at = np.minimum((np.arange(len(torque)) / len(torque) * phases).astype(np.int64), phases - 1)
-    mean = np.bincount(at, torque, phases) / np.bincount(at, minlength=phases)
-    return np.concatenate([mean, np.zeros(phases)])
+    angle: Floats = np.linspace(0.0, TURN, len(torque), endpoint=False)
+    first = np.zeros(len(torque), np.int64)
+    return np.concatenate([phase_means(first, angle, torque, (1, phases))[0], np.zeros(phases)])

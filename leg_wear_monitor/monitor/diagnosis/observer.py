@@ -243,6 +243,8 @@ class TorqueObserver:
             cycle_s = 60.0 / abs(self.config.cadence.commanded_rpm)
             instant = self.config.drive_torque.sampling == INSTANT
             state.sensor = TorqueSensor(float(f"{period_s:.2g}"), cycle_s, self._size_nm, instant)
+            if state.commissioned and state.commissioned.signatures.shape[1] != 2 * state.sensor.phases:
+                state.commissioned = None  # of a sensor with another rate: the leg is commissioned anew
         if not state.sensor.phases:
             return None
         torque = cycle_torque(state.samples, begin_ns, end_ns, state.sensor)

@@ -10,7 +10,7 @@ from leg_wear_monitor.mechanism.ideal import TURN
 
 SAMPLES = 200  # a gait cycle: what comes faster is averaged, since clearances show at these times already
 
-_PHASES = (40, 20, 10)
+_PHASES = (80, 40, 20, 10)
 _LEAST_IN_PHASE = 2.5  # samples on average
 _FLOOR = 1.0e-4  # of the torque's size, below which roughness is rounding
 _CLIP = 8.0  # times the torque's size: a peak counts as at most this
@@ -48,8 +48,12 @@ class TorqueSensor:
     @property
     def phases(self) -> int:
         """Number of phases of a signature; 0 where samples are too few for one."""
-        samples = self.cycle_s / (self.period_s * self.together)
-        return next((phases for phases in _PHASES if samples >= _LEAST_IN_PHASE * phases), 0)
+        return next((phases for phases in _PHASES if round(self.samples) >= _LEAST_IN_PHASE * phases), 0)
+
+    @property
+    def samples(self) -> float:
+        """Number of samples in a gait cycle, after averaging."""
+        return self.cycle_s / (self.period_s * self.together)
 
 
 def averaged(values: Floats, together: int) -> Floats:
@@ -78,18 +82,38 @@ def signatures(cycle: Ints, angle: Floats, torque: Floats, step: Floats, sensor:
         phase without samples.
     """
     phases, furthest = sensor.phases, _CLIP * sensor.size_nm
-    at = np.minimum(((angle / TURN) % 1.0 * phases).astype(np.int64), phases - 1)
-    cycles = int(cycle.max()) + 1 if len(cycle) else 0
-    sums, counts = np.zeros((2, cycles, 2 * phases))
-    known = np.isfinite(step)
-    for which, value, first in ((known | True, torque, 0), (known, np.abs(step), phases)):
-        place = (cycle[which] * 2 * phases + first + at[which]).astype(np.int64)
-        np.add.at(sums.ravel(), place, np.clip(value[which], -furthest, furthest))
-        np.add.at(counts.ravel(), place, 1.0)
+    cycles, known = int(cycle.max()) + 1 if len(cycle) else 0, np.isfinite(step)
+    mean = phase_means(cycle, angle, np.clip(torque, -furthest, furthest), (cycles, phases))
+    size = np.minimum(np.abs(step[known]), furthest)
+    rough = phase_means(cycle[known], angle[known], size, (cycles, phases))
+    return np.hstack([mean, np.log(rough + _FLOOR * sensor.size_nm)])
+
+
+def phase_means(cycle: Ints, angle: Floats, value: Floats, shape: tuple[int, int]) -> Floats:
+    """Means of a quantity in each phase of gait cycles.
+
+    A sample counts for the two phases whose middles are next to it, the nearer one more. Samples often come
+    at the same angles in each cycle, and a small shift of theirs must not move them into another phase.
+
+    Parameters
+    ----------
+    cycle : (n,) array of int
+        Number of the gait cycle of each sample, from 0.
+    angle, value : (n,) arrays
+        Crank angle [rad] and quantity of each sample.
+    shape : (cycles, phases)
+        That of the result; NaN for a phase without samples.
+    """
+    cycles, phases = shape
+    place = ((angle / TURN) % 1.0) * phases - 0.5
+    before = np.floor(place).astype(np.int64)
+    sums, counts = np.zeros((2, cycles * phases))
+    for at, weight in ((before, before + 1 - place), (before + 1, place - before)):
+        flat = cycle * phases + at % phases
+        sums += np.bincount(flat, weight * value, cycles * phases)
+        counts += np.bincount(flat, weight, cycles * phases)
     with np.errstate(invalid="ignore"):
-        means = sums / counts
-    means[:, phases:] = np.log(means[:, phases:] + _FLOOR * sensor.size_nm)
-    return np.asarray(means)
+        return np.asarray((sums / counts).reshape(shape))
 
 
 def quiet_phases(signature: Floats) -> Floats:

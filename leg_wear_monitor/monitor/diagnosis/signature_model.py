@@ -11,6 +11,7 @@ from leg_wear_monitor.twin.reference.torque_reference import POINTS, TorqueRefer
 # of the noise that is added to simulated torques: the same at each start, and another one for each leg, or
 # their covariance would be that of a single leg's cycles
 _SEED = 20261122
+_PART_OF_SAMPLE = 0.618  # by which samples move in each simulated gait cycle
 _WEAKEST_NOISE, _STRONGEST_NOISE = 1.0e-4, 1.0  # of the torque's size
 _HALVINGS = 12  # of that range: the noise is found to 0.2 %
 
@@ -89,7 +90,9 @@ def simulated_signatures(
     """
     torque = reference.torque_nm[leg].astype(float)
     period, points = TURN / abs(reference.profile.speed), torque.size
-    ends = np.arange(sensor.period_s, period * len(torque), sensor.period_s)
+    # another part of a sample each gait cycle: samples of a real leg fall anywhere, too
+    between = period / (period / sensor.period_s + _PART_OF_SAMPLE)
+    ends = np.arange(between, period * len(torque), between)
     place = ends * (POINTS / period)
     if sensor.is_instant:
         sampled = torque.ravel()[np.minimum(place.astype(np.int64), points - 1)]

@@ -21,6 +21,7 @@ _UNITS = {
     Cause.LAG: "s",
     Cause.CRANK_OFFSET: "rad",
     Cause.MASS: "",
+    Cause.LENGTH: "",
     Cause.UNKNOWN: "",
 }
 _NAMES = {
@@ -30,6 +31,7 @@ _NAMES = {
     Cause.LAG: "torque_lag",
     Cause.CRANK_OFFSET: "crank_offset",
     Cause.MASS: "mass",
+    Cause.LENGTH: "length",
     Cause.UNKNOWN: "unknown_change",
 }
 

@@ -96,7 +96,7 @@ RULES = (
     Rule(
         code="MECHANISM_CHANGED",
         state=State.INSPECT,
-        hits=clearance_rules.diagnosed(Cause.MASS, Cause.UNKNOWN),
+        hits=clearance_rules.diagnosed(Cause.MASS, Cause.LENGTH, Cause.UNKNOWN),
         why="the drive torque is that of another leg than the counted one: {change}",
         do="look for loose, bent or added parts, and rock each joint",
         not_valid=EVERYTHING,

@@ -11,6 +11,7 @@ from leg_wear_monitor.monitor.config.settings import MonitorConfig
 from leg_wear_monitor.monitor.diagnosis.diagnosis import Cause, DiagnosisState
 from leg_wear_monitor.monitor.diagnosis.observer import COMMISSIONING_CYCLES, TorqueObserver
 from leg_wear_monitor.monitor.diagnosis.reference_file import shipped_reference
+from leg_wear_monitor.monitor.ledger.entry import CommissionedTorque
 from leg_wear_monitor.twin.kinds import CRANK, TORQUE
 from leg_wear_monitor.twin.reference.torque_reference import POINTS, WIDER
 from leg_wear_monitor.twin.sample import gait_samples
@@ -179,3 +180,12 @@ def test_a_small_opening_is_reported_and_not_corrected(leg, reference) -> None:
     assert walk(observer, block) == []
     (change,) = observer.diagnosis.changes
     assert (change.subject, change.is_corrected) == ("A", False)
+
+
+def test_a_baseline_of_a_sensor_with_another_rate_is_not_used(leg, reference) -> None:
+    other = CommissionedTorque(START_NS, NEW, np.zeros((COMMISSIONING_CYCLES, 40)))
+    observer = observer_of(leg, commissioned=other)
+    walk(observer, samples(reference, [0] * (COMMISSIONING_CYCLES + 2)))
+    assert observer.diagnosis.state is DiagnosisState.AS_COUNTED
+    assert observer.state.commissioned is not None
+    assert observer.state.commissioned.signatures.shape[1] == 160

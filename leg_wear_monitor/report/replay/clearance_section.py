@@ -41,8 +41,8 @@ def _table(summary: ReplaySummary) -> Table:
         head=("joint", "counted clearance [mm]", "opened [nm]", "growth [pm/cycle]", "± [pm/cycle]"),
         rows=rows,
         note="Counted: the clearance when new plus the wear counted by the model since, in its "
-        "significant digits. ± is the standard error of the growth; single gait cycles of a chaotic "
-        "motion scatter.",
+        "significant digits. ± is one standard deviation of the growth: gait cycles of a chaotic "
+        "motion scatter, and the leg may be built with other masses than its file has.",
     )
 
 

@@ -5,7 +5,7 @@ import attrs
 from leg_wear_monitor.monitor.alarms.alarm import Level
 from leg_wear_monitor.monitor.forecast.words import clearance_mm
 from leg_wear_monitor.monitor.verdict.alarm_rules import OF_A_JOINT
-from leg_wear_monitor.monitor.verdict.verdict import Figure
+from leg_wear_monitor.monitor.verdict.verdict import Figure, State
 from leg_wear_monitor.playback.result.condition import JointClearance, LifeHours
 from leg_wear_monitor.playback.result.parts import ReplayAlarm
 from leg_wear_monitor.playback.result.replay_summary import ReplaySummary
@@ -75,6 +75,8 @@ def _view(summary: ReplaySummary, joint: str) -> JointView:
     seen = clearance if clearance and _is_seen(summary, joint, clearance) else None
     shown = counted if counted is not None else seen.seen_m if seen else None
     used = _used(clearance, shown) if clearance and shown is not None else None
+    if summary.verdict.state is State.NOT_MONITORED and (used or 0.0) < 1.0:
+        used = None  # a joint that nobody watches is not shown as one that is all right
     drawn = summary.leg.joints.get(joint)
     life, life_doubt = summary.life.get(joint), not_valid(summary.verdict, Figure.FORECAST)
     return JointView(

@@ -107,8 +107,10 @@ def _is_near(one: Place, other: Place) -> bool:
 
 
 def _words(view: JointView) -> str:
-    if view.clearance is None or view.shown_m is None or view.used is None:
+    if view.clearance is None or view.shown_m is None:
         return "not valid" if view.doubt.startswith("not valid") else "not known"
+    if view.used is None:
+        return "not monitored"
     if view.used >= 1.0:
         return f"{1.0e3 * view.shown_m:.3g} mm, limit {1.0e3 * view.clearance.limit_m:.3g} mm"
     return f"{100.0 * view.used:.0f} % used"

@@ -6,7 +6,7 @@ from collections.abc import Callable, Sequence
 import attrs
 
 from leg_wear_monitor.monitor.accounting import Accounting
-from leg_wear_monitor.monitor.diagnosis.diagnosis import Cause, Diagnosis, DiagnosisState
+from leg_wear_monitor.monitor.diagnosis.diagnosis import Diagnosis
 from leg_wear_monitor.monitor.encoders.clearance_estimate import ClearanceEstimate, ClearanceObservation
 from leg_wear_monitor.monitor.encoders.observer import EncoderObserver
 from leg_wear_monitor.monitor.encoders.state import faults
@@ -172,7 +172,8 @@ def _joint(
     report = last.joints[k] if last else None
     by_encoders = _seen_by_encoders(report)
     seen = [SeenClearance("encoders", by_encoders.clearance_m, by_encoders.sigma_m)] if by_encoders else []
-    seen += seen_by_torque(k, name, diagnosis) if diagnosis else []
+    if diagnosis and diagnosis.clearance_m and math.isfinite(diagnosis.clearance_m[k]):
+        seen.append(SeenClearance("torque", diagnosis.clearance_m[k], diagnosis.sigma_m[k]))
     return JointSituation(
         joint=name,
         counted_m=counted_m,
@@ -181,16 +182,6 @@ def _joint(
         seen=tuple(seen),
         is_used=bool(by_encoders and by_encoders.believed),
     )
-
-
-def seen_by_torque(k: int, name: str, diagnosis: Diagnosis) -> list[SeenClearance]:
-    """Clearance in the fit of all joints; where that does not observe it, that of the change, if it is its."""
-    if diagnosis.clearance_m and math.isfinite(diagnosis.clearance_m[k]):
-        return [SeenClearance("torque", diagnosis.clearance_m[k], diagnosis.sigma_m[k])]
-    change = diagnosis.changes[-1] if diagnosis.state is DiagnosisState.CHANGED else None
-    if change is None or (change.cause, change.subject) != (Cause.CLEARANCE, name):
-        return []
-    return [SeenClearance("torque", change.value, change.sigma)]
 
 
 def _seen_by_encoders(report: JointReport | None) -> ClearanceEstimate | None:

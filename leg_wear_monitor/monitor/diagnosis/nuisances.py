@@ -13,7 +13,7 @@ from leg_wear_monitor.monitor.diagnosis.signature import TorqueSensor, phase_mea
 from leg_wear_monitor.monitor.diagnosis.signature_model import simulated_signatures
 from leg_wear_monitor.monitor.ledger.entry import CommissionedTorque
 from leg_wear_monitor.twin.follower.load import load_signature
-from leg_wear_monitor.twin.reference.body_factors import BodyFactors
+from leg_wear_monitor.twin.reference.body_factors import MASS_TOLERANCE, BodyFactors
 from leg_wear_monitor.twin.reference.torque_reference import TorqueReference
 
 # usual changes of a leg that is all right: friction warms up, sensors drift, the ground differs
@@ -23,12 +23,12 @@ _OFFSET_RAD = 0.01  # a lag of 1.6 ms at 60 rpm, or a crank offset: at one speed
 _LOAD_N = 5.0
 
 # of a leg that was never commissioned: tolerances of bodies, and what else the model may have wrong
-_TOLERANCES = {Cause.MASS: 0.05, Cause.LENGTH: 0.005}
+_TOLERANCES = {Cause.MASS: MASS_TOLERANCE, Cause.LENGTH: 0.005}
 _MEAN_ERROR = 0.05  # of the torque's size, in each phase
 _ROUGHNESS_ERROR = 0.15
 _SENSOR_TOLERANCE = 5.0  # times the usual changes of friction, scale and lag
 
-_IDEAL_POINTS = 480  # of a gait cycle: six in each of 80 phases
+_IDEAL_POINTS = 240  # of a gait cycle: three in each of 80 phases
 _SCALE_STEP, _OFFSET_STEP_RAD, _BODY_STEP = 0.1, 0.03, 0.002
 
 

@@ -14,8 +14,10 @@ from leg_wear_monitor.mechanism.arrays import Floats
 from leg_wear_monitor.mechanism.spec import Mechanism
 from leg_wear_monitor.monitor.config.settings import MonitorConfig
 from leg_wear_monitor.monitor.diagnosis.change_detector import ChangeDetector
+from leg_wear_monitor.monitor.diagnosis.clearance_fit import ClearanceFit
 from leg_wear_monitor.monitor.diagnosis.diagnosis import Cause, Change, Diagnosis, DiagnosisState
 from leg_wear_monitor.monitor.diagnosis.explanations import Explainer
+from leg_wear_monitor.monitor.diagnosis.identification import UNLIKE_FILE, identified_bodies, misfit
 from leg_wear_monitor.monitor.diagnosis.leg_model import (
     best_fit,
     change_of,
@@ -109,6 +111,7 @@ class TorqueObserver:
         self._run: TorqueReferenceRun | None = None
         self._explainer: Explainer | None = None
         self._detector: ChangeDetector | None = None
+        self._misfit: float | None = None
         self.state = TorqueState(np.asarray(counted_m, float).copy(), commissioned=commissioned)
 
     def add_samples(self, piece: Samples) -> None:
@@ -157,12 +160,13 @@ class TorqueObserver:
         state.commissioned = CommissionedTorque(cycles[-1].end_ns, counted_m, signatures)
         state.settled = (*state.settled, attrs.evolve(change, is_corrected=True))
         self._restart(counted_m)
-        self._explainer = None
+        self._forget_legs()
 
     def replaced(self, counted_m: Floats) -> None:
         """Start again after the replacement of a part: the leg has to be commissioned again."""
         self.state.settled, self.state.commissioned = (), None
         self._restart(counted_m)
+        self._forget_legs()
 
     def begin_epoch(self) -> None:
         """Forget kept samples and gait cycles, because stamps start again."""
@@ -175,16 +179,31 @@ class TorqueObserver:
         state = self.state
         if state.fit is None or state.detector is None:
             return Diagnosis(state=DiagnosisState.WAITING, reason=self._missing(), changes=state.settled)
-        observable = state.fit.sigma_m <= np.maximum(_ESTIMATED_M, _ESTIMATED * state.fit.clearance_m)
-        unlike = "the crank turns otherwise than it did before; a new reference is being simulated"
+        clearance_m, sigma_m = self._observed(state.fit)
         return Diagnosis(
             state=DiagnosisState.CHANGED if state.changes else DiagnosisState.AS_COUNTED,
-            reason=unlike if state.unlike >= _UNLIKE_CYCLES else "",
+            reason=self._doubt(),
             cycles=state.fit_cycles,
-            clearance_m=tuple(np.where(observable, state.fit.clearance_m, math.nan).tolist()),
-            sigma_m=tuple(np.where(observable, state.fit.sigma_m, math.nan).tolist()),
+            clearance_m=tuple(clearance_m.tolist()),
+            sigma_m=tuple(sigma_m.tolist()),
             changes=state.settled + state.changes,
         )
+
+    def _observed(self, fit: ClearanceFit) -> tuple[Floats, Floats]:
+        """Observable clearances and their standard deviations, NaN for the others.
+
+        A joint that the fit of all joints does not show is known from its own change.
+        """
+        observable = fit.sigma_m <= np.maximum(_ESTIMATED_M, _ESTIMATED * fit.clearance_m)
+        clearance_m, sigma_m = (
+            np.where(observable, each, math.nan) for each in (fit.clearance_m, fit.sigma_m)
+        )
+        for change in self.state.changes:
+            if change.cause is Cause.CLEARANCE:
+                k = self._mechanism.clearance_joints.index(change.subject)
+                if not observable[k]:
+                    clearance_m[k], sigma_m[k] = change.value, change.sigma
+        return clearance_m, sigma_m
 
     def snapshot(self) -> TorqueObserverSnapshot:
         """A copy of the whole state."""
@@ -197,7 +216,19 @@ class TorqueObserver:
         if snapshot.reference is not None:
             self._run = TorqueReferenceRun(self._mechanism)
             self._run.restore(snapshot.reference)
-        self._explainer, self._detector = None, None
+        self._forget_legs()
+
+    def _doubt(self) -> str:
+        """Why an estimate is not sure."""
+        if self.state.unlike >= _UNLIKE_CYCLES:
+            return "the crank turns otherwise than it did before; a new reference is being simulated"
+        if self._is_of_file:
+            return ""
+        known = "the leg is not that of its mechanism file, and the names of joints are not sure: "
+        if self._run is not None and self._run.is_busy:
+            what = "its masses and lengths are" if self.state.is_identifying else "a reference for it is"
+            return f"{known}{what} being simulated, {math.floor(100.0 * self._run.progress)} %"
+        return f"{known}masses and lengths near those of the file do not explain its drive torque"
 
     def _missing(self) -> str:
         """Why there is no estimate."""
@@ -311,6 +342,8 @@ class TorqueObserver:
         state = self.state
         if not self.config.diagnosis.correct or not state.changes or state.fit_cycles < SETTLING_CYCLES:
             return None
+        if not self._is_of_file:
+            return None
         change, joints = state.changes[-1], self._mechanism.clearance_joints
         is_wide = change.value >= CORRECTED_FROM * change.counted
         if change.subject not in joints or not change.is_sure or not is_wide:
@@ -323,10 +356,12 @@ class TorqueObserver:
         if self._run is not None and self._run.is_busy:
             state.pause = not state.pause
             found = None if state.pause else self._run.advance()
-            if found is not None:
+            if found is not None and state.is_identifying:
+                self._identify(found, counted_m, depth)
+            elif found is not None:
                 self._install(found)
             elif not self._run.is_busy:
-                state.has_failed = True
+                self._give_up()
             return
         if len(state.cycles) < _FIRST_CYCLES or state.has_failed:
             return
@@ -339,24 +374,58 @@ class TorqueObserver:
                 self._begin(counted_m, depth, profile)
         elif state.unlike >= _UNLIKE_CYCLES:
             state.cycles, state.reference, state.fit, state.unlike = (), None, None, 0
-            self._explainer, self._detector = None, None
+            self._forget_legs()
         elif (np.abs(state.reference.clearance_m[0] / counted_m - 1.0) > _FAR).any():
             self._begin(counted_m, depth, mean_profile([cycle.profile for cycle in state.cycles]))
+        elif state.commissioned is not None and state.bodies is None and not self._is_of_file:
+            run, state.is_identifying = self._begun(), True
+            run.begin_bodies(
+                state.commissioned.clearance_m, depth, state.reference.profile, state.reference.bodies
+            )
+
+    def _begun(self) -> TorqueReferenceRun:
+        """The run, made when it is needed first."""
+        if self._run is None:
+            self._run = TorqueReferenceRun(self._mechanism)
+        return self._run
 
     def _begin(self, counted_m: Floats, depth: Floats, profile: CrankProfile) -> None:
         """Begin the simulation of a reference."""
-        if self._run is None:
-            self._run = TorqueReferenceRun(self._mechanism)
-        self._run.begin(counted_m, depth, profile)
+        self._begun().begin(counted_m, depth, profile, self.state.bodies)
+
+    def _identify(self, legs: TorqueReference, counted_m: Floats, depth: Floats) -> None:
+        """Begin a reference with the bodies that explain the commissioned leg."""
+        state, explainer = self.state, self._legs
+        state.is_identifying = False
+        if state.commissioned is not None:
+            state.bodies = identified_bodies(legs, explainer.model, explainer.nuisances, state.commissioned)
+            self._begin(counted_m, depth, legs.profile)
+
+    def _give_up(self) -> None:
+        """Go on without what could not be simulated."""
+        state = self.state
+        if state.reference is None:
+            state.has_failed = True
+        else:
+            state.is_identifying, state.bodies = False, state.reference.bodies
 
     def _install(self, reference: TorqueReference) -> None:
-        """Evaluate the kept cycles with a new reference."""
-        self.state.reference = reference
+        """Evaluate the kept cycles with a new reference.
+
+        One with identified bodies must explain the leg better than the one with those of the file.
+        """
+        state, before, off = self.state, self.state.reference, self._file_misfit
+        state.reference = reference
+        self._forget_legs()
+        is_first = before is not None and state.bodies not in (None, before.bodies)
+        if before is not None and is_first and self._file_misfit > off:
+            state.reference, state.bodies = before, before.bodies
         self._review()
 
     def _review(self) -> None:
         """Evaluate the kept cycles again."""
-        state, self._explainer, self._detector = self.state, None, None
+        state = self.state
+        self._forget_legs()
         if state.reference is not None and state.sensor is not None:
             measured = state.commissioned.mean if state.commissioned else self._signatures().mean(axis=0)
             state.sensor = with_noise_of(state.reference, state.sensor, measured)
@@ -364,6 +433,31 @@ class TorqueObserver:
         for cycle in state.cycles:
             self._take(cycle)
         self._explain()
+
+    def _forget_legs(self) -> None:
+        """Make legs, tests and the misfit anew, because what they depend on has changed."""
+        self._explainer, self._detector, self._misfit = None, None, None
+
+    @property
+    def _file_misfit(self) -> float:
+        """Of the commissioned leg, from that of the reference; 0 where that is not known.
+
+        The baseline after a correction holds fewer cycles, and clearances that are not sure.
+        """
+        commissioned = self.state.commissioned
+        if self.state.reference is None or commissioned is None:
+            return 0.0
+        if commissioned.cycles < COMMISSIONING_CYCLES:
+            return 0.0
+        if self._misfit is None:
+            legs = self._legs
+            self._misfit = misfit(legs.model, legs.nuisances, commissioned)
+        return self._misfit
+
+    @property
+    def _is_of_file(self) -> bool:
+        """Whether the commissioned leg is that of the reference."""
+        return self._file_misfit < UNLIKE_FILE
 
     def _restart(self, counted_m: Floats) -> None:
         """Forget the kept cycles, because the leg, or what is counted of it, has changed."""

@@ -10,6 +10,7 @@ from leg_wear_monitor.errors import ConfigError
 from leg_wear_monitor.mechanism.spec import Mechanism
 from leg_wear_monitor.monitor.ledger.binding import fingerprint
 from leg_wear_monitor.share import share_directory
+from leg_wear_monitor.twin.reference.body_factors import BodyFactors
 from leg_wear_monitor.twin.reference.crank_profile import CrankProfile
 from leg_wear_monitor.twin.reference.torque_reference import TorqueReference
 
@@ -22,9 +23,8 @@ def shipped_reference(mechanism: Mechanism) -> TorqueReference | None:
     ConfigError
         If a file cannot be read.
     """
-    own = fingerprint(mechanism)
     for file in sorted((share_directory() / "config" / "references").glob("*.npz")):
-        found = read_reference(file, own)
+        found = read_reference(file, mechanism)
         if found is not None:
             return found
     return None
@@ -43,8 +43,8 @@ def write_reference(file: IO[bytes], mechanism: Mechanism, reference: TorqueRefe
     )
 
 
-def read_reference(path: Path, own: str) -> TorqueReference | None:
-    """Reference in a file; None if it is of a leg with another fingerprint.
+def read_reference(path: Path, mechanism: Mechanism) -> TorqueReference | None:
+    """Reference in a file; None if it is of another leg.
 
     Raises
     ------
@@ -53,12 +53,12 @@ def read_reference(path: Path, own: str) -> TorqueReference | None:
     """
     try:
         with np.load(path, allow_pickle=False) as parts:
-            if str(parts["fingerprint"]) != own:
+            if str(parts["fingerprint"]) != fingerprint(mechanism):
                 return None
             cosine, sine = parts["ripple_rad"]
             profile = CrankProfile(float(parts["speed_radps"]), cosine, sine)
             torque = (parts["expected_torque_nm"], *parts["torque_nm"])
-            return TorqueReference(profile, parts["clearance_m"], torque)
+            return TorqueReference(profile, parts["clearance_m"], torque, BodyFactors.none(mechanism))
     except OSError as error:
         raise ConfigError(str(path), "", f"cannot be read: {error.strerror or error}") from error
     except (KeyError, ValueError, zipfile.BadZipFile) as error:

@@ -11,6 +11,7 @@ from leg_wear_monitor.monitor.diagnosis.diagnosis import Change
 from leg_wear_monitor.monitor.diagnosis.signature import TorqueSensor
 from leg_wear_monitor.monitor.diagnosis.torque_samples import NO_TORQUE_SAMPLES, TorqueSamples
 from leg_wear_monitor.monitor.ledger.entry import CommissionedTorque
+from leg_wear_monitor.twin.reference.body_factors import BodyFactors
 from leg_wear_monitor.twin.reference.crank_profile import CrankProfile
 from leg_wear_monitor.twin.reference.torque_reference import TorqueReference
 
@@ -57,6 +58,10 @@ class TorqueState:
         Gait cycles in a row without a signature.
     pause : bool
         Whether the last period did not simulate; each second one does, so that a monitor has time for both.
+    bodies : BodyFactors or None
+        Identified ones, of which references are made; None before.
+    is_identifying : bool
+        Whether the run simulates legs with other bodies.
     has_failed : bool
         Whether the leg could not be simulated for a reference.
     """
@@ -77,4 +82,6 @@ class TorqueState:
     unlike: int = 0
     unusable: int = 0
     pause: bool = False
+    bodies: BodyFactors | None = None
+    is_identifying: bool = False
     has_failed: bool = False

@@ -6,6 +6,10 @@ import numpy as np
 from leg_wear_monitor.mechanism.arrays import Floats
 from leg_wear_monitor.mechanism.spec import Mechanism
 
+MASS_TOLERANCE = (
+    0.05  # standard deviation of a body's mass about that of the file, where nothing else is known
+)
+
 
 @attrs.frozen(eq=False)
 class BodyFactors:

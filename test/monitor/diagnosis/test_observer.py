@@ -8,11 +8,13 @@ import pytest
 
 from leg_wear_monitor.mechanism.ideal import TURN
 from leg_wear_monitor.monitor.config.settings import MonitorConfig
+from leg_wear_monitor.monitor.diagnosis import observer as module
 from leg_wear_monitor.monitor.diagnosis.diagnosis import Cause, DiagnosisState
 from leg_wear_monitor.monitor.diagnosis.observer import COMMISSIONING_CYCLES, TorqueObserver
 from leg_wear_monitor.monitor.diagnosis.reference_file import shipped_reference
 from leg_wear_monitor.monitor.ledger.entry import CommissionedTorque
 from leg_wear_monitor.twin.kinds import CRANK, TORQUE
+from leg_wear_monitor.twin.reference import torque_reference
 from leg_wear_monitor.twin.reference.torque_reference import POINTS, WIDER
 from leg_wear_monitor.twin.sample import gait_samples
 from leg_wear_monitor.wear.surfaces import SECTORS
@@ -121,8 +123,10 @@ def test_a_leg_that_was_never_healthy_is_not_commissioned(leg, reference) -> Non
     observer = observer_of(leg)
     walk(observer, samples(reference, [leg_number(2, 3.0)] * (COMMISSIONING_CYCLES + 5)))
     assert observer.diagnosis.state is DiagnosisState.CHANGED
-    assert observer.diagnosis.changes[0].subject == "G"
+    (change,) = observer.diagnosis.changes
+    assert change.subject == "G"
     assert observer.state.commissioned is None
+    assert observer.diagnosis.clearance_m[2] == pytest.approx(9.0e-4, rel=0.2)
 
 
 def test_one_strange_cycle_raises_nothing(leg, reference) -> None:
@@ -189,3 +193,37 @@ def test_a_baseline_of_a_sensor_with_another_rate_is_not_used(leg, reference) ->
     assert observer.diagnosis.state is DiagnosisState.AS_COUNTED
     assert observer.state.commissioned is not None
     assert observer.state.commissioned.signatures.shape[1] == 160
+
+
+def test_a_commissioned_leg_that_is_not_of_its_file_is_identified(leg, reference, monkeypatch) -> None:
+    monkeypatch.setattr(module, "UNLIKE_FILE", 0.0)  # any leg
+    observer = observer_of(leg)
+    walk(observer, samples(reference, [0] * (COMMISSIONING_CYCLES + 4)))
+    assert "its masses and lengths are being simulated" in observer.diagnosis.reason
+    assert observer.state.is_identifying
+    restored = observer_of(leg)
+    restored.restore(observer.snapshot())
+    assert restored.diagnosis == observer.diagnosis
+
+
+@pytest.mark.slow
+def test_the_reference_of_an_identified_leg_is_used_if_it_explains_the_leg_better(
+    leg, reference, monkeypatch
+) -> None:
+    monkeypatch.setattr(module, "UNLIKE_FILE", 0.0)
+    monkeypatch.setattr(torque_reference, "CYCLES", 8)
+    observer = observer_of(leg)
+    walk(observer, samples(reference, [0] * 1200))
+    assert observer.state.bodies is observer.state.reference.bodies
+    assert not observer.state.is_identifying
+    assert np.abs(observer.state.bodies.mass - 1.0).max() < 0.1
+    assert observer.diagnosis.state is DiagnosisState.AS_COUNTED
+    assert "do not explain its drive torque" in observer.diagnosis.reason  # nothing is below 0
+
+
+def test_nothing_is_corrected_by_a_reference_of_another_leg(leg, reference, monkeypatch) -> None:
+    monkeypatch.setattr(module, "UNLIKE_FILE", 0.0)
+    observer = observer_of(leg)
+    block = samples(reference, [0] * COMMISSIONING_CYCLES + [leg_number(0, 1.5)] * 25)
+    assert walk(observer, block) == []
+    assert observer.diagnosis.changes[0].subject == "A"

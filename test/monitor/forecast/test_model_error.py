@@ -5,7 +5,8 @@ import numpy as np
 import pytest
 
 from leg_wear_monitor import load_mechanism
-from leg_wear_monitor.monitor.forecast.model_error import MASS_TOLERANCE, ModelError, model_error
+from leg_wear_monitor.monitor.forecast.model_error import ModelError, model_error
+from leg_wear_monitor.twin.reference.body_factors import MASS_TOLERANCE
 
 pytestmark = pytest.mark.plain
 

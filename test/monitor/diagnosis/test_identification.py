@@ -1,0 +1,86 @@
+"""Masses and lengths of a leg, from its commissioned torque."""
+
+import attrs
+import numpy as np
+import pytest
+
+from leg_wear_monitor.mechanism.ideal import TURN, one_cycle
+from leg_wear_monitor.mechanism.position import build_linkage
+from leg_wear_monitor.monitor.diagnosis.identification import identified_bodies, misfit
+from leg_wear_monitor.monitor.diagnosis.nuisances import nuisances
+from leg_wear_monitor.monitor.diagnosis.reference_file import shipped_reference
+from leg_wear_monitor.monitor.diagnosis.signature import TorqueSensor
+from leg_wear_monitor.monitor.diagnosis.signature_model import signature_model, simulated_signatures
+from leg_wear_monitor.monitor.ledger.entry import CommissionedTorque
+from leg_wear_monitor.twin.reference.body_factors import BodyFactors
+from leg_wear_monitor.twin.reference.torque_reference import HEAVIER, LONGER, POINTS
+
+SENSOR = TorqueSensor(period_s=0.005, cycle_s=1.0, size_nm=9.2, noise_nm=0.3)
+
+
+@pytest.fixture(scope="module")
+def known(leg):
+    reference = shipped_reference(leg)
+    return reference, signature_model(reference, SENSOR), nuisances(leg, reference, SENSOR)
+
+
+def ideal(leg, bodies: BodyFactors):
+    """Drive torque of ideal joints at the steps of a reference."""
+    return one_cycle(build_linkage(bodies.applied(leg)), POINTS, TURN).drive_torque
+
+
+def walked(leg, reference, bodies: BodyFactors, number: int = 0):
+    """Torques of a leg of the reference, with the change that other bodies make with ideal joints."""
+    change = ideal(leg, bodies) - ideal(leg, BodyFactors.none(leg))
+    return (reference.torque_nm[number].astype(float) + change).astype(np.float16)
+
+
+def legs_of(leg, reference):
+    """Legs with each body heavier, then longer."""
+    none = BodyFactors.none(leg)
+    changed = [none]
+    changed += [attrs.evolve(none, mass=none.mass + HEAVIER * one) for one in np.eye(len(none.mass))]
+    changed += [attrs.evolve(none, length=none.length + LONGER * one) for one in np.eye(len(none.mass))]
+    torques = tuple(walked(leg, reference, bodies) for bodies in changed)
+    return attrs.evolve(reference, torque_nm=torques, bodies=none)
+
+
+def commissioned(reference, torque) -> CommissionedTorque:
+    found = simulated_signatures(attrs.evolve(reference, torque_nm=(torque,)), 0, SENSOR)
+    return CommissionedTorque(1, reference.clearance_m[0], found)
+
+
+def test_a_leg_of_its_file_keeps_its_bodies(leg, known) -> None:
+    reference, model, found = known
+    same = commissioned(reference, reference.torque_nm[0])
+    assert misfit(model, found, same) < 0.1
+    bodies = identified_bodies(legs_of(leg, reference), model, found, same)
+    np.testing.assert_allclose(np.concatenate([bodies.mass, bodies.length]), 1.0, atol=1e-6)
+
+
+def test_other_bodies_are_identified_from_the_torque(leg, known) -> None:
+    reference, model, found = known
+    none = BodyFactors.none(leg)
+    names = list(leg.bodies)
+    truth = attrs.evolve(none, mass=none.mass + 0.05 * (np.array(names) == "shank"))
+    truth = attrs.evolve(truth, length=truth.length + 0.008 * (np.array(names) == "thigh"))
+    other = commissioned(reference, walked(leg, reference, truth))
+    bodies = identified_bodies(legs_of(leg, reference), model, found, other)
+    # only combinations act on the torque: what is judged is the torque of the identified leg
+    mean = commissioned(reference, walked(leg, reference, bodies)).mean
+    own = misfit(model, found, commissioned(reference, reference.torque_nm[0]))
+    before = misfit(model, found, other) - own
+    after = misfit(attrs.evolve(model, mean=mean), found, other) - own
+    assert after < 0.25 * before
+
+
+def test_factors_scale_bodies(leg) -> None:
+    none = BodyFactors.none(leg)
+    assert none.applied(leg) == leg
+    twice = BodyFactors(2.0 * none.mass, 2.0 * none.length).applied(leg)
+    for name, body in leg.bodies.items():
+        other = twice.bodies[name]
+        assert (other.mass, other.inertia) == pytest.approx((2.0 * body.mass, 8.0 * body.inertia))
+        assert other.points["toe" if "toe" in body.points else next(iter(body.points))] == pytest.approx(
+            tuple(2.0 * np.array(body.points["toe" if "toe" in body.points else next(iter(body.points))]))
+        )

@@ -29,11 +29,13 @@ from leg_wear_monitor.mechanism.spec import Mechanism
 from leg_wear_monitor.monitor.diagnosis.change_detector import ChangeDetector
 from leg_wear_monitor.monitor.diagnosis.diagnosis import Cause
 from leg_wear_monitor.monitor.diagnosis.explanations import Explainer
+from leg_wear_monitor.monitor.diagnosis.identification import UNLIKE_FILE, identified_bodies, misfit
 from leg_wear_monitor.monitor.diagnosis.leg_model import best_fit, explainer_of
 from leg_wear_monitor.monitor.diagnosis.signature import TorqueSensor, averaged, signatures
 from leg_wear_monitor.monitor.diagnosis.signature_model import with_noise_of
 from leg_wear_monitor.monitor.ledger.entry import CommissionedTorque
 from leg_wear_monitor.twin.follower.load import torque_size
+from leg_wear_monitor.twin.reference.body_factors import BodyFactors
 from leg_wear_monitor.twin.reference.crank_profile import CrankProfile, cycle_profile, mean_profile
 from leg_wear_monitor.twin.reference.torque_reference import TorqueReference, TorqueReferenceRun
 from leg_wear_monitor.wear.surfaces import SECTORS
@@ -44,6 +46,7 @@ NEW = np.full(5, 3.0e-4)
 SIZES = (3.6e-4, 4.5e-4, 6.0e-4, 1.0e-3)
 MONTH = 8.64e5  # gait cycles: eight hours a day at 60 rpm
 CLOCK = 1.0021  # period of the sensor over what it says: its samples drift through the gait cycle
+UNWORN = np.zeros((5, 2, SECTORS))
 STARTS = 5  # gait cycles between two starts of a test
 
 HEAD = """
@@ -52,25 +55,34 @@ HEAD = """
 
 
 class Leg(NamedTuple):
-    """Factors on the masses of a leg, and the ripple of its crank."""
+    """Factors on masses and lengths of a leg, the ripple of its crank, and the sizes of its joints [m]."""
 
     masses: dict[str, float]
+    lengths: dict[str, float]
     ripple: float
+    sizes: tuple[float, ...]
 
 
+BODIES = ("crank", "thigh", "coupler", "rocker", "shank", "foot", "tendon")
 LEGS = {
-    "a": Leg({"thigh": 1.04, "shank": 0.97, "foot": 1.03}, 0.03),
-    "b": Leg({"thigh": 0.96, "shank": 1.05, "foot": 0.95, "coupler": 1.05, "rocker": 0.95}, 0.02),
+    "a": Leg({"thigh": 1.04, "shank": 0.97, "foot": 1.03}, {}, 0.03, SIZES),
+    "b": Leg({"thigh": 0.96, "shank": 1.05, "foot": 0.95, "coupler": 1.05, "rocker": 0.95}, {}, 0.02, SIZES),
+    # drawn evenly, within 5 % and 1 %
+    "c": Leg(
+        dict(zip(BODIES, (0.963, 1.0, 1.01, 0.953, 0.965, 1.043, 0.957), strict=True)),
+        dict(zip(BODIES, (0.9926, 1.009, 1.0024, 0.9974, 1.0002, 1.0033, 0.9955), strict=True)),
+        0.025,
+        (3.6e-4, 1.0e-3),
+    ),
 }
 
 
-def heavier(leg: Mechanism, masses: dict[str, float]) -> Mechanism:
-    """The mechanism with other masses and inertias."""
-    bodies = dict(leg.bodies)
-    for name, factor in masses.items():
-        body = bodies[name]
-        bodies[name] = attrs.evolve(body, mass=factor * body.mass, inertia=factor * body.inertia)
-    return attrs.evolve(leg, bodies=bodies)
+def truth(leg: Mechanism, name: str) -> Mechanism:
+    """The mechanism with the masses and lengths of a leg."""
+    masses, lengths = (
+        [part.get(body, 1.0) for body in leg.bodies] for part in (LEGS[name].masses, LEGS[name].lengths)
+    )
+    return BodyFactors(np.array(masses), np.array(lengths)).applied(leg)
 
 
 def walked(leg: Mechanism, clearance: np.ndarray, cycles: int, ripple: float) -> np.ndarray:
@@ -89,11 +101,11 @@ def walked(leg: Mechanism, clearance: np.ndarray, cycles: int, ripple: float) ->
     return walk
 
 
-def cases(joints: tuple[str, ...]) -> Iterator[tuple[str, np.ndarray, int]]:
+def cases(joints: tuple[str, ...], sizes: tuple[float, ...]) -> Iterator[tuple[str, np.ndarray, int]]:
     """Name, clearances and gait cycles of each walk."""
     yield "new", NEW, HEALTHY
     for k, joint in enumerate(joints):
-        for size in SIZES:
+        for size in sizes:
             yield f"{joint} {1e3 * size:.2f}", np.where(np.arange(5) == k, size, NEW), AFTER
     yield "A 0.45 G 0.45", np.array([4.5e-4, 3e-4, 4.5e-4, 3e-4, 3e-4]), AFTER
     yield "B 0.60 J 0.60", np.array([3e-4, 6e-4, 3e-4, 3e-4, 6e-4]), AFTER
@@ -121,10 +133,22 @@ def profile_of(walk: np.ndarray, cycles: int = 20) -> CrankProfile:
     return mean_profile(profiles)
 
 
-def referred(leg: Mechanism, profile: CrankProfile) -> TorqueReference:
-    """A reference of the leg as it is on paper."""
+def referred(leg: Mechanism, profile: CrankProfile, bodies: BodyFactors) -> TorqueReference:
+    """A reference of a leg with given bodies."""
     run = TorqueReferenceRun(leg)
-    run.begin(NEW, np.zeros((5, 2, SECTORS)), profile)
+    run.begin(NEW, UNWORN, profile, bodies)
+    return simulated(run)
+
+
+def bodies_of(leg: Mechanism, explainer: Explainer, known: CommissionedTorque, reference) -> BodyFactors:
+    """The bodies that explain the torque of a commissioned leg."""
+    run = TorqueReferenceRun(leg)
+    run.begin_bodies(NEW, UNWORN, reference.profile, reference.bodies)
+    return identified_bodies(simulated(run), explainer.model, explainer.nuisances, known)
+
+
+def simulated(run: TorqueReferenceRun) -> TorqueReference:
+    """What a run simulates."""
     while (found := run.advance()) is None:
         if not run.is_busy:
             raise SystemExit("the leg could not be simulated")
@@ -145,12 +169,13 @@ def measured(walk: np.ndarray, sensor: TorqueSensor, noise_nm: float, random) ->
 
 def explained(
     leg, reference, walk, sensor, noise_nm, random, commissioned=True
-) -> tuple[Explainer, np.ndarray]:
+) -> tuple[Explainer, CommissionedTorque | None, np.ndarray]:
     """The explainer of a leg, commissioned on its first cycles or not, and its further signatures."""
     new = measured(walk, sensor, noise_nm, random)
     mean = new[:COMMISSIONING].mean(axis=0)
     known = CommissionedTorque(0, NEW, new[:COMMISSIONING]) if commissioned else None
-    return explainer_of(leg, reference, with_noise_of(reference, sensor, mean), known), new[COMMISSIONING:]
+    explainer = explainer_of(leg, reference, with_noise_of(reference, sensor, mean), known)
+    return explainer, known, new[COMMISSIONING:]
 
 
 def detected(detector: ChangeDetector, cycles: np.ndarray) -> int | None:
@@ -215,11 +240,35 @@ def at(explainer: Explainer, cycles: np.ndarray) -> list[str]:
 
 def walks_of(name: str, leg: Mechanism, keep: Path | None) -> dict[str, np.ndarray]:
     """Walks of a leg by case."""
-    truth, ripple, walks = heavier(leg, LEGS[name].masses), LEGS[name].ripple, {}
-    for case, clearance, cycles in cases(leg.clearance_joints):
-        make = functools.partial(walked, truth, clearance, cycles + 2, ripple)
+    real, walks = truth(leg, name), {}
+    for case, clearance, cycles in cases(leg.clearance_joints, LEGS[name].sizes):
+        make = functools.partial(walked, real, clearance, cycles + 2, LEGS[name].ripple)
         walks[case] = kept(keep / f"{name} {case}.pkl" if keep else None, make)
     return walks
+
+
+def known_leg(name, leg, walk, profile, sensor, random, options) -> tuple[Explainer, np.ndarray]:
+    """The explainer of a leg, with its bodies identified if required, and its signatures when healthy."""
+    file = (lambda what: options.keep / f"{name} {what}.pkl") if options.keep else (lambda what: None)
+    use = walk, sensor, options.noise_nm, random, not options.uncommissioned
+    none = BodyFactors.none(leg)
+    reference = kept(file("of file"), lambda: referred(leg, profile, none))
+    explainer, known, healthy = explained(leg, reference, *use)
+    if known is None:
+        return explainer, healthy
+    off = misfit(explainer.model, explainer.nuisances, known)
+    print(f"misfit of leg {name} with the bodies of its file {off:.2f}")
+    if off < UNLIKE_FILE or options.as_of_file:
+        return explainer, healthy
+    reference = kept(
+        file("identified"), lambda: referred(leg, profile, bodies_of(leg, explainer, known, reference))
+    )
+    explainer, known, healthy = explained(leg, reference, *use)
+    off = misfit(explainer.model, explainer.nuisances, known)
+    for what, factors in (("masses", reference.bodies.mass), ("lengths", reference.bodies.length)):
+        print(f"identified {what} [% off the file]:", np.round(100.0 * (factors - 1.0), 1))
+    print(f"misfit with these {off:.2f}")
+    return explainer, healthy
 
 
 def main() -> None:
@@ -228,6 +277,7 @@ def main() -> None:
     parser.add_argument("--noise-nm", type=float, default=0.5)
     parser.add_argument("--rate-hz", type=float, default=200.0)
     parser.add_argument("--uncommissioned", action="store_true")
+    parser.add_argument("--as-of-file", action="store_true", help="do not identify masses and lengths")
     parser.add_argument("--legs", nargs="+", default=list(LEGS))
     options = parser.parse_args()
     leg, random = load_mechanism("bionic_leg"), np.random.default_rng(5)
@@ -237,12 +287,8 @@ def main() -> None:
     for name in options.legs:
         walks = walks_of(name, leg, options.keep)
         profile = profile_of(walks["new"])
-        file = options.keep / f"{name} reference.pkl" if options.keep else None
-        reference = kept(file, functools.partial(referred, leg, profile))
         sensor = TorqueSensor(1.0 / options.rate_hz, TURN / abs(profile.speed), size)
-        explainer, healthy = explained(
-            leg, reference, walks["new"], sensor, options.noise_nm, random, not options.uncommissioned
-        )
+        explainer, healthy = known_leg(name, leg, walks["new"], profile, sensor, random, options)
         detector = ChangeDetector(explainer, NEW, MONTH)
         most = largest_sum(detector, healthy)
         print(
@@ -250,7 +296,7 @@ def main() -> None:
             f"{detector.threshold:.1f}, largest sum in {len(healthy)} healthy cycles {most:.1f}"
         )
         print(HEAD)
-        for case, clearance, _ in cases(leg.clearance_joints):
+        for case, clearance, _ in cases(leg.clearance_joints, LEGS[name].sizes):
             cycles = measured(walks[case], sensor, options.noise_nm, random)
             wide = [joint for joint, c in zip(leg.clearance_joints, clearance, strict=True) if c > 3.3e-4]
             right = {n: rightly(explainer, cycles, n, wide) for n in (5, 10)}

@@ -34,6 +34,7 @@ _NAMES = {
     Cause.LENGTH: "length",
     Cause.UNKNOWN: "unknown_change",
 }
+_COMPARED = {Cause.MASS: ("lighter", "heavier"), Cause.LENGTH: ("shorter", "longer")}
 
 
 def believed_at_limit(situation: Situation) -> Sequence[Hit]:
@@ -61,7 +62,7 @@ def seen_at_limit(situation: Situation) -> Sequence[Hit]:
                 "joint": each.joint,
                 "by": seen.by,
                 "value": estimate(seen.clearance_m, seen.sigma_m, "m"),
-                "limit": amount(each.limit_m, "m"),
+                "limit": amount(each.limit_m, "m") + (_doubt(situation) if seen.by == "torque" else ""),
             },
             joint=each.joint,
             evidence=(Evidence(f"clearance {each.joint} by {seen.by}", seen.clearance_m, each.limit_m, "m"),),
@@ -94,7 +95,7 @@ def diagnosed(*causes: Cause) -> Callable[[Situation], Sequence[Hit]]:
     """Significant changes of the drive torque with one of some causes."""
 
     def hits(situation: Situation) -> Sequence[Hit]:
-        return [_hit(change) for change in changes(situation) if change.cause in causes]
+        return [_hit(change, _doubt(situation)) for change in changes(situation) if change.cause in causes]
 
     return hits
 
@@ -120,9 +121,10 @@ def words_of(change: Change) -> str:
     if change.cause is Cause.CLEARANCE:
         verb = "was" if change.is_corrected else "is"
         words = f"clearance of {value} in joint {change.subject}, {counted} {verb} counted"
-    elif change.cause is Cause.MASS:
+    elif change.cause in _COMPARED:
         percent = estimate(100.0 * abs(change.value), 100.0 * change.sigma, "%")
-        words = f"body {change.subject} is {percent} {'heavier' if change.value > 0.0 else 'lighter'}"
+        less, more = _COMPARED[change.cause]
+        words = f"body {change.subject} is {percent} {more if change.value > 0.0 else less}"
     elif change.cause is Cause.UNKNOWN:
         words = "no single cause explains the change"
     else:
@@ -133,11 +135,17 @@ def words_of(change: Change) -> str:
     return words
 
 
-def _hit(change: Change) -> Hit:
+def _doubt(situation: Situation) -> str:
+    """Why what the drive torque shows is not sure, in parentheses; empty if it is."""
+    reason = situation.diagnosis.reason if situation.diagnosis else ""
+    return f" ({reason})" if reason else ""
+
+
+def _hit(change: Change, doubt: str = "") -> Hit:
     is_joint = change.cause is Cause.CLEARANCE
     name = f"clearance {change.subject} by torque" if is_joint else _NAMES[change.cause]
     return Hit(
-        words={"change": words_of(change)},
+        words={"change": f"{words_of(change)}{doubt}"},
         joint=change.subject if is_joint else "",
         since_ns=change.since_ns,
         evidence=(Evidence(name, change.value, math.nan, _UNITS[change.cause]),),

@@ -406,3 +406,20 @@ def test_the_page_lists_every_rule_as_it_is_declared() -> None:
 
 if __name__ == "__main__":
     PAGE.write_text(renewed(PAGE.read_text(encoding="utf-8")), encoding="utf-8")
+
+
+def test_a_name_that_is_not_sure_is_said_to_be_so() -> None:
+    reason = "the leg is not that of its mechanism file"
+    unsure = attrs.evolve(diagnosis(change(Cause.CLEARANCE, "G")), reason=reason)
+    assert f"0.3 mm is counted ({reason})" in judged(diagnosis=unsure).why
+    at_limit = judged(diagnosis=unsure, joints=seen("torque", 6.7e-4, 3.0e-5))
+    assert f"the limit is 0.6 mm ({reason})" in at_limit.why
+    assert (
+        reason not in judged(diagnosis=unsure, joints=seen("encoders", 6.7e-4, 3.0e-5)).why.partition(";")[0]
+    )
+
+
+def test_a_body_that_is_longer_is_another_mechanism() -> None:
+    found = judged(diagnosis=diagnosis(change(Cause.LENGTH, "thigh", value=-0.012, sigma=0.002, counted=0.0)))
+    assert (found.state, found.fault_code) == (State.INSPECT, "MECHANISM_CHANGED")
+    assert "body thigh is 1.2 % ± 0.2 % shorter" in found.why

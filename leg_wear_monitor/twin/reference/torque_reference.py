@@ -28,7 +28,7 @@ from leg_wear_monitor.twin.reference.crank_profile import CrankProfile
 from leg_wear_monitor.twin.reference.reference import worn_to
 
 POINTS = INTERVALS // 4  # of a gait cycle: whole intervals of the stepper
-CYCLES = 40  # simulated for each leg, and twice as many for the expected one
+CYCLES = 40  # simulated for each wider leg, and twice as many for each other one
 WIDER = (1.2, 1.35, 1.5, 2.0, 3.0, 5.0, 8.0)  # factors on the expected clearance, one joint at a time
 
 HEAVIER, LONGER = 0.04, 0.004  # of a body's mass and length, one body at a time
@@ -116,7 +116,7 @@ class TorqueReferenceRun:
     @property
     def progress(self) -> float:
         """Fraction of the gait cycles that are done; 0 where nothing was begun."""
-        return sum(len(one) for one in self._done) / (CYCLES * (len(self._legs) + 1))
+        return sum(len(one) for one in self._done) / sum(map(self._cycles_of, self._legs))
 
     def begin(
         self, clearance_m: Floats, depth: Floats, profile: CrankProfile, bodies: BodyFactors | None = None
@@ -219,6 +219,10 @@ class TorqueReferenceRun:
         self._use(profile)
         self._begin_leg()
 
+    def _cycles_of(self, leg: _Leg) -> int:
+        """Gait cycles that are simulated for a leg."""
+        return CYCLES if (leg.clearance_m != self._legs[0].clearance_m).any() else 2 * CYCLES
+
     def _prepare(self, bodies: BodyFactors) -> None:
         """Prepare the simulation of a leg with given bodies."""
         self._bodies = bodies
@@ -248,7 +252,7 @@ class TorqueReferenceRun:
         self._stepper = ClearanceStepper(self._setup, self._period / INTERVALS, tables=self._tables)
         start = self._profile.at(0.0)
         self._stepper.init(start.angle, start.speed)
-        self._torque = np.zeros((CYCLES if number else 2 * CYCLES, POINTS), np.float16)
+        self._torque = np.zeros((self._cycles_of(leg), POINTS), np.float16)
         self._cycle, self._statistics.drive_integral[TORQUE] = 0, 0.0
         return self._stepper
 

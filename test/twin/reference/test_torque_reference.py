@@ -1,0 +1,76 @@
+"""Runs of simulated legs: which legs, and that a restored run continues bit for bit."""
+
+import attrs
+import numpy as np
+import pytest
+
+from leg_wear_monitor.mechanism.ideal import TURN
+from leg_wear_monitor.twin.reference import torque_reference
+from leg_wear_monitor.twin.reference.body_factors import BodyFactors
+from leg_wear_monitor.twin.reference.crank_profile import CrankProfile
+from leg_wear_monitor.twin.reference.torque_reference import (
+    HEAVIER,
+    LONGER,
+    WIDER,
+    TorqueReference,
+    TorqueReferenceRun,
+)
+from leg_wear_monitor.wear.surfaces import SECTORS
+
+NEW, UNWORN = np.full(5, 3.0e-4), np.zeros((5, 2, SECTORS))
+STEADY = CrankProfile.steady(TURN)
+
+
+def finished(run: TorqueReferenceRun) -> TorqueReference:
+    while (found := run.advance()) is None:
+        assert run.is_busy
+    return found
+
+
+@pytest.fixture
+def short(monkeypatch):
+    """Runs of a single gait cycle a leg, and two where there are twice as many."""
+    monkeypatch.setattr(torque_reference, "CYCLES", 1)
+    monkeypatch.setattr(torque_reference, "_SETTLING", 0)
+
+
+def test_each_joint_is_wider_in_turn(leg, short) -> None:
+    run = TorqueReferenceRun(leg)
+    run.begin(NEW, UNWORN, STEADY)
+    found = finished(run)
+    assert len(found.torque_nm) == 1 + 5 * len(WIDER)
+    assert [len(torque) for torque in found.torque_nm] == [2] + 5 * len(WIDER) * [1]
+    np.testing.assert_allclose(found.clearance_m[1 : 1 + len(WIDER), 0], 3.0e-4 * np.array(WIDER))
+    assert (found.clearance_m[1 : 1 + len(WIDER), 1:] == 3.0e-4).all()
+    np.testing.assert_array_equal(found.bodies.mass, 1.0)
+
+
+def test_each_body_is_heavier_and_longer_in_turn(leg, short) -> None:
+    none, run = BodyFactors.none(leg), TorqueReferenceRun(leg)
+    run.begin_bodies(NEW, UNWORN, STEADY, none)
+    found = finished(run)
+    bodies = len(leg.bodies)
+    assert len(found.torque_nm) == 1 + 2 * bodies
+    assert (found.clearance_m == 3.0e-4).all()
+    # the fourth leg of the heavier ones is that with its fourth body heavier, simulated alone
+    one = np.eye(bodies)[3]
+    for number, alone in (
+        (4, attrs.evolve(none, mass=none.mass + HEAVIER * one)),
+        (4 + bodies, attrs.evolve(none, length=none.length + LONGER * one)),
+    ):
+        other = TorqueReferenceRun(alone.applied(leg))
+        other.begin(NEW, UNWORN, STEADY)
+        while not other.snapshot().done:
+            other.advance()
+        np.testing.assert_array_equal(other.snapshot().done[0], found.torque_nm[number])
+
+
+def test_a_restored_run_continues_bit_for_bit(leg, short) -> None:
+    run, other = TorqueReferenceRun(leg), TorqueReferenceRun(leg)
+    run.begin_bodies(NEW, UNWORN, STEADY, BodyFactors.none(leg))
+    for _ in range(7):  # amidst a leg with another body
+        run.advance()
+    other.restore(run.snapshot())
+    assert other.progress == run.progress
+    for one, same in zip(finished(run).torque_nm, finished(other).torque_nm, strict=True):
+        np.testing.assert_array_equal(one, same)

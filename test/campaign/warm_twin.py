@@ -6,11 +6,11 @@ from typing import Any
 def keep_twin() -> None:
     """Have every monitor of the default leg from now on take the same twin, as new each time."""
     from leg_wear_monitor import MonitorConfig, load_mechanism
-    from leg_wear_monitor.monitor import wear_monitor
+    from leg_wear_monitor.monitor import parts
     from leg_wear_monitor.monitor.config.fitting import fitted, twin_settings
 
     config = MonitorConfig()
-    made = wear_monitor.DigitalTwin
+    made = parts.DigitalTwin
     twin = made(fitted(load_mechanism(config.mechanism), config), twin_settings(config))
     twin.warm_up()
     new, settings = twin.snapshot(), twin_settings(config)
@@ -21,4 +21,4 @@ def keep_twin() -> None:
         twin.restore(new)
         return twin
 
-    wear_monitor.DigitalTwin = again  # type: ignore[assignment, misc]
+    parts.DigitalTwin = again  # type: ignore[assignment, misc]

@@ -51,7 +51,7 @@ kernels: .venv/installed
 demo: .venv/installed
 	.venv/bin/leg-wear-monitor demo --out build/demo
 
-# Hostile users by the hundred, minutes to an hour (docs/campaign.md); the tests run a few of each family.
+# Hostile users by the hundred, minutes to an hour (docs/appendix/campaign.md); the tests run a few of each family.
 campaign: .venv/installed
 	PYTHONPATH=test .venv/bin/python -m campaign
 

@@ -44,7 +44,8 @@ def installed(monkeypatch):
 def test_the_docs_that_help_names_are_installed(installed):
     files = {f"{place}/{Path(name).name}" for place, names in installed["data_files"] for name in names}
     fraction = "share/leg_wear_monitor"
-    assert {f"{fraction}/docs/parameters.md", f"{fraction}/docs/decisions/0001-packaging.md"} <= files
+    docs = f"{fraction}/docs"
+    assert {f"{docs}/reference/parameters.md", f"{docs}/decisions/0001-packaging.md"} <= files
     assert {f"{fraction}/SECURITY.md", f"{fraction}/README.md", f"{fraction}/launch/demo.launch.xml"} <= files
 
 

@@ -1,4 +1,4 @@
-"""Print the tables of docs/validation.md on the leg with clearances: sections 7 to 9. About three minutes."""
+"""Print the tables of validation.md on the leg with clearances: sections 7 to 9. About three minutes."""
 
 import argparse
 

@@ -1,4 +1,4 @@
-"""How long both models go the same way: a table of docs/validation_clearance.md, and docs/decorrelation.png.
+"""How long both models go the same way: a table of validation_clearance.md, and decorrelation.png.
 
 From the same ideal start at 60 rpm: full against clearance coordinates, and two runs in full coordinates
 whose clearances differ by a nanometre. A minute on one core.
@@ -19,7 +19,7 @@ from leg_wear_monitor.report.figures import figure as drawing
 LEGS, SETS = ("bionic_leg", "jansen_leg"), ("AB", "G", "IJ", "ABGIJ")
 CLEARANCE, APART = 3.0e-4, 1.0e-9  # m: of all joints, and by what two runs in full coordinates differ
 FAR = 0.1  # of the clearance: motions so far apart have nothing to do with each other
-PICTURE = Path(__file__).parents[1] / "decorrelation.png"
+PICTURE = Path(__file__).parents[1] / "appendix" / "decorrelation.png"
 
 
 class Watched:

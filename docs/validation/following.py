@@ -1,4 +1,4 @@
-"""How the twin's wear errs with noise, rate and losses of its samples: a table of docs/physics.md.
+"""How the twin's wear errs with noise, rate and losses of its samples: a table of physics.md.
 
 A leg in full coordinates walks for 40 gait cycles at 60 rpm, and wears; the twin sees its crank and torque.
 Three minutes, most of them for that leg.

@@ -1,4 +1,4 @@
-"""Print the tables of docs/validation_clearance.md on means: clearance against full coordinates.
+"""Print the tables of validation_clearance.md on means: clearance against full coordinates.
 
 Twenty-four cases, ten independent runs of twenty cycles in each model: about ten minutes on two cores.
 """

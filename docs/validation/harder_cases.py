@@ -1,4 +1,4 @@
-"""Print section 5 of docs/validation_clearance.md: loads, no friction, much friction, other clearances.
+"""Print section 5 of validation_clearance.md: loads, no friction, much friction, other clearances.
 
 Nine cases, some runs of twenty cycles in each model: half an hour on one core. With numbers as arguments,
 only these cases.

@@ -1,4 +1,4 @@
-"""Print the tables of docs/validation.md that compare with published results: sections 1 to 6.
+"""Print the tables of validation.md that compare with published results: sections 1 to 6.
 
 Cases and wanted values are those of the tests, taken from their files.
 """

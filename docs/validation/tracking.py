@@ -1,4 +1,4 @@
-"""What the crank tracker makes of noise and of speed ripple, over its bandwidth: a table of docs/physics.md.
+"""What the crank tracker makes of noise and of speed ripple, over its bandwidth: a table of physics.md.
 
 The crank turns at 60 rpm with a ripple of 3 % twice a turn; an encoder of 1e-3 rad sees it. Half a minute.
 """

@@ -26,7 +26,7 @@ DONE, COULD_NOT = 0, 2
 
 _SIGNALS = (signal.SIGINT, signal.SIGTERM)
 
-# The events executor needs a sixth of the default executor's time (docs/decisions/0008-live-node.md). Its
+# The events executor needs a sixth of the default executor's time (docs/decisions/0007-live-node.md). Its
 # spin() without a timeout hangs at full load in the Jazzy wheels, so it is called repeatedly with a timeout.
 WAKE_S = 0.2
 

@@ -1,4 +1,4 @@
-"""The tables of docs/mechanism_file.md are those of the classes; run this file as a script to renew them."""
+"""The tables of mechanism_file.md are those of the classes; run this file as a script to renew them."""
 
 import re
 from pathlib import Path
@@ -9,7 +9,7 @@ import pytest
 
 from leg_wear_monitor.mechanism import clearance, spec
 
-PAGE = Path(__file__).parents[2] / "docs" / "mechanism_file.md"
+PAGE = Path(__file__).parents[2] / "docs" / "reference" / "mechanism_file.md"
 TABLE = re.compile(r"(<!-- keys of (\w+) -->\n).*?(<!-- end -->)", re.DOTALL)
 
 

@@ -1,4 +1,4 @@
-"""docs/ros.md lists the gait publisher's parameters as they are declared; a script renews the table."""
+"""ros.md lists the gait publisher's parameters as they are declared; a script renews the table."""
 
 import re
 from configparser import ConfigParser
@@ -14,7 +14,7 @@ from leg_wear_monitor.monitor.config.parameters import Parameter, parameters_of,
 from leg_wear_monitor.ros.gait_publisher.config import PublisherConfig
 from leg_wear_monitor.share import share_directory
 
-PAGE = Path(__file__).parents[2] / "docs" / "ros.md"
+PAGE = Path(__file__).parents[2] / "docs" / "reference" / "ros.md"
 TABLE = re.compile(r"(<!-- parameters -->\n).*?(<!-- end -->)", re.DOTALL)
 
 

@@ -1,4 +1,4 @@
-"""docs/study.md lists the keys of descriptions as the classes declare them; a script renews the table.
+"""study.md lists the keys of descriptions as the classes declare them; a script renews the table.
 
 python test/studies/test_study_docs.py
 """
@@ -13,7 +13,7 @@ import pytest
 
 from leg_wear_monitor.studies.plan.settings import STUDIES
 
-PAGE = Path(__file__).parents[2] / "docs" / "study.md"
+PAGE = Path(__file__).parents[2] / "docs" / "appendix" / "study.md"
 TABLE = re.compile(r"(<!-- keys -->\n).*?(<!-- end -->)", re.DOTALL)
 
 

@@ -9,6 +9,6 @@ monitor = node_verb(
     """Monitor the joint wear of a leg from joint_states and drive_torque.
 
     It monitors as soon as it runs. Parameters: --ros-args --params-file FILE, or -p NAME:=VALUE;
-    docs/parameters.md lists them. `ros2 run leg_wear_monitor monitor` starts the same node.
+    docs/reference/parameters.md lists them. `ros2 run leg_wear_monitor monitor` starts the same node.
     """,
 )

@@ -59,7 +59,7 @@ def _signs(signs: tuple[float, ...]) -> str | None:
 
 @attrs.frozen(kw_only=True)
 class Encoders:
-    """Further encoders, in whose angles clearances show (docs/forecast.md); by default there are none."""
+    """Further encoders, in whose angles clearances show (forecast.md); by default there are none."""
 
     names: tuple[str, ...] = described(
         "their names in joint_states, in the messages with the crank; empty: none is read",

@@ -119,7 +119,7 @@ def structured(kind: type[_Config], values: Mapping[str, Any], source: str) -> _
     known = parameters_of(kind)
     for name, value in values.items():
         if name not in known:
-            fault = unknown_fault("parameter", name, known, "docs/parameters.md lists all")
+            fault = unknown_fault("parameter", name, known, "docs/reference/parameters.md lists all")
             raise ConfigError(source, name, fault)
         _check_type(known[name], value, source)
         *sections, last = name.split(".")

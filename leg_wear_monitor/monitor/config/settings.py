@@ -1,6 +1,6 @@
 """Every parameter of the monitor, declared once: name, default, unit, bounds, meaning.
 
-The check of config/monitor.yaml, the descriptors of the ROS node and the table in docs/parameters.md follow
+The check of config/monitor.yaml, the descriptors of the ROS node and the table in parameters.md follow
 from these classes. A section is a class, so `limits.clearance_m` is the parameter's name everywhere.
 """
 
@@ -190,7 +190,7 @@ class Diagnostics:
 
 @attrs.frozen(kw_only=True)
 class TorqueDiagnosis:
-    """Clearances that the drive torque shows (docs/diagnosis.md)."""
+    """Clearances that the drive torque shows (docs/explanation/diagnosis.md)."""
 
     enabled: bool = described("whether clearances are estimated from the drive torque", default=True)
     correct: bool = described(

@@ -9,7 +9,7 @@ from leg_wear_monitor.monitor.diagnosis.explanations import MODEL_ERROR, Explain
 _ROUNDS = 30
 _LEAST_FACTOR = 0.7  # of the expected clearance
 _FLAT = 1.0  # prior standard deviation of a clearance's logarithm: what shows nothing keeps its prior
-_MODEL_M = 5.0e-6  # error of the model against full coordinates (docs/diagnosis.md)
+_MODEL_M = 5.0e-6  # error of the model against full coordinates (docs/explanation/diagnosis.md)
 
 
 @attrs.frozen(eq=False)

@@ -16,13 +16,13 @@ from leg_wear_monitor.monitor.ledger.entry import CommissionedTorque
 from leg_wear_monitor.twin.reference.body_factors import BodyFactors
 from leg_wear_monitor.twin.reference.torque_reference import HEAVIER, LONGER, TorqueReference
 
-UNLIKE_FILE = 0.8  # misfit from which on the leg is not that of its file (docs/diagnosis.md)
+UNLIKE_FILE = 0.8  # misfit from which on the leg is not that of its file (docs/explanation/diagnosis.md)
 
 _MASS, _LENGTH = 0.03, 0.006  # standard deviations of a leg's bodies about those of its file
 _SENSOR = 5.0  # times the usual changes of friction, scale, offset and load: they are constant here
 
 # a model with the right bodies is off by a part of the torque's size, by a part of its steps where it is
-# steep, and in its roughness (docs/diagnosis.md)
+# steep, and in its roughness (docs/explanation/diagnosis.md)
 _OF_SIZE, _OF_STEP, _ROUGHNESS = 0.005, 0.1, 0.1
 
 

@@ -48,7 +48,7 @@ from leg_wear_monitor.twin.settings import INSTANT
 from leg_wear_monitor.twin.statistics import CycleStatistics
 
 COMMISSIONING_CYCLES = 60
-# of the counted clearance: smaller openings are named wrongly where masses are 5 % off (docs/diagnosis.md)
+# of the counted clearance: smaller openings are named wrongly where masses are 5 % off (diagnosis.md)
 CORRECTED_FROM = 1.3
 WINDOW_CYCLES = 60  # that clearances are estimated from
 SETTLING_CYCLES = 10  # since a change, before the counted clearances are corrected by it

@@ -114,7 +114,7 @@ def not_observed(situation: Situation) -> Sequence[Hit]:
     """The diagnosis does not show some joints yet, or not at all, and no encoder does.
 
     The mismatch of the torque shows broken hip and knee joints, but not those of the foot
-    (docs/monitor.md), so a leg without a mismatch is not known to be healthy. A diagnosis that is off is the
+    (monitor.md), so a leg without a mismatch is not known to be healthy. A diagnosis that is off is the
     choice of somebody, and does not raise this.
     """
     found = situation.diagnosis

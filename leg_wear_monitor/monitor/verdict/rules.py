@@ -1,6 +1,6 @@
 """The rules of the verdict, one entry each; the most severe one that holds decides, the first of equals.
 
-docs/monitor.md lists them; a test compares the two.
+docs/reference/monitor.md lists them; a test compares the two.
 """
 
 from leg_wear_monitor.monitor.alarms.alarm import Level

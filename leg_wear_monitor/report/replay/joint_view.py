@@ -113,7 +113,7 @@ def _is_seen(summary: ReplaySummary, joint: str, clearance: JointClearance) -> b
     """Whether the seen clearance is believed.
 
     While the leg is not the counted one, the torque names a joint rightly and estimates the others from the
-    counted leg (docs/diagnosis.md); encoders do not suppose the counted clearances.
+    counted leg (docs/explanation/diagnosis.md); encoders do not suppose the counted clearances.
     """
     if clearance.seen_m is None or clearance.seen_sigma_m is None:
         return False

@@ -1,1 +1,1 @@
-"""One module for each family of cases; docs/campaign.md says what it holds."""
+"""One module for each family of cases; docs/appendix/campaign.md says what it holds."""

@@ -142,7 +142,7 @@ def test_means_hold_at_half_the_interval_and_a_tenth_of_the_tolerance(leg, finer
     ["G", pytest.param("AB", marks=pytest.mark.slow), pytest.param("IJ", marks=pytest.mark.slow), "ABGIJ"],
 )
 def test_means_are_those_of_full_coordinates(leg, leg_cycles, clearance_joints):
-    """Over twenty cycles; docs/validation.md has more of them, and more figures."""
+    """Over twenty cycles; docs/appendix/validation.md has more of them, and more figures."""
     cycles, setup = leg_cycles(clearance_joints, CYCLES), prepare(leg, clearances=tuple(clearance_joints))
     known = build_tables(setup.linkage, setup.contacts)
     full = np.stack([cycles.force, cycles.archard, cycles.contact], axis=1)

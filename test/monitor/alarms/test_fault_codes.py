@@ -1,4 +1,4 @@
-"""Fault codes: those of alarms, and the table of the others in docs/ros.md, which this script renews."""
+"""Fault codes: those of alarms, and the table of the others in ros.md, which this script renews."""
 
 import re
 from pathlib import Path
@@ -12,7 +12,7 @@ from leg_wear_monitor.monitor.alarms.fault_codes import FAULT_CODES, NO_FAULT, c
 pytestmark = pytest.mark.plain
 
 PACKAGE = Path(__file__).parents[3] / "leg_wear_monitor"
-PAGE = PACKAGE.parent / "docs" / "ros.md"
+PAGE = PACKAGE.parent / "docs" / "reference" / "ros.md"
 TABLE = re.compile(r"(<!-- fault codes -->\n).*?(<!-- end -->)", re.DOTALL)
 CLEAR = Alarm(kind="clearance", subject="A")
 WARNS, FAILS = attrs.evolve(CLEAR, level=Level.WARN), Alarm(kind="torque_mismatch", level=Level.ERROR)

@@ -1,4 +1,4 @@
-"""docs/parameters.md and config/monitor.yaml say what the classes declare; a script renews the table."""
+"""parameters.md and config/monitor.yaml say what the classes declare; a script renews the table."""
 
 import re
 from pathlib import Path
@@ -11,7 +11,7 @@ from leg_wear_monitor.monitor.config.parameter_file import load_config, shipped_
 from leg_wear_monitor.monitor.config.parameters import PARAMETERS, Parameter
 from leg_wear_monitor.monitor.config.settings import MonitorConfig
 
-PAGE = Path(__file__).parents[3] / "docs" / "parameters.md"
+PAGE = Path(__file__).parents[3] / "docs" / "reference" / "parameters.md"
 TABLE = re.compile(r"(<!-- parameters -->\n).*?(<!-- end -->)", re.DOTALL)
 
 

@@ -1,4 +1,4 @@
-"""The table of alarms is what docs/monitor.md lists and a board holds; a script renews the page's table."""
+"""The table of alarms is what monitor.md lists and a board holds; a script renews the page's table."""
 
 import re
 from pathlib import Path
@@ -15,7 +15,7 @@ from leg_wear_monitor.monitor.forecast.forecast import Quantiles
 
 pytestmark = pytest.mark.plain
 
-PAGE = Path(__file__).parents[3] / "docs" / "monitor.md"
+PAGE = Path(__file__).parents[3] / "docs" / "reference" / "monitor.md"
 TABLE = re.compile(r"(<!-- alarms -->\n).*?(<!-- end -->)", re.DOTALL)
 ENCODERS = {"encoders.names": ["knee"], "encoders.joints": ["G"]}
 

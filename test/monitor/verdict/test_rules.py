@@ -384,7 +384,7 @@ def test_a_verdict_is_plain_data() -> None:
 
 # --- the page ---
 
-PAGE = Path(__file__).parents[3] / "docs" / "monitor.md"
+PAGE = Path(__file__).parents[3] / "docs" / "reference" / "monitor.md"
 TABLE = re.compile(r"(<!-- verdicts -->\n).*?(<!-- end -->)", re.DOTALL)
 
 

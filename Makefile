@@ -1,5 +1,5 @@
 # `make test` and `make demo` do all the set-up themselves, once: Python 3.11 to 3.13 with venv and a C compiler are enough.
-.PHONY: test test-slow lint kernels test-oldest test-oldest-quick package colcon docs-check demo campaign lock sbom clean
+.PHONY: test test-slow lint kernels test-oldest test-oldest-quick package colcon docs docs-check demo campaign lock sbom clean
 .DELETE_ON_ERROR:
 
 # Percent of lines and branches that the two runs of the tests reach together.
@@ -80,6 +80,13 @@ colcon: .venv/installed .venv-tools/installed
 		--pytest-args test/test_packaging.py test/monitor/alarms/test_words.py --no-cov
 	$(COLCON) test-result --test-result-base build/colcon/build --verbose
 
+# The documentation site, without network: build/docs/index.html, and a browser on it where there is a screen.
+docs: .venv/installed .venv-docs/installed
+	PYTHONPATH=$$(echo .venv-docs/lib/python3*/site-packages) .venv/bin/python -m sphinx \
+		-q -n -W --keep-going -d build/doctrees docs build/docs
+	@echo "build/docs/index.html"
+	@test -n "$$CI" || test -z "$$DISPLAY$$WAYLAND_DISPLAY" || .venv/bin/python -m webbrowser build/docs/index.html
+
 # Spelling, and links from one document to another.
 docs-check: .venv/installed .venv-tools/installed
 	.venv-tools/bin/codespell *.md *.rst Makefile docs benchmarks config launch security leg_wear_monitor test
@@ -91,7 +98,7 @@ test-oldest-quick: .venv-oldest/installed
 		test/contact test/messages test/monitor
 
 clean:
-	rm -rf .venv .venv-oldest .venv-tools build dist *.egg-info .coverage .hypothesis .import_linter_cache .*_cache
+	rm -rf .venv .venv-oldest .venv-tools .venv-docs build dist *.egg-info .coverage .hypothesis .import_linter_cache .*_cache
 
 # What the packages are built with comes first: without build isolation, which would fetch a setuptools that nothing pins.
 .venv/installed: setup.cfg setup.py package.xml requirements-build.lock requirements.lock
@@ -108,6 +115,11 @@ clean:
 	$(@D)/bin/python -m pip install $(QUICKLY) --constraint constraints-oldest.txt --no-build-isolation --editable ".[bags,test]"
 	@touch $@
 
+.venv-docs/installed: requirements-docs.lock
+	$(call environment,python3.13 python3.12 python3.11 python3)
+	$(call locked,requirements-docs.lock)
+	@touch $@
+
 .venv-tools/installed: requirements-build.lock requirements-tools.lock
 	$(call environment,python3.13 python3.12 python3.11 python3)
 	$(call locked,requirements-build.lock)
@@ -119,6 +131,7 @@ lock: .venv-tools/installed
 	$(LOCK) --constraint constraints.txt --extra ros --extra bags --extra test --extra lint --extra dask \
 		--output-file requirements.lock setup.py
 	printf 'setuptools\nwheel\n' | $(LOCK) --constraint constraints.txt --output-file requirements-build.lock -
+	$(LOCK) --fork-strategy fewest --constraint constraints.txt --output-file requirements-docs.lock requirements-docs.in
 	printf '%s\n' $(TOOLS) | $(LOCK) --output-file requirements-tools.lock -
 
 # A bill of materials in CycloneDX's format: all that is in the environment of `make test`, this package included.

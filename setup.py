@@ -6,6 +6,7 @@ from xml.etree import ElementTree
 from setuptools import setup
 
 FRACTION = "share/leg_wear_monitor"
+SITE = {"conf.py", "three_clicks.py", "site.css"}  # what builds the pages below docs/ is no page
 
 
 def share_files() -> list[tuple[str, list[str]]]:
@@ -13,7 +14,7 @@ def share_files() -> list[tuple[str, list[str]]]:
     found: dict[str, list[str]] = {}
     for top in ("bags", "config", "docs", "launch", "security"):
         for path in sorted(Path(top).rglob("*")):
-            if path.is_file() and "__pycache__" not in path.parts:
+            if path.is_file() and "__pycache__" not in path.parts and path.name not in SITE:
                 found.setdefault(f"{FRACTION}/{path.parent.as_posix()}", []).append(path.as_posix())
     return list(found.items())
 

@@ -55,7 +55,7 @@ def test_ros2_launch_is_among_the_dependencies():
     assert {"launch", "launch_ros", "launch_xml", "ros2launch"} <= needed
 
 
-@pytest.mark.parametrize("lock", ["requirements.lock", "requirements-build.lock"])
+@pytest.mark.parametrize("lock", ["requirements.lock", "requirements-build.lock", "requirements-docs.lock"])
 def test_a_lock_pins_what_the_constraints_pin_and_by_hash(lock):
     constraints, locked = pins(ROOT / "constraints.txt"), pins(ROOT / lock)
     assert {name: pin[0] for name, pin in locked.items() if name in constraints} == {
@@ -74,6 +74,11 @@ def test_the_lock_has_all_that_make_installs():
     asked = [line for text in texts for line in text.splitlines() if line and not line.startswith("#")]
     names = {normal(re.match(r"[A-Za-z0-9._-]+", line)[0]) for line in asked}
     assert names <= set(pins(ROOT / "requirements.lock"))
+
+
+def test_the_lock_of_the_site_has_what_it_is_built_with():
+    asked = re.findall(r"^([a-z][a-z-]*)>=", (ROOT / "requirements-docs.in").read_text(), re.MULTILINE)
+    assert asked and set(asked) <= set(pins(ROOT / "requirements-docs.lock"))
 
 
 @pytest.mark.parametrize("lock", sorted(ROOT.glob("requirements*.lock")), ids=lambda path: path.name)

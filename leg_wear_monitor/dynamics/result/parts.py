@@ -103,7 +103,8 @@ class JointResult:
     friction_work_j_per_cycle : float or None
         Friction work per cycle [J].
     archard_integral_j_per_cycle : float or None
-        Integral of F_N |v_t| dt per cycle [J]; times a wear coefficient [1/Pa] it is the worn volume [m³].
+        Integral of ``F_N |v_t| dt`` per cycle [J]; times a wear coefficient [1/Pa] it is the worn volume
+        [m³].
     wear_depth_m_per_cycle : WearDepth or None
     wear_zone_deg : tuple of two floats or None
         Narrowest zone (from, to) [deg] with 90 % of the bushing's wear, in the frame of the bushing's body;

@@ -1,0 +1,67 @@
+"""Settings of the documentation site; `make docs` builds it into build/docs, without network."""
+
+import sys
+from pathlib import Path
+from typing import Any
+from xml.etree import ElementTree
+
+ROOT = Path(__file__).parents[1]
+sys.path[:0] = [str(Path(__file__).parent / "_ext"), str(ROOT)]
+
+project = "leg_wear_monitor"
+author = "leg_wear_monitor maintainers"
+copyright = author
+version = release = ElementTree.parse(ROOT / "package.xml").findtext("version") or "unknown"
+
+extensions = [
+    "myst_parser",
+    "numpydoc",
+    "sphinx.ext.autodoc",
+    "sphinx.ext.autosummary",
+    "sphinx_click",
+    "sphinx_design",
+    "three_clicks",
+]
+exclude_patterns = ["_ext", "validation"]
+nitpicky = True
+
+# Pages are read on a forge, too: headings have its anchors, and links are those of plain Markdown.
+myst_heading_anchors = 4
+myst_enable_extensions = ["colon_fence", "deflist"]
+
+autosummary_generate = False
+autodoc_member_order = "bysource"
+autodoc_typehints = "none"  # the docstrings have types, with shapes and units
+numpydoc_show_class_members = False
+
+default_role = "literal"  # in docstrings, single backticks mark names
+
+
+def _plain_help(_app: object, _context: object, lines: list[str]) -> None:
+    """Help texts are plain: their asterisks are no emphasis, and an argument without a name is not listed."""
+    if lines[:1] == [".. option:: "]:
+        lines.clear()
+    lines[:] = [line.replace("*", r"\*") for line in lines]
+
+
+def setup(app: Any) -> None:
+    """Sphinx calls this."""
+    for part in ("arguments", "options"):
+        app.connect(f"sphinx-click-process-{part}", _plain_help)
+
+
+html_theme = "pydata_sphinx_theme"
+html_title = f"leg_wear_monitor {version}"
+html_static_path = ["_static"]
+html_css_files = ["site.css"]
+html_copy_source = False
+html_show_sourcelink = False
+html_theme_options = {
+    "logo": {"text": "leg_wear_monitor"},
+    "navbar_align": "left",
+    "navigation_depth": 3,
+    "show_toc_level": 2,
+    "secondary_sidebar_items": ["page-toc"],
+    "footer_start": ["copyright"],
+    "footer_end": ["sphinx-version"],
+}

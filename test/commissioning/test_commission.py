@@ -18,14 +18,14 @@ from leg_wear_monitor.commissioning.series.signals import (
     FLOAT64,
     WRENCH,
     JointName,
-    Series,
     Signals,
     TorqueSource,
 )
-from leg_wear_monitor.commissioning.torque_model import TorqueModel
 from leg_wear_monitor.mechanism.ideal import TURN
 from leg_wear_monitor.monitor.config.fitting import fitted
 from leg_wear_monitor.monitor.config.parameter_file import load_config
+from leg_wear_monitor.torque_fit.series import Series
+from leg_wear_monitor.torque_fit.torque_model import TorqueModel
 
 from .conftest import Robot, Walk, columns_of
 

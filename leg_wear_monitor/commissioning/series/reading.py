@@ -20,16 +20,15 @@ from leg_wear_monitor.commissioning.series.signals import (
     FLOAT64,
     WRENCH,
     JointName,
-    Series,
     Signals,
     TorqueSource,
-    series,
 )
 from leg_wear_monitor.messages import outputs
 from leg_wear_monitor.messages.decode import Decoder
 from leg_wear_monitor.messages.streams import JOINT_STATE, STREAMS, WRENCH_STAMPED, Stream
 from leg_wear_monitor.monitor.config.inputs import DriveTorque
 from leg_wear_monitor.monitor.config.settings import MonitorConfig
+from leg_wear_monitor.torque_fit.series import Series, series
 from leg_wear_monitor.twin.kinds import CRANK
 from leg_wear_monitor.twin.sample import MISSING_JOINT, NO_FAULT, ZERO_STAMP, Samples
 

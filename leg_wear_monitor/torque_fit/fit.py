@@ -5,9 +5,11 @@ import math
 import attrs
 import numpy as np
 
-from leg_wear_monitor.commissioning.fit.blocks import Blocks, blocks_of
-from leg_wear_monitor.commissioning.fit.gear_scan import Start
-from leg_wear_monitor.commissioning.fit.regression import (
+from leg_wear_monitor.mechanism.arrays import Floats
+from leg_wear_monitor.mechanism.ideal import TURN
+from leg_wear_monitor.torque_fit.blocks import Blocks, blocks_of
+from leg_wear_monitor.torque_fit.pairing import Pair
+from leg_wear_monitor.torque_fit.regression import (
     State,
     Terms,
     begin,
@@ -15,10 +17,8 @@ from leg_wear_monitor.commissioning.fit.regression import (
     jackknife,
     least_squares,
 )
-from leg_wear_monitor.commissioning.series.pairing import Pair
-from leg_wear_monitor.commissioning.torque_model import TorqueModel
-from leg_wear_monitor.mechanism.arrays import Floats
-from leg_wear_monitor.mechanism.ideal import TURN
+from leg_wear_monitor.torque_fit.start import Start
+from leg_wear_monitor.torque_fit.torque_model import TorqueModel
 
 _STEPS = 15
 _LONGEST_STEP_RAD = 0.2  # of the phase in one step, half a radian of the torque's third harmonic
@@ -130,12 +130,15 @@ def fit(
 def _move(state: State, moved: Floats, terms: Terms, reach: float) -> float:
     """Go a step of bounded length; its full length [rad]."""
     k = len(state.phase)
-    longest = max(float(np.abs(moved[:k]).max()), reach * abs(float(moved[k])))
+    longest = float(np.abs(moved[:k]).max())
+    if terms.ratio:
+        longest = max(longest, reach * abs(float(moved[k])))
     moved = moved * min(1.0, _LONGEST_STEP_RAD / max(longest, _EXACT_RAD))
     state.phase += moved[:k]
-    state.ratio += float(moved[k])
+    if terms.ratio:
+        state.ratio += float(moved[k])
     if terms.lag:
-        state.lag_s += float(moved[k + 1])
+        state.lag_s += float(moved[-1])
     return longest
 
 
@@ -172,8 +175,9 @@ def _fit(
 
 def _errors(by: Floats, rest: Floats, state: State, terms: Terms) -> dict[str, float]:
     """Standard deviations by name."""
-    names = (*terms.linear, *(f"phase {i}" for i in range(len(state.phase))), "ratio", "lag_s")
-    sigma = dict(zip(names, jackknife(by, rest).tolist(), strict=False))
+    moving = [name for name, is_free in (("ratio", terms.ratio), ("lag_s", terms.lag)) if is_free]
+    names = (*terms.linear, *(f"phase {i}" for i in range(len(state.phase))), *moving)
+    sigma = {"ratio": 0.0} | dict(zip(names, jackknife(by, rest).tolist(), strict=True))
     phase = max(sigma[f"phase {i}"] for i in range(len(state.phase)))
     sigma["offset_rad"] = math.hypot(phase, sigma["ratio"] * float(np.abs(state.middle).max()))
     return sigma

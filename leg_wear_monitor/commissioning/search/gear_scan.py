@@ -5,14 +5,14 @@ every gear ratio; their correlation with those of the model, over all offsets, i
 Multiples and fractions of the true ratio have the wrong harmonics, and the model the wrong speed.
 """
 
-import attrs
 import numpy as np
 from numpy.typing import NDArray
 
-from leg_wear_monitor.commissioning.series.pairing import Pair
-from leg_wear_monitor.commissioning.torque_model import TorqueModel
 from leg_wear_monitor.mechanism.arrays import Floats
 from leg_wear_monitor.mechanism.ideal import TURN
+from leg_wear_monitor.torque_fit.pairing import Pair
+from leg_wear_monitor.torque_fit.start import Start
+from leg_wear_monitor.torque_fit.torque_model import TorqueModel
 
 LEAST_TURNS = 5.0
 _HARMONICS = 10
@@ -23,33 +23,6 @@ _OFFSETS = 64
 _LEAST_SAMPLES_PER_TURN = 2.5 * _HARMONICS
 _FASTEST_RADPS = 60.0  # 570 rpm
 _APART = 2 * _FINE  # two ratios nearer than two turns in the recording are one
-
-
-@attrs.frozen
-class Start:
-    """A guess of how the crank follows from the joint: ratio * position + offset.
-
-    Attributes
-    ----------
-    ratio : float
-        Turns of the crank per turn of the joint, negative if it turns against it.
-    offset_rad : float
-        Crank angle at joint position 0.
-    torque_sign : int
-    explained : float
-        Fraction of the torque's variance that the model explains.
-    recording : int
-        Recording whose torque was used.
-    lag_s : float
-        Time by which the torque is late [s]; it stays unless it is among the terms of the fit.
-    """
-
-    ratio: float
-    offset_rad: float
-    torque_sign: int
-    explained: float
-    recording: int
-    lag_s: float = 0.0
 
 
 def scan(pair: Pair, model: TorqueModel, count: int) -> list[Start]:

@@ -4,22 +4,23 @@ import attrs
 import numpy as np
 from numpy.typing import NDArray
 
-from leg_wear_monitor.commissioning.fit.blocks import Blocks, blocks_of
-from leg_wear_monitor.commissioning.fit.gear_scan import Start
-from leg_wear_monitor.commissioning.series.pairing import Pair
-from leg_wear_monitor.commissioning.torque_model import TorqueModel
 from leg_wear_monitor.mechanism.arrays import Floats
 from leg_wear_monitor.mechanism.ideal import TURN
+from leg_wear_monitor.torque_fit.blocks import Blocks, blocks_of
+from leg_wear_monitor.torque_fit.pairing import Pair
+from leg_wear_monitor.torque_fit.start import Start
+from leg_wear_monitor.torque_fit.torque_model import TorqueModel
 
-_STARTS = 128  # offsets tried for a recording that the start does not come from
+PHASES = 128  # offsets tried where a start does not tell one
 _CHUNKS = 12  # stretches of time, each left out once
 _SMALL = 1.0e-9
 
 
 @attrs.frozen
 class Terms:
-    """Terms of the regression beside gain, friction, ratio and offset."""
+    """Terms of the regression beside gain, friction and offset."""
 
+    ratio: bool = True
     bias: bool = False
     load: bool = False
     lag: bool = False
@@ -59,21 +60,26 @@ def begin(pair: Pair, model: TorqueModel, start: Start) -> State:
     phase = start.ratio * middle + start.offset_rad
     for i, number in enumerate(numbers.tolist()):
         if number != start.recording:
-            phase[i] = _phase(pair.part(row == i), model, start, float(middle[i]))
+            phase[i] = _best_phase(pair.part(row == i), model, start, float(middle[i]))
     return State(start.ratio, phase, middle, row, start.lag_s)
 
 
-def _phase(pair: Pair, model: TorqueModel, start: Start, middle: float) -> float:
+def _best_phase(pair: Pair, model: TorqueModel, start: Start, middle: float) -> float:
+    return int(np.argmax(explained_by_phase(pair, model, start, middle))) * TURN / PHASES
+
+
+def explained_by_phase(pair: Pair, model: TorqueModel, start: Start, middle: float) -> Floats:
+    """Torque that the model explains (PHASES,), at equal steps of the crank angle at a position [rad]."""
     blocks = blocks_of(pair, start.ratio)
     measured = blocks.mean(pair.torque)
     speed, acceleration = start.ratio * pair.speed_radps, start.ratio * pair.acceleration_radps2
-    explained = []
-    for i in range(_STARTS):
-        angle = start.ratio * (pair.position_rad - middle) + i * TURN / _STARTS
+    explained = np.empty(PHASES)
+    for i in range(PHASES):
+        angle = start.ratio * (pair.position_rad - middle) + i * TURN / PHASES
         torque = blocks.mean(model.torque(angle, speed, acceleration)[0])
         torque -= torque.mean()
-        explained.append(start.torque_sign * float(torque @ measured) / float(np.linalg.norm(torque)))
-    return int(np.argmax(explained)) * TURN / _STARTS
+        explained[i] = start.torque_sign * float(torque @ measured) / float(np.linalg.norm(torque))
+    return explained
 
 
 def columns(
@@ -91,7 +97,8 @@ def columns(
     if terms.load:
         linear.append(model.load_torque(angle))
     moving = [np.where(state.row == i, slope, 0.0) for i in range(len(state.phase))]
-    moving.append(slope * late)
+    if terms.ratio:
+        moving.append(slope * late)
     if terms.lag:
         moving.append(-slope * speed)
     return blocks.mean(np.array(linear)), blocks.mean(np.array(moving))

@@ -1,0 +1,30 @@
+"""Where a fit starts."""
+
+import attrs
+
+
+@attrs.frozen
+class Start:
+    """A guess of how the crank follows from the joint: ratio * position + offset.
+
+    Attributes
+    ----------
+    ratio : float
+        Turns of the crank per turn of the joint, negative if it turns against it.
+    offset_rad : float
+        Crank angle at joint position 0.
+    torque_sign : int
+    explained : float
+        Fraction of the torque's variance that the model explains.
+    recording : int
+        Recording whose torque was used.
+    lag_s : float
+        Time by which the torque is late [s]; it stays unless it is among the terms of the fit.
+    """
+
+    ratio: float
+    offset_rad: float
+    torque_sign: int
+    explained: float
+    recording: int
+    lag_s: float = 0.0

@@ -8,6 +8,7 @@
     twin.tracking, twin.speed_radps, twin.intake        # state of tracking, counts of samples
     twin.clearance_mean_m, twin.depth                   # present wear
     twin.set_depth(depth), twin.reset_wear("G")         # from a ledger; after a replacement
+    twin.set_bodies(bodies)                             # masses and lengths that were identified
     twin.wear_acceleration = 100.0                      # may change at any time
     snapshot = twin.snapshot(); twin.restore(snapshot)  # continues bit-identically
 
@@ -23,10 +24,12 @@ import numpy as np
 from leg_wear_monitor.dynamics.simulation import prepare
 from leg_wear_monitor.errors import ConfigError, LegWearError
 from leg_wear_monitor.mechanism.arrays import Floats
-from leg_wear_monitor.mechanism.ideal import TURN
+from leg_wear_monitor.mechanism.ideal import TURN, check_cycle
+from leg_wear_monitor.mechanism.position import build_linkage
 from leg_wear_monitor.mechanism.spec import Mechanism
 from leg_wear_monitor.twin.follower.follower import FollowerSnapshot, LegFollower
 from leg_wear_monitor.twin.intake import intake
+from leg_wear_monitor.twin.reference.body_factors import BodyFactors
 from leg_wear_monitor.twin.sample import Samples, gait_samples
 from leg_wear_monitor.twin.settings import TwinSettings
 from leg_wear_monitor.twin.statistics import (
@@ -47,6 +50,7 @@ class TwinSnapshot(NamedTuple):
     tracker: TrackerSnapshot
     follower: FollowerSnapshot
     wear_acceleration: float
+    bodies: BodyFactors
 
 
 class DigitalTwin:
@@ -82,7 +86,7 @@ class DigitalTwin:
                 mechanism.source, "clearances.joints", "no joint has clearance, nothing can wear"
             )
         self.clearance_joints = setup.clearance_joints
-        self._setup = setup
+        self._setup, self._mechanism, self._bodies = setup, mechanism, BodyFactors.none(mechanism)
         self._nominal = setup.contacts.wear_coefficient.copy()
         self._follower = LegFollower(setup, self.settings)
         self._tracker = CrankTracker(self.settings.tracker)
@@ -143,6 +147,25 @@ class DigitalTwin:
             self._intake = intake(self._tracker.records, self._follower.records)
         return self._intake
 
+    @property
+    def bodies(self) -> BodyFactors:
+        """Factors on the bodies of the mechanism."""
+        return self._bodies
+
+    def set_bodies(self, bodies: BodyFactors) -> None:
+        """Continue with other masses and lengths; motion and wear go on.
+
+        Raises
+        ------
+        AssemblyError
+            If the linkage does not close or has a dead point.
+        """
+        if bodies != self._bodies:
+            linkage = build_linkage(bodies.applied(self._mechanism))
+            check_cycle(linkage)
+            self._follower.take_bodies(linkage)
+            self._bodies = bodies
+
     def set_depth(self, depth: Floats) -> None:
         """Set wear depths (k, 2, N) [m], for instance from a ledger.
 
@@ -197,11 +220,14 @@ class DigitalTwin:
 
     def snapshot(self) -> TwinSnapshot:
         """A copy of the whole state."""
-        return TwinSnapshot(self._tracker.snapshot(), self._follower.snapshot(), self.wear_acceleration)
+        return TwinSnapshot(
+            self._tracker.snapshot(), self._follower.snapshot(), self.wear_acceleration, self._bodies
+        )
 
     def restore(self, snapshot: TwinSnapshot) -> None:
         """Restore a snapshot of a twin of the same mechanism and settings."""
         self._intake = None
+        self.set_bodies(snapshot.bodies)
         self._tracker.restore(snapshot.tracker)
         self._follower.restore(snapshot.follower)
         self.wear_acceleration = snapshot.wear_acceleration

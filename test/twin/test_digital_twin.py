@@ -13,6 +13,7 @@ from leg_wear_monitor.errors import ConfigError, LegWearError
 from leg_wear_monitor.mechanism.ideal import TURN
 from leg_wear_monitor.twin.digital_twin import DigitalTwin
 from leg_wear_monitor.twin.kinds import TORQUE
+from leg_wear_monitor.twin.reference.body_factors import BodyFactors
 from leg_wear_monitor.twin.sample import Samples, gait_samples
 from leg_wear_monitor.twin.settings import TrackerSettings, TwinSettings
 from leg_wear_monitor.twin.statistics import (
@@ -112,6 +113,34 @@ def test_restored_it_goes_on_bit_for_bit(_made, gait, eventful, in_one_go, where
     whole = TwinUpdate(SampleStatistics(*parts), before.cycles + after.cycles, before.events + after.events)
     assert_same(whole, in_one_go[0])
     np.testing.assert_array_equal(twin.depth, in_one_go[1])
+
+
+@pytest.fixture(scope="module")
+def heavier(leg) -> BodyFactors:
+    factors = np.random.default_rng(1).uniform(0.95, 1.05, (2, len(leg.bodies)))
+    return BodyFactors(factors[0], 1.0 + 0.1 * (factors[1] - 1.0))
+
+
+def test_with_other_bodies_it_is_the_twin_of_a_leg_that_has_them(twin, leg, gait, heavier):
+    loaded = gait(2.5)
+    loaded["torque_nm"] = 3.0
+    twin.set_bodies(heavier)
+    assert twin.bodies == heavier
+    assert_same(run(twin, [loaded]), run(DigitalTwin(heavier.applied(leg)), [loaded]))
+
+
+def test_bodies_that_change_underway_belong_to_a_snapshot(twin, gait, heavier):
+    walk = gait(3.0)
+    run(twin, [walk[:300]])
+    before = twin.snapshot()
+    twin.set_bodies(heavier)
+    with_them = twin.snapshot()
+    after = run(twin, [walk[300:]])
+    twin.restore(before)
+    as_of_file = run(twin, [walk[300:]])
+    assert (after.cycles[-1].mean_force_n != as_of_file.cycles[-1].mean_force_n).all()
+    twin.restore(with_them)
+    assert_same(run(twin, [walk[300:]]), after)
 
 
 def test_what_happens_is_told(in_one_go):

@@ -266,6 +266,23 @@ class CommissionedTorque:
         return np.asarray(self.signatures.mean(axis=0))
 
 
+@attrs.frozen
+class IdentifiedBodies:
+    """Masses and lengths of a leg, as factors on those of its mechanism file.
+
+    Attributes
+    ----------
+    stamp_ns : int
+    names : tuple of str
+    mass, length : tuple of float
+    """
+
+    stamp_ns: int
+    names: tuple[str, ...]
+    mass: tuple[float, ...]
+    length: tuple[float, ...]
+
+
 Event = (
     Audit
     | AlarmEvent
@@ -275,5 +292,6 @@ Event = (
     | ForecastPoint
     | Commissioned
     | CommissionedTorque
+    | IdentifiedBodies
     | VerdictEvent
 )

@@ -23,6 +23,7 @@ from leg_wear_monitor.monitor.ledger.recovery import Recovered
 from leg_wear_monitor.monitor.ledger.rows import (
     read_commissioned,
     read_commissioned_torque,
+    read_identified_bodies,
     read_last_reset,
     read_measurements,
     read_spans,
@@ -52,8 +53,11 @@ class Ledger:
     measurements : tuple of Measurement
         Manually measured clearances of earlier runs, including withdrawn ones.
     commissioned : Commissioned or None
-    commissioned_torque : CommissionedTorque or None
         Errors of further encoders from earlier runs.
+    commissioned_torque : CommissionedTorque or None
+        Signatures of the drive torque from earlier runs.
+    bodies : IdentifiedBodies or None
+        Masses and lengths that were identified in earlier runs.
     last_run : Run
         The previous run.
     epoch, boot_id : int, str
@@ -113,6 +117,7 @@ class Ledger:
         self.measurements = self._store.ask(read_measurements)
         self.commissioned = self._store.ask(read_commissioned)
         self.commissioned_torque = self._store.ask(read_commissioned_torque)
+        self.bodies = self._store.ask(read_identified_bodies)
 
     @property
     def counted_ns(self) -> Ints:

@@ -16,6 +16,7 @@ from leg_wear_monitor.monitor.ledger.entry import (
     Entry,
     Event,
     ForecastPoint,
+    IdentifiedBodies,
     JointWear,
     Measurement,
     VerdictEvent,
@@ -107,6 +108,11 @@ def write_event(db: sqlite3.Connection, event: Event) -> None:
                 "VALUES (?, ?, ?, ?)",
                 (event.stamp_ns, event.cycles, known.tobytes(), signatures.tobytes()),
             )
+        case IdentifiedBodies(stamp_ns, names, mass, length):
+            db.executemany(
+                "INSERT INTO body (stamp_ns, name, mass, length) VALUES (?, ?, ?, ?)",
+                [(stamp_ns, *factors) for factors in zip(names, mass, length, strict=True)],
+            )
         case Audit(stamp_ns, who, what, was, undoes):
             values = (was.name, was.cycles, _depth_bytes(was), was.moving_s, was.replaced_ns) if was else ()
             db.execute(
@@ -159,6 +165,18 @@ def read_commissioned_torque(db: sqlite3.Connection) -> CommissionedTorque | Non
         return None
     clearance_m, signatures = (np.frombuffer(part, "<f8").astype(float) for part in row[2:])
     return CommissionedTorque(row[0], clearance_m, signatures.reshape(row[1], -1))
+
+
+def read_identified_bodies(db: sqlite3.Connection) -> IdentifiedBodies | None:
+    """Masses and lengths of the leg, None if they were not identified."""
+    rows = db.execute(
+        "SELECT stamp_ns, name, mass, length FROM body "
+        "WHERE stamp_ns = (SELECT stamp_ns FROM body ORDER BY id DESC LIMIT 1) ORDER BY id"
+    ).fetchall()
+    if not rows:
+        return None
+    _, names, mass, length = zip(*rows, strict=True)
+    return IdentifiedBodies(rows[0][0], names, mass, length)
 
 
 def read_last_reset(db: sqlite3.Connection, joint: str) -> Audit | None:

@@ -217,13 +217,23 @@ CREATE TABLE torque_commissioning (
 ) STRICT;
 """
 
-MIGRATIONS = (_FIRST, _SECOND, _THIRD, _FOURTH, _FIFTH)
+_SIXTH = """
+-- masses and lengths that the drive torque shows, as factors on those of the mechanism file; the rows of the
+-- last stamp are in force
+CREATE TABLE body (
+    id INTEGER PRIMARY KEY, stamp_ns INTEGER NOT NULL, name TEXT NOT NULL, mass REAL NOT NULL,
+    length REAL NOT NULL
+) STRICT;
+"""
+
+MIGRATIONS = (_FIRST, _SECOND, _THIRD, _FOURTH, _FIFTH, _SIXTH)
 
 FORMAT = len(MIGRATIONS)
 SEALED_FROM = 4  # first format with checksums over the whole content
 
 GROWING = (  # append only
-    "alarm_history", "audit", "commissioning", "forecast", "history", "torque_commissioning", "verdict",
+    "alarm_history", "audit", "body", "commissioning", "forecast", "history", "torque_commissioning",
+    "verdict",
 )  # fmt: skip
 CHANGING = ("alarm", "binding", "entry", "joint", "measurement", "run", "span", "total")
 

@@ -13,6 +13,7 @@ from leg_wear_monitor.dynamics.run.run_statistics import TORQUE, new_run_statist
 from leg_wear_monitor.kernel import compile_for
 from leg_wear_monitor.mechanism.arrays import Floats
 from leg_wear_monitor.mechanism.ideal import TURN
+from leg_wear_monitor.mechanism.position import Linkage
 from leg_wear_monitor.record import Record, Records, new_records, record_of
 from leg_wear_monitor.twin import steps as step_codes
 from leg_wear_monitor.twin.follower.cycle import (
@@ -121,6 +122,10 @@ class LegFollower:
         own[:] = depth
         state.pending[changed] = 0.0
         self._before[:, changed] = self.clearances[:, changed]
+
+    def take_bodies(self, linkage: Linkage) -> None:
+        """Continue with other masses or lengths; the motion goes on where it is."""
+        self._load.rebuild(linkage)
 
     def follow(
         self, steps: Steps, n: int, cycles: list[CycleStatistics], events: list[Event]

@@ -44,18 +44,34 @@ class FootLoad:
     def __init__(self, linkage: Linkage, contacts: ContactArrays, shape: str = STANCE) -> None:
         self.tables = build_tables(linkage, contacts)
         self.signature = np.zeros(POINTS + 1)
-        self._load = 0.0
+        self._contacts, self._shape, self._load = contacts, shape, 0.0
         self._parts: list[tuple[NDArray[Any], ...]] = []
+        self._add_load(linkage)
+
+    def rebuild(self, linkage: Linkage) -> None:
+        """Set the tables, in place, to those of a leg with other masses or lengths, under the same load."""
+        load, self._load = self._load, 0.0
+        for own, table in self._pairs(build_tables(linkage, self._contacts)):
+            own[...] = table
+        self._add_load(linkage)
+        self.set(load)
+
+    def _add_load(self, linkage: Linkage) -> None:
+        """Learn what a load changes, if there is a toe; the tables are those without load."""
         mechanism = linkage.mechanism
         if mechanism.toe is not None:
-            self.signature, fraction = load_signature(linkage, shape)
+            self.signature[:], fraction = load_signature(linkage, self._shape)
             loaded = build_linkage(_loaded(mechanism, _TRIAL_N * fraction[:, None] * _up(mechanism)))
-            self._find_parts(build_tables(loaded, contacts))
+            self._find_parts(build_tables(loaded, self._contacts))
+
+    def _pairs(self, tables: ClearanceTables) -> Iterable[tuple[NDArray[Any], NDArray[Any]]]:
+        """The own tables, each with the corresponding other one."""
+        return zip(self.tables, tables, strict=True)
 
     def _find_parts(self, loaded: ClearanceTables) -> None:
         """Find the columns that the load affects, their values without load and derivatives per newton."""
-        pairs: Iterable[tuple[NDArray[Any], NDArray[Any]]] = zip(self.tables, loaded, strict=True)
-        for table, other in pairs:
+        self._parts = []
+        for table, other in self._pairs(loaded):
             flat = table.reshape(len(table), -1)  # a view
             slope = (other.reshape(flat.shape) - flat) / _TRIAL_N
             columns = np.flatnonzero(slope.any(axis=0))

@@ -11,7 +11,7 @@ MASS_TOLERANCE = (
 )
 
 
-@attrs.frozen(eq=False)
+@attrs.frozen
 class BodyFactors:
     """Factors on the bodies of a mechanism, in the order of its file.
 
@@ -21,8 +21,8 @@ class BodyFactors:
         A heavier body has the same shape; a longer one is scaled in all directions and has the same mass.
     """
 
-    mass: Floats
-    length: Floats
+    mass: Floats = attrs.field(eq=attrs.cmp_using(eq=np.array_equal))
+    length: Floats = attrs.field(eq=attrs.cmp_using(eq=np.array_equal))
 
     @classmethod
     def none(cls, mechanism: Mechanism) -> "BodyFactors":

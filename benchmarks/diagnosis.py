@@ -9,7 +9,7 @@ monitor runs. `python benchmarks/diagnosis.py` takes about an hour, most of it f
 import argparse
 import functools
 import pickle
-from collections.abc import Iterator
+from collections.abc import Iterator, Sequence
 from pathlib import Path
 from typing import NamedTuple
 
@@ -92,18 +92,26 @@ def truth(leg: Mechanism, name: str) -> Mechanism:
     return BodyFactors(np.array(masses), np.array(lengths)).applied(leg)
 
 
-def walked(leg: Mechanism, clearance: np.ndarray, cycles: int, ripple: float) -> np.ndarray:
-    """Time [s], crank angle [rad] and impulse of the drive torque [N m s] (cycles RATE, 3)."""
+def walked(
+    leg: Mechanism, clearance: np.ndarray, cycles: int, ripple: float, loads: Sequence[float] = ()
+) -> np.ndarray:
+    """Time [s], crank angle [rad], impulse [N m s] and instants [N m] of the drive torque (cycles RATE, 4).
+
+    The loads of the leg are multiplied in each gait cycle by one of the factors ``loads``, if there are any.
+    """
     setup, pace = prepare(leg), Pace(PaceConfig(ripple=ripple))
     setup.contacts.clearance[:] = clearance
     run = FullRun(attrs.evolve(setup, speed=pace.at(0.0).speed), tolerance_m=1e-9)
+    forces = run.model.arrays.load_force.copy()
     statistics, before = new_run_statistics(len(leg.joints)), 0.0
-    walk = np.empty((cycles * RATE, 3))
+    walk = np.empty((cycles * RATE, 4))
     for i in range(len(walk)):
+        if loads and i % RATE == 0:
+            run.model.arrays.load_force[:] = loads[i // RATE % len(loads)] * forces
         t = (i + 1) / RATE
         run.polynomial[:] = quintic(before, pace.at(before), t - before, pace.at(t))
         run.advance(t, statistics)
-        walk[i] = t, pace.at(t).angle, statistics.drive_integral[TORQUE]
+        walk[i] = t, pace.at(t).angle, statistics.drive_integral[TORQUE], run.sample().drive_torque
         before = t
     return walk
 
@@ -166,8 +174,11 @@ def measured(walk: np.ndarray, sensor: TorqueSensor, noise_nm: float, random) ->
     """Signatures (cycles, F) of whole gait cycles, the first two left out."""
     between = sensor.period_s * CLOCK
     time = np.arange(between, walk[-1, 0], between)
-    angle, impulse = (np.interp(time, walk[:, 0], column) for column in walk[:, 1:].T)
+    angle, impulse = (np.interp(time, walk[:, 0], column) for column in walk[:, 1:3].T)
     torque = np.diff(impulse, prepend=0.0) / between
+    if sensor.is_instant:
+        taken = walk[np.searchsorted(walk[:, 0], time)]  # of those that are kept
+        angle, torque = taken[:, 1], taken[:, 3]
     torque = averaged(torque + noise_nm * random.standard_normal(len(torque)), sensor.together)
     angle = angle[sensor.together - 1 :: sensor.together][: len(torque)]
     cycle = np.floor(angle / TURN - 1e-9).astype(np.int64)

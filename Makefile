@@ -1,5 +1,5 @@
 # `make test` and `make demo` do all the set-up themselves, once: Python 3.11 to 3.13 with venv and a C compiler are enough.
-.PHONY: test test-slow lint kernels test-oldest test-oldest-quick package colcon docs docs-check demo campaign lock sbom clean
+.PHONY: test test-slow lint kernels test-oldest test-oldest-quick package colcon docs tables docs-check demo campaign lock sbom clean
 .DELETE_ON_ERROR:
 
 # Percent of lines and branches that the two runs of the tests reach together.
@@ -86,6 +86,10 @@ docs: .venv/installed .venv-docs/installed
 		-q -n -W --keep-going -d build/doctrees docs build/docs
 	@echo "build/docs/index.html"
 	@test -n "$$CI" || test -z "$$DISPLAY$$WAYLAND_DISPLAY" || .venv/bin/python -m webbrowser build/docs/index.html
+
+# The tables of documents that follow from the source; a test beside each fails while a table is out of date.
+tables: .venv/installed
+	for script in $$(grep --recursive --files-with-matches '^    PAGE.write_text' test); do .venv/bin/python $$script || exit 1; done
 
 # Spelling, and links from one document to another.
 docs-check: .venv/installed .venv-tools/installed

@@ -64,15 +64,25 @@ class Life:
     Attributes
     ----------
     clearance_joints : tuple of str
+        The joints, in the order of all values.
     cycles : (p,) array
-    clearance_m, clearance_max_m : (p, k) arrays
-        Mean around the bushing; largest value of the profiles of both surfaces combined.
+        Gait cycles since the life began.
+    clearance_m : (p, k) array
+        Mean radial clearance around the bushing.
+    clearance_max_m : (p, k) array
+        Largest value of the profiles of both surfaces combined.
     worst_sector_deg : (p, k) array
         Angle of the deepest wear of the bushing, in its own frame; NaN without wear.
-    peak_force_n, growth_m_per_cycle, growth_error_m_per_cycle : (p, k) arrays
+    peak_force_n : (p, k) array
+        Largest contact force of a cycle, mean over the simulated cycles.
+    growth_m_per_cycle : (p, k) array
+        Growth of the mean clearance in a gait cycle.
+    growth_error_m_per_cycle : (p, k) array
+        Its standard error, from the scatter of the cycles.
     error_m : (p,) array
         Estimated error of the mean clearance in the jump to each point.
     depth : (p, k, 2, N) array, m
+        Wear of bushing and journal, by sector.
     """
 
     clearance_joints: tuple[str, ...]

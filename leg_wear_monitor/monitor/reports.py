@@ -164,12 +164,26 @@ class Lost:
         Samples of a time whose wear is in the ledger from an earlier run.
     faulty : dict of str to int
         Faulty samples, by the name of the fault.
-    conflicting, implausible : int
-        Of those out of range: crank samples from two sources, and crank samples in another unit.
-    duplicates, late, stray_stamps, outliers : int
-        Dropped samples: repeated, later than the window, with a stamp far off, with a value far off.
-    gaps_bridged, gaps_lost, backward_jumps, failures : int
-        Bridged gaps and others; new time bases; motions that the model could not resolve.
+    conflicting : int
+        Of those out of range: crank samples from two sources.
+    implausible : int
+        Of those out of range: crank samples in another unit.
+    duplicates : int
+        Dropped samples that repeat another one.
+    late : int
+        Dropped samples that are later than the window.
+    stray_stamps : int
+        Dropped samples with a stamp far off.
+    outliers : int
+        Dropped samples with a value far off.
+    gaps_bridged : int
+        Gaps over which the leg was followed.
+    gaps_lost : int
+        Gaps over which it was not.
+    backward_jumps : int
+        Jumps back of the stamps, each a new time base.
+    failures : int
+        Motions that the model could not resolve.
     paused_s : float
         Time between recordings that were replayed together; it is not in the other values.
     """

@@ -29,6 +29,7 @@ class CommissioningItem:
     value : str, int or float
         NaN if it cannot be told.
     unit : str
+        Unit of the value; empty for a name or a ratio.
     sigma : float, optional
         Standard deviation, in the unit.
     mismatch : float, optional
@@ -38,6 +39,7 @@ class CommissioningItem:
     other_mismatch : float, optional
         Its mismatch.
     remark : str
+        What else is known of it.
     """
 
     name: str
@@ -57,6 +59,7 @@ class CommissioningResult:
     Attributes
     ----------
     items : tuple of CommissioningItem
+        What was looked for, one by one.
     not_told : tuple of str
         What the recording is not enough to tell, and why.
     findings : tuple of str

@@ -11,7 +11,14 @@ class TorqueResult:
 
     Attributes
     ----------
-    mean, rms, min, max : float
+    mean : float
+        Mean over time.
+    rms : float
+        Root of the mean square over time.
+    min : float
+        Smallest value, negative where the drive brakes.
+    max : float
+        Largest value.
     p99 : float
         99th percentile of the signed torque over time.
     max_abs : float
@@ -39,8 +46,10 @@ class EnergyBalance:
         Work of the drive and of the loads.
     stored : float
         Change of kinetic and potential energy.
-    friction_loss, contact_loss : float
-        Energy lost in the tangential and in the normal direction of the contacts.
+    friction_loss : float
+        Energy lost in the tangential direction of the contacts.
+    contact_loss : float
+        Energy lost in the normal direction of the contacts.
     wear_loss : float
         Elastic contact energy lost with removed material: negligible at real wear rates, a thousandth of the
         losses if clearances double within some thousand cycles.
@@ -63,8 +72,11 @@ class ToeResult:
     Attributes
     ----------
     max_position_error_m : float
+        Of the position.
     max_velocity_error_mps : float
+        Of the velocity.
     max_acceleration_error_mps2 : float
+        Of the acceleration.
     """
 
     max_position_error_m: float
@@ -74,7 +86,19 @@ class ToeResult:
 
 @attrs.frozen
 class WearDepth:
-    """Wear depth per cycle of both surfaces of a joint [m]: deepest sector and mean over all sectors."""
+    """Wear depth per cycle of both surfaces of a joint [m].
+
+    Attributes
+    ----------
+    bushing_max : float
+        Of the deepest sector of the bushing.
+    bushing_mean : float
+        Mean over all sectors of the bushing.
+    journal_max : float
+        Of the deepest sector of the journal.
+    journal_mean : float
+        Mean over all sectors of the journal.
+    """
 
     bushing_max: float
     bushing_mean: float
@@ -84,7 +108,15 @@ class WearDepth:
 
 @attrs.frozen
 class ClearanceResult:
-    """Radial clearance [m] at the end: mean and largest around the bushing."""
+    """Radial clearance [m] at the end.
+
+    Attributes
+    ----------
+    mean : float
+        Mean around the bushing.
+    max : float
+        Largest around the bushing.
+    """
 
     mean: float
     max: float
@@ -96,8 +128,14 @@ class JointResult:
 
     Attributes
     ----------
-    mean_force_n, rms_force_n, p99_force_n, max_force_n : float
-        Magnitude of the joint force [N]; 99 % of the time it is below ``p99_force_n``.
+    mean_force_n : float
+        Mean magnitude of the joint force [N].
+    rms_force_n : float
+        Root of its mean square [N].
+    p99_force_n : float
+        Magnitude that is not exceeded 99 % of the time [N].
+    max_force_n : float
+        Largest magnitude [N]: one sample of a heavy tail, which does not repeat.
     contact_fraction : float or None
         Fraction of the time in contact, 0 to 1.
     friction_work_j_per_cycle : float or None
@@ -106,10 +144,12 @@ class JointResult:
         Integral of ``F_N |v_t| dt`` per cycle [J]; times a wear coefficient [1/Pa] it is the worn volume
         [m³].
     wear_depth_m_per_cycle : WearDepth or None
+        Of both surfaces.
     wear_zone_deg : tuple of two floats or None
         Narrowest zone (from, to) [deg] with 90 % of the bushing's wear, in the frame of the bushing's body;
         None without wear.
     clearance_m : ClearanceResult or None
+        Radial clearance at the end.
     """
 
     mean_force_n: float
@@ -140,7 +180,7 @@ class Impact:
     speed_mps : float
         Approach speed [m/s].
     end_s : float or None
-        None for a contact that lasts beyond the end.
+        End of the contact; None for one that lasts beyond the end of the run.
     peak_n : float
         Largest normal force [N].
     """
@@ -158,10 +198,13 @@ class Trace:
     Attributes
     ----------
     crank_angle_rad : (n,) array
-        Continuous over the turns.
-    toe_x_m, toe_y_m : (n,) array or None
-        None for a mechanism without a point called ``toe``.
+        Crank angle, continuous over the turns.
+    toe_x_m : (n,) array or None
+        Toe, to the right; None for a mechanism without a point called ``toe``.
+    toe_y_m : (n,) array or None
+        Toe, upwards.
     drive_torque_nm : (n,) array
+        Torque of the drive on the crank.
     force_n : dict of str to (n,) array
         Magnitude of the force in each joint [N].
     """

@@ -31,7 +31,10 @@ class SimulationResult:
 
     Attributes
     ----------
-    mechanism, model : str
+    mechanism : str
+        Name of the mechanism.
+    model : str
+        Formulation of the motion: ``clearance``, ``full`` or ``ideal``.
     speed_rpm : float
         Mean crank speed, negative for clockwise.
     cycles : float
@@ -39,17 +42,19 @@ class SimulationResult:
     simulated_s : float
         Simulated time [s], skipped cycles included.
     drive_torque_nm : TorqueResult
+        Torque of the drive on the crank.
     energy_j : EnergyBalance or None
-        None for an ideal leg and for a leg of a batch.
+        Energy balance; None for an ideal leg and for a leg of a batch.
     toe : ToeResult or None
-        None without a point called ``toe`` or without an ideal motion to compare with.
+        Deviations of the toe; None without a point called ``toe`` or without an ideal motion to compare with.
     joints : dict of str to JointResult
         All joints, ideal ones included.
     impacts : dict of str to tuple of Impact
         The first thousand impacts of each clearance joint.
     trace : Trace or None
-        None if no trace was requested.
+        Samples over the counted cycles; None if no trace was requested.
     clearance_joints : tuple of str
+        Joints with clearance, in the order of ``surfaces``.
     surfaces : Surfaces or None
         Worn surfaces at the end, in the order of ``clearance_joints``; None for an ideal leg.
     """

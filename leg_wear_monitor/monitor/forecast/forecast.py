@@ -31,7 +31,17 @@ class Answer(Enum):
 
 @attrs.frozen
 class Quantiles:
-    """Values that are not exceeded with a probability of 10, 50 and 90 %."""
+    """Quantiles of what is not known.
+
+    Attributes
+    ----------
+    p10 : float
+        Value that is not exceeded with a probability of 10 %.
+    p50 : float
+        Value that is not exceeded with a probability of 50 %.
+    p90 : float
+        Value that is not exceeded with a probability of 90 %.
+    """
 
     p10: float
     p50: float
@@ -45,9 +55,13 @@ class JointForecast:
     Attributes
     ----------
     answer : Answer
-    cycles, hours, days : Quantiles or None
-        Gait cycles, hours of walking and days at the usual duty until the mean clearance reaches its limit;
-        None unless known (0 at the limit).
+        What can be said of it.
+    cycles : Quantiles or None
+        Gait cycles until the mean clearance reaches its limit; None unless known (0 at the limit).
+    hours : Quantiles or None
+        Hours of walking until then.
+    days : Quantiles or None
+        Days at the usual duty until then.
     clearance_m : Quantiles
         The clearance now, as far as it is known.
     measurements : int

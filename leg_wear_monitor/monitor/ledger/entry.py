@@ -149,19 +149,28 @@ class Measurement:
     ----------
     stamp_ns : int
         Time of the clock, for information only.
-    joint, who : str
-    clearance_m, sigma_m : float
-        Mean radial clearance and its standard deviation.
+    joint : str
+        Joint that was measured.
+    who : str
+        Who measured it.
+    clearance_m : float
+        Mean radial clearance.
+    sigma_m : float
+        Its standard deviation.
     wear_m : float
         Wear that the twin had counted for this part at that time.
-    cycles, replaced_ns : int
-        Values of the part, as in `JointWear`.
+    cycles : int
+        Gait cycles of this part at that time.
+    replaced_ns : int
+        When the part was replaced, 0 if it never was.
     expected_below : float
         Predicted probability of a smaller clearance.
     counts : bool
         Whether the forecast uses it, unless it was withdrawn.
-    withdrawn_ns, withdrawn_by : int, str
-        When and by whom it was withdrawn; 0 and empty if it was not.
+    withdrawn_ns : int
+        When it was withdrawn; 0 if it was not.
+    withdrawn_by : str
+        By whom it was withdrawn; empty if it was not.
     id : int
         Number of its row in the ledger, 0 before it is written.
     """

@@ -46,6 +46,7 @@ CREATE TABLE alarm (
     acknowledged INTEGER NOT NULL, raised_ns INTEGER NOT NULL, PRIMARY KEY (kind, subject)
 ) STRICT;
 
+-- changes of alarms: shown level, acknowledgement, value and limit of that time
 CREATE TABLE alarm_history (
     id INTEGER PRIMARY KEY, stamp_ns INTEGER NOT NULL, kind TEXT NOT NULL, subject TEXT NOT NULL,
     level INTEGER NOT NULL, acknowledged INTEGER NOT NULL, value REAL, limit_value REAL

@@ -58,8 +58,11 @@ class Evidence:
     Attributes
     ----------
     name : str
-    value, limit : float or None
-        None for what is not known, or where there is no limit; NaN becomes None.
+        Name of the alarm, or of what was observed.
+    value : float or None
+        Its value; None if it is not known.
+    limit : float or None
+        Its limit; None where there is no limit.
     unit : str
         Of both, SI; empty for a fraction.
     """
@@ -106,6 +109,7 @@ class Verdict:
     Attributes
     ----------
     state : State
+        State of the leg.
     joints : tuple of str
         The joints that the reason concerns; empty if that is not known, or none is.
     why : str

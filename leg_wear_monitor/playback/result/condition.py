@@ -13,12 +13,16 @@ class JointClearance:
     ----------
     counted_m : float
         Clearance when new, plus the wear counted since.
-    seen_m, seen_sigma_m : float or None
-        Clearance that measurements of the gait show, and its standard deviation.
+    seen_m : float or None
+        Clearance that measurements of the gait show.
+    seen_sigma_m : float or None
+        Its standard deviation.
     seen_by : tuple of str
         What shows it, such as ``encoders``.
-    new_m, limit_m : float
-        Clearance when new, and its limit.
+    new_m : float
+        Clearance when new.
+    limit_m : float
+        Limit of the clearance.
     """
 
     counted_m: float
@@ -31,7 +35,17 @@ class JointClearance:
 
 @attrs.frozen(kw_only=True)
 class LifeHours:
-    """Hours of walking that are not exceeded with a probability of 10, 50 and 90 %."""
+    """Remaining hours of walking, as quantiles.
+
+    Attributes
+    ----------
+    p10_h : float
+        Hours that are not exceeded with a probability of 10 %.
+    p50_h : float
+        Hours that are not exceeded with a probability of 50 %.
+    p90_h : float
+        Hours that are not exceeded with a probability of 90 %.
+    """
 
     p10_h: float
     p50_h: float

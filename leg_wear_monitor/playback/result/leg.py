@@ -14,6 +14,7 @@ class LegJoint:
     label : str
         What people call it, such as ``knee``; empty if the mechanism's file does not say.
     place_m : tuple of float
+        Its place at crank angle 0.
     is_on_ground : bool
         Whether it joins a body to the ground.
     """

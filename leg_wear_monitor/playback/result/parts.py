@@ -27,7 +27,17 @@ def _perhaps() -> Any:
 
 @attrs.frozen
 class ClearanceChange:
-    """Mean radial clearance [m] after the first and the last gait cycle, and its largest value at the end."""
+    """Radial clearance of a joint, as counted [m].
+
+    Attributes
+    ----------
+    first : float
+        Mean around the bushing after the first gait cycle.
+    last : float
+        Mean around the bushing after the last gait cycle.
+    max : float
+        Largest around the bushing at the end.
+    """
 
     first: float
     last: float
@@ -41,8 +51,13 @@ class SeenClearance:
     Attributes
     ----------
     observation : ClearanceObservation
-    clearance_m, sigma_m, departure_m : float or None
-        Clearance, its standard deviation, and its difference from the counted one.
+        Whether the encoders show it, and why not.
+    clearance_m : float or None
+        The estimate.
+    sigma_m : float or None
+        Its standard deviation.
+    departure_m : float or None
+        Estimated minus counted clearance.
     believed : bool
         Whether the forecast uses it.
     is_other : bool
@@ -65,15 +80,22 @@ class ReplayJoint:
     ----------
     clearance_m : ClearanceChange
         As counted: the clearance when new plus the wear counted since.
-    growth_m_per_cycle, growth_error_m_per_cycle, growth_mps : float or None
-        Growth of the mean clearance a gait cycle, the standard deviation of what it may be off, and growth
-        per second of walking.
+    growth_m_per_cycle : float or None
+        Growth of the mean clearance in a gait cycle; None while there is not enough data.
+    growth_error_m_per_cycle : float or None
+        Standard deviation of what it may be off.
+    growth_mps : float or None
+        Growth of the mean clearance per second of walking.
     forecast : JointForecast or None
-    peak_force_n, mean_force_n : float or None
-        Largest contact force, and the mean over all gait cycles.
+        Remaining life; None before the first forecast.
+    peak_force_n : float or None
+        Largest contact force.
+    mean_force_n : float or None
+        Mean contact force over all gait cycles.
     seen : SeenClearance or None
-        None without further encoders.
+        Clearance that further encoders show; None without such encoders.
     impacts : int
+        Number of impacts.
     """
 
     clearance_m: ClearanceChange
@@ -94,12 +116,17 @@ class LegLife:
     Attributes
     ----------
     answer : Answer
-    cycles, hours, days : Quantiles or None
-        Gait cycles, hours of walking and days at the usual duty; None unless known.
+        What can be said of it.
+    cycles : Quantiles or None
+        Gait cycles; None unless known.
+    hours : Quantiles or None
+        Hours of walking; None unless known.
+    days : Quantiles or None
+        Days at the usual duty; None unless known.
     first_probability : dict of str to float
-        With which each joint is the first; empty unless known.
+        Probability that this joint is the first; empty unless known.
     simulated_lives : int
-        That tell how joints act upon each other.
+        Number of simulated lives, which show the effect of joints on each other.
     first : str or None
         The joint that is most likely the first.
     """
@@ -120,12 +147,19 @@ class ReplayAlarm:
     Attributes
     ----------
     name : str
+        Kind and subject, such as ``clearance A``.
     level : Level
+        Level that is shown; a latched alarm keeps its highest one.
     state : str
         Whether it is present or latched, and acknowledged.
-    value, limit, worst : float or None
-        Last value, limit of ERROR and worst value since it was raised [unit].
+    value : float or None
+        Last value, in ``unit``.
+    limit : float or None
+        Limit of the level ERROR, in ``unit``.
+    worst : float or None
+        Worst value since it was raised, in ``unit``.
     unit : str
+        Unit of the values, SI; empty for a fraction.
     raised_ns : int
         Stamp at which the level last rose [ns]; 0 before.
     """
@@ -142,7 +176,15 @@ class ReplayAlarm:
 
 @attrs.frozen(kw_only=True)
 class AlarmChange:
-    """An alarm after a change at a stamp [ns]."""
+    """An alarm after a change.
+
+    Attributes
+    ----------
+    stamp_ns : int
+        Stamp of the change [ns].
+    alarm : ReplayAlarm
+        The alarm then.
+    """
 
     stamp_ns: int
     alarm: ReplayAlarm = attrs.field(metadata={"flat": True})
@@ -150,7 +192,15 @@ class AlarmChange:
 
 @attrs.frozen(kw_only=True)
 class ReplayAlarms:
-    """All alarms at the end (``now``), and the first ten thousand changes."""
+    """All alarms.
+
+    Attributes
+    ----------
+    now : tuple of ReplayAlarm
+        All of them, at the end.
+    changes : tuple of AlarmChange
+        The first ten thousand changes.
+    """
 
     now: tuple[ReplayAlarm, ...]
     changes: tuple[AlarmChange, ...]
@@ -158,9 +208,20 @@ class ReplayAlarms:
 
 @attrs.frozen(kw_only=True)
 class ReplayStatus:
-    """A line of /diagnostics at the end; the keys of ``values`` end in their unit.
+    """A line of /diagnostics at the end.
 
-    ``fault_code`` is a stable name of what is wrong; empty in a file of an older version.
+    Attributes
+    ----------
+    name : str
+        Name of the status, such as ``joint A``.
+    level : Level
+        Level of the status.
+    message : str
+        The status in words.
+    values : dict of str to float or None
+        Values of the status; each key ends in its unit.
+    fault_code : str
+        Stable name of what is wrong; empty in a file of an older version.
     """
 
     name: str
@@ -172,7 +233,15 @@ class ReplayStatus:
 
 @attrs.frozen(eq=False)
 class WornDepth:
-    """Wear depth (N,) [m] around a joint's bushing and journal, by sector of their own frames."""
+    """Wear depth (N,) [m] around both surfaces of a joint, by sector.
+
+    Attributes
+    ----------
+    bushing : (N,) array
+        By sector of the bushing's frame, the first one from angle 0 on.
+    journal : (N,) array
+        By sector of the journal's frame.
+    """
 
     bushing: Floats
     journal: Floats

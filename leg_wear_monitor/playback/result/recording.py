@@ -8,7 +8,17 @@ from leg_wear_monitor.monitor.config.settings import Limits
 
 @attrs.frozen(kw_only=True)
 class ReplayFinding:
-    """A fault of the recording: ``file``, ``text`` on one line, and ``weight``, its effect on the result."""
+    """A fault of the recording.
+
+    Attributes
+    ----------
+    file : str
+        File in which it was found.
+    text : str
+        What was found, on one line.
+    weight : Severity
+        Effect on the result: ``loss`` if data are lost or may be wrong.
+    """
 
     file: str
     text: str
@@ -22,17 +32,25 @@ class ReplayRecording:
     Attributes
     ----------
     files : tuple of str
+        Files that were read.
     topics : dict of str to str
-        By their relative name in the node.
+        Topic that was read, by its relative name in the node.
     time : str
         Source of the stamps: ``header``, ``log`` or ``publish``.
     is_partial : bool
         Whether recorded data are lost or may be wrong.
     findings : tuple of ReplayFinding
-    crank_samples, torque_samples : int
-    begin_ns, end_ns : int
-        First and last stamp [ns]; 0 without samples.
+        Faults of the recording.
+    crank_samples : int
+        Number of samples of the crank.
+    torque_samples : int
+        Number of samples of the drive torque.
+    begin_ns : int
+        First stamp [ns]; 0 without samples.
+    end_ns : int
+        Last stamp [ns]; 0 without samples.
     duration_s : float
+        Time between the two [s].
     """
 
     files: tuple[str, ...]
@@ -53,15 +71,20 @@ class ReplayMonitor:
 
     Attributes
     ----------
-    mechanism, hardware_id : str
+    mechanism : str
+        Name of the mechanism.
+    hardware_id : str
+        Which leg this is.
     clearance_joints : tuple of str
+        Joints whose wear is counted.
     commanded_rpm : float
         Cadence that the gait should have.
     wear_acceleration : float
         Factor on all wear.
     bushing_radius_m : dict of str to float
-        Of each clearance joint.
+        Radius of the bushing.
     limits : Limits
+        Limits of the alarms.
     duty_hours_per_day : float
         Usual walking a day.
     """
@@ -82,8 +105,10 @@ class ReplayGait:
 
     Attributes
     ----------
-    believable_cycles, doubtful_cycles : int
-        Gait cycles that fit this leg, and that do not.
+    believable_cycles : int
+        Gait cycles that fit this leg.
+    doubtful_cycles : int
+        Gait cycles that do not.
     missing : str
         Why none fits; empty if one does.
     is_counted : bool

@@ -23,21 +23,41 @@ class ReplayHistory:
         End of the last gait cycle [ns].
     cycle : (n,) array
         Number of that gait cycle over the whole life in the ledger.
-    cadence_rpm, moving_s, bridged_s : (n,) arrays
-        Mean crank speed, time in motion and of it the time bridged in gaps.
-    measured_torque_rms_nm, predicted_torque_rms_nm, torque_mismatch : (n,) arrays
-        RMS of the drive torque, and the fraction that load, friction and lag do not explain.
-    load_n, friction_nm : (n,) arrays
-        Foot load and friction of the drive, as estimated.
-    clearance_m, clearance_max_m : dict of str to (n,) array
-        Mean and largest radial clearance around the bushing.
+    cadence_rpm : (n,) array
+        Mean crank speed while moving.
+    moving_s : (n,) array
+        Time in motion.
+    bridged_s : (n,) array
+        Of it the time bridged in gaps.
+    measured_torque_rms_nm : (n,) array
+        RMS of the measured drive torque.
+    predicted_torque_rms_nm : (n,) array
+        RMS of the predicted drive torque.
+    torque_mismatch : (n,) array
+        Fraction of the predicted RMS that load, friction and lag do not explain.
+    load_n : (n,) array
+        Foot load, as estimated, up positive.
+    friction_nm : (n,) array
+        Friction of the drive, as estimated.
+    clearance_m : dict of str to (n,) array
+        Mean radial clearance around the bushing.
+    clearance_max_m : dict of str to (n,) array
+        Largest radial clearance around the bushing.
     growth_m_per_cycle : dict of str to (n,) array
-    peak_force_n, p99_force_n, mean_force_n : dict of str to (n,) array
-        Of the contact force.
+        Growth of the mean clearance in a gait cycle.
+    peak_force_n : dict of str to (n,) array
+        Largest contact force.
+    p99_force_n : dict of str to (n,) array
+        Contact force that is not exceeded 99 % of the time.
+    mean_force_n : dict of str to (n,) array
+        Mean contact force.
     impacts : dict of str to (n,) array
-    lowest, highest : dict of str to (n,) array
-        Of cadence, torques, mismatch, load and friction, by their names: the smallest and the largest value
-        in each group; empty if each group is one gait cycle.
+        Number of impacts.
+    lowest : dict of str to (n,) array
+        Of cadence, torques, mismatch, load and friction, by their names: the smallest value in each group;
+        empty if each group is one gait cycle.
+    highest : dict of str to (n,) array
+        The largest value in each group.
     """
 
     stamp_ns: Ints

@@ -40,11 +40,13 @@ class ReplaySummary:
     Attributes
     ----------
     verdict : Verdict
-        At the end.
+        What the monitor concludes of the leg, at the end.
     recording : ReplayRecording
+        What was read.
     monitor : ReplayMonitor
+        Settings of the monitor.
     leg : ReplayLeg
-        Empty in a file of an older version.
+        The mechanism as a picture needs it; empty in a file of an older version.
     wall_s : float or None
         Wall-clock duration of the replay [s]; None if nobody measured it.
     real_time_factor : float or None
@@ -52,25 +54,32 @@ class ReplaySummary:
     cycles : int
         Gait cycles.
     gait : ReplayGait
+        Whether the motion was a gait of this leg.
     joints : dict of str to ReplayJoint
         Clearance joints; empty without one gait cycle that fits this leg, like the next two.
     clearances : dict of str to JointClearance
-        Of each joint, as counted and as seen.
+        Clearance of each joint, as counted and as seen.
     life : dict of str to LifeHours or None
-        Of each joint, and of the ``leg``; None where it is not known, or the verdict does not believe it.
+        Remaining life of each joint, and of the ``leg``; None where it is not known, or the verdict does not
+        believe it.
     forecast : LegLife or None
-        The leg's.
+        Remaining life of the leg.
     measurements : tuple of Measurement
-        Of the ledger.
+        Clearances measured by hand, from the ledger.
     alarms : ReplayAlarms
+        Alarms at the end and their changes.
     status : tuple of ReplayStatus
+        Lines of /diagnostics at the end.
     lost : Lost
+        Samples and time that were not used.
     history : ReplayHistory
+        The gait cycles over time.
     wear_depth_m : dict of str to WornDepth
-        Since the start of the ledger, or of the replay without one.
+        Wear around the surfaces of each joint since the start of the ledger, or of the replay without one.
     advice : str
+        What the results are not: the absence of an alarm does not mean the joints are healthy.
     made_with : dict of str to str
-        Names and versions of what made it.
+        Versions of the programs that made it.
     """
 
     verdict: Verdict

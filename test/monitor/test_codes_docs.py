@@ -1,0 +1,56 @@
+"""docs/reference/codes.md has every fault code with what to do; this file as a script renews it."""
+
+import re
+from collections.abc import Iterator
+from pathlib import Path
+
+import pytest
+
+from leg_wear_monitor.monitor.alarms.fault_codes import FAULT_CODES
+from leg_wear_monitor.monitor.evaluation import specs
+from leg_wear_monitor.monitor.verdict.rules import RULES
+
+PAGE = Path(__file__).parents[2] / "docs" / "reference" / "codes.md"
+PART = re.compile(r"(<!-- codes -->\n).*?(<!-- end -->)", re.DOTALL)
+OF_A_JOINT = {*specs.JOINT, *specs.ENCODERS}
+ALARMS = (*specs.JOINT, *specs.ENCODERS, *specs.TORQUE, *specs.GAIT, *specs.INPUT, specs.SOURCES)
+
+pytestmark = pytest.mark.plain
+
+
+def plain(text: str) -> str:
+    """A rule's text; what it fills in is in italics."""
+    return re.sub(r"\{(\w+)\}", r"*\1*", text.replace("{past}", "").replace("{causes}", ""))
+
+
+def meanings() -> Iterator[tuple[str, str]]:
+    """Each code with a line for each place that reports it."""
+    for rule in RULES:
+        yield rule.code, f"- Verdict *{rule.state.words}*: {plain(rule.why)}."
+        if rule.not_valid:
+            yield rule.code, f"- Not valid meanwhile: {', '.join(each.words for each in rule.not_valid)}."
+        yield rule.code, f"- To do: {plain(rule.do)}."
+    for spec in ALARMS:
+        code = spec.name("").strip().upper().replace(" ", "_")
+        whose = f"`{spec.name('<joint>')}`" if spec in OF_A_JOINT else f"`{spec.name('')}`"
+        yield code, f"- Alarm {whose}: {spec.meaning}. Limit: {spec.limit_words}."
+    for code, meaning in FAULT_CODES.items():
+        yield code, f"- Status: {meaning}."
+
+
+def renewed(page: str) -> str:
+    told: dict[str, list[str]] = {}
+    for code, line in meanings():
+        told.setdefault(code, []).append(line)
+    parts = ["\n".join([f"## {code}", "", *told[code], ""]) for code in sorted(told)]
+    return PART.sub(lambda found: found[1] + "\n".join(parts) + found[2], page)
+
+
+def test_the_page_has_every_code() -> None:
+    page = PAGE.read_text(encoding="utf-8")
+    assert "<!-- codes -->" in page
+    assert renewed(page) == page
+
+
+if __name__ == "__main__":
+    PAGE.write_text(renewed(PAGE.read_text(encoding="utf-8")), encoding="utf-8")

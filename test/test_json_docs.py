@@ -1,0 +1,140 @@
+"""docs/reference/json.md lists the fields that the classes declare; this file as a script renews it."""
+
+import json
+import re
+import sys
+from collections.abc import Iterator
+from pathlib import Path
+from typing import Any
+
+import pytest
+
+sys.path.insert(0, str(Path(__file__).parent))  # as a script
+
+from json_fields import Row, descriptions, rows_of, unit_of
+from made_up_summary import made_up_summary
+
+import leg_wear_monitor as lw
+from leg_wear_monitor.life.result import Life
+
+ROOT = Path(__file__).parents[1]
+PAGE = ROOT / "docs" / "reference" / "json.md"
+TABLE = re.compile(r"(<!-- fields of (\w+) -->\n).*?(<!-- end -->)", re.DOTALL)
+VERSION = ("schema_version", "whole number", "", "Version of these fields; see above.")
+
+
+def simulation() -> Iterator[Row]:
+    clock = {
+        "wall_s": ("number", "Wall-clock duration of the run; the command line writes it."),
+        "real_time_factor": ("number", "Simulated time as a multiple of that."),
+    }
+    yield VERSION
+    yield from ((name, kind, unit_of(name), text) for name, (kind, text) in clock.items())
+    yield from rows_of(lw.SimulationResult, left_out=("clearance_joints", "surfaces"))
+
+
+def replay() -> Iterator[Row]:
+    yield VERSION
+    yield from rows_of(lw.ReplaySummary)
+
+
+def life() -> Iterator[Row]:
+    told = descriptions(Life)
+    yield "mechanism", "text", "", "Name of the mechanism."
+    yield "fingerprint", "text", "", "Checksum of the mechanism; a forecast refuses the lives of another leg."
+    yield VERSION
+    for name in ("cycles", "error_m"):
+        yield name, "list of numbers", unit_of(name), told[name]
+    further = ("clearance_m", "growth_m_per_cycle")
+    for name in (*further, "clearance_max_m", "worst_sector_deg", "peak_force_n"):
+        yield f"joints.<joint>.{name}", "list of numbers", unit_of(name), told[name]
+    yield "wear_factor.<joint>", "number", "", "Factor on the wear coefficients of this life."
+    yield "further[]", "object", "", "Lives with other wear coefficients, in short."
+    yield "further[].wear_factor.<joint>", "number", "", "As above."
+    yield "further[].cycles", "list of numbers", unit_of("cycles"), told["cycles"]
+    for name in further:
+        yield f"further[].joints.<joint>.{name}", "list of numbers", unit_of(name), told[name]
+
+
+def commissioning() -> Iterator[Row]:
+    told = descriptions(lw.CommissioningResult)
+    yield VERSION
+    yield "turns", "number", "", told["turns"]
+    yield "is_sure", "true or false", "", lw.CommissioningResult.is_sure.__doc__ or ""
+    yield "items[]", "object", "", told["items"]
+    yield from rows_of(lw.CommissioningItem, "items[].")
+    yield "not_enough_to_tell[]", "text", "", told["not_told"]
+    yield "findings[]", "text", "", told["findings"]
+    yield "notes[]", "text", "", told["notes"]
+
+
+DOCUMENTS = {"simulation": simulation, "replay": replay, "life": life, "commissioning": commissioning}
+
+
+def renewed(page: str) -> str:
+    def table(rows: Iterator[Row]) -> str:
+        lines = ["| field | type | unit | what it is |", "|---|---|---|---|"]
+        for path, kind, unit, text in rows:
+            words = re.sub(r"\bNone\b", "null", text.replace("``", "`")).replace("|", r"\|")
+            lines.append(f"| `{path}` | {kind} | {unit} | {words} |")
+        return "\n".join([*lines, ""])
+
+    return TABLE.sub(lambda found: found[1] + table(DOCUMENTS[found[2]]()) + found[3], page)
+
+
+def example(name: str) -> Any:
+    if name == "simulation":
+        return lw.simulate("four_bar", cycles=0.5, skip_cycles=0.0, trace=8).to_dict(wall_s=1.0)
+    if name == "replay":
+        return made_up_summary().to_dict()
+    if name == "life":
+        return json.loads((ROOT / "config" / "lives" / "bionic_leg.json").read_text())
+    item = lw.CommissioningItem(name="crank.sign", value=1)
+    return lw.CommissioningResult(
+        items=(item,), not_told=("lag",), findings=("load",), notes=("note",), config=None, turns=1.0
+    ).to_dict()
+
+
+def leaves(value: Any, path: str = "") -> Iterator[str]:
+    """Paths of plain values, of lists of them, and of what is null or empty; entries of lists in brackets."""
+    if isinstance(value, dict) and value:
+        for name, part in value.items():
+            yield from leaves(part, f"{path}.{name}" if path else name)
+    elif isinstance(value, list) and value and isinstance(value[0], dict):
+        for part in value:
+            yield from leaves(part, f"{path}[]")
+    else:
+        yield path
+
+
+def is_of(row: str, leaf: str) -> bool:
+    """Whether a leaf is what a row lists, or a part above it that is null or empty."""
+    names = row.split(".")
+    above = (".".join(names[: number + 1]) for number in range(len(names)))
+    return any(re.fullmatch(re.sub(r"<\w+>", "[^.]+", re.escape(each)), leaf) for each in above)
+
+
+@pytest.mark.plain
+def test_the_page_lists_every_field_as_the_classes_declare_it() -> None:
+    page = PAGE.read_text(encoding="utf-8")
+    assert {found[1] for found in TABLE.findall(page)} == set(DOCUMENTS)
+    assert renewed(page) == page
+
+
+@pytest.mark.plain
+@pytest.mark.parametrize("name", DOCUMENTS)
+def test_every_field_is_described(name: str) -> None:
+    assert [path for path, _, _, text in DOCUMENTS[name]() if not text] == []
+
+
+@pytest.mark.parametrize("name", DOCUMENTS)
+def test_the_page_has_the_fields_of_a_document_and_no_others(name: str) -> None:
+    told = [(path.removesuffix("[]"), kind) for path, kind, _, _ in DOCUMENTS[name]()]
+    written = set(leaves(example(name)))
+    assert [leaf for leaf in written if not any(is_of(path, leaf) for path, _ in told)] == []
+    plain = [path for path, kind in told if not kind.startswith("object")]
+    assert [path for path in plain if not any(is_of(path, leaf) for leaf in written)] == []
+
+
+if __name__ == "__main__":
+    PAGE.write_text(renewed(PAGE.read_text(encoding="utf-8")), encoding="utf-8")

@@ -36,6 +36,15 @@ class ConfigError(LegWearError):
         Dotted path of the key, empty where the fault is the file's own.
     fault : str
         What was found and what was expected, with its unit.
+
+    Examples
+    --------
+    >>> import leg_wear_monitor as lw
+    >>> try:
+    ...     lw.simulate("four_bar", clearance_m=-0.001)
+    ... except lw.ConfigError as error:
+    ...     print(error)
+    clearance-m: -0.001 is not above 0 m (joint B)
     """
 
     def __init__(self, source: str, key: str, fault: str) -> None:

@@ -101,10 +101,6 @@ def simulate(
 ) -> SimulationResult:
     """Simulate a leg: forces, drive torque and toe motion, impacts and wear of its clearance joints.
 
-    >>> result = simulate("four_bar", cycles=0.25, skip_cycles=0.0)
-    >>> wear = result.joints["B"].archard_integral_j_per_cycle
-    >>> torque = result.drive_torque_nm.rms
-
     Parameters
     ----------
     mechanism : Mechanism, str or pathlib.Path
@@ -145,6 +141,14 @@ def simulate(
         If the linkage does not close or has a dead point.
     SimulationError
         If the motion diverges; names joint, time and what to try.
+
+    Examples
+    --------
+    >>> import leg_wear_monitor as lw
+    >>> result = lw.simulate("four_bar", cycles=0.25, skip_cycles=0.0)
+    >>> joint = result.joints["B"]
+    >>> joint.mean_force_n < joint.max_force_n and joint.archard_integral_j_per_cycle > 0.0
+    True
     """
     mechanism = given_mechanism(mechanism)
     check_kinds(cycles=cycles, duration_s=duration_s, skip_cycles=skip_cycles, trace=trace, wear=wear)

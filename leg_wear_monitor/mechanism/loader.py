@@ -61,6 +61,15 @@ def load_mechanism(name_or_path: str | Path = "bionic_leg") -> spec.Mechanism:
     ------
     ConfigError
         Names file, key, value and what was expected.
+
+    Examples
+    --------
+    >>> import leg_wear_monitor as lw
+    >>> leg = lw.load_mechanism("bionic_leg")
+    >>> leg.clearance_joints
+    ('A', 'B', 'G', 'I', 'J')
+    >>> leg.joint_words("G")
+    'G (knee)'
     """
     path = Path(name_or_path)
     if is_file_name(path):

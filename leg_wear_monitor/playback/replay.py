@@ -162,6 +162,15 @@ def replay(
         If the recording contains nothing usable, or the reports cannot be written.
     ConfigError, LedgerError
         If the parameters or the ledger are unusable.
+
+    Examples
+    --------
+    A recording that comes with the package, of a leg whose bushing G breaks:
+
+    >>> import leg_wear_monitor as lw
+    >>> summary = lw.replay("bags/knocking.mcap", "bags/knocking.yaml").summary()
+    >>> summary.cycles, summary.verdict.state.value, summary.verdict.joints
+    (10, 'stop', ('G',))
     """
     config = config if isinstance(config, MonitorConfig) else load_config(config, node)
     kept = attrs.evolve(config.ledger, path="" if ledger is None else str(ledger))

@@ -1,7 +1,5 @@
 """What `plot` draws of each kind of result, and where."""
 
-import doctest
-
 import attrs
 import numpy as np
 import pytest
@@ -10,7 +8,6 @@ from matplotlib import pyplot
 
 import leg_wear_monitor as lw
 from leg_wear_monitor.life.result import Life
-from leg_wear_monitor.report import plot as module
 
 pytestmark = pytest.mark.plain
 
@@ -83,8 +80,3 @@ def test_axes_that_are_given_are_drawn_on(life):
 def test_what_is_no_result_is_named():
     with pytest.raises(TypeError, match=r"^dict has no picture, expected SimulationResult"):
         lw.plot({})
-
-
-def test_the_example_runs():
-    done = doctest.testmod(module)
-    assert done.attempted and not done.failed

@@ -38,6 +38,13 @@ def load_config(path: str | Path | None = None, node: str | None = None) -> Moni
     ------
     ConfigError
         Naming file, parameter, value, unit and what was expected.
+
+    Examples
+    --------
+    >>> import leg_wear_monitor as lw
+    >>> config = lw.load_config()
+    >>> config.mechanism, config.limits.clearance_m
+    ('bionic_leg', 0.0006)
     """
     place = shipped_config() if path is None else Path(path)
     source = place.name if path is None else str(path)

@@ -1,11 +1,8 @@
 """A result's JSON: its version, its fields, and the clock's values where they belong."""
 
-import doctest
 import json
 
 import pytest
-
-from leg_wear_monitor.dynamics.result import simulation_result
 
 pytestmark = pytest.mark.plain
 
@@ -26,8 +23,3 @@ def test_a_duration_adds_the_values_of_the_clock(result):
     assert list(record)[:8] == [*HEAD, "wall_s", "simulated_s", "real_time_factor"]
     assert (record.pop("wall_s"), record.pop("real_time_factor")) == (0.5, 2.0)
     assert record == json.loads(result.to_json())
-
-
-def test_the_example_runs():
-    done = doctest.testmod(simulation_result)
-    assert done.attempted and not done.failed

@@ -3,6 +3,7 @@
 from typing import NamedTuple
 
 import attrs
+import numpy as np
 
 from leg_wear_monitor.mechanism.arrays import Floats
 from leg_wear_monitor.monitor.diagnosis.change_detector import DetectorState
@@ -85,3 +86,8 @@ class TorqueState:
     bodies: BodyFactors | None = None
     is_identifying: bool = False
     has_failed: bool = False
+
+    @property
+    def signatures(self) -> Floats:
+        """Signatures (n, F) of the kept cycles."""
+        return np.array([cycle.signature for cycle in self.cycles])

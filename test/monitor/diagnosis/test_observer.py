@@ -8,9 +8,10 @@ import pytest
 
 from leg_wear_monitor.mechanism.ideal import TURN
 from leg_wear_monitor.monitor.config.settings import MonitorConfig
-from leg_wear_monitor.monitor.diagnosis import observer as module
+from leg_wear_monitor.monitor.diagnosis import leg_models
 from leg_wear_monitor.monitor.diagnosis.diagnosis import Cause, DiagnosisState
-from leg_wear_monitor.monitor.diagnosis.observer import COMMISSIONING_CYCLES, TorqueObserver
+from leg_wear_monitor.monitor.diagnosis.leg_models import COMMISSIONING_CYCLES
+from leg_wear_monitor.monitor.diagnosis.observer import TorqueObserver
 from leg_wear_monitor.monitor.diagnosis.reference_file import shipped_reference
 from leg_wear_monitor.monitor.ledger.entry import CommissionedTorque
 from leg_wear_monitor.twin.kinds import CRANK, TORQUE
@@ -196,7 +197,7 @@ def test_a_baseline_of_a_sensor_with_another_rate_is_not_used(leg, reference) ->
 
 
 def test_a_commissioned_leg_that_is_not_of_its_file_is_identified(leg, reference, monkeypatch) -> None:
-    monkeypatch.setattr(module, "UNLIKE_FILE", 0.0)  # any leg
+    monkeypatch.setattr(leg_models, "UNLIKE_FILE", 0.0)  # any leg
     observer = observer_of(leg)
     walk(observer, samples(reference, [0] * (COMMISSIONING_CYCLES + 4)))
     assert "its masses and lengths are being simulated" in observer.diagnosis.reason
@@ -210,7 +211,7 @@ def test_a_commissioned_leg_that_is_not_of_its_file_is_identified(leg, reference
 def test_the_reference_of_an_identified_leg_is_used_if_it_explains_the_leg_better(
     leg, reference, monkeypatch
 ) -> None:
-    monkeypatch.setattr(module, "UNLIKE_FILE", 0.0)
+    monkeypatch.setattr(leg_models, "UNLIKE_FILE", 0.0)
     monkeypatch.setattr(torque_reference, "CYCLES", 8)
     observer = observer_of(leg)
     walk(observer, samples(reference, [0] * 1200))
@@ -222,7 +223,7 @@ def test_the_reference_of_an_identified_leg_is_used_if_it_explains_the_leg_bette
 
 
 def test_nothing_is_corrected_by_a_reference_of_another_leg(leg, reference, monkeypatch) -> None:
-    monkeypatch.setattr(module, "UNLIKE_FILE", 0.0)
+    monkeypatch.setattr(leg_models, "UNLIKE_FILE", 0.0)
     observer = observer_of(leg)
     block = samples(reference, [0] * COMMISSIONING_CYCLES + [leg_number(0, 1.5)] * 25)
     assert walk(observer, block) == []

@@ -1,0 +1,69 @@
+"""The models that follow from an observer's state: legs that may be the measured one, tests, the misfit.
+
+They are made where they are needed first, and again where what they depend on has changed.
+"""
+
+from leg_wear_monitor.mechanism.spec import Mechanism
+from leg_wear_monitor.monitor.config.settings import MonitorConfig
+from leg_wear_monitor.monitor.diagnosis.change_detector import ChangeDetector
+from leg_wear_monitor.monitor.diagnosis.explanations import Explainer
+from leg_wear_monitor.monitor.diagnosis.identification import UNLIKE_FILE, misfit
+from leg_wear_monitor.monitor.diagnosis.leg_model import explainer_of
+from leg_wear_monitor.monitor.diagnosis.state import TorqueState
+
+COMMISSIONING_CYCLES = 60
+
+
+class LegModels:
+    """Models of a leg and of its torque sensor.
+
+    Parameters
+    ----------
+    mechanism : Mechanism
+    """
+
+    def __init__(self, mechanism: Mechanism) -> None:
+        self._mechanism = mechanism
+        self._explainer: Explainer | None = None
+        self._detector: ChangeDetector | None = None
+        self._misfit: float | None = None
+
+    def forget(self) -> None:
+        """Make all of them again, because the reference, the sensor or the baseline has changed."""
+        self._explainer, self._detector, self._misfit = None, None, None
+
+    def forget_tests(self) -> None:
+        """Make the tests again, because the counted clearances have changed."""
+        self._detector = None
+
+    def explainer(self, state: TorqueState) -> Explainer:
+        """Legs that may be the measured one."""
+        if self._explainer is None:
+            if state.reference is None or state.sensor is None:
+                raise RuntimeError("there is no reference yet")
+            self._explainer = explainer_of(self._mechanism, state.reference, state.sensor, state.commissioned)
+        return self._explainer
+
+    def detector(self, state: TorqueState, config: MonitorConfig) -> ChangeDetector:
+        """Tests against the counted leg."""
+        if self._detector is None:
+            cycles = 60.0 * abs(config.cadence.commanded_rpm) * config.diagnosis.false_alarm_hours
+            self._detector = ChangeDetector(self.explainer(state), state.counted_m, cycles)
+        return self._detector
+
+    def misfit(self, state: TorqueState) -> float:
+        """Misfit of the commissioned leg to that of the reference; 0 where that is not known.
+
+        The baseline after a correction holds fewer cycles, and clearances that are not sure.
+        """
+        commissioned = state.commissioned
+        if state.reference is None or commissioned is None or commissioned.cycles < COMMISSIONING_CYCLES:
+            return 0.0
+        if self._misfit is None:
+            legs = self.explainer(state)
+            self._misfit = misfit(legs.model, legs.nuisances, commissioned)
+        return self._misfit
+
+    def is_of_file(self, state: TorqueState) -> bool:
+        """Whether the commissioned leg is that of the reference."""
+        return self.misfit(state) < UNLIKE_FILE

@@ -1,0 +1,33 @@
+"""Why there is no estimate of the clearances yet, or why it is not sure; for operators."""
+
+from leg_wear_monitor.monitor.diagnosis.leg_models import LegModels
+from leg_wear_monitor.monitor.diagnosis.references import FIRST_CYCLES, UNLIKE_CYCLES, References
+from leg_wear_monitor.monitor.diagnosis.state import TorqueState
+
+_UNUSABLE_CYCLES = 3
+
+
+def missing(state: TorqueState, references: References) -> str:
+    """Why there is no estimate."""
+    if state.sensor is None or state.unusable >= _UNUSABLE_CYCLES:
+        return "no drive torque with enough samples in a gait cycle"
+    if not state.sensor.phases:
+        return "the drive torque has too few samples in a gait cycle"
+    if state.reference is None and references.is_busy:
+        return f"the reference for this leg is being simulated: {references.percent} %"
+    if state.has_failed:
+        return "the leg could not be simulated for a reference"
+    return f"gait cycles: {len(state.cycles)} of {FIRST_CYCLES}"
+
+
+def doubt(state: TorqueState, references: References, models: LegModels) -> str:
+    """Why an estimate is not sure; empty if it is."""
+    if state.unlike >= UNLIKE_CYCLES:
+        return "the crank turns otherwise than it did before; a new reference is being simulated"
+    if models.is_of_file(state):
+        return ""
+    known = "the leg is not that of its mechanism file, and the names of joints are not sure: "
+    if references.is_busy:
+        what = "its masses and lengths are" if state.is_identifying else "a reference for it is"
+        return f"{known}{what} being simulated, {references.percent} %"
+    return f"{known}masses and lengths near those of the file do not explain its drive torque"

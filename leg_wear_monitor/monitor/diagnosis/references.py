@@ -1,0 +1,153 @@
+"""The torque reference of a measured leg: chosen, simulated, renewed, and its bodies identified."""
+
+import math
+
+import numpy as np
+
+from leg_wear_monitor.mechanism.arrays import Floats
+from leg_wear_monitor.mechanism.spec import Mechanism
+from leg_wear_monitor.monitor.diagnosis.identification import identified_bodies
+from leg_wear_monitor.monitor.diagnosis.leg_models import LegModels
+from leg_wear_monitor.monitor.diagnosis.reference_file import shipped_reference
+from leg_wear_monitor.monitor.diagnosis.state import TorqueState
+from leg_wear_monitor.twin.reference.crank_profile import CrankProfile, mean_profile
+from leg_wear_monitor.twin.reference.torque_reference import (
+    TorqueReference,
+    TorqueReferenceRun,
+    TorqueReferenceSnapshot,
+)
+
+FIRST_CYCLES = 5  # before a reference is chosen
+UNLIKE = 0.015  # of the mean speed: a crank that turns otherwise than in the reference by more
+UNLIKE_CYCLES = 20  # in a row, until a new reference is made
+
+_FAR = 0.1  # of a counted clearance: the reference is renewed where it was made for another one
+
+
+class References:
+    """Chooses the reference of a leg, and simulates it if required.
+
+    Parameters
+    ----------
+    mechanism : Mechanism
+    models : LegModels
+        Told to forget what depends on a reference.
+
+    Raises
+    ------
+    ConfigError
+        If a reference that comes with the package cannot be read.
+    """
+
+    def __init__(self, mechanism: Mechanism, models: LegModels) -> None:
+        self._mechanism, self._models = mechanism, models
+        self._shipped = shipped_reference(mechanism)
+        self._run: TorqueReferenceRun | None = None
+
+    @property
+    def is_busy(self) -> bool:
+        """Whether legs are being simulated."""
+        return self._run is not None and self._run.is_busy
+
+    @property
+    def percent(self) -> int:
+        """How much of what is being simulated is done [%]."""
+        return math.floor(100.0 * self._run.progress) if self._run is not None else 0
+
+    def snapshot(self) -> TorqueReferenceSnapshot | None:
+        """A copy of what is being simulated; None before anything was."""
+        return self._run.snapshot() if self._run else None
+
+    def restore(self, snapshot: TorqueReferenceSnapshot | None) -> None:
+        """Restore a snapshot of the same mechanism; it continues bit for bit."""
+        self._run = None
+        if snapshot is not None:
+            self._begun().restore(snapshot)
+
+    def advance(self, state: TorqueState, counted_m: Floats, depth: Floats) -> bool:
+        """Choose a reference, continue its simulation, or begin a new one if required.
+
+        Returns
+        -------
+        bool
+            Whether the state has another reference, with which the kept cycles are to be evaluated again.
+        """
+        if self._run is not None and self._run.is_busy:
+            return self._continue(self._run, state, counted_m, depth)
+        if len(state.cycles) < FIRST_CYCLES or state.has_failed:
+            return False
+        if state.reference is None:
+            return self._choose(state, counted_m, depth)
+        if state.unlike >= UNLIKE_CYCLES:
+            state.cycles, state.reference, state.fit, state.unlike = (), None, None, 0
+            self._models.forget()
+        elif (np.abs(state.reference.clearance_m[0] / counted_m - 1.0) > _FAR).any():
+            self._begin(state, counted_m, depth, mean_profile([cycle.profile for cycle in state.cycles]))
+        elif state.commissioned is not None and state.bodies is None and not self._models.is_of_file(state):
+            run, state.is_identifying = self._begun(), True
+            run.begin_bodies(
+                state.commissioned.clearance_m, depth, state.reference.profile, state.reference.bodies
+            )
+        return False
+
+    def _continue(
+        self, run: TorqueReferenceRun, state: TorqueState, counted_m: Floats, depth: Floats
+    ) -> bool:
+        """Simulate one more gait cycle in each second period."""
+        state.pause = not state.pause
+        found = None if state.pause else run.advance()
+        if found is not None and state.is_identifying:
+            self._identify(state, found, counted_m, depth)
+        elif found is not None:
+            self._install(state, found)
+            return True
+        elif not run.is_busy:
+            _give_up(state)
+        return False
+
+    def _choose(self, state: TorqueState, counted_m: Floats, depth: Floats) -> bool:
+        """Use the reference that comes with the package if the crank turns as in it; or begin one."""
+        profile = mean_profile([cycle.profile for cycle in state.cycles])
+        if self._shipped is not None and profile.departure(self._shipped.profile) <= UNLIKE:
+            self._install(state, self._shipped)
+            return True
+        self._begin(state, counted_m, depth, profile)
+        return False
+
+    def _begun(self) -> TorqueReferenceRun:
+        """The run, made when it is needed first."""
+        if self._run is None:
+            self._run = TorqueReferenceRun(self._mechanism)
+        return self._run
+
+    def _begin(self, state: TorqueState, counted_m: Floats, depth: Floats, profile: CrankProfile) -> None:
+        """Begin the simulation of a reference."""
+        self._begun().begin(counted_m, depth, profile, state.bodies)
+
+    def _identify(self, state: TorqueState, legs: TorqueReference, counted_m: Floats, depth: Floats) -> None:
+        """Begin a reference with the bodies that explain the commissioned leg."""
+        explainer = self._models.explainer(state)
+        state.is_identifying = False
+        if state.commissioned is not None:
+            state.bodies = identified_bodies(legs, explainer.model, explainer.nuisances, state.commissioned)
+            self._begin(state, counted_m, depth, legs.profile)
+
+    def _install(self, state: TorqueState, reference: TorqueReference) -> None:
+        """Use a new reference.
+
+        One with identified bodies must explain the leg better than the one with those of the file.
+        """
+        before, off = state.reference, self._models.misfit(state)
+        state.reference = reference
+        self._models.forget()
+        is_first = before is not None and state.bodies not in (None, before.bodies)
+        if before is not None and is_first and self._models.misfit(state) > off:
+            state.reference, state.bodies = before, before.bodies
+
+
+def _give_up(state: TorqueState) -> None:
+    """Go on without what could not be simulated."""
+    if state.reference is None:
+        state.has_failed = True
+    else:
+        state.is_identifying, state.bodies = False, state.reference.bodies

@@ -6,7 +6,7 @@ from xml.etree import ElementTree
 from setuptools import setup
 
 FRACTION = "share/leg_wear_monitor"
-SITE = {"conf.py", "three_clicks.py", "site.css"}  # what builds the pages below docs/ is no page
+SITE = ("docs/conf.py", "docs/_")  # what builds the pages below docs/ is no page
 
 
 def share_files() -> list[tuple[str, list[str]]]:
@@ -14,7 +14,7 @@ def share_files() -> list[tuple[str, list[str]]]:
     found: dict[str, list[str]] = {}
     for top in ("bags", "config", "docs", "launch", "security"):
         for path in sorted(Path(top).rglob("*")):
-            if path.is_file() and "__pycache__" not in path.parts and path.name not in SITE:
+            if path.is_file() and "__pycache__" not in path.parts and not path.as_posix().startswith(SITE):
                 found.setdefault(f"{FRACTION}/{path.parent.as_posix()}", []).append(path.as_posix())
     return list(found.items())
 
@@ -25,7 +25,8 @@ setup(
     python_requires=">=3.11",
     data_files=[
         ("share/ament_index/resource_index/packages", ["resource/leg_wear_monitor"]),
-        (FRACTION, ["README.md", "SECURITY.md", "package.xml"]),  # the first two name files below docs/
+        # These pages name files below docs/, and each other.
+        (FRACTION, ["CONTRIBUTING.md", "QUALITY_DECLARATION.md", "README.md", "SECURITY.md", "package.xml"]),
         *share_files(),
     ],
 )

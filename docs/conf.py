@@ -16,6 +16,7 @@ version = release = ElementTree.parse(ROOT / "package.xml").findtext("version") 
 extensions = [
     "myst_parser",
     "numpydoc",
+    "root_pages",
     "sphinx.ext.autodoc",
     "sphinx.ext.autosummary",
     "sphinx_click",

@@ -49,6 +49,11 @@ def test_the_docs_that_help_names_are_installed(installed):
     assert {f"{fraction}/SECURITY.md", f"{fraction}/README.md", f"{fraction}/launch/demo.launch.xml"} <= files
 
 
+def test_the_citation_has_the_version_of_the_package():
+    version = ElementTree.parse(ROOT / "package.xml").findtext("version")
+    assert f"\nversion: {version}\n" in (ROOT / "CITATION.cff").read_text()
+
+
 def test_ros2_launch_is_among_the_dependencies():
     package = ElementTree.parse(ROOT / "package.xml")
     needed = {element.text for element in package.findall("exec_depend")}

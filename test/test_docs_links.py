@@ -23,6 +23,13 @@ def targets(text: str) -> Iterator[str]:
                 yield str(where)
 
 
+def text_of(file: Path) -> str:
+    """Text of a page; that of another document where it includes one."""
+    text = file.read_text()
+    included = re.match(r"```{include} (\S+)", text)
+    return (file.parent / included[1]).read_text() if included else text
+
+
 def anchors(text: str) -> set[str]:
     """Its headings as a forge links to them."""
     blocks = MarkdownIt().parse(text)
@@ -38,7 +45,7 @@ def dead(page: Path) -> list[str]:
             continue
         path, _, anchor = unquote(target).partition("#")
         file = page.parent / path if path else page
-        if not file.exists() or (anchor and anchor not in anchors(file.read_text())):
+        if not file.exists() or (anchor and anchor not in anchors(text_of(file))):
             found.append(target)
     return found
 

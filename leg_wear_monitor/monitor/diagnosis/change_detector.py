@@ -84,8 +84,8 @@ class ChangeDetector:
         self._expected = expected + explainer.baseline.offset
         self._weighted = weighted
         # the baseline is off by the same in each cycle: that alone must not drive a test upwards
-        drift = np.sqrt(np.einsum("ij,jk,ik->i", weighted, explainer.baseline.covariance, weighted))
-        information = np.einsum("ij,ij->i", weighted, change)
+        drift = np.sqrt(((weighted @ explainer.baseline.covariance) * weighted).sum(axis=1))
+        information = (weighted * change).sum(axis=1)
         self._half = 0.5 * information + _SIGMAS * drift
         self._excess = excess(explainer.baseline.scatter @ weighted.T, information)
         self.threshold = threshold(false_alarm_cycles, len(change))

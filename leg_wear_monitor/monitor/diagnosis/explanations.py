@@ -14,6 +14,7 @@ MODEL_ERROR = 0.1  # of what a clearance changes: another leg's masses and lengt
 
 _SIZES = 24  # clearances of a joint that are tried; between them a parabola finds the best
 _LEAST_FACTOR = 0.7  # of the counted clearance
+_CORNER = 1.0e200
 
 
 @attrs.frozen(eq=False)
@@ -120,30 +121,32 @@ class Explainer:
         counted_m : (k,) array
             Counted clearances.
         """
-        there = self.model.at(counted_m)[0]
+        covariance, there = self.covariance(cycles), self.model.at(counted_m)[0]
         rest = mean - self.baseline.offset - there
-        found = [self._as_counted(rest, cycles)]
-        found += [self._clearance(k, rest, there, cycles, counted_m) for k in range(len(counted_m))]
-        found += [self._nuisance(one, rest, self.covariance(cycles)) for one in self.nuisances]
+        found = [self._as_counted(rest, covariance), *self._others(rest, covariance)]
+        found += [self._clearance(k, rest, there, covariance, counted_m) for k in range(len(counted_m))]
         return sorted(found, key=lambda one: one.misfit)
 
-    def _as_counted(self, rest: Floats, cycles: int) -> Explanation:
-        misfit = _misfit(rest, self.covariance(cycles))
+    def _as_counted(self, rest: Floats, covariance: Floats) -> Explanation:
+        misfit = float(Misfits(rest[None], covariance, np.zeros((1, len(rest)))).value[0])
         return Explanation(cause=Cause.UNKNOWN, subject="", value=0.0, sigma=0.0, counted=0.0, misfit=misfit)
 
-    def _clearance(self, k: int, rest: Floats, there: Floats, cycles: int, counted_m: Floats) -> Explanation:
+    def _clearance(
+        self, k: int, rest: Floats, there: Floats, covariance: Floats, counted_m: Floats
+    ) -> Explanation:
         """Best clearance of one joint, the others as counted."""
-        covariance, widest = self.covariance(cycles), self.model.grid_m[k, -1]
+
+        def tried(sizes: Floats) -> Misfits:
+            change = np.array([self.model.at(opened(counted_m, k, size))[0] for size in sizes]) - there
+            return Misfits(rest - change, covariance, MODEL_ERROR * change)
+
+        widest = self.model.grid_m[k, -1]
         sizes = np.geomspace(_LEAST_FACTOR * counted_m[k], max(widest, counted_m[k]), _SIZES)
-        misfits = np.empty(_SIZES)
-        for i, size in enumerate(sizes):
-            change = self.model.at(opened(counted_m, k, size))[0] - there
-            misfits[i] = _misfit(rest - change, covariance + np.diag((MODEL_ERROR * change) ** 2))
+        misfits = tried(sizes).value
         best = int(misfits.argmin())
         value, sigma = _vertex(np.log(sizes), misfits, best)
         size = float(np.exp(value))
-        change = self.model.at(opened(counted_m, k, size))[0] - there
-        poor = poorness(rest - change, covariance + np.diag((MODEL_ERROR * change) ** 2))
+        poor = math.sqrt(max(1.0, float(tried(np.array([size])).square[0]) / len(rest)))  # Birge's ratio
         return Explanation(
             cause=Cause.CLEARANCE,
             subject=self.joints[k],
@@ -153,22 +156,64 @@ class Explainer:
             misfit=float(misfits[best]),
         )
 
-    def _nuisance(self, one: Nuisance, rest: Floats, covariance: Floats) -> Explanation:
-        """Best value of a nuisance, of which nothing was known."""
-        plain = covariance - one.spread**2 * np.outer(one.column, one.column)
-        weighted = np.linalg.solve(plain, one.column)
-        information = float(weighted @ one.column)
-        value = float(weighted @ rest) / information
-        change = value * one.column
-        misfit = _misfit(rest - change, plain + np.diag((MODEL_ERROR * change) ** 2))
-        return Explanation(
-            cause=one.cause,
-            subject=one.subject,
-            value=value,
-            sigma=information**-0.5,
-            counted=0.0,
-            misfit=misfit,
-        )
+    def _others(self, rest: Floats, covariance: Floats) -> list[Explanation]:
+        """Best values of the nuisances, of each of which nothing was known."""
+        columns = np.array([one.column for one in self.nuisances]).reshape(-1, len(rest))
+        spread = np.array([one.spread for one in self.nuisances])
+        weighted = np.linalg.solve(covariance, columns.T).T
+        information = (weighted * columns).sum(axis=1)
+        values = weighted @ rest / information
+        # by Sherman and Morrison: without what the covariance contains of the nuisance itself
+        sigmas = np.sqrt(1.0 / information - spread**2)
+        change = values[:, None] * columns
+        misfits = Misfits(rest - change, covariance, MODEL_ERROR * change, spread[:, None] * columns).value
+        return [
+            Explanation(
+                cause=one.cause,
+                subject=one.subject,
+                value=float(value),
+                sigma=float(sigma),
+                counted=0.0,
+                misfit=float(misfit),
+            )
+            for one, value, sigma, misfit in zip(self.nuisances, values, sigmas, misfits, strict=True)
+        ]
+
+
+class Misfits:
+    """How well normal distributions explain what is left over by several causes.
+
+    Parameters
+    ----------
+    rest : (n, F) array
+        What is left over.
+    covariance : (F, F) array
+    error : (n, F) array
+        Further standard deviations.
+    known : (n, F) array, optional
+        Columns whose outer products do not belong to the covariance.
+
+    Attributes
+    ----------
+    square : (n,) array
+        Squares of what is left over, in units of its covariance: about F each if the cause is right.
+    value : (n,) array
+        Minus twice the logarithms of the densities, less a constant.
+    """
+
+    def __init__(self, rest: Floats, covariance: Floats, error: Floats, known: Floats | None = None) -> None:
+        n, size = rest.shape
+        bordered = np.zeros((n, size + 1, size + 1))
+        bordered[:, :size, :size] = covariance
+        if known is not None:
+            bordered[:, :size, :size] -= known[:, :, None] * known[:, None, :]
+        diagonal = np.arange(size)
+        bordered[:, diagonal, diagonal] += error**2
+        # a further row of L is the solution of L z = rest; the corner, of no meaning, only has to be large
+        bordered[:, size, :size], bordered[:, size, size] = rest, _CORNER
+        root = np.linalg.cholesky(bordered)
+        self.square = np.square(root[:, size, :size]).sum(axis=1)
+        self.value = self.square + 2.0 * np.log(root[:, diagonal, diagonal]).sum(axis=1)
 
 
 def opened(clearance_m: Floats, k: int, size: float) -> Floats:
@@ -176,18 +221,6 @@ def opened(clearance_m: Floats, k: int, size: float) -> Floats:
     changed = clearance_m.copy()
     changed[k] = size
     return changed
-
-
-def _misfit(rest: Floats, covariance: Floats) -> float:
-    """Minus twice the logarithm of a normal density, less a constant."""
-    root = np.linalg.cholesky(covariance)
-    return float(np.sum(np.linalg.solve(root, rest) ** 2) + 2.0 * np.log(np.diagonal(root)).sum())
-
-
-def poorness(rest: Floats, covariance: Floats) -> float:
-    """Birge's ratio, at least 1: by how much a standard deviation is too small where the best fit is poor."""
-    ratio = float(rest @ np.linalg.solve(covariance, rest)) / len(rest)
-    return math.sqrt(max(1.0, ratio))
 
 
 def _vertex(x: Floats, y: Floats, best: int) -> tuple[float, float]:

@@ -1,19 +1,19 @@
 """What changes a torque's signature beside clearances: friction, scale, lag, load, bodies."""
 
-import attrs
 import numpy as np
 
 from leg_wear_monitor.mechanism.arrays import Floats
-from leg_wear_monitor.mechanism.ideal import TURN, one_cycle
+from leg_wear_monitor.mechanism.ideal import TURN
 from leg_wear_monitor.mechanism.position import build_linkage
 from leg_wear_monitor.mechanism.spec import Mechanism
+from leg_wear_monitor.monitor.diagnosis.body_torques import body_torques
 from leg_wear_monitor.monitor.diagnosis.diagnosis import Cause
 from leg_wear_monitor.monitor.diagnosis.explanations import Baseline, Nuisance
-from leg_wear_monitor.monitor.diagnosis.signature import TorqueSensor, phase_means
+from leg_wear_monitor.monitor.diagnosis.signature import PhaseMeans, TorqueSensor
 from leg_wear_monitor.monitor.diagnosis.signature_model import simulated_signatures
 from leg_wear_monitor.monitor.ledger.entry import CommissionedTorque
 from leg_wear_monitor.twin.follower.load import load_signature
-from leg_wear_monitor.twin.reference.body_factors import MASS_TOLERANCE, BodyFactors
+from leg_wear_monitor.twin.reference.body_factors import MASS_TOLERANCE
 from leg_wear_monitor.twin.reference.torque_reference import TorqueReference
 
 # usual changes of a leg that is all right: friction warms up, sensors drift, the ground differs
@@ -28,8 +28,7 @@ _MEAN_ERROR = 0.05  # of the torque's size, in each phase
 _ROUGHNESS_ERROR = 0.15
 _SENSOR_TOLERANCE = 5.0  # times the usual changes of friction, scale and lag
 
-_IDEAL_POINTS = 240  # of a gait cycle: three in each of 80 phases
-_SCALE_STEP, _OFFSET_STEP_RAD, _BODY_STEP = 0.1, 0.03, 0.002
+_SCALE_STEP, _OFFSET_STEP_RAD = 0.1, 0.03
 
 
 def nuisances(mechanism: Mechanism, reference: TorqueReference, sensor: TorqueSensor) -> list[Nuisance]:
@@ -47,15 +46,9 @@ def nuisances(mechanism: Mechanism, reference: TorqueReference, sensor: TorqueSe
     if mechanism.toe is not None:
         lever, _ = load_signature(build_linkage(mechanism))
         found.append(Nuisance(Cause.LOAD, "", _of_torque(lever[:-1], phases), _LOAD_N))
-    ideal, whole = _ideal_torque(mechanism, speed), BodyFactors.none(mechanism)
-    for i, name in enumerate(mechanism.bodies):
-        one = np.arange(len(whole.mass)) == i
-        for cause, changed in (
-            (Cause.MASS, attrs.evolve(whole, mass=whole.mass + _BODY_STEP * one)),
-            (Cause.LENGTH, attrs.evolve(whole, length=whole.length + _BODY_STEP * one)),
-        ):
-            change = _ideal_torque(changed.applied(mechanism), speed) - ideal
-            found.append(Nuisance(cause, name, _of_torque(change / _BODY_STEP, phases), 0.0))
+    for name, mass, length in zip(mechanism.bodies, *body_torques(mechanism).at(speed), strict=True):
+        found.append(Nuisance(Cause.MASS, name, _of_torque(mass, phases), 0.0))
+        found.append(Nuisance(Cause.LENGTH, name, _of_torque(length, phases), 0.0))
     return found
 
 
@@ -89,12 +82,8 @@ def _difference(
     return np.asarray((more - less) / (2.0 * step))
 
 
-def _ideal_torque(mechanism: Mechanism, speed: float) -> Floats:
-    return one_cycle(build_linkage(mechanism), _IDEAL_POINTS, speed).drive_torque
-
-
 def _of_torque(torque: Floats, phases: int) -> Floats:
     """Signature's change by a torque that is added at equal steps of the crank angle, without roughness."""
     angle: Floats = np.linspace(0.0, TURN, len(torque), endpoint=False)
     first = np.zeros(len(torque), np.int64)
-    return np.concatenate([phase_means(first, angle, torque, (1, phases))[0], np.zeros(phases)])
+    return np.concatenate([PhaseMeans(first, angle, (1, phases)).of(torque)[0], np.zeros(phases)])

@@ -81,16 +81,14 @@ def signatures(cycle: Ints, angle: Floats, torque: Floats, step: Floats, sensor:
         Mean torque [N m] of each phase, then the logarithm of the mean size of the steps [log N m]; NaN for a
         phase without samples.
     """
-    phases, furthest = sensor.phases, _CLIP * sensor.size_nm
-    cycles, known = int(cycle.max()) + 1 if len(cycle) else 0, np.isfinite(step)
-    mean = phase_means(cycle, angle, np.clip(torque, -furthest, furthest), (cycles, phases))
-    size = np.minimum(np.abs(step[known]), furthest)
-    rough = phase_means(cycle[known], angle[known], size, (cycles, phases))
-    return np.hstack([mean, np.log(rough + _FLOOR * sensor.size_nm)])
+    shape = int(cycle.max()) + 1 if len(cycle) else 0, sensor.phases
+    known = np.isfinite(step)
+    steps = PhaseMeans(cycle[known], angle[known], shape)
+    return signatures_by_phase(PhaseMeans(cycle, angle, shape), steps, torque, step[known], sensor)
 
 
-def phase_means(cycle: Ints, angle: Floats, value: Floats, shape: tuple[int, int]) -> Floats:
-    """Means of a quantity in each phase of gait cycles.
+class PhaseMeans:
+    """Means of quantities in each phase of gait cycles, for samples at given angles.
 
     A sample counts for the two phases whose middles are next to it, the nearer one more. Samples often come
     at the same angles in each cycle, and a small shift of theirs must not move them into another phase.
@@ -99,21 +97,36 @@ def phase_means(cycle: Ints, angle: Floats, value: Floats, shape: tuple[int, int
     ----------
     cycle : (n,) array of int
         Number of the gait cycle of each sample, from 0.
-    angle, value : (n,) arrays
-        Crank angle [rad] and quantity of each sample.
+    angle : (n,) array
+        Crank angle of each sample [rad].
     shape : (cycles, phases)
-        That of the result; NaN for a phase without samples.
+        That of the means.
     """
-    cycles, phases = shape
-    place = ((angle / TURN) % 1.0) * phases - 0.5
-    before = np.floor(place).astype(np.int64)
-    sums, counts = np.zeros((2, cycles * phases))
-    for at, weight in ((before, before + 1 - place), (before + 1, place - before)):
-        flat = cycle * phases + at % phases
-        sums += np.bincount(flat, weight * value, cycles * phases)
-        counts += np.bincount(flat, weight, cycles * phases)
-    with np.errstate(invalid="ignore"):
-        return np.asarray((sums / counts).reshape(shape))
+
+    def __init__(self, cycle: Ints, angle: Floats, shape: tuple[int, int]) -> None:
+        phases = shape[1]
+        place = ((angle / TURN) % 1.0) * phases - 0.5
+        before = np.floor(place).astype(np.int64)
+        self._shape = shape
+        self._flat = np.concatenate([cycle * phases + at % phases for at in (before, before + 1)])
+        self._weight = np.concatenate([before + 1 - place, place - before])
+        self._counts = np.bincount(self._flat, self._weight, shape[0] * phases)
+
+    def of(self, value: Floats) -> Floats:
+        """Means of a quantity (n,), NaN for a phase without samples."""
+        sums = np.bincount(self._flat, self._weight * np.tile(value, 2), len(self._counts))
+        with np.errstate(invalid="ignore"):
+            return np.asarray((sums / self._counts).reshape(self._shape))
+
+
+def signatures_by_phase(
+    samples: PhaseMeans, steps: PhaseMeans, torque: Floats, step: Floats, sensor: TorqueSensor
+) -> Floats:
+    """`signatures` of samples whose phases are known: torques (n,) and steps (m,) at their places."""
+    furthest = _CLIP * sensor.size_nm
+    mean = samples.of(np.clip(torque, -furthest, furthest))
+    rough = steps.of(np.minimum(np.abs(step), furthest))
+    return np.hstack([mean, np.log(rough + _FLOOR * sensor.size_nm)])
 
 
 def quiet_phases(signature: Floats) -> Floats:

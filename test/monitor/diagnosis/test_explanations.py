@@ -6,7 +6,7 @@ import pytest
 
 from leg_wear_monitor.monitor.diagnosis.clearance_fit import fit_clearances
 from leg_wear_monitor.monitor.diagnosis.diagnosis import Cause
-from leg_wear_monitor.monitor.diagnosis.explanations import Baseline, Explainer, Nuisance
+from leg_wear_monitor.monitor.diagnosis.explanations import Baseline, Explainer, Misfits, Nuisance
 from leg_wear_monitor.monitor.diagnosis.leg_model import change_of
 from leg_wear_monitor.monitor.diagnosis.signature import TorqueSensor
 from leg_wear_monitor.monitor.diagnosis.signature_model import SignatureModel
@@ -107,6 +107,18 @@ def test_usual_friction_is_no_change_of_clearances(explainer: Explainer) -> None
     extra = 0.3 * explainer.nuisances[0].column
     fit = fit_clearances(explainer, measured(explainer, NEW, 60, 1, extra), 60, NEW, NEW)
     assert (np.abs(fit.clearance_m - NEW) < 4.0 * fit.sigma_m).all()
+
+
+def test_misfits_are_those_of_normal_densities() -> None:
+    random = np.random.default_rng(3)
+    root, (rest, error, known) = random.standard_normal((6, 6)), random.standard_normal((3, 4, 6))
+    covariance = root @ root.T + 10.0 * np.eye(6)
+    found = Misfits(rest, covariance, error, 0.1 * known)
+    for i in range(4):
+        own = covariance + np.diag(error[i] ** 2) - np.outer(0.1 * known[i], 0.1 * known[i])
+        square = rest[i] @ np.linalg.solve(own, rest[i])
+        assert found.square[i] == pytest.approx(square, rel=1e-12)
+        assert found.value[i] == pytest.approx(square + np.linalg.slogdet(own)[1], rel=1e-12)
 
 
 def test_causes_do_not_depend_on_the_order_of_the_joints(explainer: Explainer) -> None:

@@ -6,9 +6,9 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from leg_wear_monitor.monitor.diagnosis.signature import (
+    PhaseMeans,
     TorqueSensor,
     averaged,
-    phase_means,
     quiet_phases,
     signatures,
 )
@@ -75,7 +75,7 @@ def test_a_phase_without_samples_is_unknown() -> None:
 @pytest.mark.parametrize("phases", [10, 40, 80])
 def test_phase_means_are_those_of_hat_functions(phases: int) -> None:
     angle = np.linspace(0.0, 2.0 * np.pi, 4001)[:-1]
-    found = phase_means(np.zeros(4000, np.int64), angle, np.cos(angle), (1, phases))[0]
+    found = PhaseMeans(np.zeros(4000, np.int64), angle, (1, phases)).of(np.cos(angle))[0]
     middles = (np.arange(phases) + 0.5) * 2.0 * np.pi / phases
     width = np.sinc(1.0 / phases) ** 2  # a hat is a box folded with itself
     np.testing.assert_allclose(found, width * np.cos(middles), atol=1e-5)

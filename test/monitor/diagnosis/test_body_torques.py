@@ -1,0 +1,30 @@
+"""What bodies change of the ideal leg's torque, held against the torque of changed legs."""
+
+import attrs
+import numpy as np
+import pytest
+
+from leg_wear_monitor.mechanism.ideal import one_cycle
+from leg_wear_monitor.mechanism.position import build_linkage
+from leg_wear_monitor.monitor.diagnosis.body_torques import body_torques
+from leg_wear_monitor.twin.reference.body_factors import BodyFactors
+
+POINTS = 240
+
+
+@pytest.mark.parametrize("speed", [2.0 * np.pi, -5.0])
+@pytest.mark.parametrize(("kind", "step", "off"), [("mass", 0.5, 1e-9), ("length", 1.0e-3, 1e-2)])
+def test_they_are_differences_of_the_torques_of_other_legs(leg, speed, kind, step, off) -> None:
+    """The torque is linear in the masses; that of lengths is a difference with another step."""
+    none, k = BodyFactors.none(leg), list(leg.bodies).index("shank")
+    more = attrs.evolve(none, **{kind: np.ones(len(leg.bodies)) + step * np.eye(len(leg.bodies))[k]})
+    torques = [
+        one_cycle(build_linkage(bodies.applied(leg)), POINTS, speed).drive_torque for bodies in (none, more)
+    ]
+    expected = (torques[1] - torques[0]) / step
+    found = body_torques(leg).at(speed)[kind == "length"][k]
+    np.testing.assert_allclose(found, expected, atol=off * np.abs(expected).max())
+
+
+def test_they_are_computed_once(leg) -> None:
+    assert body_torques(leg) is body_torques(leg)

@@ -1,5 +1,6 @@
 """How the command line starts: light, from three places, with names that are the library's."""
 
+import os
 import subprocess
 import sys
 
@@ -95,3 +96,18 @@ def test_the_help_of_a_node_shows_the_line_that_starts_it(node):
     code = f"import sys; sys.argv = ['x', '--help']; from leg_wear_monitor.cli.start import {node}; {node}()"
     done = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, check=True)
     assert done.stdout.splitlines()[0] == f"Usage: ros2 run leg_wear_monitor {node} [--ros-args ...]"
+
+
+@pytest.mark.plain
+@pytest.mark.parametrize(("given", "threads"), [({}, "1"), ({"OMP_NUM_THREADS": "3"}, "3")])
+def test_linear_algebra_takes_one_thread_if_nothing_else_is_asked_for(given, threads):
+    code = (
+        "import atexit, os, sys; sys.argv = ['x', '--help']; "
+        "atexit.register(lambda: print(os.environ['OPENBLAS_NUM_THREADS'])); "
+        "from leg_wear_monitor.cli.start import main; main()"
+    )
+    free = {name: value for name, value in os.environ.items() if not name.endswith("_NUM_THREADS")}
+    done = subprocess.run(
+        [sys.executable, "-c", code], capture_output=True, text=True, check=True, env={**free, **given}
+    )
+    assert done.stdout.splitlines()[-1] == threads

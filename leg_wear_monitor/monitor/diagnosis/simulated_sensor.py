@@ -10,7 +10,8 @@ from leg_wear_monitor.monitor.diagnosis.signature import (
     averaged,
     signatures_by_phase,
 )
-from leg_wear_monitor.twin.reference.torque_reference import POINTS, TorqueReference
+from leg_wear_monitor.twin.reference.leg_simulation import POINTS
+from leg_wear_monitor.twin.reference.torque_reference import TorqueReference
 
 # of the noise that is added to simulated torques: the same at each start, and another one for each leg, or
 # their covariance would be that of a single leg's cycles

@@ -2,32 +2,33 @@
 
 A clearance shows in where in the gait cycle the torque is rough. That depends on how the crank turns, so the
 leg is simulated under the measured profile of the crank: with the clearances that are expected, and with each
-of them wider in turn. That takes half a minute of a processor, so it goes on a gait cycle at a time.
+of them wider in turn. That takes a minute of a processor, so it goes on a gait cycle at a time, in a thread:
+preparing a leg alone takes longer than the samples of a live leg may wait.
 
 It depends on the leg's masses and lengths, too: legs with each body heavier and longer in turn show which
 bodies a leg has.
 """
 
 from collections.abc import Sequence
+from concurrent.futures import Future, ThreadPoolExecutor, wait
 from typing import NamedTuple
 
 import attrs
 import numpy as np
 from numpy.typing import NDArray
 
-from leg_wear_monitor.dynamics.clearance.stepper import INTERVALS, ClearanceStepper, Snapshot
-from leg_wear_monitor.dynamics.run.drive import quintic
-from leg_wear_monitor.dynamics.run.protocol import DONE
-from leg_wear_monitor.dynamics.run.run_statistics import TORQUE, new_run_statistics
-from leg_wear_monitor.dynamics.simulation import prepare
+from leg_wear_monitor.errors import AssemblyError
 from leg_wear_monitor.mechanism.arrays import Floats
-from leg_wear_monitor.mechanism.ideal import TURN
 from leg_wear_monitor.mechanism.spec import Mechanism
 from leg_wear_monitor.twin.reference.body_factors import BodyFactors
 from leg_wear_monitor.twin.reference.crank_profile import CrankProfile
-from leg_wear_monitor.twin.reference.reference import worn_to
+from leg_wear_monitor.twin.reference.leg_simulation import (
+    POINTS,
+    LegSimulation,
+    LegSimulationSnapshot,
+    even_angles,
+)
 
-POINTS = INTERVALS // 4  # of a gait cycle: whole intervals of the stepper
 CYCLES = 40  # simulated for each wider leg, and twice as many for each other one
 WIDER = (1.2, 1.35, 1.5, 2.0, 3.0, 5.0, 8.0)  # factors on the expected clearance, one joint at a time
 
@@ -63,7 +64,7 @@ class TorqueReference:
     @property
     def angle(self) -> Floats:
         """Crank angle (POINTS + 1,) [rad] between the steps, from the profile's angle 0 on."""
-        return self.profile.angles(_even_angles(self.profile))
+        return self.profile.angles(even_angles(self.profile))
 
 
 class _Leg(NamedTuple):
@@ -74,7 +75,11 @@ class _Leg(NamedTuple):
 
 
 class TorqueReferenceSnapshot(NamedTuple):
-    """State of a `TorqueReferenceRun`; plain arrays and numbers."""
+    """State of a `TorqueReferenceRun`; plain arrays and numbers.
+
+    ``ahead`` holds the torque (POINTS,) of the gait cycle that is simulated but not counted yet, None instead
+    of it where the leg failed; it is empty before the first. ``simulation`` is the state after it.
+    """
 
     profile: CrankProfile
     legs: tuple[_Leg, ...]
@@ -82,12 +87,15 @@ class TorqueReferenceSnapshot(NamedTuple):
     done: tuple[HalfFloats, ...]
     torque: HalfFloats
     cycle: int
-    impulse: float
-    stepper: Snapshot | None
+    ahead: tuple[Floats | None, ...]
+    simulation: LegSimulationSnapshot | None
 
 
 class TorqueReferenceRun:
     """Simulates a torque reference, a gait cycle at a time.
+
+    A thread simulates the next gait cycle while the caller goes on. `advance` waits for it: what it returns
+    depends on the number of calls alone.
 
     Parameters
     ----------
@@ -96,27 +104,25 @@ class TorqueReferenceRun:
 
     def __init__(self, mechanism: Mechanism) -> None:
         self._mechanism = mechanism
-        self._prepare(BodyFactors.none(mechanism))
         self._radius = np.array(
             [mechanism.clearances[joint].bushing_radius for joint in mechanism.clearance_joints]
         )
-        self._statistics = new_run_statistics(len(mechanism.joints))
-        self._stepper: ClearanceStepper | None = None
-        self._legs: tuple[_Leg, ...] = (_Leg(self._bodies, self._fresh),)
-        self._depth = self._setup.surfaces.depth.copy()
+        self._legs: tuple[_Leg, ...] = ()
         self._done: tuple[HalfFloats, ...] = ()
         self._torque, self._cycle = np.zeros((0, POINTS), np.float16), 0
-        self._use(CrankProfile.steady(self._setup.speed))
+        self._pool = ThreadPoolExecutor(1, "torque-reference")
+        self._ahead: Future[Floats | None] | None = None
+        self._simulation = LegSimulation(mechanism)  # of the thread alone while that is at work
 
     @property
     def is_busy(self) -> bool:
         """Whether there is something to simulate."""
-        return self._stepper is not None
+        return len(self._done) < len(self._legs)
 
     @property
     def progress(self) -> float:
         """Fraction of the gait cycles that are done; 0 where nothing was begun."""
-        return sum(len(one) for one in self._done) / sum(map(self._cycles_of, self._legs))
+        return sum(len(one) for one in self._done) / max(1, sum(map(self._cycles_of, self._legs)))
 
     def begin(
         self, clearance_m: Floats, depth: Floats, profile: CrankProfile, bodies: BodyFactors | None = None
@@ -157,106 +163,89 @@ class TorqueReferenceRun:
         self._begin([_Leg(each, clearance_m) for each in changed], depth, profile)
 
     def advance(self) -> TorqueReference | None:
-        """Simulate one gait cycle; the reference, when that was the last one.
+        """Count the gait cycle that was simulated, and begin the next; the reference after the last one.
 
         A leg that cannot be simulated ends it without one.
         """
-        if self._stepper is None:
+        if not self.is_busy:
             return None
-        impulses = np.empty(POINTS + 1)
-        impulses[0] = self._statistics.drive_integral[TORQUE]
-        for i in range(POINTS):
-            piece = self._pieces[i].copy()
-            piece[0] += self._cycle * self._period
-            piece[1] += self._cycle * self._turn
-            # a little past the end of an interval, or rounding could leave it out
-            end = (self._cycle * POINTS + i + 1.01) * self._period / POINTS
-            status, _ = self._stepper.advance(piece, end, self._statistics)
-            if status != DONE:
-                self._stepper = None
+        if self._ahead is not None:
+            torque, self._ahead = self._ahead.result(), None
+            if torque is None:
+                self._legs, self._done = (), ()
                 return None
-            impulses[i + 1] = self._statistics.drive_integral[TORQUE]
-        if self._cycle >= _SETTLING:
-            self._torque[self._cycle - _SETTLING] = np.diff(impulses) * (POINTS / self._period)
-        self._cycle += 1
-        if self._cycle < _SETTLING + len(self._torque):
+            self._count(torque)
+        if self.is_busy:
+            leg = self._legs[len(self._done)]
+            self._ahead = self._pool.submit(self._simulated, leg, self._depth, self._cycle)
             return None
-        self._done = (*self._done, self._torque)
-        if len(self._done) < len(self._legs):
-            self._begin_leg()
-            return None
-        self._stepper = None
         clearance_m = np.array([leg.clearance_m for leg in self._legs])
-        return TorqueReference(self._profile, clearance_m, self._done, self._legs[0].bodies)
+        return TorqueReference(self._simulation.profile, clearance_m, self._done, self._legs[0].bodies)
 
     def snapshot(self) -> TorqueReferenceSnapshot:
         """A copy of the whole state."""
-        stepper = self._stepper.snapshot() if self._stepper else None
-        impulse = float(self._statistics.drive_integral[TORQUE])
+        ahead = () if self._ahead is None else (self._ahead.result(),)
         return TorqueReferenceSnapshot(
-            self._profile,
+            self._simulation.profile,
             self._legs,
             self._depth,
             self._done,
             self._torque.copy(),
             self._cycle,
-            impulse,
-            stepper,
+            ahead,
+            self._simulation.snapshot() if ahead and ahead[0] is not None else None,
         )
 
     def restore(self, snapshot: TorqueReferenceSnapshot) -> None:
         """Restore a snapshot of a run of the same mechanism; it continues bit for bit."""
+        self._settle()
         self._legs, self._depth, self._done = snapshot.legs, snapshot.depth, snapshot.done
-        self._use(snapshot.profile)
-        self._stepper = None
-        if snapshot.stepper is not None:
-            self._begin_leg().restore(snapshot.stepper)
+        self._simulation.use(snapshot.profile)
         self._torque, self._cycle = snapshot.torque.copy(), snapshot.cycle
-        self._statistics.drive_integral[TORQUE] = snapshot.impulse
+        if snapshot.simulation is not None:
+            leg = self._legs[len(self._done)]
+            self._simulation.begin(leg.bodies, leg.clearance_m, self._depth)
+            self._simulation.restore(snapshot.simulation)
+        if snapshot.ahead:
+            self._ahead = Future()
+            self._ahead.set_result(snapshot.ahead[0])
+
+    def _settle(self) -> None:
+        """Wait for the thread, and forget what it simulated."""
+        if self._ahead is not None:
+            wait([self._ahead])
+            self._ahead = None
 
     def _begin(self, legs: Sequence[_Leg], depth: Floats, profile: CrankProfile) -> None:
+        self._settle()
         self._legs, self._depth, self._done = tuple(legs), depth.copy(), ()
-        self._use(profile)
-        self._begin_leg()
+        self._simulation.use(profile)
+        self._clear()
+
+    def _clear(self) -> None:
+        """Make room for the next leg."""
+        cycles = self._cycles_of(self._legs[len(self._done)])
+        self._torque, self._cycle = np.zeros((cycles, POINTS), np.float16), 0
+
+    def _count(self, torque: Floats) -> None:
+        """Count a gait cycle with its torque (POINTS,)."""
+        if self._cycle >= _SETTLING:
+            self._torque[self._cycle - _SETTLING] = torque
+        self._cycle += 1
+        if self._cycle == _SETTLING + len(self._torque):
+            self._done = (*self._done, self._torque)
+            if self.is_busy:
+                self._clear()
 
     def _cycles_of(self, leg: _Leg) -> int:
         """Gait cycles that are simulated for a leg."""
         return CYCLES if (leg.clearance_m != self._legs[0].clearance_m).any() else 2 * CYCLES
 
-    def _prepare(self, bodies: BodyFactors) -> None:
-        """Prepare the simulation of a leg with given bodies."""
-        self._bodies = bodies
-        self._setup = prepare(bodies.applied(self._mechanism), wear=True)
-        self._setup.contacts.wear_coefficient[:] = 0.0
-        self._fresh = self._setup.contacts.clearance.copy()
-        self._tables = ClearanceStepper(self._setup).model.tables
-
-    def _use(self, profile: CrankProfile) -> None:
-        """Prepare the drive polynomials of a gait cycle."""
-        self._profile = profile
-        self._period = TURN / abs(profile.speed)
-        self._turn = float(np.copysign(TURN, profile.speed))
-        motions = [profile.at(phi) for phi in _even_angles(profile)]
-        step = self._period / POINTS
-        self._pieces = np.array([quintic(i * step, motions[i], step, motions[i + 1]) for i in range(POINTS)])
-
-    def _begin_leg(self) -> ClearanceStepper:
-        """Set the next leg in motion."""
-        number = len(self._done)
-        leg = self._legs[number]
-        if leg.bodies is not self._bodies:
-            self._prepare(leg.bodies)
-        clearance, depth = worn_to(self._fresh, self._depth, leg.clearance_m)
-        self._setup.contacts.clearance[:] = clearance
-        self._setup.surfaces.depth[:] = depth
-        self._stepper = ClearanceStepper(self._setup, self._period / INTERVALS, tables=self._tables)
-        start = self._profile.at(0.0)
-        self._stepper.init(start.angle, start.speed)
-        self._torque = np.zeros((self._cycles_of(leg), POINTS), np.float16)
-        self._cycle, self._statistics.drive_integral[TORQUE] = 0, 0.0
-        return self._stepper
-
-
-def _even_angles(profile: CrankProfile) -> Floats:
-    """Angles (POINTS + 1,) [rad] of the evenly turning crank at equal steps of a gait cycle."""
-    return np.linspace(0.0, np.copysign(TURN, profile.speed), POINTS + 1)
+    def _simulated(self, leg: _Leg, depth: Floats, cycle: int) -> Floats | None:
+        """Mean torque (POINTS,) in the next gait cycle of a leg; None if it cannot be simulated."""
+        if cycle == 0:
+            try:
+                self._simulation.begin(leg.bodies, leg.clearance_m, depth)
+            except AssemblyError:  # with such lengths it does not close
+                return None
+        return self._simulation.cycle(cycle)

@@ -13,7 +13,8 @@ from leg_wear_monitor.monitor.diagnosis.signature import TorqueSensor
 from leg_wear_monitor.monitor.diagnosis.signature_model import signature_model, simulated_signatures
 from leg_wear_monitor.monitor.ledger.entry import CommissionedTorque
 from leg_wear_monitor.twin.reference.body_factors import BodyFactors
-from leg_wear_monitor.twin.reference.torque_reference import HEAVIER, LONGER, POINTS
+from leg_wear_monitor.twin.reference.leg_simulation import POINTS
+from leg_wear_monitor.twin.reference.torque_reference import HEAVIER, LONGER
 
 SENSOR = TorqueSensor(period_s=0.005, cycle_s=1.0, size_nm=9.2, noise_nm=0.3)
 

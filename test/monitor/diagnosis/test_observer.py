@@ -16,7 +16,8 @@ from leg_wear_monitor.monitor.diagnosis.reference_file import shipped_reference
 from leg_wear_monitor.monitor.ledger.entry import CommissionedTorque
 from leg_wear_monitor.twin.kinds import CRANK, TORQUE
 from leg_wear_monitor.twin.reference import torque_reference
-from leg_wear_monitor.twin.reference.torque_reference import POINTS, WIDER
+from leg_wear_monitor.twin.reference.leg_simulation import POINTS
+from leg_wear_monitor.twin.reference.torque_reference import WIDER
 from leg_wear_monitor.twin.sample import gait_samples
 from leg_wear_monitor.wear.surfaces import SECTORS
 

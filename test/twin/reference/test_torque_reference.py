@@ -74,3 +74,28 @@ def test_a_restored_run_continues_bit_for_bit(leg, short) -> None:
     assert other.progress == run.progress
     for one, same in zip(finished(run).torque_nm, finished(other).torque_nm, strict=True):
         np.testing.assert_array_equal(one, same)
+
+
+def test_a_leg_that_does_not_close_ends_a_run(leg, short) -> None:
+    none, run, other = BodyFactors.none(leg), TorqueReferenceRun(leg), TorqueReferenceRun(leg)
+    crank = np.eye(len(leg.bodies))[list(leg.bodies).index("crank")]
+    run.begin(NEW, UNWORN, STEADY, attrs.evolve(none, length=none.length + 50.0 * crank))
+    assert run.advance() is None
+    other.restore(run.snapshot())
+    for each in (run, other):
+        assert each.is_busy
+        assert each.advance() is None
+        assert not each.is_busy
+
+
+def test_what_advance_returns_does_not_depend_on_how_long_the_thread_takes(leg, short) -> None:
+    quick, slow = TorqueReferenceRun(leg), TorqueReferenceRun(leg)
+    for run in (quick, slow):
+        run.begin(NEW, UNWORN, STEADY)
+    for _ in range(8):
+        quick.advance()
+        slow.advance()
+        slow.snapshot()  # waits for the thread
+        assert quick.progress == slow.progress
+    for one, same in zip(quick.snapshot().done, slow.snapshot().done, strict=True):
+        np.testing.assert_array_equal(one, same)

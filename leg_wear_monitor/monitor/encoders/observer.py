@@ -10,6 +10,7 @@ import attrs
 import numpy as np
 
 from leg_wear_monitor.mechanism.arrays import Floats
+from leg_wear_monitor.mechanism.ideal import TURN
 from leg_wear_monitor.mechanism.spec import Mechanism
 from leg_wear_monitor.monitor.config.settings import MonitorConfig
 from leg_wear_monitor.monitor.encoders.angle_regression import Estimate, binned
@@ -27,6 +28,7 @@ from leg_wear_monitor.monitor.encoders.commissioning import commissioned, errors
 from leg_wear_monitor.monitor.encoders.samples import after, extended, no_encoder_samples, within
 from leg_wear_monitor.monitor.encoders.state import LEAST_PHASES, EncoderState, fault_of
 from leg_wear_monitor.monitor.ledger.entry import Commissioned
+from leg_wear_monitor.twin.reference.crank_profile import cycle_profile, mean_profile
 from leg_wear_monitor.twin.reference.joint_angles import angle_model
 from leg_wear_monitor.twin.reference.reference import ReferenceRun, ReferenceSnapshot
 from leg_wear_monitor.twin.sample import Samples
@@ -36,6 +38,8 @@ OTHERWISE_CYCLES = 20  # in a row with other encoders than before, until the cha
 
 _UNKNOWN_M = 1.0e-3  # prior standard deviation of a clearance without prior knowledge
 _FAR_M = 1.0e-4  # difference of a clearance from the reference at which the reference is renewed
+_UNLIKE = 0.015  # of the mean speed: the reference is renewed if the crank turns otherwise by more
+_PROFILES = 10  # gait cycles whose crank motion is averaged
 _AGAIN_CYCLES = 100  # least number of cycles between two references
 
 
@@ -157,7 +161,12 @@ class EncoderObserver:
     def _add_cycle(self, begin_ns: int, end_ns: int) -> None:
         """Add a gait cycle if its encoders are those of the previous cycles."""
         state = self.state
-        crank, raw = within(state.samples, begin_ns, end_ns)
+        stamp_ns, crank, raw = within(state.samples, begin_ns, end_ns)
+        if len(crank) >= LEAST_PHASES:
+            turned: Floats = np.asarray(np.unwrap(crank, period=TURN), dtype=np.float64)
+            since_s = np.asarray(1.0e-9 * (stamp_ns - begin_ns), dtype=np.float64)
+            profile = cycle_profile(since_s, turned, 1.0e-9 * (end_ns - begin_ns))
+            state.profiles = (*state.profiles, profile)[-_PROFILES:]
         angles = np.where(np.isfinite(raw), raw, np.nan)
         self._centre(crank, angles)
         deviation, counts = binned(self._model, crank, angles - state.errors.centre_rad)
@@ -225,17 +234,19 @@ class EncoderObserver:
             self._clearance_regression.refer(reference, self._before(reference.clearance_m))
         if self._reference.is_busy or not any(state.present):
             return
-        if not state.asked:
+        if not state.asked and state.profiles:
             state.asked = True
-            self._reference.begin(clearance_m, depth)
+            self._reference.begin(clearance_m, depth, mean_profile(state.profiles))
         elif self._is_far():
             state.since_reference = 0
-            self._reference.begin(self._best(clearance_m), depth)
+            self._reference.begin(self._best(clearance_m), depth, mean_profile(state.profiles))
 
     def _is_far(self) -> bool:
         found, reference = self.state.found, self._clearance_regression.reference
         if found is None or reference is None or self.state.since_reference < _AGAIN_CYCLES:
             return False
+        if mean_profile(self.state.profiles).departure(reference.profile) > _UNLIKE:
+            return True
         off = np.abs(found.clearance_m - reference.clearance_m)
         return bool((off[found.sigma_m <= ESTIMATED_M] > _FAR_M).any())
 

@@ -55,11 +55,14 @@ def extended(kept: EncoderSamples, piece: Samples) -> EncoderSamples:
     )
 
 
-def within(kept: EncoderSamples, begin_ns: int, end_ns: int) -> tuple[Floats, Floats]:
-    """Crank (n,) and encoder angles (n, m) [rad] between two stamps; of equal stamps the first sample."""
+def within(kept: EncoderSamples, begin_ns: int, end_ns: int) -> tuple[Ints, Floats, Floats]:
+    """Stamps (n,) [ns], crank (n,) and encoder angles (n, m) [rad] between two stamps.
+
+    Of equal stamps the first sample counts.
+    """
     _, first = np.unique(kept.stamp_ns, return_index=True)
     first = first[(kept.stamp_ns[first] >= begin_ns) & (kept.stamp_ns[first] < end_ns)]
-    return kept.crank_rad[first], kept.encoder_rad[first]
+    return kept.stamp_ns[first], kept.crank_rad[first], kept.encoder_rad[first]
 
 
 def after(kept: EncoderSamples, stamp_ns: int) -> EncoderSamples:

@@ -9,6 +9,7 @@ from leg_wear_monitor.mechanism.arrays import Floats
 from leg_wear_monitor.monitor.encoders.angle_regression import Estimate, rms
 from leg_wear_monitor.monitor.encoders.commissioning import EncoderErrors
 from leg_wear_monitor.monitor.encoders.samples import EncoderSamples
+from leg_wear_monitor.twin.reference.crank_profile import CrankProfile
 from leg_wear_monitor.twin.reference.joint_angles import PHASES
 
 LEAST_PHASES = PHASES // 4  # with samples: at 60 rpm a rate of 32 Hz
@@ -38,6 +39,8 @@ class EncoderState:
         Whether a reference was requested since the last change of the leg.
     since_reference : int
         Cycles since the last reference was ready.
+    profiles : tuple of CrankProfile
+        How the crank turned in the last cycles.
     found : Estimate or None
     updated_ns : int
         Stamp of the last forecast update with it, 0 if an update is due.
@@ -54,6 +57,7 @@ class EncoderState:
     faults: tuple[str, ...] = ()
     asked: bool = False
     since_reference: int = 0
+    profiles: tuple[CrankProfile, ...] = ()
     found: Estimate | None = None
     updated_ns: int = 0
     other: tuple[bool, ...] = ()

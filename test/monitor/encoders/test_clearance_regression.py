@@ -1,5 +1,6 @@
 """Clearances from encoders: what is put into angles is found again, and what cannot be seen is said."""
 
+import attrs
 import numpy as np
 import pytest
 
@@ -13,6 +14,7 @@ from leg_wear_monitor.monitor.config.inputs import Encoders
 from leg_wear_monitor.monitor.encoders.clearance_estimate import ClearanceObservation, clearance_estimates
 from leg_wear_monitor.monitor.encoders.clearance_regression import ClearanceRegression
 from leg_wear_monitor.monitor.encoders.commissioning import commissioned, errors_of, known_with
+from leg_wear_monitor.twin.reference.crank_profile import HARMONICS, CrankProfile
 from leg_wear_monitor.twin.reference.joint_angles import PHASES, angle_model, design
 from leg_wear_monitor.twin.reference.reference import Reference, ReferenceRun, worn_to
 
@@ -39,7 +41,7 @@ def shape():
 def reference(model, shape):
     """Of a leg that obeys the linear model, so well known as if from any number of gait cycles."""
     columns = design(model, shape)
-    return Reference(FRESH, columns[:, :, :5] @ FRESH, columns, 10**9)
+    return Reference(FRESH, columns[:, :, :5] @ FRESH, columns, 10**9, CrankProfile.steady(TURN))
 
 
 @pytest.fixture(scope="module")
@@ -200,7 +202,9 @@ def test_a_leg_in_full_coordinates_shows_its_worn_knee(leg, model, simulated):
 def test_an_encoder_that_is_absent_is_as_one_that_was_never_there(leg, model, simulated, shape):
     """What I and J do to the hip by way of others shows in a simulated reference; it is not to be used."""
     hip, own = angle_model(leg, ("B",)), [*range(7), 9]
-    reference = Reference(FRESH, simulated.deviation[:, :1], simulated.columns[:, :1, own], simulated.cycles)
+    reference = attrs.evolve(
+        simulated, deviation=simulated.deviation[:, :1], columns=simulated.columns[:, :1, own]
+    )
     errors = errors_of(Encoders(names=("hip",), joints=("B",)), None)
     alone = ClearanceRegression(hip, reference, known_with(errors, FRESH, 1e-3))
     absent = ClearanceRegression(model, simulated, known_with(UNKNOWN, FRESH, 1e-3))
@@ -247,3 +251,15 @@ def test_a_worn_joint_is_worn_more_where_it_is_worn():
 def test_a_sensor_has_to_sit_on_a_revolute_joint(leg):
     with pytest.raises(ConfigError, match="'Z' is not a revolute joint"):
         angle_model(leg, ("Z",))
+
+
+@pytest.mark.parametrize("sign", [1.0, -1.0])
+def test_phases_are_where_they_are_however_the_crank_turns(leg, model, sign) -> None:
+    """A crank with ripple passes each phase at another time, but at the same angle."""
+    run = ReferenceRun(leg, model, 1)
+    ripple = CrankProfile(sign * TURN, np.zeros(HARMONICS), 0.015 * np.eye(HARMONICS)[1])
+    run.begin(FRESH, np.zeros((5, 2, 720)), ripple)
+    wanted = (0.5 + sign * np.arange(PHASES)) * (TURN / PHASES)
+    np.testing.assert_allclose(run._pieces[:, 1], wanted, atol=1e-7)
+    assert run._times[-1] == pytest.approx(1.0, abs=1e-9)
+    assert np.ptp(np.diff(run._times)) > 0.05 / PHASES

@@ -5,8 +5,13 @@ from pathlib import Path
 from typing import Any
 from xml.etree import ElementTree
 
-ROOT = Path(__file__).parents[1]
-sys.path[:0] = [str(Path(__file__).parent / "_ext"), str(ROOT)]
+sys.path.insert(0, str(Path(__file__).parent / "_ext"))
+
+import rosdoc2_copy
+
+ROOT = rosdoc2_copy.documents(Path(__file__)).parent
+sys.path.insert(0, str(ROOT))
+rosdoc2_settings = rosdoc2_copy.SETTINGS
 
 project = "leg_wear_monitor"
 author = "leg_wear_monitor maintainers"
@@ -23,7 +28,7 @@ extensions = [
     "sphinx_design",
     "three_clicks",
 ]
-exclude_patterns = ["_ext", "validation"]
+exclude_patterns = ["_ext", "validation", *rosdoc2_copy.PAGES]
 nitpicky = True
 
 # Pages are read on a forge, too: headings have its anchors, and links are those of plain Markdown.

@@ -1,9 +1,10 @@
-"""A Sphinx extension: pages that include a document of the package's root link to others of them.
+"""A Sphinx extension: links of the package's root documents, in the pages that include them.
 
-A link such as ``SECURITY.md`` in a root document is right on a forge; on the site it leads to the page that
-includes that document.
+On a forge, ``SECURITY.md`` and ``docs/reference/ros.md`` are right. On the site the first one leads to the
+page that includes that document, and the second one is a page by its place below docs/.
 """
 
+from pathlib import PurePosixPath
 from typing import Any
 
 PAGES = {
@@ -18,8 +19,11 @@ def _link(_app: Any, doctree: Any) -> None:
 
     for link in doctree.findall(pending_xref):
         path, _, anchor = link["reftarget"].partition("#")
-        if link["reftype"] == "myst" and path in PAGES:
-            link["refdomain"], link["reftarget"], link["reftargetid"] = "doc", PAGES[path], anchor or None
+        page = PAGES.get(path)
+        if path.startswith("docs/"):
+            page = str(PurePosixPath(path).relative_to("docs").with_suffix(""))
+        if link["reftype"] == "myst" and page is not None:
+            link["refdomain"], link["reftarget"], link["reftargetid"] = "doc", page, anchor or None
 
 
 def setup(app: Any) -> dict[str, bool]:

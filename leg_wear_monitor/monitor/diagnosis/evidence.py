@@ -36,7 +36,8 @@ class Evidence:
     def review(self, state: TorqueState, config: MonitorConfig) -> None:
         """Evaluate all kept cycles again, because the reference or the baseline has changed."""
         self._models.forget()
-        if state.reference is not None and state.sensor is not None:
+        is_measured = state.commissioned is not None or len(state.cycles) > 0
+        if state.reference is not None and state.sensor is not None and is_measured:
             measured = state.commissioned.mean if state.commissioned else state.signatures.mean(axis=0)
             state.sensor = with_noise_of(state.reference, state.sensor, measured)
         state.detector, state.changes = None, ()

@@ -169,6 +169,17 @@ def test_a_replaced_part_is_commissioned_again(leg, reference) -> None:
     assert observer.state.commissioned is None
 
 
+def test_a_reference_that_comes_after_a_replacement_leaves_the_noise_as_it_was(leg, reference) -> None:
+    """There are no gait cycles of the new part yet that it could be found from."""
+    observer = observer_of(leg)
+    walk(observer, samples(reference, [0] * 6))
+    noise_nm = observer.state.sensor.noise_nm
+    assert noise_nm == pytest.approx(0.3, rel=0.2)
+    observer.replaced(NEW)
+    observer._evidence.review(observer.state, observer.config)
+    assert observer.state.sensor.noise_nm == noise_nm
+
+
 def test_a_stored_baseline_is_used_from_the_first_cycles_on(leg, reference) -> None:
     first = observer_of(leg)
     walk(first, samples(reference, [0] * COMMISSIONING_CYCLES))

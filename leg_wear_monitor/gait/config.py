@@ -64,6 +64,9 @@ class EncoderConfig:
     )
     offset_rad: float = quantity("rad", "reading at crank angle 0", default=0.0)
     wrapped: bool = described("wrap the angle to a turn; otherwise it is continuous", default=False)
+    restarts_s: tuple[float, ...] = quantity(
+        "s", "times at which the encoder starts anew at 0; none if empty", at_least=0.0, default=()
+    )
 
 
 @attrs.frozen(kw_only=True)

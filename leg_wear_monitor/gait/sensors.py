@@ -103,14 +103,17 @@ def _taken(leg: SyntheticLeg, config: GaitConfig) -> Iterator[Reading]:
     by_effort = config.torque_sensor.source == EFFORT
     crank_times = _times(config.encoder.rate_hz, jitter, encoder, CRANK)
     torque_times = iter(()) if by_effort else _times(config.torque_sensor.rate_hz, jitter, torque, TORQUE)
-    since, impulse = 0.0, 0.0
+    since, impulse, zero_rad, restarts = 0.0, 0.0, 0.0, list(config.encoder.restarts_s)
     for t, kind in heapq.merge(crank_times, torque_times):
         if config.duration_s and t >= config.duration_s:
             return
         instant = leg.advance(t)
         angle, velocity, torque_nm = math.nan, math.nan, math.nan
         if kind == CRANK:
-            angle, velocity = _encoder(config.encoder, instant.crank, encoder)
+            while restarts and t >= restarts[0]:
+                zero_rad = instant.crank.angle
+                restarts.pop(0)
+            angle, velocity = _encoder(config.encoder, instant.crank, zero_rad, encoder)
             turned = _further(config.joint_encoders, instant.encoder_rad, further)
         if kind == TORQUE or by_effort:
             mean = (instant.torque_impulse - impulse) / (t - since)
@@ -127,8 +130,8 @@ def _times(rate_hz: float, jitter_s: float, noise: Noise, kind: int) -> Iterator
         yield i / rate_hz + min(most, max(-most, jitter_s * noise.normal())), kind
 
 
-def _encoder(config: EncoderConfig, crank: CrankMotion, noise: Noise) -> tuple[float, float]:
-    angle = crank.angle + config.offset_rad + config.noise_rad * noise.normal()
+def _encoder(config: EncoderConfig, crank: CrankMotion, zero_rad: float, noise: Noise) -> tuple[float, float]:
+    angle = crank.angle - zero_rad + config.offset_rad + config.noise_rad * noise.normal()
     velocity = crank.speed + config.velocity_noise_radps * noise.normal()
     if config.counts_per_turn:
         step = TURN / config.counts_per_turn

@@ -69,6 +69,8 @@ class AccountingState:
         Of the alarms, what the history has last.
     pauses : Pauses
         Times in which nobody recorded.
+    without_zero_s : float
+        Time of samples that did not reach the twin, because the crank's zero is not known.
     commissioned : dict of str to float
         What the ledger keeps of this leg's torque, by names that end in their unit.
     """
@@ -85,6 +87,7 @@ class AccountingState:
     skipped_ns: int = 0
     shown: Mapping[str, tuple[Level, bool]] = attrs.field(factory=dict)
     pauses: Pauses = Pauses()
+    without_zero_s: float = 0.0
     commissioned: dict[str, float] = attrs.field(factory=dict)
 
 
@@ -143,7 +146,8 @@ class Accounting:
         What earlier runs have counted is not in it, nor are pauses between recordings.
         """
         unmonitored_s = self._twin.intake.unmonitored_s
-        return max(0.0, unmonitored_s - self.state.skipped_s - self.state.pauses.passed_s(unmonitored_s))
+        others_s = self.state.skipped_s + self.state.pauses.passed_s(unmonitored_s)
+        return max(0.0, unmonitored_s - others_s) + self.state.without_zero_s
 
     def pause(self, pause_s: float) -> None:
         """Nobody records for a time [s], from the newest sample on."""

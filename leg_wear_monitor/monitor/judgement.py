@@ -47,6 +47,8 @@ class Judge:
         Stores changes as events.
     diagnosis : callable
         What the drive torque shows now.
+    without_zero : callable
+        Why nothing is monitored while the crank's zero is not known; empty if it is.
     """
 
     def __init__(
@@ -57,9 +59,11 @@ class Judge:
         forecaster: Forecaster,
         accounting: Accounting,
         diagnosis: Callable[[], Diagnosis],
+        without_zero: Callable[[], str] = lambda: "",
     ) -> None:
         self._twin, self._evaluation, self._encoders = twin, evaluation, encoders
         self._forecaster, self._accounting, self._diagnosis = forecaster, accounting, diagnosis
+        self._without_zero = without_zero
 
     def report(self, state: MonitorState) -> VerdictReport:
         """The verdict now."""
@@ -73,6 +77,7 @@ class Judge:
             self._encoders,
             self._diagnosis(),
             state.mismatch.explanation,
+            self._without_zero(),
         )
         return VerdictReport(stamp_ns, dated(findings(situation), state.findings, stamp_ns))
 
@@ -107,6 +112,7 @@ def situation_of(
     encoders: EncoderObserver | None = None,
     diagnosis: Diagnosis | None = None,
     explained: TorqueExplanation | None = None,
+    without_zero: str = "",
 ) -> Situation:
     """What the verdict depends on, at the end of an evaluation period.
 
@@ -122,6 +128,8 @@ def situation_of(
         What the drive torque shows.
     explained : TorqueExplanation, optional
         What explains a torque mismatch.
+    without_zero : str
+        Why nothing is monitored while the crank's zero is not known; empty if it is.
     """
     alarms, config = evaluation.board.alarms, evaluation.config
     return Situation(
@@ -135,6 +143,7 @@ def situation_of(
         mismatch=last.torque_mismatch if last else math.nan,
         mismatch_limit=config.limits.torque_mismatch,
         torque_causes=_torque_causes(evaluation, last, record),
+        without_zero="" if evaluation.guard.cause else without_zero,
         unfollowed=_unfollowed(twin, evaluation),
         input_causes=tuple(evaluation.causes),
         is_out_of_step=twin.tracking is Tracking.OUT_OF_STEP,

@@ -5,7 +5,9 @@ import attrs
 from leg_wear_monitor.mechanism.spec import Mechanism
 from leg_wear_monitor.monitor.accounting import Accounting
 from leg_wear_monitor.monitor.config.fitting import fitted, twin_settings
+from leg_wear_monitor.monitor.config.inputs import AT_START
 from leg_wear_monitor.monitor.config.settings import MonitorConfig
+from leg_wear_monitor.monitor.crank_zero.crank_zero import CrankZero
 from leg_wear_monitor.monitor.diagnosis.diagnosis import Diagnosis, DiagnosisState
 from leg_wear_monitor.monitor.diagnosis.observer import TorqueObserver
 from leg_wear_monitor.monitor.encoders.observer import EncoderObserver
@@ -20,6 +22,7 @@ from leg_wear_monitor.monitor.judgement import Judge
 from leg_wear_monitor.monitor.ledger.ledger import Ledger
 from leg_wear_monitor.monitor.state import MonitorSnapshot, MonitorState
 from leg_wear_monitor.monitor.torque_causes.explainer import TorqueExplainer
+from leg_wear_monitor.torque_fit.torque_model import torque_model
 from leg_wear_monitor.twin.digital_twin import DigitalTwin
 
 WRONG_TORQUE = "the drive torque is wrong as received, see the status torque"
@@ -50,6 +53,11 @@ class Parts:
         self.clearance_joints = self.mechanism.clearance_joints
         self.twin = DigitalTwin(self.mechanism, twin_settings(self.config))
         self.guard = InputGuard(self.twin.settings.tracker)
+        self.crank_zero = (
+            CrankZero(torque_model(self.mechanism), self.config, self.twin.settings.tracker)
+            if self.config.crank.zero == AT_START
+            else None
+        )
         self.accounting = Accounting(self.twin, ledger, self.config.ledger)
         cycle_ns = round(60.0e9 / abs(self.config.cadence.commanded_rpm))
         self.evaluation = AlarmEvaluation(self.twin, self.config, cycle_ns, self.guard)
@@ -83,6 +91,7 @@ class Parts:
             self.forecaster,
             self.accounting,
             lambda: self.diagnosis,
+            lambda: self.crank_zero.cause if self.crank_zero else "",
         )
         if ledger and ledger.entry:
             self.evaluation.board.restore(ledger.entry.alarms)
@@ -124,6 +133,7 @@ class Parts:
             self.guard.snapshot(),
             self.encoders.snapshot() if self.encoders else None,
             self.torque.snapshot() if self.torque else None,
+            self.crank_zero.snapshot() if self.crank_zero else None,
         )
 
     def restore(self, snapshot: MonitorSnapshot) -> None:
@@ -140,6 +150,8 @@ class Parts:
             self.encoders.restore(snapshot.encoders)
         if self.torque and snapshot.torque:
             self.torque.restore(snapshot.torque)
+        if self.crank_zero and snapshot.crank_zero:
+            self.crank_zero.restore(snapshot.crank_zero)
 
     def keep(self, closed: bool = False) -> bool:
         """Write an entry into the ledger; return whether it is on the disk."""

@@ -35,10 +35,16 @@ class Processing:
         self._twin, self._guard, self._accounting = parts.twin, parts.guard, parts.accounting
         self._evaluation, self._forecaster = parts.evaluation, parts.forecaster
         self._encoders, self._torque = parts.encoders, parts.torque
+        self._crank_zero = parts.crank_zero
 
-    def take(self, piece: Samples, changes: list[AlarmList]) -> tuple[SampleReports, list[CycleReport]]:
+    def take(
+        self, piece: Samples, changes: list[AlarmList], ends_period: bool
+    ) -> tuple[SampleReports, list[CycleReport]]:
         """Process a piece of an evaluation period, and evaluate the gait cycles that end in it."""
         piece = self._guard.checked(self._accounting.not_counted(piece))
+        if self._crank_zero:
+            piece = self._crank_zero.passed(piece, ends_period)
+            self._accounting.state.without_zero_s = self._crank_zero.unmonitored_s
         update = self._twin.update(piece)
         self._evaluation.add_samples(piece)
         if self._encoders:

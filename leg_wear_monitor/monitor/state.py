@@ -4,6 +4,7 @@ import attrs
 
 from leg_wear_monitor.monitor.accounting import AccountingState
 from leg_wear_monitor.monitor.alarms.alarm import Alarm
+from leg_wear_monitor.monitor.crank_zero.crank_zero import CrankZeroSnapshot
 from leg_wear_monitor.monitor.diagnosis.observer import TorqueObserverSnapshot
 from leg_wear_monitor.monitor.encoders.observer import EncoderSnapshot
 from leg_wear_monitor.monitor.evaluation.evaluation import AlarmEvaluationState
@@ -47,3 +48,4 @@ class MonitorSnapshot:
     guard: Records
     encoders: EncoderSnapshot | None = None
     torque: TorqueObserverSnapshot | None = None
+    crank_zero: CrankZeroSnapshot | None = None

@@ -8,6 +8,7 @@ import attrs
 from leg_wear_monitor.monitor.accounting import Accounting
 from leg_wear_monitor.monitor.alarms.alarm import Level
 from leg_wear_monitor.monitor.alarms.fault_codes import (
+    CRANK_ZERO,
     ENCODERS,
     LEDGER_INTERRUPTED,
     LEDGER_NOT_WRITTEN,
@@ -16,6 +17,7 @@ from leg_wear_monitor.monitor.alarms.fault_codes import (
     worst_code,
 )
 from leg_wear_monitor.monitor.alarms.words import ADVICE
+from leg_wear_monitor.monitor.crank_zero.crank_zero import CrankZero
 from leg_wear_monitor.monitor.diagnosis.diagnosis import Diagnosis
 from leg_wear_monitor.monitor.encoders.clearance_estimate import ClearanceObservation
 from leg_wear_monitor.monitor.encoders.observer import EncoderObserver
@@ -30,6 +32,7 @@ from leg_wear_monitor.monitor.torque_causes.explanation import TorqueExplanation
 from leg_wear_monitor.monitor.torque_status import diagnosis_status, torque_status
 from leg_wear_monitor.monitor.verdict.verdict import Verdict
 from leg_wear_monitor.monitor.verdict.words import with_unit
+from leg_wear_monitor.monitor.zero_status import zero_status
 from leg_wear_monitor.twin.digital_twin import DigitalTwin
 from leg_wear_monitor.twin.statistics import Event, Tracking
 
@@ -47,12 +50,14 @@ def statuses(
     diagnosis: Diagnosis,
     encoders: EncoderObserver | None = None,
     explained: TorqueExplanation | None = None,
+    crank_zero: CrankZero | None = None,
 ) -> tuple[Status, ...]:
     """All statuses, verdict first, then gait, inputs, joints, alarms and ledger."""
     joints = [_joint(k, name, twin, evaluation, last) for k, name in enumerate(twin.clearance_joints)]
     return (
         verdict_status(verdict),
-        _gait(twin, evaluation, accounting, last, happened),
+        _gait(twin, evaluation, accounting, last, happened, crank_zero.cause if crank_zero else ""),
+        *((zero_status(crank_zero),) if crank_zero else ()),
         _input(twin, evaluation, accounting),
         torque_status(evaluation, last, record, explained),
         diagnosis_status(twin.clearance_joints, diagnosis),
@@ -81,12 +86,15 @@ def _gait(
     accounting: Accounting,
     last: CycleReport | None,
     happened: Sequence[Event],
+    without_zero: str,
 ) -> Status:
     tracking = twin.tracking
     cadence = evaluation.board.alarms[specs.CADENCE.name()]
     message, level, code = tracking.name.lower().replace("_", " "), cadence.level, code_of(cadence)
     if evaluation.guard.cause:
         message, level, code = "not monitored: see input", Level.ERROR, NOT_FOLLOWED
+    elif without_zero:
+        message, level, code = "not monitored: see crank zero", max(level, Level.WARN), CRANK_ZERO
     elif happened and tracking in (Tracking.STARTING, Tracking.OUT_OF_STEP):
         message += f", last {happened[-1].what.value.replace('_', ' ')}"
     if evaluation.config.wear_acceleration != 1.0:

@@ -93,6 +93,8 @@ class WearMonitor:
     def warm_up(self) -> None:
         """Compile all kernels that `update` needs, before the first sample; takes about a minute once."""
         self._guard.warm_up()
+        if self._parts.crank_zero:
+            self._parts.crank_zero.warm_up()
         list(EvaluationPeriods(1).pieces(np.zeros(1, GAIT_SAMPLE)))
         self._twin.warm_up()
 
@@ -114,7 +116,7 @@ class WearMonitor:
         changes: list[AlarmList] = []
         verdicts: list[VerdictReport] = []
         for piece, ends_period in self._parts.evaluation_periods.pieces(samples):
-            reports, ended = self._processing.take(piece, changes)
+            reports, ended = self._processing.take(piece, changes, ends_period)
             sampled.append(reports)
             cycles += ended
             if ends_period:
@@ -219,6 +221,7 @@ class WearMonitor:
             self.diagnosis,
             self._encoders,
             state.mismatch.explanation,
+            self._parts.crank_zero,
         )
 
     def snapshot(self) -> MonitorSnapshot:

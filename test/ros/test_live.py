@@ -17,7 +17,7 @@ from visualization_msgs.msg import MarkerArray
 
 from leg_wear_monitor import load_mechanism
 from leg_wear_monitor.bags.reader import Recording
-from leg_wear_monitor.gait.config import KnockConfig, PaceConfig, TransportConfig
+from leg_wear_monitor.gait.config import EncoderConfig, KnockConfig, PaceConfig, TransportConfig
 from leg_wear_monitor.messages.outputs import Messages
 from leg_wear_monitor.monitor.config.parameters import config_from
 from leg_wear_monitor.monitor.config.settings import MonitorConfig
@@ -284,3 +284,27 @@ def replayed_from(path: Path, monitor: WearMonitor) -> dict[str, list[bytes]]:
         for out in itertools.chain.from_iterable(messages.of(monitor.update(block)) for block in blocks):
             found.setdefault(out.output.name, []).extend(row.tobytes() for row in out.messages)
     return found
+
+
+def test_an_encoder_that_starts_at_zero_is_found_and_replayed(stage, tmp_path: Path) -> None:
+    recording = tmp_path / "live.mcap"
+    anew = stage.walk(PublisherConfig(duration_s=6.0, encoder=EncoderConfig(restarts_s=(0.3,))))
+    values = {"crank__zero": "at_start", "diagnosis__enabled": False}
+    monitor = stage.monitor(record__path=str(recording), diagnostics__period_s=0.2, **values)
+    diagnostics = stage.listen("/diagnostics", DiagnosticArray)
+    verdicts = stage.listen(f"{ME}/verdict", DiagnosticArray, latched=True)
+    stage.legs().play(anew, monitor)
+    stage.wait_for(lambda: diagnostics and levels(diagnostics[-1]).get("crank zero") == 0, "the zero")
+    stage.wait_for(lambda: any("CRANK_ZERO" in repr(one) for one in verdicts), "why nothing is monitored")
+    monitor.stop()
+    (found,) = (one for one in monitor.node.monitor.status() if one.name == "crank zero")
+    assert found.values["times_found"] == 1.0
+    # at 0.3 s, the crank of 60 rpm has turned by 0.3 turns
+    assert found.values["offset_rad"] == pytest.approx(0.3 * 2.0 * np.pi, abs=0.04)
+    config = config_from(dotted(values))
+    again = WearMonitor(load_mechanism(config.mechanism), config)
+    lived, replayed = published(recording), replayed_from(recording, again)
+    assert repr(found) in map(repr, again.status())
+    assert len(replayed["~/clearance_states"]) >= 4
+    for topic in ("~/clearance_states", "~/predicted_torque"):
+        assert lived[topic] == replayed[topic]

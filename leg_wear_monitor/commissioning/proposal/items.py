@@ -19,11 +19,11 @@ from leg_wear_monitor.mechanism.ideal import TURN
 from leg_wear_monitor.monitor.config.settings import MonitorConfig
 from leg_wear_monitor.torque_fit.fit import Fit
 from leg_wear_monitor.torque_fit.motion import JointMotion
+from leg_wear_monitor.torque_fit.torque_model import PHASE_ERROR_RAD
 
 _SURE = 3.0  # standard deviations
 _NEAR = 0.05  # relative error by which clearances shift the scale: a given one that near is kept
 _DRIFT_RAD = 0.05  # by which clearances may shift the phase over a recording
-_MODEL_PHASE_RAD = 0.02  # by which clearances of 0.3 mm in five joints shift the torque's phase
 _MODEL_SCALE = 0.03  # by which they raise it
 _HALF_A_GEAR = 0.5, 1.5  # efficiencies with which a torque may be that of the motor's shaft
 
@@ -128,7 +128,7 @@ def _crank(found: Found) -> Iterator[Item]:
         name="crank.offset_rad",
         value=round(offset_rad(found, last), 4),
         unit="rad",
-        sigma=math.hypot(one.sigma["offset_rad"], _MODEL_PHASE_RAD),
+        sigma=math.hypot(one.sigma["offset_rad"], PHASE_ERROR_RAD),
         remark="clearances shift the torque's phase",
         mismatch=mismatch,
     )

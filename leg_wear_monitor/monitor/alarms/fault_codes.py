@@ -8,7 +8,7 @@ from collections.abc import Iterable
 from leg_wear_monitor.monitor.alarms.alarm import Alarm, Level
 
 NO_FAULT = "NONE"
-INPUT_SILENCE, NOT_FOLLOWED = "INPUT_SILENCE", "NOT_FOLLOWED"
+INPUT_SILENCE, NOT_FOLLOWED, CRANK_ZERO = "INPUT_SILENCE", "NOT_FOLLOWED", "CRANK_ZERO"
 ENCODERS, DIAGNOSIS = "ENCODERS", "DIAGNOSIS"
 LEDGER_NOT_WRITTEN, LEDGER_INTERRUPTED = "LEDGER_NOT_WRITTEN", "LEDGER_INTERRUPTED"
 SAMPLES_DROPPED, SAMPLES_NOT_PUBLISHED = "SAMPLES_DROPPED", "SAMPLES_NOT_PUBLISHED"
@@ -20,6 +20,7 @@ FAULT_CODES = {
     NO_FAULT: "nothing is wrong",
     INPUT_SILENCE: "no samples come; each status that has no current data then has this code",
     NOT_FOLLOWED: "the samples of the crank cannot be followed, see `input`",
+    CRANK_ZERO: "the zero of the crank's encoder is not found yet, see `crank zero`",
     ENCODERS: "a further encoder gives nothing that can be used",
     DIAGNOSIS: "the drive torque shows a change; the code of the verdict says which",
     LEDGER_NOT_WRITTEN: "the ledger cannot be written",

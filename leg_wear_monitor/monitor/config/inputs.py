@@ -11,6 +11,7 @@ from leg_wear_monitor.twin.settings import AVERAGE, SAMPLINGS
 LIVE = {"live": True}  # may change while the monitor runs
 
 TORQUE_SOURCES = ("wrench", "float64", "effort")
+KNOWN, AT_START = ZEROS = ("known", "at_start")
 
 
 LEAST_RPM = 0.1  # ten minutes a gait cycle: nothing that walks is slower
@@ -45,6 +46,17 @@ class Crank:
         at_most=1.0e4,
         default=1.0,
     )
+    zero: str = choice(
+        ZEROS,
+        "whether crank.offset_rad is known, or the encoder has its zero where it starts, so that the monitor "
+        "finds the offset from the drive torque",
+        default=KNOWN,
+    )
+
+    def __attrs_post_init__(self) -> None:
+        if self.zero == AT_START and self.offset_rad != 0.0:
+            fault = f"{self.offset_rad!r} rad is not used with crank.zero {AT_START!r}, expected 0.0"
+            raise FieldError("offset_rad", fault)
 
 
 def _few_and_different(names: tuple[str, ...]) -> str | None:

@@ -12,6 +12,7 @@ import math
 import numpy as np
 
 from leg_wear_monitor.kernel import entry, kernel
+from leg_wear_monitor.monitor.inputs.angle_series import begin, distance, extend, guess_speed
 from leg_wear_monitor.twin.kinds import CRANK
 from leg_wear_monitor.twin.sample import NO_FAULT, OUT_OF_RANGE
 from leg_wear_monitor.twin.tracker.arrival import LARGEST_ANGLE
@@ -53,81 +54,29 @@ STATE = np.dtype(
 )
 
 # Samples that make a series, and changes from one to the other. Glitches at random angles continue each other
-# by chance in one of twelve (2 * _WIDEST of a turn): eight in a row are one in thirty million.
-_SERIES, _INTERLEAVED, _WIDEST = 8, 8, 0.25
-_SETTLING = 0.02  # s, over which the speed of a series is averaged
+# by chance in one of twelve (2 * WIDEST of a turn): eight in a row are one in thirty million.
+_SERIES, _INTERLEAVED = 8, 8
 _STEP_NS = 20_000_000  # least time of a step: noise of 1 mrad over it is 0.05 rad/s
 _STEPS = 3  # fast steps in a row: the jump of an angle that wraps is one
-
-
-@kernel
-def _wrapped(angle):
-    """An angle in [-pi, pi)."""
-    return angle - _TURN * math.floor(angle / _TURN + 0.5)
-
-
-@kernel
-def _guess_speed(settings, state, k, stamp, angle):
-    """Speed of a series of one sample: at rest, as commanded, or that of the other, what fits best."""
-    if state.number[k] != 1:
-        return
-    h = 1.0e-9 * (stamp - state.stamp[k])
-    moved, least = _wrapped(angle - state.angle[k]), math.inf
-    for speed in (0.0, settings.commanded, state.speed[1 - k]):
-        off = abs(_wrapped(moved - speed * h))
-        if off < least:
-            least, state.speed[k] = off, speed
-
-
-@kernel
-def _distance(settings, state, k, stamp, angle):
-    """How far an angle is from where series k would be; infinite where it cannot belong to it."""
-    if state.number[k] == 0:
-        return math.inf
-    h = 1.0e-9 * (stamp - state.stamp[k])
-    if abs(h) > settings.gap:
-        return math.inf
-    off = abs(_wrapped(angle - state.angle[k] - state.speed[k] * h))
-    # by how much the crank's greatest acceleration may have moved it
-    widest = min(_WIDEST, settings.gate + 0.5 * (settings.largest * h) ** 2)
-    return off if off <= widest else math.inf
-
-
-@kernel
-def _extend(state, k, stamp, angle):
-    """One more sample of series k; a late or repeated one tells nothing new."""
-    h = 1.0e-9 * (stamp - state.stamp[k])
-    if h <= 0.0:
-        return
-    off = _wrapped(angle - state.angle[k] - state.speed[k] * h)
-    state.speed[k] += off / (h + _SETTLING)
-    state.angle[k], state.stamp[k] = angle, stamp
-    state.number[k] += 1
-
-
-@kernel
-def _begin(state, k, stamp, angle):
-    """A new series takes the place of series k."""
-    state.number[k], state.stamp[k], state.switches = 1, stamp, 0
-    state.angle[k], state.speed[k] = angle, 0.0
 
 
 @kernel
 def _are_two(settings, state, stamp, angle):
     """Whether two series go on side by side, after one more sample."""
     for k in range(2):
-        _guess_speed(settings, state, k, stamp, angle)
-    near = _distance(settings, state, 0, stamp, angle)
-    far = _distance(settings, state, 1, stamp, angle)
+        guess_speed(settings, state, k, stamp, angle)
+    near = distance(settings, state, 0, stamp, angle)
+    far = distance(settings, state, 1, stamp, angle)
     k = 0 if near <= far else 1
     strong = 0 if state.number[0] >= state.number[1] else 1
     if max(near, far) < math.inf and state.number[1 - strong] < _SERIES:
         k = strong  # a series must show itself by samples that the other does not explain
     if min(near, far) < math.inf:
-        _extend(state, k, stamp, angle)
+        extend(state, k, stamp, angle)
     else:
         k = 0 if state.number[0] < state.number[1] else 1
-        _begin(state, k, stamp, angle)
+        begin(state, k, stamp, angle)
+        state.switches = 0
     if k != state.last:
         state.last, state.since = k, stamp
         state.switches += 1

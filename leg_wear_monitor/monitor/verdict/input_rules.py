@@ -69,6 +69,11 @@ def impossible_torque(situation: Situation) -> Sequence[Hit]:
     ]
 
 
+def without_zero(situation: Situation) -> Sequence[Hit]:
+    """The zero of the crank's encoder is not known."""
+    return _said(situation.without_zero)
+
+
 def unfollowed(situation: Situation) -> Sequence[Hit]:
     """The crank is not followed."""
     return _said(situation.unfollowed)

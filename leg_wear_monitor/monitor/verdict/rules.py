@@ -4,6 +4,7 @@ docs/reference/monitor.md lists them; a test compares the two.
 """
 
 from leg_wear_monitor.monitor.alarms.alarm import Level
+from leg_wear_monitor.monitor.alarms.fault_codes import CRANK_ZERO
 from leg_wear_monitor.monitor.alarms.words import ADVICE
 from leg_wear_monitor.monitor.diagnosis.diagnosis import Cause
 from leg_wear_monitor.monitor.torque_causes.explanation import TorqueCause
@@ -149,6 +150,15 @@ RULES = (
         why="joint {joint} reaches its limit within {value} with a probability of 10 %, the limit is "
         "{limit}{past}",
         do=f"{_ROCK}; plan its replacement; {_ACKNOWLEDGE}",
+    ),
+    Rule(
+        code=CRANK_ZERO,
+        state=State.NOT_MONITORED,
+        hits=input_rules.without_zero,
+        why="{cause}",
+        do="let the leg walk steadily at the commanded cadence; if the zero is still not found, check the "
+        "drive torque and its parameters, or set crank.zero to known and crank.offset_rad",
+        not_valid=OF_THE_GAIT,
     ),
     Rule(
         code="NOT_FOLLOWED",

@@ -68,6 +68,8 @@ class Situation:
         known.
     torque_causes : tuple of str
         Sentences on impossible bias, drift or lag of the torque.
+    without_zero : str
+        Why nothing is monitored while the crank's zero is not known; empty if it is.
     unfollowed : str
         Why the crank is not followed at present; empty if it is.
     input_causes : tuple of str
@@ -93,6 +95,7 @@ class Situation:
     mismatch: float = 0.0
     mismatch_limit: float = math.nan
     torque_causes: tuple[str, ...] = ()
+    without_zero: str = ""
     unfollowed: str = ""
     input_causes: tuple[str, ...] = ()
     is_out_of_step: bool = False

@@ -2,7 +2,7 @@
 
 import math
 
-from leg_wear_monitor.monitor.config.inputs import Crank, DriveTorque
+from leg_wear_monitor.monitor.config.inputs import AT_START, Crank, DriveTorque
 from leg_wear_monitor.monitor.torque_causes.explanation import (
     NamedCause,
     Timing,
@@ -143,6 +143,8 @@ def _remedy(one: NamedCause, explained: TorqueExplanation, crank: Crank, torque:
 def _timing_remedy(one: NamedCause, explained: TorqueExplanation, crank: Crank) -> str:
     offset = one.value if explained.timing is None else explained.timing.offset_rad
     shift = f"set crank.offset_rad to {crank.offset_rad + offset:.4g}"
+    if crank.zero == AT_START:
+        shift = "restart the monitor while the leg walks steadily, so that the crank's zero is found again"
     late = "look for a delay of the torque"
     if explained.timing is None:
         return f"turn the crank to a known angle and compare: {shift} if its angle is wrong, else {late}"

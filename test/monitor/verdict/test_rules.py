@@ -155,6 +155,12 @@ CASES = [
     ),
     ({"alarms": (alarm("input_samples", present=Level.OK),)}, State.WATCH, "ALARM", ()),
     ({"alarms": (alarm("input_rate torque"),)}, State.WATCH, "ALARM", ()),
+    (
+        {"without_zero": "the crank's zero is being found: 2 of 3 turns"},
+        State.NOT_MONITORED,
+        "CRANK_ZERO",
+        (Figure.GROWTH, Figure.IMPACT_FORCES),
+    ),
     ({"doubts": ("the crank turns at 240 rpm",)}, State.NOT_MONITORED, "NOT_THIS_LEG", tuple(Figure)),
     ({"has_cycle": False, "has_torque": False}, State.NOT_MONITORED, "NO_GAIT_CYCLE", ()),
     ({"has_torque": False}, State.WATCH, "NO_DRIVE_TORQUE", ()),

@@ -1,6 +1,9 @@
 """The live node under load: what is lost, what it takes, how long a report takes.
 
-python benchmarks/live.py [--legs 1] [--rate-hz 1000] [--seconds 20] [--joints A,B,G,I,J]
+python benchmarks/live.py [--legs 1] [--rate-hz 1000] [--rpm 60] [--seconds 20] [--without-diagnosis]
+
+At 60 rpm the diagnosis uses the reference of the package: it is put in after five gait cycles, and reviewed
+after 60. At another speed the node simulates a reference while it monitors.
 
 Each leg is a monitor in a process and a namespace of its own; one more process sends the joint states and
 the torque of all legs, a recorded walk again and again; this one listens to the predicted torque.
@@ -24,7 +27,7 @@ from rclpy.qos import QoSProfile, ReliabilityPolicy
 from rclpy.serialization import serialize_message
 from sensor_msgs.msg import JointState
 
-from leg_wear_monitor.gait.config import EncoderConfig, TorqueSensorConfig
+from leg_wear_monitor.gait.config import EncoderConfig, PaceConfig, TorqueSensorConfig
 from leg_wear_monitor.gait.leg import SyntheticLeg
 from leg_wear_monitor.gait.sensors import readings
 from leg_wear_monitor.ros.gait_publisher.config import PublisherConfig
@@ -32,15 +35,17 @@ from leg_wear_monitor.ros.gait_publisher.sensor_messages import sensor_message
 from leg_wear_monitor.ros.running import spin
 from leg_wear_monitor.twin.kinds import CRANK
 
-LOOP_S = 8  # of walking that is sent again and again; whole gait cycles, with an angle that wraps
+LOOP_CYCLES = 8  # that are sent again and again, with an angle that wraps
 STAMP = slice(4, 12)  # of a header in CDR
+SHOWN = ("received", "shed_messages")
 BEST_EFFORT = QoSProfile(depth=200, reliability=ReliabilityPolicy.BEST_EFFORT)
 
 
-def recorded(rate_hz: float) -> list[tuple[float, int, bytes]]:
-    """When [s], which topic, which bytes: a walk at 60 rpm."""
+def recorded(rate_hz: float, rpm: float) -> list[tuple[float, int, bytes]]:
+    """When [s], which topic, which bytes: a walk."""
     config = PublisherConfig(
-        duration_s=float(LOOP_S),
+        duration_s=60.0 * LOOP_CYCLES / rpm,
+        pace=PaceConfig(speeds_rpm=(rpm,)),
         further_joints=tuple(f"joint_{i}" for i in range(6)),
         encoder=EncoderConfig(rate_hz=rate_hz, wrapped=True),
         torque_sensor=TorqueSensorConfig(rate_hz=rate_hz),
@@ -49,9 +54,9 @@ def recorded(rate_hz: float) -> list[tuple[float, int, bytes]]:
     return [(one.taken_s, one.kind, serialize_message(sensor_message(one, 0, config))) for one in walk]
 
 
-def publish(legs: int, rate_hz: float, seconds: float) -> None:
+def publish(legs: int, rate_hz: float, rpm: float, seconds: float) -> None:
     """Send the walk to all legs in step with the clock, once all listen; print how many messages each."""
-    walk = recorded(rate_hz)
+    walk, loop_s = recorded(rate_hz, rpm), 60.0 * LOOP_CYCLES / rpm
     rclpy.init()
     node = Node("walkers")
     topics = [
@@ -67,9 +72,9 @@ def publish(legs: int, rate_hz: float, seconds: float) -> None:
     while not all(one.get_subscription_count() for topic in topics for one in topic.values()):
         time.sleep(0.05)
     began_ns, began, sent = time.time_ns(), time.monotonic(), 0
-    for turn in range(int(np.ceil(seconds / LOOP_S))):
+    for turn in range(int(np.ceil(seconds / loop_s))):
         for taken_s, kind, raw in walk:
-            at = turn * LOOP_S + taken_s
+            at = turn * loop_s + taken_s
             if at > seconds:
                 break
             if (wait := began + at - time.monotonic()) > 0.0:
@@ -84,19 +89,25 @@ def publish(legs: int, rate_hz: float, seconds: float) -> None:
 
 
 class Listener(Node):
-    """Delays of predicted torques behind their stamps, and what the nodes say of themselves."""
+    """Delays of predicted torques and of gait cycles behind their stamps, and what the nodes report."""
 
     def __init__(self, legs: int) -> None:
         super().__init__("listener")
         self.delays_s: list[list[float]] = [[] for _ in range(legs)]
+        self.cycle_delays_s: list[list[float]] = [[] for _ in range(legs)]
+        self.diagnoses = [""] * legs
         self.told: list[dict[str, float]] = [{} for _ in range(legs)]
         self.hardware = {f"leg{leg}": leg for leg in range(legs)}
         deep = QoSProfile(depth=2000, reliability=ReliabilityPolicy.BEST_EFFORT)
         for leg in range(legs):
-            topic, delays = f"leg{leg}/leg_wear_monitor/predicted_torque", self.delays_s[leg]
-            self.create_subscription(
-                WrenchStamped, topic, lambda raw, delays=delays: self.hear(raw, delays), deep, raw=True
-            )
+            for kind, name, delays in (
+                (WrenchStamped, "predicted_torque", self.delays_s[leg]),
+                (JointState, "clearance_states", self.cycle_delays_s[leg]),
+            ):
+                topic = f"leg{leg}/leg_wear_monitor/{name}"
+                self.create_subscription(
+                    kind, topic, lambda raw, delays=delays: self.hear(raw, delays), deep, raw=True
+                )
         self.create_subscription(DiagnosticArray, "/diagnostics", self.hear_diagnostics, 50)
 
     def hear(self, raw: bytes, delays: list[float]) -> None:
@@ -109,8 +120,10 @@ class Listener(Node):
             return  # somebody else's in the same domain
         told = self.told[leg]
         for status in message.status:
+            if status.name.endswith(": diagnosis"):
+                self.diagnoses[leg] = status.message
             if status.name.endswith((": load", ": topics", ": input")):
-                told.update((one.key, float(one.value)) for one in status.values)
+                told.update((one.key, float(one.value)) for one in status.values if one.key in SHOWN)
 
 
 def used(pid: int) -> tuple[float, float]:
@@ -120,23 +133,20 @@ def used(pid: int) -> tuple[float, float]:
     return sum(map(int, ticks)) / os.sysconf("SC_CLK_TCK"), pages * os.sysconf("SC_PAGE_SIZE") / 1e6
 
 
-def monitors(legs: int, joints: str) -> list["subprocess.Popen[bytes]"]:
+def monitors(args: argparse.Namespace) -> list["subprocess.Popen[bytes]"]:
     """A monitor a leg."""
+    joints = ",".join(f"'{joint}'" for joint in args.joints.split(","))
     command = [sys.executable, "-m", "leg_wear_monitor", "monitor", "--ros-args", "--log-level", "warn"]
-    clearance_joints = ",".join(f"'{joint}'" for joint in joints.split(","))
+    parameters = [
+        f"clearance_joints:=[{joints}]",
+        f"cadence.commanded_rpm:={args.rpm}",
+        f"diagnosis.enabled:={str(not args.without_diagnosis).lower()}",
+    ]
+    for parameter in parameters:
+        command += ["-p", parameter]
     return [
-        subprocess.Popen(
-            [
-                *command,
-                "-r",
-                f"__ns:=/leg{leg}",
-                "-p",
-                f"hardware_id:=leg{leg}",
-                "-p",
-                f"clearance_joints:=[{clearance_joints}]",
-            ]
-        )
-        for leg in range(legs)
+        subprocess.Popen([*command, "-r", f"__ns:=/leg{leg}", "-p", f"hardware_id:=leg{leg}"])
+        for leg in range(args.legs)
     ]
 
 
@@ -159,7 +169,9 @@ def main() -> None:
     parser = argparse.ArgumentParser(description=__doc__)
     parser.add_argument("--legs", type=int, default=1)
     parser.add_argument("--rate-hz", type=float, default=1000.0)
+    parser.add_argument("--rpm", type=float, default=60.0)
     parser.add_argument("--seconds", type=float, default=20.0)
+    parser.add_argument("--without-diagnosis", action="store_true")
     parser.add_argument("--joints", default="A,B,G,I,J")
     args = parser.parse_args()
     os.environ["ROS_AUTOMATIC_DISCOVERY_RANGE"] = "LOCALHOST"
@@ -168,9 +180,9 @@ def main() -> None:
     listener = Listener(args.legs)
     hearing = threading.Thread(target=spin, args=(listener,))
     hearing.start()
-    nodes = monitors(args.legs, args.joints)
-    rest = [sys.executable, __file__, "publish", str(args.legs), str(args.rate_hz), str(args.seconds)]
-    source = subprocess.Popen(rest, stdout=subprocess.PIPE, text=True)
+    nodes = monitors(args)
+    rest = [str(value) for value in (args.legs, args.rate_hz, args.rpm, args.seconds)]
+    source = subprocess.Popen([sys.executable, __file__, "publish", *rest], stdout=subprocess.PIPE, text=True)
     try:
         while not all(listener.delays_s):
             time.sleep(0.1)
@@ -194,12 +206,18 @@ def report(leg: int, sent: int, rows: list[tuple[float, ...]], listener: Listene
     print(
         f"leg {leg}: sent {sent}, received {told['received']:.0f}, shed {told['shed_messages']:.0f}; "
         f"{fraction:.1%} of a core; memory {memory[0]:.0f} to {memory[-1]:.0f} MB; "
-        f"stamp to report: median {median:.0f} ms, p99 {p99:.0f} ms of {len(delays)}"
+        f"stamp to report: median {median:.0f} ms, p99 {p99:.0f} ms, worst {1e3 * delays.max():.0f} ms "
+        f"of {len(delays)}"
     )
+    cycles = 1e3 * np.array(listener.cycle_delays_s[leg])
+    median, p99 = np.percentile(cycles, [50, 99])
+    late = ", ".join(f"{cycles[i]:.0f} ms ({i + 1})" for i in np.argsort(cycles)[:-6:-1])
+    print(f"  gait cycles: median {median:.0f} ms, p99 {p99:.0f} ms of {len(cycles)}; worst (which): {late}")
+    print(f"  diagnosis: {listener.diagnoses[leg]}")
 
 
 if __name__ == "__main__":
     if sys.argv[1:2] == ["publish"]:
-        publish(int(sys.argv[2]), float(sys.argv[3]), float(sys.argv[4]))
+        publish(int(sys.argv[2]), *map(float, sys.argv[3:6]))
     else:
         main()

@@ -1,28 +1,47 @@
-"""A replay end to end: 1 kHz each of joint states and torque, five clearance joints; where its time goes."""
+"""A replay end to end: 1 kHz each of joint states and torque, five clearance joints; where its time goes.
+
+The leg has clearances, and the same gait cycles of it are repeated: the diagnosis finds a leg as counted.
+"""
 
 import argparse
 import tempfile
 from pathlib import Path
 
+import attrs
 import numpy as np
 from watch import Watch
 
 import leg_wear_monitor as lw
 from leg_wear_monitor.bags.mcap.writer import McapWriter
 from leg_wear_monitor.bags.reader import Recording
+from leg_wear_monitor.gait.config import EncoderConfig, GaitConfig, PaceConfig, TorqueSensorConfig
+from leg_wear_monitor.gait.leg import SyntheticLeg
+from leg_wear_monitor.gait.sensors import readings
+from leg_wear_monitor.mechanism.ideal import TURN
 from leg_wear_monitor.messages import encode
+from leg_wear_monitor.twin.kinds import TORQUE
 
 NAMES = ["hip", "knee", "ankle", "crank", "toe", "pelvis", "spare"]
 RATE_HZ = 1000
 CHUNK_BYTES = 768 * 1024
+WALK_S = 12  # that are repeated: whole gait cycles at a multiple of 5 rpm
 
 
-def write_walk(path: Path, seconds: int) -> None:
-    """A steady gait with an encoder's noise, and the ideal leg's torque."""
-    rng = np.random.default_rng(1)
-    ideal = lw.simulate(lw.load_mechanism("bionic_leg"), clearances=[], cycles=1, trace=720).trace
-    order = np.argsort(ideal.crank_angle_rad)
-    angles, torques = ideal.crank_angle_rad[order], ideal.drive_torque_nm[order]
+def torques(rpm: float) -> np.ndarray:
+    """Drive torque of a leg with clearances over some gait cycles, the first sample at crank angle 0."""
+    config = GaitConfig(
+        duration_s=WALK_S + 0.5 / RATE_HZ,
+        pace=PaceConfig(speeds_rpm=(rpm,)),
+        encoder=EncoderConfig(rate_hz=10.0),
+        torque_sensor=TorqueSensorConfig(rate_hz=float(RATE_HZ)),
+    )
+    found = [one.torque_nm for one in readings(SyntheticLeg(config), config) if one.kind == TORQUE]
+    return np.roll(found, 1)  # the first reading comes a sample after the start
+
+
+def write_walk(path: Path, seconds: int, rpm: float) -> None:
+    """A steady gait with an encoder's noise."""
+    rng, torque_nm, speed = np.random.default_rng(1), torques(rpm), TURN * rpm / 60.0
     with McapWriter(path, chunk_bytes=CHUNK_BYTES) as writer:
         joints = writer.channel("/joint_states", encode.JOINT_STATE)
         torque = writer.channel("/drive_torque", encode.WRENCH_STAMPED)
@@ -30,10 +49,10 @@ def write_walk(path: Path, seconds: int) -> None:
             since = second + np.arange(RATE_HZ) / RATE_HZ
             stamps = 1_700_000_000 * 10**9 + np.round(since * 1e9).astype(np.int64)
             position = rng.normal(0.0, 1.0e-4, (RATE_HZ, len(NAMES)))
-            position[:, NAMES.index("crank")] += 2.0 * np.pi * since
+            position[:, NAMES.index("crank")] += speed * since
             wrench = np.zeros((RATE_HZ, 3))
-            wrench[:, 2] = np.interp(2.0 * np.pi * (since % 1.0), angles, torques, period=2.0 * np.pi)
-            velocity = np.full((RATE_HZ, len(NAMES)), 2.0 * np.pi)
+            wrench[:, 2] = np.take(torque_nm, second * RATE_HZ + np.arange(RATE_HZ), mode="wrap")
+            velocity = np.full((RATE_HZ, len(NAMES)), speed)
             rows = encode.joint_states(stamps, NAMES, position=position, velocity=velocity, effort=velocity)
             writer.write_many(joints, stamps, rows)
             writer.write_many(torque, stamps, encode.wrenches(stamps, torque=wrench, frame_id="pelvis"))
@@ -48,7 +67,7 @@ def reading(path: Path) -> Watch:
     return watch
 
 
-def replaying(path: Path, out: Path | None) -> Watch:
+def replaying(path: Path, config: lw.MonitorConfig, out: Path | None = None) -> Watch:
     """Put them through the monitor, and write its reports if there is a place for them."""
     watches: list[Watch] = []
 
@@ -56,8 +75,8 @@ def replaying(path: Path, out: Path | None) -> Watch:
         monitor.warm_up()
         watches.append(Watch())
 
-    result = lw.replay(path, lw.MonitorConfig(), out=out, ready=ready)
-    if len(result.history) < result.duration_s - 3.0:
+    result = lw.replay(path, config, out=out, ready=ready)
+    if len(result.history) < result.duration_s * config.cadence.commanded_rpm / 60.0 - 3.0:
         raise SystemExit(f"only {len(result.history)} gait cycles were followed")
     return watches[0]
 
@@ -65,16 +84,21 @@ def replaying(path: Path, out: Path | None) -> Watch:
 def main() -> None:
     parser = argparse.ArgumentParser(description=__doc__)
     parser.add_argument("--seconds", type=int, default=60, help="length of the recording")
-    seconds = parser.parse_args().seconds
+    parser.add_argument("--rpm", type=float, default=60.0, help="at others than 60 a reference is simulated")
+    args = parser.parse_args()
+    seconds, with_it = args.seconds, lw.MonitorConfig()
+    with_it = attrs.evolve(with_it, cadence=attrs.evolve(with_it.cadence, commanded_rpm=args.rpm))
+    without = attrs.evolve(with_it, diagnosis=attrs.evolve(with_it.diagnosis, enabled=False))
     with tempfile.TemporaryDirectory() as directory:
         path = Path(directory) / "walk.mcap"
-        write_walk(path, seconds)
+        write_walk(path, seconds, args.rpm)
         reading(path)
-        replaying(path, None)
+        replaying(path, without)
         spent = {
             "reading": reading(path).read(),
-            "reading and monitoring": replaying(path, None).read(),
-            "all, with reports as MCAP": replaying(path, Path(directory)).read(),
+            "monitoring, no diagnosis": replaying(path, without).read(),
+            "monitoring": replaying(path, with_it).read(),
+            "all, with reports as MCAP": replaying(path, with_it, Path(directory)).read(),
         }
     print(f"{seconds} s of motion, 2 x {RATE_HZ} Hz, by the wall clock (by the processor's time)")
     for name, (wall, processor) in spent.items():

@@ -97,6 +97,8 @@ class WearMonitor:
             self._parts.crank_zero.warm_up()
         list(EvaluationPeriods(1).pieces(np.zeros(1, GAIT_SAMPLE)))
         self._twin.warm_up()
+        if self._torque:
+            self._torque.warm_up()
 
     def update(self, samples: Samples) -> Reports:
         """Process a block of samples.

@@ -5,6 +5,7 @@ They are made where they are needed first, and again where what they depend on h
 
 from leg_wear_monitor.mechanism.spec import Mechanism
 from leg_wear_monitor.monitor.config.settings import MonitorConfig
+from leg_wear_monitor.monitor.diagnosis.body_torques import body_torques
 from leg_wear_monitor.monitor.diagnosis.change_detector import ChangeDetector
 from leg_wear_monitor.monitor.diagnosis.explanations import Explainer
 from leg_wear_monitor.monitor.diagnosis.identification import UNLIKE_FILE, misfit
@@ -27,6 +28,10 @@ class LegModels:
         self._explainer: Explainer | None = None
         self._detector: ChangeDetector | None = None
         self._misfit: float | None = None
+
+    def warm_up(self) -> None:
+        """Compute what bodies change of the torque: it takes longer than samples may wait."""
+        body_torques(self._mechanism)
 
     def forget(self) -> None:
         """Make all of them again, because the reference, the sensor or the baseline has changed."""

@@ -74,6 +74,10 @@ class TorqueObserver:
         self._evidence = Evidence(self._models)
         self.state = TorqueState(np.asarray(counted_m, float).copy(), commissioned=commissioned)
 
+    def warm_up(self) -> None:
+        """Compute before the first sample what depends on the mechanism alone."""
+        self._models.warm_up()
+
     def add_samples(self, piece: Samples) -> None:
         """Add samples in the order of arrival."""
         self.state.samples = extended(self.state.samples, piece)

@@ -28,7 +28,8 @@ from leg_wear_monitor.mechanism.spec import Mechanism
 from leg_wear_monitor.twin import kinds
 from leg_wear_monitor.twin.sample import gait_samples
 
-RATE_HZ, NOISE_RAD, NOISE_NM = 200, 1.0e-3, 0.5  # a gait cycle takes a second
+SAMPLES, NOISE_RAD, NOISE_NM = 200, 1.0e-3, 0.5  # of a gait cycle, which takes a second
+PERIOD_NS = 5_010_500  # between samples: they drift through the gait cycle
 RIPPLE = 0.01  # of the crank's speed: the reference that comes with the package holds up to 1.5 %
 BREAK, AFTER = 1560, 62  # gait cycles
 BROKEN_M = 1.0e-3
@@ -55,17 +56,17 @@ class Walker:
         self.joints = [list(leg.joints).index(joint) for joint in leg.clearance_joints]
 
     def walk(self, cycles: int) -> Walk:
-        """Some more gait cycles."""
+        """Some more times SAMPLES samples, about a gait cycle each."""
         run, angles, torques, figures = self.run, [], [], []
         for _ in range(cycles):
             statistics, impulse = new_run_statistics(len(self.setup.linkage.mechanism.joints)), 0.0
             opened = self.setup.surfaces.depth.sum(axis=1).mean(axis=1)
-            for i in range(RATE_HZ):
-                before, t = run.time, self.cycle + (i + 1) / RATE_HZ
+            for i in range(SAMPLES):
+                before, t = run.time, 1.0e-9 * PERIOD_NS * (self.cycle * SAMPLES + i + 1)
                 run.polynomial[:] = quintic(before, self.pace.at(before), t - before, self.pace.at(t))
                 run.advance(t, statistics)
                 angles.append(self.pace.at(t).angle)
-                torques.append((statistics.drive_integral[TORQUE] - impulse) * RATE_HZ)
+                torques.append((statistics.drive_integral[TORQUE] - impulse) / (1.0e-9 * PERIOD_NS))
                 impulse = float(statistics.drive_integral[TORQUE])
             grown = self.setup.surfaces.depth.sum(axis=1).mean(axis=1) - opened
             tails = [percentile(statistics.force_time[joint], 0.99) for joint in self.joints]
@@ -89,7 +90,7 @@ def walks(leg: Mechanism) -> tuple[Walk, list[Walk]]:
 def samples_of(walk: Walk, first: int, random: np.random.Generator) -> np.ndarray:
     """Samples of a crank encoder and a torque sensor, from the end of some gait cycles on."""
     count = len(walk.angle)
-    stamps = 10**9 + (first * RATE_HZ + np.arange(count) + 1) * (10**9 // RATE_HZ)
+    stamps = 10**9 + (first * SAMPLES + np.arange(count) + 1) * PERIOD_NS
     angle = walk.angle + NOISE_RAD * random.standard_normal(count)
     torque = walk.torque + NOISE_NM * random.standard_normal(count)
     crank = gait_samples(stamps, kinds.CRANK, crank_angle_rad=angle)
@@ -111,7 +112,8 @@ def reported(monitor: WearMonitor, samples: np.ndarray) -> dict[int, np.ndarray]
 
 def mean_figures(found: dict[int, np.ndarray]) -> np.ndarray:
     """Means (4, k) as in FIGURES over the compared gait cycles."""
-    cycles = [found[i] for i in range(BREAK + COMPARED.start, BREAK + COMPARED.stop)]
+    begin = round(1.0e-9 * PERIOD_NS * SAMPLES * BREAK)
+    cycles = [found[i] for i in range(begin + COMPARED.start, begin + COMPARED.stop)]
     means = np.mean(cycles, axis=0)
     means[3] = 1e12 * (cycles[-1][3] - cycles[0][3]) / (len(cycles) - 1)
     return means

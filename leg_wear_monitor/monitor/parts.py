@@ -1,6 +1,7 @@
 """The parts of a monitor: their construction, their common state, and its snapshots."""
 
 import attrs
+import numpy as np
 
 from leg_wear_monitor.mechanism.spec import Mechanism
 from leg_wear_monitor.monitor.accounting import Accounting
@@ -24,6 +25,7 @@ from leg_wear_monitor.monitor.state import MonitorSnapshot, MonitorState
 from leg_wear_monitor.monitor.torque_causes.explainer import TorqueExplainer
 from leg_wear_monitor.torque_fit.torque_model import torque_model
 from leg_wear_monitor.twin.digital_twin import DigitalTwin
+from leg_wear_monitor.twin.reference.body_factors import BodyFactors
 
 WRONG_TORQUE = "the drive torque is wrong as received, see the status torque"
 ACCELERATED = "wear is accelerated: clearances grow within the gait cycles that are compared"
@@ -79,10 +81,13 @@ class Parts:
                 self.twin.torque_size_nm,
                 self.twin.clearance_mean_m,
                 ledger.commissioned_torque if ledger else None,
+                self._known_bodies(ledger),
             )
             if self.config.diagnosis.enabled and self.config.wear_acceleration == 1.0
             else None
         )
+        if self.torque and self.torque.state.bodies and self.config.diagnosis.correct:
+            self.twin.set_bodies(self.torque.state.bodies)
         self.explainer = TorqueExplainer(self.mechanism)
         self.judge = Judge(
             self.twin,
@@ -100,6 +105,14 @@ class Parts:
         self.evaluation_periods = EvaluationPeriods(cycle_ns // A_CYCLE)
         kept = TorqueRecord.of(self.accounting.state.commissioned)
         self.state = MonitorState(tuple(GrowthWindow() for _ in self.clearance_joints), kept)
+
+    def _known_bodies(self, ledger: Ledger | None) -> BodyFactors | None:
+        """Masses and lengths of the ledger, in the order of the mechanism."""
+        if ledger is None or ledger.bodies is None:
+            return None
+        of = {name: i for i, name in enumerate(ledger.bodies.names)}
+        order = [of[name] for name in self.mechanism.bodies]
+        return BodyFactors(np.array(ledger.bodies.mass)[order], np.array(ledger.bodies.length)[order])
 
     @property
     def diagnosis(self) -> Diagnosis:

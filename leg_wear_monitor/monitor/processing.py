@@ -8,7 +8,7 @@ from leg_wear_monitor.monitor.encoders.clearance_estimate import ClearanceEstima
 from leg_wear_monitor.monitor.evaluation.specs import MISMATCH
 from leg_wear_monitor.monitor.forecast.growth import GrowthWindow, extended
 from leg_wear_monitor.monitor.forecast_update import update_forecast
-from leg_wear_monitor.monitor.ledger.entry import Audit, CommissionedTorque
+from leg_wear_monitor.monitor.ledger.entry import Audit, CommissionedTorque, IdentifiedBodies
 from leg_wear_monitor.monitor.parts import Parts
 from leg_wear_monitor.monitor.reports import (
     AlarmList,
@@ -16,6 +16,7 @@ from leg_wear_monitor.monitor.reports import (
     SampleReports,
     VerdictReport,
 )
+from leg_wear_monitor.twin.reference.body_factors import BodyFactors
 from leg_wear_monitor.twin.sample import Samples
 from leg_wear_monitor.twin.statistics import CycleStatistics
 
@@ -139,7 +140,11 @@ class Processing:
             return
         before = self._torque.state.commissioned
         correction = self._torque.end_period(self._twin.clearance_mean_m, self._twin.depth)
-        if correction is None or self._parts.is_torque_wrong:
+        if self._parts.is_torque_wrong:
+            self._note_commissioned(before)
+            return
+        self._take_bodies(self._torque.bodies)
+        if correction is None:
             self._note_commissioned(before)
             return
         joint = self._clearance_joints[correction.joint]
@@ -151,6 +156,19 @@ class Processing:
         )
         growth, k = self._parts.state.growth, correction.joint
         self._parts.state.growth = (*growth[:k], GrowthWindow(), *growth[k + 1 :])
+        self._parts.keep()
+
+    def _take_bodies(self, bodies: BodyFactors | None) -> None:
+        """Let the twin walk on with the masses and lengths that the drive torque shows."""
+        if bodies is None or bodies == self._twin.bodies or not self._parts.config.diagnosis.correct:
+            return
+        self._twin.set_bodies(bodies)
+        names = tuple(self._parts.mechanism.bodies)
+        stamp_ns = self._twin.intake.followed_stamp_ns
+        self._accounting.note(
+            IdentifiedBodies(stamp_ns, names, tuple(bodies.mass.tolist()), tuple(bodies.length.tolist()))
+        )
+        self._parts.state.growth = tuple(GrowthWindow() for _ in self._clearance_joints)
         self._parts.keep()
 
     def _note_commissioned(self, before: CommissionedTorque | None) -> None:

@@ -3,14 +3,20 @@
 A real leg is not quite that of its mechanism file. Where its impacts fall, and what a clearance changes,
 depends on its masses and lengths: a length that is 1 % off makes a reference name wrong joints. So the
 reference is simulated again with the bodies that explain the torque of the leg when it was commissioned.
+
+Simulated legs show what each body changes, near the leg that is simulated. Where a leg is far from its file,
+the torque with ideal joints leads near it: lengths that are 5 % off change that by half of the torque's size.
 """
 
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 
 import numpy as np
 
+from leg_wear_monitor.errors import AssemblyError
 from leg_wear_monitor.mechanism.arrays import Floats
+from leg_wear_monitor.mechanism.spec import Mechanism
 from leg_wear_monitor.monitor.diagnosis.explanations import Nuisance
+from leg_wear_monitor.monitor.diagnosis.ideal_signature import ideal_torque, signature_of_torque
 from leg_wear_monitor.monitor.diagnosis.signature_model import SignatureModel, simulated_signatures
 from leg_wear_monitor.monitor.ledger.entry import CommissionedTorque
 from leg_wear_monitor.twin.reference.body_factors import BodyFactors
@@ -18,7 +24,13 @@ from leg_wear_monitor.twin.reference.torque_reference import HEAVIER, LONGER, To
 
 UNLIKE_FILE = 0.8  # misfit from which on the leg is not that of its file (docs/explanation/diagnosis.md)
 
+FAR_FROM_FILE = 20.0  # misfit from which on the ideal torque comes first
+
 _MASS, _LENGTH = 0.03, 0.006  # standard deviations of a leg's bodies about those of its file
+_FAR = 0.03  # that of masses and lengths of a leg far from its file
+_HARMONICS = 6  # of the torque that show masses and lengths rather than impacts
+_IDEAL = 0.01  # of the torque's size: what impacts change in each of them
+_STEP, _ROUNDS, _SHORTEST = 1.0e-4, 20, 0.05
 _SENSOR = 5.0  # times the usual changes of friction, scale, offset and load: they are constant here
 
 # a model with the right bodies is off by a part of the torque's size, by a part of its steps where it is
@@ -41,7 +53,8 @@ def identified_bodies(
 ) -> BodyFactors:
     """Most probable masses and lengths of a commissioned leg: one step of Gauss and Newton.
 
-    What the torque does not show of them stays that of the file.
+    What the torque does not show of them stays that of the file. Lengths are supposed to be as far from the
+    file as those of the simulated leg are.
 
     Parameters
     ----------
@@ -54,13 +67,72 @@ def identified_bodies(
     means = [simulated_signatures(legs, leg, model.sensor).mean(axis=0) for leg in range(len(legs.torque_nm))]
     bodies = len(legs.bodies.mass)
     before = np.concatenate([legs.bodies.mass, legs.bodies.length]) - 1.0
-    steps, sigma = np.repeat([HEAVIER, LONGER], bodies), np.repeat([_MASS, _LENGTH], bodies)
+    far = float(np.sqrt(np.mean(np.square(legs.bodies.length - 1.0))))
+    steps, sigma = np.repeat([HEAVIER, LONGER], bodies), np.repeat([_MASS, np.hypot(_LENGTH, far)], bodies)
     slopes = ((np.array(means[1:]) - means[0]) / steps[:, None]).T
     weighted = np.linalg.solve(_covariance(model, nuisances, commissioned.cycles), slopes)
     information = slopes.T @ weighted + np.diag(sigma**-2.0)
     rest = commissioned.mean - means[0]
     found = before + np.linalg.solve(information, weighted.T @ rest - before / sigma**2)
     return BodyFactors(1.0 + found[:bodies], 1.0 + found[bodies:])
+
+
+def bodies_of_ideal_torque(
+    mechanism: Mechanism, model: SignatureModel, commissioned: CommissionedTorque, speed: float
+) -> BodyFactors:
+    """Masses and lengths near those of a leg far from its file, by the torque with ideal joints.
+
+    That torque differs from the torque of the file's leg as the measured mean torque differs from the
+    model's, if impacts have the same part in both.
+
+    Parameters
+    ----------
+    mechanism : Mechanism
+    model : SignatureModel
+        Of the leg of the file.
+    commissioned : CommissionedTorque
+    speed : float
+        Of the crank [rad/s].
+    """
+    phases, bodies = model.sensor.phases, len(mechanism.bodies)
+    unit = _IDEAL * model.sensor.size_nm
+    rest = (commissioned.mean - model.at(commissioned.clearance_m)[0])[:phases]
+
+    def bodies_at(x: Floats) -> BodyFactors:
+        return BodyFactors(1.0 + _FAR * x[:bodies], 1.0 + _FAR * x[bodies:])
+
+    def residual(x: Floats) -> Floats:
+        torque = ideal_torque(bodies_at(x).applied(mechanism), speed) - of_file
+        left = _harmonics(signature_of_torque(torque, phases)[:phases] - rest)
+        return np.concatenate([left / unit, x])
+
+    of_file = ideal_torque(mechanism, speed)
+    x = np.zeros(2 * bodies)
+    now = residual(x)
+    for _ in range(_ROUNDS):
+        slopes = np.array([residual(x + _STEP * one) - now for one in np.eye(2 * bodies)]).T / _STEP
+        step, length = np.linalg.lstsq(slopes, -now, rcond=None)[0], 1.0
+        while length > _SHORTEST and not _is_less(residual, x + length * step, now):
+            length *= 0.5
+        if length <= _SHORTEST:
+            break
+        x = x + length * step
+        now = residual(x)
+    return bodies_at(x)
+
+
+def _is_less(residual: Callable[[Floats], Floats], x: Floats, now: Floats) -> bool:
+    """Whether a leg can move and explains more."""
+    try:
+        return float(np.sum(residual(x) ** 2)) < (1.0 - 1.0e-6) * float(np.sum(now**2))
+    except AssemblyError:
+        return False
+
+
+def _harmonics(torque: Floats) -> Floats:
+    """The mean and the first harmonics (1 + 2 n,) of a torque over the phases."""
+    found = np.fft.rfft(torque)[: _HARMONICS + 1] / len(torque)
+    return np.concatenate([found.real, found.imag[1:]])
 
 
 def _covariance(model: SignatureModel, nuisances: Sequence[Nuisance], cycles: int) -> Floats:

@@ -3,13 +3,13 @@
 import numpy as np
 
 from leg_wear_monitor.mechanism.arrays import Floats
-from leg_wear_monitor.mechanism.ideal import TURN
 from leg_wear_monitor.mechanism.position import build_linkage
 from leg_wear_monitor.mechanism.spec import Mechanism
 from leg_wear_monitor.monitor.diagnosis.body_torques import body_torques
 from leg_wear_monitor.monitor.diagnosis.diagnosis import Cause
 from leg_wear_monitor.monitor.diagnosis.explanations import Baseline, Nuisance
-from leg_wear_monitor.monitor.diagnosis.signature import PhaseMeans, TorqueSensor
+from leg_wear_monitor.monitor.diagnosis.ideal_signature import signature_of_torque
+from leg_wear_monitor.monitor.diagnosis.signature import TorqueSensor
 from leg_wear_monitor.monitor.diagnosis.signature_model import simulated_signatures
 from leg_wear_monitor.monitor.ledger.entry import CommissionedTorque
 from leg_wear_monitor.twin.follower.load import load_signature
@@ -45,10 +45,10 @@ def nuisances(mechanism: Mechanism, reference: TorqueReference, sensor: TorqueSe
     ]
     if mechanism.toe is not None:
         lever, _ = load_signature(build_linkage(mechanism))
-        found.append(Nuisance(Cause.LOAD, "", _of_torque(lever[:-1], phases), _LOAD_N))
+        found.append(Nuisance(Cause.LOAD, "", signature_of_torque(lever[:-1], phases), _LOAD_N))
     for name, mass, length in zip(mechanism.bodies, *body_torques(mechanism).at(speed), strict=True):
-        found.append(Nuisance(Cause.MASS, name, _of_torque(mass, phases), 0.0))
-        found.append(Nuisance(Cause.LENGTH, name, _of_torque(length, phases), 0.0))
+        found.append(Nuisance(Cause.MASS, name, signature_of_torque(mass, phases), 0.0))
+        found.append(Nuisance(Cause.LENGTH, name, signature_of_torque(length, phases), 0.0))
     return found
 
 
@@ -80,10 +80,3 @@ def _difference(
         for sign in (-1.0, 1.0)
     )
     return np.asarray((more - less) / (2.0 * step))
-
-
-def _of_torque(torque: Floats, phases: int) -> Floats:
-    """Signature's change by a torque that is added at equal steps of the crank angle, without roughness."""
-    angle: Floats = np.linspace(0.0, TURN, len(torque), endpoint=False)
-    first = np.zeros(len(torque), np.int64)
-    return np.concatenate([PhaseMeans(first, angle, (1, phases)).of(torque)[0], np.zeros(phases)])

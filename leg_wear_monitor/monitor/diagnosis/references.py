@@ -6,7 +6,11 @@ import numpy as np
 
 from leg_wear_monitor.mechanism.arrays import Floats
 from leg_wear_monitor.mechanism.spec import Mechanism
-from leg_wear_monitor.monitor.diagnosis.identification import identified_bodies
+from leg_wear_monitor.monitor.diagnosis.identification import (
+    FAR_FROM_FILE,
+    bodies_of_ideal_torque,
+    identified_bodies,
+)
 from leg_wear_monitor.monitor.diagnosis.leg_models import LegModels
 from leg_wear_monitor.monitor.diagnosis.reference_file import shipped_reference
 from leg_wear_monitor.monitor.diagnosis.state import TorqueState
@@ -20,6 +24,8 @@ from leg_wear_monitor.twin.reference.torque_reference import (
 FIRST_CYCLES = 5  # before a reference is chosen
 UNLIKE = 0.015  # of the mean speed: a crank that turns otherwise than in the reference by more
 UNLIKE_CYCLES = 20  # in a row, until a new reference is made
+
+ROUNDS = 3  # of identification
 
 _FAR = 0.1  # of a counted clearance: the reference is renewed where it was made for another one
 
@@ -83,12 +89,23 @@ class References:
             self._models.forget()
         elif (np.abs(state.reference.clearance_m[0] / counted_m - 1.0) > _FAR).any():
             self._begin(state, counted_m, depth, mean_profile([cycle.profile for cycle in state.cycles]))
-        elif state.commissioned is not None and state.bodies is None and not self._models.is_of_file(state):
-            run, state.is_identifying = self._begun(), True
-            run.begin_bodies(
-                state.commissioned.clearance_m, depth, state.reference.profile, state.reference.bodies
-            )
+        elif state.bodies not in (None, state.reference.bodies):  # those of the ledger
+            self._begin(state, counted_m, depth, state.reference.profile)
+        elif state.rounds < ROUNDS and not self._models.is_of_file(state):
+            self._begin_bodies(state, state.reference, depth)
         return False
+
+    def _begin_bodies(self, state: TorqueState, reference: TorqueReference, depth: Floats) -> None:
+        """Begin the simulation of legs with other bodies, near the commissioned leg."""
+        if state.commissioned is None:
+            return
+        start, model = reference.bodies, self._models.explainer(state).model
+        if self._models.misfit(state) >= FAR_FROM_FILE and not state.rounds:
+            start = bodies_of_ideal_torque(
+                self._mechanism, model, state.commissioned, reference.profile.speed
+            )
+        state.is_identifying, state.rounds = True, state.rounds + 1
+        self._begun().begin_bodies(state.commissioned.clearance_m, depth, reference.profile, start)
 
     def _continue(
         self, run: TorqueReferenceRun, state: TorqueState, counted_m: Floats, depth: Floats
@@ -135,14 +152,14 @@ class References:
     def _install(self, state: TorqueState, reference: TorqueReference) -> None:
         """Use a new reference.
 
-        One with identified bodies must explain the leg better than the one with those of the file.
+        One with identified bodies must explain the leg better than the one before.
         """
         before, off = state.reference, self._models.misfit(state)
         state.reference = reference
         self._models.forget()
-        is_first = before is not None and state.bodies not in (None, before.bodies)
-        if before is not None and is_first and self._models.misfit(state) > off:
-            state.reference, state.bodies = before, before.bodies
+        is_other = before is not None and state.bodies not in (None, before.bodies)
+        if before is not None and is_other and self._models.misfit(state) > off:
+            state.reference, state.bodies, state.rounds = before, before.bodies, ROUNDS
 
 
 def _give_up(state: TorqueState) -> None:
@@ -150,4 +167,4 @@ def _give_up(state: TorqueState) -> None:
     if state.reference is None:
         state.has_failed = True
     else:
-        state.is_identifying, state.bodies = False, state.reference.bodies
+        state.is_identifying, state.bodies, state.rounds = False, state.reference.bodies, ROUNDS

@@ -61,6 +61,8 @@ class TorqueState:
         Whether the last period did not simulate; each second one does, so that a monitor has time for both.
     bodies : BodyFactors or None
         Identified ones, of which references are made; None before.
+    rounds : int
+        How often masses and lengths were identified.
     is_identifying : bool
         Whether the run simulates legs with other bodies.
     has_failed : bool
@@ -84,6 +86,7 @@ class TorqueState:
     unusable: int = 0
     pause: bool = False
     bodies: BodyFactors | None = None
+    rounds: int = 0
     is_identifying: bool = False
     has_failed: bool = False
 

@@ -6,7 +6,12 @@ import pytest
 
 from leg_wear_monitor.mechanism.ideal import TURN, one_cycle
 from leg_wear_monitor.mechanism.position import build_linkage
-from leg_wear_monitor.monitor.diagnosis.identification import identified_bodies, misfit
+from leg_wear_monitor.monitor.diagnosis.identification import (
+    FAR_FROM_FILE,
+    bodies_of_ideal_torque,
+    identified_bodies,
+    misfit,
+)
 from leg_wear_monitor.monitor.diagnosis.nuisances import nuisances
 from leg_wear_monitor.monitor.diagnosis.reference_file import shipped_reference
 from leg_wear_monitor.monitor.diagnosis.signature import TorqueSensor
@@ -73,6 +78,25 @@ def test_other_bodies_are_identified_from_the_torque(leg, known) -> None:
     before = misfit(model, found, other) - own
     after = misfit(attrs.evolve(model, mean=mean), found, other) - own
     assert after < 0.25 * before
+
+
+@pytest.mark.parametrize("seed", [1, 4, 6])  # legs that can turn
+def test_a_leg_far_from_its_file_is_found_near_by_the_ideal_torque(leg, known, seed) -> None:
+    reference, model, found = known
+    mass, length = np.random.default_rng(seed).uniform(0.95, 1.05, (2, len(leg.bodies)))
+    truth = BodyFactors(mass, length)
+    other = commissioned(reference, walked(leg, reference, truth))
+    assert misfit(model, found, other) > FAR_FROM_FILE
+    near = bodies_of_ideal_torque(leg, model, other, TURN)
+    left, whole = (ideal(leg, bodies) - ideal(leg, truth) for bodies in (near, BodyFactors.none(leg)))
+    assert np.sqrt(np.mean(left**2)) < 0.15 * np.sqrt(np.mean(whole**2))
+
+
+def test_a_leg_of_its_file_is_not_moved_by_the_ideal_torque(leg, known) -> None:
+    reference, model, _ = known
+    same = commissioned(reference, reference.torque_nm[0])
+    near = bodies_of_ideal_torque(leg, model, same, TURN)
+    np.testing.assert_allclose(np.concatenate([near.mass, near.length]), 1.0, atol=2.0e-3)
 
 
 def test_factors_scale_bodies(leg) -> None:

@@ -8,7 +8,7 @@ import pytest
 
 from leg_wear_monitor.mechanism.ideal import TURN
 from leg_wear_monitor.monitor.config.settings import MonitorConfig
-from leg_wear_monitor.monitor.diagnosis import leg_models
+from leg_wear_monitor.monitor.diagnosis import leg_models, references
 from leg_wear_monitor.monitor.diagnosis.diagnosis import Cause, DiagnosisState
 from leg_wear_monitor.monitor.diagnosis.leg_models import COMMISSIONING_CYCLES
 from leg_wear_monitor.monitor.diagnosis.observer import TorqueObserver
@@ -224,6 +224,7 @@ def test_the_reference_of_an_identified_leg_is_used_if_it_explains_the_leg_bette
     leg, reference, monkeypatch
 ) -> None:
     monkeypatch.setattr(leg_models, "UNLIKE_FILE", 0.0)
+    monkeypatch.setattr(references, "ROUNDS", 1)
     monkeypatch.setattr(torque_reference, "CYCLES", 8)
     observer = observer_of(leg)
     walk(observer, samples(reference, [0] * 1200))

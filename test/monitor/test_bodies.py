@@ -1,0 +1,45 @@
+"""Masses and lengths that the drive torque shows: the twin walks with them, and the ledger keeps them."""
+
+import attrs
+import numpy as np
+import pytest
+
+from leg_wear_monitor.monitor.config.settings import MonitorConfig
+from leg_wear_monitor.monitor.diagnosis.observer import TorqueObserver
+from leg_wear_monitor.monitor.opening import open_monitor
+from leg_wear_monitor.twin.reference.body_factors import BodyFactors
+
+
+@pytest.fixture
+def found(leg, monkeypatch) -> BodyFactors:
+    """Bodies that each observer says it has identified."""
+    factors = np.linspace(0.96, 1.04, len(leg.bodies))
+    bodies = BodyFactors(factors, 1.0 + 0.05 * (factors - 1.0))
+    monkeypatch.setattr(TorqueObserver, "bodies", bodies)
+    return bodies
+
+
+def config_of(path, correct: bool = True) -> MonitorConfig:
+    config = MonitorConfig()
+    ledger = attrs.evolve(config.ledger, path=str(path))
+    return attrs.evolve(config, ledger=ledger, diagnosis=attrs.evolve(config.diagnosis, correct=correct))
+
+
+def test_the_twin_walks_on_with_identified_bodies_and_the_ledger_keeps_them(leg, gait, tmp_path, found):
+    config = config_of(tmp_path / "wear.ledger")
+    monitor = open_monitor(leg, config)
+    monitor.update(gait(2.5))
+    assert monitor._parts.twin.bodies == found
+    monitor.close()
+    again = open_monitor(leg, config)
+    assert again._parts.twin.bodies == found
+    assert again._parts.torque.state.bodies == found
+    again.close()
+
+
+def test_without_corrections_the_twin_keeps_the_bodies_of_its_file(leg, gait, tmp_path, found):
+    config = config_of(tmp_path / "wear.ledger", correct=False)
+    monitor = open_monitor(leg, config)
+    monitor.update(gait(2.5))
+    assert monitor._parts.twin.bodies == BodyFactors.none(leg)
+    monitor.close()

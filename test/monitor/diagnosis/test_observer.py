@@ -227,7 +227,7 @@ def test_the_reference_of_an_identified_leg_is_used_if_it_explains_the_leg_bette
     monkeypatch.setattr(references, "ROUNDS", 1)
     monkeypatch.setattr(torque_reference, "CYCLES", 8)
     observer = observer_of(leg)
-    walk(observer, samples(reference, [0] * 1200))
+    walk(observer, samples(reference, [0] * 1400))
     assert observer.state.bodies is observer.state.reference.bodies
     assert not observer.state.is_identifying
     assert np.abs(observer.state.bodies.mass - 1.0).max() < 0.1

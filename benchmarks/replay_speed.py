@@ -4,8 +4,13 @@ The leg has clearances, and the same gait cycles of it are repeated: the diagnos
 """
 
 import argparse
+import os
 import tempfile
 from pathlib import Path
+
+os.environ.setdefault("OPENBLAS_NUM_THREADS", "1")  # before numpy, as the command line does
+
+# isort: split
 
 import attrs
 import numpy as np

@@ -29,7 +29,13 @@ from leg_wear_monitor.mechanism.spec import Mechanism
 from leg_wear_monitor.monitor.diagnosis.change_detector import ChangeDetector
 from leg_wear_monitor.monitor.diagnosis.diagnosis import Cause
 from leg_wear_monitor.monitor.diagnosis.explanations import Explainer
-from leg_wear_monitor.monitor.diagnosis.identification import UNLIKE_FILE, identified_bodies, misfit
+from leg_wear_monitor.monitor.diagnosis.identification import (
+    FAR_FROM_FILE,
+    UNLIKE_FILE,
+    bodies_of_ideal_torque,
+    identified_bodies,
+    misfit,
+)
 from leg_wear_monitor.monitor.diagnosis.leg_model import best_fit, explainer_of
 from leg_wear_monitor.monitor.diagnosis.signature import TorqueSensor, averaged, signatures
 from leg_wear_monitor.monitor.diagnosis.signature_model import with_noise_of
@@ -157,8 +163,10 @@ def referred(leg: Mechanism, profile: CrankProfile, bodies: BodyFactors) -> Torq
 
 def bodies_of(leg: Mechanism, explainer: Explainer, known: CommissionedTorque, reference) -> BodyFactors:
     """The bodies that explain the torque of a commissioned leg."""
-    run = TorqueReferenceRun(leg)
-    run.begin_bodies(NEW, UNWORN, reference.profile, reference.bodies)
+    run, start = TorqueReferenceRun(leg), reference.bodies
+    if misfit(explainer.model, explainer.nuisances, known) >= FAR_FROM_FILE:
+        start = bodies_of_ideal_torque(leg, explainer.model, known, reference.profile.speed)
+    run.begin_bodies(NEW, UNWORN, reference.profile, start)
     return identified_bodies(simulated(run), explainer.model, explainer.nuisances, known)
 
 

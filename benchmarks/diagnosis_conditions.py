@@ -41,6 +41,7 @@ from leg_wear_monitor.mechanism.spec import Mechanism, PhaseLoad
 from leg_wear_monitor.monitor.diagnosis.change_detector import ChangeDetector
 from leg_wear_monitor.monitor.diagnosis.explanations import Explainer
 from leg_wear_monitor.monitor.diagnosis.identification import UNLIKE_FILE, misfit
+from leg_wear_monitor.monitor.diagnosis.references import ROUNDS
 from leg_wear_monitor.monitor.diagnosis.signature import TorqueSensor
 from leg_wear_monitor.twin.follower.load import torque_size
 from leg_wear_monitor.twin.reference.body_factors import BodyFactors
@@ -159,23 +160,27 @@ def print_row(name: str, row: Sequence[str]) -> None:
 
 def known_reference(walk, profile, sensor: TorqueSensor, noise_nm: float, keep: Path, paper: Mechanism):
     """The reference that the monitor would have of a leg: that of its file, or with identified bodies."""
-    of_file = kept(
+    best = kept(
         keep.with_name(f"{keep.name} of file.pkl"), lambda: referred(paper, profile, BodyFactors.none(paper))
     )
-    explainer, commissioned, _ = explained(paper, of_file, walk, sensor, noise_nm, np.random.default_rng(5))
-    off = misfit(explainer.model, explainer.nuisances, commissioned)
+    found = explained(paper, best, walk, sensor, noise_nm, np.random.default_rng(5))
+    off = misfit(found[0].model, found[0].nuisances, found[1])
     print(f"{keep.name}: misfit {off:.2f} with the bodies of the file")
-    if off < UNLIKE_FILE:
-        return of_file
+    for number in range(1, ROUNDS + 1):
+        if off < UNLIKE_FILE:
+            break
 
-    def identify():
-        return referred(paper, profile, bodies_of(paper, explainer, commissioned, of_file))
+        def identify(best=best, found=found):
+            return referred(paper, profile, bodies_of(paper, found[0], found[1], best))
 
-    identified = kept(keep.with_name(f"{keep.name} identified.pkl"), identify)
-    better, commissioned, _ = explained(paper, identified, walk, sensor, noise_nm, np.random.default_rng(5))
-    now = misfit(better.model, better.nuisances, commissioned)
-    print(f"{keep.name}: misfit {now:.2f} with identified bodies")
-    return identified if now < off else of_file
+        other = kept(keep.with_name(f"{keep.name} identified {number}.pkl"), identify)
+        found = explained(paper, other, walk, sensor, noise_nm, np.random.default_rng(5))
+        now = misfit(found[0].model, found[0].nuisances, found[1])
+        print(f"{keep.name}: misfit {now:.2f} after {number} rounds of identification", flush=True)
+        if now > off:
+            break
+        best, off = other, now
+    return best
 
 
 def known(walk, sensor: TorqueSensor, noise_nm: float, random, reference, paper: Mechanism):

@@ -9,7 +9,7 @@ from leg_wear_monitor.monitor.config.fitting import fitted, twin_settings
 from leg_wear_monitor.monitor.config.inputs import AT_START
 from leg_wear_monitor.monitor.config.settings import MonitorConfig
 from leg_wear_monitor.monitor.crank_zero.crank_zero import CrankZero
-from leg_wear_monitor.monitor.diagnosis.diagnosis import Diagnosis, DiagnosisState
+from leg_wear_monitor.monitor.diagnosis.diagnosis import Body, Diagnosis, DiagnosisState
 from leg_wear_monitor.monitor.diagnosis.observer import TorqueObserver
 from leg_wear_monitor.monitor.encoders.observer import EncoderObserver
 from leg_wear_monitor.monitor.evaluation.evaluation import AlarmEvaluation
@@ -120,12 +120,20 @@ class Parts:
         if self.torque:
             found = self.torque.diagnosis
             if not self.is_torque_wrong:
-                return found
+                return attrs.evolve(found, bodies=self._counted_bodies())
             settled = tuple(change for change in found.changes if change.is_corrected)
             return Diagnosis(state=DiagnosisState.WAITING, reason=WRONG_TORQUE, changes=settled)
         return Diagnosis(
             reason=ACCELERATED if self.config.diagnosis.enabled else "diagnosis.enabled is false"
         )
+
+    def _counted_bodies(self) -> tuple[Body, ...]:
+        """Bodies of the twin; none where they are those of the mechanism file."""
+        bodies = self.twin.bodies
+        if bodies == BodyFactors.none(self.mechanism):
+            return ()
+        factors = zip(self.mechanism.bodies, bodies.mass.tolist(), bodies.length.tolist(), strict=True)
+        return tuple(Body(*one) for one in factors)
 
     @property
     def is_torque_wrong(self) -> bool:

@@ -68,6 +68,9 @@ def diagnosis_status(joints: Sequence[str], diagnosis: Diagnosis) -> Status:
         known = bool(diagnosis.clearance_m)
         values[f"{joint}_clearance_m"] = diagnosis.clearance_m[k] if known else math.nan
         values[f"{joint}_sigma_m"] = diagnosis.sigma_m[k] if known else math.nan
+    for body in diagnosis.bodies:
+        values[f"{body.name}_mass_factor"] = body.mass
+        values[f"{body.name}_length_factor"] = body.length
     if diagnosis.state is DiagnosisState.CHANGED:
         return Status("diagnosis", Level.WARN, diagnosis_words(diagnosis, joints), values, DIAGNOSIS)
     return Status("diagnosis", Level.OK, diagnosis_words(diagnosis, joints), values)

@@ -30,6 +30,10 @@ def test_the_twin_walks_on_with_identified_bodies_and_the_ledger_keeps_them(leg,
     monitor = open_monitor(leg, config)
     monitor.update(gait(2.5))
     assert monitor._parts.twin.bodies == found
+    assert [body.mass for body in monitor.diagnosis.bodies] == found.mass.tolist()
+    status = next(one for one in monitor.status() if one.name == "diagnosis")
+    assert "counted with the masses and lengths" in status.message
+    assert status.values["thigh_mass_factor"] == found.mass[list(leg.bodies).index("thigh")]
     monitor.close()
     again = open_monitor(leg, config)
     assert again._parts.twin.bodies == found
@@ -42,4 +46,5 @@ def test_without_corrections_the_twin_keeps_the_bodies_of_its_file(leg, gait, tm
     monitor = open_monitor(leg, config)
     monitor.update(gait(2.5))
     assert monitor._parts.twin.bodies == BodyFactors.none(leg)
+    assert monitor.diagnosis.bodies == ()
     monitor.close()

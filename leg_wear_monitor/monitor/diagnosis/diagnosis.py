@@ -75,6 +75,15 @@ class Change:
         return self.cause is Cause.CLEARANCE and odds >= _SURE_LOG_ODDS
 
 
+@attrs.frozen
+class Body:
+    """Identified mass and length of a body, as factors on those of the mechanism file."""
+
+    name: str
+    mass: float
+    length: float
+
+
 @attrs.frozen(kw_only=True)
 class Diagnosis:
     """Clearances estimated from the drive torque, and what has changed.
@@ -92,6 +101,8 @@ class Diagnosis:
     changes : tuple of Change
         Significant departures, the oldest first: those by which counted clearances were corrected, and, where
         the state is CHANGED, the one that is not settled yet.
+    bodies : tuple of Body
+        Identified masses and lengths that the wear is counted with; empty while those of the file are.
     """
 
     state: DiagnosisState = DiagnosisState.OFF
@@ -100,3 +111,4 @@ class Diagnosis:
     clearance_m: tuple[float, ...] = ()
     sigma_m: tuple[float, ...] = ()
     changes: tuple[Change, ...] = ()
+    bodies: tuple[Body, ...] = ()

@@ -15,7 +15,7 @@ from leg_wear_monitor.monitor.config.settings import MonitorConfig
 from leg_wear_monitor.ros.inputs.message_class import message_class
 from leg_wear_monitor.ros.inputs.publishers import Publishers
 
-DEPTH = 200
+DEPTH = 2000  # messages: two seconds at 1 kHz, more than the longest evaluation between two of them takes
 
 
 @attrs.define

@@ -154,7 +154,8 @@ def is_stored(compiled: Callable[..., object]) -> bool:
     if function is None:
         return True
     home = cache_directory(Path(function.__code__.co_filename))
-    return home is not None and any(home.glob(f"**/*.{function.__name__}-*.nbi"))
+    # the code, not its index, which numba writes first
+    return home is not None and any(home.glob(f"**/*.{function.__name__}-*.nbc"))
 
 
 class ByAddress:

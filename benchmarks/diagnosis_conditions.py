@@ -111,7 +111,7 @@ def conditions(paper: Mechanism) -> Iterator[Condition]:
 
 
 def walks_of(one: Condition, keep: Path) -> dict[tuple[str, float], np.ndarray]:
-    """Walks by joint and size; that of the healthy leg has no name."""
+    """Walks by joint and size; the joint of the healthy leg is an empty string."""
     walks = {}
     for joint, size, cycles in [("", 0.0, HEALTHY)] + [
         (j, s, CYCLES) for j in one.leg.clearance_joints for s in SIZES

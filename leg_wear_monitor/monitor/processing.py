@@ -140,11 +140,10 @@ class Processing:
             return
         before = self._torque.state.commissioned
         correction = self._torque.end_period(self._twin.clearance_mean_m, self._twin.depth)
-        if self._parts.is_torque_wrong:
-            self._note_commissioned(before)
-            return
-        self._take_bodies(self._torque.bodies)
-        if correction is None:
+        is_wrong = self._parts.is_torque_wrong
+        if not is_wrong:
+            self._take_bodies(self._torque.bodies)
+        if correction is None or is_wrong:
             self._note_commissioned(before)
             return
         joint = self._clearance_joints[correction.joint]

@@ -29,10 +29,6 @@ class BodyFactors:
         """Factors of the mechanism as it is."""
         return cls(np.ones(len(mechanism.bodies)), np.ones(len(mechanism.bodies)))
 
-    def equals(self, other: "BodyFactors") -> bool:
-        """Whether these are the same factors."""
-        return np.array_equal(self.mass, other.mass) and np.array_equal(self.length, other.length)
-
     def applied(self, mechanism: Mechanism) -> Mechanism:
         """The mechanism with these factors on its bodies."""
         bodies = {}

@@ -70,7 +70,7 @@ class LegSimulation:
         AssemblyError
             If its bodies do not close.
         """
-        if self._bodies is None or not bodies.equals(self._bodies):
+        if bodies != self._bodies:
             self._prepare(bodies)
         clearance, worn = worn_to(self._fresh, depth, clearance_m)
         self._setup.contacts.clearance[:] = clearance

@@ -9,6 +9,7 @@ from rich.table import Table
 
 from leg_wear_monitor.cli.tables import figure
 from leg_wear_monitor.monitor.alarms.words import ADVICE
+from leg_wear_monitor.share import share_directory
 
 if TYPE_CHECKING:
     from leg_wear_monitor.monitor.forecast.forecast import JointForecast, LegForecast
@@ -68,12 +69,13 @@ def print_replay(result: "ReplayResult", wall_s: float) -> None:
 
 
 def _print_verdict(console: Console, verdict: "Verdict", joint_words: Callable[[str], str]) -> None:
-    """State, joints and reason; what a person does next; which figures do not hold meanwhile."""
+    """State, joints and reason; what a person does next, and the page on it; which figures do not hold."""
     from leg_wear_monitor.monitor.alarms.words import time_words
 
     whose = f" joint {', '.join(map(joint_words, verdict.joints))}" if verdict.joints else ""
     console.print(f"\n[bold]{verdict.state.words.upper()}{whose}[/bold]: {verdict.why}", soft_wrap=True)
     console.print(f"to do      {verdict.do}", soft_wrap=True)
+    console.print(f"code       {verdict.fault_code}, see {share_directory() / verdict.guide}", soft_wrap=True)
     if verdict.not_valid:
         console.print(f"{NOT_VALID}  {', '.join(figure.words for figure in verdict.not_valid)}")
     if verdict.since_ns:

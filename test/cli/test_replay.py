@@ -5,6 +5,7 @@ import json
 import math
 import random
 import re
+from pathlib import Path
 from types import SimpleNamespace
 
 import numpy as np
@@ -65,7 +66,9 @@ def test_a_whole_recording(run, bag, complaints, tmp_path):
     files = ("reports.mcap", "summary.json", "report.html")
     assert [f"written: out/{name}" in result.stdout for name in files] == [True] * 3
     assert "does not mean the joints are healthy" in result.stdout
+    (code, guide) = re.findall(r"^code +(\w+), see (.+)$", result.stdout, re.MULTILINE)[0]
     record = json.loads((tmp_path / "out" / "summary.json").read_text())
+    assert code == record["verdict"]["fault_code"] and f"`{code}`" in Path(guide).read_text(encoding="utf-8")
     assert record["recording"]["crank_samples"] == SECONDS * RATE_HZ
     page = (tmp_path / "out" / "report.html").read_text()
     (tmp_path / "out" / "report.html").unlink()

@@ -1,4 +1,4 @@
-"""docs/reference/codes.md has every fault code with what to do; this file as a script renews it."""
+"""docs/reference/codes.md has every fault code and its guide; this file as a script renews it."""
 
 import re
 from collections.abc import Iterator
@@ -7,10 +7,12 @@ from pathlib import Path
 import pytest
 
 from leg_wear_monitor.monitor.alarms.fault_codes import FAULT_CODES
+from leg_wear_monitor.monitor.alarms.guides import CODES_OF_GUIDES, FOLDER, guide_of
 from leg_wear_monitor.monitor.evaluation import specs
 from leg_wear_monitor.monitor.verdict.rules import RULES
 
-PAGE = Path(__file__).parents[2] / "docs" / "reference" / "codes.md"
+ROOT = Path(__file__).parents[2]
+PAGE = ROOT / "docs" / "reference" / "codes.md"
 PART = re.compile(r"(<!-- codes -->\n).*?(<!-- end -->)", re.DOTALL)
 OF_A_JOINT = {*specs.JOINT, *specs.ENCODERS}
 ALARMS = (*specs.JOINT, *specs.ENCODERS, *specs.TORQUE, *specs.GAIT, *specs.INPUT, specs.SOURCES)
@@ -38,10 +40,19 @@ def meanings() -> Iterator[tuple[str, str]]:
         yield code, f"- Status: {meaning}."
 
 
+def guide(code: str) -> str:
+    """A line with a link to the code's guide."""
+    path = guide_of(code)
+    title = (ROOT / path).read_text(encoding="utf-8").partition("\n")[0].removeprefix("# ")
+    return f"- Guide: [{title}](../{path.removeprefix('docs/')})."
+
+
 def renewed(page: str) -> str:
     told: dict[str, list[str]] = {}
     for code, line in meanings():
         told.setdefault(code, []).append(line)
+    for code, lines in told.items():
+        lines.append(guide(code))
     parts = ["\n".join([f"## {code}", "", *told[code], ""]) for code in sorted(told)]
     return PART.sub(lambda found: found[1] + "\n".join(parts) + found[2], page)
 
@@ -50,6 +61,19 @@ def test_the_page_has_every_code() -> None:
     page = PAGE.read_text(encoding="utf-8")
     assert "<!-- codes -->" in page
     assert renewed(page) == page
+
+
+def test_every_code_has_one_guide_that_names_it() -> None:
+    told = [code for codes in CODES_OF_GUIDES.values() for code in codes]
+    assert sorted(told) == sorted({code for code, _ in meanings()})
+    for name, codes in CODES_OF_GUIDES.items():
+        page = (ROOT / FOLDER / f"{name}.md").read_text(encoding="utf-8")
+        missing = [code for code in codes if f"](../../reference/codes.md#{code.lower()})" not in page]
+        assert missing == [], name
+
+
+def test_there_is_no_guide_without_a_code() -> None:
+    assert {path.stem for path in (ROOT / FOLDER).glob("*.md")} == set(CODES_OF_GUIDES)
 
 
 if __name__ == "__main__":

@@ -41,7 +41,7 @@ def blinding(situation: Situation) -> Sequence[Hit]:
 
 def hit_of(alarm: Alarm, **words: str) -> Hit:
     """An alarm as a case of a rule: its worst value if it is known, else its last one."""
-    is_present = alarm.present is not Level.OK
+    is_present = alarm.present is alarm.level  # a level that has fallen has a value within the limit
     value = alarm.value if is_present or math.isnan(alarm.worst) else alarm.worst
     told = {
         "name": alarm.name,

@@ -8,6 +8,7 @@ from typing import Any
 import attrs
 
 from leg_wear_monitor.monitor.alarms.alarm import Level
+from leg_wear_monitor.monitor.alarms.guides import guide_of
 
 
 class _Word(Enum):
@@ -149,6 +150,11 @@ class Verdict:
         """State, joints, reason and action in one line."""
         whose = f" joint {', '.join(self.joints)}" if self.joints else ""
         return f"{self.state.words}{whose}: {self.why}. To do: {self.do}"
+
+    @property
+    def guide(self) -> str:
+        """Page that says what to do about the reason, as a path below the share directory."""
+        return guide_of(self.fault_code.removesuffix("".join(f"_{joint}" for joint in self.joints)))
 
     def to_dict(self) -> dict[str, Any]:
         """Plain data as in summary.json; an unknown value is None."""

@@ -15,10 +15,10 @@ LOOKS = {
 
 
 def verdict_banner(summary: ReplaySummary) -> Banner:
-    """State as symbol and word, joints, reason, action, begin, and the figures that do not hold."""
+    """State as symbol and word, joints, reason, action, code, begin, and the figures that do not hold."""
     verdict = summary.verdict
     symbol, severity = LOOKS[verdict.state]
-    notes = [("Do", verdict.do)]
+    notes = [("Do", verdict.do), ("Code", f"{verdict.fault_code}, see {verdict.guide}")]
     if verdict.since_ns:
         notes.append(("Since", since_words(summary, verdict.since_ns)))
     if verdict.not_valid:

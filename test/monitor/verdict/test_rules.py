@@ -11,6 +11,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from leg_wear_monitor.monitor.alarms.alarm import Alarm, Level
+from leg_wear_monitor.monitor.alarms.guides import guide_of
 from leg_wear_monitor.monitor.alarms.words import ADVICE
 from leg_wear_monitor.monitor.config.parameters import config_from
 from leg_wear_monitor.monitor.diagnosis.diagnosis import Cause, Change, Diagnosis, DiagnosisState
@@ -209,6 +210,7 @@ def test_each_case_has_its_verdict(
     assert (verdict.state, verdict.fault_code, verdict.not_valid) == (state, code, not_valid)
     assert verdict.why and verdict.do and "{" not in verdict.words
     assert verdict.joints == tuple(part for part in code.split("_") if part in JOINTS)
+    assert verdict.guide == guide_of(re.sub("(_[AG])+$", "", code))
 
 
 def test_every_rule_is_the_verdict_of_some_case() -> None:
@@ -275,6 +277,12 @@ def test_a_reason_to_stop_is_not_hidden_by_an_input_that_fails() -> None:
 def test_a_latched_alarm_is_told_with_its_worst_value_and_as_past() -> None:
     verdict = judged(alarms=(alarm("impact_force A", present=Level.OK, value=3.0, worst=1234.5),))
     assert "is 1234 N" in verdict.why and "(since 0.000 s; within its limit again now)" in verdict.why
+
+
+def test_an_alarm_that_has_fallen_to_a_warning_is_told_with_its_worst_value_too() -> None:
+    verdict = judged(alarms=(alarm("impact_force A", present=Level.WARN, value=0.9, worst=1234.5),))
+    assert verdict.state is State.INSPECT
+    assert "is 1234 N" in verdict.why and "within its limit again now" in verdict.why
 
 
 def test_encoders_on_all_joints_observe_the_leg_without_a_drive_torque() -> None:

@@ -54,6 +54,11 @@ def test_the_first_screen_has_verdict_joints_belief_and_alarms():
     assert "Clearance over time" not in text
 
 
+def test_the_banner_leads_from_the_code_to_its_guide():
+    text = visible(page_of(made_up_summary()))
+    assert "CLEARANCE_CHANGED_A, see docs/howto/verdict/clearance_changed.md" in text
+
+
 @pytest.mark.parametrize("state", State)
 def test_every_state_has_a_symbol_a_word_and_a_colour(state):
     page = page_of(doubted(state=state))

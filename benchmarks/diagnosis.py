@@ -32,8 +32,8 @@ from leg_wear_monitor.monitor.diagnosis.explanations import Explainer
 from leg_wear_monitor.monitor.diagnosis.identification import (
     FAR_FROM_FILE,
     UNLIKE_FILE,
-    bodies_of_ideal_torque,
-    identified_bodies,
+    identified_leg,
+    leg_of_ideal_torque,
     misfit,
 )
 from leg_wear_monitor.monitor.diagnosis.leg_model import best_fit, explainer_of
@@ -41,8 +41,8 @@ from leg_wear_monitor.monitor.diagnosis.signature import TorqueSensor, averaged,
 from leg_wear_monitor.monitor.diagnosis.signature_model import with_noise_of
 from leg_wear_monitor.monitor.ledger.entry import CommissionedTorque
 from leg_wear_monitor.twin.follower.load import torque_size
-from leg_wear_monitor.twin.reference.body_factors import BodyFactors
 from leg_wear_monitor.twin.reference.crank_profile import CrankProfile, cycle_profile, mean_profile
+from leg_wear_monitor.twin.reference.leg_parameters import LegParameters
 from leg_wear_monitor.twin.reference.torque_reference import TorqueReference, TorqueReferenceRun
 from leg_wear_monitor.wear.surfaces import SECTORS
 
@@ -95,7 +95,7 @@ def truth(leg: Mechanism, name: str) -> Mechanism:
     masses, lengths = (
         [part.get(body, 1.0) for body in leg.bodies] for part in (LEGS[name].masses, LEGS[name].lengths)
     )
-    return BodyFactors(np.array(masses), np.array(lengths)).applied(leg)
+    return LegParameters(np.array(masses), np.array(lengths)).applied(leg)
 
 
 def walked(
@@ -154,20 +154,20 @@ def profile_of(walk: np.ndarray, cycles: int = 20) -> CrankProfile:
     return mean_profile(profiles)
 
 
-def referred(leg: Mechanism, profile: CrankProfile, bodies: BodyFactors) -> TorqueReference:
+def referred(leg: Mechanism, profile: CrankProfile, bodies: LegParameters) -> TorqueReference:
     """A reference of a leg with given bodies."""
     run = TorqueReferenceRun(leg)
     run.begin(NEW, UNWORN, profile, bodies)
     return simulated(run)
 
 
-def bodies_of(leg: Mechanism, explainer: Explainer, known: CommissionedTorque, reference) -> BodyFactors:
+def bodies_of(leg: Mechanism, explainer: Explainer, known: CommissionedTorque, reference) -> LegParameters:
     """The bodies that explain the torque of a commissioned leg."""
-    run, start = TorqueReferenceRun(leg), reference.bodies
+    run, start = TorqueReferenceRun(leg), reference.parameters
     if misfit(explainer.model, explainer.nuisances, known) >= FAR_FROM_FILE:
-        start = bodies_of_ideal_torque(leg, explainer.model, known, reference.profile.speed)
-    run.begin_bodies(NEW, UNWORN, reference.profile, start)
-    return identified_bodies(simulated(run), explainer.model, explainer.nuisances, known)
+        start = leg_of_ideal_torque(leg, explainer.model, known, reference.profile.speed)
+    run.begin_identification(NEW, UNWORN, reference.profile, start)
+    return identified_leg(simulated(run), explainer.model, explainer.nuisances, known)
 
 
 def simulated(run: TorqueReferenceRun) -> TorqueReference:
@@ -277,7 +277,7 @@ def known_leg(name, leg, walk, profile, sensor, random, options) -> tuple[Explai
     """The explainer of a leg, with its bodies identified if required, and its signatures when healthy."""
     file = (lambda what: options.keep / f"{name} {what}.pkl") if options.keep else (lambda what: None)
     use = walk, sensor, options.noise_nm, random, not options.uncommissioned
-    none = BodyFactors.none(leg)
+    none = LegParameters.none(leg)
     reference = kept(file("of file"), lambda: referred(leg, profile, none))
     explainer, known, healthy = explained(leg, reference, *use)
     if known is None:
@@ -291,7 +291,7 @@ def known_leg(name, leg, walk, profile, sensor, random, options) -> tuple[Explai
     )
     explainer, known, healthy = explained(leg, reference, *use)
     off = misfit(explainer.model, explainer.nuisances, known)
-    for what, factors in (("masses", reference.bodies.mass), ("lengths", reference.bodies.length)):
+    for what, factors in (("masses", reference.parameters.mass), ("lengths", reference.parameters.length)):
         print(f"identified {what} [% off the file]:", np.round(100.0 * (factors - 1.0), 1))
     print(f"misfit with these {off:.2f}")
     return explainer, healthy
@@ -303,7 +303,7 @@ def main() -> None:
     parser.add_argument("--noise-nm", type=float, default=0.5)
     parser.add_argument("--rate-hz", type=float, default=200.0)
     parser.add_argument("--uncommissioned", action="store_true")
-    parser.add_argument("--as-of-file", action="store_true", help="do not identify masses and lengths")
+    parser.add_argument("--as-of-file", action="store_true", help="do not identify masses, lengths and friction")
     parser.add_argument("--legs", nargs="+", default=list(LEGS))
     options = parser.parse_args()
     leg, random = load_mechanism("bionic_leg"), np.random.default_rng(5)

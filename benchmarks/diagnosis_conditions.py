@@ -44,7 +44,7 @@ from leg_wear_monitor.monitor.diagnosis.identification import UNLIKE_FILE, misfi
 from leg_wear_monitor.monitor.diagnosis.references import ROUNDS
 from leg_wear_monitor.monitor.diagnosis.signature import TorqueSensor
 from leg_wear_monitor.twin.follower.load import torque_size
-from leg_wear_monitor.twin.reference.body_factors import BodyFactors
+from leg_wear_monitor.twin.reference.leg_parameters import LegParameters
 
 SIZES, CYCLES = (3.6e-4, 1.0e-3), 40
 RATES, NOISES_NM, INSTANTS = (50.0, 100.0, 200.0, 500.0, 1000.0), (0.05, 0.5, 2.0), (200.0, 1000.0)
@@ -106,7 +106,7 @@ def conditions(paper: Mechanism) -> Iterator[Condition]:
         lengths = [1.0 + (LEGS["d"].lengths[body] - 1.0) * percent / 0.2 for body in BODIES]
         masses = [LEGS["d"].masses[body] for body in BODIES]
         yield Condition(
-            f"lengths within {percent:g} %", BodyFactors(np.array(masses), np.array(lengths)).applied(paper)
+            f"lengths within {percent:g} %", LegParameters(np.array(masses), np.array(lengths)).applied(paper)
         )
 
 
@@ -161,7 +161,8 @@ def print_row(name: str, row: Sequence[str]) -> None:
 def known_reference(walk, profile, sensor: TorqueSensor, noise_nm: float, keep: Path, paper: Mechanism):
     """The reference that the monitor would have of a leg: that of its file, or with identified bodies."""
     best = kept(
-        keep.with_name(f"{keep.name} of file.pkl"), lambda: referred(paper, profile, BodyFactors.none(paper))
+        keep.with_name(f"{keep.name} of file.pkl"),
+        lambda: referred(paper, profile, LegParameters.none(paper)),
     )
     found = explained(paper, best, walk, sensor, noise_nm, np.random.default_rng(5))
     off = misfit(found[0].model, found[0].nuisances, found[1])

@@ -25,7 +25,7 @@ from leg_wear_monitor.monitor.state import MonitorSnapshot, MonitorState
 from leg_wear_monitor.monitor.torque_causes.explainer import TorqueExplainer
 from leg_wear_monitor.torque_fit.torque_model import torque_model
 from leg_wear_monitor.twin.digital_twin import DigitalTwin
-from leg_wear_monitor.twin.reference.body_factors import BodyFactors
+from leg_wear_monitor.twin.reference.leg_parameters import LegParameters
 
 WRONG_TORQUE = "the drive torque is wrong as received, see the status torque"
 ACCELERATED = "wear is accelerated: clearances grow within the gait cycles that are compared"
@@ -81,13 +81,13 @@ class Parts:
                 self.twin.torque_size_nm,
                 self.twin.clearance_mean_m,
                 ledger.commissioned_torque if ledger else None,
-                self._known_bodies(ledger),
+                self._known_parameters(ledger),
             )
             if self.config.diagnosis.enabled and self.config.wear_acceleration == 1.0
             else None
         )
-        if self.torque and self.torque.state.bodies and self.config.diagnosis.correct:
-            self.twin.set_bodies(self.torque.state.bodies)
+        if self.torque and self.torque.state.parameters and self.config.diagnosis.correct:
+            self.twin.set_parameters(self.torque.state.parameters)
         self.explainer = TorqueExplainer(self.mechanism)
         self.judge = Judge(
             self.twin,
@@ -106,13 +106,14 @@ class Parts:
         kept = TorqueRecord.of(self.accounting.state.commissioned)
         self.state = MonitorState(tuple(GrowthWindow() for _ in self.clearance_joints), kept)
 
-    def _known_bodies(self, ledger: Ledger | None) -> BodyFactors | None:
-        """Masses and lengths of the ledger, in the order of the mechanism."""
-        if ledger is None or ledger.bodies is None:
+    def _known_parameters(self, ledger: Ledger | None) -> LegParameters | None:
+        """Masses, lengths and friction of the ledger, in the order of the mechanism."""
+        known = ledger.parameters if ledger else None
+        if known is None:
             return None
-        of = {name: i for i, name in enumerate(ledger.bodies.names)}
+        of = {name: i for i, name in enumerate(known.names)}
         order = [of[name] for name in self.mechanism.bodies]
-        return BodyFactors(np.array(ledger.bodies.mass)[order], np.array(ledger.bodies.length)[order])
+        return LegParameters(np.array(known.mass)[order], np.array(known.length)[order], known.friction)
 
     @property
     def diagnosis(self) -> Diagnosis:
@@ -120,7 +121,9 @@ class Parts:
         if self.torque:
             found = self.torque.diagnosis
             if not self.is_torque_wrong:
-                return attrs.evolve(found, bodies=self._counted_bodies())
+                return attrs.evolve(
+                    found, bodies=self._counted_bodies(), friction=self.twin.parameters.friction
+                )
             settled = tuple(change for change in found.changes if change.is_corrected)
             return Diagnosis(state=DiagnosisState.WAITING, reason=WRONG_TORQUE, changes=settled)
         return Diagnosis(
@@ -128,11 +131,11 @@ class Parts:
         )
 
     def _counted_bodies(self) -> tuple[Body, ...]:
-        """Bodies of the twin; none where they are those of the mechanism file."""
-        bodies = self.twin.bodies
-        if bodies == BodyFactors.none(self.mechanism):
+        """Bodies of the twin; none where its parameters are those of the mechanism file."""
+        own = self.twin.parameters
+        if own == LegParameters.none(self.mechanism):
             return ()
-        factors = zip(self.mechanism.bodies, bodies.mass.tolist(), bodies.length.tolist(), strict=True)
+        factors = zip(self.mechanism.bodies, own.mass.tolist(), own.length.tolist(), strict=True)
         return tuple(Body(*one) for one in factors)
 
     @property

@@ -8,7 +8,7 @@ from leg_wear_monitor.monitor.encoders.clearance_estimate import ClearanceEstima
 from leg_wear_monitor.monitor.evaluation.specs import MISMATCH
 from leg_wear_monitor.monitor.forecast.growth import GrowthWindow, extended
 from leg_wear_monitor.monitor.forecast_update import update_forecast
-from leg_wear_monitor.monitor.ledger.entry import Audit, CommissionedTorque, IdentifiedBodies
+from leg_wear_monitor.monitor.ledger.entry import Audit, CommissionedTorque, IdentifiedLeg
 from leg_wear_monitor.monitor.parts import Parts
 from leg_wear_monitor.monitor.reports import (
     AlarmList,
@@ -16,7 +16,7 @@ from leg_wear_monitor.monitor.reports import (
     SampleReports,
     VerdictReport,
 )
-from leg_wear_monitor.twin.reference.body_factors import BodyFactors
+from leg_wear_monitor.twin.reference.leg_parameters import LegParameters
 from leg_wear_monitor.twin.sample import Samples
 from leg_wear_monitor.twin.statistics import CycleStatistics
 
@@ -142,7 +142,7 @@ class Processing:
         correction = self._torque.end_period(self._twin.clearance_mean_m, self._twin.depth)
         is_wrong = self._parts.is_torque_wrong
         if not is_wrong:
-            self._take_bodies(self._torque.bodies)
+            self._take_parameters(self._torque.parameters)
         if correction is None or is_wrong:
             self._note_commissioned(before)
             return
@@ -157,16 +157,15 @@ class Processing:
         self._parts.state.growth = (*growth[:k], GrowthWindow(), *growth[k + 1 :])
         self._parts.keep()
 
-    def _take_bodies(self, bodies: BodyFactors | None) -> None:
-        """Let the twin walk on with the masses and lengths that the drive torque shows."""
-        if bodies is None or bodies == self._twin.bodies or not self._parts.config.diagnosis.correct:
+    def _take_parameters(self, found: LegParameters | None) -> None:
+        """Let the twin walk on with the masses, lengths and friction that the drive torque shows."""
+        if found is None or found == self._twin.parameters or not self._parts.config.diagnosis.correct:
             return
-        self._twin.set_bodies(bodies)
+        self._twin.set_parameters(found)
         names = tuple(self._parts.mechanism.bodies)
         stamp_ns = self._twin.intake.followed_stamp_ns
-        self._accounting.note(
-            IdentifiedBodies(stamp_ns, names, tuple(bodies.mass.tolist()), tuple(bodies.length.tolist()))
-        )
+        factors = tuple(found.mass.tolist()), tuple(found.length.tolist()), found.friction
+        self._accounting.note(IdentifiedLeg(stamp_ns, names, *factors))
         self._parts.state.growth = tuple(GrowthWindow() for _ in self._clearance_joints)
         self._parts.keep()
 

@@ -71,6 +71,8 @@ def diagnosis_status(joints: Sequence[str], diagnosis: Diagnosis) -> Status:
     for body in diagnosis.bodies:
         values[f"{body.name}_mass_factor"] = body.mass
         values[f"{body.name}_length_factor"] = body.length
+    if diagnosis.bodies:
+        values["joint_friction_factor"] = diagnosis.friction
     if diagnosis.state is DiagnosisState.CHANGED:
         return Status("diagnosis", Level.WARN, diagnosis_words(diagnosis, joints), values, DIAGNOSIS)
     return Status("diagnosis", Level.OK, diagnosis_words(diagnosis, joints), values)

@@ -8,7 +8,7 @@
     twin.tracking, twin.speed_radps, twin.intake        # state of tracking, counts of samples
     twin.clearance_mean_m, twin.depth                   # present wear
     twin.set_depth(depth), twin.reset_wear("G")         # from a ledger; after a replacement
-    twin.set_bodies(bodies)                             # masses and lengths that were identified
+    twin.set_parameters(parameters)                     # masses, lengths and friction that were identified
     twin.wear_acceleration = 100.0                      # may change at any time
     snapshot = twin.snapshot(); twin.restore(snapshot)  # continues bit-identically
 
@@ -29,7 +29,7 @@ from leg_wear_monitor.mechanism.position import build_linkage
 from leg_wear_monitor.mechanism.spec import Mechanism
 from leg_wear_monitor.twin.follower.follower import FollowerSnapshot, LegFollower
 from leg_wear_monitor.twin.intake import intake
-from leg_wear_monitor.twin.reference.body_factors import BodyFactors
+from leg_wear_monitor.twin.reference.leg_parameters import LegParameters
 from leg_wear_monitor.twin.sample import Samples, gait_samples
 from leg_wear_monitor.twin.settings import TwinSettings
 from leg_wear_monitor.twin.statistics import (
@@ -50,7 +50,7 @@ class TwinSnapshot(NamedTuple):
     tracker: TrackerSnapshot
     follower: FollowerSnapshot
     wear_acceleration: float
-    bodies: BodyFactors
+    parameters: LegParameters
 
 
 class DigitalTwin:
@@ -86,8 +86,10 @@ class DigitalTwin:
                 mechanism.source, "clearances.joints", "no joint has clearance, nothing can wear"
             )
         self.clearance_joints = setup.clearance_joints
-        self._setup, self._mechanism, self._bodies = setup, mechanism, BodyFactors.none(mechanism)
+        self._setup, self._mechanism = setup, mechanism
+        self._parameters = LegParameters.none(mechanism)
         self._nominal = setup.contacts.wear_coefficient.copy()
+        self._friction = setup.contacts.friction[:, 0].copy()
         self._follower = LegFollower(setup, self.settings)
         self._tracker = CrankTracker(self.settings.tracker)
         self.wear_acceleration = self.settings.wear_acceleration
@@ -148,23 +150,23 @@ class DigitalTwin:
         return self._intake
 
     @property
-    def bodies(self) -> BodyFactors:
-        """Factors on the bodies of the mechanism."""
-        return self._bodies
+    def parameters(self) -> LegParameters:
+        """Factors on the parameters of the mechanism."""
+        return self._parameters
 
-    def set_bodies(self, bodies: BodyFactors) -> None:
-        """Continue with other masses and lengths; motion and wear go on.
+    def set_parameters(self, parameters: LegParameters) -> None:
+        """Continue with other masses, lengths and friction; motion and wear go on.
 
         Raises
         ------
         AssemblyError
             If the linkage does not close or has a dead point.
         """
-        if bodies != self._bodies:
-            linkage = build_linkage(bodies.applied(self._mechanism))
+        if parameters != self._parameters:
+            linkage = build_linkage(parameters.applied(self._mechanism))
             check_cycle(linkage)
-            self._follower.take_bodies(linkage)
-            self._bodies = bodies
+            self._follower.take_parameters(linkage, parameters.friction * self._friction)
+            self._parameters = parameters
 
     def set_depth(self, depth: Floats) -> None:
         """Set wear depths (k, 2, N) [m], for instance from a ledger.
@@ -221,13 +223,13 @@ class DigitalTwin:
     def snapshot(self) -> TwinSnapshot:
         """A copy of the whole state."""
         return TwinSnapshot(
-            self._tracker.snapshot(), self._follower.snapshot(), self.wear_acceleration, self._bodies
+            self._tracker.snapshot(), self._follower.snapshot(), self.wear_acceleration, self._parameters
         )
 
     def restore(self, snapshot: TwinSnapshot) -> None:
         """Restore a snapshot of a twin of the same mechanism and settings."""
         self._intake = None
-        self.set_bodies(snapshot.bodies)
+        self.set_parameters(snapshot.parameters)
         self._tracker.restore(snapshot.tracker)
         self._follower.restore(snapshot.follower)
         self.wear_acceleration = snapshot.wear_acceleration

@@ -1,4 +1,4 @@
-"""Masses and lengths that the drive torque shows: the twin walks with them, and the ledger keeps them."""
+"""Parameters that the drive torque shows: the twin walks with them, and the ledger keeps them."""
 
 import attrs
 import numpy as np
@@ -7,16 +7,16 @@ import pytest
 from leg_wear_monitor.monitor.config.settings import MonitorConfig
 from leg_wear_monitor.monitor.diagnosis.observer import TorqueObserver
 from leg_wear_monitor.monitor.opening import open_monitor
-from leg_wear_monitor.twin.reference.body_factors import BodyFactors
+from leg_wear_monitor.twin.reference.leg_parameters import LegParameters
 
 
 @pytest.fixture
-def found(leg, monkeypatch) -> BodyFactors:
-    """Bodies that each observer says it has identified."""
+def found(leg, monkeypatch) -> LegParameters:
+    """Parameters that each observer says it has identified."""
     factors = np.linspace(0.96, 1.04, len(leg.bodies))
-    bodies = BodyFactors(factors, 1.0 + 0.05 * (factors - 1.0))
-    monkeypatch.setattr(TorqueObserver, "bodies", bodies)
-    return bodies
+    parameters = LegParameters(factors, 1.0 + 0.05 * (factors - 1.0), 1.5)
+    monkeypatch.setattr(TorqueObserver, "parameters", parameters)
+    return parameters
 
 
 def config_of(path, correct: bool = True) -> MonitorConfig:
@@ -25,26 +25,27 @@ def config_of(path, correct: bool = True) -> MonitorConfig:
     return attrs.evolve(config, ledger=ledger, diagnosis=attrs.evolve(config.diagnosis, correct=correct))
 
 
-def test_the_twin_walks_on_with_identified_bodies_and_the_ledger_keeps_them(leg, gait, tmp_path, found):
+def test_the_twin_walks_on_with_identified_parameters_and_the_ledger_keeps_them(leg, gait, tmp_path, found):
     config = config_of(tmp_path / "wear.ledger")
     monitor = open_monitor(leg, config)
     monitor.update(gait(2.5))
-    assert monitor._parts.twin.bodies == found
+    assert monitor._parts.twin.parameters == found
     assert [body.mass for body in monitor.diagnosis.bodies] == found.mass.tolist()
     status = next(one for one in monitor.status() if one.name == "diagnosis")
-    assert "counted with the masses and lengths" in status.message
+    assert "counted with the masses, lengths and friction" in status.message
     assert status.values["thigh_mass_factor"] == found.mass[list(leg.bodies).index("thigh")]
+    assert status.values["joint_friction_factor"] == monitor.diagnosis.friction == 1.5
     monitor.close()
     again = open_monitor(leg, config)
-    assert again._parts.twin.bodies == found
-    assert again._parts.torque.state.bodies == found
+    assert again._parts.twin.parameters == found
+    assert again._parts.torque.state.parameters == found
     again.close()
 
 
-def test_without_corrections_the_twin_keeps_the_bodies_of_its_file(leg, gait, tmp_path, found):
+def test_without_corrections_the_twin_keeps_the_parameters_of_its_file(leg, gait, tmp_path, found):
     config = config_of(tmp_path / "wear.ledger", correct=False)
     monitor = open_monitor(leg, config)
     monitor.update(gait(2.5))
-    assert monitor._parts.twin.bodies == BodyFactors.none(leg)
+    assert monitor._parts.twin.parameters == LegParameters.none(leg)
     assert monitor.diagnosis.bodies == ()
     monitor.close()

@@ -13,7 +13,7 @@ from leg_wear_monitor.errors import ConfigError, LegWearError
 from leg_wear_monitor.mechanism.ideal import TURN
 from leg_wear_monitor.twin.digital_twin import DigitalTwin
 from leg_wear_monitor.twin.kinds import TORQUE
-from leg_wear_monitor.twin.reference.body_factors import BodyFactors
+from leg_wear_monitor.twin.reference.leg_parameters import LegParameters
 from leg_wear_monitor.twin.sample import Samples, gait_samples
 from leg_wear_monitor.twin.settings import TrackerSettings, TwinSettings
 from leg_wear_monitor.twin.statistics import (
@@ -116,24 +116,24 @@ def test_restored_it_goes_on_bit_for_bit(_made, gait, eventful, in_one_go, where
 
 
 @pytest.fixture(scope="module")
-def heavier(leg) -> BodyFactors:
+def heavier(leg) -> LegParameters:
     factors = np.random.default_rng(1).uniform(0.95, 1.05, (2, len(leg.bodies)))
-    return BodyFactors(factors[0], 1.0 + 0.1 * (factors[1] - 1.0))
+    return LegParameters(factors[0], 1.0 + 0.1 * (factors[1] - 1.0), 1.5)
 
 
-def test_with_other_bodies_it_is_the_twin_of_a_leg_that_has_them(twin, leg, gait, heavier):
+def test_with_other_parameters_it_is_the_twin_of_a_leg_that_has_them(twin, leg, gait, heavier):
     loaded = gait(2.5)
     loaded["torque_nm"] = 3.0
-    twin.set_bodies(heavier)
-    assert twin.bodies == heavier
+    twin.set_parameters(heavier)
+    assert twin.parameters == heavier
     assert_same(run(twin, [loaded]), run(DigitalTwin(heavier.applied(leg)), [loaded]))
 
 
-def test_bodies_that_change_underway_belong_to_a_snapshot(twin, gait, heavier):
+def test_parameters_that_change_underway_belong_to_a_snapshot(twin, gait, heavier):
     walk = gait(3.0)
     run(twin, [walk[:300]])
     before = twin.snapshot()
-    twin.set_bodies(heavier)
+    twin.set_parameters(heavier)
     with_them = twin.snapshot()
     after = run(twin, [walk[300:]])
     twin.restore(before)

@@ -11,7 +11,7 @@ from leg_wear_monitor.mechanism.forces import applied_forces_at
 from leg_wear_monitor.mechanism.ideal import TURN, one_cycle
 from leg_wear_monitor.mechanism.position import Linkage, build_linkage, drive_column, gammas, jacobians
 from leg_wear_monitor.mechanism.spec import Mechanism
-from leg_wear_monitor.twin.reference.body_factors import BodyFactors
+from leg_wear_monitor.twin.reference.leg_parameters import LegParameters
 
 _POINTS = 240  # of a gait cycle: three in each of 80 phases
 _LONGER = 0.002  # step of the difference by a body's length
@@ -53,7 +53,7 @@ class _Same:
 @functools.lru_cache(maxsize=2)
 def _computed(same: _Same) -> BodyTorques:
     mechanism = same.mechanism
-    linkage, whole = build_linkage(mechanism), BodyFactors.none(mechanism)
+    linkage, whole = build_linkage(mechanism), LegParameters.none(mechanism)
     q = one_cycle(linkage, _POINTS, 1.0).q
     torque, mass = _torques(linkage, q)
     length = []

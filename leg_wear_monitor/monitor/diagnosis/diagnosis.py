@@ -102,7 +102,9 @@ class Diagnosis:
         Significant departures, the oldest first: those by which counted clearances were corrected, and, where
         the state is CHANGED, the one that is not settled yet.
     bodies : tuple of Body
-        Identified masses and lengths that the wear is counted with; empty while those of the file are.
+        Identified masses and lengths that the wear is counted with; empty while it is counted as in the file.
+    friction : float
+        Factor on the friction in the joints that the wear is counted with.
     """
 
     state: DiagnosisState = DiagnosisState.OFF
@@ -112,3 +114,4 @@ class Diagnosis:
     sigma_m: tuple[float, ...] = ()
     changes: tuple[Change, ...] = ()
     bodies: tuple[Body, ...] = ()
+    friction: float = 1.0

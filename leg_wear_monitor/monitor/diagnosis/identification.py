@@ -1,13 +1,15 @@
-"""Masses and lengths of a commissioned leg, from its drive torque.
+"""Masses, lengths and friction of a commissioned leg, from its drive torque.
 
 A real leg is not quite that of its mechanism file. Where its impacts fall, and what a clearance changes,
-depends on its masses and lengths: a length that is 1 % off makes a reference name wrong joints. So the
-reference is simulated again with the bodies that explain the torque of the leg when it was commissioned.
+depends on its masses, lengths and friction: a length that is 1 % off, or friction twice that of the file, makes
+a reference name wrong joints. So the reference is simulated again with the parameters that explain the torque
+of the leg when it was commissioned.
 
-Simulated legs show what each body changes, near the leg that is simulated. Where a leg is far from its file,
+Simulated legs show what each parameter changes, near the leg that is simulated. Where a leg is far from its file,
 the torque with ideal joints leads near it: lengths that are 5 % off change that by half of the torque's size.
 """
 
+import math
 from collections.abc import Callable, Sequence
 
 import numpy as np
@@ -19,21 +21,22 @@ from leg_wear_monitor.monitor.diagnosis.explanations import Nuisance
 from leg_wear_monitor.monitor.diagnosis.ideal_signature import ideal_torque, signature_of_torque
 from leg_wear_monitor.monitor.diagnosis.signature_model import SignatureModel, simulated_signatures
 from leg_wear_monitor.monitor.ledger.entry import CommissionedTorque
-from leg_wear_monitor.twin.reference.body_factors import BodyFactors
-from leg_wear_monitor.twin.reference.torque_reference import HEAVIER, LONGER, TorqueReference
+from leg_wear_monitor.twin.reference.leg_parameters import LegParameters
+from leg_wear_monitor.twin.reference.torque_reference import HEAVIER, LONGER, ROUGHER, TorqueReference
 
 UNLIKE_FILE = 0.8  # misfit from which on the leg is not that of its file (docs/explanation/diagnosis.md)
 
 FAR_FROM_FILE = 20.0  # misfit from which on the ideal torque comes first
 
 _MASS, _LENGTH = 0.03, 0.006  # standard deviations of a leg's bodies about those of its file
+_LOG_FRICTION = 0.7  # of the logarithm of its friction: a factor of two, greased or not
 _FAR = 0.03  # that of masses and lengths of a leg far from its file
 _HARMONICS = 6  # of the torque that show masses and lengths rather than impacts
 _IDEAL = 0.01  # of the torque's size: what impacts change in each of them
 _STEP, _ROUNDS, _SHORTEST = 1.0e-4, 20, 0.05
 _SENSOR = 5.0  # times the usual changes of friction, scale, offset and load: they are constant here
 
-# a model with the right bodies is off by a part of the torque's size, by a part of its steps where it is
+# a model with the right parameters is off by a part of the torque's size, by a part of its steps where it is
 # steep, and in its roughness (docs/explanation/diagnosis.md)
 _OF_SIZE, _OF_STEP, _ROUGHNESS = 0.005, 0.1, 0.1
 
@@ -45,13 +48,13 @@ def misfit(model: SignatureModel, nuisances: Sequence[Nuisance], commissioned: C
     return float(rest @ np.linalg.solve(covariance, rest)) / len(rest)
 
 
-def identified_bodies(
+def identified_leg(
     legs: TorqueReference,
     model: SignatureModel,
     nuisances: Sequence[Nuisance],
     commissioned: CommissionedTorque,
-) -> BodyFactors:
-    """Most probable masses and lengths of a commissioned leg: one step of Gauss and Newton.
+) -> LegParameters:
+    """Most probable parameters of a commissioned leg: one step of Gauss and Newton.
 
     What the torque does not show of them stays that of the file. Lengths are supposed to be as far from the
     file as those of the simulated leg are.
@@ -59,27 +62,29 @@ def identified_bodies(
     Parameters
     ----------
     legs : TorqueReference
-        Of `begin_bodies`, with the clearances of the commissioned leg.
+        Of `begin_identification`, with the clearances of the commissioned leg.
     model : SignatureModel
     nuisances : sequence of Nuisance
     commissioned : CommissionedTorque
     """
     means = [simulated_signatures(legs, leg, model.sensor).mean(axis=0) for leg in range(len(legs.torque_nm))]
-    bodies = len(legs.bodies.mass)
-    before = np.concatenate([legs.bodies.mass, legs.bodies.length]) - 1.0
-    far = float(np.sqrt(np.mean(np.square(legs.bodies.length - 1.0))))
-    steps, sigma = np.repeat([HEAVIER, LONGER], bodies), np.repeat([_MASS, np.hypot(_LENGTH, far)], bodies)
+    bodies, near = len(legs.parameters.mass), legs.parameters
+    # friction is positive, and known to a factor: its logarithm is the unknown
+    before = np.concatenate([near.mass - 1.0, near.length - 1.0, [math.log(near.friction)]])
+    far = float(np.sqrt(np.mean(np.square(near.length - 1.0))))
+    steps = np.append(np.repeat([HEAVIER, LONGER], bodies), math.log(ROUGHER))
+    sigma = np.append(np.repeat([_MASS, np.hypot(_LENGTH, far)], bodies), _LOG_FRICTION)
     slopes = ((np.array(means[1:]) - means[0]) / steps[:, None]).T
     weighted = np.linalg.solve(_covariance(model, nuisances, commissioned.cycles), slopes)
     information = slopes.T @ weighted + np.diag(sigma**-2.0)
     rest = commissioned.mean - means[0]
     found = before + np.linalg.solve(information, weighted.T @ rest - before / sigma**2)
-    return BodyFactors(1.0 + found[:bodies], 1.0 + found[bodies:])
+    return LegParameters(1.0 + found[:bodies], 1.0 + found[bodies:-1], math.exp(found[-1]))
 
 
-def bodies_of_ideal_torque(
+def leg_of_ideal_torque(
     mechanism: Mechanism, model: SignatureModel, commissioned: CommissionedTorque, speed: float
-) -> BodyFactors:
+) -> LegParameters:
     """Masses and lengths near those of a leg far from its file, by the torque with ideal joints.
 
     That torque differs from the torque of the file's leg as the measured mean torque differs from the
@@ -98,8 +103,8 @@ def bodies_of_ideal_torque(
     unit = _IDEAL * model.sensor.size_nm
     rest = (commissioned.mean - model.at(commissioned.clearance_m)[0])[:phases]
 
-    def bodies_at(x: Floats) -> BodyFactors:
-        return BodyFactors(1.0 + _FAR * x[:bodies], 1.0 + _FAR * x[bodies:])
+    def bodies_at(x: Floats) -> LegParameters:
+        return LegParameters(1.0 + _FAR * x[:bodies], 1.0 + _FAR * x[bodies:])
 
     def residual(x: Floats) -> Floats:
         torque = ideal_torque(bodies_at(x).applied(mechanism), speed) - of_file

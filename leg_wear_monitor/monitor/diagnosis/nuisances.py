@@ -13,7 +13,7 @@ from leg_wear_monitor.monitor.diagnosis.signature import TorqueSensor
 from leg_wear_monitor.monitor.diagnosis.signature_model import simulated_signatures
 from leg_wear_monitor.monitor.ledger.entry import CommissionedTorque
 from leg_wear_monitor.twin.follower.load import load_signature
-from leg_wear_monitor.twin.reference.body_factors import MASS_TOLERANCE
+from leg_wear_monitor.twin.reference.leg_parameters import MASS_TOLERANCE
 from leg_wear_monitor.twin.reference.torque_reference import TorqueReference
 
 # usual changes of a leg that is all right: friction warms up, sensors drift, the ground differs

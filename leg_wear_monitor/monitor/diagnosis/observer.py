@@ -24,7 +24,7 @@ from leg_wear_monitor.monitor.diagnosis.signed_cycle import find_sensor, signed_
 from leg_wear_monitor.monitor.diagnosis.state import TorqueState
 from leg_wear_monitor.monitor.diagnosis.torque_samples import NO_TORQUE_SAMPLES, after, extended
 from leg_wear_monitor.monitor.ledger.entry import CommissionedTorque
-from leg_wear_monitor.twin.reference.body_factors import BodyFactors
+from leg_wear_monitor.twin.reference.leg_parameters import LegParameters
 from leg_wear_monitor.twin.reference.torque_reference import TorqueReferenceSnapshot
 from leg_wear_monitor.twin.sample import Samples
 from leg_wear_monitor.twin.statistics import CycleStatistics
@@ -55,7 +55,7 @@ class TorqueObserver:
         Counted clearances.
     commissioned : CommissionedTorque or None
         That of the ledger.
-    bodies : BodyFactors or None
+    parameters : LegParameters or None
         Those of the ledger.
 
     Raises
@@ -70,14 +70,14 @@ class TorqueObserver:
         size_nm: float,
         counted_m: Floats,
         commissioned: CommissionedTorque | None = None,
-        bodies: BodyFactors | None = None,
+        parameters: LegParameters | None = None,
     ) -> None:
         self.config, self._size_nm, self._joints = config, size_nm, mechanism.clearance_joints
         self._models = LegModels(mechanism)
         self._references = References(mechanism, self._models)
         self._evidence = Evidence(self._models)
         counted_m = np.asarray(counted_m, float).copy()
-        self.state = TorqueState(counted_m, commissioned=commissioned, bodies=bodies)
+        self.state = TorqueState(counted_m, commissioned=commissioned, parameters=parameters)
 
     def warm_up(self) -> None:
         """Compute before the first sample what depends on the mechanism alone."""
@@ -133,12 +133,16 @@ class TorqueObserver:
         self._models.forget()
 
     @property
-    def bodies(self) -> BodyFactors | None:
-        """Identified masses and lengths that explain the drive torque; None where there are none."""
+    def parameters(self) -> LegParameters | None:
+        """Identified masses, lengths and friction that explain the drive torque; None where there are none."""
         state = self.state
-        if state.bodies is None or state.reference is None or state.reference.bodies != state.bodies:
+        if (
+            state.parameters is None
+            or state.reference is None
+            or state.reference.parameters != state.parameters
+        ):
             return None
-        return state.bodies if self._models.is_of_file(state) else None
+        return state.parameters if self._models.is_of_file(state) else None
 
     def begin_epoch(self) -> None:
         """Forget kept samples and gait cycles, because stamps start again."""

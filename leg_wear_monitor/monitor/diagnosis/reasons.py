@@ -28,6 +28,6 @@ def doubt(state: TorqueState, references: References, models: LegModels) -> str:
         return ""
     known = "the leg is not that of its mechanism file, and the names of joints are not sure: "
     if references.is_busy:
-        what = "its masses and lengths are" if state.is_identifying else "a reference for it is"
+        what = "its masses, lengths and friction are" if state.is_identifying else "a reference for it is"
         return f"{known}{what} being simulated, {references.percent} %"
-    return f"{known}masses and lengths near those of the file do not explain its drive torque"
+    return f"{known}masses, lengths and friction near those of the file do not explain its drive torque"

@@ -10,8 +10,8 @@ from leg_wear_monitor.errors import ConfigError
 from leg_wear_monitor.mechanism.spec import Mechanism
 from leg_wear_monitor.monitor.ledger.binding import fingerprint
 from leg_wear_monitor.share import share_directory
-from leg_wear_monitor.twin.reference.body_factors import BodyFactors
 from leg_wear_monitor.twin.reference.crank_profile import CrankProfile
+from leg_wear_monitor.twin.reference.leg_parameters import LegParameters
 from leg_wear_monitor.twin.reference.torque_reference import TorqueReference
 
 
@@ -58,7 +58,7 @@ def read_reference(path: Path, mechanism: Mechanism) -> TorqueReference | None:
             cosine, sine = parts["ripple_rad"]
             profile = CrankProfile(float(parts["speed_radps"]), cosine, sine)
             torque = (parts["expected_torque_nm"], *parts["torque_nm"])
-            return TorqueReference(profile, parts["clearance_m"], torque, BodyFactors.none(mechanism))
+            return TorqueReference(profile, parts["clearance_m"], torque, LegParameters.none(mechanism))
     except OSError as error:
         raise ConfigError(str(path), "", f"cannot be read: {error.strerror or error}") from error
     except (KeyError, ValueError, zipfile.BadZipFile) as error:

@@ -1,4 +1,4 @@
-"""The torque reference of a measured leg: chosen, simulated, renewed, and its bodies identified."""
+"""The torque reference of a measured leg: chosen, simulated, renewed, and its parameters identified."""
 
 import math
 
@@ -8,8 +8,8 @@ from leg_wear_monitor.mechanism.arrays import Floats
 from leg_wear_monitor.mechanism.spec import Mechanism
 from leg_wear_monitor.monitor.diagnosis.identification import (
     FAR_FROM_FILE,
-    bodies_of_ideal_torque,
-    identified_bodies,
+    identified_leg,
+    leg_of_ideal_torque,
 )
 from leg_wear_monitor.monitor.diagnosis.leg_models import LegModels
 from leg_wear_monitor.monitor.diagnosis.reference_file import shipped_reference
@@ -89,23 +89,21 @@ class References:
             self._models.forget()
         elif (np.abs(state.reference.clearance_m[0] / counted_m - 1.0) > _FAR).any():
             self._begin(state, counted_m, depth, mean_profile([cycle.profile for cycle in state.cycles]))
-        elif state.bodies not in (None, state.reference.bodies):  # those of the ledger
+        elif state.parameters not in (None, state.reference.parameters):  # those of the ledger
             self._begin(state, counted_m, depth, state.reference.profile)
         elif state.rounds < ROUNDS and not self._models.is_of_file(state):
-            self._begin_bodies(state, state.reference, depth)
+            self._begin_identification(state, state.reference, depth)
         return False
 
-    def _begin_bodies(self, state: TorqueState, reference: TorqueReference, depth: Floats) -> None:
-        """Begin the simulation of legs with other bodies, near the commissioned leg."""
+    def _begin_identification(self, state: TorqueState, reference: TorqueReference, depth: Floats) -> None:
+        """Begin the simulation of legs with other parameters, near the commissioned leg."""
         if state.commissioned is None:
             return
-        start, model = reference.bodies, self._models.explainer(state).model
+        start, model = reference.parameters, self._models.explainer(state).model
         if self._models.misfit(state) >= FAR_FROM_FILE and not state.rounds:
-            start = bodies_of_ideal_torque(
-                self._mechanism, model, state.commissioned, reference.profile.speed
-            )
+            start = leg_of_ideal_torque(self._mechanism, model, state.commissioned, reference.profile.speed)
         state.is_identifying, state.rounds = True, state.rounds + 1
-        self._begun().begin_bodies(state.commissioned.clearance_m, depth, reference.profile, start)
+        self._begun().begin_identification(state.commissioned.clearance_m, depth, reference.profile, start)
 
     def _continue(
         self, run: TorqueReferenceRun, state: TorqueState, counted_m: Floats, depth: Floats
@@ -139,27 +137,27 @@ class References:
 
     def _begin(self, state: TorqueState, counted_m: Floats, depth: Floats, profile: CrankProfile) -> None:
         """Begin the simulation of a reference."""
-        self._begun().begin(counted_m, depth, profile, state.bodies)
+        self._begun().begin(counted_m, depth, profile, state.parameters)
 
     def _identify(self, state: TorqueState, legs: TorqueReference, counted_m: Floats, depth: Floats) -> None:
-        """Begin a reference with the bodies that explain the commissioned leg."""
+        """Begin a reference with the parameters that explain the commissioned leg."""
         explainer = self._models.explainer(state)
         state.is_identifying = False
         if state.commissioned is not None:
-            state.bodies = identified_bodies(legs, explainer.model, explainer.nuisances, state.commissioned)
+            state.parameters = identified_leg(legs, explainer.model, explainer.nuisances, state.commissioned)
             self._begin(state, counted_m, depth, legs.profile)
 
     def _install(self, state: TorqueState, reference: TorqueReference) -> None:
         """Use a new reference.
 
-        One with identified bodies must explain the leg better than the one before.
+        One with identified parameters must explain the leg better than the one before.
         """
         before, off = state.reference, self._models.misfit(state)
         state.reference = reference
         self._models.forget()
-        is_other = before is not None and state.bodies not in (None, before.bodies)
+        is_other = before is not None and state.parameters not in (None, before.parameters)
         if before is not None and is_other and self._models.misfit(state) > off:
-            state.reference, state.bodies, state.rounds = before, before.bodies, ROUNDS
+            state.reference, state.parameters, state.rounds = before, before.parameters, ROUNDS
 
 
 def _give_up(state: TorqueState) -> None:
@@ -167,4 +165,4 @@ def _give_up(state: TorqueState) -> None:
     if state.reference is None:
         state.has_failed = True
     else:
-        state.is_identifying, state.bodies, state.rounds = False, state.reference.bodies, ROUNDS
+        state.is_identifying, state.parameters, state.rounds = False, state.reference.parameters, ROUNDS

@@ -12,8 +12,8 @@ from leg_wear_monitor.monitor.diagnosis.diagnosis import Change
 from leg_wear_monitor.monitor.diagnosis.signature import TorqueSensor
 from leg_wear_monitor.monitor.diagnosis.torque_samples import NO_TORQUE_SAMPLES, TorqueSamples
 from leg_wear_monitor.monitor.ledger.entry import CommissionedTorque
-from leg_wear_monitor.twin.reference.body_factors import BodyFactors
 from leg_wear_monitor.twin.reference.crank_profile import CrankProfile
+from leg_wear_monitor.twin.reference.leg_parameters import LegParameters
 from leg_wear_monitor.twin.reference.torque_reference import TorqueReference
 
 
@@ -59,12 +59,12 @@ class TorqueState:
         Gait cycles in a row without a signature.
     pause : bool
         Whether the last period did not simulate; each second one does, so that a monitor has time for both.
-    bodies : BodyFactors or None
+    parameters : LegParameters or None
         Identified ones, of which references are made; None before.
     rounds : int
-        How often masses and lengths were identified.
+        How often parameters were identified.
     is_identifying : bool
-        Whether the run simulates legs with other bodies.
+        Whether the run simulates legs with other parameters.
     has_failed : bool
         Whether the leg could not be simulated for a reference.
     """
@@ -85,7 +85,7 @@ class TorqueState:
     unlike: int = 0
     unusable: int = 0
     pause: bool = False
-    bodies: BodyFactors | None = None
+    parameters: LegParameters | None = None
     rounds: int = 0
     is_identifying: bool = False
     has_failed: bool = False

@@ -14,7 +14,7 @@ from leg_wear_monitor.mechanism.arrays import Floats, body_names
 from leg_wear_monitor.mechanism.ideal import TURN, one_cycle
 from leg_wear_monitor.mechanism.position import build_linkage
 from leg_wear_monitor.mechanism.spec import Mechanism
-from leg_wear_monitor.twin.reference.body_factors import MASS_TOLERANCE
+from leg_wear_monitor.twin.reference.leg_parameters import MASS_TOLERANCE
 
 # squared sensitivity of what impacts make: by regression over the joints of sixteen legs as built
 # (`benchmarks/growth_coverage.py --quick --legs 16`)

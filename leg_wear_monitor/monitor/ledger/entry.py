@@ -276,20 +276,23 @@ class CommissionedTorque:
 
 
 @attrs.frozen
-class IdentifiedBodies:
-    """Masses and lengths of a leg, as factors on those of its mechanism file.
+class IdentifiedLeg:
+    """Masses, lengths and friction of a leg, as factors on those of its mechanism file.
 
     Attributes
     ----------
     stamp_ns : int
     names : tuple of str
     mass, length : tuple of float
+    friction : float
+        In all joints.
     """
 
     stamp_ns: int
     names: tuple[str, ...]
     mass: tuple[float, ...]
     length: tuple[float, ...]
+    friction: float
 
 
 Event = (
@@ -301,6 +304,6 @@ Event = (
     | ForecastPoint
     | Commissioned
     | CommissionedTorque
-    | IdentifiedBodies
+    | IdentifiedLeg
     | VerdictEvent
 )

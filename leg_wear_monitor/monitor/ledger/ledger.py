@@ -23,7 +23,7 @@ from leg_wear_monitor.monitor.ledger.recovery import Recovered
 from leg_wear_monitor.monitor.ledger.rows import (
     read_commissioned,
     read_commissioned_torque,
-    read_identified_bodies,
+    read_identified_leg,
     read_last_reset,
     read_measurements,
     read_spans,
@@ -56,7 +56,7 @@ class Ledger:
         Errors of further encoders from earlier runs.
     commissioned_torque : CommissionedTorque or None
         Signatures of the drive torque from earlier runs.
-    bodies : IdentifiedBodies or None
+    parameters : IdentifiedLeg or None
         Masses and lengths that were identified in earlier runs.
     last_run : Run
         The previous run.
@@ -117,7 +117,7 @@ class Ledger:
         self.measurements = self._store.ask(read_measurements)
         self.commissioned = self._store.ask(read_commissioned)
         self.commissioned_torque = self._store.ask(read_commissioned_torque)
-        self.bodies = self._store.ask(read_identified_bodies)
+        self.parameters = self._store.ask(read_identified_leg)
 
     @property
     def counted_ns(self) -> Ints:

@@ -16,7 +16,7 @@ from leg_wear_monitor.monitor.ledger.entry import (
     Entry,
     Event,
     ForecastPoint,
-    IdentifiedBodies,
+    IdentifiedLeg,
     JointWear,
     Measurement,
     VerdictEvent,
@@ -108,7 +108,8 @@ def write_event(db: sqlite3.Connection, event: Event) -> None:
                 "VALUES (?, ?, ?, ?)",
                 (event.stamp_ns, event.cycles, known.tobytes(), signatures.tobytes()),
             )
-        case IdentifiedBodies(stamp_ns, names, mass, length):
+        case IdentifiedLeg(stamp_ns, names, mass, length, friction):
+            db.execute("INSERT INTO friction (stamp_ns, factor) VALUES (?, ?)", (stamp_ns, friction))
             db.executemany(
                 "INSERT INTO body (stamp_ns, name, mass, length) VALUES (?, ?, ?, ?)",
                 [(stamp_ns, *factors) for factors in zip(names, mass, length, strict=True)],
@@ -167,16 +168,22 @@ def read_commissioned_torque(db: sqlite3.Connection) -> CommissionedTorque | Non
     return CommissionedTorque(row[0], clearance_m, signatures.reshape(row[1], -1))
 
 
-def read_identified_bodies(db: sqlite3.Connection) -> IdentifiedBodies | None:
-    """Masses and lengths of the leg, None if they were not identified."""
+def read_identified_leg(db: sqlite3.Connection) -> IdentifiedLeg | None:
+    """Masses, lengths and friction of the leg, None if they were not identified.
+
+    Rows of older formats were identified with the friction of the mechanism file.
+    """
     rows = db.execute(
         "SELECT stamp_ns, name, mass, length FROM body "
         "WHERE stamp_ns = (SELECT stamp_ns FROM body ORDER BY id DESC LIMIT 1) ORDER BY id"
     ).fetchall()
     if not rows:
         return None
-    _, names, mass, length = zip(*rows, strict=True)
-    return IdentifiedBodies(rows[0][0], names, mass, length)
+    stamps, names, mass, length = zip(*rows, strict=True)
+    found = db.execute(
+        "SELECT factor FROM friction WHERE stamp_ns = ? ORDER BY id DESC", stamps[:1]
+    ).fetchone()
+    return IdentifiedLeg(stamps[0], names, mass, length, found[0] if found else 1.0)
 
 
 def read_last_reset(db: sqlite3.Connection, joint: str) -> Audit | None:

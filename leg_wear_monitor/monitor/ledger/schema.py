@@ -227,14 +227,20 @@ CREATE TABLE body (
 ) STRICT;
 """
 
-MIGRATIONS = (_FIRST, _SECOND, _THIRD, _FOURTH, _FIFTH, _SIXTH)
+_SEVENTH = """
+-- friction in the joints that the drive torque shows, as a factor on that of the mechanism file; it belongs to
+-- the rows of body with the same stamp
+CREATE TABLE friction (id INTEGER PRIMARY KEY, stamp_ns INTEGER NOT NULL, factor REAL NOT NULL) STRICT;
+"""
+
+MIGRATIONS = (_FIRST, _SECOND, _THIRD, _FOURTH, _FIFTH, _SIXTH, _SEVENTH)
 
 FORMAT = len(MIGRATIONS)
 SEALED_FROM = 4  # first format with checksums over the whole content
 
 GROWING = (  # append only
-    "alarm_history", "audit", "body", "commissioning", "forecast", "history", "torque_commissioning",
-    "verdict",
+    "alarm_history", "audit", "body", "commissioning", "forecast", "friction", "history",
+    "torque_commissioning", "verdict",
 )  # fmt: skip
 CHANGING = ("alarm", "binding", "entry", "joint", "measurement", "run", "span", "total")
 

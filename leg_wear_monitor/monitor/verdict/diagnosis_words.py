@@ -22,7 +22,7 @@ def diagnosis_words(diagnosis: Diagnosis, joints: Sequence[str]) -> str:
     if diagnosis.clearance_m and hidden:
         told.append(f"not observable: {', '.join(hidden)}")
     if diagnosis.bodies:
-        told.append("wear is counted with the masses and lengths that the drive torque shows")
+        told.append("wear is counted with the masses, lengths and friction that the drive torque shows")
     return "; ".join(told)
 
 

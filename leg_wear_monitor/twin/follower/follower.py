@@ -5,6 +5,7 @@ from typing import NamedTuple
 
 import numpy as np
 
+from leg_wear_monitor.dynamics.clearance.contact import contact_laws
 from leg_wear_monitor.dynamics.clearance.stepper import INTERVALS, ClearanceStepper
 from leg_wear_monitor.dynamics.clearance.stepper import Snapshot as StepperSnapshot
 from leg_wear_monitor.dynamics.run.drive import steady_drive
@@ -123,9 +124,12 @@ class LegFollower:
         state.pending[changed] = 0.0
         self._before[:, changed] = self.clearances[:, changed]
 
-    def take_bodies(self, linkage: Linkage) -> None:
-        """Continue with other masses or lengths; the motion goes on where it is."""
+    def take_parameters(self, linkage: Linkage, friction: Floats) -> None:
+        """Continue with other masses, lengths and friction coefficients (k,); the motion goes on where it is."""
         self._load.rebuild(linkage)
+        contacts = self._setup.contacts
+        contacts.friction[:, 0] = friction
+        self._stepper.model.law[:] = contact_laws(contacts)
 
     def follow(
         self, steps: Steps, n: int, cycles: list[CycleStatistics], events: list[Event]

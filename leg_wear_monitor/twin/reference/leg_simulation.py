@@ -12,8 +12,8 @@ from leg_wear_monitor.dynamics.simulation import prepare
 from leg_wear_monitor.mechanism.arrays import Floats
 from leg_wear_monitor.mechanism.ideal import TURN
 from leg_wear_monitor.mechanism.spec import Mechanism
-from leg_wear_monitor.twin.reference.body_factors import BodyFactors
 from leg_wear_monitor.twin.reference.crank_profile import CrankProfile
+from leg_wear_monitor.twin.reference.leg_parameters import LegParameters
 from leg_wear_monitor.twin.reference.reference import worn_to
 
 POINTS = INTERVALS // 4  # of a gait cycle: whole intervals of the stepper
@@ -42,7 +42,7 @@ class LegSimulation:
 
     def __init__(self, mechanism: Mechanism) -> None:
         self._mechanism = mechanism
-        self._bodies: BodyFactors | None = None
+        self._parameters: LegParameters | None = None
         self._statistics = new_run_statistics(len(mechanism.joints))
 
     def use(self, profile: CrankProfile) -> None:
@@ -54,12 +54,12 @@ class LegSimulation:
         step = self._period / POINTS
         self._pieces = np.array([quintic(i * step, motions[i], step, motions[i + 1]) for i in range(POINTS)])
 
-    def begin(self, bodies: BodyFactors, clearance_m: Floats, depth: Floats) -> None:
+    def begin(self, parameters: LegParameters, clearance_m: Floats, depth: Floats) -> None:
         """Set a leg in motion.
 
         Parameters
         ----------
-        bodies : BodyFactors
+        parameters : LegParameters
         clearance_m : (k,) array
             Mean clearances [m].
         depth : (k, 2, N) array
@@ -70,8 +70,8 @@ class LegSimulation:
         AssemblyError
             If its bodies do not close.
         """
-        if bodies != self._bodies:
-            self._prepare(bodies)
+        if parameters != self._parameters:
+            self._prepare(parameters)
         clearance, worn = worn_to(self._fresh, depth, clearance_m)
         self._setup.contacts.clearance[:] = clearance
         self._setup.surfaces.depth[:] = worn
@@ -106,13 +106,13 @@ class LegSimulation:
         self._stepper.restore(snapshot.stepper)
         self._statistics.drive_integral[TORQUE] = snapshot.impulse
 
-    def _prepare(self, bodies: BodyFactors) -> None:
-        """Prepare the simulation of legs with given bodies."""
-        self._setup = prepare(bodies.applied(self._mechanism), wear=True)
+    def _prepare(self, parameters: LegParameters) -> None:
+        """Prepare the simulation of legs with given masses, lengths and friction."""
+        self._setup = prepare(parameters.applied(self._mechanism), wear=True)
         self._setup.contacts.wear_coefficient[:] = 0.0
         self._fresh = self._setup.contacts.clearance.copy()
         self._tables = ClearanceStepper(self._setup).model.tables
-        self._bodies = bodies
+        self._parameters = parameters
 
 
 def even_angles(profile: CrankProfile) -> Floats:

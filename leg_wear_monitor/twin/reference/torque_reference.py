@@ -5,8 +5,8 @@ leg is simulated under the measured profile of the crank: with the clearances th
 of them wider in turn. That takes a minute of a processor, so it goes on a gait cycle at a time, in a thread:
 preparing a leg alone takes longer than the samples of a live leg may wait.
 
-It depends on the leg's masses and lengths, too: legs with each body heavier and longer in turn show which
-bodies a leg has.
+It depends on the leg's masses, lengths and friction, too: legs with each body heavier and longer in turn, and
+one with more friction, show which of them a leg has.
 """
 
 from collections.abc import Sequence
@@ -20,8 +20,8 @@ from numpy.typing import NDArray
 from leg_wear_monitor.errors import AssemblyError
 from leg_wear_monitor.mechanism.arrays import Floats
 from leg_wear_monitor.mechanism.spec import Mechanism
-from leg_wear_monitor.twin.reference.body_factors import BodyFactors
 from leg_wear_monitor.twin.reference.crank_profile import CrankProfile
+from leg_wear_monitor.twin.reference.leg_parameters import LegParameters
 from leg_wear_monitor.twin.reference.leg_simulation import (
     POINTS,
     LegSimulation,
@@ -33,6 +33,7 @@ CYCLES = 40  # simulated for each wider leg, and twice as many for each other on
 WIDER = (1.2, 1.35, 1.5, 2.0, 3.0, 5.0, 8.0)  # factors on the expected clearance, one joint at a time
 
 HEAVIER, LONGER = 0.04, 0.004  # of a body's mass and length, one body at a time
+ROUGHER = 1.5  # factor on the friction in the joints
 
 _SETTLING = 2  # gait cycles before those that count
 _LEAST_CLEARANCE_M = 5.0e-5
@@ -52,14 +53,14 @@ class TorqueReference:
         turn, all sizes of the first joint before those of the next.
     torque_nm : tuple of (cycles, POINTS) arrays
         Mean drive torque between equal steps of time of a gait cycle, which begins at the profile's angle 0.
-    bodies : BodyFactors
+    parameters : LegParameters
         Those of the expected leg.
     """
 
     profile: CrankProfile
     clearance_m: Floats
     torque_nm: tuple[HalfFloats, ...]
-    bodies: BodyFactors
+    parameters: LegParameters
 
     @property
     def angle(self) -> Floats:
@@ -68,9 +69,9 @@ class TorqueReference:
 
 
 class _Leg(NamedTuple):
-    """A leg to be simulated: its bodies, and its clearances (k,) [m]."""
+    """A leg to be simulated: its parameters, and its clearances (k,) [m]."""
 
-    bodies: BodyFactors
+    parameters: LegParameters
     clearance_m: Floats
 
 
@@ -125,7 +126,11 @@ class TorqueReferenceRun:
         return sum(len(one) for one in self._done) / max(1, sum(map(self._cycles_of, self._legs)))
 
     def begin(
-        self, clearance_m: Floats, depth: Floats, profile: CrankProfile, bodies: BodyFactors | None = None
+        self,
+        clearance_m: Floats,
+        depth: Floats,
+        profile: CrankProfile,
+        parameters: LegParameters | None = None,
     ) -> None:
         """Begin a reference: the expected leg, and each of its joints wider in turn.
 
@@ -136,30 +141,31 @@ class TorqueReferenceRun:
         depth : (k, 2, N) array
             Wear depths [m], which show where joints are worn.
         profile : CrankProfile
-        bodies : BodyFactors, optional
+        parameters : LegParameters, optional
             Those of the mechanism file by default.
         """
-        bodies = bodies or BodyFactors.none(self._mechanism)
+        parameters = parameters or LegParameters.none(self._mechanism)
         centre = np.maximum(clearance_m, _LEAST_CLEARANCE_M)
         widest = 0.5 * self._radius  # no clearance is wider than its journal is thick
-        legs = [_Leg(bodies, centre)]
+        legs = [_Leg(parameters, centre)]
         for k in range(len(centre)):
             for factor in WIDER:
                 wider = centre.copy()
                 wider[k] = min(factor * centre[k], widest[k])
-                legs.append(_Leg(bodies, wider))
+                legs.append(_Leg(parameters, wider))
         self._begin(legs, depth, profile)
 
-    def begin_bodies(
-        self, clearance_m: Floats, depth: Floats, profile: CrankProfile, bodies: BodyFactors
+    def begin_identification(
+        self, clearance_m: Floats, depth: Floats, profile: CrankProfile, near: LegParameters
     ) -> None:
-        """Begin legs whose bodies are those given, then each of them heavier, then each of them longer."""
+        """Begin the leg with given parameters, then each body heavier, each longer, and more friction."""
         clearance_m = np.maximum(clearance_m, _LEAST_CLEARANCE_M)
-        changed = [bodies]
-        for one in np.eye(len(bodies.mass)):
-            changed.append(attrs.evolve(bodies, mass=bodies.mass + HEAVIER * one))
-        for one in np.eye(len(bodies.mass)):
-            changed.append(attrs.evolve(bodies, length=bodies.length + LONGER * one))
+        changed = [near]
+        for one in np.eye(len(near.mass)):
+            changed.append(attrs.evolve(near, mass=near.mass + HEAVIER * one))
+        for one in np.eye(len(near.mass)):
+            changed.append(attrs.evolve(near, length=near.length + LONGER * one))
+        changed.append(attrs.evolve(near, friction=near.friction * ROUGHER))
         self._begin([_Leg(each, clearance_m) for each in changed], depth, profile)
 
     def advance(self) -> TorqueReference | None:
@@ -180,7 +186,7 @@ class TorqueReferenceRun:
             self._ahead = self._pool.submit(self._simulated, leg, self._depth, self._cycle)
             return None
         clearance_m = np.array([leg.clearance_m for leg in self._legs])
-        return TorqueReference(self._simulation.profile, clearance_m, self._done, self._legs[0].bodies)
+        return TorqueReference(self._simulation.profile, clearance_m, self._done, self._legs[0].parameters)
 
     def snapshot(self) -> TorqueReferenceSnapshot:
         """A copy of the whole state."""
@@ -204,7 +210,7 @@ class TorqueReferenceRun:
         self._torque, self._cycle = snapshot.torque.copy(), snapshot.cycle
         if snapshot.simulation is not None:
             leg = self._legs[len(self._done)]
-            self._simulation.begin(leg.bodies, leg.clearance_m, self._depth)
+            self._simulation.begin(leg.parameters, leg.clearance_m, self._depth)
             self._simulation.restore(snapshot.simulation)
         if snapshot.ahead:
             self._ahead = Future()
@@ -245,7 +251,7 @@ class TorqueReferenceRun:
         """Mean torque (POINTS,) in the next gait cycle of a leg; None if it cannot be simulated."""
         if cycle == 0:
             try:
-                self._simulation.begin(leg.bodies, leg.clearance_m, depth)
+                self._simulation.begin(leg.parameters, leg.clearance_m, depth)
             except AssemblyError:  # with such lengths it does not close
                 return None
         return self._simulation.cycle(cycle)

@@ -7,7 +7,7 @@ import pytest
 from leg_wear_monitor.mechanism.ideal import one_cycle
 from leg_wear_monitor.mechanism.position import build_linkage
 from leg_wear_monitor.monitor.diagnosis.body_torques import body_torques
-from leg_wear_monitor.twin.reference.body_factors import BodyFactors
+from leg_wear_monitor.twin.reference.leg_parameters import LegParameters
 
 POINTS = 240
 
@@ -16,7 +16,7 @@ POINTS = 240
 @pytest.mark.parametrize(("kind", "step", "off"), [("mass", 0.5, 1e-9), ("length", 2.0e-3, 1e-6)])
 def test_they_are_differences_of_the_torques_of_other_legs(leg, speed, kind, step, off) -> None:
     """The torque is linear in the masses, and that of lengths is a difference with the same step."""
-    none, k = BodyFactors.none(leg), list(leg.bodies).index("shank")
+    none, k = LegParameters.none(leg), list(leg.bodies).index("shank")
     more = attrs.evolve(none, **{kind: np.ones(len(leg.bodies)) + step * np.eye(len(leg.bodies))[k]})
     torques = [
         one_cycle(build_linkage(bodies.applied(leg)), POINTS, speed).drive_torque for bodies in (none, more)

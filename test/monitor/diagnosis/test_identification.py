@@ -1,4 +1,6 @@
-"""Masses and lengths of a leg, from its commissioned torque."""
+"""Masses, lengths and friction of a leg, from its commissioned torque."""
+
+import math
 
 import attrs
 import numpy as np
@@ -8,8 +10,8 @@ from leg_wear_monitor.mechanism.ideal import TURN, one_cycle
 from leg_wear_monitor.mechanism.position import build_linkage
 from leg_wear_monitor.monitor.diagnosis.identification import (
     FAR_FROM_FILE,
-    bodies_of_ideal_torque,
-    identified_bodies,
+    identified_leg,
+    leg_of_ideal_torque,
     misfit,
 )
 from leg_wear_monitor.monitor.diagnosis.nuisances import nuisances
@@ -17,9 +19,9 @@ from leg_wear_monitor.monitor.diagnosis.reference_file import shipped_reference
 from leg_wear_monitor.monitor.diagnosis.signature import TorqueSensor
 from leg_wear_monitor.monitor.diagnosis.signature_model import signature_model, simulated_signatures
 from leg_wear_monitor.monitor.ledger.entry import CommissionedTorque
-from leg_wear_monitor.twin.reference.body_factors import BodyFactors
+from leg_wear_monitor.twin.reference.leg_parameters import LegParameters
 from leg_wear_monitor.twin.reference.leg_simulation import POINTS
-from leg_wear_monitor.twin.reference.torque_reference import HEAVIER, LONGER
+from leg_wear_monitor.twin.reference.torque_reference import HEAVIER, LONGER, ROUGHER
 
 SENSOR = TorqueSensor(period_s=0.005, cycle_s=1.0, size_nm=9.2, noise_nm=0.3)
 
@@ -30,25 +32,31 @@ def known(leg):
     return reference, signature_model(reference, SENSOR), nuisances(leg, reference, SENSOR)
 
 
-def ideal(leg, bodies: BodyFactors):
+def ideal(leg, bodies: LegParameters):
     """Drive torque of ideal joints at the steps of a reference."""
     return one_cycle(build_linkage(bodies.applied(leg)), POINTS, TURN).drive_torque
 
 
-def walked(leg, reference, bodies: BodyFactors, number: int = 0):
+def walked(leg, reference, bodies: LegParameters, number: int = 0):
     """Torques of a leg of the reference, with the change that other bodies make with ideal joints."""
-    change = ideal(leg, bodies) - ideal(leg, BodyFactors.none(leg))
+    change = ideal(leg, bodies) - ideal(leg, LegParameters.none(leg))
     return (reference.torque_nm[number].astype(float) + change).astype(np.float16)
 
 
 def legs_of(leg, reference):
-    """Legs with each body heavier, then longer."""
-    none = BodyFactors.none(leg)
+    """Legs with each body heavier, then longer, and one with more friction, whose torque is scaled for it."""
+    none = LegParameters.none(leg)
     changed = [none]
     changed += [attrs.evolve(none, mass=none.mass + HEAVIER * one) for one in np.eye(len(none.mass))]
     changed += [attrs.evolve(none, length=none.length + LONGER * one) for one in np.eye(len(none.mass))]
     torques = tuple(walked(leg, reference, bodies) for bodies in changed)
-    return attrs.evolve(reference, torque_nm=torques, bodies=none)
+    rougher = (torques[0] + math.log(ROUGHER) * of_friction(reference)).astype(np.float16)
+    return attrs.evolve(reference, torque_nm=(*torques, rougher), parameters=none)
+
+
+def of_friction(reference):
+    """Change (POINTS,) of the torque [N m] by one unit of the logarithm of the friction, of any shape."""
+    return 0.4 * np.sign(np.sin(3.0 * np.linspace(0.0, TURN, POINTS, endpoint=False)))
 
 
 def commissioned(reference, torque) -> CommissionedTorque:
@@ -60,18 +68,26 @@ def test_a_leg_of_its_file_keeps_its_bodies(leg, known) -> None:
     reference, model, found = known
     same = commissioned(reference, reference.torque_nm[0])
     assert misfit(model, found, same) < 0.1
-    bodies = identified_bodies(legs_of(leg, reference), model, found, same)
+    bodies = identified_leg(legs_of(leg, reference), model, found, same)
     np.testing.assert_allclose(np.concatenate([bodies.mass, bodies.length]), 1.0, atol=1e-6)
+    assert bodies.friction == pytest.approx(1.0, abs=1e-5)
+
+
+def test_friction_is_identified_from_the_torque(leg, known) -> None:
+    reference, model, found = known
+    torque = (reference.torque_nm[0] + math.log(2.0) * of_friction(reference)).astype(np.float16)
+    other = identified_leg(legs_of(leg, reference), model, found, commissioned(reference, torque))
+    assert other.friction == pytest.approx(2.0, rel=0.1)
 
 
 def test_other_bodies_are_identified_from_the_torque(leg, known) -> None:
     reference, model, found = known
-    none = BodyFactors.none(leg)
+    none = LegParameters.none(leg)
     names = list(leg.bodies)
     truth = attrs.evolve(none, mass=none.mass + 0.05 * (np.array(names) == "shank"))
     truth = attrs.evolve(truth, length=truth.length + 0.008 * (np.array(names) == "thigh"))
     other = commissioned(reference, walked(leg, reference, truth))
-    bodies = identified_bodies(legs_of(leg, reference), model, found, other)
+    bodies = identified_leg(legs_of(leg, reference), model, found, other)
     # only combinations act on the torque: what is judged is the torque of the identified leg
     mean = commissioned(reference, walked(leg, reference, bodies)).mean
     own = misfit(model, found, commissioned(reference, reference.torque_nm[0]))
@@ -84,28 +100,35 @@ def test_other_bodies_are_identified_from_the_torque(leg, known) -> None:
 def test_a_leg_far_from_its_file_is_found_near_by_the_ideal_torque(leg, known, seed) -> None:
     reference, model, found = known
     mass, length = np.random.default_rng(seed).uniform(0.95, 1.05, (2, len(leg.bodies)))
-    truth = BodyFactors(mass, length)
+    truth = LegParameters(mass, length)
     other = commissioned(reference, walked(leg, reference, truth))
     assert misfit(model, found, other) > FAR_FROM_FILE
-    near = bodies_of_ideal_torque(leg, model, other, TURN)
-    left, whole = (ideal(leg, bodies) - ideal(leg, truth) for bodies in (near, BodyFactors.none(leg)))
+    near = leg_of_ideal_torque(leg, model, other, TURN)
+    left, whole = (ideal(leg, bodies) - ideal(leg, truth) for bodies in (near, LegParameters.none(leg)))
     assert np.sqrt(np.mean(left**2)) < 0.15 * np.sqrt(np.mean(whole**2))
 
 
 def test_a_leg_of_its_file_is_not_moved_by_the_ideal_torque(leg, known) -> None:
     reference, model, _ = known
     same = commissioned(reference, reference.torque_nm[0])
-    near = bodies_of_ideal_torque(leg, model, same, TURN)
+    near = leg_of_ideal_torque(leg, model, same, TURN)
     np.testing.assert_allclose(np.concatenate([near.mass, near.length]), 1.0, atol=2.0e-3)
 
 
 def test_factors_scale_bodies(leg) -> None:
-    none = BodyFactors.none(leg)
+    none = LegParameters.none(leg)
     assert none.applied(leg) == leg
-    twice = BodyFactors(2.0 * none.mass, 2.0 * none.length).applied(leg)
+    twice = LegParameters(2.0 * none.mass, 2.0 * none.length).applied(leg)
     for name, body in leg.bodies.items():
         other = twice.bodies[name]
         assert (other.mass, other.inertia) == pytest.approx((2.0 * body.mass, 8.0 * body.inertia))
         assert other.points["toe" if "toe" in body.points else next(iter(body.points))] == pytest.approx(
             tuple(2.0 * np.array(body.points["toe" if "toe" in body.points else next(iter(body.points))]))
         )
+
+
+def test_a_factor_scales_the_friction_of_all_joints(leg) -> None:
+    rough = attrs.evolve(LegParameters.none(leg), friction=3.0).applied(leg)
+    for joint, one in leg.clearances.items():
+        assert rough.clearances[joint].friction.coefficient == pytest.approx(3.0 * one.friction.coefficient)
+    assert rough.bodies == leg.bodies

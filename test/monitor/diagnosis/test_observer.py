@@ -212,7 +212,7 @@ def test_a_commissioned_leg_that_is_not_of_its_file_is_identified(leg, reference
     monkeypatch.setattr(leg_models, "UNLIKE_FILE", 0.0)  # any leg
     observer = observer_of(leg)
     walk(observer, samples(reference, [0] * (COMMISSIONING_CYCLES + 4)))
-    assert "its masses and lengths are being simulated" in observer.diagnosis.reason
+    assert "its masses, lengths and friction are being simulated" in observer.diagnosis.reason
     assert observer.state.is_identifying
     restored = observer_of(leg)
     restored.restore(observer.snapshot())
@@ -228,9 +228,9 @@ def test_the_reference_of_an_identified_leg_is_used_if_it_explains_the_leg_bette
     monkeypatch.setattr(torque_reference, "CYCLES", 8)
     observer = observer_of(leg)
     walk(observer, samples(reference, [0] * 1400))
-    assert observer.state.bodies is observer.state.reference.bodies
+    assert observer.state.parameters is observer.state.reference.parameters
     assert not observer.state.is_identifying
-    assert np.abs(observer.state.bodies.mass - 1.0).max() < 0.1
+    assert np.abs(observer.state.parameters.mass - 1.0).max() < 0.1
     assert observer.diagnosis.state is DiagnosisState.AS_COUNTED
     assert "do not explain its drive torque" in observer.diagnosis.reason  # nothing is below 0
 

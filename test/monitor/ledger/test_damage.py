@@ -16,7 +16,7 @@ from leg_wear_monitor.monitor.ledger.entry import (
     Commissioned,
     CommissionedTorque,
     ForecastPoint,
-    IdentifiedBodies,
+    IdentifiedLeg,
     Measurement,
     VerdictEvent,
 )
@@ -37,7 +37,7 @@ def full(open_ledger, entry_at):
     ledger.note(Measurement(1, "A", "ann", 3e-4, 1e-6, 1e-5, 3, 0, 0.3, True))
     ledger.note(Commissioned(1, ("hip",), np.zeros(1), np.zeros(3), np.eye(3)))
     ledger.note(CommissionedTorque(1, np.full(5, 3e-4), np.ones((3, 80))))
-    ledger.note(IdentifiedBodies(1, ("thigh",), (1.02,), (0.999,)))
+    ledger.note(IdentifiedLeg(1, ("thigh",), (1.02,), (0.999,), 1.5))
     texts = ("state", "fault_code", "joints", "why", "to_do", "evidence", "not_valid")
     ledger.note(VerdictEvent(stamp_ns=4, since_ns=3, **dict.fromkeys(texts, "[]")))
     ledger.keep(entry_at(2), closed=True)

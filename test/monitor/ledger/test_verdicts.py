@@ -8,7 +8,7 @@ import attrs
 import pytest
 
 from leg_wear_monitor.monitor.ledger import file, ledger, recovery, schema
-from leg_wear_monitor.monitor.ledger.entry import IdentifiedBodies, VerdictEvent
+from leg_wear_monitor.monitor.ledger.entry import IdentifiedLeg, VerdictEvent
 
 pytestmark = pytest.mark.plain
 
@@ -34,14 +34,14 @@ def test_a_verdict_is_a_row(open_ledger, entry_at):
     assert json.loads(rows(ledger.path)[0]["evidence"])[0]["limit"] is None
 
 
-def test_identified_bodies_are_read_as_written_and_the_last_are_in_force(open_ledger, entry_at):
+def test_an_identified_leg_is_read_as_written_and_the_last_is_in_force(open_ledger, entry_at):
     ledger = open_ledger()
-    assert ledger.bodies is None
+    assert ledger.parameters is None
     for stamp_ns, mass in ((5, 1.1), (7, 0.9)):
-        ledger.note(IdentifiedBodies(stamp_ns, ("thigh", "foot"), (mass, 1.02), (0.998, 1.001)))
+        ledger.note(IdentifiedLeg(stamp_ns, ("thigh", "foot"), (mass, 1.02), (0.998, 1.001), 2.0 * mass))
     ledger.keep(entry_at(1), closed=True)
     ledger.close()
-    assert open_ledger().bodies == IdentifiedBodies(7, ("thigh", "foot"), (0.9, 1.02), (0.998, 1.001))
+    assert open_ledger().parameters == IdentifiedLeg(7, ("thigh", "foot"), (0.9, 1.02), (0.998, 1.001), 1.8)
 
 
 def rows(path):
@@ -57,7 +57,7 @@ def in_format_4(monkeypatch):
         then.setattr(schema, "MIGRATIONS", schema.MIGRATIONS[:4])
         for module in (schema, file, recovery):
             then.setattr(module, "FORMAT", 4)
-        for later in ("read_commissioned_torque", "read_identified_bodies"):  # of formats 5 and 6
+        for later in ("read_commissioned_torque", "read_identified_leg"):  # of formats 5 and later
             then.setattr(ledger, later, lambda _: None)
         schema.expected_definitions.cache_clear()
         yield then
@@ -86,7 +86,7 @@ def test_a_ledger_of_format_4_is_migrated_with_the_entries_of_its_log(
     found.note(EVENT)
     found.keep(entry_at(6), closed=True)
     found.close()
-    assert version(ledger.path) == schema.FORMAT == 6
+    assert version(ledger.path) == schema.FORMAT == 7
     assert len(rows(ledger.path)) == 1
     assert open_ledger().entry.digest() == entry_at(6).digest()
 

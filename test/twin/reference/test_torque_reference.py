@@ -6,11 +6,12 @@ import pytest
 
 from leg_wear_monitor.mechanism.ideal import TURN
 from leg_wear_monitor.twin.reference import torque_reference
-from leg_wear_monitor.twin.reference.body_factors import BodyFactors
 from leg_wear_monitor.twin.reference.crank_profile import CrankProfile
+from leg_wear_monitor.twin.reference.leg_parameters import LegParameters
 from leg_wear_monitor.twin.reference.torque_reference import (
     HEAVIER,
     LONGER,
+    ROUGHER,
     WIDER,
     TorqueReference,
     TorqueReferenceRun,
@@ -42,21 +43,22 @@ def test_each_joint_is_wider_in_turn(leg, short) -> None:
     assert [len(torque) for torque in found.torque_nm] == [2] + 5 * len(WIDER) * [1]
     np.testing.assert_allclose(found.clearance_m[1 : 1 + len(WIDER), 0], 3.0e-4 * np.array(WIDER))
     assert (found.clearance_m[1 : 1 + len(WIDER), 1:] == 3.0e-4).all()
-    np.testing.assert_array_equal(found.bodies.mass, 1.0)
+    np.testing.assert_array_equal(found.parameters.mass, 1.0)
 
 
-def test_each_body_is_heavier_and_longer_in_turn(leg, short) -> None:
-    none, run = BodyFactors.none(leg), TorqueReferenceRun(leg)
-    run.begin_bodies(NEW, UNWORN, STEADY, none)
+def test_each_body_is_heavier_and_longer_in_turn_and_friction_larger(leg, short) -> None:
+    none, run = LegParameters.none(leg), TorqueReferenceRun(leg)
+    run.begin_identification(NEW, UNWORN, STEADY, none)
     found = finished(run)
     bodies = len(leg.bodies)
-    assert len(found.torque_nm) == 1 + 2 * bodies
+    assert len(found.torque_nm) == 2 + 2 * bodies
     assert (found.clearance_m == 3.0e-4).all()
     # the fourth leg of the heavier ones is that with its fourth body heavier, simulated alone
     one = np.eye(bodies)[3]
     for number, alone in (
         (4, attrs.evolve(none, mass=none.mass + HEAVIER * one)),
         (4 + bodies, attrs.evolve(none, length=none.length + LONGER * one)),
+        (1 + 2 * bodies, attrs.evolve(none, friction=ROUGHER)),
     ):
         other = TorqueReferenceRun(alone.applied(leg))
         other.begin(NEW, UNWORN, STEADY)
@@ -67,7 +69,7 @@ def test_each_body_is_heavier_and_longer_in_turn(leg, short) -> None:
 
 def test_a_restored_run_continues_bit_for_bit(leg, short) -> None:
     run, other = TorqueReferenceRun(leg), TorqueReferenceRun(leg)
-    run.begin_bodies(NEW, UNWORN, STEADY, BodyFactors.none(leg))
+    run.begin_identification(NEW, UNWORN, STEADY, LegParameters.none(leg))
     for _ in range(7):  # amidst a leg with another body
         run.advance()
     other.restore(run.snapshot())
@@ -77,7 +79,7 @@ def test_a_restored_run_continues_bit_for_bit(leg, short) -> None:
 
 
 def test_a_leg_that_does_not_close_ends_a_run(leg, short) -> None:
-    none, run, other = BodyFactors.none(leg), TorqueReferenceRun(leg), TorqueReferenceRun(leg)
+    none, run, other = LegParameters.none(leg), TorqueReferenceRun(leg), TorqueReferenceRun(leg)
     crank = np.eye(len(leg.bodies))[list(leg.bodies).index("crank")]
     run.begin(NEW, UNWORN, STEADY, attrs.evolve(none, length=none.length + 50.0 * crank))
     assert run.advance() is None

@@ -1,4 +1,4 @@
-"""A leg whose bodies are a little heavier or longer than those of the mechanism file."""
+"""A leg whose masses, lengths and friction are not quite those of the mechanism file."""
 
 import attrs
 import numpy as np
@@ -12,25 +12,29 @@ MASS_TOLERANCE = (
 
 
 @attrs.frozen
-class BodyFactors:
-    """Factors on the bodies of a mechanism, in the order of its file.
+class LegParameters:
+    """Factors on the parameters of a mechanism.
 
     Attributes
     ----------
     mass, length : (bodies,) arrays
-        A heavier body has the same shape; a longer one is scaled in all directions and has the same mass.
+        On bodies, in the order of the file. A heavier body has the same shape; a longer one is scaled in all
+        directions and has the same mass.
+    friction : float
+        On the friction coefficients of all clearance joints.
     """
 
     mass: Floats = attrs.field(eq=attrs.cmp_using(eq=np.array_equal))
     length: Floats = attrs.field(eq=attrs.cmp_using(eq=np.array_equal))
+    friction: float = 1.0
 
     @classmethod
-    def none(cls, mechanism: Mechanism) -> "BodyFactors":
+    def none(cls, mechanism: Mechanism) -> "LegParameters":
         """Factors of the mechanism as it is."""
         return cls(np.ones(len(mechanism.bodies)), np.ones(len(mechanism.bodies)))
 
     def applied(self, mechanism: Mechanism) -> Mechanism:
-        """The mechanism with these factors on its bodies."""
+        """The mechanism with these factors."""
         bodies = {}
         for (name, body), mass, length in zip(mechanism.bodies.items(), self.mass, self.length, strict=True):
             bodies[name] = attrs.evolve(
@@ -40,7 +44,14 @@ class BodyFactors:
                 com=_scaled(body.com, length),
                 points={point: _scaled(place, length) for point, place in body.points.items()},
             )
-        return attrs.evolve(mechanism, bodies=bodies)
+        clearances = {
+            joint: attrs.evolve(
+                one,
+                friction=attrs.evolve(one.friction, coefficient=self.friction * one.friction.coefficient),
+            )
+            for joint, one in mechanism.clearances.items()
+        }
+        return attrs.evolve(mechanism, bodies=bodies, clearances=clearances)
 
 
 def _scaled(place: tuple[float, float], factor: float) -> tuple[float, float]:

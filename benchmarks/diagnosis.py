@@ -303,7 +303,7 @@ def main() -> None:
     parser.add_argument("--noise-nm", type=float, default=0.5)
     parser.add_argument("--rate-hz", type=float, default=200.0)
     parser.add_argument("--uncommissioned", action="store_true")
-    parser.add_argument("--as-of-file", action="store_true", help="do not identify masses, lengths and friction")
+    parser.add_argument("--as-of-file", action="store_true", help="do not identify the leg")
     parser.add_argument("--legs", nargs="+", default=list(LEGS))
     options = parser.parse_args()
     leg, random = load_mechanism("bionic_leg"), np.random.default_rng(5)

@@ -1,12 +1,13 @@
 """Masses, lengths and friction of a commissioned leg, from its drive torque.
 
 A real leg is not quite that of its mechanism file. Where its impacts fall, and what a clearance changes,
-depends on its masses, lengths and friction: a length that is 1 % off, or friction twice that of the file, makes
-a reference name wrong joints. So the reference is simulated again with the parameters that explain the torque
-of the leg when it was commissioned.
+depends on its masses, lengths and friction: a length that is 1 % off, or friction twice that of the file,
+makes a reference name wrong joints. So the reference is simulated again with the parameters that explain the
+torque of the leg when it was commissioned.
 
-Simulated legs show what each parameter changes, near the leg that is simulated. Where a leg is far from its file,
-the torque with ideal joints leads near it: lengths that are 5 % off change that by half of the torque's size.
+Simulated legs show what each parameter changes, near the leg that is simulated. Where a leg is far from its
+file, the torque with ideal joints leads near it: lengths that are 5 % off change that by half of the torque's
+size.
 """
 
 import math

@@ -134,7 +134,7 @@ class TorqueObserver:
 
     @property
     def parameters(self) -> LegParameters | None:
-        """Identified masses, lengths and friction that explain the drive torque; None where there are none."""
+        """Identified masses, lengths and friction that explain the drive torque; None without any."""
         state = self.state
         if (
             state.parameters is None

@@ -228,8 +228,8 @@ CREATE TABLE body (
 """
 
 _SEVENTH = """
--- friction in the joints that the drive torque shows, as a factor on that of the mechanism file; it belongs to
--- the rows of body with the same stamp
+-- friction in the joints that the drive torque shows, as a factor on that of the mechanism file; it belongs
+-- to the rows of body with the same stamp
 CREATE TABLE friction (id INTEGER PRIMARY KEY, stamp_ns INTEGER NOT NULL, factor REAL NOT NULL) STRICT;
 """
 

@@ -125,7 +125,7 @@ class LegFollower:
         self._before[:, changed] = self.clearances[:, changed]
 
     def take_parameters(self, linkage: Linkage, friction: Floats) -> None:
-        """Continue with other masses, lengths and friction coefficients (k,); the motion goes on where it is."""
+        """Continue with other masses, lengths and friction coefficients (k,); the motion goes on."""
         self._load.rebuild(linkage)
         contacts = self._setup.contacts
         contacts.friction[:, 0] = friction

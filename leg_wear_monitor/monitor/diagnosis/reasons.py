@@ -1,10 +1,20 @@
 """Why there is no estimate of the clearances yet, or why it is not sure; for operators."""
 
+import numpy as np
+
 from leg_wear_monitor.monitor.diagnosis.leg_models import LegModels
 from leg_wear_monitor.monitor.diagnosis.references import FIRST_CYCLES, UNLIKE_CYCLES, References
 from leg_wear_monitor.monitor.diagnosis.state import TorqueState
 
 _UNUSABLE_CYCLES = 3
+
+_ENOUGH_CYCLES, _LOCKED = 20, 0.9  # gait cycles, and the length of their mean phase: 1 if samples never drift
+
+
+LOCKED_SAMPLES = (
+    "the torque samples come at the same crank angles in each gait cycle; after a restart they may come at "
+    "others, which can look like a small change"
+)
 
 
 def missing(state: TorqueState, references: References) -> str:
@@ -25,9 +35,20 @@ def doubt(state: TorqueState, references: References, models: LegModels) -> str:
     if state.unlike >= UNLIKE_CYCLES:
         return "the crank turns otherwise than it did before; a new reference is being simulated"
     if models.is_of_file(state):
-        return ""
+        return LOCKED_SAMPLES if _are_locked(state) else ""
     known = "the leg is not that of its mechanism file, and the names of joints are not sure: "
     if references.is_busy:
         what = "its masses, lengths and friction are" if state.is_identifying else "a reference for it is"
         return f"{known}{what} being simulated, {references.percent} %"
     return f"{known}masses, lengths and friction near those of the file do not explain its drive torque"
+
+
+def _are_locked(state: TorqueState) -> bool:
+    """Whether samples come at the same crank angles in each gait cycle.
+
+    Where several are averaged, their first one is the first of the gait cycle, so none of this matters.
+    """
+    if state.sensor is None or state.sensor.together > 1 or len(state.cycles) < _ENOUGH_CYCLES:
+        return False
+    phases = np.exp(2j * np.pi * np.array([cycle.late for cycle in state.cycles]))
+    return bool(abs(phases.mean()) > _LOCKED)

@@ -40,4 +40,4 @@ def signed_cycle(state: TorqueState, begin_ns: int, end_ns: int) -> SignedCycle 
     signature = signatures(first, torque.angle, torque.torque, torque.step, sensor)[0]
     if not np.isfinite(signature).all():
         return None
-    return SignedCycle(begin_ns, end_ns, signature, torque.profile)
+    return SignedCycle(begin_ns, end_ns, signature, torque.profile, torque.late)

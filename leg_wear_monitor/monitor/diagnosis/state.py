@@ -18,12 +18,16 @@ from leg_wear_monitor.twin.reference.torque_reference import TorqueReference
 
 
 class SignedCycle(NamedTuple):
-    """A gait cycle: stamps of its begin and end [ns], its signature (F,), and how the crank turned."""
+    """A gait cycle: stamps of its begin and end [ns], its signature (F,), and how the crank turned.
+
+    ``late`` is the time from its begin to its first torque sample, in periods of the sensor.
+    """
 
     begin_ns: int
     end_ns: int
     signature: Floats
     profile: CrankProfile
+    late: float
 
 
 @attrs.define

@@ -35,7 +35,8 @@ class CycleTorque(NamedTuple):
     """Drive torque over a gait cycle.
 
     ``angle`` (n,) crank angle [rad], ``torque`` (n,) [N m], ``step`` (n,) torque less that of the sample
-    before [N m], NaN where that was lost; ``profile`` how the crank turned; ``period_s`` of the sensor.
+    before [N m], NaN where that was lost; ``profile`` how the crank turned; ``period_s`` of the sensor;
+    ``late`` from the begin to the first sample, in periods of the sensor.
     """
 
     angle: Floats
@@ -43,6 +44,7 @@ class CycleTorque(NamedTuple):
     step: Floats
     profile: CrankProfile
     period_s: float
+    late: float
 
 
 def extended(kept: TorqueSamples, piece: Samples) -> TorqueSamples:
@@ -94,7 +96,8 @@ def cycle_torque(kept: TorqueSamples, begin_ns: int, end_ns: int, sensor: Torque
         angle = angle[: len(torque)]
     step = np.diff(torque, prepend=np.nan)
     step[gap] = np.nan
-    return CycleTorque(angle, torque, step, profile, sensor.period_s)
+    late = 1.0e-9 * float(torque_ns[0] - begin_ns) / sensor.period_s
+    return CycleTorque(angle, torque, step, profile, sensor.period_s, late)
 
 
 def _between(stamps: Ints, values: Floats, begin_ns: int, end_ns: int) -> tuple[Ints, Floats]:

@@ -12,6 +12,7 @@ from leg_wear_monitor.monitor.diagnosis import leg_models, references
 from leg_wear_monitor.monitor.diagnosis.diagnosis import Cause, DiagnosisState
 from leg_wear_monitor.monitor.diagnosis.leg_models import COMMISSIONING_CYCLES
 from leg_wear_monitor.monitor.diagnosis.observer import TorqueObserver
+from leg_wear_monitor.monitor.diagnosis.reasons import LOCKED_SAMPLES
 from leg_wear_monitor.monitor.diagnosis.reference_file import shipped_reference
 from leg_wear_monitor.monitor.ledger.entry import CommissionedTorque
 from leg_wear_monitor.twin.kinds import CRANK, TORQUE
@@ -99,6 +100,15 @@ def test_a_healthy_leg_is_as_counted_and_becomes_commissioned(leg, reference) ->
     assert observer.state.commissioned is not None
     off = np.abs(np.array(found.clearance_m) - NEW)
     assert (off < 4.0 * np.array(found.sigma_m)).all()
+
+
+def test_samples_at_the_same_angles_in_each_cycle_are_reported(leg, reference) -> None:
+    observer = observer_of(leg)
+    walk(observer, samples(reference, [0] * (COMMISSIONING_CYCLES + 1)))
+    assert observer.diagnosis.reason == LOCKED_SAMPLES
+    drifting = [cycle._replace(late=0.3 * i % 1.0) for i, cycle in enumerate(observer.state.cycles)]
+    observer.state.cycles = tuple(drifting)
+    assert observer.diagnosis.reason == ""
 
 
 @pytest.mark.parametrize("joint", [0, 3])

@@ -11,7 +11,7 @@ from leg_wear_monitor.torque_fit.series import Series, series
 from leg_wear_monitor.twin.kinds import CRANK
 from leg_wear_monitor.twin.sample import NO_FAULT, Samples
 
-MOST_TURNS = 16  # as many as a sensor that samples instants needs, see docs/howto/commission.md
+MOST_TURNS = 16  # as many as a sensor that samples instants needs, see docs/appendix/commissioning.md
 _STANDS = 0.1  # of a turn in the time of a gait cycle
 _LONGEST = 1.5  # times the time of the commanded turns, for slower ones
 

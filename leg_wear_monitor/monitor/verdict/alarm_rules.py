@@ -42,7 +42,8 @@ def blinding(situation: Situation) -> Sequence[Hit]:
 def hit_of(alarm: Alarm, **words: str) -> Hit:
     """An alarm as a case of a rule: its worst value if it is known, else its last one."""
     is_present = alarm.present is alarm.level  # a level that has fallen has a value within the limit
-    value = alarm.value if is_present or math.isnan(alarm.worst) else alarm.worst
+    is_last = math.isnan(alarm.worst) or (is_present and not math.isnan(alarm.value))
+    value = alarm.value if is_last else alarm.worst
     told = {
         "name": alarm.name,
         "joint": alarm.subject,

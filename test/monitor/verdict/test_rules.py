@@ -285,6 +285,11 @@ def test_an_alarm_that_has_fallen_to_a_warning_is_told_with_its_worst_value_too(
     assert "is 1234 N" in verdict.why and "within its limit again now" in verdict.why
 
 
+def test_an_alarm_of_the_ledger_without_a_new_value_is_told_with_its_worst_value() -> None:
+    verdict = judged(alarms=(alarm("impact_force A", value=math.nan, worst=1234.5),))
+    assert "is 1234 N" in verdict.why and "again now" not in verdict.why
+
+
 def test_encoders_on_all_joints_observe_the_leg_without_a_drive_torque() -> None:
     eyes = (SeenClearance("encoders", 3.0e-4, 1.0e-5),)
     verdict = judged(has_torque=False, joints=tuple(attrs.evolve(each, seen=eyes) for each in NEW))

@@ -16,6 +16,7 @@ Settings = dict[str, Any]
 
 # sources that a result depends on; from `studies`, only the tasks
 _ROOMS = ("configuration", "mechanism", "contact", "wear", "dynamics", "life", "studies/tasks")
+_FILES = ("twin/reference/body_factors.py",)
 
 
 @attrs.frozen(kw_only=True)
@@ -66,6 +67,7 @@ def code_digest() -> str:
     """Digest of the sources that produce results: the physics, and the tasks of studies."""
     home = Path(__file__).parents[1]
     sources = [source for room in _ROOMS for source in (home / room).rglob("*.py")]
+    sources += [home / name for name in _FILES]
     digest = hashlib.sha256()
     for source in sorted(sources):
         digest.update(f"{source.relative_to(home).as_posix()}\n".encode())

@@ -8,6 +8,7 @@ import attrs
 from leg_wear_monitor.data_frame import data_frame
 from leg_wear_monitor.mechanism.loader import parse_mechanism, read_yaml
 from leg_wear_monitor.mechanism.spec import Mechanism
+from leg_wear_monitor.studies.claims.evaluation import LegClaims, evaluate
 from leg_wear_monitor.studies.plan.settings import parse_settings
 from leg_wear_monitor.studies.plan.study import Study
 from leg_wear_monitor.studies.point import Arrays, Point
@@ -59,6 +60,10 @@ class StudyResults:
     def missing(self) -> list[str]:
         """Labels of the points that have no result yet."""
         return [point.label for point, arrays in zip(self.points, self.arrays, strict=True) if not arrays]
+
+    def claims(self) -> LegClaims:
+        """The paper's claims against the legs of a study ``legs``; requires scipy."""
+        return evaluate(self.of("leg"))
 
     def to_pandas(self) -> "dict[str, pd.DataFrame]":
         """Tables ``points`` and ``joints`` of the points with a response; requires pandas.

@@ -24,6 +24,7 @@ TINY = {
         "joints": ["G"], "normal_laws": ["hertz", "flores"], "friction_laws": ["none"],
         "friction_coefficients": [0.1],
     },
+    "legs": {"legs": 1, "draw_seed": 3},
     "wear": {
         "sets": [["I", "J"]],
         "life": {"opens_m": 5.0e-6, "jump_m": 1.0e-5, "cycles": 2, "runs": 2},

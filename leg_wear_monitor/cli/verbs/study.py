@@ -12,7 +12,7 @@ if TYPE_CHECKING:
     from leg_wear_monitor.studies.plan.study import Study
 
 # spelled out, for --help shall not wait for numpy; the tests compare it with the library's
-NAMES = ("size", "speed", "location", "wear", "multi", "chaos", "laws")
+NAMES = ("size", "speed", "location", "wear", "multi", "chaos", "laws", "legs")
 
 FAULTS_FOUND = 1
 
@@ -50,7 +50,7 @@ def study(
     workers: int | None,
     scheduler: str | None,
 ) -> int:
-    """Compute a study and write its page: size, speed, location, wear, multi, chaos or laws.
+    """Compute a study and write its page: size, speed, location, wear, multi, chaos, laws or legs.
 
     What DIR holds already for the same leg, settings and code is kept, so an interrupted study goes on
     where it was.
@@ -97,13 +97,17 @@ def _compute(
 def write_study_page(path: Path) -> int:
     """Draw the page of a study from the data in its directory; 1 if something is missing there."""
     from leg_wear_monitor.cli.output import write_directory
+    from leg_wear_monitor.json_text import json_text
     from leg_wear_monitor.report.page import page_html
     from leg_wear_monitor.report.study.page import study_page
     from leg_wear_monitor.studies.results import load_results
 
     results = load_results(path)
-    (page,) = write_directory(path, {"report.html": page_html(study_page(results)).encode()})
-    click.echo(f"written: {page}")
+    contents = {"report.html": page_html(study_page(results)).encode()}
+    if results.of("leg"):
+        contents["claims.json"] = json_text(results.claims().to_dict()).encode()
+    for file in write_directory(path, contents):
+        click.echo(f"written: {file}")
     for label, fault in results.faults:
         click.echo(f"warning: point {label}: {fault}", err=True)
     for label in results.missing:

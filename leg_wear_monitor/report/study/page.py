@@ -10,6 +10,7 @@ from leg_wear_monitor.report.page import Page, Section
 from leg_wear_monitor.report.parts import Sentences
 from leg_wear_monitor.report.study import findings
 from leg_wear_monitor.report.study.chaos_page import chaos
+from leg_wear_monitor.report.study.legs_page import legs
 from leg_wear_monitor.report.study.sections import (
     Sections,
     asked,
@@ -38,7 +39,7 @@ def study_page(results: StudyResults) -> Page:
     """
     labelled = [(point.label, arrays) for point, arrays in results.of("response")]
     study = STUDIES[results.study]
-    sections = _sections(study.sweep, results, labelled) if labelled else []
+    sections = _sections(study.sweep, results, labelled) if labelled or results.of("leg") else []
     buffer = io.StringIO()
     YAML().dump(attrs.asdict(results.settings), buffer)
     return Page(
@@ -126,4 +127,5 @@ _PAGES: dict[str, Callable[[StudyResults, Labelled], Sections]] = {
     "laws": _laws,
     "wear": life,
     "chaos": chaos,
+    "legs": legs,
 }

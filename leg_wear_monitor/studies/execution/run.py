@@ -63,6 +63,7 @@ def run_study(
     ConfigWarning
         For each existing result that was altered, exchanged or damaged; it is computed again.
     """
+    settings.check()
     mechanism, points = load_mechanism(settings.mechanism), settings.points()
     check_points(mechanism, [point.settings for point in points])
     about = versions()

@@ -9,6 +9,7 @@ from leg_wear_monitor.mechanism.loader import read_yaml
 from leg_wear_monitor.share import share_directory
 from leg_wear_monitor.studies.plan.kinds.chaos import Chaos
 from leg_wear_monitor.studies.plan.kinds.laws import Laws
+from leg_wear_monitor.studies.plan.kinds.legs import Legs
 from leg_wear_monitor.studies.plan.kinds.location import Location
 from leg_wear_monitor.studies.plan.kinds.multi import Multi
 from leg_wear_monitor.studies.plan.kinds.size import Size
@@ -24,6 +25,7 @@ STUDIES: dict[str, type[Study]] = {
     "multi": Multi,
     "chaos": Chaos,
     "laws": Laws,
+    "legs": Legs,
 }
 
 

@@ -73,6 +73,15 @@ class Study:
     mechanism: str = described("a mechanism that comes with the package, or a file", default="bionic_leg")
     ensemble: Ensemble = described("the runs of each point", factory=Ensemble)
 
+    def check(self) -> None:
+        """Check what the study needs beside valid settings.
+
+        Raises
+        ------
+        ConfigError
+            If something is missing.
+        """
+
     def points(self) -> list[Point]:
         """Points to compute, in display order; duplicates are allowed."""
         raise NotImplementedError

@@ -14,6 +14,7 @@ Task = Callable[[Mechanism, dict[str, Any]], Arrays]
 
 TASKS = {
     "response": "response.run_ensemble",
+    "leg": "leg.drawn_leg_response",
     "life": "life.wear_life",
     "section": "section.poincare_section",
     "exponent": "exponent.lyapunov_exponent",

@@ -84,7 +84,7 @@ def observed_legs(legs: list[Leg], tolerance_m: float | None = None) -> list[Obs
 
 
 def check_points(mechanism: Mechanism, settings: list[dict[str, Any]]) -> None:
-    """Prepare one leg of every setting, so that errors are reported before any computation.
+    """Prepare one leg of every setting, equal ones once, so that errors are reported before any computation.
 
     Raises
     ------
@@ -93,8 +93,8 @@ def check_points(mechanism: Mechanism, settings: list[dict[str, Any]]) -> None:
     AssemblyError
         If a linkage does not close or has a dead point.
     """
-    for each in settings:
-        leg = ensemble(mechanism, each | {"runs": 1})[0]
+    legs = [ensemble(mechanism, each | {"runs": 1})[0] for each in settings]
+    for leg in {repr(leg): leg for leg in legs}.values():
         if not leg.clearances:
             raise ConfigError("joints", "", "names no joint")
         leg.prepare()

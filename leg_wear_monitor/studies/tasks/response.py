@@ -49,7 +49,8 @@ def run_ensemble(mechanism: Mechanism, settings: dict[str, Any]) -> Arrays:
         ``wear_depth_m_per_cycle`` (r, k, 2, N): of bushing and journal;
         ``band_<name>`` (3, s, ...): quantiles `BAND` of the curves; ``example_<name>`` (s, ...): first cycle
         of the first run; ``ideal_<name>`` (s, ...): curve of the ideal linkage;
-        ``repeats_<name>`` (k,): fraction of a curve's variance that its mean cycle explains.
+        ``repeats_<name>`` (k,): fraction of a curve's variance that its mean cycle explains;
+        ``repeats_contact_force_by_run`` (r, k): its jackknife pseudo-values, for its scatter over runs.
 
     Raises
     ------
@@ -63,7 +64,7 @@ def run_ensemble(mechanism: Mechanism, settings: dict[str, Any]) -> Arrays:
     curves = {
         name: np.concatenate([member["curves"][name] for member in members]) for name in members[0]["curves"]
     }
-    result |= _bands(curves) | _ideal(linkage, legs[0].setup.speed)
+    result |= _bands(curves, len(members)) | _ideal(linkage, legs[0].setup.speed)
     result["joints"], result["clearance_joints"] = (
         np.array(list(mechanism.joints)),
         np.array(clearance_joints),
@@ -132,8 +133,8 @@ def _curves(moments: list[Moment], shift: int) -> dict[str, Floats]:
     return {name: np.roll(curve, shift, axis=0) for name, curve in curves.items()}
 
 
-def _bands(curves: dict[str, Floats]) -> Arrays:
-    """Quantiles, an example and the periodicity of each curve; curves (r c, s, ...)."""
+def _bands(curves: dict[str, Floats], runs: int) -> Arrays:
+    """Quantiles, an example and the periodicity of each curve; curves (r c, s, ...) of r runs."""
     result: Arrays = {f"example_{name}": curve[0] for name, curve in curves.items()}
     magnitude = np.linalg.norm(curves["contact_force_n"], axis=-1)
     bands = {name: curve for name, curve in curves.items() if name.startswith(("toe", "drive"))}
@@ -141,6 +142,7 @@ def _bands(curves: dict[str, Floats]) -> Arrays:
     for name, curve in bands.items():
         result[f"band_{name}"] = np.quantile(curve, BAND, axis=0).astype(np.float32)
     result["repeats_contact_force"] = _repeats(magnitude[..., None])
+    result["repeats_contact_force_by_run"] = _by_run(magnitude[..., None], runs)
     result["repeats_eccentricity"] = _repeats(curves["eccentricity_m"])
     return result
 
@@ -151,6 +153,13 @@ def _repeats(curve: Floats) -> Floats:
     whole = np.square(curve - middle.mean(axis=0)).sum(axis=-1).mean(axis=(0, 1))
     mean = np.square(middle - middle.mean(axis=0)).sum(axis=-1).mean(axis=0)
     return np.asarray(mean / np.maximum(whole, 1.0e-300))
+
+
+def _by_run(curve: Floats, runs: int) -> Floats:
+    """Jackknife pseudo-values (r, k) of `_repeats`, one run left out; their mean has no bias 1 / n."""
+    whole, members = _repeats(curve), np.split(curve, runs)
+    without = [_repeats(np.concatenate(members[:i] + members[i + 1 :])) for i in range(runs)]
+    return np.asarray(runs * whole - (runs - 1) * np.array(without))
 
 
 def _ideal(linkage: Linkage, speed: float) -> Arrays:

@@ -1,0 +1,194 @@
+"""The claims of the paper that statistics of a leg can test, in our words."""
+
+from collections.abc import Callable
+from itertools import pairwise, product
+
+import attrs
+import numpy as np
+
+from leg_wear_monitor.mechanism.arrays import Floats
+from leg_wear_monitor.studies.claims.effect import (
+    Effect,
+    Measured,
+    difference,
+    greatest,
+    least,
+    log_ratio,
+)
+from leg_wear_monitor.studies.plan.keys import Names
+from leg_wear_monitor.studies.plan.kinds.legs import FOOT, HIP, KNEE, PLACES, SETS
+from leg_wear_monitor.studies.point import Arrays
+from leg_wear_monitor.studies.tasks.response import ERRORS
+
+Measure = Callable[[Arrays], Effect]
+
+ALL = SETS[-1]
+_SUM_WITHIN = 0.1  # deviation up to which the effect of all at once counts as the sum, as on a study's page
+_REGULAR = 0.5  # fraction of a force's variance from which on it counts as regular: most of it repeats
+_TITLES = dict(
+    zip(ERRORS, ("toe displacement", "toe velocity", "toe acceleration", "drive torque"), strict=True)
+)
+
+
+@attrs.frozen
+class Claim:
+    """A claim.
+
+    Attributes
+    ----------
+    key : str
+        Name in the data.
+    place : str
+        Where the clearances are.
+    text : str
+    measure : callable
+        Its `Effect` in a leg.
+    """
+
+    key: str
+    place: str
+    text: str
+    measure: Measure
+
+
+def _ratio(over: Measured, under: Measured) -> Measure:
+    return lambda leg: log_ratio(over.of(leg), under.of(leg), over.where == under.where)
+
+
+def _each(*measures: Measure) -> Measure:
+    return lambda leg: least([measure(leg) for measure in measures])
+
+
+def _depth(where: Names, joint: str) -> Measured:
+    return Measured("wear_depth_m_per_cycle", where, joint)
+
+
+def _repeats(where: Names, more: str, less: str) -> Measure:
+    """Forces of the joints ``more`` repeat more than those of ``less``, on the mean of each group."""
+
+    def mean(leg: Arrays, joints: str) -> Floats:
+        each = [Measured("repeats_contact_force", where, joint).of(leg) for joint in joints]
+        return np.asarray(np.mean(each, axis=0))
+
+    return lambda leg: difference(mean(leg, more), mean(leg, less), True)
+
+
+def _regular(leg: Arrays) -> Effect:
+    repeats = Measured("repeats_contact_force", KNEE, "G").of(leg)
+    return difference(repeats, np.full_like(repeats, _REGULAR), True)
+
+
+def _by_derivative(leg: Arrays) -> Effect:
+    """Errors as fractions of the ideal curve's range: displacement < velocity < acceleration, in all sets."""
+
+    def fraction(where: Names, name: str) -> Floats:
+        reach = leg[f"set{SETS.index(where)}_ideal_range_{name}"]
+        return Measured(f"error_{name}", where).of(leg) / reach
+
+    pairs = product(SETS, pairwise(ERRORS[:3]))
+    return least([log_ratio(fraction(s, after), fraction(s, before), True) for s, (before, after) in pairs])
+
+
+def _apart_from_sum(leg: Arrays) -> Effect:
+    """How far errors of all at once are from the sum of the places, in the quantity where it is farthest."""
+    effects = []
+    for name in ERRORS:
+        total = np.sum([Measured(f"error_{name}", place).of(leg) for place in PLACES], axis=0)
+        ratio = log_ratio(Measured(f"error_{name}", ALL).of(leg), total, False)
+        effects.append(Effect(abs(ratio.value) - np.log1p(_SUM_WITHIN), ratio.error))
+    return greatest(effects)
+
+
+def _ranked(name: str) -> Claim:
+    hip, knee, foot = (Measured(f"error_{name}", place) for place in PLACES)
+    text = f"the hip disturbs the {_TITLES[name]} most, the foot least"
+    return Claim(f"hip_most_{name}", "one place", text, _each(_ratio(hip, knee), _ratio(knee, foot)))
+
+
+def _more_than_alone(name: str) -> Claim:
+    whole = Measured(f"error_{name}", ALL)
+    measures = [_ratio(whole, Measured(f"error_{name}", place)) for place in PLACES]
+    text = f"the {_TITLES[name]} is disturbed more than by any place alone"
+    return Claim(f"all_more_{name}", "all five", text, _each(*measures))
+
+
+def _milder(key: str, text: str, place: Names) -> Claim:
+    """Forces with all five below those with the place alone, at each of its joints."""
+    pairs = [(Measured("p99_force_n", where, joint) for where in (place, ALL)) for joint in place]
+    return Claim(key, "all five", text, _each(*(_ratio(*pair) for pair in pairs)))
+
+
+CLAIMS: tuple[Claim, ...] = (
+    Claim("a_shallow", "hip", "A wears less deep than B", _ratio(_depth(HIP, "B"), _depth(HIP, "A"))),
+    Claim(
+        "a_denser",
+        "hip",
+        "impacts are denser at A than at B",
+        _ratio(Measured("impacts", HIP, "A"), Measured("impacts", HIP, "B")),
+    ),
+    Claim(
+        "b_zone",
+        "hip",
+        "half of B's wear lies in a narrower zone than that of A",
+        _ratio(Measured("zone_deg", HIP, "A"), Measured("zone_deg", HIP, "B")),
+    ),
+    Claim("b_chaotic", "hip", "B's force repeats less than A's", _repeats(HIP, "A", "B")),
+    Claim("g_regular", "knee", "most of the variance of G's force repeats", _regular),
+    Claim("j_deeper", "foot", "J wears deeper than I", _ratio(_depth(FOOT, "J"), _depth(FOOT, "I"))),
+    Claim(
+        "j_harder",
+        "foot",
+        "J is hit harder than I",
+        _ratio(Measured("peak_force_n", FOOT, "J"), Measured("peak_force_n", FOOT, "I")),
+    ),
+    *(_ranked(name) for name in ERRORS),
+    Claim(
+        "by_derivative",
+        "each",
+        "velocity is disturbed more than displacement, acceleration more than velocity",
+        _by_derivative,
+    ),
+    *(_more_than_alone(name) for name in (ERRORS[0], ERRORS[3])),
+    Claim("not_the_sum", "all five", "the effect is not the sum of the places alone", _apart_from_sum),
+    Claim(
+        "a_worst",
+        "all five",
+        "A wears deepest",
+        _each(*(_ratio(_depth(ALL, "A"), _depth(ALL, joint)) for joint in "BGIJ")),
+    ),
+    Claim(
+        "a_worse",
+        "all five",
+        "A wears deeper than with the hip alone",
+        _ratio(_depth(ALL, "A"), _depth(HIP, "A")),
+    ),
+    Claim(
+        "j_mildest",
+        "all five",
+        "J wears least deep",
+        _each(*(_ratio(_depth(ALL, joint), _depth(ALL, "J")) for joint in "ABGI")),
+    ),
+    Claim(
+        "j_falls",
+        "all five",
+        "J wears less deep than with the foot alone",
+        _ratio(_depth(FOOT, "J"), _depth(ALL, "J")),
+    ),
+    Claim(
+        "g_between",
+        "all five",
+        "G wears less deep than A and B, deeper than I and J",
+        _each(
+            *(_ratio(_depth(ALL, joint), _depth(ALL, "G")) for joint in HIP),
+            *(_ratio(_depth(ALL, "G"), _depth(ALL, joint)) for joint in FOOT),
+        ),
+    ),
+    Claim(
+        "disorder",
+        "all five",
+        "the forces of I and J repeat less than those of A, B and G, on the mean",
+        _repeats(ALL, "ABG", "IJ"),
+    ),
+    _milder("hip_milder", "A and B are hit less hard than with the hip alone", HIP),
+    _milder("foot_milder", "I and J are hit less hard than with the foot alone", FOOT),
+)

@@ -7,6 +7,7 @@ import numpy as np
 import pytest
 
 from leg_wear_monitor import load_mechanism
+from leg_wear_monitor.cli.verbs.study import write_study_page
 from leg_wear_monitor.errors import AssemblyError, ConfigError
 from leg_wear_monitor.mechanism.ideal import one_cycle
 from leg_wear_monitor.mechanism.position import build_linkage
@@ -39,10 +40,15 @@ def settings(tiny):
 
 
 @pytest.fixture(scope="module")
-def results(settings, tmp_path_factory):
+def directory(settings, tmp_path_factory):
     out = tmp_path_factory.mktemp("legs")
     run_study("legs", settings, out)
-    return load_results(out)
+    return out
+
+
+@pytest.fixture(scope="module")
+def results(directory):
+    return load_results(directory)
 
 
 @pytest.fixture(scope="module")
@@ -214,6 +220,15 @@ def test_claims_are_json_and_have_a_state_for_every_leg(results):
     assert [each["claim"] for each in plain["claims"]] == [claim.key for claim in CLAIMS]
     assert all(each["holds"] + each["fails"] + each["undecided"] == claims.legs for each in plain["claims"])
     assert {each["file_leg"]["state"] for each in plain["claims"]} <= {HOLDS, FAILS, UNDECIDED}
+
+
+def test_the_claims_are_written_beside_the_page(directory, results, unpainted):
+    assert write_study_page(directory) == 0
+    assert json.loads((directory / "claims.json").read_text()) == results.claims().to_dict()
+    assert (
+        "Of 3 drawn legs 2 walk; rejected: no assembly near that of the file 1."
+        in (directory / "report.html").read_text()
+    )
 
 
 def test_the_file_s_leg_wears_deeper_at_a_than_at_b(results):

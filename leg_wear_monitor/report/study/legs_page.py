@@ -17,7 +17,7 @@ from leg_wear_monitor.report.figures.figure import (
 from leg_wear_monitor.report.page import Section
 from leg_wear_monitor.report.parts import Gallery, Picture, Table
 from leg_wear_monitor.report.study.sections import Sections, asked, conclude
-from leg_wear_monitor.report.study.text import Labelled, joined, percent
+from leg_wear_monitor.report.study.text import Labelled, percent
 from leg_wear_monitor.studies.claims.evaluation import (
     CONFIDENCE,
     FAILS,
@@ -31,10 +31,10 @@ from leg_wear_monitor.studies.tasks.drawn_leg import DEAD_POINT, OPEN, STEP, TRA
 
 _ALWAYS, _NEVER = 0.9, 0.1  # a fraction whose interval is beyond these hardly depends on the leg
 _REASONS = {
-    OPEN: "do not close near the pose of the file",
-    DEAD_POINT: "have a dead point",
-    TRANSMISSION: "are close to a dead point",
-    STEP: "make a step of another size",
+    OPEN: "no assembly near that of the file",
+    DEAD_POINT: "dead point",
+    TRANSMISSION: "transmission near a dead point",
+    STEP: "step of another size",
 }
 _LOOKS = ((HOLDS, BLUE, "o"), (FAILS, VERMILION, "s"), (UNDECIDED, GREEN, "^"))
 _WIDE = 52  # characters in a line of a picture's title
@@ -51,7 +51,7 @@ def legs(results: StudyResults, _labelled: Labelled) -> Sections:
 
 
 def _sentences(found: LegClaims) -> list[str]:
-    rejected = [f"{count} {_REASONS[reason]}" for reason, count in found.rejected.items()]
+    rejected = [f"{_REASONS[reason]} {count}" for reason, count in found.rejected.items()]
     drawn = found.legs + sum(found.rejected.values())
     sentences = [f"Of {drawn} drawn legs {found.legs} walk" + _tail(rejected) + "."]
     known = [result for result in found.claims if result.fraction is not None]
@@ -74,7 +74,7 @@ def _sentences(found: LegClaims) -> list[str]:
 
 
 def _tail(rejected: Sequence[str]) -> str:
-    return f"; {joined(rejected)}" if rejected else ""
+    return f"; rejected: {', '.join(rejected)}" if rejected else ""
 
 
 def claim_table(found: LegClaims) -> Table:

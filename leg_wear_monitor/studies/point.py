@@ -16,7 +16,7 @@ Settings = dict[str, Any]
 
 # sources that a result depends on; from `studies`, only the tasks
 _ROOMS = ("configuration", "mechanism", "contact", "wear", "dynamics", "life", "studies/tasks")
-_FILES = ("twin/reference/body_factors.py",)
+_FILES = ("twin/reference/leg_parameters.py",)
 
 
 @attrs.frozen(kw_only=True)

@@ -10,7 +10,7 @@ from leg_wear_monitor.mechanism.arrays import Floats
 from leg_wear_monitor.mechanism.ideal import one_cycle, point_motion
 from leg_wear_monitor.mechanism.position import assemble, build_linkage, jacobians
 from leg_wear_monitor.mechanism.spec import Mechanism
-from leg_wear_monitor.twin.reference.body_factors import BodyFactors
+from leg_wear_monitor.twin.reference.leg_parameters import LegParameters
 
 OPEN, DEAD_POINT, TRANSMISSION, STEP = "open", "dead_point", "transmission", "step"  # why a leg is rejected
 
@@ -45,7 +45,7 @@ def draw_leg(mechanism: Mechanism, settings: dict[str, Any]) -> DrawnLeg:
     mass = 1.0 + settings["mass_tolerance"] * chance.uniform(-1.0, 1.0, bodies)
     if settings["leg"] == 0:
         length, mass = np.ones_like(length), np.ones_like(mass)
-    leg = BodyFactors(mass, length[1:]).applied(mechanism)
+    leg = LegParameters(mass, length[1:]).applied(mechanism)
     points = {
         name: (float(length[0] * x), float(length[0] * y)) for name, (x, y) in leg.ground.points.items()
     }

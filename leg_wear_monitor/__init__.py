@@ -36,6 +36,7 @@ if TYPE_CHECKING:
     from leg_wear_monitor.playback.result.parts import ReplayJoint
     from leg_wear_monitor.playback.result.replay_summary import ReplaySummary
     from leg_wear_monitor.report.plot import plot
+    from leg_wear_monitor.twin.sample import gait_samples
 
 _HOME = {
     "CommissioningItem": "commissioning.result.commissioning_result",
@@ -54,6 +55,7 @@ _HOME = {
     "Trace": "dynamics.result.parts",
     "WearMonitor": "monitor.wear_monitor",
     "commission": "commissioning.commission",
+    "gait_samples": "twin.sample",
     "load_config": "monitor.config.parameter_file",
     "load_mechanism": "mechanism.loader",
     "open_ledger": "monitor.ledger.ledger",
@@ -83,6 +85,7 @@ __all__ = [
     "Trace",
     "WearMonitor",
     "commission",
+    "gait_samples",
     "load_config",
     "load_mechanism",
     "open_ledger",

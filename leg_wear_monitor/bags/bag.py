@@ -1,20 +1,39 @@
-"""Resolve user paths to an ordered list of recording files (plain, split and compressed bags)."""
+"""Resolve what a user names to an ordered list of recordings: bags (plain, split, compressed) and tables."""
 
 import os
 import re
 import stat
-from collections.abc import Iterable
+from collections.abc import Iterable, Mapping
 from pathlib import Path
-from typing import Any
+from typing import Any, Protocol, TypeAlias, cast
 
 import attrs
+from numpy.typing import ArrayLike
 
 from leg_wear_monitor.bags.findings import DamageError, Finding, RecordingError, Severity
 from leg_wear_monitor.bags.metadata import METADATA, read_metadata
 from leg_wear_monitor.bags.regular_file import kind_of
 
-MCAP, SQLITE = ".mcap", ".db3"
+MCAP, SQLITE, CSV, PARQUET, IN_MEMORY = ".mcap", ".db3", ".csv", ".parquet", ""
+TABLES = (CSV, PARQUET, IN_MEMORY)
 _NAME = re.compile(r".*(\.mcap|\.db3)(\.zstd)?", re.DOTALL)
+_TABLE = re.compile(r".*(\.csv|\.parquet)(\.zstd)?", re.DOTALL | re.IGNORECASE)
+_EXPECTED = "a bag directory, .mcap, .db3, .csv or .parquet"
+
+
+class DataFrame(Protocol):
+    """What is used of a data frame, of pandas or of another library."""
+
+    @property
+    def columns(self) -> Iterable[Any]:
+        """Names of the columns."""
+
+    def __getitem__(self, name: Any, /) -> Any:
+        """A column."""
+
+
+Recordable: TypeAlias = str | Path | Mapping[str, ArrayLike] | DataFrame
+"""A path, or a table in memory: columns by name."""
 
 
 @attrs.frozen
@@ -25,7 +44,7 @@ class BagFile:
     ----------
     path : pathlib.Path
     storage : str
-        `MCAP` or `SQLITE`.
+        `MCAP`, `SQLITE`, `CSV`, `PARQUET`, or `IN_MEMORY`.
     compressed : bool
         Whether the whole file is compressed.
     by_message : bool
@@ -34,6 +53,8 @@ class BagFile:
         Message type by topic name, from metadata.yaml.
     recording : int
         Index of the given path that the file belongs to.
+    table : optional
+        Columns in memory.
     """
 
     path: Path
@@ -42,15 +63,23 @@ class BagFile:
     by_message: bool = False
     types: dict[str, str] = attrs.Factory(dict)
     recording: int = 0
+    table: Any = None
 
 
-def find_files(paths: Iterable[str | Path]) -> tuple[list[BagFile], list[Finding]]:
+def listed_recordings(given: Recordable | Iterable[Recordable]) -> list[Recordable]:
+    """Recordings that were given: one, or several."""
+    if isinstance(given, str | os.PathLike | Mapping) or hasattr(given, "columns"):
+        return [cast("Recordable", given)]
+    return list(given)
+
+
+def find_files(paths: Iterable[Recordable]) -> tuple[list[BagFile], list[Finding]]:
     """Find the recording files of paths, and report findings about their directories.
 
     Parameters
     ----------
     paths : iterable
-        Files and bag directories.
+        Files, bag directories, tables in memory.
 
     Raises
     ------
@@ -59,14 +88,19 @@ def find_files(paths: Iterable[str | Path]) -> tuple[list[BagFile], list[Finding
     """
     files: list[BagFile] = []
     findings: list[Finding] = []
-    for number, path in enumerate(map(Path, paths)):
+    for number, given in enumerate(paths):
+        if not isinstance(given, str | os.PathLike):
+            name = Path(f"table {number + 1}")
+            files.append(BagFile(name, IN_MEMORY, recording=number, table=given))
+            continue
+        path = Path(given)
         mode = _mode(path)
         if mode is None:
-            raise RecordingError(str(path), "", "does not exist, expected a bag directory, .mcap or .db3")
+            raise RecordingError(str(path), "", f"does not exist, expected {_EXPECTED}")
         found = _directory(path, findings) if stat.S_ISDIR(mode) else [_file(path, mode)]
         files += [attrs.evolve(file, recording=number) for file in found]
     if not files:
-        raise RecordingError("", "", "no recording given, expected bag directories or .mcap or .db3 files")
+        raise RecordingError("", "", f"no recording given, expected {_EXPECTED}")
     return files, findings
 
 
@@ -82,12 +116,12 @@ def _mode(path: Path) -> int | None:
 
 
 def _file(path: Path, mode: int, **parts: Any) -> BagFile:
-    match = _NAME.fullmatch(path.name)
+    match = _NAME.fullmatch(path.name) or _TABLE.fullmatch(path.name)
     if match is None:
-        raise RecordingError(str(path), "", "is neither a bag directory nor an .mcap or .db3 file")
+        raise RecordingError(str(path), "", f"is no recording by its name, expected {_EXPECTED}")
     if what := kind_of(mode):
         raise RecordingError(str(path), "", f"is {what}, expected a file")
-    return BagFile(path, match[1], match[2] is not None, **parts)
+    return BagFile(path, match[1].lower(), match[2] is not None, **parts)
 
 
 def _directory(path: Path, findings: list[Finding]) -> list[BagFile]:

@@ -10,7 +10,7 @@ import attrs
 import numpy as np
 from numpy.typing import NDArray
 
-from leg_wear_monitor.bags.bag import find_files
+from leg_wear_monitor.bags.bag import TABLES, BagFile, Recordable, find_files
 from leg_wear_monitor.bags.budget import DEFAULT_MB, Budget
 from leg_wear_monitor.bags.findings import Finding, RecordingError, Severity
 from leg_wear_monitor.bags.joint_names import JointNames
@@ -38,7 +38,7 @@ class Recording:
     Parameters
     ----------
     paths : iterable
-        MCAP and .db3 files, bag directories; zstd-compressed or not.
+        MCAP, .db3, CSV and Parquet files, zstd-compressed or not; bag directories; tables in memory.
     config : MonitorConfig
         Provides the name of the crank joint and the source of the torque.
     joint_states, drive_torque : str, optional
@@ -61,7 +61,7 @@ class Recording:
 
     def __init__(
         self,
-        paths: Iterable[str | Path],
+        paths: Iterable[Recordable],
         config: MonitorConfig,
         *,
         joint_states: str | None = None,
@@ -79,7 +79,7 @@ class Recording:
         self._one_leg = OneLeg()
         bag_files, self._findings = find_files(paths)
         with ExitStack() as stack:
-            self._sources, lost = open_sources(bag_files, self._budget, stack)
+            self._sources, lost = open_sources(bag_files, config, self._budget, stack)
             given = {"joint_states": joint_states, "drive_torque": drive_torque}
             wanted = roles(config.drive_torque.source, given)
             self.topics, missing = assign(self._sources, wanted)
@@ -134,19 +134,19 @@ class Recording:
         none: NDArray[np.int64] = np.zeros(0, np.int64)
         waiting = Block(np.zeros(0, GAIT_SAMPLE), none, 0.0, none)
         for number, piece in self._pieces():
-            path = self.files[number]
+            bag_file = self._sources[number].bag_file
             passed = int(np.searchsorted(waiting.log_time_ns, piece.start_ns))
             if passed >= _TOGETHER:
                 yield waiting.part(slice(passed))
                 waiting = waiting.part(slice(passed, None))
             elif len(waiting.samples) * _OF_A_SAMPLE > self._budget.left:
-                self._too_many_wait(path)
+                self._too_many_wait(bag_file.path)
                 yield waiting
                 waiting = waiting.part(slice(0))
             read += piece.stored
             times = piece.messages["log_time_ns"]
             source = np.full(len(times), number, np.int64)
-            new = Block(self._samples(path, piece), times, min(read / total, 1.0), source)
+            new = Block(self._samples(bag_file, piece), times, min(read / total, 1.0), source)
             waiting = _merged(waiting, new)
         if len(waiting.samples):
             yield attrs.evolve(waiting, fraction=1.0)
@@ -168,13 +168,14 @@ class Recording:
         if not any(finding.text == text for finding in self._findings):
             self._findings.append(Finding(path, text))
 
-    def _samples(self, path: Path, piece: Piece) -> Samples:
+    def _samples(self, bag_file: BagFile, piece: Piece) -> Samples:
         """Decode a piece, and stamp its samples with the selected time."""
         samples = self._decoder.many(piece.data, piece.messages)
-        self._joints.add_samples(path, piece.data, piece.messages, samples)
+        self._joints.add_samples(bag_file.path, piece.data, piece.messages, samples)
         if len(self._sources) > 1:
-            self._one_leg.add_samples(path, samples)
-        self._clocks.compare(samples, piece.messages)
+            self._one_leg.add_samples(bag_file.path, samples)
+        if bag_file.storage not in TABLES:  # which have one clock only
+            self._clocks.compare(samples, piece.messages)
         if self.time != "header":
             samples["fault"][samples["fault"] == ZERO_STAMP] = NO_FAULT
             samples["stamp_ns"] = piece.messages[f"{self.time}_time_ns"]

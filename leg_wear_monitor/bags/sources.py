@@ -10,18 +10,20 @@ from typing import Protocol
 import attrs
 import numpy as np
 
-from leg_wear_monitor.bags.bag import MCAP, BagFile
+from leg_wear_monitor.bags.bag import IN_MEMORY, MCAP, TABLES, BagFile
 from leg_wear_monitor.bags.budget import Budget
 from leg_wear_monitor.bags.findings import DamageError, Finding, RecordingError, Severity
 from leg_wear_monitor.bags.mcap.compression import ZSTD_MAGIC, expand_message, expanded
 from leg_wear_monitor.bags.mcap.file import Due, McapFile, Piece
 from leg_wear_monitor.bags.mcap.layout import Channel
 from leg_wear_monitor.bags.regular_file import open_regular
+from leg_wear_monitor.bags.tables.file import TableFile
 from leg_wear_monitor.bags.topics import Role, check_channel, find_topic, listed
+from leg_wear_monitor.monitor.config.settings import MonitorConfig
 
 
 class OpenFile(Protocol):
-    """Common interface of MCAP and .db3 files."""
+    """Common interface of MCAP files, .db3 files and tables."""
 
     path: Path
     size: int
@@ -56,13 +58,15 @@ class Source:
 
 
 def open_sources(
-    bag_files: Iterable[BagFile], budget: Budget, stack: ExitStack
+    bag_files: Iterable[BagFile], config: MonitorConfig, budget: Budget, stack: ExitStack
 ) -> tuple[list[Source], list[Finding]]:
     """Open the files of a recording; an unreadable file becomes a finding if another one can be opened.
 
     Parameters
     ----------
     bag_files : iterable of BagFile
+    config : MonitorConfig
+        Columns and units of tables.
     budget : Budget
     stack : contextlib.ExitStack
         Closes the files.
@@ -76,7 +80,7 @@ def open_sources(
     failed: list[RecordingError] = []
     for bag_file in bag_files:
         try:
-            sources.append(Source(bag_file, _open(bag_file, budget, stack), budget))
+            sources.append(Source(bag_file, _open(bag_file, config, budget, stack), budget))
         except RecordingError as error:
             failed.append(error)
     if not sources:
@@ -125,11 +129,16 @@ def _types(source: Source, role: Role, topic: str) -> dict[int, int]:
     }
 
 
-def _open(bag_file: BagFile, budget: Budget, stack: ExitStack) -> OpenFile:
+def _open(bag_file: BagFile, config: MonitorConfig, budget: Budget, stack: ExitStack) -> OpenFile:
     path = bag_file.path
     try:
+        if bag_file.storage == IN_MEMORY:
+            return TableFile(path, bag_file.table, bag_file.storage, config, budget)
         if bag_file.compressed:
             path = _expanded_file(bag_file, budget, stack)
+        if bag_file.storage in TABLES:
+            content = stack.enter_context(open_regular(path))
+            return TableFile(bag_file.path, content, bag_file.storage, config, budget)
         if bag_file.storage == MCAP:
             return McapFile(bag_file.path, stack.enter_context(open_regular(path)), budget)
     except DamageError as error:

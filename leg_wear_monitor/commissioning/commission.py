@@ -5,6 +5,7 @@ from pathlib import Path
 
 import attrs
 
+from leg_wear_monitor.bags.bag import Recordable, listed_recordings
 from leg_wear_monitor.commissioning.evidence.misfit import Load, with_load
 from leg_wear_monitor.commissioning.evidence.sampling import sampling_of
 from leg_wear_monitor.commissioning.evidence.timing import separates_lag, timing_of
@@ -32,7 +33,7 @@ _LEAST_S = 10.0  # ten turns at 60 rpm
 
 
 def commission(
-    paths: str | Path | Iterable[str | Path],
+    paths: Recordable | Iterable[Recordable],
     config: MonitorConfig | str | Path | None = None,
     *,
     joint_states: str | None = None,
@@ -44,8 +45,9 @@ def commission(
 
     Parameters
     ----------
-    paths : path, or iterable of paths
-        MCAP and .db3 files, bag directories; an encoder may start anew in each.
+    paths : path, table, or iterable of these
+        MCAP, .db3, CSV and Parquet files, bag directories, tables in memory (see `replay`); an encoder may
+        start anew in each.
     config : MonitorConfig or path, optional
         Parameters, or a parameter file: names the mechanism, and keeps what is not measured; default: the
         file shipped with the package.
@@ -70,10 +72,13 @@ def commission(
         If it has no torque, no joint that turns on and on, or is too short.
     """
     base = config if isinstance(config, MonitorConfig) else load_config(config)
-    paths = [paths] if isinstance(paths, str | Path) else paths
     mechanism = fitted(load_mechanism(base.mechanism), base)
     signals, faults = read_signals(
-        paths, joint_states=joint_states, drive_torque=drive_torque, progress=lambda f: progress(0.5 * f)
+        listed_recordings(paths),
+        base,
+        joint_states=joint_states,
+        drive_torque=drive_torque,
+        progress=lambda f: progress(0.5 * f),
     )
     result = propose(signals, mechanism, base, crank_joint, lambda f: progress(0.5 + 0.5 * f))
     return attrs.evolve(result, faults=tuple(faults))

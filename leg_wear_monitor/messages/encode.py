@@ -51,8 +51,9 @@ class _Layout:
         rows = np.empty((n, len(_LITTLE) + len(self.body)), np.uint8)
         rows[:] = np.frombuffer(_LITTLE + bytes(self.body), np.uint8)
         for at, values in self.columns:
-            raw = np.ascontiguousarray(values).view(np.uint8).reshape(n, -1)
-            rows[:, len(_LITTLE) + at : len(_LITTLE) + at + raw.shape[1]] = raw
+            size = values.dtype.itemsize * values.shape[1]
+            raw = np.ascontiguousarray(values).view(np.uint8).reshape(n, size)
+            rows[:, len(_LITTLE) + at : len(_LITTLE) + at + size] = raw
         return rows
 
 
@@ -124,6 +125,14 @@ def wrenches(
         column = np.zeros((len(stamps), 3)) if values is None else np.asarray(values, float)
         layout.column(column.astype("<f8").reshape(len(stamps), 3))
     return layout.messages(len(stamps))
+
+
+def float64s(values: ArrayLike) -> NDArray[np.uint8]:
+    """Messages of std_msgs/Float64, from values (n,): a message a row."""
+    numbers = np.atleast_1d(np.asarray(values, "<f8"))
+    layout = _Layout()
+    layout.column(numbers[:, None])
+    return layout.messages(len(numbers))
 
 
 def diagnostic_array(

@@ -67,10 +67,9 @@ class WearMonitor:
 
     >>> import numpy as np
     >>> import leg_wear_monitor as lw
-    >>> from leg_wear_monitor.twin.sample import gait_samples
     >>> monitor = lw.WearMonitor(lw.load_mechanism("bionic_leg"))
     >>> stamps_ns = 1_000_000_000 + 5_000_000 * np.arange(800)
-    >>> reports = monitor.update(gait_samples(stamps_ns, crank_angle_rad=2e-9 * np.pi * stamps_ns))
+    >>> reports = monitor.update(lw.gait_samples(stamps_ns, crank_angle_rad=2e-9 * np.pi * stamps_ns))
     >>> len(reports.cycles), monitor.verdict.verdict.state.value
     (2, 'watch')
     """

@@ -7,6 +7,7 @@ from pathlib import Path
 import attrs
 import numpy as np
 
+from leg_wear_monitor.bags.bag import Recordable, listed_recordings
 from leg_wear_monitor.bags.budget import DEFAULT_MB
 from leg_wear_monitor.bags.findings import Finding, RecordingError, Severity
 from leg_wear_monitor.bags.pauses import Block
@@ -107,7 +108,7 @@ class ReplayResult:
 
 
 def replay(
-    paths: str | Path | Iterable[str | Path],
+    paths: Recordable | Iterable[Recordable],
     config: MonitorConfig | str | Path | None = None,
     *,
     out: str | Path | None = None,
@@ -128,8 +129,10 @@ def replay(
 
     Parameters
     ----------
-    paths : path, or iterable of paths
-        MCAP and .db3 files, bag directories; several paths are read as one recording.
+    paths : path, table, or iterable of these
+        MCAP, .db3, CSV and Parquet files, bag directories; tables in memory, which are data frames or
+        mappings of column names to arrays. Several are read as one recording. ``input`` of the parameters
+        names the columns of tables and their units.
     config : MonitorConfig or path, optional
         Parameters, or the parameter file of the node; default: the file shipped with the package.
     out : path, optional
@@ -171,11 +174,24 @@ def replay(
     >>> summary = lw.replay("bags/knocking.mcap", "bags/knocking.yaml").summary()
     >>> summary.cycles, summary.verdict.state.value, summary.verdict.joints
     (10, 'stop', ('G',))
+
+    Arrays, and in the same way a data frame of pandas; here twelve turns of a leg with ideal joints:
+
+    >>> import numpy as np
+    >>> ideal = lw.simulate("bionic_leg", clearances=[], cycles=1, trace=200).trace
+    >>> walk = {
+    ...     "time": 1.0 + 0.005 * np.arange(2400),
+    ...     "crank_angle": np.tile(ideal.crank_angle_rad, 12),
+    ...     "drive_torque": np.tile(ideal.drive_torque_nm, 12),
+    ... }
+    >>> summary = lw.replay(walk).summary()
+    >>> summary.cycles, summary.recording.torque_samples
+    (10, 2400)
     """
     config = config if isinstance(config, MonitorConfig) else load_config(config, node)
     kept = attrs.evolve(config.ledger, path="" if ledger is None else str(ledger))
     config = attrs.evolve(config, ledger=kept)
-    named = [paths] if isinstance(paths, str | Path) else list(paths)
+    named = listed_recordings(paths)
     asked = {"joint_states": joint_states, "drive_torque": drive_torque}
     with (
         Recording(named, config, time=time, memory_mb=memory_mb, **asked) as recording,

@@ -60,29 +60,39 @@ def gait_samples(
     encoder_rad: ArrayLike = np.nan,
     fault: ArrayLike = NO_FAULT,
 ) -> Samples:
-    """A block of samples.
+    """A block of samples for `WearMonitor.update`, from arrays in order of arrival.
+
+    For a whole recording, `replay` takes arrays and data frames directly.
 
     Parameters
     ----------
     stamp_ns : (n,) array of int
-        Times of the headers [ns].
+        Times of measurement [ns].
     kind : (n,) array or int
-        A key of `KINDS`.
+        0 for a sample of the crank, which may contain a torque, too; 1 for one of the drive torque alone.
     crank_angle_rad, crank_velocity_radps, torque_nm : (n,) array or float
-        NaN where absent.
+        Angle and speed of the mechanism's crank [rad, rad/s], drive torque on the crank [N m]; NaN where
+        absent.
     encoder_rad : (n, m) array or float
-        Angles of m further encoders, at most `ENCODERS`.
+        Angles of m further encoders [rad], at most 4, in the order of ``encoders.names``.
     fault : (n,) array or int
-        A key of `FAULTS`.
+        0 for a valid sample; others are counted and not used.
 
     Returns
     -------
-    (n,) array of GAIT_SAMPLE
+    (n,) structured array
 
     Raises
     ------
     LegWearError
         For an unknown kind or fault, or for stamps that are not integers.
+
+    Examples
+    --------
+    >>> import leg_wear_monitor as lw
+    >>> samples = lw.gait_samples([0, 5_000_000], crank_angle_rad=[0.1, 0.13], torque_nm=[2.5, 2.4])
+    >>> samples["torque_nm"].tolist()
+    [2.5, 2.4]
     """
     stamps = np.atleast_1d(np.asarray(stamp_ns))
     if stamps.dtype.kind not in "iu":

@@ -28,7 +28,8 @@ def check(configs: tuple[str, ...]) -> int:
     """Check files of mechanisms and of parameters, or, without any, the installation and its own files.
 
     Prints what was understood of each that is in order, and a line on stderr for each that is not. A value
-    that is likely meant in another unit is a warning; the exit code is then 1.
+    that is likely meant in another unit is a warning; the exit code is then 1. Tables (.csv, .parquet) are
+    read with the columns and units of the parameter file before them: check monitor.yaml leg.csv.
     """
     with warnings.catch_warnings(record=True) as doubted:
         warnings.simplefilter("always", ConfigWarning)
@@ -88,7 +89,33 @@ def _kernels() -> str:
 
 
 def _files(names: tuple[str, ...]) -> Mapping[str, Callable[[], str]]:
-    return {name: partial(_file, name) for name in names}
+    files, parameters = {}, None
+    for name in names:
+        files[name] = partial(_table, name, parameters) if _is_table(name) else partial(_file, name)
+        parameters = name if name.endswith((".yaml", ".yml")) else parameters
+    return files
+
+
+def _is_table(name: str) -> bool:
+    return name.lower().endswith((".csv", ".parquet"))
+
+
+def _table(name: str, parameters: str | None) -> str:
+    """Read a table, and say what was understood of it."""
+    try:
+        from leg_wear_monitor.bags.findings import Severity
+        from leg_wear_monitor.bags.table_check import understood
+    except ModuleNotFoundError as error:
+        raise LegWearError(f"{error.name} is not installed; pip install 'leg_wear_monitor[bags]'") from error
+    from leg_wear_monitor.monitor.config.parameter_file import load_config
+
+    lines, findings = understood(Path(name), load_config(parameters))
+    for finding in findings:
+        if finding.severity is Severity.LOSS:
+            warnings.warn(str(finding), ConfigWarning, stacklevel=2)
+        else:
+            lines.append(f"note: {finding.text}")
+    return f"\n{'':13} ".join(lines)
 
 
 def _file(name: str) -> str:

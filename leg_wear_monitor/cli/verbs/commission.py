@@ -48,7 +48,8 @@ def commission(
 ) -> int:
     """Propose the parameters of a robot from recordings of its healthy leg.
 
-    A minute of walking with the foot in the air, best at two cadences. All joints and all torques are tried,
+    MCAP, .db3, CSV and Parquet files or bag directories: a minute of walking with the foot in the air, best
+    at two cadences. All joints and all torques are tried,
     in both directions, with every gear ratio and offset; the drive torque of the mechanism is the judge. Exit
     code 1 if something cannot be told, or does not fit.
     """

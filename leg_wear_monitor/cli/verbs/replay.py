@@ -88,7 +88,7 @@ def replay(
     fail_on: tuple[str, ...],
     **options: Any,
 ) -> int:
-    """Put recordings through the monitor: MCAP and .db3 files or bag directories, several as one recording.
+    """Put recordings through the monitor: MCAP, .db3, CSV, Parquet or bag directories, several as one.
 
     Exits with 1 if parts of a recording were lost, if no gait cycle in it can be this leg's, or for an alarm
     asked for with --fail-on.

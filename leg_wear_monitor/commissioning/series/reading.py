@@ -2,13 +2,12 @@
 
 from collections.abc import Callable, Iterable
 from contextlib import ExitStack
-from pathlib import Path
 
 import attrs
 import numpy as np
 from numpy.typing import NDArray
 
-from leg_wear_monitor.bags.bag import find_files
+from leg_wear_monitor.bags.bag import Recordable, find_files
 from leg_wear_monitor.bags.budget import Budget
 from leg_wear_monitor.bags.findings import Finding, RecordingError, Severity
 from leg_wear_monitor.bags.joint_names import names_in
@@ -60,7 +59,8 @@ class _Collected:
 
 
 def read_signals(
-    paths: Iterable[str | Path],
+    paths: Iterable[Recordable],
+    config: MonitorConfig,
     *,
     joint_states: str | None = None,
     drive_torque: str | None = None,
@@ -71,7 +71,9 @@ def read_signals(
     Parameters
     ----------
     paths : iterable
-        MCAP and .db3 files, bag directories.
+        MCAP, .db3, CSV and Parquet files, bag directories, tables in memory.
+    config : MonitorConfig
+        Columns and units of tables.
     joint_states, drive_torque : str, optional
         Topics to read, and no others of their kind; default: all.
     progress : callable
@@ -84,10 +86,14 @@ def read_signals(
     """
     bag_files, findings = find_files(paths)
     with ExitStack() as stack:
-        sources, lost = open_sources(bag_files, Budget(), stack)
+        sources, lost = open_sources(bag_files, config, Budget(), stack)
         selected, skipped = _select(sources, joint_states, drive_torque)
         if not any(each.stream.kind == CRANK for each in selected):
-            raise RecordingError(str(paths), "joint_states", "no topic of sensor_msgs/msg/JointState")
+            raise RecordingError(
+                ", ".join(str(one.path) for one in bag_files),
+                "joint_states",
+                "no topic of sensor_msgs/msg/JointState",
+            )
         collected: dict[JointName | TorqueSource, _Collected] = {}
         read, total = 0, max(1, sum(source.file.size for source in sources))
         for source in sources:

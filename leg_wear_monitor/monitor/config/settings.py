@@ -9,6 +9,7 @@ import attrs
 from leg_wear_monitor.configuration.quantity import described, quantity
 from leg_wear_monitor.monitor.config.forecast import Forecasting
 from leg_wear_monitor.monitor.config.inputs import LIVE, Cadence, Crank, DriveTorque, Encoders, Tracker
+from leg_wear_monitor.monitor.config.tables import TableInput
 
 
 def _filled(text: str) -> str | None:
@@ -247,6 +248,7 @@ class MonitorConfig:
     crank: Crank = described("", factory=Crank)
     encoders: Encoders = described("", factory=Encoders)
     drive_torque: DriveTorque = described("", factory=DriveTorque)
+    input: TableInput = described("", factory=TableInput)
     cadence: Cadence = described("", factory=Cadence)
     tracker: Tracker = described("", factory=Tracker)
     limits: Limits = described("", factory=Limits)

@@ -1,0 +1,1 @@
+"""Tables as recordings: CSV, Parquet, data frames and arrays."""

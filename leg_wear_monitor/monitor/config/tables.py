@@ -1,0 +1,99 @@
+"""Parameters of tables (CSV, Parquet, data frames): which columns are read, and their units."""
+
+import math
+from collections.abc import Mapping
+from datetime import UTC, datetime
+
+import attrs
+
+from leg_wear_monitor.configuration.quantity import choice, described, quantity
+
+DATE = "date"
+STAMPS: Mapping[str, int] = {"s": 9, "ms": 6, "us": 3, "ns": 0}
+"""Power of ten by which a time becomes nanoseconds."""
+ANGLES: Mapping[str, tuple[float, float]] = {
+    "rad": (1.0, 1.0),
+    "deg": (math.pi, 180.0),
+    "rev": (2.0 * math.pi, 1.0),
+}
+SPEEDS: Mapping[str, tuple[float, float]] = {
+    "rad/s": (1.0, 1.0),
+    "deg/s": (math.pi, 180.0),
+    "rev/s": (2.0 * math.pi, 1.0),
+    "rpm": (2.0 * math.pi, 60.0),
+}
+TORQUES: Mapping[str, tuple[float, float]] = {"N m": (1.0, 1.0), "N mm": (1.0, 1000.0)}
+"""Factor and divisor to SI of the units of angles, speeds and torques; a division by 1000 is rounded once."""
+
+
+def _filled(name: str) -> str | None:
+    return None if name else "'' is empty, expected the name of a column"
+
+
+@attrs.frozen(kw_only=True)
+class Columns:
+    """Names of the columns."""
+
+    stamp: str = described(
+        "column of the time; not read if input.rate_hz is set", default="time", check=_filled
+    )
+    crank_angle: str = described(
+        "column of the position of the crank's joint", default="crank_angle", check=_filled
+    )
+    crank_speed: str = described("column of the speed of the crank's joint; empty: none", default="")
+    drive_torque: str = described("column of the drive torque; empty: none", default="drive_torque")
+
+
+@attrs.frozen(kw_only=True)
+class Units:
+    """Units of the columns."""
+
+    stamp: str = choice(
+        (*STAMPS, DATE),
+        "unit of the time, since 1970 or since input.start; date: dates and times such as "
+        "2026-03-01 09:00:00.001, in UTC",
+        default="s",
+    )
+    crank_angle: str = choice(tuple(ANGLES), "unit of the position, also of further encoders", default="rad")
+    crank_speed: str = choice(tuple(SPEEDS), "unit of the speed", default="rad/s")
+    drive_torque: str = choice(tuple(TORQUES), "unit of the torque", default="N m")
+
+
+def _date(text: str) -> str | None:
+    if not text:
+        return None
+    try:
+        datetime.fromisoformat(text)
+    except ValueError:
+        return f"{text!r} is no date and time, expected one such as '2026-03-01T09:00:00Z'"
+    return None
+
+
+@attrs.frozen(kw_only=True)
+class TableInput:
+    """Columns of tables; sign, gear ratio, offset and scale are those of `crank` and `drive_torque`."""
+
+    columns: Columns = described("", factory=Columns)
+    units: Units = described("", factory=Units)
+    rate_hz: float = quantity(
+        "Hz",
+        "rows per second of a table without a column of the time; 0: there is input.columns.stamp",
+        at_least=0.0,
+        at_most=1.0e6,
+        default=0.0,
+    )
+    start: str = described(
+        "date and time at which the time is 0, such as 2026-03-01T09:00:00Z; empty: 1970",
+        default="",
+        check=_date,
+    )
+
+    @property
+    def start_ns(self) -> int:
+        """Stamp of time 0 [ns]."""
+        if not self.start:
+            return 0
+        begin = datetime.fromisoformat(self.start)
+        begin = begin if begin.tzinfo else begin.replace(tzinfo=UTC)
+        passed = begin - datetime(1970, 1, 1, tzinfo=UTC)
+        return ((passed.days * 86400 + passed.seconds) * 1_000_000 + passed.microseconds) * 1000

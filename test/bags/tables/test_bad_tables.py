@@ -1,0 +1,213 @@
+"""What is wrong with a table is one line each; what can be read is read."""
+
+from collections.abc import Callable
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pytest
+
+from leg_wear_monitor.bags.findings import RecordingError, Severity
+from leg_wear_monitor.errors import LegWearError
+from leg_wear_monitor.monitor.config.parameters import config_from
+
+Read = Callable[..., Any]
+Found = tuple[int, list[str], list[str]]
+HEAD = "time,crank_angle,drive_torque"
+GOOD = [f"{0.005 * k + 1.0!r},{(0.03 * k) % 6.283!r},{float(k % 7)!r}" for k in range(1000)]
+
+
+@pytest.fixture
+def table(tmp_path: Path, read: Read) -> Callable[..., Found]:
+    """Read a file: number of samples, losses, notes."""
+
+    def make(content: str | bytes, name: str = "a.csv", **parameters: Any) -> Found:
+        path = tmp_path / name
+        path.write_bytes(content if isinstance(content, bytes) else content.encode())
+        given = {f"input.{key.replace('__', '.')}": value for key, value in parameters.items()}
+        samples, recording = read(path, config=config_from(given))
+        found: dict[Severity, list[str]] = {severity: [] for severity in Severity}
+        for finding in recording.findings:
+            found[finding.severity].append(finding.text)
+        assert recording.is_partial == bool(found[Severity.LOSS])
+        return len(samples), found[Severity.LOSS], found[Severity.NOTE]
+
+    return make
+
+
+def lines(*texts: str, head: str = HEAD) -> str:
+    return "\n".join([head, *texts]) + "\n"
+
+
+@pytest.mark.parametrize(
+    ("content", "fault"),
+    [
+        ("", "is empty, expected a line with the names of the columns"),
+        (HEAD, "has no complete line, expected the names of the columns"),
+        (HEAD + "\n", "has no row that can be read"),
+        (lines("1;2;3"), r"line 2 is lost: 1 cells, expected 3"),
+        (lines("1,5,2,5,3,5"), r"line 2 is lost: 6 cells, expected 3; decimal commas\?"),
+        (
+            lines("1;2,5;3", head=HEAD.replace(",", ";")),
+            r"'2,5' is not a number, .* in rad; a decimal comma\?",
+        ),
+        (lines("x,2,3"), "column 'time': 'x' is not a number, expected one in s"),
+        (lines("1700000000000,2,3"), r"1700000000000 s is no time from 1902 to 2038; another unit"),
+        (lines("1e999999,2,3"), "1e999999 is no time, expected one in s"),
+        (lines("1,2,3").encode("utf-16"), "is not a text in UTF-8"),
+        (
+            lines("1,2,3", head="t,q,tau"),
+            "input.columns.stamp: column 'time' does not exist, expected one of: t, q, tau",
+        ),
+        (lines("1,2,3,4", head=HEAD + ",time"), "column 'time' is there more than once"),
+    ],
+)
+def test_nothing_that_can_be_read_is_one_line(table: Any, content: str | bytes, fault: str) -> None:
+    with pytest.raises(RecordingError, match=fault) as error:
+        table(content)
+    assert "\n" not in str(error.value) and "a.csv" in str(error.value)
+
+
+def test_lines_that_cannot_be_read_are_lost_and_the_others_are_not(table: Any) -> None:
+    bad = ["x,1,2", ",1,2", "5,1", "nan,1,2", '"5', "6,1,y", "7,8,9,10"]
+    found, losses, _ = table(lines(*GOOD[:500], *bad, "", *GOOD[500:]))
+    assert found == 2 * len(GOOD)
+    assert losses[:2] == ["line 504 is lost: 2 cells, expected 3", "line 506 is lost: 1 cells, expected 3"]
+    assert losses[-1] == "2 more lines are lost"
+
+
+def test_a_file_that_was_cut_short_loses_its_last_line(table: Any) -> None:
+    for cut in (3, 1):  # in a number, and before the line break: the number may go on
+        found, losses, _ = table(lines(*GOOD)[:-cut])
+        assert found == 2 * len(GOOD) - 2
+        assert losses == ["line 1001 is lost: it has no line break at its end, so it may be cut short"]
+
+
+def test_zeros_of_a_computer_that_lost_power_are_no_rows(table: Any) -> None:
+    found, losses, _ = table(lines(*GOOD).encode() + bytes(5000))
+    assert found == 2 * len(GOOD) and len(losses) == 1
+
+
+def test_a_line_without_an_end_does_not_fill_the_memory(table: Any) -> None:
+    found, losses, _ = table(lines(*GOOD).encode() + b"1" * 5_000_000)
+    assert found == 2 * len(GOOD)
+    assert losses == ["line 1002 has no end within 2097152 bytes: all from it on is lost"]
+
+
+def test_times_that_go_back_repeat_or_jump_are_notes(table: Any) -> None:
+    found, losses, notes = table(lines(*GOOD[:300], *GOOD[100:300], GOOD[299], *GOOD[600:]))
+    assert found == 2 * (300 + 200 + 1 + 400) and not losses
+    assert notes == [
+        "the time goes back by 0.995 s at line 302",
+        "the time repeats at line 502",
+        "the time jumps by 1.505 s at line 503; the leg was not monitored in between",
+    ]
+
+
+def test_a_time_of_zero_is_a_note(table: Any) -> None:
+    _, losses, notes = table(lines("0,1,2", *GOOD))
+    assert not losses
+    assert (
+        notes[-1] == "a time of 0 is that of a clock that is not set, and counts as faulty; set input.start"
+    )
+
+
+def test_a_torque_without_an_angle_is_no_effort(tmp_path: Path, read: Read) -> None:
+    (tmp_path / "a.csv").write_text(lines("1,,2", *GOOD))
+    _, recording = read(tmp_path / "a.csv", config=config_from({"drive_torque.source": "effort"}))
+    assert recording.is_partial
+    assert "1 torques have no angle in their row" in str(recording.findings)
+
+
+def turning(rpm: float, turn: float = 2.0 * np.pi, wrapped: bool = True) -> dict[str, Any]:
+    """Ten seconds at 200 Hz of an angle with this turn."""
+    times = 1.0 + 0.005 * np.arange(2000)
+    angle = turn * rpm / 60.0 * times
+    return {"time": times, "crank_angle": angle % turn if wrapped else angle, "drive_torque": times}
+
+
+@pytest.mark.parametrize(
+    ("columns", "parameters", "doubt"),
+    [
+        (turning(60.0), {}, ""),
+        (turning(-60.0, wrapped=False), {}, ""),
+        (turning(40.0, 360.0), {"units.crank_angle": "deg"}, ""),
+        (turning(55.0, 360.0), {}, "in 'rad' a turn is 6.283: is it in 'deg' (input.units.crank_angle)?"),
+        (turning(55.0, 1.0), {}, "is it in 'rev' (input.units.crank_angle)?"),
+        (turning(60.0), {"units.crank_angle": "deg"}, "is it in 'rad' (input.units.crank_angle)?"),
+        (
+            turning(60.0, 360.0, wrapped=False),
+            {},
+            "with input.units.crank_angle 'deg' it would turn at 60 rpm",
+        ),
+        (turning(60.0), {"units.stamp": "ms"}, "with input.units.stamp 's' it would turn at 60 rpm"),
+        (turning(60.0) | {"v": np.full(2000, 6.3)}, {"columns.crank_speed": "v"}, ""),
+        (turning(60.0) | {"v": np.full(2000, 60.0)}, {"columns.crank_speed": "v"}, "is it in 'rpm'"),
+        (turning(60.0) | {"v": np.full(2000, 6300.0)}, {"columns.crank_speed": "v"}, "or its unit is wrong"),
+        (turning(60.0) | {"v": np.full(2000, -6.3)}, {"columns.crank_speed": "v"}, "or its unit is wrong"),
+    ],
+)
+def test_a_column_that_is_likely_in_another_unit_is_doubted(
+    read: Read, columns: Any, parameters: Any, doubt: str
+) -> None:
+    config = config_from({f"input.{key}": value for key, value in parameters.items()})
+    _, recording = read(columns, config=config)
+    losses = [finding.text for finding in recording.findings if finding.severity is Severity.LOSS]
+    assert len(losses) == bool(doubt)
+    assert not doubt or doubt in losses[0]
+
+
+@pytest.mark.parametrize(
+    ("columns", "fault"),
+    [
+        ({"time": [1.0], "crank_angle": [1.0]}, "column 'drive_torque' does not exist"),
+        ({"time": [1.0], "crank_angle": [1.0, 2.0], "drive_torque": [1.0]}, "columns of different lengths"),
+        ({"time": [1.0], "crank_angle": ["x"], "drive_torque": [1.0]}, "column 'crank_angle' is of type <U1"),
+        ({"time": [1.0], "crank_angle": [[1.0]], "drive_torque": [1.0]}, "has the shape"),
+        ({"time": [], "crank_angle": [], "drive_torque": []}, "has no row that can be read"),
+        ({"time": [np.nan], "crank_angle": [1.0], "drive_torque": [1.0]}, "row 1 is lost: has no time"),
+        ({"time": [1e18], "crank_angle": [1.0], "drive_torque": [1.0]}, "1e[+]18 s is no time from 1902"),
+        (
+            {"time": np.array(["2026-03-01"], "M8[ns]"), "crank_angle": [1.0], "drive_torque": [1.0]},
+            "input.units.stamp: 's' does not fit column 'time', which has dates",
+        ),
+    ],
+)
+def test_arrays_that_are_no_table_are_one_line(read: Read, columns: Any, fault: str) -> None:
+    with pytest.raises(RecordingError, match=f"^table 1: .*{fault}"):
+        read(columns, config=config_from({}))
+
+
+def test_a_damaged_parquet_file_is_one_line(table: Any) -> None:
+    pytest.importorskip("pyarrow")
+    with pytest.raises(RecordingError, match="is not a readable Parquet file"):
+        table(b"PAR1 and no more", "a.parquet")
+
+
+def test_a_parquet_file_of_texts_is_one_line(tmp_path: Path, read: Read) -> None:
+    pyarrow = pytest.importorskip("pyarrow")
+    parquet = pytest.importorskip("pyarrow.parquet")
+    columns = {"time": [1.0], "crank_angle": ["x"], "drive_torque": [1.0]}
+    parquet.write_table(pyarrow.table(columns), tmp_path / "a.parquet")
+    with pytest.raises(RecordingError, match="column 'crank_angle' is of type string, expected numbers"):
+        read(tmp_path / "a.parquet", config=config_from({}))
+
+
+def test_a_group_of_rows_that_is_damaged_is_lost_and_the_others_are_not(tmp_path: Path, read: Read) -> None:
+    pandas, parquet = pytest.importorskip("pandas"), pytest.importorskip("pyarrow.parquet")
+    path, frame = tmp_path / "a.parquet", pandas.DataFrame(turning(60.0))
+    frame.to_parquet(path, row_group_size=500, compression="zstd")
+    group = parquet.ParquetFile(path).metadata.row_group(2).column(1)
+    content = bytearray(path.read_bytes())
+    begin = group.data_page_offset + group.total_compressed_size // 2
+    content[begin : begin + 200] = bytes(200)
+    path.write_bytes(content)
+    samples, recording = read(path, config=config_from({}))
+    assert len(samples) == 3000 and recording.is_partial
+    assert any(finding.text.startswith("rows 1001 to 1500: cannot be read") for finding in recording.findings)
+
+
+def test_without_pyarrow_one_line_says_what_to_install(table: Any, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setitem(__import__("sys").modules, "pyarrow", None)
+    with pytest.raises(LegWearError, match=r"need pyarrow.*pip install 'leg_wear_monitor\[parquet\]'"):
+        table(b"PAR1", "a.parquet")

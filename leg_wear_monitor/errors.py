@@ -22,18 +22,18 @@ def printable(text: str, most: int = _MOST_SHOWN) -> str:
 
 
 class LegWearError(Exception):
-    """Something a user can mend; the command line prints it as one line and returns 2."""
+    """An error that a user can correct; the command line prints it as one line and returns 2."""
 
 
 class ConfigError(LegWearError):
-    """A file or an option holds something that cannot be used.
+    """A file or an option has an unusable value.
 
     Parameters
     ----------
     source : str
         File or command-line option the value came from.
     key : str
-        Dotted path of the key, empty where the fault is the file's own.
+        Dotted path of the key, empty if the fault concerns the whole file.
     fault : str
         What was found and what was expected, with its unit.
 
@@ -61,7 +61,7 @@ class AssemblyError(LegWearError):
 
 
 class SimulationError(LegWearError):
-    """A run that had to stop: says where, when and what to try."""
+    """A run that stopped; the message gives the place, the time and the remedy."""
 
 
 class ConfigWarning(UserWarning):

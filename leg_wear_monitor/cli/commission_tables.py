@@ -17,7 +17,7 @@ if TYPE_CHECKING:
 
 
 def print_commissioning(result: "CommissioningResult") -> None:
-    """Print what was found, what cannot be told, and what does not fit."""
+    """Print what was found, what cannot be determined, and what does not fit."""
     console = Console(highlight=False, markup=False)
     console.print(f"\nfrom {result.turns:.3g} turns of the crank\n")
     console.print(_table(result))
@@ -31,7 +31,7 @@ def print_commissioning(result: "CommissioningResult") -> None:
         for text in told:
             console.print(f"{label}: {printable(text)}", soft_wrap=True)
     if result.config is None:
-        console.print("no parameters are proposed, since a choice between them is not sure")
+        console.print("no parameters are proposed, because a choice between them is not certain")
 
 
 def _table(result: "CommissioningResult") -> Table:

@@ -123,7 +123,7 @@ def _print_version(ctx: click.Context, _param: click.Parameter, wanted: bool) ->
 )
 @click.pass_context
 def cli(ctx: click.Context) -> None:
-    """Joint wear of a crank-driven leg: what clearances in its joints do, and what they wear away."""
+    """Monitor, simulate and forecast the joint wear of a crank-driven leg."""
     if ctx.invoked_subcommand is None:
         raise click.UsageError(f"no verb, expected one of {', '.join(_VERBS)}", ctx)
 

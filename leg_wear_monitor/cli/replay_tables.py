@@ -47,7 +47,7 @@ def print_replay(result: "ReplayResult", wall_s: float) -> None:
         is_counted_leg = Figure.CLEARANCES not in verdict.not_valid
         console.print(_joints(result, is_counted_leg))
         if not is_counted_leg:
-            console.print(f"{NOT_VALID}: the clearances are not those of the leg, see the verdict")
+            console.print(f"{NOT_VALID}: the clearances are not those of this leg; see the verdict")
         console.print(f"torque {_by_torque(result)}", soft_wrap=True)
         console.print()
         if Figure.FORECAST in verdict.not_valid:
@@ -69,7 +69,7 @@ def print_replay(result: "ReplayResult", wall_s: float) -> None:
 
 
 def _print_verdict(console: Console, verdict: "Verdict", joint_words: Callable[[str], str]) -> None:
-    """State, joints and reason; what a person does next, and the page on it; which figures do not hold."""
+    """State, joints and reason; what a person does next, and the page on it; which values are not valid."""
     from leg_wear_monitor.monitor.alarms.words import time_words
 
     whose = f" joint {', '.join(map(joint_words, verdict.joints))}" if verdict.joints else ""

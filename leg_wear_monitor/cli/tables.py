@@ -84,7 +84,7 @@ def _summary(result: "SimulationResult", wall_s: float) -> Iterator[tuple[str, s
     """Rows of a label and a text."""
     torque = result.drive_torque_nm
     if result.clearance_joints:
-        yield "wear", "greatest depth; 1 pm a cycle makes 1 um in a million cycles"
+        yield "wear", "greatest depth; 1 pm per cycle is 1 um in a million cycles"
         yield "zone", "contains 90 % of the bushing's wear, in angles of its own body"
     values = {name: getattr(torque, name) for name in ("mean", "rms", "min", "max", "p99")}
     signed = ", ".join(f"{name} {figure(value)}" for name, value in values.items())
@@ -114,7 +114,7 @@ def _energy(energy: "EnergyBalance") -> str:
     return (
         f"work in {figure(energy.work_in)} = stored {figure(energy.stored)} + friction "
         f"{figure(energy.friction_loss)} + impacts {figure(energy.contact_loss)} J, "
-        f"but for {figure(energy.residual)} J"
+        f"residual {figure(energy.residual)} J"
     )
 
 

@@ -36,7 +36,7 @@ def compilation(*kernels: str, how_long: str = "about half a minute") -> Iterato
     if all(is_compiled(one) for one in kernels):
         yield
         return
-    with _shown(f"compiling for this machine, once: {how_long}"):
+    with _shown(f"compiling numerical kernels (once per installation, {how_long})"):
         yield
     for mark in map(_mark, kernels):
         if mark is not None:

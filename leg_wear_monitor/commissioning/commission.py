@@ -69,7 +69,7 @@ def commission(
     RecordingError
         If a recording cannot be read.
     LegWearError
-        If it has no torque, no joint that turns on and on, or is too short.
+        If it has no torque, no joint that turns continuously, or is too short.
     """
     base = config if isinstance(config, MonitorConfig) else load_config(config)
     mechanism = fitted(load_mechanism(base.mechanism), base)
@@ -175,7 +175,7 @@ def _cranks(joints: dict[JointName, Series], wanted: str | None) -> dict[JointNa
             motions[name] = motion_of(each)
     if not motions:
         raise LegWearError(
-            f"no joint turns on and on like a crank: {'; '.join(reasons) or 'there is no joint'}"
+            f"no joint turns continuously like a crank: {'; '.join(reasons) or 'there is no joint'}"
         )
     return motions
 

@@ -31,12 +31,14 @@ class PaceConfig:
     """How the crank turns: speeds that follow one another, with a ripple."""
 
     times_s: tuple[float, ...] = quantity(
-        "s", "when each speed is set, the first at 0", default=(0.0,), check=_rises_from_zero
+        "s", "times at which the speeds are set, the first at 0", default=(0.0,), check=_rises_from_zero
     )
     speeds_rpm: tuple[float, ...] = quantity(
-        "rpm", "the speeds, one for each time; 0 stands still, below 0 turns clockwise", default=(60.0,)
+        "rpm",
+        "speeds, one for each time; at 0 the leg stands, below 0 the crank turns clockwise",
+        default=(60.0,),
     )
-    ramp_s: float = quantity("s", "time that a change of speed takes", above=0.0, default=0.5)
+    ramp_s: float = quantity("s", "duration of a change of speed", above=0.0, default=0.5)
     ripple: float = quantity(
         "", "speed ripple, as a fraction of the speed", at_least=0.0, at_most=0.9, default=0.0
     )
@@ -74,10 +76,12 @@ class JointEncodersConfig:
     """Further encoders, read with the crank's: each on a revolute joint, with errors of its own."""
 
     names: tuple[str, ...] = described(
-        "their names in joint_states, four at most; none if empty", default=(), check=_at_most_four
+        "names of further encoders in joint_states, four at most; none if empty",
+        default=(),
+        check=_at_most_four,
     )
     joints: tuple[str, ...] = described(
-        "revolute joint of each; the angle is from the bushing's body to the journal's", default=()
+        "revolute joint of each encoder; the angle is from the bushing's body to the journal's", default=()
     )
     noise_rad: float = quantity(
         "rad", "noise of the angles, standard deviation", at_least=0.0, default=1.0e-4
@@ -120,11 +124,11 @@ class TransportConfig:
     jitter_s: float = quantity(
         "s", "jitter of the sampling time, standard deviation", at_least=0.0, default=1.0e-4
     )
-    drop_fraction: float = _fraction("fraction that is lost")
-    duplicate_fraction: float = _fraction("fraction that arrives twice")
-    late_fraction: float = _fraction("fraction that arrives late, overtaken by others")
+    drop_fraction: float = _fraction("fraction of messages that are lost")
+    duplicate_fraction: float = _fraction("fraction of messages that arrive twice")
+    late_fraction: float = _fraction("fraction of messages that arrive late, after newer ones")
     late_s: float = quantity("s", "delay of late messages", at_least=0.0, default=0.02)
-    fault_fraction: float = _fraction("fraction of messages that are malformed, every way in turn")
+    fault_fraction: float = _fraction("fraction of messages that are malformed, each fault in turn")
     gaps_s: tuple[float, ...] = quantity(
         "s", "start times of gaps without messages", at_least=0.0, default=()
     )
@@ -149,7 +153,7 @@ class KnockConfig:
 
     joint: str = described("the clearance joint, none if empty", default="")
     at_s: float = quantity("s", "when", at_least=0.0, default=5.0)
-    clearance_m: float = quantity("m", "its radial clearance from then on", above=0.0, default=1.0e-3)
+    clearance_m: float = quantity("m", "radial clearance after the break", above=0.0, default=1.0e-3)
 
 
 @attrs.frozen(kw_only=True)
@@ -174,4 +178,4 @@ class GaitConfig:
     torque_sensor: TorqueSensorConfig = described("the drive's torque sensor", factory=TorqueSensorConfig)
     transport: TransportConfig = described("what happens to a reading on its way", factory=TransportConfig)
     load: LoadConfig = described("what a monitor cannot know of", factory=LoadConfig)
-    knock: KnockConfig = described("a bushing that breaks out", factory=KnockConfig)
+    knock: KnockConfig = described("a bushing that breaks", factory=KnockConfig)

@@ -46,7 +46,7 @@ def _label_fault(label: str) -> str | None:
 
 
 def _label() -> Any:
-    return described("what people call it, such as knee", default="", check=_label_fault, in_repr=False)
+    return described("name for operators, such as knee", default="", check=_label_fault, in_repr=False)
 
 
 @attrs.frozen(kw_only=True)
@@ -131,7 +131,7 @@ class Track:
     )
     max_torque_nm: float | None = quantity(
         "N m",
-        "largest torque of the drive, either way; without it there is no limit",
+        "largest torque of the drive, in both directions; none: no limit",
         above=0.0,
         default=None,
     )

@@ -44,8 +44,8 @@ class Clocks:
             return None
         apart = (crank[1] - crank[0]) / 1e9
         return (
-            f"{stream.topic} has no header and takes its log time, which is {apart:.6g} s after the header "
-            "stamps of joint_states: they do not meet, try --time log"
+            f"{stream.topic} has no header, so its stamps are log times; they are {apart:.6g} s after the "
+            "header stamps of joint_states; try --time log"
         )
 
     def _rate(self, kind: int, name: str) -> str | None:
@@ -57,5 +57,5 @@ class Clocks:
             return None
         return (
             f"{name}: header stamps span {span / 1e9:.6g} s, log times {span_log / 1e9:.6g} s; header stamps "
-            "count unless --time says otherwise"
+            "are used, unless --time selects others"
         )

@@ -132,12 +132,14 @@ def situation_of(
         Why nothing is monitored while the crank's zero is not known; empty if it is.
     """
     alarms, config = evaluation.board.alarms, evaluation.config
+    labels = {name: joint.label for name, joint in twin.mechanism.joints.items()}
     return Situation(
         joints=tuple(
-            _joint(k, name, float(twin.clearance_mean_m[k]), evaluation, last, diagnosis)
+            _joint(k, name, labels[name], float(twin.clearance_mean_m[k]), evaluation, last, diagnosis)
             for k, name in enumerate(twin.clearance_joints)
         ),
         alarms=tuple(alarms.values()),
+        quantities=specs.QUANTITIES,
         has_cycle=last is not None,
         has_torque=last is not None and last.torque_samples > 0,
         mismatch=last.torque_mismatch if last else math.nan,
@@ -173,6 +175,7 @@ def _doubts(
 def _joint(
     k: int,
     name: str,
+    label: str,
     counted_m: float,
     evaluation: AlarmEvaluation,
     last: CycleReport | None,
@@ -190,6 +193,7 @@ def _joint(
         believed_m=report.forecast.clearance_m.p50 if report and report.forecast else math.nan,
         seen=tuple(seen),
         is_used=bool(by_encoders and by_encoders.believed),
+        label=label,
     )
 
 
@@ -212,4 +216,4 @@ def _unfollowed(twin: DigitalTwin, evaluation: AlarmEvaluation) -> str:
     if evaluation.guard.cause:
         return evaluation.guard.cause
     out_s, cycle_s = twin.intake.out_s, 60.0 / abs(evaluation.config.cadence.commanded_rpm)
-    return f"the crank is not followed since {out_s:.3g} s" if out_s >= cycle_s else ""
+    return f"the crank has not been followed for {out_s:.3g} s" if out_s >= cycle_s else ""

@@ -27,7 +27,7 @@ from leg_wear_monitor.torque_fit.torque_model import torque_model
 from leg_wear_monitor.twin.digital_twin import DigitalTwin
 from leg_wear_monitor.twin.reference.leg_parameters import LegParameters
 
-WRONG_TORQUE = "the drive torque is wrong as received, see the status torque"
+WRONG_TORQUE = "the received drive torque is wrong; see the status `torque`"
 ACCELERATED = "wear is accelerated: clearances grow within the gait cycles that are compared"
 
 
@@ -117,7 +117,7 @@ class Parts:
 
     @property
     def diagnosis(self) -> Diagnosis:
-        """What the drive torque shows of the clearances; nothing while it is wrong as received."""
+        """Clearances that the drive torque shows; empty while the received torque is wrong."""
         if self.torque:
             found = self.torque.diagnosis
             if not self.is_torque_wrong:

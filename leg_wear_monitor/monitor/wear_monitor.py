@@ -154,7 +154,7 @@ class WearMonitor:
 
     @property
     def diagnosis(self) -> Diagnosis:
-        """What the drive torque shows of the clearances; nothing while it is wrong as received."""
+        """Clearances that the drive torque shows; empty while the received torque is wrong."""
         return self._parts.diagnosis
 
     @property

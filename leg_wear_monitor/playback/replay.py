@@ -93,7 +93,7 @@ class ReplayResult:
     def summary(
         self, wall_s: float | None = None, made_with: Mapping[str, str] | None = None
     ) -> ReplaySummary:
-        """What the replay found, as classes that go out as JSON and as tables; see `playback.summary`."""
+        """Results as classes, which give JSON and tables; see `playback.summary`."""
         return summary(self, wall_s, made_with)
 
     def count(self, samples: Samples) -> None:

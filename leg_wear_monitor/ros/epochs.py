@@ -21,10 +21,10 @@ NOW_NS = 10 * 10**9  # live samples are within this time of the node's clock; th
 NO_DATE_NS = 10**17  # stamps below are of 1970 to 1973: they count from the start of something
 
 UNDECIDED = (
-    "samples of a time that is in the ledger already are skipped: nothing is monitored. "
+    "the ledger contains the time of these samples already, so they are skipped and nothing is monitored. "
     "If they are simulated, set use_sim_time: true; "
-    "if their clock restarts with each start, ledger.skip_counted: false; "
-    "if a recording is played, use replay or no ledger"
+    "if their clock restarts with each start, set ledger.skip_counted: false; "
+    "if they are from a recording, use replay, or no ledger"
 )
 BEGUN = "the clock of the samples has restarted: they are counted as a new epoch"
 

@@ -150,6 +150,11 @@ class DigitalTwin:
         return self._intake
 
     @property
+    def mechanism(self) -> Mechanism:
+        """The mechanism as it was given."""
+        return self._mechanism
+
+    @property
     def parameters(self) -> LegParameters:
         """Factors on the parameters of the mechanism."""
         return self._parameters

@@ -17,7 +17,7 @@ WRONG = [
     ("simulate --cycles 0", ["--cycles", "0 is not above 0"]),
     ("simulate --duration -1", ["--duration", "-1", "above 0 s"]),
     ("simulate --duration inf", ["--duration", "inf", "finite number of s"]),
-    ("simulate --duration 1 --cycles 1", ["--duration", "--cycles", "exclude"]),
+    ("simulate --duration 1 --cycles 1", ["--duration", "--cycles", "cannot be combined"]),
     ("simulate --skip-cycles -1", ["--skip-cycles", "-1", "at least 0"]),
     ("simulate --trace 1.5", ["--trace", "'1.5'", "integer"]),
     ("simulate --trace -1", ["--trace", "-1", "0"]),

@@ -36,7 +36,7 @@ def test_a_measurement_is_kept_and_explained(run, ledger):
     result = run("measure", "A", "0.42", "--sigma", "0.005", "--ledger", str(ledger))
     assert (result.exit_code, result.stderr) == (0, "")
     first, second, third = result.stdout.splitlines()
-    assert first == "A: 0.42 mm ± 0.005 mm, 4000 gait cycles after it was new"
+    assert first == "A: 0.42 mm ± 0.005 mm, 4000 gait cycles after the part was new"
     assert second.startswith("the wear coefficient is 1.9")
     assert third.startswith("1 of 1 measured clearances were between expected p10 and p90")
     assert rows(ledger) == [("A", pytest.approx(4.2e-4), pytest.approx(6e-5), 4000, 1)]
@@ -141,8 +141,8 @@ def test_a_withdrawal_can_be_tried(run, ledger):
         (("A", "--withdraw", "last"), "no measurement of joint A can be withdrawn"),
         (("--withdraw", "7"), "'7' is not last, nor a measurement (none)"),
         (("--withdraw", "first"), "'first' is not last, nor a measurement (none)"),
-        (("--withdraw", "1", "--list"), "exclude each other"),
-        (("A", "0.4", "--withdraw", "1"), "exclude each other"),
+        (("--withdraw", "1", "--list"), "cannot be combined"),
+        (("A", "0.4", "--withdraw", "1"), "cannot be combined"),
         (("A", "0.4"), "expected JOINT MM --sigma MM, or --list, or --withdraw"),
         ((), "expected JOINT MM --sigma MM, or --list, or --withdraw"),
     ],

@@ -225,7 +225,7 @@ TURNING = 2.0 * np.pi * np.arange(N) / RATE_HZ
 @pytest.mark.parametrize(
     ("stamps", "angle", "why"),
     [
-        (STAMPS, 4.0 * TURNING, "the crank turns at 240 rpm, commanded are 60 rpm"),
+        (STAMPS, 4.0 * TURNING, "the crank turns at 240 rpm, the commanded cadence is 60 rpm"),
         (0 * STAMPS, TURNING, f"no crank sample can be used ({N} zero_stamp)"),
     ],
     ids=["a wheel", "no clock"],

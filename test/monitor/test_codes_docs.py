@@ -22,7 +22,7 @@ pytestmark = pytest.mark.plain
 
 def plain(text: str) -> str:
     """A rule's text; what it fills in is in italics."""
-    return re.sub(r"\{(\w+)\}", r"*\1*", text.replace("{past}", "").replace("{causes}", ""))
+    return re.sub(r"\{(\w+)\}", r"*\1*", re.sub(r"\{(past|causes|doubt)\}", "", text))
 
 
 def meanings() -> Iterator[tuple[str, str]]:

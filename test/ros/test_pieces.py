@@ -153,7 +153,7 @@ def test_a_publisher_of_another_type_is_named_with_both_types() -> None:
     assert told.level is Level.ERROR
     assert told.message == (
         "/left/joint_states: /arm/driver publishes std_msgs/msg/Float64, "
-        "expected sensor_msgs/msg/JointState; nothing comes from it"
+        "expected sensor_msgs/msg/JointState; no message arrives from it"
     )
 
 
@@ -180,7 +180,7 @@ def test_a_topic_that_falls_silent_is_an_error() -> None:
     assert (spoken.level, spoken.values["joint_states_silent_s"]) == (Level.OK, 1.0)
     silent = topics_status([topic(publishers=Publishers())], 13 * SECOND, SECOND)
     assert (silent.level, silent.values["joint_states_silent_s"]) == (Level.ERROR, 3.0)
-    assert "has fallen silent since 2023-11-14T22:13:20.000Z" in silent.message
+    assert "has been silent since 2023-11-14T22:13:20.000Z" in silent.message
 
 
 def test_an_inbox_holds_its_bytes_and_counts_what_it_sheds() -> None:

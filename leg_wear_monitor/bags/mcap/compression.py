@@ -38,7 +38,7 @@ def expand(data: bytes, compression: str, size: int) -> bytes:
     else:
         raise DamageError(f"has compression {compression!r}, expected zstd, lz4 or none")
     if len(content) != size:
-        raise DamageError(f"holds {len(content)} bytes, expected {size}")
+        raise DamageError(f"contains {len(content)} bytes, expected {size}")
     return content
 
 
@@ -124,7 +124,7 @@ def _zstd(data: bytes, size: int) -> bytes:
     try:
         said = zstandard.frame_content_size(data)
         if said not in (-1, size):
-            raise DamageError(f"holds {said} bytes, expected {size}")
+            raise DamageError(f"contains {said} bytes, expected {size}")
         return zstandard.ZstdDecompressor().decompress(data, max_output_size=size)
     except zstandard.ZstdError as error:
         raise DamageError(f"cannot be decompressed: {error}") from error

@@ -160,7 +160,10 @@ class McapFile:
         rest = len(data) - int(counts["read"][0])
         if rest and not segment.cut:
             self._find(f"chunk at byte {segment.at} holds {rest} bytes that are not records: they are lost")
-        for name, what in (("unknown_channel", "messages of no channel"), ("foreign", "records of no kind")):
+        for name, what in (
+            ("unknown_channel", "messages without a channel"),
+            ("foreign", "records of an unknown kind"),
+        ):
             if counts[name][0]:
                 self._find(f"chunk at byte {segment.at} holds {counts[name][0]} {what}: they are lost")
         return messages
@@ -197,7 +200,7 @@ class McapFile:
         while left and (part := self.file.read(min(left, 2**20))):
             crc, left = zlib.crc32(part, crc), left - len(part)
         if crc != self.layout.data_crc:
-            self._find("does not match the checksum of its data: something in it is damaged")
+            self._find("does not match the checksum of its data: a part of it is damaged")
 
     def _find(self, text: str, severity: Severity = Severity.LOSS) -> None:
         if len(self.findings) < _MOST_FINDINGS:

@@ -64,7 +64,7 @@ def open_database(
     except (*UNREADABLE, OSError) as error:
         raise RecordingError(str(path), "", f"is not a readable .db3 file: {one_line(error)}") from error
     names = " and ".join(each.name for each in beside)
-    return database, [f"was not closed: the content of {names} beside it is read, too"] if beside else []
+    return database, [f"was not closed: the content of {names} beside it is read as well"] if beside else []
 
 
 def one_line(error: Exception) -> str:

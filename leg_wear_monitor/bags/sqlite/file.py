@@ -127,7 +127,7 @@ class SqliteFile:
         """Report the number of messages that belong to no listed topic."""
         count = sum(count for topic, count in self._counts.items() if topic not in self.channels)
         if count:
-            text = f"holds {count} messages of topics that it does not list: they are lost"
+            text = f"contains {count} messages of topics that it does not list: they are lost"
             self.findings.append(Finding(self.path, text))
 
 

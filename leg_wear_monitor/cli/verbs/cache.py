@@ -14,10 +14,10 @@ _MOST = 20  # directories that are listed: one version has about ten
 @click.command(short_help="List or remove the compiled code on this machine.")
 @click.option("--clear", is_flag=True, help="Remove it; the next start compiles again.")
 def cache(clear: bool) -> None:
-    """Print where compiled code is kept and how much of it, by version; or remove it.
+    """Print the place and the size of the compiled code, by version; or remove it.
 
-    Each change of the sources makes a version. Of each part of the code the two versions that were used last
-    are kept, and all that were used within a day.
+    Each change of the source makes a new version. The two versions that were used last are kept, and all
+    versions that were used within a day.
     """
     from leg_wear_monitor.code_cache import kept_directories
     from leg_wear_monitor.kernel import cache_directory
@@ -41,7 +41,7 @@ def cache(clear: bool) -> None:
         used = datetime.fromtimestamp(_used(directory)).strftime("%Y-%m-%d %H:%M")
         click.echo(f"  {_in_mb(_size(directory)):>9}  used {used}  {directory.name}")
     if len(kept) > _MOST:
-        click.echo(f"  and {len(kept) - _MOST} that were used before")
+        click.echo(f"  and {len(kept) - _MOST} that are older")
 
 
 def _used(directory: Path) -> float:

@@ -25,11 +25,11 @@ _LIBRARIES = ("attrs", "cattrs", "click", "jinja2", "matplotlib", "numba", "nump
 @click.command(short_help="Check a configuration or the installation.")
 @click.argument("configs", nargs=-1, metavar="[CONFIG]...")
 def check(configs: tuple[str, ...]) -> int:
-    """Check files of mechanisms and of parameters, or, without any, the installation and its own files.
+    """Check mechanism files and parameter files; without a file, the installation and its own files.
 
-    Prints what was understood of each that is in order, and a line on stderr for each that is not. A value
-    that is likely meant in another unit is a warning; the exit code is then 1. Tables (.csv, .parquet) are
-    read with the columns and units of the parameter file before them: check monitor.yaml leg.csv.
+    Prints a summary of each correct file, and a line on stderr for each fault. A value that is probably in
+    another unit causes a warning; the exit code is then 1. Tables (.csv, .parquet) are read with the columns
+    and units of the parameter file before them: check monitor.yaml leg.csv.
     """
     with warnings.catch_warnings(record=True) as doubted:
         warnings.simplefilter("always", ConfigWarning)

@@ -24,14 +24,15 @@ WITH_FINDINGS = 1
     "--config",
     type=click.Path(path_type=Path),
     metavar="FILE",
-    help="Parameter file that names the mechanism; what is not measured is kept.  [default: the one that "
-    "comes with the package]",
+    help="Parameter file that names the mechanism; parameters that are not measured are kept.  "
+    "[default: the one that comes with the package]",
 )
 @click.option(
     "--out",
     type=click.Path(path_type=Path, dir_okay=False),
     metavar="FILE",
-    help="Write the proposed parameters, such as monitor.yaml; nothing is written if a choice is not sure.",
+    help="Write the proposed parameters, such as monitor.yaml; nothing is written if a choice is not "
+    "certain.",
 )
 @click.option("--joint-states", metavar="TOPIC", help="Topic of the crank.  [default: all are tried]")
 @click.option("--drive-torque", metavar="TOPIC", help="Topic of the torque.  [default: all are tried]")
@@ -48,10 +49,10 @@ def commission(
 ) -> int:
     """Propose the parameters of a robot from recordings of its healthy leg.
 
-    MCAP, .db3, CSV and Parquet files or bag directories: a minute of walking with the foot in the air, best
-    at two cadences. All joints and all torques are tried,
-    in both directions, with every gear ratio and offset; the drive torque of the mechanism is the judge. Exit
-    code 1 if something cannot be told, or does not fit.
+    Reads MCAP, .db3, CSV and Parquet files or bag directories. Record a minute of walking with the foot in
+    the air, preferably at two cadences. The command tries all joints and all torques, in both directions,
+    with every gear ratio and offset. It compares each with the drive torque of the mechanism. Exit code 1 if
+    a parameter cannot be determined, or does not fit.
     """
     for option, path in (("--out", out), ("--json", json_file)):
         if path is not None and path != STDOUT:

@@ -30,7 +30,7 @@ _PATIENCE_S = 60.0
 _COMPARED = ("clearance_states", "impact_forces", "predicted_torque")
 
 
-@click.command(short_help="A demonstration on this machine in about half a minute.")
+@click.command(short_help="Run a demonstration on this machine, about half a minute.")
 @click.option(
     "--out",
     type=click.Path(path_type=Path),
@@ -40,10 +40,11 @@ _COMPARED = ("clearance_states", "impact_forces", "predicted_torque")
     help="Directory of recording, report and logs.",
 )
 def demo(out: Path) -> int:
-    """Run the monitor and a synthetic leg as two ROS processes; record, replay and report what they did.
+    """Run the monitor and a synthetic leg as two ROS processes; record, replay and report the run.
 
     The leg and its twin wear a thousand times as fast as steel. The leg walks faster for a while, until
-    impacts raise an alarm, which is acknowledged. Then the recording goes through the same monitor again.
+    impacts raise an alarm; the demonstration acknowledges it. Then the recording goes through the same
+    monitor again.
     """
     need_rclpy()
     check_directory("--out", out)

@@ -5,7 +5,7 @@ from leg_wear_monitor.cli.node import node_verb
 gait_publisher = node_verb(
     "gait-publisher",
     "gait_publisher.node",
-    "The synthetic leg as a ROS 2 node.",
+    "Run the synthetic leg as a ROS 2 node.",
     """Publish the sensor signals of a synthetic leg: joint_states and drive_torque.
 
     The leg is simulated in full coordinates with its own clearances and wear; noise, loss, load, speed and a

@@ -28,7 +28,7 @@ if TYPE_CHECKING:
 _ROWS = 12  # of the table
 
 
-@click.command(short_help="A leg's wear over its life, by cycle jumps.")
+@click.command(short_help="Simulate the wear of a leg over its life, by cycle jumps.")
 @mechanism_option
 @clearances_option("A,B")
 @speed_option
@@ -87,10 +87,10 @@ _ROWS = 12  # of the table
 @json_option("the life")
 @out_option("Write life.json and life.png.")
 def life(mechanism: str, json_file: Path | None, out: Path | None, **options: Any) -> None:
-    """Let a leg wear from new until a clearance reaches its limit.
+    """Simulate the wear of a leg from new until a clearance reaches its limit.
 
-    A few gait cycles are simulated, and their mean wear is applied over many; single cycles are chaotic, so
-    the values scatter, and the scatter is reported.
+    A few gait cycles are simulated, and their mean wear is applied over many. Single cycles are chaotic, so
+    the values scatter; the scatter is reported.
     """
     from leg_wear_monitor.mechanism.loader import load_mechanism
     from leg_wear_monitor.mechanism.plausible import doubts

@@ -18,7 +18,7 @@ if TYPE_CHECKING:
 CONTRADICTS = 1
 
 
-@click.command(short_help="A measured clearance, which updates the forecast.")
+@click.command(short_help="Enter a measured clearance, which updates the forecast.")
 @click.argument("joint", required=False)
 @click.argument("mm", type=float, required=False, callback=bounded("mm", above=0.0))
 @click.option(
@@ -47,7 +47,8 @@ CONTRADICTS = 1
     "--withdraw",
     "withdrawn",
     metavar=f"NUMBER|{LAST}",
-    help=f"Withdraw a measurement: it is kept, and does not count. {LAST}: the last one, of JOINT if given.",
+    help=f"Withdraw a measurement: it stays in the ledger and no longer counts. {LAST}: the last one, of "
+    "JOINT if given.",
 )
 def measure(
     joint: str | None,
@@ -57,13 +58,14 @@ def measure(
     withdrawn: str | None,
     **options: Any,
 ) -> int:
-    """Tell that the mean radial clearance of JOINT was measured as MM millimetres.
+    """Enter the measured mean radial clearance of JOINT, in millimetres.
 
-    By feeler gauge, micrometer or dial; a dial that is moved to and fro shows twice the radial clearance. The
-    monitor of this leg must not run meanwhile. Exit code 1 if the measurement contradicts the model.
+    Measure with a feeler gauge, a micrometer or a dial. A dial shows twice the radial clearance if the pin is
+    moved to and fro. Stop the monitor of this leg first. Exit code 1 if the measurement contradicts the
+    model.
     """
     if (listed or withdrawn) and (mm is not None or sigma is not None or (listed and withdrawn)):
-        raise click.UsageError("--list and --withdraw exclude each other, MM and --sigma")
+        raise click.UsageError("--list and --withdraw cannot be combined, nor used with MM or --sigma")
     if listed:
         list_measurements(options["config"], options["ledger"])
         return 0
@@ -74,7 +76,9 @@ def measure(
     if joint is None or mm is None or sigma is None:
         raise click.UsageError("expected JOINT MM --sigma MM, or --list, or --withdraw")
     found, record = _measured(joint, 1.0e-3 * mm, 1.0e-3 * sigma, **options)
-    click.echo(f"{joint}: {mm:g} mm ± {sigma:g} mm, {found.measurement.cycles} gait cycles after it was new")
+    click.echo(
+        f"{joint}: {mm:g} mm ± {sigma:g} mm, {found.measurement.cycles} gait cycles after the part was new"
+    )
     for line in (*found.words, record):
         click.echo(line)
     if options["dry_run"]:

@@ -29,7 +29,7 @@ TIMES = ("header", "log", "publish")
 _MOST_LINES = 20
 
 
-@click.command(short_help="Replay a recording through the monitor that runs live.")
+@click.command(short_help="Replay a recording through the monitor.")
 @click.argument("bags", nargs=-1, required=True, type=click.Path(path_type=Path), metavar="BAG...")
 @out_option("Write reports.mcap (for rosbag2 and Foxglove), summary.json and report.html.")
 @click.option(
@@ -70,7 +70,7 @@ _MOST_LINES = 20
     metavar="FILE",
     help="Ledger to continue or to begin; the one in the parameters is never touched.",
 )
-@click.option("--allow-partial", is_flag=True, help="Exit with 0 also if parts of the recording are lost.")
+@click.option("--allow-partial", is_flag=True, help="Exit with 0 even if parts of the recording are lost.")
 @click.option(
     "--fail-on",
     type=click.Choice(("alarm", "warning", "input", *KINDS)),
@@ -88,10 +88,10 @@ def replay(
     fail_on: tuple[str, ...],
     **options: Any,
 ) -> int:
-    """Put recordings through the monitor: MCAP, .db3, CSV, Parquet or bag directories, several as one.
+    """Replay recordings through the monitor: MCAP, .db3, CSV and Parquet files or bag directories.
 
-    Exits with 1 if parts of a recording were lost, if no gait cycle in it can be this leg's, or for an alarm
-    asked for with --fail-on.
+    Several paths are one recording. Exits with 1 if parts of it were lost, if no gait cycle in it fits this
+    leg, or if an alarm of --fail-on was raised.
     """
     check_outputs(json_file, out)
     written: list[Path] = []

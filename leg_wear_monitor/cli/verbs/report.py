@@ -21,7 +21,7 @@ _MISMADE = (
 @click.command(short_help="Write the HTML page of a run again, from its data.")
 @click.argument("directory", type=click.Path(path_type=Path), metavar="DIR")
 def report(directory: Path) -> int:
-    """Draw the page of a study or a replay again from what lies in DIR; nothing is computed."""
+    """Draw the page of a study or a replay again from the data in DIR; nothing is computed."""
     if (directory / SUMMARY).is_file():
         return _replay(directory)
     if not (directory / "study.json").is_file():

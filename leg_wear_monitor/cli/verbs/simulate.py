@@ -31,7 +31,7 @@ MODELS, DEFAULT_MODEL = ("clearance", "full"), "clearance"
 _WARM_UP_CYCLES, _WARM_UP_S = 1.0 / 256.0, 1.0e-9
 
 
-@click.command(short_help="The leg offline, ideal or with clearances.")
+@click.command(short_help="Simulate the leg offline, ideal or with clearances.")
 @mechanism_option
 @clearances_option("A,B|none")
 @click.option(
@@ -61,7 +61,7 @@ _WARM_UP_CYCLES, _WARM_UP_S = 1.0 / 256.0, 1.0e-9
     type=float,
     callback=bounded(at_least=0.0),
     metavar="N",
-    help="Gait cycles to let pass before counting.  [default: 1; 0 with --duration]",
+    help="Gait cycles before counting.  [default: 1; 0 with --duration]",
 )
 @click.option(
     "--model", type=click.Choice(MODELS), help=f"Formulation of the motion.  [default: {DEFAULT_MODEL}]"
@@ -71,7 +71,7 @@ _WARM_UP_CYCLES, _WARM_UP_S = 1.0 / 256.0, 1.0e-9
     type=click.Choice(("on", "off")),
     default="off",
     show_default=True,
-    help="Whether wear opens the clearances as it goes; it is counted either way.",
+    help="Whether wear opens the clearances during the run; it is counted either way.",
 )
 @click.option(
     "--normal-law",
@@ -84,14 +84,14 @@ _WARM_UP_CYCLES, _WARM_UP_S = 1.0 / 256.0, 1.0e-9
     type=click.IntRange(min=0),
     metavar="N",
     default=0,
-    help="Keep N samples a cycle, for --json and, as a picture too, for --out.",
+    help="Keep N samples per cycle, for --json and for the pictures of --out.",
 )
 @json_option("the result")
 @out_option("Write result.json and pictures of the leg and its worn bushings.")
 def simulate(mechanism: str, json_file: Path | None, out: Path | None, **options: Any) -> None:
-    """Move the leg, ideal or with clearances, and say what forces and wear that makes."""
+    """Simulate the motion of the leg, ideal or with clearances, and report forces and wear."""
     if options["cycles"] is not None and options["duration"] is not None:
-        raise click.UsageError("--cycles and --duration exclude each other")
+        raise click.UsageError("--cycles and --duration cannot be combined")
     from leg_wear_monitor.mechanism.loader import load_mechanism
     from leg_wear_monitor.mechanism.plausible import doubts
 

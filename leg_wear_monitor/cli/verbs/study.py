@@ -17,7 +17,7 @@ NAMES = ("size", "speed", "location", "wear", "multi", "chaos", "laws", "legs")
 FAULTS_FOUND = 1
 
 
-@click.command(short_help="The paper's parameter studies.")
+@click.command(short_help="Run one of the parameter studies of the paper.")
 @click.argument("name", type=click.Choice(NAMES), metavar="NAME")
 @click.option("--mechanism", metavar="FILE", help="Another leg than that of the study file.")
 @click.option(

@@ -69,13 +69,13 @@ def sampling_of(one: Fit, model: TorqueModel) -> Sampling:
     near = min(_TYPICAL, key=lambda name: abs(math.log(max(added, _LEAST) / _TYPICAL[name])))
     odds = min(_odds(near, added - _SURE * error), _odds(near, added + _SURE * error))
     told = (
-        f"the errors of neighbouring samples add up to {added:.2g} ± {error:.1g} of what independent ones "
-        f"do, averages' to about {_TYPICAL[AVERAGE]:g}, instants' to about {_TYPICAL[INSTANT]:g}"
+        f"the errors of neighbouring samples add up to {added:.2g} ± {error:.1g} times those of independent "
+        f"samples (averages: about {_TYPICAL[AVERAGE]:g}, instants: about {_TYPICAL[INSTANT]:g})"
     )
     if added > _STRANGE or (near == INSTANT and narrow < _FLAT * added):
         return Sampling("", f"{told}: does a load change slowly?")
     if odds < _SURE_ODDS:
-        return Sampling("", f"{told}: more like {near}, but not for sure")
+        return Sampling("", f"{told}: probably {near}, but this is not certain")
     return Sampling(near, f"odds {'at least ' if odds >= _MOST_ODDS else ''}{odds:.0f} to 1: {told}")
 
 
@@ -98,16 +98,16 @@ def _shows_impacts(one: Fit, rest: Floats, noise: float) -> bool:
 
 def _by_lag(one: Fit) -> Sampling:
     """Averages are late by half a sampling interval: it shows if no other lag does."""
-    why = "the torque shows no strong impacts beyond its noise, by which averages and instants differ"
+    why = "averages and instants differ by impacts, and the torque shows no strong impacts above its noise"
     half, error = 0.5 * one.pair.interval_s, lag_error_s(one)
     if not separates_lag(one.pair) or error > 0.5 * half:
         return Sampling("", why)
     late = {AVERAGE: abs(one.lag_s - half), INSTANT: abs(one.lag_s)}
     near = [name for name, away in late.items() if away <= 2.0 * error]
     if len(near) != 1:
-        return Sampling("", f"{why}, and a lag of {1.0e3 * one.lag_s:.2g} ms is that of neither or both")
+        return Sampling("", f"{why}; a lag of {1.0e3 * one.lag_s:.2g} ms fits neither or both")
     return Sampling(
-        near[0], f"the torque is late by {1.0e3 * one.lag_s:.2g} ms; half an interval is that of averages"
+        near[0], f"the torque is late by {1.0e3 * one.lag_s:.2g} ms; averages are late by half an interval"
     )
 
 

@@ -1,4 +1,4 @@
-"""Sentences on what cannot be told, on what does not fit, and on what is worth knowing."""
+"""Sentences on what cannot be determined, on what does not fit, and on what is worth knowing."""
 
 import math
 from collections.abc import Iterator
@@ -23,7 +23,7 @@ _AT_ZERO_RAD = 0.02
 
 
 def not_told(found: Found) -> tuple[str, ...]:
-    """What the recording is not enough to tell, and why."""
+    """Parameters that the recording does not determine, and why."""
     told = list(found.choice.doubts)
     if not found.sampling.value:
         told.append(f"drive_torque.sampling: {found.sampling.why}")
@@ -33,16 +33,16 @@ def not_told(found: Found) -> tuple[str, ...]:
         error = found.fit.sigma["ratio"] / abs(found.fit.ratio)
         away = error * abs(float(found.fit.crank()[1].mean())) * 3600.0
         told.append(
-            f"crank.gear_ratio: {ratio:.7g} is known to ± {error * ratio:.2g}, by which the crank angle runs "
-            f"away by {away:.2g} rad in an hour; enter the ratio of the teeth"
+            f"crank.gear_ratio: {ratio:.7g} is known to ± {error * ratio:.2g}, so the crank angle drifts "
+            f"by up to {away:.2g} rad in an hour; enter the ratio of the teeth"
         )
     scale, rest = found.fit.sigma["gain"] / abs(found.fit.gain), repeating(found.fit)
     if scale > _ROUGH_SCALE:
         told.append(f"drive_torque.scale: known to ± {100.0 * scale:.0f} % only; record longer")
     elif rest > _ROUGH_REST:
         told.append(
-            f"drive_torque.scale: {100.0 * rest:.0f} % of the torque repeats and does not fit, by as much "
-            "the scale may be wrong"
+            f"drive_torque.scale: {100.0 * rest:.0f} % of the torque repeats and does not fit; the scale "
+            "may be wrong by as much"
         )
     return tuple(told)
 
@@ -79,8 +79,8 @@ def _lag(found: Found) -> Iterator[str]:
     elif _TOLD * timing.error_s > most:
         error = 1.0e3 * _TOLD * timing.error_s
         yield (
-            f"lag: known to ± {error:.2g} ms only, more than drive_torque.max_lag_s, {1.0e3 * most:g} ms, "
-            "since clearances shift the torque's phase from cadence to cadence; record cadences further apart"
+            f"lag: known to ± {error:.2g} ms only, more than drive_torque.max_lag_s ({1.0e3 * most:g} ms), "
+            "because clearances shift the torque's phase with the cadence; record cadences further apart"
         )
 
 
@@ -99,7 +99,7 @@ def _drives(found: Found) -> str:
     size = float(one.predicted.std()) / abs(one.gain)
     if friction < -_SURE * sigma and abs(friction) > 0.02 * size:
         return (
-            f"a constant torque of {abs(friction):.2g} N m drives the crank, which friction cannot: zero the "
+            f"a constant torque of {abs(friction):.2g} N m drives the crank; friction cannot drive: zero the "
             "torque sensor"
         )
     return ""
@@ -110,7 +110,7 @@ def _late(found: Found) -> str:
     if not abs(late) - _SURE * found.timing.error_s > most:
         return ""
     return (
-        f"the torque is late by {1.0e3 * late:.3g} ms, more than drive_torque.max_lag_s, {1.0e3 * most:g} ms"
+        f"the torque is late by {1.0e3 * late:.3g} ms, more than drive_torque.max_lag_s ({1.0e3 * most:g} ms)"
     )
 
 
@@ -121,15 +121,15 @@ def _anew(found: Found) -> str:
         return ""
     each = ", ".join(f"{offset:.3f}" for offset in offsets)
     return (
-        f"the encoder starts anew in each recording: its offsets, found again from the torque's phase, are "
-        f"{each} rad; the proposed one is that of the last recording and holds until the next boot"
+        f"the encoder starts at another zero in each recording: the torque's phase gives the offsets {each} "
+        "rad; the proposed offset is that of the last recording and is valid until the next boot"
     )
 
 
 def _position(found: Found) -> str:
     measured = found.fit.gear_ratio
     if abs(measured / _IN_DEGREES - 1.0) < 2.0 * gear_error(found.fit):
-        return "the joint's position looks like degrees, ROS expects radians: gear ratio 57.2958"
+        return "the joint's position looks like degrees; ROS expects radians: gear ratio 57.2958"
     if found.motion.is_wrapped and gear(found)[0] != 1.0:
         return (
             f"the joint's position is wrapped to a turn, but its gear ratio is {measured:.6g}: the monitor "
@@ -143,10 +143,10 @@ def _notes(found: Found) -> Iterator[str]:
     ratio = gear(found)[0]
     if ratio != 1.0 and len(found.fit.offset_rad) == 1:
         is_zero = bool(abs(found.motion.first_rad[-1]) < _AT_ZERO_RAD)
-        seems = "its first reading is 0 as if it did" if is_zero else "a motor's often does"
+        seems = "its first reading is 0" if is_zero else "motor encoders often do"
         yield (
             f"the encoder turns {ratio:.6g} times in a turn of the crank; if it starts at zero at each boot "
-            f"({seems}), the offset, found here from the torque's phase, holds until the next boot; then run "
+            f"({seems}), the offset from the torque's phase is valid until the next boot; then run "
             "commission again"
         )
     for topic, name in (
@@ -156,8 +156,8 @@ def _notes(found: Found) -> Iterator[str]:
         if topic != f"/{name}" and not (name == "drive_torque" and topic == found.best.joint.topic):
             yield f"start the monitor with -r {name}:={topic}, replay with --{name.replace('_', '-')} {topic}"
     if found.best.torque.source == FLOAT64:
-        yield "a Float64 has no stamp: the torque's time is that of its arrival, so its lag counts"
+        yield "a Float64 has no stamp: the torque has its time of arrival, so delayed messages are a lag"
     speeds = cadences_rpm(found.fit)
     if len(speeds) > 1:
         each = " and ".join(f"{speed:g}" for speed in speeds)
-        yield f"the leg walks at about {each} rpm; cadence.commanded_rpm is that of most of the time"
+        yield f"the leg walks at about {each} rpm; cadence.commanded_rpm is the most frequent one"

@@ -190,7 +190,7 @@ def _timing(found: Found) -> Iterator[Item]:
         sigma=timing.error_s if timing.is_lag_separated else None,
         remark="of the torque, beside that of its sampling"
         if timing.is_lag_separated
-        else "not enough to tell from an offset at one cadence",
+        else "cannot be distinguished from an offset at one cadence",
     )
     cadence, tolerance = cadence_rpm(one)
     yield Item(name="cadence.commanded_rpm", value=cadence, unit="rpm")

@@ -1,4 +1,4 @@
-"""What commissioning found: each parameter with its runner-up, what cannot be told, what does not fit."""
+"""Result of commissioning: each parameter with its runner-up, the undetermined ones, what does not fit."""
 
 import math
 from typing import TYPE_CHECKING, Any
@@ -20,14 +20,14 @@ SCHEMA_VERSION = 1
 
 @attrs.frozen(kw_only=True)
 class CommissioningItem:
-    """One thing that was looked for.
+    """A quantity that commissioning determines.
 
     Attributes
     ----------
     name : str
-        A parameter of the monitor, or what else was measured.
+        A parameter of the monitor, or another measured quantity.
     value : str, int or float
-        NaN if it cannot be told.
+        NaN if it cannot be determined.
     unit : str
         Unit of the value; empty for a name or a ratio.
     sigma : float, optional
@@ -39,7 +39,7 @@ class CommissioningItem:
     other_mismatch : float, optional
         Its mismatch.
     remark : str
-        What else is known of it.
+        Further information.
     """
 
     name: str
@@ -59,15 +59,15 @@ class CommissioningResult:
     Attributes
     ----------
     items : tuple of CommissioningItem
-        What was looked for, one by one.
+        The quantities, one by one.
     not_told : tuple of str
-        What the recording is not enough to tell, and why.
+        Parameters that the recording does not determine, and why.
     findings : tuple of str
-        What does not fit, and what to do.
+        What does not fit, and the remedy.
     notes : tuple of str
-        What is worth knowing.
+        Further information.
     config : MonitorConfig or None
-        The proposed parameters; None if a choice between alternatives is not sure.
+        The proposed parameters; None if a choice between alternatives is not certain.
     turns : float
         Turns of the crank in the recording.
     faults : tuple of Finding
@@ -84,7 +84,7 @@ class CommissioningResult:
 
     @property
     def is_sure(self) -> bool:
-        """Whether everything could be told, and all fits."""
+        """Whether every parameter was determined, and everything fits."""
         return self.config is not None and not self.not_told and not self.findings
 
     def item(self, name: str) -> CommissioningItem:
@@ -92,7 +92,7 @@ class CommissioningResult:
         return {each.name: each for each in self.items}[name]
 
     def to_dict(self) -> dict[str, Any]:
-        """Plain object for JSON; null for what cannot be told."""
+        """Plain object for JSON; null for what cannot be determined."""
         return {
             "schema_version": SCHEMA_VERSION,
             "turns": self.turns,
@@ -122,7 +122,7 @@ class CommissioningResult:
         return data_frame(columns, index="name")
 
     def to_yaml(self) -> str:
-        """Parameter file of the monitor; what is not sure stands as comments at its head.
+        """Parameter file of the monitor; uncertain parameters are comments at its head.
 
         Raises
         ------

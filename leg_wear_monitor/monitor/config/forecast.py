@@ -48,7 +48,7 @@ class Forecasting:
     )
     window_cycles: int = quantity(
         "",
-        "gait cycles the forecast's growth rate is averaged over",
+        "gait cycles over which the growth of the forecast is averaged",
         at_least=10,
         at_most=100000,
         default=2000,

@@ -74,12 +74,12 @@ class Encoders:
     """Further encoders, in whose angles clearances show (forecast.md); by default there are none."""
 
     names: tuple[str, ...] = described(
-        "their names in joint_states, in the messages with the crank; empty: none is read",
+        "names of further encoders in joint_states, in the messages with the crank; empty: none",
         default=(),
         check=_few_and_different,
     )
     joints: tuple[str, ...] = described(
-        "the mechanism's revolute joint of each; its angle is from the bushing's body to the journal's, with "
+        "revolute joint of each encoder; its angle is from the bushing's body to the journal's, with "
         "an offset that is estimated",
         default=(),
         check=_few_and_different,
@@ -101,7 +101,7 @@ class Encoders:
     )
     window_cycles: int = quantity(
         "",
-        "gait cycles that clearances are estimated from; a sudden change shows after half of them",
+        "gait cycles from which clearances are estimated; a sudden change shows after half of them",
         at_least=20,
         at_most=2000,
         default=60,
@@ -163,7 +163,7 @@ class DriveTorque:
     )
     saturation_nm: float = quantity(
         "N m",
-        "torque on the crank from which on the sensor is saturated; 0 if not known",
+        "torque on the crank at which the sensor saturates; 0: unknown",
         at_least=0.0,
         at_most=1.0e6,
         default=0.0,
@@ -185,7 +185,7 @@ class Cadence:
     )
     tolerance_rpm: float = quantity(
         "rpm",
-        "departure from the commanded speed up to which predictions are valid",
+        "largest departure from the commanded speed at which predictions are valid",
         above=0.0,
         at_most=1200.0,
         default=6.0,
@@ -205,7 +205,7 @@ class Tracker:
         "Hz", "bandwidth of the crank's tracker", at_least=1.0, at_most=100.0, default=8.0
     )
     reorder_window_s: float = quantity(
-        "s", "how long a sample waits for earlier ones", at_least=0.0, at_most=0.5, default=0.02
+        "s", "time for which a sample waits for earlier ones", at_least=0.0, at_most=0.5, default=0.02
     )
     gap_limit_s: float = quantity(
         "s",

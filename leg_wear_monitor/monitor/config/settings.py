@@ -22,7 +22,7 @@ class Limits:
 
     warn_fraction: float = quantity(
         "",
-        "fraction of a limit from which on there is a warning",
+        "fraction of a limit at which the level WARN begins",
         above=0.0,
         at_most=1.0,
         default=0.8,
@@ -68,7 +68,7 @@ class Limits:
     )
     remaining_life_h: float = quantity(
         "h",
-        "least remaining life of a joint, the p10 of its forecast; 0: when that is over",
+        "least remaining life of a joint (p10 of its forecast); 0: at its end",
         at_least=0.0,
         at_most=1.0e6,
         default=0.0,
@@ -84,7 +84,7 @@ class Limits:
     )
     torque_bias_nm: float = quantity(
         "N m",
-        "constant drive torque beyond 0 to drive_torque.max_friction_nm; 0: a tenth of the predicted RMS",
+        "constant drive torque outside 0 to drive_torque.max_friction_nm; 0: a tenth of the predicted RMS",
         at_least=0.0,
         at_most=1.0e6,
         default=0.0,
@@ -102,7 +102,7 @@ class Limits:
         "Hz", "least rate of crank samples", above=0.0, at_most=1.0e5, default=40.0, metadata=LIVE
     )
     bad_sample_fraction: float = quantity(
-        "", "fraction of samples that cannot be used", above=0.0, at_most=1.0, default=0.05, metadata=LIVE
+        "", "fraction of unusable samples", above=0.0, at_most=1.0, default=0.05, metadata=LIVE
     )
     stuck_torque_fraction: float = quantity(
         "",
@@ -131,7 +131,7 @@ class Alarms:
     )
     on_delay_cycles: int = quantity(
         "",
-        "gait cycles in a row beyond a limit before the level rises",
+        "consecutive gait cycles beyond a limit before the level rises",
         at_least=1,
         at_most=1000,
         default=3,
@@ -139,7 +139,7 @@ class Alarms:
     )
     knock_on_delay_cycles: int = quantity(
         "",
-        "on-delay of the alarms that show a knock at once: impact forces and torque mismatch",
+        "on-delay of the alarms that a knock raises: impact forces and torque mismatch",
         at_least=1,
         at_most=1000,
         default=1,
@@ -152,7 +152,7 @@ class Growth:
     """How growth is averaged."""
 
     window_cycles: int = quantity(
-        "", "gait cycles a growth rate is averaged over", at_least=3, at_most=10000, default=30
+        "", "gait cycles over which growth is averaged", at_least=3, at_most=10000, default=30
     )
 
 
@@ -169,7 +169,7 @@ class LedgerFile:
         default=5.0,
     )
     skip_counted: bool = described(
-        "leave out samples of a time whose wear is in the ledger from an earlier run", default=True
+        "skip samples of a time whose wear an earlier run has stored in the ledger", default=True
     )
 
 
@@ -217,7 +217,7 @@ class MonitorConfig:
         check=_filled,
     )
     hardware_id: str = described(
-        "which leg this is, for diagnostics and the ledger; empty: namespace of the node, or leg",
+        "name of this leg in diagnostics and the ledger; empty: namespace of the node, or leg",
         default="",
     )
     clearance_joints: tuple[str, ...] = described(
@@ -239,7 +239,7 @@ class MonitorConfig:
     )
     wear_acceleration: float = quantity(
         "",
-        "factor on all wear, other than 1 for demonstrations only",
+        "factor on all wear; other than 1 for demonstrations only",
         at_least=1.0e-9,
         at_most=1.0e9,
         default=1.0,
@@ -269,7 +269,7 @@ class MonitorConfig:
 
     @property
     def hardware(self) -> str:
-        """Which leg this is: `hardware_id`, or ``leg``."""
+        """Name of the leg: `hardware_id`, or ``leg``."""
         return self.hardware_id or "leg"
 
     def on_node(self, node: str) -> "MonitorConfig":

@@ -109,6 +109,6 @@ def _why_none(crank: Series, cadence: Cadence) -> str:
     if abs(rpm - cadence.commanded_rpm) <= cadence.tolerance_rpm:
         return ""
     return (
-        f"the leg walks at {rpm:.3g} rpm, commanded are {cadence.commanded_rpm:.3g} ± "
+        f"the leg walks at {rpm:.3g} rpm, the commanded cadence is {cadence.commanded_rpm:.3g} ± "
         f"{cadence.tolerance_rpm:.2g} rpm"
     )

@@ -29,7 +29,9 @@ def doubts(cycle: CycleReport, config: MonitorConfig) -> list[str]:
     """
     commanded, found = config.cadence.commanded_rpm, []
     if not _SLOWEST <= cycle.cadence_rpm / commanded <= _FASTEST:
-        found.append(f"the crank turns at {cycle.cadence_rpm:.3g} rpm, commanded are {commanded:.3g} rpm")
+        found.append(
+            f"the crank turns at {cycle.cadence_rpm:.3g} rpm, the commanded cadence is {commanded:.3g} rpm"
+        )
     if cycle.torque_samples:
         predicted, measured = cycle.predicted_torque_rms_nm, cycle.measured_torque_rms_nm
         if measured < _FLAT * predicted:
@@ -121,5 +123,5 @@ class GaitEvidence:
                 f"the crank turns {turns:.2g} times in {self._passed_s:.3g} s: less than a whole gait cycle"
             )
         if not _SLOWEST <= rpm / abs(commanded) <= _FASTEST:
-            return f"the crank turns at {rpm:.3g} rpm, commanded are {abs(commanded):.3g} rpm"
+            return f"the crank turns at {rpm:.3g} rpm, the commanded cadence is {abs(commanded):.3g} rpm"
         return f"the crank turns {turns:.3g} times, but its motion cannot be followed over a whole gait cycle"

@@ -64,6 +64,8 @@ class AlarmSpec(Generic[_E]):
         The subject of an alarm of a clearance joint is the joint.
     unit : str
         Unit of value and limit.
+    quantity : str
+        Noun of the value, for sentences.
     meaning, limit_words : str
         For operators: meaning of the value, and the parameters of its limit.
     value : callable
@@ -81,6 +83,7 @@ class AlarmSpec(Generic[_E]):
     kind: str
     subject: str = ""
     unit: str = ""
+    quantity: str
     meaning: str
     limit_words: str
     value: Callable[[_E], float]
@@ -109,6 +112,7 @@ class AlarmSpec(Generic[_E]):
 IMPACT: "AlarmSpec[JointReport]" = AlarmSpec(
     kind="impact_force",
     unit="N",
+    quantity="peak contact force",
     meaning="peak contact force of the gait cycle, N",
     limit_words="`limits.impact_force_n`, `limits.joint_impact_force_n`",
     value=lambda joint: joint.peak_force_n,
@@ -118,6 +122,7 @@ IMPACT: "AlarmSpec[JointReport]" = AlarmSpec(
 CLEARANCE: "AlarmSpec[JointReport]" = AlarmSpec(
     kind="clearance",
     unit="m",
+    quantity="mean radial clearance",
     meaning="mean radial clearance, m",
     limit_words="`limits.clearance_m`, `limits.joint_clearance_m`",
     value=lambda joint: joint.clearance_m,
@@ -126,6 +131,7 @@ CLEARANCE: "AlarmSpec[JointReport]" = AlarmSpec(
 GROWTH: "AlarmSpec[JointReport]" = AlarmSpec(
     kind="growth",
     unit="m/h",
+    quantity="growth of the mean radial clearance",
     meaning="growth of the mean radial clearance, m/h",
     limit_words="`limits.growth_m_per_hour`",
     value=lambda joint: math.nan if joint.growth_mps is None else 3600.0 * joint.growth_mps,
@@ -134,6 +140,7 @@ GROWTH: "AlarmSpec[JointReport]" = AlarmSpec(
 LIFE: "AlarmSpec[JointReport]" = AlarmSpec(
     kind="remaining_life",
     unit="h",
+    quantity="p10 of the remaining life",
     meaning="hours of walking that the joint exceeds with a probability of 90 %, h",
     limit_words="`limits.remaining_life_h`",
     value=lambda joint: joint.forecast.hours.p10 if joint.forecast and joint.forecast.hours else math.nan,
@@ -143,6 +150,7 @@ LIFE: "AlarmSpec[JointReport]" = AlarmSpec(
 DEPARTURE: "AlarmSpec[JointReport]" = AlarmSpec(
     kind="clearance_departure",
     unit="m",
+    quantity="difference between the clearance from encoders and the counted clearance",
     meaning="difference between the clearance from further encoders and the counted one, m; 0 below four "
     "standard deviations. Only with `encoders.names`",
     limit_words="`limits.clearance_departure_m`",
@@ -151,6 +159,7 @@ DEPARTURE: "AlarmSpec[JointReport]" = AlarmSpec(
 )
 MISMATCH: "AlarmSpec[CycleEvidence]" = AlarmSpec(
     kind="torque_mismatch",
+    quantity="unexplained fraction of the drive torque",
     meaning="RMS of the torque that foot load, friction and lag do not explain, as a fraction of the "
     "predicted RMS",
     limit_words="`limits.torque_mismatch`",
@@ -161,6 +170,7 @@ MISMATCH: "AlarmSpec[CycleEvidence]" = AlarmSpec(
 CADENCE: "AlarmSpec[CycleEvidence]" = AlarmSpec(
     kind="cadence",
     unit="rpm",
+    quantity="departure from the commanded cadence",
     meaning="departure from the commanded cadence, rpm",
     limit_words="`cadence.tolerance_rpm`",
     value=lambda cycle: abs(cycle.report.cadence_rpm - cycle.commanded_rpm),
@@ -168,7 +178,8 @@ CADENCE: "AlarmSpec[CycleEvidence]" = AlarmSpec(
 )
 SOURCES: "AlarmSpec[InputGuard]" = AlarmSpec(
     kind="input_sources",
-    meaning="number of sources of the crank's angle",
+    quantity="number of sources of the crank angle",
+    meaning="number of sources of the crank angle",
     limit_words="2, at once",
     value=lambda guard: float(guard.sources),
     limit=lambda _: 2.0,
@@ -182,6 +193,7 @@ TORQUE: "tuple[AlarmSpec[CycleEvidence], ...]" = (
     AlarmSpec(
         kind=BIAS,
         unit="N m",
+        quantity="constant drive torque beyond the bounds of friction",
         meaning="constant drive torque outside the bounds of friction, N m: it drives, or exceeds "
         "`drive_torque.max_friction_nm`",
         limit_words="`limits.torque_bias_nm`",
@@ -191,6 +203,7 @@ TORQUE: "tuple[AlarmSpec[CycleEvidence], ...]" = (
     AlarmSpec(
         kind=DRIFT,
         unit="N m",
+        quantity="change of the constant drive torque since commissioning",
         meaning="change of the constant drive torque since this leg was commissioned, N m",
         limit_words="`limits.torque_drift_nm`",
         value=lambda cycle: cycle.torque.get(DRIFT, math.nan),
@@ -199,6 +212,7 @@ TORQUE: "tuple[AlarmSpec[CycleEvidence], ...]" = (
     AlarmSpec(
         kind=LAG,
         unit="s",
+        quantity="delay of the measured torque",
         meaning="delay of the measured torque, late or early, s",
         limit_words="`drive_torque.max_lag_s`",
         value=lambda cycle: cycle.torque.get(LAG, math.nan),
@@ -214,6 +228,7 @@ def _rate(name: str) -> "AlarmSpec[InputHealth]":
         kind="input_rate",
         subject=name,
         unit="Hz",
+        quantity=f"rate of usable {name} samples",
         meaning=f"rate of usable {name} samples, Hz",
         limit_words="`limits.min_rate_hz`",
         value=lambda health: health.rate_hz[name],
@@ -226,6 +241,7 @@ INPUT: "tuple[AlarmSpec[InputHealth], ...]" = (
     *(_rate(kind.name) for kind in SAMPLE_KINDS.values()),
     AlarmSpec(
         kind="input_samples",
+        quantity="fraction of unusable samples",
         meaning="fraction of samples that could not be used: faulty, repeated, late, stray stamp, far off",
         limit_words="`limits.bad_sample_fraction`",
         value=lambda health: health.bad_fraction,
@@ -233,6 +249,7 @@ INPUT: "tuple[AlarmSpec[InputHealth], ...]" = (
     ),
     AlarmSpec(
         kind="input_gaps",
+        quantity="fraction of unmonitored time",
         meaning="fraction of the time that was not monitored",
         limit_words="`limits.lost_time_fraction`",
         value=lambda health: health.lost_fraction,
@@ -240,7 +257,8 @@ INPUT: "tuple[AlarmSpec[InputHealth], ...]" = (
     ),
     AlarmSpec(
         kind="input_torque",
-        meaning="fraction of torques that are saturated, or repeat the largest or the smallest",
+        quantity="fraction of stuck or saturated torque samples",
+        meaning="fraction of torque samples that are saturated, or repeat the largest or the smallest",
         limit_words="`limits.stuck_torque_fraction`",
         value=lambda health: health.stuck_torque_fraction,
         limit=lambda of: of.config.limits.stuck_torque_fraction,
@@ -252,3 +270,9 @@ ALL: "tuple[AlarmSpec[Any], ...]" = (*JOINT, *ENCODERS, *TORQUE, *GAIT, *OF_INPU
 
 INPUT_KINDS = tuple(dict.fromkeys(spec.kind for spec in OF_INPUT))
 KINDS = tuple(dict.fromkeys(spec.kind for spec in ALL))
+
+QUANTITIES = {
+    **{spec.kind: spec.quantity for spec in (*JOINT, *ENCODERS)},
+    **{spec.name(): spec.quantity for spec in (*TORQUE, *GAIT, *OF_INPUT)},
+}
+"""Nouns by the alarm's name; by its kind for an alarm of a joint."""

@@ -69,7 +69,7 @@ def torque_causes(
     constant = f"a constant torque of {estimate(report.friction_nm, report.friction_sigma_nm, 'N m')}"
     if BIAS in raised and report.friction_nm < 0.0:
         causes.append(
-            f"{constant} drives the crank, friction cannot do this: the sensor's offset is not zeroed, "
+            f"{constant} drives the crank; friction cannot drive: the sensor's offset is not zeroed, "
             "or drive_torque.sign is wrong"
         )
     elif BIAS in raised:
@@ -80,9 +80,9 @@ def torque_causes(
         )
     if DRIFT in raised:
         causes.append(
-            f"the constant torque, {amount(record.friction_nm, 'N m')} when this leg was commissioned, is "
-            f"{estimate(report.friction_nm, report.friction_sigma_nm, 'N m')}: the drive's friction has "
-            "changed, or the sensor's offset"
+            f"the constant torque is {estimate(report.friction_nm, report.friction_sigma_nm, 'N m')} and "
+            f"was {amount(record.friction_nm, 'N m')} when this leg was commissioned: the friction of the "
+            "drive or the offset of the sensor has changed"
         )
     if LAG in raised:
         causes.append(_lag_cause(record, bounds))

@@ -33,7 +33,7 @@ class Validity:
         """In a line, for operators."""
         text = f"{self.within} of {self.measurements} measured clearances were between expected p10 and p90"
         if self.measurements < LEAST:
-            return f"{text}; too few to judge the forecast"
+            return f"{text}; too few to evaluate the forecast"
         # a mean of n even numbers from 0 to 1 has a standard deviation of 1 / sqrt(12 n)
         if abs(self.bias) * np.sqrt(12.0 * self.measurements) < 2.0:
             return f"{text}; no bias found"

@@ -20,7 +20,7 @@ def raised(*kinds: str, least: Level = Level.WARN) -> Condition:
 
     def hits(situation: Situation) -> Sequence[Hit]:
         return [
-            hit_of(alarm)
+            hit_of(alarm, situation)
             for alarm in situation.alarms
             if alarm.level >= least and (not kinds or alarm.kind in kinds)
         ]
@@ -33,27 +33,29 @@ def blinding(situation: Situation) -> Sequence[Hit]:
     kinds = ("input_sources", "input_rate", "input_samples", "input_gaps", "input_silence")
     causes = f": {situation.input_causes[0]}" if situation.input_causes else ""  # the most frequent
     return [
-        hit_of(alarm, causes=causes)
+        hit_of(alarm, situation, causes=causes)
         for alarm in situation.alarms
         if alarm.kind in kinds and alarm.subject != "torque" and alarm.present is Level.ERROR
     ]
 
 
-def hit_of(alarm: Alarm, **words: str) -> Hit:
+def hit_of(alarm: Alarm, situation: Situation, **words: str) -> Hit:
     """An alarm as a case of a rule: its worst value if it is known, else its last one."""
     is_present = alarm.present is alarm.level  # a level that has fallen has a value within the limit
     is_last = math.isnan(alarm.worst) or (is_present and not math.isnan(alarm.value))
     value = alarm.value if is_last else alarm.worst
+    is_of_a_joint = alarm.kind in OF_A_JOINT
+    joint, noun = situation.joint_words(alarm.subject), situation.quantity(alarm)
     told = {
-        "name": alarm.name,
-        "joint": alarm.subject,
+        "quantity": f"{noun} of joint {joint}" if is_of_a_joint else noun,
+        "joint": joint,
         "value": amount(value, alarm.unit),
         "limit": amount(alarm.limit, alarm.unit),
-        "past": "" if is_present else f" (since {time_words(alarm.raised_ns)}; within its limit again now)",
+        "past": "" if is_present else f" (since {time_words(alarm.raised_ns)}; now within its limit)",
     }
     return Hit(
         words=told | words,
-        joint=alarm.subject if alarm.kind in OF_A_JOINT else "",
+        joint=alarm.subject if is_of_a_joint else "",
         since_ns=alarm.raised_ns,
         evidence=(Evidence(alarm.name, value, alarm.limit, alarm.unit),),
     )

@@ -34,6 +34,7 @@ _NAMES = {
     Cause.LENGTH: "length",
     Cause.UNKNOWN: "unknown_change",
 }
+_SOURCES = {"encoders": "the joint encoders", "torque": "the drive torque"}
 _COMPARED = {Cause.MASS: ("lighter", "heavier"), Cause.LENGTH: ("shorter", "longer")}
 
 
@@ -42,7 +43,7 @@ def believed_at_limit(situation: Situation) -> Sequence[Hit]:
     return [
         Hit(
             words={
-                "joint": each.joint,
+                "joint": situation.joint_words(each.joint),
                 "value": amount(each.believed_m, "m"),
                 "limit": amount(each.limit_m, "m"),
             },
@@ -59,10 +60,11 @@ def seen_at_limit(situation: Situation) -> Sequence[Hit]:
     return [
         Hit(
             words={
-                "joint": each.joint,
-                "by": seen.by,
+                "joint": situation.joint_words(each.joint),
+                "by": _SOURCES[seen.by],
                 "value": estimate(seen.clearance_m, seen.sigma_m, "m"),
-                "limit": amount(each.limit_m, "m") + (_doubt(situation) if seen.by == "torque" else ""),
+                "limit": amount(each.limit_m, "m"),
+                "doubt": _doubt(situation) if seen.by == "torque" else "",
             },
             joint=each.joint,
             evidence=(Evidence(f"clearance {each.joint} by {seen.by}", seen.clearance_m, each.limit_m, "m"),),
@@ -95,7 +97,11 @@ def diagnosed(*causes: Cause) -> Callable[[Situation], Sequence[Hit]]:
     """Significant changes of the drive torque with one of some causes."""
 
     def hits(situation: Situation) -> Sequence[Hit]:
-        return [_hit(change, _doubt(situation)) for change in changes(situation) if change.cause in causes]
+        return [
+            _hit(change, situation, _doubt(situation))
+            for change in changes(situation)
+            if change.cause in causes
+        ]
 
     return hits
 
@@ -111,16 +117,17 @@ def changes(situation: Situation) -> tuple[Change, ...]:
 def corrected(situation: Situation) -> Sequence[Hit]:
     """Changes by which counted clearances were corrected."""
     found = situation.diagnosis.changes if situation.diagnosis else ()
-    return [_hit(change) for change in found if change.is_corrected]
+    return [_hit(change, situation) for change in found if change.is_corrected]
 
 
-def words_of(change: Change) -> str:
-    """A change in words, such as ``clearance of 0.62 mm ± 0.03 mm in joint G, 0.3 mm is counted``."""
+def words_of(change: Change, situation: Situation) -> str:
+    """A change in words, such as ``clearance of 0.62 mm ± 0.03 mm in joint G (0.3 mm is counted)``."""
     unit = _UNITS[change.cause]
     value, counted = estimate(change.value, change.sigma, unit), amount(change.counted, unit)
     if change.cause is Cause.CLEARANCE:
         verb = "was" if change.is_corrected else "is"
-        words = f"clearance of {value} in joint {change.subject}, {counted} {verb} counted"
+        joint = situation.joint_words(change.subject)
+        words = f"clearance of {value} in joint {joint} ({counted} {verb} counted)"
     elif change.cause in _COMPARED:
         percent = estimate(100.0 * abs(change.value), 100.0 * change.sigma, "%")
         less, more = _COMPARED[change.cause]
@@ -129,23 +136,23 @@ def words_of(change: Change) -> str:
         words = "no single cause explains the change"
     else:
         subject = f" {change.subject}" if change.subject else ""
-        words = f"{change.cause.value}{subject}: {value}, {counted} is counted"
+        words = f"{change.cause.value}{subject}: {value} ({counted} is counted)"
     if change.runner_up and change.runner_up_log_odds < CLOSE_ODDS:
         words += f" (or {change.runner_up})"
     return words
 
 
 def _doubt(situation: Situation) -> str:
-    """Why what the drive torque shows is not sure, in parentheses; empty if it is."""
+    """Why what the drive torque shows is not sure; empty if it is."""
     reason = situation.diagnosis.reason if situation.diagnosis else ""
-    return f" ({reason})" if reason else ""
+    return f"; {reason}" if reason else ""
 
 
-def _hit(change: Change, doubt: str = "") -> Hit:
+def _hit(change: Change, situation: Situation, doubt: str = "") -> Hit:
     is_joint = change.cause is Cause.CLEARANCE
     name = f"clearance {change.subject} by torque" if is_joint else _NAMES[change.cause]
     return Hit(
-        words={"change": f"{words_of(change)}{doubt}"},
+        words={"change": f"{words_of(change, situation)}{doubt}"},
         joint=change.subject if is_joint else "",
         since_ns=change.since_ns,
         evidence=(Evidence(name, change.value, math.nan, _UNITS[change.cause]),),

@@ -17,7 +17,7 @@ from leg_wear_monitor.monitor.verdict.words import amount
 
 def mismatch(situation: Situation) -> Sequence[Hit]:
     """The drive torque is not that of the counted leg; with what may cause it, as far as that is known."""
-    told = [*situation.torque_causes, *(words_of(change) for change in changes(situation))]
+    told = [*situation.torque_causes, *(words_of(change, situation) for change in changes(situation))]
     causes = f"; possible cause: {'; '.join(told)}" if told else ""
     if situation.explained is not None:
         causes = f"; {_in_words(situation)}{causes}"
@@ -99,12 +99,13 @@ def no_torque(situation: Situation) -> Sequence[Hit]:
     if not situation.has_cycle or not situation.unobserved:
         return []
     fault = _fault_of_torque(situation)
-    return [Hit(words={"joints": ", ".join(situation.unobserved), "cause": fault})] if fault else []
+    joints = ", ".join(map(situation.joint_words, situation.unobserved))
+    return [Hit(words={"joints": joints, "cause": fault})] if fault else []
 
 
 def _fault_of_torque(situation: Situation) -> str:
     if not situation.has_torque:
-        return "no drive torque"
+        return "there is no drive torque"
     stuck = [each for each in situation.alarms if each.kind == "input_torque" and each.present is Level.ERROR]
     return "the drive torque is stuck or saturated" if stuck else ""
 
@@ -129,7 +130,7 @@ def not_observed(situation: Situation) -> Sequence[Hit]:
     if not blind or not situation.has_cycle or not situation.has_torque:
         return []
     cause = f": {found.reason}" if found.reason else ""
-    return [Hit(words={"joints": ", ".join(blind), "causes": cause})]
+    return [Hit(words={"joints": ", ".join(map(situation.joint_words, blind)), "causes": cause})]
 
 
 def other_cadence(situation: Situation) -> Sequence[Hit]:
@@ -164,11 +165,11 @@ def nothing_found(situation: Situation) -> Sequence[Hit]:
         limit = situation.mismatch_limit
         evidence = (Evidence("torque_mismatch", situation.mismatch, limit, ""),)
         observed = (
-            f"the drive torque is that of the counted leg: {amount(situation.mismatch, '')} of its RMS is "
-            f"not explained, the limit is {amount(limit, '')}"
+            f"the drive torque agrees with the counted leg: {amount(situation.mismatch, '')} of its RMS is "
+            f"not explained (limit {amount(limit, '')})"
         )
         if situation.diagnosis is not None and situation.diagnosis.state is DiagnosisState.OFF:
-            observed += f"; it is not compared with wider joints: {situation.diagnosis.reason}"
+            observed += f"; the torque is not compared with wider joints: {situation.diagnosis.reason}"
     return [Hit(words={"observed": observed}, evidence=evidence)]
 
 

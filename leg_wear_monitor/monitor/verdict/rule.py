@@ -19,7 +19,7 @@ class Hit:
     Attributes
     ----------
     words : mapping of str to str
-        What the rule's texts name in braces.
+        Words for the braces of the rule's texts.
     joint : str
         The joint concerned, empty if it is none.
     since_ns : int
@@ -48,9 +48,10 @@ class Rule:
     hits : callable
         Its condition: the cases in a situation for which it holds.
     why, do : str
-        Texts, with the words of a hit in braces; ``{joints}`` in ``do`` names all joints of the hits.
+        Texts, with the words of a hit in braces; in ``do``, ``{joints}`` names all joints
+        of the hits with their labels, and ``{joint}`` is the first one as commands take it.
     not_valid : tuple of Figure
-        The figures that do not hold while the rule does.
+        Kinds of values that are not valid while the rule applies.
     """
 
     code: str
@@ -68,12 +69,13 @@ class Rule:
         joints = tuple(dict.fromkeys(hit.joint for hit in hits if hit.joint))
         since = [hit.since_ns for hit in hits if hit.since_ns]
         not_valid = {*self.not_valid, *(figure for hit in hits for figure in hit.not_valid)}
+        words = {"joints": ", ".join(map(situation.joint_words, joints)), **hits[0].words}
         return Finding(
             code=self.code,
             state=self.state,
             joints=joints,
             why="; ".join(dict.fromkeys(self.why.format(**hit.words) for hit in hits)),
-            do=self.do.format(**{"joints": ", ".join(joints), **hits[0].words, "joint": hits[0].joint}),
+            do=self.do.format(**(words | {"joint": hits[0].joint})),
             since_ns=min(since, default=0),
             evidence=tuple(each for hit in hits for each in hit.evidence),
             not_valid=tuple(figure for figure in Figure if figure in not_valid),

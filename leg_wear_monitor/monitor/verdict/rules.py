@@ -16,7 +16,7 @@ from leg_wear_monitor.monitor.verdict.verdict import NO_GAIT_CYCLE, NONE, Figure
 
 _ACKNOWLEDGE = "then acknowledge the alarms"
 _ROCK = (
-    "stop when it is safe, block the drive and rock joint {joints}; measure its radial clearance, and enter "
+    "stop when it is safe, block the drive and rock joint {joints}; measure its radial clearance and enter "
     "it: leg-wear-monitor measure {joint} MM --sigma MM"
 )
 _REPLACE = (
@@ -33,7 +33,7 @@ def _cause_of_mismatch(cause: TorqueCause, meaning: str) -> Rule:
         code=cause.value,
         state=State.INSPECT,
         hits=input_rules.explained(cause),
-        why=f"the drive torque is not as predicted, {meaning}{{causes}}",
+        why=f"the drive torque differs from the prediction: {meaning}{{causes}}",
         do=f"{{remedy}}; {_ACKNOWLEDGE}",
         not_valid=EVERYTHING,
     )
@@ -44,14 +44,14 @@ RULES = (
         code="CLEARANCE",
         state=State.STOP,
         hits=raised("clearance", least=Level.ERROR),
-        why="the counted clearance of joint {joint} is {value}, the limit is {limit}{past}",
+        why="the counted clearance of joint {joint} is {value} (limit {limit}){past}",
         do=_REPLACE,
     ),
     Rule(
         code="CLEARANCE_SEEN",
         state=State.STOP,
         hits=clearance_rules.seen_at_limit,
-        why="the clearance of joint {joint} is {value} by {by}, the limit is {limit}",
+        why="according to {by}, the clearance of joint {joint} is {value} (limit {limit}){doubt}",
         do=_REPLACE,
         not_valid=EVERYTHING,
     ),
@@ -59,15 +59,15 @@ RULES = (
         code="CLEARANCE_BELIEVED",
         state=State.STOP,
         hits=clearance_rules.believed_at_limit,
-        why="the clearance of joint {joint} is {value} by counting and measurements, the limit is {limit}",
+        why="counting and measurements together give a clearance of {value} in joint {joint} (limit {limit})",
         do=_REPLACE,
     ),
     *(
         _cause_of_mismatch(cause, meaning)
         for cause, meaning in (
-            (TorqueCause.SIGN, "its sign is wrong"),
+            (TorqueCause.SIGN, "its sign is reversed"),
             (TorqueCause.SCALE, "its size is wrong"),
-            (TorqueCause.TIMING, "it does not fit the crank angle in time"),
+            (TorqueCause.TIMING, "its time does not fit the crank angle"),
         )
     ),
     Rule(
@@ -89,8 +89,8 @@ RULES = (
         code="CLEARANCE_DEPARTURE",
         state=State.INSPECT,
         hits=clearance_rules.departing,
-        why="the encoders show a clearance of joint {joint} that differs from the counted one by {value}, "
-        "the limit is {limit}{past}",
+        why="the encoders show a clearance of joint {joint} that differs from the counted one by {value} "
+        "(limit {limit}){past}",
         do=f"{_ROCK}; {_ACKNOWLEDGE}",
         not_valid=(Figure.CLEARANCES, *OF_THE_GAIT),
     ),
@@ -98,7 +98,7 @@ RULES = (
         code="MECHANISM_CHANGED",
         state=State.INSPECT,
         hits=clearance_rules.diagnosed(Cause.MASS, Cause.LENGTH, Cause.UNKNOWN),
-        why="the drive torque is that of another leg than the counted one: {change}",
+        why="the drive torque does not fit the counted leg: {change}",
         do="look for loose, bent or added parts, and rock each joint",
         not_valid=EVERYTHING,
     ),
@@ -108,9 +108,9 @@ RULES = (
         code="TORQUE_MISMATCH",
         state=State.INSPECT,
         hits=input_rules.mismatch,
-        why="the torque is not that of the counted leg, the forecast is not valid: {value} of the predicted "
-        "RMS is not explained, the limit is {limit}{past}{causes}",
-        do="stop when it is safe, block the drive and rock each joint; measure the one with play, and enter "
+        why="the drive torque does not fit the counted leg, so the forecast is not valid: {value} of the "
+        "predicted RMS is not explained (limit {limit}){past}{causes}",
+        do="stop when it is safe, block the drive and rock each joint; measure the joint with play and enter "
         "it: leg-wear-monitor measure JOINT MM --sigma MM; if none has play, check the load at the foot and "
         f"the torque sensor; {_ACKNOWLEDGE}",
         not_valid=EVERYTHING,
@@ -126,29 +126,28 @@ RULES = (
         code="TORQUE_INPUT",
         state=State.INSPECT,
         hits=input_rules.impossible_torque,
-        why="{name} is {value}, the limit is {limit}{past}{causes}",
+        why="the {quantity} is {value} (limit {limit}){past}{causes}",
         do=f"{_TORQUE_INPUT}; {_ACKNOWLEDGE}",
     ),
     Rule(
         code="IMPACT_FORCE",
         state=State.INSPECT,
         hits=raised("impact_force", least=Level.ERROR),
-        why="the impact force in joint {joint} is {value}, the limit is {limit}{past}",
+        why="the impact force in joint {joint} is {value} (limit {limit}){past}",
         do=f"{_ROCK}; check its lubrication and the cadence; {_ACKNOWLEDGE}",
     ),
     Rule(
         code="GROWTH",
         state=State.INSPECT,
         hits=raised("growth", least=Level.ERROR),
-        why="the clearance of joint {joint} grows by {value}, the limit is {limit}{past}",
+        why="the clearance of joint {joint} grows by {value} (limit {limit}){past}",
         do=f"{_ROCK}; check its lubrication and for dirt; {_ACKNOWLEDGE}",
     ),
     Rule(
         code="REMAINING_LIFE",
         state=State.INSPECT,
         hits=raised("remaining_life", least=Level.ERROR),
-        why="joint {joint} reaches its limit within {value} with a probability of 10 %, the limit is "
-        "{limit}{past}",
+        why="joint {joint} reaches its limit within {value} with a probability of 10 % (limit {limit}){past}",
         do=f"{_ROCK}; plan its replacement; {_ACKNOWLEDGE}",
     ),
     Rule(
@@ -165,15 +164,15 @@ RULES = (
         state=State.NOT_MONITORED,
         hits=input_rules.unfollowed,
         why="{cause}",
-        do="repair the input of the crank; the status `input` counts what is wrong",
+        do="repair the input of the crank; the status `input` counts the faults",
         not_valid=OF_THE_GAIT,
     ),
     Rule(
         code="BAD_INPUT",
         state=State.NOT_MONITORED,
         hits=blinding,
-        why="{name} is {value}, the limit is {limit}{causes}",
-        do="repair the input; the status `input` counts what is wrong",
+        why="the {quantity} is {value} (limit {limit}){causes}",
+        do="repair the input; the status `input` counts the faults",
         not_valid=OF_THE_GAIT,
     ),
     Rule(
@@ -188,21 +187,21 @@ RULES = (
         code=NO_GAIT_CYCLE,
         state=State.NOT_MONITORED,
         hits=input_rules.no_cycle,
-        why="no whole gait cycle was monitored yet",
-        do="let the leg walk; if it does, see the status `input`",
+        why="the monitor has not received a whole gait cycle yet",
+        do="let the leg walk; if it walks already, see the status `input`",
     ),
     Rule(
         code="NO_DRIVE_TORQUE",
         state=State.WATCH,
         hits=input_rules.no_torque,
-        why="joints cannot be observed ({joints}): {cause}",
-        do="provide the drive torque, see drive_torque.source; until then rock the joints by hand regularly",
+        why="joints {joints} cannot be observed: {cause}",
+        do="provide the drive torque (drive_torque.source); until then, rock the joints by hand regularly",
     ),
     Rule(
         code="TORQUE_NOT_COMPARED",
         state=State.WATCH,
         hits=input_rules.not_compared,
-        why="the drive torque is not compared yet: it needs more gait cycles",
+        why="the comparison of the drive torque needs more gait cycles",
         do="let the leg walk on",
     ),
     Rule(
@@ -210,13 +209,13 @@ RULES = (
         state=State.WATCH,
         hits=input_rules.not_observed,
         why="the drive torque does not show the clearances of joints {joints} yet{causes}",
-        do="let the leg walk on at a steady cadence; until then rock these joints by hand regularly",
+        do="let the leg walk on at a steady cadence; until then, rock these joints by hand regularly",
     ),
     Rule(
         code="CADENCE",
         state=State.WATCH,
         hits=input_rules.other_cadence,
-        why="the leg {walks}, commanded are {commanded} ± {tolerance}",
+        why="the leg {walks}; the commanded cadence is {commanded} ± {tolerance}",
         do=f"walk at the commanded cadence, or set cadence.commanded_rpm; {_ACKNOWLEDGE}",
         not_valid=(Figure.FORECAST,),
     ),
@@ -225,7 +224,7 @@ RULES = (
         state=State.WATCH,
         hits=clearance_rules.diagnosed(Cause.LOAD),
         why="the drive torque shows a change: {change}",
-        do="check what the foot carries or meets",
+        do="check the load and the ground at the foot",
         not_valid=OF_THE_MODEL,
     ),
     Rule(
@@ -240,13 +239,13 @@ RULES = (
         state=State.WATCH,
         hits=input_rules.encoder_faults,
         why="encoder {cause}",
-        do="repair the encoder, or take it out of encoders.names",
+        do="repair the encoder, or remove it from encoders.names",
     ),
     Rule(
         code="ALARM",
         state=State.WATCH,
         hits=raised(),
-        why="alarm {name} is raised: {value}, the limit is {limit}{past}",
+        why="alarm: the {quantity} is {value} (limit {limit}){past}",
         do=f"see the status of the joint or the input; {_ACKNOWLEDGE}",
     ),
     Rule(

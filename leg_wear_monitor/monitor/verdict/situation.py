@@ -1,6 +1,7 @@
 """What a verdict depends on, and nothing else; the defaults are those of a leg without a fault."""
 
 import math
+from collections.abc import Mapping
 
 import attrs
 
@@ -33,6 +34,8 @@ class JointSituation:
     Attributes
     ----------
     joint : str
+    label : str
+        What operators call the joint, such as ``knee``; empty if it has no label.
     counted_m, limit_m : float
         Counted mean radial clearance, and its limit.
     believed_m : float
@@ -49,6 +52,7 @@ class JointSituation:
     believed_m: float = math.nan
     seen: tuple[SeenClearance, ...] = ()
     is_used: bool = False
+    label: str = ""
 
 
 @attrs.frozen(kw_only=True)
@@ -59,6 +63,8 @@ class Situation:
     ----------
     joints : tuple of JointSituation
     alarms : tuple of Alarm
+    quantities : mapping of str to str
+        Noun of each alarm's value, by the alarm's name; by its kind for an alarm of a joint.
     has_cycle : bool
         Whether a whole gait cycle was monitored in this run.
     has_torque : bool
@@ -90,6 +96,7 @@ class Situation:
 
     joints: tuple[JointSituation, ...] = ()
     alarms: tuple[Alarm, ...] = ()
+    quantities: Mapping[str, str] = attrs.field(factory=dict)
     has_cycle: bool = True
     has_torque: bool = True
     mismatch: float = 0.0
@@ -108,6 +115,16 @@ class Situation:
     explained: TorqueExplanation | None = None
     crank: Crank = Crank()
     drive_torque: DriveTorque = DriveTorque()
+
+    def joint_words(self, joint: str) -> str:
+        """A joint with its label, such as ``G (knee)``."""
+        label = next((each.label for each in self.joints if each.joint == joint), "")
+        return f"{joint} ({label})" if label else joint
+
+    def quantity(self, alarm: Alarm) -> str:
+        """Noun of an alarm's value; its name where there is none."""
+        noun = self.quantities.get(alarm.name) or self.quantities.get(alarm.kind)
+        return noun or alarm.name.replace("_", " ")
 
     @property
     def unobserved(self) -> tuple[str, ...]:

@@ -32,7 +32,7 @@ def causes_in_words(explained: TorqueExplanation, crank: Crank, torque: DriveTor
     if not explained.alternatives:
         return (
             "no reversed sign, factor, crank angle, lag, load at the foot or mass of a body explains half of "
-            f"it: {rest}, {other}"
+            f"it: {rest}; {other}"
         )
     told = [
         " and ".join(_words(one, explained, crank, torque) for one in causes)
@@ -40,7 +40,7 @@ def causes_in_words(explained: TorqueExplanation, crank: Crank, torque: DriveTor
     ]
     words = ", or ".join([*told[:_MOST], *(["others"] if len(told) > _MOST else [])])
     if len(told) > 1:
-        words += " (these explain the torque alike and cannot be told apart)"
+        words += " (these explain the torque equally well and cannot be distinguished)"
     if abs(explained.bias_nm) > _SURE * explained.bias_sigma_nm:
         words += f"; {_bias(explained)}"
     return words if explained.is_whole else f"{words}; {rest}: {other}"
@@ -49,7 +49,7 @@ def causes_in_words(explained: TorqueExplanation, crank: Crank, torque: DriveTor
 def _bias(explained: TorqueExplanation) -> str:
     value = estimate(abs(explained.bias_nm), explained.bias_sigma_nm, "N m")
     if explained.bias_nm < 0.0:
-        return f"a constant torque of {value} drives the crank, which friction cannot"
+        return f"a constant torque of {value} drives the crank; friction cannot drive"
     return f"a constant torque exceeds the largest friction of the drive by {value}"
 
 
@@ -83,12 +83,13 @@ def _known_factor(one: NamedCause, crank: Crank, torque: DriveTorque) -> tuple[s
         return ": it is in N mm", scale
     if gear != 1.0 and _is_near(one, 1.0 / gear):
         return (
-            f": it is that on the joint's shaft, crank.gear_ratio is {amount(gear, '')}",
+            f": it is the torque on the joint's shaft; crank.gear_ratio is {amount(gear, '')}",
             f"set drive_torque.gear_ratio to {torque.gear_ratio * gear:.4g}",
         )
     if torque.gear_ratio != 1.0 and _is_near(one, torque.gear_ratio):
         return (
-            f": it is that on the crank already, drive_torque.gear_ratio is {amount(torque.gear_ratio, '')}",
+            ": it is already the torque on the crank; drive_torque.gear_ratio is "
+            f"{amount(torque.gear_ratio, '')}",
             "set drive_torque.gear_ratio to 1",
         )
     return "", f"{scale}, or correct drive_torque.gear_ratio"
@@ -105,7 +106,7 @@ def _timing(one: NamedCause, explained: TorqueExplanation) -> str:
     offset = _offset(one.value, one.sigma)
     speed = explained.speed_radps
     lag = _lag(-one.value / speed, one.sigma / abs(speed))
-    return f"{offset}, or {lag}: at one speed the two cannot be told apart"
+    return f"{offset}, or {lag}: at one speed the two cannot be distinguished"
 
 
 def _parts(timing: Timing) -> tuple[str, str]:
@@ -136,7 +137,7 @@ def _remedy(one: NamedCause, explained: TorqueExplanation, crank: Crank, torque:
         case TorqueCause.TIMING:
             return _timing_remedy(one, explained, crank)
         case TorqueCause.LOAD:
-            return "check what the foot carries or meets"
+            return "check the load and the ground at the foot"
     return f"check for loose or added parts, and the mass of {one.subject} in the mechanism's file"
 
 

@@ -40,7 +40,7 @@ class State(_Word):
 
 
 class Figure(_Word):
-    """Values that may not hold; the value is the word that files contain."""
+    """Kinds of values that may not be valid; the value is the word that files contain."""
 
     CLEARANCES = "clearances"
     GROWTH = "growth"
@@ -88,7 +88,7 @@ class Finding:
     why, do : str
         What was found, and what a person does next.
     since_ns : int
-        Stamp since which it holds; 0 if it is not known.
+        Stamp since which it has been valid; 0 if it is not known.
     evidence : tuple of Evidence
     not_valid : tuple of Figure
     """
@@ -105,7 +105,7 @@ class Finding:
 
 @attrs.frozen(kw_only=True)
 class Verdict:
-    """What the monitor concludes of the leg.
+    """Conclusion of the monitor on the leg.
 
     Attributes
     ----------
@@ -116,13 +116,13 @@ class Verdict:
     why : str
         The reason, with values and units.
     since_ns : int
-        Stamp since which the reason holds; 0 if it is not known.
+        Stamp since which the reason has been valid; 0 if it is not known.
     do : str
-        What a person does next.
+        Next action of a person.
     evidence : tuple of Evidence
         Of all findings, that of the reason first.
     not_valid : tuple of Figure
-        The figures that do not hold meanwhile.
+        Kinds of values that are not valid meanwhile.
     fault_code : str
         Stable name of the reason, such as ``CLEARANCE_G``; ``NONE`` for a healthy leg.
     """

@@ -15,6 +15,8 @@ def with_unit(name: str, unit: str) -> str:
 def amount(value: float, unit: str) -> str:
     """A value [SI] with its unit, such as ``0.62 mm``; a fraction has none."""
     factor, shown = _SHOWN.get(unit, (1.0, unit))
+    if unit == "s" and abs(value) >= 1.0:
+        factor, shown = 1.0, unit
     return f"{_digits(factor * value)} {shown}".rstrip()
 
 

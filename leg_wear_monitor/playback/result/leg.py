@@ -12,7 +12,7 @@ class LegJoint:
     Attributes
     ----------
     label : str
-        What people call it, such as ``knee``; empty if the mechanism's file does not say.
+        Name for operators, such as ``knee``; empty if the mechanism file has no label.
     place_m : tuple of float
         Its place at crank angle 0.
     is_on_ground : bool

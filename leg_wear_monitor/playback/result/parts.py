@@ -83,7 +83,7 @@ class ReplayJoint:
     growth_m_per_cycle : float or None
         Growth of the mean clearance in a gait cycle; None while there is not enough data.
     growth_error_m_per_cycle : float or None
-        Standard deviation of what it may be off.
+        Standard deviation of its error.
     growth_mps : float or None
         Growth of the mean clearance per second of walking.
     forecast : JointForecast or None

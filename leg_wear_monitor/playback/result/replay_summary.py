@@ -35,12 +35,12 @@ SCHEMA_VERSION = 2
 
 @attrs.frozen(kw_only=True, eq=False)
 class ReplaySummary:
-    """What a replay found; its page is made of this alone.
+    """Results of a replay; its page contains nothing else.
 
     Attributes
     ----------
     verdict : Verdict
-        What the monitor concludes of the leg, at the end.
+        Conclusion of the monitor on the leg, at the end.
     recording : ReplayRecording
         What was read.
     monitor : ReplayMonitor
@@ -58,10 +58,10 @@ class ReplaySummary:
     joints : dict of str to ReplayJoint
         Clearance joints; empty without one gait cycle that fits this leg, like the next two.
     clearances : dict of str to JointClearance
-        Clearance of each joint, as counted and as seen.
+        Clearance of each joint, as counted and as measured.
     life : dict of str to LifeHours or None
-        Remaining life of each joint, and of the ``leg``; None where it is not known, or the verdict does not
-        believe it.
+        Remaining life of each joint, and of the ``leg``; None where it is not known or not
+        valid.
     forecast : LegLife or None
         Remaining life of the leg.
     measurements : tuple of Measurement
@@ -77,7 +77,7 @@ class ReplaySummary:
     wear_depth_m : dict of str to WornDepth
         Wear around the surfaces of each joint since the start of the ledger, or of the replay without one.
     advice : str
-        What the results are not: the absence of an alarm does not mean the joints are healthy.
+        Limits of the results: the absence of an alarm does not mean the joints are healthy.
     made_with : dict of str to str
         Versions of the programs that made it.
     """

@@ -15,7 +15,7 @@ LOOKS = {
 
 
 def verdict_banner(summary: ReplaySummary) -> Banner:
-    """State as symbol and word, joints, reason, action, code, begin, and the figures that do not hold."""
+    """State as symbol and word, joints, reason, action, code, begin, and the values that are not valid."""
     verdict = summary.verdict
     symbol, severity = LOOKS[verdict.state]
     notes = [("Do", verdict.do), ("Code", f"{verdict.fault_code}, see {verdict.guide}")]

@@ -70,7 +70,7 @@ def _input(summary: ReplaySummary) -> Card:
 def _torque(summary: ReplaySummary) -> Card:
     status = _status(summary, "torque")
     if status is None:
-        return Card("Torque", "no", ("Not known.",))
+        return Card("Torque", "no", ("Unknown.",))
     is_compared = status.values.get("mismatch") is not None
     answer = _OF_LEVEL[status.level] if is_compared else "no"
     return Card("Torque", answer, _sentences(status.message.split("; ")))
@@ -80,7 +80,7 @@ def _cadence(summary: ReplaySummary) -> Card:
     status, commanded = _status(summary, "gait"), summary.monitor.commanded_rpm
     cadence = status.values.get("cadence_rpm") if status else None
     if status is None or cadence is None:
-        return Card("Cadence", "no", ("Not known.",))
+        return Card("Cadence", "no", ("Unknown.",))
     is_other = summary.verdict.fault_code == "CADENCE"
     answer = _worst(_OF_LEVEL[status.level], "in part" if is_other else "yes")
     if not summary.gait.believable_cycles:
@@ -99,7 +99,7 @@ def _model(summary: ReplaySummary) -> Card:
     elif explained := _explained(summary):
         sentences = [explained]
     else:
-        answer, sentences = "in part", ["nothing measured is compared with it"]
+        answer, sentences = "in part", ["no measurement is compared with it"]
     if summary.gait.doubtful_cycles:
         answer = _worst(answer, "in part")
         sentences.append(f"{summary.gait.doubtful_cycles} gait cycles do not fit this leg")
@@ -117,7 +117,7 @@ def _explained(summary: ReplaySummary) -> str:
     if mismatch is None:
         return ""
     limit = 100.0 * summary.monitor.limits.torque_mismatch
-    return f"{100.0 * mismatch:.2g} % of the drive torque is not explained, the limit is {limit:.3g} %"
+    return f"{100.0 * mismatch:.2g} % of the drive torque is not explained (limit {limit:.3g} %)"
 
 
 def _sentences(parts: Sequence[str]) -> tuple[str, ...]:

@@ -128,7 +128,7 @@ def _clearance_words(view: JointView) -> list[tuple[str, str]]:
         by = " and ".join(view.clearance.seen_by)
         sigma = 1.0e3 * (view.seen_sigma_m or 0.0)
         digits = 2 if sigma >= 0.1 else 3
-        seen.append(("", f"seen {1.0e3 * view.seen_m:.{digits}f} ± {sigma:.{digits}f} mm by {by}"))
+        seen.append(("", f"measured {1.0e3 * view.seen_m:.{digits}f} ± {sigma:.{digits}f} mm by {by}"))
     limit = ("", f"limit {1.0e3 * view.clearance.limit_m:.3g} mm")
     return [*seen, counted, limit] if view.doubt else [counted, *seen, limit]
 
@@ -160,7 +160,7 @@ def _note(views: Sequence[JointView], most_m: float, life: tuple[int, int] | Non
     if not any(view.clearance for view in views):
         return ""
     notes = [
-        f"Clearances are radial, all bars from 0 to {1.0e3 * most_m:.3g} mm: blue bar counted, mark seen by "
+        f"Clearances are radial, all bars from 0 to {1.0e3 * most_m:.3g} mm: blue bar counted, mark the "
         "measurement with two standard deviations, red line limit.",
     ]
     if life:

@@ -1,4 +1,4 @@
-"""A clearance joint as the first screen shows it: only what the verdict believes."""
+"""A clearance joint as the first screen shows it: only values that are valid."""
 
 import attrs
 
@@ -38,7 +38,7 @@ class JointView:
     life_words : str
         Why there is no remaining life; empty if there is.
     life_doubt : bool
-        Whether that is because the verdict does not believe it.
+        Whether that is because the verdict lists it as not valid.
     alarms : tuple of ReplayAlarm
         Those that are raised.
     """

@@ -26,7 +26,7 @@ from leg_wear_monitor.report.replay.words import duration
 def replay_page(summary: ReplaySummary) -> Page:
     """The page of a replay."""
     recording, monitor = summary.recording, summary.monitor
-    sections = [_joints(summary), Section("Can these figures be believed?", [belief(summary)])]
+    sections = [_joints(summary), Section("Are these values valid?", [belief(summary)])]
     sections.append(raised_section(summary))
     if summary.gait.believable_cycles:
         sections += [clearance_section(summary), *encoder_sections(summary), forecast_section(summary)]

@@ -15,7 +15,7 @@ def not_valid(verdict: Verdict, *figures: Figure) -> str:
 
 
 def reason(verdict: Verdict) -> str:
-    """Why the figures of a verdict's list do not hold, in general words."""
+    """Why the values of a verdict's list are not valid, in general words."""
     if Figure.CLEARANCES in verdict.not_valid:
         return "leg differs from its model"
     return "leg not monitored" if verdict.state is State.NOT_MONITORED else "see the verdict"

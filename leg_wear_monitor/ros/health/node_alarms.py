@@ -17,6 +17,13 @@ _TWO_SOURCES = Limit(2.0, 2.0)
 _CRANK = KINDS[CRANK].name
 _LIMITS = {SILENCE: _SILENT, SOURCES: _TWO_SOURCES}
 
+QUANTITIES = {
+    **{f"{SILENCE} {kind.name}": f"time without {kind.name} samples" for kind in KINDS.values()},
+    **{f"{SOURCES} {kind.name}": f"number of publishers of the {kind.name}" for kind in KINDS.values()},
+    SOURCES: f"number of publishers of the {_CRANK}",
+}
+"""Nouns of the alarms' values, by the alarms' names."""
+
 
 def sources_alarm(kind: str) -> Alarm:
     """Name of the alarm for several publishers; for the crank, the monitor's alarm without a subject."""

@@ -96,11 +96,11 @@ def _faults(topic: InputTopic, silent_s: float, running_s: float) -> Iterator[tu
     elif topic.incompatible:
         yield Level.ERROR, topic.incompatible
     if silent_s > SILENT_FROM_S:
-        yield Level.ERROR, f"has fallen silent since {utc(topic.heard_wall_ns)}: nothing is monitored"
+        yield Level.ERROR, f"has been silent since {utc(topic.heard_wall_ns)}: nothing is monitored"
     elif not topic.publishers.fitting and not topic.publishers.other:
         yield Level.ERROR if running_s >= NOTHING_FROM_S else Level.WARN, "nobody publishes it"
     elif math.isnan(silent_s) and running_s >= NOTHING_FROM_S:
-        yield Level.ERROR, "has a publisher, but no message came yet"
+        yield Level.ERROR, "has a publisher, but no message has arrived yet"
     if topic.lost > topic.lost_reported:
         yield Level.WARN, "messages are lost on the way to this node"
     if topic.without_crank:

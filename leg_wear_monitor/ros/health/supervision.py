@@ -16,7 +16,7 @@ from leg_wear_monitor.monitor.verdict.rules import findings
 from leg_wear_monitor.monitor.verdict.situation import Situation
 from leg_wear_monitor.monitor.verdict.verdict import dated
 from leg_wear_monitor.ros.health.clock_monitor import ClockMonitor, both_clocks
-from leg_wear_monitor.ros.health.node_alarms import SILENCE, NodeAlarms, sources_alarm
+from leg_wear_monitor.ros.health.node_alarms import QUANTITIES, SILENCE, NodeAlarms, sources_alarm
 from leg_wear_monitor.ros.health.node_health import topics_status
 from leg_wear_monitor.ros.health.node_log import AlarmLog, StatusLog
 from leg_wear_monitor.ros.health.silence import Silence
@@ -77,7 +77,7 @@ class Supervision:
         own = self._alarms.raised
         if not own:
             return report
-        found = findings(Situation(alarms=own))
+        found = findings(Situation(alarms=own, quantities=QUANTITIES))
         return attrs.evolve(report, findings=(*report.findings, *dated(found, (), report.stamp_ns)))
 
     def acknowledge(self) -> tuple[tuple[Alarm, ...], tuple[Alarm, ...]]:

@@ -72,11 +72,13 @@ def _subscribe(
 
     def misfit(what: str) -> None:
         topic.incompatible = what
-        node.get_logger().warning(f"{topic.name}: a publisher does not fit: {what}; nothing comes from it")
+        node.get_logger().warning(
+            f"{topic.name}: a publisher is incompatible: {what}; no message arrives from it"
+        )
 
     def quality(event: Any) -> None:
         policy = qos_policy_name_from_kind(event.last_policy_kind)
-        misfit(f"its {policy.lower()} is less than this node asks for, see qos_overrides")
+        misfit(f"its {policy.lower()} is lower than this node requests; see qos_overrides")
 
     callbacks = SubscriptionEventCallbacks(
         incompatible_qos=quality,

@@ -50,7 +50,7 @@ def _full_name(info: object) -> str:
 def misfit(publishers: Publishers, expected: str) -> str:
     """Fault text for publishers of another type; empty if there are none."""
     listed = _listed(f"{name} publishes {kind}" for name, kind in publishers.other)
-    return f"{listed}, expected {expected}; nothing comes from it" if listed else ""
+    return f"{listed}, expected {expected}; no message arrives from it" if listed else ""
 
 
 def several(publishers: Publishers) -> str:

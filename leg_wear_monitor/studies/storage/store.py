@@ -50,7 +50,7 @@ class StudyDirectory:
                 raise ConfigError(
                     str(self.path),
                     "",
-                    f"holds the study {present}, expected {manifest['study']} or a new directory",
+                    f"contains the study {present}, expected {manifest['study']} or a new directory",
                 )
         try:
             (self.path / POINTS).mkdir(parents=True, exist_ok=True)

@@ -77,7 +77,7 @@ def test_messages_of_no_topic_are_told(path: Path, read: Any) -> None:
         database.execute("UPDATE messages SET topic_id = 77 WHERE id % 2 = 0")
         (count,) = database.execute("SELECT COUNT(*) FROM messages WHERE topic_id = 77").fetchone()
     _, recording = read(path)
-    assert losses(recording) == [f"holds {count} messages of topics that it does not list: they are lost"]
+    assert losses(recording) == [f"contains {count} messages of topics that it does not list: they are lost"]
 
 
 @pytest.mark.parametrize(

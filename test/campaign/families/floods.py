@@ -157,7 +157,7 @@ _KINDS: dict[str, tuple[Callable[[Stage, np.random.Generator], int], str]] = {
     "huge messages": (_huge, "do not name the crank 'crank': set crank_joint"),
     "a burst": (_burst, "overloaded: samples were dropped"),
     "two publishers": (_two, "two series of crank angles interleave"),
-    "another type": (_other_type, "expected sensor_msgs/msg/JointState; nothing comes from it"),
+    "another type": (_other_type, "expected sensor_msgs/msg/JointState; no message arrives from it"),
     "damaged messages": (_damaged, "samples "),
     "no numbers": (_no_numbers, "have a value that is NaN or infinite"),
     "ten thousand a second": (_fast, ""),

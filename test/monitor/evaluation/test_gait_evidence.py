@@ -42,9 +42,9 @@ def test_a_leg_is_believed_worn_slow_or_without_torque(other: dict[str, float]) 
 @pytest.mark.parametrize(
     ("other", "why"),
     [
-        ({"cadence_rpm": 3.0}, "the crank turns at 3 rpm, commanded are 60 rpm"),
-        ({"cadence_rpm": -60.0}, "the crank turns at -60 rpm, commanded are 60 rpm"),
-        ({"cadence_rpm": 300.0}, "the crank turns at 300 rpm, commanded are 60 rpm"),
+        ({"cadence_rpm": 3.0}, "the crank turns at 3 rpm, the commanded cadence is 60 rpm"),
+        ({"cadence_rpm": -60.0}, "the crank turns at -60 rpm, the commanded cadence is 60 rpm"),
+        ({"cadence_rpm": 300.0}, "the crank turns at 300 rpm, the commanded cadence is 60 rpm"),
         ({"torque_mismatch": 1.2}, "the drive torque does not resemble the predicted one"),
         ({"torque_mismatch": np.nan}, "the drive torque does not resemble the predicted one"),
         ({"measured_torque_rms_nm": 0.01}, "the drive torque is only 0.01 N m RMS"),
@@ -77,7 +77,7 @@ def test_what_is_missing_is_named() -> None:
     assert seen(rate_hz=1.0) == "no two of 4 crank samples follow each other within 0.5 s"
     assert seen(rate_hz=5.0) == "crank samples come at 5.26 Hz, too few: 60 rpm need 12 Hz"
     assert seen(seconds=1.0) == "the crank turns 0.99 times in 0.995 s: less than a whole gait cycle"
-    assert seen(rpm=3.0, seconds=60.0) == "the crank turns at 3 rpm, commanded are 60 rpm"
+    assert seen(rpm=3.0, seconds=60.0) == "the crank turns at 3 rpm, the commanded cadence is 60 rpm"
     assert seen().startswith("the crank turns 3.99 times, but its motion cannot be followed")
 
 

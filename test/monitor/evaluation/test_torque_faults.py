@@ -66,11 +66,13 @@ def test_a_torque_that_is_wrong_as_received_is_named_and_shows_nothing_of_the_le
     verdict, status = monitor.verdict.verdict, {one.name: one for one in monitor.status()}["torque"]
     assert verdict.fault_code == code
     assert not any(change.is_corrected for change in monitor.diagnosis.changes)
-    assert monitor.diagnosis.clearance_m == () and "wrong as received" in monitor.diagnosis.reason
+    assert (
+        monitor.diagnosis.clearance_m == () and "received drive torque is wrong" in monitor.diagnosis.reason
+    )
     assert len(monitor._torque.state.cycles) <= 3  # gait cycles until it is known; none is commissioned
     if offset_rad:
         assert status.values["crank_angle_ahead_rad"] == pytest.approx(-offset_rad, abs=0.01)
-        assert "cannot be told apart" in status.message
+        assert "cannot be distinguished" in status.message
     else:
         name = "torque_factor" if factor < 0.0 else "torque_factor_size"
         assert status.values[name] == pytest.approx(factor, rel=0.02)

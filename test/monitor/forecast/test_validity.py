@@ -33,5 +33,5 @@ def test_bias_is_said(power, word):
 
 
 def test_a_few_measurements_say_nothing():
-    assert "too few to judge" in validity(measured([0.99, 0.98])).words
+    assert "too few to evaluate" in validity(measured([0.99, 0.98])).words
     assert validity([]).within == 0

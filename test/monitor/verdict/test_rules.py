@@ -35,7 +35,7 @@ pytestmark = pytest.mark.plain
 
 JOINTS = ("A", "G")
 NEW = tuple(JointSituation(joint=joint, counted_m=3.0e-4, limit_m=6.0e-4) for joint in JOINTS)
-HEALTHY = Situation(joints=NEW, mismatch=0.031, mismatch_limit=0.1)
+HEALTHY = Situation(joints=NEW, quantities=specs.QUANTITIES, mismatch=0.031, mismatch_limit=0.1)
 BOARD = AlarmBoard(config_from({"encoders.names": ["knee"], "encoders.joints": ["G"]}), JOINTS)
 
 
@@ -223,8 +223,8 @@ def test_a_mismatch_without_a_diagnosis_is_told_as_what_it_is() -> None:
         alarms=(alarm("torque_mismatch", value=0.35, limit=0.1),),
         torque_causes=("drive_torque.sign is wrong",),
     )
-    assert "the torque is not that of the counted leg, the forecast is not valid" in verdict.why
-    assert "0.35 of the predicted RMS is not explained, the limit is 0.1" in verdict.why
+    assert "the drive torque does not fit the counted leg, so the forecast is not valid" in verdict.why
+    assert "0.35 of the predicted RMS is not explained (limit 0.1)" in verdict.why
     assert verdict.why.endswith("possible cause: drive_torque.sign is wrong")
     assert "rock each joint" in verdict.do and "leg-wear-monitor measure JOINT MM" in verdict.do
     (evidence,) = (each for each in verdict.evidence if each.name == "torque_mismatch")
@@ -253,7 +253,9 @@ def test_a_diagnosis_names_the_joint_that_a_mismatch_does_not() -> None:
     found = change(Cause.CLEARANCE, "G", runner_up="B 0.5 mm", runner_up_log_odds=1.0)
     verdict = judged(alarms=(alarm("torque_mismatch"),), diagnosis=diagnosis(found))
     assert (verdict.fault_code, verdict.joints, verdict.since_ns) == ("CLEARANCE_CHANGED_G", ("G",), 55)
-    assert "shows a clearance of 0.62 mm ± 0.03 mm in joint G, 0.3 mm is counted (or B 0.5 mm)" in verdict.why
+    assert (
+        "shows a clearance of 0.62 mm ± 0.03 mm in joint G (0.3 mm is counted) (or B 0.5 mm)" in verdict.why
+    )
     assert "rock joint G" in verdict.do and "leg-wear-monitor measure G MM --sigma MM" in verdict.do
 
 
@@ -264,25 +266,51 @@ def test_a_changed_mass_is_told_as_a_fraction_of_the_body() -> None:
 
 def test_a_corrected_clearance_is_told_with_the_one_that_was_counted() -> None:
     found = Diagnosis(changes=(change(Cause.CLEARANCE, "G", is_corrected=True),))
-    assert "in joint G, 0.3 mm was counted; the counted clearance is corrected" in judged(diagnosis=found).why
+    assert (
+        "in joint G (0.3 mm was counted); the counted clearance is corrected" in judged(diagnosis=found).why
+    )
 
 
 def test_a_reason_to_stop_is_not_hidden_by_an_input_that_fails() -> None:
-    verdict = judged(alarms=(alarm("clearance G"),), unfollowed="the crank is not followed since 4 s")
+    verdict = judged(alarms=(alarm("clearance G"),), unfollowed="the crank has not been followed for 4 s")
     assert verdict.state is State.STOP
-    assert verdict.why.endswith("the leg is not monitored now: the crank is not followed since 4 s")
+    assert verdict.why.endswith("the leg is not monitored now: the crank has not been followed for 4 s")
     assert verdict.not_valid == (Figure.GROWTH, Figure.IMPACT_FORCES)
 
 
 def test_a_latched_alarm_is_told_with_its_worst_value_and_as_past() -> None:
     verdict = judged(alarms=(alarm("impact_force A", present=Level.OK, value=3.0, worst=1234.5),))
-    assert "is 1234 N" in verdict.why and "(since 0.000 s; within its limit again now)" in verdict.why
+    assert "is 1234 N" in verdict.why and "(since 0.000 s; now within its limit)" in verdict.why
+
+
+def test_an_alarm_is_told_in_words_with_the_label_of_its_joint() -> None:
+    labelled = tuple(attrs.evolve(each, label="knee" if each.joint == "G" else "") for each in NEW)
+    impact = judged(alarms=(alarm("impact_force G"),), joints=labelled)
+    assert impact.why == "the impact force in joint G (knee) is 2 N (limit 1 N)"
+    assert "rock joint G (knee); " in impact.do and "leg-wear-monitor measure G MM" in impact.do
+    warning = judged(alarms=(alarm("clearance G", Level.WARN, value=5e-4, limit=6e-4),), joints=labelled)
+    assert warning.why == "alarm: the mean radial clearance of joint G (knee) is 0.5 mm (limit 0.6 mm)"
+    samples = judged(alarms=(alarm("input_samples", value=0.0972, limit=0.05),), input_causes=("x",))
+    assert samples.why == "the fraction of unusable samples is 0.0972 (limit 0.05): x"
+
+
+def test_an_alarm_without_a_noun_is_told_by_its_name() -> None:
+    own = attrs.evolve(alarm("torque_lag", Level.WARN), kind="input_silence", subject="torque")
+    assert judged(alarms=(own,)).why == "alarm: the input silence torque is 2 s (limit 1 s)"
+
+
+def test_no_sentence_of_a_verdict_has_a_code_name_of_an_alarm() -> None:
+    for name in BOARD.alarms:
+        for level in (Level.WARN, Level.ERROR):
+            assert name.partition(" ")[0] not in re.findall(
+                r"\w+_\w+", judged(alarms=(alarm(name, level),)).why
+            )
 
 
 def test_an_alarm_that_has_fallen_to_a_warning_is_told_with_its_worst_value_too() -> None:
     verdict = judged(alarms=(alarm("impact_force A", present=Level.WARN, value=0.9, worst=1234.5),))
     assert verdict.state is State.INSPECT
-    assert "is 1234 N" in verdict.why and "within its limit again now" in verdict.why
+    assert "is 1234 N" in verdict.why and "now within its limit" in verdict.why
 
 
 def test_an_alarm_of_the_ledger_without_a_new_value_is_told_with_its_worst_value() -> None:
@@ -298,18 +326,18 @@ def test_encoders_on_all_joints_observe_the_leg_without_a_drive_torque() -> None
         "no alarm is raised, and the encoders show the counted clearances",
     )
     some = judged(has_torque=False, joints=(attrs.evolve(NEW[0], seen=eyes), NEW[1]))
-    assert (some.state, some.why) == (State.WATCH, "joints cannot be observed (G): no drive torque")
+    assert (some.state, some.why) == (State.WATCH, "joints G cannot be observed: there is no drive torque")
 
 
 def test_a_healthy_leg_is_told_that_no_alarm_is_no_proof() -> None:
     verdict = judged()
     assert ADVICE in verdict.do
-    assert "0.031 of its RMS is not explained, the limit is 0.1" in verdict.why
+    assert "0.031 of its RMS is not explained (limit 0.1)" in verdict.why
 
 
 def test_a_healthy_leg_is_told_that_the_diagnosis_is_off() -> None:
     off = judged(diagnosis=Diagnosis(reason="diagnosis.enabled is false"))
-    assert off.why.endswith("it is not compared with wider joints: diagnosis.enabled is false")
+    assert off.why.endswith("the torque is not compared with wider joints: diagnosis.enabled is false")
 
 
 def test_joints_that_encoders_show_need_no_diagnosis() -> None:
@@ -408,10 +436,10 @@ TABLE = re.compile(r"(<!-- verdicts -->\n).*?(<!-- end -->)", re.DOTALL)
 
 
 def renewed(page: str) -> str:
-    rows = ["| `fault_code` | state | reason | figures that do not hold |", "|---|---|---|---|"]
+    rows = ["| `fault_code` | state | reason | values that are not valid |", "|---|---|---|---|"]
     for rule in RULES:
         figures = ", ".join(figure.value for figure in rule.not_valid)
-        why = re.sub(r"\{(\w+)\}", r"*\1*", rule.why.replace("{past}", "").replace("{causes}", ""))
+        why = re.sub(r"\{(\w+)\}", r"*\1*", re.sub(r"\{(past|causes|doubt)\}", "", rule.why))
         rows.append(f"| `{rule.code}` | {rule.state.value} | {why} | {figures} |")
     table = "\n".join([*rows, ""])
     return TABLE.sub(lambda found: found[1] + table + found[2], page)
@@ -430,12 +458,10 @@ if __name__ == "__main__":
 def test_a_name_that_is_not_sure_is_said_to_be_so() -> None:
     reason = "the leg is not that of its mechanism file"
     unsure = attrs.evolve(diagnosis(change(Cause.CLEARANCE, "G")), reason=reason)
-    assert f"0.3 mm is counted ({reason})" in judged(diagnosis=unsure).why
+    assert f"(0.3 mm is counted); {reason}" in judged(diagnosis=unsure).why
     at_limit = judged(diagnosis=unsure, joints=seen("torque", 6.7e-4, 3.0e-5))
-    assert f"the limit is 0.6 mm ({reason})" in at_limit.why
-    assert (
-        reason not in judged(diagnosis=unsure, joints=seen("encoders", 6.7e-4, 3.0e-5)).why.partition(";")[0]
-    )
+    assert f"(limit 0.6 mm); {reason}" in at_limit.why
+    assert reason not in judged(diagnosis=unsure, joints=seen("encoders", 6.7e-4, 3.0e-5)).why
 
 
 def test_a_body_that_is_longer_is_another_mechanism() -> None:

@@ -49,7 +49,7 @@ def visible(page):
 
 def test_the_first_screen_has_verdict_joints_belief_and_alarms():
     text = visible(page_of(made_up_summary()))
-    for words in ("INSPECT", "joint A", "why", "Do", "do", "Can these figures be believed?", "clearance A"):
+    for words in ("INSPECT", "joint A", "why", "Do", "do", "Are these values valid?", "clearance A"):
         assert words in text
     assert "Clearance over time" not in text
 
@@ -110,7 +110,7 @@ def test_a_chart_of_what_is_believed_is_there_and_else_is_not(figure, file):
 
 def test_a_seen_clearance_is_given_where_the_counted_one_is_not():
     text = visible(page_of(doubted(*Figure)))
-    assert "seen 0.500 ± 0.010 mm by encoders" in text
+    assert "measured 0.500 ± 0.010 mm by encoders" in text
     assert "counted" not in text.partition("Clearances are radial")[0]
 
 

@@ -26,6 +26,7 @@ from leg_wear_monitor.monitor.torque_causes.explainer import TorqueExplainer
 from leg_wear_monitor.torque_fit.torque_model import torque_model
 from leg_wear_monitor.twin.digital_twin import DigitalTwin
 from leg_wear_monitor.twin.reference.leg_parameters import LegParameters
+from leg_wear_monitor.twin.reference.torque_reference import TorqueReference
 
 WRONG_TORQUE = "the received drive torque is wrong; see the status `torque`"
 ACCELERATED = "wear is accelerated: clearances grow within the gait cycles that are compared"
@@ -82,6 +83,7 @@ class Parts:
                 self.twin.clearance_mean_m,
                 ledger.commissioned_torque if ledger else None,
                 self._known_parameters(ledger),
+                self._known_reference(ledger),
             )
             if self.config.diagnosis.enabled and self.config.wear_acceleration == 1.0
             else None
@@ -111,9 +113,17 @@ class Parts:
         known = ledger.parameters if ledger else None
         if known is None:
             return None
-        of = {name: i for i, name in enumerate(known.names)}
-        order = [of[name] for name in self.mechanism.bodies]
+        order = [known.names.index(name) for name in self.mechanism.bodies]
         return LegParameters(np.array(known.mass)[order], np.array(known.length)[order], known.friction)
+
+    def _known_reference(self, ledger: Ledger | None) -> TorqueReference | None:
+        """Torque reference of the ledger, its parameters in the order of the mechanism."""
+        kept = ledger.reference if ledger else None
+        if kept is None:
+            return None
+        order, own = [kept.bodies.index(name) for name in self.mechanism.bodies], kept.reference.parameters
+        parameters = attrs.evolve(own, mass=own.mass[order], length=own.length[order])
+        return attrs.evolve(kept.reference, parameters=parameters)
 
     @property
     def diagnosis(self) -> Diagnosis:

@@ -8,7 +8,12 @@ from leg_wear_monitor.monitor.encoders.clearance_estimate import ClearanceEstima
 from leg_wear_monitor.monitor.evaluation.specs import MISMATCH
 from leg_wear_monitor.monitor.forecast.growth import GrowthWindow, extended
 from leg_wear_monitor.monitor.forecast_update import update_forecast
-from leg_wear_monitor.monitor.ledger.entry import Audit, CommissionedTorque, IdentifiedLeg
+from leg_wear_monitor.monitor.ledger.entry import (
+    Audit,
+    CommissionedTorque,
+    IdentifiedLeg,
+    SimulatedReference,
+)
 from leg_wear_monitor.monitor.parts import Parts
 from leg_wear_monitor.monitor.reports import (
     AlarmList,
@@ -17,6 +22,7 @@ from leg_wear_monitor.monitor.reports import (
     VerdictReport,
 )
 from leg_wear_monitor.twin.reference.leg_parameters import LegParameters
+from leg_wear_monitor.twin.reference.torque_reference import TorqueReference
 from leg_wear_monitor.twin.sample import Samples
 from leg_wear_monitor.twin.statistics import CycleStatistics
 
@@ -138,8 +144,9 @@ class Processing:
         """Compare the drive torque with that of the counted leg, and correct what is surely counted wrong."""
         if not self._torque:
             return
-        before = self._torque.state.commissioned
+        before, reference = self._torque.state.commissioned, self._torque.state.reference
         correction = self._torque.end_period(self._twin.clearance_mean_m, self._twin.depth)
+        self._note_reference(reference)
         is_wrong = self._parts.is_torque_wrong
         if not is_wrong:
             self._take_parameters(self._torque.parameters)
@@ -174,6 +181,14 @@ class Processing:
         now = self._torque.state.commissioned if self._torque else None
         if now is not None and now is not before:
             self._accounting.note(now)
+
+    def _note_reference(self, before: TorqueReference | None) -> None:
+        """Store a reference that was simulated since: to simulate it again takes minutes of walking."""
+        now = self._torque.simulated_reference if self._torque else None
+        if now is not None and now is not before:
+            names = tuple(self._parts.mechanism.bodies)
+            self._accounting.note(SimulatedReference(self._twin.intake.followed_stamp_ns, names, now))
+            self._parts.keep()
 
     def _clearance_estimates(self, statistics: CycleStatistics) -> tuple[ClearanceEstimate, ...] | None:
         """Clearances estimated from encoders; they update the forecast."""

@@ -6,6 +6,7 @@ import pytest
 
 from leg_wear_monitor.monitor.config.settings import MonitorConfig
 from leg_wear_monitor.monitor.diagnosis.observer import TorqueObserver
+from leg_wear_monitor.monitor.diagnosis.reference_file import shipped_reference
 from leg_wear_monitor.monitor.opening import open_monitor
 from leg_wear_monitor.twin.reference.leg_parameters import LegParameters
 
@@ -39,6 +40,19 @@ def test_the_twin_walks_on_with_identified_parameters_and_the_ledger_keeps_them(
     again = open_monitor(leg, config)
     assert again._parts.twin.parameters == found
     assert again._parts.torque.state.parameters == found
+    again.close()
+
+
+def test_a_simulated_reference_is_in_the_ledger(leg, gait, tmp_path, monkeypatch):
+    config, shipped = config_of(tmp_path / "wear.ledger"), shipped_reference(leg)
+    monkeypatch.setattr(TorqueObserver, "simulated_reference", shipped)
+    monitor = open_monitor(leg, config)
+    monitor.update(gait(2.5))
+    monitor.close()
+    again = open_monitor(leg, config)
+    (kept, *_) = again._parts.torque._references._given
+    np.testing.assert_array_equal(kept.torque_nm[3], shipped.torque_nm[3])
+    assert kept.parameters == LegParameters.none(leg)
     again.close()
 
 

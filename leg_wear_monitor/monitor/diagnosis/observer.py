@@ -25,7 +25,7 @@ from leg_wear_monitor.monitor.diagnosis.state import TorqueState
 from leg_wear_monitor.monitor.diagnosis.torque_samples import NO_TORQUE_SAMPLES, after, extended
 from leg_wear_monitor.monitor.ledger.entry import CommissionedTorque
 from leg_wear_monitor.twin.reference.leg_parameters import LegParameters
-from leg_wear_monitor.twin.reference.torque_reference import TorqueReferenceSnapshot
+from leg_wear_monitor.twin.reference.torque_reference import TorqueReference, TorqueReferenceSnapshot
 from leg_wear_monitor.twin.sample import Samples
 from leg_wear_monitor.twin.statistics import CycleStatistics
 
@@ -57,6 +57,8 @@ class TorqueObserver:
         That of the ledger.
     parameters : LegParameters or None
         Those of the ledger.
+    reference : TorqueReference or None
+        That of the ledger.
 
     Raises
     ------
@@ -71,10 +73,11 @@ class TorqueObserver:
         counted_m: Floats,
         commissioned: CommissionedTorque | None = None,
         parameters: LegParameters | None = None,
+        reference: TorqueReference | None = None,
     ) -> None:
         self.config, self._size_nm, self._joints = config, size_nm, mechanism.clearance_joints
         self._models = LegModels(mechanism)
-        self._references = References(mechanism, self._models)
+        self._references = References(mechanism, self._models, reference)
         self._evidence = Evidence(self._models)
         counted_m = np.asarray(counted_m, float).copy()
         self.state = TorqueState(counted_m, commissioned=commissioned, parameters=parameters)
@@ -143,6 +146,12 @@ class TorqueObserver:
         ):
             return None
         return state.parameters if self._models.is_of_file(state) else None
+
+    @property
+    def simulated_reference(self) -> TorqueReference | None:
+        """The reference in force if it was simulated in this run, else None."""
+        reference = self.state.reference
+        return None if self._references.is_given(reference) else reference
 
     def begin_epoch(self) -> None:
         """Forget kept samples and gait cycles, because stamps start again."""

@@ -38,6 +38,8 @@ class References:
     mechanism : Mechanism
     models : LegModels
         Told to forget what depends on a reference.
+    kept : TorqueReference or None
+        One that was simulated in an earlier run.
 
     Raises
     ------
@@ -45,9 +47,9 @@ class References:
         If a reference that comes with the package cannot be read.
     """
 
-    def __init__(self, mechanism: Mechanism, models: LegModels) -> None:
+    def __init__(self, mechanism: Mechanism, models: LegModels, kept: TorqueReference | None = None) -> None:
         self._mechanism, self._models = mechanism, models
-        self._shipped = shipped_reference(mechanism)
+        self._given = [one for one in (kept, shipped_reference(mechanism)) if one is not None]
         self._run: TorqueReferenceRun | None = None
 
     @property
@@ -59,6 +61,10 @@ class References:
     def percent(self) -> int:
         """How much of what is being simulated is done [%]."""
         return math.floor(100.0 * self._run.progress) if self._run is not None else 0
+
+    def is_given(self, reference: TorqueReference | None) -> bool:
+        """Whether a reference comes from the ledger or with the package."""
+        return any(reference is one for one in self._given)
 
     def snapshot(self) -> TorqueReferenceSnapshot | None:
         """A copy of what is being simulated; None before anything was."""
@@ -121,11 +127,12 @@ class References:
         return False
 
     def _choose(self, state: TorqueState, counted_m: Floats, depth: Floats) -> bool:
-        """Use the reference that comes with the package if the crank turns as in it; or begin one."""
+        """Use a given reference if the crank turns as in it, or begin one."""
         profile = mean_profile([cycle.profile for cycle in state.cycles])
-        if self._shipped is not None and profile.departure(self._shipped.profile) <= UNLIKE:
-            self._install(state, self._shipped)
-            return True
+        for one in self._given:
+            if profile.departure(one.profile) <= UNLIKE:
+                self._install(state, one)
+                return True
         self._begin(state, counted_m, depth, profile)
         return False
 

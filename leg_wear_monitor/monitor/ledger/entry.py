@@ -8,6 +8,7 @@ import numpy as np
 
 from leg_wear_monitor.mechanism.arrays import Floats
 from leg_wear_monitor.monitor.alarms.alarm import Alarm
+from leg_wear_monitor.twin.reference.torque_reference import TorqueReference
 from leg_wear_monitor.wear.surfaces import SECTORS
 
 
@@ -295,6 +296,23 @@ class IdentifiedLeg:
     friction: float
 
 
+@attrs.frozen(eq=False)
+class SimulatedReference:
+    """A torque reference that was simulated for this leg.
+
+    Attributes
+    ----------
+    stamp_ns : int
+    bodies : tuple of str
+        Names of the bodies, in the order of its parameters.
+    reference : TorqueReference
+    """
+
+    stamp_ns: int
+    bodies: tuple[str, ...]
+    reference: TorqueReference
+
+
 Event = (
     Audit
     | AlarmEvent
@@ -305,5 +323,6 @@ Event = (
     | Commissioned
     | CommissionedTorque
     | IdentifiedLeg
+    | SimulatedReference
     | VerdictEvent
 )

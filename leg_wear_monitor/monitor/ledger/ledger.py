@@ -26,6 +26,7 @@ from leg_wear_monitor.monitor.ledger.rows import (
     read_identified_leg,
     read_last_reset,
     read_measurements,
+    read_simulated_reference,
     read_spans,
 )
 from leg_wear_monitor.monitor.ledger.run import Run
@@ -56,8 +57,10 @@ class Ledger:
         Errors of further encoders from earlier runs.
     commissioned_torque : CommissionedTorque or None
         Signatures of the drive torque from earlier runs.
+    reference : SimulatedReference or None
+        Torque reference that was simulated in earlier runs.
     parameters : IdentifiedLeg or None
-        Masses and lengths that were identified in earlier runs.
+        Masses, lengths and friction that were identified in earlier runs.
     last_run : Run
         The previous run.
     epoch, boot_id : int, str
@@ -118,6 +121,7 @@ class Ledger:
         self.commissioned = self._store.ask(read_commissioned)
         self.commissioned_torque = self._store.ask(read_commissioned_torque)
         self.parameters = self._store.ask(read_identified_leg)
+        self.reference = self._store.ask(read_simulated_reference)
 
     @property
     def counted_ns(self) -> Ints:

@@ -19,10 +19,15 @@ from leg_wear_monitor.monitor.ledger.entry import (
     IdentifiedLeg,
     JointWear,
     Measurement,
+    SimulatedReference,
     VerdictEvent,
     Withdrawal,
 )
 from leg_wear_monitor.monitor.ledger.run import Run
+from leg_wear_monitor.twin.reference.crank_profile import CrankProfile
+from leg_wear_monitor.twin.reference.leg_parameters import LegParameters
+from leg_wear_monitor.twin.reference.leg_simulation import POINTS
+from leg_wear_monitor.twin.reference.torque_reference import TorqueReference
 
 
 def write_run(db: sqlite3.Connection, run: Run) -> None:
@@ -114,6 +119,10 @@ def write_event(db: sqlite3.Connection, event: Event) -> None:
                 "INSERT INTO body (stamp_ns, name, mass, length) VALUES (?, ?, ?, ?)",
                 [(stamp_ns, *factors) for factors in zip(names, mass, length, strict=True)],
             )
+        case SimulatedReference():
+            values = _reference_values(event)
+            places = ", ".join("?" * len(values))
+            db.execute(f"INSERT OR REPLACE INTO torque_reference VALUES (1, {places})", values)
         case Audit(stamp_ns, who, what, was, undoes):
             values = (was.name, was.cycles, _depth_bytes(was), was.moving_s, was.replaced_ns) if was else ()
             db.execute(
@@ -184,6 +193,41 @@ def read_identified_leg(db: sqlite3.Connection) -> IdentifiedLeg | None:
         "SELECT factor FROM friction WHERE stamp_ns = ? ORDER BY id DESC", stamps[:1]
     ).fetchone()
     return IdentifiedLeg(stamps[0], names, mass, length, found[0] if found else 1.0)
+
+
+def _reference_values(event: SimulatedReference) -> tuple[float | bytes | str, ...]:
+    """Values of the columns of a reference, without its id."""
+    reference = event.reference
+    profile, leg, known = reference.profile, reference.parameters, reference.clearance_m
+    ripple = np.stack([profile.cosine, profile.sine])
+    return (
+        event.stamp_ns,
+        profile.speed,
+        *(part.astype("<f8").tobytes() for part in (ripple, known)),
+        len(known),
+        "\n".join(event.bodies),
+        *(part.astype("<f8").tobytes() for part in (leg.mass, leg.length)),
+        leg.friction,
+        reference.torque_nm[0].astype("<f2").tobytes(),
+        np.stack(reference.torque_nm[1:]).astype("<f2").tobytes(),
+    )
+
+
+def read_simulated_reference(db: sqlite3.Connection) -> SimulatedReference | None:
+    """Torque reference that was simulated for the leg, None if there is none."""
+    row = db.execute(
+        "SELECT stamp_ns, bodies, speed_radps, legs, friction, ripple_rad, clearance_m, mass, length, "
+        "expected_torque_nm, torque_nm FROM torque_reference"
+    ).fetchone()
+    if row is None:
+        return None
+    stamp_ns, bodies, speed, legs, friction = row[:5]
+    ripple, known, mass, length = (np.frombuffer(part, "<f8").astype(float) for part in row[5:9])
+    expected, wider = (np.frombuffer(part, "<f2").astype(np.float16).reshape(-1, POINTS) for part in row[9:])
+    profile, leg = CrankProfile(speed, *ripple.reshape(2, -1)), LegParameters(mass, length, friction)
+    torque = (expected, *wider.reshape(legs - 1, -1, POINTS))
+    reference = TorqueReference(profile, known.reshape(legs, -1), torque, leg)
+    return SimulatedReference(stamp_ns, tuple(bodies.split("\n")), reference)
 
 
 def read_last_reset(db: sqlite3.Connection, joint: str) -> Audit | None:

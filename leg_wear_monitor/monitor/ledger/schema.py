@@ -233,7 +233,20 @@ _SEVENTH = """
 CREATE TABLE friction (id INTEGER PRIMARY KEY, stamp_ns INTEGER NOT NULL, factor REAL NOT NULL) STRICT;
 """
 
-MIGRATIONS = (_FIRST, _SECOND, _THIRD, _FOURTH, _FIFTH, _SIXTH, _SEVENTH)
+_EIGHTH = """
+-- the torque reference in force, if it was simulated for this leg: speed of its crank and ripple (2,
+-- harmonics), clearances (legs, k), bodies (a line each) and their factors on masses and lengths of the
+-- mechanism file, the factor on its friction, and drive torques [N m] of the expected leg and of the wider
+-- ones (cycles, points each); float64 and, of torques, float16, little endian
+CREATE TABLE torque_reference (
+    id INTEGER PRIMARY KEY CHECK (id = 1), stamp_ns INTEGER NOT NULL, speed_radps REAL NOT NULL,
+    ripple_rad BLOB NOT NULL, clearance_m BLOB NOT NULL, legs INTEGER NOT NULL, bodies TEXT NOT NULL,
+    mass BLOB NOT NULL, length BLOB NOT NULL, friction REAL NOT NULL, expected_torque_nm BLOB NOT NULL,
+    torque_nm BLOB NOT NULL
+) STRICT;
+"""
+
+MIGRATIONS = (_FIRST, _SECOND, _THIRD, _FOURTH, _FIFTH, _SIXTH, _SEVENTH, _EIGHTH)
 
 FORMAT = len(MIGRATIONS)
 SEALED_FROM = 4  # first format with checksums over the whole content
@@ -242,7 +255,9 @@ GROWING = (  # append only
     "alarm_history", "audit", "body", "commissioning", "forecast", "friction", "history",
     "torque_commissioning", "verdict",
 )  # fmt: skip
-CHANGING = ("alarm", "binding", "entry", "joint", "measurement", "run", "span", "total")
+CHANGING = (
+    "alarm", "binding", "entry", "joint", "measurement", "run", "span", "torque_reference", "total",
+)  # fmt: skip
 
 Definitions = list[tuple[str, str, str, str | None]]
 

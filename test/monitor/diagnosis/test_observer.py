@@ -102,6 +102,21 @@ def test_a_healthy_leg_is_as_counted_and_becomes_commissioned(leg, reference) ->
     assert (off < 4.0 * np.array(found.sigma_m)).all()
 
 
+def test_the_reference_of_the_ledger_comes_before_the_shipped_one(leg, reference) -> None:
+    kept = attrs.evolve(reference)
+    observer = observer_of(leg, reference=kept)
+    walk(observer, samples(reference, [0] * 8))
+    assert observer.state.reference is kept
+    assert observer.simulated_reference is None  # nothing to store
+
+
+def test_a_reference_of_the_ledger_under_another_crank_motion_is_not_used(leg, reference) -> None:
+    profile = attrs.evolve(reference.profile, sine=np.append(0.02, reference.profile.sine[1:]))
+    observer = observer_of(leg, reference=attrs.evolve(reference, profile=profile))
+    walk(observer, samples(reference, [0] * 8))
+    np.testing.assert_array_equal(observer.state.reference.profile.sine, 0.0)
+
+
 def test_samples_at_the_same_angles_in_each_cycle_are_reported(leg, reference) -> None:
     observer = observer_of(leg)
     walk(observer, samples(reference, [0] * (COMMISSIONING_CYCLES + 1)))

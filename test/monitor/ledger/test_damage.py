@@ -18,12 +18,19 @@ from leg_wear_monitor.monitor.ledger.entry import (
     ForecastPoint,
     IdentifiedLeg,
     Measurement,
+    SimulatedReference,
     VerdictEvent,
 )
 from leg_wear_monitor.monitor.ledger.file import LedgerError
 from leg_wear_monitor.monitor.ledger.schema import CHANGING, GROWING
+from leg_wear_monitor.twin.reference.crank_profile import CrankProfile
+from leg_wear_monitor.twin.reference.leg_parameters import LegParameters
+from leg_wear_monitor.twin.reference.leg_simulation import POINTS
+from leg_wear_monitor.twin.reference.torque_reference import TorqueReference
 
 pytestmark = pytest.mark.plain
+
+LEG = LegParameters(np.ones(1), np.ones(1))
 
 
 @pytest.fixture
@@ -37,6 +44,9 @@ def full(open_ledger, entry_at):
     ledger.note(Measurement(1, "A", "ann", 3e-4, 1e-6, 1e-5, 3, 0, 0.3, True))
     ledger.note(Commissioned(1, ("hip",), np.zeros(1), np.zeros(3), np.eye(3)))
     ledger.note(CommissionedTorque(1, np.full(5, 3e-4), np.ones((3, 80))))
+    torque = np.ones((2, 1, POINTS), np.float16)
+    reference = TorqueReference(CrankProfile.steady(6.0), np.full((2, 5), 3e-4), tuple(torque), LEG)
+    ledger.note(SimulatedReference(1, ("thigh",), reference))
     ledger.note(IdentifiedLeg(1, ("thigh",), (1.02,), (0.999,), 1.5))
     texts = ("state", "fault_code", "joints", "why", "to_do", "evidence", "not_valid")
     ledger.note(VerdictEvent(stamp_ns=4, since_ns=3, **dict.fromkeys(texts, "[]")))

@@ -5,12 +5,18 @@ import sqlite3
 from contextlib import closing
 
 import attrs
+import numpy as np
 import pytest
 
+from leg_wear_monitor.monitor.diagnosis.reference_file import shipped_reference
 from leg_wear_monitor.monitor.ledger import file, ledger, recovery, schema
-from leg_wear_monitor.monitor.ledger.entry import IdentifiedLeg, VerdictEvent
+from leg_wear_monitor.monitor.ledger.entry import IdentifiedLeg, SimulatedReference, VerdictEvent
+from leg_wear_monitor.twin.reference.leg_parameters import LegParameters
 
 pytestmark = pytest.mark.plain
+
+# what a ledger of format 4 does not ask for
+LATER = ("read_commissioned_torque", "read_identified_leg", "read_simulated_reference")
 
 EVENT = VerdictEvent(
     stamp_ns=7,
@@ -44,6 +50,29 @@ def test_an_identified_leg_is_read_as_written_and_the_last_is_in_force(open_ledg
     assert open_ledger().parameters == IdentifiedLeg(7, ("thigh", "foot"), (0.9, 1.02), (0.998, 1.001), 1.8)
 
 
+def test_a_simulated_reference_is_read_as_written_and_the_last_is_in_force(open_ledger, entry_at, leg):
+    shipped = shipped_reference(leg)
+    factors = 1.0 + 0.01 * np.arange(len(leg.bodies))
+    other = attrs.evolve(
+        shipped,
+        profile=attrs.evolve(shipped.profile, sine=np.linspace(0.0, 0.01, len(shipped.profile.sine))),
+        parameters=LegParameters(factors, 2.0 - factors, 1.7),
+    )
+    ledger = open_ledger()
+    assert ledger.reference is None
+    for stamp_ns, reference in ((5, shipped), (7, other)):
+        ledger.note(SimulatedReference(stamp_ns, tuple(leg.bodies), reference))
+    ledger.keep(entry_at(1), closed=True)
+    ledger.close()
+    found = open_ledger().reference
+    assert (found.stamp_ns, found.bodies) == (7, tuple(leg.bodies))
+    assert found.reference.parameters == other.parameters
+    assert found.reference.profile.departure(other.profile) == 0.0
+    np.testing.assert_array_equal(found.reference.clearance_m, other.clearance_m)
+    for one, same in zip(found.reference.torque_nm, other.torque_nm, strict=True):
+        np.testing.assert_array_equal(one, same)
+
+
 def rows(path):
     with closing(sqlite3.connect(path)) as db:
         db.row_factory = sqlite3.Row
@@ -57,7 +86,7 @@ def in_format_4(monkeypatch):
         then.setattr(schema, "MIGRATIONS", schema.MIGRATIONS[:4])
         for module in (schema, file, recovery):
             then.setattr(module, "FORMAT", 4)
-        for later in ("read_commissioned_torque", "read_identified_leg"):  # of formats 5 and later
+        for later in LATER:
             then.setattr(ledger, later, lambda _: None)
         schema.expected_definitions.cache_clear()
         yield then
@@ -86,7 +115,7 @@ def test_a_ledger_of_format_4_is_migrated_with_the_entries_of_its_log(
     found.note(EVENT)
     found.keep(entry_at(6), closed=True)
     found.close()
-    assert version(ledger.path) == schema.FORMAT == 7
+    assert version(ledger.path) == schema.FORMAT == 8
     assert len(rows(ledger.path)) == 1
     assert open_ledger().entry.digest() == entry_at(6).digest()
 

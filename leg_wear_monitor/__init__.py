@@ -26,6 +26,8 @@ if TYPE_CHECKING:
     )
     from leg_wear_monitor.dynamics.result.simulation_result import SimulationResult
     from leg_wear_monitor.dynamics.simulation import simulate
+    from leg_wear_monitor.life.life import LifeRun, LifeSettings, simulate_life
+    from leg_wear_monitor.life.result import Life
     from leg_wear_monitor.mechanism.loader import load_mechanism
     from leg_wear_monitor.mechanism.spec import Mechanism
     from leg_wear_monitor.monitor.config.parameter_file import load_config
@@ -36,6 +38,7 @@ if TYPE_CHECKING:
     from leg_wear_monitor.playback.result.parts import ReplayJoint
     from leg_wear_monitor.playback.result.replay_summary import ReplaySummary
     from leg_wear_monitor.report.plot import plot
+    from leg_wear_monitor.share import share_directory
     from leg_wear_monitor.twin.sample import gait_samples
 
 _HOME = {
@@ -44,6 +47,9 @@ _HOME = {
     "EnergyBalance": "dynamics.result.parts",
     "Impact": "dynamics.result.parts",
     "JointResult": "dynamics.result.parts",
+    "Life": "life.result",
+    "LifeRun": "life.life",
+    "LifeSettings": "life.life",
     "Mechanism": "mechanism.spec",
     "MonitorConfig": "monitor.config.settings",
     "ReplayJoint": "playback.result.parts",
@@ -61,7 +67,9 @@ _HOME = {
     "open_ledger": "monitor.ledger.ledger",
     "plot": "report.plot",
     "replay": "playback.replay",
+    "share_directory": "share",
     "simulate": "dynamics.simulation",
+    "simulate_life": "life.life",
 }
 
 __all__ = [
@@ -73,6 +81,9 @@ __all__ = [
     "Impact",
     "JointResult",
     "LegWearError",
+    "Life",
+    "LifeRun",
+    "LifeSettings",
     "Mechanism",
     "MonitorConfig",
     "ReplayJoint",
@@ -91,7 +102,9 @@ __all__ = [
     "open_ledger",
     "plot",
     "replay",
+    "share_directory",
     "simulate",
+    "simulate_life",
 ]
 
 

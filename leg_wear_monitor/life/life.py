@@ -47,7 +47,23 @@ _TRIALS = 4  # of a jump with too large an error, before it is accepted and repo
 
 @attrs.frozen(kw_only=True)
 class LifeSettings:
-    """How a life is simulated."""
+    """How a life is simulated.
+
+    Attributes
+    ----------
+    legs : int
+        Legs whose wear is averaged, alike but for their start.
+    cycles : int
+        Gait cycles of each leg that are averaged before a jump.
+    settle_cycles : int
+        Gait cycles before those, since the surfaces have changed.
+    perturb_fraction : float
+        Journals start up to this fraction of the smallest clearance from the centre.
+    jump : JumpControl
+        How far a jump may go: deepest change of a surface ``opens_m`` and error ``tolerance_m`` [m].
+    seed : int
+        Of where the legs start.
+    """
 
     legs: int = quantity("", "legs whose wear is averaged, alike but for their start", at_least=1, default=2)
     cycles: int = quantity("", "gait cycles of each that are averaged, before a jump", at_least=2, default=4)

@@ -1,4 +1,4 @@
-"""A result on matplotlib's axes, for a notebook or a script to go on with."""
+"""A result, or a mechanism, on matplotlib's axes, for a notebook or a script to go on with."""
 
 from functools import singledispatch
 from typing import Any
@@ -9,23 +9,26 @@ from matplotlib.axes import Axes
 from leg_wear_monitor.dynamics.result.simulation_result import SimulationResult
 from leg_wear_monitor.life.result import Life
 from leg_wear_monitor.mechanism.ideal import TURN
+from leg_wear_monitor.mechanism.spec import Mechanism
 from leg_wear_monitor.playback.result.replay_summary import ReplaySummary
 from leg_wear_monitor.report.figures.figure import BODY_COLOURS, SMALL, tidy
 from leg_wear_monitor.report.figures.force_traces import LEAST_N
+from leg_wear_monitor.report.figures.leg_picture import draw_leg
 from leg_wear_monitor.report.figures.life_picture import draw_clearances
 from leg_wear_monitor.report.figures.openings import draw_openings
 
 
 @singledispatch
 def plot(result: Any, axes: Axes | None = None) -> Axes:
-    """Draw a result.
+    """Draw a result, or a mechanism.
 
     Parameters
     ----------
-    result : SimulationResult, Life or ReplaySummary
+    result : SimulationResult, Life, ReplaySummary or Mechanism
         Of a simulation, the force in each clearance joint over the turns of the crank, or without a trace the
         mean, 99 % and largest force in every joint [N]; of a life, the clearance of each joint over the gait
-        cycles [µm]; of a replay, how much each clearance has opened over time.
+        cycles [µm]; of a replay, how much each clearance has opened over time; of a mechanism, its bodies at
+        crank angle 0, to scale, and the path of its toe [m].
     axes : matplotlib.axes.Axes, optional
         Where to draw; new axes of pyplot without.
 
@@ -41,7 +44,7 @@ def plot(result: Any, axes: Axes | None = None) -> Axes:
     'force [N]'
     """
     raise TypeError(
-        f"{type(result).__name__} has no picture, expected SimulationResult, Life or ReplaySummary"
+        f"{type(result).__name__} has no picture, expected SimulationResult, Life, ReplaySummary or Mechanism"
     )
 
 
@@ -85,6 +88,15 @@ def _replay(result: ReplaySummary, axes: Axes | None = None) -> Axes:
     axes = _new() if axes is None else axes
     unit = draw_openings(axes, result)
     axes.set_xlabel(f"time since the recording's begin [{unit}]", fontsize=SMALL)
+    return _finished(axes)
+
+
+@plot.register
+def _mechanism(result: Mechanism, axes: Axes | None = None) -> Axes:
+    axes = _new() if axes is None else axes
+    draw_leg(axes, result)
+    axes.set_xlabel("x [m]", fontsize=SMALL)
+    axes.set_ylabel("y [m]", fontsize=SMALL)
     return _finished(axes)
 
 

@@ -77,6 +77,15 @@ def test_axes_that_are_given_are_drawn_on(life):
     assert lw.plot(life, axes) is axes and len(axes.get_lines()) == 2
 
 
+def test_a_mechanism_to_scale_with_the_path_of_its_toe():
+    axes = lw.plot(lw.load_mechanism("four_bar"))
+    trace = lw.simulate("four_bar", clearances=[], cycles=1, trace=360).trace
+    toe = np.column_stack([trace.toe_x_m, trace.toe_y_m])
+    paths = [line.get_xydata() for line in axes.get_lines()]
+    assert any(path.shape == (361, 2) and path[:360] == pytest.approx(toe, abs=1e-9) for path in paths)
+    assert axes.get_aspect() == 1.0 and axes.get_ylabel() == "y [m]"
+
+
 def test_what_is_no_result_is_named():
     with pytest.raises(TypeError, match=r"^dict has no picture, expected SimulationResult"):
         lw.plot({})

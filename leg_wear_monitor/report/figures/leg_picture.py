@@ -83,6 +83,22 @@ def leg_picture(
     return figure
 
 
+def draw_leg(axes: Axes, mechanism: Mechanism) -> None:
+    """Draw the ideal mechanism at crank angle 0, to scale, and the path of its toe over one gait cycle.
+
+    Raises
+    ------
+    AssemblyError
+        If the mechanism does not close or has a dead point.
+    """
+    linkage = build_linkage(mechanism)
+    paths = _paths(linkage, one_cycle(linkage, _PATH_POINTS, 1.0))
+    low, high = _extent(paths)
+    _draw_still(axes, mechanism, paths, paths, mechanism.clearance_joints)
+    _draw_toe_path(axes, mechanism, paths)
+    axes.set(aspect="equal", xlim=(low[0], high[0]), ylim=(low[1], high[1]))
+
+
 def _paths(linkage: Linkage, motion: IdealMotion) -> Paths:
     """Path (N, 2) [m] of every point over the motion, by body and point."""
     mechanism = linkage.mechanism
@@ -163,6 +179,10 @@ def _draw_cycle(axes: Axes, mechanism: Mechanism, paths: Paths) -> None:
                 alpha=0.7,
                 solid_capstyle="round",
             )
+    _draw_toe_path(axes, mechanism, paths)
+
+
+def _draw_toe_path(axes: Axes, mechanism: Mechanism, paths: Paths) -> None:
     if mechanism.toe is not None:
         body, point = mechanism.toe
         path = paths[body][point]

@@ -104,7 +104,7 @@ test-oldest-quick: .venv-oldest/installed
 		test/contact test/messages test/monitor
 
 clean:
-	rm -rf .venv .venv-oldest .venv-tools .venv-docs build dist docs/tutorials/pages *.egg-info .coverage .hypothesis .import_linter_cache .*_cache
+	rm -rf .venv .venv-oldest .venv-tools .venv-docs build dist docs/lessons *.egg-info .coverage .hypothesis .import_linter_cache .*_cache
 
 # What the packages are built with comes first: without build isolation, which would fetch a setuptools that nothing pins.
 .venv/installed: setup.cfg setup.py package.xml requirements-build.lock requirements.lock

@@ -6,7 +6,8 @@ from xml.etree import ElementTree
 from setuptools import setup
 
 FRACTION = "share/leg_wear_monitor"
-SITE = ("docs/conf.py", "docs/_")  # what builds the pages below docs/ is no page
+# What builds the pages below docs/ is no page, and what the site's build writes there comes and goes.
+SITE = ("docs/conf.py", "docs/_", "docs/lessons/")
 
 
 def share_files() -> list[tuple[str, list[str]]]:

@@ -1,5 +1,6 @@
 """Settings of the documentation site; `make docs` builds it into build/docs, without network."""
 
+import os
 import sys
 from pathlib import Path
 from typing import Any
@@ -26,9 +27,16 @@ extensions = [
     "sphinx.ext.autosummary",
     "sphinx_click",
     "sphinx_design",
+    "sphinx_gallery.gen_gallery",
     "three_clicks",
 ]
-exclude_patterns = ["_ext", "validation", *rosdoc2_copy.PAGES]
+exclude_patterns = [
+    "_ext",
+    "lessons/index.rst",  # in tutorials/index.rst
+    "tutorials/GALLERY_HEADER.rst",
+    "validation",
+    *rosdoc2_copy.PAGES,
+]
 nitpicky = True
 
 # Pages are read on a forge, too: headings have its anchors, and links are those of plain Markdown.
@@ -56,10 +64,31 @@ def setup(app: Any) -> None:
         app.connect(f"sphinx-click-process-{part}", _plain_help)
 
 
+# The tutorials run while the site is built, and one that fails stops the build.
+os.environ["PATH"] = f"{Path(sys.executable).parent}{os.pathsep}{os.environ['PATH']}"  # leg-wear-monitor
+sphinx_gallery_conf = {
+    "examples_dirs": "tutorials",
+    "gallery_dirs": "lessons",
+    "filename_pattern": r"\d_",
+    "copyfile_regex": "(?!)",  # nothing; an empty one would match index.rst
+    "within_subsection_order": "FileNameSortKey",
+    "abort_on_example_error": True,
+    "run_stale_examples": True,  # the package may have changed
+    "reset_modules": ("matplotlib",),
+    "image_srcset": ["2x"],
+    "first_notebook_cell": "%matplotlib inline",
+    "doc_module": ("leg_wear_monitor",),
+    "download_all_examples": False,
+    "write_computation_times": False,
+    "min_reported_time": 3600,  # s; the time of a build is no property of a tutorial
+    "show_signature": False,
+}
+
 html_theme = "pydata_sphinx_theme"
 html_title = f"leg_wear_monitor {version}"
 html_static_path = ["_static"]
 html_css_files = ["site.css"]
+html_sidebars = {"lessons/*": []}  # what a terminal prints is wide
 html_copy_source = False
 html_show_sourcelink = False
 html_theme_options = {

@@ -7,7 +7,7 @@ from leg_wear_monitor.report.figures.figure import (
     BLUE,
     GREEN,
     INK,
-    PALE,
+    PAPER,
     SMALL,
     VERMILION,
     new_figure,
@@ -134,7 +134,8 @@ def influence_gallery(found: LegClaims) -> Gallery:
             )  # fmt: skip
         axes.axhline(0.0, color=INK, linewidth=0.8)
         if result.file_leg is not None:
-            axes.plot(1.0, result.file_leg.value, "*", color=INK, markersize=9.0, markeredgecolor=PALE)
+            axes.plot(1.0, result.file_leg.value, "*", color=INK, markersize=13.0, markeredgecolor=PAPER)
+        axes.margins(y=0.2)  # room for the legend
         tidy(axes)
         axes.set_xlabel(f"factor on the {first.factor}", fontsize=SMALL)
         axes.set_ylabel("measure of the claim", fontsize=SMALL)

@@ -13,6 +13,7 @@ import pytest
 
 from leg_wear_monitor.cli.verbs import replay as verb
 from leg_wear_monitor.monitor.alarms.alarm import Level
+from leg_wear_monitor.monitor.verdict.verdict import State
 
 pytest.importorskip("mcap")
 pytest.importorskip("rosbags")
@@ -168,6 +169,13 @@ def test_an_alarm_asked_for_fails(run, bag, tmp_path):
 def test_what_counts_as_an_alarm_asked_for(worst, asked, raised):
     result = SimpleNamespace(history=SimpleNamespace(worst=worst))
     assert verb.is_raised(result, asked) == raised
+
+
+@pytest.mark.parametrize("state", list(State))
+def test_a_verdict_that_asks_to_act_fails_where_it_is_asked_for(state):
+    report = SimpleNamespace(verdict=SimpleNamespace(state=state))
+    result = SimpleNamespace(monitor=SimpleNamespace(verdict=report))
+    assert verb.asks_to_act(result) == (state.value in ("not_monitored", "inspect", "stop"))
 
 
 @pytest.mark.parametrize(

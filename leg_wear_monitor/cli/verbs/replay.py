@@ -73,10 +73,11 @@ _MOST_LINES = 20
 @click.option("--allow-partial", is_flag=True, help="Exit with 0 even if parts of the recording are lost.")
 @click.option(
     "--fail-on",
-    type=click.Choice(("alarm", "warning", "input", *KINDS)),
+    type=click.Choice(("verdict", "alarm", "warning", "input", *KINDS)),
     multiple=True,
     metavar="WHAT",
-    help="Exit with 1 if any alarm was raised, any warning, any alarm of the input, or one of a kind: "
+    help="Exit with 1 on 'verdict' (inspect, stop or not monitored at the end), 'alarm' (any at ERROR), 'warning' "
+    "(any alarm), 'input' (any alarm of the input), or a kind of alarm: "
     f"{', '.join(KINDS)}. May be repeated.",
 )
 @json_option("the summary")
@@ -91,7 +92,7 @@ def replay(
     """Replay recordings through the monitor: MCAP, .db3, CSV and Parquet files or bag directories.
 
     Several paths are one recording. Exits with 1 if parts of it were lost, if no gait cycle in it fits this
-    leg, or if an alarm of --fail-on was raised.
+    leg, or if the verdict is or an alarm was one of --fail-on.
     """
     check_outputs(json_file, out)
     written: list[Path] = []
@@ -114,7 +115,7 @@ def replay(
         for path in written:
             click.echo(f"written: {path}")
     failed = (result.is_partial and not allow_partial) or is_raised(result, fail_on)
-    failed = failed or result.is_unusable
+    failed = failed or result.is_unusable or ("verdict" in fail_on and asks_to_act(result))
     return WITH_FINDINGS if failed else 0
 
 
@@ -167,6 +168,13 @@ def _config(path: Path | None, crank_joint: str | None, node: str | None) -> "Mo
 
     config = load_config(path, node)
     return config if crank_joint is None else attrs.evolve(config, crank_joint=crank_joint)
+
+
+def asks_to_act(result: "ReplayResult") -> bool:
+    """Whether the verdict at the end asks a person to do something, or cannot be given."""
+    from leg_wear_monitor.monitor.verdict.verdict import State
+
+    return result.monitor.verdict.verdict.state in (State.NOT_MONITORED, State.INSPECT, State.STOP)
 
 
 def is_raised(result: "ReplayResult", fail_on: tuple[str, ...]) -> bool:

@@ -76,8 +76,8 @@ _MOST_LINES = 20
     type=click.Choice(("verdict", "alarm", "warning", "input", *KINDS)),
     multiple=True,
     metavar="WHAT",
-    help="Exit with 1 on 'verdict' (inspect, stop or not monitored at the end), 'alarm' (any at ERROR), 'warning' "
-    "(any alarm), 'input' (any alarm of the input), or a kind of alarm: "
+    help="Exit with 1 on 'verdict' (inspect, stop or not monitored at the end), 'alarm' (any at ERROR), "
+    "'warning' (any alarm), 'input' (any alarm of the input), or a kind of alarm: "
     f"{', '.join(KINDS)}. May be repeated.",
 )
 @json_option("the summary")

@@ -136,7 +136,7 @@ def test_names_that_are_no_recordings_are_refused(tmp_path: Path, read: Any) -> 
     for name, text in (
         ("nowhere", "does not exist"),
         ("empty", "contains no .mcap"),
-        ("notes.txt", "is neither"),
+        ("notes.txt", "is no recording by its name"),
     ):
         with pytest.raises(RecordingError, match=text):
             read(tmp_path / name)

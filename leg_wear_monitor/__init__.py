@@ -29,6 +29,8 @@ if TYPE_CHECKING:
     from leg_wear_monitor.life.life import LifeRun, LifeSettings, simulate_life
     from leg_wear_monitor.life.result import Life
     from leg_wear_monitor.mechanism.loader import load_mechanism
+    from leg_wear_monitor.mechanism.materials.loader import load_material, materials
+    from leg_wear_monitor.mechanism.materials.material import Material
     from leg_wear_monitor.mechanism.spec import Mechanism
     from leg_wear_monitor.monitor.config.parameter_file import load_config
     from leg_wear_monitor.monitor.config.settings import MonitorConfig
@@ -50,6 +52,7 @@ _HOME = {
     "Life": "life.result",
     "LifeRun": "life.life",
     "LifeSettings": "life.life",
+    "Material": "mechanism.materials.material",
     "Mechanism": "mechanism.spec",
     "MonitorConfig": "monitor.config.settings",
     "ReplayJoint": "playback.result.parts",
@@ -63,7 +66,9 @@ _HOME = {
     "commission": "commissioning.commission",
     "gait_samples": "twin.sample",
     "load_config": "monitor.config.parameter_file",
+    "load_material": "mechanism.materials.loader",
     "load_mechanism": "mechanism.loader",
+    "materials": "mechanism.materials.loader",
     "open_ledger": "monitor.ledger.ledger",
     "plot": "report.plot",
     "replay": "playback.replay",
@@ -84,6 +89,7 @@ __all__ = [
     "Life",
     "LifeRun",
     "LifeSettings",
+    "Material",
     "Mechanism",
     "MonitorConfig",
     "ReplayJoint",
@@ -98,7 +104,9 @@ __all__ = [
     "commission",
     "gait_samples",
     "load_config",
+    "load_material",
     "load_mechanism",
+    "materials",
     "open_ledger",
     "plot",
     "replay",

@@ -1,0 +1,169 @@
+"""Material files: sources, units and their traps, and one line for a bad one."""
+
+import math
+from pathlib import Path
+from typing import Any
+
+import pytest
+from ruamel.yaml import YAML
+
+import leg_wear_monitor as lw
+from leg_wear_monitor.mechanism.materials.material import Material
+from leg_wear_monitor.mechanism.materials.sourced import SourcedValue, WearCoefficient
+from leg_wear_monitor.mechanism.materials.units import UNITS
+
+pytestmark = pytest.mark.plain
+
+
+def wear(value: float, unit: str, hardness: SourcedValue | None = None) -> float:
+    return WearCoefficient(value=value, unit=unit, source="a", conditions="b", hardness=hardness).si
+
+
+def number(value: float, unit: str) -> SourcedValue:
+    return SourcedValue(value=value, unit=unit, source="a", conditions="b")
+
+
+@pytest.mark.parametrize("name", lw.materials())
+def test_every_number_of_every_file_has_a_source(name: str) -> None:
+    """In the text of the file, whatever the classes ask for."""
+    document = YAML(typ="safe").load(lw.materials()[name])
+    assert document["name"] == name
+
+    def check(part: Any) -> int:
+        """Number of mappings with a number of their own, each with its source."""
+        if not isinstance(part, dict):
+            return 0
+        assert not any(isinstance(key, int | float) for key in part)
+        own = [entry for entry in part.values() if isinstance(entry, int | float | list)]
+        if own:
+            assert part["source"].strip()
+            assert part["conditions"].strip()
+            assert part["unit"] in UNITS
+        return bool(own) + sum(check(entry) for entry in part.values())
+
+    assert check(document) == len(list(lw.load_material(name).values())) > 0
+
+
+def test_at_least_twelve_pairs() -> None:
+    assert len(lw.materials()) >= 12
+
+
+def test_cubic_millimetres_per_newton_metre() -> None:
+    """A cube of 1 mm a N m is 1e-9 m^3 a J."""
+    assert wear(1.0, "mm^3/(N m)") == pytest.approx(1.0e-9)
+
+
+def test_micrometres_per_kilometre_at_a_megapascal() -> None:
+    """Depth over distance and pressure: 1 µm in 1 km at 1 MPa."""
+    assert wear(1.0, "um/km at 1 MPa") == pytest.approx(1.0e-6 / (1.0e3 * 1.0e6)) == pytest.approx(1.0e-15)
+
+
+def test_inch_units_of_the_makers_page_are_its_metric_ones() -> None:
+    """RTP gives its tests of acetal in 1e-10 in^3 min/(lbf ft h) and in 1e-8 mm^3/(N m), rounded."""
+    for inch, metric in ((13, 26), (132, 265), (61, 122), (228, 459), (4, 8), (149, 300)):
+        rounding = 0.5e-10 * UNITS["in^3 min/(lbf ft h)"].factor + 0.5e-8 * 1.0e-9
+        difference = wear(inch * 1.0e-10, "in^3 min/(lbf ft h)") - wear(metric * 1.0e-8, "mm^3/(N m)")
+        assert abs(difference) < rounding
+
+
+def test_the_factor_three_of_archards_k() -> None:
+    hardness = number(120.0, "kgf/mm^2")
+    thirds, whole = (wear(7.0e-3, f"K of V = K F s / {h}", hardness) for h in ("(3 H)", "H"))
+    assert whole == pytest.approx(3.0 * thirds)
+    assert thirds == pytest.approx(7.0e-3 / (3.0 * 120.0 * 9.80665e6))
+    # the example of the source: 1 m, 10 kgf = 98 N gives 2e-10 m^3
+    assert thirds * 98.0 * 1.0 == pytest.approx(2.0e-10, rel=0.05)
+
+
+def test_a_k_without_hardness_is_refused_and_hardness_without_a_k() -> None:
+    with pytest.raises(ValueError, match="hardness: is missing, expected the hardness H"):
+        wear(7.0e-3, "K of V = K F s / H")
+    with pytest.raises(ValueError, match="hardness: does not belong to a coefficient in 1/Pa"):
+        wear(1.0e-15, "1/Pa", number(1.0, "GPa"))
+
+
+@pytest.mark.parametrize(
+    ("value", "unit", "si"),
+    [
+        (39000, "psi ft/min", 1.366e6),  # igus prints 1.37 MPa m/s
+        (13050, "psi", 90.0e6),  # and 90 MPa
+        (196, "ft/min", 1.0),
+        (1.0, "N/mm^2 m/s", 1.0e6),
+        (1.0, "kgf/mm^2", 9.80665e6),
+    ],
+)
+def test_units(value: float, unit: str, si: float) -> None:
+    assert number(value, unit).si == pytest.approx(si, rel=5.0e-3)
+
+
+def test_a_range_stands_for_its_geometric_middle() -> None:
+    value = SourcedValue(unit="1", source="a", conditions="b", range=(0.02, 0.25))
+    assert value.si == pytest.approx(math.sqrt(0.02 * 0.25))
+
+
+def test_regimes_of_steel_differ_by_a_factor_of_thousands() -> None:
+    severe, mild, greased = (
+        lw.load_material(f"steel-on-steel-{regime}").bushing.wear_coefficient.si
+        for regime in ("dry-severe", "dry-mild", "greased-mild")
+    )
+    assert greased < mild < severe
+    assert severe / greased == pytest.approx(2000.0, rel=0.02)
+
+
+def test_a_pair_with_one_unknown_side_has_no_coefficient() -> None:
+    pair = lw.load_material("ferritic-stainless-on-steel-dry")
+    assert pair.bushing.wear_coefficient is not None
+    assert pair.wear_coefficients is None
+
+
+PAIR = """
+name: mine
+title: a pair
+bushing: {material: bronze}
+journal: {material: steel}
+lubricant: none
+regime: dry
+friction: {value: 0.1, unit: "1", source: a book, conditions: dry}
+"""
+
+
+def load(path: Path, text: str) -> Material:
+    file = path / "mine.yaml"
+    file.write_text(text)
+    return lw.load_material(file)
+
+
+def test_a_file_of_ones_own(tmp_path: Path) -> None:
+    assert load(tmp_path, PAIR).friction.si == 0.1
+
+
+@pytest.mark.parametrize(
+    ("old", "new", "words"),
+    [
+        (", source: a book", "", ["friction.source", "missing", "where it is from"]),
+        ("source: a book", "source: ' '", ["friction.source", "empty"]),
+        (", conditions: dry", "", ["friction.conditions", "missing"]),
+        ("friction:", "frictoin:", ["frictoin", "did you mean friction?"]),
+        ("value: 0.1,", "valeu: 0.1,", ["friction.valeu", "did you mean value?"]),
+        ("value: 0.1, ", "", ["friction.value", "range"]),
+        ('unit: "1"', "unit: Nm", ["friction.unit", "'Nm'", "MPa"]),
+        ('unit: "1"', "unit: MPa", ["friction", "'MPa'", "number", "expected 1"]),
+        ("value: 0.1", "value: -0.1", ["friction", "-0.1", "above 0"]),
+        ("value: 0.1", "range: [0.2, 0.1]", ["friction.range", "does not rise"]),
+        ("value: 0.1", "value: soft", ["friction.value", "'soft'", "not a number"]),
+        ("{material: steel}", "{}", ["journal.material", "missing"]),
+    ],
+)
+def test_a_bad_file_is_one_line(tmp_path: Path, old: str, new: str, words: list[str]) -> None:
+    assert old in PAIR
+    with pytest.raises(lw.ConfigError) as caught:
+        load(tmp_path, PAIR.replace(old, new))
+    line = str(caught.value)
+    assert "\n" not in line
+    assert "mine.yaml: " in line
+    assert [word for word in words if word not in line] == []
+
+
+def test_an_unknown_name_is_one_line_with_a_similar_one() -> None:
+    with pytest.raises(lw.ConfigError, match=r"no material of this name.*did you mean du-on-steel-dry"):
+        lw.load_material("du-on-steel-dri")

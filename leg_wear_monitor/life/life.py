@@ -31,6 +31,7 @@ from leg_wear_monitor.life.limits import MOST_JUMPS, check_life
 from leg_wear_monitor.life.result import Life, LifePoint, life_of
 from leg_wear_monitor.mechanism.arrays import Floats
 from leg_wear_monitor.mechanism.ideal import TURN
+from leg_wear_monitor.mechanism.materials.of_joints import check_wear_is_known
 from leg_wear_monitor.mechanism.plausible import suspects
 from leg_wear_monitor.mechanism.spec import Mechanism
 from leg_wear_monitor.wear.cycle_jump import (
@@ -136,6 +137,7 @@ class LifeRun:
     ) -> None:
         self.settings = settings or LifeSettings()
         self._workers = workers
+        check_wear_is_known(mechanism, mechanism.clearance_joints if clearances is None else clearances)
         alike = Leg(
             mechanism=mechanism,
             clearances=clearances,

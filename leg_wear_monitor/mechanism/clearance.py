@@ -50,6 +50,12 @@ class Clearance:
     approach_speed_floor: float = quantity(
         "m/s", "least approach speed in the damping of the normal law", above=0.0, default=1.0e-3
     )
+    material: str = described(
+        "material pair, which gives Young's moduli, Poisson's ratios, friction and wear coefficient that it "
+        "knows; values beside it come first",
+        default="",
+        in_repr=False,
+    )
 
     def __attrs_post_init__(self) -> None:
         if not self.radial_clearance < self.bushing_radius:

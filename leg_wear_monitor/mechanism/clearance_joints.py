@@ -9,6 +9,8 @@ from leg_wear_monitor.configuration.quantity import FieldError
 from leg_wear_monitor.configuration.strict import choose, shown, structure
 from leg_wear_monitor.errors import ConfigError
 from leg_wear_monitor.mechanism.clearance import Clearance, ClearanceSection, Pair
+from leg_wear_monitor.mechanism.materials.loader import load_material
+from leg_wear_monitor.mechanism.materials.of_joints import settings_of
 from leg_wear_monitor.mechanism.spec import PrismaticJoint, RevoluteJoint
 
 _REQUIRED = {field.name for field in attrs.fields(Clearance) if field.default is attrs.NOTHING}
@@ -55,9 +57,10 @@ def _settings(defaults: dict[str, Any], own: Any, source: str, name: str) -> Cle
     """Settings of one joint; an error names the place of the key in the file."""
     place = f"clearances.joints.{name}"
     own = structure({} if own is None else own, dict[str, Any], source, place)
-    merged = defaults | own
-    if isinstance(defaults.get("friction"), dict) and isinstance(own.get("friction"), dict):
-        merged["friction"] = defaults["friction"] | own["friction"]
+    merged: dict[str, Any] = {}
+    # a pair named in the defaults, then their values; a pair of the joint's own, then its values
+    for given, where in ((defaults, "clearances.defaults"), (own, place)):
+        merged = _over(_over(merged, _of_pair(given, source, where)), given)
     try:
         settings: Clearance = structure(merged, Clearance, source, "")
     except ConfigError as error:
@@ -66,6 +69,25 @@ def _settings(defaults: dict[str, Any], own: Any, source: str, name: str) -> Cle
             place = "clearances.defaults"
         raise ConfigError(source, f"{place}.{error.key}", error.fault) from error
     return settings
+
+
+def _of_pair(given: dict[str, Any], source: str, place: str) -> dict[str, Any]:
+    """Settings that come from the material pair named here, as the file would have them; none without."""
+    if "material" not in given:
+        return {}
+    name = structure(given["material"], str, source, f"{place}.material")
+    try:
+        return settings_of(load_material(name))
+    except ConfigError as error:
+        raise ConfigError(source, f"{place}.material", str(error)) from error
+
+
+def _over(below: dict[str, Any], above: dict[str, Any]) -> dict[str, Any]:
+    """Settings with others over them, key by key, also inside ``friction``."""
+    merged = below | above
+    if isinstance(below.get("friction"), dict) and isinstance(above.get("friction"), dict):
+        merged["friction"] = below["friction"] | above["friction"]
+    return merged
 
 
 def _list_or_mapping(value: Any) -> tuple[Any, Any]:

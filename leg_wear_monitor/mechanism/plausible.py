@@ -12,6 +12,7 @@ import attrs
 
 from leg_wear_monitor.mechanism.clearance import Clearance
 from leg_wear_monitor.mechanism.ideal import TURN
+from leg_wear_monitor.mechanism.materials.of_joints import lacks_wear
 from leg_wear_monitor.mechanism.spec import Body, Mechanism, PhaseLoad, SpeedDrive, TorqueDrive, Vector
 
 _USUAL_LENGTH = 5.0e-3, 5.0  # m, of the largest link
@@ -173,6 +174,9 @@ def _clearance(c: Clearance) -> Iterator[Doubt]:
         yield Doubt(
             "wear_coefficient", f"{k:g} 1/Pa, usual are below 1e-9 1/Pa; K for K/H, or 1/MPa for 1/Pa?"
         )
+    if lacks_wear(c):
+        fault = "gives no wear coefficient, so wear is not counted; expected wear_coefficient beside it"
+        yield Doubt("material", f"{c.material} {fault}")
     if c.stiffness is not None and _beyond(c.stiffness, 1.0e6, 1.0e14):
         yield Doubt("stiffness", f"{c.stiffness:g} N/m^1.5, usual are 1e6 to 1e14 N/m^1.5")
 

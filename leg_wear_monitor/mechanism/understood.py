@@ -5,6 +5,7 @@ from collections.abc import Iterator
 import numpy as np
 
 from leg_wear_monitor.mechanism.ideal import TURN, one_cycle, point_motion
+from leg_wear_monitor.mechanism.materials.of_joints import regimes
 from leg_wear_monitor.mechanism.plausible import largest_link
 from leg_wear_monitor.mechanism.position import Linkage
 from leg_wear_monitor.mechanism.spec import Mechanism, SpeedDrive, TorqueDrive
@@ -45,6 +46,13 @@ def _clearances(mechanism: Mechanism) -> Iterator[str]:
     moduli = sorted({modulus for c in clearance_joints for modulus in c.youngs_modulus})
     if moduli:
         yield "E " + " and ".join(f"{1.0e-9 * modulus:.4g}" for modulus in moduli) + " GPa"
+    yield from _pairs(mechanism)
     for fresh, radius in sorted({(c.radial_clearance, c.bushing_radius) for c in clearance_joints}):
         ratio = 100.0 * fresh / radius
         yield f"clearance {1.0e3 * fresh:.4g} mm in a radius of {1.0e3 * radius:.4g} mm ({ratio:.2g} %)"
+
+
+def _pairs(mechanism: Mechanism) -> Iterator[str]:
+    """Material pairs of the clearance joints, with regime and wear coefficients."""
+    for what, names in regimes(mechanism, mechanism.clearance_joints).items():
+        yield f"material of {', '.join(names)}: {what}"

@@ -88,6 +88,7 @@ def test_the_default_leg_is_the_bionic_one():
         restitution=0.9,
         friction=Friction(law="ambrosio", coefficient=0.05, ramp=(0.001, 0.01)),
         wear_coefficient=(1.0e-15, 1.0e-15),
+        material="steel-on-steel-greased-mild",
     )
     assert leg.clearances["A"].journal_radius == pytest.approx(0.0097, rel=1e-15)
 

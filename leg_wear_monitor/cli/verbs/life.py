@@ -110,7 +110,8 @@ def life(mechanism: str, json_file: Path | None, out: Path | None, **options: An
         files = {"life.json": text.encode(), "life.png": life_picture(result)}
         written += write_directory(out, files)
     if json_file != STDOUT:
-        for line in [*lines(result, options["limit_m"]), *(f"written: {path}" for path in written)]:
+        told = [*lines(result, options["limit_m"]), *_validity(leg, result)]
+        for line in [*told, *(f"written: {path}" for path in written)]:
             click.echo(line)
 
 
@@ -131,6 +132,7 @@ def _lives(leg: "Mechanism", lives: int, opens_m: float | None, **options: Any) 
     from leg_wear_monitor.life.life import LifeSettings
     from leg_wear_monitor.life.limits import check_life
     from leg_wear_monitor.life.many_lives import simulate_lives
+    from leg_wear_monitor.mechanism.materials.of_joints import check_wear_is_known
     from leg_wear_monitor.wear.cycle_jump import JumpControl
 
     given = {name: value for name in ("legs", "cycles") if (value := options.pop(name)) is not None}
@@ -138,6 +140,7 @@ def _lives(leg: "Mechanism", lives: int, opens_m: float | None, **options: Any) 
     if opens_m is not None:
         settings = attrs.evolve(settings, jump=JumpControl.of(opens_m))
     own = clearance_settings(leg, leg.clearance_joints)
+    check_wear_is_known(leg, leg.clearance_joints)  # before any compilation
     fresh_m, radius_m = np.array([[c.radial_clearance, c.bushing_radius] for c in own]).reshape(-1, 2).T
     check_life(leg.clearance_joints, fresh_m, radius_m, options["limit_m"], settings.jump)
     with compilation("clearance"), progress_bar("life") as progress:
@@ -150,6 +153,14 @@ def _document(leg: "Mechanism", lives: "Lives") -> dict[str, Any]:
     from leg_wear_monitor.monitor.ledger.binding import fingerprint
 
     return {"mechanism": leg.name, "fingerprint": fingerprint(leg), **lives_document(lives)}
+
+
+def _validity(leg: "Mechanism", result: "Life") -> list[str]:
+    """What the life holds for: the regime of each joint's wear."""
+    from leg_wear_monitor.mechanism.materials.of_joints import regimes
+
+    found = regimes(leg, result.clearance_joints).items()
+    return [f"holds for {', '.join(joints)}: {what}" for what, joints in found]
 
 
 def lines(result: "Life", limit_m: float) -> list[str]:

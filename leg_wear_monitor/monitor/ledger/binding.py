@@ -12,7 +12,7 @@ from leg_wear_monitor.wear.surfaces import SECTORS
 
 # fields of a mechanism that may change without a change of the worn parts
 _FREE = ("name", "source", "drive", "loads", "clearance_joints", "clearances")
-_FREE_OF_CLEARANCE = ("wear_coefficient",)
+_FREE_OF_CLEARANCE = ("wear_coefficient", "material")  # what a pair gives is in the other settings
 _FREE_OF_JOINTS = ("label",)
 
 

@@ -1,0 +1,67 @@
+"""Material pairs of the joints of a mechanism."""
+
+from collections.abc import Sequence
+from typing import Any
+
+from leg_wear_monitor.errors import ConfigError
+from leg_wear_monitor.mechanism.clearance import Clearance
+from leg_wear_monitor.mechanism.materials.loader import load_material
+from leg_wear_monitor.mechanism.materials.material import Material
+from leg_wear_monitor.mechanism.spec import Mechanism
+
+
+def settings_of(pair: Material) -> dict[str, Any]:
+    """Settings of a clearance joint that a pair gives, as a mechanism file would have them.
+
+    A pair without wear coefficient gives 0: the coefficient of another pair must not take its place.
+    """
+    given: dict[str, Any] = {"wear_coefficient": list(pair.wear_coefficients or (0.0, 0.0))}
+    for key in ("youngs_modulus", "poissons_ratio"):
+        sides = getattr(pair.bushing, key), getattr(pair.journal, key)
+        if None not in sides:
+            given[key] = [side.si for side in sides]
+    if pair.friction is not None:
+        given["friction"] = {"coefficient": pair.friction.si}
+    return given
+
+
+def lacks_wear(settings: Clearance) -> bool:
+    """Whether a joint's pair gives no wear coefficient, and no value stands beside it."""
+    if not settings.material or max(settings.wear_coefficient) > 0.0:
+        return False
+    return load_material(settings.material).wear_coefficients is None
+
+
+def check_wear_is_known(mechanism: Mechanism, joints: Sequence[str]) -> None:
+    """Check that each joint's wear coefficient is known, for a life.
+
+    Raises
+    ------
+    ConfigError
+        For the first joint whose pair has limits only.
+    """
+    for joint in joints:
+        settings = mechanism.clearances.get(joint)
+        if settings is not None and lacks_wear(settings):
+            raise ConfigError(
+                mechanism.source,
+                f"clearances.joints.{joint}.wear_coefficient",
+                f"is missing for a life: {settings.material} has no wear coefficient of both bodies, "
+                "expected one beside the material [1/Pa]",
+            )
+
+
+def regimes(mechanism: Mechanism, joints: Sequence[str]) -> dict[str, list[str]]:
+    """The joints by what their wear holds for: a pair and its regime, or a bare coefficient."""
+    found: dict[str, list[str]] = {}
+    for joint in joints:
+        settings = mechanism.clearances[joint]
+        wear = " and ".join(f"{k:.3g}" for k in dict.fromkeys(settings.wear_coefficient))
+        if settings.material:
+            pair = load_material(settings.material)
+            own = "" if settings.wear_coefficient == pair.wear_coefficients else "a value beside "
+            what = f"{own}{pair.name} ({pair.regime})"
+        else:
+            what = "no material named, regime unknown"
+        found.setdefault(f"{what}, wear coefficient {wear} 1/Pa", []).append(joint)
+    return found

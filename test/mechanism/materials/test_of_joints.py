@@ -1,0 +1,97 @@
+"""A joint names its material pair in the mechanism file."""
+
+import copy
+from typing import Any
+
+import attrs
+import pytest
+from ruamel.yaml import YAML
+
+import leg_wear_monitor as lw
+from leg_wear_monitor.life.life import LifeRun
+from leg_wear_monitor.mechanism.loader import parse_mechanism, shipped_mechanisms
+from leg_wear_monitor.mechanism.plausible import doubts
+from leg_wear_monitor.monitor.ledger.binding import fingerprint
+
+pytestmark = pytest.mark.plain
+
+DOCUMENT = YAML(typ="safe").load(shipped_mechanisms()["bionic_leg"])
+
+
+def leg(defaults: dict[str, Any] | None = None, **joints: dict[str, Any]) -> lw.Mechanism:
+    document = copy.deepcopy(DOCUMENT)
+    document["clearances"]["defaults"] |= defaults or {}
+    if joints:
+        document["clearances"]["joints"] = joints
+    return parse_mechanism(document, "leg.yaml")
+
+
+def test_the_default_leg_names_a_regime_that_gives_the_bare_numbers() -> None:
+    named = lw.load_mechanism()
+    assert "wear_coefficient" not in DOCUMENT["clearances"]["defaults"]
+    bare = copy.deepcopy(DOCUMENT)
+    del bare["clearances"]["defaults"]["material"]
+    bare["clearances"]["defaults"]["wear_coefficient"] = 1.0e-15
+    other = parse_mechanism(bare, named.source)
+    for joint, settings in named.clearances.items():
+        assert settings.material == "steel-on-steel-greased-mild"
+        assert attrs.evolve(settings, material="") == other.clearances[joint]
+    assert repr(named) == repr(other)
+    assert fingerprint(named) == fingerprint(other)
+
+
+def test_the_pair_of_a_joint_gives_what_it_knows() -> None:
+    pair = lw.load_material("pom-on-pa66")
+    settings = leg(A={}, G={"material": "pom-on-pa66"}).clearances
+    assert settings["G"].wear_coefficient == pair.wear_coefficients
+    assert settings["G"].friction.coefficient == 0.24
+    assert settings["G"].friction.ramp == settings["A"].friction.ramp
+    assert settings["A"].wear_coefficient == (1.0e-15, 1.0e-15)
+
+
+def test_both_moduli_of_a_pair_take_the_place_of_the_defaults() -> None:
+    defaults = {"youngs_modulus": 1.0e9, "poissons_ratio": 0.4}
+    own = leg(defaults, A={}, G={"material": "steel-on-steel-greased-mild"}).clearances
+    assert own["A"].youngs_modulus == (1.0e9, 1.0e9)
+    assert own["G"].youngs_modulus == (2.07e11, 2.07e11)
+    assert own["G"].poissons_ratio == (0.29, 0.29)
+
+
+def test_a_value_beside_the_pair_comes_first() -> None:
+    own = {"material": "pom-on-pa66", "wear_coefficient": 5.0e-15, "friction": {"coefficient": 0.3}}
+    settings = leg(G=own).clearances["G"]
+    assert settings.wear_coefficient == (5.0e-15, 5.0e-15)
+    assert settings.friction.coefficient == 0.3
+
+
+def test_a_pair_with_limits_only_does_not_take_the_coefficient_of_another() -> None:
+    limited = leg(A={}, G={"material": "du-on-steel-dry"})
+    assert limited.clearances["G"].wear_coefficient == (0.0, 0.0)
+    (doubt,) = doubts(limited)
+    assert "du-on-steel-dry gives no wear coefficient" in str(doubt)
+    with pytest.raises(lw.ConfigError) as caught:
+        LifeRun(limited)
+    line = str(caught.value)
+    assert "\n" not in line
+    assert "clearances.joints.G.wear_coefficient: is missing for a life: du-on-steel-dry" in line
+
+
+def test_a_coefficient_beside_limits_is_enough() -> None:
+    own = {"material": "du-on-steel-dry", "wear_coefficient": [1.0e-16, 0.0]}
+    assert doubts(leg(G=own)) == ()
+
+
+@pytest.mark.parametrize(
+    ("defaults", "joints", "words"),
+    [
+        ({"material": "steal"}, {}, "clearances.defaults.material: steal: no material of this name"),
+        ({}, {"G": {"material": "du-on-stel"}}, "clearances.joints.G.material: du-on-stel: no material"),
+        ({}, {"G": {"material": 7}}, "clearances.joints.G.material: 7 is not a text"),
+        ({}, {"G": {"material": "./none.yaml"}}, "clearances.joints.G.material: none.yaml: cannot be read"),
+    ],
+)
+def test_an_unknown_pair_is_one_line(defaults: Any, joints: Any, words: str) -> None:
+    with pytest.raises(lw.ConfigError) as caught:
+        leg(defaults, **joints)
+    assert str(caught.value).startswith(f"leg.yaml: {words}")
+    assert "\n" not in str(caught.value)

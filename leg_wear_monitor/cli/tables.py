@@ -93,6 +93,9 @@ def _summary(result: "SimulationResult", wall_s: float) -> Iterator[tuple[str, s
         yield "largest errors", _response(result.toe, torque)
     if result.energy_j is not None:
         yield "energy", _energy(result.energy_j)
+    loads = [(name, joint) for name, joint in result.joints.items() if joint.has_clearance]
+    for label, (name, joint) in zip(["load", *[""] * len(loads)], loads, strict=False):
+        yield label, f"{name}: {_load(joint)}"
     if result.surfaces is not None and result.surfaces.feeds_back:
         yield "opened by", f"{_opened(result.surfaces, result.clearance_joints)} pm, mean (greatest)"
     yield (
@@ -100,6 +103,15 @@ def _summary(result: "SimulationResult", wall_s: float) -> Iterator[tuple[str, s
         f"{result.simulated_s:.4g} s of motion in {wall_s:.3g} s: "
         f"{figure(result.simulated_s / wall_s)} times real time",
     )
+
+
+def _load(joint: "JointResult") -> str:
+    """Pressure and sliding speed, and what of them is outside the limits of the material."""
+    pressure, speed = joint.mean_pressure_pa or 0.0, joint.mean_sliding_speed_mps or 0.0
+    values = f"p {figure(1e-6 * pressure)} (p99 {figure(1e-6 * (joint.p99_pressure_pa or 0.0))}) MPa"
+    product = figure(1e-6 * (joint.mean_pressure_speed_pa_mps or 0.0))
+    beyond = f"; {joint.outside_limits}" if joint.outside_limits else ""
+    return f"{values}, v {figure(speed)} m/s, p v {product} MPa m/s{beyond}"
 
 
 def _response(toe: "ToeResult", torque: "TorqueResult") -> str:

@@ -31,6 +31,27 @@ def test_life_tells_when_each_joint_reaches_its_limit(run, tmp_path):
     assert len({round(fraction[0] / fraction[1], 2) for fraction in fractions}) == 3
 
 
+def test_life_tells_regime_limits_and_the_makers_own_life(run, shipped, tmp_path):
+    """A pair with limits only is refused; with a coefficient beside it, the maker's life is printed, too."""
+    pair = "material: skf-ptfe-composite-on-steel"
+    text = shipped("four_bar")
+    (tmp_path / "limited.yaml").write_text(text.replace("wear_coefficient: 1.0e-15", pair))
+    refused = run("life", "--mechanism", "limited.yaml")
+    assert refused.exit_code == 2
+    (line,) = refused.stderr.splitlines()
+    assert "wear_coefficient: is missing for a life: skf-ptfe-composite-on-steel" in line
+    (tmp_path / "beside.yaml").write_text(
+        text.replace("wear_coefficient: 1.0e-15", f"{pair}\n    wear_coefficient: 1.0e-15")
+    )
+    result = run("life", "--mechanism", "beside.yaml", *ONE[3:], "--limit-m", "5.2e-4")
+    assert result.exit_code == 0
+    assert (
+        "holds for B, C: a value beside skf-ptfe-composite-on-steel (dry), wear coefficient 1e-15"
+        in result.stdout
+    )
+    assert result.stdout.count("maker's basic rating life") == 2
+
+
 def test_life_refuses_what_cannot_be(run):
     assert run(*ONE, "--limit-m", "-1").exit_code == 2
     assert run(*ONE, "--clearances", "Z").exit_code == 2

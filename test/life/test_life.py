@@ -16,6 +16,7 @@ from leg_wear_monitor.dynamics.run.protocol import DONE
 from leg_wear_monitor.dynamics.run.run_statistics import new_run_statistics
 from leg_wear_monitor.dynamics.simulation import prepare
 from leg_wear_monitor.life import life as life_module
+from leg_wear_monitor.life.bushing_load import pressure_speed
 from leg_wear_monitor.life.life import LifeRun, LifeSettings, simulate_life
 from leg_wear_monitor.wear.cycle_jump import JumpControl
 from leg_wear_monitor.wear.surfaces import Surfaces, worn_volume
@@ -42,6 +43,19 @@ def test_volume_worn_is_coefficient_times_archard_integral(leg, lived):
     expected = setup.contacts.wear_coefficient * last.archard_j[:, None]
     # what is pending when a cycle is counted is worn off in the next one
     np.testing.assert_allclose(volume, expected, rtol=2e-3)
+
+
+def test_p_v_is_the_archard_integral_over_area_and_period(leg, lived):
+    """Over the first jump: the growth of the clearance and the integral are counted apart."""
+    run, life = lived
+    growth = life.growth_m_per_cycle[:2].mean(axis=0, keepdims=True)
+    found = pressure_speed(leg, attrs.evolve(life, growth_m_per_cycle=growth), np.ones(2), 0.5)
+    area = np.array(
+        [2.0 * leg.clearances[joint].bushing_radius * leg.clearances[joint].width for joint in found]
+    )
+    expected = run.points[1].archard_j / run.points[1].cycles / (0.5 * area)
+    assert list(found) == ["A", "B"]
+    np.testing.assert_allclose(list(found.values()), expected, rtol=2e-3)
 
 
 def test_a_jump_repeats_the_mean_wear_of_a_cycle_at_its_ends(lived):

@@ -111,6 +111,7 @@ def life(mechanism: str, json_file: Path | None, out: Path | None, **options: An
         written += write_directory(out, files)
     if json_file != STDOUT:
         told = [*lines(result, options["limit_m"]), *_validity(leg, result)]
+        told += _loads(leg, lives, options["speed_rpm"])
         for line in [*told, *(f"written: {path}" for path in written)]:
             click.echo(line)
 
@@ -161,6 +162,29 @@ def _validity(leg: "Mechanism", result: "Life") -> list[str]:
 
     found = regimes(leg, result.clearance_joints).items()
     return [f"holds for {', '.join(joints)}: {what}" for what, joints in found]
+
+
+def _loads(leg: "Mechanism", lives: "Lives", speed_rpm: float | None) -> list[str]:
+    """What p v of the new leg is beyond, and the makers' own life of their bushings."""
+    from leg_wear_monitor.dynamics.simulation import prepare
+    from leg_wear_monitor.life.bushing_load import pressure_speed
+    from leg_wear_monitor.mechanism.ideal import TURN
+    from leg_wear_monitor.mechanism.materials.loader import load_material
+    from leg_wear_monitor.mechanism.materials.of_joints import outside_limits
+    from leg_wear_monitor.mechanism.materials.rating_life import rating_life_hours
+
+    factor, result = lives[0]
+    period_s = TURN / abs(prepare(leg, speed_rpm=speed_rpm).speed)
+    told = []
+    for joint, load in pressure_speed(leg, result, factor, period_s).items():
+        settings = leg.clearances[joint]
+        beyond = outside_limits(settings, 0.0, 0.0, load)
+        told += [f"{joint}: {beyond}"] if beyond else []
+        constants = load_material(settings.material).rating_life if settings.material else None
+        if constants is not None:
+            hours = f"{rating_life_hours(load, constants):.3g} h at p v {1e-6 * load:.3g} MPa m/s"
+            told.append(f"{joint}: maker's basic rating life {hours}, all factors 1")
+    return told
 
 
 def lines(result: "Life", limit_m: float) -> list[str]:

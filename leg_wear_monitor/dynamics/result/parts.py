@@ -150,6 +150,17 @@ class JointResult:
         None without wear.
     clearance_m : ClearanceResult or None
         Radial clearance at the end.
+    mean_pressure_pa : float or None
+        Mean force over the projected area of the bushing, its diameter times its width [Pa].
+    p99_pressure_pa : float or None
+        Pressure that is not exceeded 99 % of the time [Pa].
+    mean_sliding_speed_mps : float or None
+        Sliding speed under load: its mean weighted by the force [m/s].
+    mean_pressure_speed_pa_mps : float or None
+        Mean of pressure times sliding speed [Pa m/s].
+    outside_limits : str or None
+        What of ``p99_pressure_pa`` and the two means is beyond the limits of the joint's material, so that
+        its wear coefficient does not hold; None within the limits, and without limits.
     """
 
     mean_force_n: float
@@ -162,6 +173,11 @@ class JointResult:
     wear_depth_m_per_cycle: WearDepth | None = None
     wear_zone_deg: tuple[float, float] | None = None
     clearance_m: ClearanceResult | None = None
+    mean_pressure_pa: float | None = attrs.field(default=None, metadata={"unit": "Pa"})
+    p99_pressure_pa: float | None = attrs.field(default=None, metadata={"unit": "Pa"})
+    mean_sliding_speed_mps: float | None = None
+    mean_pressure_speed_pa_mps: float | None = attrs.field(default=None, metadata={"unit": "Pa m/s"})
+    outside_limits: str | None = None
 
     @property
     def has_clearance(self) -> bool:

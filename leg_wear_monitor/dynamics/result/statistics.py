@@ -31,6 +31,7 @@ from leg_wear_monitor.dynamics.run.run_statistics import (
 )
 from leg_wear_monitor.mechanism.arrays import Floats
 from leg_wear_monitor.mechanism.ideal import TURN
+from leg_wear_monitor.mechanism.materials.of_joints import outside_limits
 from leg_wear_monitor.wear.surfaces import BUSHING, JOURNAL, wear_zone
 
 
@@ -92,7 +93,7 @@ def _joint(setup: Setup, statistics: RunStatistics, joint: int, worn: Floats, cy
         return forces
     k = setup.clearance_joints.index(name)
     return attrs.evolve(
-        forces,
+        _loaded(forces, setup, k, float(statistics.integral[joint, ARCHARD] / statistics.time[0])),
         contact_fraction=float(contact),
         friction_work_j_per_cycle=float(statistics.integral[joint, FRICTION] / cycles),
         archard_integral_j_per_cycle=float(statistics.integral[joint, ARCHARD] / cycles),
@@ -104,6 +105,23 @@ def _joint(setup: Setup, statistics: RunStatistics, joint: int, worn: Floats, cy
         ),
         wear_zone_deg=wear_zone(worn[k, BUSHING]),
         clearance_m=_clearance(setup, k),
+    )
+
+
+def _loaded(forces: JointResult, setup: Setup, k: int, rubbing_w: float) -> JointResult:
+    """Pressure and sliding speed of clearance joint k; ``rubbing_w`` is the mean of F_N |v_t| [W]."""
+    area = 2.0 * float(setup.contacts.bushing_radius[k] * setup.contacts.width[k])
+    pressure, speed = forces.p99_force_n / area, 0.0
+    if forces.mean_force_n > 0.0:
+        speed = rubbing_w / forces.mean_force_n
+    settings = setup.linkage.mechanism.clearances[setup.clearance_joints[k]]
+    return attrs.evolve(
+        forces,
+        mean_pressure_pa=forces.mean_force_n / area,
+        p99_pressure_pa=pressure,
+        mean_sliding_speed_mps=speed,
+        mean_pressure_speed_pa_mps=rubbing_w / area,
+        outside_limits=outside_limits(settings, pressure, speed, rubbing_w / area),
     )
 
 

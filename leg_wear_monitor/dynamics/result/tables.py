@@ -43,8 +43,8 @@ def trace_columns(trace: Trace) -> Columns:
     }
 
 
-def _cells(joint: JointResult) -> dict[str, float | None]:
-    cells: dict[str, float | None] = {}
+def _cells(joint: JointResult) -> dict[str, float | str | None]:
+    cells: dict[str, float | str | None] = {}
     for name, value in attrs.asdict(joint, recurse=False).items():
         if name not in _PARTS:
             cells[name] = value

@@ -1,0 +1,37 @@
+"""SKF's formula of the life of a bushing gives SKF's own example."""
+
+import math
+
+import pytest
+
+import leg_wear_monitor as lw
+from leg_wear_monitor.mechanism.materials.rating_life import (
+    mean_sliding_speed,
+    rating_life_hours,
+    specific_load,
+)
+
+pytestmark = pytest.mark.plain
+
+
+def test_the_published_example() -> None:
+    """The door of a tramway: published 1.64 N/mm^2, 0.01 m/s and 22 500 h; 22 464 h by the formula."""
+    pair = lw.load_material("skf-ptfe-composite-on-steel")
+    assert pair.rating_life is not None
+    assert pair.limits.dynamic_pressure is not None
+    pressure = specific_load(800.0, 39_000.0, pair.limits.dynamic_pressure.si)
+    assert pressure == pytest.approx(1.64e6, rel=2.0e-3)
+    speed = mean_sliding_speed(0.020, math.radians(90.0), 10.0 / 60.0)
+    assert speed == pytest.approx(5.82e-7 * 20.0 * 90.0 * 10.0, rel=1.0e-3)
+    assert pressure * speed < 0.025e6  # so the least p v stands for it
+    hours = rating_life_hours(pressure * speed, pair.rating_life, (1.3, 1.0, 1.0, 0.6, 1.5))
+    assert hours == pytest.approx(22_464.0)
+    assert hours == pytest.approx(22_500.0, rel=2.0e-3)
+
+
+def test_above_the_least_value_the_life_falls_with_p_v() -> None:
+    constants = lw.load_material("skf-ptfe-composite-on-steel").rating_life
+    assert constants is not None
+    one, two = (rating_life_hours(pv, constants) for pv in (0.1e6, 0.2e6))
+    assert one == pytest.approx(4800.0)
+    assert one / two == pytest.approx(2.0**constants.exponent.si)

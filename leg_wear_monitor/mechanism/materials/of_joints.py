@@ -56,14 +56,16 @@ def regimes(mechanism: Mechanism, joints: Sequence[str]) -> dict[str, list[str]]
     found: dict[str, list[str]] = {}
     for joint in joints:
         settings = mechanism.clearances[joint]
-        wear = " and ".join(f"{k:.3g}" for k in dict.fromkeys(settings.wear_coefficient))
+        wear = " and ".join(f"{k:.3g}" for k in dict.fromkeys(settings.wear_coefficient)) + " 1/Pa"
         if settings.material:
             pair = load_material(settings.material)
-            own = "" if settings.wear_coefficient == pair.wear_coefficients else "a value beside "
+            wear = "not known" if lacks_wear(settings) else wear
+            as_the_pair = lacks_wear(settings) or settings.wear_coefficient == pair.wear_coefficients
+            own = "" if as_the_pair else "a value beside "
             what = f"{own}{pair.name} ({pair.regime})"
         else:
             what = "no material named, regime unknown"
-        found.setdefault(f"{what}, wear coefficient {wear} 1/Pa", []).append(joint)
+        found.setdefault(f"{what}, wear coefficient {wear}", []).append(joint)
     return found
 
 

@@ -10,6 +10,7 @@ from ruamel.yaml import YAML
 import leg_wear_monitor as lw
 from leg_wear_monitor.life.life import LifeRun
 from leg_wear_monitor.mechanism.loader import parse_mechanism, shipped_mechanisms
+from leg_wear_monitor.mechanism.materials.of_joints import regimes
 from leg_wear_monitor.mechanism.plausible import doubts
 from leg_wear_monitor.monitor.ledger.binding import fingerprint
 
@@ -74,6 +75,18 @@ def test_a_pair_with_limits_only_does_not_take_the_coefficient_of_another() -> N
     line = str(caught.value)
     assert "\n" not in line
     assert "clearances.joints.G.wear_coefficient: is missing for a life: du-on-steel-dry" in line
+
+
+def test_the_joints_by_what_their_wear_holds_for() -> None:
+    beside = {"material": "du-on-steel-dry", "wear_coefficient": [1.0e-16, 0.0]}
+    mixed = leg(A={}, B={}, G={"material": "du-on-steel-dry"}, I=beside)
+    assert regimes(mixed, mixed.clearance_joints) == {
+        "steel-on-steel-greased-mild (greased, mild), wear coefficient 1e-15 1/Pa": ["A", "B"],
+        "du-on-steel-dry (dry), wear coefficient not known": ["G"],
+        "a value beside du-on-steel-dry (dry), wear coefficient 1e-16 and 0 1/Pa": ["I"],
+    }
+    bare = lw.load_mechanism("four_bar")
+    assert list(regimes(bare, ["B"])) == ["no material named, regime unknown, wear coefficient 1e-15 1/Pa"]
 
 
 def test_a_coefficient_beside_limits_is_enough() -> None:

@@ -16,6 +16,7 @@ from made_up_summary import made_up_summary
 
 import leg_wear_monitor as lw
 from leg_wear_monitor.life.result import Life
+from leg_wear_monitor.play.result import Play
 
 ROOT = Path(__file__).parents[1]
 PAGE = ROOT / "docs" / "reference" / "json.md"
@@ -68,7 +69,18 @@ def commissioning() -> Iterator[Row]:
     yield "notes[]", "text", "", told["notes"]
 
 
-DOCUMENTS = {"simulation": simulation, "replay": replay, "life": life, "commissioning": commissioning}
+def play() -> Iterator[Row]:
+    yield VERSION
+    yield from rows_of(Play)
+
+
+DOCUMENTS = {
+    "simulation": simulation,
+    "replay": replay,
+    "life": life,
+    "commissioning": commissioning,
+    "play": play,
+}
 
 
 def renewed(page: str) -> str:
@@ -89,6 +101,9 @@ def example(name: str) -> Any:
         return made_up_summary().to_dict()
     if name == "life":
         return json.loads((ROOT / "config" / "lives" / "bionic_leg.json").read_text())
+    if name == "play":
+        numbers = ("play_rad", "sigma_rad", "count_rad", "noise_rad", "scatter_rad", "drift_rad")
+        return Play(joint="knee", load="", plateaus=(10, 10), **dict.fromkeys(numbers, 0.001)).to_dict()
     item = lw.CommissioningItem(name="crank.sign", value=1)
     return lw.CommissioningResult(
         items=(item,), not_told=("lag",), findings=("load",), notes=("note",), config=None, turns=1.0

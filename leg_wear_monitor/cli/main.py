@@ -18,7 +18,7 @@ COULD_NOT, INTERRUPTED = 2, 130
 
 _VERBS = (
     "cache", "check", "commission", "demo", "gait-publisher", "life", "materials", "measure", "monitor",
-    "replay", "report", "simulate", "study",
+    "play", "replay", "report", "simulate", "study",
 )  # fmt: skip
 
 

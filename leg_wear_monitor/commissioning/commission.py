@@ -6,6 +6,8 @@ from pathlib import Path
 import attrs
 
 from leg_wear_monitor.bags.bag import Recordable, listed_recordings
+from leg_wear_monitor.bags.series.reading import read_signals
+from leg_wear_monitor.bags.series.signals import JointName, Signals, TorqueSource
 from leg_wear_monitor.commissioning.evidence.misfit import Load, with_load
 from leg_wear_monitor.commissioning.evidence.sampling import sampling_of
 from leg_wear_monitor.commissioning.evidence.timing import separates_lag, timing_of
@@ -14,8 +16,6 @@ from leg_wear_monitor.commissioning.proposal.items import Found, changes, items
 from leg_wear_monitor.commissioning.result.commissioning_result import CommissioningResult
 from leg_wear_monitor.commissioning.search.candidates import candidates
 from leg_wear_monitor.commissioning.search.choice import Choice, choose
-from leg_wear_monitor.commissioning.series.reading import read_signals
-from leg_wear_monitor.commissioning.series.signals import JointName, Signals, TorqueSource
 from leg_wear_monitor.errors import LegWearError
 from leg_wear_monitor.mechanism.loader import load_mechanism
 from leg_wear_monitor.mechanism.spec import Mechanism

@@ -19,9 +19,10 @@ class Play:
         Name of the angle.
     load : str
         Signal that gave the side; empty if the angle itself did.
-    play_rad, sigma_rad : float
-        Distance between the plateaus on both sides, and its standard uncertainty: scatter of the repeats and
-        the encoder's count.
+    play_rad : float
+        Distance between the plateaus on both sides of the load's reversals.
+    sigma_rad : float
+        Standard uncertainty of the play, from the scatter of the repeats and the encoder's count.
     count_rad : float
         Count of the encoder.
     noise_rad : float
@@ -32,8 +33,12 @@ class Play:
         Range of the drift that was removed.
     plateaus : tuple of int
         Plateaus that count, on either side.
-    moving, short, outside : int
-        Pushes left out: the angle still moved at their end, stopped short of the others, went further.
+    moving : int
+        Pushes left out because the angle still moved at their end.
+    short : int
+        Pushes left out because the angle stopped short of the others.
+    outside : int
+        Pushes left out because the angle went beyond the others.
     findings : tuple of str
         What makes the result doubtful, and the remedy.
     notes : tuple of str

@@ -10,7 +10,7 @@ import pytest
 from leg_wear_monitor import Mechanism, MonitorConfig
 from leg_wear_monitor.bags.mcap.writer import McapWriter
 from leg_wear_monitor.bags.reader import Recording
-from leg_wear_monitor.commissioning.series.signals import EFFORT, FLOAT64, WRENCH
+from leg_wear_monitor.bags.series.signals import EFFORT, FLOAT64, WRENCH
 from leg_wear_monitor.mechanism.arrays import Floats
 from leg_wear_monitor.mechanism.ideal import TURN
 from leg_wear_monitor.messages import encode

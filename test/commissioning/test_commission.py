@@ -11,9 +11,7 @@ import numpy as np
 import pytest
 
 from leg_wear_monitor import LegWearError, Mechanism, MonitorConfig
-from leg_wear_monitor.commissioning.commission import commission, propose
-from leg_wear_monitor.commissioning.result.commissioning_result import CommissioningResult
-from leg_wear_monitor.commissioning.series.signals import (
+from leg_wear_monitor.bags.series.signals import (
     EFFORT,
     FLOAT64,
     WRENCH,
@@ -21,6 +19,8 @@ from leg_wear_monitor.commissioning.series.signals import (
     Signals,
     TorqueSource,
 )
+from leg_wear_monitor.commissioning.commission import commission, propose
+from leg_wear_monitor.commissioning.result.commissioning_result import CommissioningResult
 from leg_wear_monitor.mechanism.ideal import TURN
 from leg_wear_monitor.monitor.config.fitting import fitted
 from leg_wear_monitor.monitor.config.parameter_file import load_config

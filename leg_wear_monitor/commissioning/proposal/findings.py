@@ -5,10 +5,10 @@ from collections.abc import Iterator
 
 import numpy as np
 
+from leg_wear_monitor.bags.series.signals import FLOAT64
 from leg_wear_monitor.commissioning.evidence.misfit import Load, does_not_fit
 from leg_wear_monitor.commissioning.evidence.timing import cadences_rpm
 from leg_wear_monitor.commissioning.proposal.items import Found, gear, gear_error, offset_rad
-from leg_wear_monitor.commissioning.series.signals import FLOAT64
 from leg_wear_monitor.mechanism.ideal import TURN
 from leg_wear_monitor.mechanism.spec import Mechanism
 from leg_wear_monitor.torque_fit.likeness import repeating

@@ -7,6 +7,7 @@ from typing import Any
 import attrs
 import numpy as np
 
+from leg_wear_monitor.bags.series.signals import WRENCH
 from leg_wear_monitor.commissioning.evidence.noise import scatter, sensor_noise
 from leg_wear_monitor.commissioning.evidence.sampling import Sampling
 from leg_wear_monitor.commissioning.evidence.timing import Timing, cadence_rpm
@@ -14,7 +15,6 @@ from leg_wear_monitor.commissioning.proposal.exact_ratio import exact_ratio
 from leg_wear_monitor.commissioning.result.commissioning_result import CommissioningItem as Item
 from leg_wear_monitor.commissioning.search.candidates import SAME_GEAR, Candidate
 from leg_wear_monitor.commissioning.search.choice import Choice, Rival
-from leg_wear_monitor.commissioning.series.signals import WRENCH
 from leg_wear_monitor.mechanism.ideal import TURN
 from leg_wear_monitor.monitor.config.settings import MonitorConfig
 from leg_wear_monitor.torque_fit.fit import Fit

@@ -5,8 +5,8 @@ from collections.abc import Callable, Iterable
 import attrs
 import numpy as np
 
+from leg_wear_monitor.bags.series.signals import EFFORT, JointName, TorqueSource
 from leg_wear_monitor.commissioning.search.gear_scan import scan
-from leg_wear_monitor.commissioning.series.signals import EFFORT, JointName, TorqueSource
 from leg_wear_monitor.torque_fit.fit import Fit, fit
 from leg_wear_monitor.torque_fit.motion import JointMotion
 from leg_wear_monitor.torque_fit.pairing import Pair, paired, steady_stretch

@@ -1,4 +1,4 @@
-"""All joints and torques of recordings, read by the monitor's own decoder, one channel at a time."""
+"""All joints and torques of recordings as series, by the monitor's own decoder, one channel at a time."""
 
 from collections.abc import Callable, Iterable
 from contextlib import ExitStack
@@ -12,9 +12,7 @@ from leg_wear_monitor.bags.budget import Budget
 from leg_wear_monitor.bags.findings import Finding, RecordingError, Severity
 from leg_wear_monitor.bags.joint_names import names_in
 from leg_wear_monitor.bags.mcap.layout import Channel
-from leg_wear_monitor.bags.sources import Source, open_sources
-from leg_wear_monitor.bags.topics import Role, check_channel
-from leg_wear_monitor.commissioning.series.signals import (
+from leg_wear_monitor.bags.series.signals import (
     EFFORT,
     FLOAT64,
     WRENCH,
@@ -22,6 +20,8 @@ from leg_wear_monitor.commissioning.series.signals import (
     Signals,
     TorqueSource,
 )
+from leg_wear_monitor.bags.sources import Source, open_sources
+from leg_wear_monitor.bags.topics import Role, check_channel
 from leg_wear_monitor.messages import outputs
 from leg_wear_monitor.messages.decode import Decoder
 from leg_wear_monitor.messages.streams import JOINT_STATE, STREAMS, WRENCH_STAMPED, Stream

@@ -1,0 +1,106 @@
+"""`play` on bags and tables of synthetic rocks."""
+
+import json
+import math
+from pathlib import Path
+
+import numpy as np
+import pytest
+from play.rocks import Rocks, rocks
+
+from leg_wear_monitor.bags.mcap.writer import McapWriter
+from leg_wear_monitor.messages import encode
+
+START_NS = 1_772_352_000 * 10**9
+
+
+@pytest.fixture(scope="module")
+def one() -> Rocks:
+    return rocks(1, bits=14, counts=20.0, noise=0.5, stuck=0.0, drift=5.0, pushes=24)
+
+
+@pytest.fixture
+def table(one: Rocks, tmp_path: Path) -> str:
+    columns = np.column_stack([one.time_s, np.degrees(one.angle_rad), one.load, np.ones(len(one.load))])
+    names = "time,knee,push,still"
+    np.savetxt(tmp_path / "rocks.csv", columns, "%.12g", ",", header=names, comments="")
+    (tmp_path / "units.yaml").write_text("/**: {ros__parameters: {input: {units: {crank_angle: deg}}}}\n")
+    return "rocks.csv"
+
+
+@pytest.fixture
+def bag(one: Rocks, tmp_path: Path) -> str:
+    stamps = START_NS + np.round(1e9 * one.time_s).astype(np.int64)
+    position = np.column_stack([np.zeros(len(stamps)), one.angle_rad])
+    effort = np.column_stack([np.zeros(len(stamps)), one.load])
+    wrench = np.zeros((len(stamps), 3))
+    wrench[:, 1] = one.load
+    with McapWriter(tmp_path / "rocks.mcap") as writer:
+        joints = writer.channel("/joint_states", encode.JOINT_STATE)
+        target = writer.channel("/target", encode.JOINT_STATE)
+        pushes = writer.channel("/push", encode.WRENCH_STAMPED)
+        names = ["crank", "knee"]
+        writer.write_many(
+            joints, stamps, encode.joint_states(stamps, names, position=position, effort=effort)
+        )
+        writer.write_many(target, stamps, encode.joint_states(stamps, ["goal"], position=one.load[:, None]))
+        # sent a little later than the angle
+        writer.write_many(pushes, stamps + 10**6, encode.wrenches(stamps + 10**6, torque=wrench))
+    return "rocks.mcap"
+
+
+@pytest.mark.parametrize("load", ["effort", "effort:knee", "/push:y", "push:y", "/target:goal", None])
+def test_a_bag_gives_the_play(run, bag: str, one: Rocks, load: str | None) -> None:
+    result = run("play", bag, "--joint", "knee", *(["--load", load] if load else []), "--json", "play.json")
+    assert result.exit_code == 0, result.stderr
+    found = json.loads(Path("play.json").read_text())
+    assert abs(found["play_rad"] - one.play_rad) < one.count_rad
+    assert found["count_rad"] == pytest.approx(one.count_rad, rel=1e-6)
+    assert found["load"] == (load or "")
+    assert f"{math.degrees(found['play_rad']):.3g} deg" in result.stdout
+    assert "16384 per turn" in result.stdout
+
+
+def test_a_table_gives_the_play(run, table: str, one: Rocks) -> None:
+    given = ("play", table, "--joint", "knee", "--config", "units.yaml")
+    for load in (("--load", "push"), ()):
+        result = run(*given, *load, "--json", "-")
+        assert result.exit_code == 0, result.stderr
+        assert abs(json.loads(result.stdout)["play_rad"] - one.play_rad) < one.count_rad
+
+
+@pytest.mark.parametrize(
+    ("options", "said"),
+    [
+        (("--joint", "hip"), "rocks.csv: --joint: column 'hip' does not exist, expected one of: time, knee"),
+        (("--joint", "knee", "--load", "pull"), "rocks.csv: --load: column 'pull' does not exist"),
+        (("--joint", "knee", "--load", "still"), "still: does not reverse"),
+        (("--joint", "still"), "still: is constant"),
+        (("--joint", "knee", "--counts-per-turn", "0"), "--counts-per-turn"),
+        (("--joint", "knee", "--load", "push", "--counts-per-turn", "100"), "less than one count"),
+        ((), "--joint"),
+    ],
+)
+def test_a_bad_table_is_one_line(run, table: str, options: tuple[str, ...], said: str) -> None:
+    result = run("play", table, *options, "--config", "units.yaml")
+    assert result.exit_code == 2
+    (line,) = result.stderr.splitlines()
+    assert said in line
+
+
+@pytest.mark.parametrize(
+    ("options", "said"),
+    [
+        (
+            ("--joint", "kne"),
+            "'kne' is not a joint of the recording, it has crank, goal, knee; did you mean knee?",
+        ),
+        (("--joint", "knee", "--load", "pull"), "--load: 'pull' is not in the recording, expected one of"),
+        (("--joint", "knee", "--load", "push:x"), "push:x: does not reverse"),
+    ],
+)
+def test_a_bad_bag_is_one_line(run, bag: str, options: tuple[str, ...], said: str) -> None:
+    result = run("play", bag, *options)
+    assert result.exit_code == 2
+    (line,) = result.stderr.splitlines()
+    assert said in line

@@ -16,7 +16,7 @@ from made_up_summary import made_up_summary
 
 import leg_wear_monitor as lw
 from leg_wear_monitor.life.result import Life
-from leg_wear_monitor.play.result import Play
+from leg_wear_monitor.play.result import Clearances, JointClearance, Play, PlayMeasurement
 
 ROOT = Path(__file__).parents[1]
 PAGE = ROOT / "docs" / "reference" / "json.md"
@@ -70,8 +70,16 @@ def commissioning() -> Iterator[Row]:
 
 
 def play() -> Iterator[Row]:
+    told = descriptions(PlayMeasurement)
     yield VERSION
-    yield from rows_of(Play)
+    yield "is_sure", "true or false", "", PlayMeasurement.is_sure.__doc__ or ""
+    yield "plays[]", "object", "", told["plays"]
+    yield from rows_of(Play, "plays[].")
+    yield "clearances", "object or null", "", told["clearances"]
+    yield "clearances.joints[]", "object", "", descriptions(Clearances)["joints"]
+    yield from rows_of(JointClearance, "clearances.joints[].")
+    yield "clearances.findings[]", "text", "", descriptions(Clearances)["findings"]
+    yield "clearances.not_told_apart[]", "text", "", Clearances.not_told_apart.__doc__ or ""
 
 
 DOCUMENTS = {
@@ -103,7 +111,9 @@ def example(name: str) -> Any:
         return json.loads((ROOT / "config" / "lives" / "bionic_leg.json").read_text())
     if name == "play":
         numbers = ("play_rad", "sigma_rad", "count_rad", "noise_rad", "scatter_rad", "drift_rad")
-        return Play(joint="knee", load="", plateaus=(10, 10), **dict.fromkeys(numbers, 0.001)).to_dict()
+        one = Play(joint="knee", load="", plateaus=(10, 10), **dict.fromkeys(numbers, 0.001))
+        joints = (JointClearance(joint="G", rad_per_m=(5.0,), most_m=0.001),)
+        return json.loads(PlayMeasurement(plays=(one,), clearances=Clearances(joints=joints)).to_json())
     item = lw.CommissioningItem(name="crank.sign", value=1)
     return lw.CommissioningResult(
         items=(item,), not_told=("lag",), findings=("load",), notes=("note",), config=None, turns=1.0

@@ -1,4 +1,4 @@
-"""Result of a play measurement."""
+"""Results of a play measurement: plays, and the clearances that they come from."""
 
 from typing import Any
 
@@ -43,6 +43,10 @@ class Play:
         What makes the result doubtful, and the remedy.
     notes : tuple of str
         Further information.
+    recording : str
+        What was measured from; empty for arrays.
+    crank_angle_rad : float, optional
+        Crank angle of the posture; null if it was not given.
     """
 
     joint: str
@@ -59,15 +63,88 @@ class Play:
     outside: int = 0
     findings: tuple[str, ...] = ()
     notes: tuple[str, ...] = ()
+    recording: str = ""
+    crank_angle_rad: float | None = None
+
+
+@attrs.frozen(kw_only=True)
+class JointClearance:
+    """Clearance of a joint as plays show it.
+
+    Attributes
+    ----------
+    joint : str
+        Name of the joint in the mechanism.
+    rad_per_m : tuple of float
+        Play that a meter of radial clearance gives, in each posture.
+    clearance_m : float, optional
+        Mean radial clearance; null if the plays do not tell it from others.
+    sigma_m : float, optional
+        Its standard deviation.
+    most_m : float, optional
+        Largest clearance that the plays allow; null if the joint has no effect on the encoder.
+    """
+
+    joint: str
+    rad_per_m: tuple[float, ...]
+    clearance_m: float | None = None
+    sigma_m: float | None = None
+    most_m: float | None = None
+
+
+@attrs.frozen(kw_only=True)
+class Clearances:
+    """Clearances of the clearance joints.
+
+    Attributes
+    ----------
+    joints : tuple of JointClearance
+        The clearance joints, one by one.
+    findings : tuple of str
+        What does not fit.
+    """
+
+    joints: tuple[JointClearance, ...]
+    findings: tuple[str, ...] = ()
+
+    @property
+    def not_told_apart(self) -> tuple[str, ...]:
+        """Joints with an effect whose clearances are not told apart."""
+        return tuple(one.joint for one in self.joints if one.most_m is not None and one.clearance_m is None)
+
+
+@attrs.frozen(kw_only=True)
+class PlayMeasurement:
+    """Plays of a joint in one or several postures, and the clearances that they come from.
+
+    Attributes
+    ----------
+    plays : tuple of Play
+        The plays, one a recording.
+    clearances : Clearances, optional
+        Where they come from; null without a mechanism.
+    """
+
+    plays: tuple[Play, ...]
+    clearances: Clearances | None = None
+
+    @property
+    def is_sure(self) -> bool:
+        """Whether nothing is doubtful, and all clearances that have an effect are told apart."""
+        found = self.clearances
+        is_told = found is None or not (found.findings or found.not_told_apart)
+        return is_told and not any(play.findings for play in self.plays)
 
     def to_dict(self) -> dict[str, Any]:
         """Plain object for JSON."""
-        plain = {key: list(value) if isinstance(value, tuple) else value for key, value in self._fields()}
-        return {"schema_version": SCHEMA_VERSION, **plain}
+        plain: dict[str, Any] = {"schema_version": SCHEMA_VERSION, "is_sure": self.is_sure}
+        plain["plays"] = [attrs.asdict(play) for play in self.plays]
+        plain["clearances"] = None
+        if self.clearances is not None:
+            told = {"not_told_apart": self.clearances.not_told_apart}
+            plain["clearances"] = {**attrs.asdict(self.clearances), **told}
+        return plain
 
     def to_json(self) -> str:
-        """Text of `to_dict`."""
+        """Text of `to_dict`: what ``play --json`` writes."""
         return json_text(self.to_dict())
-
-    def _fields(self) -> list[tuple[str, Any]]:
-        return list(attrs.asdict(self, recurse=False).items())

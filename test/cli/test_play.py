@@ -4,12 +4,16 @@ import json
 import math
 from pathlib import Path
 
+import attrs
 import numpy as np
 import pytest
 from play.rocks import Rocks, rocks
 
+from leg_wear_monitor import load_mechanism
 from leg_wear_monitor.bags.mcap.writer import McapWriter
 from leg_wear_monitor.messages import encode
+from leg_wear_monitor.play.clearances import effects
+from leg_wear_monitor.twin.reference.joint_angles import angle_model
 
 START_NS = 1_772_352_000 * 10**9
 
@@ -53,7 +57,7 @@ def bag(one: Rocks, tmp_path: Path) -> str:
 def test_a_bag_gives_the_play(run, bag: str, one: Rocks, load: str | None) -> None:
     result = run("play", bag, "--joint", "knee", *(["--load", load] if load else []), "--json", "play.json")
     assert result.exit_code == 0, result.stderr
-    found = json.loads(Path("play.json").read_text())
+    (found,) = json.loads(Path("play.json").read_text())["plays"]
     assert abs(found["play_rad"] - one.play_rad) < one.count_rad
     assert found["count_rad"] == pytest.approx(one.count_rad, rel=1e-6)
     assert found["load"] == (load or "")
@@ -66,7 +70,7 @@ def test_a_table_gives_the_play(run, table: str, one: Rocks) -> None:
     for load in (("--load", "push"), ()):
         result = run(*given, *load, "--json", "-")
         assert result.exit_code == 0, result.stderr
-        assert abs(json.loads(result.stdout)["play_rad"] - one.play_rad) < one.count_rad
+        assert abs(json.loads(result.stdout)["plays"][0]["play_rad"] - one.play_rad) < one.count_rad
 
 
 @pytest.mark.parametrize(
@@ -101,6 +105,63 @@ def test_a_bad_table_is_one_line(run, table: str, options: tuple[str, ...], said
 )
 def test_a_bad_bag_is_one_line(run, bag: str, options: tuple[str, ...], said: str) -> None:
     result = run("play", bag, *options)
+    assert result.exit_code == 2
+    (line,) = result.stderr.splitlines()
+    assert said in line
+
+
+CLEARANCES = {"A": 0.0004, "G": 0.0007}
+DEGREES = (20, 100, 180, 260, 330)
+
+
+@pytest.fixture
+def postures(tmp_path: Path) -> list[str]:
+    """Tables of an encoder at the knee of the leg with clearances, in five postures."""
+    leg = attrs.evolve(load_mechanism("bionic_leg"), clearance_joints=tuple(CLEARANCES))
+    effect = effects(angle_model(leg, ["G"]), np.radians(DEGREES))
+    count = 2.0 * math.pi / 2**16
+    for number, play in enumerate(effect @ list(CLEARANCES.values())):
+        one = rocks(number, bits=16, counts=play / count, noise=0.5, stuck=0.0, drift=3.0, pushes=24)
+        columns = np.column_stack([one.time_s, one.angle_rad, one.load])
+        np.savetxt(tmp_path / f"{number}.csv", columns, "%.12g", ",", header="time,G,push", comments="")
+    return [f"{number}.csv" for number in range(len(DEGREES))]
+
+
+def test_postures_tell_clearances_apart_and_print_what_measure_takes(run, postures: list[str]) -> None:
+    angles = [part for each in DEGREES for part in ("--crank-angle", str(each))]
+    given = ("--joint", "G", "--load", "push", "--mechanism", "bionic_leg", "--clearances", "A,G")
+    result = run("play", *postures, *given, *angles, "--json", "play.json")
+    assert result.exit_code == 0, result.stdout + result.stderr
+    found = json.loads(Path("play.json").read_text())["clearances"]
+    for one in found["joints"]:
+        error = abs(one["clearance_m"] - CLEARANCES[one["joint"]])
+        assert error < 3.0 * one["sigma_m"] < 1.0e-4
+        measure = f"leg-wear-monitor measure {one['joint']} {1e3 * one['clearance_m']:.4f} --sigma "
+        assert measure in result.stdout
+
+
+def test_one_posture_does_not_tell_joints_apart(run, postures: list[str]) -> None:
+    given = ("--joint", "G", "--load", "push", "--mechanism", "bionic_leg", "--clearances", "A,G")
+    result = run("play", postures[0], *given, "--crank-angle", "20")
+    assert result.exit_code == 1
+    assert "not told apart: A (at most" in result.stdout
+    assert "leg-wear-monitor measure" not in result.stdout
+
+
+@pytest.mark.parametrize(
+    ("options", "said"),
+    [
+        (("--mechanism", "bionic_leg"), "--crank-angle: 0 given for 1 recordings, expected one for each"),
+        (("--crank-angle", "20"), "need --mechanism"),
+        (
+            ("--mechanism", "bionic_leg", "--crank-angle", "20", "--encoder", "K"),
+            "'K' is not a revolute joint",
+        ),
+        (("--mechanism", "bionic_leg", "--crank-angle", "20", "--clearances", "Q"), "Q"),
+    ],
+)
+def test_a_bad_mechanism_is_one_line(run, postures: list[str], options: tuple[str, ...], said: str) -> None:
+    result = run("play", postures[0], "--joint", "G", "--load", "push", *options)
     assert result.exit_code == 2
     (line,) = result.stderr.splitlines()
     assert said in line

@@ -9,6 +9,7 @@ from play.rocks import rocks
 
 from leg_wear_monitor.errors import LegWearError
 from leg_wear_monitor.play.measurement import measure_play
+from leg_wear_monitor.play.result import PlayMeasurement
 
 pytestmark = pytest.mark.plain
 
@@ -60,10 +61,11 @@ def test_stiction_that_spoils_the_play_is_named() -> None:
 
 def test_json_has_every_field() -> None:
     found = measured(rocks(7))
-    plain = json.loads(found.to_json())
+    plain = json.loads(PlayMeasurement(plays=(found,)).to_json())
     assert plain["schema_version"] == 1
-    assert plain["play_rad"] == found.play_rad
-    assert plain["plateaus"] == list(found.plateaus)
+    assert plain["is_sure"] is True
+    assert plain["plays"][0]["play_rad"] == found.play_rad
+    assert plain["plays"][0]["plateaus"] == list(found.plateaus)
 
 
 def refusal(*arguments, **given) -> str:

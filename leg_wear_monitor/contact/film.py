@@ -10,8 +10,6 @@ import math
 
 from leg_wear_monitor.kernel import kernel
 
-NARROWEST, WIDEST = 0.125, 1.0  # width over diameter of the tables behind the formulas
-
 
 @kernel
 def rotation_number(x, epsilon):

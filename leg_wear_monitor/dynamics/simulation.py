@@ -5,7 +5,7 @@ from collections.abc import Callable, Iterator, Sequence
 from pathlib import Path
 
 from leg_wear_monitor.configuration.strict import shown
-from leg_wear_monitor.contact.arrays import clearance_settings, compile_contacts
+from leg_wear_monitor.contact.arrays import clearance_settings, compile_contacts, compile_films
 from leg_wear_monitor.dynamics.arguments import check_kinds, given_joints, given_mechanism
 from leg_wear_monitor.dynamics.clearance.run import ClearanceRun
 from leg_wear_monitor.dynamics.full.run import FullRun
@@ -79,6 +79,7 @@ def prepare(
         linkage,
         clearance_joints,
         contacts,
+        compile_films(settings),
         fresh_surfaces(contacts, wear, sectors),
         _speed(mechanism, speed_rpm),
     )

@@ -31,6 +31,19 @@ class Friction:
     )
 
 
+FILM_WIDTHS = 0.125, 1.0  # width over the bushing's diameter for which the film's force is known
+
+
+@attrs.frozen(kw_only=True)
+class Film:
+    """Oil or grease between journal and bushing."""
+
+    viscosity_pa_s: float = quantity("Pa s", "dynamic viscosity", above=0.0)
+    roughness_m: float = quantity(
+        "m", "thickness below which the film resists no more than there; below the clearance", above=0.0
+    )
+
+
 @attrs.frozen(kw_only=True)
 class Clearance:
     """Settings of a revolute clearance joint; pairs are (bushing, journal)."""
@@ -43,6 +56,9 @@ class Clearance:
     normal_law: str = choice(NORMAL_LAWS, "law of the normal force", default="lankarani-nikravesh")
     restitution: float = quantity("", "coefficient of restitution", above=0.0, at_most=1.0, default=0.9)
     friction: Friction = described("friction, a mapping of the keys below", default=Friction())
+    film: Film | None = described(
+        "oil or grease, a mapping of the keys below; only `--model full` has it", default=None
+    )
     wear_coefficient: Pair = quantity("1/Pa", "K/H of Archard's law", at_least=0.0, default=(0.0, 0.0))
     stiffness: float | None = quantity(
         "N/m^1.5", "contact stiffness instead of Hertz's", above=0.0, default=None
@@ -62,6 +78,22 @@ class Clearance:
             raise FieldError(
                 "radial_clearance",
                 f"{self.radial_clearance!r} is not below the bushing_radius of {self.bushing_radius!r} m",
+            )
+        if self.film is not None:
+            self._check_film(self.film)
+
+    def _check_film(self, film: Film) -> None:
+        if not self.radial_clearance > film.roughness_m:
+            raise FieldError(
+                "radial_clearance",
+                f"{self.radial_clearance!r} is not above the film's roughness_m of {film.roughness_m!r} m",
+            )
+        least, most = (2.0 * self.bushing_radius * ratio for ratio in FILM_WIDTHS)
+        if not least * (1.0 - 1.0e-9) <= self.width <= most * (1.0 + 1.0e-9):
+            raise FieldError(
+                "width",
+                f"{self.width!r} m with a film, whose force is known from {least:g} to {most:g} m, "
+                "an eighth of the bushing's diameter to the whole",
             )
 
     @property

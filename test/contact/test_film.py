@@ -11,13 +11,12 @@ from hypothesis import strategies as st
 from reynolds import film_numbers
 
 from leg_wear_monitor.contact.film import (
-    NARROWEST,
-    WIDEST,
     attitude_angle,
     film_force,
     rotation_number,
     squeeze_number,
 )
+from leg_wear_monitor.mechanism.clearance import FILM_WIDTHS
 
 pytestmark = pytest.mark.plain
 
@@ -63,7 +62,7 @@ def at_table(table, column, row, j):
 
 
 def test_rotation_is_that_of_the_tables():
-    assert (min(WIDTHS), max(WIDTHS)) == (NARROWEST, WIDEST)
+    assert (min(WIDTHS), max(WIDTHS)) == FILM_WIDTHS
     for x, e, i, j in cells("rotation"):
         assert e * rotation_number(x, e) == pytest.approx(at_table("rotation", "sommerfeld", i, j), rel=0.07)
         beta = math.degrees(attitude_angle(x, e))

@@ -76,7 +76,7 @@ class ClearanceStepper:
     Raises
     ------
     ConfigError
-        For a mechanism driven by a torque: clearance coordinates need a given crank motion.
+        For a mechanism driven by a torque: clearance coordinates need a given crank motion. For a film.
     """
 
     def __init__(
@@ -89,6 +89,7 @@ class ClearanceStepper:
         mechanism = setup.linkage.mechanism
         if not isinstance(mechanism.drive, SpeedDrive):
             raise needs_speed(mechanism)
+        _refuse_film(setup)
         self._setup = setup
         self.model = ClearanceModel(
             contacts=setup.contacts,
@@ -198,6 +199,17 @@ class ClearanceStepper:
         """Restore a snapshot of a stepper of the same setup."""
         self.state.motion[:] = snapshot.motion
         self.state.depth[:] = snapshot.depth
+
+
+def _refuse_film(setup: Setup) -> None:
+    """Raise ConfigError for a joint with a film, which clearance coordinates do not have."""
+    for name, film in zip(setup.clearance_joints, setup.films, strict=True):
+        if film[0] > 0.0:
+            raise ConfigError(
+                setup.linkage.mechanism.source,
+                f"clearances.joints.{name}.film",
+                "the clearance model has no film; leave the key out, or try simulate --model full",
+            )
 
 
 def needs_speed(mechanism: Mechanism) -> ConfigError:

@@ -11,6 +11,7 @@ from typing import NamedTuple
 import numpy as np
 
 from leg_wear_monitor.contact.arrays import ContactArrays
+from leg_wear_monitor.dynamics.full.film import add_film
 from leg_wear_monitor.dynamics.joint.contact_event import DELTA, DELTA_DOT, EX, EY, F_N, SAMPLE, VX, VY
 from leg_wear_monitor.dynamics.joint.joint_contact import contact_energy, joint_force
 from leg_wear_monitor.dynamics.run.cholesky import factorise, substitute
@@ -43,13 +44,15 @@ BAUMGARTE = 200.0  # alpha = beta [1/s]: drift decays within 5 ms, far slower th
 class FullModel(NamedTuple):
     """Constants of a run.
 
-    ``rows``: of the ideal joints and of a drive by speed; ``contacts``: the clearance joints;
-    ``baumgarte``: alpha = beta [1/s].
+    ``rows``: of the ideal joints and of a drive by speed; ``contacts``: the clearance joints; ``films``
+    (k, 2): their films' viscosity [Pa s] and roughness [m], 0 for a dry joint; ``baumgarte``: alpha
+    = beta [1/s].
     """
 
     arrays: MechanismArrays
     rows: Rows
     contacts: ContactArrays
+    films: Floats
     baumgarte: float
 
 
@@ -74,11 +77,17 @@ class FullScratch(NamedTuple):
 
 
 def full_model(
-    arrays: MechanismArrays, contacts: ContactArrays, driven: bool, baumgarte: float = BAUMGARTE
+    arrays: MechanismArrays,
+    contacts: ContactArrays,
+    driven: bool,
+    films: Floats | None = None,
+    baumgarte: float = BAUMGARTE,
 ) -> FullModel:
     """Model with the clearance joints of ``contacts`` and all other joints ideal."""
     ideal = [joint for joint in range(len(arrays.joint_kind)) if joint not in contacts.joint]
-    return FullModel(arrays, select_rows(arrays, ideal, driven), contacts, baumgarte)
+    if films is None:
+        films = np.zeros((len(contacts.joint), 2))
+    return FullModel(arrays, select_rows(arrays, ideal, driven), contacts, films, baumgarte)
 
 
 def full_scratch(model: FullModel) -> FullScratch:
@@ -144,6 +153,9 @@ def add_contacts(model, surfaces, approach, q, v, scratch, out_rate):
             rate[FRICTION] = -f_t * slip
             rate[ARCHARD] = f_n * abs(slip)
         rate[DISSIPATION] = (f_n - elastic) * delta_dot
+        if model.films[k, 0] > 0.0:
+            cx, cy = -f_n * nx - f_t * ny, -f_n * ny + f_t * nx
+            add_film(model, k, ex, ey, vx, vy, b, j, sbx, sby, cx, cy, delta, q, v, scratch, rate)
 
 
 @kernel

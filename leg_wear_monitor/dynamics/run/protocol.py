@@ -36,6 +36,8 @@ class Setup:
     clearance_joints : tuple of str
         Names of the clearance joints, in the order of ``contacts``.
     contacts : ContactArrays
+    films : (k, 2) array
+        Viscosity [Pa s] and roughness [m] of the clearance joints' films; 0 for a dry joint.
     surfaces : Surfaces
         Worn surfaces; the run changes them.
     speed : float
@@ -45,6 +47,7 @@ class Setup:
     linkage: Linkage
     clearance_joints: tuple[str, ...]
     contacts: ContactArrays
+    films: Floats
     surfaces: Surfaces
     speed: float
 

@@ -1,0 +1,94 @@
+"""Films of oil or grease in full coordinates: energy, both limits of the viscosity, and who refuses them."""
+
+import attrs
+import numpy as np
+import pytest
+
+from leg_wear_monitor.dynamics.clearance.run import ClearanceRun
+from leg_wear_monitor.dynamics.full.run import FullRun
+from leg_wear_monitor.dynamics.result.statistics import energy_balance
+from leg_wear_monitor.dynamics.run.run_statistics import ARCHARD, CONTACT, FORCE, new_run_statistics
+from leg_wear_monitor.dynamics.simulation import prepare, simulate
+from leg_wear_monitor.errors import ConfigError
+from leg_wear_monitor.mechanism.clearance import Film
+from leg_wear_monitor.mechanism.loader import load_mechanism, parse_mechanism
+
+CYCLE = 60.0 / 5000.0  # s
+
+
+@pytest.fixture(scope="module")
+def slider_crank():
+    return load_mechanism("slider_crank")
+
+
+def oiled(mechanism, viscosity):
+    film = Film(viscosity_pa_s=viscosity, roughness_m=1.6e-6)
+    clearances = {name: attrs.evolve(c, film=film) for name, c in mechanism.clearances.items()}
+    return attrs.evolve(mechanism, clearances=clearances)
+
+
+def moved(mechanism, until=CYCLE, **options):
+    """Integrals of joint B, energy balance and state after a time [s]."""
+    run, statistics = FullRun(prepare(mechanism, **options)), new_run_statistics(len(mechanism.joints))
+    stored = run.stored_energy
+    run.advance(until, statistics)
+    return statistics.integral[2], energy_balance(statistics, stored, run.stored_energy), run.state.y.copy()
+
+
+@pytest.mark.parametrize("viscosity", [0.001, 0.1, 4.0])
+def test_energy_adds_up(slider_crank, viscosity):
+    energy = moved(oiled(slider_crank, viscosity))[1]
+    assert energy.contact_loss > 0.0
+    assert abs(energy.residual) < 1.0e-4 * energy.contact_loss
+
+
+def test_energy_adds_up_on_walls_that_wear(slider_crank):
+    """At 1e4 times the pace of real wear."""
+    own = {n: attrs.evolve(c, wear_coefficient=(1e-11, 1e-11)) for n, c in slider_crank.clearances.items()}
+    energy = moved(oiled(attrs.evolve(slider_crank, clearances=own), 0.01), wear=True)[1]
+    assert energy.wear_loss > 0.0
+    assert abs(energy.residual) < 1.0e-3 * energy.contact_loss
+
+
+def test_a_film_of_no_viscosity_is_the_dry_joint(slider_crank):
+    """Before impacts have made a difference of 1e-9 a large one."""
+    dry, thin = (moved(leg, CYCLE / 20.0) for leg in (slider_crank, oiled(slider_crank, 1.0e-9)))
+    assert dry[0][CONTACT] > 0.0
+    assert thin[2] == pytest.approx(dry[2], rel=1.0e-4, abs=1.0e-6)
+
+
+def test_a_stiff_film_is_an_ideal_joint_and_does_not_wear(slider_crank):
+    stiff = moved(oiled(slider_crank, 40.0))
+    assert stiff[0][CONTACT] == stiff[0][ARCHARD] == 0.0
+    ideal = simulate(slider_crank, clearances=(), cycles=1.0, skip_cycles=0.0)
+    assert stiff[0][FORCE] / CYCLE == pytest.approx(ideal.joints["B"].mean_force_n, rel=0.01)
+
+
+def test_clearance_coordinates_refuse_a_film(slider_crank):
+    with pytest.raises(ConfigError, match=r"joints\.B\.film: the clearance model has no film; leave"):
+        ClearanceRun(prepare(oiled(slider_crank, 0.1)))
+
+
+@pytest.mark.plain
+@pytest.mark.parametrize(
+    "change, said",
+    [
+        ({"film": {"viscosity_pa_s": 0.1, "roughness_m": 5e-4}}, "radial_clearance: 0.0005 is not above the"),
+        ({"film": {"viscosity_pa_s": 0.1, "roughness_m": 1e-6}, "width": 0.03}, "width: 0.03 m with a film"),
+        ({"film": {"viscosity_pa_s": 0.0, "roughness_m": 1e-6}}, r"film\.viscosity_pa_s: 0.0 is not above 0"),
+        ({"film": {"viscosity_pa_s": 0.1}}, "film"),
+    ],
+)
+def test_a_file_s_film_is_checked(document, change, said):
+    plain = document("slider_crank")
+    plain["clearances"]["joints"]["B"].update(change)
+    with pytest.raises(ConfigError, match=said):
+        parse_mechanism(plain, "mine.yaml")
+
+
+@pytest.mark.plain
+def test_a_file_s_film_is_read(document):
+    plain = document("slider_crank")
+    plain["clearances"]["joints"]["B"]["film"] = {"viscosity_pa_s": 0.1, "roughness_m": 1e-6}
+    assert np.array_equal(prepare(parse_mechanism(plain, "mine.yaml")).films, [[0.1, 1.0e-6]])
+    assert not prepare(load_mechanism("slider_crank")).films.any()

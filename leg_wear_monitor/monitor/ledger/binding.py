@@ -13,6 +13,7 @@ from leg_wear_monitor.wear.surfaces import SECTORS
 # fields of a mechanism that may change without a change of the worn parts
 _FREE = ("name", "source", "drive", "loads", "clearance_joints", "clearances")
 _FREE_OF_CLEARANCE = ("wear_coefficient", "material")  # what a pair gives is in the other settings
+_LATER = ("film",)  # settings of later versions: absent, they leave the hash of an older leg as it was
 _FREE_OF_JOINTS = ("label",)
 
 
@@ -27,7 +28,9 @@ def fingerprint(mechanism: Mechanism) -> str:
     for joint in mechanism.clearance_joints:
         settings = attrs.asdict(mechanism.clearances[joint])
         parts[f"clearance {joint}"] = {
-            name: _plain(value) for name, value in settings.items() if name not in _FREE_OF_CLEARANCE
+            name: _plain(value)
+            for name, value in settings.items()
+            if name not in _FREE_OF_CLEARANCE and not (name in _LATER and value is None)
         }
     text = json.dumps(parts, sort_keys=True, default=_plain)
     return hashlib.sha256(text.encode()).hexdigest()[:16]

@@ -1,10 +1,13 @@
 """What a ledger is bound to: the worn parts, not what people call them."""
 
+import json
+
 import attrs
 import numpy as np
 import pytest
 
 import leg_wear_monitor as lw
+from leg_wear_monitor.mechanism.clearance import Film
 from leg_wear_monitor.monitor.ledger.binding import fingerprint
 from leg_wear_monitor.share import share_directory
 
@@ -22,3 +25,12 @@ def test_a_label_does_not_make_another_leg():
 def test_the_torque_reference_of_the_default_leg_is_of_this_leg():
     with np.load(share_directory() / "config" / "references" / "bionic_leg.npz") as reference:
         assert str(reference["fingerprint"]) == fingerprint(lw.load_mechanism("bionic_leg"))
+
+
+def test_a_film_is_a_part_of_the_leg_and_none_leaves_an_older_leg_as_it_was():
+    leg = lw.load_mechanism("bionic_leg")
+    film = Film(viscosity_pa_s=0.1, roughness_m=1e-6)
+    oiled = {**leg.clearances, "G": attrs.evolve(leg.clearances["G"], film=film)}
+    assert fingerprint(attrs.evolve(leg, clearances=oiled)) != fingerprint(leg)
+    lives = json.loads((share_directory() / "config" / "lives" / "bionic_leg.json").read_text())
+    assert lives["fingerprint"] == fingerprint(leg)

@@ -96,6 +96,7 @@ def _measured(
     dry_run: bool,
 ) -> tuple["MeasurementResult", str]:
     """What a measurement says, and what all of the ledger's together do."""
+    from leg_wear_monitor.monitor.forecast.coefficient_prior import prior_source
     from leg_wear_monitor.monitor.forecast.measurement import measure as evaluate
     from leg_wear_monitor.monitor.forecast.validity import validity
     from leg_wear_monitor.monitor.ledger.entry import new_part
@@ -106,10 +107,11 @@ def _measured(
         raise ConfigError("JOINT", "", fault + did_you_mean(joint, leg.clearance_joints))
     with opened(leg, settings, dry_run) as kept:
         parts = {wear.name: wear for wear in kept.entry.joints} if kept.entry else {}
+        part = parts.get(joint) or new_part(joint)
         found = evaluate(
             settings.forecast,
             leg.clearances[joint],
-            parts.get(joint) or new_part(joint),
+            part,
             kept.measurements,
             clearance_m=clearance_m,
             sigma_m=sigma_m,
@@ -117,6 +119,7 @@ def _measured(
             who=getpass.getuser(),
             kept_ns=kept.kept_ns,
             accept=accept,
+            prior=prior_source(leg, settings.forecast).prior(joint, part.replaced_ns),
         )
         kept.note(found.measurement)
         kept.record()

@@ -66,6 +66,8 @@ class JointForecast:
         The clearance now, as far as it is known.
     measurements : int
         Measured clearances of this part that are in it.
+    prior : str
+        What was measured on other parts for the prior of its wear coefficient; empty for the configured one.
     """
 
     answer: Answer
@@ -74,6 +76,7 @@ class JointForecast:
     days: Quantiles | None
     clearance_m: Quantiles
     measurements: int
+    prior: str = ""
 
 
 @attrs.frozen(kw_only=True)
@@ -202,6 +205,7 @@ def forecast(
             **_life(a, end, cycle_s, day),
             clearance_m=q,
             measurements=coefficient_estimate.observations,
+            prior=coefficient_estimate.basis,
         )
         for a, end, q, coefficient_estimate in zip(
             answers, ends, clearances, coefficient_estimates, strict=True

@@ -8,6 +8,7 @@ import numpy as np
 from leg_wear_monitor.mechanism.arrays import Floats
 from leg_wear_monitor.mechanism.spec import Mechanism
 from leg_wear_monitor.monitor.config.forecast import Forecasting
+from leg_wear_monitor.monitor.forecast.coefficient_prior import prior_source
 from leg_wear_monitor.monitor.forecast.forecast import Forecast, JointCondition, forecast
 from leg_wear_monitor.monitor.forecast.growth import GrowthRate, GrowthWindow, extended, growth_rate
 from leg_wear_monitor.monitor.forecast.life_file import law_of
@@ -67,7 +68,7 @@ class Forecaster:
     Raises
     ------
     ConfigError
-        For a file of lives that cannot be used.
+        For a file of lives or of priors that cannot be used.
     """
 
     def __init__(
@@ -82,10 +83,9 @@ class Forecaster:
         self._fresh_m = [clearance.radial_clearance for clearance in self._clearances]
         self._law = law_of(mechanism, settings.life, settings.model_sigma)
         self._measurements = list(measurements)
-        joints = zip(self._clearance_joints, self._fresh_m, replaced_ns, strict=True)
+        self._priors = prior_source(mechanism, settings)
         coefficient_estimates = tuple(
-            estimate_coefficient(settings, fresh, observations_of(measurements, joint, when))
-            for joint, fresh, when in joints
+            self._estimate(k, when) for k, when in zip(range(len(self._fresh_m)), replaced_ns, strict=True)
         )
         self.state = ForecastState(
             tuple(GrowthWindow() for _ in self._clearance_joints), coefficient_estimates
@@ -141,9 +141,8 @@ class Forecaster:
     def replaced(self, joint: str, replaced_ns: int) -> None:
         """Reset the estimate of a joint whose part changed to the measurements of this part."""
         k, state = self._clearance_joints.index(joint), self.state
-        observations = observations_of(self._measurements, joint, replaced_ns)
         state.growth = (*state.growth[:k], GrowthWindow(), *state.growth[k + 1 :])
-        self._update_coefficients(k, estimate_coefficient(self._settings, self._fresh_m[k], observations))
+        self._update_coefficients(k, self._estimate(k, replaced_ns))
 
     def measured(
         self,
@@ -169,6 +168,7 @@ class Forecaster:
             who=who,
             kept_ns=kept_ns,
             accept=accept,
+            prior=self._priors.prior(wear.name, wear.replaced_ns),
         )
         self._measurements.append(found.measurement)
         self._update_coefficients(k, found.after)
@@ -191,20 +191,20 @@ class Forecaster:
         bool
             Whether it is used: not if its tail probability is below `CONTRADICTS`.
         """
-        observations = observations_of(self._measurements, self._clearance_joints[k], replaced_ns)
-        below = estimate_coefficient(self._settings, self._fresh_m[k], observations).probability_below(
-            self._fresh_m[k], observation
-        )
+        estimate = self._estimate(k, replaced_ns)
+        below = estimate.probability_below(self._fresh_m[k], observation)
         is_plausible = CONTRADICTS <= below <= 1.0 - CONTRADICTS
         self._update_coefficients(
-            k,
-            estimate_coefficient(
-                self._settings,
-                self._fresh_m[k],
-                [*observations, observation] if is_plausible else observations,
-            ),
+            k, self._estimate(k, replaced_ns, observation) if is_plausible else estimate
         )
         return is_plausible
+
+    def _estimate(self, k: int, replaced_ns: int, *further: MeasuredClearance) -> CoefficientEstimate:
+        """Estimate for a part, from its prior, the measurements that count, and further ones."""
+        joint = self._clearance_joints[k]
+        observations = observations_of(self._measurements, joint, replaced_ns)
+        prior = self._priors.prior(joint, replaced_ns)
+        return estimate_coefficient(self._settings, self._fresh_m[k], [*observations, *further], prior)
 
     def _update_coefficients(self, k: int, coefficient_estimate: CoefficientEstimate) -> None:
         coefficient_estimates = self.state.coefficient_estimates

@@ -9,6 +9,7 @@ from leg_wear_monitor.errors import ConfigError
 from leg_wear_monitor.mechanism.clearance import Clearance
 from leg_wear_monitor.mechanism.clearance_range import measured_fault, sigma_fault
 from leg_wear_monitor.monitor.config.forecast import Forecasting
+from leg_wear_monitor.monitor.forecast.coefficient_prior import CoefficientPrior
 from leg_wear_monitor.monitor.forecast.wear_coefficients import (
     CoefficientEstimate,
     MeasuredClearance,
@@ -67,6 +68,7 @@ def measure(
     who: str,
     kept_ns: int = 0,
     accept: bool = False,
+    prior: CoefficientPrior | None = None,
 ) -> MeasurementResult:
     """Evaluate a measured clearance.
 
@@ -88,6 +90,8 @@ def measure(
         Stamp of the ledger's last entry, 0 if there is none.
     accept : bool
         Whether it counts even if it contradicts the model.
+    prior : CoefficientPrior, optional
+        Without it, the configured spread about the nominal coefficient.
 
     Raises
     ------
@@ -103,11 +107,11 @@ def measure(
             raise ConfigError(name, "", fault)
     observations = observations_of(earlier, wear.name, wear.replaced_ns)
     observation = MeasuredClearance(clearance_m, sigma_m, float(wear.depth.sum(axis=0).mean()))
-    before = estimate_coefficient(settings, fresh_m, observations)
+    before = estimate_coefficient(settings, fresh_m, observations, prior)
     below = before.probability_below(fresh_m, observation)
     contradicts = not CONTRADICTS <= below <= 1.0 - CONTRADICTS
     counts = accept or not contradicts
-    after = estimate_coefficient(settings, fresh_m, [*observations, observation]) if counts else before
+    after = estimate_coefficient(settings, fresh_m, [*observations, observation], prior) if counts else before
     measurement = Measurement(
         stamp_ns=stamp_ns,
         joint=wear.name,

@@ -16,6 +16,7 @@ from numpy.typing import ArrayLike
 
 from leg_wear_monitor.mechanism.arrays import Floats
 from leg_wear_monitor.monitor.config.forecast import Forecasting
+from leg_wear_monitor.monitor.forecast.coefficient_prior import CoefficientPrior
 
 GRID = 801
 _WIDTH = 8.0  # standard deviations on both sides, of the prior and of the measurements
@@ -56,6 +57,8 @@ class CoefficientEstimate:
         Its standard deviation.
     observations : int
         Measurements in it.
+    basis : str
+        What its prior rests on, as in `CoefficientPrior`.
     """
 
     log_factor: Floats
@@ -63,6 +66,7 @@ class CoefficientEstimate:
     excess_m: Floats
     excess_sigma_m: float
     observations: int
+    basis: str = ""
 
     @property
     def mean(self) -> float:
@@ -88,7 +92,10 @@ class CoefficientEstimate:
 
 
 def estimate_coefficient(
-    settings: Forecasting, fresh_m: float, observations: Sequence[MeasuredClearance] = ()
+    settings: Forecasting,
+    fresh_m: float,
+    observations: Sequence[MeasuredClearance] = (),
+    prior: CoefficientPrior | None = None,
 ) -> CoefficientEstimate:
     """Coefficient estimate after measurements of the same part, in any order.
 
@@ -98,9 +105,11 @@ def estimate_coefficient(
     fresh_m : float
         Nominal clearance when new.
     observations : sequence of MeasuredClearance
+    prior : CoefficientPrior, optional
+        Without it, the configured spread about the nominal coefficient.
     """
-    own_estimate = _own_estimate(settings, fresh_m, observations)
-    log_factor, log_weight = _laid_out(settings.wear_coefficient_sigma, *own_estimate)
+    prior = prior or CoefficientPrior(sigma=settings.wear_coefficient_sigma)
+    log_factor, log_weight = posterior_grid(prior, *measured_factor(settings, fresh_m, observations))
     weight = np.exp(log_weight - log_weight.max())
     precision = 1.0 / settings.clearance_sigma_m**2 + sum(
         observation.sigma_m**-2 for observation in observations
@@ -111,16 +120,22 @@ def estimate_coefficient(
             observation.clearance_m - fresh_m - np.exp(log_factor) * observation.wear_m
         ) / observation.sigma_m**2
     return CoefficientEstimate(
-        log_factor, weight / weight.sum(), pull / precision, precision**-0.5, len(observations)
+        log_factor,
+        weight / weight.sum(),
+        pull / precision,
+        precision**-0.5,
+        len(observations),
+        prior.basis,
     )
 
 
-def _own_estimate(
+def measured_factor(
     settings: Forecasting, fresh_m: float, observations: Sequence[MeasuredClearance]
 ) -> tuple[float, float]:
     """Mean and precision of the factor from the measurements alone; 0 if they have no information.
 
-    The clearance when new is eliminated: it correlates their errors.
+    The likelihood is normal in the factor, not in its logarithm. The clearance when new is eliminated: it
+    correlates the errors of the measurements.
     """
     if not any(observation.wear_m for observation in observations):
         return 0.0, 0.0
@@ -135,8 +150,23 @@ def _own_estimate(
     return product / precision, precision
 
 
-def _laid_out(sigma: float, mean: float, precision: float) -> tuple[Floats, Floats]:
-    """Grid (g,) over the factor's logarithm where its density is, and the logarithm of that, (g,)."""
+def posterior_grid(prior: CoefficientPrior, mean: float, precision: float) -> tuple[Floats, Floats]:
+    """Grid (g,) over the factor's logarithm where its density is, and the logarithm of that, (g,).
+
+    Parameters
+    ----------
+    prior : CoefficientPrior
+    mean, precision : float
+        Of the factor, from `measured_factor`.
+    """
+    # relative to the median of the prior, the factor is normal as well
+    median = math.exp(prior.mean)
+    grid, density = _centred_grid(prior.sigma, mean / median, precision * median**2)
+    return grid + prior.mean, density
+
+
+def _centred_grid(sigma: float, mean: float, precision: float) -> tuple[Floats, Floats]:
+    """Grid and density for a prior with mean 0."""
     low, high = -_WIDTH * sigma, _WIDTH * sigma
     if precision > 0.0:
         own = precision**-0.5

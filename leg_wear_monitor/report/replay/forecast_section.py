@@ -132,4 +132,5 @@ def _first(leg: LegLife | None, joint: str) -> str:
 
 def _answer(told: JointForecast) -> str:
     measured = f"; measured {told.measurements} times" if told.measurements else ""
-    return f"{told.answer.value}{measured}"
+    prior = f"; prior from {told.prior}" if told.prior else ""
+    return f"{told.answer.value}{measured}{prior}"

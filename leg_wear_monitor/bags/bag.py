@@ -104,6 +104,22 @@ def find_files(paths: Iterable[Recordable]) -> tuple[list[BagFile], list[Finding
     return files, findings
 
 
+def is_recording_name(path: Path) -> bool:
+    """Whether a file is a recording by its name."""
+    return bool(_NAME.fullmatch(path.name) or _TABLE.fullmatch(path.name))
+
+
+def is_bag_directory(path: Path) -> bool:
+    """Whether a directory is one recording, not a collection of them.
+
+    It has metadata, or files with the names that rosbag2 gives them: it writes the metadata last.
+    """
+    names = [file.name for file in path.iterdir() if _NAME.fullmatch(file.name)]
+    return bool(names) and (
+        (path / METADATA).is_file() or all(name.startswith(f"{path.name}_") for name in names)
+    )
+
+
 def _mode(path: Path) -> int | None:
     """File mode of a path, or None if it does not exist; not opened, because a pipe would block forever."""
     try:

@@ -9,7 +9,7 @@ import numpy as np
 import pytest
 
 from leg_wear_monitor.errors import ConfigError, ConfigWarning, LegWearError
-from leg_wear_monitor.studies.execution import processes
+from leg_wear_monitor.studies.execution import run
 from leg_wear_monitor.studies.execution.run import run_study
 from leg_wear_monitor.studies.results import load_results
 from leg_wear_monitor.studies.storage import archive
@@ -36,7 +36,7 @@ def computed(sweep, tmp_path_factory):
     """A study's directory, its results made up."""
     out = tmp_path_factory.mktemp("computed")
     with pytest.MonkeyPatch.context() as patch:
-        patch.setattr(processes, "compute", result)
+        patch.setattr(run, "compute", result)
         assert run_study("size", sweep, out) == 3
     return out
 
@@ -44,7 +44,7 @@ def computed(sweep, tmp_path_factory):
 @pytest.fixture
 def study(computed, tmp_path, monkeypatch):
     """A copy of it that may be spoilt."""
-    monkeypatch.setattr(processes, "compute", result)
+    monkeypatch.setattr(run, "compute", result)
     shutil.copytree(computed, tmp_path / "study")
     return tmp_path / "study"
 

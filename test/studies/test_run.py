@@ -14,11 +14,13 @@ import numpy as np
 import pytest
 
 from leg_wear_monitor.errors import ConfigError, LegWearError
-from leg_wear_monitor.studies.execution import processes
+from leg_wear_monitor.studies.execution import run
 from leg_wear_monitor.studies.execution.run import run_study
 from leg_wear_monitor.studies.results import load_results
 from leg_wear_monitor.studies.storage.store import StudyDirectory
 from leg_wear_monitor.studies.tasks import compute as tasks
+from leg_wear_monitor.workers import processes
+from leg_wear_monitor.workers.job import Job
 
 
 def files(directory):
@@ -50,7 +52,7 @@ def test_finished_points_are_kept_and_others_computed(sweep, uninterrupted, tmp_
             raise KeyboardInterrupt
         return compute(task, mechanism, settings, code)
 
-    monkeypatch.setattr(processes, "compute", counted)
+    monkeypatch.setattr(run, "compute", counted)
     with pytest.raises(KeyboardInterrupt):
         run_study("size", sweep, tmp_path)
     assert load_results(tmp_path).missing == ["0.3 mm", "0.4 mm"]
@@ -175,8 +177,8 @@ def test_workers_that_keep_dying_end_the_study(monkeypatch):
             pass
 
     monkeypatch.setattr(loky, "ProcessPoolExecutor", Broken)
-    job = processes.Job("k", "response", None, {}, "", 1.0)
-    with pytest.raises(LegWearError, match="worker processes died 3 times; finished points are kept"):
+    job = Job("k", print, ())
+    with pytest.raises(LegWearError, match="worker processes died 3 times; finished results are kept"):
         processes.run_in_processes([job], 2, lambda *_: None)
 
 

@@ -1,1 +1,1 @@
-"""Points of a study computed in processes or on a Dask cluster."""
+"""Points of a study computed by workers, and each result stored immediately."""

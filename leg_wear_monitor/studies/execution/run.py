@@ -12,12 +12,14 @@ import attrs
 from leg_wear_monitor.errors import ConfigError, ConfigWarning
 from leg_wear_monitor.mechanism.loader import is_file_name, load_mechanism, shipped_mechanisms
 from leg_wear_monitor.share import share_directory
-from leg_wear_monitor.studies.execution.cluster import run_on_cluster
-from leg_wear_monitor.studies.execution.processes import Job, run_here, run_in_processes
 from leg_wear_monitor.studies.plan.study import Study
 from leg_wear_monitor.studies.point import Arrays, Point, code_digest
 from leg_wear_monitor.studies.storage.store import StudyDirectory
+from leg_wear_monitor.studies.tasks.compute import compute
 from leg_wear_monitor.studies.tasks.ensemble import check_points
+from leg_wear_monitor.workers.cluster import run_on_cluster
+from leg_wear_monitor.workers.job import Job
+from leg_wear_monitor.workers.processes import run_here, run_in_processes
 
 _LIBRARIES = ("numpy", "numba")
 
@@ -70,17 +72,19 @@ def run_study(
     keys = [point.key(mechanism) for point in points]
     directory = StudyDirectory(out)
     directory.open(_manifest(name, settings, points, keys, about), _text(settings.mechanism))
-    jobs = {
-        key: Job(key, point.task, mechanism, point.settings, code_digest(), point.cost)
-        for key, point in zip(keys, points, strict=True)
-    }
-    missing = [job for job in jobs.values() if not _is_kept(directory, job)]
-    report, total = progress or (lambda _fraction: None), sum(job.cost for job in jobs.values())
+    wanted = dict(zip(keys, points, strict=True))
+    missing = [
+        Job(key, compute, (point.task, mechanism, point.settings, code_digest()), point.cost)
+        for key, point in wanted.items()
+        if not _is_kept(directory, key, point)
+    ]
+    report, total = progress or (lambda _fraction: None), sum(point.cost for point in wanted.values())
     spent = total - sum(job.cost for job in missing)
 
     def done(job: Job, arrays: Arrays) -> None:
         nonlocal spent
-        directory.write(job.key, arrays, {"task": job.task, "settings": job.settings, "versions": about})
+        point = wanted[job.key]
+        directory.write(job.key, arrays, {"task": point.task, "settings": point.settings, "versions": about})
         spent += job.cost
         report(spent / total)
 
@@ -94,12 +98,12 @@ def run_study(
     return len(missing)
 
 
-def _is_kept(directory: StudyDirectory, job: Job) -> bool:
+def _is_kept(directory: StudyDirectory, key: str, point: Point) -> bool:
     """Whether the directory contains a valid result of a point; warns about an invalid one."""
-    if not directory.has(job.key):
+    if not directory.has(key):
         return False
     try:
-        directory.read(job.key, job.task, job.settings)
+        directory.read(key, point.task, point.settings)
     except ConfigError as error:
         warnings.warn(f"{error}; it is computed again", ConfigWarning, stacklevel=2)
         return False

@@ -1,16 +1,17 @@
-"""Computation of points on a Dask cluster. If a worker dies, only the points it was computing are lost."""
+"""Calls computed on a Dask cluster. If a worker dies, only the jobs in progress there are lost."""
 
 from collections.abc import Sequence
+from typing import Any
 
 from leg_wear_monitor.errors import ConfigError, LegWearError
-from leg_wear_monitor.studies.execution.processes import TRIES, Done, Job
-from leg_wear_monitor.studies.tasks.compute import compute
+from leg_wear_monitor.workers.job import Done, Job, by_cost
+from leg_wear_monitor.workers.processes import TRIES
 
 PATIENCE_S = 10.0  # timeout for the scheduler's answer
 
 
 def run_on_cluster(jobs: Sequence[Job], address: str, done: Done) -> None:
-    """Compute points on the workers of a scheduler.
+    """Run jobs on the workers of a scheduler.
 
     Parameters
     ----------
@@ -25,7 +26,7 @@ def run_on_cluster(jobs: Sequence[Job], address: str, done: Done) -> None:
     ConfigError
         If dask.distributed is not installed, or the scheduler does not answer.
     LegWearError
-        If workers die repeatedly while computing a point.
+        If workers die repeatedly during one job.
     """
     try:
         from distributed import Client, as_completed
@@ -38,15 +39,19 @@ def run_on_cluster(jobs: Sequence[Job], address: str, done: Done) -> None:
         raise ConfigError("--scheduler", address, "no scheduler answers there") from error
     with client, client.as_current():
         futures = {}
-        for job in sorted(jobs, key=lambda job: -job.cost):
-            call = (compute, job.task, job.mechanism, job.settings, job.code)
-            futures[client.submit(*call, key=f"leg-wear-{job.key}", retries=TRIES)] = job
-        for future in as_completed(list(futures)):
+
+        def submit(job: Job) -> Any:
+            future = client.submit(job.call, *job.arguments, key=f"leg-wear-{job.key}", retries=TRIES)
+            futures[future] = job
+            return future
+
+        finished = as_completed([submit(job) for job in by_cost(jobs)])
+        for future in finished:
             try:
                 result = future.result()
             except KilledWorker as error:
                 raise LegWearError(
-                    f"{address}: workers died over a point; finished points are kept"
+                    f"{address}: workers died repeatedly during one job; finished results are kept"
                 ) from error
-            done(futures.pop(future), result)
+            finished.update([submit(job) for job in done(futures.pop(future), result) or ()])
             future.release()

@@ -1,50 +1,36 @@
-"""Computation of points in local single-thread processes; if one dies, only points in progress are lost."""
+"""Calls computed in local single-thread processes; if one dies, only jobs in progress are lost."""
 
 import os
 import signal
 import threading
-from collections.abc import Callable, Iterator, Sequence
-from concurrent.futures import as_completed
+from collections.abc import Iterator, Sequence
+from concurrent.futures import FIRST_COMPLETED, wait
 from concurrent.futures.process import BrokenProcessPool
 from contextlib import contextmanager
 from multiprocessing import get_context, parent_process
-from typing import TYPE_CHECKING, Any, NamedTuple
+from typing import TYPE_CHECKING, Any
 
 from leg_wear_monitor.errors import ConfigError, LegWearError
-from leg_wear_monitor.mechanism.spec import Mechanism
-from leg_wear_monitor.studies.point import Arrays
-from leg_wear_monitor.studies.tasks.compute import compute
+from leg_wear_monitor.workers.job import Done, Job, by_cost
 
 if TYPE_CHECKING:
     from loky import ProcessPoolExecutor
 
-TRIES = 3  # attempts per point if its worker dies
+TRIES = 3  # attempts per job if its worker dies
 
 _THREADS = ("OMP_NUM_THREADS", "OPENBLAS_NUM_THREADS", "MKL_NUM_THREADS", "NUMBA_NUM_THREADS")
 
 
-class Job(NamedTuple):
-    """A point to compute: its key, the arguments of `studies.execution.tasks.compute`, and its cost."""
-
-    key: str
-    task: str
-    mechanism: Mechanism
-    settings: dict[str, Any]
-    code: str
-    cost: float
-
-
-Done = Callable[[Job, Arrays], None]
-
-
 def run_here(jobs: Sequence[Job], done: Done) -> None:
-    """Compute points one after the other in this process."""
-    for job in jobs:
-        done(job, _compute(job))
+    """Run jobs one after the other in this process."""
+    waiting = list(reversed(jobs))
+    while waiting:
+        job = waiting.pop()
+        waiting.extend(done(job, job.run()) or ())
 
 
 def run_in_processes(jobs: Sequence[Job], workers: int, done: Done) -> None:
-    """Compute points in worker processes.
+    """Run jobs in worker processes.
 
     Parameters
     ----------
@@ -60,32 +46,38 @@ def run_in_processes(jobs: Sequence[Job], workers: int, done: Done) -> None:
     LegWearError
         If workers die repeatedly.
     """
-    open_jobs = {job.key: job for job in sorted(jobs, key=lambda job: -job.cost)}
+    open_jobs = {job.key: job for job in by_cost(jobs)}
     for _ in range(TRIES):
         try:
             with _pool(workers) as pool:
-                futures = {pool.submit(_compute, job): job for job in open_jobs.values()}
-                for future in as_completed(futures):
-                    done(futures[future], future.result())
-                    del open_jobs[futures[future].key]
+                _work_off(open_jobs, pool, done)
             return
         except BrokenProcessPool:
             continue
     raise LegWearError(
-        f"worker processes died {TRIES} times; finished points are kept; "
+        f"worker processes died {TRIES} times; finished results are kept; "
         f"is there enough memory for --workers {workers}?"
     )
 
 
-def _compute(job: Job) -> Arrays:
-    return compute(job.task, job.mechanism, job.settings, job.code)
+def _work_off(open_jobs: dict[str, Job], pool: "ProcessPoolExecutor", done: Done) -> None:
+    """Run the open jobs and those that follow from them; what is finished is removed."""
+    futures = {pool.submit(job.run): job for job in open_jobs.values()}
+    while futures:
+        finished, _ = wait(futures, return_when=FIRST_COMPLETED)
+        for future in finished:
+            job = futures.pop(future)
+            more = done(job, future.result()) or ()
+            del open_jobs[job.key]
+            open_jobs |= {each.key: each for each in more}
+            futures |= {pool.submit(each.run): each for each in more}
 
 
 @contextmanager
 def _pool(workers: int) -> Iterator["ProcessPoolExecutor"]:
     """A pool of single-thread workers, which is shut down at the end of the context.
 
-    The pool is that of loky. In the pool of Python 3.11, a worker that dies while points are being submitted
+    The pool is that of loky. In the pool of Python 3.11, a worker that dies while jobs are being submitted
     ends the thread that manages the workers, or raises OSError (both were observed).
     """
     try:

@@ -1,0 +1,100 @@
+"""``leg-wear-monitor fleet``: many legs, many recordings."""
+
+from collections.abc import Sequence
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+import click
+
+from leg_wear_monitor.cli.output import check_directory
+from leg_wear_monitor.cli.waiting import compilation, progress_bar
+
+if TYPE_CHECKING:
+    from leg_wear_monitor.fleet.chain.queue import Chain
+    from leg_wear_monitor.fleet.update import FleetUpdate
+
+WITH_FINDINGS = 1
+_MOST_LINES = 20
+
+
+@click.group(short_help="Monitor many legs from their recordings.")
+def fleet() -> None:
+    """Keep the ledgers, tables and the overview of many legs."""
+
+
+@fleet.command(short_help="Count the recordings that are not counted yet.")
+@click.argument("description", type=click.Path(path_type=Path), metavar="FLEET.yaml")
+@click.option(
+    "--out", type=click.Path(path_type=Path), metavar="DIR", required=True, help="Directory of the fleet."
+)
+@click.option(
+    "--workers", type=click.IntRange(min=1), metavar="N", help="Number of local processes.  [default: cores]"
+)
+@click.option(
+    "--scheduler", metavar="ADDRESS", help="Dask scheduler whose workers count instead, tcp://HOST:PORT."
+)
+def update(description: Path, out: Path, workers: int | None, scheduler: str | None) -> int:
+    """Bring the ledger of each leg up to date with its recordings, in the order of time.
+
+    Writes ledgers, tables of the gait cycles and fleet.json. A recording counts once, whatever its name. An
+    interrupted update keeps every finished recording, and the next one goes on there. Exits with 1 if parts
+    of a recording are lost, if no gait cycle in it fits its leg, or if a leg could not be updated.
+    """
+    check_directory("--out", out)
+    done = _update(description, out, workers, scheduler)
+    for leg, text in done.findings[:_MOST_LINES]:
+        click.echo(f"warning: {leg}: {text}", err=True)
+    if len(done.findings) > _MOST_LINES:
+        click.echo(f"warning: {len(done.findings) - _MOST_LINES} more findings in {out}/legs/*/log", err=True)
+    _print_counts(done, out)
+    return WITH_FINDINGS if done.findings else 0
+
+
+def _update(description: Path, out: Path, workers: int | None, scheduler: str | None) -> "FleetUpdate":
+    import os
+
+    from leg_wear_monitor.fleet.description.loader import load_fleet
+    from leg_wear_monitor.fleet.update import update_fleet
+
+    legs = load_fleet(description)
+    with progress_bar("updating the fleet") as progress:
+        return update_fleet(
+            legs,
+            out,
+            workers=workers or os.cpu_count() or 1,
+            scheduler=scheduler,
+            begin=None if scheduler else _compile,
+            progress=progress,
+        )
+
+
+def _compile(chains: Sequence["Chain"]) -> None:
+    """Compile all that the monitors of these legs need: once, and not in every worker at the same time."""
+    from leg_wear_monitor.cli.waiting import is_compiled
+
+    if is_compiled("monitor"):
+        return
+    from leg_wear_monitor.dynamics.clearance.beforehand import advance_beside
+    from leg_wear_monitor.mechanism.loader import load_mechanism
+    from leg_wear_monitor.monitor.opening import open_monitor
+
+    with compilation("monitor", how_long="about a minute"), advance_beside():
+        config: Any = chains[0].leg.config
+        open_monitor(load_mechanism(config.mechanism), config, at_end=True).warm_up()
+
+
+def _print_counts(done: "FleetUpdate", out: Path) -> None:
+    from leg_wear_monitor.fleet.overview.read import FILE, load_overview
+
+    if done.is_up_to_date:
+        click.echo("everything is in the ledger already")
+    else:
+        click.echo(f"recordings: {done.counted} counted now")
+    overview = load_overview(out)
+    states = [f"{number} {state.replace('_', ' ')}" for state, number in overview.counts.items() if number]
+    click.echo(f"legs: {', '.join(states)}")
+    for name in overview.first:
+        verdict = overview.leg(name).verdict
+        if verdict:
+            click.echo(f"{name}: {verdict.words}")
+    click.echo(f"written: {out / FILE}")

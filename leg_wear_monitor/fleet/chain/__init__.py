@@ -1,0 +1,1 @@
+"""One leg: its recordings, in the order of time, through its ledger."""

@@ -1,0 +1,67 @@
+"""The legs of a fleet as a description names them, with their recordings and parameters."""
+
+import hashlib
+from pathlib import Path
+
+import attrs
+
+from leg_wear_monitor.monitor.config.settings import MonitorConfig
+
+
+@attrs.frozen(kw_only=True)
+class FleetLeg:
+    """One leg.
+
+    Attributes
+    ----------
+    id : str
+        Name of the leg; its directories are named after it.
+    lot : str
+        Production lot of its joints; empty if it is not known.
+    config : MonitorConfig
+        Parameters of its monitor.
+    recordings : tuple of pathlib.Path
+        Recordings, sorted by name.
+    home : pathlib.Path
+        Directory of the description.
+    row : str
+        Row of the table of cycles, ``minute`` or ``cycle``.
+    node, joint_states, drive_torque : str or None
+        As in `leg_wear_monitor.replay`.
+    """
+
+    id: str
+    lot: str
+    config: MonitorConfig
+    recordings: tuple[Path, ...]
+    home: Path
+    row: str
+    node: str | None
+    joint_states: str | None
+    drive_torque: str | None
+
+    def shown(self, recording: Path) -> str:
+        """Name of a recording in tables: relative to the description where it is below it."""
+        return str(recording.relative_to(self.home) if recording.is_relative_to(self.home) else recording)
+
+    @property
+    def settings(self) -> str:
+        """Digest of what decides whether a recording can be read and fits the leg."""
+        parts = (self.config, self.node, self.joint_states, self.drive_torque)
+        return hashlib.sha256(repr(parts).encode()).hexdigest()[:20]
+
+
+@attrs.frozen(kw_only=True)
+class FleetDescription:
+    """A fleet.
+
+    Attributes
+    ----------
+    path : pathlib.Path
+        File of the description.
+    legs : tuple of FleetLeg
+        In the order of the file.
+    """
+
+    path: Path
+    legs: tuple[FleetLeg, ...]

@@ -1,0 +1,47 @@
+"""Makes the overview of a fleet from the records of its legs."""
+
+import math
+from collections.abc import Iterable
+from contextlib import suppress
+from pathlib import Path
+
+from leg_wear_monitor.errors import ConfigError
+from leg_wear_monitor.fleet.description.fleet_description import FleetDescription
+from leg_wear_monitor.fleet.directory.atomic import write_whole
+from leg_wear_monitor.fleet.directory.leg_directory import LegDirectory
+from leg_wear_monitor.fleet.overview.leg import leg_overview
+from leg_wear_monitor.fleet.overview.parts import UNKNOWN, FleetOverview, LegOverview
+from leg_wear_monitor.fleet.overview.read import FILE, load_overview
+from leg_wear_monitor.monitor.alarms.words import ADVICE
+from leg_wear_monitor.monitor.verdict.verdict import State
+
+_FIRST = 10
+
+
+def write_overview(fleet: FleetDescription, out: Path) -> FleetOverview:
+    """Write the overview of a fleet, with what is new since the one that is there."""
+    before: dict[str, LegOverview] = {}
+    with suppress(ConfigError):  # none is there, or one of another version
+        before = {leg.id: leg for leg in load_overview(out / FILE).legs}
+    legs = [leg_overview(leg, LegDirectory(out, leg.id), before.get(leg.id)) for leg in fleet.legs]
+    overview = FleetOverview(counts=_counts(legs), first=_first(legs), legs=tuple(legs), advice=ADVICE)
+    write_whole(out / FILE, overview.to_json().encode())
+    return overview
+
+
+def _counts(legs: Iterable[LegOverview]) -> dict[str, int]:
+    states = [leg.state for leg in legs]
+    return {state: states.count(state) for state in (*(each.value for each in State), UNKNOWN)}
+
+
+def _first(legs: Iterable[LegOverview]) -> tuple[str, ...]:
+    """Legs that need a person first: by state, then by what is left of their life, then by clearance."""
+    asking = [leg for leg in legs if leg.verdict and leg.verdict.state is not State.HEALTHY]
+    return tuple(leg.id for leg in sorted(asking, key=_urgency)[:_FIRST])
+
+
+def _urgency(leg: LegOverview) -> tuple[float, float, float, str]:
+    severity = leg.verdict.state.severity if leg.verdict else 0
+    life = leg.life.get("leg")
+    used = max(leg.used_fraction.values(), default=0.0)
+    return -severity, life.p10_h if life else math.inf, -used, leg.id

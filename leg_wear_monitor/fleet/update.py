@@ -1,0 +1,183 @@
+"""Brings the ledgers of a fleet up to date with recordings that are not counted yet."""
+
+from collections.abc import Callable, Sequence
+from pathlib import Path
+from typing import Any
+
+import attrs
+
+from leg_wear_monitor.fleet.chain.queue import Chain
+from leg_wear_monitor.fleet.chain.words import words_of
+from leg_wear_monitor.fleet.description.fleet_description import FleetDescription
+from leg_wear_monitor.fleet.directory.lock import locked
+from leg_wear_monitor.fleet.overview.make import write_overview
+from leg_wear_monitor.fleet.tables.parquet import arrow
+from leg_wear_monitor.workers.cluster import run_on_cluster
+from leg_wear_monitor.workers.job import Job
+from leg_wear_monitor.workers.processes import run_here, run_in_processes
+
+Tell = Callable[[str, str], None]
+"""Called with the id of a leg and a line about it."""
+
+
+@attrs.frozen
+class FleetUpdate:
+    """What an update did.
+
+    Attributes
+    ----------
+    chains : tuple of Chain
+        The legs, in the order of the description.
+    """
+
+    chains: tuple[Chain, ...]
+
+    @property
+    def counted(self) -> int:
+        """Number of recordings that were counted."""
+        return sum(line["outcome"] == "counted" for chain in self.chains for line in chain.new)
+
+    @property
+    def is_up_to_date(self) -> bool:
+        """Whether there was nothing to do."""
+        return not any(chain.new or chain.copies or chain.refused or chain.fault for chain in self.chains)
+
+    @property
+    def findings(self) -> list[tuple[str, str]]:
+        """What a person must see: the leg, and a line about what is lost or was not done."""
+        found = []
+        for chain in self.chains:
+            bad = [line for line in chain.new if line["is_partial"] or line["outcome"] == "no_gait"]
+            found += [(chain.leg.id, words_of(line)) for line in bad]
+            found += [(chain.leg.id, text) for text in [*chain.refused, chain.fault] if text]
+        return found
+
+
+def update_fleet(
+    fleet: FleetDescription,
+    out: Path,
+    *,
+    workers: int = 1,
+    scheduler: str | None = None,
+    begin: Callable[[Sequence[Chain]], None] | None = None,
+    progress: Callable[[float], None] | None = None,
+    tell: Tell | None = None,
+) -> FleetUpdate:
+    """Count what is not counted yet: each leg in the order of time, the legs independently of each other.
+
+    Interrupted, it keeps every recording that is finished; the next update goes on there.
+
+    Parameters
+    ----------
+    fleet : FleetDescription
+    out : pathlib.Path
+        Directory of the fleet.
+    workers : int
+        Number of local processes; 1 uses this process only. Results do not depend on it.
+    scheduler : str, optional
+        Address of a Dask scheduler whose workers count instead; they need the same files at the same paths.
+    begin : callable, optional
+        Called with the legs that have work, before it begins, such as to compile.
+    progress : callable, optional
+        Called with the completed fraction of the work, 0 to 1.
+    tell : callable, optional
+        Called with the id of a leg and a line, for each recording.
+
+    Raises
+    ------
+    ConfigError
+        If another process updates this directory, or it cannot be written to.
+    LegWearError
+        If pyarrow is not installed, or workers die repeatedly.
+    """
+    arrow()
+    out = out.absolute()
+    with locked(out):
+        work = _Work([Chain(leg, out) for leg in fleet.legs], progress, tell)
+        scans = work.scans()
+        if scans or work.is_due:
+            if begin:
+                begin(work.chains)
+            _run(scans or work.first_counts(), work.done, workers, scheduler)
+        write_overview(fleet, out)
+    return FleetUpdate(tuple(work.chains))
+
+
+def _run(jobs: Sequence[Job], done: Any, workers: int, scheduler: str | None) -> None:
+    if scheduler is not None:
+        run_on_cluster(jobs, scheduler, done)
+    elif workers > 1:
+        run_in_processes(jobs, workers, done)
+    else:
+        run_here(jobs, done)
+
+
+class _Work:
+    """All legs: first unknown recordings are read, then all that is not counted yet is counted."""
+
+    def __init__(
+        self, chains: list[Chain], progress: Callable[[float], None] | None, tell: Tell | None
+    ) -> None:
+        self.chains = chains
+        self._by_leg = {chain.leg.id: chain for chain in chains}
+        self._progress, self._tell = progress or (lambda _fraction: None), tell or (lambda *_: None)
+        self._scans = 0
+        self._total = 1
+
+    @property
+    def is_due(self) -> bool:
+        """Whether anything that is known is not counted yet; after `scans`."""
+        return any(chain.waiting for chain in self.chains)
+
+    def scans(self) -> list[Job]:
+        """Jobs that read the recordings that are not known yet."""
+        jobs = [job for job in (chain.begin() for chain in self.chains) if job is not None]
+        self._scans = len(jobs)
+        if not jobs:
+            self._plan()
+        return jobs
+
+    def first_counts(self) -> list[Job]:
+        """The first recording of each leg."""
+        return [job for job in (chain.next_job() for chain in self.chains) if job is not None]
+
+    def done(self, job: Job, result: Any) -> list[Job]:
+        """Take a result; the jobs that follow from it."""
+        chain = self._by_leg[job.arguments[0].id]
+        if job.key.startswith("scan-"):
+            chain.take(result)
+            self._scans -= 1
+            if self._scans:
+                return []
+            self._plan()
+            return self.first_counts()
+        chain.done(result)
+        self._tell(chain.leg.id, result if isinstance(result, str) else words_of(result))
+        left = sum(each.waiting_bytes for each in self.chains if not each.fault)
+        self._progress(1.0 - left / self._total)
+        following = chain.next_job()
+        return [following] if following else []
+
+    def _plan(self) -> None:
+        """Queue the recordings of all legs."""
+        for chain in self.chains:
+            chain.plan()
+        _refuse_shared(self.chains)
+        for chain in self.chains:
+            for copy, original in chain.copies:
+                self._tell(chain.leg.id, f"{copy}: is a copy of {original}, counted once")
+        self._total = max(1, sum(chain.waiting_bytes for chain in self.chains))
+
+
+def _refuse_shared(chains: Sequence[Chain]) -> None:
+    """Refuse recordings whose content two legs have, unless the legs have a topic each in it."""
+    owners: dict[str, list[Chain]] = {}
+    for chain in chains:
+        for found in {each.key: each for each in chain.found}.values():
+            owners.setdefault(found.key, []).append(chain)
+    for key, sharing in owners.items():
+        topics = [chain.leg.joint_states for chain in sharing]
+        if len(sharing) > 1 and (None in topics or len(set(topics)) < len(topics)):
+            for chain in sharing:
+                others = ", ".join(other.leg.id for other in sharing if other is not chain)
+                chain.refuse(key, f"the leg {others} has a recording with the same content; not counted")

@@ -1,0 +1,1 @@
+"""Calls computed in processes of this machine or on a Dask cluster."""

@@ -154,6 +154,11 @@ class Accounting:
         self.state.pauses = self.state.pauses.with_pause(pause_s, self._twin.intake.unmonitored_s)
 
     @property
+    def replaced_ns(self) -> list[int]:
+        """When each joint's part was replaced, 0 if it never was."""
+        return [part.replaced_ns for part in self.state.parts]
+
+    @property
     def totals(self) -> dict[str, float]:
         """Counters over all runs."""
         intake, before = self._twin.intake, self._before

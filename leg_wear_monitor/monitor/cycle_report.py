@@ -9,6 +9,7 @@ from leg_wear_monitor.monitor.encoders.clearance_estimate import ClearanceEstima
 from leg_wear_monitor.monitor.forecast.forecast import Forecast, JointForecast
 from leg_wear_monitor.monitor.forecast.growth import GrowthWindow, growth_rate
 from leg_wear_monitor.monitor.forecast.model_error import ModelError
+from leg_wear_monitor.monitor.ledger.entry import Measurement
 from leg_wear_monitor.monitor.reports import CycleReport, JointReport
 from leg_wear_monitor.twin.statistics import CycleStatistics, TorqueStatistics
 
@@ -21,6 +22,7 @@ def cycle_report(
     model: ModelError,
     forecast: Forecast,
     seen: Sequence[ClearanceEstimate] | None = None,
+    measured: Sequence[Measurement | None] | None = None,
 ) -> CycleReport:
     """Report of a gait cycle.
 
@@ -37,6 +39,8 @@ def cycle_report(
         What the growth of each may be off beside its scatter.
     forecast : Forecast
     seen : sequence of ClearanceEstimate, optional
+    measured : sequence of Measurement or None, optional
+        Last measurement of each joint's part.
     """
     torque = statistics.torque
     return CycleReport(
@@ -55,6 +59,7 @@ def cycle_report(
                 model,
                 forecast.joints[k],
                 seen[k] if seen else None,
+                measured[k] if measured else None,
             )
             for k, joint in enumerate(clearance_joints)
         ),
@@ -80,10 +85,12 @@ def _mismatch(torque: TorqueStatistics) -> float:
     return float(left / torque.predicted_rms_nm) if torque.predicted_rms_nm > 0.0 else math.nan
 
 
-def with_forecast(report: CycleReport, forecast: Forecast) -> CycleReport:
-    """The same gait cycle with a newer forecast."""
-    joints = zip(report.joints, forecast.joints, strict=True)
-    renewed = tuple(attrs.evolve(joint, forecast=new) for joint, new in joints)
+def with_forecast(
+    report: CycleReport, forecast: Forecast, measured: Sequence[Measurement | None]
+) -> CycleReport:
+    """The same gait cycle with a newer forecast, and the measurements that it rests on."""
+    joints = zip(report.joints, forecast.joints, measured, strict=True)
+    renewed = tuple(attrs.evolve(joint, forecast=new, measured=by) for joint, new, by in joints)
     return attrs.evolve(report, joints=renewed, forecast=forecast.leg)
 
 
@@ -95,6 +102,7 @@ def _joint_report(
     model: ModelError,
     forecast: JointForecast,
     seen: ClearanceEstimate | None,
+    measured: Measurement | None,
 ) -> JointReport:
     rate = growth_rate(window)
     return JointReport(
@@ -106,6 +114,7 @@ def _joint_report(
         growth_error_m_per_cycle=rate.error_m(model.relative(k, rate.per_cycle_m)) if rate else None,
         forecast=forecast,
         seen=seen,
+        measured=measured,
         peak_force_n=float(statistics.peak_force_n[k]),
         p99_force_n=float(statistics.p99_force_n[k]),
         mean_force_n=float(statistics.mean_force_n[k]),

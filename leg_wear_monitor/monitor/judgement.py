@@ -16,6 +16,7 @@ from leg_wear_monitor.monitor.evaluation.gait_evidence import doubts
 from leg_wear_monitor.monitor.evaluation.torque_checks import torque_causes
 from leg_wear_monitor.monitor.evaluation.torque_record import TorqueRecord
 from leg_wear_monitor.monitor.forecast.forecaster import Forecaster
+from leg_wear_monitor.monitor.ledger.entry import Measurement
 from leg_wear_monitor.monitor.reports import CycleReport, JointReport, VerdictReport
 from leg_wear_monitor.monitor.state import MonitorState
 from leg_wear_monitor.monitor.torque_causes.explanation import TorqueExplanation
@@ -78,6 +79,7 @@ class Judge:
             self._diagnosis(),
             state.mismatch.explanation,
             self._without_zero(),
+            self._forecaster.last_measured(self._accounting.replaced_ns),
         )
         return VerdictReport(stamp_ns, dated(findings(situation), state.findings, stamp_ns))
 
@@ -113,6 +115,7 @@ def situation_of(
     diagnosis: Diagnosis | None = None,
     explained: TorqueExplanation | None = None,
     without_zero: str = "",
+    measured: Sequence[Measurement | None] = (),
 ) -> Situation:
     """What the verdict depends on, at the end of an evaluation period.
 
@@ -130,12 +133,17 @@ def situation_of(
         What explains a torque mismatch.
     without_zero : str
         Why nothing is monitored while the crank's zero is not known; empty if it is.
+    measured : sequence of Measurement or None, optional
+        Last measurement of each joint's part.
     """
     alarms, config = evaluation.board.alarms, evaluation.config
     labels = {name: joint.label for name, joint in twin.mechanism.joints.items()}
     return Situation(
         joints=tuple(
-            _joint(k, name, labels[name], float(twin.clearance_mean_m[k]), evaluation, last, diagnosis)
+            _with_measured(
+                _joint(k, name, labels[name], float(twin.clearance_mean_m[k]), evaluation, last, diagnosis),
+                measured[k] if measured else None,
+            )
             for k, name in enumerate(twin.clearance_joints)
         ),
         alarms=tuple(alarms.values()),
@@ -195,6 +203,12 @@ def _joint(
         is_used=bool(by_encoders and by_encoders.believed),
         label=label,
     )
+
+
+def _with_measured(joint: JointSituation, measured: Measurement | None) -> JointSituation:
+    if measured is None:
+        return joint
+    return attrs.evolve(joint, measured=SeenClearance("measurement", measured.clearance_m, measured.sigma_m))
 
 
 def _seen_by_encoders(report: JointReport | None) -> ClearanceEstimate | None:

@@ -20,6 +20,7 @@ from leg_wear_monitor.monitor.forecast.growth import GrowthWindow
 from leg_wear_monitor.monitor.forecast.model_error import model_error
 from leg_wear_monitor.monitor.inputs.guard import InputGuard
 from leg_wear_monitor.monitor.judgement import Judge
+from leg_wear_monitor.monitor.ledger.entry import Measurement
 from leg_wear_monitor.monitor.ledger.ledger import Ledger
 from leg_wear_monitor.monitor.state import MonitorSnapshot, MonitorState
 from leg_wear_monitor.monitor.torque_causes.explainer import TorqueExplainer
@@ -68,7 +69,7 @@ class Parts:
             self.mechanism,
             self.config.forecast,
             ledger.measurements if ledger else (),
-            [part.replaced_ns for part in self.accounting.state.parts],
+            self.accounting.replaced_ns,
         )
         self.encoders = (
             EncoderObserver(self.mechanism, self.config, ledger.commissioned if ledger else None)
@@ -124,6 +125,11 @@ class Parts:
         order, own = [kept.bodies.index(name) for name in self.mechanism.bodies], kept.reference.parameters
         parameters = attrs.evolve(own, mass=own.mass[order], length=own.length[order])
         return attrs.evolve(kept.reference, parameters=parameters)
+
+    @property
+    def measured(self) -> tuple[Measurement | None, ...]:
+        """Last measured clearance of each joint's present part."""
+        return self.forecaster.last_measured(self.accounting.replaced_ns)
 
     @property
     def diagnosis(self) -> Diagnosis:

@@ -1,12 +1,15 @@
 """Processing of the samples: gait cycles, their reports, what is observed at the ends of periods."""
 
+import math
+
 import numpy as np
 
 from leg_wear_monitor.mechanism.arrays import Floats
 from leg_wear_monitor.monitor.cycle_report import cycle_report
 from leg_wear_monitor.monitor.encoders.clearance_estimate import ClearanceEstimate
-from leg_wear_monitor.monitor.evaluation.specs import MISMATCH
+from leg_wear_monitor.monitor.evaluation.specs import CLEARANCE, MISMATCH
 from leg_wear_monitor.monitor.forecast.growth import GrowthWindow, extended
+from leg_wear_monitor.monitor.forecast.measurement import judged_clearance_m
 from leg_wear_monitor.monitor.forecast_update import update_forecast
 from leg_wear_monitor.monitor.ledger.entry import (
     Audit,
@@ -75,9 +78,24 @@ class Processing:
     def end_period(self, changes: list[AlarmList]) -> tuple[VerdictReport, ...]:
         """Evaluate what is due at the end of an evaluation period; returns changes of the verdict."""
         self._add_changes(self._evaluation.end_period(self._accounting.state.skipped), changes)
+        self._add_changes(self.evaluate_measured(), changes)
         self._observe_encoders()
         self._observe_torque()
         return self._parts.judge.changed(self._parts.state)
+
+    def evaluate_measured(self) -> tuple[AlarmList, ...]:
+        """Compare measured clearances with their limits: at once, for a measurement does not scatter."""
+        last, counted_m = self._parts.state.last, self._twin.clearance_mean_m
+        values = {}
+        for k, measured in enumerate(self._parts.measured):
+            told = last.joints[k].forecast if last else None
+            believed_m = told.clearance_m.p50 if told else math.nan
+            judged_m = judged_clearance_m(float(counted_m[k]), measured, believed_m)
+            if judged_m > counted_m[k]:  # a counted one is evaluated once a gait cycle
+                values[CLEARANCE.name(self._clearance_joints[k])] = judged_m
+        intake, cycles = self._twin.intake, self._parts.config.alarms.on_delay_cycles
+        stamp_ns = intake.followed_stamp_ns or intake.newest_stamp_ns
+        return self._evaluation.board.evaluate(values, stamp_ns, cycles) if values else ()
 
     def part_changed(self, joint: str, replaced_ns: int) -> None:
         """Discard the growth and the estimates of the former part."""
@@ -113,6 +131,7 @@ class Processing:
             self._parts.model_error,
             forecast,
             estimates,
+            self._parts.measured,
         )
         accounting.note_clearances(state.last)
         return state.last

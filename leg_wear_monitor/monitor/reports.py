@@ -8,8 +8,10 @@ from leg_wear_monitor.monitor.alarms.alarm import Alarm, Level
 from leg_wear_monitor.monitor.alarms.fault_codes import NO_FAULT
 from leg_wear_monitor.monitor.encoders.clearance_estimate import ClearanceEstimate
 from leg_wear_monitor.monitor.forecast.forecast import JointForecast, LegForecast
+from leg_wear_monitor.monitor.forecast.measurement import judged_clearance_m
 from leg_wear_monitor.monitor.inputs.guard import InputGuard
 from leg_wear_monitor.monitor.inputs.pauses import Pauses
+from leg_wear_monitor.monitor.ledger.entry import Measurement
 from leg_wear_monitor.monitor.verdict.verdict import Finding, Verdict, verdict_of
 from leg_wear_monitor.twin.statistics import Intake, SampleStatistics
 
@@ -38,6 +40,8 @@ class JointReport:
         Renewed once a minute, and when more is known.
     seen : ClearanceEstimate or None
         The clearance estimated from further encoders; None without encoders.
+    measured : Measurement or None
+        The last clearance of this part that somebody measured.
     """
 
     joint: str
@@ -52,6 +56,13 @@ class JointReport:
     impacts: int
     forecast: JointForecast | None = None
     seen: ClearanceEstimate | None = None
+    measured: Measurement | None = None
+
+    @property
+    def judged_clearance_m(self) -> float:
+        """Clearance that is compared with the limit: the counted one, or a larger one by measurement."""
+        believed_m = self.forecast.clearance_m.p50 if self.forecast else math.nan
+        return judged_clearance_m(self.clearance_m, self.measured, believed_m)
 
 
 @attrs.frozen(kw_only=True)

@@ -27,11 +27,12 @@ from leg_wear_monitor.monitor.evaluation.evaluation import AlarmEvaluation
 from leg_wear_monitor.monitor.evaluation.torque_record import TorqueRecord
 from leg_wear_monitor.monitor.forecast.words import UNKNOWN, lifetime_values
 from leg_wear_monitor.monitor.inputs.health import InputHealth
+from leg_wear_monitor.monitor.ledger.entry import Measurement
 from leg_wear_monitor.monitor.reports import CycleReport, Status
 from leg_wear_monitor.monitor.torque_causes.explanation import TorqueExplanation
 from leg_wear_monitor.monitor.torque_status import diagnosis_status, torque_status
 from leg_wear_monitor.monitor.verdict.verdict import Verdict
-from leg_wear_monitor.monitor.verdict.words import with_unit
+from leg_wear_monitor.monitor.verdict.words import amount, estimate, with_unit
 from leg_wear_monitor.monitor.zero_status import zero_status
 from leg_wear_monitor.twin.digital_twin import DigitalTwin
 from leg_wear_monitor.twin.statistics import Event, Tracking
@@ -51,9 +52,11 @@ def statuses(
     encoders: EncoderObserver | None = None,
     explained: TorqueExplanation | None = None,
     crank_zero: CrankZero | None = None,
+    measured: Sequence[Measurement | None] = (),
 ) -> tuple[Status, ...]:
     """All statuses, verdict first, then gait, inputs, joints, alarms and ledger."""
     joints = [_joint(k, name, twin, evaluation, last) for k, name in enumerate(twin.clearance_joints)]
+    joints = [_with_measured(*each) for each in zip(joints, measured or (None,) * len(joints), strict=True)]
     return (
         verdict_status(verdict),
         _gait(twin, evaluation, accounting, last, happened, crank_zero.cause if crank_zero else ""),
@@ -164,6 +167,18 @@ def _joint(
         return Status(f"joint {name}", level, "no forecast yet", values, code)
     values |= UNKNOWN | lifetime_values(report.forecast)
     return Status(f"joint {name}", level, report.forecast.answer.value, values, code)
+
+
+def _with_measured(joint: Status, measured: Measurement | None) -> Status:
+    """A joint's status with its measured clearance beside the counted one."""
+    if measured is None:
+        return joint
+    words = f"{estimate(measured.clearance_m, measured.sigma_m, 'm')} was measured"
+    if not measured.counts:
+        words += " (contradicts the model, not in the forecast)"
+    words += f", {amount(joint.values['clearance_m'], 'm')} is counted"
+    values = {"measured_clearance_m": measured.clearance_m, "measured_sigma_m": measured.sigma_m}
+    return attrs.evolve(joint, message=f"{joint.message}; {words}", values=joint.values | values)
 
 
 def _encoders(encoders: EncoderObserver, evaluation: AlarmEvaluation, last: CycleReport | None) -> Status:

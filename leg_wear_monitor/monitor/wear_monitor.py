@@ -180,6 +180,11 @@ class WearMonitor:
         return self._forecaster.measurements
 
     @property
+    def last_cycle(self) -> CycleReport | None:
+        """Report of the last gait cycle; None before the first."""
+        return self._parts.state.last
+
+    @property
     def wear_depth_m(self) -> Floats:
         """Wear depth (clearance joints, 2, sectors) of bushings and journals [m]; a copy."""
         return self._twin.depth
@@ -223,6 +228,7 @@ class WearMonitor:
             self._encoders,
             state.mismatch.explanation,
             self._parts.crank_zero,
+            self._parts.measured,
         )
 
     def snapshot(self) -> MonitorSnapshot:
@@ -301,7 +307,9 @@ class WearMonitor:
     def measure(
         self, joint: str, clearance_m: float, sigma_m: float, stamp_ns: int, who: str, accept: bool = False
     ) -> MeasurementResult:
-        """Add a measured clearance to the ledger and update the forecast with it.
+        """Add a measured clearance to the ledger; forecast, alarms and verdict follow at once.
+
+        The counted clearance stays as it is.
 
         Parameters
         ----------
@@ -332,6 +340,10 @@ class WearMonitor:
         self._accounting.note(found.measurement)
         if self._encoders:
             self._encoders.state.updated_ns = 0  # the next estimate updates the forecast again
+        self.renew_forecast()
+        for change in self._processing.evaluate_measured():
+            self._accounting.note_alarms(change)
+        self._parts.judge.changed(self._parts.state)
         self._parts.keep()
         return found
 
@@ -349,12 +361,10 @@ class WearMonitor:
         fresh = [self.mechanism.clearances[joint].radial_clearance for joint in self.clearance_joints]
         worn_m = np.asarray(self._twin.clearance_mean_m - fresh)
         limits = self._evaluation.board.clearance_limits_m
-        self._parts.state.last = with_forecast(
-            last,
-            self._forecaster.renewed(
-                worn_m, limits, self._parts.judge.is_forecast_valid(self.verdict.findings)
-            ),
+        forecast = self._forecaster.renewed(
+            worn_m, limits, self._parts.judge.is_forecast_valid(self.verdict.findings)
         )
+        self._parts.state.last = with_forecast(last, forecast, self._parts.measured)
         return self._parts.state.last
 
     def save(self) -> None:

@@ -47,6 +47,8 @@ def clearances(result: "ReplayResult") -> dict[str, JointClearance]:
             seen_by=(by,) if by else (),
             new_m=monitor.mechanism.clearances[joint.joint].radial_clearance,
             limit_m=limits[joint.joint],
+            measured_m=joint.measured.clearance_m if joint.measured else None,
+            measured_sigma_m=joint.measured.sigma_m if joint.measured else None,
         )
     return found
 

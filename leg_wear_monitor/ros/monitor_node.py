@@ -33,6 +33,7 @@ from leg_wear_monitor.ros.health.node_health import Load, load_status, recording
 from leg_wear_monitor.ros.health.supervision import Supervision
 from leg_wear_monitor.ros.inputs.inbox import Inbox
 from leg_wear_monitor.ros.inputs.inputs import InputTopic, subscribe
+from leg_wear_monitor.ros.measure_service import MeasureRequest, measured, offer_measure
 from leg_wear_monitor.ros.outputs.black_box import BlackBox
 from leg_wear_monitor.ros.outputs.markers import MarkerTopic
 from leg_wear_monitor.ros.outputs.outlets import Outlets
@@ -210,6 +211,7 @@ class MonitorNode(ClosingNode):
         for joint in self._monitor.clearance_joints:
             self._offer(f"~/reset_wear/{joint}", partial(self._reset_wear, joint))
             self._offer(f"~/undo_reset/{joint}", partial(self._undo_reset, joint))
+        offer_measure(self, self._measure)
 
     def _offer(self, name: str, act: Callable[[], str]) -> None:
         """Create a service that performs an action and returns its result or error in one line."""
@@ -234,6 +236,13 @@ class MonitorNode(ClosingNode):
     def _save(self) -> str:
         self._monitor.save()
         return f"saved in {self._monitor.config.ledger.path}"
+
+    def _measure(self, wanted: MeasureRequest) -> str:
+        text = measured(self._monitor, wanted, audit_time(self._ros_now_ns()))
+        self._send_state()
+        if last := self._monitor.last_cycle:
+            self._outlets.send(outputs.FORECAST, time.time_ns(), self._messages.forecast(last))
+        return text
 
     def _reset_wear(self, joint: str) -> str:
         stamp_ns = audit_time(self._ros_now_ns())

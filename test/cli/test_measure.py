@@ -35,10 +35,11 @@ def rows(path):
 def test_a_measurement_is_kept_and_explained(run, ledger):
     result = run("measure", "A", "0.42", "--sigma", "0.005", "--ledger", str(ledger))
     assert (result.exit_code, result.stderr) == (0, "")
-    first, second, third = result.stdout.splitlines()
+    first, second, third, fourth = result.stdout.splitlines()
     assert first == "A: 0.42 mm ± 0.005 mm, 4000 gait cycles after the part was new"
-    assert second.startswith("the wear coefficient is 1.9")
-    assert third.startswith("1 of 1 measured clearances were between expected p10 and p90")
+    assert second == "0.36 mm is counted (limit 0.6 mm); that stays as it is"
+    assert third.startswith("the wear coefficient is 1.9")
+    assert fourth.startswith("1 of 1 measured clearances were between expected p10 and p90")
     assert rows(ledger) == [("A", pytest.approx(4.2e-4), pytest.approx(6e-5), 4000, 1)]
 
 
@@ -46,6 +47,7 @@ def test_a_contradiction_ends_with_findings_and_leaves_wear_as_it_is(run, ledger
     result = run("measure", "G", "1.2", "--sigma", "0.005", "--ledger", str(ledger))
     assert result.exit_code == 1
     assert "contradicts the model" in result.stdout
+    assert "the measured clearance is at its limit: stop the leg when it is safe" in result.stdout
     assert [row[-1] for row in rows(ledger)] == [0]
     assert run("measure", "G", "1.2", "--sigma", "0.005", "--ledger", str(ledger), "--accept").exit_code == 1
     assert [row[-1] for row in rows(ledger)] == [0, 1]
@@ -79,6 +81,17 @@ def test_what_cannot_be_is_refused_in_one_line(run, ledger, arguments, fault):
     assert len(result.stderr.splitlines()) == 1
     assert fault in result.stderr
     assert rows(ledger) == []
+
+
+def test_what_is_near_the_limit_or_at_it_is_said_and_at_it_the_caller_has_to_act(run, ledger, tmp_path):
+    (tmp_path / "mine.yaml").write_text("/**: {ros__parameters: {limits.clearance_m: 0.00045}}")
+    arguments = ("--sigma", "0.005", "--ledger", str(ledger), "--config", "mine.yaml")
+    near = run("measure", "A", "0.42", *arguments)
+    assert near.exit_code == 0
+    assert "above 80 % of its limit: the alarm clearance A is raised" in near.stdout
+    at = run("measure", "B", "0.451", *arguments)
+    assert "contradicts" not in at.stdout
+    assert (at.exit_code, "at its limit" in at.stdout) == (1, True)
 
 
 def test_a_dry_run_says_the_same_and_leaves_the_ledger_as_it_is(run, ledger):
@@ -122,8 +135,8 @@ def test_a_withdrawn_measurement_is_kept_and_teaches_nothing(run, ledger):
     assert listed[1].endswith(", counts")
     # the next one is judged as the first was
     again = run("measure", "A", "0.42", "--sigma", "0.005", *kept)
-    assert again.stdout.splitlines()[:2] == first.stdout.splitlines()[:2]
-    assert again.stdout.splitlines()[2].startswith("1 of 2 measured clearances")
+    assert again.stdout.splitlines()[:3] == first.stdout.splitlines()[:3]
+    assert again.stdout.splitlines()[3].startswith("1 of 2 measured clearances")
     assert run("measure", "--withdraw", "3", *kept).exit_code == 0
 
 
@@ -145,6 +158,7 @@ def test_a_withdrawal_can_be_tried(run, ledger):
         (("A", "0.4", "--withdraw", "1"), "cannot be combined"),
         (("A", "0.4"), "expected JOINT MM --sigma MM, or --list, or --withdraw"),
         ((), "expected JOINT MM --sigma MM, or --list, or --withdraw"),
+        (("A", "0.4", "--sigma", "0.01", "--node", "/leg_wear_monitor"), "--node cannot be combined with"),
     ],
 )
 def test_what_cannot_be_withdrawn_is_one_line(run, ledger, arguments, fault):

@@ -3,19 +3,17 @@
 import getpass
 import time
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 import click
 
 from leg_wear_monitor.cli.measurements import LAST, leg_of, list_measurements, opened, withdraw
+from leg_wear_monitor.cli.node import need_rclpy
 from leg_wear_monitor.cli.number import bounded
 from leg_wear_monitor.configuration.nearest import did_you_mean
 from leg_wear_monitor.errors import ConfigError
 
-if TYPE_CHECKING:
-    from leg_wear_monitor.monitor.forecast.measurement import MeasurementResult
-
-CONTRADICTS = 1
+WITH_FINDINGS = 1
 
 
 @click.command(short_help="Enter a measured clearance, which updates the forecast.")
@@ -42,6 +40,20 @@ CONTRADICTS = 1
 )
 @click.option("--accept", is_flag=True, help="Use it even if it contradicts the model.")
 @click.option("--dry-run", is_flag=True, help="Print the result and write nothing.")
+@click.option(
+    "--node",
+    metavar="NAME",
+    help="Full name of a running monitor to enter it into, such as /left/leg_wear_monitor.",
+)
+@click.option(
+    "--wait",
+    "wait_s",
+    type=click.FloatRange(min=0.0, min_open=True),
+    default=10.0,
+    show_default=True,
+    metavar="S",
+    help="With --node: longest wait for the monitor, and again for its answer.",
+)
 @click.option("--list", "listed", is_flag=True, help="Print the ledger's measurements with their numbers.")
 @click.option(
     "--withdraw",
@@ -56,14 +68,18 @@ def measure(
     sigma: float | None,
     listed: bool,
     withdrawn: str | None,
+    node: str | None,
+    wait_s: float,
     **options: Any,
 ) -> int:
     """Enter the measured mean radial clearance of JOINT, in millimetres.
 
     Measure with a feeler gauge, a micrometer or a dial. A dial shows twice the radial clearance if the pin is
-    moved to and fro. Stop the monitor of this leg first. Exit code 1 if the measurement contradicts the
-    model.
+    moved to and fro. A running monitor locks its ledger: name it with --node, or stop it first. The counted
+    clearance stays as it is. Exit code 1 if the measurement contradicts the model or is at its limit.
     """
+    if node is not None:
+        _check_alone(listed, withdrawn, **options)
     if (listed or withdrawn) and (mm is not None or sigma is not None or (listed and withdrawn)):
         raise click.UsageError("--list and --withdraw cannot be combined, nor used with MM or --sigma")
     if listed:
@@ -75,15 +91,36 @@ def measure(
         return 0
     if joint is None or mm is None or sigma is None:
         raise click.UsageError("expected JOINT MM --sigma MM, or --list, or --withdraw")
-    found, record = _measured(joint, 1.0e-3 * mm, 1.0e-3 * sigma, **options)
-    click.echo(
-        f"{joint}: {mm:g} mm ± {sigma:g} mm, {found.measurement.cycles} gait cycles after the part was new"
-    )
-    for line in (*found.words, record):
+    size = joint, 1.0e-3 * mm, 1.0e-3 * sigma
+    if node is not None:
+        return _on_node(node, *size, accept=options["accept"], wait_s=wait_s)
+    lines, has_findings = _measured(*size, **options)
+    for line in lines:
         click.echo(line)
     if options["dry_run"]:
         click.echo("dry run: nothing was written")
-    return CONTRADICTS if found.contradicts else 0
+    return WITH_FINDINGS if has_findings else 0
+
+
+def _check_alone(
+    listed: bool, withdrawn: str | None, config: Path | None, ledger: Path | None, dry_run: bool, accept: bool
+) -> None:
+    """A running monitor has its own parameters and ledger."""
+    if listed or withdrawn or config or ledger or dry_run:
+        raise click.UsageError(
+            "--node cannot be combined with --config, --ledger, --dry-run, --list or --withdraw"
+        )
+
+
+def _on_node(node: str, joint: str, clearance_m: float, sigma_m: float, accept: bool, wait_s: float) -> int:
+    """Enter it into a running monitor, which says the same as the verb does with a ledger."""
+    need_rclpy()
+    from leg_wear_monitor.monitor.forecast.measurement import asks_to_act
+    from leg_wear_monitor.ros.measure_client import measure_on
+
+    told = measure_on(node, joint, clearance_m, sigma_m, accept, wait_s)
+    click.echo(told)
+    return WITH_FINDINGS if asks_to_act(told) else 0
 
 
 def _measured(
@@ -94,17 +131,19 @@ def _measured(
     ledger: Path | None,
     accept: bool,
     dry_run: bool,
-) -> tuple["MeasurementResult", str]:
-    """What a measurement says, and what all of the ledger's together do."""
+) -> tuple[tuple[str, ...], bool]:
+    """What came of a measurement, a line each, and whether the caller has to act."""
+    from leg_wear_monitor.monitor.evaluation.board import AlarmBoard
     from leg_wear_monitor.monitor.forecast.coefficient_prior import prior_source
     from leg_wear_monitor.monitor.forecast.measurement import measure as evaluate
-    from leg_wear_monitor.monitor.forecast.validity import validity
     from leg_wear_monitor.monitor.ledger.entry import new_part
 
     settings, leg = leg_of(config, ledger)
     if joint not in leg.clearance_joints:
         fault = f"{joint!r} is not a clearance joint, expected one of {', '.join(leg.clearance_joints)}"
         raise ConfigError("JOINT", "", fault + did_you_mean(joint, leg.clearance_joints))
+    limits_m = AlarmBoard(settings, leg.clearance_joints).clearance_limits_m
+    limit_m = limits_m[leg.clearance_joints.index(joint)]
     with opened(leg, settings, dry_run) as kept:
         parts = {wear.name: wear for wear in kept.entry.joints} if kept.entry else {}
         part = parts.get(joint) or new_part(joint)
@@ -123,4 +162,5 @@ def _measured(
         )
         kept.note(found.measurement)
         kept.record()
-    return found, validity([*kept.measurements, found.measurement]).words
+    told = found.told(limit_m, settings.limits.warn_fraction, kept.measurements)
+    return told, found.has_findings(limit_m)

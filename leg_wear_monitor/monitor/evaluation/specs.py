@@ -123,9 +123,9 @@ CLEARANCE: "AlarmSpec[JointReport]" = AlarmSpec(
     kind="clearance",
     unit="m",
     quantity="mean radial clearance",
-    meaning="mean radial clearance, m",
+    meaning="mean radial clearance, counted or, if it is larger, by measurement, m",
     limit_words="`limits.clearance_m`, `limits.joint_clearance_m`",
-    value=lambda joint: joint.clearance_m,
+    value=lambda joint: joint.judged_clearance_m,
     limit=lambda of: of.by_joint(of.config.limits.joint_clearance_m, of.config.limits.clearance_m),
 )
 GROWTH: "AlarmSpec[JointReport]" = AlarmSpec(

@@ -15,6 +15,7 @@ from leg_wear_monitor.monitor.forecast.life_file import law_of
 from leg_wear_monitor.monitor.forecast.measurement import (
     CONTRADICTS,
     MeasurementResult,
+    last_measured,
     measure,
     observations_of,
 )
@@ -137,6 +138,11 @@ class Forecaster:
     def measurements(self) -> tuple[Measurement, ...]:
         """Of the ledger, and since."""
         return tuple(self._measurements)
+
+    def last_measured(self, replaced_ns: Sequence[int]) -> tuple[Measurement | None, ...]:
+        """Last measurement of each joint's present part, None without one."""
+        parts = zip(self._clearance_joints, replaced_ns, strict=True)
+        return tuple(last_measured(self._measurements, joint, when) for joint, when in parts)
 
     def replaced(self, joint: str, replaced_ns: int) -> None:
         """Reset the estimate of a joint whose part changed to the measurements of this part."""

@@ -1,5 +1,6 @@
 """A measured clearance: what it says of the joint, in figures and in words."""
 
+import math
 from collections.abc import Sequence
 
 import attrs
@@ -10,6 +11,7 @@ from leg_wear_monitor.mechanism.clearance import Clearance
 from leg_wear_monitor.mechanism.clearance_range import measured_fault, sigma_fault
 from leg_wear_monitor.monitor.config.forecast import Forecasting
 from leg_wear_monitor.monitor.forecast.coefficient_prior import CoefficientPrior
+from leg_wear_monitor.monitor.forecast.validity import validity
 from leg_wear_monitor.monitor.forecast.wear_coefficients import (
     CoefficientEstimate,
     MeasuredClearance,
@@ -18,6 +20,9 @@ from leg_wear_monitor.monitor.forecast.wear_coefficients import (
 from leg_wear_monitor.monitor.ledger.entry import JointWear, Measurement
 
 CONTRADICTS = 0.00135  # probability of a tail: three standard deviations of a normal one
+
+CONTRADICTION = "this contradicts the model"
+AT_LIMIT = "the measured clearance is at its limit"
 
 _SAYS_SOMETHING = 0.9  # of the spread before: what is left after a measurement that says something
 
@@ -34,6 +39,8 @@ class MeasurementResult:
         Of the joint's wear coefficient.
     contradicts : bool
         Whether the model holds it next to impossible.
+    counted_m : float
+        Clearance that the twin had counted for this part.
     words : tuple of str
         For people, a line each.
     """
@@ -42,7 +49,68 @@ class MeasurementResult:
     before: CoefficientEstimate
     after: CoefficientEstimate
     contradicts: bool
+    counted_m: float
     words: tuple[str, ...]
+
+    def told(self, limit_m: float, warn_fraction: float, earlier: Sequence[Measurement]) -> tuple[str, ...]:
+        """The measurement and what came of it, for people, a line each.
+
+        Parameters
+        ----------
+        limit_m : float
+            Of the joint's clearance.
+        warn_fraction : float
+            Of the limit, where its alarm begins.
+        earlier : sequence of Measurement
+            All of the ledger, without this one.
+        """
+        now = self.measurement
+        size = f"{_mm(now.clearance_m)} ± {_mm(now.sigma_m)}"
+        lines = [f"{now.joint}: {size}, {now.cycles} gait cycles after the part was new"]
+        lines.append(f"{_mm(self.counted_m)} is counted (limit {_mm(limit_m)}); that stays as it is")
+        if now.clearance_m >= limit_m:
+            lines.append(
+                f"{AT_LIMIT}: stop the leg when it is safe; the alarm clearance {now.joint} is raised"
+            )
+        elif now.clearance_m >= warn_fraction * limit_m:
+            part = f"{100.0 * warn_fraction:g} % of its limit"
+            lines.append(f"the measured clearance is above {part}: the alarm clearance {now.joint} is raised")
+        return (*lines, *self.words, validity([*earlier, now]).words)
+
+    def has_findings(self, limit_m: float) -> bool:
+        """Whether the caller has to act: the measurement contradicts the model, or is at the limit."""
+        return self.contradicts or self.measurement.clearance_m >= limit_m
+
+
+def asks_to_act(told: str) -> bool:
+    """Whether `MeasurementResult.told` contains a finding, for a program that has the text alone."""
+    return AT_LIMIT in told or CONTRADICTION in told
+
+
+def last_measured(measurements: Sequence[Measurement], joint: str, replaced_ns: int) -> Measurement | None:
+    """The last measurement of a joint's present part, even if the model contradicts it; None without one."""
+    own = [
+        m for m in measurements if m.joint == joint and m.replaced_ns == replaced_ns and not m.is_withdrawn
+    ]
+    return own[-1] if own else None
+
+
+def judged_clearance_m(counted_m: float, measured: Measurement | None, believed_m: float = math.nan) -> float:
+    """Clearance that is compared with the limit: the counted one, or a larger one by measurement.
+
+    Parameters
+    ----------
+    counted_m : float
+    measured : Measurement or None
+        The last one of the part. A measurement that does not count for the forecast is still what somebody
+        found on the leg.
+    believed_m : float
+        Median of what counting and measurements together give; NaN if it is not known.
+    """
+    if measured is None:
+        return counted_m
+    believed = [believed_m] if measured.counts and not math.isnan(believed_m) else []
+    return max(counted_m, measured.clearance_m, *believed)
 
 
 def observations_of(
@@ -127,7 +195,18 @@ def measure(
     words = _clock(stamp_ns, kept_ns)
     if contradicts:
         words += _contradiction(accept, below, wear.name)
-    return MeasurementResult(measurement, before, after, contradicts, (*words, _change(before, after)))
+    return MeasurementResult(
+        measurement=measurement,
+        before=before,
+        after=after,
+        contradicts=contradicts,
+        counted_m=fresh_m + observation.wear_m,
+        words=(*words, _change(before, after)),
+    )
+
+
+def _mm(value_m: float) -> str:
+    return f"{1.0e3 * value_m:.4g} mm"
 
 
 def _clock(stamp_ns: int, kept_ns: int) -> list[str]:
@@ -143,7 +222,7 @@ def _contradiction(accept: bool, below: float, joint: str) -> list[str]:
     more = "larger" if below > 0.5 else "smaller"
     done = "it counts, as requested" if accept else "it is kept in the ledger, but does not count"
     return [
-        f"this contradicts the model: the clearance of {joint} is far {more} than possible; {done}",
+        f"{CONTRADICTION}: the clearance of {joint} is far {more} than possible; {done}",
         "measure again; if the part was replaced, reset its wear first; if load or clearance when new are "
         "other than configured, correct that; if the measurement is correct, use --accept",
     ]

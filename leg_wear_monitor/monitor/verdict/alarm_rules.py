@@ -6,9 +6,9 @@ from collections.abc import Callable, Sequence
 from leg_wear_monitor.monitor.alarms.alarm import Alarm, Level
 from leg_wear_monitor.monitor.alarms.words import time_words
 from leg_wear_monitor.monitor.verdict.rule import Hit
-from leg_wear_monitor.monitor.verdict.situation import Situation
+from leg_wear_monitor.monitor.verdict.situation import JointSituation, Situation
 from leg_wear_monitor.monitor.verdict.verdict import Evidence
-from leg_wear_monitor.monitor.verdict.words import amount
+from leg_wear_monitor.monitor.verdict.words import amount, estimate
 
 Condition = Callable[[Situation], Sequence[Hit]]
 
@@ -52,10 +52,29 @@ def hit_of(alarm: Alarm, situation: Situation, **words: str) -> Hit:
         "value": amount(value, alarm.unit),
         "limit": amount(alarm.limit, alarm.unit),
         "past": "" if is_present else f" (since {time_words(alarm.raised_ns)}; now within its limit)",
+        "known": "counted",
     }
+    evidence: tuple[Evidence, ...] = ()
+    each = _measured(alarm, value, situation)
+    if each is not None and each.measured is not None:
+        told["known"] = "measured" if value <= each.measured.clearance_m else "estimated"
+        told["past"] += (
+            f"; {estimate(each.measured.clearance_m, each.measured.sigma_m, 'm')} was measured, "
+            f"{amount(each.counted_m, 'm')} is counted"
+        )
+        evidence = (
+            Evidence(f"measured clearance {each.joint}", each.measured.clearance_m, each.limit_m, "m"),
+            Evidence(f"counted clearance {each.joint}", each.counted_m, each.limit_m, "m"),
+        )
     return Hit(
         words=told | words,
         joint=alarm.subject if is_of_a_joint else "",
         since_ns=alarm.raised_ns,
-        evidence=(Evidence(alarm.name, value, alarm.limit, alarm.unit),),
+        evidence=(Evidence(alarm.name, value, alarm.limit, alarm.unit), *evidence),
     )
+
+
+def _measured(alarm: Alarm, value: float, situation: Situation) -> JointSituation | None:
+    """The joint of an alarm of the clearance, if its value is known by measurement and not by counting."""
+    own = (each for each in situation.joints if alarm.kind == "clearance" and each.joint == alarm.subject)
+    return next((each for each in own if each.measured is not None and value > each.counted_m), None)

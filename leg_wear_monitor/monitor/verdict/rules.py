@@ -44,7 +44,7 @@ RULES = (
         code="CLEARANCE",
         state=State.STOP,
         hits=raised("clearance", least=Level.ERROR),
-        why="the counted clearance of joint {joint} is {value} (limit {limit}){past}",
+        why="the {known} clearance of joint {joint} is {value} (limit {limit}){past}",
         do=_REPLACE,
     ),
     Rule(

@@ -18,7 +18,7 @@ class SeenClearance:
     Attributes
     ----------
     by : str
-        ``encoders`` or ``torque``.
+        ``encoders``, ``torque``, or ``measurement`` for what a person measured.
     clearance_m, sigma_m : float
     """
 
@@ -40,6 +40,8 @@ class JointSituation:
         Counted mean radial clearance, and its limit.
     believed_m : float
         Median of what the forecast believes of the clearance; NaN before the first forecast.
+    measured : SeenClearance or None
+        What a person measured last on the present part.
     seen : tuple of SeenClearance
         Estimates from measurements, as far as there are any.
     is_used : bool
@@ -50,6 +52,7 @@ class JointSituation:
     counted_m: float
     limit_m: float
     believed_m: float = math.nan
+    measured: SeenClearance | None = None
     seen: tuple[SeenClearance, ...] = ()
     is_used: bool = False
     label: str = ""

@@ -23,6 +23,10 @@ class JointClearance:
         Clearance when new.
     limit_m : float
         Limit of the clearance.
+    measured_m : float or None
+        Clearance that somebody measured last on this part.
+    measured_sigma_m : float or None
+        Its standard deviation.
     """
 
     counted_m: float
@@ -31,6 +35,8 @@ class JointClearance:
     seen_by: tuple[str, ...] = ()
     new_m: float
     limit_m: float
+    measured_m: float | None = None
+    measured_sigma_m: float | None = None
 
 
 @attrs.frozen(kw_only=True)

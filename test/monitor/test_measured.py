@@ -1,0 +1,98 @@
+"""A measured clearance beside the counted one: status, alarm and verdict, in a run and the next."""
+
+import pytest
+
+from leg_wear_monitor import WearMonitor, open_ledger
+from leg_wear_monitor.monitor.alarms.alarm import Level
+from leg_wear_monitor.monitor.config.parameters import config_from
+from leg_wear_monitor.monitor.ledger.entry import Measurement
+
+START_NS = 1_700_000_000_123_456_789
+LIMIT_M = 6.0e-4
+
+
+@pytest.fixture
+def begin(leg, tmp_path):
+    """Begin a run of a monitor on the ledger of this test."""
+    values = {
+        "ledger.path": str(tmp_path / "wear.ledger"),
+        "clearance_joints": ["A", "G"],
+        "diagnosis.enabled": False,
+        "limits.clearance_m": LIMIT_M,
+    }
+    config = config_from(values)
+    return lambda: WearMonitor(leg, config, open_ledger(leg, config))
+
+
+def status(monitor, joint):
+    return next(one for one in monitor.status() if one.name == f"joint {joint}")
+
+
+def test_a_measured_clearance_stands_beside_the_counted_one_and_raises_its_alarm(begin, gait) -> None:
+    monitor = begin()
+    monitor.update(gait(2.5))
+    assert status(monitor, "G").level is Level.OK
+    counted_m = status(monitor, "G").values["clearance_m"]
+    found = monitor.measure("G", 5.8e-4, 5e-6, START_NS, "ann", accept=True)
+    assert found.measurement.counts
+    told = status(monitor, "G")
+    assert (told.level, told.fault_code) == (Level.WARN, "CLEARANCE_G")
+    assert "0.58 mm ± 0.005 mm was measured, 0.3 mm is counted" in told.message
+    assert told.values["clearance_m"] == counted_m
+    assert told.values["measured_clearance_m"] == 5.8e-4
+    assert status(monitor, "A").level is Level.OK
+    monitor.measure("G", 6.1e-4, 5e-6, START_NS, "ann", accept=True)
+    assert status(monitor, "G").level is Level.ERROR
+    verdict = monitor.verdict.verdict
+    assert (verdict.state.value, verdict.fault_code) == ("stop", "CLEARANCE_G")
+    assert verdict.why.startswith("the ")
+    assert "0.61 mm ± 0.005 mm was measured, 0.3 mm is counted" in verdict.why
+    evidence = {each.name: each.value for each in verdict.evidence}
+    assert evidence["measured clearance G"] == 6.1e-4
+    assert evidence["counted clearance G"] == pytest.approx(counted_m, rel=1e-3)
+    monitor.close()
+
+
+def test_what_contradicts_the_model_raises_the_alarm_too_and_a_new_part_ends_it(begin, gait) -> None:
+    monitor = begin()
+    monitor.update(gait(2.5))
+    found = monitor.measure("G", 1.2e-3, 5e-6, START_NS, "ann")
+    assert found.contradicts and not found.measurement.counts
+    assert status(monitor, "G").level is Level.ERROR
+    assert "contradicts the model, not in the forecast" in status(monitor, "G").message
+    assert monitor.verdict.verdict.why.startswith("the measured clearance of joint G (knee) is 1.2 mm")
+    monitor.reset_wear("G", START_NS + 1, "ann")
+    monitor.update(gait(3.0, begin_s=2.5))
+    assert "measured" not in status(monitor, "G").message
+    monitor.acknowledge(START_NS + 2)
+    assert status(monitor, "G").level is Level.OK
+    monitor.close()
+
+
+def test_what_was_measured_between_two_runs_is_judged_with_the_first_samples(begin, gait) -> None:
+    first = begin()
+    first.update(gait(2.5))
+    first.close()
+    config = first.config
+    kept = open_ledger(first.mechanism, config)
+    (part,) = (one for one in kept.entry.joints if one.name == "G")
+    wear_m = float(part.depth.sum(axis=0).mean())
+    kept.note(Measurement(START_NS, "G", "ann", 7e-4, 5e-6, wear_m, part.cycles, 0, 0.9, True))
+    kept.record()
+    kept.close()
+    again = begin()
+    assert "was measured" in status(again, "G").message
+    reports = again.update(gait(1.0, begin_s=2.5))
+    raised = [alarm.name for alarms in reports.alarms for alarm in alarms.alarms if alarm.level]
+    assert "clearance G" in raised
+    assert status(again, "G").level is Level.ERROR
+    again.close()
+    kept = open_ledger(first.mechanism, config)
+    kept.withdraw(1, START_NS, "ann")
+    kept.record()
+    kept.close()
+    third = begin()
+    third.update(gait(3.0, begin_s=3.5))
+    third.acknowledge(START_NS)
+    assert status(third, "G").level is Level.OK
+    third.close()

@@ -99,8 +99,12 @@ def update_fleet(
             if begin:
                 begin(work.chains)
             _run(scans or work.first_counts(), work.done, workers, scheduler)
-        write_overview(fleet, out)
+        write_overview(fleet, out, {chain.leg.id: _first_fault(chain) for chain in work.chains})
     return FleetUpdate(tuple(work.chains))
+
+
+def _first_fault(chain: Chain) -> str:
+    return next(filter(None, [chain.fault, *chain.refused]), "")
 
 
 def _run(jobs: Sequence[Job], done: Any, workers: int, scheduler: str | None) -> None:

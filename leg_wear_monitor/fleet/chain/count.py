@@ -8,6 +8,7 @@ from leg_wear_monitor.fleet.chain.record import Outcome, record_of, unreadable
 from leg_wear_monitor.fleet.chain.scan import Found
 from leg_wear_monitor.fleet.chain.words import words_of
 from leg_wear_monitor.fleet.description.fleet_description import FleetLeg
+from leg_wear_monitor.fleet.directory.atomic import write_whole
 from leg_wear_monitor.fleet.directory.leg_directory import LegDirectory, Line
 from leg_wear_monitor.fleet.tables.cycles import cycle_columns
 from leg_wear_monitor.fleet.tables.parquet import write_parquet
@@ -70,6 +71,7 @@ def _replayed(leg: FleetLeg, directory: LegDirectory, found: Found, last_ns: int
         lines.append(record.to_dict())
         if record.outcome is Outcome.COUNTED:
             write_parquet(directory.table(found.key), cycle_columns(result, leg.row))
+            write_whole(directory.summary, result.summary().to_json().encode())
             directory.expect(lines[0])
 
     replay(

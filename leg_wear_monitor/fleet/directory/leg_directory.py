@@ -2,6 +2,7 @@
 
 legs/ID/ledger            the ledger
 legs/ID/recordings.jsonl  a line a recording: what was found in it; JSON
+legs/ID/summary.json      result of the recording that was counted last, as `replay --out` writes it
 legs/ID/pending.json      the recording whose result is about to be in the ledger
 legs/ID/files.json        known files: size, time of change, key and begin of the recording
 legs/ID/log               a line a recording, for people
@@ -35,6 +36,7 @@ class LegDirectory:
         self.ledger = self.path / "ledger"
         self.records = self.path / "recordings.jsonl"
         self.log = self.path / "log"
+        self.summary = self.path / "summary.json"
         self.cycles = out / "cycles" / f"leg={leg}"
         self._pending, self._files = self.path / "pending.json", self.path / "files.json"
 

@@ -9,14 +9,16 @@ from leg_wear_monitor.configuration.strict import structure
 from leg_wear_monitor.fleet.chain.record import Outcome
 from leg_wear_monitor.fleet.description.fleet_description import FleetLeg
 from leg_wear_monitor.fleet.directory.leg_directory import LegDirectory, Line
-from leg_wear_monitor.fleet.overview.parts import LegChange, LegOverview, RecordingHealth
+from leg_wear_monitor.fleet.overview.parts import BadRecording, LegChange, LegOverview, RecordingHealth
 from leg_wear_monitor.monitor.verdict.verdict import Verdict
 from leg_wear_monitor.playback.result.condition import JointClearance, LifeHours
 
 _MOST_BAD = 10
 
 
-def leg_overview(leg: FleetLeg, directory: LegDirectory, before: LegOverview | None) -> LegOverview:
+def leg_overview(
+    leg: FleetLeg, directory: LegDirectory, before: LegOverview | None, fault: str = ""
+) -> LegOverview:
     """A leg at a glance.
 
     Parameters
@@ -25,11 +27,13 @@ def leg_overview(leg: FleetLeg, directory: LegDirectory, before: LegOverview | N
     directory : LegDirectory
     before : LegOverview or None
         The leg after an earlier update.
+    fault : str
+        Why this update could not count all of its recordings.
     """
     lines = {line["key"]: line for line in directory.lines()}  # the last one of each recording
     counted = [line for line in lines.values() if line["outcome"] == Outcome.COUNTED.value]
     health = _health(lines.values(), counted, len(leg.recordings))
-    now = LegOverview(id=leg.id, lot=leg.lot, recordings=health)
+    now = LegOverview(id=leg.id, lot=leg.lot, recordings=health, fault=fault)
     if counted:
         source = str(directory.records)
         joints = structure(counted[-1]["clearances"], dict[str, JointClearance], source, "clearances")
@@ -59,7 +63,11 @@ def _life(given: Mapping[str, Any], source: str) -> dict[str, LifeHours | None]:
 def _health(lines: Iterable[Line], counted: list[Line], found: int) -> RecordingHealth:
     lines = list(lines)
     outcomes = [line["outcome"] for line in lines]
-    bad = [line["file"] for line in lines if line["is_partial"] or line["outcome"] == Outcome.NO_GAIT.value]
+    bad = [
+        BadRecording(file=line["file"], outcome=line["outcome"], why=next(iter(line["findings"]), ""))
+        for line in lines
+        if line["is_partial"] or line["outcome"] == Outcome.NO_GAIT.value
+    ]
     return RecordingHealth(
         found=found,
         **{outcome.value: outcomes.count(outcome.value) for outcome in Outcome},

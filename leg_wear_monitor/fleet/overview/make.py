@@ -1,7 +1,7 @@
 """Makes the overview of a fleet from the records of its legs."""
 
 import math
-from collections.abc import Iterable
+from collections.abc import Iterable, Mapping
 from contextlib import suppress
 from pathlib import Path
 
@@ -18,12 +18,24 @@ from leg_wear_monitor.monitor.verdict.verdict import State
 _FIRST = 10
 
 
-def write_overview(fleet: FleetDescription, out: Path) -> FleetOverview:
-    """Write the overview of a fleet, with what is new since the one that is there."""
+def write_overview(fleet: FleetDescription, out: Path, faults: Mapping[str, str]) -> FleetOverview:
+    """Write the overview of a fleet, with what is new since the one that is there.
+
+    Parameters
+    ----------
+    fleet : FleetDescription
+    out : pathlib.Path
+        Directory of the fleet.
+    faults : mapping of str to str
+        Why recordings of a leg could not be counted, by its id.
+    """
     before: dict[str, LegOverview] = {}
     with suppress(ConfigError):  # none is there, or one of another version
         before = {leg.id: leg for leg in load_overview(out / FILE).legs}
-    legs = [leg_overview(leg, LegDirectory(out, leg.id), before.get(leg.id)) for leg in fleet.legs]
+    legs = [
+        leg_overview(leg, LegDirectory(out, leg.id), before.get(leg.id), faults.get(leg.id, ""))
+        for leg in fleet.legs
+    ]
     overview = FleetOverview(counts=_counts(legs), first=_first(legs), legs=tuple(legs), advice=ADVICE)
     write_whole(out / FILE, overview.to_json().encode())
     return overview

@@ -14,6 +14,24 @@ SCHEMA_VERSION = 1
 
 
 @attrs.frozen(kw_only=True)
+class BadRecording:
+    """A recording that is not sound.
+
+    Attributes
+    ----------
+    file : str
+    outcome : str
+        What became of it: ``counted`` in part, ``already_counted``, ``no_gait`` or ``unreadable``.
+    why : str
+        What was found in it first.
+    """
+
+    file: str
+    outcome: str
+    why: str = ""
+
+
+@attrs.frozen(kw_only=True)
 class RecordingHealth:
     """The recordings of a leg.
 
@@ -39,8 +57,8 @@ class RecordingHealth:
         Gait cycles in them.
     unmonitored_s : float
         Time in them during which the leg was not followed [s].
-    bad : tuple of str
-        Names of the last ten that are not sound, the newest first.
+    bad : tuple of BadRecording
+        The last ten that are not sound, the newest first.
     """
 
     found: int = 0
@@ -54,7 +72,7 @@ class RecordingHealth:
     counted_h: float = 0.0
     cycles: int = 0
     unmonitored_s: float = 0.0
-    bad: tuple[str, ...] = ()
+    bad: tuple[BadRecording, ...] = ()
 
 
 @attrs.frozen(kw_only=True)
@@ -98,6 +116,8 @@ class LegOverview:
         Remaining life of each joint, and of the ``leg``; None where it is not known or not valid.
     change : LegChange
     recordings : RecordingHealth
+    fault : str
+        Why the last update could not count all of its recordings; empty if it could.
     """
 
     id: str
@@ -108,6 +128,7 @@ class LegOverview:
     life: dict[str, LifeHours | None] = attrs.Factory(dict)
     change: LegChange = attrs.Factory(LegChange)
     recordings: RecordingHealth = attrs.Factory(RecordingHealth)
+    fault: str = ""
 
     @property
     def state(self) -> str:

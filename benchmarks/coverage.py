@@ -23,7 +23,7 @@ from leg_wear_monitor.monitor.forecast.wear_coefficients import MeasuredClearanc
 
 FRESH_M, MEASURED_M, GROWTH_NOISE = 3.0e-4, 5.0e-6, 0.03
 STEPS = 100  # of a joint's way to its limit, in the truth by a law
-SETTINGS = Forecasting()
+SETTINGS = Forecasting(wear_coefficient_sigma=0.7)
 
 
 @attrs.frozen

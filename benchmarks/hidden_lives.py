@@ -39,7 +39,7 @@ class HiddenLife:
 
 def hidden_life(leg: Mechanism, number: int) -> HiddenLife:
     """Life of a leg; the first is the nominal one, which the twin has."""
-    settings, k, seed = Forecasting(), len(leg.clearance_joints), number - 1
+    settings, k, seed = Forecasting(wear_coefficient_sigma=0.7), len(leg.clearance_joints), number - 1
     clearances, factor = dict(leg.clearances), np.ones(k)
     if number:
         factor *= np.exp(

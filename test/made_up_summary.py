@@ -9,6 +9,7 @@ from leg_wear_monitor.bags.findings import Severity
 from leg_wear_monitor.monitor.alarms.alarm import Level
 from leg_wear_monitor.monitor.config.settings import Limits
 from leg_wear_monitor.monitor.encoders.clearance_estimate import ClearanceObservation
+from leg_wear_monitor.monitor.forecast.coefficient_prior import CoefficientPrior
 from leg_wear_monitor.monitor.forecast.forecast import Answer, JointForecast, Quantiles
 from leg_wear_monitor.monitor.ledger.entry import Measurement
 from leg_wear_monitor.monitor.reports import Lost
@@ -46,8 +47,9 @@ def made_up_summary() -> ReplaySummary:
         worst=math.nan, raised_ns=1_700_000_000_000_000_001,
     )  # fmt: skip
     forecast = JointForecast(
-        answer=Answer.KNOWN, cycles=LIFE, hours=LIFE, days=None, clearance_m=LIFE, measurements=1
-    )
+        answer=Answer.KNOWN, cycles=LIFE, hours=LIFE, days=None, clearance_m=LIFE, measurements=1,
+        prior=CoefficientPrior(sigma=0.7, basis="a judgement", holds_for="steel on steel (greased)"),
+    )  # fmt: skip
     joint = ReplayJoint(
         clearance_m=ClearanceChange(3e-4, 4e-4, 5e-4), growth_m_per_cycle=1e-12,
         growth_error_m_per_cycle=1e-13, growth_mps=None, forecast=forecast, peak_force_n=np.float64(9.0),

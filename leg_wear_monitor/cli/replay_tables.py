@@ -130,6 +130,7 @@ def _counted(joint: "JointReport") -> str:
 def _print_lifetimes(console: Console, report: "CycleReport", duty_hours: float) -> None:
     """How long each joint and the leg last: hours of walking, and days of duty; or why that is not known."""
     from leg_wear_monitor.monitor.forecast.forecast import Answer
+    from leg_wear_monitor.monitor.forecast.words import bases
 
     told = {joint.joint: joint.forecast for joint in report.joints if joint.forecast is not None}
     both: dict[str, JointForecast | LegForecast] = {**told}
@@ -142,6 +143,8 @@ def _print_lifetimes(console: Console, report: "CycleReport", duty_hours: float)
         names = [name for name, each in both.items() if each.answer is answer]
         if names and answer is not Answer.KNOWN:
             console.print(f"lasts  {', '.join(names)}: {answer.value}", soft_wrap=True)
+    for basis in bases(told):
+        console.print(f"lasts  {basis}", soft_wrap=True)
     console.print()
 
 

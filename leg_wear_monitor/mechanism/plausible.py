@@ -12,10 +12,11 @@ import attrs
 
 from leg_wear_monitor.mechanism.clearance import Clearance
 from leg_wear_monitor.mechanism.ideal import TURN
-from leg_wear_monitor.mechanism.materials.of_joints import lacks_wear
+from leg_wear_monitor.mechanism.materials.of_joints import lacks_wear, spread_of
 from leg_wear_monitor.mechanism.spec import Body, Mechanism, PhaseLoad, SpeedDrive, TorqueDrive, Vector
 
 _USUAL_LENGTH = 5.0e-3, 5.0  # m, of the largest link
+_LEAST_SPREAD = 0.3  # of ln k: repeats of one careful test scatter by 0.1 to 0.3, parts by more
 _ROUND = 1.0e-3  # rpm: a converted speed in rad/s is within this of a whole number of rpm
 
 
@@ -177,6 +178,10 @@ def _clearance(c: Clearance) -> Iterator[Doubt]:
     if lacks_wear(c):
         fault = "gives no wear coefficient, so wear is not counted; expected wear_coefficient beside it"
         yield Doubt("material", f"{c.material} {fault}")
+    spread = spread_of(c, math.inf)
+    if spread is not None and spread < _LEAST_SPREAD:
+        fault = f"spread {spread:.2g} of {c.material} is below {_LEAST_SPREAD}; of repeats instead of parts?"
+        yield Doubt("material", fault)
     if c.stiffness is not None and _beyond(c.stiffness, 1.0e6, 1.0e14):
         yield Doubt("stiffness", f"{c.stiffness:g} N/m^1.5, usual are 1e6 to 1e14 N/m^1.5")
 

@@ -15,7 +15,7 @@ from leg_wear_monitor.monitor.alarms.words import state_of
 from leg_wear_monitor.monitor.config.parameter_file import NODE
 from leg_wear_monitor.monitor.config.settings import MonitorConfig
 from leg_wear_monitor.monitor.forecast.forecast import LegForecast
-from leg_wear_monitor.monitor.forecast.words import lifetime_values
+from leg_wear_monitor.monitor.forecast.words import answer_words, lifetime_values
 from leg_wear_monitor.monitor.reports import (
     AlarmList,
     CycleReport,
@@ -201,7 +201,9 @@ def _lifetime(joint: JointReport) -> Status:
         f"clearance_{fraction}_m": value for fraction, value in attrs.asdict(forecast.clearance_m).items()
     }
     values["measurements"] = float(forecast.measurements)
-    return Status(name, Level.OK, forecast.answer.value, values)
+    if forecast.prior is not None:
+        values["wear_coefficient_sigma"] = forecast.prior.sigma
+    return Status(name, Level.OK, answer_words(forecast), values)
 
 
 def _leg_lifetime(forecast: LegForecast) -> Status:

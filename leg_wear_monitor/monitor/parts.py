@@ -72,7 +72,12 @@ class Parts:
             self.accounting.replaced_ns,
         )
         self.encoders = (
-            EncoderObserver(self.mechanism, self.config, ledger.commissioned if ledger else None)
+            EncoderObserver(
+                self.mechanism,
+                self.config,
+                [one.prior.sigma for one in self.forecaster.state.coefficient_estimates],
+                ledger.commissioned if ledger else None,
+            )
             if self.config.encoders.names
             else None
         )

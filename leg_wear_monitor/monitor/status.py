@@ -25,7 +25,7 @@ from leg_wear_monitor.monitor.encoders.state import faults
 from leg_wear_monitor.monitor.evaluation import specs
 from leg_wear_monitor.monitor.evaluation.evaluation import AlarmEvaluation
 from leg_wear_monitor.monitor.evaluation.torque_record import TorqueRecord
-from leg_wear_monitor.monitor.forecast.words import UNKNOWN, lifetime_values
+from leg_wear_monitor.monitor.forecast.words import UNKNOWN, answer_words, lifetime_values
 from leg_wear_monitor.monitor.inputs.health import InputHealth
 from leg_wear_monitor.monitor.ledger.entry import Measurement
 from leg_wear_monitor.monitor.reports import CycleReport, Status
@@ -166,7 +166,9 @@ def _joint(
     if report.forecast is None:
         return Status(f"joint {name}", level, "no forecast yet", values, code)
     values |= UNKNOWN | lifetime_values(report.forecast)
-    return Status(f"joint {name}", level, report.forecast.answer.value, values, code)
+    if report.forecast.prior is not None:
+        values["wear_coefficient_sigma"] = report.forecast.prior.sigma
+    return Status(f"joint {name}", level, answer_words(report.forecast), values, code)
 
 
 def _with_measured(joint: Status, measured: Measurement | None) -> Status:

@@ -44,12 +44,12 @@ def test_a_measurement_is_kept_and_explained(run, ledger):
 
 
 def test_a_contradiction_ends_with_findings_and_leaves_wear_as_it_is(run, ledger):
-    result = run("measure", "G", "1.2", "--sigma", "0.005", "--ledger", str(ledger))
+    result = run("measure", "G", "3.0", "--sigma", "0.005", "--ledger", str(ledger))
     assert result.exit_code == 1
     assert "contradicts the model" in result.stdout
     assert "the measured clearance is at its limit: stop the leg when it is safe" in result.stdout
     assert [row[-1] for row in rows(ledger)] == [0]
-    assert run("measure", "G", "1.2", "--sigma", "0.005", "--ledger", str(ledger), "--accept").exit_code == 1
+    assert run("measure", "G", "3.0", "--sigma", "0.005", "--ledger", str(ledger), "--accept").exit_code == 1
     assert [row[-1] for row in rows(ledger)] == [0, 1]
 
 

@@ -9,6 +9,8 @@ from leg_wear_monitor.mechanism.materials.loader import load_material
 from leg_wear_monitor.mechanism.materials.material import Material
 from leg_wear_monitor.mechanism.spec import Mechanism
 
+_BESIDE = "a value beside "  # a wear coefficient of the mechanism file, in place of the pair's
+
 
 def settings_of(pair: Material) -> dict[str, Any]:
     """Settings of a clearance joint that a pair gives, as a mechanism file would have them.
@@ -57,16 +59,49 @@ def regimes(mechanism: Mechanism, joints: Sequence[str]) -> dict[str, list[str]]
     for joint in joints:
         settings = mechanism.clearances[joint]
         wear = " and ".join(f"{k:.3g}" for k in dict.fromkeys(settings.wear_coefficient)) + " 1/Pa"
-        if settings.material:
-            pair = load_material(settings.material)
-            wear = "not known" if lacks_wear(settings) else wear
-            as_the_pair = lacks_wear(settings) or settings.wear_coefficient == pair.wear_coefficients
-            own = "" if as_the_pair else "a value beside "
-            what = f"{own}{pair.name} ({pair.regime})"
-        else:
-            what = "no material named, regime unknown"
-        found.setdefault(f"{what}, wear coefficient {wear}", []).append(joint)
+        wear = "not known" if lacks_wear(settings) else wear
+        found.setdefault(f"{regime_of(settings)}, wear coefficient {wear}", []).append(joint)
     return found
+
+
+def regime_of(settings: Clearance) -> str:
+    """What a joint's wear coefficient holds for: its pair and the pair's regime."""
+    if not settings.material:
+        return "no material named, regime unknown"
+    pair = load_material(settings.material)
+    own = "" if lacks_wear(settings) or settings.wear_coefficient == pair.wear_coefficients else _BESIDE
+    return f"{own}{pair.name} ({pair.regime})"
+
+
+def spread_of(settings: Clearance, usual: float) -> float | None:
+    """Logarithmic standard deviation of a joint's wear coefficient by its pair.
+
+    The clearance grows by the sum of both coefficients. Both bodies are in the same regime, so their
+    deviations are taken as one: their spreads count by their part of the sum.
+
+    Parameters
+    ----------
+    settings : Clearance
+    usual : float
+        Spread of a body for which the pair gives none, while it gives one for the other.
+
+    Returns
+    -------
+    float or None
+        None if the pair gives no spread, or if a wear coefficient stands beside the pair.
+    """
+    if not settings.material:
+        return None
+    pair = load_material(settings.material)
+    both = pair.bushing.wear_coefficient, pair.journal.wear_coefficient
+    if settings.wear_coefficient != pair.wear_coefficients or None in both:
+        return None
+    spreads = [side.spread for side in both if side is not None]
+    if not any(spreads):
+        return None
+    known = [usual if spread is None else spread.si for spread in spreads]
+    weighted = sum(k * spread for k, spread in zip(settings.wear_coefficient, known, strict=True))
+    return weighted / sum(settings.wear_coefficient)
 
 
 def outside_limits(

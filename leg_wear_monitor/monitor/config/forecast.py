@@ -4,21 +4,27 @@ import attrs
 
 from leg_wear_monitor.configuration.quantity import described, quantity
 
+_LEAST_SIGMA = 0.001  # below, the grid of the estimate would be finer than rounding
+
+
+def _not_next_to_0(sigma: float) -> str | None:
+    if sigma == 0.0 or sigma >= _LEAST_SIGMA:
+        return None
+    return f"{sigma!r} is neither 0 nor at least {_LEAST_SIGMA:g}"
+
 
 @attrs.frozen(kw_only=True)
 class Forecasting:
-    """Uncertainties of the forecast as standard deviations; those of factors are of the natural logarithm.
-
-    The one of the wear coefficient is a factor of two up or down: reported wear rates scatter by that much
-    and more (Schmitz and others, Journal of Tribology 126 (2004) 802). It is a judgement, not a measurement.
-    """
+    """Uncertainties of the forecast as standard deviations; those of factors are of the natural logarithm."""
 
     wear_coefficient_sigma: float = quantity(
         "",
-        "standard deviation of the logarithm of a joint's wear coefficient about the given one",
-        at_least=0.001,
+        "standard deviation of the logarithm of a joint's wear coefficient about the given one; 0: the "
+        "spread of the joint's material pair, or 0.7 where that gives none",
+        at_least=0.0,
         at_most=3.0,
-        default=0.7,
+        default=0.0,
+        check=_not_next_to_0,
     )
     load_sigma: float = quantity(
         "",
@@ -60,6 +66,6 @@ class Forecasting:
     )
     priors: str = described(
         "file of priors that a fleet has learned for this leg's wear coefficients; empty: "
-        "wear_coefficient_sigma about the given ones",
+        "the spread of wear_coefficient_sigma about the given ones",
         default="",
     )

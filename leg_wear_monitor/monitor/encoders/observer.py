@@ -4,6 +4,7 @@ All evaluation takes place at the ends of evaluation periods, which depend on th
 period evaluates the gait cycles that ended, and simulates at most one cycle for the reference.
 """
 
+from collections.abc import Sequence
 from typing import NamedTuple
 
 import attrs
@@ -59,6 +60,8 @@ class EncoderObserver:
     mechanism : Mechanism
         With the parameters of the configuration applied.
     config : MonitorConfig
+    coefficient_sigma : sequence of float
+        Prior standard deviation of the logarithm of each clearance joint's wear coefficient.
     known : Commissioned or None
         Stored encoder errors of the ledger.
 
@@ -67,7 +70,14 @@ class EncoderObserver:
     ConfigError, AssemblyError
     """
 
-    def __init__(self, mechanism: Mechanism, config: MonitorConfig, known: Commissioned | None) -> None:
+    def __init__(
+        self,
+        mechanism: Mechanism,
+        config: MonitorConfig,
+        coefficient_sigma: Sequence[float],
+        known: Commissioned | None,
+    ) -> None:
+        self._coefficient_sigma = np.array(coefficient_sigma)
         self._settings, self.config = config.encoders, config
         self._fresh = np.array(
             [mechanism.clearances[joint].radial_clearance for joint in mechanism.clearance_joints]
@@ -268,5 +278,5 @@ class EncoderObserver:
         forecast = self.config.forecast
         if not self.commissions:
             return known_with(self.state.errors, clearance_m, _UNKNOWN_M)
-        worn = forecast.wear_coefficient_sigma * (clearance_m - self._fresh)
+        worn = self._coefficient_sigma * (clearance_m - self._fresh)
         return known_with(self.state.errors, clearance_m, np.hypot(forecast.clearance_sigma_m, worn))

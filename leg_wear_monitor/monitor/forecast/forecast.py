@@ -13,6 +13,7 @@ import numpy as np
 
 from leg_wear_monitor.mechanism.arrays import Floats
 from leg_wear_monitor.monitor.config.forecast import Forecasting
+from leg_wear_monitor.monitor.forecast.coefficient_prior import CoefficientPrior
 from leg_wear_monitor.monitor.forecast.even_draws import MEMBERS, even_fractions, even_normals
 from leg_wear_monitor.monitor.forecast.growth_law import GrowthLaw, cycles_to
 from leg_wear_monitor.monitor.forecast.wear_coefficients import CoefficientEstimate
@@ -25,8 +26,9 @@ class Answer(Enum):
     PARTLY_KNOWN = "of the joints whose growth is known; the others are not included"
     AT_LIMIT = "at its limit"
     NOT_ENOUGH_DATA = "not enough data for a growth rate yet"
-    OUTSIDE_VALIDITY = "not valid: cadence, torque or clearances are not those of the counted leg"
+    OUTSIDE_VALIDITY = "not valid: the model does not hold for this cadence, torque, clearance or load"
     NO_GROWTH = "clearance does not grow"
+    NO_COEFFICIENT = "not known: the joint has no wear coefficient"
 
 
 @attrs.frozen
@@ -66,8 +68,9 @@ class JointForecast:
         The clearance now, as far as it is known.
     measurements : int
         Measured clearances of this part that are in it.
-    prior : str
-        What was measured on other parts for the prior of its wear coefficient; empty for the configured one.
+    prior : CoefficientPrior or None
+        What was believed of its wear coefficient before any measurement of this part, and the regime that it
+        holds for; None in a file of an older version.
     """
 
     answer: Answer
@@ -76,7 +79,7 @@ class JointForecast:
     days: Quantiles | None
     clearance_m: Quantiles
     measurements: int
-    prior: str = ""
+    prior: CoefficientPrior | None = None
 
 
 @attrs.frozen(kw_only=True)
@@ -129,6 +132,8 @@ class JointCondition:
     growth_error_m : float
         Uncertainty of this mean because cycles scatter. What the model is off is the same in all cycles of a
         leg: it is in the factor of the wear coefficient, which a measured clearance corrects.
+    has_coefficient : bool
+        Whether its wear coefficient is above 0; without one no wear is counted.
     """
 
     joint: str
@@ -137,6 +142,7 @@ class JointCondition:
     limit_m: float
     growth_m: float | None
     growth_error_m: float
+    has_coefficient: bool = True
 
     def answer(self, clearance_m: float, valid: bool) -> Answer:
         """What can be said of it, supposing its clearance."""
@@ -144,6 +150,8 @@ class JointCondition:
             return Answer.AT_LIMIT
         if not valid:
             return Answer.OUTSIDE_VALIDITY
+        if not self.has_coefficient:
+            return Answer.NO_COEFFICIENT
         if self.growth_m is None:
             return Answer.NOT_ENOUGH_DATA
         return Answer.KNOWN if self.growth_m > 0.0 else Answer.NO_GROWTH
@@ -205,7 +213,7 @@ def forecast(
             **_life(a, end, cycle_s, day),
             clearance_m=q,
             measurements=coefficient_estimate.observations,
-            prior=coefficient_estimate.basis,
+            prior=coefficient_estimate.prior,
         )
         for a, end, q, coefficient_estimate in zip(
             answers, ends, clearances, coefficient_estimates, strict=True
@@ -271,9 +279,10 @@ def _leg_answer(joints: Sequence[Answer]) -> Answer:
     for answer in (Answer.AT_LIMIT, Answer.OUTSIDE_VALIDITY):
         if answer in joints:
             return answer
+    unknown = next((each for each in (Answer.NOT_ENOUGH_DATA, Answer.NO_COEFFICIENT) if each in joints), None)
     if Answer.KNOWN not in joints:
-        return Answer.NOT_ENOUGH_DATA if Answer.NOT_ENOUGH_DATA in joints else Answer.NO_GROWTH
-    return Answer.PARTLY_KNOWN if Answer.NOT_ENOUGH_DATA in joints else Answer.KNOWN
+        return unknown or Answer.NO_GROWTH
+    return Answer.PARTLY_KNOWN if unknown else Answer.KNOWN
 
 
 def quantiles(values: Floats) -> Quantiles:

@@ -233,6 +233,7 @@ class Forecaster:
                 limit_m=limits_m[k],
                 growth_m=rate.per_cycle_m if rate else None,
                 growth_error_m=rate.sampling_m if rate else 0.0,
+                has_coefficient=max(self._clearances[k].wear_coefficient) > 0.0,
             )
             for k, (joint, rate) in enumerate(zip(self._clearance_joints, rates, strict=True))
         ]

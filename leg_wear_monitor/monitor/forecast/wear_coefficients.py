@@ -16,7 +16,7 @@ from numpy.typing import ArrayLike
 
 from leg_wear_monitor.mechanism.arrays import Floats
 from leg_wear_monitor.monitor.config.forecast import Forecasting
-from leg_wear_monitor.monitor.forecast.coefficient_prior import CoefficientPrior
+from leg_wear_monitor.monitor.forecast.coefficient_prior import CoefficientPrior, usual_prior
 
 GRID = 801
 _WIDTH = 8.0  # standard deviations on both sides, of the prior and of the measurements
@@ -57,8 +57,8 @@ class CoefficientEstimate:
         Its standard deviation.
     observations : int
         Measurements in it.
-    basis : str
-        What its prior rests on, as in `CoefficientPrior`.
+    prior : CoefficientPrior
+        What was believed before them.
     """
 
     log_factor: Floats
@@ -66,7 +66,7 @@ class CoefficientEstimate:
     excess_m: Floats
     excess_sigma_m: float
     observations: int
-    basis: str = ""
+    prior: CoefficientPrior
 
     @property
     def mean(self) -> float:
@@ -106,9 +106,9 @@ def estimate_coefficient(
         Nominal clearance when new.
     observations : sequence of MeasuredClearance
     prior : CoefficientPrior, optional
-        Without it, the configured spread about the nominal coefficient.
+        Without it, the configured or usual spread about the nominal coefficient.
     """
-    prior = prior or CoefficientPrior(sigma=settings.wear_coefficient_sigma)
+    prior = prior or usual_prior(settings)
     log_factor, log_weight = posterior_grid(prior, *measured_factor(settings, fresh_m, observations))
     weight = np.exp(log_weight - log_weight.max())
     precision = 1.0 / settings.clearance_sigma_m**2 + sum(
@@ -125,7 +125,7 @@ def estimate_coefficient(
         pull / precision,
         precision**-0.5,
         len(observations),
-        prior.basis,
+        prior,
     )
 
 

@@ -1,9 +1,11 @@
 """How long something lasts, and how large a clearance is, in as many digits as are known."""
 
 import math
+from collections.abc import Mapping
 
 import attrs
 
+from leg_wear_monitor.monitor.forecast.coefficient_prior import CoefficientPrior
 from leg_wear_monitor.monitor.forecast.forecast import JointForecast, LegForecast
 
 UNKNOWN = {
@@ -22,6 +24,26 @@ def lifetime_values(forecast: JointForecast | LegForecast) -> dict[str, float]:
         if quantiles is not None:
             values |= {f"{fraction}_{key}": value for fraction, value in attrs.asdict(quantiles).items()}
     return values
+
+
+def answer_words(forecast: JointForecast) -> str:
+    """What can be said of a joint's life, and what it holds for."""
+    held = "" if forecast.prior is None else f"; {_basis(forecast.prior)}"
+    return f"{forecast.answer.value}{held}"
+
+
+def bases(forecasts: Mapping[str, JointForecast]) -> list[str]:
+    """What the lives of some joints hold for, a sentence for all joints alike."""
+    found: dict[str, list[str]] = {}
+    for joint, forecast in forecasts.items():
+        if forecast.prior is not None:
+            found.setdefault(_basis(forecast.prior), []).append(joint)
+    return [f"{', '.join(joints)}: {basis}" for basis, joints in found.items()]
+
+
+def _basis(prior: CoefficientPrior) -> str:
+    factor = f"{math.exp(prior.sigma):.2g}"
+    return f"holds for {prior.holds_for}, its wear coefficient known to a factor of {factor} ({prior.basis})"
 
 
 def three_digits(value: float) -> str:

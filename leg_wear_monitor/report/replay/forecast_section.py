@@ -7,7 +7,7 @@ import numpy as np
 
 from leg_wear_monitor.monitor.forecast.forecast import JointForecast
 from leg_wear_monitor.monitor.forecast.validity import validity
-from leg_wear_monitor.monitor.forecast.words import three_digits
+from leg_wear_monitor.monitor.forecast.words import bases, three_digits
 from leg_wear_monitor.monitor.ledger.entry import Measurement
 from leg_wear_monitor.monitor.verdict.verdict import Figure
 from leg_wear_monitor.playback.result.parts import LegLife
@@ -26,11 +26,18 @@ def forecast_section(summary: ReplaySummary) -> Section:
     doubt = not_valid(summary.verdict, Figure.FORECAST)
     parts: list[Part] = [Text(sentence) for sentence in leg_sentence(summary)]
     parts.append(Text(doubt, is_not_valid=True) if doubt else _table(summary))
+    parts += [Text(f"The life of {basis}.") for basis in bases(forecasts_of(summary))]
     if summary.measurements:
         parts.append(_validity(summary.measurements))
     else:
         parts.append(Text("No clearance was measured yet; one measurement makes the forecast much narrower."))
     return Section("Forecast", parts, is_folded=True)
+
+
+def forecasts_of(summary: ReplaySummary) -> dict[str, JointForecast]:
+    """Forecasts by the joints' names in words."""
+    found = {summary.leg.joint_words(name): joint.forecast for name, joint in summary.joints.items()}
+    return {name: told for name, told in found.items() if told is not None}
 
 
 def _table(summary: ReplaySummary) -> Table:
@@ -132,5 +139,4 @@ def _first(leg: LegLife | None, joint: str) -> str:
 
 def _answer(told: JointForecast) -> str:
     measured = f"; measured {told.measurements} times" if told.measurements else ""
-    prior = f"; prior from {told.prior}" if told.prior else ""
-    return f"{told.answer.value}{measured}{prior}"
+    return f"{told.answer.value}{measured}"

@@ -62,7 +62,15 @@ def joint_rows(summary: ReplaySummary, views: Sequence[JointView]) -> Fragment:
         for view in views
     ]
     row = {"life": _life(leg, life), "words": _hours_words(leg), "first": _first(summary)} if leg else None
-    return Fragment(render("replay/joints.html", rows=rows, leg=row, note=_note(views, most_m, life)))
+    note = " ".join([_note(views, most_m, life), *(_holds_for(summary) if life else [])]).strip()
+    return Fragment(render("replay/joints.html", rows=rows, leg=row, note=note))
+
+
+def _holds_for(summary: ReplaySummary) -> list[str]:
+    """Regimes that the remaining lives hold for, a sentence each."""
+    priors = [joint.forecast.prior for joint in summary.joints.values() if joint.forecast]
+    regimes = dict.fromkeys(prior.holds_for for prior in priors if prior)
+    return [f"It holds for {', '.join(regimes)}."] if regimes else []
 
 
 def _leg_life(summary: ReplaySummary) -> LifeHours | None:

@@ -78,15 +78,16 @@ def _parameters(path: Path) -> str:
     from leg_wear_monitor.monitor.config.parameter_file import load_config
     from leg_wear_monitor.monitor.config.parameters import PARAMETERS, values_of
     from leg_wear_monitor.monitor.config.plausible import parameter_doubts
+    from leg_wear_monitor.monitor.forecast.coefficient_prior import usual_prior
     from leg_wear_monitor.monitor.forecast.wear_coefficients import MeasuredClearance, estimate_coefficient
 
     config = load_config(path)
     leg = fitted(load_mechanism(config.mechanism), config)
     settings = twin_settings(config)
     parameter_doubts(config, leg)
-    coefficient_estimate = estimate_coefficient(
-        config.forecast, 3e-4, [MeasuredClearance(3.5e-4, 1e-5, 4e-5)]
-    )
+    prior = usual_prior(config.forecast, leg.clearances[leg.clearance_joints[0]])
+    observations = [MeasuredClearance(3.5e-4, 1e-5, 4e-5)]
+    coefficient_estimate = estimate_coefficient(config.forecast, 3e-4, observations, prior)
     numbers = [
         settings.tracker.lag,
         settings.tracker.largest_speed,

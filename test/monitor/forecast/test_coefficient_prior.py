@@ -15,13 +15,16 @@ from leg_wear_monitor.monitor.forecast.coefficient_prior import (
     CoefficientPrior,
     nominal_per_pa,
     prior_source,
+    usual_prior,
 )
 from leg_wear_monitor.monitor.forecast.forecaster import Forecaster
 from leg_wear_monitor.monitor.forecast.wear_coefficients import MeasuredClearance, estimate_coefficient
 
 pytestmark = pytest.mark.plain
 
-LEG, CONFIGURED, FRESH = load_mechanism("bionic_leg"), Forecasting(), 3.0e-4
+LEG, FRESH = load_mechanism("bionic_leg"), 3.0e-4
+CONFIGURED = Forecasting(wear_coefficient_sigma=0.7)
+BASIS_CONFIGURED = "forecast.wear_coefficient_sigma"
 NOMINAL = nominal_per_pa(LEG.clearances["A"])
 BASIS = "19 parts of lot 2026-03"
 
@@ -48,7 +51,7 @@ def learned(tmp_path):
 
 def test_without_a_file_every_joint_has_the_configured_prior():
     found = prior_source(LEG, CONFIGURED).prior("A", 0)
-    assert found == CoefficientPrior(sigma=CONFIGURED.wear_coefficient_sigma)
+    assert found == usual_prior(CONFIGURED, LEG.clearances["A"])
     one, other = estimate_coefficient(CONFIGURED, FRESH), estimate_coefficient(CONFIGURED, FRESH, (), found)
     assert one.weight.tobytes() == other.weight.tobytes()
     assert one.log_factor.tobytes() == other.log_factor.tobytes()
@@ -59,7 +62,7 @@ def test_each_part_of_a_joint_has_its_own_prior(learned):
     present, following, other = source.prior("A", 5), source.prior("A", 6), source.prior("B", 0)
     assert (present.mean, present.sigma, present.basis) == (pytest.approx(math.log(2.0)), 0.3, BASIS)
     assert (following.mean, following.sigma) == (pytest.approx(0.0), 0.5)
-    assert other == CoefficientPrior(sigma=CONFIGURED.wear_coefficient_sigma)
+    assert other == usual_prior(CONFIGURED, LEG.clearances["B"])
 
 
 def test_a_prior_follows_the_nominal_coefficient(learned):
@@ -87,15 +90,15 @@ def test_the_estimate_is_this_prior_times_the_likelihood(mean, sigma, factor, ow
 def test_the_forecast_says_what_its_prior_rests_on(learned):
     forecaster = Forecaster(LEG, learned(document()), (), [5, 0, 0, 0, 0])
     first, *others = forecaster.state.coefficient_estimates
-    assert (first.basis, first.sigma) == (BASIS, pytest.approx(0.3, rel=1e-3))
-    assert {(each.basis, round(each.sigma, 3)) for each in others} == {("", 0.7)}
+    assert (first.prior.basis, first.sigma) == (BASIS, pytest.approx(0.3, rel=1e-3))
+    assert {(each.prior.basis, round(each.sigma, 3)) for each in others} == {(BASIS_CONFIGURED, 0.7)}
     forecaster.state.growth = tuple(
         attrs.evolve(each, growth_m=np.zeros(1), moving_s=np.ones(1)) for each in forecaster.state.growth
     )
     told = forecaster.renewed(np.zeros(5), [6e-4] * 5, True)
-    assert [each.prior for each in told.joints] == [BASIS, "", "", "", ""]
+    assert [each.prior.basis for each in told.joints] == [BASIS, *[BASIS_CONFIGURED] * 4]
     forecaster.replaced("A", 9)
-    assert forecaster.state.coefficient_estimates[0].basis == "19 parts of 1 other lot"
+    assert forecaster.state.coefficient_estimates[0].prior.basis == "19 parts of 1 other lot"
 
 
 @pytest.mark.parametrize(

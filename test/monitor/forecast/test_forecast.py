@@ -10,6 +10,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from leg_wear_monitor.monitor.config.forecast import Forecasting
+from leg_wear_monitor.monitor.forecast.coefficient_prior import USUAL_SPREAD
 from leg_wear_monitor.monitor.forecast.forecast import Answer, JointCondition, forecast
 from leg_wear_monitor.monitor.forecast.growth_law import GrowthLaw, no_law
 from leg_wear_monitor.monitor.forecast.wear_coefficients import MeasuredClearance, estimate_coefficient
@@ -42,7 +43,7 @@ def test_with_the_coefficient_alone_unknown_life_is_lognormal():
     told = alone(settings=SURE)
     assert told.answer is Answer.KNOWN
     assert told.cycles.p50 == pytest.approx(2e7, rel=0.01)
-    spread = math.exp(Z * SURE.wear_coefficient_sigma)
+    spread = math.exp(Z * USUAL_SPREAD)
     assert told.cycles.p90 / told.cycles.p50 == pytest.approx(spread, rel=0.02)
     assert told.cycles.p50 / told.cycles.p10 == pytest.approx(spread, rel=0.02)
     assert told.hours.p50 == pytest.approx(told.cycles.p50 / 3600.0)
@@ -113,13 +114,11 @@ def test_a_leg_of_one_joint_lasts_as_long_as_it():
 def test_a_leg_ends_with_the_first_of_two_lognormal_lives():
     """The smaller of two; the probability that it is A's is that of a difference of normals."""
     told = whole([NOW, B], SURE).leg
-    gap = math.log(NOW.growth_m / B.growth_m) / (math.sqrt(2.0) * SURE.wear_coefficient_sigma)
+    gap = math.log(NOW.growth_m / B.growth_m) / (math.sqrt(2.0) * USUAL_SPREAD)
     assert told.first == "A"
     assert told.first_probability["A"] == pytest.approx(statistics.NormalDist().cdf(gap), abs=0.01)
     random = np.random.default_rng(0)
-    lives = np.array([[2e7], [6e7]]) / np.exp(
-        SURE.wear_coefficient_sigma * random.standard_normal((2, 200_000))
-    )
+    lives = np.array([[2e7], [6e7]]) / np.exp(USUAL_SPREAD * random.standard_normal((2, 200_000)))
     expected = np.quantile(lives.min(axis=0), (0.1, 0.5, 0.9))
     np.testing.assert_allclose(attrs.astuple(told.cycles), expected, rtol=0.03)
 

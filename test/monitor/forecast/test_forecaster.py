@@ -32,7 +32,7 @@ def walked(forecaster, seconds, worn=0.0, valid=True):
 
 @pytest.fixture
 def forecaster(leg):
-    return Forecaster(leg, Forecasting(), (), [0] * 5)
+    return Forecaster(leg, Forecasting(wear_coefficient_sigma=0.7), (), [0] * 5)
 
 
 @pytest.mark.plain

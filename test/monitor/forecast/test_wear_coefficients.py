@@ -17,7 +17,7 @@ from leg_wear_monitor.monitor.ledger.entry import JointWear
 
 pytestmark = pytest.mark.plain
 
-FRESH, PRIOR = 3.0e-4, Forecasting()
+FRESH, PRIOR = 3.0e-4, Forecasting(wear_coefficient_sigma=0.7)
 CLEARANCE = load_mechanism("bionic_leg").clearances["A"]
 HOUR = 3_600_000_000_000
 

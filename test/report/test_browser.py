@@ -3,24 +3,15 @@
 Headless Chromium lays out all pages in frames of two widths, a script tries them and leaves what it found.
 """
 
-import html
-import json
 import re
-import shutil
-import subprocess
 
 import pytest
+from browser import NEEDS_CHROMIUM, WIDTHS, browse
 
 from leg_wear_monitor.report.page import page_html
 from leg_wear_monitor.studies.plan.settings import STUDIES
 
-CHROMIUM = next(filter(None, map(shutil.which, ("chromium", "chromium-browser", "google-chrome"))), None)
-
-pytestmark = pytest.mark.skipif(
-    CHROMIUM is None, reason="no chromium here: apt install chromium runs these tests"
-)
-
-WIDTHS = (1200, 390)
+pytestmark = NEEDS_CHROMIUM
 
 TRY = """
 function look(frame) {
@@ -74,25 +65,6 @@ window.addEventListener("load", () => setTimeout(() => {
 """
 
 
-def browse(pages, directory):
-    """What the script finds in each page at each width, and the lines on the browser's console."""
-    frames = "".join(
-        f'<iframe style="width:{width}px;height:900px;border:0" srcdoc="{html.escape(page)}"></iframe>'
-        for page in pages
-        for width in WIDTHS
-    )
-    wrapper = directory / "wrapper.html"
-    text = f'<!doctype html><meta charset="utf-8"><script>{TRY}</script>{frames}<pre id="found"></pre>'
-    wrapper.write_text(text)
-    line = [CHROMIUM, "--headless", "--no-sandbox", "--disable-gpu", "--disable-dev-shm-usage"]
-    line += [f"--user-data-dir={directory / 'profile'}", "--enable-logging=stderr", "--window-size=1300,1000"]
-    line += ["--virtual-time-budget=10000", "--dump-dom", wrapper.as_uri()]
-    done = subprocess.run(line, capture_output=True, text=True, timeout=240, check=True)
-    found = re.search(r'<pre id="found">(.*?)</pre>', done.stdout, re.DOTALL).group(1)
-    console = [said for said in done.stderr.splitlines() if "CONSOLE" in said]
-    return json.loads(html.unescape(found)), console
-
-
 @pytest.fixture(
     scope="module", params=[("location",), pytest.param(tuple(STUDIES), marks=pytest.mark.slow)], ids=len
 )
@@ -100,7 +72,7 @@ def seen(request, drawn, tmp_path_factory):
     """By name of the study and width."""
     names = [(name, width) for name in request.param for width in WIDTHS]
     pages = [page_html(drawn(name)) for name in request.param]
-    found, console = browse(pages, tmp_path_factory.mktemp("browser"))
+    found, console = browse(pages, tmp_path_factory.mktemp("browser"), TRY)
     assert console == []
     return dict(zip(names, found, strict=True))
 
@@ -132,7 +104,7 @@ def test_the_slider_moves_the_leg(seen, study):
 def test_what_is_wrong_would_be_seen(tmp_path):
     """A page that is too wide, lacks its picture and its script."""
     page = '<div style="width:2000px">wide</div><img src="data:image/png;base64,AAAA">'
-    (found, narrow), console = browse([page + "<script>nothing()</script>"], tmp_path)
+    (found, narrow), console = browse([page + "<script>nothing()</script>"], tmp_path, TRY)
     assert found["overflow"] > 500 < narrow["overflow"]
     assert (found["broken"], found["unnamed"], found["images"]) == (1, 1, 1)
     assert any("nothing is not defined" in said for said in console)

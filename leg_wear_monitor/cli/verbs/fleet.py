@@ -98,3 +98,33 @@ def _print_counts(done: "FleetUpdate", out: Path) -> None:
         if verdict:
             click.echo(f"{name}: {verdict.words}")
     click.echo(f"written: {out / FILE}")
+
+
+@fleet.command(short_help="Write the page of the fleet, and a page for each leg.")
+@click.argument("description", type=click.Path(path_type=Path), metavar="FLEET.yaml")
+@click.option(
+    "--out", type=click.Path(path_type=Path), metavar="DIR", required=True, help="Directory of the fleet."
+)
+@click.option(
+    "--fresh-days",
+    type=click.FloatRange(min=0.0, min_open=True, max=3650.0),
+    metavar="DAYS",
+    default=7.0,
+    show_default=True,
+    help="Age of its last recording up to which a leg counts as monitored.",
+)
+def report(description: Path, out: Path, fresh_days: float) -> int:
+    """Write DIR/report.html from what the last update found, and legs/ID/report.html for each leg.
+
+    A leg of the description that was never updated is on the page, without a recording. Nothing is computed.
+    Exits with 1 if the page of a leg cannot be made.
+    """
+    from leg_wear_monitor.cli.fleet_pages import write_pages
+
+    check_directory("--out", out)
+    written = write_pages(description, out, fresh_days)
+    for fault in written.faults[:_MOST_LINES]:
+        click.echo(f"warning: no page of its own: {fault}", err=True)
+    click.echo(f"pages of legs that have changed: {written.legs}")
+    click.echo(f"written: {written.fleet}")
+    return WITH_FINDINGS if written.faults else 0

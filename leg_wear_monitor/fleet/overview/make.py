@@ -36,23 +36,25 @@ def write_overview(fleet: FleetDescription, out: Path, faults: Mapping[str, str]
         leg_overview(leg, LegDirectory(out, leg.id), before.get(leg.id), faults.get(leg.id, ""))
         for leg in fleet.legs
     ]
-    overview = FleetOverview(counts=_counts(legs), first=_first(legs), legs=tuple(legs), advice=ADVICE)
+    overview = FleetOverview(counts=counts_of(legs), first=first_of(legs), legs=tuple(legs), advice=ADVICE)
     write_whole(out / FILE, overview.to_json().encode())
     return overview
 
 
-def _counts(legs: Iterable[LegOverview]) -> dict[str, int]:
+def counts_of(legs: Iterable[LegOverview]) -> dict[str, int]:
+    """Number of legs in each state, zeros included."""
     states = [leg.state for leg in legs]
     return {state: states.count(state) for state in (*(each.value for each in State), UNKNOWN)}
 
 
-def _first(legs: Iterable[LegOverview]) -> tuple[str, ...]:
+def first_of(legs: Iterable[LegOverview]) -> tuple[str, ...]:
     """Legs that need a person first: by state, then by what is left of their life, then by clearance."""
     asking = [leg for leg in legs if leg.verdict and leg.verdict.state is not State.HEALTHY]
-    return tuple(leg.id for leg in sorted(asking, key=_urgency)[:_FIRST])
+    return tuple(leg.id for leg in sorted(asking, key=urgency)[:_FIRST])
 
 
-def _urgency(leg: LegOverview) -> tuple[float, float, float, str]:
+def urgency(leg: LegOverview) -> tuple[float, float, float, str]:
+    """Key that sorts legs by who needs a person first."""
     severity = leg.verdict.state.severity if leg.verdict else 0
     life = leg.life.get("leg")
     used = max(leg.used_fraction.values(), default=0.0)

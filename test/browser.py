@@ -1,0 +1,39 @@
+"""Pages in headless Chromium, in frames of two widths, which a script tries."""
+
+import html
+import json
+import re
+import shutil
+import subprocess
+
+import pytest
+
+CHROMIUM = next(filter(None, map(shutil.which, ("chromium", "chromium-browser", "google-chrome"))), None)
+
+NEEDS_CHROMIUM = pytest.mark.skipif(
+    CHROMIUM is None, reason="no chromium here: apt install chromium runs these tests"
+)
+
+WIDTHS = (1200, 390)
+
+
+def browse(pages, directory, script):
+    """What a script finds in each page at each width, and the lines on the browser's console.
+
+    The script leaves its findings as JSON in the element ``found``, a list with an entry a frame.
+    """
+    frames = "".join(
+        f'<iframe style="width:{width}px;height:900px;border:0" srcdoc="{html.escape(page)}"></iframe>'
+        for page in pages
+        for width in WIDTHS
+    )
+    wrapper = directory / "wrapper.html"
+    text = f'<!doctype html><meta charset="utf-8"><script>{script}</script>{frames}<pre id="found"></pre>'
+    wrapper.write_text(text)
+    line = [CHROMIUM, "--headless", "--no-sandbox", "--disable-gpu", "--disable-dev-shm-usage"]
+    line += [f"--user-data-dir={directory / 'profile'}", "--enable-logging=stderr", "--window-size=1300,1000"]
+    line += ["--virtual-time-budget=10000", "--dump-dom", wrapper.as_uri()]
+    done = subprocess.run(line, capture_output=True, text=True, timeout=240, check=True)
+    found = re.search(r'<pre id="found">(.*?)</pre>', done.stdout, re.DOTALL).group(1)
+    console = [said for said in done.stderr.splitlines() if "CONSOLE" in said]
+    return json.loads(html.unescape(found)), console

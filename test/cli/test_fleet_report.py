@@ -1,0 +1,66 @@
+"""``fleet report``: the page of a fleet and those of its legs, from what the last update wrote."""
+
+import time
+
+import pytest
+from made_up_fleet import made_up_fleet, made_up_leg
+from made_up_summary import made_up_summary
+
+
+@pytest.fixture
+def fleet(tmp_path):
+    """Two updated legs, one with its summary; the description has one more."""
+    (tmp_path / "fleet.yaml").write_text(
+        "legs:\n" + "".join(f"- {{id: {name}, recordings: {name}.mcap, lot: L}}\n" for name in "abc")
+    )
+    for name in "abc":
+        (tmp_path / f"{name}.mcap").touch()
+    home = tmp_path / "out" / "legs" / "a"
+    home.mkdir(parents=True)
+    (home / "summary.json").write_text(made_up_summary().to_json())
+    overview = made_up_fleet([made_up_leg("a"), made_up_leg("b")])
+    (tmp_path / "out" / "fleet.json").write_text(overview.to_json())
+    return tmp_path / "out"
+
+
+COMMAND = ("fleet", "report", "fleet.yaml", "--out", "out")
+
+
+def test_it_writes_the_pages_that_have_changed(run, fleet):
+    done = run(*COMMAND)
+    assert done.exit_code == 0
+    assert done.stdout.splitlines() == ["pages of legs that have changed: 1", "written: out/report.html"]
+    assert "Joint wear of" in (fleet / "legs" / "a" / "report.html").read_text()
+    page = (fleet / "report.html").read_text()
+    assert "3 legs, as of 20" in page
+    assert "legs/a/report.html" in page and "legs/b/report.html" not in page
+    assert "no recording of it was counted" in page  # the leg c
+    assert "changed: 0" in run(*COMMAND).stdout
+    summary = fleet / "legs" / "a" / "summary.json"
+    time.sleep(0.02)
+    summary.write_bytes(summary.read_bytes())
+    assert "changed: 1" in run(*COMMAND).stdout
+
+
+@pytest.mark.parametrize("text", ["{", "{}", '{"schema_version": 99}'])
+def test_a_summary_that_makes_no_page_costs_its_page_only(run, fleet, text):
+    (fleet / "legs" / "a" / "summary.json").write_text(text)
+    done = run(*COMMAND)
+    assert done.exit_code == 1
+    assert "summary.json" in done.stderr and len(done.stderr.splitlines()) == 1
+    assert "legs/a/report.html" not in (fleet / "report.html").read_text()
+
+
+def test_without_an_update_there_is_no_page(run, fleet):
+    (fleet / "fleet.json").unlink()
+    done = run(*COMMAND)
+    assert done.exit_code == 2
+    assert "run fleet update" in done.stderr and len(done.stderr.splitlines()) == 1
+    assert not (fleet / "report.html").exists()
+
+
+def test_how_old_a_recording_may_be(run, fleet):
+    assert "last 7 days" in (run(*COMMAND), (fleet / "report.html").read_text())[1]
+    run(*COMMAND, "--fresh-days", "30")
+    assert "last 30 days" in (fleet / "report.html").read_text()
+    assert run(*COMMAND, "--fresh-days", "0").exit_code == 2

@@ -184,6 +184,12 @@ class Accounting:
             return np.zeros(len(samples), bool)
         return is_within(samples["stamp_ns"], self._counted)
 
+    @property
+    def is_all_counted(self) -> bool:
+        """Whether there were samples, and the ledger already contained the wear of all of them."""
+        state = self.state
+        return state.skipped > 0 and not (state.spans or state.past or state.anew)
+
     def begin_epoch(self) -> None:
         """The clock has begun anew: stamps from now on are of another time than those before."""
         epoch = self.ledger.epoch if self.ledger else 0

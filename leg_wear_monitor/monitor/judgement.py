@@ -80,6 +80,7 @@ class Judge:
             state.mismatch.explanation,
             self._without_zero(),
             self._forecaster.last_measured(self._accounting.replaced_ns),
+            self._accounting.is_all_counted,
         )
         return VerdictReport(stamp_ns, dated(findings(situation), state.findings, stamp_ns))
 
@@ -116,6 +117,7 @@ def situation_of(
     explained: TorqueExplanation | None = None,
     without_zero: str = "",
     measured: Sequence[Measurement | None] = (),
+    is_all_counted: bool = False,
 ) -> Situation:
     """What the verdict depends on, at the end of an evaluation period.
 
@@ -135,6 +137,8 @@ def situation_of(
         Why nothing is monitored while the crank's zero is not known; empty if it is.
     measured : sequence of Measurement or None, optional
         Last measurement of each joint's part.
+    is_all_counted : bool
+        Whether the ledger already contained the wear of all samples.
     """
     alarms, config = evaluation.board.alarms, evaluation.config
     labels = {name: joint.label for name, joint in twin.mechanism.joints.items()}
@@ -149,6 +153,7 @@ def situation_of(
         alarms=tuple(alarms.values()),
         quantities=specs.QUANTITIES,
         has_cycle=last is not None,
+        is_all_counted=is_all_counted,
         has_torque=last is not None and last.torque_samples > 0,
         mismatch=last.torque_mismatch if last else math.nan,
         mismatch_limit=config.limits.torque_mismatch,

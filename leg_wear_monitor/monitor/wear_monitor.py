@@ -412,4 +412,9 @@ class WearMonitor:
     @property
     def is_all_counted(self) -> bool:
         """Whether there were samples, and the ledger already contained the wear of all of them."""
-        return self._accounting.state.skipped > 0 and not self._accounting.state.spans
+        return self._accounting.is_all_counted
+
+    @property
+    def already_counted_s(self) -> float:
+        """Time of the samples that the ledger already contained the wear of [s]."""
+        return self._accounting.state.skipped_s

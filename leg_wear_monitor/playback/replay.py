@@ -1,5 +1,6 @@
 """Replay of a recording through the monitor; the reports equal those of a live run."""
 
+import os
 from collections.abc import Callable, Iterable, Iterator, Mapping
 from contextlib import ExitStack, nullcontext
 from pathlib import Path
@@ -124,6 +125,9 @@ def replay(
 ) -> ReplayResult:
     """Replay a recording through the monitor.
 
+    What the ledger contains already is not counted again; if that is all of the recording, ledger and earlier
+    reports stay as they are.
+
     The ledger is written last and atomically. An interrupted replay leaves the ledger unchanged, so repeating
     the replay gives the same result.
 
@@ -204,15 +208,21 @@ def replay(
         stack.callback(monitor.abandon)
         history, evidence = History(monitor.clearance_joints), GaitEvidence(config)
         result = ReplayResult(monitor, history, recording.files, recording.topics, time, evidence)
-        with nullcontext() if out is None else _sink(Path(out), monitor, node, recording.files) as sink:
+        part = None if out is None else _place(Path(out), recording.files)
+        if part:
+            stack.callback(part.unlink, missing_ok=True)
+        with Sink(part, monitor, node) if part else nullcontext() as sink:
             if ready:
                 ready(monitor)
             _run(result, recording, sink, progress)
+        if out is not None and part:
+            _put_in_place(part, Path(out) / REPORTS_FILE, result)
         result.findings = recording.findings + _about_the_ledger(result)
         result.is_partial = recording.is_partial
         if finish:
             finish(result)
-        if not result.is_unusable:  # otherwise the wear of another machine would remain in the ledger
+        # otherwise the wear of another machine would remain in the ledger, or a run that counted nothing
+        if not result.is_unusable and not monitor.is_all_counted:
             monitor.close()
     return result
 
@@ -252,7 +262,11 @@ def _about_the_ledger(result: ReplayResult) -> list[Finding]:
         path = Path(result.monitor.config.ledger.path)
         found.append(Finding(path, result.monitor.ledger_loss, Severity.NOTE))
     if result.monitor.is_all_counted:
-        found.append(Finding(result.files[0], "all of it is in the ledger already", Severity.NOTE))
+        text = "everything in this recording is in the ledger already: nothing was counted"
+        found.append(Finding(result.files[0], text, Severity.NOTE))
+    elif result.monitor.already_counted_s > 0.0:
+        text = f"{result.monitor.already_counted_s:.4g} s of it are in the ledger already: not counted again"
+        found.append(Finding(result.files[0], text, Severity.NOTE))
     if result.monitor.config.ledger.path and result.is_unusable:
         path = Path(result.monitor.config.ledger.path)
         found.append(Finding(path, "nothing of this recording is written into the ledger", Severity.NOTE))
@@ -276,7 +290,8 @@ def node_beside(topic: str) -> str:
     return topic.rpartition("/")[0] + NODE
 
 
-def _sink(directory: Path, monitor: WearMonitor, node: str, files: list[Path]) -> Sink:
+def _place(directory: Path, files: list[Path]) -> Path:
+    """File to write reports into: beside those of an earlier replay, which may have to stay."""
     path = directory / REPORTS_FILE
     if any(path.resolve() == file.resolve() for file in files):
         raise RecordingError(str(path), "", "is to be read and written, expected another directory")
@@ -284,7 +299,13 @@ def _sink(directory: Path, monitor: WearMonitor, node: str, files: list[Path]) -
         directory.mkdir(parents=True, exist_ok=True)
     except OSError as error:
         raise RecordingError(str(directory), "", f"cannot be made: {error.strerror}") from error
-    return Sink(path, monitor, node)
+    return path.with_name(f".{path.name}.{os.getpid()}.part")
+
+
+def _put_in_place(part: Path, path: Path, result: ReplayResult) -> None:
+    """Put finished reports in their place, but empty ones not over those of an earlier replay."""
+    if not (result.monitor.is_all_counted and path.exists()):
+        part.replace(path)
 
 
 def _evaluation_periods(block: Block, config: MonitorConfig) -> Iterator[Samples]:

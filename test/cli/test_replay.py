@@ -77,6 +77,22 @@ def test_a_whole_recording(run, bag, complaints, tmp_path):
     assert (tmp_path / "out" / "report.html").read_text() == page
 
 
+def test_the_same_recording_again_keeps_the_report_and_exits_with_findings(run, bag, complaints, tmp_path):
+    arguments = ("replay", str(bag), "--ledger", "own.db", "--out", "out")
+    assert run(*arguments).exit_code == 0
+    before = {path.name: path.read_bytes() for path in (tmp_path / "out").iterdir()}
+    again = run(*arguments, "--json", "again.json")
+    assert again.exit_code == 1
+    assert complaints(again) == [
+        f"warning: {bag}: everything in this recording is in the ledger already: nothing was counted",
+        "warning: out: nothing was counted, so the earlier report stays as it is",
+    ]
+    assert re.search("^code +ALREADY_COUNTED, see .+node.md$", again.stdout, re.MULTILINE)
+    assert "written: out" not in again.stdout
+    assert {path.name: path.read_bytes() for path in (tmp_path / "out").iterdir()} == before
+    assert json.loads((tmp_path / "again.json").read_text())["verdict"]["fault_code"] == "ALREADY_COUNTED"
+
+
 def spoilt(document, draw):
     """A copy with one part removed, or of another type or value, at any depth."""
     document = json.loads(json.dumps(document))

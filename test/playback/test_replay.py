@@ -1,5 +1,6 @@
 """A replay is the live run: the same samples, the same reports, however they were cut and stored."""
 
+import itertools
 import json
 import sqlite3
 from contextlib import closing
@@ -27,6 +28,8 @@ from leg_wear_monitor.playback.result.replay_summary import summary_of
 
 SECONDS, RATE_HZ = 8, 200
 CYCLES = SECONDS - 2  # the first and the last are not whole
+
+ALL_COUNTED = "everything in this recording is in the ledger already: nothing was counted"
 
 Messages_ = list[tuple[int, int, bytes]]
 
@@ -232,8 +235,8 @@ def test_the_ledger_of_the_parameters_is_left_alone_and_one_that_is_asked_for_is
     assert len(again.history) == 0
     assert again.monitor.wear_depth_m.tobytes() == first.monitor.wear_depth_m.tobytes()
     assert not first.findings
-    assert [str(finding) for finding in again.findings] == [f"{bag}: all of it is in the ledger already"]
-    assert again.summary().recording.findings[0].text == "all of it is in the ledger already"
+    assert [str(finding) for finding in again.findings] == [f"{bag}: {ALL_COUNTED}"]
+    assert again.summary().recording.findings[0].text == ALL_COUNTED
 
 
 def test_what_is_counted_already_is_no_doubt_and_another_machine_is_not_counted(
@@ -253,6 +256,57 @@ def test_what_is_counted_already_is_no_doubt_and_another_machine_is_not_counted(
     kept = open_ledger(leg, config)
     assert kept is not None and kept.entry is None
     kept.close()
+
+
+def test_the_same_recording_again_changes_neither_ledger_nor_report(bag: Path, tmp_path: Path) -> None:
+    own, out = tmp_path / "own.db", tmp_path / "out"
+    lw.replay(bag, lw.MonitorConfig(), ledger=own, out=out)
+    kept, report = rows(own), (out / "reports.mcap").read_bytes()
+    again = lw.replay(bag, lw.MonitorConfig(), ledger=own, out=out)
+    # an alarm that the ledger holds stays the reason
+    verdict, nothing = again.summary().verdict, "everything that was received is in the ledger already"
+    assert verdict.fault_code == "TORQUE_MISMATCH"
+    assert verdict.why.endswith(f"; the leg is not monitored now: {nothing}: nothing was counted")
+    assert rows(own) == kept
+    assert (out / "reports.mcap").read_bytes() == report
+    assert [path.name for path in out.iterdir()] == ["reports.mcap"]
+    elsewhere = tmp_path / "elsewhere"
+    lw.replay(bag, lw.MonitorConfig(), ledger=own, out=elsewhere)
+    assert (elsewhere / "reports.mcap").exists()
+
+
+def part(walk: Messages_, path: Path, begin_s: float, end_s: float) -> Path:
+    """A part of the walk as a recording."""
+    begin, end = (2 * round(time_s * RATE_HZ) for time_s in (begin_s, end_s))
+    with McapWriter(path) as writer:
+        joints = writer.channel("/joint_states", encode.JOINT_STATE)
+        torque = writer.channel("/drive_torque", encode.WRENCH_STAMPED)
+        for kind, log_time_ns, raw in walk[begin:end]:
+            writer.write(joints if kind == JOINT_STATE else torque, log_time_ns, raw)
+    return path
+
+
+@pytest.mark.parametrize("order", [(0, 1), (1, 0)], ids=["in order", "the later one first"])
+def test_what_two_recordings_have_in_common_is_counted_once_and_told(
+    walk: Messages_, tmp_path: Path, leg: lw.Mechanism, order: tuple[int, int]
+) -> None:
+    parts = [part(walk, tmp_path / "a.mcap", 0.0, 5.0), part(walk, tmp_path / "b.mcap", 3.0, SECONDS)]
+    first, second = (lw.replay(parts[i], lw.MonitorConfig(), ledger=tmp_path / "own.db") for i in order)
+    assert not first.findings
+    (told,) = second.findings
+    assert str(told).startswith(f"{parts[order[1]]}: ")
+    assert str(told).endswith(" s of it are in the ledger already: not counted again")
+    common_s = float(told.text.split()[0])
+    lag_s, lost_s = 0.3, 0.3  # what the tracker leaves at an end, and what it needs at a begin
+    assert 2.0 - lag_s - lost_s <= common_s <= 2.0
+    assert second.monitor.verdict.verdict.fault_code != "ALREADY_COUNTED"
+    kept = open_ledger(leg, ledger_at(tmp_path / "own.db"))
+    assert kept is not None and kept.entry is not None
+    assert SECONDS - 2 * (lag_s + lost_s) <= kept.entry.moving_s <= SECONDS
+    spans = sorted(kept.counted_ns.tolist())
+    kept.close()
+    # no time is in two spans
+    assert all(before[1] <= after[0] for before, after in itertools.pairwise(spans))
 
 
 def rows(path: Path) -> list[str]:

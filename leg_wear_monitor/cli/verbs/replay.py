@@ -92,7 +92,7 @@ def replay(
     """Replay recordings through the monitor: MCAP, .db3, CSV and Parquet files or bag directories.
 
     Several paths are one recording. Exits with 1 if parts of it were lost, if no gait cycle in it fits this
-    leg, or if the verdict is or an alarm was one of --fail-on.
+    leg, if all of it is in the ledger already, or if the verdict is or an alarm was one of --fail-on.
     """
     check_outputs(json_file, out)
     written: list[Path] = []
@@ -100,6 +100,7 @@ def replay(
     def write(result: "ReplayResult", wall_s: float) -> None:
         written.extend(_write(result, wall_s, out, json_file))
 
+    is_report_there = out is not None and (out / SUMMARY).exists()
     result, wall_s = _run(bags, out, write, **options)
     for finding in result.findings[:_MOST_LINES]:
         click.echo(f"warning: {finding}", err=True)
@@ -114,8 +115,11 @@ def replay(
         print_replay(result, wall_s)
         for path in written:
             click.echo(f"written: {path}")
+    if is_report_there and result.monitor.is_all_counted:
+        click.echo(f"warning: {out}: nothing was counted, so the earlier report stays as it is", err=True)
     failed = (result.is_partial and not allow_partial) or is_raised(result, fail_on)
-    failed = failed or result.is_unusable or ("verdict" in fail_on and asks_to_act(result))
+    failed = failed or result.is_unusable or result.monitor.is_all_counted
+    failed = failed or ("verdict" in fail_on and asks_to_act(result))
     return WITH_FINDINGS if failed else 0
 
 
@@ -198,7 +202,7 @@ def _write(result: "ReplayResult", wall_s: float, out: Path | None, json_file: P
     summary = result.summary(wall_s, made_with={"leg_wear_monitor": version()})
     text = summary.to_json()
     written: list[Path] = []
-    if out is not None:
+    if out is not None and not (result.monitor.is_all_counted and (out / SUMMARY).exists()):
         files = {SUMMARY: text.encode(), PAGE: page_of(summary)}
         written = [out / REPORTS_FILE, *write_directory(out, files)]
     return written + write_json(json_file, text)

@@ -69,6 +69,11 @@ def impossible_torque(situation: Situation) -> Sequence[Hit]:
     ]
 
 
+def all_counted(situation: Situation) -> Sequence[Hit]:
+    """The ledger already contained the wear of all samples."""
+    return [Hit()] if situation.is_all_counted else []
+
+
 def without_zero(situation: Situation) -> Sequence[Hit]:
     """The zero of the crank's encoder is not known."""
     return _said(situation.without_zero)

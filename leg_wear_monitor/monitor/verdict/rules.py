@@ -4,7 +4,7 @@ docs/reference/monitor.md lists them; a test compares the two.
 """
 
 from leg_wear_monitor.monitor.alarms.alarm import Level
-from leg_wear_monitor.monitor.alarms.fault_codes import CRANK_ZERO
+from leg_wear_monitor.monitor.alarms.fault_codes import ALREADY_COUNTED, CRANK_ZERO
 from leg_wear_monitor.monitor.alarms.words import ADVICE
 from leg_wear_monitor.monitor.diagnosis.diagnosis import Cause
 from leg_wear_monitor.monitor.torque_causes.explanation import TorqueCause
@@ -149,6 +149,15 @@ RULES = (
         hits=raised("remaining_life", least=Level.ERROR),
         why="joint {joint} reaches its limit within {value} with a probability of 10 % (limit {limit}){past}",
         do=f"{_ROCK}; plan its replacement; {_ACKNOWLEDGE}",
+    ),
+    Rule(
+        code=ALREADY_COUNTED,
+        state=State.NOT_MONITORED,
+        hits=input_rules.all_counted,
+        why="everything that was received is in the ledger already: nothing was counted",
+        do="nothing, if a recording was replayed again; for its report, replay it without a ledger; "
+        "on a live leg, check the clock of the samples",
+        not_valid=OF_THE_GAIT,
     ),
     Rule(
         code=CRANK_ZERO,

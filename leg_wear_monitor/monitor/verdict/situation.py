@@ -70,6 +70,8 @@ class Situation:
         Noun of each alarm's value, by the alarm's name; by its kind for an alarm of a joint.
     has_cycle : bool
         Whether a whole gait cycle was monitored in this run.
+    is_all_counted : bool
+        Whether the ledger already contained the wear of all samples of this run.
     has_torque : bool
         Whether the last gait cycle has samples of the drive torque.
     mismatch, mismatch_limit : float
@@ -101,6 +103,7 @@ class Situation:
     alarms: tuple[Alarm, ...] = ()
     quantities: Mapping[str, str] = attrs.field(factory=dict)
     has_cycle: bool = True
+    is_all_counted: bool = False
     has_torque: bool = True
     mismatch: float = 0.0
     mismatch_limit: float = math.nan

@@ -143,6 +143,12 @@ CASES = [
     ({"alarms": (alarm("growth A"),)}, State.INSPECT, "GROWTH_A", ()),
     ({"alarms": (alarm("remaining_life A"),)}, State.INSPECT, "REMAINING_LIFE_A", ()),
     (
+        {"is_all_counted": True, "has_cycle": False, "unfollowed": "not followed for 8 s"},
+        State.NOT_MONITORED,
+        "ALREADY_COUNTED",
+        (Figure.GROWTH, Figure.IMPACT_FORCES),
+    ),
+    (
         {"unfollowed": "two series of crank angles"},
         State.NOT_MONITORED,
         "NOT_FOLLOWED",

@@ -17,7 +17,7 @@ from leg_wear_monitor.share import share_directory
 COULD_NOT, INTERRUPTED = 2, 130
 
 _VERBS = (
-    "cache", "check", "commission", "demo", "fleet", "gait-publisher", "life", "materials", "measure",
+    "cache", "check", "commission", "demo", "draw", "fleet", "gait-publisher", "life", "materials", "measure",
     "monitor", "play", "replay", "report", "simulate", "study",
 )  # fmt: skip
 

@@ -7,6 +7,7 @@ import attrs
 import numpy as np
 
 from leg_wear_monitor.data_frame import data_frame
+from leg_wear_monitor.drawable import Drawable
 from leg_wear_monitor.json_text import json_text
 from leg_wear_monitor.mechanism.arrays import Floats
 from leg_wear_monitor.wear.cycle_jump import WearRate
@@ -58,7 +59,7 @@ class LifePoint:
 
 
 @attrs.frozen(eq=False)
-class Life:
+class Life(Drawable):
     """A life as arrays over p points and k clearance joints.
 
     Attributes

@@ -10,16 +10,10 @@ from numpy.typing import ArrayLike
 
 from leg_wear_monitor.mechanism.arrays import Floats, body_names, com_poses, point_from_com
 from leg_wear_monitor.mechanism.constraints import DRIVE
+from leg_wear_monitor.mechanism.continuation import follow, positions
 from leg_wear_monitor.mechanism.forces import applied_forces_at
-from leg_wear_monitor.mechanism.position import (
-    Linkage,
-    assemble,
-    drive_column,
-    follow,
-    gammas,
-    jacobians,
-    positions,
-)
+from leg_wear_monitor.mechanism.position import Linkage, assemble, drive_column, gammas, jacobians
+from leg_wear_monitor.mechanism.spec import Mechanism
 
 TURN = 2.0 * math.pi
 
@@ -170,6 +164,12 @@ def point_motion(
     across = np.stack([-lever[:, 1], lever[:, 0]], axis=1)
     w, alpha = v[:, 2:], a[:, 2:]
     return q[:, :2] + lever, v[:, :2] + w * across, a[:, :2] + alpha * across - w * w * lever
+
+
+def point_path(mechanism: Mechanism, q: Floats, body: str, point: str) -> Floats:
+    """Position (N, 2) [m] of a point of a body at coordinates q (N, n, 3)."""
+    i = body_names(mechanism).index(body)
+    return q[:, i, :2] + rotated(point_from_com(mechanism, body, point), q[:, i, 2])
 
 
 def rotated(vector: ArrayLike, angle: ArrayLike) -> Floats:

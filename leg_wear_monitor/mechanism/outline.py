@@ -8,7 +8,7 @@ import numpy as np
 from leg_wear_monitor.mechanism.arrays import Floats
 from leg_wear_monitor.mechanism.ideal import ideal_motion, point_motion
 from leg_wear_monitor.mechanism.position import build_linkage
-from leg_wear_monitor.mechanism.spec import GROUND, Mechanism
+from leg_wear_monitor.mechanism.spec import GROUND, Mechanism, PrismaticJoint
 
 
 @attrs.frozen(eq=False)
@@ -50,6 +50,13 @@ def outline_of(mechanism: Mechanism) -> Outline:
 def is_on_ground(mechanism: Mechanism, joint: str) -> bool:
     """Whether a joint joins a body to the ground."""
     return GROUND in mechanism.sides(joint)
+
+
+def carriers(mechanism: Mechanism, joint: str) -> tuple[str, str]:
+    """The two bodies of a joint, last the one at whose point it is drawn: the ground, or the journal."""
+    bushing, journal = mechanism.sides(joint)
+    is_fixed = bushing == GROUND and not isinstance(mechanism.joints[joint], PrismaticJoint)
+    return (journal, bushing) if is_fixed else (bushing, journal)
 
 
 def corners(points: Mapping[str, Floats]) -> Floats:

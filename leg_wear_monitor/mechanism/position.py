@@ -1,4 +1,4 @@
-"""Position analysis: assembly, and continuation along the crank angle (physics.md section 1)."""
+"""Position analysis: assembly at one crank angle (physics.md section 1)."""
 
 from typing import NamedTuple
 
@@ -10,8 +10,6 @@ from leg_wear_monitor.mechanism.constraints import DRIVE, Rows, closures_at, jac
 from leg_wear_monitor.mechanism.spec import Mechanism
 
 _TOLERANCE = 1.0e-12  # residual of a closed joint [m, rad], near rounding for links of a metre
-_LONGEST_STEP = np.deg2rad(2.0)  # crank step that keeps the continuation on its branch
-_SHORTEST_STEP = np.deg2rad(1.0e-4)  # crank step below which a dead point is reported
 _FAR = 0.5  # rad or link lengths: an assembly further from the initial guess is a different one
 
 
@@ -24,6 +22,14 @@ class Linkage(NamedTuple):
     mechanism: Mechanism
     arrays: MechanismArrays
     rows: Rows
+
+
+class OpenJoint(NamedTuple):
+    """A joint that does not close: its name, its gap [m], coordinates (n, 3) with all other joints closed."""
+
+    joint: str
+    gap_m: float
+    q: Floats
 
 
 class Closures(NamedTuple):
@@ -103,73 +109,38 @@ def assemble(linkage: Linkage) -> Floats:
         If there is no assembly, naming the joint that does not close and its gap; or if the one found is far
         from the initial guess.
     """
-    mechanism = linkage.mechanism
-    start = com_poses(mechanism)
-    angle = mechanism.assembly.crank_angle
-    q = _newton(linkage, start, angle)
+    where = f"{linkage.mechanism.source}: assembly"
+    q = find_assembly(linkage)
     if q is None:
-        q = _newton(linkage, _nearest(linkage, start, angle, np.ones(len(linkage.rows.body))), angle)
-    where = f"{mechanism.source}: assembly"
-    if q is None:
-        raise AssemblyError(f"{where}: no assembly near the given start: {_gap(linkage, start, angle)}")
-    moved = np.abs(q - start) / [_size(mechanism), _size(mechanism), 1.0]
-    if moved.max() > _FAR:
-        body = list(mechanism.bodies)[np.unravel_index(moved.argmax(), moved.shape)[0] - 1]
+        joint, gap_m, _ = open_joint(linkage)
         raise AssemblyError(
-            f"{where}.{body}: no assembly near the given start: the one found moves this body "
-            f"by {moved.max():.2g} (rad or link lengths), expected at most {_FAR}"
+            f"{where}: no assembly near the given start: joint {joint} stays open by {1e3 * gap_m:.3g} mm"
         )
+    if fault := far_from_start(linkage, q):
+        raise AssemblyError(f"{where}.{fault}")
     return q
 
 
-def positions(linkage: Linkage, crank_angles: Floats) -> Floats:
-    """Coordinates q (p, n, 3) at p crank angles [rad], visited in this order; see `follow`."""
-    q, angle = assemble(linkage), linkage.mechanism.assembly.crank_angle
-    found = np.empty((len(crank_angles), *q.shape))
-    for i, target in enumerate(crank_angles):
-        q, angle = follow(linkage, q, angle, target), target
-        found[i] = q
-    return found
-
-
-def follow(linkage: Linkage, q: Floats, angle: float, target: float) -> Floats:
-    """Coordinates (n, 3) at the crank angle ``target``, continued on one branch from q at ``angle`` [rad].
-
-    Raises
-    ------
-    AssemblyError
-        If there is a dead point between the angles, naming its crank angle.
-    """
-    while angle != target:
-        step = np.clip(target - angle, -_LONGEST_STEP, _LONGEST_STEP)
-        while True:
-            near = _step(linkage, q, angle, step)
-            if near is not None:
-                break
-            step *= 0.5
-            if abs(step) < _SHORTEST_STEP:
-                raise AssemblyError(
-                    f"{linkage.mechanism.source}: drive.body: "
-                    f"dead point at crank angle {np.rad2deg(angle) % 360.0:.2f} deg: "
-                    "the crank cannot turn through a full cycle"
-                )
-        q, angle = near, target if step == target - angle else angle + step
+def find_assembly(linkage: Linkage) -> Floats | None:
+    """Coordinates q (n, 3) of an assembly at the file's crank angle, from its initial guess; None without."""
+    start, angle = com_poses(linkage.mechanism), linkage.mechanism.assembly.crank_angle
+    q = newton(linkage, start, angle)
+    if q is None:
+        q = newton(linkage, nearest(linkage, start, angle, np.ones(len(linkage.rows.body))), angle)
     return q
 
 
-def _step(linkage: Linkage, q: Floats, angle: float, step: float) -> Floats | None:
-    """One continuation step [rad] along the tangent; None if it fails or passes a singular position."""
-    here = evaluate(linkage, q, np.zeros_like(q), (angle, 0.0, 0.0)).jacobian
-    sign = np.linalg.slogdet(here)[0]
-    if sign == 0.0:
-        return None
-    guess = q.copy()
-    guess[1:] += (np.linalg.solve(here, drive_column(linkage)) * step).reshape(-1, 3)
-    near = _newton(linkage, guess, angle + step)
-    if near is None or np.abs(near - guess).max() > abs(step):
-        return None
-    ahead = evaluate(linkage, near, np.zeros_like(q), (angle + step, 0.0, 0.0)).jacobian
-    return near if np.linalg.slogdet(ahead)[0] == sign else None
+def far_from_start(linkage: Linkage, q: Floats) -> str:
+    """Text on the body that an assembly has far from its initial guess; empty if it is near."""
+    size = _size(linkage.mechanism)
+    moved = np.abs(q - com_poses(linkage.mechanism)) / [size, size, 1.0]
+    if moved.max() <= _FAR:
+        return ""
+    body = list(linkage.mechanism.bodies)[np.unravel_index(moved.argmax(), moved.shape)[0] - 1]
+    return (
+        f"{body}: no assembly near the given start: the one found moves this body "
+        f"by {moved.max():.2g} (rad or link lengths), expected at most {_FAR}"
+    )
 
 
 def drive_column(linkage: Linkage) -> Floats:
@@ -179,7 +150,7 @@ def drive_column(linkage: Linkage) -> Floats:
     return column
 
 
-def _newton(linkage: Linkage, start: Floats, angle: float) -> Floats | None:
+def newton(linkage: Linkage, start: Floats, angle: float) -> Floats | None:
     """Coordinates (n, 3) by Newton's method from an initial guess; None if it does not converge."""
     q = start.copy()
     for _ in range(30):
@@ -196,7 +167,7 @@ def _newton(linkage: Linkage, start: Floats, angle: float) -> Floats | None:
     return None
 
 
-def _nearest(linkage: Linkage, start: Floats, angle: float, weight: Floats) -> Floats:
+def nearest(linkage: Linkage, start: Floats, angle: float, weight: Floats) -> Floats:
     """Coordinates with the least weighted residual of the closures near a start, by Levenberg-Marquardt."""
 
     def weighted(q: Floats) -> tuple[Floats, Floats]:
@@ -223,22 +194,28 @@ def _nearest(linkage: Linkage, start: Floats, angle: float, weight: Floats) -> F
     return q
 
 
-def _gap(linkage: Linkage, start: Floats, angle: float) -> str:
-    """Text on the joint with the smallest gap when all other joints are closed."""
+def open_joint(linkage: Linkage) -> OpenJoint:
+    """The joint with the smallest gap when all other joints are closed, at the file's crank angle."""
+    start, angle = com_poses(linkage.mechanism), linkage.mechanism.assembly.crank_angle
     rows, names = linkage.rows, list(linkage.mechanism.joints)
-    gaps: dict[str, tuple[bool, float]] = {}
+    found: list[tuple[bool, OpenJoint]] = []
     for closure, row in zip(rows.closure, rows.row, strict=True):
         if closure == DRIVE:
             continue
-        weight = np.full(len(rows.body), 100.0)
-        weight[row : row + 2] = 1.0
-        q = _nearest(linkage, start, angle, weight)
+        q = nearest(linkage, start, angle, all_but(linkage, names[closure]))
         phi = evaluate(linkage, q, np.zeros_like(q), (angle, 0.0, 0.0)).phi
         gap = float(np.hypot(*phi[row : row + 2]))
         others_open = np.abs(np.delete(phi, [row, row + 1])).max() > 0.01 * gap
-        gaps[names[closure]] = bool(others_open), gap
-    joint = min(gaps, key=lambda name: gaps[name])
-    return f"joint {joint} stays open by {1e3 * gaps[joint][1]:.3g} mm"
+        found.append((bool(others_open), OpenJoint(names[closure], gap, q)))
+    return min(found, key=lambda one: (one[0], one[1].gap_m))[1]
+
+
+def all_but(linkage: Linkage, joint: str) -> Floats:
+    """Weights (m,) of the rows for `nearest`: all joints closed rather than this one."""
+    weight = np.full(len(linkage.rows.body), 100.0)
+    row = linkage.rows.row[list(linkage.rows.closure).index(list(linkage.mechanism.joints).index(joint))]
+    weight[row : row + 2] = 1.0
+    return weight
 
 
 def _size(mechanism: Mechanism) -> float:

@@ -6,6 +6,7 @@ from typing import Annotated, Any, Literal
 import attrs
 
 from leg_wear_monitor.configuration.quantity import FieldError, described, quantity
+from leg_wear_monitor.drawable import Drawable
 from leg_wear_monitor.mechanism.clearance import Clearance
 
 Vector = tuple[float, float]
@@ -204,7 +205,7 @@ class Assembly:
 
 
 @attrs.frozen(kw_only=True)
-class Mechanism:
+class Mechanism(Drawable):
     """A planar linkage with one drive; the fields with a description are the keys of the file.
 
     Attributes

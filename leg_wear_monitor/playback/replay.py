@@ -13,6 +13,7 @@ from leg_wear_monitor.bags.budget import DEFAULT_MB
 from leg_wear_monitor.bags.findings import Finding, RecordingError, Severity
 from leg_wear_monitor.bags.pauses import Block
 from leg_wear_monitor.bags.reader import Recording
+from leg_wear_monitor.drawable import Drawable
 from leg_wear_monitor.errors import printable
 from leg_wear_monitor.mechanism.loader import load_mechanism
 from leg_wear_monitor.monitor.config.parameter_file import NODE, load_config
@@ -32,7 +33,7 @@ _LONGER, _LONGER_S = 1.05, 1.0  # stamps may span this factor times, plus these 
 
 
 @attrs.define(eq=False)
-class ReplayResult:
+class ReplayResult(Drawable):
     """Result of a replay.
 
     Attributes

@@ -74,6 +74,8 @@ class Page:
         Further style sheets, and scripts that come before those of the interactive parts.
     has_dark : bool
         Whether it follows a reader who prefers dark colours; its pictures must follow as well.
+    generator : str
+        What made it, in its head; nothing if empty.
     """
 
     title: str
@@ -85,6 +87,7 @@ class Page:
     styles: Sequence[str] = ()
     libraries: Sequence[str] = ()
     has_dark: bool = False
+    generator: str = ""
 
     @property
     def scripts(self) -> tuple[str, ...]:

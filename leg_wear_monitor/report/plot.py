@@ -10,10 +10,13 @@ from leg_wear_monitor.dynamics.result.simulation_result import SimulationResult
 from leg_wear_monitor.life.result import Life
 from leg_wear_monitor.mechanism.ideal import TURN
 from leg_wear_monitor.mechanism.spec import Mechanism
+from leg_wear_monitor.playback.replay import ReplayResult
 from leg_wear_monitor.playback.result.replay_summary import ReplaySummary
+from leg_wear_monitor.report.drawing.drawing import drawing_of
+from leg_wear_monitor.report.drawing.still import draw_drawing
 from leg_wear_monitor.report.figures.figure import BODY_COLOURS, SMALL, tidy
 from leg_wear_monitor.report.figures.force_traces import LEAST_N
-from leg_wear_monitor.report.figures.leg_picture import draw_leg
+from leg_wear_monitor.report.figures.leg_picture import PATH_POINTS
 from leg_wear_monitor.report.figures.life_picture import draw_clearances
 from leg_wear_monitor.report.figures.openings import draw_openings
 
@@ -24,11 +27,12 @@ def plot(result: Any, axes: Axes | None = None) -> Axes:
 
     Parameters
     ----------
-    result : SimulationResult, Life, ReplaySummary or Mechanism
+    result : SimulationResult, Life, ReplayResult, ReplaySummary or Mechanism
         Of a simulation, the force in each clearance joint over the turns of the crank, or without a trace the
         mean, 99 % and largest force in every joint [N]; of a life, the clearance of each joint over the gait
         cycles [µm]; of a replay, how much each clearance has opened over time; of a mechanism, its bodies at
-        crank angle 0, to scale, and the path of its toe [m].
+        crank angle 0, to scale, and the path of its toe [m]; where it does not close or turn, the
+        bodies apart, or at the dead point.
     axes : matplotlib.axes.Axes, optional
         Where to draw; new axes of pyplot without.
 
@@ -92,11 +96,14 @@ def _replay(result: ReplaySummary, axes: Axes | None = None) -> Axes:
 
 
 @plot.register
+def _replay_result(result: ReplayResult, axes: Axes | None = None) -> Axes:
+    return _replay(result.summary(), axes)
+
+
+@plot.register
 def _mechanism(result: Mechanism, axes: Axes | None = None) -> Axes:
     axes = _new() if axes is None else axes
-    draw_leg(axes, result)
-    axes.set_xlabel("x [m]", fontsize=SMALL)
-    axes.set_ylabel("y [m]", fontsize=SMALL)
+    draw_drawing(axes, drawing_of(result, points=PATH_POINTS))
     return _finished(axes)
 
 

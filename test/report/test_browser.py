@@ -8,6 +8,9 @@ import re
 import pytest
 from browser import NEEDS_CHROMIUM, WIDTHS, browse
 
+from leg_wear_monitor.mechanism.loader import load_mechanism, parse_mechanism
+from leg_wear_monitor.report.drawing.drawing import drawing_of
+from leg_wear_monitor.report.drawing.page import drawing_html
 from leg_wear_monitor.report.page import page_html
 from leg_wear_monitor.studies.plan.settings import STUDIES
 
@@ -57,7 +60,7 @@ window.addEventListener("load", () => setTimeout(() => {
   setTimeout(() => {
     frames.forEach((frame, i) => {
       const leg = frame.contentDocument.getElementById("leg-slider");
-      if (leg) found[i].slider.played = leg.dataset.frame;
+      if (found[i].slider) found[i].slider.played = leg.dataset.frame;
     });
     document.getElementById("found").textContent = JSON.stringify(found);
   }, 1500);
@@ -99,6 +102,31 @@ def test_the_slider_moves_the_leg(seen, study):
         assert slider["played"] != "200", (name, width)
     assert seen["location", 1200]["slider"]["pins"] == 2
     assert seen["location", 1200]["slider"]["last"] == 1
+
+
+def test_the_page_of_a_mechanism_moves_and_fits(document, tmp_path):
+    """One that turns with its forces, one that rocks, one that is open, one that does not move."""
+    rocking, open_, free = document("four_bar"), document("four_bar"), document("four_bar")
+    rocking["bodies"]["coupler"]["points"]["C"] = [0.13, 0.0]
+    rocking["bodies"]["rocker"]["points"]["C"] = [0.1, 0.0]
+    open_["bodies"]["coupler"]["points"]["C"] = [0.5, 0.0]
+    del free["joints"]["C"], free["clearances"]
+    mechanisms = [parse_mechanism(each, "edited.yaml") for each in (rocking, open_, free)]
+    drawings = [drawing_of(load_mechanism("four_bar"), has_forces=True), *map(drawing_of, mechanisms)]
+    assert [bool(drawing.findings) for drawing in drawings] == [False, True, True, True]
+    found, console = browse([drawing_html(drawing) for drawing in drawings], tmp_path)
+    assert console == []
+    for page in found:
+        assert page["overflow"] <= 0
+        assert (page["small"], page["tables"]) == (0, 2)
+    for page in found[:6]:
+        assert page["slider"]["playing"] == "true"
+        assert page["slider"]["played"] != page["slider"]["frame"]
+        assert page["slider"]["letters"] == "ABCD"
+    assert [page["slider"]["moved"] for page in found[:6:2]] == [True, False, True]  # at its last one already
+    assert [page["slider"] for page in found[6:]] == [None, None]
+    assert all(re.fullmatch(r"[A-D]: \d+ N", said) for said in found[0]["slider"]["said"])
+    assert found[0]["slider"]["arrows"] == 4
 
 
 def test_what_is_wrong_would_be_seen(tmp_path):

@@ -5,6 +5,7 @@ from typing import TYPE_CHECKING, Any
 import attrs
 
 from leg_wear_monitor.data_frame import data_frame
+from leg_wear_monitor.drawable import Drawable
 from leg_wear_monitor.dynamics.result.document import joint_document, part_document, trace_document
 from leg_wear_monitor.dynamics.result.parts import (
     EnergyBalance,
@@ -26,7 +27,7 @@ SCHEMA_VERSION = 1
 
 
 @attrs.frozen(eq=False)
-class SimulationResult:
+class SimulationResult(Drawable):
     """Result of `simulate` over the counted cycles.
 
     Attributes

@@ -7,6 +7,7 @@ import attrs
 
 from leg_wear_monitor.configuration.strict import structure
 from leg_wear_monitor.data_frame import data_frame
+from leg_wear_monitor.drawable import Drawable
 from leg_wear_monitor.errors import ConfigError
 from leg_wear_monitor.json_text import json_text
 from leg_wear_monitor.monitor.ledger.entry import Measurement
@@ -34,7 +35,7 @@ SCHEMA_VERSION = 2
 
 
 @attrs.frozen(kw_only=True, eq=False)
-class ReplaySummary:
+class ReplaySummary(Drawable):
     """Results of a replay; its page contains nothing else.
 
     Attributes

@@ -10,7 +10,7 @@ from matplotlib.lines import Line2D
 from matplotlib.patches import Polygon
 
 from leg_wear_monitor.mechanism.arrays import Floats
-from leg_wear_monitor.report.figures.figure import INK, PAPER, USUAL, VERMILION
+from leg_wear_monitor.report.figures.figure import INK, PAPER, USUAL, VERMILION, plain
 
 _HALO = [patheffects.withStroke(linewidth=3.0, foreground=PAPER)]
 
@@ -72,7 +72,7 @@ def draw_joint(axes: Axes, place: Floats, names: Mapping[str, bool], away: Float
 def write_beside(axes: Axes, place: Floats, text: str, offset: tuple[float, float], colour: str) -> None:
     """Write bold text at an offset (2,) [points] from a place (2,) [m]."""
     axes.annotate(
-        text,
+        plain(text),
         (float(place[0]), float(place[1])),
         xytext=offset,
         textcoords="offset points",
@@ -84,6 +84,13 @@ def write_beside(axes: Axes, place: Floats, text: str, offset: tuple[float, floa
         path_effects=_HALO,
         zorder=30.0,
     )
+
+
+def draw_gap(axes: Axes, ends: tuple[Floats, Floats], text: str) -> None:
+    """Draw the distance between the two points (2,) [m] of an open joint."""
+    axes.plot(*np.array(ends).T, "--", color=VERMILION, linewidth=1.8, zorder=19.0)
+    axes.plot(*ends[0], "o", markerfacecolor=PAPER, markeredgecolor=VERMILION, markersize=5.5, zorder=20.0)
+    write_beside(axes, 0.5 * (ends[0] + ends[1]), text, (0.0, 22.0), VERMILION)
 
 
 def joint_mark(has_clearance: bool, place: Floats | tuple[float, float] = (0.0, 0.0)) -> Line2D:

@@ -7,6 +7,8 @@ from matplotlib.axes import Axes
 from matplotlib.backends.backend_agg import FigureCanvasAgg
 from matplotlib.figure import Figure
 
+from leg_wear_monitor.errors import printable
+
 # Okabe and Ito, Color Universal Design, 2008
 BLUE, ORANGE, GREEN, VERMILION = "#0072b2", "#e69f00", "#009e73", "#d55e00"
 PURPLE, SKY, YELLOW = "#cc79a7", "#56b4e9", "#f0e442"
@@ -30,12 +32,17 @@ def png(figure: Figure, dots_per_inch: float = 100.0) -> bytes:
     return buffer.getvalue()
 
 
-def svg(figure: Figure) -> bytes:
+def svg(figure: Figure, creator: str | None = None) -> bytes:
     """The figure as SVG, for figures with few lines; equal figures give equal bytes."""
     buffer = io.BytesIO()
     with matplotlib.rc_context({"svg.hashsalt": "leg_wear_monitor"}):
-        figure.savefig(buffer, format="svg", metadata={"Date": None, "Creator": None})
+        figure.savefig(buffer, format="svg", metadata={"Date": None, "Creator": creator})
     return buffer.getvalue()
+
+
+def plain(text: str) -> str:
+    """A name from a file as matplotlib writes it: on one line, and a dollar sign begins no formula."""
+    return printable(text, 200).replace("$", r"\$")
 
 
 def tidy(axes: Axes) -> None:

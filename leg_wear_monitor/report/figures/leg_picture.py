@@ -9,12 +9,15 @@ from matplotlib.figure import Figure
 from matplotlib.lines import Line2D
 
 from leg_wear_monitor.mechanism.arrays import Floats
-from leg_wear_monitor.mechanism.ideal import IdealMotion, ideal_motion, one_cycle, point_motion
+from leg_wear_monitor.mechanism.ideal import ideal_motion, one_cycle, point_path
+from leg_wear_monitor.mechanism.outline import carriers
 from leg_wear_monitor.mechanism.outline import corners as body_corners
-from leg_wear_monitor.mechanism.position import Linkage, build_linkage
+from leg_wear_monitor.mechanism.position import build_linkage
+from leg_wear_monitor.mechanism.reach.reach import Reach
 from leg_wear_monitor.mechanism.spec import GROUND, Mechanism, PrismaticJoint
 from leg_wear_monitor.report.figures.bodies import (
     draw_body,
+    draw_gap,
     draw_joint,
     draw_spring,
     draw_support,
@@ -22,9 +25,18 @@ from leg_wear_monitor.report.figures.bodies import (
     lighter,
     write_beside,
 )
-from leg_wear_monitor.report.figures.figure import BODY_COLOURS, INK, SMALL, USUAL, new_figure, tidy
+from leg_wear_monitor.report.figures.figure import (
+    BODY_COLOURS,
+    INK,
+    SMALL,
+    USUAL,
+    VERMILION,
+    new_figure,
+    plain,
+    tidy,
+)
 
-_PATH_POINTS = 360
+PATH_POINTS = 360
 _TOE_EVERY, _BODIES_EVERY = 30, 60
 _NEAR_M = 1.0e-3  # joints closer than this are drawn at one place [m]
 _PANEL_IN, _KEY_IN = 4.4, 1.2
@@ -55,8 +67,8 @@ def leg_picture(
         If the mechanism does not close or has a dead point.
     """
     linkage = build_linkage(mechanism)
-    here = _paths(linkage, ideal_motion(linkage, [crank_angle_rad], 1.0))
-    paths = _paths(linkage, one_cycle(linkage, _PATH_POINTS, 1.0))
+    here = _paths(mechanism, ideal_motion(linkage, [crank_angle_rad], 1.0).q)
+    paths = _paths(mechanism, one_cycle(linkage, PATH_POINTS, 1.0).q)
     low, high = _extent(paths)
     height = (_PANEL_IN - 0.5) * (high[1] - low[1]) / (high[0] - low[0]) + 0.75
     figure = new_figure(2.0 * _PANEL_IN + _KEY_IN, float(np.clip(height, 2.8, 6.4)))
@@ -71,7 +83,7 @@ def leg_picture(
     _draw_cycle(moving, mechanism, paths)
     _draw_key(key, mechanism)
     still.set_title(
-        f"{mechanism.name}, crank at {np.rad2deg(crank_angle_rad):.0f}°", fontsize=USUAL, color=INK
+        f"{plain(mechanism.name)}, crank at {np.rad2deg(crank_angle_rad):.0f}°", fontsize=USUAL, color=INK
     )
     toe = f", the toe every {_TOE_EVERY}° of the crank" if mechanism.toe else ""
     moving.set_title(f"one cycle{toe}", fontsize=USUAL, color=INK)
@@ -83,27 +95,28 @@ def leg_picture(
     return figure
 
 
-def draw_leg(axes: Axes, mechanism: Mechanism) -> None:
-    """Draw the ideal mechanism at crank angle 0, to scale, and the path of its toe over one gait cycle.
-
-    Raises
-    ------
-    AssemblyError
-        If the mechanism does not close or has a dead point.
-    """
-    linkage = build_linkage(mechanism)
-    paths = _paths(linkage, one_cycle(linkage, _PATH_POINTS, 1.0))
+def draw_leg(axes: Axes, reach: Reach, shown: int) -> None:
+    """Draw one position of a mechanism to scale, the path of its toe, and which joint is open or in line."""
+    mechanism = reach.mechanism
+    paths, here = _paths(mechanism, reach.q), _paths(mechanism, reach.q[shown : shown + 1])
     low, high = _extent(paths)
-    _draw_still(axes, mechanism, paths, paths, mechanism.clearance_joints)
-    _draw_toe_path(axes, mechanism, paths)
+    _draw_still(axes, mechanism, here, paths, mechanism.clearance_joints)
+    _draw_toe_path(axes, mechanism, paths, is_closed=reach.turns)
+    for joint in mechanism.joints:
+        if reach.is_open(joint):
+            first, last = (here[body][joint][0] for body in carriers(mechanism, joint))
+            draw_gap(axes, (first, last), f"{1e3 * reach.gap_of(joint)[shown]:.3g} mm")
+    for dead, i in ((reach.low, 0), (reach.high, len(reach.q) - 1)):
+        if dead is not None and dead.is_in_line and i == shown and not reach.open_joint:
+            line = np.array([here[mechanism.sides(joint)[1]][joint][0] for joint in dead.joints])
+            axes.plot(*line.T, "--", color=VERMILION, linewidth=1.8, zorder=19.0)
     axes.set(aspect="equal", xlim=(low[0], high[0]), ylim=(low[1], high[1]))
 
 
-def _paths(linkage: Linkage, motion: IdealMotion) -> Paths:
-    """Path (N, 2) [m] of every point over the motion, by body and point."""
-    mechanism = linkage.mechanism
+def _paths(mechanism: Mechanism, q: Floats) -> Paths:
+    """Path (N, 2) [m] of every point at coordinates q (N, n, 3), by body and point."""
     return {
-        body: {point: point_motion(motion, linkage, body, point)[0] for point in mechanism.points_of(body)}
+        body: {point: point_path(mechanism, q, body, point) for point in mechanism.points_of(body)}
         for body in (GROUND, *mechanism.bodies)
     }
 
@@ -158,7 +171,7 @@ def _places(mechanism: Mechanism, here: Paths) -> list[tuple[list[str], Floats]]
     """Groups of joints that share a place: their names, and the place (2,) [m]."""
     groups: list[tuple[list[str], Floats]] = []
     for name in mechanism.joints:
-        place = here[mechanism.sides(name)[1]][name][0]
+        place = here[carriers(mechanism, name)[1]][name][0]
         near = [names for names, other in groups if np.hypot(*(place - other)) < _NEAR_M]
         if near:
             near[0].append(name)
@@ -169,7 +182,7 @@ def _places(mechanism: Mechanism, here: Paths) -> list[tuple[list[str], Floats]]
 
 def _draw_cycle(axes: Axes, mechanism: Mechanism, paths: Paths) -> None:
     for body, colour in _colours(mechanism).items():
-        for i in range(0, _PATH_POINTS, _PATH_POINTS * _BODIES_EVERY // 360):
+        for i in range(0, PATH_POINTS, PATH_POINTS * _BODIES_EVERY // 360):
             corners = _outline_at(paths, body, i)
             axes.plot(
                 *np.vstack([corners, corners[:1]]).T,
@@ -182,19 +195,22 @@ def _draw_cycle(axes: Axes, mechanism: Mechanism, paths: Paths) -> None:
     _draw_toe_path(axes, mechanism, paths)
 
 
-def _draw_toe_path(axes: Axes, mechanism: Mechanism, paths: Paths) -> None:
+def _draw_toe_path(axes: Axes, mechanism: Mechanism, paths: Paths, is_closed: bool = True) -> None:
     if mechanism.toe is not None:
         body, point = mechanism.toe
         path = paths[body][point]
+        if not is_closed:
+            axes.plot(*path.T, color=INK, linewidth=2.0, zorder=20.0)
+            return
         axes.plot(*np.vstack([path, path[:1]]).T, color=INK, linewidth=2.0, zorder=20.0)
-        every = _PATH_POINTS * _TOE_EVERY // 360
+        every = PATH_POINTS * _TOE_EVERY // 360
         axes.plot(*path[::every].T, "o", color=INK, markersize=4.0, zorder=21.0)
 
 
 def _draw_key(axes: Axes, mechanism: Mechanism) -> None:
     axes.set_axis_off()
     entries = {
-        body: Line2D([], [], color=lighter(colour, 0.4), linewidth=7.0, solid_capstyle="round")
+        plain(body): Line2D([], [], color=lighter(colour, 0.4), linewidth=7.0, solid_capstyle="round")
         for body, colour in _colours(mechanism).items()
     }
     entries |= {"clearance joint": joint_mark(True), "ideal joint": joint_mark(False)}

@@ -8,7 +8,8 @@
   const svg = root.querySelector(".leg"), pins = root.querySelector(".pins");
   const slider = root.querySelector("input"), angle = root.querySelector(".angle");
   const play = root.querySelector(".play"), choice = root.querySelector(".run");
-  const unit = data.box[3] / 100;  // a hundredth of the picture's height
+  const said = root.querySelector(".said");
+  const unit = Math.max(data.box[3], 0.6 * data.box[2]) / 100;  // a hundredth of the picture's height
 
   function add(parent, name, attributes, text) {
     const element = document.createElementNS("http://www.w3.org/2000/svg", name);
@@ -22,7 +23,7 @@
   }
 
   if (data.toe.length) {
-    add(svg, "path", { d: line(data.toe, true), fill: "none", stroke: INK, "stroke-width": 0.5 * unit, "stroke-dasharray": 1.5 * unit });
+    add(svg, "path", { d: line(data.toe, data.turns), fill: "none", stroke: INK, "stroke-width": 0.5 * unit, "stroke-dasharray": 1.5 * unit });
   }
   const bodies = data.bodies.map((body) => {
     const group = add(svg, "g", {});
@@ -36,13 +37,23 @@
   data.joints.forEach((joint, i) => {
     const twin = data.joints.slice(0, i).some((o) => Math.hypot(o.path[0][0] - joint.path[0][0], o.path[0][1] - joint.path[0][1]) < 1);
     const group = add(svg, "g", {});
+    if (joint.ground) add(group, "path", { d: "M0 0L" + -2 * unit + " " + 3.4 * unit + "H" + 2 * unit + "Z", fill: "#8a8a8a" });
     const mark = add(group, "circle", { r: 1.1 * unit, fill: "#ffffff", stroke: INK, "stroke-width": 0.4 * unit });
     const letter = add(group, "text", {
       "text-anchor": "middle", "font-size": 4 * unit, "font-weight": 700, fill: INK,
       stroke: "#ffffff", "stroke-width": 0.9 * unit, "paint-order": "stroke", "font-family": "sans-serif"
     }, joint.name);
     joints[joint.name] = { path: joint.path, group: group, mark: mark, letter: letter, twin: twin };
+    if (joint.other) {
+      joints[joint.name].open = joint;
+      joints[joint.name].gap = add(svg, "path", { fill: "none", stroke: VERMILION, "stroke-width": 0.9 * unit, "stroke-dasharray": 1.6 * unit });
+      joints[joint.name].end = add(svg, "circle", { r: 1.1 * unit, fill: "#ffffff", stroke: VERMILION, "stroke-width": 0.6 * unit });
+    }
   });
+  const inLine = data.marks.map((mark) => ({
+    frame: mark.frame,
+    path: add(svg, "path", { d: line(mark.line, false), fill: "none", stroke: VERMILION, "stroke-width": 0.9 * unit, "stroke-dasharray": 2 * unit })
+  }));
   // A letter stands on the side of its joint that is away from the joints near it.
   function placeLetter(joint, index) {
     const here = joint.path[index];
@@ -74,18 +85,23 @@
   }
 
   function choose(index) {
-    run = data.runs[index];
+    run = data.runs[index] || { pins: {} };
     while (pins.firstChild) pins.removeChild(pins.firstChild);
     while (arrows.firstChild) arrows.removeChild(arrows.firstChild);
     for (const name in joints) {
-      const loose = name in run.pins;
+      const loose = name in run.pins && run.pins[name].e || joints[name].open;
       joints[name].mark.setAttribute("stroke", loose ? VERMILION : INK);
       joints[name].mark.setAttribute("stroke-width", (loose ? 0.8 : 0.4) * unit);
       joints[name].letter.setAttribute("fill", loose ? VERMILION : INK);
     }
     parts = Object.keys(run.pins).map((name) => {
       const pin = run.pins[name], box = document.createElement("div");
+      const text = document.createElement("p"), force = add(arrows, "g", {});
       pins.appendChild(box);
+      if (!pin.e) {  // a joint without clearance
+        box.appendChild(text);
+        return { name: name, pin: pin, text: text, force: force };
+      }
       const picture = add(box, "svg", { viewBox: "-70 -70 140 140", role: "img", "aria-label": "Pin " + name + " in its bushing" });
       add(picture, "path", { d: "M-66-66H66V66H-66Z M" + BUSHING + " 0A" + BUSHING + " " + BUSHING + " 0 1 0 " + -BUSHING + " 0A" + BUSHING + " " + BUSHING + " 0 1 0 " + BUSHING + " 0Z", fill: PALE, "fill-rule": "evenodd" });
       add(picture, "circle", { r: BUSHING, fill: "none", stroke: INK, "stroke-width": 1.2 });
@@ -95,19 +111,21 @@
       const centre = add(picture, "circle", { r: 2, fill: INK });
       const push = add(picture, "g", {});
       add(picture, "text", { x: -62, y: -50, "font-size": 16, "font-weight": 700, fill: VERMILION, "font-family": "sans-serif" }, name);
-      const text = document.createElement("p");
       box.appendChild(text);
-      return { name: name, pin: pin, disc: disc, centre: centre, push: push, text: text, force: add(arrows, "g", {}) };
+      return { name: name, pin: pin, disc: disc, centre: centre, push: push, text: text, force: force };
     });
     show(frame);
   }
 
   function show(index) {
     frame = index;
-    slider.value = index;
-    const degrees = Math.round(360 * index / data.frames);
-    angle.textContent = degrees + "°";
-    slider.setAttribute("aria-valuetext", degrees + " degrees");
+    if (slider) {
+      const degrees = Number(data.angles[index].toFixed(data.digits));
+      slider.value = index;
+      angle.textContent = degrees + "°";
+      slider.setAttribute("aria-valuetext", degrees + " degrees");
+    }
+    const words = [];
     bodies.forEach((body) => {
       const pose = body.poses[index];
       body.group.setAttribute("transform", "translate(" + pose[0] + " " + pose[1] + ") rotate(" + pose[2] + ")");
@@ -116,32 +134,57 @@
       const place = joints[name].path[index];
       joints[name].group.setAttribute("transform", "translate(" + place[0] + " " + place[1] + ")");
       placeLetter(joints[name], index);
-    }
-    parts.forEach((part) => {
-      const e = part.pin.e[index], f = part.pin.f[index], size = Math.hypot(f[0], f[1]), share = Math.sqrt(size / data.longest_n);
-      for (const circle of [part.disc, part.centre]) {
-        circle.setAttribute("cx", GAP * e[0]);
-        circle.setAttribute("cy", GAP * e[1]);
+      const open = joints[name].open;
+      if (open) {
+        joints[name].gap.setAttribute("d", line([place, open.other[index]], false));
+        joints[name].end.setAttribute("cx", open.other[index][0]);
+        joints[name].end.setAttribute("cy", open.other[index][1]);
+        words.push("Joint " + name + " is open by " + open.gap_mm[index] + " mm.");
       }
+    }
+    inLine.forEach((mark) => mark.path.setAttribute("visibility", mark.frame === index ? "visible" : "hidden"));
+    if (data.said[index]) words.push(data.said[index]);
+    said.textContent = words.join(" ");
+    parts.forEach((part) => {
+      const f = part.pin.f[index], size = Math.hypot(f[0], f[1]), share = Math.sqrt(size / data.longest_n);
       const place = joints[part.name].path[index];
       arrow(part.force, place[0], place[1], f[0], f[1], share * data.arrow_mm, 0.9 * unit);
-      arrow(part.push, GAP * e[0], GAP * e[1], f[0], f[1], share * 34, 2);
       part.text.textContent = part.name + ": " + (size < 0.05 ? "free" : size.toFixed(0) + " N");
+      if (part.pin.e) {
+        const e = part.pin.e[index];
+        for (const circle of [part.disc, part.centre]) {
+          circle.setAttribute("cx", GAP * e[0]);
+          circle.setAttribute("cy", GAP * e[1]);
+        }
+        arrow(part.push, GAP * e[0], GAP * e[1], f[0], f[1], share * 34, 2);
+      }
     });
     root.dataset.frame = index;
   }
 
-  slider.addEventListener("input", () => show(Number(slider.value)));
+  // A crank that does not turn through goes to and fro.
+  let way = 1;
+  function next() {
+    if (data.turns) return (frame + data.skip) % data.frames;
+    if (frame + way * data.skip < 0 || frame + way * data.skip >= data.frames) way = -way;
+    return Math.min(Math.max(frame + way * data.skip, 0), data.frames - 1);
+  }
+
+  if (data.marks.length || data.joints.some((joint) => joint.other)) said.hidden = false;
   if (choice) choice.addEventListener("change", () => choose(Number(choice.value)));
-  play.addEventListener("click", () => {
-    if (timer === null) {
-      timer = setInterval(() => show((frame + 2) % data.frames), 45);
-    } else {
-      clearInterval(timer);
-      timer = null;
-    }
-    play.textContent = timer === null ? "Play" : "Pause";
-    play.setAttribute("aria-pressed", String(timer !== null));
-  });
+  if (slider) {
+    slider.addEventListener("input", () => show(Number(slider.value)));
+    play.addEventListener("click", () => {
+      if (timer === null) {
+        timer = setInterval(() => show(next()), 45);
+      } else {
+        clearInterval(timer);
+        timer = null;
+      }
+      play.textContent = timer === null ? "Play" : "Pause";
+      play.setAttribute("aria-pressed", String(timer !== null));
+    });
+  }
   choose(0);
+  if (data.first) show(data.first);
 })();

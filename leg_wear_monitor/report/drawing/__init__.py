@@ -1,0 +1,1 @@
+"""Picture of a mechanism, working or not: one HTML file, or SVG."""

@@ -1,0 +1,67 @@
+"""What a notebook shows: small, without scripts, with names as text; and `plot` as a method."""
+
+import attrs
+import pytest
+from made_up_summary import made_up_summary
+from matplotlib import pyplot
+
+import leg_wear_monitor as lw
+from leg_wear_monitor.mechanism.loader import parse_mechanism
+from leg_wear_monitor.monitor.verdict.verdict import Figure
+from leg_wear_monitor.report.notebook import notebook_html
+
+pytestmark = pytest.mark.plain
+
+EVIL = "<script>alert(1)</script>"
+
+
+@pytest.fixture(autouse=True)
+def closed():
+    """Pyplot keeps its figures until they are closed."""
+    yield
+    pyplot.close("all")
+
+
+def test_a_mechanism_is_a_picture_and_its_name_is_text():
+    html = attrs.evolve(lw.load_mechanism("four_bar"), name=EVIL)._repr_html_()
+    assert "&lt;script&gt;alert(1)&lt;/script&gt;" in html
+    assert "<script" not in html
+    assert 'src="data:image/svg+xml;base64,' in html
+    assert "closes, and the crank turns through" in html
+    assert len(html) < 200_000
+
+
+def test_a_mechanism_that_does_not_close_is_shown_and_plotted(document):
+    long = document("four_bar")
+    long["bodies"]["coupler"]["points"]["C"] = [0.5, 0.0]
+    mechanism = parse_mechanism(long, "long.yaml")
+    assert "is open by 200 mm" in mechanism._repr_html_()
+    axes = mechanism.plot()
+    assert any(text.get_text() == "200 mm" for text in axes.texts)
+    assert "does not close" in axes.get_title()
+
+
+def test_a_simulation_is_a_table_of_its_joints():
+    result = lw.simulate("four_bar", clearances=[], cycles=1)
+    html = attrs.evolve(result, mechanism=EVIL)._repr_html_()
+    assert "<script" not in html
+    assert html.count('<th scope="row">') == len(result.joints)
+    assert f"<td>{result.joints['B'].max_force_n:.4g}</td>" in html
+    assert result.plot().get_ylabel() == "force [N]"
+
+
+def test_a_replay_is_its_verdict_and_clearances_only_where_valid():
+    summary = made_up_summary()
+    html = summary._repr_html_()
+    assert summary.verdict.fault_code in html
+    for not_valid, cells in (((), 0), ((Figure.CLEARANCES,), len(summary.clearances))):
+        verdict = attrs.evolve(summary.verdict, not_valid=not_valid)
+        html = attrs.evolve(summary, verdict=verdict)._repr_html_()
+        assert html.count("<td>not valid</td>") == cells
+        for each in summary.clearances.values():
+            assert (f"<td>{1e3 * each.counted_m:.4g}</td>" in html) is (cells == 0)
+
+
+def test_what_is_no_result_is_named():
+    with pytest.raises(TypeError, match="dict has no HTML"):
+        notebook_html({})

@@ -1,0 +1,84 @@
+"""Learning from the ledgers of a fleet, before an update or after it."""
+
+from collections.abc import Mapping, Sequence
+from contextlib import closing
+from pathlib import Path
+
+import attrs
+
+from leg_wear_monitor.errors import LegWearError
+from leg_wear_monitor.fleet.description.fleet_description import FleetLeg
+from leg_wear_monitor.fleet.directory.leg_directory import LegDirectory
+from leg_wear_monitor.fleet.learning.files import write_learning
+from leg_wear_monitor.fleet.learning.learn import LearnedPair, learn
+from leg_wear_monitor.fleet.learning.part import Part, parts_of
+from leg_wear_monitor.mechanism.loader import load_mechanism
+from leg_wear_monitor.monitor.config.fitting import fitted
+from leg_wear_monitor.monitor.ledger.copy import copy_of
+from leg_wear_monitor.monitor.ledger.ledger import open_ledger
+
+
+@attrs.frozen(kw_only=True)
+class FleetLearning:
+    """What a fleet has learned.
+
+    Attributes
+    ----------
+    pairs : mapping of str to LearnedPair
+        By material pair.
+    priors : mapping of str to pathlib.Path
+        File for ``forecast.priors`` of each leg.
+    findings : tuple of (str, str)
+        The leg, and a line about a part that contradicts the others, or a ledger that cannot be read.
+    """
+
+    pairs: Mapping[str, LearnedPair]
+    priors: Mapping[str, Path]
+    findings: tuple[tuple[str, str], ...]
+
+
+def learn_fleet(legs: Sequence[FleetLeg], out: Path) -> FleetLearning:
+    """Learn from the measured clearances in the ledgers of a fleet, and write what was learned.
+
+    Parameters
+    ----------
+    legs : sequence of FleetLeg
+        In any order; the result is the same. A leg without a ledger has new parts.
+    out : pathlib.Path
+        Directory of the fleet, which exists.
+    """
+    parts: list[Part] = []
+    findings = []
+    for leg in sorted(legs, key=lambda leg: leg.id):
+        try:
+            parts += leg_parts(leg, LegDirectory(out, leg.id).ledger)
+        except LegWearError as error:
+            findings.append((leg.id, f"nothing is learned from it: {error}"))
+    pairs = learn(parts)
+    for pair in pairs.values():
+        findings += [(each.part.leg, each.finding) for each in pair.measured if each.finding]
+    return FleetLearning(
+        pairs=pairs, priors=write_learning(out, parts, pairs), findings=tuple(sorted(findings))
+    )
+
+
+def leg_parts(leg: FleetLeg, path: Path) -> list[Part]:
+    """Parts of a leg, with the measured clearances of its ledger if there is one; it is left unchanged.
+
+    Raises
+    ------
+    LegWearError
+        If the ledger cannot be read.
+    """
+    mechanism = fitted(load_mechanism(leg.config.mechanism), leg.config)
+    if not path.exists():
+        return parts_of(leg.id, mechanism, leg.config.forecast, (), {}, lot=leg.lot)
+    with copy_of(path) as copy:
+        settings = attrs.evolve(leg.config, ledger=attrs.evolve(leg.config.ledger, path=str(copy)))
+        ledger = open_ledger(mechanism, settings)
+        if ledger is None:
+            raise LegWearError(f"{path}: no ledger")
+        with closing(ledger):
+            entry, measurements = ledger.entry, ledger.measurements
+    replaced_ns = {wear.name: wear.replaced_ns for wear in entry.joints} if entry else {}
+    return parts_of(leg.id, mechanism, leg.config.forecast, measurements, replaced_ns, lot=leg.lot)

@@ -1,0 +1,72 @@
+"""Learning from the ledgers of a fleet: what a leg gets from the measured clearances of others."""
+
+from pathlib import Path
+
+import attrs
+import pytest
+
+from leg_wear_monitor import load_mechanism
+from leg_wear_monitor.fleet.description.fleet_description import FleetLeg
+from leg_wear_monitor.fleet.directory.leg_directory import LegDirectory
+from leg_wear_monitor.fleet.learning.of_fleet import learn_fleet
+from leg_wear_monitor.monitor.config.fitting import fitted
+from leg_wear_monitor.monitor.config.settings import MonitorConfig
+from leg_wear_monitor.monitor.forecast.coefficient_prior import read_priors
+from leg_wear_monitor.monitor.ledger.entry import Measurement
+from leg_wear_monitor.monitor.ledger.ledger import open_ledger
+
+pytestmark = pytest.mark.plain
+
+CONFIG = MonitorConfig()
+
+
+def leg(name, lot="2026-03"):
+    config = attrs.evolve(CONFIG, hardware_id=name)
+    return FleetLeg(id=name, lot=lot, config=config, recordings=(), home=Path(), row="minute",
+                    node=None, joint_states=None, drive_torque=None)  # fmt: skip
+
+
+def measured(out, of, clearance_m):
+    """Ledger of a leg with a measured clearance of joint A after 60 µm of counted wear."""
+    path = LegDirectory(out, of.id).ledger
+    path.parent.mkdir(parents=True)
+    settings = attrs.evolve(of.config, ledger=attrs.evolve(of.config.ledger, path=str(path)))
+    ledger = open_ledger(fitted(load_mechanism(settings.mechanism), settings), settings)
+    ledger.note(
+        Measurement(
+            stamp_ns=1, joint="A", who="ann", clearance_m=clearance_m, sigma_m=2e-6, wear_m=6e-5, cycles=9,
+            replaced_ns=0, expected_below=0.5, counts=True,
+        )
+    )  # fmt: skip
+    ledger.record()
+    ledger.close()
+    return path.read_bytes()
+
+
+def test_a_new_leg_learns_from_the_ledgers_of_its_lot(tmp_path):
+    legs = [leg("a"), leg("b"), leg("new"), leg("other", "2026-09")]
+    before = [measured(tmp_path, one, 4.2e-4) for one in legs[:2]]
+    found = learn_fleet(legs, tmp_path)
+    assert found.findings == ()
+    new, other = (read_priors(str(found.priors[name])).joints["A"].present for name in ("new", "other"))
+    assert (new.basis, other.basis) == ("2 parts of lot 2026-03", "2 parts of other lots")
+    assert new.sigma < other.sigma
+    # twice the nominal coefficients of bushing and journal, as measured
+    assert 2e-15 < other.wear_coefficient_per_pa < new.wear_coefficient_per_pa < 4e-15
+    assert [LegDirectory(tmp_path, one.id).ledger.read_bytes() for one in legs[:2]] == before
+    again = learn_fleet(legs[::-1], tmp_path)
+    assert again == found
+
+
+def test_a_ledger_that_cannot_be_read_is_named_and_the_others_are_used(tmp_path):
+    legs = [leg("a"), leg("broken"), leg("new")]
+    measured(tmp_path, legs[0], 4.2e-4)
+    broken = LegDirectory(tmp_path, "broken").ledger
+    broken.parent.mkdir()
+    broken.write_bytes(b"not a ledger")
+    found = learn_fleet(legs, tmp_path)
+    ((name, text),) = found.findings
+    assert name == "broken"
+    assert text.startswith("nothing is learned from it: ")
+    assert sorted(found.priors) == ["a", "new"]
+    assert read_priors(str(found.priors["new"])).joints["A"].present.basis == "1 part of lot 2026-03"

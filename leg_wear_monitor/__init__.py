@@ -26,6 +26,8 @@ if TYPE_CHECKING:
     )
     from leg_wear_monitor.dynamics.result.simulation_result import SimulationResult
     from leg_wear_monitor.dynamics.simulation import simulate
+    from leg_wear_monitor.fleet.fleet import Fleet
+    from leg_wear_monitor.fleet.overview.parts import FleetOverview, LegOverview
     from leg_wear_monitor.life.life import LifeRun, LifeSettings, simulate_life
     from leg_wear_monitor.life.result import Life
     from leg_wear_monitor.mechanism.loader import load_mechanism
@@ -47,8 +49,11 @@ _HOME = {
     "CommissioningItem": "commissioning.result.commissioning_result",
     "CommissioningResult": "commissioning.result.commissioning_result",
     "EnergyBalance": "dynamics.result.parts",
+    "Fleet": "fleet.fleet",
+    "FleetOverview": "fleet.overview.parts",
     "Impact": "dynamics.result.parts",
     "JointResult": "dynamics.result.parts",
+    "LegOverview": "fleet.overview.parts",
     "Life": "life.result",
     "LifeRun": "life.life",
     "LifeSettings": "life.life",
@@ -83,8 +88,11 @@ __all__ = [
     "CommissioningResult",
     "ConfigError",
     "EnergyBalance",
+    "Fleet",
+    "FleetOverview",
     "Impact",
     "JointResult",
+    "LegOverview",
     "LegWearError",
     "Life",
     "LifeRun",

@@ -11,6 +11,7 @@ import pytest
 
 sys.path.insert(0, str(Path(__file__).parent))  # as a script
 
+from filled_fleet import filled_fleet
 from json_fields import Row, descriptions, rows_of, unit_of
 from made_up_summary import made_up_summary
 
@@ -82,12 +83,18 @@ def play() -> Iterator[Row]:
     yield "clearances.not_told_apart[]", "text", "", Clearances.not_told_apart.__doc__ or ""
 
 
+def fleet() -> Iterator[Row]:
+    yield VERSION
+    yield from rows_of(lw.FleetOverview)
+
+
 DOCUMENTS = {
     "simulation": simulation,
     "replay": replay,
     "life": life,
     "commissioning": commissioning,
     "play": play,
+    "fleet": fleet,
 }
 
 
@@ -109,6 +116,8 @@ def example(name: str) -> Any:
         return made_up_summary().to_dict()
     if name == "life":
         return json.loads((ROOT / "config" / "lives" / "bionic_leg.json").read_text())
+    if name == "fleet":
+        return filled_fleet().to_dict()
     if name == "play":
         numbers = ("play_rad", "sigma_rad", "count_rad", "noise_rad", "scatter_rad", "drift_rad")
         one = Play(joint="knee", load="", plateaus=(10, 10), **dict.fromkeys(numbers, 0.001))

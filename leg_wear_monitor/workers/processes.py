@@ -22,11 +22,11 @@ _THREADS = ("OMP_NUM_THREADS", "OPENBLAS_NUM_THREADS", "MKL_NUM_THREADS", "NUMBA
 
 
 def run_here(jobs: Sequence[Job], done: Done) -> None:
-    """Run jobs one after the other in this process."""
+    """Run jobs one after the other in this process, those that follow from one right after it."""
     waiting = list(reversed(jobs))
     while waiting:
         job = waiting.pop()
-        waiting.extend(done(job, job.run()) or ())
+        waiting.extend(reversed(list(done(job, job.run()) or ())))
 
 
 def run_in_processes(jobs: Sequence[Job], workers: int, done: Done) -> None:

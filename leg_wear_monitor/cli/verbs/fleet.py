@@ -1,16 +1,18 @@
 """``leg-wear-monitor fleet``: many legs, many recordings."""
 
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 import click
 
+from leg_wear_monitor.cli.options import out_option
 from leg_wear_monitor.cli.output import check_directory
 from leg_wear_monitor.cli.waiting import compilation, progress_bar
 
 if TYPE_CHECKING:
     from leg_wear_monitor.fleet.chain.queue import Chain
+    from leg_wear_monitor.fleet.description.fleet_description import FleetDescription
     from leg_wear_monitor.fleet.update import FleetUpdate
 
 WITH_FINDINGS = 1
@@ -24,39 +26,72 @@ def fleet() -> None:
 
 @fleet.command(short_help="Count the recordings that are not counted yet.")
 @click.argument("description", type=click.Path(path_type=Path), metavar="FLEET.yaml")
-@click.option(
-    "--out", type=click.Path(path_type=Path), metavar="DIR", required=True, help="Directory of the fleet."
-)
+@out_option("Directory of the fleet.  [default: out of the description, or fleet beside it]")
 @click.option(
     "--workers", type=click.IntRange(min=1), metavar="N", help="Number of local processes.  [default: cores]"
 )
 @click.option(
     "--scheduler", metavar="ADDRESS", help="Dask scheduler whose workers count instead, tcp://HOST:PORT."
 )
-def update(description: Path, out: Path, workers: int | None, scheduler: str | None) -> int:
+@click.option("--follow", is_flag=True, help="Go on with new recordings as they are completed, until ^C.")
+@click.option(
+    "--every-s",
+    type=click.FloatRange(min=0.1),
+    default=10.0,
+    show_default=True,
+    metavar="S",
+    help="With --follow: time between two looks for new recordings [s].",
+)
+def update(
+    description: Path,
+    out: Path | None,
+    workers: int | None,
+    scheduler: str | None,
+    follow: bool,
+    every_s: float,
+) -> int:
     """Bring the ledger of each leg up to date with its recordings, in the order of time.
 
     Writes ledgers, tables of the gait cycles and fleet.json. A recording counts once, whatever its name. An
     interrupted update keeps every finished recording, and the next one goes on there. Exits with 1 if parts
     of a recording are lost, if no gait cycle in it fits its leg, or if a leg could not be updated.
     """
+    from leg_wear_monitor.fleet.description.loader import load_fleet
+
+    legs = load_fleet(description)
+    out = out or legs.out
     check_directory("--out", out)
-    done = _update(description, out, workers, scheduler)
-    for leg, text in done.findings[:_MOST_LINES]:
-        click.echo(f"warning: {leg}: {text}", err=True)
-    if len(done.findings) > _MOST_LINES:
-        click.echo(f"warning: {len(done.findings) - _MOST_LINES} more findings in {out}/legs/*/log", err=True)
+
+    def count(now: "FleetDescription") -> "FleetUpdate":
+        return _update(now, out, workers, scheduler)
+
+    if follow:
+        return _follow(description, count, every_s)
+    done = count(legs)
+    _print_findings(done, out)
     _print_counts(done, out)
     return WITH_FINDINGS if done.findings else 0
 
 
-def _update(description: Path, out: Path, workers: int | None, scheduler: str | None) -> "FleetUpdate":
+@fleet.command(short_help="Write the tables of a fleet as CSV and Parquet files.")
+@click.argument("path", type=click.Path(path_type=Path), metavar="DIR|FLEET.yaml")
+@out_option("Directory of the tables.  [default: tables in the directory of the fleet]")
+def export(path: Path, out: Path | None) -> None:
+    """Write verdicts, cycles, recordings and lives, each as a CSV and a Parquet file."""
+    from leg_wear_monitor.fleet.fleet import Fleet
+
+    found = Fleet(path)
+    out = out or found.path / "tables"
+    check_directory("--out", out)
+    for file in found.export(out):
+        click.echo(f"written: {file}")
+
+
+def _update(legs: "FleetDescription", out: Path, workers: int | None, scheduler: str | None) -> "FleetUpdate":
     import os
 
-    from leg_wear_monitor.fleet.description.loader import load_fleet
     from leg_wear_monitor.fleet.update import update_fleet
 
-    legs = load_fleet(description)
     with progress_bar("updating the fleet") as progress:
         return update_fleet(
             legs,
@@ -66,6 +101,46 @@ def _update(description: Path, out: Path, workers: int | None, scheduler: str | 
             begin=None if scheduler else _compile,
             progress=progress,
         )
+
+
+def _follow(description: Path, count: "Callable[[FleetDescription], FleetUpdate]", every_s: float) -> int:
+    """Update again and again; the exit code at the end."""
+    import signal
+    import time
+    import warnings
+
+    from leg_wear_monitor.errors import ConfigWarning
+    from leg_wear_monitor.fleet.chain.words import words_of
+    from leg_wear_monitor.fleet.description.loader import load_fleet
+    from leg_wear_monitor.fleet.follow import Followed
+
+    signal.signal(signal.SIGTERM, signal.getsignal(signal.SIGINT))
+    followed, code, told = Followed(), 0, set[tuple[str, str]]()
+    click.echo("following; ^C ends it")
+    try:
+        while True:
+            with warnings.catch_warnings():
+                warnings.simplefilter("ignore", ConfigWarning)  # said at the start
+                legs = followed.complete(load_fleet(description))
+            done = count(legs)
+            for chain in done.chains:
+                for line in chain.new:
+                    click.echo(f"{chain.leg.id}: {words_of(line)}")
+            new = [each for each in done.findings if each not in told]
+            told.update(new)
+            code = WITH_FINDINGS if told else 0
+            for leg, text in new:
+                click.echo(f"warning: {leg}: {text}", err=True)
+            time.sleep(every_s)
+    except KeyboardInterrupt:
+        return code
+
+
+def _print_findings(done: "FleetUpdate", out: Path) -> None:
+    for leg, text in done.findings[:_MOST_LINES]:
+        click.echo(f"warning: {leg}: {text}", err=True)
+    if len(done.findings) > _MOST_LINES:
+        click.echo(f"warning: {len(done.findings) - _MOST_LINES} more findings in {out}/legs/*/log", err=True)
 
 
 def _compile(chains: Sequence["Chain"]) -> None:
@@ -102,9 +177,7 @@ def _print_counts(done: "FleetUpdate", out: Path) -> None:
 
 @fleet.command(short_help="Write the page of the fleet, and a page for each leg.")
 @click.argument("description", type=click.Path(path_type=Path), metavar="FLEET.yaml")
-@click.option(
-    "--out", type=click.Path(path_type=Path), metavar="DIR", required=True, help="Directory of the fleet."
-)
+@out_option("Directory of the fleet.  [default: out of the description, or fleet beside it]")
 @click.option(
     "--fresh-days",
     type=click.FloatRange(min=0.0, min_open=True, max=3650.0),
@@ -113,14 +186,16 @@ def _print_counts(done: "FleetUpdate", out: Path) -> None:
     show_default=True,
     help="Age of its last recording up to which a leg counts as monitored.",
 )
-def report(description: Path, out: Path, fresh_days: float) -> int:
+def report(description: Path, out: Path | None, fresh_days: float) -> int:
     """Write DIR/report.html from what the last update found, and legs/ID/report.html for each leg.
 
     A leg of the description that was never updated is on the page, without a recording. Nothing is computed.
     Exits with 1 if the page of a leg cannot be made.
     """
     from leg_wear_monitor.cli.fleet_pages import write_pages
+    from leg_wear_monitor.fleet.description.loader import fleet_directory
 
+    out = out or fleet_directory(description)
     check_directory("--out", out)
     written = write_pages(description, out, fresh_days)
     for fault in written.faults[:_MOST_LINES]:

@@ -59,9 +59,12 @@ class FleetDescription:
     ----------
     path : pathlib.Path
         File of the description.
+    out : pathlib.Path
+        Directory of the fleet.
     legs : tuple of FleetLeg
         In the order of the file.
     """
 
     path: Path
+    out: Path
     legs: tuple[FleetLeg, ...]

@@ -46,7 +46,15 @@ def load_fleet(path: str | Path) -> FleetDescription:
             configs[name, entry.node] = _config(home, name, entry.node, source)
         legs.append(_leg(entry, configs[name, entry.node], file.row, home, source))
     _check_recordings(legs, source)
-    return FleetDescription(path=Path(path), legs=tuple(legs))
+    return FleetDescription(path=Path(path), out=home / file.out, legs=tuple(legs))
+
+
+def fleet_directory(path: str | Path) -> Path:
+    """Directory of a fleet, given itself or the description of the fleet."""
+    if Path(path).is_dir():
+        return Path(path)
+    file: FleetFile = structure(read_yaml(Path(path), str(path)), FleetFile, str(path), "")
+    return Path(path).resolve().parent / file.out
 
 
 def _leg(entry: LegEntry, config: MonitorConfig, row: str, home: Path, source: str) -> FleetLeg:

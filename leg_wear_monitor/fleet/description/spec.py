@@ -60,6 +60,7 @@ class FleetFile:
     """All keys of the file."""
 
     defaults: Defaults = described("values for legs that have none of their own", factory=Defaults)
+    out: str = described("directory of the fleet, unless a command has another one", default="fleet")
     row: str = choice(("minute", "cycle"), "what a row of the cycles' table is", default="minute")
     legs: tuple[LegEntry, ...] = described(
         "the legs", check=lambda legs: None if legs else "is empty, expected at least one leg"

@@ -28,6 +28,20 @@ def write_whole(path: Path, content: bytes) -> None:
         part.unlink(missing_ok=True)
 
 
+def make_directory(path: Path) -> None:
+    """Make a directory if it does not exist.
+
+    Raises
+    ------
+    ConfigError
+        If the disk does not take it.
+    """
+    try:
+        path.mkdir(parents=True, exist_ok=True)
+    except OSError as error:
+        raise ConfigError(str(path), "", f"cannot be made: {error.strerror}") from error
+
+
 def append_line(path: Path, line: str) -> None:
     """Append a line to a file, and write it to the disk; a line that was cut off before is removed.
 

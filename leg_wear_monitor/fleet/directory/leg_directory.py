@@ -44,6 +44,11 @@ class LegDirectory:
         """File of the gait cycles of a recording."""
         return self.cycles / f"{key}.parquet"
 
+    def tables(self) -> list[Path]:
+        """Files of the gait cycles of all counted recordings, in the order of time."""
+        lines = sorted(self.lines(), key=lambda line: (line["begin_ns"], line["key"]))
+        return [self.table(line["key"]) for line in lines if line["outcome"] == "counted"]
+
     def lines(self) -> Iterator[Line]:
         """Records of all recordings so far, in the order in which they were counted.
 

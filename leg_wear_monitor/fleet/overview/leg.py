@@ -10,6 +10,7 @@ from leg_wear_monitor.fleet.chain.record import Outcome
 from leg_wear_monitor.fleet.description.fleet_description import FleetLeg
 from leg_wear_monitor.fleet.directory.leg_directory import LegDirectory, Line
 from leg_wear_monitor.fleet.overview.parts import BadRecording, LegChange, LegOverview, RecordingHealth
+from leg_wear_monitor.fleet.tables.used import used_fraction
 from leg_wear_monitor.monitor.verdict.verdict import Verdict
 from leg_wear_monitor.playback.result.condition import JointClearance, LifeHours
 
@@ -41,16 +42,16 @@ def leg_overview(
             now,
             verdict=structure(counted[-1]["verdict"], Verdict, source, "verdict"),
             clearances=joints,
-            used_fraction={name: used_fraction(joint) for name, joint in joints.items()},
+            used_fraction={name: _used(joint) for name, joint in joints.items()},
             life=_life(counted[-1]["life"], source),
         )
     return attrs.evolve(now, change=_change(now, before))
 
 
-def used_fraction(joint: JointClearance) -> float:
-    """Fraction of the clearance from new to limit that is used up; as seen where that is known."""
+def _used(joint: JointClearance) -> float:
+    """Fraction of the clearance that is used up; as seen where that is known."""
     clearance_m = joint.counted_m if joint.seen_m is None else joint.seen_m
-    return (clearance_m - joint.new_m) / (joint.limit_m - joint.new_m)
+    return used_fraction(clearance_m, joint.new_m, joint.limit_m)
 
 
 def _life(given: Mapping[str, Any], source: str) -> dict[str, LifeHours | None]:

@@ -20,6 +20,7 @@ class BadRecording:
     Attributes
     ----------
     file : str
+        Its name when it was counted.
     outcome : str
         What became of it: ``counted`` in part, ``already_counted``, ``no_gait`` or ``unreadable``.
     why : str
@@ -104,6 +105,7 @@ class LegOverview:
     Attributes
     ----------
     id : str
+        Name of the leg.
     lot : str
         Production lot; empty if it is not known.
     verdict : Verdict or None
@@ -115,7 +117,9 @@ class LegOverview:
     life : dict of str to LifeHours or None
         Remaining life of each joint, and of the ``leg``; None where it is not known or not valid.
     change : LegChange
+        What is new.
     recordings : RecordingHealth
+        The recordings of the leg.
     fault : str
         Why the last update could not count all of its recordings; empty if it could.
     """

@@ -5,6 +5,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 from numpy.typing import NDArray
 
+from leg_wear_monitor.fleet.tables.used import used_fraction
 from leg_wear_monitor.playback.history import CYCLE_COLUMNS, JOINT_COLUMNS, History
 
 if TYPE_CHECKING:
@@ -53,7 +54,7 @@ def _used(history: History, mechanism: Any, limits_m: Any, ends: NDArray[np.int6
     columns: Columns = {}
     for k, joint in enumerate(history.clearance_joints):
         new = mechanism.clearances[joint].radial_clearance
-        used = (clearance[:, k] - new) / (limits_m[k] - new)
+        used = used_fraction(clearance[:, k], new, limits_m[k])
         columns[f"used_fraction.{joint}"] = used.astype(np.float32)
     return columns
 

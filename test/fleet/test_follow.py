@@ -1,0 +1,64 @@
+"""A recording is taken while others are recorded, once it is complete."""
+
+import pytest
+
+from leg_wear_monitor.bags.mcap.layout import MAGIC
+from leg_wear_monitor.fleet.description.loader import load_fleet
+from leg_wear_monitor.fleet.follow import PATIENCE, Followed, has_end
+
+pytestmark = pytest.mark.plain
+
+
+@pytest.fixture
+def look(tmp_path, describe):
+    """Names of the complete recordings at each look."""
+    (tmp_path / "a").mkdir()
+    (tmp_path / "a/0.mcap").write_bytes(MAGIC + MAGIC)
+    path, followed = describe(tmp_path, "a"), Followed()
+
+    def names():
+        (leg,) = followed.complete(load_fleet(path)).legs
+        return [path.name for path in leg.recordings]
+
+    return names
+
+
+def test_what_has_its_end_is_taken_when_it_does_not_change(look, tmp_path):
+    assert look() == []
+    assert look() == ["0.mcap"]
+    growing = tmp_path / "a/1.mcap"
+    growing.write_bytes(MAGIC)
+    assert look() == ["0.mcap"]
+    growing.write_bytes(MAGIC + b"part")
+    assert look() == ["0.mcap"]
+    growing.write_bytes(MAGIC + b"parts" + MAGIC)
+    assert look() == ["0.mcap"]
+    assert look() == ["0.mcap", "1.mcap"]
+
+
+def test_without_an_end_it_is_taken_when_it_has_not_changed_for_long(look, tmp_path):
+    (tmp_path / "a/1.mcap").write_bytes(MAGIC + b"cut off")
+    taken = ["1.mcap" in look() for _ in range(PATIENCE + 2)]
+    assert taken == [False] * PATIENCE + [True] * 2
+
+
+@pytest.mark.parametrize(
+    ("name", "content", "ended"),
+    [
+        ("a.mcap", MAGIC + b"x" + MAGIC, True),
+        ("a.mcap", b"", False),
+        ("a.parquet", b"PAR1xPAR1", True),
+        ("a.csv", b"1,2\n", False),
+        ("a.txt", b"", False),
+    ],
+)
+def test_ends(tmp_path, name, content, ended):
+    (tmp_path / name).write_bytes(content)
+    assert has_end(tmp_path / name) is ended
+
+
+def test_a_bag_directory_ends_with_its_metadata(tmp_path):
+    (tmp_path / "run_0.mcap").touch()
+    assert not has_end(tmp_path)
+    (tmp_path / "metadata.yaml").touch()
+    assert has_end(tmp_path)

@@ -1,0 +1,209 @@
+"""A fleet's tables are the same however it was updated, and each recording counts once."""
+
+import os
+import shutil
+import signal
+
+import pytest
+
+import leg_wear_monitor as lw
+from leg_wear_monitor.errors import ConfigError, LegWearError
+from leg_wear_monitor.fleet.directory.leg_directory import LegDirectory
+from leg_wear_monitor.fleet.directory.lock import locked
+from leg_wear_monitor.fleet.overview.read import load_overview
+
+pytest.importorskip("pyarrow", reason="the extra 'fleet' is not installed")
+
+
+def contents(out):
+    """All files of a fleet but the ledgers, whose pages need not have one order, by their names."""
+    left_out = ("ledger", ".lock")
+    files = (path for path in sorted(out.rglob("*")) if path.is_file() and path.name not in left_out)
+    return {str(path.relative_to(out)): path.read_bytes() for path in files}
+
+
+def lines(out, leg):
+    return {line["file"]: line for line in LegDirectory(out, leg).lines()}
+
+
+@pytest.fixture(scope="module")
+def home(walk, describe, tmp_path_factory):
+    """A fleet of two legs: names that do not sort by time, a truncated recording, and a file that is none."""
+    home = tmp_path_factory.mktemp("fleet")
+    walk(home / "a/z.mcap", seed=1)
+    walk(home / "a/y.mcap", begin_s=100.0, seed=2)
+    whole = walk(home / "b/half.mcap", seed=3)
+    whole.write_bytes(whole.read_bytes()[: whole.stat().st_size * 7 // 8])
+    (home / "b/trash.mcap").write_bytes(b"no recording" * 10)
+    describe(home, "a", "b")
+    return home
+
+
+@pytest.fixture(scope="module")
+def updated(home, update, tmp_path_factory):
+    """Its directory after an uninterrupted update in this process."""
+    out = tmp_path_factory.mktemp("updated")
+    update(home / "fleet.yaml", out)
+    return out
+
+
+def test_recordings_are_counted_in_the_order_of_time(updated):
+    found = list(LegDirectory(updated, "a").lines())
+    assert [(line["file"], line["outcome"]) for line in found] == [
+        ("a/z.mcap", "counted"),
+        ("a/y.mcap", "counted"),
+    ]
+    assert found[0]["end_ns"] < found[1]["begin_ns"]
+    assert not any(line["is_late"] or line["is_partial"] for line in found)
+    growths = [line["clearances"]["A"]["counted_m"] for line in found]
+    assert growths == sorted(growths)
+
+
+def test_a_damaged_recording_costs_itself_and_is_named(home, update, tmp_path):
+    found = update(home / "fleet.yaml", tmp_path)
+    (trash, half) = found.findings
+    assert (trash[0], half[0]) == ("b", "b")
+    assert trash[1].startswith("b/trash.mcap: unreadable; parts of it are lost; begins with")
+    assert half[1].startswith("b/half.mcap: counted, 2 gait cycles") and "parts of it are lost" in half[1]
+    health = load_overview(tmp_path).leg("b").recordings
+    assert (health.found, health.counted, health.unreadable, health.partial) == (2, 1, 1, 1)
+    assert [(bad.file, bad.outcome) for bad in health.bad] == [
+        ("b/half.mcap", "counted"),
+        ("b/trash.mcap", "unreadable"),
+    ]
+    assert (tmp_path / "legs/b/log").read_text().splitlines() == [trash[1], half[1]]
+
+
+def test_a_second_update_finds_nothing_to_do(home, updated, update):
+    before = contents(updated)
+    again = update(home / "fleet.yaml", updated, begin=lambda _: pytest.fail("nothing is to be computed"))
+    assert again.is_up_to_date and again.counted == 0
+    assert contents(updated) == before
+
+
+def test_processes_give_the_same_to_the_bit(home, updated, update, tmp_path):
+    fractions = []
+    assert update(home / "fleet.yaml", tmp_path, workers=2, progress=fractions.append).counted == 3
+    assert contents(tmp_path) == contents(updated)
+    assert fractions == sorted(fractions) and fractions[-1] == pytest.approx(1.0)
+
+
+def test_a_cluster_gives_the_same_though_a_worker_is_killed(home, updated, update, tmp_path):
+    pytest.importorskip("distributed", reason="the extra 'dask' is not installed")
+    from dask_cluster import cluster
+
+    (tmp_path / "dask").mkdir()
+    with cluster(tmp_path / "dask") as (address, workers):
+
+        def kill_one(*_):
+            if workers[0].poll() is None:
+                os.kill(workers[0].pid, signal.SIGKILL)
+
+        done = update(home / "fleet.yaml", tmp_path / "out", scheduler=address, tell=kill_one)
+        assert workers[0].wait() == -signal.SIGKILL
+    assert done.counted == 3
+    assert contents(tmp_path / "out") == contents(updated)
+
+
+def test_interrupted_between_two_recordings_it_goes_on_there(home, updated, update, tmp_path):
+    told = []
+
+    def interrupt(*line):
+        told.append(line)
+        if len(told) == 2:
+            raise KeyboardInterrupt
+
+    with pytest.raises(KeyboardInterrupt):
+        update(home / "fleet.yaml", tmp_path, tell=interrupt)
+    assert not (tmp_path / "fleet.json").exists()
+    update(home / "fleet.yaml", tmp_path, tell=interrupt)
+    assert len(told) == 4
+    assert contents(tmp_path) == contents(updated)
+
+
+@pytest.mark.parametrize("instant", ["expect", "add"])
+def test_killed_before_or_after_the_ledger_is_written_nothing_is_lost_or_twice(
+    home, updated, update, tmp_path, monkeypatch, instant
+):
+    """With `expect` the table is written and the ledger is not; with `add` both are."""
+    with monkeypatch.context() as patch:
+
+        def killed(*_):
+            raise KeyboardInterrupt
+
+        patch.setattr(LegDirectory, instant, killed)
+        with pytest.raises(KeyboardInterrupt):
+            update(home / "fleet.yaml", tmp_path)
+    assert list((tmp_path / "cycles").rglob("*.parquet"))
+    update(home / "fleet.yaml", tmp_path)
+    assert contents(tmp_path) == contents(updated)
+
+
+def test_a_line_that_was_cut_off_is_written_again(home, updated, update, tmp_path):
+    shutil.copytree(updated, tmp_path / "out")
+    records, log = (tmp_path / "out/legs/a" / name for name in ("recordings.jsonl", "log"))
+    first, second = records.read_bytes().splitlines(keepends=True)
+    (tmp_path / "out/legs/a/pending.json").write_bytes(second)
+    records.write_bytes(first + second[:100])
+    log.write_bytes(log.read_bytes().splitlines(keepends=True)[0])
+    update(home / "fleet.yaml", tmp_path / "out")
+    assert contents(tmp_path / "out") == contents(updated)
+
+
+def test_a_copy_counts_once(walk, describe, update, tmp_path):
+    path = walk(tmp_path / "a/1.mcap")
+    shutil.copy(path, tmp_path / "a/2.mcap")
+    description, out, told = describe(tmp_path, "a"), tmp_path / "out", []
+    assert update(description, out, tell=lambda *line: told.append(line)).counted == 1
+    assert told[0] == ("a", "a/2.mcap: is a copy of a/1.mcap, counted once")
+    path.rename(tmp_path / "a/3.mcap")
+    assert update(description, out).counted == 0
+
+
+def test_what_overlaps_counts_once_and_late_ones_are_said(walk, describe, update, tmp_path):
+    walk(tmp_path / "a/1.mcap", begin_s=10.0, seconds=6.0)
+    description, out = describe(tmp_path, "a"), tmp_path / "out"
+    update(description, out)
+    walk(tmp_path / "a/0.mcap", begin_s=0.0, seconds=4.0)
+    walk(tmp_path / "a/2.mcap", begin_s=12.0, seconds=6.0)
+    walk(tmp_path / "a/3.mcap", begin_s=11.0, seconds=3.0)
+    update(description, out)
+    found = lines(out, "a")
+    assert [name for name, line in found.items() if line["is_late"]] == ["a/0.mcap", "a/3.mcap", "a/2.mcap"]
+    assert found["a/3.mcap"]["outcome"] == "already_counted"
+    overlapping = found["a/2.mcap"]
+    assert overlapping["outcome"] == "counted"
+    assert 0.9 < overlapping["lost"]["already_counted"] / (4.0 * 2 * 200) <= 1.0
+    assert sum(line["cycles"] for line in found.values()) <= 4 + 8  # of a second, in 0 to 4 s and 10 to 18 s
+    log = (out / "legs/a/log").read_text()
+    assert "a/2.mcap: counted" in log and "s of it are in the ledger already: not counted again" in log
+    assert "a/0.mcap: counted" in log and "a later recording was counted before it" in log
+
+
+def test_the_content_of_two_legs_is_counted_for_none(walk, describe, update, tmp_path):
+    shutil.copytree(walk(tmp_path / "a/1.mcap").parent, tmp_path / "b")
+    done = update(describe(tmp_path, "a", "b"), tmp_path / "out")
+    assert done.counted == 0
+    text = "has a recording with the same content; not counted"
+    assert done.findings == [("a", f"a/1.mcap: the leg b {text}"), ("b", f"b/1.mcap: the leg a {text}")]
+    (tmp_path / "b/1.mcap").unlink()
+    with pytest.warns(lw.errors.ConfigWarning, match=r"b/\* matches no recording"):
+        assert update(describe(tmp_path, "a", "b"), tmp_path / "out").counted == 1
+
+
+def test_a_leg_without_its_ledger_stops_and_others_go_on(home, updated, update, tmp_path):
+    shutil.copytree(updated, tmp_path / "out")
+    (tmp_path / "out/legs/a/ledger").unlink()
+    done = update(home / "fleet.yaml", tmp_path / "out")
+    assert done.findings == [("a", f"{tmp_path}/out/legs/a/ledger is missing: put a copy of it back")]
+
+
+def test_one_update_at_a_time(home, updated, update):
+    with locked(updated), pytest.raises(ConfigError, match="is being updated by another process"):
+        update(home / "fleet.yaml", updated)
+
+
+def test_without_pyarrow_one_line_says_what_to_install(home, update, tmp_path, monkeypatch):
+    monkeypatch.setitem(__import__("sys").modules, "pyarrow", None)
+    with pytest.raises(LegWearError, match=r"need pyarrow.*pip install 'leg_wear_monitor\[fleet\]'"):
+        update(home / "fleet.yaml", tmp_path)

@@ -21,6 +21,7 @@ from leg_wear_monitor.monitor.ledger.entry import (
     ForecastPoint,
     JointWear,
     VerdictEvent,
+    one_part,
 )
 from leg_wear_monitor.monitor.ledger.ledger import Ledger
 from leg_wear_monitor.monitor.reports import AlarmList, CycleReport, VerdictReport
@@ -246,11 +247,11 @@ class Accounting:
         """Undo `replace`: the wear before and that since are of one part. Gives the wear since."""
         k = self._index(joint)
         since, depth = self.joint_wear(k, self._twin.depth), self._twin.depth
-        depth[k] += before.depth
+        part = one_part(before, since)
+        depth[k] = part.depth
         self._twin.set_depth(depth)
-        begun_s = self.totals["moving_s"] - before.moving_s - since.moving_s
-        cycles = self.state.cycles - before.cycles - since.cycles
-        self._set_part(k, PartLife(cycles, begun_s, before.replaced_ns))
+        begun_s = self.totals["moving_s"] - part.moving_s
+        self._set_part(k, PartLife(self.state.cycles - part.cycles, begun_s, part.replaced_ns))
         return since
 
     def _set_part(self, k: int, part: PartLife) -> None:

@@ -5,6 +5,7 @@ from collections.abc import Callable
 
 from leg_wear_monitor.errors import LegWearError
 from leg_wear_monitor.monitor.ledger.entry import JointWear
+from leg_wear_monitor.monitor.resets import wear_words
 
 CONFIRM_S = 30.0
 
@@ -51,7 +52,7 @@ def audit_time(now_ns: int) -> int:
 def asked_once(joint: str, wear: JointWear) -> str:
     """Reply to a first reset request: the wear that a reset would delete, and how to confirm."""
     return (
-        f"joint {joint}: not reset yet; this would set {_wear_text(wear)} to 0; "
+        f"joint {joint}: not reset yet; this would set {wear_words(wear)} to 0; "
         f"call again within {CONFIRM_S:g} s if the part was replaced"
     )
 
@@ -59,10 +60,5 @@ def asked_once(joint: str, wear: JointWear) -> str:
 def undone(joint: str, wear: JointWear) -> str:
     """Reply to an undone reset: the joint's wear, including the wear since the reset."""
     return (
-        f"joint {joint}: the reset is undone, {_wear_text(wear)} are counted, including those since the reset"
+        f"joint {joint}: the reset is undone, {wear_words(wear)} are counted, including those since the reset"
     )
-
-
-def _wear_text(wear: JointWear) -> str:
-    """Text with the mean total wear of both surfaces, and its number of gait cycles."""
-    return f"{1e6 * float(wear.depth.sum(axis=0).mean()):.4g} um of wear from {wear.cycles} gait cycles"

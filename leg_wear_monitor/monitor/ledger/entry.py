@@ -39,6 +39,17 @@ def new_part(name: str) -> JointWear:
     return JointWear(name, np.zeros((2, SECTORS)))
 
 
+def one_part(before: JointWear, since: JointWear) -> JointWear:
+    """The wear before a reset and the wear since, of a part that was not replaced."""
+    return JointWear(
+        before.name,
+        before.depth + since.depth,
+        before.cycles + since.cycles,
+        before.moving_s + since.moving_s,
+        before.replaced_ns,
+    )
+
+
 @attrs.frozen(eq=False)
 class Entry:
     """The state of the wear at one instant.

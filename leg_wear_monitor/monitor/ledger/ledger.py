@@ -212,8 +212,13 @@ class Ledger:
             self._kept_moving_s = entry.moving_s
         return kept
 
-    def record(self) -> None:
-        """Write the events since the last entry, which stays in force; for a run that monitors nothing.
+    def record(self, entry: Entry | None = None) -> None:
+        """Write the events since the last entry; for a run that monitors nothing.
+
+        Parameters
+        ----------
+        entry : Entry, optional
+            To replace the last one, which otherwise stays in force.
 
         Raises
         ------
@@ -222,7 +227,7 @@ class Ledger:
         """
         self._interval_s = max(self._interval_s, self.cut_off_s or 0.0)  # until the loss is acknowledged
         run = self._run(closed=self.cut_off_s is None)
-        if not self._try(lambda: self._store.write(run, None, self._events)):
+        if not self._try(lambda: self._store.write(run, entry, self._events)):
             raise LedgerError(f"{self.path}: {self.fault}")
         self._events.clear()
 

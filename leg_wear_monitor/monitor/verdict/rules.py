@@ -20,7 +20,8 @@ _ROCK = (
     "it: leg-wear-monitor measure {joint} MM --sigma MM"
 )
 _REPLACE = (
-    "take the leg out of service and replace the parts of joint {joints}; then call ~/reset_wear/{joint}"
+    "take the leg out of service and replace the parts of joint {joints}; then call ~/reset_wear/{joint}, "
+    "or without a running monitor: leg-wear-monitor reset {joint} --ledger FILE"
 )
 _TORQUE_INPUT = (
     "check the torque sensor (zero, scale, time stamps) and the parameters of drive_torque and crank"

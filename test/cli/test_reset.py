@@ -1,0 +1,145 @@
+"""`reset`: a replaced part into a ledger, as the service of a node does it."""
+
+import sqlite3
+from contextlib import closing
+
+import attrs
+import numpy as np
+import pytest
+
+from leg_wear_monitor.mechanism.loader import load_mechanism
+from leg_wear_monitor.monitor.alarms.alarm import Alarm, Level
+from leg_wear_monitor.monitor.config.settings import MonitorConfig
+from leg_wear_monitor.monitor.ledger.entry import Entry, JointWear
+from leg_wear_monitor.monitor.ledger.ledger import open_ledger
+from leg_wear_monitor.monitor.wear_monitor import WearMonitor
+
+LEG = load_mechanism("bionic_leg")
+
+
+def opened(path):
+    config = MonitorConfig()
+    config = attrs.evolve(config, ledger=attrs.evolve(config.ledger, path=str(path)))
+    return config, open_ledger(LEG, config)
+
+
+@pytest.fixture
+def ledger(tmp_path):
+    """A ledger of the default leg whose joints have opened by 60 um; G is at its limit, say its alarms."""
+    path = tmp_path / "wear.ledger"
+    _, kept = opened(path)
+    joints = tuple(JointWear(name, np.full((2, 720), 3e-5), 4000, 4000.0) for name in LEG.clearance_joints)
+    raised = {"level": Level.ERROR, "raised_ns": 5}
+    alarms = (
+        Alarm(kind="clearance", subject="G", present=Level.ERROR, **raised),
+        Alarm(kind="impact_force", subject="G", **raised),
+        Alarm(kind="clearance", subject="A", **raised),
+    )
+    totals = {"cycles": 5e3, "moving_s": 5e3}
+    entry = Entry(stamp_ns=10**9, joints=joints, totals=totals, alarms=alarms, spans=((0, 10**9),))
+    kept.keep(entry, closed=True)
+    kept.close()
+    return path
+
+
+def content(path):
+    _, kept = opened(path)
+    entry, spans = kept.entry, kept.counted_ns.tolist()
+    kept.close()
+    return entry, spans
+
+
+def audits(path):
+    with closing(sqlite3.connect(path)) as db:
+        return db.execute("SELECT what, joint, cycles, moving_s, undoes FROM audit").fetchall()
+
+
+@pytest.mark.plain
+def test_a_reset_gives_new_surfaces_and_keeps_the_history(run, ledger):
+    before, spans = content(ledger)
+    result = run("reset", "G", "--ledger", str(ledger))
+    assert (result.exit_code, result.stderr) == (0, "")
+    told = "joint G: new surfaces, 60 um of wear from 4000 gait cycles are set to 0, history kept"
+    assert result.stdout.splitlines() == [f"{told}; --undo reverts it"]
+    after, now = content(ledger)
+    assert now == spans
+    joints = {each.name: each for each in after.joints}
+    assert not joints["G"].depth.any()
+    assert (joints["G"].cycles, joints["G"].moving_s) == (0, 0.0)
+    assert joints["G"].replaced_ns > 10**18
+    assert all(np.array_equal(joints[one.name].depth, one.depth) for one in before.joints if one.name != "G")
+    assert after.totals == before.totals
+    alarms = {alarm.name: alarm for alarm in after.alarms}
+    assert set(alarms) == {"clearance G", "clearance A"}
+    assert (alarms["clearance G"].acknowledged, alarms["clearance A"].acknowledged) == (True, False)
+    assert audits(ledger) == [("reset_wear", "G", 4000, 4000.0, None)]
+
+
+@pytest.mark.plain
+def test_an_undone_reset_is_as_before(run, ledger):
+    before, spans = content(ledger)
+    run("reset", "G", "--ledger", str(ledger))
+    result = run("reset", "G", "--undo", "--ledger", str(ledger))
+    assert "60 um of wear from 4000 gait cycles are counted, including those since" in result.stdout
+    after, now = content(ledger)
+    assert now == spans
+    for one, other in zip(before.joints, after.joints, strict=True):
+        assert np.array_equal(one.depth, other.depth)
+        assert (one.cycles, one.moving_s, one.replaced_ns) == (
+            other.cycles,
+            other.moving_s,
+            other.replaced_ns,
+        )
+    again = run("reset", "G", "--undo", "--ledger", str(ledger))
+    assert (again.exit_code, again.stderr) == (2, "error: joint G: the ledger has no reset to undo\n")
+    assert audits(ledger)[1] == ("undo_reset", "G", 0, 0.0, 1)
+
+
+@pytest.mark.plain
+def test_a_dry_run_leaves_the_ledger_as_it_is(run, ledger):
+    before = {path.name: path.read_bytes() for path in ledger.parent.iterdir()}
+    result = run("reset", "G", "--ledger", str(ledger), "--dry-run")
+    assert result.stdout.splitlines()[-1] == "dry run: nothing was written"
+    assert {path.name: path.read_bytes() for path in ledger.parent.iterdir()} == before
+
+
+@pytest.mark.plain
+@pytest.mark.parametrize(
+    ("arguments", "fault"),
+    [
+        (("g",), "'g' is not a clearance joint, expected one of A, B, G, I, J; did you mean G?"),
+        (("A", "--undo"), "joint A: the ledger has no reset to undo"),
+        ((), "Missing argument 'JOINT'"),
+    ],
+)
+def test_what_cannot_be_reset_is_one_line(run, ledger, arguments, fault):
+    result = run("reset", *arguments, "--ledger", str(ledger))
+    assert result.exit_code == 2
+    (line,) = result.stderr.splitlines()
+    assert fault in line
+    assert audits(ledger) == []
+
+
+@pytest.mark.plain
+def test_a_ledger_without_wear_has_nothing_to_reset(run, tmp_path):
+    path = tmp_path / "new.ledger"
+    opened(path)[1].abandon()
+    result = run("reset", "G", "--ledger", str(path))
+    assert (result.exit_code, result.stderr) == (2, "error: joint G: the ledger contains no wear yet\n")
+
+
+def test_a_monitor_resets_to_the_same(run, ledger, tmp_path):
+    other = tmp_path / "other.ledger"
+    other.write_bytes(ledger.read_bytes())
+    run("reset", "G", "--ledger", str(ledger))
+    stamp_ns = {each.name: each for each in content(ledger)[0].joints}["G"].replaced_ns
+    config, kept = opened(other)
+    monitor = WearMonitor(LEG, config, kept)
+    monitor.reset_wear("G", stamp_ns, "ann")
+    monitor.close()
+    for one, same in zip(content(ledger)[0].joints, content(other)[0].joints, strict=True):
+        assert np.array_equal(one.depth, same.depth)
+        assert (one.name, one.cycles, one.replaced_ns) == (same.name, same.cycles, same.replaced_ns)
+        assert one.moving_s == pytest.approx(same.moving_s, abs=1e-9)
+    assert content(ledger)[1] == content(other)[1]
+    assert audits(ledger) == audits(other)

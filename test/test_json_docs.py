@@ -40,10 +40,19 @@ def replay() -> Iterator[Row]:
     yield from rows_of(lw.ReplaySummary)
 
 
+_LOAD = "number or null", "Pa m/s", "Mean of pressure times sliding speed when new; None without wear."
+
+
 def life() -> Iterator[Row]:
     told = descriptions(Life)
     yield "mechanism", "text", "", "Name of the mechanism."
     yield "fingerprint", "text", "", "Checksum of the mechanism; a forecast refuses the lives of another leg."
+    yield "validity.<joint>.holds_for", "text", "", "Material pair and regime that its life holds for."
+    yield "validity.<joint>.mean_pressure_speed_pa_mps", *_LOAD
+    beyond = "What of it is beyond the limits of the joint's material; None within them."
+    yield "validity.<joint>.outside_limits", "text or null", "", beyond
+    beyond = "Why its normal law does not hold for the contact arc when new; None if it does."
+    yield "validity.<joint>.outside_contact_law", "text or null", "", beyond
     yield VERSION
     for name in ("cycles", "error_m"):
         yield name, "list of numbers", unit_of(name), told[name]

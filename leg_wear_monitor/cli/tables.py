@@ -96,6 +96,8 @@ def _summary(result: "SimulationResult", wall_s: float) -> Iterator[tuple[str, s
     loads = [(name, joint) for name, joint in result.joints.items() if joint.has_clearance]
     for label, (name, joint) in zip(["load", *[""] * len(loads)], loads, strict=False):
         yield label, f"{name}: {_load(joint)}"
+    for regime in _regimes(loads):
+        yield "wear holds for", regime
     if result.surfaces is not None and result.surfaces.feeds_back:
         yield "opened by", f"{_opened(result.surfaces, result.clearance_joints)} pm, mean (greatest)"
     yield (
@@ -110,8 +112,14 @@ def _load(joint: "JointResult") -> str:
     pressure, speed = joint.mean_pressure_pa or 0.0, joint.mean_sliding_speed_mps or 0.0
     values = f"p {figure(1e-6 * pressure)} (p99 {figure(1e-6 * (joint.p99_pressure_pa or 0.0))}) MPa"
     product = figure(1e-6 * (joint.mean_pressure_speed_pa_mps or 0.0))
-    beyond = f"; {joint.outside_limits}" if joint.outside_limits else ""
+    beyond = "".join(f"; {doubt}" for doubt in (joint.outside_limits, joint.outside_contact_law) if doubt)
     return f"{values}, v {figure(speed)} m/s, p v {product} MPa m/s{beyond}"
+
+
+def _regimes(loads: list[tuple[str, "JointResult"]]) -> Iterator[str]:
+    """What the wear of the clearance joints holds for, a text for all joints alike."""
+    for regime in dict.fromkeys(joint.holds_for for _, joint in loads):
+        yield f"{', '.join(name for name, joint in loads if joint.holds_for == regime)}: {regime}"
 
 
 def _response(toe: "ToeResult", torque: "TorqueResult") -> str:

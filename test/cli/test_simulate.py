@@ -20,7 +20,8 @@ ANY_JOINT = {"mean_force_n", "rms_force_n", "p99_force_n", "max_force_n"}
 CLEARANCE_JOINT = ANY_JOINT | {
     "contact_fraction", "friction_work_j_per_cycle", "archard_integral_j_per_cycle", "wear_depth_m_per_cycle",
     "wear_zone_deg", "clearance_m", "mean_pressure_pa", "p99_pressure_pa", "mean_sliding_speed_mps",
-    "mean_pressure_speed_pa_mps", "outside_limits",
+    "mean_pressure_speed_pa_mps", "outside_limits", "holds_for", "contact_half_angle_deg",
+    "outside_contact_law",
 }  # fmt: skip
 DEPTH = {"bushing_max", "bushing_mean", "journal_max", "journal_mean"}
 IMPACT = {"begin_s", "speed_mps", "end_s", "peak_n"}

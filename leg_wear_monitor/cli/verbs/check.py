@@ -157,10 +157,11 @@ def _mechanism(name: str) -> str:
 
     leg = load_mechanism(name)
     with compilation("mechanism", how_long="a few seconds"):
+        from leg_wear_monitor.contact.conformity import conformity_doubts
         from leg_wear_monitor.dynamics.simulation import prepare
 
         linkage = prepare(leg).linkage
-    warn_of(leg.source, doubts(leg))
+    warn_of(leg.source, (*doubts(leg), *conformity_doubts(linkage)))
     clearance_joints = (
         f"clearance joints {', '.join(leg.clearance_joints)}"
         if leg.clearance_joints

@@ -102,7 +102,8 @@ def life(mechanism: str, json_file: Path | None, out: Path | None, **options: An
         lives = _lives(leg, **options)
     warn_of(leg.source, doubts(leg))  # what fails names them itself, in its one line
     result = lives[0][1]
-    text = json_text(_document(leg, lives))
+    period_s = _period_s(leg, options["speed_rpm"])
+    text = json_text(_document(leg, lives, period_s))
     written = write_json(json_file, text)
     if out is not None:
         from leg_wear_monitor.report.figures.life_picture import life_picture
@@ -111,7 +112,7 @@ def life(mechanism: str, json_file: Path | None, out: Path | None, **options: An
         written += write_directory(out, files)
     if json_file != STDOUT:
         told = [*lines(result, options["limit_m"]), *_validity(leg, result)]
-        told += _loads(leg, lives, options["speed_rpm"])
+        told += _loads(leg, lives, period_s)
         for line in [*told, *(f"written: {path}" for path in written)]:
             click.echo(line)
 
@@ -148,12 +149,18 @@ def _lives(leg: "Mechanism", lives: int, opens_m: float | None, **options: Any) 
         return list(simulate_lives(leg, settings, lives, progress=progress, **options))
 
 
-def _document(leg: "Mechanism", lives: "Lives") -> dict[str, Any]:
+def _document(leg: "Mechanism", lives: "Lives", period_s: float) -> dict[str, Any]:
     """Lives, bound to the leg that they are of."""
+    from leg_wear_monitor.life.bushing_load import validity
     from leg_wear_monitor.life.many_lives import lives_document
     from leg_wear_monitor.monitor.ledger.binding import fingerprint
 
-    return {"mechanism": leg.name, "fingerprint": fingerprint(leg), **lives_document(lives)}
+    return {
+        "mechanism": leg.name,
+        "fingerprint": fingerprint(leg),
+        "validity": validity(leg, lives[0][1], lives[0][0], period_s),
+        **lives_document(lives),
+    }
 
 
 def _validity(leg: "Mechanism", result: "Life") -> list[str]:
@@ -164,27 +171,32 @@ def _validity(leg: "Mechanism", result: "Life") -> list[str]:
     return [f"holds for {', '.join(joints)}: {what}" for what, joints in found]
 
 
-def _loads(leg: "Mechanism", lives: "Lives", speed_rpm: float | None) -> list[str]:
-    """What p v of the new leg is beyond, and the makers' own life of their bushings."""
-    from leg_wear_monitor.dynamics.simulation import prepare
-    from leg_wear_monitor.life.bushing_load import pressure_speed
-    from leg_wear_monitor.mechanism.ideal import TURN
+def _loads(leg: "Mechanism", lives: "Lives", period_s: float) -> list[str]:
+    """What p v of the new leg is beyond, the makers' own life of their bushings, and contacts too wide."""
+    from leg_wear_monitor.life.bushing_load import contact_doubts, pressure_speed
+    from leg_wear_monitor.mechanism.materials.load import Bushing
     from leg_wear_monitor.mechanism.materials.loader import load_material
-    from leg_wear_monitor.mechanism.materials.of_joints import outside_limits
     from leg_wear_monitor.mechanism.materials.rating_life import rating_life_hours
 
     factor, result = lives[0]
-    period_s = TURN / abs(prepare(leg, speed_rpm=speed_rpm).speed)
     told = []
     for joint, load in pressure_speed(leg, result, factor, period_s).items():
         settings = leg.clearances[joint]
-        beyond = outside_limits(settings, 0.0, 0.0, load)
+        beyond = Bushing.of(settings).loaded(0.0, 0.0, 0.0, load).outside_limits
         told += [f"{joint}: {beyond}"] if beyond else []
         constants = load_material(settings.material).rating_life if settings.material else None
         if constants is not None:
             hours = f"{rating_life_hours(load, constants):.3g} h at p v {1e-6 * load:.3g} MPa m/s"
             told.append(f"{joint}: maker's basic rating life {hours}, all factors 1")
-    return told
+    return told + [f"{joint}: {doubt}" for joint, doubt in contact_doubts(leg, result).items()]
+
+
+def _period_s(leg: "Mechanism", speed_rpm: float | None) -> float:
+    """Duration of a gait cycle [s]."""
+    from leg_wear_monitor.dynamics.simulation import prepare
+    from leg_wear_monitor.mechanism.ideal import TURN
+
+    return TURN / abs(prepare(leg, speed_rpm=speed_rpm).speed)
 
 
 def lines(result: "Life", limit_m: float) -> list[str]:

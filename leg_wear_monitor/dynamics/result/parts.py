@@ -161,6 +161,12 @@ class JointResult:
     outside_limits : str or None
         What of ``p99_pressure_pa`` and the two means is beyond the limits of the joint's material, so that
         its wear coefficient does not hold; None within the limits, and without limits.
+    holds_for : str or None
+        Material pair and regime that the wear holds for.
+    contact_half_angle_deg : float or None
+        Half angle of the contact arc under ``p99_force_n`` [deg].
+    outside_contact_law : str or None
+        Why the joint's normal law does not hold for this arc; None if it does.
     """
 
     mean_force_n: float
@@ -178,6 +184,9 @@ class JointResult:
     mean_sliding_speed_mps: float | None = None
     mean_pressure_speed_pa_mps: float | None = attrs.field(default=None, metadata={"unit": "Pa m/s"})
     outside_limits: str | None = None
+    holds_for: str | None = None
+    contact_half_angle_deg: float | None = None
+    outside_contact_law: str | None = None
 
     @property
     def has_clearance(self) -> bool:

@@ -1,8 +1,11 @@
 """Computation of a simulation's result from run statistics."""
 
+import math
+
 import attrs
 import numpy as np
 
+from leg_wear_monitor.contact.conformity import contact_doubt, contact_half_angle, is_winkler_form
 from leg_wear_monitor.dynamics.result.parts import (
     ClearanceResult,
     EnergyBalance,
@@ -31,7 +34,8 @@ from leg_wear_monitor.dynamics.run.run_statistics import (
 )
 from leg_wear_monitor.mechanism.arrays import Floats
 from leg_wear_monitor.mechanism.ideal import TURN
-from leg_wear_monitor.mechanism.materials.of_joints import outside_limits
+from leg_wear_monitor.mechanism.materials.load import Bushing
+from leg_wear_monitor.mechanism.materials.of_joints import regime_of
 from leg_wear_monitor.wear.surfaces import BUSHING, JOURNAL, wear_zone
 
 
@@ -110,19 +114,31 @@ def _joint(setup: Setup, statistics: RunStatistics, joint: int, worn: Floats, cy
 
 def _loaded(forces: JointResult, setup: Setup, k: int, rubbing_w: float) -> JointResult:
     """Pressure and sliding speed of clearance joint k; ``rubbing_w`` is the mean of F_N |v_t| [W]."""
-    area = 2.0 * float(setup.contacts.bushing_radius[k] * setup.contacts.width[k])
-    pressure, speed = forces.p99_force_n / area, 0.0
-    if forces.mean_force_n > 0.0:
-        speed = rubbing_w / forces.mean_force_n
     settings = setup.linkage.mechanism.clearances[setup.clearance_joints[k]]
+    load = Bushing.of(settings).load(forces.mean_force_n, forces.p99_force_n, rubbing_w)
+    psi, doubt = _contact(setup, k, forces.p99_force_n)
     return attrs.evolve(
         forces,
-        mean_pressure_pa=forces.mean_force_n / area,
-        p99_pressure_pa=pressure,
-        mean_sliding_speed_mps=speed,
-        mean_pressure_speed_pa_mps=rubbing_w / area,
-        outside_limits=outside_limits(settings, pressure, speed, rubbing_w / area),
+        mean_pressure_pa=load.mean_pressure_pa,
+        p99_pressure_pa=load.p99_pressure_pa,
+        mean_sliding_speed_mps=load.mean_sliding_speed_mps,
+        mean_pressure_speed_pa_mps=load.mean_pressure_speed_pa_mps,
+        outside_limits=load.outside_limits,
+        holds_for=regime_of(settings),
+        contact_half_angle_deg=math.degrees(psi),
+        outside_contact_law=doubt,
     )
+
+
+def _contact(setup: Setup, k: int, force_n: float) -> tuple[float, str | None]:
+    """Half angle [rad] of clearance joint k's contact arc under a force, and why its law does not hold."""
+    contacts = setup.contacts
+    modulus, width, clearance, radius = (
+        float(values[k])
+        for values in (contacts.modulus, contacts.width, contacts.clearance, contacts.bushing_radius)
+    )
+    psi = contact_half_angle(force_n, modulus, width, clearance)
+    return psi, contact_doubt(psi, force_n, radius, is_winkler_form(int(contacts.normal_form[k])))
 
 
 def _clearance(setup: Setup, k: int) -> ClearanceResult:

@@ -102,30 +102,3 @@ def spread_of(settings: Clearance, usual: float) -> float | None:
     known = [usual if spread is None else spread.si for spread in spreads]
     weighted = sum(k * spread for k, spread in zip(settings.wear_coefficient, known, strict=True))
     return weighted / sum(settings.wear_coefficient)
-
-
-def outside_limits(
-    settings: Clearance, pressure_pa: float, speed_mps: float, pressure_speed: float
-) -> str | None:
-    """What is beyond the limits of a joint's pair, as one text; None within them, or without limits.
-
-    Parameters
-    ----------
-    settings : Clearance
-    pressure_pa, speed_mps, pressure_speed : float
-        Pressure [Pa], sliding speed [m/s], and pressure times speed [Pa m/s].
-    """
-    if not settings.material:
-        return None
-    limits = load_material(settings.material).limits
-    compared = (
-        ("p", pressure_pa, limits.dynamic_pressure or limits.static_pressure, "Pa"),
-        ("v", speed_mps, limits.sliding_speed, "m/s"),
-        ("p v", pressure_speed, limits.pressure_speed, "Pa m/s"),
-    )
-    beyond = [
-        f"{name} {value:.3g} {unit} above {limit.si:.3g}"
-        for name, value, limit, unit in compared
-        if limit is not None and value > limit.si
-    ]
-    return f"outside the limits of {settings.material}: {', '.join(beyond)}" if beyond else None

@@ -6,6 +6,7 @@ import attrs
 import numpy as np
 
 from leg_wear_monitor.bags.findings import Severity
+from leg_wear_monitor.mechanism.materials.load import BushingLoad
 from leg_wear_monitor.monitor.alarms.alarm import Level
 from leg_wear_monitor.monitor.config.settings import Limits
 from leg_wear_monitor.monitor.encoders.clearance_estimate import ClearanceObservation
@@ -54,6 +55,10 @@ def made_up_summary() -> ReplaySummary:
         clearance_m=ClearanceChange(3e-4, 4e-4, 5e-4), growth_m_per_cycle=1e-12,
         growth_error_m_per_cycle=1e-13, growth_mps=None, forecast=forecast, peak_force_n=np.float64(9.0),
         mean_force_n=4.0, impacts=7,
+        load=BushingLoad(
+            mean_pressure_pa=1e6, p99_pressure_pa=2e6, mean_sliding_speed_mps=0.1,
+            mean_pressure_speed_pa_mps=1e5, pressure_limit_pa=1.4e8,
+        ),
         seen=SeenClearance(
             observation=ClearanceObservation.SEEN, clearance_m=5e-4, sigma_m=math.nan, departure_m=1e-4,
             believed=True, is_other=True,

@@ -1,10 +1,11 @@
 """A gait cycle's statistics from the twin, as a report with growth and remaining life."""
 
 import math
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 
 import attrs
 
+from leg_wear_monitor.mechanism.materials.load import Bushing
 from leg_wear_monitor.monitor.encoders.clearance_estimate import ClearanceEstimate
 from leg_wear_monitor.monitor.forecast.forecast import Forecast, JointForecast
 from leg_wear_monitor.monitor.forecast.growth import GrowthWindow, growth_rate
@@ -17,7 +18,7 @@ from leg_wear_monitor.twin.statistics import CycleStatistics, TorqueStatistics
 def cycle_report(
     statistics: CycleStatistics,
     cycle: int,
-    clearance_joints: Sequence[str],
+    bushings: Mapping[str, Bushing],
     growth: Sequence[GrowthWindow],
     model: ModelError,
     forecast: Forecast,
@@ -31,8 +32,8 @@ def cycle_report(
     statistics : CycleStatistics
     cycle : int
         Its number over all runs.
-    clearance_joints : sequence of str
-        Names of the clearance joints.
+    bushings : mapping of str to Bushing
+        Those of the clearance joints, in their order.
     growth : sequence of GrowthWindow
         Of each of them, this cycle included.
     model : ModelError
@@ -55,13 +56,14 @@ def cycle_report(
                 statistics,
                 k,
                 joint,
+                bushing,
                 growth[k],
                 model,
                 forecast.joints[k],
                 seen[k] if seen else None,
                 measured[k] if measured else None,
             )
-            for k, joint in enumerate(clearance_joints)
+            for k, (joint, bushing) in enumerate(bushings.items())
         ),
         torque_samples=torque.samples,
         measured_torque_rms_nm=float(torque.measured_rms_nm),
@@ -98,6 +100,7 @@ def _joint_report(
     statistics: CycleStatistics,
     k: int,
     joint: str,
+    bushing: Bushing,
     window: GrowthWindow,
     model: ModelError,
     forecast: JointForecast,
@@ -105,6 +108,8 @@ def _joint_report(
     measured: Measurement | None,
 ) -> JointReport:
     rate = growth_rate(window)
+    mean_n, p99_n = float(statistics.mean_force_n[k]), float(statistics.p99_force_n[k])
+    rubbing_w = float(statistics.archard_j[k] / statistics.moving_s)
     return JointReport(
         joint=joint,
         clearance_m=float(statistics.clearance_mean_m[k]),
@@ -116,7 +121,8 @@ def _joint_report(
         seen=seen,
         measured=measured,
         peak_force_n=float(statistics.peak_force_n[k]),
-        p99_force_n=float(statistics.p99_force_n[k]),
-        mean_force_n=float(statistics.mean_force_n[k]),
+        p99_force_n=p99_n,
+        mean_force_n=mean_n,
         impacts=int(statistics.impacts[k]),
+        load=bushing.load(mean_n, p99_n, rubbing_w),
     )

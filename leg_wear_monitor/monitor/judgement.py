@@ -207,6 +207,7 @@ def _joint(
         seen=tuple(seen),
         is_used=bool(by_encoders and by_encoders.believed),
         label=label,
+        load=report.load if report else None,
     )
 
 

@@ -3,6 +3,7 @@
 import attrs
 import numpy as np
 
+from leg_wear_monitor.mechanism.materials.load import Bushing
 from leg_wear_monitor.mechanism.spec import Mechanism
 from leg_wear_monitor.monitor.accounting import Accounting
 from leg_wear_monitor.monitor.config.fitting import fitted, twin_settings
@@ -65,6 +66,9 @@ class Parts:
         self.accounting = Accounting(self.twin, ledger, self.config.ledger)
         cycle_ns = round(60.0e9 / abs(self.config.cadence.commanded_rpm))
         self.evaluation = AlarmEvaluation(self.twin, self.config, cycle_ns, self.guard)
+        self.bushings = {
+            joint: Bushing.of(self.mechanism.clearances[joint]) for joint in self.clearance_joints
+        }
         self.forecaster = Forecaster(
             self.mechanism,
             self.config.forecast,

@@ -126,7 +126,7 @@ class Processing:
         state.last = cycle_report(
             statistics,
             accounting.state.cycles,
-            self._clearance_joints,
+            self._parts.bushings,
             state.growth,
             self._parts.model_error,
             forecast,

@@ -4,6 +4,7 @@ import math
 
 import attrs
 
+from leg_wear_monitor.mechanism.materials.load import BushingLoad
 from leg_wear_monitor.monitor.alarms.alarm import Alarm, Level
 from leg_wear_monitor.monitor.alarms.fault_codes import NO_FAULT
 from leg_wear_monitor.monitor.encoders.clearance_estimate import ClearanceEstimate
@@ -42,6 +43,8 @@ class JointReport:
         The clearance estimated from further encoders; None without encoders.
     measured : Measurement or None
         The last clearance of this part that somebody measured.
+    load : BushingLoad or None
+        Pressure and sliding speed in this cycle, against the limits of the joint's material.
     """
 
     joint: str
@@ -57,6 +60,7 @@ class JointReport:
     forecast: JointForecast | None = None
     seen: ClearanceEstimate | None = None
     measured: Measurement | None = None
+    load: BushingLoad | None = None
 
     @property
     def judged_clearance_m(self) -> float:

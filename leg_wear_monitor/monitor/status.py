@@ -5,6 +5,7 @@ from collections.abc import Iterable, Sequence
 
 import attrs
 
+from leg_wear_monitor.mechanism.materials.load import BushingLoad
 from leg_wear_monitor.monitor.accounting import Accounting
 from leg_wear_monitor.monitor.alarms.alarm import Level
 from leg_wear_monitor.monitor.alarms.fault_codes import (
@@ -162,6 +163,7 @@ def _joint(
         "p99_force_n": report.p99_force_n,
         "mean_force_n": report.mean_force_n,
         "impacts": float(report.impacts),
+        **(_load_values(report.load) if report.load else {}),
     }
     if report.forecast is None:
         return Status(f"joint {name}", level, "no forecast yet", values, code)
@@ -181,6 +183,12 @@ def _with_measured(joint: Status, measured: Measurement | None) -> Status:
     words += f", {amount(joint.values['clearance_m'], 'm')} is counted"
     values = {"measured_clearance_m": measured.clearance_m, "measured_sigma_m": measured.sigma_m}
     return attrs.evolve(joint, message=f"{joint.message}; {words}", values=joint.values | values)
+
+
+def _load_values(load: BushingLoad) -> dict[str, float]:
+    """Pressure and sliding speed, and the limits that the material gives."""
+    values = attrs.asdict(load)
+    return {name: value for name, value in values.items() if isinstance(value, float)}
 
 
 def _encoders(encoders: EncoderObserver, evaluation: AlarmEvaluation, last: CycleReport | None) -> Status:

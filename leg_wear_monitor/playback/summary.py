@@ -180,6 +180,7 @@ def _joint(history: History, k: int, joint: JointReport, verdict: Verdict) -> Re
         mean_force_n=mean.mean(),
         seen=_seen(joint.seen) if joint.seen else None,
         impacts=int(impacts.sum()),
+        load=joint.load,
     )
 
 

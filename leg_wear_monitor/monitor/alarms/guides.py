@@ -24,7 +24,7 @@ CODES_OF_GUIDES = {
     ),
     "torque_mismatch": ("TORQUE_MISMATCH", "MECHANISM_CHANGED", "TORQUE_MASS"),
     "load_and_friction": ("TORQUE_LOAD", "LOAD_CHANGED", "FRICTION_CHANGED"),
-    "force_growth_life": ("IMPACT_FORCE", "GROWTH", "REMAINING_LIFE"),
+    "force_growth_life": ("IMPACT_FORCE", "GROWTH", "REMAINING_LIFE", "MATERIAL_LIMIT"),
     "input": (
         "BAD_INPUT",
         "INPUT_GAPS",

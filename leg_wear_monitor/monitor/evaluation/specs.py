@@ -54,6 +54,10 @@ def _knock(alarms: "Alarms") -> int:
     return alarms.knock_on_delay_cycles
 
 
+def _or_nan(value: float | None) -> float:
+    return math.nan if value is None else value
+
+
 @attrs.frozen(kw_only=True)
 class AlarmSpec(Generic[_E]):
     """An alarm.
@@ -147,6 +151,15 @@ LIFE: "AlarmSpec[JointReport]" = AlarmSpec(
     limit=lambda of: of.config.limits.remaining_life_h,
     is_least=True,
 )
+MATERIAL: "AlarmSpec[JointReport]" = AlarmSpec(
+    kind="material_limit",
+    quantity="load over the limits of the material",
+    meaning="largest of pressure (99th percentile), sliding speed and p v (means) of the gait cycle, as a "
+    "fraction of the limits of the joint's material. Only with a material that has limits",
+    limit_words="1, the limits of the material",
+    value=lambda joint: _or_nan(joint.load.fraction if joint.load else None),
+    limit=lambda _: 1.0,
+)
 DEPARTURE: "AlarmSpec[JointReport]" = AlarmSpec(
     kind="clearance_departure",
     unit="m",
@@ -186,7 +199,7 @@ SOURCES: "AlarmSpec[InputGuard]" = AlarmSpec(
     is_count=True,
 )
 
-JOINT = (IMPACT, CLEARANCE, GROWTH, LIFE)
+JOINT = (IMPACT, CLEARANCE, GROWTH, LIFE, MATERIAL)
 ENCODERS = (DEPARTURE,)
 TORQUE: "tuple[AlarmSpec[CycleEvidence], ...]" = (
     MISMATCH,

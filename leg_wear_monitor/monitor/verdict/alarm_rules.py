@@ -12,7 +12,14 @@ from leg_wear_monitor.monitor.verdict.words import amount, estimate
 
 Condition = Callable[[Situation], Sequence[Hit]]
 
-OF_A_JOINT = ("impact_force", "clearance", "growth", "remaining_life", "clearance_departure")
+OF_A_JOINT = (
+    "impact_force",
+    "clearance",
+    "growth",
+    "remaining_life",
+    "material_limit",
+    "clearance_departure",
+)
 
 
 def raised(*kinds: str, least: Level = Level.WARN) -> Condition:

@@ -8,7 +8,7 @@ from leg_wear_monitor.monitor.alarms.fault_codes import ALREADY_COUNTED, CRANK_Z
 from leg_wear_monitor.monitor.alarms.words import ADVICE
 from leg_wear_monitor.monitor.diagnosis.diagnosis import Cause
 from leg_wear_monitor.monitor.torque_causes.explanation import TorqueCause
-from leg_wear_monitor.monitor.verdict import clearance_rules, input_rules
+from leg_wear_monitor.monitor.verdict import clearance_rules, input_rules, material_rules
 from leg_wear_monitor.monitor.verdict.alarm_rules import blinding, raised
 from leg_wear_monitor.monitor.verdict.rule import EVERYTHING, OF_THE_GAIT, OF_THE_MODEL, Rule
 from leg_wear_monitor.monitor.verdict.situation import Situation
@@ -199,6 +199,15 @@ RULES = (
         hits=input_rules.no_cycle,
         why="the monitor has not received a whole gait cycle yet",
         do="let the leg walk; if it walks already, see the status `input`",
+    ),
+    Rule(
+        code="MATERIAL_LIMIT",
+        state=State.WATCH,
+        hits=material_rules.outside_limits,
+        why="joint {joint}: {outside}; its wear coefficient does not hold",
+        do="compare the material of the mechanism file with the part, and load and cadence with its limits; "
+        f"until then, measure the clearance of joint {{joints}} regularly; {_ACKNOWLEDGE}",
+        not_valid=(Figure.GROWTH, Figure.FORECAST),
     ),
     Rule(
         code="NO_DRIVE_TORQUE",

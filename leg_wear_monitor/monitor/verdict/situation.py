@@ -5,6 +5,7 @@ from collections.abc import Mapping
 
 import attrs
 
+from leg_wear_monitor.mechanism.materials.load import BushingLoad
 from leg_wear_monitor.monitor.alarms.alarm import Alarm
 from leg_wear_monitor.monitor.config.inputs import Crank, DriveTorque
 from leg_wear_monitor.monitor.diagnosis.diagnosis import Diagnosis
@@ -46,6 +47,8 @@ class JointSituation:
         Estimates from measurements, as far as there are any.
     is_used : bool
         Whether the forecast rests on what encoders show of this joint.
+    load : BushingLoad or None
+        That of the last gait cycle; None before it.
     """
 
     joint: str
@@ -56,6 +59,7 @@ class JointSituation:
     seen: tuple[SeenClearance, ...] = ()
     is_used: bool = False
     label: str = ""
+    load: BushingLoad | None = None
 
 
 @attrs.frozen(kw_only=True)

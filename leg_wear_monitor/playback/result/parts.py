@@ -7,6 +7,7 @@ from typing import Any
 import attrs
 
 from leg_wear_monitor.mechanism.arrays import Floats
+from leg_wear_monitor.mechanism.materials.load import BushingLoad
 from leg_wear_monitor.monitor.alarms.alarm import Level
 from leg_wear_monitor.monitor.encoders.clearance_estimate import ClearanceObservation
 from leg_wear_monitor.monitor.forecast.forecast import Answer, JointForecast, Quantiles
@@ -96,6 +97,9 @@ class ReplayJoint:
         Clearance that further encoders show; None without such encoders.
     impacts : int
         Number of impacts.
+    load : BushingLoad or None
+        Pressure and sliding speed in the last gait cycle, and the limits of the joint's material; None in a
+        file of an older version.
     """
 
     clearance_m: ClearanceChange
@@ -107,6 +111,7 @@ class ReplayJoint:
     mean_force_n: float | None = _perhaps()
     seen: SeenClearance | None = None
     impacts: int
+    load: BushingLoad | None = None
 
 
 @attrs.frozen(kw_only=True)

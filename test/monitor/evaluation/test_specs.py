@@ -43,7 +43,10 @@ def test_kinds_are_those_of_the_board():
 
 
 def test_names_and_their_order_are_a_contract():
-    joint = ("impact_force {}", "clearance {}", "growth {}", "remaining_life {}", "clearance_departure {}")
+    joint = (
+        "impact_force {}", "clearance {}", "growth {}", "remaining_life {}", "material_limit {}",
+        "clearance_departure {}",
+    )  # fmt: skip
     of_leg = (
         "torque_mismatch", "torque_bias", "torque_drift", "torque_lag", "cadence", "input_rate crank",
         "input_rate torque", "input_samples", "input_gaps", "input_torque", "input_sources",

@@ -149,6 +149,13 @@ CASES = [
         (Figure.GROWTH, Figure.IMPACT_FORCES),
     ),
     (
+        {"alarms": (alarm("material_limit A"),)},
+        State.WATCH,
+        "MATERIAL_LIMIT_A",
+        (Figure.GROWTH, Figure.FORECAST),
+    ),
+    ({"alarms": (alarm("material_limit A", Level.WARN),)}, State.WATCH, "ALARM_A", ()),
+    (
         {"unfollowed": "two series of crank angles"},
         State.NOT_MONITORED,
         "NOT_FOLLOWED",

@@ -118,6 +118,20 @@ plt.show()
 
 # %%
 # The line with dots is the path of the toe.
+# ``leg-wear-monitor draw four_bar.yaml`` writes a page that moves the linkage; with ``--watch`` it draws again whenever you save the file.
+#
+# A linkage that does not work is drawn, too.
+# Put a decimal point in the wrong place, a crank of 500 mm:
+
+crank_of_500_mm = FOUR_BAR.replace("B: [0.050, 0.000]}}", "B: [0.500, 0.000]}}")
+written = (folder / "long.yaml").write_text(crank_of_500_mm)
+terminal("leg-wear-monitor draw long.yaml")
+
+lw.load_mechanism(folder / "long.yaml").plot()
+plt.show()
+
+# %%
+# The command names what is wrong, with numbers, and the picture shows it.
 #
 # Drive the ideal linkage
 # -----------------------

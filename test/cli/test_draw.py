@@ -73,6 +73,14 @@ def test_what_does_not_close_is_drawn_and_said_with_its_gap(run, long_coupler, c
 
 
 @pytest.mark.plain
+def test_a_start_far_from_the_assembly_is_drawn_as_found(run, shipped, complaints, tmp_path):
+    (tmp_path / "far.yaml").write_text(shipped("four_bar").replace("0.0, 1.6961]", "0.0, 2.3]"))
+    result = run("draw", "far.yaml")
+    assert (result.exit_code, len(complaints(result))) == (1, 1)
+    assert "no assembly near the given start" in result.stderr
+
+
+@pytest.mark.plain
 def test_names_are_text(run, evil, tmp_path):
     assert run("draw", evil).exit_code == 0
     page = (tmp_path / "evil.html").read_text()

@@ -1,7 +1,11 @@
 """How far a mechanism closes and turns, against closed forms of the four-bar and the slider-crank."""
 
+import re
+from pathlib import Path
+
 import numpy as np
 import pytest
+from ruamel.yaml import YAML
 
 from leg_wear_monitor.mechanism.ideal import TURN, point_path
 from leg_wear_monitor.mechanism.loader import load_mechanism, parse_mechanism, shipped_mechanisms
@@ -85,6 +89,19 @@ def test_a_folded_end_is_told_from_a_stretched_one(rocking):
     end = corner(CRANK, 0.13, COUPLER - ROCKER)
     assert found.low.crank_angle == pytest.approx(end, abs=4e-4)
     assert found.low.is_folded
+
+
+def test_each_end_of_a_leg_has_its_own_bodies_in_line():
+    """A Klann leg whose rod is 30 % longer to the lower rocker; upper rocker and leg are carried along."""
+    lesson = Path(__file__).parents[2] / "docs" / "tutorials" / "2_your_linkage.py"
+    klann = re.search(r'KLANN = """(.*?)"""', lesson.read_text(), re.DOTALL)[1]
+    made = YAML(typ="safe").load(klann)
+    crank_pin, rocker_pin = (np.array(made["bodies"]["rod"]["points"][name]) for name in "BD")
+    made["bodies"]["rod"]["points"]["D"] = (crank_pin + 1.3 * (rocker_pin - crank_pin)).tolist()
+    found = reach(made)
+    assert (set(found.low.bodies), found.low.is_folded) == ({"rod", "lower_rocker"}, True)
+    assert (set(found.high.bodies), found.high.is_folded) == ({"leg", "upper_rocker"}, False)
+    assert max(abs(in_line(found, dead)) for dead in (found.low, found.high)) < 0.1
 
 
 def test_a_rod_shorter_than_the_crank_stands_at_a_right_angle_to_its_guide(document):

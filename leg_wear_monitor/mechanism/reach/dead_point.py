@@ -16,7 +16,9 @@ from leg_wear_monitor.mechanism.ideal import point_path
 from leg_wear_monitor.mechanism.position import Linkage, evaluate
 from leg_wear_monitor.mechanism.spec import Mechanism, PrismaticJoint
 
-_STILL = 0.05  # of the fastest joint: the position is not exactly that of the dead point
+# the position is not exactly that of the dead point
+_STILL = 0.05  # speed of a joint that stays, as a fraction of that of the joint that moves
+_STRAIGHT = 0.1  # sine of the angle between bodies in line
 
 
 @attrs.frozen(eq=False)
@@ -53,22 +55,34 @@ def dead_point(linkage: Linkage, crank_angle: float, q: Floats) -> DeadPoint:
     mechanism = linkage.mechanism
     velocity = _locked_velocity(linkage, q)
     speed = {body: _joint_speeds(mechanism, q, velocity, body) for body in mechanism.bodies}
-    fastest = max((value for each in speed.values() for value in each.values()), default=0.0)
-    limit = _STILL * fastest
-    for joint, a, b in _pairs(mechanism, speed, limit):
-        ends = _still_joint(speed[a], joint, limit), _still_joint(speed[b], joint, limit)
-        if ends[0] and ends[1]:
-            joints = ends[0], joint, ends[1]
-            return DeadPoint(
-                crank_angle, q, (a, b), joints, is_in_line=True, is_folded=_is_folded(mechanism, q, joints)
-            )
-    for joint, a, b in _pairs(mechanism, speed, limit):
+    dyads = list(_dyads(mechanism, q, speed))
+    if dyads:
+        _, bodies, joints, is_folded = min(dyads)
+        return DeadPoint(crank_angle, q, bodies, joints, is_in_line=True, is_folded=is_folded)
+    for joint, a, b in _pairs(mechanism, speed):
         for rod, slider in ((a, b), (b, a)):
-            guide = _guide(mechanism, slider, speed, limit)
-            if guide and _still_joint(speed[rod], joint, limit):
+            guide = _guide(mechanism, slider, speed, _STILL * speed[rod][joint])
+            if guide and _still_joint(speed[rod], joint):
                 return DeadPoint(crank_angle, q, (rod,), (joint, guide))
+    limit = _STILL * max((value for each in speed.values() for value in each.values()), default=0.0)
     moving = tuple(body for body, each in speed.items() if max(each.values(), default=0.0) > limit)
     return DeadPoint(crank_angle, q, moving)
+
+
+def _dyads(
+    mechanism: Mechanism, q: Floats, speed: dict[str, dict[str, float]]
+) -> Iterator[tuple[float, tuple[str, str], tuple[str, str, str], bool]]:
+    """Two bodies whose common joint moves while another joint of each stays, all three in line.
+
+    How still these are, the bodies, the joints, and whether the bodies are folded.
+    """
+    for joint, a, b in _pairs(mechanism, speed):
+        first, last = _still_joint(speed[a], joint), _still_joint(speed[b], joint)
+        if first and last:
+            joints = first, joint, last
+            sine, is_folded = _bend(mechanism, q, joints)
+            if abs(sine) < _STRAIGHT:
+                yield (speed[a][first] + speed[b][last]) / speed[a][joint], (a, b), joints, is_folded
 
 
 def _locked_velocity(linkage: Linkage, q: Floats) -> Floats:
@@ -94,19 +108,18 @@ def _joint_speeds(mechanism: Mechanism, q: Floats, velocity: Floats, body: str) 
     return speeds
 
 
-def _pairs(
-    mechanism: Mechanism, speed: dict[str, dict[str, float]], limit: float
-) -> Iterator[tuple[str, str, str]]:
-    """Revolute joints that move with the crank locked, with their two bodies."""
+def _pairs(mechanism: Mechanism, speed: dict[str, dict[str, float]]) -> Iterator[tuple[str, str, str]]:
+    """Revolute joints of two moving bodies that move with the crank locked, with the bodies."""
     for joint in mechanism.joints:
         a, b = mechanism.sides(joint)
         is_revolute = not isinstance(mechanism.joints[joint], PrismaticJoint)
-        if is_revolute and a in speed and b in speed and speed[a][joint] > limit:
+        if is_revolute and a in speed and b in speed and min(speed[a][joint], speed[b][joint]) > 0.0:
             yield joint, a, b
 
 
-def _still_joint(speeds: dict[str, float], moving: str, limit: float) -> str:
-    """The joint of a body that stays, empty without one."""
+def _still_joint(speeds: dict[str, float], moving: str) -> str:
+    """The joint of a body that stays while another moves, empty without one."""
+    limit = _STILL * speeds[moving]
     still = {name: value for name, value in speeds.items() if name != moving and value <= limit}
     return min(still, key=lambda name: still[name], default="")
 
@@ -121,7 +134,9 @@ def _guide(mechanism: Mechanism, slider: str, speed: dict[str, dict[str, float]]
     return ""
 
 
-def _is_folded(mechanism: Mechanism, q: Floats, joints: tuple[str, str, str]) -> bool:
-    """Whether the outer two of three joints in line lie on one side of the middle one."""
+def _bend(mechanism: Mechanism, q: Floats, joints: tuple[str, str, str]) -> tuple[float, bool]:
+    """Sine of the angle at the middle one of three joints, and whether the outer two lie on one side."""
     places = [point_path(mechanism, q[None], mechanism.sides(joint)[1], joint)[0] for joint in joints]
-    return bool(np.dot(places[0] - places[1], places[2] - places[1]) > 0.0)
+    a, b = places[0] - places[1], places[2] - places[1]
+    length = float(np.hypot(*a) * np.hypot(*b)) or 1.0
+    return float(a[0] * b[1] - a[1] * b[0]) / length, bool(np.dot(a, b) > 0.0)

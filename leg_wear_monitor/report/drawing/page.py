@@ -30,7 +30,11 @@ def drawing_html(drawing: Drawing, is_watched: bool = False) -> str:
     reach, found = drawing.reach, drawing.findings
     mechanism = reach.mechanism
     faults = [Section("What is wrong", [Sentences(found)])] if found else []
-    told = [Section("In everyday units", [Sentences(understood(reach.linkage))])] if reach.turns else []
+    told = (
+        [Section("In everyday units", [Sentences(understood(reach.linkage))])]
+        if reach.turns and not found
+        else []
+    )
     reload = [Section("Redrawn on save", [_reload()])] if is_watched else []
     page = Page(
         title=mechanism.name,

@@ -37,8 +37,8 @@ def change_section(legs: Sequence[LegOverview]) -> Section:
     )
     added = sum(leg.change.recordings for leg in legs)
     sentences = [
-        f"{added} recordings were counted since.",
-        f"The verdict of {len(worse)} legs is worse, that of {len(changed) - len(worse)} legs is better.",
+        f"Recordings counted since: {added}.",
+        f"Legs with a worse verdict: {len(worse)}; with a better one: {len(changed) - len(worse)}.",
     ]
     parts: list[Part] = [Sentences(sentences)]
     if changed:

@@ -15,9 +15,10 @@ def deadline(leg: LegOverview, standing: Standing, day: Day) -> str:
     if standing in (Standing.NOT_MONITORED, Standing.OUTDATED, Standing.UNKNOWN):
         return "as soon as possible: nobody monitors it meanwhile"
     life = leg.life.get("leg")
-    if life is None:
-        return "at its next stop" if standing is Standing.INSPECT else "at its next service"
-    return f"within {hours(life.p10_h)} h of walking (p10 of its life){_date(leg, life.p10_h, day)}"
+    p10 = "" if life is None else f"{hours(life.p10_h)} h of walking{_date(leg, life.p10_h, day)}"
+    if standing is Standing.INSPECT:  # what is to be inspected may make the forecast wrong
+        return f"at its next stop{p10 and f'; p10 of its life: {p10}'}"
+    return f"within the p10 of its life: {p10}" if p10 else "at its next service"
 
 
 def hours(value_h: float) -> str:

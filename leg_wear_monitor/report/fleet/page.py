@@ -19,9 +19,9 @@ _FIRST = 10
 _UNWATCHED = (Standing.NOT_MONITORED, Standing.OUTDATED, Standing.UNKNOWN)
 _GROUPS = (
     ("must stop", (Standing.STOP,)),
-    ("want a look", (Standing.INSPECT, Standing.WATCH)),
-    ("are not monitored", _UNWATCHED),
-    ("are well", (Standing.HEALTHY,)),
+    ("to look at", (Standing.INSPECT, Standing.WATCH)),
+    ("unmonitored", _UNWATCHED),
+    ("well", (Standing.HEALTHY,)),
 )
 
 
@@ -61,6 +61,7 @@ def fleet_page(
         versions=versions or {},
         banner=_banner(overview, day),
         styles=[template_text("replay/replay.css"), template_text("fleet/fleet.css")],
+        libraries=[template_text("fleet/map.js")],
         has_dark=True,
     )
 

@@ -54,12 +54,13 @@ def _sentences(legs: Sequence[LegOverview], day: Day) -> list[str]:
     ages = [day.age_days(leg) for leg in legs]
     old = sum(age is not None and age > day.fresh_days for age in ages)
     ahead = sum(age is not None and age < -1.0 for age in ages)
+    none = ages.count(None)
     told = [
-        f"{len(legs) - old - ahead - ages.count(None)} legs have a recording of the last "
-        f"{day.fresh_days:g} days, {old} legs have an older one, {ages.count(None)} legs have none."
+        f"Legs with a recording of the last {day.fresh_days:g} days: {len(legs) - old - ahead - none}; "
+        f"with an older one: {old}; with none: {none}."
     ]
     if ahead:
-        told.append(f"The last recording of {ahead} legs is dated in the future.")
+        told.append(f"Legs whose last recording is dated in the future: {ahead}.")
     return told
 
 

@@ -1,5 +1,7 @@
 """The page of a thousand legs in a browser: it searches, filters, sorts, fits, and runs no text."""
 
+import re
+
 import attrs
 import pytest
 from browser import NEEDS_CHROMIUM, WIDTHS, browse
@@ -45,6 +47,15 @@ function look(frame) {
   found.sorted = page.querySelectorAll(".legs th")[3].getAttribute("aria-sort");
   buttons[3].click();
   found.up = column(3);
+  const map = page.querySelector("canvas"), box = map.getBoundingClientRect();
+  const pixels = map.getContext("2d").getImageData(0, 0, map.width, map.height).data;
+  found.tints = new Set(new Uint32Array(pixels.buffer)).size;
+  const spot = { clientX: box.right - 1, clientY: box.top + 5, bubbles: true };
+  const pointer = frame.contentWindow.PointerEvent;
+  map.dispatchEvent(new pointer("pointermove", spot));
+  found.pointed = page.querySelector(".map .note").textContent;
+  map.dispatchEvent(new pointer("click", spot));
+  found.clicked = column(0);
   put(search, "onerror", "input");
   found.nasty = [rows().length, rows()[0].textContent, Boolean(window.ran)];
   return found;
@@ -71,10 +82,10 @@ def seen(fleet, tmp_path_factory):
     return dict(zip(WIDTHS, found, strict=True))
 
 
-def test_it_fits_and_shows_a_hundred_legs_at_first(seen):
+def test_it_fits_and_shows_fifty_legs_at_first(seen):
     for width, found in seen.items():
         assert found["overflow"] <= 0, width
-        assert (found["begin"], found["more"], found["small"]) == (100, 200, 0), width
+        assert (found["begin"], found["more"], found["small"]) == (50, 300, 0), width
 
 
 def test_search_and_filters(seen, fleet):
@@ -90,8 +101,15 @@ def test_a_title_sorts_and_what_is_not_known_comes_last(seen):
     for found in seen.values():
         for column, is_down in ((found["down"], True), (found["up"], False)):
             known = [int(each) for each in column if each not in ("–", "not valid")]
-            assert len(known) == 100 and known == sorted(known, reverse=is_down)
+            assert len(known) == 50 and known == sorted(known, reverse=is_down)
         assert found["sorted"] == "ascending"
+
+
+def test_the_map_is_drawn_and_finds_the_leg_one_points_at(seen):
+    for found in seen.values():
+        assert found["tints"] >= 4
+        assert re.fullmatch(r"leg-\d+: A (–|not valid|\d+ %), .*", found["pointed"])
+        assert found["clicked"] == [found["pointed"].split(":")[0]]
 
 
 def test_no_text_is_run_as_a_script(seen):

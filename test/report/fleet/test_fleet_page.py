@@ -44,7 +44,7 @@ def test_the_counts_sum_up():
     assert sum(found.values()) == 300
     assert all(number > 0 for number in found.values())  # otherwise this shows nothing
     text = words_of(read(page_html(fleet_page(fleet, DAY))))
-    told = re.search(r"(\d+) must stop, (\d+) want a look, (\d+) are not monitored, (\d+) are well\.", text)
+    told = re.search(r"(\d+) must stop, (\d+) to look at, (\d+) unmonitored, (\d+) well\.", text)
     stop, look, blind, well = map(int, told.groups())
     assert stop == found[Standing.STOP] == fleet.counts["stop"]
     assert look == fleet.counts["inspect"] + fleet.counts["watch"]
@@ -81,7 +81,7 @@ def test_a_leg_without_a_fresh_recording_is_not_well(age_days):
     leg = made_up_leg(age_days=age_days)
     assert DAY.standing(leg) is Standing.OUTDATED
     html = html_of(leg)
-    assert "0 are well" in words_of(read(html)) and "banner careful" in html
+    assert " 0 well" in words_of(read(html)) and "banner careful" in html
     assert data_of(html)["legs"][0]["tone"] == "careful"
     assert DAY.standing(made_up_leg(age_days=6.9)) is Standing.HEALTHY
 
@@ -102,7 +102,7 @@ def test_an_old_recording_hides_no_stop():
 def test_a_leg_without_a_recording_is_on_the_page():
     leg = LegOverview(id="new-1")
     html = html_of(leg)
-    assert "1 are not monitored" in words_of(read(html)) and "no recording of it was counted" in html
+    assert "1 unmonitored" in words_of(read(html)) and "no recording of it was counted" in html
     (row,) = data_of(html)["legs"]
     assert (row["standing"], row["age"], row["life"]) == ("no recording", None, None)
 
@@ -144,13 +144,17 @@ def test_legs_with_other_joints_share_a_table():
 def test_by_when_follows_from_the_p10_and_the_hours_a_day():
     leg = made_up_leg(state=State.WATCH, p10_h=40.0, age_days=0.0)  # 80 h in 20 days
     text = deadline(leg, Standing.WATCH, DAY)
-    assert text.startswith("within 40 h of walking (p10 of its life); by 2026-11-28 at the 4 h a day")
+    assert text.startswith("within the p10 of its life: 40 h of walking; by 2026-11-28 at the 4 h a day")
     late = made_up_leg(state=State.WATCH, p10_h=4.0, age_days=6.0)
     assert "; overdue: by 2026-11-13 " in deadline(late, Standing.WATCH, DAY)
     short = attrs.evolve(leg.recordings, begin_ns=leg.recordings.end_ns - DAY_NS // 2)
     assert "a day" not in deadline(attrs.evolve(leg, recordings=short), Standing.WATCH, DAY)
     unknown = attrs.evolve(leg, life={"leg": None})
     assert deadline(unknown, Standing.INSPECT, DAY) == "at its next stop"
+    assert deadline(leg, Standing.INSPECT, DAY).startswith(
+        "at its next stop; p10 of its life: 40 h of walking"
+    )
+    assert deadline(unknown, Standing.WATCH, DAY) == "at its next service"
 
 
 def test_what_changed():
@@ -159,8 +163,8 @@ def test_what_changed():
     )
     better = made_up_leg("b", change=LegChange(recordings=1, state="inspect"))
     text = words_of(read(html_of(worse, better)))
-    assert "3 recordings were counted since." in text
-    assert "The verdict of 1 legs is worse, that of 1 legs is better." in text
+    assert "Recordings counted since: 3." in text
+    assert "Legs with a worse verdict: 1; with a better one: 1." in text
     assert "+5" in text
     rows = {row["id"]: row for row in data_of(html_of(worse, better))["legs"]}
     assert (rows["w"]["was"], rows["w"]["rise"], rows["b"]["was"]) == ("watch", [5.0, "A"], "inspect")

@@ -3,7 +3,7 @@
   const root = document.getElementById("fleet-legs");
   if (!root) return;
   const data = JSON.parse(root.querySelector("script").textContent), legs = data.legs;
-  const STEP = 100;  // rows that are drawn at once: a screen shows fewer, and a thousand take a second
+  const FIRST = 50, MORE = 250;  // rows: a screen shows fewer than fifty, and a thousand take a second to lay out
   const form = root.querySelector("form"), search = form.querySelector("input"), said = form.querySelector("output");
   const choices = Array.from(form.querySelectorAll("select"));
   const head = root.querySelector("thead"), body = root.querySelector("tbody");
@@ -87,15 +87,15 @@
     if (a === null || b === null) return (a === null) - (b === null);
     return order.sign * (typeof a === "string" ? a.localeCompare(b, "en", { numeric: true }) : a - b);
   }
-  function draw() {
+  function draw(number) {
     const rows = document.createDocumentFragment();
-    found.slice(shown, shown + STEP).forEach((leg) => {
+    found.slice(shown, shown + number).forEach((leg) => {
       const row = make("tr");
       row.append(...columns.map((column) => column.cell(leg)));
       rows.append(row);
     });
     body.append(rows);
-    shown = Math.min(shown + STEP, found.length);
+    shown = Math.min(shown + number, found.length);
     more.hidden = shown === found.length;
     said.textContent = found.length + " of " + legs.length + " legs" + (shown < found.length ? ", the first " + shown + " are shown" : "");
   }
@@ -104,9 +104,10 @@
     found = sorted.filter((leg) =>
       choices.every((choice) => !choice.value || leg[choice.dataset.key] === choice.value) &&
       words.every((word) => texts.get(leg).includes(word)));
+    root.dispatchEvent(new CustomEvent("legs", { detail: { legs: found, joints: data.joints } }));
     body.replaceChildren();
     shown = 0;
-    draw();
+    draw(FIRST);
   }
   function sortBy(column) {
     order = { column: column, sign: order.column === column ? -order.sign : 1 };
@@ -132,8 +133,8 @@
   search.addEventListener("input", select);
   choices.forEach((choice) => choice.addEventListener("change", select));
   form.addEventListener("submit", (event) => event.preventDefault());
-  more.querySelector("button").addEventListener("click", draw);
-  window.addEventListener("beforeprint", () => { while (shown < found.length) draw(); });  // paper has no button
-  root.querySelectorAll("form, .scroll, .key").forEach((part) => { part.hidden = false; });
+  more.querySelector("button").addEventListener("click", () => draw(MORE));
+  window.addEventListener("beforeprint", () => { if (shown < found.length) draw(found.length); });  // paper has no button
+  root.querySelectorAll("form, .scroll, .map").forEach((part) => { part.hidden = false; });
   sortBy(columns[1]);
 })();

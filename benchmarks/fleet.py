@@ -1,7 +1,7 @@
 """Times and bytes of a fleet of short synthetic legs; interrupted, with a worker killed, and gone on.
 
-Legs in two lots walk some recordings of a few seconds each; some recordings are damaged, and ten legs have a
-worn knee from the begin. Needs the extras bags, fleet and dask. With --keep, the directory stays for a look.
+Legs in two lots walk some recordings of a few seconds each; some recordings are damaged, and ten legs have
+worn joints from the begin. Needs the extras bags, fleet and dask. With --keep, the directory stays.
 """
 
 import argparse
@@ -19,13 +19,16 @@ from pathlib import Path
 
 import numpy as np
 
-import leg_wear_monitor as lw
 from leg_wear_monitor.bags.mcap.writer import McapWriter
 from leg_wear_monitor.fleet.overview.read import load_overview
+from leg_wear_monitor.gait.config import EncoderConfig, GaitConfig, PaceConfig, TorqueSensorConfig
+from leg_wear_monitor.gait.leg import SyntheticLeg
+from leg_wear_monitor.gait.sensors import readings
 from leg_wear_monitor.messages import encode
+from leg_wear_monitor.twin.kinds import TORQUE
 
-RATE_HZ, BEGIN_NS = 200, 1_790_000_000 * 10**9
-DAY_S, WORN_M = 86_400, 1.0e-3
+RATE_HZ, WALK_S, BEGIN_NS = 200, 12, 1_790_000_000 * 10**9
+DAY_S, NEW_M, WORN_M = 86_400, 3.0e-4, 1.0e-3
 DAMAGED = 17  # each so many-th recording is truncated, the one after it is no recording
 LEGS_YAML = """
 out: fleet
@@ -33,35 +36,38 @@ legs:
 """
 
 
-def curve(clearance_m: float) -> tuple[np.ndarray, np.ndarray]:
-    """Crank angle [rad] and drive torque [N m] of a turn; with a clearance, of a simulated knee."""
-    options = {"clearances": ["G"], "clearance_m": clearance_m} if clearance_m else {"clearances": []}
-    trace = lw.simulate("bionic_leg", cycles=1, trace=720, **options).trace
-    angle = trace.crank_angle_rad % (2.0 * np.pi)
-    order = np.argsort(angle)
-    return angle[order], trace.drive_torque_nm[order]
+def torques(clearance_m: float) -> np.ndarray:
+    """Drive torque [N m] of the synthetic leg over whole gait cycles, the first sample at crank angle 0."""
+    config = GaitConfig(
+        duration_s=WALK_S + 0.5 / RATE_HZ,
+        clearances_m=(clearance_m,) * 5,
+        pace=PaceConfig(speeds_rpm=(60.0,)),
+        encoder=EncoderConfig(rate_hz=10.0),
+        torque_sensor=TorqueSensorConfig(rate_hz=float(RATE_HZ)),
+    )
+    found = [one.torque_nm for one in readings(SyntheticLeg(config), config) if one.kind == TORQUE]
+    return np.roll(found, 1)  # the first reading comes a sample after the start
 
 
-def write(path: Path, turn: tuple[np.ndarray, np.ndarray], begin_ns: int, seconds: float, seed: int) -> None:
+def write(path: Path, torque_nm: np.ndarray, begin_ns: int, seconds: float, seed: int) -> None:
     n = round(seconds * RATE_HZ)
-    draw = np.random.default_rng(seed)
-    angle = 2.0 * np.pi * np.arange(n) / RATE_HZ + draw.normal(0.0, 2.0e-4, n)
-    torque = np.interp(angle % (2.0 * np.pi), *turn, period=2.0 * np.pi) + draw.normal(0.0, 0.05, n)
+    angle = 2.0 * np.pi * np.arange(n) / RATE_HZ + np.random.default_rng(seed).normal(0.0, 2.0e-4, n)
     stamps = begin_ns + np.arange(n, dtype=np.int64) * (10**9 // RATE_HZ)
-    still = np.zeros(n)
+    wrench = np.zeros((n, 3))
+    wrench[:, 2] = np.take(torque_nm, np.arange(n) + RATE_HZ * (seed % WALK_S), mode="wrap")
     joints = encode.joint_states(stamps, ["crank"], position=angle[:, None])
-    wrenches = encode.wrenches(stamps, torque=np.stack([still, still, torque], axis=1), frame_id="pelvis")
+    wrenches = encode.wrenches(stamps, torque=wrench, frame_id="pelvis")
     with McapWriter(path, chunk_bytes=100_000) as writer:
         crank = writer.channel("/joint_states", encode.JOINT_STATE)
         drive = writer.channel("/drive_torque", encode.WRENCH_STAMPED)
-        for stamp, joint, wrench in zip(stamps.tolist(), joints, wrenches, strict=True):
+        for stamp, joint, force in zip(stamps.tolist(), joints, wrenches, strict=True):
             writer.write(crank, stamp, bytes(joint))
-            writer.write(drive, stamp, bytes(wrench))
+            writer.write(drive, stamp, bytes(force))
 
 
 def make(home: Path, legs: int, recordings: int, seconds: float) -> tuple[Path, dict[str, int]]:
     """A fleet's description with its recordings, and what must be found in them."""
-    healthy, worn = curve(0.0), curve(WORN_M)
+    healthy, worn = torques(NEW_M), torques(WORN_M)
     entries, expected = [], {"sound": 0, "truncated": 0, "unreadable": 0}
     for leg in range(legs):
         name, lot = f"leg-{leg:04}", "AB"[leg % 2]
@@ -70,8 +76,8 @@ def make(home: Path, legs: int, recordings: int, seconds: float) -> tuple[Path, 
         for day in range(recordings):
             number = leg * recordings + day
             path = home / name / f"{recordings - day}.mcap"  # names that do not sort by time
-            turn = worn if leg % max(1, legs // 10) == 0 else healthy
-            write(path, turn, BEGIN_NS + day * DAY_S * 10**9 + leg, seconds, number)
+            torque_nm = worn if leg % max(1, legs // 10) == 0 else healthy
+            write(path, torque_nm, BEGIN_NS + day * DAY_S * 10**9 + leg, seconds, number)
             kind = {0: "truncated", 1: "unreadable"}.get(number % DAMAGED, "sound")
             if kind == "truncated":
                 path.write_bytes(path.read_bytes()[: path.stat().st_size * 7 // 8])

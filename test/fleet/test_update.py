@@ -8,6 +8,9 @@ import pytest
 
 import leg_wear_monitor as lw
 from leg_wear_monitor.errors import ConfigError, LegWearError
+from leg_wear_monitor.fleet.chain.count import count_or_fault
+from leg_wear_monitor.fleet.chain.scan import Found
+from leg_wear_monitor.fleet.description.loader import load_fleet
 from leg_wear_monitor.fleet.directory.leg_directory import LegDirectory
 from leg_wear_monitor.fleet.directory.lock import locked
 from leg_wear_monitor.fleet.overview.read import load_overview
@@ -196,6 +199,14 @@ def test_a_leg_without_its_ledger_stops_and_others_go_on(home, updated, update, 
     (tmp_path / "out/legs/a/ledger").unlink()
     done = update(home / "fleet.yaml", tmp_path / "out")
     assert done.findings == [("a", f"{tmp_path}/out/legs/a/ledger is missing: put a copy of it back")]
+
+
+def test_a_worker_with_other_code_counts_nothing(home, tmp_path):
+    (leg, _) = load_fleet(home / "fleet.yaml").legs
+    found = Found(leg.recordings[0], 1, 1, "key")
+    fault = count_or_fault(leg, tmp_path, found, 0, "of another version")
+    assert fault == "a worker has another version of leg_wear_monitor; install the same one everywhere"
+    assert list(tmp_path.iterdir()) == []
 
 
 def test_one_update_at_a_time(home, updated, update):

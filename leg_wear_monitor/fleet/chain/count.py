@@ -13,10 +13,16 @@ from leg_wear_monitor.fleet.directory.leg_directory import LegDirectory, Line
 from leg_wear_monitor.fleet.tables.cycles import cycle_columns
 from leg_wear_monitor.fleet.tables.parquet import write_parquet
 from leg_wear_monitor.playback.replay import ReplayResult, replay
+from leg_wear_monitor.workers.code import package_digest
 
 
-def count_or_fault(leg: FleetLeg, out: Path, found: Found, last_ns: int) -> Line | str:
-    """Record of a recording, or why the leg cannot go on; see `count_recording`."""
+def count_or_fault(leg: FleetLeg, out: Path, found: Found, last_ns: int, code: str) -> Line | str:
+    """Record of a recording, or why the leg cannot go on; see `count_recording`.
+
+    ``code`` is the `package_digest` of who asks.
+    """
+    if package_digest() != code:
+        return "a worker has another version of leg_wear_monitor; install the same one everywhere"
     try:
         return count_recording(leg, out, found, last_ns)
     except LegWearError as error:

@@ -10,6 +10,7 @@ from leg_wear_monitor.fleet.chain.record import Outcome
 from leg_wear_monitor.fleet.chain.scan import Found, entry_of, known, scan
 from leg_wear_monitor.fleet.description.fleet_description import FleetLeg
 from leg_wear_monitor.fleet.directory.leg_directory import LegDirectory, Line
+from leg_wear_monitor.workers.code import package_digest
 from leg_wear_monitor.workers.job import Job
 
 
@@ -110,7 +111,7 @@ class Chain:
             return None
         found = self.waiting[-1]
         leg = attrs.evolve(self.leg, recordings=())
-        arguments = (leg, self.out, found, self._last_ns)
+        arguments = (leg, self.out, found, self._last_ns, package_digest())
         return Job(f"count-{leg.id}-{found.key}", count_or_fault, arguments, float(self.waiting_bytes))
 
     def done(self, result: Line | str) -> None:

@@ -1,6 +1,7 @@
 """Files that are written whole or not at all."""
 
 import os
+from contextlib import suppress
 from pathlib import Path
 
 from leg_wear_monitor.errors import ConfigError
@@ -14,7 +15,7 @@ def write_whole(path: Path, content: bytes) -> None:
     ConfigError
         If the disk does not take it.
     """
-    part = path.with_name(f".{path.name}.{os.getpid()}.part")
+    part = path.with_name(f".{path.name}.part")  # one name, so that what a kill leaves does not stay
     try:
         path.parent.mkdir(parents=True, exist_ok=True)
         with part.open("wb") as file:
@@ -25,7 +26,8 @@ def write_whole(path: Path, content: bytes) -> None:
     except OSError as error:
         raise ConfigError(str(path), "", f"cannot be written: {error.strerror}") from error
     finally:
-        part.unlink(missing_ok=True)
+        with suppress(OSError):
+            part.unlink(missing_ok=True)
 
 
 def make_directory(path: Path) -> None:

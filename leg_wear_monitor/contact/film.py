@@ -10,6 +10,8 @@ import math
 
 from leg_wear_monitor.kernel import kernel
 
+_NUDGE = 1.0e-4  # step of a difference, as a fraction of the gap
+
 
 @kernel
 def rotation_number(x, epsilon):
@@ -64,6 +66,27 @@ def opening_factor(rate, whirl, epsilon, beta):
 
 
 @kernel
+def _motion(ex, ey, vx, vy, turning, clearance, roughness):
+    """Motion of the journal as the film has it; ``turning`` is the sum of both bodies' speeds [rad/s].
+
+    Returns
+    -------
+    nx, ny, epsilon, rate, whirl
+        Line of centres, epsilon up to the roughness, its rate [1/s], and epsilon omega_res [1/s], which is
+        finite where the line of centres of a nearly centred journal turns fast.
+    """
+    e = math.sqrt(ex * ex + ey * ey)
+    nx, ny, speed = 1.0, 0.0, math.sqrt(vx * vx + vy * vy)
+    if e > 0.0:
+        nx, ny = ex / e, ey / e
+    elif speed > 0.0:
+        nx, ny = vx / speed, vy / speed
+    epsilon = min(e, clearance - roughness) / clearance
+    whirl = (e * turning - 2.0 * (nx * vy - ny * vx)) / clearance
+    return nx, ny, epsilon, (nx * vx + ny * vy) / clearance, whirl
+
+
+@kernel
 def film_force(ex, ey, vx, vy, speed_b, speed_j, clearance, bushing_radius, width, viscosity, roughness):
     """Force of the film on the journal and its moments on both bodies.
 
@@ -79,19 +102,10 @@ def film_force(ex, ey, vx, vy, speed_b, speed_j, clearance, bushing_radius, widt
         bushing's and the journal's body, about these centres. The film has no mass: the moments' sum is that
         of the two forces, reversed.
     """
-    e = math.sqrt(ex * ex + ey * ey)
-    nx, ny, speed = 1.0, 0.0, math.sqrt(vx * vx + vy * vy)
-    if e > 0.0:
-        nx, ny = ex / e, ey / e
-    elif speed > 0.0:
-        nx, ny = vx / speed, vy / speed
-    epsilon = min(e, clearance - roughness) / clearance
+    nx, ny, epsilon, rate, whirl = _motion(ex, ey, vx, vy, speed_b + speed_j, clearance, roughness)
     x, diameter = width / (2.0 * bushing_radius), 2.0 * (bushing_radius - clearance)
     psi = 2.0 * clearance / diameter
     scale = width * diameter * viscosity / (psi * psi)
-    rate = (nx * vx + ny * vy) / clearance
-    # epsilon omega_res, which is finite where the line of centres of a nearly centred journal turns fast
-    whirl = (e * (speed_j + speed_b) - 2.0 * (nx * vy - ny * vx)) / clearance
     beta = attitude_angle(x, epsilon)
     rotation = scale * rotation_number(x, epsilon) * abs(whirl)
     rotation *= opening_factor(rate, abs(whirl), epsilon, beta)
@@ -102,3 +116,59 @@ def film_force(ex, ey, vx, vy, speed_b, speed_j, clearance, bushing_radius, widt
     shear = 0.5 * math.pi * width * diameter**2 * viscosity / psi / math.sqrt(1.0 - epsilon * epsilon)
     drag, half = shear * (speed_j - speed_b), 0.5 * (ex * fy - ey * fx)
     return fx, fy, drag - half, -drag - half
+
+
+@kernel
+def film_damping(ex, ey, vx, vy, speed_b, speed_j, clearance, bushing_radius, width, viscosity, roughness):
+    """Minus the derivatives of the film's force by the rate of the eccentricity [N s/m].
+
+    Arguments as in `film_force`.
+
+    Returns
+    -------
+    xx, xy, yx, yy
+        Force's component first, rate's component second.
+    """
+    nx, ny, epsilon, rate, whirl = _motion(ex, ey, vx, vy, speed_b + speed_j, clearance, roughness)
+    x, diameter = width / (2.0 * bushing_radius), 2.0 * (bushing_radius - clearance)
+    psi = 2.0 * clearance / diameter
+    unit = width * diameter * viscosity / (psi * psi) / clearance
+    beta = attitude_angle(x, epsilon)
+    nn, nt, tn, tt = unit * squeeze_number(x, math.copysign(epsilon, rate)), 0.0, 0.0, 0.0
+    if opening_factor(rate, abs(whirl), epsilon, beta) > 0.0:
+        rotation, cosine, sine = 2.0 * unit * rotation_number(x, epsilon), math.cos(beta), math.sin(beta)
+        nt, tt = -math.copysign(rotation * cosine, whirl), rotation * sine
+        if rate < 0.0:
+            nn, tn = nn + rotation * cosine * cosine / sine, nt
+    xx = nn * nx * nx - (nt + tn) * nx * ny + tt * ny * ny
+    yy = nn * ny * ny + (nt + tn) * nx * ny + tt * nx * nx
+    xy = (nn - tt) * nx * ny + nt * nx * nx - tn * ny * ny
+    yx = (nn - tt) * nx * ny + tn * nx * nx - nt * ny * ny
+    return xx, xy, yx, yy
+
+
+@kernel
+def film_stiffness(ex, ey, vx, vy, speed_b, speed_j, clearance, bushing_radius, width, viscosity, roughness):
+    """Minus the derivative of the film's force along the line of centres [N/m]; arguments as in `film_force`.
+
+    That across it is left out: it is as slow as the motion. Where the gap opens, so is this one, which would
+    be negative: both components are 0.
+
+    Returns
+    -------
+    kx, ky
+        Components of the force.
+    """
+    e = math.sqrt(ex * ex + ey * ey)
+    if not (ex * vx + ey * vy > 0.0 and e < clearance - roughness):
+        return 0.0, 0.0
+    part = _NUDGE * (clearance - e)
+    ahead = 1.0 + part / e
+    fx, fy, _, _ = film_force(
+        ex, ey, vx, vy, speed_b, speed_j, clearance, bushing_radius, width, viscosity, roughness
+    )
+    gx, gy, _, _ = film_force(
+        ahead * ex, ahead * ey, vx, vy, speed_b, speed_j,
+        clearance, bushing_radius, width, viscosity, roughness,
+    )  # fmt: skip
+    return (fx - gx) / part, (fy - gy) / part

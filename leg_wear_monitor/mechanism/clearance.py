@@ -56,9 +56,7 @@ class Clearance:
     normal_law: str = choice(NORMAL_LAWS, "law of the normal force", default="lankarani-nikravesh")
     restitution: float = quantity("", "coefficient of restitution", above=0.0, at_most=1.0, default=0.9)
     friction: Friction = described("friction, a mapping of the keys below", default=Friction())
-    film: Film | None = described(
-        "oil or grease, a mapping of the keys below; only `--model full` has it", default=None
-    )
+    film: Film | None = described("oil or grease, a mapping of the keys below", default=None)
     wear_coefficient: Pair = quantity("1/Pa", "K/H of Archard's law", at_least=0.0, default=(0.0, 0.0))
     stiffness: float | None = quantity(
         "N/m^1.5", "contact stiffness instead of Hertz's", above=0.0, default=None

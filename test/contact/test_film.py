@@ -6,13 +6,15 @@ from pathlib import Path
 
 import numpy as np
 import pytest
-from hypothesis import given
+from hypothesis import assume, given
 from hypothesis import strategies as st
 from reynolds import film_numbers
 
 from leg_wear_monitor.contact.film import (
     attitude_angle,
+    film_damping,
     film_force,
+    film_stiffness,
     rotation_number,
     squeeze_number,
 )
@@ -231,3 +233,58 @@ def test_an_opening_gap_loses_the_rotation_s_push_as_reynolds_equation_does(x, e
         added = spin + np.array(film_numbers(x, epsilon, 0.0, rate))
         sums.append(math.dist(added, solved) / math.hypot(*spin))
     assert max(sums) > 0.7
+
+
+# --- its derivatives, for the implicit step ---
+
+inner = st.tuples(st.floats(0.01, 0.99), angles, speeds, speeds, spins, spins).map(
+    lambda s: (*turned(s[1], s[0] * C, 0.0), *s[2:])
+)
+
+
+def rates(state):
+    """Rate of epsilon, and epsilon omega_res, of a state [1/s]."""
+    ex, ey, vx, vy, speed_b, speed_j = state
+    e = math.hypot(ex, ey)
+    across = (ex * vy - ey * vx) / e
+    return (ex * vx + ey * vy) / e / C, (e * (speed_b + speed_j) - 2.0 * across) / C
+
+
+@given(state=inner)
+def test_damping_is_the_derivative_by_the_rates(state):
+    """Exact but where the force has a kink: where the gap begins to open, where rotation turns about."""
+    ex, ey, vx, vy, *spin = state
+    rate, whirl = rates(state)
+    beta = attitude_angle(X, math.hypot(ex, ey) / C)
+    assume(min(abs(rate), abs(whirl)) > 1.0)
+    assume(rate > 0.0 or abs(abs(whirl) * math.sin(beta) + 2.0 * rate * math.cos(beta)) > 1.0)
+    damping = np.reshape(film_damping(*state, C, R_B, WIDTH, ETA, ROUGH), (2, 2))
+    step = 1.0e-6
+    for i, (dx, dy) in enumerate([(step, 0.0), (0.0, step)]):
+        ahead, behind = (film(ex, ey, vx + s * dx, vy + s * dy, *spin)[:2] for s in (1.0, -1.0))
+        assert damping[:, i] == pytest.approx(
+            (behind - ahead) / (2.0 * step), rel=1.0e-5, abs=1.0e-6 * np.abs(damping).max()
+        )
+
+
+@given(state=inner)
+def test_stiffness_is_the_derivative_along_the_line_of_centres(state):
+    ex, ey, *rest = state
+    stiffness = np.array(film_stiffness(*state, C, R_B, WIDTH, ETA, ROUGH))
+    if rates(state)[0] <= 0.0:
+        assert not stiffness.any()
+        return
+    e = math.hypot(ex, ey)
+    assume(abs(rates(state)[1]) > 1.0 and attitude_angle(X, e / C) < 0.499 * math.pi)
+    part = 1.0e-6 * (C - e) / e
+    ahead, behind = (film(ex * (1.0 + s * part), ey * (1.0 + s * part), *rest)[:2] for s in (1.0, -1.0))
+    exact = (behind - ahead) / (2.0 * part * e)
+    assert stiffness == pytest.approx(exact, abs=2.0e-3 * np.abs(exact).max())
+
+
+@pytest.mark.parametrize("e", [0.0, C - ROUGH, C, 1.05 * C])
+def test_derivatives_are_finite_at_the_centre_and_in_contact(e):
+    for v in (0.0, 0.1, -0.1):
+        damping = film_damping(e, 0.0, v, 0.0, 0.0, 5.0, C, R_B, WIDTH, ETA, ROUGH)
+        assert np.isfinite(damping).all() and damping[0] > 0.0
+        assert film_stiffness(e, 0.0, v, 0.0, 0.0, 5.0, C, R_B, WIDTH, ETA, ROUGH) == (0.0, 0.0)

@@ -11,6 +11,7 @@ import math
 from numba import types
 
 from leg_wear_monitor.dynamics.clearance.contact import A0, E0, F_T, V0, accelerate_clearances
+from leg_wear_monitor.dynamics.clearance.film_effects import integrate_films, total_force
 from leg_wear_monitor.dynamics.clearance.model import ACCELERATION, ANGLE, SPEED, blend, crank_between
 from leg_wear_monitor.dynamics.clearance.outputs import (
     drive_torque,
@@ -176,6 +177,7 @@ def _accept(model, surfaces, state, t, h, turned, statistics, work):
     x, now, start, end, contacts = work.x, work.now, work.start, work.end, model.contacts
     statistics.steps[1] += 1
     integrate_joints(model.law, state.approach, h, start, end, work.added)
+    integrate_films(model.film.settings, contacts.joint, h, start, end, work.added, statistics.peak)
     gather_wear(work.added, start, end, state.pending)
     for k in range(work.added.shape[0]):
         for r in range(JOINT_RATES):
@@ -223,6 +225,8 @@ def _finish(model, surfaces, state, statistics, work):
                 model.contacts, surfaces, k, sample, now, here, amid, state.pending, work.weight
             )
         force = math.sqrt(sample[k, F_N] ** 2 + sample[k, F_T] ** 2)
+        if model.film.settings.shape[0] > 0:
+            force = total_force(k, sample)
         statistics.force_time[joint[k], bin_of(force)] += interval
     torque = work.drive_start[WHOLE]
     statistics.torque_time[1 if torque > 0.0 else 0, bin_of(abs(torque))] += interval

@@ -10,6 +10,7 @@ import numpy as np
 from leg_wear_monitor.beside import compiled_beside
 from leg_wear_monitor.contact.arrays import ContactArrays
 from leg_wear_monitor.dynamics.clearance.advance import advance_clearances, observe
+from leg_wear_monitor.dynamics.clearance.film_system import film_model
 from leg_wear_monitor.dynamics.clearance.layout import motion_shapes
 from leg_wear_monitor.dynamics.clearance.model import (
     ClearanceModel,
@@ -44,12 +45,18 @@ def _tables() -> ClearanceTables:
         parts=np.zeros(1, np.int64),
         by_e=np.zeros((1, 1, 1), np.float32),
         bend=np.zeros((1, 1, 1), np.float32),
+        spin=np.zeros((1, 1, 1, 1), np.float32),
+        spin_reaction=np.zeros((1, 1, 1), np.float32),
     )
 
 
 def _leg() -> tuple[ClearanceModel, ClearanceState, ClearanceWork]:
     """A leg that has the types of all legs, and nothing else."""
-    model = ClearanceModel(_contacts(), _tables(), 1.0, tolerance=np.zeros(2), law=np.zeros((1, 1)), damped=0)
+    contacts, line = _contacts(), np.zeros(2)
+    film = film_model(contacts, np.zeros((1, 2)))
+    model = ClearanceModel(
+        contacts, _tables(), 1.0, tolerance=line, law=np.zeros((1, 1)), film=film, damped=0
+    )
     state = clearance_state(np.zeros((1, 2, 1)), 0.0, 1.0)
     return model, state, clearance_work(model, state)
 

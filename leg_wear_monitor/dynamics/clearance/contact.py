@@ -12,17 +12,19 @@ from leg_wear_monitor.contact.arrays import ContactArrays
 from leg_wear_monitor.contact.friction import friction_force
 from leg_wear_monitor.contact.geometry import journal_contact
 from leg_wear_monitor.contact.normal.laws import normal_force
-from leg_wear_monitor.dynamics.joint.contact_event import DELTA, DELTA_DOT, EX, EY, F_N, SAMPLE, VX, VY
+from leg_wear_monitor.dynamics.clearance.film import ADD_FILMS, FILM_SAMPLE
+from leg_wear_monitor.dynamics.joint.contact_event import DELTA, DELTA_DOT, EX, EY, F_N, VX, VY
 from leg_wear_monitor.dynamics.joint.joint_contact import coefficient_at, penetration
 from leg_wear_monitor.kernel import entry, kernel
 from leg_wear_monitor.mechanism.arrays import Floats
 
-# further columns of a sample: normal, friction force [N], slip speed [m/s], derivatives of the normal force
-# by the penetration [N/m] and by its rate [N s/m], its elastic part [N], derivative of the penetration by the
-# crank angle through the rotation of worn bodies [m/rad], the normal law's coefficient for the local radii
-# (unit of the law), and the local clearance [m]
-NX, NY, F_T, SLIP, STIFFNESS, DAMPING, ELASTIC, CAM, COEFFICIENT, CLEARANCE = range(SAMPLE, SAMPLE + 10)
-COLUMNS = SAMPLE + 10
+# further columns of a sample, after the film's: normal, friction force [N], slip speed [m/s], derivatives of
+# the normal force by the penetration [N/m] and by its rate [N s/m], its elastic part [N], derivative of the
+# penetration by the crank angle through the rotation of worn bodies [m/rad], the normal law's coefficient for
+# the local radii (unit of the law), and the local clearance [m]
+NX, NY, F_T, SLIP, STIFFNESS = range(FILM_SAMPLE, FILM_SAMPLE + 5)
+DAMPING, ELASTIC, CAM, COEFFICIENT, CLEARANCE = range(FILM_SAMPLE + 5, FILM_SAMPLE + 10)
+COLUMNS = FILM_SAMPLE + 10
 
 # a reference direction, near which angles are computed without an arc tangent: cosine, sine and angle [rad]
 TO_X, TO_Y, TO_ANGLE = range(3)
@@ -37,6 +39,8 @@ FRICTION_COEFFICIENT, RAMP_0, RAMP_1, FRICTION_LAW = range(3, 7)
 # change of the rates in the last step; coefficients of the rates in the drive torque
 E0, V0, A0, EM, VM, E1, V1, A1, DRIFT, K1E, K1V, K2E, K2V, RE, RV, DV, BY_V = range(17)
 VECTORS = 17
+
+_add_films = ADD_FILMS.call
 
 _NEAR = 0.1  # largest sine of an angle for the arc sine's series, whose error is then 3e-11 rad
 
@@ -133,3 +137,10 @@ def accelerate_clearances(model, surfaces, approach, now, turned, x, at_e, at_v,
         out_sample[k, NX], out_sample[k, NY], out_sample[k, F_T], out_sample[k, SLIP] = nx, ny, f_t, slip
         out_sample[k, STIFFNESS], out_sample[k, DAMPING], out_sample[k, ELASTIC] = stiffness, damping, elastic
         out_sample[k, CAM], out_sample[k, COEFFICIENT], out_sample[k, CLEARANCE] = cam, coefficient, clearance
+    films = model.film.settings
+    if films.shape[0] > 0:
+        spin, turn = now.spin, now.spin_turn
+        _add_films(
+            model.film.force,
+            (films, spin, turn, now.spin_response, inverse_mass, speed, x, at_v, out_a, out_sample),
+        )

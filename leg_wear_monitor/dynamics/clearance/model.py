@@ -7,6 +7,7 @@ import numpy as np
 
 from leg_wear_monitor.contact.arrays import ContactArrays
 from leg_wear_monitor.dynamics.clearance.contact import COLUMNS, TO_ANGLE, VECTORS
+from leg_wear_monitor.dynamics.clearance.film import FilmModel
 from leg_wear_monitor.dynamics.clearance.layout import motion_shapes, views
 from leg_wear_monitor.dynamics.clearance.rosenbrock import ContactSystem, contact_system
 from leg_wear_monitor.dynamics.clearance.tables import ClearanceTables
@@ -22,7 +23,7 @@ class ClearanceModel(NamedTuple):
 
     ``interval`` [s]: time between the instants at which the state exists; ``tolerance`` (2,): reciprocals of
     the local error allowed in a step, of eccentricities [1/m] and of their rates [s/m]; ``law`` (k, 7): of
-    `contact_laws`; ``damped``: 1 with dampers, else 0.
+    `contact_laws`; ``film``: films of the joints; ``damped``: 1 with dampers, else 0.
     """
 
     contacts: ContactArrays
@@ -30,6 +31,7 @@ class ClearanceModel(NamedTuple):
     interval: float
     tolerance: Floats
     law: Floats
+    film: FilmModel
     damped: int
 
 
@@ -65,7 +67,9 @@ class StepTables(NamedTuple):
     at rest, without contact; ``bare`` (d,): its acceleration; ``drift`` (d, d): accelerations per e';
     ``lever_response`` (k, d): accelerations per friction force in each joint; drive torque: ``torque_0`` (1,)
     [N m] at rest, ``torque_by_v`` (d,) per e', ``torque_by_e`` (d,) per e. ``toward`` (k, 3): reference
-    directions of the eccentricities at the start of the interval.
+    directions of the eccentricities at the start of the interval. For the moments of films, of both bodies of
+    each joint: ``spin`` (d, d): their rates per e', ``spin_turn`` (d,): per crank speed; ``spin_response``
+    (d, d): accelerations per moment.
     """
 
     row: Floats
@@ -94,6 +98,9 @@ class StepTables(NamedTuple):
     load_power: Floats
     viscous: Floats
     damper: Floats
+    spin: Floats
+    spin_turn: Floats
+    spin_response: Floats
 
 
 class ClearanceWork(NamedTuple):
@@ -156,6 +163,7 @@ def clearance_state(depth: Floats, angle: float, speed: float) -> ClearanceState
 def clearance_work(model: ClearanceModel, state: ClearanceState) -> ClearanceWork:
     """Work arrays for a model and a state."""
     clearance_joints, d = len(state.approach), len(state.e)
+    films = 2 * len(model.film.settings)
     row = np.zeros(model.tables.motion.shape[1])
     parts = views(row, motion_shapes(clearance_joints, model.damped > 0))
     now = StepTables(
@@ -169,6 +177,9 @@ def clearance_work(model: ClearanceModel, state: ClearanceState) -> ClearanceWor
         torque_by_v=np.zeros(d),
         torque_by_e=np.zeros(d),
         toward=np.zeros((clearance_joints, TO_ANGLE + 1)),
+        spin=np.zeros((films, d)),
+        spin_turn=np.zeros(films),
+        spin_response=np.zeros((films, d)),
         **parts,
     )
     return ClearanceWork(

@@ -3,6 +3,7 @@
 import math
 
 from leg_wear_monitor.dynamics.clearance.contact import A0, BY_V, CAM, DV, E0, F_T, V0
+from leg_wear_monitor.dynamics.clearance.film_effects import add_film_reactions, film_torque
 from leg_wear_monitor.dynamics.clearance.model import blend
 from leg_wear_monitor.dynamics.joint.contact_event import F_N
 from leg_wear_monitor.kernel import kernel
@@ -17,6 +18,8 @@ def drive_torque(now, x, sample):
         sudden += now.torque_a[i] * x[A0, i]
     for k in range(sample.shape[0]):
         torque += sample[k, F_N] * sample[k, CAM] - now.lever_drive[k] * sample[k, F_T]
+    if now.spin.shape[0] > 0:
+        torque += film_torque(now, sample)
     return torque + sudden, sudden
 
 
@@ -51,6 +54,9 @@ def reactions(tables, angle, now, x, sample, out_by, out_reaction):
         before, after = (1.0 - w) * out_by[c], w * out_by[c]
         for r in range(out_reaction.shape[0]):
             out_reaction[r] += before * table[i, c, r] + after * table[i + 1, c, r]
+    if now.spin.shape[0] > 0:
+        points = blend(tables.spin_reaction.shape[0] - 1, angle)
+        add_film_reactions(tables, points, now, sample, out_reaction)
 
 
 @kernel

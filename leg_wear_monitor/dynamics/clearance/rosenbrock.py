@@ -28,7 +28,8 @@ class ContactSystem(NamedTuple):
 
     ``active`` (k,): the contacts' joints; ``normal`` (k, 2); ``response`` (k, d): B^T; ``factor`` (k, k): L,
     with 1 / D of L D L^T on its diagonal; ``ratio`` (k,): gamma h K / D; ``cam`` (k,) [m/s]: part of the
-    penetration's rate that does not depend on e'; ``p`` (k,): unknowns.
+    penetration's rate that does not depend on e'; ``p`` (k,): unknowns. With films, of `film_system`:
+    ``block``, ``stiff`` (d, 2), ``push`` (d,), ``matrix`` (d, d).
     """
 
     active: Ints
@@ -38,6 +39,10 @@ class ContactSystem(NamedTuple):
     ratio: Floats
     cam: Floats
     p: Floats
+    block: Floats
+    stiff: Floats
+    push: Floats
+    matrix: Floats
 
 
 def contact_system(k: int) -> ContactSystem:
@@ -50,6 +55,10 @@ def contact_system(k: int) -> ContactSystem:
         ratio=np.zeros(k),
         cam=np.zeros(k),
         p=np.zeros(k),
+        block=np.zeros((2 * k, 2)),
+        stiff=np.zeros((2 * k, 2)),
+        push=np.zeros(2 * k),
+        matrix=np.zeros((2 * k, 2 * k)),
     )
 
 

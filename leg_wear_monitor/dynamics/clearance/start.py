@@ -1,7 +1,8 @@
 """Start of a part of an interval: state, step tables, samples of the joints (physics.md section 7)."""
 
 from leg_wear_monitor.dynamics.clearance.contact import A0, E0, V0, accelerate_clearances, take_directions
-from leg_wear_monitor.dynamics.clearance.model import hold_eccentricities, take_tables
+from leg_wear_monitor.dynamics.clearance.film_effects import load_spins
+from leg_wear_monitor.dynamics.clearance.model import blend, hold_eccentricities, take_tables
 from leg_wear_monitor.dynamics.clearance.step import drift
 from leg_wear_monitor.dynamics.joint.contact_event import DELTA, DELTA_DOT, begin_contact
 from leg_wear_monitor.kernel import kernel
@@ -13,6 +14,9 @@ def load_state(model, surfaces, state, angle, speed, acceleration, ahead, work):
     x, now = work.x, work.now
     take_tables(model.tables, angle, speed, acceleration, now)
     hold_eccentricities(model.tables, angle, state.e, state.v, ahead, now)
+    if now.spin.shape[0] > 0:
+        points = blend(model.tables.spin.shape[0] - 1, angle)
+        load_spins(model.tables, points, state.e, state.v, ahead, now)
     for i in range(state.e.shape[0]):
         x[E0, i], x[V0, i] = state.e[i], state.v[i]
     if surfaces.feeds_back:

@@ -35,7 +35,7 @@ from leg_wear_monitor.dynamics.clearance.contact import (
     VM,
     accelerate_clearances,
 )
-from leg_wear_monitor.dynamics.clearance.rosenbrock import factorise_contacts, solve_contacts
+from leg_wear_monitor.dynamics.clearance.film_system import factorise_step, solve_step
 from leg_wear_monitor.dynamics.joint.contact_event import DELTA, DELTA_DOT, EX, EY, F_N
 from leg_wear_monitor.dynamics.joint.joint_contact import wear_joint
 from leg_wear_monitor.dynamics.run.dormand_prince import hermite
@@ -81,8 +81,8 @@ def try_step(model, surfaces, approach, h, turned, now, system, x, start, end):
     at both ends, filtered like a stage so that stiff contacts do not exaggerate it (Shampine's filter).
     """
     d, tolerance = x.shape[1], model.tolerance
-    m = factorise_contacts(h, now.inverse_mass, now.speed[0], start, system)
-    solve_contacts(h, system, m, 1.0, x, V0, A0, K1E, K1V)
+    m = factorise_step(model.film, h, 1.0 / tolerance[1], now, start, system)
+    solve_step(model.film, h, now, system, m, 1.0, x, V0, A0, K1E, K1V)
     for i in range(d):
         x[EM, i] = x[E0, i] + h * x[K1E, i]
         x[VM, i] = x[V0, i] + h * x[K1V, i]
@@ -90,7 +90,7 @@ def try_step(model, surfaces, approach, h, turned, now, system, x, start, end):
     for i in range(d):
         x[RE, i] = x[VM, i] - 2.0 * x[K1E, i]
         x[RV, i] -= 2.0 * x[K1V, i]
-    solve_contacts(h, system, m, -1.0, x, RE, RV, K2E, K2V)
+    solve_step(model.film, h, now, system, m, -1.0, x, RE, RV, K2E, K2V)
     for i in range(d):
         x[E1, i] = x[E0, i] + h * (1.5 * x[K1E, i] + 0.5 * x[K2E, i])
         x[V1, i] = x[V0, i] + h * (1.5 * x[K1V, i] + 0.5 * x[K2V, i])
@@ -98,7 +98,7 @@ def try_step(model, surfaces, approach, h, turned, now, system, x, start, end):
     for i in range(d):
         x[RE, i] = x[E1, i] - x[E0, i] - h * x[V0, i] - h * h / 6.0 * (2.0 * x[A0, i] + x[A1, i])
         x[RV, i] = x[V1, i] - x[V0, i] - 0.5 * h * (x[A0, i] + x[A1, i])
-    solve_contacts(h, system, m, 0.0, x, RE, RV, RE, RV)
+    solve_step(model.film, h, now, system, m, 0.0, x, RE, RV, RE, RV)
     worst = 0.0
     for i in range(d):
         ratio = max(abs(x[RE, i]) * tolerance[0], abs(x[RV, i]) * tolerance[1])

@@ -7,6 +7,8 @@ import numpy as np
 from leg_wear_monitor.dynamics.clearance.advance import ADVANCE, advance_clearances, observe
 from leg_wear_monitor.dynamics.clearance.basis import is_damped
 from leg_wear_monitor.dynamics.clearance.contact import A0, E0, F_T, NX, NY, V0, contact_laws
+from leg_wear_monitor.dynamics.clearance.film import FILM_X, FILM_Y
+from leg_wear_monitor.dynamics.clearance.film_system import film_model
 from leg_wear_monitor.dynamics.clearance.model import (
     ANGLE,
     SPEED,
@@ -76,7 +78,7 @@ class ClearanceStepper:
     Raises
     ------
     ConfigError
-        For a mechanism driven by a torque: clearance coordinates need a given crank motion. For a film.
+        For a mechanism driven by a torque: clearance coordinates need a given crank motion.
     """
 
     def __init__(
@@ -89,7 +91,6 @@ class ClearanceStepper:
         mechanism = setup.linkage.mechanism
         if not isinstance(mechanism.drive, SpeedDrive):
             raise needs_speed(mechanism)
-        _refuse_film(setup)
         self._setup = setup
         self.model = ClearanceModel(
             contacts=setup.contacts,
@@ -97,6 +98,7 @@ class ClearanceStepper:
             interval=interval_s or TURN / abs(setup.speed) / INTERVALS,
             tolerance=np.array([1.0, 1.0 / TOLERANCE_RATE]) / tolerance_m,
             law=contact_laws(setup.contacts),
+            film=film_model(setup.contacts, setup.films),
             damped=int(is_damped(setup.linkage.arrays)),
         )
         self.state: ClearanceState = clearance_state(setup.surfaces.depth, 0.0, setup.speed)
@@ -129,9 +131,19 @@ class ClearanceStepper:
 
     @property
     def last_force(self) -> Floats:
-        """Magnitude (k,) of the contact forces [N] at the last sample before that time."""
+        """Magnitude (k,) of the forces [N] of contact and film at the last sample before that time."""
         sample = self.work.start
-        return np.asarray(np.hypot(sample[:, F_N], sample[:, F_T]))
+        if not len(self.model.film.settings):
+            return np.asarray(np.hypot(sample[:, F_N], sample[:, F_T]))
+        return np.asarray(np.linalg.norm(self._forces(), axis=1))
+
+    def _forces(self) -> Floats:
+        """Forces (k, 2) [N] of contact and film on the journals at that sample."""
+        sample = self.work.start
+        n = sample[:, [NX, NY]]
+        t = np.stack([-n[:, 1], n[:, 0]], axis=1)
+        force = -sample[:, F_N, None] * n + sample[:, F_T, None] * t
+        return np.asarray(force + sample[:, FILM_X : FILM_Y + 1] if len(self.model.film.settings) else force)
 
     def set_eccentricities(self, eccentricity: Floats) -> None:
         """Set the eccentricities (k, 2) [m]."""
@@ -151,15 +163,13 @@ class ClearanceStepper:
         """The leg at that time; does not change the state."""
         work, state = self.work, self.state
         energy = observe(self.model, self._setup.surfaces.feeds_back, state, work)
-        x, now, start = work.x, work.now, work.start
-        n = start[:, [NX, NY]]
-        t = np.stack([-n[:, 1], n[:, 0]], axis=1)
+        x, now = work.x, work.now
         return Moment(
             deviation=_toe_deviations(now.toe, now.speed[0], x[E0], x[V0], x[A0]),
             torque=float(work.reaction[0]),
             e=self.eccentricity,
             rate=state.v.reshape(-1, 2).copy(),
-            force=-start[:, F_N, None] * n + start[:, F_T, None] * t,
+            force=self._forces(),
             reaction=work.reaction.copy(),
             toe=work.toe.copy(),
             elastic_energy=float(energy),
@@ -199,17 +209,6 @@ class ClearanceStepper:
         """Restore a snapshot of a stepper of the same setup."""
         self.state.motion[:] = snapshot.motion
         self.state.depth[:] = snapshot.depth
-
-
-def _refuse_film(setup: Setup) -> None:
-    """Raise ConfigError for a joint with a film, which clearance coordinates do not have."""
-    for name, film in zip(setup.clearance_joints, setup.films, strict=True):
-        if film[0] > 0.0:
-            raise ConfigError(
-                setup.linkage.mechanism.source,
-                f"clearances.joints.{name}.film",
-                "the clearance model has no film; leave the key out, or try simulate --model full",
-            )
 
 
 def needs_speed(mechanism: Mechanism) -> ConfigError:

@@ -46,7 +46,10 @@ class ClearanceTables(NamedTuple):
 
     ``by_e`` (M + 1, d, u): derivatives by e of the parts of `changing_shapes`; ``bend`` (M + 1, d, d d):
     accelerations A^-1 Gamma, bilinear in e'. Both are small, and therefore stored in single precision at
-    every `COARSER`-th point, which reduces the memory traffic of an interval.
+    every `COARSER`-th point, which reduces the memory traffic of an interval. So are the tables for the
+    moments of films, bushing's body before journal's: ``spin`` (M + 1, 2, d, d): rates of the bodies per e',
+    and their derivative by the crank angle; ``spin_reaction`` (M + 1, d, r): drive torque and reactions per
+    moment.
     """
 
     motion: Floats
@@ -56,6 +59,8 @@ class ClearanceTables(NamedTuple):
     parts: Ints
     by_e: Singles
     bend: Singles
+    spin: Singles
+    spin_reaction: Singles
 
 
 def build_tables(linkage: Linkage, contacts: ContactArrays, points: int = POINTS) -> ClearanceTables:
@@ -79,7 +84,8 @@ def build_tables(linkage: Linkage, contacts: ContactArrays, points: int = POINTS
     """
     motion = one_cycle(linkage, points, 1.0)
     basis = Basis(linkage, contacts, motion)
-    reaction, joints = _reactions(linkage, basis)
+    held, joints = _held_rows(linkage, basis)
+    reaction = _reactions(basis, held)
     parts = {
         **_accelerations(basis),
         **_torque(basis),
@@ -104,6 +110,7 @@ def build_tables(linkage: Linkage, contacts: ContactArrays, points: int = POINTS
         reaction_joint=joints,
         stored=_stored(basis),
         parts=_parts(parts["coriolis"]),
+        **_spins(linkage.arrays.joint_body[contacts.joint], basis, held),
         **_first_order(basis, parts["inverse_mass"]),
     )
 
@@ -197,19 +204,38 @@ def _stored(basis: Basis) -> Floats:
     return np.concatenate([rows, rows[:1]])
 
 
-def _reactions(linkage: Linkage, basis: Basis) -> tuple[Floats, Ints]:
-    """Table ``reaction`` (N, 4 + 3 d + k, r) without its closing row, and the joint (r,) of each reaction."""
+def _held_rows(linkage: Linkage, basis: Basis) -> tuple[list[int], Ints]:
+    """Rows of the Jacobian for the drive and the ideal joints (r,), and the joint of each."""
     rows, joints = [linkage.rows.drive_row], [DRIVE]
     for closure, start in zip(linkage.rows.closure.tolist(), linkage.rows.row.tolist(), strict=True):
         if closure != DRIVE and start not in basis.rows:
             rows += [start, start + 1]
             joints += [closure, closure]
+    return rows, np.array(joints, dtype=np.int64)
+
+
+def _reactions(basis: Basis, rows: list[int]) -> Floats:
+    """Table ``reaction`` (N, 4 + 3 d + k, r) without its closing row."""
     mass = basis.mass[:, None]
     by = [-basis.force[:, :, None], mass * basis.drive[:, :, None], mass * basis.drive_t[:, :, None]]
     by += [basis.drag[:, :, -1:], mass * basis.s, 2.0 * mass * basis.s_t]
     by += [basis.drag[:, :, :-1], -basis.friction]
-    reaction = project(np.concatenate(by, axis=2), basis.x[:, :, rows])
-    return reaction, np.array(joints, dtype=np.int64)
+    return project(np.concatenate(by, axis=2), basis.x[:, :, rows])
+
+
+def _spins(bodies: Ints, basis: Basis, rows: list[int]) -> dict[str, Singles]:
+    """Tables ``spin`` and ``spin_reaction`` for the bodies (k, 2) of bushing and journal."""
+    n, moments = len(basis.s), bodies.size
+    unit = np.zeros((3 + len(basis.mass), moments))
+    unit[3 * bodies.ravel() + 2, np.arange(moments)] = 1.0
+    moment = np.broadcast_to(unit[3:], (n, len(basis.mass), moments))  # on the ground it does nothing
+    spin = np.stack([project(moment, basis.s), project(moment, basis.s_t)], axis=1)
+    reaction = -project(moment, basis.x[:, :, rows])
+    coarse = [*range(0, n, COARSER), 0]
+    return {
+        "spin": np.ascontiguousarray(spin[coarse], dtype=np.float32),
+        "spin_reaction": np.ascontiguousarray(reaction[coarse], dtype=np.float32),
+    }
 
 
 def _toe(linkage: Linkage, motion: IdealMotion, basis: Basis) -> Floats:

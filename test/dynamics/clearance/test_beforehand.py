@@ -1,5 +1,6 @@
 """What is compiled before a leg is there is what the leg calls."""
 
+import attrs
 import numba
 import pytest
 
@@ -9,6 +10,7 @@ from leg_wear_monitor.dynamics.clearance.beforehand import advance_arguments, ob
 from leg_wear_monitor.dynamics.clearance.run import ClearanceRun
 from leg_wear_monitor.dynamics.run.run_statistics import new_run_statistics
 from leg_wear_monitor.dynamics.simulation import prepare
+from leg_wear_monitor.mechanism.clearance import Film
 
 
 def types_of(arguments):
@@ -18,8 +20,11 @@ def types_of(arguments):
 @pytest.mark.plain
 @pytest.mark.parametrize("mechanism", ["bionic_leg", "four_bar"])
 @pytest.mark.parametrize("wear", [True, False])
-def test_types_are_those_of_a_leg(mechanism, wear):
+@pytest.mark.parametrize("film", [None, Film(viscosity_pa_s=0.1, roughness_m=1.0e-6)])
+def test_types_are_those_of_a_leg(mechanism, wear, film):
     leg = lw.load_mechanism(mechanism)
+    clearances = {name: attrs.evolve(c, film=film) for name, c in leg.clearances.items()}
+    leg = attrs.evolve(leg, clearances=clearances)
     setup = prepare(leg, wear=wear)
     run = ClearanceRun(setup)
     stepper, feeds_back = run.stepper, setup.surfaces.feeds_back

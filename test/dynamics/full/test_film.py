@@ -1,10 +1,9 @@
-"""Films of oil or grease in full coordinates: energy, both limits of the viscosity, and who refuses them."""
+"""Films of oil or grease in full coordinates: energy, both limits of the viscosity, and bad settings."""
 
 import attrs
 import numpy as np
 import pytest
 
-from leg_wear_monitor.dynamics.clearance.run import ClearanceRun
 from leg_wear_monitor.dynamics.full.run import FullRun
 from leg_wear_monitor.dynamics.result.statistics import energy_balance
 from leg_wear_monitor.dynamics.run.run_statistics import ARCHARD, CONTACT, FORCE, new_run_statistics
@@ -62,11 +61,6 @@ def test_a_stiff_film_is_an_ideal_joint_and_does_not_wear(slider_crank):
     assert stiff[0][CONTACT] == stiff[0][ARCHARD] == 0.0
     ideal = simulate(slider_crank, clearances=(), cycles=1.0, skip_cycles=0.0)
     assert stiff[0][FORCE] / CYCLE == pytest.approx(ideal.joints["B"].mean_force_n, rel=0.01)
-
-
-def test_clearance_coordinates_refuse_a_film(slider_crank):
-    with pytest.raises(ConfigError, match=r"joints\.B\.film: the clearance model has no film; leave"):
-        ClearanceRun(prepare(oiled(slider_crank, 0.1)))
 
 
 @pytest.mark.plain

@@ -24,6 +24,7 @@ TINY = {
         "joints": ["G"], "normal_laws": ["hertz", "flores"], "friction_laws": ["none"],
         "friction_coefficients": [0.1],
     },
+    "lubrication": {"joints": ["I", "J"], "viscosities_pa_s": [0.003, 1.0]},
     "legs": {"legs": 1, "draw_seed": 3},
     "wear": {
         "sets": [["I", "J"]],

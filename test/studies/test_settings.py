@@ -78,6 +78,12 @@ def test_studies_cover_what_was_asked():
             {"joints": ["A"], "exponent": {"renewals": 48}},
             "exponent.renewals: 48 does not divide 512",
         ),
+        (
+            "lubrication",
+            {"joints": ["A"], "viscosities_pa_s": [1.0, 0.1]},
+            "viscosities_pa_s: [1.0, 0.1] does",
+        ),
+        ("lubrication", {"joints": ["A"], "viscosities_pa_s": [0.0]}, "viscosities_pa_s: 0.0 is not above 0"),
         ("laws", {"joints": ["A"], "normal_laws": ["hooke"]}, "normal_laws: 'hooke' is not one of hertz,"),
     ],
 )

@@ -11,6 +11,7 @@ from leg_wear_monitor.report.parts import Sentences
 from leg_wear_monitor.report.study import findings
 from leg_wear_monitor.report.study.chaos_page import chaos
 from leg_wear_monitor.report.study.legs_page import legs
+from leg_wear_monitor.report.study.lubrication_page import lubrication
 from leg_wear_monitor.report.study.sections import (
     Sections,
     asked,
@@ -121,10 +122,15 @@ def _laws(results: StudyResults, labelled: Labelled) -> Sections:
     return _compared(results, labelled, findings.laws(labelled), "law")
 
 
+def _lubrication(results: StudyResults, labelled: Labelled) -> Sections:
+    return _compared(results, labelled, lubrication(labelled) + findings.disturbance(labelled), "lubricant")
+
+
 _PAGES: dict[str, Callable[[StudyResults, Labelled], Sections]] = {
     "location": _location,
     "multi": _multi,
     "laws": _laws,
+    "lubrication": _lubrication,
     "wear": life,
     "chaos": chaos,
     "legs": legs,

@@ -11,6 +11,7 @@ from leg_wear_monitor.studies.plan.kinds.chaos import Chaos
 from leg_wear_monitor.studies.plan.kinds.laws import Laws
 from leg_wear_monitor.studies.plan.kinds.legs import Legs
 from leg_wear_monitor.studies.plan.kinds.location import Location
+from leg_wear_monitor.studies.plan.kinds.lubrication import Lubrication
 from leg_wear_monitor.studies.plan.kinds.multi import Multi
 from leg_wear_monitor.studies.plan.kinds.size import Size
 from leg_wear_monitor.studies.plan.kinds.speed import Speed
@@ -25,6 +26,7 @@ STUDIES: dict[str, type[Study]] = {
     "multi": Multi,
     "chaos": Chaos,
     "laws": Laws,
+    "lubrication": Lubrication,
     "legs": Legs,
 }
 

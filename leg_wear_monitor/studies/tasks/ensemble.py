@@ -5,11 +5,13 @@ from typing import Any
 import attrs
 import numpy as np
 
+from leg_wear_monitor.configuration.quantity import FieldError
 from leg_wear_monitor.contact.arrays import clearance_settings
 from leg_wear_monitor.dynamics.batch.leg import Leg, prepare_legs
 from leg_wear_monitor.dynamics.clearance.tables import build_tables
 from leg_wear_monitor.dynamics.run.protocol import Setup
 from leg_wear_monitor.errors import ConfigError
+from leg_wear_monitor.mechanism.clearance import Film
 from leg_wear_monitor.mechanism.ideal import TURN
 from leg_wear_monitor.mechanism.spec import Mechanism
 from leg_wear_monitor.studies.tasks.grid import SAMPLES
@@ -22,6 +24,24 @@ def with_friction(mechanism: Mechanism, changes: dict[str, Any]) -> Mechanism:
         name: attrs.evolve(own, friction=attrs.evolve(own.friction, **changes))
         for name, own in mechanism.clearances.items()
     }
+    return attrs.evolve(mechanism, clearances=clearances)
+
+
+def with_film(mechanism: Mechanism, film: dict[str, float]) -> Mechanism:
+    """The mechanism with a film, fields of `mechanism.clearance.Film`, in all its joints.
+
+    Raises
+    ------
+    ConfigError
+        If a joint cannot have this film.
+    """
+    clearances = {}
+    for name, own in mechanism.clearances.items():
+        try:
+            clearances[name] = attrs.evolve(own, film=Film(**film))
+        except FieldError as error:
+            where = f"clearances.joints.{name}.{error.key}"
+            raise ConfigError(mechanism.source, where, error.fault) from error
     return attrs.evolve(mechanism, clearances=clearances)
 
 
@@ -40,13 +60,16 @@ def ensemble(mechanism: Mechanism, settings: dict[str, Any]) -> list[Leg]:
     mechanism : Mechanism
     settings : dict
         ``clearance_joints``, ``clearance_m`` [m], ``speed_rpm``, ``runs``, ``seed``, ``perturb_fraction`` (of
-        the smallest clearance); optional ``normal_law`` and ``friction``.
+        the smallest clearance); optional ``normal_law``, ``friction`` and
+        ``film``.
 
     Returns
     -------
     list of Leg
         One for each run.
     """
+    if settings.get("film"):
+        mechanism = with_film(mechanism, settings["film"])
     if settings.get("friction"):
         mechanism = with_friction(mechanism, settings["friction"])
     clearance_joints, clearance_m = settings["clearance_joints"], settings["clearance_m"]

@@ -4,6 +4,7 @@ import math
 from collections.abc import Callable, Mapping
 from typing import TYPE_CHECKING
 
+import numpy as np
 from rich.console import Console
 from rich.table import Table
 
@@ -49,6 +50,9 @@ def print_replay(result: "ReplayResult", wall_s: float) -> None:
         if not is_counted_leg:
             console.print(f"{NOT_VALID}: the clearances are not those of this leg; see the verdict")
         console.print(f"torque {_by_torque(result)}", soft_wrap=True)
+        errors = [f"{joint.joint} {figure(1.0e9 * joint.sampling_sigma_m)} nm" for joint in last.joints]
+        if any(joint.sampling_sigma_m for joint in last.joints):
+            console.print(f"standard errors of the clearances by sampling: {', '.join(errors)}")
         console.print()
         if Figure.FORECAST in verdict.not_valid:
             console.print(f"lasts  {NOT_VALID}: {verdict.why}\n", soft_wrap=True)
@@ -88,7 +92,7 @@ def _joints(result: "ReplayResult", is_counted_leg: bool) -> Table:
     columns = ("\njoint", "counted clearance\nmm", "growth\npm/cycle", "±\npm/cycle", "peak\nN")
     for column in columns:
         table.add_column(column, justify="left" if column == "\njoint" else "right")
-    peaks = result.history.joint_column("peak_force_n").max(axis=0)
+    peaks = np.fmax.reduce(result.history.joint_column("peak_force_n"))
     last = result.history.last
     for joint, peak in zip(last.joints if last else (), peaks, strict=True):
         cells = (

@@ -33,16 +33,22 @@ from leg_wear_monitor.wear.surfaces import BUSHING
 
 POINT_S = 600.0  # of walking, between two points of the clearances' history
 
+ESTIMATED_KEY = "estimated_cycles"  # of `cycles`, in sampled replays; of totals
+
 _SUMS = ("moving_s", "standing_s", "bridged_s", "unmonitored_s")
 
 
 @attrs.frozen
 class PartLife:
-    """When a joint's part was new: gait cycles and time in motion of the leg then, and the stamp."""
+    """When a joint's part was new: gait cycles and time in motion of the leg then, and the stamp.
+
+    ``sampling_m2``: variance of its clearance by sampled replays, less that of this run [m^2].
+    """
 
     cycles: int = 0
     moving_s: float = 0.0
     replaced_ns: int = 0
+    sampling_m2: float = 0.0
 
 
 @attrs.define
@@ -92,6 +98,11 @@ class AccountingState:
     commissioned: dict[str, float] = attrs.field(factory=dict)
 
 
+def _sampling_key(joint: str) -> str:
+    """Name of the total with the variance of a clearance by sampled replays."""
+    return f"sampling_variance_{joint}_m2"
+
+
 def _is_apart(step_ns: Ints) -> NDArray[np.bool_]:
     return np.asarray((step_ns < 0) | (step_ns > NEIGHBOURS_NS))
 
@@ -136,6 +147,7 @@ class Accounting:
                 self.state.cycles - joint.cycles,
                 self._before["moving_s"] - joint.moving_s,
                 joint.replaced_ns,
+                self._before.get(_sampling_key(joint.name), 0.0),
             )
             for joint in own
         )
@@ -215,6 +227,32 @@ class Accounting:
             part.replaced_ns,
         )
 
+    @property
+    def sampling_sigma_m(self) -> Floats:
+        """Standard deviation of each mean clearance, because not all gait cycles were followed (k,)."""
+        return np.asarray(np.sqrt(self._sampling_m2))
+
+    @property
+    def _sampling_m2(self) -> Floats:
+        """Variance of each clearance by sampled replays since its part was new (k,) [m^2]."""
+        before = np.array([part.sampling_m2 for part in self.state.parts])
+        return np.maximum(0.0, before + self._run_sampling_m2)
+
+    @property
+    def _run_sampling_m2(self) -> Floats:
+        sampling = self._twin.sampling
+        return sampling.variance_m2 if sampling else np.zeros(len(self.state.parts))
+
+    @property
+    def _sampling_totals(self) -> dict[str, float]:
+        """What the ledger keeps of sampled replays; empty if there was none."""
+        sampling, before = self._twin.sampling, self._before.get(ESTIMATED_KEY, 0.0)
+        estimated = before + (sampling.estimated_cycles if sampling else 0.0)
+        if not estimated:
+            return {}
+        keys = map(_sampling_key, self._twin.clearance_joints)
+        return {ESTIMATED_KEY: estimated, **dict(zip(keys, self._sampling_m2.tolist(), strict=True))}
+
     def wear_of(self, joint: str) -> JointWear:
         """Present wear of a joint; raises LegWearError for a joint without clearance."""
         return self.joint_wear(self._index(joint), self._twin.depth)
@@ -231,7 +269,8 @@ class Accounting:
         k = self._index(joint)
         was = self.joint_wear(k, self._twin.depth)
         self._twin.reset_wear(joint)
-        self._set_part(k, PartLife(self.state.cycles, self.totals["moving_s"], stamp_ns))
+        run_m2 = float(self._run_sampling_m2[k])
+        self._set_part(k, PartLife(self.state.cycles, self.totals["moving_s"], stamp_ns, -run_m2))
         return was
 
     def correct(self, joint: str, clearance_m: float) -> JointWear:
@@ -251,7 +290,9 @@ class Accounting:
         depth[k] = part.depth
         self._twin.set_depth(depth)
         begun_s = self.totals["moving_s"] - part.moving_s
-        self._set_part(k, PartLife(self.state.cycles - part.cycles, begun_s, part.replaced_ns))
+        sampling_m2 = self.state.parts[k].sampling_m2
+        cycles = self.state.cycles - part.cycles
+        self._set_part(k, PartLife(cycles, begun_s, part.replaced_ns, sampling_m2))
         return since
 
     def _set_part(self, k: int, part: PartLife) -> None:
@@ -336,7 +377,7 @@ class Accounting:
         return Entry(
             stamp_ns=self._twin.intake.followed_stamp_ns or (self.ledger.kept_ns if self.ledger else 0),
             joints=tuple(self.joint_wear(k, depth) for k in range(len(self._twin.clearance_joints))),
-            totals=self.totals | self.state.commissioned,
+            totals=self.totals | self.state.commissioned | self._sampling_totals,
             alarms=tuple(alarm for alarm in alarms if alarm.level is not Level.OK),
             spans=tuple((begin, end) for begin, end, _ in spans),
             span_epochs=tuple(of for *_, of in spans) if any(of for *_, of in spans) else (),

@@ -24,6 +24,7 @@ def cycle_report(
     forecast: Forecast,
     seen: Sequence[ClearanceEstimate] | None = None,
     measured: Sequence[Measurement | None] | None = None,
+    sampling_sigma_m: Sequence[float] | None = None,
 ) -> CycleReport:
     """Report of a gait cycle.
 
@@ -42,6 +43,8 @@ def cycle_report(
     seen : sequence of ClearanceEstimate, optional
     measured : sequence of Measurement or None, optional
         Last measurement of each joint's part.
+    sampling_sigma_m : sequence of float, optional
+        Standard deviation of each mean clearance, because not all gait cycles were followed; default 0.
     """
     torque = statistics.torque
     return CycleReport(
@@ -62,6 +65,7 @@ def cycle_report(
                 forecast.joints[k],
                 seen[k] if seen else None,
                 measured[k] if measured else None,
+                float(sampling_sigma_m[k]) if sampling_sigma_m is not None else 0.0,
             )
             for k, (joint, bushing) in enumerate(bushings.items())
         ),
@@ -78,6 +82,7 @@ def cycle_report(
         friction_sigma_nm=float(torque.friction_sigma_nm),
         torque_lag_sigma_s=float(torque.torque_lag_sigma_s),
         forecast=forecast.leg,
+        is_followed=statistics.is_followed,
     )
 
 
@@ -87,12 +92,37 @@ def _mismatch(torque: TorqueStatistics) -> float:
     return float(left / torque.predicted_rms_nm) if torque.predicted_rms_nm > 0.0 else math.nan
 
 
+def latest(report: CycleReport, followed: CycleReport | None) -> CycleReport:
+    """A gait cycle; one that was tracked only, with forces and torques of the last one that was followed."""
+    if report.is_followed or followed is None:
+        return report
+    own = ("cycle", "begin_ns", "stamp_ns", "cadence_rpm", "moving_s", "bridged_s", "forecast")
+    joints = tuple(
+        attrs.evolve(
+            new,
+            peak_force_n=old.peak_force_n,
+            p99_force_n=old.p99_force_n,
+            mean_force_n=old.mean_force_n,
+            impacts=old.impacts,
+            load=old.load,
+        )
+        for new, old in zip(report.joints, followed.joints, strict=True)
+    )
+    return attrs.evolve(followed, joints=joints, **{name: getattr(report, name) for name in own})
+
+
 def with_forecast(
-    report: CycleReport, forecast: Forecast, measured: Sequence[Measurement | None]
+    report: CycleReport,
+    forecast: Forecast,
+    measured: Sequence[Measurement | None],
+    sampling_sigma_m: Sequence[float],
 ) -> CycleReport:
-    """The same gait cycle with a newer forecast, and the measurements that it rests on."""
-    joints = zip(report.joints, forecast.joints, measured, strict=True)
-    renewed = tuple(attrs.evolve(joint, forecast=new, measured=by) for joint, new, by in joints)
+    """The same gait cycle with a newer forecast, its measurements, and newer errors by sampling."""
+    joints = zip(report.joints, forecast.joints, measured, sampling_sigma_m, strict=True)
+    renewed = tuple(
+        attrs.evolve(joint, forecast=new, measured=by, sampling_sigma_m=sigma_m)
+        for joint, new, by, sigma_m in joints
+    )
     return attrs.evolve(report, joints=renewed, forecast=forecast.leg)
 
 
@@ -106,6 +136,7 @@ def _joint_report(
     forecast: JointForecast,
     seen: ClearanceEstimate | None,
     measured: Measurement | None,
+    sampling_sigma_m: float,
 ) -> JointReport:
     rate = growth_rate(window)
     mean_n, p99_n = float(statistics.mean_force_n[k]), float(statistics.p99_force_n[k])
@@ -123,6 +154,7 @@ def _joint_report(
         peak_force_n=float(statistics.peak_force_n[k]),
         p99_force_n=p99_n,
         mean_force_n=mean_n,
-        impacts=int(statistics.impacts[k]),
-        load=bushing.load(mean_n, p99_n, rubbing_w),
+        impacts=int(statistics.impacts[k]) if statistics.is_followed else None,
+        load=bushing.load(mean_n, p99_n, rubbing_w) if statistics.is_followed else None,
+        sampling_sigma_m=sampling_sigma_m,
     )

@@ -21,6 +21,7 @@ from leg_wear_monitor.monitor.reports import CycleReport, JointReport, VerdictRe
 from leg_wear_monitor.monitor.state import MonitorState
 from leg_wear_monitor.monitor.torque_causes.explanation import TorqueExplanation
 from leg_wear_monitor.monitor.verdict.rules import findings
+from leg_wear_monitor.monitor.verdict.sampled import with_sampling
 from leg_wear_monitor.monitor.verdict.situation import JointSituation, SeenClearance, Situation
 from leg_wear_monitor.monitor.verdict.verdict import (
     NO_GAIT_CYCLE,
@@ -82,7 +83,11 @@ class Judge:
             self._forecaster.last_measured(self._accounting.replaced_ns),
             self._accounting.is_all_counted,
         )
-        return VerdictReport(stamp_ns, dated(findings(situation), state.findings, stamp_ns))
+        found = findings(situation)
+        if self._twin.sampling:
+            joints, sigma_m = self._twin.clearance_joints, self._accounting.sampling_sigma_m
+            found = with_sampling(found, self._twin.sampling, joints, sigma_m)
+        return VerdictReport(stamp_ns, dated(found, state.findings, stamp_ns))
 
     def changed(self, state: MonitorState) -> tuple[VerdictReport, ...]:
         """The verdict if it has changed since the last call; it is then an event, too.
@@ -141,11 +146,12 @@ def situation_of(
         Whether the ledger already contained the wear of all samples.
     """
     alarms, config = evaluation.board.alarms, evaluation.config
+    counted_m, limits_m = twin.clearance_mean_m.tolist(), evaluation.board.clearance_limits_m
     labels = {name: joint.label for name, joint in twin.mechanism.joints.items()}
     return Situation(
         joints=tuple(
             _with_measured(
-                _joint(k, name, labels[name], float(twin.clearance_mean_m[k]), evaluation, last, diagnosis),
+                _joint(k, name, labels[name], counted_m[k], limits_m[k], last, diagnosis),
                 measured[k] if measured else None,
             )
             for k, name in enumerate(twin.clearance_joints)
@@ -190,7 +196,7 @@ def _joint(
     name: str,
     label: str,
     counted_m: float,
-    evaluation: AlarmEvaluation,
+    limit_m: float,
     last: CycleReport | None,
     diagnosis: Diagnosis | None,
 ) -> JointSituation:
@@ -202,7 +208,7 @@ def _joint(
     return JointSituation(
         joint=name,
         counted_m=counted_m,
-        limit_m=evaluation.board.clearance_limits_m[k],
+        limit_m=limit_m,
         believed_m=report.forecast.clearance_m.p50 if report and report.forecast else math.nan,
         seen=tuple(seen),
         is_used=bool(by_encoders and by_encoders.believed),

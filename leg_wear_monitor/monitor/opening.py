@@ -5,9 +5,15 @@ from leg_wear_monitor.mechanism.spec import Mechanism
 from leg_wear_monitor.monitor.config.settings import MonitorConfig
 from leg_wear_monitor.monitor.ledger.ledger import open_ledger
 from leg_wear_monitor.monitor.wear_monitor import WearMonitor
+from leg_wear_monitor.twin.sampling.settings import SamplingSettings
 
 
-def open_monitor(mechanism: Mechanism, config: MonitorConfig, at_end: bool = False) -> WearMonitor:
+def open_monitor(
+    mechanism: Mechanism,
+    config: MonitorConfig,
+    at_end: bool = False,
+    sampling: SamplingSettings | None = None,
+) -> WearMonitor:
     """Open the ledger and build the monitor that continues it.
 
     Building takes seconds, and a minute where kernels are compiled: if it is cut short, the ledger must not
@@ -19,6 +25,8 @@ def open_monitor(mechanism: Mechanism, config: MonitorConfig, at_end: bool = Fal
     config : MonitorConfig
     at_end : bool
         Whether the ledger is written at the end of the run alone, see `open_ledger`.
+    sampling : SamplingSettings, optional
+        Follow blocks of gait cycles only.
 
     Raises
     ------
@@ -27,10 +35,10 @@ def open_monitor(mechanism: Mechanism, config: MonitorConfig, at_end: bool = Fal
     """
     ledger = open_ledger(mechanism, config, at_end)
     if ledger is None:
-        return WearMonitor(mechanism, config)
+        return WearMonitor(mechanism, config, sampling=sampling)
     with closed_at_the_end(ledger.abandon):
         try:
-            return WearMonitor(mechanism, config, ledger)
+            return WearMonitor(mechanism, config, ledger, sampling)
         except BaseException:
             ledger.abandon()
             raise

@@ -29,6 +29,7 @@ from leg_wear_monitor.torque_fit.torque_model import torque_model
 from leg_wear_monitor.twin.digital_twin import DigitalTwin
 from leg_wear_monitor.twin.reference.leg_parameters import LegParameters
 from leg_wear_monitor.twin.reference.torque_reference import TorqueReference
+from leg_wear_monitor.twin.sampling.settings import SamplingSettings
 
 WRONG_TORQUE = "the received drive torque is wrong; see the status `torque`"
 ACCELERATED = "wear is accelerated: clearances grow within the gait cycles that are compared"
@@ -42,6 +43,8 @@ class Parts:
     mechanism : Mechanism
     config : MonitorConfig
     ledger : Ledger or None
+    sampling : SamplingSettings, optional
+        Follow blocks of gait cycles only.
 
     Attributes
     ----------
@@ -52,11 +55,17 @@ class Parts:
     state : MonitorState
     """
 
-    def __init__(self, mechanism: Mechanism, config: MonitorConfig, ledger: Ledger | None) -> None:
+    def __init__(
+        self,
+        mechanism: Mechanism,
+        config: MonitorConfig,
+        ledger: Ledger | None,
+        sampling: SamplingSettings | None = None,
+    ) -> None:
         self.config = config
         self.mechanism = fitted(mechanism, config)
         self.clearance_joints = self.mechanism.clearance_joints
-        self.twin = DigitalTwin(self.mechanism, twin_settings(self.config))
+        self.twin = DigitalTwin(self.mechanism, twin_settings(self.config), sampling)
         self.guard = InputGuard(self.twin.settings.tracker)
         self.crank_zero = (
             CrankZero(torque_model(self.mechanism), self.config, self.twin.settings.tracker)
@@ -65,7 +74,9 @@ class Parts:
         )
         self.accounting = Accounting(self.twin, ledger, self.config.ledger)
         cycle_ns = round(60.0e9 / abs(self.config.cadence.commanded_rpm))
-        self.evaluation = AlarmEvaluation(self.twin, self.config, cycle_ns, self.guard)
+        # shorter than a gait cycle for early alarms of impacts, which a sampled replay does not promise
+        periods = 1 if sampling else A_CYCLE
+        self.evaluation = AlarmEvaluation(self.twin, self.config, cycle_ns, self.guard, periods)
         self.bushings = {
             joint: Bushing.of(self.mechanism.clearances[joint]) for joint in self.clearance_joints
         }
@@ -114,7 +125,7 @@ class Parts:
             self.evaluation.board.restore(ledger.entry.alarms)
         speed = self.twin.settings.tracker.commanded_speed_radps
         self.model_error = model_error(self.mechanism, speed, self.config.wear_acceleration)
-        self.evaluation_periods = EvaluationPeriods(cycle_ns // A_CYCLE)
+        self.evaluation_periods = EvaluationPeriods(cycle_ns // periods)
         kept = TorqueRecord.of(self.accounting.state.commissioned)
         self.state = MonitorState(tuple(GrowthWindow() for _ in self.clearance_joints), kept)
 

@@ -5,7 +5,7 @@ import math
 import numpy as np
 
 from leg_wear_monitor.mechanism.arrays import Floats
-from leg_wear_monitor.monitor.cycle_report import cycle_report
+from leg_wear_monitor.monitor.cycle_report import cycle_report, latest
 from leg_wear_monitor.monitor.encoders.clearance_estimate import ClearanceEstimate
 from leg_wear_monitor.monitor.evaluation.specs import CLEARANCE, MISMATCH
 from leg_wear_monitor.monitor.forecast.growth import GrowthWindow, extended
@@ -71,8 +71,9 @@ class Processing:
                 self._torque.ended(statistics)
             cycles.append(self._report(statistics))
             self._add_changes(self._evaluation.end_cycle(cycles[-1], self._parts.state.torque), changes)
-            self._explain_mismatch(statistics)
-            self._keep_torque(statistics, cycles[-1])
+            if statistics.is_followed:
+                self._explain_mismatch(statistics)
+                self._keep_torque(statistics, cycles[-1])
         return update.samples, cycles
 
     def end_period(self, changes: list[AlarmList]) -> tuple[VerdictReport, ...]:
@@ -111,19 +112,22 @@ class Processing:
         """Report of a gait cycle."""
         state, accounting = self._parts.state, self._accounting
         accounting.state.cycles += 1
-        state.growth = tuple(
-            extended(window, float(growth), statistics.moving_s, self._parts.config.growth.window_cycles)
-            for window, growth in zip(state.growth, statistics.growth_mean_m, strict=True)
-        )
+        if statistics.is_followed:
+            state.growth = tuple(
+                extended(window, float(growth), statistics.moving_s, self._parts.config.growth.window_cycles)
+                for window, growth in zip(state.growth, statistics.growth_mean_m, strict=True)
+            )
         estimates = self._clearance_estimates(statistics)
         limits = self._evaluation.board.clearance_limits_m
+        sigma_m = accounting.sampling_sigma_m
         forecast = self._forecaster.after(
             statistics,
             self._worn_m(statistics),
             limits,
             lambda: self._parts.judge.is_forecast_valid(state.findings),
+            sigma_m,
         )
-        state.last = cycle_report(
+        report = cycle_report(
             statistics,
             accounting.state.cycles,
             self._parts.bushings,
@@ -132,9 +136,11 @@ class Processing:
             forecast,
             estimates,
             self._parts.measured,
+            sigma_m.tolist(),
         )
-        accounting.note_clearances(state.last)
-        return state.last
+        state.last = latest(report, state.last)
+        accounting.note_clearances(report)
+        return report
 
     def _explain_mismatch(self, statistics: CycleStatistics) -> None:
         """Look for causes of a torque mismatch after a gait cycle."""
@@ -175,6 +181,7 @@ class Processing:
         joint = self._clearance_joints[correction.joint]
         was = self._accounting.correct(joint, correction.clearance_m)
         self._torque.corrected(correction, self._twin.clearance_mean_m)
+        self._twin.pull_block()
         self._note_commissioned(before)
         self._accounting.note(
             Audit(self._twin.intake.followed_stamp_ns, "diagnosis", "correct_clearance", was)
@@ -188,6 +195,7 @@ class Processing:
         if found is None or found == self._twin.parameters or not self._parts.config.diagnosis.correct:
             return
         self._twin.set_parameters(found)
+        self._twin.pull_block()
         names = tuple(self._parts.mechanism.bodies)
         stamp_ns = self._twin.intake.followed_stamp_ns
         factors = tuple(found.mass.tolist()), tuple(found.length.tolist()), found.friction
@@ -225,5 +233,6 @@ class Processing:
 
     def _add_changes(self, changed: tuple[AlarmList, ...], changes: list[AlarmList]) -> None:
         for change in changed:
+            self._twin.pull_block()
             changes.append(change)
             self._accounting.note_alarms(change)

@@ -36,7 +36,8 @@ class JointReport:
         Standard deviation of what it may be off: cycles scatter, and masses are not those on paper.
     peak_force_n, p99_force_n, mean_force_n : float
         Of the contact force in this cycle; the peak is a sample of a heavy tail.
-    impacts : int
+    impacts : int or None
+        None if the gait cycle was tracked only; forces are NaN then.
     forecast : JointForecast or None
         Renewed once a minute, and when more is known.
     seen : ClearanceEstimate or None
@@ -45,6 +46,8 @@ class JointReport:
         The last clearance of this part that somebody measured.
     load : BushingLoad or None
         Pressure and sliding speed in this cycle, against the limits of the joint's material.
+    sampling_sigma_m : float
+        Standard deviation of the mean clearance, because sampled replays did not follow all gait cycles.
     """
 
     joint: str
@@ -56,11 +59,12 @@ class JointReport:
     peak_force_n: float
     p99_force_n: float
     mean_force_n: float
-    impacts: int
+    impacts: int | None
     forecast: JointForecast | None = None
     seen: ClearanceEstimate | None = None
     measured: Measurement | None = None
     load: BushingLoad | None = None
+    sampling_sigma_m: float = 0.0
 
     @property
     def judged_clearance_m(self) -> float:
@@ -101,6 +105,9 @@ class CycleReport:
         Their standard deviations.
     forecast : LegForecast or None
         Renewed once a minute.
+    is_followed : bool
+        Whether the leg was followed. Otherwise, in a sampled replay, the cycle was tracked only: forces and
+        torques are NaN, and clearances are estimates from other cycles.
     """
 
     cycle: int
@@ -123,6 +130,7 @@ class CycleReport:
     friction_sigma_nm: float = math.nan
     torque_lag_sigma_s: float = math.nan
     forecast: LegForecast | None = None
+    is_followed: bool = True
 
 
 @attrs.frozen

@@ -32,11 +32,12 @@ from leg_wear_monitor.monitor.ledger.entry import Measurement
 from leg_wear_monitor.monitor.reports import CycleReport, Status
 from leg_wear_monitor.monitor.torque_causes.explanation import TorqueExplanation
 from leg_wear_monitor.monitor.torque_status import diagnosis_status, torque_status
+from leg_wear_monitor.monitor.verdict.sampled import sampled_words
 from leg_wear_monitor.monitor.verdict.verdict import Verdict
 from leg_wear_monitor.monitor.verdict.words import amount, estimate, with_unit
 from leg_wear_monitor.monitor.zero_status import zero_status
 from leg_wear_monitor.twin.digital_twin import DigitalTwin
-from leg_wear_monitor.twin.statistics import Event, Tracking
+from leg_wear_monitor.twin.statistics import Event, Sampling, Tracking
 
 _INPUT = tuple(spec.name() for spec in specs.OF_INPUT)
 
@@ -55,7 +56,8 @@ def statuses(
     crank_zero: CrankZero | None = None,
     measured: Sequence[Measurement | None] = (),
 ) -> tuple[Status, ...]:
-    """All statuses, verdict first, then gait, inputs, joints, alarms and ledger."""
+    """All statuses, verdict first, then gait, inputs, joints, alarms and ledger; last, a sampled replay."""
+    sampling = twin.sampling
     joints = [_joint(k, name, twin, evaluation, last) for k, name in enumerate(twin.clearance_joints)]
     joints = [_with_measured(*each) for each in zip(joints, measured or (None,) * len(joints), strict=True)]
     return (
@@ -69,7 +71,21 @@ def statuses(
         *((_encoders(encoders, evaluation, last),) if encoders else ()),
         _alarms(evaluation),
         _ledger(accounting),
+        *((_sampling(sampling, twin.clearance_joints, accounting),) if sampling else ()),
     )
+
+
+def _sampling(sampling: Sampling, joints: Sequence[str], accounting: Accounting) -> Status:
+    """A sampled replay: what was followed, and the standard errors of the counted clearances."""
+    values = {
+        "fraction": sampling.fraction,
+        "followed_cycles": float(sampling.followed_cycles),
+        "estimated_cycles": sampling.estimated_cycles,
+        "blocks": float(sampling.blocks),
+    }
+    sigmas = accounting.sampling_sigma_m.tolist()
+    values |= {f"{joint}_sigma_m": sigma for joint, sigma in zip(joints, sigmas, strict=True)}
+    return Status("sampling", Level.OK, sampled_words(sampling), values)
 
 
 def verdict_status(verdict: Verdict) -> Status:
@@ -162,7 +178,7 @@ def _joint(
         "peak_force_n": report.peak_force_n,
         "p99_force_n": report.p99_force_n,
         "mean_force_n": report.mean_force_n,
-        "impacts": float(report.impacts),
+        "impacts": _or_nan(report.impacts),
         **(_load_values(report.load) if report.load else {}),
     }
     if report.forecast is None:

@@ -32,7 +32,8 @@ from leg_wear_monitor.monitor.resets import last_reset
 from leg_wear_monitor.monitor.state import MonitorSnapshot
 from leg_wear_monitor.monitor.status import statuses
 from leg_wear_monitor.twin.sample import GAIT_SAMPLE, Samples
-from leg_wear_monitor.twin.statistics import joined
+from leg_wear_monitor.twin.sampling.settings import SamplingSettings
+from leg_wear_monitor.twin.statistics import Sampling, joined
 
 
 class WearMonitor:
@@ -47,6 +48,8 @@ class WearMonitor:
     config : MonitorConfig, optional
     ledger : Ledger, optional
         See `open_ledger`; its wear is continued. Without one, wear begins at 0 and is lost at the end.
+    sampling : SamplingSettings, optional
+        For long recordings: follow blocks of gait cycles only. By default, all are followed.
 
     Attributes
     ----------
@@ -75,9 +78,13 @@ class WearMonitor:
     """
 
     def __init__(
-        self, mechanism: Mechanism, config: MonitorConfig | None = None, ledger: Ledger | None = None
+        self,
+        mechanism: Mechanism,
+        config: MonitorConfig | None = None,
+        ledger: Ledger | None = None,
+        sampling: SamplingSettings | None = None,
     ) -> None:
-        self._parts = parts = Parts(mechanism, config or MonitorConfig(), ledger)
+        self._parts = parts = Parts(mechanism, config or MonitorConfig(), ledger, sampling)
         self._processing = Processing(parts)
         self.mechanism, self.clearance_joints = parts.mechanism, parts.clearance_joints
         self._twin, self._guard, self._accounting = parts.twin, parts.guard, parts.accounting
@@ -168,6 +175,11 @@ class WearMonitor:
             self._guard,
             accounting.pauses,
         )
+
+    @property
+    def sampling(self) -> Sampling | None:
+        """State of a sampled replay; None where all gait cycles are followed."""
+        return self._twin.sampling
 
     @property
     def used(self) -> dict[str, int]:
@@ -347,6 +359,10 @@ class WearMonitor:
         self._parts.keep()
         return found
 
+    def end_recording(self) -> None:
+        """Count the wear up to the last sample, which a sampled replay does at the end of a gait cycle."""
+        self._twin.end_recording()
+
     def renew_forecast(self) -> CycleReport | None:
         """Renew the forecast now; otherwise it may be a minute old.
 
@@ -361,10 +377,11 @@ class WearMonitor:
         fresh = [self.mechanism.clearances[joint].radial_clearance for joint in self.clearance_joints]
         worn_m = np.asarray(self._twin.clearance_mean_m - fresh)
         limits = self._evaluation.board.clearance_limits_m
+        sigma_m = self._accounting.sampling_sigma_m
         forecast = self._forecaster.renewed(
-            worn_m, limits, self._parts.judge.is_forecast_valid(self.verdict.findings)
+            worn_m, limits, self._parts.judge.is_forecast_valid(self.verdict.findings), sigma_m
         )
-        self._parts.state.last = with_forecast(last, forecast, self._parts.measured)
+        self._parts.state.last = with_forecast(last, forecast, self._parts.measured, sigma_m.tolist())
         return self._parts.state.last
 
     def save(self) -> None:

@@ -27,6 +27,7 @@ from leg_wear_monitor.playback.sink import Sink
 from leg_wear_monitor.playback.summary import summary
 from leg_wear_monitor.twin.kinds import CRANK, TORQUE
 from leg_wear_monitor.twin.sample import Samples, brings
+from leg_wear_monitor.twin.sampling.settings import SamplingSettings
 
 REPORTS_FILE = "reports.mcap"
 _LONGER, _LONGER_S = 1.05, 1.0  # stamps may span this factor times, plus these seconds, the logged time
@@ -120,6 +121,7 @@ def replay(
     drive_torque: str | None = None,
     node: str | None = None,
     memory_mb: float = DEFAULT_MB,
+    sample: float | None = None,
     ready: Callable[[WearMonitor], None] | None = None,
     progress: Callable[[float], None] | None = None,
     finish: Callable[[ReplayResult], None] | None = None,
@@ -153,6 +155,9 @@ def replay(
         namespace of the crank topic, such as ``/left/leg_wear_monitor`` for ``/left/joint_states``.
     memory_mb : float
         Memory limit for reading the recording, including temporary files [10⁶ bytes].
+    sample : float, optional
+        Fraction of the gait cycles that is followed, for long recordings: the others are tracked and checked,
+        and their wear is estimated; by default, all are followed. See ``docs/explanation/sampling.md``.
     ready : callable, optional
         Called with the monitor before the first sample.
     progress : callable, optional
@@ -170,6 +175,8 @@ def replay(
         If the recording contains nothing usable, or the reports cannot be written.
     ConfigError, LedgerError
         If the parameters or the ledger are unusable.
+    LegWearError
+        If ``sample`` is no fraction.
 
     Examples
     --------
@@ -193,6 +200,7 @@ def replay(
     >>> summary.cycles, summary.recording.torque_samples
     (10, 2400)
     """
+    sampling = _sampling(sample)
     config = config if isinstance(config, MonitorConfig) else load_config(config, node)
     kept = attrs.evolve(config.ledger, path="" if ledger is None else str(ledger))
     config = attrs.evolve(config, ledger=kept)
@@ -205,7 +213,7 @@ def replay(
         node = node or node_beside(printable(recording.topics["joint_states"]))
         config = config.on_node(node)
         mechanism = load_mechanism(config.mechanism)
-        monitor = open_monitor(mechanism, config, at_end=True)
+        monitor = open_monitor(mechanism, config, at_end=True, sampling=sampling)
         stack.callback(monitor.abandon)
         history, evidence = History(monitor.clearance_joints), GaitEvidence(config)
         result = ReplayResult(monitor, history, recording.files, recording.topics, time, evidence)
@@ -228,6 +236,12 @@ def replay(
     return result
 
 
+def _sampling(fraction: float | None) -> SamplingSettings | None:
+    """Settings of a sampled replay; None where all gait cycles are followed."""
+    settings = None if fraction is None else SamplingSettings(fraction=fraction)
+    return settings if settings and settings.fraction < 1.0 else None
+
+
 def _run(
     result: ReplayResult,
     recording: Recording,
@@ -242,11 +256,13 @@ def _run(
         result.logged_s = max(result.logged_s, (int(block.log_time_ns[-1]) - first_ns) / 1e9)
         if block.pause_ns:
             monitor.pause(_stamps_apart_s(result, block))
-        for samples in _evaluation_periods(block, monitor.config):
+        whole = sink is None and monitor.sampling is not None  # diagnostics are due in reports only
+        for samples in [block.samples] if whole else _evaluation_periods(block, monitor.config):
             result.count(samples)
             _take(result, samples, sink)
         if progress:
             progress(block.fraction)
+    monitor.end_recording()
     result.history.last = monitor.renew_forecast()
 
 
@@ -279,7 +295,8 @@ def _take(result: ReplayResult, samples: Samples, sink: Sink | None) -> None:
     reports = result.monitor.update(samples)
     for cycle in reports.cycles:
         result.history.add_cycle(cycle)
-        result.evidence.add(cycle)
+        if cycle.is_followed:
+            result.evidence.add(cycle)
     for alarms in reports.alarms:
         result.history.add_alarms(alarms)
     if sink:

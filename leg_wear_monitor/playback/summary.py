@@ -1,6 +1,6 @@
 """The summary of a replay, from which its files and its page are made."""
 
-from collections.abc import Mapping
+from collections.abc import Callable, Mapping
 from typing import TYPE_CHECKING, Any
 
 import attrs
@@ -35,9 +35,11 @@ from leg_wear_monitor.playback.result.recording import (
     ReplayGait,
     ReplayMonitor,
     ReplayRecording,
+    ReplaySampling,
 )
 from leg_wear_monitor.playback.result.replay_history import ReplayHistory
 from leg_wear_monitor.playback.result.replay_summary import ReplaySummary
+from leg_wear_monitor.twin.statistics import Sampling
 from leg_wear_monitor.wear.surfaces import BUSHING, JOURNAL
 
 if TYPE_CHECKING:
@@ -90,10 +92,22 @@ def summary(
         alarms=_alarms(result),
         status=tuple(map(_status, monitor.status())),
         lost=monitor.lost,
+        sampling=_sampling(monitor.sampling),
         history=_history(result.history),
         wear_depth_m=_wear(result),
         advice=ADVICE,
         made_with=dict(made_with or {}),
+    )
+
+
+def _sampling(sampling: Sampling | None) -> ReplaySampling | None:
+    if sampling is None:
+        return None
+    return ReplaySampling(
+        fraction=sampling.fraction,
+        followed_cycles=sampling.followed_cycles,
+        estimated_cycles=sampling.estimated_cycles,
+        blocks=sampling.blocks,
     )
 
 
@@ -176,12 +190,19 @@ def _joint(history: History, k: int, joint: JointReport, verdict: Verdict) -> Re
         growth_error_m_per_cycle=joint.growth_error_m_per_cycle,
         growth_mps=joint.growth_mps,
         forecast=joint_forecast(joint.forecast, verdict),
-        peak_force_n=peak.max(),
-        mean_force_n=mean.mean(),
+        peak_force_n=_of_known(np.max, peak),
+        mean_force_n=_of_known(np.mean, mean),
         seen=_seen(joint.seen) if joint.seen else None,
-        impacts=int(impacts.sum()),
+        impacts=int(np.nansum(impacts)),
         load=joint.load,
+        sampling_sigma_m=joint.sampling_sigma_m,
     )
+
+
+def _of_known(statistic: Callable[[Floats], Any], values: Floats) -> float | None:
+    """A statistic of the values that are known: forces of gait cycles that were followed."""
+    known = values[np.isfinite(values)]
+    return float(statistic(known)) if len(known) else None
 
 
 def _seen(seen: ClearanceEstimate) -> SeenClearance:
@@ -237,9 +258,9 @@ def _begins(last: np.ndarray[Any, np.dtype[np.int64]]) -> np.ndarray[Any, np.dty
 def _thinned(name: str, column: Floats, last: np.ndarray[Any, np.dtype[np.int64]]) -> Floats:
     begins = _begins(last)
     if name == "peak_force_n" and len(last):
-        return np.asarray(np.maximum.reduceat(column, begins))
+        return np.asarray(np.fmax.reduceat(column, begins))
     if name == "impacts" and len(last):
-        return np.asarray(np.add.reduceat(column, begins))
+        return np.asarray(np.add.reduceat(np.nan_to_num(column), begins))
     return np.asarray(column[last])
 
 

@@ -28,15 +28,18 @@ from leg_wear_monitor.mechanism.ideal import TURN, check_cycle
 from leg_wear_monitor.mechanism.position import build_linkage
 from leg_wear_monitor.mechanism.spec import Mechanism
 from leg_wear_monitor.twin.follower.follower import FollowerSnapshot, LegFollower
+from leg_wear_monitor.twin.follower.sampled import SampledFollower
 from leg_wear_monitor.twin.intake import intake
 from leg_wear_monitor.twin.reference.leg_parameters import LegParameters
 from leg_wear_monitor.twin.sample import Samples, gait_samples
+from leg_wear_monitor.twin.sampling.settings import SamplingSettings
 from leg_wear_monitor.twin.settings import TwinSettings
 from leg_wear_monitor.twin.statistics import (
     CycleStatistics,
     Event,
     Intake,
     SampleStatistics,
+    Sampling,
     Tracking,
     TwinUpdate,
     joined,
@@ -60,6 +63,8 @@ class DigitalTwin:
     ----------
     mechanism : Mechanism
     settings : TwinSettings, optional
+    sampling : SamplingSettings, optional
+        Follow blocks of gait cycles only; by default, all.
 
     Attributes
     ----------
@@ -75,7 +80,12 @@ class DigitalTwin:
         If the linkage does not close or has a dead point.
     """
 
-    def __init__(self, mechanism: Mechanism, settings: TwinSettings | None = None) -> None:
+    def __init__(
+        self,
+        mechanism: Mechanism,
+        settings: TwinSettings | None = None,
+        sampling: SamplingSettings | None = None,
+    ) -> None:
         self.settings = settings or TwinSettings()
         commanded = self.settings.tracker.commanded_speed_radps
         setup = prepare(
@@ -90,7 +100,9 @@ class DigitalTwin:
         self._parameters = LegParameters.none(mechanism)
         self._nominal = setup.contacts.wear_coefficient.copy()
         self._friction = setup.contacts.friction[:, 0].copy()
-        self._follower = LegFollower(setup, self.settings)
+        self._follower = (
+            SampledFollower(setup, self.settings, sampling) if sampling else LegFollower(setup, self.settings)
+        )
         self._tracker = CrankTracker(self.settings.tracker)
         self.wear_acceleration = self.settings.wear_acceleration
         self._intake: Intake | None = None
@@ -124,13 +136,28 @@ class DigitalTwin:
 
     @property
     def peak_force_n(self) -> Floats:
-        """Largest contact force (k,) [N] since the begin of the gait cycle."""
-        return np.asarray(self._follower.statistics.peak[self._setup.contacts.joint])
+        """Largest contact force (k,) [N] since the begin of the gait cycle; NaN if it is tracked only."""
+        return self._follower.peak_force_n
 
     @property
     def torque_size_nm(self) -> float:
         """RMS of the ideal drive torque at the commanded speed [N m]."""
         return self._follower.torque_size_nm
+
+    @property
+    def sampling(self) -> Sampling | None:
+        """State of a sampled replay; None where all gait cycles are followed."""
+        return self._follower.sampling if isinstance(self._follower, SampledFollower) else None
+
+    def pull_block(self) -> None:
+        """In a sampled replay, follow the next gait cycles, because something has changed."""
+        if isinstance(self._follower, SampledFollower):
+            self._follower.pull_block()
+
+    def end_recording(self) -> None:
+        """In a sampled replay, count the part of a gait cycle that was tracked at the end."""
+        if isinstance(self._follower, SampledFollower):
+            self._follower.end_recording()
 
     @property
     def tracking(self) -> Tracking:

@@ -171,6 +171,9 @@ class CycleStatistics:
         Greatest wear depth of bushing and journal.
     torque : TorqueStatistics
     torque_profile : TorqueProfile
+    is_followed : bool
+        Whether the leg was followed. Otherwise, in a sampled replay, the cycle was tracked only: its forces,
+        growth and torques are NaN, it has no impacts, and its clearances are estimates.
     """
 
     cycle: int
@@ -192,6 +195,7 @@ class CycleStatistics:
     depth_max_m: Floats
     torque: TorqueStatistics
     torque_profile: TorqueProfile
+    is_followed: bool = True
 
     @property
     def duration_s(self) -> float:
@@ -216,6 +220,31 @@ class TwinUpdate:
     samples: SampleStatistics
     cycles: tuple[CycleStatistics, ...]
     events: tuple[Event, ...]
+
+
+@attrs.frozen(eq=False)
+class Sampling:
+    """State of a sampled replay.
+
+    Attributes
+    ----------
+    fraction : float
+        Fraction of the gait cycles that was asked for.
+    followed_cycles : int
+        Gait cycles that were followed and counted.
+    estimated_cycles : float
+        Gait cycles whose wear is that of others; a part of a cycle counts as such.
+    blocks : int
+        Blocks of followed cycles of one condition.
+    variance_m2 : (k,) array
+        Variance of the mean clearances because of this, since the twin was created.
+    """
+
+    fraction: float
+    followed_cycles: int
+    estimated_cycles: float
+    blocks: int
+    variance_m2: Floats
 
 
 @attrs.frozen

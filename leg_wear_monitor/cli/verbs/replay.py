@@ -65,6 +65,13 @@ _MOST_LINES = 20
     help="Memory limit of reading, temporary files included.",
 )
 @click.option(
+    "--sample",
+    type=click.FloatRange(0.0, 1.0, min_open=True),
+    metavar="FRACTION",
+    help="Follow this fraction of the gait cycles, track and check the others, and estimate their wear; for "
+    "long recordings, where no impact needs to be seen.  [default: all]",
+)
+@click.option(
     "--ledger",
     type=click.Path(path_type=Path, dir_okay=False),
     metavar="FILE",

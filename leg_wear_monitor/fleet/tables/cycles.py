@@ -74,7 +74,7 @@ def _reduced(
     if not len(values) or name in _LAST:
         reduced = values[ends]
     elif name in _SUM:
-        reduced = np.add.reduceat(values, begins)
+        reduced = np.add.reduceat(np.nan_to_num(values), begins)  # of cycles that were followed
     elif name in _MAX:
         reduced = np.fmax.reduceat(values, begins)
     else:

@@ -64,10 +64,19 @@ class AlarmEvaluation:
     cycle_ns : int
         Duration of a commanded gait cycle.
     guard : InputGuard
+    periods : int
+        Evaluation periods in that duration.
     """
 
-    def __init__(self, twin: DigitalTwin, config: MonitorConfig, cycle_ns: int, guard: InputGuard) -> None:
-        self._twin = twin
+    def __init__(
+        self,
+        twin: DigitalTwin,
+        config: MonitorConfig,
+        cycle_ns: int,
+        guard: InputGuard,
+        periods: int = A_CYCLE,
+    ) -> None:
+        self._twin, self._periods = twin, periods
         self.guard = guard
         self._cycle_ns = cycle_ns
         self.config = config
@@ -114,12 +123,22 @@ class AlarmEvaluation:
     def end_cycle(self, report: CycleReport, record: TorqueRecord) -> tuple[AlarmList, ...]:
         """Evaluate a whole gait cycle, with its torque and the record; returns all alarms if one changed."""
         self.state.cycles += 1
+        if not report.is_followed:
+            return self._end_tracked(report)
         torque = torque_values(report, record, self.torque_bounds)
         cycle = CycleEvidence(report, torque, self.config.cadence.commanded_rpm)
         values = {spec.name(): spec.value(cycle) for spec in (*specs.TORQUE, *specs.GAIT)}
         for joint in report.joints:
             values |= {spec.name(joint.joint): spec.value(joint) for spec in joint_specs(self.config)}
         return self.board.evaluate(values, report.stamp_ns)
+
+    def _end_tracked(self, report: CycleReport) -> tuple[AlarmList, ...]:
+        """Evaluate a gait cycle that was tracked only: it has neither forces nor a predicted torque."""
+        departure = abs(report.cadence_rpm - self.config.cadence.commanded_rpm)
+        clearances = {
+            specs.CLEARANCE.name(joint.joint): specs.CLEARANCE.value(joint) for joint in report.joints
+        }
+        return self.board.evaluate({specs.CADENCE.name(): departure, **clearances}, report.stamp_ns)
 
     def end_period(self, skipped: int = 0) -> tuple[AlarmList, ...]:
         """Evaluate impacts of the running gait cycle, and once per duration of a cycle the input.
@@ -137,7 +156,7 @@ class AlarmEvaluation:
         sources = {specs.SOURCES.name(): specs.SOURCES.value(self.guard)}
         early += self.board.evaluate(sources, self.guard.stamp_ns)
         self.state.evaluation_periods += 1
-        if self.state.evaluation_periods < A_CYCLE:
+        if self.state.evaluation_periods < self._periods:
             return early
         return early + self._evaluate_input(skipped)
 

@@ -102,7 +102,7 @@ class AlarmSpec(Generic[_E]):
 
     def name(self, joint: str = "") -> str:
         """Name of the alarm, such as ``clearance A``."""
-        return self.new(joint).name
+        return f"{self.kind} {self.subject or joint}".rstrip()
 
     def limits(self, source: LimitSource) -> Limit:
         """Limits of its levels."""

@@ -127,6 +127,8 @@ class JointCondition:
     joint : str
     fresh_m, wear_m, limit_m : float
         Clearance when new, wear since, and limit of the mean clearance.
+    wear_sigma_m : float
+        Standard deviation of the wear, because not all gait cycles were followed.
     growth_m : float or None
         A cycle; None while there is not enough data.
     growth_error_m : float
@@ -143,6 +145,7 @@ class JointCondition:
     growth_m: float | None
     growth_error_m: float
     has_coefficient: bool = True
+    wear_sigma_m: float = 0.0
 
     def answer(self, clearance_m: float, valid: bool) -> Answer:
         """What can be said of it, supposing its clearance."""
@@ -245,9 +248,9 @@ def _legs(
     excess = np.array(
         [
             np.interp(own, coefficient_estimate.log_factor, coefficient_estimate.excess_m)
-            + coefficient_estimate.excess_sigma_m * row
-            for own, coefficient_estimate, row in zip(
-                log_factor, coefficient_estimates, normals[k:], strict=False
+            + np.hypot(coefficient_estimate.excess_sigma_m, np.exp(own) * each.wear_sigma_m) * row
+            for own, coefficient_estimate, row, each in zip(
+                log_factor, coefficient_estimates, normals[k:], now, strict=False
             )
         ]
     )

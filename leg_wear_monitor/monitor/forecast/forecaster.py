@@ -98,6 +98,7 @@ class Forecaster:
         wear_m: Floats,
         limits_m: Sequence[float],
         is_valid: Callable[[], bool],
+        sampling_sigma_m: Floats | None = None,
     ) -> Forecast:
         """Forecast after a gait cycle: a new one if it is due, else the last.
 
@@ -110,24 +111,37 @@ class Forecaster:
             Of the mean clearances.
         is_valid : callable
             Whether the leg is in the range of the model.
+        sampling_sigma_m : (k,) array, optional
+            Standard deviation of the wear, because not all gait cycles were followed [m].
         """
         state = self.state
-        state.growth = tuple(
-            extended(window, float(growth), statistics.moving_s, self._settings.window_cycles)
-            for window, growth in zip(state.growth, statistics.growth_mean_m, strict=True)
-        )
-        rates = [growth_rate(window) for window in state.growth]
+        if statistics.is_followed:
+            state.growth = tuple(
+                extended(window, float(growth), statistics.moving_s, self._settings.window_cycles)
+                for window, growth in zip(state.growth, statistics.growth_mean_m, strict=True)
+            )
         is_recent = 0 <= statistics.stamp_ns - state.stamp_ns < RENEWED_NS
+        if state.last is not None and is_recent and not statistics.is_followed:
+            return state.last
+        rates = [growth_rate(window) for window in state.growth]
         if state.last is None or not is_recent or _known(rates) > state.known:
             state.stamp_ns = statistics.stamp_ns
-            return self.renewed(wear_m, limits_m, is_valid())
+            return self.renewed(wear_m, limits_m, is_valid(), sampling_sigma_m)
         return state.last
 
-    def renewed(self, wear_m: Floats, limits_m: Sequence[float], is_valid: bool) -> Forecast:
+    def renewed(
+        self,
+        wear_m: Floats,
+        limits_m: Sequence[float],
+        is_valid: bool,
+        sampling_sigma_m: Floats | None = None,
+    ) -> Forecast:
         """A new forecast from the present state; parameters as in `after`."""
         rates = [growth_rate(window) for window in self.state.growth]
         self.state.known = _known(rates)
-        self.state.last = self._forecast(rates, wear_m, limits_m, is_valid)
+        if sampling_sigma_m is None:
+            sampling_sigma_m = np.zeros(len(wear_m))
+        self.state.last = self._forecast(rates, wear_m, sampling_sigma_m, limits_m, is_valid)
         return self.state.last
 
     def expire(self) -> None:
@@ -222,7 +236,12 @@ class Forecaster:
         self.state.last = None
 
     def _forecast(
-        self, rates: Sequence[GrowthRate | None], wear_m: Floats, limits_m: Sequence[float], valid: bool
+        self,
+        rates: Sequence[GrowthRate | None],
+        wear_m: Floats,
+        sampling_sigma_m: Floats,
+        limits_m: Sequence[float],
+        valid: bool,
     ) -> Forecast:
         state = self.state
         now = [
@@ -230,6 +249,7 @@ class Forecaster:
                 joint=joint,
                 fresh_m=self._fresh_m[k],
                 wear_m=float(wear_m[k]),
+                wear_sigma_m=float(sampling_sigma_m[k]),
                 limit_m=limits_m[k],
                 growth_m=rate.per_cycle_m if rate else None,
                 growth_error_m=rate.sampling_m if rate else 0.0,

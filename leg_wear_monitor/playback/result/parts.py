@@ -96,10 +96,12 @@ class ReplayJoint:
     seen : SeenClearance or None
         Clearance that further encoders show; None without such encoders.
     impacts : int
-        Number of impacts.
+        Number of impacts, in the gait cycles that were followed.
     load : BushingLoad or None
         Pressure and sliding speed in the last gait cycle, and the limits of the joint's material; None in a
         file of an older version.
+    sampling_sigma_m : float
+        Standard deviation of the mean clearance, because sampled replays did not follow all gait cycles.
     """
 
     clearance_m: ClearanceChange
@@ -112,6 +114,7 @@ class ReplayJoint:
     seen: SeenClearance | None = None
     impacts: int
     load: BushingLoad | None = None
+    sampling_sigma_m: float = 0.0
 
 
 @attrs.frozen(kw_only=True)

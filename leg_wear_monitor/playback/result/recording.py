@@ -100,6 +100,28 @@ class ReplayMonitor:
 
 
 @attrs.frozen(kw_only=True)
+class ReplaySampling:
+    """How much of the gait was followed in a sampled replay.
+
+    Attributes
+    ----------
+    fraction : float
+        Fraction of the gait cycles that was asked for.
+    followed_cycles : int
+        Gait cycles that were followed and counted.
+    estimated_cycles : float
+        Gait cycles that were tracked only: their wear is estimated, their forces are not known.
+    blocks : int
+        Blocks of followed gait cycles with one cadence and load.
+    """
+
+    fraction: float
+    followed_cycles: int
+    estimated_cycles: float
+    blocks: int
+
+
+@attrs.frozen(kw_only=True)
 class ReplayGait:
     """Whether the motion was a gait of this leg.
 

@@ -15,7 +15,8 @@ if TYPE_CHECKING:
 class ReplayHistory:
     """Columns over n groups of gait cycles: last value of each; maximum of peaks, sum of impacts.
 
-    NaN where a value is not known. What a joint has is an array a joint, by its name.
+    NaN where a value is not known, such as forces and torques of gait cycles that were tracked only. What a
+    joint has is an array a joint, by its name.
 
     Attributes
     ----------

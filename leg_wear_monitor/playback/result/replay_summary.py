@@ -23,7 +23,12 @@ from leg_wear_monitor.playback.result.parts import (
     ReplayStatus,
     WornDepth,
 )
-from leg_wear_monitor.playback.result.recording import ReplayGait, ReplayMonitor, ReplayRecording
+from leg_wear_monitor.playback.result.recording import (
+    ReplayGait,
+    ReplayMonitor,
+    ReplayRecording,
+    ReplaySampling,
+)
 from leg_wear_monitor.playback.result.replay_history import ReplayHistory
 from leg_wear_monitor.playback.result.tables import joint_columns
 
@@ -73,6 +78,8 @@ class ReplaySummary(Drawable):
         Lines of /diagnostics at the end.
     lost : Lost
         Samples and time that were not used.
+    sampling : ReplaySampling or None
+        How much of the gait was followed; None if all of it was.
     history : ReplayHistory
         The gait cycles over time.
     wear_depth_m : dict of str to WornDepth
@@ -99,6 +106,7 @@ class ReplaySummary(Drawable):
     alarms: ReplayAlarms
     status: tuple[ReplayStatus, ...]
     lost: Lost
+    sampling: ReplaySampling | None = None
     history: ReplayHistory
     wear_depth_m: dict[str, WornDepth]
     advice: str

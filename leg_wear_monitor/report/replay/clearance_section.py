@@ -21,6 +21,7 @@ def clearance_section(summary: ReplaySummary) -> Section:
 
 def _table(summary: ReplaySummary) -> Table:
     has_growth = Figure.GROWTH not in summary.verdict.not_valid
+    is_sampled = any(joint.sampling_sigma_m for joint in summary.joints.values())
     rows = []
     for name, joint in summary.joints.items():
         clearance = joint.clearance_m
@@ -33,12 +34,17 @@ def _table(summary: ReplaySummary) -> Table:
                 summary.leg.joint_words(name),
                 counted_mm(summary, name),
                 value(1.0e9, clearance.last - clearance.first),
+                *((value(1.0e9, joint.sampling_sigma_m),) if is_sampled else ()),
                 *(growth if has_growth else (NOT_VALID, NOT_VALID)),
             )
         )
     return Table(
         caption="Clearances at the end",
-        head=("joint", "counted clearance [mm]", "opened [nm]", "growth [pm/cycle]", "± [pm/cycle]"),
+        head=(
+            *("joint", "counted clearance [mm]", "opened [nm]"),
+            *(("standard error of sampling [nm]",) if is_sampled else ()),
+            *("growth [pm/cycle]", "± [pm/cycle]"),
+        ),
         rows=rows,
         note="Counted: the clearance when new plus the wear counted by the model since, in its "
         "significant digits. ± is one standard deviation of the growth: gait cycles of a chaotic "

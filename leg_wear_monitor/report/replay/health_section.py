@@ -21,6 +21,12 @@ def health_section(summary: ReplaySummary) -> Section:
         if not isinstance(number, dict)
     ]
     parts: list[Part] = [health_chart(summary)] if summary.cycles else []
+    if summary.sampling:
+        sampled = [
+            (name.replace("_", " "), value(1.0, number))
+            for name, number in attrs.asdict(summary.sampling).items()
+        ]
+        parts.append(Table(caption="Sampled replay", head=("", "number"), rows=sampled))
     parts.append(Table(caption="Unused samples and lost time", head=("", "number"), rows=rows))
     status = [(each.name, each.level.name, each.message) for each in summary.status]
     parts.append(Table(caption="State at the end", head=("", "level", "message"), rows=status, is_text=True))

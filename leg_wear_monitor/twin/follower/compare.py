@@ -39,7 +39,7 @@ def compare(sensor, signature, leg, stepper, measured):
     if 0.0 < longest < duration:
         return
     torque.unfiltered = 0.0
-    _add_to_profile(leg.sums.profile, stepper.drive[ANGLE], measured, mean / duration, 0.5 * (before + lever))
+    add_to_profile(leg.sums.profile, stepper.drive[ANGLE], measured, mean / duration, 0.5 * (before + lever))
     direction = 1.0 if stepper.drive[SPEED] > 0.0 else -1.0
     if sensor.instants != 0:
         mean /= duration
@@ -62,7 +62,7 @@ def compare(sensor, signature, leg, stepper, measured):
 
 
 @kernel
-def _add_to_profile(profile, angle, measured, predicted, lever):
+def add_to_profile(profile, angle, measured, predicted, lever):
     """Add a measured and a predicted torque [N m] and the torque per load [N m/N] to the sums of a phase."""
     phase = phase_of(angle, profile.shape[1])
     profile[0, phase] += 1.0

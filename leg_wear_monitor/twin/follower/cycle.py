@@ -1,5 +1,6 @@
 """Statistics of a gait cycle from its sums."""
 
+import attrs
 import numpy as np
 
 from leg_wear_monitor.contact.arrays import ContactArrays
@@ -103,4 +104,35 @@ def cycle_statistics(
         depth_max_m=depth.max(axis=2),
         torque=torque,
         torque_profile=profile,
+    )
+
+
+def tracked_cycle(
+    leg: Record, stamp: int, contacts: ContactArrays, depth: Floats, moving_s: float
+) -> CycleStatistics:
+    """Statistics of a cycle that was tracked, but does not count by itself; depth (k, 2, N) is estimated."""
+    motion, now = leg.motion, clearances(contacts, depth)
+    unknown = np.full(len(contacts.joint), np.nan)
+    values = [field.name for field in attrs.fields(TorqueStatistics) if field.name != "samples"]
+    return CycleStatistics(
+        cycle=int(motion.cycles),
+        begin_ns=int(motion.cycle_begin_ns),
+        stamp_ns=stamp,
+        direction=1 if motion.cut_rises else -1,
+        moving_s=moving_s,
+        bridged_s=float(motion.cycle_bridged_ns) * 1.0e-9,
+        peak_force_n=unknown,
+        p99_force_n=unknown,
+        mean_force_n=unknown,
+        impacts=np.zeros(len(unknown), np.int64),
+        contact_fraction=unknown,
+        archard_j=unknown,
+        clearance_mean_m=now[0],
+        clearance_max_m=now[1],
+        growth_mean_m=unknown,
+        growth_max_m=unknown,
+        depth_max_m=depth.max(axis=2),
+        torque=TorqueStatistics(samples=0, **dict.fromkeys(values, np.nan)),
+        torque_profile=torque_profile(leg.sums, 0.0),
+        is_followed=False,
     )

@@ -29,8 +29,16 @@ from leg_wear_monitor.twin.follower.load import FootLoad, torque_size
 from leg_wear_monitor.twin.follower.repeating import RepeatingResidual
 from leg_wear_monitor.twin.follower.state import EVALUATED, TORQUE_SENSOR, LegState, leg_state
 from leg_wear_monitor.twin.follower.torque_estimate import CycleEstimate, LoadEstimate, find
+from leg_wear_monitor.twin.sampling.state import SampledState
 from leg_wear_monitor.twin.settings import INSTANT, STANCE, TwinSettings
-from leg_wear_monitor.twin.statistics import CycleStatistics, Event, SampleStatistics, TwinEventKind
+from leg_wear_monitor.twin.statistics import (
+    CycleStatistics,
+    Event,
+    SampleStatistics,
+    TorqueProfile,
+    TorqueStatistics,
+    TwinEventKind,
+)
 from leg_wear_monitor.twin.steps import MOVE, Steps
 
 _RUN_IN_S = 0.2
@@ -61,6 +69,7 @@ class FollowerSnapshot(NamedTuple):
     before: Floats
     estimate: Floats
     repeating: tuple[Floats, ...]
+    sampled: SampledState | None = None
 
 
 class LegFollower:
@@ -112,6 +121,11 @@ class LegFollower:
         return self._stepper.advance_address(self._leg.polynomial, self.statistics)
 
     @property
+    def peak_force_n(self) -> Floats:
+        """Largest contact force (k,) [N] since the begin of the gait cycle."""
+        return np.asarray(self.statistics.peak[self._setup.contacts.joint])
+
+    @property
     def clearances(self) -> Floats:
         """Mean and largest radial clearance (2, k) [m]."""
         return clearances(self._setup.contacts, self._setup.surfaces.depth)
@@ -152,6 +166,7 @@ class LegFollower:
                 if reason == LEFT:
                     self.state.motion.runs, self.state.motion.lost = 0, 0
                 events.append(Event(int(steps["begin_ns"][i]), _EVENT_KINDS[int(steps["detail"][i])]))
+                self._happened(events[-1].what)
                 i += 1
             elif reason != DONE:
                 joint = self._setup.clearance_joints[k] if k >= 0 else None
@@ -186,6 +201,9 @@ class LegFollower:
         self._leg.polynomial[:] = 0.0, angle, speed, 0.0, 0.0, 0.0, 0.0
         clear_run_statistics(self.statistics)
         return Event(stamp, TwinEventKind.ACQUIRED)
+
+    def _happened(self, what: TwinEventKind) -> None:
+        """Hook for an event of the tracker, in the order of stamps."""
 
     def _run_in(self, angle: float, speed: float) -> int:
         """Run the leg in up to a crank angle [rad] and speed [rad/s], without wear.
@@ -222,25 +240,35 @@ class LegFollower:
         motion, depth = self.state.motion, self._setup.surfaces.depth
         if motion.cycle_is_whole:
             motion.cycles += 1
-            # number of independent samples after two equal low-pass stages
-            independent = max(0.25 * self._cutoff * self.statistics.time[0], 1.0)
-            sums = self.state.sums
-            profile = torque_profile(sums, self.estimate.acting)
-            found = find(sums, sums.number / independent, self.estimate.room)
-            if found is not None:
-                self.estimate.take(found, self._acts)
-                self._load.set(self.estimate.acting)
-            torque = torque_statistics(sums, found, self.estimate, self._unexplained_nm(found))
+            torque, profile = self._end_torque()
             cycles.append(
                 cycle_statistics(
                     self.state, stamp, self._setup.contacts, depth, self._before, self.statistics, torque,
                     profile,
                 )
             )  # fmt: skip
+        self._begin_cycle(stamp)
+
+    def _begin_cycle(self, stamp: int) -> None:
+        """Begin a gait cycle at a stamp [ns]."""
+        motion = self.state.motion
         motion.cycle_begin_ns, motion.cycle_bridged_ns = stamp, 0
         self.records["sums"] = 0
         clear_run_statistics(self.statistics)
         self._before = self.clearances
+
+    def _end_torque(self) -> tuple[TorqueStatistics, TorqueProfile]:
+        """Torque of the gait cycle that ends; the load that it shows acts from now on."""
+        # number of independent samples after two equal low-pass stages
+        independent = max(0.25 * self._cutoff * self.statistics.time[0], 1.0)
+        sums = self.state.sums
+        profile = torque_profile(sums, self.estimate.acting)
+        found = find(sums, sums.number / independent, self.estimate.room)
+        if found is not None:
+            self.estimate.take(found, self._acts)
+            self._load.set(self.estimate.acting)
+        torque = torque_statistics(sums, found, self.estimate, self._unexplained_nm(found))
+        return torque, profile
 
     def _unexplained_nm(self, found: CycleEstimate | None) -> float:
         """RMS of the unexplained residual [N m], of this cycle or over cycles; NaN if unknown."""

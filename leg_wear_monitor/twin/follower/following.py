@@ -4,12 +4,13 @@ import math
 
 from leg_wear_monitor.dynamics.clearance.advance import ADVANCE
 from leg_wear_monitor.dynamics.clearance.contact import F_T
-from leg_wear_monitor.dynamics.clearance.model import ANGLE, move_time_origin
+from leg_wear_monitor.dynamics.clearance.model import ANGLE, blend, move_time_origin
 from leg_wear_monitor.dynamics.joint.contact_event import F_N
 from leg_wear_monitor.dynamics.run.protocol import DONE
 from leg_wear_monitor.dynamics.run.run_statistics import TORQUE, TORQUE_SQUARED
 from leg_wear_monitor.kernel import entry, kernel
-from leg_wear_monitor.twin.follower.compare import compare
+from leg_wear_monitor.twin.follower.compare import add_to_profile, compare
+from leg_wear_monitor.twin.follower.state import COUNTED, TRACKED
 from leg_wear_monitor.twin.steps import EVALUATE, LEAVE, MOVE, REPORT, START
 
 # reasons for which the kernel returns before the last step: a cycle has ended; the caller must start the leg,
@@ -79,14 +80,39 @@ def _load_piece(model, stepper, leg, polynomial, step):
 def _evaluate(sensor, signature, leg, polynomial, stepper, step, out):
     """Evaluate the running leg at a sample, into the record ``out`` of `EVALUATED`."""
     motion, torque = leg.motion, leg.torque
+    if motion.counts == TRACKED:
+        out.angle = _add_measured(signature, leg, polynomial, step)
+        return
     if torque.time > 0.0:
         torque.mean_before = torque.impulse / torque.time
         torque.impulse, torque.time = 0.0, 0.0
     at = min(max(step.end_ns, motion.piece_begin_ns), motion.piece_end_ns)
     angle = _angle_at(polynomial, 1.0e-9 * (at - motion.piece_begin_ns))
-    out.angle, out.torque = angle - _TURN * math.floor(angle / _TURN), torque.mean_before
+    out.angle = angle - _TURN * math.floor(angle / _TURN)
+    if motion.counts == COUNTED:
+        out.torque = torque.mean_before
     if motion.piece_begin_ns <= step.end_ns <= motion.piece_end_ns and math.isfinite(step.torque):
         compare(sensor, signature, leg, stepper, step.torque)
+
+
+@kernel
+def _add_measured(signature, leg, polynomial, step):
+    """Add a sample's torque, if it has one, to the profile of a gait cycle that is only tracked.
+
+    Returns
+    -------
+    float
+        The crank angle at the sample [rad].
+    """
+    motion = leg.motion
+    at = min(max(step.end_ns, motion.piece_begin_ns), motion.piece_end_ns)
+    angle = _angle_at(polynomial, 1.0e-9 * (at - motion.piece_begin_ns))
+    if motion.piece_begin_ns <= step.end_ns <= motion.piece_end_ns and math.isfinite(step.torque):
+        i, w = blend(signature.shape[0] - 1, angle)
+        lever = signature[i] + w * (signature[i + 1] - signature[i])
+        before, leg.torque.last_lever = leg.torque.last_lever, lever  # the torque is a mean since then
+        add_to_profile(leg.sums.profile, angle, step.torque, math.nan, 0.5 * (before + lever))
+    return angle - _TURN * math.floor(angle / _TURN)
 
 
 @kernel
@@ -120,7 +146,7 @@ def follow(
     """Follow steps from index ``first`` to n; ``stepper`` is the ClearanceState, ``state`` the LegState.
 
     ``sensors`` (1,) contains the torque sensor. Values at samples are written to ``evaluated`` (n,) from
-    index m on, contact forces [N] to ``forces`` (n, k), NaN while the leg does not run.
+    index m on, contact forces [N] to ``forces`` (n, k), NaN while the leg does not run or does not count.
 
     Returns
     -------
@@ -140,9 +166,11 @@ def follow(
             impulse, squares = statistics.drive_integral[TORQUE], statistics.drive_integral[TORQUE_SQUARED]
             time, before = statistics.time[0], stepper.intervals[0]
             t_end = 1.0e-9 * (until - motion.base_ns)
-            status, k = _advance(
-                advance_address, (model, feeds_back, stepper, polynomial, t_end, statistics, work)
-            )
+            status, k = DONE, -1
+            if motion.counts != TRACKED:
+                status, k = _advance(
+                    advance_address, (model, feeds_back, stepper, polynomial, t_end, statistics, work)
+                )
             if stepper.intervals[0] > before:
                 impulse = statistics.drive_integral[TORQUE] - impulse
                 squares = statistics.drive_integral[TORQUE_SQUARED] - squares
@@ -171,7 +199,7 @@ def follow(
             if motion.runs != 0:
                 _evaluate(sensor, signature, leg, polynomial, stepper, step, out)
             for j in range(force.shape[0]):
-                forces[m, j] = force[j] if motion.runs != 0 else math.nan
+                forces[m, j] = force[j] if motion.runs != 0 and motion.counts == COUNTED else math.nan
             m += 1
         elif code == START:
             return NEEDS_START, i, -1, m

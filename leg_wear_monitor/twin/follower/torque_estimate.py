@@ -130,6 +130,10 @@ class LoadEstimate:
         """Least and largest possible load minus the acting one [N]."""
         return self._least - self.acting, self._limit - self.acting
 
+    def wait(self, cycles: int) -> None:
+        """Let so many cycles pass without an estimate."""
+        self.state[3:6] += cycles * _DRIFT**2
+
     def take(self, found: CycleEstimate, acts: bool) -> None:
         """Update by a cycle's estimate; ``acts``: whether a significant load acts on the leg."""
         values, variance = self.state[:3], self.state[3:6]

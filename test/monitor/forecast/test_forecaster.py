@@ -19,9 +19,8 @@ def cycle(second, growth=2e-11):
     """A gait cycle's figures that end at a second, as far as the forecast looks at them."""
     zeros = {field.name: 0 for field in attrs.fields(CycleStatistics)}
     wobble = growth * (1.0 + 0.1 * np.sin(1.7 * second + np.arange(5.0)))
-    return CycleStatistics(
-        **(zeros | {"stamp_ns": second * SECOND, "moving_s": 1.0, "growth_mean_m": wobble})
-    )
+    own = {"stamp_ns": second * SECOND, "moving_s": 1.0, "growth_mean_m": wobble, "is_followed": True}
+    return CycleStatistics(**(zeros | own))
 
 
 def walked(forecaster, seconds, worn=0.0, valid=True):

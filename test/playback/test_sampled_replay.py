@@ -1,0 +1,123 @@
+"""A sampled replay: its wear is that of a whole one within its error, and it says that it is sampled."""
+
+import json
+from pathlib import Path
+
+import numpy as np
+import pytest
+from click.testing import CliRunner
+
+import leg_wear_monitor as lw
+from leg_wear_monitor.cli.main import cli
+from leg_wear_monitor.errors import LegWearError
+from leg_wear_monitor.monitor.config.parameters import config_from
+from leg_wear_monitor.monitor.ledger.ledger import open_ledger
+from leg_wear_monitor.playback.replay import ReplayResult
+from leg_wear_monitor.playback.result.replay_summary import summary_of
+from leg_wear_monitor.report.page import page_html
+from leg_wear_monitor.report.replay.page import replay_page
+
+CYCLES, SAMPLE = 75, 0.4
+
+Table = dict[str, np.ndarray]
+
+
+@pytest.fixture(scope="module")
+def walk() -> Table:
+    """A steady gait with its torque, as a table."""
+    ideal = lw.simulate("bionic_leg", clearances=[], cycles=1, trace=200).trace
+    return {
+        "time": 1.0 + 0.005 * np.arange(200 * CYCLES),
+        "crank_angle": np.tile(ideal.crank_angle_rad, CYCLES),
+        "drive_torque": np.tile(ideal.drive_torque_nm, CYCLES),
+    }
+
+
+@pytest.fixture(scope="module")
+def config() -> lw.MonitorConfig:
+    return config_from({"diagnosis.enabled": False})
+
+
+@pytest.fixture(scope="module")
+def ledger(tmp_path_factory: pytest.TempPathFactory) -> Path:
+    return tmp_path_factory.mktemp("sampled") / "wear.ledger"
+
+
+@pytest.fixture(scope="module")
+def sampled(walk: Table, config: lw.MonitorConfig, ledger: Path) -> ReplayResult:
+    return lw.replay(walk, config, sample=SAMPLE, ledger=ledger)
+
+
+def clearances(result: ReplayResult) -> np.ndarray:
+    return np.array([joint.clearance_m.last for joint in result.summary().joints.values()])
+
+
+def test_the_wear_is_that_of_a_whole_replay_within_its_error(sampled, walk, config):
+    whole = lw.replay(walk, config)
+    assert len(sampled.history) == len(whole.history)
+    np.testing.assert_array_equal(sampled.history.stamp_ns, whole.history.stamp_ns)
+    sigma = np.array([joint.sampling_sigma_m for joint in sampled.summary().joints.values()])
+    assert (sigma > 0.0).all()
+    assert (np.abs(clearances(sampled) - clearances(whole)) < 4.0 * sigma).all()
+    assert whole.monitor.sampling is None
+    assert whole.summary().sampling is None
+
+
+def test_the_summary_says_what_was_followed(sampled):
+    summary = sampled.summary()
+    told = summary.sampling
+    assert told.fraction == SAMPLE
+    assert told.followed_cycles + told.estimated_cycles == pytest.approx(summary.cycles, abs=1.0)
+    assert 0.2 < told.followed_cycles / summary.cycles < 0.7
+    assert "gait cycles were followed" in summary.verdict.why
+    evidence = {each.name: each.value for each in summary.verdict.evidence}
+    assert evidence["sampled fraction"] == SAMPLE
+    assert evidence["standard error A"] == summary.joints["A"].sampling_sigma_m
+    status = next(each for each in summary.status if each.name == "sampling")
+    assert status.values["A_sigma_m"] == summary.joints["A"].sampling_sigma_m
+    known = np.isfinite(summary.history.peak_force_n["A"])
+    assert known.sum() == told.followed_cycles
+    assert summary.joints["A"].peak_force_n == summary.history.peak_force_n["A"][known].max()
+
+
+def test_the_summary_comes_back_from_its_file_and_makes_a_page(sampled):
+    text = sampled.summary().to_json()
+    again = summary_of(json.loads(text), "summary.json")
+    assert again.to_json() == text
+    page = page_html(replay_page(again))
+    assert "Sampled replay" in page
+    assert "gait cycles were followed" in page
+
+
+def test_the_ledger_keeps_the_variance(sampled, walk, config, ledger, leg):
+    """A second recording, replayed whole, adds none; a third, sampled, does."""
+    first = np.array([joint.sampling_sigma_m for joint in sampled.summary().joints.values()])
+    later = walk | {"time": walk["time"] + 1000.0}
+    short = {name: column[:2000] for name, column in later.items()}
+    whole = lw.replay(short, config, ledger=ledger).summary()
+    np.testing.assert_allclose([joint.sampling_sigma_m for joint in whole.joints.values()], first)
+    third = lw.replay(walk | {"time": walk["time"] + 2000.0}, config, ledger=ledger, sample=SAMPLE).summary()
+    assert all(joint.sampling_sigma_m > one for joint, one in zip(third.joints.values(), first, strict=True))
+    kept = open_ledger(leg, config_from({"diagnosis.enabled": False, "ledger.path": str(ledger)}))
+    assert kept.entry.totals["estimated_cycles"] > sampled.monitor.sampling.estimated_cycles
+    variance = kept.entry.totals["sampling_variance_G_m2"]
+    assert variance == pytest.approx(third.joints["G"].sampling_sigma_m ** 2)
+    kept.close()
+
+
+def test_all_of_it_is_a_whole_replay(walk, config):
+    short = {name: column[:2400] for name, column in walk.items()}
+    whole, all_, cut = (lw.replay(short, config, sample=sample) for sample in (None, 1.0, 0.1))
+    np.testing.assert_array_equal(clearances(whole), clearances(all_))
+    assert all_.monitor.sampling is None
+    # shorter than the first block
+    np.testing.assert_array_equal(clearances(whole), clearances(cut))
+    assert cut.monitor.sampling.estimated_cycles == 0.0
+
+
+def test_what_is_no_fraction_is_refused(walk):
+    with pytest.raises(LegWearError, match="sample: 2 is not a fraction above 0, up to 1"):
+        lw.replay(walk, sample=2)
+    said = CliRunner().invoke(cli, ["replay", "bags/knocking.mcap", "--sample", "0"])
+    assert said.exit_code == 2
+    assert "0.0 is not in the range 0.0<x<=1.0" in said.output

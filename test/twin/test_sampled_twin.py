@@ -1,0 +1,132 @@
+"""A twin that follows blocks of gait cycles only: what it says of the others, and that it repeats itself."""
+
+import attrs
+import numpy as np
+import pytest
+
+from leg_wear_monitor.mechanism.ideal import TURN
+from leg_wear_monitor.twin.digital_twin import DigitalTwin, TwinSnapshot
+from leg_wear_monitor.twin.sampling.settings import SamplingSettings
+from leg_wear_monitor.twin.statistics import CycleStatistics, TwinUpdate
+
+SETTINGS = SamplingSettings(fraction=0.3, block_cycles=8, settle_cycles=1)
+SECONDS = 70.0
+
+
+def angle(t: np.ndarray) -> np.ndarray:
+    """A cadence that changes by a tenth every twenty seconds."""
+    speed = TURN * (1.0 + 0.1 * (t // 20.0 % 2.0))
+    return np.cumsum(speed) * (t[1] - t[0])
+
+
+@pytest.fixture(scope="module")
+def _sampled(leg) -> tuple[DigitalTwin, TwinSnapshot]:
+    twin = DigitalTwin(leg, sampling=SETTINGS)
+    return twin, twin.snapshot()
+
+
+@pytest.fixture
+def sampled(_sampled) -> DigitalTwin:
+    twin, new = _sampled
+    twin.restore(new)
+    return twin
+
+
+@pytest.fixture(scope="module")
+def walk(gait):
+    return gait(SECONDS, angle=angle)
+
+
+def updated(twin: DigitalTwin, samples: np.ndarray, size: int) -> list[TwinUpdate]:
+    return [twin.update(samples[i : i + size]) for i in range(0, len(samples), size)]
+
+
+def cycles_of(updates: list[TwinUpdate]) -> list[CycleStatistics]:
+    return [cycle for update in updates for cycle in update.cycles]
+
+
+def worn(twin: DigitalTwin) -> np.ndarray:
+    return twin.depth.sum(axis=1).mean(axis=1)
+
+
+def test_the_wear_is_that_of_a_whole_replay_within_its_error(sampled, twin, walk):
+    whole = cycles_of(updated(twin, walk, 1000))
+    found = cycles_of(updated(sampled, walk, 1000))
+    assert [(each.begin_ns, each.stamp_ns) for each in found] == [(e.begin_ns, e.stamp_ns) for e in whole]
+    np.testing.assert_allclose([e.moving_s for e in found], [e.moving_s for e in whole], rtol=1e-3)
+    sampled.end_recording()
+    followed = [each.is_followed for each in found]
+    assert 0.2 < np.mean(followed) < 0.6
+    assert sampled.sampling.followed_cycles == sum(followed)
+    assert 0.0 <= sampled.sampling.estimated_cycles - (len(found) - sum(followed)) < 1.1  # the last is a part
+    off, sigma = worn(sampled) - worn(twin), np.sqrt(sampled.sampling.variance_m2)
+    assert (np.abs(off) < 4.0 * sigma).all()
+    assert (sigma < 0.5 * worn(twin)).all()
+    # until the first jump it is the whole replay, bit for bit
+    first = followed.index(False)
+    for one, same in zip(found[:first], whole[:first], strict=True):
+        np.testing.assert_array_equal(one.clearance_mean_m[:], same.clearance_mean_m)
+        np.testing.assert_array_equal(one.peak_force_n, same.peak_force_n)
+
+
+def test_cycles_that_are_not_followed_have_no_forces(sampled, walk):
+    updates = updated(sampled, walk, 1000)
+    tracked = [each for each in cycles_of(updates) if not each.is_followed]
+    for name in ("peak_force_n", "p99_force_n", "mean_force_n", "growth_mean_m", "archard_j"):
+        assert np.isnan([getattr(each, name) for each in tracked]).all()
+    assert {each.torque.samples for each in tracked} == {0}
+    assert (np.diff([each.clearance_mean_m for each in tracked], axis=0) > -1e-10).all()
+    stamps, force, torque, turned = (
+        np.concatenate([getattr(update.samples, name) for update in updates])
+        for name in ("stamp_ns", "contact_force_n", "predicted_torque_nm", "crank_angle_rad")
+    )
+    for each in tracked:
+        inside = (stamps > each.begin_ns) & (stamps < each.stamp_ns)
+        assert np.isnan(force[inside]).all() and np.isnan(torque[inside]).all()
+        assert np.isfinite(turned[inside]).all()
+
+
+def test_forces_after_a_jump_are_those_of_the_gait(sampled, walk):
+    """The journals go on where they were left: nothing knocks."""
+    found = cycles_of(updated(sampled, walk, 1000))
+    followed = np.array([each.is_followed for each in found])
+    peak = np.array([each.peak_force_n for each in found])
+    again = np.flatnonzero(~followed[:-1] & followed[1:]) + 1
+    assert len(again) >= 1
+    assert (peak[again] < 3.0 * np.nanmax(peak[: followed.argmin()], axis=0)).all()
+
+
+def test_blocks_of_samples_do_not_matter(sampled, _sampled, walk):
+    one = cycles_of(updated(sampled, walk, 1000))
+    depth = sampled.depth
+    sampled.restore(_sampled[1])
+    other = cycles_of(updated(sampled, walk, 137))
+    assert len(one) == len(other)
+    np.testing.assert_array_equal(depth, sampled.depth)
+    assert [each.is_followed for each in one] == [each.is_followed for each in other]
+
+
+def test_a_restored_twin_goes_on_bit_for_bit(sampled, walk):
+    half = len(walk) // 2
+    updated(sampled, walk[:half], 1000)
+    kept = sampled.snapshot()
+    updated(sampled, walk[half:], 1000)
+    depth, sampling = sampled.depth, sampled.sampling
+    sampled.restore(kept)
+    updated(sampled, walk[half:], 1000)
+    np.testing.assert_array_equal(sampled.depth, depth)
+    for one, same in zip(attrs.astuple(sampled.sampling), attrs.astuple(sampling), strict=True):
+        np.testing.assert_array_equal(one, same)
+
+
+def test_a_lost_crank_is_left_out_and_a_stop_pulls_a_block(sampled, gait):
+    """After a gap of two seconds the leg is set in motion again, and followed."""
+    samples = gait(40.0)
+    kept = np.concatenate([samples[: 200 * 20], samples[200 * 22 :]])
+    found = cycles_of(updated(sampled, kept, 1000))
+    assert sampled.intake.unmonitored_s == pytest.approx(2.0, abs=0.5)
+    after = next(k for k, each in enumerate(found) if each.begin_ns > samples["stamp_ns"][200 * 22])
+    assert all(each.is_followed for each in found[after : after + SETTINGS.block_cycles])
+    whole = sum(1 for each in found if each.is_followed)
+    parts = sampled.sampling.estimated_cycles % 1.0
+    assert whole + sampled.sampling.estimated_cycles - parts == len(found)

@@ -27,10 +27,14 @@ def leg_of(config: Path | None, ledger: Path | None) -> tuple["MonitorConfig", "
     from leg_wear_monitor.mechanism.loader import load_mechanism
     from leg_wear_monitor.monitor.config.fitting import fitted
     from leg_wear_monitor.monitor.config.parameter_file import load_config
+    from leg_wear_monitor.monitor.ledger.file import hardware_id_of
 
     settings = load_config(config)
     if ledger is not None:
-        settings = attrs.evolve(settings, ledger=attrs.evolve(settings.ledger, path=str(ledger)))
+        # who names a ledger means its leg, unless the parameters name one
+        hardware = settings.hardware_id or hardware_id_of(ledger)
+        kept = attrs.evolve(settings.ledger, path=str(ledger))
+        settings = attrs.evolve(settings, ledger=kept, hardware_id=hardware)
     if not settings.ledger.path:
         raise ConfigError("--ledger", "", "no ledger given, neither by --ledger nor by ledger.path")
     return settings, fitted(load_mechanism(settings.mechanism), settings)

@@ -10,6 +10,7 @@ from leg_wear_monitor.fleet.chain.queue import Chain
 from leg_wear_monitor.fleet.chain.words import words_of
 from leg_wear_monitor.fleet.description.fleet_description import FleetDescription
 from leg_wear_monitor.fleet.directory.lock import locked
+from leg_wear_monitor.fleet.learning.of_fleet import learn_fleet
 from leg_wear_monitor.fleet.overview.make import write_overview
 from leg_wear_monitor.fleet.tables.parquet import arrow
 from leg_wear_monitor.workers.cluster import run_on_cluster
@@ -28,9 +29,12 @@ class FleetUpdate:
     ----------
     chains : tuple of Chain
         The legs, in the order of the description.
+    learned : tuple of (str, str)
+        The leg, and a line about what is not learned from its measured clearances.
     """
 
     chains: tuple[Chain, ...]
+    learned: tuple[tuple[str, str], ...] = ()
 
     @property
     def counted(self) -> int:
@@ -45,7 +49,7 @@ class FleetUpdate:
     @property
     def findings(self) -> list[tuple[str, str]]:
         """What a person must see: the leg, and a line about what is lost or was not done."""
-        found = []
+        found = list(self.learned)
         for chain in self.chains:
             bad = [line for line in chain.new if line["is_partial"] or line["outcome"] == "no_gait"]
             found += [(chain.leg.id, words_of(line)) for line in bad]
@@ -100,7 +104,7 @@ def update_fleet(
                 begin(work.chains)
             _run(scans or work.first_counts(), work.done, workers, scheduler)
         write_overview(fleet, out, {chain.leg.id: _first_fault(chain) for chain in work.chains})
-    return FleetUpdate(tuple(work.chains))
+    return FleetUpdate(tuple(work.chains), work.learned)
 
 
 def _first_fault(chain: Chain) -> str:
@@ -127,6 +131,7 @@ class _Work:
         self._progress, self._tell = progress or (lambda _fraction: None), tell or (lambda *_: None)
         self._scans = 0
         self._total = 1
+        self.learned: tuple[tuple[str, str], ...] = ()
 
     @property
     def is_due(self) -> bool:
@@ -171,6 +176,16 @@ class _Work:
             for copy, original in chain.copies:
                 self._tell(chain.leg.id, f"{copy}: is a copy of {original}, counted once")
         self._total = max(1, sum(chain.waiting_bytes for chain in self.chains))
+        if self.is_due:
+            self._learn()
+
+    def _learn(self) -> None:
+        """Let the forecasts of all legs use what the measured clearances of the fleet tell."""
+        learning = learn_fleet([chain.leg for chain in self.chains], self.chains[0].out)
+        self.learned = learning.findings
+        for chain in self.chains if learning.pairs else ():
+            if chain.leg.id in learning.priors:
+                chain.leg = chain.leg.with_priors(learning.priors[chain.leg.id])
 
 
 def _refuse_shared(chains: Sequence[Chain]) -> None:

@@ -128,7 +128,8 @@ def test_check_doubts_another_unit_and_says_what_it_understood(run, complaints, 
     ):
         assert part in good.stdout
     assert soft.exit_code == 1
-    (line,) = complaints(soft)
+    line, *consequences = complaints(soft)
     assert line.startswith("warning: soft.yaml: clearances (")
     assert "youngs_modulus: 207 Pa" in line
     assert line.endswith("GPa for Pa?")
+    assert consequences and all("contact half angle" in each for each in consequences)

@@ -1,12 +1,15 @@
 """A fleet's tables are the same however it was updated, and each recording counts once."""
 
+import json
 import os
 import shutil
 import signal
 
 import pytest
+from click.testing import CliRunner
 
 import leg_wear_monitor as lw
+from leg_wear_monitor.cli.main import cli
 from leg_wear_monitor.errors import ConfigError, LegWearError
 from leg_wear_monitor.fleet.chain.count import count_or_fault
 from leg_wear_monitor.fleet.chain.scan import Found
@@ -218,3 +221,31 @@ def test_without_pyarrow_one_line_says_what_to_install(home, update, tmp_path, m
     monkeypatch.setitem(__import__("sys").modules, "pyarrow", None)
     with pytest.raises(LegWearError, match=r"need pyarrow.*pip install 'leg_wear_monitor\[fleet\]'"):
         update(home / "fleet.yaml", tmp_path)
+
+
+def test_a_leg_is_forecast_with_what_others_measured(walk, update, tmp_path):
+    """Its forecast names the parts that it learned from; nothing that is counted changes by it."""
+    walk(tmp_path / "old/1.mcap", seed=1)
+    path = tmp_path / "fleet.yaml"
+    path.write_text('legs:\n  - {id: old, recordings: "old/*", lot: "2026-03"}\n')
+    out = tmp_path / "out"
+    update(path, out)
+    assert (
+        not (out / "learning.json").exists() or not json.loads((out / "learning.json").read_text())["pairs"]
+    )
+    alone = json.loads((out / "legs/old/summary.json").read_text())["joints"]["A"]["forecast"]["prior"]
+    assert "lot" not in alone["basis"]
+
+    ledger = LegDirectory(out, "old").ledger
+    counted = lines(out, "old")["old/1.mcap"]["clearances"]["A"]["counted_m"]
+    line = ["measure", "A", f"{1e3 * counted + 0.01:.4f}", "--sigma", "0.001", "--ledger", str(ledger)]
+    told = CliRunner().invoke(cli, line)
+    assert told.exit_code in (0, 1), told.output
+    walk(tmp_path / "new/1.mcap", seed=2)
+    with path.open("a") as file:
+        file.write('  - {id: new, recordings: "new/*", lot: "2026-03"}\n')
+    done = update(path, out)
+    assert [chain.leg.id for chain in done.chains if chain.new] == ["new"]
+    prior = json.loads((out / "legs/new/summary.json").read_text())["joints"]["A"]["forecast"]["prior"]
+    assert prior["basis"] == "1 part of lot 2026-03"
+    assert update(path, out).is_up_to_date

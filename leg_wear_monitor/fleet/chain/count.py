@@ -82,7 +82,7 @@ def _replayed(leg: FleetLeg, directory: LegDirectory, found: Found, last_ns: int
 
     replay(
         found.path,
-        leg.config,
+        leg.used_config,
         ledger=directory.ledger,
         node=leg.node,
         joint_states=leg.joint_states,

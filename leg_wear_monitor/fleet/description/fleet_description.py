@@ -28,6 +28,8 @@ class FleetLeg:
         Row of the table of cycles, ``minute`` or ``cycle``.
     node, joint_states, drive_torque : str or None
         As in `leg_wear_monitor.replay`.
+    learned_priors : str
+        File with the priors of its wear coefficients that the fleet has learned; empty without.
     """
 
     id: str
@@ -39,10 +41,25 @@ class FleetLeg:
     node: str | None
     joint_states: str | None
     drive_torque: str | None
+    learned_priors: str = ""
 
     def shown(self, recording: Path) -> str:
         """Name of a recording in tables: relative to the description where it is below it."""
         return str(recording.relative_to(self.home) if recording.is_relative_to(self.home) else recording)
+
+    def with_priors(self, file: Path) -> "FleetLeg":
+        """The leg with what its fleet has learned for its forecasts, unless its parameters name a file."""
+        if self.config.forecast.priors or self.learned_priors:
+            return self
+        return attrs.evolve(self, learned_priors=str(file))
+
+    @property
+    def used_config(self) -> MonitorConfig:
+        """Parameters of its monitor, with what its fleet has learned."""
+        if not self.learned_priors:
+            return self.config
+        forecast = attrs.evolve(self.config.forecast, priors=self.learned_priors)
+        return attrs.evolve(self.config, forecast=forecast)
 
     @property
     def settings(self) -> str:

@@ -116,6 +116,18 @@ def transaction(db: sqlite3.Connection) -> Iterator[None]:
         raise
 
 
+def hardware_id_of(path: Path) -> str:
+    """Hardware id that a ledger belongs to; empty if it cannot be read, which opening it reports."""
+    if not path.is_file():
+        return ""
+    try:
+        with closing(_connect(path, "ro")) as db:
+            row = db.execute("SELECT value FROM binding WHERE key = 'hardware_id'").fetchone()
+    except sqlite3.Error:
+        return ""
+    return str(row[0]) if row else ""
+
+
 def sync_directory(path: Path) -> None:
     """Write the creation or removal of a file's name to the disk."""
     handle = os.open(path.parent, os.O_RDONLY)

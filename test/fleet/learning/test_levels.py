@@ -85,13 +85,14 @@ def test_without_evidence_the_prediction_is_the_configured_spread(sigma):
 
 
 @given(PARTS)
-def test_a_part_without_evidence_changes_nothing_to_the_bit(parts):
+def test_a_part_without_evidence_changes_nothing_but_rounding(parts):
     evidence, *_ = evidence_of(parts)
     more = Evidence(*(np.append(each, 0.0) for each in (evidence.precision, evidence.pull)),
                     np.append(evidence.lot, evidence.lot[-1]))  # fmt: skip
     one, other = predict(evidence, variances(0.7)), predict(more, variances(0.7))
-    assert one.mean.tobytes() == other.mean[:-1].tobytes()
-    assert one.sigma.tobytes() == other.sigma[:-1].tobytes()
+    # one more term changes how numpy groups its sums, and so the last bits
+    np.testing.assert_allclose(other.mean[:-1], one.mean, rtol=1e-10, atol=1e-12)
+    np.testing.assert_allclose(other.sigma[:-1], one.sigma, rtol=1e-10)
 
 
 def test_standard_deviations_of_lots_and_parts_are_found_in_many():

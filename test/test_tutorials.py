@@ -21,6 +21,7 @@ SHORTER = {
     "2_your_linkage": ("cycles=5, trace=720", "cycles=1, trace=90"),
     "3_what_clearance_does": ("cycles = 10 ", "cycles = 5 "),
     "4_a_life": ('("bionic_leg"), settings', '("bionic_leg"), settings, clearances=["A", "B"]'),
+    "5_a_fleet": ("fleet update fleet.yaml", "fleet update fleet.yaml --workers 1"),
 }
 
 Learnt = Callable[[str], SimpleNamespace]
@@ -38,7 +39,7 @@ def learnt(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Learnt:
     def run(name: str) -> SimpleNamespace:
         long, short = SHORTER[name]
         source = (DOCS / "tutorials" / f"{name}.py").read_text()
-        assert source.count(long) == 1
+        assert long in source
         shorter = tmp_path / f"{name}.py"
         shorter.write_text(source.replace(long, short))
         return SimpleNamespace(**runpy.run_path(str(shorter)))
@@ -110,6 +111,19 @@ def test_a_life_and_its_forecast(learnt: Learnt) -> None:
     assert p50 == pytest.approx((ends[0] - lesson.walked) / 3600, rel=0.15)
     assert not lesson.found.contradicts and lesson.counted_m < 0.000325
     assert p50_after < p50 and p90_after - p10_after < (p90 - p10) / 3
+
+
+@pytest.mark.no_cover
+def test_a_fleet(learnt: Learnt, capsys: pytest.CaptureFixture[str]) -> None:
+    pytest.importorskip("mcap")
+    pytest.importorskip("pandas")
+    pytest.importorskip("pyarrow")
+    lesson, said = learnt("5_a_fleet"), capsys.readouterr().out
+    assert "recordings: 2 counted now" in said and "everything is in the ledger already" in said
+    assert "right-07: stop joint G" in said and "A: 0.31 mm ± 0.01 mm" in said
+    assert lesson.verdicts.state.tolist() == ["healthy", "stop"]
+    above = lesson.joints > 1e-3 * lesson.limit_mm
+    assert above.stack()[lambda worn: worn].index.tolist() == [("right-07", "G")]
 
 
 @pytest.mark.plain

@@ -178,7 +178,7 @@ def _joint(
         "peak_force_n": report.peak_force_n,
         "p99_force_n": report.p99_force_n,
         "mean_force_n": report.mean_force_n,
-        "impacts": _or_nan(report.impacts),
+        "impacts": float(_or_nan(report.impacts)),
         **(_load_values(report.load) if report.load else {}),
     }
     if report.forecast is None:

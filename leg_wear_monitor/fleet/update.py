@@ -63,6 +63,7 @@ def update_fleet(
     *,
     workers: int = 1,
     scheduler: str | None = None,
+    sample: float | None = None,
     begin: Callable[[Sequence[Chain]], None] | None = None,
     progress: Callable[[float], None] | None = None,
     tell: Tell | None = None,
@@ -80,6 +81,8 @@ def update_fleet(
         Number of local processes; 1 uses this process only. Results do not depend on it.
     scheduler : str, optional
         Address of a Dask scheduler whose workers count instead; they need the same files at the same paths.
+    sample : float, optional
+        Fraction of the gait cycles that are followed, as in `leg_wear_monitor.replay`; without it, all.
     begin : callable, optional
         Called with the legs that have work, before it begins, such as to compile.
     progress : callable, optional
@@ -97,7 +100,7 @@ def update_fleet(
     arrow()
     out = out.absolute()
     with locked(out):
-        work = _Work([Chain(leg, out) for leg in fleet.legs], progress, tell)
+        work = _Work([Chain(attrs.evolve(leg, sample=sample), out) for leg in fleet.legs], progress, tell)
         scans = work.scans()
         if scans or work.is_due:
             if begin:

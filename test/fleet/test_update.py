@@ -249,3 +249,13 @@ def test_a_leg_is_forecast_with_what_others_measured(walk, update, tmp_path):
     prior = json.loads((out / "legs/new/summary.json").read_text())["joints"]["A"]["forecast"]["prior"]
     assert prior["basis"] == "1 part of lot 2026-03"
     assert update(path, out).is_up_to_date
+
+
+def test_a_fleet_follows_a_sample_of_the_gait_cycles(walk, describe, update, tmp_path):
+    walk(tmp_path / "a/1.mcap", seconds=90.0)
+    path = describe(tmp_path, "a")
+    done = update(path, tmp_path / "out", sample=0.25)
+    (line,) = done.chains[0].new
+    sampling = json.loads((tmp_path / "out/legs/a/summary.json").read_text())["sampling"]
+    assert line["outcome"] == "counted" and line["cycles"] >= 85
+    assert 0.0 < sampling["estimated_cycles"] < line["cycles"]

@@ -33,6 +33,13 @@ def fleet() -> None:
 @click.option(
     "--scheduler", metavar="ADDRESS", help="Dask scheduler whose workers count instead, tcp://HOST:PORT."
 )
+@click.option(
+    "--sample",
+    type=click.FloatRange(0.0, 1.0, min_open=True),
+    metavar="FRACTION",
+    help="Follow this fraction of the gait cycles and estimate the wear of the others, as in replay.  "
+    "[default: all]",
+)
 @click.option("--follow", is_flag=True, help="Go on with new recordings as they are completed, until ^C.")
 @click.option(
     "--every-s",
@@ -47,6 +54,7 @@ def update(
     out: Path | None,
     workers: int | None,
     scheduler: str | None,
+    sample: float | None,
     follow: bool,
     every_s: float,
 ) -> int:
@@ -63,7 +71,7 @@ def update(
     check_directory("--out", out)
 
     def count(now: "FleetDescription") -> "FleetUpdate":
-        return _update(now, out, workers, scheduler)
+        return _update(now, out, workers, scheduler, sample)
 
     if follow:
         return _follow(description, count, every_s)
@@ -87,7 +95,9 @@ def export(path: Path, out: Path | None) -> None:
         click.echo(f"written: {file}")
 
 
-def _update(legs: "FleetDescription", out: Path, workers: int | None, scheduler: str | None) -> "FleetUpdate":
+def _update(
+    legs: "FleetDescription", out: Path, workers: int | None, scheduler: str | None, sample: float | None
+) -> "FleetUpdate":
     import os
 
     from leg_wear_monitor.fleet.update import update_fleet
@@ -98,6 +108,7 @@ def _update(legs: "FleetDescription", out: Path, workers: int | None, scheduler:
             out,
             workers=workers or os.cpu_count() or 1,
             scheduler=scheduler,
+            sample=sample,
             begin=None if scheduler else _compile,
             progress=progress,
         )

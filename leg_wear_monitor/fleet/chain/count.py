@@ -87,6 +87,7 @@ def _replayed(leg: FleetLeg, directory: LegDirectory, found: Found, last_ns: int
         node=leg.node,
         joint_states=leg.joint_states,
         drive_torque=leg.drive_torque,
+        sample=leg.sample,
         finish=finish,
     )
     (line,) = lines

@@ -30,6 +30,8 @@ class FleetLeg:
         As in `leg_wear_monitor.replay`.
     learned_priors : str
         File with the priors of its wear coefficients that the fleet has learned; empty without.
+    sample : float, optional
+        Fraction of the gait cycles that are followed, as in `leg_wear_monitor.replay`.
     """
 
     id: str
@@ -42,6 +44,7 @@ class FleetLeg:
     joint_states: str | None
     drive_torque: str | None
     learned_priors: str = ""
+    sample: float | None = None
 
     def shown(self, recording: Path) -> str:
         """Name of a recording in tables: relative to the description where it is below it."""

@@ -1,5 +1,6 @@
 """``leg-wear-monitor life``: a leg from new until a clearance reaches its limit, by cycle jumps."""
 
+import math
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
@@ -217,7 +218,13 @@ def lines(result: "Life", limit_m: float) -> list[str]:
         table.append(f"{result.cycles[i]:10.3g}{cells}")
     table.append(f"jumps: {points - 1}; largest error of one: {1e6 * result.error_m.max():.2g} µm")
     for k, joint in enumerate(result.clearance_joints):
-        cycles = result.cycles_to(k, limit_m)
-        held = "" if cycles <= result.cycles[-1] else ", extrapolated at its last rate"
-        table.append(f"{joint} reaches {1e6 * limit_m:g} µm after {cycles:.3g} gait cycles{held}")
+        table.append(f"{joint} {_end(result.cycles_to(k, limit_m), limit_m, result.cycles[-1])}")
     return table
+
+
+def _end(cycles: float, limit_m: float, simulated: float) -> str:
+    """When a joint reaches its limit."""
+    if math.isinf(cycles):
+        return f"does not reach {1e6 * limit_m:g} µm: at its last rate, its clearance does not grow"
+    held = "" if cycles <= simulated else ", extrapolated at its last rate"
+    return f"reaches {1e6 * limit_m:g} µm after {cycles:.3g} gait cycles{held}"

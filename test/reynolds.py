@@ -12,7 +12,7 @@ The pressure is 0 at the ends. The film breaks up and forms again where the solu
 import math
 
 import numpy as np
-from scipy.sparse import csr_array, diags_array, kron
+from scipy.sparse import csr_array, diags, kron
 from scipy.sparse.linalg import spsolve
 
 AROUND, ALONG = 160, 8  # cells around the bearing, and from its middle to its end
@@ -23,7 +23,7 @@ def _flow(x: float, epsilon: float, fed: bool) -> csr_array:
     theta = np.arange(AROUND) * 2.0 * math.pi / AROUND  # of the faces before the cells
     face = (1.0 + epsilon * np.cos(theta)) ** 3 * (AROUND / (2.0 * math.pi)) ** 2
     after = np.roll(face, -1)
-    across = diags_array(
+    across = diags(
         [face + after, -face[1:], -face[1:], [0.0 if fed else -face[0]], [0.0 if fed else -face[0]]],
         offsets=[0, 1, -1, AROUND - 1, 1 - AROUND],
     ).tolil()
@@ -32,10 +32,10 @@ def _flow(x: float, epsilon: float, fed: bool) -> csr_array:
         across[AROUND - 1, AROUND - 1] += face[0]
     middle = np.full(ALONG, 2.0)
     middle[0], middle[-1] = 1.0, 3.0
-    axial = diags_array([middle, -np.ones(ALONG - 1), -np.ones(ALONG - 1)], offsets=[0, 1, -1])
+    axial = diags([middle, -np.ones(ALONG - 1), -np.ones(ALONG - 1)], offsets=[0, 1, -1])
     gap = (1.0 + epsilon * np.cos(theta + math.pi / AROUND)) ** 3
-    ends = kron(diags_array(gap), axial * (ALONG / x) ** 2)
-    return csr_array(kron(across, diags_array(np.ones(ALONG))) + ends)
+    ends = kron(diags(gap), axial * (ALONG / x) ** 2)
+    return csr_array(kron(across, diags(np.ones(ALONG))) + ends)
 
 
 def _pressure(flow: csr_array, closing: np.ndarray) -> np.ndarray:

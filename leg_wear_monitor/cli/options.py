@@ -26,6 +26,20 @@ speed_option: Option = click.option(
     help="Crank speed, negative for clockwise.  [default: the mechanism's own]",
 )
 
+config_option: Option = click.option(
+    "--config",
+    type=click.Path(path_type=Path),
+    metavar="FILE",
+    help="Parameter file of the node.  [default: the one that comes with the package]",
+)
+
+ledger_option: Option = click.option(
+    "--ledger",
+    type=click.Path(path_type=Path, dir_okay=False, exists=True),
+    metavar="FILE",
+    help="Ledger to write into.  [default: the one in the parameters]",
+)
+
 
 def clearances_option(metavar: str) -> Option:
     """``--clearances``: names of the clearance joints, separated by commas."""

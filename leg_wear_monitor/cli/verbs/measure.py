@@ -7,11 +7,10 @@ from typing import Any
 
 import click
 
-from leg_wear_monitor.cli.measurements import LAST, leg_of, list_measurements, opened, withdraw
+from leg_wear_monitor.cli.measurements import LAST, check_joint, leg_of, list_measurements, opened, withdraw
 from leg_wear_monitor.cli.node import need_rclpy
 from leg_wear_monitor.cli.number import bounded
-from leg_wear_monitor.configuration.nearest import did_you_mean
-from leg_wear_monitor.errors import ConfigError
+from leg_wear_monitor.cli.options import config_option, ledger_option
 
 WITH_FINDINGS = 1
 
@@ -26,18 +25,8 @@ WITH_FINDINGS = 1
     metavar="MM",
     help="Standard deviation of the measurement.",
 )
-@click.option(
-    "--config",
-    type=click.Path(path_type=Path),
-    metavar="FILE",
-    help="Parameter file of the node.  [default: the one that comes with the package]",
-)
-@click.option(
-    "--ledger",
-    type=click.Path(path_type=Path, dir_okay=False, exists=True),
-    metavar="FILE",
-    help="Ledger to write into.  [default: the one in the parameters]",
-)
+@config_option
+@ledger_option
 @click.option("--accept", is_flag=True, help="Use it even if it contradicts the model.")
 @click.option("--dry-run", is_flag=True, help="Print the result and write nothing.")
 @click.option(
@@ -139,9 +128,7 @@ def _measured(
     from leg_wear_monitor.monitor.ledger.entry import new_part
 
     settings, leg = leg_of(config, ledger)
-    if joint not in leg.clearance_joints:
-        fault = f"{joint!r} is not a clearance joint, expected one of {', '.join(leg.clearance_joints)}"
-        raise ConfigError("JOINT", "", fault + did_you_mean(joint, leg.clearance_joints))
+    check_joint(joint, leg)
     limits_m = AlarmBoard(settings, leg.clearance_joints).clearance_limits_m
     limit_m = limits_m[leg.clearance_joints.index(joint)]
     with opened(leg, settings, dry_run) as kept:

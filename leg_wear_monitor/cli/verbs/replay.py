@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING, Any
 import click
 
 from leg_wear_monitor.cli.main import version
-from leg_wear_monitor.cli.options import json_option, out_option
+from leg_wear_monitor.cli.options import config_option, json_option, out_option
 from leg_wear_monitor.cli.output import STDOUT, check_outputs, write_directory, write_json
 from leg_wear_monitor.cli.waiting import compilation, progress_bar
 from leg_wear_monitor.errors import LegWearError
@@ -32,12 +32,7 @@ _MOST_LINES = 20
 @click.command(short_help="Replay a recording through the monitor.")
 @click.argument("bags", nargs=-1, required=True, type=click.Path(path_type=Path), metavar="BAG...")
 @out_option("Write reports.mcap (for rosbag2 and Foxglove), summary.json and report.html.")
-@click.option(
-    "--config",
-    type=click.Path(path_type=Path),
-    metavar="FILE",
-    help="Parameter file of the node.  [default: the one that comes with the package]",
-)
+@config_option
 @click.option(
     "--time",
     "time_source",

@@ -6,25 +6,14 @@ from pathlib import Path
 
 import click
 
-from leg_wear_monitor.cli.measurements import leg_of, opened
-from leg_wear_monitor.configuration.nearest import did_you_mean
-from leg_wear_monitor.errors import ConfigError
+from leg_wear_monitor.cli.measurements import check_joint, leg_of, opened
+from leg_wear_monitor.cli.options import config_option, ledger_option
 
 
 @click.command(short_help="Enter a replaced part into a ledger.")
 @click.argument("joint")
-@click.option(
-    "--config",
-    type=click.Path(path_type=Path),
-    metavar="FILE",
-    help="Parameter file of the node.  [default: the one that comes with the package]",
-)
-@click.option(
-    "--ledger",
-    type=click.Path(path_type=Path, dir_okay=False, exists=True),
-    metavar="FILE",
-    help="Ledger to write into.  [default: the one in the parameters]",
-)
+@config_option
+@ledger_option
 @click.option("--undo", is_flag=True, help="Undo the last reset: the part was not replaced.")
 @click.option("--dry-run", is_flag=True, help="Print the result and write nothing.")
 def reset(joint: str, config: Path | None, ledger: Path | None, undo: bool, dry_run: bool) -> int:
@@ -36,9 +25,7 @@ def reset(joint: str, config: Path | None, ledger: Path | None, undo: bool, dry_
     from leg_wear_monitor.monitor.resets import reset_in, undo_in, wear_words
 
     settings, leg = leg_of(config, ledger)
-    if joint not in leg.clearance_joints:
-        fault = f"{joint!r} is not a clearance joint, expected one of {', '.join(leg.clearance_joints)}"
-        raise ConfigError("JOINT", "", fault + did_you_mean(joint, leg.clearance_joints))
+    check_joint(joint, leg)
     with opened(leg, settings, dry_run) as kept:
         if kept.loss:
             click.echo(f"warning: {kept.path}: {kept.loss}", err=True)

@@ -7,6 +7,7 @@ from typing import Any
 
 import attrs
 
+from leg_wear_monitor.fleet.directory.atomic import write_whole
 from leg_wear_monitor.fleet.learning.learn import LearnedPair, LearnedPart
 from leg_wear_monitor.fleet.learning.part import Part
 from leg_wear_monitor.json_text import json_text
@@ -63,14 +64,18 @@ def write_learning(
     -------
     dict of str to pathlib.Path
         The file of priors of each leg.
+
+    Raises
+    ------
+    ConfigError
+        If the disk does not take a file.
     """
-    (directory / "learning.json").write_text(json_text(document(learned)), encoding="utf-8")
-    (directory / "priors").mkdir(exist_ok=True)
+    write_whole(directory / "learning.json", json_text(document(learned)).encode())
     written = {}
     for leg in sorted({part.leg for part in parts}):
         written[leg] = directory / "priors" / f"{leg}.json"
         text = json_text(attrs.asdict(priors_of(leg, parts, learned)))
-        written[leg].write_text(text, encoding="utf-8")
+        write_whole(written[leg], text.encode())
     return written
 
 

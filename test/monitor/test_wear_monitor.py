@@ -288,6 +288,11 @@ def test_the_trackers_defaults_are_the_twins_own():
     assert ours == attrs.evolve(its, tracker=tracker)
 
 
+def test_lag_and_node_interval_are_those_of_the_parameters():
+    found = twin_settings(config_from({"tracker.lag_s": 0.04, "tracker.node_interval_s": 0.01})).tracker
+    assert (found.lag, found.node_interval) == (0.04, 0.01)
+
+
 def test_a_reorder_window_longer_than_a_bridged_gap_is_refused():
     with pytest.raises(ConfigError, match=r"reorder_window_s: 0.2 s is not below tracker.gap_limit_s, 0.1 s"):
         twin_settings(config_from({"tracker.reorder_window_s": 0.2, "tracker.gap_limit_s": 0.1}))

@@ -204,6 +204,20 @@ class Tracker:
     bandwidth_hz: float = quantity(
         "Hz", "bandwidth of the crank's tracker", at_least=1.0, at_most=100.0, default=8.0
     )
+    lag_s: float = quantity(
+        "s",
+        "delay of the leg behind the newest sample, for smoothing; 0: 0.8 / bandwidth_hz",
+        at_least=0.0,
+        at_most=1.0,
+        default=0.0,
+    )
+    node_interval_s: float = quantity(
+        "s",
+        "time between the nodes of the leg's motion, for which a sample waits at most; 0: 0.2 / bandwidth_hz",
+        at_least=0.0,
+        at_most=0.2,
+        default=0.0,
+    )
     reorder_window_s: float = quantity(
         "s", "time for which a sample waits for earlier ones", at_least=0.0, at_most=0.5, default=0.02
     )

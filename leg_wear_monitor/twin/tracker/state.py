@@ -12,7 +12,7 @@ from leg_wear_monitor.twin.steps import SPLINE_NODE
 
 ARRIVALS, QUEUE = 2048, 4096  # capacities for samples that wait for their order, and for the leg
 
-_NODE_INTERVALS, _RUN_UPS = 0.2, 0.8  # interval of spline nodes, and run-up from rest, in 1 / bandwidth
+_RUN_UPS = 0.8  # run-up from rest, in 1 / bandwidth
 
 TRACKER_MODEL = np.dtype(
     [
@@ -172,7 +172,7 @@ def tracker_model(settings: TrackerSettings) -> Records:
     model.acquire_ns = _nanoseconds(s.acquire_s)
     model.stop_hold_ns = _nanoseconds(s.stop_hold_s)
     model.settle_ns = _nanoseconds(s.settle_s)
-    model.node_interval_ns = _nanoseconds(_NODE_INTERVALS / s.bandwidth_hz)
+    model.node_interval_ns = _nanoseconds(s.node_interval)
     model.run_up_ns = _nanoseconds(_RUN_UPS / s.bandwidth_hz)
     model.angle_noise = s.encoder_noise_rad**2 * reference
     model.jerk = model.angle_noise * w**6

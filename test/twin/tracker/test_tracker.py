@@ -195,6 +195,23 @@ def test_encoder_noise_makes_little_acceleration(gait, rate_hz, bound):
     assert speed[steady].mean() == pytest.approx(TURN, rel=1.0e-4)
 
 
+@pytest.mark.parametrize("lag_s, node_interval_s", [(0.0, 0.0), (0.1, 0.005), (0.04, 0.025), (0.003, 0.01)])
+def test_a_sample_waits_for_lag_window_and_the_next_node_at_most(gait, lag_s, node_interval_s):
+    """At 1 kHz, sample by sample; a node and the newest sample may each come a period late."""
+    settings = TrackerSettings(lag_s=lag_s, node_interval_s=node_interval_s)
+    tracker, period_ns, waited = CrankTracker(settings), S // 1000, []
+    for sample in cut(gait(3.0, 1000.0), range(3000)):
+        stamp = int(sample["stamp_ns"][0]) if len(sample) else 0
+        for steps, n in tracker.update(sample):
+            done = steps[:n][steps["code"][:n] == EVALUATE]["end_ns"]
+            waited.extend((stamp - done).tolist() if stamp > START_NS + S else [])
+    shortest = round(1.0e9 * (settings.lag + settings.reorder_window_s))
+    longest = shortest + round(1.0e9 * settings.node_interval)
+    assert len(waited) > 1500
+    assert shortest <= min(waited) + period_ns
+    assert longest - 2 * period_ns <= max(waited) <= longest + 2 * period_ns
+
+
 @pytest.mark.parametrize("times", [1, 2])
 def test_speed_ripple_is_followed(gait, times):
     """Three percent, once or twice a turn, to a twentieth of it."""
@@ -414,6 +431,7 @@ def test_no_sequence_of_samples_breaks_it(rows):
 @pytest.mark.parametrize(
     "name, value",
     [("bandwidth_hz", 0.0), ("gate_rad", np.nan), ("lag_s", -1.0), ("commanded_speed_radps", 0.0),
+     ("node_interval_s", -0.01),
      ("reorder_window_s", 2.0), ("bandwidth_hz", 0.1), ("largest_speed_radps", -1.0)],
 )  # fmt: skip
 def test_senseless_settings_are_refused(name: str, value: float, refused: Callable[..., None]) -> None:

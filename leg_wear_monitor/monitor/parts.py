@@ -85,6 +85,7 @@ class Parts:
             self.config.forecast,
             ledger.measurements if ledger else (),
             self.accounting.replaced_ns,
+            ledger.corrections if ledger else (),
         )
         self.encoders = (
             EncoderObserver(

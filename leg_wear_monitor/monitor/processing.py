@@ -6,6 +6,7 @@ import numpy as np
 
 from leg_wear_monitor.mechanism.arrays import Floats
 from leg_wear_monitor.monitor.cycle_report import cycle_report, latest
+from leg_wear_monitor.monitor.diagnosis.corrections import Correction
 from leg_wear_monitor.monitor.encoders.clearance_estimate import ClearanceEstimate
 from leg_wear_monitor.monitor.evaluation.specs import CLEARANCE, MISMATCH
 from leg_wear_monitor.monitor.forecast.growth import GrowthWindow, extended
@@ -14,6 +15,7 @@ from leg_wear_monitor.monitor.forecast_update import update_forecast
 from leg_wear_monitor.monitor.ledger.entry import (
     Audit,
     CommissionedTorque,
+    CorrectedClearance,
     IdentifiedLeg,
     SimulatedReference,
 )
@@ -178,17 +180,34 @@ class Processing:
         if correction is None or is_wrong:
             self._note_commissioned(before)
             return
-        joint = self._clearance_joints[correction.joint]
-        was = self._accounting.correct(joint, correction.clearance_m)
+        self._correct(correction)
         self._torque.corrected(correction, self._twin.clearance_mean_m)
         self._twin.pull_block()
         self._note_commissioned(before)
-        self._accounting.note(
-            Audit(self._twin.intake.followed_stamp_ns, "diagnosis", "correct_clearance", was)
-        )
-        growth, k = self._parts.state.growth, correction.joint
-        self._parts.state.growth = (*growth[:k], GrowthWindow(), *growth[k + 1 :])
         self._parts.keep()
+
+    def _correct(self, correction: Correction) -> None:
+        """Open a joint to the clearance that the drive torque shows, and count its wear from there."""
+        stamp_ns, k = self._twin.intake.followed_stamp_ns, correction.joint
+        joint = self._clearance_joints[k]
+        was = self._accounting.correct(joint, correction.clearance_m)
+        now = self._accounting.wear_of(joint)
+        corrected = CorrectedClearance(
+            stamp_ns=stamp_ns,
+            joint=joint,
+            clearance_m=float(self._twin.clearance_mean_m[k]),
+            sigma_m=correction.change.sigma,
+            before_m=was.mean_m,
+            wear_m=now.mean_m,
+            replaced_ns=now.replaced_ns,
+        )
+        self._accounting.note(Audit(stamp_ns, "diagnosis", "correct_clearance", was))
+        self._accounting.note(corrected)
+        self._forecaster.corrected(corrected)
+        if self._encoders:
+            self._encoders.state.updated_ns = 0  # the next estimate updates the forecast again
+        growth = self._parts.state.growth
+        self._parts.state.growth = (*growth[:k], GrowthWindow(), *growth[k + 1 :])
 
     def _take_parameters(self, found: LegParameters | None) -> None:
         """Let the twin walk on with the masses, lengths and friction that the drive torque shows."""

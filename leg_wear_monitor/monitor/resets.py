@@ -95,7 +95,7 @@ def undo_in(ledger: Ledger, joint: str, stamp_ns: int, who: str) -> JointWear:
 
 def wear_words(wear: JointWear) -> str:
     """Mean total wear of both surfaces, and its number of gait cycles."""
-    return f"{1e6 * float(wear.depth.sum(axis=0).mean()):.4g} um of wear from {wear.cycles} gait cycles"
+    return f"{1e6 * wear.mean_m:.4g} um of wear from {wear.cycles} gait cycles"
 
 
 def _entry_with(ledger: Ledger, joint: str) -> tuple[Entry, JointWear]:

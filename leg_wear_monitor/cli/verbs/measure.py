@@ -146,6 +146,7 @@ def _measured(
             kept_ns=kept.kept_ns,
             accept=accept,
             prior=prior_source(leg, settings.forecast).prior(joint, part.replaced_ns),
+            corrections=kept.corrections,
         )
         kept.note(found.measurement)
         kept.record()

@@ -79,6 +79,7 @@ def leg_parts(leg: FleetLeg, path: Path) -> list[Part]:
         if ledger is None:
             raise LegWearError(f"{path}: no ledger")
         with closing(ledger):
-            entry, measurements = ledger.entry, ledger.measurements
+            entry, measurements, corrections = ledger.entry, ledger.measurements, ledger.corrections
     replaced_ns = {wear.name: wear.replaced_ns for wear in entry.joints} if entry else {}
-    return parts_of(leg.id, mechanism, leg.config.forecast, measurements, replaced_ns, lot=leg.lot)
+    known = leg.config.forecast, measurements, replaced_ns
+    return parts_of(leg.id, mechanism, *known, lot=leg.lot, corrections=corrections)

@@ -12,9 +12,10 @@ from leg_wear_monitor.monitor.forecast.coefficient_prior import (
     nominal_per_pa,
     usual_prior,
 )
+from leg_wear_monitor.monitor.forecast.known_clearance import corrections_of
 from leg_wear_monitor.monitor.forecast.measurement import observations_of
 from leg_wear_monitor.monitor.forecast.wear_coefficients import measured_factor
-from leg_wear_monitor.monitor.ledger.entry import Measurement
+from leg_wear_monitor.monitor.ledger.entry import CorrectedClearance, Measurement
 
 
 @attrs.frozen(kw_only=True)
@@ -67,6 +68,7 @@ def parts_of(
     *,
     lot: str = "",
     lots: Mapping[str, str] | None = None,
+    corrections: Sequence[CorrectedClearance] = (),
 ) -> list[Part]:
     """All parts that a leg has, and those it had that were measured.
 
@@ -85,6 +87,8 @@ def parts_of(
         Lot of the parts that the leg was built with.
     lots : mapping of str to str, optional
         Lots of the present parts of single joints; a replaced part has no other known lot.
+    corrections : sequence of CorrectedClearance
+        Of its ledger.
     """
     parts = []
     for joint in mechanism.clearance_joints:
@@ -92,7 +96,8 @@ def parts_of(
         mounted = {m.replaced_ns for m in measurements if m.joint == joint} | {present}
         for when in sorted(mounted):
             observations = observations_of(measurements, joint, when)
-            factor, precision = measured_factor(settings, clearance.radial_clearance, observations)
+            corrected = corrections_of(corrections, joint, when)
+            factor, precision = measured_factor(settings, clearance.radial_clearance, observations, corrected)
             own = (lots or {}).get(joint, "") if when == present else ""
             parts.append(
                 Part(

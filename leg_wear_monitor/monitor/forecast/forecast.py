@@ -258,7 +258,11 @@ def _legs(
         np.array([[getattr(each, name) or 0.0] for each in now])
         for name in ("fresh_m", "wear_m", "growth_m", "growth_error_m")
     )
-    clearance = np.maximum(fresh + excess + np.exp(log_factor) * wear, 0.0)
+    known, before = (
+        np.array([[getattr(each.known, name)] for each in coefficient_estimates])
+        for name in ("clearance_m", "wear_m")
+    )
+    clearance = np.maximum(known + excess + np.exp(log_factor) * (wear - before), 0.0)
     relative = np.divide(error, growth, out=np.zeros_like(error), where=growth > 0.0)
     log_rate = log_factor + np.hypot(law.sigma[:, None], relative) * normals[2 * k : 3 * k]
     log_rate += settings.load_sigma * normals[3 * k]

@@ -11,6 +11,7 @@ from leg_wear_monitor.monitor.config.forecast import Forecasting
 from leg_wear_monitor.monitor.forecast.coefficient_prior import prior_source
 from leg_wear_monitor.monitor.forecast.forecast import Forecast, JointCondition, forecast
 from leg_wear_monitor.monitor.forecast.growth import GrowthRate, GrowthWindow, extended, growth_rate
+from leg_wear_monitor.monitor.forecast.known_clearance import corrections_of
 from leg_wear_monitor.monitor.forecast.life_file import law_of
 from leg_wear_monitor.monitor.forecast.measurement import (
     CONTRADICTS,
@@ -24,7 +25,7 @@ from leg_wear_monitor.monitor.forecast.wear_coefficients import (
     MeasuredClearance,
     estimate_coefficient,
 )
-from leg_wear_monitor.monitor.ledger.entry import JointWear, Measurement
+from leg_wear_monitor.monitor.ledger.entry import CorrectedClearance, JointWear, Measurement
 from leg_wear_monitor.twin.statistics import CycleStatistics
 
 RENEWED_NS = 60_000_000_000
@@ -65,6 +66,8 @@ class Forecaster:
         Of the ledger.
     replaced_ns : sequence of int
         When each joint's part was replaced, 0 if it never was.
+    corrections : sequence of CorrectedClearance
+        Of the ledger.
 
     Raises
     ------
@@ -78,12 +81,13 @@ class Forecaster:
         settings: Forecasting,
         measurements: Sequence[Measurement],
         replaced_ns: Sequence[int],
+        corrections: Sequence[CorrectedClearance] = (),
     ) -> None:
         self._settings, self._clearance_joints = settings, mechanism.clearance_joints
         self._clearances = [mechanism.clearances[joint] for joint in mechanism.clearance_joints]
         self._fresh_m = [clearance.radial_clearance for clearance in self._clearances]
         self._law = law_of(mechanism, settings.life, settings.model_sigma)
-        self._measurements = list(measurements)
+        self._measurements, self._corrections = list(measurements), list(corrections)
         self._priors = prior_source(mechanism, settings)
         coefficient_estimates = tuple(
             self._estimate(k, when) for k, when in zip(range(len(self._fresh_m)), replaced_ns, strict=True)
@@ -159,10 +163,15 @@ class Forecaster:
         return tuple(last_measured(self._measurements, joint, when) for joint, when in parts)
 
     def replaced(self, joint: str, replaced_ns: int) -> None:
-        """Reset the estimate of a joint whose part changed to the measurements of this part."""
+        """Reset the estimate of a joint whose part changed to what is known of this part."""
         k, state = self._clearance_joints.index(joint), self.state
         state.growth = (*state.growth[:k], GrowthWindow(), *state.growth[k + 1 :])
         self._update_coefficients(k, self._estimate(k, replaced_ns))
+
+    def corrected(self, correction: CorrectedClearance) -> None:
+        """Count the wear of a joint from a corrected clearance on."""
+        self._corrections.append(correction)
+        self.replaced(correction.joint, correction.replaced_ns)
 
     def measured(
         self,
@@ -189,6 +198,7 @@ class Forecaster:
             kept_ns=kept_ns,
             accept=accept,
             prior=self._priors.prior(wear.name, wear.replaced_ns),
+            corrections=self._corrections,
         )
         self._measurements.append(found.measurement)
         self._update_coefficients(k, found.after)
@@ -212,7 +222,7 @@ class Forecaster:
             Whether it is used: not if its tail probability is below `CONTRADICTS`.
         """
         estimate = self._estimate(k, replaced_ns)
-        below = estimate.probability_below(self._fresh_m[k], observation)
+        below = estimate.probability_below(observation)
         is_plausible = CONTRADICTS <= below <= 1.0 - CONTRADICTS
         self._update_coefficients(
             k, self._estimate(k, replaced_ns, observation) if is_plausible else estimate
@@ -223,8 +233,13 @@ class Forecaster:
         """Estimate for a part, from its prior, the measurements that count, and further ones."""
         joint = self._clearance_joints[k]
         observations = observations_of(self._measurements, joint, replaced_ns)
-        prior = self._priors.prior(joint, replaced_ns)
-        return estimate_coefficient(self._settings, self._fresh_m[k], [*observations, *further], prior)
+        return estimate_coefficient(
+            self._settings,
+            self._fresh_m[k],
+            [*observations, *further],
+            self._priors.prior(joint, replaced_ns),
+            corrections_of(self._corrections, joint, replaced_ns),
+        )
 
     def _update_coefficients(self, k: int, coefficient_estimate: CoefficientEstimate) -> None:
         coefficient_estimates = self.state.coefficient_estimates

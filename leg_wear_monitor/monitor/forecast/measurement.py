@@ -11,13 +11,14 @@ from leg_wear_monitor.mechanism.clearance import Clearance
 from leg_wear_monitor.mechanism.clearance_range import measured_fault, sigma_fault
 from leg_wear_monitor.monitor.config.forecast import Forecasting
 from leg_wear_monitor.monitor.forecast.coefficient_prior import CoefficientPrior
+from leg_wear_monitor.monitor.forecast.known_clearance import corrections_of
 from leg_wear_monitor.monitor.forecast.validity import validity
 from leg_wear_monitor.monitor.forecast.wear_coefficients import (
     CoefficientEstimate,
     MeasuredClearance,
     estimate_coefficient,
 )
-from leg_wear_monitor.monitor.ledger.entry import JointWear, Measurement
+from leg_wear_monitor.monitor.ledger.entry import CorrectedClearance, JointWear, Measurement
 
 CONTRADICTS = 0.00135  # probability of a tail: three standard deviations of a normal one
 
@@ -137,6 +138,7 @@ def measure(
     kept_ns: int = 0,
     accept: bool = False,
     prior: CoefficientPrior | None = None,
+    corrections: Sequence[CorrectedClearance] = (),
 ) -> MeasurementResult:
     """Evaluate a measured clearance.
 
@@ -160,6 +162,8 @@ def measure(
         Whether it counts even if it contradicts the model.
     prior : CoefficientPrior, optional
         Without it, the configured spread about the nominal coefficient.
+    corrections : sequence of CorrectedClearance
+        All of the ledger.
 
     Raises
     ------
@@ -174,12 +178,14 @@ def measure(
         if fault:
             raise ConfigError(name, "", fault)
     observations = observations_of(earlier, wear.name, wear.replaced_ns)
-    observation = MeasuredClearance(clearance_m, sigma_m, float(wear.depth.sum(axis=0).mean()))
-    before = estimate_coefficient(settings, fresh_m, observations, prior)
-    below = before.probability_below(fresh_m, observation)
+    observation = MeasuredClearance(clearance_m, sigma_m, wear.mean_m)
+    corrected = corrections_of(corrections, wear.name, wear.replaced_ns)
+    before = estimate_coefficient(settings, fresh_m, observations, prior, corrected)
+    below = before.probability_below(observation)
     contradicts = not CONTRADICTS <= below <= 1.0 - CONTRADICTS
     counts = accept or not contradicts
-    after = estimate_coefficient(settings, fresh_m, [*observations, observation], prior) if counts else before
+    observations += [observation] if counts else []
+    after = estimate_coefficient(settings, fresh_m, observations, prior, corrected)
     measurement = Measurement(
         stamp_ns=stamp_ns,
         joint=wear.name,

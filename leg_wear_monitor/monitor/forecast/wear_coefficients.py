@@ -4,6 +4,9 @@ The clearance is c = c_0 + d + x w: c_0 the nominal one when new, d the deviatio
 the twin has counted with the nominal coefficient, x the joint's factor on it. The priors are lognormal for
 x and normal for d; measured clearances have normal errors. d is eliminated in closed form, x is on a grid
 around the estimate: an accepted measurement moves it as far as the data require.
+
+Where the counted clearance was corrected by what the drive torque shows, c_0, d and w begin anew with that
+clearance, its error and the wear since; x remains.
 """
 
 import math
@@ -17,6 +20,8 @@ from numpy.typing import ArrayLike
 from leg_wear_monitor.mechanism.arrays import Floats
 from leg_wear_monitor.monitor.config.forecast import Forecasting
 from leg_wear_monitor.monitor.forecast.coefficient_prior import CoefficientPrior, usual_prior
+from leg_wear_monitor.monitor.forecast.known_clearance import KnownClearance, known_clearances
+from leg_wear_monitor.monitor.ledger.entry import CorrectedClearance
 
 GRID = 801
 _WIDTH = 8.0  # standard deviations on both sides, of the prior and of the measurements
@@ -35,7 +40,7 @@ class MeasuredClearance:
     clearance_m, sigma_m : float
         Mean radial clearance and its standard deviation.
     wear_m : float
-        Wear w that the twin had counted then.
+        Wear in the twin then.
     """
 
     clearance_m: float
@@ -59,6 +64,8 @@ class CoefficientEstimate:
         Measurements in it.
     prior : CoefficientPrior
         What was believed before them.
+    known : KnownClearance
+        The one from which on wear is counted now; d is the deviation from it.
     """
 
     log_factor: Floats
@@ -67,6 +74,7 @@ class CoefficientEstimate:
     excess_sigma_m: float
     observations: int
     prior: CoefficientPrior
+    known: KnownClearance
 
     @property
     def mean(self) -> float:
@@ -83,9 +91,10 @@ class CoefficientEstimate:
         reached = np.cumsum(self.weight) - 0.5 * self.weight
         return np.asarray(np.interp(np.asarray(fractions), reached, self.log_factor))
 
-    def probability_below(self, fresh_m: float, observation: MeasuredClearance) -> float:
-        """Predicted probability that a measurement of this accuracy is smaller than this one."""
-        expected = fresh_m + self.excess_m + np.exp(self.log_factor) * observation.wear_m
+    def probability_below(self, observation: MeasuredClearance) -> float:
+        """Predicted probability that a measurement of this accuracy, now, is smaller than this one."""
+        worn = observation.wear_m - self.known.wear_m
+        expected = self.known.clearance_m + self.excess_m + np.exp(self.log_factor) * worn
         spread = math.hypot(observation.sigma_m, self.excess_sigma_m)
         below = np.asarray(_phi((observation.clearance_m - expected) / spread), dtype=float)
         return float(self.weight @ below)
@@ -96,6 +105,7 @@ def estimate_coefficient(
     fresh_m: float,
     observations: Sequence[MeasuredClearance] = (),
     prior: CoefficientPrior | None = None,
+    corrections: Sequence[CorrectedClearance] = (),
 ) -> CoefficientEstimate:
     """Coefficient estimate after measurements of the same part, in any order.
 
@@ -107,18 +117,19 @@ def estimate_coefficient(
     observations : sequence of MeasuredClearance
     prior : CoefficientPrior, optional
         Without it, the configured or usual spread about the nominal coefficient.
+    corrections : sequence of CorrectedClearance
+        Of its counted clearance, in the order of time.
     """
     prior = prior or usual_prior(settings)
-    log_factor, log_weight = posterior_grid(prior, *measured_factor(settings, fresh_m, observations))
+    factor = measured_factor(settings, fresh_m, observations, corrections)
+    log_factor, log_weight = posterior_grid(prior, *factor)
     weight = np.exp(log_weight - log_weight.max())
-    precision = 1.0 / settings.clearance_sigma_m**2 + sum(
-        observation.sigma_m**-2 for observation in observations
-    )
+    known, own = _spans(settings, fresh_m, observations, corrections)[-1]
+    precision = 1.0 / known.sigma_m**2 + sum(observation.sigma_m**-2 for observation in own)
     pull = np.zeros(GRID)
-    for observation in observations:
-        pull += (
-            observation.clearance_m - fresh_m - np.exp(log_factor) * observation.wear_m
-        ) / observation.sigma_m**2
+    for observation in own:
+        opened, worn = observation.clearance_m - known.clearance_m, observation.wear_m - known.wear_m
+        pull += (opened - np.exp(log_factor) * worn) / observation.sigma_m**2
     return CoefficientEstimate(
         log_factor,
         weight / weight.sum(),
@@ -126,28 +137,57 @@ def estimate_coefficient(
         precision**-0.5,
         len(observations),
         prior,
+        known,
     )
 
 
 def measured_factor(
-    settings: Forecasting, fresh_m: float, observations: Sequence[MeasuredClearance]
+    settings: Forecasting,
+    fresh_m: float,
+    observations: Sequence[MeasuredClearance],
+    corrections: Sequence[CorrectedClearance] = (),
 ) -> tuple[float, float]:
     """Mean and precision of the factor from the measurements alone; 0 if they have no information.
 
-    The likelihood is normal in the factor, not in its logarithm. The clearance when new is eliminated: it
-    correlates the errors of the measurements.
+    The likelihood is normal in the factor, not in its logarithm. The clearance from which on wear is counted
+    is eliminated: it correlates the errors of the measurements after it.
     """
-    if not any(observation.wear_m for observation in observations):
+    spans = [_factor_since(*span) for span in _spans(settings, fresh_m, observations, corrections)]
+    product, precision = (sum(each) for each in zip(*spans, strict=True))
+    return (product / precision, precision) if precision else (0.0, 0.0)
+
+
+def _spans(
+    settings: Forecasting,
+    fresh_m: float,
+    observations: Sequence[MeasuredClearance],
+    corrections: Sequence[CorrectedClearance],
+) -> list[tuple[KnownClearance, list[MeasuredClearance]]]:
+    """Known clearances, each with the measurements between it and the next one."""
+    known = known_clearances(settings, fresh_m, corrections)
+    ends = [*(each.from_m for each in known[1:]), math.inf]
+    return [
+        (each, [one for one in observations if each.from_m <= one.wear_m < end])
+        for each, end in zip(known, ends, strict=True)
+    ]
+
+
+def _factor_since(known: KnownClearance, observations: Sequence[MeasuredClearance]) -> tuple[float, float]:
+    """Factor times its precision, and the precision, from measurements after a known clearance."""
+    if not any(observation.wear_m != known.wear_m for observation in observations):
         return 0.0, 0.0
     opened, wear, sigma = np.array(
-        [(one.clearance_m - fresh_m, one.wear_m, one.sigma_m) for one in observations]
+        [
+            (one.clearance_m - known.clearance_m, one.wear_m - known.wear_m, one.sigma_m)
+            for one in observations
+        ]
     ).T
-    own, new = sigma**-2.0, settings.clearance_sigma_m**-2.0
+    own, new = sigma**-2.0, known.sigma_m**-2.0
     # about their common mean, so that nothing large cancels
     common_wear, common = (float(own @ values) / (float(own.sum()) + new) for values in (wear, opened))
     precision = float(own @ np.square(wear - common_wear)) + new * common_wear**2
     product = float(own @ ((wear - common_wear) * (opened - common))) + new * common_wear * common
-    return product / precision, precision
+    return product, precision
 
 
 def posterior_grid(prior: CoefficientPrior, mean: float, precision: float) -> tuple[Floats, Floats]:

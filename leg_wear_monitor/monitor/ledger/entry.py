@@ -33,6 +33,11 @@ class JointWear:
     moving_s: float = 0.0
     replaced_ns: int = 0
 
+    @property
+    def mean_m(self) -> float:
+        """Mean depth of bushing and journal together, which is what the mean clearance has grown by [m]."""
+        return float(self.depth.sum(axis=0).mean())
+
 
 def new_part(name: str) -> JointWear:
     """A joint whose part is new."""
@@ -217,6 +222,35 @@ class Withdrawal:
 
 
 @attrs.frozen
+class CorrectedClearance:
+    """A counted clearance that was replaced by the one that the drive torque shows.
+
+    Attributes
+    ----------
+    stamp_ns : int
+    joint : str
+    clearance_m : float
+        Mean radial clearance from then on.
+    sigma_m : float
+        Its standard deviation.
+    before_m : float
+        Wear that the twin had counted for this part.
+    wear_m : float
+        Wear in the twin from then on, which makes the clearance this one.
+    replaced_ns : int
+        When the part was replaced, 0 if it never was.
+    """
+
+    stamp_ns: int
+    joint: str
+    clearance_m: float
+    sigma_m: float
+    before_m: float
+    wear_m: float
+    replaced_ns: int
+
+
+@attrs.frozen
 class ForecastPoint:
     """A joint's gait cycles to its limit (p10, p50, p90), as forecast after so many gait cycles."""
 
@@ -330,6 +364,7 @@ Event = (
     | ClearancePoint
     | Measurement
     | Withdrawal
+    | CorrectedClearance
     | ForecastPoint
     | Commissioned
     | CommissionedTorque

@@ -23,6 +23,7 @@ from leg_wear_monitor.monitor.ledger.recovery import Recovered
 from leg_wear_monitor.monitor.ledger.rows import (
     read_commissioned,
     read_commissioned_torque,
+    read_corrections,
     read_identified_leg,
     read_last_reset,
     read_measurements,
@@ -53,6 +54,8 @@ class Ledger:
         Last entry of earlier runs; None in a new ledger.
     measurements : tuple of Measurement
         Manually measured clearances of earlier runs, including withdrawn ones.
+    corrections : tuple of CorrectedClearance
+        Counted clearances that were corrected by the drive torque in earlier runs.
     commissioned : Commissioned or None
         Errors of further encoders from earlier runs.
     commissioned_torque : CommissionedTorque or None
@@ -118,6 +121,7 @@ class Ledger:
             spans += [(*span, epoch) for span, epoch in zip(self.entry.spans, own, strict=True)]
         self._spans = np.array(sorted(set(spans)), dtype=np.int64).reshape(-1, 3)
         self.measurements = self._store.ask(read_measurements)
+        self.corrections = self._store.ask(read_corrections)
         self.commissioned = self._store.ask(read_commissioned)
         self.commissioned_torque = self._store.ask(read_commissioned_torque)
         self.parameters = self._store.ask(read_identified_leg)

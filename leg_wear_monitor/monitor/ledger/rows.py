@@ -13,6 +13,7 @@ from leg_wear_monitor.monitor.ledger.entry import (
     ClearancePoint,
     Commissioned,
     CommissionedTorque,
+    CorrectedClearance,
     Entry,
     Event,
     ForecastPoint,
@@ -93,7 +94,7 @@ def write_event(db: sqlite3.Connection, event: Event) -> None:
                 "VALUES (?, ?, ?, ?, ?)",
                 (stamp_ns, cycle, joint, clearance_m, clearance_max_m),
             )
-        case Measurement() | ForecastPoint() | VerdictEvent():
+        case Measurement() | CorrectedClearance() | ForecastPoint() | VerdictEvent():
             _append(db, event)
         case Withdrawal(stamp_ns, who, measurement):
             db.execute(
@@ -133,10 +134,17 @@ def write_event(db: sqlite3.Connection, event: Event) -> None:
             )
 
 
-_TABLES = {Measurement: "measurement", ForecastPoint: "forecast", VerdictEvent: "verdict"}
+_TABLES = {
+    Measurement: "measurement",
+    CorrectedClearance: "correction",
+    ForecastPoint: "forecast",
+    VerdictEvent: "verdict",
+}
 
 
-def _append(db: sqlite3.Connection, event: Measurement | ForecastPoint | VerdictEvent) -> None:
+def _append(
+    db: sqlite3.Connection, event: Measurement | CorrectedClearance | ForecastPoint | VerdictEvent
+) -> None:
     """Append a row to the table whose columns are the event's fields."""
     table = _TABLES[type(event)]
     values = attrs.asdict(event, filter=lambda field, _: field.name != "id")
@@ -150,6 +158,13 @@ def read_measurements(db: sqlite3.Connection) -> tuple[Measurement, ...]:
     rows = db.execute(f"SELECT {', '.join(names)} FROM measurement ORDER BY id")
     found = (Measurement(**dict(zip(names, row, strict=True))) for row in rows)
     return tuple(attrs.evolve(each, counts=bool(each.counts)) for each in found)
+
+
+def read_corrections(db: sqlite3.Connection) -> tuple[CorrectedClearance, ...]:
+    """All counted clearances that were corrected by the drive torque, in the order of their entry."""
+    names = [field.name for field in attrs.fields(CorrectedClearance)]
+    rows = db.execute(f"SELECT {', '.join(names)} FROM correction ORDER BY id")
+    return tuple(CorrectedClearance(*row) for row in rows)
 
 
 def read_commissioned(db: sqlite3.Connection) -> Commissioned | None:

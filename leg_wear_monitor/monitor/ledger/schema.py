@@ -246,13 +246,22 @@ CREATE TABLE torque_reference (
 ) STRICT;
 """
 
-MIGRATIONS = (_FIRST, _SECOND, _THIRD, _FOURTH, _FIFTH, _SIXTH, _SEVENTH, _EIGHTH)
+_NINTH = """
+-- counted clearances that were replaced by what the drive torque shows: of which part (replaced_ns as in
+-- joint), the clearance from then on, and the wear that was counted for it before and is from then on
+CREATE TABLE correction (
+    id INTEGER PRIMARY KEY, stamp_ns INTEGER NOT NULL, joint TEXT NOT NULL, clearance_m REAL NOT NULL,
+    sigma_m REAL NOT NULL, before_m REAL NOT NULL, wear_m REAL NOT NULL, replaced_ns INTEGER NOT NULL
+) STRICT;
+"""
+
+MIGRATIONS = (_FIRST, _SECOND, _THIRD, _FOURTH, _FIFTH, _SIXTH, _SEVENTH, _EIGHTH, _NINTH)
 
 FORMAT = len(MIGRATIONS)
 SEALED_FROM = 4  # first format with checksums over the whole content
 
 GROWING = (  # append only
-    "alarm_history", "audit", "body", "commissioning", "forecast", "friction", "history",
+    "alarm_history", "audit", "body", "commissioning", "correction", "forecast", "friction", "history",
     "torque_commissioning", "verdict",
 )  # fmt: skip
 CHANGING = (

@@ -137,7 +137,7 @@ def test_measurements_that_repeat_the_same_model_are_expected_evenly():
     drawn = FRESH + PRIOR.clearance_sigma_m * random.standard_normal(400)
     drawn += wear * np.exp(PRIOR.wear_coefficient_sigma * random.standard_normal(400))
     drawn += 5e-6 * random.standard_normal(400)
-    below = [coefficient_estimate.probability_below(FRESH, MeasuredClearance(c, 5e-6, wear)) for c in drawn]
+    below = [coefficient_estimate.probability_below(MeasuredClearance(c, 5e-6, wear)) for c in drawn]
     assert 0.75 <= np.mean((np.array(below) > 0.1) & (np.array(below) < 0.9)) <= 0.85
     assert np.mean(below) == pytest.approx(0.5, abs=0.05)
 

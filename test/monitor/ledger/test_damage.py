@@ -15,6 +15,7 @@ from leg_wear_monitor.monitor.ledger.entry import (
     ClearancePoint,
     Commissioned,
     CommissionedTorque,
+    CorrectedClearance,
     ForecastPoint,
     IdentifiedLeg,
     Measurement,
@@ -42,6 +43,7 @@ def full(open_ledger, entry_at):
     ledger.note(ClearancePoint(3, 7, "A", 3.0e-4, 4.0e-4))
     ledger.note(ForecastPoint(3, 7, "A", 1.0, 2.0, 3.0))
     ledger.note(Measurement(1, "A", "ann", 3e-4, 1e-6, 1e-5, 3, 0, 0.3, True))
+    ledger.note(CorrectedClearance(1, "A", 1e-3, 4e-5, 1e-5, 7e-4, 0))
     ledger.note(Commissioned(1, ("hip",), np.zeros(1), np.zeros(3), np.eye(3)))
     ledger.note(CommissionedTorque(1, np.full(5, 3e-4), np.ones((3, 80))))
     torque = np.ones((2, 1, POINTS), np.float16)

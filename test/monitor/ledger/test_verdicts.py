@@ -16,7 +16,12 @@ from leg_wear_monitor.twin.reference.leg_parameters import LegParameters
 pytestmark = pytest.mark.plain
 
 # what a ledger of format 4 does not ask for
-LATER = ("read_commissioned_torque", "read_identified_leg", "read_simulated_reference")
+LATER = (
+    "read_commissioned_torque",
+    "read_corrections",
+    "read_identified_leg",
+    "read_simulated_reference",
+)
 
 EVENT = VerdictEvent(
     stamp_ns=7,
@@ -115,7 +120,7 @@ def test_a_ledger_of_format_4_is_migrated_with_the_entries_of_its_log(
     found.note(EVENT)
     found.keep(entry_at(6), closed=True)
     found.close()
-    assert version(ledger.path) == schema.FORMAT == 8
+    assert version(ledger.path) == schema.FORMAT == 9
     assert len(rows(ledger.path)) == 1
     assert open_ledger().entry.digest() == entry_at(6).digest()
 

@@ -2,6 +2,7 @@
 
 import json
 import time
+from collections.abc import Sequence
 from pathlib import Path
 
 import attrs
@@ -18,6 +19,11 @@ from leg_wear_monitor.playback.result.replay_summary import summary_of
 from leg_wear_monitor.report.fleet.page import fleet_page
 from leg_wear_monitor.report.fleet.standing import Day
 from leg_wear_monitor.report.page import page_html
+from leg_wear_monitor.workers.job import Job
+from leg_wear_monitor.workers.processes import run_here, run_in_processes
+
+_WORTH_WORKERS = 8
+"""Pages from which on workers, which take a second or two to start, write them sooner than one process."""
 
 
 @attrs.define
@@ -39,8 +45,17 @@ class WrittenPages:
     faults: list[str] = attrs.Factory(list)
 
 
-def write_pages(description: Path, out: Path, fresh_days: float) -> WrittenPages:
+def write_pages(description: Path, out: Path, fresh_days: float, workers: int = 1) -> WrittenPages:
     """Write the page of a fleet, and those of its legs that have changed.
+
+    Parameters
+    ----------
+    description, out : pathlib.Path
+        File of the description, and directory of the fleet.
+    fresh_days : float
+        Age of its last recording up to which a leg counts as monitored.
+    workers : int
+        Number of local processes for the pages of the legs; pages do not depend on it.
 
     Raises
     ------
@@ -48,33 +63,56 @@ def write_pages(description: Path, out: Path, fresh_days: float) -> WrittenPages
         If the description or the overview is unusable, or the disk does not take a page.
     """
     overview = described(load_overview(out), load_fleet(description))
-    written, pages = WrittenPages(out / PAGE), set()
-    with progress_bar("writing the pages") as progress:
-        for number, leg in enumerate(overview.legs):
-            home = out / "legs" / leg.id
-            _write_leg(home, written)
-            if (home / PAGE).is_file():
-                pages.add(leg.id)
-            progress((number + 1) / len(overview.legs))
+    written = WrittenPages(out / PAGE)
+    homes = [out / "legs" / leg.id for leg in overview.legs]
+    _write_legs([home for home in homes if _is_due(home)], written, workers)
+    pages = {home.name for home in homes if (home / PAGE).is_file()}
     day = Day(now_ns=time.time_ns(), fresh_days=fresh_days)
     page = fleet_page(overview, day, pages, {"leg_wear_monitor": version()})
     write_directory(out, {PAGE: page_html(page).encode()})
     return written
 
 
-def _write_leg(home: Path, written: WrittenPages) -> None:
-    """Write the page of a leg if its summary is newer; one that cannot be made any more is removed."""
+def _is_due(home: Path) -> bool:
+    """Whether the summary of a leg is newer than its page."""
     source, page = home / SUMMARY, home / PAGE
-    if not source.is_file() or (page.is_file() and page.stat().st_mtime_ns > source.stat().st_mtime_ns):
-        return
+    return source.is_file() and not (page.is_file() and page.stat().st_mtime_ns > source.stat().st_mtime_ns)
+
+
+def _write_legs(homes: Sequence[Path], written: WrittenPages, workers: int) -> None:
+    with progress_bar("writing the pages") as progress:
+        done = 0
+
+        def take(_job: Job, fault: str) -> None:
+            nonlocal done
+            done += 1
+            progress(done / len(homes))
+            if fault:
+                written.faults.append(fault)
+            else:
+                written.legs += 1
+
+        jobs = [Job(home.name, write_leg, (home,)) for home in homes]
+        if workers > 1 and len(jobs) >= _WORTH_WORKERS:
+            run_in_processes(jobs, workers, take)
+        else:
+            run_here(jobs, take)
+    written.faults.sort()
+
+
+def write_leg(home: Path) -> str:
+    """Write the page of a leg from its summary; why that is not possible, empty if it is.
+
+    A page that cannot be made any more is removed: the page of the fleet does without.
+    """
+    source = home / SUMMARY
     try:
         text = page_of(summary_of(_record(source), str(source)))
-    except ConfigError as error:  # of an earlier version, or damaged: the page of the fleet does without
-        written.faults.append(str(error))
+    except ConfigError as error:  # of an earlier version, or damaged
         write_directory(home, {PAGE: None})
-        return
+        return str(error)
     write_directory(home, {PAGE: text})
-    written.legs += 1
+    return ""
 
 
 def _record(source: Path) -> object:

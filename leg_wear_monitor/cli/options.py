@@ -40,6 +40,18 @@ ledger_option: Option = click.option(
     help="Ledger to write into.  [default: the one in the parameters]",
 )
 
+sample_option: Option = click.option(
+    "--sample",
+    type=click.FloatRange(0.0, 1.0, min_open=True),
+    metavar="FRACTION",
+    help="Follow this fraction of the gait cycles, track and check the others, and estimate their wear; for "
+    "long recordings, where no impact needs to be seen.  [default: all]",
+)
+
+workers_option: Option = click.option(
+    "--workers", type=click.IntRange(min=1), metavar="N", help="Number of local processes.  [default: cores]"
+)
+
 
 def clearances_option(metavar: str) -> Option:
     """``--clearances``: names of the clearance joints, separated by commas."""

@@ -7,6 +7,7 @@ from pathlib import Path
 import click
 
 from leg_wear_monitor.errors import ConfigError
+from leg_wear_monitor.whole_file import write_whole
 
 STDOUT = Path("-")
 
@@ -72,7 +73,7 @@ def write_json(path: Path | None, text: str) -> list[Path]:
 
 
 def write_file(path: Path, content: bytes) -> None:
-    """Write a file such that no one ever sees a part of it: beside it first, then in its place.
+    """Write a file such that no one ever sees a part of it; a device or a pipe just gets the bytes.
 
     Raises
     ------
@@ -82,15 +83,7 @@ def write_file(path: Path, content: bytes) -> None:
     if _is_stream(path):
         path.write_bytes(content)
         return
-    target = path.resolve()
-    part = _beside(target)
-    try:
-        part.write_bytes(content)
-        os.replace(part, target)
-    except OSError as error:
-        raise ConfigError(str(path), "", f"cannot be written: {error.strerror}") from error
-    finally:
-        part.unlink(missing_ok=True)
+    write_whole(path.resolve(), content)
 
 
 def write_directory(path: Path, files: Mapping[str, bytes | None]) -> list[Path]:
@@ -113,10 +106,6 @@ def write_directory(path: Path, files: Mapping[str, bytes | None]) -> list[Path]
     return [path / name for name, content in files.items() if content is not None]
 
 
-def _beside(target: Path) -> Path:
-    return target.with_name(f".{target.name}.{os.getpid()}.part")
-
-
 def _is_stream(path: Path) -> bool:
     """A device or a pipe, which must not be replaced by a file."""
     return path.exists() and not path.is_file()
@@ -124,7 +113,7 @@ def _is_stream(path: Path) -> bool:
 
 def _try(option: str, path: Path, directory: Path) -> None:
     """Only writing tells: rights, a read-only file system, and an administrator whom rights do not stop."""
-    probe = _beside(directory / path.name)
+    probe = directory / f".{path.name}.{os.getpid()}.part"
     try:
         probe.write_bytes(b"")
     except OSError as error:

@@ -3,6 +3,7 @@
 import os
 import signal
 import threading
+import warnings
 from collections.abc import Iterator, Sequence
 from concurrent.futures import FIRST_COMPLETED, wait
 from concurrent.futures.process import BrokenProcessPool
@@ -84,7 +85,9 @@ def _pool(workers: int) -> Iterator["ProcessPoolExecutor"]:
         from loky import ProcessPoolExecutor
     except ImportError as error:
         raise ConfigError("--workers", str(workers), "needs loky (pip install loky), expected 1") from error
-    with _environment(dict.fromkeys(_THREADS, "1")):
+    with _environment(dict.fromkeys(_THREADS, "1")), warnings.catch_warnings():
+        # A worker that has grown starts anew between two jobs, which loses nothing.
+        warnings.filterwarnings("ignore", "A worker was restarted", UserWarning)
         pool = ProcessPoolExecutor(workers, context=get_context("spawn"), initializer=_begin_worker)
         try:
             yield pool

@@ -6,7 +6,7 @@ from typing import TYPE_CHECKING, Any
 
 import click
 
-from leg_wear_monitor.cli.options import out_option
+from leg_wear_monitor.cli.options import out_option, sample_option, workers_option
 from leg_wear_monitor.cli.output import check_directory
 from leg_wear_monitor.cli.waiting import compilation, progress_bar
 
@@ -27,19 +27,11 @@ def fleet() -> None:
 @fleet.command(short_help="Count the recordings that are not counted yet.")
 @click.argument("description", type=click.Path(path_type=Path), metavar="FLEET.yaml")
 @out_option("Directory of the fleet.  [default: out of the description, or fleet beside it]")
-@click.option(
-    "--workers", type=click.IntRange(min=1), metavar="N", help="Number of local processes.  [default: cores]"
-)
+@workers_option
 @click.option(
     "--scheduler", metavar="ADDRESS", help="Dask scheduler whose workers count instead, tcp://HOST:PORT."
 )
-@click.option(
-    "--sample",
-    type=click.FloatRange(0.0, 1.0, min_open=True),
-    metavar="FRACTION",
-    help="Follow this fraction of the gait cycles and estimate the wear of the others, as in replay.  "
-    "[default: all]",
-)
+@sample_option
 @click.option("--follow", is_flag=True, help="Go on with new recordings as they are completed, until ^C.")
 @click.option(
     "--every-s",
@@ -197,18 +189,21 @@ def _print_counts(done: "FleetUpdate", out: Path) -> None:
     show_default=True,
     help="Age of its last recording up to which a leg counts as monitored.",
 )
-def report(description: Path, out: Path | None, fresh_days: float) -> int:
+@workers_option
+def report(description: Path, out: Path | None, fresh_days: float, workers: int | None) -> int:
     """Write DIR/report.html from what the last update found, and legs/ID/report.html for each leg.
 
     A leg of the description that was never updated is on the page, without a recording. Nothing is computed.
     Exits with 1 if the page of a leg cannot be made.
     """
+    import os
+
     from leg_wear_monitor.cli.fleet_pages import write_pages
     from leg_wear_monitor.fleet.description.loader import fleet_directory
 
     out = out or fleet_directory(description)
     check_directory("--out", out)
-    written = write_pages(description, out, fresh_days)
+    written = write_pages(description, out, fresh_days, workers or os.cpu_count() or 1)
     for fault in written.faults[:_MOST_LINES]:
         click.echo(f"warning: no page of its own: {fault}", err=True)
     click.echo(f"pages of legs that have changed: {written.legs}")

@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING, Any
 import click
 
 from leg_wear_monitor.cli.main import version
-from leg_wear_monitor.cli.options import config_option, json_option, out_option
+from leg_wear_monitor.cli.options import config_option, json_option, out_option, sample_option
 from leg_wear_monitor.cli.output import STDOUT, check_outputs, write_directory, write_json
 from leg_wear_monitor.cli.waiting import compilation, progress_bar
 from leg_wear_monitor.errors import LegWearError
@@ -59,13 +59,7 @@ _MOST_LINES = 20
     metavar="MB",
     help="Memory limit of reading, temporary files included.",
 )
-@click.option(
-    "--sample",
-    type=click.FloatRange(0.0, 1.0, min_open=True),
-    metavar="FRACTION",
-    help="Follow this fraction of the gait cycles, track and check the others, and estimate their wear; for "
-    "long recordings, where no impact needs to be seen.  [default: all]",
-)
+@sample_option
 @click.option(
     "--ledger",
     type=click.Path(path_type=Path, dir_okay=False),

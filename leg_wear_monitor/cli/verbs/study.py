@@ -5,6 +5,7 @@ from typing import TYPE_CHECKING
 
 import click
 
+from leg_wear_monitor.cli.options import workers_option
 from leg_wear_monitor.cli.output import check_directory
 from leg_wear_monitor.cli.waiting import compilation, progress_bar
 
@@ -33,12 +34,7 @@ FAULTS_FOUND = 1
     required=True,
     help="Data and page.",
 )
-@click.option(
-    "--workers",
-    type=click.IntRange(min=1),
-    metavar="N",
-    help="Number of local processes.  [default: cores]",
-)
+@workers_option
 @click.option(
     "--scheduler", metavar="ADDRESS", help="Dask scheduler whose workers compute instead, tcp://HOST:PORT."
 )

@@ -160,4 +160,7 @@ def _notes(found: Found) -> Iterator[str]:
     speeds = cadences_rpm(found.fit)
     if len(speeds) > 1:
         each = " and ".join(f"{speed:g}" for speed in speeds)
-        yield f"the leg walks at about {each} rpm; cadence.commanded_rpm is the most frequent one"
+        yield (
+            f"the leg walks at about {each} rpm; cadence.commanded_rpm is the most frequent one: "
+            "set it to the cadence of its work"
+        )

@@ -8,11 +8,11 @@ from leg_wear_monitor.fleet.chain.record import Outcome, record_of, unreadable
 from leg_wear_monitor.fleet.chain.scan import Found
 from leg_wear_monitor.fleet.chain.words import words_of
 from leg_wear_monitor.fleet.description.fleet_description import FleetLeg
-from leg_wear_monitor.fleet.directory.atomic import write_whole
 from leg_wear_monitor.fleet.directory.leg_directory import LegDirectory, Line
 from leg_wear_monitor.fleet.tables.cycles import cycle_columns
 from leg_wear_monitor.fleet.tables.parquet import write_parquet
 from leg_wear_monitor.playback.replay import ReplayResult, replay
+from leg_wear_monitor.whole_file import write_whole
 from leg_wear_monitor.workers.code import package_digest
 
 

@@ -1,33 +1,9 @@
-"""Files that are written whole or not at all."""
+"""Directories of a fleet, and lines of its files, which are written whole or not at all."""
 
 import os
-from contextlib import suppress
 from pathlib import Path
 
 from leg_wear_monitor.errors import ConfigError
-
-
-def write_whole(path: Path, content: bytes) -> None:
-    """Write a file and its name to the disk; nobody ever sees a part of it.
-
-    Raises
-    ------
-    ConfigError
-        If the disk does not take it.
-    """
-    part = path.with_name(f".{path.name}.part")  # one name, so that what a kill leaves does not stay
-    try:
-        path.parent.mkdir(parents=True, exist_ok=True)
-        with part.open("wb") as file:
-            file.write(content)
-            file.flush()
-            os.fsync(file.fileno())
-        os.replace(part, path)
-    except OSError as error:
-        raise ConfigError(str(path), "", f"cannot be written: {error.strerror}") from error
-    finally:
-        with suppress(OSError):
-            part.unlink(missing_ok=True)
 
 
 def make_directory(path: Path) -> None:

@@ -15,7 +15,8 @@ from pathlib import Path
 from typing import Any
 
 from leg_wear_monitor.errors import ConfigError, printable
-from leg_wear_monitor.fleet.directory.atomic import append_line, write_whole
+from leg_wear_monitor.fleet.directory.atomic import append_line
+from leg_wear_monitor.whole_file import write_whole
 
 Line = dict[str, Any]
 

@@ -7,7 +7,6 @@ from typing import Any
 
 import attrs
 
-from leg_wear_monitor.fleet.directory.atomic import write_whole
 from leg_wear_monitor.fleet.learning.learn import LearnedPair, LearnedPart
 from leg_wear_monitor.fleet.learning.part import Part
 from leg_wear_monitor.json_text import json_text
@@ -18,6 +17,7 @@ from leg_wear_monitor.monitor.forecast.coefficient_prior import (
     LearnedJoint,
     LearnedPriors,
 )
+from leg_wear_monitor.whole_file import write_whole
 
 LEARNING_VERSION = 1
 

@@ -15,6 +15,7 @@ from leg_wear_monitor.fleet.learning.part import Part, parts_of
 from leg_wear_monitor.mechanism.loader import load_mechanism
 from leg_wear_monitor.monitor.config.fitting import fitted
 from leg_wear_monitor.monitor.ledger.copy import copy_of
+from leg_wear_monitor.monitor.ledger.file import may_have_measurements
 from leg_wear_monitor.monitor.ledger.ledger import open_ledger
 
 
@@ -25,9 +26,9 @@ class FleetLearning:
     Attributes
     ----------
     pairs : mapping of str to LearnedPair
-        By material pair.
+        By material pair; empty if no clearance was measured.
     priors : mapping of str to pathlib.Path
-        File for ``forecast.priors`` of each leg.
+        File for ``forecast.priors`` of each leg; empty if no ledger has ever had a measurement.
     findings : tuple of (str, str)
         The leg, and a line about a part that contradicts the others, or a ledger that cannot be read.
     """
@@ -47,11 +48,14 @@ def learn_fleet(legs: Sequence[FleetLeg], out: Path) -> FleetLearning:
     out : pathlib.Path
         Directory of the fleet, which exists.
     """
+    ledgers = {leg.id: LegDirectory(out, leg.id).ledger for leg in legs}
+    if not any(map(may_have_measurements, ledgers.values())):  # nobody ever measured: no ledger is copied
+        return FleetLearning(pairs={}, priors=write_learning(out, (), {}), findings=())
     parts: list[Part] = []
     findings = []
     for leg in sorted(legs, key=lambda leg: leg.id):
         try:
-            parts += leg_parts(leg, LegDirectory(out, leg.id).ledger)
+            parts += leg_parts(leg, ledgers[leg.id])
         except LegWearError as error:
             findings.append((leg.id, f"nothing is learned from it: {error}"))
     pairs = learn(parts)

@@ -7,13 +7,13 @@ from pathlib import Path
 
 from leg_wear_monitor.errors import ConfigError
 from leg_wear_monitor.fleet.description.fleet_description import FleetDescription
-from leg_wear_monitor.fleet.directory.atomic import write_whole
 from leg_wear_monitor.fleet.directory.leg_directory import LegDirectory
 from leg_wear_monitor.fleet.overview.leg import leg_overview
 from leg_wear_monitor.fleet.overview.parts import UNKNOWN, FleetOverview, LegOverview
 from leg_wear_monitor.fleet.overview.read import FILE, load_overview
 from leg_wear_monitor.monitor.alarms.words import ADVICE
 from leg_wear_monitor.monitor.verdict.verdict import State
+from leg_wear_monitor.whole_file import write_whole
 
 _FIRST = 10
 

@@ -6,7 +6,7 @@ from pathlib import Path
 from typing import Any
 
 from leg_wear_monitor.errors import ConfigError, LegWearError
-from leg_wear_monitor.fleet.directory.atomic import write_whole
+from leg_wear_monitor.whole_file import write_whole
 
 
 def arrow() -> Any:

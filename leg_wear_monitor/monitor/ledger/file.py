@@ -128,6 +128,17 @@ def hardware_id_of(path: Path) -> str:
     return str(row[0]) if row else ""
 
 
+def may_have_measurements(path: Path) -> bool:
+    """Whether opening a ledger would show measured clearances, or that it cannot be read; without a lock."""
+    if not path.is_file():
+        return False
+    try:
+        with closing(_connect(path, "ro")) as db:
+            return db.execute("SELECT 1 FROM measurement LIMIT 1").fetchone() is not None
+    except sqlite3.Error:  # damaged, of the first format, or being written: opening it decides
+        return True
+
+
 def sync_directory(path: Path) -> None:
     """Write the creation or removal of a file's name to the disk."""
     handle = os.open(path.parent, os.O_RDONLY)

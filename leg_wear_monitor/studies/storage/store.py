@@ -6,7 +6,6 @@ points/KEY.npz   arrays of a point; its settings, seed, versions and a checksum 
 """
 
 import json
-import os
 import re
 from pathlib import Path
 from typing import Any
@@ -18,6 +17,7 @@ from leg_wear_monitor.studies.point import Arrays
 from leg_wear_monitor.studies.storage.archive import archive, read_archive
 from leg_wear_monitor.studies.storage.checksum import canonical, text_checksum
 from leg_wear_monitor.studies.tasks.compute import TASKS
+from leg_wear_monitor.whole_file import write_whole
 
 MANIFEST, MECHANISM, POINTS = "study.json", "mechanism.yaml", "points"
 _FORMAT = 2
@@ -56,10 +56,10 @@ class StudyDirectory:
             (self.path / POINTS).mkdir(parents=True, exist_ok=True)
         except OSError as error:
             raise ConfigError(str(self.path), "", f"cannot be made: {error.strerror}") from error
-        self._write(MECHANISM, mechanism_text.encode())
+        write_whole(self.path / MECHANISM, mechanism_text.encode())
         whole = {"format": _FORMAT, **manifest}
         whole["checksum"] = text_checksum(canonical(whole), mechanism_text)
-        self._write(MANIFEST, json_text(whole).encode())
+        write_whole(self.path / MANIFEST, json_text(whole).encode())
 
     def has(self, key: str) -> bool:
         """Whether a result file of a point exists, valid or not."""
@@ -67,7 +67,7 @@ class StudyDirectory:
 
     def write(self, key: str, arrays: Arrays, about: dict[str, Any]) -> None:
         """Store the result of a point, with its task, settings and versions."""
-        self._write(f"{POINTS}/{key}.npz", archive(arrays, {"key": key, **about}))
+        write_whole(self._file(key), archive(arrays, {"key": key, **about}))
 
     def read(self, key: str, task: str, settings: dict[str, Any]) -> Arrays:
         """Result of a point.
@@ -81,21 +81,6 @@ class StudyDirectory:
 
     def _file(self, key: str) -> Path:
         return self.path / POINTS / f"{key}.npz"
-
-    def _write(self, name: str, content: bytes) -> None:
-        """Write to a temporary file and rename it, so that readers see the whole file or none."""
-        target = self.path / name
-        part = target.with_name(f".{target.name}.{os.getpid()}.part")
-        try:
-            with part.open("wb") as file:
-                file.write(content)
-                file.flush()
-                os.fsync(file.fileno())
-            os.replace(part, target)
-        except OSError as error:
-            raise ConfigError(str(target), "", f"cannot be written: {error.strerror}") from error
-        finally:
-            part.unlink(missing_ok=True)
 
 
 def read_manifest(path: Path) -> dict[str, Any]:

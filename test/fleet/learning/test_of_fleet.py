@@ -1,5 +1,6 @@
 """Learning from the ledgers of a fleet: what a leg gets from the measured clearances of others."""
 
+import json
 from pathlib import Path
 
 import attrs
@@ -8,6 +9,7 @@ import pytest
 from leg_wear_monitor import load_mechanism
 from leg_wear_monitor.fleet.description.fleet_description import FleetLeg
 from leg_wear_monitor.fleet.directory.leg_directory import LegDirectory
+from leg_wear_monitor.fleet.learning import of_fleet
 from leg_wear_monitor.fleet.learning.of_fleet import learn_fleet
 from leg_wear_monitor.monitor.config.fitting import fitted
 from leg_wear_monitor.monitor.config.settings import MonitorConfig
@@ -26,7 +28,7 @@ def leg(name, lot="2026-03"):
                     node=None, joint_states=None, drive_torque=None)  # fmt: skip
 
 
-def measured(out, of, clearance_m):
+def measured(out, of, clearance_m, withdrawn=False):
     """Ledger of a leg with a measured clearance of joint A after 60 µm of counted wear."""
     path = LegDirectory(out, of.id).ledger
     path.parent.mkdir(parents=True)
@@ -40,6 +42,11 @@ def measured(out, of, clearance_m):
     )  # fmt: skip
     ledger.record()
     ledger.close()
+    if withdrawn:
+        again = open_ledger(fitted(load_mechanism(settings.mechanism), settings), settings)
+        again.withdraw(again.measurements[-1].id, 2, "ann")
+        again.record()
+        again.close()
     return path.read_bytes()
 
 
@@ -70,3 +77,24 @@ def test_a_ledger_that_cannot_be_read_is_named_and_the_others_are_used(tmp_path)
     assert text.startswith("nothing is learned from it: ")
     assert sorted(found.priors) == ["a", "new"]
     assert read_priors(str(found.priors["new"])).joints["A"].present.basis == "1 part of lot 2026-03"
+
+
+def test_where_nobody_ever_measured_no_ledger_is_copied(tmp_path, monkeypatch):
+    legs = [leg("a"), leg("b")]
+    for one in legs:
+        path = LegDirectory(tmp_path, one.id).ledger
+        path.parent.mkdir(parents=True)
+        settings = attrs.evolve(one.config, ledger=attrs.evolve(one.config.ledger, path=str(path)))
+        open_ledger(fitted(load_mechanism(settings.mechanism), settings), settings).close()
+    monkeypatch.setattr(of_fleet, "copy_of", lambda path: pytest.fail(f"{path} is copied"))
+    found = learn_fleet(legs, tmp_path)
+    assert (dict(found.pairs), dict(found.priors), found.findings) == ({}, {}, ())
+    assert json.loads((tmp_path / "learning.json").read_text())["pairs"] == {}
+
+
+def test_when_the_only_measurement_is_withdrawn_the_priors_say_nothing(tmp_path):
+    legs = [leg("a"), leg("b")]
+    measured(tmp_path, legs[0], 4.2e-4, withdrawn=True)
+    found = learn_fleet(legs, tmp_path)
+    assert dict(found.pairs) == {}
+    assert dict(read_priors(str(found.priors["b"])).joints) == {}

@@ -1,0 +1,64 @@
+"""Files that are written whole or not at all."""
+
+import fcntl
+import os
+from collections.abc import Iterator
+from contextlib import contextmanager, suppress
+from pathlib import Path
+from typing import BinaryIO
+
+from leg_wear_monitor.errors import ConfigError
+
+
+def write_whole(path: Path, content: bytes) -> None:
+    """Write a file and bring it to the disk; nobody ever sees a part of it.
+
+    Several processes may write the same file at the same time: one waits for the other, and the last one
+    counts. What a kill leaves is used by the next write.
+
+    Parameters
+    ----------
+    path : pathlib.Path
+        On a file system with locks; its directory is made if it does not exist.
+    content : bytes
+
+    Raises
+    ------
+    ConfigError
+        If the disk does not take it; the file is then as it was.
+    """
+    part = path.with_name(f".{path.name}.part")
+    try:
+        path.parent.mkdir(parents=True, exist_ok=True)
+        with _alone(part) as file:
+            try:
+                file.write(content)
+                file.flush()
+                os.fsync(file.fileno())
+                os.replace(part, path)
+            except BaseException:
+                with suppress(OSError):  # the first fault is the one to report
+                    part.unlink()
+                raise
+    except OSError as error:
+        raise ConfigError(str(path), "", f"cannot be written: {error.strerror}") from error
+
+
+@contextmanager
+def _alone(part: Path) -> Iterator[BinaryIO]:
+    """An empty file with this name, which no other process writes meanwhile."""
+    while True:
+        with part.open("ab") as file:
+            fcntl.flock(file, fcntl.LOCK_EX)
+            if not _is_at(part, file):  # who had it before has put it in its place
+                continue
+            file.truncate(0)
+            yield file
+            return
+
+
+def _is_at(path: Path, file: BinaryIO) -> bool:
+    try:
+        return os.path.samestat(path.stat(), os.fstat(file.fileno()))
+    except FileNotFoundError:
+        return False

@@ -34,6 +34,7 @@ from leg_wear_monitor.ros.gait_publisher.config import PublisherConfig
 from leg_wear_monitor.ros.gait_publisher.sensor_messages import sensor_message
 from leg_wear_monitor.ros.running import spin
 from leg_wear_monitor.twin.kinds import CRANK
+from leg_wear_monitor.twin.settings import TrackerSettings
 
 LOOP_CYCLES = 8  # that are sent again and again, with an angle that wraps
 STAMP = slice(4, 12)  # of a header in CDR
@@ -94,24 +95,30 @@ class Listener(Node):
     def __init__(self, legs: int) -> None:
         super().__init__("listener")
         self.delays_s: list[list[float]] = [[] for _ in range(legs)]
+        self.stamps_s: list[list[float]] = [[] for _ in range(legs)]
         self.cycle_delays_s: list[list[float]] = [[] for _ in range(legs)]
         self.diagnoses = [""] * legs
         self.told: list[dict[str, float]] = [{} for _ in range(legs)]
         self.hardware = {f"leg{leg}": leg for leg in range(legs)}
         deep = QoSProfile(depth=2000, reliability=ReliabilityPolicy.BEST_EFFORT)
         for leg in range(legs):
-            for kind, name, delays in (
-                (WrenchStamped, "predicted_torque", self.delays_s[leg]),
-                (JointState, "clearance_states", self.cycle_delays_s[leg]),
+            for kind, name, delays, stamps in (
+                (WrenchStamped, "predicted_torque", self.delays_s[leg], self.stamps_s[leg]),
+                (JointState, "clearance_states", self.cycle_delays_s[leg], []),
             ):
                 topic = f"leg{leg}/leg_wear_monitor/{name}"
                 self.create_subscription(
-                    kind, topic, lambda raw, delays=delays: self.hear(raw, delays), deep, raw=True
+                    kind,
+                    topic,
+                    lambda raw, delays=delays, stamps=stamps: self.hear(raw, delays, stamps),
+                    deep,
+                    raw=True,
                 )
         self.create_subscription(DiagnosticArray, "/diagnostics", self.hear_diagnostics, 50)
 
-    def hear(self, raw: bytes, delays: list[float]) -> None:
+    def hear(self, raw: bytes, delays: list[float], stamps: list[float]) -> None:
         seconds, rest = struct.unpack("<iI", raw[STAMP])
+        stamps.append(seconds % 100_000 + 1e-9 * rest)
         delays.append((time.time_ns() - seconds * 1_000_000_000 - rest) * 1e-9)
 
     def hear_diagnostics(self, message: DiagnosticArray) -> None:
@@ -124,6 +131,18 @@ class Listener(Node):
                 self.diagnoses[leg] = status.message
             if status.name.endswith((": load", ": topics", ": input")):
                 told.update((one.key, float(one.value)) for one in status.values if one.key in SHOWN)
+
+
+def beyond_lag_s(stamps: np.ndarray, delays: np.ndarray) -> np.ndarray:
+    """Delays [s] beyond the tracker's lag and window, of the newest sample that each spline node completes.
+
+    Samples wait for the node after them; in the time of two nodes, the one that waits least waits for none.
+    """
+    tracker = TrackerSettings()
+    bins = np.floor((stamps - stamps.min()) / (2.0 * tracker.node_interval)).astype(int)
+    least = np.full(bins.max() + 1, np.inf)
+    np.minimum.at(least, bins, delays)
+    return least[1:-1][np.isfinite(least[1:-1])] - tracker.lag - tracker.reorder_window_s
 
 
 def used(pid: int) -> tuple[float, float]:
@@ -209,6 +228,8 @@ def report(leg: int, sent: int, rows: list[tuple[float, ...]], listener: Listene
         f"stamp to report: median {median:.0f} ms, p99 {p99:.0f} ms, worst {1e3 * delays.max():.0f} ms "
         f"of {len(delays)}"
     )
+    beyond = 1e3 * np.percentile(beyond_lag_s(np.array(listener.stamps_s[leg]), delays), [50, 99])
+    print(f"  beyond the tracker's lag, window and nodes: median {beyond[0]:.1f} ms, p99 {beyond[1]:.1f} ms")
     cycles = 1e3 * np.array(listener.cycle_delays_s[leg])
     median, p99 = np.percentile(cycles, [50, 99])
     late = ", ".join(f"{cycles[i]:.0f} ms ({i + 1})" for i in np.argsort(cycles)[:-6:-1])

@@ -31,6 +31,7 @@ from leg_wear_monitor.monitor.wear_monitor import WearMonitor
 from leg_wear_monitor.ros.epochs import Epochs, boot_id
 from leg_wear_monitor.ros.health.node_health import Load, load_status, recording_status
 from leg_wear_monitor.ros.health.supervision import Supervision
+from leg_wear_monitor.ros.inputs.due import Due
 from leg_wear_monitor.ros.inputs.inbox import Inbox
 from leg_wear_monitor.ros.inputs.inputs import InputTopic, subscribe
 from leg_wear_monitor.ros.measure_service import MeasureRequest, measured, offer_measure
@@ -44,8 +45,8 @@ from leg_wear_monitor.ros.waiting import repeated
 
 NO_COMMANDS = "It publishes no commands and must not be part of a safety function."
 
-_WORK_S = 0.01  # period at which the monitor processes received messages
-_AT_ONCE = 500  # messages per period, so that services and parameters are also served
+_WORK_S = 0.01  # period at which messages are processed while no report is due at a known stamp
+_AT_ONCE = 500  # messages at once, so that services and parameters are also served
 _HELD = 20_000  # capacity in messages: ten seconds at 1 kHz on both topics
 _A_SAMPLE = (outputs.TORQUE, outputs.IMPACTS)
 
@@ -79,6 +80,7 @@ class MonitorNode(ClosingNode):
         config = parameters.config
         decoder = Decoder(config)
         self._inbox = Inbox(decoder, _HELD)
+        self._due = Due(lambda: self._monitor.due_stamp_ns)
         self._load = Load()
         self._epochs = Epochs(self._monitor, boot_id(), self._ros_now_ns, self._report)
         self._messages = Messages(config, self._monitor.clearance_joints, self.get_fully_qualified_name())
@@ -101,7 +103,7 @@ class MonitorNode(ClosingNode):
             self._black_box.add_topic(topic.name, topic.stream.type, SENSOR_DATA)
         # work and diagnostics continue while simulation time stands still
         steady = Clock(clock_type=ClockType.STEADY_TIME)
-        self.create_timer(_WORK_S, self._work, clock=steady)
+        self.create_timer(_WORK_S, self._work_in_time, clock=steady)
         self.create_timer(config.diagnostics.period_s, self._diagnose, clock=steady)
         joints, leg = ", ".join(self._monitor.clearance_joints), self._monitor.mechanism.name
         self.get_logger().info(f"monitoring joints {joints} of {leg}")
@@ -143,6 +145,13 @@ class MonitorNode(ClosingNode):
     def _receive(self, topic: InputTopic, raw: bytes) -> None:
         topic.heard_ns, topic.heard_wall_ns = time.monotonic_ns(), time.time_ns()
         self._inbox.add(topic.stream.code, raw, topic.heard_wall_ns)
+        if self._due.completes(topic.stream, raw, topic.heard_wall_ns, topic.heard_ns):
+            self._work()
+
+    def _work_in_time(self) -> None:
+        """Process messages that wait too long, or all while no report is due at a known stamp."""
+        if self._due.is_late(time.monotonic_ns()):
+            self._work()
 
     def _work(self) -> None:
         """Process received messages, a bounded number at a time."""
@@ -159,6 +168,7 @@ class MonitorNode(ClosingNode):
         reports = self._monitor.update(samples)
         self._supervision.note(arrivals, samples)
         self._publish(reports, coarse)
+        self._due.processed(time.monotonic_ns())
 
     # --- outputs ---
 

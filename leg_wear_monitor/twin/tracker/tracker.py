@@ -71,6 +71,18 @@ class CrankTracker:
             n = track(self._model, self.records, self._arrivals, self._queue, own, self.steps)
             yield self.steps, int(n)
 
+    @property
+    def due_stamp_ns(self) -> int:
+        """Stamp that the samples of all kinds must reach for the next spline node; 0 while none is followed.
+
+        The node is the first crank sample after its interval, so it may be reached a period later.
+        """
+        (model,), clock = self._model, self.state.clock
+        if not clock.followed:
+            return 0
+        waits = model["node_interval_ns"] + model["lag_ns"] + model["reorder_window_ns"]
+        return int(clock.last_node_ns + waits)
+
     def snapshot(self) -> TrackerSnapshot:
         """A copy of the whole state."""
         clock = self.state.clock

@@ -212,6 +212,19 @@ def test_a_sample_waits_for_lag_window_and_the_next_node_at_most(gait, lag_s, no
     assert longest - 2 * period_ns <= max(waited) <= longest + 2 * period_ns
 
 
+@pytest.mark.parametrize("rate_hz", [100.0, 1000.0])
+def test_no_node_comes_before_its_due_stamp_and_each_at_it_or_a_period_later(gait, rate_hz):
+    tracker, period_ns, nodes = CrankTracker(TrackerSettings()), round(S / rate_hz), 0
+    for sample in cut(with_torque(gait(3.0, rate_hz)), range(int(6 * rate_hz))):
+        due_ns = tracker.due_stamp_ns
+        reached = sum(int((steps["code"][:n] == MOVE).sum()) for steps, n in tracker.update(sample))
+        if due_ns and len(sample):
+            late_ns = int(sample["stamp_ns"][0]) - due_ns
+            assert not reached or 0 <= late_ns <= 2 * period_ns
+            nodes += reached
+    assert nodes >= 60
+
+
 @pytest.mark.parametrize("times", [1, 2])
 def test_speed_ripple_is_followed(gait, times):
     """Three percent, once or twice a turn, to a twentieth of it."""

@@ -62,6 +62,10 @@ class SampleStatistics:
         Mean of the predicted drive torque since the previous sample.
     contact_force_n : (n, k) array
         Contact forces at the sample.
+    measured_torque_nm : (n,) array
+        Drive torque that the sample brings, while tracking is lost, too; NaN without one.
+    eccentricity_m : (n, k, 2) array
+        Centre of each journal from the centre of its bushing, in the plane of the leg.
     """
 
     stamp_ns: Ints
@@ -69,6 +73,8 @@ class SampleStatistics:
     crank_angle_rad: Floats
     predicted_torque_nm: Floats
     contact_force_n: Floats
+    measured_torque_nm: Floats
+    eccentricity_m: Floats
 
     def __len__(self) -> int:
         return len(self.stamp_ns)
@@ -309,4 +315,5 @@ def joined(parts: Sequence[SampleStatistics], clearance_joints: int) -> SampleSt
 def no_samples(clearance_joints: int) -> SampleStatistics:
     """Empty sample statistics."""
     stamps: NDArray[np.int64] = np.zeros(0, dtype=np.int64)
-    return SampleStatistics(stamps, stamps, np.zeros(0), np.zeros(0), np.zeros((0, clearance_joints)))
+    none, forces = np.zeros(0), np.zeros((0, clearance_joints))
+    return SampleStatistics(stamps, stamps, none, none, forces, none, np.zeros((0, clearance_joints, 2)))

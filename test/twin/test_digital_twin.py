@@ -165,7 +165,29 @@ def test_every_sample_used_is_looked_at_once_and_in_order(in_one_go):
     assert np.isfinite(samples.predicted_torque_nm[followed]).all()
     assert np.isfinite(samples.contact_force_n[followed]).all()
     assert np.isnan(samples.contact_force_n[~followed]).all()
+    assert np.isnan(samples.eccentricity_m[~followed]).all()
     assert followed.mean() > 0.7
+
+
+def test_a_measured_torque_is_reported_with_its_sample_whether_the_leg_is_followed_or_not(
+    in_one_go, eventful
+):
+    samples = in_one_go[0].samples
+    given = {(one["stamp_ns"], one["kind"]): one["torque_nm"] for one in eventful}
+    wanted = [given[key] for key in zip(samples.stamp_ns, samples.kind, strict=True)]
+    np.testing.assert_array_equal(samples.measured_torque_nm, wanted)
+    unfollowed = np.isnan(samples.crank_angle_rad)
+    assert np.isfinite(samples.measured_torque_nm[unfollowed]).any()
+
+
+def test_a_loaded_journal_is_pressed_into_its_bushing(in_one_go, leg):
+    """Its eccentricity is the clearance and the penetration; a free journal is within its clearance."""
+    samples = in_one_go[0].samples
+    clearance_m = [leg.clearances[joint].radial_clearance for joint in leg.clearance_joints]
+    e, force = np.linalg.norm(samples.eccentricity_m, axis=2) / clearance_m, samples.contact_force_n
+    assert (e[force > 10.0] > 0.999).all()
+    assert (e[np.isfinite(force)] < 1.1).all()
+    assert (e[force == 0.0] < 1.01).all()
 
 
 def test_a_steady_gait_wears_as_a_steady_simulation(leg, twin, gait):

@@ -150,12 +150,12 @@ class LegFollower:
     ) -> SampleStatistics:
         """Follow n steps; append finished gait cycles and events; returns statistics of the samples."""
         i, m = 0, 0
-        evaluated, forces = self._room(n)
+        room = evaluated, forces, eccentricities = self._room(n)
         while i < n:
             reason, i, k, m = follow(
                 self._advance_address, self._stepper.model, self._setup.surfaces.feeds_back,
                 self._stepper.state, self.statistics, self._stepper.work, self._sensor, self._load.signature,
-                self._leg, steps, i, n, m, evaluated, forces,
+                self._leg, steps, i, n, m, *room,
             )  # fmt: skip
             if reason == CYCLE:
                 self._end_cycle(k, cycles)
@@ -171,12 +171,14 @@ class LegFollower:
             elif reason != DONE:
                 joint = self._setup.clearance_joints[k] if k >= 0 else None
                 events.append(Event(int(self.state.motion.failed_at_ns), _FAILURES[reason], joint))
-        stamp, kind, angle, torque = (evaluated[name][:m] for name in EVALUATED.names or ())
-        return SampleStatistics(stamp, kind, angle, torque, forces[:m])
+        stamp, kind, angle, torque, measured = (evaluated[name][:m] for name in EVALUATED.names or ())
+        at = eccentricities[:m].reshape(m, forces.shape[1], 2)
+        return SampleStatistics(stamp, kind, angle, torque, forces[:m], measured, at)
 
-    def _room(self, n: int) -> tuple[Records, Floats]:
-        """Room for n samples: `EVALUATED` and contact forces (n, k) [N]."""
-        return new_records(n, EVALUATED), np.zeros((n, len(self._setup.clearance_joints)))
+    def _room(self, n: int) -> tuple[Records, Floats, Floats]:
+        """Room for n samples: `EVALUATED`, contact forces (n, k) [N], and eccentricities (n, 2 k) [m]."""
+        joints = len(self._setup.clearance_joints)
+        return new_records(n, EVALUATED), np.zeros((n, joints)), np.zeros((n, 2 * joints))
 
     def compile(self, steps: Steps) -> None:
         """Compile what follows steps, but for the motion itself; the leg stays where it is."""

@@ -142,11 +142,13 @@ def follow(
     m,
     evaluated,
     forces,
+    eccentricities,
 ):
     """Follow steps from index ``first`` to n; ``stepper`` is the ClearanceState, ``state`` the LegState.
 
     ``sensors`` (1,) contains the torque sensor. Values at samples are written to ``evaluated`` (n,) from
-    index m on, contact forces [N] to ``forces`` (n, k), NaN while the leg does not run or does not count.
+    index m on, contact forces [N] to ``forces`` (n, k) and eccentricities [m] to ``eccentricities`` (n, 2 k),
+    NaN while the leg does not run or does not count.
 
     Returns
     -------
@@ -196,10 +198,14 @@ def follow(
         elif code == EVALUATE:
             out = evaluated[m]
             out.stamp_ns, out.kind, out.angle, out.torque = step.end_ns, step.detail, math.nan, math.nan
+            out.measured = step.torque
             if motion.runs != 0:
                 _evaluate(sensor, signature, leg, polynomial, stepper, step, out)
+            is_counted = motion.runs != 0 and motion.counts == COUNTED
             for j in range(force.shape[0]):
-                forces[m, j] = force[j] if motion.runs != 0 and motion.counts == COUNTED else math.nan
+                forces[m, j] = force[j] if is_counted else math.nan
+            for j in range(stepper.e.shape[0]):
+                eccentricities[m, j] = stepper.e[j] if is_counted else math.nan
             m += 1
         elif code == START:
             return NEEDS_START, i, -1, m

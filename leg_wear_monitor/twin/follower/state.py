@@ -134,6 +134,7 @@ EVALUATED = np.dtype(
         ("kind", "i8"),  # of `twin.sample`
         ("angle", "f8"),  # of the crank [rad], NaN while the leg does not run
         ("torque", "f8"),  # mean drive torque since the previous sample [N m], NaN while the leg does not run
+        ("measured", "f8"),  # drive torque that the sample brings [N m], NaN without one
     ]
 )
 """The leg at a sample."""

@@ -105,7 +105,9 @@ def _follow(model, state, sample, steps, n):
     if kind == TORQUE:
         count.used[TORQUE] += 1
         if clock.last_crank_ns == 0:  # nothing to compare it with
-            return add_step(steps, n, EVALUATE, stamp, stamp, kind)
+            n = add_step(steps, n, EVALUATE, stamp, stamp, kind)
+            steps[n - 1].torque = row.torque
+            return n
     elif kind == CRANK:
         if clock.last_crank_ns == 0:
             _begin(model, state, sample, row)

@@ -10,26 +10,40 @@ from numpy.typing import ArrayLike, NDArray
 JOINT_STATE = "sensor_msgs/msg/JointState"
 WRENCH_STAMPED = "geometry_msgs/msg/WrenchStamped"
 DIAGNOSTIC_ARRAY = "diagnostic_msgs/msg/DiagnosticArray"
+FLOAT64 = "std_msgs/msg/Float64"
+MARKER_ARRAY = "visualization_msgs/msg/MarkerArray"
 
-_LITTLE = b"\0\1\0\0"
+LITTLE_ENDIAN = b"\0\1\0\0"
+"""The encapsulation header of a message."""
 _SECOND = 1_000_000_000
 
 
-class _Layout:
-    """Message layout, built part by part; number columns are registered first and filled in later."""
+class Layout:
+    """Message layout, built part by part; number columns are registered first and filled in later.
+
+    Attributes
+    ----------
+    body : bytearray
+        The message so far, without the encapsulation header.
+    columns : list of tuples
+        Place in the body and values (n, any) of numbers that differ between messages.
+    """
 
     def __init__(self) -> None:
         self.body = bytearray()
         self.columns: list[tuple[int, NDArray[Any]]] = []
 
     def align(self, size: int) -> None:
+        """Pad to a multiple of a size [bytes]."""
         self.body += bytes(-len(self.body) % size)
 
     def count(self, number: int) -> None:
+        """Add the length of a sequence."""
         self.align(4)
         self.body += struct.pack("<I", number)
 
     def text(self, text: str) -> None:
+        """Add a string."""
         content = text.encode() + b"\0"
         self.count(len(content))
         self.body += content
@@ -41,6 +55,7 @@ class _Layout:
         self.body += bytes(values.dtype.itemsize * values.shape[1])
 
     def header(self, stamp_ns: NDArray[np.int64], frame_id: str) -> None:
+        """Add a std_msgs/Header."""
         seconds, rest = np.divmod(stamp_ns, _SECOND)
         self.column(seconds.astype("<i4")[:, None])
         self.column(rest.astype("<u4")[:, None])
@@ -48,12 +63,12 @@ class _Layout:
 
     def messages(self, n: int) -> NDArray[np.uint8]:
         """All messages, one per row."""
-        rows = np.empty((n, len(_LITTLE) + len(self.body)), np.uint8)
-        rows[:] = np.frombuffer(_LITTLE + bytes(self.body), np.uint8)
+        rows = np.empty((n, len(LITTLE_ENDIAN) + len(self.body)), np.uint8)
+        rows[:] = np.frombuffer(LITTLE_ENDIAN + bytes(self.body), np.uint8)
         for at, values in self.columns:
             size = values.dtype.itemsize * values.shape[1]
             raw = np.ascontiguousarray(values).view(np.uint8).reshape(n, size)
-            rows[:, len(_LITTLE) + at : len(_LITTLE) + at + size] = raw
+            rows[:, len(LITTLE_ENDIAN) + at : len(LITTLE_ENDIAN) + at + size] = raw
         return rows
 
 
@@ -84,7 +99,7 @@ def joint_states(
         A message a row.
     """
     stamps = np.atleast_1d(np.asarray(stamp_ns, np.int64))
-    layout = _Layout()
+    layout = Layout()
     layout.header(stamps, frame_id)
     layout.count(len(names))
     for name in names:
@@ -119,7 +134,7 @@ def wrenches(
         A message a row.
     """
     stamps = np.atleast_1d(np.asarray(stamp_ns, np.int64))
-    layout = _Layout()
+    layout = Layout()
     layout.header(stamps, frame_id)
     for values in (force, torque):
         column = np.zeros((len(stamps), 3)) if values is None else np.asarray(values, float)
@@ -130,7 +145,7 @@ def wrenches(
 def float64s(values: ArrayLike) -> NDArray[np.uint8]:
     """Messages of std_msgs/Float64, from values (n,): a message a row."""
     numbers = np.atleast_1d(np.asarray(values, "<f8"))
-    layout = _Layout()
+    layout = Layout()
     layout.column(numbers[:, None])
     return layout.messages(len(numbers))
 
@@ -148,7 +163,7 @@ def diagnostic_array(
         Name, level (0 OK, 1 WARN, 2 ERROR, 3 STALE), message, hardware id, values by key.
     frame_id : str
     """
-    layout = _Layout()
+    layout = Layout()
     layout.header(np.array([stamp_ns], np.int64), frame_id)
     layout.count(len(statuses))
     for name, level, message, hardware_id, values in statuses:

@@ -7,8 +7,12 @@ import attrs
 import numpy as np
 from numpy.typing import NDArray
 
+from leg_wear_monitor.mechanism.arrays import Floats
 from leg_wear_monitor.messages import encode
-from leg_wear_monitor.messages.qos import LATCHED, RELIABLE, SENSOR_DATA, Qos
+from leg_wear_monitor.messages.leg_markers import MARKERS
+from leg_wear_monitor.messages.output import Outgoing, Output, single
+from leg_wear_monitor.messages.qos import LATCHED, SENSOR_DATA
+from leg_wear_monitor.messages.scalars import Scalars
 from leg_wear_monitor.monitor.alarms.alarm import Alarm, Level
 from leg_wear_monitor.monitor.alarms.fault_codes import code_of
 from leg_wear_monitor.monitor.alarms.words import state_of
@@ -29,44 +33,19 @@ from leg_wear_monitor.monitor.status import verdict_status
 from leg_wear_monitor.monitor.verdict.words import with_unit
 from leg_wear_monitor.twin.kinds import CRANK
 
-
-@attrs.frozen
-class Output:
-    """An output topic of the monitor: name relative to the node, type and offered quality of service."""
-
-    name: str
-    type: str
-    qos: Qos = RELIABLE
-
-
 CLEARANCES = Output("~/clearance_states", encode.JOINT_STATE)
 IMPACTS = Output("~/impact_forces", encode.JOINT_STATE, SENSOR_DATA)
 TORQUE = Output("~/predicted_torque", encode.WRENCH_STAMPED, SENSOR_DATA)
+MEASURED_TORQUE = Output("~/measured_torque", encode.WRENCH_STAMPED, SENSOR_DATA)
 FORECAST = Output("~/forecast", encode.DIAGNOSTIC_ARRAY)
 ALARMS = Output("~/alarms", encode.DIAGNOSTIC_ARRAY, LATCHED)
 VERDICT = Output("~/verdict", encode.DIAGNOSTIC_ARRAY, LATCHED)
 DIAGNOSTICS = Output("/diagnostics", encode.DIAGNOSTIC_ARRAY)
-OUTPUTS = (CLEARANCES, IMPACTS, TORQUE, FORECAST, ALARMS, VERDICT, DIAGNOSTICS)
+OUTPUTS = (CLEARANCES, IMPACTS, TORQUE, FORECAST, ALARMS, VERDICT, DIAGNOSTICS, MARKERS)
+"""Those of every monitor; `Messages.outputs` has all."""
 
 _AXES = {"x": 0, "y": 1, "z": 2}
 _DIGITS = 15
-
-
-@attrs.frozen(eq=False)
-class Outgoing:
-    """Messages for one topic.
-
-    Attributes
-    ----------
-    output : Output
-    stamp_ns : (n,) array of int
-    messages : (n, bytes) array of uint8
-        One message per row.
-    """
-
-    output: Output
-    stamp_ns: NDArray[np.int64]
-    messages: NDArray[np.uint8]
 
 
 class Messages:
@@ -79,10 +58,18 @@ class Messages:
         The clearance joints, in the order of the reports.
     node : str
         Full name of the node; without its leading slash, it prefixes the names in diagnostics.
+
+    Attributes
+    ----------
+    outputs : tuple of Output
+        All topics that the parameters ask for.
     """
 
     def __init__(self, config: MonitorConfig, clearance_joints: Sequence[str], node: str = NODE) -> None:
         self.config, self._node = config, node.lstrip("/")
+        self._scalars = Scalars(clearance_joints) if config.publish_scalars else None
+        plotted = () if self._scalars is None else (MEASURED_TORQUE, *self._scalars.outputs)
+        self.outputs = (*OUTPUTS, *plotted)
         self._clearances = [f"{joint}_clearance" for joint in clearance_joints]
         self._impacts = [f"{joint}_impact" for joint in clearance_joints]
 
@@ -90,26 +77,31 @@ class Messages:
         """All messages for reports: those of samples, of gait cycles, of alarms and of the verdict."""
         yield from self.of_samples(reports.samples)
         for cycle in reports.cycles:
-            yield _single(CLEARANCES, cycle.stamp_ns, self.clearances(cycle))
+            yield single(CLEARANCES, cycle.stamp_ns, self.clearances(cycle))
+            if self._scalars:
+                yield from self._scalars.of(cycle)
         for alarms in reports.alarms:
-            yield _single(ALARMS, alarms.stamp_ns, self.alarms(alarms))
+            yield single(ALARMS, alarms.stamp_ns, self.alarms(alarms))
         for verdict in reports.verdicts:
-            yield _single(VERDICT, verdict.stamp_ns, self.verdict(verdict))
+            yield single(VERDICT, verdict.stamp_ns, self.verdict(verdict))
 
     def of_samples(self, samples: SampleReports) -> Iterator[Outgoing]:
-        """Torque at each tracked sample, and contact forces at each crank sample."""
+        """Torque at each tracked sample, contact forces at each crank sample, and the measured torque."""
         followed = np.isfinite(samples.predicted_torque_nm)
         if followed.any():
-            yield self._torques(samples, followed)
+            yield self._torques(TORQUE, samples.stamp_ns[followed], samples.predicted_torque_nm[followed])
+        measured = np.isfinite(samples.measured_torque_nm)
+        if self._scalars and measured.any():
+            torques = samples.measured_torque_nm[measured]
+            yield self._torques(MEASURED_TORQUE, samples.stamp_ns[measured], torques)
         followed &= samples.kind == CRANK
         if self.config.publish_impact_forces and followed.any():
             yield self._forces(samples, followed)
 
-    def _torques(self, samples: SampleReports, which: NDArray[np.bool_]) -> Outgoing:
-        stamps = samples.stamp_ns[which]
+    def _torques(self, output: Output, stamps: NDArray[np.int64], torques: Floats) -> Outgoing:
         torque = np.zeros((len(stamps), 3))
-        torque[:, _AXES[self.config.drive_torque.axis]] = samples.predicted_torque_nm[which]
-        return Outgoing(TORQUE, stamps, encode.wrenches(stamps, torque=torque, frame_id=self.config.frame_id))
+        torque[:, _AXES[self.config.drive_torque.axis]] = torques
+        return Outgoing(output, stamps, encode.wrenches(stamps, torque=torque, frame_id=self.config.frame_id))
 
     def _forces(self, samples: SampleReports, which: NDArray[np.bool_]) -> Outgoing:
         stamps, forces = samples.stamp_ns[which], samples.contact_force_n[which]
@@ -164,15 +156,6 @@ class Messages:
             for status in statuses
         ]
         return encode.diagnostic_array(stamp_ns, lines)
-
-
-def _single(output: Output, stamp_ns: int, raw: bytes) -> Outgoing:
-    return Outgoing(output, np.array([stamp_ns], np.int64), np.frombuffer(raw, np.uint8)[None, :])
-
-
-def topic_of(output: Output, node: str) -> str:
-    """Full name of a topic, for a node such as ``/robot/leg_wear_monitor``."""
-    return node + output.name[1:] if output.name.startswith("~") else output.name
 
 
 def plain(value: float) -> str:

@@ -6,12 +6,14 @@ from collections.abc import Mapping, Sequence
 import attrs
 
 from leg_wear_monitor.mechanism.materials.load import Bushing
+from leg_wear_monitor.monitor.diagnosis.diagnosis import Diagnosis
 from leg_wear_monitor.monitor.encoders.clearance_estimate import ClearanceEstimate
 from leg_wear_monitor.monitor.forecast.forecast import Forecast, JointForecast
 from leg_wear_monitor.monitor.forecast.growth import GrowthWindow, growth_rate
 from leg_wear_monitor.monitor.forecast.model_error import ModelError
 from leg_wear_monitor.monitor.ledger.entry import Measurement
 from leg_wear_monitor.monitor.reports import CycleReport, JointReport
+from leg_wear_monitor.monitor.verdict.situation import SeenClearance
 from leg_wear_monitor.twin.statistics import CycleStatistics, TorqueStatistics
 
 
@@ -25,6 +27,7 @@ def cycle_report(
     seen: Sequence[ClearanceEstimate] | None = None,
     measured: Sequence[Measurement | None] | None = None,
     sampling_sigma_m: Sequence[float] | None = None,
+    diagnosis: Diagnosis | None = None,
 ) -> CycleReport:
     """Report of a gait cycle.
 
@@ -45,6 +48,8 @@ def cycle_report(
         Last measurement of each joint's part.
     sampling_sigma_m : sequence of float, optional
         Standard deviation of each mean clearance, because not all gait cycles were followed; default 0.
+    diagnosis : Diagnosis, optional
+        Clearances that the drive torque shows.
     """
     torque = statistics.torque
     return CycleReport(
@@ -66,6 +71,7 @@ def cycle_report(
                 seen[k] if seen else None,
                 measured[k] if measured else None,
                 float(sampling_sigma_m[k]) if sampling_sigma_m is not None else 0.0,
+                _shown(k, diagnosis),
             )
             for k, (joint, bushing) in enumerate(bushings.items())
         ),
@@ -137,6 +143,7 @@ def _joint_report(
     seen: ClearanceEstimate | None,
     measured: Measurement | None,
     sampling_sigma_m: float,
+    shown: SeenClearance | None,
 ) -> JointReport:
     rate = growth_rate(window)
     mean_n, p99_n = float(statistics.mean_force_n[k]), float(statistics.p99_force_n[k])
@@ -157,4 +164,12 @@ def _joint_report(
         impacts=int(statistics.impacts[k]) if statistics.is_followed else None,
         load=bushing.load(mean_n, p99_n, rubbing_w) if statistics.is_followed else None,
         sampling_sigma_m=sampling_sigma_m,
+        shown=shown,
     )
+
+
+def _shown(k: int, diagnosis: Diagnosis | None) -> SeenClearance | None:
+    """The clearance of joint k that the drive torque shows."""
+    if diagnosis is None or not diagnosis.clearance_m or not math.isfinite(diagnosis.clearance_m[k]):
+        return None
+    return SeenClearance("torque", diagnosis.clearance_m[k], diagnosis.sigma_m[k])

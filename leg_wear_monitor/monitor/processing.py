@@ -139,6 +139,7 @@ class Processing:
             estimates,
             self._parts.measured,
             sigma_m.tolist(),
+            self._parts.diagnosis,
         )
         state.last = latest(report, state.last)
         accounting.note_clearances(report)

@@ -7,12 +7,13 @@ import attrs
 from leg_wear_monitor.mechanism.materials.load import BushingLoad
 from leg_wear_monitor.monitor.alarms.alarm import Alarm, Level
 from leg_wear_monitor.monitor.alarms.fault_codes import NO_FAULT
-from leg_wear_monitor.monitor.encoders.clearance_estimate import ClearanceEstimate
+from leg_wear_monitor.monitor.encoders.clearance_estimate import ClearanceEstimate, ClearanceObservation
 from leg_wear_monitor.monitor.forecast.forecast import JointForecast, LegForecast
 from leg_wear_monitor.monitor.forecast.measurement import judged_clearance_m
 from leg_wear_monitor.monitor.inputs.guard import InputGuard
 from leg_wear_monitor.monitor.inputs.pauses import Pauses
 from leg_wear_monitor.monitor.ledger.entry import Measurement
+from leg_wear_monitor.monitor.verdict.situation import SeenClearance
 from leg_wear_monitor.monitor.verdict.verdict import Finding, Verdict, verdict_of
 from leg_wear_monitor.twin.statistics import Intake, SampleStatistics
 
@@ -48,6 +49,8 @@ class JointReport:
         Pressure and sliding speed in this cycle, against the limits of the joint's material.
     sampling_sigma_m : float
         Standard deviation of the mean clearance, because sampled replays did not follow all gait cycles.
+    shown : SeenClearance or None
+        The clearance that the drive torque shows; None if it shows none.
     """
 
     joint: str
@@ -65,6 +68,15 @@ class JointReport:
     measured: Measurement | None = None
     load: BushingLoad | None = None
     sampling_sigma_m: float = 0.0
+    shown: SeenClearance | None = None
+
+    @property
+    def best_seen_m(self) -> float | None:
+        """Clearance that encoders or the drive torque show, the surer one; None if neither shows it."""
+        found = [] if self.shown is None else [(self.shown.sigma_m, self.shown.clearance_m)]
+        if self.seen is not None and self.seen.observation is ClearanceObservation.SEEN:
+            found.append((self.seen.sigma_m, self.seen.clearance_m))
+        return min(found)[1] if found else None
 
     @property
     def judged_clearance_m(self) -> float:

@@ -160,6 +160,11 @@ class WearMonitor:
         return self._parts.judge.report(self._parts.state)
 
     @property
+    def clearances_m(self) -> tuple[float, ...]:
+        """Mean clearance of each clearance joint, as counted."""
+        return tuple(self._twin.clearance_mean_m.tolist())
+
+    @property
     def clearance_limits_m(self) -> tuple[float, ...]:
         """Limit of the mean clearance of each clearance joint."""
         return self._evaluation.board.clearance_limits_m

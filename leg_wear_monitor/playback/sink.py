@@ -7,15 +7,10 @@ from types import TracebackType
 from leg_wear_monitor.bags.findings import RecordingError
 from leg_wear_monitor.bags.mcap.writer import McapWriter
 from leg_wear_monitor.messages.forecast_times import ForecastTimes
-from leg_wear_monitor.messages.outputs import (
-    ALARMS,
-    DIAGNOSTICS,
-    FORECAST,
-    OUTPUTS,
-    VERDICT,
-    Messages,
-    topic_of,
-)
+from leg_wear_monitor.messages.leg_drawing import LegDrawing
+from leg_wear_monitor.messages.leg_markers import LegMarkers
+from leg_wear_monitor.messages.output import topic_of
+from leg_wear_monitor.messages.outputs import ALARMS, DIAGNOSTICS, FORECAST, VERDICT, Messages
 from leg_wear_monitor.monitor.config.parameter_file import NODE
 from leg_wear_monitor.monitor.reports import Reports
 from leg_wear_monitor.monitor.wear_monitor import WearMonitor
@@ -45,10 +40,13 @@ class Sink:
         self._writer = McapWriter(path, chunk_bytes=_CHUNK_BYTES)
         self._channels = {
             output: self._writer.channel(topic_of(output, node), output.type, output.qos)
-            for output in OUTPUTS
+            for output in self._messages.outputs
         }
         self._start, self._has_begun = (monitor.alarms, monitor.verdict), False
         self._forecasts = ForecastTimes()
+        self._markers = (
+            LegMarkers(monitor, LegDrawing(monitor.mechanism)) if monitor.config.publish_markers else None
+        )
 
     def __enter__(self) -> "Sink":
         return self
@@ -77,6 +75,8 @@ class Sink:
             self._writer.write(self._channels[ALARMS], stamp_ns, self._messages.alarms(alarms))
             self._writer.write(self._channels[VERDICT], stamp_ns, self._messages.verdict(verdict))
         for outgoing in self._messages.of(reports):
+            self._writer.write_many(self._channels[outgoing.output], outgoing.stamp_ns, outgoing.messages)
+        for outgoing in self._markers.of(reports) if self._markers else ():
             self._writer.write_many(self._channels[outgoing.output], outgoing.stamp_ns, outgoing.messages)
         for cycle in self._forecasts.due(reports):
             raw = self._messages.forecast(cycle)

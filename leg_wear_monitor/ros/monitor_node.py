@@ -48,7 +48,7 @@ NO_COMMANDS = "It publishes no commands and must not be part of a safety functio
 _WORK_S = 0.01  # period at which messages are processed while no report is due at a known stamp
 _AT_ONCE = 500  # messages at once, so that services and parameters are also served
 _HELD = 20_000  # capacity in messages: ten seconds at 1 kHz on both topics
-_A_SAMPLE = (outputs.TORQUE, outputs.IMPACTS)
+_A_SAMPLE = (outputs.TORQUE, outputs.MEASURED_TORQUE, outputs.IMPACTS)
 
 
 class MonitorNode(ClosingNode):
@@ -85,7 +85,7 @@ class MonitorNode(ClosingNode):
         self._epochs = Epochs(self._monitor, boot_id(), self._ros_now_ns, self._report)
         self._messages = Messages(config, self._monitor.clearance_joints, self.get_fully_qualified_name())
         self._black_box = BlackBox(config.record.path)
-        self._outlets = Outlets(self, outputs.OUTPUTS, self._black_box)
+        self._outlets = Outlets(self, self._messages.outputs, self._black_box)
         self._forecasts = ForecastTimes()
         self._compile(decoder)
         mechanism = self._monitor.mechanism
@@ -95,7 +95,7 @@ class MonitorNode(ClosingNode):
         self._confirmation = Confirmation()
         self._serve()
         self._supervision = Supervision(self, self._monitor, config)
-        self._markers = MarkerTopic(self, self._monitor, lambda: self._supervision.is_current)
+        self._markers = MarkerTopic(self, self._outlets, self._monitor, lambda: self._supervision.is_current)
         self._send_state()
         self._inputs = subscribe(self, config, self._receive)
         self._supervision.inputs = [topic for topic, _ in self._inputs]
@@ -174,7 +174,7 @@ class MonitorNode(ClosingNode):
 
     def _publish(self, reports: Reports, coarse: bool) -> None:
         now_ns = time.time_ns()
-        self._markers.note(reports.samples)
+        self._markers.publish(reports)
         reports = attrs.evolve(
             reports,
             alarms=tuple(map(self._supervision.alarms, reports.alarms)),
@@ -239,6 +239,7 @@ class MonitorNode(ClosingNode):
     def _acknowledge(self) -> str:
         cleared, kept = self._monitor.acknowledge(self._ros_now_ns())
         own_cleared, own_kept = self._supervision.acknowledge()
+        self._markers.operated()
         cleared, kept = (*cleared, *own_cleared), (*kept, *own_kept)
         self._send_state()
         return f"cleared: {_listed(cleared)}; still present: {_listed(kept)}"
@@ -249,6 +250,7 @@ class MonitorNode(ClosingNode):
 
     def _measure(self, wanted: MeasureRequest) -> str:
         text = measured(self._monitor, wanted, audit_time(self._ros_now_ns()))
+        self._markers.operated()
         self._send_state()
         if last := self._monitor.last_cycle:
             self._outlets.send(outputs.FORECAST, time.time_ns(), self._messages.forecast(last))

@@ -10,20 +10,23 @@ import numpy as np
 import pytest
 
 from leg_wear_monitor.messages.forecast_times import ForecastTimes
+from leg_wear_monitor.messages.output import topic_of
 from leg_wear_monitor.messages.outputs import (
     ALARMS,
     CLEARANCES,
     DIAGNOSTICS,
     FORECAST,
     IMPACTS,
+    MEASURED_TORQUE,
+    OUTPUTS,
     TORQUE,
     Messages,
     plain,
-    topic_of,
 )
 from leg_wear_monitor.monitor.alarms.alarm import Alarm, Level
 from leg_wear_monitor.monitor.config.inputs import DriveTorque
 from leg_wear_monitor.monitor.config.settings import MonitorConfig
+from leg_wear_monitor.monitor.encoders.clearance_estimate import ClearanceEstimate, ClearanceObservation
 from leg_wear_monitor.monitor.forecast.forecast import Answer, JointForecast, LegForecast, Quantiles
 from leg_wear_monitor.monitor.reports import (
     AlarmList,
@@ -34,6 +37,7 @@ from leg_wear_monitor.monitor.reports import (
     SampleReports,
     Status,
 )
+from leg_wear_monitor.monitor.verdict.situation import SeenClearance
 from leg_wear_monitor.playback.replay import node_beside
 from leg_wear_monitor.twin.kinds import CRANK
 from leg_wear_monitor.twin.kinds import TORQUE as TORQUE_SAMPLE
@@ -41,6 +45,7 @@ from leg_wear_monitor.twin.kinds import TORQUE as TORQUE_SAMPLE
 pytestmark = pytest.mark.plain
 
 CLEARANCE_JOINTS = ("A", "G")
+PLOTTED = MonitorConfig(publish_scalars=True)
 
 
 @pytest.fixture(scope="module")
@@ -52,9 +57,19 @@ def reports() -> Reports:
         crank_angle_rad=np.array([nan, 0.1, 0.2, 0.3]),
         predicted_torque_nm=np.array([nan, 1.5, 2.5, 3.5]),
         contact_force_n=np.array([[nan, nan], [1.0, 2.0], [3.0, 4.0], [5.0, 6.0]]),
+        measured_torque_nm=np.array([nan, 1.25, nan, 3.25]),
+        eccentricity_m=np.full((4, 2, 2), 1e-4),
     )
     blank = {field.name: 0 for field in attrs.fields(JointReport)}
-    known = {**blank, "forecast": None, "clearance_m": 3e-4, "growth_mps": 1e-15, "peak_force_n": 50.0}
+    known = {
+        **blank,
+        "forecast": None,
+        "seen": None,
+        "shown": None,
+        "clearance_m": 3e-4,
+        "growth_mps": 1e-15,
+        "peak_force_n": 50.0,
+    }
     joints = (
         JointReport(**{**known, "joint": "A"}),
         JointReport(**{**known, "joint": "G", "growth_mps": None}),
@@ -99,6 +114,50 @@ def test_torque_is_about_the_axis_of_the_parameters(store: Any, reports: Reports
     (outgoing,) = Messages(config, CLEARANCE_JOINTS).of_samples(reports.samples)
     message = store.deserialize_cdr(outgoing.messages[0].tobytes(), outgoing.output.type)
     assert (message.wrench.torque.x, message.wrench.torque.z) == (1.5, 0.0)
+
+
+def test_a_measured_torque_is_of_all_samples_that_bring_one(store: Any, reports: Reports) -> None:
+    (measured,) = (
+        outgoing
+        for outgoing in Messages(PLOTTED, CLEARANCE_JOINTS).of_samples(reports.samples)
+        if outgoing.output == MEASURED_TORQUE
+    )
+    messages = [store.deserialize_cdr(row.tobytes(), MEASURED_TORQUE.type) for row in measured.messages]
+    assert measured.stamp_ns.tolist() == [message.header.stamp.nanosec for message in messages] == [20, 40]
+    assert [message.wrench.torque.z for message in messages] == [1.25, 3.25]
+
+
+def test_each_known_value_of_a_joint_is_a_number_of_its_own(store: Any, reports: Reports) -> None:
+    of = Quantiles(1.0, 2.0, 3.0)
+    known = JointForecast(answer=Answer.KNOWN, cycles=of, hours=of, days=of, clearance_m=of, measurements=0)
+    unknown = attrs.evolve(known, answer=Answer.NO_GROWTH, hours=None)
+    by_encoders = ClearanceEstimate(observation=ClearanceObservation.SEEN, clearance_m=4.1e-4, sigma_m=2.0e-5)
+    one, other = reports.cycles[0].joints
+    joints = (
+        attrs.evolve(one, forecast=known, seen=by_encoders, shown=SeenClearance("torque", 4.2e-4, 1.0e-5)),
+        attrs.evolve(other, forecast=unknown, peak_force_n=math.nan),
+    )
+    cycle = attrs.evolve(reports.cycles[0], joints=joints)
+    messages = Messages(PLOTTED, CLEARANCE_JOINTS)
+    sent = {
+        outgoing.output.name: store.deserialize_cdr(outgoing.messages[0].tobytes(), outgoing.output.type).data
+        for outgoing in messages.of(attrs.evolve(reports, cycles=(cycle,)))
+        if outgoing.output.type == "std_msgs/msg/Float64"
+    }
+    assert sent == {
+        "~/joints/A/clearance_m": 3e-4,
+        "~/joints/A/seen_m": 4.2e-4,  # that of the smaller standard deviation
+        "~/joints/A/remaining_p50_h": 2.0,
+        "~/joints/A/peak_force_n": 50.0,
+        "~/joints/G/clearance_m": 3e-4,  # of what is not known, nothing
+    }
+    names = {output.name for output in messages.outputs}
+    assert set(sent) < names and "~/joints/G/remaining_p50_h" in names
+
+
+def test_nothing_is_plotted_unless_it_is_asked_for(reports: Reports) -> None:
+    messages = Messages(MonitorConfig(), CLEARANCE_JOINTS)
+    assert {outgoing.output for outgoing in messages.of(reports)} < set(OUTPUTS) == set(messages.outputs)
 
 
 def test_clearances_are_those_of_the_gait_cycle(sent: dict[str, list[Any]]) -> None:

@@ -17,7 +17,10 @@ from leg_wear_monitor.bags.mcap.writer import McapWriter
 from leg_wear_monitor.messages import encode
 from leg_wear_monitor.messages.decode import Decoder
 from leg_wear_monitor.messages.forecast_times import ForecastTimes
-from leg_wear_monitor.messages.outputs import Messages, topic_of
+from leg_wear_monitor.messages.leg_drawing import LegDrawing
+from leg_wear_monitor.messages.leg_markers import LegMarkers
+from leg_wear_monitor.messages.output import topic_of
+from leg_wear_monitor.messages.outputs import Messages
 from leg_wear_monitor.messages.streams import JOINT_STATE, WRENCH_STAMPED
 from leg_wear_monitor.monitor.config.inputs import Cadence
 from leg_wear_monitor.monitor.config.settings import LedgerFile
@@ -28,6 +31,8 @@ from leg_wear_monitor.playback.result.replay_summary import summary_of
 
 SECONDS, RATE_HZ = 8, 200
 CYCLES = SECONDS - 2  # the first and the last are not whole
+
+PLOTTED = lw.MonitorConfig(publish_scalars=True, publish_markers=True)
 
 ALL_COUNTED = "everything in this recording is in the ledger already: nothing was counted"
 
@@ -76,7 +81,7 @@ def bag(walk: Messages_, tmp_path_factory: pytest.TempPathFactory) -> Path:
 def out(bag: Path, tmp_path_factory: pytest.TempPathFactory) -> tuple[Path, Any]:
     """Directory and result of a replay."""
     directory = tmp_path_factory.mktemp("out")
-    return directory, lw.replay(bag, lw.MonitorConfig(), out=directory)
+    return directory, lw.replay(bag, PLOTTED, out=directory)
 
 
 def reported(path: Path) -> dict[str, list[bytes]]:
@@ -94,9 +99,9 @@ def reported(path: Path) -> dict[str, list[bytes]]:
 def test_a_replay_reports_bit_for_bit_what_the_monitor_reported_live(
     leg: lw.Mechanism, walk: Messages_, out: tuple[Path, Any]
 ) -> None:
-    config = lw.MonitorConfig()
+    config = PLOTTED
     monitor, decoder = lw.WearMonitor(leg, config), Decoder(config)
-    messages = Messages(config, monitor.clearance_joints)
+    messages, markers = Messages(config, monitor.clearance_joints), LegMarkers(monitor, LegDrawing(leg))
     live: dict[str, list[bytes]] = {}
     forecasts: list[bytes] = []
     times = ForecastTimes()
@@ -106,13 +111,15 @@ def test_a_replay_reports_bit_for_bit_what_the_monitor_reported_live(
         samples = [decoder.one(raw, kind, time) for kind, time, raw in walk[begin:end]]
         reports = monitor.update(np.concatenate(samples))
         forecasts += [messages.forecast(cycle) for cycle in times.due(reports)]
-        for outgoing in messages.of(reports):
+        for outgoing in (*messages.of(reports), *markers.of(reports)):
             topic = topic_of(outgoing.output, "/leg_wear_monitor")
             live.setdefault(topic, []).extend(row.tobytes() for row in outgoing.messages)
         begin = end
     replayed = reported(out[0] / "reports.mcap")
     assert len(live["/leg_wear_monitor/impact_forces"]) > 0.9 * SECONDS * RATE_HZ
     assert len(live["/leg_wear_monitor/clearance_states"]) >= CYCLES
+    assert len(live["/leg_wear_monitor/joints/G/clearance_m"]) >= CYCLES
+    assert len(live["/leg_wear_monitor/markers"]) == pytest.approx(10 * SECONDS, abs=3)
     begun_with, *changes = replayed.pop("/leg_wear_monitor/alarms")
     assert changes == live.pop("/leg_wear_monitor/alarms", [])
     new = lw.WearMonitor(leg, config)

@@ -18,6 +18,8 @@ from visualization_msgs.msg import MarkerArray
 from leg_wear_monitor import load_mechanism
 from leg_wear_monitor.bags.reader import Recording
 from leg_wear_monitor.gait.config import EncoderConfig, KnockConfig, PaceConfig, TransportConfig
+from leg_wear_monitor.messages.leg_drawing import LegDrawing
+from leg_wear_monitor.messages.leg_markers import LegMarkers
 from leg_wear_monitor.messages.outputs import Messages
 from leg_wear_monitor.monitor.config.parameters import config_from
 from leg_wear_monitor.monitor.config.settings import MonitorConfig
@@ -27,6 +29,7 @@ from leg_wear_monitor.share import share_directory
 
 ME = "/leg_wear_monitor"
 FAST = {"wear_acceleration": 1.0e5}
+PLOTTED = {"publish_scalars": True, "publish_markers": True}
 ENCODERS = {"encoders__names": ["hip", "knee", "shin"], "encoders__joints": ["B", "G", "I"]}
 
 
@@ -58,9 +61,8 @@ def raised(messages: list[DiagnosticArray]) -> list[tuple[float, str]]:
 
 def test_an_even_gait_is_followed_told_recorded_and_replayed(stage, walk, tmp_path: Path) -> None:
     recording = tmp_path / "live.mcap"
-    monitor = stage.monitor(
-        record__path=str(recording), diagnostics__period_s=0.2, publish_markers=True, **(FAST | ENCODERS)
-    )
+    values = FAST | ENCODERS | PLOTTED
+    monitor = stage.monitor(record__path=str(recording), diagnostics__period_s=0.2, **values)
     clearances = stage.listen(f"{ME}/clearance_states", JointState)
     forces = stage.listen(f"{ME}/impact_forces", JointState)
     torques = stage.listen(f"{ME}/predicted_torque", WrenchStamped)
@@ -75,7 +77,7 @@ def test_an_even_gait_is_followed_told_recorded_and_replayed(stage, walk, tmp_pa
     assert np.ptp([message.wrench.torque.z for message in torques]) > 50.0
     are_one_number_a_value(diagnostics)
     draws_the_leg(markers[-1])
-    is_what_a_replay_gives(recording, config_from(dotted(FAST | ENCODERS)), monitor.node.monitor)
+    is_what_a_replay_gives(recording, config_from(dotted(values)), monitor.node.monitor)
 
 
 def tells_the_wear(clearances: list[JointState], walk) -> None:
@@ -103,9 +105,10 @@ def are_one_number_a_value(diagnostics: list[DiagnosticArray]) -> None:
 
 
 def draws_the_leg(drawn: MarkerArray) -> None:
-    """Seven bodies and five clearance joints, A and B on the hip's axis."""
-    lines, *joints = drawn.markers
-    assert len(lines.points) == 2 * (1 + 2 + 2 + 1 + 2 + 2 + 1)
+    """Seven bodies, the pelvis, and five clearance joints, A and B on the hip's axis."""
+    (lines,) = (marker for marker in drawn.markers if marker.ns == "bodies")
+    assert len(lines.points) == 2 * (1 + 2 + 2 + 1 + 2 + 2 + 1 + 1)
+    joints = [marker for marker in drawn.markers if marker.ns == "joints"]
     assert [marker.id for marker in joints] == [0, 1, 2, 3, 4]
     positions = [(joint.pose.position.x, joint.pose.position.z) for joint in joints]
     assert np.array(positions[:2]) == pytest.approx(np.zeros((2, 2)), abs=1e-12)
@@ -124,6 +127,10 @@ def is_what_a_replay_gives(recording: Path, config: MonitorConfig, live: WearMon
     # silence is seen by a clock, which a replay has not
     for topic in ("~/alarms", "~/verdict"):
         lived[topic] = [raw for raw in lived[topic] if b"input_silence" not in raw]
+    for found in (lived, replayed):
+        found["~/markers"] = [raw for raw in found["~/markers"] if b"no current data" not in raw]
+    assert len(replayed["~/markers"]) > 50 and len(replayed["~/measured_torque"]) > 1000
+    assert len(replayed["~/joints/G/clearance_m"]) == len(replayed["~/clearance_states"])
     assert len(replayed["~/verdict"]) >= 2  # no gait cycle yet, then the first
     for topic, messages in replayed.items():
         begin = len(lived[topic]) - len(messages)  # alarms and verdict as they stood at the start come first
@@ -279,10 +286,12 @@ def published(path: Path) -> dict[str, list[bytes]]:
 def replayed_from(path: Path, monitor: WearMonitor) -> dict[str, list[bytes]]:
     config = monitor.config
     messages = Messages(config, monitor.clearance_joints)
+    markers = LegMarkers(monitor, LegDrawing(monitor.mechanism))
     found: dict[str, list[bytes]] = {}
     with Recording([path], config) as recording:
-        blocks = (block.samples for block in recording.blocks())
-        for out in itertools.chain.from_iterable(messages.of(monitor.update(block)) for block in blocks):
+        all_reports = (monitor.update(block.samples) for block in recording.blocks())
+        several = ((messages.of(reports), markers.of(reports)) for reports in all_reports)
+        for out in itertools.chain.from_iterable(itertools.chain.from_iterable(several)):
             found.setdefault(out.output.name, []).extend(row.tobytes() for row in out.messages)
     return found
 

@@ -255,6 +255,10 @@ def words(messages: list[DiagnosticArray], name: str) -> str:
     return "" if found is None else found.message
 
 
+def is_grey(drawn: MarkerArray) -> bool:
+    return all(one.color.r == one.color.g == one.color.b for one in drawn.markers)
+
+
 def test_silence_reaches_statuses_alarms_markers_and_log(stage, walk) -> None:
     monitor = stage.monitor(diagnostics__period_s=0.1, publish_markers=True)
     diagnostics = stage.listen("/diagnostics", DiagnosticArray)
@@ -269,7 +273,7 @@ def test_silence_reaches_statuses_alarms_markers_and_log(stage, walk) -> None:
         assert status.level == b"\2", status.name
         assert "no current data since" in status.message
     stage.wait_for(lambda: line(alarms, "input_silence crank") is not None, "the alarm of silence")
-    stage.wait_for(lambda: markers[-1].markers[1].color.r == markers[-1].markers[1].color.g, "grey joints")
+    stage.wait_for(lambda: markers and is_grey(markers[-1]), "a grey leg")
     assert any("has been silent since" in text for _, text in logged.lines)
     rises = [text for _, text in logged.lines if text.startswith("alarm input_silence crank rises")]
     assert len(rises) == 1

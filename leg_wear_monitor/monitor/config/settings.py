@@ -262,6 +262,10 @@ class MonitorConfig:
     publish_impact_forces: bool = described(
         "publish the contact forces of every sample", default=True, metadata=LIVE
     )
+    publish_scalars: bool = described(
+        "publish values of each joint as numbers of their own, and the measured torque, for plots",
+        default=False,
+    )
     publish_markers: bool = described("publish markers for RViz and Foxglove", default=False, metadata=LIVE)
     frame_id: str = described(
         "frame of the pelvis, for wrenches and markers", default="pelvis", check=_filled

@@ -11,8 +11,10 @@ from rclpy.publisher import Publisher
 from rclpy.qos import DurabilityPolicy, QoSProfile, ReliabilityPolicy
 from rclpy.qos_overriding_options import QoSOverridingOptions
 from sensor_msgs.msg import JointState
+from std_msgs.msg import Float64
+from visualization_msgs.msg import MarkerArray
 
-from leg_wear_monitor.messages.outputs import Output
+from leg_wear_monitor.messages.output import Output
 from leg_wear_monitor.messages.qos import Qos
 from leg_wear_monitor.ros.outputs.black_box import BlackBox
 from leg_wear_monitor.ros.running import until_down
@@ -23,6 +25,8 @@ _KINDS = {
     "sensor_msgs/msg/JointState": JointState,
     "geometry_msgs/msg/WrenchStamped": WrenchStamped,
     "diagnostic_msgs/msg/DiagnosticArray": DiagnosticArray,
+    "std_msgs/msg/Float64": Float64,
+    "visualization_msgs/msg/MarkerArray": MarkerArray,
 }
 
 

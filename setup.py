@@ -13,7 +13,7 @@ SITE = ("docs/conf.py", "docs/_", "docs/lessons/")
 def share_files() -> list[tuple[str, list[str]]]:
     """Every file below the top-level data directories, with the directory it is installed to."""
     found: dict[str, list[str]] = {}
-    for top in ("bags", "config", "docs", "launch", "security"):
+    for top in ("bags", "config", "docs", "foxglove", "launch", "plotjuggler", "rviz", "security"):
         for path in sorted(Path(top).rglob("*")):
             if path.is_file() and "__pycache__" not in path.parts and not path.as_posix().startswith(SITE):
                 found.setdefault(f"{FRACTION}/{path.parent.as_posix()}", []).append(path.as_posix())

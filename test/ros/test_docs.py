@@ -67,9 +67,38 @@ def test_launch_files_start_what_is_installed() -> None:
     scripts = setup["options.entry_points"]["console_scripts"].split("\n")
     installed = {line.split("=")[0].strip() for line in scripts if line}
     nodes = [node for path in package.glob("launch/*.xml") for node in ElementTree.parse(path).iter("node")]
+    shown, nodes = (
+        [node for node in nodes if (node.get("pkg") == "rviz2") is is_rviz] for is_rviz in (True, False)
+    )
     assert len(nodes) == 4
     assert {node.get("pkg") for node in nodes} == {"leg_wear_monitor"}
     assert {node.get("exec") for node in nodes} <= installed
+    assert len(shown) == 2
+    for node in shown:
+        assert node.get("if") == "$(var rviz)"
+        layout = node.get("args").removeprefix("-d $(find-pkg-share leg_wear_monitor)/")
+        assert (package / layout).is_file()
+
+
+@pytest.mark.plain
+def test_the_parameters_for_tools_prevail_where_rviz_is_asked_for() -> None:
+    package = share_directory()
+    document = YAML(typ="safe", pure=True).load(
+        (package / "config" / "tools.yaml").read_text(encoding="utf-8")
+    )
+    config = parse_config(document, "tools.yaml", "/left/leg_wear_monitor")
+    assert config.publish_scalars and config.publish_markers
+    for name in ("monitor", "demo"):
+        launch = ElementTree.parse(package / "launch" / f"{name}.launch.xml").getroot()
+        values = {next(iter(one.items())): one.get("value") for one in launch.iter("let")}
+        assert values == {
+            ("if", "$(var rviz)"): "$(find-pkg-share leg_wear_monitor)/config/tools.yaml",
+            ("unless", "$(var rviz)"): "$(var params_file)",
+        }
+        for node in launch.iter("node"):
+            if node.get("exec") == "monitor":
+                files = [one.get("from") for one in node.iter("param") if one.get("from")]
+                assert files == ["$(var params_file)", "$(var shown)"]
 
 
 if __name__ == "__main__":

@@ -31,14 +31,15 @@ def allowed(node: str, kind: str, right: str) -> set[str]:
     return {"/" + rule.text.replace("~", node).lstrip("/") for rule in rules}
 
 
-@pytest.mark.parametrize("make", [MonitorNode, GaitPublisher])
+@pytest.mark.parametrize(("make", "own"), [(MonitorNode, ["publish_scalars"]), (GaitPublisher, [])])
 def test_a_node_may_do_what_it_does_and_nothing_else(
-    make: Callable[..., Any], monkeypatch: pytest.MonkeyPatch
+    make: Callable[..., Any], own: list[str], monkeypatch: pytest.MonkeyPatch
 ) -> None:
     monkeypatch.setattr(MonitorNode, "_compile", lambda self, decoder: None)
     context = rclpy.Context()
     rclpy.init(args=["--ros-args", "--log-level", "fatal"], context=context)
     overrides = [Parameter("use_sim_time", value=True), Parameter("clearance_joints", value=["G"])]
+    overrides += [Parameter(name, value=True) for name in own]
     try:
         node = make(context=context, parameter_overrides=overrides)
         name = node.get_name()

@@ -172,9 +172,17 @@ def _strict_tuple(kind: Any) -> _Hook:
     def hook(value: Any, _kind: Any) -> tuple[Any, ...]:
         if not isinstance(value, list) or (items[-1] is not Ellipsis and len(value) != len(items)):
             raise FieldError("", f"{shown(value)} is not {wanted}")
+        if attrs.has(items[0]):
+            return tuple(_part(_place(k, entry), entry, items[0]) for k, entry in enumerate(value, 1))
         return tuple(_converter.structure(entry, items[0]) for entry in value)
 
     return hook
+
+
+def _place(number: int, entry: Any) -> str:
+    """Name of a mapping in a list: its id if it has one, else the how many-th it is."""
+    name = entry.get("id") if isinstance(entry, dict) else None
+    return name if isinstance(name, str) and name and name.isprintable() else str(number)
 
 
 def _array(kind: Any) -> _Hook:

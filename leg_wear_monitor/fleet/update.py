@@ -17,6 +17,8 @@ from leg_wear_monitor.workers.cluster import run_on_cluster
 from leg_wear_monitor.workers.job import Job
 from leg_wear_monitor.workers.processes import run_here, run_in_processes
 
+_NOT_COUNTED = ("no_gait", "already_counted")
+
 Tell = Callable[[str, str], None]
 """Called with the id of a leg and a line about it."""
 
@@ -51,7 +53,7 @@ class FleetUpdate:
         """What a person must see: the leg, and a line about what is lost or was not done."""
         found = list(self.learned)
         for chain in self.chains:
-            bad = [line for line in chain.new if line["is_partial"] or line["outcome"] == "no_gait"]
+            bad = [line for line in chain.new if line["is_partial"] or line["outcome"] in _NOT_COUNTED]
             found += [(chain.leg.id, words_of(line)) for line in bad]
             found += [(chain.leg.id, text) for text in [*chain.refused, chain.fault] if text]
         return found

@@ -25,7 +25,7 @@ _LIBRARIES = ("attrs", "cattrs", "click", "jinja2", "matplotlib", "numba", "nump
 @click.command(short_help="Check a configuration or the installation.")
 @click.argument("configs", nargs=-1, metavar="[CONFIG]...")
 def check(configs: tuple[str, ...]) -> int:
-    """Check mechanism files and parameter files; without a file, the installation and its own files.
+    """Check mechanism, parameter and fleet files; without a file, the installation and its own files.
 
     Prints a summary of each correct file, and a line on stderr for each fault. A value that is probably in
     another unit causes a warning; the exit code is then 1. Tables (.csv, .parquet) are read with the columns
@@ -123,9 +123,28 @@ def _file(name: str) -> str:
     from leg_wear_monitor.mechanism.loader import is_file_name, read_yaml
     from leg_wear_monitor.monitor.config.parameter_file import is_parameter_file
 
-    if is_file_name(name) and is_parameter_file(read_yaml(Path(name), name)):
+    document = read_yaml(Path(name), name) if is_file_name(name) else None
+    if is_parameter_file(document):
         return _parameters(name)
-    return _mechanism(name)
+    from leg_wear_monitor.fleet.description.loader import is_fleet_file
+
+    return _fleet(name) if is_fleet_file(document) else _mechanism(name)
+
+
+def _fleet(path: str) -> str:
+    """Read the description of a fleet and the begins of its recordings, and say what was understood."""
+    from leg_wear_monitor.cli.waiting import progress_bar
+    from leg_wear_monitor.fleet.description.loader import load_fleet
+    from leg_wear_monitor.fleet.understood import understood
+
+    fleet = load_fleet(path)
+    for file in dict.fromkeys(leg.config_file for leg in fleet.legs if leg.config_file):
+        click.echo(f"{file.name:<13} {_parameters(str(file))}")
+    with progress_bar("looking at the recordings") as progress:
+        pairs = list(understood(fleet, progress))
+    for fault in (fault for _, fault in pairs if fault):
+        warnings.warn(f"{path}: {fault}", ConfigWarning, stacklevel=2)
+    return f"\n{'':13} ".join(line for line, _ in pairs if line)
 
 
 def _parameters(path: str) -> str:

@@ -54,7 +54,8 @@ def update(
 
     Writes ledgers, tables of the gait cycles and fleet.json. A recording counts once, whatever its name. An
     interrupted update keeps every finished recording, and the next one goes on there. Exits with 1 if parts
-    of a recording are lost, if no gait cycle in it fits its leg, or if a leg could not be updated.
+    of a recording are lost, if no gait cycle in it fits its leg, if all of its time is counted already, or if
+    a leg could not be updated.
     """
     from leg_wear_monitor.fleet.description.loader import load_fleet
 

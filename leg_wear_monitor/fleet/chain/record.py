@@ -122,6 +122,9 @@ def record_of(
         texts.insert(0, f"no gait cycle fits this leg: {printable(result.evidence.missing())}")
         return RecordingRecord(outcome=Outcome.NO_GAIT, findings=tuple(texts[:_MOST_FINDINGS]), **about)
     if result.monitor.is_all_counted:
+        texts.insert(
+            0, "all of its time is that of recordings before it; if it is another walk, its clock is wrong"
+        )
         return RecordingRecord(
             outcome=Outcome.ALREADY_COUNTED, findings=tuple(texts[:_MOST_FINDINGS]), **about
         )

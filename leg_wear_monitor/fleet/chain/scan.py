@@ -79,10 +79,16 @@ def look(path: Path, leg: FleetLeg) -> Found:
     except (RecordingError, OSError) as error:
         why = error.strerror if isinstance(error, OSError) else error.fault
         return Found(path, size, changed_ns, _text_key(str(path)), fault=f"cannot be read: {why}")
+    begin_ns, fault = begin_of(path, leg)
+    return Found(path, size, changed_ns, key, begin_ns, fault)
+
+
+def begin_of(path: Path, leg: FleetLeg) -> tuple[int, str]:
+    """First valid stamp in a recording [ns], 0 if there is none; why it cannot be read, empty if it can."""
     try:
-        return Found(path, size, changed_ns, key, _first_stamp_ns(path, leg))
+        return _first_stamp_ns(path, leg), ""
     except RecordingError as error:
-        return Found(path, size, changed_ns, key, fault=": ".join(filter(None, (error.key, error.fault))))
+        return 0, ": ".join(filter(None, (error.key, error.fault)))
 
 
 def entry_of(found: Found) -> dict[str, Any]:

@@ -20,6 +20,8 @@ class FleetLeg:
         Production lot of its joints; empty if it is not known.
     config : MonitorConfig
         Parameters of its monitor.
+    config_file : pathlib.Path or None
+        File of these parameters; None for those of the package.
     recordings : tuple of pathlib.Path
         Recordings, sorted by name.
     home : pathlib.Path
@@ -45,6 +47,7 @@ class FleetLeg:
     drive_torque: str | None
     learned_priors: str = ""
     sample: float | None = None
+    config_file: Path | None = None
 
     def shown(self, recording: Path) -> str:
         """Name of a recording in tables: relative to the description where it is below it."""

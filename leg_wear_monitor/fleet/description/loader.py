@@ -3,6 +3,7 @@
 import warnings
 from collections.abc import Iterable
 from pathlib import Path
+from typing import Any
 
 import attrs
 
@@ -15,6 +16,11 @@ from leg_wear_monitor.mechanism.loader import is_file_name, load_mechanism, read
 from leg_wear_monitor.monitor.config.fitting import fitted
 from leg_wear_monitor.monitor.config.parameter_file import load_config
 from leg_wear_monitor.monitor.config.settings import MonitorConfig
+
+
+def is_fleet_file(document: Any) -> bool:
+    """Whether the content of a YAML file is meant as the description of a fleet."""
+    return isinstance(document, dict) and ("legs" in document or "defaults" in document)
 
 
 def load_fleet(path: str | Path) -> FleetDescription:
@@ -44,7 +50,8 @@ def load_fleet(path: str | Path) -> FleetDescription:
         name = entry.config or file.defaults.config
         if (name, entry.node) not in configs:
             configs[name, entry.node] = _config(home, name, entry.node, source)
-        legs.append(_leg(entry, configs[name, entry.node], file.row, home, source))
+        leg = _leg(entry, configs[name, entry.node], file.row, home, source)
+        legs.append(attrs.evolve(leg, config_file=home / name if name else None))
     _check_recordings(legs, source)
     return FleetDescription(path=Path(path), out=home / file.out, legs=tuple(legs))
 

@@ -15,7 +15,18 @@ from leg_wear_monitor.twin.sample import FAULTS, NO_FAULT, Samples
 _SLOWEST, _FASTEST = 0.5, 2.0  # cadence over the commanded one
 _UNLIKE = 0.8  # unexplained torque over the predicted one
 _FLAT = 0.05  # measured torque over the predicted one
+_STEEP = 20.0  # likewise; 1/_FLAT, and far beyond what any load or wear adds
 _SAMPLES_A_TURN = 12
+
+
+def _unit_words(measured: float, predicted: float) -> str:
+    """What to look at if the torque is in another unit; empty if it is not."""
+    if not any(1.0 / 3.0 < factor * measured / predicted < 3.0 for factor in (1.0e-3, 1.0e3)):
+        return ""
+    return (
+        "; that is a factor of 1000: check its unit (of a table input.units.drive_torque, "
+        "else drive_torque.scale)"
+    )
 
 
 def doubts(cycle: CycleReport, config: MonitorConfig) -> list[str]:
@@ -34,9 +45,11 @@ def doubts(cycle: CycleReport, config: MonitorConfig) -> list[str]:
         )
     if cycle.torque_samples:
         predicted, measured = cycle.predicted_torque_rms_nm, cycle.measured_torque_rms_nm
-        if measured < _FLAT * predicted:
+        if not _FLAT * predicted <= measured <= _STEEP * predicted and math.isfinite(measured):
+            size = f"only {measured:.3g}" if measured < predicted else f"{measured:.3g}"
             found.append(
-                f"the drive torque is only {measured:.3g} N m RMS, {predicted:.3g} N m are predicted"
+                f"the drive torque is {size} N m RMS, {predicted:.3g} N m are predicted"
+                + _unit_words(measured, predicted)
             )
         elif not cycle.torque_mismatch < _UNLIKE:
             found.append(

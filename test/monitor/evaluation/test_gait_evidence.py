@@ -48,6 +48,7 @@ def test_a_leg_is_believed_worn_slow_or_without_torque(other: dict[str, float]) 
         ({"torque_mismatch": 1.2}, "the drive torque does not resemble the predicted one"),
         ({"torque_mismatch": np.nan}, "the drive torque does not resemble the predicted one"),
         ({"measured_torque_rms_nm": 0.01}, "the drive torque is only 0.01 N m RMS"),
+        ({"measured_torque_rms_nm": 8e3, "torque_mismatch": 1e3}, "the drive torque is 8e+03 N m RMS"),
     ],
 )
 def test_another_machine_is_not(other: dict[str, float], why: str) -> None:

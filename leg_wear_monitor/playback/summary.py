@@ -12,6 +12,7 @@ from leg_wear_monitor.mechanism.outline import is_on_ground, outline_of
 from leg_wear_monitor.mechanism.spec import Mechanism
 from leg_wear_monitor.monitor.alarms.alarm import Alarm
 from leg_wear_monitor.monitor.alarms.words import ADVICE, state_of
+from leg_wear_monitor.monitor.config.settings import MonitorConfig
 from leg_wear_monitor.monitor.encoders.clearance_estimate import ClearanceEstimate
 from leg_wear_monitor.monitor.forecast.forecast import LegForecast
 from leg_wear_monitor.monitor.reports import JointReport, Status
@@ -78,8 +79,8 @@ def summary(
     return ReplaySummary(
         verdict=verdict,
         recording=_recording(result),
-        monitor=_monitor(result),
-        leg=_leg_shape(monitor.mechanism),
+        monitor=settings_of(monitor.config, monitor.mechanism),
+        leg=leg_shape(monitor.mechanism),
         wall_s=wall_s,
         real_time_factor=result.duration_s / wall_s if wall_s else None,
         cycles=len(result.history),
@@ -129,9 +130,9 @@ def _recording(result: "ReplayResult") -> ReplayRecording:
     )
 
 
-def _monitor(result: "ReplayResult") -> ReplayMonitor:
-    config, mechanism = result.monitor.config, result.monitor.mechanism
-    joints = result.monitor.clearance_joints
+def settings_of(config: MonitorConfig, mechanism: Mechanism) -> ReplayMonitor:
+    """Settings that the results depend on, for a mechanism that `fitted` returned."""
+    joints = mechanism.clearance_joints
     return ReplayMonitor(
         mechanism=mechanism.name,
         hardware_id=config.hardware,
@@ -144,7 +145,8 @@ def _monitor(result: "ReplayResult") -> ReplayMonitor:
     )
 
 
-def _leg_shape(mechanism: Mechanism) -> ReplayLeg:
+def leg_shape(mechanism: Mechanism) -> ReplayLeg:
+    """A mechanism as a picture needs it."""
     outline = outline_of(mechanism)
     return ReplayLeg(
         bodies_m={body: _places(corners) for body, corners in outline.bodies.items()},
@@ -215,11 +217,14 @@ def _leg(told: LegForecast) -> LegLife:
 
 
 def _alarms(result: "ReplayResult") -> ReplayAlarms:
-    changes = (AlarmChange(stamp_ns=stamp, alarm=_alarm(alarm)) for stamp, alarm in result.history.changes)
-    return ReplayAlarms(now=tuple(map(_alarm, result.monitor.alarms.alarms)), changes=tuple(changes))
+    changes = (
+        AlarmChange(stamp_ns=stamp, alarm=replay_alarm(alarm)) for stamp, alarm in result.history.changes
+    )
+    return ReplayAlarms(now=tuple(map(replay_alarm, result.monitor.alarms.alarms)), changes=tuple(changes))
 
 
-def _alarm(alarm: Alarm) -> ReplayAlarm:
+def replay_alarm(alarm: Alarm) -> ReplayAlarm:
+    """An alarm as operators see it."""
     return ReplayAlarm(
         name=alarm.name,
         level=alarm.level,

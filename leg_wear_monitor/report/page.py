@@ -8,6 +8,7 @@ import base64
 import hashlib
 import re
 from collections.abc import Mapping, Sequence
+from functools import cache
 from typing import Any
 
 import attrs
@@ -74,6 +75,8 @@ class Page:
         Further style sheets, and scripts that come before those of the interactive parts.
     has_dark : bool
         Whether it follows a reader who prefers dark colours; its pictures must follow as well.
+    live : str
+        Settings, as JSON, of the script that renews a page from its server; empty for a page that is a file.
     generator : str
         What made it, in its head; nothing if empty.
     """
@@ -87,6 +90,7 @@ class Page:
     styles: Sequence[str] = ()
     libraries: Sequence[str] = ()
     has_dark: bool = False
+    live: str = ""
     generator: str = ""
 
     @property
@@ -97,12 +101,27 @@ class Page:
         return tuple(dict.fromkeys((*self.libraries, *live)))
 
     @property
+    def style(self) -> str:
+        """Its style sheets as one."""
+        return "\n".join([template_text("page.css"), *self.styles])
+
+    @property
     def policy(self) -> str:
-        """Content security policy: these scripts run, no others, and nothing is fetched."""
-        digests = (hashlib.sha256(script.encode()).digest() for script in self.scripts)
-        allowed = " ".join(f"'sha256-{base64.b64encode(digest).decode()}'" for digest in digests)
-        scripts = f"; script-src {allowed}" if allowed else ""
-        return f"default-src 'none'; img-src data:; style-src 'unsafe-inline'{scripts}"
+        """Content security policy: these scripts run, no others, and nothing is fetched.
+
+        A live page hears from its own server only, and has no other style than its own.
+        """
+        scripts = f"; script-src {_allowed(self.scripts)}" if self.scripts else ""
+        if not self.live:
+            return f"default-src 'none'; img-src data:; style-src 'unsafe-inline'{scripts}"
+        only = "connect-src 'self'; base-uri 'none'; form-action 'none'"
+        return f"default-src 'none'; img-src data:; style-src {_allowed([self.style])}{scripts}; {only}"
+
+
+def _allowed(texts: Sequence[str]) -> str:
+    """Scripts or styles by their checksums, as a content security policy names them."""
+    digests = (hashlib.sha256(text.encode()).digest() for text in texts)
+    return " ".join(f"'sha256-{base64.b64encode(digest).decode()}'" for digest in digests)
 
 
 def render(name: str, **values: Any) -> str:
@@ -124,15 +143,20 @@ def render(name: str, **values: Any) -> str:
     jinja2.UndefinedError
         If the template uses a variable that is not given.
     """
-    environment = jinja2.Environment(
+    text: str = _environment().get_template(name).render(**values)
+    return text
+
+
+@cache
+def _environment() -> Any:
+    """The templates of this package, each compiled once: a live page renders them again and again."""
+    return jinja2.Environment(
         loader=jinja2.PackageLoader("leg_wear_monitor.report"),
         autoescape=True,
         undefined=jinja2.StrictUndefined,
         trim_blocks=True,
         lstrip_blocks=True,
     )
-    text: str = environment.get_template(name).render(**values)
-    return text
 
 
 def page_html(page: Page) -> str:

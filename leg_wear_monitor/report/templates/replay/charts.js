@@ -165,6 +165,14 @@
     plot.redraw(false);
   }));
 
+  // Markup was replaced: forget the charts that are gone, and draw the new ones.
+  document.addEventListener("replaced", () => {
+    const isThere = (plot) => plot.root.isConnected || plot.destroy();
+    Object.keys(groups).forEach((group) => { groups[group] = groups[group].filter(isThere); });
+    charts.splice(0, charts.length, ...charts.filter((chart) => chart.box.isConnected));
+    drawAll();
+  });
+
   const folded = Array.from(document.querySelectorAll("details"));
   folded.forEach((details) => details.addEventListener("toggle", drawAll));
   window.addEventListener("resize", () => resize(0));

@@ -1,0 +1,1 @@
+"""A live page: verdict, leg, alarms and trends in a browser, read-only."""

@@ -1,0 +1,206 @@
+"""A leg as its ledger has it, which a monitor may be writing meanwhile."""
+
+import json
+from collections.abc import Callable, Iterable
+from pathlib import Path
+from typing import Any
+
+import attrs
+
+from leg_wear_monitor.dashboard import regions as region
+from leg_wear_monitor.dashboard.leg_view import NO_VERDICT, Known, leg_setup, view_of
+from leg_wear_monitor.dashboard.source import Content, Freshness, LegPage, words_of
+from leg_wear_monitor.dashboard.trends import Row, Trends
+from leg_wear_monitor.errors import printable
+from leg_wear_monitor.mechanism.spec import Mechanism
+from leg_wear_monitor.monitor.config.settings import MonitorConfig
+from leg_wear_monitor.monitor.ledger.binding import binding_of
+from leg_wear_monitor.monitor.ledger.entry import ClearancePoint, JointWear, VerdictEvent
+from leg_wear_monitor.monitor.ledger.file import LedgerError, beside
+from leg_wear_monitor.monitor.ledger.log import ENDING
+from leg_wear_monitor.monitor.ledger.reading import LedgerContent, read_ledger
+from leg_wear_monitor.monitor.verdict.verdict import Evidence, Figure, State, Verdict
+from leg_wear_monitor.playback.result.condition import JointClearance, LifeHours
+from leg_wear_monitor.playback.result.parts import ClearanceChange, ReplayJoint
+from leg_wear_monitor.playback.result.replay_summary import ReplaySummary
+from leg_wear_monitor.playback.summary import replay_alarm
+
+OLD_AFTER_S = 60.0  # a monitor of a walking leg writes more often
+
+_TRIES = 6  # half a second apart: a copy that a monitor wrote into meanwhile is not whole
+_SILENCE = "nothing was written into the ledger; the monitor does not run, or the leg does not walk"
+
+_Stamp = tuple[tuple[int, int], ...]
+
+
+class LedgerLeg:
+    """A source that reads a ledger again when it has changed.
+
+    Parameters
+    ----------
+    path : pathlib.Path
+    config : MonitorConfig
+    mechanism : Mechanism
+        As `fitted` returned it.
+    clock : callable
+        Seconds since 1970, as file systems have them.
+
+    Raises
+    ------
+    LedgerError
+        If the ledger is not one of this leg.
+    """
+
+    def __init__(
+        self, path: Path, config: MonitorConfig, mechanism: Mechanism, clock: Callable[[], float]
+    ) -> None:
+        self._path, self._clock = path, clock
+        self._setup, self._binding = leg_setup(config, mechanism), binding_of(mechanism, config)
+        self._read_stamp: _Stamp = ()
+        self._failures = 0
+        self._fault = ""
+        self._content: LedgerContent | None = None
+        while not self._read() and self._failures < _TRIES:
+            continue
+        if self._content is None:
+            raise LedgerError(self._fault)
+
+    def renew(self) -> bool:
+        """Read the ledger if it has changed; whether there is something else to show."""
+        return self._stamp() != self._read_stamp and (self._read() or self._failures == _TRIES)
+
+    def _read(self) -> bool:
+        stamp = self._stamp()
+        try:
+            self._content = read_ledger(self._path, self._binding)
+        except LedgerError as error:
+            self._failures += 1
+            self._fault = str(error)
+            return False
+        self._failures, self._fault, self._read_stamp = 0, "", stamp
+        return True
+
+    def _stamp(self) -> _Stamp:
+        """What changes when something is written; empty while there is no file."""
+        found = []
+        for path in (self._path, beside(self._path, ENDING)):
+            try:
+                stat = path.stat()
+            except OSError:
+                continue
+            found.append((stat.st_mtime_ns, stat.st_size))
+        return tuple(found)
+
+    def freshness(self) -> Freshness:
+        """Since when nothing was written."""
+        if self._failures >= _TRIES:
+            return Freshness(None, f"NOT READABLE: {printable(self._fault)}; what is shown is old")
+        written_ns = max((stamp for stamp, _ in self._read_stamp), default=0)
+        return Freshness(max(0.0, self._clock() - 1.0e-9 * written_ns), _SILENCE)
+
+    def content(self) -> Content:
+        """The page."""
+        view = self._view()
+        regions = {
+            region.VERDICT: region.verdict_region(view),
+            region.JOINTS: region.joints_region(view),
+            region.ALARMS: region.alarms_region(view),
+            region.TRENDS: region.trends_region(view, "As the ledger has it."),
+        }
+        page = LegPage(
+            title=f"Joint wear of {printable(self._setup.monitor.hardware_id)}",
+            summary=f"{self._setup.monitor.mechanism}, from the ledger {printable(str(self._path))}",
+            fresh="Written ",
+            old_after_s=OLD_AFTER_S,
+        )
+        name = printable(self._setup.monitor.hardware_id)
+        return page.content(regions, words_of(view, name), self.freshness())
+
+    def leg_page(self, name: str) -> None:
+        """There is one leg."""
+
+    def _view(self) -> ReplaySummary:
+        found = self._content
+        if found is None:
+            raise LedgerError(self._fault)
+        parts = {part.name: part for part in found.entry.joints} if found.entry else {}
+        joints = {joint: parts[joint] for joint in self._setup.joints if joint in parts}
+        counted = {joint: self._setup.new_m[joint] + _worn_m(part) for joint, part in joints.items()}
+        known = Known(
+            verdict=ledger_verdict(found.verdict) if found.verdict else NO_VERDICT,
+            history=_trends(found.clearances).history(self._setup.joints),
+            cycles=int(found.entry.totals.get("cycles", 0.0)) if found.entry else 0,
+            joints={joint: _report(part, counted[joint]) for joint, part in joints.items()},
+            clearances={joint: self._clearance(joint, counted_m) for joint, counted_m in counted.items()},
+            life={joint: _life(found, part) for joint, part in joints.items()},
+            alarms=[replay_alarm(alarm) for alarm in found.entry.alarms] if found.entry else [],
+            measurements=found.measurements,
+        )
+        return view_of(self._setup, known)
+
+    def _clearance(self, joint: str, counted_m: float) -> JointClearance:
+        found = self._content.measurements if self._content else ()
+        last = next((each for each in reversed(found) if each.joint == joint and not each.is_withdrawn), None)
+        return JointClearance(
+            counted_m=counted_m,
+            new_m=self._setup.new_m[joint],
+            limit_m=self._setup.limits_m[joint],
+            measured_m=last.clearance_m if last else None,
+            measured_sigma_m=last.sigma_m if last else None,
+        )
+
+
+def ledger_verdict(event: VerdictEvent) -> Verdict:
+    """A verdict of a ledger."""
+    return Verdict(
+        state=State(event.state),
+        joints=tuple(json.loads(event.joints)),
+        why=event.why,
+        since_ns=event.since_ns,
+        do=event.to_do,
+        evidence=tuple(_evidence(each) for each in json.loads(event.evidence)),
+        not_valid=tuple(map(Figure, json.loads(event.not_valid))),
+        fault_code=event.fault_code,
+    )
+
+
+def _evidence(record: dict[str, Any]) -> Evidence:
+    return Evidence(**{field.name: record[field.name] for field in attrs.fields(Evidence)})
+
+
+def _worn_m(part: JointWear) -> float:
+    """Wear of both surfaces of a joint, its mean around the bushing."""
+    return float(part.depth.sum(axis=0).mean())
+
+
+def _report(part: JointWear, counted_m: float) -> ReplayJoint:
+    greatest_m = counted_m - _worn_m(part) + float(part.depth.sum(axis=0).max())
+    return ReplayJoint(
+        clearance_m=ClearanceChange(counted_m, counted_m, greatest_m), forecast=None, impacts=0,
+        growth_m_per_cycle=None, growth_error_m_per_cycle=None, growth_mps=None, peak_force_n=None,
+        mean_force_n=None,
+    )  # fmt: skip
+
+
+def _life(found: LedgerContent, part: JointWear) -> LifeHours | None:
+    """Hours of walking from the last forecast on, with the part's own mean duration of a gait cycle."""
+    point = found.forecasts.get(part.name)
+    if point is None or not part.cycles or point.stamp_ns < part.replaced_ns or found.entry is None:
+        return None
+    since = max(0.0, found.entry.totals.get("cycles", 0.0) - point.cycle)
+    hours = part.moving_s / part.cycles / 3600.0
+    p10, p50, p90 = (
+        hours * max(0.0, cycles - since) for cycles in (point.p10_cycles, point.p50_cycles, point.p90_cycles)
+    )
+    return LifeHours(p10_h=p10, p50_h=p50, p90_h=p90)
+
+
+def _trends(points: Iterable[ClearancePoint]) -> Trends:
+    """The clearances over time, those of one stamp in one row."""
+    rows: dict[int, dict[str, float | None]] = {}
+    for point in points:
+        rows.setdefault(point.stamp_ns, {})[point.joint] = point.clearance_m
+    trends = Trends()
+    for stamp_ns, clearances in rows.items():
+        trends.add(Row(stamp_ns, {}, {"clearance_m": clearances}))
+    return trends

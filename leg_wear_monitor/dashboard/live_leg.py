@@ -1,0 +1,212 @@
+"""A leg as a running monitor reports it: takes in its messages, in any order, and gives the page."""
+
+import math
+import threading
+from collections.abc import Callable, Iterable, Mapping, Sequence
+from itertools import islice
+
+from leg_wear_monitor.dashboard import regions as region
+from leg_wear_monitor.dashboard.leg_view import NO_VERDICT, Known, LegSetup, unknown_leg, view_of
+from leg_wear_monitor.dashboard.live_joints import joints_of
+from leg_wear_monitor.dashboard.received import (
+    MOST,
+    NO_DATA,
+    alarm_of,
+    leg_life_of,
+    own_statuses,
+    verdict_of,
+)
+from leg_wear_monitor.dashboard.source import Content, Freshness, LegPage, words_of
+from leg_wear_monitor.dashboard.trends import Row, Trends
+from leg_wear_monitor.errors import printable
+from leg_wear_monitor.playback.result.parts import ReplayStatus
+from leg_wear_monitor.playback.result.replay_summary import ReplaySummary
+
+OLD_AFTER_S = 5.0  # the monitor reports every second, whether the leg walks or not
+_TRENDS_S = 5.0  # charts are many kilobytes: not with each message
+
+_GAIT = {"cycle": "cycles", "cadence_rpm": "cadence_rpm"}
+_TORQUE = {
+    "measured_torque_rms_nm": "measured_rms_nm",
+    "predicted_torque_rms_nm": "predicted_rms_nm",
+    "torque_mismatch": "mismatch",
+    "load_n": "load_n",
+    "friction_nm": "friction_nm",
+}
+
+
+class LiveLeg:
+    """A source that is told what a monitor publishes, from any thread.
+
+    Parameters
+    ----------
+    node : str
+        Full name of the monitor, such as ``/left/leg_wear_monitor``.
+    waited_for : sequence of str
+        Topics that its messages are to come from.
+    clock : callable
+        Seconds that only grow.
+    """
+
+    def __init__(self, node: str, waited_for: Sequence[str], clock: Callable[[], float]) -> None:
+        self._node, self._clock = node, clock
+        self._waited_for = ", ".join(map(printable, waited_for))
+        self._lock = threading.Lock()
+        self._setup: LegSetup | None = None
+        self._why_unknown = "The monitor has not told its parameters yet."
+        self._statuses: dict[str, ReplayStatus] = {}
+        self._verdict: ReplayStatus | None = None
+        self._leg_silent_s: float | None = None
+        self._alarms: dict[str, ReplayStatus] = {}
+        self._forecasts: dict[str, ReplayStatus] = {}
+        self._cycle: dict[str, dict[str, float | None]] = {}
+        self._trends = Trends()
+        self._heard_s: float | None = None
+        self._is_new = True
+        self._drawn: tuple[float, str] = (-math.inf, "")
+
+    # --- what the monitor says ---
+
+    def take_setup(self, setup: LegSetup | None, why_not: str = "") -> None:
+        """The leg's parameters, or why they are not known."""
+        with self._lock:
+            self._setup, self._why_unknown, self._is_new = setup, printable(why_not), True
+
+    def take_diagnostics(self, stamp_ns: int, statuses: Iterable[ReplayStatus]) -> None:
+        """A message of ``/diagnostics``; those of other nodes are left out."""
+        own = own_statuses(self._node, statuses)
+        if not own:
+            return
+        with self._lock:
+            self._hear()
+            self._take_current(own.pop("verdict", None))
+            self._statuses = own
+            self._trends.add(self._row(stamp_ns))
+
+    def _take_current(self, verdict: ReplayStatus | None) -> None:
+        """The verdict of this second: of one without data, what it was is in ``~/verdict``."""
+        self._leg_silent_s = verdict.values.get(NO_DATA) if verdict else None
+        if verdict and (self._leg_silent_s is None or self._verdict is None):
+            self._verdict = verdict
+
+    def take_verdict(self, statuses: Iterable[ReplayStatus]) -> None:
+        """A message of ``~/verdict``."""
+        own = own_statuses(self._node, statuses)
+        with self._lock:
+            self._hear()
+            self._verdict = own.get("verdict", self._verdict)
+
+    def take_alarms(self, statuses: Iterable[ReplayStatus]) -> None:
+        """A message of ``~/alarms``."""
+        with self._lock:
+            self._hear()
+            self._alarms = own_statuses(self._node, statuses)
+
+    def take_forecast(self, statuses: Iterable[ReplayStatus]) -> None:
+        """A message of ``~/forecast``."""
+        with self._lock:
+            self._hear()
+            self._forecasts = own_statuses(self._node, statuses)
+
+    def take_cycle(self, columns: Mapping[str, Mapping[str, float]]) -> None:
+        """A message of ``~/clearance_states``: values by column and joint."""
+        with self._lock:
+            self._hear()
+            self._cycle = {name: _of_joints(values) for name, values in columns.items()}
+
+    def _hear(self) -> None:
+        self._heard_s, self._is_new = self._clock(), True
+
+    def _row(self, stamp_ns: int) -> Row:
+        leg: dict[str, float | None] = {}
+        for status, columns in (("gait", _GAIT), ("torque", _TORQUE)):
+            if status in self._statuses:
+                values = self._statuses[status].values
+                leg |= {column: values.get(name) for column, name in columns.items()}
+        return Row(stamp_ns, leg, self._cycle)
+
+    # --- what the page shows ---
+
+    def renew(self) -> bool:
+        """Whether anything was heard since the last content."""
+        return self._is_new
+
+    def content(self) -> Content:
+        """The page with all that was heard last."""
+        with self._lock:
+            view, why_unknown = self._view(), "" if self._setup else self._why_unknown
+            self._is_new = False
+        regions = {
+            region.VERDICT: region.verdict_region(view),
+            region.JOINTS: region.joints_region(view, why_unknown),
+            region.ALARMS: region.alarms_region(view),
+            region.BELIEF: region.belief_region(view),
+            region.TRENDS: self._trends_region(view),
+            region.STATUS: region.status_region(view),
+        }
+        return self._page().content(regions, words_of(view, printable(self._node)), self.freshness())
+
+    def freshness(self) -> Freshness:
+        """Since when nothing was heard of the monitor; or, if it speaks, since when it has no data."""
+        with self._lock:
+            heard_s, leg_s = self._heard_s, self._leg_silent_s
+        if heard_s is None:
+            return Freshness(
+                None,
+                f"WAITING for the monitor {printable(self._node)}: no message yet on {self._waited_for}. "
+                "Is it running, with this name and this ROS_DOMAIN_ID?",
+            )
+        age_s = self._clock() - heard_s
+        if leg_s is not None and age_s < OLD_AFTER_S:
+            return Freshness(
+                leg_s + age_s,
+                "the monitor runs, but receives nothing from the leg; see its status topics below",
+            )
+        return Freshness(age_s, "nothing is heard of the monitor; is it running?")
+
+    def leg_page(self, name: str) -> None:
+        """There is one leg."""
+
+    def _page(self) -> LegPage:
+        setup = self._setup
+        which = f"{setup.monitor.mechanism}, live from " if setup else "live from "
+        return LegPage(
+            title=f"Joint wear of {printable(setup.monitor.hardware_id) if setup else 'a leg'}",
+            summary=f"{which}{printable(self._node)}",
+            fresh="Live, data ",
+            old_after_s=OLD_AFTER_S,
+        )
+
+    def _trends_region(self, view: ReplaySummary) -> str:
+        now_s, (drawn_s, markup) = self._clock(), self._drawn
+        if now_s - drawn_s >= _TRENDS_S or len(view.history.stamp_ns) < 3:
+            markup = region.trends_region(view, "Since this dashboard was started.")
+            self._drawn = now_s, markup
+        return markup
+
+    def _view(self) -> ReplaySummary:
+        setup = self._setup or unknown_leg()
+        verdict = verdict_of(self._verdict) if self._verdict else NO_VERDICT
+        gait = self._statuses.get("gait")
+        joints = joints_of(setup, self._statuses, self._forecasts, self._cycle)
+        leg = leg_life_of(self._forecasts["forecast leg"]) if "forecast leg" in self._forecasts else None
+        cycles = int((gait.values.get("cycles") if gait else None) or 0.0)
+        known = Known(
+            verdict=verdict,
+            history=self._trends.history(setup.joints),
+            cycles=cycles,
+            joints=joints.reports,
+            clearances=joints.clearances,
+            life=joints.life_with(leg),
+            forecast=leg,
+            alarms=[alarm_of(status) for status in self._alarms.values()],
+            status=list(self._statuses.values()),
+            missing="" if cycles else gait.message if gait else "nothing was heard",
+        )
+        return view_of(setup, known)
+
+
+def _of_joints(values: Mapping[str, float]) -> dict[str, float | None]:
+    """Values by joint, as far as they are numbers and not too many."""
+    first = islice(values.items(), MOST)
+    return {printable(joint): value if math.isfinite(value) else None for joint, value in first}

@@ -1,0 +1,79 @@
+"""The page in a browser, on a desk and on a phone: it is renewed, loud when it is old, and runs no markup."""
+
+import pytest
+from browser import NEEDS_CHROMIUM, WIDTHS
+from heard_leg import status, walk
+
+pytest.importorskip("tornado")
+from live_browser import LivePage
+
+from leg_wear_monitor.dashboard.live_leg import OLD_AFTER_S
+
+pytestmark = NEEDS_CHROMIUM
+
+IS_OLD = "document.documentElement.hasAttribute('data-old')"
+IS_FRESH = f"document.querySelector('.freshness') && !{IS_OLD}"
+TOO_WIDE = "document.documentElement.scrollWidth - document.documentElement.clientWidth"
+FOREIGN = "document.querySelectorAll('[data-region] img, [data-region] script:not([type])').length"
+NASTY = "<img src=x onerror=\"document.title='run'\"><script>document.title='run'</script>"
+
+
+@pytest.fixture(params=WIDTHS)
+def page(request, served, tmp_path, leg):
+    dashboard = served(leg)
+    page = LivePage(f"http://127.0.0.1:{dashboard.port}/", tmp_path, request.param)
+    page.wait(IS_FRESH, "data")
+    yield page
+    page.close()
+
+
+def test_it_is_renewed_says_when_it_is_old_and_runs_no_markup(page, leg, clock):
+    assert page.text("[data-region=verdict] .verdict").split() == ["✓", "HEALTHY"]
+    assert page.value("document.title").startswith("✓ healthy")
+    assert page.value("document.querySelectorAll('[data-region=trends] canvas').length") >= 4
+    assert page.value(TOO_WIDE) <= 0
+
+    leg.take_verdict([
+        status("verdict", f"stop joint G: {NASTY}. To do: {NASTY}", severity=4, joint_G=1, fault_code="X")
+    ])  # fmt: skip
+    leg.take_alarms([status("clearance G", NASTY, level=2, value_m=7e-4, limit_m=6e-4, worst_m=7e-4)])
+    page.wait("document.title.startsWith('■ stop joint G (knee)')", "the new verdict")
+    assert "STOP" in page.text("[data-region=verdict]") and "<img" in page.text("[data-region=verdict]")
+    assert "ERROR clearance G (knee)" in page.text("[data-region=alarms]")
+    assert (
+        page.value("document.querySelectorAll('[data-region] img, [data-region] script:not([type])').length")
+        == 0
+    )
+    assert page.value(TOO_WIDE) <= 0
+
+    clock.now_s += OLD_AFTER_S + 7.0
+    page.wait(IS_OLD, "the page to turn grey")
+    assert page.text(".freshness").startswith("NO DATA for 1")
+    assert page.value("document.title").startswith("? no data")
+    walk(leg, 30)
+    page.wait(IS_FRESH, "the page to be fresh again")
+    assert page.console == []
+
+
+def test_it_says_when_the_server_is_gone(leg, served, tmp_path):
+    dashboard = served(leg)
+    page = LivePage(f"http://127.0.0.1:{dashboard.port}/", tmp_path, 390)
+    try:
+        page.wait(
+            IS_FRESH,
+            "data",
+        )
+        dashboard.end()
+        page.wait(IS_OLD, "the page to turn grey")
+        assert page.text(".freshness").startswith("NO CONNECTION to the dashboard for ")
+    finally:
+        page.close()
+
+
+def test_what_is_wrong_would_be_seen(tmp_path):
+    page = LivePage("data:text/html,<script>nothing()</script><p>shown", tmp_path)
+    try:
+        page.wait("document.body.innerText === 'shown'", "the page")
+        assert any("nothing is not defined" in line for line in page.console)
+    finally:
+        page.close()

@@ -1,0 +1,139 @@
+"""The server: reads only, answers to its own names only, the same for all who look, and ends well."""
+
+import socket
+import threading
+
+import pytest
+from heard_leg import walk
+
+pytest.importorskip("tornado")
+
+from leg_wear_monitor.dashboard import hub as hubs
+from leg_wear_monitor.dashboard.server import listen
+from leg_wear_monitor.errors import LegWearError
+
+pytestmark = pytest.mark.plain
+
+WRITES = ["POST", "PUT", "DELETE", "PATCH", "OPTIONS", "TRACE", "PROPFIND", "CONNECT", "x"]
+
+
+def test_the_page_comes_with_a_policy_that_lets_nothing_else_in(leg, served):
+    code, headers, html = served(leg).ask("/")
+    assert code == 200
+    assert html == leg.content().html
+    policy = headers["Content-Security-Policy"]
+    assert policy.startswith("default-src 'none'; ")
+    assert "unsafe" not in policy and "http" not in policy and "*" not in policy
+    assert "connect-src 'self'" in policy and "frame-ancestors 'none'" in policy
+    assert headers["X-Content-Type-Options"] == "nosniff"
+    assert headers["Cache-Control"] == "no-store"
+    assert "Server" not in headers
+    assert " src=" not in html and '<link rel="stylesheet' not in html
+
+
+@pytest.mark.parametrize("method", WRITES)
+@pytest.mark.parametrize("path", ["/", "/events", "/legs/a/report.html", "/other"])
+def test_writes_are_refused(leg, served, method, path):
+    code, headers, text = served(leg).ask(path, method, body=b"x=1")
+    assert code in (405, 400)  # what is no method at all is no request
+    if code == 405:
+        assert headers["Allow"] == "GET, HEAD"
+    assert "x=1" not in text
+
+
+def test_head_is_as_get_without_a_body(leg, served):
+    dashboard = served(leg)
+    for path, code in (("/", 200), ("/events", 200), ("/nothing", 404)):
+        found, _, text = dashboard.ask(path, "HEAD")
+        assert (found, text) == (code, "")
+
+
+PATHS = ["/../etc/passwd", "/%2e%2e/etc/passwd", "/legs/../../etc/passwd", "/legs/..%2f..%2fx/report.html",
+         "/legs/%00/report.html", "/legs//report.html", "//evil.example/", "/index.html", "/events/",
+         "/<script>"]  # fmt: skip
+
+
+@pytest.mark.parametrize("path", PATHS)
+def test_there_is_no_other_path(leg, served, path):
+    code, _, text = served(leg).ask(path)
+    assert code == 404
+    assert text == "404 Not Found\n"
+
+
+@pytest.mark.parametrize("path", ["/", "/events", "/legs/a/report.html"])
+def test_another_name_is_refused(leg, served, path):
+    dashboard = served(leg)
+    for host in ("evil.example", f"evil.example:{dashboard.port}", "", "127.0.0.1.evil.example"):
+        code, _, text = dashboard.ask(path, Host=host)
+        assert (code, text) == (403, "403 Forbidden\n"), host
+    assert dashboard.ask("/", Host=f"localhost:{dashboard.port}")[0] == 200
+
+
+def test_a_page_of_another_site_may_link_here_and_not_read(leg, served):
+    dashboard = served(leg)
+    assert dashboard.ask("/events", Sec_Fetch_Site="cross-site", Sec_Fetch_Mode="cors")[0] == 403
+    code, headers, _ = dashboard.ask("/", Sec_Fetch_Site="cross-site", Sec_Fetch_Mode="navigate")
+    assert code == 200
+    assert not [name for name in headers if name.startswith("Access-Control")]
+
+
+def test_two_who_look_see_the_same_and_what_changes(leg, served):
+    dashboard = served(leg)
+    with dashboard.events() as one, dashboard.events() as other:
+        first = [next(one), next(other)]
+        assert first[0]["regions"] == first[1]["regions"] == leg.content().regions
+        walk(leg, 20, clearance_m=5.0e-4)
+        states = [next(state for state in each if state["regions"]) for each in (one, other)]
+        assert states[0]["regions"] == states[1]["regions"]
+        assert "0.500" in states[0]["regions"]["joints"]
+        assert "belief" not in states[0]["regions"]  # it is as it was
+        assert dashboard.hub.viewers == 2
+
+
+def test_a_word_comes_without_news_and_who_goes_is_forgotten(leg, served, clock):
+    dashboard = served(leg)
+    with dashboard.events() as states:
+        assert next(states)["age_s"] == 0.0
+        clock.now_s += 3.0
+        assert next(state for state in states if state["age_s"] == 3.0)["regions"] == {}
+    gone = threading.Event()
+    for _ in range(200):
+        if dashboard.hub.viewers == 0:
+            break
+        gone.wait(0.1)
+    assert dashboard.hub.viewers == 0
+
+
+def test_there_are_not_more_viewers_than_it_can_serve(leg, served, monkeypatch):
+    monkeypatch.setattr(hubs, "MOST_VIEWERS", 1)
+    dashboard = served(leg)
+    with dashboard.events() as states:
+        next(states)
+        assert dashboard.ask("/events")[0] == 503
+        assert dashboard.ask("/")[0] == 200
+
+
+def test_a_rendering_serves_all(leg, served, monkeypatch):
+    """However many look, the content is made once for each change."""
+    made = []
+    content = leg.content
+    monkeypatch.setattr(leg, "content", lambda: made.append(1) or content())
+    dashboard = served(leg)
+    with dashboard.events() as one, dashboard.events() as two, dashboard.events() as three:
+        for states in (one, two, three):
+            next(states)
+        assert len(made) == 1
+        walk(leg, 30, clearance_m=5.5e-4)
+        for states in (one, two, three):
+            next(state for state in states if state["regions"])
+        assert len(made) == 2
+
+
+def test_a_port_in_use_is_one_line():
+    with socket.create_server(("127.0.0.1", 0)) as taken:
+        port = taken.getsockname()[1]
+        fault = rf"--port: 127\.0\.0\.1:{port} cannot be used: .*in use"
+        with pytest.raises(LegWearError, match=fault):
+            listen("127.0.0.1", port)
+    with pytest.raises(LegWearError, match="--host"):
+        listen("no.such.host.invalid", 0)

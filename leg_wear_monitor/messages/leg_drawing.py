@@ -51,7 +51,8 @@ class LegDrawing:
         names = mechanism.clearance_joints
         joints = [_path(motion, linkage, mechanism.sides(name)[0], name) for name in names]
         self.joints = np.stack(joints, axis=1) if joints else np.zeros((_STEPS, 0, 3))
-        corners = np.array([self.lines.min(axis=(0, 1)), self.lines.max(axis=(0, 1))])
+        all_points = np.concatenate([self.lines, self.joints], axis=1)
+        corners = np.array([all_points.min(axis=(0, 1)), all_points.max(axis=(0, 1))])
         self.size = float(np.ptp(corners, axis=0).max())
         self.tags = _tags(names, self.joints, _SAME * self.size)
         toe = mechanism.toe
@@ -87,14 +88,14 @@ def _lines(mechanism: Mechanism, motion: IdealMotion, linkage: Linkage) -> Float
     """Lines from each moving body's first point to its other points, as pairs of points."""
     ends: list[Floats] = []
     for body in mechanism.bodies:
-        first, *others = (_path(motion, linkage, body, point) for point in mechanism.points_of(body))
-        for other in others:
-            ends += [first, other]
+        places = [_path(motion, linkage, body, point) for point in mechanism.points_of(body)]
+        for other in places[1:]:
+            ends += [places[0], other]
     ground = [_path(motion, linkage, GROUND, point) for point in mechanism.points_of(GROUND)]
     for one, other in itertools.pairwise(ground):
         if math.dist(one[0], other[0]) > 0.0:
             ends += [one, other]
-    return np.stack(ends, axis=1)
+    return np.stack(ends, axis=1) if ends else np.zeros((_STEPS, 0, 3))
 
 
 def _tags(names: tuple[str, ...], joints: Floats, same: float) -> tuple[tuple[str, int], ...]:

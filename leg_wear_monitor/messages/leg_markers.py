@@ -41,7 +41,8 @@ class LegMarkers:
 
     def __init__(self, monitor: WearMonitor, drawing: LegDrawing) -> None:
         self._frame_id, self._joints = monitor.config.frame_id, monitor.clearance_joints
-        self._scene = LegScene(drawing, self._joints, max(monitor.clearance_limits_m))
+        limit_m = max(monitor.clearance_limits_m, default=monitor.config.limits.clearance_m)
+        self._scene = LegScene(drawing, self._joints, limit_m)
         self._now = Shown(
             self._levels(monitor.alarms), monitor.clearances_m, _words(monitor.verdict), is_current=False
         )

@@ -203,3 +203,14 @@ def test_markers_are_the_same_however_reports_are_cut(
     assert drawn_from(cuts) == one_by_one
     assert [b"G: WARN" in raw for raw in one_by_one] == [False] * 3 + [True] * 2 + [False] * 3 + [True] * 2
     assert [b"G: ERROR" in raw for raw in one_by_one] == [False] * 5 + [True] * 3 + [False] * 2
+
+
+@pytest.mark.parametrize("name", ["andrews", "four_bar", "jansen_leg", "slider_crank"])
+def test_other_mechanisms_are_drawn_with_all_their_clearance_joints(name: str) -> None:
+    mechanism = lw.load_mechanism(name)
+    drawing = LegDrawing(mechanism)
+    joints = len(mechanism.clearance_joints)
+    assert drawing.rings.shape == (joints, 3)
+    assert sum(len(text.split()) for text, _ in drawing.tags) == joints
+    assert np.isfinite(drawing.lines).all() and drawing.lines.shape[1] > 0
+    assert (len(drawing.path) > 0) == (mechanism.toe is not None)

@@ -98,6 +98,7 @@ def are_one_number_a_value(diagnostics: list[DiagnosticArray]) -> None:
     assert expected <= set(levels(diagnostics[-1]))
     assert all(line.level in (b"\0", b"\1", b"\2") for line in lines)
     assert all(line.hardware_id == "leg" for line in lines)
+    assert all([value.key for value in line.values].count("fault_code") == 1 for line in lines)
     values = [value for line in lines for value in line.values if value.key != "fault_code"]
     assert len(values) > 40
     for value in values:

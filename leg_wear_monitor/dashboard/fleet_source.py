@@ -88,19 +88,21 @@ class FleetSource:
             styles=[*page.styles, template_text("dashboard/dashboard.css")],
         )
         state = page.banner.word.lower() if page.banner else ""
-        words = Words(title=f"{state} – fleet", state=state)
+        words = Words(title=f"{state} – fleet", state=state, heading=page.title, summary=page.summary)
         identity = hashlib.sha256(page_html(page).encode()).hexdigest()[:16]
-        live = live_settings(identity, words, self.freshness(), "Updated ", OLD_AFTER_S)
+        live = live_settings(identity, words, self.freshness(), "Updated ")
         page = attrs.evolve(page, live=live)
         return Content(page=identity, html=page_html(page), regions={}, words=words, policy=page.policy)
 
     def freshness(self) -> Freshness:
         """Since when the fleet was not updated."""
         if self._fault:
-            return Freshness(None, f"NOT READABLE: {printable(self._fault)}; what is shown is old")
+            return Freshness(
+                None, f"NOT READABLE: {printable(self._fault)}; what is shown is old", OLD_AFTER_S
+            )
         written_ns = max((stamp for stamp, _ in self._stamp[1:]), default=0)
         age_s = max(0.0, self._clock() - 1.0e-9 * written_ns)
-        return Freshness(age_s, "the fleet was not updated; run leg-wear-monitor fleet update")
+        return Freshness(age_s, "the fleet was not updated; run leg-wear-monitor fleet update", OLD_AFTER_S)
 
     def leg_page(self, name: str) -> str | None:
         """The page of a leg of the description, by its exact id; no other name leads to a file."""

@@ -75,10 +75,13 @@ class Hub:
                 self._ring()
 
     def close(self) -> None:
-        """Send the viewers away."""
+        """Send the viewers away; `run` ends after its tick."""
         self.is_closing = True
         self._ring()
-        self._worker.shutdown(wait=False, cancel_futures=True)
+
+    def finish(self) -> None:
+        """End the worker, when nobody asks any more."""
+        self._worker.shutdown(wait=False)
 
     def _ring(self) -> None:
         for viewer in self._viewers:

@@ -94,9 +94,11 @@ class LedgerLeg:
     def freshness(self) -> Freshness:
         """Since when nothing was written."""
         if self._failures >= _TRIES:
-            return Freshness(None, f"NOT READABLE: {printable(self._fault)}; what is shown is old")
+            return Freshness(
+                None, f"NOT READABLE: {printable(self._fault)}; what is shown is old", OLD_AFTER_S
+            )
         written_ns = max((stamp for stamp, _ in self._read_stamp), default=0)
-        return Freshness(max(0.0, self._clock() - 1.0e-9 * written_ns), _SILENCE)
+        return Freshness(max(0.0, self._clock() - 1.0e-9 * written_ns), _SILENCE, OLD_AFTER_S)
 
     def content(self) -> Content:
         """The page."""
@@ -107,14 +109,10 @@ class LedgerLeg:
             region.ALARMS: region.alarms_region(view),
             region.TRENDS: region.trends_region(view, "As the ledger has it."),
         }
-        page = LegPage(
-            title=f"Joint wear of {printable(self._setup.monitor.hardware_id)}",
-            summary=f"{self._setup.monitor.mechanism}, from the ledger {printable(str(self._path))}",
-            fresh="Written ",
-            old_after_s=OLD_AFTER_S,
-        )
         name = printable(self._setup.monitor.hardware_id)
-        return page.content(regions, words_of(view, name), self.freshness())
+        summary = f"{self._setup.monitor.mechanism}, from the ledger {printable(str(self._path))}"
+        words = words_of(view, name, f"Joint wear of {name}", summary)
+        return LegPage(fresh="Written ").content(regions, words, self.freshness())
 
     def leg_page(self, name: str) -> None:
         """There is one leg."""

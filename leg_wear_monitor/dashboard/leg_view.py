@@ -58,12 +58,15 @@ class LegSetup:
     shape : ReplayLeg
     limits_m, new_m : dict of str to float
         Limit of each joint's mean clearance, and its clearance when new.
+    report_s : float
+        Time between two reports of the monitor on itself.
     """
 
     monitor: ReplayMonitor
     shape: ReplayLeg
     limits_m: dict[str, float]
     new_m: dict[str, float]
+    report_s: float = 1.0
 
     @property
     def joints(self) -> tuple[str, ...]:
@@ -80,6 +83,7 @@ def leg_setup(config: MonitorConfig, mechanism: Mechanism) -> LegSetup:
         shape=leg_shape(mechanism),
         limits_m=dict(zip(joints, limits, strict=True)),
         new_m={joint: float(mechanism.clearances[joint].radial_clearance) for joint in joints},
+        report_s=config.diagnostics.period_s,
     )
 
 

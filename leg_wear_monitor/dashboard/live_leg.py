@@ -16,13 +16,14 @@ from leg_wear_monitor.dashboard.received import (
     own_statuses,
     verdict_of,
 )
-from leg_wear_monitor.dashboard.source import Content, Freshness, LegPage, words_of
+from leg_wear_monitor.dashboard.source import Content, Freshness, LegPage, Words, words_of
 from leg_wear_monitor.dashboard.trends import Row, Trends
 from leg_wear_monitor.errors import printable
 from leg_wear_monitor.playback.result.parts import ReplayStatus
 from leg_wear_monitor.playback.result.replay_summary import ReplaySummary
 
 OLD_AFTER_S = 5.0  # the monitor reports every second, whether the leg walks or not
+_REPORTS = 3.0  # or so many of its reports did not come
 _TRENDS_S = 5.0  # charts are many kilobytes: not with each message
 
 _GAIT = {"cycle": "cycles", "cadence_rpm": "cadence_rpm"}
@@ -144,7 +145,7 @@ class LiveLeg:
             region.TRENDS: self._trends_region(view),
             region.STATUS: region.status_region(view),
         }
-        return self._page().content(regions, words_of(view, printable(self._node)), self.freshness())
+        return LegPage(fresh="Live, data ").content(regions, self._words(view), self.freshness())
 
     def freshness(self) -> Freshness:
         """Since when nothing was heard of the monitor; or, if it speaks, since when it has no data."""
@@ -155,27 +156,26 @@ class LiveLeg:
                 None,
                 f"WAITING for the monitor {printable(self._node)}: no message yet on {self._waited_for}. "
                 "Is it running, with this name and this ROS_DOMAIN_ID?",
+                self._old_after_s,
             )
         age_s = self._clock() - heard_s
-        if leg_s is not None and age_s < OLD_AFTER_S:
-            return Freshness(
-                leg_s + age_s,
-                "the monitor runs, but receives nothing from the leg; see its status topics below",
-            )
-        return Freshness(age_s, "nothing is heard of the monitor; is it running?")
+        silence = "nothing is heard of the monitor; is it running?"
+        if leg_s is not None and age_s < self._old_after_s:
+            age_s += leg_s
+            silence = "the monitor runs, but receives nothing from the leg; see its status below"
+        return Freshness(age_s, silence, self._old_after_s)
 
     def leg_page(self, name: str) -> None:
         """There is one leg."""
 
-    def _page(self) -> LegPage:
-        setup = self._setup
-        which = f"{setup.monitor.mechanism}, live from " if setup else "live from "
-        return LegPage(
-            title=f"Joint wear of {printable(setup.monitor.hardware_id) if setup else 'a leg'}",
-            summary=f"{which}{printable(self._node)}",
-            fresh="Live, data ",
-            old_after_s=OLD_AFTER_S,
-        )
+    def _words(self, view: ReplaySummary) -> Words:
+        node, leg = printable(self._node), printable(view.monitor.hardware_id) or "a leg"
+        which = ", ".join(filter(None, [view.monitor.mechanism, f"live from {node}"]))
+        return words_of(view, node, f"Joint wear of {leg}", which)
+
+    @property
+    def _old_after_s(self) -> float:
+        return max(OLD_AFTER_S, _REPORTS * self._setup.report_s) if self._setup else OLD_AFTER_S
 
     def _trends_region(self, view: ReplaySummary) -> str:
         now_s, (drawn_s, markup) = self._clock(), self._drawn

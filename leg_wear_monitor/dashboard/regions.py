@@ -1,11 +1,12 @@
 """Regions of the page: markup of what is known of a leg, each replaced by itself when it changes."""
 
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 
 import attrs
 import numpy as np
 
 from leg_wear_monitor.dashboard.leg_view import over_time
+from leg_wear_monitor.mechanism.arrays import Floats
 from leg_wear_monitor.monitor.alarms.alarm import Level
 from leg_wear_monitor.monitor.verdict.verdict import Evidence, Figure
 from leg_wear_monitor.monitor.verdict.words import amount
@@ -100,10 +101,15 @@ def trends_region(view: ReplaySummary, caption: str) -> str:
     parts: list[Part] = [Text(caption)]
     if np.isfinite(timed.history.cadence_rpm).any():
         parts.append(health_chart(timed))
-    parts += _unless_doubted(timed, Figure.CLEARANCES, "Clearances", openings_chart(timed))
-    if any(np.isfinite(values).any() for values in timed.history.peak_force_n.values()):
+    if _is_known(timed.history.clearance_m):
+        parts += _unless_doubted(timed, Figure.CLEARANCES, "Clearances", openings_chart(timed))
+    if _is_known(timed.history.peak_force_n):
         parts += _unless_doubted(timed, Figure.IMPACT_FORCES, "Impact forces", force_chart(timed))
     return _parts(parts)
+
+
+def _is_known(columns: Mapping[str, Floats]) -> bool:
+    return any(np.isfinite(values).any() for values in columns.values())
 
 
 def _unless_doubted(view: ReplaySummary, figure: Figure, name: str, chart: Chart) -> list[Part]:

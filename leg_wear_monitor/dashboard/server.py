@@ -114,6 +114,7 @@ async def serve(hub: Hub, place: Place, ready: Callable[[asyncio.Event], None]) 
         server.stop()
         await renewing  # raises what it may have ended with
         await server.close_all_connections()
+        hub.finish()
 
 
 def application(hub: Hub, host: str) -> Application:

@@ -25,10 +25,14 @@ class Words:
         Of the browser's tab.
     state : str
         Spoken when it changes.
+    heading, summary : str
+        At the head of the page.
     """
 
     title: str
     state: str
+    heading: str
+    summary: str
 
 
 @attrs.frozen
@@ -41,10 +45,13 @@ class Freshness:
         None before there are any.
     silence : str
         What it means that nothing new comes, and what to look at.
+    old_after_s : float
+        Age from which on the page says loudly that its data are old.
     """
 
     age_s: float | None
     silence: str
+    old_after_s: float
 
 
 @attrs.frozen(kw_only=True)
@@ -93,17 +100,11 @@ class LegPage:
 
     Attributes
     ----------
-    title, summary : str
     fresh : str
         Begin of the line that says how old the data are, such as ``Data ``.
-    old_after_s : float
-        Age from which on the page says loudly that its data are old.
     """
 
-    title: str
-    summary: str
     fresh: str
-    old_after_s: float
 
     def content(self, regions: Mapping[str, str], words: Words, freshness: Freshness) -> Content:
         """The page with its regions."""
@@ -114,8 +115,8 @@ class LegPage:
     def _page(self, words: Words, freshness: Freshness) -> tuple[Page, str]:
         """The page without its regions, and its identity."""
         page = Page(
-            title=self.title,
-            summary=self.summary,
+            title=words.heading,
+            summary=words.summary,
             sections=(),
             styles=[
                 template_text("uplot/uPlot.min.css"),
@@ -130,32 +131,31 @@ class LegPage:
             has_dark=True,
         )
         identity = _identity(page)
-        live = live_settings(identity, words, freshness, self.fresh, self.old_after_s)
+        live = live_settings(identity, words, freshness, self.fresh)
         return attrs.evolve(page, live=live), identity
 
 
-def live_settings(page: str, words: Words, freshness: Freshness, fresh: str, old_after_s: float) -> str:
+def live_settings(page: str, words: Words, freshness: Freshness, fresh: str) -> str:
     """Settings of the page's script, as JSON."""
     settings = {
         "page": page,
         "fresh": fresh,
-        "old_after_s": old_after_s,
-        "age_s": freshness.age_s,
-        "silence": freshness.silence,
+        **attrs.asdict(freshness),
         "words": attrs.asdict(words),
     }
     return json.dumps(settings, allow_nan=False)
 
 
-def words_of(view: ReplaySummary, name: str) -> Words:
-    """The verdict in a few words."""
+def words_of(view: ReplaySummary, name: str, heading: str, summary: str) -> Words:
+    """The verdict in a few words, and what stands at the head of its page."""
     verdict = view.verdict
     joints = ", ".join(map(view.leg.joint_words, verdict.joints))
     state = f"{verdict.state.words} joint {joints}" if joints else verdict.state.words
-    return Words(title=f"{LOOKS[verdict.state][0]} {state} – {name}", state=f"{name}: {state}")
+    title = f"{LOOKS[verdict.state][0]} {state} – {name}"
+    return Words(title=title, state=f"{name}: {state}", heading=heading, summary=summary)
 
 
 def _identity(page: Page) -> str:
-    """The same for pages with the same scripts, styles and title."""
-    parts = (page.title, page.summary, page.style, *page.scripts)
+    """The same for pages with the same scripts and styles."""
+    parts = (page.style, *page.scripts)
     return hashlib.sha256("\0".join(parts).encode()).hexdigest()[:16]

@@ -2,6 +2,7 @@
 
 from html.parser import HTMLParser
 
+import attrs
 import pytest
 from heard_leg import NODE, status, walk
 from html_reader import read
@@ -62,6 +63,14 @@ def test_it_says_which_topics_it_waits_for_and_then_that_nothing_comes(clock, se
     clock.now_s += 12.0
     assert leg.freshness().age_s == 12.0 > OLD_AFTER_S
     assert "nothing is heard of the monitor" in leg.freshness().silence
+
+
+def test_a_monitor_that_reports_seldom_is_not_old_between_two_reports(leg, setup, clock):
+    assert leg.freshness().old_after_s == OLD_AFTER_S
+    page = leg.content().page
+    leg.take_setup(attrs.evolve(setup, report_s=20.0))
+    assert leg.freshness().old_after_s == 60.0
+    assert leg.content().page == page
 
 
 def test_a_monitor_that_hears_no_leg_is_no_fresh_data(leg):

@@ -5,7 +5,7 @@
   const root = document.documentElement, settings = JSON.parse(root.dataset.live);
   const strip = document.createElement("p"), said = document.createElement("p");
   const waiting = new Map();  // regions that the reader is using just now
-  let age = settings.age_s, silence = settings.silence, words = settings.words, heard = Date.now(), spoken = "";
+  let age = settings.age_s, silence = settings.silence, oldAfter = settings.old_after_s, words = settings.words, heard = Date.now(), spoken = "";
 
   strip.className = "freshness";
   strip.setAttribute("role", "status");
@@ -27,7 +27,7 @@
       text = "NO CONNECTION to the dashboard for " + duration(quiet) + ": what is shown is old";
     } else if (old === null) {
       kind = text = silence;
-    } else if (old > settings.old_after_s) {
+    } else if (old > oldAfter) {
       kind = silence;
       text = "NO DATA for " + duration(old) + ": " + silence;
     } else {
@@ -37,6 +37,8 @@
     strip.textContent = text;
     root.toggleAttribute("data-old", isOld);
     strip.toggleAttribute("data-old", isOld);
+    document.querySelector("h1").textContent = words.heading;
+    document.querySelector(".summary").textContent = words.summary;
     document.title = (isOld ? "? no data – " : "") + words.title;
     speak(isOld ? kind : words.state);
   }
@@ -82,6 +84,7 @@
     heard = Date.now();
     age = state.age_s;
     silence = state.silence;
+    oldAfter = state.old_after_s;
     words = state.words;
     if (state.page !== settings.page) another();
     else Object.entries(state.regions).forEach(([name, markup]) => replace(name, markup));

@@ -74,11 +74,16 @@ def evaluate(linkage: Linkage, q: Floats, v: Floats, drive: tuple[float, float, 
 
 def jacobians(linkage: Linkage, q: Floats) -> Floats:
     """Jacobians (p, m, 3 (n - 1)) of all closures and the drive at p positions q (p, n, 3)."""
+    return dense_jacobian(linkage.rows, jacobian_blocks(linkage, q), q.shape[1])
+
+
+def jacobian_blocks(linkage: Linkage, q: Floats) -> Floats:
+    """Blocks (p, m, 2, 3) of the Jacobians of all closures and the drive at p positions q (p, n, 3)."""
     m, n = len(linkage.rows.body), q.shape[1]
     blocks = np.zeros((len(q), m, 2, 3))
     room = np.zeros((n, 3)), np.zeros(3), np.zeros((n, 2)), np.zeros(m), np.zeros(m)
     jacobians_at(linkage.arrays, linkage.rows, np.ascontiguousarray(q), *room, blocks)
-    return dense_jacobian(linkage.rows, blocks, n)
+    return blocks
 
 
 def gammas(linkage: Linkage, q: Floats, v: Floats, acceleration: float) -> Floats:
@@ -95,8 +100,8 @@ def dense_jacobian(rows: Rows, blocks: Floats, bodies: int) -> Floats:
     """Jacobian (..., m, 3 (n - 1)) of the moving bodies from its blocks (..., m, 2, 3)."""
     m = len(rows.body)
     full = np.zeros((*blocks.shape[:-3], m, bodies, 3))
-    for slot in range(2):
-        full[..., np.arange(m), rows.body[:, slot], :] += blocks[..., slot, :]
+    for slot in range(2):  # no closure joins a body to itself
+        full[..., np.arange(m), rows.body[:, slot], :] = blocks[..., slot, :]
     return full[..., 1:, :].reshape(*blocks.shape[:-3], m, -1)
 
 

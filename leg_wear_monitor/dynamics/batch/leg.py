@@ -7,8 +7,9 @@ from threading import Lock
 import attrs
 import numpy as np
 
+from leg_wear_monitor.dynamics.clearance.basis import Basis
 from leg_wear_monitor.dynamics.clearance.stepper import ClearanceStepper, needs_speed
-from leg_wear_monitor.dynamics.clearance.tables import ClearanceTables, build_tables
+from leg_wear_monitor.dynamics.clearance.tables import ClearanceTables, build_basis, build_tables
 from leg_wear_monitor.dynamics.run.protocol import Setup
 from leg_wear_monitor.dynamics.simulation import prepare
 from leg_wear_monitor.errors import AssemblyError, ConfigError
@@ -109,6 +110,27 @@ def prepare_legs(legs: Sequence[Leg]) -> list[Setup | AssemblyError]:
     return setups
 
 
+class SharedBasis:
+    """Basis of the tables of legs that differ in radii, contacts, speed and initial state only.
+
+    Parameters
+    ----------
+    setup : Setup
+        Setup of any of these legs.
+    """
+
+    def __init__(self, setup: Setup) -> None:
+        self._lock, self._setup = Lock(), setup
+        self._basis: Basis | None = None
+
+    def get(self) -> Basis:
+        """The basis; the first call builds it, other threads wait meanwhile."""
+        with self._lock:
+            if self._basis is None:
+                self._basis = build_basis(self._setup.linkage, self._setup.contacts)
+            return self._basis
+
+
 class SharedTables:
     """Tables of a group of legs, built when the first of them runs.
 
@@ -116,38 +138,41 @@ class SharedTables:
     ----------
     setup : Setup
         Setup of any leg of the group.
+    basis : SharedBasis, optional
+        That of this group and of others.
     """
 
-    def __init__(self, setup: Setup) -> None:
-        self._lock, self._setup = Lock(), setup
+    def __init__(self, setup: Setup, basis: SharedBasis | None = None) -> None:
+        self._lock, self._setup, self._basis = Lock(), setup, basis
         self._tables: ClearanceTables | None = None
 
     def get(self) -> ClearanceTables:
         """The tables; the first call builds them, other threads wait meanwhile."""
         with self._lock:
             if self._tables is None:
-                self._tables = build_tables(self._setup.linkage, self._setup.contacts)
+                basis = self._basis.get() if self._basis else None
+                self._tables = build_tables(self._setup.linkage, self._setup.contacts, basis=basis)
+                self._basis = None
             return self._tables
 
 
 def share_tables(setups: Sequence[Setup | AssemblyError]) -> Iterator[tuple[int, Setup, SharedTables]]:
-    """Index, setup and tables of the valid legs; legs with common tables follow each other.
+    """Index, setup and tables of the valid legs; legs with common tables, then bases, follow each other.
 
-    Therefore no more tables exist at a time than legs are running.
+    Therefore no more tables and bases exist at a time than legs are running.
     """
-    groups: dict[object, list[tuple[int, Setup]]] = {}
+    groups: dict[object, dict[object, list[tuple[int, Setup]]]] = {}
     for i, setup in enumerate(setups):
         if isinstance(setup, Setup):
             mechanism, contacts = setup.linkage.mechanism, setup.contacts
             bare = repr(attrs.evolve(mechanism, clearances={}, clearance_joints=()))
-            key = (
-                bare,
-                setup.clearance_joints,
-                contacts.bushing_radius.tobytes(),
-                contacts.clearance.tobytes(),
-            )
-            groups.setdefault(key, []).append((i, setup))
+            radii = contacts.bushing_radius.tobytes(), contacts.clearance.tobytes()
+            group = groups.setdefault((bare, setup.clearance_joints), {})
+            group.setdefault(radii, []).append((i, setup))
     for group in groups.values():
-        tables = SharedTables(group[0][1])
-        for i, setup in group:
-            yield i, setup, tables
+        (first, *_), *others = group.values()
+        basis = SharedBasis(first[1]) if others else None
+        for legs in group.values():
+            tables = SharedTables(legs[0][1], basis)
+            for i, setup in legs:
+                yield i, setup, tables

@@ -1,12 +1,14 @@
 """The linkage near its ideal motion: effects of the eccentricities (physics.md section 7)."""
 
+import copy
+
 import numpy as np
 
 from leg_wear_monitor.contact.arrays import ContactArrays
 from leg_wear_monitor.mechanism.arrays import Floats, Ints, MechanismArrays
 from leg_wear_monitor.mechanism.forces import applied_forces_at, stored_energy_at
 from leg_wear_monitor.mechanism.ideal import IdealMotion
-from leg_wear_monitor.mechanism.position import Linkage, jacobians
+from leg_wear_monitor.mechanism.position import Linkage, dense_jacobian, jacobian_blocks, jacobians
 
 _NUDGE = 1.0e-5  # m or rad: step of central differences of smooth functions of the coordinates
 
@@ -16,6 +18,7 @@ class Basis:
 
     Attributes
     ----------
+    motion : IdealMotion
     x : (N, 3 b, 3 b) array
         Inverse Jacobian of all closures and the drive.
     rows : list of int
@@ -46,7 +49,7 @@ class Basis:
     """
 
     def __init__(self, linkage: Linkage, contacts: ContactArrays, motion: IdealMotion) -> None:
-        n = len(motion.q)
+        self.motion, n = motion, len(motion.q)
         self.x: Floats = np.asarray(np.linalg.inv(jacobians(linkage, motion.q)), dtype=np.float64)
         self.mass = linkage.arrays.mass[1:].ravel()
         self.rows = _rows(linkage, contacts.joint)
@@ -56,15 +59,24 @@ class Basis:
         self.drive_t = motion.a[:, 1:].reshape(n, -1)
         self.all = np.concatenate([self.s, self.drive[:, :, None]], axis=2)
         self.force, self.load, self.potential = _forces(linkage, motion.q)
-        levers = _friction_levers(linkage.arrays, contacts)
-        self.friction = np.broadcast_to(levers, (n, *levers.shape))
+        self._take_levers(linkage, contacts)
         self.drag = _drag(linkage.arrays, motion.q, self.all)
         self._curve(linkage, motion.q)
+
+    def with_contacts(self, linkage: Linkage, contacts: ContactArrays) -> "Basis":
+        """That of the same linkage and joints with other radii: only the levers of friction differ."""
+        other = copy.copy(self)
+        other._take_levers(linkage, contacts)
+        return other
+
+    def _take_levers(self, linkage: Linkage, contacts: ContactArrays) -> None:
+        levers = _friction_levers(linkage.arrays, contacts)
+        self.friction: Floats = np.broadcast_to(levers, (len(self.motion.q), *levers.shape))
 
     def _curve(self, linkage: Linkage, q: Floats) -> None:
         """Set the quantities of first order in e."""
         d = len(self.rows)
-        mass = self.mass[:, None]
+        mass, minus_x = self.mass[:, None], -self.x
         curvature = np.empty((*self.s.shape, d))
         force_s, load_s = np.zeros((2, *self.s.shape))
         for j in range(d):
@@ -72,8 +84,9 @@ class Basis:
             ahead, behind = q.copy(), q.copy()
             ahead[:, 1:] += step
             behind[:, 1:] -= step
-            slope = (jacobians(linkage, ahead) - jacobians(linkage, behind)) / (2.0 * _NUDGE)
-            curvature[..., j] = -self.x @ (slope @ self.s)
+            blocks = (jacobian_blocks(linkage, ahead) - jacobian_blocks(linkage, behind)) / (2.0 * _NUDGE)
+            slope = dense_jacobian(linkage.rows, blocks, q.shape[1])
+            curvature[..., j] = minus_x @ (slope @ self.s)
             if len(linkage.arrays.load_body) or len(linkage.arrays.spring_body):
                 after, before = _forces(linkage, ahead), _forces(linkage, behind)
                 force_s[:, :, j] = (after[0] - before[0]) / (2.0 * _NUDGE)

@@ -63,7 +63,20 @@ class ClearanceTables(NamedTuple):
     spin_reaction: Singles
 
 
-def build_tables(linkage: Linkage, contacts: ContactArrays, points: int = POINTS) -> ClearanceTables:
+def build_basis(linkage: Linkage, contacts: ContactArrays, points: int = POINTS) -> Basis:
+    """What the tables of a linkage are made of, but for the radii of its clearance joints: most of the time.
+
+    Raises
+    ------
+    AssemblyError
+        If the linkage does not close or has a dead point.
+    """
+    return Basis(linkage, contacts, one_cycle(linkage, points, 1.0))
+
+
+def build_tables(
+    linkage: Linkage, contacts: ContactArrays, points: int = POINTS, basis: Basis | None = None
+) -> ClearanceTables:
     """Tables of a linkage with the clearance joints of ``contacts``.
 
     Parameters
@@ -72,6 +85,8 @@ def build_tables(linkage: Linkage, contacts: ContactArrays, points: int = POINTS
     contacts : ContactArrays
     points : int
         Crank steps per turn.
+    basis : Basis, optional
+        That of the same linkage and clearance joints, with any radii; ``points`` is then not used.
 
     Returns
     -------
@@ -82,8 +97,8 @@ def build_tables(linkage: Linkage, contacts: ContactArrays, points: int = POINTS
     AssemblyError
         If the linkage does not close or has a dead point.
     """
-    motion = one_cycle(linkage, points, 1.0)
-    basis = Basis(linkage, contacts, motion)
+    basis = basis.with_contacts(linkage, contacts) if basis else build_basis(linkage, contacts, points)
+    motion, points = basis.motion, len(basis.motion.q)
     held, joints = _held_rows(linkage, basis)
     reaction = _reactions(basis, held)
     parts = {
@@ -150,11 +165,12 @@ def _first_order(basis: Basis, inverse_mass: Floats) -> dict[str, Singles]:
     The inverse of A + Gamma e + (Gamma e)^T is A^-1 - Q e - (Q e)^T with Q = A^-1 Gamma A^-1.
     """
     n, d = inverse_mass.shape[:2]
-    bend = (inverse_mass @ basis.gamma.reshape(n, d, d * d)).reshape(n, d, d, d).transpose(0, 3, 2, 1)
+    coarse = [*range(0, n, COARSER), 0]
+    inverse_mass, m = inverse_mass[coarse], len(coarse)
+    bend = (inverse_mass @ basis.gamma[coarse].reshape(m, d, d * d)).reshape(m, d, d, d).transpose(0, 3, 2, 1)
     change = inverse_mass[:, None] @ bend
     free = np.stack([basis.force_e, -basis.b_e, 0.5 * basis.c_ee - derivative(basis.b_e)], axis=1)
     parts = {
-        "inverse_mass": -(change + change.transpose(0, 1, 3, 2)),
         "free": free.transpose(0, 3, 1, 2),
         "lever_drive": project(basis.s_t, basis.friction),
         "load_power": np.concatenate(
@@ -163,11 +179,12 @@ def _first_order(basis: Basis, inverse_mass: Floats) -> dict[str, Singles]:
         "torque_a": basis.b_e.transpose(0, 2, 1),
         "torque_v": basis.c_ee.transpose(0, 2, 1),
     }
-    by_e = np.concatenate([parts[name].reshape(n, d, -1) for name in changing_shapes(d // 2)], axis=2)
-    coarse = [*range(0, n, COARSER), 0]
+    parts = {name: part[coarse] for name, part in parts.items()}
+    parts["inverse_mass"] = -(change + change.transpose(0, 1, 3, 2))
+    by_e = np.concatenate([parts[name].reshape(m, d, -1) for name in changing_shapes(d // 2)], axis=2)
     return {
-        "by_e": np.ascontiguousarray(by_e[coarse], dtype=np.float32),
-        "bend": np.ascontiguousarray(bend.reshape(n, d, d * d)[coarse], dtype=np.float32),
+        "by_e": np.ascontiguousarray(by_e, dtype=np.float32),
+        "bend": np.ascontiguousarray(bend.reshape(m, d, d * d), dtype=np.float32),
     }
 
 

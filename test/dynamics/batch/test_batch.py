@@ -11,7 +11,7 @@ from leg_wear_monitor.dynamics.batch import leg as batch_leg
 from leg_wear_monitor.dynamics.batch.batch import advance_batch, simulate_batch
 from leg_wear_monitor.dynamics.batch.leg import Leg
 from leg_wear_monitor.dynamics.clearance.stepper import ClearanceStepper
-from leg_wear_monitor.dynamics.clearance.tables import build_tables
+from leg_wear_monitor.dynamics.clearance.tables import build_basis, build_tables
 from leg_wear_monitor.dynamics.run.drive import steady_drive
 from leg_wear_monitor.dynamics.run.protocol import DONE, INVALID_DRIVE
 from leg_wear_monitor.dynamics.run.run_statistics import new_run_statistics
@@ -121,11 +121,12 @@ def test_a_leg_that_a_torque_drives_is_refused():
 
 def test_tables_are_made_once_for_legs_that_share_them(leg, monkeypatch):
     """Wear, laws, speed and start do not matter; the clearance and which joints are loose do."""
-    made = []
+    made, bases = [], []
 
-    def counted(linkage, contacts):
+    def counted(linkage, contacts, **shared):
         made.append(contacts.clearance[0])
-        return build_tables(linkage, contacts)
+        bases.append(shared["basis"])
+        return build_tables(linkage, contacts, **shared)
 
     monkeypatch.setattr(batch_leg, "build_tables", counted)
     same = [
@@ -135,6 +136,19 @@ def test_tables_are_made_once_for_legs_that_share_them(leg, monkeypatch):
     other = Leg(mechanism=leg, clearances=("G",), clearance_m=1.0e-4)
     simulate_batch([same[0], other, *same[1:]], cycles=0.01, skip_cycles=0.0)
     assert sorted(made) == [1.0e-4, 3.0e-4]
+    assert bases[0] is bases[1] is not None
+
+
+@pytest.mark.parametrize("name, joints", [("bionic_leg", ("A", "G")), ("jansen_leg", None)])
+def test_tables_of_a_shared_basis_are_those_of_the_leg_alone(name, joints):
+    """Bit for bit: the radii change the friction's levers, which are not in the basis of other legs."""
+    first, other = (
+        prepare(load_mechanism(name), clearances=joints, clearance_m=clearance) for clearance in (None, 1e-4)
+    )
+    shared = build_tables(other.linkage, other.contacts, basis=build_basis(first.linkage, first.contacts))
+    alone, former = (build_tables(setup.linkage, setup.contacts) for setup in (other, first))
+    assert all(map(np.array_equal, shared, alone))
+    assert not all(map(np.array_equal, shared, former))
 
 
 def test_progress_is_the_share_of_the_legs_that_are_done(leg):

@@ -18,13 +18,14 @@ import attrs
 import numpy as np
 
 import leg_wear_monitor as lw
+from leg_wear_monitor.monitor.accounting import next_point_s
 from leg_wear_monitor.monitor.config.fitting import fitted
 from leg_wear_monitor.monitor.ledger.binding import binding_of
 from leg_wear_monitor.monitor.ledger.entry import ClearancePoint, Entry, ForecastPoint, JointWear
 from leg_wear_monitor.monitor.ledger.ledger import Ledger
 from leg_wear_monitor.twin.sample import gait_samples
 
-CHECKPOINT_S, POINT_S, DAY_S = 5.0, 600.0, 8 * 3600.0
+CHECKPOINT_S, WHOLE_S, DAY_S = 5.0, 600.0, 8 * 3600.0
 EACH = 97
 RATE_HZ = 200
 GB = 1.0e9
@@ -55,7 +56,7 @@ class Walk:
     def __init__(self, rise, clearance_joints):
         self.rise, self.clearance_joints = rise, clearance_joints
         self.depth = np.zeros(rise.shape[1:])
-        self.count, self.begin_ns = 0, 10**18
+        self.count, self.begin_ns, self.point_due_s = 0, 10**18, 0.0
 
     def entry(self):
         """The next one, 5 s on."""
@@ -73,7 +74,7 @@ class Walk:
         )
 
     def points(self, entry):
-        """What the history takes each ten minutes."""
+        """What the history takes now and then."""
         for joint in self.clearance_joints:
             yield ClearancePoint(entry.stamp_ns, round(entry.moving_s), joint, 3.1e-4, 3.2e-4)
             yield ForecastPoint(entry.stamp_ns, round(entry.moving_s), joint, 1e8, 2e8, 3e8)
@@ -90,10 +91,10 @@ def a_day(walk, path, binding, stretch, costs):
     before = written()
     ledger = Ledger(path, binding, CHECKPOINT_S)
     costs["opened and closed"] += written() - before
-    for _ in range(round(DAY_S / POINT_S)):
+    for _ in range(round(DAY_S / WHOLE_S)):
         is_written = stretch[0] % EACH == 0
         stretch[0] += 1
-        for _ in range(round(POINT_S / CHECKPOINT_S) - 1):
+        for _ in range(round(WHOLE_S / CHECKPOINT_S) - 1):
             entry = walk.entry()
             if is_written:
                 before = written()
@@ -102,8 +103,10 @@ def a_day(walk, path, binding, stretch, costs):
                 costs["records written"] += 1
         entry = walk.entry()
         before = written()
-        for point in walk.points(entry):
-            ledger.note(point)
+        if entry.moving_s >= walk.point_due_s:
+            walk.point_due_s = next_point_s(entry.moving_s)
+            for point in walk.points(entry):
+                ledger.note(point)
         keep(ledger, entry, whole=False)
         costs["whole"] += written() - before
     before = written()
@@ -130,12 +133,12 @@ def main(days, directory):
         opened_s = time.perf_counter() - began_open
     entries = round(days * DAY_S / CHECKPOINT_S)
     a_record = costs["records"] / costs["records written"]
-    records = (entries - round(days * DAY_S / POINT_S)) * a_record
+    records = (entries - round(days * DAY_S / WHOLE_S)) * a_record
     total = records + costs["whole"] + costs["opened and closed"]
     print(f"{days} days, {entries} entries, {costs['records written'][0]:.0f} records written in truth")
     print(f"{'':24}{'handed on':>14}{'pages':>14}")
     print(f"{'a record':24}{a_record[0]:12.0f} B{a_record[1]:12.0f} B")
-    a_whole = costs["whole"] / round(days * DAY_S / POINT_S)
+    a_whole = costs["whole"] / round(days * DAY_S / WHOLE_S)
     print(f"{'a whole entry':24}{a_whole[0]:12.0f} B{a_whole[1]:12.0f} B")
     for name, cost in (("records", records), ("whole entries", costs["whole"]), ("all", total)):
         print(f"{name:24}{cost[0] / GB:11.2f} GB{cost[1] / GB:11.2f} GB")

@@ -32,6 +32,10 @@ from leg_wear_monitor.twin.statistics import SampleStatistics
 from leg_wear_monitor.wear.surfaces import BUSHING
 
 POINT_S = 600.0  # of walking, between two points of the clearances' history
+# of all walking so far, likewise if it is more: a year of 8 h a day then has some 1100 points, not 17 500
+POINT_FRACTION = 0.005
+
+_DUE_KEY = "history_due_s"  # moving_s at which the history takes its next point; of totals
 
 ESTIMATED_KEY = "estimated_cycles"  # of `cycles`, in sampled replays; of totals
 
@@ -67,7 +71,7 @@ class AccountingState:
     anew : bool
         Whether the clock began anew in this run, so that nothing that comes is counted already.
     point_due_s : float
-        Time in motion at which the history wants its next point.
+        Time in motion over all runs at which the history wants its next point.
     cut_off_s : float or None
         What an earlier run lost, until it is acknowledged.
     skipped, skipped_s, skipped_ns : int, float, int
@@ -96,6 +100,11 @@ class AccountingState:
     pauses: Pauses = Pauses()
     without_zero_s: float = 0.0
     commissioned: dict[str, float] = attrs.field(factory=dict)
+
+
+def next_point_s(moving_s: float) -> float:
+    """Time in motion over all runs [s] of the history's next point after one at ``moving_s``."""
+    return moving_s + max(POINT_S, POINT_FRACTION * moving_s)
 
 
 def _sampling_key(joint: str) -> str:
@@ -130,6 +139,7 @@ class Accounting:
         self.state = AccountingState(
             int(self._before.get("cycles", 0)),
             (PartLife(),) * len(twin.clearance_joints),
+            point_due_s=self._before.get(_DUE_KEY, 0.0),
             cut_off_s=ledger.cut_off_s if ledger else None,
         )
         if entry:
@@ -339,7 +349,7 @@ class Accounting:
         moving_s = self.totals["moving_s"]
         if moving_s < self.state.point_due_s:
             return
-        self.state.point_due_s = moving_s + POINT_S
+        self.state.point_due_s = next_point_s(moving_s)
         for joint in report.joints:
             if joint.forecast and joint.forecast.cycles:
                 quantiles = attrs.astuple(joint.forecast.cycles)
@@ -377,7 +387,10 @@ class Accounting:
         return Entry(
             stamp_ns=self._twin.intake.followed_stamp_ns or (self.ledger.kept_ns if self.ledger else 0),
             joints=tuple(self.joint_wear(k, depth) for k in range(len(self._twin.clearance_joints))),
-            totals=self.totals | self.state.commissioned | self._sampling_totals,
+            totals=self.totals
+            | self.state.commissioned
+            | self._sampling_totals
+            | {_DUE_KEY: self.state.point_due_s},
             alarms=tuple(alarm for alarm in alarms if alarm.level is not Level.OK),
             spans=tuple((begin, end) for begin, end, _ in spans),
             span_epochs=tuple(of for *_, of in spans) if any(of for *_, of in spans) else (),

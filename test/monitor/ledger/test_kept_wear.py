@@ -2,12 +2,14 @@
 
 import sqlite3
 from contextlib import closing
+from itertools import pairwise
 
 import numpy as np
 import pytest
 
 from leg_wear_monitor import WearMonitor, open_ledger
 from leg_wear_monitor.errors import LegWearError
+from leg_wear_monitor.monitor.accounting import next_point_s
 from leg_wear_monitor.monitor.alarms.alarm import Level
 from leg_wear_monitor.monitor.config.parameters import config_from
 from leg_wear_monitor.monitor.ledger.ledger import LedgerError
@@ -210,3 +212,16 @@ def test_clearances_are_noted_for_the_history(begin, gait, tmp_path):
         (1, "G"),
     ]  # the next after ten minutes
     assert all(clearance_m > 3.0e-4 for *_, clearance_m in points)
+    again, _ = begin()
+    again.update(gait(4.0, begin_s=10.0))
+    again.close()
+    assert rows(tmp_path, "SELECT cycle, joint, clearance_m FROM history") == points  # in a later run, too
+
+
+def test_the_history_of_a_year_is_thin_and_has_no_hole():
+    year_s, times = 365 * 8 * 3600.0, [0.0]
+    while times[-1] < year_s:
+        times.append(next_point_s(times[-1]))
+    assert times[1] == 600.0
+    assert len(times) < 1200
+    assert all(b - a <= max(600.0, 0.0051 * a) for a, b in pairwise(times))

@@ -147,11 +147,11 @@ def situation_of(
     """
     alarms, config = evaluation.board.alarms, evaluation.config
     counted_m, limits_m = twin.clearance_mean_m.tolist(), evaluation.board.clearance_limits_m
-    labels = {name: joint.label for name, joint in twin.mechanism.joints.items()}
+    joints = twin.mechanism.joints
     return Situation(
         joints=tuple(
             _with_measured(
-                _joint(k, name, labels[name], counted_m[k], limits_m[k], last, diagnosis),
+                _joint(k, name, joints[name].label, counted_m[k], limits_m[k], last, diagnosis),
                 measured[k] if measured else None,
             )
             for k, name in enumerate(twin.clearance_joints)

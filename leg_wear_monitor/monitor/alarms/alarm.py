@@ -147,21 +147,33 @@ def evaluated(alarm: Alarm, value: float, limit: Limit, stamp_ns: int, cycles: i
     if math.isnan(value):
         return alarm
     present, beyond = next_level(alarm.present, value, limit, alarm.beyond, cycles)
-    alarm = attrs.evolve(alarm, present=present, value=value, limit=limit.error, beyond=beyond)
-    if present > alarm.level:
-        alarm = attrs.evolve(alarm, level=present, acknowledged=False, raised_ns=stamp_ns)
-    elif alarm.acknowledged and present < alarm.level:
-        alarm = attrs.evolve(alarm, level=present, acknowledged=present is not Level.OK)
-    return attrs.evolve(alarm, worst=_worst(alarm, value, limit))
+    level, is_acknowledged, raised_ns = alarm.level, alarm.acknowledged, alarm.raised_ns
+    if present > level:
+        level, is_acknowledged, raised_ns = present, False, stamp_ns
+    elif is_acknowledged and present < level:
+        level, is_acknowledged = present, present is not Level.OK
+    return Alarm(  # all fields: `attrs.evolve` takes several times as long, for each value of each period
+        kind=alarm.kind,
+        subject=alarm.subject,
+        unit=alarm.unit,
+        present=present,
+        level=level,
+        acknowledged=is_acknowledged,
+        value=value,
+        limit=limit.error,
+        raised_ns=raised_ns,
+        worst=_worst(level, alarm.worst, value, limit),
+        beyond=beyond,
+    )
 
 
-def _worst(alarm: Alarm, value: float, limit: Limit) -> float:
+def _worst(level: Level, worst: float, value: float, limit: Limit) -> float:
     """The worst value of an alarm since it was raised; NaN while its level is OK."""
-    if alarm.level is Level.OK:
+    if level is Level.OK:
         return math.nan
-    if math.isnan(alarm.worst):
+    if math.isnan(worst):
         return value
-    return min(alarm.worst, value) if limit.is_least else max(alarm.worst, value)
+    return min(worst, value) if limit.is_least else max(worst, value)
 
 
 def acknowledged(alarm: Alarm) -> Alarm:

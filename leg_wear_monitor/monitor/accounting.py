@@ -107,11 +107,6 @@ def next_point_s(moving_s: float) -> float:
     return moving_s + max(POINT_S, POINT_FRACTION * moving_s)
 
 
-def _sampling_key(joint: str) -> str:
-    """Name of the total with the variance of a clearance by sampled replays."""
-    return f"sampling_variance_{joint}_m2"
-
-
 def _is_apart(step_ns: Ints) -> NDArray[np.bool_]:
     return np.asarray((step_ns < 0) | (step_ns > NEIGHBOURS_NS))
 
@@ -157,7 +152,7 @@ class Accounting:
                 self.state.cycles - joint.cycles,
                 self._before["moving_s"] - joint.moving_s,
                 joint.replaced_ns,
-                self._before.get(_sampling_key(joint.name), 0.0),
+                joint.sampling_m2,
             )
             for joint in own
         )
@@ -235,6 +230,7 @@ class Accounting:
             self.state.cycles - part.cycles,
             totals["moving_s"] - part.moving_s,
             part.replaced_ns,
+            float(self._sampling_m2[k]),
         )
 
     @property
@@ -258,10 +254,7 @@ class Accounting:
         """What the ledger keeps of sampled replays; empty if there was none."""
         sampling, before = self._twin.sampling, self._before.get(ESTIMATED_KEY, 0.0)
         estimated = before + (sampling.estimated_cycles if sampling else 0.0)
-        if not estimated:
-            return {}
-        keys = map(_sampling_key, self._twin.clearance_joints)
-        return {ESTIMATED_KEY: estimated, **dict(zip(keys, self._sampling_m2.tolist(), strict=True))}
+        return {ESTIMATED_KEY: estimated} if estimated else {}
 
     def wear_of(self, joint: str) -> JointWear:
         """Present wear of a joint; raises LegWearError for a joint without clearance."""
@@ -290,6 +283,9 @@ class Accounting:
         was = self.joint_wear(k, depth.copy())
         depth[k, BUSHING] += max(clearance_m - float(self._twin.clearance_mean_m[k]), 0.0)
         self._twin.set_depth(depth)
+        # what was not followed before does not matter for a clearance that is known otherwise
+        run_m2 = float(self._run_sampling_m2[k])
+        self._set_part(k, attrs.evolve(self.state.parts[k], sampling_m2=-run_m2))
         return was
 
     def put_back(self, joint: str, before: JointWear) -> JointWear:
@@ -300,7 +296,7 @@ class Accounting:
         depth[k] = part.depth
         self._twin.set_depth(depth)
         begun_s = self.totals["moving_s"] - part.moving_s
-        sampling_m2 = self.state.parts[k].sampling_m2
+        sampling_m2 = part.sampling_m2 - float(self._run_sampling_m2[k])
         cycles = self.state.cycles - part.cycles
         self._set_part(k, PartLife(cycles, begun_s, part.replaced_ns, sampling_m2))
         return since

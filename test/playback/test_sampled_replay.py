@@ -100,9 +100,23 @@ def test_the_ledger_keeps_the_variance(sampled, walk, config, ledger, leg):
     assert all(joint.sampling_sigma_m > one for joint, one in zip(third.joints.values(), first, strict=True))
     kept = open_ledger(leg, config_from({"diagnosis.enabled": False, "ledger.path": str(ledger)}))
     assert kept.entry.totals["estimated_cycles"] > sampled.monitor.sampling.estimated_cycles
-    variance = kept.entry.totals["sampling_variance_G_m2"]
-    assert variance == pytest.approx(third.joints["G"].sampling_sigma_m ** 2)
+    part = {joint.name: joint for joint in kept.entry.joints}["G"]
+    assert part.sampling_m2 == pytest.approx(third.joints["G"].sampling_sigma_m ** 2)
     kept.close()
+
+
+def test_a_new_part_has_no_sampling_error_and_an_undone_reset_gives_it_back(
+    sampled, walk, config, ledger, leg
+):
+    """By the ledger alone and by a monitor, which sums what was before and since."""
+    later = lw.replay(walk | {"time": walk["time"] + 4000.0}, config, ledger=ledger, sample=SAMPLE)
+    before = later.summary().joints["G"].sampling_sigma_m
+    monitor = lw.WearMonitor(leg, later.monitor.config, open_ledger(leg, later.monitor.config))
+    assert monitor._accounting.wear_of("G").sampling_m2 == pytest.approx(before**2)
+    monitor.reset_wear("G", 10**18, "ann")
+    assert monitor._accounting.wear_of("G").sampling_m2 == 0.0
+    assert monitor.undo_reset("G", 10**18, "ann").sampling_m2 == pytest.approx(before**2)
+    monitor.close()
 
 
 def test_all_of_it_is_a_whole_replay(walk, config):

@@ -119,7 +119,7 @@ def observations_of(
 ) -> list[MeasuredClearance]:
     """Measurements of a joint's present part that count."""
     return [
-        MeasuredClearance(m.clearance_m, m.sigma_m, m.wear_m)
+        MeasuredClearance(m.clearance_m, math.hypot(m.sigma_m, m.wear_sigma_m), m.wear_m)
         for m in measurements
         if m.joint == joint and m.replaced_ns == replaced_ns and m.counts and not m.is_withdrawn
     ]
@@ -178,7 +178,8 @@ def measure(
         if fault:
             raise ConfigError(name, "", fault)
     observations = observations_of(earlier, wear.name, wear.replaced_ns)
-    observation = MeasuredClearance(clearance_m, sigma_m, wear.mean_m)
+    wear_sigma_m = math.sqrt(wear.sampling_m2)
+    observation = MeasuredClearance(clearance_m, math.hypot(sigma_m, wear_sigma_m), wear.mean_m)
     corrected = corrections_of(corrections, wear.name, wear.replaced_ns)
     before = estimate_coefficient(settings, fresh_m, observations, prior, corrected)
     below = before.probability_below(observation)
@@ -197,6 +198,7 @@ def measure(
         replaced_ns=wear.replaced_ns,
         expected_below=below,
         counts=counts,
+        wear_sigma_m=wear_sigma_m,
     )
     words = _clock(stamp_ns, kept_ns)
     if contradicts:

@@ -2,6 +2,7 @@
 
 import sqlite3
 
+import attrs
 import numpy as np
 
 from leg_wear_monitor.monitor.alarms.alarm import Alarm, Level
@@ -51,3 +52,12 @@ def _entry(db: sqlite3.Connection, run: int, stamp_ns: int) -> Entry:
         ),
         spans=tuple(spans.fetchall()),
     )  # fmt: skip
+
+
+def sampling_to_joints(entry: Entry) -> Entry:
+    """Move variances by sampled replays, which were totals up to format 8, to the joints that they are of."""
+    totals, joints = dict(entry.totals), []
+    for joint in entry.joints:
+        variance_m2 = totals.pop(f"sampling_variance_{joint.name}_m2", joint.sampling_m2)
+        joints.append(attrs.evolve(joint, sampling_m2=variance_m2))
+    return attrs.evolve(entry, joints=tuple(joints), totals=totals)

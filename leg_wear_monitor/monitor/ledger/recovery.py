@@ -7,6 +7,7 @@ import attrs
 
 from leg_wear_monitor.monitor.ledger.entry import Entry
 from leg_wear_monitor.monitor.ledger.file import MOVE, LedgerError, beside, transaction
+from leg_wear_monitor.monitor.ledger.former_format import sampling_to_joints
 from leg_wear_monitor.monitor.ledger.log import ENDING, LogContent, read_log
 from leg_wear_monitor.monitor.ledger.rows import read_entry, read_last_run, write_entry, write_run
 from leg_wear_monitor.monitor.ledger.run import Run
@@ -93,6 +94,7 @@ def migrated(db: sqlite3.Connection, found: Recovered) -> Recovered:
     (number,) = db.execute("PRAGMA user_version").fetchone()
     if number >= FORMAT:
         return found
+    found = attrs.evolve(found, entry=sampling_to_joints(found.entry) if found.entry else None)
     with transaction(db):
         migrate(db, number)
         write_run(db, found.run)

@@ -51,8 +51,11 @@ def write_entry(db: sqlite3.Connection, run: int, head: int, entry: Entry) -> No
     """
     db.execute("INSERT OR REPLACE INTO entry VALUES (1, ?, ?)", (run, entry.stamp_ns))
     db.executemany(
-        "INSERT INTO joint VALUES (?, ?, ?, ?, ?, ?)",
-        [(head, j.name, _depth_bytes(j), j.cycles, j.moving_s, j.replaced_ns) for j in entry.joints],
+        "INSERT INTO joint VALUES (?, ?, ?, ?, ?, ?, ?)",
+        [
+            (head, j.name, _depth_bytes(j), j.cycles, j.moving_s, j.replaced_ns, j.sampling_m2)
+            for j in entry.joints
+        ],
     )
     db.execute("DELETE FROM joint WHERE head != ?", (head,))
     db.executemany("INSERT OR REPLACE INTO total VALUES (?, ?)", entry.totals.items())
@@ -125,12 +128,15 @@ def write_event(db: sqlite3.Connection, event: Event) -> None:
             places = ", ".join("?" * len(values))
             db.execute(f"INSERT OR REPLACE INTO torque_reference VALUES (1, {places})", values)
         case Audit(stamp_ns, who, what, was, undoes):
-            values = (was.name, was.cycles, _depth_bytes(was), was.moving_s, was.replaced_ns) if was else ()
+            state: tuple[object, ...] = (None,) * 6
+            if was:
+                surfaces, life = _depth_bytes(was), (was.moving_s, was.replaced_ns, was.sampling_m2)
+                state = was.name, was.cycles, surfaces, *life
             db.execute(
                 "INSERT INTO audit "
-                "(stamp_ns, who, what, joint, cycles, depth, moving_s, replaced_ns, undoes) "
-                "VALUES (?, ?, ?, ?, ?, ?, ?, ?, ?)",
-                (stamp_ns, who, what, *(values or (None,) * 5), undoes),
+                "(stamp_ns, who, what, joint, cycles, depth, moving_s, replaced_ns, sampling_m2, undoes) "
+                "VALUES (?, ?, ?, ?, ?, ?, ?, ?, ?, ?)",
+                (stamp_ns, who, what, *state, undoes),
             )
 
 
@@ -251,7 +257,8 @@ def read_last_reset(db: sqlite3.Connection, joint: str) -> Audit | None:
     Rows of older formats do not contain the whole state of the joint: `joint` is then None.
     """
     row = db.execute(
-        "SELECT id, stamp_ns, who, what, joint, depth, cycles, moving_s, replaced_ns FROM audit AS a "
+        "SELECT id, stamp_ns, who, what, joint, depth, cycles, moving_s, replaced_ns, "
+        "coalesce(sampling_m2, 0) FROM audit AS a "
         "WHERE joint = ? AND what = 'reset_wear' "
         "AND NOT EXISTS (SELECT 1 FROM audit WHERE undoes = a.id) ORDER BY id DESC LIMIT 1",
         (joint,),
@@ -272,10 +279,10 @@ def read_entry(db: sqlite3.Connection) -> tuple[int, Entry] | None:
     spans = db.execute(
         "SELECT begin_ns, end_ns, epoch FROM span WHERE run = ? ORDER BY part", (run,)
     ).fetchall()
-    joints = db.execute("SELECT name, depth, cycles, moving_s, replaced_ns FROM joint ORDER BY name")
+    joints = db.execute("SELECT * FROM joint ORDER BY name")  # before format 9 without sampling_m2
     return run, Entry(
         stamp_ns=stamp_ns,
-        joints=tuple(_joint(*row) for row in joints),
+        joints=tuple(_joint(*row[1:]) for row in joints),
         totals=dict(db.execute("SELECT name, value FROM total")),
         alarms=tuple(_alarm(*row) for row in db.execute("SELECT * FROM alarm")),
         spans=tuple((begin, end) for begin, end, _ in spans),
@@ -300,8 +307,11 @@ def _depth_bytes(joint: JointWear) -> bytes:
     return np.ascontiguousarray(joint.depth, dtype="<f8").tobytes()
 
 
-def _joint(name: str, depth: bytes, cycles: int, moving_s: float, replaced_ns: int) -> JointWear:
-    return JointWear(name, np.frombuffer(depth, "<f8").reshape(2, -1).copy(), cycles, moving_s, replaced_ns)
+def _joint(
+    name: str, depth: bytes, cycles: int, moving_s: float, replaced_ns: int, sampling_m2: float = 0.0
+) -> JointWear:
+    surfaces = np.frombuffer(depth, "<f8").reshape(2, -1).copy()
+    return JointWear(name, surfaces, cycles, moving_s, replaced_ns, sampling_m2)
 
 
 def _alarm(

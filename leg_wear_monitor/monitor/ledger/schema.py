@@ -253,6 +253,54 @@ CREATE TABLE correction (
     id INTEGER PRIMARY KEY, stamp_ns INTEGER NOT NULL, joint TEXT NOT NULL, clearance_m REAL NOT NULL,
     sigma_m REAL NOT NULL, before_m REAL NOT NULL, wear_m REAL NOT NULL, replaced_ns INTEGER NOT NULL
 ) STRICT;
+
+CREATE TEMP TABLE former AS SELECT * FROM joint;
+DROP TABLE joint;
+
+-- depth: float64, little endian, (2, sectors) of bushing and journal [m]; the rest since the part was new;
+-- sampling_m2 is the variance of the mean depth because sampled replays did not follow all gait cycles.
+-- Rows of the head in force alone; they come before those of the last one go, so that they take the pages of
+-- the one before that, which are free: no page that holds anything is written over
+CREATE TABLE joint (
+    head INTEGER NOT NULL, name TEXT NOT NULL, depth BLOB NOT NULL, cycles INTEGER NOT NULL,
+    moving_s REAL NOT NULL, replaced_ns INTEGER NOT NULL, sampling_m2 REAL NOT NULL DEFAULT 0,
+    PRIMARY KEY (head, name)
+) STRICT;
+INSERT INTO joint SELECT head, name, depth, cycles, moving_s, replaced_ns, coalesce(
+    (SELECT value FROM total WHERE total.name = 'sampling_variance_' || former.name || '_m2'), 0
+) FROM former;
+DROP TABLE former;
+DELETE FROM total WHERE name GLOB 'sampling_variance_*_m2';
+
+CREATE TEMP TABLE former AS SELECT * FROM audit;
+DROP TABLE audit;
+
+-- who did what to the wear; the joint is as it was before (of rows of older formats without moving_s,
+-- replaced_ns and sampling_m2), undoes is the row that was undone
+CREATE TABLE audit (
+    id INTEGER PRIMARY KEY, stamp_ns INTEGER NOT NULL, who TEXT NOT NULL, what TEXT NOT NULL, joint TEXT,
+    cycles INTEGER, depth BLOB, moving_s REAL, replaced_ns INTEGER, undoes INTEGER, sampling_m2 REAL
+) STRICT;
+INSERT INTO audit SELECT id, stamp_ns, who, what, joint, cycles, depth, moving_s, replaced_ns, undoes, NULL
+    FROM former;
+DROP TABLE former;
+
+CREATE TEMP TABLE former AS SELECT * FROM measurement;
+DROP TABLE measurement;
+
+-- clearances measured by hand: of which part (replaced_ns as in joint), what the twin had counted for it and
+-- the standard deviation of that by sampled replays, with what probability a smaller one was expected,
+-- whether the forecast believes it, and when and by whom it was withdrawn, 0 and '' if it was not
+CREATE TABLE measurement (
+    id INTEGER PRIMARY KEY, stamp_ns INTEGER NOT NULL, joint TEXT NOT NULL, who TEXT NOT NULL,
+    clearance_m REAL NOT NULL, sigma_m REAL NOT NULL, wear_m REAL NOT NULL, cycles INTEGER NOT NULL,
+    replaced_ns INTEGER NOT NULL, expected_below REAL NOT NULL, counts INTEGER NOT NULL,
+    withdrawn_ns INTEGER NOT NULL DEFAULT 0, withdrawn_by TEXT NOT NULL DEFAULT '',
+    wear_sigma_m REAL NOT NULL DEFAULT 0
+) STRICT;
+INSERT INTO measurement SELECT id, stamp_ns, joint, who, clearance_m, sigma_m, wear_m, cycles, replaced_ns,
+    expected_below, counts, withdrawn_ns, withdrawn_by, 0 FROM former;
+DROP TABLE former;
 """
 
 MIGRATIONS = (_FIRST, _SECOND, _THIRD, _FOURTH, _FIFTH, _SIXTH, _SEVENTH, _EIGHTH, _NINTH)

@@ -53,7 +53,7 @@ def encode(entry: Entry, run: Run, before: Entry, shared: int) -> tuple[bytes, E
         "run": attrs.astuple(run),
         "stamp_ns": entry.stamp_ns,
         "totals": entry.totals,
-        "parts": [(joint.cycles, joint.moving_s, joint.replaced_ns) for joint in entry.joints],
+        "parts": [(j.cycles, j.moving_s, j.replaced_ns, j.sampling_m2) for j in entry.joints],
         "alarms": [_alarm_values(alarm) for alarm in entry.alarms],
         "same": same,
         "spans": [_span(entry, i) for i in range(same, len(entry.spans))],

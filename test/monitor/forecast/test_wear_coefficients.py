@@ -198,3 +198,16 @@ def test_figures_that_cannot_be_are_refused(clearance_m, sigma_m):
         measure(
             PRIOR, CLEARANCE, worn(0.0), (), clearance_m=clearance_m, sigma_m=sigma_m, stamp_ns=1, who="ann"
         )
+
+
+def test_wear_that_was_counted_by_samples_teaches_as_much_less_as_it_is_uncertain():
+    """Like a measurement with the errors of both, now and from the ledger."""
+    sampled = attrs.evolve(worn(6e-5), sampling_m2=12e-6**2)
+    now = found(sampled, 0.36)
+    exact = found(worn(6e-5), 0.36, sigma_m=math.hypot(5e-6, 12e-6))
+    assert now.measurement.sigma_m == 5e-6
+    assert now.measurement.wear_sigma_m == pytest.approx(12e-6)
+    assert now.after.sigma == pytest.approx(exact.after.sigma)
+    again = [found(worn(7e-5), 0.37, [each.measurement]).before.sigma for each in (now, exact)]
+    assert again[0] == pytest.approx(again[1])
+    assert now.after.sigma > 1.2 * found(worn(6e-5), 0.36).after.sigma

@@ -8,7 +8,7 @@ import pytest
 
 from leg_wear_monitor.monitor.ledger.entry import Audit, ForecastPoint, Measurement
 from leg_wear_monitor.monitor.ledger.file import LedgerError
-from leg_wear_monitor.monitor.ledger.schema import APPLICATION_ID, MIGRATIONS, run_step
+from leg_wear_monitor.monitor.ledger.schema import APPLICATION_ID, MIGRATIONS, migrate, run_step
 
 pytestmark = pytest.mark.plain
 
@@ -133,3 +133,16 @@ def test_spans_are_kept_by_epochs_of_the_clock(open_ledger, entry_at):
     assert found.counted_in(0).shape == (0, 2)
     assert (found.epoch, found.boot_id) == (3, "7f-2")
     assert (found.last_run.epoch, found.last_run.boot_id, found.last_run.closed) == (3, "7f-2", True)
+
+
+def test_sampling_errors_of_format_8_stay_with_their_joints() -> None:
+    with closing(sqlite3.connect(":memory:", isolation_level=None)) as db:
+        for step in MIGRATIONS[:8]:
+            run_step(db, step)
+        for name in ("A", "G"):
+            db.execute("INSERT INTO joint VALUES (3, ?, x'00', 7, 6.5, 0)", (name,))
+        totals = {"cycles": 7.0, "sampling_variance_G_m2": 4e-12, "estimated_cycles": 5.0}
+        db.executemany("INSERT INTO total VALUES (?, ?)", totals.items())
+        migrate(db, 8)
+        assert db.execute("SELECT name, sampling_m2 FROM joint").fetchall() == [("A", 0.0), ("G", 4e-12)]
+        assert dict(db.execute("SELECT * FROM total")) == {"cycles": 7.0, "estimated_cycles": 5.0}

@@ -70,7 +70,7 @@ def parts(setup: Setup) -> list[Part]:
     all_of_it = (stepper.model, stepper.state, stepper.work)
     contact = (stepper.model, setup.surfaces, stepper.state, stepper.work)
     loops.evaluations(1, 0.0, *contact)
-    added = np.zeros((len(setup.clearance_joints), statistics.integral.shape[1]))
+    added = np.zeros_like(stepper.work.added)
     return [
         Part("trial step", 1.0, "trial", _least(loops.trials, *contact)),
         Part("  contact forces and their product", 2.0, "", _least(loops.evaluations, *contact)),

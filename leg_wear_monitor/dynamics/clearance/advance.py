@@ -58,7 +58,8 @@ WEARING = 8  # intervals after which pending wear is deposited, to spread its co
 MOST_TRIALS = 20000  # trial steps in a part of an interval before the run stops
 
 _SHORTEST_STEP = 1.0e-13  # s
-# of the drive at one end of a step: torque [N m], its part without e'' [N m], power of loads [W]
+_FASTEST_GROWTH = 3.0  # of a step over the one before; none after a trial with too large an error
+# of the drive at one end of a step: torque [N m], its smooth part [N m], power of loads [W]
 WHOLE, SMOOTH, OUTSIDE = 0, 1, 2
 
 _FASTEST = 1.0e4  # largest crank speed, and largest change of it in an interval [rad/s]: far above any leg
@@ -133,7 +134,7 @@ def _steps(model, surfaces, state, begin, length, statistics, work):
     """All steps of a part of the given begin and length [s]; returns status and joint."""
     x, now, start, end, approach = work.x, work.now, work.start, work.end, state.approach
     contacts = model.contacts
-    done, trials, cut = 0.0, 0, NEVER
+    done, trials, cut, growth = 0.0, 0, NEVER, _FASTEST_GROWTH
     speed = now.speed[0]
     _sample_drive(now, x, start, work.drive_start, statistics)
     while done < length:
@@ -149,7 +150,7 @@ def _steps(model, surfaces, state, begin, length, statistics, work):
         statistics.steps[0] += 1
         if not error <= 1.0:
             state.step[0] = h * max(0.2, 0.9 * error ** (-1.0 / 3.0)) if error < 1.0e9 else 0.1 * h
-            cut = NEVER
+            cut, growth = NEVER, 1.0
             if state.step[0] < _SHORTEST_STEP or trials > MOST_TRIALS:
                 return STEP_TOO_SMALL, pushed_through(contacts.bushing_radius, end)
             continue
@@ -161,8 +162,8 @@ def _steps(model, surfaces, state, begin, length, statistics, work):
         if pushed >= 0:
             return PUSHED_THROUGH, pushed
         if cut == NEVER:
-            state.step[0] = h * min(3.0, 0.9 * max(error, 1.0e-6) ** (-1.0 / 3.0))
-        cut = NEVER
+            state.step[0] = h * min(growth, 0.9 * max(error, 1.0e-6) ** (-1.0 / 3.0))
+        cut, growth = NEVER, _FASTEST_GROWTH
         _accept(model, surfaces, state, begin + done, h, turned, statistics, work)
         done = length if h >= left * (1.0 - 1.0e-9) else done + h
     return DONE, -1
@@ -194,7 +195,7 @@ def _accept(model, surfaces, state, t, h, turned, statistics, work):
     _sample_drive(now, x, start, work.drive_end, statistics)
     toe_deviation(now, x, statistics.response)
     first, last = work.drive_start, work.drive_end
-    impulse = 0.5 * h * (first[SMOOTH] + last[SMOOTH]) + sudden_impulse(now, x)
+    impulse = 0.5 * h * (first[SMOOTH] + last[SMOOTH]) + sudden_impulse(now, x, work.added)
     statistics.drive_integral[TORQUE] += impulse
     statistics.drive_integral[TORQUE_SQUARED] += 0.5 * h * (first[WHOLE] ** 2 + last[WHOLE] ** 2)
     statistics.drive_integral[POWER] += impulse * now.speed[0] + 0.5 * h * (first[OUTSIDE] + last[OUTSIDE])
@@ -203,9 +204,9 @@ def _accept(model, surfaces, state, t, h, turned, statistics, work):
 
 @kernel
 def _sample_drive(now, x, sample, out_drive, statistics):
-    """Drive torque, its part without e'' [N m] and the power of loads [W], (3,); updates the extremes."""
-    torque, sudden = drive_torque(now, x, sample)
-    out_drive[WHOLE], out_drive[SMOOTH], out_drive[OUTSIDE] = torque, torque - sudden, outside_power(now, x)
+    """Drive torque, its smooth part [N m] and the power of loads [W], (3,); updates the extremes."""
+    torque, smooth = drive_torque(now, x, sample)
+    out_drive[WHOLE], out_drive[SMOOTH], out_drive[OUTSIDE] = torque, smooth, outside_power(now, x)
     statistics.drive_range[0] = min(statistics.drive_range[0], torque)
     statistics.drive_range[1] = max(statistics.drive_range[1], torque)
     statistics.response[TORQUE_ERROR] = max(statistics.response[TORQUE_ERROR], abs(torque - now.torque_0[0]))

@@ -15,8 +15,10 @@ from leg_wear_monitor.contact.normal.laws import normal_force
 from leg_wear_monitor.dynamics.clearance.film import ADD_FILMS, FILM_SAMPLE
 from leg_wear_monitor.dynamics.joint.contact_event import DELTA, DELTA_DOT, EX, EY, F_N, VX, VY
 from leg_wear_monitor.dynamics.joint.joint_contact import coefficient_at, penetration
+from leg_wear_monitor.dynamics.run.run_statistics import JOINT_RATES
 from leg_wear_monitor.kernel import entry, kernel
 from leg_wear_monitor.mechanism.arrays import Floats
+from leg_wear_monitor.pairs import pair_at, pair_sum, put_pair
 
 # further columns of a sample, after the film's: normal, friction force [N], slip speed [m/s], derivatives of
 # the normal force by the penetration [N/m] and by its rate [N s/m], its elastic part [N], derivative of the
@@ -25,6 +27,11 @@ from leg_wear_monitor.mechanism.arrays import Floats
 NX, NY, F_T, SLIP, STIFFNESS = range(FILM_SAMPLE, FILM_SAMPLE + 5)
 DAMPING, ELASTIC, CAM, COEFFICIENT, CLEARANCE = range(FILM_SAMPLE + 5, FILM_SAMPLE + 10)
 COLUMNS = FILM_SAMPLE + 10
+
+# integrals of a joint in a step beyond those of the run statistics: friction force [N s]; moment about the
+# crank of the normal force on rotating worn walls [N m s]
+RUB, LIFT = JOINT_RATES, JOINT_RATES + 1
+ADDED = JOINT_RATES + 2
 
 # a reference direction, near which angles are computed without an arc tangent: cosine, sine and angle [rad]
 TO_X, TO_Y, TO_ANGLE = range(3)
@@ -36,9 +43,9 @@ FRICTION_COEFFICIENT, RAMP_0, RAMP_1, FRICTION_LAW = range(3, 7)
 
 # rows of the step's vectors (d,): eccentricities, rates and accelerations at its start (0), between its
 # stages (M) and at its end (1); accelerations without contact; slopes of the stages; right-hand sides;
-# change of the rates in the last step; coefficients of the rates in the drive torque
-E0, V0, A0, EM, VM, E1, V1, A1, DRIFT, K1E, K1V, K2E, K2V, RE, RV, DV, BY_V = range(17)
-VECTORS = 17
+# change of the rates in the last step; coefficients of the rates in the drive torque; contact forces
+E0, V0, A0, EM, VM, E1, V1, A1, DRIFT, K1E, K1V, K2E, K2V, RE, RV, DV, BY_V, PUSH = range(18)
+VECTORS = 18
 
 _add_films = ADD_FILMS.call
 
@@ -94,10 +101,7 @@ def accelerate_clearances(model, surfaces, approach, now, turned, x, at_e, at_v,
     angle relative to that of the tables [rad]; x (VECTORS, d) with eccentricities [m] and rates [m/s] in rows
     at_e and at_v, the result in row out_a; out_sample (k, COLUMNS).
     """
-    contacts, law, d, speed = model.contacts, model.law, x.shape[1], now.speed[0]
-    inverse_mass, lever, response = now.inverse_mass, now.lever, now.lever_response
-    for i in range(d):
-        x[out_a, i] = x[DRIFT, i]
+    contacts, law, speed, inverse_mass = model.contacts, model.law, now.speed[0], now.inverse_mass
     for k in range(approach.shape[0]):
         ex, ey, vx, vy = x[at_e, 2 * k], x[at_e, 2 * k + 1], x[at_v, 2 * k], x[at_v, 2 * k + 1]
         cam, coefficient, clearance = 0.0, law[k, FRESH_COEFFICIENT], contacts.clearance[k]
@@ -116,27 +120,24 @@ def accelerate_clearances(model, surfaces, approach, now, turned, x, at_e, at_v,
             delta, nx, ny = journal_contact(ex, ey, clearance)
         delta_dot = nx * vx + ny * vy + cam * speed
         f_n, stiffness, damping, elastic, f_t, slip = 0.0, 0.0, 0.0, 0.0, 0.0, 0.0
+        fx, fy = 0.0, 0.0
         if delta > 0.0 and approach[k] > 0.0:
             loss = law[k, HYSTERESIS_FACTOR] / approach[k]
             f_n, stiffness, damping, elastic = normal_force(
                 law[k, NORMAL_FORM], coefficient, clearance, loss, delta, delta_dot
             )
             if f_n > 0.0:
-                slip = nx * vy - ny * vx + now.lever_drive[k] * speed
-                for i in range(d):
-                    slip += lever[k, i] * x[at_v, i]
+                slip = nx * vy - ny * vx + now.lever_drive[k] * speed + _row_product(now.lever, k, x, at_v)
                 mu, code = law[k, FRICTION_COEFFICIENT], law[k, FRICTION_LAW]
                 f_t = friction_force(code, mu, law[k, RAMP_0], law[k, RAMP_1], f_n, slip)
                 fx, fy = -f_n * nx - f_t * ny, -f_n * ny + f_t * nx
-                row = 2 * k
-                for i in range(d):
-                    pushed = inverse_mass[row, i] * fx + inverse_mass[row + 1, i] * fy
-                    x[out_a, i] += pushed + response[k, i] * f_t
+        x[PUSH, 2 * k], x[PUSH, 2 * k + 1] = fx, fy
         out_sample[k, EX], out_sample[k, EY], out_sample[k, VX], out_sample[k, VY] = ex, ey, vx, vy
         out_sample[k, F_N], out_sample[k, DELTA], out_sample[k, DELTA_DOT] = f_n, delta, delta_dot
         out_sample[k, NX], out_sample[k, NY], out_sample[k, F_T], out_sample[k, SLIP] = nx, ny, f_t, slip
         out_sample[k, STIFFNESS], out_sample[k, DAMPING], out_sample[k, ELASTIC] = stiffness, damping, elastic
         out_sample[k, CAM], out_sample[k, COEFFICIENT], out_sample[k, CLEARANCE] = cam, coefficient, clearance
+    _push(inverse_mass, now.lever_response, x, out_a, out_sample)
     films = model.film.settings
     if films.shape[0] > 0:
         spin, turn = now.spin, now.spin_turn
@@ -144,3 +145,25 @@ def accelerate_clearances(model, surfaces, approach, now, turned, x, at_e, at_v,
             model.film.force,
             (films, spin, turn, now.spin_response, inverse_mass, speed, x, at_v, out_a, out_sample),
         )
+
+
+@kernel
+def _row_product(matrix, row, x, at):
+    """Product of a row of a matrix (..., d) with row ``at`` of x (VECTORS, d)."""
+    total = pair_at(matrix, row, 0) * pair_at(x, at, 0)
+    for i in range(2, x.shape[1], 2):
+        total += pair_at(matrix, row, i) * pair_at(x, at, i)
+    return pair_sum(total)
+
+
+@kernel
+def _push(inverse_mass, response, x, out_a, sample):
+    """Accelerations in row out_a by the forces of the joints in row PUSH, and by their friction's moments."""
+    for i in range(0, x.shape[1], 2):
+        total = pair_at(x, DRIFT, i)
+        for k in range(sample.shape[0]):
+            if sample[k, F_N] > 0.0:
+                pushed = x[PUSH, 2 * k + 1] * pair_at(inverse_mass, 2 * k + 1, i)
+                pushed += sample[k, F_T] * pair_at(response, k, i)
+                total += x[PUSH, 2 * k] * pair_at(inverse_mass, 2 * k, i) + pushed
+        put_pair(x, out_a, i, total)

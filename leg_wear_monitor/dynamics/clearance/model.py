@@ -6,12 +6,11 @@ from typing import NamedTuple
 import numpy as np
 
 from leg_wear_monitor.contact.arrays import ContactArrays
-from leg_wear_monitor.dynamics.clearance.contact import COLUMNS, TO_ANGLE, VECTORS
+from leg_wear_monitor.dynamics.clearance.contact import ADDED, COLUMNS, TO_ANGLE, VECTORS
 from leg_wear_monitor.dynamics.clearance.film import FilmModel
 from leg_wear_monitor.dynamics.clearance.layout import motion_shapes, views
 from leg_wear_monitor.dynamics.clearance.rosenbrock import ContactSystem, contact_system
 from leg_wear_monitor.dynamics.clearance.tables import ClearanceTables
-from leg_wear_monitor.dynamics.run.run_statistics import JOINT_RATES
 from leg_wear_monitor.kernel import kernel
 from leg_wear_monitor.mechanism.arrays import Floats
 
@@ -110,7 +109,7 @@ class ClearanceWork(NamedTuple):
     at a step's start and end; ``x`` (VECTORS, d): vectors of a step; ``weight`` (N,): of the wear on an arc;
     ``by``
     (c,): factors of the reactions' table; ``reaction`` (r,), ``toe`` (2,): observed values; ``added``
-    (k, JOINT_RATES): increments of the joints' integrals in a step; ``drive_start``, ``drive_end`` (3,): of
+    (k, ADDED): increments of the joints' integrals in a step; ``drive_start``, ``drive_end`` (3,): of
     the drive at its ends; ``backup`` (s,): state to restore after a failed interval, except ``pending`` (k,
     4);
     ``crank`` (3,): drive at the start of the interval.
@@ -192,7 +191,7 @@ def clearance_work(model: ClearanceModel, state: ClearanceState) -> ClearanceWor
         by=np.zeros(model.tables.reaction.shape[1]),
         reaction=np.zeros(len(model.tables.reaction_joint)),
         toe=np.zeros(2),
-        added=np.zeros((clearance_joints, JOINT_RATES)),
+        added=np.zeros((clearance_joints, ADDED)),
         drive_start=np.zeros(3),
         drive_end=np.zeros(3),
         backup=np.zeros_like(state.motion),

@@ -2,7 +2,7 @@
 
 import math
 
-from leg_wear_monitor.dynamics.clearance.contact import A0, BY_V, CAM, DV, E0, F_T, V0
+from leg_wear_monitor.dynamics.clearance.contact import A0, BY_V, CAM, DV, E0, F_T, LIFT, RUB, V0
 from leg_wear_monitor.dynamics.clearance.film_effects import add_film_reactions, film_torque
 from leg_wear_monitor.dynamics.clearance.model import blend
 from leg_wear_monitor.dynamics.joint.contact_event import F_N
@@ -11,27 +11,33 @@ from leg_wear_monitor.kernel import kernel
 
 @kernel
 def drive_torque(now, x, sample):
-    """Drive torque [N m] from rows E0, V0, A0 and BY_V of x, and its part that is linear in e'' [N m]."""
-    sudden, torque = 0.0, now.torque_0[0]
+    """Drive torque [N m] from rows E0, V0, A0 and BY_V of x, and its smooth part [N m].
+
+    The smooth part lacks the terms of e'' and of the contact forces, which impacts change suddenly.
+    """
+    sudden, smooth = 0.0, now.torque_0[0]
     for i in range(x.shape[1]):
-        torque += x[BY_V, i] * x[V0, i] + now.torque_by_e[i] * x[E0, i]
+        smooth += x[BY_V, i] * x[V0, i] + now.torque_by_e[i] * x[E0, i]
         sudden += now.torque_a[i] * x[A0, i]
     for k in range(sample.shape[0]):
-        torque += sample[k, F_N] * sample[k, CAM] - now.lever_drive[k] * sample[k, F_T]
+        sudden += sample[k, F_N] * sample[k, CAM] - now.lever_drive[k] * sample[k, F_T]
     if now.spin.shape[0] > 0:
-        torque += film_torque(now, sample)
-    return torque + sudden, sudden
+        smooth += film_torque(now, sample)
+    return smooth + sudden, smooth
 
 
 @kernel
-def sudden_impulse(now, x):
-    """Integral over a step [N m s] of the drive torque's part that is linear in e''.
+def sudden_impulse(now, x, added):
+    """Integral over a step [N m s] of the drive torque without its smooth part.
 
-    It is computed from the change of the rates, row DV, which is exact for the torque peaks of impacts.
+    The term of e'' follows from the change of the rates, row DV, which is exact for the torque peaks of
+    impacts; those of the contact forces from their integrals in ``added``, which have the rule of the losses.
     """
     total = 0.0
     for i in range(x.shape[1]):
         total += now.torque_a[i] * x[DV, i]
+    for k in range(added.shape[0]):
+        total += added[k, LIFT] - now.lever_drive[k] * added[k, RUB]
     return total
 
 

@@ -19,6 +19,7 @@ from leg_wear_monitor.dynamics.clearance.contact import CAM, DAMPING, NX, NY, ST
 from leg_wear_monitor.dynamics.joint.contact_event import F_N
 from leg_wear_monitor.kernel import kernel
 from leg_wear_monitor.mechanism.arrays import Floats, Ints
+from leg_wear_monitor.pairs import pair_at, put_pair
 
 GAMMA = 1.0 - math.sqrt(0.5)
 
@@ -69,27 +70,31 @@ def factorise_contacts(h, inverse_mass, speed, sample, out_system):
     response, factor = out_system.response, out_system.factor
     for k in range(sample.shape[0]):
         if sample[k, F_N] > 0.0:
-            stiffness, nx, ny = sample[k, STIFFNESS], sample[k, NX], sample[k, NY]
-            for i in range(inverse_mass.shape[0]):
-                response[m, i] = nx * inverse_mass[2 * k, i] + ny * inverse_mass[2 * k + 1, i]
+            stiffness, nx, ny, row = sample[k, STIFFNESS], sample[k, NX], sample[k, NY], 2 * k
             compliance = 1.0 / (g * (sample[k, DAMPING] + g * stiffness))
             out_system.ratio[m] = g * stiffness * compliance
             out_system.active[m] = k
             out_system.cam[m] = sample[k, CAM] * speed
             out_system.normal[m, 0], out_system.normal[m, 1] = nx, ny
+            for i in range(0, inverse_mass.shape[0], 2):
+                pushed = nx * pair_at(inverse_mass, row, i) + ny * pair_at(inverse_mass, row + 1, i)
+                put_pair(response, m, i, pushed)
             for a in range(m + 1):
-                factor[m, a] = nx * response[a, 2 * k] + ny * response[a, 2 * k + 1]
+                factor[m, a] = nx * response[a, row] + ny * response[a, row + 1]
             factor[m, m] += compliance
             m += 1
     for i in range(m):
         for j in range(i):
+            rest = factor[i, j]
             for c in range(j):
-                factor[i, j] -= factor[i, c] * factor[j, c]
+                rest -= factor[i, c] * factor[j, c]
+            factor[i, j] = rest
+        pivot = factor[i, i]
         for c in range(i):
             scaled = factor[i, c] * factor[c, c]
-            factor[i, i] -= scaled * factor[i, c]
+            pivot -= scaled * factor[i, c]
             factor[i, c] = scaled
-        factor[i, i] = 1.0 / factor[i, i]
+        factor[i, i] = 1.0 / pivot
     return m
 
 
@@ -102,19 +107,20 @@ def solve_contacts(h, system, m, stage, x, r_e, r_v, out_e, out_v):
     """
     g, p, factor, response = GAMMA * h, system.p, system.factor, system.response
     for a in range(m):
-        k, nx, ny = system.active[a], system.normal[a, 0], system.normal[a, 1]
-        p[a] = nx * x[r_v, 2 * k] + ny * x[r_v, 2 * k + 1]
-        p[a] += system.ratio[a] * (nx * x[r_e, 2 * k] + ny * x[r_e, 2 * k + 1] + stage * system.cam[a])
+        nx, ny, i = system.normal[a, 0], system.normal[a, 1], 2 * system.active[a]
+        right = nx * x[r_v, i] + ny * x[r_v, i + 1]
+        right += system.ratio[a] * (nx * x[r_e, i] + ny * x[r_e, i + 1] + stage * system.cam[a])
         for b in range(a):
-            p[a] -= factor[a, b] * p[b]
+            right -= factor[a, b] * p[b]
+        p[a] = right
     for a in range(m - 1, -1, -1):
-        p[a] *= factor[a, a]
+        right = p[a] * factor[a, a]
         for b in range(a + 1, m):
-            p[a] -= factor[b, a] * p[b]
-    for i in range(x.shape[1]):
-        x[out_v, i] = x[r_v, i]
-    for a in range(m):
-        for i in range(x.shape[1]):
-            x[out_v, i] -= response[a, i] * p[a]
-    for i in range(x.shape[1]):
-        x[out_e, i] = x[r_e, i] + g * x[out_v, i]
+            right -= factor[b, a] * p[b]
+        p[a] = right
+    for i in range(0, x.shape[1], 2):
+        total = pair_at(x, r_v, i)
+        for a in range(m):
+            total -= p[a] * pair_at(response, a, i)
+        put_pair(x, out_v, i, total)
+        put_pair(x, out_e, i, pair_at(x, r_e, i) + g * total)

@@ -8,6 +8,7 @@ from leg_wear_monitor.dynamics.clearance.contact import (
     A0,
     A1,
     BY_V,
+    CAM,
     CLEARANCE,
     COEFFICIENT,
     DRIFT,
@@ -24,10 +25,12 @@ from leg_wear_monitor.dynamics.clearance.contact import (
     K1V,
     K2E,
     K2V,
+    LIFT,
     NORMAL_FORM,
     RAMP_0,
     RAMP_1,
     RE,
+    RUB,
     RV,
     SLIP,
     V0,
@@ -46,9 +49,11 @@ from leg_wear_monitor.dynamics.run.run_statistics import (
     FORCE,
     FORCE_SQUARED,
     FRICTION,
-    JOINT_RATES,
 )
 from leg_wear_monitor.kernel import kernel
+from leg_wear_monitor.pairs import pair_at, put_pair
+
+_UNEVEN = 0.1  # change of a normal force in a step, over its sum at both ends, above which its middle counts
 
 
 @kernel
@@ -80,32 +85,36 @@ def try_step(model, surfaces, approach, h, turned, now, system, x, start, end):
     error over the tolerance: the difference of the second-order step and the cubic through the accelerations
     at both ends, filtered like a stage so that stiff contacts do not exaggerate it (Shampine's filter).
     """
-    d, tolerance = x.shape[1], model.tolerance
-    m = factorise_step(model.film, h, 1.0 / tolerance[1], now, start, system)
-    solve_step(model.film, h, now, system, m, 1.0, x, V0, A0, K1E, K1V)
-    for i in range(d):
-        x[EM, i] = x[E0, i] + h * x[K1E, i]
-        x[VM, i] = x[V0, i] + h * x[K1V, i]
+    film, d, tolerance = model.film, x.shape[1], model.tolerance
+    m = factorise_step(film, h, 1.0 / tolerance[1], now, start, system)
+    solve_step(film, h, now, system, m, 1.0, x, V0, A0, K1E, K1V)
+    for i in range(0, d, 2):
+        put_pair(x, EM, i, pair_at(x, E0, i) + h * pair_at(x, K1E, i))
+        put_pair(x, VM, i, pair_at(x, V0, i) + h * pair_at(x, K1V, i))
     accelerate_clearances(model, surfaces, approach, now, turned, x, EM, VM, RV, end)
-    for i in range(d):
-        x[RE, i] = x[VM, i] - 2.0 * x[K1E, i]
-        x[RV, i] -= 2.0 * x[K1V, i]
-    solve_step(model.film, h, now, system, m, -1.0, x, RE, RV, K2E, K2V)
-    for i in range(d):
-        x[E1, i] = x[E0, i] + h * (1.5 * x[K1E, i] + 0.5 * x[K2E, i])
-        x[V1, i] = x[V0, i] + h * (1.5 * x[K1V, i] + 0.5 * x[K2V, i])
+    for i in range(0, d, 2):
+        put_pair(x, RE, i, pair_at(x, VM, i) - 2.0 * pair_at(x, K1E, i))
+        put_pair(x, RV, i, pair_at(x, RV, i) - 2.0 * pair_at(x, K1V, i))
+    solve_step(film, h, now, system, m, -1.0, x, RE, RV, K2E, K2V)
+    first, second = 1.5 * h, 0.5 * h
+    for i in range(0, d, 2):
+        put_pair(x, E1, i, pair_at(x, E0, i) + first * pair_at(x, K1E, i) + second * pair_at(x, K2E, i))
+        put_pair(x, V1, i, pair_at(x, V0, i) + first * pair_at(x, K1V, i) + second * pair_at(x, K2V, i))
     accelerate_clearances(model, surfaces, approach, now, turned, x, E1, V1, A1, end)
+    third, sixth = h * h / 3.0, h * h / 6.0
+    for i in range(0, d, 2):
+        before, after = pair_at(x, A0, i), pair_at(x, A1, i)
+        moved = pair_at(x, E1, i) - pair_at(x, E0, i) - h * pair_at(x, V0, i)
+        put_pair(x, RE, i, moved - third * before - sixth * after)
+        put_pair(x, RV, i, pair_at(x, V1, i) - pair_at(x, V0, i) - second * (before + after))
+    solve_step(film, h, now, system, m, 0.0, x, RE, RV, RE, RV)
+    worst, total = 0.0, 0.0
     for i in range(d):
-        x[RE, i] = x[E1, i] - x[E0, i] - h * x[V0, i] - h * h / 6.0 * (2.0 * x[A0, i] + x[A1, i])
-        x[RV, i] = x[V1, i] - x[V0, i] - 0.5 * h * (x[A0, i] + x[A1, i])
-    solve_step(model.film, h, now, system, m, 0.0, x, RE, RV, RE, RV)
-    worst = 0.0
-    for i in range(d):
-        ratio = max(abs(x[RE, i]) * tolerance[0], abs(x[RV, i]) * tolerance[1])
-        if not math.isfinite(ratio):
-            return math.inf
-        worst = max(worst, ratio)
-    return worst
+        off, rate_off = abs(x[RE, i]) * tolerance[0], abs(x[RV, i]) * tolerance[1]
+        total += off + rate_off
+        worst = off if off > worst else worst
+        worst = rate_off if rate_off > worst else worst
+    return worst if math.isfinite(total) else math.inf
 
 
 @kernel
@@ -122,17 +131,17 @@ def shift_start(now, x):
 
 @kernel
 def integrate_joints(law, approach, h, start, end, out_added):
-    """Integrals of the clearance joints over a step of length h [s]; out_added (k, JOINT_RATES).
+    """Integrals of the clearance joints over a step of length h [s]; out_added (k, ADDED).
 
     Simpson's rule where the force changes by more than 10 %, with the contact law at the middle of the
     penetration's cubic, because an impact takes few steps; the trapezoidal rule elsewhere.
     """
     for k in range(start.shape[0]):
-        for r in range(JOINT_RATES):
+        for r in range(out_added.shape[1]):
             out_added[k, r] = 0.0
         before, after, weight = start[k, F_N], end[k, F_N], 0.5 * h
         if before + after > 0.0:
-            if abs(after - before) > 0.1 * (after + before):
+            if abs(after - before) > _UNEVEN * (after + before):
                 weight = h / 6.0
                 delta, rate = hermite(
                     0.5, h, start[k, DELTA], start[k, DELTA_DOT], end[k, DELTA], end[k, DELTA_DOT]
@@ -146,24 +155,22 @@ def integrate_joints(law, approach, h, start, end, out_added):
                 )
                 mu, code = law[k, FRICTION_COEFFICIENT], law[k, FRICTION_LAW]
                 f_t = friction_force(code, mu, law[k, RAMP_0], law[k, RAMP_1], f_n, slip)
-                _add_rates(k, 4.0 * weight, f_n, f_t, elastic, rate, slip, out_added)
-            _add_rates(
-                k,
-                weight,
-                before,
-                start[k, F_T],
-                start[k, ELASTIC],
-                start[k, DELTA_DOT],
-                start[k, SLIP],
-                out_added,
-            )
-            _add_rates(
-                k, weight, after, end[k, F_T], end[k, ELASTIC], end[k, DELTA_DOT], end[k, SLIP], out_added
-            )
+                cam = 0.5 * (start[k, CAM] + end[k, CAM])
+                _add_rates(k, 4.0 * weight, f_n, f_t, elastic, rate, slip, cam, out_added)
+            _add_sample(k, weight, start, out_added)
+            _add_sample(k, weight, end, out_added)
 
 
 @kernel
-def _add_rates(k, weight, f_n, f_t, elastic, delta_dot, slip, out_added):
+def _add_sample(k, weight, sample, out_added):
+    """Add the rates of joint k's integrals at a sample (k, COLUMNS), times a weight [s]."""
+    f_n, f_t, elastic = sample[k, F_N], sample[k, F_T], sample[k, ELASTIC]
+    rate, slip, cam = sample[k, DELTA_DOT], sample[k, SLIP], sample[k, CAM]
+    _add_rates(k, weight, f_n, f_t, elastic, rate, slip, cam, out_added)
+
+
+@kernel
+def _add_rates(k, weight, f_n, f_t, elastic, delta_dot, slip, cam, out_added):
     """Add the rates of joint k's integrals at one instant, times a weight [s]."""
     if f_n > 0.0:
         squared = f_n * f_n + f_t * f_t
@@ -172,6 +179,8 @@ def _add_rates(k, weight, f_n, f_t, elastic, delta_dot, slip, out_added):
         out_added[k, CONTACT] += weight
         out_added[k, FRICTION] -= weight * f_t * slip
         out_added[k, ARCHARD] += weight * f_n * abs(slip)
+        out_added[k, RUB] += weight * f_t
+        out_added[k, LIFT] += weight * f_n * cam
     out_added[k, DISSIPATION] += weight * (f_n - elastic) * delta_dot
 
 

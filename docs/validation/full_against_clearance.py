@@ -68,7 +68,7 @@ class Case(NamedTuple):
         def run(i: int) -> SimulationResult:
             return simulate(
                 self.mechanism,
-                clearances=self.clearance_joints,
+                clearances=tuple(self.clearance_joints),
                 clearance_m=self.clearance_m + i * APART,
                 speed_rpm=self.rpm,
                 cycles=cycles,
@@ -83,7 +83,7 @@ class Case(NamedTuple):
         """Runs whose journals start elsewhere by up to a micrometre."""
         leg = Leg(
             mechanism=self.mechanism,
-            clearances=self.clearance_joints,
+            clearances=tuple(self.clearance_joints),
             clearance_m=self.clearance_m,
             speed_rpm=self.rpm,
             perturb_m=1.0e-6,

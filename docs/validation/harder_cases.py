@@ -78,7 +78,7 @@ def results(case: Case, model: str, runs: int, cycles: int) -> list[SimulationRe
     def run(i: int) -> SimulationResult:
         return simulate(
             case.mechanism,
-            clearances=case.clearance_joints,
+            clearances=tuple(case.clearance_joints),
             clearance_m=case.clearance_m + i * APART,
             speed_rpm=case.rpm,
             cycles=cycles,

@@ -19,7 +19,8 @@ def write_whole(path: Path, content: bytes) -> None:
     Parameters
     ----------
     path : pathlib.Path
-        On a file system with locks; its directory is made if it does not exist.
+        On a file system with locks; its directory is made if it does not exist. A symbolic link stays, and
+        the file that it leads to is written.
     content : bytes
 
     Raises
@@ -27,15 +28,16 @@ def write_whole(path: Path, content: bytes) -> None:
     ConfigError
         If the disk does not take it; the file is then as it was.
     """
-    part = path.with_name(f".{path.name}.part")
+    target = path.resolve()
+    part = target.with_name(f".{target.name}.part")
     try:
-        path.parent.mkdir(parents=True, exist_ok=True)
+        target.parent.mkdir(parents=True, exist_ok=True)
         with _alone(part) as file:
             try:
                 file.write(content)
                 file.flush()
                 os.fsync(file.fileno())
-                os.replace(part, path)
+                os.replace(part, target)
             except BaseException:
                 with suppress(OSError):  # the first fault is the one to report
                     part.unlink()

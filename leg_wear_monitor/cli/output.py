@@ -83,7 +83,7 @@ def write_file(path: Path, content: bytes) -> None:
     if _is_stream(path):
         path.write_bytes(content)
         return
-    write_whole(path.resolve(), content)
+    write_whole(path, content)
 
 
 def write_directory(path: Path, files: Mapping[str, bytes | None]) -> list[Path]:

@@ -58,6 +58,9 @@ WEARING = 8  # intervals after which pending wear is deposited, to spread its co
 MOST_TRIALS = 20000  # trial steps in a part of an interval before the run stops
 
 _SHORTEST_STEP = 1.0e-13  # s
+# A rest that is one step but for rounding is one step: a step of half a rest leaves as much, and which of the
+# two is longer would depend on the last bit.
+_NEARLY = 1.0 + 1.0e-6
 _FASTEST_GROWTH = 3.0  # of a step over the one before; none after a trial with too large an error
 # of the drive at one end of a step: torque [N m], its smooth part [N m], power of loads [W]
 WHOLE, SMOOTH, OUTSIDE = 0, 1, 2
@@ -139,9 +142,9 @@ def _steps(model, surfaces, state, begin, length, statistics, work):
     _sample_drive(now, x, start, work.drive_start, statistics)
     while done < length:
         left = length - done
-        h = min(state.step[0], left)
-        if h < left < 2.0 * h:
-            h = 0.5 * left
+        h = state.step[0]
+        if left < 2.0 * h:
+            h = left if left <= _NEARLY * h else 0.5 * left
         if cut < NEVER:
             h = cut
         turned = speed * (done + h - 0.5 * length)

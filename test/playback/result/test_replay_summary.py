@@ -68,7 +68,6 @@ def test_json_has_a_version_and_null_for_what_is_not_known(summary):
         ("history.stamp_ns", [2**70], "has a number that is too large"),
         ("history.clearance_m.B", [1.0, "2"], "'2' is not a number"),
         ("history.cycle", {}, "{} is not a list of numbers"),
-        ("status", [7], "7 is not a mapping"),
         ("recording.findings", "none", "'none' is not a list of mappings"),
     ],
 )
@@ -83,6 +82,12 @@ def test_a_fault_of_the_file_is_named(summary, path, value, fault):
         summary_of(record, "summary.json")
     assert str(caught.value).startswith(f"summary.json: {path}: ")
     assert fault in str(caught.value)
+
+
+def test_an_entry_of_a_list_is_named_by_its_number(summary):
+    record = json.loads(summary.to_json()) | {"status": [7]}
+    with pytest.raises(ConfigError, match=r"summary\.json: status\.1: 7 is not a mapping"):
+        summary_of(record, "summary.json")
 
 
 def test_what_is_missing_is_named(summary):

@@ -14,6 +14,7 @@ from leg_wear_monitor.dashboard.trends import Row, Trends
 from leg_wear_monitor.errors import printable
 from leg_wear_monitor.mechanism.spec import Mechanism
 from leg_wear_monitor.monitor.config.settings import MonitorConfig
+from leg_wear_monitor.monitor.forecast.measurement import last_measured
 from leg_wear_monitor.monitor.ledger.binding import binding_of
 from leg_wear_monitor.monitor.ledger.entry import ClearancePoint, JointWear, VerdictEvent
 from leg_wear_monitor.monitor.ledger.file import LedgerError, beside
@@ -123,22 +124,22 @@ class LedgerLeg:
             raise LedgerError(self._fault)
         parts = {part.name: part for part in found.entry.joints} if found.entry else {}
         joints = {joint: parts[joint] for joint in self._setup.joints if joint in parts}
-        counted = {joint: self._setup.new_m[joint] + _worn_m(part) for joint, part in joints.items()}
+        counted = {joint: self._setup.new_m[joint] + part.mean_m for joint, part in joints.items()}
         known = Known(
             verdict=ledger_verdict(found.verdict) if found.verdict else NO_VERDICT,
             history=_trends(found.clearances).history(self._setup.joints),
             cycles=int(found.entry.totals.get("cycles", 0.0)) if found.entry else 0,
             joints={joint: _report(part, counted[joint]) for joint, part in joints.items()},
-            clearances={joint: self._clearance(joint, counted_m) for joint, counted_m in counted.items()},
+            clearances={joint: self._clearance(part, counted[joint]) for joint, part in joints.items()},
             life={joint: _life(found, part) for joint, part in joints.items()},
             alarms=[replay_alarm(alarm) for alarm in found.entry.alarms] if found.entry else [],
             measurements=found.measurements,
         )
         return view_of(self._setup, known)
 
-    def _clearance(self, joint: str, counted_m: float) -> JointClearance:
-        found = self._content.measurements if self._content else ()
-        last = next((each for each in reversed(found) if each.joint == joint and not each.is_withdrawn), None)
+    def _clearance(self, part: JointWear, counted_m: float) -> JointClearance:
+        joint, found = part.name, self._content.measurements if self._content else ()
+        last = last_measured(found, joint, part.replaced_ns)
         return JointClearance(
             counted_m=counted_m,
             new_m=self._setup.new_m[joint],
@@ -166,13 +167,8 @@ def _evidence(record: dict[str, Any]) -> Evidence:
     return Evidence(**{field.name: record[field.name] for field in attrs.fields(Evidence)})
 
 
-def _worn_m(part: JointWear) -> float:
-    """Wear of both surfaces of a joint, its mean around the bushing."""
-    return float(part.depth.sum(axis=0).mean())
-
-
 def _report(part: JointWear, counted_m: float) -> ReplayJoint:
-    greatest_m = counted_m - _worn_m(part) + float(part.depth.sum(axis=0).max())
+    greatest_m = counted_m - part.mean_m + float(part.depth.sum(axis=0).max())
     return ReplayJoint(
         clearance_m=ClearanceChange(counted_m, counted_m, greatest_m), forecast=None, impacts=0,
         growth_m_per_cycle=None, growth_error_m_per_cycle=None, growth_mps=None, peak_force_n=None,

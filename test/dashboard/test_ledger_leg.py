@@ -19,6 +19,7 @@ from leg_wear_monitor.monitor.ledger.entry import (
     Entry,
     ForecastPoint,
     JointWear,
+    Measurement,
     VerdictEvent,
 )
 from leg_wear_monitor.monitor.ledger.file import LedgerError
@@ -154,3 +155,17 @@ def test_the_age_is_that_of_the_file(ledger):
     found = leg_of(ledger, written_s + 90.0).freshness()
     assert 88.0 < found.age_s <= 91.0
     assert leg_of(ledger, written_s - 90.0).freshness().age_s == 0.0  # the disk's clock is another
+
+
+def test_a_measurement_of_the_part_before_is_not_shown_for_the_present_one(ledger):
+    old = Measurement(
+        stamp_ns=11 * SECOND, joint="G", who="ann", clearance_m=5.5e-4, sigma_m=5e-6, wear_m=1e-5, cycles=10,
+        replaced_ns=0, expected_below=0.9, counts=True,
+    )  # fmt: skip
+    ledger.note(old)
+    assert ledger.keep(entry(12))
+    assert leg_of(ledger)._view().clearances["G"].measured_m == 5.5e-4
+    new = entry(14)
+    joints = tuple(attrs.evolve(j, replaced_ns=13 * SECOND) if j.name == "G" else j for j in new.joints)
+    assert ledger.keep(attrs.evolve(new, joints=joints))
+    assert leg_of(ledger)._view().clearances["G"].measured_m is None

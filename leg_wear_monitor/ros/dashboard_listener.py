@@ -30,7 +30,7 @@ from leg_wear_monitor.messages.qos import LATCHED, Qos
 from leg_wear_monitor.monitor.config.fitting import fitted
 from leg_wear_monitor.monitor.config.parameters import PARAMETERS, config_from
 from leg_wear_monitor.playback.result.parts import ReplayStatus
-from leg_wear_monitor.ros.running import WAKE_S, until_down
+from leg_wear_monitor.ros.running import spin
 
 _ASK_AGAIN_S = 2.0
 _HEARD = (outputs.VERDICT, outputs.DIAGNOSTICS, outputs.ALARMS, outputs.FORECAST, outputs.CLEARANCES)
@@ -80,7 +80,9 @@ def listening(node: str, leg: LiveLeg, setup: LegSetup | None = None) -> Iterato
             leg.take_setup(setup)
         wanted = threading.Event()
         wanted.set()
-        thread = threading.Thread(target=_spin, args=(listener, wanted.is_set), name="listener", daemon=True)
+        # with the default executor, what fails in a callback is an exception, and messages are few
+        spinning = listener, wanted.is_set, SingleThreadedExecutor
+        thread = threading.Thread(target=spin, args=spinning, name="listener", daemon=True)
         thread.start()
         try:
             yield
@@ -90,18 +92,6 @@ def listening(node: str, leg: LiveLeg, setup: LegSetup | None = None) -> Iterato
             listener.destroy_node()
     finally:
         try_shutdown(context=context)
-
-
-def _spin(node: Node, wanted: Callable[[], bool]) -> None:
-    """Spin with the default executor: what fails in a callback then is an exception, and messages are few."""
-    executor = SingleThreadedExecutor(context=node.context)
-    try:
-        with until_down(node.context):
-            executor.add_node(node)
-            while node.context.ok() and wanted():
-                executor.spin_once(timeout_sec=WAKE_S)
-    finally:
-        executor.shutdown()
 
 
 class _Listener(Node):

@@ -11,7 +11,7 @@ from typing import TypeVar
 
 import rclpy
 from rclpy.context import Context
-from rclpy.executors import ExternalShutdownException
+from rclpy.executors import Executor, ExternalShutdownException
 from rclpy.experimental.events_executor import EventsExecutor
 from rclpy.impl.implementation_singleton import rclpy_implementation as _rclpy
 from rclpy.node import Node
@@ -55,9 +55,13 @@ def until_down(context: Context) -> Iterator[None]:
             raise
 
 
-def spin(node: Node, wanted: Callable[[], bool] = lambda: True) -> None:
+def spin(
+    node: Node,
+    wanted: Callable[[], bool] = lambda: True,
+    executor_type: Callable[..., Executor] = EventsExecutor,
+) -> None:
     """Spin a node until its context shuts down or `wanted` returns false."""
-    executor = EventsExecutor(context=node.context)
+    executor = executor_type(context=node.context)
     try:
         with until_down(node.context):
             executor.add_node(node)

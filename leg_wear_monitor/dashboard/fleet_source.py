@@ -7,8 +7,17 @@ from pathlib import Path
 
 import attrs
 
-from leg_wear_monitor.dashboard.source import SCRIPT, Content, Freshness, Words, live_settings
-from leg_wear_monitor.errors import ConfigError, LegWearError, printable
+from leg_wear_monitor.dashboard.source import (
+    SCRIPT,
+    Content,
+    Freshness,
+    Stamps,
+    Words,
+    live_settings,
+    stamps_of,
+    unreadable,
+)
+from leg_wear_monitor.errors import ConfigError, LegWearError
 from leg_wear_monitor.fleet.description.loader import fleet_directory, load_fleet
 from leg_wear_monitor.fleet.overview.described import described
 from leg_wear_monitor.fleet.overview.parts import FleetOverview
@@ -48,26 +57,19 @@ class FleetSource:
         self._home = fleet_directory(description)
         self._fault = ""
         self._overview = self._read()
-        self._stamp, self._made_s = self._stamp_now(), -_AGAIN_S
+        self._stamps, self._made_s = self._stamps_now(), -_AGAIN_S
 
     def _read(self) -> FleetOverview:
         return described(load_overview(self._home), load_fleet(self._description))
 
-    def _stamp_now(self) -> tuple[tuple[int, int], ...]:
-        found = []
-        for path in (self._description, self._home / FILE):
-            try:
-                stat = path.stat()
-            except OSError:
-                continue
-            found.append((stat.st_mtime_ns, stat.st_size))
-        return tuple(found)
+    def _stamps_now(self) -> Stamps:
+        return stamps_of(self._description, self._home / FILE)
 
     def renew(self) -> bool:
         """Read description and overview again if one of them has changed."""
-        stamp = self._stamp_now()
-        if stamp != self._stamp:
-            self._stamp = stamp
+        stamps = self._stamps_now()
+        if stamps != self._stamps:
+            self._stamps = stamps
             try:
                 self._overview, self._fault = self._read(), ""
             except LegWearError as error:  # the page of before stays, and says so
@@ -97,10 +99,8 @@ class FleetSource:
     def freshness(self) -> Freshness:
         """Since when the fleet was not updated."""
         if self._fault:
-            return Freshness(
-                None, f"NOT READABLE: {printable(self._fault)}; what is shown is old", OLD_AFTER_S
-            )
-        written_ns = max((stamp for stamp, _ in self._stamp[1:]), default=0)
+            return unreadable(self._fault, OLD_AFTER_S)
+        _, (written_ns, _) = self._stamps
         age_s = max(0.0, self._clock() - 1.0e-9 * written_ns)
         return Freshness(age_s, "the fleet was not updated; run leg-wear-monitor fleet update", OLD_AFTER_S)
 

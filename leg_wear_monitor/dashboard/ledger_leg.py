@@ -9,7 +9,15 @@ import attrs
 
 from leg_wear_monitor.dashboard import regions as region
 from leg_wear_monitor.dashboard.leg_view import NO_VERDICT, Known, leg_setup, view_of
-from leg_wear_monitor.dashboard.source import Content, Freshness, LegPage, words_of
+from leg_wear_monitor.dashboard.source import (
+    Content,
+    Freshness,
+    LegPage,
+    Stamps,
+    stamps_of,
+    unreadable,
+    words_of,
+)
 from leg_wear_monitor.dashboard.trends import Row, Trends
 from leg_wear_monitor.errors import printable
 from leg_wear_monitor.mechanism.spec import Mechanism
@@ -30,8 +38,6 @@ OLD_AFTER_S = 60.0  # a monitor of a walking leg writes more often
 
 _TRIES = 6  # half a second apart: a copy that a monitor wrote into meanwhile is not whole
 _SILENCE = "nothing was written into the ledger; the monitor does not run, or the leg does not walk"
-
-_Stamp = tuple[tuple[int, int], ...]
 
 
 class LedgerLeg:
@@ -57,7 +63,7 @@ class LedgerLeg:
     ) -> None:
         self._path, self._clock = path, clock
         self._setup, self._binding = leg_setup(config, mechanism), binding_of(mechanism, config)
-        self._read_stamp: _Stamp = ()
+        self._read_stamps: Stamps = stamps_of(path, beside(path, ENDING))
         self._failures = 0
         self._fault = ""
         self._content: LedgerContent | None = None
@@ -68,37 +74,27 @@ class LedgerLeg:
 
     def renew(self) -> bool:
         """Read the ledger if it has changed; whether there is something else to show."""
-        return self._stamp() != self._read_stamp and (self._read() or self._failures == _TRIES)
+        return self._stamps() != self._read_stamps and (self._read() or self._failures == _TRIES)
 
     def _read(self) -> bool:
-        stamp = self._stamp()
+        stamps = self._stamps()
         try:
             self._content = read_ledger(self._path, self._binding)
         except LedgerError as error:
             self._failures += 1
             self._fault = str(error)
             return False
-        self._failures, self._fault, self._read_stamp = 0, "", stamp
+        self._failures, self._fault, self._read_stamps = 0, "", stamps
         return True
 
-    def _stamp(self) -> _Stamp:
-        """What changes when something is written; empty while there is no file."""
-        found = []
-        for path in (self._path, beside(self._path, ENDING)):
-            try:
-                stat = path.stat()
-            except OSError:
-                continue
-            found.append((stat.st_mtime_ns, stat.st_size))
-        return tuple(found)
+    def _stamps(self) -> Stamps:
+        return stamps_of(self._path, beside(self._path, ENDING))
 
     def freshness(self) -> Freshness:
         """Since when nothing was written."""
         if self._failures >= _TRIES:
-            return Freshness(
-                None, f"NOT READABLE: {printable(self._fault)}; what is shown is old", OLD_AFTER_S
-            )
-        written_ns = max((stamp for stamp, _ in self._read_stamp), default=0)
+            return unreadable(self._fault, OLD_AFTER_S)
+        written_ns = max(time_ns for time_ns, _ in self._read_stamps)
         return Freshness(max(0.0, self._clock() - 1.0e-9 * written_ns), _SILENCE, OLD_AFTER_S)
 
     def content(self) -> Content:

@@ -11,17 +11,19 @@ from leg_wear_monitor.contact.normal.laws import normal_force
 from leg_wear_monitor.dynamics.clearance.contact import (
     A0,
     E0,
+    K1E,
+    K1V,
+    V0,
+    accelerate_clearances,
+)
+from leg_wear_monitor.dynamics.clearance.joint_laws import (
     FRESH_COEFFICIENT,
     FRICTION_COEFFICIENT,
     FRICTION_LAW,
     HYSTERESIS_FACTOR,
-    K1E,
-    K1V,
     NORMAL_FORM,
     RAMP_0,
     RAMP_1,
-    V0,
-    accelerate_clearances,
 )
 from leg_wear_monitor.dynamics.clearance.model import hold_eccentricities, take_tables
 from leg_wear_monitor.dynamics.clearance.outputs import drive_torque, reactions, toe_deviation
@@ -45,11 +47,11 @@ def floors(count, chain, law, clearance, e, v, inverse_mass, force, out_a):
             length = math.sqrt(ex * ex + ey * ey)
             nx, ny = ex / length, ey / length
             f_n, _, _, _ = normal_force(
-                law[k, NORMAL_FORM], law[k, FRESH_COEFFICIENT], clearance[k], law[k, HYSTERESIS_FACTOR],
+                law[NORMAL_FORM, k], law[FRESH_COEFFICIENT, k], clearance[k], law[HYSTERESIS_FACTOR, k],
                 length - clearance[k], nx * vx + ny * vy,
             )  # fmt: skip
-            mu, code, slip = law[k, FRICTION_COEFFICIENT], law[k, FRICTION_LAW], nx * vy - ny * vx
-            f_t = friction_force(code, mu, law[k, RAMP_0], law[k, RAMP_1], f_n, slip)
+            mu, code, slip = law[FRICTION_COEFFICIENT, k], law[FRICTION_LAW, k], nx * vy - ny * vx
+            f_t = friction_force(code, mu, law[RAMP_0, k], law[RAMP_1, k], f_n, slip)
             force[2 * k], force[2 * k + 1] = -f_n * nx - f_t * ny, -f_n * ny + f_t * nx
         for j in range(e.shape[0]):
             for i in range(e.shape[0]):
@@ -68,7 +70,7 @@ def trials(count, chain, model, surfaces, state, work):
 def evaluations(count, chain, model, surfaces, state, work):
     x = work.x
     for _ in range(count):
-        accelerate_clearances(model, surfaces, state.approach, work.now, 0.0, x, E0, V0, A0, work.start)
+        accelerate_clearances(model, surfaces, state.approach, work.now, 0.0, x, E0, V0, A0, work.start, True)
         x[E0, 0] += chain * x[A0, 0]
 
 
@@ -76,7 +78,7 @@ def evaluations(count, chain, model, surfaces, state, work):
 def factorisations(count, chain, model, state, work):
     m, now = state.approach.shape[0], work.now
     for _ in range(count):
-        h = STEP + chain * work.system.factor[m - 1, m - 1]
+        h = STEP + chain * work.system.rows[m - 1, 0]
         factorise_contacts(h, now.inverse_mass, now.speed[0], work.start, work.system)
 
 
@@ -92,7 +94,7 @@ def solutions(count, chain, model, state, work):
 def integrals(count, chain, model, state, work, added):
     for _ in range(count):
         h = STEP + chain * added[0, 0]
-        integrate_joints(model.law, state.approach, h, work.start, work.end, added)
+        integrate_joints(model, state.approach, h, work.start, work.end, added)
 
 
 @entry
@@ -103,7 +105,7 @@ def touches(count, chain, model, state, work, contacts, statistics):
             contacts.joint, contacts.speed_floor, 0.0, STEP + chain * fraction, work.start, work.end,
             state.approach, state.recent, statistics.peak, statistics.impact, statistics.impacts,
         )  # fmt: skip
-        work.end[0, DELTA] += chain * statistics.peak[0]
+        work.end[DELTA, 0] += chain * statistics.peak[0]
 
 
 @entry

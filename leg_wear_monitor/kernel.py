@@ -194,11 +194,3 @@ def _called_directly(target: Callable[..., object]) -> Callable[..., Any]:
         return target(*arguments)
 
     return call
-
-
-@kernel
-def copy_array(source, out):  # type: ignore[no-untyped-def]
-    """Copy an array of one to three dimensions; numba's own slice assignment would allocate for it."""
-    a, b = source.reshape(-1), out.reshape(-1)
-    for i in range(b.shape[0]):
-        b[i] = a[i]

@@ -3,17 +3,20 @@
 import math
 
 from leg_wear_monitor.kernel import kernel
+from leg_wear_monitor.vectors import largest, where
 
 NONE, AMBROSIO, THRELFALL = 0, 1, 2
+_LEAST = 1.0e-300  # m/s: the reciprocal is finite
 FRICTION_CODES = {"none": NONE, "ambrosio": AMBROSIO, "threlfall": THRELFALL}
 
 
 @kernel
 def ambrosio_ramp(speed, v0, v1):
-    """Fraction c_d [-] of Coulomb's friction: 0 up to v0, 1 from v1, linear between [m/s] (Ambrosio 2003)."""
-    if speed <= v0:
-        return 0.0
-    return 1.0 if speed >= v1 else (speed - v0) / (v1 - v0)
+    """Fraction c_d [-] of Coulomb's friction: 0 up to v0, 1 from v1, linear between [m/s] (Ambrosio 2003).
+
+    For numbers or vectors.
+    """
+    return where(speed > v0, where(speed < v1, (speed - v0) / largest(v1 - v0, _LEAST), 1.0), 0.0)
 
 
 @kernel
@@ -32,4 +35,10 @@ def friction_force(law, coefficient, v0, v1, f_n, slip):
         fraction = threlfall_ramp(speed, v1)
     else:
         fraction = 0.0
-    return -math.copysign(coefficient * fraction * f_n, slip)
+    return against(slip, coefficient * fraction * f_n)
+
+
+@kernel
+def against(slip, force):
+    """A force [N] opposite to the slip speed. For numbers or vectors."""
+    return where(slip < 0.0, force, -force)

@@ -3,7 +3,9 @@
 import math
 
 from leg_wear_monitor.kernel import kernel
+from leg_wear_monitor.vectors import largest, root, where
 
+_LEAST = 1.0e-300  # m: the reciprocal is finite
 _SHARPEST = 1.0  # bound of the gradient's part across e by the bend; the wall's unit normal has length 1
 
 
@@ -11,13 +13,11 @@ _SHARPEST = 1.0  # bound of the gradient's part across e by the bend; the wall's
 def journal_contact(ex, ey, clearance):
     """Penetration [m], negative when apart, and unit normal of a journal at eccentricity (ex, ey) [m].
 
-    physics.md section 3.
+    For numbers or vectors. physics.md section 3.
     """
-    e = math.sqrt(ex * ex + ey * ey)
-    if e == 0.0:
-        return -clearance, 1.0, 0.0
-    inverse = 1.0 / e
-    return e - clearance, ex * inverse, ey * inverse
+    e = root(ex * ex + ey * ey)
+    inverse, away = 1.0 / largest(e, _LEAST), e > 0.0
+    return e - clearance, where(away, ex * inverse, 1.0), where(away, ey * inverse, 0.0)
 
 
 @kernel
@@ -29,7 +29,7 @@ def worn_contact(ex, ey, clearance, slope, bend):
     gradient of the penetration, so that it has a potential (physics.md section 3): the gradient is the wall's
     unit normal plus parts of the order of penetration / clearance, because the normal changes along the wall.
     The part by the bend is bounded: in notches too narrow for the journal it would be many times the normal,
-    and there the force has no potential.
+    and there the force has no potential. For numbers or vectors.
 
     Returns
     -------
@@ -38,15 +38,13 @@ def worn_contact(ex, ey, clearance, slope, bend):
         [-] and of its slope's change [rad] in the change of the penetration.
     """
     delta, rx, ry = journal_contact(ex, ey, clearance)
-    inside = max(delta, 0.0)
-    inverse = 1.0 / (clearance + inside)  # in contact, 1 / |e|
+    inside = largest(delta, 0.0)
+    inverse = 1.0 / largest(clearance + inside, _LEAST)  # in contact, 1 / |e|
     tilt = slope * inverse
     square = 1.0 / (1.0 + tilt * tilt)
-    scale = math.sqrt(square)
+    scale = root(square)
     by_slope = inside * square * scale * tilt * inverse
-    bent = abs(by_slope * bend * inverse)
-    if bent > _SHARPEST:
-        by_slope *= _SHARPEST / bent
+    by_slope = by_slope * (_SHARPEST / largest(abs(by_slope * bend * inverse), _SHARPEST))
     outwards, back = scale + by_slope * tilt, scale * tilt + by_slope * bend * inverse
     return delta * scale, outwards * rx + back * ry, outwards * ry - back * rx, scale, by_slope
 

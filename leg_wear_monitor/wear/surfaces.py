@@ -16,6 +16,7 @@ from leg_wear_monitor.contact.arrays import ContactArrays
 from leg_wear_monitor.kernel import kernel
 from leg_wear_monitor.mechanism.arrays import Floats
 from leg_wear_monitor.mechanism.ideal import TURN
+from leg_wear_monitor.vectors import floor, gather, where
 
 SECTORS = 720
 
@@ -44,12 +45,41 @@ def profile_at(profile, angle):
     The profile (N,) is interpolated by a quadratic spline, whose slope is continuous. physics.md section 6.
     """
     n = profile.shape[0]
-    turns = angle * _TURNS_PER_RAD
-    u = n * (turns - math.floor(turns))
-    i = min(int(u), n - 1)
-    w = u - i
-    before, here, after = profile[i - 1 if i > 0 else n - 1], profile[i], profile[i + 1 if i < n - 1 else 0]
-    depth = 0.5 * ((1.0 - w) ** 2 * before + (1.0 + 2.0 * w * (1.0 - w)) * here + w * w * after)
+    before, here, after, w = _sectors_at(n, angle)
+    return _spline(n, w, profile[int(before)], profile[int(here)], profile[int(after)])
+
+
+@kernel
+def profiles_at(depth, k, surface, angle):
+    """As `profile_at`, of eight joints from joint k on: depth (k, 2, N), a vector of angles."""
+    n = depth.shape[2]
+    before, here, after, w = _sectors_at(n, angle)
+    return _spline(
+        n,
+        w,
+        gather(depth, k, surface, before),
+        gather(depth, k, surface, here),
+        gather(depth, k, surface, after),
+    )
+
+
+@kernel
+def _sectors_at(n, angle):
+    """Numbers of the sectors before, at and after an angle [rad], and the fraction of the sector before it.
+
+    For numbers or vectors; the sectors' numbers are floats.
+    """
+    turns, last = angle * _TURNS_PER_RAD, n - 1.0
+    u = n * (turns - floor(turns))
+    here = where(u < n, floor(u), last)
+    return where(here > 0.0, here - 1.0, last), here, where(here < last, here + 1.0, 0.0), u - here
+
+
+@kernel
+def _spline(n, w, before, here, after):
+    """Quadratic spline in a sector of n, and its derivatives; for numbers or vectors."""
+    rest = 1.0 - w
+    depth = 0.5 * (rest * rest * before + (1.0 + 2.0 * w * rest) * here + w * w * after)
     per_rad = n * _TURNS_PER_RAD
     rise, next_rise = here - before, after - here
     return depth, (rise + w * (next_rise - rise)) * per_rad, (next_rise - rise) * per_rad * per_rad
@@ -72,31 +102,42 @@ def local_surfaces(contacts, surfaces, k, direction, angle_b, angle_j):
 
 
 @kernel
-def _weigh_arc(contacts, surfaces, k, ex, ey, angle_b, angle_j, centre, side, out_weight):
+def _weigh_arc(contacts, surfaces, k, ex, ey, angle_b, angle_j, centre, side, turning, out_weight):
     """Overlap [m] of the sectors from ``centre`` to one side (1 or -1); returns its sum [m] and their number.
 
-    The direction is advanced from sector to sector by rotation, without cosines. physics.md section 6.
+    ``turning``: cosine and sine of a sector, by which the direction is turned from one to the next.
+    physics.md section 6.
     """
     n = surfaces.depth.shape[2]
     width = TURN / n
     along = angle_b + (centre + 0.5) * width
-    cos_step, sin_step = math.cos(width), side * math.sin(width)
+    cos_step, sin_step = turning[0], side * turning[1]
     c, s = math.cos(along), math.sin(along)
-    total, count = 0.0, 0
+    total, count, sector = 0.0, 0, centre
     for step in range(n // 2):
         if step > 0:
             c, s = c * cos_step - s * sin_step, s * cos_step + c * sin_step
+            sector = _beside(sector, side, n)
         if step > 0 or side > 0:
             overlap = ex * c + ey * s - contacts.clearance[k]
             if surfaces.feeds_back:
-                overlap -= surfaces.depth[k, BUSHING, (centre + side * step) % n]
+                overlap -= surfaces.depth[k, BUSHING, sector]
                 overlap -= profile_at(surfaces.depth[k, JOURNAL], along + side * step * width - angle_j)[0]
             if overlap <= 0.0:
                 break
-            out_weight[(centre + side * step) % n] = overlap
+            out_weight[sector] = overlap
             total += overlap
         count += 1
     return total, count
+
+
+@kernel
+def _beside(sector, side, n):
+    """The next of n sectors to one side (1 or -1); without a division, which takes longer than all else."""
+    beside = sector + side
+    if beside == n:
+        return 0
+    return n - 1 if beside < 0 else beside
 
 
 @kernel
@@ -110,6 +151,7 @@ def deposit_wear(contacts, surfaces, k, ex, ey, angle_b, angle_j, integral, out_
     """
     n = surfaces.depth.shape[2]
     sector = TURN / n
+    turning = math.cos(sector), math.sin(sector)
     towards = math.floor((math.atan2(ey, ex) - angle_b) / sector) % n
     for beside in range(
         2 * _BESIDE + 1
@@ -117,11 +159,13 @@ def deposit_wear(contacts, surfaces, k, ex, ey, angle_b, angle_j, integral, out_
         aside = (beside + 1) // 2
         centre = (towards + (aside if beside % 2 == 1 else -aside)) % n
         right, count_right = _weigh_arc(
-            contacts, surfaces, k, ex, ey, angle_b, angle_j, centre, 1, out_weight
+            contacts, surfaces, k, ex, ey, angle_b, angle_j, centre, 1, turning, out_weight
         )
         if right > 0.0:
             break
-    left, count_left = _weigh_arc(contacts, surfaces, k, ex, ey, angle_b, angle_j, centre, -1, out_weight)
+    left, count_left = _weigh_arc(
+        contacts, surfaces, k, ex, ey, angle_b, angle_j, centre, -1, turning, out_weight
+    )
     if right <= 0.0:  # contact narrower than a sector
         centre, count_right, count_left = towards, 1, 1
         out_weight[centre] = right = 1.0
@@ -130,13 +174,16 @@ def deposit_wear(contacts, surfaces, k, ex, ey, angle_b, angle_j, integral, out_
     shift = (angle_b - angle_j) / sector
     floor = math.floor(shift)
     w = shift - floor
-    first = centre - count_left + 1
-    for i in range(first, centre + count_right):
-        fraction = depth * out_weight[i % n]
-        surfaces.depth[k, BUSHING, i % n] += contacts.wear_coefficient[k, BUSHING] * fraction
+    i = (centre - count_left + 1) % n
+    j = (i + int(floor)) % n
+    for _ in range(count_left + count_right - 1):
+        fraction = depth * out_weight[i]
+        surfaces.depth[k, BUSHING, i] += contacts.wear_coefficient[k, BUSHING] * fraction
         worn = contacts.wear_coefficient[k, JOURNAL] * fraction
-        surfaces.depth[k, JOURNAL, (i + int(floor)) % n] += (1.0 - w) * worn
-        surfaces.depth[k, JOURNAL, (i + int(floor) + 1) % n] += w * worn
+        after = _beside(j, 1, n)
+        surfaces.depth[k, JOURNAL, j] += (1.0 - w) * worn
+        surfaces.depth[k, JOURNAL, after] += w * worn
+        i, j = _beside(i, 1, n), after
 
 
 def worn_volume(contacts: ContactArrays, surfaces: Surfaces) -> Floats:

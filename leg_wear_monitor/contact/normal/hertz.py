@@ -1,38 +1,43 @@
 """Hertz's force K delta^1.5, the elastic part of most laws (physics.md section 4)."""
 
-import math
-
 from leg_wear_monitor.contact.normal.form import Form
 from leg_wear_monitor.contact.normal.hysteresis import with_hysteresis
 from leg_wear_monitor.kernel import kernel
+from leg_wear_monitor.vectors import largest, root, where
 
 _EXPONENT = 1.5
+_LEAST = 1.0e-300  # m or m^3: the reciprocal is finite
 
 
 @kernel
 def contact_stiffness(modulus, bushing_radius, journal_radius):
     """Hertz stiffness K [N/m^1.5] of a journal in a bushing: modulus sqrt(R_b R_j / (R_b - R_j)); Pa, m.
 
-    physics.md section 4.
+    For numbers or vectors. physics.md section 4.
     """
-    return modulus * math.sqrt(bushing_radius * journal_radius / (bushing_radius - journal_radius))
+    clearance = largest(bushing_radius - journal_radius, _LEAST)
+    return modulus * root(bushing_radius * journal_radius / clearance)
 
 
 @kernel
-def _coefficient(given, modulus, width, bushing, journal):
-    """Contact stiffness K [N/m^1.5]: the given one if above 0, else that of the radii [m]."""
-    return given if given > 0.0 else contact_stiffness(modulus, bushing, journal)
+def hertz_coefficient(given, modulus, width, bushing, journal):
+    """Contact stiffness K [N/m^1.5]: the given one if above 0, else that of the radii [m].
+
+    For numbers or vectors.
+    """
+    return where(given > 0.0, given, contact_stiffness(modulus, bushing, journal))
 
 
 @kernel
 def elastic_force(stiffness, delta):
-    """Elastic part of the force, K delta^1.5 [N]; 0 when apart."""
-    return stiffness * delta * math.sqrt(delta) if delta > 0.0 else 0.0
+    """Elastic part of the force, K delta^1.5 [N]; 0 when apart. For numbers or vectors."""
+    inside = largest(delta, 0.0)
+    return stiffness * inside * root(inside)
 
 
 @kernel
-def _force(stiffness, clearance, loss, delta, delta_dot):
-    """As `Form.force`."""
+def hertz_force(stiffness, clearance, loss, delta, delta_dot):
+    """As `Form.force`, for numbers or vectors."""
     return with_hysteresis(elastic_force(stiffness, delta), _EXPONENT, loss, delta, delta_dot)
 
 
@@ -43,12 +48,11 @@ def _energy(stiffness, clearance, delta):
 
 
 @kernel
-def _softening(given, delta, bushing, journal, slope_b, slope_j):
-    """As `Form.softening`: -2/5 delta d ln K, with K that of the local radii."""
-    if given > 0.0:
-        return 0.0, 0.0
-    softer = 0.2 * delta / ((bushing - journal) * bushing * journal)
+def hertz_softening(given, delta, bushing, journal, slope_b, slope_j):
+    """As `Form.softening`, for numbers or vectors: -2/5 delta d ln K, with K that of the local radii."""
+    softer = 0.2 * delta / largest((bushing - journal) * bushing * journal, _LEAST)
+    softer = where(given > 0.0, 0.0, softer)
     return softer * slope_b * journal * journal, softer * slope_j * bushing * bushing
 
 
-HERTZ = Form(_coefficient, _force, _energy, _softening, takes_stiffness=True)
+HERTZ = Form(hertz_coefficient, hertz_force, _energy, hertz_softening, takes_stiffness=True)

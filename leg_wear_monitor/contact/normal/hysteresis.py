@@ -6,6 +6,9 @@ The factors chi by the nominal coefficient of restitution, and the restitution t
 import math
 
 from leg_wear_monitor.kernel import kernel
+from leg_wear_monitor.vectors import largest, where
+
+_LEAST = 1.0e-300  # m: the reciprocal is finite
 
 
 def no_loss(restitution: float) -> float:
@@ -42,18 +45,17 @@ def hu_guo(restitution: float) -> float:
 def with_hysteresis(elastic, exponent, loss, delta, delta_dot):
     """Normal force with damping in proportion to its elastic part [N]; never negative: no adhesion.
 
-    ``exponent`` [-] is that of the elastic part at delta [m], d ln F / d ln delta; ``loss`` [s/m] is chi over
-    the approach speed.
+    For numbers or vectors; ``exponent`` [-] is that of the elastic part at delta [m], d ln F / d ln delta;
+    ``loss`` [s/m] is chi over the approach speed.
 
     Returns
     -------
     f_n, stiffness, damping, elastic
         Force [N], its derivatives by delta [N/m] and by delta_dot [N s/m], and its elastic part [N].
     """
-    f_n = max(0.0, elastic * (1.0 + loss * delta_dot))
-    if f_n > 0.0:
-        return f_n, exponent * f_n / delta, elastic * loss, elastic
-    return 0.0, 0.0, 0.0, elastic
+    f_n = largest(elastic * (1.0 + loss * delta_dot), 0.0)
+    stiffness = exponent * f_n / largest(delta, _LEAST)
+    return f_n, stiffness, where(f_n > 0.0, elastic * loss, 0.0), elastic
 
 
 def delivered_restitution(hysteresis: float) -> float:

@@ -49,7 +49,8 @@ from leg_wear_monitor.dynamics.run.run_statistics import (
     TORQUE_SQUARED,
     bin_of,
 )
-from leg_wear_monitor.kernel import ByAddress, copy_array, entry, kernel
+from leg_wear_monitor.kernel import ByAddress, entry, kernel
+from leg_wear_monitor.vectors import WIDTH, copy_array, put_vector, vector_at
 from leg_wear_monitor.wear.surfaces import Surfaces
 
 RENEWAL = 2  # intervals between two evaluations of the ideal joints' reactions, which change slowly
@@ -100,24 +101,36 @@ ADVANCE = ByAddress(advance_clearances, types.UniTuple(types.int64, 2))
 def _interval(model, surfaces, state, polynomial, statistics, work):
     """Advance by one interval, in parts where the linkage moves fast; returns status and joint."""
     i, _ = blend(model.tables.parts.shape[0], state.drive[ANGLE])
-    parts = model.tables.parts[i]
+    parts, status, k = model.tables.parts[i], DONE, -1
     for part in range(parts):
         begin, end = state.intervals[0] + part / parts, state.intervals[0] + (part + 1.0) / parts
         status, k = _part(
             model, surfaces, state, polynomial, begin * model.interval, end * model.interval, statistics, work
         )
         if status != DONE:
-            return status, k
-    state.intervals[0] += 1.0
-    _finish(model, surfaces, state, statistics, work)
-    return DONE, -1
+            break
+    _add_sums(model.contacts.joint, work.sums, statistics)
+    if status == DONE:
+        state.intervals[0] += 1.0
+        _finish(model, surfaces, state, statistics, work)
+    return status, k
+
+
+@kernel
+def _add_sums(joint, sums, statistics):
+    """Add the integrals of an interval (JOINT_RATES, room) to the run statistics, and set them to 0."""
+    for k in range(joint.shape[0]):
+        for r in range(JOINT_RATES):
+            statistics.integral[joint[k], r] += sums[r, k]
+            sums[r, k] = 0.0
 
 
 @kernel
 def _part(model, surfaces, state, polynomial, begin, end, statistics, work):
     """Advance by a part of an interval, from begin to end [s], with the tables of its middle."""
     length = end - begin
-    copy_array(state.drive, work.crank)
+    for i in range(work.crank.shape[0]):
+        work.crank[i] = state.drive[i]
     drive_at(polynomial, end, state.drive)
     angle, speed, acceleration = crank_between(work.crank, state.drive, length)
     if not (abs(speed) < _FASTEST and abs(acceleration) * length < _FASTEST):
@@ -165,11 +178,18 @@ def _steps(model, surfaces, state, begin, length, statistics, work):
         if pushed >= 0:
             return PUSHED_THROUGH, pushed
         if cut == NEVER:
-            state.step[0] = h * min(growth, 0.9 * max(error, 1.0e-6) ** (-1.0 / 3.0))
+            state.step[0] = h * _next_over(error, growth)
         cut, growth = NEVER, _FASTEST_GROWTH
         _accept(model, surfaces, state, begin + done, h, turned, statistics, work)
         done = length if h >= left * (1.0 - 1.0e-9) else done + h
     return DONE, -1
+
+
+@kernel
+def _next_over(error, growth):
+    """Length of the next step over that of this one, which has a local error relative to the tolerance."""
+    # the power is needed in half of the steps only, and takes as long as the forces of all joints
+    return growth if error * growth**3 <= 0.9**3 else 0.9 * error ** (-1.0 / 3.0)
 
 
 @kernel
@@ -180,12 +200,12 @@ def _accept(model, surfaces, state, t, h, turned, statistics, work):
     """
     x, now, start, end, contacts = work.x, work.now, work.start, work.end, model.contacts
     statistics.steps[1] += 1
-    integrate_joints(model.law, state.approach, h, start, end, work.added)
+    integrate_joints(model, state.approach, h, start, end, work.added)
     integrate_films(model.film.settings, contacts.joint, h, start, end, work.added, statistics.peak)
     gather_wear(work.added, start, end, state.pending)
-    for k in range(work.added.shape[0]):
+    for k in range(0, work.added.shape[1], WIDTH):
         for r in range(JOINT_RATES):
-            statistics.integral[contacts.joint[k], r] += work.added[k, r]
+            put_vector(work.sums, (r, k), vector_at(work.sums, (r, k)) + vector_at(work.added, (r, k)))
     update_contacts(
         contacts.joint, contacts.speed_floor, t, h, start, end,
         state.approach, state.recent, statistics.peak, statistics.impact, statistics.impacts,
@@ -202,7 +222,8 @@ def _accept(model, surfaces, state, t, h, turned, statistics, work):
     statistics.drive_integral[TORQUE] += impulse
     statistics.drive_integral[TORQUE_SQUARED] += 0.5 * h * (first[WHOLE] ** 2 + last[WHOLE] ** 2)
     statistics.drive_integral[POWER] += impulse * now.speed[0] + 0.5 * h * (first[OUTSIDE] + last[OUTSIDE])
-    copy_array(last, first)
+    for i in range(last.shape[0]):
+        first[i] = last[i]
 
 
 @kernel
@@ -228,7 +249,7 @@ def _finish(model, surfaces, state, statistics, work):
             statistics.worn_energy[0] += deposit_pending(
                 model.contacts, surfaces, k, sample, now, here, amid, state.pending, work.weight
             )
-        force = math.sqrt(sample[k, F_N] ** 2 + sample[k, F_T] ** 2)
+        force = math.sqrt(sample[F_N, k] ** 2 + sample[F_T, k] ** 2)
         if model.film.settings.shape[0] > 0:
             force = total_force(k, sample)
         statistics.force_time[joint[k], bin_of(force)] += interval
@@ -265,11 +286,11 @@ def observe(model, feeds_back, state, work):
     copy_array(state.motion, work.backup)
     angle, speed = state.drive[ANGLE], state.drive[SPEED]
     load_state(model, surfaces, state, angle, speed, state.drive[ACCELERATION], 0.0, work)
-    accelerate_clearances(model, surfaces, state.approach, now, 0.0, x, E0, V0, A0, work.start)
+    accelerate_clearances(model, surfaces, state.approach, now, 0.0, x, E0, V0, A0, work.start, True)
     copy_array(work.backup, state.motion)
     reactions(model.tables, angle, now, x, work.start, work.by, work.reaction)
     work.reaction[0] = drive_torque(now, x, work.start)[0]
-    d = x.shape[1]
+    d = state.e.shape[0]
     for i in range(2):
         work.toe[i] = now.toe[i, 0]
         for j in range(d):

@@ -11,6 +11,7 @@ from leg_wear_monitor.beside import compiled_beside
 from leg_wear_monitor.contact.arrays import ContactArrays
 from leg_wear_monitor.dynamics.clearance.advance import advance_clearances, observe
 from leg_wear_monitor.dynamics.clearance.film_system import film_model
+from leg_wear_monitor.dynamics.clearance.joint_laws import contact_laws
 from leg_wear_monitor.dynamics.clearance.layout import motion_shapes
 from leg_wear_monitor.dynamics.clearance.model import (
     ClearanceModel,
@@ -29,7 +30,7 @@ def _contacts() -> ContactArrays:
     whole, line, pair = np.zeros(1, np.int64), np.zeros(1), np.zeros((1, 2))
     return ContactArrays(
         joint=whole, bushing_radius=line, clearance=line, width=line, modulus=line, normal_form=whole,
-        stiffness=line, hysteresis=line, speed_floor=line, friction_law=whole, friction=pair,
+        stiffness=line, hysteresis=line, speed_floor=line, friction_law=whole, friction=np.zeros((1, 3)),
         wear_coefficient=pair,
     )  # fmt: skip
 
@@ -43,8 +44,8 @@ def _tables() -> ClearanceTables:
         reaction_joint=np.zeros(1, np.int64),
         stored=np.zeros((1, 1)),
         parts=np.zeros(1, np.int64),
-        by_e=np.zeros((1, 1, 1), np.float32),
-        bend=np.zeros((1, 1, 1), np.float32),
+        by_e=np.zeros((1, 1, 1, 1), np.float32),
+        bend=np.zeros((1, 1, 1, 1), np.float32),
         spin=np.zeros((1, 1, 1, 1), np.float32),
         spin_reaction=np.zeros((1, 1, 1), np.float32),
     )
@@ -55,7 +56,7 @@ def _leg() -> tuple[ClearanceModel, ClearanceState, ClearanceWork]:
     contacts, line = _contacts(), np.zeros(2)
     film = film_model(contacts, np.zeros((1, 2)))
     model = ClearanceModel(
-        contacts, _tables(), 1.0, tolerance=line, law=np.zeros((1, 1)), film=film, damped=0
+        contacts, _tables(), 1.0, tolerance=line, law=contact_laws(contacts), usual=1, film=film, damped=0
     )
     state = clearance_state(np.zeros((1, 2, 1)), 0.0, 1.0)
     return model, state, clearance_work(model, state)

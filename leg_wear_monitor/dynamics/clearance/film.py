@@ -53,7 +53,7 @@ def add_films(settings, spin, spin_turn, response, inverse_mass, crank_speed, x,
     ``spin`` (2 k, d), ``spin_turn`` (2 k,), ``response`` (2 k, d): of the step tables; rates of the
     eccentricities [m/s] in row at_v. The film is that of the local clearance. Returns the number of joints.
     """
-    d = x.shape[1]
+    d = inverse_mass.shape[0]
     for k in range(settings.shape[0]):
         if settings[k, VISCOSITY] > 0.0:
             b, j = 2 * k, 2 * k + 1
@@ -61,18 +61,18 @@ def add_films(settings, spin, spin_turn, response, inverse_mass, crank_speed, x,
             for i in range(d):
                 speed_b += spin[b, i] * x[at_v, i]
                 speed_j += spin[j, i] * x[at_v, i]
-            ex, ey = out_sample[k, EX], out_sample[k, EY]
-            clearance = math.sqrt(ex * ex + ey * ey) - out_sample[k, DELTA]
+            ex, ey = out_sample[EX, k], out_sample[EY, k]
+            clearance = math.sqrt(ex * ex + ey * ey) - out_sample[DELTA, k]
             fx, fy, moment_b, moment_j = film_force(
-                ex, ey, out_sample[k, VX], out_sample[k, VY], speed_b, speed_j, clearance,
+                ex, ey, out_sample[VX, k], out_sample[VY, k], speed_b, speed_j, clearance,
                 settings[k, RADIUS], settings[k, WIDTH], settings[k, VISCOSITY], settings[k, ROUGHNESS],
             )  # fmt: skip
             for i in range(d):
                 x[out_a, i] += inverse_mass[b, i] * fx + inverse_mass[j, i] * fy
                 x[out_a, i] += response[b, i] * moment_b + response[j, i] * moment_j
-            out_sample[k, FILM_X], out_sample[k, FILM_Y] = fx, fy
-            out_sample[k, MOMENT_B], out_sample[k, MOMENT_J] = moment_b, moment_j
-            out_sample[k, SPEED_B], out_sample[k, SPEED_J] = speed_b, speed_j
+            out_sample[FILM_X, k], out_sample[FILM_Y, k] = fx, fy
+            out_sample[MOMENT_B, k], out_sample[MOMENT_J, k] = moment_b, moment_j
+            out_sample[SPEED_B, k], out_sample[SPEED_J, k] = speed_b, speed_j
     return settings.shape[0]
 
 

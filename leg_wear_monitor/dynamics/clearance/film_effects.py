@@ -43,7 +43,7 @@ def film_torque(now, sample):
     """Drive torque [N m] that the films' moments need."""
     torque = 0.0
     for r in range(now.spin.shape[0]):
-        torque -= now.spin_turn[r] * sample[r // 2, MOMENT_B + r % 2]
+        torque -= now.spin_turn[r] * sample[MOMENT_B + r % 2, r // 2]
     return torque
 
 
@@ -52,7 +52,7 @@ def add_film_reactions(tables, points, now, sample, out_reaction):
     """Add what the films' moments make of drive torque and reactions (r,); ``points`` as in `load_spins`."""
     table, (i, w) = tables.spin_reaction, points
     for m in range(now.spin.shape[0]):
-        moment = sample[m // 2, MOMENT_B + m % 2]
+        moment = sample[MOMENT_B + m % 2, m // 2]
         for r in range(out_reaction.shape[0]):
             out_reaction[r] += moment * ((1.0 - w) * table[i, m, r] + w * table[i + 1, m, r])
 
@@ -60,22 +60,22 @@ def add_film_reactions(tables, points, now, sample, out_reaction):
 @kernel
 def _power(k, sample):
     """Power [W] that the film of joint k takes from the leg."""
-    power = sample[k, FILM_X] * sample[k, VX] + sample[k, FILM_Y] * sample[k, VY]
-    return -power - sample[k, MOMENT_B] * sample[k, SPEED_B] - sample[k, MOMENT_J] * sample[k, SPEED_J]
+    power = sample[FILM_X, k] * sample[VX, k] + sample[FILM_Y, k] * sample[VY, k]
+    return -power - sample[MOMENT_B, k] * sample[SPEED_B, k] - sample[MOMENT_J, k] * sample[SPEED_J, k]
 
 
 @kernel
 def total_force(k, sample):
     """Force [N] of contact and film together in clearance joint k; without a film, that of the contact."""
-    f_n, f_t = sample[k, F_N], sample[k, F_T]
-    fx = sample[k, FILM_X] - f_n * sample[k, NX] - f_t * sample[k, NY]
-    fy = sample[k, FILM_Y] - f_n * sample[k, NY] + f_t * sample[k, NX]
+    f_n, f_t = sample[F_N, k], sample[F_T, k]
+    fx = sample[FILM_X, k] - f_n * sample[NX, k] - f_t * sample[NY, k]
+    fy = sample[FILM_Y, k] - f_n * sample[NY, k] + f_t * sample[NX, k]
     return math.sqrt(fx * fx + fy * fy)
 
 
 @kernel
 def integrate_films(settings, joint, h, start, end, out_added, out_peak):
-    """Add what films change in the integrals of a step of length h [s]; out_added (k, JOINT_RATES).
+    """Add what films change in the integrals of a step of length h [s]; out_added (ADDED, room).
 
     ``out_peak`` [N]: largest force of each joint of the mechanism.
     """
@@ -83,8 +83,8 @@ def integrate_films(settings, joint, h, start, end, out_added, out_peak):
         if settings[k, VISCOSITY] > 0.0:
             for end_of_step in range(2):
                 sample = end if end_of_step else start
-                total, contact = total_force(k, sample), sample[k, F_N] ** 2 + sample[k, F_T] ** 2
-                out_added[k, FORCE] += 0.5 * h * (total - math.sqrt(contact))
-                out_added[k, FORCE_SQUARED] += 0.5 * h * (total * total - contact)
-                out_added[k, DISSIPATION] += 0.5 * h * _power(k, sample)
+                total, contact = total_force(k, sample), sample[F_N, k] ** 2 + sample[F_T, k] ** 2
+                out_added[FORCE, k] += 0.5 * h * (total - math.sqrt(contact))
+                out_added[FORCE_SQUARED, k] += 0.5 * h * (total * total - contact)
+                out_added[DISSIPATION, k] += 0.5 * h * _power(k, sample)
             out_peak[joint[k]] = max(out_peak[joint[k]], total_force(k, end))

@@ -40,10 +40,10 @@ def _film_block(settings, k, g, slack, sample, out_block, out_stiffness):
     The damping is that of a gap which closes by ``slack`` [m/s] more, the tolerance of the rates. Where the
     gap begins to open the damping falls many times over, and steps with the smaller one would bounce off.
     """
-    ex, ey, vx, vy = sample[k, EX], sample[k, EY], sample[k, VX], sample[k, VY]
-    speed_b, speed_j = sample[k, SPEED_B], sample[k, SPEED_J]
+    ex, ey, vx, vy = sample[EX, k], sample[EY, k], sample[VX, k], sample[VY, k]
+    speed_b, speed_j = sample[SPEED_B, k], sample[SPEED_J, k]
     e = math.sqrt(ex * ex + ey * ey)
-    clearance, radius, width = e - sample[k, DELTA], settings[k, RADIUS], settings[k, WIDTH]
+    clearance, radius, width = e - sample[DELTA, k], settings[k, RADIUS], settings[k, WIDTH]
     viscosity, roughness = settings[k, VISCOSITY], settings[k, ROUGHNESS]
     nx, ny, r = ex / e, ey / e, 2 * k
     xx, xy, yx, yy = film_damping(
@@ -77,21 +77,21 @@ def factorise_films(
     triangular factors (2 k, 2 k). Returns the number of unknowns.
     """
     g, d = GAMMA * h, inverse_mass.shape[0]
-    for k in range(sample.shape[0]):
-        r, nx, ny = 2 * k, sample[k, NX], sample[k, NY]
+    for k in range(settings.shape[0]):
+        r, nx, ny = 2 * k, sample[NX, k], sample[NY, k]
         for i in range(r, r + 2):
             out_cam[i] = 0.0
             for c in range(2):
                 out_block[i, c], out_stiffness[i, c] = 0.0, 0.0
-        if settings[k, VISCOSITY] > 0.0 and sample[k, EX] ** 2 + sample[k, EY] ** 2 > 0.0:
+        if settings[k, VISCOSITY] > 0.0 and sample[EX, k] ** 2 + sample[EY, k] ** 2 > 0.0:
             _film_block(settings, k, g, slack, sample, out_block, out_stiffness)
-        if sample[k, F_N] > 0.0:
-            stiff = g * sample[k, STIFFNESS]
-            hard = g * (sample[k, DAMPING] + stiff)
+        if sample[F_N, k] > 0.0:
+            stiff = g * sample[STIFFNESS, k]
+            hard = g * (sample[DAMPING, k] + stiff)
             _add_block(r, stiff * nx * nx, stiff * nx * ny, stiff * ny * nx, stiff * ny * ny, out_stiffness)
             _add_block(r, hard * nx * nx, hard * nx * ny, hard * ny * nx, hard * ny * ny, out_block)
-            out_cam[r] = stiff * nx * sample[k, CAM] * crank_speed
-            out_cam[r + 1] = stiff * ny * sample[k, CAM] * crank_speed
+            out_cam[r] = stiff * nx * sample[CAM, k] * crank_speed
+            out_cam[r + 1] = stiff * ny * sample[CAM, k] * crank_speed
         for i in range(d):
             for c in range(2):
                 out_matrix[i, r + c] = inverse_mass[r, i] * out_block[r, c]
@@ -110,7 +110,7 @@ def factorise_films(
 @entry
 def solve_films(h, stage, inverse_mass, stiffness, cam, matrix, x, r_e, r_v, out_e, out_v):
     """As `rosenbrock.solve_contacts`, with what `factorise_films` gave."""
-    g, d = GAMMA * h, x.shape[1]
+    g, d = GAMMA * h, matrix.shape[0]
     for i in range(d):
         x[out_v, i] = x[r_v, i]
     for r in range(0, d, 2):

@@ -38,7 +38,7 @@ def motion_shapes(k: int, damped: bool) -> Shapes:
         "torque_a": (d,),
         "torque_v": (2, d),
         "coriolis": (d, d),
-        "lever": (k, d),
+        "lever": (d, k),
         "torque": (4,),
         "torque_e": (3, d),
         "torque_vv": (d, d),

@@ -6,13 +6,16 @@ from typing import NamedTuple
 import numpy as np
 
 from leg_wear_monitor.contact.arrays import ContactArrays
-from leg_wear_monitor.dynamics.clearance.contact import ADDED, COLUMNS, TO_ANGLE, VECTORS
+from leg_wear_monitor.dynamics.clearance.contact import ADDED, VECTORS, fresh_sample
 from leg_wear_monitor.dynamics.clearance.film import FilmModel
 from leg_wear_monitor.dynamics.clearance.layout import motion_shapes, views
 from leg_wear_monitor.dynamics.clearance.rosenbrock import ContactSystem, contact_system
 from leg_wear_monitor.dynamics.clearance.tables import ClearanceTables
+from leg_wear_monitor.dynamics.clearance.worn_walls import TO_ANGLE
+from leg_wear_monitor.dynamics.run.run_statistics import JOINT_RATES
 from leg_wear_monitor.kernel import kernel
 from leg_wear_monitor.mechanism.arrays import Floats
+from leg_wear_monitor.vectors import WIDTH, every, fetch, padded, part_at, put_part, vector_at
 
 ANGLE, SPEED, ACCELERATION = 0, 1, 2
 
@@ -21,8 +24,9 @@ class ClearanceModel(NamedTuple):
     """Constants of a run.
 
     ``interval`` [s]: time between the instants at which the state exists; ``tolerance`` (2,): reciprocals of
-    the local error allowed in a step, of eccentricities [1/m] and of their rates [s/m]; ``law`` (k, 7): of
-    `contact_laws`; ``film``: films of the joints; ``damped``: 1 with dampers, else 0.
+    the local error allowed in a step, of eccentricities [1/m] and of their rates [s/m]; ``law`` (LAW_ROWS,
+    room): of `contact_laws`, ``usual``: 1 if `have_usual_laws`, else 0; ``film``: films of the joints;
+    ``damped``: 1 with dampers, else 0.
     """
 
     contacts: ContactArrays
@@ -30,6 +34,7 @@ class ClearanceModel(NamedTuple):
     interval: float
     tolerance: Floats
     law: Floats
+    usual: int
     film: FilmModel
     damped: int
 
@@ -41,7 +46,7 @@ class ClearanceState(NamedTuple):
     remaining fields are views: ``intervals`` (1,): number of intervals since time 0; ``e`` [m], ``v`` [m/s]
     (d,): eccentricities and rates; ``drive`` (3,): angle [rad], speed and acceleration of the crank; ``step``
     (1,) [s]: next trial step; ``approach`` (k,) [m/s]: approach speed of each joint in contact, 0 for the
-    others; ``recent`` (k, 4): its last two samples of time [s] and normal force [N]; ``pending`` (k, 4):
+    others; ``recent`` (k, 4): its last two samples of time [s] and normal force [N]; ``pending`` (4, k):
     Archard integral that is not yet deposited as wear [J], and the integrals of its product with the
     direction (x, y) [J] and the length [J m] of the eccentricity.
     """
@@ -63,12 +68,13 @@ class StepTables(NamedTuple):
 
     Parts that depend on e are evaluated for the eccentricities in the middle of the part of an interval.
     ``speed`` (2,): speed [rad/s] and acceleration [rad/s^2] of the crank. For these: ``force`` (d,) [N]: on e
-    at rest, without contact; ``bare`` (d,): its acceleration; ``drift`` (d, d): accelerations per e';
-    ``lever_response`` (k, d): accelerations per friction force in each joint; drive torque: ``torque_0`` (1,)
-    [N m] at rest, ``torque_by_v`` (d,) per e', ``torque_by_e`` (d,) per e. ``toward`` (k, 3): reference
-    directions of the eccentricities at the start of the interval. For the moments of films, of both bodies of
-    each joint: ``spin`` (d, d): their rates per e', ``spin_turn`` (d,): per crank speed; ``spin_response``
-    (d, d): accelerations per moment.
+    at rest, without contact; ``bare`` (d,): its acceleration; ``drift`` (d, d): accelerations per e',
+    ``drift_line`` (d d,): the same entries, as ``coriolis_line``, ``angle_line`` and ``turn_line`` those of
+    ``coriolis``, ``angle`` and ``turn``; ``moment`` (k, d): forces on e per friction force in each joint,
+    ``lever`` transposed; drive torque: ``torque_0`` (1,) [N m] at rest, ``torque_by_v`` (d,) per e',
+    ``torque_by_e`` (d,) per e. ``toward`` (3, k): reference directions of the eccentricities at the start of
+    the interval. For the moments of films, of both bodies of each joint: ``spin`` (d, d): their rates per e',
+    ``spin_turn`` (d,): per crank speed; ``spin_response`` (d, d): accelerations per moment.
     """
 
     row: Floats
@@ -76,7 +82,11 @@ class StepTables(NamedTuple):
     force: Floats
     bare: Floats
     drift: Floats
-    lever_response: Floats
+    drift_line: Floats
+    coriolis_line: Floats
+    angle_line: Floats
+    turn_line: Floats
+    moment: Floats
     torque_0: Floats
     torque_by_v: Floats
     torque_by_e: Floats
@@ -105,14 +115,13 @@ class StepTables(NamedTuple):
 class ClearanceWork(NamedTuple):
     """Work arrays of an interval.
 
-    ``now``: step tables; ``system``: contact system; ``start``, ``end`` (k, COLUMNS): samples of the joints
-    at a step's start and end; ``x`` (VECTORS, d): vectors of a step; ``weight`` (N,): of the wear on an arc;
-    ``by``
-    (c,): factors of the reactions' table; ``reaction`` (r,), ``toe`` (2,): observed values; ``added``
-    (k, ADDED): increments of the joints' integrals in a step; ``drive_start``, ``drive_end`` (3,): of
-    the drive at its ends; ``backup`` (s,): state to restore after a failed interval, except ``pending`` (k,
-    4);
-    ``crank`` (3,): drive at the start of the interval.
+    ``now``: step tables; ``system``: contact system; ``start``, ``end`` (COLUMNS, room): samples of the
+    joints at a step's start and end; ``x`` (VECTORS, 2 room): vectors of a step; ``weight`` (N,): of the wear
+    on an arc; ``by`` (c,): factors of the reactions' table; ``reaction`` (r,), ``toe`` (2,): observed values;
+    ``added`` (ADDED, room): increments of the joints' integrals in a step, ``sums`` (JOINT_RATES, room): in
+    an interval; ``drive_start``, ``drive_end`` (3,): of the drive at its ends; ``backup`` (s,): state to
+    restore after a failed interval, except ``pending`` (4, k); ``crank`` (3,): drive at the start of the
+    interval.
     """
 
     now: StepTables
@@ -125,6 +134,7 @@ class ClearanceWork(NamedTuple):
     reaction: Floats
     toe: Floats
     added: Floats
+    sums: Floats
     drive_start: Floats
     drive_end: Floats
     backup: Floats
@@ -136,7 +146,7 @@ def state_shapes(k: int) -> dict[str, tuple[int, ...]]:
     """Shapes of the parts of ``ClearanceState.motion`` in their order, for k clearance joints."""
     return {
         "intervals": (1,), "e": (2 * k,), "v": (2 * k,), "drive": (3,), "step": (1,),
-        "approach": (k,), "recent": (k, 4), "pending": (k, 4),
+        "approach": (k,), "recent": (k, 4), "pending": (4, k),
     }  # fmt: skip
 
 
@@ -165,17 +175,22 @@ def clearance_work(model: ClearanceModel, state: ClearanceState) -> ClearanceWor
     films = 2 * len(model.film.settings)
     row = np.zeros(model.tables.motion.shape[1])
     parts = views(row, motion_shapes(clearance_joints, model.damped > 0))
+    drift = np.zeros((d, d))
     now = StepTables(
         row=row,
         speed=np.zeros(2),
         force=np.zeros(d),
         bare=np.zeros(d),
-        drift=np.zeros((d, d)),
-        lever_response=np.zeros((clearance_joints, d)),
+        drift=drift,
+        drift_line=drift.reshape(-1),
+        coriolis_line=parts["coriolis"].reshape(-1),
+        moment=np.zeros((clearance_joints, d)),
         torque_0=np.zeros(1),
         torque_by_v=np.zeros(d),
         torque_by_e=np.zeros(d),
-        toward=np.zeros((clearance_joints, TO_ANGLE + 1)),
+        toward=np.zeros((TO_ANGLE + 1, clearance_joints)),
+        angle_line=parts["angle"].reshape(-1),
+        turn_line=parts["turn"].reshape(-1),
         spin=np.zeros((films, d)),
         spin_turn=np.zeros(films),
         spin_response=np.zeros((films, d)),
@@ -184,14 +199,15 @@ def clearance_work(model: ClearanceModel, state: ClearanceState) -> ClearanceWor
     return ClearanceWork(
         now=now,
         system=contact_system(clearance_joints),
-        start=np.zeros((clearance_joints, COLUMNS)),
-        end=np.zeros((clearance_joints, COLUMNS)),
-        x=np.zeros((VECTORS, d)),
+        start=fresh_sample(model.law),
+        end=fresh_sample(model.law),
+        x=np.zeros((VECTORS, 2 * padded(clearance_joints))),
         weight=np.zeros(state.depth.shape[2]),
         by=np.zeros(model.tables.reaction.shape[1]),
         reaction=np.zeros(len(model.tables.reaction_joint)),
         toe=np.zeros(2),
-        added=np.zeros((clearance_joints, ADDED)),
+        added=np.zeros((ADDED, padded(clearance_joints))),
+        sums=np.zeros((JOINT_RATES, padded(clearance_joints))),
         drive_start=np.zeros(3),
         drive_end=np.zeros(3),
         backup=np.zeros_like(state.motion),
@@ -214,8 +230,9 @@ def take_tables(tables, angle, speed, acceleration, out_step_tables):
     """Interpolate the step tables at a crank angle [rad]; speed [rad/s] and acceleration [rad/s^2]."""
     motion, row = tables.motion, out_step_tables.row
     i, w = blend(motion.shape[0] - 1, angle)
-    for j in range(row.shape[0]):
-        row[j] = motion[i, j] + w * (motion[i + 1, j] - motion[i, j])
+    for j in range(0, row.shape[0], WIDTH):
+        before = part_at(motion, (i, j))
+        put_part(row, j, before + w * (part_at(motion, (i + 1, j)) - before))
     out_step_tables.speed[0], out_step_tables.speed[1] = speed, acceleration
 
 
@@ -236,32 +253,56 @@ def hold_eccentricities(tables, angle, e, v, ahead, now):
         now.torque_by_v[i] = speed * now.torque_v[0, i] + now.torque_v[1, i]
         now.torque_by_e[i] = by_e[0, i] + acceleration * by_e[1, i] + square * by_e[2, i]
         now.bare[i] = speed * now.viscous[i, d] if now.viscous.shape[0] > 0 else 0.0
-        for k in range(now.lever.shape[0]):
-            now.lever_response[k, i] = 0.0
+    for i in range(0, d, WIDTH):
+        bare = part_at(now.bare, i)
+        for j in range(d):
+            bare += force[j] * part_at(now.inverse_mass, (j, i))
+        put_part(now.bare, i, bare)
     for j in range(d):
-        for i in range(d):
-            now.bare[i] += now.inverse_mass[j, i] * force[j]
-        for k in range(now.lever.shape[0]):
-            for i in range(d):
-                now.lever_response[k, i] += now.inverse_mass[j, i] * now.lever[k, j]
+        for k in range(now.lever.shape[1]):
+            now.moment[k, j] = now.lever[j, k]
 
 
 @kernel
 def _follow_eccentricities(tables, angle, e, v, ahead, now):
     """Add the first order of e + ahead v to the tables, and the terms bilinear in e' to ``drift``."""
     by_e, bend, row, speed = tables.by_e, tables.bend, now.row, now.speed[0]
-    drift, coriolis = now.drift.reshape(-1), now.coriolis.reshape(-1)
+    drift, coriolis = now.drift_line, now.coriolis_line
     n, w = blend(by_e.shape[0] - 1, angle)
-    for i in range(drift.shape[0]):
-        drift[i] = speed * coriolis[i]
-    for j in range(e.shape[0]):
-        middle, rate = e[j] + ahead * v[j], v[j]
-        before, after = (1.0 - w) * middle, w * middle
-        for i in range(by_e.shape[2]):
-            row[i] += before * by_e[n, j, i] + after * by_e[n + 1, j, i]
-        before, after = (1.0 - w) * rate, w * rate
-        for i in range(drift.shape[0]):
-            drift[i] -= before * bend[n, j, i] + after * bend[n + 1, j, i]
+    for block in range(by_e.shape[1]):
+        before, after, i = every(0.0), every(0.0), WIDTH * block
+        for j in range(e.shape[0]):
+            middle = e[j] + ahead * v[j]
+            before += middle * vector_at(by_e, (n, block, j, 0))
+            after += middle * vector_at(by_e, (n + 1, block, j, 0))
+        put_part(row, i, part_at(row, i) + ((1.0 - w) * before + w * after))
+    for block in range(bend.shape[1]):
+        before, after, i = every(0.0), every(0.0), WIDTH * block
+        for j in range(e.shape[0]):
+            before += v[j] * vector_at(bend, (n, block, j, 0))
+            after += v[j] * vector_at(bend, (n + 1, block, j, 0))
+        put_part(drift, i, speed * part_at(coriolis, i) - ((1.0 - w) * before + w * after))
+
+
+@kernel
+def fetch_tables(tables, angle, speed):
+    """Have the memory bring the rows that the next intervals need, while this one is computed."""
+    motion, by_e, bend = tables.motion, tables.by_e, tables.bend
+    ahead = 2 if speed > 0.0 else -1
+    i, w = blend(motion.shape[0] - 1, angle)
+    if (w < 0.5) == (speed > 0.0):  # the first of two intervals between two rows, at the usual length
+        i = (i + ahead) % motion.shape[0]
+        for j in range(0, motion.shape[1], WIDTH):
+            fetch(motion, (i, j))
+    i, w = blend(by_e.shape[0] - 1, angle)
+    if (w < 0.25 and speed > 0.0) or (w > 0.75 and speed <= 0.0):  # the first of four
+        i = (i + ahead) % by_e.shape[0]
+        for block in range(by_e.shape[1]):
+            for j in range(0, by_e.shape[2], 2):
+                fetch(by_e, (i, block, j, 0))
+        for block in range(bend.shape[1]):
+            for j in range(0, bend.shape[2], 2):
+                fetch(bend, (i, block, j, 0))
 
 
 @kernel

@@ -7,7 +7,8 @@ the normals of the contacts, the system in d unknowns reduces to one with a sing
 
     (D^-1 + N^T B) p = N^T r_v + gamma h D^-1 K N^T r_e,    D = gamma h C + (gamma h)^2 K,
 
-and x_v = r_v - B p, x_e = r_e + gamma h x_v solve (I - gamma h A) x = r.
+and x_v = r_v - B p, x_e = r_e + gamma h x_v solve (I - gamma h A) x = r. The same steps that eliminate D^-1 +
+N^T B turn B into T = B (D^-1 + N^T B)^-1, with which each of the three solutions of a step is a product.
 """
 
 import math
@@ -19,27 +20,30 @@ from leg_wear_monitor.dynamics.clearance.contact import CAM, DAMPING, NX, NY, ST
 from leg_wear_monitor.dynamics.joint.contact_event import F_N
 from leg_wear_monitor.kernel import kernel
 from leg_wear_monitor.mechanism.arrays import Floats, Ints
-from leg_wear_monitor.pairs import pair_at, put_pair
+from leg_wear_monitor.vectors import WIDTH, evens, odds, only, padded, part_at, put_vector, vector_at, where
 
 GAMMA = 1.0 - math.sqrt(0.5)
 
 
 class ContactSystem(NamedTuple):
-    """The factored system of m contacts in k clearance joints; the first m rows of each array are used.
+    """The reduced system of m contacts in k clearance joints; rooms are multiples of `WIDTH`.
 
-    ``active`` (k,): the contacts' joints; ``normal`` (k, 2); ``response`` (k, d): B^T; ``factor`` (k, k): L,
-    with 1 / D of L D L^T on its diagonal; ``ratio`` (k,): gamma h K / D; ``cam`` (k,) [m/s]: part of the
-    penetration's rate that does not depend on e'; ``p`` (k,): unknowns. With films, of `film_system`:
-    ``block``, ``stiff`` (d, 2), ``push`` (d,), ``matrix`` (d, d).
+    ``active`` (k,): joints of the m contacts; ``normal`` (2, room): x, then y of the normals, 0 without
+    contact; ``ratio`` (room,): gamma h K / D; ``cam`` (room,) [m/s]: part of the penetration's rate that does
+    not depend on e'; ``compliance`` (room,): 1 / D; ``rows`` (k, 3 room), one for each contact: of
+    D^-1 + N^T B by joints (room) and of B^T (2 room), then of the unit matrix and of T^T; ``factor`` (k,): of
+    the rows in an elimination; ``right`` (room,): right-hand side. With films, of `film_system`: ``block``,
+    ``stiff`` (d, 2), ``push`` (d,), ``matrix`` (d, d).
     """
 
     active: Ints
     normal: Floats
-    response: Floats
-    factor: Floats
     ratio: Floats
     cam: Floats
-    p: Floats
+    compliance: Floats
+    rows: Floats
+    factor: Floats
+    right: Floats
     block: Floats
     stiff: Floats
     push: Floats
@@ -48,14 +52,16 @@ class ContactSystem(NamedTuple):
 
 def contact_system(k: int) -> ContactSystem:
     """Work arrays of the system for k clearance joints."""
+    room = padded(k)
     return ContactSystem(
         active=np.zeros(k, dtype=np.int64),
-        normal=np.zeros((k, 2)),
-        response=np.zeros((k, 2 * k)),
-        factor=np.zeros((k, k)),
-        ratio=np.zeros(k),
-        cam=np.zeros(k),
-        p=np.zeros(k),
+        normal=np.zeros((2, room)),
+        ratio=np.zeros(room),
+        cam=np.zeros(room),
+        compliance=np.zeros(room),
+        rows=np.zeros((k, 3 * room)),
+        factor=np.zeros(k),
+        right=np.zeros(room),
         block=np.zeros((2 * k, 2)),
         stiff=np.zeros((2 * k, 2)),
         push=np.zeros(2 * k),
@@ -65,62 +71,78 @@ def contact_system(k: int) -> ContactSystem:
 
 @kernel
 def factorise_contacts(h, inverse_mass, speed, sample, out_system):
-    """Factorise the system of a step h [s] from a sample (k, COLUMNS); returns the number m of contacts."""
-    m, g = 0, GAMMA * h
-    response, factor = out_system.response, out_system.factor
-    for k in range(sample.shape[0]):
-        if sample[k, F_N] > 0.0:
-            stiffness, nx, ny, row = sample[k, STIFFNESS], sample[k, NX], sample[k, NY], 2 * k
-            compliance = 1.0 / (g * (sample[k, DAMPING] + g * stiffness))
-            out_system.ratio[m] = g * stiffness * compliance
-            out_system.active[m] = k
-            out_system.cam[m] = sample[k, CAM] * speed
-            out_system.normal[m, 0], out_system.normal[m, 1] = nx, ny
-            for i in range(0, inverse_mass.shape[0], 2):
-                pushed = nx * pair_at(inverse_mass, row, i) + ny * pair_at(inverse_mass, row + 1, i)
-                put_pair(response, m, i, pushed)
-            for a in range(m + 1):
-                factor[m, a] = nx * response[a, row] + ny * response[a, row + 1]
-            factor[m, m] += compliance
+    """Eliminate the system of a step h [s] from a sample (COLUMNS, room); returns the number of contacts."""
+    m, g, active = 0, GAMMA * h, out_system.active
+    for k in range(0, sample.shape[1], WIDTH):
+        pushing = vector_at(sample, (F_N, k)) > 0.0
+        stiffness = vector_at(sample, (STIFFNESS, k))
+        damping = g * (vector_at(sample, (DAMPING, k)) + g * stiffness)
+        compliance = 1.0 / where(pushing, damping, 1.0)
+        put_vector(out_system.compliance, k, compliance)
+        put_vector(out_system.ratio, k, g * stiffness * compliance)
+        put_vector(out_system.cam, k, vector_at(sample, (CAM, k)) * speed)
+        put_vector(out_system.normal, (0, k), where(pushing, vector_at(sample, (NX, k)), 0.0))
+        put_vector(out_system.normal, (1, k), where(pushing, vector_at(sample, (NY, k)), 0.0))
+    for k in range(active.shape[0]):
+        if sample[F_N, k] > 0.0:
+            active[m] = k
             m += 1
-    for i in range(m):
-        for j in range(i):
-            rest = factor[i, j]
-            for c in range(j):
-                rest -= factor[i, c] * factor[j, c]
-            factor[i, j] = rest
-        pivot = factor[i, i]
-        for c in range(i):
-            scaled = factor[i, c] * factor[c, c]
-            pivot -= scaled * factor[i, c]
-            factor[i, c] = scaled
-        factor[i, i] = 1.0 / pivot
+    for a in range(m):
+        _couple(a, inverse_mass, sample, out_system)
+    for c in range(m):
+        _eliminate(c, m, inverse_mass.shape[0], out_system)
     return m
 
 
 @kernel
+def _couple(a, inverse_mass, sample, out_system):
+    """Row of contact a in D^-1 + N^T B and in B^T."""
+    k, rows, normal = out_system.active[a], out_system.rows, out_system.normal
+    room, nx, ny = normal.shape[1], sample[NX, k], sample[NY, k]
+    for i in range(0, inverse_mass.shape[0], WIDTH):
+        pushed = nx * part_at(inverse_mass, (2 * k, i)) + ny * part_at(inverse_mass, (2 * k + 1, i))
+        put_vector(rows, (a, room + i), pushed)
+    for b in range(0, room, WIDTH):
+        first, second = vector_at(rows, (a, room + 2 * b)), vector_at(rows, (a, room + 2 * b + WIDTH))
+        along = vector_at(normal, (0, b)) * evens(first, second)
+        along += vector_at(normal, (1, b)) * odds(first, second)
+        put_vector(rows, (a, b), along + only(out_system.compliance[k], k - b))
+
+
+@kernel
+def _eliminate(c, m, d, out_system):
+    """Make the column of contact c one of the unit matrix: a step of Gauss and Jordan's, in all m rows."""
+    rows, factor, joint = out_system.rows, out_system.factor, out_system.active[c]
+    scale = 1.0 / rows[c, joint]
+    for a in range(m):
+        factor[a] = rows[a, joint]
+    factor[c] = 0.0
+    for i in range(0, rows.shape[1] // 3 + d, WIDTH):
+        pivot = scale * vector_at(rows, (c, i))
+        for a in range(m):
+            put_vector(rows, (a, i), vector_at(rows, (a, i)) - factor[a] * pivot)
+        put_vector(rows, (c, i), pivot)
+
+
+@kernel
 def solve_contacts(h, system, m, stage, x, r_e, r_v, out_e, out_v):
-    """Solve (I - gamma h A) y = r: rows r_e and r_v of x (VECTORS, d) contain r, rows out_e and out_v get y.
+    """Solve (I - gamma h A) y = r: rows r_e and r_v of x contain r, rows out_e and out_v get y.
 
     ``stage`` is the coefficient of the explicit time derivative: 1 in the first stage, -1 in the second (1
     minus twice the first), 0 for the error.
     """
-    g, p, factor, response = GAMMA * h, system.p, system.factor, system.response
-    for a in range(m):
-        nx, ny, i = system.normal[a, 0], system.normal[a, 1], 2 * system.active[a]
-        right = nx * x[r_v, i] + ny * x[r_v, i + 1]
-        right += system.ratio[a] * (nx * x[r_e, i] + ny * x[r_e, i + 1] + stage * system.cam[a])
-        for b in range(a):
-            right -= factor[a, b] * p[b]
-        p[a] = right
-    for a in range(m - 1, -1, -1):
-        right = p[a] * factor[a, a]
-        for b in range(a + 1, m):
-            right -= factor[b, a] * p[b]
-        p[a] = right
-    for i in range(0, x.shape[1], 2):
-        total = pair_at(x, r_v, i)
+    g, right, normal, rows = GAMMA * h, system.right, system.normal, system.rows
+    if m > 0:
+        for k in range(0, right.shape[0], WIDTH):
+            first, second = vector_at(x, (r_v, 2 * k)), vector_at(x, (r_v, 2 * k + WIDTH))
+            nx, ny = vector_at(normal, (0, k)), vector_at(normal, (1, k))
+            rate = nx * evens(first, second) + ny * odds(first, second)
+            first, second = vector_at(x, (r_e, 2 * k)), vector_at(x, (r_e, 2 * k + WIDTH))
+            along = nx * evens(first, second) + ny * odds(first, second) + stage * vector_at(system.cam, k)
+            put_vector(right, k, rate + vector_at(system.ratio, k) * along)
+    for i in range(0, system.matrix.shape[0], WIDTH):
+        total = vector_at(x, (r_v, i))
         for a in range(m):
-            total -= p[a] * pair_at(response, a, i)
-        put_pair(x, out_v, i, total)
-        put_pair(x, out_e, i, pair_at(x, r_e, i) + g * total)
+            total -= right[system.active[a]] * vector_at(rows, (a, right.shape[0] + i))
+        put_vector(x, (out_v, i), total)
+        put_vector(x, (out_e, i), vector_at(x, (r_e, i)) + g * total)

@@ -2,8 +2,6 @@
 
 import math
 
-from leg_wear_monitor.contact.friction import friction_force
-from leg_wear_monitor.contact.normal.laws import normal_force
 from leg_wear_monitor.dynamics.clearance.contact import (
     A0,
     A1,
@@ -18,17 +16,11 @@ from leg_wear_monitor.dynamics.clearance.contact import (
     ELASTIC,
     EM,
     F_T,
-    FRICTION_COEFFICIENT,
-    FRICTION_LAW,
-    HYSTERESIS_FACTOR,
     K1E,
     K1V,
     K2E,
     K2V,
     LIFT,
-    NORMAL_FORM,
-    RAMP_0,
-    RAMP_1,
     RE,
     RUB,
     RV,
@@ -39,6 +31,7 @@ from leg_wear_monitor.dynamics.clearance.contact import (
     accelerate_clearances,
 )
 from leg_wear_monitor.dynamics.clearance.film_system import factorise_step, solve_step
+from leg_wear_monitor.dynamics.clearance.joint_laws import joint_forces
 from leg_wear_monitor.dynamics.joint.contact_event import DELTA, DELTA_DOT, EX, EY, F_N
 from leg_wear_monitor.dynamics.joint.joint_contact import wear_joint
 from leg_wear_monitor.dynamics.run.dormand_prince import hermite
@@ -51,25 +44,37 @@ from leg_wear_monitor.dynamics.run.run_statistics import (
     FRICTION,
 )
 from leg_wear_monitor.kernel import kernel
-from leg_wear_monitor.pairs import pair_at, put_pair
+from leg_wear_monitor.vectors import (
+    WIDTH,
+    any_of,
+    every,
+    largest,
+    part_at,
+    put_part,
+    put_vector,
+    root,
+    vector_at,
+    vector_max,
+    vector_sum,
+    where,
+)
 
 
 @kernel
 def drift(now, x):
-    """Terms that depend on the rates in row V0 of x (VECTORS, d).
+    """Terms that depend on the rates in row V0 of x (VECTORS, room).
 
     Row DRIFT: acceleration without contact, by gravity, crank, Coriolis terms and dampers [m/s^2]; row BY_V:
     coefficients of e' in the drive torque [N s].
     """
-    by_v, torque, viscous, d = now.drift, now.torque_vv, now.viscous, x.shape[1]
-    for i in range(d):
-        x[DRIFT, i], x[BY_V, i] = now.bare[i], now.torque_by_v[i]
-    for k in range(now.lever.shape[0]):
-        vx, vy = x[V0, 2 * k], x[V0, 2 * k + 1]
-        for i in range(d):
-            x[DRIFT, i] += by_v[2 * k, i] * vx + by_v[2 * k + 1, i] * vy
-        for i in range(d):
-            x[BY_V, i] += torque[2 * k, i] * vx + torque[2 * k + 1, i] * vy
+    viscous, d = now.viscous, now.bare.shape[0]
+    for i in range(0, d, WIDTH):
+        total, by_v = part_at(now.bare, i), part_at(now.torque_by_v, i)
+        for j in range(d):
+            total += x[V0, j] * part_at(now.drift, (j, i))
+            by_v += x[V0, j] * part_at(now.torque_vv, (j, i))
+        put_vector(x, (DRIFT, i), total)
+        put_vector(x, (BY_V, i), by_v)
     for i in range(viscous.shape[0]):
         for j in range(d):
             x[DRIFT, i] += viscous[i, j] * x[V0, j]
@@ -77,121 +82,141 @@ def drift(now, x):
 
 @kernel
 def try_step(model, surfaces, approach, h, turned, now, system, x, start, end):
-    """Trial step of length h [s] from rows E0, V0, A0 of x to E1, V1, A1 and sample ``end`` (k, COLUMNS).
+    """Trial step of length h [s] from rows E0, V0, A0 of x to E1, V1, A1 and sample ``end`` (COLUMNS, room).
 
     ``turned``: crank angle at the end of the step, relative to that of the tables [rad]. Returns the local
     error over the tolerance: the difference of the second-order step and the cubic through the accelerations
     at both ends, filtered like a stage so that stiff contacts do not exaggerate it (Shampine's filter).
     """
-    film, d, tolerance = model.film, x.shape[1], model.tolerance
+    film, d, tolerance = model.film, now.bare.shape[0], model.tolerance
     m = factorise_step(film, h, 1.0 / tolerance[1], now, start, system)
     solve_step(film, h, now, system, m, 1.0, x, V0, A0, K1E, K1V)
-    for i in range(0, d, 2):
-        put_pair(x, EM, i, pair_at(x, E0, i) + h * pair_at(x, K1E, i))
-        put_pair(x, VM, i, pair_at(x, V0, i) + h * pair_at(x, K1V, i))
-    accelerate_clearances(model, surfaces, approach, now, turned, x, EM, VM, RV, end)
-    for i in range(0, d, 2):
-        put_pair(x, RE, i, pair_at(x, VM, i) - 2.0 * pair_at(x, K1E, i))
-        put_pair(x, RV, i, pair_at(x, RV, i) - 2.0 * pair_at(x, K1V, i))
+    for i in range(0, d, WIDTH):
+        put_vector(x, (EM, i), vector_at(x, (E0, i)) + h * vector_at(x, (K1E, i)))
+        put_vector(x, (VM, i), vector_at(x, (V0, i)) + h * vector_at(x, (K1V, i)))
+    accelerate_clearances(model, surfaces, approach, now, turned, x, EM, VM, RV, end, False)
+    for i in range(0, d, WIDTH):
+        put_vector(x, (RE, i), vector_at(x, (VM, i)) - 2.0 * vector_at(x, (K1E, i)))
+        put_vector(x, (RV, i), vector_at(x, (RV, i)) - 2.0 * vector_at(x, (K1V, i)))
     solve_step(film, h, now, system, m, -1.0, x, RE, RV, K2E, K2V)
     first, second = 1.5 * h, 0.5 * h
-    for i in range(0, d, 2):
-        put_pair(x, E1, i, pair_at(x, E0, i) + first * pair_at(x, K1E, i) + second * pair_at(x, K2E, i))
-        put_pair(x, V1, i, pair_at(x, V0, i) + first * pair_at(x, K1V, i) + second * pair_at(x, K2V, i))
-    accelerate_clearances(model, surfaces, approach, now, turned, x, E1, V1, A1, end)
+    for i in range(0, d, WIDTH):
+        moved = first * vector_at(x, (K1E, i)) + second * vector_at(x, (K2E, i))
+        gained = first * vector_at(x, (K1V, i)) + second * vector_at(x, (K2V, i))
+        put_vector(x, (E1, i), vector_at(x, (E0, i)) + moved)
+        put_vector(x, (V1, i), vector_at(x, (V0, i)) + gained)
+    accelerate_clearances(model, surfaces, approach, now, turned, x, E1, V1, A1, end, True)
     third, sixth = h * h / 3.0, h * h / 6.0
-    for i in range(0, d, 2):
-        before, after = pair_at(x, A0, i), pair_at(x, A1, i)
-        moved = pair_at(x, E1, i) - pair_at(x, E0, i) - h * pair_at(x, V0, i)
-        put_pair(x, RE, i, moved - third * before - sixth * after)
-        put_pair(x, RV, i, pair_at(x, V1, i) - pair_at(x, V0, i) - second * (before + after))
+    for i in range(0, d, WIDTH):
+        before, after = vector_at(x, (A0, i)), vector_at(x, (A1, i))
+        moved = vector_at(x, (E1, i)) - vector_at(x, (E0, i)) - h * vector_at(x, (V0, i))
+        put_vector(x, (RE, i), moved - third * before - sixth * after)
+        gained = vector_at(x, (V1, i)) - vector_at(x, (V0, i))
+        put_vector(x, (RV, i), gained - second * (before + after))
     solve_step(film, h, now, system, m, 0.0, x, RE, RV, RE, RV)
-    worst, total = 0.0, 0.0
-    for i in range(d):
-        off, rate_off = abs(x[RE, i]) * tolerance[0], abs(x[RV, i]) * tolerance[1]
+    worst, total = every(0.0), every(0.0)
+    for i in range(0, d, WIDTH):
+        off = abs(vector_at(x, (RE, i))) * tolerance[0]
+        rate_off = abs(vector_at(x, (RV, i))) * tolerance[1]
         total += off + rate_off
-        worst = off if off > worst else worst
-        worst = rate_off if rate_off > worst else worst
-    return worst if math.isfinite(total) else math.inf
+        worst = largest(worst, largest(off, rate_off))
+    return vector_max(worst) if math.isfinite(vector_sum(total)) else math.inf
 
 
 @kernel
 def shift_start(now, x):
     """Move the end of the step to the start of the next one, with its own DRIFT and BY_V; sets row DV."""
-    for i in range(x.shape[1]):
-        x[DV, i] = x[V1, i] - x[V0, i]
-        x[E0, i], x[V0, i] = x[E1, i], x[V1, i]
-        x[A0, i] = x[A1, i] - x[DRIFT, i]
+    d = now.bare.shape[0]
+    for i in range(0, d, WIDTH):
+        rate = vector_at(x, (V1, i))
+        put_vector(x, (DV, i), rate - vector_at(x, (V0, i)))
+        put_vector(x, (E0, i), vector_at(x, (E1, i)))
+        put_vector(x, (V0, i), rate)
+        put_vector(x, (A0, i), vector_at(x, (A1, i)) - vector_at(x, (DRIFT, i)))
     drift(now, x)
-    for i in range(x.shape[1]):
-        x[A0, i] += x[DRIFT, i]
+    for i in range(0, d, WIDTH):
+        put_vector(x, (A0, i), vector_at(x, (A0, i)) + vector_at(x, (DRIFT, i)))
 
 
 @kernel
-def integrate_joints(law, approach, h, start, end, out_added):
-    """Integrals of the clearance joints over a step of length h [s]; out_added (k, ADDED).
+def integrate_joints(model, approach, h, start, end, out_added):
+    """Integrals of the clearance joints over a step of length h [s]; out_added (ADDED, room).
 
     Simpson's rule with the contact law at the middle of the penetration's cubic, because an impact takes few
     steps, and small errors of the same sign in many steps add up.
     """
-    for k in range(start.shape[0]):
-        for r in range(out_added.shape[1]):
-            out_added[k, r] = 0.0
-        if start[k, F_N] + end[k, F_N] > 0.0:
+    for k in range(0, out_added.shape[1], WIDTH):
+        for r in range(out_added.shape[0]):
+            put_vector(out_added, (r, k), every(0.0))
+        if any_of(vector_at(start, (ELASTIC, k)) + vector_at(end, (ELASTIC, k)) > 0.0):
             weight = h / 6.0
             delta, rate = hermite(
-                0.5, h, start[k, DELTA], start[k, DELTA_DOT], end[k, DELTA], end[k, DELTA_DOT]
-            )
-            slip = 0.5 * (start[k, SLIP] + end[k, SLIP])
-            coefficient = 0.5 * (start[k, COEFFICIENT] + end[k, COEFFICIENT])
-            clearance = 0.5 * (start[k, CLEARANCE] + end[k, CLEARANCE])
-            loss = law[k, HYSTERESIS_FACTOR] / approach[k]
-            f_n, _, _, elastic = normal_force(law[k, NORMAL_FORM], coefficient, clearance, loss, delta, rate)
-            mu, code = law[k, FRICTION_COEFFICIENT], law[k, FRICTION_LAW]
-            f_t = friction_force(code, mu, law[k, RAMP_0], law[k, RAMP_1], f_n, slip)
-            cam = 0.5 * (start[k, CAM] + end[k, CAM])
+                0.5, h, vector_at(start, (DELTA, k)), vector_at(start, (DELTA_DOT, k)),
+                vector_at(end, (DELTA, k)), vector_at(end, (DELTA_DOT, k)),
+            )  # fmt: skip
+            slip, cam = _middle(start, end, SLIP, k), _middle(start, end, CAM, k)
+            f_n, _, _, elastic, f_t = joint_forces(
+                model, k, _middle(start, end, COEFFICIENT, k), _middle(start, end, CLEARANCE, k),
+                part_at(approach, k), delta, rate, slip,
+            )  # fmt: skip
             _add_rates(k, 4.0 * weight, f_n, f_t, elastic, rate, slip, cam, out_added)
             _add_sample(k, weight, start, out_added)
             _add_sample(k, weight, end, out_added)
 
 
 @kernel
+def _middle(start, end, row, k):
+    """Means of a row at both ends, of eight joints."""
+    return 0.5 * (vector_at(start, (row, k)) + vector_at(end, (row, k)))
+
+
+@kernel
 def _add_sample(k, weight, sample, out_added):
-    """Add the rates of joint k's integrals at a sample (k, COLUMNS), times a weight [s]."""
-    f_n, f_t, elastic = sample[k, F_N], sample[k, F_T], sample[k, ELASTIC]
-    rate, slip, cam = sample[k, DELTA_DOT], sample[k, SLIP], sample[k, CAM]
+    """Add the rates of the integrals of eight joints at a sample (COLUMNS, room), times a weight [s]."""
+    f_n, f_t = vector_at(sample, (F_N, k)), vector_at(sample, (F_T, k))
+    elastic, rate = vector_at(sample, (ELASTIC, k)), vector_at(sample, (DELTA_DOT, k))
+    slip, cam = vector_at(sample, (SLIP, k)), vector_at(sample, (CAM, k))
     _add_rates(k, weight, f_n, f_t, elastic, rate, slip, cam, out_added)
 
 
 @kernel
 def _add_rates(k, weight, f_n, f_t, elastic, delta_dot, slip, cam, out_added):
-    """Add the rates of joint k's integrals at one instant, times a weight [s]."""
-    if f_n > 0.0:
-        squared = f_n * f_n + f_t * f_t
-        out_added[k, FORCE] += weight * math.sqrt(squared)
-        out_added[k, FORCE_SQUARED] += weight * squared
-        out_added[k, CONTACT] += weight
-        out_added[k, FRICTION] -= weight * f_t * slip
-        out_added[k, ARCHARD] += weight * f_n * abs(slip)
-        out_added[k, RUB] += weight * f_t
-        out_added[k, LIFT] += weight * f_n * cam
-    out_added[k, DISSIPATION] += weight * (f_n - elastic) * delta_dot
+    """Add the rates of the integrals of eight joints at one instant, times a weight [s]."""
+    squared = f_n * f_n + f_t * f_t
+    _add(FORCE, k, weight, root(squared), out_added)
+    _add(FORCE_SQUARED, k, weight, squared, out_added)
+    _add(CONTACT, k, weight, where(f_n > 0.0, 1.0, 0.0), out_added)
+    _add(FRICTION, k, -weight, f_t * slip, out_added)
+    _add(ARCHARD, k, weight, f_n * abs(slip), out_added)
+    _add(RUB, k, weight, f_t, out_added)
+    _add(LIFT, k, weight, f_n * cam, out_added)
+    _add(DISSIPATION, k, weight, (f_n - elastic) * delta_dot, out_added)
+
+
+@kernel
+def _add(row, k, weight, value, out_added):
+    """Add a value of eight joints, times a weight."""
+    put_vector(out_added, (row, k), vector_at(out_added, (row, k)) + weight * value)
 
 
 @kernel
 def gather_wear(added, start, end, pending):
-    """Add a step's Archard integrals, and the eccentricities at which they acted, to ``pending`` (k, 4)."""
-    for k in range(pending.shape[0]):
-        integral = added[k, ARCHARD]
-        if integral > 0.0:
-            w = end[k, F_N] / (start[k, F_N] + end[k, F_N])
-            ex = start[k, EX] + w * (end[k, EX] - start[k, EX])
-            ey = start[k, EY] + w * (end[k, EY] - start[k, EY])
-            length = math.sqrt(ex * ex + ey * ey)
-            pending[k, 0] += integral
-            pending[k, 1] += integral * ex / length
-            pending[k, 2] += integral * ey / length
-            pending[k, 3] += integral * length
+    """Add a step's Archard integrals, and the eccentricities at which they acted, to ``pending`` (4, k)."""
+    for k in range(0, added.shape[1], WIDTH):
+        integral = vector_at(added, (ARCHARD, k))
+        if any_of(integral > 0.0):
+            after = vector_at(end, (F_N, k))
+            both = vector_at(start, (F_N, k)) + after
+            w = where(both > 0.0, after, 0.5) / where(both > 0.0, both, 1.0)
+            ex, ey = vector_at(start, (EX, k)), vector_at(start, (EY, k))
+            ex += w * (vector_at(end, (EX, k)) - ex)
+            ey += w * (vector_at(end, (EY, k)) - ey)
+            length = root(ex * ex + ey * ey)
+            share = integral / where(integral > 0.0, length, 1.0)
+            put_part(pending, (0, k), part_at(pending, (0, k)) + integral)
+            put_part(pending, (1, k), part_at(pending, (1, k)) + share * ex)
+            put_part(pending, (2, k), part_at(pending, (2, k)) + share * ey)
+            put_part(pending, (3, k), part_at(pending, (3, k)) + integral * length)
 
 
 @kernel
@@ -202,19 +227,19 @@ def deposit_pending(contacts, surfaces, k, start, now, turned, acted, pending, o
     acted. Returns the contact energy lost with the removed material [J].
     """
     lost = 0.0
-    integral = pending[k, 0]
+    integral = pending[0, k]
     if integral > 0.0:
-        scale = pending[k, 3] / integral / math.hypot(pending[k, 1], pending[k, 2])
-        ex, ey = scale * pending[k, 1], scale * pending[k, 2]
+        scale = pending[3, k] / integral / math.sqrt(pending[1, k] ** 2 + pending[2, k] ** 2)
+        ex, ey = scale * pending[1, k], scale * pending[2, k]
         angle_b, turn_b = now.angle[k, 0], now.turn[k, 0]
         angle_j, turn_j = now.angle[k, 1], now.turn[k, 1]
         acted_at = (ex, ey, angle_b + turn_b * acted, angle_j + turn_j * acted)
         lost = wear_joint(
-            contacts, surfaces, k, start[k, EX], start[k, EY],
+            contacts, surfaces, k, start[EX, k], start[EY, k],
             angle_b + turn_b * turned, angle_j + turn_j * turned, acted_at, integral, out_weight,
         )  # fmt: skip
-        for i in range(pending.shape[1]):
-            pending[k, i] = 0.0
+        for i in range(pending.shape[0]):
+            pending[i, k] = 0.0
     return lost
 
 
@@ -225,8 +250,8 @@ def deposit_due(contacts, surfaces, approach, start, now, turned, pending, out_w
     Returns the contact energy lost with the removed material [J]; ``turned`` as in `deposit_pending`.
     """
     limit, lost = 4.0 * math.pi / surfaces.depth.shape[2], 0.0
-    for k in range(pending.shape[0]):
-        across = abs(pending[k, 1] * start[k, EY] - pending[k, 2] * start[k, EX])
-        if approach[k] == 0.0 or across > limit * pending[k, 3]:
+    for k in range(pending.shape[1]):
+        across = abs(pending[1, k] * start[EY, k] - pending[2, k] * start[EX, k])
+        if approach[k] == 0.0 or across > limit * pending[3, k]:
             lost += deposit_pending(contacts, surfaces, k, start, now, turned, 0.0, pending, out_weight)
     return lost

@@ -6,9 +6,10 @@ import numpy as np
 
 from leg_wear_monitor.dynamics.clearance.advance import ADVANCE, advance_clearances, observe
 from leg_wear_monitor.dynamics.clearance.basis import is_damped
-from leg_wear_monitor.dynamics.clearance.contact import A0, E0, F_T, NX, NY, V0, contact_laws
+from leg_wear_monitor.dynamics.clearance.contact import A0, E0, F_T, NX, NY, V0
 from leg_wear_monitor.dynamics.clearance.film import FILM_X, FILM_Y
 from leg_wear_monitor.dynamics.clearance.film_system import film_model
+from leg_wear_monitor.dynamics.clearance.joint_laws import contact_laws, have_usual_laws
 from leg_wear_monitor.dynamics.clearance.model import (
     ANGLE,
     SPEED,
@@ -98,6 +99,7 @@ class ClearanceStepper:
             interval=interval_s or TURN / abs(setup.speed) / INTERVALS,
             tolerance=np.array([1.0, 1.0 / TOLERANCE_RATE]) / tolerance_m,
             law=contact_laws(setup.contacts),
+            usual=int(have_usual_laws(setup.contacts)),
             film=film_model(setup.contacts, setup.films),
             damped=int(is_damped(setup.linkage.arrays)),
         )
@@ -132,18 +134,22 @@ class ClearanceStepper:
     @property
     def last_force(self) -> Floats:
         """Magnitude (k,) of the forces [N] of contact and film at the last sample before that time."""
-        sample = self.work.start
         if not len(self.model.film.settings):
-            return np.asarray(np.hypot(sample[:, F_N], sample[:, F_T]))
+            sample = self._sample()
+            return np.asarray(np.hypot(sample[F_N], sample[F_T]))
         return np.asarray(np.linalg.norm(self._forces(), axis=1))
 
     def _forces(self) -> Floats:
         """Forces (k, 2) [N] of contact and film on the journals at that sample."""
-        sample = self.work.start
-        n = sample[:, [NX, NY]]
-        t = np.stack([-n[:, 1], n[:, 0]], axis=1)
-        force = -sample[:, F_N, None] * n + sample[:, F_T, None] * t
-        return np.asarray(force + sample[:, FILM_X : FILM_Y + 1] if len(self.model.film.settings) else force)
+        sample = self._sample()
+        nx, ny = sample[NX], sample[NY]
+        force = np.stack([-sample[F_N] * nx - sample[F_T] * ny, -sample[F_N] * ny + sample[F_T] * nx], axis=1)
+        films = sample[[FILM_X, FILM_Y]].T if len(self.model.film.settings) else 0.0
+        return np.asarray(force + films)
+
+    def _sample(self) -> Floats:
+        """The last sample before that time (COLUMNS, k)."""
+        return self.work.start[:, : len(self.state.approach)]
 
     def set_eccentricities(self, eccentricity: Floats) -> None:
         """Set the eccentricities (k, 2) [m]."""
@@ -163,7 +169,7 @@ class ClearanceStepper:
         """The leg at that time; does not change the state."""
         work, state = self.work, self.state
         energy = observe(self.model, self._setup.surfaces.feeds_back, state, work)
-        x, now = work.x, work.now
+        x, now = work.x[:, : len(state.e)], work.now
         return Moment(
             deviation=_toe_deviations(now.toe, now.speed[0], x[E0], x[V0], x[A0]),
             torque=float(work.reaction[0]),

@@ -26,6 +26,7 @@ from leg_wear_monitor.mechanism.arrays import Floats, Ints, Singles, body_names,
 from leg_wear_monitor.mechanism.constraints import DRIVE
 from leg_wear_monitor.mechanism.ideal import TURN, IdealMotion, one_cycle, rotated
 from leg_wear_monitor.mechanism.position import Linkage
+from leg_wear_monitor.vectors import WIDTH, padded
 
 POINTS = 1024  # table points per turn, with linear interpolation
 COARSER = 2  # ratio of the step of the tables of first order in e to that of the others
@@ -44,12 +45,12 @@ class ClearanceTables(NamedTuple):
     `stored_shapes`;
     ``parts`` (N,): number of parts of an interval that starts there.
 
-    ``by_e`` (M + 1, d, u): derivatives by e of the parts of `changing_shapes`; ``bend`` (M + 1, d, d d):
-    accelerations A^-1 Gamma, bilinear in e'. Both are small, and therefore stored in single precision at
-    every `COARSER`-th point, which reduces the memory traffic of an interval. So are the tables for the
-    moments of films, bushing's body before journal's: ``spin`` (M + 1, 2, d, d): rates of the bodies per e',
-    and their derivative by the crank angle; ``spin_reaction`` (M + 1, d, r): drive torque and reactions per
-    moment.
+    ``by_e`` (M + 1, u / WIDTH, d, WIDTH): derivatives by e of the parts of `changing_shapes`, in blocks of
+    vectors; ``bend`` (M + 1, d d / WIDTH, d, WIDTH): accelerations A^-1 Gamma, bilinear in e'. Both are
+    small, and therefore stored in single precision at every `COARSER`-th point, which reduces the memory
+    traffic of an interval. So are the tables for the moments of films, bushing's body before journal's:
+    ``spin`` (M + 1, 2, d, d): rates of the bodies per e', and their derivative by the crank angle;
+    ``spin_reaction`` (M + 1, d, r): drive torque and reactions per moment.
     """
 
     motion: Floats
@@ -104,7 +105,7 @@ def build_tables(
     parts = {
         **_accelerations(basis),
         **_torque(basis),
-        "lever": project(basis.s, basis.friction).transpose(0, 2, 1),
+        "lever": project(basis.s, basis.friction),
         "lever_drive": project(basis.friction, basis.drive[:, :, None]),
         "angle": motion.q[:, linkage.arrays.joint_body[contacts.joint], 2],
         "turn": motion.v[:, linkage.arrays.joint_body[contacts.joint], 2],
@@ -183,9 +184,17 @@ def _first_order(basis: Basis, inverse_mass: Floats) -> dict[str, Singles]:
     parts["inverse_mass"] = -(change + change.transpose(0, 1, 3, 2))
     by_e = np.concatenate([parts[name].reshape(m, d, -1) for name in changing_shapes(d // 2)], axis=2)
     return {
-        "by_e": np.ascontiguousarray(by_e, dtype=np.float32),
-        "bend": np.ascontiguousarray(bend.reshape(m, d, d * d), dtype=np.float32),
+        "by_e": _in_blocks(by_e),
+        "bend": _in_blocks(bend.reshape(m, d, d * d)),
     }
+
+
+def _in_blocks(table: Floats) -> Singles:
+    """A table (M + 1, d, u) in the order in which vectors are taken from it, (M + 1, u / WIDTH, d, WIDTH)."""
+    points, d, u = table.shape
+    blocks = np.zeros((points, d, padded(u)), dtype=np.float32)
+    blocks[:, :, :u] = table
+    return np.ascontiguousarray(blocks.reshape(points, d, -1, WIDTH).transpose(0, 2, 1, 3))
 
 
 def _torque(basis: Basis) -> dict[str, Floats]:

@@ -31,8 +31,9 @@ from leg_wear_monitor.dynamics.run.dormand_prince import (
 from leg_wear_monitor.dynamics.run.protocol import DONE, PUSHED_THROUGH, SINGULAR, STEP_TOO_SMALL
 from leg_wear_monitor.dynamics.run.run_statistics import ARCHARD, DRIVE_RATES, JOINT_RATES, TORQUE, add_step
 from leg_wear_monitor.dynamics.run.toe_deviation import compare_toe
-from leg_wear_monitor.kernel import copy_array, entry, kernel
+from leg_wear_monitor.kernel import entry, kernel
 from leg_wear_monitor.mechanism.arrays import Floats
+from leg_wear_monitor.vectors import copy_array
 
 LONGEST_STEP = 1.0e-3  # s: its product with Baumgarte's alpha is well inside the region of stability
 _SHORTEST_STEP = 1.0e-14  # s
@@ -56,7 +57,7 @@ class FullWork(NamedTuple):
     """Work arrays of a step, for n bodies, j joints and k clearance joints.
 
     ``slope`` (7, 6 n): slopes of the stages; ``trial`` (6 n,): trial state; ``rates`` (7, j, JOINT_RATES),
-    ``drive_rates`` (7, DRIVE_RATES): rates of the statistics' integrals; ``start`` (k, SAMPLE): samples at
+    ``drive_rates`` (7, DRIVE_RATES): rates of the statistics' integrals; ``start`` (SAMPLE, k): samples at
     its start; ``scale`` (6 n,): error tolerances; ``weight`` (N,): of the wear on an arc; ``scratch``.
     """
 
@@ -85,7 +86,7 @@ def full_work(model: FullModel, tolerance_m: float, tolerance_mps: float, sector
         trial=np.zeros(6 * n),
         rates=np.zeros((STAGES, joints, JOINT_RATES)),
         drive_rates=np.zeros((STAGES, DRIVE_RATES)),
-        start=np.zeros((k, SAMPLE)),
+        start=np.zeros((SAMPLE, k)),
         scale=np.concatenate([np.full(3 * n, tolerance_m), np.full(3 * n, tolerance_mps)]),
         weight=np.zeros(sectors),
         scratch=full_scratch(model),
@@ -146,7 +147,7 @@ def _accept(model, surfaces, state, h, toe, statistics, work):
             for s in range(STAGES):
                 integral += h * WEIGHTS[s] * work.rates[s, joint, ARCHARD]
             b, j = arrays.joint_body[joint, 0], arrays.joint_body[joint, 1]
-            ex, ey = scratch.contact[k, EX], scratch.contact[k, EY]
+            ex, ey = scratch.contact[EX, k], scratch.contact[EY, k]
             here = (ex, ey, q[b, 2], q[j, 2])
             statistics.worn_energy[0] += wear_joint(
                 contacts, surfaces, k, ex, ey, q[b, 2], q[j, 2], here, integral, work.weight

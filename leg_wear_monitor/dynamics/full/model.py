@@ -62,7 +62,7 @@ class FullScratch(NamedTuple):
     ``cs`` (n, 2): cosines and sines; ``force`` (n, 3): generalised forces; ``phi``, ``gamma`` (m,) and
     ``jac`` (m, 2, 3): closures; ``schur`` (m, m): phi_q M^-1 phi_q^T and its factor; ``lam`` (m,):
     multipliers;
-    ``drive`` (3,): crank motion; ``contact`` (k, SAMPLE): samples of the clearance joints.
+    ``drive`` (3,): crank motion; ``contact`` (SAMPLE, k): samples of the clearance joints.
     """
 
     cs: Floats
@@ -102,7 +102,7 @@ def full_scratch(model: FullModel) -> FullScratch:
         schur=np.zeros((m, m)),
         lam=np.zeros(m),
         drive=np.zeros(3),
-        contact=np.zeros((k, SAMPLE)),
+        contact=np.zeros((SAMPLE, k)),
     )
 
 
@@ -135,9 +135,9 @@ def add_contacts(model, surfaces, approach, q, v, scratch, out_rate):
         f_n, f_t, delta, delta_dot, slip, nx, ny, elastic, moment = joint_force(
             contacts, surfaces, k, ex, ey, vx, vy, q[b, 2], q[j, 2], v[b, 2], v[j, 2], approach[k]
         )
-        sample = scratch.contact[k]
-        sample[EX], sample[EY], sample[VX], sample[VY] = ex, ey, vx, vy
-        sample[F_N], sample[DELTA], sample[DELTA_DOT] = f_n, delta, delta_dot
+        sample = scratch.contact
+        sample[EX, k], sample[EY, k], sample[VX, k], sample[VY, k] = ex, ey, vx, vy
+        sample[F_N, k], sample[DELTA, k], sample[DELTA_DOT, k] = f_n, delta, delta_dot
         rate = out_rate[contacts.joint[k]]
         rate[:] = 0.0
         if f_n > 0.0:

@@ -1,6 +1,6 @@
 """Contact events: begin and end of contact inside a step, on the penetration's cubic Hermite interpolant.
 
-The kernels take samples (k, SAMPLE) of the clearance joints at the start and at the end of a step.
+The kernels take samples (SAMPLE, k) of the clearance joints at the start and at the end of a step.
 The contact begins where the penetration of physics.md section 3 becomes positive.
 """
 
@@ -8,7 +8,7 @@ from leg_wear_monitor.dynamics.run.dormand_prince import hermite
 from leg_wear_monitor.dynamics.run.run_statistics import begin_impact, end_impact, parabola_peak, raise_peak
 from leg_wear_monitor.kernel import kernel
 
-# columns of a sample: eccentricity [m], its rate [m/s], normal force [N], penetration [m], its rate [m/s]
+# rows of a sample: eccentricity [m], its rate [m/s], normal force [N], penetration [m], its rate [m/s]
 EX, EY, VX, VY, F_N, DELTA, DELTA_DOT = 0, 1, 2, 3, 4, 5, 6
 SAMPLE = 7
 
@@ -27,7 +27,7 @@ def _crossing(low, high, rising, h, k, start, end):
     """
     u = 0.5 * (low + high)
     for _ in range(48):
-        delta, rate = hermite(u, h, start[k, DELTA], start[k, DELTA_DOT], end[k, DELTA], end[k, DELTA_DOT])
+        delta, rate = hermite(u, h, start[DELTA, k], start[DELTA_DOT, k], end[DELTA, k], end[DELTA_DOT, k])
         if (delta > 0.0) == rising:
             high = u
         else:
@@ -43,22 +43,22 @@ def _crossing(low, high, rising, h, k, start, end):
 @kernel
 def _delta_at(u, h, k, start, end):
     """Penetration [m] of joint k at the fraction u of a step of length h [s]."""
-    return hermite(u, h, start[k, DELTA], start[k, DELTA_DOT], end[k, DELTA], end[k, DELTA_DOT])[0]
+    return hermite(u, h, start[DELTA, k], start[DELTA_DOT, k], end[DELTA, k], end[DELTA_DOT, k])[0]
 
 
 @kernel
 def first_contact_event(approach, h, start, end):
     """Fraction of a step after which the first open joint comes into contact; NEVER if none does.
 
-    ``approach`` (k,) [m/s] is 0 for open joints; ``start`` and ``end`` (k, SAMPLE) are samples. The middle of
+    ``approach`` (k,) [m/s] is 0 for open joints; ``start`` and ``end`` (SAMPLE, k) are samples. The middle of
     the step is checked too, for a contact that begins and ends inside the step.
     """
     earliest = NEVER
     for k in range(approach.shape[0]):
-        if approach[k] == 0.0 and start[k, DELTA] <= CONTACT_EVENT:
-            if start[k, DELTA_DOT] > 0.0 and _delta_at(0.5, h, k, start, end) > CONTACT_EVENT:
+        if approach[k] == 0.0 and start[DELTA, k] <= CONTACT_EVENT:
+            if start[DELTA_DOT, k] > 0.0 and _delta_at(0.5, h, k, start, end) > CONTACT_EVENT:
                 earliest = min(earliest, _crossing(0.0, 0.5, True, h, k, start, end))
-            elif end[k, DELTA] > CONTACT_EVENT:
+            elif end[DELTA, k] > CONTACT_EVENT:
                 earliest = min(earliest, _crossing(0.5, 1.0, True, h, k, start, end))
     return earliest
 
@@ -83,11 +83,11 @@ def update_contacts(joint, speed_floor, t, h, start, end, approach, recent, peak
     """
     changed = False
     for k in range(approach.shape[0]):
-        rate, force = end[k, DELTA_DOT], end[k, F_N]
+        rate, force = end[DELTA_DOT, k], end[F_N, k]
         if approach[k] == 0.0:
             # a rotating worn profile can come into contact with a journal that does not approach it
-            nearer = rate > 0.0 or end[k, DELTA] > start[k, DELTA]
-            if end[k, DELTA] >= -CONTACT_EVENT and nearer:
+            nearer = rate > 0.0 or end[DELTA, k] > start[DELTA, k]
+            if end[DELTA, k] >= -CONTACT_EVENT and nearer:
                 begin_contact(k, joint, speed_floor, t + h, rate, approach, recent, impact, impacts)
                 changed = True
             continue
@@ -96,7 +96,7 @@ def update_contacts(joint, speed_floor, t, h, start, end, approach, recent, peak
             top = parabola_peak(recent[k, 0], recent[k, 1], recent[k, 2], recent[k, 3], t + h, force)
         raise_peak(peak, impact, impacts, joint[k], top)
         recent[k, 0], recent[k, 1], recent[k, 2], recent[k, 3] = recent[k, 2], recent[k, 3], t + h, force
-        if end[k, DELTA] <= 0.0 and rate < 0.0:
+        if end[DELTA, k] <= 0.0 and rate < 0.0:
             end_impact(impact, impacts, joint[k], t + h * _crossing(0.0, 1.0, False, h, k, start, end))
             approach[k] = 0.0
             changed = True
@@ -106,7 +106,7 @@ def update_contacts(joint, speed_floor, t, h, start, end, approach, recent, peak
 @kernel
 def pushed_through(bushing_radius, sample):
     """First clearance joint with a penetration of more than a tenth of the bushing's radius, else -1."""
-    for k in range(sample.shape[0]):
-        if not sample[k, DELTA] < 0.1 * bushing_radius[k]:
+    for k in range(bushing_radius.shape[0]):
+        if not sample[DELTA, k] < 0.1 * bushing_radius[k]:
             return k
     return -1

@@ -6,7 +6,10 @@ from leg_wear_monitor.contact.friction import friction_force
 from leg_wear_monitor.contact.geometry import journal_contact, worn_contact
 from leg_wear_monitor.contact.normal.laws import elastic_energy, law_coefficient, normal_force, softening
 from leg_wear_monitor.kernel import kernel
+from leg_wear_monitor.vectors import largest
 from leg_wear_monitor.wear.surfaces import deposit_wear, local_surfaces
+
+_LEAST = 1.0e-300  # m^2: the reciprocal is finite
 
 
 @kernel
@@ -30,17 +33,28 @@ def penetration(contacts, surfaces, k, ex, ey, direction, angle_b, angle_j):
     if not surfaces.feeds_back:
         delta, nx, ny = journal_contact(ex, ey, contacts.clearance[k])
         return delta, nx, ny, bushing, journal, 0.0, 0.0
-    clearance = bushing - journal
-    delta, nx, ny, scale, by_slope = worn_contact(ex, ey, clearance, slope_b + slope_j, bend_b + bend_j)
-    cam_b, cam_j = slope_b * scale + by_slope * bend_b, slope_j * scale + by_slope * bend_j
+    delta, nx, ny, cam_b, cam_j = touch_walls(ex, ey, bushing - journal, slope_b, slope_j, bend_b, bend_j)
     if delta > 0.0:
         softer_b, softer_j = softening(
             contacts.normal_form[k], contacts.stiffness[k], delta, bushing, journal, slope_b, slope_j
         )
-        along = (softer_b + softer_j) / (ex * ex + ey * ey)
-        nx, ny = nx + along * ey, ny - along * ex
-        cam_b, cam_j = cam_b + softer_b, cam_j + softer_j
+        nx, ny, cam_b, cam_j = soften(ex, ey, nx, ny, cam_b, cam_j, softer_b, softer_j)
     return delta, nx, ny, bushing, journal, cam_b, cam_j
+
+
+@kernel
+def touch_walls(ex, ey, clearance, slope_b, slope_j, bend_b, bend_j):
+    """Penetration, normal and derivatives of `penetration` by the geometry; for numbers or vectors."""
+    delta, nx, ny, scale, by_slope = worn_contact(ex, ey, clearance, slope_b + slope_j, bend_b + bend_j)
+    cam_b, cam_j = slope_b * scale + by_slope * bend_b, slope_j * scale + by_slope * bend_j
+    return delta, nx, ny, cam_b, cam_j
+
+
+@kernel
+def soften(ex, ey, nx, ny, cam_b, cam_j, softer_b, softer_j):
+    """Normal and derivatives with the change of the law's coefficient; for numbers or vectors."""
+    along = (softer_b + softer_j) / largest(ex * ex + ey * ey, _LEAST)
+    return nx + along * ey, ny - along * ex, cam_b + softer_b, cam_j + softer_j
 
 
 @kernel

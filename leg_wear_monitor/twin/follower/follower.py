@@ -5,7 +5,7 @@ from typing import NamedTuple
 
 import numpy as np
 
-from leg_wear_monitor.dynamics.clearance.contact import contact_laws
+from leg_wear_monitor.dynamics.clearance.joint_laws import contact_laws
 from leg_wear_monitor.dynamics.clearance.stepper import INTERVALS, ClearanceStepper
 from leg_wear_monitor.dynamics.clearance.stepper import Snapshot as StepperSnapshot
 from leg_wear_monitor.dynamics.run.drive import steady_drive
@@ -135,7 +135,7 @@ class LegFollower:
         own, state = self._setup.surfaces.depth, self._stepper.state
         changed = (own != depth).any(axis=(1, 2))
         own[:] = depth
-        state.pending[changed] = 0.0
+        state.pending[:, changed] = 0.0
         self._before[:, changed] = self.clearances[:, changed]
 
     def take_parameters(self, linkage: Linkage, friction: Floats) -> None:

@@ -178,7 +178,7 @@ def follow(
                 squares = statistics.drive_integral[TORQUE_SQUARED] - squares
                 _add_torque(leg.torque, impulse, squares, statistics.time[0] - time)
                 for j in range(force.shape[0]):
-                    force[j] = math.hypot(work.start[j, F_N], work.start[j, F_T])
+                    force[j] = math.hypot(work.start[F_N, j], work.start[F_T, j])
             if status != DONE:
                 motion.runs, motion.lost = 0, 1
                 motion.failures += 1

@@ -20,7 +20,7 @@ from leg_wear_monitor.dynamics.clearance.run import ClearanceRun
 from leg_wear_monitor.dynamics.clearance.stepper import ClearanceStepper
 from leg_wear_monitor.dynamics.clearance.tables import COARSER, build_tables
 from leg_wear_monitor.dynamics.full.run import FullRun
-from leg_wear_monitor.dynamics.joint.contact_event import DELTA, EX, F_N
+from leg_wear_monitor.dynamics.joint.contact_event import DELTA, EX, EY, F_N
 from leg_wear_monitor.dynamics.result.statistics import energy_balance
 from leg_wear_monitor.dynamics.run.drive import steady_drive
 from leg_wear_monitor.dynamics.run.run_statistics import (
@@ -34,6 +34,7 @@ from leg_wear_monitor.dynamics.run.run_statistics import (
 from leg_wear_monitor.dynamics.simulation import prepare
 from leg_wear_monitor.mechanism.clearance import Film
 from leg_wear_monitor.mechanism.ideal import TURN, one_cycle
+from leg_wear_monitor.vectors import padded
 
 FIVE = tuple("ABGIJ")
 POINTS = 256
@@ -90,15 +91,15 @@ def test_the_system_is_solved(seed, viscosity):
     d = 2 * k
     a = random.normal(size=(d, d))
     inverse_mass = a @ a.T + np.eye(d)
-    sample = random.normal(size=(k, COLUMNS)) * 0.1
+    sample = random.normal(size=(COLUMNS, padded(k))) * 0.1
     for j in range(k):
         direction = random.uniform(0.0, TURN)
         n = np.array([np.cos(direction), np.sin(direction)])
         size = 3.0e-4 + 1.0e-6 * random.normal()
-        sample[j, EX : EX + 2], sample[j, [NX, NY]] = size * n, n
-        sample[j, DELTA] = size - 3.0e-4
-        sample[j, F_N] = 50.0 if j < 2 else 0.0
-        sample[j, STIFFNESS], sample[j, DAMPING], sample[j, CAM] = 1.0e7, 1.0e3, 1.0e-6
+        sample[[EX, EY], j], sample[[NX, NY], j] = size * n, n
+        sample[DELTA, j] = size - 3.0e-4
+        sample[F_N, j] = 50.0 if j < 2 else 0.0
+        sample[STIFFNESS, j], sample[DAMPING, j], sample[CAM, j] = 1.0e7, 1.0e3, 1.0e-6
     films = np.array([[0.01, 0.02, 0.0 if j == 0 else viscosity, 1.6e-6] for j in range(k)])
     block, stiff, push, matrix = np.zeros((d, 2)), np.zeros((d, 2)), np.zeros(d), np.zeros((d, d))
     factorise_films(h, films, 5.0e-5, inverse_mass, speed, sample, block, stiff, push, matrix)
@@ -120,12 +121,13 @@ def test_without_films_it_is_the_system_of_the_contacts():
     random, k, h = np.random.default_rng(3), 3, 1.0e-5
     d = 2 * k
     a = random.normal(size=(d, d))
-    inverse_mass, sample = a @ a.T + np.eye(d), np.zeros((k, COLUMNS))
+    inverse_mass, sample = a @ a.T + np.eye(d), np.zeros((COLUMNS, padded(k)))
     for j, angle in enumerate((0.3, 2.0, 4.0)):
-        sample[j, [NX, NY]] = np.cos(angle), np.sin(angle)
-        sample[j, F_N], sample[j, STIFFNESS] = (20.0 if j != 1 else 0.0), 2.0e7
-        sample[j, DAMPING], sample[j, CAM] = 500.0, 1.0e-4 * j
-    x, system = random.normal(size=(VECTORS, d)), contact_system(k)
+        sample[[NX, NY], j] = np.cos(angle), np.sin(angle)
+        sample[F_N, j], sample[STIFFNESS, j] = (20.0 if j != 1 else 0.0), 2.0e7
+        sample[DAMPING, j], sample[CAM, j] = 500.0, 1.0e-4 * j
+    x, system = np.zeros((VECTORS, 2 * padded(k))), contact_system(k)
+    x[:, :d] = random.normal(size=(VECTORS, d))
     m = factorise_contacts(h, inverse_mass, TURN, sample, system)
     factorise_films(
         h, np.zeros((k, 4)), 5.0e-5, inverse_mass, TURN, sample,
@@ -221,7 +223,7 @@ def test_only_the_joints_with_a_film_have_one(leg):
     """A and B greased, the ankle dry."""
     run, _, energy = walked(greased(leg, 0.1, "AB"), 0.5, 1.5)
     sample = run.stepper.work.start
-    film = np.abs(sample[:, [FILM_X, FILM_Y, MOMENT_B, MOMENT_J]]).sum(axis=1)
+    film = np.abs(sample[[FILM_X, FILM_Y, MOMENT_B, MOMENT_J]]).sum(axis=0)
     assert (film[:2] > 0.0).all() and not film[2:].any()
     assert abs(energy.residual) < 5.0e-3 * (energy.contact_loss + energy.friction_loss)
 

@@ -296,7 +296,7 @@ def test_no_wear_is_lost(new_stepper, t):
     """Depth x arc x width over all sectors, with what is pending, is k times the Archard integral."""
     stepper, statistics = new_stepper(), new_run_statistics(10)
     drive(stepper, [Piece(steady_drive(0.0, TURN), t)], statistics)
-    contacts, pending = stepper.model.contacts, stepper.state.pending[:, :1]
+    contacts, pending = stepper.model.contacts, stepper.state.pending[0, :, None]
     volume = worn_volume(contacts, Surfaces(stepper.state.depth, 1)) + contacts.wear_coefficient * pending
     wanted = contacts.wear_coefficient * statistics.integral[contacts.joint, ARCHARD][:, None]
     np.testing.assert_allclose(volume, wanted, rtol=1.0e-11)

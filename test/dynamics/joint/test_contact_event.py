@@ -17,9 +17,9 @@ CLEARANCE = 3.0e-4
 
 def _sample(ex, ey, vx, vy):
     """One joint as the integrators hand it over."""
-    sample = np.zeros((1, SAMPLE))
+    sample = np.zeros((SAMPLE, 1))
     delta, nx, ny = journal_contact(ex, ey, CLEARANCE)
-    sample[0, DELTA], sample[0, DELTA_DOT] = delta, nx * vx + ny * vy
+    sample[DELTA, 0], sample[DELTA_DOT, 0] = delta, nx * vx + ny * vy
     return sample
 
 
@@ -59,17 +59,17 @@ def test_a_joint_that_is_in_contact_cannot_touch(fraction, angle, heading, speed
 
 
 def test_the_first_of_several_counts():
-    start = np.vstack([_sample(fraction * CLEARANCE, 0.0, 1.0, 0.0) for fraction in (0.5, 0.9, 0.7)])
+    start = np.hstack([_sample(fraction * CLEARANCE, 0.0, 1.0, 0.0) for fraction in (0.5, 0.9, 0.7)])
     h = 0.6 * CLEARANCE
-    end = np.vstack([_sample((fraction + 0.6) * CLEARANCE, 0.0, 1.0, 0.0) for fraction in (0.5, 0.9, 0.7)])
+    end = np.hstack([_sample((fraction + 0.6) * CLEARANCE, 0.0, 1.0, 0.0) for fraction in (0.5, 0.9, 0.7)])
     assert first_contact_event(np.zeros(3), h, start, end) == pytest.approx(0.1 / 0.6, rel=1.0e-6)
     assert first_contact_event(np.array([0.0, 1.0, 0.0]), h, start, end) == pytest.approx(0.5, rel=1.0e-6)
 
 
 def test_a_touch_and_parting_inside_one_step_is_seen():
     """Penetration -1, 0.5, -1 um over the step: both ends are open."""
-    start, end = np.zeros((1, SAMPLE)), np.zeros((1, SAMPLE))
-    start[0, DELTA], start[0, DELTA_DOT] = -1.0e-6, 6.0
-    end[0, DELTA], end[0, DELTA_DOT] = -1.0e-6, -6.0
+    start, end = np.zeros((SAMPLE, 1)), np.zeros((SAMPLE, 1))
+    start[DELTA, 0], start[DELTA_DOT, 0] = -1.0e-6, 6.0
+    end[DELTA, 0], end[DELTA_DOT, 0] = -1.0e-6, -6.0
     fraction = first_contact_event(np.zeros(1), 1.0e-6, start, end)
     assert 6.0 * fraction * (1.0 - fraction) == pytest.approx(1.0, rel=1.0e-9)

@@ -1,0 +1,67 @@
+"""Functions in formulas for numbers and for vectors."""
+
+from typing import Any
+
+from numba import types
+
+from leg_wear_monitor.vectors.kinds import (
+    FLAGS,
+    LLVM_VECTOR,
+    NUMBER,
+    VECTOR,
+    WIDTH,
+    as_vector,
+    larger,
+    llvm_function,
+)
+
+
+def square_root(_context: Any, value: Any) -> Any:
+    """Square root of a number or of a vector."""
+
+    def generate(context: Any, builder: Any, sig: Any, values: Any) -> Any:
+        kind = LLVM_VECTOR if sig.args[0] == VECTOR else NUMBER
+        name = f"llvm.sqrt.v{WIDTH}f64" if sig.args[0] == VECTOR else "llvm.sqrt.f64"
+        return builder.call(llvm_function(builder, name, kind, kind), values)
+
+    kind = VECTOR if value == VECTOR else types.float64
+    return kind(kind), generate
+
+
+def whole_part(_context: Any, value: Any) -> Any:
+    """The largest whole number that is not above a number or a vector, as such."""
+
+    def generate(_context: Any, builder: Any, sig: Any, values: Any) -> Any:
+        kind = LLVM_VECTOR if sig.args[0] == VECTOR else NUMBER
+        name = f"llvm.floor.v{WIDTH}f64" if sig.args[0] == VECTOR else "llvm.floor.f64"
+        return builder.call(llvm_function(builder, name, kind, kind), values)
+
+    kind = VECTOR if value == VECTOR else types.float64
+    return kind(kind), generate
+
+
+def larger_value(_context: Any, a: Any, b: Any) -> Any:
+    """The larger of two numbers or vectors; the second if they cannot be compared."""
+
+    def generate(context: Any, builder: Any, sig: Any, values: Any) -> Any:
+        if VECTOR in sig.args:
+            values = [as_vector(context, builder, *each) for each in zip(sig.args, values, strict=True)]
+        return larger(builder, *values)
+
+    kinds = [VECTOR if kind == VECTOR else types.float64 for kind in (a, b)]
+    return (VECTOR if VECTOR in kinds else types.float64)(*kinds), generate
+
+
+def choice(_context: Any, flags: Any, a: Any, b: Any) -> Any:
+    """One of two numbers or vectors, by an answer or by eight."""
+
+    def generate(context: Any, builder: Any, sig: Any, values: Any) -> Any:
+        if sig.args[0] == FLAGS:
+            both = zip(sig.args[1:], values[1:], strict=True)
+            values = [values[0], *(as_vector(context, builder, *each) for each in both)]
+        return builder.select(*values)
+
+    kinds = [VECTOR if kind == VECTOR else types.float64 for kind in (a, b)]
+    if flags == FLAGS:
+        return VECTOR(FLAGS, *kinds), generate
+    return types.float64(types.boolean, types.float64, types.float64), generate

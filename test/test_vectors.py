@@ -9,10 +9,12 @@ from leg_wear_monitor.kernel import entry, kernel
 from leg_wear_monitor.vectors import (
     WIDTH,
     any_of,
+    bits_of,
     entry_of,
     evens,
     every,
     largest,
+    number_of,
     odds,
     only,
     padded,
@@ -119,6 +121,17 @@ def test_single_precision_rows_of_three_dimensions():
     x, out = np.arange(24.0, dtype=np.float32).reshape(2, 3, 4), np.full(WIDTH, 9.0)
     widened(x, out)
     np.testing.assert_array_equal(out, [18.0, 19.0, 0, 0, 0, 0, 0, 0])
+
+
+@entry
+def there_and_back(number):
+    whole = bits_of(number)
+    return whole, number_of(whole)
+
+
+@pytest.mark.parametrize("number", [0.0, 1.0, -2.5, 1.0e-300, math.pi, math.inf])
+def test_bits(number):
+    assert there_and_back(number) == (int(np.float64(number).view(np.int64)), number)
 
 
 @pytest.mark.parametrize(("count", "room"), [(0, 0), (1, 8), (8, 8), (9, 16)])

@@ -24,9 +24,9 @@ from leg_wear_monitor.vectors.kinds import WIDTH, padded
 from leg_wear_monitor.vectors.operators import register_operators
 
 __all__ = [
-    "WIDTH", "any_of", "copy_array", "entry_of", "evens", "every", "fetch", "floor", "gather", "largest",
-    "odds", "only", "padded", "part_at", "put_part", "put_vector", "root", "vector_at", "vector_max",
-    "vector_sum", "where", "with_entry", "zip_first", "zip_last",
+    "WIDTH", "any_of", "bits_of", "copy_array", "entry_of", "evens", "every", "fetch", "floor", "gather",
+    "largest", "number_of", "odds", "only", "padded", "part_at", "put_part", "put_vector", "root",
+    "vector_at", "vector_max", "vector_sum", "where", "with_entry", "zip_first", "zip_last",
 ]  # fmt: skip
 
 _COMPILED = not numba.config.DISABLE_JIT
@@ -71,6 +71,9 @@ every: Any = _kernel(entries.repeated, lambda number: np.full(WIDTH, number, dty
 only: Any = _kernel(entries.single, lambda number, i: plain.replaced(np.zeros(WIDTH), i, number))
 # any_of(flags): whether one of them is set
 any_of: Any = _kernel(entries.any_flag, lambda flags: bool(flags.any()))
+# bits_of(number), number_of(bits): a number, and its bits as a whole number
+bits_of: Any = _kernel(formulas.bits, lambda number: int(np.float64(number).view(np.int64)))
+number_of: Any = _kernel(formulas.of_bits, lambda bits: float(np.int64(bits).view(np.float64)))
 # root(a), floor(a), largest(a, b), where(flags, a, b): square root, whole number below, larger value, a or b;
 # of numbers and of vectors
 root: Any = _kernel(formulas.square_root, plain.root_of)

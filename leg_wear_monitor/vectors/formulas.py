@@ -2,6 +2,7 @@
 
 from typing import Any
 
+from llvmlite import ir
 from numba import types
 
 from leg_wear_monitor.vectors.kinds import (
@@ -38,6 +39,24 @@ def whole_part(_context: Any, value: Any) -> Any:
 
     kind = VECTOR if value == VECTOR else types.float64
     return kind(kind), generate
+
+
+def bits(_context: Any, number: Any) -> Any:
+    """The bits of a number as a whole number: sign, exponent plus 1023 above 52 binary digits."""
+
+    def generate(_context: Any, builder: Any, _sig: Any, values: Any) -> Any:
+        return builder.bitcast(values[0], ir.IntType(64))
+
+    return types.int64(types.float64), generate
+
+
+def of_bits(_context: Any, whole: Any) -> Any:
+    """The number with such bits."""
+
+    def generate(_context: Any, builder: Any, _sig: Any, values: Any) -> Any:
+        return builder.bitcast(values[0], NUMBER)
+
+    return types.float64(types.int64), generate
 
 
 def larger_value(_context: Any, a: Any, b: Any) -> Any:

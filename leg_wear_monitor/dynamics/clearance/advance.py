@@ -50,7 +50,7 @@ from leg_wear_monitor.dynamics.run.run_statistics import (
     bin_of,
 )
 from leg_wear_monitor.kernel import ByAddress, entry, kernel
-from leg_wear_monitor.vectors import WIDTH, copy_array, put_vector, vector_at
+from leg_wear_monitor.vectors import WIDTH, bits_of, copy_array, number_of, put_vector, vector_at
 from leg_wear_monitor.wear.surfaces import Surfaces
 
 RENEWAL = 2  # intervals between two evaluations of the ideal joints' reactions, which change slowly
@@ -59,6 +59,7 @@ WEARING = 8  # intervals after which pending wear is deposited, to spread its co
 MOST_TRIALS = 20000  # trial steps in a part of an interval before the run stops
 
 _SHORTEST_STEP = 1.0e-13  # s
+_CUBE_ROOT_GUESS = 0x553EF0FF289DD796  # bits of 1 times 4/3, less what makes the largest error least
 # A rest that is one step but for rounding is one step: a step of half a rest leaves as much, and which of the
 # two is longer would depend on the last bit.
 _NEARLY = 1.0 + 1.0e-6
@@ -165,7 +166,7 @@ def _steps(model, surfaces, state, begin, length, statistics, work):
         trials += 1
         statistics.steps[0] += 1
         if not error <= 1.0:
-            state.step[0] = h * max(0.2, 0.9 * error ** (-1.0 / 3.0)) if error < 1.0e9 else 0.1 * h
+            state.step[0] = h * max(0.2, 0.9 * inverse_cube_root(error)) if error < 1.0e9 else 0.1 * h
             cut, growth = NEVER, 1.0
             if state.step[0] < _SHORTEST_STEP or trials > MOST_TRIALS:
                 return STEP_TOO_SMALL, pushed_through(contacts.bushing_radius, end)
@@ -188,8 +189,18 @@ def _steps(model, surfaces, state, begin, length, statistics, work):
 @kernel
 def _next_over(error, growth):
     """Length of the next step over that of this one, which has a local error relative to the tolerance."""
-    # the power is needed in half of the steps only, and takes as long as the forces of all joints
-    return growth if error * growth**3 <= 0.9**3 else 0.9 * error ** (-1.0 / 3.0)
+    return growth if error * growth**3 <= 0.9**3 else 0.9 * inverse_cube_root(error)
+
+
+@kernel
+def inverse_cube_root(x):
+    """x^(-1/3) to 1.2e-5, for a normal positive x: a guess by the bits, nearly a logarithm, and Newton.
+
+    The library's power would take as long as the forces of all joints.
+    """
+    y = number_of(_CUBE_ROOT_GUESS - bits_of(x) // 3)
+    y *= (4.0 - x * y * y * y) / 3.0
+    return y * (4.0 - x * y * y * y) / 3.0
 
 
 @kernel

@@ -11,6 +11,7 @@ import numpy as np
 
 from leg_wear_monitor.kernel import kernel
 from leg_wear_monitor.mechanism.arrays import Floats, Ints
+from leg_wear_monitor.vectors import bits_of
 
 # integrals of a joint: |F| [N s], F^2 [N^2 s], time in contact [s], friction work [J], loss in the normal
 # direction [J], F_N |v_t| [J]
@@ -28,6 +29,8 @@ POSITION, VELOCITY, ACCELERATION, TORQUE_ERROR = 0, 1, 2, 3
 # bins of a histogram: 128 per octave, at most 0.8 % wide, from 2^-20 to 2^30
 _FIRST_OCTAVE, _OCTAVES, _IN_OCTAVE = -20, 50, 128
 _BINS = _OCTAVES * _IN_OCTAVE
+# of the 52 binary digits of a number, 7 tell 128 bins; its exponent is stored plus 1023
+_DIGITS_AFTER_BIN, _BITS_OF_FIRST = 52 - 7, (1023 + _FIRST_OCTAVE) * _IN_OCTAVE
 
 
 class RunStatistics(NamedTuple):
@@ -76,12 +79,10 @@ def new_run_statistics(joints: int) -> RunStatistics:
 
 @kernel
 def bin_of(magnitude):
-    """Index of a magnitude's bin, from its binary exponent and mantissa."""
+    """Index of a magnitude's bin: its binary exponent and the first binary digits after it."""
     if not magnitude > 2.0**_FIRST_OCTAVE:
         return 0
-    mantissa, exponent = math.frexp(magnitude)
-    i = (exponent - 1 - _FIRST_OCTAVE) * _IN_OCTAVE + int((2.0 * mantissa - 1.0) * _IN_OCTAVE)
-    return min(i, _BINS - 1)
+    return min((bits_of(magnitude) >> _DIGITS_AFTER_BIN) - _BITS_OF_FIRST, _BINS - 1)
 
 
 def bin_edge(i: float) -> float:

@@ -277,7 +277,7 @@ def test_a_mirrored_leg_moves_and_wears_mirrored(worn_leg):
     steppers = []
     for mechanism, speed in ((worn_leg, TURN), (_mirrored(worn_leg), -TURN)):
         stepper = ClearanceStepper(prepare(mechanism, clearances=("A", "B"), wear=True))
-        drive(stepper, [Piece(steady_drive(0.0, speed), 0.1)], new_run_statistics(10))
+        drive(stepper, [Piece(steady_drive(0.0, speed), 0.09)], new_run_statistics(10))
         steppers.append(stepper)
     seen, mirrored = steppers
     assert np.abs(seen.state.e).max() > 2.9e-4

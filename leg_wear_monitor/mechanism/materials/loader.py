@@ -20,7 +20,13 @@ def materials() -> dict[str, Path]:
     >>> "du-on-steel-dry" in lw.materials()
     True
     """
-    return {path.stem: path for path in sorted((share_directory() / "config" / "materials").glob("*.yaml"))}
+    return dict(_files(share_directory() / "config" / "materials"))
+
+
+@cache
+def _files(directory: Path) -> dict[str, Path]:
+    """Files of a directory of the package, which each joint of a leg asks for."""
+    return {path.stem: path for path in sorted(directory.glob("*.yaml"))}
 
 
 def load_material(name_or_path: str | Path) -> Material:
@@ -59,7 +65,7 @@ def load_material(name_or_path: str | Path) -> Material:
 
 @cache
 def _shipped(path: Path) -> Material:
-    """A file of the package, which each joint of a leg asks for."""
+    """A file of the package."""
     return _read(path, path.name)
 
 

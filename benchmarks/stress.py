@@ -59,7 +59,7 @@ def main() -> None:
             print(f"{done + chunk:7d}  {sizes}{residuals[-1]:15.2e}")
     spent = time.process_time() - began
     coefficient = setup.contacts.wear_coefficient
-    taken = coefficient * (total[setup.contacts.joint] - run.stepper.state.pending[:, 0])[:, None]
+    taken = coefficient * (total[setup.contacts.joint] - run.stepper.state.pending[0])[:, None]
     lost = np.abs(worn_volume(setup.contacts, setup.surfaces) / taken - 1.0).max()
     middle, most = np.median(np.abs(residuals)), np.abs(residuals).max()
     print(f"energy residual over losses, {chunk} cycles at a time: median {middle:.1e}, largest {most:.1e}")

@@ -56,7 +56,8 @@ def test_vectors_are_the_numbers_one_by_one(width):
     total, most = along(0.3, a, b, out)
     np.testing.assert_array_equal(out, (b + 0.3 * a) - a * b)
     assert total == pytest.approx(a[1] @ b[1], rel=1.0e-12)
-    assert most == max(0.0, (a[1] * b[1]).max()) if width % WIDTH else (a[1] * b[1]).max()
+    largest_of_row = (a[1] * b[1]).max()
+    assert most == (max(0.0, largest_of_row) if width % WIDTH else largest_of_row)
 
 
 def test_a_row_that_starts_at_any_number_and_a_store_that_stays_inside():

@@ -3,10 +3,9 @@
 import math
 
 from leg_wear_monitor.kernel import kernel
-from leg_wear_monitor.vectors import largest, where
+from leg_wear_monitor.vectors import LEAST_DIVISOR, largest, where
 
 NONE, AMBROSIO, THRELFALL = 0, 1, 2
-_LEAST = 1.0e-300  # m/s: the reciprocal is finite
 FRICTION_CODES = {"none": NONE, "ambrosio": AMBROSIO, "threlfall": THRELFALL}
 
 
@@ -16,7 +15,7 @@ def ambrosio_ramp(speed, v0, v1):
 
     For numbers or vectors.
     """
-    return where(speed > v0, where(speed < v1, (speed - v0) / largest(v1 - v0, _LEAST), 1.0), 0.0)
+    return where(speed > v0, where(speed < v1, (speed - v0) / largest(v1 - v0, LEAST_DIVISOR), 1.0), 0.0)
 
 
 @kernel

@@ -3,9 +3,8 @@
 import math
 
 from leg_wear_monitor.kernel import kernel
-from leg_wear_monitor.vectors import largest, root, where
+from leg_wear_monitor.vectors import LEAST_DIVISOR, largest, root, where
 
-_LEAST = 1.0e-300  # m: the reciprocal is finite
 _SHARPEST = 1.0  # bound of the gradient's part across e by the bend; the wall's unit normal has length 1
 
 
@@ -16,7 +15,7 @@ def journal_contact(ex, ey, clearance):
     For numbers or vectors. physics.md section 3.
     """
     e = root(ex * ex + ey * ey)
-    inverse, away = 1.0 / largest(e, _LEAST), e > 0.0
+    inverse, away = 1.0 / largest(e, LEAST_DIVISOR), e > 0.0
     return e - clearance, where(away, ex * inverse, 1.0), where(away, ey * inverse, 0.0)
 
 
@@ -39,7 +38,7 @@ def worn_contact(ex, ey, clearance, slope, bend):
     """
     delta, rx, ry = journal_contact(ex, ey, clearance)
     inside = largest(delta, 0.0)
-    inverse = 1.0 / largest(clearance + inside, _LEAST)  # in contact, 1 / |e|
+    inverse = 1.0 / largest(clearance + inside, LEAST_DIVISOR)  # in contact, 1 / |e|
     tilt = slope * inverse
     square = 1.0 / (1.0 + tilt * tilt)
     scale = root(square)

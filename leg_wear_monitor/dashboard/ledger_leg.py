@@ -63,7 +63,7 @@ class LedgerLeg:
     ) -> None:
         self._path, self._clock = path, clock
         self._setup, self._binding = leg_setup(config, mechanism), binding_of(mechanism, config)
-        self._read_stamps: Stamps = stamps_of(path, beside(path, ENDING))
+        self._read_stamps: Stamps = ()
         self._failures = 0
         self._fault = ""
         self._content: LedgerContent | None = None

@@ -20,13 +20,13 @@ import numpy as np
 from numba.extending import intrinsic
 
 from leg_wear_monitor.vectors import entries, formulas, plain, rows
-from leg_wear_monitor.vectors.kinds import WIDTH, padded
+from leg_wear_monitor.vectors.kinds import LEAST_DIVISOR, WIDTH, padded
 from leg_wear_monitor.vectors.operators import register_operators
 
 __all__ = [
-    "WIDTH", "any_of", "bits_of", "copy_array", "entry_of", "evens", "every", "fetch", "floor", "gather",
-    "largest", "number_of", "odds", "only", "padded", "part_at", "put_part", "put_vector", "root",
-    "vector_at", "vector_max", "vector_sum", "where", "with_entry", "zip_first", "zip_last",
+    "LEAST_DIVISOR", "WIDTH", "any_of", "bits_of", "copy_array", "entry_of", "evens", "every", "fetch",
+    "floor", "gather", "largest", "number_of", "odds", "only", "padded", "part_at", "put_part", "put_vector",
+    "root", "vector_at", "vector_max", "vector_sum", "where", "with_entry", "zip_first", "zip_last",
 ]  # fmt: skip
 
 _COMPILED = not numba.config.DISABLE_JIT
@@ -76,7 +76,7 @@ bits_of: Any = _kernel(formulas.bits, lambda number: int(np.float64(number).view
 number_of: Any = _kernel(formulas.of_bits, lambda bits: float(np.int64(bits).view(np.float64)))
 # root(a), floor(a), largest(a, b), where(flags, a, b): square root, whole number below, larger value, a or b;
 # of numbers and of vectors
-root: Any = _kernel(formulas.square_root, plain.root_of)
-floor: Any = _kernel(formulas.whole_part, plain.whole_part_of)
+root: Any = _kernel(formulas.of_llvm("sqrt"), plain.root_of)
+floor: Any = _kernel(formulas.of_llvm("floor"), plain.whole_part_of)
 largest: Any = _kernel(formulas.larger_value, plain.larger_of)
 where: Any = _kernel(formulas.choice, plain.chosen)

@@ -6,7 +6,17 @@ from typing import Any
 from llvmlite import ir
 from numba import types
 
-from leg_wear_monitor.vectors.kinds import FLAGS, LLVM_VECTOR, VECTOR, WIDTH, WORD, larger, spread, words
+from leg_wear_monitor.vectors.kinds import (
+    FLAGS,
+    LLVM_VECTOR,
+    VECTOR,
+    WIDTH,
+    WORD,
+    larger,
+    numbered,
+    spread,
+    words,
+)
 
 
 def shuffling(first: list[int]) -> Any:
@@ -72,8 +82,7 @@ def single(_context: Any, _number: Any, _i: Any) -> Any:
 
     def generate(_context: Any, builder: Any, _sig: Any, values: Any) -> Any:
         number, i = values
-        kind = ir.VectorType(i.type, WIDTH)
-        here = builder.icmp_signed("==", ir.Constant(kind, list(range(WIDTH))), spread(builder, i))
+        here = builder.icmp_signed("==", numbered(i.type), spread(builder, i))
         return builder.select(here, spread(builder, number), ir.Constant(LLVM_VECTOR, [0.0] * WIDTH))
 
     return VECTOR(types.float64, types.intp), generate

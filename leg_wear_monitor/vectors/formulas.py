@@ -17,28 +17,18 @@ from leg_wear_monitor.vectors.kinds import (
 )
 
 
-def square_root(_context: Any, value: Any) -> Any:
-    """Square root of a number or of a vector."""
+def of_llvm(name: str) -> Any:
+    """A function of LLVM's own, of a number or of a vector, by its name there."""
 
-    def generate(context: Any, builder: Any, sig: Any, values: Any) -> Any:
-        kind = LLVM_VECTOR if sig.args[0] == VECTOR else NUMBER
-        name = f"llvm.sqrt.v{WIDTH}f64" if sig.args[0] == VECTOR else "llvm.sqrt.f64"
-        return builder.call(llvm_function(builder, name, kind, kind), values)
+    def find(_context: Any, value: Any) -> Any:
+        def generate(_context: Any, builder: Any, sig: Any, values: Any) -> Any:
+            whole, suffix = (LLVM_VECTOR, f"v{WIDTH}f64") if sig.args[0] == VECTOR else (NUMBER, "f64")
+            return builder.call(llvm_function(builder, f"llvm.{name}.{suffix}", whole, whole), values)
 
-    kind = VECTOR if value == VECTOR else types.float64
-    return kind(kind), generate
+        kind = VECTOR if value == VECTOR else types.float64
+        return kind(kind), generate
 
-
-def whole_part(_context: Any, value: Any) -> Any:
-    """The largest whole number that is not above a number or a vector, as such."""
-
-    def generate(_context: Any, builder: Any, sig: Any, values: Any) -> Any:
-        kind = LLVM_VECTOR if sig.args[0] == VECTOR else NUMBER
-        name = f"llvm.floor.v{WIDTH}f64" if sig.args[0] == VECTOR else "llvm.floor.f64"
-        return builder.call(llvm_function(builder, name, kind, kind), values)
-
-    kind = VECTOR if value == VECTOR else types.float64
-    return kind(kind), generate
+    return find
 
 
 def bits(_context: Any, number: Any) -> Any:

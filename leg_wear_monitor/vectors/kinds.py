@@ -9,6 +9,9 @@ from numba.extending import models, register_model
 
 WIDTH = 8
 
+# a formula without a jump divides by the larger of this and what may be 0, whatever its unit
+LEAST_DIVISOR = 1.0e-300
+
 WORD, NUMBER = ir.IntType(32), ir.DoubleType()
 LLVM_VECTOR, LLVM_FLAGS = ir.VectorType(NUMBER, WIDTH), ir.VectorType(ir.IntType(1), WIDTH)
 
@@ -45,6 +48,11 @@ class _FlagsModel(models.PrimitiveModel):  # type: ignore[misc]
 def padded(count: int) -> int:
     """Least multiple of `WIDTH` that has room for a number of entries."""
     return -(-count // WIDTH) * WIDTH
+
+
+def numbered(kind: Any) -> Any:
+    """The constant vector 0 to 7 of a type of whole numbers."""
+    return ir.Constant(ir.VectorType(kind, WIDTH), list(range(WIDTH)))
 
 
 def words(values: Any) -> Any:

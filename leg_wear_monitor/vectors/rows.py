@@ -14,6 +14,7 @@ from leg_wear_monitor.vectors.kinds import (
     WIDTH,
     WORD,
     llvm_function,
+    numbered,
     spread,
 )
 
@@ -31,8 +32,7 @@ def _place(context: Any, builder: Any, sig: Any, values: Any) -> tuple[Any, Any]
 
 def _flags_below(builder: Any, count: Any) -> Any:
     """Flags of the entries whose number is below a count."""
-    kind = ir.VectorType(count.type, WIDTH)
-    return builder.icmp_signed("<", ir.Constant(kind, list(range(WIDTH))), spread(builder, count))
+    return builder.icmp_signed("<", numbered(count.type), spread(builder, count))
 
 
 def _load(context: Any, builder: Any, sig: Any, values: Any, whole: bool) -> Any:
@@ -60,6 +60,9 @@ def loading(whole: bool) -> Any:
     """Take eight entries from an index on: all in the row, or those beyond its end as 0."""
 
     def load(_context: Any, array: Any, index: Any) -> Any:
+        if array.dtype not in (types.float32, types.float64):
+            return None
+
         def generate(context: Any, builder: Any, sig: Any, values: Any) -> Any:
             return _load(context, builder, sig, values, whole)
 

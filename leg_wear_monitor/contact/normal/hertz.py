@@ -3,10 +3,9 @@
 from leg_wear_monitor.contact.normal.form import Form
 from leg_wear_monitor.contact.normal.hysteresis import with_hysteresis
 from leg_wear_monitor.kernel import kernel
-from leg_wear_monitor.vectors import largest, root, where
+from leg_wear_monitor.vectors import LEAST_DIVISOR, largest, root, where
 
 _EXPONENT = 1.5
-_LEAST = 1.0e-300  # m or m^3: the reciprocal is finite
 
 
 @kernel
@@ -15,7 +14,7 @@ def contact_stiffness(modulus, bushing_radius, journal_radius):
 
     For numbers or vectors. physics.md section 4.
     """
-    clearance = largest(bushing_radius - journal_radius, _LEAST)
+    clearance = largest(bushing_radius - journal_radius, LEAST_DIVISOR)
     return modulus * root(bushing_radius * journal_radius / clearance)
 
 
@@ -50,7 +49,7 @@ def _energy(stiffness, clearance, delta):
 @kernel
 def hertz_softening(given, delta, bushing, journal, slope_b, slope_j):
     """As `Form.softening`, for numbers or vectors: -2/5 delta d ln K, with K that of the local radii."""
-    softer = 0.2 * delta / largest((bushing - journal) * bushing * journal, _LEAST)
+    softer = 0.2 * delta / largest((bushing - journal) * bushing * journal, LEAST_DIVISOR)
     softer = where(given > 0.0, 0.0, softer)
     return softer * slope_b * journal * journal, softer * slope_j * bushing * bushing
 

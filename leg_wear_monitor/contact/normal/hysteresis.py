@@ -6,9 +6,7 @@ The factors chi by the nominal coefficient of restitution, and the restitution t
 import math
 
 from leg_wear_monitor.kernel import kernel
-from leg_wear_monitor.vectors import largest, where
-
-_LEAST = 1.0e-300  # m: the reciprocal is finite
+from leg_wear_monitor.vectors import LEAST_DIVISOR, largest, where
 
 
 def no_loss(restitution: float) -> float:
@@ -54,7 +52,7 @@ def with_hysteresis(elastic, exponent, loss, delta, delta_dot):
         Force [N], its derivatives by delta [N/m] and by delta_dot [N s/m], and its elastic part [N].
     """
     f_n = largest(elastic * (1.0 + loss * delta_dot), 0.0)
-    stiffness = exponent * f_n / largest(delta, _LEAST)
+    stiffness = exponent * f_n / largest(delta, LEAST_DIVISOR)
     return f_n, stiffness, where(f_n > 0.0, elastic * loss, 0.0), elastic
 
 

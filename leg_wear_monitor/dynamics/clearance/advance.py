@@ -130,8 +130,7 @@ def _add_sums(joint, sums, statistics):
 def _part(model, surfaces, state, polynomial, begin, end, statistics, work):
     """Advance by a part of an interval, from begin to end [s], with the tables of its middle."""
     length = end - begin
-    for i in range(work.crank.shape[0]):
-        work.crank[i] = state.drive[i]
+    copy_array(state.drive, work.crank)
     drive_at(polynomial, end, state.drive)
     angle, speed, acceleration = crank_between(work.crank, state.drive, length)
     if not (abs(speed) < _FASTEST and abs(acceleration) * length < _FASTEST):
@@ -233,8 +232,7 @@ def _accept(model, surfaces, state, t, h, turned, statistics, work):
     statistics.drive_integral[TORQUE] += impulse
     statistics.drive_integral[TORQUE_SQUARED] += 0.5 * h * (first[WHOLE] ** 2 + last[WHOLE] ** 2)
     statistics.drive_integral[POWER] += impulse * now.speed[0] + 0.5 * h * (first[OUTSIDE] + last[OUTSIDE])
-    for i in range(last.shape[0]):
-        first[i] = last[i]
+    copy_array(last, first)
 
 
 @kernel

@@ -36,7 +36,7 @@ from leg_wear_monitor.vectors import (
 # the local radii (unit of the law), and the local clearance [m]
 NX, NY, F_T, SLIP, STIFFNESS = range(FILM_SAMPLE, FILM_SAMPLE + 5)
 DAMPING, ELASTIC, CAM, COEFFICIENT, CLEARANCE = range(FILM_SAMPLE + 5, FILM_SAMPLE + 10)
-COLUMNS = FILM_SAMPLE + 10
+SAMPLE_ROWS = FILM_SAMPLE + 10
 
 # integrals of a joint in a step beyond those of the run statistics: friction force [N s]; moment about the
 # crank of the normal force on rotating worn walls [N m s]
@@ -53,8 +53,8 @@ _add_films = ADD_FILMS.call
 
 
 def fresh_sample(law: Floats) -> Floats:
-    """A sample (COLUMNS, room) with what does not change as long as the walls are not worn."""
-    sample = np.zeros((COLUMNS, law.shape[1]))
+    """A sample (SAMPLE_ROWS, room) with what does not change as long as the walls are not worn."""
+    sample = np.zeros((SAMPLE_ROWS, law.shape[1]))
     sample[CLEARANCE], sample[COEFFICIENT] = law[FRESH_CLEARANCE], law[FRESH_COEFFICIENT]
     return sample
 
@@ -65,8 +65,8 @@ def accelerate_clearances(model, surfaces, approach, now, turned, x, at_e, at_v,
 
     ``approach`` (k,): approach speeds [m/s], 0 for open joints; ``now``: the step's tables; ``turned``: crank
     angle relative to that of the tables [rad]; x (VECTORS, room) with eccentricities [m] and rates [m/s] in
-    rows at_e and at_v, the result in row out_a; out_sample (COLUMNS, room), only what the accelerations need
-    of it if not ``whole``.
+    rows at_e and at_v, the result in row out_a; out_sample (SAMPLE_ROWS, room), only what the accelerations
+    need of it if not ``whole``.
     """
     for k in range(0, out_sample.shape[1], WIDTH):
         _push_joints(model, surfaces, approach, now, turned, k, x, at_e, at_v, out_sample, whole)
@@ -83,8 +83,8 @@ def accelerate_clearances(model, surfaces, approach, now, turned, x, at_e, at_v,
 @kernel
 def _push_joints(model, surfaces, approach, now, turned, k, x, at_e, at_v, out_sample, whole):
     """Contact forces of eight joints from joint k on, into row PUSH of x and into the samples."""
-    ex, ey = _components(x, at_e, k)
-    vx, vy = _components(x, at_v, k)
+    ex, ey = components(x, at_e, 2 * k)
+    vx, vy = components(x, at_v, 2 * k)
     if surfaces.feeds_back:
         delta, nx, ny, cam, clearance, coefficient = touch_worn_walls(model, surfaces, now, turned, k, ex, ey)
         put_vector(out_sample, (CAM, k), cam)
@@ -124,9 +124,9 @@ def _push_joints(model, surfaces, approach, now, turned, k, x, at_e, at_v, out_s
 
 
 @kernel
-def _components(x, row, k):
-    """X and y of eight joints from joint k on, in a row of x."""
-    first, second = vector_at(x, (row, 2 * k)), vector_at(x, (row, 2 * k + WIDTH))
+def components(rows, row, i):
+    """X and y of eight joints in a row of an array, from its entry i on."""
+    first, second = vector_at(rows, (row, i)), vector_at(rows, (row, i + WIDTH))
     return evens(first, second), odds(first, second)
 
 

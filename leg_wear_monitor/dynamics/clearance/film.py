@@ -17,7 +17,7 @@ from leg_wear_monitor.dynamics.joint.contact_event import DELTA, EX, EY, SAMPLE,
 from leg_wear_monitor.kernel import ByAddress, entry
 from leg_wear_monitor.mechanism.arrays import Floats
 
-# columns of a sample: force of the film on the journal [N], its moments on the bushing's and the journal's
+# rows of a sample: force of the film on the journal [N], its moments on the bushing's and the journal's
 # body [N m], speeds of these bodies [rad/s]
 FILM_X, FILM_Y, MOMENT_B, MOMENT_J, SPEED_B, SPEED_J = range(SAMPLE, SAMPLE + 6)
 FILM_SAMPLE = SAMPLE + 6

@@ -24,9 +24,8 @@ def load_spins(tables, points, e, v, ahead, now):
     ``points`` (i, w): row of the table and fraction to the next. physics.md section 7.
     """
     spin, (i, w), d = tables.spin, points, e.shape[0]
-    turn = now.turn.reshape(-1)
     for r in range(now.spin.shape[0]):
-        now.spin_turn[r] = turn[r]
+        now.spin_turn[r] = now.turn_line[r]
         for c in range(d):
             here = (1.0 - w) * spin[i, 0, r, c] + w * spin[i + 1, 0, r, c]
             slope = (1.0 - w) * spin[i, 1, r, c] + w * spin[i + 1, 1, r, c]

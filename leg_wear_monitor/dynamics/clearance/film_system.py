@@ -71,7 +71,7 @@ def _add_block(r, xx, xy, yx, yy, out_block):
 def factorise_films(
     h, settings, slack, inverse_mass, crank_speed, sample, out_block, out_stiffness, out_cam, out_matrix
 ):
-    """Factorise the system of a step h [s] from a sample (k, COLUMNS).
+    """Factorise the system of a step h [s] from a sample (SAMPLE_ROWS, room).
 
     Results: D and gamma h K as blocks (2 k, 2); force (2 k,) [N] of contacts by the rotation of worn walls;
     triangular factors (2 k, 2 k). Returns the number of unknowns.

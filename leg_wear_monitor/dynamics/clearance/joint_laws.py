@@ -8,7 +8,7 @@ import numpy as np
 
 from leg_wear_monitor.contact.arrays import ContactArrays
 from leg_wear_monitor.contact.friction import (
-    AMBROSIO,
+    NONE,
     THRELFALL,
     against,
     ambrosio_ramp,
@@ -38,6 +38,7 @@ def contact_laws(contacts: ContactArrays) -> Floats:
     laws[:FRICTION_COEFFICIENT, :k] = contacts.normal_form, contacts.hysteresis, fresh, contacts.clearance
     laws[FRICTION_COEFFICIENT:FRICTION_LAW, :k] = contacts.friction.T
     laws[FRICTION_LAW, :k] = contacts.friction_law
+    laws[FRICTION_COEFFICIENT, :k][contacts.friction_law == NONE] = 0.0
     return laws
 
 
@@ -67,10 +68,9 @@ def joint_forces(model, k, coefficient, clearance, approach, delta, rate, slip):
     touching = (delta > 0.0) & (approach > 0.0)
     loss = vector_at(law, (HYSTERESIS_FACTOR, k)) / where(touching, approach, 1.0)
     delta = where(touching, delta, 0.0)
-    mu, code = vector_at(law, (FRICTION_COEFFICIENT, k)), vector_at(law, (FRICTION_LAW, k))
+    mu = vector_at(law, (FRICTION_COEFFICIENT, k))
     v0, v1 = vector_at(law, (RAMP_0, k)), vector_at(law, (RAMP_1, k))
     f_n, stiffness, damping, elastic = hertz_force(coefficient, clearance, loss, delta, rate)
-    mu = where(code == AMBROSIO, mu, 0.0)
     f_t = against(slip, mu * ambrosio_ramp(abs(slip), v0, v1) * f_n)
     if not model.usual:
         for i in range(WIDTH):

@@ -67,18 +67,20 @@ class StepTables(NamedTuple):
     """Tables at the present crank angle: ``row`` (w,) of the table ``motion``, and its parts.
 
     Parts that depend on e are evaluated for the eccentricities in the middle of the part of an interval.
-    ``speed`` (2,): speed [rad/s] and acceleration [rad/s^2] of the crank. For these: ``force`` (d,) [N]: on e
-    at rest, without contact; ``bare`` (d,): its acceleration; ``drift`` (d, d): accelerations per e',
-    ``drift_line`` (d d,): the same entries, as ``coriolis_line``, ``angle_line`` and ``turn_line`` those of
-    ``coriolis``, ``angle`` and ``turn``; ``moment`` (k, d): forces on e per friction force in each joint,
-    ``lever`` transposed; drive torque: ``torque_0`` (1,) [N m] at rest, ``torque_by_v`` (d,) per e',
-    ``torque_by_e`` (d,) per e. ``toward`` (3, k): reference directions of the eccentricities at the start of
-    the interval. For the moments of films, of both bodies of each joint: ``spin`` (d, d): their rates per e',
-    ``spin_turn`` (d,): per crank speed; ``spin_response`` (d, d): accelerations per moment.
+    ``speed`` (2,): speed [rad/s] and acceleration [rad/s^2] of the crank. ``middle`` (d,): these
+    eccentricities. For both: ``force`` (d,) [N]: on e at rest, without contact; ``bare`` (d,): its
+    acceleration; ``drift`` (d, d): accelerations per e', ``drift_line`` (d d,): the same entries, as
+    ``coriolis_line``, ``angle_line`` and ``turn_line`` those of ``coriolis``, ``angle`` and ``turn``;
+    ``moment`` (k, d): forces on e per friction force in each joint, ``lever`` transposed; drive torque:
+    ``torque_0`` (1,) [N m] at rest, ``torque_by_v`` (d,) per e', ``torque_by_e`` (d,) per e. ``toward`` (3,
+    k): reference directions of the eccentricities at the start of the interval. For the moments of films, of
+    both bodies of each joint: ``spin`` (d, d): their rates per e', ``spin_turn`` (d,): per crank speed;
+    ``spin_response`` (d, d): accelerations per moment.
     """
 
     row: Floats
     speed: Floats
+    middle: Floats
     force: Floats
     bare: Floats
     drift: Floats
@@ -115,7 +117,7 @@ class StepTables(NamedTuple):
 class ClearanceWork(NamedTuple):
     """Work arrays of an interval.
 
-    ``now``: step tables; ``system``: contact system; ``start``, ``end`` (COLUMNS, room): samples of the
+    ``now``: step tables; ``system``: contact system; ``start``, ``end`` (SAMPLE_ROWS, room): samples of the
     joints at a step's start and end; ``x`` (VECTORS, 2 room): vectors of a step; ``weight`` (N,): of the wear
     on an arc; ``by`` (c,): factors of the reactions' table; ``reaction`` (r,), ``toe`` (2,): observed values;
     ``added`` (ADDED, room): increments of the joints' integrals in a step, ``sums`` (JOINT_RATES, room): in
@@ -179,6 +181,7 @@ def clearance_work(model: ClearanceModel, state: ClearanceState) -> ClearanceWor
     now = StepTables(
         row=row,
         speed=np.zeros(2),
+        middle=np.zeros(d),
         force=np.zeros(d),
         bare=np.zeros(d),
         drift=drift,
@@ -269,19 +272,24 @@ def _follow_eccentricities(tables, angle, e, v, ahead, now):
     by_e, bend, row, speed = tables.by_e, tables.bend, now.row, now.speed[0]
     drift, coriolis = now.drift_line, now.coriolis_line
     n, w = blend(by_e.shape[0] - 1, angle)
+    for j in range(e.shape[0]):
+        now.middle[j] = e[j] + ahead * v[j]
     for block in range(by_e.shape[1]):
-        before, after, i = every(0.0), every(0.0), WIDTH * block
-        for j in range(e.shape[0]):
-            middle = e[j] + ahead * v[j]
-            before += middle * vector_at(by_e, (n, block, j, 0))
-            after += middle * vector_at(by_e, (n + 1, block, j, 0))
-        put_part(row, i, part_at(row, i) + ((1.0 - w) * before + w * after))
+        i = WIDTH * block
+        put_part(row, i, part_at(row, i) + _times_table(by_e, n, w, block, now.middle))
     for block in range(bend.shape[1]):
-        before, after, i = every(0.0), every(0.0), WIDTH * block
-        for j in range(e.shape[0]):
-            before += v[j] * vector_at(bend, (n, block, j, 0))
-            after += v[j] * vector_at(bend, (n + 1, block, j, 0))
-        put_part(drift, i, speed * part_at(coriolis, i) - ((1.0 - w) * before + w * after))
+        i = WIDTH * block
+        put_part(drift, i, speed * part_at(coriolis, i) - _times_table(bend, n, w, block, v))
+
+
+@kernel
+def _times_table(table, n, w, block, values):
+    """Product of values (d,) and a block of a table (M + 1, blocks, d, WIDTH), w rows after row n."""
+    before, after = every(0.0), every(0.0)
+    for j in range(values.shape[0]):
+        before += values[j] * vector_at(table, (n, block, j, 0))
+        after += values[j] * vector_at(table, (n + 1, block, j, 0))
+    return (1.0 - w) * before + w * after
 
 
 @kernel
@@ -297,12 +305,16 @@ def fetch_tables(tables, angle, speed):
     i, w = blend(by_e.shape[0] - 1, angle)
     if (w < 0.25 and speed > 0.0) or (w > 0.75 and speed <= 0.0):  # the first of four
         i = (i + ahead) % by_e.shape[0]
-        for block in range(by_e.shape[1]):
-            for j in range(0, by_e.shape[2], 2):
-                fetch(by_e, (i, block, j, 0))
-        for block in range(bend.shape[1]):
-            for j in range(0, bend.shape[2], 2):
-                fetch(bend, (i, block, j, 0))
+        _fetch_blocks(by_e, i)
+        _fetch_blocks(bend, i)
+
+
+@kernel
+def _fetch_blocks(table, i):
+    """Fetch row i of a table in blocks of single vectors, of which two are in a line of memory."""
+    for block in range(table.shape[1]):
+        for j in range(0, table.shape[2], 2):
+            fetch(table, (i, block, j, 0))
 
 
 @kernel

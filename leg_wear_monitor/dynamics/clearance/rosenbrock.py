@@ -16,11 +16,11 @@ from typing import NamedTuple
 
 import numpy as np
 
-from leg_wear_monitor.dynamics.clearance.contact import CAM, DAMPING, NX, NY, STIFFNESS
+from leg_wear_monitor.dynamics.clearance.contact import CAM, DAMPING, NX, NY, STIFFNESS, components
 from leg_wear_monitor.dynamics.joint.contact_event import F_N
 from leg_wear_monitor.kernel import kernel
 from leg_wear_monitor.mechanism.arrays import Floats, Ints
-from leg_wear_monitor.vectors import WIDTH, evens, odds, only, padded, part_at, put_vector, vector_at, where
+from leg_wear_monitor.vectors import WIDTH, only, padded, part_at, put_vector, vector_at, where
 
 GAMMA = 1.0 - math.sqrt(0.5)
 
@@ -71,7 +71,7 @@ def contact_system(k: int) -> ContactSystem:
 
 @kernel
 def factorise_contacts(h, inverse_mass, speed, sample, out_system):
-    """Eliminate the system of a step h [s] from a sample (COLUMNS, room); returns the number of contacts."""
+    """Eliminate the system of a step h [s] from a sample (SAMPLE_ROWS, room); returns how many touch."""
     m, g, active = 0, GAMMA * h, out_system.active
     for k in range(0, sample.shape[1], WIDTH):
         pushing = vector_at(sample, (F_N, k)) > 0.0
@@ -103,9 +103,8 @@ def _couple(a, inverse_mass, sample, out_system):
         pushed = nx * part_at(inverse_mass, (2 * k, i)) + ny * part_at(inverse_mass, (2 * k + 1, i))
         put_vector(rows, (a, room + i), pushed)
     for b in range(0, room, WIDTH):
-        first, second = vector_at(rows, (a, room + 2 * b)), vector_at(rows, (a, room + 2 * b + WIDTH))
-        along = vector_at(normal, (0, b)) * evens(first, second)
-        along += vector_at(normal, (1, b)) * odds(first, second)
+        x, y = components(rows, a, room + 2 * b)
+        along = vector_at(normal, (0, b)) * x + vector_at(normal, (1, b)) * y
         put_vector(rows, (a, b), along + only(out_system.compliance[k], k - b))
 
 
@@ -134,12 +133,11 @@ def solve_contacts(h, system, m, stage, x, r_e, r_v, out_e, out_v):
     g, right, normal, rows = GAMMA * h, system.right, system.normal, system.rows
     if m > 0:
         for k in range(0, right.shape[0], WIDTH):
-            first, second = vector_at(x, (r_v, 2 * k)), vector_at(x, (r_v, 2 * k + WIDTH))
             nx, ny = vector_at(normal, (0, k)), vector_at(normal, (1, k))
-            rate = nx * evens(first, second) + ny * odds(first, second)
-            first, second = vector_at(x, (r_e, 2 * k)), vector_at(x, (r_e, 2 * k + WIDTH))
-            along = nx * evens(first, second) + ny * odds(first, second) + stage * vector_at(system.cam, k)
-            put_vector(right, k, rate + vector_at(system.ratio, k) * along)
+            vx, vy = components(x, r_v, 2 * k)
+            ex, ey = components(x, r_e, 2 * k)
+            along = nx * ex + ny * ey + stage * vector_at(system.cam, k)
+            put_vector(right, k, nx * vx + ny * vy + vector_at(system.ratio, k) * along)
     for i in range(0, system.matrix.shape[0], WIDTH):
         total = vector_at(x, (r_v, i))
         for a in range(m):

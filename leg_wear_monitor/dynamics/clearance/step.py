@@ -82,7 +82,7 @@ def drift(now, x):
 
 @kernel
 def try_step(model, surfaces, approach, h, turned, now, system, x, start, end):
-    """Trial step of length h [s] from rows E0, V0, A0 of x to E1, V1, A1 and sample ``end`` (COLUMNS, room).
+    """Trial step of length h [s] from rows E0, V0, A0 of x to E1, V1, A1 and the sample ``end``.
 
     ``turned``: crank angle at the end of the step, relative to that of the tables [rad]. Returns the local
     error over the tolerance: the difference of the second-order step and the cubic through the accelerations
@@ -172,7 +172,7 @@ def _middle(start, end, row, k):
 
 @kernel
 def _add_sample(k, weight, sample, out_added):
-    """Add the rates of the integrals of eight joints at a sample (COLUMNS, room), times a weight [s]."""
+    """Add the rates of the integrals of eight joints at a sample (SAMPLE_ROWS, room), times a weight [s]."""
     f_n, f_t = vector_at(sample, (F_N, k)), vector_at(sample, (F_T, k))
     elastic, rate = vector_at(sample, (ELASTIC, k)), vector_at(sample, (DELTA_DOT, k))
     slip, cam = vector_at(sample, (SLIP, k)), vector_at(sample, (CAM, k))
@@ -212,10 +212,10 @@ def gather_wear(added, start, end, pending):
             ex += w * (vector_at(end, (EX, k)) - ex)
             ey += w * (vector_at(end, (EY, k)) - ey)
             length = root(ex * ex + ey * ey)
-            share = integral / where(integral > 0.0, length, 1.0)
+            per_length = integral / where(integral > 0.0, length, 1.0)
             put_part(pending, (0, k), part_at(pending, (0, k)) + integral)
-            put_part(pending, (1, k), part_at(pending, (1, k)) + share * ex)
-            put_part(pending, (2, k), part_at(pending, (2, k)) + share * ey)
+            put_part(pending, (1, k), part_at(pending, (1, k)) + per_length * ex)
+            put_part(pending, (2, k), part_at(pending, (2, k)) + per_length * ey)
             put_part(pending, (3, k), part_at(pending, (3, k)) + integral * length)
 
 

@@ -148,7 +148,7 @@ class ClearanceStepper:
         return np.asarray(force + films)
 
     def _sample(self) -> Floats:
-        """The last sample before that time (COLUMNS, k)."""
+        """The last sample before that time (SAMPLE_ROWS, k)."""
         return self.work.start[:, : len(self.state.approach)]
 
     def set_eccentricities(self, eccentricity: Floats) -> None:

@@ -7,6 +7,7 @@ from leg_wear_monitor.dynamics.clearance.joint_laws import FRESH_COEFFICIENT
 from leg_wear_monitor.dynamics.joint.joint_contact import coefficient_at, penetration, soften, touch_walls
 from leg_wear_monitor.kernel import kernel
 from leg_wear_monitor.vectors import (
+    LEAST_DIVISOR,
     WIDTH,
     any_of,
     entry_of,
@@ -26,7 +27,6 @@ from leg_wear_monitor.wear.surfaces import BUSHING, JOURNAL, profiles_at
 TO_X, TO_Y, TO_ANGLE = range(3)
 
 _NEAR = 0.1  # largest sine of an angle for the arc sine's series, whose error is then 3e-11 rad
-_LEAST = 1.0e-300  # m: the reciprocal is finite
 
 
 @kernel
@@ -45,7 +45,7 @@ def directions_of(ex, ey, k, toward):
     """Angles [rad] of the eccentricities of eight joints, from the reference directions where near."""
     to_x, to_y = part_at(toward, (TO_X, k)), part_at(toward, (TO_Y, k))
     across, along, length = to_x * ey - to_y * ex, to_x * ex + to_y * ey, root(ex * ex + ey * ey)
-    s = across / largest(length, _LEAST)
+    s = across / largest(length, LEAST_DIVISOR)
     square = s * s
     series = 1.0 + square * (1.0 / 6.0 + square * (3.0 / 40.0 + square * (15.0 / 336.0)))
     direction = part_at(toward, (TO_ANGLE, k)) + s * series

@@ -6,10 +6,8 @@ from leg_wear_monitor.contact.friction import friction_force
 from leg_wear_monitor.contact.geometry import journal_contact, worn_contact
 from leg_wear_monitor.contact.normal.laws import elastic_energy, law_coefficient, normal_force, softening
 from leg_wear_monitor.kernel import kernel
-from leg_wear_monitor.vectors import largest
+from leg_wear_monitor.vectors import LEAST_DIVISOR, largest
 from leg_wear_monitor.wear.surfaces import deposit_wear, local_surfaces
-
-_LEAST = 1.0e-300  # m^2: the reciprocal is finite
 
 
 @kernel
@@ -53,7 +51,7 @@ def touch_walls(ex, ey, clearance, slope_b, slope_j, bend_b, bend_j):
 @kernel
 def soften(ex, ey, nx, ny, cam_b, cam_j, softer_b, softer_j):
     """Normal and derivatives with the change of the law's coefficient; for numbers or vectors."""
-    along = (softer_b + softer_j) / largest(ex * ex + ey * ey, _LEAST)
+    along = (softer_b + softer_j) / largest(ex * ex + ey * ey, LEAST_DIVISOR)
     return nx + along * ey, ny - along * ex, cam_b + softer_b, cam_j + softer_j
 
 

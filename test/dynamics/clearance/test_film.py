@@ -7,7 +7,7 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from leg_wear_monitor import Mechanism
-from leg_wear_monitor.dynamics.clearance.contact import CAM, COLUMNS, DAMPING, NX, NY, STIFFNESS, VECTORS
+from leg_wear_monitor.dynamics.clearance.contact import CAM, DAMPING, NX, NY, SAMPLE_ROWS, STIFFNESS, VECTORS
 from leg_wear_monitor.dynamics.clearance.film import FILM_X, FILM_Y, MOMENT_B, MOMENT_J
 from leg_wear_monitor.dynamics.clearance.film_system import factorise_films, solve_films
 from leg_wear_monitor.dynamics.clearance.rosenbrock import (
@@ -91,7 +91,7 @@ def test_the_system_is_solved(seed, viscosity):
     d = 2 * k
     a = random.normal(size=(d, d))
     inverse_mass = a @ a.T + np.eye(d)
-    sample = random.normal(size=(COLUMNS, padded(k))) * 0.1
+    sample = random.normal(size=(SAMPLE_ROWS, padded(k))) * 0.1
     for j in range(k):
         direction = random.uniform(0.0, TURN)
         n = np.array([np.cos(direction), np.sin(direction)])
@@ -121,7 +121,7 @@ def test_without_films_it_is_the_system_of_the_contacts():
     random, k, h = np.random.default_rng(3), 3, 1.0e-5
     d = 2 * k
     a = random.normal(size=(d, d))
-    inverse_mass, sample = a @ a.T + np.eye(d), np.zeros((COLUMNS, padded(k)))
+    inverse_mass, sample = a @ a.T + np.eye(d), np.zeros((SAMPLE_ROWS, padded(k)))
     for j, angle in enumerate((0.3, 2.0, 4.0)):
         sample[[NX, NY], j] = np.cos(angle), np.sin(angle)
         sample[F_N, j], sample[STIFFNESS, j] = (20.0 if j != 1 else 0.0), 2.0e7

@@ -92,7 +92,10 @@ class TorqueObserver:
 
     def ended(self, statistics: CycleStatistics) -> None:
         """Note the end of a gait cycle, which is used if the leg walked as commanded."""
-        if statistics.is_steady and self.config.cadence.allows(statistics.cadence_rpm):
+        rpm = statistics.cadence_rpm
+        is_allowed = self.config.cadence.allows(rpm)
+        self.state.off_cadence_rpm = math.nan if is_allowed else rpm
+        if statistics.is_steady and is_allowed:
             self.state.due = (*self.state.due, (statistics.begin_ns, statistics.stamp_ns))
 
     def end_period(self, counted_m: Floats, depth: Floats) -> Correction | None:
@@ -163,7 +166,7 @@ class TorqueObserver:
         """What the drive torque shows now."""
         state = self.state
         if state.fit is None or state.detector is None:
-            reason = missing(state, self._references)
+            reason = missing(state, self._references, self.config)
             return Diagnosis(state=DiagnosisState.WAITING, reason=reason, changes=state.settled)
         clearance_m, sigma_m = self._observed(state.fit)
         return Diagnosis(

@@ -1,7 +1,10 @@
 """Why there is no estimate of the clearances yet, or why it is not sure; for operators."""
 
+import math
+
 import numpy as np
 
+from leg_wear_monitor.monitor.config.settings import MonitorConfig
 from leg_wear_monitor.monitor.diagnosis.leg_models import LegModels
 from leg_wear_monitor.monitor.diagnosis.references import FIRST_CYCLES, UNLIKE_CYCLES, References
 from leg_wear_monitor.monitor.diagnosis.state import TorqueState
@@ -17,8 +20,14 @@ LOCKED_SAMPLES = (
 )
 
 
-def missing(state: TorqueState, references: References) -> str:
+def missing(state: TorqueState, references: References, config: MonitorConfig) -> str:
     """Why there is no estimate."""
+    if not math.isnan(state.off_cadence_rpm):
+        own = config.cadence
+        return (
+            f"the cadence is {state.off_cadence_rpm:.3g} rpm, not the commanded "
+            f"{own.commanded_rpm:.3g} ± {own.tolerance_rpm:.3g} rpm"
+        )
     if state.sensor is None or state.unusable >= _UNUSABLE_CYCLES:
         return "no drive torque with enough samples in a gait cycle"
     if not state.sensor.phases:

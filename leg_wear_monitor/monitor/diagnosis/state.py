@@ -1,5 +1,6 @@
 """State of the torque observer; every value is immutable, so a shallow copy is a snapshot."""
 
+import math
 from typing import NamedTuple
 
 import attrs
@@ -61,6 +62,8 @@ class TorqueState:
         Gait cycles in a row whose crank turned otherwise than in the reference.
     unusable : int
         Gait cycles in a row without a signature.
+    off_cadence_rpm : float
+        Cadence of the last gait cycle if it is not the commanded one, else NaN.
     pause : bool
         Whether the last period did not simulate; each second one does, so that a monitor has time for both.
     parameters : LegParameters or None
@@ -88,6 +91,7 @@ class TorqueState:
     settled: tuple[Change, ...] = ()
     unlike: int = 0
     unusable: int = 0
+    off_cadence_rpm: float = math.nan
     pause: bool = False
     parameters: LegParameters | None = None
     rounds: int = 0

@@ -91,6 +91,19 @@ def test_without_torques_it_reports_so(leg, reference) -> None:
     assert "no drive torque" in observer.diagnosis.reason
 
 
+def test_gait_cycles_of_another_cadence_are_reported_as_such(leg, reference) -> None:
+    observer = observer_of(leg)
+    block = samples(reference, [0] * 8)
+    slow = SimpleNamespace(is_steady=True, cadence_rpm=45.0, begin_ns=START_NS, stamp_ns=START_NS + 10**9)
+    for _ in range(4):
+        observer.add_samples(block)
+        observer.ended(slow)
+        observer.end_period(NEW, DEPTH)
+    assert observer.diagnosis.reason == "the cadence is 45 rpm, not the commanded 60 ± 6 rpm"
+    walk(observer, block)
+    assert "cadence" not in observer.diagnosis.reason
+
+
 def test_a_healthy_leg_is_as_counted_and_becomes_commissioned(leg, reference) -> None:
     observer = observer_of(leg)
     assert walk(observer, samples(reference, [0] * (COMMISSIONING_CYCLES + 5))) == []

@@ -1,5 +1,5 @@
 # `make test` and `make demo` do all the set-up themselves, once: Python 3.11 to 3.13 with venv and a C compiler are enough.
-.PHONY: test test-slow lint kernels test-oldest test-oldest-quick package colcon docs tables docs-check demo campaign lock sbom clean
+.PHONY: test test-slow test-machines test-machine-in-turn lint kernels test-oldest test-oldest-quick package colcon docs tables docs-check demo campaign lock sbom clean
 .DELETE_ON_ERROR:
 
 # Percent of lines and branches that the two runs of the tests reach together.
@@ -40,6 +40,17 @@ test: .venv/installed
 # and kernels compiled by themselves (marker `uncompiled`).
 test-slow: kernels
 	.venv/bin/python -m pytest $(TWO) $(IN_ORDER) -m "slow or uncompiled"
+
+# The tests as other machines would run them (test/machines.py), one machine after the other, each as long as the second
+# step of `make test`; MACHINE=haswell runs one of them. A red one does not end it: how each did stands at the end.
+# Another Python is tried where it is installed, in an environment of its own.
+MACHINE ?= all
+test-machines: .venv/installed
+	.venv/bin/python test/machines.py --machine $(MACHINE) $(TWO) $(IN_ORDER)
+
+# What CI has time for: the tests of chaotic motion, on one machine in turn, commit by commit.
+test-machine-in-turn: .venv/installed
+	.venv/bin/python test/machines.py --turn $$(git rev-list --count HEAD) --select "chaotic and not slow" $(TWO) $(IN_ORDER)
 
 lint: .venv/installed
 	.venv/bin/ruff check
@@ -104,11 +115,18 @@ test-oldest-quick: .venv-oldest/installed
 		test/contact test/messages test/monitor
 
 clean:
-	rm -rf .venv .venv-oldest .venv-tools .venv-docs build dist docs/lessons *.egg-info .coverage .hypothesis .import_linter_cache .*_cache
+	rm -rf .venv .venv-python* .venv-oldest .venv-tools .venv-docs build dist docs/lessons *.egg-info .coverage .hypothesis .import_linter_cache .*_cache
 
 # What the packages are built with comes first: without build isolation, which would fetch a setuptools that nothing pins.
 .venv/installed: setup.cfg setup.py package.xml requirements-build.lock requirements.lock
 	$(call environment,python3.13 python3.12 python3.11 python3)
+	$(call locked,requirements-build.lock)
+	$(call locked,requirements.lock)
+	$(@D)/bin/python -m pip install $(QUICKLY) --no-deps --no-build-isolation --editable .
+	@touch $@
+
+.venv-python3.%/installed: .venv/installed
+	$(call environment,python3.$*)
 	$(call locked,requirements-build.lock)
 	$(call locked,requirements.lock)
 	$(@D)/bin/python -m pip install $(QUICKLY) --no-deps --no-build-isolation --editable .

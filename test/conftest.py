@@ -18,6 +18,11 @@ from leg_wear_monitor import Mechanism, load_mechanism
 from leg_wear_monitor.mechanism.position import Linkage, build_linkage
 from leg_wear_monitor.share import share_directory
 
+if os.environ.get("MOVED_STARTS"):  # as `make test-machines` sets it
+    from moved_starts import move_starts
+
+    move_starts(int(os.environ["MOVED_STARTS"]))
+
 if find_spec("mcap") and find_spec("rosbags"):
     pytest_plugins = ["recordings"]
 else:  # the extra `bags` is not installed

@@ -73,7 +73,7 @@ def test_it_says_when_the_server_is_gone(leg, served, tmp_path):
 def test_what_is_wrong_would_be_seen(tmp_path):
     page = LivePage("data:text/html,<script>nothing()</script><p>shown", tmp_path)
     try:
-        page.wait("document.body.innerText === 'shown'", "the page")
+        page.wait("document.body?.innerText === 'shown'", "the page")
         assert any("nothing is not defined" in line for line in page.console)
     finally:
         page.close()

@@ -10,14 +10,22 @@ from leg_wear_monitor.gait.leg import SyntheticLeg
 STOP = PaceConfig(times_s=(0.0, 0.3), speeds_rpm=(60.0, 0.0), ramp_s=0.3)
 
 
-def test_one_loose_joint_wears_as_in_the_simulation() -> None:
-    leg = SyntheticLeg(GaitConfig(clearance_joints=("A",), wear_acceleration=1.0e4))
-    leg.advance(2.0)
-    figures = simulate(load_mechanism("bionic_leg"), clearances=["A"], model="full", skip_cycles=0, cycles=2)
+@pytest.mark.chaotic
+@pytest.mark.parametrize("faster, bound", [(1.0, 1.0e-3), (1.0e4, 0.02)])
+def test_one_loose_joint_wears_as_in_the_simulation(faster: float, bound: float) -> None:
+    """Through its first impacts, in a twentieth of a cycle: until then a last bit does not part the motions.
+
+    Off by -9.4e-5, sigma 2e-8, and by -0.0076, sigma 6e-6, where ten thousand times the wear has opened the
+    joint meanwhile; after two cycles the sigma is 0.03. From 30 starts moved by 1e-12, 2026-11-23.
+    """
+    leg = SyntheticLeg(GaitConfig(clearance_joints=("A",), wear_acceleration=faster))
+    leg.advance(0.05)
+    span = {"skip_cycles": 0, "cycles": 0.05}
+    figures = simulate(load_mechanism("bionic_leg"), clearances=["A"], model="full", **span)
+    assert figures.impacts["A"]
     depth = figures.joints["A"].wear_depth_m_per_cycle
-    expected = 2.0 * 1.0e4 * (depth.bushing_mean + depth.journal_mean)
-    # wear, ten thousand times as fast here, has opened the joint by a thousandth: impacts differ a little
-    assert leg.clearance_m()[0] - 3.0e-4 == pytest.approx(expected, rel=0.03)
+    expected = 0.05 * faster * (depth.bushing_mean + depth.journal_mean)
+    assert leg.clearance_m()[0] - 3.0e-4 == pytest.approx(expected, rel=bound)
 
 
 def test_a_cycle_of_the_drive_pays_for_friction_and_impacts_only() -> None:

@@ -185,7 +185,7 @@ def test_a_start_is_inside_the_clearance_and_repeats_itself(leg, new_stepper, pe
     one = Leg(mechanism=leg, perturb_m=perturb_m, seed=seed, crank_angle_rad=angle)
     one.start(stepper)
     e = stepper.state.e.reshape(-1, 2).copy()
-    assert (np.linalg.norm(e, axis=1) <= perturb_m * (1.0 + 1.0e-12)).all()
+    assert (np.linalg.norm(e, axis=1) <= perturb_m * (1.0 + 1.0e-12) + 1.0e-14).all()  # m: moved starts
     np.testing.assert_array_equal(stepper.state.drive, [angle, TURN, 0.0])
     assert not stepper.state.v.any()
     one.start(stepper)

@@ -81,7 +81,7 @@ def listening(node: str, leg: LiveLeg, setup: LegSetup | None = None) -> Iterato
         wanted = threading.Event()
         wanted.set()
         # with the default executor, what fails in a callback is an exception, and messages are few
-        spinning = listener, wanted.is_set, SingleThreadedExecutor
+        spinning = listener, wanted.is_set, lambda node: SingleThreadedExecutor(context=node.context)
         thread = threading.Thread(target=spin, args=spinning, name="listener", daemon=True)
         thread.start()
         try:

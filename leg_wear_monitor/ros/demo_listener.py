@@ -5,7 +5,6 @@ from typing import Any
 
 from diagnostic_msgs.msg import DiagnosticArray, DiagnosticStatus
 from rclpy.context import Context
-from rclpy.experimental.events_executor import EventsExecutor
 from rclpy.node import Node
 from rclpy.qos import DurabilityPolicy, QoSProfile
 from rclpy.task import Future
@@ -13,7 +12,7 @@ from rclpy.utilities import try_shutdown
 from sensor_msgs.msg import JointState
 from std_srvs.srv import Trigger
 
-from leg_wear_monitor.ros.running import WAKE_S
+from leg_wear_monitor.ros.running import WAKE_S, executor_for
 
 _MONITOR = "leg_wear_monitor"
 
@@ -44,7 +43,7 @@ class DemoListener:
         self._context = Context()
         self._context.init(args=[], domain_id=domain)
         self._node = Node("witness", context=self._context, namespace=namespace)
-        self._executor = EventsExecutor(context=self._context)
+        self._executor = executor_for(self._node)
         self._executor.add_node(self._node)
         self.clearances_m: dict[str, float] = {}
         self.stamp_ns = 0

@@ -5,14 +5,13 @@ import signal
 import sys
 import threading
 from collections.abc import Callable, Iterator, Sequence
-from contextlib import contextmanager
+from contextlib import contextmanager, suppress
 from types import FrameType
 from typing import TypeVar
 
 import rclpy
 from rclpy.context import Context
-from rclpy.executors import Executor, ExternalShutdownException
-from rclpy.experimental.events_executor import EventsExecutor
+from rclpy.executors import Executor, ExternalShutdownException, SingleThreadedExecutor
 from rclpy.impl.implementation_singleton import rclpy_implementation as _rclpy
 from rclpy.node import Node
 from rclpy.signals import SignalHandlerOptions
@@ -22,13 +21,24 @@ from leg_wear_monitor.errors import ConfigError, LegWearError
 from leg_wear_monitor.interrupt import put_in_order, would_be_lost
 from leg_wear_monitor.ros.parameters.node import ParameterNode
 
+# The events executor needs a sixth of the default executor's time (docs/decisions/0007-live-node.md). Its
+# spin() without a timeout hangs at full load in the Jazzy wheels, so it is called repeatedly with a timeout.
+# Jazzy has it since rclpy 7.1.4 of April 2025.
+_new_executor: Callable[..., Executor] | None = None
+with suppress(ImportError):
+    from rclpy.experimental.events_executor import EventsExecutor
+
+    _new_executor = EventsExecutor
+WAKE_S = 0.2
+
+_FORMER = (
+    "this rclpy has no events executor (rclpy 7.1.4 and newer have it): the node runs with the default "
+    "executor, which needs six times the processor time"
+)
+
 DONE, COULD_NOT = 0, 2
 
 _SIGNALS = (signal.SIGINT, signal.SIGTERM)
-
-# The events executor needs a sixth of the default executor's time (docs/decisions/0007-live-node.md). Its
-# spin() without a timeout hangs at full load in the Jazzy wheels, so it is called repeatedly with a timeout.
-WAKE_S = 0.2
 
 # of the interpreter's lock, which each message takes: while another thread prepares a simulated leg, Python's
 # own 5 ms would let 200 messages a second through
@@ -55,13 +65,21 @@ def until_down(context: Context) -> Iterator[None]:
             raise
 
 
+def executor_for(node: Node) -> Executor:
+    """Executor for a node, not yet with it; the log says if it is not the events executor."""
+    if _new_executor is not None:
+        return _new_executor(context=node.context)
+    node.get_logger().warning(_FORMER)
+    return SingleThreadedExecutor(context=node.context)
+
+
 def spin(
     node: Node,
     wanted: Callable[[], bool] = lambda: True,
-    executor_type: Callable[..., Executor] = EventsExecutor,
+    make_executor: Callable[[Node], Executor] = executor_for,
 ) -> None:
     """Spin a node until its context shuts down or `wanted` returns false."""
-    executor = executor_type(context=node.context)
+    executor = make_executor(node)
     try:
         with until_down(node.context):
             executor.add_node(node)

@@ -1,12 +1,17 @@
 """Where the commands start: ^C is answered from the first moment, with one line and exit code 130.
 
+A node is also ended by SIGTERM, and either signal is an orderly end: exit code 0.
+
 What this module imports delays that moment, so it imports next to nothing.
 """
 
 import os
 import signal
+import sys
 
 INTERRUPTED = 130
+
+_NODES = ("monitor", "gait-publisher", "gait_publisher")
 
 _BLAS = "OPENBLAS_NUM_THREADS"
 
@@ -32,15 +37,23 @@ def leave(*_: object) -> None:
     os._exit(INTERRUPTED)
 
 
+def _leave_node(*_: object) -> None:
+    """End the process of a node before it has opened anything."""
+    os._exit(0)
+
+
 def _start(node: str | None = None) -> None:
     """Run the command line, or a node as a program of its own."""
+    is_node = node is not None or (len(sys.argv) > 1 and sys.argv[1] in _NODES)
     try:
-        signal.signal(signal.SIGINT, leave)  # there is nothing yet to put in order
+        for number in (signal.SIGINT, signal.SIGTERM) if is_node else (signal.SIGINT,):
+            signal.signal(number, _leave_node if is_node else leave)  # there is nothing yet to put in order
         # before numpy is imported: a second thread on the small matrices here takes ten times the time
         os.environ.setdefault(_BLAS, os.environ.get("OMP_NUM_THREADS", "1"))
-        from leg_wear_monitor.cli.interrupts import interrupt
+        if not is_node:  # `ros.running.run` follows
+            from leg_wear_monitor.cli.interrupts import interrupt
 
-        signal.signal(signal.SIGINT, interrupt)
+            signal.signal(signal.SIGINT, interrupt)
         from leg_wear_monitor.cli.main import main as run
 
         run(node)

@@ -9,6 +9,8 @@ pytest.importorskip("rclpy")
 
 import rclpy
 import yaml
+from rcl_interfaces.msg import Parameter as ParameterMessage
+from rcl_interfaces.msg import ParameterValue
 from rcl_interfaces.srv import (
     DescribeParameters,
     GetParameters,
@@ -19,6 +21,7 @@ from rcl_interfaces.srv import (
 )
 from rclpy.parameter import Parameter, parameter_dict_from_yaml_file, parameter_value_to_python
 from rclpy.utilities import try_shutdown
+from rosgraph_msgs.msg import Clock
 
 from leg_wear_monitor.monitor.config.parameter_file import load_config
 from leg_wear_monitor.monitor.config.parameters import PARAMETERS
@@ -146,6 +149,69 @@ def test_parameters_are_set_together_or_not_at_all(shared_stage, node) -> None:
     assert not refused.successful
     assert "alarms.deadband" in refused.reason
     assert node.monitor.config.limits.impact_force_n == 9000.0
+
+
+def test_a_type_that_does_not_exist_is_refused_and_the_node_stays(shared_stage, node) -> None:
+    def one(name: str, **value: Any) -> ParameterMessage:
+        return ParameterMessage(name=name, value=ParameterValue(**value))
+
+    good = one("limits.growth_m_per_hour", type=3, double_value=2.0e-4)
+    bad = [one("limits.clearance_m", type=200), one("", type=10), one("x" * 100_000, type=255)]
+    request = SetParameters.Request(parameters=[*bad, good])
+    results = shared_stage.call(SetParameters, f"{ME}/set_parameters", request).results
+    assert [result.successful for result in results] == [False, False, False, True]
+    assert results[0].reason == "limits.clearance_m: 200 is no type of a parameter, expected 0 to 9"
+    assert len(results[2].reason) < 300
+    assert node.monitor.config.limits.growth_m_per_hour == 2.0e-4
+    for service in ("set_parameters_atomically", "measure"):
+        request = SetParametersAtomically.Request(parameters=[good, *bad])
+        result = shared_stage.call(SetParametersAtomically, f"{ME}/{service}", request).result
+        assert (result.successful, result.reason) == (False, results[0].reason)
+
+
+def test_a_time_before_0_on_clock_is_ignored(stage) -> None:
+    node = stage.monitor(use_sim_time=True).node
+    clock = stage.node.create_publisher(Clock, "/clock", 10)
+    stage.wait_for(lambda: clock.get_subscription_count() > 0, "the node's clock")
+    for sec in (-5, 7):
+        message = Clock()
+        message.clock.sec = sec
+        clock.publish(message)
+    stage.wait_for(lambda: node.get_clock().now().nanoseconds == 7_000_000_000, "the time after it")
+
+
+def test_descriptors_have_the_bounds_as_ranges_and_any_value_between_is_taken(shared_stage, node) -> None:
+    request = DescribeParameters.Request(names=list(PARAMETERS))
+    told = shared_stage.call(DescribeParameters, f"{ME}/describe_parameters", request).descriptors
+    ranged = 0
+    for name, one in zip(PARAMETERS, told, strict=True):
+        declared = PARAMETERS[name]
+        ranges = [*one.floating_point_range, *one.integer_range]
+        bounds = (declared.above, declared.at_least, declared.at_most)
+        is_number = declared.type in ("double", "integer")
+        assert bool(ranges) is (is_number and any(bound is not None for bound in bounds)), name
+        for each in ranges:
+            ranged += 1
+            assert each.step == 0
+            assert each.from_value <= declared.default <= each.to_value
+            if declared.at_most is not None:
+                assert each.to_value == declared.at_most
+            lower = declared.above if declared.at_least is None else declared.at_least
+            if lower is not None:
+                assert each.from_value == lower
+    assert ranged > 40
+
+    def set_to(value: float) -> Any:
+        wanted = Parameter("limits.warn_fraction", value=value).to_parameter_msg()
+        request = SetParameters.Request(parameters=[wanted])
+        return shared_stage.call(SetParameters, f"{ME}/set_parameters", request).results[0]
+
+    assert set_to(0.812345678901).successful
+    for value in (0.0, 1.5, float("nan")):  # the first is excluded, though in the range
+        refused = set_to(value)
+        assert not refused.successful
+        assert "limits.warn_fraction" in refused.reason and "at most 1" in refused.reason
+    assert node.monitor.config.limits.warn_fraction == 0.812345678901
 
 
 def test_the_clock_is_kept_while_the_node_runs(shared_stage, node) -> None:

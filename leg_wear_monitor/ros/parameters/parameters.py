@@ -1,9 +1,10 @@
 """Parameters of a node from a configuration class: reading, validation, description, changes."""
 
+import math
 from collections.abc import Callable, Mapping
 from typing import Any, Generic, TypeVar
 
-from rcl_interfaces.msg import ParameterDescriptor, SetParametersResult
+from rcl_interfaces.msg import FloatingPointRange, IntegerRange, ParameterDescriptor
 from rclpy.parameter import Parameter as RosParameter
 
 from leg_wear_monitor.errors import ConfigError
@@ -19,6 +20,7 @@ from leg_wear_monitor.ros.parameters.node import ParameterNode, plain
 Config = TypeVar("Config")
 
 # parameters of every node, handled by rclpy itself
+_LARGEST = 2**63 - 1  # of an integer parameter
 _OF_ROS = ("use_sim_time", "start_type_description_service", "qos_overrides.")
 
 
@@ -72,18 +74,18 @@ class Parameters(Generic[Config]):
             Raises ConfigError for values that are valid on their own but inconsistent with the node's state.
         """
 
-        def check(parameters: list[RosParameter]) -> SetParametersResult:
+        def fault_of(parameters: list[RosParameter]) -> str:
             try:
                 check_fit(self._with(parameters))
             except ConfigError as error:
-                return SetParametersResult(successful=False, reason=str(error))
-            return SetParametersResult(successful=True)
+                return str(error)
+            return ""
 
         def take(parameters: list[RosParameter]) -> None:
             self.config = self._with(parameters)
             changed_to(self.config)
 
-        node.add_on_set_parameters_callback(check)
+        node.fault_of = fault_of
         node.add_post_set_parameters_callback(take)
 
     def _with(self, parameters: list[RosParameter]) -> Config:
@@ -92,12 +94,32 @@ class Parameters(Generic[Config]):
         return changed(self.config, changes, self._source)
 
 
+def _range(parameter: Parameter) -> dict[str, Any]:
+    """Field of a descriptor with the bounds of one number; without bounds, none.
+
+    A lower bound that is excluded is part of the range, which cannot exclude it; it is refused by the check.
+    The step is 0, for any value between.
+    """
+    bounds = (parameter.above, parameter.at_least, parameter.at_most)
+    if parameter.type not in ("double", "integer") or all(bound is None for bound in bounds):
+        return {}
+    least = parameter.above if parameter.at_least is None else parameter.at_least
+    if parameter.type == "double":
+        begin = -math.inf if least is None else float(least)
+        end = math.inf if parameter.at_most is None else float(parameter.at_most)
+        return {"floating_point_range": [FloatingPointRange(from_value=begin, to_value=end, step=0.0)]}
+    first = -_LARGEST if least is None else math.ceil(least)
+    last = _LARGEST if parameter.at_most is None else math.floor(parameter.at_most)
+    return {"integer_range": [IntegerRange(from_value=first, to_value=last, step=0)]}
+
+
 def _declare(node: ParameterNode, parameter: Parameter, value: Any) -> None:
     unit = f" [{parameter.unit}]" if parameter.unit else ""
     descriptor = ParameterDescriptor(
         description=f"{parameter.description}{unit}",
         additional_constraints=parameter.bounds,
         read_only=parameter.read_only,
+        **_range(parameter),
     )
     if isinstance(value, tuple) and not value:
         # rclpy treats an empty array as one of bytes; an unset parameter breaks every reply that contains it

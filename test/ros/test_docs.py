@@ -74,8 +74,17 @@ def test_launch_files_start_what_is_installed() -> None:
     assert {node.get("pkg") for node in nodes} == {"leg_wear_monitor"}
     assert {node.get("exec") for node in nodes} <= installed
     assert len(shown) == 2
+    for path in package.glob("launch/*.xml"):
+        for group in ElementTree.parse(path).iterfind("group"):
+            # a package that is missing aborts a launch, also that of the monitor
+            assert group.get("if") == "$(var rviz)"
+            (has,) = (one for one in group.iterfind("let") if one.get("name") == "has_rviz2")
+            assert '"rviz2" in ament_index_python.get_packages_with_prefixes()' in has.get("value")
+            (said,) = group.iterfind("log")
+            assert said.get("unless") == "$(var has_rviz2)"
+            assert "rviz2 is not installed" in said.get("message")
     for node in shown:
-        assert node.get("if") == "$(var rviz)"
+        assert node.get("if") == "$(var has_rviz2)"
         layout = node.get("args").removeprefix("-d $(find-pkg-share leg_wear_monitor)/")
         assert (package / layout).is_file()
 
@@ -90,7 +99,7 @@ def test_the_parameters_for_tools_prevail_where_rviz_is_asked_for() -> None:
     assert config.publish_scalars and config.publish_markers
     for name in ("monitor", "demo"):
         launch = ElementTree.parse(package / "launch" / f"{name}.launch.xml").getroot()
-        values = {next(iter(one.items())): one.get("value") for one in launch.iter("let")}
+        values = {next(iter(one.items())): one.get("value") for one in launch.iterfind("let")}
         assert values == {
             ("if", "$(var rviz)"): "$(find-pkg-share leg_wear_monitor)/config/tools.yaml",
             ("unless", "$(var rviz)"): "$(var params_file)",

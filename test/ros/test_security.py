@@ -1,5 +1,6 @@
 """security/policy.xml allows what the live nodes do, and nothing else."""
 
+import re
 import time
 from collections.abc import Callable
 from fnmatch import fnmatchcase
@@ -23,9 +24,9 @@ PATIENCE_S = 60.0
 POLICY = ElementTree.parse(share_directory() / "security" / "policy.xml").getroot()
 
 
-def allowed(node: str, kind: str, right: str) -> set[str]:
+def allowed(node: str, kind: str, right: str, policy: ElementTree.Element = POLICY) -> set[str]:
     """Full names, patterns among them, of what a node in the root may publish, subscribe or reply to."""
-    (profile,) = POLICY.iterfind(f".//profile[@node='{node}']")
+    (profile,) = policy.iterfind(f".//profile[@node='{node}']")
     assert profile.get("ns") == "/"
     rules = profile.iterfind(f"{kind}s[@{right}='ALLOW']/{kind}")
     return {"/" + rule.text.replace("~", node).lstrip("/") for rule in rules}
@@ -48,6 +49,40 @@ def test_a_node_may_do_what_it_does_and_nothing_else(
         agrees(node.get_service_names_and_types_by_node, name, allowed(name, "service", "reply"))
         agrees(node.get_client_names_and_types_by_node, name, allowed(name, "service", "request"))
         node.close()
+        node.destroy_node()
+    finally:
+        try_shutdown(context=context)
+
+
+def test_an_operator_may_do_what_its_program_does_and_nothing_else() -> None:
+    """The policy of docs/howto/sros2.md against the program of docs/howto/verdict/index.md."""
+    pages = share_directory() / "docs" / "howto"
+    (text,) = re.findall(
+        r"(<policy.*?</policy>)", (pages / "sros2.md").read_text(encoding="utf-8"), re.DOTALL
+    )
+    policy = ElementTree.fromstring(text)
+    assert 'create_node("operator")' in (pages / "verdict" / "index.md").read_text(encoding="utf-8")
+    context = rclpy.Context()
+    rclpy.init(args=[], context=context)
+    try:
+        node = rclpy.create_node(
+            "operator", context=context, parameter_overrides=[Parameter("use_sim_time", value=True)]
+        )
+        rights = {
+            "topic": {
+                "publish": node.get_publisher_names_and_types_by_node,
+                "subscribe": node.get_subscriber_names_and_types_by_node,
+            },
+            "service": {"reply": node.get_service_names_and_types_by_node},
+        }
+        for kind, graphs in rights.items():
+            for right, graph in graphs.items():
+                agrees(graph, "operator", allowed("operator", kind, right, policy))
+        assert allowed("operator", "service", "request", policy) == {
+            name.replace("~", "leg_wear_monitor")
+            for name in allowed("leg_wear_monitor", "service", "reply")
+            if "param" not in name and "type_description" not in name
+        }
         node.destroy_node()
     finally:
         try_shutdown(context=context)

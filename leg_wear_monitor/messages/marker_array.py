@@ -15,6 +15,7 @@ SPHERE, CYLINDER, LINE_STRIP, LINE_LIST, TEXT = 2, 3, 4, 5, 9
 
 _SECOND = 1_000_000_000
 _STAMP, _POINT = 8, 24  # bytes
+_LIFETIME_S = 2  # without a new message, tools remove the markers: those of a node that died would stay
 
 
 @attrs.frozen(kw_only=True, eq=False)
@@ -110,7 +111,7 @@ class MarkerArrayTemplate:
             self._points.append(len(layout.body))
         layout.body += struct.pack("<10d", *marker.position, *marker.orientation, *marker.scale)
         layout.body += struct.pack("<4f", *marker.colour, 1.0)
-        layout.body += bytes(_STAMP + 1)  # lifetime, frame_locked
+        layout.body += struct.pack("<iI", _LIFETIME_S, 0) + bytes(1)  # lifetime, frame_locked
         layout.count(len(marker.points))
         if len(marker.points):
             layout.align(8)

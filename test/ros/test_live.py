@@ -106,7 +106,8 @@ def are_one_number_a_value(diagnostics: list[DiagnosticArray]) -> None:
 
 
 def draws_the_leg(drawn: MarkerArray) -> None:
-    """Seven bodies, the pelvis, and five clearance joints, A and B on the hip's axis."""
+    """Seven bodies, the pelvis, and five clearance joints, A and B on the hip's axis; for two seconds."""
+    assert {(marker.lifetime.sec, marker.lifetime.nanosec) for marker in drawn.markers} == {(2, 0)}
     (lines,) = (marker for marker in drawn.markers if marker.ns == "bodies")
     assert len(lines.points) == 2 * (1 + 2 + 2 + 1 + 2 + 2 + 1 + 1)
     joints = [marker for marker in drawn.markers if marker.ns == "joints"]

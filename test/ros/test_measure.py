@@ -148,3 +148,6 @@ def test_the_forecast_follows_a_measurement_at_once(stage, walk) -> None:
     assert answer.successful
     assert answer.reason.endswith("it is not stored: no ledger is kept; set ledger.path")
     stage.wait_for(lambda: len(forecasts) > before, "the forecast after the measurement")
+    late = stage.listen(f"{NODE}/forecast", DiagnosticArray, latched=True)
+    stage.wait_for(lambda: bool(late), "the last forecast, for who comes late")
+    assert late == forecasts[-1:]

@@ -3,6 +3,8 @@
 from collections.abc import Mapping
 
 from leg_wear_monitor.monitor.config.settings import MonitorConfig
+from leg_wear_monitor.monitor.inputs.health import of_other_joints
+from leg_wear_monitor.twin.sample import FAULTS, MISSING_JOINT
 from leg_wear_monitor.twin.statistics import Intake
 
 _WORTH_TELLING = 0.01  # fraction of the samples; smaller ones are visible in the counters only
@@ -36,8 +38,9 @@ def causes(before: Intake, after: Intake, withheld: int, config: MonitorConfig) 
     config : MonitorConfig
         Gives the name of the crank.
     """
-    received = after.received - before.received
-    lost = _unused(after, before, withheld)
+    others = of_other_joints(before, after)
+    received = after.received - before.received - others
+    lost = _unused(after, before, withheld, others)
     frequent = [name for name, count in lost.items() if count > _WORTH_TELLING * received]
     return [
         f"{lost[name]} of {received} samples {_SENTENCES[name].format(crank=config.crank_joint)}"
@@ -45,7 +48,8 @@ def causes(before: Intake, after: Intake, withheld: int, config: MonitorConfig) 
     ]
 
 
-def _unused(after: Intake, before: Intake, withheld: int) -> Mapping[str, int]:
+def _unused(after: Intake, before: Intake, withheld: int, others: int) -> Mapping[str, int]:
     lost = {name: count - before.faulty[name] for name, count in after.faulty.items()}
     lost["out_of_range"] -= withheld
+    lost[FAULTS[MISSING_JOINT]] -= others
     return lost | {name: getattr(after, name) - getattr(before, name) for name in _DROPPED}

@@ -5,7 +5,8 @@ import math
 import attrs
 import numpy as np
 
-from leg_wear_monitor.twin.sample import NO_FAULT, Samples
+from leg_wear_monitor.twin.kinds import CRANK, KINDS
+from leg_wear_monitor.twin.sample import FAULTS, MISSING_JOINT, NO_FAULT, Samples
 from leg_wear_monitor.twin.statistics import Intake
 
 _LEAST_TORQUES = 10
@@ -61,6 +62,7 @@ class InputHealth:
         Used samples per second, by the names of `KINDS`.
     bad_fraction : float
         Fraction of the samples that were not used: faulty, repeated, late, with a stray stamp, or outliers.
+        Messages of other joints do not count while the crank's come.
     lost_fraction : float
         Fraction of the time in which the leg was not followed.
     stuck_torque_fraction : float
@@ -90,14 +92,25 @@ def input_health(before: Intake, after: Intake, torque: TorqueRange, is_whole: b
     is_known = is_whole and span_s > 0.0 and before.newest_stamp_ns > 0
     duration_s = span_s if is_known else math.nan
     monitored_s = after.moving_s - before.moving_s + after.standing_s - before.standing_s
-    received = after.received - before.received
+    others = of_other_joints(before, after)
+    received = after.received - before.received - others
     return InputHealth(
         duration_s=duration_s,
         rate_hz={name: (used - before.used[name]) / duration_s for name, used in after.used.items()},
-        bad_fraction=(unused(after) - unused(before)) / received if received else math.nan,
+        bad_fraction=(unused(after) - unused(before) - others) / received if received else math.nan,
         lost_fraction=min(1.0, max(0.0, 1.0 - monitored_s / duration_s)) if is_known else math.nan,
         stuck_torque_fraction=torque.stuck_fraction,
     )
+
+
+def of_other_joints(before: Intake, after: Intake) -> int:
+    """Number of messages without the crank between two counts, if the crank came from another publisher.
+
+    Several drivers may publish joints of one robot on one topic.
+    """
+    crank, name = KINDS[CRANK].name, FAULTS[MISSING_JOINT]
+    has_crank = after.used[crank] > before.used[crank]
+    return after.faulty[name] - before.faulty[name] if has_crank else 0
 
 
 def unused(counts: Intake) -> int:

@@ -184,7 +184,6 @@ def test_a_gear_that_is_not_set_is_named(monitor, gait):
 
 CAUSES = [
     (ZERO_STAMP, "300 of 400 samples have a zero stamp: set header.stamp"),
-    (MISSING_JOINT, "300 of 400 samples do not name the crank 'crank': set crank_joint"),
     (EMPTY, "300 of 400 samples have no name or no position"),
 ]
 
@@ -200,6 +199,23 @@ def test_why_samples_cannot_be_used_is_said_in_a_sentence(monitor, gait, fault, 
     assert of == "of"
     assert rest.startswith(sentence.split(" ", 3)[3])
     assert 0 < int(number) <= min(int(total), counted)
+
+
+def test_messages_without_the_crank_are_a_fault_only_if_none_has_it(monitor, gait):
+    stream = gait(6.0)
+    others = stream[::2].copy()
+    others["fault"] = MISSING_JOINT
+    both = np.concatenate([stream, others])
+    monitor.update(both[np.argsort(both["stamp_ns"], kind="stable")])
+    told = status_of(monitor)
+    assert told.values["faulty_missing_joint"] == len(others)
+    assert told.message == "see: input_rate torque"  # there is none in this gait, and no other fault
+    assert level_of(monitor, "input_samples") is Level.OK
+    unnamed = gait(4.0, begin_s=6.0)
+    unnamed["fault"] = MISSING_JOINT
+    monitor.update(unnamed)
+    assert "samples do not name the crank 'crank': set crank_joint" in status_of(monitor).message
+    assert level_of(monitor, "input_samples") is Level.ERROR
 
 
 def test_a_cause_that_has_gone_is_not_told_any_more(monitor, gait):

@@ -1,5 +1,7 @@
 """The monitor: samples in, reports out; the live node and replay use the same code."""
 
+from collections.abc import Iterable
+
 import numpy as np
 from numpy.typing import NDArray
 
@@ -13,7 +15,7 @@ from leg_wear_monitor.monitor.cycle_report import with_forecast
 from leg_wear_monitor.monitor.diagnosis.diagnosis import Diagnosis
 from leg_wear_monitor.monitor.evaluation.evaluation_period import EvaluationPeriods
 from leg_wear_monitor.monitor.forecast.measurement import MeasurementResult
-from leg_wear_monitor.monitor.ledger.entry import Audit, JointWear, Measurement
+from leg_wear_monitor.monitor.ledger.entry import AlarmEvent, Audit, JointWear, Measurement
 from leg_wear_monitor.monitor.ledger.file import LedgerError
 from leg_wear_monitor.monitor.ledger.ledger import Ledger
 from leg_wear_monitor.monitor.parts import Parts
@@ -160,6 +162,11 @@ class WearMonitor:
         return self._parts.judge.report(self._parts.state)
 
     @property
+    def predicted_torque_nm(self) -> float:
+        """RMS of the drive torque that is predicted for the commanded gait."""
+        return float(self._twin.torque_size_nm)
+
+    @property
     def clearances_m(self) -> tuple[float, ...]:
         """Mean clearance of each clearance joint, as counted."""
         return tuple(self._twin.clearance_mean_m.tolist())
@@ -292,6 +299,15 @@ class WearMonitor:
         if cleared or kept:
             self._parts.keep()
         return cleared, kept
+
+    def note_alarms(self, stamp_ns: int, alarms: Iterable[Alarm]) -> None:
+        """Store changed alarms that are not of this monitor in the ledger, such as those of its node."""
+        own = {alarm.name for alarm in self.alarms.alarms}
+        changed = [AlarmEvent(stamp_ns, alarm) for alarm in alarms if alarm.name not in own]
+        for event in changed:
+            self._accounting.note(event)
+        if changed:
+            self._parts.keep()
 
     def reset_wear(self, joint: str, stamp_ns: int, who: str) -> None:
         """Reset the wear of a joint whose part was replaced; its history stays in the ledger.

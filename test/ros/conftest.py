@@ -90,6 +90,7 @@ class Legs:
         end_s: float = 1e9,
         block_s: float = 0.015,
         before: Callable[[float], None] = lambda _: None,
+        start_ns: int = START_NS,
     ) -> None:
         """Publish a part of a walk, no faster than it is taken in; ``before`` is told when each block is."""
         if monitor:
@@ -101,7 +102,7 @@ class Legs:
             before(block[0].arrival_s)
             taken = monitor.received if monitor else 0
             for reading in block:
-                self._publishers[reading.kind].publish(sensor_message(reading, START_NS, walk.config))
+                self._publishers[reading.kind].publish(sensor_message(reading, start_ns, walk.config))
             if monitor:
                 sent = taken + len(block)
                 wait_for(lambda sent=sent: monitor.received >= sent, "a message on its way")

@@ -85,6 +85,46 @@ def test_a_monitor_stopped_while_it_gets_ready_leaves_an_ordered_ledger(stage, t
 
 
 @pytest.mark.parametrize("name", ["SIGINT", "SIGTERM"])
+@pytest.mark.parametrize("verb", [(), ("monitor",), ("gait-publisher",)])
+@pytest.mark.parametrize("module", ["click", "numpy", "rclpy.node", "leg_wear_monitor.ros.running"])
+def test_a_node_stopped_while_it_imports_ends_in_order(name: str, verb: tuple[str, ...], module: str) -> None:
+    """The signal comes within an import, where Python would print a traceback or go on with half a module."""
+    start = "main" if verb else "monitor"
+    code = (
+        "import os, signal, sys\n"
+        f"sys.argv = ['program', *{verb!r}]\n"
+        "def stop(event, arguments):\n"
+        f"    if event == 'import' and arguments[0] == {module!r}:\n"
+        f"        os.kill(os.getpid(), signal.{name})\n"
+        f"from leg_wear_monitor.cli.start import {start}\n"
+        "sys.addaudithook(stop)\n"
+        f"{start}()\n"
+    )
+    done = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, check=False)
+    assert (done.returncode, done.stdout, done.stderr) == (0, "", "")
+
+
+def test_a_node_runs_with_an_rclpy_that_has_no_events_executor() -> None:
+    code = (
+        "import sys\n"
+        "sys.modules['rclpy.experimental.events_executor'] = None\n"
+        "import rclpy\n"
+        "from leg_wear_monitor.ros.running import ClosingNode, run, spin\n"
+        "beats = []\n"
+        "def make():\n"
+        "    node = ClosingNode('leg')\n"
+        "    node.create_timer(0.01, lambda: beats.append(1))\n"
+        "    return node\n"
+        "code = run(make, lambda node, wanted: spin(node, lambda: wanted() and len(beats) < 5), ['leg'])\n"
+        "print(code, len(beats))\n"
+    )
+    done = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, check=False)
+    assert (done.returncode, done.stdout) == (0, "0 5\n")
+    (line,) = done.stderr.splitlines()
+    assert "this rclpy has no events executor (rclpy 7.1.4 and newer have it)" in line
+
+
+@pytest.mark.parametrize("name", ["SIGINT", "SIGTERM"])
 def test_a_monitor_stopped_while_it_compiles_leaves_an_ordered_ledger(tmp_path: Path, name: str) -> None:
     """In a callback of LLVM, where Python prints an exception and goes on: the node went on, too."""
     ledger = tmp_path / "wear.db"

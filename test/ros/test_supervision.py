@@ -1,6 +1,10 @@
 """What the node tells of silence, of alarms and of its own faults: by itself, and over real DDS."""
 
 import math
+import sqlite3
+import time
+from contextlib import closing
+from pathlib import Path
 
 import pytest
 
@@ -13,7 +17,6 @@ from rclpy.node import Node
 from rclpy.serialization import serialize_message
 from sensor_msgs.msg import JointState
 from std_msgs.msg import Float64
-from std_srvs.srv import Trigger
 from visualization_msgs.msg import MarkerArray
 
 from leg_wear_monitor.messages.decode import Decoder
@@ -189,8 +192,9 @@ def test_alarms_of_the_node_are_listed_while_they_are_raised_and_acknowledged_li
     assert (shown["input_silence crank"].level, shown["input_silence crank"].value) == (Level.ERROR, 3.5)
     assert (shown["input_sources"].level, shown["input_sources"].value) == (Level.ERROR, 2.0)
     node.evaluate({"input_silence crank": 0.0, "input_sources": 2.0}, NOON_NS)
+    assert [alarm.name for alarm in node.raised] == ["input_sources"]  # data are back, and silence is over
     cleared, kept = node.acknowledge()
-    assert [alarm.name for alarm in cleared] == ["input_silence crank"]
+    assert [alarm.name for alarm in cleared] == []
     assert [alarm.name for alarm in kept] == ["input_sources"]
 
 
@@ -220,7 +224,7 @@ def noted(names: CrankNames, *messages: list[str]) -> str:
         message.header.stamp.sec = 5
         box.add(JOINT_STATE, serialize_message(message), 1)
     arrivals = box.take(100)
-    names.note(arrivals, box.decoded(arrivals))
+    names.note(arrivals, box.decoded(arrivals), 5 * SECOND)
     return names.report()
 
 
@@ -230,6 +234,11 @@ def test_a_crank_that_no_message_names_is_told_with_the_names_that_are_there() -
     assert told == "no joint is named 'crank'; there are hip, knee; set crank_joint to its name"
     assert noted(names) == told
     assert noted(names, ["knee"], ["hip", "crank"]) == ""
+    assert noted(names, ["left", "right"], ["knee", "hip"], ["left", "right"]) == (
+        "no joint is named 'crank'; there are hip, knee, left, right; set crank_joint to its name"
+    )
+    assert names.others(since_ns=5 * SECOND) == 3
+    assert names.others(since_ns=6 * SECOND) == 0
 
 
 def test_names_that_would_harm_a_terminal_or_fill_it_are_tamed() -> None:
@@ -259,8 +268,19 @@ def is_grey(drawn: MarkerArray) -> bool:
     return all(one.color.r == one.color.g == one.color.b for one in drawn.markers)
 
 
-def test_silence_reaches_statuses_alarms_markers_and_log(stage, walk) -> None:
-    monitor = stage.monitor(diagnostics__period_s=0.1, publish_markers=True)
+def is_healthy(verdicts: list[DiagnosticArray]) -> bool:
+    """Whether nothing is left to acknowledge: a few cycles show no clearances yet."""
+    return bool(verdicts) and verdicts[-1].status[0].message.startswith(
+        ("healthy", "watch: the drive torque")
+    )
+
+
+def test_silence_reaches_statuses_alarms_markers_and_log_and_ends_by_itself(
+    stage, walk, tmp_path: Path
+) -> None:
+    ledger = tmp_path / "wear.ledger"
+    monitor = stage.monitor(diagnostics__period_s=0.1, publish_markers=True, ledger__path=str(ledger))
+    verdicts = stage.listen(f"{ME}/verdict", DiagnosticArray, latched=True)
     diagnostics = stage.listen("/diagnostics", DiagnosticArray)
     alarms = stage.listen(f"{ME}/alarms", DiagnosticArray, latched=True)
     markers = stage.listen(f"{ME}/markers", MarkerArray)
@@ -277,9 +297,69 @@ def test_silence_reaches_statuses_alarms_markers_and_log(stage, walk) -> None:
     assert any("has been silent since" in text for _, text in logged.lines)
     rises = [text for _, text in logged.lines if text.startswith("alarm input_silence crank rises")]
     assert len(rises) == 1
-    stage.legs().play(walk, monitor, begin_s=2.5)
-    answer = stage.call(Trigger, f"{ME}/acknowledge_alarms", Trigger.Request())
-    assert "input_silence" in answer.message
+    assert not is_healthy(verdicts)
+    # the leg has walked on meanwhile, so its own alarm of a gap rises, too, and ends
+    stage.legs().play(walk, monitor, begin_s=4.5)
+    stage.legs().play(walk, monitor, start_ns=NOON_NS + 6 * SECOND, end_s=2.5)
+    stage.wait_for(lambda: line(alarms, "input_silence crank") is None, "the end of the silence")
+    stage.wait_for(lambda: is_healthy(verdicts), "a verdict without alarms")
+    monitor.stop()
+    changes = history(ledger)
+    for name in ("input_silence crank", "input_silence torque", "input_gaps"):
+        assert [level for alarm, level in changes if alarm == name] == [2, 0], name
+
+
+def history(ledger: Path) -> list[tuple[str, int]]:
+    """Changed alarms of a ledger with the level that was shown, in their order."""
+    with closing(sqlite3.connect(ledger)) as db:
+        rows = db.execute("SELECT kind, subject, level FROM alarm_history ORDER BY id").fetchall()
+    return [(f"{kind} {subject}".rstrip(), level) for kind, subject, level in rows]
+
+
+def test_other_joints_on_the_topic_of_the_crank_are_no_fault(stage, walk) -> None:
+    """A gripper publishes, too: half as many messages as the leg."""
+    other = Node("gripper", context=stage.node.context)
+    publisher = other.create_publisher(JointState, "joint_states", 10)
+    monitor = stage.monitor(diagnostics__period_s=0.1, alarms__on_delay_cycles=1)
+    diagnostics = stage.listen("/diagnostics", DiagnosticArray)
+    verdicts = stage.listen(f"{ME}/verdict", DiagnosticArray, latched=True)
+    legs = stage.legs()
+    stage.wait_for(lambda: publisher.get_subscription_count() > 0, "the monitor's subscription")
+
+    def grip(at_s: float) -> None:
+        message = JointState(name=["left", "right"], position=[0.0, 0.1])
+        message.header.stamp.sec, message.header.stamp.nanosec = divmod(NOON_NS + int(at_s * SECOND), SECOND)
+        publisher.publish(message)
+
+    legs.play(walk, monitor, before=grip)
+    lost = monitor.node.monitor.lost
+    assert lost.faulty["missing_joint"] > 100
+    stage.wait_for(lambda: is_healthy(verdicts), "the verdict of a healthy leg")
+    assert not any("not monitored: the fraction" in one.status[0].message for one in verdicts)
+    assert words(diagnostics, "input") == "in order"
+    assert "expected one" not in words(diagnostics, "topics")
+    assert not [one for one in monitor.node.monitor.alarms.alarms if one.level]
+    other.destroy_node()
+
+
+def test_stamps_of_a_time_to_come_and_a_torque_about_another_axis_are_told(stage, walk) -> None:
+    monitor = stage.monitor(diagnostics__period_s=0.1, drive_torque__axis="x")
+    diagnostics = stage.listen("/diagnostics", DiagnosticArray)
+    alarms = stage.listen(f"{ME}/alarms", DiagnosticArray, latched=True)
+    told: list[str] = []
+
+    def listen(_: float) -> None:
+        told.append(words(diagnostics, "clock"))
+
+    stage.legs().play(walk, monitor, end_s=3.0, before=listen, start_ns=time.time_ns() + 100 * SECOND)
+    assert any("s ahead of the node's clock: set the clocks" in text for text in told)
+    assert "the torque about x is still (0 N m RMS), the one about z is not" in words(diagnostics, "topics")
+    assert "set drive_torque.axis to z" in words(diagnostics, "topics")
+    raised = [
+        one for message in alarms for one in message.status if one.name.endswith(": stamps_ahead crank")
+    ]
+    assert float(next(one.value for one in raised[0].values if one.key == "value_s")) > 90.0
+    stage.wait_for(lambda: line(alarms, "stamps_ahead crank") is None, "the end of the alarm")
 
 
 def test_the_names_that_are_there_are_told_where_the_crank_is_not(stage, walk) -> None:
@@ -320,7 +400,8 @@ def test_two_publishers_of_one_crank_are_named_even_if_they_agree(stage, walk) -
     expected = "/joint_states: 2 publishers: /simulator, /stage; expected one"
     stage.wait_for(lambda: expected in words(diagnostics, "topics"), "both publishers")
     stage.wait_for(lambda: line(alarms, "input_sources torque") is not None, "the alarm of two torques")
-    assert line(alarms, "input_sources").level == b"\2"
+    # a node that has just come may yet turn out to publish other joints than the crank
+    stage.wait_for(lambda: line(alarms, "input_sources").level == b"\2", "the alarm of two cranks")
     other.destroy_node()
 
 

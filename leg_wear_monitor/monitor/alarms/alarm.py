@@ -1,5 +1,7 @@
 """Alarms as a state machine: levels with a deadband and an on-delay, latched until acknowledged.
 
+An alarm of silence is not latched: when data return, nothing is left to look at but its row in the history.
+
 Everything here is a pure function of (alarm, value, limit). A value is evaluated once per gait cycle, so the
 on-delay counts gait cycles.
 """
@@ -32,6 +34,8 @@ class Limit:
         Gait cycles in a row for which a value must be beyond before the level rises; 1: at once.
     is_least : bool
         Whether the limits are lower bounds: values below them are faults.
+    is_latched : bool
+        Whether a level that was shown stays until it is acknowledged.
     """
 
     warn: float
@@ -39,6 +43,7 @@ class Limit:
     deadband: float = 0.0
     on_delay: int = 1
     is_least: bool = False
+    is_latched: bool = True
 
     def reaches(self, value: float, level: Level) -> bool:
         """Whether a value is at the limit of WARN or ERROR, or beyond it."""
@@ -150,8 +155,8 @@ def evaluated(alarm: Alarm, value: float, limit: Limit, stamp_ns: int, cycles: i
     level, is_acknowledged, raised_ns = alarm.level, alarm.acknowledged, alarm.raised_ns
     if present > level:
         level, is_acknowledged, raised_ns = present, False, stamp_ns
-    elif is_acknowledged and present < level:
-        level, is_acknowledged = present, present is not Level.OK
+    elif (is_acknowledged or not limit.is_latched) and present < level:
+        level, is_acknowledged = present, is_acknowledged and present is not Level.OK
     return Alarm(  # all fields: `attrs.evolve` takes several times as long, for each value of each period
         kind=alarm.kind,
         subject=alarm.subject,

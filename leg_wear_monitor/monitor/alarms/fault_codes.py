@@ -14,7 +14,7 @@ LEDGER_NOT_WRITTEN, LEDGER_INTERRUPTED = "LEDGER_NOT_WRITTEN", "LEDGER_INTERRUPT
 SAMPLES_DROPPED, SAMPLES_NOT_PUBLISHED = "SAMPLES_DROPPED", "SAMPLES_NOT_PUBLISHED"
 TOPICS, RECORDING_STOPPED = "TOPICS", "RECORDING_STOPPED"
 CLOCK_MISSING, CLOCK_STOPPED, CLOCK_SET_BACK = "CLOCK_MISSING", "CLOCK_STOPPED", "CLOCK_SET_BACK"
-ALREADY_COUNTED = "ALREADY_COUNTED"
+STAMPS_AHEAD, ALREADY_COUNTED = "STAMPS_AHEAD", "ALREADY_COUNTED"
 
 FAULT_CODES = {
     NO_FAULT: "nothing is wrong",
@@ -27,11 +27,13 @@ FAULT_CODES = {
     LEDGER_INTERRUPTED: "the previous run was interrupted",
     SAMPLES_DROPPED: "the node is overloaded: samples were dropped",
     SAMPLES_NOT_PUBLISHED: "the node is overloaded: values of samples are not published",
-    TOPICS: "an input topic has no publisher, several, another type, or messages are lost",
+    TOPICS: "an input topic has no publisher, several, another type, not the crank, a torque about another "
+    "axis, or messages are lost",
     RECORDING_STOPPED: "the recording of the node has stopped",
     CLOCK_MISSING: "`use_sim_time` is set and nobody publishes `/clock`",
     CLOCK_STOPPED: "`/clock` has stopped",
     CLOCK_SET_BACK: "the clock was set back",
+    STAMPS_AHEAD: "the stamps of an input are ahead of the clock of the node",
     ALREADY_COUNTED: "samples of a time that is in the ledger are skipped",
 }
 """Codes that are not the name of an alarm, and their meaning."""

@@ -49,6 +49,7 @@ CODES_OF_GUIDES = {
         "RECORDING_STOPPED",
         "SAMPLES_DROPPED",
         "SAMPLES_NOT_PUBLISHED",
+        "STAMPS_AHEAD",
     ),
 }
 """Codes without their joints, by the name of the page; a test compares them with the codes that there are."""

@@ -82,6 +82,8 @@ class AlarmSpec(Generic[_E]):
         Whether the limit is a lower bound: values below it are faults.
     is_count : bool
         Whether the value is a count: ERROR begins at the limit, without WARN and deadband.
+    is_latched : bool
+        Whether the alarm stays until it is acknowledged; that of missing data ends when they return.
     """
 
     kind: str
@@ -95,6 +97,7 @@ class AlarmSpec(Generic[_E]):
     on_delay: Callable[["Alarms"], int] = _usual
     is_least: bool = False
     is_count: bool = False
+    is_latched: bool = True
 
     def new(self, joint: str = "") -> Alarm:
         """The alarm in its initial state."""
@@ -110,7 +113,7 @@ class AlarmSpec(Generic[_E]):
         if self.is_count:
             return Limit(error, error)
         first = error / warn if self.is_least else warn * error
-        return Limit(first, error, alarms.deadband, self.on_delay(alarms), self.is_least)
+        return Limit(first, error, alarms.deadband, self.on_delay(alarms), self.is_least, self.is_latched)
 
 
 IMPACT: "AlarmSpec[JointReport]" = AlarmSpec(
@@ -247,6 +250,7 @@ def _rate(name: str) -> "AlarmSpec[InputHealth]":
         value=lambda health: health.rate_hz[name],
         limit=lambda of: of.config.limits.min_rate_hz,
         is_least=True,
+        is_latched=False,
     )
 
 
@@ -267,6 +271,7 @@ INPUT: "tuple[AlarmSpec[InputHealth], ...]" = (
         limit_words="`limits.lost_time_fraction`",
         value=lambda health: health.lost_fraction,
         limit=lambda of: of.config.limits.lost_time_fraction,
+        is_latched=False,
     ),
     AlarmSpec(
         kind="input_torque",

@@ -1,4 +1,4 @@
-"""Alarms that need a clock or the ROS graph: a silent input, several publishers of one input."""
+"""Alarms that need a clock or the ROS graph: a silent input, stamps of a time to come, several publishers."""
 
 from collections.abc import Mapping
 
@@ -10,15 +10,18 @@ from leg_wear_monitor.monitor.reports import AlarmList
 from leg_wear_monitor.ros.health.silence import SILENT_FROM_S
 from leg_wear_monitor.twin.kinds import CRANK, KINDS
 
-SILENCE = "input_silence"
-_SILENT = Limit(SILENT_FROM_S, SILENT_FROM_S)
+SILENCE, AHEAD = "input_silence", "stamps_ahead"
+AHEAD_FROM_S = 1.0  # more than what a network's clocks differ by
+_SILENT = Limit(SILENT_FROM_S, SILENT_FROM_S, is_latched=False)
+_AHEAD = Limit(AHEAD_FROM_S, 2.0 * AHEAD_FROM_S, is_latched=False)
 SOURCES = specs.SOURCES.kind
 _TWO_SOURCES = Limit(2.0, 2.0)
 _CRANK = KINDS[CRANK].name
-_LIMITS = {SILENCE: _SILENT, SOURCES: _TWO_SOURCES}
+_LIMITS = {SILENCE: _SILENT, AHEAD: _AHEAD, SOURCES: _TWO_SOURCES}
 
 QUANTITIES = {
     **{f"{SILENCE} {kind.name}": f"time without {kind.name} samples" for kind in KINDS.values()},
+    **{f"{AHEAD} {kind.name}": f"lead of the {kind.name}'s stamps over the clock" for kind in KINDS.values()},
     **{f"{SOURCES} {kind.name}": f"number of publishers of the {kind.name}" for kind in KINDS.values()},
     SOURCES: f"number of publishers of the {_CRANK}",
 }
@@ -43,19 +46,20 @@ class NodeAlarms:
     """
 
     def __init__(self, kinds: tuple[str, ...]) -> None:
-        alarms = [Alarm(kind=SILENCE, subject=kind, unit="s") for kind in kinds]
+        alarms = [Alarm(kind=each, subject=kind, unit="s") for each in (SILENCE, AHEAD) for kind in kinds]
         alarms += [sources_alarm(kind) for kind in kinds]
         self._alarms = {alarm.name: alarm for alarm in alarms}
 
-    def evaluate(self, values: Mapping[str, float], stamp_ns: int) -> bool:
-        """Evaluate values by alarm name; return whether the published state has changed."""
-        changed = False
+    def evaluate(self, values: Mapping[str, float], stamp_ns: int) -> tuple[Alarm, ...]:
+        """Evaluate values by alarm name; return the alarms whose published state has changed."""
+        changed = []
         for name, value in values.items():
             before = self._alarms[name]
             after = evaluated(before, value, _LIMITS[before.kind], stamp_ns)
-            changed |= has_changed(before, after)
+            if has_changed(before, after):
+                changed.append(after)
             self._alarms[name] = after
-        return changed
+        return tuple(changed)
 
     def acknowledge(self) -> tuple[tuple[Alarm, ...], tuple[Alarm, ...]]:
         """Acknowledge all raised alarms; return the cleared ones and the remaining ones."""

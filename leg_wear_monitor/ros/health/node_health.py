@@ -105,7 +105,9 @@ def _faults(topic: InputTopic, silent_s: float, running_s: float) -> Iterator[tu
         yield Level.WARN, "messages are lost on the way to this node"
     if topic.without_crank:
         yield Level.ERROR, topic.without_crank
-    if several_of := several(topic.publishers):
+    if topic.other_axis:
+        yield Level.ERROR, topic.other_axis
+    if len(topic.publishers.fitting) - topic.shared > 1 and (several_of := several(topic.publishers)):
         at = Level.ERROR if topic.sources > 1 else Level.WARN
         yield at, f"{several_of}; expected one"
 

@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING
 import attrs
 from rclpy.node import Node
 
-from leg_wear_monitor.messages.streams import streams_read
+from leg_wear_monitor.messages.streams import WRENCH_STAMPED, streams_read
 from leg_wear_monitor.monitor.alarms.alarm import Alarm, Level
 from leg_wear_monitor.monitor.config.settings import MonitorConfig
 from leg_wear_monitor.monitor.reports import AlarmList, Status, VerdictReport
@@ -16,7 +16,7 @@ from leg_wear_monitor.monitor.verdict.rules import findings
 from leg_wear_monitor.monitor.verdict.situation import Situation
 from leg_wear_monitor.monitor.verdict.verdict import dated
 from leg_wear_monitor.ros.health.clock_monitor import ClockMonitor, both_clocks
-from leg_wear_monitor.ros.health.node_alarms import QUANTITIES, SILENCE, NodeAlarms, sources_alarm
+from leg_wear_monitor.ros.health.node_alarms import AHEAD, QUANTITIES, SILENCE, NodeAlarms, sources_alarm
 from leg_wear_monitor.ros.health.node_health import topics_status
 from leg_wear_monitor.ros.health.node_log import AlarmLog, StatusLog
 from leg_wear_monitor.ros.health.silence import Silence
@@ -24,8 +24,9 @@ from leg_wear_monitor.ros.inputs.crank_names import CrankNames
 from leg_wear_monitor.ros.inputs.inbox import Arrival
 from leg_wear_monitor.ros.inputs.inputs import InputTopic
 from leg_wear_monitor.ros.inputs.publishers import publishers_of
+from leg_wear_monitor.ros.inputs.wrench_axis import WrenchAxis
 from leg_wear_monitor.twin.kinds import CRANK, KINDS
-from leg_wear_monitor.twin.sample import Samples
+from leg_wear_monitor.twin.sample import NO_FAULT, Samples
 
 if TYPE_CHECKING:
     from leg_wear_monitor.monitor.wear_monitor import WearMonitor
@@ -33,6 +34,9 @@ if TYPE_CHECKING:
 # A killed publisher stays in the graph until its lease expires (20 s by default): two publishers of one name
 # may be one that was restarted.
 _SAME_NAME_S = 30.0
+# A node that has just come may still tell by its first message that it publishes other joints than the crank.
+_NEW_S = 3.0
+_OTHERS_S = 60.0  # for which it is known, though it publishes seldom
 
 
 class Supervision:
@@ -51,9 +55,14 @@ class Supervision:
         kinds = tuple(KINDS[stream.kind].name for stream in streams_read(config.drive_torque.source))
         self._silence = Silence(kinds, self._started_ns, time.time_ns())
         self._names = CrankNames(config.crank_joint)
+        torque = config.drive_torque
+        predicted_nm = monitor.predicted_torque_nm / abs(torque.scale * torque.gear_ratio)
+        self._axis = WrenchAxis(torque.axis, predicted_nm)
+        self._ahead_s = dict.fromkeys(kinds, 0.0)
         self._alarms, self._clock = NodeAlarms(kinds), ClockMonitor()
         self._alarm_log, self._status_log = AlarmLog(node.get_logger()), StatusLog(node.get_logger())
         self._several_since: dict[str, int] = {}
+        self._most_ahead_s = 0.0
         self.inputs: Sequence[InputTopic] = ()
 
     @property
@@ -63,8 +72,23 @@ class Supervision:
 
     def note(self, arrivals: Sequence[Arrival], samples: Samples) -> None:
         """Record processed messages and their samples."""
-        self._names.note(arrivals, samples)
+        self._names.note(arrivals, samples, time.monotonic_ns())
+        self._axis.note(arrivals, samples)
+        self._note_stamps(samples)
         self._silence.note(self._monitor.used, time.monotonic_ns(), time.time_ns())
+
+    def _note_stamps(self, samples: Samples) -> None:
+        """Record by how much the stamps of each kind are ahead of the clock, at most since the last check."""
+        now_ns = self._now_ns()
+        for code, kind in KINDS.items():
+            stamps = samples["stamp_ns"][(samples["kind"] == code) & (samples["fault"] == NO_FAULT)]
+            if now_ns > 0 and len(stamps) and kind.name in self._ahead_s:
+                ahead_s = (int(stamps.max()) - now_ns) * 1.0e-9
+                self._ahead_s[kind.name] = max(self._ahead_s[kind.name], ahead_s)
+
+    def _now_ns(self) -> int:
+        """Present ROS time [ns]; 0 if there is none."""
+        return int(self._node.get_clock().now().nanoseconds)
 
     def alarms(self, alarms: AlarmList) -> AlarmList:
         """Merge the monitor's alarms with those of the node, and log the changes."""
@@ -86,30 +110,37 @@ class Supervision:
 
     def check(self) -> bool:
         """Check topics and graph; return whether the node's alarms have changed."""
-        now_ns, lack = time.monotonic_ns(), self._names.some_lack_it
-        without = self._names.report()
+        now_ns, without, axis = time.monotonic_ns(), self._names.report(), self._axis.report()
         values: dict[str, float] = {}
         for topic in self.inputs:
             topic.publishers = publishers_of(self._node, topic.name, topic.stream.type)
             is_crank = topic.stream.kind == CRANK
             if is_crank:
                 topic.without_crank = without
-            # several nodes may publish joints of one robot; then some messages lack the crank
-            topic.sources = 1 if is_crank and lack else self._sources(topic, now_ns)
+                topic.shared = self._names.others(now_ns - int(_OTHERS_S * 1.0e9))
+            elif topic.stream.code == WRENCH_STAMPED:
+                topic.other_axis = axis
+            topic.sources = self._sources(topic, now_ns)
             values[sources_alarm(KINDS[topic.stream.kind].name).name] = float(topic.sources)
         for kind in self._silence.kinds:
             is_silent = self._silence.level(kind, now_ns) is Level.ERROR
             values[f"{SILENCE} {kind}"] = self._silence.silent_s(kind, now_ns) if is_silent else 0.0
-        return self._alarms.evaluate(values, time.time_ns())
+            values[f"{AHEAD} {kind}"] = self._ahead_s[kind]
+        self._most_ahead_s = max(self._ahead_s.values())
+        self._ahead_s = dict.fromkeys(self._ahead_s, 0.0)
+        stamp_ns = self._now_ns() or time.time_ns()
+        changed = self._alarms.evaluate(values, stamp_ns)
+        self._monitor.note_alarms(stamp_ns, changed)
+        return bool(changed)
 
     def statuses(self, statuses: Iterable[Status]) -> tuple[Status, ...]:
         """Add the statuses of topics and clock, and mark statuses without current data."""
-        now_ns, ros_ns = time.monotonic_ns(), self._node.get_clock().now().nanoseconds
+        now_ns, ros_ns = time.monotonic_ns(), self._now_ns()
         is_simulated = bool(self._node.get_parameter("use_sim_time").value)
         topics = topics_status(self.inputs, now_ns, self._started_ns)
         for topic in self.inputs:
             topic.lost_reported = topic.lost
-        clock = self._clock.status(ros_ns, now_ns, is_simulated)
+        clock = self._clock.status(ros_ns, now_ns, is_simulated, self._most_ahead_s)
         given = {status.name: status for status in statuses}
         verdict = verdict_status(self.verdict(self._monitor.verdict).verdict)
         given[verdict.name] = verdict
@@ -119,12 +150,12 @@ class Supervision:
         return self._silence.marked((*given.values(), topics), now_ns)
 
     def _sources(self, topic: InputTopic, now_ns: int) -> int:
-        """Number of publishers that a topic certainly has."""
+        """Number of publishers that certainly send what is expected of a topic."""
         names = topic.publishers.fitting
-        if len(names) < 2:
+        sources = len(names) - topic.shared
+        if sources < 2:
             self._several_since.pop(topic.name, None)
             return 1
         since_ns = self._several_since.setdefault(topic.name, now_ns)
-        if len(set(names)) > 1 or (now_ns - since_ns) * 1.0e-9 > _SAME_NAME_S:
-            return len(names)
-        return 1
+        wait_s = _SAME_NAME_S if len(set(names)) < 2 else _NEW_S if topic.stream.kind == CRANK else 0.0
+        return sources if (now_ns - since_ns) * 1.0e-9 >= wait_s else 1

@@ -41,6 +41,10 @@ class InputTopic:
         Number of publishers that certainly send the expected data; 1 while this is unknown.
     without_crank : str
         Report on messages without the crank; empty if there are none.
+    other_axis : str
+        Report on a torque about another axis than the one that is read; empty if there is none.
+    shared : int
+        Number of publishers that are known to publish other joints than the crank.
     """
 
     name: str
@@ -53,6 +57,8 @@ class InputTopic:
     publishers: Publishers = Publishers()
     sources: int = 1
     without_crank: str = ""
+    other_axis: str = ""
+    shared: int = 0
 
 
 def subscribe(

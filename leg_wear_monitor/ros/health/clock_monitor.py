@@ -51,8 +51,8 @@ class ClockMonitor:
             return Status("clock", Level.WARN, message, values, fault_codes.CLOCK_SET_BACK)
         if ahead_s >= AHEAD_FROM_S:
             message = (
-                f"stamps of the samples are {ahead_s:.3g} s ahead of the node's clock: set the clocks of "
-                "both computers; samples of a time that was counted ahead are skipped later"
+                "the stamps of the samples are ahead of the node's clock: set the clocks of both computers; "
+                "samples of a time that was counted ahead are skipped later"
             )
             return Status("clock", Level.WARN, message, values, fault_codes.STAMPS_AHEAD)
         return Status("clock", Level.OK, "goes on", values)

@@ -14,7 +14,7 @@ from leg_wear_monitor.monitor.reports import AlarmList, Status, VerdictReport
 from leg_wear_monitor.monitor.status import verdict_status
 from leg_wear_monitor.monitor.verdict.rules import findings
 from leg_wear_monitor.monitor.verdict.situation import Situation
-from leg_wear_monitor.monitor.verdict.verdict import dated
+from leg_wear_monitor.monitor.verdict.verdict import Finding, dated
 from leg_wear_monitor.ros.health.clock_monitor import ClockMonitor, both_clocks
 from leg_wear_monitor.ros.health.node_alarms import AHEAD, QUANTITIES, SILENCE, NodeAlarms, sources_alarm
 from leg_wear_monitor.ros.health.node_health import topics_status
@@ -37,6 +37,8 @@ _SAME_NAME_S = 30.0
 # A node that has just come may still tell by its first message that it publishes other joints than the crank.
 _NEW_S = 3.0
 _OTHERS_S = 60.0  # for which it is known, though it publishes seldom
+# rules of the verdict that a torque about another axis can be the cause of
+_OF_AXIS = ("MECHANISM_CHANGED", "TORQUE_INPUT", "TORQUE_MISMATCH", "TORQUE_SCALE", "TORQUE_SENSOR")
 
 
 class Supervision:
@@ -62,7 +64,7 @@ class Supervision:
         self._alarms, self._clock = NodeAlarms(kinds), ClockMonitor()
         self._alarm_log, self._status_log = AlarmLog(node.get_logger()), StatusLog(node.get_logger())
         self._several_since: dict[str, int] = {}
-        self._most_ahead_s = 0.0
+        self._most_ahead_s, self._other_axis = 0.0, ""
         self.inputs: Sequence[InputTopic] = ()
 
     @property
@@ -97,41 +99,54 @@ class Supervision:
         return shown
 
     def verdict(self, report: VerdictReport) -> VerdictReport:
-        """Merge the monitor's verdict with what the node's own alarms say; without any, it is unchanged."""
-        own = self._alarms.raised
-        if not own:
+        """Merge the monitor's verdict with what the node knows; without any, it is unchanged."""
+        own, monitors = self._alarms.raised, report.findings
+        if self._other_axis:
+            monitors = tuple(map(self._with_axis, monitors))
+        found = findings(Situation(alarms=own, quantities=QUANTITIES)) if own else ()
+        if not found and monitors == report.findings:
             return report
-        found = findings(Situation(alarms=own, quantities=QUANTITIES))
-        return attrs.evolve(report, findings=(*report.findings, *dated(found, (), report.stamp_ns)))
+        return attrs.evolve(report, findings=(*monitors, *dated(found, (), report.stamp_ns)))
+
+    def _with_axis(self, finding: Finding) -> Finding:
+        """A finding about the drive torque with its cause, if the torque is about another axis."""
+        if finding.code not in _OF_AXIS:
+            return finding
+        do = "correct drive_torque.axis and start the monitor again; then acknowledge the alarms"
+        return attrs.evolve(finding, why=f"{finding.why}; {self._other_axis}", do=do)
 
     def acknowledge(self) -> tuple[tuple[Alarm, ...], tuple[Alarm, ...]]:
         """Acknowledge the node's own alarms; return the cleared ones and the remaining ones."""
         return self._alarms.acknowledge()
 
     def check(self) -> bool:
-        """Check topics and graph; return whether the node's alarms have changed."""
-        now_ns, without, axis = time.monotonic_ns(), self._names.report(), self._axis.report()
-        values: dict[str, float] = {}
-        for topic in self.inputs:
-            topic.publishers = publishers_of(self._node, topic.name, topic.stream.type)
-            is_crank = topic.stream.kind == CRANK
-            if is_crank:
-                topic.without_crank = without
-                topic.shared = self._names.others(now_ns - int(_OTHERS_S * 1.0e9))
-            elif topic.stream.code == WRENCH_STAMPED:
-                topic.other_axis = axis
-            topic.sources = self._sources(topic, now_ns)
-            values[sources_alarm(KINDS[topic.stream.kind].name).name] = float(topic.sources)
+        """Check topics and graph; return whether alarms of the node or its part of the verdict changed."""
+        now_ns, stamp_ns = time.monotonic_ns(), self._now_ns() or time.time_ns()
+        axis, self._other_axis = self._other_axis, self._axis.report()
+        values = self._check_topics(now_ns)
         for kind in self._silence.kinds:
             is_silent = self._silence.level(kind, now_ns) is Level.ERROR
             values[f"{SILENCE} {kind}"] = self._silence.silent_s(kind, now_ns) if is_silent else 0.0
             values[f"{AHEAD} {kind}"] = self._ahead_s[kind]
         self._most_ahead_s = max(self._ahead_s.values())
         self._ahead_s = dict.fromkeys(self._ahead_s, 0.0)
-        stamp_ns = self._now_ns() or time.time_ns()
         changed = self._alarms.evaluate(values, stamp_ns)
         self._monitor.note_alarms(stamp_ns, changed)
-        return bool(changed)
+        return bool(changed) or axis != self._other_axis
+
+    def _check_topics(self, now_ns: int) -> dict[str, float]:
+        """Check publishers and contents of the topics; return the values of the alarms of several sources."""
+        without, values = self._names.report(), {}
+        for topic in self.inputs:
+            topic.publishers = publishers_of(self._node, topic.name, topic.stream.type)
+            if topic.stream.kind == CRANK:
+                topic.without_crank = without
+                topic.shared = self._names.others(now_ns - int(_OTHERS_S * 1.0e9))
+            elif topic.stream.code == WRENCH_STAMPED:
+                topic.other_axis = self._other_axis
+            topic.sources = self._sources(topic, now_ns)
+            values[sources_alarm(KINDS[topic.stream.kind].name).name] = float(topic.sources)
+        return values
 
     def statuses(self, statuses: Iterable[Status]) -> tuple[Status, ...]:
         """Add the statuses of topics and clock, and mark statuses without current data."""

@@ -53,8 +53,8 @@ class WrenchAxis:
         largest = int(np.argmax(np.nan_to_num(rms)))
         if rms[largest] < _SWINGS * self._predicted_nm or rms[self._axis] > _STILL * rms[largest]:
             return ""
+        # without values, for each change of a message is a line of the log
         return (
-            f"the torque about {_AXES[self._axis]} is still ({rms[self._axis]:.2g} N m RMS), the one about "
-            f"{_AXES[largest]} is not ({rms[largest]:.3g} N m RMS); if that is the drive's, set "
-            f"drive_torque.axis to {_AXES[largest]}"
+            f"the torque about {_AXES[self._axis]} does not change, the one about {_AXES[largest]} does; "
+            f"if that is the drive's, set drive_torque.axis to {_AXES[largest]}"
         )

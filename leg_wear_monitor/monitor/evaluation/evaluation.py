@@ -18,7 +18,7 @@ from leg_wear_monitor.monitor.inputs.health import InputHealth, TorqueRange, inp
 from leg_wear_monitor.monitor.reports import AlarmList, CycleReport
 from leg_wear_monitor.twin.digital_twin import DigitalTwin
 from leg_wear_monitor.twin.sample import Samples
-from leg_wear_monitor.twin.statistics import Intake, Tracking
+from leg_wear_monitor.twin.statistics import CycleStatistics, Intake, NotCompared, Tracking
 
 
 @attrs.define
@@ -120,6 +120,11 @@ class AlarmEvaluation:
         """Whether a gait cycle's torque is as predicted, so that its friction is that of this leg."""
         return report.torque_mismatch < self.config.limits.warn_fraction * self.config.limits.torque_mismatch
 
+    def why_not_compared(self, statistics: CycleStatistics) -> NotCompared | None:
+        """Why the torque of a gait cycle is not compared with the predicted one; None if it is."""
+        is_allowed = self.config.cadence.allows(statistics.cadence_rpm)
+        return statistics.not_compared if is_allowed else NotCompared.CADENCE
+
     def end_cycle(self, report: CycleReport, record: TorqueRecord) -> tuple[AlarmList, ...]:
         """Evaluate a whole gait cycle, with its torque and the record; returns all alarms if one changed."""
         self.state.cycles += 1
@@ -128,6 +133,8 @@ class AlarmEvaluation:
         torque = torque_values(report, record, self.torque_bounds)
         cycle = CycleEvidence(report, torque, self.config.cadence.commanded_rpm)
         values = {spec.name(): spec.value(cycle) for spec in (*specs.TORQUE, *specs.GAIT)}
+        if not self.config.cadence.allows(report.cadence_rpm):
+            del values[specs.MISMATCH.name()]
         for joint in report.joints:
             values |= {spec.name(joint.joint): spec.value(joint) for spec in joint_specs(self.config)}
         return self.board.evaluate(values, report.stamp_ns)

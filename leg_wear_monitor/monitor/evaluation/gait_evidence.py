@@ -29,6 +29,13 @@ def _unit_words(measured: float, predicted: float) -> str:
     )
 
 
+def _difference(cycle: CycleReport) -> float:
+    """Difference of measured and predicted torque, as a fraction of the predicted one."""
+    if math.isnan(cycle.torque_mismatch):  # as in the first gait cycles: with load, friction and lag
+        return cycle.residual_torque_rms_nm / cycle.predicted_torque_rms_nm
+    return cycle.torque_mismatch
+
+
 def doubts(cycle: CycleReport, config: MonitorConfig) -> list[str]:
     """Reasons why a gait cycle is unlikely to be one of this leg; empty if there are none.
 
@@ -51,10 +58,10 @@ def doubts(cycle: CycleReport, config: MonitorConfig) -> list[str]:
                 f"the drive torque is {size} N m RMS, {predicted:.3g} N m are predicted"
                 + _unit_words(measured, predicted)
             )
-        elif not cycle.torque_mismatch < _UNLIKE:
+        elif not (differs := _difference(cycle)) < _UNLIKE:
             found.append(
                 "the drive torque does not resemble the predicted one: they differ by "
-                f"{cycle.torque_mismatch:.2g} times the predicted torque"
+                f"{differs:.2g} times the predicted torque"
             )
     return found
 

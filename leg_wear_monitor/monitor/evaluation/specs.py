@@ -176,8 +176,8 @@ DEPARTURE: "AlarmSpec[JointReport]" = AlarmSpec(
 MISMATCH: "AlarmSpec[CycleEvidence]" = AlarmSpec(
     kind="torque_mismatch",
     quantity="unexplained fraction of the drive torque",
-    meaning="RMS of the torque that foot load, friction and lag do not explain, as a fraction of the "
-    "predicted RMS",
+    meaning="RMS of the torque that repeats over the last gait cycles, and that foot load, friction and lag "
+    "do not explain, as a fraction of the predicted RMS",
     limit_words="`limits.torque_mismatch`",
     value=lambda cycle: cycle.report.torque_mismatch,
     limit=lambda of: of.config.limits.torque_mismatch,

@@ -1,12 +1,13 @@
 """History of a leg's drive torque: friction at commissioning, lag at other speeds."""
 
 import math
+from collections.abc import Mapping
 
 import attrs
 
 from leg_wear_monitor.mechanism.ideal import TURN
 from leg_wear_monitor.monitor.reports import CycleReport
-from leg_wear_monitor.twin.statistics import CycleStatistics
+from leg_wear_monitor.twin.statistics import CycleStatistics, NotCompared
 
 COMMISSIONING_CYCLES = 20  # in a row with the torque as predicted, to store their friction as this leg's
 FRICTION_KEY, SIGMA_KEY = "friction_commissioned_nm", "friction_commissioned_sigma_nm"
@@ -61,12 +62,15 @@ class TorqueRecord:
     friction_nm, sigma_nm : float
         Constant torque at the commissioning of this leg, and its standard deviation; NaN before.
     lags : LagBySpeed
+    not_compared : mapping of str to int
+        Gait cycles whose torque was not compared in this run, by the values of `NotCompared`.
     """
 
     cycles: int = 0
     friction_nm: float = math.nan
     sigma_nm: float = math.nan
     lags: LagBySpeed = LagBySpeed()
+    not_compared: Mapping[str, int] = attrs.field(factory=dict)
 
     @classmethod
     def of(cls, totals: dict[str, float]) -> "TorqueRecord":
@@ -80,14 +84,34 @@ class TorqueRecord:
             return {}
         return {FRICTION_KEY: self.friction_nm, SIGMA_KEY: self.sigma_nm}
 
-    def with_cycle(self, statistics: CycleStatistics, report: CycleReport, is_sound: bool) -> "TorqueRecord":
-        """Record with one more gait cycle; ``is_sound``: its torque was as predicted."""
+    def with_cycle(
+        self,
+        statistics: CycleStatistics,
+        report: CycleReport,
+        is_sound: bool,
+        not_compared: NotCompared | None = None,
+    ) -> "TorqueRecord":
+        """Record with one more gait cycle.
+
+        Parameters
+        ----------
+        statistics : CycleStatistics
+        report : CycleReport
+        is_sound : bool
+            Whether its torque was as predicted.
+        not_compared : NotCompared, optional
+            Why it was not compared.
+        """
         if not report.torque_samples:
             return self
-        lags = self.lags.with_cycle(statistics)
+        record = attrs.evolve(self, lags=self.lags.with_cycle(statistics))
+        if not_compared is not None:
+            number = self.not_compared.get(not_compared.value, 0) + 1
+            return attrs.evolve(record, not_compared={**self.not_compared, not_compared.value: number})
         if not math.isnan(self.friction_nm):
-            return attrs.evolve(self, lags=lags)
+            return record
         cycles = self.cycles + 1 if is_sound else 0
         if cycles < COMMISSIONING_CYCLES:
-            return attrs.evolve(self, cycles=cycles, lags=lags)
-        return TorqueRecord(cycles, report.friction_nm, report.friction_sigma_nm, lags)
+            return attrs.evolve(record, cycles=cycles)
+        friction_nm, sigma_nm = report.friction_nm, report.friction_sigma_nm
+        return attrs.evolve(record, cycles=cycles, friction_nm=friction_nm, sigma_nm=sigma_nm)

@@ -9,6 +9,7 @@ from leg_wear_monitor.monitor.torque_causes.explanation import TorqueExplanation
 from leg_wear_monitor.twin.statistics import CycleStatistics
 
 _LONGEST = 60  # gait cycles
+_RISES = 2  # gait cycles of a new mismatch before it is found in the mean of the last ones
 _FIRST, _EVERY = (3, 5, 10), 20  # gait cycles after which they are explained, then each so many
 
 
@@ -19,7 +20,7 @@ class MismatchWindow:
     Attributes
     ----------
     cycles : tuple of CycleStatistics
-        The last ones.
+        The last ones; while the torque is as predicted, the last few that were compared.
     number : int
         How many there were.
     is_open : bool
@@ -49,16 +50,27 @@ class MismatchWindow:
         explain : callable
             Explanation of some gait cycles.
         """
+        is_compared = statistics.not_compared is None
         if alarm.level is Level.OK:
-            return NO_MISMATCH
-        if alarm.present is Level.OK or not statistics.torque.samples:
-            return attrs.evolve(self, is_open=False)
-        before = self if self.is_open else NO_MISMATCH
+            if not is_compared:
+                return self
+            return MismatchWindow((*self.cycles, statistics)[-_FIRST[0] :], self.number + 1)
+        if alarm.present is Level.OK:
+            return attrs.evolve(self, cycles=(), number=_FIRST[0], is_open=False)
+        if not is_compared:
+            return self
+        before = self if self.is_open else self._before()
         cycles, number = (*before.cycles, statistics)[-_LONGEST:], before.number + 1
         explanation = before.explanation
         if number in _FIRST or number % _EVERY == 0:
             explanation = explain(cycles)
         return MismatchWindow(cycles, number, True, explanation)
+
+    def _before(self) -> "MismatchWindow":
+        """Window before the first gait cycle with the alarm: those in which it was found."""
+        since = self.number if self.number < _FIRST[0] else _RISES - 1
+        cycles = self.cycles[-since:] if since else ()
+        return MismatchWindow(cycles, len(cycles))
 
 
 NO_MISMATCH = MismatchWindow()

@@ -9,7 +9,7 @@ from leg_wear_monitor.mechanism.arrays import Floats
 from leg_wear_monitor.record import Record
 from leg_wear_monitor.twin.follower.state import FRICTION, LAG, LOAD
 from leg_wear_monitor.twin.follower.torque_estimate import CycleEstimate, LoadEstimate
-from leg_wear_monitor.twin.statistics import CycleStatistics, TorqueProfile, TorqueStatistics
+from leg_wear_monitor.twin.statistics import CycleStatistics, NotCompared, TorqueProfile, TorqueStatistics
 
 
 def clear_run_statistics(statistics: RunStatistics) -> None:
@@ -39,23 +39,23 @@ def torque_statistics(
     settled : LoadEstimate
         Estimate filtered over cycles.
     unexplained_nm : float
-        RMS of the unexplained residual.
+        RMS of the unexplained residual over the last cycles that were compared.
 
     Returns
     -------
     TorqueStatistics
     """
-    n = int(sums.number)
+    n, weight = int(sums.number), sums.weight
 
     def rms(squares: float) -> float:
-        return float(np.sqrt(squares / n)) if n else np.nan
+        return float(np.sqrt(squares / weight)) if n else np.nan
 
     load, friction, lag = settled.values.tolist()
     return TorqueStatistics(
         samples=n,
         measured_rms_nm=rms(sums.measured_squares),
         predicted_rms_nm=rms(sums.predicted_squares),
-        residual_mean_nm=float(sums.residual / n) if n else np.nan,
+        residual_mean_nm=float(sums.residual / weight) if n else np.nan,
         residual_rms_nm=rms(sums.residual_squares),
         unexplained_rms_nm=unexplained_nm,
         condition=found.condition if found else np.nan,
@@ -80,6 +80,7 @@ def torque_profile(sums: Record, acting_n: float) -> TorqueProfile:
 def cycle_statistics(
     leg: Record, stamp: int, contacts: ContactArrays, depth: Floats, before: Floats,
     statistics: RunStatistics, torque: TorqueStatistics, profile: TorqueProfile,
+    not_compared: NotCompared | None,
 ) -> CycleStatistics:  # fmt: skip
     """Statistics of a cycle at its end from a `LEG_STATE`; ``before`` (2, k) [m]: initial clearances."""
     joint, motion, now = contacts.joint, leg.motion, clearances(contacts, depth)
@@ -104,6 +105,7 @@ def cycle_statistics(
         depth_max_m=depth.max(axis=2),
         torque=torque,
         torque_profile=profile,
+        not_compared=not_compared,
     )
 
 

@@ -26,14 +26,21 @@ from leg_wear_monitor.twin.follower.cycle import (
 )
 from leg_wear_monitor.twin.follower.following import CYCLE, LEFT, NEEDS_START, REPORTED, follow
 from leg_wear_monitor.twin.follower.load import FootLoad, torque_size
-from leg_wear_monitor.twin.follower.repeating import RepeatingResidual
-from leg_wear_monitor.twin.follower.state import EVALUATED, TORQUE_SENSOR, LegState, leg_state
-from leg_wear_monitor.twin.follower.torque_estimate import CycleEstimate, LoadEstimate, find
+from leg_wear_monitor.twin.follower.repeating import (
+    CYCLES,
+    INSTANT_CYCLES,
+    LEAST_CYCLES,
+    RepeatingResidual,
+    averages_by_phase,
+)
+from leg_wear_monitor.twin.follower.state import EVALUATED, LAG, TORQUE_SENSOR, LegState, leg_state
+from leg_wear_monitor.twin.follower.torque_estimate import LEAST_SAMPLES, LoadEstimate, find
 from leg_wear_monitor.twin.sampling.state import SampledState
 from leg_wear_monitor.twin.settings import INSTANT, STANCE, TwinSettings
 from leg_wear_monitor.twin.statistics import (
     CycleStatistics,
     Event,
+    NotCompared,
     SampleStatistics,
     TorqueProfile,
     TorqueStatistics,
@@ -42,6 +49,7 @@ from leg_wear_monitor.twin.statistics import (
 from leg_wear_monitor.twin.steps import MOVE, Steps
 
 _RUN_IN_S = 0.2
+_STEADY = 0.05  # relative difference of two gait cycles' durations beyond which the cadence changes
 _LEAST_TORQUE_NM = 1.0e-6  # lower bound of the RMS torque, for a leg that needs no torque
 
 _EVENT_KINDS = {
@@ -105,13 +113,14 @@ class LegFollower:
         self.state: Record = record_of(self.records)
         self.statistics = new_run_statistics(len(setup.linkage.mechanism.joints))
         # a ground force cannot pull
-        self.estimate = LoadEstimate(
-            settings.load_limit_n, 0.0 if settings.load_shape == STANCE else -settings.load_limit_n
-        )
+        least_n = 0.0 if settings.load_shape == STANCE else -settings.load_limit_n
+        self._loads = least_n, settings.load_limit_n
+        self.estimate = LoadEstimate(settings.load_limit_n, least_n)
         self._cutoff = TURN * settings.torque_bandwidth_hz
-        self._repeating = RepeatingResidual()
         self.torque_size_nm = max(torque_size(setup.linkage, setup.speed), _LEAST_TORQUE_NM)
         self._instants = settings.torque_sampling == INSTANT
+        kept = (INSTANT_CYCLES, INSTANT_CYCLES) if self._instants else (CYCLES, LEAST_CYCLES)
+        self._repeating = RepeatingResidual(*kept)
         self._sensor = new_records(1, TORQUE_SENSOR)
         self._sensor[0] = self._cutoff, self.torque_size_nm, self._instants
         self._before = self.clearances
@@ -135,6 +144,8 @@ class LegFollower:
         own, state = self._setup.surfaces.depth, self._stepper.state
         changed = (own != depth).any(axis=(1, 2))
         own[:] = depth
+        if changed.any():
+            self._repeating.cycles = ()
         state.pending[:, changed] = 0.0
         self._before[:, changed] = self.clearances[:, changed]
 
@@ -144,6 +155,7 @@ class LegFollower:
         contacts = self._setup.contacts
         contacts.friction[:, 0] = friction
         self._stepper.model.law[:] = contact_laws(contacts)
+        self._repeating.cycles = ()
 
     def follow(
         self, steps: Steps, n: int, cycles: list[CycleStatistics], events: list[Event]
@@ -199,6 +211,7 @@ class LegFollower:
             motion.failed_ns += stamp - motion.failed_at_ns
         motion.piece_begin_ns = motion.piece_end_ns = stamp
         motion.lost = motion.anchored = motion.cut_ns = motion.cycle_begin_ns = motion.cycle_bridged_ns = 0
+        motion.whole_cycles = motion.cycle_before_ns = 0
         motion.runs, motion.turns_before, self.state.low_pass.stage = 1, step["turns"], 0
         self._leg.polynomial[:] = 0.0, angle, speed, 0.0, 0.0, 0.0, 0.0
         clear_run_statistics(self.statistics)
@@ -242,11 +255,14 @@ class LegFollower:
         motion, depth = self.state.motion, self._setup.surfaces.depth
         if motion.cycle_is_whole:
             motion.cycles += 1
-            torque, profile = self._end_torque()
+            not_compared = self._why_not_compared(stamp)
+            torque, profile = self._end_torque(not_compared is None)
+            motion.whole_cycles += 1
+            motion.cycle_before_ns = stamp - motion.cycle_begin_ns
             cycles.append(
                 cycle_statistics(
                     self.state, stamp, self._setup.contacts, depth, self._before, self.statistics, torque,
-                    profile,
+                    profile, not_compared,
                 )
             )  # fmt: skip
         self._begin_cycle(stamp)
@@ -259,27 +275,48 @@ class LegFollower:
         clear_run_statistics(self.statistics)
         self._before = self.clearances
 
-    def _end_torque(self) -> tuple[TorqueStatistics, TorqueProfile]:
+    def _why_not_compared(self, stamp: int) -> NotCompared | None:
+        """Why the torque of the gait cycle that ends at a stamp [ns] is not compared; None if it is."""
+        motion = self.state.motion
+        if self.state.sums.number < LEAST_SAMPLES:
+            return NotCompared.SAMPLES
+        if motion.whole_cycles == 0:
+            return NotCompared.FIRST
+        if motion.cycle_bridged_ns > 0:
+            return NotCompared.GAP
+        duration = float(stamp - motion.cycle_begin_ns)
+        if abs(duration / float(motion.cycle_before_ns) - 1.0) > _STEADY:
+            return NotCompared.CADENCE
+        return None
+
+    def _end_torque(self, is_compared: bool) -> tuple[TorqueStatistics, TorqueProfile]:
         """Torque of the gait cycle that ends; the load that it shows acts from now on."""
         # number of independent samples after two equal low-pass stages
         independent = max(0.25 * self._cutoff * self.statistics.time[0], 1.0)
         sums = self.state.sums
-        profile = torque_profile(sums, self.estimate.acting)
+        acting_n = self.estimate.acting
+        profile = torque_profile(sums, acting_n)
         found = find(sums, sums.number / independent, self.estimate.room)
         if found is not None:
             self.estimate.take(found, self._acts)
             self._load.set(self.estimate.acting)
-        torque = torque_statistics(sums, found, self.estimate, self._unexplained_nm(found))
+        if found is not None and is_compared:
+            self._repeating.take(sums.by_phase if self._instants else self._by_phase(profile, acting_n))
+        torque = torque_statistics(sums, found, self.estimate, self._unexplained_nm)
         return torque, profile
 
-    def _unexplained_nm(self, found: CycleEstimate | None) -> float:
-        """RMS of the unexplained residual [N m], of this cycle or over cycles; NaN if unknown."""
-        if not self._instants:
-            return found.left if found else np.nan
-        if found is None:
-            return np.nan
-        self._repeating.take(self.state.sums.by_phase)
-        return self._repeating.rms_nm
+    def _by_phase(self, profile: TorqueProfile, acting_n: float) -> Floats:
+        """Residual (5, n) of the gait cycle that ends, of a sensor that averages."""
+        direction = 1 if self.state.motion.cut_rises else -1
+        lag_s = float(self.estimate.values[LAG])
+        duration_s = float(self.statistics.time[0])
+        return averages_by_phase(profile, acting_n, lag_s, direction, duration_s, self._cutoff)
+
+    @property
+    def _unexplained_nm(self) -> float:
+        """RMS of the residual that repeats and is not explained [N m]; NaN if unknown."""
+        # the residual of averages is from the torque without a load, that of instants is not
+        return self._repeating.rms_nm() if self._instants else self._repeating.rms_nm(self._loads)
 
     def snapshot(self) -> FollowerSnapshot:
         """A copy of the whole state, surfaces included."""

@@ -111,7 +111,7 @@ def _add_measured(signature, leg, polynomial, step):
         i, w = blend(signature.shape[0] - 1, angle)
         lever = signature[i] + w * (signature[i + 1] - signature[i])
         before, leg.torque.last_lever = leg.torque.last_lever, lever  # the torque is a mean since then
-        add_to_profile(leg.sums.profile, angle, step.torque, math.nan, 0.5 * (before + lever))
+        add_to_profile(leg.sums.profile, angle, step.torque, math.nan, 0.5 * (before + lever), 1.0)
     return angle - _TURN * math.floor(angle / _TURN)
 
 

@@ -1,37 +1,61 @@
-"""The part of the torque residual that repeats over gait cycles, without the scatter of instants."""
+"""The part of the torque residual that repeats over gait cycles, by crank phase (physics.md section 9).
+
+What a lost sample, a stamp that is off, noise and the chance of impacts leave in one gait cycle, they do not
+leave in the next at the same phase: it shows as scatter over cycles, and is taken off. A mismatch of the leg
+repeats.
+"""
 
 import numpy as np
 
 from leg_wear_monitor.mechanism.arrays import Floats
+from leg_wear_monitor.twin.follower.state import LOAD
+from leg_wear_monitor.twin.statistics import TorqueProfile
 
-CYCLES = 8  # averaged gait cycles: fewer have more scatter, more have a longer delay
+# gait cycles whose mean is taken, and how many are needed; fewer have more scatter, more have a longer delay
+# (tuned on the synthetic leg in full coordinates at 60 rpm: knocks in A and G, lost samples, late stamps)
+CYCLES, LEAST_CYCLES = 4, 3  # of averages
+INSTANT_CYCLES = 8  # of instants, whose scatter is larger
 _LEAST_PHASES = 8
+_LEAST_WEIGHT = 0.05  # of a phase, as a fraction of the mean one: less is of samples elsewhere in the turn
+_LONGEST_LAG_S = 0.01  # a longer one is a torque or an angle that is wrong as received, not to be explained
 
 
 class RepeatingResidual:
     """The torque residual by crank phase over the last gait cycles.
 
+    Parameters
+    ----------
+    most, least : int
+        Gait cycles that are kept, and that are needed.
+
     Attributes
     ----------
-    cycles : tuple of (5, PHASES) arrays
-        ``by_phase`` of `TORQUE_SUMS` for each gait cycle, the newest last.
+    cycles : tuple of (5, n) arrays
+        For each gait cycle, the newest last, rows by phase: weight, then weight times residual, and weight
+        times its regressors load, friction and lag.
     """
 
-    def __init__(self) -> None:
+    def __init__(self, most: int = INSTANT_CYCLES, least: int = INSTANT_CYCLES) -> None:
+        self._most, self._least = most, least
         self.cycles: tuple[Floats, ...] = ()
 
     def take(self, by_phase: Floats) -> None:
-        """Add the sums (5, PHASES) of a complete gait cycle."""
-        self.cycles = (*self.cycles[1 - CYCLES :], by_phase.copy())
+        """Add the sums (5, n) of a complete gait cycle."""
+        self.cycles = (*self.cycles, by_phase.copy())[-self._most :]
 
-    @property
-    def rms_nm(self) -> float:
+    def rms_nm(self, loads: tuple[float, float] = (-np.inf, np.inf)) -> float:
         """RMS [N m] of the repeating residual without load, friction and lag; NaN without enough cycles.
 
         The squared standard error of the mean over cycles is subtracted, so that pure scatter gives 0 on
         average.
+
+        Parameters
+        ----------
+        loads : (float, float)
+            Least and largest possible load of the residual [N].
         """
-        if len(self.cycles) < CYCLES:
+        number = len(self.cycles)
+        if number < self._least:
             return float("nan")
         sums = np.stack(self.cycles)
         sums = sums[:, :, (sums[:, 0] > 0.0).all(axis=0)]
@@ -39,12 +63,63 @@ class RepeatingResidual:
             return float("nan")
         weight = sums[:, 0]
         total = sums.sum(axis=0)
-        mean, columns = total[1] / total[0], (total[2:] / total[0]).T
-        # leave out columns of zeros (no toe, no speed)
-        columns = columns[:, np.abs(columns).max(axis=0) > 0.0]
-        size = np.linalg.norm(columns, axis=0)
-        explained = columns @ (np.linalg.lstsq(columns / size, mean, rcond=None)[0] / size)
+        mean = total[1] / total[0]
+        if not np.isfinite(mean).all():
+            return float("inf")
+        explained = _explained(mean, total[2:] / total[0], loads)
         fraction = weight / total[0]
-        scatter = (fraction**2 * (sums[:, 1] / weight - mean) ** 2).sum(axis=0) * CYCLES / (CYCLES - 1)
+        scatter = (fraction**2 * (sums[:, 1] / weight - mean) ** 2).sum(axis=0) * number / (number - 1)
         square = ((mean - explained) ** 2).mean() - scatter.mean()
         return float(np.sqrt(max(square, 0.0)))
+
+
+def _explained(mean: Floats, rows: Floats, loads: tuple[float, float]) -> Floats:
+    """What rows (3, n) of load, friction and lag explain of a mean residual (n,) by least squares."""
+    size = np.linalg.norm(rows, axis=1)
+    unit = rows / np.where(size > 0.0, size, 1.0)[:, None]  # zeros without a toe or speed explain nothing
+    found = np.linalg.lstsq(unit.T, mean, rcond=None)[0]
+    most = np.array(loads) * size[LOAD] if size[LOAD] > 0.0 else np.zeros(2)
+    load = min(max(float(found[LOAD]), most[0]), most[1])
+    if load != found[LOAD]:
+        rest = np.delete(unit, LOAD, axis=0)
+        by_load = load * unit[LOAD]
+        return np.asarray(by_load + np.linalg.lstsq(rest.T, mean - by_load, rcond=None)[0] @ rest)
+    return np.asarray(found @ unit)
+
+
+def averages_by_phase(
+    profile: TorqueProfile, acting_n: float, lag_s: float, direction: int, duration_s: float, cutoff: float
+) -> Floats:
+    """Sums (5, n) of a gait cycle of averages for `RepeatingResidual`.
+
+    Each sample counts by the time that it stands for: where some are lost, the others weigh alone. Weights
+    decrease with the time to a sample as exp(-cutoff t): as the two stages of the low-pass filter, without
+    their delay.
+
+    Parameters
+    ----------
+    profile : TorqueProfile
+    acting_n : float
+        Foot load that acted in the model.
+    lag_s : float
+        Delay of the torque as far as it is known: the difference of two times is the derivative between them.
+    direction : int
+        1 or -1.
+    duration_s : float
+        Of the gait cycle.
+    cutoff : float
+        Of the low-pass filter [rad/s].
+    """
+    weight, n = profile.number, len(profile.number)
+    apart = np.minimum(np.arange(n), n - np.arange(n)) / n * duration_s
+    near = np.exp(-cutoff * apart)[np.abs(np.subtract.outer(np.arange(n), np.arange(n)))]
+    residual = profile.measured_nm - profile.predicted_nm
+    predicted = profile.predicted_nm + acting_n * profile.lever_m
+    smooth = near @ np.stack([weight, residual, profile.lever_m, direction * weight, predicted], axis=1)
+    of_all = smooth[:, 0].copy()
+    torque = smooth[:, 4] / np.where(of_all > 0.0, of_all, 1.0)
+    rate = (np.roll(torque, -1) - np.roll(torque, 1)) * n / (2.0 * duration_s)  # along the crank's angle
+    between = 0.5 * min(max(lag_s, -_LONGEST_LAG_S), _LONGEST_LAG_S) * direction / duration_s * n
+    smooth[:, 4] = -np.interp(np.arange(n) - between, np.arange(n), rate, period=n) * direction * of_all
+    smooth[of_all < _LEAST_WEIGHT * of_all.mean()] = 0.0
+    return np.asarray(smooth.T)

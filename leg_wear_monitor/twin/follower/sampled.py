@@ -156,7 +156,7 @@ class SampledFollower(LegFollower):
         motion.cycles += 1
         profile = torque_profile(self.state.sums, 0.0)
         if motion.counts == SETTLING:
-            self._end_torque()  # the load may be another one than before the jump
+            self._end_torque(is_compared=False)  # the load may be another one than before the jump
         direction = 1 if motion.cut_rises else -1
         condition = self._condition(60.0 * direction / moved_s, profile)
         self._estimate(condition, 1.0)

@@ -34,6 +34,8 @@ LEG_MOTION = np.dtype(
         # the last passage of crank angle 0
         ("anchored", "i8"),  # 1 if there was one
         ("anchor_turn", "i8"),  # whole crank turns there
+        ("whole_cycles", "i8"),  # complete gait cycles since the leg was set in motion
+        ("cycle_before_ns", "i8"),  # duration of the last of them
         # the gait cycle
         ("cycle_begin_ns", "i8"),  # stamp
         ("cycle_bridged_ns", "i8"),  # time bridged in it
@@ -61,6 +63,7 @@ LEG_TORQUE = np.dtype(
         ("last_lever", "f8"),  # drive torque per foot load at the last torque sample [N m/N]
         ("last_predicted", "f8"),  # predicted torque after the low-pass filter [N m]
         ("period", "f8"),  # of the torque sensor [s]
+        ("period_scatter", "f8"),  # mean departure of the times between samples from it, as a fraction
         ("unfiltered", "f8"),  # time since the last filtered sample [s]
     ]
 )
@@ -95,6 +98,7 @@ WAITING_INSTANT = np.dtype(
 TORQUE_SUMS = np.dtype(
     [
         ("number", "f8"),  # of compared torques
+        ("weight", "f8"),  # by which the following sums are weighed, in samples
         ("residual", "f8"),  # [N m]
         ("residual_squares", "f8"),  # [N^2 m^2]
         ("measured_squares", "f8"),  # [N^2 m^2]
@@ -103,7 +107,7 @@ TORQUE_SUMS = np.dtype(
         ("along", "f8", (3,)),  # products of the regressors with the residual
         # for a sensor that samples instants: rows of weight, then weight times residual, load, friction, lag
         ("by_phase", "f8", (5, PHASES)),
-        # before the low-pass filter: number, crank angle, measured torque, predicted torque, torque per load
+        # before the low-pass filter: weight, crank angle, measured torque, predicted torque, torque per load
         ("profile", "f8", (5, FINE_PHASES)),
     ]
 )

@@ -15,7 +15,7 @@ from leg_wear_monitor.mechanism.arrays import Floats
 from leg_wear_monitor.record import Record
 from leg_wear_monitor.twin.follower.state import FRICTION, LOAD
 
-_LEAST_SAMPLES = 8
+LEAST_SAMPLES = 8
 _SMALL = 1.0e-9
 # prior standard deviations of the three around 0 [N, N m, s], and random walk per cycle
 _UNKNOWN = np.array([1000.0, 10.0, 0.02])
@@ -60,7 +60,7 @@ def find(
     gram, along = sums.gram, sums.along
     scale = np.sqrt(np.diag(gram))
     active = scale > _SMALL * max(scale.max(), _SMALL)
-    if sums.number < _LEAST_SAMPLES or not active[FRICTION]:
+    if sums.number < LEAST_SAMPLES or not active[FRICTION]:
         return None
     scaled = gram[np.ix_(active, active)] / np.outer(scale[active], scale[active])
     condition = float(np.linalg.cond(scaled)) ** 0.5
@@ -71,7 +71,7 @@ def find(
     values[active] = inverse @ along[active]
     bounded = _bounded(values, gram, along, active, loads)
     square = float(sums.residual_squares - 2.0 * bounded @ along + bounded @ gram @ bounded)
-    left = max(square, 0.0) / sums.number
+    left = max(square, 0.0) / sums.weight
     sigma[active] = np.sqrt(left * max(correlated, 1.0) * np.diag(inverse))
     return CycleEstimate(values, sigma, condition, float(left**0.5))
 

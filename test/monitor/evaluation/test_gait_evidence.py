@@ -20,6 +20,7 @@ def cycle(**other: float) -> Any:
         "torque_samples": 200,
         "measured_torque_rms_nm": 8.4,
         "predicted_torque_rms_nm": 8.4,
+        "residual_torque_rms_nm": 1.2,
         "torque_mismatch": 0.03,
     }
     return SimpleNamespace(**healthy | other)
@@ -32,6 +33,7 @@ def cycle(**other: float) -> Any:
         {"cadence_rpm": 45.0},
         {"torque_mismatch": 0.34},  # a healthy leg's with a sensor that samples at instants
         {"torque_mismatch": 0.6},
+        {"torque_mismatch": np.nan},  # not compared yet
         {"torque_samples": 0, "measured_torque_rms_nm": np.nan, "torque_mismatch": np.nan},
     ],
 )
@@ -46,7 +48,10 @@ def test_a_leg_is_believed_worn_slow_or_without_torque(other: dict[str, float]) 
         ({"cadence_rpm": -60.0}, "the crank turns at -60 rpm, the commanded cadence is 60 rpm"),
         ({"cadence_rpm": 300.0}, "the crank turns at 300 rpm, the commanded cadence is 60 rpm"),
         ({"torque_mismatch": 1.2}, "the drive torque does not resemble the predicted one"),
-        ({"torque_mismatch": np.nan}, "the drive torque does not resemble the predicted one"),
+        (
+            {"torque_mismatch": np.nan, "residual_torque_rms_nm": 9.0},
+            "the drive torque does not resemble the predicted one",
+        ),
         ({"measured_torque_rms_nm": 0.01}, "the drive torque is only 0.01 N m RMS"),
         ({"measured_torque_rms_nm": 8e3, "torque_mismatch": 1e3}, "the drive torque is 8e+03 N m RMS"),
     ],

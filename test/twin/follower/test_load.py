@@ -79,7 +79,8 @@ def test_the_signature_is_virtual_work_without_mean(leg, shape):
 
 def sums_of(columns: np.ndarray, residual: np.ndarray) -> Record:
     sums = record_of(new_records(1, TORQUE_SUMS))
-    sums.number, sums.residual_squares = len(residual), residual @ residual
+    sums.number = sums.weight = len(residual)
+    sums.residual_squares = residual @ residual
     sums.gram[:], sums.along[:] = columns.T @ columns, columns.T @ residual
     return sums
 
@@ -131,7 +132,7 @@ def test_a_load_is_found_and_moves_the_contact_forces(leg, force, friction):
 
 
 def test_a_load_that_is_not_asked_for_does_not_act(leg):
-    samples, _ = measured(pushed(leg, 100.0), 5, 0.0)
+    samples, _ = measured(pushed(leg, 100.0), 6, 0.0)
     twin = DigitalTwin(leg, TwinSettings(load_shape=CONSTANT, estimate_load=False))
     torque = twin.update(samples).cycles[-1].torque
     assert torque.load_n == pytest.approx(100.0, abs=8.0)

@@ -7,11 +7,13 @@ from hypothesis import strategies as st
 
 from leg_wear_monitor.mechanism.ideal import TURN
 from leg_wear_monitor.record import new_records, record_of
-from leg_wear_monitor.twin.follower.repeating import CYCLES, RepeatingResidual
+from leg_wear_monitor.twin.digital_twin import DigitalTwin
+from leg_wear_monitor.twin.follower.repeating import INSTANT_CYCLES, RepeatingResidual
 from leg_wear_monitor.twin.follower.state import PHASES, TORQUE_SUMS
 from leg_wear_monitor.twin.follower.torque_estimate import LoadEstimate, find
-
-pytestmark = pytest.mark.plain
+from leg_wear_monitor.twin.sample import gait_samples
+from leg_wear_monitor.twin.settings import TwinSettings
+from leg_wear_monitor.twin.statistics import NotCompared
 
 ANGLE = np.linspace(0.0, TURN, 200, endpoint=False)
 COLUMNS = np.stack([0.1 * np.sin(ANGLE), np.ones(200), 40.0 * np.cos(3.0 * ANGLE)], axis=1)
@@ -19,11 +21,13 @@ COLUMNS = np.stack([0.1 * np.sin(ANGLE), np.ones(200), 40.0 * np.cos(3.0 * ANGLE
 
 def sums_of(residual):
     sums = record_of(new_records(1, TORQUE_SUMS))
-    sums.number, sums.residual_squares = len(residual), residual @ residual
+    sums.number = sums.weight = len(residual)
+    sums.residual_squares = residual @ residual
     sums.gram[:], sums.along[:] = COLUMNS.T @ COLUMNS, COLUMNS.T @ residual
     return sums
 
 
+@pytest.mark.plain
 def test_a_foot_that_pulls_is_not_explained_by_a_load():
     """What a load below 0 would explain is left in the mismatch; the friction beside it is still found."""
     residual = COLUMNS @ [-50.0, 1.5, 0.001]
@@ -37,6 +41,7 @@ def test_a_foot_that_pulls_is_not_explained_by_a_load():
     assert estimate.room == (0.0, 1000.0)
 
 
+@pytest.mark.plain
 @given(st.floats(0.0, 500.0))
 def test_a_load_within_its_bounds_is_explained(load):
     found = find(sums_of(COLUMNS @ [load, 0.0, 0.0]), 10.0, (0.0, 1000.0))
@@ -47,7 +52,7 @@ def instants(repeats: float, scatter: float, seed: int = 0):
     """Residuals by phase: a wave that repeats, noise that does not, a friction of 2 N m."""
     found, chance = RepeatingResidual(), np.random.default_rng(seed)
     phase = (np.arange(PHASES) + 0.5) / PHASES * TURN
-    for _ in range(CYCLES):
+    for _ in range(INSTANT_CYCLES):
         sums = np.ones((5, PHASES))
         wave = np.sqrt(2.0) * repeats * np.sin(5.0 * phase)
         sums[1] = 2.0 + wave + scatter * chance.standard_normal(PHASES)
@@ -57,15 +62,40 @@ def instants(repeats: float, scatter: float, seed: int = 0):
     return found
 
 
+@pytest.mark.plain
 def test_what_scatters_is_taken_off_and_what_repeats_stays():
-    quiet = [instants(0.0, 2.0, seed).rms_nm for seed in range(20)]
+    quiet = [instants(0.0, 2.0, seed).rms_nm() for seed in range(20)]
     assert np.sqrt(np.mean(np.square(quiet))) < 0.35  # of 2 N m, 0.7 in a mean of eight cycles
-    loud = [instants(3.0, 2.0, seed).rms_nm for seed in range(20)]
+    loud = [instants(3.0, 2.0, seed).rms_nm() for seed in range(20)]
     assert np.mean(loud) == pytest.approx(3.0, rel=0.05)
-    assert instants(3.0, 0.0).rms_nm == pytest.approx(3.0, rel=1e-6)
+    assert instants(3.0, 0.0).rms_nm() == pytest.approx(3.0, rel=1e-6)
 
 
+@pytest.mark.plain
 def test_before_enough_cycles_nothing_is_told():
     found = instants(1.0, 0.0)
     found.cycles = found.cycles[1:]
-    assert np.isnan(found.rms_nm)
+    assert np.isnan(found.rms_nm())
+
+
+def test_gait_cycles_that_cannot_be_compared_say_why(leg):
+    """The first since a start, one with another cadence than the one before, one with a bridged gap."""
+    n = np.arange(9 * 200)
+    seconds = n / 200
+    turned = seconds + np.where(seconds > 4.5, 0.25 * (seconds - 4.5), 0.0)  # turns: 60 rpm, then 75 rpm
+    samples = gait_samples(
+        1_700_000_000_000_000_000 + n * 5_000_000,
+        crank_angle_rad=TURN * turned % TURN,
+        torque_nm=np.sin(TURN * turned),
+    )
+    samples = samples[(seconds < 6.8) | (seconds > 6.85)]
+    cycles = DigitalTwin(leg, TwinSettings()).update(samples).cycles
+    first, *rest = [cycle.not_compared for cycle in cycles]
+    assert first is NotCompared.FIRST
+    assert rest.count(NotCompared.CADENCE) == 2  # the cycle of the change, and the one after it
+    assert rest.count(NotCompared.GAP) == 1
+    assert rest.count(None) == len(rest) - 3
+    without = samples.copy()
+    without["torque_nm"] = np.nan
+    cycles = DigitalTwin(leg, TwinSettings()).update(without).cycles
+    assert {cycle.not_compared for cycle in cycles} == {NotCompared.SAMPLES}

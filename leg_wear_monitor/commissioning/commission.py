@@ -124,7 +124,7 @@ def propose(
 def _result(facts: Found, load: Load | None, mechanism: Mechanism) -> CommissioningResult:
     told = items(facts)
     proposed = None
-    if not facts.choice.doubts:
+    if not facts.doubts:
         proposed = config_from({**values_of(facts.base), **changes(told)}, "commission")
     return CommissioningResult(
         items=tuple(told),

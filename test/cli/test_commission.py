@@ -28,6 +28,12 @@ def test_the_sample_recording_gives_a_file_that_check_accepts(run, tmp_path: Pat
     found = json.loads((tmp_path / "found.json").read_text())
     signs = next(item for item in found["items"] if item["name"] == "crank.sign")
     assert signs["mismatch"] < 0.1 < 0.5 < signs["other_mismatch"]
+    # the lag is not determined: what is there may be better
+    (tmp_path / "monitor.yaml").write_text("by hand")
+    result = run("commission", str(HEALTHY), "--out", "monitor.yaml")
+    assert result.exit_code == 1
+    assert "not written: monitor.yaml exists" in result.stderr
+    assert (tmp_path / "monitor.yaml").read_text() == "by hand"
 
 
 def test_a_missing_recording_is_one_line(run) -> None:

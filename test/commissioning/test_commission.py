@@ -171,6 +171,37 @@ def test_one_cadence_is_not_enough_to_tell_the_sampling(
     assert result.to_dict()["items"][[i.name for i in result.items].index("lag")]["value"] is None
 
 
+def test_a_lag_is_within_the_sigma_of_the_offset_at_one_cadence(
+    walked: Walk, proposed: Callable[..., CommissioningResult]
+) -> None:
+    """What cannot be told apart is in the error: the declared lag, 5 ms, times the speed."""
+    for lag_s in (0.0, 0.005):
+        offset = proposed(signals_of(Robot(lag_s=lag_s, offset_rad=0.3), walked)).item("crank.offset_rad")
+        assert offset.sigma is not None
+        assert offset.sigma > 0.005 * TURN
+        assert angle_between(float(offset.value), 0.3) < 2.0 * offset.sigma
+
+
+def test_two_recordings_of_a_cadence_each_do_not_tell_a_lag(
+    ideal_walk: Callable[..., Walk], proposed: Callable[..., CommissioningResult]
+) -> None:
+    """Each has an offset of its own; with a torque that impacts hide, the fit went astray."""
+    parts = []
+    for number, rpm in enumerate((60.0, 45.0)):
+        walk, robot = ideal_walk(rpm), Robot(offset_rad=0.3, torque_noise_nm=0.01, seed=number)
+        parts.append(
+            (100.0 * number + walk.time_s, *columns_of(robot, walk), np.full(len(walk.time_s), number))
+        )
+    time_s, position, torque, recording = (np.concatenate(column) for column in zip(*parts, strict=True))
+    signals = Signals(
+        {CRANK: Series(time_s, position, recording)}, {SENSOR: Series(time_s, torque, recording)}
+    )
+    result = proposed(signals)
+    assert any("two cadences in one recording" in text for text in result.not_told)
+    offset = result.item("crank.offset_rad")
+    assert offset.sigma is not None and angle_between(float(offset.value), 0.3) < 2.0 * offset.sigma < 0.2
+
+
 def test_an_encoder_that_starts_anew_is_found_again_and_reported(
     ideal_walk: Callable[..., Walk], proposed: Callable[..., CommissioningResult]
 ) -> None:
@@ -239,6 +270,8 @@ def test_noise_is_no_torque(
     noise = np.random.default_rng(1).standard_normal(len(walk.time_s))
     result = proposed(signals_of(Robot(), attrs.evolve(walk, torque_nm=noise)))
     assert result.config is None
+    assert any("whatever is chosen" in text for text in result.not_told)
+    assert result.findings == ()  # neither zeros nor friction of a leg that is not seen
 
 
 def test_a_short_recording_is_refused(walked: Walk, proposed: Callable[..., CommissioningResult]) -> None:

@@ -32,7 +32,7 @@ WITH_FINDINGS = 1
     type=click.Path(path_type=Path, dir_okay=False),
     metavar="FILE",
     help="Write the proposed parameters, such as monitor.yaml; nothing is written if a choice is not "
-    "certain.",
+    "certain, and a file that exists is kept unless everything is determined and fits.",
 )
 @click.option("--joint-states", metavar="TOPIC", help="Topic of the crank.  [default: all are tried]")
 @click.option("--drive-torque", metavar="TOPIC", help="Topic of the torque.  [default: all are tried]")
@@ -65,8 +65,11 @@ def commission(
         print_commissioning(result)
     written = write_json(json_file, result.to_json() if json_file is not None else "")
     if out is not None and result.config is not None:
-        write_file(out, result.to_yaml().encode())
-        written.append(out)
+        if out.exists() and not result.is_sure:
+            click.echo(f"not written: {out} exists, and the proposal is not certain in all", err=True)
+        else:
+            write_file(out, result.to_yaml().encode())
+            written.append(out)
     if json_file != STDOUT:
         for path in written:
             click.echo(f"written: {path}")

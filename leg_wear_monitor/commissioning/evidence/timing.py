@@ -19,9 +19,13 @@ _ONE_CADENCE = 0.2  # relative distance from the usual cadence beyond which ther
 
 
 def separates_lag(pair: Pair) -> bool:
-    """Whether the crank walks at speeds different enough to tell a lag from an offset."""
-    low, high = np.quantile(slow_speed(pair), [0.1, 0.9])
-    return bool(abs(high - low) > _SPREAD * max(abs(high), abs(low)))
+    """Whether the crank walks at speeds different enough to tell a lag from an offset.
+
+    In one recording: each has an offset of its own, as its encoder may have started anew.
+    """
+    speed = slow_speed(pair)
+    spans = [np.quantile(speed[pair.recording == i], [0.1, 0.9]) for i in np.unique(pair.recording)]
+    return any(abs(high - low) > _SPREAD * max(abs(high), abs(low)) for low, high in spans)
 
 
 @attrs.frozen

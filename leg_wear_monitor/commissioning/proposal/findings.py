@@ -24,7 +24,7 @@ _AT_ZERO_RAD = 0.02
 
 def not_told(found: Found) -> tuple[str, ...]:
     """Parameters that the recording does not determine, and why."""
-    told = list(found.choice.doubts)
+    told = list(found.doubts)
     if not found.sampling.value:
         told.append(f"drive_torque.sampling: {found.sampling.why}")
     told += _lag(found)
@@ -53,10 +53,12 @@ def findings(found: Found, load: Load | None, mechanism: Mechanism) -> tuple[str
         text
         for text in (
             _load(load),
-            "" if found.choice.doubts else does_not_fit(found.fit, mechanism),
-            _drives(found),
-            _late(found),
-            _anew(found),
+            # of a leg that is not known, neither friction nor phases tell anything
+            *(
+                ()
+                if found.doubts
+                else (does_not_fit(found.fit, mechanism), _drives(found), _late(found), _anew(found))
+            ),
             _position(found),
         )
         if text
@@ -74,7 +76,7 @@ def _lag(found: Found) -> Iterator[str]:
         turned = 1.0e-3 * abs(float(np.median(found.fit.crank()[1])))
         yield (
             f"lag: at one cadence, a torque that is late by 1 ms looks like {turned:.2g} rad of offset; "
-            "record two cadences"
+            "record two cadences in one recording"
         )
     elif _TOLD * timing.error_s > most:
         error = 1.0e3 * _TOLD * timing.error_s

@@ -29,12 +29,15 @@ QUICKLY := --quiet --no-compile
 unexport PYTHONPATH LD_LIBRARY_PATH _ROS_WHEELS_BOOTSTRAP_COMPLETE
 
 test: .venv/installed
-	$(MAKE) --no-print-directory --jobs 2 --output-sync=target lint kernels
-	TRACED_LATER="$(WITH_KERNELS)" .venv/bin/python -m pytest $(TWO) $(IN_ORDER) -m "not slow and not uncompiled" \
-		--cov --cov-report=
+	@echo "== 1 of 3: style, types, layers; kernels are compiled"
+	@$(MAKE) --no-print-directory --jobs 2 --output-sync=target lint kernels
+	@echo "== 2 of 3: all tests, with compiled kernels"
+	@TRACED_LATER="$(WITH_KERNELS)" .venv/bin/python -m pytest $(TWO) $(IN_ORDER) -m "not slow and not uncompiled" \
+		--verbose --cov --cov-report=
 	@# Coverage cannot see into compiled kernels: once more, uncompiled, where there are kernels, and the sum of both is judged.
-	NUMBA_DISABLE_JIT=1 .venv/bin/python -m pytest $(TWO) $(IN_ORDER) -m "plain and not slow" $(WITH_KERNELS) \
-		--cov --cov-append --cov-fail-under=$(COVERAGE_MIN)
+	@echo "== 3 of 3: tests of kernels, uncompiled; coverage of 2 and 3"
+	@NUMBA_DISABLE_JIT=1 .venv/bin/python -m pytest $(TWO) $(IN_ORDER) -m "plain and not slow" $(WITH_KERNELS) \
+		--verbose --cov --cov-append --cov-fail-under=$(COVERAGE_MIN)
 
 # What `make test` leaves out: more of the same laws, at a length that finds what a short run does not (marker `slow`),
 # and kernels compiled by themselves (marker `uncompiled`).

@@ -1,6 +1,5 @@
 """The tutorials run as notebooks do, only shorter, and what they say of their results is so."""
 
-import math
 import re
 import runpy
 from collections.abc import Callable
@@ -82,12 +81,14 @@ def test_your_own_linkage(learnt: Learnt, capsys: pytest.CaptureFixture[str]) ->
 
 
 @pytest.mark.no_cover
+@pytest.mark.chaotic
 def test_what_clearance_does(learnt: Learnt) -> None:
     lesson = learnt("3_what_clearance_does")
     first, later, ideal = (result.joints["G"] for result in (lesson.knee, lesson.later, lesson.ideal))
     assert later.mean_force_n == pytest.approx(first.mean_force_n, rel=0.02)
-    # the lesson's quarter is for ten cycles: of their p99 the standard deviation is 5 %; here are five
-    assert later.p99_force_n == pytest.approx(first.p99_force_n, rel=0.25 * math.sqrt(2.0))
+    # the lesson's quarter is for ten cycles: of their p99 the standard deviation is 5 %; here are five, and
+    # 5.3 sigma of the difference of two
+    assert later.p99_force_n == pytest.approx(first.p99_force_n, rel=5.3 * 0.05 * 2.0)
     assert first.p99_force_n > 2.0 * ideal.p99_force_n
     off = [result.toe.max_position_error_m for result in lesson.by_size]
     assert off == sorted(off) and off[-1] > 3.0 * off[0]

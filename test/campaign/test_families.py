@@ -15,6 +15,10 @@ NAMES = sorted(path.stem for path in (ROOM / "families").glob("[a-z]*.py"))
 FEW = {"configurations": 16, "floods": 2, "kills": 1, "ledgers": 13, "live_kills": 1, "recordings": 10}
 
 
+# Left to `make test-slow` and `make campaign`: test/monitor/ledger/test_kill.py holds their law in less time.
+LONG = {"kills", "live_kills"}
+
+
 def run(name: str, *how_many: str) -> None:
     """In a process of its own: what this one has loaded must not be in the cases."""
     paths = [str(ROOM.parent), *filter(None, [os.environ.get("PYTHONPATH")])]
@@ -30,7 +34,9 @@ def run(name: str, *how_many: str) -> None:
     assert done.returncode == 0, done.stdout + done.stderr
 
 
-@pytest.mark.parametrize("name", NAMES)
+@pytest.mark.parametrize(
+    "name", [pytest.param(name, marks=pytest.mark.slow if name in LONG else ()) for name in NAMES]
+)
 def test_nothing_crashes_hangs_or_lies(name: str) -> None:
     run(name, "--number", str(FEW[name]))
 

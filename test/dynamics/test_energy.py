@@ -14,6 +14,7 @@ from leg_wear_monitor.mechanism.loader import parse_mechanism
 from leg_wear_monitor.mechanism.spec import ConstantLoad, PhaseLoad
 
 
+@pytest.mark.chaotic
 @pytest.mark.parametrize("model, cycles, bound", [(FullRun, 2, 1.0e-4), (ClearanceRun, 8, 1.0e-3)])
 def test_walls_that_wear_away_take_energy_along(leg, model, cycles, bound):
     """At 3e4 times the pace of real wear the balance closes as ever, with what contacts had stored in it."""
@@ -39,6 +40,7 @@ LOADS = {
 }
 
 
+@pytest.mark.chaotic
 @pytest.mark.parametrize("clearance_joints", ["AB", "ABGIJ"])
 @pytest.mark.parametrize("load", LOADS)
 def test_energy_of_the_clearance_model_under_a_foot_load(leg, clearance_joints, load):
@@ -73,6 +75,7 @@ HARDER = {
 }
 
 
+@pytest.mark.chaotic
 @pytest.mark.parametrize("case", HARDER)
 def test_energy_of_the_clearance_model_in_harder_cases(leg, case):
     coefficient, force, clearance_m, bound = HARDER[case]

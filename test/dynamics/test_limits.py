@@ -14,15 +14,20 @@ from leg_wear_monitor.mechanism.position import dense_jacobian
 from leg_wear_monitor.wear.surfaces import SECTORS
 
 
+@pytest.mark.chaotic
 def test_a_vanishing_clearance_is_an_ideal_joint(leg_cycles, leg, linkage_of):
-    """Mean forces fall towards the ideal ones as all clearances shrink, and come within 5 %, J's 20 %."""
+    """Mean forces fall towards the ideal ones as all clearances shrink, and come within 5 %, J's 20 %.
+
+    From 3e-4 m on, means of three cycles have sigmas of 0.2 % (J 2.5 %) and less, of the ideal force; J comes
+    from 0.126 to 0.116 above it in the last step, with sigmas of 0.007 and 0.003 (six cycles, 2026-11-23).
+    """
     ideal = one_cycle(linkage_of("bionic_leg"), 360, TURN).joint_force
     joints = [list(leg.joints).index(name) for name in "ABGIJ"]
     wanted = np.linalg.norm(ideal[:, joints], axis=2).mean(axis=0)
     forces = [leg_cycles("ABGIJ", 3, clearance_m=c).force for c in (1.0e-3, 3.0e-4, 1.0e-4, 3.0e-5)]
     surplus = np.array([force.mean(axis=0) for force in forces]) - wanted
-    scatter = np.array([force.std(axis=0) for force in forces])
-    assert (np.diff(surplus, axis=0) < scatter[1:] + scatter[:-1]).all()
+    assert (np.diff(surplus[:3], axis=0) < 0.0).all()
+    assert (surplus[3] - surplus[2] < 0.05 * wanted).all()
     assert (surplus[-1] < 0.35 * surplus[0]).all()
     assert (np.abs(surplus[-1, :4]) < 0.05 * wanted[:4]).all()
     assert abs(surplus[-1, 4]) < 0.2 * wanted[4]

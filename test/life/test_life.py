@@ -83,8 +83,12 @@ def test_cycles_to_a_clearance_are_read_off_the_life_and_beyond_it_at_its_last_r
     assert beyond == pytest.approx(1e-6 / life.growth_m_per_cycle[-1, k])
 
 
+@pytest.mark.chaotic
 def test_all_coefficients_larger_by_a_factor_make_the_same_life_faster(leg):
-    """Wear enters by coefficient times cycles; what is left is the scatter of the cycles simulated."""
+    """Wear enters by coefficient times cycles; what is left is the scatter of the cycles simulated.
+
+    Off by -0.004, sigma 0.012 (30 starts moved by 1e-12, 2026-11-23).
+    """
     lives = []
     for factor in (1.0, 4.0):
         run = LifeRun(leg, SHORT, clearances=("B",), wear_factor=factor)
@@ -100,6 +104,7 @@ def test_a_life_goes_on_from_where_another_stopped(leg, lived):
     assert (later.jump().opened_m > run.points[-1].opened_m).all()
 
 
+@pytest.mark.chaotic
 def test_jumps_meet_every_single_cycle(leg):
     """Within the scatter of a few hundred cycles; benchmarks/life.py has the long comparison."""
     cycles, factor = 150, 3000.0

@@ -77,6 +77,7 @@ def test_a_restored_monitor_goes_on_bit_for_bit(monitor, gait):
     assert said([monitor.update(stream[500:])]) == first
 
 
+@pytest.mark.chaotic
 def test_a_gait_cycle_is_reported_as_the_twin_saw_it(monitor, gait):
     reports = monitor.update(gait(14.5))
     assert [cycle.cycle for cycle in reports.cycles] == list(range(1, 14))
@@ -111,9 +112,13 @@ def with_torque(samples, torque_nm):
     return np.stack([samples, torque], axis=1).ravel()
 
 
+@pytest.mark.chaotic
 def test_a_knock_raises_its_alarm_within_a_gait_cycle_and_not_before(monitor, gait):
     before, after = gait(6.0), gait(3.0, begin_s=6.0)
-    monitor.configure(config_from({"limits.impact_force_n": 7000.0}))
+    # largest force of the six seconds before, 4810 N with a sigma of 360 N, and of those after, 8920 N with
+    # 390 N (12 starts moved by 1e-12, 2026-11-23)
+    limit_n = 6800.0
+    monitor.configure(config_from({"limits.impact_force_n": limit_n}))
     # the crank jumps on by 0.3 rad within 40 ms: journals are thrown across their clearances
     t = (after["stamp_ns"] - after["stamp_ns"][0]) * 1.0e-9
     after["crank_angle_rad"] += 0.3 * np.clip(t / 0.04, 0.0, 1.0)
@@ -126,11 +131,12 @@ def test_a_knock_raises_its_alarm_within_a_gait_cycle_and_not_before(monitor, ga
             loud = [a for a in change.alarms if a.kind == "impact_force" and a.level is Level.ERROR]
             arrived += [(int(block["stamp_ns"][0]), change.stamp_ns, alarm) for alarm in loud]
     now_ns, stamp_ns, alarm = arrived[0]
-    assert alarm.value > 7000.0
+    assert alarm.value > limit_n
     assert knock_ns - SECOND // 10 <= stamp_ns <= knock_ns + SECOND
     assert knock_ns <= now_ns <= knock_ns + SECOND
 
 
+@pytest.mark.chaotic
 def test_a_bushing_that_breaks_out_shows_in_the_torque_within_four_gait_cycles(monitor):
     """Of a leg that is not the model's: full coordinates, with clearances and sensors of its own."""
     knock_ns = START + 4 * SECOND

@@ -11,8 +11,11 @@ from leg_wear_monitor.playback.result.replay_summary import ReplaySummary
 from leg_wear_monitor.share import share_directory
 
 BAGS = share_directory() / "bags"
-# Motion with clearance is chaotic: another processor's rounding moves sums over ten cycles by some percent.
-SCATTER = 0.25
+# Relative bounds of forces and wear over eight or ten cycles: 5.3 sigma of the difference of two such means,
+# by the sigma over five cycles in test/dynamics/clearance/test_sets.py (32 runs, 2026-11-23), a fifth more.
+SCATTER = {
+    "A": (0.02, 0.03), "B": (0.02, 0.16), "G": (0.02, 0.15), "I": (0.03, 0.31), "J": (0.13, 0.58),
+}  # fmt: skip
 
 
 @pytest.fixture(scope="module", params=["healthy", "knocking", "bad_input"])
@@ -33,6 +36,7 @@ def test_every_message_is_taken_or_counted(bag: tuple[ReplaySummary, dict[str, A
     assert found.lost.unmonitored_s == pytest.approx(expected["lost"]["unmonitored_s"], abs=0.3)
 
 
+@pytest.mark.chaotic
 def test_alarms_are_those_that_must_be_raised(bag: tuple[ReplaySummary, dict[str, Any]]) -> None:
     found, expected = bag
     alarms = [change.alarm for change in found.alarms.changes]  # to WARN before, and back to OK, too
@@ -40,6 +44,7 @@ def test_alarms_are_those_that_must_be_raised(bag: tuple[ReplaySummary, dict[str
     assert sorted(f"{name}: {level.name}" for name, level in worst.items()) == expected["alarms"]
 
 
+@pytest.mark.chaotic
 def test_forces_and_wear_are_the_same_within_their_scatter(
     bag: tuple[ReplaySummary, dict[str, Any]],
 ) -> None:
@@ -47,11 +52,12 @@ def test_forces_and_wear_are_the_same_within_their_scatter(
     assert found.cycles == expected["cycles"]
     assert found.joints.keys() == expected["opened_m"].keys()
     for name, joint in found.joints.items():
-        opened = joint.clearance_m.last - joint.clearance_m.first
-        assert opened == pytest.approx(expected["opened_m"][name], rel=SCATTER)
-        assert joint.mean_force_n == pytest.approx(expected["mean_force_n"][name], rel=SCATTER)
+        opened, (force, wear) = joint.clearance_m.last - joint.clearance_m.first, SCATTER[name]
+        assert opened == pytest.approx(expected["opened_m"][name], rel=wear)
+        assert joint.mean_force_n == pytest.approx(expected["mean_force_n"][name], rel=force)
 
 
+@pytest.mark.chaotic
 def test_the_verdict_is_the_one_that_is_written_beside(bag: tuple[ReplaySummary, dict[str, Any]]) -> None:
     found, expected = bag
     verdict = found.verdict

@@ -119,6 +119,7 @@ SETTINGS = {
 }  # fmt: skip
 
 
+@pytest.mark.chaotic
 def test_a_leg_that_stays_in_contact_forgets_and_one_that_bounces_does_not():
     """At 20 rpm the knee stays in contact all the time; the hip at 60 rpm bounces."""
     calm = lyapunov_exponent(load_mechanism(), SETTINGS | {"speed_rpm": 20.0})["stretch_per_cycle"]
@@ -130,6 +131,7 @@ def test_a_leg_that_stays_in_contact_forgets_and_one_that_bounces_does_not():
     assert wild.mean() > 10.0
 
 
+@pytest.mark.chaotic
 def test_the_exponent_of_the_leg_does_not_depend_on_how_far_the_neighbour_stands():
     place = SETTINGS | {"clearance_joints": ["A", "B"], "speed_rpm": 60.0}
     near, far = (

@@ -110,8 +110,14 @@ def test_wear_is_what_the_archard_integral_wears_off(response):
     assert volume == pytest.approx(expected, rel=0.01)
 
 
+# Relative sigma of the means below, of their difference: 32 cycles of four runs and 8 in full coordinates,
+# 2026-11-23. An error of the acceleration or the torque is that of one impact.
+SIGMA = dict(zip((*ERRORS, "peak_force_n"), (0.0003, 0.0016, 0.042, 0.036, 0.047), strict=True))
+
+
+@pytest.mark.chaotic
 def test_errors_are_those_of_the_full_coordinates():
-    """One set, both models, many cycles: means of the largest errors in a cycle within their scatter."""
+    """One set, both models, many cycles: means of the largest errors in a cycle, within 2 % and 5.3 sigma."""
     runs = {"runs": 4, "cycles": 8, "skip_cycles": 2, "traced_cycles": 1}
     ours = run_ensemble(load_mechanism(), PLACE | runs)
     setup = prepare(load_mechanism(), clearances=["G"], clearance_m=3.0e-4, speed_rpm=60.0)
@@ -121,14 +127,13 @@ def test_errors_are_those_of_the_full_coordinates():
         errors.append(statistics.response.copy())
         peaks.append(statistics.peak[6])
         statistics.response[:], statistics.peak[:] = 0.0, 0.0
-    errors, peaks = np.array(errors[2:]), np.array(peaks[2:])
-    for i, name in enumerate(ERRORS):
-        mine = ours[f"error_{name}"]
-        scatter = np.hypot(mine.std() / np.sqrt(mine.size), errors[:, i].std() / np.sqrt(len(errors)))
-        assert abs(mine.mean() - errors[:, i].mean()) < 4.0 * scatter + 0.02 * errors[:, i].mean(), name
-    mine = ours["peak_force_n"][..., 6]
-    scatter = np.hypot(mine.std() / np.sqrt(mine.size), peaks.std() / np.sqrt(len(peaks)))
-    assert abs(mine.mean() - peaks.mean()) < 4.0 * scatter + 0.02 * peaks.mean()
+    wanted = dict(zip(ERRORS, np.mean(errors[2:], axis=0), strict=True)) | {
+        "peak_force_n": np.mean(peaks[2:])
+    }
+    found = {name: ours[f"error_{name}"].mean() for name in ERRORS}
+    found["peak_force_n"] = ours["peak_force_n"][..., 6].mean()
+    for name, sigma in SIGMA.items():
+        assert abs(found[name] / wanted[name] - 1.0) < 0.02 + 5.3 * sigma, name
 
 
 def test_runs_start_on_the_grid_one_in_each_part_of_a_turn():

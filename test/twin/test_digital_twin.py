@@ -190,15 +190,21 @@ def test_a_loaded_journal_is_pressed_into_its_bushing(in_one_go, leg):
     assert (e[force == 0.0] < 1.01).all()
 
 
+# Relative sigma of Archard's integral over five cycles of joints A, B, G, I, J: 32 runs, 2026-11-23
+# (test/dynamics/clearance/test_sets.py).
+SIGMA = np.array([0.0032, 0.0244, 0.0224, 0.0483, 0.0907])
+
+
+@pytest.mark.chaotic
 def test_a_steady_gait_wears_as_a_steady_simulation(leg, twin, gait):
-    """Encoder noise and all, within 2 % and four standard errors of the two means, which chaos scatters."""
+    """Encoder noise and all, within 2 % and 5.3 sigma of the two means, which chaos scatters."""
     update = twin.update(gait(12.0))
     archard = np.array([cycle.archard_j for cycle in update.cycles])
     result = lw.simulate(leg, cycles=12, wear=True)
     wanted = [result.joints[name].archard_integral_j_per_cycle for name in twin.clearance_joints]
-    scatter = archard.std(axis=0, ddof=1) * math.sqrt(2.0 / len(archard))
-    wrong = (archard.mean(axis=0) - wanted) / (0.02 * np.array(wanted) + 4.0 * scatter)
-    assert (np.abs(wrong) < 1.0).all(), wrong
+    sigma = SIGMA * math.sqrt(5.0 / len(archard) + 5.0 / 12.0)
+    wrong = archard.mean(axis=0) / wanted - 1.0
+    assert (np.abs(wrong) < 0.02 + 5.3 * sigma).all(), wrong
     assert twin.tracking is Tracking.IN_STEP
     assert twin.speed_radps == pytest.approx(TURN, rel=0.01)
     assert [event.what for event in update.events] == [TwinEventKind.ACQUIRED]
@@ -218,8 +224,12 @@ def test_the_leg_does_not_care_when_it_walks(twin, gait):
     np.testing.assert_array_equal(seen[0][1], seen[1][1])
 
 
+@pytest.mark.chaotic
 def test_a_start_makes_no_impacts_that_a_gait_does_not(twin, gait):
-    """Wherever the crank is: the first impacts of centred journals are over, and have worn nothing."""
+    """Wherever the crank is: the first impacts of centred journals are over, and have worn nothing.
+
+    Largest impacts have a long tail: mostly, starts are compared by the ninth of twelve.
+    """
     new, fresh, peaks = twin.snapshot(), twin.depth, []
     usual = np.max([cycle.peak_force_n for cycle in twin.update(gait(12.0)).cycles], axis=0)
     for phase in np.linspace(0.0, TURN, 12, endpoint=False):
@@ -229,8 +239,11 @@ def test_a_start_makes_no_impacts_that_a_gait_does_not(twin, gait):
         assert not before.cycles
         twin.update(gait(0.6, angle=lambda t, phase=phase: TURN * t + phase)[44:])
         peaks.append(twin.peak_force_n)
-    assert (np.max(peaks, axis=0) < 1.5 * usual).all()
-    assert (np.median(peaks, axis=0) < usual).all()
+    # mean and sigma of the joint that is nearest to its bound, as a fraction of the usual
+    # peak: 12 starts moved by 1e-12, 2026-11-23
+    assert (np.median(peaks, axis=0) < 0.5 * usual).all()  # A: 0.34, 0.02
+    assert (np.sort(peaks, axis=0)[8] < 1.3 * usual).all()  # G: 0.70, 0.07
+    assert (np.max(peaks, axis=0) < 3.0 * usual).all()  # I: 0.98, 0.24; J: 0.98, 0.23; 1.6 in one of 65
 
 
 def test_growth_adds_up_to_the_clearance(twin, gait):
@@ -245,16 +258,20 @@ def test_growth_adds_up_to_the_clearance(twin, gait):
     np.testing.assert_allclose(twin.clearance_max_m, 3.0e-4 + twin.depth.sum(axis=1).max(axis=1))
 
 
+@pytest.mark.chaotic
 @pytest.mark.parametrize("noise_rad, rate_hz", [(1.0e-3, 200.0), (1.0e-3, 50.0), (3.0e-3, 200.0)])
 def test_noise_of_the_encoder_is_no_wear(twin, gait, noise_rad, rate_hz):
-    """Against the same gait without noise, by the joint that varies least."""
+    """Against the same gait without noise, by the joint that varies least and by the others together.
+
+    By `SIGMA`, over six cycles each, the sigma of A is 0.004 and of the others 0.020; A is off by 0.005.
+    """
     new, wear = twin.snapshot(), []
     for noise in (0.0, noise_rad):
         twin.restore(new)
         update = twin.update(gait(8.0, rate_hz, noise_rad=noise))
         wear.append(np.mean([cycle.archard_j for cycle in update.cycles], axis=0))
-    assert wear[1][0] == pytest.approx(wear[0][0], rel=0.02)
-    assert wear[1][1:].sum() == pytest.approx(wear[0][1:].sum(), rel=0.06)
+    assert wear[1][0] == pytest.approx(wear[0][0], rel=0.03)
+    assert wear[1][1:].sum() == pytest.approx(wear[0][1:].sum(), rel=0.13)
 
 
 def test_a_leg_at_rest_does_not_wear(twin, gait):
@@ -314,6 +331,7 @@ def test_a_moment_of_a_leg_with_one_loose_joint(leg, gait):
     assert not update.cycles
 
 
+@pytest.mark.chaotic
 def test_wear_goes_faster_by_its_acceleration(twin, gait):
     new, grown = twin.snapshot(), []
     for factor in (1.0, 50.0, 0.0):
@@ -321,8 +339,9 @@ def test_wear_goes_faster_by_its_acceleration(twin, gait):
         twin.wear_acceleration = factor
         twin.update(gait(2.5))
         grown.append(twin.clearance_mean_m - 3.0e-4)
-    assert grown[1][0] == pytest.approx(50.0 * grown[0][0], rel=0.02)  # others are chaotic
-    assert grown[1][1:].sum() == pytest.approx(50.0 * grown[0][1:].sum(), rel=0.2)
+    # 12 starts moved by 1e-12, mean and sigma, 2026-11-23
+    assert grown[1][0] == pytest.approx(50.0 * grown[0][0], rel=0.03)  # 0.0015, 0.0037
+    assert grown[1][1:].sum() == pytest.approx(50.0 * grown[0][1:].sum(), rel=0.2)  # 0.001, 0.028
     assert not grown[2].any()
     with pytest.raises(LegWearError, match="wear_acceleration: -1"):
         twin.wear_acceleration = -1.0

@@ -165,6 +165,7 @@ def moved(model, leg, clearance_joints, cycles, wear=False, pace=1.0):
     return np.array(integrals), energy, setup.surfaces.depth
 
 
+@pytest.mark.chaotic
 @pytest.mark.parametrize("model, cycles, bound", [(FullRun, 1, 2.0e-4), (ClearanceRun, 2, 2.0e-2)])
 def test_energy_adds_up_on_walls_that_wear(leg, model, cycles, bound):
     """At 3e4 times the pace of real wear.

@@ -240,6 +240,7 @@ def test_the_force_that_is_observed_is_the_one_that_is_integrated(leg):
     np.testing.assert_allclose(mean, 0.5 * (ends[0] + ends[1]), rtol=0.05)
 
 
+@pytest.mark.chaotic
 def test_full_coordinates_find_the_same_forces_wear_and_losses(leg):
     """A greased leg repeats itself: its cycles scatter by less than what is left out of this formulation."""
     grease = greased(leg, 0.01)

@@ -228,6 +228,7 @@ def test_a_drive_that_tears_the_leg_apart_is_stopped(new_stepper):
     assert_same(stepper, another)
 
 
+@pytest.mark.chaotic
 def test_at_rest_the_contacts_carry_the_weight(leg, tables):
     """Two seconds after the crank has stopped, mean forces are the static reactions of the ideal leg.
 
@@ -302,6 +303,7 @@ def test_no_wear_is_lost(new_stepper, t):
     np.testing.assert_allclose(volume, wanted, rtol=1.0e-11)
 
 
+@pytest.mark.chaotic
 @pytest.mark.parametrize("name", ["bionic_leg", "jansen_leg"])
 def test_it_is_the_full_motion_until_impacts_decorrelate(name):
     """Every joint's first impact: when, how fast, how hard; the models differ by e / L from the start on."""

@@ -178,6 +178,7 @@ def test_fusion_weighs_by_covariance(model, shape, reference):
     assert unsure.clearance_m[2] == pytest.approx(WORN[2], abs=3e-5)
 
 
+@pytest.mark.chaotic
 def test_a_leg_in_full_coordinates_shows_its_worn_knee(leg, model, simulated):
     """Its angles come from its own equations of motion, not from the model that looks at them."""
     setup, names = prepare(leg), body_names(leg)

@@ -81,13 +81,13 @@ def test_an_even_gait_is_followed_told_recorded_and_replayed(stage, walk, tmp_pa
 
 
 def tells_the_wear(clearances: list[JointState], walk) -> None:
-    """Of a few gait cycles, which scatter: a change in rounding alone has made 11 % of a joint's wear."""
+    """Of a few gait cycles, which scatter: B's by 5 % between leg and twin, as its single cycles by 6 %."""
     last = clearances[-1]
     assert list(last.name) == [f"{joint}_clearance" for joint in "ABGIJ"]
     assert np.diff([seconds(message) for message in clearances]) == pytest.approx(1.0, abs=0.01)
     for joint, k in (("A", 0), ("B", 1), ("G", 2)):
         true = np.interp(seconds(last), walk.truth["cycle_end_s"], walk.truth["clearance_m"][joint][:-1])
-        assert last.position[k] - 3.0e-4 == pytest.approx(true - 3.0e-4, rel=0.2)
+        assert last.position[k] - 3.0e-4 == pytest.approx(true - 3.0e-4, rel=0.3)
 
 
 def are_one_number_a_value(diagnostics: list[DiagnosticArray]) -> None:

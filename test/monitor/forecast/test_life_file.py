@@ -78,8 +78,12 @@ def test_another_version_is_refused(leg, tmp_path):
     assert law_of(leg, str(tmp_path / "older.json"), 0.5).lives == law_of(leg, "", 0.5).lives
 
 
+@pytest.mark.chaotic
 def test_the_shipped_lives_are_of_this_model(leg):
-    """Their growth when all is new is what is simulated now, within its scatter: stale lives fail here."""
+    """Their growth when all is new is what is simulated now, within its scatter: stale lives fail here.
+
+    Off by as many errors as 0.4 at most with a sigma of 0.73 (30 starts moved by 1e-12, 2026-11-23).
+    """
     run = LifeRun(leg, LifeSettings(legs=2, cycles=6, seed=90))
     seen = run.points[0].rate
     told = np.array([life.growth_m_per_cycle[0] / life.factor for life in read_lives(str(SHIPPED), leg)])

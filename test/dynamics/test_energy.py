@@ -15,9 +15,12 @@ from leg_wear_monitor.mechanism.spec import ConstantLoad, PhaseLoad
 
 
 @pytest.mark.chaotic
-@pytest.mark.parametrize("model, cycles, bound", [(FullRun, 2, 1.0e-4), (ClearanceRun, 8, 1.0e-3)])
+@pytest.mark.parametrize("model, cycles, bound", [(FullRun, 2, 1.0e-4), (ClearanceRun, 8, 2.0e-3)])
 def test_walls_that_wear_away_take_energy_along(leg, model, cycles, bound):
-    """At 3e4 times the pace of real wear the balance closes as ever, with what contacts had stored in it."""
+    """At 3e4 times the pace of real wear the balance closes as ever, with what contacts had stored in it.
+
+    To 7e-6 with a sigma of 3e-6, and to -1.5e-4 with 3.1e-4 (10 starts moved by 1e-12, 2026-11-23).
+    """
     fast = {
         name: attrs.evolve(c, wear_coefficient=tuple(3.0e4 * k for k in c.wear_coefficient))
         for name, c in leg.clearances.items()
@@ -44,7 +47,10 @@ LOADS = {
 @pytest.mark.parametrize("clearance_joints", ["AB", "ABGIJ"])
 @pytest.mark.parametrize("load", LOADS)
 def test_energy_of_the_clearance_model_under_a_foot_load(leg, clearance_joints, load):
-    """The load does its work where the toe is, which the eccentricities move."""
+    """The load does its work where the toe is, which the eccentricities move.
+
+    Off by 1.7e-3 with a sigma of 1.4e-4 at most (10 starts moved by 1e-12, 2026-11-23).
+    """
     kind = PhaseLoad if load == "stance" else ConstantLoad
     pushed = attrs.evolve(leg, loads={"ground": kind(body="foot", point="toe", **LOADS[load])})
     run = ClearanceRun(prepare(pushed, clearances=tuple(clearance_joints)))
@@ -65,7 +71,8 @@ def rubbing(leg, coefficient):
 
 
 # friction coefficient, force up at the toe [N], clearance [m], bound of the residual over the losses: some
-# three times what docs/appendix/validation_clearance.md lists, because the cycles of a run scatter
+# three times what docs/appendix/validation_clearance.md lists, because the cycles of a run scatter. Mean and
+# sigma: 1.1e-3, 2e-5; -1.3e-3, 1.8e-3; 6.7e-3, 2.1e-3; 0, 7e-5; -1e-4, 2.2e-4 (10 moved starts, 2026-11-23)
 HARDER = {
     "100 N": (0.05, 100.0, 3.0e-4, 3.0e-3),
     "no friction": (0.0, 0.0, 3.0e-4, 1.5e-2),

@@ -171,11 +171,12 @@ def test_energy_adds_up_on_walls_that_wear(leg, model, cycles, bound):
     """At 3e4 times the pace of real wear.
 
     Penetrations are far below Hertz's, so the clearance model's local error makes more of them: 0.8 % of the
-    losses here; on fresh walls 0.7 %, and 0.1 % at a tenth of the tolerance.
+    losses once; on fresh walls 0.7 %, and 0.1 % at a tenth of the tolerance. Off by 2.8e-5, sigma 2.6e-5, and
+    by -0.0111, sigma 0.0013 (10 starts moved by 1e-12, 2026-11-23).
     """
     _, energy, depth = moved(model, leg, "ABGIJ", cycles, wear=True, pace=3.0e4)
     losses = sum(cycle.friction_loss + cycle.contact_loss for cycle in energy)
-    assert sum(cycle.wear_loss for cycle in energy) > 4.0e-3 * losses
+    assert sum(cycle.wear_loss for cycle in energy) > 2.5e-3 * losses  # least: 8.6e-3, sigma 1.1e-3
     assert abs(sum(cycle.residual for cycle in energy)) < bound * losses
     assert (depth.max(axis=2) > 0.0).all()  # every bushing and journal
 

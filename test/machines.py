@@ -72,8 +72,8 @@ def try_on(machine: Machine, options: list[str]) -> Outcome:
     """Compile the kernels and run the tests."""
     print(f"== {machine.name}: {machine.what}", flush=True)
     if machine in OTHER_PYTHONS:
-        if not shutil.which(machine.name):
-            return Outcome(machine.name, "not run: this Python is not on the machine", True)
+        if not _is_there(machine.name):
+            return Outcome(machine.name, "not run: this Python, with venv, is not on the machine", True)
         if subprocess.run(["make", f"{machine.environment}/installed"], check=False).returncode:
             return Outcome(machine.name, "not run: its environment could not be made", False)
     report = BUILD / f"{machine.name}.xml"
@@ -83,6 +83,14 @@ def try_on(machine: Machine, options: list[str]) -> Outcome:
     if not report.is_file():
         return Outcome(machine.name, f"ended with code {code} before there was a report", False)
     return Outcome(machine.name, _counted(report), code == 0)
+
+
+def _is_there(python: str) -> bool:
+    """Whether a Python is installed, runs, and can make an environment; a name may be there without."""
+    line = [python, "-c", "import ensurepip, venv"]
+    return (
+        bool(shutil.which(python)) and not subprocess.run(line, capture_output=True, check=False).returncode
+    )
 
 
 def _counted(report: Path) -> str:

@@ -17,8 +17,8 @@ from leg_wear_monitor.share import share_directory
 COULD_NOT, INTERRUPTED = 2, 130
 
 _VERBS = (
-    "cache", "check", "commission", "dashboard", "demo", "draw", "fleet", "gait-publisher", "life",
-    "materials", "measure", "monitor", "play", "replay", "report", "reset", "simulate", "study",
+    "acknowledge", "cache", "check", "commission", "dashboard", "demo", "draw", "fleet", "gait-publisher",
+    "life", "materials", "measure", "monitor", "play", "replay", "report", "reset", "simulate", "study",
 )  # fmt: skip
 
 

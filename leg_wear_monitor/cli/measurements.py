@@ -9,7 +9,6 @@ from typing import TYPE_CHECKING
 
 import click
 
-from leg_wear_monitor.configuration.nearest import did_you_mean
 from leg_wear_monitor.errors import ConfigError
 
 if TYPE_CHECKING:
@@ -39,13 +38,6 @@ def leg_of(config: Path | None, ledger: Path | None) -> tuple["MonitorConfig", "
     if not settings.ledger.path:
         raise ConfigError("--ledger", "", "no ledger given, neither by --ledger nor by ledger.path")
     return settings, fitted(load_mechanism(settings.mechanism), settings)
-
-
-def check_joint(joint: str, leg: "Mechanism") -> None:
-    """Refuse a name that is not that of a clearance joint."""
-    if joint not in leg.clearance_joints:
-        fault = f"{joint!r} is not a clearance joint, expected one of {', '.join(leg.clearance_joints)}"
-        raise ConfigError("JOINT", "", fault + did_you_mean(joint, leg.clearance_joints))
 
 
 @contextmanager

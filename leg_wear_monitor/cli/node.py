@@ -27,6 +27,27 @@ def need_rclpy() -> None:
         ) from error
 
 
+def check_alone(**others: object) -> None:
+    """Refuse options beside ``--node``: a running monitor has its own parameters and ledger."""
+    if any(others.values()):
+        names = ", ".join(f"--{name.replace('_', '-')}" for name in others)
+        raise click.UsageError(f"--node cannot be combined with {names}")
+
+
+def trigger(node: str, service: str, wait_s: float, times: int = 1) -> str:
+    """Last reply of a service of a running monitor, which is called so many times.
+
+    Raises
+    ------
+    LegWearError
+        Without ROS, if nobody answers, or if the last call is refused.
+    """
+    need_rclpy()
+    from leg_wear_monitor.ros.measure_client import trigger_on
+
+    return trigger_on(node, service, wait_s, times)
+
+
 def node_verb(name: str, module: str, summary: str, text: str) -> click.Command:
     """Command that runs a node."""
 

@@ -40,6 +40,22 @@ ledger_option: Option = click.option(
     help="Ledger to write into.  [default: the one in the parameters]",
 )
 
+node_option: Option = click.option(
+    "--node",
+    metavar="NAME",
+    help="Full name of a running monitor to enter it into, such as /left/leg_wear_monitor.",
+)
+
+wait_option: Option = click.option(
+    "--wait",
+    "wait_s",
+    type=click.FloatRange(min=0.0, min_open=True),
+    default=10.0,
+    show_default=True,
+    metavar="S",
+    help="With --node: longest wait for the monitor, and again for its answer.",
+)
+
 sample_option: Option = click.option(
     "--sample",
     type=click.FloatRange(0.0, 1.0, min_open=True),

@@ -30,6 +30,7 @@ def print_replay(result: "ReplayResult", wall_s: float) -> None:
     wall_s : float
         What it took [s].
     """
+    from leg_wear_monitor.monitor.verdict.belief import COUNTED, believed_words
     from leg_wear_monitor.monitor.verdict.verdict import Figure
 
     console = Console(highlight=False)
@@ -45,10 +46,14 @@ def print_replay(result: "ReplayResult", wall_s: float) -> None:
         console.print(f"{result.evidence.doubtful} of the gait cycles do not fit this leg\n")
     last = result.history.last
     if result.is_believable and last is not None:
-        is_counted_leg = Figure.CLEARANCES not in verdict.not_valid
-        console.print(_joints(result, is_counted_leg))
-        if not is_counted_leg:
-            console.print(f"{NOT_VALID}: the clearances are not those of this leg; see the verdict")
+        if Figure.CLEARANCES in verdict.not_valid:
+            console.print(_believed(result))
+            console.print(f"{NOT_VALID}: the counted clearances, growth and forces; see the verdict")
+        else:
+            console.print(_joints(result))
+            for joint, one in monitor.believed_clearances.items():
+                if one is not None and one.by != COUNTED:
+                    console.print(f"joint {joint}: {believed_words(one)}")
         console.print(f"torque {_by_torque(result)}", soft_wrap=True)
         errors = [f"{joint.joint} {figure(1.0e9 * joint.sampling_sigma_m)} nm" for joint in last.joints]
         if any(joint.sampling_sigma_m for joint in last.joints):
@@ -86,23 +91,43 @@ def _print_verdict(console: Console, verdict: "Verdict", joint_words: Callable[[
         console.print(f"since      {time_words(verdict.since_ns)}")
 
 
-def _joints(result: "ReplayResult", is_counted_leg: bool) -> Table:
-    """Clearance, growth and peak force; none where the leg is not the one that is counted."""
-    table = Table(box=None, pad_edge=False, padding=(0, 1), header_style="bold")
+def _joints(result: "ReplayResult") -> Table:
+    """Counted clearance, growth and peak force."""
     columns = ("\njoint", "counted clearance\nmm", "growth\npm/cycle", "±\npm/cycle", "peak\nN")
-    for column in columns:
-        table.add_column(column, justify="left" if column == "\njoint" else "right")
+    table = _table(columns, 1)
     peaks = np.fmax.reduce(result.history.joint_column("peak_force_n"))
     last = result.history.last
     for joint, peak in zip(last.joints if last else (), peaks, strict=True):
-        cells = (
+        table.add_row(
+            result.monitor.mechanism.joint_words(joint.joint),
             _counted(joint),
             _known(1.0e12, joint.growth_m_per_cycle),
             _known(1.0e12, joint.growth_error_m_per_cycle),
             figure(float(peak)),
         )
-        name = result.monitor.mechanism.joint_words(joint.joint)
-        table.add_row(name, *(cells if is_counted_leg else (NOT_VALID,) * len(cells)))
+    return table
+
+
+def _believed(result: "ReplayResult") -> Table:
+    """Clearance of each joint by what is believed of it, while the counted ones are not valid."""
+    from leg_wear_monitor.monitor.verdict.belief import SOURCES
+
+    table = _table(("\njoint", "clearance\nmm", "±\nmm", "\naccording to"), 1, 4)
+    for joint, one in result.monitor.believed_clearances.items():
+        name = result.monitor.mechanism.joint_words(joint)
+        if one is None:
+            table.add_row(name, NOT_VALID, "-", "-")
+            continue
+        sigma = "-" if math.isnan(one.sigma_m) else f"{1.0e3 * one.sigma_m:.3f}"
+        table.add_row(name, f"{1.0e3 * one.clearance_m:.3f}", sigma, SOURCES[one.by])
+    return table
+
+
+def _table(columns: tuple[str, ...], *left: int) -> Table:
+    """A table whose columns of these numbers are of words."""
+    table = Table(box=None, pad_edge=False, padding=(0, 1), header_style="bold")
+    for number, column in enumerate(columns, start=1):
+        table.add_column(column, justify="left" if number in left else "right")
     return table
 
 

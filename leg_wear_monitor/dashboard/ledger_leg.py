@@ -28,7 +28,10 @@ from leg_wear_monitor.monitor.ledger.entry import ClearancePoint, JointWear, Ver
 from leg_wear_monitor.monitor.ledger.file import LedgerError, beside
 from leg_wear_monitor.monitor.ledger.log import ENDING
 from leg_wear_monitor.monitor.ledger.reading import LedgerContent, read_ledger
+from leg_wear_monitor.monitor.verdict.belief import believed
+from leg_wear_monitor.monitor.verdict.situation import JointSituation, SeenClearance
 from leg_wear_monitor.monitor.verdict.verdict import Evidence, Figure, State, Verdict
+from leg_wear_monitor.playback.condition import believed_fields
 from leg_wear_monitor.playback.result.condition import JointClearance, LifeHours
 from leg_wear_monitor.playback.result.parts import ClearanceChange, ReplayJoint
 from leg_wear_monitor.playback.result.replay_summary import ReplaySummary
@@ -126,22 +129,35 @@ class LedgerLeg:
             history=_trends(found.clearances).history(self._setup.joints),
             cycles=int(found.entry.totals.get("cycles", 0.0)) if found.entry else 0,
             joints={joint: _report(part, counted[joint]) for joint, part in joints.items()},
-            clearances={joint: self._clearance(part, counted[joint]) for joint, part in joints.items()},
+            clearances={
+                joint: self._clearance(found, part, counted[joint]) for joint, part in joints.items()
+            },
             life={joint: _life(found, part) for joint, part in joints.items()},
             alarms=[replay_alarm(alarm) for alarm in found.entry.alarms] if found.entry else [],
             measurements=found.measurements,
         )
         return view_of(self._setup, known)
 
-    def _clearance(self, part: JointWear, counted_m: float) -> JointClearance:
-        joint, found = part.name, self._content.measurements if self._content else ()
-        last = last_measured(found, joint, part.replaced_ns)
+    def _clearance(self, found: LedgerContent, part: JointWear, counted_m: float) -> JointClearance:
+        joint, limit_m = part.name, self._setup.limits_m[part.name]
+        last = last_measured(found.measurements, joint, part.replaced_ns)
+        known = JointSituation(
+            joint=joint,
+            counted_m=counted_m,
+            limit_m=limit_m,
+            measured=SeenClearance("measurement", last.clearance_m, last.sigma_m) if last else None,
+        )
+        alarms = found.entry.alarms if found.entry else ()
+        own = next((each for each in alarms if (each.kind, each.subject) == ("clearance", joint)), None)
+        verdict = ledger_verdict(found.verdict) if found.verdict else NO_VERDICT
+        one = believed(known, own, Figure.CLEARANCES not in verdict.not_valid)
         return JointClearance(
             counted_m=counted_m,
             new_m=self._setup.new_m[joint],
-            limit_m=self._setup.limits_m[joint],
+            limit_m=limit_m,
             measured_m=last.clearance_m if last else None,
             measured_sigma_m=last.sigma_m if last else None,
+            **(believed_fields(one) if one else {}),
         )
 
 

@@ -11,6 +11,8 @@ from leg_wear_monitor.playback.result.parts import ClearanceChange, LegLife, Rep
 
 _SEEN_BY = (("encoders", "encoders", "{}_seen_m"), ("diagnosis", "torque", "{}_clearance_m"))
 
+_BELIEVED_BY = "believed_by_"
+
 Statuses = Mapping[str, ReplayStatus]
 
 
@@ -89,6 +91,7 @@ def _clearance(
             seen.append((sigma_m, clearance_m, by))
     sigma_m, clearance_m, by = min(seen) if seen else (None, None, "")
     limit_m = status.values.get("clearance_limit_m")
+    believed = (key.removeprefix(_BELIEVED_BY) for key in status.values if key.startswith(_BELIEVED_BY))
     return JointClearance(
         counted_m=counted_m,
         seen_m=clearance_m,
@@ -98,4 +101,7 @@ def _clearance(
         limit_m=setup.limits_m[joint] if limit_m is None else limit_m,
         measured_m=status.values.get("measured_clearance_m"),
         measured_sigma_m=status.values.get("measured_sigma_m"),
+        believed_m=status.values.get("believed_m"),
+        believed_sigma_m=status.values.get("believed_sigma_m"),
+        believed_by=next(believed, None),
     )

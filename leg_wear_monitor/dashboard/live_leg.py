@@ -91,7 +91,7 @@ class LiveLeg:
             self._verdict = verdict
 
     def take_verdict(self, statuses: Iterable[ReplayStatus]) -> None:
-        """A message of ``~/verdict``."""
+        """A message of ``~/verdict``; a joint that it names is drawn as it says, before its next report."""
         own = own_statuses(self._node, statuses)
         with self._lock:
             self._hear()
@@ -124,7 +124,9 @@ class LiveLeg:
             if status in self._statuses:
                 values = self._statuses[status].values
                 leg |= {column: values.get(name) for column, name in columns.items()}
-        return Row(stamp_ns, leg, self._cycle)
+        joints = joints_of(self._setup or unknown_leg(), self._statuses, {}, {}).clearances
+        seen = {joint: each.seen_m for joint, each in joints.items()}
+        return Row(stamp_ns, leg, self._cycle | {"seen_m": seen})
 
     # --- what the page shows ---
 

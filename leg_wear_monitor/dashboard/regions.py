@@ -1,6 +1,7 @@
 """Regions of the page: markup of what is known of a leg, each replaced by itself when it changes."""
 
 from collections.abc import Mapping, Sequence
+from pathlib import PurePosixPath
 
 import attrs
 import numpy as np
@@ -17,7 +18,13 @@ from leg_wear_monitor.report.parts import Part, Table, Text
 from leg_wear_monitor.report.replay.alarm_words import alarm_line
 from leg_wear_monitor.report.replay.banner import verdict_banner
 from leg_wear_monitor.report.replay.belief import belief
-from leg_wear_monitor.report.replay.charts import force_chart, health_chart, openings_chart
+from leg_wear_monitor.report.replay.charts import (
+    estimates_chart,
+    force_chart,
+    has_estimates,
+    health_chart,
+    openings_chart,
+)
 from leg_wear_monitor.report.replay.joint_rows import joint_rows
 from leg_wear_monitor.report.replay.joint_view import joint_views
 from leg_wear_monitor.report.replay.leg_drawing import leg_drawing
@@ -38,8 +45,9 @@ _MOST_EVIDENCE = 6
 
 
 def verdict_region(view: ReplaySummary) -> str:
-    """State, reason, action, evidence and what is not valid."""
-    return banner_markup(with_evidence(verdict_banner(view), view.verdict.evidence))
+    """State, reason, action, evidence and what is not valid; its guide is one of the server's pages."""
+    banner = verdict_banner(view, f"/guides/{PurePosixPath(view.verdict.guide).name}")
+    return banner_markup(with_evidence(banner, view.verdict.evidence))
 
 
 def banner_markup(banner: Banner) -> str:
@@ -101,8 +109,10 @@ def trends_region(view: ReplaySummary, caption: str) -> str:
     parts: list[Part] = [Text(caption)]
     if np.isfinite(timed.history.cadence_rpm).any():
         parts.append(health_chart(timed))
+    if has_estimates(timed):
+        parts.append(estimates_chart(timed))
     if _is_known(timed.history.clearance_m):
-        parts += _unless_doubted(timed, Figure.CLEARANCES, "Clearances", openings_chart(timed))
+        parts += _unless_doubted(timed, Figure.CLEARANCES, "Counted clearances", openings_chart(timed))
     if _is_known(timed.history.peak_force_n):
         parts += _unless_doubted(timed, Figure.IMPACT_FORCES, "Impact forces", force_chart(timed))
     return _parts(parts)

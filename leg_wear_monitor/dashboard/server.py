@@ -14,6 +14,8 @@ from tornado.web import Application, HTTPError, RequestHandler
 from leg_wear_monitor.dashboard.hosts import is_allowed, own_names
 from leg_wear_monitor.dashboard.hub import Hub
 from leg_wear_monitor.errors import LegWearError, printable
+from leg_wear_monitor.monitor.alarms.guides import CODES_OF_GUIDES, FOLDER
+from leg_wear_monitor.share import share_directory
 
 _WRITE_S = 20.0  # a viewer that takes nothing for so long is sent away
 _REQUEST_BYTES = 16_384
@@ -124,6 +126,7 @@ def application(hub: Hub, host: str) -> Application:
         [
             (r"/", _Page, common),
             (r"/events", _Events, common),
+            (r"/guides/([a-z_]+)\.md", _Guide, common),
             (r"/legs/([^/]+)/report\.html", _Leg, common),
         ],
         default_handler_class=_Nothing,
@@ -174,6 +177,19 @@ class _Page(_Reading):
     async def get(self) -> None:
         content = await self._hub.content()
         self.show(content.html, content.policy)
+
+    head = get
+
+
+class _Guide(_Reading):
+    """A guide that comes with the package, as text."""
+
+    def get(self, name: str) -> None:
+        page = share_directory() / FOLDER / f"{name}.md"
+        if name not in CODES_OF_GUIDES or not page.is_file():
+            raise HTTPError(HTTPStatus.NOT_FOUND)
+        self.set_header("Content-Type", "text/plain; charset=utf-8")
+        self.finish(page.read_bytes())
 
     head = get
 

@@ -5,8 +5,10 @@ from typing import Annotated, Any, Literal
 
 import attrs
 
+from leg_wear_monitor.configuration.nearest import did_you_mean
 from leg_wear_monitor.configuration.quantity import FieldError, described, quantity
 from leg_wear_monitor.drawable import Drawable
+from leg_wear_monitor.errors import ConfigError
 from leg_wear_monitor.mechanism.clearance import Clearance
 
 Vector = tuple[float, float]
@@ -242,6 +244,25 @@ class Mechanism(Drawable):
         """A joint by its name and its label, such as ``G (knee)``."""
         label = self.joints[joint].label
         return f"{joint} ({label})" if label else joint
+
+    def clearance_joint(self, name: str) -> str:
+        """A clearance joint by its name or by its label, such as ``knee``.
+
+        Raises
+        ------
+        ConfigError
+            If there is none such, or several have this label.
+        """
+        if name in self.clearance_joints:
+            return name
+        labels = {joint: self.joints[joint].label for joint in self.clearance_joints}
+        found = [joint for joint, label in labels.items() if label and label.lower() == name.lower()]
+        if len(found) == 1:
+            return found[0]
+        known = [*labels, *filter(None, labels.values())]
+        expected = ", ".join(labels)
+        fault = f"{name!r} is not a clearance joint, expected one of {expected}{did_you_mean(name, known)}"
+        raise ConfigError("JOINT", "", fault)
 
     def points_of(self, body: str) -> dict[str, Vector]:
         """Points of a body, the ground included, in its own frame [m]."""

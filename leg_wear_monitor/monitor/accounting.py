@@ -111,6 +111,21 @@ def _is_apart(step_ns: Ints) -> NDArray[np.bool_]:
     return np.asarray((step_ns < 0) | (step_ns > NEIGHBOURS_NS))
 
 
+def verdict_event(report: VerdictReport) -> VerdictEvent:
+    """A verdict as the ledger stores it."""
+    told = report.verdict.to_dict()
+    texts = {key: json.dumps(told[key], allow_nan=False) for key in ("joints", "evidence", "not_valid")}
+    return VerdictEvent(
+        stamp_ns=report.stamp_ns,
+        state=told["state"],
+        fault_code=told["fault_code"],
+        since_ns=told["since_ns"],
+        why=told["why"],
+        to_do=told["do"],
+        **texts,
+    )
+
+
 class Accounting:
     """Counts for the ledger, and writes to it when it is time.
 
@@ -175,6 +190,11 @@ class Accounting:
     def replaced_ns(self) -> list[int]:
         """When each joint's part was replaced, 0 if it never was."""
         return [part.replaced_ns for part in self.state.parts]
+
+    @property
+    def part_lives(self) -> list[tuple[int, int]]:
+        """When each joint's part was replaced, 0 if it never was, and its gait cycles."""
+        return [(part.replaced_ns, self.state.cycles - part.cycles) for part in self.state.parts]
 
     @property
     def totals(self) -> dict[str, float]:
@@ -326,19 +346,7 @@ class Accounting:
 
     def note_verdict(self, report: VerdictReport) -> None:
         """Note a changed verdict for the ledger."""
-        told = report.verdict.to_dict()
-        texts = {key: json.dumps(told[key], allow_nan=False) for key in ("joints", "evidence", "not_valid")}
-        self.note(
-            VerdictEvent(
-                stamp_ns=report.stamp_ns,
-                state=told["state"],
-                fault_code=told["fault_code"],
-                since_ns=told["since_ns"],
-                why=told["why"],
-                to_do=told["do"],
-                **texts,
-            )
-        )
+        self.note(verdict_event(report))
 
     def note_clearances(self, report: CycleReport) -> None:
         """Take the clearances down, now and then."""

@@ -20,6 +20,7 @@ from leg_wear_monitor.monitor.ledger.entry import Measurement
 from leg_wear_monitor.monitor.reports import CycleReport, JointReport, VerdictReport
 from leg_wear_monitor.monitor.state import MonitorState
 from leg_wear_monitor.monitor.torque_causes.explanation import TorqueExplanation
+from leg_wear_monitor.monitor.verdict.belief import BelievedClearance, at_limit_by_estimate, believed
 from leg_wear_monitor.monitor.verdict.rules import findings
 from leg_wear_monitor.monitor.verdict.sampled import with_sampling
 from leg_wear_monitor.monitor.verdict.situation import JointSituation, SeenClearance, Situation
@@ -27,6 +28,7 @@ from leg_wear_monitor.monitor.verdict.verdict import (
     NO_GAIT_CYCLE,
     Figure,
     Finding,
+    Verdict,
     dated,
     has_changed,
     verdict_of,
@@ -82,12 +84,33 @@ class Judge:
             self._without_zero(),
             self._forecaster.last_measured(self._accounting.replaced_ns),
             self._accounting.is_all_counted,
+            self._accounting.part_lives,
         )
         found = findings(situation)
         if self._twin.sampling:
             joints, sigma_m = self._twin.clearance_joints, self._accounting.sampling_sigma_m
             found = with_sampling(found, self._twin.sampling, joints, sigma_m)
         return VerdictReport(stamp_ns, dated(found, state.findings, stamp_ns))
+
+    def joints(self, state: MonitorState) -> tuple[JointSituation, ...]:
+        """What is known of each joint's clearance now."""
+        measured = self._forecaster.last_measured(self._accounting.replaced_ns)
+        return joint_situations(self._twin, self._evaluation, state.last, self._diagnosis(), measured)
+
+    def shown(self, state: MonitorState, joint: str) -> SeenClearance | None:
+        """What encoders or the drive torque show of a joint best, or showed when its alarm was raised."""
+        own = next(each for each in self.joints(state) if each.joint == joint)
+        alarm = self._evaluation.board.alarms[specs.CLEARANCE.name(joint)]
+        best = min(own.seen, key=lambda one: one.sigma_m, default=None)
+        return at_limit_by_estimate(own, alarm) or best
+
+    def believed(self, state: MonitorState, verdict: Verdict) -> dict[str, BelievedClearance | None]:
+        """The believed clearance of each joint, in the words of a verdict of this state."""
+        alarms, is_counted_leg = self._evaluation.board.alarms, Figure.CLEARANCES not in verdict.not_valid
+        return {
+            each.joint: believed(each, alarms[specs.CLEARANCE.name(each.joint)], is_counted_leg)
+            for each in self.joints(state)
+        }
 
     def changed(self, state: MonitorState) -> tuple[VerdictReport, ...]:
         """The verdict if it has changed since the last call; it is then an event, too.
@@ -123,6 +146,7 @@ def situation_of(
     without_zero: str = "",
     measured: Sequence[Measurement | None] = (),
     is_all_counted: bool = False,
+    parts: Sequence[tuple[int, int]] = (),
 ) -> Situation:
     """What the verdict depends on, at the end of an evaluation period.
 
@@ -144,18 +168,12 @@ def situation_of(
         Last measurement of each joint's part.
     is_all_counted : bool
         Whether the ledger already contained the wear of all samples.
+    parts : sequence of (int, int)
+        When each joint's part was replaced, 0 if it never was, and its gait cycles.
     """
     alarms, config = evaluation.board.alarms, evaluation.config
-    counted_m, limits_m = twin.clearance_mean_m.tolist(), evaluation.board.clearance_limits_m
-    joints = twin.mechanism.joints
     return Situation(
-        joints=tuple(
-            _with_measured(
-                _joint(k, name, joints[name].label, counted_m[k], limits_m[k], last, diagnosis),
-                measured[k] if measured else None,
-            )
-            for k, name in enumerate(twin.clearance_joints)
-        ),
+        joints=joint_situations(twin, evaluation, last, diagnosis, measured, parts),
         alarms=tuple(alarms.values()),
         quantities=specs.QUANTITIES,
         has_cycle=last is not None,
@@ -178,6 +196,31 @@ def situation_of(
         crank=config.crank,
         drive_torque=config.drive_torque,
     )
+
+
+def joint_situations(
+    twin: DigitalTwin,
+    evaluation: AlarmEvaluation,
+    last: CycleReport | None,
+    diagnosis: Diagnosis | None = None,
+    measured: Sequence[Measurement | None] = (),
+    parts: Sequence[tuple[int, int]] = (),
+) -> tuple[JointSituation, ...]:
+    """The clearance joints of a situation; parameters as in `situation_of`."""
+    counted_m, limits_m = twin.clearance_mean_m.tolist(), evaluation.board.clearance_limits_m
+    labels = (twin.mechanism.joints[name].label for name in twin.clearance_joints)
+    found = [
+        _joint(k, name, label, counted_m[k], limits_m[k], last, diagnosis)
+        for k, (name, label) in enumerate(zip(twin.clearance_joints, labels, strict=True))
+    ]
+    if measured:
+        found = [with_measured(*each) for each in zip(found, measured, strict=True)]
+    if parts:
+        found = [
+            attrs.evolve(each, replaced_ns=replaced_ns, part_cycles=cycles)
+            for each, (replaced_ns, cycles) in zip(found, parts, strict=True)
+        ]
+    return tuple(found)
 
 
 def _doubts(
@@ -217,10 +260,12 @@ def _joint(
     )
 
 
-def _with_measured(joint: JointSituation, measured: Measurement | None) -> JointSituation:
+def with_measured(joint: JointSituation, measured: Measurement | None) -> JointSituation:
+    """A joint with the last measurement of its part."""
     if measured is None:
         return joint
-    return attrs.evolve(joint, measured=SeenClearance("measurement", measured.clearance_m, measured.sigma_m))
+    by = SeenClearance("measurement", measured.clearance_m, measured.sigma_m)
+    return attrs.evolve(joint, measured=by, is_measurement_used=measured.counts)
 
 
 def _seen_by_encoders(report: JointReport | None) -> ClearanceEstimate | None:

@@ -1,16 +1,15 @@
 """Processing of the samples: gait cycles, their reports, what is observed at the ends of periods."""
 
-import math
-
+import attrs
 import numpy as np
 
 from leg_wear_monitor.mechanism.arrays import Floats
+from leg_wear_monitor.monitor.alarms.alarm import Level
 from leg_wear_monitor.monitor.cycle_report import cycle_report, latest
 from leg_wear_monitor.monitor.diagnosis.corrections import Correction
 from leg_wear_monitor.monitor.encoders.clearance_estimate import ClearanceEstimate
 from leg_wear_monitor.monitor.evaluation.specs import CLEARANCE, MISMATCH
 from leg_wear_monitor.monitor.forecast.growth import GrowthWindow, extended
-from leg_wear_monitor.monitor.forecast.measurement import judged_clearance_m
 from leg_wear_monitor.monitor.forecast_update import update_forecast
 from leg_wear_monitor.monitor.ledger.entry import (
     Audit,
@@ -26,6 +25,7 @@ from leg_wear_monitor.monitor.reports import (
     SampleReports,
     VerdictReport,
 )
+from leg_wear_monitor.monitor.verdict.belief import COUNTED, alarm_value, is_surely_below
 from leg_wear_monitor.twin.reference.leg_parameters import LegParameters
 from leg_wear_monitor.twin.reference.torque_reference import TorqueReference
 from leg_wear_monitor.twin.sample import Samples
@@ -81,30 +81,50 @@ class Processing:
     def end_period(self, changes: list[AlarmList]) -> tuple[VerdictReport, ...]:
         """Evaluate what is due at the end of an evaluation period; returns changes of the verdict."""
         self._add_changes(self._evaluation.end_period(self._accounting.state.skipped), changes)
-        self._add_changes(self.evaluate_measured(), changes)
         self._observe_encoders()
         self._observe_torque()
+        self._add_changes(self.evaluate_clearances(), changes)
         return self._parts.judge.changed(self._parts.state)
 
-    def evaluate_measured(self) -> tuple[AlarmList, ...]:
-        """Compare measured clearances with their limits: at once, for a measurement does not scatter."""
-        last, counted_m = self._parts.state.last, self._twin.clearance_mean_m
-        values = {}
-        for k, measured in enumerate(self._parts.measured):
-            told = last.joints[k].forecast if last else None
-            believed_m = told.clearance_m.p50 if told else math.nan
-            judged_m = judged_clearance_m(float(counted_m[k]), measured, believed_m)
-            if judged_m > counted_m[k]:  # a counted one is evaluated once a gait cycle
-                values[CLEARANCE.name(self._clearance_joints[k])] = judged_m
+    def evaluate_clearances(self) -> tuple[AlarmList, ...]:
+        """Compare clearances by measurement and by estimate with their limits: at once, for none scatters."""
+        board, values, sources = self._evaluation.board, {}, {}
+        for joint in self._parts.judge.joints(self._parts.state):
+            name = CLEARANCE.name(joint.joint)
+            known = alarm_value(joint, board.alarms[name])
+            if known is not None:
+                values[name], sources[name] = known.clearance_m, (known.sigma_m, known.by)
         intake, cycles = self._twin.intake, self._parts.config.alarms.on_delay_cycles
         stamp_ns = intake.followed_stamp_ns or intake.newest_stamp_ns
-        return self._evaluation.board.evaluate(values, stamp_ns, cycles) if values else ()
+        return board.evaluate(values, stamp_ns, cycles, sources) if values else ()
+
+    def measured(self, joint: str) -> tuple[AlarmList, ...]:
+        """Compare a new measurement with the limit; it ends an alarm of the clearance that it contradicts."""
+        changes, board, name = self.evaluate_clearances(), self._evaluation.board, CLEARANCE.name(joint)
+        own = next(each for each in self._parts.judge.joints(self._parts.state) if each.joint == joint)
+        before = board.alarms[name]
+        if own.measured is None or before.cause in ("", COUNTED) or before.level is Level.OK:
+            return changes
+        if is_surely_below(own.limit_m, own.measured.clearance_m, own.measured.sigma_m):
+            board.acknowledge_one(name)
+            intake = self._twin.intake
+            stamp_ns = intake.followed_stamp_ns or intake.newest_stamp_ns
+            changes = (*changes, AlarmList(stamp_ns, tuple(board.alarms.values())))
+        return changes
 
     def part_changed(self, joint: str, replaced_ns: int) -> None:
         """Discard the growth and the estimates of the former part."""
         k, growth = self._clearance_joints.index(joint), self._parts.state.growth
         self._parts.state.growth = (*growth[:k], GrowthWindow(), *growth[k + 1 :])
         self._forecaster.replaced(joint, replaced_ns)
+        last = self._parts.state.last
+        if last:  # what was estimated is of the former part
+            joints = [
+                *last.joints[:k],
+                attrs.evolve(last.joints[k], seen=None, shown=None),
+                *last.joints[k + 1 :],
+            ]
+            self._parts.state.last = attrs.evolve(last, joints=tuple(joints))
         if self._encoders:
             self._encoders.replaced()
         if self._torque:

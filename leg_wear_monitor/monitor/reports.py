@@ -71,7 +71,7 @@ class JointReport:
     shown: SeenClearance | None = None
 
     @property
-    def best_seen_m(self) -> float | None:
+    def seen_m(self) -> float | None:
         """Clearance that encoders or the drive torque show, the surer one; None if neither shows it."""
         found = [] if self.shown is None else [(self.shown.sigma_m, self.shown.clearance_m)]
         if self.seen is not None and self.seen.observation is ClearanceObservation.SEEN:

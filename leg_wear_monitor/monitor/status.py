@@ -1,7 +1,7 @@
 """The monitor's own state, as /diagnostics shows it: stable names, numbers only as values."""
 
 import math
-from collections.abc import Iterable, Sequence
+from collections.abc import Iterable, Mapping, Sequence
 
 import attrs
 
@@ -32,13 +32,15 @@ from leg_wear_monitor.monitor.ledger.entry import Measurement
 from leg_wear_monitor.monitor.reports import CycleReport, Status
 from leg_wear_monitor.monitor.torque_causes.explanation import TorqueExplanation
 from leg_wear_monitor.monitor.torque_status import diagnosis_status, torque_status
+from leg_wear_monitor.monitor.verdict.belief import BelievedClearance, believed_words
 from leg_wear_monitor.monitor.verdict.sampled import sampled_words
-from leg_wear_monitor.monitor.verdict.verdict import Verdict
+from leg_wear_monitor.monitor.verdict.verdict import Finding, State, Verdict, verdict_of
 from leg_wear_monitor.monitor.verdict.words import amount, estimate, with_unit
 from leg_wear_monitor.monitor.zero_status import zero_status
 from leg_wear_monitor.twin.digital_twin import DigitalTwin
 from leg_wear_monitor.twin.statistics import Event, Sampling, Tracking
 
+_NOTHING_BELIEVED: Mapping[str, BelievedClearance | None] = {}
 _INPUT = tuple(spec.name() for spec in specs.OF_INPUT)
 
 
@@ -55,11 +57,17 @@ def statuses(
     explained: TorqueExplanation | None = None,
     crank_zero: CrankZero | None = None,
     measured: Sequence[Measurement | None] = (),
+    believed: Mapping[str, BelievedClearance | None] = _NOTHING_BELIEVED,
+    findings: Sequence[Finding] = (),
 ) -> tuple[Status, ...]:
     """All statuses, verdict first, then gait, inputs, joints, alarms and ledger; last, a sampled replay."""
     sampling = twin.sampling
     joints = [_joint(k, name, twin, evaluation, last) for k, name in enumerate(twin.clearance_joints)]
     joints = [_with_measured(*each) for each in zip(joints, measured or (None,) * len(joints), strict=True)]
+    joints = [
+        _as_judged(joint, believed.get(name), [each for each in findings if name in each.joints])
+        for joint, name in zip(joints, twin.clearance_joints, strict=True)
+    ]
     return (
         verdict_status(verdict),
         _gait(twin, evaluation, accounting, last, happened, crank_zero.cause if crank_zero else ""),
@@ -199,6 +207,25 @@ def _with_measured(joint: Status, measured: Measurement | None) -> Status:
     words += f", {amount(joint.values['clearance_m'], 'm')} is counted"
     values = {"measured_clearance_m": measured.clearance_m, "measured_sigma_m": measured.sigma_m}
     return attrs.evolve(joint, message=f"{joint.message}; {words}", values=joint.values | values)
+
+
+def _as_judged(joint: Status, believed: BelievedClearance | None, findings: Sequence[Finding]) -> Status:
+    """A joint's status with its believed clearance, and with what the verdict's findings say of it."""
+    values, message = joint.values, joint.message
+    if believed is not None:
+        values = {"believed_m": believed.clearance_m, f"believed_by_{believed.by}": 1.0, **values}
+        if not math.isnan(believed.sigma_m):
+            values["believed_sigma_m"] = believed.sigma_m
+        message = f"{believed_words(believed)}; {message}"
+    joint = attrs.evolve(joint, values=values, message=message)
+    if not findings:
+        return joint
+    worst = max(findings, key=lambda finding: finding.state.severity)
+    level, is_grave = verdict_of([worst]).level, worst.state in (State.INSPECT, State.STOP)
+    if level < joint.level or (level is joint.level and not is_grave):
+        return joint
+    code = "_".join((worst.code, *worst.joints))
+    return attrs.evolve(joint, level=level, fault_code=code, message=f"{worst.state.words}: {message}")
 
 
 def _load_values(load: BushingLoad) -> dict[str, float]:

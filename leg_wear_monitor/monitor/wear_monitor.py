@@ -2,18 +2,20 @@
 
 from collections.abc import Iterable
 
+import attrs
 import numpy as np
 from numpy.typing import NDArray
 
 from leg_wear_monitor.errors import LegWearError
 from leg_wear_monitor.mechanism.arrays import Floats
 from leg_wear_monitor.mechanism.spec import Mechanism
-from leg_wear_monitor.monitor.alarms.alarm import Alarm
+from leg_wear_monitor.monitor.alarms.alarm import Alarm, Level
 from leg_wear_monitor.monitor.config.fitting import check_limits
 from leg_wear_monitor.monitor.config.settings import MonitorConfig
 from leg_wear_monitor.monitor.cycle_report import with_forecast
 from leg_wear_monitor.monitor.diagnosis.diagnosis import Diagnosis
 from leg_wear_monitor.monitor.evaluation.evaluation_period import EvaluationPeriods
+from leg_wear_monitor.monitor.evaluation.specs import MISMATCH
 from leg_wear_monitor.monitor.forecast.measurement import MeasurementResult
 from leg_wear_monitor.monitor.ledger.entry import AlarmEvent, Audit, JointWear, Measurement
 from leg_wear_monitor.monitor.ledger.file import LedgerError
@@ -30,9 +32,11 @@ from leg_wear_monitor.monitor.reports import (
     VerdictReport,
     lost,
 )
-from leg_wear_monitor.monitor.resets import last_reset
+from leg_wear_monitor.monitor.resets import Acknowledged, last_reset, named_for_clearance, rested_on
 from leg_wear_monitor.monitor.state import MonitorSnapshot
 from leg_wear_monitor.monitor.status import statuses
+from leg_wear_monitor.monitor.torque_causes.window import NO_MISMATCH
+from leg_wear_monitor.monitor.verdict.belief import SOURCES, BelievedClearance, is_held_by_estimate
 from leg_wear_monitor.twin.sample import GAIT_SAMPLE, Samples
 from leg_wear_monitor.twin.sampling.settings import SamplingSettings
 from leg_wear_monitor.twin.statistics import Sampling, joined
@@ -177,6 +181,11 @@ class WearMonitor:
         return self._evaluation.board.clearance_limits_m
 
     @property
+    def believed_clearances(self) -> dict[str, BelievedClearance | None]:
+        """The believed clearance of each clearance joint; None where nothing known of it is valid."""
+        return self._parts.judge.believed(self._parts.state, self.verdict.verdict)
+
+    @property
     def diagnosis(self) -> Diagnosis:
         """Clearances that the drive torque shows; empty while the received torque is wrong."""
         return self._parts.diagnosis
@@ -244,7 +253,7 @@ class WearMonitor:
 
     def status(self) -> tuple[Status, ...]:
         """Statuses for /diagnostics; their names and order are constant."""
-        state = self._parts.state
+        state, found = self._parts.state, self.verdict
         return statuses(
             self._twin,
             self._evaluation,
@@ -252,12 +261,14 @@ class WearMonitor:
             state.last,
             state.happened,
             state.torque,
-            self.verdict.verdict,
+            found.verdict,
             self.diagnosis,
             self._encoders,
             state.mismatch.explanation,
             self._parts.crank_zero,
             self._parts.measured,
+            self._parts.judge.believed(state, found.verdict),
+            found.findings,
         )
 
     def snapshot(self) -> MonitorSnapshot:
@@ -309,18 +320,35 @@ class WearMonitor:
         if changed:
             self._parts.keep()
 
-    def reset_wear(self, joint: str, stamp_ns: int, who: str) -> None:
+    def reset_wear(self, joint: str, stamp_ns: int, who: str) -> Acknowledged:
         """Reset the wear of a joint whose part was replaced; its history stays in the ledger.
+
+        What rested on the former part is acknowledged and clears.
+
+        Returns
+        -------
+        Acknowledged
+            Alarms that cleared, and alarms that are still raised.
 
         Raises
         ------
         LegWearError
             For a joint without clearance.
         """
+        board, state = self._evaluation.board, self._parts.state
         was = self._accounting.replace(joint, stamp_ns)
+        gone = rested_on(board.alarms.values(), joint, named_for_clearance(state.findings))
+        board.clear(gone)
+        if MISMATCH.name() in gone:
+            state.mismatch = NO_MISMATCH
         self._processing.part_changed(joint, stamp_ns)
+        self.renew_forecast()
         self._accounting.note(Audit(stamp_ns, who, "reset_wear", was))
+        self._accounting.note_alarms(AlarmList(stamp_ns, self.alarms.alarms))
+        self._parts.judge.changed(state)
         self._parts.keep()
+        kept = tuple(alarm.name for alarm in self.alarms.alarms if alarm.level is not Level.OK)
+        return Acknowledged(gone, kept)
 
     def undo_reset(self, joint: str, stamp_ns: int, who: str) -> JointWear:
         """Undo the last `reset_wear` of a joint whose part was not replaced.
@@ -338,6 +366,7 @@ class WearMonitor:
         reset = last_reset(self._accounting.ledger, joint, self._accounting.wear_of(joint))
         since = self._accounting.put_back(joint, reset.before)
         self._processing.part_changed(joint, reset.before.replaced_ns)
+        self.renew_forecast()
         self._accounting.note(Audit(stamp_ns, who, "undo_reset", since, undoes=reset.id))
         self._parts.keep()
         return self._accounting.wear_of(joint)
@@ -352,6 +381,7 @@ class WearMonitor:
         Parameters
         ----------
         joint : str
+            Its name or its label.
         clearance_m, sigma_m : float
             Mean radial clearance, and its standard deviation.
         stamp_ns : int
@@ -364,7 +394,8 @@ class WearMonitor:
         LegWearError
             For a joint without clearance, or impossible values.
         """
-        wear = self._accounting.wear_of(joint)
+        joint = self.mechanism.clearance_joint(joint)
+        wear, shown = self._accounting.wear_of(joint), self._parts.judge.shown(self._parts.state, joint)
         kept_ns = self._accounting.ledger.kept_ns if self._accounting.ledger else 0
         found = self._forecaster.measured(
             wear,
@@ -375,11 +406,18 @@ class WearMonitor:
             kept_ns=kept_ns,
             accept=accept,
         )
+        if shown:
+            found = attrs.evolve(
+                found,
+                shown_m=shown.clearance_m,
+                shown_sigma_m=shown.sigma_m,
+                shown_by=SOURCES[shown.by],
+            )
         self._accounting.note(found.measurement)
         if self._encoders:
             self._encoders.state.updated_ns = 0  # the next estimate updates the forecast again
         self.renew_forecast()
-        for change in self._processing.evaluate_measured():
+        for change in self._processing.measured(joint):
             self._accounting.note_alarms(change)
         self._parts.judge.changed(self._parts.state)
         self._parts.keep()
@@ -436,7 +474,9 @@ class WearMonitor:
         if ledger is None:
             return
         if self._parts.state.findings:
-            self._parts.judge.changed(self._parts.state)
+            is_noted = bool(self._parts.judge.changed(self._parts.state))
+            if not is_noted and any(map(is_held_by_estimate, self.alarms.alarms)):
+                self._accounting.note_verdict(self.verdict)  # the ledger's verdict names the last estimate
         kept = self._parts.keep(closed=True)
         ledger.close()
         if ledger.at_end and not kept:

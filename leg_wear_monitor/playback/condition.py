@@ -1,12 +1,13 @@
 """Condition of the leg at the end of a replay; what the verdict does not believe has no remaining life."""
 
 import math
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any
 
 import attrs
 
 from leg_wear_monitor.monitor.encoders.clearance_estimate import ClearanceObservation
 from leg_wear_monitor.monitor.forecast.forecast import JointForecast, LegForecast
+from leg_wear_monitor.monitor.verdict.belief import BelievedClearance
 from leg_wear_monitor.monitor.verdict.verdict import Figure, Verdict
 from leg_wear_monitor.playback.result.condition import JointClearance, LifeHours, life_hours
 
@@ -32,7 +33,7 @@ def clearances(result: "ReplayResult") -> dict[str, JointClearance]:
     """Clearance of each joint, as counted and as encoders or the drive torque show it best."""
     monitor, last = result.monitor, result.history.last
     limits = dict(zip(monitor.clearance_joints, monitor.clearance_limits_m, strict=True))
-    diagnosis, found = monitor.diagnosis, {}
+    diagnosis, found, believed = monitor.diagnosis, {}, monitor.believed_clearances
     for k, joint in enumerate(last.joints if last else ()):
         seen = []
         if joint.seen and joint.seen.observation is ClearanceObservation.SEEN:
@@ -40,6 +41,7 @@ def clearances(result: "ReplayResult") -> dict[str, JointClearance]:
         if diagnosis.clearance_m and math.isfinite(diagnosis.clearance_m[k]):
             seen.append((diagnosis.sigma_m[k], diagnosis.clearance_m[k], "torque"))
         sigma_m, clearance_m, by = min(seen) if seen else (None, None, None)
+        one = believed[joint.joint]
         found[joint.joint] = JointClearance(
             counted_m=joint.clearance_m,
             seen_m=clearance_m,
@@ -49,8 +51,15 @@ def clearances(result: "ReplayResult") -> dict[str, JointClearance]:
             limit_m=limits[joint.joint],
             measured_m=joint.measured.clearance_m if joint.measured else None,
             measured_sigma_m=joint.measured.sigma_m if joint.measured else None,
+            **(believed_fields(one) if one else {}),
         )
     return found
+
+
+def believed_fields(one: BelievedClearance) -> dict[str, Any]:
+    """A believed clearance as the fields of a `JointClearance` or a `ReplayJoint`."""
+    sigma_m = None if math.isnan(one.sigma_m) else one.sigma_m
+    return {"believed_m": one.clearance_m, "believed_sigma_m": sigma_m, "believed_by": one.by}
 
 
 def life(result: "ReplayResult", verdict: Verdict) -> dict[str, LifeHours | None]:

@@ -58,6 +58,7 @@ class History:
         self._stamps = array("q")
         self._cycles = array("d")
         self._joints = array("d")
+        self._seen = array("d")
         self._before: dict[str, Alarm] = {}
 
     def __len__(self) -> int:
@@ -70,6 +71,7 @@ class History:
         self._cycles.extend(float(getattr(report, name)) for name in CYCLE_COLUMNS)
         for joint in report.joints:
             self._joints.extend(_number(joint, name) for name in JOINT_COLUMNS)
+            self._seen.append(_number(joint, "seen_m"))
 
     def add_alarms(self, alarms: AlarmList) -> None:
         """Add the alarms of a list that have changed."""
@@ -91,6 +93,11 @@ class History:
         """One of `CYCLE_COLUMNS`, shape (cycles,)."""
         table = np.array(self._cycles).reshape(len(self), len(CYCLE_COLUMNS))
         return table[:, CYCLE_COLUMNS.index(name)]
+
+    @property
+    def seen_m(self) -> Floats:
+        """What encoders or the drive torque show best, shape (cycles, clearance joints); NaN without it."""
+        return np.array(self._seen).reshape(len(self), len(self.clearance_joints))
 
     def joint_column(self, name: str) -> Floats:
         """One of `JOINT_COLUMNS`, shape (cycles, clearance joints); NaN where it is unknown."""

@@ -16,8 +16,15 @@ from leg_wear_monitor.monitor.config.settings import MonitorConfig
 from leg_wear_monitor.monitor.encoders.clearance_estimate import ClearanceEstimate
 from leg_wear_monitor.monitor.forecast.forecast import LegForecast
 from leg_wear_monitor.monitor.reports import JointReport, Status
+from leg_wear_monitor.monitor.verdict.belief import BelievedClearance
 from leg_wear_monitor.monitor.verdict.verdict import Verdict
-from leg_wear_monitor.playback.condition import clearances, joint_forecast, leg_forecast, life
+from leg_wear_monitor.playback.condition import (
+    believed_fields,
+    clearances,
+    joint_forecast,
+    leg_forecast,
+    life,
+)
 from leg_wear_monitor.playback.history import CYCLE_COLUMNS, JOINT_COLUMNS, History
 from leg_wear_monitor.playback.result.leg import LegJoint, Place, ReplayLeg
 from leg_wear_monitor.playback.result.parts import (
@@ -85,7 +92,7 @@ def summary(
         real_time_factor=result.duration_s / wall_s if wall_s else None,
         cycles=len(result.history),
         gait=_gait(result),
-        joints=_joints(result.history, verdict) if is_known else {},
+        joints=_joints(result, verdict) if is_known else {},
         clearances=clearances(result) if is_known else {},
         life=life(result, verdict) if is_known else {},
         forecast=_leg(told) if told else None,
@@ -175,13 +182,19 @@ def _gait(result: "ReplayResult") -> ReplayGait:
     )
 
 
-def _joints(history: History, verdict: Verdict) -> dict[str, ReplayJoint]:
+def _joints(result: "ReplayResult", verdict: Verdict) -> dict[str, ReplayJoint]:
     """Last values of each joint, and the maximum and the mean of its forces."""
+    history, believed = result.history, result.monitor.believed_clearances
     joints = history.last.joints if history.last else ()
-    return {joint.joint: _joint(history, k, joint, verdict) for k, joint in enumerate(joints)}
+    return {
+        joint.joint: _joint(history, k, joint, verdict, believed[joint.joint])
+        for k, joint in enumerate(joints)
+    }
 
 
-def _joint(history: History, k: int, joint: JointReport, verdict: Verdict) -> ReplayJoint:
+def _joint(
+    history: History, k: int, joint: JointReport, verdict: Verdict, believed: BelievedClearance | None
+) -> ReplayJoint:
     clearance, peak, mean, impacts = (
         history.joint_column(name)[:, k]
         for name in ("clearance_m", "peak_force_n", "mean_force_n", "impacts")
@@ -198,6 +211,7 @@ def _joint(history: History, k: int, joint: JointReport, verdict: Verdict) -> Re
         impacts=int(np.nansum(impacts)),
         load=joint.load,
         sampling_sigma_m=joint.sampling_sigma_m,
+        **(believed_fields(believed) if believed else {}),
     )
 
 
@@ -248,6 +262,8 @@ def _history(history: History) -> ReplayHistory:
     for name in JOINT_COLUMNS:
         thinned = _thinned(name, history.joint_column(name), last)
         columns[name] = {joint: thinned[:, k] for k, joint in enumerate(history.clearance_joints)}
+    seen_m = history.seen_m[last]
+    columns["seen_m"] = {joint: seen_m[:, k] for k, joint in enumerate(history.clearance_joints)}
     if len(history) > len(last):
         begins = _begins(last)
         for name, reduced in (("lowest", np.fmin), ("highest", np.fmax)):  # of those that are known

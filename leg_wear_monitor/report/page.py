@@ -47,6 +47,8 @@ class Banner:
         Lines below the text, each with its title.
     severity : str
         Class of its colour: ``fine``, ``careful`` or ``bad``.
+    guide : str
+        Address of the page that says what to do; empty without one.
     """
 
     symbol: str
@@ -55,6 +57,7 @@ class Banner:
     text: str
     notes: Sequence[tuple[str, str]] = ()
     severity: str
+    guide: str = ""
 
 
 @attrs.frozen(kw_only=True)

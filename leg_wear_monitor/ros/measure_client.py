@@ -1,4 +1,9 @@
-"""Client of ``~/measure``: a measured clearance for a monitor that runs in another process."""
+"""Client of the services of a monitor in another process: measurements, acknowledgements, resets."""
+
+from collections.abc import Callable, Iterator
+from contextlib import contextmanager
+from functools import partial
+from typing import Any
 
 import rclpy
 from rcl_interfaces.srv import SetParametersAtomically
@@ -10,6 +15,7 @@ from rclpy.parameter import Parameter
 from rclpy.signals import SignalHandlerOptions
 from rclpy.utilities import try_shutdown
 from rclpy.validate_full_topic_name import validate_full_topic_name
+from std_srvs.srv import Trigger
 
 from leg_wear_monitor.errors import ConfigError, LegWearError
 
@@ -43,22 +49,77 @@ def measure_on(
     LegWearError
         If nobody answers, or the monitor refuses it.
     """
-    service = _service_of(monitor)
+    service = _service_of(monitor, "measure")
+    values = {"joint": joint, "clearance_m": clearance_m, "sigma_m": sigma_m, "accept": accept}
+    parameters = [Parameter(name, value=value).to_parameter_msg() for name, value in values.items()]
+    with _caller(SetParametersAtomically, service, wait_s) as call:
+        result = call(SetParametersAtomically.Request(parameters=parameters)).result
+    if not result.successful:
+        raise LegWearError(f"{service}: {result.reason}")
+    return str(result.reason)
+
+
+def trigger_on(monitor: str, name: str, wait_s: float, times: int = 1) -> str:
+    """Call a service without arguments of a running monitor.
+
+    Parameters
+    ----------
+    monitor : str
+        Full name of its node.
+    name : str
+        Of the service below the node, such as ``reset_wear/G``.
+    wait_s : float
+        Longest wait for the service, and again for each answer.
+    times : int
+        Number of calls; a reset asks to be called twice.
+
+    Returns
+    -------
+    str
+        The last answer.
+
+    Raises
+    ------
+    LegWearError
+        If nobody answers, or the monitor refuses the last call.
+    """
+    service = _service_of(monitor, name)
+    with _caller(Trigger, service, wait_s) as call:
+        answer = [call(Trigger.Request()) for _ in range(times)][-1]
+    if not answer.success:
+        raise LegWearError(f"{service}: {answer.message}")
+    return str(answer.message)
+
+
+@contextmanager
+def _caller(kind: Any, service: str, wait_s: float) -> Iterator[Callable[[Any], Any]]:
+    """A function that calls a service, from a node of its own.
+
+    Raises
+    ------
+    LegWearError
+        If nobody offers the service, or nobody answers.
+    """
     context = Context()
     rclpy.init(args=[], context=context, signal_handler_options=SignalHandlerOptions.NO)
     try:
         node = Node(_NAME, context=context, enable_rosout=False, start_parameter_services=False)
         try:
-            values = {"joint": joint, "clearance_m": clearance_m, "sigma_m": sigma_m, "accept": accept}
-            return _answer(node, service, values, wait_s)
+            client = node.create_client(kind, service)
+            if not client.wait_for_service(timeout_sec=wait_s):
+                raise LegWearError(
+                    f"{service}: nobody offers this service within {wait_s:g} s; is the monitor running, "
+                    "with this name and this ROS_DOMAIN_ID?"
+                )
+            yield partial(_answer, node, client, service, wait_s)
         finally:
             node.destroy_node()
     finally:
         try_shutdown(context=context)
 
 
-def _service_of(monitor: str) -> str:
-    service = f"/{monitor.strip('/')}/measure"
+def _service_of(monitor: str, name: str) -> str:
+    service = f"/{monitor.strip('/')}/{name}"
     try:
         validate_full_topic_name(service, is_service=True)
     except InvalidServiceNameException as error:
@@ -67,25 +128,15 @@ def _service_of(monitor: str) -> str:
     return service
 
 
-def _answer(node: Node, service: str, values: dict[str, object], wait_s: float) -> str:
-    client = node.create_client(SetParametersAtomically, service)
-    if not client.wait_for_service(timeout_sec=wait_s):
-        raise LegWearError(
-            f"{service}: nobody offers this service within {wait_s:g} s; is the monitor running, "
-            "with this name and this ROS_DOMAIN_ID?"
-        )
-    parameters = [Parameter(name, value=value).to_parameter_msg() for name, value in values.items()]
-    future = client.call_async(SetParametersAtomically.Request(parameters=parameters))
+def _answer(node: Node, client: Any, service: str, wait_s: float, request: Any) -> Any:
+    future = client.call_async(request)
     executor = SingleThreadedExecutor(context=node.context)
     executor.add_node(node)
     executor.spin_until_future_complete(future, timeout_sec=wait_s)
     executor.shutdown()
     if not future.done():
         raise LegWearError(
-            f"{service}: no answer within {wait_s:g} s; whether the measurement was entered is not known: "
+            f"{service}: no answer within {wait_s:g} s; whether it was done is not known: "
             "see the log of the monitor"
         )
-    result = future.result().result
-    if not result.successful:
-        raise LegWearError(f"{service}: {result.reason}")
-    return str(result.reason)
+    return future.result()

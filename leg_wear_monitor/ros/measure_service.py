@@ -91,7 +91,7 @@ def measured(monitor: WearMonitor, wanted: MeasureRequest, stamp_ns: int) -> str
     found = monitor.measure(
         wanted.joint, wanted.clearance_m, wanted.sigma_m, stamp_ns, WHO, accept=wanted.accept
     )
-    limit_m = monitor.clearance_limits_m[monitor.clearance_joints.index(wanted.joint)]
+    limit_m = monitor.clearance_limits_m[monitor.clearance_joints.index(found.measurement.joint)]
     lines = found.told(limit_m, monitor.config.limits.warn_fraction, monitor.measurements[:-1])
     try:
         monitor.save()

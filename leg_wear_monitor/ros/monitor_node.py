@@ -260,8 +260,12 @@ class MonitorNode(ClosingNode):
         stamp_ns = audit_time(self._ros_now_ns())
         if not self._confirmation.is_confirmed(joint):
             raise LegWearError(asked_once(joint, self._monitor.wear_of(joint)))
-        self._monitor.reset_wear(joint, stamp_ns, "service ~/reset_wear")
-        return f"joint {joint}: new surfaces, history kept; ~/undo_reset/{joint} reverts it"
+        done = self._monitor.reset_wear(joint, stamp_ns, "service ~/reset_wear")
+        self._send_state()
+        return (
+            f"joint {joint}: new surfaces, history kept; ~/undo_reset/{joint} reverts it; "
+            f"alarms {done.words}; confirm by walking"
+        )
 
     def _undo_reset(self, joint: str) -> str:
         stamp_ns = audit_time(self._ros_now_ns())

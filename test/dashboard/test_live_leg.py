@@ -48,6 +48,10 @@ def test_a_joint_that_opens_changes_verdict_alarms_and_joints(leg):
     assert "STOP" in after.regions["verdict"] and "Stop it".lower() in after.regions["verdict"].lower()
     assert "ERROR clearance G (knee)" in words(after.regions["alarms"])
     assert "STOP" in after.regions["joints"]
+    assert (
+        "at its limit, see the verdict" in after.regions["joints"]
+    )  # not green beside a banner that says stop
+    assert 'class="over"' in after.regions["joints"]
     assert after.words.state == f"{NODE}: stop joint G (knee)"
 
 

@@ -14,6 +14,7 @@ def long_history(cycles):
     history._stamps.extend(range(cycles))
     history._cycles.extend(draw.normal(size=cycles * len(CYCLE_COLUMNS)))
     history._joints.extend(draw.normal(size=cycles * 2 * len(JOINT_COLUMNS)))
+    history._seen.extend(draw.normal(size=cycles * 2))
     return history
 
 

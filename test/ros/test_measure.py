@@ -88,7 +88,7 @@ def test_a_running_monitor_takes_measured_clearances(stage, running) -> None:
     done = measure("Z", "0.4", "--sigma", "0.005", "--node", NODE)
     assert (done.returncode, done.stdout) == (2, "")
     assert done.stderr.splitlines() == [
-        f"error: {NODE}/measure: Z: no clearance joint, expected one of A, B, G, I, J"
+        f"error: {NODE}/measure: JOINT: 'Z' is not a clearance joint, expected one of A, B, G, I, J"
     ]
     refuses_in_one_line(stage)
     end()

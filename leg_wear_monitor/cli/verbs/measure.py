@@ -7,10 +7,10 @@ from typing import Any
 
 import click
 
-from leg_wear_monitor.cli.measurements import LAST, check_joint, leg_of, list_measurements, opened, withdraw
+from leg_wear_monitor.cli.measurements import LAST, leg_of, list_measurements, opened, withdraw
 from leg_wear_monitor.cli.node import need_rclpy
 from leg_wear_monitor.cli.number import bounded
-from leg_wear_monitor.cli.options import config_option, ledger_option
+from leg_wear_monitor.cli.options import config_option, ledger_option, node_option, wait_option
 
 WITH_FINDINGS = 1
 
@@ -29,20 +29,8 @@ WITH_FINDINGS = 1
 @ledger_option
 @click.option("--accept", is_flag=True, help="Use it even if it contradicts the model.")
 @click.option("--dry-run", is_flag=True, help="Print the result and write nothing.")
-@click.option(
-    "--node",
-    metavar="NAME",
-    help="Full name of a running monitor to enter it into, such as /left/leg_wear_monitor.",
-)
-@click.option(
-    "--wait",
-    "wait_s",
-    type=click.FloatRange(min=0.0, min_open=True),
-    default=10.0,
-    show_default=True,
-    metavar="S",
-    help="With --node: longest wait for the monitor, and again for its answer.",
-)
+@node_option
+@wait_option
 @click.option("--list", "listed", is_flag=True, help="Print the ledger's measurements with their numbers.")
 @click.option(
     "--withdraw",
@@ -61,7 +49,7 @@ def measure(
     wait_s: float,
     **options: Any,
 ) -> int:
-    """Enter the measured mean radial clearance of JOINT, in millimetres.
+    """Enter the measured mean radial clearance of JOINT, a name or a label such as knee, in millimetres.
 
     Measure with a feeler gauge, a micrometer or a dial. A dial shows twice the radial clearance if the pin is
     moved to and fro. A running monitor locks its ledger: name it with --node, or stop it first. The counted
@@ -122,13 +110,17 @@ def _measured(
     dry_run: bool,
 ) -> tuple[tuple[str, ...], bool]:
     """What came of a measurement, a line each, and whether the caller has to act."""
+    import attrs
+
     from leg_wear_monitor.monitor.evaluation.board import AlarmBoard
     from leg_wear_monitor.monitor.forecast.coefficient_prior import prior_source
     from leg_wear_monitor.monitor.forecast.measurement import measure as evaluate
     from leg_wear_monitor.monitor.ledger.entry import new_part
+    from leg_wear_monitor.monitor.resets import overrule_in, shown_in
+    from leg_wear_monitor.monitor.verdict.belief import SOURCES
 
     settings, leg = leg_of(config, ledger)
-    check_joint(joint, leg)
+    joint = leg.clearance_joint(joint)
     limits_m = AlarmBoard(settings, leg.clearance_joints).clearance_limits_m
     limit_m = limits_m[leg.clearance_joints.index(joint)]
     with opened(leg, settings, dry_run) as kept:
@@ -148,7 +140,11 @@ def _measured(
             prior=prior_source(leg, settings.forecast).prior(joint, part.replaced_ns),
             corrections=kept.corrections,
         )
+        shown = shown_in(kept, joint)
+        if shown:
+            by = SOURCES[shown.by]
+            found = attrs.evolve(found, shown_m=shown.clearance_m, shown_sigma_m=shown.sigma_m, shown_by=by)
         kept.note(found.measurement)
-        kept.record()
+        kept.record(overrule_in(kept, leg, settings, found.measurement))
     told = found.told(limit_m, settings.limits.warn_fraction, kept.measurements)
     return told, found.has_findings(limit_m)

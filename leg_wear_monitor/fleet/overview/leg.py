@@ -49,8 +49,10 @@ def leg_overview(
 
 
 def _used(joint: JointClearance) -> float:
-    """Fraction of the clearance that is used up; as seen where that is known."""
-    clearance_m = joint.counted_m if joint.seen_m is None else joint.seen_m
+    """Fraction of the clearance that is used up, by the believed clearance."""
+    clearance_m = joint.believed_m
+    if clearance_m is None:  # nothing is valid, or it is a line of an older version
+        clearance_m = joint.counted_m if joint.seen_m is None else joint.seen_m
     return used_fraction(clearance_m, joint.new_m, joint.limit_m)
 
 

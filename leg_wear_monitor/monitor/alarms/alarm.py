@@ -83,7 +83,12 @@ class Alarm:
     raised_ns : int
         Stamp at which the level last rose; 0 before.
     worst : float
-        The worst value since it was raised; NaN while its level is OK.
+        The worst value since it was raised; NaN while its level is OK. Of estimates, which have a standard
+        deviation, the last one at this level: it rests on most, and the largest of many is too large.
+    sigma : float
+        Standard deviation of `worst`; NaN if it is not known.
+    cause : str
+        Source or cause of `worst` as it was known then, such as ``torque``; a value without one keeps it.
     beyond : tuple of int
         Number of gait cycles in a row with the value beyond the limits of WARN and ERROR.
     """
@@ -98,6 +103,8 @@ class Alarm:
     limit: float = math.nan
     raised_ns: int = 0
     worst: float = math.nan
+    sigma: float = math.nan
+    cause: str = ""
     beyond: tuple[int, int] = (0, 0)
 
     @property
@@ -135,7 +142,15 @@ def next_level(
     return Level.OK, beyond
 
 
-def evaluated(alarm: Alarm, value: float, limit: Limit, stamp_ns: int, cycles: int = 1) -> Alarm:
+def evaluated(
+    alarm: Alarm,
+    value: float,
+    limit: Limit,
+    stamp_ns: int,
+    cycles: int = 1,
+    sigma: float = math.nan,
+    cause: str = "",
+) -> Alarm:
     """Alarm after a value; NaN leaves the alarm unchanged.
 
     Parameters
@@ -148,6 +163,10 @@ def evaluated(alarm: Alarm, value: float, limit: Limit, stamp_ns: int, cycles: i
         Stamp of the value.
     cycles : int
         Gait cycles the value stands for.
+    sigma : float
+        Standard deviation of the value.
+    cause : str
+        Source or cause of the value; empty if it is not known.
     """
     if math.isnan(value):
         return alarm
@@ -157,6 +176,12 @@ def evaluated(alarm: Alarm, value: float, limit: Limit, stamp_ns: int, cycles: i
         level, is_acknowledged, raised_ns = present, False, stamp_ns
     elif (is_acknowledged or not limit.is_latched) and present < level:
         level, is_acknowledged = present, is_acknowledged and present is not Level.OK
+    is_estimate = not math.isnan(sigma) and present is level is not Level.OK
+    worst = value if is_estimate else _worst(level, alarm.worst, value, limit)
+    if level is Level.OK:
+        sigma, cause = math.nan, ""
+    elif worst == alarm.worst and not is_estimate:  # what was known of the worst value stays with it
+        sigma, cause = alarm.sigma, alarm.cause or cause
     return Alarm(  # all fields: `attrs.evolve` takes several times as long, for each value of each period
         kind=alarm.kind,
         subject=alarm.subject,
@@ -167,7 +192,9 @@ def evaluated(alarm: Alarm, value: float, limit: Limit, stamp_ns: int, cycles: i
         value=value,
         limit=limit.error,
         raised_ns=raised_ns,
-        worst=_worst(level, alarm.worst, value, limit),
+        worst=worst,
+        sigma=sigma,
+        cause=cause or (alarm.cause if level is not Level.OK else ""),
         beyond=beyond,
     )
 
@@ -186,8 +213,15 @@ def acknowledged(alarm: Alarm) -> Alarm:
     if alarm.level is Level.OK:
         return alarm
     if alarm.present is Level.OK:
-        return attrs.evolve(alarm, level=Level.OK, acknowledged=False, worst=math.nan)
+        return attrs.evolve(
+            alarm, level=Level.OK, acknowledged=False, worst=math.nan, sigma=math.nan, cause=""
+        )
     return attrs.evolve(alarm, level=alarm.present, acknowledged=True)
+
+
+def cleared(alarm: Alarm) -> Alarm:
+    """Alarm of a part that is not there any more: as new."""
+    return Alarm(kind=alarm.kind, subject=alarm.subject, unit=alarm.unit)
 
 
 def has_changed(before: Alarm, after: Alarm) -> bool:

@@ -5,7 +5,7 @@ START = "index"
 
 CODES_OF_GUIDES = {
     START: ("NONE", "ALARM"),
-    "joint_at_limit": ("CLEARANCE", "CLEARANCE_SEEN", "CLEARANCE_BELIEVED"),
+    "joint_at_limit": ("CLEARANCE", "CLEARANCE_SEEN", "CLEARANCE_BELIEVED", "PART_REPLACED"),
     "clearance_changed": (
         "CLEARANCE_CHANGED",
         "CLEARANCE_CORRECTED",

@@ -5,12 +5,23 @@ from typing import Any
 
 import attrs
 
-from leg_wear_monitor.monitor.alarms.alarm import Alarm, Level, Limit, acknowledged, evaluated, has_changed
+from leg_wear_monitor.monitor.alarms.alarm import (
+    Alarm,
+    Level,
+    Limit,
+    acknowledged,
+    cleared,
+    evaluated,
+    has_changed,
+)
 from leg_wear_monitor.monitor.config.settings import MonitorConfig
 from leg_wear_monitor.monitor.evaluation import specs
 from leg_wear_monitor.monitor.evaluation.specs import AlarmSpec, LimitSource
 from leg_wear_monitor.monitor.evaluation.torque_checks import torque_bounds
 from leg_wear_monitor.monitor.reports import AlarmList, JointReport
+from leg_wear_monitor.monitor.verdict.belief import is_held_by_estimate
+
+_NO_SOURCES: Mapping[str, tuple[float, str]] = {}
 
 
 def joint_specs(config: MonitorConfig) -> tuple[AlarmSpec[JointReport], ...]:
@@ -71,7 +82,19 @@ class AlarmBoard:
         """Limit of each clearance joint's clearance."""
         return tuple(self._limits[specs.CLEARANCE.name(joint)].error for joint in self._clearance_joints)
 
-    def evaluate(self, values: Mapping[str, float], stamp_ns: int, cycles: int = 1) -> tuple[AlarmList, ...]:
+    @property
+    def held_by_estimate(self) -> tuple[str, ...]:
+        """Alarms of clearances that are present because of what encoders or the drive torque showed."""
+        names = map(specs.CLEARANCE.name, self._clearance_joints)
+        return tuple(name for name in names if is_held_by_estimate(self.alarms[name]))
+
+    def evaluate(
+        self,
+        values: Mapping[str, float],
+        stamp_ns: int,
+        cycles: int = 1,
+        sources: Mapping[str, tuple[float, str]] = _NO_SOURCES,
+    ) -> tuple[AlarmList, ...]:
         """Evaluate values by alarm name; returns one list of all alarms if the shown state has changed.
 
         Parameters
@@ -80,9 +103,11 @@ class AlarmBoard:
         stamp_ns : int
         cycles : int
             Number of gait cycles that the values represent.
+        sources : mapping of str to (float, str)
+            Standard deviation and source of some values, by alarm name.
         """
         found = [
-            evaluated(self.alarms[name], value, self._limits[name], stamp_ns, cycles)
+            evaluated(self.alarms[name], value, self._limits[name], stamp_ns, cycles, *sources.get(name, ()))
             for name, value in values.items()
         ]
         return self._set(found, stamp_ns)
@@ -101,8 +126,16 @@ class AlarmBoard:
         """Acknowledge all alarms; returns the cleared ones and the remaining ones in their new state."""
         now = [acknowledged(alarm) for alarm in self.alarms.values() if alarm.level is not Level.OK]
         self.alarms |= {alarm.name: alarm for alarm in now}
-        cleared = tuple(alarm for alarm in now if alarm.level is Level.OK)
-        return cleared, tuple(alarm for alarm in now if alarm.level is not Level.OK)
+        normal = tuple(alarm for alarm in now if alarm.level is Level.OK)
+        return normal, tuple(alarm for alarm in now if alarm.level is not Level.OK)
+
+    def acknowledge_one(self, name: str) -> None:
+        """Acknowledge one alarm."""
+        self.alarms = self.alarms | {name: acknowledged(self.alarms[name])}
+
+    def clear(self, names: Iterable[str]) -> None:
+        """Make alarms as new whose part is not there any more."""
+        self.alarms = self.alarms | {name: cleared(self.alarms[name]) for name in names}
 
     def restore(self, alarms: Iterable[Alarm]) -> None:
         """Restore alarms from another run."""

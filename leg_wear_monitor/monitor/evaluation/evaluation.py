@@ -137,6 +137,8 @@ class AlarmEvaluation:
             del values[specs.MISMATCH.name()]
         for joint in report.joints:
             values |= {spec.name(joint.joint): spec.value(joint) for spec in joint_specs(self.config)}
+        for name in self.board.held_by_estimate:  # it is evaluated with the estimate, at the period's end
+            values.pop(name, None)
         return self.board.evaluate(values, report.stamp_ns)
 
     def _end_tracked(self, report: CycleReport) -> tuple[AlarmList, ...]:
@@ -145,6 +147,8 @@ class AlarmEvaluation:
         clearances = {
             specs.CLEARANCE.name(joint.joint): specs.CLEARANCE.value(joint) for joint in report.joints
         }
+        for name in self.board.held_by_estimate:
+            clearances.pop(name, None)
         return self.board.evaluate({specs.CADENCE.name(): departure, **clearances}, report.stamp_ns)
 
     def end_period(self, skipped: int = 0) -> tuple[AlarmList, ...]:

@@ -23,8 +23,10 @@ from leg_wear_monitor.monitor.ledger.entry import CorrectedClearance, JointWear,
 CONTRADICTS = 0.00135  # probability of a tail: three standard deviations of a normal one
 
 CONTRADICTION = "this contradicts the model"
+AGREES = "this agrees with what"
 AT_LIMIT = "the measured clearance is at its limit"
 
+_SURE_SIGMAS = 2.0  # of a measurement and an estimate that still agree
 _SAYS_SOMETHING = 0.9  # of the spread before: what is left after a measurement that says something
 
 
@@ -44,6 +46,9 @@ class MeasurementResult:
         Clearance that the twin had counted for this part.
     words : tuple of str
         For people, a line each.
+    shown_m, shown_sigma_m, shown_by : float, float, str
+        What encoders or the drive torque showed of the joint before, with its source in words; NaN and empty
+        if they showed nothing.
     """
 
     measurement: Measurement
@@ -52,6 +57,27 @@ class MeasurementResult:
     contradicts: bool
     counted_m: float
     words: tuple[str, ...]
+    shown_m: float = math.nan
+    shown_sigma_m: float = math.nan
+    shown_by: str = ""
+
+    @property
+    def agrees(self) -> bool:
+        """Whether the measurement is what encoders or the drive torque showed."""
+        sigma_m = math.hypot(self.measurement.sigma_m, self.shown_sigma_m)
+        return abs(self.measurement.clearance_m - self.shown_m) <= _SURE_SIGMAS * sigma_m  # not with NaN
+
+    def _compared(self, limit_m: float) -> list[str]:
+        """The measurement against what encoders or the drive torque showed."""
+        if math.isnan(self.shown_m):
+            return []
+        now, shown = self.measurement, f"{_mm(self.shown_m)} ± {_mm(self.shown_sigma_m)}"
+        if self.agrees:
+            return [f"{AGREES} {self.shown_by} shows, {shown}"]
+        line = f"{self.shown_by} showed {shown}, and this measurement contradicts it"
+        if now.clearance_m + _SURE_SIGMAS * now.sigma_m < limit_m <= self.shown_m:
+            line += f": the alarm clearance {now.joint} is acknowledged with it"
+        return [line]
 
     def told(self, limit_m: float, warn_fraction: float, earlier: Sequence[Measurement]) -> tuple[str, ...]:
         """The measurement and what came of it, for people, a line each.
@@ -76,11 +102,17 @@ class MeasurementResult:
         elif now.clearance_m >= warn_fraction * limit_m:
             part = f"{100.0 * warn_fraction:g} % of its limit"
             lines.append(f"the measured clearance is above {part}: the alarm clearance {now.joint} is raised")
+        lines += self._compared(limit_m)
+        if self.agrees and self.contradicts:  # the counting is wrong, not the measurement
+            used = "uses" if now.counts else "does not use"
+            lines.append(f"the joint has opened otherwise than counted; the forecast {used} the measurement")
+            return (*lines, validity([*earlier, now]).words)
         return (*lines, *self.words, validity([*earlier, now]).words)
 
     def has_findings(self, limit_m: float) -> bool:
         """Whether the caller has to act: the measurement contradicts the model, or is at the limit."""
-        return self.contradicts or self.measurement.clearance_m >= limit_m
+        is_odd = self.contradicts and not self.agrees
+        return is_odd or self.measurement.clearance_m >= limit_m
 
 
 def asks_to_act(told: str) -> bool:

@@ -17,7 +17,7 @@ from leg_wear_monitor.mechanism.spec import Mechanism
 from leg_wear_monitor.monitor.config.fitting import fitted
 from leg_wear_monitor.monitor.config.settings import MonitorConfig
 from leg_wear_monitor.monitor.ledger.binding import Binding, binding_of
-from leg_wear_monitor.monitor.ledger.entry import Audit, Entry, Event, Measurement, Withdrawal
+from leg_wear_monitor.monitor.ledger.entry import Audit, Entry, Event, Measurement, VerdictEvent, Withdrawal
 from leg_wear_monitor.monitor.ledger.file import LedgerError
 from leg_wear_monitor.monitor.ledger.recovery import Recovered
 from leg_wear_monitor.monitor.ledger.rows import (
@@ -26,6 +26,7 @@ from leg_wear_monitor.monitor.ledger.rows import (
     read_corrections,
     read_identified_leg,
     read_last_reset,
+    read_last_verdict,
     read_measurements,
     read_simulated_reference,
     read_spans,
@@ -176,6 +177,17 @@ class Ledger:
         self.measurements = tuple(now if each.id == measurement else each for each in self.measurements)
         self.note(Withdrawal(stamp_ns, who, measurement))
         return now
+
+    @property
+    def last_verdict(self) -> VerdictEvent | None:
+        """The last stored change of the verdict; None without one.
+
+        Raises
+        ------
+        LedgerError
+            If the ledger cannot be read now.
+        """
+        return self._store.ask(read_last_verdict)
 
     def last_reset(self, joint: str) -> Audit | None:
         """The last stored `reset_wear` of a joint that was not undone, None if there is none.

@@ -17,9 +17,9 @@ from leg_wear_monitor.monitor.ledger.entry import (
 )
 from leg_wear_monitor.monitor.ledger.file import MOVE, LedgerError, connect
 from leg_wear_monitor.monitor.ledger.recovery import migrated, recover
-from leg_wear_monitor.monitor.ledger.rows import read_measurements
+from leg_wear_monitor.monitor.ledger.rows import read_last_verdict, read_measurements
 
-_Row = TypeVar("_Row", ClearancePoint, ForecastPoint, VerdictEvent)
+_Row = TypeVar("_Row", ClearancePoint, ForecastPoint)
 
 
 @attrs.frozen(kw_only=True, eq=False)
@@ -69,10 +69,9 @@ def read_ledger(path: Path, binding: Binding) -> LedgerContent:
 def _content(db: sqlite3.Connection, copy: Path) -> LedgerContent:
     found = migrated(db, recover(db, copy))
     forecasts = _rows(db, ForecastPoint, "forecast WHERE id IN (SELECT max(id) FROM forecast GROUP BY joint)")
-    verdicts = _rows(db, VerdictEvent, "verdict ORDER BY id DESC LIMIT 1")
     return LedgerContent(
         entry=found.entry,
-        verdict=verdicts[0] if verdicts else None,
+        verdict=read_last_verdict(db),
         clearances=_rows(db, ClearancePoint, "history ORDER BY id"),
         forecasts={point.joint: point for point in forecasts},
         measurements=read_measurements(db),

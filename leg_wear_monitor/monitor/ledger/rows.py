@@ -61,11 +61,11 @@ def write_entry(db: sqlite3.Connection, run: int, head: int, entry: Entry) -> No
     db.executemany("INSERT OR REPLACE INTO total VALUES (?, ?)", entry.totals.items())
     db.execute("DELETE FROM alarm")
     db.executemany(
-        "INSERT INTO alarm VALUES (?, ?, ?, ?, ?, ?, ?, ?)",
+        "INSERT INTO alarm VALUES (?, ?, ?, ?, ?, ?, ?, ?, ?, ?)",
         [
             (
                 *(a.kind, a.subject, int(a.level), int(a.present), int(a.acknowledged), a.raised_ns),
-                *(a.worst, a.limit),  # SQLite stores NaN as NULL
+                *(a.worst, a.limit, a.sigma, a.cause),  # SQLite stores NaN as NULL
             )
             for a in entry.alarms
         ],
@@ -295,6 +295,13 @@ def read_spans(db: sqlite3.Connection) -> list[tuple[int, int, int]]:
     return db.execute("SELECT begin_ns, end_ns, epoch FROM span").fetchall()
 
 
+def read_last_verdict(db: sqlite3.Connection) -> VerdictEvent | None:
+    """The last change of the verdict."""
+    names = [field.name for field in attrs.fields(VerdictEvent)]
+    row = db.execute(f"SELECT {', '.join(names)} FROM verdict ORDER BY id DESC LIMIT 1").fetchone()
+    return VerdictEvent(**dict(zip(names, row, strict=True))) if row else None
+
+
 def read_last_run(db: sqlite3.Connection) -> Run:
     """The last run."""
     last = db.execute(
@@ -323,6 +330,8 @@ def _alarm(
     raised_ns: int,
     worst: float | None,
     limit: float | None,
+    sigma: float | None = None,  # before format 10 without it and the cause
+    cause: str = "",
 ) -> Alarm:
     return Alarm(
         kind=kind,
@@ -333,4 +342,6 @@ def _alarm(
         raised_ns=raised_ns,
         worst=math.nan if worst is None else worst,
         limit=math.nan if limit is None else limit,
+        sigma=math.nan if sigma is None else sigma,
+        cause=cause,
     )

@@ -303,7 +303,25 @@ INSERT INTO measurement SELECT id, stamp_ns, joint, who, clearance_m, sigma_m, w
 DROP TABLE former;
 """
 
-MIGRATIONS = (_FIRST, _SECOND, _THIRD, _FOURTH, _FIFTH, _SIXTH, _SEVENTH, _EIGHTH, _NINTH)
+_TENTH = """
+CREATE TEMP TABLE former AS SELECT * FROM alarm;
+DROP TABLE alarm;
+
+-- alarms that are not OK: they stay latched over a new start; worst and limit as far as they are known, with
+-- the standard deviation of worst and its source or cause, '' if it has none
+CREATE TABLE alarm (
+    kind TEXT NOT NULL, subject TEXT NOT NULL, level INTEGER NOT NULL, present INTEGER NOT NULL,
+    acknowledged INTEGER NOT NULL, raised_ns INTEGER NOT NULL, worst REAL, limit_value REAL, sigma REAL,
+    cause TEXT NOT NULL DEFAULT '', PRIMARY KEY (kind, subject)
+) STRICT;
+INSERT INTO alarm SELECT kind, subject, level, present, acknowledged, raised_ns, worst, limit_value, NULL, ''
+    FROM former;
+DROP TABLE former;
+"""
+
+MIGRATIONS = (
+    _FIRST, _SECOND, _THIRD, _FOURTH, _FIFTH, _SIXTH, _SEVENTH, _EIGHTH, _NINTH, _TENTH,
+)  # fmt: skip
 
 FORMAT = len(MIGRATIONS)
 SEALED_FROM = 4  # first format with checksums over the whole content

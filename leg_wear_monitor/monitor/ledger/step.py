@@ -114,8 +114,32 @@ def _span(entry: Entry, i: int) -> list[int]:
 
 def _alarm_values(alarm: Alarm) -> list[Any]:
     level, present = int(alarm.level), int(alarm.present)
-    known = [value if math.isfinite(value) else None for value in (alarm.worst, alarm.limit)]
-    return [alarm.kind, alarm.subject, level, present, bool(alarm.acknowledged), alarm.raised_ns, *known]
+    found = (alarm.worst, alarm.limit, alarm.sigma)
+    known = [value if math.isfinite(value) else None for value in found]
+    is_acknowledged = bool(alarm.acknowledged)
+    return [
+        alarm.kind, alarm.subject, level, present, is_acknowledged, alarm.raised_ns, *known, alarm.cause
+    ]  # fmt: skip
+
+
+def _alarm(
+    kind: str,
+    subject: str,
+    level: int,
+    present: int,
+    acknowledged: bool,
+    raised_ns: int,
+    worst: float | None,
+    limit: float | None,
+    sigma: float | None = None,  # before format 10 without it and the cause
+    cause: str = "",
+) -> Alarm:
+    return Alarm(
+        kind=kind, subject=subject, level=Level(level), present=Level(present),
+        acknowledged=acknowledged, raised_ns=raised_ns, cause=cause,
+        worst=math.nan if worst is None else worst, limit=math.nan if limit is None else limit,
+        sigma=math.nan if sigma is None else sigma,
+    )  # fmt: skip
 
 
 def _entry(values: dict[str, Any], before: Entry, depth: Floats) -> Entry:
@@ -128,14 +152,7 @@ def _entry(values: dict[str, Any], before: Entry, depth: Floats) -> Entry:
             for joint, own, part in zip(before.joints, depth, values["parts"], strict=True)
         ),
         totals=values["totals"],
-        alarms=tuple(
-            Alarm(
-                kind=kind, subject=subject, level=Level(level), present=Level(present),
-                acknowledged=acknowledged, raised_ns=raised_ns,
-                worst=math.nan if worst is None else worst, limit=math.nan if limit is None else limit,
-            )
-            for kind, subject, level, present, acknowledged, raised_ns, worst, limit in values["alarms"]
-        ),
+        alarms=tuple(_alarm(*each) for each in values["alarms"]),
         spans=tuple((begin, end) for begin, end, _ in spans),
         span_epochs=epochs if any(epochs) else (),
-    )  # fmt: skip
+    )

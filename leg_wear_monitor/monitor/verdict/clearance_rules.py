@@ -3,14 +3,17 @@
 import math
 from collections.abc import Callable, Sequence
 
+from leg_wear_monitor.monitor.alarms.alarm import Alarm, Level
+from leg_wear_monitor.monitor.alarms.words import time_words
 from leg_wear_monitor.monitor.diagnosis.diagnosis import Cause, Change, DiagnosisState
-from leg_wear_monitor.monitor.verdict.alarm_rules import raised
+from leg_wear_monitor.monitor.verdict.alarm_rules import hit_of, raised
+from leg_wear_monitor.monitor.verdict.belief import SEEN, SOURCES, at_limit_by_estimate
 from leg_wear_monitor.monitor.verdict.rule import Hit
-from leg_wear_monitor.monitor.verdict.situation import Situation
+from leg_wear_monitor.monitor.verdict.situation import JointSituation, SeenClearance, Situation
 from leg_wear_monitor.monitor.verdict.verdict import Evidence, Figure
 from leg_wear_monitor.monitor.verdict.words import amount, estimate
 
-SURE_SIGMAS = 2.0  # by which a clearance that is seen must be beyond its limit
+CONFIRMED_CYCLES = 20  # gait cycles of a new part; another leg is told in fewer
 CLOSE_ODDS = 3.0  # log odds below which the runner-up is named as well: 20 to 1
 
 _UNITS = {
@@ -34,7 +37,6 @@ _NAMES = {
     Cause.LENGTH: "length",
     Cause.UNKNOWN: "unknown_change",
 }
-_SOURCES = {"encoders": "the joint encoders", "torque": "the drive torque"}
 _COMPARED = {Cause.MASS: ("lighter", "heavier"), Cause.LENGTH: ("shorter", "longer")}
 
 
@@ -55,24 +57,64 @@ def believed_at_limit(situation: Situation) -> Sequence[Hit]:
     ]
 
 
+def counted_at_limit(situation: Situation) -> Sequence[Hit]:
+    """Alarms of clearances that are at their limit as counted or as measured."""
+    alarms = (alarm for alarm in situation.alarms if alarm.kind == "clearance" and alarm.cause not in SEEN)
+    return [hit_of(alarm, situation) for alarm in alarms if alarm.level is Level.ERROR]
+
+
 def seen_at_limit(situation: Situation) -> Sequence[Hit]:
-    """Joints whose clearance is surely at its limit by what encoders or the drive torque show."""
+    """Joints whose clearance is surely at its limit by what encoders or the drive torque show, or showed.
+
+    What they showed stays until somebody acknowledges it, or a measurement contradicts it.
+    """
+    found = ((each, situation.alarm_of(each.joint)) for each in situation.joints)
+    estimates = ((each, alarm, at_limit_by_estimate(each, alarm)) for each, alarm in found)
+    return [_seen_hit(each, alarm, seen, situation) for each, alarm, seen in estimates if seen is not None]
+
+
+def _seen_hit(each: JointSituation, alarm: Alarm | None, seen: SeenClearance, situation: Situation) -> Hit:
+    raised_ns = alarm.raised_ns if alarm is not None and alarm.level is Level.ERROR else 0
+    is_present = seen in each.seen
+    past = "" if is_present else f" (since {time_words(raised_ns)}; not shown now)"
+    if each.measured is not None:
+        past += f"; {estimate(each.measured.clearance_m, each.measured.sigma_m, 'm')} was measured"
+    return Hit(
+        words={
+            "joint": situation.joint_words(each.joint),
+            "by": SOURCES[seen.by],
+            "value": estimate(seen.clearance_m, seen.sigma_m, "m"),
+            "limit": amount(each.limit_m, "m"),
+            "past": past,
+            "doubt": _doubt(situation) if seen.by == "torque" and is_present else "",
+        },
+        joint=each.joint,
+        since_ns=raised_ns,
+        evidence=(Evidence(f"clearance {each.joint} by {seen.by}", seen.clearance_m, each.limit_m, "m"),),
+    )
+
+
+def replaced(situation: Situation) -> Sequence[Hit]:
+    """Joints whose part is so new that no gait cycles confirm the repair yet."""
     return [
         Hit(
             words={
                 "joint": situation.joint_words(each.joint),
-                "by": _SOURCES[seen.by],
-                "value": estimate(seen.clearance_m, seen.sigma_m, "m"),
-                "limit": amount(each.limit_m, "m"),
-                "doubt": _doubt(situation) if seen.by == "torque" else "",
+                "when": time_words(each.replaced_ns),
+                "cycles": str(each.part_cycles),
             },
             joint=each.joint,
-            evidence=(Evidence(f"clearance {each.joint} by {seen.by}", seen.clearance_m, each.limit_m, "m"),),
         )
         for each in situation.joints
-        for seen in each.seen
-        if seen.clearance_m - SURE_SIGMAS * seen.sigma_m >= each.limit_m
+        if each.replaced_ns and each.part_cycles < CONFIRMED_CYCLES and not _is_confirmed(each, situation)
     ]
+
+
+def _is_confirmed(each: JointSituation, situation: Situation) -> bool:
+    """Whether encoders or the drive torque show the counted clearance of a new part already."""
+    found = situation.diagnosis
+    is_as_counted = found is not None and found.state is DiagnosisState.AS_COUNTED
+    return bool(each.seen) and (is_as_counted or each.is_used)
 
 
 def departing(situation: Situation) -> Sequence[Hit]:
@@ -150,6 +192,10 @@ def _doubt(situation: Situation) -> str:
 
 def _hit(change: Change, situation: Situation, doubt: str = "") -> Hit:
     is_joint = change.cause is Cause.CLEARANCE
+    own = (each.measured for each in situation.joints if is_joint and each.joint == change.subject)
+    measured = next(own, None)
+    if measured is not None:
+        doubt += f"; {estimate(measured.clearance_m, measured.sigma_m, 'm')} was measured"
     name = f"clearance {change.subject} by torque" if is_joint else _NAMES[change.cause]
     return Hit(
         words={"change": f"{words_of(change, situation)}{doubt}"},

@@ -14,14 +14,18 @@ from leg_wear_monitor.monitor.verdict.rule import EVERYTHING, OF_THE_GAIT, OF_TH
 from leg_wear_monitor.monitor.verdict.situation import Situation
 from leg_wear_monitor.monitor.verdict.verdict import NO_GAIT_CYCLE, NONE, Figure, Finding, State
 
-_ACKNOWLEDGE = "then acknowledge the alarms"
+_ACKNOWLEDGE = "then acknowledge the alarms: leg-wear-monitor acknowledge --ledger FILE, or --node NAME"
 _ROCK = (
     "stop when it is safe, block the drive and rock joint {joints}; measure its radial clearance and enter "
     "it: leg-wear-monitor measure {joint} MM --sigma MM"
 )
+_ENTER_PART = (
+    "replace the parts of joint {joints}, and enter that: leg-wear-monitor reset {joint} --ledger FILE, or "
+    "--node NAME while a monitor runs"
+)
 _REPLACE = (
-    "take the leg out of service and replace the parts of joint {joints}; then call ~/reset_wear/{joint}, "
-    "or without a running monitor: leg-wear-monitor reset {joint} --ledger FILE"
+    "stop when it is safe, block the drive, and measure joint {joints}: leg-wear-monitor measure {joint} MM "
+    f"--sigma MM; if the joint is at its limit, {_ENTER_PART}"
 )
 _TORQUE_INPUT = (
     "check the torque sensor (zero, scale, time stamps) and the parameters of drive_torque and crank"
@@ -44,7 +48,7 @@ RULES = (
     Rule(
         code="CLEARANCE",
         state=State.STOP,
-        hits=raised("clearance", least=Level.ERROR),
+        hits=clearance_rules.counted_at_limit,
         why="the {known} clearance of joint {joint} is {value} (limit {limit}){past}",
         do=_REPLACE,
     ),
@@ -52,7 +56,7 @@ RULES = (
         code="CLEARANCE_SEEN",
         state=State.STOP,
         hits=clearance_rules.seen_at_limit,
-        why="according to {by}, the clearance of joint {joint} is {value} (limit {limit}){doubt}",
+        why="according to {by}, the clearance of joint {joint} is {value} (limit {limit}){past}{doubt}",
         do=_REPLACE,
         not_valid=EVERYTHING,
     ),
@@ -208,6 +212,13 @@ RULES = (
         do="compare the material of the mechanism file with the part, and load and cadence with its limits; "
         f"until then, measure the clearance of joint {{joints}} regularly; {_ACKNOWLEDGE}",
         not_valid=(Figure.GROWTH, Figure.FORECAST),
+    ),
+    Rule(
+        code="PART_REPLACED",
+        state=State.WATCH,
+        hits=clearance_rules.replaced,
+        why="joint {joint} was replaced on {when}, {cycles} gait cycles ago",
+        do="confirm by walking: let the leg walk on at the commanded cadence, and see the verdict then",
     ),
     Rule(
         code="NO_DRIVE_TORQUE",

@@ -47,6 +47,10 @@ class JointSituation:
         Estimates from measurements, as far as there are any.
     is_used : bool
         Whether the forecast rests on what encoders show of this joint.
+    is_measurement_used : bool
+        Whether it rests on `measured`; not on one that contradicts the model.
+    replaced_ns, part_cycles : int
+        When its part was replaced, 0 if it never was, and the gait cycles of this part.
     load : BushingLoad or None
         That of the last gait cycle; None before it.
     """
@@ -58,6 +62,9 @@ class JointSituation:
     measured: SeenClearance | None = None
     seen: tuple[SeenClearance, ...] = ()
     is_used: bool = False
+    is_measurement_used: bool = False
+    replaced_ns: int = 0
+    part_cycles: int = 0
     label: str = ""
     load: BushingLoad | None = None
 
@@ -130,6 +137,11 @@ class Situation:
         """A joint with its label, such as ``G (knee)``."""
         label = next((each.label for each in self.joints if each.joint == joint), "")
         return f"{joint} ({label})" if label else joint
+
+    def alarm_of(self, joint: str) -> Alarm | None:
+        """The alarm of a joint's clearance; None if it is not listed."""
+        own = (each for each in self.alarms if each.kind == "clearance" and each.subject == joint)
+        return next(own, None)
 
     def quantity(self, alarm: Alarm) -> str:
         """Noun of an alarm's value; its name where there is none."""

@@ -47,6 +47,11 @@ class Figure(_Word):
     IMPACT_FORCES = "impact_forces"
     FORECAST = "forecast"
 
+    @property
+    def words(self) -> str:
+        """What operators read: a clearance by torque, by encoders or by hand is not meant."""
+        return "counted clearances" if self is Figure.CLEARANCES else super().words
+
 
 def _known(value: float | None) -> float | None:
     return None if value is None or not math.isfinite(value) else value

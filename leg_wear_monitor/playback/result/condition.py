@@ -27,6 +27,13 @@ class JointClearance:
         Clearance that somebody measured last on this part.
     measured_sigma_m : float or None
         Its standard deviation.
+    believed_m : float or None
+        The clearance that the verdict rests on; None where nothing known of the joint is valid.
+    believed_sigma_m : float or None
+        Its standard deviation.
+    believed_by : str or None
+        Whose it is: ``counted``, ``torque``, ``encoders``, ``measured``, or ``both`` for what counting and
+        measurements give together.
     """
 
     counted_m: float
@@ -37,6 +44,9 @@ class JointClearance:
     limit_m: float
     measured_m: float | None = None
     measured_sigma_m: float | None = None
+    believed_m: float | None = None
+    believed_sigma_m: float | None = None
+    believed_by: str | None = None
 
 
 @attrs.frozen(kw_only=True)

@@ -26,6 +26,11 @@ def _perhaps() -> Any:
     return attrs.field(converter=_known)
 
 
+def _perhaps_none() -> Any:
+    """The same for a number that files of older versions do not have."""
+    return attrs.field(default=None, converter=_known)
+
+
 @attrs.frozen
 class ClearanceChange:
     """Radial clearance of a joint, as counted [m].
@@ -102,6 +107,13 @@ class ReplayJoint:
         file of an older version.
     sampling_sigma_m : float
         Standard deviation of the mean clearance, because sampled replays did not follow all gait cycles.
+    believed_m : float or None
+        The clearance that the verdict rests on, at the end, as in ``clearances``; None where nothing known
+        of the joint is valid.
+    believed_sigma_m : float or None
+        Its standard deviation.
+    believed_by : str or None
+        Whose it is, such as ``counted`` or ``torque``.
     """
 
     clearance_m: ClearanceChange
@@ -115,6 +127,9 @@ class ReplayJoint:
     impacts: int
     load: BushingLoad | None = None
     sampling_sigma_m: float = 0.0
+    believed_m: float | None = _perhaps_none()
+    believed_sigma_m: float | None = _perhaps_none()
+    believed_by: str | None = None
 
 
 @attrs.frozen(kw_only=True)

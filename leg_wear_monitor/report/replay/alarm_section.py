@@ -36,7 +36,7 @@ def change_section(summary: ReplaySummary) -> Section:
 
 def _row(summary: ReplaySummary, change: AlarmChange) -> tuple[str, ...]:
     alarm = change.alarm
-    is_valid = not alarm_doubt(summary.verdict, alarm)
+    is_valid = not alarm_doubt(summary, alarm)
     return (
         f"{(change.stamp_ns - summary.recording.begin_ns) / 1.0e9:.2f}",
         alarm.name,

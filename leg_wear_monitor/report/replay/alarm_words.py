@@ -5,7 +5,8 @@ import attrs
 from leg_wear_monitor.monitor.alarms.alarm import Level
 from leg_wear_monitor.monitor.alarms.words import raised_words
 from leg_wear_monitor.monitor.verdict.alarm_rules import OF_A_JOINT
-from leg_wear_monitor.monitor.verdict.verdict import Figure, Verdict
+from leg_wear_monitor.monitor.verdict.belief import COUNTED
+from leg_wear_monitor.monitor.verdict.verdict import Figure
 from leg_wear_monitor.playback.result.parts import ReplayAlarm
 from leg_wear_monitor.playback.result.replay_summary import ReplaySummary
 from leg_wear_monitor.report.replay.words import not_valid, since_words
@@ -52,7 +53,7 @@ def alarm_line(summary: ReplaySummary, alarm: ReplayAlarm) -> AlarmLine:
     symbol, look = LOOKS[alarm.level]
     kind, _, subject = alarm.name.partition(" ")
     name = f"{kind} {summary.leg.joint_words(subject)}" if kind in OF_A_JOINT else alarm.name
-    doubt = alarm_doubt(summary.verdict, alarm)
+    doubt = alarm_doubt(summary, alarm)
     words = raised_words(alarm.state, alarm.worst, alarm.limit, alarm.unit, alarm.raised_ns)
     return AlarmLine(
         symbol=symbol,
@@ -66,7 +67,10 @@ def alarm_line(summary: ReplaySummary, alarm: ReplayAlarm) -> AlarmLine:
     )
 
 
-def alarm_doubt(verdict: Verdict, alarm: ReplayAlarm) -> str:
-    """Why the value of an alarm does not hold; empty if it does."""
-    figure = _FIGURES.get(alarm.name.partition(" ")[0])
-    return not_valid(verdict, figure) if figure else ""
+def alarm_doubt(summary: ReplaySummary, alarm: ReplayAlarm) -> str:
+    """Why the value of an alarm does not hold; empty if it does: that of an estimate does."""
+    kind, _, subject = alarm.name.partition(" ")
+    figure, clearance = _FIGURES.get(kind), summary.clearances.get(subject)
+    if figure is Figure.CLEARANCES and clearance and clearance.believed_by not in (None, COUNTED):
+        return ""
+    return not_valid(summary.verdict, figure) if figure else ""

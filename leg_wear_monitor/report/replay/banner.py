@@ -14,11 +14,18 @@ LOOKS = {
 }
 
 
-def verdict_banner(summary: ReplaySummary) -> Banner:
-    """State as symbol and word, joints, reason, action, code, begin, and the values that are not valid."""
+def verdict_banner(summary: ReplaySummary, guide: str) -> Banner:
+    """State as symbol and word, joints, reason, action, code, begin, and the values that are not valid.
+
+    Parameters
+    ----------
+    summary : ReplaySummary
+    guide : str
+        Address of the verdict's guide.
+    """
     verdict = summary.verdict
     symbol, severity = LOOKS[verdict.state]
-    notes = [("Do", verdict.do), ("Code", f"{verdict.fault_code}, see {verdict.guide}")]
+    notes = [("Do", verdict.do), ("Code", verdict.fault_code)]
     if verdict.since_ns:
         notes.append(("Since", since_words(summary, verdict.since_ns)))
     if verdict.not_valid:
@@ -31,4 +38,5 @@ def verdict_banner(summary: ReplaySummary) -> Banner:
         text=verdict.why,
         notes=notes,
         severity=severity,
+        guide=guide,
     )

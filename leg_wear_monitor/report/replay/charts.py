@@ -37,6 +37,32 @@ def openings_chart(summary: ReplaySummary) -> Chart:
     )
 
 
+def has_estimates(summary: ReplaySummary) -> bool:
+    """Whether encoders or the drive torque have shown a clearance at any time."""
+    return any(np.isfinite(values).any() for values in summary.history.seen_m.values())
+
+
+def estimates_chart(summary: ReplaySummary) -> Chart:
+    """Clearances that encoders or the drive torque show, with their limit."""
+    limits = [each.limit_m for each in summary.clearances.values()]
+    series = [
+        Series(name=f"clearance {joint}", unit="mm", values=1.0e3 * values, colour=_colour(k))
+        for k, (joint, values) in enumerate(summary.history.seen_m.items())
+    ]
+    if limits:
+        series.append(_limit("limit", "mm", 1.0e3 * min(limits), series[0].values))
+    return Chart(
+        name="estimates",
+        alt="Clearances that encoders or the drive torque show, over time",
+        caption="Mean radial clearance of each joint as encoders or the drive torque show it, whatever is "
+        "counted; nothing is drawn while they show none.",
+        x=_time(summary),
+        ends=_ends(summary),
+        panels=[Panel(title="Clearances by estimate", series=series, low=0.0, height=260)],
+        group=_GROUP,
+    )
+
+
 def force_chart(summary: ReplaySummary) -> Chart:
     """Peak and mean contact force of each joint in each gait cycle, a panel a joint, all on the same axis."""
     history, limits = summary.history, summary.monitor.limits

@@ -4,7 +4,7 @@ from leg_wear_monitor.monitor.verdict.verdict import Figure
 from leg_wear_monitor.playback.result.replay_summary import ReplaySummary
 from leg_wear_monitor.report.page import Section
 from leg_wear_monitor.report.parts import Table, Text
-from leg_wear_monitor.report.replay.charts import openings_chart
+from leg_wear_monitor.report.replay.charts import estimates_chart, has_estimates, openings_chart
 from leg_wear_monitor.report.replay.joint_view import counted_mm
 from leg_wear_monitor.report.replay.words import NOT_VALID, not_valid, value
 
@@ -12,11 +12,13 @@ _TITLE = "Clearance over time"
 
 
 def clearance_section(summary: ReplaySummary) -> Section:
-    """Counted clearances."""
+    """Clearances by estimate, and the counted ones where they are valid."""
     doubt = not_valid(summary.verdict, Figure.CLEARANCES)
+    seen = [estimates_chart(summary)] if has_estimates(summary) else []
     if doubt:
-        return Section(_TITLE, [Text(doubt, is_not_valid=True)], is_folded=True)
-    return Section(_TITLE, [openings_chart(summary), _table(summary)], is_folded=True)
+        text = Text(f"Counted clearances: {doubt}.", is_not_valid=True)
+        return Section(_TITLE, [*seen, text], is_folded=True)
+    return Section(_TITLE, [openings_chart(summary), *seen, _table(summary)], is_folded=True)
 
 
 def _table(summary: ReplaySummary) -> Table:

@@ -128,15 +128,21 @@ def _span(low: float, high: float, most: float) -> Span:
 
 def _clearance_words(view: JointView) -> list[tuple[str, str]]:
     """What is counted and what is seen, each with the class of its words."""
-    counted = ("not-valid", view.doubt) if view.doubt else ("", f"counted {view.counted_words} mm")
+    counted = (
+        ("not-valid", f"counted {view.doubt}") if view.doubt else ("", f"counted {view.counted_words} mm")
+    )
     if view.clearance is None:
         return [counted]
     seen = []
     if view.seen_m is not None:
-        by = " and ".join(view.clearance.seen_by)
         sigma = 1.0e3 * (view.seen_sigma_m or 0.0)
         digits = 2 if sigma >= 0.1 else 3
-        seen.append(("", f"measured {1.0e3 * view.seen_m:.{digits}f} ± {sigma:.{digits}f} mm by {by}"))
+        seen.append(
+            ("", f"estimated {1.0e3 * view.seen_m:.{digits}f} ± {sigma:.{digits}f} mm by {view.seen_by}")
+        )
+    if view.clearance.measured_m is not None:
+        sigma = 1.0e3 * (view.clearance.measured_sigma_m or 0.0)
+        seen.append(("", f"measured {1.0e3 * view.clearance.measured_m:.3f} ± {sigma:.3f} mm by hand"))
     limit = ("", f"limit {1.0e3 * view.clearance.limit_m:.3g} mm")
     return [*seen, counted, limit] if view.doubt else [counted, *seen, limit]
 
@@ -169,7 +175,7 @@ def _note(views: Sequence[JointView], most_m: float, life: tuple[int, int] | Non
         return ""
     notes = [
         f"Clearances are radial, all bars from 0 to {1.0e3 * most_m:.3g} mm: blue bar counted, mark the "
-        "measurement with two standard deviations, red line limit.",
+        "estimate with two standard deviations, red line limit.",
     ]
     if life:
         notes.append(

@@ -5,6 +5,7 @@ import attrs
 from leg_wear_monitor.monitor.alarms.alarm import Level
 from leg_wear_monitor.monitor.forecast.words import clearance_mm
 from leg_wear_monitor.monitor.verdict.alarm_rules import OF_A_JOINT
+from leg_wear_monitor.monitor.verdict.belief import SEEN, SOURCES
 from leg_wear_monitor.monitor.verdict.verdict import Figure, State
 from leg_wear_monitor.playback.result.condition import JointClearance, LifeHours
 from leg_wear_monitor.playback.result.parts import ReplayAlarm
@@ -24,8 +25,14 @@ class JointView:
         Name, and what people call it; that may be empty.
     clearance : JointClearance or None
         None if it is not known.
-    counted_m, seen_m, seen_sigma_m : float or None
-        Those of `clearance` that are believed.
+    counted_m : float or None
+        As counted; None while that is not valid.
+    seen_m, seen_sigma_m : float or None
+        What encoders or the drive torque show, or showed when its latched alarm was raised.
+    seen_by : str
+        Which of them.
+    shown_m : float or None
+        The clearance that the verdict rests on.
     counted_words : str
         The counted clearance [mm] in the digits that are known of it.
     doubt : str
@@ -49,6 +56,8 @@ class JointView:
     counted_m: float | None
     seen_m: float | None
     seen_sigma_m: float | None
+    seen_by: str
+    shown_m: float | None
     counted_words: str
     doubt: str
     used: float | None
@@ -57,11 +66,6 @@ class JointView:
     life_words: str
     life_doubt: bool
     alarms: tuple[ReplayAlarm, ...]
-
-    @property
-    def shown_m(self) -> float | None:
-        """The clearance that is believed: the counted one, else the one that is seen."""
-        return self.seen_m if self.counted_m is None else self.counted_m
 
 
 def joint_views(summary: ReplaySummary) -> tuple[JointView, ...]:
@@ -72,8 +76,10 @@ def joint_views(summary: ReplaySummary) -> tuple[JointView, ...]:
 def _view(summary: ReplaySummary, joint: str) -> JointView:
     clearance, doubt = summary.clearances.get(joint), not_valid(summary.verdict, Figure.CLEARANCES)
     counted = clearance.counted_m if clearance and not doubt else None
-    seen = clearance if clearance and _is_seen(summary, joint, clearance) else None
-    shown = counted if counted is not None else seen.seen_m if seen else None
+    seen_m, seen_sigma_m, seen_by = _seen(clearance) if clearance else (None, None, "")
+    shown = clearance.believed_m if clearance else None
+    if shown is None:  # a file of an older version
+        shown = seen_m if counted is None else counted
     used = _used(clearance, shown) if clearance and shown is not None else None
     if summary.verdict.state is State.NOT_MONITORED and (used or 0.0) < 1.0:
         used = None  # a joint that nobody watches is not shown as one that is all right
@@ -84,12 +90,14 @@ def _view(summary: ReplaySummary, joint: str) -> JointView:
         label=drawn.label if drawn else "",
         clearance=clearance,
         counted_m=counted,
-        seen_m=seen.seen_m if seen else None,
-        seen_sigma_m=seen.seen_sigma_m if seen else None,
+        seen_m=seen_m,
+        seen_sigma_m=seen_sigma_m,
+        seen_by=seen_by,
+        shown_m=shown,
         counted_words="" if counted is None else counted_mm(summary, joint),
         doubt=doubt or ("" if clearance else "not known: no gait cycle of this leg"),
         used=used,
-        look=_look(summary, clearance, shown, used),
+        look=_look(summary, joint, clearance, shown, used),
         life=None if life_doubt else life,
         life_words=life_doubt or ("" if life else _answer(summary, joint)),
         life_doubt=bool(life_doubt),
@@ -109,16 +117,15 @@ def counted_mm(summary: ReplaySummary, joint: str) -> str:
     return clearance_mm(counted, may_be.p10, may_be.p90)
 
 
-def _is_seen(summary: ReplaySummary, joint: str, clearance: JointClearance) -> bool:
-    """Whether the seen clearance is believed.
+def _seen(clearance: JointClearance) -> tuple[float | None, float | None, str]:
+    """What encoders or the drive torque show, its standard deviation, and which of them; or what they showed.
 
-    While the leg is not the counted one, the torque names a joint rightly and estimates the others from the
-    counted leg (docs/explanation/diagnosis.md); encoders do not suppose the counted clearances.
+    An estimate by torque does not rest on the counted clearance, so it is shown while that is not valid.
     """
-    if clearance.seen_m is None or clearance.seen_sigma_m is None:
-        return False
-    is_counted_leg = Figure.CLEARANCES not in summary.verdict.not_valid
-    return is_counted_leg or joint in summary.verdict.joints or "encoders" in clearance.seen_by
+    if clearance.believed_by in SEEN:
+        return clearance.believed_m, clearance.believed_sigma_m, SOURCES[str(clearance.believed_by)]
+    by = " and ".join(SOURCES.get(one, one) for one in clearance.seen_by)
+    return clearance.seen_m, clearance.seen_sigma_m, by
 
 
 def _used(clearance: JointClearance, shown_m: float) -> float:
@@ -129,12 +136,20 @@ def _used(clearance: JointClearance, shown_m: float) -> float:
 
 
 def _look(
-    summary: ReplaySummary, clearance: JointClearance | None, shown_m: float | None, used: float | None
+    summary: ReplaySummary,
+    joint: str,
+    clearance: JointClearance | None,
+    shown_m: float | None,
+    used: float | None,
 ) -> str:
+    """Look of a joint: as the verdict says, where it names the joint."""
     if clearance is None or shown_m is None or used is None:
         return "unknown"
-    if used >= 1.0:
+    is_named = joint in summary.verdict.joints
+    if used >= 1.0 or (is_named and summary.verdict.state is State.STOP):
         return "over"
+    if is_named and summary.verdict.state is State.INSPECT:
+        return "near"
     is_warning = shown_m >= summary.monitor.limits.warn_fraction * clearance.limit_m > clearance.new_m
     return "near" if used >= _NEAR or is_warning else "fine"
 

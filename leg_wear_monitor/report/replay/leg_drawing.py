@@ -113,6 +113,8 @@ def _words(view: JointView) -> str:
         return "not monitored"
     if view.used >= 1.0:
         return f"{1.0e3 * view.shown_m:.3g} mm, limit {1.0e3 * view.clearance.limit_m:.3g} mm"
+    if view.look == "over":  # the verdict says so, and is newer than the joint's last report
+        return "at its limit, see the verdict"
     return f"{100.0 * view.used:.0f} % used"
 
 

@@ -21,6 +21,7 @@ from leg_wear_monitor.report.replay.joint_view import joint_views
 from leg_wear_monitor.report.replay.leg_drawing import leg_drawing
 from leg_wear_monitor.report.replay.wear_section import wear_section
 from leg_wear_monitor.report.replay.words import duration
+from leg_wear_monitor.share import share_directory
 
 
 def replay_page(summary: ReplaySummary) -> Page:
@@ -38,7 +39,7 @@ def replay_page(summary: ReplaySummary) -> Page:
         f"{time_words(recording.begin_ns)}, {summary.cycles} gait cycles",
         sections=sections,
         versions=summary.made_with,
-        banner=verdict_banner(summary),
+        banner=verdict_banner(summary, (share_directory() / summary.verdict.guide).as_uri()),
         styles=[template_text("uplot/uPlot.min.css"), template_text("replay/replay.css")],
         libraries=[template_text("uplot/uPlot.iife.min.js"), template_text("replay/charts.js")],
         has_dark=True,

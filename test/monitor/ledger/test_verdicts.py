@@ -86,8 +86,8 @@ def rows(path):
         return [dict(row) for row in db.execute("SELECT * FROM verdict")]
 
 
-class WithoutSampling:
-    """A database whose table of joints has no variance by sampled replays yet."""
+class OfFormat4:
+    """A database whose joints have no variance by sampled replays yet, and whose alarms have no cause."""
 
     def __init__(self, db):
         self.execute, self._executemany = db.execute, db.executemany
@@ -95,6 +95,8 @@ class WithoutSampling:
     def executemany(self, sql, rows):
         if "INTO joint" in sql:
             sql, rows = "INSERT INTO joint VALUES (?, ?, ?, ?, ?, ?)", [row[:6] for row in rows]
+        if "INTO alarm " in sql:
+            sql, rows = "INSERT INTO alarm VALUES (?, ?, ?, ?, ?, ?, ?, ?)", [row[:8] for row in rows]
         return self._executemany(sql, rows)
 
 
@@ -108,7 +110,7 @@ def in_format_4(monkeypatch):
         for later in LATER:
             then.setattr(ledger, later, lambda _: None)
         for module in (store, recovery):
-            then.setattr(module, "write_entry", lambda db, *given: write_entry(WithoutSampling(db), *given))
+            then.setattr(module, "write_entry", lambda db, *given: write_entry(OfFormat4(db), *given))
         schema.expected_definitions.cache_clear()
         yield then
     schema.expected_definitions.cache_clear()
@@ -136,7 +138,7 @@ def test_a_ledger_of_format_4_is_migrated_with_the_entries_of_its_log(
     found.note(EVENT)
     found.keep(entry_at(6), closed=True)
     found.close()
-    assert version(ledger.path) == schema.FORMAT == 9
+    assert version(ledger.path) == schema.FORMAT == 10
     assert len(rows(ledger.path)) == 1
     assert open_ledger().entry.digest() == entry_at(6).digest()
 

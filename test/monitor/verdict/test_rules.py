@@ -75,6 +75,8 @@ CASES = [
     ({"alarms": (alarm("clearance G", Level.WARN),)}, State.WATCH, "ALARM_G", ()),
     ({"alarms": (alarm("clearance A"), alarm("clearance G"))}, State.STOP, "CLEARANCE_A_G", ()),
     ({"joints": seen("torque", 6.7e-4, 3.0e-5)}, State.STOP, "CLEARANCE_SEEN_G", tuple(Figure)),
+    ({"joints": (attrs.evolve(NEW[0], replaced_ns=1, part_cycles=19),)}, State.WATCH, "PART_REPLACED_A", ()),
+    ({"joints": (attrs.evolve(NEW[0], replaced_ns=1, part_cycles=20),)}, State.HEALTHY, "NONE", ()),
     ({"joints": seen("encoders", 6.2e-4, 3.0e-5)}, State.HEALTHY, "NONE", ()),  # not surely
     ({"joints": (NEW[0], attrs.evolve(NEW[1], believed_m=6.1e-4))}, State.STOP, "CLEARANCE_BELIEVED_G", ()),
     (

@@ -54,7 +54,8 @@ def test_json_has_a_version_and_null_for_what_is_not_known(summary):
     assert record["alarms"]["now"][0]["level"] == "WARN" and record["alarms"]["now"][0]["worst"] is None
     assert record["status"][0]["values"] == {"cadence_rpm": None}
     assert record["history"]["cycle"] == [1.0, None]
-    assert list(record["history"]) == ["stamp_ns", *CYCLE_COLUMNS, *JOINT_COLUMNS, "lowest", "highest"]
+    columns = ["stamp_ns", *CYCLE_COLUMNS, *JOINT_COLUMNS, "seen_m", "lowest", "highest"]
+    assert list(record["history"]) == columns
 
 
 @pytest.mark.parametrize(

@@ -58,7 +58,10 @@ def test_a_counted_clearance_that_is_not_believed_is_no_number():
     ((table,),) = (section.parts for section in encoder_sections(summary))
     assert [row[1] for row in table.rows] == ["not valid"]
     (told,) = clearance_section(summary).parts
-    assert (told.text, told.is_not_valid) == ("not valid: leg differs from its model", True)
+    assert (told.text, told.is_not_valid) == (
+        "Counted clearances: not valid: leg differs from its model.",
+        True,
+    )
 
 
 def test_growth_alone_may_not_be_valid():

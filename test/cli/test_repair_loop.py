@@ -1,0 +1,123 @@
+"""From the verdict to the repair on the command line, with the recordings that come with the package."""
+
+import json
+import shutil
+import sqlite3
+from contextlib import closing
+
+import pytest
+
+from leg_wear_monitor.share import share_directory
+
+BAGS = share_directory() / "bags"
+
+
+@pytest.fixture(scope="module")
+def knocked(tmp_path_factory):
+    """Ledger and summary of a leg whose bushing G has broken."""
+    from click.testing import CliRunner
+
+    from leg_wear_monitor.cli.main import cli
+
+    place = tmp_path_factory.mktemp("knocked")
+    arguments = ["replay", str(BAGS / "knocking.mcap"), "--config", str(BAGS / "knocking.yaml")]
+    arguments += ["--ledger", str(place / "wear.ledger"), "--out", str(place / "out")]
+    result = CliRunner().invoke(cli, arguments)
+    assert result.exit_code == 0, result.output
+    return place, result.output
+
+
+@pytest.fixture
+def ledger(knocked, tmp_path):
+    """A copy of that ledger, for a test to write into."""
+    return shutil.copy(knocked[0] / "wear.ledger", tmp_path / "wear.ledger")
+
+
+def test_verdict_status_json_and_terminal_tell_one_story_of_the_joint(knocked):
+    place, told = knocked
+    found = json.loads((place / "out" / "summary.json").read_text())
+    evidence = found["verdict"]["evidence"][0]
+    joint = found["clearances"]["G"]
+    assert (found["verdict"]["state"], found["verdict"]["joints"]) == ("stop", ["G"])
+    assert joint["believed_m"] == found["joints"]["G"]["believed_m"] == evidence["value"]
+    assert joint["believed_by"] == found["joints"]["G"]["believed_by"] == "torque"
+    assert joint["believed_m"] > joint["limit_m"] > joint["counted_m"]
+    (status,) = (each for each in found["status"] if each["name"] == "joint G")
+    assert (status["level"], status["fault_code"]) == ("ERROR", "CLEARANCE_SEEN_G")
+    assert status["values"]["believed_m"] == joint["believed_m"]
+    (row,) = (line for line in told.splitlines() if line.startswith("G (knee)"))
+    assert row.split()[2] == f"{1e3 * joint['believed_m']:.3f}"
+    alarm = next(each for each in found["alarms"]["now"] if each["name"] == "clearance G")
+    assert alarm["worst"] == joint["believed_m"]
+    others = [each for name, each in found["clearances"].items() if name != "G"]
+    assert all(abs(each["believed_m"] - 3e-4) < 3.0 * each["believed_sigma_m"] for each in others)
+    first, last = (next(v for v in line if v is not None) for line in _ends(found["history"]["seen_m"]["G"]))
+    assert last > 1.5e-3 > first
+
+
+def test_the_verdict_in_the_ledger_names_the_same_value(knocked):
+    place, _ = knocked
+    found = json.loads((place / "out" / "summary.json").read_text())
+    with closing(sqlite3.connect(place / "wear.ledger")) as db:
+        (why,) = db.execute("SELECT why FROM verdict ORDER BY id DESC LIMIT 1").fetchone()
+        (worst,) = db.execute("SELECT worst FROM alarm WHERE kind = 'clearance'").fetchone()
+    assert (why, worst) == (found["verdict"]["why"], found["clearances"]["G"]["believed_m"])
+
+
+def _ends(column):
+    return column, column[::-1]
+
+
+def test_the_page_of_the_stop_shows_the_estimates_and_links_the_guide(knocked):
+    page = (knocked[0] / "out" / "report.html").read_text()
+    assert "estimated 2.05 ± 0.65 mm by the drive torque" in page
+    assert page.count("mm by the drive torque") == 5  # all joints, not the broken one alone
+    assert "Clearances by estimate" in page
+    assert (share_directory() / "docs/howto/verdict/joint_at_limit.md").as_uri() in page
+
+
+def test_a_measurement_is_compared_with_what_the_torque_shows(run, ledger):
+    agrees = run("measure", "knee", "2.0", "--sigma", "0.05", "--ledger", ledger)
+    assert agrees.exit_code == 1  # it is at its limit
+    assert "this agrees with what the drive torque shows, 2.0" in agrees.stdout
+    assert "contradicts" not in agrees.stdout
+
+
+def test_after_the_repair_a_healthy_recording_is_not_to_be_inspected(run, ledger, tmp_path):
+    reset = run("reset", "knee", "--ledger", ledger)
+    assert "alarms cleared: clearance G, torque_mismatch; still present: none" in reset.stdout
+    config = tmp_path / "leg.yaml"
+    config.write_text((BAGS / "healthy.yaml").read_text().replace("healthy", "knocking"))
+    run("replay", str(BAGS / "healthy.mcap"), "--config", str(config), "--ledger", ledger, "--json", "s.json")
+    found = json.loads((tmp_path / "s.json").read_text())
+    assert found["verdict"]["state"] in ("watch", "healthy")
+    assert found["verdict"]["not_valid"] == []
+    assert not any(alarm["level"] != "OK" for alarm in found["alarms"]["now"])
+
+
+def test_acknowledged_alarms_clear_once_their_values_have_returned(run, ledger, tmp_path):
+    first = run("acknowledge", "--ledger", ledger)
+    assert (first.exit_code, first.stdout) == (
+        0,
+        "cleared: none; still present: clearance G, torque_mismatch\n",
+    )
+    config = tmp_path / "leg.yaml"
+    config.write_text((BAGS / "healthy.yaml").read_text().replace("healthy", "knocking"))
+    run("replay", str(BAGS / "healthy.mcap"), "--config", str(config), "--ledger", ledger, "--json", "s.json")
+    found = json.loads((tmp_path / "s.json").read_text())
+    assert not any(alarm["level"] != "OK" for alarm in found["alarms"]["now"])
+    assert run("acknowledge", "--ledger", ledger).stdout == "cleared: none; still present: none\n"
+
+
+def test_a_dry_run_acknowledges_nothing(run, ledger, tmp_path):
+    before = (tmp_path / "wear.ledger").read_bytes()
+    told = run("acknowledge", "--ledger", ledger, "--dry-run").stdout
+    assert told.splitlines()[-1] == "dry run: nothing was written"
+    assert (tmp_path / "wear.ledger").read_bytes() == before
+
+
+@pytest.mark.parametrize("verb", [("acknowledge",), ("reset", "G")])
+def test_a_running_monitor_has_its_own_ledger(run, ledger, verb):
+    result = run(*verb, "--node", "/leg_wear_monitor", "--ledger", ledger)
+    assert result.exit_code == 2
+    assert "--node cannot be combined with" in result.stderr

@@ -1,0 +1,127 @@
+"""The believed clearance: one number a joint, and the alarm that keeps what an estimate showed."""
+
+import math
+
+import attrs
+import pytest
+from hypothesis import given
+from hypothesis import strategies as st
+
+from leg_wear_monitor.monitor.alarms.alarm import Alarm, Level, Limit, acknowledged, evaluated
+from leg_wear_monitor.monitor.verdict.belief import alarm_value, at_limit_by_estimate, believed
+from leg_wear_monitor.monitor.verdict.rules import findings
+from leg_wear_monitor.monitor.verdict.situation import JointSituation, SeenClearance, Situation
+from leg_wear_monitor.monitor.verdict.verdict import Figure, State, verdict_of
+
+LIMIT_M = 6.0e-4
+LIMIT = Limit(0.8 * LIMIT_M, LIMIT_M, 0.05, 3)
+COUNTED = JointSituation(joint="G", counted_m=3.0e-4, limit_m=LIMIT_M, label="knee")
+NEW = Alarm(kind="clearance", subject="G", unit="m")
+BROKEN = SeenClearance("torque", 2.05e-3, 0.65e-3)
+
+
+def after(alarm: Alarm, *seen: SeenClearance, joint: JointSituation = COUNTED) -> Alarm:
+    """The alarm after a period in which the torque or encoders show something."""
+    known = alarm_value(attrs.evolve(joint, seen=seen), alarm)
+    if known is None:
+        return alarm
+    return evaluated(alarm, known.clearance_m, LIMIT, 1, 3, known.sigma_m, known.by)
+
+
+def verdict(alarm: Alarm, *seen: SeenClearance, joint: JointSituation = COUNTED):
+    joints = (attrs.evolve(joint, seen=seen),)
+    return verdict_of(findings(Situation(joints=joints, alarms=(alarm,))))
+
+
+def test_a_stop_stays_while_the_estimate_comes_and_goes() -> None:
+    """A break-out went stop, inspect, stop, inspect, stop: 2.05, 1.43, 2.1 mm, and unsure ones between."""
+    alarm, states = NEW, []
+    estimates = (
+        BROKEN,
+        None,
+        SeenClearance("torque", 1.43e-3, 0.6e-3),
+        None,
+        SeenClearance("torque", 2.1e-3, 0.2e-3),
+    )
+    for seen in estimates:
+        shown = () if seen is None else (seen,)
+        alarm = after(alarm, *shown)
+        states.append(verdict(alarm, *shown).state)
+    assert states == [State.STOP] * 5
+    last = verdict(alarm)
+    assert (last.fault_code, last.joints) == ("CLEARANCE_SEEN_G", ("G",))
+    assert "the drive torque" in last.why and "2.1 mm ± 0.2 mm" in last.why
+
+
+def test_what_the_alarm_keeps_is_what_was_known_when_the_estimate_was_last_sure() -> None:
+    alarm = after(after(NEW, BROKEN))
+    assert (alarm.level, alarm.present) == (Level.ERROR, Level.OK)
+    assert (alarm.worst, alarm.sigma, alarm.cause) == (2.05e-3, 0.65e-3, "torque")
+    now = acknowledged(alarm)
+    assert (now.level, now.cause, math.isnan(now.worst), math.isnan(now.sigma)) == (Level.OK, "", True, True)
+    assert verdict(now).state is State.HEALTHY
+
+
+@pytest.mark.parametrize("by", ["torque", "encoders"])
+def test_an_estimate_that_is_not_surely_beyond_raises_nothing(by: str) -> None:
+    unsure = SeenClearance(by, 9.0e-4, 2.0e-4)  # 1.5 sigma
+    assert after(NEW, unsure) is NEW
+    assert verdict(NEW, unsure).state is State.HEALTHY
+
+
+def test_a_measurement_that_contradicts_ends_the_stop_until_the_estimate_rises_anew() -> None:
+    measured = attrs.evolve(COUNTED, measured=SeenClearance("measurement", 3.1e-4, 1.0e-5))
+    raised = after(NEW, BROKEN)
+    assert verdict(raised, BROKEN, joint=measured).state is State.STOP  # measured long before
+    overruled = acknowledged(raised)
+    assert (overruled.level, overruled.acknowledged) == (Level.ERROR, True)
+    assert verdict(overruled, BROKEN, joint=measured).state is not State.STOP
+    again = after(overruled, BROKEN, joint=measured)
+    assert again.acknowledged  # the same estimate, and a start of the monitor without any, change nothing
+    assert after(again, joint=measured) is again
+    returned = after(again, SeenClearance("torque", 3.2e-4, 2.0e-5), joint=measured)
+    assert returned.level is Level.OK
+    assert verdict(after(returned, BROKEN, joint=measured), BROKEN, joint=measured).state is State.STOP
+
+
+def test_a_measurement_at_the_limit_ends_no_stop() -> None:
+    measured = attrs.evolve(COUNTED, measured=SeenClearance("measurement", 5.9e-4, 1.0e-5))
+    assert verdict(acknowledged(after(NEW, BROKEN)), BROKEN, joint=measured).state is State.STOP
+
+
+def test_an_estimate_is_believed_although_the_counted_clearance_is_not_valid() -> None:
+    other = attrs.evolve(COUNTED, joint="A", seen=(SeenClearance("torque", 2.93e-4, 2.8e-5),))
+    one = believed(other, None, is_counted_leg=False)
+    assert one is not None
+    assert (one.clearance_m, one.sigma_m, one.by) == (2.93e-4, 2.8e-5, "torque")
+    assert believed(COUNTED, None, is_counted_leg=False) is None
+
+
+METRES = st.floats(1.0e-4, 3.0e-3)
+SEEN = st.builds(SeenClearance, st.sampled_from(("torque", "encoders")), METRES, st.floats(1.0e-6, 1.0e-3))
+
+
+@given(
+    counted_m=METRES,
+    measured=st.none() | st.builds(SeenClearance, st.just("measurement"), METRES, st.floats(1e-6, 1e-4)),
+    before=st.lists(SEEN, max_size=2),
+    now=st.lists(SEEN, max_size=2),
+    is_acknowledged=st.booleans(),
+)
+def test_the_verdict_and_the_believed_clearance_tell_one_story(
+    counted_m, measured, before, now, is_acknowledged
+) -> None:
+    """Whoever is at a limit by the verdict is so by the believed clearance, and the other way round."""
+    joint = attrs.evolve(COUNTED, counted_m=counted_m, measured=measured)
+    alarm = after(NEW, *before, joint=joint)
+    alarm = evaluated(alarm, counted_m, LIMIT, 1, 3) if alarm.level is Level.OK else alarm
+    alarm = after(acknowledged(alarm) if is_acknowledged else alarm, *now, joint=joint)
+    found = verdict(alarm, *now, joint=joint)
+    one = believed(attrs.evolve(joint, seen=tuple(now)), alarm, Figure.CLEARANCES not in found.not_valid)
+    estimate = at_limit_by_estimate(attrs.evolve(joint, seen=tuple(now)), alarm)
+    if estimate is not None:
+        assert found.state is State.STOP
+    if one is not None and one.clearance_m >= LIMIT_M:
+        assert found.state is State.STOP
+    if found.fault_code == "CLEARANCE_SEEN_G":
+        assert one is not None and one.clearance_m >= LIMIT_M

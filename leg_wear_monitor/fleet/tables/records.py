@@ -99,7 +99,8 @@ def _lives(line: Line) -> Iterator[Line]:
         clearance = line["clearances"].get(joint) or {}
         row = {"stamp_ns": line["end_ns"], "joint": joint, **clearance, **(line["life"].get(joint) or {})}
         if clearance:
-            best_m = clearance["counted_m"] if clearance["seen_m"] is None else clearance["seen_m"]
+            counted_m, seen_m = clearance["counted_m"], clearance["seen_m"]
+            best_m = clearance.get("believed_m") or (counted_m if seen_m is None else seen_m)
             row["used_fraction"] = used_fraction(best_m, clearance["new_m"], clearance["limit_m"])
             row["seen_by"] = ",".join(clearance["seen_by"])
         yield row

@@ -21,7 +21,7 @@ from leg_wear_monitor.monitor.forecast.growth import GrowthWindow
 from leg_wear_monitor.monitor.forecast.model_error import model_error
 from leg_wear_monitor.monitor.inputs.guard import InputGuard
 from leg_wear_monitor.monitor.judgement import Judge
-from leg_wear_monitor.monitor.ledger.entry import Measurement
+from leg_wear_monitor.monitor.ledger.entry import Measurement, SimulatedReference
 from leg_wear_monitor.monitor.ledger.ledger import Ledger
 from leg_wear_monitor.monitor.state import MonitorSnapshot, MonitorState
 from leg_wear_monitor.monitor.torque_causes.explainer import TorqueExplainer
@@ -105,7 +105,8 @@ class Parts:
                 self.twin.clearance_mean_m,
                 ledger.commissioned_torque if ledger else None,
                 self._known_parameters(ledger),
-                self._known_reference(ledger),
+                self._known_reference(ledger.reference if ledger else None),
+                self._known_reference(ledger.part_of_reference if ledger else None),
             )
             if self.config.diagnosis.enabled and self.config.wear_acceleration == 1.0
             else None
@@ -138,9 +139,8 @@ class Parts:
         order = [known.names.index(name) for name in self.mechanism.bodies]
         return LegParameters(np.array(known.mass)[order], np.array(known.length)[order], known.friction)
 
-    def _known_reference(self, ledger: Ledger | None) -> TorqueReference | None:
+    def _known_reference(self, kept: SimulatedReference | None) -> TorqueReference | None:
         """Torque reference of the ledger, its parameters in the order of the mechanism."""
-        kept = ledger.reference if ledger else None
         if kept is None:
             return None
         order, own = [kept.bodies.index(name) for name in self.mechanism.bodies], kept.reference.parameters
@@ -162,7 +162,12 @@ class Parts:
                     found, bodies=self._counted_bodies(), friction=self.twin.parameters.friction
                 )
             settled = tuple(change for change in found.changes if change.is_corrected)
-            return Diagnosis(state=DiagnosisState.WAITING, reason=WRONG_TORQUE, changes=settled)
+            return Diagnosis(
+                state=DiagnosisState.WAITING,
+                reason=WRONG_TORQUE,
+                changes=settled,
+                cycles_not_used=found.cycles_not_used,
+            )
         return Diagnosis(
             reason=ACCELERATED if self.config.diagnosis.enabled else "diagnosis.enabled is false"
         )
@@ -215,5 +220,12 @@ class Parts:
             self.crank_zero.restore(snapshot.crank_zero)
 
     def keep(self, closed: bool = False) -> bool:
-        """Write an entry into the ledger; return whether it is on the disk."""
+        """Write an entry into the ledger; return whether it is on the disk.
+
+        The last one of a run keeps what is simulated of a reference: recordings are often shorter.
+        """
+        part = self.torque.part_of_reference if closed and self.torque else None
+        if part is not None:
+            names = tuple(self.mechanism.bodies)
+            self.accounting.note(SimulatedReference(self.twin.intake.followed_stamp_ns, names, part))
         return self.accounting.keep(self.evaluation.board.alarms.values(), closed)

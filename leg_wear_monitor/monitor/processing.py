@@ -69,8 +69,8 @@ class Processing:
         for statistics in update.cycles:
             if self._encoders:
                 self._encoders.ended(statistics)
-            if self._torque and not self._parts.is_torque_wrong:  # or a wrong torque is commissioned
-                self._torque.ended(statistics)
+            if self._torque:
+                self._torque.ended(statistics, self._parts.is_torque_wrong)
             cycles.append(self._report(statistics))
             self._add_changes(self._evaluation.end_cycle(cycles[-1], self._parts.state.torque), changes)
             if statistics.is_followed:
@@ -168,13 +168,19 @@ class Processing:
     def _explain_mismatch(self, statistics: CycleStatistics) -> None:
         """Look for causes of a torque mismatch after a gait cycle."""
         max_friction_nm = self._evaluation.torque_bounds.max_friction_nm
+        was_wrong, alarm = self._parts.is_torque_wrong, self._evaluation.board.alarms[MISMATCH.name()]
         self._parts.state.mismatch = self._parts.state.mismatch.with_cycle(
             statistics,
-            self._evaluation.board.alarms[MISMATCH.name()],
+            alarm,
             lambda cycles: self._parts.explainer.explanation(
                 cycles, self._parts.config, self._twin.settings, max_friction_nm
             ),
         )
+        if self._torque and self._parts.is_torque_wrong and not was_wrong:
+            # the alarm rose some gait cycles after the torque became wrong
+            before = self._parts.config.alarms.on_delay_cycles + 1
+            first = self._parts.state.mismatch.cycles[0]
+            self._torque.withdraw(first.begin_ns - before * (first.stamp_ns - first.begin_ns))
 
     def _keep_torque(self, statistics: CycleStatistics, report: CycleReport) -> None:
         """Record the torque of a gait cycle if it is as predicted."""

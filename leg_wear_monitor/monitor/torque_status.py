@@ -5,7 +5,7 @@ from collections.abc import Sequence
 
 from leg_wear_monitor.monitor.alarms.alarm import Level
 from leg_wear_monitor.monitor.alarms.fault_codes import DIAGNOSIS, worst_code
-from leg_wear_monitor.monitor.diagnosis.diagnosis import Diagnosis, DiagnosisState
+from leg_wear_monitor.monitor.diagnosis.diagnosis import Diagnosis, DiagnosisState, NotUsed
 from leg_wear_monitor.monitor.evaluation import specs
 from leg_wear_monitor.monitor.evaluation.evaluation import AlarmEvaluation
 from leg_wear_monitor.monitor.evaluation.torque_checks import offset_error_rad, torque_causes
@@ -67,6 +67,8 @@ def torque_status(
 def diagnosis_status(joints: Sequence[str], diagnosis: Diagnosis) -> Status:
     """What the drive torque shows of the clearances; NaN where a joint is not observable."""
     values = {"cycles": float(diagnosis.cycles)}
+    for reason in NotUsed:
+        values[f"not_used_{reason.value}"] = float(diagnosis.cycles_not_used.get(reason.value, 0))
     for k, joint in enumerate(joints):
         known = bool(diagnosis.clearance_m)
         values[f"{joint}_clearance_m"] = diagnosis.clearance_m[k] if known else math.nan

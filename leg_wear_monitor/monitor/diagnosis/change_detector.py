@@ -13,8 +13,10 @@ import numpy as np
 from leg_wear_monitor.mechanism.arrays import Floats, Ints
 from leg_wear_monitor.monitor.diagnosis.explanations import Explainer, opened
 
+# on the counted clearance of one joint; two further tests are for a new part in a worn joint
 FACTORS = (1.08, 1.2, 1.35, 1.5, 2.0, 2.5, 3.3, 5.0, 8.0)  # on the counted clearance of one joint
 
+_LEAST_INFORMATION = 1.0e-6  # of one gait cycle, by which a test can tell anything
 _SIGMAS = 4.0  # by which the baseline may be off
 _MOST = 0.6  # of the threshold: what one gait cycle counts at most, so that one alone raises nothing
 
@@ -60,7 +62,7 @@ def excess(scatter: Floats, expected: Floats) -> Floats:
 
 
 class ChangeDetector:
-    """CUSUM tests of a leg against one with a wider joint.
+    """CUSUM tests of a leg against one with a wider joint, and against one with a new part.
 
     Parameters
     ----------
@@ -76,9 +78,9 @@ class ChangeDetector:
         expected = model.at(counted_m)[0]
         changes = []
         for k in range(len(counted_m)):
-            for factor in FACTORS:
-                wider = opened(counted_m, k, factor * counted_m[k])
-                changes.append(model.at(wider)[0] - expected)
+            fresh = min(explainer.fresh_m[k], counted_m[k])
+            sizes = [factor * counted_m[k] for factor in FACTORS] + [fresh, math.sqrt(fresh * counted_m[k])]
+            changes += [model.at(opened(counted_m, k, size))[0] - expected for size in sizes]
         change = np.array(changes)
         weighted = np.linalg.solve(explainer.covariance(1), change.T).T
         self._expected = expected + explainer.baseline.offset
@@ -87,6 +89,10 @@ class ChangeDetector:
         drift = np.sqrt(((weighted @ explainer.baseline.covariance) * weighted).sum(axis=1))
         information = (weighted * change).sum(axis=1)
         self._half = 0.5 * information + _SIGMAS * drift
+        # a part that is new already cannot be renewed
+        is_possible = information > _LEAST_INFORMATION
+        self._half = np.where(is_possible, self._half, np.inf)
+        information = np.maximum(information, _LEAST_INFORMATION)
         self._excess = excess(explainer.baseline.scatter @ weighted.T, information)
         self.threshold = threshold(false_alarm_cycles, len(change))
 

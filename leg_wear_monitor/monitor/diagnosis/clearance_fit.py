@@ -27,7 +27,12 @@ class ClearanceFit:
 
 
 def fit_clearances(
-    explainer: Explainer, mean: Floats, cycles: int, start_m: Floats, counted_m: Floats
+    explainer: Explainer,
+    mean: Floats,
+    cycles: int,
+    start_m: Floats,
+    counted_m: Floats,
+    known_sigma_m: Floats | float = 0.0,
 ) -> ClearanceFit:
     """Generalised least squares over the logarithms of all clearances.
 
@@ -39,6 +44,8 @@ def fit_clearances(
     cycles : int
     start_m, counted_m : (k,) arrays
         Where the search begins, and the counted clearances.
+    known_sigma_m : (k,) array, optional
+        Standard deviations of the clearances that the baseline was taken with.
     """
     model = explainer.model
     measured = mean - explainer.baseline.offset
@@ -69,7 +76,8 @@ def fit_clearances(
     clearance: Floats = np.asarray(np.exp(x), dtype=np.float64)
     # what a clearance changes is known to a fraction, and so is a clearance that is far from the counted one
     uncertain = np.hypot(_MODEL_M, MODEL_ERROR * (clearance - counted_m))
-    covariance = spread * np.outer(clearance, clearance) + np.diag(uncertain**2)
+    # a baseline after a correction hides what that is off
+    covariance = spread * np.outer(clearance, clearance) + np.diag(uncertain**2 + known_sigma_m**2)
     rest = measured - expected
     misfit = float(rest @ weight @ rest)
     return ClearanceFit(clearance, max(1.0, misfit / len(rest)) * covariance, misfit)

@@ -35,12 +35,22 @@ def correction_of(state: TorqueState, joints: Sequence[str]) -> Correction | Non
     return Correction(joints.index(change.subject), change.value, change)
 
 
-def settle(state: TorqueState, change: Change, counted_m: Floats) -> None:
+def settle(state: TorqueState, correction: Correction, counted_m: Floats) -> None:
     """Make the gait cycles since a change those of the commissioned leg, with clearances (k,) [m].
 
-    What the correction is off does then not look like a further change.
+    What the correction is off does then not look like a further change; it stays in the standard deviation.
     """
+    joint, _, change = correction
     cycles = [cycle for cycle in state.cycles if cycle.begin_ns >= change.since_ns]
-    signatures = np.array([cycle.signature for cycle in cycles])
-    state.commissioned = CommissionedTorque(cycles[-1].end_ns, counted_m, signatures)
+    signatures, before = np.array([cycle.signature for cycle in cycles]), state.commissioned
+    sigma_m = before.sigma_m.copy() if before else np.zeros(len(counted_m))
+    sigma_m[joint] = change.sigma
+    state.commissioned = CommissionedTorque(
+        cycles[-1].end_ns,
+        counted_m,
+        signatures,
+        sigma_m,
+        before.delay_s if before else 0.0,
+        before.time_constant_s if before else 0.0,
+    )
     state.settled = (*state.settled, attrs.evolve(change, is_corrected=True))

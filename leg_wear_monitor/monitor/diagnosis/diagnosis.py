@@ -1,6 +1,7 @@
 """What the measured drive torque shows of the clearances, compared with those that the monitor counts."""
 
 import math
+from collections.abc import Mapping
 from enum import Enum
 
 import attrs
@@ -29,6 +30,16 @@ class Cause(Enum):
     MASS = "mass of a body"
     LENGTH = "length of a body"
     UNKNOWN = "unknown"
+
+
+class NotUsed(Enum):
+    """Why a gait cycle says nothing of the clearances; the value is the word that files contain."""
+
+    CADENCE = "cadence"
+    GAP = "gap"
+    JITTER = "jitter"
+    TORQUE_CAUSE = "torque_cause"
+    UNLIKE = "unlike"
 
 
 @attrs.frozen(kw_only=True)
@@ -95,6 +106,9 @@ class Diagnosis:
         Why there is no estimate yet, or why it is not to be believed now; empty otherwise.
     cycles : int
         Gait cycles in the estimate.
+    cycles_not_used : mapping of str to int
+        Gait cycles of this run that were not used, by reason: another cadence; standstill, or too few torque
+        samples; irregular stamps; a torque that is wrong as received; a crank that turns otherwise.
     clearance_m, sigma_m : tuple of float
         Estimated clearance of each clearance joint and its standard deviation; NaN where it is not
         observable.
@@ -110,6 +124,7 @@ class Diagnosis:
     state: DiagnosisState = DiagnosisState.OFF
     reason: str = ""
     cycles: int = 0
+    cycles_not_used: Mapping[str, int] = attrs.field(factory=dict)
     clearance_m: tuple[float, ...] = ()
     sigma_m: tuple[float, ...] = ()
     changes: tuple[Change, ...] = ()

@@ -2,14 +2,21 @@
 
 from collections.abc import Sequence
 
+import attrs
 import numpy as np
 
 from leg_wear_monitor.mechanism.arrays import Floats
 from leg_wear_monitor.mechanism.spec import Mechanism
 from leg_wear_monitor.monitor.diagnosis.clearance_fit import ClearanceFit, fit_clearances
 from leg_wear_monitor.monitor.diagnosis.diagnosis import Cause, Change
-from leg_wear_monitor.monitor.diagnosis.explanations import Explainer, Explanation, opened
-from leg_wear_monitor.monitor.diagnosis.nuisances import commissioned_baseline, nuisances, unknown_baseline
+from leg_wear_monitor.monitor.diagnosis.explanations import POOREST, Explainer, Explanation, opened
+from leg_wear_monitor.monitor.diagnosis.nuisances import (
+    commissioned_baseline,
+    nuisances,
+    other_channels,
+    unknown_baseline,
+    with_scatter_of,
+)
 from leg_wear_monitor.monitor.diagnosis.signature import TorqueSensor
 from leg_wear_monitor.monitor.diagnosis.signature_model import signature_model
 from leg_wear_monitor.monitor.ledger.entry import CommissionedTorque
@@ -24,20 +31,28 @@ def explainer_of(
 ) -> Explainer:
     """What explains changes of a leg, measured by a sensor whose noise is known."""
     model = signature_model(reference, sensor)
-    found = nuisances(mechanism, reference, sensor)
+    found, joints = nuisances(mechanism, reference, sensor), mechanism.clearance_joints
     if commissioned is None:
         baseline = unknown_baseline(found, sensor)
     else:
         expected = model.at(commissioned.clearance_m)[0]
-        baseline = commissioned_baseline(commissioned, expected, model.covariance)
-    return Explainer(model, mechanism.clearance_joints, baseline, found)
+        covariance = with_scatter_of(model.covariance, commissioned.signatures)
+        model = attrs.evolve(model, covariance=covariance)
+        baseline = commissioned_baseline(commissioned, expected, covariance)
+    fresh_m = np.array([mechanism.clearances[joint].radial_clearance for joint in joints])
+    return Explainer(model, joints, baseline, found, other_channels(reference, sensor), fresh_m)
 
 
 def best_fit(
-    explainer: Explainer, mean: Floats, cycles: int, counted_m: Floats, starts: Sequence[Floats]
+    explainer: Explainer,
+    mean: Floats,
+    cycles: int,
+    counted_m: Floats,
+    starts: Sequence[Floats],
+    known_sigma_m: Floats | float = 0.0,
 ) -> ClearanceFit:
     """All clearances from a mean signature, from the best of several starts: there are several minima."""
-    fits = [fit_clearances(explainer, mean, cycles, start, counted_m) for start in starts]
+    fits = [fit_clearances(explainer, mean, cycles, start, counted_m, known_sigma_m) for start in starts]
     return min(fits, key=lambda fit: fit.misfit)
 
 
@@ -54,6 +69,13 @@ def change_of(explanations: Sequence[Explanation], since_ns: int) -> Change | No
     nothing = next(one for one in explanations if one.cause is Cause.UNKNOWN)
     if best is nothing:
         return None
+    log_odds = 0.5 * (nothing.misfit - best.misfit)
+    if not best.explains(nothing.square):
+        if nothing.square <= POOREST:
+            return None
+        return Change(
+            cause=Cause.UNKNOWN, since_ns=since_ns, value=0.0, sigma=0.0, counted=0.0, log_odds=log_odds
+        )
     runner_up = f"{second.cause.value} {second.subject}".strip()
     return Change(
         cause=best.cause,
@@ -62,7 +84,7 @@ def change_of(explanations: Sequence[Explanation], since_ns: int) -> Change | No
         value=best.value,
         sigma=best.sigma,
         counted=best.counted,
-        log_odds=0.5 * (nothing.misfit - best.misfit),
+        log_odds=log_odds,
         runner_up="as counted" if second is nothing else runner_up,
         runner_up_log_odds=0.5 * (second.misfit - best.misfit),
     )

@@ -1,13 +1,15 @@
 """What changes a torque's signature beside clearances: friction, scale, lag, load, bodies."""
 
+import attrs
 import numpy as np
 
 from leg_wear_monitor.mechanism.arrays import Floats
+from leg_wear_monitor.mechanism.ideal import TURN
 from leg_wear_monitor.mechanism.position import build_linkage
 from leg_wear_monitor.mechanism.spec import Mechanism
 from leg_wear_monitor.monitor.diagnosis.body_torques import body_torques
 from leg_wear_monitor.monitor.diagnosis.diagnosis import Cause
-from leg_wear_monitor.monitor.diagnosis.explanations import Baseline, Nuisance
+from leg_wear_monitor.monitor.diagnosis.explanations import Baseline, Nuisance, OtherChannel
 from leg_wear_monitor.monitor.diagnosis.ideal_signature import signature_of_torque
 from leg_wear_monitor.monitor.diagnosis.signature import TorqueSensor
 from leg_wear_monitor.monitor.diagnosis.signature_model import simulated_signatures
@@ -30,13 +32,20 @@ _SENSOR_TOLERANCE = 5.0  # times the usual changes of friction, scale and lag
 
 _SCALE_STEP, _OFFSET_STEP_RAD = 0.1, 0.03
 
+_LATER_S = 0.0025 * np.array([*range(-8, 0), *range(1, 13)])
+_SLOWER_S = tuple(1.0 / (TURN * hz) for hz in (70.0, 35.0, 20.0, 10.0))
+_CHANNEL_CYCLES = 20
+
+# gait cycles that the expected covariance counts as: fewer left out directions of the scatter on the ground
+_EXPECTED_CYCLES = 60
+
 
 def nuisances(mechanism: Mechanism, reference: TorqueReference, sensor: TorqueSensor) -> list[Nuisance]:
     """Nuisances of a leg that walks as a reference does."""
     phases, speed = sensor.phases, reference.profile.speed
     constant = np.concatenate([np.full(phases, np.sign(speed)), np.zeros(phases)])
-    scaled = _difference(reference, sensor, "scale", 1.0, _SCALE_STEP)
-    shifted = _difference(reference, sensor, "offset_rad", 0.0, _OFFSET_STEP_RAD)
+    scaled = _difference(reference, sensor, scale_step=_SCALE_STEP)
+    shifted = _difference(reference, sensor, offset_step_rad=_OFFSET_STEP_RAD)
     found = [
         Nuisance(Cause.FRICTION, "", constant, _FRICTION * sensor.size_nm),
         Nuisance(Cause.SCALE, "", scaled, _SCALE),
@@ -50,6 +59,43 @@ def nuisances(mechanism: Mechanism, reference: TorqueReference, sensor: TorqueSe
         found.append(Nuisance(Cause.MASS, name, signature_of_torque(mass, phases), 0.0))
         found.append(Nuisance(Cause.LENGTH, name, signature_of_torque(length, phases), 0.0))
     return found
+
+
+def other_channels(reference: TorqueReference, sensor: TorqueSensor) -> list[OtherChannel]:
+    """Channels that a torque sensor may have instead of its own: earlier, later, filtered."""
+    own = simulated_signatures(reference, 0, sensor, cycles=_CHANNEL_CYCLES).mean(axis=0)
+    slower = [one for one in _SLOWER_S if one > sensor.time_constant_s]
+    tried = [(late, sensor.time_constant_s) for late in _LATER_S] + [
+        (late, time_constant_s)
+        for time_constant_s in slower
+        for late in (0.0, *_LATER_S[_LATER_S > 0.0][::2])
+    ]
+    found = []
+    for later_s, time_constant_s in tried:
+        other = attrs.evolve(sensor, delay_s=sensor.delay_s + later_s, time_constant_s=time_constant_s)
+        column = simulated_signatures(reference, 0, other, cycles=_CHANNEL_CYCLES).mean(axis=0) - own
+        found.append(OtherChannel(float(other.lateness_s - sensor.lateness_s), column))
+    return found
+
+
+def with_scatter_of(covariance: Floats, signatures: Floats) -> Floats:
+    """Covariance (F, F) of a gait cycle in a leg that scatters as some commissioned cycles do.
+
+    The sample covariance is shrunk to the expected one, whose variances are at least the measured ones.
+
+    Parameters
+    ----------
+    covariance : (F, F) array
+        Expected one.
+    signatures : (n, F) array
+        Measured gait cycles.
+    """
+    if len(signatures) < 2:
+        return covariance
+    measured = np.cov(signatures.T)
+    more = np.maximum(0.0, np.diagonal(measured) - np.diagonal(covariance))
+    weight = len(signatures) / (len(signatures) + _EXPECTED_CYCLES)
+    return np.asarray(weight * measured + (1.0 - weight) * (covariance + np.diag(more)))
 
 
 def commissioned_baseline(commissioned: CommissionedTorque, expected: Floats, covariance: Floats) -> Baseline:
@@ -72,11 +118,14 @@ def unknown_baseline(found: list[Nuisance], sensor: TorqueSensor) -> Baseline:
 
 
 def _difference(
-    reference: TorqueReference, sensor: TorqueSensor, argument: str, middle: float, step: float
+    reference: TorqueReference, sensor: TorqueSensor, scale_step: float = 0.0, offset_step_rad: float = 0.0
 ) -> Floats:
-    """Derivative of the expected leg's signature by an argument of `simulated_signatures`."""
+    """Derivative of the expected leg's signature by a factor on the torque, or by an offset of the crank."""
     less, more = (
-        simulated_signatures(reference, 0, sensor, **{argument: middle + sign * step}).mean(axis=0)
+        simulated_signatures(reference, 0, sensor, 1.0 + sign * scale_step, sign * offset_step_rad).mean(
+            axis=0
+        )
         for sign in (-1.0, 1.0)
     )
+    step = scale_step or offset_step_rad
     return np.asarray((more - less) / (2.0 * step))

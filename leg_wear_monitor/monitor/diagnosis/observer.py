@@ -15,13 +15,13 @@ from leg_wear_monitor.mechanism.spec import Mechanism
 from leg_wear_monitor.monitor.config.settings import MonitorConfig
 from leg_wear_monitor.monitor.diagnosis.clearance_fit import ClearanceFit
 from leg_wear_monitor.monitor.diagnosis.corrections import Correction, correction_of, settle
-from leg_wear_monitor.monitor.diagnosis.diagnosis import Cause, Diagnosis, DiagnosisState
+from leg_wear_monitor.monitor.diagnosis.diagnosis import Cause, Diagnosis, DiagnosisState, NotUsed
 from leg_wear_monitor.monitor.diagnosis.evidence import Evidence
 from leg_wear_monitor.monitor.diagnosis.leg_models import COMMISSIONING_CYCLES, LegModels
 from leg_wear_monitor.monitor.diagnosis.reasons import doubt, missing
 from leg_wear_monitor.monitor.diagnosis.references import UNLIKE, References
 from leg_wear_monitor.monitor.diagnosis.signed_cycle import find_sensor, signed_cycle
-from leg_wear_monitor.monitor.diagnosis.state import TorqueState
+from leg_wear_monitor.monitor.diagnosis.state import UNUSED_CYCLES, TorqueState
 from leg_wear_monitor.monitor.diagnosis.torque_samples import NO_TORQUE_SAMPLES, after, extended
 from leg_wear_monitor.monitor.ledger.entry import CommissionedTorque
 from leg_wear_monitor.twin.reference.leg_parameters import LegParameters
@@ -57,8 +57,8 @@ class TorqueObserver:
         That of the ledger.
     parameters : LegParameters or None
         Those of the ledger.
-    reference : TorqueReference or None
-        That of the ledger.
+    reference, part : TorqueReference or None
+        That of the ledger, and one there whose simulation was not finished.
 
     Raises
     ------
@@ -74,10 +74,11 @@ class TorqueObserver:
         commissioned: CommissionedTorque | None = None,
         parameters: LegParameters | None = None,
         reference: TorqueReference | None = None,
+        part: TorqueReference | None = None,
     ) -> None:
         self.config, self._size_nm, self._joints = config, size_nm, mechanism.clearance_joints
         self._models = LegModels(mechanism)
-        self._references = References(mechanism, self._models, reference)
+        self._references = References(mechanism, self._models, reference, part)
         self._evidence = Evidence(self._models)
         counted_m = np.asarray(counted_m, float).copy()
         self.state = TorqueState(counted_m, commissioned=commissioned, parameters=parameters)
@@ -90,13 +91,35 @@ class TorqueObserver:
         """Add samples in the order of arrival."""
         self.state.samples = extended(self.state.samples, piece)
 
-    def ended(self, statistics: CycleStatistics) -> None:
-        """Note the end of a gait cycle, which is used if the leg walked as commanded."""
+    def ended(self, statistics: CycleStatistics, is_torque_wrong: bool = False) -> None:
+        """Note the end of a gait cycle, which is used if the leg walked as commanded with a right torque."""
         rpm = statistics.cadence_rpm
         is_allowed = self.config.cadence.allows(rpm)
         self.state.off_cadence_rpm = math.nan if is_allowed else rpm
-        if statistics.is_steady and is_allowed:
+        if is_torque_wrong:
+            self.state.leave_out(NotUsed.TORQUE_CAUSE)
+        elif not is_allowed:
+            self.state.leave_out(NotUsed.CADENCE)
+        elif not statistics.is_steady:
+            self.state.leave_out(NotUsed.GAP)
+        else:
             self.state.due = (*self.state.due, (statistics.begin_ns, statistics.stamp_ns))
+
+    def withdraw(self, since_ns: int) -> None:
+        """Forget the gait cycles from a stamp on: the torque that was received was wrong."""
+        state = self.state
+        cycles = tuple(cycle for cycle in state.cycles if cycle.begin_ns < since_ns)
+        due = tuple(span for span in state.due if span[0] < since_ns)
+        number = len(state.cycles) + len(state.due) - len(cycles) - len(due)
+        if not number:
+            return
+        state.cycles, state.due = cycles, due
+        state.leave_out(NotUsed.TORQUE_CAUSE, number)
+        known = state.commissioned
+        if known is not None and known.stamp_ns > since_ns:  # some of them are in it
+            state.commissioned = None
+        if state.reference is not None:
+            self._evidence.review(state, self.config)
 
     def end_period(self, counted_m: Floats, depth: Floats) -> Correction | None:
         """Evaluate the gait cycles that ended, and simulate one more for the reference.
@@ -128,7 +151,7 @@ class TorqueObserver:
     def corrected(self, correction: Correction, counted_m: Floats) -> None:
         """Compare with the corrected clearances (k,) [m] from now on."""
         counted_m = np.asarray(counted_m, float).copy()
-        settle(self.state, correction.change, counted_m)
+        settle(self.state, correction, counted_m)
         self._restart(counted_m)
         self._models.forget()
 
@@ -156,6 +179,11 @@ class TorqueObserver:
         reference = self.state.reference
         return None if self._references.is_given(reference) else reference
 
+    @property
+    def part_of_reference(self) -> TorqueReference | None:
+        """The legs of a reference that are simulated so far; None where there is nothing to go on with."""
+        return None if self.state.is_identifying else self._references.part
+
     def begin_epoch(self) -> None:
         """Forget kept samples and gait cycles, because stamps start again."""
         self.state.samples, self.state.due = NO_TORQUE_SAMPLES, ()
@@ -165,9 +193,14 @@ class TorqueObserver:
     def diagnosis(self) -> Diagnosis:
         """What the drive torque shows now."""
         state = self.state
-        if state.fit is None or state.detector is None:
-            reason = missing(state, self._references, self.config)
-            return Diagnosis(state=DiagnosisState.WAITING, reason=reason, changes=state.settled)
+        is_old = not state.cycles or (len(state.unused) == UNUSED_CYCLES and not state.changes)
+        if state.fit is None or state.detector is None or is_old:
+            return Diagnosis(
+                state=DiagnosisState.WAITING,
+                reason=missing(state, self._references, self.config),
+                changes=state.settled,
+                cycles_not_used=state.not_used,
+            )
         clearance_m, sigma_m = self._observed(state.fit)
         return Diagnosis(
             state=DiagnosisState.CHANGED if state.changes else DiagnosisState.AS_COUNTED,
@@ -176,13 +209,18 @@ class TorqueObserver:
             clearance_m=tuple(clearance_m.tolist()),
             sigma_m=tuple(sigma_m.tolist()),
             changes=state.settled + state.changes,
+            cycles_not_used=state.not_used,
         )
 
     def _observed(self, fit: ClearanceFit) -> tuple[Floats, Floats]:
         """Observable clearances and their standard deviations, NaN for the others.
 
-        A joint that the fit of all joints does not show is known from its own change.
+        A joint that the fit of all joints does not show is known from its own change. Where the reference is
+        not that of the leg, a change can have the name of another joint, and no clearance is known.
         """
+        if not self._models.fits(self.state):
+            nothing = np.full(len(fit.clearance_m), math.nan)
+            return nothing, nothing
         observable = fit.sigma_m <= np.maximum(_ESTIMATED_M, _ESTIMATED * fit.clearance_m)
         clearance_m, sigma_m = (
             np.where(observable, each, math.nan) for each in (fit.clearance_m, fit.sigma_m)
@@ -209,15 +247,16 @@ class TorqueObserver:
         state = self.state
         find_sensor(state, begin_ns, end_ns, self.config, self._size_nm)
         cycle = signed_cycle(state, begin_ns, end_ns)
-        if cycle is None:
-            state.unusable += 1
+        if isinstance(cycle, NotUsed):
+            state.leave_out(cycle)
             return
-        state.unusable = 0
         if state.reference is not None:
             if cycle.profile.departure(state.reference.profile) > UNLIKE:
                 state.unlike += 1
+                state.leave_out(NotUsed.UNLIKE)
                 return
             state.unlike = 0
+        state.unused = ()
         state.cycles = (*state.cycles, cycle)[-WINDOW_CYCLES:]
         if state.reference is not None:
             self._evidence.add(state, cycle, self.config)

@@ -5,7 +5,8 @@ import math
 import numpy as np
 
 from leg_wear_monitor.monitor.config.settings import MonitorConfig
-from leg_wear_monitor.monitor.diagnosis.leg_models import LegModels
+from leg_wear_monitor.monitor.diagnosis.diagnosis import NotUsed
+from leg_wear_monitor.monitor.diagnosis.leg_models import COMMISSIONING_CYCLES, LegModels
 from leg_wear_monitor.monitor.diagnosis.references import FIRST_CYCLES, UNLIKE_CYCLES, References
 from leg_wear_monitor.monitor.diagnosis.state import TorqueState
 
@@ -28,7 +29,11 @@ def missing(state: TorqueState, references: References, config: MonitorConfig) -
             f"the cadence is {state.off_cadence_rpm:.3g} rpm, not the commanded "
             f"{own.commanded_rpm:.3g} ± {own.tolerance_rpm:.3g} rpm"
         )
-    if state.sensor is None or state.unusable >= _UNUSABLE_CYCLES:
+    if state.unused and state.unused[-1] is NotUsed.JITTER:
+        return (
+            "the stamps of the drive torque are too irregular: a step between two samples has no known time"
+        )
+    if state.sensor is None or state.unused[-_UNUSABLE_CYCLES:] == (NotUsed.GAP,) * _UNUSABLE_CYCLES:
         return "no drive torque with enough samples in a gait cycle"
     if not state.sensor.phases:
         return "the drive torque has too few samples in a gait cycle"
@@ -36,7 +41,12 @@ def missing(state: TorqueState, references: References, config: MonitorConfig) -
         return f"the reference for this leg is being simulated: {references.percent} %"
     if state.has_failed:
         return "the leg could not be simulated for a reference"
-    return f"gait cycles: {len(state.cycles)} of {FIRST_CYCLES}"
+    if len(state.cycles) < FIRST_CYCLES or state.reference is None:
+        return f"gait cycles: {len(state.cycles)} of {FIRST_CYCLES}"
+    return (
+        "the drive torque is not that of the mechanism file (late, filtered, loaded, or of another leg); "
+        f"changes are observed after {COMMISSIONING_CYCLES} gait cycles, {len(state.cycles)} are there"
+    )
 
 
 def doubt(state: TorqueState, references: References, models: LegModels) -> str:
@@ -45,7 +55,9 @@ def doubt(state: TorqueState, references: References, models: LegModels) -> str:
         return "the crank turns otherwise than it did before; a new reference is being simulated"
     if models.is_of_file(state):
         return LOCKED_SAMPLES if _are_locked(state) else ""
-    known = "the leg is not that of its mechanism file, and the names of joints are not sure: "
+    known = "the model does not fit this leg, and the names of joints are not sure: "
+    if not state.changes:
+        known = "the model does not fit this leg, but nothing has changed since it was commissioned: "
     if references.is_busy:
         what = "its masses, lengths and friction are" if state.is_identifying else "a reference for it is"
         return f"{known}{what} being simulated, {references.percent} %"

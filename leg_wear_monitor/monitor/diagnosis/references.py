@@ -15,6 +15,7 @@ from leg_wear_monitor.monitor.diagnosis.leg_models import LegModels
 from leg_wear_monitor.monitor.diagnosis.reference_file import shipped_reference
 from leg_wear_monitor.monitor.diagnosis.state import TorqueState
 from leg_wear_monitor.twin.reference.crank_profile import CrankProfile, mean_profile
+from leg_wear_monitor.twin.reference.leg_parameters import LegParameters
 from leg_wear_monitor.twin.reference.torque_reference import (
     TorqueReference,
     TorqueReferenceRun,
@@ -40,6 +41,8 @@ class References:
         Told to forget what depends on a reference.
     kept : TorqueReference or None
         One that was simulated in an earlier run.
+    part : TorqueReference or None
+        One whose simulation was not finished in an earlier run.
 
     Raises
     ------
@@ -47,8 +50,14 @@ class References:
         If a reference that comes with the package cannot be read.
     """
 
-    def __init__(self, mechanism: Mechanism, models: LegModels, kept: TorqueReference | None = None) -> None:
-        self._mechanism, self._models = mechanism, models
+    def __init__(
+        self,
+        mechanism: Mechanism,
+        models: LegModels,
+        kept: TorqueReference | None = None,
+        part: TorqueReference | None = None,
+    ) -> None:
+        self._mechanism, self._models, self._part = mechanism, models, part
         self._given = [one for one in (kept, shipped_reference(mechanism)) if one is not None]
         self._run: TorqueReferenceRun | None = None
 
@@ -61,6 +70,11 @@ class References:
     def percent(self) -> int:
         """How much of what is being simulated is done [%]."""
         return math.floor(100.0 * self._run.progress) if self._run is not None else 0
+
+    @property
+    def part(self) -> TorqueReference | None:
+        """The legs that are simulated so far; None where none is, or all are."""
+        return self._run.part if self._run is not None else None
 
     def is_given(self, reference: TorqueReference | None) -> bool:
         """Whether a reference comes from the ledger or with the package."""
@@ -93,7 +107,7 @@ class References:
         if state.unlike >= UNLIKE_CYCLES:
             state.cycles, state.reference, state.fit, state.unlike = (), None, None, 0
             self._models.forget()
-        elif (np.abs(state.reference.clearance_m[0] / counted_m - 1.0) > _FAR).any():
+        elif _is_far(state.reference, counted_m):
             self._begin(state, counted_m, depth, mean_profile([cycle.profile for cycle in state.cycles]))
         elif state.parameters not in (None, state.reference.parameters):  # those of the ledger
             self._begin(state, counted_m, depth, state.reference.profile)
@@ -143,8 +157,17 @@ class References:
         return self._run
 
     def _begin(self, state: TorqueState, counted_m: Floats, depth: Floats, profile: CrankProfile) -> None:
-        """Begin the simulation of a reference."""
-        self._begun().begin(counted_m, depth, profile, state.parameters)
+        """Begin the simulation of a reference, or go on with that of an earlier run."""
+        part, own = self._part, state.parameters or LegParameters.none(self._mechanism)
+        if (
+            part is not None
+            and part.parameters == own
+            and profile.departure(part.profile) <= UNLIKE
+            and not _is_far(part, counted_m)
+        ):
+            self._begun().go_on(part, depth)
+        else:
+            self._begun().begin(counted_m, depth, profile, state.parameters)
 
     def _identify(self, state: TorqueState, legs: TorqueReference, counted_m: Floats, depth: Floats) -> None:
         """Begin a reference with the parameters that explain the commissioned leg."""
@@ -165,6 +188,11 @@ class References:
         is_other = before is not None and state.parameters not in (None, before.parameters)
         if before is not None and is_other and self._models.misfit(state) > off:
             state.reference, state.parameters, state.rounds = before, before.parameters, ROUNDS
+
+
+def _is_far(reference: TorqueReference, counted_m: Floats) -> bool:
+    """Whether a reference is for other clearances than the counted ones (k,) [m]."""
+    return bool((np.abs(reference.clearance_m[0] / counted_m - 1.0) > _FAR).any())
 
 
 def _give_up(state: TorqueState) -> None:

@@ -32,6 +32,11 @@ class TorqueSensor:
         Whether a sample is the torque at its instant, or else the mean since the one before.
     noise_nm : float
         Standard deviation of a sample.
+    delay_s : float
+        Time by which samples are late for their crank angle: a lag, less an offset of the crank over its
+        speed.
+    time_constant_s : float
+        Of the first-order low-pass between the leg's torque and its samples; 0 without one.
     """
 
     period_s: float
@@ -39,6 +44,21 @@ class TorqueSensor:
     size_nm: float
     is_instant: bool = False
     noise_nm: float = 0.0
+    delay_s: float = 0.0
+    time_constant_s: float = 0.0
+
+    @property
+    def lateness_s(self) -> float:
+        """Time by which slow changes of the torque are late: by the delay and by the low-pass."""
+        return self.delay_s + self.time_constant_s
+
+    def received(self, torque: Floats, step_s: float) -> Floats:
+        """Torque (n,) in equal steps of time [s] as it arrives, late and filtered; taken as periodic."""
+        if self.delay_s == 0.0 and self.time_constant_s == 0.0:
+            return torque
+        omega = TURN * np.fft.rfftfreq(len(torque), step_s)
+        channel = np.exp(-1j * omega * self.delay_s) / (1.0 + 1j * omega * self.time_constant_s)
+        return np.asarray(np.fft.irfft(np.fft.rfft(torque) * channel, len(torque)))
 
     @property
     def together(self) -> int:

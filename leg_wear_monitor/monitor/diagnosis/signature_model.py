@@ -74,13 +74,20 @@ def signature_model(reference: TorqueReference, sensor: TorqueSensor) -> Signatu
     covariance = scatter.T @ scatter / (len(scatter) - len(legs))
     joints = reference.clearance_m.shape[1]
     order = np.arange(1, len(legs)).reshape(joints, -1)
-    grid = [[reference.clearance_m[0, k], *reference.clearance_m[order[k], k]] for k in range(joints)]
-    change = [np.vstack([np.zeros_like(means[0]), means[order[k]] - means[0]]) for k in range(joints)]
-    return SignatureModel(sensor, np.array(grid), means[0], np.array(change), covariance, cycles[1])
+    grid = np.array([reference.clearance_m[[0, *order[k]], k] for k in range(joints)])
+    change = np.array([means[[0, *order[k]]] - means[0] for k in range(joints)])
+    place = np.argsort(grid, axis=1, kind="stable")
+    grid, change = np.take_along_axis(grid, place, 1), np.take_along_axis(change, place[:, :, None], 1)
+    return SignatureModel(sensor, grid, means[0], change, covariance, cycles[1])
 
 
 def simulated_signatures(
-    reference: TorqueReference, leg: int, sensor: TorqueSensor, scale: float = 1.0, offset_rad: float = 0.0
+    reference: TorqueReference,
+    leg: int,
+    sensor: TorqueSensor,
+    scale: float = 1.0,
+    offset_rad: float = 0.0,
+    cycles: int | None = None,
 ) -> Floats:
     """Signatures (cycles, F) of a leg of a reference.
 
@@ -93,8 +100,10 @@ def simulated_signatures(
         Factor on the torque.
     offset_rad : float
         Added to the crank angle.
+    cycles : int, optional
+        The first ones; all by default.
     """
-    simulated = SimulatedSensor(reference, len(reference.torque_nm[leg]), sensor, offset_rad)
+    simulated = SimulatedSensor(reference, cycles or len(reference.torque_nm[leg]), sensor, offset_rad)
     return simulated.signatures(leg, scale)
 
 

@@ -5,10 +5,14 @@ import math
 import numpy as np
 
 from leg_wear_monitor.monitor.config.settings import MonitorConfig
+from leg_wear_monitor.monitor.diagnosis.diagnosis import NotUsed
 from leg_wear_monitor.monitor.diagnosis.signature import TorqueSensor, signatures
 from leg_wear_monitor.monitor.diagnosis.state import SignedCycle, TorqueState
 from leg_wear_monitor.monitor.diagnosis.torque_samples import cycle_torque, sensor_period_s
 from leg_wear_monitor.twin.settings import INSTANT
+
+# of the sensor's period: steps between samples at times that are more irregular say nothing of its roughness
+_JITTER = 0.15
 
 
 def find_sensor(
@@ -28,16 +32,18 @@ def find_sensor(
         state.commissioned = None  # of a sensor with another rate: the leg is commissioned anew
 
 
-def signed_cycle(state: TorqueState, begin_ns: int, end_ns: int) -> SignedCycle | None:
-    """A gait cycle between two stamps; None where samples are too few."""
+def signed_cycle(state: TorqueState, begin_ns: int, end_ns: int) -> SignedCycle | NotUsed:
+    """A gait cycle between two stamps, or why it has no signature."""
     sensor = state.sensor
     if sensor is None or not sensor.phases:
-        return None
+        return NotUsed.GAP
     torque = cycle_torque(state.samples, begin_ns, end_ns, sensor)
     if torque is None:
-        return None
+        return NotUsed.GAP
+    if torque.jitter > _JITTER:
+        return NotUsed.JITTER
     first = np.zeros(len(torque.angle), np.int64)
     signature = signatures(first, torque.angle, torque.torque, torque.step, sensor)[0]
     if not np.isfinite(signature).all():
-        return None
+        return NotUsed.GAP
     return SignedCycle(begin_ns, end_ns, signature, torque.profile, torque.late)

@@ -42,6 +42,7 @@ class SimulatedSensor:
         # another part of a sample each gait cycle: samples of a real leg fall anywhere, too
         between = period / (period / sensor.period_s + _PART_OF_SAMPLE)
         place = np.arange(between, period * cycles, between) * (POINTS / period)
+        self._cycles, self._step_s = cycles, period / POINTS
         self._samples, self._between = len(place), between * (POINTS / period)
         self._at = np.minimum(place.astype(np.int64), cycles * POINTS - 1)
         # of averaged samples
@@ -62,7 +63,8 @@ class SimulatedSensor:
 
     def torque(self, leg: int) -> Floats:
         """Averaged samples (n,) of a leg [N m], without noise."""
-        torque: Floats = self._reference.torque_nm[leg].astype(float).ravel()
+        simulated = self._reference.torque_nm[leg][: self._cycles].astype(float).ravel()
+        torque = self._sensor.received(simulated, self._step_s)
         if self._sensor.is_instant:
             return averaged(torque[self._at], self._sensor.together)
         at = np.minimum(self._ends.astype(np.int64), len(torque) - 1)

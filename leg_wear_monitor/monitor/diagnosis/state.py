@@ -9,13 +9,15 @@ import numpy as np
 from leg_wear_monitor.mechanism.arrays import Floats
 from leg_wear_monitor.monitor.diagnosis.change_detector import DetectorState
 from leg_wear_monitor.monitor.diagnosis.clearance_fit import ClearanceFit
-from leg_wear_monitor.monitor.diagnosis.diagnosis import Change
+from leg_wear_monitor.monitor.diagnosis.diagnosis import Change, NotUsed
 from leg_wear_monitor.monitor.diagnosis.signature import TorqueSensor
 from leg_wear_monitor.monitor.diagnosis.torque_samples import NO_TORQUE_SAMPLES, TorqueSamples
 from leg_wear_monitor.monitor.ledger.entry import CommissionedTorque
 from leg_wear_monitor.twin.reference.crank_profile import CrankProfile
 from leg_wear_monitor.twin.reference.leg_parameters import LegParameters
 from leg_wear_monitor.twin.reference.torque_reference import TorqueReference
+
+UNUSED_CYCLES = 20  # in a row, after which a result is not one of the leg as it walks now
 
 
 class SignedCycle(NamedTuple):
@@ -60,8 +62,10 @@ class TorqueState:
         Changes by which the counted clearances were corrected.
     unlike : int
         Gait cycles in a row whose crank turned otherwise than in the reference.
-    unusable : int
-        Gait cycles in a row without a signature.
+    not_used : dict of str to int
+        Gait cycles that were not used, by the values of `NotUsed`; replaced, never changed.
+    unused : tuple of NotUsed
+        Reasons of the last gait cycles in a row that were not used.
     off_cadence_rpm : float
         Cadence of the last gait cycle if it is not the commanded one, else NaN.
     pause : bool
@@ -90,13 +94,19 @@ class TorqueState:
     changes: tuple[Change, ...] = ()
     settled: tuple[Change, ...] = ()
     unlike: int = 0
-    unusable: int = 0
+    not_used: dict[str, int] = attrs.field(factory=dict)
+    unused: tuple[NotUsed, ...] = ()
     off_cadence_rpm: float = math.nan
     pause: bool = False
     parameters: LegParameters | None = None
     rounds: int = 0
     is_identifying: bool = False
     has_failed: bool = False
+
+    def leave_out(self, reason: NotUsed, cycles: int = 1) -> None:
+        """Count gait cycles that are not used."""
+        self.not_used = {**self.not_used, reason.value: self.not_used.get(reason.value, 0) + cycles}
+        self.unused = (*self.unused, reason)[-UNUSED_CYCLES:]
 
     @property
     def signatures(self) -> Floats:

@@ -36,7 +36,8 @@ class CycleTorque(NamedTuple):
 
     ``angle`` (n,) crank angle [rad], ``torque`` (n,) [N m], ``step`` (n,) torque less that of the sample
     before [N m], NaN where that was lost; ``profile`` how the crank turned; ``period_s`` of the sensor;
-    ``late`` from the begin to the first sample, in periods of the sensor.
+    ``late`` from the begin to the first sample, in periods of the sensor; ``jitter`` median departure of the
+    times between samples from that period, as a fraction of it.
     """
 
     angle: Floats
@@ -45,6 +46,7 @@ class CycleTorque(NamedTuple):
     profile: CrankProfile
     period_s: float
     late: float
+    jitter: float
 
 
 def extended(kept: TorqueSamples, piece: Samples) -> TorqueSamples:
@@ -97,7 +99,9 @@ def cycle_torque(kept: TorqueSamples, begin_ns: int, end_ns: int, sensor: Torque
     step = np.diff(torque, prepend=np.nan)
     step[gap] = np.nan
     late = 1.0e-9 * float(torque_ns[0] - begin_ns) / sensor.period_s
-    return CycleTorque(angle, torque, step, profile, sensor.period_s, late)
+    period_ns = 1.0e9 * sensor.period_s
+    jitter = float(np.median(np.abs(np.diff(torque_ns) - period_ns))) / period_ns
+    return CycleTorque(angle, torque, step, profile, sensor.period_s, late, jitter)
 
 
 def _between(stamps: Ints, values: Floats, begin_ns: int, end_ns: int) -> tuple[Ints, Floats]:

@@ -311,11 +311,27 @@ class CommissionedTorque:
         Counted clearances then.
     signatures : (cycles, F) array
         Of each gait cycle, as in `diagnosis.signature`.
+    sigma_m : (k,) array
+        Standard deviations of the clearances: above 0 where a correction made them.
+    delay_s, time_constant_s : float
+        Of the torque sensor, by these signatures.
     """
 
     stamp_ns: int
     clearance_m: Floats
     signatures: Floats
+    sigma_m: Floats = attrs.field()
+    delay_s: float = 0.0
+    time_constant_s: float = 0.0
+
+    @sigma_m.default
+    def _as_counted(self) -> Floats:
+        return np.zeros(len(self.clearance_m))
+
+    @property
+    def is_as_counted(self) -> bool:
+        """Whether the clearances were the counted ones, not corrected."""
+        return not self.sigma_m.any()
 
     @property
     def cycles(self) -> int:

@@ -28,6 +28,7 @@ from leg_wear_monitor.monitor.ledger.rows import (
     read_last_reset,
     read_last_verdict,
     read_measurements,
+    read_part_of_reference,
     read_simulated_reference,
     read_spans,
 )
@@ -61,8 +62,8 @@ class Ledger:
         Errors of further encoders from earlier runs.
     commissioned_torque : CommissionedTorque or None
         Signatures of the drive torque from earlier runs.
-    reference : SimulatedReference or None
-        Torque reference that was simulated in earlier runs.
+    reference, part_of_reference : SimulatedReference or None
+        Torque reference that was simulated in earlier runs, and one that is not whole yet.
     parameters : IdentifiedLeg or None
         Masses, lengths and friction that were identified in earlier runs.
     last_run : Run
@@ -127,6 +128,7 @@ class Ledger:
         self.commissioned_torque = self._store.ask(read_commissioned_torque)
         self.parameters = self._store.ask(read_identified_leg)
         self.reference = self._store.ask(read_simulated_reference)
+        self.part_of_reference = self._store.ask(read_part_of_reference)
 
     @property
     def counted_ns(self) -> Ints:

@@ -30,6 +30,8 @@ from leg_wear_monitor.twin.reference.leg_parameters import LegParameters
 from leg_wear_monitor.twin.reference.leg_simulation import POINTS
 from leg_wear_monitor.twin.reference.torque_reference import TorqueReference
 
+_PART = 2  # row of a reference that is not whole
+
 
 def write_run(db: sqlite3.Connection, run: Run) -> None:
     """Insert or replace a run; to be called within a transaction."""
@@ -111,11 +113,17 @@ def write_event(db: sqlite3.Connection, event: Event) -> None:
                 (stamp_ns, "\n".join(encoders), errors.astype("<f8").tobytes()),
             )
         case CommissionedTorque():
-            known, signatures = event.clearance_m.astype("<f8"), event.signatures.astype("<f8")
+            parts = (event.clearance_m, event.signatures, event.sigma_m)
             db.execute(
-                "INSERT INTO torque_commissioning (stamp_ns, cycles, clearance_m, signatures) "
-                "VALUES (?, ?, ?, ?)",
-                (event.stamp_ns, event.cycles, known.tobytes(), signatures.tobytes()),
+                "INSERT INTO torque_commissioning (stamp_ns, cycles, clearance_m, signatures, sigma_m, "
+                "delay_s, time_constant_s) VALUES (?, ?, ?, ?, ?, ?, ?)",
+                (
+                    event.stamp_ns,
+                    event.cycles,
+                    *(part.astype("<f8").tobytes() for part in parts),
+                    event.delay_s,
+                    event.time_constant_s,
+                ),
             )
         case IdentifiedLeg(stamp_ns, names, mass, length, friction):
             db.execute("INSERT INTO friction (stamp_ns, factor) VALUES (?, ?)", (stamp_ns, friction))
@@ -124,9 +132,10 @@ def write_event(db: sqlite3.Connection, event: Event) -> None:
                 [(stamp_ns, *factors) for factors in zip(names, mass, length, strict=True)],
             )
         case SimulatedReference():
-            values = _reference_values(event)
+            values, number = _reference_values(event), 1 if event.reference.is_whole else _PART
             places = ", ".join("?" * len(values))
-            db.execute(f"INSERT OR REPLACE INTO torque_reference VALUES (1, {places})", values)
+            db.execute("DELETE FROM torque_reference WHERE id IN (?, ?)", (number, _PART))
+            db.execute(f"INSERT INTO torque_reference VALUES ({number}, {places})", values)
         case Audit(stamp_ns, who, what, was, undoes):
             state: tuple[object, ...] = (None,) * 6
             if was:
@@ -189,13 +198,16 @@ def read_commissioned(db: sqlite3.Connection) -> Commissioned | None:
 def read_commissioned_torque(db: sqlite3.Connection) -> CommissionedTorque | None:
     """Stored signature of the drive torque, None if it was not commissioned since a part was replaced."""
     row = db.execute(
-        "SELECT stamp_ns, cycles, clearance_m, signatures FROM torque_commissioning "
+        "SELECT stamp_ns, cycles, delay_s, time_constant_s, clearance_m, signatures, sigma_m "
+        "FROM torque_commissioning "
         "WHERE stamp_ns > (SELECT coalesce(max(replaced_ns), 0) FROM joint) ORDER BY id DESC LIMIT 1"
     ).fetchone()
     if row is None:
         return None
-    clearance_m, signatures = (np.frombuffer(part, "<f8").astype(float) for part in row[2:])
-    return CommissionedTorque(row[0], clearance_m, signatures.reshape(row[1], -1))
+    clearance_m, signatures, sigma_m = (np.frombuffer(part, "<f8").astype(float) for part in row[4:])
+    return CommissionedTorque(
+        row[0], clearance_m, signatures.reshape(row[1], -1), sigma_m, delay_s=row[2], time_constant_s=row[3]
+    )
 
 
 def read_identified_leg(db: sqlite3.Connection) -> IdentifiedLeg | None:
@@ -230,15 +242,25 @@ def _reference_values(event: SimulatedReference) -> tuple[float | bytes | str, .
         *(part.astype("<f8").tobytes() for part in (leg.mass, leg.length)),
         leg.friction,
         reference.torque_nm[0].astype("<f2").tobytes(),
-        np.stack(reference.torque_nm[1:]).astype("<f2").tobytes(),
+        b"".join(one.astype("<f2").tobytes() for one in reference.torque_nm[1:]),
     )
 
 
 def read_simulated_reference(db: sqlite3.Connection) -> SimulatedReference | None:
     """Torque reference that was simulated for the leg, None if there is none."""
+    return _read_reference(db, 1)
+
+
+def read_part_of_reference(db: sqlite3.Connection) -> SimulatedReference | None:
+    """Torque reference whose simulation was not finished, None if there is none."""
+    return _read_reference(db, _PART)
+
+
+def _read_reference(db: sqlite3.Connection, number: int) -> SimulatedReference | None:
     row = db.execute(
         "SELECT stamp_ns, bodies, speed_radps, legs, friction, ripple_rad, clearance_m, mass, length, "
-        "expected_torque_nm, torque_nm FROM torque_reference"
+        "expected_torque_nm, torque_nm FROM torque_reference WHERE id = ?",
+        (number,),
     ).fetchone()
     if row is None:
         return None
@@ -246,7 +268,7 @@ def read_simulated_reference(db: sqlite3.Connection) -> SimulatedReference | Non
     ripple, known, mass, length = (np.frombuffer(part, "<f8").astype(float) for part in row[5:9])
     expected, wider = (np.frombuffer(part, "<f2").astype(np.float16).reshape(-1, POINTS) for part in row[9:])
     profile, leg = CrankProfile(speed, *ripple.reshape(2, -1)), LegParameters(mass, length, friction)
-    torque = (expected, *wider.reshape(legs - 1, -1, POINTS))
+    torque = (expected, *wider.reshape(-1, len(expected) // 2, POINTS))  # half as many cycles each
     reference = TorqueReference(profile, known.reshape(legs, -1), torque, leg)
     return SimulatedReference(stamp_ns, tuple(bodies.split("\n")), reference)
 

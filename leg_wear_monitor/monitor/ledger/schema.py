@@ -317,6 +317,38 @@ CREATE TABLE alarm (
 INSERT INTO alarm SELECT kind, subject, level, present, acknowledged, raised_ns, worst, limit_value, NULL, ''
     FROM former;
 DROP TABLE former;
+
+CREATE TEMP TABLE former AS SELECT * FROM torque_commissioning;
+DROP TABLE torque_commissioning;
+
+-- signatures of the drive torque while the clearances were known; the last row is in force. All are float64,
+-- little endian: counted clearances of the clearance joints [m], the signature of each gait cycle, and the
+-- standard deviations of the clearances [m], above 0 where a correction made them; then the delay and the
+-- time constant of the torque sensor by them
+CREATE TABLE torque_commissioning (
+    id INTEGER PRIMARY KEY, stamp_ns INTEGER NOT NULL, cycles INTEGER NOT NULL, clearance_m BLOB NOT NULL,
+    signatures BLOB NOT NULL, sigma_m BLOB NOT NULL, delay_s REAL NOT NULL, time_constant_s REAL NOT NULL
+) STRICT;
+INSERT INTO torque_commissioning SELECT id, stamp_ns, cycles, clearance_m, signatures,
+    zeroblob(length(clearance_m)), 0, 0 FROM former;
+DROP TABLE former;
+
+CREATE TEMP TABLE former AS SELECT * FROM torque_reference;
+DROP TABLE torque_reference;
+
+-- the torque reference in force, if it was simulated for this leg (id 1), and one whose simulation was not
+-- finished (id 2), whose torques are those of the first of its legs: speed of its crank and ripple (2,
+-- harmonics), clearances (legs, k), bodies (a line each) and their factors on masses and lengths of the
+-- mechanism file, the factor on its friction, and drive torques [N m] of the expected leg and of the other
+-- ones (cycles, points each; half as many cycles); float64 and, of torques, float16, little endian
+CREATE TABLE torque_reference (
+    id INTEGER PRIMARY KEY CHECK (id IN (1, 2)), stamp_ns INTEGER NOT NULL, speed_radps REAL NOT NULL,
+    ripple_rad BLOB NOT NULL, clearance_m BLOB NOT NULL, legs INTEGER NOT NULL, bodies TEXT NOT NULL,
+    mass BLOB NOT NULL, length BLOB NOT NULL, friction REAL NOT NULL, expected_torque_nm BLOB NOT NULL,
+    torque_nm BLOB NOT NULL
+) STRICT;
+INSERT INTO torque_reference SELECT * FROM former;
+DROP TABLE former;
 """
 
 MIGRATIONS = (

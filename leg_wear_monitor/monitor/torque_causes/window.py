@@ -26,7 +26,7 @@ class MismatchWindow:
     is_open : bool
         Whether the alarm was present in the last gait cycle.
     explanation : TorqueExplanation or None
-        As of the last time it was due; kept while the alarm is latched.
+        As of the last time that one was found; kept while the alarm is latched.
     """
 
     cycles: tuple[CycleStatistics, ...] = ()
@@ -63,14 +63,14 @@ class MismatchWindow:
         cycles, number = (*before.cycles, statistics)[-_LONGEST:], before.number + 1
         explanation = before.explanation
         if number in _FIRST or number % _EVERY == 0:
-            explanation = explain(cycles)
+            explanation = explain(cycles) or explanation  # a cause stays if the mismatch becomes less
         return MismatchWindow(cycles, number, True, explanation)
 
     def _before(self) -> "MismatchWindow":
         """Window before the first gait cycle with the alarm: those in which it was found."""
         since = self.number if self.number < _FIRST[0] else _RISES - 1
         cycles = self.cycles[-since:] if since else ()
-        return MismatchWindow(cycles, len(cycles))
+        return MismatchWindow(cycles, len(cycles), explanation=self.explanation)
 
 
 NO_MISMATCH = MismatchWindow()

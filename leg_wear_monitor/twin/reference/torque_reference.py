@@ -32,6 +32,8 @@ from leg_wear_monitor.twin.reference.leg_simulation import (
 CYCLES = 40  # simulated for each wider leg, and twice as many for each other one
 WIDER = (1.2, 1.35, 1.5, 2.0, 3.0, 5.0, 8.0)  # factors on the expected clearance, one joint at a time
 
+WORN, NARROWER = 1.2, 0.8  # a clearance over the new one, and a factor on the others beside it
+
 HEAVIER, LONGER = 0.04, 0.004  # of a body's mass and length, one body at a time
 ROUGHER = 1.5  # factor on the friction in the joints
 
@@ -61,6 +63,11 @@ class TorqueReference:
     clearance_m: Floats
     torque_nm: tuple[HalfFloats, ...]
     parameters: LegParameters
+
+    @property
+    def is_whole(self) -> bool:
+        """Whether all legs are simulated: a part of a reference has the torques of the first ones."""
+        return len(self.torque_nm) == len(self.clearance_m)
 
     @property
     def angle(self) -> Floats:
@@ -105,9 +112,9 @@ class TorqueReferenceRun:
 
     def __init__(self, mechanism: Mechanism) -> None:
         self._mechanism = mechanism
-        self._radius = np.array(
-            [mechanism.clearances[joint].bushing_radius for joint in mechanism.clearance_joints]
-        )
+        joints = [mechanism.clearances[joint] for joint in mechanism.clearance_joints]
+        self._radius = np.array([joint.bushing_radius for joint in joints])
+        self._fresh = np.array([joint.radial_clearance for joint in joints])
         self._legs: tuple[_Leg, ...] = ()
         self._done: tuple[HalfFloats, ...] = ()
         self._torque, self._cycle = np.zeros((0, POINTS), np.float16), 0
@@ -137,7 +144,7 @@ class TorqueReferenceRun:
         Parameters
         ----------
         clearance_m : (k,) array
-            Expected mean clearances [m].
+                Expected mean clearances [m].
         depth : (k, 2, N) array
             Wear depths [m], which show where joints are worn.
         profile : CrankProfile
@@ -146,14 +153,40 @@ class TorqueReferenceRun:
         """
         parameters = parameters or LegParameters.none(self._mechanism)
         centre = np.maximum(clearance_m, _LEAST_CLEARANCE_M)
-        widest = 0.5 * self._radius  # no clearance is wider than its journal is thick
+        # no clearance is wider than its journal is thick; a worn joint may have got a new part without a word
+        widest, is_worn = 0.5 * self._radius, centre > WORN * self._fresh
+        narrower = np.where(is_worn, self._fresh, NARROWER * centre)
         legs = [_Leg(parameters, centre)]
         for k in range(len(centre)):
-            for factor in WIDER:
-                wider = centre.copy()
-                wider[k] = min(factor * centre[k], widest[k])
-                legs.append(_Leg(parameters, wider))
+            sizes = [min(factor * centre[k], widest[k]) for factor in WIDER]
+            for size in [*sizes, narrower[k]] if is_worn.any() else sizes:
+                other = centre.copy()
+                other[k] = size
+                legs.append(_Leg(parameters, other))
         self._begin(legs, depth, profile)
+
+    def go_on(self, part: TorqueReference, depth: Floats) -> None:
+        """Go on with a reference of which the first legs were simulated in an earlier run.
+
+        Parameters
+        ----------
+        part : TorqueReference
+        depth : (k, 2, N) array
+            Wear depths [m], as of `begin`.
+        """
+        legs = [_Leg(part.parameters, clearance_m) for clearance_m in part.clearance_m]
+        self._begin(legs, depth, part.profile)
+        self._done = part.torque_nm
+        if self.is_busy:
+            self._clear()
+
+    @property
+    def part(self) -> TorqueReference | None:
+        """The legs of a reference that are simulated so far; None where none is, or all are."""
+        if not (self._done and self.is_busy):
+            return None
+        clearance_m = np.array([leg.clearance_m for leg in self._legs])
+        return TorqueReference(self._simulation.profile, clearance_m, self._done, self._legs[0].parameters)
 
     def begin_identification(
         self, clearance_m: Floats, depth: Floats, profile: CrankProfile, near: LegParameters

@@ -170,6 +170,8 @@ def words_of(change: Change, situation: Situation) -> str:
         verb = "was" if change.is_corrected else "is"
         joint = situation.joint_words(change.subject)
         words = f"clearance of {value} in joint {joint} ({counted} {verb} counted)"
+        if change.value < change.counted:
+            words += ", less than before: if its part was replaced, reset the joint"
     elif change.cause in _COMPARED:
         percent = estimate(100.0 * abs(change.value), 100.0 * change.sigma, "%")
         less, more = _COMPARED[change.cause]

@@ -140,9 +140,14 @@ class LegFollower:
         return clearances(self._setup.contacts, self._setup.surfaces.depth)
 
     def take_surfaces(self, depth: Floats) -> None:
-        """Set wear depths (k, 2, N) [m]; for changed joints, the growth of the cycle counts from there."""
+        """Set wear depths (k, 2, N) [m]; for changed joints, the growth of the cycle counts from there.
+
+        Where a wall is closer than before, journals may be behind it: the leg is set in motion again.
+        """
         own, state = self._setup.surfaces.depth, self._stepper.state
         changed = (own != depth).any(axis=(1, 2))
+        if (depth < own).any():
+            self.state.motion.runs = 0
         own[:] = depth
         if changed.any():
             self._repeating.cycles = ()

@@ -28,7 +28,7 @@ from leg_wear_monitor.monitor.ledger.run import Run
 from leg_wear_monitor.twin.reference.crank_profile import CrankProfile
 from leg_wear_monitor.twin.reference.leg_parameters import LegParameters
 from leg_wear_monitor.twin.reference.leg_simulation import POINTS
-from leg_wear_monitor.twin.reference.torque_reference import TorqueReference
+from leg_wear_monitor.twin.reference.torque_reference import CYCLES, TorqueReference
 
 _PART = 2  # row of a reference that is not whole
 
@@ -268,7 +268,8 @@ def _read_reference(db: sqlite3.Connection, number: int) -> SimulatedReference |
     ripple, known, mass, length = (np.frombuffer(part, "<f8").astype(float) for part in row[5:9])
     expected, wider = (np.frombuffer(part, "<f2").astype(np.float16).reshape(-1, POINTS) for part in row[9:])
     profile, leg = CrankProfile(speed, *ripple.reshape(2, -1)), LegParameters(mass, length, friction)
-    torque = (expected, *wider.reshape(-1, len(expected) // 2, POINTS))  # half as many cycles each
+    cycles = CYCLES if number == _PART else -1
+    torque = (expected, *wider.reshape(-1 if number == _PART else legs - 1, cycles, POINTS))
     reference = TorqueReference(profile, known.reshape(legs, -1), torque, leg)
     return SimulatedReference(stamp_ns, tuple(bodies.split("\n")), reference)
 

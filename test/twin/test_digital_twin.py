@@ -395,3 +395,17 @@ def test_it_can_walk_backwards_as_commanded(leg, gait):
 )
 def test_senseless_settings_are_refused(name, value, refused):
     refused(TwinSettings, name, value)
+
+
+def test_a_reset_of_a_wide_joint_sets_the_leg_in_motion_again(twin, gait) -> None:
+    """Seen before: the journal was left 1.7 mm behind the new wall, and IMPACT_FORCE_G 108 409 N followed."""
+    depth = twin.depth
+    depth[twin.clearance_joints.index("G"), 0] += 1.75e-3
+    twin.set_depth(depth)
+    wide = twin.update(gait(3.0))
+    twin.reset_wear("G")
+    after = twin.update(gait(3.0 + 3.0)[600:])
+    assert TwinEventKind.ACQUIRED in [event.what for event in after.events]
+    # no more than the joint with its wide clearance: a new one is hit less hard
+    assert np.nanmax(after.samples.contact_force_n) <= np.nanmax([c.peak_force_n for c in wide.cycles])
+    assert all((cycle.peak_force_n < 1.0e4).all() for cycle in after.cycles)

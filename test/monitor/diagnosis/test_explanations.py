@@ -6,8 +6,15 @@ import pytest
 
 from leg_wear_monitor.monitor.diagnosis.clearance_fit import fit_clearances
 from leg_wear_monitor.monitor.diagnosis.diagnosis import Cause
-from leg_wear_monitor.monitor.diagnosis.explanations import Baseline, Explainer, Misfits, Nuisance
+from leg_wear_monitor.monitor.diagnosis.explanations import (
+    Baseline,
+    Explainer,
+    Misfits,
+    Nuisance,
+    OtherChannel,
+)
 from leg_wear_monitor.monitor.diagnosis.leg_model import change_of
+from leg_wear_monitor.monitor.diagnosis.nuisances import with_scatter_of
 from leg_wear_monitor.monitor.diagnosis.signature import TorqueSensor
 from leg_wear_monitor.monitor.diagnosis.signature_model import SignatureModel
 
@@ -107,6 +114,42 @@ def test_usual_friction_is_no_change_of_clearances(explainer: Explainer) -> None
     extra = 0.3 * explainer.nuisances[0].column
     fit = fit_clearances(explainer, measured(explainer, NEW, 60, 1, extra), 60, NEW, NEW)
     assert (np.abs(fit.clearance_m - NEW) < 4.0 * fit.sigma_m).all()
+
+
+def test_what_no_leg_can_have_is_no_cause(explainer: Explainer) -> None:
+    """A foot three times as heavy fits best, and the next best would be a wrong clearance."""
+    extra = 2.0 * explainer.nuisances[1].column
+    found = explainer.explanations(measured(explainer, NEW, 10, 1, extra), 10, NEW)
+    assert found[0].value == pytest.approx(2.0, abs=0.1)
+    change = change_of(found, 5)
+    assert change is not None
+    assert (change.cause, change.subject) == (Cause.UNKNOWN, "")
+
+
+def test_another_channel_is_a_lag_and_no_clearance(explainer: Explainer) -> None:
+    late = OtherChannel(0.01, 3.0 * np.random.default_rng(8).standard_normal(F))
+    own = Explainer(
+        explainer.model,
+        JOINTS,
+        explainer.baseline,
+        explainer.nuisances,
+        (OtherChannel(0.005, late.column[::-1]), late),
+    )
+    found = own.explanations(measured(explainer, NEW, 10, 1, late.column), 10, NEW)
+    assert (found[0].cause, found[0].value) == (Cause.LAG, 0.01)
+
+
+@pytest.mark.parametrize("scale", [1.0, 3.0])
+def test_a_leg_that_scatters_more_has_a_larger_covariance_in_that_direction(scale: float) -> None:
+    random = np.random.default_rng(3)
+    along = np.ones(F) / np.sqrt(F)
+    cycles = random.standard_normal((60, F)) + (scale - 1.0) * 3.0 * random.standard_normal((60, 1)) * along
+    found = with_scatter_of(np.eye(F), cycles)
+    assert np.linalg.eigvalsh(found)[0] > 0.1  # it can be inverted with fewer cycles than entries
+    variance = along @ found @ along
+    expected = 1.0 + (3.0 * (scale - 1.0)) ** 2
+    # half of the weight is the sample's; a sample variance of 60 scatters by 18 %
+    assert 0.4 * expected < variance < 1.7 * expected
 
 
 def test_misfits_are_those_of_normal_densities() -> None:

@@ -22,7 +22,8 @@ LATER = (
     "read_corrections",
     "read_identified_leg",
     "read_measurements",
-    "read_simulated_reference", "read_part_of_reference",
+    "read_simulated_reference",
+    "read_part_of_reference",
 )
 
 EVENT = VerdictEvent(

@@ -46,6 +46,37 @@ def test_each_joint_is_wider_in_turn(leg, short) -> None:
     np.testing.assert_array_equal(found.parameters.mass, 1.0)
 
 
+def test_a_worn_joint_is_also_new_and_the_others_narrower(leg, short) -> None:
+    worn, run = NEW.copy(), TorqueReferenceRun(leg)
+    worn[2] = 9.0e-4
+    run.begin(worn, UNWORN, STEADY)
+    found = finished(run)
+    sizes = len(WIDER) + 1
+    assert len(found.torque_nm) == 1 + 5 * sizes
+    np.testing.assert_allclose(found.clearance_m[3 * sizes, 2], 3.0e-4)
+    np.testing.assert_allclose(found.clearance_m[sizes, 0], 0.8 * 3.0e-4)
+
+
+def test_a_part_of_a_reference_goes_on_where_it_ended(leg, short) -> None:
+    whole, first, second = (TorqueReferenceRun(leg) for _ in range(3))
+    whole.begin(NEW, UNWORN, STEADY)
+    first.begin(NEW, UNWORN, STEADY)
+    assert first.part is None
+    for _ in range(12):
+        first.advance()
+    part = first.part
+    assert part is not None
+    assert not part.is_whole
+    assert 5 < len(part.torque_nm) < 12
+    second.go_on(part, UNWORN)
+    assert second.progress == pytest.approx(first.progress, abs=0.03)
+    one, other = finished(whole), finished(second)
+    assert other.is_whole
+    assert second.part is None
+    for torque, same in zip(one.torque_nm, other.torque_nm, strict=True):
+        np.testing.assert_array_equal(torque, same)
+
+
 def test_each_body_is_heavier_and_longer_in_turn_and_friction_larger(leg, short) -> None:
     none, run = LegParameters.none(leg), TorqueReferenceRun(leg)
     run.begin_identification(NEW, UNWORN, STEADY, none)

@@ -99,7 +99,9 @@ class Evidence:
         if since_ns and not _is_due(len(cycles)):
             return
         mean, change = np.mean([cycle.signature for cycle in cycles], axis=0), None
-        explanations = self._models.explainer(state).explanations(mean, len(cycles), state.counted_m)
+        explanations: Sequence[Explanation] = ()
+        if since_ns or state.commissioned is None:
+            explanations = self._models.explainer(state).explanations(mean, len(cycles), state.counted_m)
         if since_ns:
             change = self._change(state, explanations, since_ns)
             if change is not None:

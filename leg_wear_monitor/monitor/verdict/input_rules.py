@@ -135,7 +135,12 @@ def not_observed(situation: Situation) -> Sequence[Hit]:
     if not blind or not situation.has_cycle or not situation.has_torque:
         return []
     cause = f": {found.reason}" if found.reason else ""
-    return [Hit(words={"joints": ", ".join(map(situation.joint_words, blind)), "causes": cause})]
+    unused = tuple(
+        Evidence(f"cycles not used: {reason}", float(number), math.nan, "")
+        for reason, number in found.cycles_not_used.items()
+    )
+    joints = ", ".join(map(situation.joint_words, blind))
+    return [Hit(words={"joints": joints, "causes": cause}, evidence=unused)]
 
 
 def other_cadence(situation: Situation) -> Sequence[Hit]:

@@ -1,14 +1,16 @@
 """Commissioning: recordings of a healthy leg in, proposed parameters out."""
 
-from collections.abc import Callable, Iterable
+from collections.abc import Callable, Iterable, Sequence
 from pathlib import Path
 
 import attrs
 
 from leg_wear_monitor.bags.bag import Recordable, listed_recordings
+from leg_wear_monitor.bags.findings import RecordingError
 from leg_wear_monitor.bags.series.reading import read_signals
 from leg_wear_monitor.bags.series.signals import JointName, Signals, TorqueSource
 from leg_wear_monitor.commissioning.evidence.misfit import Load, with_load
+from leg_wear_monitor.commissioning.evidence.mismatch import LIMIT, mismatch_item
 from leg_wear_monitor.commissioning.evidence.sampling import sampling_of
 from leg_wear_monitor.commissioning.evidence.timing import separates_lag, timing_of
 from leg_wear_monitor.commissioning.proposal.findings import findings, not_told, notes
@@ -73,15 +75,35 @@ def commission(
     """
     base = config if isinstance(config, MonitorConfig) else load_config(config)
     mechanism = fitted(load_mechanism(base.mechanism), base)
+    recordings = listed_recordings(paths)
     signals, faults = read_signals(
-        listed_recordings(paths),
+        recordings,
         base,
         joint_states=joint_states,
         drive_torque=drive_torque,
         progress=lambda f: progress(0.5 * f),
     )
     result = propose(signals, mechanism, base, crank_joint, lambda f: progress(0.5 + 0.5 * f))
-    return attrs.evolve(result, faults=tuple(faults))
+    return attrs.evolve(_with_limit(result, recordings, joint_states, drive_torque), faults=tuple(faults))
+
+
+def _with_limit(
+    result: CommissioningResult,
+    recordings: Sequence[Recordable],
+    joint_states: str | None,
+    drive_torque: str | None,
+) -> CommissioningResult:
+    """The proposal with a limit of the mismatch for this leg: by its last recording, as is the offset."""
+    if result.config is None:
+        return result
+    try:
+        item = mismatch_item(recordings[-1:], result.config, joint_states, drive_torque)
+    except RecordingError as error:  # topics that the proposal chose among several have to be named
+        return attrs.evolve(result, notes=(*result.notes, f"{LIMIT} stays as it is: {error}"))
+    if item is None:
+        return result
+    config = config_from({**values_of(result.config), LIMIT: item.value}, "commission")
+    return attrs.evolve(result, items=(*result.items, item), config=config)
 
 
 def propose(

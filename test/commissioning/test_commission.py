@@ -10,7 +10,7 @@ import attrs
 import numpy as np
 import pytest
 
-from leg_wear_monitor import LegWearError, Mechanism, MonitorConfig
+from leg_wear_monitor import LegWearError, Mechanism, MonitorConfig, simulate
 from leg_wear_monitor.bags.series.signals import (
     EFFORT,
     FLOAT64,
@@ -223,6 +223,29 @@ def test_an_encoder_that_starts_anew_is_found_again_and_reported(
     (text,) = result.findings
     assert "starts at another zero in each recording" in text
     assert "0.316" in text
+
+
+def test_the_limit_of_the_mismatch_is_that_of_the_leg(leg: Mechanism) -> None:
+    """A torque of which a part is not the model's would raise the alarm in each gait cycle."""
+    ideal = simulate(leg, clearances=[], cycles=1, trace=200).trace
+    angle, random, limits = np.tile(ideal.crank_angle_rad, 40), np.random.default_rng(1), []
+    for strange_nm in (0.0, 2.5):
+        torque = np.tile(ideal.drive_torque_nm, 40) + strange_nm * np.sin(9.0 * angle)
+        result = commission(
+            {
+                "time": 1.0 + 0.005 * np.arange(len(angle)),
+                "crank_angle": angle,
+                "drive_torque": torque + 0.1 * random.standard_normal(len(angle)),
+            }
+        )
+        assert result.config is not None
+        (item,) = (each for each in result.items if each.name == "limits.torque_mismatch")
+        assert result.config.limits.torque_mismatch == item.value
+        limits.append(item.value)
+    # a leg without clearance, whose instants are taken as averages, has 0.12; 1.8 of 9.2 N m RMS are added
+    assert MonitorConfig().limits.torque_mismatch <= limits[0] < 0.2
+    # the filter before the comparison takes some of it
+    assert 1.2 * limits[0] < limits[1] < math.hypot(0.14, 1.8 / 9.2) / 0.8
 
 
 def test_two_legs_in_one_recording_are_not_enough_to_tell(

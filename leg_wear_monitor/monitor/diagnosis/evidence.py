@@ -27,6 +27,7 @@ _FIT_EVERY = 10  # gait cycles, while nothing changes
 # a joint at 0.36 to 1 mm, from 1.1 on behind a low-pass of 50 Hz or a lag (docs/explanation/diagnosis.md)
 _GOOD = 1.5
 _SURE_LOG_ODDS = 5.0
+_LEAST_BEFORE = 3  # gait cycles before a change that show the leg without it
 
 
 class Evidence:
@@ -102,13 +103,15 @@ class Evidence:
         explanations: Sequence[Explanation] = ()
         if since_ns or state.commissioned is None:
             explanations = self._models.explainer(state).explanations(mean, len(cycles), state.counted_m)
-        if since_ns:
+        is_known = bool(state.commissioned or state.changes or self._fits(state, explanations, since_ns))
+        if since_ns and is_known:
             change = self._change(state, explanations, since_ns)
+        if since_ns:
             if change is not None:
                 state.changes = (change,)
             elif len(cycles) >= SETTLING_CYCLES:  # what was detected does not last
                 state.changes, state.detector = (), detector.fresh()
-        if state.commissioned is None and not _fits(explanations):
+        if not is_known:
             state.fit = None
         else:
             self._fit(state, mean, len(cycles), change)
@@ -117,17 +120,30 @@ class Evidence:
         """Gait cycles since a change before it is explained."""
         return _LEAST_CYCLES if self._models.fits(state) else _LEAST_CYCLES_UNLIKE
 
+    def _fits(self, state: TorqueState, explanations: Sequence[Explanation], since_ns: int) -> bool:
+        """Whether a leg that was never commissioned is that of the reference, but for one clearance at most.
+
+        It is, too, if it was before a change: a large opening is explained less well.
+        """
+        if _is_of_reference(explanations):
+            return True
+        before = [cycle.signature for cycle in state.cycles if cycle.begin_ns < since_ns]
+        if len(before) < _LEAST_BEFORE:
+            return False
+        explainer, mean = self._models.explainer(state), np.mean(before, axis=0)
+        return _is_of_reference(explainer.explanations(mean, len(before), state.counted_m))
+
     def _change(
         self, state: TorqueState, explanations: Sequence[Explanation], since_ns: int
     ) -> Change | None:
         """What has changed since a gait cycle, by the explanations of those from then on, the best first.
 
-        Nothing has before a leg is commissioned, unless its torque is that of the reference but for one
-        joint: all else is constant, and becomes part of the baseline. A change of a clearance gets its most
-        probable begin; another one keeps that of its detection.
+        Before a leg is commissioned, a clearance that is sure to have: all else is constant, and becomes part
+        of the baseline. A change of a clearance gets its most probable begin; another one keeps that of its
+        detection.
         """
         change = change_of(explanations, since_ns)
-        if state.commissioned is None and not (change and change.is_sure and _fits(explanations)):
+        if state.commissioned is None and not (change and change.is_sure):
             return None
         if change is None or change.cause is not Cause.CLEARANCE:
             return change
@@ -146,10 +162,10 @@ class Evidence:
         state.fit_cycles = cycles
 
 
-def _fits(explanations: Sequence[Explanation]) -> bool:
-    """Whether a leg that was never commissioned is that of the reference, but for one clearance at most.
+def _is_of_reference(explanations: Sequence[Explanation]) -> bool:
+    """Whether one clearance at most explains a torque, by its causes, the best first.
 
-    The causes, the best first, include a torque that is late or filtered.
+    They include a torque that is late or filtered.
     """
     best = explanations[0]
     own = next(one for one in explanations if one.cause in (Cause.CLEARANCE, Cause.UNKNOWN))

@@ -13,6 +13,7 @@ from leg_wear_monitor.monitor.diagnosis.signature_model import SignatureModel
 # of what a clearance changes, and of an opening: legs with masses 4 % off show 10 to 27 % less (2026-11-23)
 MODEL_ERROR = 0.2
 
+_APART = 2.0  # standard deviations by which likely sizes may scatter about the best one
 _SIZES = 24  # clearances of a joint that are tried; between them a parabola finds the best
 _LEAST_FACTOR = 0.7  # of the counted clearance
 _CORNER = 1.0e200
@@ -225,10 +226,12 @@ class Explainer:
         size = float(np.exp(value))
         square = float(tried(np.array([size])).square[0]) / len(rest)
         poor = max(1.0, square)  # the square of Birge's ratio
-        # sizes far from the best one may fit almost as well
+        # sizes far from the best one may fit almost as well: then the mean of all
         likely = np.exp(-0.5 * (misfits - misfits[best]) / poor)
-        apart = float(np.sqrt((likely * np.square(sizes - size)).sum() / likely.sum()))
-        own = max(math.sqrt(poor) * size * sigma, apart)
+        mean, own = float((likely @ sizes) / likely.sum()), math.sqrt(poor) * size * sigma
+        apart = float(np.sqrt((likely @ np.square(sizes - mean)) / likely.sum()))
+        if apart > _APART * own:
+            size, own = mean, apart
         return Explanation(
             cause=Cause.CLEARANCE,
             subject=self.joints[k],

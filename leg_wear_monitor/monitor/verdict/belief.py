@@ -72,12 +72,16 @@ def is_surely_below(limit_m: float, clearance_m: float, sigma_m: float) -> bool:
 def is_overruled(joint: JointSituation, alarm: Alarm | None) -> bool:
     """Whether a measurement contradicts the estimate that an alarm of the clearance rests on.
 
+    The counted clearance is below the limit, too: a measurement does not end what counting says.
     It was acknowledged with the measurement, and rises again, not acknowledged, if the estimate returns
     below the limit and then passes it again.
     """
     if alarm is None or joint.measured is None or not alarm.acknowledged or alarm.cause not in SEEN:
         return False
-    return is_surely_below(joint.limit_m, joint.measured.clearance_m, joint.measured.sigma_m)
+    is_counted_below = not judged(joint).clearance_m >= joint.limit_m
+    return is_counted_below and is_surely_below(
+        joint.limit_m, joint.measured.clearance_m, joint.measured.sigma_m
+    )
 
 
 def at_limit_by_estimate(joint: JointSituation, alarm: Alarm | None) -> SeenClearance | None:

@@ -48,6 +48,7 @@ from leg_wear_monitor.twin.statistics import (
 )
 from leg_wear_monitor.twin.steps import MOVE, Steps
 
+_DENT_M = 1.0e-5  # a third of the penetration under 10 kN
 _RUN_IN_S = 0.2
 _STEADY = 0.05  # relative difference of two gait cycles' durations beyond which the cadence changes
 _LEAST_TORQUE_NM = 1.0e-6  # lower bound of the RMS torque, for a leg that needs no torque
@@ -142,11 +143,12 @@ class LegFollower:
     def take_surfaces(self, depth: Floats) -> None:
         """Set wear depths (k, 2, N) [m]; for changed joints, the growth of the cycle counts from there.
 
-        Where a wall is closer than before, journals may be behind it: the leg is set in motion again.
+        Where a wall comes closer by more than an impact dents it, a journal may be behind it: the leg is set
+        in motion again.
         """
         own, state = self._setup.surfaces.depth, self._stepper.state
         changed = (own != depth).any(axis=(1, 2))
-        if (depth < own).any():
+        if (own - depth > _DENT_M).any():
             self.state.motion.runs = 0
         own[:] = depth
         if changed.any():

@@ -27,6 +27,7 @@ from leg_wear_monitor.mechanism.ideal import TURN
 from leg_wear_monitor.mechanism.position import build_linkage
 from leg_wear_monitor.mechanism.spec import Mechanism
 from leg_wear_monitor.monitor.diagnosis.change_detector import ChangeDetector
+from leg_wear_monitor.monitor.diagnosis.channel import with_channel_of
 from leg_wear_monitor.monitor.diagnosis.diagnosis import Cause
 from leg_wear_monitor.monitor.diagnosis.explanations import Explainer
 from leg_wear_monitor.monitor.diagnosis.identification import (
@@ -200,7 +201,8 @@ def explained(
     new = measured(walk, sensor, noise_nm, random)
     mean = new[:COMMISSIONING].mean(axis=0)
     known = CommissionedTorque(0, NEW, new[:COMMISSIONING]) if commissioned else None
-    explainer = explainer_of(leg, reference, with_noise_of(reference, sensor, mean), known)
+    own = (with_channel_of if commissioned else with_noise_of)(reference, sensor, mean)
+    explainer = explainer_of(leg, reference, own, known)
     return explainer, known, new[COMMISSIONING:]
 
 

@@ -56,7 +56,11 @@ def test_the_first_recording(learnt: Learnt, capsys: pytest.CaptureFixture[str])
     lesson, said = learnt("1_first_recording"), capsys.readouterr().out
     archard = dict(re.findall(r"^([A-J]) +(?:[\d.]+ +){4}([\d.]+)", said, re.MULTILINE))
     assert len(archard) == 5 and max(archard, key=lambda joint: float(archard[joint])) == "A"
-    assert "STOP joint G" in said and "not valid  clearances" in said and "ERROR  torque_mismatch" in said
+    assert (
+        "STOP joint G" in said
+        and "not valid  counted clearances" in said
+        and "ERROR  torque_mismatch" in said
+    )
     assert lesson.healthy.verdict.state.value == "healthy"
     above = lesson.knocking.history.torque_mismatch > lesson.config.limits.torque_mismatch
     # G breaks at the begin of the fifth gait cycle; a mismatch lasts for three of four before it is sure

@@ -80,4 +80,4 @@ def is_as_said(page: LivePage, verdicts: list) -> bool:
     state = re.match("healthy|watch|not monitored|inspect|stop", status.message)[0]
     code = next(pair.value for pair in status.values if pair.key == "fault_code")
     text = page.text("[data-region=verdict]")
-    return state.upper() in text and f"{code}, see docs/" in text
+    return state.upper() in text and code in text

@@ -300,7 +300,7 @@ def test_silence_reaches_statuses_alarms_markers_and_log_and_ends_by_itself(
     assert not is_healthy(verdicts)
     # the leg has walked on meanwhile, so its own alarm of a gap rises, too, and ends
     stage.legs().play(walk, monitor, begin_s=4.5)
-    stage.legs().play(walk, monitor, start_ns=NOON_NS + 6 * SECOND, end_s=2.5)
+    stage.legs().play(walk, monitor, start_ns=NOON_NS + 6 * SECOND)
     stage.wait_for(lambda: line(alarms, "input_silence crank") is None, "the end of the silence")
     stage.wait_for(lambda: is_healthy(verdicts), "a verdict without alarms")
     monitor.stop()
@@ -352,7 +352,8 @@ def test_stamps_of_a_time_to_come_and_a_torque_about_another_axis_are_told(stage
     def listen(_: float) -> None:
         told.append(words(diagnostics, "clock"))
 
-    stage.legs().play(walk, monitor, end_s=3.0, before=listen, start_ns=time.time_ns() + 100 * SECOND)
+    # a mismatch is known after some gait cycles
+    stage.legs().play(walk, monitor, before=listen, start_ns=time.time_ns() + 100 * SECOND)
     assert any("are ahead of the node's clock: set the clocks" in text for text in told)
     axis = (
         "the torque about x does not change, the one about z does; if that is the drive's, set drive_torque"

@@ -379,6 +379,27 @@ def test_a_crank_with_another_ripple_waits_for_a_reference_of_its_own(leg, refer
     assert "is being simulated" in found.reason
 
 
+def test_a_reference_that_was_half_simulated_goes_on_in_the_next_run(leg, reference) -> None:
+    """Eight recordings of 70 s each never came to the end of a reference that takes thirteen minutes."""
+    block = samples(reference, [0] * 60)
+    crank = block["kind"] == CRANK
+    block["crank_angle_rad"][crank] += 0.03 * np.sin(2.0 * block["crank_angle_rad"][crank])
+    first = observer_of(leg)
+    walk(first, block, end=8)
+    assert first.part_of_reference is None  # no leg is done
+    run = first._references._run
+    while len(run._done) < 2:
+        run.advance()
+    part = first.part_of_reference
+    second = observer_of(leg, part=part)
+    walk(second, block, end=8)
+    assert second._references._run._done[0] is part.torque_nm[0]
+    assert "is being simulated" in second.diagnosis.reason
+    steady = observer_of(leg, part=part)  # whose crank turns otherwise has no use for it
+    walk(steady, samples(reference, [0] * 8))
+    assert steady.part_of_reference is None
+
+
 def test_a_replaced_part_is_commissioned_again(leg, reference) -> None:
     observer = observer_of(leg)
     walk(observer, samples(reference, [0] * COMMISSIONING_CYCLES))

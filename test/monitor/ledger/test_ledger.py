@@ -20,10 +20,15 @@ from leg_wear_monitor.monitor.ledger.entry import (
     Audit,
     ClearancePoint,
     ForecastPoint,
+    SimulatedReference,
 )
 from leg_wear_monitor.monitor.ledger.file import LedgerError
 from leg_wear_monitor.monitor.ledger.ledger import Ledger
 from leg_wear_monitor.monitor.ledger.schema import FORMAT
+from leg_wear_monitor.twin.reference.crank_profile import CrankProfile
+from leg_wear_monitor.twin.reference.leg_parameters import LegParameters
+from leg_wear_monitor.twin.reference.leg_simulation import POINTS
+from leg_wear_monitor.twin.reference.torque_reference import CYCLES, TorqueReference
 
 pytestmark = pytest.mark.plain
 
@@ -317,3 +322,22 @@ def test_a_raised_alarm_keeps_its_worst_value_over_a_new_start(open_ledger, entr
     kept = {one.name: one for one in open_ledger().entry.alarms}
     assert (kept["input_gaps"].worst, kept["input_gaps"].limit) == (0.42, 0.05)
     assert math.isnan(kept["cadence"].worst) and math.isnan(kept["cadence"].limit)
+
+
+def test_a_reference_that_is_not_whole_is_kept_until_it_is(open_ledger, entry_at) -> None:
+    leg = LegParameters(np.ones(1), np.ones(1))
+    expected, wider = (np.full((cycles, POINTS), 1.5, np.float16) for cycles in (2 * CYCLES, CYCLES))
+    whole = TorqueReference(CrankProfile.steady(6.0), np.full((3, 5), 3e-4), (expected, wider, wider), leg)
+    part = attrs.evolve(whole, torque_nm=whole.torque_nm[:2])
+    for kept, has_part in ((part, True), (whole, False)):
+        ledger = open_ledger()
+        ledger.note(SimulatedReference(1, ("thigh",), kept))
+        ledger.keep(entry_at(2), closed=True)
+        ledger.close()
+        found = open_ledger()
+        assert (found.part_of_reference is not None) == has_part
+        assert (found.reference is not None) != has_part
+        one = (found.part_of_reference or found.reference).reference
+        assert [torque.shape for torque in one.torque_nm] == [torque.shape for torque in kept.torque_nm]
+        np.testing.assert_array_equal(one.clearance_m, whole.clearance_m)
+        found.close()

@@ -27,7 +27,6 @@ from leg_wear_monitor.mechanism.ideal import TURN
 from leg_wear_monitor.mechanism.position import build_linkage
 from leg_wear_monitor.mechanism.spec import Mechanism
 from leg_wear_monitor.monitor.diagnosis.change_detector import ChangeDetector
-from leg_wear_monitor.monitor.diagnosis.channel import with_channel_of
 from leg_wear_monitor.monitor.diagnosis.diagnosis import Cause
 from leg_wear_monitor.monitor.diagnosis.explanations import Explainer
 from leg_wear_monitor.monitor.diagnosis.identification import (
@@ -38,6 +37,7 @@ from leg_wear_monitor.monitor.diagnosis.identification import (
     misfit,
 )
 from leg_wear_monitor.monitor.diagnosis.leg_model import best_fit, explainer_of
+from leg_wear_monitor.monitor.diagnosis.leg_models import LegModels
 from leg_wear_monitor.monitor.diagnosis.signature import TorqueSensor, averaged, signatures
 from leg_wear_monitor.monitor.diagnosis.signature_model import with_noise_of
 from leg_wear_monitor.monitor.ledger.entry import CommissionedTorque
@@ -201,7 +201,9 @@ def explained(
     new = measured(walk, sensor, noise_nm, random)
     mean = new[:COMMISSIONING].mean(axis=0)
     known = CommissionedTorque(0, NEW, new[:COMMISSIONING]) if commissioned else None
-    own = (with_channel_of if commissioned else with_noise_of)(reference, sensor, mean)
+    own = with_noise_of(reference, sensor, mean)
+    if known is not None:
+        own = LegModels(leg).channel(reference, sensor, known)
     explainer = explainer_of(leg, reference, own, known)
     return explainer, known, new[COMMISSIONING:]
 

@@ -21,8 +21,8 @@ from leg_wear_monitor import load_mechanism
 from leg_wear_monitor.mechanism.ideal import TURN
 from leg_wear_monitor.mechanism.position import build_linkage
 from leg_wear_monitor.monitor.diagnosis.change_detector import ChangeDetector, DetectorState
-from leg_wear_monitor.monitor.diagnosis.channel import with_channel_of
 from leg_wear_monitor.monitor.diagnosis.leg_model import explainer_of
+from leg_wear_monitor.monitor.diagnosis.leg_models import LegModels
 from leg_wear_monitor.monitor.diagnosis.signature import TorqueSensor
 from leg_wear_monitor.monitor.ledger.entry import CommissionedTorque
 from leg_wear_monitor.twin.follower.load import load_signature, torque_size
@@ -104,7 +104,7 @@ def main() -> None:
         inside = np.arange(len(healthy))
         inside = (inside >= first) & (inside < first + COMMISSIONING)
         known = CommissionedTorque(0, NEW, healthy[inside])
-        explainer = explainer_of(paper, reference, with_channel_of(reference, plain, known.mean), known)
+        explainer = explainer_of(paper, reference, LegModels(paper).channel(reference, plain, known), known)
         detector = ChangeDetector(explainer, NEW, MONTH)
         for name, cycles in legs.items():
             of_cycles = ratios(detector, cycles[~inside])

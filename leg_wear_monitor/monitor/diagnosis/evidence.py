@@ -7,7 +7,6 @@ import numpy as np
 
 from leg_wear_monitor.mechanism.arrays import Floats
 from leg_wear_monitor.monitor.config.settings import MonitorConfig
-from leg_wear_monitor.monitor.diagnosis.channel import with_channel_of
 from leg_wear_monitor.monitor.diagnosis.diagnosis import Cause, Change
 from leg_wear_monitor.monitor.diagnosis.explanations import Explanation
 from leg_wear_monitor.monitor.diagnosis.leg_model import best_fit, change_of, first_changed, start_of
@@ -18,9 +17,7 @@ from leg_wear_monitor.monitor.diagnosis.state import SignedCycle, TorqueState
 SETTLING_CYCLES = 10  # since a change, before the counted clearances are corrected by it
 
 _LEAST_CYCLES = 2  # since a change, before it is explained: the first contains the change itself
-_LEAST_CYCLES_UNLIKE = (
-    6  # where the leg is not that of its reference: two strange steps in a row are no change
-)
+_LEAST_CYCLES_UNLIKE = 6  # where the leg is not that of its reference: two strange steps are no change
 _FIT_EVERY = 10  # gait cycles, while nothing changes
 
 # mean square up to which a leg that was never commissioned fits: 0.4 to 0.9 for legs with masses 4 % off and
@@ -50,7 +47,7 @@ class Evidence:
         """Evaluate all kept cycles again, because the reference or the baseline has changed."""
         self._models.forget()
         self._know_sensor(state)
-        state.detector, state.changes = None, ()
+        state.detector, state.changes, state.fit_due = None, (), 0
         for cycle in state.cycles:
             self._test(state, cycle, config)
         self._explain(state, config)
@@ -68,7 +65,7 @@ class Evidence:
         if known is None:
             state.sensor = attrs.evolve(state.sensor, delay_s=0.0, time_constant_s=0.0)
         elif known.is_as_counted:
-            state.sensor = with_channel_of(state.reference, state.sensor, mean)
+            state.sensor = self._models.channel(state.reference, state.sensor, known)
             delay_s, time_constant_s = state.sensor.delay_s, state.sensor.time_constant_s
             if (known.delay_s, known.time_constant_s) != (delay_s, time_constant_s):
                 state.commissioned = attrs.evolve(known, delay_s=delay_s, time_constant_s=time_constant_s)
@@ -91,9 +88,7 @@ class Evidence:
         found = detector.detection(state.detector) if state.detector else None
         since_ns = state.changes[-1].since_ns if state.changes else found.since_ns if found else 0
         cycles = [cycle for cycle in state.cycles if cycle.begin_ns >= since_ns]
-        if len(cycles) < self._least_cycles(state) or not (
-            since_ns or state.fit is None or state.fit_due <= 0
-        ):
+        if len(cycles) < self._least_cycles(state) or not (since_ns or state.fit_due <= 0):
             state.fit_due -= 1
             return
         state.fit_due = _FIT_EVERY - 1

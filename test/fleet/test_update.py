@@ -94,6 +94,7 @@ def test_processes_give_the_same_to_the_bit(home, updated, update, tmp_path):
     assert fractions == sorted(fractions) and fractions[-1] == pytest.approx(1.0)
 
 
+@pytest.mark.slow  # studies/test_cluster.py holds it for the same workers
 def test_a_cluster_gives_the_same_though_a_worker_is_killed(home, updated, update, tmp_path):
     pytest.importorskip("distributed", reason="the extra 'dask' is not installed")
     from dask_cluster import cluster
@@ -251,6 +252,7 @@ def test_a_leg_is_forecast_with_what_others_measured(walk, update, tmp_path):
     assert update(path, out).is_up_to_date
 
 
+@pytest.mark.slow  # playback/test_sampled_replay.py holds the law for one leg
 def test_a_fleet_follows_a_sample_of_the_gait_cycles(walk, describe, update, tmp_path):
     walk(tmp_path / "a/1.mcap", seconds=90.0)
     path = describe(tmp_path, "a")

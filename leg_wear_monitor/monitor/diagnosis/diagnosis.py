@@ -6,7 +6,7 @@ from enum import Enum
 
 import attrs
 
-_SURE_LOG_ODDS = 5.0  # 150 to 1
+SURE_LOG_ODDS = 5.0  # 150 to 1
 
 
 class DiagnosisState(Enum):
@@ -83,7 +83,7 @@ class Change:
     def is_sure(self) -> bool:
         """Whether a clearance has changed, much more probably than anything else."""
         odds = min(self.log_odds, self.runner_up_log_odds)
-        return self.cause is Cause.CLEARANCE and odds >= _SURE_LOG_ODDS
+        return self.cause is Cause.CLEARANCE and odds >= SURE_LOG_ODDS
 
 
 @attrs.frozen

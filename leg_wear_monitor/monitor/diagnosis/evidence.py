@@ -7,7 +7,7 @@ import numpy as np
 
 from leg_wear_monitor.mechanism.arrays import Floats
 from leg_wear_monitor.monitor.config.settings import MonitorConfig
-from leg_wear_monitor.monitor.diagnosis.diagnosis import Cause, Change
+from leg_wear_monitor.monitor.diagnosis.diagnosis import SURE_LOG_ODDS, Cause, Change
 from leg_wear_monitor.monitor.diagnosis.explanations import Explanation
 from leg_wear_monitor.monitor.diagnosis.leg_model import best_fit, change_of, first_changed, start_of
 from leg_wear_monitor.monitor.diagnosis.leg_models import LegModels
@@ -23,7 +23,6 @@ _FIT_EVERY = 10  # gait cycles, while nothing changes
 # mean square up to which a leg that was never commissioned fits: 0.4 to 0.9 for legs with masses 4 % off and
 # a joint at 0.36 to 1 mm, from 1.1 on behind a low-pass of 50 Hz or a lag (docs/explanation/diagnosis.md)
 _GOOD = 1.5
-_SURE_LOG_ODDS = 5.0
 _LEAST_BEFORE = 3  # gait cycles before a change that show the leg without it
 
 
@@ -133,9 +132,9 @@ class Evidence:
     ) -> Change | None:
         """What has changed since a gait cycle, by the explanations of those from then on, the best first.
 
-        Before a leg is commissioned, a clearance that is sure to have: all else is constant, and becomes part
-        of the baseline. A change of a clearance gets its most probable begin; another one keeps that of its
-        detection.
+        Before a leg is commissioned, only a clearance that is sure counts: all else is constant, and becomes
+        part of the baseline. A change of a clearance gets its most probable begin; another one keeps that of
+        its detection.
         """
         change = change_of(explanations, since_ns)
         if state.commissioned is None and not (change and change.is_sure):
@@ -164,7 +163,7 @@ def _is_of_reference(explanations: Sequence[Explanation]) -> bool:
     """
     best = explanations[0]
     own = next(one for one in explanations if one.cause in (Cause.CLEARANCE, Cause.UNKNOWN))
-    return own.square <= _GOOD and 0.5 * (own.misfit - best.misfit) < _SURE_LOG_ODDS
+    return own.square <= _GOOD and 0.5 * (own.misfit - best.misfit) < SURE_LOG_ODDS
 
 
 def _is_due(cycles: int) -> bool:

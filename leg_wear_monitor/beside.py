@@ -1,4 +1,7 @@
-"""Compilation of an entry in a second process; what it compiles reaches this one through the cache."""
+"""Python processes that this one starts, and compilation in a second one.
+
+What that one compiles reaches this one through the cache.
+"""
 
 import os
 import subprocess
@@ -56,14 +59,28 @@ def compiled_beside(compile_it: Callable[[], None], entry: Callable[..., object]
             process.kill()
 
 
-def _started(compile_it: Callable[[], None], log: IO[bytes]) -> subprocess.Popen[bytes]:
-    """A process that calls a function of a module, with the modules that this process would find."""
+def python_command(call: Callable[[], None], *arguments: str) -> list[str]:
+    """Command of a Python process that calls a function of a module.
+
+    It finds the modules that this process finds, and none in the current directory besides.
+
+    Parameters
+    ----------
+    call : callable
+        Function of a module.
+    *arguments : str
+        Of the command line.
+    """
     # set inside, since what stands beside a user's script must not replace what Python itself starts with
     found = f"import sys; sys.path[:] = {sys.path!r}"
-    called = f"from {compile_it.__module__} import {compile_it.__name__} as run; run()"
-    command = [sys.executable, "-P", "-c", f"{found}; {called}"]
+    called = f"from {call.__module__} import {call.__name__} as run; run()"
+    return [sys.executable, "-P", "-c", f"{found}; {called}", *arguments]
+
+
+def _started(compile_it: Callable[[], None], log: IO[bytes]) -> subprocess.Popen[bytes]:
+    """A process that compiles."""
     return subprocess.Popen(
-        command,
+        python_command(compile_it),
         stdin=subprocess.DEVNULL,
         stdout=log,
         stderr=log,

@@ -2,7 +2,7 @@
 
 import os
 import sys
-from collections.abc import Callable
+from collections.abc import Callable, Iterator
 from functools import cache, wraps
 from importlib.util import find_spec
 from pathlib import Path
@@ -66,6 +66,20 @@ def pytest_collection_modifyitems(items: list[pytest.Item]) -> None:
 def unpainted(monkeypatch: pytest.MonkeyPatch) -> None:
     """Pictures are made but not painted: that takes most of a page's time and changes none of its text."""
     monkeypatch.setattr(Figure, "savefig", lambda *_, **__: None)
+
+
+@pytest.fixture
+def traps(tmp_path_factory: pytest.TempPathFactory, monkeypatch: pytest.MonkeyPatch) -> Iterator[Path]:
+    """The current directory: its modules have the names of all that a new process imports, and tell of it."""
+    home = tmp_path_factory.mktemp("traps")
+    told = home / "told"
+    for name in {*sys.stdlib_module_names, "leg_wear_monitor", "loky", "numba", "numpy", "sitecustomize"}:
+        trap = f"open({str(told)!r}, 'a').write({name!r} + '\\n')\nraise SystemExit(66)\n"
+        (home / f"{name}.py").write_text(trap)
+    monkeypatch.chdir(home)
+    monkeypatch.setattr(sys, "path", [path for path in sys.path if path])  # as a console script has it
+    yield home
+    assert not told.exists(), f"modules of the current directory were imported: {told.read_text()}"
 
 
 @pytest.fixture(scope="session")

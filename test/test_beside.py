@@ -2,7 +2,9 @@
 
 import fcntl
 import json
+import operator
 import os
+import re
 import signal
 import subprocess
 import sys
@@ -11,10 +13,13 @@ from pathlib import Path
 import pytest
 
 from leg_wear_monitor import beside
-from leg_wear_monitor.beside import compiled_beside
+from leg_wear_monitor.beside import compiled_beside, python_command
+from leg_wear_monitor.cli.start import main
 from leg_wear_monitor.code_cache import one_process_at_a_time
 from leg_wear_monitor.errors import ConfigWarning
 from leg_wear_monitor.interrupt import put_in_order
+from leg_wear_monitor.workers.job import Job
+from leg_wear_monitor.workers.processes import run_in_processes
 
 MODULE = """
 from leg_wear_monitor.kernel import compile_for, entry
@@ -75,6 +80,30 @@ def test_what_both_processes_compile_is_in_the_cache(tmp_path):
         results.append(done.stdout.split())
         assert done.stderr == ""
     assert results == [["6.0", "9.0", "0", "1"], ["6.0", "9.0", "1", "1"]]
+
+
+@pytest.mark.plain
+@pytest.mark.usefixtures("traps")
+def test_a_process_imports_nothing_from_the_current_directory():
+    """Nor do the workers of fleets and studies, and the demo's nodes: their tests run among traps, too."""
+    done = subprocess.run(python_command(main, "--version"), capture_output=True, text=True, check=True)
+    assert done.stdout.startswith("leg-wear-monitor ")
+    added = {}
+    run_in_processes(
+        [Job("sum", operator.add, (1, 2))], 2, lambda job, result: added.update({job.key: result})
+    )
+    assert added == {"sum": 3}
+
+
+@pytest.mark.plain
+def test_processes_are_started_in_three_places():
+    """Each of which keeps the current directory out."""
+    home = Path(beside.__file__).parent
+    start = re.compile(
+        r"sys\.executable|ProcessPoolExecutor\(|get_context\(|\bPopen\(|subprocess\.run\(|os\.system"
+    )
+    found = {str(path.relative_to(home)) for path in home.rglob("*.py") if start.search(path.read_text())}
+    assert found == {"beside.py", "cli/verbs/demo.py", "workers/processes.py"}
 
 
 @pytest.mark.plain

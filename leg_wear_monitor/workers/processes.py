@@ -21,6 +21,9 @@ TRIES = 3  # attempts per job if its worker dies
 
 _THREADS = ("OMP_NUM_THREADS", "OPENBLAS_NUM_THREADS", "MKL_NUM_THREADS", "NUMBA_NUM_THREADS")
 
+# multiprocessing starts `python -c`, which would import from the current directory
+_OF_A_WORKER = {**dict.fromkeys(_THREADS, "1"), "PYTHONSAFEPATH": "1"}
+
 
 def run_here(jobs: Sequence[Job], done: Done) -> None:
     """Run jobs one after the other in this process, those that follow from one right after it."""
@@ -85,7 +88,7 @@ def _pool(workers: int) -> Iterator["ProcessPoolExecutor"]:
         from loky import ProcessPoolExecutor
     except ImportError as error:
         raise ConfigError("--workers", str(workers), "needs loky (pip install loky), expected 1") from error
-    with _environment(dict.fromkeys(_THREADS, "1")), warnings.catch_warnings():
+    with _environment(_OF_A_WORKER), warnings.catch_warnings():
         # A worker that has grown starts anew between two jobs, which loses nothing.
         warnings.filterwarnings("ignore", "A worker was restarted", UserWarning)
         pool = ProcessPoolExecutor(workers, context=get_context("spawn"), initializer=_begin_worker)

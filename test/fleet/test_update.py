@@ -87,6 +87,7 @@ def test_a_second_update_finds_nothing_to_do(home, updated, update):
     assert contents(updated) == before
 
 
+@pytest.mark.usefixtures("traps")
 def test_processes_give_the_same_to_the_bit(home, updated, update, tmp_path):
     fractions = []
     assert update(home / "fleet.yaml", tmp_path, workers=2, progress=fractions.append).counted == 3

@@ -156,8 +156,9 @@ def test_a_monitor_stopped_while_it_compiles_leaves_an_ordered_ledger(tmp_path: 
     db.close()
 
 
+@pytest.mark.usefixtures("traps")
 def test_the_demo_tells_its_story(tmp_path: Path) -> None:
-    command = [sys.executable, "-m", "leg_wear_monitor", "demo", "--out", str(tmp_path / "demo")]
+    command = [sys.executable, "-P", "-m", "leg_wear_monitor", "demo", "--out", str(tmp_path / "demo")]
     done = subprocess.run(command, capture_output=True, text=True, check=False)
     assert done.returncode == 0, done.stdout + done.stderr
     alarm = done.stdout.index("ALARM impact_force")

@@ -62,6 +62,7 @@ def test_finished_points_are_kept_and_others_computed(sweep, uninterrupted, tmp_
     assert files(tmp_path) == files(uninterrupted)
 
 
+@pytest.mark.usefixtures("traps")
 def test_processes_give_the_same_results_to_the_bit(sweep, uninterrupted, tmp_path):
     fractions = []
     assert run_study("size", sweep, tmp_path, workers=2, progress=fractions.append) == 4

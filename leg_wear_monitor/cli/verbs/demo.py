@@ -4,7 +4,6 @@ import json
 import os
 import signal
 import subprocess
-import sys
 from collections import defaultdict
 from collections.abc import Iterator
 from contextlib import contextmanager
@@ -13,8 +12,10 @@ from typing import TYPE_CHECKING, Any
 
 import click
 
+from leg_wear_monitor.beside import python_command
 from leg_wear_monitor.cli.node import need_rclpy
 from leg_wear_monitor.cli.output import check_directory
+from leg_wear_monitor.cli.start import main as program
 from leg_wear_monitor.cli.waiting import compilation, is_compiled
 from leg_wear_monitor.errors import LegWearError
 from leg_wear_monitor.interrupt import closed_at_the_end
@@ -68,13 +69,12 @@ def _compile(out: Path) -> None:
     from leg_wear_monitor.mechanism.loader import load_mechanism
     from leg_wear_monitor.monitor.wear_monitor import WearMonitor
 
-    command = [sys.executable, "-c", f"from {__name__} import compile_leg; compile_leg()"]
     log_path = out / "compilation.log"
     with (
         compilation("monitor", "gait", how_long="about a minute"),
         log_path.open("wb") as log,
         # a group of its own: Ctrl-C reaches it by us, once
-        subprocess.Popen(command, stdout=log, stderr=log, start_new_session=True) as leg,
+        subprocess.Popen(python_command(compile_leg), stdout=log, stderr=log, start_new_session=True) as leg,
         closed_at_the_end(leg.kill),
         advance_beside(),
     ):
@@ -126,7 +126,7 @@ def _live(out: Path) -> "DemoListener":
 @contextmanager
 def _process(verb: str, out: Path, domain: int, **paths: Path) -> "Iterator[subprocess.Popen[bytes]]":
     """A node as a process of its own, ended as from a terminal."""
-    command = [sys.executable, "-m", "leg_wear_monitor", verb, "--ros-args", "-r", f"__ns:={_NAMESPACE}"]
+    command = python_command(program, verb, "--ros-args", "-r", f"__ns:={_NAMESPACE}")
     command += ["--params-file", str(share_directory() / "config" / "demo.yaml")]
     for name, path in paths.items():
         command += ["-p", f"{name}.path:={path.resolve()}"]
@@ -154,10 +154,10 @@ def _check_ended(process: "subprocess.Popen[bytes]", log: Path) -> None:
 
 def _replay(out: Path) -> bool:
     """The recording through the same monitor; whether it gives the same messages."""
-    command = [sys.executable, "-m", "leg_wear_monitor", "replay", str(out / "live.mcap"), "--out", str(out)]
-    command += ["--config", str(share_directory() / "config" / "demo.yaml")]
-    click.echo(f"leg-wear-monitor {' '.join(command[3:])}")
-    done = subprocess.run(command, check=False)
+    arguments = ["replay", str(out / "live.mcap"), "--out", str(out)]
+    arguments += ["--config", str(share_directory() / "config" / "demo.yaml")]
+    click.echo(f"leg-wear-monitor {' '.join(arguments)}")
+    done = subprocess.run(python_command(program, *arguments), check=False)
     if done.returncode != DONE:
         raise LegWearError(f"{out / 'live.mcap'}: its replay ended with {done.returncode}")
     live, again = _messages(out / "live.mcap"), _messages(out / "reports.mcap")

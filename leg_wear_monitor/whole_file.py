@@ -1,6 +1,7 @@
 """Files that are written whole or not at all."""
 
 import fcntl
+import glob
 import os
 from collections.abc import Iterator
 from contextlib import contextmanager, suppress
@@ -44,6 +45,49 @@ def write_whole(path: Path, content: bytes) -> None:
                 raise
     except OSError as error:
         raise ConfigError(str(path), "", f"cannot be written: {error.strerror}") from error
+
+
+@contextmanager
+def unfinished(path: Path) -> Iterator[Path]:
+    """A new file beside ``path`` to write into; it is removed at the end, unless it was put in its place.
+
+    Those of processes that were killed are removed at the begin.
+
+    Parameters
+    ----------
+    path : pathlib.Path
+        In a directory that exists, on a file system with locks.
+
+    Raises
+    ------
+    OSError
+        If the disk does not take it.
+    """
+    remove_parts(path.parent, f"{glob.escape(path.name)}.[0-9]*")
+    part = path.with_name(f".{path.name}.{os.getpid()}.part")
+    with _alone(part):
+        try:
+            yield part
+        finally:
+            part.unlink(missing_ok=True)
+
+
+def remove_parts(directory: Path, names: str) -> None:
+    """Remove parts of files that killed processes left in a directory.
+
+    Parameters
+    ----------
+    directory : pathlib.Path
+        It may not exist.
+    names : str
+        Pattern of the names of the files.
+    """
+    for part in directory.glob(f".{names}.part"):
+        with suppress(OSError):  # a process writes it, or it may not be removed: it harms nobody
+            if part.is_file() and not part.is_symlink():
+                with part.open("r+b") as file:
+                    fcntl.flock(file, fcntl.LOCK_EX | fcntl.LOCK_NB)
+                    part.unlink()
 
 
 @contextmanager

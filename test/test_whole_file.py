@@ -1,5 +1,6 @@
 """Files are whole, also after a kill in the middle of a write, and if several processes write at once."""
 
+import fcntl
 import os
 import signal
 import subprocess
@@ -8,7 +9,7 @@ import sys
 import pytest
 
 from leg_wear_monitor.errors import ConfigError
-from leg_wear_monitor.whole_file import write_whole
+from leg_wear_monitor.whole_file import unfinished, write_whole
 
 pytestmark = pytest.mark.plain
 
@@ -38,6 +39,28 @@ def test_a_kill_leaves_the_old_file_and_nothing_after_the_next_write(tmp_path):
     assert path.read_bytes() == b"old"
     write_whole(path, b"newer")
     assert [(each.name, each.read_bytes()) for each in tmp_path.iterdir()] == [("a.parquet", b"newer")]
+
+
+def test_what_killed_processes_left_is_removed_and_what_is_being_written_stays(tmp_path):
+    path = tmp_path / "reports.mcap"
+    left = [tmp_path / f".reports.mcap.{number}.part" for number in (7, 8, 9)]
+    others = [tmp_path / f".{name}.part" for name in ("summary.mcap.7", "reports.mcap", "reports.mcap.x")]
+    for each in [*left, *others]:
+        each.touch()
+    left.append(tmp_path / ".reports.mcap.10.part")
+    left[-1].symlink_to("nowhere")
+    with left[1].open() as writing:
+        fcntl.flock(writing, fcntl.LOCK_EX)
+        with unfinished(path) as part:
+            part.write_bytes(b"reports")
+            with unfinished(tmp_path / "another"):  # begins meanwhile
+                assert set(tmp_path.glob(".reports.*")) >= {part, left[1]}
+            part.replace(path)
+    assert sorted(tmp_path.iterdir()) == sorted([path, left[1], left[3], *others])
+    with pytest.raises(KeyError), unfinished(path):
+        raise KeyError
+    assert sorted(tmp_path.iterdir()) == sorted([path, left[3], *others])
+    assert path.read_bytes() == b"reports"
 
 
 def test_where_nothing_can_be_written_one_line_says_so(tmp_path):

@@ -1,6 +1,6 @@
 """Files written whole or not at all, to places that are known to take them before the work begins."""
 
-import os
+import tempfile
 from collections.abc import Mapping
 from pathlib import Path
 
@@ -113,10 +113,8 @@ def _is_stream(path: Path) -> bool:
 
 def _try(option: str, path: Path, directory: Path) -> None:
     """Only writing tells: rights, a read-only file system, and an administrator whom rights do not stop."""
-    probe = directory / f".{path.name}.{os.getpid()}.part"
     try:
-        probe.write_bytes(b"")
+        with tempfile.TemporaryFile(dir=directory):
+            return
     except OSError as error:
         raise ConfigError(option, str(path), f"cannot be written: {error.strerror}") from error
-    finally:
-        probe.unlink(missing_ok=True)

@@ -8,12 +8,12 @@ from typing import Any
 from ruamel.yaml import YAML
 from ruamel.yaml.constructor import DuplicateKeyError
 from ruamel.yaml.error import MarkedYAMLError, YAMLError
-from ruamel.yaml.events import CollectionEndEvent, CollectionStartEvent, Event
+from ruamel.yaml.events import CollectionEndEvent, CollectionStartEvent, Event, NodeEvent
 
 from leg_wear_monitor.errors import ConfigError
 
 MOST_BYTES = 1_000_000  # the largest file of the package has 3000
-MOST_VALUES, DEEPEST = 100_000, 50  # with all aliases expanded
+MOST_VALUES, DEEPEST = 100_000, 50  # values that aliases add; depth with all of them expanded
 
 
 def read_document(path: Path, source: str) -> Any:
@@ -33,14 +33,14 @@ def read_document(path: Path, source: str) -> Any:
     """
     try:
         text = _text(path, source)
-        _check_depth(text, source)
+        written = _values(text, source)
         document = YAML(typ="safe", pure=True).load(text)
     except UnicodeDecodeError as error:
         raise ConfigError(source, "", f"is not UTF-8 text: byte {error.start}") from error
     # an invalid date or number; a tag that does not fit its value; recursion
     except (YAMLError, ValueError, TypeError, AttributeError, LookupError, RecursionError) as error:
         raise ConfigError(source, "", f"is not YAML: {_fault(error)}") from error
-    _check_size(document, source)
+    _check_size(document, written, source)
     return document
 
 
@@ -62,13 +62,20 @@ def _text(path: Path, source: str) -> str:
     return content.decode("utf-8")
 
 
-def _check_depth(text: str, source: str) -> None:
-    """Stop at the first place that is too deep: to compose thousands of levels takes seconds."""
+def _values(text: str, source: str) -> int:
+    """Number of values and keys as they are written; aliases count once.
+
+    Stops at the first place that is too deep: to compose thousands of levels takes seconds.
+    """
+    number = 0
     try:
-        if any(depth > DEEPEST for _, depth in events_with_depth(text)):
-            raise ConfigError(source, "", f"is nested more than {DEEPEST} deep")
+        for event, depth in events_with_depth(text):
+            if depth > DEEPEST:
+                raise ConfigError(source, "", f"is nested more than {DEEPEST} deep")
+            number += isinstance(event, NodeEvent)
     except YAMLError:
-        return  # reported when the document is composed, after earlier faults
+        return number  # reported when the document is composed, after earlier faults
+    return number
 
 
 def events_with_depth(text: str) -> Iterator[tuple[Event, int]]:
@@ -79,12 +86,12 @@ def events_with_depth(text: str) -> Iterator[tuple[Event, int]]:
         yield event, depth
 
 
-def _check_size(document: Any, source: str) -> None:
+def _check_size(document: Any, written: int, source: str) -> None:
     """Check the size of a document with its aliases expanded, visiting each part only once."""
     values, levels = _extent(document, {}, frozenset())
     if levels > DEEPEST:
         raise ConfigError(source, "", f"is nested more than {DEEPEST} deep, or contains itself")
-    if values > MOST_VALUES:
+    if values > written + MOST_VALUES:
         raise ConfigError(source, "", f"its aliases expand to more than {MOST_VALUES} values")
 
 

@@ -178,8 +178,8 @@ class _Work:
             chain.plan()
         _refuse_shared(self.chains)
         for chain in self.chains:
-            for copy, original in chain.copies:
-                self._tell(chain.leg.id, f"{copy}: is a copy of {original}, counted once")
+            for line in chain.copies:
+                self._tell(chain.leg.id, line)
         self._total = max(1, sum(chain.waiting_bytes for chain in self.chains))
         if self.is_due:
             self._learn()

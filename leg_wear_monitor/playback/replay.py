@@ -1,8 +1,7 @@
 """Replay of a recording through the monitor; the reports equal those of a live run."""
 
-import os
 from collections.abc import Callable, Iterable, Iterator, Mapping
-from contextlib import ExitStack, nullcontext
+from contextlib import ExitStack, contextmanager, nullcontext
 from pathlib import Path
 
 import attrs
@@ -28,6 +27,7 @@ from leg_wear_monitor.playback.summary import summary
 from leg_wear_monitor.twin.kinds import CRANK, TORQUE
 from leg_wear_monitor.twin.sample import Samples, brings
 from leg_wear_monitor.twin.sampling.settings import SamplingSettings
+from leg_wear_monitor.whole_file import unfinished
 
 REPORTS_FILE = "reports.mcap"
 _LONGER, _LONGER_S = 1.05, 1.0  # stamps may span this factor times, plus these seconds, the logged time
@@ -217,9 +217,7 @@ def replay(
         stack.callback(monitor.abandon)
         history, evidence = History(monitor.clearance_joints), GaitEvidence(config)
         result = ReplayResult(monitor, history, recording.files, recording.topics, time, evidence)
-        part = None if out is None else _place(Path(out), recording.files)
-        if part:
-            stack.callback(part.unlink, missing_ok=True)
+        part = None if out is None else stack.enter_context(_part(Path(out), recording.files))
         with Sink(part, monitor, node) if part else nullcontext() as sink:
             if ready:
                 ready(monitor)
@@ -308,7 +306,8 @@ def node_beside(topic: str) -> str:
     return topic.rpartition("/")[0] + NODE
 
 
-def _place(directory: Path, files: list[Path]) -> Path:
+@contextmanager
+def _part(directory: Path, files: list[Path]) -> Iterator[Path]:
     """File to write reports into: beside those of an earlier replay, which may have to stay."""
     path = directory / REPORTS_FILE
     if any(path.resolve() == file.resolve() for file in files):
@@ -317,7 +316,12 @@ def _place(directory: Path, files: list[Path]) -> Path:
         directory.mkdir(parents=True, exist_ok=True)
     except OSError as error:
         raise RecordingError(str(directory), "", f"cannot be made: {error.strerror}") from error
-    return path.with_name(f".{path.name}.{os.getpid()}.part")
+    with ExitStack() as stack:
+        try:
+            part = stack.enter_context(unfinished(path))
+        except OSError as error:
+            raise RecordingError(str(path), "", f"cannot be written: {error.strerror}") from error
+        yield part
 
 
 def _put_in_place(part: Path, path: Path, result: ReplayResult) -> None:

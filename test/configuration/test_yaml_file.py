@@ -1,8 +1,11 @@
 """A YAML file is read within bounds, and whatever it holds, it is refused in one line."""
 
+from contextlib import nullcontext
+
 import pytest
 
 from leg_wear_monitor import ConfigError, load_config, load_mechanism
+from leg_wear_monitor.configuration import yaml_file
 from leg_wear_monitor.configuration.yaml_file import MOST_BYTES
 
 pytestmark = pytest.mark.plain
@@ -38,6 +41,22 @@ def test_hostile_yaml_is_one_line(tmp_path, what):
         assert "\n" not in str(told.value)
         assert said in str(told.value) or "is not a ROS parameter file" in str(told.value)
     assert not (tmp_path / "pwned").exists()
+
+
+@pytest.mark.parametrize(
+    ("text", "is_refused"),
+    [
+        ("".join(f"k{i}: {i}\n" for i in range(99)), False),  # a fleet of many legs
+        ("a: &a [1, 2]\n" + "".join(f"k{i}: *a\n" for i in range(3)), False),
+        ("a: &a [1, 2]\n" + "".join(f"k{i}: *a\n" for i in range(9)), True),
+        ("a: &a {x: 1, y: 2}\n" + "".join(f"k{i}: {{<<: *a}}\n" for i in range(9)), True),
+    ],
+)
+def test_only_what_aliases_add_is_bounded(tmp_path, monkeypatch, text, is_refused):
+    monkeypatch.setattr(yaml_file, "MOST_VALUES", 10)
+    (tmp_path / "x.yaml").write_text(text)
+    with pytest.raises(ConfigError, match="aliases expand to") if is_refused else nullcontext():
+        yaml_file.read_document(tmp_path / "x.yaml", "x.yaml")
 
 
 @pytest.mark.parametrize(

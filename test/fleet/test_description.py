@@ -59,6 +59,27 @@ def test_a_bag_directory_is_one_recording_a_folder_of_them_is_none(written, tmp_
     assert names == ["c/day/x.mcap", "c/killed", "c/run"]
 
 
+def test_links_that_lead_back_end_and_each_directory_counts_once(written, tmp_path):
+    """Forty levels of two links each are 2^40 directories."""
+    for name in ("a/b/c", "elsewhere", ".hidden"):
+        (tmp_path / "c" / name).mkdir(parents=True)
+        (tmp_path / "c" / name / "x.mcap").touch()
+        for link in ("back", "again"):
+            (tmp_path / "c" / name / link).symlink_to(tmp_path / "c")
+    (tmp_path / "c/0").symlink_to("a")
+    (tmp_path / "c/itself").symlink_to("itself")
+    (tmp_path / "c/b").symlink_to(tmp_path / "b")  # what is elsewhere is followed
+
+    def found(pattern):
+        (leg,) = load_fleet(written(f'legs: [{{id: c, recordings: "{pattern}"}}]')).legs
+        return [str(path.relative_to(tmp_path)) for path in leg.recordings]
+
+    every = ["c/a/b/c/x.mcap", "c/b/1.mcap", "c/elsewhere/x.mcap"]
+    assert found("c/**") == every
+    assert found(f"{tmp_path}/c/**") == every
+    assert found("**/c/*.mcap") == ["c/a/b/c/x.mcap"]
+
+
 @pytest.mark.parametrize(
     ("text", "fault"),
     [

@@ -166,6 +166,36 @@ def test_a_copy_counts_once(walk, describe, update, tmp_path):
     assert told[0] == ("a", "a/2.mcap: is a copy of a/1.mcap, counted once")
     path.rename(tmp_path / "a/3.mcap")
     assert update(description, out).counted == 0
+    shutil.copy(tmp_path / "a/3.mcap", tmp_path / "a/0.mcap")
+    assert update(description, out).counted == 0 and update(description, out).is_up_to_date
+    assert [line for line in (out / "legs/a/log").read_text().splitlines() if "copy" in line] == [
+        "a/2.mcap: is a copy of a/1.mcap, counted once",
+        "a/3.mcap: is a copy of a/2.mcap, counted once",
+        "a/0.mcap: is a copy of a/2.mcap, counted once",
+    ]
+
+
+def test_a_name_that_a_terminal_obeys_is_escaped_everywhere(walk, describe, update, tmp_path, capfd):
+    walk(tmp_path / "a/\x1b[2J\n.mcap")
+    (tmp_path / "b").mkdir()
+    (tmp_path / "b" / os.fsdecode(b"\xff\x1b]0;x.mcap")).write_bytes(b"no recording")
+    done = update(describe(tmp_path, "a", "b"), tmp_path / "out")
+    assert done.counted == 1
+    assert load_overview(tmp_path / "out").leg("a").recordings.counted == 1
+    (bad,) = load_overview(tmp_path / "out").leg("b").recordings.bad
+    assert bad.file == r"b/\udcff\x1b]0;x.mcap"
+    texts = [text for _, text in done.findings]
+    texts += [line["file"] for leg in "ab" for line in LegDirectory(tmp_path / "out", leg).lines()]
+    texts += [line for leg in "ab" for line in (tmp_path / f"out/legs/{leg}/log").read_text().split("\n")]
+    assert len(texts) == 1 + 2 + 4 and all(text.isprintable() for text in texts)
+
+
+def test_what_a_killed_update_left_is_removed(home, updated, update, tmp_path):
+    shutil.copytree(updated, tmp_path / "out")
+    for name in ("legs/a/.summary.json.part", "cycles/leg=a/.0123456789.parquet.part"):
+        (tmp_path / "out" / name).touch()
+    update(home / "fleet.yaml", tmp_path / "out")
+    assert contents(tmp_path / "out") == contents(updated)
 
 
 def test_what_overlaps_counts_once_and_late_ones_are_said(walk, describe, update, tmp_path):

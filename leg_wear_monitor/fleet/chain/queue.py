@@ -29,8 +29,8 @@ class Chain:
         All of its recordings, in the order of time.
     new : list of dict
         Records of this update.
-    copies : list of tuples
-        Names of copies that were not known before, each with the name of what it is a copy of.
+    copies : list of str
+        Lines about copies that were not known before.
     refused : list of str
         Recordings that are not counted because another leg has them.
     fault : str
@@ -42,7 +42,7 @@ class Chain:
     waiting: list[Found] = attrs.Factory(list)
     found: list[Found] = attrs.Factory(list)
     new: list[Line] = attrs.Factory(list)
-    copies: list[tuple[str, str]] = attrs.Factory(list)
+    copies: list[str] = attrs.Factory(list)
     refused: list[str] = attrs.Factory(list)
     fault: str = ""
     _settled: set[str] = attrs.Factory(set)
@@ -62,6 +62,7 @@ class Chain:
     def begin(self) -> Job | None:
         """Read what is known of the leg; the job that reads unknown recordings, None if there are none."""
         lines = list(self.directory.lines())
+        self.directory.remove_parts()
         if any(line["outcome"] == "counted" for line in lines) and not self.directory.ledger.exists():
             self.fault = f"{self.directory.ledger} is missing: put a copy of it back"
             return None
@@ -85,11 +86,13 @@ class Chain:
         """Take the recordings that were read; what of them can be read is known from now on."""
         before = {each.path for each in self.found}
         self.found = list(found)
-        self.directory.keep_files({str(each.path): entry_of(each) for each in self.found if each.size})
         first: dict[str, Found] = {}
-        for each in sorted(self.found, key=lambda one: str(one.path)):
+        for each in sorted(self.found, key=lambda one: (one.path not in before, str(one.path))):
             if first.setdefault(each.key, each) is not each and each.path not in before:
-                self.copies.append((self.leg.shown(each.path), self.leg.shown(first[each.key].path)))
+                original = self.leg.shown(first[each.key].path)
+                self.copies.append(f"{self.leg.shown(each.path)}: is a copy of {original}, counted once")
+        self.directory.note(self.copies)  # before they are known: a kill in between must not lose a line
+        self.directory.keep_files({str(each.path): entry_of(each) for each in self.found if each.size})
 
     def plan(self) -> None:
         """Queue what is not counted yet: what is pending, then in the order of time, each content once."""

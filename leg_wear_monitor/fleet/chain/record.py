@@ -98,7 +98,12 @@ class RecordingRecord:
 def unreadable(key: str, file: str, settings: str, fault: str) -> RecordingRecord:
     """Record of a recording that cannot be read."""
     return RecordingRecord(
-        key=key, file=file, settings=settings, outcome=Outcome.UNREADABLE, is_partial=True, findings=(fault,)
+        key=key,
+        file=file,
+        settings=settings,
+        outcome=Outcome.UNREADABLE,
+        is_partial=True,
+        findings=(printable(fault),),
     )
 
 

@@ -5,6 +5,7 @@ from pathlib import Path
 
 import attrs
 
+from leg_wear_monitor.errors import printable
 from leg_wear_monitor.monitor.config.settings import MonitorConfig
 
 
@@ -50,8 +51,9 @@ class FleetLeg:
     config_file: Path | None = None
 
     def shown(self, recording: Path) -> str:
-        """Name of a recording in tables: relative to the description where it is below it."""
-        return str(recording.relative_to(self.home) if recording.is_relative_to(self.home) else recording)
+        """Name of a recording in tables: relative to the description where it is below it, and printable."""
+        is_below = recording.is_relative_to(self.home)
+        return printable(str(recording.relative_to(self.home) if is_below else recording))
 
     def with_priors(self, file: Path) -> "FleetLeg":
         """The leg with what its fleet has learned for its forecasts, unless its parameters name a file."""

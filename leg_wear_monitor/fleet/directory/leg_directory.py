@@ -10,13 +10,13 @@ cycles/leg=ID/KEY.parquet table of the gait cycles of a recording
 """
 
 import json
-from collections.abc import Iterator, Mapping
+from collections.abc import Iterator, Mapping, Sequence
 from pathlib import Path
 from typing import Any
 
 from leg_wear_monitor.errors import ConfigError, printable
 from leg_wear_monitor.fleet.directory.atomic import append_line
-from leg_wear_monitor.whole_file import write_whole
+from leg_wear_monitor.whole_file import remove_parts, write_whole
 
 Line = dict[str, Any]
 
@@ -74,6 +74,18 @@ class LegDirectory:
         append_line(self.records, json.dumps(line, allow_nan=False))
         append_line(self.log, printable(words))
         self._pending.unlink(missing_ok=True)
+
+    def note(self, lines: Sequence[str]) -> None:
+        """Add lines to the log, unless it has them."""
+        known = set(self.log.read_text().splitlines()) if lines and self.log.exists() else set()
+        for line in map(printable, lines):
+            if line not in known:
+                append_line(self.log, line)
+
+    def remove_parts(self) -> None:
+        """Remove parts of files that a killed update left."""
+        remove_parts(self.path, "*.json")
+        remove_parts(self.cycles, "*.parquet")
 
     def pending(self) -> Line | None:
         """Record of the recording that may or may not be in the ledger; None if there is none."""

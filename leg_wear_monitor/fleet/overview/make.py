@@ -5,7 +5,7 @@ from collections.abc import Iterable, Mapping
 from contextlib import suppress
 from pathlib import Path
 
-from leg_wear_monitor.errors import ConfigError
+from leg_wear_monitor.errors import ConfigError, printable
 from leg_wear_monitor.fleet.description.fleet_description import FleetDescription
 from leg_wear_monitor.fleet.directory.leg_directory import LegDirectory
 from leg_wear_monitor.fleet.overview.leg import leg_overview
@@ -33,7 +33,7 @@ def write_overview(fleet: FleetDescription, out: Path, faults: Mapping[str, str]
     with suppress(ConfigError):  # none is there, or one of another version
         before = {leg.id: leg for leg in load_overview(out / FILE).legs}
     legs = [
-        leg_overview(leg, LegDirectory(out, leg.id), before.get(leg.id), faults.get(leg.id, ""))
+        leg_overview(leg, LegDirectory(out, leg.id), before.get(leg.id), printable(faults.get(leg.id, "")))
         for leg in fleet.legs
     ]
     overview = FleetOverview(counts=counts_of(legs), first=first_of(legs), legs=tuple(legs), advice=ADVICE)

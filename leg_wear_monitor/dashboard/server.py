@@ -1,6 +1,7 @@
 """The web server: one page and its events, for reading only."""
 
 import asyncio
+import resource
 import socket
 from collections.abc import Callable, Sequence
 from http import HTTPStatus
@@ -8,7 +9,7 @@ from typing import Any
 
 import attrs
 from tornado.httpserver import HTTPServer
-from tornado.iostream import StreamClosedError
+from tornado.iostream import IOStream, StreamClosedError
 from tornado.web import Application, HTTPError, RequestHandler
 
 from leg_wear_monitor.dashboard.hosts import is_allowed, own_names
@@ -17,7 +18,10 @@ from leg_wear_monitor.errors import LegWearError, printable
 from leg_wear_monitor.monitor.alarms.guides import CODES_OF_GUIDES, FOLDER
 from leg_wear_monitor.share import share_directory
 
+MOST_CONNECTIONS = 300  # of the viewers of a hub, and what their browsers keep open beside
+
 _WRITE_S = 20.0  # a viewer that takes nothing for so long is sent away
+_IDLE_S = 20.0  # so is a connection without a whole request for so long; a browser just makes a new one
 _REQUEST_BYTES = 16_384
 _HEADERS = {
     "Cache-Control": "no-store",
@@ -99,9 +103,10 @@ async def serve(hub: Hub, place: Place, ready: Callable[[asyncio.Event], None]) 
         Called once the page can be loaded.
     """
     ended = asyncio.Event()
-    server = HTTPServer(
+    server = _Server(
         application(hub, place.host),
-        idle_connection_timeout=60.0,
+        idle_connection_timeout=_IDLE_S,
+        body_timeout=_IDLE_S,
         max_header_size=_REQUEST_BYTES,
         max_body_size=_REQUEST_BYTES,
     )
@@ -117,6 +122,24 @@ async def serve(hub: Hub, place: Place, ready: Callable[[asyncio.Event], None]) 
         await renewing  # raises what it may have ended with
         await server.close_all_connections()
         hub.finish()
+
+
+class _Server(HTTPServer):
+    """A server that hangs up on connections beyond a number, long before descriptors run out."""
+
+    _open = 0
+
+    def handle_stream(self, stream: IOStream, address: tuple[Any, ...]) -> None:
+        descriptors, _ = resource.getrlimit(resource.RLIMIT_NOFILE)
+        if self._open >= min(MOST_CONNECTIONS, descriptors // 2):
+            stream.close()
+            return
+        self._open += 1
+        super().handle_stream(stream, address)
+
+    def on_close(self, server_conn: object) -> None:
+        self._open -= 1
+        super().on_close(server_conn)
 
 
 def application(hub: Hub, host: str) -> Application:
@@ -166,17 +189,25 @@ class _Reading(RequestHandler):
         self.set_header("Content-Type", "text/plain; charset=utf-8")
         self.finish(f"{status_code} {HTTPStatus(status_code).phrase}\n")
 
-    def show(self, html: str, policy: str) -> None:
+    def log_exception(self, kind: Any, value: Any, trace: Any) -> None:
+        """No line for a refused request: whoever asks could fill a disk; a fault of ours has its line."""
+        if not isinstance(value, HTTPError):
+            super().log_exception(kind, value, trace)
+
+    async def show(self, html: str, policy: str) -> None:
         """Answer with a page."""
         self.set_header("Content-Security-Policy", f"{policy}; frame-ancestors 'none'")
         self.set_header("Content-Type", "text/html; charset=utf-8")
-        self.finish(html)
+        try:
+            await asyncio.wait_for(self.finish(html), _WRITE_S)
+        except (StreamClosedError, TimeoutError):
+            self.request.connection.stream.close()  # type: ignore[union-attr]
 
 
 class _Page(_Reading):
     async def get(self) -> None:
         content = await self._hub.content()
-        self.show(content.html, content.policy)
+        await self.show(content.html, content.policy)
 
     head = get
 
@@ -199,7 +230,7 @@ class _Leg(_Reading):
         page = await self._hub.leg_page(name)
         if page is None:
             raise HTTPError(HTTPStatus.NOT_FOUND)
-        self.show(page, "base-uri 'none'; form-action 'none'")  # the page itself says what may run
+        await self.show(page, "base-uri 'none'; form-action 'none'")  # the page itself says what may run
 
     head = get
 

@@ -1,7 +1,9 @@
 """The server: reads only, answers to its own names only, the same for all who look, and ends well."""
 
+import logging
 import socket
 import threading
+from contextlib import ExitStack, suppress
 
 import pytest
 from heard_leg import walk
@@ -9,6 +11,7 @@ from heard_leg import walk
 pytest.importorskip("tornado")
 
 from leg_wear_monitor.dashboard import hub as hubs
+from leg_wear_monitor.dashboard import server as servers
 from leg_wear_monitor.dashboard.server import listen
 from leg_wear_monitor.errors import LegWearError
 
@@ -111,6 +114,43 @@ def test_there_are_not_more_viewers_than_it_can_serve(leg, served, monkeypatch):
         next(states)
         assert dashboard.ask("/events")[0] == 503
         assert dashboard.ask("/")[0] == 200
+
+
+def test_connections_that_ask_nothing_are_capped_and_sent_away(leg, served, monkeypatch):
+    monkeypatch.setattr(servers, "MOST_CONNECTIONS", 5)
+    monkeypatch.setattr(servers, "_IDLE_S", 0.5)
+    dashboard = served(leg)
+    with ExitStack() as stack:
+        idle = [
+            stack.enter_context(socket.create_connection(("127.0.0.1", dashboard.port), timeout=30))
+            for _ in range(20)
+        ]
+        idle[0].sendall(b"GET / HTTP/1.1\r\nHost:")  # and no more
+        idle[1].sendall(b"POST / HTTP/1.1\r\nHost: localhost\r\nContent-Length: 9\r\n\r\n")
+        for connection in idle[5:]:
+            assert connection.recv(1) == b""
+        for connection in idle[:5]:
+            while connection.recv(100):
+                continue
+        assert dashboard.ask("/")[0] == 200
+
+
+@pytest.mark.parametrize(
+    "request_",
+    [b"GET /legs/%ff%fe/report.html HTTP/1.1", b"GET /guides/%ff.md HTTP/1.1", b"\xff\xfe / HTTP/1.1",
+     b"GET /?\x1b[2J=%ff HTTP/1.1", b"GET / HTTP/9", b"x" * 20_000,
+     b"POST / HTTP/1.1\r\nContent-Length: -1", b"POST / HTTP/1.1\r\nTransfer-Encoding: chunked",
+     b"GET / HTTP/1.1\r\nContent-Length: 99999999"],
+)  # fmt: skip
+def test_no_request_writes_a_line(leg, served, caplog, request_):
+    dashboard = served(leg)
+    with socket.create_connection(("127.0.0.1", dashboard.port), timeout=30) as connection:
+        connection.sendall(request_ + b"\r\nHost: localhost\r\nConnection: close\r\n\r\nzz\r\n")
+        with suppress(ConnectionResetError):
+            while connection.recv(4096):
+                continue
+    assert dashboard.ask("/")[0] == 200
+    assert [record.getMessage() for record in caplog.records if record.levelno >= logging.WARNING] == []
 
 
 def test_a_rendering_serves_all(leg, served, monkeypatch):

@@ -23,6 +23,8 @@ _KERNEL = {**_ENTRY, "forceinline": True}
 
 _HOME = Path(__file__).parent
 
+at_compilation: list[Callable[[], None]] = []  # called when an entry is compiled, and not loaded
+
 
 def _module(parts: Iterable[str]) -> Path | None:
     """File of a module of this package, from the parts of its name; None if there is none."""
@@ -68,12 +70,13 @@ def _sources(roots: Iterable[Path]) -> set[Path]:
 
 
 def _digest(sources: Iterable[Path]) -> str:
-    """Digest of the contents, paths and times of sources, and of numba's version."""
+    """Digest of the names and contents of sources, and of numba's version: equal for equal copies."""
     digest = hashlib.sha256(numba.__version__.encode())
     for source in sorted(sources):
-        digest.update(source.read_bytes())
-        # numba recompiles for a file with another path or time
-        digest.update(f"{source} {source.stat().st_mtime_ns}".encode())
+        text = source.read_bytes()
+        name = source.relative_to(_HOME) if source.is_relative_to(_HOME) else source
+        digest.update(f"{name} {len(text)} ".encode())
+        digest.update(text)
     return digest.hexdigest()[:16]
 
 
@@ -120,23 +123,24 @@ def entry(function: _Function) -> _Function:
 
     While another process compiles the same entry, this one waits for it and loads the result.
     """
-    home, previous = cache_directory(Path(function.__code__.co_filename)), numba.config.CACHE_DIR
-    numba.config.CACHE_DIR = str(home or previous)
-    try:
-        compiled = numba.njit(cache=home is not None, nogil=True, **_ENTRY)(function)
-    finally:
-        numba.config.CACHE_DIR = previous
+    home = cache_directory(Path(function.__code__.co_filename))
+    compiled = numba.njit(nogil=True, **_ENTRY)(function)
     if home is not None and not numba.config.DISABLE_JIT:
-        compiled.compile = _compiled_once(compiled.compile, home / f"{function.__name__}.lock")
+        whole_program.store(compiled, home)
+        compiled.compile = _compiled_once(compiled, home / f"{function.__name__}.lock")
     return compiled  # type: ignore[no-any-return]
 
 
-def _compiled_once(compile_or_load: Callable[..., object], lock: Path) -> Callable[..., object]:
+def _compiled_once(compiled: Any, lock: Path) -> Callable[..., object]:
     """A dispatcher's method ``compile``, in one process at a time."""
+    compile_or_load = compiled.compile
 
     def compile_in_turn(signature: object) -> object:
         # numba's own lock first: two threads that each held one of the two would wait for ever
         with global_compiler_lock, one_process_at_a_time(lock):
+            if at_compilation and not is_stored(compiled):
+                for call in at_compilation:
+                    call()
             return compile_or_load(signature)
 
     return compile_in_turn

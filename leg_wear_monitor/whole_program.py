@@ -11,7 +11,10 @@ later.
 
 from collections.abc import Callable, Iterable
 from functools import wraps
+from pathlib import Path
 from typing import Any
+
+import numba
 
 _LIBRARY = (
     "_finalized", "_linking_libraries", "add_linking_library", "finalize", "get_pointer_to_function",
@@ -178,6 +181,61 @@ class KernelDispatcher(_Dispatcher):  # type: ignore[misc]
     def get_overload(self, sig: Any) -> Any:
         """What stands for the part with a signature."""
         return self._part.get_overload(sig)
+
+
+class _Place:
+    """Where numba stores code: a directory whose name is a digest of all sources, wherever they lie.
+
+    Its own locators know the source by its path and time, so an equal copy would be compiled again.
+    """
+
+    def __init__(self, function: Callable[..., object], directory: Path) -> None:
+        self._line, self._directory = function.__code__.co_firstlineno, directory
+
+    def ensure_cache_path(self) -> None:
+        """Nothing to do: it is there."""
+
+    def get_cache_path(self) -> str:
+        """The directory."""
+        return str(self._directory)
+
+    def get_source_stamp(self) -> str:
+        """Always the same: another source has another directory."""
+        return ""
+
+    def get_disambiguator(self) -> str:
+        """What tells functions of one name apart."""
+        return str(self._line)
+
+
+def store(entry: Any, directory: Path) -> None:
+    """Have numba store an entry's code in a directory, and load it from there.
+
+    Parameters
+    ----------
+    entry : dispatcher
+    directory : pathlib.Path
+        For these sources alone, and writable.
+    """
+    try:
+        from numba.core.caching import CompileResultCacheImpl, FunctionCache
+
+        class Locators:
+            """As numba asks for them."""
+
+            @staticmethod
+            def from_function(function: Callable[..., object], _file: str) -> _Place:
+                return _Place(function, directory)
+
+        implementation = type("Stored", (CompileResultCacheImpl,), {"_locator_classes": [Locators]})
+        cache = type("Cache", (FunctionCache,), {"_impl_class": implementation})
+        entry._cache = cache(entry.py_func)
+    except (AttributeError, ImportError):  # then by path and time
+        previous, numba.config.CACHE_DIR = numba.config.CACHE_DIR, str(directory)
+        try:
+            entry.enable_caching()
+        finally:
+            numba.config.CACHE_DIR = previous
 
 
 def address_of(entry: Any, arguments: Iterable[object], returns: Any) -> int:

@@ -26,8 +26,10 @@ ROOT = (
     "@entry\ndef line(x):\n    return slope(x) + 1.0\n"
 )
 SCRIPT = """
-from leg_wear_monitor.kernel import cache_directory
+import sys
+from leg_wear_monitor.kernel import at_compilation, cache_directory
 from leg_wear_monitor.root import line
+at_compilation.append(lambda: print("compiling", end=" ", file=sys.stderr))
 print(line(2.0), len(line.stats.cache_hits), cache_directory())
 """
 
@@ -53,9 +55,10 @@ class Package:
         kept = {key: value for key, value in os.environ.items() if not key.startswith(unset)}
         kept |= {"PYTHONPATH": str(self.directory.parent), "PYTHONDONTWRITEBYTECODE": "1", **environment}
         command, where = [sys.executable, "-c", SCRIPT], self.directory.parent
-        return subprocess.run(
-            command, env=kept, cwd=where, text=True, capture_output=True, check=True
-        ).stdout.split()
+        done = subprocess.run(command, env=kept, cwd=where, text=True, capture_output=True, check=True)
+        value, hits, home = done.stdout.split()
+        assert ("compiling" in done.stderr) == (hits == "0")
+        return [value, hits, home]
 
 
 @pytest.fixture
@@ -148,13 +151,16 @@ def test_an_entry_does_not_follow_what_it_does_not_import(package, home):
     assert package.run(**home)[:2] == ["5.0", "1"]
 
 
-def test_another_copy_compiles_for_itself_in_a_directory_of_its_own(package, home, tmp_path):
-    """So a note in the cache directory that all is compiled is true of the copy that left it only."""
+def test_an_equal_copy_does_not_compile(package, home, tmp_path):
+    """So a checkout and the package that was installed from it compile once."""
     (tmp_path / "copy").mkdir()
     _, _, here = package.run(**home)
-    _, hits, there = Package(tmp_path / "copy").run(**home)
-    assert hits == "0"
-    assert here != there
+    copy = Package(tmp_path / "copy")
+    assert copy.run(**home) == ["5.0", "1", here]
+    copy.write(3.0)
+    value, hits, there = copy.run(**home)
+    assert (value, hits) == ("7.0", "0")
+    assert there != here
 
 
 def test_a_kernel_that_allocates_is_refused():

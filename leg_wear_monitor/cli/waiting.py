@@ -31,17 +31,36 @@ def is_compiled(kernels: str) -> bool:
 def compilation(*kernels: str, how_long: str = "about half a minute") -> Iterator[None]:
     """Show the time that passes while the work inside compiles sets of kernels for the first time.
 
-    Only a terminal shows it: in a pipe, stderr is for what programs must see.
+    In a pipe it is one line when the first of them is compiled: what fails before it is one line, too.
     """
     if all(is_compiled(one) for one in kernels):
         yield
         return
-    with _shown(f"compiling numerical kernels (once per installation, {how_long})"):
+    what = f"compiling numerical kernels (once per installation, {how_long})"
+    with _shown(what) if sys.stderr.isatty() else _said_by_the_compiler(what):
         yield
     for mark in map(_mark, kernels):
         if mark is not None:
             with suppress(FileNotFoundError):  # `cache --clear` meanwhile: then it is to be compiled again
                 mark.touch()
+
+
+@contextmanager
+def _said_by_the_compiler(what: str) -> Iterator[None]:
+    from leg_wear_monitor.kernel import at_compilation
+
+    said: list[str] = []
+
+    def say() -> None:
+        if not said:
+            said.append(what)
+            print(what, file=sys.stderr, flush=True)
+
+    at_compilation.append(say)
+    try:
+        yield
+    finally:
+        at_compilation.remove(say)
 
 
 @contextmanager

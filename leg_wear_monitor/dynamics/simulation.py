@@ -123,7 +123,8 @@ def simulate(
     normal_law : str, optional
         Normal contact law of all clearance joints.
     trace : int
-        Stored samples per cycle, the first at crank angle 0; 0 for none.
+        Stored samples per cycle, the first at crank angle 0; 0 for none. They do not change the run. Each
+        is integrated to its own instant: from some hundred per cycle on, they take longer than the run.
     progress : callable, optional
         Called with the completed fraction of the run.
 

@@ -6,6 +6,7 @@ import sys
 import pytest
 
 from leg_wear_monitor.cli import waiting
+from leg_wear_monitor.kernel import at_compilation
 
 
 class Terminal(io.StringIO):
@@ -39,11 +40,16 @@ def test_one_display_shows_a_compilation_inside_a_progress_and_the_other_way_rou
     assert not waiting._display
 
 
-def test_a_pipe_shows_nothing(monkeypatch, fresh):
+def test_a_pipe_gets_a_line_when_it_compiles_and_nothing_else(monkeypatch, fresh):
     monkeypatch.setattr(sys, "stderr", pipe := io.StringIO())
     with waiting.compilation("monitor"), waiting.progress_bar("life") as progress:
         progress(0.5)
-    assert pipe.getvalue() == ""
+        assert pipe.getvalue() == ""
+        for _ in range(2):  # as of two entries
+            for call in at_compilation:
+                call()
+    assert pipe.getvalue() == "compiling numerical kernels (once per installation, about half a minute)\n"
+    assert not at_compilation
 
 
 def test_what_fails_is_not_marked_as_compiled_and_leaves_no_display(monkeypatch, fresh):

@@ -84,7 +84,8 @@ _WARM_UP_CYCLES, _WARM_UP_S = 1.0 / 256.0, 1.0e-9
     type=click.IntRange(min=0),
     metavar="N",
     default=0,
-    help="Keep N samples per cycle, for --json and for the pictures of --out.",
+    help="Keep N samples per cycle, for --json and for the pictures of --out; from some hundred on, samples "
+    "take longer than the simulation.",
 )
 @json_option("the result")
 @out_option("Write result.json and pictures of the leg and its worn bushings.")

@@ -37,6 +37,7 @@ class ClearanceRun:
         self.stepper = ClearanceStepper(setup, TURN / abs(setup.speed) / intervals)
         self._setup = setup
         self._polynomial = steady_drive(0.0, setup.speed)
+        self._ahead: tuple[ClearanceRun, RunStatistics] | None = None
 
     @property
     def time(self) -> float:
@@ -84,6 +85,7 @@ class ClearanceRun:
         """An independent copy of the run in its present state."""
         surfaces = self._setup.surfaces._replace(depth=self.stepper.state.depth.copy())
         run, model = copy(self), self.stepper.model
+        run._ahead = None
         run._setup = attrs.evolve(self._setup, surfaces=surfaces)
         run.stepper = ClearanceStepper(run._setup, model.interval, tables=model.tables)
         run.stepper.restore(self.stepper.snapshot())
@@ -94,10 +96,14 @@ class ClearanceRun:
         stepper, rest = self.stepper, t - self.time
         if rest <= _ROUNDING * stepper.model.interval:
             return self.sample()
-        run = self.branch()
-        run.stepper.model = stepper.model._replace(interval=rest)
-        run.stepper.state.intervals[0] = 0.0
+        if self._ahead is None:  # kept for the next sample: to build a stepper takes longer than the interval
+            joints = len(self._setup.linkage.mechanism.joints)
+            self._ahead = self.branch(), new_run_statistics(joints)
+        ahead, statistics = self._ahead
+        ahead.stepper.restore(stepper.snapshot())
+        ahead.stepper.model = stepper.model._replace(interval=rest)
+        ahead.stepper.state.intervals[0] = 0.0
         angle, speed, _ = stepper.state.drive
-        run._polynomial = steady_drive(angle, speed)
-        run.advance(rest, new_run_statistics(len(self._setup.linkage.mechanism.joints)))
-        return run.sample()
+        ahead._polynomial = steady_drive(angle, speed)
+        ahead.advance(rest, statistics)
+        return ahead.sample()

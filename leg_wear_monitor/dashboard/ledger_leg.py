@@ -1,11 +1,7 @@
 """A leg as its ledger has it, which a monitor may be writing meanwhile."""
 
-import json
 from collections.abc import Callable, Iterable
 from pathlib import Path
-from typing import Any
-
-import attrs
 
 from leg_wear_monitor.dashboard import regions as region
 from leg_wear_monitor.dashboard.leg_view import NO_VERDICT, Known, leg_setup, view_of
@@ -24,14 +20,14 @@ from leg_wear_monitor.mechanism.spec import Mechanism
 from leg_wear_monitor.monitor.config.settings import MonitorConfig
 from leg_wear_monitor.monitor.forecast.measurement import last_measured
 from leg_wear_monitor.monitor.ledger.binding import binding_of
-from leg_wear_monitor.monitor.ledger.entry import ClearancePoint, JointWear, VerdictEvent
+from leg_wear_monitor.monitor.ledger.entry import ClearancePoint, JointWear
 from leg_wear_monitor.monitor.ledger.file import LedgerError, beside
 from leg_wear_monitor.monitor.ledger.log import ENDING
 from leg_wear_monitor.monitor.ledger.reading import LedgerContent, read_ledger
 from leg_wear_monitor.monitor.verdict.belief import believed
 from leg_wear_monitor.monitor.verdict.situation import JointSituation, SeenClearance
-from leg_wear_monitor.monitor.verdict.verdict import Evidence, Figure, State, Verdict
-from leg_wear_monitor.playback.condition import believed_fields
+from leg_wear_monitor.monitor.verdict.verdict import Figure
+from leg_wear_monitor.playback.condition import believed_fields, ledger_verdict
 from leg_wear_monitor.playback.result.condition import JointClearance, LifeHours
 from leg_wear_monitor.playback.result.parts import ClearanceChange, ReplayJoint
 from leg_wear_monitor.playback.result.replay_summary import ReplaySummary
@@ -159,24 +155,6 @@ class LedgerLeg:
             measured_sigma_m=last.sigma_m if last else None,
             **(believed_fields(one) if one else {}),
         )
-
-
-def ledger_verdict(event: VerdictEvent) -> Verdict:
-    """A verdict of a ledger."""
-    return Verdict(
-        state=State(event.state),
-        joints=tuple(json.loads(event.joints)),
-        why=event.why,
-        since_ns=event.since_ns,
-        do=event.to_do,
-        evidence=tuple(_evidence(each) for each in json.loads(event.evidence)),
-        not_valid=tuple(map(Figure, json.loads(event.not_valid))),
-        fault_code=event.fault_code,
-    )
-
-
-def _evidence(record: dict[str, Any]) -> Evidence:
-    return Evidence(**{field.name: record[field.name] for field in attrs.fields(Evidence)})
 
 
 def _report(part: JointWear, counted_m: float) -> ReplayJoint:

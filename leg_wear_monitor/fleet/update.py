@@ -10,7 +10,9 @@ from leg_wear_monitor.fleet.chain.queue import Chain
 from leg_wear_monitor.fleet.chain.words import words_of
 from leg_wear_monitor.fleet.description.fleet_description import FleetDescription
 from leg_wear_monitor.fleet.directory.lock import locked
-from leg_wear_monitor.fleet.learning.of_fleet import learn_fleet
+from leg_wear_monitor.fleet.learning.files import learned_from
+from leg_wear_monitor.fleet.learning.of_fleet import learn_fleet, measured_in
+from leg_wear_monitor.fleet.learning.renew import is_renewal_due, renew
 from leg_wear_monitor.fleet.overview.make import write_overview
 from leg_wear_monitor.fleet.tables.parquet import arrow
 from leg_wear_monitor.workers.cluster import run_on_cluster
@@ -46,7 +48,14 @@ class FleetUpdate:
     @property
     def is_up_to_date(self) -> bool:
         """Whether there was nothing to do."""
-        return not any(chain.new or chain.copies or chain.refused or chain.fault for chain in self.chains)
+        return not self.renewed and not any(
+            chain.new or chain.copies or chain.refused or chain.fault for chain in self.chains
+        )
+
+    @property
+    def renewed(self) -> int:
+        """Number of legs without a new recording whose forecast follows a measurement."""
+        return sum(chain.is_renewed and not chain.fault for chain in self.chains)
 
     @property
     def findings(self) -> list[tuple[str, str]]:
@@ -104,10 +113,10 @@ def update_fleet(
     with locked(out):
         work = _Work([Chain(attrs.evolve(leg, sample=sample), out) for leg in fleet.legs], progress, tell)
         scans = work.scans()
-        if scans or work.is_due:
-            if begin:
-                begin(work.chains)
-            _run(scans or work.first_counts(), work.done, workers, scheduler)
+        if begin and (scans or work.is_due):
+            begin(work.chains)
+        if jobs := scans or work.first_jobs():
+            _run(jobs, work.done, workers, scheduler)
         write_overview(fleet, out, {chain.leg.id: _first_fault(chain) for chain in work.chains})
     return FleetUpdate(tuple(work.chains), work.learned)
 
@@ -151,9 +160,16 @@ class _Work:
             self._plan()
         return jobs
 
-    def first_counts(self) -> list[Job]:
-        """The first recording of each leg."""
-        return [job for job in (chain.next_job() for chain in self.chains) if job is not None]
+    def first_jobs(self) -> list[Job]:
+        """The first recording of each leg, or its forecast."""
+        return [job for job in map(self._next_job, self.chains) if job is not None]
+
+    def _next_job(self, chain: Chain) -> Job | None:
+        """The next recording of a leg; after the last one, its forecast if something was measured."""
+        if chain.waiting or chain.fault or chain.is_renewed or not is_renewal_due(chain.directory):
+            return chain.next_job()
+        leg = attrs.evolve(chain.leg, recordings=())
+        return Job(f"renew-{leg.id}", renew, (leg, chain.directory))
 
     def done(self, job: Job, result: Any) -> list[Job]:
         """Take a result; the jobs that follow from it."""
@@ -164,12 +180,15 @@ class _Work:
             if self._scans:
                 return []
             self._plan()
-            return self.first_counts()
+            return self.first_jobs()
+        if job.key.startswith("renew-"):
+            chain.is_renewed, chain.fault = True, result
+            return []
         chain.done(result)
         self._tell(chain.leg.id, result if isinstance(result, str) else words_of(result))
         left = sum(each.waiting_bytes for each in self.chains if not each.fault)
         self._progress(1.0 - left / self._total)
-        following = chain.next_job()
+        following = self._next_job(chain)
         return [following] if following else []
 
     def _plan(self) -> None:
@@ -181,7 +200,12 @@ class _Work:
             for line in chain.copies:
                 self._tell(chain.leg.id, line)
         self._total = max(1, sum(chain.waiting_bytes for chain in self.chains))
-        if self.is_due:
+        out = self.chains[0].out
+        if (
+            self.is_due
+            or measured_in([chain.leg for chain in self.chains], out) != learned_from(out)
+            or any(is_renewal_due(chain.directory) for chain in self.chains if not chain.fault)
+        ):
             self._learn()
 
     def _learn(self) -> None:

@@ -16,6 +16,7 @@ from leg_wear_monitor.monitor.cycle_report import with_forecast
 from leg_wear_monitor.monitor.diagnosis.diagnosis import Diagnosis
 from leg_wear_monitor.monitor.evaluation.evaluation_period import EvaluationPeriods
 from leg_wear_monitor.monitor.evaluation.specs import MISMATCH
+from leg_wear_monitor.monitor.forecast.forecast import ForecastBasis
 from leg_wear_monitor.monitor.forecast.measurement import MeasurementResult
 from leg_wear_monitor.monitor.ledger.entry import AlarmEvent, Audit, JointWear, Measurement
 from leg_wear_monitor.monitor.ledger.file import LedgerError
@@ -426,6 +427,11 @@ class WearMonitor:
     def end_recording(self) -> None:
         """Count the wear up to the last sample, which a sampled replay does at the end of a gait cycle."""
         self._twin.end_recording()
+
+    @property
+    def forecast_basis(self) -> ForecastBasis | None:
+        """What the last forecast rests on; None before the first."""
+        return self._forecaster.state.basis
 
     def renew_forecast(self) -> CycleReport | None:
         """Renew the forecast now; otherwise it may be a minute old.

@@ -1,14 +1,17 @@
 """Condition of the leg at the end of a replay; what the verdict does not believe has no remaining life."""
 
+import json
 import math
+from collections.abc import Mapping
 from typing import TYPE_CHECKING, Any
 
 import attrs
 
 from leg_wear_monitor.monitor.encoders.clearance_estimate import ClearanceObservation
 from leg_wear_monitor.monitor.forecast.forecast import JointForecast, LegForecast
+from leg_wear_monitor.monitor.ledger.entry import VerdictEvent
 from leg_wear_monitor.monitor.verdict.belief import BelievedClearance
-from leg_wear_monitor.monitor.verdict.verdict import Figure, Verdict
+from leg_wear_monitor.monitor.verdict.verdict import Evidence, Figure, State, Verdict
 from leg_wear_monitor.playback.result.condition import JointClearance, LifeHours, life_hours
 
 if TYPE_CHECKING:
@@ -67,7 +70,33 @@ def life(result: "ReplayResult", verdict: Verdict) -> dict[str, LifeHours | None
     last = result.history.last
     if last is None:
         return {}
-    joints = {joint.joint: joint_forecast(joint.forecast, verdict) for joint in last.joints}
-    told: dict[str, JointForecast | LegForecast | None] = {**joints}
-    told["leg"] = leg_forecast(last.forecast, verdict)
+    return life_of({joint.joint: joint.forecast for joint in last.joints}, last.forecast, verdict)
+
+
+def life_of(
+    joints: Mapping[str, JointForecast | None], leg: LegForecast | None, verdict: Verdict
+) -> dict[str, LifeHours | None]:
+    """Remaining life of each joint and of the ``leg`` by their forecasts, as far as it is believed."""
+    told: dict[str, JointForecast | LegForecast | None] = {
+        name: joint_forecast(each, verdict) for name, each in joints.items()
+    }
+    told["leg"] = leg_forecast(leg, verdict)
     return {name: life_hours(each.hours) if each else None for name, each in told.items()}
+
+
+def ledger_verdict(event: VerdictEvent) -> Verdict:
+    """A verdict of a ledger."""
+    return Verdict(
+        state=State(event.state),
+        joints=tuple(json.loads(event.joints)),
+        why=event.why,
+        since_ns=event.since_ns,
+        do=event.to_do,
+        evidence=tuple(_evidence(each) for each in json.loads(event.evidence)),
+        not_valid=tuple(map(Figure, json.loads(event.not_valid))),
+        fault_code=event.fault_code,
+    )
+
+
+def _evidence(record: dict[str, Any]) -> Evidence:
+    return Evidence(**{field.name: record[field.name] for field in attrs.fields(Evidence)})

@@ -95,7 +95,7 @@ def summary(
         joints=_joints(result, verdict) if is_known else {},
         clearances=clearances(result) if is_known else {},
         life=life(result, verdict) if is_known else {},
-        forecast=_leg(told) if told else None,
+        forecast=leg_life(told),
         measurements=tuple(monitor.measurements),
         alarms=_alarms(result),
         status=tuple(map(_status, monitor.status())),
@@ -225,8 +225,10 @@ def _seen(seen: ClearanceEstimate) -> SeenClearance:
     return SeenClearance(**attrs.asdict(seen, recurse=False), is_other=seen.is_other)
 
 
-def _leg(told: LegForecast) -> LegLife:
+def leg_life(told: LegForecast | None) -> LegLife | None:
     """The leg's end of life: the first joint to reach its limit."""
+    if told is None:
+        return None
     return LegLife(**attrs.asdict(told, recurse=False), first=told.first)
 
 

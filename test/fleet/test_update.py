@@ -16,6 +16,7 @@ from leg_wear_monitor.fleet.chain.scan import Found
 from leg_wear_monitor.fleet.description.loader import load_fleet
 from leg_wear_monitor.fleet.directory.leg_directory import LegDirectory
 from leg_wear_monitor.fleet.directory.lock import locked
+from leg_wear_monitor.fleet.fleet import Fleet
 from leg_wear_monitor.fleet.overview.read import load_overview
 
 pytest.importorskip("pyarrow", reason="the extra 'fleet' is not installed")
@@ -265,8 +266,9 @@ def test_a_leg_is_forecast_with_what_others_measured(walk, update, tmp_path):
     assert (
         not (out / "learning.json").exists() or not json.loads((out / "learning.json").read_text())["pairs"]
     )
-    alone = json.loads((out / "legs/old/summary.json").read_text())["joints"]["A"]["forecast"]["prior"]
-    assert "lot" not in alone["basis"]
+    before = json.loads((out / "legs/old/summary.json").read_text())
+    assert "lot" not in before["joints"]["A"]["forecast"]["prior"]["basis"]
+    cycles = Fleet(out).cycles().leg.value_counts().to_dict()
 
     ledger = LegDirectory(out, "old").ledger
     counted = lines(out, "old")["old/1.mcap"]["clearances"]["A"]["counted_m"]
@@ -280,7 +282,31 @@ def test_a_leg_is_forecast_with_what_others_measured(walk, update, tmp_path):
     assert [chain.leg.id for chain in done.chains if chain.new] == ["new"]
     prior = json.loads((out / "legs/new/summary.json").read_text())["joints"]["A"]["forecast"]["prior"]
     assert prior["basis"] == "1 part of lot 2026-03"
+    (old,) = [chain for chain in done.chains if chain.is_renewed]  # nothing new was recorded of it
+    assert old.leg.id == "old" and done.renewed == 1
+    now, own = load_overview(out).leg("old"), json.loads((out / "legs/old/summary.json").read_text())
+    assert now.clearances["A"].measured_m == pytest.approx(counted + 1e-5, abs=1e-7)
+    assert now.clearances["A"].counted_m == counted and now.recordings.counted == 1
+    assert own["joints"]["A"]["forecast"]["measurements"] == len(own["measurements"]) == 1
+    assert own["joints"]["A"]["forecast"]["clearance_m"] != before["joints"]["A"]["forecast"]["clearance_m"]
+    assert own["clearances"]["A"]["believed_by"] in ("measured", "both")
+    assert Fleet(out).cycles().leg.value_counts().to_dict() == cycles | {"new": cycles["old"]}
     assert update(path, out).is_up_to_date
+
+    # a measurement alone, no recording: all legs of the lot follow, and what follows is what a replay gives
+    line[1] = "B"
+    assert CliRunner().invoke(cli, line).exit_code in (0, 1)
+    kept = contents(out)
+    done = update(path, out, begin=lambda _: pytest.fail("nothing is to be compiled"))
+    assert (done.counted, done.renewed, done.is_up_to_date) == (0, 2, False)
+    new = json.loads((out / "legs/new/summary.json").read_text())["joints"]["A"]["forecast"]
+    assert new["prior"]["basis"] == "2 parts of lot 2026-03" and update(path, out).is_up_to_date
+    shutil.rmtree(out / "legs/new")
+    shutil.rmtree(out / "cycles/leg=new")
+    update(path, out)
+    again = json.loads((out / "legs/new/summary.json").read_text())["joints"]["A"]["forecast"]
+    assert again == new
+    assert set(contents(out)) == set(kept)
 
 
 @pytest.mark.slow  # playback/test_sampled_replay.py holds the law for one leg

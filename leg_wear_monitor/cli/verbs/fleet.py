@@ -169,6 +169,8 @@ def _print_counts(done: "FleetUpdate", out: Path) -> None:
         click.echo("everything is in the ledger already")
     else:
         click.echo(f"recordings: {done.counted} counted now")
+        if done.renewed:
+            click.echo(f"forecasts: {done.renewed} renewed after measurements")
     overview = load_overview(out)
     states = [f"{number} {state.replace('_', ' ')}" for state, number in overview.counts.items() if number]
     click.echo(f"legs: {', '.join(states)}")

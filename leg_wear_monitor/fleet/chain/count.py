@@ -70,10 +70,11 @@ def count_recording(leg: FleetLeg, out: Path, found: Found, last_ns: int) -> Lin
 def _replayed(leg: FleetLeg, directory: LegDirectory, found: Found, last_ns: int) -> Line:
     """Replay a recording into the ledger; its record."""
     pending, lines = directory.pending(), []
+    knows = directory.knowledge()
     about = {"key": found.key, "file": leg.shown(found.path), "settings": leg.settings}
 
     def finish(result: ReplayResult) -> None:
-        record = record_of(result, **about, is_late=found.begin_ns < last_ns)
+        record = record_of(result, **about, is_late=found.begin_ns < last_ns, knows=knows)
         lines.append(record.to_dict())
         if record.outcome is Outcome.COUNTED:
             write_parquet(directory.table(found.key), cycle_columns(result, leg.row))

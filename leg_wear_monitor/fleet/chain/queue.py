@@ -33,6 +33,8 @@ class Chain:
         Lines about copies that were not known before.
     refused : list of str
         Recordings that are not counted because another leg has them.
+    is_renewed : bool
+        Whether its forecast was made again, because something was measured.
     fault : str
         Why the leg could not go on; empty if it could.
     """
@@ -44,6 +46,7 @@ class Chain:
     new: list[Line] = attrs.Factory(list)
     copies: list[str] = attrs.Factory(list)
     refused: list[str] = attrs.Factory(list)
+    is_renewed: bool = False
     fault: str = ""
     _settled: set[str] = attrs.Factory(set)
     _pending: str = ""

@@ -1,11 +1,13 @@
 """What is kept of one recording of a leg."""
 
+import math
 from enum import Enum
 from typing import TYPE_CHECKING, Any
 
 import attrs
 
 from leg_wear_monitor.errors import printable
+from leg_wear_monitor.monitor.forecast.forecast import ForecastBasis
 from leg_wear_monitor.monitor.reports import Lost
 from leg_wear_monitor.monitor.verdict.verdict import Verdict
 from leg_wear_monitor.playback.condition import clearances, life
@@ -67,6 +69,10 @@ class RecordingRecord:
     clearances : dict of str to JointClearance
     life : dict of str to LifeHours or None
         Remaining life of each joint, and of the ``leg``.
+    basis : ForecastBasis or None
+        What the forecast rests on; None without one.
+    knows : str
+        Digest of the measurements and priors in it; with others, the forecast is made again.
     """
 
     key: str
@@ -84,6 +90,8 @@ class RecordingRecord:
     verdict: Verdict | None = None
     clearances: dict[str, JointClearance] = attrs.Factory(dict)
     life: dict[str, LifeHours | None] = attrs.Factory(dict)
+    basis: ForecastBasis | None = None
+    knows: str = ""
 
     def to_dict(self) -> dict[str, Any]:
         """Plain object, as its line in the file has it."""
@@ -108,7 +116,7 @@ def unreadable(key: str, file: str, settings: str, fault: str) -> RecordingRecor
 
 
 def record_of(
-    result: "ReplayResult", *, key: str, file: str, settings: str, is_late: bool
+    result: "ReplayResult", *, key: str, file: str, settings: str, is_late: bool, knows: str = ""
 ) -> RecordingRecord:
     """Record of a replay; `ReplayResult.findings` must be complete."""
     texts = [printable(one.text) for one in result.findings]
@@ -133,7 +141,7 @@ def record_of(
         return RecordingRecord(
             outcome=Outcome.ALREADY_COUNTED, findings=tuple(texts[:_MOST_FINDINGS]), **about
         )
-    verdict = result.monitor.verdict.verdict
+    verdict, basis = result.monitor.verdict.verdict, result.monitor.forecast_basis
     return RecordingRecord(
         outcome=Outcome.COUNTED,
         cycles=len(result.history),
@@ -141,5 +149,7 @@ def record_of(
         verdict=verdict,
         clearances=clearances(result),
         life=life(result, verdict),
+        basis=basis if basis and math.isfinite(basis.cycle_s) else None,
+        knows=knows,
         **about,
     )

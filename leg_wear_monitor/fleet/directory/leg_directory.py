@@ -6,9 +6,11 @@ legs/ID/summary.json      result of the recording that was counted last, as `rep
 legs/ID/pending.json      the recording whose result is about to be in the ledger
 legs/ID/files.json        known files: size, time of change, key and begin of the recording
 legs/ID/log               a line a recording, for people
+priors/ID.json            what its forecast uses of the measured clearances of the fleet
 cycles/leg=ID/KEY.parquet table of the gait cycles of a recording
 """
 
+import hashlib
 import json
 from collections.abc import Iterator, Mapping, Sequence
 from pathlib import Path
@@ -16,6 +18,7 @@ from typing import Any
 
 from leg_wear_monitor.errors import ConfigError, printable
 from leg_wear_monitor.fleet.directory.atomic import append_line
+from leg_wear_monitor.monitor.ledger.file import measurements_of
 from leg_wear_monitor.whole_file import remove_parts, write_whole
 
 Line = dict[str, Any]
@@ -34,6 +37,7 @@ class LegDirectory:
 
     def __init__(self, out: Path, leg: str) -> None:
         self.path = out / "legs" / leg
+        self.priors = out / "priors" / f"{leg}.json"
         self.ledger = self.path / "ledger"
         self.records = self.path / "recordings.jsonl"
         self.log = self.path / "log"
@@ -47,7 +51,8 @@ class LegDirectory:
 
     def tables(self) -> list[Path]:
         """Files of the gait cycles of all counted recordings, in the order of time."""
-        lines = sorted(self.lines(), key=lambda line: (line["begin_ns"], line["key"]))
+        last = {line["key"]: line for line in self.lines()}
+        lines = sorted(last.values(), key=lambda line: (line["begin_ns"], line["key"]))
         return [self.table(line["key"]) for line in lines if line["outcome"] == "counted"]
 
     def lines(self) -> Iterator[Line]:
@@ -65,6 +70,16 @@ class LegDirectory:
                 if line.endswith(b"\n"):  # otherwise it was cut off, and its recording is still pending
                     yield _object(line, f"{self.records}: line {number}")
 
+    def last_counted(self) -> Line | None:
+        """Record of the recording that was counted last, as it is now; None before the first."""
+        lines = {line["key"]: line for line in self.lines()}
+        return next((line for line in reversed(lines.values()) if line["outcome"] == "counted"), None)
+
+    def knowledge(self) -> str:
+        """Digest of what a forecast rests on besides walking: measured clearances, and what is learned."""
+        learned = self.priors.read_bytes() if self.priors.exists() else b""
+        return hashlib.sha256(measurements_of(self.ledger).encode() + b"\0" + learned).hexdigest()[:20]
+
     def keys(self) -> set[str]:
         """Keys of all recordings so far."""
         return {line["key"] for line in self.lines()}
@@ -74,6 +89,10 @@ class LegDirectory:
         append_line(self.records, json.dumps(line, allow_nan=False))
         append_line(self.log, printable(words))
         self._pending.unlink(missing_ok=True)
+
+    def renew(self, line: Line) -> None:
+        """Replace the record of a recording; its line in the log stays."""
+        append_line(self.records, json.dumps(line, allow_nan=False))
 
     def note(self, lines: Sequence[str]) -> None:
         """Add lines to the log, unless it has them."""
@@ -116,6 +135,20 @@ def _read(path: Path) -> Line | None:
         return _object(path.read_bytes(), str(path))
     except FileNotFoundError:
         return None
+
+
+def json_object(path: Path) -> Line:
+    """The JSON object in a file.
+
+    Raises
+    ------
+    ConfigError
+        If it cannot be read, or is none.
+    """
+    try:
+        return _object(path.read_bytes(), str(path))
+    except OSError as error:
+        raise ConfigError(str(path), "", f"cannot be read: {error.strerror}") from error
 
 
 def _object(content: bytes, source: str) -> Line:

@@ -1,5 +1,6 @@
 """What a fleet has learned, as files: ``learning.json``, and for each leg the file of ``forecast.priors``."""
 
+import json
 import math
 from collections.abc import Mapping, Sequence
 from pathlib import Path
@@ -7,6 +8,7 @@ from typing import Any
 
 import attrs
 
+from leg_wear_monitor.fleet.directory.leg_directory import LegDirectory
 from leg_wear_monitor.fleet.learning.learn import LearnedPair, LearnedPart
 from leg_wear_monitor.fleet.learning.part import Part
 from leg_wear_monitor.json_text import json_text
@@ -19,7 +21,7 @@ from leg_wear_monitor.monitor.forecast.coefficient_prior import (
 )
 from leg_wear_monitor.whole_file import write_whole
 
-LEARNING_VERSION = 1
+LEARNING, LEARNING_VERSION = "learning.json", 1
 
 
 def priors_of(leg: str, parts: Sequence[Part], learned: Mapping[str, LearnedPair]) -> LearnedPriors:
@@ -49,7 +51,7 @@ def priors_of(leg: str, parts: Sequence[Part], learned: Mapping[str, LearnedPair
 
 
 def write_learning(
-    directory: Path, parts: Sequence[Part], learned: Mapping[str, LearnedPair]
+    directory: Path, parts: Sequence[Part], learned: Mapping[str, LearnedPair], measured: str = ""
 ) -> dict[str, Path]:
     """Write ``learning.json``, and ``priors/LEG.json`` for each leg; the same content for the same parts.
 
@@ -59,6 +61,8 @@ def write_learning(
         Of the fleet's results; it exists.
     parts : sequence of Part
     learned : mapping of str to LearnedPair
+    measured : str
+        Digest of the measurements, by which the next update knows whether there are others.
 
     Returns
     -------
@@ -70,19 +74,30 @@ def write_learning(
     ConfigError
         If the disk does not take a file.
     """
-    write_whole(directory / "learning.json", json_text(document(learned)).encode())
     written = {}
     for leg in sorted({part.leg for part in parts}):
-        written[leg] = directory / "priors" / f"{leg}.json"
+        written[leg] = LegDirectory(directory, leg).priors
         text = json_text(attrs.asdict(priors_of(leg, parts, learned)))
         write_whole(written[leg], text.encode())
+    # last: it says that all of this is learned
+    write_whole(directory / LEARNING, json_text(document(learned, measured)).encode())
     return written
 
 
-def document(learned: Mapping[str, LearnedPair]) -> dict[str, Any]:
+def learned_from(directory: Path) -> str:
+    """Digest of the measurements that a fleet has learned from; empty if it has not learned yet."""
+    try:
+        record = json.loads((directory / LEARNING).read_bytes())
+    except (OSError, ValueError):  # none yet, or damaged: it is learned again
+        return ""
+    return str(record.get("measured", "")) if isinstance(record, dict) else ""
+
+
+def document(learned: Mapping[str, LearnedPair], measured: str = "") -> dict[str, Any]:
     """Content of ``learning.json``."""
     return {
         "schema_version": LEARNING_VERSION,
+        "measured": measured,
         "pairs": {name: _pair(learned[name]) for name in sorted(learned)},
     }
 

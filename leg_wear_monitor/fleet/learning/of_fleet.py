@@ -1,7 +1,8 @@
 """Learning from the ledgers of a fleet, before an update or after it."""
 
-from collections.abc import Mapping, Sequence
-from contextlib import closing
+import hashlib
+from collections.abc import Iterator, Mapping, Sequence
+from contextlib import closing, contextmanager
 from pathlib import Path
 
 import attrs
@@ -13,10 +14,12 @@ from leg_wear_monitor.fleet.learning.files import write_learning
 from leg_wear_monitor.fleet.learning.learn import LearnedPair, learn
 from leg_wear_monitor.fleet.learning.part import Part, parts_of
 from leg_wear_monitor.mechanism.loader import load_mechanism
+from leg_wear_monitor.mechanism.spec import Mechanism
 from leg_wear_monitor.monitor.config.fitting import fitted
+from leg_wear_monitor.monitor.config.settings import MonitorConfig
 from leg_wear_monitor.monitor.ledger.copy import copy_of
-from leg_wear_monitor.monitor.ledger.file import may_have_measurements
-from leg_wear_monitor.monitor.ledger.ledger import open_ledger
+from leg_wear_monitor.monitor.ledger.file import measurements_of
+from leg_wear_monitor.monitor.ledger.ledger import Ledger, open_ledger
 
 
 @attrs.frozen(kw_only=True)
@@ -49,7 +52,8 @@ def learn_fleet(legs: Sequence[FleetLeg], out: Path) -> FleetLearning:
         Directory of the fleet, which exists.
     """
     ledgers = {leg.id: LegDirectory(out, leg.id).ledger for leg in legs}
-    if not any(map(may_have_measurements, ledgers.values())):  # nobody ever measured: no ledger is copied
+    measured = measured_in(legs, out)
+    if not measured:  # nobody ever measured: no ledger is copied
         return FleetLearning(pairs={}, priors=write_learning(out, (), {}), findings=())
     parts: list[Part] = []
     findings = []
@@ -62,8 +66,16 @@ def learn_fleet(legs: Sequence[FleetLeg], out: Path) -> FleetLearning:
     for pair in pairs.values():
         findings += [(each.part.leg, each.finding) for each in pair.measured if each.finding]
     return FleetLearning(
-        pairs=pairs, priors=write_learning(out, parts, pairs), findings=tuple(sorted(findings))
+        pairs=pairs, priors=write_learning(out, parts, pairs, measured), findings=tuple(sorted(findings))
     )
+
+
+def measured_in(legs: Sequence[FleetLeg], out: Path) -> str:
+    """Digest of all that was ever measured in a fleet; empty if nothing was. No ledger is copied."""
+    texts = [(leg.id, leg.lot, measurements_of(LegDirectory(out, leg.id).ledger)) for leg in legs]
+    if not any(text for _, _, text in texts):
+        return ""
+    return hashlib.sha256(repr(sorted(texts)).encode()).hexdigest()[:20]
 
 
 def leg_parts(leg: FleetLeg, path: Path) -> list[Part]:
@@ -77,13 +89,26 @@ def leg_parts(leg: FleetLeg, path: Path) -> list[Part]:
     mechanism = fitted(load_mechanism(leg.config.mechanism), leg.config)
     if not path.exists():
         return parts_of(leg.id, mechanism, leg.config.forecast, (), {}, lot=leg.lot)
+    with ledger_copy(mechanism, leg.config, path) as ledger:
+        entry, measurements, corrections = ledger.entry, ledger.measurements, ledger.corrections
+    replaced_ns = {wear.name: wear.replaced_ns for wear in entry.joints} if entry else {}
+    known = leg.config.forecast, measurements, replaced_ns
+    return parts_of(leg.id, mechanism, *known, lot=leg.lot, corrections=corrections)
+
+
+@contextmanager
+def ledger_copy(mechanism: Mechanism, config: MonitorConfig, path: Path) -> Iterator[Ledger]:
+    """A ledger opened in a copy: it is left unchanged.
+
+    Raises
+    ------
+    LegWearError
+        If it cannot be read.
+    """
     with copy_of(path) as copy:
-        settings = attrs.evolve(leg.config, ledger=attrs.evolve(leg.config.ledger, path=str(copy)))
+        settings = attrs.evolve(config, ledger=attrs.evolve(config.ledger, path=str(copy)))
         ledger = open_ledger(mechanism, settings)
         if ledger is None:
             raise LegWearError(f"{path}: no ledger")
         with closing(ledger):
-            entry, measurements, corrections = ledger.entry, ledger.measurements, ledger.corrections
-    replaced_ns = {wear.name: wear.replaced_ns for wear in entry.joints} if entry else {}
-    known = leg.config.forecast, measurements, replaced_ns
-    return parts_of(leg.id, mechanism, *known, lot=leg.lot, corrections=corrections)
+            yield ledger

@@ -16,7 +16,7 @@ from leg_wear_monitor.monitor.config.forecast import Forecasting
 from leg_wear_monitor.monitor.forecast.coefficient_prior import CoefficientPrior
 from leg_wear_monitor.monitor.forecast.even_draws import MEMBERS, even_fractions, even_normals
 from leg_wear_monitor.monitor.forecast.growth_law import GrowthLaw, cycles_to
-from leg_wear_monitor.monitor.forecast.wear_coefficients import CoefficientEstimate
+from leg_wear_monitor.monitor.forecast.wear_coefficients import CoefficientEstimate, MeasuredClearance
 
 
 class Answer(Enum):
@@ -158,6 +158,28 @@ class JointCondition:
         if self.growth_m is None:
             return Answer.NOT_ENOUGH_DATA
         return Answer.KNOWN if self.growth_m > 0.0 else Answer.NO_GROWTH
+
+
+@attrs.frozen(kw_only=True)
+class ForecastBasis:
+    """What a forecast rests on, besides wear coefficients and their measurements: it can be made again.
+
+    Attributes
+    ----------
+    conditions : tuple of JointCondition
+        In the order of the clearance joints.
+    observed : tuple of MeasuredClearance or None
+        What encoders showed of each joint, as far as the forecast uses it.
+    cycle_s : float
+        Time of a gait cycle.
+    is_valid : bool
+        Whether the model holds for what the leg does.
+    """
+
+    conditions: tuple[JointCondition, ...]
+    observed: tuple[MeasuredClearance | None, ...]
+    cycle_s: float
+    is_valid: bool
 
 
 @attrs.frozen(eq=False)

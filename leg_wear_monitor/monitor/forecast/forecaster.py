@@ -9,7 +9,12 @@ from leg_wear_monitor.mechanism.arrays import Floats
 from leg_wear_monitor.mechanism.spec import Mechanism
 from leg_wear_monitor.monitor.config.forecast import Forecasting
 from leg_wear_monitor.monitor.forecast.coefficient_prior import prior_source
-from leg_wear_monitor.monitor.forecast.forecast import Forecast, JointCondition, forecast
+from leg_wear_monitor.monitor.forecast.forecast import (
+    Forecast,
+    ForecastBasis,
+    JointCondition,
+    forecast,
+)
 from leg_wear_monitor.monitor.forecast.growth import GrowthRate, GrowthWindow, extended, growth_rate
 from leg_wear_monitor.monitor.forecast.known_clearance import corrections_of
 from leg_wear_monitor.monitor.forecast.life_file import law_of
@@ -45,6 +50,10 @@ class ForecastState:
         Of the last.
     known : int
         Joints whose growth was known then.
+    observed : tuple of MeasuredClearance or None
+        What encoders show of each joint, where the estimate uses it.
+    basis : ForecastBasis or None
+        Of the last forecast that was made.
     """
 
     growth: tuple[GrowthWindow, ...]
@@ -52,6 +61,8 @@ class ForecastState:
     last: Forecast | None = None
     stamp_ns: int = 0
     known: int = 0
+    observed: tuple[MeasuredClearance | None, ...] = ()
+    basis: ForecastBasis | None = None
 
 
 class Forecaster:
@@ -93,7 +104,9 @@ class Forecaster:
             self._estimate(k, when) for k, when in zip(range(len(self._fresh_m)), replaced_ns, strict=True)
         )
         self.state = ForecastState(
-            tuple(GrowthWindow() for _ in self._clearance_joints), coefficient_estimates
+            tuple(GrowthWindow() for _ in self._clearance_joints),
+            coefficient_estimates,
+            observed=(None,) * len(self._clearance_joints),
         )
 
     def after(
@@ -167,6 +180,7 @@ class Forecaster:
         k, state = self._clearance_joints.index(joint), self.state
         state.growth = (*state.growth[:k], GrowthWindow(), *state.growth[k + 1 :])
         self._update_coefficients(k, self._estimate(k, replaced_ns))
+        self._observe(k, None)
 
     def corrected(self, correction: CorrectedClearance) -> None:
         """Count the wear of a joint from a corrected clearance on."""
@@ -227,7 +241,22 @@ class Forecaster:
         self._update_coefficients(
             k, self._estimate(k, replaced_ns, observation) if is_plausible else estimate
         )
+        self._observe(k, observation if is_plausible else None)
         return is_plausible
+
+    def again(self, basis: ForecastBasis, replaced_ns: Sequence[int]) -> Forecast:
+        """A former forecast with the wear coefficients as they are known now.
+
+        Parameters
+        ----------
+        basis : ForecastBasis
+        replaced_ns : sequence of int
+            As for the forecaster.
+        """
+        for k, observation in enumerate(basis.observed):
+            if observation is not None:
+                self.use_estimate(k, observation, replaced_ns[k])
+        return self._of(basis)
 
     def _estimate(self, k: int, replaced_ns: int, *further: MeasuredClearance) -> CoefficientEstimate:
         """Estimate for a part, from its prior, the measurements that count, and further ones."""
@@ -240,6 +269,10 @@ class Forecaster:
             self._priors.prior(joint, replaced_ns),
             corrections_of(self._corrections, joint, replaced_ns),
         )
+
+    def _observe(self, k: int, observation: MeasuredClearance | None) -> None:
+        observed = self.state.observed
+        self.state.observed = (*observed[:k], observation, *observed[k + 1 :])
 
     def _update_coefficients(self, k: int, coefficient_estimate: CoefficientEstimate) -> None:
         coefficient_estimates = self.state.coefficient_estimates
@@ -274,13 +307,19 @@ class Forecaster:
         ]
         # a new part's window is shorter than the others'
         walked = max((window.moving_s for window in state.growth), key=len)
+        state.basis = ForecastBasis(
+            conditions=tuple(now), observed=state.observed, cycle_s=float(np.mean(walked)), is_valid=valid
+        )
+        return self._of(state.basis)
+
+    def _of(self, basis: ForecastBasis) -> Forecast:
         return forecast(
-            now,
-            state.coefficient_estimates,
+            basis.conditions,
+            self.state.coefficient_estimates,
             self._settings,
             self._law,
-            cycle_s=float(np.mean(walked)),
-            valid=valid,
+            cycle_s=basis.cycle_s,
+            valid=basis.is_valid,
         )
 
 

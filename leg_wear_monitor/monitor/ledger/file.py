@@ -128,15 +128,19 @@ def hardware_id_of(path: Path) -> str:
     return str(row[0]) if row else ""
 
 
-def may_have_measurements(path: Path) -> bool:
-    """Whether opening a ledger would show measured clearances, or that it cannot be read; without a lock."""
+def measurements_of(path: Path) -> str:
+    """The measured clearances of a ledger as a text, empty without any; it is read without a lock.
+
+    Where they cannot be read (damaged, of the first format, being written), the text says so: opening it
+    decides.
+    """
     if not path.is_file():
-        return False
+        return ""
     try:
         with closing(_connect(path, "ro")) as db:
-            return db.execute("SELECT 1 FROM measurement LIMIT 1").fetchone() is not None
-    except sqlite3.Error:  # damaged, of the first format, or being written: opening it decides
-        return True
+            return "\n".join(map(repr, db.execute("SELECT * FROM measurement ORDER BY rowid")))
+    except sqlite3.Error as error:
+        return f"not readable: {error}"
 
 
 def sync_directory(path: Path) -> None:

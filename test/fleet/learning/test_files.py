@@ -106,7 +106,11 @@ def test_without_a_measurement_no_joint_has_a_learned_prior(tmp_path):
     new = parts("left", lot="2026-03")
     written = write_learning(tmp_path, new, learn(new))
     assert json.loads(written["left"].read_text())["joints"] == {}
-    assert json.loads((tmp_path / "learning.json").read_text()) == {"schema_version": 1, "pairs": {}}
+    assert json.loads((tmp_path / "learning.json").read_text()) == {
+        "schema_version": 1,
+        "measured": "",
+        "pairs": {},
+    }
     source = prior_source(MECHANISM, attrs.evolve(SETTINGS, priors=str(written["left"])))
     assert source.prior("A", 0) == prior_source(MECHANISM, SETTINGS).prior("A", 0)
 

@@ -29,7 +29,8 @@ def lines(result: "PlayMeasurement", mechanism: str, encoder: str) -> Iterator[s
 def _play(play: "Play") -> Iterator[str]:
     up, down = play.plateaus
     name, sigma = printable(play.joint), _angle(play.sigma_rad)
-    yield f"{name}: play {_angle(play.play_rad)}, standard deviation {sigma}"
+    counts = play.play_rad / play.count_rad
+    yield f"{name}: play {_angle(play.play_rad)}, standard deviation {sigma}; {counts:.3g} counts"
     yield f"  side by {printable(play.load) or 'the angle itself'}; {up} and {down} pushes count"
     turn = 2.0 * math.pi / play.count_rad
     yield f"  count of the encoder {_angle(play.count_rad)}, {turn:.5g} per turn"

@@ -1,9 +1,9 @@
 """What makes a measured play doubtful, and further information on it."""
 
+from leg_wear_monitor.play.fit import MANY
 from leg_wear_monitor.play.result import Play
 
 EXCESS = 3.0  # times what count and noise explain
-_MANY = 0.25  # fraction of the pushes
 
 
 def findings(play: Play, expected_rad: float) -> tuple[str, ...]:
@@ -27,11 +27,11 @@ def _findings(play: Play, expected_rad: float) -> list[str]:
             f"{_mrad(expected_rad)}: stiction stops the joint short of its end, or the pushes bend the leg "
             "by different amounts; push harder and longer, or always alike"
         )
-    if play.short > _MANY * pushes:
+    if play.short > MANY * pushes:
         found.append(
             f"in {play.short} of {pushes} pushes the joint stopped short of its end (stiction): push harder"
         )
-    if play.moving > _MANY * pushes:
+    if play.moving > MANY * pushes:
         found.append(f"in {play.moving} of {pushes} pushes the angle still moved at the end: hold longer")
     if play.sigma_rad > 0.5 * play.play_rad:
         found.append(
@@ -52,13 +52,22 @@ def notes(play: Play) -> tuple[str, ...]:
         (play.outside, "the angle went beyond the others"),
     ):
         if number:
-            told.append(f"{number} {'push' if number == 1 else 'pushes'} left out: {what}")
+            told.append(f"{_pushes(number)} left out: {what}")
+    if play.sprung:
+        told.append(
+            f"in {_pushes(play.sprung)} the joint sprang back while the signal kept its value; its outermost "
+            "rest counts"
+        )
     if not play.load:
         told.append(
             "without a load signal, the play is the distance between the places where the joint rests: a "
             "joint that rests before its end has more"
         )
     return tuple(told)
+
+
+def _pushes(number: int) -> str:
+    return f"{number} {'push' if number == 1 else 'pushes'}"
 
 
 def _mrad(value_rad: float) -> str:

@@ -11,6 +11,8 @@ _MOST_DEGREE = 3  # of the drift: a slow change with at most two turning points
 _A_DEGREE = 4  # plateaus for each further degree
 _ROUNDS = 20
 _FAR = 3.5  # standard deviations from which a plateau is left out
+MANY = 0.25  # fraction of the pushes
+_NEAR = 0.25  # of the play: pushes as near to the others differ, none of them is an outlier
 
 
 @attrs.frozen(eq=False)
@@ -64,6 +66,11 @@ def fit_play(found: Plateaus, least_rad: float) -> Fit:
     columns = np.column_stack([0.5 * found.side, basis])
     used, solution = _robust(columns, found.angle_rad, least_rad)
     residual = found.angle_rad - columns @ solution
+    if np.count_nonzero(~used) > MANY * m:
+        # two ends on one side, none of which is the rare one
+        used = used | (np.abs(residual) < _NEAR * abs(solution[0]))
+        solution = _solved(columns[used], found.angle_rad[used], np.ones(int(used.sum())))
+        residual = found.angle_rad - columns @ solution
     outward = residual * found.side * np.sign(solution[0])
     x, rest = columns[used], int(used.sum()) - columns.shape[1]
     scatter = float(np.sqrt(np.sum(np.square(residual[used])) / max(rest, 1)))

@@ -15,6 +15,7 @@ from leg_wear_monitor.play.result import Play
 
 LEAST_PLATEAUS = 4  # on each side
 _APART = 6.0  # standard deviations: noise then takes no sample of one cluster into the other
+_LEAST_HELD = 0.4  # of the time: a joint that is elsewhere for longer rests at a third place
 _PASSES = 3  # without a load: the sides change with the drift that is removed
 
 
@@ -104,9 +105,10 @@ def _with_side(time_s: Floats, angle: Floats, side: Sides, count: float, joint: 
     each = [int(np.count_nonzero(found.side == one)) for one in (1.0, -1.0)]
     if min(each) < LEAST_PLATEAUS:
         moving = f", and {found.moving} pushes at whose end it still moves" if found.moving else ""
+        moving += f", and {found.brief} pushes of less than 3 samples" if found.brief else ""
         fault = (
             f"rests {each[0]} times on one side and {each[1]} times on the other{moving}; expected at least "
-            f"{LEAST_PLATEAUS} times on each: push it to and fro more often, and hold each push"
+            f"{LEAST_PLATEAUS} times on each: push it to and fro more often, hold each push, or record faster"
         )
         raise ConfigError(joint, "", fault)
     return found, fit_play(found, _expected(found, count))
@@ -115,6 +117,13 @@ def _with_side(time_s: Floats, angle: Floats, side: Sides, count: float, joint: 
 def _from_clusters(time_s: Floats, angle: Floats, count: float, joint: str) -> tuple[Plateaus, Fit]:
     """Plateaus and fit with the side from the angle itself, free of the drift."""
     level = angle - np.polynomial.Polynomial.fit(time_s, angle, 1)(time_s)
+    held = float(_sides(level, joint).is_held.mean())
+    if held < _LEAST_HELD:
+        fault = (
+            f"is between its outermost places for {100.0 * (1.0 - held):.0f} % of the time: it rests at more "
+            "than two places, give a load signal"
+        )
+        raise ConfigError(joint, "", fault)
     for _ in range(_PASSES):
         # an angle that is chosen by its own value would seem to have less noise
         both = attrs.evolve(_sides(level, joint), is_held=np.ones(len(level), bool))
@@ -171,5 +180,6 @@ def _result(found: Plateaus, fit: Fit, count: float, joint: str, load: str) -> P
         moving=found.moving,
         short=fit.short,
         outside=outside,
+        sprung=found.sprung,
     )
     return attrs.evolve(result, findings=findings(result, expected), notes=notes(result))

@@ -39,6 +39,8 @@ class Play:
         Pushes left out because the angle stopped short of the others.
     outside : int
         Pushes left out because the angle went beyond the others.
+    sprung : int
+        Pushes that the load signal held, while the joint had sprung back; their outermost rest counts.
     findings : tuple of str
         What makes the result doubtful, and the remedy.
     notes : tuple of str
@@ -61,6 +63,7 @@ class Play:
     moving: int = 0
     short: int = 0
     outside: int = 0
+    sprung: int = 0
     findings: tuple[str, ...] = ()
     notes: tuple[str, ...] = ()
     recording: str = ""

@@ -7,7 +7,7 @@ from pathlib import Path
 import attrs
 import numpy as np
 import pytest
-from play.rocks import Rocks, rocks
+from play.rocks import COUNTS_PER_TURN, SIGNALS, Rocks, rocks, servo
 
 from leg_wear_monitor import load_mechanism
 from leg_wear_monitor.bags.mcap.writer import McapWriter
@@ -108,6 +108,36 @@ def test_a_bad_bag_is_one_line(run, bag: str, options: tuple[str, ...], said: st
     assert result.exit_code == 2
     (line,) = result.stderr.splitlines()
     assert said in line
+
+
+@pytest.mark.parametrize("counts", [8.0, 14.8])
+@pytest.mark.parametrize("signal", SIGNALS)
+def test_a_servo_log_in_counts_gives_the_play(run, tmp_path: Path, signal: str, counts: float) -> None:
+    log = servo(1, counts=counts)
+    dates = np.datetime64("2026-11-12T10:03:29.555", "ms") + np.round(1e3 * log["time"]).astype(int)
+    lines = [",".join(["when", *list(log)[1:]])]
+    columns = [column.astype(int).astype(str) for column in list(log.values())[1:]]
+    lines += [",".join(row) for row in zip(np.datetime_as_string(dates, "ms") + "Z", *columns, strict=True)]
+    lines[1] = lines[1].split(",")[0] + "," * (len(log) - 1)  # nothing was measured yet
+    (tmp_path / "servo.csv").write_text("\n".join(lines) + "\n")
+    loads = [part for column in SIGNALS[signal] for part in ("--load", column)]
+    unit = ("--unit", "counts", "--counts-per-turn", str(COUNTS_PER_TURN))
+    times = ("--time", "when", "--time-unit", "date")
+    result = run("play", "servo.csv", "--joint", "pos", *loads, *unit, *times, "--json", "play.json")
+    assert result.exit_code == 0, result.stdout + result.stderr
+    (found,) = json.loads(Path("play.json").read_text())["plays"]
+    assert abs(found["play_rad"] * COUNTS_PER_TURN / (2.0 * math.pi) - counts) < 1.0
+    assert f"side by {' + '.join(SIGNALS[signal])}" in result.stdout
+    assert ("sprang back" in result.stdout) == (signal == "push that keeps its value")
+    assert "crank" not in result.stdout + result.stderr
+    if signal == "push of -1, 0, 1":
+        no_load = run("play", "servo.csv", "--joint", "pos", *unit, *times)
+        assert no_load.exit_code == 2
+        assert "it rests at more than two places, give a load signal" in no_load.stderr
+        no_turn = run("play", "servo.csv", "--joint", "pos", *unit[:2], *times)
+        assert "--counts-per-turn: is missing, expected it with --unit counts" in no_turn.stderr
+        no_date = run("play", "servo.csv", "--joint", "pos", *unit, *times[:2])
+        assert "a date (input.units.stamp: date)?" in no_date.stderr
 
 
 CLEARANCES = {"A": 0.0004, "G": 0.0007}

@@ -1,9 +1,11 @@
 """How often measured plays are right, over seeds; `python test/play/coverage.py [SEEDS]` prints it."""
 
+import math
 import sys
 
 import attrs
-from play.rocks import rocks
+import numpy as np
+from play.rocks import COUNTS_PER_TURN, SIGNALS, rocks, servo
 
 from leg_wear_monitor.errors import LegWearError
 from leg_wear_monitor.play.measurement import measure_play
@@ -66,6 +68,20 @@ def coverage(seeds: range, *, with_load: bool, **given) -> Coverage:
     return Coverage(**numbers)
 
 
+def servo_errors(seeds: range, signal: str, **given: float) -> list[float]:
+    """Errors of the plays of servos [counts]; NaN where refused."""
+    errors, count = [], 2.0 * math.pi / COUNTS_PER_TURN
+    for seed in seeds:
+        log = servo(seed, **given)
+        load = sum(log[column] for column in SIGNALS[signal])
+        try:
+            found = measure_play(log["time"], count * log["pos"], load, count_rad=count)
+            errors.append(found.play_rad / count - given["counts"])
+        except LegWearError:
+            errors.append(math.nan)
+    return errors
+
+
 if __name__ == "__main__":
     number = int(sys.argv[1]) if len(sys.argv) > 1 else 500
     for with_load in (True, False):
@@ -81,3 +97,12 @@ if __name__ == "__main__":
         ):
             for value in values:
                 print(f"  {key} {value}: {coverage(range(number // 2), with_load=with_load, **{key: value})}")
+    print("servos, 24 pulls of 0.5 s, 10 Hz, error in counts: median, largest; within one count; refused")
+    for signal in SIGNALS:
+        for counts in (2.0, 8.0, 14.8):
+            errors = np.abs(servo_errors(range(number), signal, counts=counts))
+            told = errors[np.isfinite(errors)]
+            print(
+                f"  {signal}, play {counts}: {np.median(told):.2f}, {told.max():.2f}; "
+                f"{np.count_nonzero(told <= 1.0)} of {number}; {number - len(told)}"
+            )

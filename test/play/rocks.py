@@ -81,3 +81,64 @@ def _pushed(rng: np.random.Generator, pushes: int, rate: float, stuck: float) ->
         at.append(now + (to - now) * np.clip((u - loose) / slide, 0.0, 1.0))
         now = to
     return np.concatenate(load), np.concatenate(at)
+
+
+COUNTS_PER_TURN = 4096
+SIGNALS = {  # of a servo's log: what it is called, and the columns
+    "positions of two pull motors": ("pull a", "pull b"),
+    "push of -1, 0, 1": ("push",),
+    "push that keeps its value": ("latched",),
+}
+
+
+def servo(seed: int, *, counts: float, rate: float = 10.0, springs: float = 0.5) -> dict[str, Floats]:
+    """Log of a servo in counts, which two motors pull to and fro by elastic bands for half a second each.
+
+    The servo gives way under the pull, and springs back by a fraction of its loaded play when released. It
+    moves by itself to another place and back after every third pull. Commands lead the pull by 0.3 s.
+
+    Parameters
+    ----------
+    seed : int
+    counts : float
+        Play under the pull.
+    rate : float
+        Rows per second.
+    springs : float
+        Fraction of the play that is left when nobody pulls.
+    """
+    rng = np.random.default_rng(seed)
+    pull, at, push, latched = [], [], [], []
+    side, now = 1.0, 0.5 * counts * springs
+
+    def add(duration_s: float, pulled: float, place: float, command: float, kept: float) -> None:
+        nonlocal now
+        n = round(rate * duration_s)
+        u = np.minimum(1.0, (np.arange(n) + 1.0) / rate / 0.15)
+        pull.append(np.full(n, pulled))
+        at.append(now + u * (place - now))
+        push.append(np.full(n, command))
+        latched.append(np.full(n, kept))
+        now = place
+
+    for number in range(24):
+        end = 0.5 * side * (counts + 0.3 * rng.standard_normal())
+        add(0.3, 0.0, now, side, side)
+        add(0.2, side, end, side, side)
+        add(0.3, side, end, 0.0, side)
+        add(rng.uniform(1.4, 3.0), 0.0, springs * end, 0.0, side)
+        if number % 3 == 2:
+            add(1.0, 0.0, 100.0 * side, 0.0, side)
+            add(1.0, 0.0, springs * end, 0.0, side)
+        side = -side
+    total = np.concatenate(pull)
+    bend = 400.0 * np.convolve(np.pad(total, 1, "edge"), np.ones(3) / 3.0, "valid")
+    place = rng.uniform(2040.0, 2050.0) + np.concatenate(at)
+    return {
+        "time": np.arange(len(total)) / rate,
+        "pos": np.rint(place),
+        "pull a": np.rint(1747.0 + np.maximum(bend, 0.0)),
+        "pull b": np.rint(2347.0 + np.minimum(bend, 0.0)),
+        "push": np.concatenate(push),
+        "latched": np.concatenate(latched),
+    }

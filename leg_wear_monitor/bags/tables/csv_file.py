@@ -188,5 +188,7 @@ def _fault(column: Column, text: str) -> str:
         return f"{shown} is no time, expected one in {unit}"
     if is_number(text):
         return f"{shown} {unit} is no time from 1902 to 2038; another unit (input.units.stamp)?"
-    comma = "; a decimal comma?" if is_number(text.replace(",", ".", 1)) else ""
-    return f"{shown!r} is not a number, expected one in {unit}{comma}"
+    hint = "; a decimal comma?" if is_number(text.replace(",", ".", 1)) else ""
+    if column.key == STAMP and dates([text])[1][0]:
+        hint = f"; a date ({column.parameter.replace('columns', 'units')}: {DATE})?"
+    return f"{shown!r} is not a number, expected one in {unit}{hint}"

@@ -11,7 +11,7 @@ from leg_wear_monitor.bags.findings import RecordingError
 from leg_wear_monitor.errors import printable
 from leg_wear_monitor.mechanism.arrays import Floats
 from leg_wear_monitor.monitor.config.settings import MonitorConfig
-from leg_wear_monitor.monitor.config.tables import ANGLES, SPEEDS, TORQUES
+from leg_wear_monitor.monitor.config.tables import SPEEDS, TORQUES
 
 STAMP, CRANK_ANGLE, CRANK_SPEED, DRIVE_TORQUE = "stamp", "crank_angle", "crank_speed", "drive_torque"
 _MOST_LISTED = 20
@@ -81,7 +81,7 @@ def columns_of(config: MonitorConfig) -> tuple[Column, ...]:
     names, units = config.input.columns, config.input.units
     scales = {
         STAMP: (1.0, 1.0),
-        CRANK_ANGLE: ANGLES[units.crank_angle],
+        CRANK_ANGLE: config.input.angle_scale,
         CRANK_SPEED: SPEEDS[units.crank_speed],
         DRIVE_TORQUE: TORQUES[units.drive_torque],
     }
@@ -91,7 +91,7 @@ def columns_of(config: MonitorConfig) -> tuple[Column, ...]:
         if getattr(names, key) and not (key == STAMP and config.input.rate_hz)
     ]
     further = [
-        Column(name, name, "encoders.names", units.crank_angle, *ANGLES[units.crank_angle])
+        Column(name, name, "encoders.names", units.crank_angle, *config.input.angle_scale)
         for name in config.encoders.names
     ]
     return (*own, *further)

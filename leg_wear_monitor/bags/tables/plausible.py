@@ -67,19 +67,19 @@ def _wraps(angle: Floats) -> int:
 
 def _other_turn(angle: Floats, config: MonitorConfig) -> str:
     """Doubt about the unit of an angle that jumps back by a turn of another unit; empty if there is none."""
-    unit = config.input.units.crank_angle
-    of_unit = ANGLES[unit][0] / ANGLES[unit][1]
+    unit, (factor, divisor) = config.input.units.crank_angle, config.input.angle_scale
+    of_unit = factor / divisor
     if _wraps(angle) < _LEAST_TURNS:
         return ""
     span = float(angle.max() - angle.min())
     step = float(np.median(np.abs(np.diff(angle))))
-    turns = {one: TURN * divisor / factor for one, (factor, divisor) in ANGLES.items()}
+    turns = {one: TURN * over / by for one, (by, over) in ANGLES.items()} | {unit: TURN / of_unit}
     raw = (span + step) / of_unit
     for other, turn in turns.items():
         if other != unit and max(raw / turn, turn / raw) < _SAME:
             key, value = (
                 "input.units.crank_angle",
-                f"the crank's angle jumps back by about {raw:.3g} each turn",
+                f"the angle jumps back by about {raw:.3g} each turn",
             )
             return f"{value}, in {unit!r} a turn is {turns[unit]:.4g}: is it in {other!r} ({key})?"
     return ""
@@ -94,7 +94,7 @@ def _cadence(turning: _Turning, config: MonitorConfig) -> str:
     if units.stamp in STAMPS and not config.input.rate_hz:
         for other, power in STAMPS.items():
             found.append((rpm * 10.0 ** (STAMPS[units.stamp] - power), "input.units.stamp", other))
-    factor, divisor = ANGLES[units.crank_angle]
+    factor, divisor = config.input.angle_scale
     for other, (its_factor, its_divisor) in ANGLES.items():
         of_other = rpm * (its_factor / its_divisor) / (factor / divisor)
         found.append((of_other, "input.units.crank_angle", other))

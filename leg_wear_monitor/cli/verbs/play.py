@@ -11,6 +11,7 @@ from leg_wear_monitor.cli.options import clearances_option, json_option
 from leg_wear_monitor.cli.output import STDOUT, check_file, write_json
 from leg_wear_monitor.cli.waiting import compilation, progress_bar
 from leg_wear_monitor.errors import ConfigError, LegWearError
+from leg_wear_monitor.monitor.config.tables import ANGLES, COUNTS, DATE, STAMPS
 
 if TYPE_CHECKING:
     from leg_wear_monitor.mechanism.spec import Mechanism
@@ -29,10 +30,22 @@ WITH_FINDINGS = 1
 )
 @click.option(
     "--load",
+    "loads",
+    multiple=True,
     metavar="SIGNAL",
     help="Signal with the direction of the push, in any unit: effort, effort:JOINT, TOPIC, TOPIC:AXIS "
-    "(torque of a wrench) or TOPIC:JOINT (position, such as a target) in a bag, a column in a table.  "
+    "(torque of a wrench) or TOPIC:JOINT (position, such as a target) in a bag, a column in a table. Given "
+    "several times, the signals add up, such as the positions of two motors that pull to one side each.  "
     "[default: none, the angle rests at two places]",
+)
+@click.option("--time", metavar="COLUMN", help="Column of the time in a table.  [default: that of --config]")
+@click.option(
+    "--time-unit", type=click.Choice([*STAMPS, DATE]), help="Its unit.  [default: that of --config]"
+)
+@click.option(
+    "--unit",
+    type=click.Choice([*ANGLES, COUNTS]),
+    help="Unit of the angle in a table; counts are those of --counts-per-turn.  [default: that of --config]",
 )
 @click.option(
     "--counts-per-turn",
@@ -112,27 +125,58 @@ def _plays(
     recordings: tuple[Path, ...],
     crank_angles: tuple[float, ...],
     joint: str,
-    load: str | None,
+    loads: tuple[str, ...],
     counts_per_turn: float | None,
     config: Path | None,
+    **of_table: str | None,
 ) -> tuple[list["Play"], bool]:
     """The plays, and whether something of the recordings is lost."""
     import attrs
 
     from leg_wear_monitor.monitor.config.parameter_file import load_config
 
-    settings = load_config(config)
+    settings = _settings(load_config(config), counts_per_turn, **of_table)
+    counts_per_turn = counts_per_turn or settings.input.counts_per_turn
     plays, is_lossy = [], False
     for number, recording in enumerate(recordings):
-        one, lossy = _play(recording, settings, joint, load, counts_per_turn)
+        one, lossy = _play(recording, settings, joint, loads, counts_per_turn)
         angle = math.radians(crank_angles[number]) if crank_angles else None
         plays.append(attrs.evolve(one, recording=str(recording), crank_angle_rad=angle))
         is_lossy |= lossy
     return plays, is_lossy
 
 
+def _settings(
+    config: "MonitorConfig",
+    counts_per_turn: float | None,
+    time: str | None,
+    time_unit: str | None,
+    unit: str | None,
+) -> "MonitorConfig":
+    """The parameters with the options for a table in their place."""
+    import attrs
+
+    def given(**values: str | float | None) -> dict[str, Any]:
+        return {key: value for key, value in values.items() if value is not None}
+
+    table = config.input
+    if unit == COUNTS and not (counts_per_turn or table.counts_per_turn):
+        raise ConfigError("--counts-per-turn", "", "is missing, expected it with --unit counts")
+    table = attrs.evolve(
+        table,
+        columns=attrs.evolve(table.columns, **given(stamp=time)),
+        units=attrs.evolve(table.units, **given(stamp=time_unit, crank_angle=unit)),
+        **given(counts_per_turn=counts_per_turn),
+    )
+    return attrs.evolve(config, input=table)
+
+
 def _play(
-    recording: Path, settings: "MonitorConfig", joint: str, load: str | None, counts_per_turn: float | None
+    recording: Path,
+    settings: "MonitorConfig",
+    joint: str,
+    loads: tuple[str, ...],
+    counts_per_turn: float | None,
 ) -> tuple["Play", bool]:
     try:
         from leg_wear_monitor.bags.findings import Severity
@@ -141,12 +185,12 @@ def _play(
     except ModuleNotFoundError as error:
         raise LegWearError(f"{error.name} is not installed; pip install 'leg_wear_monitor[bags]'") from error
     with compilation("play"), progress_bar("reading") as progress:
-        read = read_rocked(recording, settings, joint, load, progress)
+        read = read_rocked(recording, settings, joint, loads, progress)
     for finding in read.findings:
         click.echo(f"warning: {finding}", err=True)
     count = 2.0 * math.pi / counts_per_turn if counts_per_turn else None
     result = measure_play(
-        read.time_s, read.angle_rad, read.load, count_rad=count, joint=joint, load_name=load or ""
+        read.time_s, read.angle_rad, read.load, count_rad=count, joint=joint, load_name=" + ".join(loads)
     )
     return result, any(finding.severity is Severity.LOSS for finding in read.findings)
 

@@ -6,7 +6,7 @@ from datetime import UTC, datetime
 
 import attrs
 
-from leg_wear_monitor.configuration.quantity import choice, described, quantity
+from leg_wear_monitor.configuration.quantity import FieldError, choice, described, quantity
 
 DATE = "date"
 STAMPS: Mapping[str, int] = {"s": 9, "ms": 6, "us": 3, "ns": 0}
@@ -22,6 +22,8 @@ SPEEDS: Mapping[str, tuple[float, float]] = {
     "rev/s": (2.0 * math.pi, 1.0),
     "rpm": (2.0 * math.pi, 60.0),
 }
+COUNTS = "counts"
+"""Unit of an encoder's raw position; `TableInput.counts_per_turn` says how many make a turn."""
 TORQUES: Mapping[str, tuple[float, float]] = {"N m": (1.0, 1.0), "N mm": (1.0, 1000.0)}
 """Factor and divisor to SI of the units of angles, speeds and torques; a division by 1000 is rounded once."""
 
@@ -54,7 +56,12 @@ class Units:
         "2026-03-01 09:00:00.001, in UTC",
         default="s",
     )
-    crank_angle: str = choice(tuple(ANGLES), "unit of the position, also of further encoders", default="rad")
+    crank_angle: str = choice(
+        (*ANGLES, COUNTS),
+        "unit of the position, also of further encoders; counts: those of the encoder, "
+        "input.counts_per_turn a turn",
+        default="rad",
+    )
     crank_speed: str = choice(tuple(SPEEDS), "unit of the speed", default="rad/s")
     drive_torque: str = choice(tuple(TORQUES), "unit of the torque", default="N m")
 
@@ -75,6 +82,14 @@ class TableInput:
 
     columns: Columns = described("", factory=Columns)
     units: Units = described("", factory=Units)
+    counts_per_turn: float = quantity(
+        "",
+        "counts of the encoders in a turn of their joint, for positions in counts, such as 4096 for 12 bits; "
+        "0: positions are in another unit",
+        at_least=0.0,
+        at_most=1.0e12,
+        default=0.0,
+    )
     rate_hz: float = quantity(
         "Hz",
         "rows per second of a table without a column of the time; 0: there is input.columns.stamp",
@@ -87,6 +102,16 @@ class TableInput:
         default="",
         check=_date,
     )
+
+    def __attrs_post_init__(self) -> None:
+        if self.units.crank_angle == COUNTS and not self.counts_per_turn:
+            raise FieldError("counts_per_turn", "is missing, expected the counts of the encoder in a turn")
+
+    @property
+    def angle_scale(self) -> tuple[float, float]:
+        """Factor and divisor that make a position one in radians."""
+        unit = self.units.crank_angle
+        return (2.0 * math.pi, self.counts_per_turn) if unit == COUNTS else ANGLES[unit]
 
     @property
     def start_ns(self) -> int:

@@ -136,7 +136,7 @@ def test_what_is_within_the_bounds_is_taken_and_kept(parameter, data):
             # a crank that stands, and what is as good as 0 where that cannot be, are refused
             lambda value: (
                 abs(value)
-                >= {"cadence.commanded_rpm": 0.1}.get(
+                >= {"cadence.commanded_rpm": 0.1, "forecast.wear_coefficient_sigma": 0.001}.get(
                     parameter.name, 1.0e-30 if parameter.above == 0.0 else 0.0
                 )
             )

@@ -17,7 +17,7 @@ from leg_wear_monitor.studies.claims.evaluation import FAILS, HOLDS, UNDECIDED, 
 from leg_wear_monitor.studies.claims.paper import CLAIMS
 from leg_wear_monitor.studies.execution.run import run_study
 from leg_wear_monitor.studies.plan.kinds import legs
-from leg_wear_monitor.studies.plan.kinds.legs import HIP, PLACES, SETS
+from leg_wear_monitor.studies.plan.kinds.legs import ALL, FOOT, HIP, PLACES, SETS
 from leg_wear_monitor.studies.point import Point
 from leg_wear_monitor.studies.results import load_results
 from leg_wear_monitor.studies.summary import clearance_joints_of, depth_per_cycle, largest_error, peak_force
@@ -171,12 +171,43 @@ def invented(count, scatter=1.0e-3):
             for name in ERRORS:
                 leg[f"set{i}_error_{name}"], leg[f"set{i}_ideal_range_{name}"] = np.ones(4), np.array(1.0)
             for name in ("wear_depth_m_per_cycle", "peak_force_n", "p99_force_n", "impacts", "zone_deg",
-                         "repeats_contact_force"):  # fmt: skip
+                         "zone_centre_deg", "repeats_contact_force"):  # fmt: skip
                 leg[f"set{i}_{name}"] = 1.0 + scatter * chance.standard_normal((4, len(joints)))
         leg["set2_wear_depth_m_per_cycle"][:, 1] *= length[0]
         settings = {"leg": number, "runs": 4}
         found.append((Point(label=str(number), task="leg", settings=settings), leg))
     return found
+
+
+@pytest.mark.plain
+@pytest.mark.parametrize(
+    ("alone", "with_five", "holds"), [(359.0, 3.0, True), (3.0, 359.0, True), (355.0, 5.5, False)]
+)
+def test_a_zone_stays_if_its_middle_moves_by_less_than_half_its_width(alone, with_five, holds):
+    (_, leg), *_ = invented(0)
+    for where, middle in ((HIP, alone), (ALL, with_five)):
+        at = f"set{SETS.index(where)}_zone"
+        leg[f"{at}_deg"][:, 1], leg[f"{at}_centre_deg"][:, 1] = 10.0, middle
+    (stays,) = (claim for claim in CLAIMS if claim.key == "b_stays")
+    assert (stays.measure(leg).value > 0.0) == holds
+
+
+@pytest.mark.plain
+def test_several_clearances_are_said_to_make_impacts_stronger_and_ours_contradict_at_the_hip():
+    """The paper's 7.1 and 7.2, the right way round: forces as of our leg, alone and with five."""
+    (_, leg), *_ = invented(0, scatter=0.0)
+    forces = {
+        HIP: (1676.0, 757.0),
+        ("G",): (557.0,),
+        FOOT: (46.0, 10.0),
+        ALL: (947.0, 530.0, 499.0, 152.0, 38.0),
+    }
+    for where, values in forces.items():
+        leg[f"set{SETS.index(where)}_p99_force_n"] = np.tile(values, (4, 1))
+    signs = {claim.key: claim.measure(leg).value > 0.0 for claim in CLAIMS if claim.key.endswith("harder")}
+    assert signs == {
+        "j_harder": False, "a_harder": False, "b_harder": False, "g_harder": False, "foot_harder": True
+    }  # fmt: skip
 
 
 def test_fractions_count_legs_and_what_decides_is_found():

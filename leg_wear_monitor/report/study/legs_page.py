@@ -145,7 +145,7 @@ def influence_gallery(found: LegClaims) -> Gallery:
         pictures.append(Picture(image=png(figure), alt=alt))
     caption = (
         "A point for each leg; star: the leg of the file. The measure is the logarithm of the ratio that the "
-        "claim says is above 1, or the difference of the fractions of variance that repeat; above 0 the "
-        "claim holds."
+        "claim says is above 1, or the difference of the fractions (of variance that repeats, of a turn); "
+        "above 0 the claim holds."
     )
     return Gallery(pictures=pictures, caption=caption)

@@ -1,4 +1,7 @@
-"""The claims of the paper that statistics of a leg can test, in our words."""
+"""The claims of the paper's sections 6 and 7 that statistics of a leg can test, in our words.
+
+The text of the paper was not at hand: the claims are as others who read it handed them on.
+"""
 
 from collections.abc import Callable
 from itertools import pairwise, product
@@ -16,13 +19,12 @@ from leg_wear_monitor.studies.claims.effect import (
     log_ratio,
 )
 from leg_wear_monitor.studies.plan.keys import Names
-from leg_wear_monitor.studies.plan.kinds.legs import FOOT, HIP, KNEE, PLACES, SETS
+from leg_wear_monitor.studies.plan.kinds.legs import ALL, FOOT, HIP, KNEE, PLACES, RIGID_KNEE, SETS
 from leg_wear_monitor.studies.point import Arrays
 from leg_wear_monitor.studies.tasks.response import ERRORS
 
 Measure = Callable[[Arrays], Effect]
 
-ALL = SETS[-1]
 _SUM_WITHIN = 0.1  # deviation up to which the effect of all at once counts as the sum, as on a study's page
 _REGULAR = 0.5  # fraction of a force's variance from which on it counts as regular: most of it repeats
 _TITLES = dict(
@@ -112,10 +114,45 @@ def _more_than_alone(name: str) -> Claim:
     return Claim(f"all_more_{name}", "all five", text, _each(*measures))
 
 
-def _milder(key: str, text: str, place: Names) -> Claim:
-    """Forces with all five below those with the place alone, at each of its joints."""
-    pairs = [(Measured("p99_force_n", where, joint) for where in (place, ALL)) for joint in place]
-    return Claim(key, "all five", text, _each(*(_ratio(*pair) for pair in pairs)))
+def _zone(where: Names, joint: str) -> Measured:
+    return Measured("zone_deg", where, joint)
+
+
+def _apart(where: Names, joint: str, other_where: Names, other: str, leg: Arrays) -> tuple[Floats, Floats]:
+    """How far the middles of two zones are from each other, and half of their widths together [turns]."""
+    middles = (
+        Measured("zone_centre_deg", where, joint).of(leg),
+        Measured("zone_centre_deg", other_where, other).of(leg),
+    )
+    between = np.abs((middles[0] - middles[1] + 180.0) % 360.0 - 180.0)
+    reach = 0.5 * (_zone(where, joint).of(leg) + _zone(other_where, other).of(leg))
+    return between / 360.0, reach / 360.0
+
+
+def _stays(leg: Arrays) -> Effect:
+    """B's zones, alone and with all five, lie over each other: their middles are nearer than half widths."""
+    between, reach = _apart(HIP, "B", ALL, "B", leg)
+    return difference(reach, between, True)
+
+
+def _differ(leg: Arrays) -> Effect:
+    """The zones of I and J, both in the frame of the foot, have nothing in common."""
+    between, reach = _apart(FOOT, "I", FOOT, "J", leg)
+    return difference(between, reach, True)
+
+
+def _harder(key: str, joints: str, place: Names) -> Claim:
+    """Forces with all five above those with the place alone, at each of these joints."""
+    pairs = [(Measured("p99_force_n", where, joint) for where in (ALL, place)) for joint in joints]
+    measures = [_ratio(*pair) for pair in pairs]
+    are, names = "are" if len(joints) > 1 else "is", " and ".join(joints)
+    alone = {HIP: "hip", KNEE: "knee", FOOT: "foot"}[place]
+    return Claim(key, "all five", f"{names} {are} hit harder than with the {alone} alone", _each(*measures))
+
+
+def _buffered(name: str, joint: str = "") -> Measure:
+    """A statistic is less with a clearance at G than with a rigid knee, hip and foot alike."""
+    return _ratio(Measured(name, RIGID_KNEE, joint), Measured(name, ALL, joint))
 
 
 CLAIMS: tuple[Claim, ...] = (
@@ -189,6 +226,34 @@ CLAIMS: tuple[Claim, ...] = (
         "the forces of I and J repeat less than those of A, B and G, on the mean",
         _repeats(ALL, "ABG", "IJ"),
     ),
-    _milder("hip_milder", "A and B are hit less hard than with the hip alone", HIP),
-    _milder("foot_milder", "I and J are hit less hard than with the foot alone", FOOT),
+    Claim(
+        "zones_widen",
+        "each",
+        "half of B's wear lies in a narrower zone than that of G, half of G's than that of I",
+        _each(_ratio(_zone(KNEE, "G"), _zone(HIP, "B")), _ratio(_zone(FOOT, "I"), _zone(KNEE, "G"))),
+    ),
+    Claim("b_stays", "all five", "B's zone stays where it is with the hip alone", _stays),
+    Claim("i_j_differ", "foot", "the zones of I and J have nothing in common", _differ),
+    Claim(
+        "a_wide",
+        "all five",
+        "half of A's wear lies in a wider zone than that of B",
+        _ratio(_zone(ALL, "A"), _zone(ALL, "B")),
+    ),
+    _harder("a_harder", "A", HIP),
+    _harder("b_harder", "B", HIP),
+    _harder("g_harder", "G", KNEE),
+    _harder("foot_harder", "IJ", FOOT),
+    Claim(
+        "g_buffers_foot",
+        "all five",
+        "I and J are hit less hard than with a rigid knee",
+        _each(*(_buffered("p99_force_n", joint) for joint in FOOT)),
+    ),
+    Claim(
+        "g_buffers_drive",
+        "all five",
+        "the drive torque is disturbed less than with a rigid knee",
+        _buffered(f"error_{ERRORS[3]}"),
+    ),
 )

@@ -4,7 +4,6 @@ from typing import Any
 
 import numpy as np
 
-from leg_wear_monitor.mechanism.arrays import Floats
 from leg_wear_monitor.mechanism.spec import GROUND, Mechanism
 from leg_wear_monitor.studies.point import Arrays
 from leg_wear_monitor.studies.tasks.drawn_leg import draw_leg, rejection
@@ -28,8 +27,9 @@ def drawn_leg_response(mechanism: Mechanism, settings: dict[str, Any]) -> Arrays
         ``rms_torque_nm`` (r,); ``error_<name>`` (r,), ``peak_force_n`` (r, k): mean over cycles of the
         largest in a cycle;
         ``ideal_range_<name>`` (): range of the ideal curve, the larger one of x and y;
-        ``wear_depth_m_per_cycle`` (r, k): greatest of the bushing; ``zone_deg`` (r, k): width of the zone
-        with half of its wear; ``mean_force_n``, ``p99_force_n``, ``impacts``, ``contact_fraction``,
+        ``wear_depth_m_per_cycle`` (r, k): greatest of the bushing; ``zone_deg``, ``zone_centre_deg``
+        (r, k): width of the zone with half of its wear, and the angle of its middle in the bushing's frame;
+        ``mean_force_n``, ``p99_force_n``, ``impacts``, ``contact_fraction``,
         ``archard_integral_j_per_cycle``, ``impact_speed_mps``, ``repeats_contact_force`` (r, k): as of
         `run_ensemble`; the last are pseudo-values.
 
@@ -58,13 +58,16 @@ def _of_runs(arrays: Arrays) -> Arrays:
     """The statistics of every run in a result of `run_ensemble`."""
     joints = [list(arrays["joints"]).index(name) for name in arrays["clearance_joints"]]
     depth = arrays["wear_depth_m_per_cycle"][:, :, BUSHING]
+    # without wear, the zone with half of it is the whole turn
+    zone = np.array([[wear_zone(profile, HALF) or (0.0, 360.0) for profile in run] for run in depth])
     found: Arrays = {
         "peak_force_n": arrays["peak_force_n"][:, :, joints].mean(axis=1),
         "mean_force_n": arrays["mean_force_n"][:, joints],
         "p99_force_n": arrays["p99_force_n"][:, joints],
         "rms_torque_nm": arrays["rms_torque_nm"],
         "wear_depth_m_per_cycle": depth.max(axis=2),
-        "zone_deg": np.array([[_zone(profile) for profile in run] for run in depth]),
+        "zone_deg": zone[..., 1] - zone[..., 0],
+        "zone_centre_deg": zone.mean(axis=2) % 360.0,
         "repeats_contact_force": arrays["repeats_contact_force_by_run"],
     }
     for name in _OF_CLEARANCE_JOINTS:
@@ -74,9 +77,3 @@ def _of_runs(arrays: Arrays) -> Arrays:
         if f"ideal_{name}" in arrays:
             found[f"ideal_range_{name}"] = np.ptp(arrays[f"ideal_{name}"], axis=0).max()
     return found
-
-
-def _zone(profile: Floats) -> float:
-    """Width [deg] of the narrowest zone with half of the wear; 360 without wear."""
-    zone = wear_zone(profile, HALF)
-    return 360.0 if zone is None else zone[1] - zone[0]

@@ -49,8 +49,9 @@ def run_ensemble(mechanism: Mechanism, settings: dict[str, Any]) -> Arrays:
         ``wear_depth_m_per_cycle`` (r, k, 2, N): of bushing and journal;
         ``band_<name>`` (3, s, ...): quantiles `BAND` of the curves; ``example_<name>`` (s, ...): first cycle
         of the first run; ``ideal_<name>`` (s, ...): curve of the ideal linkage;
-        ``repeats_<name>`` (k,): fraction of a curve's variance that its mean cycle explains;
-        ``repeats_contact_force_by_run`` (r, k): its jackknife pseudo-values, for its scatter over runs.
+        ``repeats_contact_force`` (k,), ``repeats_eccentricity`` (k, 2): fraction of the variance of the
+        force, and of the eccentricity along the ground's x and y, that the mean cycle explains; with
+        ``_by_run`` (r, ...) appended their jackknife pseudo-values, for their scatter over runs.
 
     Raises
     ------
@@ -141,22 +142,22 @@ def _bands(curves: dict[str, Floats], runs: int) -> Arrays:
     bands["contact_force_n"] = magnitude
     for name, curve in bands.items():
         result[f"band_{name}"] = np.quantile(curve, BAND, axis=0).astype(np.float32)
-    result["repeats_contact_force"] = _repeats(magnitude[..., None])
-    result["repeats_contact_force_by_run"] = _by_run(magnitude[..., None], runs)
-    result["repeats_eccentricity"] = _repeats(curves["eccentricity_m"])
+    for name, curve in (("contact_force", magnitude), ("eccentricity", curves["eccentricity_m"])):
+        result[f"repeats_{name}"] = _repeats(curve)
+        result[f"repeats_{name}_by_run"] = _by_run(curve, runs)
     return result
 
 
 def _repeats(curve: Floats) -> Floats:
-    """Fraction (k,) of the variance of curves (n, s, k, m) that their mean over n explains; 1 if equal."""
+    """Fraction (...) of the variance of curves (n, s, ...) that their mean over n explains; 1 if equal."""
     middle = curve.mean(axis=0)
-    whole = np.square(curve - middle.mean(axis=0)).sum(axis=-1).mean(axis=(0, 1))
-    mean = np.square(middle - middle.mean(axis=0)).sum(axis=-1).mean(axis=0)
+    whole = np.square(curve - middle.mean(axis=0)).mean(axis=(0, 1))
+    mean = np.square(middle - middle.mean(axis=0)).mean(axis=0)
     return np.asarray(mean / np.maximum(whole, 1.0e-300))
 
 
 def _by_run(curve: Floats, runs: int) -> Floats:
-    """Jackknife pseudo-values (r, k) of `_repeats`, one run left out; their mean has no bias 1 / n."""
+    """Jackknife pseudo-values (r, ...) of `_repeats`, one run left out; their mean has no bias 1 / n."""
     whole, members = _repeats(curve), np.split(curve, runs)
     without = [_repeats(np.concatenate(members[:i] + members[i + 1 :])) for i in range(runs)]
     return np.asarray(runs * whole - (runs - 1) * np.array(without))

@@ -13,7 +13,8 @@ from leg_wear_monitor.studies.point import Point
 
 HIP, KNEE, FOOT = ("A", "B"), ("G",), ("I", "J")
 PLACES: tuple[Names, ...] = (HIP, KNEE, FOOT)
-SETS: tuple[Names, ...] = (*PLACES, HIP + KNEE + FOOT)  # of every leg: each place alone, and all at once
+ALL, RIGID_KNEE = HIP + KNEE + FOOT, HIP + FOOT
+SETS: tuple[Names, ...] = (*PLACES, ALL, RIGID_KNEE)  # of every leg: each place alone, all, all but the knee
 
 
 @attrs.frozen(kw_only=True)
@@ -54,7 +55,7 @@ class Legs(Study):
 
     def _leg(self, number: int) -> Point:
         where = place(
-            SETS[-1], self.clearance_m, self.speed_rpm,
+            ALL, self.clearance_m, self.speed_rpm,
             sets=[list(joints) for joints in SETS], leg=number, draw_seed=self.draw_seed,
             length_tolerance=self.length_tolerance, mass_tolerance=self.mass_tolerance,
         )  # fmt: skip

@@ -1,14 +1,25 @@
-"""Pictures of results and mechanisms as methods of theirs, for notebooks."""
+"""What notebooks show of results, mechanisms and materials, and pictures, as methods of theirs."""
 
 from importlib import import_module
 from typing import Any
 
 
-class Drawable:
-    """Base of what ``report/`` draws.
+class Shown:
+    """Base of what a notebook shows.
 
-    The report stands above the results in the order of imports, so it is looked up when it is asked for.
+    The report stands above it in the order of imports, so it is looked up when it is asked for.
     """
+
+    __slots__ = ()
+
+    def _repr_html_(self) -> str:
+        """What a notebook shows: HTML without scripts, with every name escaped."""
+        html: str = import_module("leg_wear_monitor.report.notebook").notebook_html(self)
+        return html
+
+
+class Drawable(Shown):
+    """Base of what ``report/`` draws, too."""
 
     __slots__ = ()
 
@@ -25,8 +36,3 @@ class Drawable:
         matplotlib.axes.Axes
         """
         return import_module("leg_wear_monitor.report.plot").plot(self, axes)
-
-    def _repr_html_(self) -> str:
-        """What a notebook shows: HTML without scripts, with every name escaped."""
-        html: str = import_module("leg_wear_monitor.report.notebook").notebook_html(self)
-        return html

@@ -8,13 +8,15 @@ At the end you can read a verdict and the values behind it.
 Install
 -------
 
-In a checkout of the package, with Python 3.11 or newer:
+In a checkout of the package, with Python 3.11 or newer, as in its README:
 
 .. code-block:: console
 
+   $ python3 -m venv build/python
+   $ . build/python/bin/activate
    $ pip install '.[bags]'
 
-Then start Python or Jupyter in the same environment.
+Then start Python or Jupyter in this environment.
 `Installation <../installation.html>`_ explains other ways.
 """
 

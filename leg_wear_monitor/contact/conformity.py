@@ -66,7 +66,7 @@ def contact_doubt(half_angle_rad: float, force_n: float, radius_m: float, is_win
         return None
     wide = 2.0e3 * radius_m * math.sin(half_angle_rad)
     arc = (
-        f"contact half angle {math.degrees(half_angle_rad):.0f} deg at {force_n:.3g} N "
+        f"contact half angle {math.degrees(half_angle_rad):.0f} deg at {float(f'{force_n:.3g}'):g} N "
         f"({wide:.3g} mm wide in a radius of {1.0e3 * radius_m:.4g} mm)"
     )
     if is_winkler:

@@ -7,8 +7,9 @@ import attrs
 
 from leg_wear_monitor.dynamics.result.simulation_result import SimulationResult
 from leg_wear_monitor.life.result import Life
+from leg_wear_monitor.mechanism.materials.material import Material
 from leg_wear_monitor.mechanism.spec import Mechanism
-from leg_wear_monitor.monitor.verdict.verdict import Figure
+from leg_wear_monitor.monitor.verdict.verdict import Figure, Verdict
 from leg_wear_monitor.playback.replay import ReplayResult
 from leg_wear_monitor.playback.result.replay_summary import ReplaySummary
 from leg_wear_monitor.report.drawing.drawing import drawing_of
@@ -35,7 +36,7 @@ def _shown(result: Any) -> _Shown:
 
 
 def notebook_html(result: Any) -> str:
-    """HTML of a simulation, a life, a replay, its summary, or a mechanism; names are escaped."""
+    """HTML of a result, a verdict, a mechanism or a material; names are escaped."""
     return render("notebook.html", shown=_shown(result))
 
 
@@ -65,7 +66,7 @@ def _simulation(result: SimulationResult) -> _Shown:
         ))  # fmt: skip
     lines = (
         f"{result.model} model, {result.speed_rpm:.4g} rpm, {result.cycles:.4g} gait cycles",
-        f"drive torque {torque.min:.4g} to {torque.max:.4g} N m, rms {torque.rms:.4g} N m",
+        f"drive torque {_number(torque.min)} to {_number(torque.max)} N m, rms {_number(torque.rms)} N m",
     )
     return _Shown(result.mechanism, lines, Table(caption="Joints", head=head, rows=rows))
 
@@ -88,17 +89,43 @@ def _life(life: Life) -> _Shown:
 
 @_shown.register
 def _replay(summary: ReplaySummary) -> _Shown:
-    verdict = summary.verdict
+    shown, verdict = _verdict(summary.verdict), summary.verdict
     is_valid = Figure.CLEARANCES not in verdict.not_valid
     head = ["joint", "counted clearance [mm]", "limit [mm]"]
     rows = [
         (name, _number(1.0e3 * each.counted_m) if is_valid else _NOT_VALID, _number(1.0e3 * each.limit_m))
         for name, each in summary.clearances.items()
     ]
+    return attrs.evolve(
+        shown,
+        lines=(*shown.lines, summary.advice),
+        table=Table(caption="Clearance joints", head=head, rows=rows),
+    )
+
+
+@_shown.register
+def _verdict(verdict: Verdict) -> _Shown:
     whose = f" (joint {', '.join(verdict.joints)})" if verdict.joints else ""
-    lines = (f"{verdict.why} [{verdict.fault_code}]", f"to do: {verdict.do}", summary.advice)
-    heading = f"Verdict: {verdict.state.words}{whose}"
-    return _Shown(heading, lines, Table(caption="Clearance joints", head=head, rows=rows))
+    not_valid = ", ".join(figure.words for figure in verdict.not_valid)
+    lines = (f"{verdict.why} [{verdict.fault_code}]", f"to do: {verdict.do}")
+    more = (f"{_NOT_VALID}: {not_valid}",) if not_valid else ()
+    return _Shown(f"Verdict: {verdict.state.words}{whose}", (*lines, *more))
+
+
+@_shown.register
+def _material(pair: Material) -> _Shown:
+    rows = [(key, value.text, value.conditions, value.source) for key, value in pair.values()]
+    notes = (f"note: {pair.notes}",) if pair.notes else ()
+    lines = (
+        pair.title,
+        f"bushing: {pair.bushing.material}; journal: {pair.journal.material}; lubricant: {pair.lubricant}",
+        f"regime: {pair.regime}",
+        *notes,
+    )
+    head = ["value", "given", "conditions", "source"]
+    return _Shown(
+        pair.name, lines, Table(caption="Values with their sources", head=head, rows=rows, is_text=True)
+    )
 
 
 @_shown.register
@@ -107,4 +134,4 @@ def _replay_result(result: ReplayResult) -> _Shown:
 
 
 def _number(value: float | None) -> str:
-    return "" if value is None else f"{value:.4g}"
+    return "" if value is None else f"{float(f'{value:.4g}'):g}"  # 11640, not 1.164e+04

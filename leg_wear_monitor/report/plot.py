@@ -10,6 +10,7 @@ from leg_wear_monitor.dynamics.result.simulation_result import SimulationResult
 from leg_wear_monitor.life.result import Life
 from leg_wear_monitor.mechanism.ideal import TURN
 from leg_wear_monitor.mechanism.spec import Mechanism
+from leg_wear_monitor.monitor.verdict.verdict import Figure
 from leg_wear_monitor.playback.replay import ReplayResult
 from leg_wear_monitor.playback.result.replay_summary import ReplaySummary
 from leg_wear_monitor.report.drawing.drawing import drawing_of
@@ -30,9 +31,10 @@ def plot(result: Any, axes: Axes | None = None) -> Axes:
     result : SimulationResult, Life, ReplayResult, ReplaySummary or Mechanism
         Of a simulation, the force in each clearance joint over the turns of the crank, or without a trace the
         mean, 99 % and largest force in every joint [N]; of a life, the clearance of each joint over the gait
-        cycles [µm]; of a replay, how much each clearance has opened over time; of a mechanism, its bodies at
-        crank angle 0, to scale, and the path of its toe [m]; where it does not close or turn, the
-        bodies apart, or at the dead point.
+        cycles [µm]; of a replay, how much each clearance has opened over time, dotted and named
+        in the title where the verdict says that this is not valid; of a mechanism, its bodies at crank
+        angle 0, to scale, and the path of its toe [m]; where it does not close or turn, the bodies apart, or
+        at the dead point.
     axes : matplotlib.axes.Axes, optional
         Where to draw; new axes of pyplot without.
 
@@ -91,6 +93,10 @@ def _life(result: Life, axes: Axes | None = None) -> Axes:
 def _replay(result: ReplaySummary, axes: Axes | None = None) -> Axes:
     axes = _new() if axes is None else axes
     unit = draw_openings(axes, result)
+    if Figure.CLEARANCES in result.verdict.not_valid:
+        for line in axes.get_lines():
+            line.set_linestyle(":")
+        axes.set_title(f"not valid: {Figure.CLEARANCES.words} ({result.verdict.fault_code})", fontsize=SMALL)
     axes.set_xlabel(f"time since the recording's begin [{unit}]", fontsize=SMALL)
     return _finished(axes)
 

@@ -62,6 +62,24 @@ def test_a_replay_is_its_verdict_and_clearances_only_where_valid():
             assert (f"<td>{1e3 * each.counted_m:.4g}</td>" in html) is (cells == 0)
 
 
+def test_a_verdict_says_what_is_not_valid_and_a_material_has_its_sources():
+    verdict = attrs.evolve(made_up_summary().verdict, why=EVIL, not_valid=(Figure.CLEARANCES,))
+    html = verdict._repr_html_()
+    assert "<script" not in html
+    assert "not valid: counted clearances" in html
+    pair = lw.load_material("steel-on-steel-greased-mild")
+    html = attrs.evolve(pair, notes=EVIL)._repr_html_()
+    assert "<script" not in html
+    assert html.count('<th scope="row">') == len(list(pair.values()))
+
+
+def test_large_numbers_have_no_exponent():
+    result = lw.simulate("four_bar", clearances=[], cycles=1)
+    joint = attrs.evolve(result.joints["B"], max_force_n=11642.3)
+    html = attrs.evolve(result, joints={"B": joint})._repr_html_()
+    assert "<td>11640</td>" in html
+
+
 def test_what_is_no_result_is_named():
     with pytest.raises(TypeError, match="dict has no HTML"):
         notebook_html({})

@@ -8,6 +8,7 @@ from matplotlib import pyplot
 
 import leg_wear_monitor as lw
 from leg_wear_monitor.life.result import Life
+from leg_wear_monitor.monitor.verdict.verdict import Figure
 
 pytestmark = pytest.mark.plain
 
@@ -89,3 +90,12 @@ def test_a_mechanism_to_scale_with_the_path_of_its_toe():
 def test_what_is_no_result_is_named():
     with pytest.raises(TypeError, match=r"^dict has no picture, expected SimulationResult"):
         lw.plot({})
+
+
+def test_openings_that_are_not_valid_are_dotted_and_named():
+    summary = made_up_summary()
+    for not_valid, style in (((), "-"), ((Figure.CLEARANCES,), ":")):
+        verdict = attrs.evolve(summary.verdict, not_valid=not_valid)
+        axes = lw.plot(attrs.evolve(summary, verdict=verdict))
+        assert {line.get_linestyle() for line in axes.get_lines()} == {style}
+        assert ("not valid: counted clearances" in axes.get_title()) is bool(not_valid)

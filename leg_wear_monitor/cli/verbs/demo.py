@@ -12,7 +12,6 @@ from typing import TYPE_CHECKING, Any
 
 import click
 
-from leg_wear_monitor.beside import python_command
 from leg_wear_monitor.cli.node import need_rclpy
 from leg_wear_monitor.cli.output import check_directory
 from leg_wear_monitor.cli.start import main as program
@@ -63,6 +62,8 @@ def demo(out: Path) -> int:
 
 def _compile(out: Path) -> None:
     """Compile what the nodes need: the monitor's kernels here, the motion and the leg in processes beside."""
+    from leg_wear_monitor.beside import python_command  # numba: not for --help
+
     if is_compiled("monitor") and is_compiled("gait"):
         return
     from leg_wear_monitor.dynamics.clearance.beforehand import advance_beside
@@ -126,6 +127,8 @@ def _live(out: Path) -> "DemoListener":
 @contextmanager
 def _process(verb: str, out: Path, domain: int, **paths: Path) -> "Iterator[subprocess.Popen[bytes]]":
     """A node as a process of its own, ended as from a terminal."""
+    from leg_wear_monitor.beside import python_command
+
     command = python_command(program, verb, "--ros-args", "-r", f"__ns:={_NAMESPACE}")
     command += ["--params-file", str(share_directory() / "config" / "demo.yaml")]
     for name, path in paths.items():
@@ -157,6 +160,8 @@ def _replay(out: Path) -> bool:
     arguments = ["replay", str(out / "live.mcap"), "--out", str(out)]
     arguments += ["--config", str(share_directory() / "config" / "demo.yaml")]
     click.echo(f"leg-wear-monitor {' '.join(arguments)}")
+    from leg_wear_monitor.beside import python_command
+
     done = subprocess.run(python_command(program, *arguments), check=False)
     if done.returncode != DONE:
         raise LegWearError(f"{out / 'live.mcap'}: its replay ended with {done.returncode}")

@@ -11,7 +11,6 @@ from leg_wear_monitor.json_text import json_text
 
 if TYPE_CHECKING:
     from leg_wear_monitor.mechanism.materials.material import Material
-    from leg_wear_monitor.mechanism.materials.sourced import SourcedValue
 
 
 @click.command(short_help="List the material pairs of joints, with their sources.")
@@ -43,7 +42,7 @@ def _listed(pair: "Material") -> list[str]:
     wear = "no wear coefficient" if known is None else " and ".join(f"{k:.3g}" for k in known) + " 1/Pa"
     limits = (pair.limits.dynamic_pressure or pair.limits.static_pressure, pair.limits.pressure_speed)
     parts = [
-        f"{label} up to {_given(value)}" for label, value in zip(("p", "p v"), limits, strict=True) if value
+        f"{label} up to {value.text}" for label, value in zip(("p", "p v"), limits, strict=True) if value
     ]
     return [pair.name, f"    {pair.title}: {', '.join([wear, *parts])}"]
 
@@ -56,7 +55,7 @@ def _in_full(pair: "Material") -> list[str]:
         f"regime: {pair.regime}",
     ]
     for key, value in pair.values():
-        lines += [f"{key}: {_given(value)}, {value.conditions}", f"    {value.source}"]
+        lines += [f"{key}: {value.text}, {value.conditions}", f"    {value.source}"]
     if pair.wear_coefficients is None:
         lines.append(
             "wear coefficient of the pair: not known; a life needs a wear_coefficient beside the material"
@@ -65,12 +64,3 @@ def _in_full(pair: "Material") -> list[str]:
         bushing, journal = pair.wear_coefficients
         lines.append(f"wear coefficient of the pair: {bushing:.3g} (bushing), {journal:.3g} (journal) 1/Pa")
     return [*lines, *([f"note: {pair.notes}"] if pair.notes else [])]
-
-
-def _given(value: "SourcedValue") -> str:
-    """A number as its source gives it, with its range."""
-    unit = "" if value.unit == "1" else f" {value.unit}"
-    interval = "" if value.range is None else f"{value.range[0]:g} to {value.range[1]:g}"
-    if value.value is None:
-        return f"{interval}{unit}"
-    return f"{value.value:g}{unit}" + (f" ({interval})" if interval else "")

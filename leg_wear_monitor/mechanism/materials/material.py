@@ -6,6 +6,7 @@ from typing import Any
 import attrs
 
 from leg_wear_monitor.configuration.quantity import described
+from leg_wear_monitor.drawable import Shown
 from leg_wear_monitor.mechanism.materials.sourced import SourcedValue, WearCoefficient, sourced
 
 
@@ -42,7 +43,7 @@ class RatingLife:
 
 
 @attrs.frozen(kw_only=True)
-class Material:
+class Material(Shown):
     """A pair of bushing and journal with its lubricant."""
 
     name: str = described("name, as the file's")

@@ -49,6 +49,15 @@ class SourcedValue:
         """The value in SI units; a temperature in degrees Celsius."""
         return self.central * UNITS[self.unit].factor
 
+    @property
+    def text(self) -> str:
+        """The number as its source gives it, with its range and unit."""
+        unit = "" if self.unit == "1" else f" {self.unit}"
+        interval = "" if self.range is None else f"{self.range[0]:g} to {self.range[1]:g}"
+        if self.value is None:
+            return f"{interval}{unit}"
+        return f"{self.value:g}{unit}" + (f" ({interval})" if interval else "")
+
 
 @attrs.frozen(kw_only=True)
 class WearCoefficient(SourcedValue):

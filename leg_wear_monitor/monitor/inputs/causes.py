@@ -42,10 +42,14 @@ def causes(before: Intake, after: Intake, withheld: int, config: MonitorConfig) 
     received = after.received - before.received - others
     lost = _unused(after, before, withheld, others)
     frequent = [name for name, count in lost.items() if count > _WORTH_TELLING * received]
-    return [
+    sentences = [
         f"{lost[name]} of {received} samples {_SENTENCES[name].format(crank=config.crank_joint)}"
         for name in sorted(frequent, key=lambda name: -lost[name])
     ]
+    unused = sum(lost.values())
+    if sentences and unused > max(lost.values()):  # one cause of several: else its number is taken for all
+        sentences[0] = f"{unused} of {received} samples are not used, {sentences[0]}"
+    return sentences
 
 
 def _unused(after: Intake, before: Intake, withheld: int, others: int) -> Mapping[str, int]:

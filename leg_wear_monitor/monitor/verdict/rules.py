@@ -15,6 +15,7 @@ from leg_wear_monitor.monitor.verdict.situation import Situation
 from leg_wear_monitor.monitor.verdict.verdict import NO_GAIT_CYCLE, NONE, Figure, Finding, State
 
 _ACKNOWLEDGE = "then acknowledge the alarms: leg-wear-monitor acknowledge --ledger FILE, or --node NAME"
+_COUNTED = "its faults are counted in the status `input` of /diagnostics, and in `lost` of `replay --json`"
 _ROCK = (
     "stop when it is safe, block the drive and rock joint {joints}; measure its radial clearance and enter "
     "it: leg-wear-monitor measure {joint} MM --sigma MM"
@@ -178,7 +179,7 @@ RULES = (
         state=State.NOT_MONITORED,
         hits=input_rules.unfollowed,
         why="{cause}",
-        do="repair the input of the crank; the status `input` counts the faults",
+        do=f"repair the input of the crank; {_COUNTED}",
         not_valid=OF_THE_GAIT,
     ),
     Rule(
@@ -186,7 +187,7 @@ RULES = (
         state=State.NOT_MONITORED,
         hits=blinding,
         why="the {quantity} is {value} (limit {limit}){causes}",
-        do="repair the input; the status `input` counts the faults",
+        do=f"repair the input; {_COUNTED}",
         not_valid=OF_THE_GAIT,
     ),
     Rule(
@@ -202,7 +203,7 @@ RULES = (
         state=State.NOT_MONITORED,
         hits=input_rules.no_cycle,
         why="the monitor has not received a whole gait cycle yet",
-        do="let the leg walk; if it walks already, see the status `input`",
+        do=f"let the leg walk; if it walks already: {_COUNTED}",
     ),
     Rule(
         code="MATERIAL_LIMIT",

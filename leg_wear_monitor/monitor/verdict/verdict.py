@@ -7,6 +7,7 @@ from typing import Any
 
 import attrs
 
+from leg_wear_monitor.drawable import Shown
 from leg_wear_monitor.monitor.alarms.alarm import Level
 from leg_wear_monitor.monitor.alarms.guides import guide_of
 
@@ -109,7 +110,7 @@ class Finding:
 
 
 @attrs.frozen(kw_only=True)
-class Verdict:
+class Verdict(Shown):
     """Conclusion of the monitor on the leg.
 
     Attributes

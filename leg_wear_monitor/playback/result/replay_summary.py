@@ -126,15 +126,18 @@ class ReplaySummary(Drawable):
     def to_pandas(self) -> "pd.DataFrame":
         """Table with a row for each joint; requires pandas.
 
-        Columns are named as the fields are, parts of a field after a dot: ``forecast.hours.p50``. The table
-        over time is `ReplayHistory.to_pandas`.
+        Columns are named as the fields are, parts of a field after a dot: ``forecast.hours.p50``. The column
+        ``not_valid`` names the kinds of values that the verdict says are not valid, separated by commas;
+        empty if all are. The table over time is `ReplayHistory.to_pandas`, for which it holds as well.
 
         Raises
         ------
         LegWearError
             If pandas is not installed.
         """
-        return data_frame(joint_columns(self.joints), index="joint")
+        kinds = ", ".join(figure.value for figure in self.verdict.not_valid)
+        columns = joint_columns(self.joints)
+        return data_frame({**columns, "not_valid": [kinds] * len(self.joints)}, index="joint")
 
 
 def summary_of(record: Any, source: str) -> ReplaySummary:

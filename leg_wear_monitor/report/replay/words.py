@@ -44,4 +44,4 @@ def duration(seconds: float) -> str:
 
 def value(factor: float, number: float | None) -> str:
     """A number times a factor in four digits; a dash if it is not known."""
-    return "-" if number is None else f"{factor * number:.4g}"
+    return "-" if number is None else f"{float(f'{factor * number:.4g}'):g}"

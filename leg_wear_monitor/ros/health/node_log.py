@@ -49,12 +49,17 @@ def line_of(alarm: Alarm, before: Level, stamp_ns: int) -> str:
     unit = f" {alarm.unit}" if alarm.unit else ""
     verb = "rises" if alarm.present > before else "falls"
     latched = ", shown until it is acknowledged" if alarm.level > alarm.present else ""
-    value = "unknown" if math.isnan(alarm.value) else f"{alarm.value:.4g}{unit}"
-    limit = "" if math.isnan(alarm.limit) else f", limit {alarm.limit:.4g}{unit}"
+    value = "unknown" if math.isnan(alarm.value) else f"{_plain(alarm.value)}{unit}"
+    limit = "" if math.isnan(alarm.limit) else f", limit {_plain(alarm.limit)}{unit}"
     time = f", at {utc(stamp_ns)}" if stamp_ns > 0 else ""
     return (
         f"alarm {alarm.name} {verb} from {before.name} to {alarm.present.name}: {value}{limit}{time}{latched}"
     )
+
+
+def _plain(value: float) -> str:
+    """Four digits, as 11640 and not as 1.164e+04."""
+    return f"{float(f'{value:.4g}'):g}"
 
 
 class StatusLog:

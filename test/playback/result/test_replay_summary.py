@@ -135,5 +135,6 @@ def test_with_pandas_they_are_frames(summary):
     pytest.importorskip("pandas")
     joints, over_time = summary.to_pandas(), summary.history.to_pandas()
     assert joints.loc["A", "forecast.hours.p90"] == 3.0
+    assert set(joints["not_valid"]) == {", ".join(each.value for each in summary.verdict.not_valid)}
     assert list(over_time.index) == summary.history.stamp_ns.tolist()
     assert np.isnan(over_time["clearance_m.A"].iloc[1])

@@ -201,6 +201,19 @@ def test_why_samples_cannot_be_used_is_said_in_a_sentence(monitor, gait, fault, 
     assert 0 < int(number) <= min(int(total), counted)
 
 
+def test_the_most_frequent_of_several_faults_is_not_taken_for_all(monitor, gait):
+    """The number of all stands before it, and is that of the alarm's fraction."""
+    stream = gait(2.0)
+    stream["fault"][100::4], stream["fault"][102::8] = ZERO_STAMP, EMPTY
+    monitor.update(stream)
+    told = status_of(monitor)
+    every, first = told.message.split(" samples are not used, ")
+    unused, total = (int(number) for number in every.split(" of "))
+    assert first.startswith(tuple(f"{n} of {total} samples have a zero stamp" for n in range(1, unused)))
+    fraction = next(alarm.value for alarm in monitor.alarms.alarms if alarm.name == "input_samples")
+    assert unused / total == pytest.approx(fraction)
+
+
 def test_messages_without_the_crank_are_a_fault_only_if_none_has_it(monitor, gait):
     stream = gait(6.0)
     others = stream[::2].copy()

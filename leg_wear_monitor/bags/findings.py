@@ -46,6 +46,11 @@ class Finding:
     def __str__(self) -> str:
         return f"{printable(str(self.file))}: {self.text}"
 
+    @property
+    def line(self) -> str:
+        """What the command line prints: a warning, or a note, which no user needs to act on."""
+        return f"{'note' if self.severity is Severity.NOTE else 'warning'}: {self}"
+
 
 class DamageError(Exception):
     """A part of a file is unusable; the reader records a finding and continues."""

@@ -275,7 +275,7 @@ def _about_the_ledger(result: ReplayResult) -> list[Finding]:
     found = []
     if result.monitor.ledger_loss:
         path = Path(result.monitor.config.ledger.path)
-        found.append(Finding(path, result.monitor.ledger_loss, Severity.NOTE))
+        found.append(Finding(path, result.monitor.ledger_loss))
     if result.monitor.is_all_counted:
         text = "everything in this recording is in the ledger already: nothing was counted"
         found.append(Finding(result.files[0], text, Severity.NOTE))

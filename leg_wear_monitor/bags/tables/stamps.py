@@ -57,7 +57,8 @@ class Clock:
         stamps, within = self.of_numbers(times)
         power = STAMPS[self.unit]
         if np.abs(times[within]).max(initial=0.0) * 10.0**power >= _EXACT_NS:
-            for k in np.flatnonzero(within).tolist():
+            # below 1 a double has the nanosecond, and the text may have an exponent that no Decimal takes
+            for k in np.flatnonzero(within & (np.abs(times) >= 1.0)).tolist():
                 exact = int(Decimal(texts[k].strip().replace("_", "")).scaleb(power).to_integral_value())
                 stamps[k] = exact + self.start_ns
         return stamps, within

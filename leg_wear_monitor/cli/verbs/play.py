@@ -187,7 +187,7 @@ def _play(
     with compilation("play"), progress_bar("reading") as progress:
         read = read_rocked(recording, settings, joint, loads, progress)
     for finding in read.findings:
-        click.echo(f"warning: {finding}", err=True)
+        click.echo(finding.line, err=True)
     count = 2.0 * math.pi / counts_per_turn if counts_per_turn else None
     result = measure_play(
         read.time_s, read.angle_rad, read.load, count_rad=count, joint=joint, load_name=" + ".join(loads)

@@ -99,7 +99,7 @@ def replay(
     is_report_there = out is not None and (out / SUMMARY).exists()
     result, wall_s = _run(bags, out, write, **options)
     for finding in result.findings[:_MOST_LINES]:
-        click.echo(f"warning: {finding}", err=True)
+        click.echo(finding.line, err=True)
     if len(result.findings) > _MOST_LINES:
         click.echo(f"warning: {len(result.findings) - _MOST_LINES} more findings", err=True)
     if result.is_unusable:

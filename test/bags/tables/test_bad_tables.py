@@ -112,6 +112,13 @@ def test_a_time_of_zero_is_a_note(table: Any) -> None:
     )
 
 
+@pytest.mark.parametrize("zero", ["0e99999", "0e99999999999999999999", "-0E+9", "1e-99999999999999999999"])
+def test_a_zero_with_any_exponent_is_a_time_of_zero(table: Any, zero: str) -> None:
+    found, losses, notes = table(lines("1700000000.000000001,1,2", f"{zero},1,2", *GOOD))
+    assert found == 2 * (2 + len(GOOD)) and not losses
+    assert "the time goes back by 1.7e+09 s at line 3" in notes[0]
+
+
 def test_a_torque_without_an_angle_is_no_effort(tmp_path: Path, read: Read) -> None:
     (tmp_path / "a.csv").write_text(lines("1,,2", *GOOD))
     _, recording = read(tmp_path / "a.csv", config=config_from({"drive_torque.source": "effort"}))

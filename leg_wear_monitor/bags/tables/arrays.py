@@ -77,11 +77,14 @@ def rows_of(
     rows = Rows(row + 1, stamps, values, there, stored)
     if good.all():
         return rows
-    for k in np.flatnonzero(~good):
+    bad = np.flatnonzero(~good)
+    shown = bad[: lost.left]
+    for k in shown:
         time, unit = arrays[STAMP][k], table.units.stamp
         is_there = measured[STAMP][k] and not (isinstance(time, np.floating) and np.isnan(time))
         fault = f"{time} {unit} is no time from 1902 to 2038" if is_there else "has no time"
         lost.add(int(row[k]) + 1, fault)
+    lost.count += len(bad) - len(shown)
     return rows.part(good)
 
 

@@ -33,6 +33,11 @@ class LostLines:
         if self.count <= _MOST:
             self.findings.append(Finding(self.path, f"{self.word} {line} is lost: {fault}"))
 
+    @property
+    def left(self) -> int:
+        """Number of lines that are still reported one by one."""
+        return max(0, _MOST - self.count)
+
     def close(self) -> None:
         """Report how many more there are; after the last line."""
         if self.count > _MOST:

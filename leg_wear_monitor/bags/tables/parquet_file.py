@@ -8,14 +8,20 @@ import numpy as np
 from numpy.typing import NDArray
 
 from leg_wear_monitor.bags.budget import Budget
-from leg_wear_monitor.bags.findings import DamageError, Finding, RecordingError
+from leg_wear_monitor.bags.findings import DamageError, Finding, RecordingError, Severity
 from leg_wear_monitor.bags.tables.arrays import check_kind, rows_of
 from leg_wear_monitor.bags.tables.damage import LostLines
 from leg_wear_monitor.bags.tables.layout import Rows, columns_of, places
+from leg_wear_monitor.bags.tables.parquet_pages import pages_of
 from leg_wear_monitor.errors import LegWearError
 from leg_wear_monitor.monitor.config.settings import MonitorConfig
 
 _ROWS = 65536
+_OF_A_FOOTER = (
+    400  # memory of the parsed footer per byte, at worst: a column of no more than a start has 3 bytes
+)
+_MOST_ROWS = 2**53
+_NO_CHECKSUMS = "has pages without checksums: a damaged number in them would not be detected"
 
 
 class ParquetFile:
@@ -51,17 +57,20 @@ class ParquetFile:
                 "Parquet files need pyarrow, which is not installed; pip install 'leg_wear_monitor[parquet]'"
             )
             raise LegWearError(text) from error
-        self._damage = (pyarrow.ArrowException, OSError)
+        self._damage = (pyarrow.ArrowException, OSError, UnicodeDecodeError)
         self._path, self._config, self._budget, self._findings = path, config.input, budget, findings
         self._lost = LostLines(path, findings, "row")
-        self.size = file.seek(0, 2)
+        self._are_checked = True
+        self._content, self.size = file, file.seek(0, 2)
         try:
-            self._file = pyarrow.parquet.ParquetFile(file, memory_map=False)
-        except self._damage as error:
-            fault = f"is not a readable Parquet file: {_one_line(error)}"
-            raise RecordingError(str(path), "", fault) from error
-        schema = self._file.schema_arrow
-        self.names = list(schema.names)
+            _check_footer(file, self.size, budget)
+            self._file = pyarrow.parquet.ParquetFile(file, memory_map=False, page_checksum_verification=True)
+            schema = self._file.schema_arrow
+            self.names = list(schema.names)
+            self._rows = self._checked_rows()
+        except (*self._damage, DamageError) as error:
+            why = "a name is not UTF-8" if isinstance(error, UnicodeDecodeError) else _one_line(error)
+            raise RecordingError(str(path), "", f"is not a readable Parquet file: {why}") from error
         self._columns = columns_of(config)
         self._places = places(str(path), self.names, self._columns)
         for column, place in zip(self._columns, self._places, strict=True):
@@ -70,9 +79,8 @@ class ParquetFile:
 
     def parts(self) -> Iterator[Rows]:
         """All sound rows, block by block."""
-        first, total = 0, max(1, self._file.metadata.num_rows)
-        for group in range(self._file.metadata.num_row_groups):
-            rows = self._file.metadata.row_group(group).num_rows
+        first, total = 0, max(1, sum(self._rows))
+        for group, rows in enumerate(self._rows):
             try:
                 yield from self._group(group, first, self.size / total)
             except DamageError as error:
@@ -81,15 +89,12 @@ class ParquetFile:
                 self._find(first, rows, f"cannot be read: {_one_line(error)}")
             first += rows
         self._lost.close()
+        if not self._are_checked:
+            self._findings.append(Finding(self._path, _NO_CHECKSUMS, Severity.NOTE))
 
     def _group(self, group: int, first: int, stored: float) -> Iterator[Rows]:
         """Rows of a group."""
-        head = self._file.metadata.row_group(group)
-        sizes = {
-            head.column(k).path_in_schema: head.column(k).total_uncompressed_size
-            for k in range(head.num_columns)
-        }
-        self._budget.check(2 * sum(sizes.get(column.name, 0) for column in self._columns))
+        self._check_pages(group)
         names = [column.name for column in self._columns]
         for batch in self._file.iter_batches(_ROWS, row_groups=[group], columns=names):
             arrays = {one.key: batch.column(one.name) for one in self._columns}
@@ -99,9 +104,61 @@ class ParquetFile:
             yield rows_of(self._columns, values, there, first, size, self._config, self._lost)
             first += batch.num_rows
 
+    def _checked_rows(self) -> list[int]:
+        """Rows of each group, of which the footer declares the sum.
+
+        Raises
+        ------
+        DamageError
+        """
+        head = self._file.metadata
+        rows = [head.row_group(group).num_rows for group in range(head.num_row_groups)]
+        if head.num_rows != sum(rows) or min(rows, default=0) < 0:
+            raise DamageError(f"it declares {head.num_rows} rows, and {sum(rows)} in its row groups")
+        if head.num_rows > _MOST_ROWS:
+            raise DamageError(f"it declares {head.num_rows} rows, expected at most {_MOST_ROWS}")
+        return rows
+
+    def _check_pages(self, group: int) -> None:
+        """Check that group, columns and pages have the same number of rows, and fit into memory.
+
+        Raises
+        ------
+        DamageError
+        """
+        head, size = self._file.metadata.row_group(group), 0
+        if head.num_columns != self._file.metadata.num_columns:  # pyarrow ends the process beyond
+            raise DamageError(f"the row group has {head.num_columns} columns, and the file another number")
+        wanted = {column.name for column in self._columns}
+        for column in (head.column(k) for k in range(head.num_columns)):
+            if column.path_in_schema not in wanted:
+                continue
+            starts = (column.dictionary_page_offset, column.data_page_offset)
+            begin = min(start for start in starts if start)
+            pages = pages_of(self._content, begin, column.total_compressed_size, head.num_rows)
+            if not pages.values == column.num_values == head.num_rows:
+                text = f"column {column.path_in_schema!r} has {pages.values} rows in its pages"
+                declared = f"the footer declares {column.num_values} and {head.num_rows}"
+                raise DamageError(f"{text}, of which {declared}")
+            self._are_checked &= pages.are_checked
+            size += max(pages.size, column.total_uncompressed_size)
+        self._budget.check(2 * size)
+
     def _find(self, first: int, rows: int, fault: str) -> None:
         text = f"rows {first + 1} to {first + rows}: {fault}: what of them was not read yet is lost"
         self._findings.append(Finding(self._path, text))
+
+
+def _check_footer(file: IO[bytes], size: int, budget: Budget) -> None:
+    """Check that the parsed footer fits into memory; whether it is one is for pyarrow to say.
+
+    Raises
+    ------
+    DamageError
+    """
+    file.seek(max(0, size - 8))
+    declared = int.from_bytes(file.read(4), "little")
+    budget.check(_OF_A_FOOTER * min(declared, size))
 
 
 def _kind(of: Any) -> str:

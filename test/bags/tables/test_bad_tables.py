@@ -214,6 +214,93 @@ def test_a_group_of_rows_that_is_damaged_is_lost_and_the_others_are_not(tmp_path
     assert any(finding.text.startswith("rows 1001 to 1500: cannot be read") for finding in recording.findings)
 
 
+@pytest.fixture
+def three_groups(tmp_path: Path) -> Callable[..., Path]:
+    """Write a Parquet file of 1000, 1001 and 999 rows, with parts of its footer replaced."""
+    pyarrow, parquet = pytest.importorskip("pyarrow"), pytest.importorskip("pyarrow.parquet")
+    times = 1.0 + 0.005 * np.arange(3000)
+    columns = {
+        "time": times,
+        "crank_angle": 2.0 * np.pi * times % (2.0 * np.pi),
+        "drive_torque": times,
+        "other": times,
+    }
+
+    def write(*replaced: tuple[bytes, bytes], metadata: dict[str, str] | None = None) -> Path:
+        table, path = pyarrow.table(columns, metadata=metadata), tmp_path / "a.parquet"
+        with parquet.ParquetWriter(path, table.schema, write_statistics=False) as writer:
+            for begin, end in ((0, 1000), (1000, 2001), (2001, 3000)):
+                writer.write_table(table.slice(begin, end - begin))
+        content = path.read_bytes()
+        begin = len(content) - 8 - int.from_bytes(content[-8:-4], "little")
+        footer = content[begin:-8]
+        for old, new in replaced:
+            assert old in footer
+            footer = footer.replace(old, new)
+        path.write_bytes(content[:begin] + footer + len(footer).to_bytes(4, "little") + b"PAR1")
+        return path
+
+    return write
+
+
+def varint(number: int) -> bytes:
+    """An integer as a footer has it."""
+    rest, found = number << 1, b""
+    while rest > 127:
+        rest, found = rest >> 7, found + bytes([rest & 127 | 128])
+    return found + bytes([rest])
+
+
+FEWER = (varint(1001), varint(501))  # as the group's rows and as the values of each of its columns
+TOTAL = (varint(3000), varint(2500))
+
+
+def test_a_group_that_hides_rows_is_lost_and_not_shortened(three_groups: Any, read: Read) -> None:
+    samples, recording = read(three_groups(FEWER, TOTAL), config=config_from({}))
+    texts = [finding.text for finding in recording.findings]
+    assert len(samples) == 2 * (1000 + 999) and recording.is_partial
+    declared = "1001 rows in its pages, of which the footer declares 501 and 501"
+    assert texts[0].startswith(f"rows 1001 to 1501: column 'time' has {declared}")
+    assert "has pages without checksums: a damaged number in them would not be detected" in texts
+
+
+@pytest.mark.parametrize(
+    ("replaced", "metadata", "fault"),
+    [
+        ([FEWER], {}, "it declares 3000 rows, and 2500 in its row groups"),
+        ([(varint(3000), varint(2**62))], {}, f"it declares {2**62} rows, and 3000 in its row groups"),
+        (
+            [(varint(3000), varint(2**62)), (varint(1001), varint(2**62 - 1999))],
+            {},
+            f"it declares {2**62} rows, expected at most {2**53}",
+        ),
+        ([(b"other", b"oth\xff\xfe")], {}, "a name is not UTF-8"),
+        ([], {"x": "y" * 700_000}, "needs [0-9]+ MB to be read, more than the 256 MB that --memory-mb 512"),
+    ],
+    ids=["groups", "rows", "rows of a group", "name", "footer"],
+)
+def test_a_footer_that_contradicts_itself_is_one_line(
+    three_groups: Any, read: Read, replaced: Any, metadata: Any, fault: str
+) -> None:
+    with pytest.raises(RecordingError, match=f"is not a readable Parquet file: {fault}"):
+        read(three_groups(*replaced, metadata=metadata), config=config_from({}))
+
+
+def test_rows_without_a_time_are_counted_and_not_listed(tmp_path: Path, read: Read) -> None:
+    """Fifty million of them, which fit into 300 kB, took minutes one by one."""
+    pyarrow, parquet = pytest.importorskip("pyarrow"), pytest.importorskip("pyarrow.parquet")
+    n = 1_000_000
+    times = pyarrow.concat_arrays([pyarrow.array([1.0]), pyarrow.nulls(n, pyarrow.float64())])
+    table = pyarrow.table(dict.fromkeys(("time", "crank_angle", "drive_torque"), times))
+    parquet.write_table(table, tmp_path / "a.parquet", write_page_checksum=True)
+    samples, recording = read(tmp_path / "a.parquet", config=config_from({}))
+    texts = [finding.text for finding in recording.findings]
+    assert len(samples) == 2 and texts == [
+        *(f"row {k} is lost: has no time" for k in range(2, 7)),
+        f"{n - 5} more rows are lost",
+    ]
+
+
 def test_without_pyarrow_one_line_says_what_to_install(table: Any, monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setitem(__import__("sys").modules, "pyarrow", None)
     with pytest.raises(LegWearError, match=r"need pyarrow.*pip install 'leg_wear_monitor\[parquet\]'"):

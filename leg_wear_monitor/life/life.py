@@ -165,7 +165,9 @@ class LifeRun:
         now = self._now = self._probe(start)
         self._wish = longest_jump(now.rate, self.settings.jump)
         none = np.zeros_like(now.archard_j)
-        self.points = [LifePoint(0.0, start, now.rate, now.peak_force_n, now.toe_position_m, none, 0.0)]
+        self.points = [
+            LifePoint(0.0, start, now.rate, now.peak_force_n, now.toe_position_m, none, 0.0, now.archard_j)
+        ]
 
     def jump(self, most_cycles: float = np.inf) -> LifePoint:
         """Advance by one jump of at most so many gait cycles.
@@ -188,7 +190,7 @@ class LifeRun:
         worked = last.archard_j + 0.5 * cycles * (now.archard_j + then.archard_j)
         self._now, self._wish = then, wish
         at, peak, toe = last.cycles + cycles, then.peak_force_n, then.toe_position_m
-        self.points.append(LifePoint(at, depth, then.rate, peak, toe, worked, error))
+        self.points.append(LifePoint(at, depth, then.rate, peak, toe, worked, error, then.archard_j))
         return self.points[-1]
 
     def hold(self, k: int) -> None:

@@ -42,6 +42,8 @@ class LifePoint:
         Integral of F_N |v_t| dt since the life began.
     error_m : float
         Estimated error of the mean clearance in the jump to this point.
+    rubbing_j_per_cycle : (k,) array
+        The same integral over a gait cycle, mean over the simulated cycles.
     """
 
     cycles: float
@@ -51,6 +53,7 @@ class LifePoint:
     toe_position_m: float
     archard_j: Floats
     error_m: float
+    rubbing_j_per_cycle: Floats
 
     @property
     def opened_m(self) -> Floats:
@@ -84,6 +87,8 @@ class Life(Drawable):
         Estimated error of the mean clearance in the jump to each point.
     depth : (p, k, 2, N) array, m
         Wear of bushing and journal, by sector.
+    rubbing_j_per_cycle : (p, k) array
+        Integral of F_N |v_t| dt over a gait cycle.
     """
 
     clearance_joints: tuple[str, ...]
@@ -96,6 +101,7 @@ class Life(Drawable):
     growth_error_m_per_cycle: Floats
     error_m: Floats
     depth: Floats
+    rubbing_j_per_cycle: Floats
 
     def cycles_to(self, k: int, clearance_m: float) -> float:
         """Gait cycles at which joint k's mean clearance reaches a value; extrapolated at its last rate.
@@ -168,4 +174,5 @@ def life_of(clearance_joints: tuple[str, ...], fresh_m: Floats, points: Sequence
         growth_error_m_per_cycle=np.array([point.rate.scatter for point in points]),
         error_m=np.array([point.error_m for point in points]),
         depth=depth,
+        rubbing_j_per_cycle=np.array([point.rubbing_j_per_cycle for point in points]),
     )

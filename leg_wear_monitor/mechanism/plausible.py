@@ -140,13 +140,13 @@ def _gravity(mechanism: Mechanism) -> Iterator[Doubt]:
 
 
 def _joints(mechanism: Mechanism) -> Iterator[Doubt]:
-    """Doubts about clearance settings, each for the first joint only: most come from the defaults."""
-    reported: set[str] = set()
+    """Doubts about clearance settings, each with all joints concerned: most come from the defaults."""
+    concerned: dict[Doubt, list[str]] = {}
     for joint, clearance in mechanism.clearances.items():
         for doubt in _clearance(clearance):
-            if doubt.key not in reported:
-                reported.add(doubt.key)
-                yield attrs.evolve(doubt, key=f"clearances ({joint}): {doubt.key}")
+            concerned.setdefault(doubt, []).append(joint)
+    for doubt, joints in concerned.items():
+        yield attrs.evolve(doubt, key=f"clearances ({', '.join(joints)}): {doubt.key}")
 
 
 def _clearance(c: Clearance) -> Iterator[Doubt]:

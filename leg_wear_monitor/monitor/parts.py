@@ -3,7 +3,7 @@
 import attrs
 import numpy as np
 
-from leg_wear_monitor.mechanism.materials.load import Bushing
+from leg_wear_monitor.mechanism.materials.load import bushing_of
 from leg_wear_monitor.mechanism.spec import Mechanism
 from leg_wear_monitor.monitor.accounting import Accounting
 from leg_wear_monitor.monitor.config.fitting import fitted, twin_settings
@@ -77,9 +77,7 @@ class Parts:
         # shorter than a gait cycle for early alarms of impacts, which a sampled replay does not promise
         periods = 1 if sampling else A_CYCLE
         self.evaluation = AlarmEvaluation(self.twin, self.config, cycle_ns, self.guard, periods)
-        self.bushings = {
-            joint: Bushing.of(self.mechanism.clearances[joint]) for joint in self.clearance_joints
-        }
+        self.bushings = {joint: bushing_of(self.mechanism, joint) for joint in self.clearance_joints}
         self.forecaster = Forecaster(
             self.mechanism,
             self.config.forecast,

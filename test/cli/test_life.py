@@ -1,6 +1,7 @@
 """What `life` prints and writes."""
 
 import json
+import re
 
 import pytest
 
@@ -21,6 +22,7 @@ def test_life_tells_when_each_joint_reaches_its_limit(run, tmp_path):
     for joint, figures in life["joints"].items():
         assert figures["clearance_m"] == sorted(figures["clearance_m"])
         assert f"{joint} reaches 520 µm after" in result.stdout
+        assert re.search(rf"{joint} reaches 520 µm after \S+ gait cycles, \S+ h", result.stdout)
     leg = load_mechanism("four_bar")
     assert life["fingerprint"] == fingerprint(leg)
     nominal, *others = read_lives(str(tmp_path / "out" / "life.json"), leg)
@@ -49,11 +51,19 @@ def test_life_tells_regime_limits_and_the_makers_own_life(run, shipped, tmp_path
     """A pair with limits only is refused; with a coefficient beside it, the maker's life is printed, too."""
     pair = "material: skf-ptfe-composite-on-steel"
     text = shipped("four_bar")
-    (tmp_path / "limited.yaml").write_text(text.replace("wear_coefficient: 1.0e-15", pair))
+    limited = text.replace("wear_coefficient: 1.0e-15", "material: du-on-steel-dry")
+    (tmp_path / "limited.yaml").write_text(limited)
     refused = run("life", "--mechanism", "limited.yaml")
     assert refused.exit_code == 2
     (line,) = refused.stderr.splitlines()
-    assert "wear_coefficient: is missing for a life: skf-ptfe-composite-on-steel" in line
+    assert "wear_coefficient: is missing for a life: du-on-steel-dry" in line
+    (tmp_path / "rule.yaml").write_text(text.replace("wear_coefficient: 1.0e-15", pair))
+    rule = run("life", "--mechanism", "rule.yaml", *ONE[3:])
+    assert rule.exit_code == 0
+    assert "B not counted: its pair gives no wear coefficient" in rule.stdout
+    assert "nan" not in rule.stdout
+    (told,) = [one for one in rule.stdout.splitlines() if one.startswith("B: maker's rating life ")]
+    assert "all factors 1; its formula holds from 0.025 MPa m/s" in told
     (tmp_path / "beside.yaml").write_text(
         text.replace("wear_coefficient: 1.0e-15", f"{pair}\n    wear_coefficient: 1.0e-15")
     )
@@ -63,7 +73,8 @@ def test_life_tells_regime_limits_and_the_makers_own_life(run, shipped, tmp_path
         "holds for B, C: a value beside skf-ptfe-composite-on-steel (dry), wear coefficient 1e-15"
         in result.stdout
     )
-    assert result.stdout.count("maker's basic rating life") == 2
+    assert result.stdout.count("maker's rating life") == 2
+    assert told in result.stdout  # the formula knows nothing of a coefficient
 
 
 def test_life_refuses_what_cannot_be(run):

@@ -1,6 +1,7 @@
 """``leg-wear-monitor life``: a leg from new until a clearance reaches its limit, by cycle jumps."""
 
 import math
+from collections.abc import Sequence
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
@@ -22,6 +23,7 @@ from leg_wear_monitor.json_text import json_text
 if TYPE_CHECKING:
     from leg_wear_monitor.life.result import Life
     from leg_wear_monitor.mechanism.arrays import Floats
+    from leg_wear_monitor.mechanism.materials.material import RatingLife
     from leg_wear_monitor.mechanism.spec import Mechanism
 
     Lives = list[tuple[Floats, Life]]  # with the factors on their wear coefficients
@@ -112,8 +114,8 @@ def life(mechanism: str, json_file: Path | None, out: Path | None, **options: An
         files = {"life.json": text.encode(), "life.png": life_picture(result)}
         written += write_directory(out, files)
     if json_file != STDOUT:
-        told = [*lines(result, options["limit_m"]), *_validity(leg, result)]
-        told += _loads(leg, lives, period_s)
+        told = [*lines(result, options["limit_m"], period_s, _not_counted(leg)), *_validity(leg, result)]
+        told += _loads(leg, result, period_s)
         for line in [*told, *(f"written: {path}" for path in written)]:
             click.echo(line)
 
@@ -159,7 +161,7 @@ def _document(leg: "Mechanism", lives: "Lives", period_s: float) -> dict[str, An
     return {
         "mechanism": leg.name,
         "fingerprint": fingerprint(leg),
-        "validity": validity(leg, lives[0][1], lives[0][0], period_s),
+        "validity": validity(leg, lives[0][1], period_s),
         **lives_document(lives),
     }
 
@@ -172,24 +174,44 @@ def _validity(leg: "Mechanism", result: "Life") -> list[str]:
     return [f"holds for {', '.join(joints)}: {what}" for what, joints in found]
 
 
-def _loads(leg: "Mechanism", lives: "Lives", period_s: float) -> list[str]:
-    """What p v of the new leg is beyond, the makers' own life of their bushings, and contacts too wide."""
-    from leg_wear_monitor.life.bushing_load import contact_doubts, pressure_speed
-    from leg_wear_monitor.mechanism.materials.load import Bushing
-    from leg_wear_monitor.mechanism.materials.loader import load_material
-    from leg_wear_monitor.mechanism.materials.rating_life import rating_life_hours
+def _not_counted(leg: "Mechanism") -> list[str]:
+    """Joints whose pair gives no wear coefficient."""
+    from leg_wear_monitor.mechanism.materials.of_joints import lacks_wear
 
-    factor, result = lives[0]
+    return [joint for joint in leg.clearance_joints if lacks_wear(leg.clearances[joint])]
+
+
+def _loads(leg: "Mechanism", result: "Life", period_s: float) -> list[str]:
+    """What p v of the new leg is beyond, the makers' own life of their bushings, and contacts too wide."""
+    from leg_wear_monitor.life.bushing_load import contact_doubts, pressure_speed, rating_hours
+    from leg_wear_monitor.mechanism.materials.load import bushing_of
+    from leg_wear_monitor.mechanism.materials.loader import load_material
+
     told = []
-    for joint, load in pressure_speed(leg, result, factor, period_s).items():
+    for joint, load in pressure_speed(leg, result, period_s).items():
         settings = leg.clearances[joint]
-        beyond = Bushing.of(settings).loaded(0.0, 0.0, 0.0, load).outside_limits
+        beyond = bushing_of(leg, joint).loaded(0.0, 0.0, 0.0, load).outside_limits
         told += [f"{joint}: {beyond}"] if beyond else []
-        constants = load_material(settings.material).rating_life if settings.material else None
-        if constants is not None:
-            hours = f"{rating_life_hours(load, constants):.3g} h at p v {1e-6 * load:.3g} MPa m/s"
-            told.append(f"{joint}: maker's basic rating life {hours}, all factors 1")
+        hours = rating_hours(settings, load)
+        if hours is not None:
+            constants = load_material(settings.material).rating_life
+            told.append(f"{joint}: maker's rating life {_rated(hours, load, period_s, constants)}")
     return told + [f"{joint}: {doubt}" for joint, doubt in contact_doubts(leg, result).items()]
+
+
+def _rated(hours: float, load: float, period_s: float, constants: "RatingLife | None") -> str:
+    """A maker's life, and the p v for which it holds."""
+    least = constants.least_pressure_speed.si if constants else 0.0
+    largest = constants.largest_pressure_speed if constants else None
+    held = f"its formula holds from {1e-6 * least:g}"
+    held += f" to {1e-6 * largest.si:g} MPa m/s" if largest else " MPa m/s"
+    at = f"p v {1e-6 * load:.3g} MPa m/s"
+    if math.isnan(hours):
+        return f"not given at {at}: {held}"
+    below = f", {1e-6 * least:g} inserted" if load < least else ""
+    return (
+        f"{hours:.3g} h ({3600.0 * hours / period_s:.3g} gait cycles) at {at}{below}, all factors 1; {held}"
+    )
 
 
 def _period_s(leg: "Mechanism", speed_rpm: float | None) -> float:
@@ -200,7 +222,7 @@ def _period_s(leg: "Mechanism", speed_rpm: float | None) -> float:
     return TURN / abs(prepare(leg, speed_rpm=speed_rpm).speed)
 
 
-def lines(result: "Life", limit_m: float) -> list[str]:
+def lines(result: "Life", limit_m: float, period_s: float, not_counted: Sequence[str] = ()) -> list[str]:
     """The life as a table, and when each joint reaches the limit."""
     points = len(result.cycles)
     shown = sorted({round(i * (points - 1) / max(1, _ROWS - 1)) for i in range(min(_ROWS, points))})
@@ -211,20 +233,30 @@ def lines(result: "Life", limit_m: float) -> list[str]:
     ]
     for i in shown:
         cells = "".join(
-            f"{1e6 * result.clearance_m[i, k]:11.1f}{result.worst_sector_deg[i, k]:5.0f}"
+            f"{1e6 * result.clearance_m[i, k]:11.1f}{_degrees(result.worst_sector_deg[i, k]):>5}"
             f"{result.peak_force_n[i, k]:6.0f}"
             for k in range(len(result.clearance_joints))
         )
         table.append(f"{result.cycles[i]:10.3g}{cells}")
     table.append(f"jumps: {points - 1}; largest error of one: {1e6 * result.error_m.max():.2g} µm")
     for k, joint in enumerate(result.clearance_joints):
-        table.append(f"{joint} {_end(result.cycles_to(k, limit_m), limit_m, result.cycles[-1])}")
+        if joint in not_counted:
+            table.append(f"{joint} not counted: its pair gives no wear coefficient")
+        else:
+            table.append(
+                f"{joint} {_end(result.cycles_to(k, limit_m), limit_m, result.cycles[-1], period_s)}"
+            )
     return table
 
 
-def _end(cycles: float, limit_m: float, simulated: float) -> str:
+def _degrees(sector_deg: float) -> str:
+    return "-" if math.isnan(sector_deg) else f"{sector_deg:.0f}"
+
+
+def _end(cycles: float, limit_m: float, simulated: float, period_s: float) -> str:
     """When a joint reaches its limit."""
     if math.isinf(cycles):
         return f"does not reach {1e6 * limit_m:g} µm: at its last rate, its clearance does not grow"
+    hours = cycles * period_s / 3600.0
     held = "" if cycles <= simulated else ", extrapolated at its last rate"
-    return f"reaches {1e6 * limit_m:g} µm after {cycles:.3g} gait cycles{held}"
+    return f"reaches {1e6 * limit_m:g} µm after {cycles:.3g} gait cycles, {hours:.3g} h{held}"

@@ -34,7 +34,7 @@ from leg_wear_monitor.dynamics.run.run_statistics import (
 )
 from leg_wear_monitor.mechanism.arrays import Floats
 from leg_wear_monitor.mechanism.ideal import TURN
-from leg_wear_monitor.mechanism.materials.load import Bushing
+from leg_wear_monitor.mechanism.materials.load import bushing_of
 from leg_wear_monitor.mechanism.materials.of_joints import regime_of
 from leg_wear_monitor.wear.surfaces import BUSHING, JOURNAL, wear_zone
 
@@ -114,8 +114,9 @@ def _joint(setup: Setup, statistics: RunStatistics, joint: int, worn: Floats, cy
 
 def _loaded(forces: JointResult, setup: Setup, k: int, rubbing_w: float) -> JointResult:
     """Pressure and sliding speed of clearance joint k; ``rubbing_w`` is the mean of F_N |v_t| [W]."""
-    settings = setup.linkage.mechanism.clearances[setup.clearance_joints[k]]
-    load = Bushing.of(settings).load(forces.mean_force_n, forces.p99_force_n, rubbing_w)
+    load = bushing_of(setup.linkage.mechanism, setup.clearance_joints[k]).load(
+        forces.mean_force_n, forces.p99_force_n, rubbing_w
+    )
     psi, doubt = _contact(setup, k, forces.p99_force_n)
     return attrs.evolve(
         forces,
@@ -124,7 +125,7 @@ def _loaded(forces: JointResult, setup: Setup, k: int, rubbing_w: float) -> Join
         mean_sliding_speed_mps=load.mean_sliding_speed_mps,
         mean_pressure_speed_pa_mps=load.mean_pressure_speed_pa_mps,
         outside_limits=load.outside_limits,
-        holds_for=regime_of(settings),
+        holds_for=regime_of(setup.linkage.mechanism.clearances[setup.clearance_joints[k]]),
         contact_half_angle_deg=math.degrees(psi),
         outside_contact_law=doubt,
     )

@@ -6,6 +6,7 @@ import attrs
 
 from leg_wear_monitor.mechanism.clearance import Clearance
 from leg_wear_monitor.mechanism.materials.loader import load_material
+from leg_wear_monitor.mechanism.spec import Mechanism
 
 
 def _si(unit: str, default: Any = attrs.NOTHING) -> Any:
@@ -114,18 +115,19 @@ class Bushing:
     pressure_speed_pa_mps: float | None = None
 
     @classmethod
-    def of(cls, settings: Clearance) -> "Bushing":
-        """The bushing of a joint with these settings."""
+    def of(cls, settings: Clearance, *, is_swinging: bool = True) -> "Bushing":
+        """The bushing of a joint with these settings; of the crank's joints, which turn, not swinging."""
         area = 2.0 * settings.bushing_radius * settings.width
         if not settings.material:
             return cls(area_m2=area)
         limits = load_material(settings.material).limits
         pressure = limits.dynamic_pressure or limits.static_pressure
+        speed = (limits.oscillating_speed if is_swinging else None) or limits.sliding_speed
         return cls(
             area_m2=area,
             material=settings.material,
             pressure_pa=pressure.si if pressure else None,
-            sliding_speed_mps=limits.sliding_speed.si if limits.sliding_speed else None,
+            sliding_speed_mps=speed.si if speed else None,
             pressure_speed_pa_mps=limits.pressure_speed.si if limits.pressure_speed else None,
         )
 
@@ -155,3 +157,9 @@ class Bushing:
             return load
         beyond = ", ".join(map(str, load.excesses))
         return attrs.evolve(load, outside_limits=f"outside the limits of {self.material}: {beyond}")
+
+
+def bushing_of(mechanism: Mechanism, joint: str) -> Bushing:
+    """The bushing of a joint: those of the crank turn, others swing."""
+    is_swinging = mechanism.drive.body not in mechanism.sides(joint)
+    return Bushing.of(mechanism.clearances[joint], is_swinging=is_swinging)

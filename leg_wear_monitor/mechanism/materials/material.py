@@ -19,6 +19,17 @@ class Side:
     poissons_ratio: SourcedValue | None = sourced("number", "Poisson's ratio")
     wear_coefficient: WearCoefficient | None = sourced("wear coefficient", "its own wear")
     roughness: SourcedValue | None = sourced("roughness", "Ra that the source asks for")
+    is_counted: bool = described(
+        "whether its own wear counts; false: the source measures the wear of the other body only",
+        default=True,
+    )
+
+    @property
+    def wear_si(self) -> float | None:
+        """Its wear coefficient [1/Pa]; 0 if its wear is not counted, None if it is not known."""
+        if self.wear_coefficient is not None:
+            return self.wear_coefficient.si
+        return None if self.is_counted else 0.0
 
 
 @attrs.frozen(kw_only=True)
@@ -28,6 +39,9 @@ class Limits:
     static_pressure: SourcedValue | None = sourced("pressure", "largest pressure at rest")
     dynamic_pressure: SourcedValue | None = sourced("pressure", "largest pressure while sliding")
     sliding_speed: SourcedValue | None = sourced("speed", "largest sliding speed")
+    oscillating_speed: SourcedValue | None = sourced(
+        "speed", "largest sliding speed of a joint that swings; without it, that of any"
+    )
     pressure_speed: SourcedValue | None = sourced("pressure times speed", "largest pressure times speed")
     lowest_temperature: SourcedValue | None = sourced("temperature", "lowest temperature")
     highest_temperature: SourcedValue | None = sourced("temperature", "highest temperature")
@@ -40,6 +54,9 @@ class RatingLife:
     constant: SourcedValue = sourced("number", "K_M, for p in N/mm^2, v in m/s and a life in h")
     exponent: SourcedValue = sourced("number", "n of (p v)^n")
     least_pressure_speed: SourcedValue = sourced("pressure times speed", "least p v to insert")
+    largest_pressure_speed: SourcedValue | None = sourced(
+        "pressure times speed", "largest p v for which these constants hold"
+    )
 
 
 @attrs.frozen(kw_only=True)
@@ -59,9 +76,9 @@ class Material(Shown):
 
     @property
     def wear_coefficients(self) -> tuple[float, float] | None:
-        """Wear coefficients of bushing and journal [1/Pa]; None unless both are known."""
-        bushing, journal = self.bushing.wear_coefficient, self.journal.wear_coefficient
-        return None if bushing is None or journal is None else (bushing.si, journal.si)
+        """Wear coefficients of bushing and journal [1/Pa]; None unless both are known or not counted."""
+        bushing, journal = self.bushing.wear_si, self.journal.wear_si
+        return None if bushing is None or journal is None else (bushing, journal)
 
     def values(self) -> Iterator[tuple[str, SourcedValue]]:
         """Every number with its dotted key."""

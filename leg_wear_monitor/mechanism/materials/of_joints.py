@@ -35,22 +35,21 @@ def lacks_wear(settings: Clearance) -> bool:
 
 
 def check_wear_is_known(mechanism: Mechanism, joints: Sequence[str]) -> None:
-    """Check that each joint's wear coefficient is known, for a life.
+    """Check that there is something to compute a life from: a coefficient, or a formula of the maker.
 
     Raises
     ------
     ConfigError
-        For the first joint whose pair has limits only.
+        If the pairs of all joints have limits only; it names the first joint.
     """
-    for joint in joints:
-        settings = mechanism.clearances.get(joint)
-        if settings is not None and lacks_wear(settings):
-            raise ConfigError(
-                mechanism.source,
-                f"clearances.joints.{joint}.wear_coefficient",
-                f"is missing for a life: {settings.material} has no wear coefficient of both bodies, "
-                "expected one beside the material [1/Pa]",
-            )
+    known = [mechanism.clearances[joint] for joint in joints if joint in mechanism.clearances]
+    if known and all(lacks_wear(each) and load_material(each.material).rating_life is None for each in known):
+        raise ConfigError(
+            mechanism.source,
+            f"clearances.joints.{joints[0]}.wear_coefficient",
+            f"is missing for a life: {known[0].material} has no wear coefficient of both bodies, "
+            "expected one beside the material [1/Pa]",
+        )
 
 
 def regimes(mechanism: Mechanism, joints: Sequence[str]) -> dict[str, list[str]]:
@@ -59,7 +58,7 @@ def regimes(mechanism: Mechanism, joints: Sequence[str]) -> dict[str, list[str]]
     for joint in joints:
         settings = mechanism.clearances[joint]
         wear = " and ".join(f"{k:.3g}" for k in dict.fromkeys(settings.wear_coefficient)) + " 1/Pa"
-        wear = "not known" if lacks_wear(settings) else wear
+        wear = "not known: not counted" if lacks_wear(settings) else wear
         found.setdefault(f"{regime_of(settings)}, wear coefficient {wear}", []).append(joint)
     return found
 
@@ -94,9 +93,9 @@ def spread_of(settings: Clearance, usual: float) -> float | None:
         return None
     pair = load_material(settings.material)
     both = pair.bushing.wear_coefficient, pair.journal.wear_coefficient
-    if settings.wear_coefficient != pair.wear_coefficients or None in both:
+    if settings.wear_coefficient != pair.wear_coefficients or not any(both):
         return None
-    spreads = [side.spread for side in both if side is not None]
+    spreads = [side.spread if side is not None else None for side in both]
     if not any(spreads):
         return None
     known = [usual if spread is None else spread.si for spread in spreads]

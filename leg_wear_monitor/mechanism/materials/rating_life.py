@@ -1,7 +1,8 @@
-"""SKF's basic rating life of a bushing, beside which a life by Archard's law can be held.
+"""A maker's rating life of a bushing, beside which a life by Archard's law can be held.
 
-SKF, Plain bearings, Calculation example: G_h = c1 c2 c3 c4 c5 K_M / (p v)^n, with p in N/mm^2, v in m/s and
-the life in h. The factors are read from SKF's diagrams: load, speed, temperature, roughness, kind of load.
+SKF, Plain bearings, Calculation example, and Federal-Mogul, GLYCODUR, Nominal service life:
+G_h = c1 c2 c3 c4 c5 K_M / (p v)^n, with p in N/mm^2, v in m/s and the life in h. The factors are read from
+the makers' diagrams: load, speed, temperature, roughness, kind of load.
 """
 
 import math
@@ -25,7 +26,7 @@ def mean_sliding_speed(bore_m: float, half_angle_rad: float, frequency_hz: float
 def rating_life_hours(
     pressure_speed: float, constants: RatingLife, factors: tuple[float, ...] = (1.0, 1.0, 1.0, 1.0, 1.0)
 ) -> float:
-    """Basic rating life G_h [h].
+    """Basic rating life G_h [h]; NaN above the p v for which the constants hold.
 
     Parameters
     ----------
@@ -36,6 +37,9 @@ def rating_life_hours(
     factors : tuple of float
         c1 to c5.
     """
+    largest = constants.largest_pressure_speed
+    if largest is not None and pressure_speed > largest.si:
+        return math.nan
     inserted = 1.0e-6 * max(pressure_speed, constants.least_pressure_speed.si)
     divided_by: float = inserted**constants.exponent.si
     return math.prod(factors) * constants.constant.si / divided_by

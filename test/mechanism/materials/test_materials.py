@@ -34,7 +34,7 @@ def test_every_number_of_every_file_has_a_source(name: str) -> None:
         if not isinstance(part, dict):
             return 0
         assert not any(isinstance(key, int | float) for key in part)
-        own = [entry for entry in part.values() if isinstance(entry, int | float | list)]
+        own = [each for each in part.values() if isinstance(each, int | float | list) and each is not False]
         if own:
             assert part["source"].strip()
             assert part["conditions"].strip()
@@ -59,8 +59,9 @@ def test_micrometres_per_kilometre_at_a_megapascal() -> None:
 
 
 def test_inch_units_of_the_makers_page_are_its_metric_ones() -> None:
-    """RTP gives its tests of acetal in 1e-10 in^3 min/(lbf ft h) and in 1e-8 mm^3/(N m), rounded."""
-    for inch, metric in ((13, 26), (132, 265), (61, 122), (228, 459), (4, 8), (149, 300)):
+    """RTP, Quadrant: 1e-10 in^3 min/(lbf ft h) and 1e-8 mm^3/(N m) of the same test, rounded."""
+    pairs = ((13, 26), (132, 265), (61, 122), (228, 459), (4, 8), (149, 300), (80, 161), (35, 70.5))
+    for inch, metric in pairs:
         rounding = 0.5e-10 * UNITS["in^3 min/(lbf ft h)"].factor + 0.5e-8 * 1.0e-9
         difference = wear(inch * 1.0e-10, "in^3 min/(lbf ft h)") - wear(metric * 1.0e-8, "mm^3/(N m)")
         assert abs(difference) < rounding
@@ -114,6 +115,19 @@ def test_a_pair_with_one_unknown_side_has_no_coefficient() -> None:
     pair = lw.load_material("ferritic-stainless-on-steel-dry")
     assert pair.bushing.wear_coefficient is not None
     assert pair.wear_coefficients is None
+
+
+def test_a_side_whose_wear_is_not_counted_has_none() -> None:
+    """Closed form of the unit: 1 in^3 over 1 lbf at 1 ft/min for 1 h, which is 60 ft."""
+    pair = lw.load_material("pa66-on-steel-dry")
+    volume, work = 80e-10 * 0.0254**3, 4.4482216152605 * 60.0 * 0.3048
+    assert pair.journal.wear_coefficient is None
+    assert pair.wear_coefficients == (pytest.approx(volume / work), 0.0)
+
+
+def test_at_least_ten_pairs_with_a_makers_coefficient() -> None:
+    known = [name for name in lw.materials() if lw.load_material(name).wear_coefficients is not None]
+    assert len([name for name in known if not name.startswith("steel-")]) >= 14
 
 
 PAIR = """

@@ -10,6 +10,7 @@ from ruamel.yaml import YAML
 import leg_wear_monitor as lw
 from leg_wear_monitor.life.life import LifeRun
 from leg_wear_monitor.mechanism.loader import parse_mechanism, shipped_mechanisms
+from leg_wear_monitor.mechanism.materials.load import bushing_of
 from leg_wear_monitor.mechanism.materials.of_joints import regimes
 from leg_wear_monitor.mechanism.plausible import doubts
 from leg_wear_monitor.monitor.ledger.binding import fingerprint
@@ -66,15 +67,24 @@ def test_a_value_beside_the_pair_comes_first() -> None:
 
 
 def test_a_pair_with_limits_only_does_not_take_the_coefficient_of_another() -> None:
-    limited = leg(A={}, G={"material": "du-on-steel-dry"})
+    limited = leg(A={}, G={"material": "du-on-steel-dry"}, I={"material": "du-on-steel-dry"})
     assert limited.clearances["G"].wear_coefficient == (0.0, 0.0)
     (doubt,) = doubts(limited)
-    assert "du-on-steel-dry gives no wear coefficient" in str(doubt)
+    assert "clearances (G, I): material: du-on-steel-dry gives no wear coefficient" in str(doubt)
     with pytest.raises(lw.ConfigError) as caught:
-        LifeRun(limited)
+        LifeRun(limited, clearances=["G", "I"])
     line = str(caught.value)
     assert "\n" not in line
     assert "clearances.joints.G.wear_coefficient: is missing for a life: du-on-steel-dry" in line
+
+
+def test_joints_that_swing_have_limits_of_their_own() -> None:
+    """iglidur H: 196 ft/min where it turns, 137 ft/min where it swings; A and B are the crank's."""
+    limited = leg({"material": "iglidur-h-on-steel"})
+    speeds = {joint: bushing_of(limited, joint).sliding_speed_mps for joint in limited.clearances}
+    assert speeds["G"] == pytest.approx(137 * 0.3048 / 60)
+    turning = {joint for joint in speeds if speeds[joint] == pytest.approx(196 * 0.3048 / 60)}
+    assert turning == {joint for joint in speeds if limited.drive.body in limited.sides(joint)} != set()
 
 
 def test_the_joints_by_what_their_wear_holds_for() -> None:
@@ -82,7 +92,7 @@ def test_the_joints_by_what_their_wear_holds_for() -> None:
     mixed = leg(A={}, B={}, G={"material": "du-on-steel-dry"}, I=beside)
     assert regimes(mixed, mixed.clearance_joints) == {
         "steel-on-steel-greased-mild (greased, mild), wear coefficient 1e-15 1/Pa": ["A", "B"],
-        "du-on-steel-dry (dry), wear coefficient not known": ["G"],
+        "du-on-steel-dry (dry), wear coefficient not known: not counted": ["G"],
         "a value beside du-on-steel-dry (dry), wear coefficient 1e-16 and 0 1/Pa": ["I"],
     }
     bare = lw.load_mechanism("four_bar")

@@ -29,6 +29,15 @@ def test_the_published_example() -> None:
     assert hours == pytest.approx(22_500.0, rel=2.0e-3)
 
 
+def test_the_constants_hold_for_their_range_only() -> None:
+    """GLYCODUR A: K_M 1900, n 1 up to 1 MPa m/s, at least 0.1 inserted."""
+    constants = lw.load_material("glycodur-a-on-steel").rating_life
+    assert constants is not None
+    hours = [rating_life_hours(1.0e6 * pv, constants) for pv in (0.05, 0.1, 0.5, 1.0)]
+    assert hours == pytest.approx([19_000.0, 19_000.0, 3800.0, 1900.0])
+    assert math.isnan(rating_life_hours(1.01e6, constants))
+
+
 def test_above_the_least_value_the_life_falls_with_p_v() -> None:
     constants = lw.load_material("skf-ptfe-composite-on-steel").rating_life
     assert constants is not None

@@ -10,15 +10,16 @@ from pathlib import Path
 import numpy as np
 
 from leg_wear_monitor.bags.budget import Budget
-from leg_wear_monitor.bags.findings import Finding, RecordingError, Severity
+from leg_wear_monitor.bags.findings import DamageError, Finding, RecordingError, Severity
 from leg_wear_monitor.bags.mcap.file import Due, Piece
 from leg_wear_monitor.bags.mcap.layout import Channel
-from leg_wear_monitor.bags.sqlite.database import UNREADABLE, one_line, open_database
+from leg_wear_monitor.bags.sqlite.database import UNREADABLE, allow_rows, one_line, open_database
 from leg_wear_monitor.messages.cdr import MESSAGE
 
 _Row = tuple[int, int, int]  # id, time, topic
 _TOGETHER = 4096
 _MOST_TOPICS = 65536
+_OF_A_ROW, _OF_A_CHARACTER = 1000, 16  # memory of a topic or definition, with its copies and escapes [bytes]
 _NO_CHECKSUMS = "has no checksums, like all .db3 files: a damaged number would not be detected"
 
 
@@ -48,12 +49,11 @@ class SqliteFile:
         self.findings += [Finding(path, note, Severity.NOTE) for note in notes]
         try:
             self.size = file.stat().st_size
-            self.channels = _channels(self._database)
-            self._counts: dict[object, int] = dict(
-                self._database.execute(
-                    "SELECT topic_id, COUNT(*) FROM messages NOT INDEXED GROUP BY topic_id"
-                )
-            )
+            self.channels = _channels(self._database, budget)
+            allow_rows(self._database, budget)
+            self._counts = _counts(self._database)
+        except DamageError as error:
+            raise RecordingError(str(path), "", str(error)) from error
         except (*UNREADABLE, OSError) as error:
             raise RecordingError(str(path), "", f"is not a readable .db3 file: {one_line(error)}") from error
         self._found = 0
@@ -131,18 +131,52 @@ class SqliteFile:
             self.findings.append(Finding(self.path, text))
 
 
-def _channels(database: sqlite3.Connection) -> dict[int, Channel]:
-    """Channels by topic number, with the definitions of their types if the file has them."""
-    tables = {name for (name,) in database.execute("SELECT name FROM sqlite_master WHERE type = 'table'")}
+def _counts(database: sqlite3.Connection) -> dict[int | None, int]:
+    """Number of messages by topic number; None where that is no integer.
+
+    Raises
+    ------
+    DamageError
+        If there are more topics than anybody has.
+    """
+    number = "CASE WHEN typeof(topic_id) = 'integer' THEN topic_id END"
+    query = f"SELECT {number}, COUNT(*) FROM messages NOT INDEXED GROUP BY 1 LIMIT ?"
+    counts = dict(database.execute(query, (_MOST_TOPICS + 1,)).fetchall())
+    if len(counts) > _MOST_TOPICS:
+        raise DamageError(f"has messages of more than {_MOST_TOPICS} topics")
+    return counts
+
+
+def _channels(database: sqlite3.Connection, budget: Budget) -> dict[int, Channel]:
+    """Channels by topic number, with the definitions of their types if the file has them.
+
+    Raises
+    ------
+    DamageError
+        If their texts do not fit into memory.
+    """
     texts: dict[str, tuple[str, str]] = {}
-    if "message_definitions" in tables:
-        query = "SELECT topic_type, encoding, encoded_message_definition FROM message_definitions LIMIT ?"
-        for name, encoding, text in database.execute(query, (_MOST_TOPICS,)):
+    query = "SELECT 1 FROM sqlite_master WHERE type = 'table' AND name = 'message_definitions'"
+    size = 0
+
+    def rows(query: str) -> Iterator[tuple[object, ...]]:
+        nonlocal size
+        for row in database.execute(f"{query} LIMIT ?", (_MOST_TOPICS + 1,)):
+            size += _OF_A_ROW + _OF_A_CHARACTER * sum(
+                len(text) for text in row if isinstance(text, str | bytes)
+            )
+            budget.check(size)
+            yield row
+
+    if database.execute(query).fetchone():
+        query = "SELECT topic_type, encoding, encoded_message_definition FROM message_definitions"
+        for name, encoding, text in rows(query):
             texts[str(name)] = str(encoding), str(text)
     channels = {}
-    query = "SELECT id, name, type, serialization_format FROM topics LIMIT ?"
-    for number, name, kind, encoding in database.execute(query, (_MOST_TOPICS,)):
+    for number, name, kind, encoding in rows("SELECT id, name, type, serialization_format FROM topics"):
         definition_encoding, text = texts.get(str(kind), ("ros2msg", ""))
         if isinstance(number, int):
             channels[number] = Channel(str(name), str(kind), str(encoding), text, definition_encoding)
+    if len(channels) > _MOST_TOPICS:
+        raise DamageError(f"has more than {_MOST_TOPICS} topics")
     return channels

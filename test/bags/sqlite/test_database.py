@@ -98,6 +98,85 @@ def test_another_schema_is_refused_and_not_carried_out(path: Path, read: Any, st
         read(path)
 
 
+_ENDLESS = (
+    "AS WITH RECURSIVE n(i) AS (SELECT 1 UNION ALL SELECT i + 1 FROM n) "
+    "SELECT i AS id, 1 AS topic_id, i AS timestamp, x'00' AS data FROM n"
+)
+# a table without a text is passed over, and beside an index of its name it is no error
+_BESIDE = f"""
+ALTER TABLE messages RENAME TO hidden; CREATE VIEW seen {_ENDLESS}; CREATE INDEX i ON hidden(id);
+PRAGMA writable_schema = ON;
+INSERT INTO sqlite_master VALUES ('table', 'messages', 'messages', 3, '');
+UPDATE sqlite_master SET name = 'MESSAGES', tbl_name = 'MESSAGES',
+    sql = 'CREATE VIEW MESSAGES {_ENDLESS.replace(chr(39), 2 * chr(39))}' WHERE name = 'seen';
+UPDATE sqlite_master SET name = 'messages', sql = 'CREATE INDEX messages ON hidden(id)' WHERE name = 'i'
+"""
+_NUMBERS = "WITH RECURSIVE n(i) AS (SELECT 10 UNION ALL SELECT i + 1 FROM n WHERE i < {}) "
+
+
+@pytest.mark.parametrize(
+    ("statements", "fault"),
+    [
+        (_BESIDE, "it has no table messages, or not a plain one"),
+        (
+            "DROP TABLE topics; CREATE VIRTUAL TABLE topics USING fts5(id, name, type)",
+            "no table topics, or not a plain one",
+        ),
+        ("UPDATE topics SET name = hex(zeroblob(20000000))", "too big"),
+        (
+            f"{_NUMBERS.format(30000)} INSERT INTO topics "
+            "SELECT i, hex(zeroblob(1000)), 't', 'cdr', '', '' FROM n",
+            "needs [0-9]+ MB to be read",
+        ),
+        (
+            f"{_NUMBERS.format(66000)} INSERT INTO messages SELECT i + 100000, i, i, x'' FROM n",
+            "has messages of more than 65536 topics",
+        ),
+        (f"CREATE TABLE wide ({', '.join(f'c{k}' for k in range(100))})", "too many columns"),
+    ],
+    ids=["a view beside a table", "a virtual table", "a name", "names", "topic numbers", "a wide table"],
+)
+def test_a_hostile_schema_is_one_line(path: Path, read: Any, statements: str, fault: str) -> None:
+    with closing(sqlite3.connect(path)) as database, database:
+        database.executescript(statements)
+    with pytest.raises(RecordingError, match=fault) as caught:
+        read(path)
+    assert str(caught.value).isprintable()
+
+
+def test_a_tree_whose_branches_meet_again_ends(path: Path, read: Any) -> None:
+    """All branches lead to one: a few pages with more rows than anybody can count."""
+    with closing(sqlite3.connect(path)) as database, database:
+        database.execute("PRAGMA page_size = 512")
+        database.execute("VACUUM")
+        rows = [(k + 10**6, 1, k, b"x" * 300) for k in range(20000)]
+        database.executemany("INSERT INTO messages VALUES (?, ?, ?, ?)", rows)
+        database.commit()
+        (root,) = database.execute("SELECT rootpage FROM sqlite_master WHERE name = 'messages'").fetchone()
+    content = bytearray(path.read_bytes())
+    size = int.from_bytes(content[16:18], "big")
+
+    def branches(page: int) -> list[int]:
+        """Places of the pointers of a page; none of a leaf's."""
+        begin = (page - 1) * size
+        if content[begin] != 5:
+            return []
+        cells = [begin + 12 + 2 * k for k in range(int.from_bytes(content[begin + 3 : begin + 5], "big"))]
+        return [begin + int.from_bytes(content[cell : cell + 2], "big") for cell in cells] + [begin + 8]
+
+    page = root
+    while places := branches(page):
+        below = content[places[-2] : places[-2] + 4]
+        for place in places:
+            content[place : place + 4] = below
+        page = int.from_bytes(below, "big")
+    path.write_bytes(content)
+    try:
+        assert losses(read(path)[1])
+    except RecordingError as error:
+        assert "reading it takes more work than its size explains" in str(error)
+
+
 def test_without_an_index_of_time_the_order_is_the_same(
     path: Path, sent: Any, expected: Any, read: Any
 ) -> None:

@@ -12,11 +12,22 @@ NAMES = sorted(path.stem for path in (ROOM / "families").glob("[a-z]*.py"))
 
 
 # Of the first seeds: some of each kind where kinds follow one another from seed to seed.
-FEW = {"configurations": 16, "floods": 2, "kills": 1, "ledgers": 13, "live_kills": 1, "recordings": 10}
+FEW = {
+    "configurations": 16,
+    "databases": 19,
+    "floods": 2,
+    "kills": 1,
+    "ledgers": 13,
+    "live_kills": 1,
+    "parquet": 10,
+    "recordings": 10,
+    "workers": 2,
+}
 
 
-# Left to `make test-slow` and `make campaign`: test/monitor/ledger/test_kill.py holds their law in less time.
-LONG = {"kills", "live_kills"}
+# Left to `make test-slow` and `make campaign`: other tests hold their laws in less time
+# (test/monitor/ledger/test_kill.py, test/test_beside.py).
+LONG = {"kills", "live_kills", "workers"}
 
 
 def run(name: str, *how_many: str) -> None:

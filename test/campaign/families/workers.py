@@ -1,0 +1,61 @@
+"""Worker processes in a directory of traps, some of which are killed: the same results, nothing imported."""
+
+import operator
+import os
+import signal
+import sys
+from pathlib import Path
+
+import numpy as np
+
+from campaign.case import Case, Outcome
+from leg_wear_monitor.workers.job import Job
+from leg_wear_monitor.workers.processes import run_in_processes
+
+SHORT, LONG = 4, 60
+
+_JOBS = 20
+_NAMES = sorted({*sys.stdlib_module_names, "leg_wear_monitor", "loky", "numba", "numpy", "sitecustomize"})
+
+
+def warm() -> None:
+    """Nothing: a child starts its own."""
+
+
+def _die_once(mark: str, number: int) -> int:
+    """Kill the worker at the first call."""
+    if not Path(mark).exists():
+        Path(mark).touch()
+        os.kill(os.getpid(), signal.SIGKILL)
+    return number + 1
+
+
+def case(seed: int) -> Case:
+    """A pool of one to three workers, one of which dies in every second case."""
+    rng = np.random.default_rng(seed)
+    traps = [name for name in _NAMES if rng.random() < rng.choice([0.02, 0.5, 1.0])]
+    workers, dies = 1 + int(rng.integers(3)), bool(seed % 2)
+
+    def prepare(directory: Path) -> None:
+        for name in traps:
+            (directory / f"{name}.py").write_text(
+                f"open({str(directory / 'told')!r}, 'a').write({name!r} + ' ')"
+            )
+
+    def run(directory: Path) -> tuple[Outcome, str]:
+        sys.path[:] = [path for path in sys.path if path]
+        jobs = [Job(f"{k}", operator.add, (k, 1)) for k in range(_JOBS)]
+        if dies:
+            jobs[-1] = Job(f"{_JOBS - 1}", _die_once, (str(directory / "died"), _JOBS - 1))
+        found: dict[str, int] = {}
+        run_in_processes(jobs, workers, lambda job, result: found.update({job.key: result}))
+        if (told := directory / "told").exists():
+            return Outcome.SILENT, f"imported {told.read_text()}"
+        is_all = found == {f"{k}": k + 1 for k in range(_JOBS)}
+        return (Outcome.SOUND, "") if is_all else (Outcome.SILENT, f"results {found}")
+
+    return Case(
+        description=f"{workers} workers, {len(traps)} traps{', one dies' if dies else ''}",
+        run=run,
+        prepare=prepare,
+    )

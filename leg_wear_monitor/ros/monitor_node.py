@@ -24,6 +24,7 @@ from leg_wear_monitor.messages.streams import STREAMS
 from leg_wear_monitor.monitor.alarms.alarm import Alarm
 from leg_wear_monitor.monitor.alarms.words import ADVICE
 from leg_wear_monitor.monitor.config.fitting import check_limits
+from leg_wear_monitor.monitor.config.plausible import acceleration_doubts
 from leg_wear_monitor.monitor.config.settings import MonitorConfig
 from leg_wear_monitor.monitor.opening import open_monitor
 from leg_wear_monitor.monitor.reports import Reports
@@ -107,6 +108,8 @@ class MonitorNode(ClosingNode):
         self.create_timer(config.diagnostics.period_s, self._diagnose, clock=steady)
         joints, leg = ", ".join(self._monitor.clearance_joints), self._monitor.mechanism.name
         self.get_logger().info(f"monitoring joints {joints} of {leg}")
+        for doubt in acceleration_doubts(config):
+            self.get_logger().warning(str(doubt))
 
     @property
     def monitor(self) -> WearMonitor:

@@ -109,6 +109,14 @@ def test_a_fault_is_one_clear_line(written, text, fault):
     assert len(str(found.value).splitlines()) == 1
 
 
+def test_accelerated_wear_is_said(written, tmp_path):
+    (tmp_path / "m.yaml").write_text("/**:\n  ros__parameters:\n    wear_acceleration: 10.0\n")
+    with pytest.warns(
+        ConfigWarning, match=r"m.yaml: wear_acceleration: .* by 10: .*; legs with it are not ranked"
+    ):
+        load_fleet(written(f"defaults: {{config: m.yaml}}\nlegs: [{LEG}]"))
+
+
 def test_two_legs_in_one_recording_have_a_topic_each(written):
     legs = ", ".join(f'{{id: {s}, recordings: "a/*", joint_states: /{s}/joint_states}}' for s in "lr")
     assert [leg.joint_states for leg in load_fleet(written(f"legs: [{legs}]")).legs] == [

@@ -100,6 +100,11 @@ def test_what_was_understood_has_units(linkage_of, leg):
 
 PARAMETERS = [
     ({"cadence.commanded_rpm": 6.2832}, "cadence.commanded_rpm: 6.2832 rpm is 9.55 s", "is 60 rpm"),
+    (
+        {"wear_acceleration": 5000.0},
+        "multiplies all wear by 5000: a demonstration",
+        "above 1000, the walls get",
+    ),
     ({"crank.offset_rad": 90.0}, "crank.offset_rad: 90 rad", "degrees for rad?"),
     ({"limits.clearance_m": 2e-4}, "limits.clearance_m: 0.0002 m is not above the new clearance", "A"),
     ({"limits.impact_force_n": 1.5}, "limits.impact_force_n: 1.5 N", "kN for N?"),

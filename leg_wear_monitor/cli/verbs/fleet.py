@@ -174,6 +174,8 @@ def _print_counts(done: "FleetUpdate", out: Path) -> None:
     overview = load_overview(out)
     states = [f"{number} {state.replace('_', ' ')}" for state, number in overview.counts.items() if number]
     click.echo(f"legs: {', '.join(states)}")
+    if demonstrations := [leg.id for leg in overview.legs if leg.is_accelerated]:
+        click.echo(f"accelerated wear, not ranked: {', '.join(demonstrations)}")
     for name in overview.first:
         verdict = overview.leg(name).verdict
         if verdict:

@@ -6,6 +6,7 @@ from typing import TYPE_CHECKING, Any
 
 import click
 
+from leg_wear_monitor.cli.doubts import warn_of
 from leg_wear_monitor.cli.main import version
 from leg_wear_monitor.cli.options import config_option, json_option, out_option, sample_option
 from leg_wear_monitor.cli.output import STDOUT, check_outputs, write_directory, write_json
@@ -165,8 +166,10 @@ def _config(path: Path | None, crank_joint: str | None, node: str | None) -> "Mo
     import attrs
 
     from leg_wear_monitor.monitor.config.parameter_file import load_config
+    from leg_wear_monitor.monitor.config.plausible import acceleration_doubts
 
     config = load_config(path, node)
+    warn_of(str(path or "parameters"), acceleration_doubts(config))
     return config if crank_joint is None else attrs.evolve(config, crank_joint=crank_joint)
 
 

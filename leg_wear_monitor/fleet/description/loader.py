@@ -15,6 +15,7 @@ from leg_wear_monitor.fleet.description.spec import FleetFile, LegEntry, listed
 from leg_wear_monitor.mechanism.loader import is_file_name, load_mechanism, read_yaml
 from leg_wear_monitor.monitor.config.fitting import fitted
 from leg_wear_monitor.monitor.config.parameter_file import load_config
+from leg_wear_monitor.monitor.config.plausible import acceleration_doubts
 from leg_wear_monitor.monitor.config.settings import MonitorConfig
 
 
@@ -39,7 +40,7 @@ def load_fleet(path: str | Path) -> FleetDescription:
     Warns
     -----
     ConfigWarning
-        For each pattern that matches no recording.
+        For each pattern that matches no recording, and for accelerated wear.
     """
     source, home = str(path), Path(path).resolve().parent
     file: FleetFile = structure(read_yaml(Path(path), source), FleetFile, source, "")
@@ -91,6 +92,9 @@ def _config(home: Path, name: str, node: str, source: str) -> MonitorConfig:
     if is_file_name(Path(config.mechanism)):
         config = attrs.evolve(config, mechanism=str(Path(config.mechanism).absolute()))
     fitted(load_mechanism(config.mechanism), config)
+    for doubt in acceleration_doubts(config, most=1.0):
+        text = f"{home / name}: {doubt}; legs with it are not ranked, and others learn nothing from them"
+        warnings.warn(text, ConfigWarning, stacklevel=3)
     return config
 
 

@@ -58,6 +58,10 @@ def learn_fleet(legs: Sequence[FleetLeg], out: Path) -> FleetLearning:
     parts: list[Part] = []
     findings = []
     for leg in sorted(legs, key=lambda leg: leg.id):
+        if leg.config.wear_acceleration != 1.0:
+            if measurements_of(ledgers[leg.id]):
+                findings.append((leg.id, "nothing is learned from it: its wear is accelerated"))
+            continue
         try:
             parts += leg_parts(leg, ledgers[leg.id])
         except LegWearError as error:

@@ -34,7 +34,8 @@ def leg_overview(
     lines = {line["key"]: line for line in directory.lines()}  # the last one of each recording
     counted = [line for line in lines.values() if line["outcome"] == Outcome.COUNTED.value]
     health = _health(lines.values(), counted, len(leg.recordings))
-    now = LegOverview(id=leg.id, lot=leg.lot, recordings=health, fault=fault)
+    factor = leg.config.wear_acceleration
+    now = LegOverview(id=leg.id, lot=leg.lot, recordings=health, fault=fault, wear_acceleration=factor)
     if counted:
         source = str(directory.records)
         joints = structure(counted[-1]["clearances"], dict[str, JointClearance], source, "clearances")

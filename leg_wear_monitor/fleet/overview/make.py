@@ -48,8 +48,15 @@ def counts_of(legs: Iterable[LegOverview]) -> dict[str, int]:
 
 
 def first_of(legs: Iterable[LegOverview]) -> tuple[str, ...]:
-    """Legs that need a person first: by state, then by what is left of their life, then by clearance."""
-    asking = [leg for leg in legs if leg.verdict and leg.verdict.state is not State.HEALTHY]
+    """Legs that need a person first: by state, then by what is left of their life, then by clearance.
+
+    Legs with accelerated wear are left out.
+    """
+    asking = [
+        leg
+        for leg in legs
+        if leg.verdict and leg.verdict.state is not State.HEALTHY and not leg.is_accelerated
+    ]
     return tuple(leg.id for leg in sorted(asking, key=urgency)[:_FIRST])
 
 

@@ -122,6 +122,8 @@ class LegOverview:
         The recordings of the leg.
     fault : str
         Why the last update could not count all of its recordings; empty if it could.
+    wear_acceleration : float
+        Factor on all of its wear; other than 1 in demonstrations, which are not ranked.
     """
 
     id: str
@@ -133,6 +135,12 @@ class LegOverview:
     change: LegChange = attrs.Factory(LegChange)
     recordings: RecordingHealth = attrs.Factory(RecordingHealth)
     fault: str = ""
+    wear_acceleration: float = 1.0
+
+    @property
+    def is_accelerated(self) -> bool:
+        """Whether its wear is that of a demonstration, which is compared with no leg."""
+        return self.wear_acceleration != 1.0
 
     @property
     def state(self) -> str:

@@ -8,10 +8,23 @@ from leg_wear_monitor.mechanism.plausible import Doubt
 from leg_wear_monitor.mechanism.spec import Mechanism
 from leg_wear_monitor.monitor.config.settings import MonitorConfig
 
+MOST_ACCELERATION = 1000.0  # that of the demonstration, config/demo.yaml; 5000 gave healthy legs 331 kN
+
 
 def parameter_doubts(config: MonitorConfig, leg: Mechanism) -> tuple[Doubt, ...]:
     """All doubtful values of a configuration, for the mechanism that `fitted` returned."""
-    return (*_gait(config), *_limits(config, leg), *_clearances(config, leg))
+    return (*_gait(config), *_limits(config, leg), *_clearances(config, leg), *acceleration_doubts(config))
+
+
+def acceleration_doubts(config: MonitorConfig, most: float = MOST_ACCELERATION) -> tuple[Doubt, ...]:
+    """A factor on all wear above ``most``, or below its inverse."""
+    factor = config.wear_acceleration
+    if 1.0 / most <= factor <= most:
+        return ()
+    text = f"multiplies all wear by {factor:g}: a demonstration, whose clearances and lives are no leg's"
+    if factor > MOST_ACCELERATION:
+        text += f"; above {MOST_ACCELERATION:g}, the walls get notches and impacts become too strong"
+    return (Doubt("wear_acceleration", text),)
 
 
 def _gait(config: MonitorConfig) -> Iterator[Doubt]:

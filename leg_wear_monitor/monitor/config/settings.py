@@ -239,9 +239,9 @@ class MonitorConfig:
     )
     wear_acceleration: float = quantity(
         "",
-        "factor on all wear; other than 1 for demonstrations only",
+        "factor on all wear; other than 1 for demonstrations only, above 1000 with a warning",
         at_least=1.0e-9,
-        at_most=1.0e9,
+        at_most=1.0e5,
         default=1.0,
     )
     crank_joint: str = described("name of the crank in joint_states", default="crank", check=_filled)

@@ -29,7 +29,7 @@ def growth(leg: LegOverview) -> tuple[float, str] | None:
 
 def change_section(legs: Sequence[LegOverview]) -> Section:
     """Legs whose verdict changed, and the joints that wore most, since the update before."""
-    changed = [leg for leg in legs if was(leg)]
+    changed = [leg for leg in legs if was(leg) and not leg.is_accelerated]
     worse = [leg for leg in changed if _step(leg) > 0]
     grown = sorted(
         ((*rise, leg.id) for leg in legs if (rise := growth(leg)) and rise[0] > 0.0),

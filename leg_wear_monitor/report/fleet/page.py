@@ -22,7 +22,9 @@ _GROUPS = (
     ("to look at", (Standing.INSPECT, Standing.WATCH)),
     ("unmonitored", _UNWATCHED),
     ("well", (Standing.HEALTHY,)),
+    ("demonstrations", (Standing.DEMONSTRATION,)),
 )
+_CALM = (Standing.HEALTHY, Standing.DEMONSTRATION)
 
 
 def fleet_page(
@@ -74,7 +76,7 @@ def counts(legs: Sequence[LegOverview], day: Day) -> dict[Standing, int]:
 
 def first_legs(legs: Sequence[LegOverview], day: Day) -> list[LegOverview]:
     """The up to ten legs that need a person first."""
-    return by_urgency((leg for leg in legs if day.standing(leg) is not Standing.HEALTHY), day)[:_FIRST]
+    return by_urgency((leg for leg in legs if day.standing(leg) not in _CALM), day)[:_FIRST]
 
 
 def _banner(overview: FleetOverview, day: Day) -> Banner:
@@ -85,7 +87,12 @@ def _banner(overview: FleetOverview, day: Day) -> Banner:
     return Banner(
         symbol=worst.symbol,
         word=f"{number} of {len(overview.legs)} {words}".upper(),
-        text=", ".join(f"{sum(found[each] for each in group)} {words}" for words, group in _GROUPS) + ".",
+        text=", ".join(
+            f"{number} {words}"
+            for words, group in _GROUPS
+            if (number := sum(found[each] for each in group)) or Standing.DEMONSTRATION not in group
+        )
+        + ".",
         notes=[
             ("In detail", ", ".join(f"{found[each]} {each.value}" for each in reversed(Standing))),
             (
@@ -102,7 +109,7 @@ def _first(legs: Sequence[LegOverview], day: Day, pages: Container[str]) -> Part
     cards = [_card(leg, day, leg.id in pages) for leg in first_legs(legs, day)]
     if not cards:
         return Text("No leg needs a person now.")
-    asking = sum(day.standing(leg) is not Standing.HEALTHY for leg in legs)
+    asking = sum(day.standing(leg) not in _CALM for leg in legs)
     return Fragment(render("fleet/first.html", cards=cards, more=asking - len(cards)))
 
 

@@ -25,7 +25,7 @@ def table_data(
         Ids of the legs that have a page of their own.
     """
     rank = {leg.id: number for number, leg in enumerate(by_urgency(legs, day))}
-    lives = [leg.life["leg"] for leg in legs if leg.life.get("leg")]
+    lives = [leg.life["leg"] for leg in legs if leg.life.get("leg") and not leg.is_accelerated]
     return {
         "joints": list(joints),
         "life_h": [
@@ -44,6 +44,8 @@ def page_address(name: str) -> str:
 def _row(leg: LegOverview, joints: Sequence[str], day: Day, rank: int, has_page: bool) -> dict[str, Any]:
     standing, used, age = day.standing(leg), valid_used(leg), day.age_days(leg)
     life, health, rise = leg.life.get("leg"), leg.recordings, growth(leg)
+    if leg.is_accelerated:
+        life = None
     doubt = day.doubt(leg)
     why = "; ".join(filter(None, [leg.verdict.why if leg.verdict else "", doubt]))
     return {

@@ -17,6 +17,7 @@ _AHEAD_NS = DAY_NS  # clocks of two machines, and time zones that somebody forgo
 class Standing(Enum):
     """Standing of a leg, from the mildest to the most severe."""
 
+    DEMONSTRATION = "demonstration"
     HEALTHY = "healthy"
     WATCH = "watch"
     UNKNOWN = "no recording"
@@ -66,6 +67,8 @@ class Day:
 
     def doubt(self, leg: LegOverview) -> str:
         """Why the verdict of a leg cannot be relied on today; empty if it can."""
+        if leg.is_accelerated:
+            return f"all wear is multiplied by {leg.wear_acceleration:g}: a demonstration, not ranked"
         if leg.fault:
             return f"the last update could not count all of its recordings: {leg.fault}"
         age = self.age_days(leg)
@@ -80,6 +83,8 @@ class Day:
 
     def standing(self, leg: LegOverview) -> Standing:
         """Standing of a leg; a healthy leg without a fresh recording is outdated."""
+        if leg.is_accelerated:
+            return Standing.DEMONSTRATION
         if leg.verdict is None:
             return Standing.UNKNOWN
         if leg.verdict.state is State.HEALTHY and self.doubt(leg):

@@ -10,12 +10,14 @@ BANDS = (0.25, 0.5, 0.8, 1.0)
 
 
 def valid_used(leg: LegOverview) -> dict[str, float | None]:
-    """Fraction of each joint's clearance that is used up; None where it is not valid.
+    """Fraction of each joint's clearance that is used up; None where it is not valid, or wear is accelerated.
 
     While the counted clearances are not valid, only those of the verdict's joints are, as measurements show
     them: those of the others are estimated from the counted leg.
     """
     verdict = leg.verdict
+    if leg.is_accelerated:
+        return dict.fromkeys(leg.used_fraction)
     if verdict is None or Figure.CLEARANCES not in verdict.not_valid:
         return dict(leg.used_fraction)
     return {

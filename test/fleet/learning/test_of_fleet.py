@@ -79,6 +79,15 @@ def test_a_ledger_that_cannot_be_read_is_named_and_the_others_are_used(tmp_path)
     assert read_priors(str(found.priors["new"])).joints["A"].present.basis == "1 part of lot 2026-03"
 
 
+def test_a_leg_with_accelerated_wear_teaches_nothing(tmp_path):
+    fast = leg("fast")
+    fast = attrs.evolve(fast, config=attrs.evolve(fast.config, wear_acceleration=5000.0))
+    measured(tmp_path, fast, 4.2e-4)
+    found = learn_fleet([fast, leg("new")], tmp_path)
+    assert dict(found.pairs) == {}
+    assert found.findings == (("fast", "nothing is learned from it: its wear is accelerated"),)
+
+
 def test_where_nobody_ever_measured_no_ledger_is_copied(tmp_path, monkeypatch):
     legs = [leg("a"), leg("b")]
     for one in legs:

@@ -9,6 +9,7 @@ import pytest
 from html_reader import read
 from made_up_fleet import DAY_NS, NOW_NS, made_up_fleet, made_up_leg, random_fleet
 
+from leg_wear_monitor.fleet.overview.make import first_of
 from leg_wear_monitor.fleet.overview.parts import BadRecording, LegChange, LegOverview
 from leg_wear_monitor.monitor.verdict.verdict import Figure, State
 from leg_wear_monitor.playback.result.condition import JointClearance
@@ -42,6 +43,7 @@ def test_the_counts_sum_up():
     fleet = random_fleet(300)
     found = counts(fleet.legs, DAY)
     assert sum(found.values()) == 300
+    assert found.pop(Standing.DEMONSTRATION) == 0
     assert all(number > 0 for number in found.values())  # otherwise this shows nothing
     text = words_of(read(page_html(fleet_page(fleet, DAY))))
     told = re.search(r"(\d+) must stop, (\d+) to look at, (\d+) unmonitored, (\d+) well\.", text)
@@ -51,7 +53,29 @@ def test_the_counts_sum_up():
     assert well == found[Standing.HEALTHY] == fleet.counts["healthy"] - found[Standing.OUTDATED]
     assert stop + look + blind + well == 300
     rows = data_of(page_html(fleet_page(fleet, DAY)))["legs"]
-    assert [sum(row["standing"] == each.value for row in rows) for each in Standing] == list(found.values())
+    assert [sum(row["standing"] == each.value for row in rows) for each in found] == list(found.values())
+
+
+def test_a_demonstration_is_named_and_compared_with_no_leg():
+    """Its wear is accelerated: nothing of it ranks, and nothing of the other legs changes by it."""
+    legs = random_fleet(30).legs
+    used = dict.fromkeys(legs[0].used_fraction, 40.0)
+    change = LegChange(recordings=1, state="healthy", used_fraction=dict.fromkeys(used, 39.0))
+    fast = made_up_leg("fast", State.STOP, used, p10_h=1e-6, change=change, wear_acceleration=5000.0)
+    assert first_of([*legs, fast]) == first_of(legs)
+    assert first_legs([*legs, fast], DAY) == first_legs(legs, DAY)
+    with_it, without = (data_of(html_of(*each)) for each in ([*legs, fast], legs))
+    row = with_it["legs"].pop()
+    assert with_it == without
+    assert (row["standing"], row["rank"], row["life"], row["rise"]) == (
+        "demonstration",
+        len(legs),
+        None,
+        None,
+    )
+    assert set(row["used"]) == {"not valid"}
+    assert "all wear is multiplied by 5000: a demonstration, not ranked" in row["why"]
+    assert "1 demonstrations." in words_of(read(html_of(*legs, fast)))
 
 
 def test_the_first_ten_are_the_most_urgent_ones():

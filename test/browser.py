@@ -17,6 +17,18 @@ NEEDS_CHROMIUM = pytest.mark.skipif(
 WIDTHS = (1200, 390)
 
 
+_LINE = [CHROMIUM, "--headless", "--no-sandbox", "--disable-gpu", "--disable-dev-shm-usage"]
+
+
+def printed(page, directory):
+    """Number of sheets that a page is printed on."""
+    (directory / "page.html").write_text(page)
+    line = [*_LINE, f"--user-data-dir={directory / 'profile'}", "--virtual-time-budget=5000"]
+    line += [f"--print-to-pdf={directory / 'page.pdf'}", (directory / "page.html").as_uri()]
+    subprocess.run(line, capture_output=True, timeout=240, check=True)
+    return max(map(int, re.findall(rb"/Count (\d+)", (directory / "page.pdf").read_bytes())))
+
+
 def browse(pages, directory, script):
     """What a script finds in each page at each width, and the lines on the browser's console.
 
@@ -30,9 +42,13 @@ def browse(pages, directory, script):
     wrapper = directory / "wrapper.html"
     text = f'<!doctype html><meta charset="utf-8"><script>{script}</script>{frames}<pre id="found"></pre>'
     wrapper.write_text(text)
-    line = [CHROMIUM, "--headless", "--no-sandbox", "--disable-gpu", "--disable-dev-shm-usage"]
-    line += [f"--user-data-dir={directory / 'profile'}", "--enable-logging=stderr", "--window-size=1300,1000"]
-    line += ["--virtual-time-budget=10000", "--dump-dom", wrapper.as_uri()]
+    line = [
+        *_LINE,
+        f"--user-data-dir={directory / 'profile'}",
+        "--enable-logging=stderr",
+        "--window-size=1300,1000",
+    ]
+    line += ["--window-size=1300,1000", "--virtual-time-budget=10000", "--dump-dom", wrapper.as_uri()]
     done = subprocess.run(line, capture_output=True, text=True, timeout=240, check=True)
     found = re.search(r'<pre id="found">(.*?)</pre>', done.stdout, re.DOTALL).group(1)
     console = [said for said in done.stderr.splitlines() if "CONSOLE" in said]

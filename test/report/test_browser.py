@@ -5,13 +5,16 @@ Headless Chromium lays out all pages in frames of two widths, a script tries the
 
 import re
 
+import attrs
 import pytest
-from browser import NEEDS_CHROMIUM, WIDTHS, browse
+from browser import NEEDS_CHROMIUM, WIDTHS, browse, printed
+from made_up_summary import made_up_summary
 
 from leg_wear_monitor.mechanism.loader import load_mechanism, parse_mechanism
 from leg_wear_monitor.report.drawing.drawing import drawing_of
 from leg_wear_monitor.report.drawing.page import drawing_html
 from leg_wear_monitor.report.page import page_html
+from leg_wear_monitor.report.replay.page import replay_page
 from leg_wear_monitor.studies.plan.settings import STUDIES
 
 pytestmark = NEEDS_CHROMIUM
@@ -136,3 +139,16 @@ def test_what_is_wrong_would_be_seen(tmp_path):
     assert found["overflow"] > 500 < narrow["overflow"]
     assert (found["broken"], found["unnamed"], found["images"]) == (1, 1, 1)
     assert any("nothing is not defined" in said for said in console)
+
+
+def test_the_page_of_a_leg_is_printed_on_two_sheets(tmp_path):
+    """With five joints and a long verdict; what is folded would need seven more."""
+    joints, summary = tuple("ABGIJ"), made_up_summary()
+    summary = attrs.evolve(
+        summary,
+        monitor=attrs.evolve(summary.monitor, clearance_joints=joints),
+        verdict=attrs.evolve(summary.verdict, why=40 * "why ", do=60 * "do "),
+        joints=dict.fromkeys(joints, summary.joints["A"]),
+        clearances=dict.fromkeys(joints, summary.clearances["A"]),
+    )
+    assert printed(page_html(replay_page(summary)), tmp_path) == 2

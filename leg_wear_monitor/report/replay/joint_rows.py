@@ -47,7 +47,8 @@ class LifeBar:
 
 
 def joint_rows(summary: ReplaySummary, views: Sequence[JointView]) -> Fragment:
-    """The rows as a table."""
+    """The rows as a table: first the joints that the verdict names, then those with alarms."""
+    views = sorted(views, key=lambda view: (view.joint not in summary.verdict.joints, not view.alarms))
     leg = _leg_life(summary)
     most_m, life = _most_m(views), _life_axis([*(view.life for view in views), leg])
     rows = [

@@ -55,6 +55,13 @@ def test_the_first_screen_has_verdict_joints_belief_and_alarms():
     assert "Clearance over time" not in text
 
 
+def test_the_joint_that_the_verdict_names_has_the_first_row():
+    for named in ("A", "B"):
+        html = html_of(doubted(joints=(named,)))
+        letters = re.findall(r'class="letter">(\w)<', html)
+        assert letters == [named, *({"A", "B"} - {named})]
+
+
 def test_the_banner_leads_from_the_code_to_its_guide():
     page = page_of(made_up_summary())
     assert "CLEARANCE_CHANGED_A" in visible(page)

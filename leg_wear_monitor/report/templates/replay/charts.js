@@ -177,18 +177,14 @@
   folded.forEach((details) => details.addEventListener("toggle", drawAll));
   window.addEventListener("resize", () => resize(0));
   matchMedia("(prefers-color-scheme: dark)").addEventListener("change", redraw);
-  let closed = [];
-  window.addEventListener("beforeprint", () => {  // paper shows everything, in the light colours
+  window.addEventListener("beforeprint", () => {  // on paper, in the light colours
     document.documentElement.dataset.printed = "";
-    closed = folded.filter((details) => !details.open);
-    closed.forEach((details) => { details.open = true; });
     drawAll();
     resize(PRINTED);
     redraw();
   });
   window.addEventListener("afterprint", () => {
     delete document.documentElement.dataset.printed;
-    closed.forEach((details) => { details.open = false; });
     resize(0);
     redraw();
   });

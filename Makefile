@@ -1,5 +1,5 @@
 # `make test` and `make demo` do all the set-up themselves, once: Python 3.11 to 3.13 with venv and a C compiler are enough.
-.PHONY: test test-slow test-machines test-machine-in-turn lint kernels test-oldest test-oldest-quick package colcon docs tables docs-check demo campaign lock sbom clean
+.PHONY: test test-slow test-slow-in-turn test-machines test-machine-in-turn lint kernels test-oldest test-oldest-quick package colcon docs tables docs-check demo campaign lock sbom clean
 .DELETE_ON_ERROR:
 
 # Percent of lines and branches that the two runs of the tests reach together.
@@ -46,6 +46,12 @@ test: .venv/installed
 # and kernels compiled by themselves (marker `uncompiled`).
 test-slow: kernels
 	.venv/bin/python -m pytest $(TWO) $(IN_ORDER) -m "slow or uncompiled"
+
+# What CI has time for: one of SLOW_PARTS even parts, commit by commit.
+SLOW_PARTS := 16
+test-slow-in-turn: kernels
+	SLOW_PART=$$(( $$(git rev-list --count HEAD) % $(SLOW_PARTS) ))/$(SLOW_PARTS) \
+		.venv/bin/python -m pytest $(TWO) $(IN_ORDER) -m "slow or uncompiled"
 
 # The tests as other machines would run them (test/machines.py), one machine after the other, each as long as the second
 # step of `make test`; MACHINE=haswell runs one of them. A red one does not end it: how each did stands at the end.

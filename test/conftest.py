@@ -54,12 +54,20 @@ if sys.gettrace() is not None:
         setattr(owner, name, untraced(getattr(owner, name)))
 
 
-def pytest_collection_modifyitems(items: list[pytest.Item]) -> None:
-    """Leave the tracing of tests that run again, uncompiled, to that run: it sees all of what they reach."""
+@pytest.hookimpl(trylast=True)  # after `-m` has made its choice
+def pytest_collection_modifyitems(config: pytest.Config, items: list[pytest.Item]) -> None:
+    """Leave the tracing of tests that run again, uncompiled, to that run: it sees all of what they reach.
+
+    Of what ``-m`` has chosen, take one of so many even parts if ``SLOW_PART`` says so: ``3/16``, from zero.
+    """
     below = tuple(os.environ.get("TRACED_LATER", "").split())
     for item in items:
         if item.nodeid.startswith(below) and item.get_closest_marker("plain"):
             item.add_marker("no_cover")
+    if os.environ.get("SLOW_PART"):
+        part, parts = map(int, os.environ["SLOW_PART"].split("/"))
+        config.hook.pytest_deselected(items=[item for i, item in enumerate(items) if i % parts != part])
+        items[:] = items[part::parts]
 
 
 @pytest.fixture

@@ -21,44 +21,52 @@ from leg_wear_monitor import whole_program
 from leg_wear_monitor.kernel import ByAddress, kernel
 
 LEAF = "from leg_wear_monitor.kernel import kernel\n@kernel\ndef slope(x):\n    return {factor} * x\n"
-ROOT = (
-    "from leg_wear_monitor.kernel import entry\nfrom leg_wear_monitor.leaf import slope\n"
-    "@entry\ndef line(x):\n    return slope(x) + 1.0\n"
-)
+ROOT = "from leg_wear_monitor.kernel import entry\n{line}\n@entry\ndef line(x):\n    return slope(x) + 1.0\n"
+DIRECT = "from leg_wear_monitor.leaf import slope"
 SCRIPT = """
-import sys
+import importlib, sys
 from leg_wear_monitor.kernel import at_compilation, cache_directory
-from leg_wear_monitor.root import line
 at_compilation.append(lambda: print("compiling", end=" ", file=sys.stderr))
-print(line(2.0), len(line.stats.cache_hits), cache_directory())
+for root in {roots}:
+    line = importlib.import_module(f"leg_wear_monitor.{{root}}").line
+    print(line(2.0), len(line.stats.cache_hits))
+print(cache_directory())
 """
 
 
 class Package:
-    """A package with our kernel.py, a kernel, and an entry that calls it."""
+    """A package with our kernel.py, a kernel, and entries that call it, each in a module of its own."""
 
-    def __init__(self, directory: Path) -> None:
+    def __init__(self, directory: Path, **lines: str) -> None:
         self.directory = directory / "leg_wear_monitor"
         self.directory.mkdir()
         (self.directory / "__init__.py").write_text("")
         for name in ("code_cache", "errors", "kernel", "whole_program"):
             shutil.copy(Path(leg_wear_monitor.__file__).with_name(f"{name}.py"), self.directory)
-        (self.directory / "root.py").write_text(ROOT)
+        self.roots = lines or {"root": DIRECT}
+        for name, line in self.roots.items():
+            (self.directory / f"{name}.py").write_text(ROOT.format(line=line))
         self.write(2.0)
 
     def write(self, factor: float) -> None:
         (self.directory / "leaf.py").write_text(LEAF.format(factor=factor))
 
-    def run(self, **environment: str) -> list[str]:
-        """In a fresh process: the value, 1 if its code came from the cache or 0, the cache directory."""
+    def run_all(self, **environment: str) -> tuple[dict[str, tuple[str, str]], str]:
+        """In a fresh process: by entry the value, 1 if its code came from the cache or 0; that directory."""
         unset = ("NUMBA_", "XDG_", "COV_", "PYTHONPATH")
         kept = {key: value for key, value in os.environ.items() if not key.startswith(unset)}
         kept |= {"PYTHONPATH": str(self.directory.parent), "PYTHONDONTWRITEBYTECODE": "1", **environment}
-        command, where = [sys.executable, "-c", SCRIPT], self.directory.parent
+        command, where = [sys.executable, "-c", SCRIPT.format(roots=[*self.roots])], self.directory.parent
         done = subprocess.run(command, env=kept, cwd=where, text=True, capture_output=True, check=True)
-        value, hits, home = done.stdout.split()
-        assert ("compiling" in done.stderr) == (hits == "0")
-        return [value, hits, home]
+        *lines, home = done.stdout.splitlines()
+        found = {name: tuple(line.split()) for name, line in zip(self.roots, lines, strict=True)}
+        assert ("compiling" in done.stderr) == any(hits == "0" for _, hits in found.values())
+        return found, home
+
+    def run(self, **environment: str) -> list[str]:
+        """Of its one entry."""
+        found, home = self.run_all(**environment)
+        return [*found["root"], home]
 
 
 @pytest.fixture
@@ -78,21 +86,25 @@ def nowhere(tmp_path):
     return str(tmp_path / "file")
 
 
-def test_a_second_process_does_not_compile(package, home, tmp_path):
-    assert package.run(**home)[:2] == ["5.0", "0"]
-    value, hits, where = package.run(**home)
-    assert (value, hits) == ("5.0", "1")
-    assert Path(where).is_relative_to(tmp_path / "home" / ".cache" / "leg_wear_monitor")
-
-
-def test_the_package_directory_is_not_written_to(package, home):
+def test_a_second_process_does_not_compile_nor_does_an_equal_copy(package, home, tmp_path):
+    """So a checkout and the package that was installed from it compile once; neither is written to."""
     before = sorted(package.directory.rglob("*"))
     package.directory.chmod(0o555)
     try:
-        assert package.run(**home)[0] == "5.0"
+        assert package.run(**home)[:2] == ["5.0", "0"]
+        value, hits, here = package.run(**home)
     finally:
         package.directory.chmod(0o755)
+    assert (value, hits) == ("5.0", "1")
+    assert Path(here).is_relative_to(tmp_path / "home" / ".cache" / "leg_wear_monitor")
     assert sorted(package.directory.rglob("*")) == before
+    (tmp_path / "copy").mkdir()
+    copy = Package(tmp_path / "copy")
+    assert copy.run(**home) == ["5.0", "1", here]
+    copy.write(3.0)
+    value, hits, there = copy.run(**home)
+    assert (value, hits) == ("7.0", "0")
+    assert there != here
 
 
 def test_without_a_writable_home_the_temporary_directory_does(package, tmp_path, nowhere):
@@ -109,58 +121,30 @@ def test_a_directory_that_is_asked_for_is_used(package, tmp_path, nowhere, varia
     assert Path(where).is_relative_to(tmp_path / "asked")
 
 
-def test_an_entry_follows_a_change_in_the_kernel_it_calls(package, home):
-    """Numba by itself looks at the file of the caller only, and would go on with the old one."""
-    assert package.run(**home)[0] == "5.0"
+def test_an_entry_follows_what_it_imports_however_and_nothing_else(tmp_path, home):
+    """Numba by itself looks at the file of the caller only, and would go on with the old kernel.
+
+    Compiling takes a minute: only what a change can reach is compiled again.
+    """
+    package = Package(
+        tmp_path,
+        direct=DIRECT,
+        module="import leg_wear_monitor.leaf\nslope = leg_wear_monitor.leaf.slope",
+        lines="from leg_wear_monitor import (\n    leaf,\n)\nslope = leaf.slope",
+        indented=f"if True: {DIRECT}",
+        constant="from leg_wear_monitor.frozen import slope",
+        other="from leg_wear_monitor.island import slope",
+    )
+    number = "from leg_wear_monitor.numbers import FACTOR\n"
+    (package.directory / "frozen.py").write_text(number + LEAF.format(factor="FACTOR"))
+    (package.directory / "island.py").write_text(LEAF.format(factor=2.0))
+    numbers = package.directory / "numbers.py"
+    numbers.write_text("FACTOR = 2.0\n")
+    assert package.run_all(**home)[0] == dict.fromkeys(package.roots, ("5.0", "0"))
     package.write(3.0)
-    assert package.run(**home)[:2] == ["7.0", "0"]
-
-
-@pytest.mark.parametrize(
-    "line",
-    [
-        "import leg_wear_monitor.leaf",
-        "from leg_wear_monitor import (\n    leaf,\n)",
-        "if True: from leg_wear_monitor.leaf import slope",
-    ],
-)
-def test_an_entry_follows_however_a_kernel_is_imported(package, home, line):
-    root = ROOT.replace("from leg_wear_monitor.leaf import slope", line)
-    if "import slope" not in line:
-        package_name = "leg_wear_monitor.leaf" if line.startswith("import") else "leaf"
-        root = root.replace("@entry", f"slope = {package_name}.slope\n@entry")
-    (package.directory / "root.py").write_text(root)
-    assert package.run(**home)[0] == "5.0"
-    package.write(3.0)
-    assert package.run(**home)[:2] == ["7.0", "0"]
-
-
-def test_an_entry_follows_a_constant_that_a_kernel_froze(package, home):
-    (package.directory / "numbers.py").write_text("FACTOR = 2.0\n")
-    text = "from leg_wear_monitor.numbers import FACTOR\n" + LEAF.format(factor="FACTOR")
-    (package.directory / "leaf.py").write_text(text)
-    assert package.run(**home)[0] == "5.0"
-    (package.directory / "numbers.py").write_text("FACTOR = 3.0\n")
-    assert package.run(**home)[:2] == ["7.0", "0"]
-
-
-def test_an_entry_does_not_follow_what_it_does_not_import(package, home):
-    """Compiling takes a minute: only what a change can reach is compiled again."""
-    package.run(**home)
-    (package.directory / "island.py").write_text(LEAF.format(factor=5.0))
-    assert package.run(**home)[:2] == ["5.0", "1"]
-
-
-def test_an_equal_copy_does_not_compile(package, home, tmp_path):
-    """So a checkout and the package that was installed from it compile once."""
-    (tmp_path / "copy").mkdir()
-    _, _, here = package.run(**home)
-    copy = Package(tmp_path / "copy")
-    assert copy.run(**home) == ["5.0", "1", here]
-    copy.write(3.0)
-    value, hits, there = copy.run(**home)
-    assert (value, hits) == ("7.0", "0")
-    assert there != here
+    numbers.write_text("FACTOR = 3.0\n")
+    changed = dict.fromkeys(package.roots, ("7.0", "0"))
+    assert package.run_all(**home)[0] == changed | {"other": ("5.0", "1")}
 
 
 def test_a_kernel_that_allocates_is_refused():

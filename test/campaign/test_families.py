@@ -26,8 +26,8 @@ FEW = {
 
 
 # Left to `make test-slow` and `make campaign`: other tests hold their laws in less time
-# (test/monitor/ledger/test_kill.py, test/test_beside.py).
-LONG = {"kills", "live_kills", "workers"}
+# (test/monitor/ledger/test_kill.py, test/test_beside.py, test/monitor/inputs/test_bad_input.py, test/bags/).
+LONG = {"floods", "kills", "live_kills", "recordings", "workers"}
 
 
 def run(name: str, *how_many: str) -> None:

@@ -96,6 +96,7 @@ def test_a_scheduler_that_does_not_answer_is_told(run, tmp_path):
     assert result.stderr.splitlines()[-1] == "error: --scheduler: frog://nowhere: no scheduler answers there"
 
 
+@pytest.mark.slow  # the page that is drawn again is the same, byte for byte
 def test_the_page_holds_what_was_computed(done, tmp_path):
     from leg_wear_monitor.report.study.page import study_page
 

@@ -75,9 +75,7 @@ def check(robot: Robot, result: CommissioningResult, seconds: float) -> None:
     assert angle_between(crank.offset_rad, robot.offset_rad) < PHASE_RAD
 
 
-@pytest.mark.parametrize(
-    "seed", [*range(2), *(pytest.param(seed, marks=pytest.mark.slow) for seed in range(2, 10))]
-)
+@pytest.mark.parametrize("seed", [0, *(pytest.param(seed, marks=pytest.mark.slow) for seed in range(1, 10))])
 def test_ten_robots(
     seed: int, walked: Walk, record: Callable[[Path, Robot, Walk], Path], tmp_path: Path
 ) -> None:

@@ -47,11 +47,16 @@ def home(walk, describe, tmp_path_factory):
 
 
 @pytest.fixture(scope="module")
-def updated(home, update, tmp_path_factory):
-    """Its directory after an uninterrupted update in this process."""
+def first(home, update, tmp_path_factory):
+    """Its directory after an uninterrupted update in this process, and what that found."""
     out = tmp_path_factory.mktemp("updated")
-    update(home / "fleet.yaml", out)
-    return out
+    return out, update(home / "fleet.yaml", out)
+
+
+@pytest.fixture(scope="module")
+def updated(first):
+    """That directory."""
+    return first[0]
 
 
 def test_recordings_are_counted_in_the_order_of_time(updated):
@@ -66,19 +71,19 @@ def test_recordings_are_counted_in_the_order_of_time(updated):
     assert growths == sorted(growths)
 
 
-def test_a_damaged_recording_costs_itself_and_is_named(home, update, tmp_path):
-    found = update(home / "fleet.yaml", tmp_path)
+def test_a_damaged_recording_costs_itself_and_is_named(first):
+    out, found = first
     (trash, half) = found.findings
     assert (trash[0], half[0]) == ("b", "b")
     assert trash[1].startswith("b/trash.mcap: unreadable; parts of it are lost; begins with")
     assert half[1].startswith("b/half.mcap: counted, 2 gait cycles") and "parts of it are lost" in half[1]
-    health = load_overview(tmp_path).leg("b").recordings
+    health = load_overview(out).leg("b").recordings
     assert (health.found, health.counted, health.unreadable, health.partial) == (2, 1, 1, 1)
     assert [(bad.file, bad.outcome) for bad in health.bad] == [
         ("b/half.mcap", "counted"),
         ("b/trash.mcap", "unreadable"),
     ]
-    assert (tmp_path / "legs/b/log").read_text().splitlines() == [trash[1], half[1]]
+    assert (out / "legs/b/log").read_text().splitlines() == [trash[1], half[1]]
 
 
 def test_a_second_update_finds_nothing_to_do(home, updated, update):
@@ -88,6 +93,7 @@ def test_a_second_update_finds_nothing_to_do(home, updated, update):
     assert contents(updated) == before
 
 
+@pytest.mark.slow  # studies/test_run.py holds it for the same workers
 @pytest.mark.usefixtures("traps")
 def test_processes_give_the_same_to_the_bit(home, updated, update, tmp_path):
     fractions = []
@@ -130,7 +136,7 @@ def test_interrupted_between_two_recordings_it_goes_on_there(home, updated, upda
     assert contents(tmp_path) == contents(updated)
 
 
-@pytest.mark.parametrize("instant", ["expect", "add"])
+@pytest.mark.parametrize("instant", ["expect", pytest.param("add", marks=pytest.mark.slow)])
 def test_killed_before_or_after_the_ledger_is_written_nothing_is_lost_or_twice(
     home, updated, update, tmp_path, monkeypatch, instant
 ):

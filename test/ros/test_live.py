@@ -199,6 +199,7 @@ def test_a_publisher_that_does_not_fit_is_told_of(stage, walk) -> None:
     assert monitor.received == 0
 
 
+@pytest.mark.slow  # monitor/test_wear_monitor.py holds it without ROS
 def test_a_knock_raises_its_alarm_within_four_gait_cycles_and_not_before(stage) -> None:
     knock = KnockConfig(joint="G", at_s=3.5, clearance_m=2.0e-3)
     walk = stage.walk(PublisherConfig(duration_s=9.0, knock=knock))
@@ -213,6 +214,7 @@ def test_a_knock_raises_its_alarm_within_four_gait_cycles_and_not_before(stage) 
     assert 3.5 < at <= 7.5 + 0.02
 
 
+@pytest.mark.slow  # the alarms' own tests hold it without ROS
 @pytest.mark.no_cover
 def test_an_impact_beyond_the_limit_raises_its_alarm_within_a_gait_cycle(stage) -> None:
     pace = PaceConfig(times_s=(0.0, 3.0), speeds_rpm=(60.0, 80.0))
@@ -308,6 +310,7 @@ def replayed_from(path: Path, monitor: WearMonitor) -> dict[str, list[bytes]]:
     return found
 
 
+@pytest.mark.slow  # playback/test_crank_zero.py holds it without ROS
 def test_an_encoder_that_starts_at_zero_is_found_and_replayed(stage, tmp_path: Path) -> None:
     recording = tmp_path / "live.mcap"
     anew = stage.walk(PublisherConfig(duration_s=6.0, encoder=EncoderConfig(restarts_s=(0.3,))))

@@ -87,9 +87,9 @@ def test_a_monitor_stopped_while_it_gets_ready_leaves_an_ordered_ledger(stage, t
 @pytest.mark.parametrize(
     ("name", "verb", "module"),
     [
-        ("SIGTERM", (), "click"),
+        pytest.param("SIGTERM", (), "click", marks=pytest.mark.slow),
         ("SIGTERM", ("monitor",), "rclpy.node"),
-        ("SIGTERM", ("gait-publisher",), "leg_wear_monitor.ros.running"),
+        pytest.param("SIGTERM", ("gait-publisher",), "leg_wear_monitor.ros.running", marks=pytest.mark.slow),
         ("SIGINT", (), "leg_wear_monitor.ros.running"),
     ],
 )
@@ -130,7 +130,7 @@ def test_a_node_runs_with_an_rclpy_that_has_no_events_executor() -> None:
     assert "this rclpy has no events executor (rclpy 7.1.4 and newer have it)" in line
 
 
-@pytest.mark.parametrize("name", ["SIGINT", "SIGTERM"])
+@pytest.mark.parametrize("name", [pytest.param("SIGINT", marks=pytest.mark.slow), "SIGTERM"])
 def test_a_monitor_stopped_while_it_compiles_leaves_an_ordered_ledger(tmp_path: Path, name: str) -> None:
     """In a callback of LLVM, where Python prints an exception and goes on: the node went on, too."""
     ledger = tmp_path / "wear.db"
@@ -156,6 +156,7 @@ def test_a_monitor_stopped_while_it_compiles_leaves_an_ordered_ledger(tmp_path: 
     db.close()
 
 
+@pytest.mark.slow  # CI runs `make demo`; ros/test_live.py and test_people.py hold its parts in one process
 @pytest.mark.usefixtures("traps")
 def test_the_demo_tells_its_story(tmp_path: Path) -> None:
     command = [sys.executable, "-P", "-m", "leg_wear_monitor", "demo", "--out", str(tmp_path / "demo")]

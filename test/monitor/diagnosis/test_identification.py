@@ -96,7 +96,8 @@ def test_other_bodies_are_identified_from_the_torque(leg, known) -> None:
     assert after < 0.25 * before
 
 
-@pytest.mark.parametrize("seed", [1, 4, 6])  # legs that can turn
+# legs that can turn
+@pytest.mark.parametrize("seed", [1, *(pytest.param(seed, marks=pytest.mark.slow) for seed in (4, 6))])
 def test_a_leg_far_from_its_file_is_found_near_by_the_ideal_torque(leg, known, seed) -> None:
     reference, model, found = known
     mass, length = np.random.default_rng(seed).uniform(0.95, 1.05, (2, len(leg.bodies)))

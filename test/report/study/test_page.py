@@ -27,11 +27,12 @@ def slow_if(is_slow):
 
 
 # the points of these are computed as those of the study size are, and more of them
-@pytest.mark.parametrize(
-    "name", [pytest.param(name, marks=slow_if(name in {"laws", "location", "speed"})) for name in STUDIES]
-)
-def test_every_page_has_configuration_versions_conclusions_and_units(drawn, name):
-    page = drawn(name)
+MORE = {"laws", "location", "lubrication", "speed"}
+
+
+@pytest.mark.parametrize("name", [pytest.param(name, marks=slow_if(name in MORE)) for name in STUDIES])
+def test_every_page_has_configuration_versions_conclusions_and_units(study, unpainted, name):
+    page = study_page(study(name))
     assert "mechanism: bionic_leg" in page.configuration
     assert {"leg_wear_monitor", "code", "seed"} <= set(page.versions)
     assert parts(page, Sentences)

@@ -29,6 +29,8 @@ POSITION, VELOCITY, ACCELERATION, TORQUE_ERROR = 0, 1, 2, 3
 # bins of a histogram: 128 per octave, at most 0.8 % wide, from 2^-20 to 2^30
 _FIRST_OCTAVE, _OCTAVES, _IN_OCTAVE = -20, 50, 128
 _BINS = _OCTAVES * _IN_OCTAVE
+# least ratio of two successive steps for a parabola through their ends; steps shrink to 0.2 at a time
+_MOST_UNEQUAL = 0.1
 # of the 52 binary digits of a number, 7 tell 128 bins; its exponent is stored plus 1023
 _DIGITS_AFTER_BIN, _BITS_OF_FIRST = 52 - 7, (1023 + _FIRST_OCTAVE) * _IN_OCTAVE
 
@@ -180,8 +182,15 @@ def end_impact(impact, impacts, joint, t):
 
 @kernel
 def parabola_peak(t0, f0, t1, f1, t2, f2):
-    """Maximum of the parabola through three samples (t [s], f [N]), the middle one of which is largest."""
+    """Maximum of the parabola through three samples (t [s], f [N]), the middle one of which is largest.
+
+    Just the middle sample where one step is much shorter than the other: wear that is deposited and a change
+    of tables are small jumps of the force, and over a very short step (one cut at a contact event) their
+    slope would put the vertex at hundreds of kN.
+    """
     a, b = t1 - t0, t2 - t1
+    if min(a, b) < _MOST_UNEQUAL * max(a, b):
+        return f1
     left, right = (f1 - f0) / a, (f2 - f1) / b
     curvature = (right - left) / (a + b)
     if not curvature < 0.0:

@@ -85,7 +85,7 @@ def test_a_step_adds_its_quadrature_and_its_end(rates, h):
 
 @given(
     apex=st.floats(-1.0, 1.0), top=st.floats(-1.0e4, 1.0e4), sharp=st.floats(0.1, 1.0e4),
-    before=st.floats(0.01, 1.0), gap=st.floats(0.01, 1.0), fraction=st.floats(0.0, 1.0),
+    before=st.floats(0.11, 1.0), gap=st.floats(0.11, 1.0), fraction=st.floats(0.0, 1.0),
 )  # fmt: skip
 def test_peak_of_a_parabola_is_exact(apex, top, sharp, before, gap, fraction):
     """Three samples of which the middle one is largest, wherever the apex lies among them."""
@@ -94,6 +94,18 @@ def test_peak_of_a_parabola_is_exact(apex, top, sharp, before, gap, fraction):
     f = top - sharp * (t - apex) ** 2
     got = parabola_peak(t[0], f[0], t[1], f[1], t[2], f[2])
     assert got == pytest.approx(top, abs=1.0e-9 * (abs(top) + np.abs(f).max() + sharp / min(before, gap)))
+
+
+@given(
+    start=st.floats(0.0, 5.0e3), jump=st.floats(0.0, 50.0), end=st.floats(0.0, 5.0e3),
+    long=st.floats(1.0e-7, 1.0e-3), ratio=st.floats(1.0e-9, 1.0), earlier=st.booleans(),
+)  # fmt: skip
+def test_a_jump_over_a_short_step_is_no_peak(start, jump, end, long, ratio, earlier):
+    """Deposited wear lowers the force at once; the peak stays at the samples' size for any two steps."""
+    middle, short = max(start, end) + jump, long * ratio
+    first, second = (long, short) if earlier else (short, long)
+    peak = parabola_peak(0.0, start, first, middle, first + second, end)
+    assert middle <= peak <= middle + 3.0 * (middle - min(start, end))
 
 
 def test_three_samples_in_a_line_have_no_other_peak():

@@ -31,6 +31,9 @@ def print_result(result: "SimulationResult", wall_s: float) -> None:
     console = Console(highlight=False)
     console.print(f"\n[bold]{result.mechanism}[/bold]: {_settings(result)}\n")
     console.print(joint_table(result))
+    if result.standard_error and result.clearance_joints:
+        console.print(f"\n[bold]standard errors[/bold], from the scatter of {_cycles(result.cycles)}")
+        console.print(_error_table(result.standard_error, list(result.joints)))
     summary = Table.grid(padding=(0, 2), pad_edge=False)
     for label, text in _summary(result, wall_s):
         summary.add_row(label, text)
@@ -50,6 +53,24 @@ def joint_table(result: "SimulationResult") -> Table:
     for name, joint in result.joints.items():
         forces = (joint.mean_force_n, joint.p99_force_n, joint.max_force_n)
         table.add_row(name, *map(figure, forces), *_wear_cells(joint))
+    return table
+
+
+def _error_table(errors: dict[str, float], joints: list[str]) -> Table:
+    """Standard errors of the table of joints, in its units."""
+    table = Table(box=None, pad_edge=False, padding=(0, 1), header_style="bold")
+    columns = {
+        "mean\nN": ("mean_force_n", 1.0), "p99\nN": ("p99_force_n", 1.0),
+        "contact\n%": ("contact_fraction", 1e2),
+        "Archard\nJ/cycle": ("archard_integral_j_per_cycle", 1.0),
+        "bushing\npm/cycle": ("wear_depth_m_per_cycle.bushing_max", 1e12),
+        "journal\npm/cycle": ("wear_depth_m_per_cycle.journal_max", 1e12),
+    }  # fmt: skip
+    for column in ("\njoint", *columns):
+        table.add_column(column, justify="right" if column in columns else "left")
+    for joint in joints:
+        found = [(errors.get(f"joints.{joint}.{name}"), scale) for name, scale in columns.values()]
+        table.add_row(joint, *("" if error is None else figure(scale * error) for error, scale in found))
     return table
 
 
@@ -87,12 +108,16 @@ def _summary(result: "SimulationResult", wall_s: float) -> Iterator[tuple[str, s
         yield "wear", "greatest depth; 1 pm per cycle is 1 um in a million cycles"
         yield "zone", "contains 90 % of the bushing's wear, in angles of its own body"
     values = {name: getattr(torque, name) for name in ("mean", "rms", "min", "max", "p99")}
-    signed = ", ".join(f"{name} {figure(value)}" for name, value in values.items())
+    errors = result.standard_error or {}
+    signed = ", ".join(
+        f"{name} {figure(value)}{_plus_minus(errors, f'drive_torque_nm.{name}')}"
+        for name, value in values.items()
+    )
     yield "drive torque", f"{signed} N m; largest magnitude {figure(torque.max_abs)} N m"
     if result.clearance_joints and result.toe is not None:
         yield "largest errors", _response(result.toe, torque)
     if result.energy_j is not None:
-        yield "energy", _energy(result.energy_j)
+        yield "energy", _energy(result.energy_j, _plus_minus(errors, "energy_j.residual"))
     loads = [(name, joint) for name, joint in result.joints.items() if joint.has_clearance]
     for label, (name, joint) in zip(["load", *[""] * len(loads)], loads, strict=False):
         yield label, f"{name}: {_load(joint)}"
@@ -130,11 +155,15 @@ def _response(toe: "ToeResult", torque: "TorqueResult") -> str:
     )
 
 
-def _energy(energy: "EnergyBalance") -> str:
+def _plus_minus(errors: dict[str, float], path: str) -> str:
+    return f" ± {figure(errors[path])}" if path in errors else ""
+
+
+def _energy(energy: "EnergyBalance", scatter: str) -> str:
     return (
         f"work in {figure(energy.work_in)} = stored {figure(energy.stored)} + friction "
         f"{figure(energy.friction_loss)} + impacts {figure(energy.contact_loss)} J, "
-        f"residual {figure(energy.residual)} J"
+        f"residual {figure(energy.residual)}{scatter} J"
     )
 
 

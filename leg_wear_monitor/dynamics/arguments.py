@@ -15,6 +15,7 @@ from leg_wear_monitor.mechanism.spec import Mechanism
 
 _KINDS: dict[str, tuple[Any, str]] = {
     "trace": (Integral, "a whole number"),
+    "intervals": (Integral, "a whole number"),
     "wear": (bool, "true or false"),
 }
 
@@ -65,7 +66,7 @@ def given_joints(names: Sequence[str], mechanism: Mechanism) -> tuple[str, ...]:
 
 
 def check_kinds(**values: object) -> None:
-    """Check the types of arguments: ``trace`` is an integer, ``wear`` a bool, all others are numbers.
+    """Check the types: ``trace`` and ``intervals`` are integers, ``wear`` is a bool, all others are numbers.
 
     None is allowed except for ``cycles``; it selects the default.
 

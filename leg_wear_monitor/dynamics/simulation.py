@@ -12,6 +12,7 @@ from leg_wear_monitor.dynamics.full.run import FullRun
 from leg_wear_monitor.dynamics.ideal_result import ideal_result
 from leg_wear_monitor.dynamics.result.simulation_result import SimulationResult
 from leg_wear_monitor.dynamics.result.statistics import (
+    CycleScatter,
     drive_torque,
     energy_balance,
     first_impacts,
@@ -32,6 +33,9 @@ from leg_wear_monitor.wear.surfaces import SECTORS, fresh_surfaces
 MODELS: dict[str, Callable[[Setup], Traceable]] = {"clearance": ClearanceRun, "full": FullRun}
 
 LEAST_RPM = 0.01  # least crank speed: below it a gait cycle takes hours
+
+# intervals per gait cycle: fewer change mean forces, more than there are table points add nothing
+LEAST_INTERVALS, MOST_INTERVALS = 1024, 65536
 
 _REPORTS_A_CYCLE = 20
 
@@ -98,6 +102,7 @@ def simulate(
     wear: bool = False,
     normal_law: str | None = None,
     trace: int = 0,
+    intervals: int | None = None,
     progress: Callable[[float], None] | None = None,
 ) -> SimulationResult:
     """Simulate a leg: forces, drive torque and toe motion, impacts and wear of its clearance joints.
@@ -125,6 +130,9 @@ def simulate(
     trace : int
         Stored samples per cycle, the first at crank angle 0; 0 for none. They do not change the run. Each
         is integrated to its own instant: from some hundred per cycle on, they take longer than the run.
+    intervals : int, optional
+        Resolution of model ``clearance``: intervals of time per gait cycle, `LEAST_INTERVALS` or more;
+        default: 2048. Inside them, steps adapt to a local error.
     progress : callable, optional
         Called with the completed fraction of the run.
 
@@ -154,6 +162,7 @@ def simulate(
     """
     mechanism = given_mechanism(mechanism)
     check_kinds(cycles=cycles, duration_s=duration_s, skip_cycles=skip_cycles, trace=trace, wear=wear)
+    check_kinds(intervals=intervals)
     setup = prepare(
         mechanism,
         clearances=clearances,
@@ -165,13 +174,25 @@ def simulate(
     model = model or default_model(mechanism)
     if not isinstance(model, str) or model not in MODELS:
         raise ConfigError("model", "", f"{shown(model)} is not one of {', '.join(MODELS)}")
+    _check_intervals(intervals, model)
     skipped, counted = _spans(setup, cycles, duration_s, skip_cycles, trace)
     if not setup.clearance_joints and isinstance(mechanism.drive, SpeedDrive):
         return ideal_result(setup, counted * abs(setup.speed) / TURN, trace)
     try:
-        return _run(setup, MODELS[model](setup), model, skipped, counted, trace, progress)
+        run = ClearanceRun(setup, intervals) if intervals else MODELS[model](setup)
+        return _run(setup, run, model, skipped, counted, trace, progress)
     except SimulationError as error:
         raise SimulationError(f"{error}{suspects(mechanism)}") from error
+
+
+def _check_intervals(intervals: int | None, model: str) -> None:
+    if intervals is None:
+        return
+    if model != "clearance":
+        raise ConfigError("intervals", "", f"{intervals} is for model clearance, model {model} has none")
+    if not LEAST_INTERVALS <= intervals <= MOST_INTERVALS:
+        expected = f"expected {LEAST_INTERVALS} to {MOST_INTERVALS} per gait cycle"
+        raise ConfigError("intervals", "", f"{intervals} is out of bounds, {expected}")
 
 
 def _speed(mechanism: Mechanism, speed_rpm: float | None) -> float:
@@ -233,10 +254,13 @@ def _run(
     tracer = Tracer(run, joints, skipped, skipped + counted, period / trace if trace else math.inf)
     angle = run.sample().crank_angle
     stored, depth = run.stored_energy, setup.surfaces.depth.copy()
+    scatter = CycleScatter(setup, statistics, stored)
     # the run is advanced to the same instants with and without a trace, so its results are the same
-    for t in _instants(skipped, skipped + counted, period / _REPORTS_A_CYCLE):
+    for i, t in enumerate(_instants(skipped, skipped + counted, period / _REPORTS_A_CYCLE), start=1):
         tracer.look_ahead(t)
         run.advance(t, statistics)
+        if i % _REPORTS_A_CYCLE == 0:
+            scatter.end_cycle(statistics, run.stored_energy)
         report(t / (skipped + counted))
     if not statistics.time[0] > 0.0:
         raise ConfigError(
@@ -257,6 +281,7 @@ def _run(
         joints=joint_statistics(setup, statistics, setup.surfaces.depth - depth, counted_cycles),
         impacts=first_impacts(setup, statistics),
         trace=trace_of(setup, tracer.samples) if trace else None,
+        standard_error=scatter.standard_errors(counted_cycles),
         clearance_joints=setup.clearance_joints,
         surfaces=setup.surfaces,
     )

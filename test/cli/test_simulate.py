@@ -12,7 +12,8 @@ from leg_wear_monitor.dynamics import simulation
 TOP = [
     "schema_version", "mechanism", "model", "speed_rpm", "cycles",
     "wall_s", "simulated_s", "real_time_factor",
-    "drive_torque_nm", "energy_j", "toe", "joints", "impacts", "trace",
+    "drive_torque_nm", "energy_j", "toe", "joints", "impacts", "standard_error",
+    "trace",
 ]  # fmt: skip
 TORQUE = {"mean", "rms", "min", "max", "p99", "max_abs", "max_error"}
 TOE = {"max_position_error_m", "max_velocity_error_mps", "max_acceleration_error_mps2"}
@@ -59,6 +60,7 @@ def test_json_has_the_keys_of_the_contract_and_the_library_s_numbers(run):
     assert set(record["joints"]["B"]["clearance_m"]) == {"mean", "max"}
     assert set(record["impacts"]) == {"B", "C"}
     assert {frozenset(impact) for impact in record["impacts"]["B"]} == {frozenset(IMPACT)}
+    assert record["standard_error"] is None  # of a quarter of a cycle
     assert set(record["trace"]) == TRACE
     assert set(record["trace"]["force_n"]) == {"A", "B", "C", "D"}
     assert record["trace"]["crank_angle_rad"][0] == 0.0

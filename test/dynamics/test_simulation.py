@@ -53,6 +53,37 @@ def test_what_is_counted(worn_leg):
     assert worn_leg.trace.crank_angle_rad == pytest.approx(TURN * np.arange(10, 30) / 40, abs=1.0e-6)
 
 
+def test_standard_errors_are_those_of_the_cycles_one_by_one():
+    """Three cycles at once and one after the other are the same motion, at any resolution."""
+    kept = {"wear": True, "intervals": 1024}
+    whole = simulate("four_bar", cycles=3, skip_cycles=1, **kept)
+    single = [simulate("four_bar", cycles=1, skip_cycles=skip, **kept) for skip in (1, 2, 3)]
+    for path in (
+        "drive_torque_nm.rms",
+        "energy_j.residual",
+        "joints.A.p99_force_n",
+        "joints.B.wear_depth_m_per_cycle.bushing_mean",
+        "joints.C.archard_integral_j_per_cycle",
+    ):
+        values = [value_at(result, path) for result in single]
+        of_sum = 3.0 if path.startswith("energy_j") else 1.0
+        expected = of_sum * np.std(values, ddof=1) / math.sqrt(3.0)
+        assert whole.standard_error[path] == pytest.approx(expected, rel=1.0e-6)
+    assert all(one.standard_error is None for one in single)
+    finer = simulate("four_bar", cycles=1, skip_cycles=0, intervals=8192)
+    usual = simulate("four_bar", cycles=1, skip_cycles=0)
+    assert finer.drive_torque_nm.rms == pytest.approx(usual.drive_torque_nm.rms, rel=0.1)
+    assert finer.energy_j != usual.energy_j
+
+
+def value_at(result, path):
+    """The value of a result at a path."""
+    value = result
+    for name in path.split("."):
+        value = value[name] if isinstance(value, dict) else getattr(value, name)
+    return value
+
+
 def test_impacts_follow_one_another(worn_leg):
     for name in worn_leg.clearance_joints:
         impacts = worn_leg.impacts[name]
@@ -110,6 +141,8 @@ def test_a_torque_drive_has_no_cycles():
         ({"clearance_m": 0.02}, "bushing_radius|bushing"),
         ({"normal_law": "soft"}, "'soft' is not one of"),
         ({"trace": -1}, "trace: -1"),
+        ({"intervals": 100}, "intervals: 100 is out of bounds, expected 1024 to 65536"),
+        ({"intervals": 4096, "model": "full"}, "intervals: 4096 is for model clearance"),
     ],
 )
 def test_what_cannot_be_is_refused(leg, options, fault):

@@ -87,6 +87,12 @@ _WARM_UP_CYCLES, _WARM_UP_S = 1.0 / 256.0, 1.0e-9
     help="Keep N samples per cycle, for --json and for the pictures of --out; from some hundred on, samples "
     "take longer than the simulation.",
 )
+@click.option(
+    "--intervals",
+    type=int,
+    metavar="N",
+    help="Resolution of model clearance: intervals of time per gait cycle.  [default: 2048]",
+)
 @json_option("the result")
 @out_option("Write result.json and pictures of the leg and its worn bushings.")
 def simulate(mechanism: str, json_file: Path | None, out: Path | None, **options: Any) -> None:

@@ -54,6 +54,10 @@ class SimulationResult(Drawable):
         The first thousand impacts of each clearance joint.
     trace : Trace or None
         Samples over the counted cycles; None if no trace was requested.
+    standard_error : dict of str to float, or None
+        Standard error of a value by its path, such as ``joints.A.mean_force_n``: the standard deviation
+        between gait cycles, divided by the root of their number, as if successive cycles were independent.
+        None below two whole cycles, for an ideal leg and for a leg of a batch.
     clearance_joints : tuple of str
         Joints with clearance, in the order of ``surfaces``.
     surfaces : Surfaces or None
@@ -71,6 +75,7 @@ class SimulationResult(Drawable):
     joints: dict[str, JointResult]
     impacts: dict[str, tuple[Impact, ...]] = attrs.Factory(dict)
     trace: Trace | None = None
+    standard_error: dict[str, float] | None = None
     clearance_joints: tuple[str, ...] = ()
     surfaces: Surfaces | None = None
 
@@ -98,6 +103,7 @@ class SimulationResult(Drawable):
             "toe": part_document(self.toe),
             "joints": {name: joint_document(joint) for name, joint in self.joints.items()},
             "impacts": {name: [part_document(one) for one in all_] for name, all_ in self.impacts.items()},
+            "standard_error": self.standard_error,
         }
         return record if self.trace is None else {**record, "trace": trace_document(self.trace)}
 

@@ -1,6 +1,8 @@
 """Computation of a simulation's result from run statistics."""
 
 import math
+from collections.abc import Iterator
+from typing import Any
 
 import attrs
 import numpy as np
@@ -72,6 +74,86 @@ def energy_balance(statistics: RunStatistics, stored_before: float, stored_after
         wear_loss=wear,
         residual=work - stored - friction - contact - wear,
     )
+
+
+_ADDITIVE = ("time", "integral", "drive_integral", "force_time", "torque_time", "worn_energy")
+_ONE_SAMPLE = ("max_force_n", "clearance_m", "contact_half_angle_deg", "min", "max", "max_abs", "max_error")
+
+
+class CycleScatter:
+    """Scatter of the values between gait cycles (Welford's sums), from run statistics that go on.
+
+    Parameters
+    ----------
+    setup : Setup
+    statistics : RunStatistics
+        Those of the counted time, empty.
+    stored : float, J
+        Stored energy now.
+    """
+
+    def __init__(self, setup: Setup, statistics: RunStatistics, stored: float) -> None:
+        self._setup, self._count = setup, 0
+        self._paths: tuple[str, ...] = ()
+        self._mean = self._squares = np.zeros(0)
+        self._before = self._now(statistics, stored)
+
+    def end_cycle(self, statistics: RunStatistics, stored: float) -> None:
+        """Add the gait cycle since the last call."""
+        before, self._before = self._before, self._now(statistics, stored)
+        names = {name: self._before[name] - before[name] for name in _ADDITIVE}
+        cycle, worn = statistics._replace(**names), self._before["depth"] - before["depth"]
+        parts = {
+            "drive_torque_nm": drive_torque(cycle),
+            "energy_j": energy_balance(cycle, before["stored"], stored),
+            "joints": joint_statistics(self._setup, cycle, worn, 1.0),
+        }
+        values = {path: value for name, part in parts.items() for path, value in _numbers(name, part)}
+        now = np.concatenate([list(values.values()), worn.ravel()])
+        if self._count == 0:
+            self._paths = tuple(values)
+            self._mean, self._squares = np.zeros_like(now), np.zeros_like(now)
+        self._count += 1
+        off = now - self._mean
+        self._mean = self._mean + off / self._count
+        self._squares = self._squares + off * (now - self._mean)
+
+    def standard_errors(self, cycles: float) -> dict[str, float] | None:
+        """Standard errors of the values over a number of cycles, by path; None after fewer than two cycles.
+
+        Energies are sums over the cycles, all else are means. The greatest depth is that of one sector.
+        """
+        if self._count < 2:
+            return None
+        sigma = np.sqrt(self._squares / (self._count - 1.0))
+        number = len(self._paths)
+        errors = {
+            path: float(each * (cycles if path.startswith("energy_j") else 1.0) / math.sqrt(cycles))
+            for path, each in zip(self._paths, sigma[:number], strict=True)
+        }
+        shape = self._before["depth"].shape
+        worn, scatter = self._mean[number:].reshape(shape), sigma[number:].reshape(shape)
+        for k, name in enumerate(self._setup.clearance_joints):
+            for side, surface in (("bushing", BUSHING), ("journal", JOURNAL)):
+                deepest = scatter[k, surface, worn[k, surface].argmax()]
+                path = f"joints.{name}.wear_depth_m_per_cycle.{side}_max"
+                errors[path] = float(deepest / math.sqrt(cycles))
+        return errors
+
+    def _now(self, statistics: RunStatistics, stored: float) -> dict[str, Any]:
+        sums = {name: getattr(statistics, name).copy() for name in _ADDITIVE}
+        return {**sums, "depth": self._setup.surfaces.depth.copy(), "stored": stored}
+
+
+def _numbers(path: str, part: Any) -> Iterator[tuple[str, float]]:
+    """Numbers in a part of a result that add up over cycles, with their paths."""
+    if isinstance(part, float):
+        yield path, part
+    elif isinstance(part, dict) or attrs.has(type(part)):
+        fields = part if isinstance(part, dict) else attrs.asdict(part, recurse=False)
+        for name, value in fields.items():
+            if name not in _ONE_SAMPLE:
+                yield from _numbers(f"{path}.{name}", value)
 
 
 def joint_statistics(

@@ -33,7 +33,7 @@ def done(run, tmp_path, tmp_path_factory, computed):
     return computed["result"]
 
 
-def test_a_study_leaves_data_and_a_page_and_goes_on_where_it_was(run, done, tmp_path, complaints):
+def test_a_study_leaves_data_and_a_page_and_goes_on_where_it_was(run, done, unpainted, tmp_path, complaints):
     assert (done.exit_code, complaints(done)) == (0, [])
     assert done.stdout == "points: 2, 2 computed now\nwritten: out/report.html\n"
     assert sorted(path.name for path in (tmp_path / "out").iterdir()) == [

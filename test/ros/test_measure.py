@@ -1,4 +1,4 @@
-"""A clearance measured while the monitor runs: by the command line, in a process of its own."""
+"""A clearance measured while the monitor runs in a process of its own: by the command line."""
 
 import signal
 import sqlite3
@@ -10,16 +10,18 @@ import pytest
 
 pytest.importorskip("rclpy")
 
+from click.testing import CliRunner, Result
 from diagnostic_msgs.msg import DiagnosticArray
 from rcl_interfaces.srv import SetParametersAtomically
 from rclpy.parameter import Parameter
 
+from leg_wear_monitor.cli.main import cli
+
 NODE = "/left/leg_wear_monitor"
 
 
-def measure(*arguments: str) -> "subprocess.CompletedProcess[str]":
-    command = [sys.executable, "-m", "leg_wear_monitor", "measure", *arguments]
-    return subprocess.run(command, capture_output=True, text=True, check=False)
+def measure(*arguments: str) -> Result:
+    return CliRunner().invoke(cli, ["measure", *arguments])
 
 
 def stop(node: "subprocess.Popen[bytes]") -> None:
@@ -67,14 +69,15 @@ def asked_with(stage, parameters):
 def test_a_running_monitor_takes_measured_clearances(stage, running) -> None:
     ledger, end = running
     verdicts = stage.listen(f"{NODE}/verdict", DiagnosticArray, latched=True)
-    done = measure("A", "0.301", "--sigma", "0.005", "--node", NODE)
-    assert (done.returncode, done.stderr) == (0, "")
-    assert done.stdout.startswith(
+    command = [sys.executable, "-m", "leg_wear_monitor", "measure", "A", "0.301", "--sigma", "0.005"]
+    alone = subprocess.run([*command, "--node", NODE], capture_output=True, text=True, check=False)
+    assert (alone.returncode, alone.stderr) == (0, "")
+    assert alone.stdout.startswith(
         "A: 0.301 mm ± 0.005 mm, 0 gait cycles after the part was new; 0.3 mm is counted"
     )
 
     done = measure("G", "0.9", "--sigma", "0.005", "--node", NODE)
-    assert (done.returncode, done.stderr) == (1, "")
+    assert (done.exit_code, done.stderr) == (1, "")
     assert "contradicts the model" in done.stdout
     assert "at its limit: stop the leg when it is safe" in done.stdout
     stage.wait_for(lambda: any("joint_G" in repr(one) for one in verdicts), "the verdict on G")
@@ -82,11 +85,11 @@ def test_a_running_monitor_takes_measured_clearances(stage, running) -> None:
     assert "the measured clearance of joint G (knee) is 0.9 mm (limit 0.6 mm)" in status.message
 
     done = measure("G", "0.9", "--sigma", "0.005", "--accept", "--node", NODE)
-    assert done.returncode == 1
+    assert done.exit_code == 1
     assert "it counts, as requested" in done.stdout
 
     done = measure("Z", "0.4", "--sigma", "0.005", "--node", NODE)
-    assert (done.returncode, done.stdout) == (2, "")
+    assert (done.exit_code, done.stdout) == (2, "")
     assert done.stderr.splitlines() == [
         f"error: {NODE}/measure: JOINT: 'Z' is not a clearance joint, expected one of A, B, G, I, J"
     ]
@@ -130,11 +133,11 @@ def refuses_in_one_line(stage) -> None:
 
 def test_nobody_answers_within_the_time_that_is_said(domain: int) -> None:
     done = measure("A", "0.301", "--sigma", "0.005", "--node", "/nowhere/monitor", "--wait", "0.5")
-    assert (done.returncode, done.stdout) == (2, "")
+    assert (done.exit_code, done.stdout) == (2, "")
     (line,) = done.stderr.splitlines()
     assert "/nowhere/monitor/measure: nobody offers this service within 0.5 s" in line
     done = measure("A", "0.301", "--sigma", "0.005", "--node", "no node")
-    assert (done.returncode, len(done.stderr.splitlines())) == (2, 1)
+    assert (done.exit_code, len(done.stderr.splitlines())) == (2, 1)
     assert "'no node' is not the name of a node" in done.stderr
 
 

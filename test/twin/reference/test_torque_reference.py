@@ -28,17 +28,42 @@ def finished(run: TorqueReferenceRun) -> TorqueReference:
     return found
 
 
+def shorten(patch: pytest.MonkeyPatch) -> None:
+    """Runs of a single gait cycle a leg, and two where there are twice as many."""
+    patch.setattr(torque_reference, "CYCLES", 1)
+    patch.setattr(torque_reference, "_SETTLING", 0)
+
+
 @pytest.fixture
 def short(monkeypatch):
-    """Runs of a single gait cycle a leg, and two where there are twice as many."""
-    monkeypatch.setattr(torque_reference, "CYCLES", 1)
-    monkeypatch.setattr(torque_reference, "_SETTLING", 0)
+    shorten(monkeypatch)
 
 
-def test_each_joint_is_wider_in_turn(leg, short) -> None:
+@pytest.fixture(scope="module")
+def whole(leg) -> TorqueReference:
+    """A short reference of wider joints."""
     run = TorqueReferenceRun(leg)
-    run.begin(NEW, UNWORN, STEADY)
-    found = finished(run)
+    with pytest.MonkeyPatch.context() as patch:
+        shorten(patch)
+        run.begin(NEW, UNWORN, STEADY)
+        return finished(run)
+
+
+@pytest.fixture(scope="module")
+def identified(leg):
+    """A short reference of other bodies, and a snapshot of its run amidst a leg with another body."""
+    run = TorqueReferenceRun(leg)
+    with pytest.MonkeyPatch.context() as patch:
+        shorten(patch)
+        run.begin_identification(NEW, UNWORN, STEADY, LegParameters.none(leg))
+        for _ in range(7):
+            run.advance()
+        snapshot, progress = run.snapshot(), run.progress
+        return finished(run), snapshot, progress
+
+
+def test_each_joint_is_wider_in_turn(leg, whole) -> None:
+    found = whole
     assert len(found.torque_nm) == 1 + 5 * len(WIDER)
     assert [len(torque) for torque in found.torque_nm] == [2] + 5 * len(WIDER) * [1]
     np.testing.assert_allclose(found.clearance_m[1 : 1 + len(WIDER), 0], 3.0e-4 * np.array(WIDER))
@@ -57,9 +82,8 @@ def test_a_worn_joint_is_also_new_and_the_others_narrower(leg, short) -> None:
     np.testing.assert_allclose(found.clearance_m[sizes, 0], 0.8 * 3.0e-4)
 
 
-def test_a_part_of_a_reference_goes_on_where_it_ended(leg, short) -> None:
-    whole, first, second = (TorqueReferenceRun(leg) for _ in range(3))
-    whole.begin(NEW, UNWORN, STEADY)
+def test_a_part_of_a_reference_goes_on_where_it_ended(leg, whole, short) -> None:
+    first, second = (TorqueReferenceRun(leg) for _ in range(2))
     first.begin(NEW, UNWORN, STEADY)
     assert first.part is None
     for _ in range(12):
@@ -70,17 +94,15 @@ def test_a_part_of_a_reference_goes_on_where_it_ended(leg, short) -> None:
     assert 5 < len(part.torque_nm) < 12
     second.go_on(part, UNWORN)
     assert second.progress == pytest.approx(first.progress, abs=0.03)
-    one, other = finished(whole), finished(second)
+    other = finished(second)
     assert other.is_whole
     assert second.part is None
-    for torque, same in zip(one.torque_nm, other.torque_nm, strict=True):
+    for torque, same in zip(whole.torque_nm, other.torque_nm, strict=True):
         np.testing.assert_array_equal(torque, same)
 
 
-def test_each_body_is_heavier_and_longer_in_turn_and_friction_larger(leg, short) -> None:
-    none, run = LegParameters.none(leg), TorqueReferenceRun(leg)
-    run.begin_identification(NEW, UNWORN, STEADY, none)
-    found = finished(run)
+def test_each_body_is_heavier_and_longer_in_turn_and_friction_larger(leg, identified, short) -> None:
+    none, found = LegParameters.none(leg), identified[0]
     bodies = len(leg.bodies)
     assert len(found.torque_nm) == 2 + 2 * bodies
     assert (found.clearance_m == 3.0e-4).all()
@@ -98,14 +120,12 @@ def test_each_body_is_heavier_and_longer_in_turn_and_friction_larger(leg, short)
         np.testing.assert_array_equal(other.snapshot().done[0], found.torque_nm[number])
 
 
-def test_a_restored_run_continues_bit_for_bit(leg, short) -> None:
-    run, other = TorqueReferenceRun(leg), TorqueReferenceRun(leg)
-    run.begin_identification(NEW, UNWORN, STEADY, LegParameters.none(leg))
-    for _ in range(7):  # amidst a leg with another body
-        run.advance()
-    other.restore(run.snapshot())
-    assert other.progress == run.progress
-    for one, same in zip(finished(run).torque_nm, finished(other).torque_nm, strict=True):
+def test_a_restored_run_continues_bit_for_bit(leg, identified, short) -> None:
+    found, snapshot, progress = identified
+    other = TorqueReferenceRun(leg)
+    other.restore(snapshot)
+    assert other.progress == progress
+    for one, same in zip(found.torque_nm, finished(other).torque_nm, strict=True):
         np.testing.assert_array_equal(one, same)
 
 

@@ -5,8 +5,10 @@
 # Percent of lines and branches that the two runs of the tests reach together.
 COVERAGE_MIN ?= 90
 
-# Measuring them slows Python by a fifth and more: it is done where CI says so, or `make test COVERAGE=1`.
+# Measuring them slows Python by a fifth and more, and takes a run of kernels uncompiled, since the tracer cannot see into
+# compiled ones: it is done where CI says so, or `make test COVERAGE=1`.
 MEASURED := $(or $(COVERAGE),$(CI))
+STEPS := $(if $(MEASURED),3,2)
 
 # Two files of tests at a time: more would compile the same kernels more often than they save.
 TWO := --numprocesses 2 --dist loadfile
@@ -32,15 +34,16 @@ QUICKLY := --quiet --no-compile
 unexport PYTHONPATH LD_LIBRARY_PATH _ROS_WHEELS_BOOTSTRAP_COMPLETE
 
 test: .venv/installed
-	@echo "== 1 of 3: style, types, layers; kernels are compiled"
+	@echo "== 1 of $(STEPS): style, types, layers; kernels are compiled"
 	@$(MAKE) --no-print-directory --jobs 2 --output-sync=target lint kernels
-	@echo "== 2 of 3: all tests, with compiled kernels"
+	@echo "== 2 of $(STEPS): all tests, with compiled kernels"
 	@TRACED_LATER="$(if $(MEASURED),$(WITH_KERNELS))" .venv/bin/python -m pytest $(TWO) $(IN_ORDER) \
 		-m "not slow and not uncompiled" --verbose $(if $(MEASURED),--cov --cov-report=)
-	@# Coverage cannot see into compiled kernels: once more, uncompiled, where there are kernels, and the sum of both is judged.
-	@echo "== 3 of 3: tests of kernels, uncompiled$(if $(MEASURED),; coverage of 2 and 3)"
+ifneq ($(MEASURED),)
+	@echo "== 3 of 3: tests of kernels, uncompiled; coverage of 2 and 3"
 	@NUMBA_DISABLE_JIT=1 .venv/bin/python -m pytest $(TWO) $(IN_ORDER) -m "plain and not slow" $(WITH_KERNELS) \
-		--verbose $(if $(MEASURED),--cov --cov-append --cov-fail-under=$(COVERAGE_MIN))
+		--verbose --cov --cov-append --cov-fail-under=$(COVERAGE_MIN)
+endif
 
 # What `make test` leaves out: more of the same laws, at a length that finds what a short run does not (marker `slow`),
 # and kernels compiled by themselves (marker `uncompiled`).

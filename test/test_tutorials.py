@@ -51,6 +51,7 @@ def learnt(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Learnt:
 
 
 @pytest.mark.no_cover
+@pytest.mark.slow  # `make docs` runs the whole lesson
 def test_the_first_recording(learnt: Learnt, capsys: pytest.CaptureFixture[str]) -> None:
     pytest.importorskip("mcap")
     lesson, said = learnt("1_first_recording"), capsys.readouterr().out
@@ -86,6 +87,7 @@ def test_your_own_linkage(learnt: Learnt, capsys: pytest.CaptureFixture[str]) ->
 
 @pytest.mark.no_cover
 @pytest.mark.chaotic
+@pytest.mark.slow  # `make docs` runs the whole lesson
 def test_what_clearance_does(learnt: Learnt) -> None:
     lesson = learnt("3_what_clearance_does")
     first, later, ideal = (result.joints["G"] for result in (lesson.knee, lesson.later, lesson.ideal))
@@ -122,6 +124,7 @@ def test_a_life_and_its_forecast(learnt: Learnt) -> None:
 
 
 @pytest.mark.no_cover
+@pytest.mark.slow  # `make docs` runs the whole lesson
 def test_a_fleet(learnt: Learnt, capsys: pytest.CaptureFixture[str]) -> None:
     pytest.importorskip("mcap")
     pytest.importorskip("pandas")

@@ -44,6 +44,7 @@ def test_it_writes_the_pages_that_have_changed(run, fleet):
     assert "changed: 1" in run(*COMMAND).stdout
 
 
+@pytest.mark.slow  # studies/test_run.py holds it for the same workers
 def test_pages_of_workers_are_those_of_one_process(run, fleet, monkeypatch):
     monkeypatch.setattr(fleet_pages, "_WORTH_WORKERS", 2)
     other = fleet / "legs" / "b"

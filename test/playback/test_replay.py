@@ -293,7 +293,13 @@ def part(walk: Messages_, path: Path, begin_s: float, end_s: float) -> Path:
     return path
 
 
-@pytest.mark.parametrize("order", [(0, 1), (1, 0)], ids=["in order", "the later one first"])
+@pytest.mark.parametrize(
+    "order",
+    [
+        pytest.param((0, 1), id="in order"),
+        pytest.param((1, 0), id="the later one first", marks=pytest.mark.slow),
+    ],
+)
 def test_what_two_recordings_have_in_common_is_counted_once_and_told(
     walk: Messages_, tmp_path: Path, leg: lw.Mechanism, order: tuple[int, int]
 ) -> None:

@@ -57,6 +57,7 @@ def clearances(result: ReplayResult) -> np.ndarray:
 OFF = np.array([0.013, 0.13, 0.12, 0.16, 0.21])
 
 
+@pytest.mark.slow  # twin/test_sampled_twin.py holds it for the twin alone
 @pytest.mark.chaotic
 def test_the_wear_is_that_of_a_whole_replay(sampled, walk, config):
     whole = lw.replay(walk, config)

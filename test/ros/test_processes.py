@@ -69,6 +69,7 @@ def test_a_signal_between_the_making_and_the_serving_of_a_node_leaves_an_ordered
     db.close()
 
 
+@pytest.mark.slow  # tests beside it stop it just before and just after
 def test_a_monitor_stopped_while_it_gets_ready_leaves_an_ordered_ledger(stage, tmp_path: Path) -> None:
     ledger, log = tmp_path / "wear.db", tmp_path / "monitor.log"
     node = started("monitor", log, "-p", f"ledger.path:={ledger}")

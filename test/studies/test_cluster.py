@@ -12,6 +12,7 @@ from leg_wear_monitor.studies.results import load_results
 pytest.importorskip("distributed", reason="the extra 'dask' is not installed")
 
 
+@pytest.mark.slow  # test_run.py holds it for processes, which get the same jobs
 def test_a_cluster_gives_the_same_results_though_a_worker_is_killed(tiny, tmp_path):
     clearances = [1.0e-4, 1.5e-4, 2.0e-4, 2.5e-4, 3.0e-4, 3.5e-4]
     settings = tiny("size", joints=["G"], clearances_m=clearances)

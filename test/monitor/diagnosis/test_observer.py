@@ -384,6 +384,7 @@ def test_a_crank_with_another_ripple_waits_for_a_reference_of_its_own(leg, refer
     assert "is being simulated" in found.reason
 
 
+@pytest.mark.slow  # twin/reference/test_torque_reference.py goes on with a part
 def test_a_reference_that_was_half_simulated_goes_on_in_the_next_run(leg, reference) -> None:
     """Eight recordings of 70 s each never came to the end of a reference that takes thirteen minutes."""
     block = samples(reference, [0] * 60)

@@ -64,13 +64,7 @@ def write_entry(db: sqlite3.Connection, run: int, head: int, entry: Entry) -> No
     db.execute("DELETE FROM alarm")
     db.executemany(
         "INSERT INTO alarm VALUES (?, ?, ?, ?, ?, ?, ?, ?, ?, ?)",
-        [
-            (
-                *(a.kind, a.subject, int(a.level), int(a.present), int(a.acknowledged), a.raised_ns),
-                *(a.worst, a.limit, a.sigma, a.cause),  # SQLite stores NaN as NULL
-            )
-            for a in entry.alarms
-        ],
+        [alarm_values(alarm) for alarm in entry.alarms],
     )
     epochs = entry.span_epochs or (0,) * len(entry.spans)
     db.execute("DELETE FROM span WHERE run = ? AND part >= ?", (run, len(entry.spans)))
@@ -307,7 +301,7 @@ def read_entry(db: sqlite3.Connection) -> tuple[int, Entry] | None:
         stamp_ns=stamp_ns,
         joints=tuple(_joint(*row[1:]) for row in joints),
         totals=dict(db.execute("SELECT name, value FROM total")),
-        alarms=tuple(_alarm(*row) for row in db.execute("SELECT * FROM alarm")),
+        alarms=tuple(alarm_of(*row) for row in db.execute("SELECT * FROM alarm")),
         spans=tuple((begin, end) for begin, end, _ in spans),
         span_epochs=tuple(epoch for *_, epoch in spans) if any(epoch for *_, epoch in spans) else (),
     )
@@ -344,7 +338,16 @@ def _joint(
     return JointWear(name, surfaces, cycles, moving_s, replaced_ns, sampling_m2)
 
 
-def _alarm(
+def alarm_values(alarm: Alarm) -> list[str | int | float | None]:
+    """Values of an alarm as of a row, None where a number is not known."""
+    found = (alarm.worst, alarm.limit, alarm.sigma)
+    return [
+        alarm.kind, alarm.subject, int(alarm.level), int(alarm.present), bool(alarm.acknowledged),
+        alarm.raised_ns, *(value if math.isfinite(value) else None for value in found), alarm.cause,
+    ]  # fmt: skip
+
+
+def alarm_of(
     kind: str,
     subject: str,
     level: int,
@@ -356,15 +359,10 @@ def _alarm(
     sigma: float | None = None,  # before format 10 without it and the cause
     cause: str = "",
 ) -> Alarm:
+    """The alarm of `alarm_values`."""
     return Alarm(
-        kind=kind,
-        subject=subject,
-        level=Level(level),
-        present=Level(present),
-        acknowledged=bool(acknowledged),
-        raised_ns=raised_ns,
-        worst=math.nan if worst is None else worst,
-        limit=math.nan if limit is None else limit,
+        kind=kind, subject=subject, level=Level(level), present=Level(present),
+        acknowledged=bool(acknowledged), raised_ns=raised_ns, cause=cause,
+        worst=math.nan if worst is None else worst, limit=math.nan if limit is None else limit,
         sigma=math.nan if sigma is None else sigma,
-        cause=cause,
-    )
+    )  # fmt: skip

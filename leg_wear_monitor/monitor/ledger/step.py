@@ -7,7 +7,6 @@ the largest rise between two entries, which is the wear of a sector in 0.14 s of
 """
 
 import json
-import math
 import zlib
 from typing import Any
 
@@ -15,8 +14,8 @@ import attrs
 import numpy as np
 
 from leg_wear_monitor.mechanism.arrays import Floats
-from leg_wear_monitor.monitor.alarms.alarm import Alarm, Level
 from leg_wear_monitor.monitor.ledger.entry import Entry, JointWear
+from leg_wear_monitor.monitor.ledger.rows import alarm_of, alarm_values
 from leg_wear_monitor.monitor.ledger.run import Run
 
 STEPS = 20  # quantisation steps of a surface's largest rise
@@ -54,7 +53,7 @@ def encode(entry: Entry, run: Run, before: Entry, shared: int) -> tuple[bytes, E
         "stamp_ns": entry.stamp_ns,
         "totals": entry.totals,
         "parts": [(j.cycles, j.moving_s, j.replaced_ns, j.sampling_m2) for j in entry.joints],
-        "alarms": [_alarm_values(alarm) for alarm in entry.alarms],
+        "alarms": [alarm_values(alarm) for alarm in entry.alarms],
         "same": same,
         "spans": [_span(entry, i) for i in range(same, len(entry.spans))],
     }
@@ -112,36 +111,6 @@ def _span(entry: Entry, i: int) -> list[int]:
     return [*entry.spans[i], entry.span_epochs[i] if entry.span_epochs else 0]
 
 
-def _alarm_values(alarm: Alarm) -> list[Any]:
-    level, present = int(alarm.level), int(alarm.present)
-    found = (alarm.worst, alarm.limit, alarm.sigma)
-    known = [value if math.isfinite(value) else None for value in found]
-    is_acknowledged = bool(alarm.acknowledged)
-    return [
-        alarm.kind, alarm.subject, level, present, is_acknowledged, alarm.raised_ns, *known, alarm.cause
-    ]  # fmt: skip
-
-
-def _alarm(
-    kind: str,
-    subject: str,
-    level: int,
-    present: int,
-    acknowledged: bool,
-    raised_ns: int,
-    worst: float | None,
-    limit: float | None,
-    sigma: float | None = None,  # before format 10 without it and the cause
-    cause: str = "",
-) -> Alarm:
-    return Alarm(
-        kind=kind, subject=subject, level=Level(level), present=Level(present),
-        acknowledged=acknowledged, raised_ns=raised_ns, cause=cause,
-        worst=math.nan if worst is None else worst, limit=math.nan if limit is None else limit,
-        sigma=math.nan if sigma is None else sigma,
-    )  # fmt: skip
-
-
 def _entry(values: dict[str, Any], before: Entry, depth: Floats) -> Entry:
     spans = [_span(before, i) for i in range(values["same"])] + values["spans"]
     epochs = tuple(epoch for *_, epoch in spans)
@@ -152,7 +121,7 @@ def _entry(values: dict[str, Any], before: Entry, depth: Floats) -> Entry:
             for joint, own, part in zip(before.joints, depth, values["parts"], strict=True)
         ),
         totals=values["totals"],
-        alarms=tuple(_alarm(*each) for each in values["alarms"]),
+        alarms=tuple(alarm_of(*each) for each in values["alarms"]),
         spans=tuple((begin, end) for begin, end, _ in spans),
         span_epochs=epochs if any(epochs) else (),
     )

@@ -18,6 +18,7 @@ _SIZES = 24  # clearances of a joint that are tried; between them a parabola fin
 _LEAST_FACTOR = 0.7  # of the counted clearance
 _CORNER = 1.0e200
 _LATE_SIGMA_S = 0.0015  # about the step between the channels that are tried
+_LEFT = 0.5  # of the mean square: less than a channel's delay, 2.5 ms from the next that is tried, leaves over
 
 # mean square above which an explanation does not explain (docs/explanation/diagnosis.md), and values that
 # linear columns can show and a leg can have
@@ -190,12 +191,21 @@ class Explainer:
         )
 
     def _late(self, rest: Floats, covariance: Floats) -> list[Explanation]:
-        """The best of the other channels; none where there are none."""
+        """The best of the other channels; none where none explains.
+
+        A channel that changes much has a large error in each phase, and could seem to explain anything: it
+        has to explain without that error.
+        """
         if not self.channels:
             return []
         change = np.array([one.column for one in self.channels])
+        exact = np.zeros_like(change)
+        left, without = (Misfits(each, covariance, exact).square for each in (rest - change, rest + exact))
+        possible = left < _LEFT * without
+        if not possible.any():
+            return []
         misfits = Misfits(rest - change, covariance, MODEL_ERROR * change)
-        best = int(misfits.value.argmin())
+        best = int(np.where(possible, misfits.value, np.inf).argmin())
         return [
             Explanation(
                 cause=Cause.LAG,
@@ -226,8 +236,9 @@ class Explainer:
         size = float(np.exp(value))
         square = float(tried(np.array([size])).square[0]) / len(rest)
         poor = max(1.0, square)  # the square of Birge's ratio
-        # sizes far from the best one may fit almost as well: then the mean of all
-        likely = np.exp(-0.5 * (misfits - misfits[best]) / poor)
+        # sizes far from the best one may fit almost as well: then the mean of all. Where none fits, the model
+        # is off by as much in neighbouring phases, which then are few independent numbers
+        likely = np.exp(-0.5 * (misfits - misfits[best]) / (poor * max(1.0, square / POOREST) ** 2))
         mean, own = float((likely @ sizes) / likely.sum()), math.sqrt(poor) * size * sigma
         apart = float(np.sqrt((likely @ np.square(sizes - mean)) / likely.sum()))
         if apart > _APART * own:

@@ -139,6 +139,34 @@ def test_another_channel_is_a_lag_and_no_clearance(explainer: Explainer) -> None
     assert (found[0].cause, found[0].value) == (Cause.LAG, 0.01)
 
 
+def test_a_channel_that_leaves_as_much_as_it_explains_is_no_lag(explainer: Explainer) -> None:
+    """Seen before: G broken out to 2 mm was a lag of 20 ms, which left over more than no cause at all."""
+    random = np.random.default_rng(11)
+    late = (OtherChannel(0.02, 40.0 * random.standard_normal(F)),)
+    legs = Explainer(explainer.model, JOINTS, explainer.baseline, explainer.nuisances, late)
+    open_wide = np.array([3.0e-4, 3.0e-4, 1.4e-3])
+    off = 3.0 * random.standard_normal(F)  # of the model at such a width
+    causes = [one.cause for one in legs.explanations(measured(legs, open_wide, 5, 1, off), 5, NEW)]
+    assert Cause.LAG not in causes
+    assert causes[0] is Cause.CLEARANCE
+
+
+def test_where_no_size_fits_those_that_fit_as_badly_are_in_the_standard_deviation(
+    explainer: Explainer,
+) -> None:
+    """Seen before: G broken out to 2 mm was 0.84 mm with a tenth of it as its standard deviation."""
+    random = np.random.default_rng(5)
+    change = explainer.model.change.copy()
+    change[2, 1:] = 3.0 * random.standard_normal((len(GRID) - 1, F))  # each size changes other phases
+    legs = attrs.evolve(explainer.model, change=change)
+    own = Explainer(legs, JOINTS, explainer.baseline, explainer.nuisances)
+    for seed in range(20):
+        off = 3.0 * np.random.default_rng(seed).standard_normal(F)
+        found = own.explanations(measured(own, [3.0e-4, 3.0e-4, 1.5e-3], 10, seed, off), 10, NEW)
+        knee = next(one for one in found if one.subject == "G")
+        assert abs(knee.value - 1.5e-3) < 3.0 * knee.sigma
+
+
 @pytest.mark.parametrize("scale", [1.0, 3.0])
 def test_a_leg_that_scatters_more_has_a_larger_covariance_in_that_direction(scale: float) -> None:
     random = np.random.default_rng(3)

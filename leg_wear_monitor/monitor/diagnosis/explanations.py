@@ -18,7 +18,9 @@ _SIZES = 24  # clearances of a joint that are tried; between them a parabola fin
 _LEAST_FACTOR = 0.7  # of the counted clearance
 _CORNER = 1.0e200
 _LATE_SIGMA_S = 0.0015  # about the step between the channels that are tried
-_LEFT = 0.5  # of the mean square: less than a channel's delay, 2.5 ms from the next that is tried, leaves over
+_LEFT = (
+    0.5  # of the mean square: less than a channel's delay, 2.5 ms from the next that is tried, leaves over
+)
 
 # mean square above which an explanation does not explain (docs/explanation/diagnosis.md), and values that
 # linear columns can show and a leg can have

@@ -6,6 +6,7 @@ from collections.abc import Sequence
 import attrs
 
 from leg_wear_monitor.monitor.forecast.words import three_digits
+from leg_wear_monitor.monitor.verdict.belief import MEASURED
 from leg_wear_monitor.monitor.verdict.verdict import Figure
 from leg_wear_monitor.playback.result.condition import LifeHours
 from leg_wear_monitor.playback.result.replay_summary import ReplaySummary
@@ -98,7 +99,7 @@ def _findings(summary: ReplaySummary, view: JointView) -> list[tuple[str, str, s
 
 
 def _most_m(views: Sequence[JointView]) -> float:
-    """End of the clearance axis [m]: all limits and what is seen, unless that is far beyond them."""
+    """End of the clearance axis [m]: all limits and marks, unless that is far beyond them."""
     limits = [view.clearance.limit_m for view in views if view.clearance]
     greatest = max(limits, default=1.0e-3)
     ends = [_end_m(view) for view in views if view.clearance]
@@ -106,8 +107,16 @@ def _most_m(views: Sequence[JointView]) -> float:
 
 
 def _end_m(view: JointView) -> float:
-    counted, seen = view.counted_m or 0.0, view.seen_m or 0.0
-    return 1.02 * max(counted, seen + _SIGMAS * (view.seen_sigma_m or 0.0))
+    mark_m, sigma_m = _mark(view) or (0.0, 0.0)
+    return 1.02 * max(view.counted_m or 0.0, mark_m + _SIGMAS * sigma_m)
+
+
+def _mark(view: JointView) -> tuple[float, float] | None:
+    """The clearance that was measured by hand, or else is seen, and its standard deviation [m]."""
+    known = view.clearance
+    if known is not None and known.believed_m is not None and known.believed_by == MEASURED:
+        return known.believed_m, known.believed_sigma_m or 0.0
+    return None if view.seen_m is None else (view.seen_m, view.seen_sigma_m or 0.0)
 
 
 def _clearance(view: JointView, most_m: float) -> ClearanceBar | None:
@@ -115,11 +124,11 @@ def _clearance(view: JointView, most_m: float) -> ClearanceBar | None:
         return None
     limit = _span(view.clearance.limit_m, view.clearance.limit_m, most_m)
     counted = None if view.counted_m is None else _span(0.0, view.counted_m, most_m)
-    if view.seen_m is None:
+    if (mark := _mark(view)) is None:
         return ClearanceBar(limit, counted)
-    reach = _SIGMAS * (view.seen_sigma_m or 0.0)
-    seen = _span(view.seen_m, view.seen_m, most_m)
-    return ClearanceBar(limit, counted, seen, _span(view.seen_m - reach, view.seen_m + reach, most_m))
+    mark_m, reach = mark[0], _SIGMAS * mark[1]
+    seen = _span(mark_m, mark_m, most_m)
+    return ClearanceBar(limit, counted, seen, _span(mark_m - reach, mark_m + reach, most_m))
 
 
 def _span(low: float, high: float, most: float) -> Span:
@@ -176,7 +185,7 @@ def _note(views: Sequence[JointView], most_m: float, life: tuple[int, int] | Non
         return ""
     notes = [
         f"Clearances are radial, all bars from 0 to {1.0e3 * most_m:.3g} mm: blue bar counted, mark the "
-        "estimate with two standard deviations, red line limit.",
+        "estimate or the measurement with two standard deviations, red line limit.",
     ]
     if life:
         notes.append(

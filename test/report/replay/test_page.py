@@ -15,6 +15,8 @@ from leg_wear_monitor.monitor.verdict.verdict import Figure, State
 from leg_wear_monitor.playback.result.leg import ReplayLeg
 from leg_wear_monitor.playback.result.parts import AlarmChange, WornDepth
 from leg_wear_monitor.report.page import page_html, template_text
+from leg_wear_monitor.report.replay.joint_rows import joint_rows
+from leg_wear_monitor.report.replay.joint_view import joint_views
 from leg_wear_monitor.report.replay.page import replay_page
 from leg_wear_monitor.share import share_directory
 
@@ -127,6 +129,19 @@ def test_a_seen_clearance_is_given_where_the_counted_one_is_not():
     assert "estimated 0.500 ± 0.010 mm by the joint encoders" in text
     assert "counted not valid: leg differs from its model" in text
     assert "counted 0" not in text.partition("Clearances are radial")[0]
+
+
+def test_a_clearance_measured_by_hand_has_a_mark_on_its_bar():
+    summary = made_up_summary()
+    measured = {"believed_m": 2.0e-3, "believed_sigma_m": 5.0e-5, "believed_by": "measured"}
+    clearances = {
+        joint: attrs.evolve(one, seen_m=None, seen_sigma_m=None, **(measured if joint == "A" else {}))
+        for joint, one in summary.clearances.items()
+    }
+    views = joint_views(attrs.evolve(summary, clearances=clearances))
+    rows = joint_rows(summary, views).markup
+    assert rows.count('<rect class="seen"') == 1
+    assert "bars from 0 to 2.14 mm" in rows
 
 
 def test_the_marks_of_the_drawing_say_how_much_of_the_limit_is_used():

@@ -254,17 +254,21 @@ class MonitorNode(ClosingNode):
     def _measure(self, wanted: MeasureRequest) -> str:
         text = measured(self._monitor, wanted, audit_time(self._ros_now_ns()))
         self._markers.operated()
+        self._send_state_and_forecast()
+        return text
+
+    def _send_state_and_forecast(self) -> None:
+        """Publish what an operator has changed: a leg at rest has no gait cycle that would."""
         self._send_state()
         if last := self._monitor.last_cycle:
             self._outlets.send(outputs.FORECAST, time.time_ns(), self._messages.forecast(last))
-        return text
 
     def _reset_wear(self, joint: str) -> str:
         stamp_ns = audit_time(self._ros_now_ns())
         if not self._confirmation.is_confirmed(joint):
             raise LegWearError(asked_once(joint, self._monitor.wear_of(joint)))
         done = self._monitor.reset_wear(joint, stamp_ns, "service ~/reset_wear")
-        self._send_state()
+        self._send_state_and_forecast()
         return (
             f"joint {joint}: new surfaces, history kept; ~/undo_reset/{joint} reverts it; "
             f"alarms {done.words}; confirm by walking"
@@ -272,7 +276,9 @@ class MonitorNode(ClosingNode):
 
     def _undo_reset(self, joint: str) -> str:
         stamp_ns = audit_time(self._ros_now_ns())
-        return undone(joint, self._monitor.undo_reset(joint, stamp_ns, "service ~/undo_reset"))
+        was = self._monitor.undo_reset(joint, stamp_ns, "service ~/undo_reset")
+        self._send_state_and_forecast()
+        return undone(joint, was)
 
 
 def _listed(alarms: Sequence[Alarm]) -> str:

@@ -104,8 +104,10 @@ def test_a_part_is_replaced_and_the_ledger_saved(shared_stage, monitor, ledger: 
     assert "not reset yet" in asked.message
     assert "call again within 30 s" in asked.message
     assert [repr(one) for one in wear_monitor.status()] == [repr(one) for one in worn]
+    forecasts = shared_stage.listen("/leg_wear_monitor/forecast", DiagnosticArray)
     answer = trigger(shared_stage, "reset_wear/A")
     assert answer.success
+    shared_stage.wait_for(lambda: bool(forecasts), "the forecast of the new part, while the leg rests")
     joints = {one.name: one.values["clearance_m"] for one in wear_monitor.status() if "joint" in one.name}
     before = {one.name: one.values["clearance_m"] for one in worn if "joint" in one.name}
     assert joints["joint A"] == pytest.approx(3.0e-4, rel=1e-12)

@@ -39,7 +39,7 @@ class LifePoint:
         Largest distance of the toe from that of the ideal linkage in a cycle, mean over the simulated cycles;
         0 without a toe.
     archard_j : (k,) array
-        Integral of F_N |v_t| dt since the life began.
+        Integral of ``F_N |v_t| dt`` since the life began.
     error_m : float
         Estimated error of the mean clearance in the jump to this point.
     rubbing_j_per_cycle : (k,) array
@@ -88,7 +88,7 @@ class Life(Drawable):
     depth : (p, k, 2, N) array, m
         Wear of bushing and journal, by sector.
     rubbing_j_per_cycle : (p, k) array
-        Integral of F_N |v_t| dt over a gait cycle.
+        Integral of ``F_N |v_t| dt`` over a gait cycle.
     """
 
     clearance_joints: tuple[str, ...]

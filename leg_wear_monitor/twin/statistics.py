@@ -179,7 +179,7 @@ class CycleStatistics:
     contact_fraction : array
         Fraction of the time in contact.
     archard_j : array
-        Integral of F_N |v_t| dt.
+        Integral of ``F_N |v_t| dt``.
     clearance_mean_m, clearance_max_m : array
         Radial clearances at its end.
     growth_mean_m, growth_max_m : array

@@ -190,8 +190,11 @@ class _Reading(RequestHandler):
         self.finish(f"{status_code} {HTTPStatus(status_code).phrase}\n")
 
     def log_exception(self, kind: Any, value: Any, trace: Any) -> None:
-        """No line for a refused request: whoever asks could fill a disk; a fault of ours has its line."""
-        if not isinstance(value, HTTPError):
+        """No line for a refused request: whoever asks could fill a disk; a fault of ours has its line.
+
+        Requests that are cut off by the end of the server are no fault.
+        """
+        if not isinstance(value, HTTPError) and not self._hub.is_closing:
             super().log_exception(kind, value, trace)
 
     async def show(self, html: str, policy: str) -> None:

@@ -14,7 +14,9 @@ NAMES = sorted(path.stem for path in (ROOM / "families").glob("[a-z]*.py"))
 # Of the first seeds: some of each kind where kinds follow one another from seed to seed.
 FEW = {
     "configurations": 16,
+    "dashboard": 6,
     "databases": 19,
+    "fleets": 6,
     "floods": 2,
     "kills": 1,
     "ledgers": 13,
@@ -26,8 +28,9 @@ FEW = {
 
 
 # Left to `make test-slow` and `make campaign`: other tests hold their laws in less time
-# (test/monitor/ledger/test_kill.py, test/test_beside.py, test/monitor/inputs/test_bad_input.py, test/bags/).
-LONG = {"floods", "kills", "live_kills", "recordings", "workers"}
+# (test/monitor/ledger/test_kill.py, test/test_beside.py, test/monitor/inputs/test_bad_input.py, test/bags/,
+# test/fleet/, test/dashboard/test_server.py).
+LONG = {"dashboard", "fleets", "floods", "kills", "live_kills", "recordings", "workers"}
 
 
 def run(name: str, *how_many: str) -> None:

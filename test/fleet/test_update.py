@@ -4,6 +4,7 @@ import json
 import os
 import shutil
 import signal
+import threading
 
 import pytest
 from click.testing import CliRunner
@@ -11,13 +12,14 @@ from click.testing import CliRunner
 import leg_wear_monitor as lw
 from leg_wear_monitor.cli.main import cli
 from leg_wear_monitor.errors import ConfigError, LegWearError
-from leg_wear_monitor.fleet.chain.count import count_or_fault
-from leg_wear_monitor.fleet.chain.scan import Found
+from leg_wear_monitor.fleet.chain.count import _counted, count_or_fault
+from leg_wear_monitor.fleet.chain.scan import Found, scan
 from leg_wear_monitor.fleet.description.loader import load_fleet
 from leg_wear_monitor.fleet.directory.leg_directory import LegDirectory
 from leg_wear_monitor.fleet.directory.lock import locked
 from leg_wear_monitor.fleet.fleet import Fleet
 from leg_wear_monitor.fleet.overview.read import load_overview
+from leg_wear_monitor.workers.code import package_digest
 
 pytest.importorskip("pyarrow", reason="the extra 'fleet' is not installed")
 
@@ -249,6 +251,22 @@ def test_a_worker_with_other_code_counts_nothing(home, tmp_path):
     fault = count_or_fault(leg, tmp_path, found, 0, "of another version")
     assert fault == "a worker has another version of leg_wear_monitor; install the same one everywhere"
     assert list(tmp_path.iterdir()) == []
+
+
+def test_what_a_worker_of_a_killed_update_has_counted_is_not_counted_again(walk, describe, tmp_path):
+    """It counts between the planning of the next update and its turn, which waits for it."""
+    walk(tmp_path / "a/1.mcap")
+    (leg,) = load_fleet(describe(tmp_path, "a")).legs
+    (found,), directory = scan(leg, {}), LegDirectory(tmp_path / "out", "a")
+    lines = []
+    with locked(directory.path):
+        arguments = leg, tmp_path / "out", found, 0, package_digest()
+        waiting = threading.Thread(target=lambda: lines.append(count_or_fault(*arguments)))
+        waiting.start()
+        orphan = _counted(leg, directory, found, 0)
+        assert waiting.is_alive()
+    waiting.join()
+    assert lines == [orphan] == list(directory.lines())
 
 
 def test_one_update_at_a_time(home, updated, update):

@@ -9,6 +9,7 @@ from leg_wear_monitor.fleet.chain.scan import Found
 from leg_wear_monitor.fleet.chain.words import words_of
 from leg_wear_monitor.fleet.description.fleet_description import FleetLeg
 from leg_wear_monitor.fleet.directory.leg_directory import LegDirectory, Line
+from leg_wear_monitor.fleet.directory.lock import locked
 from leg_wear_monitor.fleet.tables.cycles import cycle_columns
 from leg_wear_monitor.fleet.tables.parquet import write_parquet
 from leg_wear_monitor.playback.replay import ReplayResult, replay
@@ -34,7 +35,8 @@ def count_recording(leg: FleetLeg, out: Path, found: Found, last_ns: int) -> Lin
 
     Its table and its record are written before its wear is in the ledger, the record as pending. If the
     process is killed after that, the next replay finds all of it in the ledger, and the pending record holds;
-    if before, it is counted again, and replaces both.
+    if before, it is counted again, and replaces both. A worker of a killed update may go on for some seconds:
+    it is waited for, and what it has counted is not counted again.
 
     Parameters
     ----------
@@ -56,6 +58,17 @@ def count_recording(leg: FleetLeg, out: Path, found: Found, last_ns: int) -> Lin
         If the leg's parameters or its ledger are unusable.
     """
     directory = LegDirectory(out, leg.id)
+    with locked(directory.path, waits=True):
+        done = next((line for line in directory.lines() if _is_done(line, found)), None)
+        return done or _counted(leg, directory, found, last_ns)
+
+
+def _is_done(line: Line, found: Found) -> bool:
+    return line["key"] == found.key and Outcome(line["outcome"]).is_final
+
+
+def _counted(leg: FleetLeg, directory: LegDirectory, found: Found, last_ns: int) -> Line:
+    """Count a recording into a leg that is locked."""
     try:
         if found.fault:
             raise RecordingError("", "", found.fault)

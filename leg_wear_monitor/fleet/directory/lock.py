@@ -9,8 +9,15 @@ from leg_wear_monitor.errors import ConfigError
 
 
 @contextmanager
-def locked(out: Path) -> Iterator[None]:
-    """Lock the directory of a fleet; the system releases the lock of a process that is killed.
+def locked(out: Path, *, waits: bool = False) -> Iterator[None]:
+    """Lock a directory; the system releases the lock of a process that is killed.
+
+    Parameters
+    ----------
+    out : pathlib.Path
+        Of a fleet, or of a leg.
+    waits : bool
+        Whether to wait for another process.
 
     Raises
     ------
@@ -24,7 +31,7 @@ def locked(out: Path) -> Iterator[None]:
         raise ConfigError(str(out), "", f"cannot be written: {error.strerror}") from error
     with file:
         try:
-            fcntl.flock(file, fcntl.LOCK_EX | fcntl.LOCK_NB)
+            fcntl.flock(file, fcntl.LOCK_EX | (0 if waits else fcntl.LOCK_NB))
         except OSError as error:
             raise ConfigError(
                 str(out), "", "is being updated by another process; wait for its end"

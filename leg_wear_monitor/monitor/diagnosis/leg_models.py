@@ -20,7 +20,7 @@ from leg_wear_monitor.monitor.diagnosis.state import TorqueState
 from leg_wear_monitor.monitor.ledger.entry import CommissionedTorque
 from leg_wear_monitor.twin.reference.torque_reference import TorqueReference
 
-COMMISSIONING_CYCLES = 60
+COMMISSIONING_CYCLES = 50  # a recording of a minute has them
 
 # misfit from which on names of joints are not sure: they are right up to 3 in the air, partly wrong at 23
 # with load friction of 20 %, and from 40 on the ground (docs/explanation/diagnosis.md)

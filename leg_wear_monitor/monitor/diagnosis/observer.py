@@ -1,7 +1,7 @@
 """The drive torque in the monitor: from its samples to clearances, and to what has changed.
 
 All evaluation takes place at the ends of evaluation periods, which depend on the order of arrival only. Each
-period evaluates the gait cycles that ended; each second one simulates a cycle for the reference, if needed.
+period evaluates the gait cycles that ended, and goes on with the simulation of a reference, if one is needed.
 """
 
 import math
@@ -122,7 +122,7 @@ class TorqueObserver:
             self._evidence.review(state, self.config)
 
     def end_period(self, counted_m: Floats, depth: Floats) -> Correction | None:
-        """Evaluate the gait cycles that ended, and simulate one more for the reference.
+        """Evaluate the gait cycles that ended, and go on with what is simulated for the reference.
 
         Parameters
         ----------

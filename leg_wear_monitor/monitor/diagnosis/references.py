@@ -128,9 +128,8 @@ class References:
     def _continue(
         self, run: TorqueReferenceRun, state: TorqueState, counted_m: Floats, depth: Floats
     ) -> bool:
-        """Simulate one more gait cycle in each second period."""
-        state.pause = not state.pause
-        found = None if state.pause else run.advance()
+        """Go on for a period with what is being simulated."""
+        found = run.advance()
         if found is not None and state.is_identifying:
             self._identify(state, found, counted_m, depth)
         elif found is not None:

@@ -68,8 +68,6 @@ class TorqueState:
         Reasons of the last gait cycles in a row that were not used.
     off_cadence_rpm : float
         Cadence of the last gait cycle if it is not the commanded one, else NaN.
-    pause : bool
-        Whether the last period did not simulate; each second one does, so that a monitor has time for both.
     parameters : LegParameters or None
         Identified ones, of which references are made; None before.
     rounds : int
@@ -97,7 +95,6 @@ class TorqueState:
     not_used: dict[str, int] = attrs.field(factory=dict)
     unused: tuple[NotUsed, ...] = ()
     off_cadence_rpm: float = math.nan
-    pause: bool = False
     parameters: LegParameters | None = None
     rounds: int = 0
     is_identifying: bool = False

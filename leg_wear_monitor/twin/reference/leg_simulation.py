@@ -1,14 +1,14 @@
-"""The drive torque of one simulated leg, whose crank turns in the same way in each gait cycle."""
-
-from typing import NamedTuple
+"""The drive torque of simulated legs, whose crank turns in the same way in each gait cycle."""
 
 import numpy as np
 
-from leg_wear_monitor.dynamics.clearance.stepper import INTERVALS, ClearanceStepper, Snapshot
+from leg_wear_monitor.dynamics.clearance.advance import ADVANCE
+from leg_wear_monitor.dynamics.clearance.stepper import INTERVALS, ClearanceStepper
 from leg_wear_monitor.dynamics.run.drive import quintic
 from leg_wear_monitor.dynamics.run.protocol import DONE
 from leg_wear_monitor.dynamics.run.run_statistics import TORQUE, new_run_statistics
 from leg_wear_monitor.dynamics.simulation import prepare
+from leg_wear_monitor.kernel import entry
 from leg_wear_monitor.mechanism.arrays import Floats
 from leg_wear_monitor.mechanism.ideal import TURN
 from leg_wear_monitor.mechanism.spec import Mechanism
@@ -18,12 +18,36 @@ from leg_wear_monitor.twin.reference.reference import worn_to
 
 POINTS = INTERVALS // 4  # of a gait cycle: whole intervals of the stepper
 
+_advance = ADVANCE.call
 
-class LegSimulationSnapshot(NamedTuple):
-    """State of a `LegSimulation`: that of its stepper, and the impulse of the torque [N m s]."""
 
-    stepper: Snapshot
-    impulse: float
+@entry
+def simulate_torque(
+    advance_address, model, feeds_back, state, pieces, period, turn, statistics, work, polynomial, torque
+):
+    """Simulate gait cycles, and write their mean torques between equal steps of time.
+
+    ``pieces`` (POINTS, 7) are the crank's motion in the first cycle, which takes ``period`` [s] for ``turn``
+    [rad]; ``torque`` (cycles, POINTS) [N m]. Returns DONE, or the reason for stopping.
+    """
+    cycles, points = torque.shape
+    impulse = statistics.drive_integral[TORQUE]
+    for cycle in range(cycles):
+        for i in range(points):
+            for j in range(polynomial.shape[0]):
+                polynomial[j] = pieces[i, j]
+            polynomial[0] += cycle * period
+            polynomial[1] += cycle * turn
+            # a little past the end of an interval, or rounding could leave it out
+            end = (cycle * points + i + 1.01) * period / points
+            status, _ = _advance(
+                advance_address, (model, feeds_back, state, polynomial, end, statistics, work)
+            )
+            if status != DONE:
+                return status
+            before, impulse = impulse, statistics.drive_integral[TORQUE]
+            torque[cycle, i] = (impulse - before) * (points / period)
+    return DONE
 
 
 class LegSimulation:
@@ -32,38 +56,36 @@ class LegSimulation:
     Parameters
     ----------
     mechanism : Mechanism
-
-    Attributes
-    ----------
-    profile : CrankProfile
     """
-
-    profile: CrankProfile
 
     def __init__(self, mechanism: Mechanism) -> None:
         self._mechanism = mechanism
         self._parameters: LegParameters | None = None
-        self._statistics = new_run_statistics(len(mechanism.joints))
 
-    def use(self, profile: CrankProfile) -> None:
-        """Turn the crank as a profile does, from the next leg on."""
-        self.profile = profile
-        self._period = TURN / abs(profile.speed)
-        self._turn = float(np.copysign(TURN, profile.speed))
-        motions = [profile.at(phi) for phi in even_angles(profile)]
-        step = self._period / POINTS
-        self._pieces = np.array([quintic(i * step, motions[i], step, motions[i + 1]) for i in range(POINTS)])
-
-    def begin(self, parameters: LegParameters, clearance_m: Floats, depth: Floats) -> None:
-        """Set a leg in motion.
+    def torque(
+        self,
+        profile: CrankProfile,
+        parameters: LegParameters,
+        clearance_m: Floats,
+        depth: Floats,
+        cycles: int,
+    ) -> Floats | None:
+        """Simulate a leg from the start.
 
         Parameters
         ----------
+        profile : CrankProfile
         parameters : LegParameters
         clearance_m : (k,) array
             Mean clearances [m].
         depth : (k, 2, N) array
             Wear depths [m], which show where joints are worn.
+        cycles : int
+
+        Returns
+        -------
+        (cycles, POINTS) array or None
+            Mean torque [N m] between equal steps of time of each gait cycle; None if it cannot be simulated.
 
         Raises
         ------
@@ -72,39 +94,22 @@ class LegSimulation:
         """
         if parameters != self._parameters:
             self._prepare(parameters)
+        period, turn = TURN / abs(profile.speed), float(np.copysign(TURN, profile.speed))
+        motions, step = [profile.at(phi) for phi in even_angles(profile)], period / POINTS
+        pieces = np.array([quintic(i * step, motions[i], step, motions[i + 1]) for i in range(POINTS)])
         clearance, worn = worn_to(self._fresh, depth, clearance_m)
         self._setup.contacts.clearance[:] = clearance
         self._setup.surfaces.depth[:] = worn
-        self._stepper = ClearanceStepper(self._setup, self._period / INTERVALS, tables=self._tables)
-        start = self.profile.at(0.0)
-        self._stepper.init(start.angle, start.speed)
-        self._statistics.drive_integral[TORQUE] = 0.0
-
-    def cycle(self, number: int) -> Floats | None:
-        """Mean torque (POINTS,) [N m] in a gait cycle, the next one; None if it cannot be simulated."""
-        impulses = np.empty(POINTS + 1)
-        impulses[0] = self._statistics.drive_integral[TORQUE]
-        for i in range(POINTS):
-            piece = self._pieces[i].copy()
-            piece[0] += number * self._period
-            piece[1] += number * self._turn
-            # a little past the end of an interval, or rounding could leave it out
-            end = (number * POINTS + i + 1.01) * self._period / POINTS
-            status, _ = self._stepper.advance(piece, end, self._statistics)
-            if status != DONE:
-                return None
-            impulses[i + 1] = self._statistics.drive_integral[TORQUE]
-        return np.asarray(np.diff(impulses) * (POINTS / self._period))
-
-    def snapshot(self) -> LegSimulationSnapshot:
-        """A copy of the state of the leg that is in motion."""
-        impulse = float(self._statistics.drive_integral[TORQUE])
-        return LegSimulationSnapshot(self._stepper.snapshot(), impulse)
-
-    def restore(self, snapshot: LegSimulationSnapshot) -> None:
-        """Restore the state of a leg that has begun in the same way."""
-        self._stepper.restore(snapshot.stepper)
-        self._statistics.drive_integral[TORQUE] = snapshot.impulse
+        stepper = ClearanceStepper(self._setup, period / INTERVALS, tables=self._tables)
+        stepper.init(motions[0].angle, motions[0].speed)
+        statistics = new_run_statistics(len(self._mechanism.joints))
+        polynomial, torque = np.empty(7), np.empty((cycles, POINTS))
+        status = simulate_torque(
+            stepper.advance_address(polynomial, statistics), stepper.model,
+            self._setup.surfaces.feeds_back, stepper.state, pieces, period, turn, statistics, stepper.work,
+            polynomial, torque,
+        )  # fmt: skip
+        return torque if status == DONE else None
 
     def _prepare(self, parameters: LegParameters) -> None:
         """Prepare the simulation of legs with given masses, lengths and friction."""

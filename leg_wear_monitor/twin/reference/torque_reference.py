@@ -2,18 +2,24 @@
 
 A clearance shows in where in the gait cycle the torque is rough. That depends on how the crank turns, so the
 leg is simulated under the measured profile of the crank: with the clearances that are expected, and with each
-of them wider in turn. That takes a minute of a processor, so it goes on a gait cycle at a time, in a thread:
-preparing a leg alone takes longer than the samples of a live leg may wait.
+of them wider in turn. That takes seconds of a processor, so threads of low priority do it while the leg walks
+on; compiled code does not hold the interpreter's lock. A reference is there a number of evaluation periods
+after it was begun that depends on what is to be simulated alone: a replay gives what the live monitor gave.
 
 It depends on the leg's masses, lengths and friction, too: legs with each body heavier and longer in turn, and
 one with more friction, show which of them a leg has.
 """
 
+import os
+import sys
+import threading
 from collections.abc import Sequence
-from concurrent.futures import Future, ThreadPoolExecutor, wait
+from concurrent.futures import Future, ThreadPoolExecutor
+from contextlib import suppress
 from typing import NamedTuple
 
 import attrs
+import numba
 import numpy as np
 from numpy.typing import NDArray
 
@@ -22,14 +28,11 @@ from leg_wear_monitor.mechanism.arrays import Floats
 from leg_wear_monitor.mechanism.spec import Mechanism
 from leg_wear_monitor.twin.reference.crank_profile import CrankProfile
 from leg_wear_monitor.twin.reference.leg_parameters import LegParameters
-from leg_wear_monitor.twin.reference.leg_simulation import (
-    POINTS,
-    LegSimulation,
-    LegSimulationSnapshot,
-    even_angles,
-)
+from leg_wear_monitor.twin.reference.leg_simulation import LegSimulation, even_angles
 
-CYCLES = 40  # simulated for each wider leg, and twice as many for each other one
+CYCLES = 20  # simulated for each wider leg, and twice as many for each other one
+
+PACE = 6  # simulated gait cycles in an evaluation period, a quarter cycle; a core does twice as many
 WIDER = (1.2, 1.35, 1.5, 2.0, 3.0, 5.0, 8.0)  # factors on the expected clearance, one joint at a time
 
 WORN, NARROWER = 1.2, 0.8  # a clearance over the new one, and a factor on the others beside it
@@ -38,6 +41,7 @@ HEAVIER, LONGER = 0.04, 0.004  # of a body's mass and length, one body at a time
 ROUGHER = 1.5  # factor on the friction in the joints
 
 _SETTLING = 2  # gait cycles before those that count
+_NICE = 10
 _LEAST_CLEARANCE_M = 5.0e-5
 
 HalfFloats = NDArray[np.float16]
@@ -83,27 +87,20 @@ class _Leg(NamedTuple):
 
 
 class TorqueReferenceSnapshot(NamedTuple):
-    """State of a `TorqueReferenceRun`; plain arrays and numbers.
-
-    ``ahead`` holds the torque (POINTS,) of the gait cycle that is simulated but not counted yet, None instead
-    of it where the leg failed; it is empty before the first. ``simulation`` is the state after it.
-    """
+    """State of a `TorqueReferenceRun`; plain arrays and numbers."""
 
     profile: CrankProfile
     legs: tuple[_Leg, ...]
     depth: Floats
     done: tuple[HalfFloats, ...]
-    torque: HalfFloats
-    cycle: int
-    ahead: tuple[Floats | None, ...]
-    simulation: LegSimulationSnapshot | None
+    periods: int
 
 
 class TorqueReferenceRun:
-    """Simulates a torque reference, a gait cycle at a time.
+    """Simulates a torque reference while evaluation periods pass.
 
-    A thread simulates the next gait cycle while the caller goes on. `advance` waits for it: what it returns
-    depends on the number of calls alone.
+    Threads simulate some legs ahead of the caller. `advance` waits for those that are due: what it returns
+    depends on the number of calls alone. There are as many threads as numba may use (NUMBA_NUM_THREADS).
 
     Parameters
     ----------
@@ -115,12 +112,14 @@ class TorqueReferenceRun:
         joints = [mechanism.clearances[joint] for joint in mechanism.clearance_joints]
         self._radius = np.array([joint.bushing_radius for joint in joints])
         self._fresh = np.array([joint.radial_clearance for joint in joints])
+        self._profile, self._depth = CrankProfile.steady(1.0), np.zeros(0)
         self._legs: tuple[_Leg, ...] = ()
         self._done: tuple[HalfFloats, ...] = ()
-        self._torque, self._cycle = np.zeros((0, POINTS), np.float16), 0
-        self._pool = ThreadPoolExecutor(1, "torque-reference")
-        self._ahead: Future[Floats | None] | None = None
-        self._simulation = LegSimulation(mechanism)  # of the thread alone while that is at work
+        self._periods = 0
+        self._threads = numba.config.NUMBA_NUM_THREADS
+        self._pool = ThreadPoolExecutor(self._threads, "torque-reference", _lower_priority)
+        self._ahead: list[Future[HalfFloats | None]] = []
+        self._of_thread = threading.local()
 
     @property
     def is_busy(self) -> bool:
@@ -130,7 +129,7 @@ class TorqueReferenceRun:
     @property
     def progress(self) -> float:
         """Fraction of the gait cycles that are done; 0 where nothing was begun."""
-        return sum(len(one) for one in self._done) / max(1, sum(map(self._cycles_of, self._legs)))
+        return min(1.0, PACE * self._periods / max(1, sum(map(self._cost_of, self._legs))))
 
     def begin(
         self,
@@ -177,8 +176,7 @@ class TorqueReferenceRun:
         legs = [_Leg(part.parameters, clearance_m) for clearance_m in part.clearance_m]
         self._begin(legs, depth, part.profile)
         self._done = part.torque_nm
-        if self.is_busy:
-            self._clear()
+        self._periods = -(-sum(self._cost_of(leg) for leg in legs[: len(self._done)]) // PACE)
 
     @property
     def part(self) -> TorqueReference | None:
@@ -186,7 +184,7 @@ class TorqueReferenceRun:
         if not (self._done and self.is_busy):
             return None
         clearance_m = np.array([leg.clearance_m for leg in self._legs])
-        return TorqueReference(self._simulation.profile, clearance_m, self._done, self._legs[0].parameters)
+        return TorqueReference(self._profile, clearance_m, self._done, self._legs[0].parameters)
 
     def begin_identification(
         self, clearance_m: Floats, depth: Floats, profile: CrankProfile, near: LegParameters
@@ -202,89 +200,76 @@ class TorqueReferenceRun:
         self._begin([_Leg(each, clearance_m) for each in changed], depth, profile)
 
     def advance(self) -> TorqueReference | None:
-        """Count the gait cycle that was simulated, and begin the next; the reference after the last one.
+        """Note that an evaluation period has passed; return the reference when all of it is due.
 
         A leg that cannot be simulated ends it without one.
         """
         if not self.is_busy:
             return None
-        if self._ahead is not None:
-            torque, self._ahead = self._ahead.result(), None
+        self._periods += 1
+        self._look_ahead()
+        due = PACE * self._periods - sum(self._cost_of(leg) for leg in self._legs[: len(self._done)])
+        while self.is_busy and self._cost_of(self._legs[len(self._done)]) <= due:
+            due -= self._cost_of(self._legs[len(self._done)])
+            torque = self._ahead.pop(0).result()
             if torque is None:
-                self._legs, self._done = (), ()
+                self._begin((), self._depth, self._profile)
                 return None
-            self._count(torque)
+            self._done = (*self._done, torque)
+            self._look_ahead()
         if self.is_busy:
-            leg = self._legs[len(self._done)]
-            self._ahead = self._pool.submit(self._simulated, leg, self._depth, self._cycle)
             return None
         clearance_m = np.array([leg.clearance_m for leg in self._legs])
-        return TorqueReference(self._simulation.profile, clearance_m, self._done, self._legs[0].parameters)
+        return TorqueReference(self._profile, clearance_m, self._done, self._legs[0].parameters)
 
     def snapshot(self) -> TorqueReferenceSnapshot:
-        """A copy of the whole state."""
-        ahead = () if self._ahead is None else (self._ahead.result(),)
-        return TorqueReferenceSnapshot(
-            self._simulation.profile,
-            self._legs,
-            self._depth,
-            self._done,
-            self._torque.copy(),
-            self._cycle,
-            ahead,
-            self._simulation.snapshot() if ahead and ahead[0] is not None else None,
-        )
+        """The whole state; legs that are simulated ahead are simulated again."""
+        return TorqueReferenceSnapshot(self._profile, self._legs, self._depth, self._done, self._periods)
 
     def restore(self, snapshot: TorqueReferenceSnapshot) -> None:
         """Restore a snapshot of a run of the same mechanism; it continues bit for bit."""
-        self._settle()
-        self._legs, self._depth, self._done = snapshot.legs, snapshot.depth, snapshot.done
-        self._simulation.use(snapshot.profile)
-        self._torque, self._cycle = snapshot.torque.copy(), snapshot.cycle
-        if snapshot.simulation is not None:
-            leg = self._legs[len(self._done)]
-            self._simulation.begin(leg.parameters, leg.clearance_m, self._depth)
-            self._simulation.restore(snapshot.simulation)
-        if snapshot.ahead:
-            self._ahead = Future()
-            self._ahead.set_result(snapshot.ahead[0])
-
-    def _settle(self) -> None:
-        """Wait for the thread, and forget what it simulated."""
-        if self._ahead is not None:
-            wait([self._ahead])
-            self._ahead = None
+        self._begin(snapshot.legs, snapshot.depth, snapshot.profile)
+        self._done, self._periods = snapshot.done, snapshot.periods
 
     def _begin(self, legs: Sequence[_Leg], depth: Floats, profile: CrankProfile) -> None:
-        self._settle()
-        self._legs, self._depth, self._done = tuple(legs), depth.copy(), ()
-        self._simulation.use(profile)
-        self._clear()
+        for one in self._ahead:
+            one.cancel()
+        self._ahead, self._periods = [], 0
+        self._legs, self._depth, self._done, self._profile = tuple(legs), depth.copy(), (), profile
 
-    def _clear(self) -> None:
-        """Make room for the next leg."""
-        cycles = self._cycles_of(self._legs[len(self._done)])
-        self._torque, self._cycle = np.zeros((cycles, POINTS), np.float16), 0
-
-    def _count(self, torque: Floats) -> None:
-        """Count a gait cycle with its torque (POINTS,)."""
-        if self._cycle >= _SETTLING:
-            self._torque[self._cycle - _SETTLING] = torque
-        self._cycle += 1
-        if self._cycle == _SETTLING + len(self._torque):
-            self._done = (*self._done, self._torque)
-            if self.is_busy:
-                self._clear()
+    def _look_ahead(self) -> None:
+        """Let the threads simulate the next legs: not all, since a program's end waits for them."""
+        first = len(self._done) + len(self._ahead)
+        for leg in self._legs[first : len(self._done) + 2 * self._threads]:
+            arguments = self._profile, leg, self._depth, self._cycles_of(leg)
+            self._ahead.append(self._pool.submit(self._simulated, *arguments))
 
     def _cycles_of(self, leg: _Leg) -> int:
-        """Gait cycles that are simulated for a leg."""
+        """Gait cycles of a leg that count."""
         return CYCLES if (leg.clearance_m != self._legs[0].clearance_m).any() else 2 * CYCLES
 
-    def _simulated(self, leg: _Leg, depth: Floats, cycle: int) -> Floats | None:
-        """Mean torque (POINTS,) in the next gait cycle of a leg; None if it cannot be simulated."""
-        if cycle == 0:
-            try:
-                self._simulation.begin(leg.parameters, leg.clearance_m, depth)
-            except AssemblyError:  # with such lengths it does not close
-                return None
-        return self._simulation.cycle(cycle)
+    def _cost_of(self, leg: _Leg) -> int:
+        """Gait cycles that are simulated for a leg, with those in which it settles."""
+        return _SETTLING + self._cycles_of(leg)
+
+    def _simulated(
+        self, profile: CrankProfile, leg: _Leg, depth: Floats, cycles: int
+    ) -> HalfFloats | None:
+        """Mean torque (cycles, POINTS) of a leg; None if it cannot be simulated."""
+        own = self._of_thread
+        if not hasattr(own, "simulation"):
+            own.simulation = LegSimulation(self._mechanism)
+        try:
+            torque = own.simulation.torque(
+                profile, leg.parameters, leg.clearance_m, depth, _SETTLING + cycles
+            )
+        except AssemblyError:  # with such lengths it does not close
+            return None
+        return None if torque is None else torque[_SETTLING:].astype(np.float16)
+
+
+def _lower_priority() -> None:
+    """Lower the priority of this thread: samples come first."""
+    if sys.platform == "linux":  # elsewhere, it would be that of the whole process
+        with suppress(OSError):
+            os.setpriority(os.PRIO_PROCESS, threading.get_native_id(), _NICE)

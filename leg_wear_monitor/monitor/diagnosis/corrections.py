@@ -11,6 +11,7 @@ from leg_wear_monitor.monitor.diagnosis.diagnosis import Change
 from leg_wear_monitor.monitor.diagnosis.evidence import SETTLING_CYCLES
 from leg_wear_monitor.monitor.diagnosis.state import TorqueState
 from leg_wear_monitor.monitor.ledger.entry import CommissionedTorque
+from leg_wear_monitor.twin.reference.crank_profile import mean_profile
 
 # of the counted clearance: smaller openings are named wrongly where masses are 5 % off (diagnosis.md)
 CORRECTED_FROM = 1.3
@@ -52,5 +53,7 @@ def settle(state: TorqueState, correction: Correction, counted_m: Floats) -> Non
         sigma_m,
         before.delay_s if before else 0.0,
         before.time_constant_s if before else 0.0,
+        mean_profile([cycle.profile for cycle in cycles]).speed,
     )
+    state.set_aside = ()
     state.settled = (*state.settled, attrs.evolve(change, is_corrected=True))

@@ -24,6 +24,7 @@ from leg_wear_monitor.monitor.diagnosis.signed_cycle import find_sensor, signed_
 from leg_wear_monitor.monitor.diagnosis.state import UNUSED_CYCLES, TorqueState
 from leg_wear_monitor.monitor.diagnosis.torque_samples import NO_TORQUE_SAMPLES, after, extended
 from leg_wear_monitor.monitor.ledger.entry import CommissionedTorque
+from leg_wear_monitor.twin.reference.crank_profile import mean_profile
 from leg_wear_monitor.twin.reference.leg_parameters import LegParameters
 from leg_wear_monitor.twin.reference.torque_reference import TorqueReference, TorqueReferenceSnapshot
 from leg_wear_monitor.twin.sample import Samples
@@ -118,6 +119,7 @@ class TorqueObserver:
         known = state.commissioned
         if known is not None and known.stamp_ns > since_ns:  # some of them are in it
             state.commissioned = None
+        state.set_aside = tuple(one for one in state.set_aside if one.stamp_ns <= since_ns)
         if state.reference is not None:
             self._evidence.review(state, self.config)
 
@@ -157,7 +159,7 @@ class TorqueObserver:
 
     def replaced(self, counted_m: Floats) -> None:
         """Start again after the replacement of a part: the leg has to be commissioned again."""
-        self.state.settled, self.state.commissioned = (), None
+        self.state.settled, self.state.commissioned, self.state.set_aside = (), None, ()
         self._restart(counted_m)
         self._models.forget()
 
@@ -267,7 +269,10 @@ class TorqueObserver:
         state = self.state
         if state.commissioned is not None or state.changes or len(state.cycles) < COMMISSIONING_CYCLES:
             return
-        state.commissioned = CommissionedTorque(state.cycles[-1].end_ns, state.counted_m, state.signatures)
+        speed = mean_profile([cycle.profile for cycle in state.cycles]).speed
+        state.commissioned = CommissionedTorque(
+            state.cycles[-1].end_ns, state.counted_m, state.signatures, speed=speed
+        )
         self._evidence.review(state, self.config)
 
     def _restart(self, counted_m: Floats) -> None:

@@ -28,6 +28,8 @@ UNLIKE_CYCLES = 20  # in a row, until a new reference is made
 
 ROUNDS = 3  # of identification
 
+_MADE = 4  # references that are kept while the crank turns otherwise
+
 _FAR = 0.1  # of a counted clearance: the reference is renewed where it was made for another one
 
 
@@ -140,9 +142,9 @@ class References:
         return False
 
     def _choose(self, state: TorqueState, counted_m: Floats, depth: Floats) -> bool:
-        """Use a given reference if the crank turns as in it, or begin one."""
+        """Use a given reference, or one that was made, if the crank turns as in it; or begin one."""
         profile = mean_profile([cycle.profile for cycle in state.cycles])
-        for one in self._given:
+        for one in (*state.made, *self._given):
             if profile.departure(one.profile) <= UNLIKE:
                 self._install(state, one)
                 return True
@@ -183,10 +185,24 @@ class References:
         """
         before, off = state.reference, self._models.misfit(state)
         state.reference = reference
+        _set_aside(state, reference.profile.speed)
         self._models.forget()
         is_other = before is not None and state.parameters not in (None, before.parameters)
         if before is not None and is_other and self._models.misfit(state) > off:
             state.reference, state.parameters, state.rounds = before, before.parameters, ROUNDS
+        others = [one for one in state.made if one.profile.departure(state.reference.profile) > UNLIKE]
+        state.made = (state.reference, *others)[:_MADE]
+
+
+def _set_aside(state: TorqueState, speed: float) -> None:
+    """Compare with the baseline of a cadence, if there is one: inertia is another at another speed.
+
+    Compared with the baseline of 60 rpm, a healthy leg at 57 rpm had a wide joint A.
+    """
+    known = [one for one in (state.commissioned, *state.set_aside) if one is not None]
+    own = [one for one in known if not one.speed or abs(one.speed / speed - 1.0) <= UNLIKE]
+    state.commissioned = own[0] if own else None
+    state.set_aside = tuple(one for one in known if one is not state.commissioned)
 
 
 def _is_far(reference: TorqueReference, counted_m: Floats) -> bool:

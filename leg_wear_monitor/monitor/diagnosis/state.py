@@ -50,6 +50,11 @@ class TorqueState:
     counted_m : (k,) array
         Counted clearances that the detector compares with.
     commissioned : CommissionedTorque or None
+        Of the reference's cadence.
+    set_aside : tuple of CommissionedTorque
+        Of the same leg, each of another cadence.
+    made : tuple of TorqueReference
+        The last references that were simulated, each for another motion of the crank.
     detector : DetectorState or None
     fit : ClearanceFit or None
     fit_cycles : int
@@ -85,6 +90,8 @@ class TorqueState:
     cycles: tuple[SignedCycle, ...] = ()
     reference: TorqueReference | None = None
     commissioned: CommissionedTorque | None = None
+    set_aside: tuple[CommissionedTorque, ...] = ()
+    made: tuple[TorqueReference, ...] = ()
     detector: DetectorState | None = None
     fit: ClearanceFit | None = None
     fit_cycles: int = 0

@@ -315,6 +315,8 @@ class CommissionedTorque:
         Standard deviations of the clearances: above 0 where a correction made them.
     delay_s, time_constant_s : float
         Of the torque sensor, by these signatures.
+    speed : float
+        Mean speed of the crank [rad/s]; 0 where it is not known.
     """
 
     stamp_ns: int
@@ -323,6 +325,7 @@ class CommissionedTorque:
     sigma_m: Floats = attrs.field()
     delay_s: float = 0.0
     time_constant_s: float = 0.0
+    speed: float = 0.0
 
     @sigma_m.default
     def _as_counted(self) -> Floats:

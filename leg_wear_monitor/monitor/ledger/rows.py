@@ -110,13 +110,14 @@ def write_event(db: sqlite3.Connection, event: Event) -> None:
             parts = (event.clearance_m, event.signatures, event.sigma_m)
             db.execute(
                 "INSERT INTO torque_commissioning (stamp_ns, cycles, clearance_m, signatures, sigma_m, "
-                "delay_s, time_constant_s) VALUES (?, ?, ?, ?, ?, ?, ?)",
+                "delay_s, time_constant_s, speed_radps) VALUES (?, ?, ?, ?, ?, ?, ?, ?)",
                 (
                     event.stamp_ns,
                     event.cycles,
                     *(part.astype("<f8").tobytes() for part in parts),
                     event.delay_s,
                     event.time_constant_s,
+                    event.speed,
                 ),
             )
         case IdentifiedLeg(stamp_ns, names, mass, length, friction):
@@ -192,15 +193,16 @@ def read_commissioned(db: sqlite3.Connection) -> Commissioned | None:
 def read_commissioned_torque(db: sqlite3.Connection) -> CommissionedTorque | None:
     """Stored signature of the drive torque, None if it was not commissioned since a part was replaced."""
     row = db.execute(
-        "SELECT stamp_ns, cycles, delay_s, time_constant_s, clearance_m, signatures, sigma_m "
+        "SELECT stamp_ns, cycles, delay_s, time_constant_s, speed_radps, clearance_m, signatures, sigma_m "
         "FROM torque_commissioning "
         "WHERE stamp_ns > (SELECT coalesce(max(replaced_ns), 0) FROM joint) ORDER BY id DESC LIMIT 1"
     ).fetchone()
     if row is None:
         return None
-    clearance_m, signatures, sigma_m = (np.frombuffer(part, "<f8").astype(float) for part in row[4:])
+    stamp_ns, cycles, delay_s, time_constant_s, speed = row[:5]
+    clearance_m, signatures, sigma_m = (np.frombuffer(part, "<f8").astype(float) for part in row[5:])
     return CommissionedTorque(
-        row[0], clearance_m, signatures.reshape(row[1], -1), sigma_m, delay_s=row[2], time_constant_s=row[3]
+        stamp_ns, clearance_m, signatures.reshape(cycles, -1), sigma_m, delay_s, time_constant_s, speed
     )
 
 

@@ -252,9 +252,7 @@ class TorqueReferenceRun:
         """Gait cycles that are simulated for a leg, with those in which it settles."""
         return _SETTLING + self._cycles_of(leg)
 
-    def _simulated(
-        self, profile: CrankProfile, leg: _Leg, depth: Floats, cycles: int
-    ) -> HalfFloats | None:
+    def _simulated(self, profile: CrankProfile, leg: _Leg, depth: Floats, cycles: int) -> HalfFloats | None:
         """Mean torque (cycles, POINTS) of a leg; None if it cannot be simulated."""
         own = self._of_thread
         if not hasattr(own, "simulation"):

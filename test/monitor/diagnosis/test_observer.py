@@ -9,6 +9,7 @@ import pytest
 from leg_wear_monitor.mechanism.ideal import TURN
 from leg_wear_monitor.monitor.config.settings import MonitorConfig
 from leg_wear_monitor.monitor.diagnosis import leg_models, references
+from leg_wear_monitor.monitor.diagnosis import observer as observer_module
 from leg_wear_monitor.monitor.diagnosis.body_torques import body_torques
 from leg_wear_monitor.monitor.diagnosis.diagnosis import Cause, DiagnosisState
 from leg_wear_monitor.monitor.diagnosis.leg_models import COMMISSIONING_CYCLES
@@ -19,6 +20,7 @@ from leg_wear_monitor.monitor.diagnosis.state import UNUSED_CYCLES
 from leg_wear_monitor.monitor.ledger.entry import CommissionedTorque
 from leg_wear_monitor.twin.kinds import CRANK, TORQUE
 from leg_wear_monitor.twin.reference import torque_reference
+from leg_wear_monitor.twin.reference.crank_profile import CrankProfile
 from leg_wear_monitor.twin.reference.leg_simulation import POINTS
 from leg_wear_monitor.twin.reference.torque_reference import WIDER
 from leg_wear_monitor.twin.sample import gait_samples
@@ -354,6 +356,32 @@ def test_a_leg_that_was_never_healthy_is_not_commissioned(leg, reference) -> Non
     assert observer.diagnosis.clearance_m[2] == pytest.approx(9.0e-4, rel=0.2)
 
 
+def test_each_cadence_has_its_own_baseline_and_reference(leg, reference, monkeypatch) -> None:
+    """Compared with the baseline of 60 rpm, a healthy leg at 57 rpm had a wide joint A."""
+    monkeypatch.setattr(observer_module, "COMMISSIONING_CYCLES", 10)
+    monkeypatch.setattr(references, "UNLIKE_CYCLES", 3)
+    slower = attrs.evolve(reference, profile=CrankProfile.steady(0.95 * TURN))
+    observer, known = observer_of(leg, reference=slower), []
+    block, at = samples(reference, [0] * 20), START_NS
+    for period_ns in (10**9, round(10**9 / 0.95), 10**9):
+        part = block.copy()
+        part["stamp_ns"] = at + np.round((block["stamp_ns"] - START_NS) * (1e-9 * period_ns))
+        for _ in range(19):
+            inside = (part["stamp_ns"] >= at) & (part["stamp_ns"] < at + period_ns)
+            observer.add_samples(part[inside])
+            begin_ns, at = at, at + period_ns
+            rpm = 6e10 / period_ns
+            observer.ended(SimpleNamespace(is_steady=True, cadence_rpm=rpm, begin_ns=begin_ns, stamp_ns=at))
+            observer.end_period(NEW, DEPTH)
+        known.append(observer.state.commissioned)
+    fast, slow, again = known
+    assert fast is again
+    assert [fast.speed, slow.speed] == pytest.approx([TURN, 0.95 * TURN], rel=1e-3)
+    assert observer.state.set_aside == (slow,)
+    assert observer.state.reference.profile.speed == TURN
+    assert not observer.state.changes
+
+
 def test_one_strange_cycle_raises_nothing(leg, reference) -> None:
     observer = observer_of(leg)
     numbers = [0] * 62 + [leg_number(0, 8.0)] + [0] * 8
@@ -386,7 +414,7 @@ def test_a_crank_with_another_ripple_waits_for_a_reference_of_its_own(leg, refer
 
 @pytest.mark.slow  # twin/reference/test_torque_reference.py goes on with a part
 def test_a_reference_that_was_half_simulated_goes_on_in_the_next_run(leg, reference) -> None:
-    """Eight recordings of 70 s each never came to the end of a reference that takes thirteen minutes."""
+    """What is simulated at the end of a short recording is not simulated again."""
     block = samples(reference, [0] * 60)
     crank = block["kind"] == CRANK
     block["crank_angle_rad"][crank] += 0.03 * np.sin(2.0 * block["crank_angle_rad"][crank])

@@ -219,6 +219,7 @@ class TorqueReferenceRun:
             self._look_ahead()
         if self.is_busy:
             return None
+        self._of_thread = threading.local()  # gives back 20 MB a thread
         clearance_m = np.array([leg.clearance_m for leg in self._legs])
         return TorqueReference(self._profile, clearance_m, self._done, self._legs[0].parameters)
 

@@ -140,6 +140,12 @@ def ideal() -> None:
     wanted = case("mechanism/test_ideal.py")["JANSEN_FOOT"]
     print(f"\n### Jansen\n\nLargest error of the foot: {np.abs(foot - wanted).max():.1e} of his units.")
 
+    test = case("mechanism/test_ideal.py")
+    foot = test["klann_foot"](build_linkage(load_mechanism("klann_leg")))
+    off, (height, deviation) = foot[[0, 180]] - [(1.0, 0.0), (0.0, 0.0)], test["klann_step"](foot)
+    print(f"\n### Klann\n\nLargest error of the foot: {np.abs(off).max():.1e} units of the patent.")
+    print(f"Height of a step {height:.2f} %, deviation from a line {deviation:.2f} %.")
+
     reference = json.loads((TEST / "data" / "ideal_60rpm.json").read_text())
     leg = build_linkage(load_mechanism("bionic_leg"))
     motion = one_cycle(leg, 36, TURN)

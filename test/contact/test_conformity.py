@@ -93,7 +93,7 @@ def test_what_is_said_of_a_wide_arc_has_its_numbers_and_the_law_that_holds():
 
 
 def test_shipped_mechanisms_have_narrow_contacts():
-    for name in ("bionic_leg", "jansen_leg", "four_bar"):
+    for name in ("bionic_leg", "jansen_leg", "klann_leg", "four_bar"):
         assert list(conformity_doubts(build_linkage(lw.load_mechanism(name)))) == []
 
 

@@ -18,6 +18,8 @@ JANSEN_FOOT = [
     (-5.1601, -83.9569), (13.6015, -83.9909), (30.3109, -82.5894), (31.9830, -79.5393),
     (4.2703, -65.7171), (-26.5616, -73.6897), (-32.6706, -81.8428), (-21.5130, -83.9612),
 ]  # fmt: skip
+# Klann's linkage, in percent of its stride: height of a step, deviation from a line on the ground
+KLANN_STEP = (52.3, 5.5)
 
 
 @pytest.fixture(scope="module")
@@ -44,6 +46,25 @@ def test_jansen_foot(linkage_of):
     linkage = linkage_of("jansen_leg")
     foot = point_motion(one_cycle(linkage, 8, 1.0), linkage, *linkage.mechanism.toe)[0]
     np.testing.assert_allclose(foot / 0.008 + [38.0, 7.8], JANSEN_FOOT, atol=1.0e-4)
+
+
+def klann_foot(linkage):
+    """Foot (360, 2) in a turn, in units and axes of the patent."""
+    foot = point_motion(one_cycle(linkage, 360, 1.0), linkage, *linkage.mechanism.toe)[0]
+    return foot / 0.4 + [1.599, 0.750]
+
+
+def klann_step(foot):
+    """Height of a step, and deviation from a line in the half turn on the ground [% of the stride]."""
+    height, below = foot[:, 1], foot[:181, 1]
+    return 100.0 * np.array([height.max() - below.min(), np.ptp(below)]) / np.ptp(foot[:, 0])
+
+
+def test_klann_foot(linkage_of):
+    """The coordinates of the patent have three digits, and the lengths of the file follow from them."""
+    foot = klann_foot(linkage_of("klann_leg"))
+    np.testing.assert_allclose(foot[[0, 180]], [(1.0, 0.0), (0.0, 0.0)], atol=1.0e-3)
+    np.testing.assert_allclose(klann_step(foot), KLANN_STEP, atol=0.1)
 
 
 def test_leg_moves_as_the_reference(leg_linkage, cycle, reference):

@@ -68,7 +68,7 @@ def test_a_key_that_is_not_known_is_never_passed_over(data, document):
 
 def test_all_that_come_with_the_package_load():
     names = list(shipped_mechanisms())
-    assert names == ["andrews", "bionic_leg", "four_bar", "jansen_leg", "slider_crank"]
+    assert names == ["andrews", "bionic_leg", "four_bar", "jansen_leg", "klann_leg", "slider_crank"]
     assert [load_mechanism(name).name for name in names] == names
 
 

@@ -94,7 +94,7 @@ def test_start_nearer_to_another_assembly_is_refused(document):
 
 
 def test_assembly_is_closed_to_rounding(linkage_of):
-    for name in ("bionic_leg", "jansen_leg", "andrews", "four_bar", "slider_crank"):
+    for name in ("bionic_leg", "jansen_leg", "klann_leg", "andrews", "four_bar", "slider_crank"):
         linkage = linkage_of(name)
         arrays, q = linkage.arrays, assemble(linkage)
         for body, point in zip(arrays.joint_body, arrays.joint_point, strict=True):

@@ -205,7 +205,7 @@ def test_markers_are_the_same_however_reports_are_cut(
     assert [b"G: ERROR" in raw for raw in one_by_one] == [False] * 5 + [True] * 3 + [False] * 2
 
 
-@pytest.mark.parametrize("name", ["andrews", "four_bar", "jansen_leg", "slider_crank"])
+@pytest.mark.parametrize("name", ["andrews", "four_bar", "jansen_leg", "klann_leg", "slider_crank"])
 def test_other_mechanisms_are_drawn_with_all_their_clearance_joints(name: str) -> None:
     mechanism = lw.load_mechanism(name)
     drawing = LegDrawing(mechanism)

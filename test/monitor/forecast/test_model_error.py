@@ -20,7 +20,7 @@ def scaled(mechanism, factors):
     return attrs.evolve(mechanism, bodies=bodies)
 
 
-@pytest.mark.parametrize("name", ["bionic_leg", "jansen_leg", "four_bar", "slider_crank"])
+@pytest.mark.parametrize("name", ["bionic_leg", "jansen_leg", "klann_leg", "four_bar", "slider_crank"])
 def test_all_masses_together_make_all_of_the_force(name):
     """Sensitivities to n masses add up to one: their root sum of squares is at least 1 over root n."""
     mechanism = load_mechanism(name)

@@ -21,7 +21,7 @@ def letters(axes):
     return {text.get_text(): text.get_color() for text in axes.texts}
 
 
-@pytest.mark.parametrize("name", ["bionic_leg", "jansen_leg", "four_bar", "slider_crank", "andrews"])
+@pytest.mark.parametrize("name", ["bionic_leg", "klann_leg", "four_bar", "slider_crank", "andrews"])
 def test_every_joint_is_lettered_and_the_loose_ones_in_their_colour(name):
     mechanism = load_mechanism(name)
     still, moving, _key = leg_picture(mechanism).axes

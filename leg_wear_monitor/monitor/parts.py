@@ -103,7 +103,7 @@ class Parts:
                 self.twin.clearance_mean_m,
                 ledger.commissioned_torque if ledger else None,
                 self._known_parameters(ledger),
-                self._known_reference(ledger.reference if ledger else None),
+                tuple(filter(None, [self._known_reference(ledger.reference if ledger else None)])),
                 self._known_reference(ledger.part_of_reference if ledger else None),
             )
             if self.config.diagnosis.enabled and self.config.wear_acceleration == 1.0

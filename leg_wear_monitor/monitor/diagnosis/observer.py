@@ -5,6 +5,7 @@ period evaluates the gait cycles that ended, and goes on with the simulation of 
 """
 
 import math
+from collections.abc import Sequence
 from typing import NamedTuple
 
 import attrs
@@ -58,8 +59,10 @@ class TorqueObserver:
         That of the ledger.
     parameters : LegParameters or None
         Those of the ledger.
-    reference, part : TorqueReference or None
-        That of the ledger, and one there whose simulation was not finished.
+    given : sequence of TorqueReference
+        Those known beforehand: of files first, then of the ledger.
+    part : TorqueReference or None
+        One of the ledger whose simulation was not finished.
 
     Raises
     ------
@@ -74,12 +77,12 @@ class TorqueObserver:
         counted_m: Floats,
         commissioned: CommissionedTorque | None = None,
         parameters: LegParameters | None = None,
-        reference: TorqueReference | None = None,
+        given: Sequence[TorqueReference] = (),
         part: TorqueReference | None = None,
     ) -> None:
         self.config, self._size_nm, self._joints = config, size_nm, mechanism.clearance_joints
         self._models = LegModels(mechanism)
-        self._references = References(mechanism, self._models, reference, part)
+        self._references = References(mechanism, self._models, given, part)
         self._evidence = Evidence(self._models)
         counted_m = np.asarray(counted_m, float).copy()
         self.state = TorqueState(counted_m, commissioned=commissioned, parameters=parameters)

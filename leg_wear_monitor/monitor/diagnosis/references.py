@@ -1,6 +1,7 @@
 """The torque reference of a measured leg: chosen, simulated, renewed, and its parameters identified."""
 
 import math
+from collections.abc import Sequence
 
 import numpy as np
 
@@ -41,8 +42,8 @@ class References:
     mechanism : Mechanism
     models : LegModels
         Told to forget what depends on a reference.
-    kept : TorqueReference or None
-        One that was simulated in an earlier run.
+    given : sequence of TorqueReference
+        Those known beforehand: of files first, then of the ledger; the shipped one comes last.
     part : TorqueReference or None
         One whose simulation was not finished in an earlier run.
 
@@ -56,11 +57,12 @@ class References:
         self,
         mechanism: Mechanism,
         models: LegModels,
-        kept: TorqueReference | None = None,
+        given: Sequence[TorqueReference] = (),
         part: TorqueReference | None = None,
     ) -> None:
         self._mechanism, self._models, self._part = mechanism, models, part
-        self._given = [one for one in (kept, shipped_reference(mechanism)) if one is not None]
+        shipped = shipped_reference(mechanism)
+        self._given = (*given, shipped) if shipped else tuple(given)
         self._run: TorqueReferenceRun | None = None
 
     @property
@@ -79,7 +81,7 @@ class References:
         return self._run.part if self._run is not None else None
 
     def is_given(self, reference: TorqueReference | None) -> bool:
-        """Whether a reference comes from the ledger or with the package."""
+        """Whether a reference was known beforehand."""
         return any(reference is one for one in self._given)
 
     def snapshot(self) -> TorqueReferenceSnapshot | None:

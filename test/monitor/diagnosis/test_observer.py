@@ -136,7 +136,7 @@ def test_a_healthy_leg_is_as_counted_and_becomes_commissioned(leg, reference) ->
 
 def test_the_reference_of_the_ledger_comes_before_the_shipped_one(leg, reference) -> None:
     kept = attrs.evolve(reference)
-    observer = observer_of(leg, reference=kept)
+    observer = observer_of(leg, given=[kept])
     walk(observer, samples(reference, [0] * 8))
     assert observer.state.reference is kept
     assert observer.simulated_reference is None  # nothing to store
@@ -144,7 +144,7 @@ def test_the_reference_of_the_ledger_comes_before_the_shipped_one(leg, reference
 
 def test_a_reference_of_the_ledger_under_another_crank_motion_is_not_used(leg, reference) -> None:
     profile = attrs.evolve(reference.profile, sine=np.append(0.02, reference.profile.sine[1:]))
-    observer = observer_of(leg, reference=attrs.evolve(reference, profile=profile))
+    observer = observer_of(leg, given=[attrs.evolve(reference, profile=profile)])
     walk(observer, samples(reference, [0] * 8))
     np.testing.assert_array_equal(observer.state.reference.profile.sine, 0.0)
 
@@ -361,7 +361,7 @@ def test_each_cadence_has_its_own_baseline_and_reference(leg, reference, monkeyp
     monkeypatch.setattr(observer_module, "COMMISSIONING_CYCLES", 10)
     monkeypatch.setattr(references, "UNLIKE_CYCLES", 3)
     slower = attrs.evolve(reference, profile=CrankProfile.steady(0.95 * TURN))
-    observer, known = observer_of(leg, reference=slower), []
+    observer, known = observer_of(leg, given=[slower]), []
     block, at = samples(reference, [0] * 20), START_NS
     for period_ns in (10**9, round(10**9 / 0.95), 10**9):
         part = block.copy()

@@ -173,9 +173,9 @@ def bodies_of(leg: Mechanism, explainer: Explainer, known: CommissionedTorque, r
 
 def simulated(run: TorqueReferenceRun) -> TorqueReference:
     """What a run simulates."""
-    while (found := run.advance()) is None:
-        if not run.is_busy:
-            raise SystemExit("the leg could not be simulated")
+    found = run.finish()
+    if found is None:
+        raise SystemExit("the leg could not be simulated")
     return found
 
 

@@ -30,7 +30,7 @@ from leg_wear_monitor.mechanism.position import build_linkage
 from leg_wear_monitor.mechanism.spec import Mechanism, PhaseLoad
 from leg_wear_monitor.monitor.config.settings import MonitorConfig
 from leg_wear_monitor.monitor.diagnosis import leg_models, observer, references
-from leg_wear_monitor.monitor.diagnosis.reference_file import shipped_reference
+from leg_wear_monitor.monitor.diagnosis.reference_file import shipped_references
 from leg_wear_monitor.monitor.diagnosis.signature import TorqueSensor, signatures
 from leg_wear_monitor.monitor.diagnosis.state import SignedCycle
 from leg_wear_monitor.twin.follower.load import torque_size
@@ -137,7 +137,7 @@ def watched(
     leg: Mechanism, size_nm: float, rows: list[np.ndarray]
 ) -> tuple[observer.TorqueObserver, list[str]]:
     """The observer after gait cycles with given signatures; what it named, corrected or stopped, and when."""
-    left, reference = iter(rows), shipped_reference(leg)
+    left, reference = iter(rows), shipped_references(leg)[0]
     one, counted, found = observer.TorqueObserver(leg, MonitorConfig(), size_nm, NEW), NEW.copy(), []
     joints, limit_m, second = leg.clearance_joints, MonitorConfig().limits.clearance_m, 10**9
 

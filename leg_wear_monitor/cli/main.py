@@ -18,7 +18,8 @@ COULD_NOT, INTERRUPTED = 2, 130
 
 _VERBS = (
     "acknowledge", "cache", "check", "commission", "dashboard", "demo", "draw", "fleet", "gait-publisher",
-    "life", "materials", "measure", "monitor", "play", "replay", "report", "reset", "simulate", "study",
+    "life", "materials", "measure", "monitor", "play", "reference", "replay", "report", "reset", "simulate",
+    "study",
 )  # fmt: skip
 
 

@@ -1,5 +1,7 @@
 """The parts of a monitor: their construction, their common state, and its snapshots."""
 
+from pathlib import Path
+
 import attrs
 import numpy as np
 
@@ -12,6 +14,7 @@ from leg_wear_monitor.monitor.config.settings import MonitorConfig
 from leg_wear_monitor.monitor.crank_zero.crank_zero import CrankZero
 from leg_wear_monitor.monitor.diagnosis.diagnosis import Body, Diagnosis, DiagnosisState
 from leg_wear_monitor.monitor.diagnosis.observer import TorqueObserver
+from leg_wear_monitor.monitor.diagnosis.reference_file import read_references
 from leg_wear_monitor.monitor.encoders.observer import EncoderObserver
 from leg_wear_monitor.monitor.evaluation.evaluation import AlarmEvaluation
 from leg_wear_monitor.monitor.evaluation.evaluation_period import A_CYCLE, EvaluationPeriods
@@ -95,20 +98,8 @@ class Parts:
             if self.config.encoders.names
             else None
         )
-        self.torque = (
-            TorqueObserver(
-                self.mechanism,
-                self.config,
-                self.twin.torque_size_nm,
-                self.twin.clearance_mean_m,
-                ledger.commissioned_torque if ledger else None,
-                self._known_parameters(ledger),
-                tuple(filter(None, [self._known_reference(ledger.reference if ledger else None)])),
-                self._known_reference(ledger.part_of_reference if ledger else None),
-            )
-            if self.config.diagnosis.enabled and self.config.wear_acceleration == 1.0
-            else None
-        )
+        is_diagnosed = self.config.diagnosis.enabled and self.config.wear_acceleration == 1.0
+        self.torque = self._torque_observer(ledger) if is_diagnosed else None
         if self.torque and self.torque.state.parameters and self.config.diagnosis.correct:
             self.twin.set_parameters(self.torque.state.parameters)
         self.explainer = TorqueExplainer(self.mechanism)
@@ -128,6 +119,28 @@ class Parts:
         self.evaluation_periods = EvaluationPeriods(cycle_ns // periods)
         kept = TorqueRecord.of(self.accounting.state.commissioned)
         self.state = MonitorState(tuple(GrowthWindow() for _ in self.clearance_joints), kept)
+
+    def _torque_observer(self, ledger: Ledger | None) -> TorqueObserver:
+        """The torque observer, with what files and the ledger know of this leg."""
+        path = self.config.diagnosis.reference
+        of_file = read_references(Path(path), self.mechanism) if path else ()
+        of_ledger = self._known_reference(ledger.reference if ledger else None)
+        identified = [
+            one.parameters for one in of_file if one.parameters != LegParameters.none(self.mechanism)
+        ]
+        parameters = self._known_parameters(ledger) or next(iter(identified), None)
+        given = (*of_file, *(() if of_ledger is None else (of_ledger,)))
+        return TorqueObserver(
+            self.mechanism,
+            self.config,
+            self.twin.torque_size_nm,
+            self.twin.clearance_mean_m,
+            ledger.commissioned_torque if ledger else None,
+            parameters,
+            # of other parameters than those in force, one would be simulated again
+            sorted(given, key=lambda one: one.parameters != parameters),
+            self._known_reference(ledger.part_of_reference if ledger else None),
+        )
 
     def _known_parameters(self, ledger: Ledger | None) -> LegParameters | None:
         """Masses, lengths and friction of the ledger, in the order of the mechanism."""

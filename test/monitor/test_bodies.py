@@ -6,7 +6,7 @@ import pytest
 
 from leg_wear_monitor.monitor.config.settings import MonitorConfig
 from leg_wear_monitor.monitor.diagnosis.observer import TorqueObserver
-from leg_wear_monitor.monitor.diagnosis.reference_file import shipped_reference
+from leg_wear_monitor.monitor.diagnosis.reference_file import shipped_references
 from leg_wear_monitor.monitor.opening import open_monitor
 from leg_wear_monitor.twin.reference.leg_parameters import LegParameters
 
@@ -44,7 +44,7 @@ def test_the_twin_walks_on_with_identified_parameters_and_the_ledger_keeps_them(
 
 
 def test_a_simulated_reference_is_in_the_ledger(leg, gait, tmp_path, monkeypatch):
-    config, shipped = config_of(tmp_path / "wear.ledger"), shipped_reference(leg)
+    config, shipped = config_of(tmp_path / "wear.ledger"), shipped_references(leg)[0]
     monkeypatch.setattr(TorqueObserver, "simulated_reference", shipped)
     monitor = open_monitor(leg, config)
     monitor.update(gait(2.5))

@@ -158,10 +158,16 @@ def _parameters(path: str) -> str:
     leg = fitted(load_mechanism(config.mechanism), config, path)
     twin_settings(config, path)
     warn_of(path, parameter_doubts(config, leg))
-    return (
+    text = (
         f"parameters of the monitor: {config.mechanism}, clearance joints {', '.join(leg.clearance_joints)}, "
         f"{config.cadence.commanded_rpm:g} rpm, hardware {config.hardware}"
     )
+    if config.diagnosis.reference:
+        from leg_wear_monitor.monitor.diagnosis.reference_file import read_references
+
+        known = read_references(Path(config.diagnosis.reference), leg)
+        text += f", references at {', '.join(f'{one.profile.cadence_rpm:.3g}' for one in known)} rpm"
+    return text
 
 
 def _first_line(name: str) -> str:

@@ -87,10 +87,13 @@ def _leg(entry: LegEntry, config: MonitorConfig, row: str, home: Path, source: s
 
 
 def _config(home: Path, name: str, node: str, source: str) -> MonitorConfig:
-    """Parameters in a file, checked against their mechanism; a mechanism's path is made absolute."""
+    """Parameters in a file, checked against their mechanism; paths in them become absolute."""
     config = load_config(home / name if name else None, node or None)
     if is_file_name(Path(config.mechanism)):
         config = attrs.evolve(config, mechanism=str(Path(config.mechanism).absolute()))
+    if config.diagnosis.reference:
+        path = str(Path(config.diagnosis.reference).absolute())
+        config = attrs.evolve(config, diagnosis=attrs.evolve(config.diagnosis, reference=path))
     fitted(load_mechanism(config.mechanism), config)
     for doubt in acceleration_doubts(config, most=1.0):
         text = f"{home / name}: {doubt}; legs with it are not ranked, and others learn nothing from them"

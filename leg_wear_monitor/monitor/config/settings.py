@@ -198,6 +198,10 @@ class TorqueDiagnosis:
         "whether a counted clearance is corrected where the drive torque surely shows another one",
         default=True,
     )
+    reference: str = described(
+        "file of torque references of this leg, as `reference` and `commission` write it; empty: none",
+        default="",
+    )
     false_alarm_hours: float = quantity(
         "h",
         "mean time of walking between two false findings; longer: changes are found later",

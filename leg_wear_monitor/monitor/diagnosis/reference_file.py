@@ -1,65 +1,174 @@
-"""Torque references that come with the package, each bound to the leg that it was simulated for."""
+"""Files of torque references, each bound to the leg that it was simulated for."""
 
 import zipfile
+import zlib
+from collections.abc import Callable, Sequence
 from pathlib import Path
-from typing import IO
+from typing import IO, Any
 
 import numpy as np
 
-from leg_wear_monitor.errors import ConfigError
+from leg_wear_monitor.errors import ConfigError, LegWearError, printable
+from leg_wear_monitor.mechanism.ideal import TURN
 from leg_wear_monitor.mechanism.spec import Mechanism
 from leg_wear_monitor.monitor.ledger.binding import fingerprint
 from leg_wear_monitor.share import share_directory
-from leg_wear_monitor.twin.reference.crank_profile import CrankProfile
+from leg_wear_monitor.twin.reference.crank_profile import HARMONICS, CrankProfile
 from leg_wear_monitor.twin.reference.leg_parameters import LegParameters
-from leg_wear_monitor.twin.reference.torque_reference import TorqueReference
+from leg_wear_monitor.twin.reference.leg_simulation import POINTS
+from leg_wear_monitor.twin.reference.torque_reference import TorqueReference, TorqueReferenceRun
+from leg_wear_monitor.wear.surfaces import SECTORS
+
+FORMAT = 2  # 1, without a number, had one reference of a leg as its file is
+
+BEFOREHAND_CYCLES = 40  # of each leg: beforehand, there is time for twice as many as while the leg walks
+
+# what reading a damaged archive raises, as a damaged byte may be anywhere in it
+_DAMAGES = (
+    EOFError, KeyError, MemoryError, NotImplementedError, RuntimeError, TypeError, ValueError,
+    zipfile.BadZipFile, zlib.error,
+)  # fmt: skip
 
 
-def shipped_reference(mechanism: Mechanism) -> TorqueReference | None:
-    """Reference that comes with the package for just this leg, under a steady crank; None if there is none.
+def simulated_references(
+    mechanism: Mechanism,
+    cadences_rpm: Sequence[float],
+    progress: Callable[[float], None] = lambda _fraction: None,
+) -> tuple[TorqueReference, ...]:
+    """References of a new leg whose crank turns steadily, as many cores as there are at once.
+
+    Parameters
+    ----------
+    mechanism : Mechanism
+        With the parameters of the configuration applied.
+    cadences_rpm : sequence of float
+        A reference each; negative for a crank that turns clockwise.
+    progress : callable
+        Called with the fraction that is done, 0 to 1.
+
+    Raises
+    ------
+    LegWearError
+        If the leg cannot be simulated.
+    """
+    fresh = np.array([mechanism.clearances[one].radial_clearance for one in mechanism.clearance_joints])
+    unworn, run = np.zeros((len(fresh), 2, SECTORS)), TorqueReferenceRun(mechanism, BEFOREHAND_CYCLES)
+    made: list[TorqueReference] = []
+    for cadence in cadences_rpm:
+        run.begin(fresh, unworn, CrankProfile.steady(cadence / 60.0 * TURN))
+        found = run.finish(lambda part: progress((len(made) + part) / len(cadences_rpm)))
+        if found is None:
+            raise LegWearError(f"{mechanism.name}: cannot be simulated at {cadence:g} rpm")
+        made.append(found)
+    return tuple(made)
+
+
+def shipped_references(mechanism: Mechanism) -> tuple[TorqueReference, ...]:
+    """References that come with the package for just this leg; empty if there are none.
 
     Raises
     ------
     ConfigError
         If a file cannot be read.
     """
-    for file in sorted((share_directory() / "config" / "references").glob("*.npz")):
-        found = read_reference(file, mechanism)
-        if found is not None:
-            return found
-    return None
+    files = sorted((share_directory() / "config" / "references").glob("*.npz"))
+    return tuple(one for file in files for one in _references(file, mechanism)[0])
 
 
-def write_reference(file: IO[bytes], mechanism: Mechanism, reference: TorqueReference) -> None:
-    """Write a reference of a leg."""
-    np.savez_compressed(
-        file,
-        fingerprint=np.array(fingerprint(mechanism)),
-        speed_radps=np.array(reference.profile.speed),
-        ripple_rad=np.stack([reference.profile.cosine, reference.profile.sine]),
-        clearance_m=reference.clearance_m,
-        expected_torque_nm=reference.torque_nm[0],
-        torque_nm=np.stack(reference.torque_nm[1:]),
-    )
+def write_references(file: IO[bytes], mechanism: Mechanism, references: Sequence[TorqueReference]) -> None:
+    """Write references of a leg; the same references give the same bytes."""
+    parts: dict[str, Any] = {
+        "format": FORMAT,
+        "fingerprint": fingerprint(mechanism),
+        "mechanism": mechanism.name,
+        "joints": mechanism.clearance_joints,
+        "bodies": tuple(mechanism.bodies),
+        "references": len(references),
+    }
+    for i, one in enumerate(references):
+        parts |= {
+            f"speed_radps_{i}": one.profile.speed,
+            f"ripple_rad_{i}": np.stack([one.profile.cosine, one.profile.sine]),
+            f"mass_{i}": one.parameters.mass,
+            f"length_{i}": one.parameters.length,
+            f"friction_{i}": one.parameters.friction,
+            f"clearance_m_{i}": one.clearance_m,
+            f"expected_torque_nm_{i}": one.torque_nm[0],
+            f"torque_nm_{i}": np.stack(one.torque_nm[1:]),
+        }
+    np.savez_compressed(file, **parts)
 
 
-def read_reference(path: Path, mechanism: Mechanism) -> TorqueReference | None:
-    """Reference in a file; None if it is of another leg.
+def read_references(path: Path, mechanism: Mechanism) -> tuple[TorqueReference, ...]:
+    """References in a file.
 
     Raises
     ------
     ConfigError
-        If it cannot be read.
+        If it cannot be read, or is of another leg.
     """
+    found, name = _references(path, mechanism)
+    if not found:
+        raise ConfigError(
+            str(path),
+            "",
+            f"has torque references of another leg ({printable(name, 60)}), expected those of "
+            f"{mechanism.name} with its bodies, lengths, clearance joints and clearances",
+        )
+    return found
+
+
+def _references(path: Path, mechanism: Mechanism) -> tuple[tuple[TorqueReference, ...], str]:
+    """References in a file, none if it is of another leg, and the name of its mechanism."""
     try:
+        if path.stat().st_size and not zipfile.is_zipfile(path):
+            raise ValueError("it is no archive of numpy")
         with np.load(path, allow_pickle=False) as parts:
-            if str(parts["fingerprint"]) != fingerprint(mechanism):
-                return None
-            cosine, sine = parts["ripple_rad"]
-            profile = CrankProfile(float(parts["speed_radps"]), cosine, sine)
-            torque = (parts["expected_torque_nm"], *parts["torque_nm"])
-            return TorqueReference(profile, parts["clearance_m"], torque, LegParameters.none(mechanism))
+            number = int(parts["format"])
+            if number != FORMAT:
+                raise ValueError(f"format {number}, expected {FORMAT}")
+            name, joints = str(parts["mechanism"]), tuple(parts["joints"].tolist())
+            # clearances are in the order of the joints, which the fingerprint leaves open
+            if str(parts["fingerprint"]) != fingerprint(mechanism) or joints != mechanism.clearance_joints:
+                return (), name
+            order = [parts["bodies"].tolist().index(body) for body in mechanism.bodies]
+            found = tuple(_reference(parts, i, order, len(joints)) for i in range(int(parts["references"])))
+            if not found:
+                raise ValueError("there is none in it")
+            return found, name
     except OSError as error:
         raise ConfigError(str(path), "", f"cannot be read: {error.strerror or error}") from error
-    except (KeyError, ValueError, zipfile.BadZipFile) as error:
-        raise ConfigError(str(path), "", f"is not a torque reference: {error}") from error
+    except _DAMAGES as error:
+        reason = printable(" ".join(str(error).split()), 200) or type(error).__name__
+        raise ConfigError(
+            str(path), "", f"is not a file of torque references, or is damaged: {reason}"
+        ) from error
+
+
+def _reference(parts: Any, i: int, order: list[int], joints: int) -> TorqueReference:
+    """Reference number i of an archive; raises ValueError where values cannot be those of one."""
+    clearance_m = _checked(parts, f"clearance_m_{i}", (None, joints))
+    torque = _checked(parts, f"torque_nm_{i}", (len(clearance_m) - 1, None, POINTS))
+    expected = _checked(parts, f"expected_torque_nm_{i}", (None, POINTS))
+    cosine, sine = _checked(parts, f"ripple_rad_{i}", (2, HARMONICS))
+    mass, length = (_checked(parts, f"{name}_{i}", (len(order),))[order] for name in ("mass", "length"))
+    friction, speed = (float(_checked(parts, f"{name}_{i}", ())) for name in ("friction", "speed_radps"))
+    for name, values in (("mass", mass), ("length", length), ("clearance", clearance_m)):
+        if not (values > 0.0).all():
+            raise ValueError(f"a {name} is not above 0")
+    if friction < 0.0 or speed == 0.0:
+        raise ValueError("friction is below 0, or speed is 0")
+    profile = CrankProfile(speed, cosine, sine)
+    return TorqueReference(profile, clearance_m, (expected, *torque), LegParameters(mass, length, friction))
+
+
+def _checked(parts: Any, name: str, shape: tuple[int | None, ...]) -> Any:
+    """An array of finite numbers of a shape, in which None is any number but 0."""
+    found = parts[name]
+    fits = len(found.shape) == len(shape) and all(
+        own == wanted if wanted is not None else own > 0
+        for own, wanted in zip(found.shape, shape, strict=True)
+    )
+    if found.dtype.kind != "f" or not fits or not np.isfinite(found).all():
+        raise ValueError(f"{name} is of another shape, or not finite")
+    return found

@@ -13,7 +13,7 @@ from leg_wear_monitor.monitor.diagnosis.identification import (
     leg_of_ideal_torque,
 )
 from leg_wear_monitor.monitor.diagnosis.leg_models import LegModels
-from leg_wear_monitor.monitor.diagnosis.reference_file import shipped_reference
+from leg_wear_monitor.monitor.diagnosis.reference_file import shipped_references
 from leg_wear_monitor.monitor.diagnosis.state import TorqueState
 from leg_wear_monitor.twin.reference.crank_profile import CrankProfile, mean_profile
 from leg_wear_monitor.twin.reference.leg_parameters import LegParameters
@@ -43,7 +43,7 @@ class References:
     models : LegModels
         Told to forget what depends on a reference.
     given : sequence of TorqueReference
-        Those known beforehand: of files first, then of the ledger; the shipped one comes last.
+        Those known beforehand: of files first, then of the ledger; the shipped ones come last.
     part : TorqueReference or None
         One whose simulation was not finished in an earlier run.
 
@@ -61,8 +61,7 @@ class References:
         part: TorqueReference | None = None,
     ) -> None:
         self._mechanism, self._models, self._part = mechanism, models, part
-        shipped = shipped_reference(mechanism)
-        self._given = (*given, shipped) if shipped else tuple(given)
+        self._given = (*given, *shipped_references(mechanism))
         self._run: TorqueReferenceRun | None = None
 
     @property

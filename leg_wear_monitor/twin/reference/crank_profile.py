@@ -36,6 +36,11 @@ class CrankProfile:
         """Profile of a crank that turns at a constant speed [rad/s]."""
         return cls(speed, np.zeros(HARMONICS), np.zeros(HARMONICS))
 
+    @property
+    def cadence_rpm(self) -> float:
+        """Mean speed [rpm]."""
+        return 60.0 * self.speed / TURN
+
     def at(self, phi: float) -> CrankMotion:
         """Motion at an angle phi [rad] of the evenly turning crank."""
         h = np.arange(1.0, HARMONICS + 1.0)

@@ -13,7 +13,7 @@ one with more friction, show which of them a leg has.
 import os
 import sys
 import threading
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from concurrent.futures import Future, ThreadPoolExecutor
 from contextlib import suppress
 from typing import NamedTuple
@@ -105,10 +105,12 @@ class TorqueReferenceRun:
     Parameters
     ----------
     mechanism : Mechanism
+    cycles : int, optional
+        Gait cycles of each wider leg; default: CYCLES.
     """
 
-    def __init__(self, mechanism: Mechanism) -> None:
-        self._mechanism = mechanism
+    def __init__(self, mechanism: Mechanism, cycles: int | None = None) -> None:
+        self._mechanism, self._cycles = mechanism, cycles
         joints = [mechanism.clearances[joint] for joint in mechanism.clearance_joints]
         self._radius = np.array([joint.bushing_radius for joint in joints])
         self._fresh = np.array([joint.radial_clearance for joint in joints])
@@ -223,6 +225,14 @@ class TorqueReferenceRun:
         clearance_m = np.array([leg.clearance_m for leg in self._legs])
         return TorqueReference(self._profile, clearance_m, self._done, self._legs[0].parameters)
 
+    def finish(self, progress: Callable[[float], None] = lambda _fraction: None) -> TorqueReference | None:
+        """Simulate the legs that are left, at once; None where one cannot be simulated."""
+        found = None
+        while self.is_busy:
+            found = self.advance()
+            progress(self.progress)
+        return found
+
     def snapshot(self) -> TorqueReferenceSnapshot:
         """The whole state; legs that are simulated ahead are simulated again."""
         return TorqueReferenceSnapshot(self._profile, self._legs, self._depth, self._done, self._periods)
@@ -247,7 +257,8 @@ class TorqueReferenceRun:
 
     def _cycles_of(self, leg: _Leg) -> int:
         """Gait cycles of a leg that count."""
-        return CYCLES if (leg.clearance_m != self._legs[0].clearance_m).any() else 2 * CYCLES
+        cycles = self._cycles or CYCLES
+        return cycles if (leg.clearance_m != self._legs[0].clearance_m).any() else 2 * cycles
 
     def _cost_of(self, leg: _Leg) -> int:
         """Gait cycles that are simulated for a leg, with those in which it settles."""

@@ -15,7 +15,7 @@ from leg_wear_monitor.monitor.diagnosis.identification import (
     misfit,
 )
 from leg_wear_monitor.monitor.diagnosis.nuisances import nuisances
-from leg_wear_monitor.monitor.diagnosis.reference_file import shipped_reference
+from leg_wear_monitor.monitor.diagnosis.reference_file import shipped_references
 from leg_wear_monitor.monitor.diagnosis.signature import TorqueSensor
 from leg_wear_monitor.monitor.diagnosis.signature_model import signature_model, simulated_signatures
 from leg_wear_monitor.monitor.ledger.entry import CommissionedTorque
@@ -28,7 +28,7 @@ SENSOR = TorqueSensor(period_s=0.005, cycle_s=1.0, size_nm=9.2, noise_nm=0.3)
 
 @pytest.fixture(scope="module")
 def known(leg):
-    reference = shipped_reference(leg)
+    reference = shipped_references(leg)[0]
     return reference, signature_model(reference, SENSOR), nuisances(leg, reference, SENSOR)
 
 

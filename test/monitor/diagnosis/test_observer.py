@@ -15,7 +15,7 @@ from leg_wear_monitor.monitor.diagnosis.diagnosis import Cause, DiagnosisState
 from leg_wear_monitor.monitor.diagnosis.leg_models import COMMISSIONING_CYCLES
 from leg_wear_monitor.monitor.diagnosis.observer import TorqueObserver
 from leg_wear_monitor.monitor.diagnosis.reasons import LOCKED_SAMPLES
-from leg_wear_monitor.monitor.diagnosis.reference_file import shipped_reference
+from leg_wear_monitor.monitor.diagnosis.reference_file import shipped_references
 from leg_wear_monitor.monitor.diagnosis.state import UNUSED_CYCLES
 from leg_wear_monitor.monitor.ledger.entry import CommissionedTorque
 from leg_wear_monitor.twin.kinds import CRANK, TORQUE
@@ -35,7 +35,7 @@ DEPTH = np.zeros((5, 2, SECTORS))
 
 @pytest.fixture(scope="module")
 def reference(leg):
-    return shipped_reference(leg)
+    return shipped_references(leg)[0]
 
 
 def leg_number(joint: int, factor: float) -> int:

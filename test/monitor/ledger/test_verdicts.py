@@ -8,7 +8,7 @@ import attrs
 import numpy as np
 import pytest
 
-from leg_wear_monitor.monitor.diagnosis.reference_file import shipped_reference
+from leg_wear_monitor.monitor.diagnosis.reference_file import shipped_references
 from leg_wear_monitor.monitor.ledger import file, ledger, recovery, schema, store
 from leg_wear_monitor.monitor.ledger.entry import IdentifiedLeg, SimulatedReference, VerdictEvent
 from leg_wear_monitor.monitor.ledger.rows import write_entry
@@ -59,7 +59,7 @@ def test_an_identified_leg_is_read_as_written_and_the_last_is_in_force(open_ledg
 
 
 def test_a_simulated_reference_is_read_as_written_and_the_last_is_in_force(open_ledger, entry_at, leg):
-    shipped = shipped_reference(leg)
+    shipped = shipped_references(leg)[0]
     factors = 1.0 + 0.01 * np.arange(len(leg.bodies))
     other = attrs.evolve(
         shipped,

@@ -25,8 +25,8 @@ STEADY = CrankProfile.steady(TURN)
 
 
 def finished(run: TorqueReferenceRun) -> TorqueReference:
-    while (found := run.advance()) is None:
-        assert run.is_busy
+    found = run.finish()
+    assert found is not None
     return found
 
 

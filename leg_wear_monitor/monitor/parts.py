@@ -123,23 +123,14 @@ class Parts:
     def _torque_observer(self, ledger: Ledger | None) -> TorqueObserver:
         """The torque observer, with what files and the ledger know of this leg."""
         path = self.config.diagnosis.reference
-        of_file = read_references(Path(path), self.mechanism) if path else ()
-        of_ledger = self._known_reference(ledger.reference if ledger else None)
-        identified = [
-            one.parameters for one in of_file if one.parameters != LegParameters.none(self.mechanism)
-        ]
-        parameters = self._known_parameters(ledger) or next(iter(identified), None)
-        given = (*of_file, *(() if of_ledger is None else (of_ledger,)))
         return TorqueObserver(
             self.mechanism,
             self.config,
             self.twin.torque_size_nm,
             self.twin.clearance_mean_m,
-            ledger.commissioned_torque if ledger else None,
-            parameters,
-            # of other parameters than those in force, one would be simulated again
-            sorted(given, key=lambda one: one.parameters != parameters),
-            self._known_reference(ledger.part_of_reference if ledger else None),
+            ledger.commissioned_torques if ledger else (),
+            self._known_parameters(ledger),
+            (*(read_references(Path(path), self.mechanism) if path else ()), *self._known_references(ledger)),
         )
 
     def _known_parameters(self, ledger: Ledger | None) -> LegParameters | None:
@@ -150,13 +141,15 @@ class Parts:
         order = [known.names.index(name) for name in self.mechanism.bodies]
         return LegParameters(np.array(known.mass)[order], np.array(known.length)[order], known.friction)
 
-    def _known_reference(self, kept: SimulatedReference | None) -> TorqueReference | None:
-        """Torque reference of the ledger, its parameters in the order of the mechanism."""
-        if kept is None:
-            return None
-        order, own = [kept.bodies.index(name) for name in self.mechanism.bodies], kept.reference.parameters
-        parameters = attrs.evolve(own, mass=own.mass[order], length=own.length[order])
-        return attrs.evolve(kept.reference, parameters=parameters)
+    def _known_references(self, ledger: Ledger | None) -> list[TorqueReference]:
+        """Torque references of the ledger, their parameters in the order of the mechanism."""
+        known = []
+        for kept in ledger.references if ledger else ():
+            order = [kept.bodies.index(name) for name in self.mechanism.bodies]
+            own = kept.reference.parameters
+            parameters = attrs.evolve(own, mass=own.mass[order], length=own.length[order])
+            known.append(attrs.evolve(kept.reference, parameters=parameters))
+        return known
 
     @property
     def measured(self) -> tuple[Measurement | None, ...]:

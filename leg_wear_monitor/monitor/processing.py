@@ -7,13 +7,13 @@ from leg_wear_monitor.mechanism.arrays import Floats
 from leg_wear_monitor.monitor.alarms.alarm import Level
 from leg_wear_monitor.monitor.cycle_report import cycle_report, latest
 from leg_wear_monitor.monitor.diagnosis.corrections import Correction
+from leg_wear_monitor.monitor.diagnosis.state import TorqueState
 from leg_wear_monitor.monitor.encoders.clearance_estimate import ClearanceEstimate
 from leg_wear_monitor.monitor.evaluation.specs import CLEARANCE, MISMATCH
 from leg_wear_monitor.monitor.forecast.growth import GrowthWindow, extended
 from leg_wear_monitor.monitor.forecast_update import update_forecast
 from leg_wear_monitor.monitor.ledger.entry import (
     Audit,
-    CommissionedTorque,
     CorrectedClearance,
     IdentifiedLeg,
     SimulatedReference,
@@ -27,7 +27,6 @@ from leg_wear_monitor.monitor.reports import (
 )
 from leg_wear_monitor.monitor.verdict.belief import COUNTED, alarm_value, is_surely_below
 from leg_wear_monitor.twin.reference.leg_parameters import LegParameters
-from leg_wear_monitor.twin.reference.torque_reference import TorqueReference
 from leg_wear_monitor.twin.sample import Samples
 from leg_wear_monitor.twin.statistics import CycleStatistics
 
@@ -199,20 +198,18 @@ class Processing:
         """Compare the drive torque with that of the counted leg, and correct what is surely counted wrong."""
         if not self._torque:
             return
-        before, reference = self._torque.state.commissioned, self._torque.state.reference
+        before = attrs.evolve(self._torque.state)
         correction = self._torque.end_period(self._twin.clearance_mean_m, self._twin.depth)
-        self._note_reference(reference)
         is_wrong = self._parts.is_torque_wrong
         if not is_wrong:
             self._take_parameters(self._torque.parameters)
-        if correction is None or is_wrong:
-            self._note_commissioned(before)
-            return
-        self._correct(correction)
-        self._torque.corrected(correction, self._twin.clearance_mean_m)
-        self._twin.pull_block()
-        self._note_commissioned(before)
-        self._parts.keep()
+        if correction is not None and not is_wrong:
+            self._correct(correction)
+            self._torque.corrected(correction, self._twin.clearance_mean_m)
+            self._twin.pull_block()
+        self._note_torque(before)
+        if correction is not None and not is_wrong:
+            self._parts.keep()
 
     def _correct(self, correction: Correction) -> None:
         """Open a joint to the clearance that the drive torque shows, and count its wear from there."""
@@ -250,19 +247,22 @@ class Processing:
         self._parts.state.growth = tuple(GrowthWindow() for _ in self._clearance_joints)
         self._parts.keep()
 
-    def _note_commissioned(self, before: CommissionedTorque | None) -> None:
-        """Store the signature of the leg that was commissioned since."""
-        now = self._torque.state.commissioned if self._torque else None
-        if now is not None and now is not before:
-            self._accounting.note(now)
+    def _note_torque(self, before: TorqueState) -> None:
+        """Store the baselines and the references of the leg that are new since a state.
 
-    def _note_reference(self, before: TorqueReference | None) -> None:
-        """Store a reference that was simulated since: to simulate it again takes minutes of walking."""
-        now = self._torque.simulated_reference if self._torque else None
-        if now is not None and now is not before:
-            names = tuple(self._parts.mechanism.bodies)
-            self._accounting.note(SimulatedReference(self._twin.intake.followed_stamp_ns, names, now))
-            self._parts.keep()
+        To simulate a reference again takes a minute of walking.
+        """
+        if not self._torque:
+            return
+        known, stamp_ns = before.all_commissioned, self._twin.intake.followed_stamp_ns
+        for one in self._torque.state.all_commissioned:
+            if all(one is not other for other in known):
+                self._accounting.note(one)
+        names, made = tuple(self._parts.mechanism.bodies), [one.reference for one in before.known]
+        for reference in self._torque.simulated_references:
+            if all(reference is not other for other in made):
+                self._accounting.note(SimulatedReference(stamp_ns, names, reference))
+                self._parts.keep()
 
     def _clearance_estimates(self, statistics: CycleStatistics) -> tuple[ClearanceEstimate, ...] | None:
         """Clearances estimated from encoders; they update the forecast."""

@@ -45,7 +45,7 @@ def test_the_twin_walks_on_with_identified_parameters_and_the_ledger_keeps_them(
 
 def test_a_simulated_reference_is_in_the_ledger(leg, gait, tmp_path, monkeypatch):
     config, shipped = config_of(tmp_path / "wear.ledger"), shipped_references(leg)[0]
-    monkeypatch.setattr(TorqueObserver, "simulated_reference", shipped)
+    monkeypatch.setattr(TorqueObserver, "simulated_references", (shipped,))
     monitor = open_monitor(leg, config)
     monitor.update(gait(2.5))
     monitor.close()

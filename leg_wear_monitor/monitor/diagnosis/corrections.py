@@ -11,7 +11,6 @@ from leg_wear_monitor.monitor.diagnosis.diagnosis import Change
 from leg_wear_monitor.monitor.diagnosis.evidence import SETTLING_CYCLES
 from leg_wear_monitor.monitor.diagnosis.state import TorqueState
 from leg_wear_monitor.monitor.ledger.entry import CommissionedTorque
-from leg_wear_monitor.twin.reference.crank_profile import mean_profile
 
 # of the counted clearance: smaller openings are named wrongly where masses are 5 % off (diagnosis.md)
 CORRECTED_FROM = 1.3
@@ -26,10 +25,12 @@ class Correction(NamedTuple):
 
 
 def correction_of(state: TorqueState, joints: Sequence[str]) -> Correction | None:
-    """A settled change of one clearance."""
-    if not state.changes or state.fit_cycles < SETTLING_CYCLES:
+    """A settled change of one clearance, seen at the present cadence."""
+    if not state.changes or state.fit_cycles < SETTLING_CYCLES or not state.is_compared:
         return None
     change = state.changes[-1]
+    if sum(cycle.begin_ns >= change.since_ns for cycle in state.cycles) < SETTLING_CYCLES:
+        return None
     is_wide = change.value >= CORRECTED_FROM * change.counted
     if change.subject not in joints or not change.is_sure or not is_wide:
         return None
@@ -42,18 +43,18 @@ def settle(state: TorqueState, correction: Correction, counted_m: Floats) -> Non
     What the correction is off does then not look like a further change; it stays in the standard deviation.
     """
     joint, _, change = correction
-    cycles = [cycle for cycle in state.cycles if cycle.begin_ns >= change.since_ns]
-    signatures, before = np.array([cycle.signature for cycle in cycles]), state.commissioned
+    state.cycles = tuple(cycle for cycle in state.cycles if cycle.begin_ns >= change.since_ns)
+    signatures, before = state.signatures, state.commissioned
     sigma_m = before.sigma_m.copy() if before else np.zeros(len(counted_m))
     sigma_m[joint] = change.sigma
+    state.forget_baselines()
     state.commissioned = CommissionedTorque(
-        cycles[-1].end_ns,
+        state.cycles[-1].end_ns,
         counted_m,
         signatures,
         sigma_m,
         before.delay_s if before else 0.0,
         before.time_constant_s if before else 0.0,
-        mean_profile([cycle.profile for cycle in cycles]).speed,
+        state.profile.speed,
     )
-    state.set_aside = ()
     state.settled = (*state.settled, attrs.evolve(change, is_corrected=True))

@@ -39,13 +39,16 @@ class Evidence:
 
     def add(self, state: TorqueState, cycle: SignedCycle, config: MonitorConfig) -> None:
         """Evaluate one more gait cycle."""
+        if not state.is_compared:
+            return
         self._test(state, cycle, config)
         self._explain(state, config)
 
     def review(self, state: TorqueState, config: MonitorConfig) -> None:
         """Evaluate all kept cycles again, because the reference or the baseline has changed."""
-        self._models.forget()
         self._know_sensor(state)
+        if not state.is_compared:  # what was found at another cadence stays
+            return
         state.detector, state.changes, state.fit_due = None, (), 0
         for cycle in state.cycles:
             self._test(state, cycle, config)

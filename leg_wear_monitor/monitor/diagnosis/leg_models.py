@@ -5,6 +5,7 @@ They are made where they are needed first, and again where what they depend on h
 
 import attrs
 
+from leg_wear_monitor.mechanism.arrays import Floats
 from leg_wear_monitor.mechanism.spec import Mechanism
 from leg_wear_monitor.monitor.config.settings import MonitorConfig
 from leg_wear_monitor.monitor.diagnosis.body_torques import body_torques
@@ -31,6 +32,22 @@ NAMED_TO = 5.0
 _WORSE = 2.5
 
 
+_KEPT = 6  # models of the last cadences, sensors and baselines
+
+
+@attrs.define(eq=False)
+class _Models:
+    """What follows from a reference, a sensor and a baseline."""
+
+    reference: TorqueReference
+    sensor: TorqueSensor
+    commissioned: CommissionedTorque | None
+    explainer: Explainer
+    misfit: float | None = None
+    counted_m: Floats | None = None
+    detector: ChangeDetector | None = None
+
+
 class LegModels:
     """Models of a leg and of its torque sensor.
 
@@ -41,36 +58,24 @@ class LegModels:
 
     def __init__(self, mechanism: Mechanism) -> None:
         self._mechanism = mechanism
-        self._explainer: Explainer | None = None
-        self._detector: ChangeDetector | None = None
-        self._misfit: float | None = None
+        self._kept: list[_Models] = []
 
     def warm_up(self) -> None:
         """Compute what bodies change of the torque: it takes longer than samples may wait."""
         body_torques(self._mechanism)
 
-    def forget(self) -> None:
-        """Make all of them again, because the reference, the sensor or the baseline has changed."""
-        self._explainer, self._detector, self._misfit = None, None, None
-
-    def forget_tests(self) -> None:
-        """Make the tests again, because the counted clearances have changed."""
-        self._detector = None
-
     def explainer(self, state: TorqueState) -> Explainer:
         """Legs that may be the measured one."""
-        if self._explainer is None:
-            if state.reference is None or state.sensor is None:
-                raise RuntimeError("there is no reference yet")
-            self._explainer = explainer_of(self._mechanism, state.reference, state.sensor, state.commissioned)
-        return self._explainer
+        return self._of(state).explainer
 
     def detector(self, state: TorqueState, config: MonitorConfig) -> ChangeDetector:
         """Tests against the counted leg."""
-        if self._detector is None:
+        own = self._of(state)
+        if own.detector is None or own.counted_m is not state.counted_m:
             cycles = 60.0 * abs(config.cadence.commanded_rpm) * config.diagnosis.false_alarm_hours
-            self._detector = ChangeDetector(self.explainer(state), state.counted_m, cycles)
-        return self._detector
+            own.detector = ChangeDetector(own.explainer, state.counted_m, cycles)
+            own.counted_m = state.counted_m
+        return own.detector
 
     def misfit(self, state: TorqueState) -> float:
         """Misfit of the commissioned leg to that of the reference; 0 where that is not known.
@@ -80,10 +85,10 @@ class LegModels:
         commissioned = state.commissioned
         if state.reference is None or commissioned is None or not commissioned.is_as_counted:
             return 0.0
-        if self._misfit is None:
-            legs = self.explainer(state)
-            self._misfit = misfit(legs.model, legs.nuisances, commissioned)
-        return self._misfit
+        own = self._of(state)
+        if own.misfit is None:
+            own.misfit = misfit(own.explainer.model, own.explainer.nuisances, commissioned)
+        return own.misfit
 
     def channel(
         self, reference: TorqueReference, sensor: TorqueSensor, known: CommissionedTorque
@@ -110,3 +115,15 @@ class LegModels:
     def is_of_file(self, state: TorqueState) -> bool:
         """Whether the commissioned leg is that of the reference."""
         return self.misfit(state) < UNLIKE_FILE
+
+    def _of(self, state: TorqueState) -> _Models:
+        """Those of a state; they are kept while its reference, its sensor and its baseline stay."""
+        reference, sensor, known = state.reference, state.sensor, state.commissioned
+        if reference is None or sensor is None:
+            raise RuntimeError("there is no reference yet")
+        for one in self._kept:
+            if one.reference is reference and one.commissioned is known and one.sensor == sensor:
+                return one
+        made = _Models(reference, sensor, known, explainer_of(self._mechanism, reference, sensor, known))
+        self._kept = [made, *self._kept][:_KEPT]
+        return made

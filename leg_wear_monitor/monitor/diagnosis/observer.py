@@ -20,18 +20,15 @@ from leg_wear_monitor.monitor.diagnosis.diagnosis import Cause, Diagnosis, Diagn
 from leg_wear_monitor.monitor.diagnosis.evidence import Evidence
 from leg_wear_monitor.monitor.diagnosis.leg_models import COMMISSIONING_CYCLES, LegModels
 from leg_wear_monitor.monitor.diagnosis.reasons import doubt, missing
-from leg_wear_monitor.monitor.diagnosis.references import UNLIKE, References
+from leg_wear_monitor.monitor.diagnosis.references import References
 from leg_wear_monitor.monitor.diagnosis.signed_cycle import find_sensor, signed_cycle
-from leg_wear_monitor.monitor.diagnosis.state import UNUSED_CYCLES, TorqueState
+from leg_wear_monitor.monitor.diagnosis.state import UNUSED_CYCLES, WINDOW_CYCLES, TorqueState
 from leg_wear_monitor.monitor.diagnosis.torque_samples import NO_TORQUE_SAMPLES, after, extended
 from leg_wear_monitor.monitor.ledger.entry import CommissionedTorque
-from leg_wear_monitor.twin.reference.crank_profile import mean_profile
 from leg_wear_monitor.twin.reference.leg_parameters import LegParameters
 from leg_wear_monitor.twin.reference.torque_reference import TorqueReference, TorqueReferenceSnapshot
 from leg_wear_monitor.twin.sample import Samples
 from leg_wear_monitor.twin.statistics import CycleStatistics
-
-WINDOW_CYCLES = 60  # that clearances are estimated from
 
 _ESTIMATED_M, _ESTIMATED = 1.0e-4, 0.2  # largest standard deviation of an observable clearance; of it
 
@@ -55,14 +52,12 @@ class TorqueObserver:
         RMS of the leg's drive torque at the commanded speed.
     counted_m : (k,) array
         Counted clearances.
-    commissioned : CommissionedTorque or None
-        That of the ledger.
+    commissioned : sequence of CommissionedTorque, optional
+        Those of the ledger, the last one first.
     parameters : LegParameters or None
         Those of the ledger.
-    given : sequence of TorqueReference
-        Those known beforehand: of files first, then of the ledger.
-    part : TorqueReference or None
-        One of the ledger whose simulation was not finished.
+    references : sequence of TorqueReference, optional
+        Those of files first, then of the ledger; the simulation of one may not be finished.
 
     Raises
     ------
@@ -75,17 +70,21 @@ class TorqueObserver:
         config: MonitorConfig,
         size_nm: float,
         counted_m: Floats,
-        commissioned: CommissionedTorque | None = None,
+        commissioned: Sequence[CommissionedTorque] = (),
         parameters: LegParameters | None = None,
-        given: Sequence[TorqueReference] = (),
-        part: TorqueReference | None = None,
+        references: Sequence[TorqueReference] = (),
     ) -> None:
         self.config, self._size_nm, self._joints = config, size_nm, mechanism.clearance_joints
         self._models = LegModels(mechanism)
-        self._references = References(mechanism, self._models, given, part)
+        part = next((one for one in references if not one.is_whole), None)
+        whole = [one for one in references if one.is_whole]
+        self._references = References(mechanism, self._models, whole, part)
         self._evidence = Evidence(self._models)
         counted_m = np.asarray(counted_m, float).copy()
-        self.state = TorqueState(counted_m, commissioned=commissioned, parameters=parameters)
+        if parameters is None:  # those that files and unfinished references were made with
+            own = LegParameters.none(mechanism)
+            parameters = next((one.parameters for one in references if one.parameters != own), None)
+        self.state = TorqueState(counted_m, baselines=tuple(commissioned), parameters=parameters)
 
     def warm_up(self) -> None:
         """Compute before the first sample what depends on the mechanism alone."""
@@ -111,18 +110,14 @@ class TorqueObserver:
 
     def withdraw(self, since_ns: int) -> None:
         """Forget the gait cycles from a stamp on: the torque that was received was wrong."""
-        state = self.state
-        cycles = tuple(cycle for cycle in state.cycles if cycle.begin_ns < since_ns)
-        due = tuple(span for span in state.due if span[0] < since_ns)
-        number = len(state.cycles) + len(state.due) - len(cycles) - len(due)
+        state, before = self.state, self._kept_cycles
+        state.due = tuple(span for span in state.due if span[0] < since_ns)
+        state.forget_cycles(since_ns)
+        number = before - self._kept_cycles
         if not number:
             return
-        state.cycles, state.due = cycles, due
         state.leave_out(NotUsed.TORQUE_CAUSE, number)
-        known = state.commissioned
-        if known is not None and known.stamp_ns > since_ns:  # some of them are in it
-            state.commissioned = None
-        state.set_aside = tuple(one for one in state.set_aside if one.stamp_ns <= since_ns)
+        state.forget_baselines(since_ns)
         if state.reference is not None:
             self._evidence.review(state, self.config)
 
@@ -158,13 +153,12 @@ class TorqueObserver:
         counted_m = np.asarray(counted_m, float).copy()
         settle(self.state, correction, counted_m)
         self._restart(counted_m)
-        self._models.forget()
 
     def replaced(self, counted_m: Floats) -> None:
         """Start again after the replacement of a part: the leg has to be commissioned again."""
-        self.state.settled, self.state.commissioned, self.state.set_aside = (), None, ()
+        self.state.settled = ()
+        self.state.forget_baselines()
         self._restart(counted_m)
-        self._models.forget()
 
     @property
     def parameters(self) -> LegParameters | None:
@@ -179,10 +173,10 @@ class TorqueObserver:
         return state.parameters if self._models.is_of_file(state) else None
 
     @property
-    def simulated_reference(self) -> TorqueReference | None:
-        """The reference in force if it was simulated in this run, else None."""
-        reference = self.state.reference
-        return None if self._references.is_given(reference) else reference
+    def simulated_references(self) -> tuple[TorqueReference, ...]:
+        """The references that were simulated in this run, of all cadences."""
+        made = (one.reference for one in self.state.known)
+        return tuple(one for one in made if not self._references.is_given(one))
 
     @property
     def part_of_reference(self) -> TorqueReference | None:
@@ -245,7 +239,12 @@ class TorqueObserver:
         """Restore a snapshot of the same mechanism and parameters; results are then bit for bit the same."""
         self.state = attrs.evolve(snapshot.state)
         self._references.restore(snapshot.reference)
-        self._models.forget()
+
+    @property
+    def _kept_cycles(self) -> int:
+        """Number of gait cycles that are kept, at all cadences."""
+        state = self.state
+        return sum(len(one.cycles) for one in state.known) + len(state.waiting) + len(state.due)
 
     def _evaluate(self, begin_ns: int, end_ns: int) -> None:
         """Add a gait cycle to the evidence."""
@@ -255,26 +254,29 @@ class TorqueObserver:
         if isinstance(cycle, NotUsed):
             state.leave_out(cycle)
             return
-        if state.reference is not None:
-            if cycle.profile.departure(state.reference.profile) > UNLIKE:
-                state.unlike += 1
+        if state.reference is None:
+            state.unused = ()
+            state.wait_with(cycle)
+            return
+        if not cycle.profile.is_like(state.reference.profile):
+            other = state.at(cycle.profile)
+            if other is None:
+                state.wait_with(cycle)
                 state.leave_out(NotUsed.UNLIKE)
                 return
-            state.unlike = 0
+            state.turn_to(other)
         state.unused = ()
         state.cycles = (*state.cycles, cycle)[-WINDOW_CYCLES:]
-        if state.reference is not None:
-            self._evidence.add(state, cycle, self.config)
-            self._commission()
+        self._evidence.add(state, cycle, self.config)
+        self._commission()
 
     def _commission(self) -> None:
         """Keep the mean signature of a leg that is as counted."""
         state = self.state
         if state.commissioned is not None or state.changes or len(state.cycles) < COMMISSIONING_CYCLES:
             return
-        speed = mean_profile([cycle.profile for cycle in state.cycles]).speed
         state.commissioned = CommissionedTorque(
-            state.cycles[-1].end_ns, state.counted_m, state.signatures, speed=speed
+            state.cycles[-1].end_ns, state.counted_m, state.signatures, speed=state.profile.speed
         )
         self._evidence.review(state, self.config)
 
@@ -282,12 +284,11 @@ class TorqueObserver:
         """Forget the kept cycles, because the leg, or what is counted of it, has changed."""
         state = self.state
         state.counted_m = np.asarray(counted_m, float).copy()
-        state.cycles, state.detector, state.changes, state.has_failed = (), None, (), False
-        self._models.forget_tests()
+        state.forget_cycles()
+        state.detector, state.changes, state.has_failed = None, (), False
 
     def _follow_counted(self, counted_m: Floats) -> None:
         """Compare with the counted clearances as they grow."""
         state = self.state
         if (np.abs(counted_m / state.counted_m - 1.0) > 0.005).any():
             state.counted_m = np.asarray(counted_m, float).copy()
-            self._models.forget_tests()

@@ -1,14 +1,16 @@
 """Why there is no estimate of the clearances yet, or why it is not sure; for operators."""
 
 import math
+from collections.abc import Sequence
 
 import numpy as np
 
+from leg_wear_monitor.mechanism.ideal import TURN
 from leg_wear_monitor.monitor.config.settings import MonitorConfig
 from leg_wear_monitor.monitor.diagnosis.diagnosis import NotUsed
 from leg_wear_monitor.monitor.diagnosis.leg_models import COMMISSIONING_CYCLES, LegModels
 from leg_wear_monitor.monitor.diagnosis.references import FIRST_CYCLES, UNLIKE_CYCLES, References
-from leg_wear_monitor.monitor.diagnosis.state import TorqueState
+from leg_wear_monitor.monitor.diagnosis.state import AtCadence, TorqueState
 
 _UNUSABLE_CYCLES = 3
 
@@ -41,7 +43,11 @@ def missing(state: TorqueState, references: References, config: MonitorConfig) -
         return f"the reference for this leg is being simulated: {references.percent} %"
     if state.has_failed:
         return "the leg could not be simulated for a reference"
-    if len(state.cycles) < FIRST_CYCLES or state.reference is None:
+    if state.reference is None:
+        return f"gait cycles: {len(state.waiting)} of {FIRST_CYCLES}"
+    if state.unused and state.unused[-1] is NotUsed.UNLIKE:
+        return _other_cadence(state, references)
+    if len(state.cycles) < FIRST_CYCLES:
         return f"gait cycles: {len(state.cycles)} of {FIRST_CYCLES}"
     return (
         "the drive torque is not that of the mechanism file (late, filtered, loaded, or of another leg); "
@@ -51,8 +57,13 @@ def missing(state: TorqueState, references: References, config: MonitorConfig) -
 
 def doubt(state: TorqueState, references: References, models: LegModels) -> str:
     """Why an estimate is not sure; empty if it is."""
-    if state.unlike >= UNLIKE_CYCLES:
-        return "the crank turns otherwise than it did before; a new reference is being simulated"
+    if state.unused and state.unused[-1] is NotUsed.UNLIKE:
+        return _other_cadence(state, references)
+    if not state.is_compared:
+        return (
+            f"changes at this cadence are observed after {COMMISSIONING_CYCLES} gait cycles, "
+            f"{len(state.cycles)} are there; at {_cadences(state.set_aside)} they are"
+        )
     if models.is_of_file(state):
         return LOCKED_SAMPLES if _are_locked(state) else ""
     known = "the model does not fit this leg, and the names of joints are not sure: "
@@ -62,6 +73,20 @@ def doubt(state: TorqueState, references: References, models: LegModels) -> str:
         what = "its masses, lengths and friction are" if state.is_identifying else "a reference for it is"
         return f"{known}{what} being simulated, {references.percent} %"
     return f"{known}masses, lengths and friction near those of the file do not explain its drive torque"
+
+
+def _other_cadence(state: TorqueState, references: References) -> str:
+    """What becomes of gait cycles whose crank turns otherwise than in all references."""
+    known = f"the crank turns otherwise than in the references ({_cadences(state.known)})"
+    if references.is_busy:
+        return f"{known}; another one is being simulated: {references.percent} %"
+    return f"{known}; one is made after {UNLIKE_CYCLES} gait cycles alike, {len(state.waiting)} are there"
+
+
+def _cadences(known: Sequence[AtCadence]) -> str:
+    """Cadences in the order of their speeds."""
+    speeds = sorted(abs(one.reference.profile.speed) for one in known)
+    return f"{', '.join(f'{60.0 * speed / TURN:.3g}' for speed in speeds)} rpm"
 
 
 def _are_locked(state: TorqueState) -> bool:

@@ -14,8 +14,8 @@ from leg_wear_monitor.monitor.diagnosis.identification import (
 )
 from leg_wear_monitor.monitor.diagnosis.leg_models import LegModels
 from leg_wear_monitor.monitor.diagnosis.reference_file import shipped_references
-from leg_wear_monitor.monitor.diagnosis.state import TorqueState
-from leg_wear_monitor.twin.reference.crank_profile import CrankProfile, mean_profile
+from leg_wear_monitor.monitor.diagnosis.state import AtCadence, TorqueState
+from leg_wear_monitor.twin.reference.crank_profile import UNLIKE, CrankProfile, mean_profile
 from leg_wear_monitor.twin.reference.leg_parameters import LegParameters
 from leg_wear_monitor.twin.reference.torque_reference import (
     TorqueReference,
@@ -24,12 +24,9 @@ from leg_wear_monitor.twin.reference.torque_reference import (
 )
 
 FIRST_CYCLES = 5  # before a reference is chosen
-UNLIKE = 0.015  # of the mean speed: a crank that turns otherwise than in the reference by more
-UNLIKE_CYCLES = 20  # in a row, until a new reference is made
+UNLIKE_CYCLES = 20  # alike, until another reference is made: less would make one while the cadence changes
 
 ROUNDS = 3  # of identification
-
-_MADE = 4  # references that are kept while the crank turns otherwise
 
 _FAR = 0.1  # of a counted clearance: the reference is renewed where it was made for another one
 
@@ -42,7 +39,7 @@ class References:
     mechanism : Mechanism
     models : LegModels
         Told to forget what depends on a reference.
-    given : sequence of TorqueReference
+    given : sequence of TorqueReference, optional
         Those known beforehand: of files first, then of the ledger; the shipped ones come last.
     part : TorqueReference or None
         One whose simulation was not finished in an earlier run.
@@ -79,8 +76,8 @@ class References:
         """The legs that are simulated so far; None where none is, or all are."""
         return self._run.part if self._run is not None else None
 
-    def is_given(self, reference: TorqueReference | None) -> bool:
-        """Whether a reference was known beforehand."""
+    def is_given(self, reference: TorqueReference) -> bool:
+        """Whether a reference comes from the ledger or with the package."""
         return any(reference is one for one in self._given)
 
     def snapshot(self) -> TorqueReferenceSnapshot | None:
@@ -103,17 +100,17 @@ class References:
         """
         if self._run is not None and self._run.is_busy:
             return self._continue(self._run, state, counted_m, depth)
-        if len(state.cycles) < FIRST_CYCLES or state.has_failed:
+        if state.has_failed:
             return False
-        if state.reference is None:
+        if len(state.waiting) >= (FIRST_CYCLES if state.reference is None else UNLIKE_CYCLES):
             return self._choose(state, counted_m, depth)
-        if state.unlike >= UNLIKE_CYCLES:
-            state.cycles, state.reference, state.fit, state.unlike = (), None, None, 0
-            self._models.forget()
-        elif _is_far(state.reference, counted_m):
-            self._begin(state, counted_m, depth, mean_profile([cycle.profile for cycle in state.cycles]))
-        elif state.parameters not in (None, state.reference.parameters):  # those of the ledger
-            self._begin(state, counted_m, depth, state.reference.profile)
+        if state.reference is None or len(state.cycles) < FIRST_CYCLES:
+            return False
+        own, identified = state.reference.parameters, state.parameters
+        if _is_far(state.reference, counted_m):
+            self._begin(own if state.is_final else identified, counted_m, depth, state.profile)
+        elif not state.is_final and identified not in (None, own):  # at another cadence, or in the ledger
+            self._begin(identified, counted_m, depth, state.reference.profile)
         elif state.rounds < ROUNDS and not self._models.is_of_file(state):
             self._begin_identification(state, state.reference, depth)
         return False
@@ -131,7 +128,7 @@ class References:
     def _continue(
         self, run: TorqueReferenceRun, state: TorqueState, counted_m: Floats, depth: Floats
     ) -> bool:
-        """Go on for a period with what is being simulated."""
+        """Go on for a period with what is being simulated; what was made is of its own cadence."""
         found = run.advance()
         if found is not None and state.is_identifying:
             self._identify(state, found, counted_m, depth)
@@ -143,13 +140,13 @@ class References:
         return False
 
     def _choose(self, state: TorqueState, counted_m: Floats, depth: Floats) -> bool:
-        """Use a given reference, or one that was made, if the crank turns as in it; or begin one."""
-        profile = mean_profile([cycle.profile for cycle in state.cycles])
-        for one in (*state.made, *self._given):
-            if profile.departure(one.profile) <= UNLIKE:
-                self._install(state, one)
-                return True
-        self._begin(state, counted_m, depth, profile)
+        """Use a given reference if the crank turns as in it, preferably one of the leg; or begin one."""
+        profile = mean_profile([cycle.profile for cycle in state.waiting])
+        alike = [one for one in self._given if profile.is_like(one.profile)]
+        if alike:
+            self._install(state, next((one for one in alike if one.parameters == state.parameters), alike[0]))
+            return True
+        self._begin(state.parameters, counted_m, depth, profile)
         return False
 
     def _begun(self) -> TorqueReferenceRun:
@@ -158,52 +155,67 @@ class References:
             self._run = TorqueReferenceRun(self._mechanism)
         return self._run
 
-    def _begin(self, state: TorqueState, counted_m: Floats, depth: Floats, profile: CrankProfile) -> None:
+    def _begin(
+        self, parameters: LegParameters | None, counted_m: Floats, depth: Floats, profile: CrankProfile
+    ) -> None:
         """Begin the simulation of a reference, or go on with that of an earlier run."""
-        part, own = self._part, state.parameters or LegParameters.none(self._mechanism)
+        part, own = self._part, parameters or LegParameters.none(self._mechanism)
         if (
             part is not None
             and part.parameters == own
-            and profile.departure(part.profile) <= UNLIKE
+            and profile.is_like(part.profile)
             and not _is_far(part, counted_m)
         ):
             self._begun().go_on(part, depth)
         else:
-            self._begun().begin(counted_m, depth, profile, state.parameters)
+            self._begun().begin(counted_m, depth, profile, own)
 
     def _identify(self, state: TorqueState, legs: TorqueReference, counted_m: Floats, depth: Floats) -> None:
         """Begin a reference with the parameters that explain the commissioned leg."""
-        explainer = self._models.explainer(state)
         state.is_identifying = False
+        _turn(state, legs.profile)
         if state.commissioned is not None:
+            explainer = self._models.explainer(state)
             state.parameters = identified_leg(legs, explainer.model, explainer.nuisances, state.commissioned)
-            self._begin(state, counted_m, depth, legs.profile)
+            self._begin(state.parameters, counted_m, depth, legs.profile)
 
     def _install(self, state: TorqueState, reference: TorqueReference) -> None:
-        """Use a new reference.
+        """Use a new reference at its cadence.
 
         One with identified parameters must explain the leg better than the one before.
         """
+        _turn(state, reference.profile)
         before, off = state.reference, self._models.misfit(state)
+        if before is None or not before.profile.is_like(reference.profile):
+            _take_up(state, reference)
+            return
         state.reference = reference
-        _set_aside(state, reference.profile.speed)
-        self._models.forget()
-        is_other = before is not None and state.parameters not in (None, before.parameters)
-        if before is not None and is_other and self._models.misfit(state) > off:
-            state.reference, state.parameters, state.rounds = before, before.parameters, ROUNDS
-        others = [one for one in state.made if one.profile.departure(state.reference.profile) > UNLIKE]
-        state.made = (state.reference, *others)[:_MADE]
+        if reference.parameters != before.parameters and self._models.misfit(state) > off:
+            state.reference, state.is_final, state.rounds = before, True, ROUNDS
+            if all(one.reference.parameters != state.parameters for one in state.set_aside):
+                state.parameters = before.parameters
 
 
-def _set_aside(state: TorqueState, speed: float) -> None:
-    """Compare with the baseline of a cadence, if there is one: inertia is another at another speed.
+def _turn(state: TorqueState, profile: CrankProfile) -> None:
+    """Turn to the cadence that something was simulated for: the leg may walk at another one by now."""
+    other = state.at(profile)
+    if other is not None and not (state.reference and state.reference.profile.is_like(profile)):
+        state.turn_to(other)
 
-    Compared with the baseline of 60 rpm, a healthy leg at 57 rpm had a wide joint A.
+
+def _take_up(state: TorqueState, reference: TorqueReference) -> None:
+    """Begin with a further cadence, by the gait cycles that waited for its reference.
+
+    Its baseline is its own, if the ledger has one: inertia is another at another speed. Compared with the
+    baseline of 60 rpm, a healthy leg at 57 rpm had a wide joint A.
     """
-    known = [one for one in (state.commissioned, *state.set_aside) if one is not None]
-    own = [one for one in known if not one.speed or abs(one.speed / speed - 1.0) <= UNLIKE]
-    state.commissioned = own[0] if own else None
-    state.set_aside = tuple(one for one in known if one is not state.commissioned)
+    if state.sensor is None:
+        raise RuntimeError("there are no samples yet")
+    speed = reference.profile.speed
+    own = [one for one in state.baselines if not one.speed or abs(one.speed / speed - 1.0) <= UNLIKE]
+    cycles = [one for one in state.waiting if one.profile.is_like(reference.profile)]
+    state.turn_to(AtCadence(reference, state.sensor, own[0] if own else None, tuple(cycles)))
+    state.baselines, state.waiting = tuple(one for one in state.baselines if one not in own[:1]), ()
 
 
 def _is_far(reference: TorqueReference, counted_m: Floats) -> bool:
@@ -213,6 +225,7 @@ def _is_far(reference: TorqueReference, counted_m: Floats) -> bool:
 
 def _give_up(state: TorqueState) -> None:
     """Go on without what could not be simulated."""
+    state.waiting = ()
     if state.reference is None:
         state.has_failed = True
     else:

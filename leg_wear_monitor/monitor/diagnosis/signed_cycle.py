@@ -28,8 +28,9 @@ def find_sensor(
     cycle_s = 60.0 / abs(config.cadence.commanded_rpm)
     is_instant = config.drive_torque.sampling == INSTANT
     state.sensor = TorqueSensor(float(f"{period_s:.2g}"), cycle_s, size_nm, is_instant)
-    if state.commissioned and state.commissioned.signatures.shape[1] != 2 * state.sensor.phases:
-        state.commissioned = None  # of a sensor with another rate: the leg is commissioned anew
+    # those of a sensor with another rate do not count: the leg is commissioned anew
+    size = 2 * state.sensor.phases
+    state.baselines = tuple(one for one in state.baselines if one.signatures.shape[1] == size)
 
 
 def signed_cycle(state: TorqueState, begin_ns: int, end_ns: int) -> SignedCycle | NotUsed:

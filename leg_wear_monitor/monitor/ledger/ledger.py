@@ -22,14 +22,13 @@ from leg_wear_monitor.monitor.ledger.file import LedgerError
 from leg_wear_monitor.monitor.ledger.recovery import Recovered
 from leg_wear_monitor.monitor.ledger.rows import (
     read_commissioned,
-    read_commissioned_torque,
+    read_commissioned_torques,
     read_corrections,
     read_identified_leg,
     read_last_reset,
     read_last_verdict,
     read_measurements,
-    read_part_of_reference,
-    read_simulated_reference,
+    read_simulated_references,
     read_spans,
 )
 from leg_wear_monitor.monitor.ledger.run import Run
@@ -60,10 +59,10 @@ class Ledger:
         Counted clearances that were corrected by the drive torque in earlier runs.
     commissioned : Commissioned or None
         Errors of further encoders from earlier runs.
-    commissioned_torque : CommissionedTorque or None
-        Signatures of the drive torque from earlier runs.
-    reference, part_of_reference : SimulatedReference or None
-        Torque reference that was simulated in earlier runs, and one that is not whole yet.
+    commissioned_torques : list of CommissionedTorque
+        Signatures of the drive torque from earlier runs, one for each cadence, the last one first.
+    references : list of SimulatedReference
+        Torque references that were simulated in earlier runs, the last one first; one may not be whole.
     parameters : IdentifiedLeg or None
         Masses, lengths and friction that were identified in earlier runs.
     last_run : Run
@@ -125,10 +124,9 @@ class Ledger:
         self.measurements = self._store.ask(read_measurements)
         self.corrections = self._store.ask(read_corrections)
         self.commissioned = self._store.ask(read_commissioned)
-        self.commissioned_torque = self._store.ask(read_commissioned_torque)
+        self.commissioned_torques = self._store.ask(read_commissioned_torques)
         self.parameters = self._store.ask(read_identified_leg)
-        self.reference = self._store.ask(read_simulated_reference)
-        self.part_of_reference = self._store.ask(read_part_of_reference)
+        self.references = self._store.ask(read_simulated_references)
 
     @property
     def counted_ns(self) -> Ints:

@@ -25,12 +25,10 @@ from leg_wear_monitor.monitor.ledger.entry import (
     Withdrawal,
 )
 from leg_wear_monitor.monitor.ledger.run import Run
-from leg_wear_monitor.twin.reference.crank_profile import CrankProfile
+from leg_wear_monitor.twin.reference.crank_profile import UNLIKE, CrankProfile
 from leg_wear_monitor.twin.reference.leg_parameters import LegParameters
 from leg_wear_monitor.twin.reference.leg_simulation import POINTS
-from leg_wear_monitor.twin.reference.torque_reference import CYCLES, TorqueReference
-
-_PART = 2  # row of a reference that is not whole
+from leg_wear_monitor.twin.reference.torque_reference import CADENCES, CYCLES, TorqueReference
 
 
 def write_run(db: sqlite3.Connection, run: Run) -> None:
@@ -127,10 +125,7 @@ def write_event(db: sqlite3.Connection, event: Event) -> None:
                 [(stamp_ns, *factors) for factors in zip(names, mass, length, strict=True)],
             )
         case SimulatedReference():
-            values, number = _reference_values(event), 1 if event.reference.is_whole else _PART
-            places = ", ".join("?" * len(values))
-            db.execute("DELETE FROM torque_reference WHERE id IN (?, ?)", (number, _PART))
-            db.execute(f"INSERT INTO torque_reference VALUES ({number}, {places})", values)
+            _write_reference(db, event)
         case Audit(stamp_ns, who, what, was, undoes):
             state: tuple[object, ...] = (None,) * 6
             if was:
@@ -190,20 +185,27 @@ def read_commissioned(db: sqlite3.Connection) -> Commissioned | None:
     return Commissioned(row[0], encoders, errors[:m], errors[m : m + p], errors[m + p :].reshape(p, p))
 
 
-def read_commissioned_torque(db: sqlite3.Connection) -> CommissionedTorque | None:
-    """Stored signature of the drive torque, None if it was not commissioned since a part was replaced."""
-    row = db.execute(
+def read_commissioned_torques(db: sqlite3.Connection) -> list[CommissionedTorque]:
+    """Stored signatures of the drive torque since a part was replaced: the last ones of each cadence.
+
+    Those before a correction were of other clearances.
+    """
+    found: list[CommissionedTorque] = []
+    for row in db.execute(
         "SELECT stamp_ns, cycles, delay_s, time_constant_s, speed_radps, clearance_m, signatures, sigma_m "
         "FROM torque_commissioning "
-        "WHERE stamp_ns > (SELECT coalesce(max(replaced_ns), 0) FROM joint) ORDER BY id DESC LIMIT 1"
-    ).fetchone()
-    if row is None:
-        return None
-    stamp_ns, cycles, delay_s, time_constant_s, speed = row[:5]
-    clearance_m, signatures, sigma_m = (np.frombuffer(part, "<f8").astype(float) for part in row[5:])
-    return CommissionedTorque(
-        stamp_ns, clearance_m, signatures.reshape(cycles, -1), sigma_m, delay_s, time_constant_s, speed
-    )
+        "WHERE stamp_ns > (SELECT coalesce(max(replaced_ns), 0) FROM joint) ORDER BY id DESC"
+    ):
+        stamp_ns, cycles, delay_s, time_constant_s, speed = row[:5]
+        clearance_m, signatures, sigma_m = (np.frombuffer(part, "<f8").astype(float) for part in row[5:])
+        one = CommissionedTorque(
+            stamp_ns, clearance_m, signatures.reshape(cycles, -1), sigma_m, delay_s, time_constant_s, speed
+        )
+        if not any(abs(one.speed - other.speed) <= UNLIKE * abs(other.speed) for other in found):
+            found.append(one)
+        if not one.is_as_counted or not one.speed or len(found) == CADENCES:
+            break
+    return found
 
 
 def read_identified_leg(db: sqlite3.Connection) -> IdentifiedLeg | None:
@@ -224,12 +226,27 @@ def read_identified_leg(db: sqlite3.Connection) -> IdentifiedLeg | None:
     return IdentifiedLeg(stamps[0], names, mass, length, found[0] if found else 1.0)
 
 
+def _write_reference(db: sqlite3.Connection, event: SimulatedReference) -> None:
+    """Write a reference; a whole one takes the place of that of its cadence, and of one that is not whole."""
+    values, speed = _reference_values(event), event.reference.profile.speed
+    if event.reference.is_whole:
+        db.execute(
+            "DELETE FROM torque_reference WHERE abs(speed_radps - ?) <= ?", (speed, UNLIKE * abs(speed))
+        )
+    db.execute("DELETE FROM torque_reference WHERE NOT is_whole")
+    places = ", ".join("?" * len(values))
+    db.execute(f"INSERT INTO torque_reference VALUES (NULL, {places})", values)
+    newest = f"SELECT id FROM torque_reference WHERE is_whole ORDER BY id DESC LIMIT {CADENCES}"
+    db.execute(f"DELETE FROM torque_reference WHERE is_whole AND id NOT IN ({newest})")
+
+
 def _reference_values(event: SimulatedReference) -> tuple[float | bytes | str, ...]:
     """Values of the columns of a reference, without its id."""
     reference = event.reference
     profile, leg, known = reference.profile, reference.parameters, reference.clearance_m
     ripple = np.stack([profile.cosine, profile.sine])
     return (
+        int(reference.is_whole),
         event.stamp_ns,
         profile.speed,
         *(part.astype("<f8").tobytes() for part in (ripple, known)),
@@ -242,30 +259,29 @@ def _reference_values(event: SimulatedReference) -> tuple[float | bytes | str, .
     )
 
 
-def read_simulated_reference(db: sqlite3.Connection) -> SimulatedReference | None:
-    """Torque reference that was simulated for the leg, None if there is none."""
-    return _read_reference(db, 1)
+def read_simulated_references(db: sqlite3.Connection) -> list[SimulatedReference]:
+    """Torque references that were simulated for the leg, the last one first.
+
+    One whose simulation was not finished is among them.
+    """
+    rows = db.execute(
+        "SELECT is_whole, stamp_ns, bodies, speed_radps, legs, friction, ripple_rad, clearance_m, mass, "
+        "length, expected_torque_nm, torque_nm FROM torque_reference ORDER BY id DESC"
+    )
+    return [_reference_of(*row) for row in rows]
 
 
-def read_part_of_reference(db: sqlite3.Connection) -> SimulatedReference | None:
-    """Torque reference whose simulation was not finished, None if there is none."""
-    return _read_reference(db, _PART)
-
-
-def _read_reference(db: sqlite3.Connection, number: int) -> SimulatedReference | None:
-    row = db.execute(
-        "SELECT stamp_ns, bodies, speed_radps, legs, friction, ripple_rad, clearance_m, mass, length, "
-        "expected_torque_nm, torque_nm FROM torque_reference WHERE id = ?",
-        (number,),
-    ).fetchone()
-    if row is None:
-        return None
-    stamp_ns, bodies, speed, legs, friction = row[:5]
-    ripple, known, mass, length = (np.frombuffer(part, "<f8").astype(float) for part in row[5:9])
-    expected, wider = (np.frombuffer(part, "<f2").astype(np.float16).reshape(-1, POINTS) for part in row[9:])
+def _reference_of(
+    is_whole: int, stamp_ns: int, bodies: str, speed: float, legs: int, friction: float, *parts: bytes
+) -> SimulatedReference:
+    """Reference of a row."""
+    ripple, known, mass, length = (np.frombuffer(part, "<f8").astype(float) for part in parts[:4])
+    expected, wider = (
+        np.frombuffer(part, "<f2").astype(np.float16).reshape(-1, POINTS) for part in parts[4:]
+    )
     profile, leg = CrankProfile(speed, *ripple.reshape(2, -1)), LegParameters(mass, length, friction)
-    cycles = CYCLES if number == _PART else -1
-    torque = (expected, *wider.reshape(-1 if number == _PART else legs - 1, cycles, POINTS))
+    shape = (legs - 1, -1, POINTS) if is_whole else (-1, CYCLES, POINTS)
+    torque = (expected, *wider.reshape(shape))
     reference = TorqueReference(profile, known.reshape(legs, -1), torque, leg)
     return SimulatedReference(stamp_ns, tuple(bodies.split("\n")), reference)
 

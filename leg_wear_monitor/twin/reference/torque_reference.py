@@ -30,6 +30,8 @@ from leg_wear_monitor.twin.reference.crank_profile import CrankProfile
 from leg_wear_monitor.twin.reference.leg_parameters import LegParameters
 from leg_wear_monitor.twin.reference.leg_simulation import LegSimulation, even_angles
 
+CADENCES = 6  # of which the references of a leg are kept
+
 CYCLES = 20  # simulated for each wider leg, and twice as many for each other one
 
 PACE = 6  # simulated gait cycles in an evaluation period, a quarter cycle; a core does twice as many
@@ -41,7 +43,7 @@ HEAVIER, LONGER = 0.04, 0.004  # of a body's mass and length, one body at a time
 ROUGHER = 1.5  # factor on the friction in the joints
 
 _SETTLING = 2  # gait cycles before those that count
-_NICE = 10
+_NICE = 10  # lets the node have as much of a core as it needs, and other programs most of it
 _LEAST_CLEARANCE_M = 5.0e-5
 
 HalfFloats = NDArray[np.float16]
@@ -131,7 +133,7 @@ class TorqueReferenceRun:
     @property
     def progress(self) -> float:
         """Fraction of the gait cycles that are done; 0 where nothing was begun."""
-        return min(1.0, PACE * self._periods / max(1, sum(map(self._cost_of, self._legs))))
+        return min(1.0, PACE * self._periods / max(1, self._cost(self._legs)))
 
     def begin(
         self,
@@ -178,15 +180,12 @@ class TorqueReferenceRun:
         legs = [_Leg(part.parameters, clearance_m) for clearance_m in part.clearance_m]
         self._begin(legs, depth, part.profile)
         self._done = part.torque_nm
-        self._periods = -(-sum(self._cost_of(leg) for leg in legs[: len(self._done)]) // PACE)
+        self._periods = -(-self._cost(legs[: len(self._done)]) // PACE)
 
     @property
     def part(self) -> TorqueReference | None:
         """The legs of a reference that are simulated so far; None where none is, or all are."""
-        if not (self._done and self.is_busy):
-            return None
-        clearance_m = np.array([leg.clearance_m for leg in self._legs])
-        return TorqueReference(self._profile, clearance_m, self._done, self._legs[0].parameters)
+        return self._so_far() if self._done and self.is_busy else None
 
     def begin_identification(
         self, clearance_m: Floats, depth: Floats, profile: CrankProfile, near: LegParameters
@@ -210,9 +209,7 @@ class TorqueReferenceRun:
             return None
         self._periods += 1
         self._look_ahead()
-        due = PACE * self._periods - sum(self._cost_of(leg) for leg in self._legs[: len(self._done)])
-        while self.is_busy and self._cost_of(self._legs[len(self._done)]) <= due:
-            due -= self._cost_of(self._legs[len(self._done)])
+        while self.is_busy and self._cost(self._legs[: len(self._done) + 1]) <= PACE * self._periods:
             torque = self._ahead.pop(0).result()
             if torque is None:
                 self._begin((), self._depth, self._profile)
@@ -222,8 +219,7 @@ class TorqueReferenceRun:
         if self.is_busy:
             return None
         self._of_thread = threading.local()  # gives back 20 MB a thread
-        clearance_m = np.array([leg.clearance_m for leg in self._legs])
-        return TorqueReference(self._profile, clearance_m, self._done, self._legs[0].parameters)
+        return self._so_far()
 
     def finish(self, progress: Callable[[float], None] = lambda _fraction: None) -> TorqueReference | None:
         """Simulate the legs that are left, at once; None where one cannot be simulated."""
@@ -248,6 +244,11 @@ class TorqueReferenceRun:
         self._ahead, self._periods = [], 0
         self._legs, self._depth, self._done, self._profile = tuple(legs), depth.copy(), (), profile
 
+    def _so_far(self) -> TorqueReference:
+        """The reference with the torques of the legs that are simulated."""
+        clearance_m = np.array([leg.clearance_m for leg in self._legs])
+        return TorqueReference(self._profile, clearance_m, self._done, self._legs[0].parameters)
+
     def _look_ahead(self) -> None:
         """Let the threads simulate the next legs: not all, since a program's end waits for them."""
         first = len(self._done) + len(self._ahead)
@@ -260,9 +261,9 @@ class TorqueReferenceRun:
         cycles = self._cycles or CYCLES
         return cycles if (leg.clearance_m != self._legs[0].clearance_m).any() else 2 * cycles
 
-    def _cost_of(self, leg: _Leg) -> int:
-        """Gait cycles that are simulated for a leg, with those in which it settles."""
-        return _SETTLING + self._cycles_of(leg)
+    def _cost(self, legs: Sequence[_Leg]) -> int:
+        """Gait cycles that are simulated for some legs, with those in which they settle."""
+        return sum(_SETTLING + self._cycles_of(leg) for leg in legs)
 
     def _simulated(self, profile: CrankProfile, leg: _Leg, depth: Floats, cycles: int) -> HalfFloats | None:
         """Mean torque (cycles, POINTS) of a leg; None if it cannot be simulated."""
@@ -281,5 +282,5 @@ class TorqueReferenceRun:
 def _lower_priority() -> None:
     """Lower the priority of this thread: samples come first."""
     if sys.platform == "linux":  # elsewhere, it would be that of the whole process
-        with suppress(OSError):
+        with suppress(OSError):  # where a container forbids it, the thread runs at its program's priority
             os.setpriority(os.PRIO_PROCESS, threading.get_native_id(), _NICE)

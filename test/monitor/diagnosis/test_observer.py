@@ -136,15 +136,15 @@ def test_a_healthy_leg_is_as_counted_and_becomes_commissioned(leg, reference) ->
 
 def test_the_reference_of_the_ledger_comes_before_the_shipped_one(leg, reference) -> None:
     kept = attrs.evolve(reference)
-    observer = observer_of(leg, given=[kept])
+    observer = observer_of(leg, references=[kept])
     walk(observer, samples(reference, [0] * 8))
     assert observer.state.reference is kept
-    assert observer.simulated_reference is None  # nothing to store
+    assert observer.simulated_references == ()  # nothing to store
 
 
 def test_a_reference_of_the_ledger_under_another_crank_motion_is_not_used(leg, reference) -> None:
     profile = attrs.evolve(reference.profile, sine=np.append(0.02, reference.profile.sine[1:]))
-    observer = observer_of(leg, given=[attrs.evolve(reference, profile=profile)])
+    observer = observer_of(leg, references=[attrs.evolve(reference, profile=profile)])
     walk(observer, samples(reference, [0] * 8))
     np.testing.assert_array_equal(observer.state.reference.profile.sine, 0.0)
 
@@ -361,7 +361,7 @@ def test_each_cadence_has_its_own_baseline_and_reference(leg, reference, monkeyp
     monkeypatch.setattr(observer_module, "COMMISSIONING_CYCLES", 10)
     monkeypatch.setattr(references, "UNLIKE_CYCLES", 3)
     slower = attrs.evolve(reference, profile=CrankProfile.steady(0.95 * TURN))
-    observer, known = observer_of(leg, given=[slower]), []
+    observer, known = observer_of(leg, references=[slower]), []
     block, at = samples(reference, [0] * 20), START_NS
     for period_ns in (10**9, round(10**9 / 0.95), 10**9):
         part = block.copy()
@@ -377,7 +377,11 @@ def test_each_cadence_has_its_own_baseline_and_reference(leg, reference, monkeyp
     fast, slow, again = known
     assert fast is again
     assert [fast.speed, slow.speed] == pytest.approx([TURN, 0.95 * TURN], rel=1e-3)
-    assert observer.state.set_aside == (slow,)
+    assert [one.commissioned for one in observer.state.set_aside] == [slow]
+    assert observer.state.all_commissioned == (fast, slow)
+    assert observer.diagnosis.cycles_not_used == {
+        "unlike": 3
+    }  # the first ones at 57 rpm, none of the second turn
     assert observer.state.reference.profile.speed == TURN
     assert not observer.state.changes
 
@@ -425,11 +429,11 @@ def test_a_reference_that_was_half_simulated_goes_on_in_the_next_run(leg, refere
     while len(run._done) < 2:
         run.advance()
     part = first.part_of_reference
-    second = observer_of(leg, part=part)
+    second = observer_of(leg, references=[part])
     walk(second, block, end=8)
     assert second._references._run._done[0] is part.torque_nm[0]
     assert "is being simulated" in second.diagnosis.reason
-    steady = observer_of(leg, part=part)  # whose crank turns otherwise has no use for it
+    steady = observer_of(leg, references=[part])  # whose crank turns otherwise has no use for it
     walk(steady, samples(reference, [0] * 8))
     assert steady.part_of_reference is None
 
@@ -457,7 +461,7 @@ def test_a_stored_baseline_is_used_from_the_first_cycles_on(leg, reference) -> N
     first = observer_of(leg)
     walk(first, samples(reference, [0] * COMMISSIONING_CYCLES))
     known = first.state.commissioned
-    second = observer_of(leg, commissioned=known)
+    second = observer_of(leg, commissioned=[known])
     walk(second, samples(reference, [leg_number(4, 1.5)] * 14, seed=2))
     assert second.state.commissioned is known
     (change,) = second.diagnosis.changes
@@ -474,7 +478,7 @@ def test_a_small_opening_is_reported_and_not_corrected(leg, reference) -> None:
 
 def test_a_baseline_of_a_sensor_with_another_rate_is_not_used(leg, reference) -> None:
     other = CommissionedTorque(START_NS, NEW, np.zeros((COMMISSIONING_CYCLES, 40)))
-    observer = observer_of(leg, commissioned=other)
+    observer = observer_of(leg, commissioned=[other])
     walk(observer, samples(reference, [0] * (COMMISSIONING_CYCLES + 2)))
     assert observer.diagnosis.state is DiagnosisState.AS_COUNTED
     assert observer.state.commissioned is not None

@@ -54,7 +54,7 @@ class Leg:
 
     @property
     def alarms(self):
-        """Those of the clearances: that of an impact force may rise by chance, one of its input always does."""
+        """Those of the clearances: that of an impact force may rise by chance."""
         return [one.name for one in self.monitor.alarms.alarms if one.level and one.kind == "clearance"]
 
 

@@ -379,9 +379,8 @@ def test_each_cadence_has_its_own_baseline_and_reference(leg, reference, monkeyp
     assert [fast.speed, slow.speed] == pytest.approx([TURN, 0.95 * TURN], rel=1e-3)
     assert [one.commissioned for one in observer.state.set_aside] == [slow]
     assert observer.state.all_commissioned == (fast, slow)
-    assert observer.diagnosis.cycles_not_used == {
-        "unlike": 3
-    }  # the first ones at 57 rpm, none of the second turn
+    # the first ones at 57 rpm, and none of the second turn
+    assert observer.diagnosis.cycles_not_used == {"unlike": 3}
     assert observer.state.reference.profile.speed == TURN
     assert not observer.state.changes
 

@@ -19,6 +19,7 @@ from leg_wear_monitor.monitor.ledger.entry import (
     AlarmEvent,
     Audit,
     ClearancePoint,
+    CommissionedTorque,
     ForecastPoint,
     SimulatedReference,
 )
@@ -340,3 +341,24 @@ def test_a_reference_that_is_not_whole_is_kept_until_it_is(open_ledger, entry_at
         assert [torque.shape for torque in one.torque_nm] == [torque.shape for torque in kept.torque_nm]
         np.testing.assert_array_equal(one.clearance_m, whole.clearance_m)
         found.close()
+
+
+def test_references_and_baselines_are_kept_for_each_cadence(open_ledger, entry_at) -> None:
+    """Those of the same cadence replace each other, and a correction ends the baselines of all."""
+    leg, few = LegParameters(np.ones(1), np.ones(1)), np.ones((2 * CYCLES, POINTS), np.float16)
+    ledger = open_ledger()
+    for stamp_ns, speed in enumerate((6.0, 4.5, 7.5, 4.51), 10):
+        profile = CrankProfile.steady(speed)
+        one = TorqueReference(profile, np.full((2, 5), 3e-4), (few, few[:CYCLES]), leg)
+        ledger.note(SimulatedReference(stamp_ns, ("thigh",), one))
+        ledger.note(CommissionedTorque(stamp_ns, np.full(5, 3e-4), np.ones((4, 6)), speed=speed))
+    ledger.keep(entry_at(2), closed=True)
+    ledger.close()
+    found = open_ledger()
+    assert [one.reference.profile.speed for one in found.references] == [4.51, 7.5, 6.0]
+    assert [one.speed for one in found.commissioned_torques] == [4.51, 7.5, 6.0]
+    sigma_m = np.array([0.0, 0.0, 1e-5, 0.0, 0.0])
+    found.note(CommissionedTorque(20, np.full(5, 3e-4), np.ones((4, 6)), sigma_m, speed=6.0))
+    found.keep(entry_at(3), closed=True)
+    found.close()
+    assert [one.stamp_ns for one in open_ledger().commissioned_torques] == [20]

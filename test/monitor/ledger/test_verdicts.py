@@ -71,7 +71,7 @@ def test_a_simulated_reference_is_read_as_written_and_the_last_is_in_force(open_
         ledger.note(SimulatedReference(stamp_ns, tuple(leg.bodies), reference))
     ledger.keep(entry_at(1), closed=True)
     ledger.close()
-    (found,) = open_ledger().references
+    (found,) = open_ledger().references  # of the same cadence
     assert (found.stamp_ns, found.bodies) == (7, tuple(leg.bodies))
     assert found.reference.parameters == other.parameters
     assert found.reference.profile.departure(other.profile) == 0.0

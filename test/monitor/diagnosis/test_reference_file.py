@@ -121,7 +121,7 @@ def test_a_monitor_begins_with_the_parameters_of_its_file(leg, references, writt
     parts = WearMonitor(leg, config)._parts
     assert parts.torque.state.parameters == parts.twin.parameters == references[1].parameters
     given = [one.parameters == references[1].parameters for one in parts.torque._references._given]
-    assert given == [True, False, False]  # of the file: its second one, its first one; the shipped one
+    assert given == [False, True, False]  # both of the file, and the shipped one
 
 
 def test_references_are_the_same_each_time_and_those_of_a_leg_at_each_cadence(leg, monkeypatch) -> None:

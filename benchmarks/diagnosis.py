@@ -3,16 +3,22 @@
 Each leg walks with the clearances when new, and with one joint or two opened; its crank has a ripple. Torques
 are means over a sample, with noise. Times to detection, names and clearances come out of the code that the
 monitor runs. `python benchmarks/diagnosis.py` takes about an hour, most of it for the legs; with
-`--keep DIRECTORY` those are walked once.
+`--keep DIRECTORY` those are walked once. `--first` runs the observer of the monitor on a new leg until its
+names of joints are sure, then on each opened one; a walk is repeated where it is too short.
 """
 
 import argparse
 import functools
 import pickle
+import time
 from collections.abc import Iterator, Sequence
 from pathlib import Path
+from types import SimpleNamespace
 from typing import NamedTuple
 
+import one_core  # noqa: F401, before numpy: on a busy machine its threads take six times as long
+
+# isort: split
 import attrs
 import numpy as np
 
@@ -26,8 +32,9 @@ from leg_wear_monitor.gait.pace import Pace
 from leg_wear_monitor.mechanism.ideal import TURN
 from leg_wear_monitor.mechanism.position import build_linkage
 from leg_wear_monitor.mechanism.spec import Mechanism
+from leg_wear_monitor.monitor.config.settings import MonitorConfig
 from leg_wear_monitor.monitor.diagnosis.change_detector import ChangeDetector
-from leg_wear_monitor.monitor.diagnosis.diagnosis import Cause
+from leg_wear_monitor.monitor.diagnosis.diagnosis import Cause, Diagnosis, DiagnosisState
 from leg_wear_monitor.monitor.diagnosis.explanations import Explainer
 from leg_wear_monitor.monitor.diagnosis.identification import (
     FAR_FROM_FILE,
@@ -38,36 +45,49 @@ from leg_wear_monitor.monitor.diagnosis.identification import (
 )
 from leg_wear_monitor.monitor.diagnosis.leg_model import best_fit, explainer_of
 from leg_wear_monitor.monitor.diagnosis.leg_models import LegModels
+from leg_wear_monitor.monitor.diagnosis.observer import TorqueObserver
 from leg_wear_monitor.monitor.diagnosis.signature import TorqueSensor, averaged, signatures
 from leg_wear_monitor.monitor.diagnosis.signature_model import with_noise_of
 from leg_wear_monitor.monitor.ledger.entry import CommissionedTorque
 from leg_wear_monitor.twin.follower.load import torque_size
+from leg_wear_monitor.twin.kinds import CRANK
+from leg_wear_monitor.twin.kinds import TORQUE as TORQUE_SAMPLE
 from leg_wear_monitor.twin.reference.crank_profile import CrankProfile, cycle_profile, mean_profile
 from leg_wear_monitor.twin.reference.leg_parameters import LegParameters
+from leg_wear_monitor.twin.reference.leg_simulation import LegSimulation
 from leg_wear_monitor.twin.reference.torque_reference import TorqueReference, TorqueReferenceRun
+from leg_wear_monitor.twin.sample import gait_samples
 from leg_wear_monitor.wear.surfaces import SECTORS
 
 RATE = 1000  # steps of a gait cycle at which a walk is kept
 COMMISSIONING, AFTER, HEALTHY = 60, 60, 160
-NEW = np.full(5, 3.0e-4)
+NEW_M = 3.0e-4
+NEW = np.full(5, NEW_M)  # of the default leg
 SIZES = (3.6e-4, 4.5e-4, 6.0e-4, 1.0e-3)
 MONTH = 8.64e5  # gait cycles: eight hours a day at 60 rpm
 CLOCK = 1.0021  # period of the sensor over what it says: its samples drift through the gait cycle
-UNWORN = np.zeros((5, 2, SECTORS))
+UNWORN = np.zeros((5, 2, SECTORS))  # of the default leg
 STARTS = 5  # gait cycles between two starts of a test
 
 HEAD = """
 | case | cycles to detection: median, worst | named rightly in 5 cycles | in 10 | mean clearances | sigma |
 |---|---|---|---|---|---|"""
 
+FIRST_HEAD = """
+| leg | gait cycles to an estimate | to sure names | processor [s] | misfits | rounds | named (after) |
+|---|---|---|---|---|---|---|"""
+LONGEST = 480  # gait cycles to a first diagnosis
+PERIODS = 4  # evaluations in a gait cycle
+
 
 class Leg(NamedTuple):
-    """Factors on masses and lengths of a leg, the ripple of its crank, and the sizes of its joints [m]."""
+    """Factors on masses and lengths of a leg, the ripple of its crank, sizes of joints [m], and its file."""
 
     masses: dict[str, float]
     lengths: dict[str, float]
     ripple: float
     sizes: tuple[float, ...]
+    mechanism: str = "bionic_leg"
 
 
 BODIES = ("crank", "thigh", "coupler", "rocker", "shank", "foot", "tendon")
@@ -88,6 +108,26 @@ LEGS = {
         0.03,
         (3.6e-4, 1.0e-3),
     ),
+    # other linkages; nothing in the package was chosen by them
+    "e": Leg(
+        {"rod": 1.04, "lower_rocker": 0.96, "upper_rocker": 1.05, "leg": 0.97},
+        {},
+        0.03,
+        (3.6e-4, 1.0e-3),
+        "klann_leg",
+    ),
+    "f": Leg(
+        {"thigh": 1.04, "drive_rod": 0.95, "shank": 0.97, "foot": 1.03},
+        {},
+        0.03,
+        (3.6e-4, 1.0e-3),
+        "jansen_leg",
+    ),
+}
+SEVERAL_UM = {  # further clearances of joints that are wider together
+    "A 0.45 G 0.45": {"A": 150.0, "G": 150.0},
+    "B 0.60 J 0.60": {"B": 300.0, "J": 300.0},
+    "a life": {"A": 150.0, "B": 50.0, "G": 45.0, "I": 15.0, "J": 10.0},
 }
 
 
@@ -125,13 +165,13 @@ def walked(
 
 def cases(joints: tuple[str, ...], sizes: tuple[float, ...]) -> Iterator[tuple[str, np.ndarray, int]]:
     """Name, clearances and gait cycles of each walk."""
-    yield "new", NEW, HEALTHY
-    for k, joint in enumerate(joints):
+    yield "new", np.full(len(joints), NEW_M), HEALTHY
+    for joint in joints:
         for size in sizes:
-            yield f"{joint} {1e3 * size:.2f}", np.where(np.arange(5) == k, size, NEW), AFTER
-    yield "A 0.45 G 0.45", np.array([4.5e-4, 3e-4, 4.5e-4, 3e-4, 3e-4]), AFTER
-    yield "B 0.60 J 0.60", np.array([3e-4, 6e-4, 3e-4, 3e-4, 6e-4]), AFTER
-    yield "a life", NEW + 1e-6 * np.array([150.0, 50.0, 45.0, 15.0, 10.0]), AFTER
+            yield f"{joint} {1e3 * size:.2f}", np.where(np.array(joints) == joint, size, NEW_M), AFTER
+    for case, wider in SEVERAL_UM.items():
+        if set(wider) <= set(joints):
+            yield case, NEW_M + 1e-6 * np.array([wider.get(joint, 0.0) for joint in joints]), AFTER
 
 
 def kept(file: Path | None, make):
@@ -155,10 +195,16 @@ def profile_of(walk: np.ndarray, cycles: int = 20) -> CrankProfile:
     return mean_profile(profiles)
 
 
+def new(leg: Mechanism) -> tuple[np.ndarray, np.ndarray]:
+    """Clearances and wear depths of a new leg."""
+    joints = len(leg.clearance_joints)
+    return np.full(joints, NEW_M), np.zeros((joints, 2, SECTORS))
+
+
 def referred(leg: Mechanism, profile: CrankProfile, bodies: LegParameters) -> TorqueReference:
     """A reference of a leg with given bodies."""
     run = TorqueReferenceRun(leg)
-    run.begin(NEW, UNWORN, profile, bodies)
+    run.begin(*new(leg), profile, bodies)
     return simulated(run)
 
 
@@ -167,7 +213,7 @@ def bodies_of(leg: Mechanism, explainer: Explainer, known: CommissionedTorque, r
     run, start = TorqueReferenceRun(leg), reference.parameters
     if misfit(explainer.model, explainer.nuisances, known) >= FAR_FROM_FILE:
         start = leg_of_ideal_torque(leg, explainer.model, known, reference.profile.speed)
-    run.begin_identification(NEW, UNWORN, reference.profile, start)
+    run.begin_identification(*new(leg), reference.profile, start)
     return identified_leg(simulated(run), explainer.model, explainer.nuisances, known)
 
 
@@ -198,14 +244,14 @@ def explained(
     leg, reference, walk, sensor, noise_nm, random, commissioned=True
 ) -> tuple[Explainer, CommissionedTorque | None, np.ndarray]:
     """The explainer of a leg, commissioned on its first cycles or not, and its further signatures."""
-    new = measured(walk, sensor, noise_nm, random)
-    mean = new[:COMMISSIONING].mean(axis=0)
-    known = CommissionedTorque(0, NEW, new[:COMMISSIONING]) if commissioned else None
+    healthy = measured(walk, sensor, noise_nm, random)
+    mean = healthy[:COMMISSIONING].mean(axis=0)
+    known = CommissionedTorque(0, new(leg)[0], healthy[:COMMISSIONING]) if commissioned else None
     own = with_noise_of(reference, sensor, mean)
     if known is not None:
         own = LegModels(leg).channel(reference, sensor, known)
     explainer = explainer_of(leg, reference, own, known)
-    return explainer, known, new[COMMISSIONING:]
+    return explainer, known, healthy[COMMISSIONING:]
 
 
 def detected(detector: ChangeDetector, cycles: np.ndarray) -> int | None:
@@ -227,19 +273,25 @@ def largest_sum(detector: ChangeDetector, cycles: np.ndarray) -> float:
     return most
 
 
+def counted(explainer: Explainer) -> np.ndarray:
+    """Clearances that are counted."""
+    return np.full(len(explainer.joints), NEW_M)
+
+
 def named(explainer: Explainer, mean: np.ndarray, cycles: int) -> str:
     """The best cause, in words."""
-    best = explainer.explanations(mean, cycles, NEW)[0]
+    best = explainer.explanations(mean, cycles, counted(explainer))[0]
     return best.subject if best.cause is Cause.CLEARANCE else best.cause.value
 
 
 def fitted(explainer: Explainer, mean: np.ndarray, cycles: int):
     """All clearances, from starts at each single cause."""
-    starts = [NEW]
-    for one in explainer.explanations(mean, cycles, NEW):
+    known = counted(explainer)
+    starts = [known]
+    for one in explainer.explanations(mean, cycles, known):
         if one.cause is Cause.CLEARANCE:
-            starts.append(np.where(np.array(explainer.joints) == one.subject, one.value, NEW))
-    return best_fit(explainer, mean, cycles, NEW, starts)
+            starts.append(np.where(np.array(explainer.joints) == one.subject, one.value, known))
+    return best_fit(explainer, mean, cycles, known, starts)
 
 
 def delays(detector: ChangeDetector, cycles: np.ndarray) -> str:
@@ -266,6 +318,81 @@ def at(explainer: Explainer, cycles: np.ndarray) -> list[str]:
     fits = [fitted(explainer, window, 10) for window in windows]
     means = (np.mean([getattr(fit, name) for fit in fits], axis=0) for name in ("clearance_m", "sigma_m"))
     return [" ".join(f"{1e3 * value:.3f}" for value in mean) for mean in means]
+
+
+def received(walk: np.ndarray, cycles: int, first: int, options, random) -> np.ndarray:
+    """Samples of crank and torque of gait cycles of a walk, repeated, with stamps from a gait cycle on."""
+    walk = walk[2 * RATE :, :3] - walk[2 * RATE - 1, :3]  # a gait cycle is a second
+    times = 1 + cycles * RATE // len(walk)
+    walk = np.concatenate([walk + i * walk[-1] for i in range(times)])[: cycles * RATE]
+    between = CLOCK / options.rate_hz
+    stamps, crank = np.arange(between, cycles, between), np.arange(0.0, cycles, 1.0 / options.rate_hz)
+    torque = np.diff(np.interp(stamps, walk[:, 0], walk[:, 2]), prepend=0.0) / between
+    torque += options.noise_nm * random.standard_normal(len(stamps))
+    angle = np.interp(crank, walk[:, 0], walk[:, 1]) + 1e-3 * random.standard_normal(len(crank))
+    both = [
+        gait_samples(np.round(1e9 * (first + crank)).astype(np.int64), CRANK, crank_angle_rad=angle),
+        gait_samples(np.round(1e9 * (first + stamps)).astype(np.int64), TORQUE_SAMPLE, torque_nm=torque),
+    ]
+    block = np.concatenate(both)
+    return block[np.argsort(block["stamp_ns"], kind="stable")]
+
+
+def observed(
+    observer: TorqueObserver, leg: Mechanism, samples: np.ndarray, first: int
+) -> Iterator[Diagnosis]:
+    """The diagnosis after each gait cycle of samples from a cycle on."""
+    stamp = samples["stamp_ns"]
+    for period in range(round(stamp[-1] * 1e-9 - first) * PERIODS):
+        begin_ns, end_ns = ((first * PERIODS + period + i) * 10**9 // PERIODS for i in (0, 1))
+        observer.add_samples(samples[slice(*np.searchsorted(stamp, [begin_ns, end_ns]))])
+        is_end = not (period + 1) % PERIODS
+        if is_end:
+            ended = SimpleNamespace(
+                is_steady=True, cadence_rpm=60.0, begin_ns=end_ns - 10**9, stamp_ns=end_ns
+            )
+            observer.ended(ended)
+        observer.end_period(*new(leg))
+        if is_end:
+            yield observer.diagnosis
+
+
+def first_diagnosis(name: str, walks: dict[str, np.ndarray], options, random) -> list[str]:
+    """Gait cycles and seconds of processor until joints are named surely, and what is named from then on."""
+    leg = load_mechanism(LEGS[name].mechanism)
+    size, known = torque_size(build_linkage(leg), TURN), new(leg)
+    LegSimulation(leg).torque(CrankProfile.steady(TURN), LegParameters.none(leg), *known, 1)  # loads kernels
+    samples, misfits = received(walks["new"], LONGEST, 0, options, random), []
+    begin, estimate = time.process_time(), None
+    observer = TorqueObserver(leg, MonitorConfig(), size, known[0])
+    observer.warm_up()
+    for cycle, found in enumerate(observed(observer, leg, samples, 0), 1):
+        state, spent = observer.state, time.process_time() - begin
+        if found.state is not DiagnosisState.WAITING and estimate is None:
+            estimate = cycle
+        if state.commissioned is None:
+            continue
+        off = f"{observer._models.misfit(state):.2f}"
+        misfits += [] if off in misfits else [off]
+        if not found.reason:
+            break
+    else:
+        return [str(estimate), "never", f"{spent:.0f}", " → ".join(misfits), str(state.rounds), found.reason]
+    row = [str(estimate), str(cycle), f"{spent:.0f}", " → ".join(misfits), str(state.rounds)]
+    then, named = observer.snapshot(), []
+    for case in walks:
+        if case.partition(" ")[2] not in ("0.36", "1.00"):
+            continue
+        observer.restore(then)
+        samples, after = received(walks[case], AFTER, cycle, options, random), 0
+        for found in observed(observer, leg, samples, cycle):
+            after += 1
+            if any(change.is_sure for change in found.changes):
+                break
+        change = found.changes[-1] if found.changes else None
+        what = f"{change.subject or change.cause.value} {1e3 * change.value:.2f}" if change else "nothing"
+        named.append(f"{case}: {what}{'' if change is None or change.is_sure else '?'} ({after})")
+    return [*row, "; ".join(named)]
 
 
 def walks_of(name: str, leg: Mechanism, keep: Path | None) -> dict[str, np.ndarray]:
@@ -308,21 +435,29 @@ def main() -> None:
     parser.add_argument("--rate-hz", type=float, default=200.0)
     parser.add_argument("--uncommissioned", action="store_true")
     parser.add_argument("--as-of-file", action="store_true", help="do not identify the leg")
+    parser.add_argument("--first", action="store_true", help="only the times until the first diagnosis")
     parser.add_argument("--legs", nargs="+", default=list(LEGS))
     options = parser.parse_args()
-    leg, random = load_mechanism("bionic_leg"), np.random.default_rng(5)
-    size = torque_size(build_linkage(leg), TURN)
-    print(f"noise {options.noise_nm} N m, {options.rate_hz:g} Hz, RMS of the torque {size:.1f} N m")
-    rights = {}
+    random, rights = np.random.default_rng(5), {}
+    print(f"noise {options.noise_nm} N m, {options.rate_hz:g} Hz")
+    if options.first:
+        print(FIRST_HEAD)
+        for name in options.legs:
+            walks = walks_of(name, load_mechanism(LEGS[name].mechanism), options.keep)
+            print(f"| {name} | {' | '.join(first_diagnosis(name, walks, options, random))} |", flush=True)
+        return
     for name in options.legs:
+        leg = load_mechanism(LEGS[name].mechanism)
+        size = torque_size(build_linkage(leg), TURN)
         walks = walks_of(name, leg, options.keep)
         profile = profile_of(walks["new"])
         sensor = TorqueSensor(1.0 / options.rate_hz, TURN / abs(profile.speed), size)
         explainer, healthy = known_leg(name, leg, walks["new"], profile, sensor, random, options)
-        detector = ChangeDetector(explainer, NEW, MONTH)
+        detector = ChangeDetector(explainer, counted(explainer), MONTH)
         most = largest_sum(detector, healthy)
         print(
-            f"leg {name}: noise found {explainer.model.sensor.noise_nm:.3f} N m, threshold "
+            f"leg {name}: RMS of the torque {size:.1f} N m, noise found "
+            f"{explainer.model.sensor.noise_nm:.3f} N m, threshold "
             f"{detector.threshold:.1f}, largest sum in {len(healthy)} healthy cycles {most:.1f}"
         )
         print(HEAD)

@@ -27,28 +27,29 @@ from leg_wear_monitor.dynamics.full.run import FullRun
 from leg_wear_monitor.dynamics.run.drive import quintic
 from leg_wear_monitor.dynamics.run.run_statistics import TORQUE, new_run_statistics
 from leg_wear_monitor.dynamics.simulation import prepare
-from leg_wear_monitor.gait.config import PaceConfig
-from leg_wear_monitor.gait.pace import Pace
-from leg_wear_monitor.mechanism.ideal import TURN
-from leg_wear_monitor.mechanism.position import build_linkage
-from leg_wear_monitor.mechanism.spec import Mechanism
-from leg_wear_monitor.monitor.config.settings import MonitorConfig
-from leg_wear_monitor.monitor.diagnosis.change_detector import ChangeDetector
-from leg_wear_monitor.monitor.diagnosis.diagnosis import Cause, Diagnosis, DiagnosisState
-from leg_wear_monitor.monitor.diagnosis.explanations import Explainer
-from leg_wear_monitor.monitor.diagnosis.identification import (
+from leg_wear_monitor.estimate.cause import Cause
+from leg_wear_monitor.estimate.change_detector import ChangeDetector
+from leg_wear_monitor.estimate.commissioned_torque import CommissionedTorque
+from leg_wear_monitor.estimate.explanations import Explainer
+from leg_wear_monitor.estimate.identification import (
     FAR_FROM_FILE,
     UNLIKE_FILE,
     identified_leg,
     leg_of_ideal_torque,
     misfit,
 )
-from leg_wear_monitor.monitor.diagnosis.leg_model import best_fit, explainer_of
+from leg_wear_monitor.estimate.leg_model import best_fit, explainer_of
+from leg_wear_monitor.estimate.signature import TorqueSensor, averaged, signatures
+from leg_wear_monitor.estimate.signature_model import with_noise_of
+from leg_wear_monitor.gait.config import PaceConfig
+from leg_wear_monitor.gait.pace import Pace
+from leg_wear_monitor.mechanism.ideal import TURN
+from leg_wear_monitor.mechanism.position import build_linkage
+from leg_wear_monitor.mechanism.spec import Mechanism
+from leg_wear_monitor.monitor.config.settings import MonitorConfig
+from leg_wear_monitor.monitor.diagnosis.diagnosis import Diagnosis, DiagnosisState
 from leg_wear_monitor.monitor.diagnosis.leg_models import LegModels
 from leg_wear_monitor.monitor.diagnosis.observer import TorqueObserver
-from leg_wear_monitor.monitor.diagnosis.signature import TorqueSensor, averaged, signatures
-from leg_wear_monitor.monitor.diagnosis.signature_model import with_noise_of
-from leg_wear_monitor.monitor.ledger.entry import CommissionedTorque
 from leg_wear_monitor.twin.follower.load import torque_size
 from leg_wear_monitor.twin.kinds import CRANK
 from leg_wear_monitor.twin.kinds import TORQUE as TORQUE_SAMPLE

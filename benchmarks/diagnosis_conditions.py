@@ -35,14 +35,14 @@ from diagnosis import (
 )
 
 from leg_wear_monitor import load_mechanism
+from leg_wear_monitor.estimate.change_detector import ChangeDetector
+from leg_wear_monitor.estimate.explanations import Explainer
+from leg_wear_monitor.estimate.identification import UNLIKE_FILE, misfit
+from leg_wear_monitor.estimate.signature import TorqueSensor
 from leg_wear_monitor.mechanism.ideal import TURN, one_cycle, point_motion
 from leg_wear_monitor.mechanism.position import build_linkage
 from leg_wear_monitor.mechanism.spec import Mechanism, PhaseLoad
-from leg_wear_monitor.monitor.diagnosis.change_detector import ChangeDetector
-from leg_wear_monitor.monitor.diagnosis.explanations import Explainer
-from leg_wear_monitor.monitor.diagnosis.identification import UNLIKE_FILE, misfit
 from leg_wear_monitor.monitor.diagnosis.references import ROUNDS
-from leg_wear_monitor.monitor.diagnosis.signature import TorqueSensor
 from leg_wear_monitor.twin.follower.load import torque_size
 from leg_wear_monitor.twin.reference.leg_parameters import LegParameters
 

@@ -18,13 +18,13 @@ from diagnosis_conditions import known_reference
 from numba import njit
 
 from leg_wear_monitor import load_mechanism
+from leg_wear_monitor.estimate.change_detector import ChangeDetector, DetectorState
+from leg_wear_monitor.estimate.commissioned_torque import CommissionedTorque
+from leg_wear_monitor.estimate.leg_model import explainer_of
+from leg_wear_monitor.estimate.signature import TorqueSensor
 from leg_wear_monitor.mechanism.ideal import TURN
 from leg_wear_monitor.mechanism.position import build_linkage
-from leg_wear_monitor.monitor.diagnosis.change_detector import ChangeDetector, DetectorState
-from leg_wear_monitor.monitor.diagnosis.leg_model import explainer_of
 from leg_wear_monitor.monitor.diagnosis.leg_models import LegModels
-from leg_wear_monitor.monitor.diagnosis.signature import TorqueSensor
-from leg_wear_monitor.monitor.ledger.entry import CommissionedTorque
 from leg_wear_monitor.twin.follower.load import load_signature, torque_size
 
 NOISE_NM, BLOCK, STRETCH = 0.5, 10, 1000  # N m; gait cycles

@@ -19,17 +19,17 @@ from leg_wear_monitor.commissioning.result.commissioning_result import Commissio
 from leg_wear_monitor.commissioning.search.candidates import candidates
 from leg_wear_monitor.commissioning.search.choice import Choice, choose
 from leg_wear_monitor.errors import LegWearError
+from leg_wear_monitor.estimate.torque_fit.fit import fit
+from leg_wear_monitor.estimate.torque_fit.motion import JointMotion, motion_of, why_not_a_crank
+from leg_wear_monitor.estimate.torque_fit.regression import Terms
+from leg_wear_monitor.estimate.torque_fit.series import Series
+from leg_wear_monitor.estimate.torque_fit.torque_model import TorqueModel, torque_model
 from leg_wear_monitor.mechanism.loader import load_mechanism
 from leg_wear_monitor.mechanism.spec import Mechanism
 from leg_wear_monitor.monitor.config.fitting import fitted
 from leg_wear_monitor.monitor.config.parameter_file import load_config
 from leg_wear_monitor.monitor.config.parameters import config_from, values_of
 from leg_wear_monitor.monitor.config.settings import MonitorConfig
-from leg_wear_monitor.torque_fit.fit import fit
-from leg_wear_monitor.torque_fit.motion import JointMotion, motion_of, why_not_a_crank
-from leg_wear_monitor.torque_fit.regression import Terms
-from leg_wear_monitor.torque_fit.series import Series
-from leg_wear_monitor.torque_fit.torque_model import TorqueModel, torque_model
 
 _LEAST_S = 10.0  # ten turns at 60 rpm
 

@@ -5,6 +5,7 @@ from pathlib import Path
 import attrs
 import numpy as np
 
+from leg_wear_monitor.estimate.torque_fit.torque_model import torque_model
 from leg_wear_monitor.mechanism.materials.load import bushing_of
 from leg_wear_monitor.mechanism.spec import Mechanism
 from leg_wear_monitor.monitor.accounting import Accounting
@@ -28,7 +29,6 @@ from leg_wear_monitor.monitor.ledger.entry import Measurement, SimulatedReferenc
 from leg_wear_monitor.monitor.ledger.ledger import Ledger
 from leg_wear_monitor.monitor.state import MonitorSnapshot, MonitorState
 from leg_wear_monitor.monitor.torque_causes.explainer import TorqueExplainer
-from leg_wear_monitor.torque_fit.torque_model import torque_model
 from leg_wear_monitor.twin.digital_twin import DigitalTwin
 from leg_wear_monitor.twin.reference.leg_parameters import LegParameters
 from leg_wear_monitor.twin.reference.torque_reference import TorqueReference

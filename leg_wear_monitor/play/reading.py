@@ -13,9 +13,9 @@ from leg_wear_monitor.bags.series.signals import EFFORT, WRENCH, JointName, Sign
 from leg_wear_monitor.bags.topics import listed
 from leg_wear_monitor.configuration.nearest import did_you_mean
 from leg_wear_monitor.errors import ConfigError
+from leg_wear_monitor.estimate.torque_fit.series import Series
 from leg_wear_monitor.mechanism.arrays import Floats
 from leg_wear_monitor.monitor.config.settings import MonitorConfig
-from leg_wear_monitor.torque_fit.series import Series
 
 _OPTIONS = {
     "input.columns.stamp": "--time",

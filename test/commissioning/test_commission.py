@@ -21,11 +21,11 @@ from leg_wear_monitor.bags.series.signals import (
 )
 from leg_wear_monitor.commissioning.commission import commission, propose
 from leg_wear_monitor.commissioning.result.commissioning_result import CommissioningResult
+from leg_wear_monitor.estimate.torque_fit.series import Series
+from leg_wear_monitor.estimate.torque_fit.torque_model import TorqueModel
 from leg_wear_monitor.mechanism.ideal import TURN
 from leg_wear_monitor.monitor.config.fitting import fitted
 from leg_wear_monitor.monitor.config.parameter_file import load_config
-from leg_wear_monitor.torque_fit.series import Series
-from leg_wear_monitor.torque_fit.torque_model import TorqueModel
 
 from .conftest import Robot, Walk, columns_of
 

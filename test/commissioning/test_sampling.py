@@ -6,14 +6,14 @@ import numpy as np
 import pytest
 
 from leg_wear_monitor.commissioning.evidence.sampling import Sampling, added_up, sampling_of
+from leg_wear_monitor.estimate.torque_fit.fit import fit
+from leg_wear_monitor.estimate.torque_fit.motion import motion_of
+from leg_wear_monitor.estimate.torque_fit.pairing import paired
+from leg_wear_monitor.estimate.torque_fit.series import Series
+from leg_wear_monitor.estimate.torque_fit.start import Start
+from leg_wear_monitor.estimate.torque_fit.torque_model import TorqueModel
 from leg_wear_monitor.mechanism.arrays import Floats
 from leg_wear_monitor.mechanism.ideal import TURN
-from leg_wear_monitor.torque_fit.fit import fit
-from leg_wear_monitor.torque_fit.motion import motion_of
-from leg_wear_monitor.torque_fit.pairing import paired
-from leg_wear_monitor.torque_fit.series import Series
-from leg_wear_monitor.torque_fit.start import Start
-from leg_wear_monitor.torque_fit.torque_model import TorqueModel
 
 from .conftest import Robot, Walk, columns_of
 

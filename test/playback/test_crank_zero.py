@@ -8,12 +8,12 @@ import pytest
 
 import leg_wear_monitor as lw
 from leg_wear_monitor.bags.mcap.writer import McapWriter
+from leg_wear_monitor.estimate.torque_fit.torque_model import TorqueModel, torque_model
 from leg_wear_monitor.messages import encode
 from leg_wear_monitor.messages.decode import Decoder
 from leg_wear_monitor.messages.streams import JOINT_STATE, WRENCH_STAMPED
 from leg_wear_monitor.monitor.config.parameters import config_from
 from leg_wear_monitor.monitor.config.settings import MonitorConfig
-from leg_wear_monitor.torque_fit.torque_model import TorqueModel, torque_model
 
 START_NS, RATE_HZ, TURN = 1_700_000_000 * 10**9, 200, 2.0 * math.pi
 BOOTS = (1.9, 0.0), (-0.7, 30.0)  # crank angle at the start [rad], time of the start [s]

@@ -22,12 +22,12 @@ from leg_wear_monitor.bags.series.signals import (
 )
 from leg_wear_monitor.bags.sources import Source, open_sources
 from leg_wear_monitor.bags.topics import Role, check_channel
+from leg_wear_monitor.estimate.torque_fit.series import Series, series
 from leg_wear_monitor.messages import outputs
 from leg_wear_monitor.messages.decode import Decoder
 from leg_wear_monitor.messages.streams import JOINT_STATE, STREAMS, WRENCH_STAMPED, Stream
 from leg_wear_monitor.monitor.config.inputs import DriveTorque
 from leg_wear_monitor.monitor.config.settings import MonitorConfig
-from leg_wear_monitor.torque_fit.series import Series, series
 from leg_wear_monitor.twin.kinds import CRANK
 from leg_wear_monitor.twin.sample import MISSING_JOINT, NO_FAULT, ZERO_STAMP, Samples
 

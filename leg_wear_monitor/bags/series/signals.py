@@ -2,7 +2,7 @@
 
 import attrs
 
-from leg_wear_monitor.torque_fit.series import Series
+from leg_wear_monitor.estimate.torque_fit.series import Series
 
 WRENCH, FLOAT64, EFFORT = "wrench", "float64", "effort"
 

@@ -3,12 +3,12 @@
 import attrs
 import numpy as np
 
+from leg_wear_monitor.estimate.torque_fit.fit import Fit, fit
+from leg_wear_monitor.estimate.torque_fit.likeness import repeating
+from leg_wear_monitor.estimate.torque_fit.regression import Terms, least_squares
+from leg_wear_monitor.estimate.torque_fit.torque_model import TorqueModel, body_torques
 from leg_wear_monitor.mechanism.arrays import Floats
 from leg_wear_monitor.mechanism.spec import Mechanism
-from leg_wear_monitor.torque_fit.fit import Fit, fit
-from leg_wear_monitor.torque_fit.likeness import repeating
-from leg_wear_monitor.torque_fit.regression import Terms, least_squares
-from leg_wear_monitor.torque_fit.torque_model import TorqueModel, body_torques
 
 # Clearances of 0.3 mm in five joints of the default leg repeat with 0.03 to 0.17 of the torque, the most at
 # 30 rpm and of a sensor that samples instants, whose impacts do not average out

@@ -4,10 +4,10 @@ import math
 
 import numpy as np
 
+from leg_wear_monitor.estimate.torque_fit.blocks import BINS
+from leg_wear_monitor.estimate.torque_fit.fit import Fit
+from leg_wear_monitor.estimate.torque_fit.likeness import repeating
 from leg_wear_monitor.mechanism.arrays import Floats
-from leg_wear_monitor.torque_fit.blocks import BINS
-from leg_wear_monitor.torque_fit.fit import Fit
-from leg_wear_monitor.torque_fit.likeness import repeating
 
 _QUIETEST = 5  # parts of the turn of 48: so many that the median of an odd number is taken
 _MEDIAN_TO_SIGMA = 1.0 / 0.6745  # of a normal distribution's absolute values

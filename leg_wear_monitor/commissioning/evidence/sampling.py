@@ -12,11 +12,11 @@ import numpy as np
 
 from leg_wear_monitor.commissioning.evidence.noise import sensor_noise
 from leg_wear_monitor.commissioning.evidence.timing import lag_error_s, separates_lag
+from leg_wear_monitor.estimate.torque_fit.fit import Fit
+from leg_wear_monitor.estimate.torque_fit.pairing import is_steady, slow_speed
+from leg_wear_monitor.estimate.torque_fit.torque_model import TorqueModel
 from leg_wear_monitor.mechanism.arrays import Floats
 from leg_wear_monitor.mechanism.ideal import TURN
-from leg_wear_monitor.torque_fit.fit import Fit
-from leg_wear_monitor.torque_fit.pairing import is_steady, slow_speed
-from leg_wear_monitor.torque_fit.torque_model import TorqueModel
 from leg_wear_monitor.twin.settings import AVERAGE, INSTANT
 
 _WINDOW = 0.125  # of a turn, half of the window's width: some flights with their impacts

@@ -5,10 +5,10 @@ import math
 import attrs
 import numpy as np
 
+from leg_wear_monitor.estimate.torque_fit.fit import Fit
+from leg_wear_monitor.estimate.torque_fit.pairing import Pair, slow_speed
 from leg_wear_monitor.mechanism.arrays import Floats
 from leg_wear_monitor.mechanism.ideal import TURN
-from leg_wear_monitor.torque_fit.fit import Fit
-from leg_wear_monitor.torque_fit.pairing import Pair, slow_speed
 from leg_wear_monitor.twin.settings import AVERAGE
 
 _SPREAD = 0.15  # relative spread of the speed from which on a lag is separated from the offset

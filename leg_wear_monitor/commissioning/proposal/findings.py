@@ -9,9 +9,9 @@ from leg_wear_monitor.bags.series.signals import FLOAT64
 from leg_wear_monitor.commissioning.evidence.misfit import Load, does_not_fit
 from leg_wear_monitor.commissioning.evidence.timing import cadences_rpm
 from leg_wear_monitor.commissioning.proposal.items import Found, gear, gear_error, offset_rad
+from leg_wear_monitor.estimate.torque_fit.likeness import repeating
 from leg_wear_monitor.mechanism.ideal import TURN
 from leg_wear_monitor.mechanism.spec import Mechanism
-from leg_wear_monitor.torque_fit.likeness import repeating
 
 _SURE = 3.0
 _TOLD = 2.0  # standard deviations that have to be less than what is asked for

@@ -15,12 +15,12 @@ from leg_wear_monitor.commissioning.proposal.exact_ratio import exact_ratio
 from leg_wear_monitor.commissioning.result.commissioning_result import CommissioningItem as Item
 from leg_wear_monitor.commissioning.search.candidates import SAME_GEAR, Candidate
 from leg_wear_monitor.commissioning.search.choice import Choice, Rival
+from leg_wear_monitor.estimate.torque_fit.fit import Fit
+from leg_wear_monitor.estimate.torque_fit.likeness import repeating
+from leg_wear_monitor.estimate.torque_fit.motion import JointMotion
+from leg_wear_monitor.estimate.torque_fit.torque_model import PHASE_ERROR_RAD
 from leg_wear_monitor.mechanism.ideal import TURN
 from leg_wear_monitor.monitor.config.settings import MonitorConfig
-from leg_wear_monitor.torque_fit.fit import Fit
-from leg_wear_monitor.torque_fit.likeness import repeating
-from leg_wear_monitor.torque_fit.motion import JointMotion
-from leg_wear_monitor.torque_fit.torque_model import PHASE_ERROR_RAD
 
 _SURE = 3.0  # standard deviations
 _NEAR = 0.05  # relative error by which clearances shift the scale: a given one that near is kept

@@ -7,12 +7,12 @@ import numpy as np
 
 from leg_wear_monitor.bags.series.signals import EFFORT, JointName, TorqueSource
 from leg_wear_monitor.commissioning.search.gear_scan import scan
-from leg_wear_monitor.torque_fit.fit import Fit, fit
-from leg_wear_monitor.torque_fit.motion import JointMotion
-from leg_wear_monitor.torque_fit.pairing import Pair, paired, steady_stretch
-from leg_wear_monitor.torque_fit.series import Series
-from leg_wear_monitor.torque_fit.start import Start
-from leg_wear_monitor.torque_fit.torque_model import TorqueModel
+from leg_wear_monitor.estimate.torque_fit.fit import Fit, fit
+from leg_wear_monitor.estimate.torque_fit.motion import JointMotion
+from leg_wear_monitor.estimate.torque_fit.pairing import Pair, paired, steady_stretch
+from leg_wear_monitor.estimate.torque_fit.series import Series
+from leg_wear_monitor.estimate.torque_fit.start import Start
+from leg_wear_monitor.estimate.torque_fit.torque_model import TorqueModel
 
 _PEAKS = 2  # ratios that are fitted, of each direction and sign
 _HOPELESS = 0.3  # of the best explained fraction, below which a pair gets one fit only

@@ -11,8 +11,8 @@ from leg_wear_monitor.commissioning.search.candidates import (
     on_one_shaft,
     same_gear,
 )
+from leg_wear_monitor.estimate.torque_fit.likeness import repeating, too_alike
 from leg_wear_monitor.mechanism.ideal import TURN
-from leg_wear_monitor.torque_fit.likeness import repeating, too_alike
 
 _SAME_PHASE_RAD = 0.3  # two sensors of one torque differ by their lags, those of two legs by more
 _SIGNALS = ("crank_joint", "drive_torque.source")

@@ -8,11 +8,11 @@ Multiples and fractions of the true ratio have the wrong harmonics, and the mode
 import numpy as np
 from numpy.typing import NDArray
 
+from leg_wear_monitor.estimate.torque_fit.pairing import Pair
+from leg_wear_monitor.estimate.torque_fit.start import Start
+from leg_wear_monitor.estimate.torque_fit.torque_model import TorqueModel
 from leg_wear_monitor.mechanism.arrays import Floats
 from leg_wear_monitor.mechanism.ideal import TURN
-from leg_wear_monitor.torque_fit.pairing import Pair
-from leg_wear_monitor.torque_fit.start import Start
-from leg_wear_monitor.torque_fit.torque_model import TorqueModel
 
 LEAST_TURNS = 5.0
 _HARMONICS = 10

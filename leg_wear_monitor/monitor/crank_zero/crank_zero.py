@@ -10,12 +10,12 @@ from typing import NamedTuple
 import attrs
 import numpy as np
 
+from leg_wear_monitor.estimate.torque_fit.torque_model import TorqueModel
 from leg_wear_monitor.monitor.config.settings import MonitorConfig
 from leg_wear_monitor.monitor.crank_zero import restarts
 from leg_wear_monitor.monitor.crank_zero.phase import LEAST_TURNS, Zero, zero_of
 from leg_wear_monitor.monitor.crank_zero.walk import MOST_TURNS, Walk, last_walk
 from leg_wear_monitor.record import Record, Records, new_records, record_of
-from leg_wear_monitor.torque_fit.torque_model import TorqueModel
 from leg_wear_monitor.twin.kinds import CRANK
 from leg_wear_monitor.twin.sample import GAIT_SAMPLE, NO_FAULT, Samples
 from leg_wear_monitor.twin.settings import TrackerSettings

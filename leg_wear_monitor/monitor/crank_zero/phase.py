@@ -5,16 +5,16 @@ import math
 import attrs
 import numpy as np
 
+from leg_wear_monitor.estimate.torque_fit.fit import Fit, fit
+from leg_wear_monitor.estimate.torque_fit.likeness import repeating, too_alike
+from leg_wear_monitor.estimate.torque_fit.motion import motion_of
+from leg_wear_monitor.estimate.torque_fit.pairing import Pair, paired
+from leg_wear_monitor.estimate.torque_fit.regression import PHASES, Terms, explained_by_phase
+from leg_wear_monitor.estimate.torque_fit.start import Start
+from leg_wear_monitor.estimate.torque_fit.torque_model import PHASE_ERROR_RAD, TorqueModel
 from leg_wear_monitor.mechanism.arrays import Floats
 from leg_wear_monitor.mechanism.ideal import TURN
 from leg_wear_monitor.monitor.crank_zero.walk import Walk
-from leg_wear_monitor.torque_fit.fit import Fit, fit
-from leg_wear_monitor.torque_fit.likeness import repeating, too_alike
-from leg_wear_monitor.torque_fit.motion import motion_of
-from leg_wear_monitor.torque_fit.pairing import Pair, paired
-from leg_wear_monitor.torque_fit.regression import PHASES, Terms, explained_by_phase
-from leg_wear_monitor.torque_fit.start import Start
-from leg_wear_monitor.torque_fit.torque_model import PHASE_ERROR_RAD, TorqueModel
 from leg_wear_monitor.twin.settings import AVERAGE
 
 LEAST_TURNS = 3  # two were enough for sensors that average; the third shows what repeats

@@ -4,10 +4,10 @@ import attrs
 import numpy as np
 from numpy.typing import NDArray
 
+from leg_wear_monitor.estimate.torque_fit.series import Series, series
 from leg_wear_monitor.mechanism.arrays import Floats
 from leg_wear_monitor.mechanism.ideal import TURN
 from leg_wear_monitor.monitor.config.inputs import Cadence
-from leg_wear_monitor.torque_fit.series import Series, series
 from leg_wear_monitor.twin.kinds import CRANK
 from leg_wear_monitor.twin.sample import NO_FAULT, Samples
 

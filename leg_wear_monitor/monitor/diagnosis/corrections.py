@@ -6,11 +6,11 @@ from typing import NamedTuple
 import attrs
 import numpy as np
 
+from leg_wear_monitor.estimate.cause import Change
+from leg_wear_monitor.estimate.commissioned_torque import CommissionedTorque
 from leg_wear_monitor.mechanism.arrays import Floats
-from leg_wear_monitor.monitor.diagnosis.diagnosis import Change
 from leg_wear_monitor.monitor.diagnosis.evidence import SETTLING_CYCLES
 from leg_wear_monitor.monitor.diagnosis.state import TorqueState
-from leg_wear_monitor.monitor.ledger.entry import CommissionedTorque
 
 # of the counted clearance: smaller openings are named wrongly where masses are 5 % off (diagnosis.md)
 CORRECTED_FROM = 1.3

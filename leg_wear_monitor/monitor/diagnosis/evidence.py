@@ -5,13 +5,13 @@ from collections.abc import Sequence
 import attrs
 import numpy as np
 
+from leg_wear_monitor.estimate.cause import SURE_LOG_ODDS, Cause, Change
+from leg_wear_monitor.estimate.explanations import Explanation
+from leg_wear_monitor.estimate.leg_model import best_fit, change_of, first_changed, start_of
+from leg_wear_monitor.estimate.signature_model import with_noise_of
 from leg_wear_monitor.mechanism.arrays import Floats
 from leg_wear_monitor.monitor.config.settings import MonitorConfig
-from leg_wear_monitor.monitor.diagnosis.diagnosis import SURE_LOG_ODDS, Cause, Change
-from leg_wear_monitor.monitor.diagnosis.explanations import Explanation
-from leg_wear_monitor.monitor.diagnosis.leg_model import best_fit, change_of, first_changed, start_of
 from leg_wear_monitor.monitor.diagnosis.leg_models import LegModels
-from leg_wear_monitor.monitor.diagnosis.signature_model import with_noise_of
 from leg_wear_monitor.monitor.diagnosis.state import SignedCycle, TorqueState
 
 SETTLING_CYCLES = 10  # since a change, before the counted clearances are corrected by it

@@ -5,20 +5,20 @@ They are made where they are needed first, and again where what they depend on h
 
 import attrs
 
+from leg_wear_monitor.estimate.body_torques import body_torques
+from leg_wear_monitor.estimate.change_detector import ChangeDetector
+from leg_wear_monitor.estimate.channel import with_channel_of
+from leg_wear_monitor.estimate.commissioned_torque import CommissionedTorque
+from leg_wear_monitor.estimate.explanations import Explainer
+from leg_wear_monitor.estimate.identification import UNLIKE_FILE, misfit
+from leg_wear_monitor.estimate.leg_model import explainer_of
+from leg_wear_monitor.estimate.nuisances import nuisances
+from leg_wear_monitor.estimate.signature import TorqueSensor
+from leg_wear_monitor.estimate.signature_model import signature_model, with_noise_of
 from leg_wear_monitor.mechanism.arrays import Floats
 from leg_wear_monitor.mechanism.spec import Mechanism
 from leg_wear_monitor.monitor.config.settings import MonitorConfig
-from leg_wear_monitor.monitor.diagnosis.body_torques import body_torques
-from leg_wear_monitor.monitor.diagnosis.change_detector import ChangeDetector
-from leg_wear_monitor.monitor.diagnosis.channel import with_channel_of
-from leg_wear_monitor.monitor.diagnosis.explanations import Explainer
-from leg_wear_monitor.monitor.diagnosis.identification import UNLIKE_FILE, misfit
-from leg_wear_monitor.monitor.diagnosis.leg_model import explainer_of
-from leg_wear_monitor.monitor.diagnosis.nuisances import nuisances
-from leg_wear_monitor.monitor.diagnosis.signature import TorqueSensor
-from leg_wear_monitor.monitor.diagnosis.signature_model import signature_model, with_noise_of
 from leg_wear_monitor.monitor.diagnosis.state import TorqueState
-from leg_wear_monitor.monitor.ledger.entry import CommissionedTorque
 from leg_wear_monitor.twin.reference.torque_reference import TorqueReference
 
 COMMISSIONING_CYCLES = 50  # a recording of a minute has them

@@ -11,12 +11,14 @@ from typing import NamedTuple
 import attrs
 import numpy as np
 
+from leg_wear_monitor.estimate.cause import Cause
+from leg_wear_monitor.estimate.clearance_fit import ClearanceFit
+from leg_wear_monitor.estimate.commissioned_torque import CommissionedTorque
 from leg_wear_monitor.mechanism.arrays import Floats
 from leg_wear_monitor.mechanism.spec import Mechanism
 from leg_wear_monitor.monitor.config.settings import MonitorConfig
-from leg_wear_monitor.monitor.diagnosis.clearance_fit import ClearanceFit
 from leg_wear_monitor.monitor.diagnosis.corrections import Correction, correction_of, settle
-from leg_wear_monitor.monitor.diagnosis.diagnosis import Cause, Diagnosis, DiagnosisState, NotUsed
+from leg_wear_monitor.monitor.diagnosis.diagnosis import Diagnosis, DiagnosisState, NotUsed
 from leg_wear_monitor.monitor.diagnosis.evidence import Evidence
 from leg_wear_monitor.monitor.diagnosis.leg_models import COMMISSIONING_CYCLES, LegModels
 from leg_wear_monitor.monitor.diagnosis.reasons import doubt, missing
@@ -24,7 +26,6 @@ from leg_wear_monitor.monitor.diagnosis.references import References
 from leg_wear_monitor.monitor.diagnosis.signed_cycle import find_sensor, signed_cycle
 from leg_wear_monitor.monitor.diagnosis.state import UNUSED_CYCLES, WINDOW_CYCLES, TorqueState
 from leg_wear_monitor.monitor.diagnosis.torque_samples import NO_TORQUE_SAMPLES, after, extended
-from leg_wear_monitor.monitor.ledger.entry import CommissionedTorque
 from leg_wear_monitor.twin.reference.leg_parameters import LegParameters
 from leg_wear_monitor.twin.reference.torque_reference import TorqueReference, TorqueReferenceSnapshot
 from leg_wear_monitor.twin.sample import Samples

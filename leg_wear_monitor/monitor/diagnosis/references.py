@@ -5,13 +5,13 @@ from collections.abc import Sequence
 
 import numpy as np
 
-from leg_wear_monitor.mechanism.arrays import Floats
-from leg_wear_monitor.mechanism.spec import Mechanism
-from leg_wear_monitor.monitor.diagnosis.identification import (
+from leg_wear_monitor.estimate.identification import (
     FAR_FROM_FILE,
     identified_leg,
     leg_of_ideal_torque,
 )
+from leg_wear_monitor.mechanism.arrays import Floats
+from leg_wear_monitor.mechanism.spec import Mechanism
 from leg_wear_monitor.monitor.diagnosis.leg_models import LegModels
 from leg_wear_monitor.monitor.diagnosis.reference_file import shipped_references
 from leg_wear_monitor.monitor.diagnosis.state import AtCadence, TorqueState

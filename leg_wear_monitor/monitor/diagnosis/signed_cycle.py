@@ -4,9 +4,9 @@ import math
 
 import numpy as np
 
+from leg_wear_monitor.estimate.signature import TorqueSensor, signatures
 from leg_wear_monitor.monitor.config.settings import MonitorConfig
 from leg_wear_monitor.monitor.diagnosis.diagnosis import NotUsed
-from leg_wear_monitor.monitor.diagnosis.signature import TorqueSensor, signatures
 from leg_wear_monitor.monitor.diagnosis.state import SignedCycle, TorqueState
 from leg_wear_monitor.monitor.diagnosis.torque_samples import cycle_torque, sensor_period_s
 from leg_wear_monitor.twin.settings import INSTANT

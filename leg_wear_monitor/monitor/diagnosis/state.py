@@ -6,13 +6,14 @@ from typing import NamedTuple
 import attrs
 import numpy as np
 
+from leg_wear_monitor.estimate.cause import Change
+from leg_wear_monitor.estimate.change_detector import DetectorState
+from leg_wear_monitor.estimate.clearance_fit import ClearanceFit
+from leg_wear_monitor.estimate.commissioned_torque import CommissionedTorque
+from leg_wear_monitor.estimate.signature import TorqueSensor
 from leg_wear_monitor.mechanism.arrays import Floats
-from leg_wear_monitor.monitor.diagnosis.change_detector import DetectorState
-from leg_wear_monitor.monitor.diagnosis.clearance_fit import ClearanceFit
-from leg_wear_monitor.monitor.diagnosis.diagnosis import Change, NotUsed
-from leg_wear_monitor.monitor.diagnosis.signature import TorqueSensor
+from leg_wear_monitor.monitor.diagnosis.diagnosis import NotUsed
 from leg_wear_monitor.monitor.diagnosis.torque_samples import NO_TORQUE_SAMPLES, TorqueSamples
-from leg_wear_monitor.monitor.ledger.entry import CommissionedTorque
 from leg_wear_monitor.twin.reference.crank_profile import CrankProfile, mean_profile
 from leg_wear_monitor.twin.reference.leg_parameters import LegParameters
 from leg_wear_monitor.twin.reference.torque_reference import CADENCES, TorqueReference

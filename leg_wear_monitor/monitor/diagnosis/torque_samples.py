@@ -5,9 +5,9 @@ from typing import NamedTuple
 import attrs
 import numpy as np
 
+from leg_wear_monitor.estimate.signature import TorqueSensor, averaged
 from leg_wear_monitor.mechanism.arrays import Floats, Ints
 from leg_wear_monitor.mechanism.ideal import TURN
-from leg_wear_monitor.monitor.diagnosis.signature import TorqueSensor, averaged
 from leg_wear_monitor.twin.kinds import CRANK, TORQUE
 from leg_wear_monitor.twin.reference.crank_profile import CrankProfile, cycle_profile
 from leg_wear_monitor.twin.sample import NO_FAULT, Samples, brings

@@ -6,13 +6,13 @@ import sqlite3
 import attrs
 import numpy as np
 
+from leg_wear_monitor.estimate.commissioned_torque import CommissionedTorque
 from leg_wear_monitor.monitor.alarms.alarm import Alarm, Level
 from leg_wear_monitor.monitor.ledger.entry import (
     AlarmEvent,
     Audit,
     ClearancePoint,
     Commissioned,
-    CommissionedTorque,
     CorrectedClearance,
     Entry,
     Event,

@@ -3,9 +3,10 @@
 import math
 from collections.abc import Callable, Sequence
 
+from leg_wear_monitor.estimate.cause import Cause, Change
 from leg_wear_monitor.monitor.alarms.alarm import Alarm, Level
 from leg_wear_monitor.monitor.alarms.words import time_words
-from leg_wear_monitor.monitor.diagnosis.diagnosis import Cause, Change, DiagnosisState
+from leg_wear_monitor.monitor.diagnosis.diagnosis import DiagnosisState
 from leg_wear_monitor.monitor.verdict.alarm_rules import hit_of, raised
 from leg_wear_monitor.monitor.verdict.belief import SEEN, SOURCES, at_limit_by_estimate
 from leg_wear_monitor.monitor.verdict.rule import Hit

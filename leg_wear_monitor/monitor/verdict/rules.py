@@ -3,10 +3,10 @@
 docs/reference/monitor.md lists them; a test compares the two.
 """
 
+from leg_wear_monitor.estimate.cause import Cause
 from leg_wear_monitor.monitor.alarms.alarm import Level
 from leg_wear_monitor.monitor.alarms.fault_codes import ALREADY_COUNTED, CRANK_ZERO
 from leg_wear_monitor.monitor.alarms.words import ADVICE
-from leg_wear_monitor.monitor.diagnosis.diagnosis import Cause
 from leg_wear_monitor.monitor.torque_causes.explanation import TorqueCause
 from leg_wear_monitor.monitor.verdict import clearance_rules, input_rules, material_rules
 from leg_wear_monitor.monitor.verdict.alarm_rules import blinding, raised

@@ -6,18 +6,19 @@ import attrs
 import numpy as np
 import pytest
 
+from leg_wear_monitor.estimate.body_torques import body_torques
+from leg_wear_monitor.estimate.cause import Cause
+from leg_wear_monitor.estimate.commissioned_torque import CommissionedTorque
 from leg_wear_monitor.mechanism.ideal import TURN
 from leg_wear_monitor.monitor.config.settings import MonitorConfig
 from leg_wear_monitor.monitor.diagnosis import leg_models, references
 from leg_wear_monitor.monitor.diagnosis import observer as observer_module
-from leg_wear_monitor.monitor.diagnosis.body_torques import body_torques
-from leg_wear_monitor.monitor.diagnosis.diagnosis import Cause, DiagnosisState
+from leg_wear_monitor.monitor.diagnosis.diagnosis import DiagnosisState
 from leg_wear_monitor.monitor.diagnosis.leg_models import COMMISSIONING_CYCLES
 from leg_wear_monitor.monitor.diagnosis.observer import TorqueObserver
 from leg_wear_monitor.monitor.diagnosis.reasons import LOCKED_SAMPLES
 from leg_wear_monitor.monitor.diagnosis.reference_file import shipped_references
 from leg_wear_monitor.monitor.diagnosis.state import UNUSED_CYCLES
-from leg_wear_monitor.monitor.ledger.entry import CommissionedTorque
 from leg_wear_monitor.twin.kinds import CRANK, TORQUE
 from leg_wear_monitor.twin.reference import torque_reference
 from leg_wear_monitor.twin.reference.crank_profile import CrankProfile

@@ -8,13 +8,13 @@ from contextlib import closing
 import numpy as np
 import pytest
 
+from leg_wear_monitor.estimate.commissioned_torque import CommissionedTorque
 from leg_wear_monitor.monitor.alarms.alarm import Alarm, Level
 from leg_wear_monitor.monitor.ledger.entry import (
     AlarmEvent,
     Audit,
     ClearancePoint,
     Commissioned,
-    CommissionedTorque,
     CorrectedClearance,
     ForecastPoint,
     IdentifiedLeg,

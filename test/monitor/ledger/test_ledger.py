@@ -10,6 +10,7 @@ import attrs
 import numpy as np
 import pytest
 
+from leg_wear_monitor.estimate.commissioned_torque import CommissionedTorque
 from leg_wear_monitor.mechanism.loader import load_mechanism
 from leg_wear_monitor.monitor.alarms.alarm import Alarm, Level
 from leg_wear_monitor.monitor.config.fitting import fitted
@@ -19,7 +20,6 @@ from leg_wear_monitor.monitor.ledger.entry import (
     AlarmEvent,
     Audit,
     ClearancePoint,
-    CommissionedTorque,
     ForecastPoint,
     SimulatedReference,
 )

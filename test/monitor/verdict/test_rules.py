@@ -10,11 +10,12 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
+from leg_wear_monitor.estimate.cause import Cause, Change
 from leg_wear_monitor.monitor.alarms.alarm import Alarm, Level
 from leg_wear_monitor.monitor.alarms.guides import guide_of
 from leg_wear_monitor.monitor.alarms.words import ADVICE
 from leg_wear_monitor.monitor.config.parameters import config_from
-from leg_wear_monitor.monitor.diagnosis.diagnosis import Cause, Change, Diagnosis, DiagnosisState
+from leg_wear_monitor.monitor.diagnosis.diagnosis import Diagnosis, DiagnosisState
 from leg_wear_monitor.monitor.evaluation import specs
 from leg_wear_monitor.monitor.evaluation.board import AlarmBoard
 from leg_wear_monitor.monitor.torque_causes.explanation import NamedCause, TorqueCause, TorqueExplanation

@@ -6,9 +6,9 @@ from collections.abc import Sequence
 import attrs
 import numpy as np
 
+from leg_wear_monitor.estimate.cause import Cause
+from leg_wear_monitor.estimate.signature_model import SignatureModel
 from leg_wear_monitor.mechanism.arrays import Floats
-from leg_wear_monitor.monitor.diagnosis.diagnosis import Cause
-from leg_wear_monitor.monitor.diagnosis.signature_model import SignatureModel
 
 # of what a clearance changes, and of an opening: legs with masses 4 % off show 10 to 27 % less (2026-11-23)
 MODEL_ERROR = 0.2

@@ -2,14 +2,14 @@
 
 import numpy as np
 
-from leg_wear_monitor.mechanism.arrays import Floats
-from leg_wear_monitor.mechanism.ideal import TURN
-from leg_wear_monitor.monitor.diagnosis.signature import (
+from leg_wear_monitor.estimate.signature import (
     PhaseMeans,
     TorqueSensor,
     averaged,
     signatures_by_phase,
 )
+from leg_wear_monitor.mechanism.arrays import Floats
+from leg_wear_monitor.mechanism.ideal import TURN
 from leg_wear_monitor.twin.reference.leg_simulation import POINTS
 from leg_wear_monitor.twin.reference.torque_reference import TorqueReference
 

@@ -4,19 +4,19 @@ import attrs
 import numpy as np
 import pytest
 
-from leg_wear_monitor.monitor.diagnosis.clearance_fit import fit_clearances
-from leg_wear_monitor.monitor.diagnosis.diagnosis import Cause
-from leg_wear_monitor.monitor.diagnosis.explanations import (
+from leg_wear_monitor.estimate.cause import Cause
+from leg_wear_monitor.estimate.clearance_fit import fit_clearances
+from leg_wear_monitor.estimate.explanations import (
     Baseline,
     Explainer,
     Misfits,
     Nuisance,
     OtherChannel,
 )
-from leg_wear_monitor.monitor.diagnosis.leg_model import change_of
-from leg_wear_monitor.monitor.diagnosis.nuisances import with_scatter_of
-from leg_wear_monitor.monitor.diagnosis.signature import TorqueSensor
-from leg_wear_monitor.monitor.diagnosis.signature_model import SignatureModel
+from leg_wear_monitor.estimate.leg_model import change_of
+from leg_wear_monitor.estimate.nuisances import with_scatter_of
+from leg_wear_monitor.estimate.signature import TorqueSensor
+from leg_wear_monitor.estimate.signature_model import SignatureModel
 
 JOINTS = ("A", "B", "G")
 NEW = np.full(3, 3.0e-4)

@@ -2,11 +2,11 @@
 
 import numpy as np
 
+from leg_wear_monitor.estimate.signature import PhaseMeans
 from leg_wear_monitor.mechanism.arrays import Floats
 from leg_wear_monitor.mechanism.ideal import TURN, one_cycle
 from leg_wear_monitor.mechanism.position import build_linkage
 from leg_wear_monitor.mechanism.spec import Mechanism
-from leg_wear_monitor.monitor.diagnosis.signature import PhaseMeans
 
 _POINTS = 240  # of a gait cycle: three in each of 80 phases
 

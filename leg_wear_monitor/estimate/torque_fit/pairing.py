@@ -4,9 +4,9 @@ import attrs
 import numpy as np
 from numpy.typing import NDArray
 
+from leg_wear_monitor.estimate.torque_fit.motion import JointMotion
+from leg_wear_monitor.estimate.torque_fit.series import Series
 from leg_wear_monitor.mechanism.arrays import Floats
-from leg_wear_monitor.torque_fit.motion import JointMotion
-from leg_wear_monitor.torque_fit.series import Series
 
 _MOVING = 0.2  # of the usual speed, below which the leg stands or starts
 _SLOW_S = 1.0  # averaging time for a speed without its ripple

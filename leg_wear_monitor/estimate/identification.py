@@ -16,12 +16,12 @@ from collections.abc import Callable, Sequence
 import numpy as np
 
 from leg_wear_monitor.errors import AssemblyError
+from leg_wear_monitor.estimate.commissioned_torque import CommissionedTorque
+from leg_wear_monitor.estimate.explanations import Nuisance
+from leg_wear_monitor.estimate.ideal_signature import ideal_torque, signature_of_torque
+from leg_wear_monitor.estimate.signature_model import SignatureModel, simulated_signatures
 from leg_wear_monitor.mechanism.arrays import Floats
 from leg_wear_monitor.mechanism.spec import Mechanism
-from leg_wear_monitor.monitor.diagnosis.explanations import Nuisance
-from leg_wear_monitor.monitor.diagnosis.ideal_signature import ideal_torque, signature_of_torque
-from leg_wear_monitor.monitor.diagnosis.signature_model import SignatureModel, simulated_signatures
-from leg_wear_monitor.monitor.ledger.entry import CommissionedTorque
 from leg_wear_monitor.twin.reference.leg_parameters import LegParameters
 from leg_wear_monitor.twin.reference.torque_reference import HEAVIER, LONGER, ROUGHER, TorqueReference
 

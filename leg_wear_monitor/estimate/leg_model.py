@@ -5,21 +5,21 @@ from collections.abc import Sequence
 import attrs
 import numpy as np
 
-from leg_wear_monitor.mechanism.arrays import Floats
-from leg_wear_monitor.mechanism.spec import Mechanism
-from leg_wear_monitor.monitor.diagnosis.clearance_fit import ClearanceFit, fit_clearances
-from leg_wear_monitor.monitor.diagnosis.diagnosis import Cause, Change
-from leg_wear_monitor.monitor.diagnosis.explanations import POOREST, Explainer, Explanation, opened
-from leg_wear_monitor.monitor.diagnosis.nuisances import (
+from leg_wear_monitor.estimate.cause import Cause, Change
+from leg_wear_monitor.estimate.clearance_fit import ClearanceFit, fit_clearances
+from leg_wear_monitor.estimate.commissioned_torque import CommissionedTorque
+from leg_wear_monitor.estimate.explanations import POOREST, Explainer, Explanation, opened
+from leg_wear_monitor.estimate.nuisances import (
     commissioned_baseline,
     nuisances,
     other_channels,
     unknown_baseline,
     with_scatter_of,
 )
-from leg_wear_monitor.monitor.diagnosis.signature import TorqueSensor
-from leg_wear_monitor.monitor.diagnosis.signature_model import signature_model
-from leg_wear_monitor.monitor.ledger.entry import CommissionedTorque
+from leg_wear_monitor.estimate.signature import TorqueSensor
+from leg_wear_monitor.estimate.signature_model import signature_model
+from leg_wear_monitor.mechanism.arrays import Floats
+from leg_wear_monitor.mechanism.spec import Mechanism
 from leg_wear_monitor.twin.reference.torque_reference import TorqueReference
 
 

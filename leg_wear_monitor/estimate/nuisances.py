@@ -3,17 +3,17 @@
 import attrs
 import numpy as np
 
+from leg_wear_monitor.estimate.body_torques import body_torques
+from leg_wear_monitor.estimate.cause import Cause
+from leg_wear_monitor.estimate.commissioned_torque import CommissionedTorque
+from leg_wear_monitor.estimate.explanations import Baseline, Nuisance, OtherChannel
+from leg_wear_monitor.estimate.ideal_signature import signature_of_torque
+from leg_wear_monitor.estimate.signature import TorqueSensor
+from leg_wear_monitor.estimate.signature_model import simulated_signatures
 from leg_wear_monitor.mechanism.arrays import Floats
 from leg_wear_monitor.mechanism.ideal import TURN
 from leg_wear_monitor.mechanism.position import build_linkage
 from leg_wear_monitor.mechanism.spec import Mechanism
-from leg_wear_monitor.monitor.diagnosis.body_torques import body_torques
-from leg_wear_monitor.monitor.diagnosis.diagnosis import Cause
-from leg_wear_monitor.monitor.diagnosis.explanations import Baseline, Nuisance, OtherChannel
-from leg_wear_monitor.monitor.diagnosis.ideal_signature import signature_of_torque
-from leg_wear_monitor.monitor.diagnosis.signature import TorqueSensor
-from leg_wear_monitor.monitor.diagnosis.signature_model import simulated_signatures
-from leg_wear_monitor.monitor.ledger.entry import CommissionedTorque
 from leg_wear_monitor.twin.follower.load import load_signature
 from leg_wear_monitor.twin.reference.leg_parameters import MASS_TOLERANCE
 from leg_wear_monitor.twin.reference.torque_reference import TorqueReference

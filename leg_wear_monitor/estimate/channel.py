@@ -8,10 +8,10 @@ apart, so a reference has to be late and filtered as the samples are.
 import attrs
 import numpy as np
 
+from leg_wear_monitor.estimate.signature import TorqueSensor
+from leg_wear_monitor.estimate.signature_model import simulated_signatures, with_noise_of
 from leg_wear_monitor.mechanism.arrays import Floats
 from leg_wear_monitor.mechanism.ideal import TURN
-from leg_wear_monitor.monitor.diagnosis.signature import TorqueSensor
-from leg_wear_monitor.monitor.diagnosis.signature_model import simulated_signatures, with_noise_of
 from leg_wear_monitor.twin.reference.torque_reference import TorqueReference
 
 # an offset of 0.13 rad at 60 rpm, a lag of 40 ms; low-passes of 100 to 10 Hz

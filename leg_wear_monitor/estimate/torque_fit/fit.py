@@ -5,11 +5,9 @@ import math
 import attrs
 import numpy as np
 
-from leg_wear_monitor.mechanism.arrays import Floats
-from leg_wear_monitor.mechanism.ideal import TURN
-from leg_wear_monitor.torque_fit.blocks import Blocks, blocks_of
-from leg_wear_monitor.torque_fit.pairing import Pair
-from leg_wear_monitor.torque_fit.regression import (
+from leg_wear_monitor.estimate.torque_fit.blocks import Blocks, blocks_of
+from leg_wear_monitor.estimate.torque_fit.pairing import Pair
+from leg_wear_monitor.estimate.torque_fit.regression import (
     State,
     Terms,
     begin,
@@ -17,8 +15,10 @@ from leg_wear_monitor.torque_fit.regression import (
     jackknife,
     least_squares,
 )
-from leg_wear_monitor.torque_fit.start import Start
-from leg_wear_monitor.torque_fit.torque_model import TorqueModel
+from leg_wear_monitor.estimate.torque_fit.start import Start
+from leg_wear_monitor.estimate.torque_fit.torque_model import TorqueModel
+from leg_wear_monitor.mechanism.arrays import Floats
+from leg_wear_monitor.mechanism.ideal import TURN
 
 _STEPS = 15
 _LONGEST_STEP_RAD = 0.2  # of the phase in one step, half a radian of the torque's third harmonic

@@ -3,9 +3,9 @@
 import attrs
 import numpy as np
 
+from leg_wear_monitor.estimate.signature import TorqueSensor, quiet_phases
+from leg_wear_monitor.estimate.simulated_sensor import SimulatedSensor
 from leg_wear_monitor.mechanism.arrays import Floats
-from leg_wear_monitor.monitor.diagnosis.signature import TorqueSensor, quiet_phases
-from leg_wear_monitor.monitor.diagnosis.simulated_sensor import SimulatedSensor
 from leg_wear_monitor.twin.reference.torque_reference import TorqueReference
 
 _WEAKEST_NOISE, _STRONGEST_NOISE = 1.0e-4, 1.0  # of the torque's size

@@ -4,12 +4,12 @@ import attrs
 import numpy as np
 from numpy.typing import NDArray
 
+from leg_wear_monitor.estimate.torque_fit.blocks import Blocks, blocks_of
+from leg_wear_monitor.estimate.torque_fit.pairing import Pair
+from leg_wear_monitor.estimate.torque_fit.start import Start
+from leg_wear_monitor.estimate.torque_fit.torque_model import TorqueModel
 from leg_wear_monitor.mechanism.arrays import Floats
 from leg_wear_monitor.mechanism.ideal import TURN
-from leg_wear_monitor.torque_fit.blocks import Blocks, blocks_of
-from leg_wear_monitor.torque_fit.pairing import Pair
-from leg_wear_monitor.torque_fit.start import Start
-from leg_wear_monitor.torque_fit.torque_model import TorqueModel
 
 PHASES = 128  # offsets tried where a start does not tell one
 _CHUNKS = 12  # stretches of time, each left out once

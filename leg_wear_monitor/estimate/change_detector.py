@@ -10,8 +10,8 @@ from typing import NamedTuple
 
 import numpy as np
 
+from leg_wear_monitor.estimate.explanations import Explainer, opened
 from leg_wear_monitor.mechanism.arrays import Floats, Ints
-from leg_wear_monitor.monitor.diagnosis.explanations import Explainer, opened
 
 # on the counted clearance of one joint; two further tests are for a new part in a worn joint
 FACTORS = (1.08, 1.2, 1.35, 1.5, 2.0, 2.5, 3.3, 5.0, 8.0)  # on the counted clearance of one joint

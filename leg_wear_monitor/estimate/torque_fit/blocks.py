@@ -9,9 +9,9 @@ import numpy as np
 from numpy.lib.stride_tricks import sliding_window_view
 from numpy.typing import NDArray
 
+from leg_wear_monitor.estimate.torque_fit.pairing import Pair
 from leg_wear_monitor.mechanism.arrays import Floats
 from leg_wear_monitor.mechanism.ideal import TURN
-from leg_wear_monitor.torque_fit.pairing import Pair
 
 BINS = 48  # of a turn
 # A flight and the impact after it cancel within a twelfth of a turn; with fewer bins or sharp edges, impacts

@@ -5,7 +5,7 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from leg_wear_monitor.monitor.diagnosis.signature import (
+from leg_wear_monitor.estimate.signature import (
     PhaseMeans,
     TorqueSensor,
     averaged,

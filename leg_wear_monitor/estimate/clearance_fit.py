@@ -3,8 +3,8 @@
 import attrs
 import numpy as np
 
+from leg_wear_monitor.estimate.explanations import MODEL_ERROR, Explainer
 from leg_wear_monitor.mechanism.arrays import Floats
-from leg_wear_monitor.monitor.diagnosis.explanations import MODEL_ERROR, Explainer
 
 _ROUNDS = 30
 _LEAST_FACTOR = 0.7  # of the expected clearance

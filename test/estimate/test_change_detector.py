@@ -5,10 +5,10 @@ import math
 import numpy as np
 import pytest
 
-from leg_wear_monitor.monitor.diagnosis.change_detector import FACTORS, ChangeDetector, excess, threshold
-from leg_wear_monitor.monitor.diagnosis.explanations import Baseline, Explainer
-from leg_wear_monitor.monitor.diagnosis.signature import TorqueSensor
-from leg_wear_monitor.monitor.diagnosis.signature_model import SignatureModel
+from leg_wear_monitor.estimate.change_detector import FACTORS, ChangeDetector, excess, threshold
+from leg_wear_monitor.estimate.explanations import Baseline, Explainer
+from leg_wear_monitor.estimate.signature import TorqueSensor
+from leg_wear_monitor.estimate.signature_model import SignatureModel
 
 NEW = np.array([3.0e-4, 3.0e-4])
 F = 12

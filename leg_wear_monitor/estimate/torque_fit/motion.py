@@ -6,9 +6,9 @@ import attrs
 import numpy as np
 from numpy.typing import NDArray
 
+from leg_wear_monitor.estimate.torque_fit.series import Series
 from leg_wear_monitor.mechanism.arrays import Floats
 from leg_wear_monitor.mechanism.ideal import TURN
-from leg_wear_monitor.torque_fit.series import Series
 
 _WINDOW_S = 0.12  # of the local fit: a twelfth of a turn at 40 rpm, so a ripple of two a turn stays
 _LEAST_WINDOW = 7  # samples, enough for a cubic with three to spare

@@ -6,19 +6,19 @@ import attrs
 import numpy as np
 import pytest
 
-from leg_wear_monitor.mechanism.ideal import TURN, one_cycle
-from leg_wear_monitor.mechanism.position import build_linkage
-from leg_wear_monitor.monitor.diagnosis.identification import (
+from leg_wear_monitor.estimate.commissioned_torque import CommissionedTorque
+from leg_wear_monitor.estimate.identification import (
     FAR_FROM_FILE,
     identified_leg,
     leg_of_ideal_torque,
     misfit,
 )
-from leg_wear_monitor.monitor.diagnosis.nuisances import nuisances
+from leg_wear_monitor.estimate.nuisances import nuisances
+from leg_wear_monitor.estimate.signature import TorqueSensor
+from leg_wear_monitor.estimate.signature_model import signature_model, simulated_signatures
+from leg_wear_monitor.mechanism.ideal import TURN, one_cycle
+from leg_wear_monitor.mechanism.position import build_linkage
 from leg_wear_monitor.monitor.diagnosis.reference_file import shipped_references
-from leg_wear_monitor.monitor.diagnosis.signature import TorqueSensor
-from leg_wear_monitor.monitor.diagnosis.signature_model import signature_model, simulated_signatures
-from leg_wear_monitor.monitor.ledger.entry import CommissionedTorque
 from leg_wear_monitor.twin.reference.leg_parameters import LegParameters
 from leg_wear_monitor.twin.reference.leg_simulation import POINTS
 from leg_wear_monitor.twin.reference.torque_reference import HEAVIER, LONGER, ROUGHER

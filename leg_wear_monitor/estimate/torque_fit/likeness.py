@@ -4,8 +4,8 @@ import math
 
 import numpy as np
 
+from leg_wear_monitor.estimate.torque_fit.fit import Fit
 from leg_wear_monitor.mechanism.arrays import Floats
-from leg_wear_monitor.torque_fit.fit import Fit
 
 _CHUNKS = 12
 _WORSE_CHUNKS = 11  # in which a rival has to be worse; of two that are alike, in 3 of 1000 recordings

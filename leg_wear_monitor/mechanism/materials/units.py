@@ -1,4 +1,4 @@
-"""Units of material files, by what they measure, and their factors to SI.
+"""Units of the files of materials and drives, by what they measure, and their factors to SI.
 
 Two traps are spelled out. A dimensionless K of Archard's law is worth nothing without the form of the law:
 books write V = K F s / H and V = K F s / (3 H), so the unit names the form, and K / H or K / (3 H) is the
@@ -10,7 +10,7 @@ import attrs
 
 @attrs.frozen
 class Unit:
-    """A unit of a material file.
+    """A unit of a file of a material or a drive.
 
     Attributes
     ----------
@@ -55,6 +55,14 @@ UNITS = {
     "um": Unit("roughness", 1.0e-6),
     "ln": Unit("logarithmic standard deviation", 1.0),
     "1": Unit("number", 1.0),
+    "s": Unit("time", 1.0),
+    "ms": Unit("time", 1.0e-3),
+    "Hz": Unit("frequency", 1.0),
+    "N m": Unit("torque", 1.0),
+    "N mm": Unit("torque", 1.0e-3),
+    "N m s/rad": Unit("friction by speed", 1.0),
+    "N m/rad": Unit("stiffness", 1.0),
+    "N m/A": Unit("torque constant", 1.0),
 }
 
 

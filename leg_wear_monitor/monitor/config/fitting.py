@@ -12,6 +12,7 @@ from leg_wear_monitor.mechanism.clearance import Clearance
 from leg_wear_monitor.mechanism.clearance_range import limit_fault
 from leg_wear_monitor.mechanism.ideal import TURN
 from leg_wear_monitor.mechanism.spec import Mechanism, SpeedDrive
+from leg_wear_monitor.monitor.config.drive import drive_figures
 from leg_wear_monitor.monitor.config.settings import MonitorConfig
 from leg_wear_monitor.twin.settings import TrackerSettings, TwinSettings
 
@@ -32,8 +33,9 @@ def fitted(mechanism: Mechanism, config: MonitorConfig, source: str = "parameter
     ------
     ConfigError
         For joints that the mechanism does not have, lists of a wrong length, a clearance that does not fit,
-        or a mechanism with a torque as its drive.
+        a mechanism with a torque as its drive, or a drive that is not known.
     """
+    drive_figures(config.drive, source)  # a fault of it ends the start, whoever uses the figures
     if not isinstance(mechanism.drive, SpeedDrive):
         raise ConfigError(
             source, "mechanism", f"{config.mechanism!r} is driven by a torque, expected one with drive.speed"

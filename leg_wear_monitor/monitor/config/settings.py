@@ -7,6 +7,7 @@ from these classes. A section is a class, so `limits.clearance_m` is the paramet
 import attrs
 
 from leg_wear_monitor.configuration.quantity import described, quantity
+from leg_wear_monitor.monitor.config.drive import DriveParameters
 from leg_wear_monitor.monitor.config.forecast import Forecasting
 from leg_wear_monitor.monitor.config.inputs import LIVE, Cadence, Crank, DriveTorque, Encoders, Tracker
 from leg_wear_monitor.monitor.config.tables import TableInput
@@ -252,6 +253,7 @@ class MonitorConfig:
     crank: Crank = described("", factory=Crank)
     encoders: Encoders = described("", factory=Encoders)
     drive_torque: DriveTorque = described("", factory=DriveTorque)
+    drive: DriveParameters = described("", factory=DriveParameters)
     input: TableInput = described("", factory=TableInput)
     cadence: Cadence = described("", factory=Cadence)
     tracker: Tracker = described("", factory=Tracker)

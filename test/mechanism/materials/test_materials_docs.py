@@ -7,6 +7,7 @@ from typing import Any
 import attrs
 import pytest
 
+from leg_wear_monitor.mechanism.drives.drive import Drive
 from leg_wear_monitor.mechanism.materials import material, sourced
 from leg_wear_monitor.mechanism.materials.loader import load_material, materials
 from leg_wear_monitor.mechanism.materials.units import UNITS
@@ -50,7 +51,9 @@ def keys(name: str) -> str:
 
 
 def units() -> str:
-    rows = [(f"`{name}`", unit.dimension, f"{unit.factor:.6g}") for name, unit in UNITS.items()]
+    of_drives = {field.metadata.get("dimension") for field in attrs.fields(Drive)} - {"number"}
+    known = {name: unit for name, unit in UNITS.items() if unit.dimension not in of_drives}
+    rows = [(f"`{name}`", unit.dimension, f"{unit.factor:.6g}") for name, unit in known.items()]
     return table(("unit", "measures", "factor to SI"), rows)
 
 

@@ -7,6 +7,7 @@ from ruamel.yaml import YAML
 
 from leg_wear_monitor.errors import ConfigError
 from leg_wear_monitor.mechanism.loader import load_mechanism
+from leg_wear_monitor.monitor.config.drive import NOT_DECLARED
 from leg_wear_monitor.monitor.config.fitting import fitted
 from leg_wear_monitor.monitor.config.parameter_file import parse_config
 from leg_wear_monitor.monitor.config.parameters import PARAMETERS, changed, config_from, values_of
@@ -131,6 +132,8 @@ def test_defaults_are_within_their_own_bounds():
 @given(st.sampled_from([p for p in PARAMETERS.values() if p.type == "double"]), st.data())
 def test_what_is_within_the_bounds_is_taken_and_kept(parameter, data):
     least = parameter.above if parameter.at_least is None else parameter.at_least
+    if parameter.default == NOT_DECLARED:  # a declared figure: between -1 and its own bound nothing is taken
+        least = 0.01
     value = data.draw(
         st.floats(least, parameter.at_most, exclude_min=parameter.above is not None).filter(
             # a crank that stands, and what is as good as 0 where that cannot be, are refused

@@ -1,0 +1,1 @@
+"""Drives by name: their lag, bandwidth, friction and stiffness, with sources."""

@@ -30,6 +30,8 @@ if TYPE_CHECKING:
     from leg_wear_monitor.fleet.overview.parts import FleetOverview, LegOverview
     from leg_wear_monitor.life.life import LifeRun, LifeSettings, simulate_life
     from leg_wear_monitor.life.result import Life
+    from leg_wear_monitor.mechanism.drives.drive import Drive
+    from leg_wear_monitor.mechanism.drives.loader import drives, load_drive
     from leg_wear_monitor.mechanism.loader import load_mechanism
     from leg_wear_monitor.mechanism.materials.loader import load_material, materials
     from leg_wear_monitor.mechanism.materials.material import Material
@@ -48,6 +50,7 @@ if TYPE_CHECKING:
 _HOME = {
     "CommissioningItem": "commissioning.result.commissioning_result",
     "CommissioningResult": "commissioning.result.commissioning_result",
+    "Drive": "mechanism.drives.drive",
     "EnergyBalance": "dynamics.result.parts",
     "Fleet": "fleet.fleet",
     "FleetOverview": "fleet.overview.parts",
@@ -69,8 +72,10 @@ _HOME = {
     "Trace": "dynamics.result.parts",
     "WearMonitor": "monitor.wear_monitor",
     "commission": "commissioning.commission",
+    "drives": "mechanism.drives.loader",
     "gait_samples": "twin.sample",
     "load_config": "monitor.config.parameter_file",
+    "load_drive": "mechanism.drives.loader",
     "load_material": "mechanism.materials.loader",
     "load_mechanism": "mechanism.loader",
     "materials": "mechanism.materials.loader",
@@ -87,6 +92,7 @@ __all__ = [
     "CommissioningItem",
     "CommissioningResult",
     "ConfigError",
+    "Drive",
     "EnergyBalance",
     "Fleet",
     "FleetOverview",
@@ -110,8 +116,10 @@ __all__ = [
     "Trace",
     "WearMonitor",
     "commission",
+    "drives",
     "gait_samples",
     "load_config",
+    "load_drive",
     "load_material",
     "load_mechanism",
     "materials",

@@ -17,9 +17,9 @@ from leg_wear_monitor.share import share_directory
 COULD_NOT, INTERRUPTED = 2, 130
 
 _VERBS = (
-    "acknowledge", "cache", "check", "commission", "dashboard", "demo", "draw", "fleet", "gait-publisher",
-    "life", "materials", "measure", "monitor", "play", "reference", "replay", "report", "reset", "simulate",
-    "study",
+    "acknowledge", "cache", "check", "commission", "dashboard", "demo", "draw", "drives", "fleet",
+    "gait-publisher", "life", "materials", "measure", "monitor", "play", "reference", "replay", "report",
+    "reset", "simulate", "study",
 )  # fmt: skip
 
 

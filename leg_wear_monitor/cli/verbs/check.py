@@ -6,6 +6,7 @@ from collections.abc import Callable, Mapping
 from functools import partial
 from importlib import metadata
 from pathlib import Path
+from typing import TYPE_CHECKING
 
 import click
 
@@ -17,8 +18,19 @@ from leg_wear_monitor.cli.waiting import compilation, is_compiled
 from leg_wear_monitor.errors import ConfigWarning, LegWearError
 from leg_wear_monitor.share import share_directory
 
+if TYPE_CHECKING:
+    from leg_wear_monitor.monitor.config.drive import DriveParameters
+
 DOUBTED = 1
 
+_FIGURES = {
+    "lag_s": "lag",
+    "bandwidth_hz": "bandwidth",
+    "load_friction": "load friction",
+    "coulomb_nm": "Coulomb friction",
+    "viscous_nms": "viscous friction",
+    "stiffness_nm_per_rad": "stiffness",
+}
 _LIBRARIES = ("attrs", "cattrs", "click", "jinja2", "matplotlib", "numba", "numpy", "rich", "ruamel.yaml")
 
 
@@ -167,7 +179,23 @@ def _parameters(path: str) -> str:
 
         known = read_references(Path(config.diagnosis.reference), leg)
         text += f", references at {', '.join(f'{one.profile.cadence_rpm:.3g}' for one in known)} rpm"
-    return text
+    return text + _drive(config.drive, path)
+
+
+def _drive(parameters: "DriveParameters", path: str) -> str:
+    """What is declared of the drive, in a line of its own; empty if nothing is."""
+    from leg_wear_monitor.monitor.config.drive import drive_figures
+    from leg_wear_monitor.monitor.config.parameters import PARAMETERS
+
+    declared = drive_figures(parameters, path).declared
+    if not (declared or parameters.type):
+        return ""
+    known = [
+        f"{_FIGURES[name]} {value:.4g} {PARAMETERS[f'drive.{name}'].unit}".rstrip()
+        for name, value in declared.items()
+    ]
+    drive = f"\n{'':13} drive {parameters.type}".rstrip()
+    return f"{drive}, at the crank: {', '.join(known) or 'no figure is declared'}; the rest is estimated"
 
 
 def _first_line(name: str) -> str:

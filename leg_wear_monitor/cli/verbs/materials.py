@@ -7,6 +7,7 @@ import click
 
 from leg_wear_monitor.cli.options import json_option
 from leg_wear_monitor.cli.output import STDOUT, check_outputs, write_json
+from leg_wear_monitor.cli.sourced_lines import sourced_lines
 from leg_wear_monitor.json_text import json_text
 
 if TYPE_CHECKING:
@@ -53,9 +54,8 @@ def _in_full(pair: "Material") -> list[str]:
         f"{pair.name}: {pair.title}",
         f"bushing: {pair.bushing.material}; journal: {pair.journal.material}; lubricant: {pair.lubricant}",
         f"regime: {pair.regime}",
+        *sourced_lines(pair.values()),
     ]
-    for key, value in pair.values():
-        lines += [f"{key}: {value.text}, {value.conditions}", f"    {value.source}"]
     if pair.wear_coefficients is None:
         lines.append(
             "wear coefficient of the pair: not known; a life needs a wear_coefficient beside the material"

@@ -1,4 +1,4 @@
-"""What each body's mass and length change of the drive torque of ideal joints, at any speed of the crank."""
+"""Drive torque of ideal joints at any motion of the crank, and what masses and lengths change of it."""
 
 import functools
 
@@ -20,25 +20,34 @@ _ROUNDS = 4  # of Newton's method: from lengths that are 0.2 % off, the third is
 
 @attrs.frozen(eq=False)
 class BodyTorques:
-    """Derivatives of the drive torque by factors on bodies, in the order of the mechanism's file.
+    """Coefficients of the drive torque at equal steps of the crank angle from 0.
+
+    They are those of 1, of the crank's speed, of its square, and of its acceleration.
 
     Attributes
     ----------
-    mass, length : (bodies, 3, points) arrays
-        Coefficients of 1, of the crank's speed and of its square, at equal steps of the crank angle from 0.
+    own : (4, points) array
+        Of the whole leg.
+    mass, length : (bodies, 4, points) arrays
+        Derivatives by factors on bodies, in the order of the mechanism's file; a mass with its inertia.
     """
 
+    own: Floats
     mass: Floats
     length: Floats
 
     def at(self, speed: float) -> tuple[Floats, Floats]:
         """Derivatives (bodies, points) by masses and by lengths [N m], at a crank speed [rad/s]."""
-        powers = np.array([1.0, speed, speed**2])
-        return powers @ self.mass, powers @ self.length
+        return at_speed(self.mass, speed), at_speed(self.length, speed)
+
+
+def at_speed(coefficients: Floats, speed: float) -> Floats:
+    """Torques (..., points) [N m] of coefficients (..., 4, points), at a constant crank speed [rad/s]."""
+    return np.asarray(np.array([1.0, speed, speed**2, 0.0]) @ coefficients)
 
 
 def body_torques(mechanism: Mechanism) -> BodyTorques:
-    """Derivatives of the drive torque of a mechanism by its bodies; computed once for each mechanism."""
+    """Drive torque of a mechanism and its derivatives; computed once for each mechanism."""
     return _computed(_Same(mechanism, id(mechanism)))
 
 
@@ -55,12 +64,12 @@ def _computed(same: _Same) -> BodyTorques:
     mechanism = same.mechanism
     linkage, whole = build_linkage(mechanism), LegParameters.none(mechanism)
     q = one_cycle(linkage, _POINTS, 1.0).q
-    torque, mass = _torques(linkage, q)
+    own, mass = torque_coefficients(linkage, q)
     length = []
     for one in np.eye(len(whole.length)):
         longer = build_linkage(attrs.evolve(whole, length=whole.length + _LONGER * one).applied(mechanism))
-        length.append((_torques(longer, _closed(longer, q))[0] - torque) / _LONGER)
-    return BodyTorques(mass, np.array(length))
+        length.append((torque_coefficients(longer, _closed(longer, q))[0] - own) / _LONGER)
+    return BodyTorques(own, mass, np.array(length))
 
 
 def _closed(linkage: Linkage, near: Floats) -> Floats:
@@ -77,11 +86,17 @@ def _closed(linkage: Linkage, near: Floats) -> Floats:
     return q
 
 
-def _torques(linkage: Linkage, q: Floats) -> tuple[Floats, Floats]:
-    """Coefficients (3, points) of the drive torque, and what of them is each body's mass (bodies, 3, points).
+def torque_coefficients(linkage: Linkage, q: Floats) -> tuple[Floats, Floats]:
+    """Coefficients (4, points) of the drive torque, and what of them is each body's mass (bodies, 4, points).
 
     The power of the drive is that of inertia less that of all applied forces; v and a are those of the unit
     speed.
+
+    Parameters
+    ----------
+    linkage : Linkage
+    q : (points, n, 3) array
+        Coordinates that close it.
     """
     arrays, jacobian = linkage.arrays, jacobians(linkage, q)
     v, a, work = np.zeros_like(q), np.zeros_like(q), np.empty((q.shape[1], 2))
@@ -90,8 +105,8 @@ def _torques(linkage: Linkage, q: Floats) -> tuple[Floats, Floats]:
     resting, moving = np.empty_like(q), np.empty_like(q)
     applied_forces_at(arrays, q, np.zeros_like(q), work, resting)
     applied_forces_at(arrays, q, v, work, moving)
-    inertia = (arrays.mass * a * v).sum(axis=2).T
+    inertia, reduced = (arrays.mass * a * v).sum(axis=2).T, (arrays.mass * v * v).sum(axis=2).T
     weight = (arrays.mass[:, :2] * arrays.gravity * v[:, :, :2]).sum(axis=2).T
     power = np.stack([-resting * v, (resting - moving) * v]).sum(axis=(2, 3))
-    mass = np.stack([-weight, np.zeros_like(weight), inertia], axis=1)
-    return np.vstack([power, inertia.sum(axis=0)]), mass[1:]
+    mass = np.stack([-weight, np.zeros_like(weight), inertia, reduced], axis=1)
+    return np.vstack([power, inertia.sum(axis=0), reduced.sum(axis=0)]), mass[1:]

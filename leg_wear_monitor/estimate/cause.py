@@ -1,4 +1,4 @@
-"""What explains a measured drive torque: one enum of causes, and a change by one of them."""
+"""What explains a measured drive torque: one enum of causes, what names them, changes and explanations."""
 
 import math
 from enum import Enum
@@ -9,35 +9,70 @@ SURE_LOG_ODDS = 5.0  # 150 to 1
 
 
 class Cause(Enum):
-    """What explains a change of the drive torque; the value is human-readable."""
+    """What explains a drive torque that is not as predicted; the value is human-readable.
 
-    CLEARANCE = "clearance"
-    LOAD = "load at the foot"
-    FRICTION = "friction of the drive"
-    SCALE = "scale of the torque sensor"
-    LAG = "lag of the torque sensor"
-    CRANK_OFFSET = "offset of the crank encoder"
-    MASS = "mass of a body"
-    LENGTH = "length of a body"
-    UNKNOWN = "unknown"
+    Attributes
+    ----------
+    fault_code : str
+        Stable name, whoever finds the cause.
+    """
+
+    fault_code: str
+
+    def __new__(cls, words: str, fault_code: str) -> "Cause":
+        """Member whose value is its words."""
+        member = object.__new__(cls)
+        member._value_, member.fault_code = words, fault_code
+        return member
+
+    CLEARANCE = "clearance", "CLEARANCE_CHANGED"
+    SIGN = "sign of the torque sensor", "TORQUE_SIGN"
+    SCALE = "scale of the torque sensor", "TORQUE_SCALE"
+    # at one speed of the crank the two look alike
+    CRANK_OFFSET = "offset of the crank encoder", "TORQUE_TIMING"
+    LAG = "lag of the torque sensor", "TORQUE_TIMING"
+    LOAD = "load at the foot", "TORQUE_LOAD"
+    FRICTION = "friction of the drive", "FRICTION_CHANGED"
+    MASS = "mass of a body", "TORQUE_MASS"
+    LENGTH = "length of a body", "MECHANISM_CHANGED"
+    UNKNOWN = "unknown", "MECHANISM_CHANGED"
 
 
-@attrs.frozen(kw_only=True)
-class Change:
-    """A significant departure of the leg from the one that the monitor counts.
+INPUTS = (Cause.SIGN, Cause.SCALE, Cause.CRANK_OFFSET, Cause.LAG)
+"""Causes in what is received, not in the leg."""
+
+
+@attrs.frozen
+class NamedCause:
+    """A cause with its value and standard deviation.
 
     Attributes
     ----------
     cause : Cause
+    value, sigma : float
+        Clearance [m]; measured over predicted torque (SIGN, SCALE); angle by which the crank is ahead of its
+        measured angle [rad]; lag [s]; load [N]; change of the friction [N m]; fraction by which a mass or a
+        length is larger.
     subject : str
         The joint, or the body, concerned; empty where there is none.
+    """
+
+    cause: Cause
+    value: float
+    sigma: float
+    subject: str = ""
+
+
+@attrs.frozen(kw_only=True)
+class Change(NamedCause):
+    """A significant departure of the leg from the one that the monitor counts.
+
+    Attributes
+    ----------
     since_ns : int
         Stamp of the first gait cycle that belongs to the change.
-    value, sigma : float
-        Estimated value and its standard deviation: clearance [m], load [N], friction [N m], fraction of the
-        scale, lag [s], offset [rad], fraction of the mass or length.
     counted : float
-        Value that the monitor supposes, in the same unit.
+        Value that the monitor supposes, in the unit of the value.
     log_odds : float
         Natural logarithm of the odds against the leg as counted.
     runner_up : str
@@ -48,11 +83,7 @@ class Change:
         Whether the counted clearance was corrected by it.
     """
 
-    cause: Cause
-    subject: str = ""
     since_ns: int
-    value: float
-    sigma: float
     counted: float
     log_odds: float
     runner_up: str = ""
@@ -64,3 +95,67 @@ class Change:
         """Whether a clearance has changed, much more probably than anything else."""
         odds = min(self.log_odds, self.runner_up_log_odds)
         return self.cause is Cause.CLEARANCE and odds >= SURE_LOG_ODDS
+
+
+@attrs.frozen
+class Timing:
+    """Offset of the crank [rad] and lag of the torque [s] with standard deviations, from several speeds."""
+
+    offset_rad: float
+    offset_sigma_rad: float
+    lag_s: float
+    lag_sigma_s: float
+
+
+@attrs.frozen(kw_only=True)
+class TorqueExplanation:
+    """Explanation of a torque mismatch.
+
+    Attributes
+    ----------
+    alternatives : tuple of tuple of NamedCause
+        Each explains the torque as well as the others, the best first, and is made of causes that hold at
+        once; empty: nothing explains half of the mismatch.
+    before, after : float
+        What is not explained without and with the first alternative, as a fraction of the predicted RMS.
+    after_sigma : float
+    limit : float
+        Fraction below which a torque counts as predicted.
+    speed_radps : float
+        Mean crank speed.
+    timing : Timing or None
+        None while the speeds are too similar.
+    bias_nm, bias_sigma_nm : float
+        Constant torque that friction cannot be, for the first alternative: it drives where it is negative.
+    cycles : int
+        Gait cycles in it.
+    """
+
+    alternatives: tuple[tuple[NamedCause, ...], ...] = ()
+    before: float
+    after: float
+    after_sigma: float
+    limit: float
+    speed_radps: float
+    timing: Timing | None = None
+    bias_nm: float = 0.0
+    bias_sigma_nm: float = math.nan
+    cycles: int = 0
+
+    @property
+    def is_whole(self) -> bool:
+        """Whether the torque counts as predicted with the first alternative."""
+        return self.after <= self.limit
+
+    @property
+    def named(self) -> tuple[NamedCause, ...]:
+        """The causes, where they are the only ones that fit and explain the mismatch for the most part."""
+        # with less it is a part of a cause that is not among these
+        sure = len(self.alternatives) == 1 and (self.is_whole or self.after <= 0.25 * self.before)
+        return self.alternatives[0] if sure else ()
+
+    @property
+    def is_input_fault(self) -> bool:
+        """Whether the torque or the crank angle is wrong as received, so that it says nothing of the leg."""
+        found = self.alternatives if self.is_whole else (self.named,)
+        return bool(found) and all(any(one.cause in INPUTS for one in each) for each in found)

@@ -6,7 +6,7 @@ from collections.abc import Sequence
 import attrs
 import numpy as np
 
-from leg_wear_monitor.estimate.cause import Cause
+from leg_wear_monitor.estimate.cause import Cause, NamedCause
 from leg_wear_monitor.estimate.signature_model import SignatureModel
 from leg_wear_monitor.mechanism.arrays import Floats
 
@@ -90,26 +90,19 @@ class Baseline:
 
 
 @attrs.frozen(kw_only=True)
-class Explanation:
+class Explanation(NamedCause):
     """A cause that explains a change, and how well.
 
     Attributes
     ----------
-    cause : Cause
-    subject : str
-        Joint or body; empty where there is none.
-    value, sigma, counted : float
-        As those of `Change`.
+    counted : float
+        As that of `Change`.
     misfit : float
         Minus twice the logarithm of its likelihood, less a constant.
     square : float
         Mean square of what it leaves over, in units of its covariance: about 1 if the cause is right.
     """
 
-    cause: Cause
-    subject: str
-    value: float
-    sigma: float
     counted: float
     misfit: float
     square: float

@@ -5,6 +5,7 @@ from collections.abc import Callable, Sequence
 
 import attrs
 
+from leg_wear_monitor.estimate.cause import TorqueExplanation
 from leg_wear_monitor.monitor.accounting import Accounting
 from leg_wear_monitor.monitor.diagnosis.diagnosis import Diagnosis
 from leg_wear_monitor.monitor.encoders.clearance_estimate import ClearanceEstimate, ClearanceObservation
@@ -19,7 +20,6 @@ from leg_wear_monitor.monitor.forecast.forecaster import Forecaster
 from leg_wear_monitor.monitor.ledger.entry import Measurement
 from leg_wear_monitor.monitor.reports import CycleReport, JointReport, VerdictReport
 from leg_wear_monitor.monitor.state import MonitorState
-from leg_wear_monitor.monitor.torque_causes.explanation import TorqueExplanation
 from leg_wear_monitor.monitor.verdict.belief import BelievedClearance, at_limit_by_estimate, believed
 from leg_wear_monitor.monitor.verdict.rules import findings
 from leg_wear_monitor.monitor.verdict.sampled import with_sampling

@@ -28,7 +28,6 @@ from leg_wear_monitor.monitor.judgement import Judge
 from leg_wear_monitor.monitor.ledger.entry import Measurement, SimulatedReference
 from leg_wear_monitor.monitor.ledger.ledger import Ledger
 from leg_wear_monitor.monitor.state import MonitorSnapshot, MonitorState
-from leg_wear_monitor.monitor.torque_causes.explainer import TorqueExplainer
 from leg_wear_monitor.twin.digital_twin import DigitalTwin
 from leg_wear_monitor.twin.reference.leg_parameters import LegParameters
 from leg_wear_monitor.twin.reference.torque_reference import TorqueReference
@@ -102,7 +101,6 @@ class Parts:
         self.torque = self._torque_observer(ledger) if is_diagnosed else None
         if self.torque and self.torque.state.parameters and self.config.diagnosis.correct:
             self.twin.set_parameters(self.torque.state.parameters)
-        self.explainer = TorqueExplainer(self.mechanism)
         self.judge = Judge(
             self.twin,
             self.evaluation,

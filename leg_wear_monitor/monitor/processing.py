@@ -3,6 +3,7 @@
 import attrs
 import numpy as np
 
+from leg_wear_monitor.estimate.mismatch import explanation
 from leg_wear_monitor.mechanism.arrays import Floats
 from leg_wear_monitor.monitor.alarms.alarm import Level
 from leg_wear_monitor.monitor.cycle_report import cycle_report, latest
@@ -166,14 +167,12 @@ class Processing:
 
     def _explain_mismatch(self, statistics: CycleStatistics) -> None:
         """Look for causes of a torque mismatch after a gait cycle."""
-        max_friction_nm = self._evaluation.torque_bounds.max_friction_nm
+        allowed = self._evaluation.allowed_torque
         was_wrong, alarm = self._parts.is_torque_wrong, self._evaluation.board.alarms[MISMATCH.name()]
         self._parts.state.mismatch = self._parts.state.mismatch.with_cycle(
             statistics,
             alarm,
-            lambda cycles: self._parts.explainer.explanation(
-                cycles, self._parts.config, self._twin.settings, max_friction_nm
-            ),
+            lambda cycles: explanation(self._parts.mechanism, cycles, allowed),
         )
         if self._torque and self._parts.is_torque_wrong and not was_wrong:
             # the alarm rose some gait cycles after the torque became wrong

@@ -8,11 +8,11 @@ from leg_wear_monitor.monitor.crank_zero.crank_zero import CrankZeroSnapshot
 from leg_wear_monitor.monitor.diagnosis.observer import TorqueObserverSnapshot
 from leg_wear_monitor.monitor.encoders.observer import EncoderSnapshot
 from leg_wear_monitor.monitor.evaluation.evaluation import AlarmEvaluationState
+from leg_wear_monitor.monitor.evaluation.mismatch_window import NO_MISMATCH, MismatchWindow
 from leg_wear_monitor.monitor.evaluation.torque_record import TorqueRecord
 from leg_wear_monitor.monitor.forecast.forecaster import ForecastState
 from leg_wear_monitor.monitor.forecast.growth import GrowthWindow
 from leg_wear_monitor.monitor.reports import CycleReport
-from leg_wear_monitor.monitor.torque_causes.window import NO_MISMATCH, MismatchWindow
 from leg_wear_monitor.monitor.verdict.verdict import Finding
 from leg_wear_monitor.record import Records
 from leg_wear_monitor.twin.digital_twin import TwinSnapshot

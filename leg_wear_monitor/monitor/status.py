@@ -5,6 +5,7 @@ from collections.abc import Iterable, Mapping, Sequence
 
 import attrs
 
+from leg_wear_monitor.estimate.cause import TorqueExplanation
 from leg_wear_monitor.mechanism.materials.load import BushingLoad
 from leg_wear_monitor.monitor.accounting import Accounting
 from leg_wear_monitor.monitor.alarms.alarm import Level
@@ -30,7 +31,6 @@ from leg_wear_monitor.monitor.forecast.words import UNKNOWN, answer_words, lifet
 from leg_wear_monitor.monitor.inputs.health import InputHealth
 from leg_wear_monitor.monitor.ledger.entry import Measurement
 from leg_wear_monitor.monitor.reports import CycleReport, Status
-from leg_wear_monitor.monitor.torque_causes.explanation import TorqueExplanation
 from leg_wear_monitor.monitor.torque_status import diagnosis_status, torque_status
 from leg_wear_monitor.monitor.verdict.belief import BelievedClearance, believed_words
 from leg_wear_monitor.monitor.verdict.sampled import sampled_words

@@ -3,6 +3,7 @@
 import math
 from collections.abc import Sequence
 
+from leg_wear_monitor.estimate.cause import TorqueExplanation
 from leg_wear_monitor.monitor.alarms.alarm import Level
 from leg_wear_monitor.monitor.alarms.fault_codes import DIAGNOSIS, worst_code
 from leg_wear_monitor.monitor.diagnosis.diagnosis import Diagnosis, DiagnosisState, NotUsed
@@ -11,7 +12,6 @@ from leg_wear_monitor.monitor.evaluation.evaluation import AlarmEvaluation
 from leg_wear_monitor.monitor.evaluation.torque_checks import offset_error_rad, torque_causes
 from leg_wear_monitor.monitor.evaluation.torque_record import TorqueRecord
 from leg_wear_monitor.monitor.reports import CycleReport, Status
-from leg_wear_monitor.monitor.torque_causes.explanation import TorqueExplanation
 from leg_wear_monitor.monitor.verdict.diagnosis_words import diagnosis_words
 from leg_wear_monitor.monitor.verdict.torque_words import EVIDENCE, causes_in_words
 from leg_wear_monitor.monitor.verdict.words import with_unit
@@ -56,7 +56,7 @@ def torque_status(
         causes = f": {causes_in_words(explained, config.crank, config.drive_torque)}" if explained else ""
         messages = [f"the measured torque differs from the predicted one{causes}"]
         values |= _explained_values(explained) if explained else {}
-        code = explained.named[0].cause.value if explained and explained.named else code
+        code = explained.named[0].cause.fault_code if explained and explained.named else code
     if explained is None or not explained.is_input_fault:  # those are estimates for the torque as received
         messages += torque_causes(raised, last, record, evaluation.torque_bounds)
     if not messages and math.isnan(last.torque_mismatch):

@@ -15,6 +15,7 @@ from leg_wear_monitor.monitor.config.settings import MonitorConfig
 from leg_wear_monitor.monitor.cycle_report import with_forecast
 from leg_wear_monitor.monitor.diagnosis.diagnosis import Diagnosis
 from leg_wear_monitor.monitor.evaluation.evaluation_period import EvaluationPeriods
+from leg_wear_monitor.monitor.evaluation.mismatch_window import NO_MISMATCH
 from leg_wear_monitor.monitor.evaluation.specs import MISMATCH
 from leg_wear_monitor.monitor.forecast.forecast import ForecastBasis
 from leg_wear_monitor.monitor.forecast.measurement import MeasurementResult
@@ -36,7 +37,6 @@ from leg_wear_monitor.monitor.reports import (
 from leg_wear_monitor.monitor.resets import Acknowledged, last_reset, named_for_clearance, rested_on
 from leg_wear_monitor.monitor.state import MonitorSnapshot
 from leg_wear_monitor.monitor.status import statuses
-from leg_wear_monitor.monitor.torque_causes.window import NO_MISMATCH
 from leg_wear_monitor.monitor.verdict.belief import SOURCES, BelievedClearance, is_held_by_estimate
 from leg_wear_monitor.twin.sample import GAIT_SAMPLE, Samples
 from leg_wear_monitor.twin.sampling.settings import SamplingSettings

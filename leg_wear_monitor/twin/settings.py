@@ -151,3 +151,8 @@ class TwinSettings:
             raise LegWearError(f"torque_sampling: {fault}")
         if self.load_shape not in LOAD_SHAPES:
             raise LegWearError(f"load_shape: {self.load_shape!r} is not one of {', '.join(LOAD_SHAPES)}")
+
+    @property
+    def loads_n(self) -> tuple[float, float]:
+        """Bounds of the foot load [N]: the ground pushes and does not pull."""
+        return (0.0 if self.load_shape == STANCE else -self.load_limit_n), self.load_limit_n

@@ -26,5 +26,12 @@ def test_they_are_differences_of_the_torques_of_other_legs(leg, speed, kind, ste
     np.testing.assert_allclose(found, expected, atol=off * np.abs(expected).max())
 
 
+@pytest.mark.parametrize(("speed", "acceleration"), [(2.0 * np.pi, 0.0), (-5.0, 3.0)])
+def test_their_sum_is_the_torque_of_the_leg(leg, speed, acceleration) -> None:
+    expected = one_cycle(build_linkage(leg), POINTS, speed, acceleration).drive_torque
+    found = np.array([1.0, speed, speed**2, acceleration]) @ body_torques(leg).own
+    np.testing.assert_allclose(found, expected, atol=1e-12 * np.abs(expected).max())
+
+
 def test_they_are_computed_once(leg) -> None:
     assert body_torques(leg) is body_torques(leg)

@@ -3,10 +3,11 @@
 import attrs
 import numpy as np
 
+from leg_wear_monitor.estimate.body_torques import body_torques
 from leg_wear_monitor.estimate.torque_fit.fit import Fit, fit
 from leg_wear_monitor.estimate.torque_fit.likeness import repeating
 from leg_wear_monitor.estimate.torque_fit.regression import Terms, least_squares
-from leg_wear_monitor.estimate.torque_fit.torque_model import TorqueModel, body_torques
+from leg_wear_monitor.estimate.torque_fit.torque_model import TorqueModel
 from leg_wear_monitor.mechanism.arrays import Floats
 from leg_wear_monitor.mechanism.spec import Mechanism
 
@@ -73,7 +74,7 @@ def _heavier(one: Fit, mechanism: Mechanism) -> tuple[str, float, float]:
     before = float(one.rest @ one.rest)
     floor = before - len(one.rest) * (repeating(one) * float(one.measured.std())) ** 2
     best = ("", 0.0, 0.0)
-    for name, tables in body_torques(mechanism).items():
+    for name, tables in zip(mechanism.bodies, body_torques(mechanism).mass, strict=True):
         more = TorqueModel(tables, np.zeros(tables.shape[1])).torque(angle, speed, acceleration)[0]
         by = np.stack([one.blocks.mean(more), one.predicted / one.gain, np.ones_like(one.rest)])
         coefficients = least_squares(by, one.rest)

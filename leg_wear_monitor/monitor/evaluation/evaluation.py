@@ -4,6 +4,7 @@ import math
 
 import attrs
 
+from leg_wear_monitor.estimate.mismatch import Allowed
 from leg_wear_monitor.monitor.alarms.alarm import Level
 from leg_wear_monitor.monitor.config.settings import MonitorConfig
 from leg_wear_monitor.monitor.evaluation import specs
@@ -118,7 +119,18 @@ class AlarmEvaluation:
 
     def is_torque_sound(self, report: CycleReport) -> bool:
         """Whether a gait cycle's torque is as predicted, so that its friction is that of this leg."""
-        return report.torque_mismatch < self.config.limits.warn_fraction * self.config.limits.torque_mismatch
+        return report.torque_mismatch < self.allowed_torque.unexplained
+
+    @property
+    def allowed_torque(self) -> Allowed:
+        """Which torque a leg without a fault may have."""
+        limits, bounds = self.config.limits, self.torque_bounds
+        return Allowed(
+            lag_s=bounds.max_lag_s,
+            loads_n=self._twin.settings.loads_n,
+            friction_nm=bounds.max_friction_nm,
+            unexplained=limits.warn_fraction * limits.torque_mismatch,
+        )
 
     def why_not_compared(self, statistics: CycleStatistics) -> NotCompared | None:
         """Why the torque of a gait cycle is not compared with the predicted one; None if it is."""

@@ -3,9 +3,9 @@
 import math
 from collections.abc import Callable, Sequence
 
+from leg_wear_monitor.estimate.cause import Cause, NamedCause
 from leg_wear_monitor.monitor.alarms.alarm import Level
 from leg_wear_monitor.monitor.diagnosis.diagnosis import DiagnosisState
-from leg_wear_monitor.monitor.torque_causes.explanation import NamedCause, TorqueCause
 from leg_wear_monitor.monitor.verdict.alarm_rules import raised
 from leg_wear_monitor.monitor.verdict.clearance_rules import changes, words_of
 from leg_wear_monitor.monitor.verdict.rule import Hit
@@ -31,7 +31,7 @@ def mismatch(situation: Situation) -> Sequence[Hit]:
     ]
 
 
-def explained(cause: TorqueCause) -> Callable[[Situation], Sequence[Hit]]:
+def explained(cause: Cause) -> Callable[[Situation], Sequence[Hit]]:
     """The torque mismatch has surely some causes, this one first."""
 
     def hits(situation: Situation) -> Sequence[Hit]:

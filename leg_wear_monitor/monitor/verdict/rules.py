@@ -7,7 +7,6 @@ from leg_wear_monitor.estimate.cause import Cause
 from leg_wear_monitor.monitor.alarms.alarm import Level
 from leg_wear_monitor.monitor.alarms.fault_codes import ALREADY_COUNTED, CRANK_ZERO
 from leg_wear_monitor.monitor.alarms.words import ADVICE
-from leg_wear_monitor.monitor.torque_causes.explanation import TorqueCause
 from leg_wear_monitor.monitor.verdict import clearance_rules, input_rules, material_rules
 from leg_wear_monitor.monitor.verdict.alarm_rules import blinding, raised
 from leg_wear_monitor.monitor.verdict.rule import EVERYTHING, OF_THE_GAIT, OF_THE_MODEL, Rule
@@ -33,10 +32,10 @@ _TORQUE_INPUT = (
 )
 
 
-def _cause_of_mismatch(cause: TorqueCause, meaning: str) -> Rule:
+def _cause_of_mismatch(cause: Cause, meaning: str) -> Rule:
     """Rule of a torque mismatch whose cause is known."""
     return Rule(
-        code=cause.value,
+        code=cause.fault_code,
         state=State.INSPECT,
         hits=input_rules.explained(cause),
         why=f"the drive torque differs from the prediction: {meaning}{{causes}}",
@@ -71,9 +70,9 @@ RULES = (
     *(
         _cause_of_mismatch(cause, meaning)
         for cause, meaning in (
-            (TorqueCause.SIGN, "its sign is reversed"),
-            (TorqueCause.SCALE, "its size is wrong"),
-            (TorqueCause.TIMING, "its time does not fit the crank angle"),
+            (Cause.SIGN, "its sign is reversed"),
+            (Cause.SCALE, "its size is wrong"),
+            (Cause.CRANK_OFFSET, "its time does not fit the crank angle"),
         )
     ),
     Rule(
@@ -108,8 +107,8 @@ RULES = (
         do="look for loose, bent or added parts, and rock each joint",
         not_valid=EVERYTHING,
     ),
-    _cause_of_mismatch(TorqueCause.LOAD, "a load acts at the foot"),
-    _cause_of_mismatch(TorqueCause.MASS, "a body has another mass"),
+    _cause_of_mismatch(Cause.LOAD, "a load acts at the foot"),
+    _cause_of_mismatch(Cause.MASS, "a body has another mass"),
     Rule(
         code="TORQUE_MISMATCH",
         state=State.INSPECT,

@@ -5,11 +5,11 @@ from collections.abc import Mapping
 
 import attrs
 
+from leg_wear_monitor.estimate.cause import TorqueExplanation
 from leg_wear_monitor.mechanism.materials.load import BushingLoad
 from leg_wear_monitor.monitor.alarms.alarm import Alarm
 from leg_wear_monitor.monitor.config.inputs import Crank, DriveTorque
 from leg_wear_monitor.monitor.diagnosis.diagnosis import Diagnosis
-from leg_wear_monitor.monitor.torque_causes.explanation import TorqueExplanation
 
 
 @attrs.frozen

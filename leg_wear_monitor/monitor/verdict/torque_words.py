@@ -2,13 +2,13 @@
 
 import math
 
-from leg_wear_monitor.monitor.config.inputs import AT_START, Crank, DriveTorque
-from leg_wear_monitor.monitor.torque_causes.explanation import (
+from leg_wear_monitor.estimate.cause import (
+    Cause,
     NamedCause,
     Timing,
-    TorqueCause,
     TorqueExplanation,
 )
+from leg_wear_monitor.monitor.config.inputs import AT_START, Crank, DriveTorque
 from leg_wear_monitor.monitor.verdict.words import amount, estimate
 
 _SURE = 3.0  # standard deviations
@@ -16,11 +16,11 @@ _MOST = 3  # alternatives in words
 _NEAR = 0.03  # by which a factor may differ from that of a known mistake
 
 EVIDENCE = {
-    TorqueCause.SIGN: ("torque_factor", ""),
-    TorqueCause.SCALE: ("torque_factor_size", ""),
-    TorqueCause.TIMING: ("crank_angle_ahead", "rad"),
-    TorqueCause.LOAD: ("foot_load", "N"),
-    TorqueCause.MASS: ("mass_fraction", ""),
+    Cause.SIGN: ("torque_factor", ""),
+    Cause.SCALE: ("torque_factor_size", ""),
+    Cause.CRANK_OFFSET: ("crank_angle_ahead", "rad"),
+    Cause.LOAD: ("foot_load", "N"),
+    Cause.MASS: ("mass_fraction", ""),
 }
 """Name and unit of each cause's value."""
 
@@ -60,14 +60,14 @@ def remedy(explained: TorqueExplanation, crank: Crank, torque: DriveTorque) -> s
 
 def _words(one: NamedCause, explained: TorqueExplanation, crank: Crank, torque: DriveTorque) -> str:
     match one.cause:
-        case TorqueCause.SIGN:
+        case Cause.SIGN:
             return f"it is {estimate(one.value, one.sigma, '')} times the predicted one"
-        case TorqueCause.SCALE:
+        case Cause.SCALE:
             like = _known_factor(one, crank, torque)[0]
             return f"its size is {estimate(one.value, one.sigma, '')} times the predicted one{like}"
-        case TorqueCause.TIMING:
+        case Cause.CRANK_OFFSET:
             return _timing(one, explained)
-        case TorqueCause.LOAD:
+        case Cause.LOAD:
             way = "lifts" if one.value > 0.0 else "pulls down"
             return f"a load of {estimate(abs(one.value), one.sigma, 'N')} {way} the foot"
     more = "heavier" if one.value > 0.0 else "lighter"
@@ -130,13 +130,13 @@ def _lag(value: float, sigma: float) -> str:
 
 def _remedy(one: NamedCause, explained: TorqueExplanation, crank: Crank, torque: DriveTorque) -> str:
     match one.cause:
-        case TorqueCause.SIGN:
+        case Cause.SIGN:
             return f"set drive_torque.sign to {-torque.sign}"
-        case TorqueCause.SCALE:
+        case Cause.SCALE:
             return _known_factor(one, crank, torque)[1]
-        case TorqueCause.TIMING:
+        case Cause.CRANK_OFFSET:
             return _timing_remedy(one, explained, crank)
-        case TorqueCause.LOAD:
+        case Cause.LOAD:
             return "check the load and the ground at the foot"
     return f"check for loose or added parts, and the mass of {one.subject} in the mechanism's file"
 

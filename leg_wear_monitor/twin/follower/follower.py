@@ -36,7 +36,7 @@ from leg_wear_monitor.twin.follower.repeating import (
 from leg_wear_monitor.twin.follower.state import EVALUATED, LAG, TORQUE_SENSOR, LegState, leg_state
 from leg_wear_monitor.twin.follower.torque_estimate import LEAST_SAMPLES, LoadEstimate, find
 from leg_wear_monitor.twin.sampling.state import SampledState
-from leg_wear_monitor.twin.settings import INSTANT, STANCE, TwinSettings
+from leg_wear_monitor.twin.settings import INSTANT, TwinSettings
 from leg_wear_monitor.twin.statistics import (
     CycleStatistics,
     Event,
@@ -113,10 +113,8 @@ class LegFollower:
         self.records = self._leg.records
         self.state: Record = record_of(self.records)
         self.statistics = new_run_statistics(len(setup.linkage.mechanism.joints))
-        # a ground force cannot pull
-        least_n = 0.0 if settings.load_shape == STANCE else -settings.load_limit_n
-        self._loads = least_n, settings.load_limit_n
-        self.estimate = LoadEstimate(settings.load_limit_n, least_n)
+        self._loads = settings.loads_n
+        self.estimate = LoadEstimate(self._loads[1], self._loads[0])
         self._cutoff = TURN * settings.torque_bandwidth_hz
         self.torque_size_nm = max(torque_size(setup.linkage, setup.speed), _LEAST_TORQUE_NM)
         self._instants = settings.torque_sampling == INSTANT

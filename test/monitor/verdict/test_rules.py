@@ -10,7 +10,7 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from leg_wear_monitor.estimate.cause import Cause, Change
+from leg_wear_monitor.estimate.cause import Cause, Change, NamedCause, TorqueExplanation
 from leg_wear_monitor.monitor.alarms.alarm import Alarm, Level
 from leg_wear_monitor.monitor.alarms.guides import guide_of
 from leg_wear_monitor.monitor.alarms.words import ADVICE
@@ -18,7 +18,6 @@ from leg_wear_monitor.monitor.config.parameters import config_from
 from leg_wear_monitor.monitor.diagnosis.diagnosis import Diagnosis, DiagnosisState
 from leg_wear_monitor.monitor.evaluation import specs
 from leg_wear_monitor.monitor.evaluation.board import AlarmBoard
-from leg_wear_monitor.monitor.torque_causes.explanation import NamedCause, TorqueCause, TorqueExplanation
 from leg_wear_monitor.monitor.verdict.alarm_rules import OF_A_JOINT
 from leg_wear_monitor.monitor.verdict.rules import RULES, findings
 from leg_wear_monitor.monitor.verdict.situation import JointSituation, SeenClearance, Situation
@@ -59,7 +58,7 @@ def diagnosis(*changes: Change) -> Diagnosis:
     return Diagnosis(state=DiagnosisState.CHANGED, changes=changes)
 
 
-def explained(*causes: TorqueCause, **values: Any) -> TorqueExplanation:
+def explained(*causes: Cause, **values: Any) -> TorqueExplanation:
     """One explanation, with made-up values."""
     named = tuple(NamedCause(cause, -0.5, 0.01, "foot" if cause.name == "MASS" else "") for cause in causes)
     given = {"before": 2.0, "after": 0.03, "after_sigma": 0.01, "limit": 0.08, "speed_radps": 6.3} | values
@@ -129,13 +128,13 @@ CASES = [
         (
             {"alarms": (alarm("torque_mismatch"),), "explained": explained(cause)},
             State.INSPECT,
-            cause.value,
+            cause.fault_code,
             tuple(Figure),
         )
-        for cause in TorqueCause
+        for cause in (Cause.SIGN, Cause.SCALE, Cause.CRANK_OFFSET, Cause.LOAD, Cause.MASS)
     ),
     (
-        {"alarms": (alarm("torque_mismatch"),), "explained": explained(TorqueCause.LOAD, after=0.9)},
+        {"alarms": (alarm("torque_mismatch"),), "explained": explained(Cause.LOAD, after=0.9)},
         State.INSPECT,
         "TORQUE_MISMATCH",
         tuple(Figure),
@@ -248,7 +247,7 @@ def test_a_mismatch_without_a_diagnosis_is_told_as_what_it_is() -> None:
 
 
 def test_a_mismatch_that_is_explained_says_by_what_and_by_how_much() -> None:
-    found = explained(TorqueCause.SIGN, TorqueCause.TIMING)
+    found = explained(Cause.SIGN, Cause.CRANK_OFFSET)
     verdict = judged(alarms=(alarm("torque_mismatch"),), explained=found)
     assert (verdict.fault_code, verdict.since_ns) == ("TORQUE_SIGN", 77)
     assert "it is -0.5 ± 0.01 times the predicted one and the crank is 500 mrad ± 10 mrad" in verdict.why
@@ -261,8 +260,8 @@ def test_a_mismatch_that_is_explained_says_by_what_and_by_how_much() -> None:
 def test_a_cause_of_an_input_comes_before_what_the_torque_shows_of_the_leg() -> None:
     shown = diagnosis(change(Cause.CLEARANCE, "G"))
     both = {"alarms": (alarm("torque_mismatch"),), "diagnosis": shown}
-    assert judged(**both, explained=explained(TorqueCause.SCALE)).fault_code == "TORQUE_SCALE"
-    assert judged(**both, explained=explained(TorqueCause.LOAD)).fault_code == "CLEARANCE_CHANGED_G"
+    assert judged(**both, explained=explained(Cause.SCALE)).fault_code == "TORQUE_SCALE"
+    assert judged(**both, explained=explained(Cause.LOAD)).fault_code == "CLEARANCE_CHANGED_G"
 
 
 def test_a_diagnosis_names_the_joint_that_a_mismatch_does_not() -> None:

@@ -1,24 +1,33 @@
-"""Fit of a hypothesis: measured = factor * (predicted + load + mass) at another crank angle + constant."""
+"""Fit of a hypothesis: measured = factor * (predicted + load + mass) at another crank angle + constant.
+
+Crank offset and torque lag differ by how the turned angle changes with the speed of the crank.
+"""
 
 import math
+from collections.abc import Sequence
 
 import attrs
 import numpy as np
 
-from leg_wear_monitor.mechanism.arrays import Floats
-from leg_wear_monitor.mechanism.ideal import TURN
-from leg_wear_monitor.monitor.torque_causes.curves import (
+from leg_wear_monitor.estimate.cause import Timing
+from leg_wear_monitor.estimate.torque_curves import (
     Complex,
     TorqueCurves,
+    curves_of,
     inner,
     slope,
     turned,
     values_of,
 )
+from leg_wear_monitor.mechanism.arrays import Floats
+from leg_wear_monitor.mechanism.ideal import TURN
+from leg_wear_monitor.twin.statistics import CycleStatistics
 
 _ANGLES = (np.arange(720) / 720 + 0.5) % 1.0 * TURN - 0.5 * TURN
 _MASSES = (-0.9, 4.0)  # possible fractions by which a body's mass is off
 _POINTS, _SECTORS = 64, 8  # of a turn; each sector is left out once
+_LEAST_CYCLES = 6
+_RESOLVED = 6.0  # standard deviations of the offset by which an offset and a lag of the same angle differ
 
 
 @attrs.frozen(kw_only=True)
@@ -48,14 +57,6 @@ class Hypothesis:
         return (self.sign < 0) + self.is_scaled + self.is_turned + self.is_loaded + bool(self.body)
 
 
-@attrs.frozen
-class Allowed:
-    """What a leg may have without a fault: a turned angle [rad] of this size, and foot loads [N]."""
-
-    angle_rad: float
-    loads_n: tuple[float, float]
-
-
 @attrs.frozen(eq=False)
 class Fit:
     """Best values of a hypothesis.
@@ -80,16 +81,28 @@ class Fit:
     free: tuple[bool, bool, bool, bool]
 
 
-def fit(curves: TorqueCurves, hypothesis: Hypothesis, allowed: Allowed) -> Fit | None:
-    """Least-squares fit on a grid of crank angles; None if no possible values fit."""
-    angles = _ANGLES if hypothesis.is_turned else _ANGLES[np.abs(_ANGLES) <= allowed.angle_rad]
+def fit(
+    curves: TorqueCurves, hypothesis: Hypothesis, angle_rad: float, loads_n: tuple[float, float]
+) -> Fit | None:
+    """Least-squares fit on a grid of crank angles; None if no possible values fit.
+
+    Parameters
+    ----------
+    curves : TorqueCurves
+    hypothesis : Hypothesis
+    angle_rad : float
+        Largest turned angle without a fault.
+    loads_n : (float, float)
+        Foot loads without a fault.
+    """
+    angles = _ANGLES if hypothesis.is_turned else _ANGLES[np.abs(_ANGLES) <= angle_rad]
     columns = np.stack([curves.predicted, curves.lever, *_body(curves, hypothesis)])
     gram = np.array([[inner(one, other) for other in columns] for one in columns])
     turn = np.exp(1j * np.outer(angles, np.arange(1, columns.shape[1] + 1)))
     along = 2.0 * ((turn[:, None, :] * columns) @ curves.measured.conj()).real
     square, size, best = inner(curves.measured, curves.measured), curves.predicted_rms_nm, None
-    for load in _loads(hypothesis, allowed, has_toe=gram[1, 1] > 0.0):
-        found = _least(gram, along, square, hypothesis, load, allowed.loads_n)
+    for load in _loads(hypothesis, loads_n, has_toe=gram[1, 1] > 0.0):
+        found = _least(gram, along, square, hypothesis, load, loads_n)
         at = int(found[0].argmin())
         rest, factor, force, mass = (float(row[at]) for row in found)
         if math.isfinite(rest) and (best is None or rest < best[0]):
@@ -107,11 +120,13 @@ def _body(curves: TorqueCurves, hypothesis: Hypothesis) -> list[Complex]:
     return [curves.bodies[hypothesis.body]] if hypothesis.body else []
 
 
-def _loads(hypothesis: Hypothesis, allowed: Allowed, *, has_toe: bool) -> tuple[float | None, ...]:
+def _loads(
+    hypothesis: Hypothesis, loads_n: tuple[float, float], *, has_toe: bool
+) -> tuple[float | None, ...]:
     """Foot loads to fix; None: a free one."""
     if not has_toe:
         return (0.0,)
-    return (None,) if hypothesis.is_loaded else (None, *allowed.loads_n)
+    return (None,) if hypothesis.is_loaded else (None, *loads_n)
 
 
 def _least(
@@ -192,3 +207,33 @@ def _solved(matrix: Floats, rest: Floats) -> tuple[Floats, float]:
     """Coefficients, and the RMS [N m] of what remains."""
     found = np.linalg.lstsq(matrix, rest, rcond=1e-9)[0]
     return np.asarray(found, float), float(np.sqrt(np.mean((rest - matrix @ found) ** 2)))
+
+
+def timing_of(cycles: Sequence[CycleStatistics], best: Fit) -> Timing | None:
+    """Offset and lag from gait cycles at several speeds; None while the speeds are too similar.
+
+    The angle of a cycle is offset - lag * speed.
+    """
+    speed, angle = [], []
+    for one in cycles:
+        curves = curves_of([one.torque_profile], {})
+        if curves is None:
+            continue
+        base = best.factor * turned(curves.predicted + best.load_n * curves.lever, best.angle_rad)
+        rest, along = curves.measured - base, slope(base)
+        speed.append(one.direction * TURN / one.moving_s)
+        angle.append(best.angle_rad + inner(rest, along) / inner(along, along))
+    if len(speed) < _LEAST_CYCLES:
+        return None
+    x, y = np.array(speed), np.array(angle)
+    spread = float(((x - x.mean()) ** 2).sum())
+    if not spread > 0.0:
+        return None
+    rate = float((x - x.mean()) @ y) / spread
+    rest = y - y.mean() - rate * (x - x.mean())
+    variance = float(rest @ rest) / (len(x) - 2)
+    lag_sigma = float(np.sqrt(variance / spread))
+    offset_sigma = float(np.sqrt(variance / len(x) + variance / spread * x.mean() ** 2))
+    if _RESOLVED * offset_sigma > abs(best.angle_rad):
+        return None
+    return Timing(float(y.mean() - rate * x.mean()), offset_sigma, -rate, lag_sigma)

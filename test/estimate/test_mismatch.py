@@ -9,27 +9,20 @@ import attrs
 import numpy as np
 import pytest
 
+from leg_wear_monitor.estimate.cause import Cause, TorqueExplanation
+from leg_wear_monitor.estimate.mismatch import Allowed, explanation
 from leg_wear_monitor.mechanism.ideal import one_cycle
 from leg_wear_monitor.mechanism.position import build_linkage
 from leg_wear_monitor.monitor.config.parameters import config_from
-from leg_wear_monitor.monitor.config.settings import MonitorConfig
-from leg_wear_monitor.monitor.torque_causes.explainer import TorqueExplainer
-from leg_wear_monitor.monitor.torque_causes.explanation import TorqueCause, TorqueExplanation
 from leg_wear_monitor.monitor.verdict.torque_words import causes_in_words, remedy
 from leg_wear_monitor.twin.follower.load import load_signature
-from leg_wear_monitor.twin.settings import TwinSettings
 from leg_wear_monitor.twin.statistics import TorqueProfile
 
 pytestmark = pytest.mark.plain
 
 TURN, PHASES, STEPS = 2.0 * math.pi, 128, 256
-SIGN, SCALE, TIMING, LOAD, MASS = TorqueCause
-FRICTION_NM = 2.5
-
-
-@pytest.fixture(scope="module")
-def explainer(leg: Any) -> TorqueExplainer:
-    return TorqueExplainer(leg)
+SIGN, SCALE, TIMING, LOAD, MASS = Cause.SIGN, Cause.SCALE, Cause.CRANK_OFFSET, Cause.LOAD, Cause.MASS
+ALLOWED = Allowed(lag_s=0.005, loads_n=(0.0, 1000.0), friction_nm=2.5, unexplained=0.08)
 
 
 @pytest.fixture(scope="module")
@@ -89,10 +82,8 @@ def walked(leg: Any, torque_of: Any) -> Any:
     return walk
 
 
-def explained(
-    explainer: TorqueExplainer, cycles: list[Any], config: MonitorConfig | None = None
-) -> TorqueExplanation | None:
-    return explainer.explanation(cycles, config or MonitorConfig(), TwinSettings(), FRICTION_NM)
+def explained(leg: Any, cycles: list[Any]) -> TorqueExplanation | None:
+    return explanation(leg, cycles, ALLOWED)
 
 
 def words(found: TorqueExplanation, **given: Any) -> str:
@@ -110,8 +101,8 @@ def remedied(found: TorqueExplanation, **given: Any) -> str:
     [{}, {"bias": 2.0}, {"bias": 0.0}, {"lag": 0.004}, {"offset": 0.02}, {"load": 60.0}, {"factor": 1.03},
      {"noise": 1.0}, {"samples": 50}, {"body": "coupler", "more": 0.1}],
 )  # fmt: skip
-def test_a_sound_torque_has_no_cause(explainer: Any, walked: Any, sound: dict[str, Any]) -> None:
-    assert explained(explainer, walked(**sound)) is None
+def test_a_sound_torque_has_no_cause(leg: Any, walked: Any, sound: dict[str, Any]) -> None:
+    assert explained(leg, walked(**sound)) is None
 
 
 @pytest.mark.parametrize(
@@ -137,9 +128,9 @@ def test_a_sound_torque_has_no_cause(explainer: Any, walked: Any, sound: dict[st
     ],
 )
 def test_what_is_wrong_is_named_with_its_value(
-    explainer: Any, walked: Any, wrong: dict[str, Any], causes: dict[TorqueCause, float]
+    leg: Any, walked: Any, wrong: dict[str, Any], causes: dict[Cause, float]
 ) -> None:
-    found = explained(explainer, walked(**wrong))
+    found = explained(leg, walked(**wrong))
     assert found is not None and found.is_whole and found.after < 0.05
     assert {one.cause for one in found.named} == set(causes)
     for one in found.named:
@@ -153,23 +144,23 @@ def test_what_is_wrong_is_named_with_its_value(
 @pytest.mark.parametrize(("bias", "word"), [(-5.0, "drives the crank"), (9.0, "largest friction")])
 @pytest.mark.parametrize("factor", [-1.0, 3.0])
 def test_a_bias_is_told_beside_a_wrong_factor(
-    explainer: Any, walked: Any, factor: float, bias: float, word: str
+    leg: Any, walked: Any, factor: float, bias: float, word: str
 ) -> None:
-    found = explained(explainer, walked(factor=factor, bias=factor * bias))
+    found = explained(leg, walked(factor=factor, bias=factor * bias))
     assert found is not None
-    assert found.bias_nm == pytest.approx(bias if bias < 0.0 else bias - FRICTION_NM, abs=0.2)
+    assert found.bias_nm == pytest.approx(bias if bias < 0.0 else bias - ALLOWED.friction_nm, abs=0.2)
     assert word in words(found)
 
 
-def test_at_one_speed_an_offset_and_a_lag_are_both_named(explainer: Any, walked: Any) -> None:
-    found = explained(explainer, walked(lag=0.05))
+def test_at_one_speed_an_offset_and_a_lag_are_both_named(leg: Any, walked: Any) -> None:
+    found = explained(leg, walked(lag=0.05))
     assert found is not None and found.timing is None
     told = words(found)
     assert (
         "behind its measured angle" in told and "late: at one speed the two cannot be distinguished" in told
     )
     assert "ms late" in told and "50" in told
-    ahead = explained(explainer, walked(offset=-0.3))
+    ahead = explained(leg, walked(offset=-0.3))
     assert ahead is not None and "ahead of its measured angle" in words(ahead) and "early" in words(ahead)
     assert "crank.offset_rad to 0.8" in remedied(ahead, **{"crank.offset_rad": 0.5})
 
@@ -179,9 +170,9 @@ def test_at_one_speed_an_offset_and_a_lag_are_both_named(explainer: Any, walked:
     [({"lag": 0.05}, "ms late", "measured angle"), ({"offset": 0.3}, "behind its measured angle", "late")],
 )
 def test_at_two_speeds_an_offset_and_a_lag_are_told_apart(
-    explainer: Any, walked: Any, wrong: dict[str, Any], there: str, absent: str
+    leg: Any, walked: Any, wrong: dict[str, Any], there: str, absent: str
 ) -> None:
-    found = explained(explainer, walked(30, speeds=(57.0, 63.0), **wrong))
+    found = explained(leg, walked(30, speeds=(57.0, 63.0), **wrong))
     assert found is not None and found.timing is not None
     assert found.timing.lag_s == pytest.approx(wrong.get("lag", 0.0), abs=4.0 * found.timing.lag_sigma_s)
     assert found.timing.offset_rad == pytest.approx(
@@ -192,47 +183,45 @@ def test_at_two_speeds_an_offset_and_a_lag_are_told_apart(
     )
 
 
-def test_a_factor_is_compared_with_known_mistakes(explainer: Any, walked: Any) -> None:
-    shaft = explained(explainer, walked(factor=1.0 / 9.0))
+def test_a_factor_is_compared_with_known_mistakes(leg: Any, walked: Any) -> None:
+    shaft = explained(leg, walked(factor=1.0 / 9.0))
     assert shaft is not None
     assert "the torque on the joint's shaft; crank.gear_ratio is 9" in words(
         shaft, **{"crank.gear_ratio": 9.0}
     )
     assert "drive_torque.gear_ratio to 9" in remedied(shaft, **{"crank.gear_ratio": 9.0})
     assert "shaft" not in words(shaft) and "drive_torque.scale to 9" in remedied(shaft)
-    twice = explained(explainer, walked(factor=9.0))
+    twice = explained(leg, walked(factor=9.0))
     assert twice is not None and "already the torque on the crank" in words(
         twice, **{"drive_torque.gear_ratio": 9.0}
     )
-    large = explained(explainer, walked(factor=1000.0))
+    large = explained(leg, walked(factor=1000.0))
     assert large is not None and "in N mm" in words(large) and "scale to 0.001" in remedied(large)
 
 
-def test_a_torque_of_nothing_like_this_leg_has_no_named_cause(explainer: Any, walked: Any) -> None:
-    found = explained(explainer, walked(factor=1.0, extra=lambda angle: 12.0 * np.sin(5.0 * angle)))
+def test_a_torque_of_nothing_like_this_leg_has_no_named_cause(leg: Any, walked: Any) -> None:
+    found = explained(leg, walked(factor=1.0, extra=lambda angle: 12.0 * np.sin(5.0 * angle)))
     assert found is not None and not found.named and not found.is_input_fault
     told = words(found)
     assert "explains half of it" in told and "stays unexplained" in told
     assert f"{found.after:.3g} ± {found.after_sigma:.3g}" in told
 
 
-def test_a_reversed_sign_on_a_leg_that_does_not_fit_is_named_with_what_remains(
-    explainer: Any, walked: Any
-) -> None:
-    found = explained(explainer, walked(factor=-1.0, extra=lambda angle: 2.5 * np.sin(7.0 * angle)))
+def test_a_reversed_sign_on_a_leg_that_does_not_fit_is_named_with_what_remains(leg: Any, walked: Any) -> None:
+    found = explained(leg, walked(factor=-1.0, extra=lambda angle: 2.5 * np.sin(7.0 * angle)))
     assert found is not None and [one.cause for one in found.named] == [SIGN] and not found.is_whole
     assert "stays unexplained" in words(found)
 
 
-def test_two_causes_that_explain_alike_are_both_told_and_none_is_sure(explainer: Any, walked: Any) -> None:
-    found = explained(explainer, walked(body="shank", more=0.5, noise=1.0))
+def test_two_causes_that_explain_alike_are_both_told_and_none_is_sure(leg: Any, walked: Any) -> None:
+    found = explained(leg, walked(body="shank", more=0.5, noise=1.0))
     assert found is not None and len(found.alternatives) > 1 and not found.named and not found.is_input_fault
     told = words(found)
     assert "shank" in told and "times the predicted one" in told and "cannot be distinguished" in told
 
 
-def test_too_few_samples_explain_nothing(explainer: Any, walked: Any) -> None:
+def test_too_few_samples_explain_nothing(leg: Any, walked: Any) -> None:
     cycles = walked(factor=-1.0, samples=200)
     for one in cycles:
         one.torque_profile.number[8:] = 0.0
-    assert explained(explainer, cycles) is None
+    assert explained(leg, cycles) is None

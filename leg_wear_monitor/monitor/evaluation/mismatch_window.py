@@ -4,8 +4,8 @@ from collections.abc import Callable, Sequence
 
 import attrs
 
+from leg_wear_monitor.estimate.cause import TorqueExplanation
 from leg_wear_monitor.monitor.alarms.alarm import Alarm, Level
-from leg_wear_monitor.monitor.torque_causes.explanation import TorqueExplanation
 from leg_wear_monitor.twin.statistics import CycleStatistics
 
 _LONGEST = 60  # gait cycles

@@ -13,6 +13,11 @@ from leg_wear_monitor.mechanism.ideal import TURN
 # joints were 0.03 to 0.09 mm wider than at 60, and what a clearance changes is in other phases (diagnosis.md)
 UNLIKE = 0.015
 
+# of a sensor's period: times in whole milliseconds, as tables have them, move samples at 200 Hz by up to a
+# tenth of it, so that the speed of the same crank differs by 2 % from gait cycle to gait cycle
+_COARSE = 0.01
+_LOST = 1.5  # steps: in a longer time between two samples, some were lost
+
 HARMONICS = 8  # of a turn; what is faster is noise of the encoder more than motion of the crank
 
 
@@ -80,6 +85,8 @@ class CrankProfile:
 def cycle_profile(time_s: Floats, angle: Floats, duration_s: float) -> CrankProfile:
     """Profile of one gait cycle, by least squares.
 
+    Coarse times, such as whole milliseconds, are evened if the angles then fit better.
+
     Parameters
     ----------
     time_s, angle : (n,) arrays
@@ -87,15 +94,47 @@ def cycle_profile(time_s: Floats, angle: Floats, duration_s: float) -> CrankProf
     duration_s : float
         Time until the crank passes its zero again.
     """
+    stamped, rest, _ = _fitted(time_s, angle, duration_s)
+    even_s = _evened(time_s)
+    if even_s is None:
+        return stamped
+    _, _, longer = _fitted(even_s, angle, duration_s, is_whole=False)  # its passages are as coarse
+    even, rest_of_even, _ = _fitted(even_s, angle, duration_s * longer)
+    return even if rest_of_even < rest else stamped
+
+
+def _fitted(
+    time_s: Floats, angle: Floats, duration_s: float, is_whole: bool = True
+) -> tuple[CrankProfile, float, float]:
+    """Profile of angles at some times, the RMS of what it leaves over [rad], and a factor on the duration.
+
+    The factor is 1 if the gait cycle is whole, that is, if its duration is known.
+    """
     speed = float(np.copysign(TURN / duration_s, angle[-1] - angle[0]))
     phi = speed * time_s
     h = np.arange(1.0, HARMONICS + 1.0)
     columns = np.hstack([np.ones((len(phi), 1)), np.cos(np.outer(phi, h)), np.sin(np.outer(phi, h))])
+    if not is_whole:
+        columns = np.hstack([columns, phi[:, None]])
     found = np.linalg.lstsq(columns, angle - phi, rcond=None)[0]
+    rest = float(np.sqrt(np.mean((angle - phi - columns @ found) ** 2)))
     # ripple counts from angle 0 of the evenly turning crank, which is not where the crank passes its zero
     turned = found[0] - TURN * np.round(found[0] / TURN)
-    ripple = (found[1 : 1 + HARMONICS] - 1j * found[1 + HARMONICS :]) * np.exp(-1j * h * turned)
-    return CrankProfile(speed, np.asarray(ripple.real), np.asarray(-ripple.imag))
+    sines = slice(1 + HARMONICS, 1 + 2 * HARMONICS)
+    ripple = (found[1 : 1 + HARMONICS] - 1j * found[sines]) * np.exp(-1j * h * turned)
+    profile = CrankProfile(speed, np.asarray(ripple.real), np.asarray(-ripple.imag))
+    return profile, rest, 1.0 if is_whole else 1.0 / (1.0 + float(found[-1]))
+
+
+def _evened(time_s: Floats) -> Floats | None:
+    """Times (n,) of samples that come evenly, but for lost ones; None where those given are not coarse."""
+    steps = np.diff(time_s)
+    period = float(np.mean(steps[steps <= _LOST * np.median(steps)]))
+    if np.gcd.reduce(np.rint(1.0e9 * steps).astype(np.int64)) < 1.0e9 * _COARSE * period:
+        return None
+    number = np.concatenate([[0.0], np.cumsum(np.round(steps / period))])
+    even_s = np.asarray(np.polyval(np.polyfit(number, time_s, 1), number))
+    return even_s if np.abs(even_s - time_s).max() > _COARSE * period else None
 
 
 def mean_profile(profiles: Sequence[CrankProfile]) -> CrankProfile:

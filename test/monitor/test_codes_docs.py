@@ -22,7 +22,7 @@ pytestmark = pytest.mark.plain
 
 def plain(text: str) -> str:
     """A rule's text; what it fills in is in italics."""
-    return re.sub(r"\{(\w+)\}", r"*\1*", re.sub(r"\{(past|causes|doubt)\}", "", text))
+    return re.sub(r"\{(\w+)\}", r"*\1*", re.sub(r"\{(past|causes|doubt|next)\}", "", text))
 
 
 def meanings() -> Iterator[tuple[str, str]]:

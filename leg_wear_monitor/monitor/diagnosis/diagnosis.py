@@ -45,6 +45,8 @@ class Diagnosis:
     state : DiagnosisState
     reason : str
         Why there is no estimate yet, or why it is not to be believed now; empty otherwise.
+    next_step : str
+        What is known next, and after how many gait cycles; empty where walking adds nothing.
     cycles : int
         Gait cycles in the estimate.
     cycles_not_used : mapping of str to int
@@ -64,6 +66,7 @@ class Diagnosis:
 
     state: DiagnosisState = DiagnosisState.OFF
     reason: str = ""
+    next_step: str = ""
     cycles: int = 0
     cycles_not_used: Mapping[str, int] = attrs.field(factory=dict)
     clearance_m: tuple[float, ...] = ()

@@ -21,7 +21,7 @@ from leg_wear_monitor.monitor.diagnosis.corrections import Correction, correctio
 from leg_wear_monitor.monitor.diagnosis.diagnosis import Diagnosis, DiagnosisState, NotUsed
 from leg_wear_monitor.monitor.diagnosis.evidence import Evidence
 from leg_wear_monitor.monitor.diagnosis.leg_models import COMMISSIONING_CYCLES, LegModels
-from leg_wear_monitor.monitor.diagnosis.reasons import doubt, missing
+from leg_wear_monitor.monitor.diagnosis.reasons import doubt, missing, next_step
 from leg_wear_monitor.monitor.diagnosis.references import References
 from leg_wear_monitor.monitor.diagnosis.signed_cycle import find_sensor, signed_cycle
 from leg_wear_monitor.monitor.diagnosis.state import UNUSED_CYCLES, WINDOW_CYCLES, TorqueState
@@ -194,10 +194,12 @@ class TorqueObserver:
         """What the drive torque shows now."""
         state = self.state
         is_old = not state.cycles or (len(state.unused) == UNUSED_CYCLES and not state.changes)
+        upcoming = next_step(state, self._references, self.config)
         if state.fit is None or state.detector is None or is_old:
             return Diagnosis(
                 state=DiagnosisState.WAITING,
                 reason=missing(state, self._references, self.config),
+                next_step=upcoming,
                 changes=state.settled,
                 cycles_not_used=state.not_used,
             )
@@ -205,6 +207,7 @@ class TorqueObserver:
         return Diagnosis(
             state=DiagnosisState.CHANGED if state.changes else DiagnosisState.AS_COUNTED,
             reason=doubt(state, self._references, self._models),
+            next_step=upcoming,
             cycles=state.fit_cycles,
             clearance_m=tuple(clearance_m.tolist()),
             sigma_m=tuple(sigma_m.tolist()),

@@ -1,4 +1,4 @@
-"""Why there is no estimate of the clearances yet, or why it is not sure; for operators."""
+"""Why there is no estimate of the clearances yet, or why it is not sure, and what comes next."""
 
 import math
 from collections.abc import Sequence
@@ -49,10 +49,7 @@ def missing(state: TorqueState, references: References, config: MonitorConfig) -
         return _other_cadence(state, references)
     if len(state.cycles) < FIRST_CYCLES:
         return f"gait cycles: {len(state.cycles)} of {FIRST_CYCLES}"
-    return (
-        "the drive torque is not that of the mechanism file (late, filtered, loaded, or of another leg); "
-        f"changes are observed after {COMMISSIONING_CYCLES} gait cycles, {len(state.cycles)} are there"
-    )
+    return "the drive torque is not that of the mechanism file (late, filtered, loaded, or of another leg)"
 
 
 def doubt(state: TorqueState, references: References, models: LegModels) -> str:
@@ -60,10 +57,7 @@ def doubt(state: TorqueState, references: References, models: LegModels) -> str:
     if state.unused and state.unused[-1] is NotUsed.UNLIKE:
         return _other_cadence(state, references)
     if not state.is_compared:
-        return (
-            f"changes at this cadence are observed after {COMMISSIONING_CYCLES} gait cycles, "
-            f"{len(state.cycles)} are there; at {_cadences(state.set_aside)} they are"
-        )
+        return f"changes at this cadence are not observed yet; at {_cadences(state.set_aside)} they are"
     if models.is_of_file(state):
         return LOCKED_SAMPLES if _are_locked(state) else ""
     known = "the model does not fit this leg, and the names of joints are not sure: "
@@ -78,9 +72,47 @@ def doubt(state: TorqueState, references: References, models: LegModels) -> str:
 def _other_cadence(state: TorqueState, references: References) -> str:
     """What becomes of gait cycles whose crank turns otherwise than in all references."""
     known = f"the crank turns otherwise than in the references ({_cadences(state.known)})"
+    return f"{known}; another one is being simulated: {references.percent} %" if references.is_busy else known
+
+
+def next_step(state: TorqueState, references: References, config: MonitorConfig) -> str:
+    """What is known next if the leg walks on as it does, and when; empty where walking adds nothing."""
+    is_hopeless = state.has_failed or not (state.sensor and state.sensor.phases)
+    if is_hopeless or not math.isnan(state.off_cadence_rpm):
+        return ""
+    commanded_s = 60.0 / abs(config.cadence.commanded_rpm)
+    is_known = bool(state.cycles or state.waiting)
+    cycle_s = TURN / abs(state.profile.speed) if is_known else commanded_s
     if references.is_busy:
-        return f"{known}; another one is being simulated: {references.percent} %"
-    return f"{known}; one is made after {UNLIKE_CYCLES} gait cycles alike, {len(state.waiting)} are there"
+        left_s = references.cycles_left * commanded_s
+        return f"{_simulated(state)} in {_cycles(left_s / cycle_s, cycle_s)}"
+    if state.reference is None:
+        return f"a reference is chosen in {_cycles(FIRST_CYCLES - len(state.waiting), cycle_s)}"
+    if state.unused and state.unused[-1] is NotUsed.UNLIKE:
+        waiting_s = TURN / abs(state.waiting[-1].profile.speed) if state.waiting else cycle_s
+        left = UNLIKE_CYCLES - len(state.waiting)
+        return f"a reference for this motion is begun in {_cycles(left, waiting_s)} alike"
+    if state.commissioned is None and not state.changes:
+        left = COMMISSIONING_CYCLES - len(state.cycles)
+        return f"the baseline, with which smaller changes are found, is complete in {_cycles(left, cycle_s)}"
+    return ""
+
+
+def _simulated(state: TorqueState) -> str:
+    """What is known when that which is being simulated is there."""
+    if state.is_identifying:
+        return "masses, lengths and friction of this leg are known, and a reference with them is begun,"
+    if state.reference is None:
+        return "clearances are compared"
+    if state.unused and state.unused[-1] is NotUsed.UNLIKE:
+        return "gait cycles at this cadence are compared"
+    return "a reference that is nearer to this leg is in force"
+
+
+def _cycles(number: float, cycle_s: float) -> str:
+    """A number of gait cycles, and the time that they take."""
+    whole = max(1, math.ceil(number))
+    return f"{whole} gait cycle{'s' if whole > 1 else ''} ({whole * cycle_s:.0f} s)"
 
 
 def _cadences(known: Sequence[AtCadence]) -> str:

@@ -72,6 +72,11 @@ class References:
         return math.floor(100.0 * self._run.progress) if self._run is not None else 0
 
     @property
+    def cycles_left(self) -> float:
+        """Commanded gait cycles until what is being simulated is there."""
+        return self._run.cycles_left if self._run is not None else 0.0
+
+    @property
     def part(self) -> TorqueReference | None:
         """The legs that are simulated so far; None where none is, or all are."""
         return self._run.part if self._run is not None else None

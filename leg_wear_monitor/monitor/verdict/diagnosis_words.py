@@ -18,6 +18,8 @@ def diagnosis_words(diagnosis: Diagnosis, joints: Sequence[str]) -> str:
     told = [_STATES[diagnosis.state]]
     if diagnosis.reason:
         told.append(diagnosis.reason)
+    if diagnosis.next_step:
+        told.append(diagnosis.next_step)
     hidden = unseen(diagnosis, joints)
     if diagnosis.clearance_m and hidden:
         told.append(f"not observable: {', '.join(hidden)}")

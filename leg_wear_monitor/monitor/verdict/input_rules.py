@@ -5,7 +5,7 @@ from collections.abc import Callable, Sequence
 
 from leg_wear_monitor.estimate.cause import Cause, NamedCause
 from leg_wear_monitor.monitor.alarms.alarm import Level
-from leg_wear_monitor.monitor.diagnosis.diagnosis import DiagnosisState
+from leg_wear_monitor.monitor.diagnosis.diagnosis import Diagnosis, DiagnosisState
 from leg_wear_monitor.monitor.verdict.alarm_rules import raised
 from leg_wear_monitor.monitor.verdict.clearance_rules import changes, words_of
 from leg_wear_monitor.monitor.verdict.rule import Hit
@@ -135,12 +135,13 @@ def not_observed(situation: Situation) -> Sequence[Hit]:
     if not blind or not situation.has_cycle or not situation.has_torque:
         return []
     cause = f": {found.reason}" if found.reason else ""
+    upcoming = f": {found.next_step}" if found.next_step else ""
     unused = tuple(
         Evidence(f"cycles not used: {reason}", float(number), math.nan, "")
         for reason, number in found.cycles_not_used.items()
     )
     joints = ", ".join(map(situation.joint_words, blind))
-    return [Hit(words={"joints": joints, "causes": cause}, evidence=unused)]
+    return [Hit(words={"joints": joints, "causes": cause, "next": upcoming}, evidence=unused)]
 
 
 def other_cadence(situation: Situation) -> Sequence[Hit]:
@@ -178,9 +179,19 @@ def nothing_found(situation: Situation) -> Sequence[Hit]:
             f"the drive torque agrees with the counted leg: {amount(situation.mismatch, '')} of its RMS is "
             f"not explained (limit {amount(limit, '')})"
         )
-        if situation.diagnosis is not None and situation.diagnosis.state is DiagnosisState.OFF:
-            observed += f"; the torque is not compared with wider joints: {situation.diagnosis.reason}"
+        observed += _compared(situation.diagnosis)
     return [Hit(words={"observed": observed}, evidence=evidence)]
+
+
+def _compared(found: Diagnosis | None) -> str:
+    """What the torque shows of the clearances of a healthy leg, and what comes next; empty if nothing."""
+    if found is None:
+        return ""
+    if found.state is DiagnosisState.OFF:
+        return f"; the torque is not compared with wider joints: {found.reason}"
+    known = [each for each in found.sigma_m if not math.isnan(each)]
+    told = [f"{found.cycles} gait cycles show clearances to ± {amount(max(known), 'm')}"] if known else []
+    return "".join(f"; {each}" for each in (*told, found.next_step) if each)
 
 
 def _said(cause: str) -> Sequence[Hit]:

@@ -239,7 +239,7 @@ RULES = (
         state=State.WATCH,
         hits=input_rules.not_observed,
         why="the drive torque does not show the clearances of joints {joints} yet{causes}",
-        do="let the leg walk on at a steady cadence; until then, rock these joints by hand regularly",
+        do="let the leg walk on at a steady cadence{next}; until then, rock these joints by hand regularly",
     ),
     Rule(
         code="CADENCE",

@@ -34,6 +34,7 @@ CADENCES = 6  # of which the references of a leg are kept
 
 CYCLES = 20  # simulated for each wider leg, and twice as many for each other one
 
+_PERIODS = 4  # evaluation periods in a commanded gait cycle
 PACE = 6  # simulated gait cycles in an evaluation period, a quarter cycle; a core does twice as many
 WIDER = (1.2, 1.35, 1.5, 2.0, 3.0, 5.0, 8.0)  # factors on the expected clearance, one joint at a time
 
@@ -134,6 +135,12 @@ class TorqueReferenceRun:
     def progress(self) -> float:
         """Fraction of the gait cycles that are done; 0 where nothing was begun."""
         return min(1.0, PACE * self._periods / max(1, self._cost(self._legs)))
+
+    @property
+    def cycles_left(self) -> float:
+        """Commanded gait cycles until all of it is due."""
+        periods = -(-self._cost(self._legs) // PACE) - self._periods
+        return max(0, periods) / _PERIODS
 
     def begin(
         self,

@@ -1,0 +1,114 @@
+"""What the diagnosis says at each step: what is known, what is missing, what comes next and when."""
+
+import math
+from types import SimpleNamespace
+
+import numpy as np
+import pytest
+
+from leg_wear_monitor.estimate.commissioned_torque import CommissionedTorque
+from leg_wear_monitor.estimate.signature import TorqueSensor
+from leg_wear_monitor.mechanism.ideal import TURN
+from leg_wear_monitor.monitor.config.inputs import Cadence
+from leg_wear_monitor.monitor.config.settings import MonitorConfig
+from leg_wear_monitor.monitor.diagnosis.diagnosis import Diagnosis, DiagnosisState, NotUsed
+from leg_wear_monitor.monitor.diagnosis.reasons import doubt, missing, next_step
+from leg_wear_monitor.monitor.diagnosis.state import AtCadence, SignedCycle, TorqueState
+from leg_wear_monitor.monitor.verdict.input_rules import nothing_found
+from leg_wear_monitor.monitor.verdict.situation import Situation
+from leg_wear_monitor.twin.reference.crank_profile import CrankProfile
+
+NEW = np.full(5, 3.0e-4)
+SENSOR = TorqueSensor(0.005, 1.0, 9.2)
+CONFIG = MonitorConfig(cadence=Cadence(tolerance_rpm=20.0))
+IDLE, BUSY = (SimpleNamespace(is_busy=busy, percent=40, cycles_left=20.0) for busy in (False, True))
+
+
+def cycles(number: int, rpm: float = 60.0) -> tuple[SignedCycle, ...]:
+    profile = CrankProfile.steady(TURN * rpm / 60.0)
+    return tuple(SignedCycle(i, i + 1, np.zeros(160), profile, 0.37 * i % 1.0) for i in range(number))
+
+
+def of_reference(rpm: float = 60.0) -> SimpleNamespace:
+    return SimpleNamespace(profile=CrankProfile.steady(TURN * rpm / 60.0))
+
+
+def known(rpm: float = 60.0) -> CommissionedTorque:
+    return CommissionedTorque(0, NEW, np.zeros((50, 160)), speed=TURN * rpm / 60.0)
+
+
+def state(**changes: object) -> TorqueState:
+    return TorqueState(NEW, **{"sensor": SENSOR, **changes})
+
+
+UNLIKE = (NotUsed.UNLIKE,)
+STEPS = {
+    "no torque": (state(sensor=None), IDLE, ""),
+    "another cadence": (state(off_cadence_rpm=30.0, waiting=cycles(2)), IDLE, ""),
+    "two gait cycles": (state(waiting=cycles(2)), IDLE, "a reference is chosen in 3 gait cycles (3 s)"),
+    # 20 commanded gait cycles are 20 s, in which a crank at 45 rpm turns 15 times
+    "a first reference": (
+        state(waiting=cycles(9, 45.0)),
+        BUSY,
+        "clearances are compared in 15 gait cycles (20 s)",
+    ),
+    "no baseline": (
+        state(reference=of_reference(45.0), cycles=cycles(38, 45.0)),
+        IDLE,
+        "the baseline, with which smaller changes are found, is complete in 12 gait cycles (16 s)",
+    ),
+    "a baseline": (state(reference=of_reference(), cycles=cycles(50), commissioned=known()), IDLE, ""),
+    "identification": (
+        state(reference=of_reference(), cycles=cycles(50), commissioned=known(), is_identifying=True),
+        BUSY,
+        "masses, lengths and friction of this leg are known, and a reference with them is begun, "
+        "in 20 gait cycles (20 s)",
+    ),
+    "another motion": (
+        state(reference=of_reference(), cycles=cycles(50), waiting=cycles(15, 75.0), unused=UNLIKE),
+        IDLE,
+        "a reference for this motion is begun in 5 gait cycles (4 s) alike",
+    ),
+    "another motion, simulated": (
+        state(reference=of_reference(), cycles=cycles(50), waiting=cycles(15, 75.0), unused=UNLIKE),
+        BUSY,
+        "gait cycles at this cadence are compared in 20 gait cycles (20 s)",
+    ),
+}
+
+
+@pytest.mark.parametrize("step", STEPS)
+def test_the_next_step_says_what_is_known_then_and_when(step: str) -> None:
+    now, references, words = STEPS[step]
+    assert next_step(now, references, CONFIG) == words
+
+
+def test_what_is_known_of_a_cadence_without_a_baseline_of_its_own() -> None:
+    other = AtCadence(of_reference(), SENSOR, known(), cycles(50))
+    now = state(reference=of_reference(75.0), cycles=cycles(30, 75.0), set_aside=(other,))
+    models = SimpleNamespace(is_of_file=lambda _: True)
+    assert doubt(now, IDLE, models) == "changes at this cadence are not observed yet; at 60 rpm they are"
+    assert next_step(now, IDLE, CONFIG).endswith("is complete in 20 gait cycles (16 s)")
+
+
+def test_what_is_missing_does_not_repeat_the_next_step() -> None:
+    other = state(reference=of_reference(), cycles=cycles(20))
+    assert missing(other, IDLE, CONFIG) == (
+        "the drive torque is not that of the mechanism file (late, filtered, loaded, or of another leg)"
+    )
+    unlike = state(reference=of_reference(), cycles=cycles(50), waiting=cycles(4, 75.0), unused=UNLIKE)
+    assert missing(unlike, IDLE, CONFIG) == ("the crank turns otherwise than in the references (60 rpm)")
+
+
+def test_a_healthy_leg_is_told_how_well_it_is_known_and_what_comes_next() -> None:
+    found = Diagnosis(
+        state=DiagnosisState.AS_COUNTED,
+        next_step="the baseline is complete in 40 gait cycles (40 s)",
+        cycles=10,
+        clearance_m=(3.0e-4, math.nan),
+        sigma_m=(2.0e-5, math.nan),
+    )
+    (hit,) = nothing_found(Situation(diagnosis=found, mismatch_limit=0.1))
+    assert hit.words["observed"].endswith(
+        "; 10 gait cycles show clearances to ± 0.02 mm; the baseline is complete in 40 gait cycles (40 s)"
+    )

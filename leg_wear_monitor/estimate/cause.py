@@ -28,9 +28,10 @@ class Cause(Enum):
     CLEARANCE = "clearance", "CLEARANCE_CHANGED"
     SIGN = "sign of the torque sensor", "TORQUE_SIGN"
     SCALE = "scale of the torque sensor", "TORQUE_SCALE"
-    # at one speed of the crank the two look alike
+    TIMING = "crank offset or lag of the torque", "TORQUE_TIMING"  # at one speed the two look alike
     CRANK_OFFSET = "offset of the crank encoder", "TORQUE_TIMING"
     LAG = "lag of the torque sensor", "TORQUE_TIMING"
+    BIAS = "zero of the torque sensor", "TORQUE_BIAS"
     LOAD = "load at the foot", "TORQUE_LOAD"
     FRICTION = "friction of the drive", "FRICTION_CHANGED"
     MASS = "mass of a body", "TORQUE_MASS"
@@ -38,7 +39,7 @@ class Cause(Enum):
     UNKNOWN = "unknown", "MECHANISM_CHANGED"
 
 
-INPUTS = (Cause.SIGN, Cause.SCALE, Cause.CRANK_OFFSET, Cause.LAG)
+INPUTS = (Cause.SIGN, Cause.SCALE, Cause.TIMING, Cause.CRANK_OFFSET, Cause.LAG)
 """Causes in what is received, not in the leg."""
 
 
@@ -51,8 +52,9 @@ class NamedCause:
     cause : Cause
     value, sigma : float
         Clearance [m]; measured over predicted torque (SIGN, SCALE); angle by which the crank is ahead of its
-        measured angle [rad]; lag [s]; load [N]; change of the friction [N m]; fraction by which a mass or a
-        length is larger.
+        measured angle (TIMING, CRANK_OFFSET) [rad]; lag [s]; constant torque beyond the bounds of friction,
+        negative where it drives (BIAS) [N m]; change of the friction [N m]; load at the foot [N]; fraction by
+        which a mass or a length is larger.
     subject : str
         The joint, or the body, concerned; empty where there is none.
     """
@@ -97,16 +99,6 @@ class Change(NamedCause):
         return self.cause is Cause.CLEARANCE and odds >= SURE_LOG_ODDS
 
 
-@attrs.frozen
-class Timing:
-    """Offset of the crank [rad] and lag of the torque [s] with standard deviations, from several speeds."""
-
-    offset_rad: float
-    offset_sigma_rad: float
-    lag_s: float
-    lag_sigma_s: float
-
-
 @attrs.frozen(kw_only=True)
 class TorqueExplanation:
     """Explanation of a torque mismatch.
@@ -123,10 +115,8 @@ class TorqueExplanation:
         Fraction below which a torque counts as predicted.
     speed_radps : float
         Mean crank speed.
-    timing : Timing or None
-        None while the speeds are too similar.
-    bias_nm, bias_sigma_nm : float
-        Constant torque that friction cannot be, for the first alternative: it drives where it is negative.
+    bias : NamedCause
+        Constant torque that friction cannot be, for the first alternative.
     cycles : int
         Gait cycles in it.
     """
@@ -137,9 +127,7 @@ class TorqueExplanation:
     after_sigma: float
     limit: float
     speed_radps: float
-    timing: Timing | None = None
-    bias_nm: float = 0.0
-    bias_sigma_nm: float = math.nan
+    bias: NamedCause = NamedCause(Cause.BIAS, 0.0, math.nan)
     cycles: int = 0
 
     @property
@@ -159,3 +147,9 @@ class TorqueExplanation:
         """Whether the torque or the crank angle is wrong as received, so that it says nothing of the leg."""
         found = self.alternatives if self.is_whole else (self.named,)
         return bool(found) and all(any(one.cause in INPUTS for one in each) for each in found)
+
+
+def beyond_friction(constant_nm: float, sigma_nm: float, max_friction_nm: float) -> NamedCause:
+    """Part of a constant torque along the motion that friction cannot be: it is negative, or too large."""
+    beyond = min(constant_nm, 0.0) + max(constant_nm - max_friction_nm, 0.0)
+    return NamedCause(Cause.BIAS, beyond, sigma_nm)

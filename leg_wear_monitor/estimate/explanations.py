@@ -28,9 +28,10 @@ POOREST, _PART = 4.0, 0.3  # or of what is left over without it: a large opening
 _POSSIBLE = {
     Cause.MASS: (-0.9, 1.0),
     Cause.LENGTH: (-0.1, 0.1),
-    Cause.SCALE: (-0.8, 1.0),
-    Cause.CRANK_OFFSET: (-0.1, 0.1),
+    Cause.SCALE: (0.2, 2.0),
+    Cause.TIMING: (-0.1, 0.1),
 }
+_COUNTED = {Cause.SCALE: 1.0}  # value of a leg as counted; 0 for others
 
 
 @attrs.frozen(eq=False)
@@ -264,9 +265,9 @@ class Explainer:
             Explanation(
                 cause=one.cause,
                 subject=one.subject,
-                value=float(value),
+                value=_COUNTED.get(one.cause, 0.0) + float(value),
                 sigma=float(sigma),
-                counted=0.0,
+                counted=_COUNTED.get(one.cause, 0.0),
                 misfit=float(misfit),
                 square=float(square) / len(rest),
             )

@@ -9,7 +9,7 @@ from collections.abc import Sequence
 import attrs
 import numpy as np
 
-from leg_wear_monitor.estimate.cause import Timing
+from leg_wear_monitor.estimate.cause import Cause, NamedCause
 from leg_wear_monitor.estimate.torque_curves import (
     Complex,
     TorqueCurves,
@@ -27,6 +27,7 @@ _ANGLES = (np.arange(720) / 720 + 0.5) % 1.0 * TURN - 0.5 * TURN
 _MASSES = (-0.9, 4.0)  # possible fractions by which a body's mass is off
 _POINTS, _SECTORS = 64, 8  # of a turn; each sector is left out once
 _LEAST_CYCLES = 6
+_SURE = 3.0  # standard deviations of an offset or a lag beside the other
 _RESOLVED = 6.0  # standard deviations of the offset by which an offset and a lag of the same angle differ
 
 
@@ -209,8 +210,8 @@ def _solved(matrix: Floats, rest: Floats) -> tuple[Floats, float]:
     return np.asarray(found, float), float(np.sqrt(np.mean((rest - matrix @ found) ** 2)))
 
 
-def timing_of(cycles: Sequence[CycleStatistics], best: Fit) -> Timing | None:
-    """Offset and lag from gait cycles at several speeds; None while the speeds are too similar.
+def timing_of(cycles: Sequence[CycleStatistics], best: Fit) -> list[NamedCause]:
+    """Offset and lag from gait cycles at several speeds; none while the speeds are too similar.
 
     The angle of a cycle is offset - lag * speed.
     """
@@ -224,16 +225,24 @@ def timing_of(cycles: Sequence[CycleStatistics], best: Fit) -> Timing | None:
         speed.append(one.direction * TURN / one.moving_s)
         angle.append(best.angle_rad + inner(rest, along) / inner(along, along))
     if len(speed) < _LEAST_CYCLES:
-        return None
+        return []
     x, y = np.array(speed), np.array(angle)
     spread = float(((x - x.mean()) ** 2).sum())
     if not spread > 0.0:
-        return None
+        return []
     rate = float((x - x.mean()) @ y) / spread
     rest = y - y.mean() - rate * (x - x.mean())
     variance = float(rest @ rest) / (len(x) - 2)
     lag_sigma = float(np.sqrt(variance / spread))
     offset_sigma = float(np.sqrt(variance / len(x) + variance / spread * x.mean() ** 2))
     if _RESOLVED * offset_sigma > abs(best.angle_rad):
-        return None
-    return Timing(float(y.mean() - rate * x.mean()), offset_sigma, -rate, lag_sigma)
+        return []
+    offset = NamedCause(Cause.CRANK_OFFSET, float(y.mean() - rate * x.mean()), offset_sigma)
+    lag = NamedCause(Cause.LAG, -rate, lag_sigma)
+    most = max(_sureness(offset), _sureness(lag))
+    return [one for one in (offset, lag) if _sureness(one) >= min(_SURE, most)]
+
+
+def _sureness(one: NamedCause) -> float:
+    """Size of a value in standard deviations."""
+    return abs(one.value) / one.sigma if one.sigma else math.inf

@@ -7,7 +7,7 @@ import attrs
 import numpy as np
 
 from leg_wear_monitor.estimate.body_torques import at_speed, body_torques
-from leg_wear_monitor.estimate.cause import Cause, NamedCause, TorqueExplanation
+from leg_wear_monitor.estimate.cause import Cause, NamedCause, TorqueExplanation, beyond_friction
 from leg_wear_monitor.estimate.hypotheses import Fit, Hypothesis, Refined, fit, refined, timing_of
 from leg_wear_monitor.estimate.torque_curves import TorqueCurves, curves_of
 from leg_wear_monitor.mechanism.arrays import Floats
@@ -59,19 +59,18 @@ def explanation(
     if chosen is None:
         return None
     before, found = chosen
-    best = refined(curves, found[0] if found else before)
+    fits = [refined(curves, one) for one in found]
+    best = fits[0] if fits else refined(curves, before)
     friction = math.copysign(best.constant_nm, best.constant_nm * speed * best.fit.factor)
     friction /= abs(best.fit.factor)
     return TorqueExplanation(
-        alternatives=tuple(_named(refined(curves, one)) for one in found),
+        alternatives=tuple(_named(one, cycles) for one in fits),
         before=before.unexplained,
         after=best.fit.unexplained,
         after_sigma=best.unexplained_sigma,
         limit=allowed.unexplained,
         speed_radps=speed,
-        timing=timing_of(cycles, best.fit) if found and found[0].hypothesis.is_turned else None,
-        bias_nm=min(friction, 0.0) + max(friction - allowed.friction_nm, 0.0),
-        bias_sigma_nm=best.constant_sigma_nm / abs(best.fit.factor),
+        bias=beyond_friction(friction, best.constant_sigma_nm / abs(best.fit.factor), allowed.friction_nm),
         cycles=len(cycles),
     )
 
@@ -123,7 +122,7 @@ def _chosen(curves: TorqueCurves, angle_rad: float, allowed: Allowed) -> tuple[F
     return before, [one for one in fits[size] if one.unexplained <= enough]
 
 
-def _named(one: Refined) -> tuple[NamedCause, ...]:
+def _named(one: Refined, cycles: Sequence[CycleStatistics]) -> tuple[NamedCause, ...]:
     """The causes of a fit."""
     found, of = one.fit, one.fit.hypothesis
     factor_sigma, angle_sigma, load_sigma, mass_sigma = one.sigma
@@ -133,7 +132,8 @@ def _named(one: Refined) -> tuple[NamedCause, ...]:
     if of.is_scaled:
         causes.append(NamedCause(Cause.SCALE, abs(found.factor), factor_sigma))
     if of.is_turned:
-        causes.append(NamedCause(Cause.CRANK_OFFSET, found.angle_rad, angle_sigma))
+        together = NamedCause(Cause.TIMING, found.angle_rad, angle_sigma)
+        causes += timing_of(cycles, found) or [together]
     if of.is_loaded:
         causes.append(NamedCause(Cause.LOAD, found.load_n, load_sigma))
     if of.body:

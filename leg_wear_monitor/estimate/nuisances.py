@@ -49,8 +49,8 @@ def nuisances(mechanism: Mechanism, reference: TorqueReference, sensor: TorqueSe
     found = [
         Nuisance(Cause.FRICTION, "", constant, _FRICTION * sensor.size_nm),
         Nuisance(Cause.SCALE, "", scaled, _SCALE),
-        # the samples' angle is too large where the torque comes late
-        Nuisance(Cause.CRANK_OFFSET, "", shifted, _OFFSET_RAD),
+        # the samples' angle is too large where the torque comes late, and too small where the crank is ahead
+        Nuisance(Cause.TIMING, "", -shifted, _OFFSET_RAD),
     ]
     if mechanism.toe is not None:
         lever, _ = load_signature(build_linkage(mechanism))

@@ -14,7 +14,6 @@ from leg_wear_monitor.monitor.encoders.state import faults
 from leg_wear_monitor.monitor.evaluation import specs
 from leg_wear_monitor.monitor.evaluation.evaluation import AlarmEvaluation
 from leg_wear_monitor.monitor.evaluation.gait_evidence import doubts
-from leg_wear_monitor.monitor.evaluation.torque_checks import torque_causes
 from leg_wear_monitor.monitor.evaluation.torque_record import TorqueRecord
 from leg_wear_monitor.monitor.forecast.forecaster import Forecaster
 from leg_wear_monitor.monitor.ledger.entry import Measurement
@@ -181,7 +180,7 @@ def situation_of(
         has_torque=last is not None and last.torque_samples > 0,
         mismatch=last.torque_mismatch if last else math.nan,
         mismatch_limit=config.limits.torque_mismatch,
-        torque_causes=_torque_causes(evaluation, last, record),
+        torque_causes=evaluation.present_causes(last, record) if last else {},
         without_zero="" if evaluation.guard.cause else without_zero,
         unfollowed=_unfollowed(twin, evaluation),
         input_causes=tuple(evaluation.causes),
@@ -271,15 +270,6 @@ def with_measured(joint: JointSituation, measured: Measurement | None) -> JointS
 def _seen_by_encoders(report: JointReport | None) -> ClearanceEstimate | None:
     seen = report.seen if report else None
     return seen if seen and seen.observation is ClearanceObservation.SEEN else None
-
-
-def _torque_causes(
-    evaluation: AlarmEvaluation, last: CycleReport | None, record: TorqueRecord
-) -> tuple[str, ...]:
-    if last is None:
-        return ()
-    raised = {spec.name() for spec in specs.TORQUE if evaluation.board.level(spec.name())}
-    return tuple(torque_causes(raised, last, record, evaluation.torque_bounds))
 
 
 def _unfollowed(twin: DigitalTwin, evaluation: AlarmEvaluation) -> str:

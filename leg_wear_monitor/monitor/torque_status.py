@@ -5,19 +5,20 @@ from collections.abc import Sequence
 
 from leg_wear_monitor.estimate.cause import TorqueExplanation
 from leg_wear_monitor.monitor.alarms.alarm import Level
-from leg_wear_monitor.monitor.alarms.fault_codes import DIAGNOSIS, worst_code
+from leg_wear_monitor.monitor.alarms.fault_codes import CAUSES_OF_ALARMS, DIAGNOSIS, worst_code
 from leg_wear_monitor.monitor.diagnosis.diagnosis import Diagnosis, DiagnosisState, NotUsed
 from leg_wear_monitor.monitor.evaluation import specs
 from leg_wear_monitor.monitor.evaluation.evaluation import AlarmEvaluation
-from leg_wear_monitor.monitor.evaluation.torque_checks import offset_error_rad, torque_causes
+from leg_wear_monitor.monitor.evaluation.torque_checks import offset_error_rad
 from leg_wear_monitor.monitor.evaluation.torque_record import TorqueRecord
 from leg_wear_monitor.monitor.reports import CycleReport, Status
+from leg_wear_monitor.monitor.verdict.cause_words import EVIDENCE, CauseWords
 from leg_wear_monitor.monitor.verdict.diagnosis_words import diagnosis_words
-from leg_wear_monitor.monitor.verdict.torque_words import EVIDENCE, causes_in_words
 from leg_wear_monitor.monitor.verdict.words import with_unit
 from leg_wear_monitor.twin.statistics import NotCompared
 
 _TORQUE = tuple(spec.name() for spec in specs.TORQUE)
+_CODES = {name.upper(): cause.fault_code for name, cause in CAUSES_OF_ALARMS.items()}
 
 
 def torque_status(
@@ -29,6 +30,7 @@ def torque_status(
     """Comparison of measured and predicted torque, and what explains a mismatch."""
     level = evaluation.board.level(*_TORQUE)
     code = worst_code(evaluation.board.alarms[name] for name in _TORQUE)
+    code = _CODES.get(code, code)
     if last is None or not last.torque_samples:
         return Status("torque", level, "not compared: no drive torque in the last gait cycle", {}, code)
     values = {
@@ -50,15 +52,19 @@ def torque_status(
     for why in NotCompared:
         values[f"not_compared_{why.value}_cycles"] = float(record.not_compared.get(why.value, 0))
     raised = {name for name in _TORQUE if evaluation.board.alarms[name].level is not Level.OK}
-    messages = []
+    config, messages = evaluation.config, []
+    speed = explained.speed_radps if explained else last.cadence_rpm * math.pi / 30.0
+    words = CauseWords(config.crank, config.drive_torque, speed)
     if specs.MISMATCH.name() in raised:
-        config = evaluation.config
-        causes = f": {causes_in_words(explained, config.crank, config.drive_torque)}" if explained else ""
+        causes = f": {words.explanation(explained)}" if explained else ""
         messages = [f"the measured torque differs from the predicted one{causes}"]
         values |= _explained_values(explained) if explained else {}
         code = explained.named[0].cause.fault_code if explained and explained.named else code
     if explained is None or not explained.is_input_fault:  # those are estimates for the torque as received
-        messages += torque_causes(raised, last, record, evaluation.torque_bounds)
+        present = evaluation.present_causes(last, record)
+        messages += map(words.cause, present.values())
+        past = [name for name in CAUSES_OF_ALARMS if name in raised and name not in present]
+        messages += [f"the {specs.QUANTITIES[name]} was beyond its limit" for name in past]
     if not messages and math.isnan(last.torque_mismatch):
         messages = ["not enough gait cycles yet for a comparison"]
     return Status("torque", level, "; ".join(messages or ["measured as predicted"]), values, code)

@@ -14,14 +14,14 @@ from leg_wear_monitor.estimate.mismatch import Allowed, explanation
 from leg_wear_monitor.mechanism.ideal import one_cycle
 from leg_wear_monitor.mechanism.position import build_linkage
 from leg_wear_monitor.monitor.config.parameters import config_from
-from leg_wear_monitor.monitor.verdict.torque_words import causes_in_words, remedy
+from leg_wear_monitor.monitor.verdict.cause_words import CauseWords
 from leg_wear_monitor.twin.follower.load import load_signature
 from leg_wear_monitor.twin.statistics import TorqueProfile
 
 pytestmark = pytest.mark.plain
 
 TURN, PHASES, STEPS = 2.0 * math.pi, 128, 256
-SIGN, SCALE, TIMING, LOAD, MASS = Cause.SIGN, Cause.SCALE, Cause.CRANK_OFFSET, Cause.LOAD, Cause.MASS
+SIGN, SCALE, TIMING, LOAD, MASS = Cause.SIGN, Cause.SCALE, Cause.TIMING, Cause.LOAD, Cause.MASS
 ALLOWED = Allowed(lag_s=0.005, loads_n=(0.0, 1000.0), friction_nm=2.5, unexplained=0.08)
 
 
@@ -88,12 +88,12 @@ def explained(leg: Any, cycles: list[Any]) -> TorqueExplanation | None:
 
 def words(found: TorqueExplanation, **given: Any) -> str:
     config = config_from(given)
-    return causes_in_words(found, config.crank, config.drive_torque)
+    return CauseWords(config.crank, config.drive_torque, found.speed_radps).explanation(found)
 
 
 def remedied(found: TorqueExplanation, **given: Any) -> str:
     config = config_from(given)
-    return remedy(found, config.crank, config.drive_torque)
+    return " and ".join(map(CauseWords(config.crank, config.drive_torque).remedy, found.named))
 
 
 @pytest.mark.parametrize(
@@ -148,13 +148,13 @@ def test_a_bias_is_told_beside_a_wrong_factor(
 ) -> None:
     found = explained(leg, walked(factor=factor, bias=factor * bias))
     assert found is not None
-    assert found.bias_nm == pytest.approx(bias if bias < 0.0 else bias - ALLOWED.friction_nm, abs=0.2)
+    assert found.bias.value == pytest.approx(bias if bias < 0.0 else bias - ALLOWED.friction_nm, abs=0.2)
     assert word in words(found)
 
 
 def test_at_one_speed_an_offset_and_a_lag_are_both_named(leg: Any, walked: Any) -> None:
     found = explained(leg, walked(lag=0.05))
-    assert found is not None and found.timing is None
+    assert found is not None and [one.cause for one in found.named] == [TIMING]
     told = words(found)
     assert (
         "behind its measured angle" in told and "late: at one speed the two cannot be distinguished" in told
@@ -166,21 +166,20 @@ def test_at_one_speed_an_offset_and_a_lag_are_both_named(leg: Any, walked: Any) 
 
 
 @pytest.mark.parametrize(
-    ("wrong", "there", "absent"),
-    [({"lag": 0.05}, "ms late", "measured angle"), ({"offset": 0.3}, "behind its measured angle", "late")],
+    ("wrong", "cause", "value", "there", "absent"),
+    [
+        ({"lag": 0.05}, Cause.LAG, 0.05, "ms late", "measured angle"),
+        ({"offset": 0.3}, Cause.CRANK_OFFSET, -0.3, "behind its measured angle", "late"),
+    ],
 )
 def test_at_two_speeds_an_offset_and_a_lag_are_told_apart(
-    leg: Any, walked: Any, wrong: dict[str, Any], there: str, absent: str
+    leg: Any, walked: Any, wrong: dict[str, Any], cause: Cause, value: float, there: str, absent: str
 ) -> None:
     found = explained(leg, walked(30, speeds=(57.0, 63.0), **wrong))
-    assert found is not None and found.timing is not None
-    assert found.timing.lag_s == pytest.approx(wrong.get("lag", 0.0), abs=4.0 * found.timing.lag_sigma_s)
-    assert found.timing.offset_rad == pytest.approx(
-        -wrong.get("offset", 0.0), abs=4.0 * found.timing.offset_sigma_rad
-    )
-    assert (
-        there in words(found) and absent not in words(found) and "cannot be distinguished" not in words(found)
-    )
+    assert found is not None and [one.cause for one in found.named] == [cause]
+    assert found.named[0].value == pytest.approx(value, abs=4.0 * found.named[0].sigma)
+    told = words(found)
+    assert there in told and absent not in told and "cannot be distinguished" not in told
 
 
 def test_a_factor_is_compared_with_known_mistakes(leg: Any, walked: Any) -> None:

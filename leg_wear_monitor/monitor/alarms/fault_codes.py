@@ -1,10 +1,12 @@
 """Stable names of what is wrong, one with each status: those of alarms, and those of the parts of a monitor.
 
-A status of the verdict has the code of its rule (`verdict.rules`).
+A status of the verdict has the code of its rule (`verdict.rules`), which is that of a cause
+(`estimate.cause`) where one is found.
 """
 
 from collections.abc import Iterable
 
+from leg_wear_monitor.estimate.cause import Cause
 from leg_wear_monitor.monitor.alarms.alarm import Alarm, Level
 
 NO_FAULT = "NONE"
@@ -37,6 +39,13 @@ FAULT_CODES = {
     ALREADY_COUNTED: "samples of a time that is in the ledger are skipped",
 }
 """Codes that are not the name of an alarm, and their meaning."""
+
+CAUSES_OF_ALARMS = {
+    "torque_bias": Cause.BIAS,
+    "torque_drift": Cause.FRICTION,
+    "torque_lag": Cause.TIMING,
+}
+"""Causes that have a limit of their own, by the alarm."""
 
 
 def code_of(alarm: Alarm) -> str:

@@ -4,6 +4,7 @@ import math
 
 import attrs
 
+from leg_wear_monitor.estimate.cause import NamedCause
 from leg_wear_monitor.estimate.mismatch import Allowed
 from leg_wear_monitor.monitor.alarms.alarm import Level
 from leg_wear_monitor.monitor.config.settings import MonitorConfig
@@ -11,7 +12,12 @@ from leg_wear_monitor.monitor.evaluation import specs
 from leg_wear_monitor.monitor.evaluation.board import AlarmBoard, joint_specs
 from leg_wear_monitor.monitor.evaluation.evaluation_period import A_CYCLE
 from leg_wear_monitor.monitor.evaluation.specs import CycleEvidence
-from leg_wear_monitor.monitor.evaluation.torque_checks import TorqueBounds, torque_bounds, torque_values
+from leg_wear_monitor.monitor.evaluation.torque_checks import (
+    TorqueBounds,
+    torque_bounds,
+    torque_causes,
+    torque_values,
+)
 from leg_wear_monitor.monitor.evaluation.torque_record import TorqueRecord
 from leg_wear_monitor.monitor.inputs.causes import causes
 from leg_wear_monitor.monitor.inputs.guard import InputGuard
@@ -131,6 +137,12 @@ class AlarmEvaluation:
             friction_nm=bounds.max_friction_nm,
             unexplained=limits.warn_fraction * limits.torque_mismatch,
         )
+
+    def present_causes(self, report: CycleReport, record: TorqueRecord) -> dict[str, NamedCause]:
+        """Causes of the torque's alarms whose values are beyond their limits now, by the alarm."""
+        names = {spec.name() for spec in specs.TORQUE}
+        raised = {name for name in names if self.board.alarms[name].present is not Level.OK}
+        return torque_causes(raised, report, record, self.torque_bounds)
 
     def why_not_compared(self, statistics: CycleStatistics) -> NotCompared | None:
         """Why the torque of a gait cycle is not compared with the predicted one; None if it is."""

@@ -1,11 +1,11 @@
-"""Checks of the measured torque for an impossible bias, drift or lag; bounds, values and sentences."""
+"""Checks of the measured torque for an impossible bias, drift or lag: bounds, values, causes."""
 
 import math
 from typing import TYPE_CHECKING
 
 import attrs
 
-from leg_wear_monitor.monitor.verdict.words import amount, estimate
+from leg_wear_monitor.estimate.cause import Cause, NamedCause, beyond_friction
 
 if TYPE_CHECKING:
     from leg_wear_monitor.monitor.config.settings import MonitorConfig
@@ -44,64 +44,48 @@ def torque_values(report: "CycleReport", record: "TorqueRecord", bounds: TorqueB
     """Values of the alarms in their units, 0 unless significant (three sigma); empty without a torque."""
     if not report.torque_samples:
         return {}
-    bias, sigma = bias_of(report, bounds), _SURE * report.friction_sigma_nm
-    change, either = report.friction_nm - record.friction_nm, math.hypot(sigma, _SURE * record.sigma_nm)
-    lag_s = abs(report.torque_lag_s) - _SURE * report.torque_lag_sigma_s
-    # NaN (unknown) stays NaN
-    return {
-        BIAS: abs(bias) - sigma if abs(bias) > sigma else 0.0 * sigma,
-        DRIFT: abs(change) - either if abs(change) > either else 0.0 * (change + either),
-        LAG: lag_s if lag_s > 0.0 else 0.0 * lag_s,
-    }
-
-
-def bias_of(report: "CycleReport", bounds: TorqueBounds) -> float:
-    """Part of the constant torque that cannot be friction [N m]: negative, or above the largest friction."""
-    friction_nm = report.friction_nm
-    return min(friction_nm, 0.0) + max(friction_nm - bounds.max_friction_nm, 0.0)
+    bias, drift = _bias(report, bounds), _drift(report, record)
+    lag = NamedCause(Cause.LAG, report.torque_lag_s, report.torque_lag_sigma_s)
+    return {name: _surely(one) for name, one in ((BIAS, bias), (DRIFT, drift), (LAG, lag))}
 
 
 def torque_causes(
     raised: set[str], report: "CycleReport", record: "TorqueRecord", bounds: TorqueBounds
-) -> list[str]:
-    """Sentences on possible causes of raised torque alarms."""
-    causes = []
-    constant = f"a constant torque of {estimate(report.friction_nm, report.friction_sigma_nm, 'N m')}"
-    if BIAS in raised and report.friction_nm < 0.0:
-        causes.append(
-            f"{constant} drives the crank; friction cannot drive: the sensor's offset is not zeroed, "
-            "or drive_torque.sign is wrong"
-        )
-    elif BIAS in raised:
-        causes.append(
-            f"{constant} exceeds the largest friction of the drive, {amount(bounds.max_friction_nm, 'N m')}: "
-            "the sensor's offset is not zeroed, drive_torque.sign, scale or gear_ratio is wrong, or friction "
-            "has increased"
-        )
-    if DRIFT in raised:
-        causes.append(
-            f"the constant torque is {estimate(report.friction_nm, report.friction_sigma_nm, 'N m')} and "
-            f"was {amount(record.friction_nm, 'N m')} when this leg was commissioned: the friction of the "
-            "drive or the offset of the sensor has changed"
-        )
-    if LAG in raised:
-        causes.append(_lag_cause(record, bounds))
-    return causes
+) -> dict[str, NamedCause]:
+    """Cause of each alarm of the torque that is raised."""
+    causes = {
+        BIAS: _bias(report, bounds),
+        DRIFT: _drift(report, record),
+        LAG: _timing(report, record, bounds),
+    }
+    return {name: one for name, one in causes.items() if name in raised}
 
 
-def _lag_cause(record: "TorqueRecord", bounds: TorqueBounds) -> str:
-    split = record.lags.split
+def _surely(one: NamedCause) -> float:
+    """Size of a value beyond its uncertainty, 0 if it is less; NaN (unknown) stays NaN."""
+    beyond = abs(one.value) - _SURE * one.sigma
+    return beyond if not beyond < 0.0 else 0.0
+
+
+def _bias(report: "CycleReport", bounds: TorqueBounds) -> NamedCause:
+    return beyond_friction(report.friction_nm, report.friction_sigma_nm, bounds.max_friction_nm)
+
+
+def _drift(report: "CycleReport", record: "TorqueRecord") -> NamedCause:
+    sigma = math.hypot(report.friction_sigma_nm, record.sigma_nm)
+    return NamedCause(Cause.FRICTION, report.friction_nm - record.friction_nm, sigma)
+
+
+def _timing(report: "CycleReport", record: "TorqueRecord", bounds: TorqueBounds) -> NamedCause:
+    """A lag or an offset of the crank, where the speed tells them apart."""
+    split, speed = record.lags.split, report.cadence_rpm * math.pi / 30.0
     if split is None:
-        return (
-            "the torque is late or early by more than drive_torque.max_lag_s, or crank.offset_rad is wrong: "
-            "at one speed the two cannot be distinguished"
-        )
-    if abs(split[0]) > bounds.max_lag_s:
-        return "the torque is late or early by more than drive_torque.max_lag_s, at every speed"
-    return "crank.offset_rad is wrong: the lag of the torque corresponds to a constant crank angle"
+        return NamedCause(Cause.TIMING, -report.torque_lag_s * speed, report.torque_lag_sigma_s * abs(speed))
+    lag, offset = split
+    return lag if abs(lag.value) > bounds.max_lag_s else offset
 
 
 def offset_error_rad(report: "CycleReport", record: "TorqueRecord") -> float:
     """Error of crank.offset_rad [rad], if it causes all of the lag that is not known to be a time lag."""
     split = record.lags.split
-    return split[1] if split else report.torque_lag_s * report.cadence_rpm * math.pi / 30.0
+    return -split[1].value if split else report.torque_lag_s * report.cadence_rpm * math.pi / 30.0

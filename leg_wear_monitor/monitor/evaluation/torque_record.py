@@ -5,6 +5,7 @@ from collections.abc import Mapping
 
 import attrs
 
+from leg_wear_monitor.estimate.cause import Cause, NamedCause
 from leg_wear_monitor.mechanism.ideal import TURN
 from leg_wear_monitor.monitor.reports import CycleReport
 from leg_wear_monitor.twin.statistics import CycleStatistics, NotCompared
@@ -39,16 +40,17 @@ class LagBySpeed:
         return LagBySpeed((w0, w1, w2, wy, wxy))
 
     @property
-    def split(self) -> tuple[float, float] | None:
-        """Lag [s] and offset of the crank [rad]; None while the speeds are too similar to separate them."""
+    def split(self) -> tuple[NamedCause, NamedCause] | None:
+        """Lag, and offset of the crank; None while the speeds are too similar to separate them."""
         w, x, xx, y, xy = self.sums
         if not w > 0.0:
             return None
         spread = xx - x * x / w
         if not spread > _RESOLVED_RAD**-2:
             return None
-        offset_rad = (xy - x * y / w) / spread
-        return (y - offset_rad * x) / w, offset_rad
+        late_rad = (xy - x * y / w) / spread
+        lag = NamedCause(Cause.LAG, (y - late_rad * x) / w, math.sqrt(xx / (w * spread)))
+        return lag, NamedCause(Cause.CRANK_OFFSET, -late_rad, 1.0 / math.sqrt(spread))
 
 
 @attrs.frozen

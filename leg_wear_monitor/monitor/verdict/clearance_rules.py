@@ -1,7 +1,7 @@
 """Conditions on clearances: those that the forecast believes, and those that measurements show."""
 
 import math
-from collections.abc import Callable, Sequence
+from collections.abc import Sequence
 
 from leg_wear_monitor.estimate.cause import Cause, Change
 from leg_wear_monitor.monitor.alarms.alarm import Alarm, Level
@@ -9,36 +9,13 @@ from leg_wear_monitor.monitor.alarms.words import time_words
 from leg_wear_monitor.monitor.diagnosis.diagnosis import DiagnosisState
 from leg_wear_monitor.monitor.verdict.alarm_rules import hit_of, raised
 from leg_wear_monitor.monitor.verdict.belief import SEEN, SOURCES, at_limit_by_estimate
+from leg_wear_monitor.monitor.verdict.cause_rules import changes, doubt, words_of
 from leg_wear_monitor.monitor.verdict.rule import Hit
 from leg_wear_monitor.monitor.verdict.situation import JointSituation, SeenClearance, Situation
 from leg_wear_monitor.monitor.verdict.verdict import Evidence, Figure
 from leg_wear_monitor.monitor.verdict.words import amount, estimate
 
 CONFIRMED_CYCLES = 20  # gait cycles of a new part; another leg is told in fewer
-CLOSE_ODDS = 3.0  # log odds below which the runner-up is named as well: 20 to 1
-
-_UNITS = {
-    Cause.CLEARANCE: "m",
-    Cause.LOAD: "N",
-    Cause.FRICTION: "N m",
-    Cause.SCALE: "",
-    Cause.LAG: "s",
-    Cause.CRANK_OFFSET: "rad",
-    Cause.MASS: "",
-    Cause.LENGTH: "",
-    Cause.UNKNOWN: "",
-}
-_NAMES = {
-    Cause.LOAD: "load",
-    Cause.FRICTION: "friction",
-    Cause.SCALE: "torque_scale",
-    Cause.LAG: "torque_lag",
-    Cause.CRANK_OFFSET: "crank_offset",
-    Cause.MASS: "mass",
-    Cause.LENGTH: "length",
-    Cause.UNKNOWN: "unknown_change",
-}
-_COMPARED = {Cause.MASS: ("lighter", "heavier"), Cause.LENGTH: ("shorter", "longer")}
 
 
 def believed_at_limit(situation: Situation) -> Sequence[Hit]:
@@ -87,7 +64,7 @@ def _seen_hit(each: JointSituation, alarm: Alarm | None, seen: SeenClearance, si
             "value": estimate(seen.clearance_m, seen.sigma_m, "m"),
             "limit": amount(each.limit_m, "m"),
             "past": past,
-            "doubt": _doubt(situation) if seen.by == "torque" and is_present else "",
+            "doubt": doubt(situation) if seen.by == "torque" and is_present else "",
         },
         joint=each.joint,
         since_ns=raised_ns,
@@ -136,25 +113,10 @@ def _with_forecast(hit: Hit) -> Hit:
     )
 
 
-def diagnosed(*causes: Cause) -> Callable[[Situation], Sequence[Hit]]:
-    """Significant changes of the drive torque with one of some causes."""
-
-    def hits(situation: Situation) -> Sequence[Hit]:
-        return [
-            _hit(change, situation, _doubt(situation))
-            for change in changes(situation)
-            if change.cause in causes
-        ]
-
-    return hits
-
-
-def changes(situation: Situation) -> tuple[Change, ...]:
-    """What the drive torque shows that has changed; empty without an estimator."""
-    diagnosis = situation.diagnosis
-    if diagnosis is None or diagnosis.state is not DiagnosisState.CHANGED:
-        return ()
-    return tuple(change for change in diagnosis.changes if not change.is_corrected)
+def diagnosed(situation: Situation) -> Sequence[Hit]:
+    """Clearances that have changed by the drive torque, and that are not corrected."""
+    found = [change for change in changes(situation) if change.cause is Cause.CLEARANCE]
+    return [_hit(change, situation, doubt(situation)) for change in found]
 
 
 def corrected(situation: Situation) -> Sequence[Hit]:
@@ -163,46 +125,14 @@ def corrected(situation: Situation) -> Sequence[Hit]:
     return [_hit(change, situation) for change in found if change.is_corrected]
 
 
-def words_of(change: Change, situation: Situation) -> str:
-    """A change in words, such as ``clearance of 0.62 mm ± 0.03 mm in joint G (0.3 mm is counted)``."""
-    unit = _UNITS[change.cause]
-    value, counted = estimate(change.value, change.sigma, unit), amount(change.counted, unit)
-    if change.cause is Cause.CLEARANCE:
-        verb = "was" if change.is_corrected else "is"
-        joint = situation.joint_words(change.subject)
-        words = f"clearance of {value} in joint {joint} ({counted} {verb} counted)"
-        if change.value < change.counted:
-            words += ", less than before: if its part was replaced, reset the joint"
-    elif change.cause in _COMPARED:
-        percent = estimate(100.0 * abs(change.value), 100.0 * change.sigma, "%")
-        less, more = _COMPARED[change.cause]
-        words = f"body {change.subject} is {percent} {more if change.value > 0.0 else less}"
-    elif change.cause is Cause.UNKNOWN:
-        words = "no single cause explains the change"
-    else:
-        subject = f" {change.subject}" if change.subject else ""
-        words = f"{change.cause.value}{subject}: {value} ({counted} is counted)"
-    if change.runner_up and change.runner_up_log_odds < CLOSE_ODDS:
-        words += f" (or {change.runner_up})"
-    return words
-
-
-def _doubt(situation: Situation) -> str:
-    """Why what the drive torque shows is not sure; empty if it is."""
-    reason = situation.diagnosis.reason if situation.diagnosis else ""
-    return f"; {reason}" if reason else ""
-
-
-def _hit(change: Change, situation: Situation, doubt: str = "") -> Hit:
-    is_joint = change.cause is Cause.CLEARANCE
-    own = (each.measured for each in situation.joints if is_joint and each.joint == change.subject)
+def _hit(change: Change, situation: Situation, doubts: str = "") -> Hit:
+    own = (each.measured for each in situation.joints if each.joint == change.subject)
     measured = next(own, None)
     if measured is not None:
-        doubt += f"; {estimate(measured.clearance_m, measured.sigma_m, 'm')} was measured"
-    name = f"clearance {change.subject} by torque" if is_joint else _NAMES[change.cause]
+        doubts += f"; {estimate(measured.clearance_m, measured.sigma_m, 'm')} was measured"
     return Hit(
-        words={"change": f"{words_of(change, situation)}{doubt}"},
-        joint=change.subject if is_joint else "",
+        words={"change": f"{words_of(change, situation)}{doubts}"},
+        joint=change.subject,
         since_ns=change.since_ns,
-        evidence=(Evidence(name, change.value, math.nan, _UNITS[change.cause]),),
+        evidence=(Evidence(f"clearance {change.subject} by torque", change.value, math.nan, "m"),),
     )

@@ -1,72 +1,15 @@
 """Conditions on the inputs: crank, drive torque, further encoders, cadence."""
 
 import math
-from collections.abc import Callable, Sequence
+from collections.abc import Sequence
 
-from leg_wear_monitor.estimate.cause import Cause, NamedCause
 from leg_wear_monitor.monitor.alarms.alarm import Level
 from leg_wear_monitor.monitor.diagnosis.diagnosis import Diagnosis, DiagnosisState
 from leg_wear_monitor.monitor.verdict.alarm_rules import raised
-from leg_wear_monitor.monitor.verdict.clearance_rules import changes, words_of
 from leg_wear_monitor.monitor.verdict.rule import Hit
 from leg_wear_monitor.monitor.verdict.situation import Situation
-from leg_wear_monitor.monitor.verdict.torque_words import EVIDENCE, causes_in_words, remedy
 from leg_wear_monitor.monitor.verdict.verdict import Evidence
 from leg_wear_monitor.monitor.verdict.words import amount
-
-
-def mismatch(situation: Situation) -> Sequence[Hit]:
-    """The drive torque is not that of the counted leg; with what may cause it, as far as that is known."""
-    told = [*situation.torque_causes, *(words_of(change, situation) for change in changes(situation))]
-    causes = f"; possible cause: {'; '.join(told)}" if told else ""
-    if situation.explained is not None:
-        causes = f"; {_in_words(situation)}{causes}"
-    return [
-        Hit(
-            words={**hit.words, "causes": causes},
-            since_ns=hit.since_ns,
-            evidence=hit.evidence,
-        )
-        for hit in raised("torque_mismatch")(situation)
-    ]
-
-
-def explained(cause: Cause) -> Callable[[Situation], Sequence[Hit]]:
-    """The torque mismatch has surely some causes, this one first."""
-
-    def hits(situation: Situation) -> Sequence[Hit]:
-        found = situation.explained
-        if found is None or not found.named or found.named[0].cause is not cause:
-            return []
-        words = {
-            "causes": f": {_in_words(situation)}",
-            "remedy": remedy(found, situation.crank, situation.drive_torque),
-        }
-        alarms = raised("torque_mismatch")(situation)
-        since_ns = alarms[0].since_ns if alarms else 0
-        return [Hit(words=words, since_ns=since_ns, evidence=tuple(map(_evidence, found.named)))]
-
-    return hits
-
-
-def _in_words(situation: Situation) -> str:
-    found = situation.explained
-    return causes_in_words(found, situation.crank, situation.drive_torque) if found else ""
-
-
-def _evidence(one: NamedCause) -> Evidence:
-    name, unit = EVIDENCE[one.cause]
-    return Evidence(f"{name} {one.subject}".rstrip(), one.value, math.nan, unit)
-
-
-def impossible_torque(situation: Situation) -> Sequence[Hit]:
-    """The drive torque has a bias, a drift or a lag beyond its bounds; with their causes."""
-    causes = f": {'; '.join(situation.torque_causes)}" if situation.torque_causes else ""
-    found = raised("torque_bias", "torque_drift", "torque_lag", least=Level.ERROR)(situation)
-    return [
-        Hit(words={**hit.words, "causes": causes}, since_ns=hit.since_ns, evidence=hit.evidence)
-        for hit in found
-    ]
 
 
 def all_counted(situation: Situation) -> Sequence[Hit]:

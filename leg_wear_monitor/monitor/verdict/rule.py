@@ -27,6 +27,8 @@ class Hit:
     evidence : tuple of Evidence
     not_valid : tuple of Figure
         In addition to the rule's.
+    state : State
+        Where it is more severe than the rule's.
     """
 
     words: Mapping[str, str] = attrs.field(factory=dict)
@@ -34,6 +36,7 @@ class Hit:
     since_ns: int = 0
     evidence: tuple[Evidence, ...] = ()
     not_valid: tuple[Figure, ...] = ()
+    state: State = State.HEALTHY
 
 
 @attrs.frozen(kw_only=True)
@@ -72,7 +75,7 @@ class Rule:
         words = {"joints": ", ".join(map(situation.joint_words, joints)), **hits[0].words}
         return Finding(
             code=self.code,
-            state=self.state,
+            state=max((self.state, *(hit.state for hit in hits)), key=lambda state: state.severity),
             joints=joints,
             why="; ".join(dict.fromkeys(self.why.format(**hit.words) for hit in hits)),
             do=self.do.format(**(words | {"joint": hits[0].joint})),

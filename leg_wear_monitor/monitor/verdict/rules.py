@@ -3,11 +3,10 @@
 docs/reference/monitor.md lists them; a test compares the two.
 """
 
-from leg_wear_monitor.estimate.cause import Cause
 from leg_wear_monitor.monitor.alarms.alarm import Level
 from leg_wear_monitor.monitor.alarms.fault_codes import ALREADY_COUNTED, CRANK_ZERO
 from leg_wear_monitor.monitor.alarms.words import ADVICE
-from leg_wear_monitor.monitor.verdict import clearance_rules, input_rules, material_rules
+from leg_wear_monitor.monitor.verdict import cause_rules, clearance_rules, input_rules, material_rules
 from leg_wear_monitor.monitor.verdict.alarm_rules import blinding, raised
 from leg_wear_monitor.monitor.verdict.rule import EVERYTHING, OF_THE_GAIT, OF_THE_MODEL, Rule
 from leg_wear_monitor.monitor.verdict.situation import Situation
@@ -27,20 +26,17 @@ _REPLACE = (
     "stop when it is safe, block the drive, and measure joint {joints}: leg-wear-monitor measure {joint} MM "
     f"--sigma MM; if the joint is at its limit, {_ENTER_PART}"
 )
-_TORQUE_INPUT = (
-    "check the torque sensor (zero, scale, time stamps) and the parameters of drive_torque and crank"
-)
 
 
-def _cause_of_mismatch(cause: Cause, meaning: str) -> Rule:
-    """Rule of a torque mismatch whose cause is known."""
+def _cause(code: str, meaning: str, state: State = State.INSPECT, not_valid: tuple[Figure, ...] = ()) -> Rule:
+    """Rule of what explains a drive torque that is not as predicted."""
     return Rule(
-        code=cause.fault_code,
-        state=State.INSPECT,
-        hits=input_rules.explained(cause),
+        code=code,
+        state=state,
+        hits=cause_rules.found(code),
         why=f"the drive torque differs from the prediction: {meaning}{{causes}}",
         do=f"{{remedy}}; {_ACKNOWLEDGE}",
-        not_valid=EVERYTHING,
+        not_valid=not_valid,
     )
 
 
@@ -67,18 +63,13 @@ RULES = (
         why="counting and measurements together give a clearance of {value} in joint {joint} (limit {limit})",
         do=_REPLACE,
     ),
-    *(
-        _cause_of_mismatch(cause, meaning)
-        for cause, meaning in (
-            (Cause.SIGN, "its sign is reversed"),
-            (Cause.SCALE, "its size is wrong"),
-            (Cause.CRANK_OFFSET, "its time does not fit the crank angle"),
-        )
-    ),
+    _cause("TORQUE_SIGN", "its sign is reversed", not_valid=EVERYTHING),
+    _cause("TORQUE_SCALE", "its size is wrong"),
+    _cause("TORQUE_TIMING", "its time does not fit the crank angle"),
     Rule(
         code="CLEARANCE_CHANGED",
         state=State.INSPECT,
-        hits=clearance_rules.diagnosed(Cause.CLEARANCE),
+        hits=clearance_rules.diagnosed,
         why="the drive torque shows a {change}",
         do=_ROCK,
         not_valid=EVERYTHING,
@@ -99,20 +90,13 @@ RULES = (
         do=f"{_ROCK}; {_ACKNOWLEDGE}",
         not_valid=(Figure.CLEARANCES, *OF_THE_GAIT),
     ),
-    Rule(
-        code="MECHANISM_CHANGED",
-        state=State.INSPECT,
-        hits=clearance_rules.diagnosed(Cause.MASS, Cause.LENGTH, Cause.UNKNOWN),
-        why="the drive torque does not fit the counted leg: {change}",
-        do="look for loose, bent or added parts, and rock each joint",
-        not_valid=EVERYTHING,
-    ),
-    _cause_of_mismatch(Cause.LOAD, "a load acts at the foot"),
-    _cause_of_mismatch(Cause.MASS, "a body has another mass"),
+    _cause("TORQUE_MASS", "a body has another mass", not_valid=EVERYTHING),
+    _cause("MECHANISM_CHANGED", "the mechanism has changed", not_valid=EVERYTHING),
+    _cause("TORQUE_LOAD", "a load acts at the foot", State.WATCH, OF_THE_MODEL),
     Rule(
         code="TORQUE_MISMATCH",
         state=State.INSPECT,
-        hits=input_rules.mismatch,
+        hits=cause_rules.mismatch,
         why="the drive torque does not fit the counted leg, so the forecast is not valid: {value} of the "
         "predicted RMS is not explained (limit {limit}){past}{causes}",
         do="stop when it is safe, block the drive and rock each joint; measure the joint with play and enter "
@@ -120,20 +104,8 @@ RULES = (
         f"the torque sensor; {_ACKNOWLEDGE}",
         not_valid=EVERYTHING,
     ),
-    Rule(
-        code="TORQUE_SENSOR",
-        state=State.INSPECT,
-        hits=clearance_rules.diagnosed(Cause.SCALE, Cause.LAG, Cause.CRANK_OFFSET),
-        why="the drive torque shows a fault of a sensor: {change}",
-        do=_TORQUE_INPUT,
-    ),
-    Rule(
-        code="TORQUE_INPUT",
-        state=State.INSPECT,
-        hits=input_rules.impossible_torque,
-        why="the {quantity} is {value} (limit {limit}){past}{causes}",
-        do=f"{_TORQUE_INPUT}; {_ACKNOWLEDGE}",
-    ),
+    _cause("TORQUE_BIAS", "it has a constant part that friction cannot be"),
+    _cause("FRICTION_CHANGED", "the friction of the drive has changed", State.WATCH),
     Rule(
         code="IMPACT_FORCE",
         state=State.INSPECT,
@@ -248,21 +220,6 @@ RULES = (
         why="the leg {walks}; the commanded cadence is {commanded} ± {tolerance}",
         do=f"walk at the commanded cadence, or set cadence.commanded_rpm; {_ACKNOWLEDGE}",
         not_valid=(Figure.FORECAST,),
-    ),
-    Rule(
-        code="LOAD_CHANGED",
-        state=State.WATCH,
-        hits=clearance_rules.diagnosed(Cause.LOAD),
-        why="the drive torque shows a change: {change}",
-        do="check the load and the ground at the foot",
-        not_valid=OF_THE_MODEL,
-    ),
-    Rule(
-        code="FRICTION_CHANGED",
-        state=State.WATCH,
-        hits=clearance_rules.diagnosed(Cause.FRICTION),
-        why="the drive torque shows a change: {change}",
-        do="check the lubrication and the temperature of the drive",
     ),
     Rule(
         code="ENCODER",

@@ -5,7 +5,7 @@ from collections.abc import Mapping
 
 import attrs
 
-from leg_wear_monitor.estimate.cause import TorqueExplanation
+from leg_wear_monitor.estimate.cause import NamedCause, TorqueExplanation
 from leg_wear_monitor.mechanism.materials.load import BushingLoad
 from leg_wear_monitor.monitor.alarms.alarm import Alarm
 from leg_wear_monitor.monitor.config.inputs import Crank, DriveTorque
@@ -88,8 +88,8 @@ class Situation:
     mismatch, mismatch_limit : float
         Part of the drive torque that is not explained, as a fraction of the predicted RMS; NaN if it is not
         known.
-    torque_causes : tuple of str
-        Sentences on impossible bias, drift or lag of the torque.
+    torque_causes : mapping of str to NamedCause
+        Causes of an impossible bias, drift or lag of the torque, by the alarm.
     without_zero : str
         Why nothing is monitored while the crank's zero is not known; empty if it is.
     unfollowed : str
@@ -118,7 +118,7 @@ class Situation:
     has_torque: bool = True
     mismatch: float = 0.0
     mismatch_limit: float = math.nan
-    torque_causes: tuple[str, ...] = ()
+    torque_causes: Mapping[str, NamedCause] = attrs.field(factory=dict)
     without_zero: str = ""
     unfollowed: str = ""
     input_causes: tuple[str, ...] = ()

@@ -38,7 +38,10 @@ _SAME_NAME_S = 30.0
 _NEW_S = 3.0
 _OTHERS_S = 60.0  # for which it is known, though it publishes seldom
 # rules of the verdict that a torque about another axis can be the cause of
-_OF_AXIS = ("MECHANISM_CHANGED", "TORQUE_INPUT", "TORQUE_MISMATCH", "TORQUE_SCALE", "TORQUE_SENSOR")
+_OF_AXIS = (
+    "FRICTION_CHANGED", "MECHANISM_CHANGED", "TORQUE_BIAS", "TORQUE_MASS", "TORQUE_MISMATCH", "TORQUE_SCALE",
+    "TORQUE_TIMING",
+)  # fmt: skip
 
 
 class Supervision:

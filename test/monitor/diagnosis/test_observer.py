@@ -299,7 +299,7 @@ def test_a_lag_that_begins_after_commissioning_is_no_clearance(leg, reference) -
     walk(observer, known, end=COMMISSIONING_CYCLES)
     assert walk(observer, late, begin=COMMISSIONING_CYCLES) == []
     (change,) = observer.diagnosis.changes
-    assert change.cause in (Cause.LAG, Cause.CRANK_OFFSET)
+    assert change.cause in (Cause.LAG, Cause.TIMING)
     if change.cause is Cause.LAG:
         assert change.value == pytest.approx(0.01, abs=0.0026)
 

@@ -8,6 +8,7 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
+from leg_wear_monitor.estimate.cause import Cause, NamedCause
 from leg_wear_monitor.monitor.alarms.alarm import Level
 from leg_wear_monitor.monitor.config.settings import MonitorConfig
 from leg_wear_monitor.monitor.evaluation.board import AlarmBoard
@@ -56,9 +57,9 @@ def test_friction_is_no_bias(friction):
 @pytest.mark.parametrize("friction", [-5.0, -1.5, 5.0, 20.0, 100.0])
 def test_what_is_no_friction_is_a_bias(friction):
     assert levels(report(friction)) == {BIAS: Level.ERROR}
-    (cause,) = torque_causes({BIAS}, report(friction), TorqueRecord(), BOUNDS)
-    assert "offset is not zeroed" in cause and "sign" in cause
-    assert ("drives" in cause) == (friction < 0.0) and ("friction has increased" in cause) == (friction > 0.0)
+    cause = torque_causes({BIAS}, report(friction), TorqueRecord(), BOUNDS)[BIAS]
+    beyond = friction if friction < 0.0 else friction - BOUNDS.max_friction_nm
+    assert cause == NamedCause(Cause.BIAS, beyond, 0.05)
 
 
 @given(st.floats(-50.0, 50.0), st.floats(0.01, 2.0))
@@ -101,21 +102,22 @@ def walked(lag_s, offset_rad, speeds):
 def test_a_crank_offset_at_one_speed_may_be_a_lag_and_is_told_as_either():
     said, record = report(lag=0.05 / (2.0 * math.pi)), walked(0.0, 0.05, [60.0] * 50)
     assert levels(said, record) == {LAG: Level.ERROR}
-    (cause,) = torque_causes({LAG}, said, record, BOUNDS)
-    assert "max_lag_s" in cause and "crank.offset_rad" in cause
+    cause = torque_causes({LAG}, said, record, BOUNDS)[LAG]
+    assert cause.cause is Cause.TIMING and cause.value == pytest.approx(-0.05)
     assert offset_error_rad(said, record) == pytest.approx(0.05)
 
 
 @pytest.mark.parametrize(
-    ("lag_s", "offset_rad", "word"), [(0.0, 0.05, "crank.offset_rad"), (0.009, 0.0, "max_lag_s")]
+    ("lag_s", "offset_rad", "named"), [(0.0, 0.05, Cause.CRANK_OFFSET), (0.009, 0.0, Cause.LAG)]
 )
-def test_where_the_speed_varies_a_lag_and_an_offset_are_told_apart(lag_s, offset_rad, word):
+def test_where_the_speed_varies_a_lag_and_an_offset_are_told_apart(lag_s, offset_rad, named):
     record = walked(lag_s, offset_rad, [57.0, 60.0, 63.0] * 30)
     found_lag, found_offset = record.lags.split
-    assert found_lag == pytest.approx(lag_s, abs=1e-9) and found_offset == pytest.approx(offset_rad, abs=1e-9)
-    (cause,) = torque_causes({LAG}, report(lag=lag_s + 0.008), record, BOUNDS)
-    assert word in cause
-    assert ("crank.offset_rad" in cause) == (offset_rad > 0.0)
+    assert found_lag.value == pytest.approx(lag_s, abs=1e-9)
+    assert found_offset.value == pytest.approx(-offset_rad, abs=1e-9)
+    assert 0.0 < found_lag.sigma < 0.001 and 0.0 < found_offset.sigma < 0.005
+    cause = torque_causes({LAG}, report(lag=lag_s + 0.008), record, BOUNDS)[LAG]
+    assert cause in (found_lag, found_offset) and cause.cause is named
 
 
 def test_a_short_lag_is_a_sensors():

@@ -76,7 +76,7 @@ def test_what_is_of_single_samples_is_no_mismatch(leg, recorded, change, size):
     [
         (20.0, 0.0, "torque_bias", "exceeds the largest friction of the drive"),
         (-5.0, 0.0, "torque_bias", "friction cannot"),
-        (0.0, 0.05, "torque_lag", "crank.offset_rad"),
+        (0.0, 0.05, "torque_lag", "behind its measured angle"),
         (1.5, 0.0, None, "measured as predicted"),
     ],
 )

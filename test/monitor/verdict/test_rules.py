@@ -14,11 +14,13 @@ from leg_wear_monitor.estimate.cause import Cause, Change, NamedCause, TorqueExp
 from leg_wear_monitor.monitor.alarms.alarm import Alarm, Level
 from leg_wear_monitor.monitor.alarms.guides import guide_of
 from leg_wear_monitor.monitor.alarms.words import ADVICE
+from leg_wear_monitor.monitor.config.inputs import Crank, DriveTorque
 from leg_wear_monitor.monitor.config.parameters import config_from
 from leg_wear_monitor.monitor.diagnosis.diagnosis import Diagnosis, DiagnosisState
 from leg_wear_monitor.monitor.evaluation import specs
 from leg_wear_monitor.monitor.evaluation.board import AlarmBoard
 from leg_wear_monitor.monitor.verdict.alarm_rules import OF_A_JOINT
+from leg_wear_monitor.monitor.verdict.cause_words import CauseWords
 from leg_wear_monitor.monitor.verdict.rules import RULES, findings
 from leg_wear_monitor.monitor.verdict.situation import JointSituation, SeenClearance, Situation
 from leg_wear_monitor.monitor.verdict.verdict import (
@@ -92,14 +94,20 @@ CASES = [
         (),
     ),
     ({"diagnosis": diagnosis(change(Cause.UNKNOWN))}, State.INSPECT, "MECHANISM_CHANGED", tuple(Figure)),
-    ({"diagnosis": diagnosis(change(Cause.MASS, "foot"))}, State.INSPECT, "MECHANISM_CHANGED", tuple(Figure)),
-    ({"diagnosis": diagnosis(change(Cause.SCALE))}, State.INSPECT, "TORQUE_SENSOR", ()),
-    ({"diagnosis": diagnosis(change(Cause.LAG))}, State.INSPECT, "TORQUE_SENSOR", ()),
-    ({"diagnosis": diagnosis(change(Cause.CRANK_OFFSET))}, State.INSPECT, "TORQUE_SENSOR", ()),
+    (
+        {"diagnosis": diagnosis(change(Cause.LENGTH, "foot"))},
+        State.INSPECT,
+        "MECHANISM_CHANGED",
+        tuple(Figure),
+    ),
+    ({"diagnosis": diagnosis(change(Cause.MASS, "foot"))}, State.INSPECT, "TORQUE_MASS", tuple(Figure)),
+    ({"diagnosis": diagnosis(change(Cause.SCALE))}, State.INSPECT, "TORQUE_SCALE", ()),
+    ({"diagnosis": diagnosis(change(Cause.LAG))}, State.INSPECT, "TORQUE_TIMING", ()),
+    ({"diagnosis": diagnosis(change(Cause.TIMING))}, State.INSPECT, "TORQUE_TIMING", ()),
     (
         {"diagnosis": diagnosis(change(Cause.LOAD))},
         State.WATCH,
-        "LOAD_CHANGED",
+        "TORQUE_LOAD",
         (Figure.GROWTH, Figure.IMPACT_FORCES, Figure.FORECAST),
     ),
     ({"diagnosis": diagnosis(change(Cause.FRICTION))}, State.WATCH, "FRICTION_CHANGED", ()),
@@ -131,7 +139,7 @@ CASES = [
             cause.fault_code,
             tuple(Figure),
         )
-        for cause in (Cause.SIGN, Cause.SCALE, Cause.CRANK_OFFSET, Cause.LOAD, Cause.MASS)
+        for cause in (Cause.SIGN, Cause.SCALE, Cause.TIMING, Cause.LOAD, Cause.MASS)
     ),
     (
         {"alarms": (alarm("torque_mismatch"),), "explained": explained(Cause.LOAD, after=0.9)},
@@ -139,7 +147,10 @@ CASES = [
         "TORQUE_MISMATCH",
         tuple(Figure),
     ),
-    ({"alarms": (alarm("torque_bias"),)}, State.INSPECT, "TORQUE_INPUT", ()),
+    ({"alarms": (alarm("torque_bias"),)}, State.INSPECT, "TORQUE_BIAS", ()),
+    ({"alarms": (alarm("torque_drift"),)}, State.INSPECT, "FRICTION_CHANGED", ()),
+    ({"alarms": (alarm("torque_lag"),)}, State.INSPECT, "TORQUE_TIMING", ()),
+    ({"alarms": (alarm("torque_lag", present=Level.OK),)}, State.INSPECT, "TORQUE_TIMING", ()),  # latched
     ({"alarms": (alarm("torque_lag", Level.WARN),)}, State.WATCH, "ALARM", ()),
     ({"alarms": (alarm("impact_force A"),)}, State.INSPECT, "IMPACT_FORCE_A", ()),
     ({"alarms": (alarm("growth A"),)}, State.INSPECT, "GROWTH_A", ()),
@@ -236,18 +247,20 @@ def test_every_rule_is_the_verdict_of_some_case() -> None:
 def test_a_mismatch_without_a_diagnosis_is_told_as_what_it_is() -> None:
     verdict = judged(
         alarms=(alarm("torque_mismatch", value=0.35, limit=0.1),),
-        torque_causes=("drive_torque.sign is wrong",),
+        torque_causes={"torque_bias": NamedCause(Cause.BIAS, -3.0, 0.1)},
     )
     assert "the drive torque does not fit the counted leg, so the forecast is not valid" in verdict.why
     assert "0.35 of the predicted RMS is not explained (limit 0.1)" in verdict.why
-    assert verdict.why.endswith("possible cause: drive_torque.sign is wrong")
+    assert verdict.why.endswith(
+        "possible cause: a constant torque of 3 N m ± 0.1 N m drives the crank; friction cannot drive"
+    )
     assert "rock each joint" in verdict.do and "leg-wear-monitor measure JOINT MM" in verdict.do
     (evidence,) = (each for each in verdict.evidence if each.name == "torque_mismatch")
     assert (evidence.value, evidence.limit, verdict.since_ns) == (0.35, 0.1, 77)
 
 
 def test_a_mismatch_that_is_explained_says_by_what_and_by_how_much() -> None:
-    found = explained(Cause.SIGN, Cause.CRANK_OFFSET)
+    found = explained(Cause.SIGN, Cause.TIMING)
     verdict = judged(alarms=(alarm("torque_mismatch"),), explained=found)
     assert (verdict.fault_code, verdict.since_ns) == ("TORQUE_SIGN", 77)
     assert "it is -0.5 ± 0.01 times the predicted one and the crank is 500 mrad ± 10 mrad" in verdict.why
@@ -272,6 +285,49 @@ def test_a_diagnosis_names_the_joint_that_a_mismatch_does_not() -> None:
         "shows a clearance of 0.62 mm ± 0.03 mm in joint G (0.3 mm is counted) (or B 0.5 mm)" in verdict.why
     )
     assert "rock joint G" in verdict.do and "leg-wear-monitor measure G MM --sigma MM" in verdict.do
+
+
+SAME = [
+    (Cause.SCALE, {"value": 1.2}, None),
+    (Cause.TIMING, {"value": -0.05}, "torque_lag"),
+    (Cause.LOAD, {"value": -40.0}, None),
+    (Cause.MASS, {"value": 0.5, "subject": "shank"}, None),
+    (Cause.FRICTION, {"value": 2.0}, "torque_drift"),
+]
+
+
+@pytest.mark.parametrize(("cause", "values", "kind"), SAME, ids=[each[0].name for each in SAME])
+def test_a_cause_has_one_code_and_one_sentence_whoever_finds_it(
+    cause: Cause, values: dict[str, Any], kind: str | None
+) -> None:
+    one = NamedCause(cause, sigma=0.01, **values)
+    walking: dict[str, Any] = {"cadence_rpm": 60.0}
+    by_diagnosis = judged(diagnosis=diagnosis(change(cause, sigma=0.01, counted=0.0, **values)), **walking)
+    if kind is None:
+        found = TorqueExplanation(
+            alternatives=((one,),),
+            before=2.0,
+            after=0.03,
+            after_sigma=0.01,
+            limit=0.08,
+            speed_radps=2.0 * math.pi,
+        )
+        other = judged(alarms=(alarm("torque_mismatch"),), explained=found, **walking)
+    else:
+        other = judged(alarms=(alarm(kind),), torque_causes={kind: one}, **walking)
+    assert by_diagnosis.fault_code == other.fault_code == cause.fault_code
+    sentence = CauseWords(Crank(), DriveTorque(), 2.0 * math.pi).cause(one)
+    assert by_diagnosis.why.endswith(sentence) and other.why.endswith(sentence)
+    assert by_diagnosis.do == other.do
+    assert other.state is State.INSPECT  # its alarm is raised
+
+
+def test_a_lag_that_the_diagnosis_finds_at_one_cadence_may_be_an_offset() -> None:
+    late = diagnosis(change(Cause.LAG, value=0.01, sigma=0.001, counted=0.0))
+    verdict = judged(diagnosis=late, cadence_rpm=60.0)
+    assert (
+        "the crank is 62.8 mrad ± 6.28 mrad behind its measured angle, or the torque is 10 ms" in verdict.why
+    )
 
 
 def test_a_changed_mass_is_told_as_a_fraction_of_the_body() -> None:

@@ -1,0 +1,246 @@
+"""What currents of real drives do to the diagnosis, from public recordings that are not in this repository.
+
+DIR contains two folders. `dynamic_calibration` (https://github.com/shamilmamedov/dynamic_calibration) has the
+currents of a robot's joints; what is asked of them is in `real_robot.py`. `laas_anti_cogging`
+(https://github.com/heitor-andrade/laas_anti_cogging) has the angle and the current of a motor without load,
+whose speed is controlled, at 1 kHz: eight seconds with stick-slip, and eight without.
+
+This current is put on the torque of simulated legs in full coordinates with masses 4 % off, behind gears and
+torque constants of drives for legs. What repeats with the motor's angle (cogging, ripple, mean friction) is
+read at the gear's ratio times the crank angle; what is left (noise, stick-slip) is read at its own times. Its
+size is the recorded one, although a motor that turns faster shows less cogging in its current. The samples go
+through the observer of the monitor: it has the reference that comes with the package, commissions the healthy
+leg, and identifies it where that is required; its twin and its checks of size, sign and timing are not part
+of it. Behind a gear the crank turns evenly: ripple of the motor's speed, which its inertia limits, is less by
+the square of the ratio there. Without one, the crank turns evenly or as the motor did. Each drive begins with
+300 healthy gait cycles; each opened joint follows these, for 20 gait cycles.
+`python benchmarks/real_drive.py DIR --keep DIRECTORY` takes a quarter of an hour of one core.
+"""
+
+import argparse
+import functools
+from collections.abc import Iterator
+from pathlib import Path
+from types import SimpleNamespace
+from typing import NamedTuple
+
+from diagnosis import CLOCK, NEW, PERIODS, RATE, UNWORN, kept  # first: it keeps numpy on one core
+
+# isort: split
+import numpy as np
+from disturbed import MASSES, walked
+from real_motor import GRID, Motor, motors, turned
+from real_robot import FOLDER as ROBOT
+from real_robot import print_tables
+
+from leg_wear_monitor import load_mechanism
+from leg_wear_monitor.mechanism.ideal import TURN
+from leg_wear_monitor.mechanism.position import build_linkage
+from leg_wear_monitor.mechanism.spec import Mechanism
+from leg_wear_monitor.monitor.config.settings import MonitorConfig
+from leg_wear_monitor.monitor.diagnosis.observer import TorqueObserver, TorqueObserverSnapshot
+from leg_wear_monitor.twin.follower.load import torque_size
+from leg_wear_monitor.twin.kinds import CRANK, TORQUE
+from leg_wear_monitor.twin.reference.leg_parameters import LegParameters
+from leg_wear_monitor.twin.sample import gait_samples
+
+NOISE_RAD = 1.0e-3
+
+# torque constant [N m/A] and gear of AK60, AK80-9 and ActPack; and the latter's torque without a gear
+DRIVES = ((0.068, 6.0), (0.115, 9.0), (0.1133, 41.5), (4.7, 1.0))
+OPENED = tuple((joint, size_mm) for size_mm in (0.45, 1.0) for joint in "ABGIJ")
+HEALTHY, WORN, BLOCK = 260, 40, 10
+READY, PIECE = 300, 60  # gait cycles until the leg is identified, and at once
+AFTER = 20  # gait cycles of an opened joint: a correction takes ten
+
+
+def received(
+    walk: np.ndarray, motor: Motor | None, drive: tuple[float, float], first: int, cycles: int, seed: int
+) -> tuple[np.ndarray, np.ndarray]:
+    """Samples of crank and torque behind a drive, of gait cycles in drawn blocks, and their ends [s]."""
+    random, skipped = np.random.default_rng(seed), len(walk) // RATE % BLOCK
+    blocks = random.integers((len(walk) // RATE - skipped) // BLOCK, size=-(-cycles // BLOCK))
+    rows = (((skipped + BLOCK * blocks) * RATE)[:, None] + np.arange(BLOCK * RATE)).ravel()[: cycles * RATE]
+    torque = np.diff(walk[:, 2], prepend=0.0)[rows]
+    departure = (walk[:, 1] - TURN * walk[:, 0])[rows]
+    time = first + np.arange(cycles * RATE + 1) / RATE
+    angle, impulse = TURN * time + np.append(departure[0], departure), np.append(0.0, np.cumsum(torque))
+    between = CLOCK / RATE
+    stamp = between * np.arange(np.floor(first / between) + 1, np.floor((first + cycles) / between) + 1)
+    since = np.maximum(stamp - between, first)
+    torque = (np.interp(stamp, time, impulse) - np.interp(since, time, impulse)) / (stamp - since)
+    if motor is not None:
+        constant, gear = drive
+        current = motor.at(gear * np.interp(stamp, time, angle))
+        current += motor.left[(random.integers(len(motor.left)) + np.arange(len(stamp))) % len(motor.left)]
+        torque += constant * gear * current
+    crank = angle[1::5] + NOISE_RAD * random.standard_normal(len(angle[1::5]))
+    both = [
+        gait_samples(np.round(1e9 * time[1::5]).astype(np.int64), CRANK, crank_angle_rad=crank),
+        gait_samples(np.round(1e9 * stamp).astype(np.int64), TORQUE, torque_nm=torque),
+    ]
+    samples = np.concatenate(both)
+    ends = np.interp(TURN * np.arange(first + 1, first + cycles + 1), angle, time)
+    return samples[np.argsort(samples["stamp_ns"], kind="stable")], ends
+
+
+class Monitored:
+    """The observer of the monitor on a leg: what it found, named, corrected or stopped.
+
+    Parameters
+    ----------
+    leg : Mechanism
+        As in its file.
+    snapshot : TorqueObserverSnapshot, optional
+        Of the observer after some gait cycles.
+    cycle : int
+        Their number.
+    """
+
+    def __init__(
+        self, leg: Mechanism, snapshot: TorqueObserverSnapshot | None = None, cycle: int = 0
+    ) -> None:
+        self.observer = TorqueObserver(leg, MonitorConfig(), torque_size(build_linkage(leg), TURN), NEW)
+        if snapshot is not None:
+            self.observer.restore(snapshot)
+        self.joints, self.cycle, self.counted = leg.clearance_joints, cycle, NEW.copy()
+        self.end_ns = cycle * 10**9
+        self.found: dict[str, list[int]] = {}  # and in which gait cycles
+
+    def add(self, samples: np.ndarray, ends: np.ndarray) -> None:
+        """Receive samples up to the ends of gait cycles [s]."""
+        at = np.searchsorted(samples["stamp_ns"], np.round(1e9 * ends).astype(np.int64))
+        for piece, end in zip(np.split(samples, at), np.round(1e9 * ends).astype(np.int64), strict=False):
+            self.observer.add_samples(piece)
+            self._end(int(end))
+
+    def _end(self, end_ns: int) -> None:
+        """End a gait cycle."""
+        begin_ns, self.end_ns = self.end_ns, end_ns
+        rpm = 6.0e10 / (end_ns - begin_ns)
+        self.observer.ended(
+            SimpleNamespace(is_steady=True, cadence_rpm=rpm, begin_ns=begin_ns, stamp_ns=end_ns)
+        )
+        for _ in range(PERIODS):
+            correction = self.observer.end_period(self.counted, UNWORN)
+            if correction is not None:
+                self._note(f"corrected {self.joints[correction.joint]} {1e3 * correction.clearance_m:.2f} mm")
+                self.counted = self.counted.copy()
+                self.counted[correction.joint] = correction.clearance_m
+                self.observer.corrected(correction, self.counted)
+        seen, limit_m = self.observer.diagnosis, self.observer.config.limits.clearance_m
+        for change in seen.changes:
+            if not change.is_corrected:
+                self._note(f"{change.cause.value} {change.subject}".strip())
+        for joint, c, sigma in zip(self.joints, seen.clearance_m, seen.sigma_m, strict=False):
+            if c - 2.0 * sigma >= limit_m:
+                self._note(f"stop {joint}")
+        self.cycle += 1
+
+    def _note(self, text: str) -> None:
+        self.found.setdefault(text, []).append(self.cycle)
+
+
+class Case(NamedTuple):
+    """A half of the recording, a drive, and whether the crank turns as the motor did."""
+
+    half: str
+    drive: tuple[float, float]
+    is_turning: bool = False
+
+    @property
+    def name(self) -> str:
+        """In words."""
+        if not self.half:
+            return "none"
+        constant, gear = self.drive
+        through = f"{constant:g} N m/A, gear {gear:g}" if gear != 1.0 else f"{constant:g} N m/A, direct"
+        return f"{self.half}, {through}{', as it turned' if self.is_turning else ''}"
+
+
+def cases() -> Iterator[Case]:
+    """All cases, the leg without a drive first."""
+    yield Case("", (0.0, 1.0))
+    for half in ("even", "stick-slip"):
+        yield from (Case(half, drive) for drive in DRIVES)
+    yield Case("even", DRIVES[-1], True)
+
+
+def in_words(found: dict[str, list[int]], since: int = 0) -> str:
+    """What was found, in how many gait cycles, and how many after a given one it was first."""
+    each = (f"{text} ({cycles[0] - since + 1}; {len(cycles)})" for text, cycles in found.items())
+    return ", ".join(each) or "nothing"
+
+
+def of_leg(one: Monitored) -> str:
+    """What the observer knows of a healthy leg, and what it found, in words."""
+    state, diagnosis = one.observer.state, one.observer.diagnosis
+    sensor, off = state.sensor, one.observer._models.misfit(state)
+    unused = ", ".join(f"{cause.value} {number}" for cause, number in diagnosis.cycles_not_used.items())
+    return (
+        f"Noise {sensor.noise_nm:.3f} N m, delay {1e3 * sensor.delay_s:.2f} ms, low-pass "
+        f"{1e3 * sensor.time_constant_s:.2f} ms, misfit {off:.2f} after {state.rounds} rounds; not used: "
+        f"{unused or 'none'}; found in {one.cycle} healthy gait cycles (first; in how many): "
+        f"{in_words(one.found)}."
+    )
+
+
+def main() -> None:
+    parser = argparse.ArgumentParser(description=__doc__)
+    parser.add_argument("folder", type=Path, metavar="DIR")
+    parser.add_argument("--keep", type=Path)
+    parser.add_argument("--hours", type=float, default=2.0, help="of each healthy leg")
+    options = parser.parse_args()
+    found, leg = motors(options.folder), load_mechanism("bionic_leg")
+    print_tables(options.folder / ROBOT)
+    mass = np.array([MASSES.get(body, 1.0) for body in leg.bodies])
+    real = LegParameters(mass, np.ones(len(mass))).applied(leg)
+
+    @functools.cache
+    def walk(case: str, joint: str, size_mm: float) -> np.ndarray:
+        clearance = np.where(np.array(leg.clearance_joints) == joint, 1e-3 * size_mm, NEW)
+        cycles = (WORN if joint else HEALTHY) + (BLOCK // 2 if case else 3)
+        name = f"{joint or 'new'} {size_mm:.2f} {case or '0'}.pkl"
+        if case:
+            return kept(
+                options.keep and options.keep / name, lambda: turned(real, clearance, cycles, found[case])
+            )
+        return kept(
+            options.keep and options.keep / name,
+            lambda: walked(real, clearance, cycles, 0.0, round(1000 * size_mm)),
+        )
+
+    for half, motor in found.items():
+        repeated = motor.at(GRID).std()
+        print(
+            f"\n{half}: {60.0 * motor.speed / TURN:.1f} rpm, {motor.at(GRID).mean():.3f} A in the mean, "
+            f"{repeated:.3f} A RMS that repeat with the angle, {motor.left.std():.3f} A RMS left"
+        )
+    for case in cases():
+        motor, turns = found.get(case.half), case.half if case.is_turning else ""
+        one, size = Monitored(leg), case.drive[0] * case.drive[1]
+        part = functools.partial(received, motor=motor, drive=case.drive)
+        for first in range(0, READY, PIECE):
+            one.add(*part(walk(turns, "", 0.3), first=first, cycles=PIECE, seed=first))
+        then = one.observer.snapshot()
+        for first in range(READY, READY + round(3600 * options.hours), PIECE):
+            one.add(*part(walk(turns, "", 0.3), first=first, cycles=PIECE, seed=first))
+        rms = f"{size * motor.at(GRID).std():.3f} and {size * motor.left.std():.3f}" if motor else "no"
+        print(
+            f"\n**{case.name}**: {rms} N m RMS on the crank that repeat and that do not. {of_leg(one)}\n\n"
+            "| opened [mm] | found (after gait cycles; in how many) | at the end | clearance ± [mm] |\n"
+            "|---|---|---|---|",
+            flush=True,
+        )
+        for joint, size_mm in OPENED:
+            worn = Monitored(leg, then, READY)
+            worn.add(*part(walk(turns, joint, size_mm), first=READY, cycles=AFTER, seed=7))
+            seen, k = worn.observer.diagnosis, leg.clearance_joints.index(joint)
+            both = [f"{1e3 * each[k]:.3f}" for each in (seen.clearance_m, seen.sigma_m) if each]
+            names = (f"{one.subject or one.cause.value}{'' if one.is_sure else '?'}" for one in seen.changes)
+            row = [f"{joint} {size_mm}", in_words(worn.found, READY), ", ".join(names), " ± ".join(both)]
+            print(f"| {' | '.join(row)} |", flush=True)
+
+
+if __name__ == "__main__":
+    main()

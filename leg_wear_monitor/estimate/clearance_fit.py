@@ -4,9 +4,9 @@ import attrs
 import numpy as np
 
 from leg_wear_monitor.estimate.explanations import MODEL_ERROR, Explainer
+from leg_wear_monitor.estimate.least_squares import Point, gauss_newton
 from leg_wear_monitor.mechanism.arrays import Floats
 
-_ROUNDS = 30
 _LEAST_FACTOR = 0.7  # of the expected clearance
 _FLAT = 1.0  # prior standard deviation of a clearance's logarithm: what shows nothing keeps its prior
 _MODEL_M = 5.0e-6  # error of the model against full coordinates (docs/explanation/diagnosis.md)
@@ -48,36 +48,22 @@ def fit_clearances(
         Standard deviations of the clearances that the baseline was taken with.
     """
     model = explainer.model
-    measured = mean - explainer.baseline.offset
+    measured, counted = mean - explainer.baseline.offset, np.log(counted_m)
     change = model.at(start_m)[0] - model.at(counted_m)[0]
-    weight = np.linalg.inv(explainer.covariance(cycles) + np.diag((MODEL_ERROR * change) ** 2))
-    low, high = np.log(_LEAST_FACTOR * model.grid_m[:, 0]), np.log(model.grid_m[:, -1])
-    prior = np.eye(len(start_m)) / _FLAT**2
-    x = np.clip(np.log(start_m), low, high)
+    covariance = explainer.covariance(cycles) + np.diag((MODEL_ERROR * change) ** 2)
+    whiten = np.linalg.inv(np.linalg.cholesky(covariance))
 
-    def cost(at: Floats) -> float:
-        rest, off = measured - model.at(np.exp(at))[0], at - np.log(counted_m)
-        return float(rest @ weight @ rest + off @ prior @ off)
-
-    best = cost(x)
-    for _ in range(_ROUNDS):
+    def at(x: Floats) -> Point:
         expected, slopes = model.at(np.exp(x))
-        information = slopes.T @ weight @ slopes + prior
-        downhill = slopes.T @ weight @ (measured - expected) - prior @ (x - np.log(counted_m))
-        step, length = np.linalg.solve(information, downhill), 1.0
-        while length > 1.0e-3 and not cost(np.clip(x + length * step, low, high)) < best - 1.0e-9:
-            length *= 0.5
-        if length <= 1.0e-3:
-            break
-        x = np.clip(x + length * step, low, high)
-        best = cost(x)
-    expected, slopes = model.at(np.exp(x))
-    spread = np.linalg.inv(slopes.T @ weight @ slopes + prior)
-    clearance: Floats = np.asarray(np.exp(x), dtype=np.float64)
+        rest = np.concatenate([whiten @ (expected - measured), (x - counted) / _FLAT])
+        return Point(rest, lambda: np.vstack([whiten @ slopes, np.eye(len(x)) / _FLAT]))
+
+    low, high = np.log(_LEAST_FACTOR * model.grid_m[:, 0]), np.log(model.grid_m[:, -1])
+    found = gauss_newton(at, np.log(start_m), low=low, high=high)
+    clearance: Floats = np.asarray(np.exp(found.x), dtype=np.float64)
     # what a clearance changes is known to a fraction, and so is a clearance that is far from the counted one
     uncertain = np.hypot(_MODEL_M, MODEL_ERROR * (clearance - counted_m))
     # a baseline after a correction hides what that is off
-    covariance = spread * np.outer(clearance, clearance) + np.diag(uncertain**2 + known_sigma_m**2)
-    rest = measured - expected
-    misfit = float(rest @ weight @ rest)
-    return ClearanceFit(clearance, max(1.0, misfit / len(rest)) * covariance, misfit)
+    covariance = found.covariance * np.outer(clearance, clearance) + np.diag(uncertain**2 + known_sigma_m**2)
+    misfit = float(np.square(found.point.rest[: len(mean)]).sum())
+    return ClearanceFit(clearance, max(1.0, misfit / len(mean)) * covariance, misfit)

@@ -10,6 +10,7 @@ import attrs
 import numpy as np
 
 from leg_wear_monitor.estimate.cause import Cause, NamedCause
+from leg_wear_monitor.estimate.least_squares import jackknife, solved
 from leg_wear_monitor.estimate.torque_curves import (
     Complex,
     TorqueCurves,
@@ -186,13 +187,9 @@ def refined(curves: TorqueCurves, one: Fit) -> Refined:
     # of a reversed torque the factor is worth knowing, too
     kept = np.flatnonzero((one.free[0] or one.hypothesis.sign < 0, *one.free[1:]))
     rest = values_of(curves.measured - one.factor * base, _POINTS)
-    columns = [values_of(given[i], _POINTS) for i in kept]
-    matrix = np.stack([np.ones(_POINTS), *columns], axis=1)
-    sector = np.arange(_POINTS) * _SECTORS // _POINTS
-    step, left = _solved(matrix, rest)
-    without = [_solved(matrix[sector != i], rest[sector != i]) for i in range(_SECTORS)]
-    scatter = np.array([(*values, left_) for values, left_ in without])
-    sigma = np.sqrt((_SECTORS - 1) * scatter.var(axis=0))
+    matrix = np.stack([np.ones(_POINTS), *(values_of(given[i], _POINTS) for i in kept)], axis=1)
+    *step, left = _with_rest(matrix, rest).tolist()
+    sigma = jackknife(lambda some: _with_rest(matrix[some], rest[some]), _POINTS, _SECTORS)
     values, sigmas = np.array([one.factor, one.angle_rad, one.load_n, one.mass]), np.zeros(4)
     values[kept] += step[1:]
     sigmas[kept] = sigma[1:-1]
@@ -204,10 +201,10 @@ def refined(curves: TorqueCurves, one: Fit) -> Refined:
     return Refined(better, spread, float(sigma[-1] / size), float(constant), float(sigma[0]))
 
 
-def _solved(matrix: Floats, rest: Floats) -> tuple[Floats, float]:
+def _with_rest(matrix: Floats, rest: Floats) -> Floats:
     """Coefficients, and the RMS [N m] of what remains."""
-    found = np.linalg.lstsq(matrix, rest, rcond=1e-9)[0]
-    return np.asarray(found, float), float(np.sqrt(np.mean((rest - matrix @ found) ** 2)))
+    found = solved(matrix, rest)
+    return np.append(found, np.sqrt(np.mean((rest - matrix @ found) ** 2)))
 
 
 def timing_of(cycles: Sequence[CycleStatistics], best: Fit) -> list[NamedCause]:

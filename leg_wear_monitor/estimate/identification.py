@@ -11,7 +11,7 @@ size.
 """
 
 import math
-from collections.abc import Callable, Sequence
+from collections.abc import Sequence
 
 import numpy as np
 
@@ -19,6 +19,7 @@ from leg_wear_monitor.errors import AssemblyError
 from leg_wear_monitor.estimate.commissioned_torque import CommissionedTorque
 from leg_wear_monitor.estimate.explanations import Nuisance
 from leg_wear_monitor.estimate.ideal_signature import ideal_torque, signature_of_torque
+from leg_wear_monitor.estimate.least_squares import Point, gauss_newton
 from leg_wear_monitor.estimate.signature_model import SignatureModel, simulated_signatures
 from leg_wear_monitor.mechanism.arrays import Floats
 from leg_wear_monitor.mechanism.spec import Mechanism
@@ -34,7 +35,8 @@ _LOG_FRICTION = 0.7  # of the logarithm of its friction: a factor of two, grease
 _FAR = 0.03  # that of masses and lengths of a leg far from its file
 _HARMONICS = 6  # of the torque that show masses and lengths rather than impacts
 _IDEAL = 0.01  # of the torque's size: what impacts change in each of them
-_STEP, _ROUNDS, _SHORTEST = 1.0e-4, 20, 0.05
+_STEP = 1.0e-4  # of the differences by masses and lengths, in standard deviations
+_DONE = 1.0e-3  # last step of them
 _SENSOR = 5.0  # times the usual changes of friction, scale, offset and load: they are constant here
 
 # a model with the right parameters is off by a part of the torque's size, by a part of its steps where it is
@@ -112,27 +114,16 @@ def leg_of_ideal_torque(
         left = _harmonics(signature_of_torque(torque, phases)[:phases] - rest)
         return np.concatenate([left / unit, x])
 
+    def at(x: Floats) -> Point:
+        try:
+            now = residual(x)
+        except AssemblyError:  # such a leg cannot move
+            return Point(np.full(1, np.inf), lambda: np.zeros((1, len(x))))
+        steps = _STEP * np.eye(len(x))
+        return Point(now, lambda: np.array([residual(x + one) - now for one in steps]).T / _STEP)
+
     of_file = ideal_torque(mechanism, speed)
-    x = np.zeros(2 * bodies)
-    now = residual(x)
-    for _ in range(_ROUNDS):
-        slopes = np.array([residual(x + _STEP * one) - now for one in np.eye(2 * bodies)]).T / _STEP
-        step, length = np.linalg.lstsq(slopes, -now, rcond=None)[0], 1.0
-        while length > _SHORTEST and not _is_less(residual, x + length * step, now):
-            length *= 0.5
-        if length <= _SHORTEST:
-            break
-        x = x + length * step
-        now = residual(x)
-    return bodies_at(x)
-
-
-def _is_less(residual: Callable[[Floats], Floats], x: Floats, now: Floats) -> bool:
-    """Whether a leg can move and explains more."""
-    try:
-        return float(np.sum(residual(x) ** 2)) < (1.0 - 1.0e-6) * float(np.sum(now**2))
-    except AssemblyError:
-        return False
+    return bodies_at(gauss_newton(at, np.zeros(2 * bodies), done=_DONE).x)
 
 
 def _harmonics(torque: Floats) -> Floats:

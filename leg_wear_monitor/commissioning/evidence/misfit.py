@@ -4,9 +4,10 @@ import attrs
 import numpy as np
 
 from leg_wear_monitor.estimate.body_torques import body_torques
+from leg_wear_monitor.estimate.least_squares import solved
 from leg_wear_monitor.estimate.torque_fit.fit import Fit, fit
 from leg_wear_monitor.estimate.torque_fit.likeness import repeating
-from leg_wear_monitor.estimate.torque_fit.regression import Terms, least_squares
+from leg_wear_monitor.estimate.torque_fit.regression import Terms
 from leg_wear_monitor.estimate.torque_fit.torque_model import TorqueModel
 from leg_wear_monitor.mechanism.arrays import Floats
 from leg_wear_monitor.mechanism.spec import Mechanism
@@ -77,7 +78,7 @@ def _heavier(one: Fit, mechanism: Mechanism) -> tuple[str, float, float]:
     for name, tables in zip(mechanism.bodies, body_torques(mechanism).mass, strict=True):
         more = TorqueModel(tables, np.zeros(tables.shape[1])).torque(angle, speed, acceleration)[0]
         by = np.stack([one.blocks.mean(more), one.predicted / one.gain, np.ones_like(one.rest)])
-        coefficients = least_squares(by, one.rest)
+        coefficients = solved(by.T, one.rest)
         left: Floats = one.rest - coefficients @ by
         explained = (before - float(left @ left)) / max(before - floor, 1.0e-12)
         gain = one.gain + float(coefficients[1])

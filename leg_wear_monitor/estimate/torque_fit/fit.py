@@ -5,25 +5,19 @@ import math
 import attrs
 import numpy as np
 
+from leg_wear_monitor.estimate.least_squares import Point, gauss_newton, jackknife, solved
 from leg_wear_monitor.estimate.torque_fit.blocks import Blocks, blocks_of
 from leg_wear_monitor.estimate.torque_fit.pairing import Pair
-from leg_wear_monitor.estimate.torque_fit.regression import (
-    State,
-    Terms,
-    begin,
-    columns,
-    jackknife,
-    least_squares,
-)
+from leg_wear_monitor.estimate.torque_fit.regression import State, Terms, begin, columns
 from leg_wear_monitor.estimate.torque_fit.start import Start
 from leg_wear_monitor.estimate.torque_fit.torque_model import TorqueModel
 from leg_wear_monitor.mechanism.arrays import Floats
 from leg_wear_monitor.mechanism.ideal import TURN
 
-_STEPS = 15
 _LONGEST_STEP_RAD = 0.2  # of the phase in one step, half a radian of the torque's third harmonic
 _DONE_RAD = 1.0e-3  # a twentieth of what clearances shift the phase by
 _EXACT_RAD = 1.0e-6
+_CHUNKS = 12  # stretches of time, each left out once
 _NO_TERMS = Terms()
 
 
@@ -110,52 +104,49 @@ class Fit:
         return angle, speed, self.ratio * pair.acceleration_radps2
 
 
+@attrs.frozen(eq=False)
+class _Columns(Point):
+    """Parameters under way, columns (k, m) and coefficients (k,) of linear terms, columns of the motion."""
+
+    state: State
+    by_linear: Floats
+    linear: Floats
+    by_motion: Floats
+
+
 def fit(
     pair: Pair, model: TorqueModel, start: Start, terms: Terms = _NO_TERMS, with_errors: bool = False
 ) -> Fit:
     """Best fit near a start; its standard deviations and last digits only if asked for: they take long."""
     blocks = blocks_of(pair, start.ratio)
     measured = blocks.mean(pair.torque)
-    state = begin(pair, model, start)
-    reach = 0.5 * float(np.ptp(pair.position_rad))
-    for _ in range(_STEPS):
+    begun = begin(pair, model, start)
+
+    sign = 0.0
+
+    def at(x: Floats) -> _Columns:
+        """Motion (k,) with the best linear terms, which go with it, and a gain of the sign at the start."""
+        nonlocal sign
+        state = begun.at(x, terms)
         by_linear, by_motion = columns(pair, model, state, terms, blocks)
-        by_motion *= least_squares(by_linear, measured)[0]
-        moved = least_squares(np.concatenate([by_linear, by_motion]), measured)[len(by_linear) :]
-        if _move(state, moved, terms, reach) <= (_EXACT_RAD if with_errors else _DONE_RAD):
-            break
-    return _fit(state, terms, measured, blocks, pair, model, start, with_errors)
+        linear = solved(by_linear.T, measured)
+        by_motion *= linear[0]
+        sign = sign or float(np.sign(linear[0]))
+        return _Columns(
+            linear @ by_linear - measured if linear[0] * sign > 0.0 else np.full(len(measured), np.inf),
+            lambda: by_motion.T - by_linear.T @ solved(by_linear.T, by_motion.T),
+            state,
+            by_linear,
+            linear,
+            by_motion,
+        )
 
-
-def _move(state: State, moved: Floats, terms: Terms, reach: float) -> float:
-    """Go a step of bounded length; its full length [rad]."""
-    k = len(state.phase)
-    longest = float(np.abs(moved[:k]).max())
-    if terms.ratio:
-        longest = max(longest, reach * abs(float(moved[k])))
-    moved = moved * min(1.0, _LONGEST_STEP_RAD / max(longest, _EXACT_RAD))
-    state.phase += moved[:k]
-    if terms.ratio:
-        state.ratio += float(moved[k])
-    if terms.lag:
-        state.lag_s += float(moved[-1])
-    return longest
-
-
-def _fit(
-    state: State,
-    terms: Terms,
-    measured: Floats,
-    blocks: Blocks,
-    pair: Pair,
-    model: TorqueModel,
-    start: Start,
-    with_errors: bool,
-) -> Fit:
-    by_linear, by_motion = columns(pair, model, state, terms, blocks)
-    linear = least_squares(by_linear, measured)
-    rest = measured - linear @ by_linear
-    by = np.concatenate([by_linear, linear[0] * by_motion])
+    reach = 0.5 * float(np.ptp(pair.position_rad))
+    scale = np.concatenate([np.ones(len(begun.phase)), [1.0 / reach] * terms.ratio, [np.inf] * terms.lag])
+    done = scale * (_EXACT_RAD if with_errors else _DONE_RAD)
+    best = gauss_newton(at, begun.vector(terms), longest=scale * _LONGEST_STEP_RAD, done=done).point
+    state, linear, rest = best.state, best.linear, -best.rest
+    by = np.concatenate([best.by_linear, best.by_motion])
     sigma = _errors(by, rest, state, terms) if with_errors else {}
     offset = (state.phase - state.ratio * state.middle + math.pi) % TURN - math.pi
     return Fit(
@@ -165,7 +156,7 @@ def _fit(
         lag_s=state.lag_s,
         sigma=sigma,
         measured=measured,
-        predicted=linear[0] * by_linear[0],
+        predicted=linear[0] * best.by_linear[0],
         rest=rest,
         blocks=blocks,
         pair=pair,
@@ -177,7 +168,8 @@ def _errors(by: Floats, rest: Floats, state: State, terms: Terms) -> dict[str, f
     """Standard deviations by name."""
     moving = [name for name, is_free in (("ratio", terms.ratio), ("lag_s", terms.lag)) if is_free]
     names = (*terms.linear, *(f"phase {i}" for i in range(len(state.phase))), *moving)
-    sigma = {"ratio": 0.0} | dict(zip(names, jackknife(by, rest).tolist(), strict=True))
+    found = jackknife(lambda some: solved(by[:, some].T, rest[some]), len(rest), _CHUNKS)
+    sigma = {"ratio": 0.0} | dict(zip(names, found.tolist(), strict=True))
     phase = max(sigma[f"phase {i}"] for i in range(len(state.phase)))
     sigma["offset_rad"] = math.hypot(phase, sigma["ratio"] * float(np.abs(state.middle).max()))
     return sigma

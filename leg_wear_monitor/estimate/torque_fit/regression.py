@@ -1,4 +1,4 @@
-"""Regression of measured on predicted torque: its columns, their least squares, standard deviations."""
+"""Regression of measured on predicted torque: its terms, its parameters under way, and its columns."""
 
 import attrs
 import numpy as np
@@ -12,8 +12,6 @@ from leg_wear_monitor.mechanism.arrays import Floats
 from leg_wear_monitor.mechanism.ideal import TURN
 
 PHASES = 128  # offsets tried where a start does not tell one
-_CHUNKS = 12  # stretches of time, each left out once
-_SMALL = 1.0e-9
 
 
 @attrs.frozen
@@ -31,7 +29,7 @@ class Terms:
         return ("gain", "friction", *(name for name in ("bias", "load") if getattr(self, name)))
 
 
-@attrs.define(eq=False)
+@attrs.frozen(eq=False)
 class State:
     """Parameters under way.
 
@@ -51,6 +49,16 @@ class State:
     middle: Floats
     row: NDArray[np.int64]
     lag_s: float = 0.0
+
+    def vector(self, terms: Terms) -> Floats:
+        """Phases, and ratio and lag where they are terms (k,)."""
+        return np.concatenate([self.phase, [self.ratio] * terms.ratio, [self.lag_s] * terms.lag])
+
+    def at(self, x: Floats, terms: Terms) -> "State":
+        """State with other phases, ratio and lag (k,)."""
+        k = len(self.phase)
+        ratio, lag_s = float(x[k]) if terms.ratio else self.ratio, float(x[-1]) if terms.lag else self.lag_s
+        return attrs.evolve(self, phase=x[:k], ratio=ratio, lag_s=lag_s)
 
 
 def begin(pair: Pair, model: TorqueModel, start: Start) -> State:
@@ -102,17 +110,3 @@ def columns(
     if terms.lag:
         moving.append(-slope * speed)
     return blocks.mean(np.array(linear)), blocks.mean(np.array(moving))
-
-
-def least_squares(by: Floats, measured: Floats) -> Floats:
-    """Coefficients (k,) of columns (k, m) that may be of very different size."""
-    size = np.linalg.norm(by, axis=1)
-    size[size < _SMALL * max(float(size.max()), _SMALL)] = np.inf
-    return np.asarray(np.linalg.lstsq((by / size[:, None]).T, measured, rcond=_SMALL)[0] / size)
-
-
-def jackknife(by: Floats, rest: Floats) -> Floats:
-    """Standard deviations (k,) of the coefficients, from leaving out each twelfth of the time in turn."""
-    chunk = np.arange(len(rest)) * _CHUNKS // max(len(rest), 1)
-    left_out = np.array([least_squares(by[:, chunk != i], rest[chunk != i]) for i in range(_CHUNKS)])
-    return np.asarray(np.sqrt((_CHUNKS - 1) * left_out.var(axis=0)))

@@ -51,8 +51,8 @@ def test_columns_of_any_size_are_solved_for_several_values_at_once() -> None:
     random = np.random.default_rng(6)
     matrix = random.standard_normal((20, 3)) * [1.0e-4, 1.0, 1.0e4]
     true = random.standard_normal((3, 2))
-    np.testing.assert_allclose(solved(matrix, matrix @ true), true, rtol=1e-9)
-    np.testing.assert_allclose(solved(matrix, matrix @ true[:, 0]), true[:, 0], rtol=1e-9)
+    np.testing.assert_allclose(solved(matrix, matrix @ true), true, rtol=1e-6)
+    np.testing.assert_allclose(solved(matrix, matrix @ true[:, 0]), true[:, 0], rtol=1e-6)
 
 
 def test_leaving_out_parts_gives_the_scatter_of_a_mean() -> None:

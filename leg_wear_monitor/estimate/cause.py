@@ -34,6 +34,7 @@ class Cause(Enum):
     BIAS = "zero of the torque sensor", "TORQUE_BIAS"
     LOAD = "load at the foot", "TORQUE_LOAD"
     FRICTION = "friction of the drive", "FRICTION_CHANGED"
+    LOAD_FRICTION = "friction of the drive under load", "FRICTION_CHANGED"
     MASS = "mass of a body", "TORQUE_MASS"
     LENGTH = "length of a body", "MECHANISM_CHANGED"
     UNKNOWN = "unknown", "MECHANISM_CHANGED"
@@ -53,8 +54,9 @@ class NamedCause:
     value, sigma : float
         Clearance [m]; measured over predicted torque (SIGN, SCALE); angle by which the crank is ahead of its
         measured angle (TIMING, CRANK_OFFSET) [rad]; lag [s]; constant torque beyond the bounds of friction,
-        negative where it drives (BIAS) [N m]; change of the friction [N m]; load at the foot [N]; fraction by
-        which a mass or a length is larger.
+        negative where it drives (BIAS) [N m]; change of the friction [N m], or of the fraction of the
+        torque that it is (LOAD_FRICTION); load at the foot [N]; fraction by which a mass or a length is
+        larger.
     subject : str
         The joint, or the body, concerned; empty where there is none.
     """

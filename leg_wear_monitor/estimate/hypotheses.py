@@ -10,7 +10,7 @@ import attrs
 import numpy as np
 
 from leg_wear_monitor.estimate.cause import Cause, NamedCause
-from leg_wear_monitor.estimate.least_squares import jackknife, solved
+from leg_wear_monitor.estimate.least_squares import Point, gauss_newton, jackknife, solved
 from leg_wear_monitor.estimate.torque_curves import (
     Complex,
     TorqueCurves,
@@ -221,21 +221,15 @@ def timing_of(cycles: Sequence[CycleStatistics], best: Fit) -> list[NamedCause]:
         rest, along = curves.measured - base, slope(base)
         speed.append(one.direction * TURN / one.moving_s)
         angle.append(best.angle_rad + inner(rest, along) / inner(along, along))
-    if len(speed) < _LEAST_CYCLES:
+    if len(speed) < _LEAST_CYCLES or np.ptp(speed) == 0.0:
         return []
-    x, y = np.array(speed), np.array(angle)
-    spread = float(((x - x.mean()) ** 2).sum())
-    if not spread > 0.0:
+    lateness = np.stack([np.ones(len(speed)), -np.array(speed)], axis=1)
+    found = gauss_newton(lambda x: Point(lateness @ x - angle, lambda: lateness), np.zeros(2))
+    sigma = np.sqrt(np.diagonal(found.covariance) * found.point.square / (len(speed) - 2))
+    if _RESOLVED * sigma[0] > abs(best.angle_rad):
         return []
-    rate = float((x - x.mean()) @ y) / spread
-    rest = y - y.mean() - rate * (x - x.mean())
-    variance = float(rest @ rest) / (len(x) - 2)
-    lag_sigma = float(np.sqrt(variance / spread))
-    offset_sigma = float(np.sqrt(variance / len(x) + variance / spread * x.mean() ** 2))
-    if _RESOLVED * offset_sigma > abs(best.angle_rad):
-        return []
-    offset = NamedCause(Cause.CRANK_OFFSET, float(y.mean() - rate * x.mean()), offset_sigma)
-    lag = NamedCause(Cause.LAG, -rate, lag_sigma)
+    values = zip((Cause.CRANK_OFFSET, Cause.LAG), found.x.tolist(), sigma.tolist(), strict=True)
+    offset, lag = (NamedCause(*one) for one in values)
     most = max(_sureness(offset), _sureness(lag))
     return [one for one in (offset, lag) if _sureness(one) >= min(_SURE, most)]
 

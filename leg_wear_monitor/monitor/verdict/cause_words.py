@@ -23,6 +23,7 @@ EVIDENCE = {
     Cause.LAG: ("torque_late", "s"),
     Cause.BIAS: ("impossible_friction", "N m"),
     Cause.FRICTION: ("friction", "N m"),
+    Cause.LOAD_FRICTION: ("load_friction", ""),
     Cause.LOAD: ("foot_load", "N"),
     Cause.MASS: ("mass_fraction", ""),
     Cause.LENGTH: ("length_fraction", ""),
@@ -86,8 +87,9 @@ class CauseWords:
             case Cause.BIAS:
                 return f"a constant torque exceeds the largest friction of the drive by {size}"
             case Cause.FRICTION:
-                way = "risen" if one.value > 0.0 else "fallen"
-                return f"the constant torque has {way} by {size} since this leg was commissioned"
+                return f"the constant torque has {_way(one)} by {size} since this leg was commissioned"
+            case Cause.LOAD_FRICTION:
+                return f"the part of the torque that is friction has {_way(one)} by {size}, of 1"
             case Cause.LOAD:
                 return f"a load of {size} {'lifts' if one.value > 0.0 else 'pulls down'} the foot"
             case Cause.MASS | Cause.LENGTH:
@@ -112,7 +114,7 @@ class CauseWords:
             case Cause.BIAS:
                 more = ", and the friction of the drive" if one.value > 0.0 else ""
                 return f"{_ZERO}, drive_torque.sign, scale and gear_ratio{more}"
-            case Cause.FRICTION:
+            case Cause.FRICTION | Cause.LOAD_FRICTION:
                 return f"{_ZERO}, the lubrication and the temperature of the drive"
             case Cause.LOAD:
                 return "check the load and the ground at the foot"
@@ -154,6 +156,10 @@ class CauseWords:
         if self.crank.zero == AT_START:
             return "restart the monitor while the leg walks steadily, so that the crank's zero is found again"
         return f"set crank.offset_rad to {self.crank.offset_rad + angle_rad:.4g}"
+
+
+def _way(one: NamedCause) -> str:
+    return "risen" if one.value > 0.0 else "fallen"
 
 
 def _is_near(one: NamedCause, factor: float) -> bool:

@@ -91,7 +91,7 @@ RULES = (
         not_valid=(Figure.CLEARANCES, *OF_THE_GAIT),
     ),
     _cause("TORQUE_MASS", "a body has another mass", not_valid=EVERYTHING),
-    _cause("MECHANISM_CHANGED", "the mechanism has changed", not_valid=EVERYTHING),
+    _cause("MECHANISM_CHANGED", "it does not fit the counted leg", not_valid=EVERYTHING),
     _cause("TORQUE_LOAD", "a load acts at the foot", State.WATCH, OF_THE_MODEL),
     Rule(
         code="TORQUE_MISMATCH",

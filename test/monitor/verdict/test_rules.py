@@ -322,6 +322,13 @@ def test_a_cause_has_one_code_and_one_sentence_whoever_finds_it(
     assert other.state is State.INSPECT  # its alarm is raised
 
 
+@pytest.mark.parametrize("cause", [*Cause][1:], ids=lambda one: one.name)
+def test_every_cause_of_the_diagnosis_has_a_rule_and_words(cause: Cause) -> None:
+    verdict = judged(diagnosis=diagnosis(change(cause, "foot", value=0.5, sigma=0.1)), cadence_rpm=60.0)
+    assert verdict.fault_code == cause.fault_code and verdict.evidence
+    assert ("no single cause" in verdict.why) == (cause is Cause.UNKNOWN)
+
+
 def test_a_lag_that_the_diagnosis_finds_at_one_cadence_may_be_an_offset() -> None:
     late = diagnosis(change(Cause.LAG, value=0.01, sigma=0.001, counted=0.0))
     verdict = judged(diagnosis=late, cadence_rpm=60.0)

@@ -117,15 +117,24 @@ def received(walk: np.ndarray, lag: float = 0.0, hz: float = 0.0, offset: float 
     return walk
 
 
-def signed(walk: np.ndarray, sensor: TorqueSensor, seed: int, loss: float = 0.0, jitter: float = 0.0):
-    """Signatures (cycles, F) of a walk; a part of the samples lost, their stamps off by so much [s]."""
+def signed(
+    walk: np.ndarray,
+    sensor: TorqueSensor,
+    seed: int,
+    loss: float = 0.0,
+    jitter: float = 0.0,
+    quantum_nm: float = 0.0,
+):
+    """Signatures (cycles, F) of a walk; a part of the samples lost, stamps off [s], torque in steps."""
     random = np.random.default_rng(seed)
-    if not (loss or jitter):
+    if not (loss or jitter or quantum_nm):
         return measured(walk, sensor, NOISE_NM, random)[1:]
     between = sensor.period_s * CLOCK
     time = np.arange(between, walk[-1, 0], between)
     torque = np.diff(np.interp(time, walk[:, 0], walk[:, 2]), prepend=0.0) / between
     torque += NOISE_NM * random.standard_normal(len(time))
+    if quantum_nm:
+        torque = quantum_nm * np.round(torque / quantum_nm)
     angle = np.interp(time + jitter * random.standard_normal(len(time)), walk[:, 0], walk[:, 1])
     there = random.random(len(time)) >= loss
     step = np.where(np.roll(there, 1), np.diff(torque, prepend=np.nan), np.nan)
@@ -213,7 +222,7 @@ def main() -> None:
         rows = drawn(cycles_of("", 0.3, peak_n, 5, given), options.cycles)
         one, found = watched(leg, size, rows)
         own, off = one.state.sensor, one._models.misfit(one.state)
-        channel = f"{1e3 * own.delay_s:.2f}, {1e3 * own.time_constant_s:.2f}"
+        channel = f"{1e3 * own.channel.delay_s:.2f}, {1e3 * own.channel.time_constant_s:.2f}"
         print(f"| {peak_n:.0f} | {given or '-'} | {channel} | {off:.1f} | {found or 'none'} |", flush=True)
     print("\n| load [N] | drive | opened [mm] | found, in cycle | clearance ± |\n|---|---|---|---|---|")
     for peak_n in (0.0, 300.0):

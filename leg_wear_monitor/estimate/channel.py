@@ -1,14 +1,21 @@
-"""The channel between a leg's drive torque and its samples: how late they are, and how filtered.
+"""The channel between a leg's drive torque and its samples: late, filtered, and with friction of the load.
 
-Torque is often motor current: it comes late by a control loop, through a low-pass. At one cadence an offset
-of the crank looks like a delay. Both move the phases in which a torque is rough, by which clearances are told
-apart, so a reference has to be late and filtered as the samples are.
+Torque is often motor current through a gear: it comes late by a control loop, through a low-pass, and the
+gear loses a part of what it transmits. At one cadence an offset of the crank looks like a delay. All of these
+move or change the phases in which a torque is rough, by which clearances are told apart, so a reference has
+to pass the same channel as the samples.
 """
+
+import functools
+import math
+from collections.abc import Iterable, Sequence
 
 import attrs
 import numpy as np
 
-from leg_wear_monitor.estimate.signature import TorqueSensor
+from leg_wear_monitor.estimate.cause import Cause
+from leg_wear_monitor.estimate.explanations import Nuisance
+from leg_wear_monitor.estimate.signature import DIRECT, Channel, TorqueSensor
 from leg_wear_monitor.estimate.signature_model import simulated_signatures, with_noise_of
 from leg_wear_monitor.mechanism.arrays import Floats
 from leg_wear_monitor.mechanism.ideal import TURN
@@ -23,14 +30,35 @@ _CYCLES = 20  # simulated gait cycles that are enough for a mean signature
 # leave unexplained moves it by about 0.2 (docs/explanation/diagnosis.md)
 _SURELY_BETTER = 0.3
 
-# what a leg may have beside its channel: load, friction and masses in the first harmonics of the mean torque,
-# and an error of the model in each phase, of the torque's size and of the roughness' logarithm
-_HARMONICS, _HARMONIC_NM = 16, 100.0
+# friction of the load: 0.04 (harmonic drives) to 0.31 (planetary servos) of the torque; by how much it has to
+# lower the mean square: 0.02 by chance, 0.8 by a friction of 0.1
+_FRICTION, _MOST_FRICTION, _FRICTION_STEP, _FRICTION_BETTER = 0.2, 0.45, 0.1, 0.1
+_FRICTION_ERROR = 0.02  # of it, by legs with masses 4 % off
+
+# what a leg may have beside its channel: an error of the model in each phase, of the torque's size and of the
+# roughness' logarithm, and other masses, lengths, bias, scale and load; or, on the ground, anything in the
+# first harmonics of the mean torque
 _MEAN, _ROUGHNESS = 0.05, 0.4
+_SPREADS = {Cause.MASS: 0.05, Cause.LENGTH: 0.005, Cause.FRICTION: 5.0, Cause.SCALE: 0.1, Cause.LOAD: 20.0}
+_HARMONICS, _HARMONIC_NM = 16, 100.0
 
 
-def with_channel_of(reference: TorqueReference, sensor: TorqueSensor, measured: Floats) -> TorqueSensor:
-    """The sensor with the noise, delay and low-pass by which the expected leg has a measured signature.
+@attrs.frozen
+class ChannelFit:
+    """A channel that was found, the mean square that it leaves, and the error of its load friction.
+
+    The error is NaN where the load friction is not observable: on the ground, the load hides it.
+    """
+
+    channel: Channel
+    square: float
+    load_friction_sigma: float
+
+
+def with_channel_of(
+    reference: TorqueReference, sensor: TorqueSensor, measured: Floats, nuisances: Sequence[Nuisance]
+) -> TorqueSensor:
+    """The sensor with the noise and the channel by which the expected leg has a measured signature.
 
     Parameters
     ----------
@@ -38,33 +66,101 @@ def with_channel_of(reference: TorqueReference, sensor: TorqueSensor, measured: 
     sensor : TorqueSensor
     measured : (F,) array
         Mean of measured signatures of a leg as expected.
+    nuisances : sequence of Nuisance
     """
-    weight = _weight(sensor)
+    plain = with_noise_of(reference, attrs.evolve(sensor, channel=DIRECT), measured)
+    channel = channel_of(reference, plain, measured, nuisances).channel
+    if channel == DIRECT:
+        return plain
+    return with_noise_of(reference, attrs.evolve(plain, channel=channel), measured)
 
-    def misfit(tried: TorqueSensor, delay_s: float) -> float:
-        late = attrs.evolve(tried, delay_s=delay_s)
-        rest = measured - simulated_signatures(reference, 0, late, cycles=_CYCLES).mean(axis=0)
-        return float(rest @ weight @ rest) / len(rest)
 
-    plain = with_noise_of(reference, attrs.evolve(sensor, delay_s=0.0, time_constant_s=0.0), measured)
-    best, least = plain, misfit(plain, 0.0) - _SURELY_BETTER
+def channel_of(
+    reference: TorqueReference, sensor: TorqueSensor, measured: Floats, nuisances: Sequence[Nuisance]
+) -> ChannelFit:
+    """The channel of a sensor whose noise is known, as of `with_channel_of`.
+
+    The mean torque of a leg in the air has tolerances; under a load that nobody knows, its first harmonics
+    tell nothing. The more probable of the two decides.
+    """
+    variance = np.repeat([_MEAN * sensor.size_nm, _ROUGHNESS], sensor.phases) ** 2
+    known = [_SPREADS[one.cause] * one.column for one in nuisances if one.cause in _SPREADS]
+    in_air = _Leg(np.diag(variance) + _products(np.array(known)), has_friction=True)
+    on_ground = _Leg(np.diag(variance) + _products(_harmonics(sensor.phases)), has_friction=False)
+    found = [_best(reference, sensor, measured, leg) for leg in (in_air, on_ground)]
+    scores = [
+        len(measured) * one.square + leg.log_size for one, leg in zip(found, (in_air, on_ground), strict=True)
+    ]
+    return found[int(np.argmin(scores))]
+
+
+class _Leg:
+    """What a leg may have beside its channel, as a covariance (F, F), and what a channel leaves over."""
+
+    def __init__(self, covariance: Floats, has_friction: bool) -> None:
+        self._weight, self._has_friction = np.linalg.inv(covariance), has_friction
+        self.log_size = float(np.linalg.slogdet(covariance)[1])
+
+    def left(self, rest: Floats, column: Floats) -> tuple[float, float, float]:
+        """Mean square of what is left over, and the load friction, by which it is least, with its sigma.
+
+        Parameters
+        ----------
+        rest : (F,) array
+            What a channel without load friction leaves over.
+        column : (F,) array
+            Change of the signature by load friction.
+        """
+        friction, sigma = 0.0, math.nan
+        if self._has_friction:
+            weighted = self._weight @ column
+            information = float(column @ weighted) + _FRICTION**-2.0
+            friction = min(max(float(rest @ weighted) / information, 0.0), _MOST_FRICTION)
+            sigma = math.hypot(information**-0.5, _FRICTION_ERROR)
+        left = rest - friction * column
+        square = float(left @ self._weight @ left) + (friction / _FRICTION) ** 2
+        return square / len(rest), friction, sigma
+
+
+def _best(reference: TorqueReference, sensor: TorqueSensor, measured: Floats, leg: _Leg) -> ChannelFit:
+    """The channel that leaves least."""
+
+    @functools.cache
+    def rest(channel: Channel) -> Floats:
+        behind = attrs.evolve(sensor, channel=channel)
+        return np.asarray(measured - simulated_signatures(reference, 0, behind, cycles=_CYCLES).mean(axis=0))
+
+    def tried(time_constant_s: float, delay_s: float) -> ChannelFit:
+        channel = Channel(delay_s=delay_s, time_constant_s=time_constant_s)
+        more = attrs.evolve(channel, load_friction=_FRICTION_STEP)
+        column = (rest(channel) - rest(more)) / _FRICTION_STEP
+        square, friction, sigma = leg.left(rest(channel), column)
+        return ChannelFit(attrs.evolve(channel, load_friction=friction), square, sigma)
+
+    def least(found: Iterable[ChannelFit]) -> ChannelFit:
+        return min(found, key=lambda one: one.square)
+
+    best = tried(0.0, 0.0)
+    without = leg.left(rest(DIRECT), np.zeros_like(measured))[0]
+    if without - best.square < _FRICTION_BETTER:
+        best = attrs.evolve(best, channel=DIRECT, square=without)
+    other = []
     for time_constant_s in _TIME_CONSTANTS_S:
-        tried = attrs.evolve(plain, time_constant_s=time_constant_s)
-        found = {delay_s: misfit(tried, delay_s) for delay_s in _DELAYS_S.tolist()}
+        found = {delay_s: tried(time_constant_s, delay_s) for delay_s in _DELAYS_S.tolist()}
         for step_s in _FINER_S:
-            middle = min(found, key=found.__getitem__)
-            found |= {at: misfit(tried, at) for at in (middle - step_s, middle + step_s)}
-        delay_s = min(found, key=found.__getitem__)
-        if found[delay_s] < least:
-            best, least = attrs.evolve(tried, delay_s=delay_s), found[delay_s]
-    return with_noise_of(reference, best, measured) if best is not plain else plain
+            middle = min(found, key=lambda at: found[at].square)
+            found |= {at: tried(time_constant_s, at) for at in (middle - step_s, middle + step_s)}
+        other.append(least(found.values()))
+    return least(other) if least(other).square < best.square - _SURELY_BETTER else best
 
 
-def _weight(sensor: TorqueSensor) -> Floats:
-    """Inverse covariance (F, F) of what a leg may have beside its channel."""
-    phases = sensor.phases
+def _harmonics(phases: int) -> Floats:
+    """Columns (1 + 2 _HARMONICS, F) of the first harmonics of a mean torque."""
     order = np.arange(1, _HARMONICS + 1)[:, None] * (TURN * np.arange(phases) / phases)
     columns = np.vstack([np.ones((1, phases)), np.cos(order), np.sin(order)])
-    columns = _HARMONIC_NM * np.hstack([columns, np.zeros_like(columns)])
-    variance = np.repeat([_MEAN * sensor.size_nm, _ROUGHNESS], phases) ** 2
-    return np.asarray(np.linalg.inv(np.diag(variance) + columns.T @ columns))
+    return _HARMONIC_NM * np.hstack([columns, np.zeros_like(columns)])
+
+
+def _products(columns: Floats) -> Floats:
+    """Covariance (F, F) of columns (n, F), each with a standard deviation of 1."""
+    return np.asarray(columns.T @ columns)

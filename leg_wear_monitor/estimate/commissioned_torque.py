@@ -3,6 +3,7 @@
 import attrs
 import numpy as np
 
+from leg_wear_monitor.estimate.signature import DIRECT, Channel
 from leg_wear_monitor.mechanism.arrays import Floats
 
 
@@ -20,8 +21,8 @@ class CommissionedTorque:
         Of each gait cycle, as in `estimate.signature`.
     sigma_m : (k,) array
         Standard deviations of the clearances: above 0 where a correction made them.
-    delay_s, time_constant_s : float
-        Of the torque sensor, by these signatures.
+    channel : Channel
+        Of the drive, by these signatures.
     speed : float
         Mean speed of the crank [rad/s]; 0 where it is not known.
     """
@@ -30,8 +31,7 @@ class CommissionedTorque:
     clearance_m: Floats
     signatures: Floats
     sigma_m: Floats = attrs.field()
-    delay_s: float = 0.0
-    time_constant_s: float = 0.0
+    channel: Channel = DIRECT
     speed: float = 0.0
 
     @sigma_m.default

@@ -30,6 +30,7 @@ _POSSIBLE = {
     Cause.LENGTH: (-0.1, 0.1),
     Cause.SCALE: (0.2, 2.0),
     Cause.TIMING: (-0.1, 0.1),
+    Cause.LOAD_FRICTION: (-0.5, 0.5),
 }
 _COUNTED = {Cause.SCALE: 1.0}  # value of a leg as counted; 0 for others
 

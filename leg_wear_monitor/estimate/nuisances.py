@@ -23,6 +23,7 @@ _FRICTION = 0.1  # of the torque's size
 _SCALE = 0.02
 _OFFSET_RAD = 0.01  # a lag of 1.6 ms at 60 rpm, or a crank offset: at one speed the two look alike
 _LOAD_N = 5.0
+_LOAD_FRICTION = 0.03  # a gear that warms up
 
 # of a leg that was never commissioned: tolerances of bodies, and what else the model may have wrong
 _TOLERANCES = {Cause.MASS: MASS_TOLERANCE, Cause.LENGTH: 0.005}
@@ -30,7 +31,7 @@ _MEAN_ERROR = 0.05  # of the torque's size, in each phase
 _ROUGHNESS_ERROR = 0.15
 _SENSOR_TOLERANCE = 5.0  # times the usual changes of friction, scale and lag
 
-_SCALE_STEP, _OFFSET_STEP_RAD = 0.1, 0.03
+_SCALE_STEP, _OFFSET_STEP_RAD, _LOAD_FRICTION_STEP = 0.1, 0.03, 0.05
 
 _LATER_S = 0.0025 * np.array([*range(-8, 0), *range(1, 13)])
 _SLOWER_S = tuple(1.0 / (TURN * hz) for hz in (70.0, 35.0, 20.0, 10.0))
@@ -46,11 +47,13 @@ def nuisances(mechanism: Mechanism, reference: TorqueReference, sensor: TorqueSe
     constant = np.concatenate([np.full(phases, np.sign(speed)), np.zeros(phases)])
     scaled = _difference(reference, sensor, scale_step=_SCALE_STEP)
     shifted = _difference(reference, sensor, offset_step_rad=_OFFSET_STEP_RAD)
+    rubbing = _difference(reference, sensor, load_friction_step=_LOAD_FRICTION_STEP)
     found = [
         Nuisance(Cause.FRICTION, "", constant, _FRICTION * sensor.size_nm),
         Nuisance(Cause.SCALE, "", scaled, _SCALE),
         # the samples' angle is too large where the torque comes late, and too small where the crank is ahead
         Nuisance(Cause.TIMING, "", -shifted, _OFFSET_RAD),
+        Nuisance(Cause.LOAD_FRICTION, "", rubbing, _LOAD_FRICTION),
     ]
     if mechanism.toe is not None:
         lever, _ = load_signature(build_linkage(mechanism))
@@ -64,17 +67,19 @@ def nuisances(mechanism: Mechanism, reference: TorqueReference, sensor: TorqueSe
 def other_channels(reference: TorqueReference, sensor: TorqueSensor) -> list[OtherChannel]:
     """Channels that a torque sensor may have instead of its own: earlier, later, filtered."""
     own = simulated_signatures(reference, 0, sensor, cycles=_CHANNEL_CYCLES).mean(axis=0)
-    slower = [one for one in _SLOWER_S if one > sensor.time_constant_s]
-    tried = [(late, sensor.time_constant_s) for late in _LATER_S] + [
+    present = sensor.channel
+    slower = [one for one in _SLOWER_S if one > present.time_constant_s]
+    tried = [(late, present.time_constant_s) for late in _LATER_S] + [
         (late, time_constant_s)
         for time_constant_s in slower
         for late in (0.0, *_LATER_S[_LATER_S > 0.0][::2])
     ]
     found = []
     for later_s, time_constant_s in tried:
-        other = attrs.evolve(sensor, delay_s=sensor.delay_s + later_s, time_constant_s=time_constant_s)
-        column = simulated_signatures(reference, 0, other, cycles=_CHANNEL_CYCLES).mean(axis=0) - own
-        found.append(OtherChannel(float(other.lateness_s - sensor.lateness_s), column))
+        other = attrs.evolve(present, delay_s=present.delay_s + later_s, time_constant_s=time_constant_s)
+        behind = attrs.evolve(sensor, channel=other)
+        column = simulated_signatures(reference, 0, behind, cycles=_CHANNEL_CYCLES).mean(axis=0) - own
+        found.append(OtherChannel(float(other.lateness_s - present.lateness_s), column))
     return found
 
 
@@ -118,14 +123,20 @@ def unknown_baseline(found: list[Nuisance], sensor: TorqueSensor) -> Baseline:
 
 
 def _difference(
-    reference: TorqueReference, sensor: TorqueSensor, scale_step: float = 0.0, offset_step_rad: float = 0.0
+    reference: TorqueReference,
+    sensor: TorqueSensor,
+    scale_step: float = 0.0,
+    offset_step_rad: float = 0.0,
+    load_friction_step: float = 0.0,
 ) -> Floats:
-    """Derivative of the expected leg's signature by a factor on the torque, or by an offset of the crank."""
-    less, more = (
-        simulated_signatures(reference, 0, sensor, 1.0 + sign * scale_step, sign * offset_step_rad).mean(
-            axis=0
-        )
-        for sign in (-1.0, 1.0)
-    )
-    step = scale_step or offset_step_rad
-    return np.asarray((more - less) / (2.0 * step))
+    """Derivative of the expected leg's signature: by a factor on the torque, the crank's offset, friction."""
+
+    def stepped(sign: float) -> Floats:
+        own = sensor.channel
+        channel = attrs.evolve(own, load_friction=own.load_friction + sign * load_friction_step)
+        behind = attrs.evolve(sensor, channel=channel)
+        scale, offset_rad = 1.0 + sign * scale_step, sign * offset_step_rad
+        return np.asarray(simulated_signatures(reference, 0, behind, scale, offset_rad).mean(axis=0))
+
+    step = scale_step or offset_step_rad or load_friction_step
+    return np.asarray((stepped(1.0) - stepped(-1.0)) / (2.0 * step))

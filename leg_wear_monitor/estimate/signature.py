@@ -16,6 +16,54 @@ _FLOOR = 1.0e-4  # of the torque's size, below which roughness is rounding
 _CLIP = 8.0  # times the torque's size: a peak counts as at most this
 
 
+@attrs.frozen(kw_only=True)
+class Channel:
+    """What a drive makes of the leg's torque before it is sampled.
+
+    Attributes
+    ----------
+    delay_s : float
+        Time by which samples are late for their crank angle: a lag, less an offset of the crank over its
+        speed.
+    time_constant_s : float
+        Of the first-order low-pass; 0 without one.
+    load_friction : float
+        Friction of the drive over the size of the torque that it transmits.
+    """
+
+    delay_s: float = 0.0
+    time_constant_s: float = 0.0
+    load_friction: float = 0.0
+
+    @property
+    def lateness_s(self) -> float:
+        """Time by which slow changes of the torque are late: by the delay and by the low-pass."""
+        return self.delay_s + self.time_constant_s
+
+    def received(self, torque: Floats, step_s: float, direction: float) -> Floats:
+        """Torque (n,) in equal steps of time [s] behind the drive; taken as periodic.
+
+        Parameters
+        ----------
+        torque : (n,) array
+            Of the leg [N m].
+        step_s : float
+        direction : float
+            Sign of the crank's speed: friction takes power in both directions of the power.
+        """
+        if self.load_friction:
+            torque = torque + direction * self.load_friction * np.abs(torque)
+        if self.delay_s == 0.0 and self.time_constant_s == 0.0:
+            return torque
+        omega = TURN * np.fft.rfftfreq(len(torque), step_s)
+        response = np.exp(-1j * omega * self.delay_s) / (1.0 + 1j * omega * self.time_constant_s)
+        return np.asarray(np.fft.irfft(np.fft.rfft(torque) * response, len(torque)))
+
+
+DIRECT = Channel()
+"""A drive that adds nothing."""
+
+
 @attrs.frozen
 class TorqueSensor:
     """How a drive torque is measured.
@@ -32,11 +80,7 @@ class TorqueSensor:
         Whether a sample is the torque at its instant, or else the mean since the one before.
     noise_nm : float
         Standard deviation of a sample.
-    delay_s : float
-        Time by which samples are late for their crank angle: a lag, less an offset of the crank over its
-        speed.
-    time_constant_s : float
-        Of the first-order low-pass between the leg's torque and its samples; 0 without one.
+    channel : Channel
     """
 
     period_s: float
@@ -44,21 +88,7 @@ class TorqueSensor:
     size_nm: float
     is_instant: bool = False
     noise_nm: float = 0.0
-    delay_s: float = 0.0
-    time_constant_s: float = 0.0
-
-    @property
-    def lateness_s(self) -> float:
-        """Time by which slow changes of the torque are late: by the delay and by the low-pass."""
-        return self.delay_s + self.time_constant_s
-
-    def received(self, torque: Floats, step_s: float) -> Floats:
-        """Torque (n,) in equal steps of time [s] as it arrives, late and filtered; taken as periodic."""
-        if self.delay_s == 0.0 and self.time_constant_s == 0.0:
-            return torque
-        omega = TURN * np.fft.rfftfreq(len(torque), step_s)
-        channel = np.exp(-1j * omega * self.delay_s) / (1.0 + 1j * omega * self.time_constant_s)
-        return np.asarray(np.fft.irfft(np.fft.rfft(torque) * channel, len(torque)))
+    channel: Channel = DIRECT
 
     @property
     def together(self) -> int:

@@ -64,7 +64,8 @@ class SimulatedSensor:
     def torque(self, leg: int) -> Floats:
         """Averaged samples (n,) of a leg [N m], without noise."""
         simulated = self._reference.torque_nm[leg][: self._cycles].astype(float).ravel()
-        torque = self._sensor.received(simulated, self._step_s)
+        direction = float(np.sign(self._reference.profile.speed))
+        torque = self._sensor.channel.received(simulated, self._step_s, direction)
         if self._sensor.is_instant:
             return averaged(torque[self._at], self._sensor.together)
         at = np.minimum(self._ends.astype(np.int64), len(torque) - 1)

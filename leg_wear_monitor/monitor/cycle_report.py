@@ -84,6 +84,8 @@ def cycle_report(
         load_sigma_n=float(torque.load_sigma_n),
         load_acting_n=float(torque.load_acting_n),
         friction_nm=float(torque.friction_nm),
+        load_friction=float(torque.load_friction),
+        load_friction_sigma=float(torque.load_friction_sigma),
         torque_lag_s=float(torque.torque_lag_s),
         friction_sigma_nm=float(torque.friction_sigma_nm),
         torque_lag_sigma_s=float(torque.torque_lag_sigma_s),
@@ -93,7 +95,7 @@ def cycle_report(
 
 
 def _mismatch(torque: TorqueStatistics) -> float:
-    """What load, friction and lag do not explain, as a fraction of what was predicted; NaN if not known."""
+    """What load, frictions and lag do not explain, as a fraction of what was predicted; NaN if not known."""
     predicted_nm = torque.predicted_rms_nm
     return float(torque.unexplained_rms_nm / predicted_nm) if predicted_nm > 0.0 else math.nan
 

@@ -105,7 +105,8 @@ class CycleReport:
         Torque samples in it; the torque values are NaN without any.
     measured_torque_rms_nm, predicted_torque_rms_nm, residual_torque_rms_nm : float
     torque_mismatch : float
-        RMS of the torque that foot load, friction and lag do not explain, as a fraction of the predicted RMS.
+        RMS of the torque that foot load, frictions and lag do not explain, as a fraction of the predicted
+        RMS.
     load_n, load_sigma_n : float
         Foot load estimated from the measured torque, up positive, and its standard deviation.
     load_acting_n : float
@@ -113,8 +114,10 @@ class CycleReport:
     friction_nm, torque_lag_s : float
         Friction of the drive and delay of the measured torque, as estimated; implausible values raise
         ``torque_bias`` and ``torque_lag``.
-    friction_sigma_nm, torque_lag_sigma_s : float
-        Their standard deviations.
+    load_friction : float
+        Friction of the drive over the size of the torque that it transmits.
+    friction_sigma_nm, torque_lag_sigma_s, load_friction_sigma : float
+        Standard deviations of these three.
     forecast : LegForecast or None
         Renewed once a minute.
     is_followed : bool
@@ -139,8 +142,10 @@ class CycleReport:
     load_acting_n: float
     friction_nm: float
     torque_lag_s: float
+    load_friction: float = math.nan
     friction_sigma_nm: float = math.nan
     torque_lag_sigma_s: float = math.nan
+    load_friction_sigma: float = math.nan
     forecast: LegForecast | None = None
     is_followed: bool = True
 

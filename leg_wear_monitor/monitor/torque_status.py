@@ -47,6 +47,8 @@ def torque_status(
         "friction_sigma_nm": last.friction_sigma_nm,
         "friction_commissioned_nm": record.friction_nm,
         "torque_lag_sigma_s": last.torque_lag_sigma_s,
+        "load_friction": last.load_friction,
+        "load_friction_sigma": last.load_friction_sigma,
         "crank_offset_error_rad": offset_error_rad(last, record),
     }
     for why in NotCompared:

@@ -100,9 +100,9 @@ class TorqueStatistics:
     measured_rms_nm, predicted_rms_nm, residual_mean_nm, residual_rms_nm : float
     unexplained_rms_nm : float
         RMS of the residual that repeats over the last compared gait cycles, without the parts of foot load,
-        friction and lag and without what scatters from cycle to cycle: the mismatch of the model.
+        frictions and lag and without what scatters from cycle to cycle: the mismatch of the model.
     condition : float
-        Condition number of this cycle's estimate of the three parameters below, 1 at best.
+        Condition number of this cycle's estimate of the four parameters below, 1 at best.
     load_n, load_sigma_n : float
         Vertical foot load, positive upwards, and its standard deviation.
     load_acting_n : float
@@ -111,8 +111,10 @@ class TorqueStatistics:
         Friction torque of the drive, opposite to the motion; it does not load the joints.
     torque_lag_s : float
         Delay of the measured torque.
-    friction_sigma_nm, torque_lag_sigma_s : float
-        Standard deviations of these two.
+    load_friction : float
+        Friction of the drive over the size of the torque that it transmits.
+    friction_sigma_nm, torque_lag_sigma_s, load_friction_sigma : float
+        Standard deviations of these three.
     cycle_lag_s, cycle_lag_sigma_s : float
         The delay estimated from this cycle alone, and its standard deviation.
     """
@@ -129,8 +131,10 @@ class TorqueStatistics:
     load_acting_n: float
     friction_nm: float
     torque_lag_s: float
+    load_friction: float
     friction_sigma_nm: float
     torque_lag_sigma_s: float
+    load_friction_sigma: float
     cycle_lag_s: float
     cycle_lag_sigma_s: float
 

@@ -8,6 +8,7 @@ import numpy as np
 
 from leg_wear_monitor.estimate.cause import Change
 from leg_wear_monitor.estimate.commissioned_torque import CommissionedTorque
+from leg_wear_monitor.estimate.signature import DIRECT
 from leg_wear_monitor.mechanism.arrays import Floats
 from leg_wear_monitor.monitor.diagnosis.evidence import SETTLING_CYCLES
 from leg_wear_monitor.monitor.diagnosis.state import TorqueState
@@ -53,8 +54,7 @@ def settle(state: TorqueState, correction: Correction, counted_m: Floats) -> Non
         counted_m,
         signatures,
         sigma_m,
-        before.delay_s if before else 0.0,
-        before.time_constant_s if before else 0.0,
+        before.channel if before else DIRECT,
         state.profile.speed,
     )
     state.settled = (*state.settled, attrs.evolve(change, is_corrected=True))

@@ -8,6 +8,7 @@ import numpy as np
 from leg_wear_monitor.estimate.cause import SURE_LOG_ODDS, Cause, Change
 from leg_wear_monitor.estimate.explanations import Explanation
 from leg_wear_monitor.estimate.leg_model import best_fit, change_of, first_changed, start_of
+from leg_wear_monitor.estimate.signature import DIRECT
 from leg_wear_monitor.estimate.signature_model import with_noise_of
 from leg_wear_monitor.mechanism.arrays import Floats
 from leg_wear_monitor.monitor.config.settings import MonitorConfig
@@ -65,17 +66,14 @@ class Evidence:
             return
         mean = known.mean if known else state.signatures.mean(axis=0)
         if known is None:
-            state.sensor = attrs.evolve(state.sensor, delay_s=0.0, time_constant_s=0.0)
+            state.sensor = attrs.evolve(state.sensor, channel=DIRECT)
         elif known.is_as_counted:
             state.sensor = self._models.channel(state.reference, state.sensor, known)
-            delay_s, time_constant_s = state.sensor.delay_s, state.sensor.time_constant_s
-            if (known.delay_s, known.time_constant_s) != (delay_s, time_constant_s):
-                state.commissioned = attrs.evolve(known, delay_s=delay_s, time_constant_s=time_constant_s)
+            if known.channel != state.sensor.channel:
+                state.commissioned = attrs.evolve(known, channel=state.sensor.channel)
             return
         else:
-            state.sensor = attrs.evolve(
-                state.sensor, delay_s=known.delay_s, time_constant_s=known.time_constant_s
-            )
+            state.sensor = attrs.evolve(state.sensor, channel=known.channel)
         state.sensor = with_noise_of(state.reference, state.sensor, mean)
 
     def _test(self, state: TorqueState, cycle: SignedCycle, config: MonitorConfig) -> None:

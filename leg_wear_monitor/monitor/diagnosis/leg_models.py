@@ -13,7 +13,7 @@ from leg_wear_monitor.estimate.explanations import Explainer
 from leg_wear_monitor.estimate.identification import UNLIKE_FILE, misfit
 from leg_wear_monitor.estimate.leg_model import explainer_of
 from leg_wear_monitor.estimate.nuisances import nuisances
-from leg_wear_monitor.estimate.signature import TorqueSensor
+from leg_wear_monitor.estimate.signature import DIRECT, TorqueSensor
 from leg_wear_monitor.estimate.signature_model import signature_model, with_noise_of
 from leg_wear_monitor.mechanism.arrays import Floats
 from leg_wear_monitor.mechanism.spec import Mechanism
@@ -98,8 +98,9 @@ class LegModels:
         A leg of other lengths has its impacts elsewhere, which a channel seems to explain, but its mean
         torque then fits much worse: such a leg has to be identified, not delayed.
         """
-        found = with_channel_of(reference, sensor, known.mean)
-        plain = with_noise_of(reference, attrs.evolve(sensor, delay_s=0.0, time_constant_s=0.0), known.mean)
+        columns = nuisances(self._mechanism, reference, attrs.evolve(sensor, channel=DIRECT))
+        found = with_channel_of(reference, sensor, known.mean, columns)
+        plain = with_noise_of(reference, attrs.evolve(sensor, channel=DIRECT), known.mean)
         if found == plain:
             return plain
         off, without = (

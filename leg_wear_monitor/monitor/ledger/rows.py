@@ -7,6 +7,7 @@ import attrs
 import numpy as np
 
 from leg_wear_monitor.estimate.commissioned_torque import CommissionedTorque
+from leg_wear_monitor.estimate.signature import Channel
 from leg_wear_monitor.monitor.alarms.alarm import Alarm, Level
 from leg_wear_monitor.monitor.ledger.entry import (
     AlarmEvent,
@@ -108,13 +109,14 @@ def write_event(db: sqlite3.Connection, event: Event) -> None:
             parts = (event.clearance_m, event.signatures, event.sigma_m)
             db.execute(
                 "INSERT INTO torque_commissioning (stamp_ns, cycles, clearance_m, signatures, sigma_m, "
-                "delay_s, time_constant_s, speed_radps) VALUES (?, ?, ?, ?, ?, ?, ?, ?)",
+                "delay_s, time_constant_s, load_friction, speed_radps) VALUES (?, ?, ?, ?, ?, ?, ?, ?, ?)",
                 (
                     event.stamp_ns,
                     event.cycles,
                     *(part.astype("<f8").tobytes() for part in parts),
-                    event.delay_s,
-                    event.time_constant_s,
+                    event.channel.delay_s,
+                    event.channel.time_constant_s,
+                    event.channel.load_friction,
                     event.speed,
                 ),
             )
@@ -192,14 +194,15 @@ def read_commissioned_torques(db: sqlite3.Connection) -> list[CommissionedTorque
     """
     found: list[CommissionedTorque] = []
     for row in db.execute(
-        "SELECT stamp_ns, cycles, delay_s, time_constant_s, speed_radps, clearance_m, signatures, sigma_m "
-        "FROM torque_commissioning "
+        "SELECT stamp_ns, cycles, speed_radps, delay_s, time_constant_s, load_friction, clearance_m, "
+        "signatures, sigma_m FROM torque_commissioning "
         "WHERE stamp_ns > (SELECT coalesce(max(replaced_ns), 0) FROM joint) ORDER BY id DESC"
     ):
-        stamp_ns, cycles, delay_s, time_constant_s, speed = row[:5]
-        clearance_m, signatures, sigma_m = (np.frombuffer(part, "<f8").astype(float) for part in row[5:])
+        stamp_ns, cycles, speed, delay_s, time_constant_s, load_friction = row[:6]
+        clearance_m, signatures, sigma_m = (np.frombuffer(part, "<f8").astype(float) for part in row[6:])
+        channel = Channel(delay_s=delay_s, time_constant_s=time_constant_s, load_friction=load_friction)
         one = CommissionedTorque(
-            stamp_ns, clearance_m, signatures.reshape(cycles, -1), sigma_m, delay_s, time_constant_s, speed
+            stamp_ns, clearance_m, signatures.reshape(cycles, -1), sigma_m, channel, speed
         )
         if not any(abs(one.speed - other.speed) <= UNLIKE * abs(other.speed) for other in found):
             found.append(one)

@@ -390,8 +390,27 @@ INSERT INTO torque_reference SELECT id, id = 1, stamp_ns, speed_radps, ripple_ra
 DROP TABLE former;
 """
 
+_THIRTEENTH = """
+CREATE TEMP TABLE former AS SELECT * FROM torque_commissioning;
+DROP TABLE torque_commissioning;
+
+-- signatures of the drive torque while the clearances were known; the last row is in force. All are float64,
+-- little endian: counted clearances of the clearance joints [m], the signature of each gait cycle, and the
+-- standard deviations of the clearances [m], above 0 where a correction made them; then the delay, the time
+-- constant and the load friction of the drive by them, and the mean speed of the crank, 0 where not known
+CREATE TABLE torque_commissioning (
+    id INTEGER PRIMARY KEY, stamp_ns INTEGER NOT NULL, cycles INTEGER NOT NULL, clearance_m BLOB NOT NULL,
+    signatures BLOB NOT NULL, sigma_m BLOB NOT NULL, delay_s REAL NOT NULL, time_constant_s REAL NOT NULL,
+    load_friction REAL NOT NULL, speed_radps REAL NOT NULL
+) STRICT;
+INSERT INTO torque_commissioning SELECT id, stamp_ns, cycles, clearance_m, signatures, sigma_m, delay_s,
+    time_constant_s, 0, speed_radps FROM former;
+DROP TABLE former;
+"""
+
 MIGRATIONS = (
     _FIRST, _SECOND, _THIRD, _FOURTH, _FIFTH, _SIXTH, _SEVENTH, _EIGHTH, _NINTH, _TENTH, _ELEVENTH, _TWELFTH,
+    _THIRTEENTH,
 )  # fmt: skip
 
 FORMAT = len(MIGRATIONS)

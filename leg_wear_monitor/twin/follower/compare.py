@@ -7,7 +7,7 @@ from leg_wear_monitor.kernel import kernel
 from leg_wear_monitor.twin.follower.compare_instants import take_instant
 from leg_wear_monitor.twin.follower.low_pass import pass_low
 from leg_wear_monitor.twin.follower.phase import in_turn, phase_of
-from leg_wear_monitor.twin.follower.state import FRICTION, LAG, LOAD
+from leg_wear_monitor.twin.follower.state import FRICTION, LAG, LOAD, LOAD_FRICTION, REGRESSORS
 
 # weight of a time between samples in the running means of the sensor's period and of its scatter, and longest
 # time in periods: in a longer time samples were lost, and it counts as this many periods in the mean. Where
@@ -65,6 +65,8 @@ def compare(sensor, signature, leg, stepper, measured):
     p = pass_low(fraction, fresh, mean / duration, low_pass.predicted)
     by[LOAD] = pass_low(fraction, fresh, toe, low_pass.of_load)
     by[FRICTION] = pass_low(fraction, fresh, direction, low_pass.of_friction)
+    rubbing = direction * abs(mean / duration)
+    by[LOAD_FRICTION] = pass_low(fraction, fresh, rubbing, low_pass.of_load_friction)
     by[LAG] = 0.0 if fresh else (torque.last_predicted - p) / dt
     torque.last_predicted = p
     _add_up(m, p, by, leg.sums, weight)
@@ -83,7 +85,7 @@ def add_to_profile(profile, angle, measured, predicted, lever, weight):
 
 @kernel
 def _add_up(m, p, by, sums, weight):
-    """Add measured torque m, predicted torque p [N m] and regressors ``by`` (3,) to a cycle's sums."""
+    """Add measured torque m, predicted torque p [N m] and regressors ``by`` (4,) to a cycle's sums."""
     r = m - p
     sums.number += 1.0
     sums.weight += weight
@@ -91,7 +93,7 @@ def _add_up(m, p, by, sums, weight):
     sums.residual_squares += weight * r * r
     sums.measured_squares += weight * m * m
     sums.predicted_squares += weight * p * p
-    for a in range(3):
+    for a in range(REGRESSORS):
         sums.along[a] += weight * by[a] * r
-        for b in range(3):
+        for b in range(REGRESSORS):
             sums.gram[a, b] += weight * by[a] * by[b]

@@ -12,7 +12,7 @@ import math
 from leg_wear_monitor.kernel import kernel
 from leg_wear_monitor.twin.follower.low_pass import pass_low
 from leg_wear_monitor.twin.follower.phase import phase_of
-from leg_wear_monitor.twin.follower.state import FRICTION, LAG, LOAD, PHASES
+from leg_wear_monitor.twin.follower.state import FRICTION, LAG, LOAD, LOAD_FRICTION, PHASES, REGRESSORS
 
 # as fractions of the RMS torque: standard deviation that halves an instant's weight, bound of its deviation;
 # these values clearly separate a healthy leg from one with strong impacts
@@ -39,6 +39,7 @@ def take_instant(sensor, leg, measured, mean, variance, lever, direction, dt, an
     rate = (mean - w.mean_predicted) / dt if w.time > 0.0 else 0.0
     w.measured, w.mean_predicted, w.variance, w.time, w.angle = measured, mean, variance, dt, angle
     w.regressor[LOAD], w.regressor[FRICTION], w.regressor[LAG] = lever, direction, -rate
+    w.regressor[LOAD_FRICTION] = direction * abs(mean)
     return residual
 
 
@@ -57,7 +58,7 @@ def _compare_waiting(sensor, leg, variance):
     by_phase[0, phase] += of_all
     residual = pass_low(fraction, fresh, weight * off, low_pass.weighted_residual)
     by_phase[1, phase] += residual
-    for i in range(3):
+    for i in range(REGRESSORS):
         weighted = pass_low(fraction, fresh, weight * w.regressor[i], low_pass.weighted_regressor[i])
         by_phase[2 + i, phase] += weighted
         leg.regressor[i] = weighted / of_all

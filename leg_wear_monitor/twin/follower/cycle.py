@@ -7,7 +7,7 @@ from leg_wear_monitor.contact.arrays import ContactArrays
 from leg_wear_monitor.dynamics.run.run_statistics import ARCHARD, CONTACT, FORCE, RunStatistics, percentile
 from leg_wear_monitor.mechanism.arrays import Floats
 from leg_wear_monitor.record import Record
-from leg_wear_monitor.twin.follower.state import FRICTION, LAG, LOAD
+from leg_wear_monitor.twin.follower.state import FRICTION, LAG, LOAD, LOAD_FRICTION
 from leg_wear_monitor.twin.follower.torque_estimate import CycleEstimate, LoadEstimate
 from leg_wear_monitor.twin.statistics import CycleStatistics, NotCompared, TorqueProfile, TorqueStatistics
 
@@ -50,7 +50,7 @@ def torque_statistics(
     def rms(squares: float) -> float:
         return float(np.sqrt(squares / weight)) if n else np.nan
 
-    load, friction, lag = settled.values.tolist()
+    load, friction, lag, load_friction = settled.values.tolist()
     return TorqueStatistics(
         samples=n,
         measured_rms_nm=rms(sums.measured_squares),
@@ -64,6 +64,8 @@ def torque_statistics(
         load_acting_n=settled.acting,
         friction_nm=friction,
         torque_lag_s=lag,
+        load_friction=load_friction,
+        load_friction_sigma=float(settled.sigma[LOAD_FRICTION]),
         friction_sigma_nm=float(settled.sigma[FRICTION]),
         torque_lag_sigma_s=float(settled.sigma[LAG]),
         cycle_lag_s=float(found.values[LAG]) if found else np.nan,

@@ -3,6 +3,7 @@
 from functools import cached_property
 from typing import NamedTuple
 
+import attrs
 import numpy as np
 
 from leg_wear_monitor.dynamics.clearance.joint_laws import contact_laws
@@ -33,7 +34,14 @@ from leg_wear_monitor.twin.follower.repeating import (
     RepeatingResidual,
     averages_by_phase,
 )
-from leg_wear_monitor.twin.follower.state import EVALUATED, LAG, TORQUE_SENSOR, LegState, leg_state
+from leg_wear_monitor.twin.follower.state import (
+    EVALUATED,
+    LAG,
+    LOAD_FRICTION,
+    TORQUE_SENSOR,
+    LegState,
+    leg_state,
+)
 from leg_wear_monitor.twin.follower.torque_estimate import LEAST_SAMPLES, LoadEstimate, find
 from leg_wear_monitor.twin.sampling.state import SampledState
 from leg_wear_monitor.twin.settings import INSTANT, TwinSettings
@@ -308,10 +316,17 @@ class LegFollower:
         if found is not None and is_compared:
             self._repeating.take(sums.by_phase if self._instants else self._by_phase(profile, acting_n))
         torque = torque_statistics(sums, found, self.estimate, self._unexplained_nm)
-        return torque, profile
+        return torque, self._rubbing(profile, acting_n)
+
+    def _rubbing(self, profile: TorqueProfile, acting_n: float) -> TorqueProfile:
+        """The profile with the predicted torque behind a drive whose friction grows with the torque."""
+        direction = 1 if self.state.motion.cut_rises else -1
+        factor = direction * float(self.estimate.values[LOAD_FRICTION])
+        transmitted = profile.predicted_nm + acting_n * profile.lever_m
+        return attrs.evolve(profile, predicted_nm=profile.predicted_nm + factor * np.abs(transmitted))
 
     def _by_phase(self, profile: TorqueProfile, acting_n: float) -> Floats:
-        """Residual (5, n) of the gait cycle that ends, of a sensor that averages."""
+        """Residual (6, n) of the gait cycle that ends, of a sensor that averages."""
         direction = 1 if self.state.motion.cut_rises else -1
         lag_s = float(self.estimate.values[LAG])
         duration_s = float(self.statistics.time[0])

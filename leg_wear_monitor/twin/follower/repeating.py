@@ -8,7 +8,7 @@ repeats.
 import numpy as np
 
 from leg_wear_monitor.mechanism.arrays import Floats
-from leg_wear_monitor.twin.follower.state import LOAD
+from leg_wear_monitor.twin.follower.torque_estimate import bounded, bounds
 from leg_wear_monitor.twin.statistics import TorqueProfile
 
 # gait cycles whose mean is taken, and how many are needed; fewer have more scatter, more have a longer delay
@@ -30,9 +30,9 @@ class RepeatingResidual:
 
     Attributes
     ----------
-    cycles : tuple of (5, n) arrays
+    cycles : tuple of (6, n) arrays
         For each gait cycle, the newest last, rows by phase: weight, then weight times residual, and weight
-        times its regressors load, friction and lag.
+        times its regressors load, friction, lag and load friction.
     """
 
     def __init__(self, most: int = INSTANT_CYCLES, least: int = INSTANT_CYCLES) -> None:
@@ -40,11 +40,11 @@ class RepeatingResidual:
         self.cycles: tuple[Floats, ...] = ()
 
     def take(self, by_phase: Floats) -> None:
-        """Add the sums (5, n) of a complete gait cycle."""
+        """Add the sums (6, n) of a complete gait cycle."""
         self.cycles = (*self.cycles, by_phase.copy())[-self._most :]
 
     def rms_nm(self, loads: tuple[float, float] = (-np.inf, np.inf)) -> float:
-        """RMS [N m] of the repeating residual without load, friction and lag; NaN without enough cycles.
+        """RMS [N m] of the repeating residual without load, frictions and lag; NaN without enough cycles.
 
         The squared standard error of the mean over cycles is subtracted, so that pure scatter gives 0 on
         average.
@@ -74,23 +74,14 @@ class RepeatingResidual:
 
 
 def _explained(mean: Floats, rows: Floats, loads: tuple[float, float]) -> Floats:
-    """What rows (3, n) of load, friction and lag explain of a mean residual (n,) by least squares."""
-    size = np.linalg.norm(rows, axis=1)
-    unit = rows / np.where(size > 0.0, size, 1.0)[:, None]  # zeros without a toe or speed explain nothing
-    found = np.linalg.lstsq(unit.T, mean, rcond=None)[0]
-    most = np.array(loads) * size[LOAD] if size[LOAD] > 0.0 else np.zeros(2)
-    load = min(max(float(found[LOAD]), most[0]), most[1])
-    if load != found[LOAD]:
-        rest = np.delete(unit, LOAD, axis=0)
-        by_load = load * unit[LOAD]
-        return np.asarray(by_load + np.linalg.lstsq(rest.T, mean - by_load, rcond=None)[0] @ rest)
-    return np.asarray(found @ unit)
+    """What rows (4, n) of load, friction, lag and load friction explain of a mean residual (n,)."""
+    return np.asarray(bounded(rows @ rows.T, rows @ mean, *bounds(loads)) @ rows)
 
 
 def averages_by_phase(
     profile: TorqueProfile, acting_n: float, lag_s: float, direction: int, duration_s: float, cutoff: float
 ) -> Floats:
-    """Sums (5, n) of a gait cycle of averages for `RepeatingResidual`.
+    """Sums (6, n) of a gait cycle of averages for `RepeatingResidual`.
 
     Each sample counts by the time that it stands for: where some are lost, the others weigh alone. Weights
     decrease with the time to a sample as exp(-cutoff t): as the two stages of the low-pass filter, without
@@ -115,7 +106,9 @@ def averages_by_phase(
     near = np.exp(-cutoff * apart)[np.abs(np.subtract.outer(np.arange(n), np.arange(n)))]
     residual = profile.measured_nm - profile.predicted_nm
     predicted = profile.predicted_nm + acting_n * profile.lever_m
-    smooth = near @ np.stack([weight, residual, profile.lever_m, direction * weight, predicted], axis=1)
+    rubbing = direction * np.abs(predicted)
+    columns = [weight, residual, profile.lever_m, direction * weight, predicted, rubbing]
+    smooth = near @ np.stack(columns, axis=1)
     of_all = smooth[:, 0].copy()
     torque = smooth[:, 4] / np.where(of_all > 0.0, of_all, 1.0)
     rate = (np.roll(torque, -1) - np.roll(torque, 1)) * n / (2.0 * duration_s)  # along the crank's angle

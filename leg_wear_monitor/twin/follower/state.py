@@ -14,8 +14,9 @@ FINE_PHASES = 128  # of the torque profile of a gait cycle
 # jump; tracked, with the leg left where it was
 COUNTED, SETTLING, TRACKED = 0, 1, 2
 
-# indices of the regressors of a torque residual
-LOAD, FRICTION, LAG = 0, 1, 2
+# number and indices of the regressors of a torque residual
+REGRESSORS = 4
+LOAD, FRICTION, LAG, LOAD_FRICTION = range(REGRESSORS)
 
 LEG_MOTION = np.dtype(
     [
@@ -76,10 +77,11 @@ LOW_PASS = np.dtype(
         ("predicted", "f8", (2,)),  # [N m]
         ("of_load", "f8", (2,)),  # torque per foot load [N m/N]
         ("of_friction", "f8", (2,)),  # torque per friction [-]
+        ("of_load_friction", "f8", (2,)),  # torque per friction under load [N m]
         # for a sensor that samples instants
         ("weight", "f8", (2,)),  # of an instant
         ("weighted_residual", "f8", (2,)),  # weight times residual [N m]
-        ("weighted_regressor", "f8", (3, 2)),  # weight times regressors
+        ("weighted_regressor", "f8", (REGRESSORS, 2)),  # weight times regressors
     ]
 )
 
@@ -88,7 +90,7 @@ WAITING_INSTANT = np.dtype(
         ("measured", "f8"),  # torque [N m]
         ("mean_predicted", "f8"),  # of the predicted torque since the previous instant [N m]
         ("variance", "f8"),  # of that torque [N^2 m^2]
-        ("regressor", "f8", (3,)),  # torque per load, friction and lag [N m/N, -, N m/s]
+        ("regressor", "f8", (REGRESSORS,)),  # torque per load, friction, lag, load friction
         ("time", "f8"),  # since the previous instant [s], 0 if none is stored
         ("angle", "f8"),  # of the crank [rad]
     ]
@@ -103,10 +105,10 @@ TORQUE_SUMS = np.dtype(
         ("residual_squares", "f8"),  # [N^2 m^2]
         ("measured_squares", "f8"),  # [N^2 m^2]
         ("predicted_squares", "f8"),  # [N^2 m^2]
-        ("gram", "f8", (3, 3)),  # products of the regressors (load, friction, lag) with each other
-        ("along", "f8", (3,)),  # products of the regressors with the residual
-        # for a sensor that samples instants: rows of weight, then weight times residual, load, friction, lag
-        ("by_phase", "f8", (5, PHASES)),
+        ("gram", "f8", (REGRESSORS, REGRESSORS)),  # products of the regressors with each other
+        ("along", "f8", (REGRESSORS,)),  # products of the regressors with the residual
+        # for a sensor that samples instants: rows of weight, then weight times residual and regressors
+        ("by_phase", "f8", (2 + REGRESSORS, PHASES)),
         # before the low-pass filter: weight, crank angle, measured torque, predicted torque, torque per load
         ("profile", "f8", (5, FINE_PHASES)),
     ]
@@ -119,7 +121,7 @@ LEG_STATE = np.dtype(
         ("torque", LEG_TORQUE),
         ("low_pass", LOW_PASS),
         ("waiting", WAITING_INSTANT),
-        ("regressor", "f8", (3,)),  # torque per load, friction and lag [N m/N, -, N m/s]
+        ("regressor", "f8", (REGRESSORS,)),  # torque per load, friction, lag and load friction
         ("sums", TORQUE_SUMS),
     ]
 )

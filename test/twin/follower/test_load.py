@@ -17,7 +17,14 @@ from leg_wear_monitor.mechanism.spec import ConstantLoad
 from leg_wear_monitor.record import Record, new_records, record_of
 from leg_wear_monitor.twin.digital_twin import DigitalTwin
 from leg_wear_monitor.twin.follower.load import FootLoad
-from leg_wear_monitor.twin.follower.state import FRICTION, LAG, LOAD, TORQUE_SUMS
+from leg_wear_monitor.twin.follower.state import (
+    FRICTION,
+    LAG,
+    LOAD,
+    LOAD_FRICTION,
+    REGRESSORS,
+    TORQUE_SUMS,
+)
 from leg_wear_monitor.twin.follower.torque_estimate import LoadEstimate, find
 from leg_wear_monitor.twin.sample import Samples, gait_samples
 from leg_wear_monitor.twin.settings import CONSTANT, STANCE, TwinSettings
@@ -78,6 +85,8 @@ def test_the_signature_is_virtual_work_without_mean(leg, shape):
 
 
 def sums_of(columns: np.ndarray, residual: np.ndarray) -> Record:
+    """Sums with the first regressors; the others are not there."""
+    columns = np.pad(columns, ((0, 0), (0, REGRESSORS - columns.shape[1])))
     sums = record_of(new_records(1, TORQUE_SUMS))
     sums.number = sums.weight = len(residual)
     sums.residual_squares = residual @ residual
@@ -93,16 +102,50 @@ def test_load_friction_and_lag_are_told_apart(load, friction, lag, phase):
     angle = np.linspace(0.0, TURN, 200, endpoint=False)
     columns = np.stack([0.1 * np.sin(angle + phase), np.ones(200), 40.0 * np.cos(3.0 * angle)], axis=1)
     found = find(sums_of(columns, columns @ [load, friction, lag]), 10.0)
-    np.testing.assert_allclose(found.values, [load, friction, lag], atol=1.0e-9 * 500.0)
+    np.testing.assert_allclose(found.values, [load, friction, lag, 0.0], atol=1.0e-9 * 500.0)
     assert found.condition == pytest.approx(1.0)
     assert found.left < 1.0e-4
+
+
+@pytest.mark.plain
+@given(
+    load=st.floats(-500.0, 500.0), friction=st.floats(-5.0, 5.0), load_friction=st.floats(0.0, 0.4),
+    phase=st.floats(0.0, TURN),
+)  # fmt: skip
+def test_friction_that_grows_with_the_torque_is_told_from_a_constant_one(
+    load, friction, load_friction, phase
+):
+    angle = np.linspace(0.0, TURN, 200, endpoint=False)
+    torque = 10.0 * np.sin(angle + phase) + 5.0 * np.sin(3.0 * angle)
+    columns = np.stack(
+        [0.1 * np.sin(angle), np.ones(200), 10.0 * np.cos(angle + phase), np.abs(torque)], axis=1
+    )
+    found = find(sums_of(columns, columns @ [load, friction, 0.0, load_friction]), 10.0, (-1e3, 1e3))
+    if found is not None and found.condition < 100.0:  # load and lag are alike at some phases
+        np.testing.assert_allclose(found.values[[1, 3]], [friction, load_friction], atol=1.0e-6)
+        assert found.left < 1.0e-3
+
+
+@pytest.mark.plain
+def test_a_drive_does_not_gain_from_its_load():
+    """Friction below 0 or above what gears have is not explained; the constant one beside it still is."""
+    angle = np.linspace(0.0, TURN, 200, endpoint=False)
+    columns = np.stack(
+        [0.1 * np.sin(angle), np.ones(200), np.cos(3.0 * angle), np.abs(np.sin(angle))], axis=1
+    )
+    found = find(sums_of(columns, columns @ [0.0, 1.0, 0.0, -1.0]), 1.0)
+    mean = 2.0 / np.pi
+    assert found.left == pytest.approx(np.sqrt(0.5 - mean**2), rel=0.01)  # of |sin| about its mean
+    estimate = LoadEstimate(1000.0)
+    estimate.take(found, True)
+    assert estimate.values[LOAD_FRICTION] == 0.0
 
 
 def test_without_a_toe_only_friction_and_lag_are_sought():
     angle = np.linspace(0.0, TURN, 50, endpoint=False)
     columns = np.stack([np.zeros(50), np.ones(50), np.cos(angle)], axis=1)
     found = find(sums_of(columns, columns @ [0.0, 2.0, 0.1]), 1.0)
-    np.testing.assert_allclose(found.values, [0.0, 2.0, 0.1])
+    np.testing.assert_allclose(found.values, [0.0, 2.0, 0.1, 0.0])
     estimate = LoadEstimate(100.0)
     estimate.take(found, True)
     assert estimate.acting == 0.0
@@ -127,7 +170,7 @@ def test_a_load_is_found_and_moves_the_contact_forces(leg, force, friction):
     assert torque.torque_lag_s == pytest.approx(0.0, abs=1.0e-3)
     assert torque.load_acting_n == (torque.load_n if force else 0.0)
     assert torque.unexplained_rms_nm < 0.15 * torque.measured_rms_nm
-    assert torque.condition < 1.2
+    assert torque.condition < 5.0  # 2.8 to 3.7: a torque that rubs has a mean, as a constant friction has
     force_n = np.mean([cycle.mean_force_n for cycle in last], axis=0)
     np.testing.assert_allclose(force_n, wanted, rtol=0.05, atol=1.0)
 

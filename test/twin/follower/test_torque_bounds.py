@@ -9,14 +9,14 @@ from leg_wear_monitor.mechanism.ideal import TURN
 from leg_wear_monitor.record import new_records, record_of
 from leg_wear_monitor.twin.digital_twin import DigitalTwin
 from leg_wear_monitor.twin.follower.repeating import INSTANT_CYCLES, RepeatingResidual
-from leg_wear_monitor.twin.follower.state import PHASES, TORQUE_SUMS
+from leg_wear_monitor.twin.follower.state import PHASES, REGRESSORS, TORQUE_SUMS
 from leg_wear_monitor.twin.follower.torque_estimate import LoadEstimate, find
 from leg_wear_monitor.twin.sample import gait_samples
 from leg_wear_monitor.twin.settings import TwinSettings
 from leg_wear_monitor.twin.statistics import NotCompared
 
 ANGLE = np.linspace(0.0, TURN, 200, endpoint=False)
-COLUMNS = np.stack([0.1 * np.sin(ANGLE), np.ones(200), 40.0 * np.cos(3.0 * ANGLE)], axis=1)
+COLUMNS = np.stack([0.1 * np.sin(ANGLE), np.ones(200), 40.0 * np.cos(3.0 * ANGLE), np.zeros(200)], axis=1)
 
 
 def sums_of(residual):
@@ -30,11 +30,11 @@ def sums_of(residual):
 @pytest.mark.plain
 def test_a_foot_that_pulls_is_not_explained_by_a_load():
     """What a load below 0 would explain is left in the mismatch; the friction beside it is still found."""
-    residual = COLUMNS @ [-50.0, 1.5, 0.001]
+    residual = COLUMNS @ [-50.0, 1.5, 0.001, 0.0]
     free, bounded = find(sums_of(residual), 10.0), find(sums_of(residual), 10.0, (0.0, 1000.0))
     assert free.left == pytest.approx(0.0, abs=1e-4)
     assert bounded.left == pytest.approx(5.0 / np.sqrt(2.0), rel=1e-6)
-    np.testing.assert_allclose(bounded.values, [-50.0, 1.5, 0.001], rtol=1e-9)
+    np.testing.assert_allclose(bounded.values, [-50.0, 1.5, 0.001, 0.0], rtol=1e-9)
     estimate = LoadEstimate(1000.0, 0.0)
     estimate.take(bounded, True)
     assert estimate.values[0] == estimate.acting == 0.0
@@ -44,7 +44,7 @@ def test_a_foot_that_pulls_is_not_explained_by_a_load():
 @pytest.mark.plain
 @given(st.floats(0.0, 500.0))
 def test_a_load_within_its_bounds_is_explained(load):
-    found = find(sums_of(COLUMNS @ [load, 0.0, 0.0]), 10.0, (0.0, 1000.0))
+    found = find(sums_of(COLUMNS @ [load, 0.0, 0.0, 0.0]), 10.0, (0.0, 1000.0))
     assert found.left == pytest.approx(0.0, abs=1e-3)
 
 
@@ -53,7 +53,7 @@ def instants(repeats: float, scatter: float, seed: int = 0):
     found, chance = RepeatingResidual(), np.random.default_rng(seed)
     phase = (np.arange(PHASES) + 0.5) / PHASES * TURN
     for _ in range(INSTANT_CYCLES):
-        sums = np.ones((5, PHASES))
+        sums = np.ones((2 + REGRESSORS, PHASES))
         wave = np.sqrt(2.0) * repeats * np.sin(5.0 * phase)
         sums[1] = 2.0 + wave + scatter * chance.standard_normal(PHASES)
         sums[2], sums[4] = 0.1 * np.sin(phase), np.cos(2.0 * phase)

@@ -1,0 +1,197 @@
+"""Legs behind drives as they are sold: what the diagnosis says of healthy and of worn ones.
+
+The legs of `disturbed.py` in the air, in full coordinates, with masses 4 % off the file. Their torque passes
+a drive: friction that grows with the load, Coulomb and viscous friction, cogging, a low-pass, a lag, a torque
+constant and friction that change over twenty minutes, steps of the sensor, lost samples. The first table is
+of healthy legs: gait cycles drawn in blocks of ten make up the given time. The second is of joints that open
+after 90 gait cycles; where a drive warms up, when it is half warm.
+`python benchmarks/drives.py --keep DIRECTORY [--hours 100]`.
+"""
+
+import argparse
+import functools
+from pathlib import Path
+
+import one_core  # noqa: F401
+
+# isort: split
+import attrs
+import numpy as np
+from diagnosis import NEW, RATE, kept
+from disturbed import COMMISSIONED, HEALTHY, MASSES, WORN, drawn, signed, walked, watched
+
+from leg_wear_monitor import load_mechanism
+from leg_wear_monitor.estimate.signature import TorqueSensor
+from leg_wear_monitor.mechanism.ideal import TURN
+from leg_wear_monitor.mechanism.position import build_linkage
+from leg_wear_monitor.monitor.diagnosis import leg_models, references
+from leg_wear_monitor.twin.follower.load import torque_size
+from leg_wear_monitor.twin.reference.leg_parameters import LegParameters
+
+OPENINGS = (("A", 0.45), ("B", 0.45), ("G", 0.45), ("I", 0.45), ("J", 0.45), ("G", 0.6), ("J", 1.0))
+WARM = 1200  # gait cycles until a drive is warm
+LEVELS = 11  # of what drifts, between cold and warm
+
+
+@attrs.frozen(kw_only=True)
+class Drive:
+    """What stands between the leg's torque and its samples; drifts are what a warm drive has more."""
+
+    lag_s: float = 0.0
+    hz: float = 0.0
+    load_friction: float = 0.0
+    coulomb_nm: float = 0.0
+    viscous_nms: float = 0.0
+    cogging: float = 0.0  # of the torque's RMS
+    waves: float = 72.0  # of it in a turn of the crank
+    quantum_nm: float = 0.0
+    loss: float = 0.0
+    scale_drift: float = 0.0
+    coulomb_drift_nm: float = 0.0
+    load_friction_drift: float = 0.0
+
+    @property
+    def drifts(self) -> bool:
+        return bool(self.scale_drift or self.coulomb_drift_nm or self.load_friction_drift)
+
+    def received(self, walk: np.ndarray, warm: float, size_nm: float) -> np.ndarray:
+        """A walk as this drive reports it, cold (0) to warm (1)."""
+        walk, step = walk.copy(), 1.0 / RATE
+        torque = np.diff(walk[:, 2], prepend=0.0) / step
+        torque = torque + (self.load_friction + warm * self.load_friction_drift) * np.abs(torque)
+        torque += self.coulomb_nm + warm * self.coulomb_drift_nm + self.viscous_nms * TURN
+        torque += self.cogging * size_nm * np.sqrt(2.0) * np.sin(self.waves * walk[:, 1])
+        torque *= 1.0 + warm * self.scale_drift
+        if self.hz:
+            part, value = 1.0 - np.exp(-TURN * self.hz * step), torque[0]
+            for i, now in enumerate(torque):
+                value += part * (now - value)
+                torque[i] = value
+        time = walk[:, 0]
+        walk[:, 2] = np.interp(time - self.lag_s, time, np.cumsum(torque) * step, left=0.0)
+        walk[:, 1] += TURN
+        return walk
+
+
+ALL = Drive(
+    lag_s=0.01, hz=35.0, load_friction=0.2, coulomb_nm=1.0, viscous_nms=0.1, cogging=0.03, waves=72.3,
+    quantum_nm=0.1, loss=0.02, scale_drift=-0.1, coulomb_drift_nm=-0.5, load_friction_drift=-0.05,
+)  # fmt: skip
+DRIVES = {
+    "none": Drive(),
+    **{f"lag {ms} ms": Drive(lag_s=1e-3 * ms) for ms in (5, 10, 20, 30)},
+    **{f"low-pass {hz} Hz": Drive(hz=float(hz)) for hz in (20, 35, 50)},
+    **{f"load friction {eta:g}": Drive(load_friction=eta) for eta in (0.1, 0.2, 0.3)},
+    "Coulomb 1 N m": Drive(coulomb_nm=1.0),
+    "viscous 1.4 N m s": Drive(viscous_nms=1.4),
+    "torque constant -10 % in 20 min": Drive(scale_drift=-0.1),
+    "Coulomb 1 N m less in 20 min": Drive(coulomb_nm=2.0, coulomb_drift_nm=-1.0),
+    "load friction 0.2, 0.1 warm": Drive(load_friction=0.2, load_friction_drift=-0.1),
+    "cogging 3 %, 72 waves": Drive(cogging=0.03),
+    "cogging 3 %, 100.3 waves": Drive(cogging=0.03, waves=100.3),
+    "steps of 0.1 N m": Drive(quantum_nm=0.1),
+    "2 % lost": Drive(loss=0.02),
+    "friction 0.2, 35 Hz, 5 ms": Drive(load_friction=0.2, hz=35.0, lag_s=0.005),
+    "all": ALL,
+}
+
+
+def cycles_of(walk: np.ndarray, drive: Drive, sensor: TorqueSensor, seed: int) -> np.ndarray:
+    """Signatures (levels, cycles, F) of a walk, cold to warm; one level where nothing drifts."""
+    levels = np.linspace(0.0, 1.0, LEVELS) if drive.drifts else np.zeros(1)
+    return np.array(
+        [
+            signed(
+                drive.received(walk, warm, sensor.size_nm),
+                sensor,
+                seed,
+                loss=drive.loss,
+                quantum_nm=drive.quantum_nm,
+            )
+            for warm in levels
+        ]
+    )
+
+
+def warming(cycles: np.ndarray, order: list[int], begin: int = 0) -> list[np.ndarray]:
+    """Signatures in a given order, of a drive that warms up from a gait cycle on."""
+    last = len(cycles) - 1
+    warm = np.minimum((begin + np.arange(len(order))) / WARM, 1.0)
+    return [cycles[round(w * last), i] for w, i in zip(warm.tolist(), order, strict=True)]
+
+
+def main() -> None:
+    parser = argparse.ArgumentParser(description=__doc__)
+    parser.add_argument("--keep", type=Path)
+    parser.add_argument("--hours", type=float, default=2.0)
+    parser.add_argument("--drive", action="append", choices=sorted(DRIVES))
+    parser.add_argument("--worn-only", action="store_true")
+    parser.add_argument("--healthy-only", action="store_true")
+    options = parser.parse_args()
+    references.ROUNDS, leg_models.UNLIKE_FILE = 0, leg_models.NAMED_TO
+    leg = load_mechanism("bionic_leg")
+    mass = np.array([MASSES.get(body, 1.0) for body in leg.bodies])
+    real = LegParameters(mass, np.ones(len(mass))).applied(leg)
+    size = torque_size(build_linkage(leg), TURN)
+    sensor = TorqueSensor(0.005, 1.0, size)
+
+    @functools.cache
+    def walk(joint: str, size_mm: float) -> np.ndarray:
+        clearance = np.where(np.array(leg.clearance_joints) == joint, 1e-3 * size_mm, NEW)
+        cycles = WORN if joint else HEALTHY
+        file = options.keep / f"{joint or 'new'} {size_mm:.2f} 0.pkl" if options.keep else None
+        return kept(file, lambda: walked(real, clearance, cycles + 3, 0.0, round(1000 * size_mm)))
+
+    names = options.drive or list(DRIVES)
+    if not options.worn_only:
+        print("| drive | lag, time constant, load friction found | misfit | findings |\n|---|---|---|---|")
+        for name in names:
+            cycles = cycles_of(walk("", 0.3), DRIVES[name], sensor, 5)
+            order = drawn(np.arange(cycles.shape[1])[:, None], round(3600 * options.hours))
+            rows = warming(cycles, [int(one[0]) for one in order])
+            one, found = watched(leg, size, rows)
+            own, off = one.state.sensor, one._models.misfit(one.state)
+            own = own.channel
+            channel = (
+                f"{1e3 * own.delay_s:.2f} ms, {1e3 * own.time_constant_s:.2f} ms, {own.load_friction:.3f}"
+            )
+            print(f"| {name} | {channel} | {off:.2f} | {summary(found) or 'none'} |", flush=True)
+    if not options.healthy_only:
+        heads = " | ".join(f"{joint} {size_mm:g}" for joint, size_mm in OPENINGS)
+        print(f"\n| drive | {heads} |\n|---{'|---' * len(OPENINGS)}|")
+        for name in names:
+            cells = []
+            healthy = cycles_of(walk("", 0.3), DRIVES[name], sensor, 5)
+            for joint, size_mm in OPENINGS:
+                worn = cycles_of(walk(joint, size_mm), DRIVES[name], sensor, 6)
+                begin = 600 if DRIVES[name].drifts else 0
+                rows = warming(healthy, [i % healthy.shape[1] for i in range(COMMISSIONED + begin)])
+                rows += warming(worn, list(range(worn.shape[1])), len(rows))
+                one, found = watched(leg, size, rows)
+                seen, k = one.diagnosis, leg.clearance_joints.index(joint)
+                value = (
+                    f"{1e3 * seen.clearance_m[k]:.2f} ± {1e3 * seen.sigma_m[k]:.2f}"
+                    if seen.clearance_m
+                    else "-"
+                )
+                cells.append(f"{when(found, COMMISSIONED + begin)} {value}")
+            print(f"| {name} | {' | '.join(cells)} |", flush=True)
+
+
+def summary(found: list[str]) -> str:
+    """Findings, each once, with the gait cycle of the first and their number."""
+    told: dict[str, list[int]] = {}
+    for text in found:
+        at, _, what = text.partition(": ")
+        told.setdefault(what, []).append(int(at))
+    return ", ".join(f"{what} ({at[0]}, {len(at)} cycles)" for what, at in told.items())
+
+
+def when(found: list[str], since: int) -> str:
+    """What was found, and the gait cycle since a change in which it first was."""
+    told = {text.partition(": ")[2]: int(text.partition(":")[0]) for text in reversed(found)}
+    return ", ".join(f"{what} ({at - since + 1})" for what, at in reversed(told.items()))
+
+
+if __name__ == "__main__":
+    main()

@@ -11,6 +11,8 @@ import math
 from numba import types
 
 from leg_wear_monitor.dynamics.clearance.contact import A0, E0, F_T, V0, accelerate_clearances
+from leg_wear_monitor.dynamics.clearance.coupling import PARTS, STIFFNESS
+from leg_wear_monitor.dynamics.clearance.crank import coupling_torque, release, turn_crank
 from leg_wear_monitor.dynamics.clearance.film_effects import integrate_films, total_force
 from leg_wear_monitor.dynamics.clearance.model import ACCELERATION, ANGLE, SPEED, blend, crank_between
 from leg_wear_monitor.dynamics.clearance.outputs import (
@@ -103,6 +105,8 @@ def _interval(model, surfaces, state, polynomial, statistics, work):
     """Advance by one interval, in parts where the linkage moves fast; returns status and joint."""
     i, _ = blend(model.tables.parts.shape[0], state.drive[ANGLE])
     parts, status, k = model.tables.parts[i], DONE, -1
+    if model.coupling.law[STIFFNESS] > 0.0:
+        parts *= int(model.coupling.law[PARTS])
     for part in range(parts):
         begin, end = state.intervals[0] + part / parts, state.intervals[0] + (part + 1.0) / parts
         status, k = _part(
@@ -131,15 +135,30 @@ def _part(model, surfaces, state, polynomial, begin, end, statistics, work):
     """Advance by a part of an interval, from begin to end [s], with the tables of its middle."""
     length = end - begin
     copy_array(state.drive, work.crank)
-    drive_at(polynomial, end, state.drive)
-    angle, speed, acceleration = crank_between(work.crank, state.drive, length)
+    coupled, torque = model.coupling.law[STIFFNESS] > 0.0, 0.0
+    if coupled:
+        drive_at(polynomial, begin + 0.5 * length, state.drive)
+        speed, acceleration = work.crank[SPEED], 0.0
+        angle = work.crank[ANGLE] + 0.5 * length * speed
+        law = model.coupling.law
+        torque = coupling_torque(law, state.drive[ANGLE], state.drive[SPEED], angle, speed)
+    else:
+        drive_at(polynomial, end, state.drive)
+        angle, speed, acceleration = crank_between(work.crank, state.drive, length)
     if not (abs(speed) < _FASTEST and abs(acceleration) * length < _FASTEST):
         return INVALID_DRIVE, -1
     load_state(model, surfaces, state, angle, speed, acceleration, 0.5 * length, work)
+    whole, steeper = 1.0, 0.0
+    if coupled:
+        whole, steeper = release(model.coupling, angle, length, torque, work)
+    impulse = statistics.drive_integral[TORQUE]
     turned = -0.5 * length * speed  # crank angle at the begin, relative to that of the tables
     sample_start(model, surfaces, state, turned, begin, statistics, work)
     status, k = _steps(model, surfaces, state, begin, length, statistics, work)
     if status == DONE:
+        if coupled:
+            law = model.coupling.law
+            turn_crank(law, whole, steeper, length, torque, impulse, state, statistics, work)
         for i in range(state.e.shape[0]):
             state.e[i], state.v[i] = work.x[E0, i], work.x[V0, i]
     return status, k

@@ -10,6 +10,7 @@ import numpy as np
 from leg_wear_monitor.beside import compiled_beside
 from leg_wear_monitor.contact.arrays import ContactArrays
 from leg_wear_monitor.dynamics.clearance.advance import advance_clearances, observe
+from leg_wear_monitor.dynamics.clearance.coupling import rigid_coupling
 from leg_wear_monitor.dynamics.clearance.film_system import film_model
 from leg_wear_monitor.dynamics.clearance.joint_laws import contact_laws
 from leg_wear_monitor.dynamics.clearance.layout import motion_shapes
@@ -56,7 +57,15 @@ def _leg() -> tuple[ClearanceModel, ClearanceState, ClearanceWork]:
     contacts, line = _contacts(), np.zeros(2)
     film = film_model(contacts, np.zeros((1, 2)))
     model = ClearanceModel(
-        contacts, _tables(), 1.0, tolerance=line, law=contact_laws(contacts), usual=1, film=film, damped=0
+        contacts,
+        _tables(),
+        1.0,
+        tolerance=line,
+        law=contact_laws(contacts),
+        usual=1,
+        film=film,
+        damped=0,
+        coupling=rigid_coupling(),
     )
     state = clearance_state(np.zeros((1, 2, 1)), 0.0, 1.0)
     return model, state, clearance_work(model, state)

@@ -7,6 +7,7 @@ import numpy as np
 
 from leg_wear_monitor.contact.arrays import ContactArrays
 from leg_wear_monitor.dynamics.clearance.contact import ADDED, VECTORS, fresh_sample
+from leg_wear_monitor.dynamics.clearance.coupling import Coupling
 from leg_wear_monitor.dynamics.clearance.film import FilmModel
 from leg_wear_monitor.dynamics.clearance.layout import motion_shapes, views
 from leg_wear_monitor.dynamics.clearance.rosenbrock import ContactSystem, contact_system
@@ -26,7 +27,7 @@ class ClearanceModel(NamedTuple):
     ``interval`` [s]: time between the instants at which the state exists; ``tolerance`` (2,): reciprocals of
     the local error allowed in a step, of eccentricities [1/m] and of their rates [s/m]; ``law`` (LAW_ROWS,
     room): of `contact_laws`, ``usual``: 1 if `have_usual_laws`, else 0; ``film``: films of the joints;
-    ``damped``: 1 with dampers, else 0.
+    ``damped``: 1 with dampers, else 0; ``coupling``: between the drive and the crank.
     """
 
     contacts: ContactArrays
@@ -37,6 +38,7 @@ class ClearanceModel(NamedTuple):
     usual: int
     film: FilmModel
     damped: int
+    coupling: Coupling
 
 
 class ClearanceState(NamedTuple):

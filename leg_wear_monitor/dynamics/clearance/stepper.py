@@ -7,6 +7,7 @@ import numpy as np
 from leg_wear_monitor.dynamics.clearance.advance import ADVANCE, advance_clearances, observe
 from leg_wear_monitor.dynamics.clearance.basis import is_damped
 from leg_wear_monitor.dynamics.clearance.contact import A0, E0, F_T, NX, NY, V0
+from leg_wear_monitor.dynamics.clearance.coupling import rigid_coupling
 from leg_wear_monitor.dynamics.clearance.film import FILM_X, FILM_Y
 from leg_wear_monitor.dynamics.clearance.film_system import film_model
 from leg_wear_monitor.dynamics.clearance.joint_laws import contact_laws, have_usual_laws
@@ -102,6 +103,7 @@ class ClearanceStepper:
             usual=int(have_usual_laws(setup.contacts)),
             film=film_model(setup.contacts, setup.films),
             damped=int(is_damped(setup.linkage.arrays)),
+            coupling=rigid_coupling(),
         )
         self.state: ClearanceState = clearance_state(setup.surfaces.depth, 0.0, setup.speed)
         self.work = clearance_work(self.model, self.state)

@@ -3,9 +3,12 @@
 import numpy as np
 
 from leg_wear_monitor.dynamics.clearance.advance import ADVANCE
+from leg_wear_monitor.dynamics.clearance.basis import is_damped
+from leg_wear_monitor.dynamics.clearance.coupling import Coupling, coupling_of, rigid_coupling
+from leg_wear_monitor.dynamics.clearance.model import ClearanceModel
 from leg_wear_monitor.dynamics.clearance.stepper import INTERVALS, ClearanceStepper
 from leg_wear_monitor.dynamics.run.drive import quintic
-from leg_wear_monitor.dynamics.run.protocol import DONE
+from leg_wear_monitor.dynamics.run.protocol import DONE, Setup
 from leg_wear_monitor.dynamics.run.run_statistics import TORQUE, new_run_statistics
 from leg_wear_monitor.dynamics.simulation import prepare
 from leg_wear_monitor.kernel import entry
@@ -13,7 +16,7 @@ from leg_wear_monitor.mechanism.arrays import Floats
 from leg_wear_monitor.mechanism.ideal import TURN
 from leg_wear_monitor.mechanism.spec import Mechanism
 from leg_wear_monitor.twin.reference.crank_profile import CrankProfile
-from leg_wear_monitor.twin.reference.leg_parameters import LegParameters
+from leg_wear_monitor.twin.reference.leg_parameters import COUPLING_DAMPING, LegParameters
 from leg_wear_monitor.twin.reference.reference import worn_to
 
 POINTS = INTERVALS // 4  # of a gait cycle: whole intervals of the stepper
@@ -101,6 +104,8 @@ class LegSimulation:
         self._setup.contacts.clearance[:] = clearance
         self._setup.surfaces.depth[:] = worn
         stepper = ClearanceStepper(self._setup, period / INTERVALS, tables=self._tables)
+        coupling = drive_coupling(self._setup, stepper.model, parameters.compliance)
+        stepper.model = stepper.model._replace(coupling=coupling)
         stepper.init(motions[0].angle, motions[0].speed)
         statistics = new_run_statistics(len(self._mechanism.joints))
         polynomial, torque = np.empty(7), np.empty((cycles, POINTS))
@@ -118,6 +123,14 @@ class LegSimulation:
         self._fresh = self._setup.contacts.clearance.copy()
         self._tables = ClearanceStepper(self._setup).model.tables
         self._parameters = parameters
+
+
+def drive_coupling(setup: Setup, model: ClearanceModel, compliance: float) -> Coupling:
+    """Coupling of a leg whose drive has a compliance [rad/(N m)]."""
+    if compliance == 0.0:
+        return rigid_coupling()
+    joints, damped = len(setup.clearance_joints), is_damped(setup.linkage.arrays)
+    return coupling_of(model.tables, joints, damped, model.interval, 1.0 / compliance, COUPLING_DAMPING)
 
 
 def even_angles(profile: CrankProfile) -> Floats:

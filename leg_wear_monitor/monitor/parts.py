@@ -137,7 +137,8 @@ class Parts:
         if known is None:
             return None
         order = [known.names.index(name) for name in self.mechanism.bodies]
-        return LegParameters(np.array(known.mass)[order], np.array(known.length)[order], known.friction)
+        bodies = np.array(known.mass)[order], np.array(known.length)[order]
+        return LegParameters(*bodies, known.friction, known.compliance)
 
     def _known_references(self, ledger: Ledger | None) -> list[TorqueReference]:
         """Torque references of the ledger, their parameters in the order of the mechanism."""

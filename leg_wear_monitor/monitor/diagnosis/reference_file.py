@@ -92,6 +92,7 @@ def write_references(file: IO[bytes], mechanism: Mechanism, references: Sequence
             f"mass_{i}": one.parameters.mass,
             f"length_{i}": one.parameters.length,
             f"friction_{i}": one.parameters.friction,
+            f"compliance_rad_per_nm_{i}": one.parameters.compliance,
             f"clearance_m_{i}": one.clearance_m,
             f"expected_torque_nm_{i}": one.torque_nm[0],
             f"torque_nm_{i}": np.stack(one.torque_nm[1:]),
@@ -153,13 +154,15 @@ def _reference(parts: Any, i: int, order: list[int], joints: int) -> TorqueRefer
     cosine, sine = _checked(parts, f"ripple_rad_{i}", (2, HARMONICS))
     mass, length = (_checked(parts, f"{name}_{i}", (len(order),))[order] for name in ("mass", "length"))
     friction, speed = (float(_checked(parts, f"{name}_{i}", ())) for name in ("friction", "speed_radps"))
+    name = f"compliance_rad_per_nm_{i}"  # files from before drives could be compliant are without
+    compliance = float(_checked(parts, name, ())) if name in parts else 0.0
     for name, values in (("mass", mass), ("length", length), ("clearance", clearance_m)):
         if not (values > 0.0).all():
             raise ValueError(f"a {name} is not above 0")
-    if friction < 0.0 or speed == 0.0:
-        raise ValueError("friction is below 0, or speed is 0")
-    profile = CrankProfile(speed, cosine, sine)
-    return TorqueReference(profile, clearance_m, (expected, *torque), LegParameters(mass, length, friction))
+    if friction < 0.0 or compliance < 0.0 or speed == 0.0:
+        raise ValueError("friction or compliance is below 0, or speed is 0")
+    profile, leg = CrankProfile(speed, cosine, sine), LegParameters(mass, length, friction, compliance)
+    return TorqueReference(profile, clearance_m, (expected, *torque), leg)
 
 
 def _checked(parts: Any, name: str, shape: tuple[int | None, ...]) -> Any:

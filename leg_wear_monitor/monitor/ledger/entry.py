@@ -302,7 +302,7 @@ class Commissioned:
 
 @attrs.frozen
 class IdentifiedLeg:
-    """Masses, lengths and friction of a leg, as factors on those of its mechanism file.
+    """Masses, lengths and friction of a leg, as factors on those of its mechanism file, and its drive.
 
     Attributes
     ----------
@@ -311,6 +311,8 @@ class IdentifiedLeg:
     mass, length : tuple of float
     friction : float
         In all joints.
+    compliance : float
+        Between the measured crank angle and the crank [rad/(N m)].
     """
 
     stamp_ns: int
@@ -318,6 +320,7 @@ class IdentifiedLeg:
     mass: tuple[float, ...]
     length: tuple[float, ...]
     friction: float
+    compliance: float = 0.0
 
 
 @attrs.frozen(eq=False)

@@ -120,8 +120,11 @@ def write_event(db: sqlite3.Connection, event: Event) -> None:
                     event.speed,
                 ),
             )
-        case IdentifiedLeg(stamp_ns, names, mass, length, friction):
+        case IdentifiedLeg(stamp_ns, names, mass, length, friction, compliance):
             db.execute("INSERT INTO friction (stamp_ns, factor) VALUES (?, ?)", (stamp_ns, friction))
+            db.execute(
+                "INSERT INTO drive (stamp_ns, compliance_rad_per_nm) VALUES (?, ?)", (stamp_ns, compliance)
+            )
             db.executemany(
                 "INSERT INTO body (stamp_ns, name, mass, length) VALUES (?, ?, ?, ?)",
                 [(stamp_ns, *factors) for factors in zip(names, mass, length, strict=True)],
@@ -212,9 +215,9 @@ def read_commissioned_torques(db: sqlite3.Connection) -> list[CommissionedTorque
 
 
 def read_identified_leg(db: sqlite3.Connection) -> IdentifiedLeg | None:
-    """Masses, lengths and friction of the leg, None if they were not identified.
+    """Masses, lengths, friction and drive of the leg, None if they were not identified.
 
-    Rows of older formats were identified with the friction of the mechanism file.
+    Rows of older formats were identified with the friction of the mechanism file, or with a rigid drive.
     """
     rows = db.execute(
         "SELECT stamp_ns, name, mass, length FROM body "
@@ -223,10 +226,12 @@ def read_identified_leg(db: sqlite3.Connection) -> IdentifiedLeg | None:
     if not rows:
         return None
     stamps, names, mass, length = zip(*rows, strict=True)
-    found = db.execute(
-        "SELECT factor FROM friction WHERE stamp_ns = ? ORDER BY id DESC", stamps[:1]
-    ).fetchone()
-    return IdentifiedLeg(stamps[0], names, mass, length, found[0] if found else 1.0)
+    friction, compliance = (
+        db.execute(f"SELECT {value} FROM {table} WHERE stamp_ns = ? ORDER BY id DESC", stamps[:1]).fetchone()
+        for table, value in (("friction", "factor"), ("drive", "compliance_rad_per_nm"))
+    )
+    known = friction[0] if friction else 1.0, compliance[0] if compliance else 0.0
+    return IdentifiedLeg(stamps[0], names, mass, length, *known)
 
 
 def _write_reference(db: sqlite3.Connection, event: SimulatedReference) -> None:
@@ -257,6 +262,7 @@ def _reference_values(event: SimulatedReference) -> tuple[float | bytes | str, .
         "\n".join(event.bodies),
         *(part.astype("<f8").tobytes() for part in (leg.mass, leg.length)),
         leg.friction,
+        leg.compliance,
         reference.torque_nm[0].astype("<f2").tobytes(),
         b"".join(one.astype("<f2").tobytes() for one in reference.torque_nm[1:]),
     )
@@ -268,21 +274,31 @@ def read_simulated_references(db: sqlite3.Connection) -> list[SimulatedReference
     One whose simulation was not finished is among them.
     """
     rows = db.execute(
-        "SELECT is_whole, stamp_ns, bodies, speed_radps, legs, friction, ripple_rad, clearance_m, mass, "
-        "length, expected_torque_nm, torque_nm FROM torque_reference ORDER BY id DESC"
+        "SELECT is_whole, stamp_ns, bodies, speed_radps, legs, friction, compliance_rad_per_nm, ripple_rad, "
+        "clearance_m, mass, length, expected_torque_nm, torque_nm FROM torque_reference ORDER BY id DESC"
     )
     return [_reference_of(*row) for row in rows]
 
 
 def _reference_of(
-    is_whole: int, stamp_ns: int, bodies: str, speed: float, legs: int, friction: float, *parts: bytes
+    is_whole: int,
+    stamp_ns: int,
+    bodies: str,
+    speed: float,
+    legs: int,
+    friction: float,
+    compliance: float,
+    *parts: bytes,
 ) -> SimulatedReference:
     """Reference of a row."""
     ripple, known, mass, length = (np.frombuffer(part, "<f8").astype(float) for part in parts[:4])
     expected, wider = (
         np.frombuffer(part, "<f2").astype(np.float16).reshape(-1, POINTS) for part in parts[4:]
     )
-    profile, leg = CrankProfile(speed, *ripple.reshape(2, -1)), LegParameters(mass, length, friction)
+    profile, leg = (
+        CrankProfile(speed, *ripple.reshape(2, -1)),
+        LegParameters(mass, length, friction, compliance),
+    )
     shape = (legs - 1, -1, POINTS) if is_whole else (-1, CYCLES, POINTS)
     torque = (expected, *wider.reshape(shape))
     reference = TorqueReference(profile, known.reshape(legs, -1), torque, leg)

@@ -138,7 +138,7 @@ def test_a_ledger_of_format_4_is_migrated_with_the_entries_of_its_log(
     found.note(EVENT)
     found.keep(entry_at(6), closed=True)
     found.close()
-    assert version(ledger.path) == schema.FORMAT == 13
+    assert version(ledger.path) == schema.FORMAT == 14
     assert len(rows(ledger.path)) == 1
     assert open_ledger().entry.digest() == entry_at(6).digest()
 

@@ -1,6 +1,7 @@
 """docs/reference/json.md lists the fields that the classes declare; this file as a script renews it."""
 
 import json
+import math
 import re
 import sys
 from collections.abc import Iterator
@@ -16,6 +17,7 @@ from json_fields import Row, descriptions, rows_of, unit_of
 from made_up_summary import made_up_summary
 
 import leg_wear_monitor as lw
+from leg_wear_monitor.commissioning.result.joint_detection import JointDetection
 from leg_wear_monitor.life.result import Life
 from leg_wear_monitor.play.result import Clearances, JointClearance, Play, PlayMeasurement
 
@@ -83,6 +85,10 @@ def commissioning() -> Iterator[Row]:
     yield "not_enough_to_tell[]", "text", "", told["not_told"]
     yield "findings[]", "text", "", told["findings"]
     yield "notes[]", "text", "", told["notes"]
+    yield "joints[]", "object", "", told["joints"]
+    yield from rows_of(JointDetection, "joints[].")
+    yield "judgement", "text", "", lw.CommissioningResult.judgement.__doc__ or ""
+    yield "reference_used", "text", "", told["reference_used"]
 
 
 def play() -> Iterator[Row]:
@@ -139,9 +145,10 @@ def example(name: str) -> Any:
         joints = (JointClearance(joint="G", rad_per_m=(5.0,), most_m=0.001),)
         return json.loads(PlayMeasurement(plays=(one,), clearances=Clearances(joints=joints)).to_json())
     item = lw.CommissioningItem(name="crank.sign", value=1)
-    return lw.CommissioningResult(
-        items=(item,), not_told=("lag",), findings=("load",), notes=("note",), config=None, turns=1.0
-    ).to_dict()
+    told = {"not_told": ("lag",), "findings": ("load",), "notes": ("note",)}
+    cycles = {"clearances_m": (6.0e-4,), "cycles": (2.0,), "named_cycles": (math.nan,)}
+    joint = JointDetection(joint="J", is_good=False, runner_up="", **cycles)
+    return lw.CommissioningResult(items=(item,), config=None, turns=1.0, joints=(joint,), **told).to_dict()
 
 
 def leaves(value: Any, path: str = "") -> Iterator[str]:

@@ -9,12 +9,16 @@ from leg_wear_monitor.bags.bag import Recordable, listed_recordings
 from leg_wear_monitor.bags.findings import RecordingError
 from leg_wear_monitor.bags.series.reading import read_signals
 from leg_wear_monitor.bags.series.signals import JointName, Signals, TorqueSource
+from leg_wear_monitor.commissioning.detections import with_detections
+from leg_wear_monitor.commissioning.evidence.low_pass import low_pass_of
 from leg_wear_monitor.commissioning.evidence.misfit import Load, with_load
 from leg_wear_monitor.commissioning.evidence.mismatch import LIMIT, mismatch_item
 from leg_wear_monitor.commissioning.evidence.sampling import sampling_of
-from leg_wear_monitor.commissioning.evidence.timing import separates_lag, timing_of
+from leg_wear_monitor.commissioning.evidence.timing import cadences_rpm, separates_lag, timing_of
+from leg_wear_monitor.commissioning.evidence.walk import LEAST_CYCLES, Walk, walk_of
 from leg_wear_monitor.commissioning.proposal.findings import findings, not_told, notes
-from leg_wear_monitor.commissioning.proposal.items import Found, changes, items
+from leg_wear_monitor.commissioning.proposal.found import Found, settled
+from leg_wear_monitor.commissioning.proposal.items import changes, items
 from leg_wear_monitor.commissioning.result.commissioning_result import CommissioningResult
 from leg_wear_monitor.commissioning.search.candidates import candidates
 from leg_wear_monitor.commissioning.search.choice import Choice, choose
@@ -26,12 +30,14 @@ from leg_wear_monitor.estimate.torque_fit.series import Series
 from leg_wear_monitor.estimate.torque_fit.torque_model import TorqueModel, torque_model
 from leg_wear_monitor.mechanism.loader import load_mechanism
 from leg_wear_monitor.mechanism.spec import Mechanism
+from leg_wear_monitor.monitor.config.drive import drive_figures
 from leg_wear_monitor.monitor.config.fitting import fitted
 from leg_wear_monitor.monitor.config.parameter_file import load_config
 from leg_wear_monitor.monitor.config.parameters import config_from, values_of
 from leg_wear_monitor.monitor.config.settings import MonitorConfig
 
 _LEAST_S = 10.0  # ten turns at 60 rpm
+_FASTER = 1.15  # another cadence
 
 
 def commission(
@@ -41,6 +47,7 @@ def commission(
     joint_states: str | None = None,
     drive_torque: str | None = None,
     crank_joint: str | None = None,
+    reference: str | Path | None = None,
     progress: Callable[[float], None] = lambda _fraction: None,
 ) -> CommissioningResult:
     """Propose the parameters of a robot from recordings of its healthy leg.
@@ -57,6 +64,10 @@ def commission(
         Topics; default: all are tried.
     crank_joint : str, optional
         Joint; default: all are tried.
+    reference : str or pathlib.Path, optional
+        File for a torque reference of the leg under the recorded motion of the crank, which takes a minute
+        to simulate. It becomes ``diagnosis.reference``, and ``reference`` of the result; the caller writes
+        the file.
     progress : callable
         Called with the fraction that is done, 0 to 1.
 
@@ -81,26 +92,43 @@ def commission(
         base,
         joint_states=joint_states,
         drive_torque=drive_torque,
-        progress=lambda f: progress(0.5 * f),
+        progress=lambda f: progress(0.3 * f),
     )
-    result = propose(signals, mechanism, base, crank_joint, lambda f: progress(0.5 + 0.5 * f))
-    return attrs.evolve(_with_limit(result, recordings, joint_states, drive_torque), faults=tuple(faults))
-
-
-def _with_limit(
-    result: CommissioningResult,
-    recordings: Sequence[Recordable],
-    joint_states: str | None,
-    drive_torque: str | None,
-) -> CommissioningResult:
-    """The proposal with a limit of the mismatch for this leg: by its last recording, as is the offset."""
+    model = torque_model(mechanism)
+    found, load = _found(signals, base, crank_joint, lambda f: progress(0.3 + 0.3 * f), model)
+    result = attrs.evolve(_result(found, load, mechanism), faults=tuple(faults))
     if result.config is None:
         return result
-    try:
-        item = mismatch_item(recordings[-1:], result.config, joint_states, drive_torque)
+    try:  # by the last recording, as is the offset
+        walk = walk_of(recordings[-1:], result.config, joint_states, drive_torque)
     except RecordingError as error:  # topics that the proposal chose among several have to be named
         return attrs.evolve(result, notes=(*result.notes, f"{LIMIT} stays as it is: {error}"))
-    if item is None:
+    progress(0.8)
+    fast = _fastest(found, walk, recordings, (joint_states, drive_torque))
+    if len(fast.cycles) >= LEAST_CYCLES:
+        found = settled(attrs.evolve(found, low_pass=low_pass_of(fast)), model)
+        result = attrs.evolve(_result(found, load, mechanism), faults=tuple(faults))
+    progress(0.9)
+    return with_detections(_with_limit(result, walk), walk, reference, lambda f: progress(0.9 + 0.1 * f))
+
+
+def _fastest(
+    found: Found, walk: Walk, recordings: Sequence[Recordable], topics: tuple[str | None, str | None]
+) -> Walk:
+    """The walk at the highest cadence that was recorded: the faster, the stronger are the impacts."""
+    usual = walk.config.cadence.commanded_rpm
+    fastest = max((rpm for rpm in cadences_rpm(found.fit) if rpm * usual > 0.0), key=abs, default=usual)
+    if abs(fastest) < _FASTER * abs(usual):
+        return walk
+    cadence = attrs.evolve(walk.config.cadence, commanded_rpm=fastest, tolerance_rpm=0.1 * abs(fastest))
+    other = walk_of(recordings[-1:], attrs.evolve(walk.config, cadence=cadence), *topics)
+    return other if len(other.cycles) >= LEAST_CYCLES else walk
+
+
+def _with_limit(result: CommissioningResult, walk: Walk) -> CommissioningResult:
+    """The proposal with a limit of the mismatch for this leg."""
+    item = mismatch_item(walk)
+    if item is None or result.config is None:
         return result
     config = config_from({**values_of(result.config), LIMIT: item.value}, "commission")
     return attrs.evolve(result, items=(*result.items, item), config=config)
@@ -129,9 +157,20 @@ def propose(
     model : TorqueModel, optional
         The mechanism's, if it is there already.
     """
+    model = model or torque_model(mechanism)
+    return _result(*_found(signals, base, crank_joint, progress, model), mechanism)
+
+
+def _found(
+    signals: Signals,
+    base: MonitorConfig,
+    crank_joint: str | None,
+    progress: Callable[[float], None],
+    model: TorqueModel,
+) -> tuple[Found, Load | None]:
+    """The best choice of joint, torque and gear, and the load that its fit has."""
     motions = _cranks(signals.joints, crank_joint)
     torques = _torques(signals.torques)
-    model = model or torque_model(mechanism)
     found = candidates(motions, torques, model, progress)
     if not found:
         raise LegWearError(
@@ -139,8 +178,7 @@ def propose(
             "of walking at a steady cadence"
         )
     choice = choose(found)
-    facts, load = _final(choice, motions[choice.best.joint], model, base)
-    return _result(facts, load, mechanism)
+    return _final(choice, motions[choice.best.joint], model, base)
 
 
 def _result(facts: Found, load: Load | None, mechanism: Mechanism) -> CommissioningResult:
@@ -163,17 +201,14 @@ def _final(
 ) -> tuple[Found, Load | None]:
     """The chosen fit again, with the terms that the recording can tell, and the lag that it is late by."""
     one = choice.best.fit
-    terms = Terms(bias=one.pair.walks_both_ways, lag=separates_lag(one.pair))
+    terms = Terms(bias=one.pair.walks_both_ways, load_friction=True, lag=separates_lag(one.pair))
     again = fit(one.pair, model, one.refined, terms, with_errors=True)
     again, load = with_load(again, model, terms)
     sampling = sampling_of(again, model)
-    timing = timing_of(again, sampling.value or base.drive_torque.sampling)
-    if timing.is_lag_separated and not timing.is_late:
-        # a lag that does not show would only make the offset uncertain
-        known = attrs.evolve(terms, lag=False, load=load is not None)
-        start = attrs.evolve(again.refined, lag_s=timing.lag_s)
-        again = fit(one.pair, model, start, known, with_errors=True)
-    return Found(choice, again, motion, sampling, timing, base), load
+    declared = drive_figures(base.drive)
+    timing = timing_of(again, sampling.value or base.drive_torque.sampling, declared.lag_s)
+    found = Found(choice, again, motion, sampling, timing, declared, base)
+    return settled(found, model), load
 
 
 def _cranks(joints: dict[JointName, Series], wanted: str | None) -> dict[JointName, JointMotion]:

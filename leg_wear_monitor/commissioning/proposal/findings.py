@@ -8,7 +8,7 @@ import numpy as np
 from leg_wear_monitor.bags.series.signals import FLOAT64
 from leg_wear_monitor.commissioning.evidence.misfit import Load, does_not_fit
 from leg_wear_monitor.commissioning.evidence.timing import cadences_rpm
-from leg_wear_monitor.commissioning.proposal.items import Found, gear, gear_error, offset_rad
+from leg_wear_monitor.commissioning.proposal.found import Found, gear, gear_error, offset_rad
 from leg_wear_monitor.estimate.torque_fit.likeness import repeating
 from leg_wear_monitor.mechanism.ideal import TURN
 from leg_wear_monitor.mechanism.spec import Mechanism
@@ -97,7 +97,7 @@ def _load(load: Load | None) -> str:
 
 def _drives(found: Found) -> str:
     one = found.fit
-    friction, sigma = one.linear["friction"] / one.gain, one.sigma["friction"] / abs(one.gain)
+    friction, sigma = found.friction_nm
     size = float(one.predicted.std()) / abs(one.gain)
     if friction < -_SURE * sigma and abs(friction) > 0.02 * size:
         return (

@@ -21,12 +21,14 @@ class Terms:
     ratio: bool = True
     bias: bool = False
     load: bool = False
+    load_friction: bool = False
     lag: bool = False
 
     @property
     def linear(self) -> tuple[str, ...]:
         """Names of the linear terms."""
-        return ("gain", "friction", *(name for name in ("bias", "load") if getattr(self, name)))
+        further = ("bias", "load", "load_friction")
+        return ("gain", "friction", *(name for name in further if getattr(self, name)))
 
 
 @attrs.frozen(eq=False)
@@ -104,6 +106,8 @@ def columns(
         linear.append(np.ones_like(torque))
     if terms.load:
         linear.append(model.load_torque(angle))
+    if terms.load_friction:
+        linear.append(np.abs(torque) * np.sign(speed))
     moving = [np.where(state.row == i, slope, 0.0) for i in range(len(state.phase))]
     if terms.ratio:
         moving.append(slope * late)

@@ -51,14 +51,30 @@ def simulated_references(
     LegWearError
         If the leg cannot be simulated.
     """
+    steady = [CrankProfile.steady(cadence / 60.0 * TURN) for cadence in cadences_rpm]
+    return simulated_under(mechanism, steady, progress)
+
+
+def simulated_under(
+    mechanism: Mechanism,
+    profiles: Sequence[CrankProfile],
+    progress: Callable[[float], None] = lambda _fraction: None,
+) -> tuple[TorqueReference, ...]:
+    """References of a new leg under given motions of its crank, as `simulated_references`.
+
+    Raises
+    ------
+    LegWearError
+        If the leg cannot be simulated.
+    """
     fresh = np.array([mechanism.clearances[one].radial_clearance for one in mechanism.clearance_joints])
     unworn, run = np.zeros((len(fresh), 2, SECTORS)), TorqueReferenceRun(mechanism, BEFOREHAND_CYCLES)
     made: list[TorqueReference] = []
-    for cadence in cadences_rpm:
-        run.begin(fresh, unworn, CrankProfile.steady(cadence / 60.0 * TURN))
-        found = run.finish(lambda part: progress((len(made) + part) / len(cadences_rpm)))
+    for profile in profiles:
+        run.begin(fresh, unworn, profile)
+        found = run.finish(lambda part: progress((len(made) + part) / len(profiles)))
         if found is None:
-            raise LegWearError(f"{mechanism.name}: cannot be simulated at {cadence:g} rpm")
+            raise LegWearError(f"{mechanism.name}: cannot be simulated at {profile.cadence_rpm:.3g} rpm")
         made.append(found)
     return tuple(made)
 

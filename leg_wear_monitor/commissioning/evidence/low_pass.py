@@ -1,0 +1,92 @@
+"""The low-pass of a drive: by how rough the torque of the expected leg comes through it.
+
+At one cadence a low-pass delays slow changes of the torque as a lag does. What is fast, the impacts of the
+joints, becomes smoother: one simulated leg shows how rough the torque would be without it.
+"""
+
+import math
+
+import attrs
+import numpy as np
+
+from leg_wear_monitor.commissioning.evidence.walk import Walk
+from leg_wear_monitor.errors import AssemblyError
+from leg_wear_monitor.estimate.channel import channel_of
+from leg_wear_monitor.estimate.nuisances import nuisances
+from leg_wear_monitor.estimate.signature_model import with_noise_of
+from leg_wear_monitor.mechanism.ideal import TURN
+from leg_wear_monitor.twin.reference.leg_parameters import LegParameters
+from leg_wear_monitor.twin.reference.leg_simulation import LegSimulation
+from leg_wear_monitor.twin.reference.torque_reference import TorqueReference
+from leg_wear_monitor.wear.surfaces import SECTORS
+
+_SETTLING, _CYCLES = 2, 40
+# legs in full coordinates, joints of 0.2 to 0.4 mm, 30 to 85 rpm, low-passes of 15 to 120 Hz: the logarithm
+# of the corner frequency is off by 0.24 where the mean square s of what is left over is below 0.3, by 0.32
+# below 0.6, by 0.65 below 1.2; beyond, clearances or masses are too far off, and 6 of 12 low-passes do not
+# show. 100 Hz were found for 3 of 5 sensors without a low-pass (n = 75, 2026-11-24)
+_SPREAD, _BY_SQUARE, _POOR, _HIGHEST_HZ = 0.2, 0.5, 1.0, 90.0
+
+
+@attrs.frozen
+class LowPass:
+    """A first-order low-pass between a leg's torque and its samples.
+
+    Attributes
+    ----------
+    time_constant_s : float
+        0 where none shows; NaN where it cannot be told.
+    log_sigma : float
+        Standard deviation of its logarithm.
+    square : float
+        Mean square of what it leaves over.
+    """
+
+    time_constant_s: float
+    log_sigma: float
+    square: float
+
+    @property
+    def is_told(self) -> bool:
+        """Whether the recording tells if there is one."""
+        return math.isfinite(self.time_constant_s)
+
+    @property
+    def bandwidth_hz(self) -> float:
+        """Corner frequency [Hz]; NaN where none shows."""
+        return 1.0 / (TURN * self.time_constant_s) if self.time_constant_s else math.nan
+
+
+def low_pass_of(walk: Walk) -> LowPass | None:
+    """The low-pass that explains a walk; None where the leg cannot be simulated.
+
+    Parameters
+    ----------
+    walk : Walk
+        With signatures.
+    """
+    reference = _expected(walk)
+    if reference is None or walk.sensor is None:
+        return None
+    mean = walk.baseline.mean
+    columns = nuisances(walk.mechanism, reference, walk.sensor)
+    found = channel_of(reference, with_noise_of(reference, walk.sensor, mean), mean, columns)
+    one = found.channel
+    time_constant_s = one.time_constant_s if one.time_constant_s * _HIGHEST_HZ * TURN > 1.0 else 0.0
+    # a direct channel is what is taken where no other one is surely better
+    is_told = found.square <= _POOR and bool(one.delay_s or one.time_constant_s)
+    log_sigma = _SPREAD + _BY_SQUARE * found.square
+    return LowPass(time_constant_s if is_told else math.nan, log_sigma, found.square)
+
+
+def _expected(walk: Walk) -> TorqueReference | None:
+    """A reference of the new leg alone, under the walk's own motion of the crank."""
+    own, new_m = LegParameters.none(walk.mechanism), walk.new_m
+    unworn = np.zeros((len(new_m), 2, SECTORS))
+    try:
+        torque = LegSimulation(walk.mechanism).torque(walk.profile, own, new_m, unworn, _SETTLING + _CYCLES)
+    except AssemblyError:
+        return None
+    if torque is None:
+        return None
+    return TorqueReference(walk.profile, new_m[None], (torque[_SETTLING:].astype(np.float16),), own)

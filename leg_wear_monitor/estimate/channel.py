@@ -14,6 +14,7 @@ import attrs
 import numpy as np
 
 from leg_wear_monitor.estimate.cause import Cause
+from leg_wear_monitor.estimate.drive_figures import UNDECLARED, DriveFigures
 from leg_wear_monitor.estimate.explanations import Nuisance
 from leg_wear_monitor.estimate.signature import DIRECT, Channel, TorqueSensor
 from leg_wear_monitor.estimate.signature_model import simulated_signatures, with_noise_of
@@ -34,6 +35,7 @@ _SURELY_BETTER = 0.3
 # lower the mean square: 0.02 by chance, 0.8 by a friction of 0.1
 _FRICTION, _MOST_FRICTION, _FRICTION_STEP, _FRICTION_BETTER = 0.2, 0.45, 0.1, 0.1
 _FRICTION_ERROR = 0.02  # of it, by legs with masses 4 % off
+_DECLARED_FRICTION = 0.03  # error of a declared one
 
 # what a leg may have beside its channel: an error of the model in each phase, of the torque's size and of the
 # roughness' logarithm, and other masses, lengths, bias, scale and load; or, on the ground, anything in the
@@ -56,7 +58,11 @@ class ChannelFit:
 
 
 def with_channel_of(
-    reference: TorqueReference, sensor: TorqueSensor, measured: Floats, nuisances: Sequence[Nuisance]
+    reference: TorqueReference,
+    sensor: TorqueSensor,
+    measured: Floats,
+    nuisances: Sequence[Nuisance],
+    figures: DriveFigures = UNDECLARED,
 ) -> TorqueSensor:
     """The sensor with the noise and the channel by which the expected leg has a measured signature.
 
@@ -67,16 +73,22 @@ def with_channel_of(
     measured : (F,) array
         Mean of measured signatures of a leg as expected.
     nuisances : sequence of Nuisance
+    figures : DriveFigures, optional
+        Declared ones: a bandwidth is taken as it is, a load friction is known within 0.03.
     """
     plain = with_noise_of(reference, attrs.evolve(sensor, channel=DIRECT), measured)
-    channel = channel_of(reference, plain, measured, nuisances).channel
+    channel = channel_of(reference, plain, measured, nuisances, figures).channel
     if channel == DIRECT:
         return plain
     return with_noise_of(reference, attrs.evolve(plain, channel=channel), measured)
 
 
 def channel_of(
-    reference: TorqueReference, sensor: TorqueSensor, measured: Floats, nuisances: Sequence[Nuisance]
+    reference: TorqueReference,
+    sensor: TorqueSensor,
+    measured: Floats,
+    nuisances: Sequence[Nuisance],
+    figures: DriveFigures = UNDECLARED,
 ) -> ChannelFit:
     """The channel of a sensor whose noise is known, as of `with_channel_of`.
 
@@ -85,9 +97,14 @@ def channel_of(
     """
     variance = np.repeat([_MEAN * sensor.size_nm, _ROUGHNESS], sensor.phases) ** 2
     known = [_SPREADS[one.cause] * one.column for one in nuisances if one.cause in _SPREADS]
-    in_air = _Leg(np.diag(variance) + _products(np.array(known)), has_friction=True)
-    on_ground = _Leg(np.diag(variance) + _products(_harmonics(sensor.phases)), has_friction=False)
-    found = [_best(reference, sensor, measured, leg) for leg in (in_air, on_ground)]
+    is_declared = not math.isnan(figures.load_friction)
+    friction = (figures.load_friction, _DECLARED_FRICTION) if is_declared else (0.0, _FRICTION)
+    in_air = _Leg(np.diag(variance) + _products(np.array(known)), *friction)
+    unseen = friction if is_declared else (0.0, 0.0)
+    on_ground = _Leg(np.diag(variance) + _products(_harmonics(sensor.phases)), *unseen)
+    hz = figures.bandwidth_hz
+    time_constants_s = _TIME_CONSTANTS_S if math.isnan(hz) else (1.0 / (TURN * hz),)
+    found = [_best(reference, sensor, measured, leg, time_constants_s) for leg in (in_air, on_ground)]
     scores = [
         len(measured) * one.square + leg.log_size for one, leg in zip(found, (in_air, on_ground), strict=True)
     ]
@@ -95,10 +112,14 @@ def channel_of(
 
 
 class _Leg:
-    """What a leg may have beside its channel, as a covariance (F, F), and what a channel leaves over."""
+    """What a leg may have beside its channel, as a covariance (F, F), and what a channel leaves over.
 
-    def __init__(self, covariance: Floats, has_friction: bool) -> None:
-        self._weight, self._has_friction = np.linalg.inv(covariance), has_friction
+    Load friction has a prior mean and standard deviation; with a deviation of 0 it is not looked for.
+    """
+
+    def __init__(self, covariance: Floats, friction: float, friction_sigma: float) -> None:
+        self._weight = np.linalg.inv(covariance)
+        self._friction, self._sigma = friction, friction_sigma
         self.log_size = float(np.linalg.slogdet(covariance)[1])
 
     def left(self, rest: Floats, column: Floats) -> tuple[float, float, float]:
@@ -111,18 +132,25 @@ class _Leg:
         column : (F,) array
             Change of the signature by load friction.
         """
-        friction, sigma = 0.0, math.nan
-        if self._has_friction:
+        friction, sigma, square = self._friction, math.nan, 0.0
+        if self._sigma:
             weighted = self._weight @ column
-            information = float(column @ weighted) + _FRICTION**-2.0
-            friction = min(max(float(rest @ weighted) / information, 0.0), _MOST_FRICTION)
-            sigma = math.hypot(information**-0.5, _FRICTION_ERROR)
+            information = float(column @ weighted) + self._sigma**-2.0
+            found = (float(rest @ weighted) + friction / self._sigma**2) / information
+            found = min(max(found, 0.0), _MOST_FRICTION)
+            square = ((found - friction) / self._sigma) ** 2
+            friction, sigma = found, math.hypot(information**-0.5, _FRICTION_ERROR)
         left = rest - friction * column
-        square = float(left @ self._weight @ left) + (friction / _FRICTION) ** 2
-        return square / len(rest), friction, sigma
+        return (float(left @ self._weight @ left) + square) / len(rest), friction, sigma
 
 
-def _best(reference: TorqueReference, sensor: TorqueSensor, measured: Floats, leg: _Leg) -> ChannelFit:
+def _best(
+    reference: TorqueReference,
+    sensor: TorqueSensor,
+    measured: Floats,
+    leg: _Leg,
+    time_constants_s: Sequence[float],
+) -> ChannelFit:
     """The channel that leaves least."""
 
     @functools.cache
@@ -145,13 +173,14 @@ def _best(reference: TorqueReference, sensor: TorqueSensor, measured: Floats, le
     if without - best.square < _FRICTION_BETTER:
         best = attrs.evolve(best, channel=DIRECT, square=without)
     other = []
-    for time_constant_s in _TIME_CONSTANTS_S:
+    for time_constant_s in time_constants_s:
         found = {delay_s: tried(time_constant_s, delay_s) for delay_s in _DELAYS_S.tolist()}
         for step_s in _FINER_S:
             middle = min(found, key=lambda at: found[at].square)
             found |= {at: tried(time_constant_s, at) for at in (middle - step_s, middle + step_s)}
         other.append(least(found.values()))
-    return least(other) if least(other).square < best.square - _SURELY_BETTER else best
+    is_sure = 0.0 not in time_constants_s or least(other).square < best.square - _SURELY_BETTER
+    return least(other) if is_sure else best
 
 
 def _harmonics(phases: int) -> Floats:

@@ -39,3 +39,13 @@ class DriveFigures:
     def declared(self) -> dict[str, float]:
         """The figures that are declared, by name."""
         return {name: value for name, value in attrs.asdict(self).items() if not math.isnan(value)}
+
+    @property
+    def lateness_s(self) -> float:
+        """Declared time by which slow changes of the torque are late: by the lag and by the low-pass."""
+        parts = (self.lag_s, 1.0 / (2.0 * math.pi * self.bandwidth_hz))
+        return sum(one for one in parts if not math.isnan(one))
+
+
+UNDECLARED = DriveFigures()
+"""Nothing is known."""

@@ -127,6 +127,8 @@ class TwinSettings:
         constant weight.
     load_limit_n : float
         Largest plausible foot load [N].
+    torque_lag_s : float
+        Lag of the torque as declared.
     torque_sampling : str
         Meaning of a torque sample: ``average``, the mean since the previous sample; ``instant``, the value at
         the stamp.
@@ -139,6 +141,7 @@ class TwinSettings:
     estimate_load: bool = True
     load_shape: str = STANCE
     load_limit_n: float = 1000.0
+    torque_lag_s: float = 0.0
     torque_sampling: str = AVERAGE
 
     def __attrs_post_init__(self) -> None:

@@ -107,8 +107,14 @@ def twin_settings(config: MonitorConfig, source: str = "parameters") -> TwinSett
             speed_tolerance=cadence.tolerance_rpm / abs(cadence.commanded_rpm),
         ),
         wear_acceleration=config.wear_acceleration,
+        torque_lag_s=drive_figures(config.drive).lateness_s,
         torque_sampling=config.drive_torque.sampling,
     )
+
+
+def largest_lag_s(config: MonitorConfig) -> float:
+    """Largest lag that a torque may have: that of the drive as declared, and `drive_torque.max_lag_s`."""
+    return config.drive_torque.max_lag_s + drive_figures(config.drive).lateness_s
 
 
 def _check_joints(clearance_joints: Sequence[str], mechanism: Mechanism, source: str) -> None:

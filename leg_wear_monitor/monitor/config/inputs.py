@@ -155,7 +155,8 @@ class DriveTorque:
     )
     max_lag_s: float = quantity(
         "s",
-        "largest time by which the measured torque is late or early; beyond, crank.offset_rad may be off",
+        "largest time by which the measured torque is late or early, beyond what drive.lag_s and "
+        "drive.bandwidth_hz declare; above it, crank.offset_rad may be off",
         above=0.0,
         at_most=1.0,
         default=0.005,

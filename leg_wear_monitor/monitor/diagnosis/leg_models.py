@@ -9,6 +9,7 @@ from leg_wear_monitor.estimate.body_torques import body_torques
 from leg_wear_monitor.estimate.change_detector import ChangeDetector
 from leg_wear_monitor.estimate.channel import with_channel_of
 from leg_wear_monitor.estimate.commissioned_torque import CommissionedTorque
+from leg_wear_monitor.estimate.drive_figures import UNDECLARED, DriveFigures
 from leg_wear_monitor.estimate.explanations import Explainer
 from leg_wear_monitor.estimate.identification import UNLIKE_FILE, misfit
 from leg_wear_monitor.estimate.leg_model import explainer_of
@@ -54,10 +55,12 @@ class LegModels:
     Parameters
     ----------
     mechanism : Mechanism
+    figures : DriveFigures, optional
+        Declared ones of the drive.
     """
 
-    def __init__(self, mechanism: Mechanism) -> None:
-        self._mechanism = mechanism
+    def __init__(self, mechanism: Mechanism, figures: DriveFigures = UNDECLARED) -> None:
+        self._mechanism, self._figures = mechanism, figures
         self._kept: list[_Models] = []
 
     def warm_up(self) -> None:
@@ -99,7 +102,7 @@ class LegModels:
         torque then fits much worse: such a leg has to be identified, not delayed.
         """
         columns = nuisances(self._mechanism, reference, attrs.evolve(sensor, channel=DIRECT))
-        found = with_channel_of(reference, sensor, known.mean, columns)
+        found = with_channel_of(reference, sensor, known.mean, columns, self._figures)
         plain = with_noise_of(reference, attrs.evolve(sensor, channel=DIRECT), known.mean)
         if found == plain:
             return plain

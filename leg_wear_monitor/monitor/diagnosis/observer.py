@@ -16,6 +16,7 @@ from leg_wear_monitor.estimate.clearance_fit import ClearanceFit
 from leg_wear_monitor.estimate.commissioned_torque import CommissionedTorque
 from leg_wear_monitor.mechanism.arrays import Floats
 from leg_wear_monitor.mechanism.spec import Mechanism
+from leg_wear_monitor.monitor.config.drive import drive_figures
 from leg_wear_monitor.monitor.config.settings import MonitorConfig
 from leg_wear_monitor.monitor.diagnosis.corrections import Correction, correction_of, settle
 from leg_wear_monitor.monitor.diagnosis.diagnosis import Diagnosis, DiagnosisState, NotUsed
@@ -76,7 +77,7 @@ class TorqueObserver:
         references: Sequence[TorqueReference] = (),
     ) -> None:
         self.config, self._size_nm, self._joints = config, size_nm, mechanism.clearance_joints
-        self._models = LegModels(mechanism)
+        self._models = LegModels(mechanism, drive_figures(config.drive))
         part = next((one for one in references if not one.is_whole), None)
         whole = [one for one in references if one.is_whole]
         self._references = References(mechanism, self._models, whole, part)

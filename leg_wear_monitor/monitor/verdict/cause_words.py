@@ -116,8 +116,6 @@ class CauseWords:
                 return f"{_ZERO}, drive_torque.sign, scale and gear_ratio{more}"
             case Cause.FRICTION | Cause.LOAD_FRICTION:
                 return f"{_ZERO}, the lubrication and the temperature of the drive"
-            case Cause.LOAD_FRICTION:
-                return "check the lubrication and the temperature of the drive"
             case Cause.LOAD:
                 return "check the load and the ground at the foot"
             case Cause.MASS:

@@ -123,7 +123,7 @@ class LegFollower:
         self.statistics = new_run_statistics(len(setup.linkage.mechanism.joints))
         self._loads = settings.loads_n
         self.estimate = LoadEstimate(self._loads[1], self._loads[0])
-        self._cutoff = TURN * settings.torque_bandwidth_hz
+        self._cutoff, self._declared_lag_s = TURN * settings.torque_bandwidth_hz, settings.torque_lag_s
         self.torque_size_nm = max(torque_size(setup.linkage, setup.speed), _LEAST_TORQUE_NM)
         self._instants = settings.torque_sampling == INSTANT
         kept = (INSTANT_CYCLES, INSTANT_CYCLES) if self._instants else (CYCLES, LEAST_CYCLES)
@@ -328,7 +328,7 @@ class LegFollower:
     def _by_phase(self, profile: TorqueProfile, acting_n: float) -> Floats:
         """Residual (6, n) of the gait cycle that ends, of a sensor that averages."""
         direction = 1 if self.state.motion.cut_rises else -1
-        lag_s = float(self.estimate.values[LAG])
+        lag_s = self._declared_lag_s, float(self.estimate.values[LAG])
         duration_s = float(self.statistics.time[0])
         return averages_by_phase(profile, acting_n, lag_s, direction, duration_s, self._cutoff)
 

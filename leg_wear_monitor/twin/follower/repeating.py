@@ -16,8 +16,8 @@ from leg_wear_monitor.twin.statistics import TorqueProfile
 CYCLES, LEAST_CYCLES = 4, 3  # of averages
 INSTANT_CYCLES = 8  # of instants, whose scatter is larger
 _LEAST_PHASES = 8
+_LONGEST_LAG_S = 0.01  # beyond the declared one: more is wrong as received, and is not explained
 _LEAST_WEIGHT = 0.05  # of a phase, as a fraction of the mean one: less is of samples elsewhere in the turn
-_LONGEST_LAG_S = 0.01  # a longer one is a torque or an angle that is wrong as received, not to be explained
 
 
 class RepeatingResidual:
@@ -79,7 +79,12 @@ def _explained(mean: Floats, rows: Floats, loads: tuple[float, float]) -> Floats
 
 
 def averages_by_phase(
-    profile: TorqueProfile, acting_n: float, lag_s: float, direction: int, duration_s: float, cutoff: float
+    profile: TorqueProfile,
+    acting_n: float,
+    lag_s: tuple[float, float],
+    direction: int,
+    duration_s: float,
+    cutoff: float,
 ) -> Floats:
     """Sums (6, n) of a gait cycle of averages for `RepeatingResidual`.
 
@@ -92,8 +97,9 @@ def averages_by_phase(
     profile : TorqueProfile
     acting_n : float
         Foot load that acted in the model.
-    lag_s : float
-        Delay of the torque as far as it is known: the difference of two times is the derivative between them.
+    lag_s : (float, float)
+        Delay of the torque as declared, and as estimated: the difference of two times is the derivative
+        between them.
     direction : int
         1 or -1.
     duration_s : float
@@ -112,7 +118,14 @@ def averages_by_phase(
     of_all = smooth[:, 0].copy()
     torque = smooth[:, 4] / np.where(of_all > 0.0, of_all, 1.0)
     rate = (np.roll(torque, -1) - np.roll(torque, 1)) * n / (2.0 * duration_s)  # along the crank's angle
-    between = 0.5 * min(max(lag_s, -_LONGEST_LAG_S), _LONGEST_LAG_S) * direction / duration_s * n
-    smooth[:, 4] = -np.interp(np.arange(n) - between, np.arange(n), rate, period=n) * direction * of_all
+    declared_s, found_s = lag_s
+    more_s = min(max(found_s - declared_s, -_LONGEST_LAG_S), _LONGEST_LAG_S)
+
+    def earlier(values: Floats, time_s: float) -> Floats:
+        at = np.arange(n) - time_s * direction / duration_s * n
+        return np.asarray(np.interp(at, np.arange(n), values, period=n))
+
+    smooth[:, 1] -= (earlier(torque, declared_s) - torque) * of_all
+    smooth[:, 4] = -earlier(rate, declared_s + 0.5 * more_s) * direction * of_all
     smooth[of_all < _LEAST_WEIGHT * of_all.mean()] = 0.0
     return np.asarray(smooth.T)

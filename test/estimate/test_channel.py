@@ -1,0 +1,78 @@
+"""The channel of a drive from a mean signature: found in the air, half observable on the ground, declared."""
+
+import math
+
+import attrs
+import numpy as np
+import pytest
+
+from leg_wear_monitor.estimate.channel import channel_of
+from leg_wear_monitor.estimate.drive_figures import DriveFigures
+from leg_wear_monitor.estimate.nuisances import nuisances
+from leg_wear_monitor.estimate.signature import DIRECT, Channel, TorqueSensor
+from leg_wear_monitor.estimate.signature_model import simulated_signatures
+from leg_wear_monitor.mechanism.ideal import TURN
+from leg_wear_monitor.mechanism.position import build_linkage
+from leg_wear_monitor.monitor.diagnosis.reference_file import shipped_references
+from leg_wear_monitor.twin.follower.load import torque_size
+
+HZ = 35.0
+DRIVE = Channel(delay_s=0.0075, time_constant_s=1.0 / (TURN * HZ), load_friction=0.2)
+
+
+@pytest.fixture(scope="module")
+def known(leg):
+    reference = shipped_references(leg)[0]
+    sensor = TorqueSensor(0.005, 1.0, torque_size(build_linkage(leg), TURN), noise_nm=0.5)
+    return reference, sensor, nuisances(leg, reference, sensor)
+
+
+def behind(known, channel: Channel) -> np.ndarray:
+    """Mean signature of the leg as expected behind a drive, in gait cycles that the search does not use."""
+    reference, sensor, _ = known
+    return simulated_signatures(reference, 0, attrs.evolve(sensor, channel=channel))[20:].mean(axis=0)
+
+
+def test_lag_low_pass_and_load_friction_are_found_in_the_air(known):
+    reference, sensor, columns = known
+    found = channel_of(reference, sensor, behind(known, DRIVE), columns)
+    assert found.channel.lateness_s == pytest.approx(DRIVE.lateness_s, abs=0.0025)
+    assert found.channel.load_friction == pytest.approx(0.2, abs=3.0 * found.load_friction_sigma)
+    assert found.load_friction_sigma < 0.04
+
+
+def test_a_direct_drive_has_no_channel(known):
+    reference, sensor, columns = known
+    assert channel_of(reference, sensor, behind(known, DIRECT), columns).channel == DIRECT
+
+
+def test_under_an_unknown_load_the_lag_is_found_and_the_load_friction_is_not_observable(known):
+    reference, sensor, columns = known
+    phase = (np.arange(sensor.phases) + 0.5) / sensor.phases
+    stance = np.concatenate(
+        [60.0 * np.clip(np.sin(TURN * (phase - 0.1)), 0.0, None), np.zeros(sensor.phases)]
+    )
+    measured = behind(known, attrs.evolve(DRIVE, load_friction=0.0)) + stance
+    found = channel_of(reference, sensor, measured, columns)
+    assert found.channel.lateness_s == pytest.approx(DRIVE.lateness_s, abs=0.0025)
+    assert found.channel.load_friction == 0.0
+    assert math.isnan(found.load_friction_sigma)
+
+
+def test_declared_figures_are_used(known):
+    reference, sensor, columns = known
+    figures = DriveFigures(bandwidth_hz=HZ, load_friction=0.2)
+    found = channel_of(reference, sensor, behind(known, DRIVE), columns, figures)
+    assert found.channel.time_constant_s == DRIVE.time_constant_s
+    assert found.channel.delay_s == pytest.approx(DRIVE.delay_s, abs=0.0013)
+    assert found.channel.load_friction == pytest.approx(0.2, abs=0.05)
+    assert figures.lateness_s == pytest.approx(DRIVE.time_constant_s)
+
+
+@pytest.mark.plain
+def test_a_drive_that_rubs_takes_power_whichever_way_the_power_flows():
+    """The motor drives with more than the leg takes, and is driven by less than the leg gives."""
+    torque = np.array([10.0, -10.0, 0.0])
+    rubbing = Channel(load_friction=0.3)
+    np.testing.assert_allclose(rubbing.received(torque, 0.01, 1.0), [13.0, -7.0, 0.0])
+    np.testing.assert_allclose(rubbing.received(torque, 0.01, -1.0), [7.0, -13.0, 0.0])

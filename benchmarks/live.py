@@ -1,9 +1,12 @@
 """The live node under load: what is lost, what it takes, how long a report takes.
 
 python benchmarks/live.py [--legs 1] [--rate-hz 1000] [--rpm 60] [--seconds 20] [--without-diagnosis]
+                          [--record DIRECTORY]
 
 At 60 rpm the diagnosis uses the reference of the package: it is put in after five gait cycles, and reviewed
-after 60. At another speed the node simulates a reference while it monitors.
+after 50. At another speed the node simulates a reference while it monitors. With --record, each node records
+what it receives and publishes, keeps a ledger, and the recording is replayed: messages, and what both ledgers
+have of references, are compared.
 
 Each leg is a monitor in a process and a namespace of its own; one more process sends the joint states and
 the torque of all legs, a recorded walk again and again; this one listens to the predicted torque.
@@ -11,17 +14,21 @@ the torque of all legs, a recorded walk again and again; this one listens to the
 
 import argparse
 import os
+import sqlite3
 import struct
 import subprocess
 import sys
 import threading
 import time
+from collections import defaultdict
+from contextlib import closing
 from pathlib import Path
 
 import numpy as np
 import rclpy
 from diagnostic_msgs.msg import DiagnosticArray
 from geometry_msgs.msg import WrenchStamped
+from mcap.reader import make_reader
 from rclpy.node import Node
 from rclpy.qos import QoSProfile, ReliabilityPolicy
 from rclpy.serialization import serialize_message
@@ -39,6 +46,8 @@ from leg_wear_monitor.twin.settings import TrackerSettings
 LOOP_CYCLES = 8  # that are sent again and again, with an angle that wraps
 STAMP = slice(4, 12)  # of a header in CDR
 SHOWN = ("received", "shed_messages")
+RECORDED = ("record", "mcap"), ("ledger", "ledger")
+TABLES = "torque_reference", "torque_commissioning", "body", "verdict"
 BEST_EFFORT = QoSProfile(depth=200, reliability=ReliabilityPolicy.BEST_EFFORT)
 
 
@@ -161,12 +170,14 @@ def monitors(args: argparse.Namespace) -> list["subprocess.Popen[bytes]"]:
         f"cadence.commanded_rpm:={args.rpm}",
         f"diagnosis.enabled:={str(not args.without_diagnosis).lower()}",
     ]
-    for parameter in parameters:
-        command += ["-p", parameter]
-    return [
-        subprocess.Popen([*command, "-r", f"__ns:=/leg{leg}", "-p", f"hardware_id:=leg{leg}"])
-        for leg in range(args.legs)
-    ]
+    nodes = []
+    for leg in range(args.legs):
+        own = [*parameters, f"hardware_id:=leg{leg}"]
+        if args.record:
+            own += [f"{what}.path:={args.record / f'leg{leg}.{end}'}" for what, end in RECORDED]
+        given = [part for parameter in own for part in ("-p", parameter)]
+        nodes.append(subprocess.Popen([*command, *given, "-r", f"__ns:=/leg{leg}"]))
+    return nodes
 
 
 def measure(
@@ -192,6 +203,7 @@ def main() -> None:
     parser.add_argument("--seconds", type=float, default=20.0)
     parser.add_argument("--without-diagnosis", action="store_true")
     parser.add_argument("--joints", default="A,B,G,I,J")
+    parser.add_argument("--record", type=Path)
     args = parser.parse_args()
     os.environ["ROS_AUTOMATIC_DISCOVERY_RANGE"] = "LOCALHOST"
     os.environ["ROS_DOMAIN_ID"] = str(os.getpid() % 100)
@@ -215,6 +227,49 @@ def main() -> None:
             process.wait()
         rclpy.try_shutdown()
         hearing.join()
+    for leg in range(args.legs if args.record else 0):
+        replay(leg, args)
+
+
+def replay(leg: int, args: argparse.Namespace) -> None:
+    """Replay what a node recorded, and compare what both published and stored."""
+    own, out = args.record / f"leg{leg}.mcap", args.record / f"replay{leg}"
+    config = args.record / "leg.yaml"
+    config.write_text(
+        "/**:\n  ros__parameters:\n"
+        f"    clearance_joints: [{args.joints}]\n"
+        f"    cadence: {{commanded_rpm: {args.rpm}}}\n"
+        f"    diagnosis: {{enabled: {str(not args.without_diagnosis).lower()}}}\n"
+        f"    hardware_id: leg{leg}\n"
+    )
+    again = out.with_suffix(".ledger")
+    command = [sys.executable, "-m", "leg_wear_monitor", "replay", str(own), "--config", str(config)]
+    subprocess.run(
+        [*command, "--out", str(out), "--ledger", str(again)], check=True, stdout=subprocess.DEVNULL
+    )
+    live, replayed = messages(own), messages(out / "reports.mcap")
+    for topic in sorted(replayed):
+        same = "the same" if live[topic] == replayed[topic] else "NOT the same"
+        print(f"  {topic}: {len(live[topic])} live, {len(replayed[topic])} replayed, {same}")
+    for table in TABLES:
+        stored = [rows(path, table) for path in (own.with_suffix(".ledger"), again)]
+        same = "the same" if stored[0] == stored[1] else "NOT the same"
+        print(f"  ledger, {table}: {len(stored[0])} live, {len(stored[1])} replayed, {same}")
+
+
+def messages(path: Path) -> dict[str, list[bytes]]:
+    """Messages by the last word of their topic, in their order."""
+    found = defaultdict(list)
+    with path.open("rb") as stream:
+        for _, channel, message in make_reader(stream).iter_messages(log_time_order=False):
+            found[channel.topic.rsplit("/", 1)[-1]].append(message.data)
+    return found
+
+
+def rows(path: Path, table: str) -> list[tuple[object, ...]]:
+    """Rows of a table of a ledger."""
+    with closing(sqlite3.connect(path)) as ledger:
+        return ledger.execute(f"SELECT * FROM {table}").fetchall()
 
 
 def report(leg: int, sent: int, rows: list[tuple[float, ...]], listener: Listener) -> None:

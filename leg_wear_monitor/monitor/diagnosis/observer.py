@@ -85,7 +85,8 @@ class TorqueObserver:
         counted_m = np.asarray(counted_m, float).copy()
         if parameters is None:  # those that files and unfinished references were made with
             own = LegParameters.none(mechanism)
-            parameters = next((one.parameters for one in references if one.parameters != own), None)
+            made = (one.parameters for one in references if not one.is_of_parameters)
+            parameters = next((one for one in made if one != own), None)
         self.state = TorqueState(counted_m, baselines=tuple(commissioned), parameters=parameters)
 
     def warm_up(self) -> None:
@@ -182,8 +183,8 @@ class TorqueObserver:
 
     @property
     def part_of_reference(self) -> TorqueReference | None:
-        """The legs of a reference that are simulated so far; None where there is nothing to go on with."""
-        return None if self.state.is_identifying else self._references.part
+        """The legs of a reference, or of an identification, that are simulated so far; None without any."""
+        return self._references.part
 
     def begin_epoch(self) -> None:
         """Forget kept samples and gait cycles, because stamps start again."""

@@ -71,6 +71,10 @@ class References:
         """How much of what is being simulated is done [%]."""
         return math.floor(100.0 * self._run.progress) if self._run is not None else 0
 
+    def is_for(self, profile: CrankProfile) -> bool:
+        """Whether what is being simulated is for a motion of the crank."""
+        return self.is_busy and self._run is not None and profile.is_like(self._run.profile)
+
     @property
     def cycles_left(self) -> float:
         """Commanded gait cycles until what is being simulated is there."""
@@ -128,7 +132,12 @@ class References:
         if self._models.misfit(state) >= FAR_FROM_FILE and not state.rounds:
             start = leg_of_ideal_torque(self._mechanism, model, state.commissioned, reference.profile.speed)
         state.is_identifying, state.rounds = True, state.rounds + 1
-        self._begun().begin_identification(state.commissioned.clearance_m, depth, reference.profile, start)
+        clearance_m, profile = state.commissioned.clearance_m, reference.profile
+        part = self._part_of(start, profile, clearance_m, is_of_parameters=True)
+        if part is not None:
+            self._begun().go_on(part, depth)
+        else:
+            self._begun().begin_identification(clearance_m, depth, profile, start)
 
     def _continue(
         self, run: TorqueReferenceRun, state: TorqueState, counted_m: Floats, depth: Floats
@@ -164,16 +173,21 @@ class References:
         self, parameters: LegParameters | None, counted_m: Floats, depth: Floats, profile: CrankProfile
     ) -> None:
         """Begin the simulation of a reference, or go on with that of an earlier run."""
-        part, own = self._part, parameters or LegParameters.none(self._mechanism)
-        if (
-            part is not None
-            and part.parameters == own
-            and profile.is_like(part.profile)
-            and not _is_far(part, counted_m)
-        ):
+        own = parameters or LegParameters.none(self._mechanism)
+        part = self._part_of(own, profile, counted_m)
+        if part is not None:
             self._begun().go_on(part, depth)
         else:
             self._begun().begin(counted_m, depth, profile, own)
+
+    def _part_of(
+        self, own: LegParameters, profile: CrankProfile, clearance_m: Floats, is_of_parameters: bool = False
+    ) -> TorqueReference | None:
+        """What an earlier run simulated of such legs; None without any."""
+        part = self._part
+        if part is None or part.is_of_parameters is not is_of_parameters or part.parameters != own:
+            return None
+        return part if profile.is_like(part.profile) and not _is_far(part, clearance_m) else None
 
     def _identify(self, state: TorqueState, legs: TorqueReference, counted_m: Floats, depth: Floats) -> None:
         """Begin a reference with the parameters that explain the commissioned leg."""

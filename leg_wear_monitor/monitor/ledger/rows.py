@@ -299,9 +299,10 @@ def _reference_of(
         CrankProfile(speed, *ripple.reshape(2, -1)),
         LegParameters(mass, length, friction, compliance),
     )
-    shape = (legs - 1, -1, POINTS) if is_whole else (-1, CYCLES, POINTS)
-    torque = (expected, *wider.reshape(shape))
-    reference = TorqueReference(profile, known.reshape(legs, -1), torque, leg)
+    reference = TorqueReference(profile, known.reshape(legs, -1), (expected,), leg)
+    cycles = len(expected) if reference.is_of_parameters else CYCLES
+    shape = (legs - 1, -1, POINTS) if is_whole else (-1, cycles, POINTS)
+    reference = attrs.evolve(reference, torque_nm=(expected, *wider.reshape(shape)))
     return SimulatedReference(stamp_ns, tuple(bodies.split("\n")), reference)
 
 

@@ -77,6 +77,11 @@ class TorqueReference:
         return len(self.torque_nm) == len(self.clearance_m)
 
     @property
+    def is_of_parameters(self) -> bool:
+        """Whether its legs differ in masses, lengths and friction, from those of the first one."""
+        return bool((self.clearance_m == self.clearance_m[0]).all())
+
+    @property
     def angle(self) -> Floats:
         """Crank angle (POINTS + 1,) [rad] between the steps, from the profile's angle 0 on."""
         return self.profile.angles(even_angles(self.profile))
@@ -102,8 +107,9 @@ class TorqueReferenceSnapshot(NamedTuple):
 class TorqueReferenceRun:
     """Simulates a torque reference while evaluation periods pass.
 
-    Threads simulate some legs ahead of the caller. `advance` waits for those that are due: what it returns
-    depends on the number of calls alone. There are as many threads as numba may use (NUMBA_NUM_THREADS).
+    Threads simulate some legs ahead of the caller. `advance` waits for them when all are due: what it returns
+    depends on the number of calls alone, and a machine that is busy for a while catches up before. There are
+    as many threads as numba may use (NUMBA_NUM_THREADS).
 
     Parameters
     ----------
@@ -130,6 +136,11 @@ class TorqueReferenceRun:
     def is_busy(self) -> bool:
         """Whether there is something to simulate."""
         return len(self._done) < len(self._legs)
+
+    @property
+    def profile(self) -> CrankProfile:
+        """Motion of the crank of what is simulated."""
+        return self._profile
 
     @property
     def progress(self) -> float:
@@ -176,7 +187,7 @@ class TorqueReferenceRun:
         self._begin(legs, depth, profile)
 
     def go_on(self, part: TorqueReference, depth: Floats) -> None:
-        """Go on with a reference of which the first legs were simulated in an earlier run.
+        """Go on with a reference, or an identification, whose first legs were simulated in an earlier run.
 
         Parameters
         ----------
@@ -184,46 +195,40 @@ class TorqueReferenceRun:
         depth : (k, 2, N) array
             Wear depths [m], as of `begin`.
         """
-        legs = [_Leg(part.parameters, clearance_m) for clearance_m in part.clearance_m]
+        if part.is_of_parameters:
+            legs = _changed(part.parameters, part.clearance_m[0])
+        else:
+            legs = [_Leg(part.parameters, clearance_m) for clearance_m in part.clearance_m]
         self._begin(legs, depth, part.profile)
         self._done = part.torque_nm
         self._periods = -(-self._cost(legs[: len(self._done)]) // PACE)
 
     @property
     def part(self) -> TorqueReference | None:
-        """The legs of a reference that are simulated so far; None where none is, or all are."""
+        """The legs of a reference that are due so far; None where none is, or all are."""
+        self._take(waits=True)
         return self._so_far() if self._done and self.is_busy else None
 
     def begin_identification(
         self, clearance_m: Floats, depth: Floats, profile: CrankProfile, near: LegParameters
     ) -> None:
         """Begin the leg with given parameters, then each body heavier, each longer, and more friction."""
-        clearance_m = np.maximum(clearance_m, _LEAST_CLEARANCE_M)
-        changed = [near]
-        for one in np.eye(len(near.mass)):
-            changed.append(attrs.evolve(near, mass=near.mass + HEAVIER * one))
-        for one in np.eye(len(near.mass)):
-            changed.append(attrs.evolve(near, length=near.length + LONGER * one))
-        changed.append(attrs.evolve(near, friction=near.friction * ROUGHER))
-        self._begin([_Leg(each, clearance_m) for each in changed], depth, profile)
+        self._begin(_changed(near, np.maximum(clearance_m, _LEAST_CLEARANCE_M)), depth, profile)
 
-    def advance(self) -> TorqueReference | None:
+    def advance(self, waits: bool = False) -> TorqueReference | None:
         """Note that an evaluation period has passed; return the reference when all of it is due.
 
-        A leg that cannot be simulated ends it without one.
+        A leg that cannot be simulated ends it then without one. The caller may wait for each leg.
         """
         if not self.is_busy:
             return None
         self._periods += 1
-        self._look_ahead()
-        while self.is_busy and self._cost(self._legs[: len(self._done) + 1]) <= PACE * self._periods:
-            torque = self._ahead.pop(0).result()
-            if torque is None:
-                self._begin((), self._depth, self._profile)
-                return None
-            self._done = (*self._done, torque)
-            self._look_ahead()
-        if self.is_busy:
+        is_due = self._cost(self._legs) <= PACE * self._periods
+        self._take(waits or is_due)
+        if not is_due:
+            return None
+        if self.is_busy:  # a leg could not be simulated
+            self._begin((), self._depth, self._profile)
             return None
         self._of_thread = threading.local()  # gives back 20 MB a thread
         return self._so_far()
@@ -232,12 +237,13 @@ class TorqueReferenceRun:
         """Simulate the legs that are left, at once; None where one cannot be simulated."""
         found = None
         while self.is_busy:
-            found = self.advance()
+            found = self.advance(waits=True)
             progress(self.progress)
         return found
 
     def snapshot(self) -> TorqueReferenceSnapshot:
         """The whole state; legs that are simulated ahead are simulated again."""
+        self._take(waits=True)
         return TorqueReferenceSnapshot(self._profile, self._legs, self._depth, self._done, self._periods)
 
     def restore(self, snapshot: TorqueReferenceSnapshot) -> None:
@@ -256,10 +262,27 @@ class TorqueReferenceRun:
         clearance_m = np.array([leg.clearance_m for leg in self._legs])
         return TorqueReference(self._profile, clearance_m, self._done, self._legs[0].parameters)
 
+    @property
+    def _due(self) -> int:
+        """Number of legs that are due."""
+        costs = np.cumsum([_SETTLING + self._cycles_of(leg) for leg in self._legs])
+        return int(np.searchsorted(costs, PACE * self._periods, side="right"))
+
+    def _take(self, waits: bool) -> None:
+        """Take the legs that are due and simulated, or wait for them, up to one that cannot be."""
+        self._look_ahead()
+        while self._ahead and len(self._done) < self._due and (waits or self._ahead[0].done()):
+            torque = self._ahead[0].result()
+            if torque is None:
+                break
+            self._done, self._ahead = (*self._done, torque), self._ahead[1:]
+            self._look_ahead()
+
     def _look_ahead(self) -> None:
         """Let the threads simulate the next legs: not all, since a program's end waits for them."""
         first = len(self._done) + len(self._ahead)
-        for leg in self._legs[first : len(self._done) + 2 * self._threads]:
+        simulated = len(self._done) + sum(one.done() for one in self._ahead)
+        for leg in self._legs[first : min(self._due, simulated) + 2 * self._threads]:
             arguments = self._profile, leg, self._depth, self._cycles_of(leg)
             self._ahead.append(self._pool.submit(self._simulated, *arguments))
 
@@ -284,6 +307,18 @@ class TorqueReferenceRun:
         except AssemblyError:  # with such lengths it does not close
             return None
         return None if torque is None else torque[_SETTLING:].astype(np.float16)
+
+
+def _changed(near: LegParameters, clearance_m: Floats) -> list[_Leg]:
+    """The leg with given parameters, then each body heavier, each longer, and more friction."""
+    each = np.eye(len(near.mass))
+    changed = [
+        near,
+        *(attrs.evolve(near, mass=near.mass + HEAVIER * one) for one in each),
+        *(attrs.evolve(near, length=near.length + LONGER * one) for one in each),
+        attrs.evolve(near, friction=near.friction * ROUGHER),
+    ]
+    return [_Leg(parameters, clearance_m) for parameters in changed]
 
 
 def _lower_priority() -> None:

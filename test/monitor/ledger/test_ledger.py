@@ -325,10 +325,13 @@ def test_a_raised_alarm_keeps_its_worst_value_over_a_new_start(open_ledger, entr
     assert math.isnan(kept["cadence"].worst) and math.isnan(kept["cadence"].limit)
 
 
-def test_a_reference_that_is_not_whole_is_kept_until_it_is(open_ledger, entry_at) -> None:
-    leg = LegParameters(np.ones(1), np.ones(1))
-    expected, wider = (np.full((cycles, POINTS), 1.5, np.float16) for cycles in (2 * CYCLES, CYCLES))
-    whole = TorqueReference(CrankProfile.steady(6.0), np.full((3, 5), 3e-4), (expected, wider, wider), leg)
+@pytest.mark.parametrize(("wider_m", "cycles"), [(6e-4, CYCLES), (3e-4, 2 * CYCLES)])
+def test_a_reference_or_an_identification_that_is_not_whole_is_kept_until_it_is(
+    open_ledger, entry_at, wider_m: float, cycles: int
+) -> None:
+    leg, known = LegParameters(np.ones(1), np.ones(1)), np.array([[3e-4], [wider_m], [wider_m]])
+    expected, wider = (np.full((each, POINTS), 1.5, np.float16) for each in (2 * CYCLES, cycles))
+    whole = TorqueReference(CrankProfile.steady(6.0), known, (expected, wider, wider), leg)
     part = attrs.evolve(whole, torque_nm=whole.torque_nm[:2])
     for kept, has_part in ((part, True), (whole, False)):
         ledger = open_ledger()

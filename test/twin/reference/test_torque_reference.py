@@ -93,7 +93,7 @@ def test_a_part_of_a_reference_goes_on_where_it_ended(leg, whole, short) -> None
         first.advance()
     part = first.part
     assert part is not None
-    assert not part.is_whole
+    assert not part.is_whole and not part.is_of_parameters
     assert 5 < len(part.torque_nm) < 12
     second.go_on(part, UNWORN)
     assert second.progress == pytest.approx(first.progress, abs=0.03)
@@ -101,6 +101,18 @@ def test_a_part_of_a_reference_goes_on_where_it_ended(leg, whole, short) -> None
     assert other.is_whole
     assert second.part is None
     for torque, same in zip(whole.torque_nm, other.torque_nm, strict=True):
+        np.testing.assert_array_equal(torque, same)
+
+
+def test_a_part_of_an_identification_goes_on_where_it_ended(leg, identified, short) -> None:
+    found, snapshot, progress = identified
+    first, second = (TorqueReferenceRun(leg) for _ in range(2))
+    first.restore(snapshot)
+    part = first.part
+    assert part is not None and part.is_of_parameters and len(part.torque_nm) < len(found.torque_nm)
+    second.go_on(part, UNWORN)
+    assert second.progress == pytest.approx(progress, abs=0.06)
+    for torque, same in zip(found.torque_nm, finished(second).torque_nm, strict=True):
         np.testing.assert_array_equal(torque, same)
 
 
@@ -140,7 +152,7 @@ def test_a_leg_that_does_not_close_ends_a_run(leg, short) -> None:
     other.restore(run.snapshot())
     for each in (run, other):
         assert each.is_busy
-        assert each.advance() is None
+        assert each.finish() is None
         assert not each.is_busy
 
 

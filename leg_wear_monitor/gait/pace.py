@@ -1,6 +1,7 @@
 """Crank motion: a sequence of speeds joined by smooth ramps, with a phase-dependent ripple."""
 
 import math
+from bisect import bisect_right
 from itertools import pairwise
 from typing import NamedTuple
 
@@ -29,9 +30,10 @@ class Pace:
         self._ramp = config.ramp_s
         self._ripple, self._waves = config.ripple, config.ripple_per_turn
         speeds = [rpm * TURN / 60.0 for rpm in config.speeds_rpm]
-        self._stretches = [_Stretch(0.0, 0.0, speeds[0], speeds[0])]
+        self._stretches, self._since = [_Stretch(0.0, 0.0, speeds[0], speeds[0])], [0.0]
         for (_, end), (before, after) in zip(pairwise(config.times_s), pairwise(speeds), strict=True):
             self._stretches.append(_Stretch(end, self._even(end).angle, before, after))
+            self._since.append(end)
 
     def at(self, t: float) -> CrankMotion:
         """Crank motion at a time [s]."""
@@ -44,7 +46,7 @@ class Pace:
 
     def _even(self, t: float) -> CrankMotion:
         """Ripple-free motion: a smooth speed step 10 u^3 - 15 u^4 + 6 u^5, then constant speed."""
-        last = next(last for last in reversed(self._stretches) if last.since <= t)
+        last = self._stretches[bisect_right(self._since, t) - 1]
         tau, step = t - last.since, last.after - last.before
         if tau >= self._ramp:
             angle = (

@@ -184,7 +184,7 @@ def situation_of(
         without_zero="" if evaluation.guard.cause else without_zero,
         unfollowed=_unfollowed(twin, evaluation),
         input_causes=tuple(evaluation.causes),
-        is_out_of_step=twin.tracking is Tracking.OUT_OF_STEP,
+        is_out_of_step=_is_out_of_step(twin, evaluation, last),
         cadence_rpm=twin.speed_radps * 30.0 / math.pi,
         commanded_rpm=config.cadence.commanded_rpm,
         tolerance_rpm=config.cadence.tolerance_rpm,
@@ -195,6 +195,12 @@ def situation_of(
         crank=config.crank,
         drive_torque=config.drive_torque,
     )
+
+
+def _is_out_of_step(twin: DigitalTwin, evaluation: AlarmEvaluation, last: CycleReport | None) -> bool:
+    """Whether the leg walks at another cadence: not where it only starts or stops, after a right one."""
+    was_right = last is not None and evaluation.config.cadence.allows(last.cadence_rpm)
+    return twin.tracking is Tracking.OUT_OF_STEP and not was_right
 
 
 def joint_situations(

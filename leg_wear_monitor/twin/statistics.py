@@ -9,7 +9,7 @@ from numpy.typing import NDArray
 
 from leg_wear_monitor.mechanism.arrays import Floats, Ints
 
-_LONGEST = 1.5  # times the time in motion: a longer cycle contains standstill, no steady gait
+LONGEST = 1.5  # times the time in motion: a longer cycle contains standstill, no steady gait
 
 
 class Tracking(Enum):
@@ -234,7 +234,7 @@ class CycleStatistics:
     @property
     def is_steady(self) -> bool:
         """Whether the leg walked all the time, with no gap bridged."""
-        return self.bridged_s == 0.0 and self.duration_s <= _LONGEST * self.moving_s
+        return self.bridged_s == 0.0 and self.duration_s <= LONGEST * self.moving_s
 
 
 @attrs.frozen(eq=False)

@@ -45,6 +45,10 @@ class Limit:
     is_least: bool = False
     is_latched: bool = True
 
+    def times(self, factor: float) -> "Limit":
+        """The limits, multiplied."""
+        return attrs.evolve(self, warn=factor * self.warn, error=factor * self.error)
+
     def reaches(self, value: float, level: Level) -> bool:
         """Whether a value is at the limit of WARN or ERROR, or beyond it."""
         limit = self.error if level is Level.ERROR else self.warn

@@ -21,6 +21,7 @@ class NotUsed(Enum):
     """Why a gait cycle says nothing of the clearances; the value is the word that files contain."""
 
     CADENCE = "cadence"
+    STANDSTILL = "standstill"
     GAP = "gap"
     JITTER = "jitter"
     TORQUE_CAUSE = "torque_cause"
@@ -50,8 +51,9 @@ class Diagnosis:
     cycles : int
         Gait cycles in the estimate.
     cycles_not_used : mapping of str to int
-        Gait cycles of this run that were not used, by reason: another cadence; standstill, or too few torque
-        samples; irregular stamps; a torque that is wrong as received; a crank that turns otherwise.
+        Gait cycles of this run that were not used, by reason: another cadence; a stop and a start in it; a
+        bridged gap, or too few torque samples; irregular stamps; a torque that is wrong as received; a crank
+        that turns otherwise.
     clearance_m, sigma_m : tuple of float
         Estimated clearance of each clearance joint and its standard deviation; NaN where it is not
         observable.

@@ -101,13 +101,13 @@ class TorqueObserver:
         """Note the end of a gait cycle, which is used if the leg walked as commanded with a right torque."""
         rpm = statistics.cadence_rpm
         is_allowed = self.config.cadence.allows(rpm)
-        self.state.off_cadence_rpm = math.nan if is_allowed else rpm
+        self.state.off_cadence_rpm = rpm if statistics.is_steady and not is_allowed else math.nan
         if is_torque_wrong:
             self.state.leave_out(NotUsed.TORQUE_CAUSE)
+        elif not statistics.is_steady:
+            self.state.leave_out(NotUsed.GAP if statistics.bridged_s else NotUsed.STANDSTILL)
         elif not is_allowed:
             self.state.leave_out(NotUsed.CADENCE)
-        elif not statistics.is_steady:
-            self.state.leave_out(NotUsed.GAP)
         else:
             self.state.due = (*self.state.due, (statistics.begin_ns, statistics.stamp_ns))
 

@@ -12,7 +12,8 @@ from leg_wear_monitor.monitor.diagnosis.leg_models import COMMISSIONING_CYCLES, 
 from leg_wear_monitor.monitor.diagnosis.references import FIRST_CYCLES, UNLIKE_CYCLES, References
 from leg_wear_monitor.monitor.diagnosis.state import AtCadence, TorqueState
 
-_UNUSABLE_CYCLES = 3
+_UNUSABLE_CYCLES = 3  # in a row: a start has two that are unlike
+_CHANGING_CYCLES, _ALIKE_CYCLES = 5, 3  # in a ramp of 30 rpm a minute, two or three in a row are alike
 
 _ENOUGH_CYCLES, _LOCKED = 20, 0.9  # gait cycles, and the length of their mean phase: 1 if samples never drift
 
@@ -54,7 +55,7 @@ def missing(state: TorqueState, references: References, config: MonitorConfig) -
 
 def doubt(state: TorqueState, references: References, models: LegModels) -> str:
     """Why an estimate is not sure; empty if it is."""
-    if state.unused and state.unused[-1] is NotUsed.UNLIKE:
+    if _is_unlike(state):
         return _other_cadence(state, references)
     if not state.is_compared:
         return f"changes at this cadence are not observed yet; at {_cadences(state.set_aside)} they are"
@@ -69,10 +70,26 @@ def doubt(state: TorqueState, references: References, models: LegModels) -> str:
     return f"{known}masses, lengths and friction near those of the file do not explain its drive torque"
 
 
+def _is_unlike(state: TorqueState) -> bool:
+    """Whether the crank turns otherwise than in all references, and not only as it starts or stops."""
+    return state.unused[-_UNUSABLE_CYCLES:] == (NotUsed.UNLIKE,) * _UNUSABLE_CYCLES
+
+
+def _is_changing(state: TorqueState) -> bool:
+    """Whether the cadence changes: of the last gait cycles only a few are alike."""
+    last = (NotUsed.UNLIKE,) * _CHANGING_CYCLES
+    return state.unused[-_CHANGING_CYCLES:] == last and len(state.waiting) <= _ALIKE_CYCLES
+
+
 def _other_cadence(state: TorqueState, references: References) -> str:
     """What becomes of gait cycles whose crank turns otherwise than in all references."""
+    if _is_changing(state):
+        now = f"now {abs(state.waiting[-1].profile.cadence_rpm):.3g} rpm" if state.waiting else "now"
+        return f"the cadence changes, {now}; gait cycles are compared at {_cadences(state.known)}"
     known = f"the crank turns otherwise than in the references ({_cadences(state.known)})"
-    return f"{known}; another one is being simulated: {references.percent} %" if references.is_busy else known
+    if state.waiting and references.is_for(state.waiting[-1].profile):
+        return f"{known}; another one is being simulated: {references.percent} %"
+    return known
 
 
 def next_step(state: TorqueState, references: References, config: MonitorConfig) -> str:
@@ -81,30 +98,30 @@ def next_step(state: TorqueState, references: References, config: MonitorConfig)
     if is_hopeless or not math.isnan(state.off_cadence_rpm):
         return ""
     commanded_s = 60.0 / abs(config.cadence.commanded_rpm)
-    is_known = bool(state.cycles or state.waiting)
-    cycle_s = TURN / abs(state.profile.speed) if is_known else commanded_s
+    is_unlike = state.reference is not None and _is_unlike(state)
+    last = state.waiting[-1:] if is_unlike or state.reference is None else state.cycles[-1:]
+    cycle_s = TURN / abs(last[0].profile.speed) if last else commanded_s
     if references.is_busy:
         left_s = references.cycles_left * commanded_s
-        return f"{_simulated(state)} in {_cycles(left_s / cycle_s, cycle_s)}"
+        return f"{_simulated(state, references, is_unlike)} in {_cycles(left_s / cycle_s, cycle_s)}"
     if state.reference is None:
         return f"a reference is chosen in {_cycles(FIRST_CYCLES - len(state.waiting), cycle_s)}"
-    if state.unused and state.unused[-1] is NotUsed.UNLIKE:
-        waiting_s = TURN / abs(state.waiting[-1].profile.speed) if state.waiting else cycle_s
+    if is_unlike:
         left = UNLIKE_CYCLES - len(state.waiting)
-        return f"a reference for this motion is begun in {_cycles(left, waiting_s)} alike"
+        return "" if _is_changing(state) else f"a reference for it is begun in {_cycles(left, cycle_s)}"
     if state.commissioned is None and not state.changes:
         left = COMMISSIONING_CYCLES - len(state.cycles)
         return f"the baseline, with which smaller changes are found, is complete in {_cycles(left, cycle_s)}"
     return ""
 
 
-def _simulated(state: TorqueState) -> str:
+def _simulated(state: TorqueState, references: References, is_unlike: bool) -> str:
     """What is known when that which is being simulated is there."""
     if state.is_identifying:
         return "masses, lengths and friction of this leg are known, and a reference with them is begun,"
     if state.reference is None:
         return "clearances are compared"
-    if state.unused and state.unused[-1] is NotUsed.UNLIKE:
+    if is_unlike and state.waiting and references.is_for(state.waiting[-1].profile):
         return "gait cycles at this cadence are compared"
     return "a reference that is nearer to this leg is in force"
 

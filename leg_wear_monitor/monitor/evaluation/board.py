@@ -94,6 +94,7 @@ class AlarmBoard:
         stamp_ns: int,
         cycles: int = 1,
         sources: Mapping[str, tuple[float, str]] = _NO_SOURCES,
+        impact_factor: float = 1.0,
     ) -> tuple[AlarmList, ...]:
         """Evaluate values by alarm name; returns one list of all alarms if the shown state has changed.
 
@@ -105,18 +106,27 @@ class AlarmBoard:
             Number of gait cycles that the values represent.
         sources : mapping of str to (float, str)
             Standard deviation and source of some values, by alarm name.
+        impact_factor : float
+            On the limits of impact forces.
         """
-        found = [
-            evaluated(self.alarms[name], value, self._limits[name], stamp_ns, cycles, *sources.get(name, ()))
-            for name, value in values.items()
-        ]
+        found = []
+        for name, value in values.items():
+            limit = self._limit(name, impact_factor)
+            found.append(evaluated(self.alarms[name], value, limit, stamp_ns, cycles, *sources.get(name, ())))
         return self._set(found, stamp_ns)
 
-    def evaluate_early(self, values: Mapping[str, float], stamp_ns: int) -> tuple[AlarmList, ...]:
+    def _limit(self, name: str, impact_factor: float) -> Limit:
+        """Limit of an alarm, with a factor on those of impact forces."""
+        is_impact = impact_factor != 1.0 and self.alarms[name].kind == specs.IMPACT.kind
+        return self._limits[name].times(impact_factor) if is_impact else self._limits[name]
+
+    def evaluate_early(
+        self, values: Mapping[str, float], stamp_ns: int, impact_factor: float = 1.0
+    ) -> tuple[AlarmList, ...]:
         """Evaluate values that may still rise until the gait cycle ends: they can only raise their alarms."""
         found = []
         for name, value in values.items():
-            before, limit = self.alarms[name], self._limits[name]
+            before, limit = self.alarms[name], self._limit(name, impact_factor)
             after = evaluated(before, value, limit, stamp_ns)
             if limit.on_delay == 1 and after.present > before.present:
                 found.append(after)

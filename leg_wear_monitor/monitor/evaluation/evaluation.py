@@ -27,6 +27,8 @@ from leg_wear_monitor.twin.digital_twin import DigitalTwin
 from leg_wear_monitor.twin.sample import Samples
 from leg_wear_monitor.twin.statistics import CycleStatistics, Intake, NotCompared, Tracking
 
+_FASTER = 1.1  # than commanded; the default tolerance of the cadence is a tenth
+
 
 @attrs.define
 class AlarmEvaluationState:
@@ -48,6 +50,8 @@ class AlarmEvaluationState:
         Samples that the guard had withheld at the last evaluation.
     causes : tuple of str or None
         Causes of unused samples at the last evaluation.
+    cadence_rpm : float
+        Of the last gait cycle, 0 before the first.
     """
 
     before: Intake
@@ -59,6 +63,7 @@ class AlarmEvaluationState:
     health: InputHealth | None = None
     withheld: int = 0
     causes: tuple[str, ...] | None = None
+    cadence_rpm: float = 0.0
 
 
 class AlarmEvaluation:
@@ -163,7 +168,22 @@ class AlarmEvaluation:
             values |= {spec.name(joint.joint): spec.value(joint) for spec in joint_specs(self.config)}
         for name in self.board.held_by_estimate:  # it is evaluated with the estimate, at the period's end
             values.pop(name, None)
-        return self.board.evaluate(values, report.stamp_ns)
+        factor = self._impact_factor(report.cadence_rpm)
+        self.state.cadence_rpm = report.cadence_rpm
+        return self.board.evaluate(values, report.stamp_ns, impact_factor=factor)
+
+    def _impact_factor(self, rpm: float) -> float:
+        """Factor on the limits of impact forces, which are those of the commanded cadence, at another one.
+
+        Forces grow with the square of the speed and more: peaks of a healthy leg are 4.1 kN at 60 and 6.9 kN
+        at 75 rpm (medians of joint A over an hour, benchmarks/cadences.py). A gait cycle that ends slower
+        than it began has the limits of the one before. Up to a tenth faster than commanded, as by a ripple,
+        and slower, the limits stay.
+        """
+        cadence = self.config.cadence
+        commanded = abs(cadence.commanded_rpm)
+        fastest = min(max(abs(rpm), abs(self.state.cadence_rpm)), commanded + cadence.tolerance_rpm)
+        return (fastest / commanded) ** 2 if fastest > _FASTER * commanded else 1.0
 
     def _end_tracked(self, report: CycleReport) -> tuple[AlarmList, ...]:
         """Evaluate a gait cycle that was tracked only: it has neither forces nor a predicted torque."""
@@ -187,7 +207,8 @@ class AlarmEvaluation:
             specs.IMPACT.name(joint): float(peak)
             for joint, peak in zip(self._twin.clearance_joints, self._twin.peak_force_n, strict=True)
         }
-        early = self.board.evaluate_early(peaks, self._twin.intake.followed_stamp_ns)
+        factor = self._impact_factor(self._twin.speed_radps * 30.0 / math.pi)
+        early = self.board.evaluate_early(peaks, self._twin.intake.followed_stamp_ns, factor)
         sources = {specs.SOURCES.name(): specs.SOURCES.value(self.guard)}
         early += self.board.evaluate(sources, self.guard.stamp_ns)
         self.state.evaluation_periods += 1
@@ -198,7 +219,9 @@ class AlarmEvaluation:
     def pause(self) -> None:
         """Note a pause of the recording: the evaluation of the input starts again with the next sample."""
         intake = attrs.evolve(self._twin.intake, newest_stamp_ns=0)
-        self.state = AlarmEvaluationState(intake, self.state.skipped, self.state.skipped_before)
+        self.state = AlarmEvaluationState(
+            intake, self.state.skipped, self.state.skipped_before, cadence_rpm=self.state.cadence_rpm
+        )
 
     def _evaluate_input(self, skipped: int) -> tuple[AlarmList, ...]:
         state, intake, config = self.state, self._twin.intake, self.config
@@ -215,6 +238,7 @@ class AlarmEvaluation:
             health=health,
             withheld=self._withheld,
             causes=self._causes(),
+            cadence_rpm=state.cadence_rpm,
         )
         cycles = 1 if math.isnan(health.duration_s) else round(1.0e9 * health.duration_s / self._cycle_ns)
         return self.board.evaluate(values, intake.newest_stamp_ns, max(1, cycles))

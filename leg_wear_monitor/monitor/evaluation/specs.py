@@ -121,7 +121,8 @@ IMPACT: "AlarmSpec[JointReport]" = AlarmSpec(
     unit="N",
     quantity="peak contact force",
     meaning="peak contact force of the gait cycle, N",
-    limit_words="`limits.impact_force_n`, `limits.joint_impact_force_n`",
+    limit_words="`limits.impact_force_n`, `limits.joint_impact_force_n`; within a wider "
+    "`cadence.tolerance_rpm` times the square of the cadence over the commanded one, from 1.1 on",
     value=lambda joint: joint.peak_force_n,
     limit=lambda of: of.by_joint(of.config.limits.joint_impact_force_n, of.config.limits.impact_force_n),
     on_delay=_knock,

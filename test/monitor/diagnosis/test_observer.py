@@ -308,13 +308,21 @@ def test_a_lag_that_begins_after_commissioning_is_no_clearance(leg, reference) -
         assert change.value == pytest.approx(0.01, abs=0.0026)
 
 
+STEPS_NOT_USED = (
+    ({"cadence_rpm": 45.0}, False),
+    ({"is_steady": False, "cadence_rpm": 26.0, "bridged_s": 0.0}, False),  # as in a start
+    ({"is_steady": False, "bridged_s": 0.1}, False),
+    ({}, True),
+)
+
+
 def test_cycles_that_are_not_used_are_counted_by_reason(leg, reference) -> None:
     observer = observer_of(leg)
     walk(observer, samples(reference, [0] * 10))
     steady = {"is_steady": True, "cadence_rpm": 60.0, "begin_ns": 0, "stamp_ns": 1}
-    for changes, wrong in (({"cadence_rpm": 45.0}, False), ({"is_steady": False}, False), ({}, True)):
+    for changes, wrong in STEPS_NOT_USED:
         observer.ended(SimpleNamespace(**steady | changes), wrong)
-    assert observer.diagnosis.cycles_not_used == {"cadence": 1, "gap": 1, "torque_cause": 1}
+    assert observer.diagnosis.cycles_not_used == {"cadence": 1, "standstill": 1, "gap": 1, "torque_cause": 1}
     for _ in range(UNUSED_CYCLES):
         observer.ended(SimpleNamespace(**steady | {"cadence_rpm": 45.0}))
     assert observer.diagnosis.state is DiagnosisState.WAITING  # what was seen before is not the leg now
@@ -431,7 +439,7 @@ def test_a_reference_that_was_half_simulated_goes_on_in_the_next_run(leg, refere
     assert first.part_of_reference is None  # no leg is done
     run = first._references._run
     while len(run._done) < 2:
-        run.advance()
+        run.advance(waits=True)
     part = first.part_of_reference
     second = observer_of(leg, references=[part])
     walk(second, block, end=8)

@@ -21,7 +21,10 @@ from leg_wear_monitor.twin.reference.crank_profile import CrankProfile
 NEW = np.full(5, 3.0e-4)
 SENSOR = TorqueSensor(0.005, 1.0, 9.2)
 CONFIG = MonitorConfig(cadence=Cadence(tolerance_rpm=20.0))
-IDLE, BUSY = (SimpleNamespace(is_busy=busy, percent=40, cycles_left=20.0) for busy in (False, True))
+IDLE, BUSY = (
+    SimpleNamespace(is_busy=busy, percent=40, cycles_left=20.0, is_for=lambda _, busy=busy: busy)
+    for busy in (False, True)
+)
 
 
 def cycles(number: int, rpm: float = 60.0) -> tuple[SignedCycle, ...]:
@@ -41,7 +44,7 @@ def state(**changes: object) -> TorqueState:
     return TorqueState(NEW, **{"sensor": SENSOR, **changes})
 
 
-UNLIKE = (NotUsed.UNLIKE,)
+UNLIKE, RAMP = 3 * (NotUsed.UNLIKE,), 9 * (NotUsed.UNLIKE,)
 STEPS = {
     "no torque": (state(sensor=None), IDLE, ""),
     "another cadence": (state(off_cadence_rpm=30.0, waiting=cycles(2)), IDLE, ""),
@@ -67,12 +70,17 @@ STEPS = {
     "another motion": (
         state(reference=of_reference(), cycles=cycles(50), waiting=cycles(15, 75.0), unused=UNLIKE),
         IDLE,
-        "a reference for this motion is begun in 5 gait cycles (4 s) alike",
+        "a reference for it is begun in 5 gait cycles (4 s)",
     ),
     "another motion, simulated": (
         state(reference=of_reference(), cycles=cycles(50), waiting=cycles(15, 75.0), unused=UNLIKE),
         BUSY,
-        "gait cycles at this cadence are compared in 20 gait cycles (20 s)",
+        "gait cycles at this cadence are compared in 25 gait cycles (20 s)",
+    ),
+    "a ramp": (
+        state(reference=of_reference(), cycles=cycles(50), waiting=cycles(2, 67.0), unused=RAMP),
+        IDLE,
+        "",
     ),
 }
 
@@ -98,6 +106,17 @@ def test_what_is_missing_does_not_repeat_the_next_step() -> None:
     )
     unlike = state(reference=of_reference(), cycles=cycles(50), waiting=cycles(4, 75.0), unused=UNLIKE)
     assert missing(unlike, IDLE, CONFIG) == ("the crank turns otherwise than in the references (60 rpm)")
+
+
+def test_a_ramp_is_recognised_and_a_start_raises_no_doubt() -> None:
+    models = SimpleNamespace(is_of_file=lambda _: True)
+    ramp = state(reference=of_reference(), cycles=cycles(19), commissioned=known(), waiting=cycles(2, 67.0))
+    ramp.unused = RAMP
+    assert doubt(ramp, IDLE, models) == (
+        "the cadence changes, now 67 rpm; gait cycles are compared at 60 rpm"
+    )
+    ramp.unused = (NotUsed.STANDSTILL, NotUsed.UNLIKE, NotUsed.UNLIKE)
+    assert doubt(ramp, IDLE, models) == ""
 
 
 def test_a_healthy_leg_is_told_how_well_it_is_known_and_what_comes_next() -> None:

@@ -23,7 +23,9 @@ def cycle(**other: float) -> Any:
         "residual_torque_rms_nm": 1.2,
         "torque_mismatch": 0.03,
     }
-    return SimpleNamespace(**healthy | other)
+    moving_s = 60.0 / abs(other.get("cadence_rpm", 60.0))
+    times = {"begin_ns": 0, "stamp_ns": round(1e9 * moving_s), "moving_s": moving_s}
+    return SimpleNamespace(**healthy | times | other)
 
 
 @pytest.mark.parametrize(
@@ -31,6 +33,7 @@ def cycle(**other: float) -> Any:
     [
         {},
         {"cadence_rpm": 45.0},
+        {"cadence_rpm": 26.0, "stamp_ns": 4_300_000_000},  # it stopped, stood for two seconds, and started
         {"torque_mismatch": 0.34},  # a healthy leg's with a sensor that samples at instants
         {"torque_mismatch": 0.6},
         {"torque_mismatch": np.nan},  # not compared yet

@@ -71,6 +71,20 @@ def test_limits_follow_from_the_parameters():
     assert (sources.warn, sources.error, sources.deadband, sources.on_delay) == (2.0, 2.0, 0.0, 1)
 
 
+def test_the_limits_of_impact_forces_are_those_of_the_cadence() -> None:
+    board = AlarmBoard(
+        config_from({"limits.impact_force_n": 1000.0, "alarms.knock_on_delay_cycles": 1}), ("A",)
+    )
+    values = {"impact_force A": 1500.0, "torque_mismatch": 0.01}
+    board.evaluate(values, 10**9, impact_factor=2.25)
+    board.evaluate_early(values, 2 * 10**9, impact_factor=2.25)
+    assert board.alarms["impact_force A"].level is Level.OK
+    assert board.alarms["impact_force A"].limit == 2250.0
+    assert board.alarms["torque_mismatch"].limit == 0.1
+    board.evaluate_early(values, 3 * 10**9)
+    assert board.alarms["impact_force A"].level is Level.ERROR
+
+
 @pytest.mark.parametrize(
     ("hours", "level"),
     [((40.0, 80.0, 160.0), Level.ERROR), ((60.0, 120.0, 240.0), Level.WARN), (None, Level.OK)],

@@ -177,15 +177,7 @@ class Explainer:
 
     def _as_counted(self, rest: Floats, covariance: Floats) -> Explanation:
         misfits = Misfits(rest[None], covariance, np.zeros((1, len(rest))))
-        return Explanation(
-            cause=Cause.UNKNOWN,
-            subject="",
-            value=0.0,
-            sigma=0.0,
-            counted=0.0,
-            misfit=float(misfits.value[0]),
-            square=float(misfits.square[0]) / len(rest),
-        )
+        return misfits.explanation(0, NamedCause(Cause.UNKNOWN, 0.0, 0.0))
 
     def _late(self, rest: Floats, covariance: Floats) -> list[Explanation]:
         """The best of the other channels; none where none explains.
@@ -203,17 +195,7 @@ class Explainer:
             return []
         misfits = Misfits(rest - change, covariance, MODEL_ERROR * change)
         best = int(np.where(possible, misfits.value, np.inf).argmin())
-        return [
-            Explanation(
-                cause=Cause.LAG,
-                subject="",
-                value=self.channels[best].later_s,
-                sigma=_LATE_SIGMA_S,
-                counted=0.0,
-                misfit=float(misfits.value[best]),
-                square=float(misfits.square[best]) / len(rest),
-            )
-        ]
+        return [misfits.explanation(best, NamedCause(Cause.LAG, self.channels[best].later_s, _LATE_SIGMA_S))]
 
     def _clearance(
         self, k: int, rest: Floats, there: Floats, covariance: Floats, counted_m: Floats
@@ -261,19 +243,12 @@ class Explainer:
         sigmas = np.sqrt(1.0 / information - spread**2)
         change = values[:, None] * columns
         misfits = Misfits(rest - change, covariance, MODEL_ERROR * change, spread[:, None] * columns)
-        each = zip(self.nuisances, values, sigmas, misfits.value, misfits.square, strict=True)
-        return [
-            Explanation(
-                cause=one.cause,
-                subject=one.subject,
-                value=_COUNTED.get(one.cause, 0.0) + float(value),
-                sigma=float(sigma),
-                counted=_COUNTED.get(one.cause, 0.0),
-                misfit=float(misfit),
-                square=float(square) / len(rest),
-            )
-            for one, value, sigma, misfit, square in each
-        ]
+        found = []
+        for i, one in enumerate(self.nuisances):
+            counted = _COUNTED.get(one.cause, 0.0)
+            cause = NamedCause(one.cause, counted + values[i].item(), sigmas[i].item(), one.subject)
+            found.append(misfits.explanation(i, cause, counted))
+        return found
 
 
 class Misfits:
@@ -310,6 +285,16 @@ class Misfits:
         root = np.linalg.cholesky(bordered)
         self.square = np.square(root[:, size, :size]).sum(axis=1)
         self.value = self.square + 2.0 * np.log(root[:, diagonal, diagonal]).sum(axis=1)
+        self._size = size
+
+    def explanation(self, i: int, one: NamedCause, counted: float = 0.0) -> Explanation:
+        """How well the cause (i,) explains."""
+        return Explanation(
+            **attrs.asdict(one),
+            counted=counted,
+            misfit=float(self.value[i]),
+            square=float(self.square[i]) / self._size,
+        )
 
 
 def opened(clearance_m: Floats, k: int, size: float) -> Floats:

@@ -65,7 +65,7 @@ def start_of(change: Change | None, joints: Sequence[str], counted_m: Floats) ->
 
 def change_of(explanations: Sequence[Explanation], since_ns: int) -> Change | None:
     """The change that explanations, the best first, amount to; None where the leg is as counted."""
-    best, second = explanations[:2]
+    best = explanations[0]
     nothing = next(one for one in explanations if one.cause is Cause.UNKNOWN)
     if best is nothing:
         return None
@@ -76,6 +76,8 @@ def change_of(explanations: Sequence[Explanation], since_ns: int) -> Change | No
         return Change(
             cause=Cause.UNKNOWN, since_ns=since_ns, value=0.0, sigma=0.0, counted=0.0, log_odds=log_odds
         )
+    fact = (best.cause.fault_code, best.subject)
+    second = next(one for one in explanations if (one.cause.fault_code, one.subject) != fact)
     runner_up = f"{second.cause.value} {second.subject}".strip()
     return Change(
         cause=best.cause,

@@ -59,7 +59,7 @@ class SampleStatistics:
     crank_angle_rad : (n,) array
         Crank angle of the model, in [0, 2 pi).
     predicted_torque_nm : (n,) array
-        Mean of the predicted drive torque since the previous sample.
+        Mean of the predicted drive torque since the previous sample, with the friction of the drive.
     contact_force_n : (n, k) array
         Contact forces at the sample.
     measured_torque_nm : (n,) array

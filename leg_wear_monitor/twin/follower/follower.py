@@ -36,6 +36,7 @@ from leg_wear_monitor.twin.follower.repeating import (
 )
 from leg_wear_monitor.twin.follower.state import (
     EVALUATED,
+    FRICTION,
     LAG,
     LOAD_FRICTION,
     TORQUE_SENSOR,
@@ -59,6 +60,7 @@ from leg_wear_monitor.twin.steps import MOVE, Steps
 _DENT_M = 1.0e-5  # a third of the penetration under 10 kN
 _RUN_IN_S = 0.2
 _STEADY = 0.05  # relative difference of two gait cycles' durations beyond which the cadence changes
+_LARGEST_FRICTION = 0.3  # constant one, of the RMS torque: as drive_torque.max_friction_nm by default
 _LEAST_TORQUE_NM = 1.0e-6  # lower bound of the RMS torque, for a leg that needs no torque
 
 _EVENT_KINDS = {
@@ -129,7 +131,7 @@ class LegFollower:
         kept = (INSTANT_CYCLES, INSTANT_CYCLES) if self._instants else (CYCLES, LEAST_CYCLES)
         self._repeating = RepeatingResidual(*kept)
         self._sensor = new_records(1, TORQUE_SENSOR)
-        self._sensor[0] = self._cutoff, self.torque_size_nm, self._instants
+        self._sensor[0] = self._cutoff, self.torque_size_nm, self._instants, 0.0, 0.0
         self._before = self.clearances
 
     @cached_property
@@ -313,10 +315,18 @@ class LegFollower:
         if found is not None:
             self.estimate.take(found, self._acts)
             self._load.set(self.estimate.acting)
+            self._set_friction()
         if found is not None and is_compared:
             self._repeating.take(sums.by_phase if self._instants else self._by_phase(profile, acting_n))
         torque = torque_statistics(sums, found, self.estimate, self._unexplained_nm)
         return torque, self._rubbing(profile, acting_n)
+
+    def _set_friction(self) -> None:
+        """Predict torques behind the friction of the drive as estimated, as far as friction can be that."""
+        constant, under_load = self.estimate.values[[FRICTION, LOAD_FRICTION]]
+        most_nm = _LARGEST_FRICTION * self.torque_size_nm
+        self._sensor["friction"] = min(max(float(constant), 0.0), most_nm)
+        self._sensor["load_friction"] = under_load
 
     def _rubbing(self, profile: TorqueProfile, acting_n: float) -> TorqueProfile:
         """The profile with the predicted torque behind a drive whose friction grows with the torque."""
@@ -359,3 +369,4 @@ class LegFollower:
         self.estimate.state[:] = snapshot.estimate
         self._repeating.cycles = snapshot.repeating
         self._load.set(self.estimate.acting)
+        self._set_friction()

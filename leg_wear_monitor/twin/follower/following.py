@@ -4,7 +4,7 @@ import math
 
 from leg_wear_monitor.dynamics.clearance.advance import ADVANCE
 from leg_wear_monitor.dynamics.clearance.contact import F_T
-from leg_wear_monitor.dynamics.clearance.model import ANGLE, blend, move_time_origin
+from leg_wear_monitor.dynamics.clearance.model import ANGLE, SPEED, blend, move_time_origin
 from leg_wear_monitor.dynamics.joint.contact_event import F_N
 from leg_wear_monitor.dynamics.run.protocol import DONE
 from leg_wear_monitor.dynamics.run.run_statistics import TORQUE, TORQUE_SQUARED
@@ -90,7 +90,9 @@ def _evaluate(sensor, signature, leg, polynomial, stepper, step, out):
     angle = _angle_at(polynomial, 1.0e-9 * (at - motion.piece_begin_ns))
     out.angle = angle - _TURN * math.floor(angle / _TURN)
     if motion.counts == COUNTED:
-        out.torque = torque.mean_before
+        direction = 1.0 if stepper.drive[SPEED] > 0.0 else -1.0
+        rubbing = sensor.friction + sensor.load_friction * abs(torque.mean_before)
+        out.torque = torque.mean_before + direction * rubbing
     if motion.piece_begin_ns <= step.end_ns <= motion.piece_end_ns and math.isfinite(step.torque):
         compare(sensor, signature, leg, stepper, step.torque)
 

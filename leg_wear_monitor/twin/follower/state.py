@@ -131,6 +131,9 @@ TORQUE_SENSOR = np.dtype(
         ("cutoff", "f8"),  # of the low-pass filter [rad/s]
         ("usual", "f8"),  # RMS of the ideal torque [N m]
         ("instants", "i8"),  # 1 if it samples instants instead of averages
+        # of the drive, as estimated up to the last gait cycle
+        ("friction", "f8"),  # constant [N m]
+        ("load_friction", "f8"),  # over the size of the torque
     ]
 )
 
@@ -139,7 +142,8 @@ EVALUATED = np.dtype(
         ("stamp_ns", "i8"),  # of the sample
         ("kind", "i8"),  # of `twin.sample`
         ("angle", "f8"),  # of the crank [rad], NaN while the leg does not run
-        ("torque", "f8"),  # mean drive torque since the previous sample [N m], NaN while the leg does not run
+        # mean drive torque since the previous sample, with the drive's friction [N m]; NaN while at rest
+        ("torque", "f8"),
         ("measured", "f8"),  # drive torque that the sample brings [N m], NaN without one
     ]
 )

@@ -155,7 +155,8 @@ class CauseWords:
     def _shift(self, angle_rad: float) -> str:
         if self.crank.zero == AT_START:
             return "restart the monitor while the leg walks steadily, so that the crank's zero is found again"
-        return f"set crank.offset_rad to {self.crank.offset_rad + angle_rad:.4g}"
+        right = f"set crank.offset_rad to {self.crank.offset_rad + angle_rad:.4g}"
+        return right if angle_rad else "correct crank.offset_rad"
 
 
 def _way(one: NamedCause) -> str:

@@ -329,6 +329,12 @@ def test_every_cause_of_the_diagnosis_has_a_rule_and_words(cause: Cause) -> None
     assert ("no single cause" in verdict.why) == (cause is Cause.UNKNOWN)
 
 
+def test_an_alarm_of_the_lag_that_is_past_gives_no_value_to_set() -> None:
+    verdict = judged(alarms=(alarm("torque_lag", present=Level.OK),), cadence_rpm=60.0)
+    assert verdict.why.endswith("is 2 s (limit 1 s) (since 0.000 s; now within its limit)")
+    assert "correct crank.offset_rad if its angle is wrong" in verdict.do
+
+
 def test_a_lag_that_the_diagnosis_finds_at_one_cadence_may_be_an_offset() -> None:
     late = diagnosis(change(Cause.LAG, value=0.01, sigma=0.001, counted=0.0))
     verdict = judged(diagnosis=late, cadence_rpm=60.0)

@@ -147,7 +147,7 @@ def test_two_cadences_tell_a_lag_from_an_offset(
     assert result.config.drive_torque.sampling == sampling
     assert result.config.crank.offset_rad == pytest.approx(1.0, abs=2.0e-3)
     assert result.item("lag").value == pytest.approx(0.0, abs=2.0e-4)
-    assert result.is_sure
+    assert result.is_sure, (result.not_told, result.findings)
 
 
 def test_a_late_torque_is_reported(
@@ -348,3 +348,31 @@ def test_the_result_goes_out_as_json_and_as_parameters(
     assert load_config(tmp_path / "monitor.yaml") == result.config
     with pytest.raises(LegWearError, match=r"no parameters are proposed: crank\.sign: why"):
         attrs.evolve(result, config=None, not_told=("crank.sign: why",)).to_yaml()
+
+
+def test_a_declared_lag_tells_the_offset_at_one_cadence(
+    ideal_walk: Callable[..., Walk], leg: Mechanism, model: TorqueModel
+) -> None:
+    """13 ms of lag are 0.082 rad at 60 rpm; half a sampling interval is a part of them."""
+    robot = Robot(offset_rad=0.3, lag_s=0.013, torque_noise_nm=0.01)
+    signals, base = signals_of(robot, ideal_walk(60.0)), load_config()
+    base = attrs.evolve(base, drive=attrs.evolve(base.drive, lag_s=0.0105))
+    result = propose(signals, fitted(leg, base), base, model=model)
+    offset = result.item("crank.offset_rad")
+    assert offset.sigma is not None and offset.sigma < 0.05
+    assert angle_between(float(offset.value), 0.3) < 5.0e-3
+    assert not any(text.startswith("lag") for text in result.not_told)
+
+
+def test_load_friction_is_found_and_moves_nothing(
+    ideal_walk: Callable[..., Walk], proposed: Callable[..., CommissioningResult]
+) -> None:
+    walk = ideal_walk(40.0, 90.0, friction_nm=0.5)
+    rubbing = attrs.evolve(walk, torque_nm=walk.torque_nm + 0.25 * np.abs(walk.torque_nm))
+    without, result = (proposed(signals_of(Robot(offset_rad=0.3), one)) for one in (walk, rubbing))
+    load_friction, friction = result.item("load friction"), result.item("friction")
+    assert load_friction.value == pytest.approx(0.25, abs=0.01)
+    assert without.item("load friction").value == pytest.approx(0.0, abs=0.01)
+    assert friction.value == pytest.approx(0.5 * 1.25, abs=0.1)
+    for name, most in (("crank.offset_rad", 5.0e-3), ("lag", 5.0e-4)):
+        assert result.item(name).value == pytest.approx(without.item(name).value, abs=most)

@@ -21,6 +21,7 @@ from leg_wear_monitor.estimate.signature import SAMPLES, TorqueSensor
 from leg_wear_monitor.estimate.signature_model import simulated_signatures
 from leg_wear_monitor.mechanism.arrays import Floats
 from leg_wear_monitor.mechanism.ideal import TURN
+from leg_wear_monitor.monitor.config.drive import drive_figures
 from leg_wear_monitor.monitor.diagnosis.leg_models import COMMISSIONING_CYCLES, NAMED_TO, LegModels
 from leg_wear_monitor.twin.reference.torque_reference import TorqueReference
 
@@ -50,7 +51,8 @@ def joint_detections(walk: Walk, reference: TorqueReference) -> tuple[JointDetec
     if walk.sensor is None:
         return ()
     known = walk.baseline
-    sensor = LegModels(walk.mechanism).channel(reference, walk.sensor, known)
+    models = LegModels(walk.mechanism, drive_figures(walk.config.drive))
+    sensor = models.channel(reference, walk.sensor, known)
     explainer = _commissioned(walk, reference, sensor, known)
     off = misfit(explainer.model, explainer.nuisances, known)
     found = _found(walk, explainer)

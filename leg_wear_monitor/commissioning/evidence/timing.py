@@ -13,9 +13,9 @@ from leg_wear_monitor.twin.settings import AVERAGE
 
 _SPREAD = 0.15  # relative spread of the speed from which on a lag is separated from the offset
 _SURE = 3.0  # standard deviations
-# by which clearances shift the torque's phase from cadence to cadence: with 0.01, as of legs of 0.3 mm, the
-# lags of 13 legs of 0.2 to 0.4 mm were off by 1.14 standard deviations RMS (2026-11-24)
-_MODEL_LAG_RAD = 0.013
+_MODEL_LAG_RAD = 0.01  # by which clearances shift the torque's phase; measured on the synthetic leg
+# the lags of 13 legs of 0.2 to 0.4 mm were off by 1.14 standard deviations, RMS (2026-11-24)
+_LEGS_DIFFER = 1.15
 # a drive may have no lag to speak of, or any up to 30 ms: current loops, filters, buses; neither is likelier
 _MOST_S, _STEP_S = 0.030, 0.00025
 _UNKNOWN_S = 0.0122  # the RMS of that, where nothing is measured: then the proposal allows for no lag
@@ -111,7 +111,7 @@ def timing_of(one: Fit, sampling: str, declared_s: float = math.nan) -> Timing:
     half = 0.5 * one.pair.interval_s if sampling == AVERAGE else 0.0
     if not separates_lag(one.pair):
         return Timing(False, math.nan, math.nan, half, declared_s)
-    return Timing(True, one.lag_s - half, lag_error_s(one), half, declared_s)
+    return Timing(True, one.lag_s - half, _LEGS_DIFFER * lag_error_s(one), half, declared_s)
 
 
 def lag_error_s(one: Fit) -> float:

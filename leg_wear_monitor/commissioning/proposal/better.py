@@ -28,6 +28,8 @@ def _offset(found: Found) -> str:
 
 
 def _lag(found: Found) -> str:
+    if math.isfinite(found.declared.lag_s):
+        return ""
     return _further(found) if found.timing.is_lag_separated else _TWO_CADENCES
 
 

@@ -12,6 +12,7 @@ from leg_wear_monitor.commissioning.proposal.found import Found, gear, gear_erro
 from leg_wear_monitor.estimate.torque_fit.likeness import repeating
 from leg_wear_monitor.mechanism.ideal import TURN
 from leg_wear_monitor.mechanism.spec import Mechanism
+from leg_wear_monitor.monitor.config.fitting import largest_lag_s
 
 _SURE = 3.0
 _TOLD = 2.0  # standard deviations that have to be less than what is asked for
@@ -72,11 +73,13 @@ def notes(found: Found) -> tuple[str, ...]:
 
 def _lag(found: Found) -> Iterator[str]:
     timing, most = found.timing, found.base.drive_torque.max_lag_s
+    if math.isfinite(timing.declared_s):
+        return
     if not timing.is_lag_separated:
         turned = 1.0e-3 * abs(float(np.median(found.fit.crank()[1])))
         yield (
             f"lag: at one cadence, a torque that is late by 1 ms looks like {turned:.2g} rad of offset; "
-            "record two cadences in one recording"
+            "record two cadences in one recording, or declare drive.lag_s"
         )
     elif _TOLD * timing.error_s > most:
         error = 1.0e3 * _TOLD * timing.error_s
@@ -108,11 +111,12 @@ def _drives(found: Found) -> str:
 
 
 def _late(found: Found) -> str:
-    late, most = found.timing.late_s, found.base.drive_torque.max_lag_s
+    late, most = found.timing.late_s, largest_lag_s(found.base)
     if not abs(late) - _SURE * found.timing.error_s > most:
         return ""
     return (
-        f"the torque is late by {1.0e3 * late:.3g} ms, more than drive_torque.max_lag_s ({1.0e3 * most:g} ms)"
+        f"the torque is late by {1.0e3 * late:.3g} ms, more than drive_torque.max_lag_s and the declared lag "
+        f"of the drive ({1.0e3 * most:.3g} ms)"
     )
 
 

@@ -49,7 +49,7 @@ def _bandwidth(found: Found) -> str:
     one = found.low_pass
     if one is not None and one.is_told and not math.isfinite(one.bandwidth_hz):
         return ""
-    return "declare drive.bandwidth_hz, or walk at 60 rpm and more, where impacts are strong"
+    return "declare drive.bandwidth_hz, or walk faster: stronger impacts show it better"
 
 
 def _load_friction(_found: Found) -> str:

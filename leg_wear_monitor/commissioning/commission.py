@@ -206,7 +206,8 @@ def _final(
     again, load = with_load(again, model, terms)
     sampling = sampling_of(again, model)
     declared = drive_figures(base.drive)
-    timing = timing_of(again, sampling.value or base.drive_torque.sampling, declared.lag_s)
+    used = sampling.value or base.drive_torque.sampling
+    timing = timing_of(again, used, bool(sampling.value), declared.lag_s)
     found = Found(choice, again, motion, sampling, timing, declared, base)
     return settled(found, model), load
 

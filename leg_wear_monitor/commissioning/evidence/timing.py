@@ -16,6 +16,7 @@ _SURE = 3.0  # standard deviations
 _MODEL_LAG_RAD = 0.01  # by which clearances shift the torque's phase; measured on the synthetic leg
 # the lags of 13 legs of 0.2 to 0.4 mm were off by 1.14 standard deviations, RMS (2026-11-24)
 _LEGS_DIFFER = 1.15
+_FILTERED = 0.25  # of an interval: behind a low-pass, instants look like averages, and are not late by a half
 # a drive may have no lag to speak of, or any up to 30 ms: current loops, filters, buses; neither is likelier
 _MOST_S, _STEP_S = 0.030, 0.00025
 _UNKNOWN_S = 0.0122  # the RMS of that, where nothing is measured: then the proposal allows for no lag
@@ -45,8 +46,8 @@ class Timing:
     late_s, error_s : float
         Time by which the torque is late beside its sampling, and its standard deviation [s]; NaN if it is not
         separated.
-    sampling_s : float
-        Lag of the sampling: half a sampling interval for averages.
+    sampling_s, sampling_sigma_s : float
+        Lag of the sampling, half a sampling interval for averages, and its standard deviation.
     declared_s : float
         Declared lag of the drive [s]; NaN without one.
     low_pass_s, low_pass_sigma_s : float
@@ -57,6 +58,7 @@ class Timing:
     late_s: float
     error_s: float
     sampling_s: float
+    sampling_sigma_s: float = 0.0
     declared_s: float = math.nan
     low_pass_s: float = 0.0
     low_pass_sigma_s: float = 0.0
@@ -75,8 +77,10 @@ class Timing:
     def lag_sigma_s(self) -> float:
         """Standard deviation of the lag to allow for [s]."""
         sigma = self._drive[1]
-        # where the whole lag is measured, an error of the low-pass is one of the drive's part, too
-        return sigma if self.is_lag_separated else math.hypot(sigma, self.low_pass_sigma_s)
+        # where the whole lag is measured, errors of its parts are those of the drive's part, too
+        if self.is_lag_separated:
+            return sigma
+        return math.hypot(sigma, self.low_pass_sigma_s, self.sampling_sigma_s)
 
     @property
     def _drive(self) -> tuple[float, float]:
@@ -98,20 +102,26 @@ class Timing:
         return mean, math.sqrt(float(likely @ (lag - mean) ** 2))
 
 
-def timing_of(one: Fit, sampling: str, declared_s: float = math.nan) -> Timing:
+def timing_of(one: Fit, sampling: str, is_told: bool, declared_s: float = math.nan) -> Timing:
     """Timing of a torque with a sampling, from a fit whose lag is free if the recording separates it.
 
     Parameters
     ----------
     one : Fit
     sampling : str
+    is_told : bool
+        Whether the recording tells the sampling.
     declared_s : float
         Declared lag of the drive [s].
     """
-    half = 0.5 * one.pair.interval_s if sampling == AVERAGE else 0.0
+    interval_s = one.pair.interval_s
+    half, sigma_s = (0.5 * interval_s, _FILTERED * interval_s) if sampling == AVERAGE else (0.0, 0.0)
+    if not is_told:
+        sigma_s = 0.5 * interval_s
     if not separates_lag(one.pair):
-        return Timing(False, math.nan, math.nan, half, declared_s)
-    return Timing(True, one.lag_s - half, _LEGS_DIFFER * lag_error_s(one), half, declared_s)
+        return Timing(False, math.nan, math.nan, half, sigma_s, declared_s)
+    error_s = math.hypot(_LEGS_DIFFER * lag_error_s(one), sigma_s)
+    return Timing(True, one.lag_s - half, error_s, half, sigma_s, declared_s)
 
 
 def lag_error_s(one: Fit) -> float:

@@ -140,8 +140,5 @@ def offset_sigma_rad(found: Found) -> float:
     # were all of the rest that repeats a shift of the phase, it would shift by this
     slope = np.gradient(one.predicted) / np.gradient(one.blocks.mean(one.crank()[0]))
     by_rest = repeating(one) * float(one.measured.std() / np.sqrt(np.mean(slope**2)))
-    lag_s = timing.lag_sigma_s
-    if not found.sampling.value:
-        lag_s = math.hypot(lag_s, 0.5 * one.pair.interval_s)  # averages are late by half an interval
-    by_lag = lag_s * found.turned_radps
+    by_lag = timing.lag_sigma_s * found.turned_radps
     return math.hypot(one.sigma["offset_rad"], PHASE_ERROR_RAD, by_rest, by_lag)

@@ -9,10 +9,12 @@ from leg_wear_monitor.bags.series.signals import FLOAT64
 from leg_wear_monitor.commissioning.evidence.misfit import Load, does_not_fit
 from leg_wear_monitor.commissioning.evidence.timing import cadences_rpm
 from leg_wear_monitor.commissioning.proposal.found import Found, gear, gear_error, offset_rad
+from leg_wear_monitor.estimate.cause import Cause, NamedCause
 from leg_wear_monitor.estimate.torque_fit.likeness import repeating
 from leg_wear_monitor.mechanism.ideal import TURN
 from leg_wear_monitor.mechanism.spec import Mechanism
 from leg_wear_monitor.monitor.config.fitting import largest_lag_s
+from leg_wear_monitor.monitor.verdict.cause_words import CauseWords
 
 _SURE = 3.0
 _TOLD = 2.0  # standard deviations that have to be less than what is asked for
@@ -103,10 +105,8 @@ def _drives(found: Found) -> str:
     friction, sigma = found.friction_nm
     size = float(one.predicted.std()) / abs(one.gain)
     if friction < -_SURE * sigma and abs(friction) > 0.02 * size:
-        return (
-            f"a constant torque of {abs(friction):.2g} N m drives the crank; friction cannot drive: zero the "
-            "torque sensor"
-        )
+        words = CauseWords(found.base.crank, found.base.drive_torque)
+        return f"{words.cause(NamedCause(Cause.BIAS, friction, sigma))}: zero the torque sensor"
     return ""
 
 

@@ -16,6 +16,7 @@ if TYPE_CHECKING:
         CommissioningItem,
         CommissioningResult,
     )
+    from leg_wear_monitor.commissioning.result.joint_detection import JointDetection
     from leg_wear_monitor.dynamics.result.parts import (
         EnergyBalance,
         Impact,
@@ -55,6 +56,7 @@ _HOME = {
     "Fleet": "fleet.fleet",
     "FleetOverview": "fleet.overview.parts",
     "Impact": "dynamics.result.parts",
+    "JointDetection": "commissioning.result.joint_detection",
     "JointResult": "dynamics.result.parts",
     "LegOverview": "fleet.overview.parts",
     "Life": "life.result",
@@ -97,6 +99,7 @@ __all__ = [
     "Fleet",
     "FleetOverview",
     "Impact",
+    "JointDetection",
     "JointResult",
     "LegOverview",
     "LegWearError",

@@ -376,3 +376,16 @@ def test_load_friction_is_found_and_moves_nothing(
     assert friction.value == pytest.approx(0.5 * 1.25, abs=0.1)
     for name, most in (("crank.offset_rad", 5.0e-3), ("lag", 5.0e-4)):
         assert result.item(name).value == pytest.approx(without.item(name).value, abs=most)
+
+
+@pytest.mark.parametrize(("drive", "is_other"), [("erob80-50", True), ("", False)])
+def test_a_drive_that_rubs_otherwise_than_declared_is_noted(
+    drive: str, is_other: bool, ideal_walk: Callable[..., Walk], leg: Mechanism, model: TorqueModel
+) -> None:
+    walk = ideal_walk(60.0)
+    rubbing = attrs.evolve(walk, torque_nm=walk.torque_nm + 0.25 * np.abs(walk.torque_nm))
+    base = load_config()
+    base = attrs.evolve(base, drive=attrs.evolve(base.drive, type=drive))
+    result = propose(signals_of(Robot(), rubbing), fitted(leg, base), base, model=model)
+    noted = [text for text in result.notes if "is drive.type right?" in text]
+    assert any(text.startswith("the load friction of the drive is 0.25") for text in noted) is is_other

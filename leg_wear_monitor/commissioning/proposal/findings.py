@@ -22,6 +22,7 @@ _ANEW_RAD = 0.1  # by which offsets of two recordings of one absolute encoder do
 _IN_DEGREES = math.degrees(1.0)
 _ROUGH_SCALE = 0.05
 _ROUGH_REST = 0.15  # a repeating rest that may shift the scale by more than twice what clearances do
+_DECLARED_ERROR = 0.3  # by which a drive differs from another one of its kind, and when it is warm
 _AT_ZERO_RAD = 0.02
 
 
@@ -91,6 +92,21 @@ def _lag(found: Found) -> Iterator[str]:
         )
 
 
+def _otherwise(found: Found) -> Iterator[str]:
+    """Declared figures of the drive that the recording contradicts."""
+    declared = found.declared
+    pairs = (
+        ("load friction", declared.load_friction, found.load_friction, ""),
+        ("constant friction", declared.coulomb_nm, found.friction_nm, " N m"),
+    )
+    for name, figure, (value, sigma), unit in pairs:
+        if abs(figure - value) > _SURE * sigma + _DECLARED_ERROR * figure:
+            yield (
+                f"the {name} of the drive is {value:.2g} ± {sigma:.1g}{unit}, {figure:.3g}{unit} is "
+                "declared: is drive.type right?"
+            )
+
+
 def _load(load: Load | None) -> str:
     if load is None:
         return ""
@@ -146,6 +162,7 @@ def _position(found: Found) -> str:
 
 def _notes(found: Found) -> Iterator[str]:
     yield from found.choice.also
+    yield from _otherwise(found)
     ratio = gear(found)[0]
     if ratio != 1.0 and len(found.fit.offset_rad) == 1:
         is_zero = bool(abs(found.motion.first_rad[-1]) < _AT_ZERO_RAD)

@@ -13,8 +13,10 @@ through the observer of the monitor: it has the reference that comes with the pa
 leg, and identifies it where that is required; its twin and its checks of size, sign and timing are not part
 of it. Behind a gear the crank turns evenly: ripple of the motor's speed, which its inertia limits, is less by
 the square of the ratio there. Without one, the crank turns evenly or as the motor did. Each drive begins with
-300 healthy gait cycles; each opened joint follows these, for 20 gait cycles.
-`python benchmarks/real_drive.py DIR --keep DIRECTORY` takes a quarter of an hour of one core.
+300 healthy gait cycles; each opened joint follows these, for 12 gait cycles, and a minute in which the leg is
+healthy and the current that of the other half of the recording.
+`python benchmarks/real_drive.py DIR --keep DIRECTORY` takes a quarter of an hour of one core, a third of it
+with `--as-of-file`, which does not identify the leg and corrects wherever a name is sure.
 """
 
 import argparse
@@ -38,6 +40,7 @@ from leg_wear_monitor.mechanism.ideal import TURN
 from leg_wear_monitor.mechanism.position import build_linkage
 from leg_wear_monitor.mechanism.spec import Mechanism
 from leg_wear_monitor.monitor.config.settings import MonitorConfig
+from leg_wear_monitor.monitor.diagnosis import leg_models, references
 from leg_wear_monitor.monitor.diagnosis.observer import TorqueObserver, TorqueObserverSnapshot
 from leg_wear_monitor.twin.follower.load import torque_size
 from leg_wear_monitor.twin.kinds import CRANK, TORQUE
@@ -49,9 +52,10 @@ NOISE_RAD = 1.0e-3
 # torque constant [N m/A] and gear of AK60, AK80-9 and ActPack; and the latter's torque without a gear
 DRIVES = ((0.068, 6.0), (0.115, 9.0), (0.1133, 41.5), (4.7, 1.0))
 OPENED = tuple((joint, size_mm) for size_mm in (0.45, 1.0) for joint in "ABGIJ")
-HEALTHY, WORN, BLOCK = 260, 40, 10
+HEALTHY, WORN = 260, 40
+BLOCK = 20  # gait cycles that are drawn together: a multiple of the recorded turns
 READY, PIECE = 300, 60  # gait cycles until the leg is identified, and at once
-AFTER = 20  # gait cycles of an opened joint: a correction takes ten
+AFTER = 12  # gait cycles of an opened joint: a correction takes ten
 
 
 def received(
@@ -176,7 +180,7 @@ def of_leg(one: Monitored) -> str:
     """What the observer knows of a healthy leg, and what it found, in words."""
     state, diagnosis = one.observer.state, one.observer.diagnosis
     sensor, off = state.sensor, one.observer._models.misfit(state)
-    unused = ", ".join(f"{cause.value} {number}" for cause, number in diagnosis.cycles_not_used.items())
+    unused = ", ".join(f"{cause} {number}" for cause, number in diagnosis.cycles_not_used.items())
     return (
         f"Noise {sensor.noise_nm:.3f} N m, delay {1e3 * sensor.delay_s:.2f} ms, low-pass "
         f"{1e3 * sensor.time_constant_s:.2f} ms, misfit {off:.2f} after {state.rounds} rounds; not used: "
@@ -190,7 +194,10 @@ def main() -> None:
     parser.add_argument("folder", type=Path, metavar="DIR")
     parser.add_argument("--keep", type=Path)
     parser.add_argument("--hours", type=float, default=2.0, help="of each healthy leg")
+    parser.add_argument("--as-of-file", action="store_true", help="do not identify, correct as if it were")
     options = parser.parse_args()
+    if options.as_of_file:
+        references.ROUNDS, leg_models.UNLIKE_FILE = 0, leg_models.NAMED_TO
     found, leg = motors(options.folder), load_mechanism("bionic_leg")
     print_tables(options.folder / ROBOT)
     mass = np.array([MASSES.get(body, 1.0) for body in leg.bodies])
@@ -199,7 +206,7 @@ def main() -> None:
     @functools.cache
     def walk(case: str, joint: str, size_mm: float) -> np.ndarray:
         clearance = np.where(np.array(leg.clearance_joints) == joint, 1e-3 * size_mm, NEW)
-        cycles = (WORN if joint else HEALTHY) + (BLOCK // 2 if case else 3)
+        cycles = (WORN if joint else HEALTHY) + (found[case].turns if case else 3)
         name = f"{joint or 'new'} {size_mm:.2f} {case or '0'}.pkl"
         if case:
             return kept(
@@ -225,9 +232,15 @@ def main() -> None:
         then = one.observer.snapshot()
         for first in range(READY, READY + round(3600 * options.hours), PIECE):
             one.add(*part(walk(turns, "", 0.3), first=first, cycles=PIECE, seed=first))
+        swapped = Monitored(leg, then, READY)
+        if motor is not None:
+            other = found[next(half for half in found if half != case.half)]
+            swapped.add(*part(walk(turns, "", 0.3), motor=other, first=READY, cycles=PIECE, seed=7))
         rms = f"{size * motor.at(GRID).std():.3f} and {size * motor.left.std():.3f}" if motor else "no"
         print(
-            f"\n**{case.name}**: {rms} N m RMS on the crank that repeat and that do not. {of_leg(one)}\n\n"
+            f"\n**{case.name}**: {rms} N m RMS on the crank that repeat and that do not. {of_leg(one)} "
+            f"With the current of the other half instead, found in the next {PIECE} gait cycles: "
+            f"{in_words(swapped.found, READY)}.\n\n"
             "| opened [mm] | found (after gait cycles; in how many) | at the end | clearance ± [mm] |\n"
             "|---|---|---|---|",
             flush=True,

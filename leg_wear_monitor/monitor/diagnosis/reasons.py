@@ -103,7 +103,8 @@ def next_step(state: TorqueState, references: References, config: MonitorConfig)
     cycle_s = TURN / abs(last[0].profile.speed) if last else commanded_s
     if references.is_busy:
         left_s = references.cycles_left * commanded_s
-        return f"{_simulated(state, references, is_unlike)} in {_cycles(left_s / cycle_s, cycle_s)}"
+        then = "; a reference with them follows" if state.is_identifying else ""
+        return f"{_simulated(state, references, is_unlike)} in {_cycles(left_s / cycle_s, cycle_s)}{then}"
     if state.reference is None:
         return f"a reference is chosen in {_cycles(FIRST_CYCLES - len(state.waiting), cycle_s)}"
     if is_unlike:
@@ -118,7 +119,7 @@ def next_step(state: TorqueState, references: References, config: MonitorConfig)
 def _simulated(state: TorqueState, references: References, is_unlike: bool) -> str:
     """What is known when that which is being simulated is there."""
     if state.is_identifying:
-        return "masses, lengths and friction of this leg are known, and a reference with them is begun,"
+        return "masses, lengths and friction of this leg are identified"
     if state.reference is None:
         return "clearances are compared"
     if is_unlike and state.waiting and references.is_for(state.waiting[-1].profile):

@@ -64,8 +64,8 @@ STEPS = {
     "identification": (
         state(reference=of_reference(), cycles=cycles(50), commissioned=known(), is_identifying=True),
         BUSY,
-        "masses, lengths and friction of this leg are known, and a reference with them is begun, "
-        "in 20 gait cycles (20 s)",
+        "masses, lengths and friction of this leg are identified in 20 gait cycles (20 s); a reference with "
+        "them follows",
     ),
     "another motion": (
         state(reference=of_reference(), cycles=cycles(50), waiting=cycles(15, 75.0), unused=UNLIKE),

@@ -208,7 +208,8 @@ def test_a_late_filtered_or_rubbing_torque_names_nothing_before_commissioning_an
     for cycle in range(COMMISSIONING_CYCLES + 4):
         assert walk(observer, block, begin=cycle, end=cycle + 1) == []
         assert observer.diagnosis.changes == ()
-        if 6 <= cycle < COMMISSIONING_CYCLES - 1:
+        # friction alone is within the tolerances of a leg that was never commissioned
+        if 6 <= cycle < COMMISSIONING_CYCLES - 1 and channel.keys() != {"load_friction"}:
             assert observer.diagnosis.state is DiagnosisState.WAITING
             assert observer.diagnosis.clearance_m == ()
             assert "not that of the mechanism file" in observer.diagnosis.reason

@@ -143,11 +143,19 @@ def signed(
 
 
 def watched(
-    leg: Mechanism, size_nm: float, rows: list[np.ndarray]
+    leg: Mechanism,
+    size_nm: float,
+    rows: list[np.ndarray],
+    one: observer.TorqueObserver | None = None,
+    first: int = 0,
 ) -> tuple[observer.TorqueObserver, list[str]]:
-    """The observer after gait cycles with given signatures; what it named, corrected or stopped, and when."""
+    """The observer after gait cycles with given signatures; what it named, corrected or stopped, and when.
+
+    Goes on with an observer whose gait cycles end before the one with the number ``first``.
+    """
     left, reference = iter(rows), shipped_references(leg)[0]
-    one, counted, found = observer.TorqueObserver(leg, MonitorConfig(), size_nm, NEW), NEW.copy(), []
+    one = one or observer.TorqueObserver(leg, MonitorConfig(), size_nm, NEW)
+    counted, found = NEW.copy(), []
     joints, limit_m, second = leg.clearance_joints, MonitorConfig().limits.clearance_m, 10**9
 
     def next_cycle(state, begin_ns, end_ns):
@@ -157,7 +165,7 @@ def watched(
         state.sensor = state.sensor or TorqueSensor(0.005, 1.0, size_nm)
 
     with mock.patch.multiple(observer, signed_cycle=next_cycle, find_sensor=find):
-        for i in range(len(rows)):
+        for i in range(first, first + len(rows)):
             begin, end = (i + 1) * second, (i + 2) * second
             one.ended(SimpleNamespace(is_steady=True, cadence_rpm=60.0, begin_ns=begin, stamp_ns=end))
             correction = one.end_period(counted, UNWORN)

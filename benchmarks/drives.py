@@ -162,19 +162,22 @@ def main() -> None:
         for name in names:
             cells = []
             healthy = cycles_of(walk("", 0.3), DRIVES[name], sensor, 5)
+            before = COMMISSIONED + (WARM // 2 if DRIVES[name].drifts else 0)
+            order = [i % healthy.shape[1] for i in range(before)]
+            one, found = watched(leg, size, warming(healthy, order))
+            commissioned = one.snapshot()
             for joint, size_mm in OPENINGS:
                 worn = cycles_of(walk(joint, size_mm), DRIVES[name], sensor, 6)
-                begin = 600 if DRIVES[name].drifts else 0
-                rows = warming(healthy, [i % healthy.shape[1] for i in range(COMMISSIONED + begin)])
-                rows += warming(worn, list(range(worn.shape[1])), len(rows))
-                one, found = watched(leg, size, rows)
+                one.restore(commissioned)
+                rows = warming(worn, list(range(worn.shape[1])), before)
+                one, found = watched(leg, size, rows, one, before)
                 seen, k = one.diagnosis, leg.clearance_joints.index(joint)
                 value = (
                     f"{1e3 * seen.clearance_m[k]:.2f} ± {1e3 * seen.sigma_m[k]:.2f}"
                     if seen.clearance_m
                     else "-"
                 )
-                cells.append(f"{when(found, COMMISSIONED + begin)} {value}")
+                cells.append(f"{when(found, before)} {value}")
             print(f"| {name} | {' | '.join(cells)} |", flush=True)
 
 

@@ -69,6 +69,7 @@ _FASTEST_GROWTH = 3.0  # of a step over the one before; none after a trial with 
 # of the drive at one end of a step: torque [N m], its smooth part [N m], power of loads [W]
 WHOLE, SMOOTH, OUTSIDE = 0, 1, 2
 
+_FURTHEST = 1.0  # rad: largest turn of a crank behind a coupling in half a part of an interval
 _FASTEST = 1.0e4  # largest crank speed, and largest change of it in an interval [rad/s]: far above any leg
 
 
@@ -159,6 +160,8 @@ def _part(model, surfaces, state, polynomial, begin, end, statistics, work):
         if coupled:
             law = model.coupling.law
             turn_crank(law, whole, steeper, length, torque, impulse, state, statistics, work)
+            if not (abs(state.drive[SPEED]) < _FASTEST and abs(state.drive[ANGLE] - angle) < _FURTHEST):
+                return INVALID_DRIVE, -1
         for i in range(state.e.shape[0]):
             state.e[i], state.v[i] = work.x[E0, i], work.x[V0, i]
     return status, k

@@ -51,7 +51,9 @@ def turn_crank(law, whole, steeper, length, torque, impulse, state, statistics, 
     integral[TORQUE] = impulse + torque * length
     integral[POWER] += torque * motor * length - needed * now.speed[0]
     state.drive[ANGLE], state.drive[SPEED] = crank[ANGLE] + turned, crank[SPEED] + gained
-    state.drive[ACCELERATION] = now.speed[1] = gained / length
+    state.drive[ACCELERATION] = gained / length
+    # that of the last sample, for the reactions of the ideal joints: an impact changes it as it changes e''
+    now.speed[1] = (torque - work.drive_start[0] - steeper * gained) / whole
 
 
 @kernel

@@ -1,4 +1,4 @@
-"""Masses, lengths and friction of a commissioned leg, from its drive torque.
+"""Masses, lengths, friction and the drive's compliance of a commissioned leg, from its drive torque.
 
 A real leg is not quite that of its mechanism file. Where its impacts fall, and what a clearance changes,
 depends on its masses, lengths and friction: a length that is 1 % off, or friction twice that of the file,
@@ -24,7 +24,13 @@ from leg_wear_monitor.estimate.signature_model import SignatureModel, simulated_
 from leg_wear_monitor.mechanism.arrays import Floats
 from leg_wear_monitor.mechanism.spec import Mechanism
 from leg_wear_monitor.twin.reference.leg_parameters import LegParameters
-from leg_wear_monitor.twin.reference.torque_reference import HEAVIER, LONGER, ROUGHER, TorqueReference
+from leg_wear_monitor.twin.reference.torque_reference import (
+    HEAVIER,
+    LONGER,
+    ROUGHER,
+    STIFFER,
+    TorqueReference,
+)
 
 UNLIKE_FILE = 0.8  # misfit from which on the leg is not that of its file (docs/explanation/diagnosis.md)
 
@@ -32,6 +38,7 @@ FAR_FROM_FILE = 20.0  # misfit from which on the ideal torque comes first
 
 _MASS, _LENGTH = 0.03, 0.006  # standard deviations of a leg's bodies about those of its file
 _LOG_FRICTION = 0.7  # of the logarithm of its friction: a factor of two, greased or not
+_LOG_COMPLIANCE = 0.2  # of that of the drive's compliance, about that of the ideal leg's torque
 _FAR = 0.03  # that of masses and lengths of a leg far from its file
 _HARMONICS = 6  # of the torque that show masses and lengths rather than impacts
 _IDEAL = 0.01  # of the torque's size: what impacts change in each of them
@@ -72,17 +79,25 @@ def identified_leg(
     """
     means = [simulated_signatures(legs, leg, model.sensor).mean(axis=0) for leg in range(len(legs.torque_nm))]
     bodies, near = len(legs.parameters.mass), legs.parameters
-    # friction is positive, and known to a factor: its logarithm is the unknown
+    # friction and compliance are positive, and known to a factor: their logarithms are the unknowns
     before = np.concatenate([near.mass - 1.0, near.length - 1.0, [math.log(near.friction)]])
     far = float(np.sqrt(np.mean(np.square(near.length - 1.0))))
     steps = np.append(np.repeat([HEAVIER, LONGER], bodies), math.log(ROUGHER))
     sigma = np.append(np.repeat([_MASS, np.hypot(_LENGTH, far)], bodies), _LOG_FRICTION)
+    if len(means) > 1 + len(steps):  # its deviation from the compliance of the simulated leg
+        before, steps, sigma = (
+            np.append(before, 0.0),
+            np.append(steps, -math.log(STIFFER)),
+            np.append(sigma, _LOG_COMPLIANCE),
+        )
     slopes = ((np.array(means[1:]) - means[0]) / steps[:, None]).T
     weighted = np.linalg.solve(_covariance(model, nuisances, commissioned.cycles), slopes)
     information = slopes.T @ weighted + np.diag(sigma**-2.0)
     rest = commissioned.mean - means[0]
     found = before + np.linalg.solve(information, weighted.T @ rest - before / sigma**2)
-    return LegParameters(1.0 + found[:bodies], 1.0 + found[bodies:-1], math.exp(found[-1]))
+    mass, length, (log_friction, *log_compliance) = np.split(found, [bodies, 2 * bodies])
+    compliance = near.compliance * math.exp(sum(log_compliance))
+    return LegParameters(1.0 + mass, 1.0 + length, math.exp(log_friction), compliance)
 
 
 def leg_of_ideal_torque(

@@ -14,6 +14,7 @@ import numpy as np
 from leg_wear_monitor.estimate.cause import Cause
 from leg_wear_monitor.estimate.clearance_fit import ClearanceFit
 from leg_wear_monitor.estimate.commissioned_torque import CommissionedTorque
+from leg_wear_monitor.estimate.drive_compliance import compliance_of
 from leg_wear_monitor.mechanism.arrays import Floats
 from leg_wear_monitor.mechanism.spec import Mechanism
 from leg_wear_monitor.monitor.config.drive import drive_figures
@@ -77,16 +78,21 @@ class TorqueObserver:
         references: Sequence[TorqueReference] = (),
     ) -> None:
         self.config, self._size_nm, self._joints = config, size_nm, mechanism.clearance_joints
-        self._models = LegModels(mechanism, drive_figures(config.drive))
+        figures = drive_figures(config.drive)
+        self._models = LegModels(mechanism, figures)
         part = next((one for one in references if not one.is_whole), None)
         whole = [one for one in references if one.is_whole]
-        self._references = References(mechanism, self._models, whole, part)
+        is_drive_known = not math.isnan(figures.stiffness_nm_per_rad)
+        self._references = References(mechanism, self._models, whole, part, is_drive_known)
         self._evidence = Evidence(self._models)
         counted_m = np.asarray(counted_m, float).copy()
         if parameters is None:  # those that files and unfinished references were made with
             own = LegParameters.none(mechanism)
             made = (one.parameters for one in references if not one.is_of_parameters)
             parameters = next((one for one in made if one != own), None)
+        if is_drive_known:
+            whole_leg = parameters or LegParameters.none(mechanism)
+            parameters = attrs.evolve(whole_leg, compliance=compliance_of(figures.stiffness_nm_per_rad))
         self.state = TorqueState(counted_m, baselines=tuple(commissioned), parameters=parameters)
 
     def warm_up(self) -> None:

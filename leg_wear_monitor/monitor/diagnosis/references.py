@@ -5,6 +5,7 @@ from collections.abc import Sequence
 
 import numpy as np
 
+from leg_wear_monitor.estimate.drive_compliance import leg_behind_coupling
 from leg_wear_monitor.estimate.identification import (
     FAR_FROM_FILE,
     identified_leg,
@@ -43,6 +44,8 @@ class References:
         Those known beforehand: of files first, then of the ledger; the shipped ones come last.
     part : TorqueReference or None
         One whose simulation was not finished in an earlier run.
+    is_drive_known : bool
+        Whether the stiffness of the drive is declared, and not to be found.
 
     Raises
     ------
@@ -56,8 +59,10 @@ class References:
         models: LegModels,
         given: Sequence[TorqueReference] = (),
         part: TorqueReference | None = None,
+        is_drive_known: bool = False,
     ) -> None:
         self._mechanism, self._models, self._part = mechanism, models, part
+        self._is_drive_known = is_drive_known
         self._given = (*given, *shipped_references(mechanism))
         self._run: TorqueReferenceRun | None = None
 
@@ -126,18 +131,26 @@ class References:
 
     def _begin_identification(self, state: TorqueState, reference: TorqueReference, depth: Floats) -> None:
         """Begin the simulation of legs with other parameters, near the commissioned leg."""
-        if state.commissioned is None:
+        known = state.commissioned
+        if known is None:
             return
-        start, model = reference.parameters, self._models.explainer(state).model
-        if self._models.misfit(state) >= FAR_FROM_FILE and not state.rounds:
-            start = leg_of_ideal_torque(self._mechanism, model, state.commissioned, reference.profile.speed)
-        state.is_identifying, state.rounds = True, state.rounds + 1
-        clearance_m, profile = state.commissioned.clearance_m, reference.profile
+        start, model, is_first = reference.parameters, self._models.explainer(state).model, not state.rounds
+        state.rounds += 1
+        clearance_m, profile = known.clearance_m, reference.profile
+        if is_first and not (start.compliance or self._is_drive_known):
+            found = leg_behind_coupling(self._mechanism, model.sensor, profile, known.mean)
+            if found is not None:
+                state.parameters = found
+                self._begin(found, clearance_m, depth, profile)
+                return
+        if is_first and not start.compliance and self._models.misfit(state) >= FAR_FROM_FILE:
+            start = leg_of_ideal_torque(self._mechanism, model, known, profile.speed)
+        state.is_identifying = True
         part = self._part_of(start, profile, clearance_m, is_of_parameters=True)
         if part is not None:
             self._begun().go_on(part, depth)
         else:
-            self._begun().begin_identification(clearance_m, depth, profile, start)
+            self._begun().begin_identification(clearance_m, depth, profile, start, self._is_drive_known)
 
     def _continue(
         self, run: TorqueReferenceRun, state: TorqueState, counted_m: Floats, depth: Floats
@@ -156,7 +169,10 @@ class References:
     def _choose(self, state: TorqueState, counted_m: Floats, depth: Floats) -> bool:
         """Use a given reference if the crank turns as in it, preferably one of the leg; or begin one."""
         profile = mean_profile([cycle.profile for cycle in state.waiting])
-        alike = [one for one in self._given if profile.is_like(one.profile)]
+        drive = state.parameters.compliance if state.parameters else 0.0
+        alike = [
+            one for one in self._given if profile.is_like(one.profile) and one.parameters.compliance == drive
+        ]
         if alike:
             self._install(state, next((one for one in alike if one.parameters == state.parameters), alike[0]))
             return True
@@ -209,10 +225,20 @@ class References:
             _take_up(state, reference)
             return
         state.reference = reference
-        if reference.parameters != before.parameters and self._models.misfit(state) > off:
-            state.reference, state.is_final, state.rounds = before, True, ROUNDS
-            if all(one.reference.parameters != state.parameters for one in state.set_aside):
-                state.parameters = before.parameters
+        own, former, sensor = reference.parameters, before.parameters, state.sensor
+        is_new_drive = own.compliance != former.compliance
+        if is_new_drive and sensor is not None and state.commissioned is not None:
+            # what a compliant drive does looks like a channel to a rigid one
+            state.sensor = self._models.channel(reference, sensor, state.commissioned)
+        if own == former or self._models.misfit(state) <= off:
+            return
+        state.reference, state.sensor = before, sensor
+        if is_new_drive and not former.compliance:  # the leg of a rigid drive is still to be identified
+            state.parameters = former
+            return
+        state.is_final, state.rounds = True, ROUNDS
+        if all(one.reference.parameters != state.parameters for one in state.set_aside):
+            state.parameters = before.parameters
 
 
 def _turn(state: TorqueState, profile: CrankProfile) -> None:

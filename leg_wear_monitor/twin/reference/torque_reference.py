@@ -42,6 +42,7 @@ WORN, NARROWER = 1.2, 0.8  # a clearance over the new one, and a factor on the o
 
 HEAVIER, LONGER = 0.04, 0.004  # of a body's mass and length, one body at a time
 ROUGHER = 1.5  # factor on the friction in the joints
+STIFFER = 1.08  # factor on the stiffness of a drive that is not rigid: a quarter of its resonance's width
 
 _SETTLING = 2  # gait cycles before those that count
 _NICE = 10  # lets the node have as much of a core as it needs, and other programs most of it
@@ -196,7 +197,7 @@ class TorqueReferenceRun:
             Wear depths [m], as of `begin`.
         """
         if part.is_of_parameters:
-            legs = _changed(part.parameters, part.clearance_m[0])
+            legs = _changed(part.parameters, part.clearance_m[0])[: len(part.clearance_m)]
         else:
             legs = [_Leg(part.parameters, clearance_m) for clearance_m in part.clearance_m]
         self._begin(legs, depth, part.profile)
@@ -210,10 +211,19 @@ class TorqueReferenceRun:
         return self._so_far() if self._done and self.is_busy else None
 
     def begin_identification(
-        self, clearance_m: Floats, depth: Floats, profile: CrankProfile, near: LegParameters
+        self,
+        clearance_m: Floats,
+        depth: Floats,
+        profile: CrankProfile,
+        near: LegParameters,
+        is_drive_known: bool = False,
     ) -> None:
-        """Begin the leg with given parameters, then each body heavier, each longer, and more friction."""
-        self._begin(_changed(near, np.maximum(clearance_m, _LEAST_CLEARANCE_M)), depth, profile)
+        """Begin the leg with given parameters, then each body heavier, each longer, and more friction.
+
+        Where its drive is compliant, and not known, a last leg has a stiffer one.
+        """
+        legs = _changed(near, np.maximum(clearance_m, _LEAST_CLEARANCE_M))
+        self._begin(legs[:-1] if near.compliance and is_drive_known else legs, depth, profile)
 
     def advance(self, waits: bool = False) -> TorqueReference | None:
         """Note that an evaluation period has passed; return the reference when all of it is due.
@@ -310,7 +320,7 @@ class TorqueReferenceRun:
 
 
 def _changed(near: LegParameters, clearance_m: Floats) -> list[_Leg]:
-    """The leg with given parameters, then each body heavier, each longer, and more friction."""
+    """The leg with given parameters, then each body heavier, each longer, more friction, a stiffer drive."""
     each = np.eye(len(near.mass))
     changed = [
         near,
@@ -318,6 +328,8 @@ def _changed(near: LegParameters, clearance_m: Floats) -> list[_Leg]:
         *(attrs.evolve(near, length=near.length + LONGER * one) for one in each),
         attrs.evolve(near, friction=near.friction * ROUGHER),
     ]
+    if near.compliance:
+        changed.append(attrs.evolve(near, compliance=near.compliance / STIFFER))
     return [_Leg(parameters, clearance_m) for parameters in changed]
 
 

@@ -161,8 +161,9 @@ class Parts:
         if self.torque:
             found = self.torque.diagnosis
             if not self.is_torque_wrong:
+                own = self.twin.parameters
                 return attrs.evolve(
-                    found, bodies=self._counted_bodies(), friction=self.twin.parameters.friction
+                    found, bodies=self._counted_bodies(), friction=own.friction, compliance=own.compliance
                 )
             settled = tuple(change for change in found.changes if change.is_corrected)
             return Diagnosis(
@@ -178,7 +179,7 @@ class Parts:
     def _counted_bodies(self) -> tuple[Body, ...]:
         """Bodies of the twin; none where its parameters are those of the mechanism file."""
         own = self.twin.parameters
-        if own == LegParameters.none(self.mechanism):
+        if attrs.evolve(own, compliance=0.0) == LegParameters.none(self.mechanism):
             return ()
         factors = zip(self.mechanism.bodies, own.mass.tolist(), own.length.tolist(), strict=True)
         return tuple(Body(*one) for one in factors)

@@ -86,6 +86,8 @@ def diagnosis_status(joints: Sequence[str], diagnosis: Diagnosis) -> Status:
         values[f"{body.name}_length_factor"] = body.length
     if diagnosis.bodies:
         values["joint_friction_factor"] = diagnosis.friction
+    if diagnosis.compliance:
+        values["drive_stiffness_nm_per_rad"] = 1.0 / diagnosis.compliance
     if diagnosis.state is DiagnosisState.CHANGED:
         return Status("diagnosis", Level.WARN, diagnosis_words(diagnosis, joints), values, DIAGNOSIS)
     return Status("diagnosis", Level.OK, diagnosis_words(diagnosis, joints), values)

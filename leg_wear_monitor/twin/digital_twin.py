@@ -8,7 +8,7 @@
     twin.tracking, twin.speed_radps, twin.intake        # state of tracking, counts of samples
     twin.clearance_mean_m, twin.depth                   # present wear
     twin.set_depth(depth), twin.reset_wear("G")         # from a ledger; after a replacement
-    twin.set_parameters(parameters)                     # masses, lengths and friction that were identified
+    twin.set_parameters(parameters)                     # masses, lengths, friction, drive
     twin.wear_acceleration = 100.0                      # may change at any time
     snapshot = twin.snapshot(); twin.restore(snapshot)  # continues bit-identically
 
@@ -188,11 +188,11 @@ class DigitalTwin:
 
     @property
     def parameters(self) -> LegParameters:
-        """Factors on the parameters of the mechanism."""
+        """Factors on the parameters of the mechanism, and the compliance of its drive."""
         return self._parameters
 
     def set_parameters(self, parameters: LegParameters) -> None:
-        """Continue with other masses, lengths and friction; motion and wear go on.
+        """Continue with other masses, lengths, friction and drive; motion and wear go on.
 
         Raises
         ------
@@ -202,7 +202,8 @@ class DigitalTwin:
         if parameters != self._parameters:
             linkage = build_linkage(parameters.applied(self._mechanism))
             check_cycle(linkage)
-            self._follower.take_parameters(linkage, parameters.friction * self._friction)
+            friction = parameters.friction * self._friction
+            self._follower.take_parameters(linkage, friction, parameters.compliance)
             self._parameters = parameters
 
     def set_depth(self, depth: Floats) -> None:

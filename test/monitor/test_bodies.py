@@ -15,7 +15,7 @@ from leg_wear_monitor.twin.reference.leg_parameters import LegParameters
 def found(leg, monkeypatch) -> LegParameters:
     """Parameters that each observer says it has identified."""
     factors = np.linspace(0.96, 1.04, len(leg.bodies))
-    parameters = LegParameters(factors, 1.0 + 0.05 * (factors - 1.0), 1.5)
+    parameters = LegParameters(factors, 1.0 + 0.05 * (factors - 1.0), 1.5, 1.0 / 800.0)
     monkeypatch.setattr(TorqueObserver, "parameters", parameters)
     return parameters
 
@@ -36,6 +36,7 @@ def test_the_twin_walks_on_with_identified_parameters_and_the_ledger_keeps_them(
     assert "counted with the masses, lengths and friction" in status.message
     assert status.values["thigh_mass_factor"] == found.mass[list(leg.bodies).index("thigh")]
     assert status.values["joint_friction_factor"] == monitor.diagnosis.friction == 1.5
+    assert status.values["drive_stiffness_nm_per_rad"] == pytest.approx(800.0)
     monitor.close()
     again = open_monitor(leg, config)
     assert again._parts.twin.parameters == found

@@ -64,6 +64,8 @@ class Diagnosis:
         Identified masses and lengths that the wear is counted with; empty while it is counted as in the file.
     friction : float
         Factor on the friction in the joints that the wear is counted with.
+    compliance : float
+        Between the measured crank angle and the crank [rad/(N m)], that the wear is counted with; 0 if rigid.
     """
 
     state: DiagnosisState = DiagnosisState.OFF
@@ -76,3 +78,4 @@ class Diagnosis:
     changes: tuple[Change, ...] = ()
     bodies: tuple[Body, ...] = ()
     friction: float = 1.0
+    compliance: float = 0.0

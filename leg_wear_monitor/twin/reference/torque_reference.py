@@ -44,6 +44,7 @@ HEAVIER, LONGER = 0.04, 0.004  # of a body's mass and length, one body at a time
 ROUGHER = 1.5  # factor on the friction in the joints
 STIFFER = 1.08  # factor on the stiffness of a drive that is not rigid: a quarter of its resonance's width
 
+_BEHIND = 2  # legs that are due and not simulated, from which on threads of higher priority help
 _SETTLING = 2  # gait cycles before those that count
 _NICE = 10  # lets the node have as much of a core as it needs, and other programs most of it
 _LEAST_CLEARANCE_M = 5.0e-5
@@ -110,7 +111,8 @@ class TorqueReferenceRun:
 
     Threads simulate some legs ahead of the caller. `advance` waits for them when all are due: what it returns
     depends on the number of calls alone, and a machine that is busy for a while catches up before. There are
-    as many threads as numba may use (NUMBA_NUM_THREADS).
+    as many threads as numba may use (NUMBA_NUM_THREADS); while they are behind, as many of the program's own
+    priority help.
 
     Parameters
     ----------
@@ -130,7 +132,9 @@ class TorqueReferenceRun:
         self._periods = 0
         self._threads = numba.config.NUMBA_NUM_THREADS
         self._pool = ThreadPoolExecutor(self._threads, "torque-reference", _lower_priority)
+        self._urgent = ThreadPoolExecutor(self._threads, "torque-reference-urgent")
         self._ahead: list[Future[HalfFloats | None]] = []
+        self._hurried: list[Future[HalfFloats | None]] = []
         self._of_thread = threading.local()
 
     @property
@@ -234,7 +238,7 @@ class TorqueReferenceRun:
             return None
         self._periods += 1
         is_due = self._cost(self._legs) <= PACE * self._periods
-        self._take(waits or is_due)
+        self._take(waits or is_due, hurries=is_due and not waits)
         if not is_due:
             return None
         if self.is_busy:  # a leg could not be simulated
@@ -264,7 +268,7 @@ class TorqueReferenceRun:
     def _begin(self, legs: Sequence[_Leg], depth: Floats, profile: CrankProfile) -> None:
         for one in self._ahead:
             one.cancel()
-        self._ahead, self._periods = [], 0
+        self._ahead, self._hurried, self._periods = [], [], 0
         self._legs, self._depth, self._done, self._profile = tuple(legs), depth.copy(), (), profile
 
     def _so_far(self) -> TorqueReference:
@@ -278,23 +282,40 @@ class TorqueReferenceRun:
         costs = np.cumsum([_SETTLING + self._cycles_of(leg) for leg in self._legs])
         return int(np.searchsorted(costs, PACE * self._periods, side="right"))
 
-    def _take(self, waits: bool) -> None:
+    def _take(self, waits: bool, hurries: bool = False) -> None:
         """Take the legs that are due and simulated, or wait for them, up to one that cannot be."""
-        self._look_ahead()
+        self._look_ahead(hurries)
         while self._ahead and len(self._done) < self._due and (waits or self._ahead[0].done()):
             torque = self._ahead[0].result()
             if torque is None:
                 break
             self._done, self._ahead = (*self._done, torque), self._ahead[1:]
-            self._look_ahead()
+            self._look_ahead(hurries)
 
-    def _look_ahead(self) -> None:
+    def _look_ahead(self, hurries: bool = False) -> None:
         """Let the threads simulate the next legs: not all, since a program's end waits for them."""
-        first = len(self._done) + len(self._ahead)
         simulated = len(self._done) + sum(one.done() for one in self._ahead)
+        if hurries or self._due - simulated >= _BEHIND:
+            self._catch_up()
+        first = len(self._done) + len(self._ahead)
         for leg in self._legs[first : min(self._due, simulated) + 2 * self._threads]:
             arguments = self._profile, leg, self._depth, self._cycles_of(leg)
             self._ahead.append(self._pool.submit(self._simulated, *arguments))
+
+    def _catch_up(self) -> None:
+        """Let threads of the program's own priority simulate the next legs, where the others are behind.
+
+        On a machine with a load of 18, threads of low priority had a hundredth of a core: the node waited
+        for more than half a minute.
+        """
+        self._hurried = [one for one in self._hurried if not one.done()]
+        late = [i for i, one in enumerate(self._ahead) if not (one.done() or one in self._hurried)]
+        for i in late[: self._threads - len(self._hurried)]:
+            leg = self._legs[len(self._done) + i]
+            arguments = self._profile, leg, self._depth, self._cycles_of(leg)
+            self._ahead[i].cancel()
+            self._ahead[i] = self._urgent.submit(self._simulated, *arguments)
+            self._hurried.append(self._ahead[i])
 
     def _cycles_of(self, leg: _Leg) -> int:
         """Gait cycles of a leg that count."""

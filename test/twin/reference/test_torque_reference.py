@@ -1,6 +1,7 @@
 """Runs of simulated legs: which legs, and that a restored run continues bit for bit."""
 
 import time
+from threading import Event
 
 import attrs
 import numpy as np
@@ -154,6 +155,22 @@ def test_a_leg_that_does_not_close_ends_a_run(leg, short) -> None:
         assert each.is_busy
         assert each.finish() is None
         assert not each.is_busy
+
+
+def test_threads_that_are_behind_get_help(leg, short, whole) -> None:
+    """Where a machine is busy, threads of low priority got nothing, and the node waited for them."""
+    run, stuck, found = TorqueReferenceRun(leg), Event(), None
+    for _ in range(run._threads):
+        run._pool.submit(stuck.wait)
+    try:
+        run.begin(NEW, UNWORN, STEADY)
+        while run.is_busy:
+            found = run.advance()
+    finally:
+        stuck.set()
+    assert found is not None
+    for torque, same in zip(whole.torque_nm, found.torque_nm, strict=True):
+        np.testing.assert_array_equal(torque, same)
 
 
 def test_what_advance_returns_does_not_depend_on_how_long_the_thread_takes(leg, short) -> None:

@@ -256,7 +256,8 @@ class TorqueObserver:
     def _kept_cycles(self) -> int:
         """Number of gait cycles that are kept, at all cadences."""
         state = self.state
-        return sum(len(one.cycles) for one in state.known) + len(state.waiting) + len(state.due)
+        kept = (one.cycles for one in state.known)
+        return sum(map(len, (*kept, state.waiting, state.odd, state.due)))
 
     def _evaluate(self, begin_ns: int, end_ns: int) -> None:
         """Add a gait cycle to the evidence."""

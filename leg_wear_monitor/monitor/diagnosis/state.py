@@ -71,6 +71,8 @@ class TorqueState:
         As found in the first gait cycle with torques.
     waiting : tuple of SignedCycle
         The last gait cycles alike whose motion of the crank has no reference.
+    odd : tuple of SignedCycle
+        Others without a reference, of which the next may be like some.
     reference : TorqueReference or None
     cycles : tuple of SignedCycle
         The last gait cycles at the reference's cadence.
@@ -115,6 +117,7 @@ class TorqueState:
     due: tuple[tuple[int, int], ...] = ()
     sensor: TorqueSensor | None = None
     waiting: tuple[SignedCycle, ...] = ()
+    odd: tuple[SignedCycle, ...] = ()
     reference: TorqueReference | None = None
     cycles: tuple[SignedCycle, ...] = ()
     commissioned: CommissionedTorque | None = None
@@ -179,9 +182,14 @@ class TorqueState:
         self.cycles, self.is_final, self.fit_due = one.cycles, one.is_final, 0
 
     def wait_with(self, cycle: SignedCycle) -> None:
-        """Keep a gait cycle for a reference that is to be made, and those before that are like it."""
-        alike = [one for one in self.waiting if one.profile.is_like(cycle.profile)]
-        self.waiting = (*alike, cycle)[-WINDOW_CYCLES:]
+        """Keep a gait cycle for a reference that is to be made, with those before that are like it.
+
+        One odd cycle in five must not begin the wait anew.
+        """
+        kept = sorted((*self.odd, *self.waiting), key=lambda one: one.begin_ns)[1 - WINDOW_CYCLES :]
+        alike = {one.begin_ns for one in kept if one.profile.is_like(cycle.profile)}
+        self.waiting = (*(one for one in kept if one.begin_ns in alike), cycle)
+        self.odd = tuple(one for one in kept if one.begin_ns not in alike)
 
     def forget_cycles(self, since_ns: int = 0) -> None:
         """Forget the gait cycles that began at a stamp or later, at all cadences."""
@@ -189,7 +197,7 @@ class TorqueState:
         def rest(cycles: tuple[SignedCycle, ...]) -> tuple[SignedCycle, ...]:
             return tuple(cycle for cycle in cycles if cycle.begin_ns < since_ns)
 
-        self.cycles, self.waiting = rest(self.cycles), rest(self.waiting)
+        self.cycles, self.waiting, self.odd = rest(self.cycles), rest(self.waiting), rest(self.odd)
         self.set_aside = tuple(attrs.evolve(one, cycles=rest(one.cycles)) for one in self.set_aside)
 
     def forget_baselines(self, since_ns: int = 0) -> None:

@@ -104,6 +104,20 @@ def test_before_the_first_cycles_it_waits_and_reports_why(leg, reference) -> Non
     assert observer.diagnosis.reason == "gait cycles: 4 of 5"
 
 
+def test_the_first_reference_of_a_leg_behind_a_declared_coupling_is_simulated_behind_it(
+    leg, reference
+) -> None:
+    config = MonitorConfig()
+    config = attrs.evolve(config, drive=attrs.evolve(config.drive, stiffness_nm_per_rad=1000.0))
+    observer = TorqueObserver(leg, config, SIZE_NM, NEW)
+    walk(observer, samples(reference, [0] * 8))
+    assert observer.state.reference is None
+    assert observer.diagnosis.reason.startswith("the reference for this leg is being simulated")
+    simulated = observer.snapshot().reference
+    assert simulated is not None
+    assert {one.parameters.compliance for one in simulated.legs} == {1.0e-3}
+
+
 def test_without_torques_it_reports_so(leg, reference) -> None:
     observer = observer_of(leg)
     block = samples(reference, [0] * 8)

@@ -4,6 +4,7 @@ import math
 from collections.abc import Sequence
 
 from leg_wear_monitor.estimate.cause import TorqueExplanation
+from leg_wear_monitor.estimate.signature import DIRECT
 from leg_wear_monitor.monitor.alarms.alarm import Level
 from leg_wear_monitor.monitor.alarms.fault_codes import CAUSES_OF_ALARMS, DIAGNOSIS, worst_code
 from leg_wear_monitor.monitor.diagnosis.diagnosis import Diagnosis, DiagnosisState, NotUsed
@@ -86,6 +87,10 @@ def diagnosis_status(joints: Sequence[str], diagnosis: Diagnosis) -> Status:
         values[f"{body.name}_length_factor"] = body.length
     if diagnosis.bodies:
         values["joint_friction_factor"] = diagnosis.friction
+    if diagnosis.channel != DIRECT:
+        values["drive_delay_s"] = diagnosis.channel.delay_s
+        values["drive_low_pass_s"] = diagnosis.channel.time_constant_s
+        values["drive_load_friction"] = diagnosis.channel.load_friction
     if diagnosis.compliance:
         values["drive_stiffness_nm_per_rad"] = 1.0 / diagnosis.compliance
     if diagnosis.state is DiagnosisState.CHANGED:

@@ -6,6 +6,7 @@ from enum import Enum
 import attrs
 
 from leg_wear_monitor.estimate.cause import Change
+from leg_wear_monitor.estimate.signature import DIRECT, Channel
 
 
 class DiagnosisState(Enum):
@@ -60,6 +61,9 @@ class Diagnosis:
     changes : tuple of Change
         Significant departures, the oldest first: those by which counted clearances were corrected, and, where
         the state is CHANGED, the one that is not settled yet.
+    channel : Channel
+        Delay, low-pass and load friction of the drive by the commissioned gait cycles; of a drive that adds
+        nothing before.
     bodies : tuple of Body
         Identified masses and lengths that the wear is counted with; empty while it is counted as in the file.
     friction : float
@@ -76,6 +80,7 @@ class Diagnosis:
     clearance_m: tuple[float, ...] = ()
     sigma_m: tuple[float, ...] = ()
     changes: tuple[Change, ...] = ()
+    channel: Channel = DIRECT
     bodies: tuple[Body, ...] = ()
     friction: float = 1.0
     compliance: float = 0.0

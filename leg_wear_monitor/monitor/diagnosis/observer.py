@@ -15,6 +15,7 @@ from leg_wear_monitor.estimate.cause import Cause
 from leg_wear_monitor.estimate.clearance_fit import ClearanceFit
 from leg_wear_monitor.estimate.commissioned_torque import CommissionedTorque
 from leg_wear_monitor.estimate.drive_compliance import compliance_of
+from leg_wear_monitor.estimate.signature import DIRECT
 from leg_wear_monitor.mechanism.arrays import Floats
 from leg_wear_monitor.mechanism.spec import Mechanism
 from leg_wear_monitor.monitor.config.drive import drive_figures
@@ -210,6 +211,7 @@ class TorqueObserver:
                 next_step=upcoming,
                 changes=state.settled,
                 cycles_not_used=state.not_used,
+                channel=state.sensor.channel if state.sensor else DIRECT,
             )
         clearance_m, sigma_m = self._observed(state.fit)
         return Diagnosis(
@@ -221,6 +223,7 @@ class TorqueObserver:
             sigma_m=tuple(sigma_m.tolist()),
             changes=state.settled + state.changes,
             cycles_not_used=state.not_used,
+            channel=state.sensor.channel if state.sensor else DIRECT,
         )
 
     def _observed(self, fit: ClearanceFit) -> tuple[Floats, Floats]:

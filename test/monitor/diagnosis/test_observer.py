@@ -229,6 +229,7 @@ def test_a_late_filtered_or_rubbing_torque_names_nothing_before_commissioning_an
             assert "not that of the mechanism file" in observer.diagnosis.reason
     known = observer.state.commissioned
     assert observer.diagnosis.state is DiagnosisState.AS_COUNTED
+    assert observer.diagnosis.channel == known.channel
     lateness_s = channel.get("delay_s", 0.0)
     if "bandwidth_hz" in channel:
         lateness_s += 1.0 / (TURN * channel["bandwidth_hz"])

@@ -14,6 +14,7 @@ from leg_wear_monitor.monitor.alarms.alarm import (
     evaluated,
     has_changed,
 )
+from leg_wear_monitor.monitor.config.fitting import largest_lag_s
 from leg_wear_monitor.monitor.config.settings import MonitorConfig
 from leg_wear_monitor.monitor.evaluation import specs
 from leg_wear_monitor.monitor.evaluation.specs import AlarmSpec, LimitSource
@@ -43,7 +44,7 @@ def limits_of(
     config: MonitorConfig, clearance_joints: tuple[str, ...], torque_size_nm: float = 1.0
 ) -> dict[str, Limit]:
     """Limit of every alarm by its name; ``torque_size_nm`` is the RMS of the predicted drive torque."""
-    bounds = torque_bounds(config, torque_size_nm)
+    bounds = torque_bounds(config, torque_size_nm, largest_lag_s(config))
     return {
         alarm.name: spec.limits(LimitSource(config, bounds, k))
         for spec, k, alarm in specs_of(config, clearance_joints)

@@ -7,6 +7,7 @@ import attrs
 from leg_wear_monitor.estimate.cause import NamedCause
 from leg_wear_monitor.estimate.mismatch import Allowed
 from leg_wear_monitor.monitor.alarms.alarm import Level
+from leg_wear_monitor.monitor.config.fitting import largest_lag_s
 from leg_wear_monitor.monitor.config.settings import MonitorConfig
 from leg_wear_monitor.monitor.evaluation import specs
 from leg_wear_monitor.monitor.evaluation.board import AlarmBoard, joint_specs
@@ -126,7 +127,7 @@ class AlarmEvaluation:
     @property
     def torque_bounds(self) -> TorqueBounds:
         """Bounds of the drive torque."""
-        return torque_bounds(self.config, self._twin.torque_size_nm)
+        return torque_bounds(self.config, self._twin.torque_size_nm, largest_lag_s(self.config))
 
     def is_torque_sound(self, report: CycleReport) -> bool:
         """Whether a gait cycle's torque is as predicted, so that its friction is that of this leg."""

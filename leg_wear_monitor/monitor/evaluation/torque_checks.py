@@ -6,7 +6,6 @@ from typing import TYPE_CHECKING
 import attrs
 
 from leg_wear_monitor.estimate.cause import Cause, NamedCause, beyond_friction
-from leg_wear_monitor.monitor.config.fitting import largest_lag_s
 
 if TYPE_CHECKING:
     from leg_wear_monitor.monitor.config.settings import MonitorConfig
@@ -31,11 +30,11 @@ class TorqueBounds:
     drift_nm: float
 
 
-def torque_bounds(config: "MonitorConfig", size_nm: float) -> TorqueBounds:
+def torque_bounds(config: "MonitorConfig", size_nm: float, max_lag_s: float) -> TorqueBounds:
     """Bounds from the parameters; missing ones follow from the RMS of the predicted torque [N m]."""
     return TorqueBounds(
         max_friction_nm=config.drive_torque.max_friction_nm or _FRICTION * size_nm,
-        max_lag_s=largest_lag_s(config),
+        max_lag_s=max_lag_s,
         bias_nm=config.limits.torque_bias_nm or _BIAS * size_nm,
         drift_nm=config.limits.torque_drift_nm or _DRIFT * size_nm,
     )

@@ -6,7 +6,6 @@ import pytest
 from leg_wear_monitor.monitor.config.drive import DriveParameters
 from leg_wear_monitor.monitor.config.fitting import largest_lag_s
 from leg_wear_monitor.monitor.config.settings import MonitorConfig
-from leg_wear_monitor.monitor.evaluation.torque_checks import torque_bounds
 
 pytestmark = pytest.mark.plain
 
@@ -17,4 +16,3 @@ def test_a_declared_lag_and_low_pass_are_no_fault():
     assert largest_lag_s(config) == own
     late = attrs.evolve(config, drive=DriveParameters(lag_s=0.02, bandwidth_hz=50.0))
     assert largest_lag_s(late) == pytest.approx(own + 0.02 + 0.003183, abs=1e-6)
-    assert torque_bounds(late, 10.0).max_lag_s == largest_lag_s(late)

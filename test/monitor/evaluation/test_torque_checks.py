@@ -27,7 +27,7 @@ pytestmark = pytest.mark.plain
 
 SIZE_NM = 8.4
 CONFIG = MonitorConfig()
-BOUNDS = torque_bounds(CONFIG, SIZE_NM)
+BOUNDS = torque_bounds(CONFIG, SIZE_NM, CONFIG.drive_torque.max_lag_s)
 
 
 def report(friction=0.0, lag=0.0, sigma=0.05, rpm=60.0):
@@ -131,5 +131,7 @@ def test_without_a_torque_there_are_no_values():
 def test_bounds_can_be_set():
     torque = attrs.evolve(CONFIG.drive_torque, max_friction_nm=9.0)
     limits = attrs.evolve(CONFIG.limits, torque_bias_nm=0.5)
-    bounds = torque_bounds(attrs.evolve(CONFIG, drive_torque=torque, limits=limits), SIZE_NM)
+    bounds = torque_bounds(
+        attrs.evolve(CONFIG, drive_torque=torque, limits=limits), SIZE_NM, torque.max_lag_s
+    )
     assert (bounds.max_friction_nm, bounds.bias_nm) == (9.0, 0.5)

@@ -6,15 +6,13 @@ harmonics in their order, and masses, lengths and friction change the first ones
 free. The leg has ideal joints here, so an identification with simulated legs goes on from what is found.
 """
 
-import functools
 import math
 from typing import NamedTuple
 
-import attrs
 import numpy as np
 
+from leg_wear_monitor.estimate.body_torques import body_torques
 from leg_wear_monitor.estimate.signature import TorqueSensor
-from leg_wear_monitor.estimate.torque_fit.torque_model import torque_model
 from leg_wear_monitor.mechanism.arrays import Floats
 from leg_wear_monitor.mechanism.ideal import TURN
 from leg_wear_monitor.mechanism.spec import Mechanism
@@ -34,7 +32,6 @@ _MASS, _LENGTH = 0.03, 0.006  # standard deviations about the file's, as in `ide
 # those of friction, over the torque's size, and load friction; of the sensor's scale and delay
 _FRICTION, _LOAD_FRICTION, _SCALE, _DELAY_S = 0.5, 0.2, 0.1, 0.04
 _TIME_CONSTANTS_S = (0.0, 0.004, 0.008, 0.016)  # low-passes that are tried on a rigid drive: to 10 Hz
-_LONGER = 0.002  # step of the difference by a body's length
 _ROUNDS = 4  # of Gauss and Newton
 
 # Sums of squares of what is left over: with a coupling at most the first, and less than that of a rigid drive
@@ -48,16 +45,6 @@ _FITS, _BETTER = 40.0, 15.0
 _CLEARANCES, _MOST_OF_IT = 1.5e-4, 0.5
 
 _RIGID_NM_PER_RAD = 2.0e4  # a resonance above 35 Hz, which no signature of 200 samples shows
-
-
-class _Ideal(NamedTuple):
-    """Tables (4, P) of the drive torque as `TorqueModel` has them, and what bodies change of them.
-
-    ``by_body`` (2 bodies, 4, P): derivatives by factors on masses, then on lengths.
-    """
-
-    tables: Floats
-    by_body: Floats
 
 
 class _Fit(NamedTuple):
@@ -112,7 +99,8 @@ class _Search:
     def __init__(
         self, mechanism: Mechanism, sensor: TorqueSensor, profile: CrankProfile, mean: Floats
     ) -> None:
-        self._ideal, self._speed = _ideal(_Same(mechanism, id(mechanism))), profile.speed
+        torques, self._speed = body_torques(mechanism), profile.speed
+        self._own, self._by_body = torques.own, np.concatenate([torques.mass, torques.length])
         self._phi = np.arange(_POINTS) * (TURN / _POINTS)
         motion = np.array([profile.at(phi) for phi in self._phi])
         self._angle, self._rate, self._acceleration = motion.T
@@ -144,7 +132,7 @@ class _Search:
             x[:-4] = start.bodies
         square = math.inf
         for _ in range(_ROUNDS):
-            tables = self._ideal.tables + np.tensordot(x[:-4], self._ideal.by_body, 1)
+            tables = self._own + np.tensordot(x[:-4], self._by_body, 1)
             deviation, torque = self._torques(tables, stiffness, deviation)
             passed = self._sensor * np.exp(-1j * omega * x[-1]) / (1.0 + 1j * omega * time_constant_s)
             rubbing = np.copysign(np.abs(torque[:1]), self._speed)
@@ -177,7 +165,7 @@ class _Search:
         """
         if not stiffness:
             powers = np.stack([np.ones(_POINTS), self._rate, self._rate**2, self._acceleration])
-            both = np.concatenate([tables[None], self._ideal.by_body])
+            both = np.concatenate([tables[None], self._by_body])
             return deviation, np.asarray((_at(both, self._angle)[0] * powers).sum(axis=1))
         damping = 2.0 * COUPLING_DAMPING * math.sqrt(stiffness * float(tables[3].mean()))
         twice = self._slope @ self._slope
@@ -193,7 +181,7 @@ class _Search:
             deviation = deviation + min(1.0, _FURTHEST / max(largest, _SMALL)) * step
             if largest < _SMALL:
                 break
-        push = (_at(self._ideal.by_body, angle)[0] * powers).sum(axis=1)
+        push = (_at(self._by_body, angle)[0] * powers).sum(axis=1)
         moved = np.vstack([deviation, np.linalg.solve(jacobian, -push.T).T])
         return deviation, np.asarray(-stiffness * moved - damping * moved @ self._slope.T)
 
@@ -216,25 +204,3 @@ def _vertex(x: Floats, y: Floats) -> float:
     left, right = (y[1] - y[0]) / (x[1] - x[0]), (y[2] - y[1]) / (x[2] - x[1])
     bend = (right - left) / (0.5 * (x[2] - x[0]))
     return float(0.5 * (x[0] + x[1]) - left / bend)
-
-
-@attrs.frozen
-class _Same:
-    """A mechanism as a cache key: equal for the same object."""
-
-    mechanism: Mechanism = attrs.field(eq=False)
-    number: int
-
-
-@functools.lru_cache(maxsize=2)
-def _ideal(same: _Same) -> _Ideal:
-    """Tables of a mechanism."""
-    mechanism, whole = same.mechanism, LegParameters.none(same.mechanism)
-    tables, by_body = torque_model(mechanism).tables, []
-    units = np.eye(len(mechanism.bodies))
-    heavier = [attrs.evolve(whole, mass=1.0 + one) for one in units]
-    longer = [attrs.evolve(whole, length=1.0 + _LONGER * one) for one in units]
-    for step, legs in ((1.0, heavier), (_LONGER, longer)):
-        for leg in legs:
-            by_body.append((torque_model(leg.applied(mechanism)).tables - tables) / step)
-    return _Ideal(tables, np.array(by_body))

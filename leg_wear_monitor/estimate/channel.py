@@ -8,7 +8,7 @@ to pass the same channel as the samples.
 
 import functools
 import math
-from collections.abc import Iterable, Sequence
+from collections.abc import Callable, Iterable, Sequence
 
 import attrs
 import numpy as np
@@ -104,7 +104,13 @@ def channel_of(
     on_ground = _Leg(np.diag(variance) + _products(_harmonics(sensor.phases)), *unseen)
     hz = figures.bandwidth_hz
     time_constants_s = _TIME_CONSTANTS_S if math.isnan(hz) else (1.0 / (TURN * hz),)
-    found = [_best(reference, sensor, measured, leg, time_constants_s) for leg in (in_air, on_ground)]
+
+    @functools.cache  # both legs try the same channels
+    def rest(channel: Channel) -> Floats:
+        behind = attrs.evolve(sensor, channel=channel)
+        return np.asarray(measured - simulated_signatures(reference, 0, behind, cycles=_CYCLES).mean(axis=0))
+
+    found = [_best(rest, leg, time_constants_s) for leg in (in_air, on_ground)]
     scores = [
         len(measured) * one.square + leg.log_size for one, leg in zip(found, (in_air, on_ground), strict=True)
     ]
@@ -144,19 +150,8 @@ class _Leg:
         return (float(left @ self._weight @ left) + square) / len(rest), friction, sigma
 
 
-def _best(
-    reference: TorqueReference,
-    sensor: TorqueSensor,
-    measured: Floats,
-    leg: _Leg,
-    time_constants_s: Sequence[float],
-) -> ChannelFit:
-    """The channel that leaves least."""
-
-    @functools.cache
-    def rest(channel: Channel) -> Floats:
-        behind = attrs.evolve(sensor, channel=channel)
-        return np.asarray(measured - simulated_signatures(reference, 0, behind, cycles=_CYCLES).mean(axis=0))
+def _best(rest: Callable[[Channel], Floats], leg: _Leg, time_constants_s: Sequence[float]) -> ChannelFit:
+    """The channel that leaves least of what each leaves over (F,) without load friction."""
 
     def tried(time_constant_s: float, delay_s: float) -> ChannelFit:
         channel = Channel(delay_s=delay_s, time_constant_s=time_constant_s)
@@ -169,7 +164,7 @@ def _best(
         return min(found, key=lambda one: one.square)
 
     best = tried(0.0, 0.0)
-    without = leg.left(rest(DIRECT), np.zeros_like(measured))[0]
+    without = leg.left(rest(DIRECT), np.zeros_like(rest(DIRECT)))[0]
     if without - best.square < _FRICTION_BETTER:
         best = attrs.evolve(best, channel=DIRECT, square=without)
     other = []

@@ -79,7 +79,7 @@ def references(leg: Mechanism, walk: np.ndarray, sensor: TorqueSensor, file) -> 
 def print_leg(leg: Mechanism, reference: TorqueReference, sensor: TorqueSensor, off: float) -> None:
     """Stiffness and bodies of a reference, the channel found with it, and the misfit."""
     own = reference.parameters
-    stiffness = f"{1.0 / own.compliance:.0f}" if own.compliance else "rigid"
+    stiffness = f"{1.0 / own.compliance:.0f}, {own.damping:.3f}" if own.compliance else "rigid"
     bodies = " ".join(f"{100.0 * (value - 1.0):.1f}" for value in own.mass)
     own_channel = sensor.channel
     channel = f"{1e3 * own_channel.delay_s:.2f}, {1e3 * own_channel.time_constant_s:.2f}"
@@ -109,7 +109,7 @@ def main() -> None:
             return kept(file(f"{joint or 'new'} {size_mm:.2f}"), make)
 
         print(f"\n{stiffness:g} N m/rad\n")
-        print("| stiffness [N m/rad] | masses [% off] | friction | delay, time constant [ms] | misfit |")
+        print("| stiffness [N m/rad], damping | masses [% off] | friction | channel [ms] | misfit |")
         print("|---|---|---|---|---|")
         healthy = walk("", 0.3, HEALTHY)
         found = references(leg, healthy, sensor, file)

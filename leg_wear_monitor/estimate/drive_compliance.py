@@ -44,6 +44,9 @@ _FITS, _BETTER = 40.0, 15.0
 # behind 200 to 5000 N m/rad; at most this part of the compliance
 _CLEARANCES, _MOST_OF_IT = 1.5e-4, 0.5
 
+# dampings over the critical one that are tried, and what losses in clearances add to it: 0.005 to 0.015
+_DAMPINGS, _DAMPING_OF_CLEARANCES = np.geomspace(0.01, 0.16, 9), 0.012
+
 _RIGID_NM_PER_RAD = 2.0e4  # a resonance above 35 Hz, which no signature of 200 samples shows
 
 
@@ -85,7 +88,8 @@ def leg_behind_coupling(
     )
     mass, length = np.split(1.0 + found[best].bodies, 2)
     compliance = max((1.0 - _MOST_OF_IT) / stiffness, 1.0 / stiffness - _CLEARANCES)
-    return LegParameters(mass, length, compliance=compliance)
+    damping = search.damping_at(stiffness, found[best])
+    return LegParameters(mass, length, compliance=compliance, damping=damping)
 
 
 def compliance_of(stiffness_nm_per_rad: float) -> float:
@@ -124,7 +128,21 @@ class _Search:
         drive = _FRICTION * size, _LOAD_FRICTION, _SCALE, _DELAY_S
         self._sigma = np.array([*[_MASS] * bodies, *[_LENGTH] * bodies, *drive])
 
-    def fit(self, stiffness: float, time_constant_s: float, start: _Fit | None = None) -> _Fit:
+    def damping_at(self, stiffness: float, start: _Fit) -> float:
+        """Damping over the critical one of a leg behind a stiffness [N m/rad]."""
+        squares = np.array([self.fit(stiffness, 0.0, start, ratio).square for ratio in _DAMPINGS])
+        best = int(np.clip(np.argmin(squares), 1, len(_DAMPINGS) - 2))
+        near = slice(best - 1, best + 2)
+        found = math.exp(_vertex(np.log(_DAMPINGS[near]), squares[near]))
+        return float(np.clip(found - _DAMPING_OF_CLEARANCES, _DAMPINGS[0], _DAMPINGS[-1]))
+
+    def fit(
+        self,
+        stiffness: float,
+        time_constant_s: float,
+        start: _Fit | None = None,
+        damping_ratio: float = COUPLING_DAMPING,
+    ) -> _Fit:
         """The most probable leg behind a stiffness [N m/rad], 0 for a rigid drive, and a low-pass [s]."""
         x, omega = np.zeros(len(self._sigma)), self._order * self._speed
         deviation = start.deviation if start else np.zeros(_POINTS)
@@ -133,7 +151,7 @@ class _Search:
         square = math.inf
         for _ in range(_ROUNDS):
             tables = self._own + np.tensordot(x[:-4], self._by_body, 1)
-            deviation, torque = self._torques(tables, stiffness, deviation)
+            deviation, torque = self._torques(tables, stiffness, damping_ratio, deviation)
             passed = self._sensor * np.exp(-1j * omega * x[-1]) / (1.0 + 1j * omega * time_constant_s)
             rubbing = np.copysign(np.abs(torque[:1]), self._speed)
             leg, load_friction, *by_body = passed * self._harmonics(
@@ -158,7 +176,9 @@ class _Search:
         kernel = np.exp(-1j * np.outer(self._order, self._angle)) * (self._rate / self._speed / _POINTS)
         return np.asarray(torque @ kernel.T)
 
-    def _torques(self, tables: Floats, stiffness: float, deviation: Floats) -> tuple[Floats, Floats]:
+    def _torques(
+        self, tables: Floats, stiffness: float, damping_ratio: float, deviation: Floats
+    ) -> tuple[Floats, Floats]:
         """How the crank deviates (POINTS,) [rad], and the measured torque with its derivatives by bodies.
 
         The crank's motion is periodic; Newton's method finds it. The torques are rows (1 + 2 bodies, POINTS).
@@ -167,7 +187,7 @@ class _Search:
             powers = np.stack([np.ones(_POINTS), self._rate, self._rate**2, self._acceleration])
             both = np.concatenate([tables[None], self._by_body])
             return deviation, np.asarray((_at(both, self._angle)[0] * powers).sum(axis=1))
-        damping = 2.0 * COUPLING_DAMPING * math.sqrt(stiffness * float(tables[3].mean()))
+        damping = 2.0 * damping_ratio * math.sqrt(stiffness * float(tables[3].mean()))
         twice = self._slope @ self._slope
         for _ in range(_MOST):
             angle, rate = self._angle + deviation, self._rate + self._slope @ deviation

@@ -97,7 +97,7 @@ def identified_leg(
     found = before + np.linalg.solve(information, weighted.T @ rest - before / sigma**2)
     mass, length, (log_friction, *log_compliance) = np.split(found, [bodies, 2 * bodies])
     compliance = near.compliance * math.exp(sum(log_compliance))
-    return LegParameters(1.0 + mass, 1.0 + length, math.exp(log_friction), compliance)
+    return LegParameters(1.0 + mass, 1.0 + length, math.exp(log_friction), compliance, near.damping)
 
 
 def leg_of_ideal_torque(

@@ -138,7 +138,7 @@ class Parts:
             return None
         order = [known.names.index(name) for name in self.mechanism.bodies]
         bodies = np.array(known.mass)[order], np.array(known.length)[order]
-        return LegParameters(*bodies, known.friction, known.compliance)
+        return LegParameters(*bodies, known.friction, known.compliance, known.damping)
 
     def _known_references(self, ledger: Ledger | None) -> list[TorqueReference]:
         """Torque references of the ledger, their parameters in the order of the mechanism."""

@@ -203,7 +203,7 @@ class DigitalTwin:
             linkage = build_linkage(parameters.applied(self._mechanism))
             check_cycle(linkage)
             friction = parameters.friction * self._friction
-            self._follower.take_parameters(linkage, friction, parameters.compliance)
+            self._follower.take_parameters(linkage, friction, parameters)
             self._parameters = parameters
 
     def set_depth(self, depth: Floats) -> None:

@@ -15,7 +15,7 @@ from leg_wear_monitor.twin.reference.leg_parameters import LegParameters
 def found(leg, monkeypatch) -> LegParameters:
     """Parameters that each observer says it has identified."""
     factors = np.linspace(0.96, 1.04, len(leg.bodies))
-    parameters = LegParameters(factors, 1.0 + 0.05 * (factors - 1.0), 1.5, 1.0 / 800.0)
+    parameters = LegParameters(factors, 1.0 + 0.05 * (factors - 1.0), 1.5, 1.0 / 800.0, 0.07)
     monkeypatch.setattr(TorqueObserver, "parameters", parameters)
     return parameters
 

@@ -14,7 +14,7 @@ from leg_wear_monitor.mechanism.spec import Mechanism
 from leg_wear_monitor.monitor.ledger.binding import fingerprint
 from leg_wear_monitor.share import share_directory
 from leg_wear_monitor.twin.reference.crank_profile import HARMONICS, CrankProfile
-from leg_wear_monitor.twin.reference.leg_parameters import LegParameters
+from leg_wear_monitor.twin.reference.leg_parameters import COUPLING_DAMPING, LegParameters
 from leg_wear_monitor.twin.reference.leg_simulation import POINTS
 from leg_wear_monitor.twin.reference.torque_reference import TorqueReference, TorqueReferenceRun
 from leg_wear_monitor.wear.surfaces import SECTORS
@@ -109,6 +109,7 @@ def write_references(file: IO[bytes], mechanism: Mechanism, references: Sequence
             f"length_{i}": one.parameters.length,
             f"friction_{i}": one.parameters.friction,
             f"compliance_rad_per_nm_{i}": one.parameters.compliance,
+            f"damping_ratio_{i}": one.parameters.damping,
             f"clearance_m_{i}": one.clearance_m,
             f"expected_torque_nm_{i}": one.torque_nm[0],
             f"torque_nm_{i}": np.stack(one.torque_nm[1:]),
@@ -170,14 +171,19 @@ def _reference(parts: Any, i: int, order: list[int], joints: int) -> TorqueRefer
     cosine, sine = _checked(parts, f"ripple_rad_{i}", (2, HARMONICS))
     mass, length = (_checked(parts, f"{name}_{i}", (len(order),))[order] for name in ("mass", "length"))
     friction, speed = (float(_checked(parts, f"{name}_{i}", ())) for name in ("friction", "speed_radps"))
-    name = f"compliance_rad_per_nm_{i}"  # files from before drives could be compliant are without
-    compliance = float(_checked(parts, name, ())) if name in parts else 0.0
+    compliance, damping = 0.0, COUPLING_DAMPING  # files from before drives could be compliant are without
+    if f"damping_ratio_{i}" in parts:
+        compliance = float(_checked(parts, f"compliance_rad_per_nm_{i}", ()))
+        damping = float(_checked(parts, f"damping_ratio_{i}", ()))
     for name, values in (("mass", mass), ("length", length), ("clearance", clearance_m)):
         if not (values > 0.0).all():
             raise ValueError(f"a {name} is not above 0")
-    if friction < 0.0 or compliance < 0.0 or speed == 0.0:
-        raise ValueError("friction or compliance is below 0, or speed is 0")
-    profile, leg = CrankProfile(speed, cosine, sine), LegParameters(mass, length, friction, compliance)
+    if min(friction, compliance, damping) < 0.0 or speed == 0.0:
+        raise ValueError("friction, compliance or damping is below 0, or speed is 0")
+    profile, leg = (
+        CrankProfile(speed, cosine, sine),
+        LegParameters(mass, length, friction, compliance, damping),
+    )
     return TorqueReference(profile, clearance_m, (expected, *torque), leg)
 
 

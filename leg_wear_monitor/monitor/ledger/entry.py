@@ -9,6 +9,7 @@ import numpy as np
 from leg_wear_monitor.estimate.commissioned_torque import CommissionedTorque
 from leg_wear_monitor.mechanism.arrays import Floats
 from leg_wear_monitor.monitor.alarms.alarm import Alarm
+from leg_wear_monitor.twin.reference.leg_parameters import COUPLING_DAMPING
 from leg_wear_monitor.twin.reference.torque_reference import TorqueReference
 from leg_wear_monitor.wear.surfaces import SECTORS
 
@@ -311,8 +312,8 @@ class IdentifiedLeg:
     mass, length : tuple of float
     friction : float
         In all joints.
-    compliance : float
-        Between the measured crank angle and the crank [rad/(N m)].
+    compliance, damping : float
+        Between the measured crank angle and the crank [rad/(N m)]; of the critical damping.
     """
 
     stamp_ns: int
@@ -321,6 +322,7 @@ class IdentifiedLeg:
     length: tuple[float, ...]
     friction: float
     compliance: float = 0.0
+    damping: float = COUPLING_DAMPING
 
 
 @attrs.frozen(eq=False)

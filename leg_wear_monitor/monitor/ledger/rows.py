@@ -120,10 +120,11 @@ def write_event(db: sqlite3.Connection, event: Event) -> None:
                     event.speed,
                 ),
             )
-        case IdentifiedLeg(stamp_ns, names, mass, length, friction, compliance):
+        case IdentifiedLeg(stamp_ns, names, mass, length, friction):
             db.execute("INSERT INTO friction (stamp_ns, factor) VALUES (?, ?)", (stamp_ns, friction))
             db.execute(
-                "INSERT INTO drive (stamp_ns, compliance_rad_per_nm) VALUES (?, ?)", (stamp_ns, compliance)
+                "INSERT INTO drive (stamp_ns, compliance_rad_per_nm, damping_ratio) VALUES (?, ?, ?)",
+                (stamp_ns, event.compliance, event.damping),
             )
             db.executemany(
                 "INSERT INTO body (stamp_ns, name, mass, length) VALUES (?, ?, ?, ?)",
@@ -226,12 +227,11 @@ def read_identified_leg(db: sqlite3.Connection) -> IdentifiedLeg | None:
     if not rows:
         return None
     stamps, names, mass, length = zip(*rows, strict=True)
-    friction, compliance = (
+    friction, drive = (
         db.execute(f"SELECT {value} FROM {table} WHERE stamp_ns = ? ORDER BY id DESC", stamps[:1]).fetchone()
-        for table, value in (("friction", "factor"), ("drive", "compliance_rad_per_nm"))
+        for table, value in (("friction", "factor"), ("drive", "compliance_rad_per_nm, damping_ratio"))
     )
-    known = friction[0] if friction else 1.0, compliance[0] if compliance else 0.0
-    return IdentifiedLeg(stamps[0], names, mass, length, *known)
+    return IdentifiedLeg(stamps[0], names, mass, length, friction[0] if friction else 1.0, *(drive or ()))
 
 
 def _write_reference(db: sqlite3.Connection, event: SimulatedReference) -> None:
@@ -263,6 +263,7 @@ def _reference_values(event: SimulatedReference) -> tuple[float | bytes | str, .
         *(part.astype("<f8").tobytes() for part in (leg.mass, leg.length)),
         leg.friction,
         leg.compliance,
+        leg.damping,
         reference.torque_nm[0].astype("<f2").tobytes(),
         b"".join(one.astype("<f2").tobytes() for one in reference.torque_nm[1:]),
     )
@@ -274,8 +275,9 @@ def read_simulated_references(db: sqlite3.Connection) -> list[SimulatedReference
     One whose simulation was not finished is among them.
     """
     rows = db.execute(
-        "SELECT is_whole, stamp_ns, bodies, speed_radps, legs, friction, compliance_rad_per_nm, ripple_rad, "
-        "clearance_m, mass, length, expected_torque_nm, torque_nm FROM torque_reference ORDER BY id DESC"
+        "SELECT is_whole, stamp_ns, bodies, speed_radps, legs, friction, compliance_rad_per_nm, "
+        "damping_ratio, ripple_rad, clearance_m, mass, length, expected_torque_nm, torque_nm "
+        "FROM torque_reference ORDER BY id DESC"
     )
     return [_reference_of(*row) for row in rows]
 
@@ -288,6 +290,7 @@ def _reference_of(
     legs: int,
     friction: float,
     compliance: float,
+    damping: float,
     *parts: bytes,
 ) -> SimulatedReference:
     """Reference of a row."""
@@ -297,7 +300,7 @@ def _reference_of(
     )
     profile, leg = (
         CrankProfile(speed, *ripple.reshape(2, -1)),
-        LegParameters(mass, length, friction, compliance),
+        LegParameters(mass, length, friction, compliance, damping),
     )
     reference = TorqueReference(profile, known.reshape(legs, -1), (expected,), leg)
     cycles = len(expected) if reference.is_of_parameters else CYCLES

@@ -44,6 +44,7 @@ from leg_wear_monitor.twin.follower.state import (
     leg_state,
 )
 from leg_wear_monitor.twin.follower.torque_estimate import LEAST_SAMPLES, LoadEstimate, find
+from leg_wear_monitor.twin.reference.leg_parameters import LegParameters
 from leg_wear_monitor.twin.reference.leg_simulation import drive_coupling
 from leg_wear_monitor.twin.sampling.state import SampledState
 from leg_wear_monitor.twin.settings import INSTANT, TwinSettings
@@ -165,14 +166,14 @@ class LegFollower:
         state.pending[:, changed] = 0.0
         self._before[:, changed] = self.clearances[:, changed]
 
-    def take_parameters(self, linkage: Linkage, friction: Floats, compliance: float) -> None:
+    def take_parameters(self, linkage: Linkage, friction: Floats, parameters: LegParameters) -> None:
         """Continue with other masses, lengths and friction coefficients (k,); the motion goes on.
 
-        Behind a drive of a compliance [rad/(N m)], the crank swings.
+        Behind a compliant drive, as in ``parameters``, the crank swings.
         """
         self._load.rebuild(linkage)
         model = self._stepper.model
-        self._stepper.model = model._replace(coupling=drive_coupling(self._setup, model, compliance))
+        self._stepper.model = model._replace(coupling=drive_coupling(self._setup, model, parameters))
         contacts = self._setup.contacts
         contacts.friction[:, 0] = friction
         self._stepper.model.law[:] = contact_laws(contacts)

@@ -29,12 +29,15 @@ class LegParameters:
         On the friction coefficients of all clearance joints.
     compliance : float
         Of what is between the measured crank angle and the crank [rad/(N m)], at the crank; 0 if it is rigid.
+    damping : float
+        Of the crank on a compliant drive, over the critical one with the mean inertia of the ideal leg.
     """
 
     mass: Floats = attrs.field(eq=attrs.cmp_using(eq=np.array_equal))
     length: Floats = attrs.field(eq=attrs.cmp_using(eq=np.array_equal))
     friction: float = 1.0
     compliance: float = 0.0
+    damping: float = COUPLING_DAMPING
 
     @classmethod
     def none(cls, mechanism: Mechanism) -> "LegParameters":

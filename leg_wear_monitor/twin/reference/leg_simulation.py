@@ -16,7 +16,7 @@ from leg_wear_monitor.mechanism.arrays import Floats
 from leg_wear_monitor.mechanism.ideal import TURN
 from leg_wear_monitor.mechanism.spec import Mechanism
 from leg_wear_monitor.twin.reference.crank_profile import CrankProfile
-from leg_wear_monitor.twin.reference.leg_parameters import COUPLING_DAMPING, LegParameters
+from leg_wear_monitor.twin.reference.leg_parameters import LegParameters
 from leg_wear_monitor.twin.reference.reference import worn_to
 
 POINTS = INTERVALS // 4  # of a gait cycle: whole intervals of the stepper
@@ -104,7 +104,7 @@ class LegSimulation:
         self._setup.contacts.clearance[:] = clearance
         self._setup.surfaces.depth[:] = worn
         stepper = ClearanceStepper(self._setup, period / INTERVALS, tables=self._tables)
-        coupling = drive_coupling(self._setup, stepper.model, parameters.compliance)
+        coupling = drive_coupling(self._setup, stepper.model, parameters)
         stepper.model = stepper.model._replace(coupling=coupling)
         stepper.init(motions[0].angle, motions[0].speed)
         statistics = new_run_statistics(len(self._mechanism.joints))
@@ -125,12 +125,14 @@ class LegSimulation:
         self._parameters = parameters
 
 
-def drive_coupling(setup: Setup, model: ClearanceModel, compliance: float) -> Coupling:
-    """Coupling of a leg whose drive has a compliance [rad/(N m)]."""
-    if compliance == 0.0:
+def drive_coupling(setup: Setup, model: ClearanceModel, parameters: LegParameters) -> Coupling:
+    """Coupling of a leg whose drive has a compliance."""
+    if parameters.compliance == 0.0:
         return rigid_coupling()
     joints, damped = len(setup.clearance_joints), is_damped(setup.linkage.arrays)
-    return coupling_of(model.tables, joints, damped, model.interval, 1.0 / compliance, COUPLING_DAMPING)
+    return coupling_of(
+        model.tables, joints, damped, model.interval, 1.0 / parameters.compliance, parameters.damping
+    )
 
 
 def even_angles(profile: CrankProfile) -> Floats:

@@ -29,7 +29,7 @@ def references(leg):
     (shipped,) = shipped_references(leg)
     short = attrs.evolve(shipped, torque_nm=tuple(torque[:2] for torque in shipped.torque_nm))
     bodies = len(leg.bodies)
-    identified = LegParameters(np.linspace(0.96, 1.04, bodies), np.full(bodies, 1.001), 1.4, 1.0e-3)
+    identified = LegParameters(np.linspace(0.96, 1.04, bodies), np.full(bodies, 1.001), 1.4, 1.0e-3, 0.07)
     profile = CrankProfile(-0.95 * TURN, np.linspace(0.0, 0.01, 8), np.zeros(8))
     return short, attrs.evolve(short, parameters=identified, profile=profile)
 

@@ -52,12 +52,14 @@ def test_an_identified_leg_is_read_as_written_and_the_last_is_in_force(open_ledg
     assert ledger.parameters is None
     for stamp_ns, mass in ((5, 1.1), (7, 0.9)):
         ledger.note(
-            IdentifiedLeg(stamp_ns, ("thigh", "foot"), (mass, 1.02), (0.998, 1.001), 2.0 * mass, 0.5 * mass)
+            IdentifiedLeg(
+                stamp_ns, ("thigh", "foot"), (mass, 1.02), (0.998, 1.001), 2.0 * mass, 0.5 * mass, 0.1 * mass
+            )
         )
     ledger.keep(entry_at(1), closed=True)
     ledger.close()
     assert open_ledger().parameters == IdentifiedLeg(
-        7, ("thigh", "foot"), (0.9, 1.02), (0.998, 1.001), 1.8, 0.45
+        7, ("thigh", "foot"), (0.9, 1.02), (0.998, 1.001), 1.8, 0.45, 0.1 * 0.9
     )
 
 
@@ -67,7 +69,7 @@ def test_a_simulated_reference_is_read_as_written_and_the_last_is_in_force(open_
     other = attrs.evolve(
         shipped,
         profile=attrs.evolve(shipped.profile, sine=np.linspace(0.0, 0.01, len(shipped.profile.sine))),
-        parameters=LegParameters(factors, 2.0 - factors, 1.7, 2.0e-3),
+        parameters=LegParameters(factors, 2.0 - factors, 1.7, 2.0e-3, 0.08),
     )
     ledger = open_ledger()
     assert ledger.references == []
@@ -142,7 +144,7 @@ def test_a_ledger_of_format_4_is_migrated_with_the_entries_of_its_log(
     found.note(EVENT)
     found.keep(entry_at(6), closed=True)
     found.close()
-    assert version(ledger.path) == schema.FORMAT == 14
+    assert version(ledger.path) == schema.FORMAT == 15
     assert len(rows(ledger.path)) == 1
     assert open_ledger().entry.digest() == entry_at(6).digest()
 

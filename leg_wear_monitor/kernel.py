@@ -70,8 +70,11 @@ def _sources(roots: Iterable[Path]) -> set[Path]:
 
 
 def _digest(sources: Iterable[Path]) -> str:
-    """Digest of the names and contents of sources, and of numba's version: equal for equal copies."""
-    digest = hashlib.sha256(numba.__version__.encode())
+    """Digest of names and contents of sources, of numba's version and of how it compiles: equal for copies.
+
+    Code that was compiled with `whole_program` calls addresses, which plain numba gives as 0.
+    """
+    digest = hashlib.sha256(f"{numba.__version__} {whole_program.AVAILABLE}".encode())
     for source in sorted(sources):
         text = source.read_bytes()
         name = source.relative_to(_HOME) if source.is_relative_to(_HOME) else source

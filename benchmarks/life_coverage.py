@@ -4,7 +4,7 @@ The monitor has the shipped lives' law. Truth is simulated lives that it has nev
 and 200 legs by a law of another form that was fitted to those. Each leg is monitored for the first fifth of
 its own life, that of its first joint, or for a fifth of a joint's own; then without a measured clearance,
 with one of the joint (for the leg: of the joint that is most likely the first), and with all measured once.
-`python benchmarks/coverage.py LIVES` (some minutes).
+`python benchmarks/life_coverage.py LIVES` (some minutes).
 """
 
 import argparse

@@ -55,7 +55,7 @@ def test_the_demo_s_parameters_fit_both_nodes() -> None:
     monitor = parse_config(document, path.name, "/demo/leg_wear_monitor")
     leg = structured(PublisherConfig, flat(document["/**/gait_publisher"]["ros__parameters"]), path.name)
     assert monitor.wear_acceleration == leg.wear_acceleration == 1.0e3
-    # it walks faster than commanded: within a tolerance of more than a tenth, limits of impact forces would grow
+    # faster than commanded: within a tolerance of more than a tenth, limits of impact forces would grow
     own = monitor.cadence
     fastest = max(abs(speed) for speed in leg.pace.speeds_rpm)
     assert fastest > own.commanded_rpm + own.tolerance_rpm

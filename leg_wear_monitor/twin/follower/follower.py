@@ -3,7 +3,6 @@
 from functools import cached_property
 from typing import NamedTuple
 
-import attrs
 import numpy as np
 
 from leg_wear_monitor.dynamics.clearance.joint_laws import contact_laws
@@ -326,7 +325,7 @@ class LegFollower:
         if found is not None and is_compared:
             self._repeating.take(sums.by_phase if self._instants else self._by_phase(profile, acting_n))
         torque = torque_statistics(sums, found, self.estimate, self._unexplained_nm)
-        return torque, self._rubbing(profile, acting_n)
+        return torque, profile
 
     def _set_friction(self) -> None:
         """Predict torques behind the friction of the drive as estimated, as far as friction can be that."""
@@ -334,13 +333,6 @@ class LegFollower:
         most_nm = _LARGEST_FRICTION * self.torque_size_nm
         self._sensor["friction"] = min(max(float(constant), 0.0), most_nm)
         self._sensor["load_friction"] = under_load
-
-    def _rubbing(self, profile: TorqueProfile, acting_n: float) -> TorqueProfile:
-        """The profile with the predicted torque behind a drive whose friction grows with the torque."""
-        direction = 1 if self.state.motion.cut_rises else -1
-        factor = direction * float(self.estimate.values[LOAD_FRICTION])
-        transmitted = profile.predicted_nm + acting_n * profile.lever_m
-        return attrs.evolve(profile, predicted_nm=profile.predicted_nm + factor * np.abs(transmitted))
 
     def _by_phase(self, profile: TorqueProfile, acting_n: float) -> Floats:
         """Residual (6, n) of the gait cycle that ends, of a sensor that averages."""

@@ -412,8 +412,11 @@ def test_two_publishers_of_one_crank_are_named_even_if_they_agree(stage, walk) -
 
 
 def test_alarms_reach_the_log_of_the_node(stage, walk) -> None:
-    heard = stage.listen("/rosout", Log, latched=True, matched=False)  # as ROS publishes it
     monitor = stage.monitor(limits__clearance_m=3.05e-4, alarms__on_delay_cycles=1, diagnostics__period_s=0.1)
+    # ROS keeps a line for ten seconds and no longer: the listener has to be there before it is written
+    heard = stage.listen("/rosout", Log, latched=True, matched=False)
+    both = len((stage.node.get_name(), ME))
+    stage.wait_for(lambda: stage.node.count_publishers("/rosout") >= both, "the logs of both nodes")
     stage.legs().play(walk, monitor, end_s=3.0)
     stage.wait_for(
         lambda: any(one.msg.startswith("alarm clearance A rises from OK to WARN") for one in heard), "the log"

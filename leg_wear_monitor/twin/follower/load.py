@@ -7,20 +7,18 @@ affects.
 from collections.abc import Iterable
 from typing import Any
 
-import attrs
 import numpy as np
 from numpy.typing import NDArray
 
 from leg_wear_monitor.contact.arrays import ContactArrays
 from leg_wear_monitor.dynamics.clearance.tables import POINTS, ClearanceTables, build_tables
 from leg_wear_monitor.mechanism.arrays import Floats
+from leg_wear_monitor.mechanism.ground_reaction import PHASES, upwards, with_toe_force
 from leg_wear_monitor.mechanism.ideal import one_cycle, point_motion
 from leg_wear_monitor.mechanism.position import Linkage, build_linkage
-from leg_wear_monitor.mechanism.spec import Mechanism, PhaseLoad
 from leg_wear_monitor.twin.settings import STANCE
 
 _TRIAL_N = 100.0
-_PHASES = 128  # entries of the load's table; a divisor of the number of points of the leg's tables
 
 
 class FootLoad:
@@ -61,7 +59,8 @@ class FootLoad:
         mechanism = linkage.mechanism
         if mechanism.toe is not None:
             self.signature[:], fraction = load_signature(linkage, self._shape)
-            loaded = build_linkage(_loaded(mechanism, _TRIAL_N * fraction[:, None] * _up(mechanism)))
+            force = _TRIAL_N * fraction[:, None] * upwards(mechanism)
+            loaded = build_linkage(with_toe_force(mechanism, force, "the twin's foot load"))
             self._find_parts(build_tables(loaded, self._contacts))
 
     def _pairs(self, tables: ClearanceTables) -> Iterable[tuple[NDArray[Any], NDArray[Any]]]:
@@ -88,18 +87,18 @@ class FootLoad:
 
 
 def load_signature(linkage: Linkage, shape: str = STANCE) -> tuple[Floats, Floats]:
-    """Drive torque by a unit load up at the toe (POINTS + 1,) [N m/N], and the load's fraction (_PHASES,).
+    """Drive torque by a unit load up at the toe (POINTS + 1,) [N m/N], and the load's fraction (PHASES,).
 
     Zeros for a mechanism without a toe.
     """
     mechanism = linkage.mechanism
     if mechanism.toe is None:
-        return np.zeros(POINTS + 1), np.zeros(_PHASES)
-    up = _up(mechanism)
+        return np.zeros(POINTS + 1), np.zeros(PHASES)
+    up = upwards(mechanism)
     position, velocity, _ = point_motion(one_cycle(linkage, POINTS, 1.0), linkage, *mechanism.toe)
     fraction = _load_fraction(position @ up, shape)
-    phases = np.arange(POINTS) / POINTS * _PHASES
-    along = np.interp(phases, np.arange(_PHASES + 1), np.append(fraction, fraction[0]))
+    phases = np.arange(POINTS) / POINTS * PHASES
+    along = np.interp(phases, np.arange(PHASES + 1), np.append(fraction, fraction[0]))
     signature = -along * (velocity @ up)
     return np.append(signature, signature[0]), fraction
 
@@ -109,28 +108,9 @@ def torque_size(linkage: Linkage, speed: float) -> float:
     return float(np.sqrt(np.mean(one_cycle(linkage, POINTS, speed).drive_torque ** 2)))
 
 
-def _up(mechanism: Mechanism) -> Floats:
-    """Unit vector (2,) opposite to gravity; the y axis without gravity."""
-    gravity = np.array(mechanism.gravity)
-    size = float(np.hypot(*gravity))
-    return -gravity / size if size > 0.0 else np.array([0.0, 1.0])
-
-
 def _load_fraction(height: Floats, shape: str) -> Floats:
-    """Fraction (_PHASES,) of the full load at equal crank steps, from the toe's height (POINTS,) [m]."""
+    """Fraction (PHASES,) of the full load at equal crank steps, from the toe's height (POINTS,) [m]."""
     if shape != STANCE:
-        return np.ones(_PHASES)
-    depth = np.maximum(0.0, height.mean() - height)[:: POINTS // _PHASES]
+        return np.ones(PHASES)
+    depth = np.maximum(0.0, height.mean() - height)[:: POINTS // PHASES]
     return np.asarray(depth / (depth.max() or 1.0))
-
-
-def _loaded(mechanism: Mechanism, force: Floats) -> Mechanism:
-    """The mechanism with an additional force (_PHASES, 2) [N] at its toe."""
-    if mechanism.toe is None:
-        return mechanism
-    body, point = mechanism.toe
-    phases = tuple((np.arange(len(force)) / len(force)).tolist())
-    load = PhaseLoad(
-        body=body, point=point, phase=phases, force=tuple((float(x), float(y)) for x, y in force)
-    )
-    return attrs.evolve(mechanism, loads={**mechanism.loads, "the twin's foot load": load})

@@ -51,7 +51,7 @@ def test_a_healthy_leg_is_as_predicted_if_its_sensor_is_known(leg):
     """
     known = mismatches(leg, sampled_at_instants(leg, 25), INSTANT)
     assert np.isnan(known[:INSTANT_CYCLES]).all()
-    # 34 starts moved by 1e-12, 2026-11-25: mean and sigma 0.0322, 0.0092; of the logarithm, 0.285: 4.5 of these
+    # 34 starts moved by 1e-12, 2026-11-25: 0.0322, sigma 0.0092; of the logarithm 0.285, of which 4.5
     assert np.mean(known[INSTANT_CYCLES:]) < 0.111
 
 

@@ -38,23 +38,33 @@ _FRICTION_ERROR = 0.02  # of it, by legs with masses 4 % off
 _DECLARED_FRICTION = 0.03  # error of a declared one
 
 # what a leg may have beside its channel: an error of the model in each phase, of the torque's size and of the
-# roughness' logarithm, and other masses, lengths, bias, scale and load; or, on the ground, anything in the
-# first harmonics of the mean torque
-_MEAN, _ROUGHNESS = 0.05, 0.4
+# roughness' logarithm, other clearances than the counted ones, by their logarithms, and other masses,
+# lengths, bias, scale and load; or, on the ground, anything in the first harmonics of the mean torque
+_MEAN, _ROUGHNESS, _CLEARANCE = 0.05, 0.4, math.log(1.25)
 _SPREADS = {Cause.MASS: 0.05, Cause.LENGTH: 0.005, Cause.FRICTION: 5.0, Cause.SCALE: 0.1, Cause.LOAD: 20.0}
 _HARMONICS, _HARMONIC_NM = 16, 100.0
 
 
 @attrs.frozen
 class ChannelFit:
-    """A channel that was found, the mean square that it leaves, and the error of its load friction.
+    """A channel that was found.
 
-    The error is NaN where the load friction is not observable: on the ground, the load hides it.
+    Attributes
+    ----------
+    channel : Channel
+    square : float
+        Mean square of what it leaves over.
+    load_friction_sigma : float
+        Standard deviation of its load friction; NaN where that is not observable: on the ground, the load
+        hides it.
+    misfit : float
+        Minus twice the logarithm of its likelihood, less a constant.
     """
 
     channel: Channel
     square: float
     load_friction_sigma: float
+    misfit: float
 
 
 def with_channel_of(
@@ -102,6 +112,7 @@ def channel_of(
     in_air = _Leg(np.diag(variance) + _products(np.array(known)), *friction)
     unseen = friction if is_declared else (0.0, 0.0)
     on_ground = _Leg(np.diag(variance) + _products(_harmonics(sensor.phases)), *unseen)
+    reach = np.sign(reference.profile.speed) * sensor.phases / sensor.cycle_s  # phases a second
     hz = figures.bandwidth_hz
     time_constants_s = _TIME_CONSTANTS_S if math.isnan(hz) else (1.0 / (TURN * hz),)
 
@@ -110,11 +121,16 @@ def channel_of(
         behind = attrs.evolve(sensor, channel=channel)
         return np.asarray(measured - simulated_signatures(reference, 0, behind, cycles=_CYCLES).mean(axis=0))
 
-    found = [_best(rest, leg, time_constants_s) for leg in (in_air, on_ground)]
-    scores = [
-        len(measured) * one.square + leg.log_size for one, leg in zip(found, (in_air, on_ground), strict=True)
-    ]
-    return found[int(np.argmin(scores))]
+    @functools.cache
+    def filtered(time_constant_s: float) -> Floats:
+        channel = Channel(time_constant_s=time_constant_s)
+        return _clearances(reference, attrs.evolve(sensor, channel=channel))
+
+    def clearances(channel: Channel) -> Floats:
+        return _moved(filtered(channel.time_constant_s), float(reach * channel.delay_s))
+
+    found = [_best(rest, clearances, leg, time_constants_s) for leg in (in_air, on_ground)]
+    return min(found, key=lambda one: one.misfit)
 
 
 class _Leg:
@@ -126,47 +142,70 @@ class _Leg:
     def __init__(self, covariance: Floats, friction: float, friction_sigma: float) -> None:
         self._weight = np.linalg.inv(covariance)
         self._friction, self._sigma = friction, friction_sigma
-        self.log_size = float(np.linalg.slogdet(covariance)[1])
+        self._log_size = float(np.linalg.slogdet(covariance)[1])
 
-    def left(self, rest: Floats, column: Floats) -> tuple[float, float, float]:
-        """Mean square of what is left over, and the load friction, by which it is least, with its sigma.
+    def fit(self, channel: Channel, rest: Floats, rubbing: Floats, clearances: Floats) -> ChannelFit:
+        """What a channel leaves over, with the load friction and the clearances by which it is least.
 
         Parameters
         ----------
+        channel : Channel
         rest : (F,) array
-            What a channel without load friction leaves over.
-        column : (F,) array
+            What it leaves over without load friction.
+        rubbing : (F,) array
             Change of the signature by load friction.
+        clearances : (k, F) array
+            That by a standard deviation of each clearance.
         """
-        friction, sigma, square = self._friction, math.nan, 0.0
-        if self._sigma:
-            weighted = self._weight @ column
-            information = float(column @ weighted) + self._sigma**-2.0
-            found = (float(rest @ weighted) + friction / self._sigma**2) / information
-            found = min(max(found, 0.0), _MOST_FRICTION)
-            square = ((found - friction) / self._sigma) ** 2
-            friction, sigma = found, math.hypot(information**-0.5, _FRICTION_ERROR)
-        left = rest - friction * column
-        return (float(left @ self._weight @ left) + square) / len(rest), friction, sigma
+        columns = np.vstack([clearances, self._sigma * rubbing])  # each with a standard deviation of 1
+        rest = rest - self._friction * rubbing
+        information = columns @ self._weight @ columns.T + np.eye(len(columns))
+        covariance, along = np.linalg.inv(information), columns @ self._weight @ rest
+        x = covariance @ along
+        friction = self._friction + self._sigma * float(x[-1])
+        sigma = math.hypot(self._sigma * float(covariance[-1, -1]) ** 0.5, _FRICTION_ERROR)
+        if not 0.0 <= friction <= _MOST_FRICTION:
+            friction = min(max(friction, 0.0), _MOST_FRICTION)
+            x += covariance[-1] * ((friction - self._friction) / self._sigma - x[-1]) / covariance[-1, -1]
+        left = rest - x @ columns
+        square = float(left @ self._weight @ left + x @ x)
+        return ChannelFit(
+            channel=attrs.evolve(channel, load_friction=friction),
+            square=square / len(rest),
+            load_friction_sigma=sigma if self._sigma else math.nan,
+            misfit=square + self._log_size + float(np.linalg.slogdet(information)[1]),
+        )
 
 
-def _best(rest: Callable[[Channel], Floats], leg: _Leg, time_constants_s: Sequence[float]) -> ChannelFit:
-    """The channel that leaves least of what each leaves over (F,) without load friction."""
+def _best(
+    rest: Callable[[Channel], Floats],
+    clearances: Callable[[Channel], Floats],
+    leg: _Leg,
+    time_constants_s: Sequence[float],
+) -> ChannelFit:
+    """The channel that leaves least.
+
+    Parameters
+    ----------
+    rest, clearances : callable
+        What a channel leaves over (F,), and what clearances change behind it (k, F), without load friction.
+    leg : _Leg
+    time_constants_s : sequence of float
+    """
 
     def tried(time_constant_s: float, delay_s: float) -> ChannelFit:
         channel = Channel(delay_s=delay_s, time_constant_s=time_constant_s)
         more = attrs.evolve(channel, load_friction=_FRICTION_STEP)
-        column = (rest(channel) - rest(more)) / _FRICTION_STEP
-        square, friction, sigma = leg.left(rest(channel), column)
-        return ChannelFit(attrs.evolve(channel, load_friction=friction), square, sigma)
+        rubbing = (rest(channel) - rest(more)) / _FRICTION_STEP
+        return leg.fit(channel, rest(channel), rubbing, clearances(channel))
 
     def least(found: Iterable[ChannelFit]) -> ChannelFit:
         return min(found, key=lambda one: one.square)
 
     best = tried(0.0, 0.0)
-    without = leg.left(rest(DIRECT), np.zeros_like(rest(DIRECT)))[0]
-    if without - best.square < _FRICTION_BETTER:
-        best = attrs.evolve(best, channel=DIRECT, square=without)
+    without = leg.fit(DIRECT, rest(DIRECT), np.zeros_like(rest(DIRECT)), clearances(DIRECT))
+    if without.square - best.square < _FRICTION_BETTER:
+        best = attrs.evolve(without, channel=DIRECT, load_friction_sigma=best.load_friction_sigma)
     other = []
     for time_constant_s in time_constants_s:
         found = {delay_s: tried(time_constant_s, delay_s) for delay_s in _DELAYS_S.tolist()}
@@ -176,6 +215,29 @@ def _best(rest: Callable[[Channel], Floats], leg: _Leg, time_constants_s: Sequen
         other.append(least(found.values()))
     is_sure = 0.0 not in time_constants_s or least(other).square < best.square - _SURELY_BETTER
     return least(other) if is_sure else best
+
+
+def _clearances(reference: TorqueReference, sensor: TorqueSensor) -> Floats:
+    """Columns (k, F) of a standard deviation of each clearance, by the smallest wider one of a reference."""
+    joints, wider = reference.clearance_m.shape[1], len(reference.torque_nm) - 1
+    expected = simulated_signatures(reference, 0, sensor, cycles=_CYCLES).mean(axis=0)
+    columns = np.zeros((joints if wider else 0, len(expected)))
+    for column, leg in zip(columns, range(1, wider + 1, max(1, wider // joints)), strict=True):
+        by = np.log(reference.clearance_m[leg] / reference.clearance_m[0]).sum()
+        if by > 0.0:  # else it can be no wider
+            changed = simulated_signatures(reference, leg, sensor, cycles=_CYCLES).mean(axis=0)
+            column[:] = _CLEARANCE / by * (changed - expected)
+    return columns
+
+
+def _moved(columns: Floats, by: float) -> Floats:
+    """Columns (k, F) of signatures that are late by a part of a phase, or by several."""
+    whole = math.floor(by)
+    parts = columns.reshape(len(columns), 2, columns.shape[1] // 2)
+    moved = (whole + 1 - by) * np.roll(parts, whole, axis=2) + (by - whole) * np.roll(
+        parts, whole + 1, axis=2
+    )
+    return np.asarray(moved.reshape(columns.shape))
 
 
 def _harmonics(phases: int) -> Floats:

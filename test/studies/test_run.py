@@ -130,6 +130,7 @@ def test_a_point_that_is_asked_for_twice_is_computed_once(tiny, tmp_path):
     assert [point.label for point, _ in load_results(tmp_path).of("response")] == ["G", "G"]
 
 
+@pytest.mark.skipif("MOVED_STARTS" in os.environ, reason="the starts of other processes are not moved")
 @pytest.mark.usefixtures("traps")
 def test_processes_give_the_same_results_to_the_bit_though_one_dies(
     sweep, uninterrupted, tmp_path, monkeypatch

@@ -5,10 +5,12 @@ from itertools import pairwise
 import attrs
 
 from leg_wear_monitor.configuration.quantity import FieldError, choice, described, quantity
+from leg_wear_monitor.mechanism.ground_reaction import FORE_AFT
 
 MOST_ENCODERS = 4
 WRENCH, EFFORT, FLOAT64 = TORQUE_SOURCES = ("wrench", "effort", "float64")
 AVERAGE, INSTANT = SAMPLINGS = ("average", "instant")
+TEMPLATE, TREADMILL = GROUND_SHAPES = ("template", "treadmill")
 
 
 def _fraction(doc: str) -> float:
@@ -144,6 +146,63 @@ class LoadConfig:
     )
     friction_nm: float = quantity(
         "N m", "friction of the drive, against its motion", at_least=0.0, default=0.0
+    )
+    ground_n: float = quantity(
+        "N",
+        "largest vertical force of the ground on the toe in stance, mean over steps; 0 in the air",
+        at_least=0.0,
+        default=0.0,
+    )
+    fore_aft: float = quantity(
+        "",
+        "largest fore-aft force of the ground, over the largest vertical one",
+        at_least=0.0,
+        at_most=1.0,
+        default=FORE_AFT,
+    )
+    shape: str = choice(
+        GROUND_SHAPES,
+        "shape of the ground's force: the template of stance that a monitor knows, or one on a treadmill",
+        default=TEMPLATE,
+    )
+    vertical_waves: tuple[float, ...] = quantity(
+        "",
+        "another vertical shape: coefficients of sin(k pi s), s from 0 to 1 in stance; none if empty",
+        default=(),
+    )
+    fore_aft_waves: tuple[float, ...] = quantity(
+        "", "another fore-aft shape, likewise; it brakes where it is positive", default=()
+    )
+    heel_strike_shift: float = quantity(
+        "",
+        "delay of the heel strike from the nominal one by the toe's motion, in gait cycles",
+        at_least=-0.3,
+        at_most=0.3,
+        default=0.0,
+    )
+    toe_off_shift: float = quantity(
+        "", "delay of the toe-off, likewise", at_least=-0.3, at_most=0.3, default=0.0
+    )
+    amplitude_scatter: float = quantity(
+        "",
+        "standard deviation of the ground's force from step to step, over its mean",
+        at_least=0.0,
+        at_most=0.3,
+        default=0.1,
+    )
+    timing_scatter: float = quantity(
+        "",
+        "standard deviation of the stance's time from step to step, in gait cycles",
+        at_least=0.0,
+        at_most=0.1,
+        default=0.02,
+    )
+    heel_strike_transient: float = quantity(
+        "",
+        "peak of 20 ms that the heel strike adds to the vertical force, over its largest value",
+        at_least=0.0,
+        at_most=3.0,
+        default=0.0,
     )
 
 

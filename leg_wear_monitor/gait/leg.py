@@ -14,15 +14,17 @@ from leg_wear_monitor.dynamics.run.run_statistics import TORQUE, RunStatistics, 
 from leg_wear_monitor.dynamics.simulation import prepare
 from leg_wear_monitor.errors import ConfigError
 from leg_wear_monitor.gait.config import GaitConfig, KnockConfig
+from leg_wear_monitor.gait.ground import Ground
 from leg_wear_monitor.gait.pace import Pace
 from leg_wear_monitor.mechanism.arrays import Floats, body_names
+from leg_wear_monitor.mechanism.ground_reaction import GROUND, with_toe_force
 from leg_wear_monitor.mechanism.ideal import TURN, one_cycle, point_motion
 from leg_wear_monitor.mechanism.loader import load_mechanism
 from leg_wear_monitor.mechanism.position import build_linkage
-from leg_wear_monitor.mechanism.spec import Mechanism, PhaseLoad, RevoluteJoint, SpeedDrive
+from leg_wear_monitor.mechanism.spec import Mechanism, RevoluteJoint, SpeedDrive
 
 _LONGEST_PIECE_S = 2.0e-3  # longest drive polynomial: follows a ripple of 50 Hz to 1e-9 rad
-_LOAD_PHASES = 72
+_PUSH, _PUSH_PHASES = "toe_force_n", 72  # name of a load, and entries of its table
 _FRICTION_RAMP_RADPS = 0.05
 
 
@@ -37,6 +39,7 @@ class Instant(NamedTuple):
     torque_impulse: float
     encoder_rad: tuple[float, ...] = ()
     torque_nm: float = math.nan
+    foot_force_n: tuple[float, float] = (0.0, 0.0)
 
 
 class SyntheticLeg:
@@ -61,8 +64,14 @@ class SyntheticLeg:
         if not isinstance(mechanism.drive, SpeedDrive):
             raise ConfigError(mechanism.source, "drive", "is a torque; a gait needs a crank driven by speed")
         self._pace = Pace(config.pace)
-        setup = _setup(mechanism, config, self._pace.at(0.0).speed)
+        speed = self._pace.at(0.0).speed
+        self._ground = Ground(mechanism, config) if config.load.ground_n else None
+        leg = _pushed(mechanism, config.load.toe_force_n)
+        if self._ground:
+            leg = with_toe_force(leg, self._ground.step(speed))
+        setup = _setup(leg, config, speed)
         self.clearance_joints = setup.clearance_joints
+        self._foot_loads = [i for i, name in enumerate(leg.loads) if name in (GROUND, _PUSH)]
         self._setup, self._run = setup, FullRun(setup)
         self._knock, self._friction = _checked(config.knock, setup), config.load.friction_nm
         self._sides = _sides(mechanism, config.joint_encoders.joints)
@@ -94,7 +103,15 @@ class SyntheticLeg:
         turned = tuple(float(self._run.q[j, 2] - self._run.q[b, 2]) for b, j in self._sides)
         now = self._pace.at(t)
         torque_nm = self._run.sample().drive_torque + self._friction_torque(now.speed)
-        return Instant(now, impulse, turned, torque_nm)
+        return Instant(now, impulse, turned, torque_nm, self._foot_force_n(now.angle))
+
+    def _foot_force_n(self, crank_angle: float) -> tuple[float, float]:
+        arrays, phase = self._run.model.arrays, crank_angle / TURN % 1.0
+        x, y = 0.0, 0.0
+        for k in self._foot_loads:
+            x += float(np.interp(phase, arrays.load_phase[k], arrays.load_force[k, :, 0]))
+            y += float(np.interp(phase, arrays.load_phase[k], arrays.load_force[k, :, 1]))
+        return x, y
 
     def _friction_torque(self, speed: float) -> float:
         return self._friction * math.tanh(speed / _FRICTION_RAMP_RADPS)
@@ -127,12 +144,22 @@ class SyntheticLeg:
         self._friction_impulse += self._friction_torque(end.speed) * (t - before)
         if math.floor(start.angle / TURN) != math.floor(end.angle / TURN):
             self._cycles.append((t, self.clearance_m()))
+        if self._ground:
+            before_step, step = (math.floor(one.angle / TURN - self._ground.swing) for one in (start, end))
+            if step != before_step:
+                self._load(self._ground.step(end.speed))
+
+    def _load(self, force: Floats) -> None:
+        """Let a force (n, 2) [N] act on the toe from now on, closed periodically as in `compile_arrays`."""
+        k = list(self._setup.linkage.mechanism.loads).index(GROUND)
+        table = self._run.model.arrays.load_force[k]
+        table[: len(force) + 1] = force[-1], *force
+        table[len(force) + 1 :] = force[0]
 
 
 def _setup(mechanism: Mechanism, config: GaitConfig, speed: float) -> Setup:
-    """Simulation setup of the leg, with its own clearance joints, clearances, wear and load."""
-    leg = _loaded(mechanism, config.load.toe_force_n)
-    setup = prepare(leg, clearances=config.clearance_joints or None, wear=True)
+    """Simulation setup of the leg, with its own clearance joints, clearances and wear."""
+    setup = prepare(mechanism, clearances=config.clearance_joints or None, wear=True)
     contacts = setup.contacts
     clearance = np.array(config.clearances_m) if config.clearances_m else contacts.clearance
     if len(clearance) != len(setup.clearance_joints):
@@ -144,24 +171,17 @@ def _setup(mechanism: Mechanism, config: GaitConfig, speed: float) -> Setup:
     )
 
 
-def _loaded(mechanism: Mechanism, force_n: float) -> Mechanism:
+def _pushed(mechanism: Mechanism, force_n: float) -> Mechanism:
     """Mechanism with a ground force on its toe, proportional to the toe's depth below its mean height."""
     if force_n == 0.0:
         return mechanism
     if mechanism.toe is None:
         raise ConfigError("gait", "load.toe_force_n", f"{mechanism.source} has no point called toe to push")
-    body, point = mechanism.toe
     linkage = build_linkage(mechanism)
-    position, _, _ = point_motion(one_cycle(linkage, _LOAD_PHASES, TURN), linkage, body, point)
+    position, _, _ = point_motion(one_cycle(linkage, _PUSH_PHASES, TURN), linkage, *mechanism.toe)
     depth = np.maximum(0.0, position[:, 1].mean() - position[:, 1])
     push = force_n * depth / depth.max()
-    ground = PhaseLoad(
-        body=body,
-        point=point,
-        phase=tuple((np.arange(_LOAD_PHASES) / _LOAD_PHASES).tolist()),
-        force=tuple((0.0, float(f)) for f in push),
-    )
-    return attrs.evolve(mechanism, loads={**mechanism.loads, "ground": ground})
+    return with_toe_force(mechanism, np.stack([np.zeros_like(push), push], axis=1), _PUSH)
 
 
 def _sides(mechanism: Mechanism, joints: Sequence[str]) -> list[list[int]]:

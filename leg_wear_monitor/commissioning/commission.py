@@ -8,9 +8,14 @@ import attrs
 from leg_wear_monitor.bags.bag import Recordable, listed_recordings
 from leg_wear_monitor.bags.findings import RecordingError
 from leg_wear_monitor.bags.series.reading import read_signals
-from leg_wear_monitor.bags.series.signals import JointName, Signals, TorqueSource
+from leg_wear_monitor.bags.series.signals import EFFORT, JointName, Signals, TorqueSource
 from leg_wear_monitor.commissioning.detections import with_detections
-from leg_wear_monitor.commissioning.evidence.low_pass import low_pass_of
+from leg_wear_monitor.commissioning.evidence.low_pass import (
+    LowPass,
+    expected_leg,
+    low_pass_of,
+    low_pass_time,
+)
 from leg_wear_monitor.commissioning.evidence.misfit import Load, with_load
 from leg_wear_monitor.commissioning.evidence.mismatch import LIMIT, mismatch_item
 from leg_wear_monitor.commissioning.evidence.sampling import sampling_of
@@ -27,7 +32,7 @@ from leg_wear_monitor.estimate.torque_fit.fit import fit
 from leg_wear_monitor.estimate.torque_fit.motion import JointMotion, motion_of, why_not_a_crank
 from leg_wear_monitor.estimate.torque_fit.regression import Terms
 from leg_wear_monitor.estimate.torque_fit.series import Series
-from leg_wear_monitor.estimate.torque_fit.torque_model import TorqueModel, torque_model
+from leg_wear_monitor.estimate.torque_fit.torque_model import TorqueModel, torque_model, with_clearances
 from leg_wear_monitor.mechanism.loader import load_mechanism
 from leg_wear_monitor.mechanism.spec import Mechanism
 from leg_wear_monitor.monitor.config.drive import drive_figures
@@ -99,14 +104,23 @@ def commission(
     result = attrs.evolve(_result(found, load, mechanism), faults=tuple(faults))
     if result.config is None:
         return result
+    best = found.best
+    topics = (
+        joint_states or best.joint.topic,
+        drive_torque or (None if best.torque.source == EFFORT else best.torque.topic),
+    )
     try:  # by the last recording, as is the offset
-        walk = walk_of(recordings[-1:], result.config, joint_states, drive_torque)
-    except RecordingError as error:  # topics that the proposal chose among several have to be named
+        walk = walk_of(recordings[-1:], result.config, *topics)
+    except RecordingError as error:
         return attrs.evolve(result, notes=(*result.notes, f"{LIMIT} stays as it is: {error}"))
     progress(0.8)
-    fast = _fastest(found, walk, recordings, (joint_states, drive_torque))
-    if len(fast.cycles) >= LEAST_CYCLES:
-        found = settled(attrs.evolve(found, low_pass=low_pass_of(fast)), model)
+    fast = _fastest(found, walk, recordings, topics)
+    legs = [expected_leg(one) for one in ((walk,) if fast is walk else (walk, fast)) if len(one.cycles)]
+    simulated = [leg for leg in legs if leg is not None]
+    if simulated:
+        low_pass = low_pass_of(fast, simulated[-1]) if len(fast.cycles) >= LEAST_CYCLES else None
+        model = with_clearances(model, simulated)
+        found, load = _final(found.choice, found.motion, model, base, low_pass)
         result = attrs.evolve(_result(found, load, mechanism), faults=tuple(faults))
     progress(0.9)
     return with_detections(_with_limit(result, walk), walk, reference, lambda f: progress(0.9 + 0.1 * f))
@@ -197,18 +211,24 @@ def _result(facts: Found, load: Load | None, mechanism: Mechanism) -> Commission
 
 
 def _final(
-    choice: Choice, motion: JointMotion, model: TorqueModel, base: MonitorConfig
+    choice: Choice,
+    motion: JointMotion,
+    model: TorqueModel,
+    base: MonitorConfig,
+    low_pass: LowPass | None = None,
 ) -> tuple[Found, Load | None]:
     """The chosen fit again, with the terms that the recording can tell, and the lag that it is late by."""
-    one = choice.best.fit
+    one, declared = choice.best.fit, drive_figures(base.drive)
+    low_pass_s, low_pass_sigma_s = low_pass_time(low_pass, declared)
     terms = Terms(bias=one.pair.walks_both_ways, load_friction=True, lag=separates_lag(one.pair))
-    again = fit(one.pair, model, one.refined, terms, with_errors=True)
+    start = attrs.evolve(one.refined, lag_s=low_pass_s, low_pass_s=low_pass_s)
+    again = fit(one.pair, model, start, terms, with_errors=True)
     again, load = with_load(again, model, terms)
     sampling = sampling_of(again, model)
-    declared = drive_figures(base.drive)
     used = sampling.value or base.drive_torque.sampling
     timing = timing_of(again, used, bool(sampling.value), declared.lag_s)
-    found = Found(choice, again, motion, sampling, timing, declared, base)
+    timing = attrs.evolve(timing, low_pass_s=low_pass_s, low_pass_sigma_s=low_pass_sigma_s)
+    found = Found(choice, again, motion, sampling, timing, declared, base, low_pass)
     return settled(found, model), load
 
 

@@ -13,9 +13,6 @@ from leg_wear_monitor.twin.settings import AVERAGE
 
 _SPREAD = 0.15  # relative spread of the speed from which on a lag is separated from the offset
 _SURE = 3.0  # standard deviations
-_MODEL_LAG_RAD = 0.01  # by which clearances shift the torque's phase; measured on the synthetic leg
-# the lags of 13 legs of 0.2 to 0.4 mm were off by 1.14 standard deviations, RMS (2026-11-24)
-_LEGS_DIFFER = 1.15
 _FILTERED = 0.25  # of an interval: behind a low-pass, instants look like averages, and are not late by a half
 # a drive may have no lag to speak of, or any up to 30 ms: current loops, filters, buses; neither is likelier
 _MOST_S, _STEP_S = 0.030, 0.00025
@@ -120,14 +117,14 @@ def timing_of(one: Fit, sampling: str, is_told: bool, declared_s: float = math.n
         sigma_s = 0.5 * interval_s
     if not separates_lag(one.pair):
         return Timing(False, math.nan, math.nan, half, sigma_s, declared_s)
-    error_s = math.hypot(_LEGS_DIFFER * lag_error_s(one), sigma_s)
+    error_s = math.hypot(lag_error_s(one), sigma_s)
     return Timing(True, one.lag_s - half, error_s, half, sigma_s, declared_s)
 
 
 def lag_error_s(one: Fit) -> float:
     """Standard deviation of the lag [s], with what clearances may shift the phase from speed to speed."""
     speed = np.quantile(np.abs(one.crank()[1]), [0.1, 0.9])
-    shift = _MODEL_LAG_RAD / max(float(speed[1] - speed[0]), 1.0e-9)
+    shift = one.error.lag_rad / max(float(speed[1] - speed[0]), 1.0e-9)
     return math.hypot(one.sigma.get("lag_s", math.inf), shift)
 
 

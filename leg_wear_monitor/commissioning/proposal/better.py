@@ -4,7 +4,6 @@ import math
 from collections.abc import Callable, Mapping
 
 from leg_wear_monitor.commissioning.proposal.found import Found, gear
-from leg_wear_monitor.estimate.torque_fit.torque_model import PHASE_ERROR_RAD
 
 _TWO_CADENCES = "record two cadences in one recording, 40 rpm apart"
 
@@ -20,7 +19,7 @@ def _gear(found: Found) -> str:
 
 def _offset(found: Found) -> str:
     by_lag = found.timing.lag_sigma_s * found.turned_radps
-    if by_lag <= PHASE_ERROR_RAD:
+    if by_lag <= found.fit.error.phase_rad:
         return "turn the crank to a known angle, such as a dead centre"
     if found.timing.is_lag_separated:
         return f"{_further(found)}, or declare drive.lag_s"
@@ -52,8 +51,8 @@ def _bandwidth(found: Found) -> str:
     return "declare drive.bandwidth_hz, or walk faster: stronger impacts show it better"
 
 
-def _load_friction(_found: Found) -> str:
-    return "declare drive.load_friction: clearances change it by 0.025"
+def _load_friction(found: Found) -> str:
+    return f"declare drive.load_friction: clearances change it by {found.fit.error.load_friction:.2g}"
 
 
 _WAYS: Mapping[str, Callable[[Found], str]] = {

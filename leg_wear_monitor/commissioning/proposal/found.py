@@ -16,7 +16,7 @@ from leg_wear_monitor.estimate.torque_fit.fit import Fit, fit
 from leg_wear_monitor.estimate.torque_fit.likeness import repeating
 from leg_wear_monitor.estimate.torque_fit.motion import JointMotion
 from leg_wear_monitor.estimate.torque_fit.regression import Terms
-from leg_wear_monitor.estimate.torque_fit.torque_model import PHASE_ERROR_RAD, TorqueModel
+from leg_wear_monitor.estimate.torque_fit.torque_model import TorqueModel
 from leg_wear_monitor.mechanism.ideal import TURN
 from leg_wear_monitor.monitor.config.settings import MonitorConfig
 
@@ -25,10 +25,8 @@ _DRIFT_RAD = 0.05  # by which clearances may shift the phase over a recording
 # of the torque's RMS, half of its energy: legs with clearance have 0.03 to 0.05 of averages, 0.3 to 0.45 of
 # instants at 50 to 200 Hz (full coordinates, 60 rpm)
 UNEXPLAINED = 0.7
-# by which clearances change the load friction, and the constant friction as a fraction of the torque's RMS:
-# six legs in full coordinates behind 18 drives, 30 to 85 rpm (2026-11-24)
-_LOAD_FRICTION, _FRICTION = 0.025, 0.012
-_UNDER_LOAD = 3.0  # times that, where the foot carries a load, whose course is not known exactly
+# factor on the errors of friction where the foot carries a load, whose course is not known exactly
+_UNDER_LOAD = 3.0
 
 
 @attrs.frozen(eq=False)
@@ -67,7 +65,7 @@ class Found:
     def friction_nm(self) -> tuple[float, float]:
         """Constant friction on the crank, and its standard deviation [N m]."""
         one = self.fit
-        by_clearances = _FRICTION * self._roughly * float(one.predicted.std())
+        by_clearances = one.error.friction * self._roughly * float(one.predicted.std())
         sigma = math.hypot(one.sigma["friction"], by_clearances)
         return one.linear["friction"] / one.gain, sigma / abs(one.gain)
 
@@ -75,8 +73,9 @@ class Found:
     def load_friction(self) -> tuple[float, float]:
         """Friction as a fraction of the torque's size, and its standard deviation."""
         one = self.fit
-        sigma = one.sigma["load_friction"] / abs(one.gain)
-        return one.linear["load_friction"] / one.gain, math.hypot(sigma, _LOAD_FRICTION * self._roughly)
+        by_clearances = one.error.load_friction * self._roughly
+        sigma = math.hypot(one.sigma["load_friction"] / one.gain, by_clearances)
+        return one.linear["load_friction"] / one.gain, sigma
 
     @property
     def _roughly(self) -> float:
@@ -90,20 +89,13 @@ class Found:
 
 
 def settled(found: Found, model: TorqueModel) -> Found:
-    """The same with the low-pass in its timing, and with a fit for the lag to allow for."""
+    """The same with a fit for the lag to allow for."""
     timing, one = found.timing, found.fit
-    low_pass_hz = found.declared.bandwidth_hz
-    if math.isfinite(low_pass_hz):
-        timing = attrs.evolve(timing, low_pass_s=1.0 / (TURN * low_pass_hz))
-    elif found.low_pass is not None and found.low_pass.is_told:
-        low_pass_s = found.low_pass.time_constant_s
-        sigma_s = low_pass_s * found.low_pass.log_sigma
-        timing = attrs.evolve(timing, low_pass_s=low_pass_s, low_pass_sigma_s=sigma_s)
     if timing.is_lag_separated:
         terms = Terms(bias="bias" in one.linear, load="load" in one.linear, load_friction=True)
         start = attrs.evolve(one.refined, lag_s=timing.lag_s)
         one = fit(one.pair, model, start, terms, with_errors=True)
-    return attrs.evolve(found, timing=timing, fit=one)
+    return attrs.evolve(found, fit=one)
 
 
 def gear(found: Found) -> tuple[float, bool]:
@@ -141,4 +133,4 @@ def offset_sigma_rad(found: Found) -> float:
     slope = np.gradient(one.predicted) / np.gradient(one.blocks.mean(one.crank()[0]))
     by_rest = repeating(one) * float(one.measured.std() / np.sqrt(np.mean(slope**2)))
     by_lag = timing.lag_sigma_s * found.turned_radps
-    return math.hypot(one.sigma["offset_rad"], PHASE_ERROR_RAD, by_rest, by_lag)
+    return math.hypot(one.sigma["offset_rad"], one.error.phase_rad, by_rest, by_lag)

@@ -16,8 +16,6 @@ from leg_wear_monitor.commissioning.search.candidates import SAME_GEAR
 from leg_wear_monitor.commissioning.search.choice import Rival
 
 _NEAR = 0.05  # relative error by which clearances shift the scale: a given one that near is kept
-# by which they raise it: by 0.027 on average, with a scatter of 0.02 (18 drives on six legs, 2026-11-24)
-_MODEL_SCALE = 0.035
 _HALF_A_GEAR = 0.5, 1.5  # efficiencies with which a torque may be that of the motor's shaft
 
 
@@ -101,7 +99,7 @@ def _torque(found: Found) -> Iterator[Item]:
     yield Item(
         name="drive_torque.scale",
         value=scale,
-        sigma=total / turns * math.hypot(one.sigma["gain"] / abs(one.gain), _MODEL_SCALE),
+        sigma=total / turns * math.hypot(one.sigma["gain"] / abs(one.gain), one.error.scale),
         mismatch=one.mismatch,
         remark=f"scale times gear ratio measured {total:.4g}",
     )
@@ -177,7 +175,7 @@ def _low_pass(found: Found) -> Iterator[Item]:
     elif math.isfinite(hz):
         told = "corner frequency of a low-pass between the crank and the torque's samples"
     else:
-        value, told = "none below 70", "no low-pass shows"
+        value, told = f"none below {one.least_hz:g}", "no low-pass shows"
     yield Item(
         name="bandwidth",
         value=value,

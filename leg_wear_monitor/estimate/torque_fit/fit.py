@@ -10,7 +10,7 @@ from leg_wear_monitor.estimate.torque_fit.blocks import Blocks, blocks_of
 from leg_wear_monitor.estimate.torque_fit.pairing import Pair
 from leg_wear_monitor.estimate.torque_fit.regression import State, Terms, begin, columns
 from leg_wear_monitor.estimate.torque_fit.start import Start
-from leg_wear_monitor.estimate.torque_fit.torque_model import TorqueModel
+from leg_wear_monitor.estimate.torque_fit.torque_model import ModelError, TorqueModel
 from leg_wear_monitor.mechanism.arrays import Floats
 from leg_wear_monitor.mechanism.ideal import TURN
 
@@ -36,10 +36,12 @@ class Fit:
         ``friction`` and ``bias`` (constant along the motion, and constant) in the sensor's unit, ``load``
         (``gain`` times the foot load [N]).
     lag_s : float
-        Time by which the torque is late [s].
+        Time by which slow changes of the torque are late [s].
     sigma : dict of str to float
         Standard deviations of ``ratio``, ``offset_rad``, ``lag_s`` and the linear terms; empty if not asked
         for.
+    error : ModelError
+        What clearances change that is not in the standard deviations.
     measured, predicted, rest : (m,) arrays
         Torques of the blocks, in the sensor's unit; the prediction is that of the leg alone.
     """
@@ -49,6 +51,7 @@ class Fit:
     linear: dict[str, float]
     lag_s: float
     sigma: dict[str, float]
+    error: ModelError
     measured: Floats
     predicted: Floats
     rest: Floats
@@ -99,9 +102,8 @@ class Fit:
         """Angle, speed and acceleration of the crank when the torque was made, for each sample."""
         pair = self.pair
         offset = np.array([self.offset_rad[number] for number in pair.recording.tolist()])
-        angle = self.ratio * (pair.position_rad - self.lag_s * pair.speed_radps) + offset
-        speed = self.ratio * (pair.speed_radps - self.lag_s * pair.acceleration_radps2)
-        return angle, speed, self.ratio * pair.acceleration_radps2
+        position, speed, acceleration = pair.earlier(self.lag_s)
+        return self.ratio * position + offset, self.ratio * speed, self.ratio * acceleration
 
 
 @attrs.frozen(eq=False)
@@ -155,6 +157,7 @@ def fit(
         linear=dict(zip(terms.linear, linear.tolist(), strict=True)),
         lag_s=state.lag_s,
         sigma=sigma,
+        error=model.error,
         measured=measured,
         predicted=linear[0] * best.by_linear[0],
         rest=rest,

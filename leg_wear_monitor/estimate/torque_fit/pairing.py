@@ -39,6 +39,18 @@ class Pair:
         columns = {name: getattr(self, name)[which] for name in _COLUMNS}
         return attrs.evolve(self, **columns)
 
+    def earlier(self, by_s: float) -> tuple[Floats, Floats, Floats]:
+        """Position, speed and acceleration, each (n,), some time before each sample [s]."""
+        motion = (self.position_rad, self.speed_radps, self.acceleration_radps2)
+        if by_s == 0.0:
+            return motion
+        moved = np.array(motion)
+        for number in np.unique(self.recording):
+            inside = self.recording == number
+            for row in moved:
+                row[inside] = np.interp(self.time_s[inside] - by_s, self.time_s[inside], row[inside])
+        return moved[0], moved[1], moved[2]
+
     @property
     def walks_both_ways(self) -> bool:
         """Whether at least a tenth of the samples is of either direction."""

@@ -4,6 +4,7 @@ import attrs
 import numpy as np
 from numpy.typing import NDArray
 
+from leg_wear_monitor.estimate.signature import Channel
 from leg_wear_monitor.estimate.torque_fit.blocks import Blocks, blocks_of
 from leg_wear_monitor.estimate.torque_fit.pairing import Pair
 from leg_wear_monitor.estimate.torque_fit.start import Start
@@ -43,7 +44,8 @@ class State:
         Crank angle at a position in the middle of each recording, and that position [rad].
     row : (n,) array of int
         Recording of each sample, as an index of `phase`.
-    lag_s : float
+    lag_s, low_pass_s : float
+        As those of `Start`.
     """
 
     ratio: float
@@ -51,6 +53,7 @@ class State:
     middle: Floats
     row: NDArray[np.int64]
     lag_s: float = 0.0
+    low_pass_s: float = 0.0
 
     def vector(self, terms: Terms) -> Floats:
         """Phases, and ratio and lag where they are terms (k,)."""
@@ -71,7 +74,7 @@ def begin(pair: Pair, model: TorqueModel, start: Start) -> State:
     for i, number in enumerate(numbers.tolist()):
         if number != start.recording:
             phase[i] = _best_phase(pair.part(row == i), model, start, float(middle[i]))
-    return State(start.ratio, phase, middle, row, start.lag_s)
+    return State(start.ratio, phase, middle, row, start.lag_s, start.low_pass_s)
 
 
 def _best_phase(pair: Pair, model: TorqueModel, start: Start, middle: float) -> float:
@@ -96,18 +99,23 @@ def columns(
     pair: Pair, model: TorqueModel, state: State, terms: Terms, blocks: Blocks
 ) -> tuple[Floats, Floats]:
     """Columns of the linear terms, and at unit gain of small changes of phases, ratio and lag, by block."""
-    late = pair.position_rad - state.lag_s * pair.speed_radps - state.middle[state.row]
-    speed = state.ratio * (pair.speed_radps - state.lag_s * pair.acceleration_radps2)
-    acceleration = state.ratio * pair.acceleration_radps2
+    position, speed, acceleration = pair.earlier(state.lag_s - state.low_pass_s)
+    late, speed = position - state.middle[state.row], state.ratio * speed
     angle = state.ratio * late + state.phase[state.row]
-    torque, slope = model.torque(angle, speed, acceleration)
-    linear = [torque, np.sign(speed)]
+    torque, slope = model.torque(angle, speed, state.ratio * acceleration)
+    channel = Channel(time_constant_s=state.low_pass_s)
+
+    def filtered(each: Floats) -> Floats:
+        return channel.received(each, pair.interval_s, direction=1.0)
+
+    slope = filtered(slope)
+    linear = [filtered(torque), np.sign(speed)]
     if terms.bias:
         linear.append(np.ones_like(torque))
     if terms.load:
-        linear.append(model.load_torque(angle))
+        linear.append(filtered(model.load_torque(angle)))
     if terms.load_friction:
-        linear.append(np.abs(torque) * np.sign(speed))
+        linear.append(filtered(np.abs(torque) * np.sign(speed)))
     moving = [np.where(state.row == i, slope, 0.0) for i in range(len(state.phase))]
     if terms.ratio:
         moving.append(slope * late)

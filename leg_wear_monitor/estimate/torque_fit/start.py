@@ -19,7 +19,10 @@ class Start:
     recording : int
         Recording whose torque was used.
     lag_s : float
-        Time by which the torque is late [s]; it stays unless it is among the terms of the fit.
+        Time by which slow changes of the torque are late [s]; it stays unless it is among the terms of the
+        fit.
+    low_pass_s : float
+        What of it is the time constant of a first-order low-pass.
     """
 
     ratio: float
@@ -28,3 +31,4 @@ class Start:
     explained: float
     recording: int
     lag_s: float = 0.0
+    low_pass_s: float = 0.0

@@ -72,7 +72,7 @@ def foreign(store: Any) -> Callable[[str, bytes], Any]:
     return read
 
 
-CODES = {stream.type: stream.code for stream in STREAMS}
+CODES = {stream.type: stream.code for stream in STREAMS if not stream.load_source}
 
 START_NS = 1_700_000_000 * 10**9
 

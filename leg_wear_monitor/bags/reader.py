@@ -41,7 +41,7 @@ class Recording:
         MCAP, .db3, CSV and Parquet files, zstd-compressed or not; bag directories; tables in memory.
     config : MonitorConfig
         Provides the name of the crank joint and the source of the torque.
-    joint_states, drive_torque : str, optional
+    joint_states, drive_torque, foot_load : str, optional
         Topics; by default found by their relative names.
     time : str
         Time that stamps the samples, one of `TIMES`. Float64 messages have no header and use the log time.
@@ -66,6 +66,7 @@ class Recording:
         *,
         joint_states: str | None = None,
         drive_torque: str | None = None,
+        foot_load: str | None = None,
         time: str = "header",
         memory_mb: float = DEFAULT_MB,
     ) -> None:
@@ -80,9 +81,8 @@ class Recording:
         bag_files, self._findings = find_files(paths)
         with ExitStack() as stack:
             self._sources, lost = open_sources(bag_files, config, self._budget, stack)
-            given = {"joint_states": joint_states, "drive_torque": drive_torque}
-            wanted = roles(config.drive_torque.source, given)
-            self.topics, missing = assign(self._sources, wanted)
+            given = {"joint_states": joint_states, "drive_torque": drive_torque, "foot_load": foot_load}
+            self.topics, missing = assign(self._sources, roles(config, given))
             self._findings += lost + missing + check_topics(self._sources, self.topics, joint_states)
             self._close = stack.pop_all()
         recordings = [source.bag_file.recording for source in self._sources]

@@ -8,11 +8,19 @@ from leg_wear_monitor.bags.budget import Budget
 from leg_wear_monitor.bags.findings import Finding
 from leg_wear_monitor.bags.sources import open_sources
 from leg_wear_monitor.bags.tables.file import TableFile
-from leg_wear_monitor.bags.tables.layout import CRANK_SPEED, DRIVE_TORQUE, STAMP, Column, columns_of
+from leg_wear_monitor.bags.tables.layout import (
+    CRANK_SPEED,
+    DRIVE_TORQUE,
+    FOOT_LOAD,
+    FOOT_LOAD_ALONG,
+    STAMP,
+    Column,
+    columns_of,
+)
 from leg_wear_monitor.errors import printable
 from leg_wear_monitor.monitor.config.settings import MonitorConfig
 
-_SI = {CRANK_SPEED: "rad/s", DRIVE_TORQUE: "N m"}
+_SI = {CRANK_SPEED: "rad/s", DRIVE_TORQUE: "N m", FOOT_LOAD: "N", FOOT_LOAD_ALONG: "N"}
 
 
 def understood(path: Path, config: MonitorConfig) -> tuple[list[str], list[Finding]]:

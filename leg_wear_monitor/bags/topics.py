@@ -8,6 +8,7 @@ from leg_wear_monitor.bags.findings import RecordingError
 from leg_wear_monitor.bags.mcap.layout import Channel
 from leg_wear_monitor.errors import printable
 from leg_wear_monitor.messages.streams import Stream, streams_read
+from leg_wear_monitor.monitor.config.settings import MonitorConfig
 
 
 @attrs.frozen
@@ -23,9 +24,10 @@ class Role:
         return self.stream.topic
 
 
-def roles(source: str, given: Mapping[str, str | None]) -> list[Role]:
-    """Inputs that a monitor needs for a value of `drive_torque.source`; `given` holds the user's topics."""
-    return [Role(stream, given.get(stream.topic)) for stream in streams_read(source)]
+def roles(config: MonitorConfig, given: Mapping[str, str | None]) -> list[Role]:
+    """Inputs that a monitor needs; `given` holds the user's topics."""
+    read = streams_read(config.drive_torque.source, config.foot_load.source)
+    return [Role(stream, given.get(stream.topic)) for stream in read]
 
 
 def find_topic(role: Role, topics: Iterable[str], where: str) -> str | None:

@@ -46,6 +46,7 @@ class Reading(NamedTuple):
     crank_velocity_radps: float
     torque_nm: float
     encoder_rad: tuple[float, ...] = ()
+    foot_force_n: tuple[float, float] = (math.nan, math.nan)
 
 
 class Noise:
@@ -79,7 +80,14 @@ def readings(leg: SyntheticLeg, config: GaitConfig) -> Iterator[Reading]:
 def samples(block: Iterable[Reading], start_ns: int) -> Samples:
     """Convert readings to input samples of a monitor, (n,) of GAIT_SAMPLE; time 0 is ``start_ns``."""
     rows = [
-        (stamp_ns(reading, start_ns), reading.kind, reading.fault, *reading[4:7], _four(reading.encoder_rad))
+        (
+            stamp_ns(reading, start_ns),
+            reading.kind,
+            reading.fault,
+            *reading[4:7],
+            _four(reading.encoder_rad),
+            reading.foot_force_n,
+        )
         for reading in block
     ]
     return np.array(rows, dtype=GAIT_SAMPLE)

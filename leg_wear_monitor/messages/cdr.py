@@ -1,4 +1,4 @@
-"""Messages as they lie in a bag: CDR (XCDR1, either byte order) of the three input types, read in place.
+"""Messages as they lie in a bag: CDR (XCDR1, either byte order) of the input types, read in place.
 
 A message is four bytes of encapsulation and a body; members are aligned relative to the start of the body
 (OMG DDS-XTypes 1.3, section 7.4.3). Positions are indices into one array of bytes that holds many messages;
@@ -10,7 +10,15 @@ import math
 import numpy as np
 
 from leg_wear_monitor.kernel import entry, kernel
-from leg_wear_monitor.messages.streams import FLOAT64, JOINT_STATE, STREAMS, WRENCH_STAMPED
+from leg_wear_monitor.messages.streams import (
+    CONTACT,
+    FLOAT64,
+    JOINT_STATE,
+    LOAD_FLOAT64,
+    LOAD_WRENCH,
+    STREAMS,
+    WRENCH_STAMPED,
+)
 from leg_wear_monitor.twin.sample import EMPTY, MISSING_JOINT, NO_FAULT, NOT_FINITE, UNDECODABLE, WRONG_LENGTH
 
 MESSAGE = np.dtype(
@@ -205,8 +213,31 @@ def float64_message(data, begin, end, big):
     return NO_FAULT if math.isfinite(number) else NOT_FINITE, number
 
 
+@kernel
+def wrench_force(data, begin, end, big, out_force):
+    """Read the force of a geometry_msgs/WrenchStamped into (2,), x and y: fault, stamp [ns]."""
+    fault, stamp, _ = wrench_stamped(data, begin, end, big, 0)
+    if fault == UNDECODABLE:
+        return fault, stamp
+    _, at = header(data, begin + ENCAPSULATION, end, big)
+    at, finite = aligned(at, 8, begin + ENCAPSULATION), True
+    for i in range(2):
+        out_force[i] = float64(data, at + 8 * i, big)
+        finite &= math.isfinite(out_force[i])
+    return NO_FAULT if finite else NOT_FINITE, stamp
+
+
+@kernel
+def bool_message(data, begin, end):
+    """Read std_msgs/Bool: fault and 0 or 1."""
+    at = begin + ENCAPSULATION
+    if at + 1 > end or not ends(at + 1, end):
+        return UNDECODABLE, math.nan
+    return NO_FAULT, 1.0 if data[at] != 0 else 0.0
+
+
 @entry
-def decode(data, messages, crank, encoders, ends_at, axis, use_effort, out, out_angles):
+def decode(data, messages, crank, encoders, ends_at, axis, use_effort, out, out_angles, out_force):
     """Read messages into samples as they are: no sign, no scale, no offset.
 
     Parameters
@@ -225,15 +256,19 @@ def decode(data, messages, crank, encoders, ends_at, axis, use_effort, out, out_
         Whether the crank's effort is its torque.
     out : (n,) array of GAIT_SAMPLE
         The stamp is the header's; the log time where a type has no header; 0 where it cannot be read. Its
-        ``encoder_rad`` is left alone.
+        ``encoder_rad`` and ``foot_force_n`` are left alone.
     out_angles : (n, m) array
         Of the further encoders.
+    out_force : (n, 2) array
+        Force on the foot, x and y [N]; a vertical one is y, and 0 or 1 that of a contact switch.
     """
     for i in range(messages.shape[0]):
         begin, end = messages[i]["begin"], messages[i]["end"]
         kind = messages[i]["type"]
         fault, stamp = UNDECODABLE, np.int64(0)
         position, velocity, torque = math.nan, math.nan, math.nan
+        force = out_force[i]
+        force[0], force[1] = math.nan, math.nan
         # XCDR1, big or little endian; parameter lists and XCDR2 lay out otherwise
         if end - begin >= ENCAPSULATION and data[begin] == 0 and data[begin + 1] <= 1:
             big = data[begin + 1] == 0
@@ -246,6 +281,14 @@ def decode(data, messages, crank, encoders, ends_at, axis, use_effort, out, out_
             elif kind == FLOAT64:
                 fault, torque = float64_message(data, begin, end, big)
                 stamp = messages[i]["log_time_ns"]
+            elif kind == LOAD_WRENCH:
+                fault, stamp = wrench_force(data, begin, end, big, force)
+            elif kind == LOAD_FLOAT64:
+                fault, force[1] = float64_message(data, begin, end, big)
+                force[0], stamp = 0.0, messages[i]["log_time_ns"]
+            elif kind == CONTACT:
+                fault, force[1] = bool_message(data, begin, end)
+                force[0], stamp = 0.0, messages[i]["log_time_ns"]
         out[i]["stamp_ns"] = stamp
         out[i]["kind"] = _KIND[kind]
         out[i]["fault"] = fault

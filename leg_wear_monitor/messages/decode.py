@@ -1,4 +1,4 @@
-"""Decoding of messages to gait samples: selects crank and torque, and applies signs and scales."""
+"""Decoding of messages to gait samples: selects crank, torque and foot load, and applies signs and scales."""
 
 import numpy as np
 from numpy.typing import NDArray
@@ -6,6 +6,7 @@ from numpy.typing import NDArray
 from leg_wear_monitor.messages.cdr import MESSAGE, decode
 from leg_wear_monitor.monitor.config.settings import MonitorConfig
 from leg_wear_monitor.twin.sample import GAIT_SAMPLE, NO_FAULT, ZERO_STAMP, Samples
+from leg_wear_monitor.twin.settings import CONTACT
 
 _AXES = {"x": 0, "y": 1, "z": 2}
 
@@ -16,7 +17,7 @@ class Decoder:
     Parameters
     ----------
     config : MonitorConfig
-        The decoder uses `crank_joint`, `crank`, `encoders` and `drive_torque`.
+        The decoder uses `crank_joint`, `crank`, `encoders`, `drive_torque` and `foot_load`.
     """
 
     def __init__(self, config: MonitorConfig) -> None:
@@ -27,6 +28,8 @@ class Decoder:
         self._torque_scale = torque.sign * torque.scale * torque.gear_ratio
         self._axis = _AXES[torque.axis]
         self._effort = torque.source == "effort"
+        load = config.foot_load
+        self._force_scale = 1.0 if load.source == CONTACT else load.sign * load.scale
         names = [name.encode() for name in config.encoders.names]
         self._encoders = np.frombuffer(b"".join(names), np.uint8)
         self._ends = np.cumsum([len(name) for name in names], dtype=np.int64)
@@ -46,9 +49,10 @@ class Decoder:
         """
         samples = np.empty(len(messages), GAIT_SAMPLE)
         angles = np.empty((len(messages), len(self._ends)))
-        decode(
-            data, messages, self._crank, self._encoders, self._ends, self._axis, self._effort, samples, angles
-        )
+        force = np.empty((len(messages), 2))
+        out = samples, angles, force
+        decode(data, messages, self._crank, self._encoders, self._ends, self._axis, self._effort, *out)
+        samples["foot_force_n"] = force * self._force_scale
         samples["encoder_rad"] = np.nan
         samples["encoder_rad"][:, : len(self._ends)] = angles * self._signs
         samples["crank_angle_rad"] *= self._crank_scale

@@ -11,6 +11,7 @@ JOINT_STATE = "sensor_msgs/msg/JointState"
 WRENCH_STAMPED = "geometry_msgs/msg/WrenchStamped"
 DIAGNOSTIC_ARRAY = "diagnostic_msgs/msg/DiagnosticArray"
 FLOAT64 = "std_msgs/msg/Float64"
+BOOL = "std_msgs/msg/Bool"
 MARKER_ARRAY = "visualization_msgs/msg/MarkerArray"
 
 LITTLE_ENDIAN = b"\0\1\0\0"
@@ -148,6 +149,14 @@ def float64s(values: ArrayLike) -> NDArray[np.uint8]:
     layout = Layout()
     layout.column(numbers[:, None])
     return layout.messages(len(numbers))
+
+
+def bools(values: ArrayLike) -> NDArray[np.uint8]:
+    """Messages of std_msgs/Bool, from values (n,): a message a row."""
+    truths = np.atleast_1d(np.asarray(values, np.uint8))
+    layout = Layout()
+    layout.column(truths[:, None])
+    return layout.messages(len(truths))
 
 
 def diagnostic_array(

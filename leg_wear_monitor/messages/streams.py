@@ -5,9 +5,9 @@
 
 import attrs
 
-from leg_wear_monitor.twin.kinds import CRANK, TORQUE
+from leg_wear_monitor.twin.kinds import CRANK, LOAD, TORQUE
 
-JOINT_STATE, WRENCH_STAMPED, FLOAT64 = 1, 2, 3
+JOINT_STATE, WRENCH_STAMPED, FLOAT64, LOAD_WRENCH, LOAD_FLOAT64, CONTACT = range(1, 7)
 
 
 @attrs.frozen(kw_only=True)
@@ -26,8 +26,9 @@ class Stream:
         Fields of the type's main definition; names of nested types without their package.
     kind : int
         Kind of its samples, a key of `twin.kinds.KINDS`.
-    torque_source : str
-        Value of `drive_torque.source` for which the stream is read; empty if it is always read.
+    torque_source, load_source : str
+        Value of `drive_torque.source`, or of `foot_load.source`, for which the stream is read; both are empty
+        if it is always read.
     has_stamp : bool
         Whether the type has a header; without one, the time of arrival stamps its samples.
     is_needed : bool
@@ -40,6 +41,7 @@ class Stream:
     fields: tuple[str, ...]
     kind: int
     torque_source: str = ""
+    load_source: str = ""
     has_stamp: bool = True
     is_needed: bool = False
 
@@ -76,9 +78,36 @@ STREAMS = (
         torque_source="float64",
         has_stamp=False,
     ),
+    Stream(
+        code=LOAD_WRENCH,
+        topic="foot_load",
+        type="geometry_msgs/msg/WrenchStamped",
+        fields=("Header header", "Wrench wrench"),
+        kind=LOAD,
+        load_source="wrench",
+    ),
+    Stream(
+        code=LOAD_FLOAT64,
+        topic="foot_load",
+        type="std_msgs/msg/Float64",
+        fields=("float64 data",),
+        kind=LOAD,
+        load_source="float64",
+        has_stamp=False,
+    ),
+    Stream(
+        code=CONTACT,
+        topic="foot_load",
+        type="std_msgs/msg/Bool",
+        fields=("bool data",),
+        kind=LOAD,
+        load_source="contact",
+        has_stamp=False,
+    ),
 )
 
 
-def streams_read(torque_source: str) -> tuple[Stream, ...]:
-    """Streams that are read with a value of `drive_torque.source`."""
-    return tuple(stream for stream in STREAMS if stream.torque_source in ("", torque_source))
+def streams_read(torque_source: str, load_source: str = "none") -> tuple[Stream, ...]:
+    """Streams that are read with values of `drive_torque.source` and `foot_load.source`."""
+    sources = (("", ""), (torque_source, ""), ("", load_source))
+    return tuple(stream for stream in STREAMS if (stream.torque_source, stream.load_source) in sources)

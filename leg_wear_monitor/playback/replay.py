@@ -119,6 +119,7 @@ def replay(
     time: str = "header",
     joint_states: str | None = None,
     drive_torque: str | None = None,
+    foot_load: str | None = None,
     node: str | None = None,
     memory_mb: float = DEFAULT_MB,
     sample: float | None = None,
@@ -148,7 +149,7 @@ def replay(
         Ledger to continue; the ledger named in the parameters is not modified.
     time : str
         Source of the samples' stamps: ``header``, ``log`` or ``publish``.
-    joint_states, drive_torque : str, optional
+    joint_states, drive_torque, foot_load : str, optional
         Topics; by default found by their relative names.
     node : str, optional
         Full name of the node whose parameters, names and messages are used; by default the node in the
@@ -205,7 +206,7 @@ def replay(
     kept = attrs.evolve(config.ledger, path="" if ledger is None else str(ledger))
     config = attrs.evolve(config, ledger=kept)
     named = listed_recordings(paths)
-    asked = {"joint_states": joint_states, "drive_torque": drive_torque}
+    asked = {"joint_states": joint_states, "drive_torque": drive_torque, "foot_load": foot_load}
     with (
         Recording(named, config, time=time, memory_mb=memory_mb, **asked) as recording,
         ExitStack() as stack,

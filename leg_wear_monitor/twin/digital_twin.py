@@ -178,7 +178,7 @@ class DigitalTwin:
     def intake(self) -> Intake:
         """Counts of samples and times since the twin was created."""
         if self._intake is None:  # it is asked for several times between two updates
-            self._intake = intake(self._tracker.records, self._follower.records)
+            self._intake = intake(self._tracker.records, self._follower.records, self.settings.kinds)
         return self._intake
 
     @property

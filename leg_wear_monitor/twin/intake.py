@@ -1,20 +1,22 @@
 """Counts of samples and times from the state of tracker and follower."""
 
+from collections.abc import Iterable
+
 from leg_wear_monitor.record import Records, values_of
 from leg_wear_monitor.twin.kinds import KINDS
 from leg_wear_monitor.twin.sample import FAULTS, NO_FAULT
 from leg_wear_monitor.twin.statistics import Intake
 
 
-def intake(tracker: Records, leg: Records) -> Intake:
-    """Counts of a tracker's `TRACKER_STATE` and a follower's `LEG_STATE`."""
+def intake(tracker: Records, leg: Records, kinds: Iterable[int] = KINDS) -> Intake:
+    """Counts of a tracker's `TRACKER_STATE` and a follower's `LEG_STATE`, of the kinds that are read."""
     count, clock = values_of(tracker["counts"]), values_of(tracker["clock"])
     motion = values_of(leg["motion"])
     out = clock["out_since_ns"] != 0 and not clock["followed"]
     return Intake(
         received=count["received"],
         faulty={name: int(count["faults"][fault]) for fault, name in FAULTS.items() if fault != NO_FAULT},
-        used={kind.name: int(count["used"][code]) for code, kind in KINDS.items()},
+        used={KINDS[code].name: int(count["used"][code]) for code in kinds},
         duplicates=count["duplicates"],
         late=count["late"],
         stray_stamps=count["stray_stamps"],

@@ -21,7 +21,7 @@ class SampleKind:
         Field of `GAIT_SAMPLE` that must be finite in a sample of this kind. A sample of another kind may
         contain it too.
     largest : float
-        Largest plausible magnitude, in the field's unit.
+        Largest plausible magnitude, in the field's unit, of each component.
     """
 
     name: str
@@ -29,8 +29,10 @@ class SampleKind:
     largest: float
 
 
-CRANK, TORQUE = 0, 1  # samples with equal stamps are processed in this order
+CRANK, TORQUE, LOAD = 0, 1, 2  # samples with equal stamps are processed in this order
 KINDS: Mapping[int, SampleKind] = {
     CRANK: SampleKind(name="crank", value="crank_angle_rad", largest=1.0e6),
     TORQUE: SampleKind(name="torque", value="torque_nm", largest=1.0e6),
+    # five tons on a foot; a person's in millinewtons is beyond
+    LOAD: SampleKind(name="load", value="foot_force_n", largest=5.0e4),
 }

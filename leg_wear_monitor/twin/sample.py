@@ -22,6 +22,7 @@ GAIT_SAMPLE = np.dtype(
         ("crank_velocity_radps", "f8"),
         ("torque_nm", "f8"),
         ("encoder_rad", "f8", (ENCODERS,)),
+        ("foot_force_n", "f8", (2,)),
     ]
 )
 """One sample: stamp of the header, kind, fault, and values, NaN where absent.
@@ -29,7 +30,9 @@ GAIT_SAMPLE = np.dtype(
 The angle is that of the mechanism's crank, after sign, offset and gear ratio; it may be wrapped to a turn or
 be continuous. A crank sample may also contain a torque (``effort``), and the angles of further encoders in
 the order of ``encoders.names``, after their signs: NaN where absent, infinite where the value is no angle. An
-invalid torque or encoder angle is not a fault of the sample.
+invalid torque or encoder angle is not a fault of the sample. The force of the ground on the foot is along the
+axes of the ground, the second one up, or with ``foot_load.frame: foot`` of the toe's body; a contact switch
+gives (0, 1) or (0, 0).
 """
 
 # Faults of a message, found by the conversion. Such a sample is counted and never used.
@@ -58,6 +61,7 @@ def gait_samples(
     crank_velocity_radps: ArrayLike = np.nan,
     torque_nm: ArrayLike = np.nan,
     encoder_rad: ArrayLike = np.nan,
+    foot_force_n: ArrayLike = np.nan,
     fault: ArrayLike = NO_FAULT,
 ) -> Samples:
     """A block of samples for `WearMonitor.update`, from arrays in order of arrival.
@@ -69,12 +73,15 @@ def gait_samples(
     stamp_ns : (n,) array of int
         Times of measurement [ns].
     kind : (n,) array or int
-        0 for a sample of the crank, which may contain a torque, too; 1 for one of the drive torque alone.
+        0 for a sample of the crank, which may contain a torque, too; 1 for one of the drive torque alone; 2
+        for one of the foot load.
     crank_angle_rad, crank_velocity_radps, torque_nm : (n,) array or float
         Angle and speed of the mechanism's crank [rad, rad/s], drive torque on the crank [N m]; NaN where
         absent.
     encoder_rad : (n, m) array or float
         Angles of m further encoders [rad], at most 4, in the order of ``encoders.names``.
+    foot_force_n : (n, 2) array or float
+        Force of the ground on the foot [N].
     fault : (n,) array or int
         0 for a valid sample; others are counted and not used.
 
@@ -111,9 +118,11 @@ def gait_samples(
     angles = np.asarray(encoder_rad, dtype=float)
     block["encoder_rad"] = np.nan
     block["encoder_rad"][:, : angles.shape[-1] if angles.ndim else None] = angles
+    block["foot_force_n"] = foot_force_n
     return block
 
 
 def brings(samples: Samples, kind: int) -> NDArray[np.bool_]:
     """Mask (n,) of the samples with a kind's value: those of the kind, and others that contain it."""
-    return np.asarray((samples["kind"] == kind) | np.isfinite(samples[KINDS[kind].value]))
+    is_there = np.isfinite(samples[KINDS[kind].value]).reshape(len(samples), -1).all(axis=1)
+    return np.asarray((samples["kind"] == kind) | is_there)

@@ -5,6 +5,7 @@ import math
 import attrs
 
 from leg_wear_monitor.errors import LegWearError
+from leg_wear_monitor.twin.kinds import CRANK, LOAD, TORQUE
 
 FOREVER = 1.0e9
 
@@ -12,6 +13,9 @@ _FROM_ZERO = ("lag_s", "node_interval_s", "reorder_window_s", "largest_speed_rad
 
 SAMPLINGS = AVERAGE, INSTANT = "average", "instant"
 LOAD_SHAPES = STANCE, CONSTANT = "stance", "constant"
+LOAD_SOURCES = NO_LOAD, WRENCH, FLOAT64, CONTACT = "none", "wrench", "float64", "contact"
+LOAD_FRAMES = GROUND_FRAME, FOOT_FRAME = "ground", "foot"
+LOAD_MODELS = NONE, GROUND, MEASURED = "none", "ground", "measured"
 
 
 @attrs.frozen(kw_only=True)
@@ -127,6 +131,10 @@ class TwinSettings:
         constant weight.
     load_limit_n : float
         Largest plausible foot load [N].
+    load_source, load_frame : str
+        Samples of the foot load: ``none``, or what gives them; along which axes.
+    load_model : str
+        Load that acts: ``measured``, that of the samples at their times; else see `estimate_load`.
     torque_lag_s : float
         Lag of the torque as declared.
     torque_sampling : str
@@ -141,6 +149,9 @@ class TwinSettings:
     estimate_load: bool = True
     load_shape: str = STANCE
     load_limit_n: float = 1000.0
+    load_source: str = NO_LOAD
+    load_frame: str = GROUND_FRAME
+    load_model: str = NONE
     torque_lag_s: float = 0.0
     torque_sampling: str = AVERAGE
 
@@ -152,8 +163,21 @@ class TwinSettings:
         if self.torque_sampling not in SAMPLINGS:
             fault = f"{self.torque_sampling!r} is not one of {', '.join(SAMPLINGS)}"
             raise LegWearError(f"torque_sampling: {fault}")
-        if self.load_shape not in LOAD_SHAPES:
-            raise LegWearError(f"load_shape: {self.load_shape!r} is not one of {', '.join(LOAD_SHAPES)}")
+        for name, known in (
+            ("load_shape", LOAD_SHAPES),
+            ("load_source", LOAD_SOURCES),
+            ("load_frame", LOAD_FRAMES),
+            ("load_model", LOAD_MODELS),
+        ):
+            if getattr(self, name) not in known:
+                raise LegWearError(f"{name}: {getattr(self, name)!r} is not one of {', '.join(known)}")
+        if self.load_model == MEASURED and self.load_source in (NO_LOAD, CONTACT):
+            raise LegWearError(f"load_model: {MEASURED!r} needs forces, not load_source {self.load_source!r}")
+
+    @property
+    def kinds(self) -> tuple[int, ...]:
+        """Kinds of samples that are read."""
+        return (CRANK, TORQUE) if self.load_source == NO_LOAD else (CRANK, TORQUE, LOAD)
 
     @property
     def loads_n(self) -> tuple[float, float]:

@@ -162,6 +162,29 @@ class TorqueProfile:
 
 
 @attrs.frozen(eq=False)
+class LoadProfile:
+    """Measured foot load of a gait cycle, along the axes of the mechanism; a contact switch's is 0 or 1 up.
+
+    Attributes
+    ----------
+    gap_s : float
+        Time in gaps between samples.
+    least_n, largest_n : float
+        Vertical force.
+    number : (FINE_PHASES,) array
+        Samples in each phase.
+    force_n : (2, FINE_PHASES) array
+        Sum of their forces.
+    """
+
+    gap_s: float
+    least_n: float
+    largest_n: float
+    number: Floats
+    force_n: Floats
+
+
+@attrs.frozen(eq=False)
 class CycleStatistics:
     """Statistics of one complete gait cycle, from crank angle 0 to the next 0.
 
@@ -197,6 +220,8 @@ class CycleStatistics:
         growth and torques are NaN, it has no impacts, and its clearances are estimates.
     not_compared : NotCompared or None
         Why its torque is not among those of the mismatch; None if it is.
+    load : LoadProfile or None
+        None without a sample of the foot load.
     """
 
     cycle: int
@@ -220,6 +245,7 @@ class CycleStatistics:
     torque_profile: TorqueProfile
     is_followed: bool = True
     not_compared: NotCompared | None = None
+    load: LoadProfile | None = None
 
     @property
     def duration_s(self) -> float:

@@ -6,10 +6,11 @@ import pytest
 from leg_wear_monitor.messages.decode import Decoder
 from leg_wear_monitor.messages.definitions import types
 from leg_wear_monitor.messages.streams import STREAMS, streams_read
-from leg_wear_monitor.monitor.config.inputs import TORQUE_SOURCES
+from leg_wear_monitor.monitor.config.inputs import TORQUE_SOURCES, FootLoad
 from leg_wear_monitor.monitor.config.settings import MonitorConfig
 from leg_wear_monitor.twin.kinds import KINDS
 from leg_wear_monitor.twin.sample import GAIT_SAMPLE, brings, gait_samples
+from leg_wear_monitor.twin.settings import LOAD_SOURCES
 
 pytestmark = pytest.mark.plain
 
@@ -34,13 +35,21 @@ def test_each_source_of_torque_reads_the_crank_and_one_topic_a_stream(source):
     assert [stream.topic for stream in read if stream.is_needed] == ["joint_states"]
 
 
+@pytest.mark.parametrize("source", LOAD_SOURCES[1:])
+def test_each_source_of_the_foot_load_adds_one_topic(source):
+    added = set(streams_read("wrench", source)) - set(streams_read("wrench"))
+    assert [stream.topic for stream in added] == ["foot_load"]
+    assert {stream.load_source for stream in STREAMS} == {"", *LOAD_SOURCES[1:]}
+    assert FootLoad(source=source).source == source
+
+
 def test_codes_differ():
     assert len({stream.code for stream in STREAMS}) == len(STREAMS)
 
 
 def test_each_kind_has_a_value_that_others_may_bring():
     for kind, of in KINDS.items():
-        assert GAIT_SAMPLE[of.value] == np.dtype("f8")
+        assert GAIT_SAMPLE[of.value].base == np.dtype("f8")
         other = next(each for each in KINDS if each != kind)
         samples = gait_samples([1, 2, 3], [kind, other, other])
         samples[of.value][2] = 1.0

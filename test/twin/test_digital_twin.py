@@ -66,8 +66,8 @@ def assert_same(one: TwinUpdate, other: TwinUpdate) -> None:
     for cycle, expected in zip(one.cycles, other.cycles, strict=True):
         for field in attrs.fields(CycleStatistics):
             mine, wanted = getattr(cycle, field.name), getattr(expected, field.name)
-            if field.name in ("torque", "torque_profile"):
-                mine, wanted = attrs.astuple(mine), attrs.astuple(wanted)
+            if field.name in ("torque", "torque_profile", "load") and mine is not None:
+                mine, wanted = np.hstack(attrs.astuple(mine)), np.hstack(attrs.astuple(wanted))
             np.testing.assert_array_equal(mine, wanted, err_msg=field.name)
     assert one.events == other.events
 

@@ -22,7 +22,7 @@ def test_stamps_must_be_integers_for_a_float_cannot_hold_them() -> None:
         gait_samples([1.7e18])
 
 
-@pytest.mark.parametrize("name, code", [("kind", 2), ("fault", max(FAULTS) + 1)])
+@pytest.mark.parametrize("name, code", [("kind", 3), ("fault", max(FAULTS) + 1)])
 def test_unknown_codes_are_refused(name: str, code: int) -> None:
     with pytest.raises(LegWearError, match=f"{name}: {code} is none of"):
         gait_samples([1], **{name: code})

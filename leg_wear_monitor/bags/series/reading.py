@@ -141,7 +141,7 @@ def _stream(
         return None
     for stream in STREAMS:
         topic = chosen.get(stream.kind, drive_torque)
-        if stream.type == (channel.type or known):
+        if stream.type == (channel.type or known) and not stream.load_source:
             return stream if topic in (None, channel.topic, channel.topic.lstrip("/")) else None
     return None
 

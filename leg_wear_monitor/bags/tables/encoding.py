@@ -7,14 +7,21 @@ from numpy.typing import NDArray
 
 from leg_wear_monitor.bags.mcap.file import Piece
 from leg_wear_monitor.bags.mcap.layout import Channel
-from leg_wear_monitor.bags.tables.layout import CRANK_ANGLE, CRANK_SPEED, DRIVE_TORQUE, Rows
+from leg_wear_monitor.bags.tables.layout import (
+    CRANK_ANGLE,
+    CRANK_SPEED,
+    DRIVE_TORQUE,
+    FOOT_LOAD,
+    FOOT_LOAD_ALONG,
+    Rows,
+)
 from leg_wear_monitor.mechanism.arrays import Floats
 from leg_wear_monitor.messages import encode
 from leg_wear_monitor.messages.cdr import MESSAGE
-from leg_wear_monitor.messages.streams import STREAMS, WRENCH_STAMPED
+from leg_wear_monitor.messages.streams import CONTACT, LOAD_WRENCH, STREAMS, WRENCH_STAMPED
 from leg_wear_monitor.monitor.config.settings import MonitorConfig
 
-CRANK_CHANNEL, TORQUE_CHANNEL = 1, 2
+CRANK_CHANNEL, TORQUE_CHANNEL, LOAD_CHANNEL = 1, 2, 3
 _EFFORT = "effort"
 _Group = tuple[int, NDArray[np.int64], NDArray[np.uint8]]
 """Number of a channel; the rows and the messages of it."""
@@ -32,7 +39,9 @@ class Encoder:
         self._crank, self._further = config.crank_joint, config.encoders.names
         self._torque = config.drive_torque
         self.has_torque = bool(config.input.columns.drive_torque)
-        self._streams = {stream.torque_source: stream for stream in STREAMS}
+        self._streams = {stream.torque_source: stream for stream in STREAMS if not stream.load_source}
+        of_load = {stream.load_source: stream for stream in STREAMS}
+        self._load = of_load.get(config.foot_load.source if config.input.columns.foot_load else "none")
 
     @property
     def is_effort(self) -> bool:
@@ -45,10 +54,12 @@ class Encoder:
         streams = {CRANK_CHANNEL: self._streams[""]}
         if self.has_torque and not self.is_effort:
             streams[TORQUE_CHANNEL] = self._streams[self._torque.source]
+        if self._load:
+            streams[LOAD_CHANNEL] = self._load
         return {number: Channel(f"/{one.topic}", one.type, "cdr", "", "") for number, one in streams.items()}
 
     def piece(self, rows: Rows, log_time_ns: NDArray[np.int64], types: dict[int, int]) -> Piece:
-        """Messages of rows, the crank's before the torque's.
+        """Messages of rows, the crank's before the torque's and the foot load's.
 
         Parameters
         ----------
@@ -65,6 +76,9 @@ class Encoder:
             row = np.flatnonzero(rows.measured[DRIVE_TORQUE])
             raw = self._torques(rows.stamp_ns[row], rows.values[DRIVE_TORQUE][row])
             groups.append((TORQUE_CHANNEL, row, raw))
+        if LOAD_CHANNEL in types and self._load:
+            row = np.flatnonzero(rows.measured[FOOT_LOAD])
+            groups.append((LOAD_CHANNEL, row, self._loads(self._load.code, rows, row)))
         return _piece(groups, log_time_ns, types, rows.stored)
 
     def _cranks(self, rows: Rows) -> list[tuple[NDArray[np.int64], NDArray[np.uint8]]]:
@@ -101,6 +115,18 @@ class Encoder:
             vector[:, "xyz".index(self._torque.axis)] = torque
             return encode.wrenches(stamp_ns, torque=vector)
         return encode.float64s(torque)
+
+    def _loads(self, code: int, rows: Rows, row: NDArray[np.int64]) -> NDArray[np.uint8]:
+        force = rows.values[FOOT_LOAD][row]
+        if code == CONTACT:
+            return encode.bools(force != 0.0)
+        if code == LOAD_WRENCH:
+            vector = np.zeros((len(row), 3))
+            vector[:, 1] = force
+            if FOOT_LOAD_ALONG in rows.values:
+                vector[:, 0] = rows.values[FOOT_LOAD_ALONG][row]
+            return encode.wrenches(rows.stamp_ns[row], force=vector)
+        return encode.float64s(force)
 
 
 def _of_the_crank(rows: Rows, key: str, row: NDArray[np.int64], others: int) -> Floats | None:

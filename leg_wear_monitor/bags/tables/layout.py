@@ -11,9 +11,12 @@ from leg_wear_monitor.bags.findings import RecordingError
 from leg_wear_monitor.errors import printable
 from leg_wear_monitor.mechanism.arrays import Floats
 from leg_wear_monitor.monitor.config.settings import MonitorConfig
-from leg_wear_monitor.monitor.config.tables import SPEEDS, TORQUES
+from leg_wear_monitor.monitor.config.tables import FORCES, SPEEDS, TORQUES, Units
+from leg_wear_monitor.twin.settings import CONTACT, NO_LOAD, WRENCH
 
 STAMP, CRANK_ANGLE, CRANK_SPEED, DRIVE_TORQUE = "stamp", "crank_angle", "crank_speed", "drive_torque"
+FOOT_LOAD, FOOT_LOAD_ALONG = "foot_load", "foot_load_along"
+_MAY_BE_NONE = (CRANK_SPEED, DRIVE_TORQUE, FOOT_LOAD, FOOT_LOAD_ALONG)
 _MOST_LISTED = 20
 
 
@@ -85,8 +88,13 @@ def columns_of(config: MonitorConfig) -> tuple[Column, ...]:
         CRANK_SPEED: SPEEDS[units.crank_speed],
         DRIVE_TORQUE: TORQUES[units.drive_torque],
     }
+    force = (1.0, 1.0) if config.foot_load.source == CONTACT else FORCES[units.foot_load]
+    if config.foot_load.source != NO_LOAD:
+        scales[FOOT_LOAD] = force
+    if config.foot_load.source == WRENCH:
+        scales[FOOT_LOAD_ALONG] = force
     own = [
-        Column(key, getattr(names, key), f"input.columns.{key}", getattr(units, key), *scale)
+        Column(key, getattr(names, key), f"input.columns.{key}", _unit(key, units), *scale)
         for key, scale in scales.items()
         if getattr(names, key) and not (key == STAMP and config.input.rate_hz)
     ]
@@ -95,6 +103,10 @@ def columns_of(config: MonitorConfig) -> tuple[Column, ...]:
         for name in config.encoders.names
     ]
     return (*own, *further)
+
+
+def _unit(key: str, units: Units) -> str:
+    return str(getattr(units, FOOT_LOAD if key == FOOT_LOAD_ALONG else key))
 
 
 def places(source: str, names: Sequence[str], columns: Sequence[Column]) -> list[int]:
@@ -109,7 +121,7 @@ def places(source: str, names: Sequence[str], columns: Sequence[Column]) -> list
     for column in columns:
         if names.count(column.name) != 1:
             what = "is there more than once" if column.name in names else "does not exist"
-            nothing = ', or "" if there is none' if column.key in (CRANK_SPEED, DRIVE_TORQUE) else ""
+            nothing = ', or "" if there is none' if column.key in _MAY_BE_NONE else ""
             fault = f"column {column.name!r} {what}, expected one of: {_listed(names)}{nothing}"
             raise RecordingError(source, column.parameter, fault)
         found.append(names.index(column.name))

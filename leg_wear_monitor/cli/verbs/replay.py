@@ -44,6 +44,7 @@ _MOST_LINES = 20
 )
 @click.option("--joint-states", metavar="TOPIC", help="Topic of the crank.  [default: */joint_states]")
 @click.option("--drive-torque", metavar="TOPIC", help="Topic of the torque.  [default: */drive_torque]")
+@click.option("--foot-load", metavar="TOPIC", help="Topic of the foot load.  [default: */foot_load]")
 @click.option(
     "--node",
     metavar="NAME",

@@ -14,7 +14,7 @@ from leg_wear_monitor.mechanism.ideal import TURN
 from leg_wear_monitor.mechanism.spec import Mechanism, SpeedDrive
 from leg_wear_monitor.monitor.config.drive import drive_figures
 from leg_wear_monitor.monitor.config.settings import MonitorConfig
-from leg_wear_monitor.twin.settings import TrackerSettings, TwinSettings
+from leg_wear_monitor.twin.settings import CONTACT, MEASURED, NO_LOAD, TrackerSettings, TwinSettings
 
 _KEYS = {"radial_clearance": "clearances_m", "wear_coefficient": "wear_coefficients_per_pa"}
 
@@ -87,7 +87,7 @@ def twin_settings(config: MonitorConfig, source: str = "parameters") -> TwinSett
     Raises
     ------
     ConfigError
-        If the reorder window is not shorter than the bridged gaps.
+        If the reorder window is not shorter than the bridged gaps; for a measured load without forces.
     """
     tracker, cadence = config.tracker, config.cadence
     if not tracker.reorder_window_s < tracker.gap_limit_s:
@@ -96,6 +96,9 @@ def twin_settings(config: MonitorConfig, source: str = "parameters") -> TwinSett
             "tracker.reorder_window_s",
             f"{tracker.reorder_window_s!r} s is not below tracker.gap_limit_s, {tracker.gap_limit_s!r} s",
         )
+    if config.load.model == MEASURED and config.foot_load.source in (NO_LOAD, CONTACT):
+        fault = f"{MEASURED!r} needs forces, and foot_load.source is {config.foot_load.source!r}"
+        raise ConfigError(source, "load.model", fault)
     return TwinSettings(
         tracker=TrackerSettings(
             commanded_speed_radps=TURN * (cadence.commanded_rpm / 60.0),
@@ -109,6 +112,9 @@ def twin_settings(config: MonitorConfig, source: str = "parameters") -> TwinSett
         wear_acceleration=config.wear_acceleration,
         torque_lag_s=drive_figures(config.drive).lateness_s,
         torque_sampling=config.drive_torque.sampling,
+        load_source=config.foot_load.source,
+        load_frame=config.foot_load.frame,
+        load_model=config.load.model,
     )
 
 

@@ -6,7 +6,18 @@ import attrs
 
 from leg_wear_monitor.configuration.quantity import FieldError, choice, described, quantity
 from leg_wear_monitor.twin.sample import ENCODERS
-from leg_wear_monitor.twin.settings import AVERAGE, SAMPLINGS
+from leg_wear_monitor.twin.settings import (
+    AVERAGE,
+    FOOT_FRAME,
+    GROUND_FRAME,
+    LOAD_FRAMES,
+    LOAD_MODELS,
+    LOAD_SOURCES,
+    NO_LOAD,
+    NONE,
+    SAMPLINGS,
+    WRENCH,
+)
 
 LIVE = {"live": True}  # may change while the monitor runs
 
@@ -169,6 +180,42 @@ class DriveTorque:
         at_most=1.0e6,
         default=0.0,
         metadata=LIVE,
+    )
+
+
+@attrs.frozen(kw_only=True)
+class FootLoad:
+    """From a message on foot_load to the force of the ground on the toe: sign * scale * value."""
+
+    source: str = choice(
+        LOAD_SOURCES,
+        "none, or what is on foot_load: WrenchStamped, Float64 (the vertical force), or contact, a Bool",
+        default=NO_LOAD,
+    )
+    frame: str = choice(
+        LOAD_FRAMES,
+        "axes of the wrench: x and y of the mechanism (ground), or of the body with the toe (foot)",
+        default=GROUND_FRAME,
+    )
+    sign: int = _sign("1 if a force is positive that pushes the foot along the axis or up, else -1")
+    scale: float = quantity(
+        "", "factor on the force, for its unit: 1000.0 for kN", at_least=1.0e-6, at_most=1.0e6, default=1.0
+    )
+
+    def __attrs_post_init__(self) -> None:
+        if self.frame == FOOT_FRAME and self.source not in (NO_LOAD, WRENCH):
+            fault = f"{self.frame!r} needs a force with a direction, foot_load.source {WRENCH!r}"
+            raise FieldError("frame", fault)
+
+
+@attrs.frozen(kw_only=True)
+class Load:
+    """The load that the foot carries in the model."""
+
+    model: str = choice(
+        LOAD_MODELS,
+        "load at the foot: none; ground, estimated as a person's in stance; measured, that of foot_load",
+        default=NONE,
     )
 
 

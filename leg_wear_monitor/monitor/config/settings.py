@@ -9,7 +9,16 @@ import attrs
 from leg_wear_monitor.configuration.quantity import described, quantity
 from leg_wear_monitor.monitor.config.drive import DriveParameters
 from leg_wear_monitor.monitor.config.forecast import Forecasting
-from leg_wear_monitor.monitor.config.inputs import LIVE, Cadence, Crank, DriveTorque, Encoders, Tracker
+from leg_wear_monitor.monitor.config.inputs import (
+    LIVE,
+    Cadence,
+    Crank,
+    DriveTorque,
+    Encoders,
+    FootLoad,
+    Load,
+    Tracker,
+)
 from leg_wear_monitor.monitor.config.tables import TableInput
 
 
@@ -254,6 +263,8 @@ class MonitorConfig:
     encoders: Encoders = described("", factory=Encoders)
     drive_torque: DriveTorque = described("", factory=DriveTorque)
     drive: DriveParameters = described("", factory=DriveParameters)
+    foot_load: FootLoad = described("", factory=FootLoad)
+    load: Load = described("", factory=Load)
     input: TableInput = described("", factory=TableInput)
     cadence: Cadence = described("", factory=Cadence)
     tracker: Tracker = described("", factory=Tracker)

@@ -25,7 +25,8 @@ SPEEDS: Mapping[str, tuple[float, float]] = {
 COUNTS = "counts"
 """Unit of an encoder's raw position; `TableInput.counts_per_turn` says how many make a turn."""
 TORQUES: Mapping[str, tuple[float, float]] = {"N m": (1.0, 1.0), "N mm": (1.0, 1000.0)}
-"""Factor and divisor to SI of the units of angles, speeds and torques; a division by 1000 is rounded once."""
+FORCES: Mapping[str, tuple[float, float]] = {"N": (1.0, 1.0), "kN": (1000.0, 1.0)}
+"""Factor and divisor to SI of angles, speeds, torques and forces; a division by 1000 is rounded once."""
 
 
 def _filled(name: str) -> str | None:
@@ -44,6 +45,14 @@ class Columns:
     )
     crank_speed: str = described("column of the speed of the crank's joint; empty: none", default="")
     drive_torque: str = described("column of the drive torque; empty: none", default="drive_torque")
+    foot_load: str = described(
+        "column of the force on the foot, up or, of a wrench, along its y axis, or of the contact; not read "
+        "with foot_load.source none; empty: none",
+        default="foot_load",
+    )
+    foot_load_along: str = described(
+        "column of a wrench's force along its x axis; empty: none, it is 0", default=""
+    )
 
 
 @attrs.frozen(kw_only=True)
@@ -64,6 +73,7 @@ class Units:
     )
     crank_speed: str = choice(tuple(SPEEDS), "unit of the speed", default="rad/s")
     drive_torque: str = choice(tuple(TORQUES), "unit of the torque", default="N m")
+    foot_load: str = choice(tuple(FORCES), "unit of the force on the foot", default="N")
 
 
 def _date(text: str) -> str | None:
@@ -78,7 +88,7 @@ def _date(text: str) -> str | None:
 
 @attrs.frozen(kw_only=True)
 class TableInput:
-    """Columns of tables; sign, gear ratio, offset and scale are those of `crank` and `drive_torque`."""
+    """Columns of tables; signs and scales are those of `crank`, `drive_torque` and `foot_load`."""
 
     columns: Columns = described("", factory=Columns)
     units: Units = described("", factory=Units)

@@ -13,6 +13,7 @@ import attrs
 from leg_wear_monitor.monitor.alarms.alarm import Alarm, Limit
 from leg_wear_monitor.monitor.evaluation.torque_checks import BIAS, DRIFT, LAG
 from leg_wear_monitor.twin.kinds import KINDS as SAMPLE_KINDS
+from leg_wear_monitor.twin.kinds import LOAD
 
 if TYPE_CHECKING:
     from leg_wear_monitor.monitor.config.settings import Alarms, MonitorConfig
@@ -256,7 +257,7 @@ def _rate(name: str) -> "AlarmSpec[InputHealth]":
 
 
 INPUT: "tuple[AlarmSpec[InputHealth], ...]" = (
-    *(_rate(kind.name) for kind in SAMPLE_KINDS.values()),
+    *(_rate(kind.name) for code, kind in SAMPLE_KINDS.items() if code != LOAD),
     AlarmSpec(
         kind="input_samples",
         quantity="fraction of unusable samples",

@@ -57,7 +57,10 @@ class Supervision:
     def __init__(self, node: Node, monitor: "WearMonitor", config: MonitorConfig) -> None:
         self._node, self._monitor = node, monitor
         self._started_ns = time.monotonic_ns()
-        kinds = tuple(KINDS[stream.kind].name for stream in streams_read(config.drive_torque.source))
+        kinds = tuple(
+            KINDS[stream.kind].name
+            for stream in streams_read(config.drive_torque.source, config.foot_load.source)
+        )
         self._silence = Silence(kinds, self._started_ns, time.time_ns())
         self._names = CrankNames(config.crank_joint)
         torque = config.drive_torque

@@ -65,7 +65,10 @@ def subscribe(
     node: Node, config: MonitorConfig, take: Callable[[InputTopic, bytes], None]
 ) -> list[tuple[InputTopic, Subscription]]:
     """Subscribe to the configured inputs; best effort, which is compatible with reliable publishers."""
-    return [_subscribe(node, stream, take) for stream in streams_read(config.drive_torque.source)]
+    return [
+        _subscribe(node, stream, take)
+        for stream in streams_read(config.drive_torque.source, config.foot_load.source)
+    ]
 
 
 def _subscribe(

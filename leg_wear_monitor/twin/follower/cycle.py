@@ -9,7 +9,13 @@ from leg_wear_monitor.mechanism.arrays import Floats
 from leg_wear_monitor.record import Record
 from leg_wear_monitor.twin.follower.state import FRICTION, LAG, LOAD, LOAD_FRICTION
 from leg_wear_monitor.twin.follower.torque_estimate import CycleEstimate, LoadEstimate
-from leg_wear_monitor.twin.statistics import CycleStatistics, NotCompared, TorqueProfile, TorqueStatistics
+from leg_wear_monitor.twin.statistics import (
+    CycleStatistics,
+    LoadProfile,
+    NotCompared,
+    TorqueProfile,
+    TorqueStatistics,
+)
 
 
 def clear_run_statistics(statistics: RunStatistics) -> None:
@@ -79,6 +85,17 @@ def torque_profile(sums: Record, acting_n: float) -> TorqueProfile:
     return TorqueProfile(number, angle, measured, predicted - acting_n * lever, lever)
 
 
+def load_profile(leg: Record) -> LoadProfile | None:
+    """Foot load of the cycle of a `LEG_STATE`; None without a sample."""
+    sums = leg.load
+    if not sums.samples:
+        return None
+    number, *force = sums.profile.copy()
+    return LoadProfile(
+        1.0e-9 * float(sums.gap_ns), float(sums.least), float(sums.largest), number, np.stack(force)
+    )
+
+
 def cycle_statistics(
     leg: Record, stamp: int, contacts: ContactArrays, depth: Floats, before: Floats,
     statistics: RunStatistics, torque: TorqueStatistics, profile: TorqueProfile,
@@ -108,6 +125,7 @@ def cycle_statistics(
         torque=torque,
         torque_profile=profile,
         not_compared=not_compared,
+        load=load_profile(leg),
     )
 
 
@@ -139,4 +157,5 @@ def tracked_cycle(
         torque=TorqueStatistics(samples=0, **dict.fromkeys(values, np.nan)),
         torque_profile=torque_profile(leg.sums, 0.0),
         is_followed=False,
+        load=load_profile(leg),
     )

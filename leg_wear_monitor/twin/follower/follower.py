@@ -26,6 +26,7 @@ from leg_wear_monitor.twin.follower.cycle import (
 )
 from leg_wear_monitor.twin.follower.following import CYCLE, LEFT, NEEDS_START, REPORTED, follow
 from leg_wear_monitor.twin.follower.load import FootLoad, torque_size
+from leg_wear_monitor.twin.follower.measured_load import force_of, set_force
 from leg_wear_monitor.twin.follower.repeating import (
     CYCLES,
     INSTANT_CYCLES,
@@ -46,7 +47,7 @@ from leg_wear_monitor.twin.follower.torque_estimate import LEAST_SAMPLES, LoadEs
 from leg_wear_monitor.twin.reference.leg_parameters import LegParameters
 from leg_wear_monitor.twin.reference.leg_simulation import drive_coupling
 from leg_wear_monitor.twin.sampling.state import SampledState
-from leg_wear_monitor.twin.settings import INSTANT, TwinSettings
+from leg_wear_monitor.twin.settings import FOOT_FRAME, INSTANT, MEASURED, TwinSettings
 from leg_wear_monitor.twin.statistics import (
     CycleStatistics,
     Event,
@@ -89,6 +90,7 @@ class FollowerSnapshot(NamedTuple):
     before: Floats
     estimate: Floats
     repeating: tuple[Floats, ...]
+    load: tuple[Floats, ...]
     sampled: SampledState | None = None
 
 
@@ -115,8 +117,11 @@ class LegFollower:
     """
 
     def __init__(self, setup: Setup, settings: TwinSettings) -> None:
-        self._setup, self._acts = setup, settings.estimate_load
-        self._load = FootLoad(setup.linkage, setup.contacts, settings.load_shape)
+        is_measured = settings.load_model == MEASURED
+        # beside a measured load, the estimated one is what the torque shows more
+        self._setup, self._acts = setup, settings.estimate_load and not is_measured
+        is_of_foot = settings.load_frame == FOOT_FRAME
+        self._load = FootLoad(setup.linkage, setup.contacts, settings.load_shape, is_measured, is_of_foot)
         # a whole number of nanoseconds, so that the stepper's time does not drift from the stamps
         interval = round(1.0e9 * TURN / abs(setup.speed) / INTERVALS) * 1.0e-9
         self._stepper = ClearanceStepper(setup, interval, tables=self._load.tables)
@@ -188,7 +193,7 @@ class LegFollower:
             reason, i, k, m = follow(
                 self._advance_address, self._stepper.model, self._setup.surfaces.feeds_back,
                 self._stepper.state, self.statistics, self._stepper.work, self._sensor, self._load.signature,
-                self._leg, steps, i, n, m, *room,
+                self._load.rows, self._leg, steps, i, n, m, *room,
             )  # fmt: skip
             if reason == CYCLE:
                 self._end_cycle(k, cycles)
@@ -217,16 +222,18 @@ class LegFollower:
         """Compile what follows steps, but for the motion itself; the leg stays where it is."""
         compile_for(
             follow, 0, self._stepper.model, self._setup.surfaces.feeds_back, self._stepper.state,
-            self.statistics, self._stepper.work, self._sensor, self._load.signature, self._leg, steps,
-            0, 0, 0, *self._room(0),
+            self.statistics, self._stepper.work, self._sensor, self._load.signature, self._load.rows,
+            self._leg, steps, 0, 0, 0, *self._room(0),
         )  # fmt: skip
 
     def _start(self, steps: Steps, i: int) -> Event:
         """Set the leg in motion at the begin of step i, with its wear unchanged; returns the event."""
         motion, step = self.state.motion, steps[i]
         stamp, (angle, speed) = int(step["begin_ns"]), step["motion"][:2]
-        for part in ("torque", "sums"):
+        peak_n = float(self.state.push.peak_n)
+        for part in ("torque", "sums", "load", "push"):
             self.records[part] = 0
+        self.state.push.peak_n = peak_n
         motion.base_ns = stamp - self._run_in(float(angle), float(speed))
         if motion.lost:
             motion.failed_ns += stamp - motion.failed_at_ns
@@ -292,7 +299,9 @@ class LegFollower:
         """Begin a gait cycle at a stamp [ns]."""
         motion = self.state.motion
         motion.cycle_begin_ns, motion.cycle_bridged_ns = stamp, 0
-        self.records["sums"] = 0
+        self.state.push.peak_n = self.state.load.largest
+        for part in ("sums", "load"):
+            self.records[part] = 0
         clear_run_statistics(self.statistics)
         self._before = self.clearances
 
@@ -356,6 +365,7 @@ class LegFollower:
             self._before.copy(),
             self.estimate.state.copy(),
             self._repeating.cycles,
+            force_of(self._load.rows),
         )
 
     def restore(self, snapshot: FollowerSnapshot) -> None:
@@ -368,4 +378,5 @@ class LegFollower:
         self.estimate.state[:] = snapshot.estimate
         self._repeating.cycles = snapshot.repeating
         self._load.set(self.estimate.acting)
+        set_force(self._load.rows, snapshot.load)
         self._set_friction()

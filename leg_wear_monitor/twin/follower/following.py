@@ -10,8 +10,10 @@ from leg_wear_monitor.dynamics.run.protocol import DONE
 from leg_wear_monitor.dynamics.run.run_statistics import TORQUE, TORQUE_SQUARED
 from leg_wear_monitor.kernel import entry, kernel
 from leg_wear_monitor.twin.follower.compare import add_to_profile, compare
+from leg_wear_monitor.twin.follower.measured_load import LONGEST_PUSH, in_mechanism, take_push
+from leg_wear_monitor.twin.follower.phase import phase_of
 from leg_wear_monitor.twin.follower.state import COUNTED, TRACKED
-from leg_wear_monitor.twin.steps import EVALUATE, LEAVE, MOVE, REPORT, START
+from leg_wear_monitor.twin.steps import EVALUATE, LEAVE, MOVE, PUSH, REPORT, START
 
 # reasons for which the kernel returns before the last step: a cycle has ended; the caller must start the leg,
 # stop following, or record an event. Other values are the status codes of dynamics.run.
@@ -118,6 +120,33 @@ def _add_measured(signature, leg, polynomial, step):
 
 
 @kernel
+def _push(load, leg, polynomial, step):
+    """Take a sample of the foot load, for the motion and for the cycle's sums."""
+    motion, sums, push, n = leg.motion, leg.load, leg.push, load.axis.shape[0]
+    at = min(max(step.begin_ns, motion.piece_begin_ns), motion.piece_end_ns)
+    tau, speed = 1.0e-9 * (at - motion.piece_begin_ns), 0.0
+    for i in range(6, 1, -1):
+        speed = speed * tau + (i - 1) * polynomial[i]
+    angle = _angle_at(polynomial, tau)
+    row = angle * (n / _TURN)
+    step.motion[0], step.motion[1] = in_mechanism(load.axis, row, step.motion[0], step.motion[1])
+    take_push(load, push, row, speed * (n / _TURN), step, step.motion)
+    since_ns = step.begin_ns - push.last_ns
+    if push.last_ns != 0 and since_ns > 1.0e9 * LONGEST_PUSH:
+        sums.gap_ns += since_ns
+    push.last_ns, up = step.begin_ns, 0.0
+    phase = phase_of(angle, sums.profile.shape[1])
+    sums.profile[0, phase] += 1.0
+    for c in range(2):
+        push.last[c] = step.motion[c]
+        sums.profile[1 + c, phase] += step.motion[c]
+        up += load.up[c] * step.motion[c]
+    sums.least = min(sums.least, up) if sums.samples else up
+    sums.largest = max(sums.largest, up) if sums.samples else up
+    sums.samples += 1
+
+
+@kernel
 def _add_torque(torque, impulse, squares, time):
     """Add a step's integrals: drive torque [N m s], its square [N^2 m^2 s], and time [s]."""
     torque.impulse += impulse
@@ -137,6 +166,7 @@ def follow(
     work,
     sensors,
     signature,
+    load,
     state,
     steps,
     first,
@@ -148,9 +178,9 @@ def follow(
 ):
     """Follow steps from index ``first`` to n; ``stepper`` is the ClearanceState, ``state`` the LegState.
 
-    ``sensors`` (1,) contains the torque sensor. Values at samples are written to ``evaluated`` (n,) from
-    index m on, contact forces [N] to ``forces`` (n, k) and eccentricities [m] to ``eccentricities`` (n, 2 k),
-    NaN while the leg does not run or does not count.
+    ``sensors`` (1,) contains the torque sensor, ``load`` the `LoadRows`. Values at samples are written to
+    ``evaluated`` (n,) from index m on, contact forces [N] to ``forces`` (n, k) and eccentricities [m] to
+    ``eccentricities`` (n, 2 k), NaN while the leg does not run or does not count.
 
     Returns
     -------
@@ -163,7 +193,11 @@ def follow(
     while i < n:
         step, code = steps[i], steps[i].code
         if motion.runs != 0:
-            until = min(step.end_ns, motion.piece_end_ns) if code == EVALUATE else motion.piece_end_ns
+            until = motion.piece_end_ns
+            if code == EVALUATE:
+                until = min(step.end_ns, until)
+            elif code == PUSH:
+                until = min(step.begin_ns, until)
             cuts = motion.cut_ns != 0 and motion.cut_ns <= until
             if cuts:
                 until = motion.cut_ns
@@ -209,6 +243,9 @@ def follow(
             for j in range(stepper.e.shape[0]):
                 eccentricities[m, j] = stepper.e[j] if is_counted else math.nan
             m += 1
+        elif code == PUSH:
+            if motion.runs != 0:
+                _push(load, leg, polynomial, step)
         elif code == START:
             return NEEDS_START, i, -1, m
         elif code == LEAVE:

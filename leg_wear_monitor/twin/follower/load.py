@@ -16,6 +16,7 @@ from leg_wear_monitor.mechanism.arrays import Floats
 from leg_wear_monitor.mechanism.ground_reaction import PHASES, upwards, with_toe_force
 from leg_wear_monitor.mechanism.ideal import one_cycle, point_motion
 from leg_wear_monitor.mechanism.position import Linkage, build_linkage
+from leg_wear_monitor.twin.follower.measured_load import force_of, load_rows, set_force
 from leg_wear_monitor.twin.settings import STANCE
 
 _TRIAL_N = 100.0
@@ -30,6 +31,8 @@ class FootLoad:
     contacts : ContactArrays
     shape : str
         Shape of the load over the gait cycle, one of `settings.LOAD_SHAPES`.
+    is_measured, is_of_foot : bool
+        Whether a measured force acts; whether it is measured along the axes of the foot.
 
     Attributes
     ----------
@@ -37,13 +40,24 @@ class FootLoad:
         Tables for the present load, changed in place.
     signature : (N + 1,) array
         Drive torque per upward load [N m/N], zeros for a mechanism without a toe.
+    rows : LoadRows
+        The measured force.
     """
 
-    def __init__(self, linkage: Linkage, contacts: ContactArrays, shape: str = STANCE) -> None:
+    def __init__(
+        self,
+        linkage: Linkage,
+        contacts: ContactArrays,
+        shape: str = STANCE,
+        is_measured: bool = False,
+        is_of_foot: bool = False,
+    ) -> None:
         self.tables = build_tables(linkage, contacts)
         self.signature = np.zeros(POINTS + 1)
         self._contacts, self._shape, self._load = contacts, shape, 0.0
         self._parts: list[tuple[NDArray[Any], ...]] = []
+        self._measured = is_measured, is_of_foot
+        self.rows = load_rows(linkage, contacts, self.tables, *self._measured)
         self._add_load(linkage)
 
     def rebuild(self, linkage: Linkage) -> None:
@@ -51,8 +65,11 @@ class FootLoad:
         load, self._load = self._load, 0.0
         for own, table in self._pairs(build_tables(linkage, self._contacts)):
             own[...] = table
+        rows = load_rows(linkage, self._contacts, self.tables, *self._measured)
         self._add_load(linkage)
         self.set(load)
+        set_force(rows, force_of(self.rows))
+        self.rows = rows
 
     def _add_load(self, linkage: Linkage) -> None:
         """Learn what a load changes, if there is a toe; the tables are those without load."""

@@ -115,9 +115,34 @@ TORQUE_SUMS = np.dtype(
 )
 """Sums over a gait cycle."""
 
+LOAD_SUMS = np.dtype(
+    [
+        ("gap_ns", "i8"),  # time in gaps between samples
+        ("samples", "i8"),
+        ("least", "f8"),  # vertical force, 0 before the first sample [N]
+        ("largest", "f8"),  # [N]
+        ("profile", "f8", (3, FINE_PHASES)),  # number, force x and y [N]
+    ]
+)
+"""Of the samples of the foot load in a gait cycle, along the axes of the mechanism."""
+
+LOAD_FILTER = np.dtype(
+    [
+        ("last_ns", "i8"),  # stamp of the last sample, 0 before the first
+        ("last", "f8", (2,)),  # its force [N]
+        ("ahead_ns", "i8"),  # stamp of the last filtered sample, 0 before the first
+        ("stages", "f8", (2, 2)),  # of the low pass, of x and y [N]
+        ("departure", "f8", (2, 2)),  # from the mean force: before the last filtered sample, and with it [N]
+        ("reaches_ns", "i8", (2,)),  # stamps at which these are right
+        ("peak_n", "f8"),  # largest vertical force of the gait cycle before
+    ]
+)
+
 LEG_STATE = np.dtype(
     [
         ("motion", LEG_MOTION),
+        ("load", LOAD_SUMS),
+        ("push", LOAD_FILTER),
         ("torque", LEG_TORQUE),
         ("low_pass", LOW_PASS),
         ("waiting", WAITING_INSTANT),

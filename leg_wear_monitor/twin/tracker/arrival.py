@@ -3,11 +3,11 @@
 import math
 
 from leg_wear_monitor.kernel import kernel
-from leg_wear_monitor.twin.kinds import CRANK, KINDS, TORQUE
+from leg_wear_monitor.twin.kinds import CRANK, KINDS, LOAD, TORQUE
 from leg_wear_monitor.twin.sample import NO_FAULT, NOT_FINITE, OUT_OF_RANGE, WRONG_TYPE, ZERO_STAMP
 
 LARGEST_RATE = 1.0e3  # largest plausible crank speed [rad/s]
-LARGEST_ANGLE, LARGEST_TORQUE = KINDS[CRANK].largest, KINDS[TORQUE].largest
+LARGEST_ANGLE, LARGEST_TORQUE, LARGEST_FORCE = (KINDS[kind].largest for kind in (CRANK, TORQUE, LOAD))
 
 
 @kernel
@@ -19,6 +19,10 @@ def find_fault(sample):
         value, largest = sample.crank_angle_rad, LARGEST_ANGLE
     elif sample.kind == TORQUE:
         value, largest = sample.torque_nm, LARGEST_TORQUE
+    elif sample.kind == LOAD:
+        value, largest = abs(sample.foot_force_n[0]), LARGEST_FORCE
+        if not value >= abs(sample.foot_force_n[1]):
+            value = abs(sample.foot_force_n[1]) + 0.0 * value  # NaN if one of them is
     else:
         return WRONG_TYPE
     if sample.stamp_ns <= 0:
@@ -52,6 +56,8 @@ def _copy_measured(source, out):
         source.torque_nm,
     )
     out.crank_angle_rad, out.crank_velocity_radps = source.crank_angle_rad, source.crank_velocity_radps
+    for i in range(2):
+        out.foot_force_n[i] = source.foot_force_n[i]
 
 
 # decisions on an arriving sample: drop it; insert it in order; insert it after a new time base

@@ -7,13 +7,15 @@ arrived, it is smoothed and the leg is advanced to it; the leg is evaluated at a
 import math
 
 from leg_wear_monitor.kernel import kernel
-from leg_wear_monitor.twin.kinds import CRANK
+from leg_wear_monitor.twin.kinds import CRANK, LOAD
 from leg_wear_monitor.twin.steps import (
+    AHEAD_NS,
     EVALUATE,
     LEAVE,
     LOST_BY_OUTLIERS,
     MOVE,
     MOVING,
+    PUSH,
     REPORT,
     REST,
     REVERSED,
@@ -32,11 +34,36 @@ IS_STOPPED, IS_STARTING, IS_IN_STEP, IS_OUT_OF_STEP = range(4)
 
 
 @kernel
+def _push(state, j, steps, n):
+    """Add the step of a queued sample of the foot load, with the one that is a filter's delay ahead."""
+    row, after, ahead = state.queue[j], -1, j
+    for k in range(j + 1, state.clock.tail):
+        other = state.queue[k]
+        if other.kind == LOAD:
+            after, ahead = k if after < 0 else after, k
+            # the filtered force is then right until the next sample
+            if other.stamp_ns >= state.queue[after].stamp_ns + AHEAD_NS:
+                break
+    n = add_step(steps, n, PUSH, row.stamp_ns, state.queue[ahead].stamp_ns, 0)
+    push = steps[n - 1]
+    push.until_next_ns = state.queue[after].stamp_ns - row.stamp_ns if after >= 0 else 0
+    for i in range(2):
+        push.motion[i], push.motion[2 + i] = row.foot_force[i], state.queue[ahead].foot_force[i]
+    return n
+
+
+@kernel
 def evaluate_up_to(state, spline_node, steps, n):
-    """Add steps that evaluate the leg at all queued samples before an index, and drop these samples."""
+    """Add steps that evaluate the leg at all queued samples before an index, and drop these samples.
+
+    Samples of the foot load push it instead; those ahead have arrived within the lag.
+    """
     clock = state.clock
     for j in range(clock.head, spline_node):
         row = state.queue[j]
+        if row.kind == LOAD:
+            n = _push(state, j, steps, n)
+            continue
         n = add_step(steps, n, EVALUATE, row.stamp_ns, row.stamp_ns, row.kind)
         steps[n - 1].torque = row.torque
     clock.head = spline_node

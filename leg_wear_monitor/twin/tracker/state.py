@@ -112,6 +112,7 @@ QUEUED = np.dtype(
         ("stamp_ns", "i8"),  # of its header
         ("kind", "i8"),  # of `twin.sample`
         ("torque", "f8"),  # of the drive [N m], NaN where absent
+        ("foot_force", "f8", (2,)),  # of samples of the foot load only [N]
         # of crank samples only; pairs are of angle and velocity
         ("step", "f8"),  # time since the previous crank sample [s]
         ("bridged", "i8"),  # 1 if that is a bridged gap

@@ -3,7 +3,7 @@
 import math
 
 from leg_wear_monitor.kernel import entry, kernel
-from leg_wear_monitor.twin.kinds import CRANK, TORQUE
+from leg_wear_monitor.twin.kinds import CRANK, LOAD, TORQUE
 from leg_wear_monitor.twin.sample import NO_FAULT
 from leg_wear_monitor.twin.steps import (
     EVALUATE,
@@ -108,6 +108,12 @@ def _follow(model, state, sample, steps, n):
             n = add_step(steps, n, EVALUATE, stamp, stamp, kind)
             steps[n - 1].torque = row.torque
             return n
+    elif kind == LOAD:
+        count.used[LOAD] += 1
+        if clock.last_crank_ns == 0:
+            return n
+        for i in range(2):
+            row.foot_force[i] = sample.foot_force_n[i]
     elif kind == CRANK:
         if clock.last_crank_ns == 0:
             _begin(model, state, sample, row)

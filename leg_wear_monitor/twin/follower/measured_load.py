@@ -1,0 +1,255 @@
+"""A measured force on the toe, at each point of the leg's tables (physics.md section 9).
+
+The tables are linear in the force at each point. A sample writes the rows that the crank passes until the
+next sample; a row that no sample reaches keeps the force of the cycle before. White noise of a sensor would
+wear an unloaded joint: 5 % of the peak nearly four times as fast as the load does (joint J under 300 N,
+samples at 200 Hz, 2026-11-25). So the mean over gait cycles acts, with the filtered departure from it.
+"""
+
+import math
+from typing import NamedTuple
+
+import attrs
+import numpy as np
+
+from leg_wear_monitor.contact.arrays import ContactArrays
+from leg_wear_monitor.dynamics.clearance.tables import COARSER, POINTS, ClearanceTables, build_tables
+from leg_wear_monitor.kernel import kernel
+from leg_wear_monitor.mechanism.arrays import Floats, Ints, Singles, body_names
+from leg_wear_monitor.mechanism.ground_reaction import upwards
+from leg_wear_monitor.mechanism.ideal import one_cycle
+from leg_wear_monitor.mechanism.position import Linkage, build_linkage
+from leg_wear_monitor.mechanism.spec import ConstantLoad
+from leg_wear_monitor.twin.follower.low_pass import pass_low
+from leg_wear_monitor.twin.steps import AHEAD_NS
+
+_TRIAL_N = 100.0
+_STAGE_S = 0.5e-9 * AHEAD_NS  # time constant of each of the two stages of the departure's filter
+LONGEST_PUSH = 0.05  # s: longest time between samples that is no gap; at twenty a second a stance has eight
+_LEARNED = 10.0  # gait cycles of the mean force
+# fractions of the peak below which a vertical force is none, and above which it is one; in gait analysis 20 to
+# 30 N are the least force of a standing foot. A jump between them would be an impact.
+_NONE, _SURE = 0.02, 0.08
+_MARGIN = COARSER  # rows beyond the next sample, of which the present rows of all tables need one
+
+
+class LoadedTable(NamedTuple):
+    """A table that the force changes: its rows (n, w), columns (c,), parts (3, n, c): bare, per x, per y."""
+
+    rows: Floats | Singles
+    columns: Ints
+    parts: Floats
+
+
+class LoadRows(NamedTuple):
+    """The force at the points of the tables, and what it changes.
+
+    Attributes
+    ----------
+    force : (N, 2) array
+        Along the axes of the mechanism [N]; (0, 2) if the force does not act.
+    axis : (N, 2) array
+        First axis of the samples' frame; the second one is a quarter turn on.
+    up : (2,) array
+        Unit vector.
+    mean : (N, 2) array
+        Mean force over gait cycles, or (0, 2) [N].
+    learned : (N,) array
+        Gait cycles in it, as far as they count.
+    motion, reaction, stored, by_e : LoadedTable
+        Those of `ClearanceTables`.
+    """
+
+    force: Floats
+    axis: Floats
+    up: Floats
+    mean: Floats
+    learned: Floats
+    motion: LoadedTable
+    reaction: LoadedTable
+    stored: LoadedTable
+    by_e: LoadedTable
+
+
+_TABLES = LoadRows._fields[5:]
+
+
+def load_rows(
+    linkage: Linkage, contacts: ContactArrays, tables: ClearanceTables, acts: bool, is_of_foot: bool
+) -> LoadRows:
+    """Rows without a force.
+
+    Parameters
+    ----------
+    linkage : Linkage
+    contacts : ContactArrays
+    tables : ClearanceTables
+        Of this linkage, which the kernels change.
+    acts : bool
+        Whether the force acts on the leg.
+    is_of_foot : bool
+        Whether the samples' frame is that of the toe's body, and not the ground's.
+    """
+    mechanism = linkage.mechanism
+    force = np.zeros((POINTS if acts and mechanism.toe else 0, 2))
+    loaded = []
+    if len(force) and mechanism.toe:
+        body, point = mechanism.toe
+        for push in ((_TRIAL_N, 0.0), (0.0, _TRIAL_N)):
+            trial = ConstantLoad(body=body, point=point, force=push)
+            pushed = attrs.evolve(mechanism, loads={**mechanism.loads, "the twin's foot load": trial})
+            loaded.append(build_tables(build_linkage(pushed), contacts))
+    parts = [
+        _loaded_table(getattr(tables, name), [getattr(other, name) for other in loaded]) for name in _TABLES
+    ]
+    axis, up = _axis(linkage, is_of_foot), upwards(mechanism)
+    return LoadRows(force, axis, up, force.copy(), np.zeros(len(force)), *parts)
+
+
+def _loaded_table(table: Floats | Singles, others: list[Floats | Singles]) -> LoadedTable:
+    rows = table.reshape(len(table), -1)  # a view
+    if not others:
+        return LoadedTable(rows[:0], np.zeros(0, np.int64), np.zeros((3, 0, 0)))
+    slopes = [(other.reshape(rows.shape).astype(float) - rows) / _TRIAL_N for other in others]
+    columns = np.flatnonzero(np.any(slopes, axis=(0, 1)))
+    parts = np.stack([rows.astype(float), *slopes])[:, :, columns]
+    return LoadedTable(rows, columns.astype(np.int64), np.ascontiguousarray(parts))
+
+
+def _axis(linkage: Linkage, is_of_foot: bool) -> Floats:
+    """First axis (N, 2) of the samples' frame."""
+    mechanism = linkage.mechanism
+    if not is_of_foot or mechanism.toe is None:
+        up = upwards(mechanism)
+        return np.tile([up[1], -up[0]], (POINTS, 1))
+    angle = one_cycle(linkage, POINTS, 1.0).q[:, body_names(mechanism).index(mechanism.toe[0]), 2]
+    return np.stack([np.cos(angle), np.sin(angle)], axis=1)
+
+
+@kernel
+def in_mechanism(axis, row, fx, fy):
+    """A force of a sample at a row of the tables, along the axes of the mechanism."""
+    i = math.floor(row + 0.5) % axis.shape[0]
+    return axis[i, 0] * fx - axis[i, 1] * fy, axis[i, 1] * fx + axis[i, 0] * fy
+
+
+@kernel
+def take_push(load, push, row, rate, step, force):
+    """Let a sample of the foot load act, ``force`` (2,) [N], at a row that changes by ``rate`` [1/s].
+
+    Three parts: the mean force by phase is learned from the rows that the crank has passed; the departure
+    from it, which is noise and what differs from step to step, is filtered; both are written into the rows up
+    to the next sample. The filter's delay is that of the sample ahead that it takes, so the force acts at its
+    time.
+    """
+    if load.force.shape[0] == 0:
+        return
+    since, until = 1.0e-9 * (step.begin_ns - push.last_ns), 1.0e-9 * step.until_next_ns
+    if push.last_ns != 0 and since <= LONGEST_PUSH:
+        _learn(load, row - rate * since, row, push.last, force)
+    _filter(load, push, row + rate * 1.0e-9 * (step.end_ns - step.begin_ns), step)
+    _write(load, push, row, rate, until if until <= LONGEST_PUSH else 0.0, step.begin_ns)
+
+
+@kernel
+def _learn(load, before, row, force_before, force):
+    """Learn the mean force of the rows after one and up to another, from the forces (2,) there."""
+    n, step = load.force.shape[0], 1 if row >= before else -1
+    first = math.floor(before) + 1 if step > 0 else math.ceil(before) - 1
+    last = math.floor(row) if step > 0 else math.ceil(row)
+    for k in range(min(step * (last - first) + 1, n)):
+        at = first + step * k
+        w, i = (at - before) / (row - before), at % n
+        load.learned[i] = min(load.learned[i] + 1.0, _LEARNED)
+        for c in range(2):
+            now = force_before[c] + w * (force[c] - force_before[c])
+            load.mean[i, c] += (now - load.mean[i, c]) / load.learned[i]
+
+
+@kernel
+def _filter(load, push, row, step):
+    """Filter the departure of the sample ahead, at a row, from the mean force."""
+    dt = 1.0e-9 * (step.end_ns - push.ahead_ns)
+    if dt <= 0.0:
+        return
+    fresh = push.ahead_ns == 0 or dt > LONGEST_PUSH
+    n, fraction, i = load.force.shape[0], 1.0 - math.exp(-dt / _STAGE_S), math.floor(row)
+    w = row - i
+    fx, fy = in_mechanism(load.axis, row, step.motion[2], step.motion[3])
+    for c in range(2):
+        mean = load.mean[i % n, c] + w * (load.mean[(i + 1) % n, c] - load.mean[i % n, c])
+        departure = pass_low(fraction, fresh, (fx if c == 0 else fy) - mean, push.stages[c])
+        push.departure[0, c] = departure if fresh else push.departure[1, c]
+        push.departure[1, c] = departure
+    push.reaches_ns[0] = (step.end_ns if fresh else push.ahead_ns) - AHEAD_NS
+    push.reaches_ns[1], push.ahead_ns = step.end_ns - AHEAD_NS, step.end_ns
+
+
+@kernel
+def _write(load, push, row, rate, until, stamp):
+    """Write the rows from one at a stamp on, over a time [s] and a few more.
+
+    Between steps the ground does not push, and it never pulls: a small force is none.
+    """
+    n, step = load.force.shape[0], 1 if rate >= 0.0 else -1
+    first = math.ceil(row) if step > 0 else math.floor(row)
+    last = math.floor(row + rate * until) if step > 0 else math.ceil(row + rate * until)
+    whole = float(push.reaches_ns[1] - push.reaches_ns[0])
+    for k in range(min(step * (last - first) + 1 + _MARGIN, n)):
+        at = first + step * k
+        passed = float(stamp - push.reaches_ns[0]) + (1.0e9 * (at - row) / rate if rate != 0.0 else 0.0)
+        w, i = min(max(passed / whole, 0.0), 1.0) if whole > 0.0 else 1.0, at % n
+        up = 0.0
+        for c in range(2):
+            departure = push.departure[0, c] + w * (push.departure[1, c] - push.departure[0, c])
+            load.force[i, c] = load.mean[i, c] + departure
+            up += load.up[c] * load.force[i, c]
+        stands = (
+            min(max((up / push.peak_n - _NONE) / (_SURE - _NONE), 0.0), 1.0) if push.peak_n > 0.0 else 1.0
+        )
+        stands = stands * stands * (3.0 - 2.0 * stands) if up > 0.0 else 0.0
+        load.force[i, 0] *= stands
+        load.force[i, 1] *= stands
+        put_row(load, i)
+
+
+@kernel
+def put_row(load, row):
+    """Set the tables at a row to its force; the first row is also the last one."""
+    fx, fy = load.force[row, 0], load.force[row, 1]
+    for i in range(2 if row == 0 else 1):
+        at = row + i * load.force.shape[0]
+        _put(load.motion, at, fx, fy)
+        _put(load.reaction, at, fx, fy)
+        _put(load.stored, at, fx, fy)
+        if at % COARSER == 0:
+            _put(load.by_e, at // COARSER, fx, fy)
+
+
+@kernel
+def _put(table, row, fx, fy):
+    for j in range(table.columns.shape[0]):
+        part = table.parts[0, row, j] + fx * table.parts[1, row, j] + fy * table.parts[2, row, j]
+        table.rows[row, table.columns[j]] = part
+
+
+def put_all(load: LoadRows) -> None:
+    """Set the tables to the force of all rows, as `put_row` does."""
+    if len(load.force):
+        fine = np.concatenate([load.force, load.force[:1]])
+        for name in _TABLES:
+            table: LoadedTable = getattr(load, name)
+            fx, fy = fine[:: COARSER if name == "by_e" else 1].T[:, :, None]
+            table.rows[:, table.columns] = table.parts[0] + fx * table.parts[1] + fy * table.parts[2]
+
+
+def force_of(load: LoadRows) -> tuple[Floats, ...]:
+    """A copy of what the samples have made of the rows."""
+    return load.force.copy(), load.mean.copy(), load.learned.copy()
+
+
+def set_force(load: LoadRows, force: tuple[Floats, ...]) -> None:
+    """Set it, and the tables with it."""
+    for own, value in zip((load.force, load.mean, load.learned), force, strict=True):
+        own[:] = value
+    put_all(load)

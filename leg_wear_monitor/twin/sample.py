@@ -124,5 +124,7 @@ def gait_samples(
 
 def brings(samples: Samples, kind: int) -> NDArray[np.bool_]:
     """Mask (n,) of the samples with a kind's value: those of the kind, and others that contain it."""
-    is_there = np.isfinite(samples[KINDS[kind].value]).reshape(len(samples), -1).all(axis=1)
+    is_there = np.isfinite(samples[KINDS[kind].value])
+    if is_there.ndim > 1:
+        is_there = is_there.all(axis=1)
     return np.asarray((samples["kind"] == kind) | is_there)

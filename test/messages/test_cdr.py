@@ -11,10 +11,18 @@ from hypothesis import strategies as st
 
 from leg_wear_monitor.messages.cdr import MESSAGE
 from leg_wear_monitor.messages.decode import Decoder
-from leg_wear_monitor.messages.streams import FLOAT64, JOINT_STATE, STREAMS, WRENCH_STAMPED
-from leg_wear_monitor.monitor.config.inputs import Crank, DriveTorque, Encoders
+from leg_wear_monitor.messages.streams import (
+    CONTACT,
+    FLOAT64,
+    JOINT_STATE,
+    LOAD_FLOAT64,
+    LOAD_WRENCH,
+    STREAMS,
+    WRENCH_STAMPED,
+)
+from leg_wear_monitor.monitor.config.inputs import Crank, DriveTorque, Encoders, FootLoad
 from leg_wear_monitor.monitor.config.settings import MonitorConfig
-from leg_wear_monitor.twin.kinds import CRANK, TORQUE
+from leg_wear_monitor.twin.kinds import CRANK, LOAD, TORQUE
 from leg_wear_monitor.twin.sample import (
     EMPTY,
     FAULTS,
@@ -231,3 +239,33 @@ def test_further_encoders_are_read_with_the_crank(
             continue
         position = float(message.position[names.index(name)])
         assert angle == sign * position if math.isfinite(position) else math.isinf(angle)
+
+
+@given(force=st.tuples(numbers, numbers, numbers), stamp_ns=stamps.filter(bool), little=st.booleans())
+def test_the_force_of_a_wrench_is_read_with_sign_and_scale(store, wrench, force, stamp_ns, little):
+    message = wrench(force=force, torque=(1.0, 2.0, 3.0), stamp_ns=stamp_ns, frame="foot")
+    raw = bytes(store.serialize_cdr(message, NAME[LOAD_WRENCH], little_endian=little))
+    config = MonitorConfig(foot_load=FootLoad(source="wrench", sign=-1, scale=1000.0))
+    ours = Decoder(config).one(raw, LOAD_WRENCH)[0]
+    assert ours["kind"] == LOAD and ours["stamp_ns"] == stamp_ns
+    assert FAULTS[ours["fault"]] == FAULTS[NO_FAULT if np.isfinite(force[:2]).all() else NOT_FINITE]
+    assert all(map(same, ours["foot_force_n"], [-1000.0 * each for each in force[:2]]))
+    assert np.isnan([ours["torque_nm"], ours["crank_angle_rad"]]).all()
+    assert Decoder(config).one(raw[:-1], LOAD_WRENCH)[0]["fault"] == UNDECODABLE
+
+
+@pytest.mark.parametrize("little", [True, False])
+def test_a_vertical_force_and_a_contact_are_read(store, little):
+    types = store.types
+    config = MonitorConfig(foot_load=FootLoad(source="float64", scale=0.5))
+    force = types[NAME[LOAD_FLOAT64]](data=600.0)
+    raw = bytes(store.serialize_cdr(force, NAME[LOAD_FLOAT64], little_endian=little))
+    ours = Decoder(config).one(raw, LOAD_FLOAT64, 7)[0]
+    assert (ours["stamp_ns"], ours["kind"], *ours["foot_force_n"]) == (7, LOAD, 0.0, 300.0)
+    config = MonitorConfig(foot_load=FootLoad(source="contact", scale=0.5))
+    for stands in (True, False):
+        raw = bytes(
+            store.serialize_cdr(types[NAME[CONTACT]](data=stands), NAME[CONTACT], little_endian=little)
+        )
+        ours = Decoder(config).one(raw + bytes(3), CONTACT, 7)[0]
+        assert (ours["stamp_ns"], ours["fault"], *ours["foot_force_n"]) == (7, NO_FAULT, 0.0, float(stands))

@@ -27,8 +27,8 @@ _TRIAL_N = 100.0
 _STAGE_S = 0.5e-9 * AHEAD_NS  # time constant of each of the two stages of the departure's filter
 LONGEST_PUSH = 0.05  # s: longest time between samples that is no gap; at twenty a second a stance has eight
 _LEARNED = 10.0  # gait cycles of the mean force
-# fractions of the peak below which a vertical force is none, and above which it is one; in gait analysis 20 to
-# 30 N are the least force of a standing foot. A jump between them would be an impact.
+# fractions of the peak below which a vertical force is none, and above which it is one; in gait analysis 20
+# to 30 N are the least force of a standing foot. A jump between them would be an impact.
 _NONE, _SURE = 0.02, 0.08
 _MARGIN = COARSER  # rows beyond the next sample, of which the present rows of all tables need one
 

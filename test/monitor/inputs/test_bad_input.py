@@ -26,7 +26,7 @@ anything = st.tuples(stamps, kinds, faults | st.just(NO_FAULT), numbers, numbers
 
 
 def block(samples):
-    return np.array([(*sample, (np.nan,) * ENCODERS) for sample in samples], GAIT_SAMPLE)
+    return np.array([(*sample, (np.nan,) * ENCODERS, (np.nan,) * 2) for sample in samples], GAIT_SAMPLE)
 
 
 def worn(monitor):

@@ -29,6 +29,7 @@ if TYPE_CHECKING:
     from leg_wear_monitor.dynamics.simulation import simulate
     from leg_wear_monitor.fleet.fleet import Fleet
     from leg_wear_monitor.fleet.overview.parts import FleetOverview, LegOverview
+    from leg_wear_monitor.life.duty import Duty
     from leg_wear_monitor.life.life import LifeRun, LifeSettings, simulate_life
     from leg_wear_monitor.life.result import Life
     from leg_wear_monitor.mechanism.drives.drive import Drive
@@ -52,6 +53,7 @@ _HOME = {
     "CommissioningItem": "commissioning.result.commissioning_result",
     "CommissioningResult": "commissioning.result.commissioning_result",
     "Drive": "mechanism.drives.drive",
+    "Duty": "life.duty",
     "EnergyBalance": "dynamics.result.parts",
     "Fleet": "fleet.fleet",
     "FleetOverview": "fleet.overview.parts",
@@ -95,6 +97,7 @@ __all__ = [
     "CommissioningResult",
     "ConfigError",
     "Drive",
+    "Duty",
     "EnergyBalance",
     "Fleet",
     "FleetOverview",

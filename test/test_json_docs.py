@@ -8,6 +8,7 @@ from collections.abc import Iterator
 from pathlib import Path
 from typing import Any
 
+import numpy as np
 import pytest
 
 sys.path.insert(0, str(Path(__file__).parent))  # as a script
@@ -18,6 +19,7 @@ from made_up_summary import made_up_summary
 
 import leg_wear_monitor as lw
 from leg_wear_monitor.commissioning.result.joint_detection import JointDetection
+from leg_wear_monitor.life.many_lives import lives_document
 from leg_wear_monitor.life.result import Life
 from leg_wear_monitor.play.result import Clearances, JointClearance, Play, PlayMeasurement
 
@@ -67,6 +69,19 @@ def life() -> Iterator[Row]:
     further = ("clearance_m", "growth_m_per_cycle")
     for name in (*further, "clearance_max_m", "worst_sector_deg", "peak_force_n"):
         yield f"joints.<joint>.{name}", "list of numbers", unit_of(name), told[name]
+    name = "part_growth_m_per_cycle"
+    words = f"{told[name].removesuffix('.')}, load by load; with a duty only."
+    yield f"joints.<joint>.{name}", "list of lists of numbers", unit_of(name), words
+    yield "duty", "object", "", "Hours a day under each load, of `--duty`; missing without one."
+    yield "duty.peak_n", "list of numbers", "N", "Largest vertical force of the ground on the toe."
+    yield "duty.hours_per_day", "list of numbers", "h", "Hours a day under each of them."
+    yield "duty.limit_m", "number", "m", "Mean radial clearance at which a joint's life ends."
+    for name, unit, words in (
+        ("cycles", "gait cycles", "When each joint, and the `leg`, reaches the limit; null if never."),
+        ("hours", "h", "The same in hours of walking."),
+        ("days", "d", "The same in days of this duty."),
+    ):
+        yield f"duty.end.<joint>.{name}", "number or null", unit, words
     yield "wear_factor.<joint>", "number", "", "Factor on the wear coefficients of this life."
     yield "further[]", "object", "", "Lives with other wear coefficients, in short."
     yield "further[].wear_factor.<joint>", "number", "", "As above."
@@ -136,7 +151,10 @@ def example(name: str) -> Any:
     if name == "replay":
         return made_up_summary().to_dict()
     if name == "life":
-        return json.loads((ROOT / "config" / "lives" / "bionic_leg.json").read_text())
+        shipped = json.loads((ROOT / "config" / "lives" / "bionic_leg.json").read_text())
+        few = lw.LifeSettings(legs=1, cycles=2, settle_cycles=0)
+        run = lw.LifeRun(lw.load_mechanism(), few, clearances=["A"], duty=lw.Duty({0.0: 1.0, 300.0: 1.0}))
+        return shipped | lives_document([(np.ones(1), run.life)] * 2, limit_m=6.0e-4)
     if name == "fleet":
         return filled_fleet().to_dict()
     if name == "play":

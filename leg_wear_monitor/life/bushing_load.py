@@ -13,7 +13,7 @@ from leg_wear_monitor.mechanism.materials.rating_life import rating_life_hours
 from leg_wear_monitor.mechanism.spec import Mechanism
 
 
-def pressure_speed(mechanism: Mechanism, life: Life, period_s: float) -> dict[str, float]:
+def pressure_speed(mechanism: Mechanism, life: Life) -> dict[str, float]:
     """Mean pressure times sliding speed [Pa m/s] of each joint when new, whether it wears or not.
 
     It is W / (2 R w) over the period, with W the integral of F_N |v_t| dt over a gait cycle.
@@ -22,14 +22,12 @@ def pressure_speed(mechanism: Mechanism, life: Life, period_s: float) -> dict[st
     ----------
     mechanism : Mechanism
     life : Life
-    period_s : float
-        Duration of a gait cycle [s].
     """
     found = {}
     for k, joint in enumerate(life.clearance_joints):
         settings = mechanism.clearances[joint]
         area_m2 = 2.0 * settings.bushing_radius * settings.width
-        found[joint] = float(life.rubbing_j_per_cycle[0, k]) / (area_m2 * period_s)
+        found[joint] = float(life.rubbing_j_per_cycle[0, k]) / (area_m2 * life.period_s)
     return found
 
 
@@ -51,9 +49,9 @@ def rating_hours(settings: Clearance, load: float) -> float | None:
     return None if constants is None else rating_life_hours(load, constants)
 
 
-def validity(mechanism: Mechanism, life: Life, period_s: float) -> dict[str, Any]:
+def validity(mechanism: Mechanism, life: Life) -> dict[str, Any]:
     """What each joint's life holds for, as ``life --json`` has it; parameters as of `pressure_speed`."""
-    loads, contacts = pressure_speed(mechanism, life, period_s), contact_doubts(mechanism, life)
+    loads, contacts = pressure_speed(mechanism, life), contact_doubts(mechanism, life)
     found = {}
     for joint in life.clearance_joints:
         settings, load = mechanism.clearances[joint], loads[joint]

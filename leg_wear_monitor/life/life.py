@@ -12,7 +12,7 @@ depends on coefficient times cycles only. See `monitor.forecast` for different c
 """
 
 from collections.abc import Callable, Sequence
-from typing import NamedTuple
+from typing import Any, NamedTuple
 
 import attrs
 import numpy as np
@@ -20,13 +20,13 @@ from numpy.typing import ArrayLike
 
 from leg_wear_monitor.configuration.quantity import described, quantity
 from leg_wear_monitor.dynamics.batch.batch import advance_batch
-from leg_wear_monitor.dynamics.batch.leg import Leg, prepare_legs
+from leg_wear_monitor.dynamics.batch.leg import Leg, prepare_legs, share_tables
 from leg_wear_monitor.dynamics.clearance.stepper import ClearanceStepper
-from leg_wear_monitor.dynamics.clearance.tables import build_tables
 from leg_wear_monitor.dynamics.run.drive import steady_drive
 from leg_wear_monitor.dynamics.run.protocol import DONE, Setup, stop
 from leg_wear_monitor.dynamics.run.run_statistics import ARCHARD, RunStatistics, new_run_statistics
 from leg_wear_monitor.errors import ConfigError, SimulationError
+from leg_wear_monitor.life.duty import Duty
 from leg_wear_monitor.life.limits import MOST_JUMPS, check_life
 from leg_wear_monitor.life.result import Life, LifePoint, life_of
 from leg_wear_monitor.mechanism.arrays import Floats
@@ -39,8 +39,10 @@ from leg_wear_monitor.wear.cycle_jump import (
     WearRate,
     jump_error,
     longest_jump,
+    mean_rate,
     next_jump,
     wear_rate,
+    weighted,
 )
 
 _TRIALS = 4  # of a jump with too large an error, before it is accepted and reported
@@ -83,9 +85,10 @@ class LifeSettings:
 
 
 class _Probe(NamedTuple):
-    """Mean of the cycles simulated at one state of wear, for `LifePoint`."""
+    """Mean of the cycles simulated at one state of wear and under all loads of the duty, for `LifePoint`."""
 
     rate: WearRate
+    part_growth_m: Floats
     archard_j: Floats
     peak_force_n: Floats
     toe_position_m: float
@@ -108,6 +111,9 @@ class LifeRun:
         Initial wear [m]; none if not given.
     workers : int
         Number of threads.
+    duty : Duty, optional
+        Loads under which the leg walks: the wear of a gait cycle is the mean over them by their hours. The
+        mechanism's own loads if not given.
 
     Attributes
     ----------
@@ -134,9 +140,11 @@ class LifeRun:
         wear_factor: ArrayLike = 1.0,
         depth: Floats | None = None,
         workers: int = 1,
+        duty: Duty | None = None,
     ) -> None:
         self.settings = settings or LifeSettings()
-        self._workers = workers
+        self._workers, self._duty = workers, duty
+        self._shares = duty.shares if duty else np.ones(1)
         check_wear_is_known(mechanism, mechanism.clearance_joints if clearances is None else clearances)
         alike = Leg(
             mechanism=mechanism,
@@ -145,7 +153,10 @@ class LifeRun:
             speed_rpm=speed_rpm,
             wear=True,
         )
-        legs = _spread_out(alike, self.settings)
+        loaded = duty.mechanisms(mechanism) if duty else [mechanism]
+        legs = [
+            leg for one in loaded for leg in _spread_out(attrs.evolve(alike, mechanism=one), self.settings)
+        ]
         self._setups = _setups(legs, wear_factor)
         first = self._setups[0]
         if not first.clearance_joints:
@@ -154,8 +165,9 @@ class LifeRun:
             )
         self.clearance_joints, self.fresh_m = first.clearance_joints, first.contacts.clearance
         self.radius_m = first.contacts.bushing_radius
-        tables = build_tables(first.linkage, first.contacts)
-        self._steppers = [ClearanceStepper(setup, tables=tables) for setup in self._setups]
+        self._steppers = [
+            ClearanceStepper(setup, tables=tables.get()) for _, setup, tables in share_tables(self._setups)
+        ]
         self._polynomials = []
         perturb_m = self.settings.perturb_fraction * float(self.fresh_m.min())
         for leg, stepper in zip(legs, self._steppers, strict=True):
@@ -164,10 +176,7 @@ class LifeRun:
         start = np.zeros_like(first.surfaces.depth) if depth is None else depth.copy()
         now = self._now = self._probe(start)
         self._wish = longest_jump(now.rate, self.settings.jump)
-        none = np.zeros_like(now.archard_j)
-        self.points = [
-            LifePoint(0.0, start, now.rate, now.peak_force_n, now.toe_position_m, none, 0.0, now.archard_j)
-        ]
+        self.points = [self._point(0.0, start, np.zeros_like(now.archard_j), 0.0)]
 
     def jump(self, most_cycles: float = np.inf) -> LifePoint:
         """Advance by one jump of at most so many gait cycles.
@@ -189,22 +198,40 @@ class LifeRun:
         depth = last.depth + 0.5 * cycles * (now.rate.depth + then.rate.depth)
         worked = last.archard_j + 0.5 * cycles * (now.archard_j + then.archard_j)
         self._now, self._wish = then, wish
-        at, peak, toe = last.cycles + cycles, then.peak_force_n, then.toe_position_m
-        self.points.append(LifePoint(at, depth, then.rate, peak, toe, worked, error, then.archard_j))
+        self.points.append(self._point(last.cycles + cycles, depth, worked, error))
         return self.points[-1]
 
     def hold(self, k: int) -> None:
         """Stop the wear of joint k, as if its part were replaced before its clearance grows further."""
         depth = self._now.rate.depth.copy()
         depth[k] = 0.0
-        self._now = self._now._replace(rate=attrs.evolve(self._now.rate, depth=depth))
+        part_growth_m = self._now.part_growth_m.copy()
+        part_growth_m[:, k] = 0.0
+        rate = attrs.evolve(self._now.rate, depth=depth)
+        self._now = self._now._replace(rate=rate, part_growth_m=part_growth_m)
         for setup in self._setups:
             setup.contacts.wear_coefficient[k] = 0.0
 
     @property
     def life(self) -> Life:
         """The life so far."""
-        return life_of(self.clearance_joints, self.fresh_m, self.points)
+        period_s = TURN / abs(self._setups[0].speed)
+        return life_of(self.clearance_joints, self.fresh_m, self.points, period_s, self._duty)
+
+    def _point(self, cycles: float, depth: Floats, archard_j: Floats, error_m: float) -> LifePoint:
+        """The present state of wear, after a jump."""
+        now = self._now
+        return LifePoint(
+            cycles=cycles,
+            depth=depth,
+            rate=now.rate,
+            peak_force_n=now.peak_force_n,
+            toe_position_m=now.toe_position_m,
+            archard_j=archard_j,
+            error_m=error_m,
+            rubbing_j_per_cycle=now.archard_j,
+            part_growth_m=now.part_growth_m,
+        )
 
     def _probe(self, depth: Floats) -> _Probe:
         """Simulate a few cycles with surfaces (k, 2, N) [m]."""
@@ -216,12 +243,25 @@ class LifeRun:
             before = [setup.surfaces.depth.copy() for setup in self._setups]
             statistics_of_all = self._advance(1)
             joints = self._setups[0].contacts.joint
-            worn += [setup.surfaces.depth - was for setup, was in zip(self._setups, before, strict=True)]
-            archard += [statistics.integral[joints, ARCHARD] for statistics in statistics_of_all]
-            peak += [statistics.peak[joints] for statistics in statistics_of_all]
-            toe += [statistics.response[0] for statistics in statistics_of_all]
-        rate = wear_rate(np.array(worn), self.settings.jump.smooth_deg)
-        return _Probe(rate, np.mean(archard, axis=0), np.mean(peak, axis=0), float(np.mean(toe)))
+            worn.append([setup.surfaces.depth - was for setup, was in zip(self._setups, before, strict=True)])
+            archard.append([statistics.integral[joints, ARCHARD] for statistics in statistics_of_all])
+            peak.append([statistics.peak[joints] for statistics in statistics_of_all])
+            toe.append([statistics.response[0] for statistics in statistics_of_all])
+        smooth_deg = self.settings.jump.smooth_deg
+        rates = [wear_rate(one, smooth_deg) for one in self._by_part(worn)]
+        return _Probe(
+            mean_rate(rates, self._shares),
+            np.array([rate.clearance for rate in rates]),
+            weighted(self._by_part(archard).mean(axis=1), self._shares),
+            self._by_part(peak).mean(axis=1).max(axis=0),
+            float(self._by_part(toe).mean(axis=1).max()),
+        )
+
+    def _by_part(self, values: list[list[Any]]) -> Floats:
+        """Values of each cycle and leg by part of the duty (parts, cycles of all its legs, ...)."""
+        of_all = np.array(values)
+        apart = of_all.reshape(len(of_all), len(self._shares), -1, *of_all.shape[2:])
+        return np.moveaxis(apart, 1, 0).reshape(len(self._shares), -1, *of_all.shape[2:])
 
     def _advance(self, cycles: int) -> list[RunStatistics]:
         joints = len(self._setups[0].linkage.mechanism.joints)

@@ -7,6 +7,7 @@ from typing import Any
 import attrs
 import numpy as np
 
+from leg_wear_monitor.life.duty import Duty
 from leg_wear_monitor.life.life import LifeRun, LifeSettings, simulate_life
 from leg_wear_monitor.life.result import Life
 from leg_wear_monitor.mechanism.arrays import Floats
@@ -26,6 +27,7 @@ def simulate_lives(
     horizon_cycles: float,
     wear_factor: float = 1.0,
     speed_rpm: float | None = None,
+    duty: Duty | None = None,
     progress: Callable[[float], None] = lambda _fraction: None,
 ) -> Iterator[tuple[Floats, Life]]:
     """Simulate lives, each with factors (k,) on its wear coefficients: the nominal life first, then others.
@@ -41,6 +43,7 @@ def simulate_lives(
     wear_factor : float
         Factor on all wear coefficients.
     speed_rpm : float, optional
+    duty : Duty, optional
     progress : callable
         Called with the completed fraction of all lives.
 
@@ -51,7 +54,7 @@ def simulate_lives(
 
     def life(index: int, factor: Floats) -> tuple[Floats, Life]:
         own = attrs.evolve(settings, seed=settings.seed + index * settings.legs)
-        run = LifeRun(mechanism, own, speed_rpm=speed_rpm, wear_factor=factor)
+        run = LifeRun(mechanism, own, speed_rpm=speed_rpm, wear_factor=factor, duty=duty)
         done = simulate_life(
             run,
             limit_m=limit_m,
@@ -88,11 +91,20 @@ def spread_factors(nominal: Life) -> Iterator[Floats]:
         yield np.asarray(fraction / fraction.max() * opened.max() / opened)
 
 
-def lives_document(lives: list[tuple[Floats, Life]]) -> dict[str, Any]:
-    """Plain object for JSON: the nominal life, and the data of the others that the forecast needs."""
+def lives_document(lives: list[tuple[Floats, Life]], limit_m: float) -> dict[str, Any]:
+    """Plain object for JSON: the nominal life, and the data of the others that the forecast needs.
+
+    With a duty, also when each joint of the nominal life reaches the limit.
+    """
     (factor, nominal), *further = lives
+    duty = (
+        {"duty": {**nominal.duty.to_dict(), "limit_m": limit_m, "end": nominal.end(limit_m)}}
+        if nominal.duty
+        else {}
+    )
     return {
         **nominal.to_dict(),
+        **duty,
         "wear_factor": _by_joint(nominal, factor),
         "further": [_short(factor, life) for factor, life in further],
     }

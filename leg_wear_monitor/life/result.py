@@ -9,6 +9,7 @@ import numpy as np
 from leg_wear_monitor.data_frame import data_frame
 from leg_wear_monitor.drawable import Drawable
 from leg_wear_monitor.json_text import json_text
+from leg_wear_monitor.life.duty import Duty
 from leg_wear_monitor.mechanism.arrays import Floats
 from leg_wear_monitor.wear.cycle_jump import WearRate
 
@@ -34,16 +35,17 @@ class LifePoint:
     rate : WearRate
         Mean wear per cycle around this time.
     peak_force_n : (k,) array
-        Largest contact force of a cycle, mean over the simulated cycles.
+        Largest contact force of a cycle, mean over the simulated cycles; of a duty the load where it is most.
     toe_position_m : float
-        Largest distance of the toe from that of the ideal linkage in a cycle, mean over the simulated cycles;
-        0 without a toe.
+        Largest distance of the toe from that of the ideal linkage in a cycle, likewise; 0 without a toe.
     archard_j : (k,) array
         Integral of ``F_N |v_t| dt`` since the life began.
     error_m : float
         Estimated error of the mean clearance in the jump to this point.
     rubbing_j_per_cycle : (k,) array
         The same integral over a gait cycle, mean over the simulated cycles.
+    part_growth_m : (parts, k) array
+        Growth of the mean clearances per cycle under each load of the duty; one part without a duty.
     """
 
     cycles: float
@@ -54,6 +56,7 @@ class LifePoint:
     archard_j: Floats
     error_m: float
     rubbing_j_per_cycle: Floats
+    part_growth_m: Floats
 
     @property
     def opened_m(self) -> Floats:
@@ -78,7 +81,7 @@ class Life(Drawable):
     worst_sector_deg : (p, k) array
         Angle of the deepest wear of the bushing, in its own frame; NaN without wear.
     peak_force_n : (p, k) array
-        Largest contact force of a cycle, mean over the simulated cycles.
+        Largest contact force of a cycle, mean over the simulated cycles; of a duty the load where it is most.
     growth_m_per_cycle : (p, k) array
         Growth of the mean clearance in a gait cycle.
     growth_error_m_per_cycle : (p, k) array
@@ -89,6 +92,12 @@ class Life(Drawable):
         Wear of bushing and journal, by sector.
     rubbing_j_per_cycle : (p, k) array
         Integral of ``F_N |v_t| dt`` over a gait cycle.
+    period_s : float
+        Duration of a gait cycle.
+    duty : Duty or None
+        Loads under which the leg walks; None: those of its mechanism alone.
+    part_growth_m_per_cycle : (p, parts, k) array
+        Growth of the mean clearance in a gait cycle under each load of the duty.
     """
 
     clearance_joints: tuple[str, ...]
@@ -102,6 +111,9 @@ class Life(Drawable):
     error_m: Floats
     depth: Floats
     rubbing_j_per_cycle: Floats
+    period_s: float
+    duty: Duty | None
+    part_growth_m_per_cycle: Floats
 
     def cycles_to(self, k: int, clearance_m: float) -> float:
         """Gait cycles at which joint k's mean clearance reaches a value; extrapolated at its last rate.
@@ -116,12 +128,31 @@ class Life(Drawable):
         rate = self.growth_m_per_cycle[-1, k]
         return float(self.cycles[-1] + (clearance_m - clearance[-1]) / rate) if rate > 0.0 else np.inf
 
+    def end(self, limit_m: float) -> dict[str, dict[str, float | None]]:
+        """When each joint, and the leg as the first of them, reaches a mean clearance.
+
+        As ``cycles``, ``hours`` of walking and, with a duty, its ``days``; None if it never does.
+        """
+        cycles = [self.cycles_to(k, limit_m) for k in range(len(self.clearance_joints))]
+        return {
+            name: self._walking(until) for name, until in zip(self.clearance_joints, cycles, strict=True)
+        } | {"leg": self._walking(min(cycles))}
+
+    def _walking(self, cycles: float) -> dict[str, float | None]:
+        hours = cycles * self.period_s / 3600.0
+        found = {"cycles": cycles, "hours": hours} | (
+            {"days": hours / self.duty.hours_per_day} if self.duty else {}
+        )
+        return {name: value if np.isfinite(value) else None for name, value in found.items()}
+
     def to_dict(self) -> dict[str, Any]:
         """Plain object for JSON, joints by name; null for an unknown sector."""
         joints = {
             joint: {name: [_plain(v) for v in getattr(self, name)[:, k].tolist()] for name in _OF_JOINTS}
             for k, joint in enumerate(self.clearance_joints)
         }
+        for k, joint in enumerate(self.clearance_joints if self.duty else ()):
+            joints[joint]["part_growth_m_per_cycle"] = self.part_growth_m_per_cycle[:, :, k].T.tolist()
         return {
             "schema_version": SCHEMA_VERSION,
             "cycles": self.cycles.tolist(),
@@ -141,7 +172,17 @@ class Life(Drawable):
             "cycles": self.cycles.tolist() * joints,
             "error_m": self.error_m.tolist() * joints,
             **{name: getattr(self, name).T.ravel().tolist() for name in _OF_JOINTS},
+            **(self._duty_columns(self.duty) if self.duty else {}),
         }
+
+    def _duty_columns(self, duty: Duty) -> dict[str, list[Any]]:
+        """Hours and days of the duty at each point, and growth under each of its loads."""
+        hours = np.tile(self.cycles, len(self.clearance_joints)) * self.period_s / 3600.0
+        growth = {
+            f"growth_{peak_n:g}_n_m_per_cycle": self.part_growth_m_per_cycle[:, part].T.ravel().tolist()
+            for part, peak_n in enumerate(duty.hours_by_peak)
+        }
+        return {"hours": hours.tolist(), "days": (hours / duty.hours_per_day).tolist(), **growth}
 
     def to_pandas(self) -> "pd.DataFrame":
         """Table of `columns`, by joint and gait cycles; requires pandas.
@@ -158,8 +199,14 @@ def _plain(value: float) -> float | None:
     return None if np.isnan(value) else value
 
 
-def life_of(clearance_joints: tuple[str, ...], fresh_m: Floats, points: Sequence[LifePoint]) -> Life:
-    """The life that consists of the given points."""
+def life_of(
+    clearance_joints: tuple[str, ...],
+    fresh_m: Floats,
+    points: Sequence[LifePoint],
+    period_s: float,
+    duty: Duty | None = None,
+) -> Life:
+    """The life that consists of the given points; parameters as in `Life`."""
     depth = np.array([point.depth for point in points])
     both, sectors = depth.sum(axis=2), depth.shape[-1]
     deepest = (depth[:, :, 0].argmax(axis=2) + 0.5) * (360.0 / sectors)
@@ -175,4 +222,7 @@ def life_of(clearance_joints: tuple[str, ...], fresh_m: Floats, points: Sequence
         error_m=np.array([point.error_m for point in points]),
         depth=depth,
         rubbing_j_per_cycle=np.array([point.rubbing_j_per_cycle for point in points]),
+        period_s=period_s,
+        duty=duty,
+        part_growth_m_per_cycle=np.array([point.part_growth_m for point in points]),
     )

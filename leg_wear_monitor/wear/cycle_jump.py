@@ -6,6 +6,7 @@ end, then the mean of the rates at both ends. The difference of both rates beyon
 """
 
 import math
+from collections.abc import Sequence
 
 import attrs
 import numpy as np
@@ -73,6 +74,17 @@ def wear_rate(worn: Floats, smooth_deg: float) -> WearRate:
     growth = worn.mean(axis=3).sum(axis=2)
     scatter = growth.std(axis=0, ddof=1) / math.sqrt(len(worn)) if len(worn) > 1 else np.abs(growth[0])
     return WearRate(smoothed(worn.mean(axis=0), smooth_deg), np.asarray(scatter))
+
+
+def mean_rate(rates: Sequence[WearRate], shares: Floats) -> WearRate:
+    """Wear per cycle of a leg that walks a share (n,) of its cycles with each of n rates."""
+    variance = weighted(np.array([rate.scatter for rate in rates]) ** 2, shares**2)
+    return WearRate(weighted(np.array([rate.depth for rate in rates]), shares), np.sqrt(variance))
+
+
+def weighted(values: Floats, shares: Floats) -> Floats:
+    """Sum (...) of the values (n, ...) times their shares (n,)."""
+    return np.asarray(np.tensordot(shares, values, axes=1))
 
 
 def smoothed(profile: Floats, width_deg: float) -> Floats:

@@ -2,6 +2,7 @@
 
 import json
 import re
+from pathlib import Path
 
 import pytest
 
@@ -77,6 +78,23 @@ def test_life_tells_regime_limits_and_the_makers_own_life(run, shipped, tmp_path
     assert told in result.stdout  # the formula knows nothing of a coefficient
 
 
+def test_life_under_a_duty_tells_hours_days_and_growth_by_load(run):
+    few = ("--clearances", "A,G", "--legs", "1", "--cycles", "2", "--limit-m", "3.1e-4")
+    result = run("life", *few, "--duty", "0:2,600:6", "--json", "life.json")
+    assert result.exit_code == 0
+    assert re.search(
+        r"growth when new \[µm a million gait cycles\] +A +G\n0 N, 2 h a day +\S+ +\S+\n", result.stdout
+    )
+    assert "600 N, 6 h a day" in result.stdout
+    found = json.loads(Path("life.json").read_text())["duty"]
+    assert (found["peak_n"], found["hours_per_day"], found["limit_m"]) == ([0.0, 600.0], [2.0, 6.0], 3.1e-4)
+    for name, end in found["end"].items():
+        assert f"{name} reaches 310 µm after {end['cycles']:.3g} gait cycles" in result.stdout
+        assert f"{end['hours']:.3g} h, {end['days']:.3g} days of 8 h" in result.stdout
+        assert (end["hours"], end["days"]) == pytest.approx((end["cycles"] / 3600.0, end["cycles"] / 28800.0))
+    assert found["end"]["leg"] == min((found["end"][joint] for joint in "AG"), key=lambda end: end["cycles"])
+
+
 def test_life_refuses_what_cannot_be(run):
     assert run(*ONE, "--limit-m", "-1").exit_code == 2
     assert run(*ONE, "--clearances", "Z").exit_code == 2
@@ -92,6 +110,7 @@ def test_life_refuses_what_cannot_be(run):
             "--opens-m 1e-15",
             "--opens-m: 1e-15 m a jump takes 4e+11 jumps to the limit, expected at most 10000",
         ),
+        ("--duty 300", "--duty: '300' is not N:hours a day, expected such as 0:2,300:5,600:1"),
     ],
 )
 def test_a_life_that_would_not_end_is_refused_before_it_begins(run, monkeypatch, options, said):

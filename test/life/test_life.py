@@ -49,7 +49,7 @@ def test_p_v_is_the_archard_integral_over_area_and_period(leg, lived):
     """Over the first jump; the growth of the clearance is k W / (2 pi R w), counted apart."""
     run, life = lived
     rubbing = life.rubbing_j_per_cycle[:2].mean(axis=0, keepdims=True)
-    found = pressure_speed(leg, attrs.evolve(life, rubbing_j_per_cycle=rubbing), 0.5)
+    found = pressure_speed(leg, attrs.evolve(life, rubbing_j_per_cycle=rubbing, period_s=0.5))
     wear = np.array([sum(leg.clearances[joint].wear_coefficient) for joint in found])
     by_growth = np.pi * life.growth_m_per_cycle[:2].mean(axis=0) / (0.5 * wear)
     np.testing.assert_allclose(list(found.values()), by_growth, rtol=2e-3)

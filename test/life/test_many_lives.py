@@ -8,7 +8,6 @@ import pytest
 
 from leg_wear_monitor.life.life import LifeRun, LifeSettings
 from leg_wear_monitor.life.many_lives import LEAST_FRACTION, spread_factors
-from leg_wear_monitor.life.result import life_of
 
 
 @pytest.fixture(scope="module")
@@ -53,4 +52,4 @@ def test_a_joint_that_is_held_wears_no_further_and_the_other_goes_on(begun):
     now = begun.jump().opened_m
     assert now[0] == was[0]
     assert now[1] > was[1]
-    assert life_of(begun.clearance_joints, begun.fresh_m, begun.points).growth_m_per_cycle[-1, 0] == 0.0
+    assert begun.life.growth_m_per_cycle[-1, 0] == 0.0

@@ -34,7 +34,7 @@ def life():
         clearance_joints=("A",), cycles=np.array([0.0, 1e6]), clearance_m=column,
         clearance_max_m=2.0 * column, worst_sector_deg=column, peak_force_n=column, growth_m_per_cycle=column,
         growth_error_m_per_cycle=column, error_m=np.zeros(2), depth=depth,
-        rubbing_j_per_cycle=column,
+        rubbing_j_per_cycle=column, period_s=1.0, duty=None, part_growth_m_per_cycle=column[:, None],
     )  # fmt: skip
 
 

@@ -63,6 +63,12 @@ _ROWS = 12  # of the table
     help="Factor on all wear coefficients.",
 )
 @click.option(
+    "--duty",
+    metavar="N:H,...",
+    help="Hours a day at each peak of the ground's vertical force on the toe [N], such as 0:2,300:5,600:1. "
+    "[default: the mechanism's own loads]",
+)
+@click.option(
     "--opens-m",
     type=float,
     callback=bounded("m", above=0.0),
@@ -105,8 +111,7 @@ def life(mechanism: str, json_file: Path | None, out: Path | None, **options: An
         lives = _lives(leg, **options)
     warn_of(leg.source, doubts(leg))  # what fails names them itself, in its one line
     result = lives[0][1]
-    period_s = _period_s(leg, options["speed_rpm"])
-    text = json_text(_document(leg, lives, period_s))
+    text = json_text(_document(leg, lives, options["limit_m"]))
     written = write_json(json_file, text)
     if out is not None:
         from leg_wear_monitor.report.figures.life_picture import life_picture
@@ -114,8 +119,8 @@ def life(mechanism: str, json_file: Path | None, out: Path | None, **options: An
         files = {"life.json": text.encode(), "life.png": life_picture(result)}
         written += write_directory(out, files)
     if json_file != STDOUT:
-        told = [*lines(result, options["limit_m"], period_s, _not_counted(leg)), *_validity(leg, result)]
-        told += _loads(leg, result, period_s)
+        told = [*lines(result, options["limit_m"], _not_counted(leg)), *_validity(leg, result)]
+        told += _loads(leg, result)
         for line in [*told, *(f"written: {path}" for path in written)]:
             click.echo(line)
 
@@ -129,11 +134,12 @@ def _with_clearance_joints(leg: "Mechanism", names: str | None) -> "Mechanism":
     )
 
 
-def _lives(leg: "Mechanism", lives: int, opens_m: float | None, **options: Any) -> "Lives":
+def _lives(leg: "Mechanism", lives: int, opens_m: float | None, duty: str | None, **options: Any) -> "Lives":
     import attrs
     import numpy as np
 
     from leg_wear_monitor.contact.arrays import clearance_settings
+    from leg_wear_monitor.life.duty import Duty
     from leg_wear_monitor.life.life import LifeSettings
     from leg_wear_monitor.life.limits import check_life
     from leg_wear_monitor.life.many_lives import simulate_lives
@@ -144,15 +150,16 @@ def _lives(leg: "Mechanism", lives: int, opens_m: float | None, **options: Any) 
     settings = LifeSettings(**given)
     if opens_m is not None:
         settings = attrs.evolve(settings, jump=JumpControl.of(opens_m))
+    loads = None if duty is None else Duty.parse(duty)
     own = clearance_settings(leg, leg.clearance_joints)
     check_wear_is_known(leg, leg.clearance_joints)  # before any compilation
     fresh_m, radius_m = np.array([[c.radial_clearance, c.bushing_radius] for c in own]).reshape(-1, 2).T
     check_life(leg.clearance_joints, fresh_m, radius_m, options["limit_m"], settings.jump)
     with compilation("clearance"), progress_bar("life") as progress:
-        return list(simulate_lives(leg, settings, lives, progress=progress, **options))
+        return list(simulate_lives(leg, settings, lives, progress=progress, duty=loads, **options))
 
 
-def _document(leg: "Mechanism", lives: "Lives", period_s: float) -> dict[str, Any]:
+def _document(leg: "Mechanism", lives: "Lives", limit_m: float) -> dict[str, Any]:
     """Lives, bound to the leg that they are of."""
     from leg_wear_monitor.life.bushing_load import validity
     from leg_wear_monitor.life.many_lives import lives_document
@@ -161,8 +168,8 @@ def _document(leg: "Mechanism", lives: "Lives", period_s: float) -> dict[str, An
     return {
         "mechanism": leg.name,
         "fingerprint": fingerprint(leg),
-        "validity": validity(leg, lives[0][1], period_s),
-        **lives_document(lives),
+        "validity": validity(leg, lives[0][1]),
+        **lives_document(lives, limit_m),
     }
 
 
@@ -181,21 +188,21 @@ def _not_counted(leg: "Mechanism") -> list[str]:
     return [joint for joint in leg.clearance_joints if lacks_wear(leg.clearances[joint])]
 
 
-def _loads(leg: "Mechanism", result: "Life", period_s: float) -> list[str]:
+def _loads(leg: "Mechanism", result: "Life") -> list[str]:
     """What p v of the new leg is beyond, the makers' own life of their bushings, and contacts too wide."""
     from leg_wear_monitor.life.bushing_load import contact_doubts, pressure_speed, rating_hours
     from leg_wear_monitor.mechanism.materials.load import bushing_of
     from leg_wear_monitor.mechanism.materials.loader import load_material
 
     told = []
-    for joint, load in pressure_speed(leg, result, period_s).items():
+    for joint, load in pressure_speed(leg, result).items():
         settings = leg.clearances[joint]
         beyond = bushing_of(leg, joint).loaded(0.0, 0.0, 0.0, load).outside_limits
         told += [f"{joint}: {beyond}"] if beyond else []
         hours = rating_hours(settings, load)
         if hours is not None:
             constants = load_material(settings.material).rating_life
-            told.append(f"{joint}: maker's rating life {_rated(hours, load, period_s, constants)}")
+            told.append(f"{joint}: maker's rating life {_rated(hours, load, result.period_s, constants)}")
     return told + [f"{joint}: {doubt}" for joint, doubt in contact_doubts(leg, result).items()]
 
 
@@ -214,15 +221,7 @@ def _rated(hours: float, load: float, period_s: float, constants: "RatingLife | 
     )
 
 
-def _period_s(leg: "Mechanism", speed_rpm: float | None) -> float:
-    """Duration of a gait cycle [s]."""
-    from leg_wear_monitor.dynamics.simulation import prepare
-    from leg_wear_monitor.mechanism.ideal import TURN
-
-    return TURN / abs(prepare(leg, speed_rpm=speed_rpm).speed)
-
-
-def lines(result: "Life", limit_m: float, period_s: float, not_counted: Sequence[str] = ()) -> list[str]:
+def lines(result: "Life", limit_m: float, not_counted: Sequence[str] = ()) -> list[str]:
     """The life as a table, and when each joint reaches the limit."""
     points = len(result.cycles)
     shown = sorted({round(i * (points - 1) / max(1, _ROWS - 1)) for i in range(min(_ROWS, points))})
@@ -239,13 +238,25 @@ def lines(result: "Life", limit_m: float, period_s: float, not_counted: Sequence
         )
         table.append(f"{result.cycles[i]:10.3g}{cells}")
     table.append(f"jumps: {points - 1}; largest error of one: {1e6 * result.error_m.max():.2g} µm")
-    for k, joint in enumerate(result.clearance_joints):
+    if result.duty:
+        table += _growth_by_load(result)
+    ends = result.end(limit_m)
+    for joint in (*result.clearance_joints, *(["leg"] if result.duty else [])):
         if joint in not_counted:
             table.append(f"{joint} not counted: its pair gives no wear coefficient")
         else:
-            table.append(
-                f"{joint} {_end(result.cycles_to(k, limit_m), limit_m, result.cycles[-1], period_s)}"
-            )
+            table.append(f"{joint} {_end(result, ends[joint], limit_m)}")
+    return table
+
+
+def _growth_by_load(result: "Life") -> list[str]:
+    """Growth of each joint when new under each load of the duty."""
+    table = [
+        "growth when new [µm a million gait cycles]" + "".join(f"{j:>10}" for j in result.clearance_joints)
+    ]
+    for part, (peak_n, hours) in enumerate(result.duty.hours_by_peak.items() if result.duty else ()):
+        growth = 1e12 * result.part_growth_m_per_cycle[0, part]
+        table.append(f"{f'{peak_n:g} N, {hours:g} h a day':42}" + "".join(f"{one:10.3g}" for one in growth))
     return table
 
 
@@ -253,10 +264,11 @@ def _degrees(sector_deg: float) -> str:
     return "-" if math.isnan(sector_deg) else f"{sector_deg:.0f}"
 
 
-def _end(cycles: float, limit_m: float, simulated: float, period_s: float) -> str:
+def _end(result: "Life", end: dict[str, float | None], limit_m: float) -> str:
     """When a joint reaches its limit."""
-    if math.isinf(cycles):
+    if end["cycles"] is None:
         return f"does not reach {1e6 * limit_m:g} µm: at its last rate, its clearance does not grow"
-    hours = cycles * period_s / 3600.0
-    held = "" if cycles <= simulated else ", extrapolated at its last rate"
-    return f"reaches {1e6 * limit_m:g} µm after {cycles:.3g} gait cycles, {hours:.3g} h{held}"
+    days = f", {end['days']:.3g} days of {result.duty.hours_per_day:g} h" if result.duty else ""
+    held = "" if end["cycles"] <= result.cycles[-1] else ", extrapolated at its last rate"
+    after = f"{end['cycles']:.3g} gait cycles, {end['hours']:.3g} h{days}"
+    return f"reaches {1e6 * limit_m:g} µm after {after}{held}"

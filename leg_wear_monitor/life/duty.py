@@ -45,8 +45,9 @@ class Duty:
 
     Examples
     --------
-    >>> duty = Duty({0.0: 2.0, 300.0: 5.0, 600.0: 1.0})
-    >>> duty == Duty.parse("0:2,300:5,600:1"), duty.hours_per_day
+    >>> import leg_wear_monitor as lw
+    >>> duty = lw.Duty({0.0: 2.0, 300.0: 5.0, 600.0: 1.0})
+    >>> duty == lw.Duty.parse("0:2,300:5,600:1"), duty.hours_per_day
     (True, 8.0)
     """
 

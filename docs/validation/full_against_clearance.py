@@ -1,6 +1,6 @@
 """Print the tables of validation_clearance.md on means: clearance against full coordinates.
 
-Twenty-four cases, ten independent runs of twenty cycles in each model: about ten minutes on two cores.
+Twenty-seven cases, ten independent runs of twenty cycles in each model: about twelve minutes on two cores.
 """
 
 import argparse
@@ -16,10 +16,13 @@ import numpy as np
 from leg_wear_monitor import Mechanism, SimulationResult, load_mechanism, simulate
 from leg_wear_monitor.dynamics.batch.batch import simulate_batch
 from leg_wear_monitor.dynamics.batch.leg import Leg
+from leg_wear_monitor.mechanism.ground_reaction import nominal_stance, with_toe_force
+from leg_wear_monitor.mechanism.position import build_linkage
 
 LEGS = ("bionic_leg", "jansen_leg")
 SPEEDS_RPM = (30.0, 60.0, 90.0)
 SETS = ("AB", "G", "IJ", "ABGIJ")
+LOADS_N = (0.0, 300.0, 600.0)
 SKIPPED = 2.0  # cycles of each run before counting begins
 WORKERS = 2
 APART = 1.0e-9  # m: what the clearances of two runs differ by, enough to make them two samples of the chaos
@@ -35,11 +38,15 @@ ZONE = "90 % of the wear, from and to [deg]"
 
 
 class Samples(NamedTuple):
-    """Of n runs: ``joints`` (n, k, 5) `FIGURES`, ``zone`` (n, k, 2) of wear [deg], ``torque`` (n,) RMS."""
+    """Of n runs: ``joints`` (n, k, 5) `FIGURES`, ``zone`` (n, k, 2) of wear [deg], ``torque`` (n,) RMS [N m],
+    ``loss`` (n,) of energy in contacts and friction [J/cycle], ``residual`` (n,) of its balance over it.
+    """
 
     joints: np.ndarray
     zone: np.ndarray
     torque: np.ndarray
+    loss: np.ndarray
+    residual: np.ndarray
 
 
 class Comparison(NamedTuple):
@@ -97,7 +104,14 @@ class Case(NamedTuple):
             for result in results
         ]
         zones = [[result.joints[name].wear_zone_deg for name in self.clearance_joints] for result in results]
-        return Samples(np.array(joints), np.array(zones), np.array([r.drive_torque_nm.rms for r in results]))
+        loss = np.array([r.energy_j.friction_loss + r.energy_j.contact_loss for r in results])
+        return Samples(
+            np.array(joints),
+            np.array(zones),
+            np.array([r.drive_torque_nm.rms for r in results]),
+            loss / np.array([r.cycles for r in results]),
+            np.array([r.energy_j.residual for r in results]) / loss,
+        )
 
 
 def row(*cells: str) -> None:
@@ -161,6 +175,30 @@ def sets_of(name: str, runs: int, cycles: int) -> Iterator[Comparison]:
     yield from torques.values()
 
 
+def on_the_ground(runs: int, cycles: int) -> Iterator[Comparison]:
+    """Tables of the leg with a stance of several sizes; yields every comparison."""
+    leg = load_mechanism("bionic_leg")
+    force, energy = nominal_stance(build_linkage(leg)).force(), []
+    print(f"\n### On the ground: {leg.name}, 60 rpm\n")
+    table("vertical peak [N]", "joint", *FIGURES.values(), ZONE)
+    for load_n in LOADS_N:
+        case = Case(with_toe_force(leg, load_n * force), SETS[-1], 60.0)
+        full, other = case.full(runs, cycles), case.clearance(runs, cycles)
+        for k, joint in enumerate(case.clearance_joints):
+            figures = [compare(full.joints[:, k, i], other.joints[:, k, i]) for i in range(len(FIGURES))]
+            ends = compare_ends(full.zone[:, k], other.zone[:, k])
+            row(f"{load_n:.0f}", joint, *map(cell, figures, (2, 2, 0, 3, 4)), zone_cell(ends))
+            yield from [*figures, *ends]
+        energy.append((load_n, full, other))
+    print("\nDrive and energy:\n")
+    table("vertical peak [N]", "RMS torque [N m]", "loss [J/cycle]", "residual, full", "residual, clearance")
+    for load_n, full, other in energy:
+        torque, loss = compare(full.torque, other.torque), compare(full.loss, other.loss)
+        worst = (f"{np.abs(one.residual).max():.0e}" for one in (full, other))
+        row(f"{load_n:.0f}", cell(torque, 3), cell(loss, 3), *worst)
+        yield from [torque, loss]
+
+
 def summary(comparisons: list[Comparison]) -> None:
     fraction, errors = (
         np.abs([one.fraction for one in comparisons]),
@@ -190,6 +228,11 @@ if __name__ == "__main__":
     parser = argparse.ArgumentParser(description=__doc__)
     parser.add_argument("--runs", type=int, default=10, help="independent runs of each case")
     parser.add_argument("--cycles", type=int, default=20, help="counted cycles of each run")
+    parser.add_argument("--ground", action="store_true", help="only the leg on the ground")
     options = parser.parse_args()
+    ground = list(on_the_ground(options.runs, options.cycles))
+    if options.ground:
+        summary(ground)
+        raise SystemExit
     summary([one for name in LEGS for one in sets_of(name, options.runs, options.cycles)])
     by_clearance(options.runs, options.cycles)

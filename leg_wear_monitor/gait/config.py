@@ -147,6 +147,13 @@ class LoadConfig:
     friction_nm: float = quantity(
         "N m", "friction of the drive, against its motion", at_least=0.0, default=0.0
     )
+    person_kg: float = quantity(
+        "kg",
+        "mass of a person one of whose legs hangs on thigh, shank and foot",
+        at_least=0.0,
+        at_most=300.0,
+        default=0.0,
+    )
     ground_n: float = quantity(
         "N",
         "largest vertical force of the ground on the toe in stance, mean over steps; 0 in the air",

@@ -20,6 +20,7 @@ from leg_wear_monitor.mechanism.arrays import Floats, body_names
 from leg_wear_monitor.mechanism.ground_reaction import GROUND, with_toe_force
 from leg_wear_monitor.mechanism.ideal import TURN, one_cycle, point_motion
 from leg_wear_monitor.mechanism.loader import load_mechanism
+from leg_wear_monitor.mechanism.person import with_person
 from leg_wear_monitor.mechanism.position import build_linkage
 from leg_wear_monitor.mechanism.spec import Mechanism, RevoluteJoint, SpeedDrive
 
@@ -60,7 +61,7 @@ class SyntheticLeg:
     """
 
     def __init__(self, config: GaitConfig) -> None:
-        mechanism = load_mechanism(config.mechanism)
+        mechanism = with_person(load_mechanism(config.mechanism), config.load.person_kg)
         if not isinstance(mechanism.drive, SpeedDrive):
             raise ConfigError(mechanism.source, "drive", "is a torque; a gait needs a crank driven by speed")
         self._pace = Pace(config.pace)

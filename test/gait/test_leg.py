@@ -96,6 +96,10 @@ def test_a_knock_opens_one_joint_at_its_time() -> None:
         ),
         ({"knock": KnockConfig(joint="C")}, "gait: knock.joint: 'C' is none of A, B, G, I, J"),
         ({"mechanism": "no_leg"}, "no_leg: no mechanism of this name"),
+        (
+            {"mechanism": "four_bar", "load": LoadConfig(person_kg=80.0)},
+            "four_bar.yaml: bodies: has no thigh",
+        ),
         ({"mechanism": "slider_crank", "load": LoadConfig(toe_force_n=1.0)}, "gait: load.toe_force_n: slid"),
     ],
 )

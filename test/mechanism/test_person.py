@@ -1,0 +1,56 @@
+"""A person's leg on a linkage: masses and moments of inertia by hand, and its weight on the drive."""
+
+import numpy as np
+import pytest
+
+from leg_wear_monitor import ConfigError, load_mechanism
+from leg_wear_monitor.mechanism.ideal import TURN, one_cycle
+from leg_wear_monitor.mechanism.person import with_person
+from leg_wear_monitor.mechanism.position import build_linkage
+
+pytestmark = pytest.mark.plain
+
+LEG = load_mechanism("bionic_leg")
+
+
+def test_a_sixth_of_the_body_hangs_on_the_leg() -> None:
+    before, after = (sum(body.mass for body in leg.bodies.values()) for leg in (LEG, with_person(LEG, 80.0)))
+    assert after - before == pytest.approx(0.161 * 80.0)
+
+
+def test_the_thigh_by_hand() -> None:
+    """3.5 kg at 0.18 m of 0.42 m, and 8 kg at 0.433 of it with a radius of gyration of 0.323 of it."""
+    thigh, length = with_person(LEG, 80.0).bodies["thigh"], 0.42
+    com = (3.5 * 0.18 + 8.0 * 0.433 * length) / 11.5
+    inertia = 0.059062 + 3.5 * (com - 0.18) ** 2
+    inertia += 8.0 * ((0.323 * length) ** 2 + (0.433 * length - com) ** 2)
+    assert thigh.com == pytest.approx((com, 0.0))
+    assert thigh.inertia == pytest.approx(inertia)
+
+
+def test_the_drive_holds_the_weight_of_the_segments() -> None:
+    """Standing, by virtual work: torque against gravity is m g dy/dtheta of each segment's centre of mass."""
+    slow = 1.0e-4 * TURN
+    plain, carrying = (one_cycle(build_linkage(leg), 256, slow) for leg in (LEG, with_person(LEG, 80.0)))
+    expected = np.zeros(256)
+    for name, mass, upper, lower, centre in (
+        ("thigh", 8.0, "B", "G", 0.433), ("shank", 3.72, "G", "I", 0.433), ("foot", 1.16, "I", "toe", 0.5),
+    ):  # fmt: skip
+        body = LEG.bodies[name]
+        i = 1 + list(LEG.bodies).index(name)
+        own = np.array(body.points[upper])
+        own = own + centre * (np.array(body.points[lower]) - own) - np.array(body.com)
+        angle = plain.q[:, i, 2]
+        height = plain.q[:, i, 1] + np.sin(angle) * own[0] + np.cos(angle) * own[1]
+        expected += 9.81 * mass * np.gradient(np.append(height[-1:], np.append(height, height[0])))[1:-1]
+    expected /= TURN / 256
+    assert carrying.drive_torque - plain.drive_torque == pytest.approx(expected, abs=2e-3 * np.ptp(expected))
+
+
+def test_nobody_is_no_change() -> None:
+    assert with_person(LEG, 0.0) is LEG
+
+
+def test_a_linkage_without_these_bodies_is_refused_in_a_line() -> None:
+    with pytest.raises(ConfigError, match=r"four_bar.yaml: bodies: has no thigh, shank and foot"):
+        with_person(load_mechanism("four_bar"), 80.0)

@@ -39,7 +39,8 @@ ZONE = "90 % of the wear, from and to [deg]"
 
 class Samples(NamedTuple):
     """Of n runs: ``joints`` (n, k, 5) `FIGURES`, ``zone`` (n, k, 2) of wear [deg], ``torque`` (n,) RMS [N m],
-    ``loss`` (n,) of energy in contacts and friction [J/cycle], ``residual`` (n,) of its balance over it.
+    and, but for a batch, ``loss`` (n,) of energy in contacts and friction [J/cycle], and ``residual`` (n,) of
+    the balance over it.
     """
 
     joints: np.ndarray
@@ -69,7 +70,7 @@ class Case(NamedTuple):
     rpm: float
     clearance_m: float = 3.0e-4
 
-    def full(self, runs: int, cycles: int) -> Samples:
+    def simulated(self, runs: int, cycles: int, model: str = "full") -> Samples:
         """Runs whose clearances are APART."""
 
         def run(i: int) -> SimulationResult:
@@ -80,7 +81,7 @@ class Case(NamedTuple):
                 speed_rpm=self.rpm,
                 cycles=cycles,
                 skip_cycles=SKIPPED,
-                model="full",
+                model=model,
             )
 
         with ThreadPoolExecutor(WORKERS) as pool:
@@ -104,13 +105,14 @@ class Case(NamedTuple):
             for result in results
         ]
         zones = [[result.joints[name].wear_zone_deg for name in self.clearance_joints] for result in results]
-        loss = np.array([r.energy_j.friction_loss + r.energy_j.contact_loss for r in results])
+        energy = [r.energy_j for r in results if r.energy_j]  # a batch counts none
+        loss = np.array([each.friction_loss + each.contact_loss for each in energy])
         return Samples(
             np.array(joints),
             np.array(zones),
             np.array([r.drive_torque_nm.rms for r in results]),
-            loss / np.array([r.cycles for r in results]),
-            np.array([r.energy_j.residual for r in results]) / loss,
+            loss / results[0].cycles,
+            np.array([each.residual for each in energy]) / loss,
         )
 
 
@@ -160,7 +162,7 @@ def sets_of(name: str, runs: int, cycles: int) -> Iterator[Comparison]:
     table("clearance_joints", "rpm", "joint", *FIGURES.values(), ZONE)
     for clearance_joints, rpm in product(SETS, SPEEDS_RPM):
         case = Case(mechanism, clearance_joints, rpm)
-        full, other = case.full(runs, cycles), case.clearance(runs, cycles)
+        full, other = case.simulated(runs, cycles), case.clearance(runs, cycles)
         torques[clearance_joints, rpm] = compare(full.torque, other.torque)
         for k, joint in enumerate(clearance_joints):
             figures = [compare(full.joints[:, k, i], other.joints[:, k, i]) for i in range(len(FIGURES))]
@@ -183,7 +185,7 @@ def on_the_ground(runs: int, cycles: int) -> Iterator[Comparison]:
     table("vertical peak [N]", "joint", *FIGURES.values(), ZONE)
     for load_n in LOADS_N:
         case = Case(with_toe_force(leg, load_n * force), SETS[-1], 60.0)
-        full, other = case.full(runs, cycles), case.clearance(runs, cycles)
+        full, other = (case.simulated(runs, cycles, model) for model in ("full", "clearance"))
         for k, joint in enumerate(case.clearance_joints):
             figures = [compare(full.joints[:, k, i], other.joints[:, k, i]) for i in range(len(FIGURES))]
             ends = compare_ends(full.zone[:, k], other.zone[:, k])
@@ -218,7 +220,7 @@ def by_clearance(runs: int, cycles: int) -> None:
     table("clearance [mm]", "joint", *FIGURES.values())
     for clearance_m in (1.0e-4, 2.0e-4, 2.9e-4, 3.0e-4, 3.1e-4, 4.0e-4):
         case = Case(load_mechanism("jansen_leg"), "IJ", 30.0, clearance_m)
-        full, other = case.full(runs, cycles), case.clearance(runs, cycles)
+        full, other = case.simulated(runs, cycles), case.clearance(runs, cycles)
         for k, joint in enumerate("IJ"):
             figures = [compare(full.joints[:, k, i], other.joints[:, k, i]) for i in range(len(FIGURES))]
             row(f"{1e3 * clearance_m:g}", joint, *map(cell, figures, (2, 2, 0, 3, 4)))

@@ -25,6 +25,11 @@ TINY = {
         "friction_coefficients": [0.1],
     },
     "lubrication": {"joints": ["I", "J"], "viscosities_pa_s": [0.003, 1.0]},
+    "load": {
+        "joints": ["G"], "loads_n": [0, 300],
+        "life": {"opens_m": 5.0e-6, "jump_m": 1.0e-5, "cycles": 2, "runs": 2},
+        "exponent": {"runs": 2, "cycles": 10, "renewals": 16},
+    },
     "legs": {"legs": 1, "draw_seed": 3},
     "wear": {
         "sets": [["I", "J"]],

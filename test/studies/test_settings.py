@@ -8,7 +8,7 @@ from leg_wear_monitor.cli.verbs.study import NAMES
 from leg_wear_monitor.errors import ConfigError
 from leg_wear_monitor.studies.plan.settings import STUDIES, load_settings, parse_settings
 from leg_wear_monitor.studies.tasks.compute import TASKS
-from leg_wear_monitor.studies.tasks.ensemble import check_points
+from leg_wear_monitor.studies.tasks.ensemble import check_points, ensemble
 
 pytestmark = pytest.mark.plain
 
@@ -84,6 +84,7 @@ def test_studies_cover_what_was_asked():
             "viscosities_pa_s: [1.0, 0.1] does",
         ),
         ("lubrication", {"joints": ["A"], "viscosities_pa_s": [0.0]}, "viscosities_pa_s: 0.0 is not above 0"),
+        ("load", {"joints": ["A"], "loads_n": [300, 100]}, "loads_n: [300.0, 100.0] does not rise"),
         ("laws", {"joints": ["A"], "normal_laws": ["hooke"]}, "normal_laws: 'hooke' is not one of hertz,"),
     ],
 )
@@ -111,3 +112,12 @@ def test_a_key_depends_on_all_that_the_result_depends_on_and_nothing_else(tiny):
     assert attrs.evolve(point, task="section").key(leg) != key
     for name in point.settings:
         assert attrs.evolve(point, settings={**point.settings, name: 99}).key(leg) != key
+
+
+def test_a_load_is_on_the_leg_of_its_response_its_life_and_its_exponent(tiny):
+    points = tiny("load", joints=["G"], loads_n=[0.0, 300.0]).points()
+    assert [point.task for point in points] == ["response", "life", "exponent"] * 2
+    leg = load_mechanism()
+    air, ground = (ensemble(leg, point.settings | {"runs": 1})[0].mechanism for point in points[::3])
+    assert air is leg
+    assert max(y for _, y in ground.loads["ground"].force) == pytest.approx(300.0, rel=1e-3)

@@ -13,7 +13,7 @@ if TYPE_CHECKING:
     from leg_wear_monitor.studies.plan.study import Study
 
 # spelled out, for --help shall not wait for numpy; the tests compare it with the library's
-NAMES = ("size", "speed", "location", "wear", "multi", "chaos", "laws", "lubrication", "legs")
+NAMES = ("size", "speed", "location", "wear", "multi", "chaos", "laws", "lubrication", "load", "legs")
 
 FAULTS_FOUND = 1
 
@@ -48,8 +48,8 @@ def study(
 ) -> int:
     """Compute a study and write its page.
 
-    NAME is size, speed, location, wear, multi, chaos, laws, lubrication or legs. What DIR holds already for
-    the same leg, settings and code is kept, so an interrupted study goes on where it was.
+    NAME is size, speed, location, wear, multi, chaos, laws, lubrication, load or legs. What DIR holds already
+    for the same leg, settings and code is kept, so an interrupted study goes on where it was.
     """
     import attrs
 

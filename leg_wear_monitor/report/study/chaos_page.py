@@ -36,14 +36,14 @@ def chaos(results: StudyResults, labelled: Labelled) -> Sections:
     sections = results.of("section")
     whole = [pair for pair in sections if pair[0].settings["portrait_cycles"]]
     exponents = [(point.label, arrays) for point, arrays in results.of("exponent")]
-    estimates = [exponent(arrays["stretch_per_cycle"], 1.0, _FORGET) for _, arrays in exponents]
+    estimates = estimates_of(exponents)
     diagrams = _diagrams(results, [pair for pair in sections if pair not in whole])
-    sentences = [_foretold(label, one) for (label, _), one in zip(exponents, estimates, strict=True)]
+    sentences = [foretold(label, one) for (label, _), one in zip(exponents, estimates, strict=True)]
     sentences += [text for pair in whole for text in _disorder(pair)] + findings.regularity(labelled)
     sentences += [_over(name, values, pairs) for name, values, pairs in diagrams]
     parts: Sections = [asked(results), conclude(sentences)]
     if exponents:
-        table = _exponent_table(exponents, estimates)
+        table = exponent_table(exponents, estimates, "clearance joints")
         parts.append(Section("Lyapunov exponents", [exponent_gallery(exponents, estimates), table]))
     for point, arrays in whole:
         clearance = point.clearance_m
@@ -57,6 +57,11 @@ def chaos(results: StudyResults, labelled: Labelled) -> Sections:
     if galleries:
         parts.append(Section("Bifurcation diagrams", galleries))
     return [*parts, cycle(results, results.of("response")), curves(labelled)]
+
+
+def estimates_of(exponents: Labelled) -> list[Estimate]:
+    """Lyapunov exponents per cycle."""
+    return [exponent(arrays["stretch_per_cycle"], 1.0, _FORGET) for _, arrays in exponents]
 
 
 def _apart(pairs: Sequence[_Pair]) -> tuple[list[Arrays], list[float]]:
@@ -83,7 +88,7 @@ def _diagrams(results: StudyResults, pairs: Sequence[_Pair]) -> list[tuple[str, 
     return diagrams
 
 
-def _foretold(label: str, estimate: Estimate) -> str:
+def foretold(label: str, estimate: Estimate) -> str:
     """Sentence on a Lyapunov exponent: its value, its sign, and the growth of a small error."""
     value = f"{estimate.value:.2f} ± {estimate.error:.2f} a cycle (mean and standard error)"
     if estimate.value > _SURE * estimate.error:
@@ -144,7 +149,8 @@ def _over(axis: str, values: Sequence[float], pairs: Sequence[_Pair]) -> str:
     )
 
 
-def _exponent_table(labelled: Labelled, estimates: Sequence[Estimate]) -> Table:
+def exponent_table(labelled: Labelled, estimates: Sequence[Estimate], head: str) -> Table:
+    """Table of Lyapunov exponents; ``head`` titles the first column."""
     rows = []
     for (label, arrays), one in zip(labelled, estimates, strict=True):
         period = float(arrays["period_s"])
@@ -154,7 +160,7 @@ def _exponent_table(labelled: Labelled, estimates: Sequence[Estimate]) -> Table:
         rows.append([label, *each, time, f"{runs} × {cycles - _FORGET}"])
     return Table(
         caption="Largest Lyapunov exponent",
-        head=("clearance joints", "[1/cycle]", "[1/s]", "cycles for a tenfold error", "pairs × cycles"),
+        head=(head, "[1/cycle]", "[1/s]", "cycles for a tenfold error", "pairs × cycles"),
         rows=rows,
         note="Mean and standard error over pairs of neighbours (Benettin and others 1980).",
     )

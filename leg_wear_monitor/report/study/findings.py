@@ -110,7 +110,7 @@ def regular_where(labelled: Labelled) -> list[str]:
 
 def _as_power(values: Sequence[float], spreads: Sequence[Spread], what: str) -> str:
     means = np.array([each.mean for each in spreads])
-    if len(values) < 4 or not (means > 0.0).all():
+    if len(values) < 4 or min(values) <= 0.0 or not (means > 0.0).all():
         return ""
     power, error = power_law(values, means)
     if error > _NO_POWER:

@@ -11,6 +11,7 @@ from leg_wear_monitor.report.parts import Sentences
 from leg_wear_monitor.report.study import findings
 from leg_wear_monitor.report.study.chaos_page import chaos
 from leg_wear_monitor.report.study.legs_page import legs
+from leg_wear_monitor.report.study.load_page import load
 from leg_wear_monitor.report.study.lubrication_page import lubrication
 from leg_wear_monitor.report.study.sections import (
     Sections,
@@ -131,6 +132,7 @@ _PAGES: dict[str, Callable[[StudyResults, Labelled], Sections]] = {
     "multi": _multi,
     "laws": _laws,
     "lubrication": _lubrication,
+    "load": load,
     "wear": life,
     "chaos": chaos,
     "legs": legs,

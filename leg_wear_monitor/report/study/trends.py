@@ -76,10 +76,12 @@ def panels_of(arrays: Sequence[Arrays]) -> list[Panel]:
     ]
 
 
-def trend_gallery(values: Sequence[float], axis: str, arrays: Sequence[Arrays]) -> Gallery:
-    """Pictures over a numeric parameter, such as the clearance."""
+def trend_gallery(
+    values: Sequence[float], axis: str, arrays: Sequence[Arrays], more: Sequence[Panel] = ()
+) -> Gallery:
+    """Pictures over a numeric parameter, such as the clearance; ``more`` are further ones."""
     pictures = []
-    for panel in panels_of(arrays):
+    for panel in [*panels_of(arrays), *more]:
         figure = new_figure(4.6, 2.9)
         axes = figure.subplots()
         for (colour, mark), (name, spreads) in zip(MARKS, panel.lines.items(), strict=False):

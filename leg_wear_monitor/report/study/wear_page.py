@@ -40,7 +40,7 @@ def life(results: StudyResults, labelled: Labelled) -> Sections:
         sections += [_clearances(lives), _worn_surfaces(results, lives)]
     sections.append(cycle(results, results.of("response")))
     tables = [wear_table(labelled, "clearance joints"), joint_table(labelled, "clearance joints")]
-    return [*sections, Section("Tables", tables + ([_life_table(lives)] if lives else []))]
+    return [*sections, Section("Tables", tables + ([life_table(lives, "clearance joints")] if lives else []))]
 
 
 def _of_a_life(label: str, arrays: Arrays, several: bool) -> list[str]:
@@ -124,7 +124,8 @@ def _worn_surfaces(results: StudyResults, lives: Labelled) -> Section:
     )
 
 
-def _life_table(lives: Labelled) -> Table:
+def life_table(lives: Labelled, head: str) -> Table:
+    """Table of lives, a row for each clearance joint; ``head`` begins the title of the first column."""
     rows: list[Sequence[str]] = []
     for label, arrays in lives:
         for k, joint in enumerate(clearance_joints_of(arrays)):
@@ -142,7 +143,7 @@ def _life_table(lives: Labelled) -> Table:
     return Table(
         caption="A life with wear fed back",
         head=(
-            "clearance joints, joint",
+            f"{head}, joint",
             "cycles [millions]",
             "mean clearance at the end [mm]",
             "greatest depth of the bushing [µm]",

@@ -10,6 +10,7 @@ from leg_wear_monitor.share import share_directory
 from leg_wear_monitor.studies.plan.kinds.chaos import Chaos
 from leg_wear_monitor.studies.plan.kinds.laws import Laws
 from leg_wear_monitor.studies.plan.kinds.legs import Legs
+from leg_wear_monitor.studies.plan.kinds.load import Load
 from leg_wear_monitor.studies.plan.kinds.location import Location
 from leg_wear_monitor.studies.plan.kinds.lubrication import Lubrication
 from leg_wear_monitor.studies.plan.kinds.multi import Multi
@@ -27,6 +28,7 @@ STUDIES: dict[str, type[Study]] = {
     "chaos": Chaos,
     "laws": Laws,
     "lubrication": Lubrication,
+    "load": Load,
     "legs": Legs,
 }
 

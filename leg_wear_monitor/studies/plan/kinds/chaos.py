@@ -13,7 +13,7 @@ from leg_wear_monitor.studies.plan.keys import (
     speeds_field,
 )
 from leg_wear_monitor.studies.plan.responses import cycle_cost, millimetres, place, response, set_name
-from leg_wear_monitor.studies.plan.study import Study
+from leg_wear_monitor.studies.plan.study import Ensemble, Study
 from leg_wear_monitor.studies.point import Point, Settings
 from leg_wear_monitor.studies.tasks.grid import SAMPLES
 
@@ -44,6 +44,14 @@ class Exponent:
         at_most=1.0e-6,
         default=1.0e-10,
     )
+
+
+def exponent_point(label: str, where: Settings, ensemble: Ensemble, exponent: Exponent) -> Point:
+    """Point of a Lyapunov exponent for given run settings."""
+    settings = where | {"perturb_fraction": ensemble.perturb_fraction, "seed": ensemble.seed}
+    settings |= attrs.asdict(exponent) | {"skip_cycles": ensemble.skip_cycles}
+    cost = 6.0 * exponent.runs * exponent.cycles * cycle_cost(where)
+    return Point(label=label, task="exponent", settings=settings, cost=cost)
 
 
 @attrs.frozen(kw_only=True)
@@ -90,10 +98,7 @@ class Chaos(Study):
 
     def _exponent(self, clearance_joints: Names) -> Point:
         where = place(clearance_joints, self.clearance_m, self.speed_rpm)
-        settings = where | self._start | attrs.asdict(self.exponent)
-        settings["skip_cycles"] = self.ensemble.skip_cycles
-        cost = 6.0 * self.exponent.runs * self.exponent.cycles * cycle_cost(where)
-        return Point(label=set_name(clearance_joints), task="exponent", settings=settings, cost=cost)
+        return exponent_point(set_name(clearance_joints), where, self.ensemble, self.exponent)
 
     def _section(self, label: str, where: Settings, cycles: int, portrait_cycles: int = 0) -> Point:
         skipped = self.bifurcation.skip_cycles

@@ -6,7 +6,8 @@ from leg_wear_monitor.configuration.quantity import described, quantity
 from leg_wear_monitor.studies.plan.keys import Names, count_field
 from leg_wear_monitor.studies.plan.kinds.location import Location
 from leg_wear_monitor.studies.plan.responses import cycle_cost, place, set_name
-from leg_wear_monitor.studies.point import Point
+from leg_wear_monitor.studies.plan.study import Ensemble
+from leg_wear_monitor.studies.point import Point, Settings
 
 _LIKELY_JUMPS = 2.7  # of a life, for each time that the longest one is in the mean opening
 
@@ -33,6 +34,14 @@ class Life:
     runs: int = count_field("lives with different initial conditions", 2, 4)
 
 
+def life_point(label: str, where: Settings, ensemble: Ensemble, life: Life) -> Point:
+    """Point of a life for given run settings."""
+    settings = where | attrs.asdict(life)
+    settings |= {"perturb_fraction": ensemble.perturb_fraction, "seed": ensemble.seed}
+    cycles = _LIKELY_JUMPS * life.opens_m / life.jump_m * (life.cycles + 1)
+    return Point(label=label, task="life", settings=settings, cost=life.runs * cycles * cycle_cost(where))
+
+
 @attrs.frozen(kw_only=True)
 class Wear(Location):
     """Where bushings and journals wear, fresh and after wear has fed back over a life."""
@@ -47,10 +56,5 @@ class Wear(Location):
         return super().points() + [self._life(clearance_joints) for clearance_joints in self.sets]
 
     def _life(self, clearance_joints: Names) -> Point:
-        settings = place(
-            clearance_joints, self.clearance_m, self.speed_rpm, **attrs.asdict(self.life),
-            perturb_fraction=self.ensemble.perturb_fraction, seed=self.ensemble.seed,
-        )  # fmt: skip
-        cycles = _LIKELY_JUMPS * self.life.opens_m / self.life.jump_m * (self.life.cycles + 1)
-        cost = self.life.runs * cycles * cycle_cost(settings)
-        return Point(label=set_name(clearance_joints), task="life", settings=settings, cost=cost)
+        where = place(clearance_joints, self.clearance_m, self.speed_rpm)
+        return life_point(set_name(clearance_joints), where, self.ensemble, self.life)

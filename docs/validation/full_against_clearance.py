@@ -1,6 +1,6 @@
 """Print the tables of validation_clearance.md on means: clearance against full coordinates.
 
-Twenty-seven cases, ten independent runs of twenty cycles in each model: about twelve minutes on two cores.
+Twenty-seven cases, ten independent runs of twenty cycles in each model: a quarter of an hour on two cores.
 """
 
 import argparse

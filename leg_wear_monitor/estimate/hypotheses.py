@@ -9,8 +9,9 @@ from collections.abc import Sequence
 import attrs
 import numpy as np
 
-from leg_wear_monitor.estimate.cause import Cause, NamedCause
-from leg_wear_monitor.estimate.least_squares import Point, gauss_newton, jackknife, solved
+from leg_wear_monitor.estimate.cause import NamedCause
+from leg_wear_monitor.estimate.least_squares import jackknife, solved
+from leg_wear_monitor.estimate.timing_by_speed import TimingBySpeed
 from leg_wear_monitor.estimate.torque_curves import (
     Complex,
     TorqueCurves,
@@ -212,24 +213,22 @@ def timing_of(cycles: Sequence[CycleStatistics], best: Fit) -> list[NamedCause]:
 
     The angle of a cycle is offset - lag * speed.
     """
-    speed, angle = [], []
+    timing, speeds = TimingBySpeed(), []
     for one in cycles:
         curves = curves_of([one.torque_profile], {})
         if curves is None:
             continue
         base = best.factor * turned(curves.predicted + best.load_n * curves.lever, best.angle_rad)
         rest, along = curves.measured - base, slope(base)
-        speed.append(one.direction * TURN / one.moving_s)
-        angle.append(best.angle_rad + inner(rest, along) / inner(along, along))
-    if len(speed) < _LEAST_CYCLES or np.ptp(speed) == 0.0:
+        speeds.append(one.direction * TURN / one.moving_s)
+        timing = timing.with_angle(best.angle_rad + inner(rest, along) / inner(along, along), speeds[-1])
+    found = timing.split
+    if len(speeds) < _LEAST_CYCLES or np.ptp(speeds) == 0.0 or found is None:
         return []
-    lateness = np.stack([np.ones(len(speed)), -np.array(speed)], axis=1)
-    found = gauss_newton(lambda x: Point(lateness @ x - angle, lambda: lateness), np.zeros(2))
-    sigma = np.sqrt(np.diagonal(found.covariance) * found.point.square / (len(speed) - 2))
-    if _RESOLVED * sigma[0] > abs(best.angle_rad):
+    scatter = math.sqrt(timing.square / (len(speeds) - 2))
+    lag, offset = (attrs.evolve(one, sigma=one.sigma * scatter) for one in found)
+    if _RESOLVED * offset.sigma > abs(best.angle_rad):
         return []
-    values = zip((Cause.CRANK_OFFSET, Cause.LAG), found.x.tolist(), sigma.tolist(), strict=True)
-    offset, lag = (NamedCause(*one) for one in values)
     most = max(_sureness(offset), _sureness(lag))
     return [one for one in (offset, lag) if _sureness(one) >= min(_SURE, most)]
 

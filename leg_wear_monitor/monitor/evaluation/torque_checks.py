@@ -78,7 +78,7 @@ def _drift(report: "CycleReport", record: "TorqueRecord") -> NamedCause:
 
 def _timing(report: "CycleReport", record: "TorqueRecord", bounds: TorqueBounds) -> NamedCause:
     """A lag or an offset of the crank, where the speed tells them apart."""
-    split, speed = record.lags.split, report.cadence_rpm * math.pi / 30.0
+    split, speed = record.lag_and_offset, report.cadence_rpm * math.pi / 30.0
     if split is None:
         return NamedCause(Cause.TIMING, -report.torque_lag_s * speed, report.torque_lag_sigma_s * abs(speed))
     lag, offset = split
@@ -87,5 +87,5 @@ def _timing(report: "CycleReport", record: "TorqueRecord", bounds: TorqueBounds)
 
 def offset_error_rad(report: "CycleReport", record: "TorqueRecord") -> float:
     """Error of crank.offset_rad [rad], if it causes all of the lag that is not known to be a time lag."""
-    split = record.lags.split
+    split = record.lag_and_offset
     return -split[1].value if split else report.torque_lag_s * report.cadence_rpm * math.pi / 30.0

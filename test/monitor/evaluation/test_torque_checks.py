@@ -21,7 +21,7 @@ from leg_wear_monitor.monitor.evaluation.torque_checks import (
     torque_causes,
     torque_values,
 )
-from leg_wear_monitor.monitor.evaluation.torque_record import COMMISSIONING_CYCLES, LagBySpeed, TorqueRecord
+from leg_wear_monitor.monitor.evaluation.torque_record import COMMISSIONING_CYCLES, TorqueRecord
 
 pytestmark = pytest.mark.plain
 
@@ -93,10 +93,11 @@ def figures(lag_s, rpm=60.0, sigma_s=2.0e-4):
 
 
 def walked(lag_s, offset_rad, speeds):
-    lags = LagBySpeed()
+    record = TorqueRecord()
     for rpm in speeds:
-        lags = lags.with_cycle(figures(lag_s + offset_rad / (rpm * math.pi / 30.0), rpm))
-    return TorqueRecord(lags=lags)
+        lag = figures(lag_s + offset_rad / (rpm * math.pi / 30.0), rpm)
+        record = record.with_cycle(lag, report(0.0), is_sound=False)
+    return record
 
 
 def test_a_crank_offset_at_one_speed_may_be_a_lag_and_is_told_as_either():
@@ -112,7 +113,7 @@ def test_a_crank_offset_at_one_speed_may_be_a_lag_and_is_told_as_either():
 )
 def test_where_the_speed_varies_a_lag_and_an_offset_are_told_apart(lag_s, offset_rad, named):
     record = walked(lag_s, offset_rad, [57.0, 60.0, 63.0] * 30)
-    found_lag, found_offset = record.lags.split
+    found_lag, found_offset = record.lag_and_offset
     assert found_lag.value == pytest.approx(lag_s, abs=1e-9)
     assert found_offset.value == pytest.approx(-offset_rad, abs=1e-9)
     assert 0.0 < found_lag.sigma < 0.001 and 0.0 < found_offset.sigma < 0.005

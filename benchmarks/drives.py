@@ -2,9 +2,10 @@
 
 The legs of `disturbed.py` in the air, in full coordinates, with masses 4 % off the file. Their torque passes
 a drive: friction that grows with the load, Coulomb and viscous friction, cogging, a low-pass, a lag, a torque
-constant and friction that change over twenty minutes, steps of the sensor, lost samples. The first table is
-of healthy legs: gait cycles drawn in blocks of ten make up the given time. The second is of joints that open
-after 90 gait cycles; where a drive warms up, when it is half warm.
+constant and friction that change over twenty minutes, steps of the sensor, lost samples, a coupling between
+the measured angle and the crank. The first table is of healthy legs: gait cycles drawn in blocks of ten make
+up the given time. The second is of joints that open after 90 gait cycles, J on three walks; where a drive
+warms up, when it is half warm. A leg behind a coupling has a reference behind the one that is found.
 `python benchmarks/drives.py --keep DIRECTORY [--hours 100]`.
 """
 
@@ -17,6 +18,7 @@ import one_core  # noqa: F401
 # isort: split
 import attrs
 import numpy as np
+from compliant import behind
 from diagnosis import NEW, RATE, kept
 from disturbed import COMMISSIONED, HEALTHY, MASSES, WORN, drawn, signed, walked, watched
 
@@ -28,7 +30,10 @@ from leg_wear_monitor.monitor.diagnosis import leg_models, references
 from leg_wear_monitor.twin.follower.load import torque_size
 from leg_wear_monitor.twin.reference.leg_parameters import LegParameters
 
-OPENINGS = (("A", 0.45), ("B", 0.45), ("G", 0.45), ("I", 0.45), ("J", 0.45), ("G", 0.6), ("J", 1.0))
+OPENINGS = (  # and the walk, whose start is another one
+    *((joint, 0.45, 0) for joint in "ABGI"), *(("J", 0.45, walk) for walk in range(3)),
+    ("G", 0.6, 0), *(("J", 1.0, walk) for walk in range(3)),
+)  # fmt: skip
 WARM = 1200  # gait cycles until a drive is warm
 LEVELS = 11  # of what drifts, between cold and warm
 
@@ -49,6 +54,7 @@ class Drive:
     scale_drift: float = 0.0
     coulomb_drift_nm: float = 0.0
     load_friction_drift: float = 0.0
+    stiffness_nm_per_rad: float = 0.0  # rigid
 
     @property
     def drifts(self) -> bool:
@@ -93,6 +99,11 @@ DRIVES = {
     "2 % lost": Drive(loss=0.02),
     "friction 0.2, 35 Hz, 5 ms": Drive(load_friction=0.2, hz=35.0, lag_s=0.005),
     "all": ALL,
+    **{
+        f"{name}, {stiffness:g} N m/rad": attrs.evolve(drive, stiffness_nm_per_rad=stiffness)
+        for name, drive in (("none", Drive()), ("all", ALL))
+        for stiffness in (1000.0, 200.0)
+    },
 }
 
 
@@ -128,7 +139,7 @@ def main() -> None:
     parser.add_argument("--worn-only", action="store_true")
     parser.add_argument("--healthy-only", action="store_true")
     options = parser.parse_args()
-    references.ROUNDS, leg_models.UNLIKE_FILE = 0, leg_models.NAMED_TO
+    leg_models.UNLIKE_FILE = leg_models.NAMED_TO
     leg = load_mechanism("bionic_leg")
     mass = np.array([MASSES.get(body, 1.0) for body in leg.bodies])
     real = LegParameters(mass, np.ones(len(mass))).applied(leg)
@@ -136,17 +147,20 @@ def main() -> None:
     sensor = TorqueSensor(0.005, 1.0, size)
 
     @functools.cache
-    def walk(joint: str, size_mm: float) -> np.ndarray:
+    def walk(stiffness: float, joint: str = "", size_mm: float = 0.3, number: int = 0) -> np.ndarray:
         clearance = np.where(np.array(leg.clearance_joints) == joint, 1e-3 * size_mm, NEW)
-        cycles = WORN if joint else HEALTHY
-        file = options.keep / f"{joint or 'new'} {size_mm:.2f} 0.pkl" if options.keep else None
-        return kept(file, lambda: walked(real, clearance, cycles + 3, 0.0, round(1000 * size_mm)))
+        clearance *= 1.0 + 1e-12 * number  # chaotic: another draw
+        name = " ".join(f"{one:g}" for one in (0, stiffness, number)[: 1 + 2 * bool(stiffness or number)])
+        file = options.keep / f"{joint or 'new'} {size_mm:.2f} {name}.pkl" if options.keep else None
+        driven, cycles = behind(real, stiffness) if stiffness else real, WORN if joint else HEALTHY
+        return kept(file, lambda: walked(driven, clearance, cycles + 3, 0.0, round(1000 * size_mm)))
 
     names = options.drive or list(DRIVES)
     if not options.worn_only:
         print("| drive | lag, time constant, load friction found | misfit | findings |\n|---|---|---|---|")
         for name in names:
-            cycles = cycles_of(walk("", 0.3), DRIVES[name], sensor, 5)
+            references.ROUNDS = int(DRIVES[name].stiffness_nm_per_rad > 0.0)
+            cycles = cycles_of(walk(DRIVES[name].stiffness_nm_per_rad), DRIVES[name], sensor, 5)
             order = drawn(np.arange(cycles.shape[1])[:, None], round(3600 * options.hours))
             rows = warming(cycles, [int(one[0]) for one in order])
             one, found = watched(leg, size, rows)
@@ -155,19 +169,22 @@ def main() -> None:
             channel = (
                 f"{1e3 * own.delay_s:.2f} ms, {1e3 * own.time_constant_s:.2f} ms, {own.load_friction:.3f}"
             )
+            drive = one.state.reference.parameters
+            channel += f", {1.0 / drive.compliance:.0f} N m/rad" if drive.compliance else ""
             print(f"| {name} | {channel} | {off:.2f} | {summary(found) or 'none'} |", flush=True)
     if not options.healthy_only:
-        heads = " | ".join(f"{joint} {size_mm:g}" for joint, size_mm in OPENINGS)
+        heads = " | ".join(f"{joint} {size_mm:g}" for joint, size_mm, _ in OPENINGS)
         print(f"\n| drive | {heads} |\n|---{'|---' * len(OPENINGS)}|")
         for name in names:
-            cells = []
-            healthy = cycles_of(walk("", 0.3), DRIVES[name], sensor, 5)
+            cells, stiffness = [], DRIVES[name].stiffness_nm_per_rad
+            references.ROUNDS = int(stiffness > 0.0)
+            healthy = cycles_of(walk(stiffness), DRIVES[name], sensor, 5)
             before = COMMISSIONED + (WARM // 2 if DRIVES[name].drifts else 0)
             order = [i % healthy.shape[1] for i in range(before)]
             one, found = watched(leg, size, warming(healthy, order))
             commissioned = one.snapshot()
-            for joint, size_mm in OPENINGS:
-                worn = cycles_of(walk(joint, size_mm), DRIVES[name], sensor, 6)
+            for joint, size_mm, number in OPENINGS:
+                worn = cycles_of(walk(stiffness, joint, size_mm, number), DRIVES[name], sensor, 6)
                 one.restore(commissioned)
                 rows = warming(worn, list(range(worn.shape[1])), before)
                 one, found = watched(leg, size, rows, one, before)

@@ -41,13 +41,15 @@ def leg_of(config: Path | None, ledger: Path | None) -> tuple["MonitorConfig", "
 
 
 @contextmanager
-def opened(leg: "Mechanism", settings: "MonitorConfig", dry_run: bool) -> Iterator["Ledger"]:
+def opened(settings: "MonitorConfig", dry_run: bool) -> Iterator["Ledger"]:
     """The ledger; a copy of it that is thrown away, if nothing shall be written."""
     import attrs
 
+    from leg_wear_monitor.mechanism.loader import load_mechanism
     from leg_wear_monitor.monitor.ledger.copy import copy_of
     from leg_wear_monitor.monitor.ledger.ledger import open_ledger
 
+    leg = load_mechanism(settings.mechanism)  # without its parameters, which a ledger applies itself
     with copy_of(settings.ledger.path) if dry_run else nullcontext(settings.ledger.path) as path:
         kept = open_ledger(leg, attrs.evolve(settings, ledger=attrs.evolve(settings.ledger, path=str(path))))
         if kept is None:
@@ -58,8 +60,8 @@ def opened(leg: "Mechanism", settings: "MonitorConfig", dry_run: bool) -> Iterat
 
 def list_measurements(config: Path | None, ledger: Path | None) -> None:
     """Print all measurements of a ledger, a line each; the ledger is left as it is."""
-    settings, leg = leg_of(config, ledger)
-    with opened(leg, settings, dry_run=True) as kept:
+    settings, _ = leg_of(config, ledger)
+    with opened(settings, dry_run=True) as kept:
         for each in kept.measurements:
             click.echo(_line(each))
         if not kept.measurements:
@@ -70,8 +72,8 @@ def withdraw(
     joint: str | None, which: str, who: str, config: Path | None, ledger: Path | None, dry_run: bool
 ) -> None:
     """Withdraw a measurement, by its number or the last one of a joint, and print what it is then."""
-    settings, leg = leg_of(config, ledger)
-    with opened(leg, settings, dry_run) as kept:
+    settings, _ = leg_of(config, ledger)
+    with opened(settings, dry_run) as kept:
         number = _number(kept, joint, which)
         click.echo(_line(kept.withdraw(number, time.time_ns(), who)))
         kept.record()

@@ -8,6 +8,7 @@ import numpy as np
 import pytest
 
 from leg_wear_monitor.mechanism.loader import load_mechanism
+from leg_wear_monitor.monitor.config.parameter_file import load_config
 from leg_wear_monitor.monitor.config.settings import MonitorConfig
 from leg_wear_monitor.monitor.ledger.entry import Entry, JointWear
 from leg_wear_monitor.monitor.ledger.ledger import open_ledger
@@ -15,16 +16,19 @@ from leg_wear_monitor.monitor.ledger.ledger import open_ledger
 pytestmark = pytest.mark.plain
 
 
-@pytest.fixture
-def ledger(tmp_path):
+def worn_ledger(path, config):
     """A ledger of the default leg whose joints have opened by 60 µm."""
-    path = tmp_path / "wear.ledger"
-    leg, config = load_mechanism("bionic_leg"), MonitorConfig()
+    leg = load_mechanism("bionic_leg")
     kept = open_ledger(leg, attrs.evolve(config, ledger=attrs.evolve(config.ledger, path=str(path))))
     joints = tuple(JointWear(name, np.full((2, 720), 3e-5), 4000, 4000.0) for name in leg.clearance_joints)
     kept.keep(Entry(stamp_ns=10**9, joints=joints, totals={"cycles": 4e3, "moving_s": 4e3}), closed=True)
     kept.close()
     return path
+
+
+@pytest.fixture
+def ledger(tmp_path):
+    return worn_ledger(tmp_path / "wear.ledger", MonitorConfig())
 
 
 def rows(path):
@@ -172,3 +176,12 @@ def test_a_ledger_has_to_be_named(run):
     result = run("measure", "A", "0.4", "--sigma", "0.01")
     assert result.exit_code == 2
     assert "no ledger given" in result.stderr
+
+
+def test_a_leg_that_carries_a_person_is_the_one_of_its_ledger(run, tmp_path):
+    config = tmp_path / "carries.yaml"
+    config.write_text("/**: {ros__parameters: {load.person_kg: 80.0}}\n", encoding="utf-8")
+    ledger = worn_ledger(tmp_path / "wear.ledger", load_config(config))
+    result = run("measure", "A", "0.42", "--sigma", "0.005", "--ledger", str(ledger), "--config", str(config))
+    assert (result.exit_code, result.stderr) == (0, "")
+    assert rows(ledger)[0][0] == "A"

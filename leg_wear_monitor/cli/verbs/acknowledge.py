@@ -31,7 +31,7 @@ def acknowledge(
     from leg_wear_monitor.monitor.resets import acknowledge_in
 
     settings, leg = leg_of(config, ledger)
-    with opened(leg, settings, dry_run) as kept:
+    with opened(settings, dry_run) as kept:
         if kept.loss:
             click.echo(f"warning: {kept.path}: {kept.loss}", err=True)
         click.echo(acknowledge_in(kept, leg, settings, time.time_ns()).words)

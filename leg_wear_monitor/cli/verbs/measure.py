@@ -123,7 +123,7 @@ def _measured(
     joint = leg.clearance_joint(joint)
     limits_m = AlarmBoard(settings, leg.clearance_joints).clearance_limits_m
     limit_m = limits_m[leg.clearance_joints.index(joint)]
-    with opened(leg, settings, dry_run) as kept:
+    with opened(settings, dry_run) as kept:
         parts = {wear.name: wear for wear in kept.entry.joints} if kept.entry else {}
         part = parts.get(joint) or new_part(joint)
         found = evaluate(

@@ -50,7 +50,7 @@ def _reset_in(joint: str, config: Path | None, ledger: Path | None, undo: bool, 
 
     settings, leg = leg_of(config, ledger)
     joint, now_ns, who = leg.clearance_joint(joint), time.time_ns(), getpass.getuser()
-    with opened(leg, settings, dry_run) as kept:
+    with opened(settings, dry_run) as kept:
         if kept.loss:
             click.echo(f"warning: {kept.path}: {kept.loss}", err=True)
         if undo:

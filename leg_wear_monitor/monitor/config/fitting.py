@@ -11,6 +11,7 @@ from leg_wear_monitor.errors import ConfigError
 from leg_wear_monitor.mechanism.clearance import Clearance
 from leg_wear_monitor.mechanism.clearance_range import limit_fault
 from leg_wear_monitor.mechanism.ideal import TURN
+from leg_wear_monitor.mechanism.person import with_person
 from leg_wear_monitor.mechanism.spec import Mechanism, SpeedDrive
 from leg_wear_monitor.monitor.config.drive import drive_figures
 from leg_wear_monitor.monitor.config.settings import MonitorConfig
@@ -20,7 +21,7 @@ _KEYS = {"radial_clearance": "clearances_m", "wear_coefficient": "wear_coefficie
 
 
 def fitted(mechanism: Mechanism, config: MonitorConfig, source: str = "parameters") -> Mechanism:
-    """Mechanism with the clearance joints, clearances, wear and speed of a configuration.
+    """Mechanism with the clearance joints, clearances, wear, speed and person of a configuration.
 
     Parameters
     ----------
@@ -33,7 +34,8 @@ def fitted(mechanism: Mechanism, config: MonitorConfig, source: str = "parameter
     ------
     ConfigError
         For joints that the mechanism does not have, lists of a wrong length, a clearance that does not fit,
-        a mechanism with a torque as its drive, or a drive that is not known.
+        a mechanism with a torque as its drive, a drive that is not known, or a person on bodies that are not
+        there.
     """
     drive_figures(config.drive, source)  # a fault of it ends the start, whoever uses the figures
     if not isinstance(mechanism.drive, SpeedDrive):
@@ -48,7 +50,7 @@ def fitted(mechanism: Mechanism, config: MonitorConfig, source: str = "parameter
         for k, name in enumerate(clearance_joints)
     }
     leg = attrs.evolve(
-        mechanism,
+        with_person(mechanism, config.load.person_kg),
         clearance_joints=clearance_joints,
         clearances=mechanism.clearances | settings,
         drive=attrs.evolve(mechanism.drive, speed=speed),

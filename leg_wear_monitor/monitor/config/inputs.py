@@ -217,6 +217,13 @@ class Load:
         "load at the foot: none; ground, estimated as a person's in stance; measured, that of foot_load",
         default=NONE,
     )
+    person_kg: float = quantity(
+        "kg",
+        "mass of a person one of whose legs hangs on thigh, shank and foot; 0 for none",
+        at_least=0.0,
+        at_most=300.0,
+        default=0.0,
+    )
 
 
 @attrs.frozen(kw_only=True)

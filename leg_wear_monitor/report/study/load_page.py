@@ -1,5 +1,7 @@
 """HTML page of the study of the ground's load."""
 
+import attrs
+
 from leg_wear_monitor.report.page import Section
 from leg_wear_monitor.report.study import findings
 from leg_wear_monitor.report.study.chaos_page import estimates_of, exponent_table, foretold
@@ -47,6 +49,7 @@ def load(results: StudyResults, labelled: Labelled) -> Sections:
     more.append(_exponent_panel(labelled, dict(zip(dict(exponents), estimates, strict=True))))
     values = [float(point.settings["ground_n"]) for point, _ in results.of("response")]
     gallery = trend_gallery(values, "vertical force, peak [N]", [arrays for _, arrays in labelled], more)
+    gallery = attrs.evolve(gallery, caption=f"{gallery.caption} Exponents: bars of two standard errors.")
     table = tables(labelled, _HEAD)
     further = [exponent_table(exponents, estimates, _HEAD)] if exponents else []
     further += [life_table(lives, _HEAD)] if lives else []
@@ -67,8 +70,8 @@ def _order(labelled: Labelled) -> list[str]:
     for label, arrays in labelled:
         depth = {joint: depth_per_cycle(arrays, joint) for joint in clearance_joints_of(arrays)}
         ranked = sorted(depth, key=lambda joint: -depth[joint].mean)
-        texts.append(f"{label} {' > '.join(ranked)}")
-    return [f"Joints by the greatest wear depth of a cycle: {'; '.join(texts)}."]
+        texts.append(f"{label}: {' > '.join(ranked)}")
+    return [f"Joints by the greatest wear depth of a cycle, at {'; '.join(texts)}."]
 
 
 def _change(labelled: Labelled) -> list[str]:

@@ -186,6 +186,18 @@ def test_a_leg_driven_by_a_torque_is_refused():
         fitted(load_mechanism("andrews"), MonitorConfig())
 
 
+def test_a_person_hangs_on_the_leg_once(leg):
+    carrying = fitted(leg, config_from({"load.person_kg": 80.0}))
+    assert sum(body.mass for body in carrying.bodies.values()) == pytest.approx(
+        sum(body.mass for body in leg.bodies.values()) + 0.161 * 80.0
+    )
+
+
+def test_a_person_needs_bodies_to_hang_on():
+    with pytest.raises(ConfigError, match=r"four_bar.yaml: bodies: has no thigh.*load.person_kg"):
+        fitted(load_mechanism("four_bar"), config_from({"load.person_kg": 80.0}))
+
+
 def test_parameters_make_the_leg_what_they_say(leg):
     same = fitted(leg, MonitorConfig())
     assert (same.clearance_joints, same.clearances) == (leg.clearance_joints, leg.clearances)

@@ -91,7 +91,7 @@ def main() -> None:
     leg, size = truth(paper, "d"), torque_size(build_linkage(paper), TURN)
     make = functools.partial(walked, leg, NEW, options.cycles, LEGS["d"].ripple)
     walk = kept(options.keep / f"healthy {options.cycles}.pkl", make)
-    plain, lever = TorqueSensor(0.005, 1.0, size), load_signature(build_linkage(paper))[0]
+    plain, lever = TorqueSensor(0.005, 1.0, size), load_signature(build_linkage(paper))
     reference = known_reference(walk, profile_of(walk), plain, NOISE_NM, options.keep / "none", paper)
     legs = {
         name: measured(one, plain, NOISE_NM, np.random.default_rng(3))

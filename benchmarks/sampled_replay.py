@@ -58,7 +58,7 @@ def table(hours: float, seed: int) -> dict[str, np.ndarray]:
     nominal = [one_cycle(linkage, POINTS, factor * TURN).drive_torque for factor in (0.5, 1.0)]
     by_square = (nominal[1] - nominal[0]) / 0.75  # by the squared speed, over that of 60 rpm
     at_rest = nominal[1] - by_square
-    signature = load_signature(linkage)[0]
+    signature = load_signature(linkage)
     phase = np.arange(POINTS + 1) / POINTS * TURN
     turned = angle % TURN
 

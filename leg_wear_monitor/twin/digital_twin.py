@@ -188,7 +188,7 @@ class DigitalTwin:
 
     @property
     def parameters(self) -> LegParameters:
-        """Factors on the parameters of the mechanism, and the compliance of its drive."""
+        """Factors on the parameters of the mechanism, the compliance of its drive, and the load's shape."""
         return self._parameters
 
     def set_parameters(self, parameters: LegParameters) -> None:
@@ -200,7 +200,7 @@ class DigitalTwin:
             If the linkage does not close or has a dead point.
         """
         if parameters != self._parameters:
-            linkage = build_linkage(parameters.applied(self._mechanism))
+            linkage = build_linkage(parameters.in_air.applied(self._mechanism))
             check_cycle(linkage)
             friction = parameters.friction * self._friction
             self._follower.take_parameters(linkage, friction, parameters)

@@ -12,10 +12,11 @@ FOREVER = 1.0e9
 _FROM_ZERO = ("lag_s", "node_interval_s", "reorder_window_s", "largest_speed_radps")
 
 SAMPLINGS = AVERAGE, INSTANT = "average", "instant"
-LOAD_SHAPES = STANCE, CONSTANT = "stance", "constant"
 LOAD_SOURCES = NO_LOAD, WRENCH, FLOAT64, CONTACT = "none", "wrench", "float64", "contact"
 LOAD_FRAMES = GROUND_FRAME, FOOT_FRAME = "ground", "foot"
 LOAD_MODELS = NONE, GROUND, MEASURED = "none", "ground", "measured"
+STANCE, CONSTANT = "stance", "constant"
+LOAD_SHAPES = STANCE, GROUND, CONSTANT
 
 
 @attrs.frozen(kw_only=True)
@@ -127,8 +128,8 @@ class TwinSettings:
     estimate_load : bool
         Whether the estimated foot load acts on the model; it is estimated in any case.
     load_shape : str
-        ``stance``: ground force in proportion to the toe's depth below its mean height; ``constant``: a
-        constant weight.
+        ``stance``: ground force in proportion to the toe's depth below its mean height; ``ground``: the
+        template of a person's stance; ``constant``: a constant weight.
     load_limit_n : float
         Largest plausible foot load [N].
     load_source, load_frame : str
@@ -182,4 +183,4 @@ class TwinSettings:
     @property
     def loads_n(self) -> tuple[float, float]:
         """Bounds of the foot load [N]: the ground pushes and does not pull."""
-        return (0.0 if self.load_shape == STANCE else -self.load_limit_n), self.load_limit_n
+        return (-self.load_limit_n if self.load_shape == CONSTANT else 0.0), self.load_limit_n

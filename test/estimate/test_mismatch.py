@@ -44,7 +44,7 @@ def torque_of(leg: Any) -> Any:
 @pytest.fixture(scope="module")
 def walked(leg: Any, torque_of: Any) -> Any:
     """Gait cycles of a leg; the measured angle is ``offset`` too large, the torque ``lag`` late."""
-    lever = load_signature(build_linkage(leg))[0][:-1:4]
+    lever = load_signature(build_linkage(leg))[:-1:4]
 
     def at(curve: Any, angle: Any) -> Any:
         return np.interp(angle % TURN, np.arange(STEPS + 1) * TURN / STEPS, np.append(curve, curve[0]))

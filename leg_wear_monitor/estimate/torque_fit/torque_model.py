@@ -94,7 +94,7 @@ def torque_model(mechanism: Mechanism) -> TorqueModel:
     """
     linkage = build_linkage(mechanism)
     tables = torque_coefficients(linkage, one_cycle(linkage, POINTS, 1.0).q)[0]
-    return TorqueModel(tables, load_signature(linkage)[0][:-1])
+    return TorqueModel(tables, load_signature(linkage)[:-1])
 
 
 def with_clearances(model: TorqueModel, legs: Sequence[TorqueReference]) -> TorqueModel:

@@ -173,9 +173,9 @@ class LegFollower:
     def take_parameters(self, linkage: Linkage, friction: Floats, parameters: LegParameters) -> None:
         """Continue with other masses, lengths and friction coefficients (k,); the motion goes on.
 
-        Behind a compliant drive, as in ``parameters``, the crank swings.
+        Behind a compliant drive, as in ``parameters``, the crank swings; the load has the shape of theirs.
         """
-        self._load.rebuild(linkage)
+        self._load.rebuild(linkage, parameters.load)
         model = self._stepper.model
         self._stepper.model = model._replace(coupling=drive_coupling(self._setup, model, parameters))
         contacts = self._setup.contacts

@@ -1,7 +1,6 @@
 """A foot load that may change with every cycle: drive torque, effect on the tables (physics.md section 9).
 
-All tables are linear in the load, so a change of the load is a linear combination over the columns that it
-affects.
+The tables are linear in the load.
 """
 
 from collections.abc import Iterable
@@ -12,14 +11,13 @@ from numpy.typing import NDArray
 
 from leg_wear_monitor.contact.arrays import ContactArrays
 from leg_wear_monitor.dynamics.clearance.tables import POINTS, ClearanceTables, build_tables
+from leg_wear_monitor.dynamics.clearance.toe_force import loaded_tables, put_force
 from leg_wear_monitor.mechanism.arrays import Floats
-from leg_wear_monitor.mechanism.ground_reaction import PHASES, upwards, with_toe_force
+from leg_wear_monitor.mechanism.ground_reaction import PHASES, nominal_stance, upwards
 from leg_wear_monitor.mechanism.ideal import one_cycle, point_motion
-from leg_wear_monitor.mechanism.position import Linkage, build_linkage
+from leg_wear_monitor.mechanism.position import Linkage
 from leg_wear_monitor.twin.follower.measured_load import force_of, load_rows, set_force
-from leg_wear_monitor.twin.settings import STANCE
-
-_TRIAL_N = 100.0
+from leg_wear_monitor.twin.settings import GROUND, STANCE
 
 
 class FootLoad:
@@ -30,7 +28,7 @@ class FootLoad:
     linkage : Linkage
     contacts : ContactArrays
     shape : str
-        Shape of the load over the gait cycle, one of `settings.LOAD_SHAPES`.
+        Shape of the load over the gait cycle, one of `settings.LOAD_SHAPES`; that of a known load goes first.
     is_measured, is_of_foot : bool
         Whether a measured force acts; whether it is measured along the axes of the foot.
 
@@ -55,69 +53,78 @@ class FootLoad:
         self.tables = build_tables(linkage, contacts)
         self.signature = np.zeros(POINTS + 1)
         self._contacts, self._shape, self._load = contacts, shape, 0.0
-        self._parts: list[tuple[NDArray[Any], ...]] = []
+        self._known = np.zeros((0, 2))
         self._measured = is_measured, is_of_foot
-        self.rows = load_rows(linkage, contacts, self.tables, *self._measured)
-        self._add_load(linkage)
+        self._learn(linkage)
 
-    def rebuild(self, linkage: Linkage) -> None:
-        """Set the tables, in place, to those of a leg with other masses or lengths, under the same load."""
-        load, self._load = self._load, 0.0
-        for own, table in self._pairs(build_tables(linkage, self._contacts)):
+    def rebuild(self, linkage: Linkage, known: Floats) -> None:
+        """Set the tables, in place, to those of a leg with other masses or lengths, under the same load.
+
+        Parameters
+        ----------
+        linkage : Linkage
+            Without the load.
+        known : (PHASES, 2) array
+            A load of the shape that the load has [N]; (0, 2) for the shape of the settings.
+        """
+        self._known = known
+        load, self._load, measured = self._load, 0.0, force_of(self.rows)
+        new: ClearanceTables = build_tables(linkage, self._contacts)
+        pairs: Iterable[tuple[NDArray[Any], NDArray[Any]]] = zip(self.tables, new, strict=True)
+        for own, table in pairs:
             own[...] = table
-        rows = load_rows(linkage, self._contacts, self.tables, *self._measured)
-        self._add_load(linkage)
+        self._learn(linkage)
         self.set(load)
-        set_force(rows, force_of(self.rows))
-        self.rows = rows
+        set_force(self.rows, measured)
 
-    def _add_load(self, linkage: Linkage) -> None:
-        """Learn what a load changes, if there is a toe; the tables are those without load."""
-        mechanism = linkage.mechanism
-        if mechanism.toe is not None:
-            self.signature[:], fraction = load_signature(linkage, self._shape)
-            force = _TRIAL_N * fraction[:, None] * upwards(mechanism)
-            loaded = build_linkage(with_toe_force(mechanism, force, "the twin's foot load"))
-            self._find_parts(build_tables(loaded, self._contacts))
-
-    def _pairs(self, tables: ClearanceTables) -> Iterable[tuple[NDArray[Any], NDArray[Any]]]:
-        """The own tables, each with the corresponding other one."""
-        return zip(self.tables, tables, strict=True)
-
-    def _find_parts(self, loaded: ClearanceTables) -> None:
-        """Find the columns that the load affects, their values without load and derivatives per newton."""
-        self._parts = []
-        for table, other in self._pairs(loaded):
-            flat = table.reshape(len(table), -1)  # a view
-            slope = (other.reshape(flat.shape) - flat) / _TRIAL_N
-            columns = np.flatnonzero(slope.any(axis=0))
-            if columns.size:
-                self._parts.append((flat, columns, flat[:, columns], slope[:, columns]))
+    def _learn(self, linkage: Linkage) -> None:
+        """Learn what a load changes; the tables are those without one."""
+        mechanism, known = linkage.mechanism, self._known
+        self._loaded = loaded_tables(linkage, self._contacts, self.tables)
+        self.rows = load_rows(linkage, self._loaded, *self._measured)
+        self._force = load_shape(linkage, self._shape)
+        if known.size:
+            self._force = known / (known @ upwards(mechanism)).max()
+        self.signature[:] = load_signature(linkage, self._force)
 
     def set(self, load: float) -> None:
         """Set the tables to a load [N], positive upwards."""
-        if load == self._load:
-            return
-        self._load = load
-        for flat, columns, bare, slope in self._parts:
-            flat[:, columns] = bare + load * slope
+        if load != self._load:
+            self._load = load
+            put_force(self._loaded, load * at_points(self._force))
 
 
-def load_signature(linkage: Linkage, shape: str = STANCE) -> tuple[Floats, Floats]:
-    """Drive torque by a unit load up at the toe (POINTS + 1,) [N m/N], and the load's fraction (PHASES,).
+def load_shape(linkage: Linkage, shape: str = STANCE) -> Floats:
+    """Force on the toe (PHASES, 2), over its largest vertical part; zeros for a mechanism without a toe."""
+    mechanism = linkage.mechanism
+    if mechanism.toe is None:
+        return np.zeros((PHASES, 2))
+    if shape == GROUND:
+        return nominal_stance(linkage).force()
+    up = upwards(mechanism)
+    position, _, _ = point_motion(one_cycle(linkage, PHASES, 1.0), linkage, *mechanism.toe)
+    return np.outer(_fraction(position @ up, shape), up)
+
+
+def load_signature(linkage: Linkage, force: Floats | None = None) -> Floats:
+    """Drive torque (POINTS + 1,) [N m/N] by a force on the toe (PHASES, 2); by default a push in stance.
 
     Zeros for a mechanism without a toe.
     """
-    mechanism = linkage.mechanism
-    if mechanism.toe is None:
-        return np.zeros(POINTS + 1), np.zeros(PHASES)
-    up = upwards(mechanism)
-    position, velocity, _ = point_motion(one_cycle(linkage, POINTS, 1.0), linkage, *mechanism.toe)
-    fraction = _load_fraction(position @ up, shape)
-    phases = np.arange(POINTS) / POINTS * PHASES
-    along = np.interp(phases, np.arange(PHASES + 1), np.append(fraction, fraction[0]))
-    signature = -along * (velocity @ up)
-    return np.append(signature, signature[0]), fraction
+    toe = linkage.mechanism.toe
+    if toe is None:
+        return np.zeros(POINTS + 1)
+    force = load_shape(linkage) if force is None else force
+    _, velocity, _ = point_motion(one_cycle(linkage, POINTS, 1.0), linkage, *toe)
+    signature = -(at_points(force) * velocity).sum(axis=1)
+    return np.append(signature, signature[0])
+
+
+def at_points(force: Floats) -> Floats:
+    """A force (PHASES, 2) at the points of the leg's tables (POINTS, 2)."""
+    phases = np.arange(POINTS) / POINTS * len(force)
+    place = np.arange(len(force))
+    return np.stack([np.interp(phases, place, one, period=len(force)) for one in force.T], axis=1)
 
 
 def torque_size(linkage: Linkage, speed: float) -> float:
@@ -125,9 +132,9 @@ def torque_size(linkage: Linkage, speed: float) -> float:
     return float(np.sqrt(np.mean(one_cycle(linkage, POINTS, speed).drive_torque ** 2)))
 
 
-def _load_fraction(height: Floats, shape: str) -> Floats:
-    """Fraction (PHASES,) of the full load at equal crank steps, from the toe's height (POINTS,) [m]."""
+def _fraction(height: Floats, shape: str) -> Floats:
+    """Fraction (n,) of the full load at equal crank steps, from the toe's height (n,) [m]."""
     if shape != STANCE:
-        return np.ones(PHASES)
-    depth = np.maximum(0.0, height.mean() - height)[:: POINTS // PHASES]
+        return np.ones(len(height))
+    depth = np.maximum(0.0, height.mean() - height)
     return np.asarray(depth / (depth.max() or 1.0))

@@ -9,21 +9,18 @@ samples at 200 Hz, 2026-11-25). So the mean over gait cycles acts, with the filt
 import math
 from typing import NamedTuple
 
-import attrs
 import numpy as np
 
-from leg_wear_monitor.contact.arrays import ContactArrays
-from leg_wear_monitor.dynamics.clearance.tables import COARSER, POINTS, ClearanceTables, build_tables
+from leg_wear_monitor.dynamics.clearance.tables import COARSER, POINTS
+from leg_wear_monitor.dynamics.clearance.toe_force import LoadedTables, put_force
 from leg_wear_monitor.kernel import kernel
-from leg_wear_monitor.mechanism.arrays import Floats, Ints, Singles, body_names
+from leg_wear_monitor.mechanism.arrays import Floats, body_names
 from leg_wear_monitor.mechanism.ground_reaction import upwards
 from leg_wear_monitor.mechanism.ideal import one_cycle
-from leg_wear_monitor.mechanism.position import Linkage, build_linkage
-from leg_wear_monitor.mechanism.spec import ConstantLoad
+from leg_wear_monitor.mechanism.position import Linkage
 from leg_wear_monitor.twin.follower.low_pass import pass_low
 from leg_wear_monitor.twin.steps import AHEAD_NS
 
-_TRIAL_N = 100.0
 _STAGE_S = 0.5e-9 * AHEAD_NS  # time constant of each of the two stages of the departure's filter
 LONGEST_PUSH = 0.05  # s: longest time between samples that is no gap; at twenty a second a stance has eight
 _LEARNED = 10.0  # gait cycles of the mean force
@@ -31,14 +28,6 @@ _LEARNED = 10.0  # gait cycles of the mean force
 # to 30 N are the least force of a standing foot. A jump between them would be an impact.
 _NONE, _SURE = 0.02, 0.08
 _MARGIN = COARSER  # rows beyond the next sample, of which the present rows of all tables need one
-
-
-class LoadedTable(NamedTuple):
-    """A table that the force changes: its rows (n, w), columns (c,), parts (3, n, c): bare, per x, per y."""
-
-    rows: Floats | Singles
-    columns: Ints
-    parts: Floats
 
 
 class LoadRows(NamedTuple):
@@ -56,8 +45,7 @@ class LoadRows(NamedTuple):
         Mean force over gait cycles, or (0, 2) [N].
     learned : (N,) array
         Gait cycles in it, as far as they count.
-    motion, reaction, stored, by_e : LoadedTable
-        Those of `ClearanceTables`.
+    tables : LoadedTables
     """
 
     force: Floats
@@ -65,25 +53,16 @@ class LoadRows(NamedTuple):
     up: Floats
     mean: Floats
     learned: Floats
-    motion: LoadedTable
-    reaction: LoadedTable
-    stored: LoadedTable
-    by_e: LoadedTable
+    tables: LoadedTables
 
 
-_TABLES = LoadRows._fields[5:]
-
-
-def load_rows(
-    linkage: Linkage, contacts: ContactArrays, tables: ClearanceTables, acts: bool, is_of_foot: bool
-) -> LoadRows:
+def load_rows(linkage: Linkage, tables: LoadedTables, acts: bool, is_of_foot: bool) -> LoadRows:
     """Rows without a force.
 
     Parameters
     ----------
     linkage : Linkage
-    contacts : ContactArrays
-    tables : ClearanceTables
+    tables : LoadedTables
         Of this linkage, which the kernels change.
     acts : bool
         Whether the force acts on the leg.
@@ -92,28 +71,8 @@ def load_rows(
     """
     mechanism = linkage.mechanism
     force = np.zeros((POINTS if acts and mechanism.toe else 0, 2))
-    loaded = []
-    if len(force) and mechanism.toe:
-        body, point = mechanism.toe
-        for push in ((_TRIAL_N, 0.0), (0.0, _TRIAL_N)):
-            trial = ConstantLoad(body=body, point=point, force=push)
-            pushed = attrs.evolve(mechanism, loads={**mechanism.loads, "the twin's foot load": trial})
-            loaded.append(build_tables(build_linkage(pushed), contacts))
-    parts = [
-        _loaded_table(getattr(tables, name), [getattr(other, name) for other in loaded]) for name in _TABLES
-    ]
     axis, up = _axis(linkage, is_of_foot), upwards(mechanism)
-    return LoadRows(force, axis, up, force.copy(), np.zeros(len(force)), *parts)
-
-
-def _loaded_table(table: Floats | Singles, others: list[Floats | Singles]) -> LoadedTable:
-    rows = table.reshape(len(table), -1)  # a view
-    if not others:
-        return LoadedTable(rows[:0], np.zeros(0, np.int64), np.zeros((3, 0, 0)))
-    slopes = [(other.reshape(rows.shape).astype(float) - rows) / _TRIAL_N for other in others]
-    columns = np.flatnonzero(np.any(slopes, axis=(0, 1)))
-    parts = np.stack([rows.astype(float), *slopes])[:, :, columns]
-    return LoadedTable(rows, columns.astype(np.int64), np.ascontiguousarray(parts))
+    return LoadRows(force, axis, up, force.copy(), np.zeros(len(force)), tables)
 
 
 def _axis(linkage: Linkage, is_of_foot: bool) -> Floats:
@@ -219,11 +178,11 @@ def put_row(load, row):
     fx, fy = load.force[row, 0], load.force[row, 1]
     for i in range(2 if row == 0 else 1):
         at = row + i * load.force.shape[0]
-        _put(load.motion, at, fx, fy)
-        _put(load.reaction, at, fx, fy)
-        _put(load.stored, at, fx, fy)
+        _put(load.tables.motion, at, fx, fy)
+        _put(load.tables.reaction, at, fx, fy)
+        _put(load.tables.stored, at, fx, fy)
         if at % COARSER == 0:
-            _put(load.by_e, at // COARSER, fx, fy)
+            _put(load.tables.by_e, at // COARSER, fx, fy)
 
 
 @kernel
@@ -231,16 +190,6 @@ def _put(table, row, fx, fy):
     for j in range(table.columns.shape[0]):
         part = table.parts[0, row, j] + fx * table.parts[1, row, j] + fy * table.parts[2, row, j]
         table.rows[row, table.columns[j]] = part
-
-
-def put_all(load: LoadRows) -> None:
-    """Set the tables to the force of all rows, as `put_row` does."""
-    if len(load.force):
-        fine = np.concatenate([load.force, load.force[:1]])
-        for name in _TABLES:
-            table: LoadedTable = getattr(load, name)
-            fx, fy = fine[:: COARSER if name == "by_e" else 1].T[:, :, None]
-            table.rows[:, table.columns] = table.parts[0] + fx * table.parts[1] + fy * table.parts[2]
 
 
 def force_of(load: LoadRows) -> tuple[Floats, ...]:
@@ -252,4 +201,5 @@ def set_force(load: LoadRows, force: tuple[Floats, ...]) -> None:
     """Set it, and the tables with it."""
     for own, value in zip((load.force, load.mean, load.learned), force, strict=True):
         own[:] = value
-    put_all(load)
+    if len(load.force):
+        put_force(load.tables, load.force)

@@ -4,6 +4,7 @@ import attrs
 import numpy as np
 
 from leg_wear_monitor.mechanism.arrays import Floats
+from leg_wear_monitor.mechanism.ground_reaction import with_toe_force
 from leg_wear_monitor.mechanism.spec import Mechanism
 
 MASS_TOLERANCE = (
@@ -18,7 +19,7 @@ COUPLING_DAMPING = 0.05
 
 @attrs.frozen
 class LegParameters:
-    """Factors on the parameters of a mechanism, and the compliance of its drive.
+    """Factors on the parameters of a mechanism, the compliance of its drive, and the ground under its toe.
 
     Attributes
     ----------
@@ -31,6 +32,8 @@ class LegParameters:
         Of what is between the measured crank angle and the crank [rad/(N m)], at the crank; 0 if it is rigid.
     damping : float
         Of the crank on a compliant drive, over the critical one with the mean inertia of the ideal leg.
+    load : (PHASES, 2) array
+        Mean force of the ground on the toe at equal steps of the crank angle from 0 [N]; (0, 2) without one.
     """
 
     mass: Floats = attrs.field(eq=attrs.cmp_using(eq=np.array_equal))
@@ -38,11 +41,17 @@ class LegParameters:
     friction: float = 1.0
     compliance: float = 0.0
     damping: float = COUPLING_DAMPING
+    load: Floats = attrs.field(factory=lambda: np.zeros((0, 2)), eq=attrs.cmp_using(eq=np.array_equal))
 
     @classmethod
     def none(cls, mechanism: Mechanism) -> "LegParameters":
         """Factors of the mechanism as it is."""
         return cls(np.ones(len(mechanism.bodies)), np.ones(len(mechanism.bodies)))
+
+    @property
+    def in_air(self) -> "LegParameters":
+        """Those of the leg without a load."""
+        return attrs.evolve(self, load=np.zeros((0, 2)))
 
     def applied(self, mechanism: Mechanism) -> Mechanism:
         """The mechanism with these factors; the compliance is none of it."""
@@ -62,7 +71,8 @@ class LegParameters:
             )
             for joint, one in mechanism.clearances.items()
         }
-        return attrs.evolve(mechanism, bodies=bodies, clearances=clearances)
+        leg = attrs.evolve(mechanism, bodies=bodies, clearances=clearances)
+        return with_toe_force(leg, self.load) if self.load.size else leg
 
 
 def _scaled(place: tuple[float, float], factor: float) -> tuple[float, float]:

@@ -1,5 +1,7 @@
 """The drive torque of simulated legs, whose crank turns in the same way in each gait cycle."""
 
+from collections.abc import Iterator
+
 import numpy as np
 
 from leg_wear_monitor.dynamics.clearance.advance import ADVANCE
@@ -7,6 +9,8 @@ from leg_wear_monitor.dynamics.clearance.basis import is_damped
 from leg_wear_monitor.dynamics.clearance.coupling import Coupling, coupling_of, rigid_coupling
 from leg_wear_monitor.dynamics.clearance.model import ClearanceModel
 from leg_wear_monitor.dynamics.clearance.stepper import INTERVALS, ClearanceStepper
+from leg_wear_monitor.dynamics.clearance.tables import POINTS as TABLE_POINTS
+from leg_wear_monitor.dynamics.clearance.toe_force import LoadedTables, loaded_tables, put_force
 from leg_wear_monitor.dynamics.run.drive import quintic
 from leg_wear_monitor.dynamics.run.protocol import DONE, Setup
 from leg_wear_monitor.dynamics.run.run_statistics import TORQUE, new_run_statistics
@@ -21,21 +25,35 @@ from leg_wear_monitor.twin.reference.reference import worn_to
 
 POINTS = INTERVALS // 4  # of a gait cycle: whole intervals of the stepper
 
+# scatter of the ground's force from step to step, of its size and of its time in a gait cycle
+_SIZE, _TIMING, _SEED = 0.1, 0.02, 20261125
+
 _advance = ADVANCE.call
 
 
 @entry
 def simulate_torque(
-    advance_address, model, feeds_back, state, pieces, period, turn, statistics, work, polynomial, torque
+    advance_address,
+    model,
+    feeds_back,
+    state,
+    pieces,
+    period,
+    turn,
+    first,
+    statistics,
+    work,
+    polynomial,
+    torque,
 ):
-    """Simulate gait cycles, and write their mean torques between equal steps of time.
+    """Simulate gait cycles from the one with the number ``first``; write mean torques between equal times.
 
-    ``pieces`` (POINTS, 7) are the crank's motion in the first cycle, which takes ``period`` [s] for ``turn``
+    ``pieces`` (POINTS, 7) are the crank's motion in cycle 0, and a cycle takes ``period`` [s] for ``turn``
     [rad]; ``torque`` (cycles, POINTS) [N m]. Returns DONE, or the reason for stopping.
     """
     cycles, points = torque.shape
     impulse = statistics.drive_integral[TORQUE]
-    for cycle in range(cycles):
+    for cycle in range(first, first + cycles):
         for i in range(points):
             for j in range(polynomial.shape[0]):
                 polynomial[j] = pieces[i, j]
@@ -49,7 +67,7 @@ def simulate_torque(
             if status != DONE:
                 return status
             before, impulse = impulse, statistics.drive_integral[TORQUE]
-            torque[cycle, i] = (impulse - before) * (points / period)
+            torque[cycle - first, i] = (impulse - before) * (points / period)
     return DONE
 
 
@@ -64,6 +82,7 @@ class LegSimulation:
     def __init__(self, mechanism: Mechanism) -> None:
         self._mechanism = mechanism
         self._parameters: LegParameters | None = None
+        self._loaded: LoadedTables | None = None
 
     def torque(
         self,
@@ -109,19 +128,41 @@ class LegSimulation:
         stepper.init(motions[0].angle, motions[0].speed)
         statistics = new_run_statistics(len(self._mechanism.joints))
         polynomial, torque = np.empty(7), np.empty((cycles, POINTS))
-        status = simulate_torque(
-            stepper.advance_address(polynomial, statistics), stepper.model,
-            self._setup.surfaces.feeds_back, stepper.state, pieces, period, turn, statistics, stepper.work,
-            polynomial, torque,
-        )  # fmt: skip
-        return torque if status == DONE else None
+        address = stepper.advance_address(polynomial, statistics)
+        for first, last in self._steps_alike(parameters.load, cycles):
+            status = simulate_torque(
+                address, stepper.model, self._setup.surfaces.feeds_back, stepper.state, pieces, period, turn,
+                first, statistics, stepper.work, polynomial, torque[first:last],
+            )  # fmt: skip
+            if status != DONE:
+                return None
+        return torque
+
+    def _steps_alike(self, load: Floats, cycles: int) -> Iterator[tuple[int, int]]:
+        """Gait cycles, from the first to before the last, under the same load, which acts on the leg.
+
+        A force that were the same in each step would let impacts fall at the same phases.
+        """
+        if self._loaded is None:
+            yield 0, cycles
+            return
+        random, place = np.random.default_rng(_SEED), np.arange(len(load)) / len(load)
+        phase = np.arange(TABLE_POINTS) / TABLE_POINTS
+        for cycle in range(cycles):
+            factor, late = 1.0 + _SIZE * random.standard_normal(), _TIMING * random.standard_normal()
+            force = [factor * np.interp(phase - late, place, one, period=1.0) for one in load.T]
+            put_force(self._loaded, np.stack(force, axis=1))
+            yield cycle, cycle + 1
 
     def _prepare(self, parameters: LegParameters) -> None:
         """Prepare the simulation of legs with given masses, lengths and friction."""
-        self._setup = prepare(parameters.applied(self._mechanism), wear=True)
+        self._setup = prepare(parameters.in_air.applied(self._mechanism), wear=True)
         self._setup.contacts.wear_coefficient[:] = 0.0
         self._fresh = self._setup.contacts.clearance.copy()
         self._tables = ClearanceStepper(self._setup).model.tables
+        self._loaded = None
+        if parameters.load.size:
+            self._loaded = loaded_tables(self._setup.linkage, self._setup.contacts, self._tables)
         self._parameters = parameters
 
 

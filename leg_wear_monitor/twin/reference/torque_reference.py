@@ -191,6 +191,12 @@ class TorqueReferenceRun:
                 legs.append(_Leg(parameters, other))
         self._begin(legs, depth, profile)
 
+    def begin_expected(
+        self, clearance_m: Floats, depth: Floats, profile: CrankProfile, parameters: LegParameters
+    ) -> None:
+        """Begin the expected leg alone, as of `begin`."""
+        self._begin([_Leg(parameters, np.maximum(clearance_m, _LEAST_CLEARANCE_M))], depth, profile)
+
     def go_on(self, part: TorqueReference, depth: Floats) -> None:
         """Go on with a reference, or an identification, whose first legs were simulated in an earlier run.
 

@@ -9,6 +9,7 @@ from hypothesis import strategies as st
 import leg_wear_monitor as lw
 from leg_wear_monitor import Mechanism
 from leg_wear_monitor.dynamics.clearance.tables import POINTS, build_tables
+from leg_wear_monitor.dynamics.clearance.toe_force import loaded_tables, put_force
 from leg_wear_monitor.dynamics.simulation import prepare
 from leg_wear_monitor.errors import LegWearError
 from leg_wear_monitor.mechanism.arrays import Floats, body_names
@@ -16,7 +17,6 @@ from leg_wear_monitor.mechanism.ground_reaction import nominal_stance, with_toe_
 from leg_wear_monitor.mechanism.ideal import TURN, one_cycle
 from leg_wear_monitor.mechanism.position import build_linkage
 from leg_wear_monitor.twin.digital_twin import DigitalTwin, TwinSnapshot
-from leg_wear_monitor.twin.follower.measured_load import load_rows, put_all
 from leg_wear_monitor.twin.kinds import LOAD
 from leg_wear_monitor.twin.sample import Samples, gait_samples
 from leg_wear_monitor.twin.settings import TwinSettings
@@ -61,9 +61,7 @@ def pushed(crank: Samples, stance: Floats, rate_hz: float, noise_n: float = 0.0)
 def test_rows_with_a_force_are_those_of_the_loaded_leg(leg, stance):
     setup = prepare(leg)
     tables = build_tables(setup.linkage, setup.contacts)
-    rows = load_rows(setup.linkage, setup.contacts, tables, acts=True, is_of_foot=False)
-    rows.force[:] = stance
-    put_all(rows)
+    put_force(loaded_tables(setup.linkage, setup.contacts, tables), stance)
     wanted = build_tables(build_linkage(with_toe_force(leg, stance)), setup.contacts)
     for name, table, other in zip(tables._fields, tables, wanted, strict=True):
         rounding = 4.0 * float(np.finfo(np.float32).eps) if table.dtype == np.float32 else 1.0e-9

@@ -42,6 +42,7 @@ _DECLARED_FRICTION = 0.03  # error of a declared one
 # lengths, bias, scale and load; or, on the ground, anything in the first harmonics of the mean torque
 _MEAN, _ROUGHNESS, _CLEARANCE = 0.05, 0.4, math.log(1.25)
 _SPREADS = {Cause.MASS: 0.05, Cause.LENGTH: 0.005, Cause.FRICTION: 5.0, Cause.SCALE: 0.1, Cause.LOAD: 20.0}
+_UNKNOWN = 5.0  # times the usual changes, where these are larger
 _HARMONICS, _HARMONIC_NM = 16, 100.0
 
 
@@ -106,7 +107,11 @@ def channel_of(
     tell nothing. The more probable of the two decides.
     """
     variance = np.repeat([_MEAN * sensor.size_nm, _ROUGHNESS], sensor.phases) ** 2
-    known = [_SPREADS[one.cause] * one.column for one in nuisances if one.cause in _SPREADS]
+    known = [
+        max(_SPREADS[one.cause], _UNKNOWN * one.spread) * one.column
+        for one in nuisances
+        if one.cause in _SPREADS
+    ]
     is_declared = not math.isnan(figures.load_friction)
     friction = (figures.load_friction, _DECLARED_FRICTION) if is_declared else (0.0, _FRICTION)
     in_air = _Leg(np.diag(variance) + _products(np.array(known)), *friction)

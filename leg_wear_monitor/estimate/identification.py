@@ -13,6 +13,7 @@ size.
 import math
 from collections.abc import Sequence
 
+import attrs
 import numpy as np
 
 from leg_wear_monitor.errors import AssemblyError
@@ -97,11 +98,12 @@ def identified_leg(
     found = before + np.linalg.solve(information, weighted.T @ rest - before / sigma**2)
     mass, length, (log_friction, *log_compliance) = np.split(found, [bodies, 2 * bodies])
     compliance = near.compliance * math.exp(sum(log_compliance))
-    return LegParameters(1.0 + mass, 1.0 + length, math.exp(log_friction), compliance, near.damping)
+    friction = math.exp(log_friction)
+    return attrs.evolve(near, mass=1.0 + mass, length=1.0 + length, friction=friction, compliance=compliance)
 
 
 def leg_of_ideal_torque(
-    mechanism: Mechanism, model: SignatureModel, commissioned: CommissionedTorque, speed: float
+    mechanism: Mechanism, model: SignatureModel, commissioned: CommissionedTorque, speed: float, load: Floats
 ) -> LegParameters:
     """Masses and lengths near those of a leg far from its file, by the torque with ideal joints.
 
@@ -116,13 +118,15 @@ def leg_of_ideal_torque(
     commissioned : CommissionedTorque
     speed : float
         Of the crank [rad/s].
+    load : (PHASES, 2) array
+        Of the model's leg [N], or none.
     """
     phases, bodies = model.sensor.phases, len(mechanism.bodies)
     unit = _IDEAL * model.sensor.size_nm
     rest = (commissioned.mean - model.at(commissioned.clearance_m)[0])[:phases]
 
     def bodies_at(x: Floats) -> LegParameters:
-        return LegParameters(1.0 + _FAR * x[:bodies], 1.0 + _FAR * x[bodies:])
+        return LegParameters(1.0 + _FAR * x[:bodies], 1.0 + _FAR * x[bodies:], load=load)
 
     def residual(x: Floats) -> Floats:
         torque = ideal_torque(bodies_at(x).applied(mechanism), speed) - of_file
@@ -137,7 +141,7 @@ def leg_of_ideal_torque(
         steps = _STEP * np.eye(len(x))
         return Point(now, lambda: np.array([residual(x + one) - now for one in steps]).T / _STEP)
 
-    of_file = ideal_torque(mechanism, speed)
+    of_file = ideal_torque(bodies_at(np.zeros(2 * bodies)).applied(mechanism), speed)
     return bodies_at(gauss_newton(at, np.zeros(2 * bodies), done=_DONE).x)
 
 

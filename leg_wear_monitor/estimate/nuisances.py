@@ -11,10 +11,11 @@ from leg_wear_monitor.estimate.ideal_signature import signature_of_torque
 from leg_wear_monitor.estimate.signature import TorqueSensor
 from leg_wear_monitor.estimate.signature_model import simulated_signatures
 from leg_wear_monitor.mechanism.arrays import Floats
+from leg_wear_monitor.mechanism.ground_reaction import nominal_stance
 from leg_wear_monitor.mechanism.ideal import TURN
-from leg_wear_monitor.mechanism.position import build_linkage
+from leg_wear_monitor.mechanism.position import Linkage, build_linkage
 from leg_wear_monitor.mechanism.spec import Mechanism
-from leg_wear_monitor.twin.follower.load import load_signature
+from leg_wear_monitor.twin.follower.load import load_shape, load_signature
 from leg_wear_monitor.twin.reference.leg_parameters import MASS_TOLERANCE
 from leg_wear_monitor.twin.reference.torque_reference import TorqueReference
 
@@ -24,6 +25,8 @@ _SCALE = 0.02
 _OFFSET_RAD = 0.01  # a lag of 1.6 ms at 60 rpm, or a crank offset: at one speed the two look alike
 _LOAD_N = 5.0
 _LOAD_FRICTION = 0.03  # a gear that warms up
+# of the ground's peak: its mean over some steps, and the harmonics of its vertical and fore-aft shape
+_LOAD_FRACTION, _VERTICAL, _FORE_AFT, _SHAPES = 0.05, 0.01, 0.005, 8
 
 # of a leg that was never commissioned: tolerances of bodies, and what else the model may have wrong
 _TOLERANCES = {Cause.MASS: MASS_TOLERANCE, Cause.LENGTH: 0.005}
@@ -56,11 +59,30 @@ def nuisances(mechanism: Mechanism, reference: TorqueReference, sensor: TorqueSe
         Nuisance(Cause.LOAD_FRICTION, "", rubbing, _LOAD_FRICTION),
     ]
     if mechanism.toe is not None:
-        lever, _ = load_signature(build_linkage(mechanism))
-        found.append(Nuisance(Cause.LOAD, "", signature_of_torque(lever[:-1], phases), _LOAD_N))
+        found += _loads(build_linkage(reference.parameters.in_air.applied(mechanism)), reference, sensor)
     for name, mass, length in zip(mechanism.bodies, *body_torques(mechanism).at(speed), strict=True):
         found.append(Nuisance(Cause.MASS, name, signature_of_torque(mass, phases), 0.0))
         found.append(Nuisance(Cause.LENGTH, name, signature_of_torque(length, phases), 0.0))
+    return found
+
+
+def _loads(linkage: Linkage, reference: TorqueReference, sensor: TorqueSensor) -> list[Nuisance]:
+    """The ground's force: its size, and for a leg that walks under one its shape, too."""
+    known, usual = reference.parameters.load, [(load_shape(linkage), _LOAD_N)]
+    if known.size:
+        stance = nominal_stance(linkage)
+        peak_n = float((known @ stance.up).max())
+        s, order = stance.fractions(), np.arange(1, _SHAPES + 1)
+        waves = np.where(s <= 1.0, np.sin(0.5 * TURN * np.outer(order, s)), 0.0)
+        usual = [(known / peak_n, _LOAD_FRACTION * peak_n)]
+        usual += [(np.outer(one, stance.up), _VERTICAL * peak_n) for one in waves]
+        usual += [(np.outer(one, stance.back), _FORE_AFT * peak_n) for one in waves]
+    speed, found = reference.profile.speed, []
+    channel = attrs.evolve(sensor.channel, load_friction=0.0)
+    for force, spread in usual:
+        torque = load_signature(linkage, force)[:-1]
+        received = channel.received(torque, TURN / abs(speed) / len(torque), float(np.sign(speed)))
+        found.append(Nuisance(Cause.LOAD, "", signature_of_torque(received, sensor.phases), spread))
     return found
 
 

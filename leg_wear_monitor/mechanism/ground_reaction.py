@@ -52,10 +52,14 @@ class Stance:
             Largest fore-aft force, over the largest vertical one.
         points : int, optional
         """
+        vertical, along = stance_template(self.fractions(points))
+        return np.outer(vertical, self.up) + fore_aft * np.outer(along, self.back)
+
+    def fractions(self, points: int = PHASES) -> Floats:
+        """Fractions (points,) of stance at equal steps of the crank angle from 0; above 1 it is over."""
         whole = (self.turned * (self.toe_off - self.heel_strike)) % 1.0
         since = (self.turned * (np.arange(points) / points - self.heel_strike)) % 1.0
-        vertical, along = stance_template(since / whole)
-        return np.outer(vertical, self.up) + fore_aft * np.outer(along, self.back)
+        return np.asarray(since / whole)
 
 
 def stance_template(s: Floats) -> tuple[Floats, Floats]:

@@ -138,7 +138,7 @@ class Parts:
             return None
         order = [known.names.index(name) for name in self.mechanism.bodies]
         bodies = np.array(known.mass)[order], np.array(known.length)[order]
-        return LegParameters(*bodies, known.friction, known.compliance, known.damping)
+        return LegParameters(*bodies, known.friction, known.compliance, known.damping, known.load)
 
     def _known_references(self, ledger: Ledger | None) -> list[TorqueReference]:
         """Torque references of the ledger, their parameters in the order of the mechanism."""
@@ -179,7 +179,7 @@ class Parts:
     def _counted_bodies(self) -> tuple[Body, ...]:
         """Bodies of the twin; none where its parameters are those of the mechanism file."""
         own = self.twin.parameters
-        if attrs.evolve(own, compliance=0.0) == LegParameters.none(self.mechanism):
+        if attrs.evolve(own.in_air, compliance=0.0) == LegParameters.none(self.mechanism):
             return ()
         factors = zip(self.mechanism.bodies, own.mass.tolist(), own.length.tolist(), strict=True)
         return tuple(Body(*one) for one in factors)

@@ -242,7 +242,9 @@ class Processing:
         names = tuple(self._parts.mechanism.bodies)
         stamp_ns = self._twin.intake.followed_stamp_ns
         factors = tuple(found.mass.tolist()), tuple(found.length.tolist()), found.friction
-        self._accounting.note(IdentifiedLeg(stamp_ns, names, *factors, found.compliance, found.damping))
+        self._accounting.note(
+            IdentifiedLeg(stamp_ns, names, *factors, found.compliance, found.damping, found.load)
+        )
         self._parts.state.growth = tuple(GrowthWindow() for _ in self._clearance_joints)
         self._parts.keep()
 

@@ -314,6 +314,8 @@ class IdentifiedLeg:
         In all joints.
     compliance, damping : float
         Between the measured crank angle and the crank [rad/(N m)]; of the critical damping.
+    load : (n, 2) array
+        Force of the ground on the toe at equal steps of the crank angle from 0 [N]; (0, 2) without one.
     """
 
     stamp_ns: int
@@ -323,6 +325,7 @@ class IdentifiedLeg:
     friction: float
     compliance: float = 0.0
     damping: float = COUPLING_DAMPING
+    load: Floats = attrs.field(factory=lambda: np.zeros((0, 2)), eq=attrs.cmp_using(eq=np.array_equal))
 
 
 @attrs.frozen(eq=False)

@@ -8,6 +8,7 @@ import numpy as np
 
 from leg_wear_monitor.estimate.commissioned_torque import CommissionedTorque
 from leg_wear_monitor.estimate.signature import Channel
+from leg_wear_monitor.mechanism.arrays import Floats
 from leg_wear_monitor.monitor.alarms.alarm import Alarm, Level
 from leg_wear_monitor.monitor.ledger.entry import (
     AlarmEvent,
@@ -27,7 +28,7 @@ from leg_wear_monitor.monitor.ledger.entry import (
 )
 from leg_wear_monitor.monitor.ledger.run import Run
 from leg_wear_monitor.twin.reference.crank_profile import UNLIKE, CrankProfile
-from leg_wear_monitor.twin.reference.leg_parameters import LegParameters
+from leg_wear_monitor.twin.reference.leg_parameters import COUPLING_DAMPING, LegParameters
 from leg_wear_monitor.twin.reference.leg_simulation import POINTS
 from leg_wear_monitor.twin.reference.torque_reference import CADENCES, CYCLES, TorqueReference
 
@@ -126,6 +127,8 @@ def write_event(db: sqlite3.Connection, event: Event) -> None:
                 "INSERT INTO drive (stamp_ns, compliance_rad_per_nm, damping_ratio) VALUES (?, ?, ?)",
                 (stamp_ns, event.compliance, event.damping),
             )
+            force = event.load.astype("<f8").tobytes()
+            db.execute("INSERT INTO ground_load (stamp_ns, force_n) VALUES (?, ?)", (stamp_ns, force))
             db.executemany(
                 "INSERT INTO body (stamp_ns, name, mass, length) VALUES (?, ?, ?, ?)",
                 [(stamp_ns, *factors) for factors in zip(names, mass, length, strict=True)],
@@ -218,7 +221,8 @@ def read_commissioned_torques(db: sqlite3.Connection) -> list[CommissionedTorque
 def read_identified_leg(db: sqlite3.Connection) -> IdentifiedLeg | None:
     """Masses, lengths, friction and drive of the leg, None if they were not identified.
 
-    Rows of older formats were identified with the friction of the mechanism file, or with a rigid drive.
+    Rows of older formats were identified with the friction of the mechanism file, with a rigid drive, or in
+    the air.
     """
     rows = db.execute(
         "SELECT stamp_ns, name, mass, length FROM body "
@@ -227,11 +231,19 @@ def read_identified_leg(db: sqlite3.Connection) -> IdentifiedLeg | None:
     if not rows:
         return None
     stamps, names, mass, length = zip(*rows, strict=True)
-    friction, drive = (
+    friction, drive, load = (
         db.execute(f"SELECT {value} FROM {table} WHERE stamp_ns = ? ORDER BY id DESC", stamps[:1]).fetchone()
-        for table, value in (("friction", "factor"), ("drive", "compliance_rad_per_nm, damping_ratio"))
+        for table, value in (
+            ("friction", "factor"),
+            ("drive", "compliance_rad_per_nm, damping_ratio"),
+            ("ground_load", "force_n"),
+        )
     )
-    return IdentifiedLeg(stamps[0], names, mass, length, friction[0] if friction else 1.0, *(drive or ()))
+    compliance, damping = drive or (0.0, COUPLING_DAMPING)
+    factor = friction[0] if friction else 1.0
+    return IdentifiedLeg(
+        stamps[0], names, mass, length, factor, compliance, damping, _force(load[0] if load else b"")
+    )
 
 
 def _write_reference(db: sqlite3.Connection, event: SimulatedReference) -> None:
@@ -264,6 +276,7 @@ def _reference_values(event: SimulatedReference) -> tuple[float | bytes | str, .
         leg.friction,
         leg.compliance,
         leg.damping,
+        leg.load.astype("<f8").tobytes(),
         reference.torque_nm[0].astype("<f2").tobytes(),
         b"".join(one.astype("<f2").tobytes() for one in reference.torque_nm[1:]),
     )
@@ -276,7 +289,7 @@ def read_simulated_references(db: sqlite3.Connection) -> list[SimulatedReference
     """
     rows = db.execute(
         "SELECT is_whole, stamp_ns, bodies, speed_radps, legs, friction, compliance_rad_per_nm, "
-        "damping_ratio, ripple_rad, clearance_m, mass, length, expected_torque_nm, torque_nm "
+        "damping_ratio, load_n, ripple_rad, clearance_m, mass, length, expected_torque_nm, torque_nm "
         "FROM torque_reference ORDER BY id DESC"
     )
     return [_reference_of(*row) for row in rows]
@@ -291,6 +304,7 @@ def _reference_of(
     friction: float,
     compliance: float,
     damping: float,
+    load_n: bytes,
     *parts: bytes,
 ) -> SimulatedReference:
     """Reference of a row."""
@@ -300,13 +314,18 @@ def _reference_of(
     )
     profile, leg = (
         CrankProfile(speed, *ripple.reshape(2, -1)),
-        LegParameters(mass, length, friction, compliance, damping),
+        LegParameters(mass, length, friction, compliance, damping, _force(load_n)),
     )
     reference = TorqueReference(profile, known.reshape(legs, -1), (expected,), leg)
     cycles = len(expected) if reference.is_of_parameters else CYCLES
     shape = (legs - 1, -1, POINTS) if is_whole else (-1, cycles, POINTS)
     reference = attrs.evolve(reference, torque_nm=(expected, *wider.reshape(shape)))
     return SimulatedReference(stamp_ns, tuple(bodies.split("\n")), reference)
+
+
+def _force(part: bytes) -> Floats:
+    """A force (n, 2) [N]."""
+    return np.frombuffer(part, "<f8").astype(float).reshape(-1, 2)
 
 
 def read_last_reset(db: sqlite3.Connection, joint: str) -> Audit | None:

@@ -468,9 +468,37 @@ INSERT INTO torque_reference SELECT id, is_whole, stamp_ns, speed_radps, ripple_
 DROP TABLE former;
 """
 
+_SIXTEENTH = """
+-- force of the ground on the toe that the drive torque shows (n, 2) [N], at equal steps of the crank angle
+-- from 0; float64, little endian; it belongs to the rows of body with the same stamp
+CREATE TABLE ground_load (id INTEGER PRIMARY KEY, stamp_ns INTEGER NOT NULL, force_n BLOB NOT NULL) STRICT;
+
+CREATE TEMP TABLE former AS SELECT * FROM torque_reference;
+DROP TABLE torque_reference;
+
+-- torque references that were simulated for this leg, one for each cadence (is_whole 1), and one whose
+-- simulation was not finished (0), whose torques are those of the first of its legs: speed of its crank
+-- [rad/s] and ripple (2, harmonics), clearances (legs, k), bodies (a line each) and their factors on masses
+-- and lengths of the mechanism file, the factor on its friction, the compliance of its drive, 0 if it is
+-- rigid, and the damping on it, the force of the ground (n, 2) [N], empty without one, and drive torques
+-- [N m] of the expected leg and of the other ones (cycles, points each; half as many cycles); float64 and,
+-- of torques, float16, little endian
+CREATE TABLE torque_reference (
+    id INTEGER PRIMARY KEY, is_whole INTEGER NOT NULL, stamp_ns INTEGER NOT NULL, speed_radps REAL NOT NULL,
+    ripple_rad BLOB NOT NULL, clearance_m BLOB NOT NULL, legs INTEGER NOT NULL, bodies TEXT NOT NULL,
+    mass BLOB NOT NULL, length BLOB NOT NULL, friction REAL NOT NULL, compliance_rad_per_nm REAL NOT NULL,
+    damping_ratio REAL NOT NULL, load_n BLOB NOT NULL, expected_torque_nm BLOB NOT NULL,
+    torque_nm BLOB NOT NULL
+) STRICT;
+INSERT INTO torque_reference SELECT id, is_whole, stamp_ns, speed_radps, ripple_rad, clearance_m, legs,
+    bodies, mass, length, friction, compliance_rad_per_nm, damping_ratio,
+    zeroblob(0), expected_torque_nm, torque_nm FROM former;
+DROP TABLE former;
+"""
+
 MIGRATIONS = (
     _FIRST, _SECOND, _THIRD, _FOURTH, _FIFTH, _SIXTH, _SEVENTH, _EIGHTH, _NINTH, _TENTH, _ELEVENTH, _TWELFTH,
-    _THIRTEENTH, _FOURTEENTH, _FIFTEENTH,
+    _THIRTEENTH, _FOURTEENTH, _FIFTEENTH, _SIXTEENTH,
 )  # fmt: skip
 
 FORMAT = len(MIGRATIONS)
@@ -478,7 +506,7 @@ SEALED_FROM = 4  # first format with checksums over the whole content
 
 GROWING = (  # append only
     "alarm_history", "audit", "body", "commissioning", "correction", "drive", "forecast", "friction",
-    "history", "torque_commissioning", "verdict",
+    "ground_load", "history", "torque_commissioning", "verdict",
 )  # fmt: skip
 CHANGING = (
     "alarm", "binding", "entry", "joint", "measurement", "run", "span", "torque_reference", "total",

@@ -91,6 +91,11 @@ def diagnosis_status(joints: Sequence[str], diagnosis: Diagnosis) -> Status:
         values["drive_delay_s"] = diagnosis.channel.delay_s
         values["drive_low_pass_s"] = diagnosis.channel.time_constant_s
         values["drive_load_friction"] = diagnosis.channel.load_friction
+    if diagnosis.load:
+        values["foot_load_peak_n"] = diagnosis.load.peak_n
+        values["foot_load_sigma_n"] = diagnosis.load.peak_sigma_n
+        values["heel_strike_phase"] = diagnosis.load.heel_strike
+        values["toe_off_phase"] = diagnosis.load.toe_off
     if diagnosis.compliance:
         values["drive_stiffness_nm_per_rad"] = 1.0 / diagnosis.compliance
     if diagnosis.state is DiagnosisState.CHANGED:

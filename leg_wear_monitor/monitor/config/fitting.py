@@ -15,7 +15,15 @@ from leg_wear_monitor.mechanism.person import with_person
 from leg_wear_monitor.mechanism.spec import Mechanism, SpeedDrive
 from leg_wear_monitor.monitor.config.drive import drive_figures
 from leg_wear_monitor.monitor.config.settings import MonitorConfig
-from leg_wear_monitor.twin.settings import CONTACT, MEASURED, NO_LOAD, TrackerSettings, TwinSettings
+from leg_wear_monitor.twin.settings import (
+    CONTACT,
+    GROUND,
+    MEASURED,
+    NO_LOAD,
+    STANCE,
+    TrackerSettings,
+    TwinSettings,
+)
 
 _KEYS = {"radial_clearance": "clearances_m", "wear_coefficient": "wear_coefficients_per_pa"}
 
@@ -117,6 +125,7 @@ def twin_settings(config: MonitorConfig, source: str = "parameters") -> TwinSett
         load_source=config.foot_load.source,
         load_frame=config.foot_load.frame,
         load_model=config.load.model,
+        load_shape=GROUND if config.load.model == GROUND else STANCE,
     )
 
 

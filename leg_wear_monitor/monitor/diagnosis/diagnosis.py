@@ -6,6 +6,7 @@ from enum import Enum
 import attrs
 
 from leg_wear_monitor.estimate.cause import Change
+from leg_wear_monitor.estimate.ground_load import GroundLoad
 from leg_wear_monitor.estimate.signature import DIRECT, Channel
 
 
@@ -68,6 +69,8 @@ class Diagnosis:
         Identified masses and lengths that the wear is counted with; empty while it is counted as in the file.
     friction : float
         Factor on the friction in the joints that the wear is counted with.
+    load : GroundLoad or None
+        Force of the ground by the commissioned gait cycles, if the foot surely carries one.
     compliance : float
         Between the measured crank angle and the crank [rad/(N m)], that the wear is counted with; 0 if rigid.
     """
@@ -83,4 +86,5 @@ class Diagnosis:
     channel: Channel = DIRECT
     bodies: tuple[Body, ...] = ()
     friction: float = 1.0
+    load: GroundLoad | None = None
     compliance: float = 0.0

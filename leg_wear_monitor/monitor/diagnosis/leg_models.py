@@ -11,12 +11,14 @@ from leg_wear_monitor.estimate.channel import with_channel_of
 from leg_wear_monitor.estimate.commissioned_torque import CommissionedTorque
 from leg_wear_monitor.estimate.drive_figures import UNDECLARED, DriveFigures
 from leg_wear_monitor.estimate.explanations import Explainer
+from leg_wear_monitor.estimate.ground_load import GroundLoad, ground_load
 from leg_wear_monitor.estimate.identification import UNLIKE_FILE, misfit
 from leg_wear_monitor.estimate.leg_model import explainer_of
 from leg_wear_monitor.estimate.nuisances import nuisances
 from leg_wear_monitor.estimate.signature import DIRECT, TorqueSensor
 from leg_wear_monitor.estimate.signature_model import signature_model, with_noise_of
 from leg_wear_monitor.mechanism.arrays import Floats
+from leg_wear_monitor.mechanism.position import build_linkage
 from leg_wear_monitor.mechanism.spec import Mechanism
 from leg_wear_monitor.monitor.config.settings import MonitorConfig
 from leg_wear_monitor.monitor.diagnosis.state import TorqueState
@@ -32,6 +34,8 @@ NAMED_TO = 5.0
 # 1 % off; at most 1.9 by true ones, under a load of 300 N that is in both
 _WORSE = 2.5
 
+
+_UNLIKE_ON_GROUND = 2.0  # misfit that another shape of the ground's force leaves: 1.2 to 1.5
 
 _KEPT = 6  # models of the last cadences, sensors and baselines
 
@@ -112,13 +116,24 @@ class LegModels:
         )
         return plain if off > _WORSE * without else found
 
+    def ground_load(self, state: TorqueState, reference: TorqueReference) -> GroundLoad:
+        """The ground's force by the commissioned leg, from a reference of the leg under any force."""
+        own, known, sensor = self._of(state), state.commissioned, state.sensor
+        if known is None or sensor is None:
+            raise RuntimeError("the leg is not commissioned yet")
+        linkage = build_linkage(reference.parameters.in_air.applied(self._mechanism))
+        covariance = own.explainer.model.covariance * (1.0 / known.cycles + 1.0 / own.explainer.model.cycles)
+        columns = nuisances(self._mechanism, own.reference, sensor)
+        return ground_load(linkage, reference, sensor, known.mean, covariance, columns, self._figures)
+
     def fits(self, state: TorqueState) -> bool:
         """Whether the reference explains the commissioned leg so well that names of joints are right."""
         return self.misfit(state) < NAMED_TO
 
     def is_of_file(self, state: TorqueState) -> bool:
         """Whether the commissioned leg is that of the reference."""
-        return self.misfit(state) < UNLIKE_FILE
+        is_loaded = state.reference is not None and state.reference.parameters.load.size > 0
+        return self.misfit(state) < (_UNLIKE_ON_GROUND if is_loaded else UNLIKE_FILE)
 
     def _of(self, state: TorqueState) -> _Models:
         """Those of a state; they are kept while its reference, its sensor and its baseline stay."""

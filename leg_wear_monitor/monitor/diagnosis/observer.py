@@ -25,13 +25,14 @@ from leg_wear_monitor.monitor.diagnosis.diagnosis import Diagnosis, DiagnosisSta
 from leg_wear_monitor.monitor.diagnosis.evidence import Evidence
 from leg_wear_monitor.monitor.diagnosis.leg_models import COMMISSIONING_CYCLES, LegModels
 from leg_wear_monitor.monitor.diagnosis.reasons import doubt, missing, next_step
-from leg_wear_monitor.monitor.diagnosis.references import References
+from leg_wear_monitor.monitor.diagnosis.references import LOAD_ROUNDS, References
 from leg_wear_monitor.monitor.diagnosis.signed_cycle import find_sensor, signed_cycle
 from leg_wear_monitor.monitor.diagnosis.state import UNUSED_CYCLES, WINDOW_CYCLES, TorqueState
 from leg_wear_monitor.monitor.diagnosis.torque_samples import NO_TORQUE_SAMPLES, after, extended
 from leg_wear_monitor.twin.reference.leg_parameters import LegParameters
 from leg_wear_monitor.twin.reference.torque_reference import TorqueReference, TorqueReferenceSnapshot
 from leg_wear_monitor.twin.sample import Samples
+from leg_wear_monitor.twin.settings import GROUND
 from leg_wear_monitor.twin.statistics import CycleStatistics
 
 _ESTIMATED_M, _ESTIMATED = 1.0e-4, 0.2  # largest standard deviation of an observable clearance; of it
@@ -84,7 +85,8 @@ class TorqueObserver:
         part = next((one for one in references if not one.is_whole), None)
         whole = [one for one in references if one.is_whole]
         is_drive_known = not math.isnan(figures.stiffness_nm_per_rad)
-        self._references = References(mechanism, self._models, whole, part, is_drive_known)
+        is_on_ground = config.load.model == GROUND and mechanism.toe is not None
+        self._references = References(mechanism, self._models, whole, part, is_drive_known, is_on_ground)
         self._evidence = Evidence(self._models)
         counted_m = np.asarray(counted_m, float).copy()
         if parameters is None:  # those that files and unfinished references were made with
@@ -94,7 +96,13 @@ class TorqueObserver:
         if is_drive_known:
             whole_leg = parameters or LegParameters.none(mechanism)
             parameters = attrs.evolve(whole_leg, compliance=compliance_of(figures.stiffness_nm_per_rad))
-        self.state = TorqueState(counted_m, baselines=tuple(commissioned), parameters=parameters)
+        is_known = parameters is not None and parameters.load.size > 0
+        self.state = TorqueState(
+            counted_m,
+            baselines=tuple(commissioned),
+            parameters=parameters,
+            load_rounds=LOAD_ROUNDS if is_known else 0,
+        )
 
     def warm_up(self) -> None:
         """Compute before the first sample what depends on the mechanism alone."""
@@ -180,7 +188,8 @@ class TorqueObserver:
             or state.reference.parameters != state.parameters
         ):
             return None
-        return state.parameters if self._models.is_of_file(state) else None
+        is_near = self._models.fits if state.parameters.load.size else self._models.is_of_file
+        return state.parameters if is_near(state) else None
 
     @property
     def simulated_references(self) -> tuple[TorqueReference, ...]:
@@ -204,6 +213,7 @@ class TorqueObserver:
         state = self.state
         is_old = not state.cycles or (len(state.unused) == UNUSED_CYCLES and not state.changes)
         upcoming = next_step(state, self._references, self.config)
+        load = state.load if state.load and state.load.is_sure else None
         if state.fit is None or state.detector is None or is_old:
             return Diagnosis(
                 state=DiagnosisState.WAITING,
@@ -212,6 +222,7 @@ class TorqueObserver:
                 changes=state.settled,
                 cycles_not_used=state.not_used,
                 channel=state.sensor.channel if state.sensor else DIRECT,
+                load=load,
             )
         clearance_m, sigma_m = self._observed(state.fit)
         return Diagnosis(
@@ -224,6 +235,7 @@ class TorqueObserver:
             changes=state.settled + state.changes,
             cycles_not_used=state.not_used,
             channel=state.sensor.channel if state.sensor else DIRECT,
+            load=load,
         )
 
     def _observed(self, fit: ClearanceFit) -> tuple[Floats, Floats]:

@@ -3,6 +3,7 @@
 import math
 from collections.abc import Sequence
 
+import attrs
 import numpy as np
 
 from leg_wear_monitor.estimate.drive_compliance import leg_behind_coupling
@@ -28,6 +29,7 @@ FIRST_CYCLES = 5  # before a reference is chosen
 UNLIKE_CYCLES = 20  # alike, until another reference is made: less would make one while the cadence changes
 
 ROUNDS = 3  # of identification
+LOAD_ROUNDS = 4  # in which the ground's force is found: joints rub, and impacts fall, under a force otherwise
 
 _FAR = 0.1  # of a counted clearance: the reference is renewed where it was made for another one
 
@@ -46,6 +48,8 @@ class References:
         One whose simulation was not finished in an earlier run.
     is_drive_known : bool
         Whether the stiffness of the drive is declared, and not to be found.
+    is_on_ground : bool
+        Whether the leg walks on the ground, whose force is to be found.
 
     Raises
     ------
@@ -60,9 +64,10 @@ class References:
         given: Sequence[TorqueReference] = (),
         part: TorqueReference | None = None,
         is_drive_known: bool = False,
+        is_on_ground: bool = False,
     ) -> None:
         self._mechanism, self._models, self._part = mechanism, models, part
-        self._is_drive_known = is_drive_known
+        self._is_drive_known, self._is_on_ground = is_drive_known, is_on_ground
         self._given = (*given, *shipped_references(mechanism))
         self._run: TorqueReferenceRun | None = None
 
@@ -125,9 +130,33 @@ class References:
             self._begin(own if state.is_final else identified, counted_m, depth, state.profile)
         elif not state.is_final and identified not in (None, own):  # at another cadence, or in the ledger
             self._begin(identified, counted_m, depth, state.reference.profile)
-        elif state.rounds < ROUNDS and not self._models.is_of_file(state):
+        elif self._may_be_loaded(state):
+            self._begin_under_load(state, state.reference, depth)
+        elif state.rounds < ROUNDS and not (self._models.is_of_file(state) or self.is_load_left_out(state)):
             self._begin_identification(state, state.reference, depth)
         return False
+
+    def is_load_left_out(self, state: TorqueState) -> bool:
+        """Whether the foot carries a load that the model is to walk without."""
+        return state.load is not None and state.load.is_sure and not self._is_on_ground
+
+    def _may_be_loaded(self, state: TorqueState) -> bool:
+        """Whether to look for the ground's force on a leg that was commissioned just now."""
+        is_new = state.commissioned is not None and not state.load_rounds and self._mechanism.toe is not None
+        return is_new and (self._is_on_ground or not self._models.is_of_file(state))
+
+    def _begin_under_load(self, state: TorqueState, reference: TorqueReference, depth: Floats) -> None:
+        """Begin the simulation of the expected leg under the ground's force that a reference of it shows.
+
+        A force that is not asked for is told only: taken for masses, it would make other joints wear.
+        """
+        if state.commissioned is None:
+            return
+        state.load, state.load_rounds = self._models.ground_load(state, reference), state.load_rounds + 1
+        if self._is_on_ground and state.load.is_sure:
+            parameters = attrs.evolve(reference.parameters, load=state.load.force)
+            state.is_identifying = True
+            self._begun().begin_expected(state.commissioned.clearance_m, depth, reference.profile, parameters)
 
     def _begin_identification(self, state: TorqueState, reference: TorqueReference, depth: Floats) -> None:
         """Begin the simulation of legs with other parameters, near the commissioned leg."""
@@ -137,14 +166,14 @@ class References:
         start, model, is_first = reference.parameters, self._models.explainer(state).model, not state.rounds
         state.rounds += 1
         clearance_m, profile = known.clearance_m, reference.profile
-        if is_first and not (start.compliance or self._is_drive_known):
+        if is_first and not (start.compliance or self._is_drive_known or self._is_on_ground):
             found = leg_behind_coupling(self._mechanism, model.sensor, profile, known.mean)
             if found is not None:
                 state.parameters = found
                 self._begin(found, clearance_m, depth, profile)
                 return
         if is_first and not start.compliance and self._models.misfit(state) >= FAR_FROM_FILE:
-            start = leg_of_ideal_torque(self._mechanism, model, known, profile.speed)
+            start = leg_of_ideal_torque(self._mechanism, model, known, profile.speed, start.load)
         state.is_identifying = True
         part = self._part_of(start, profile, clearance_m, is_of_parameters=True)
         if part is not None:
@@ -209,7 +238,13 @@ class References:
         """Begin a reference with the parameters that explain the commissioned leg."""
         state.is_identifying = False
         _turn(state, legs.profile)
-        if state.commissioned is not None:
+        if state.commissioned is not None and len(legs.torque_nm) == 1:
+            if state.load_rounds < LOAD_ROUNDS:
+                self._begin_under_load(state, legs, depth)
+            else:
+                state.parameters = legs.parameters
+                self._begin(state.parameters, counted_m, depth, legs.profile)
+        elif state.commissioned is not None:
             explainer = self._models.explainer(state)
             state.parameters = identified_leg(legs, explainer.model, explainer.nuisances, state.commissioned)
             self._begin(state.parameters, counted_m, depth, legs.profile)
@@ -227,8 +262,9 @@ class References:
         state.reference = reference
         own, former, sensor = reference.parameters, before.parameters, state.sensor
         is_new_drive = own.compliance != former.compliance
-        if is_new_drive and sensor is not None and state.commissioned is not None:
-            # what a compliant drive does looks like a channel to a rigid one
+        is_new_load = not np.array_equal(own.load, former.load)
+        if (is_new_drive or is_new_load) and sensor is not None and state.commissioned is not None:
+            # what a compliant drive does looks like a channel to a rigid one, and a load hides load friction
             state.sensor = self._models.channel(reference, sensor, state.commissioned)
         if own == former or self._models.misfit(state) <= off:
             return

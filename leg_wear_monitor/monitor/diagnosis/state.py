@@ -10,6 +10,7 @@ from leg_wear_monitor.estimate.cause import Change
 from leg_wear_monitor.estimate.change_detector import DetectorState
 from leg_wear_monitor.estimate.clearance_fit import ClearanceFit
 from leg_wear_monitor.estimate.commissioned_torque import CommissionedTorque
+from leg_wear_monitor.estimate.ground_load import GroundLoad
 from leg_wear_monitor.estimate.signature import TorqueSensor
 from leg_wear_monitor.mechanism.arrays import Floats
 from leg_wear_monitor.monitor.diagnosis.diagnosis import NotUsed
@@ -104,8 +105,10 @@ class TorqueState:
         Cadence of the last gait cycle if it is not the commanded one, else NaN.
     parameters : LegParameters or None
         Identified ones, of which references are made; None before.
-    rounds : int
-        How often parameters were identified.
+    rounds, load_rounds : int
+        How often parameters were identified, and the ground's force.
+    load : GroundLoad or None
+        The force of the ground by the commissioned leg.
     is_identifying : bool
         Whether the run simulates legs with other parameters.
     has_failed : bool
@@ -135,6 +138,8 @@ class TorqueState:
     off_cadence_rpm: float = math.nan
     parameters: LegParameters | None = None
     rounds: int = 0
+    load_rounds: int = 0
+    load: GroundLoad | None = None
     is_identifying: bool = False
     has_failed: bool = False
 

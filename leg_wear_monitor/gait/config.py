@@ -9,6 +9,8 @@ from leg_wear_monitor.mechanism.ground_reaction import FORE_AFT
 
 MOST_ENCODERS = 4
 WRENCH, EFFORT, FLOAT64 = TORQUE_SOURCES = ("wrench", "effort", "float64")
+NO_LOAD, CONTACT = "none", "contact"
+LOAD_SOURCES = (NO_LOAD, WRENCH, FLOAT64, CONTACT)
 AVERAGE, INSTANT = SAMPLINGS = ("average", "instant")
 TEMPLATE, TREADMILL = GROUND_SHAPES = ("template", "treadmill")
 
@@ -117,6 +119,29 @@ class TorqueSensorConfig:
     noise_nm: float = quantity("N m", "noise, standard deviation", at_least=0.0, default=0.05)
     resolution_nm: float = quantity("N m", "step of the reading, 0 for none", at_least=0.0, default=0.01)
     offset_nm: float = quantity("N m", "reading without torque", default=0.0)
+
+
+@attrs.frozen(kw_only=True)
+class FootLoadSensorConfig:
+    """A sensor of the ground's force on the foot."""
+
+    source: str = choice(
+        LOAD_SOURCES,
+        "none, or the message: WrenchStamped, Float64 (the vertical force), or contact, a Bool",
+        default=NO_LOAD,
+    )
+    rate_hz: float = quantity("Hz", "messages a second", above=0.0, at_most=10000.0, default=200.0)
+    noise_n: float = quantity("N", "noise of each component, standard deviation", at_least=0.0, default=1.0)
+    scale: float = quantity("", "reading over force; negative: its sign is reversed", default=1.0)
+    zero_n: float = quantity("N", "vertical reading without force", default=0.0)
+    zero_drift_n_per_s: float = quantity("N/s", "growth of that", default=0.0)
+    stuck_from_s: float = quantity(
+        "s", "time from which the reading stays; 0: never", at_least=0.0, default=0.0
+    )
+    silent_from_s: float = quantity(
+        "s", "time from which no message comes; 0: never", at_least=0.0, default=0.0
+    )
+    is_swapped: bool = described("read the foot of the other leg, half a turn later", default=False)
 
 
 @attrs.frozen(kw_only=True)
@@ -242,6 +267,9 @@ class GaitConfig:
     encoder: EncoderConfig = described("the crank's encoder", factory=EncoderConfig)
     joint_encoders: JointEncodersConfig = described("encoders on further joints", factory=JointEncodersConfig)
     torque_sensor: TorqueSensorConfig = described("the drive's torque sensor", factory=TorqueSensorConfig)
+    foot_load_sensor: FootLoadSensorConfig = described(
+        "a sensor of the ground's force on the foot", factory=FootLoadSensorConfig
+    )
     transport: TransportConfig = described("what happens to a reading on its way", factory=TransportConfig)
     load: LoadConfig = described("what a monitor cannot know of", factory=LoadConfig)
     knock: KnockConfig = described("a bushing that breaks", factory=KnockConfig)

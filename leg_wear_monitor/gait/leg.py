@@ -104,9 +104,10 @@ class SyntheticLeg:
         turned = tuple(float(self._run.q[j, 2] - self._run.q[b, 2]) for b, j in self._sides)
         now = self._pace.at(t)
         torque_nm = self._run.sample().drive_torque + self._friction_torque(now.speed)
-        return Instant(now, impulse, turned, torque_nm, self._foot_force_n(now.angle))
+        return Instant(now, impulse, turned, torque_nm, self.foot_force_n(now.angle))
 
-    def _foot_force_n(self, crank_angle: float) -> tuple[float, float]:
+    def foot_force_n(self, crank_angle: float) -> tuple[float, float]:
+        """Force of the ground on the foot in the present step at a crank angle [rad], x and y [N]."""
         arrays, phase = self._run.model.arrays, crank_angle / TURN % 1.0
         x, y = 0.0, 0.0
         for k in self._foot_loads:

@@ -10,9 +10,13 @@ import numpy as np
 
 from leg_wear_monitor.dynamics.run.drive import CrankMotion
 from leg_wear_monitor.gait.config import (
+    CONTACT,
     EFFORT,
     INSTANT,
+    NO_LOAD,
+    WRENCH,
     EncoderConfig,
+    FootLoadSensorConfig,
     GaitConfig,
     JointEncodersConfig,
     TorqueSensorConfig,
@@ -20,7 +24,7 @@ from leg_wear_monitor.gait.config import (
 )
 from leg_wear_monitor.gait.leg import SyntheticLeg
 from leg_wear_monitor.mechanism.ideal import TURN
-from leg_wear_monitor.twin.kinds import CRANK, TORQUE
+from leg_wear_monitor.twin.kinds import CRANK, LOAD, TORQUE
 from leg_wear_monitor.twin.sample import (
     ENCODERS,
     FAULTS,
@@ -30,6 +34,8 @@ from leg_wear_monitor.twin.sample import (
     WRONG_TYPE,
     Samples,
 )
+
+_CONTACT_N = 20.0  # force from which a switch closes
 
 # faults that can be injected into messages
 _MADE = tuple(fault for fault in FAULTS if fault not in (NO_FAULT, WRONG_TYPE, OUT_OF_RANGE))
@@ -111,11 +117,20 @@ def _taken(leg: SyntheticLeg, config: GaitConfig) -> Iterator[Reading]:
     by_effort = config.torque_sensor.source == EFFORT
     crank_times = _times(config.encoder.rate_hz, jitter, encoder, CRANK)
     torque_times = iter(()) if by_effort else _times(config.torque_sensor.rate_hz, jitter, torque, TORQUE)
+    of_load = config.foot_load_sensor
+    load, stuck = Noise([config.seed, 5]), (0.0, 0.0)
+    load_times = iter(()) if of_load.source == NO_LOAD else _times(of_load.rate_hz, jitter, load, LOAD)
     since, impulse, zero_rad, restarts = 0.0, 0.0, 0.0, list(config.encoder.restarts_s)
-    for t, kind in heapq.merge(crank_times, torque_times):
+    for t, kind in heapq.merge(crank_times, torque_times, load_times):
         if config.duration_s and t >= config.duration_s:
             return
         instant = leg.advance(t)
+        if kind == LOAD:
+            if not of_load.stuck_from_s or t < of_load.stuck_from_s:
+                stuck = _foot_load(of_load, leg, instant.crank.angle, t, load)
+            if not of_load.silent_from_s or t < of_load.silent_from_s:
+                yield Reading(t, t, kind, NO_FAULT, math.nan, math.nan, math.nan, (), stuck)
+            continue
         angle, velocity, torque_nm = math.nan, math.nan, math.nan
         if kind == CRANK:
             while restarts and t >= restarts[0]:
@@ -160,6 +175,17 @@ def _torque(config: TorqueSensorConfig, torque_nm: float, noise: Noise) -> float
     if config.resolution_nm:
         reading = round(reading / config.resolution_nm) * config.resolution_nm
     return reading
+
+
+def _foot_load(
+    config: FootLoadSensorConfig, leg: SyntheticLeg, angle: float, t: float, noise: Noise
+) -> tuple[float, float]:
+    x, y = leg.foot_force_n(angle + (math.pi if config.is_swapped else 0.0))
+    if config.source == CONTACT:
+        return 0.0, float(y > _CONTACT_N)
+    x, y = x + config.noise_n * noise.normal(), y + config.noise_n * noise.normal()
+    y += config.zero_n + config.zero_drift_n_per_s * t
+    return config.scale * x if config.source == WRENCH else 0.0, config.scale * y
 
 
 def _arriving(taken: Iterable[Reading], config: TransportConfig, noise: Noise) -> Iterator[Reading]:

@@ -20,6 +20,7 @@ from leg_wear_monitor.monitor.encoders.observer import EncoderObserver
 from leg_wear_monitor.monitor.evaluation.evaluation import AlarmEvaluation
 from leg_wear_monitor.monitor.evaluation.evaluation_period import A_CYCLE, EvaluationPeriods
 from leg_wear_monitor.monitor.evaluation.torque_record import TorqueRecord
+from leg_wear_monitor.monitor.foot_load import FootLoadCheck
 from leg_wear_monitor.monitor.forecast.forecaster import Forecaster
 from leg_wear_monitor.monitor.forecast.growth import GrowthWindow
 from leg_wear_monitor.monitor.forecast.model_error import model_error
@@ -32,6 +33,7 @@ from leg_wear_monitor.twin.digital_twin import DigitalTwin
 from leg_wear_monitor.twin.reference.leg_parameters import LegParameters
 from leg_wear_monitor.twin.reference.torque_reference import TorqueReference
 from leg_wear_monitor.twin.sampling.settings import SamplingSettings
+from leg_wear_monitor.twin.settings import NO_LOAD
 
 WRONG_TORQUE = "the received drive torque is wrong; see the status `torque`"
 ACCELERATED = "wear is accelerated: clearances grow within the gait cycles that are compared"
@@ -69,6 +71,9 @@ class Parts:
         self.clearance_joints = self.mechanism.clearance_joints
         self.twin = DigitalTwin(self.mechanism, twin_settings(self.config), sampling)
         self.guard = InputGuard(self.twin.settings.tracker)
+        self.foot_load = (
+            FootLoadCheck(self.mechanism, self.config) if self.config.foot_load.source != NO_LOAD else None
+        )
         self.crank_zero = (
             CrankZero(torque_model(self.mechanism), self.config, self.twin.settings.tracker)
             if self.config.crank.zero == AT_START
@@ -204,6 +209,7 @@ class Parts:
             self.encoders.snapshot() if self.encoders else None,
             self.torque.snapshot() if self.torque else None,
             self.crank_zero.snapshot() if self.crank_zero else None,
+            self.foot_load.snapshot() if self.foot_load else None,
         )
 
     def restore(self, snapshot: MonitorSnapshot) -> None:
@@ -222,6 +228,8 @@ class Parts:
             self.torque.restore(snapshot.torque)
         if self.crank_zero and snapshot.crank_zero:
             self.crank_zero.restore(snapshot.crank_zero)
+        if self.foot_load and snapshot.foot_load:
+            self.foot_load.restore(snapshot.foot_load)
 
     def keep(self, closed: bool = False) -> bool:
         """Write an entry into the ledger; return whether it is on the disk.

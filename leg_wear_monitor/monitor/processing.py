@@ -47,7 +47,7 @@ class Processing:
         self._twin, self._guard, self._accounting = parts.twin, parts.guard, parts.accounting
         self._evaluation, self._forecaster = parts.evaluation, parts.forecaster
         self._encoders, self._torque = parts.encoders, parts.torque
-        self._crank_zero = parts.crank_zero
+        self._crank_zero, self._foot_load = parts.crank_zero, parts.foot_load
 
     def take(
         self, piece: Samples, changes: list[AlarmList], ends_period: bool
@@ -63,6 +63,8 @@ class Processing:
             self._encoders.add_samples(piece)
         if self._torque:
             self._torque.add_samples(piece)
+        if self._foot_load:
+            self._foot_load.add_samples(piece)
         self._accounting.followed(update.samples)
         self._parts.state.happened = (*self._parts.state.happened, *update.events)[-_KEPT_EVENTS:]
         cycles: list[CycleReport] = []
@@ -72,7 +74,11 @@ class Processing:
             if self._torque:
                 self._torque.ended(statistics, self._parts.is_torque_wrong)
             cycles.append(self._report(statistics))
-            self._add_changes(self._evaluation.end_cycle(cycles[-1], self._parts.state.torque), changes)
+            sensor = self._foot_load.ended(statistics) if self._foot_load else None
+            if self._foot_load and sensor is not None:
+                self._twin.freeze_load(*self._foot_load.freezes(sensor))
+            record = self._parts.state.torque
+            self._add_changes(self._evaluation.end_cycle(cycles[-1], record, sensor), changes)
             if statistics.is_followed:
                 self._explain_mismatch(statistics)
                 self._keep_torque(statistics, cycles[-1])

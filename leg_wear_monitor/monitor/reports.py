@@ -290,6 +290,34 @@ class Reports:
     verdicts: tuple[VerdictReport, ...] = ()
 
 
+@attrs.frozen(kw_only=True)
+class FootLoad:
+    """The load at the foot over the last gait cycles; None for what is not known.
+
+    Attributes
+    ----------
+    source : str
+        What it is known by: ``measured``, or ``none``.
+    peak_n, peak_sigma_n : float or None
+        Largest vertical force in the mean over gait cycles, and its standard deviation from step to step.
+    heel_strike_phase, toe_off_phase : float or None
+        Crank angles at which the foot strikes and leaves the ground, as fractions of a turn.
+    heel_strike_sigma, toe_off_sigma : float or None
+        Their standard deviations from step to step.
+    cycles : int
+        Number of gait cycles that it is from.
+    """
+
+    source: str = "none"
+    peak_n: float | None = None
+    peak_sigma_n: float | None = None
+    heel_strike_phase: float | None = None
+    toe_off_phase: float | None = None
+    heel_strike_sigma: float | None = None
+    toe_off_sigma: float | None = None
+    cycles: int = 0
+
+
 @attrs.frozen
 class Status:
     """A line of /diagnostics: ``name`` stable, numbers only in ``values``, by keys that end in their unit.

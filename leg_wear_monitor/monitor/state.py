@@ -10,6 +10,7 @@ from leg_wear_monitor.monitor.encoders.observer import EncoderSnapshot
 from leg_wear_monitor.monitor.evaluation.evaluation import AlarmEvaluationState
 from leg_wear_monitor.monitor.evaluation.mismatch_window import NO_MISMATCH, MismatchWindow
 from leg_wear_monitor.monitor.evaluation.torque_record import TorqueRecord
+from leg_wear_monitor.monitor.foot_load import FootLoadState
 from leg_wear_monitor.monitor.forecast.forecaster import ForecastState
 from leg_wear_monitor.monitor.forecast.growth import GrowthWindow
 from leg_wear_monitor.monitor.reports import CycleReport
@@ -49,3 +50,4 @@ class MonitorSnapshot:
     encoders: EncoderSnapshot | None = None
     torque: TorqueObserverSnapshot | None = None
     crank_zero: CrankZeroSnapshot | None = None
+    foot_load: FootLoadState | None = None

@@ -12,6 +12,7 @@ from leg_wear_monitor.monitor.alarms.alarm import Level
 from leg_wear_monitor.monitor.alarms.fault_codes import (
     CRANK_ZERO,
     ENCODERS,
+    FOOT_LOAD_WORDS,
     LEDGER_INTERRUPTED,
     LEDGER_NOT_WRITTEN,
     NOT_FOLLOWED,
@@ -27,6 +28,7 @@ from leg_wear_monitor.monitor.encoders.state import faults
 from leg_wear_monitor.monitor.evaluation import specs
 from leg_wear_monitor.monitor.evaluation.evaluation import AlarmEvaluation
 from leg_wear_monitor.monitor.evaluation.torque_record import TorqueRecord
+from leg_wear_monitor.monitor.foot_load import FootLoadCheck
 from leg_wear_monitor.monitor.forecast.words import UNKNOWN, answer_words, lifetime_values
 from leg_wear_monitor.monitor.inputs.health import InputHealth
 from leg_wear_monitor.monitor.ledger.entry import Measurement
@@ -38,6 +40,7 @@ from leg_wear_monitor.monitor.verdict.verdict import Finding, State, Verdict, ve
 from leg_wear_monitor.monitor.verdict.words import amount, estimate, with_unit
 from leg_wear_monitor.monitor.zero_status import zero_status
 from leg_wear_monitor.twin.digital_twin import DigitalTwin
+from leg_wear_monitor.twin.kinds import KINDS, LOAD
 from leg_wear_monitor.twin.statistics import Event, Sampling, Tracking
 
 _NOTHING_BELIEVED: Mapping[str, BelievedClearance | None] = {}
@@ -59,6 +62,7 @@ def statuses(
     measured: Sequence[Measurement | None] = (),
     believed: Mapping[str, BelievedClearance | None] = _NOTHING_BELIEVED,
     findings: Sequence[Finding] = (),
+    foot_load: FootLoadCheck | None = None,
 ) -> tuple[Status, ...]:
     """All statuses, verdict first, then gait, inputs, joints, alarms and ledger; last, a sampled replay."""
     sampling = twin.sampling
@@ -74,6 +78,7 @@ def statuses(
         *((zero_status(crank_zero),) if crank_zero else ()),
         _input(twin, evaluation, accounting),
         torque_status(evaluation, last, record, explained),
+        *((_foot_load(foot_load, evaluation),) if foot_load else ()),
         diagnosis_status(twin.clearance_joints, diagnosis),
         *joints,
         *((_encoders(encoders, evaluation, last),) if encoders else ()),
@@ -260,6 +265,20 @@ def _encoders(encoders: EncoderObserver, evaluation: AlarmEvaluation, last: Cycl
     if wrong and level is Level.OK:
         level, code = Level.WARN, ENCODERS
     return Status("encoders", level, "; ".join(messages), values, code)
+
+
+def _foot_load(check: FootLoadCheck, evaluation: AlarmEvaluation) -> Status:
+    """The measured foot load, and faults of its sensor."""
+    load, alarms = check.load, evaluation.board.alarms
+    raised = [alarms[spec.name()] for spec in specs.OF_FOOT_LOAD if alarms[spec.name()].level is not Level.OK]
+    level = max((alarm.level for alarm in raised), default=Level.OK)
+    values = {
+        name: _or_nan(value) for name, value in attrs.asdict(load).items() if not isinstance(value, str)
+    }
+    messages = [FOOT_LOAD_WORDS.get(alarm.kind, f"see: {alarm.name}") for alarm in raised]
+    if not messages:
+        messages = ["measured" if load.cycles else "no whole gait cycle with samples yet"]
+    return Status(KINDS[LOAD].name, level, "; ".join(messages), values, worst_code(raised))
 
 
 def _shown(last: CycleReport | None) -> list[str]:

@@ -27,6 +27,7 @@ from leg_wear_monitor.monitor.processing import Processing
 from leg_wear_monitor.monitor.reports import (
     AlarmList,
     CycleReport,
+    FootLoad,
     Lost,
     Reports,
     SampleReports,
@@ -192,6 +193,11 @@ class WearMonitor:
         return self._parts.diagnosis
 
     @property
+    def foot_load(self) -> FootLoad:
+        """The measured load at the foot over the last gait cycles."""
+        return self._parts.foot_load.load if self._parts.foot_load else FootLoad()
+
+    @property
     def lost(self) -> Lost:
         """Samples and time that were not integrated so far."""
         accounting = self._accounting.state
@@ -270,6 +276,7 @@ class WearMonitor:
             self._parts.measured,
             self._parts.judge.believed(state, found.verdict),
             found.findings,
+            self._parts.foot_load,
         )
 
     def snapshot(self) -> MonitorSnapshot:

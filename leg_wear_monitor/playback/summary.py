@@ -101,6 +101,7 @@ def summary(
         status=tuple(map(_status, monitor.status())),
         lost=monitor.lost,
         sampling=_sampling(monitor.sampling),
+        load=monitor.foot_load,
         history=_history(result.history),
         wear_depth_m=_wear(result),
         advice=ADVICE,

@@ -206,6 +206,18 @@ class DigitalTwin:
             self._follower.take_parameters(linkage, friction, parameters)
             self._parameters = parameters
 
+    def freeze_load(self, is_frozen: bool, clears: bool = False) -> None:
+        """Go on with the measured load of the gait cycles before, because its samples are wrong.
+
+        Parameters
+        ----------
+        is_frozen : bool
+            False to take samples again.
+        clears : bool, optional
+            Whether the load of the gait cycles before was wrong, too: then none acts.
+        """
+        self._follower.freeze_load(is_frozen, clears)
+
     def set_depth(self, depth: Floats) -> None:
         """Set wear depths (k, 2, N) [m], for instance from a ledger.
 

@@ -34,5 +34,5 @@ KINDS: Mapping[int, SampleKind] = {
     CRANK: SampleKind(name="crank", value="crank_angle_rad", largest=1.0e6),
     TORQUE: SampleKind(name="torque", value="torque_nm", largest=1.0e6),
     # five tons on a foot; a person's in millinewtons is beyond
-    LOAD: SampleKind(name="load", value="foot_force_n", largest=5.0e4),
+    LOAD: SampleKind(name="foot_load", value="foot_force_n", largest=5.0e4),
 }

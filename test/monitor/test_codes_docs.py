@@ -15,7 +15,15 @@ ROOT = Path(__file__).parents[2]
 PAGE = ROOT / "docs" / "reference" / "codes.md"
 PART = re.compile(r"(<!-- codes -->\n).*?(<!-- end -->)", re.DOTALL)
 OF_A_JOINT = {*specs.JOINT, *specs.ENCODERS}
-ALARMS = (*specs.JOINT, *specs.ENCODERS, *specs.TORQUE, *specs.GAIT, *specs.INPUT, specs.SOURCES)
+ALARMS = (
+    *specs.JOINT,
+    *specs.ENCODERS,
+    *specs.TORQUE,
+    *specs.GAIT,
+    *specs.INPUT,
+    specs.SOURCES,
+    *specs.OF_FOOT_LOAD,
+)
 
 pytestmark = pytest.mark.plain
 

@@ -18,6 +18,23 @@ TOPICS, RECORDING_STOPPED = "TOPICS", "RECORDING_STOPPED"
 CLOCK_MISSING, CLOCK_STOPPED, CLOCK_SET_BACK = "CLOCK_MISSING", "CLOCK_STOPPED", "CLOCK_SET_BACK"
 STAMPS_AHEAD, ALREADY_COUNTED = "STAMPS_AHEAD", "ALREADY_COUNTED"
 
+GAPS, STUCK, ZERO, SCALE, EXCHANGED, SIGN = (
+    "input_gaps", "foot_load_stuck", "foot_load_zero", "foot_load_scale", "foot_load_exchanged",
+    "foot_load_sign",
+)  # fmt: skip
+"""Kinds of the alarms of the foot load's sensor, by which their values are named."""
+FOOT_LOAD_LIMITS = {GAPS: 0.05, STUCK: 0.9, ZERO: 0.1, SCALE: 3.0, EXCHANGED: 0.5, SIGN: 0.5}
+
+FOOT_LOAD_WORDS = {
+    STUCK: "the foot load does not change between stance and swing: its sensor is stuck, or the leg walks in "
+    "the air",
+    ZERO: "the foot load is not 0 in swing: the zero of its sensor has drifted",
+    SCALE: "the size of the foot load does not fit the drive torque: its unit or scale is wrong",
+    EXCHANGED: "the foot load is there while this foot is in the air: it is that of the other leg",
+    SIGN: "the foot load pulls: its sign is reversed",
+}
+"""What is wrong, by the kind of the alarm."""
+
 FAULT_CODES = {
     NO_FAULT: "nothing is wrong",
     INPUT_SILENCE: "no samples come; each status that has no current data then has this code",

@@ -22,6 +22,16 @@ CODES_OF_GUIDES = {
     ),
     "torque_mismatch": ("TORQUE_MISMATCH", "MECHANISM_CHANGED", "TORQUE_MASS"),
     "load_and_friction": ("TORQUE_LOAD", "FRICTION_CHANGED"),
+    "foot_load": (
+        "FOOT_LOAD_EXCHANGED",
+        "FOOT_LOAD_MISSING",
+        "FOOT_LOAD_SCALE",
+        "FOOT_LOAD_SIGN",
+        "FOOT_LOAD_STUCK",
+        "FOOT_LOAD_ZERO",
+        "INPUT_GAPS_FOOT_LOAD",
+        "INPUT_RATE_FOOT_LOAD",
+    ),
     "force_growth_life": ("IMPACT_FORCE", "GROWTH", "REMAINING_LIFE", "MATERIAL_LIMIT"),
     "input": (
         "BAD_INPUT",

@@ -21,6 +21,7 @@ from leg_wear_monitor.monitor.evaluation.specs import AlarmSpec, LimitSource
 from leg_wear_monitor.monitor.evaluation.torque_checks import torque_bounds
 from leg_wear_monitor.monitor.reports import AlarmList, JointReport
 from leg_wear_monitor.monitor.verdict.belief import is_held_by_estimate
+from leg_wear_monitor.twin.settings import NO_LOAD
 
 _NO_SOURCES: Mapping[str, tuple[float, str]] = {}
 
@@ -37,6 +38,7 @@ def specs_of(
     for k, joint in enumerate(clearance_joints):
         yield from ((spec, k, spec.new(joint)) for spec in joint_specs(config))
     of_leg: tuple[AlarmSpec[Any], ...] = (*specs.TORQUE, *specs.GAIT, *specs.OF_INPUT)
+    of_leg += specs.OF_FOOT_LOAD if config.foot_load.source != NO_LOAD else ()
     yield from ((spec, 0, spec.new()) for spec in of_leg)
 
 

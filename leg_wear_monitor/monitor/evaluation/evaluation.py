@@ -1,6 +1,7 @@
 """Alarm evaluation of gait cycles and input, once in each evaluation period."""
 
 import math
+from collections.abc import Mapping
 
 import attrs
 
@@ -155,14 +156,20 @@ class AlarmEvaluation:
         is_allowed = self.config.cadence.allows(statistics.cadence_rpm)
         return statistics.not_compared if is_allowed else NotCompared.CADENCE
 
-    def end_cycle(self, report: CycleReport, record: TorqueRecord) -> tuple[AlarmList, ...]:
-        """Evaluate a whole gait cycle, with its torque and the record; returns all alarms if one changed."""
+    def end_cycle(
+        self, report: CycleReport, record: TorqueRecord, foot_load: Mapping[str, float] | None = None
+    ) -> tuple[AlarmList, ...]:
+        """Evaluate a whole gait cycle, with its torque and the record; returns all alarms if one changed.
+
+        ``foot_load`` are values of the alarms of the foot load's sensor; None without one.
+        """
         self.state.cycles += 1
+        sensor = {} if foot_load is None else {spec.name(): spec.value(foot_load) for spec in specs.FOOT_LOAD}
         if not report.is_followed:
-            return self._end_tracked(report)
+            return self._end_tracked(report, sensor)
         torque = torque_values(report, record, self.torque_bounds)
         cycle = CycleEvidence(report, torque, self.config.cadence.commanded_rpm)
-        values = {spec.name(): spec.value(cycle) for spec in (*specs.TORQUE, *specs.GAIT)}
+        values = {spec.name(): spec.value(cycle) for spec in (*specs.TORQUE, *specs.GAIT)} | sensor
         if not self.config.cadence.allows(report.cadence_rpm):
             del values[specs.MISMATCH.name()]
         for joint in report.joints:
@@ -186,7 +193,7 @@ class AlarmEvaluation:
         fastest = min(max(abs(rpm), abs(self.state.cadence_rpm)), commanded + cadence.tolerance_rpm)
         return (fastest / commanded) ** 2 if fastest > _FASTER * commanded else 1.0
 
-    def _end_tracked(self, report: CycleReport) -> tuple[AlarmList, ...]:
+    def _end_tracked(self, report: CycleReport, sensor: Mapping[str, float]) -> tuple[AlarmList, ...]:
         """Evaluate a gait cycle that was tracked only: it has neither forces nor a predicted torque."""
         departure = abs(report.cadence_rpm - self.config.cadence.commanded_rpm)
         clearances = {
@@ -194,7 +201,7 @@ class AlarmEvaluation:
         }
         for name in self.board.held_by_estimate:
             clearances.pop(name, None)
-        return self.board.evaluate({specs.CADENCE.name(): departure, **clearances}, report.stamp_ns)
+        return self.board.evaluate({specs.CADENCE.name(): departure, **clearances, **sensor}, report.stamp_ns)
 
     def end_period(self, skipped: int = 0) -> tuple[AlarmList, ...]:
         """Evaluate impacts of the running gait cycle, and once per duration of a cycle the input.
@@ -228,7 +235,9 @@ class AlarmEvaluation:
         state, intake, config = self.state, self._twin.intake, self.config
         is_whole = skipped == state.skipped == state.skipped_before
         health = input_health(state.before, intake, state.torque, is_whole)
-        values = {spec.name(): spec.value(health) for spec in specs.INPUT}
+        rate = specs.FOOT_LOAD_RATE
+        read = (*specs.INPUT, rate) if rate.name() in self.board.alarms else specs.INPUT
+        values = {spec.name(): spec.value(health) for spec in read}
         if state.cycles == 0 and self._twin.tracking is Tracking.OUT_OF_STEP:
             speed_rpm = self._twin.speed_radps * 30.0 / math.pi
             values[specs.CADENCE.name()] = abs(speed_rpm - config.cadence.commanded_rpm)

@@ -11,6 +11,15 @@ from typing import TYPE_CHECKING, Any, Generic, TypeVar
 import attrs
 
 from leg_wear_monitor.monitor.alarms.alarm import Alarm, Limit
+from leg_wear_monitor.monitor.alarms.fault_codes import (
+    EXCHANGED,
+    FOOT_LOAD_LIMITS,
+    GAPS,
+    SCALE,
+    SIGN,
+    STUCK,
+    ZERO,
+)
 from leg_wear_monitor.monitor.evaluation.torque_checks import BIAS, DRIFT, LAG
 from leg_wear_monitor.twin.kinds import KINDS as SAMPLE_KINDS
 from leg_wear_monitor.twin.kinds import LOAD
@@ -256,6 +265,56 @@ def _rate(name: str) -> "AlarmSpec[InputHealth]":
     )
 
 
+def _foot_load(kind: str, quantity: str, meaning: str, subject: str = "") -> Any:
+    """A fault of the sensor of the foot load, in a gait cycle."""
+    return AlarmSpec(
+        kind=kind,
+        subject=subject,
+        quantity=quantity,
+        meaning=f"{meaning}. Only with `foot_load.source`",
+        limit_words=f"{FOOT_LOAD_LIMITS[kind]:g}",
+        value=lambda values: values.get(kind, math.nan),
+        limit=lambda _: FOOT_LOAD_LIMITS[kind],
+        is_latched=not subject,
+    )
+
+
+FOOT_LOAD_RATE = _rate(SAMPLE_KINDS[LOAD].name)
+FOOT_LOAD: "tuple[AlarmSpec[Mapping[str, float]], ...]" = (
+    _foot_load(
+        GAPS,
+        "fraction of time without samples of the foot load",
+        "fraction of a gait cycle in gaps of more than 50 ms between samples of the foot load",
+        SAMPLE_KINDS[LOAD].name,
+    ),
+    _foot_load(
+        STUCK,
+        "constant fraction of the foot load",
+        "fraction of the largest foot load that does not change over a gait cycle",
+    ),
+    _foot_load(
+        ZERO,
+        "foot load in swing over its peak",
+        "median of the vertical foot load in swing, over its peak",
+    ),
+    _foot_load(
+        SCALE,
+        "factor between the foot load and what the drive torque shows of it",
+        "factor by which the foot load is larger or smaller than the drive torque shows; or three times the "
+        "largest force received over 50 kN, if that is more than 3",
+    ),
+    _foot_load(
+        EXCHANGED,
+        "correlation of the foot load with the other foot's stance, less that with this one's",
+        "correlation of the vertical foot load with stance half a turn later, less that with stance",
+    ),
+    _foot_load(
+        SIGN,
+        "pull of the foot load over its largest force",
+        "largest pull of the foot load downwards, over its largest vertical force",
+    ),
+)
+
 INPUT: "tuple[AlarmSpec[InputHealth], ...]" = (
     *(_rate(kind.name) for code, kind in SAMPLE_KINDS.items() if code != LOAD),
     AlarmSpec(
@@ -286,13 +345,14 @@ INPUT: "tuple[AlarmSpec[InputHealth], ...]" = (
 )
 
 OF_INPUT: "tuple[AlarmSpec[Any], ...]" = (*INPUT, SOURCES)
-ALL: "tuple[AlarmSpec[Any], ...]" = (*JOINT, *ENCODERS, *TORQUE, *GAIT, *OF_INPUT)
+OF_FOOT_LOAD: "tuple[AlarmSpec[Any], ...]" = (FOOT_LOAD_RATE, *FOOT_LOAD)
+ALL: "tuple[AlarmSpec[Any], ...]" = (*JOINT, *ENCODERS, *TORQUE, *GAIT, *OF_INPUT, *OF_FOOT_LOAD)
 
 INPUT_KINDS = tuple(dict.fromkeys(spec.kind for spec in OF_INPUT))
 KINDS = tuple(dict.fromkeys(spec.kind for spec in ALL))
 
 QUANTITIES = {
     **{spec.kind: spec.quantity for spec in (*JOINT, *ENCODERS)},
-    **{spec.name(): spec.quantity for spec in (*TORQUE, *GAIT, *OF_INPUT)},
+    **{spec.name(): spec.quantity for spec in (*TORQUE, *GAIT, *OF_INPUT, *OF_FOOT_LOAD)},
 }
 """Nouns by the alarm's name; by its kind for an alarm of a joint."""

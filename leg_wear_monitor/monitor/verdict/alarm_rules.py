@@ -36,13 +36,24 @@ def raised(*kinds: str, least: Level = Level.WARN) -> Condition:
 
 
 def blinding(situation: Situation) -> Sequence[Hit]:
-    """Present faults of the input of the crank; those of the torque leave the counting of wear as it is."""
+    """Present faults of the input of the crank; those of torque and foot load stop no counting."""
     kinds = ("input_sources", "input_rate", "input_samples", "input_gaps", "input_silence")
     causes = f": {situation.input_causes[0]}" if situation.input_causes else ""  # the most frequent
     return [
         hit_of(alarm, situation, causes=causes)
         for alarm in situation.alarms
-        if alarm.kind in kinds and alarm.subject != "torque" and alarm.present is Level.ERROR
+        if alarm.kind in kinds
+        and alarm.subject not in ("torque", "foot_load")
+        and alarm.present is Level.ERROR
+    ]
+
+
+def of_foot_load(situation: Situation) -> Sequence[Hit]:
+    """Present lack of samples of the foot load."""
+    return [
+        hit_of(alarm, situation)
+        for alarm in situation.alarms
+        if alarm.subject == "foot_load" and alarm.present is Level.ERROR
     ]
 
 

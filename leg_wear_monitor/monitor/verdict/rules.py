@@ -4,10 +4,19 @@ docs/reference/monitor.md lists them; a test compares the two.
 """
 
 from leg_wear_monitor.monitor.alarms.alarm import Level
-from leg_wear_monitor.monitor.alarms.fault_codes import ALREADY_COUNTED, CRANK_ZERO
+from leg_wear_monitor.monitor.alarms.fault_codes import (
+    ALREADY_COUNTED,
+    CRANK_ZERO,
+    EXCHANGED,
+    FOOT_LOAD_WORDS,
+    SCALE,
+    SIGN,
+    STUCK,
+    ZERO,
+)
 from leg_wear_monitor.monitor.alarms.words import ADVICE
 from leg_wear_monitor.monitor.verdict import cause_rules, clearance_rules, input_rules, material_rules
-from leg_wear_monitor.monitor.verdict.alarm_rules import blinding, raised
+from leg_wear_monitor.monitor.verdict.alarm_rules import blinding, of_foot_load, raised
 from leg_wear_monitor.monitor.verdict.rule import EVERYTHING, OF_THE_GAIT, OF_THE_MODEL, Rule
 from leg_wear_monitor.monitor.verdict.situation import Situation
 from leg_wear_monitor.monitor.verdict.verdict import NO_GAIT_CYCLE, NONE, Figure, Finding, State
@@ -37,6 +46,27 @@ def _cause(code: str, meaning: str, state: State = State.INSPECT, not_valid: tup
         why=f"the drive torque differs from the prediction: {meaning}{{causes}}",
         do=f"{{remedy}}; {_ACKNOWLEDGE}",
         not_valid=not_valid,
+    )
+
+
+_FOOT_LOAD = {
+    STUCK: "check the sensor of the foot load",
+    ZERO: "set the sensor's zero while the foot is in the air",
+    SCALE: "correct foot_load.scale: forces are in newtons",
+    EXCHANGED: "exchange the sensors, topics or columns of the two feet",
+    SIGN: "correct foot_load.sign",
+}
+
+
+def _foot_load(kind: str) -> Rule:
+    """Rule of a fault of the foot load's sensor."""
+    return Rule(
+        code=kind.upper(),
+        state=State.INSPECT,
+        hits=raised(kind, least=Level.ERROR),
+        why=f"{FOOT_LOAD_WORDS[kind]} (the {{quantity}} is {{value}}, limit {{limit}}){{past}}",
+        do=f"{_FOOT_LOAD[kind]}; {_ACKNOWLEDGE}",
+        not_valid=OF_THE_MODEL,
     )
 
 
@@ -175,6 +205,15 @@ RULES = (
         hits=input_rules.no_cycle,
         why="the monitor has not received a whole gait cycle yet",
         do=f"let the leg walk; if it walks already: {_COUNTED}",
+    ),
+    *map(_foot_load, _FOOT_LOAD),
+    Rule(
+        code="FOOT_LOAD_MISSING",
+        state=State.WATCH,
+        hits=of_foot_load,
+        why="the {quantity} is {value} (limit {limit}); meanwhile the load of earlier gait cycles acts",
+        do="repair the sensor of the foot load or its publisher, or set foot_load.source to none",
+        not_valid=OF_THE_GAIT,
     ),
     Rule(
         code="MATERIAL_LIMIT",

@@ -11,7 +11,7 @@ from leg_wear_monitor.drawable import Drawable
 from leg_wear_monitor.errors import ConfigError
 from leg_wear_monitor.json_text import json_text
 from leg_wear_monitor.monitor.ledger.entry import Measurement
-from leg_wear_monitor.monitor.reports import Lost
+from leg_wear_monitor.monitor.reports import FootLoad, Lost
 from leg_wear_monitor.monitor.verdict.verdict import Verdict
 from leg_wear_monitor.playback.result.condition import JointClearance, LifeHours
 from leg_wear_monitor.playback.result.document import alarms_document, joint_document, part_document
@@ -80,6 +80,8 @@ class ReplaySummary(Drawable):
         Samples and time that were not used.
     sampling : ReplaySampling or None
         How much of the gait was followed; None if all of it was.
+    load : FootLoad
+        Load at the foot over the last gait cycles.
     history : ReplayHistory
         The gait cycles over time.
     wear_depth_m : dict of str to WornDepth
@@ -107,6 +109,7 @@ class ReplaySummary(Drawable):
     status: tuple[ReplayStatus, ...]
     lost: Lost
     sampling: ReplaySampling | None = None
+    load: FootLoad = FootLoad()
     history: ReplayHistory
     wear_depth_m: dict[str, WornDepth]
     advice: str

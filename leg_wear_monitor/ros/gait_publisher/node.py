@@ -52,7 +52,7 @@ class GaitPublisher(ClosingNode):
         qos = QoSProfile(depth=200, reliability=self._reliability())
         self._by_kind: dict[int, Publisher] = {
             stream.kind: self._publisher(message_class(stream.type), stream.topic, qos)
-            for stream in streams_read(self.config.torque_sensor.source)
+            for stream in streams_read(self.config.torque_sensor.source, self.config.foot_load_sensor.source)
         }
         self.published, self._start_ns = 0, 0
 

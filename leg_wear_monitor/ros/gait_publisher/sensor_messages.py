@@ -7,12 +7,12 @@ from builtin_interfaces.msg import Time
 from geometry_msgs.msg import WrenchStamped
 from rclpy.serialization import serialize_message
 from sensor_msgs.msg import JointState
-from std_msgs.msg import Float64, Header
+from std_msgs.msg import Bool, Float64, Header
 
-from leg_wear_monitor.gait.config import FLOAT64
+from leg_wear_monitor.gait.config import CONTACT, FLOAT64
 from leg_wear_monitor.gait.sensors import Reading, stamp_ns
 from leg_wear_monitor.ros.gait_publisher.config import PublisherConfig
-from leg_wear_monitor.twin.kinds import CRANK
+from leg_wear_monitor.twin.kinds import CRANK, LOAD
 from leg_wear_monitor.twin.sample import (
     EMPTY,
     MISSING_JOINT,
@@ -22,7 +22,7 @@ from leg_wear_monitor.twin.sample import (
     ZERO_STAMP,
 )
 
-Message: TypeAlias = JointState | WrenchStamped | Float64
+Message: TypeAlias = JointState | WrenchStamped | Float64 | Bool
 
 
 def time_message(stamp: int) -> Time:
@@ -44,10 +44,23 @@ def _whole(reading: Reading, start_ns: int, config: PublisherConfig) -> Message:
     stamp = time_message(stamp_ns(reading, start_ns))
     if reading.kind == CRANK:
         return _joint_state(reading, stamp, config)
+    if reading.kind == LOAD:
+        return _foot_load(reading, stamp, config)
     if config.torque_sensor.source == FLOAT64:
         return Float64(data=reading.torque_nm)
     message = WrenchStamped(header=Header(stamp=stamp, frame_id=config.frame_id))
     message.wrench.torque.z = reading.torque_nm
+    return message
+
+
+def _foot_load(reading: Reading, stamp: Time, config: PublisherConfig) -> Message:
+    along, up = reading.foot_force_n
+    if config.foot_load_sensor.source == CONTACT:
+        return Bool(data=up > 0.0)
+    if config.foot_load_sensor.source == FLOAT64:
+        return Float64(data=up)
+    message = WrenchStamped(header=Header(stamp=stamp, frame_id=config.frame_id))
+    message.wrench.force.x, message.wrench.force.y = along, up
     return message
 
 
@@ -68,6 +81,8 @@ def _joint_state(reading: Reading, stamp: Time, config: PublisherConfig) -> Join
 
 def _break(message: Message, fault: int) -> None:
     """Inject a fault into a message; a torque message can only lack its stamp or a finite value."""
+    if isinstance(message, Bool):  # it has neither a stamp nor a number
+        return
     if fault == ZERO_STAMP and not isinstance(message, Float64):
         message.header.stamp = Time()
     elif isinstance(message, JointState):
@@ -77,7 +92,7 @@ def _break(message: Message, fault: int) -> None:
         if isinstance(message, Float64):
             message.data = number
         else:
-            message.wrench.torque.z = number
+            message.wrench.torque.z = message.wrench.force.x = number
 
 
 def _break_joint_state(message: JointState, fault: int) -> None:

@@ -183,6 +183,15 @@ class LegFollower:
         self._stepper.model.law[:] = contact_laws(contacts)
         self._repeating.cycles = ()
 
+    def freeze_load(self, is_frozen: bool, clears: bool) -> None:
+        """Let the mean of the measured force act, and no sample change it; none if it ``clears``."""
+        _, mean, learned = force_of(self._load.rows)
+        if clears:
+            mean[:], learned[:] = 0.0, 0.0
+        if is_frozen and (clears or not self.state.push.is_frozen):
+            set_force(self._load.rows, (mean, mean, learned))
+        self.state.push.is_frozen = is_frozen
+
     def follow(
         self, steps: Steps, n: int, cycles: list[CycleStatistics], events: list[Event]
     ) -> SampleStatistics:
@@ -230,10 +239,10 @@ class LegFollower:
         """Set the leg in motion at the begin of step i, with its wear unchanged; returns the event."""
         motion, step = self.state.motion, steps[i]
         stamp, (angle, speed) = int(step["begin_ns"]), step["motion"][:2]
-        peak_n = float(self.state.push.peak_n)
+        kept = float(self.state.push.peak_n), int(self.state.push.is_frozen)
         for part in ("torque", "sums", "load", "push"):
             self.records[part] = 0
-        self.state.push.peak_n = peak_n
+        self.state.push.peak_n, self.state.push.is_frozen = kept
         motion.base_ns = stamp - self._run_in(float(angle), float(speed))
         if motion.lost:
             motion.failed_ns += stamp - motion.failed_at_ns

@@ -101,7 +101,7 @@ def take_push(load, push, row, rate, step, force):
     to the next sample. The filter's delay is that of the sample ahead that it takes, so the force acts at its
     time.
     """
-    if load.force.shape[0] == 0:
+    if load.force.shape[0] == 0 or push.is_frozen != 0:
         return
     since, until = 1.0e-9 * (step.begin_ns - push.last_ns), 1.0e-9 * step.until_next_ns
     if push.last_ns != 0 and since <= LONGEST_PUSH:
@@ -127,19 +127,24 @@ def _learn(load, before, row, force_before, force):
 
 @kernel
 def _filter(load, push, row, step):
-    """Filter the departure of the sample ahead, at a row, from the mean force."""
+    """Filter the departure of the sample ahead, at a row, from the mean force.
+
+    At the start and after a gap it begins at 0: a force that is there at once would be an impact.
+    """
     dt = 1.0e-9 * (step.end_ns - push.ahead_ns)
     if dt <= 0.0:
         return
     fresh = push.ahead_ns == 0 or dt > LONGEST_PUSH
+    dt = 0.0 if fresh else dt
     n, fraction, i = load.force.shape[0], 1.0 - math.exp(-dt / _STAGE_S), math.floor(row)
     w = row - i
     fx, fy = in_mechanism(load.axis, row, step.motion[2], step.motion[3])
     for c in range(2):
         mean = load.mean[i % n, c] + w * (load.mean[(i + 1) % n, c] - load.mean[i % n, c])
-        departure = pass_low(fraction, fresh, (fx if c == 0 else fy) - mean, push.stages[c])
-        push.departure[0, c] = departure if fresh else push.departure[1, c]
-        push.departure[1, c] = departure
+        if fresh:
+            push.stages[c, 0], push.stages[c, 1], push.departure[1, c] = 0.0, 0.0, 0.0
+        push.departure[0, c] = push.departure[1, c]
+        push.departure[1, c] = pass_low(fraction, False, (fx if c == 0 else fy) - mean, push.stages[c])
     push.reaches_ns[0] = (step.end_ns if fresh else push.ahead_ns) - AHEAD_NS
     push.reaches_ns[1], push.ahead_ns = step.end_ns - AHEAD_NS, step.end_ns
 

@@ -135,6 +135,7 @@ LOAD_FILTER = np.dtype(
         ("departure", "f8", (2, 2)),  # from the mean force: before the last filtered sample, and with it [N]
         ("reaches_ns", "i8", (2,)),  # stamps at which these are right
         ("peak_n", "f8"),  # largest vertical force of the gait cycle before
+        ("is_frozen", "i8"),  # 1 while the samples are wrong: the force of the gait cycles before acts
     ]
 )
 

@@ -18,11 +18,20 @@ pytestmark = pytest.mark.plain
 PAGE = Path(__file__).parents[3] / "docs" / "reference" / "monitor.md"
 TABLE = re.compile(r"(<!-- alarms -->\n).*?(<!-- end -->)", re.DOTALL)
 ENCODERS = {"encoders.names": ["knee"], "encoders.joints": ["G"]}
+FOOT_LOAD = {"foot_load.source": "contact"}
 
 
 def renewed(page):
     rows = ["| alarm | value | limit |", "|---|---|---|"]
-    for group in (specs.JOINT, specs.ENCODERS, specs.TORQUE, specs.GAIT, specs.INPUT, (specs.SOURCES,)):
+    for group in (
+        specs.JOINT,
+        specs.ENCODERS,
+        specs.TORQUE,
+        specs.GAIT,
+        specs.INPUT,
+        (specs.SOURCES,),
+        specs.OF_FOOT_LOAD,
+    ):
         joint = "<joint>" if group in (specs.JOINT, specs.ENCODERS) else ""
         rows += [f"| `{spec.name(joint)}` | {spec.meaning} | {spec.limit_words} |" for spec in group]
     table = "\n".join([*rows, ""])
@@ -36,7 +45,7 @@ def test_the_page_lists_every_alarm_as_it_is_declared():
 
 
 def test_kinds_are_those_of_the_board():
-    board = AlarmBoard(config_from(ENCODERS), ("A", "B"))
+    board = AlarmBoard(config_from(ENCODERS | FOOT_LOAD), ("A", "B"))
     assert set(specs.KINDS) == {alarm.kind for alarm in board.alarms.values()}
     assert len(set(specs.KINDS)) == len(specs.KINDS)
     assert set(specs.INPUT_KINDS) == {kind for kind in specs.KINDS if kind.startswith("input_")}
@@ -55,6 +64,11 @@ def test_names_and_their_order_are_a_contract():
     assert list(AlarmBoard(config_from(ENCODERS), ("A", "B")).alarms) == expected
     without = [name for name in expected if "departure" not in name]
     assert list(AlarmBoard(MonitorConfig(), ("A", "B")).alarms) == without
+    of_load = (
+        "input_rate foot_load", "input_gaps foot_load", "foot_load_stuck", "foot_load_zero",
+        "foot_load_scale", "foot_load_exchanged", "foot_load_sign",
+    )  # fmt: skip
+    assert list(AlarmBoard(config_from(FOOT_LOAD), ("A", "B")).alarms) == [*without, *of_load]
 
 
 def test_limits_follow_from_the_parameters():

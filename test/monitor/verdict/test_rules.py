@@ -12,6 +12,7 @@ from hypothesis import strategies as st
 
 from leg_wear_monitor.estimate.cause import Cause, Change, NamedCause, TorqueExplanation
 from leg_wear_monitor.monitor.alarms.alarm import Alarm, Level
+from leg_wear_monitor.monitor.alarms.fault_codes import EXCHANGED, SCALE, SIGN, STUCK, ZERO
 from leg_wear_monitor.monitor.alarms.guides import guide_of
 from leg_wear_monitor.monitor.alarms.words import ADVICE
 from leg_wear_monitor.monitor.config.inputs import Crank, DriveTorque
@@ -21,6 +22,7 @@ from leg_wear_monitor.monitor.evaluation import specs
 from leg_wear_monitor.monitor.evaluation.board import AlarmBoard
 from leg_wear_monitor.monitor.verdict.alarm_rules import OF_A_JOINT
 from leg_wear_monitor.monitor.verdict.cause_words import CauseWords
+from leg_wear_monitor.monitor.verdict.rule import OF_THE_GAIT, OF_THE_MODEL
 from leg_wear_monitor.monitor.verdict.rules import RULES, findings
 from leg_wear_monitor.monitor.verdict.situation import JointSituation, SeenClearance, Situation
 from leg_wear_monitor.monitor.verdict.verdict import (
@@ -38,7 +40,10 @@ pytestmark = pytest.mark.plain
 JOINTS = ("A", "G")
 NEW = tuple(JointSituation(joint=joint, counted_m=3.0e-4, limit_m=6.0e-4) for joint in JOINTS)
 HEALTHY = Situation(joints=NEW, quantities=specs.QUANTITIES, mismatch=0.031, mismatch_limit=0.1)
-BOARD = AlarmBoard(config_from({"encoders.names": ["knee"], "encoders.joints": ["G"]}), JOINTS)
+BOARD = AlarmBoard(
+    config_from({"encoders.names": ["knee"], "encoders.joints": ["G"], "foot_load.source": "wrench"}),
+    JOINTS,
+)
 
 
 def judged(**changed: Any) -> Verdict:
@@ -161,6 +166,12 @@ CASES = [
         "ALREADY_COUNTED",
         (Figure.GROWTH, Figure.IMPACT_FORCES),
     ),
+    *(
+        ({"alarms": (alarm(kind),)}, State.INSPECT, kind.upper(), OF_THE_MODEL)
+        for kind in (STUCK, ZERO, SCALE, EXCHANGED, SIGN)
+    ),
+    ({"alarms": (alarm("input_rate foot_load"),)}, State.WATCH, "FOOT_LOAD_MISSING", OF_THE_GAIT),
+    ({"alarms": (alarm("input_gaps foot_load"),)}, State.WATCH, "FOOT_LOAD_MISSING", OF_THE_GAIT),
     (
         {"alarms": (alarm("material_limit A"),)},
         State.WATCH,

@@ -99,7 +99,7 @@ def test_it_carries_and_wears_as_a_leg_in_full_coordinates(leg, twin, gait, stan
     )
     truth = lw.simulate(with_toe_force(leg, stance[:: POINTS // 128]), cycles=12, model="full", wear=True)
     joints = [truth.joints[name] for name in twin.clearance_joints]
-    np.testing.assert_allclose(mean_n, [joint.mean_force_n for joint in joints], rtol=0.005)
+    np.testing.assert_allclose(mean_n, [joint.mean_force_n for joint in joints], rtol=0.01)
     wrong = archard_j / [joint.archard_integral_j_per_cycle for joint in joints] - 1.0
     assert (np.abs(wrong) < 0.01 + bias + 5.3 * sigma).all(), wrong
     assert cycles[-1].torque.load_acting_n == 0.0

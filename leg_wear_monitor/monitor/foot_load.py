@@ -1,0 +1,248 @@
+"""The measured foot load over the last gait cycles: size, heel strike and toe-off, and faults of its sensor.
+
+The checks compare it with the template of stance (`mechanism.ground_reaction`) and with the drive torque,
+which a load at the foot needs by virtual work.
+"""
+
+import math
+from collections.abc import Mapping
+
+import attrs
+import numpy as np
+
+from leg_wear_monitor.mechanism.arrays import Floats
+from leg_wear_monitor.mechanism.ground_reaction import nominal_stance
+from leg_wear_monitor.mechanism.ideal import TURN, one_cycle, point_motion
+from leg_wear_monitor.mechanism.position import build_linkage
+from leg_wear_monitor.mechanism.spec import Mechanism
+from leg_wear_monitor.monitor.alarms.fault_codes import (
+    EXCHANGED,
+    FOOT_LOAD_LIMITS,
+    GAPS,
+    SCALE,
+    SIGN,
+    STUCK,
+    ZERO,
+)
+from leg_wear_monitor.monitor.config.settings import MonitorConfig
+from leg_wear_monitor.monitor.reports import FootLoad
+from leg_wear_monitor.twin.follower.state import FINE_PHASES
+from leg_wear_monitor.twin.kinds import KINDS, LOAD
+from leg_wear_monitor.twin.sample import NO_FAULT, Samples
+from leg_wear_monitor.twin.settings import CONTACT, MEASURED
+from leg_wear_monitor.twin.statistics import CycleStatistics, LoadProfile, TorqueProfile
+
+_CYCLES = 10  # over which the load is averaged
+_NOISES = 3.0
+_JUDGED = 3  # fewest of them for a judgement of the sensor
+_STANDS = (
+    0.25  # fraction of the peak above which the foot stands; the template tells when it strikes and leaves
+)
+_INDEPENDENT = 16.0  # phases of a drive torque that is not as predicted
+_SWING = 0.08  # of a turn, from stance as the template has it, where the foot is surely in the air
+_SURE = 5.0  # standard deviations of what the drive torque shows
+_OF_MODEL = 0.1  # of the drive torque may be wrong by other masses and clearances
+
+
+@attrs.frozen(eq=False)
+class _Cycle:
+    """A gait cycle with samples of the load; by phase: force (2, n) [N], unexplained torque (n,) [N m].
+
+    ``acted``: 1 if the load acted in the twin, which then has its torque, else 0.
+    """
+
+    load: LoadProfile
+    force_n: Floats
+    unexplained_nm: Floats
+    acted: float
+
+
+@attrs.define
+class FootLoadState:
+    """State of the checks; every value is immutable."""
+
+    cycles: tuple[_Cycle, ...] = ()
+    acts: float = 0.0  # in the present gait cycle, as `_Cycle.acted`
+    largest_n: float = 0.0  # received since the last gait cycle, unusable ones included
+
+
+class FootLoadCheck:
+    """Follows the measured foot load.
+
+    Parameters
+    ----------
+    mechanism : Mechanism
+        With the commanded speed.
+    config : MonitorConfig
+
+    Raises
+    ------
+    ConfigError
+        For a mechanism whose toe does not walk.
+    """
+
+    def __init__(self, mechanism: Mechanism, config: MonitorConfig) -> None:
+        linkage = build_linkage(mechanism)
+        self.is_contact = config.foot_load.source == CONTACT
+        self._stance = stance = nominal_stance(linkage)
+        # at the middles of the phases
+        self._expected = stance.force(points=2 * FINE_PHASES)[1::2] @ stance.up
+        motion = one_cycle(linkage, 2 * FINE_PHASES, 1.0)
+        speed = getattr(mechanism.drive, "speed", TURN)
+        self._model_nm = _OF_MODEL * float(
+            np.sqrt(np.mean(one_cycle(linkage, FINE_PHASES, speed).drive_torque ** 2))
+        )
+        self._toe_per_turn = point_motion(motion, linkage, *(mechanism.toe or ("", "")))[1][1::2].T
+        phase = (np.arange(FINE_PHASES) + 0.5) / FINE_PHASES
+        whole = (stance.turned * (stance.toe_off - stance.heel_strike)) % 1.0
+        self._swing = (stance.turned * (phase - stance.heel_strike) + _SWING) % 1.0 > whole + 2.0 * _SWING
+        self._late = self._phases(self._expected) - np.array([stance.heel_strike, stance.toe_off])
+        self._acts = float(config.load.model == MEASURED)
+        self.state = FootLoadState(acts=self._acts)
+
+    def add_samples(self, piece: Samples) -> None:
+        """Add received samples."""
+        force = piece["foot_force_n"][(piece["kind"] == LOAD) & (piece["fault"] == NO_FAULT)]
+        if len(force):
+            largest = float(np.nan_to_num(np.abs(force)).max())
+            self.state.largest_n = max(self.state.largest_n, largest)
+
+    def ended(self, statistics: CycleStatistics) -> dict[str, float]:
+        """Add a gait cycle; returns the values of the alarms that can be judged."""
+        state, load = self.state, statistics.load
+        beyond = FOOT_LOAD_LIMITS[SCALE] * state.largest_n / KINDS[LOAD].largest
+        state.largest_n = 0.0
+        if load is None:
+            return {SCALE: beyond} if beyond > FOOT_LOAD_LIMITS[SCALE] else {}
+        force = _by_phase(load.number, load.force_n)
+        cycle = _Cycle(load, force, _unexplained(statistics.torque_profile), state.acts)
+        state.cycles = (*state.cycles, cycle)[-_CYCLES:]
+        stuck = _unchanged(load)
+        values = {GAPS: load.gap_s / statistics.duration_s, STUCK: stuck}
+        if stuck < FOOT_LOAD_LIMITS[STUCK]:
+            values |= self._compared()
+        return values | ({SCALE: beyond} if beyond > FOOT_LOAD_LIMITS[SCALE] else {})
+
+    def freezes(self, values: Mapping[str, float]) -> tuple[bool, bool]:
+        """Whether values of a gait cycle show a wrong load, and whether it has been wrong from the start."""
+        wrong = {kind for kind, limit in FOOT_LOAD_LIMITS.items() if values.get(kind, 0.0) >= limit}
+        is_frozen, clears = bool(wrong - {GAPS}), bool(wrong - {GAPS, STUCK, ZERO})
+        self.state.acts = 0.0 if clears else self._acts
+        return is_frozen, clears
+
+    @property
+    def load(self) -> FootLoad:
+        """The load over the last gait cycles."""
+        cycles = self.state.cycles
+        if not cycles:
+            return FootLoad()
+        up = np.array([self._stance.up @ each.force_n for each in cycles])
+        mean = up.mean(axis=0)
+        found, several = self._phases(mean), len(cycles) > 1
+        spread = (np.array([self._phases(each) for each in up]) - found + 0.5) % 1.0 - 0.5
+        sigma = spread.std(axis=0, ddof=1).tolist() if several else [None, None]
+        heel_strike, toe_off = ((found - self._late) % 1.0).tolist()
+        size = up @ mean / (mean @ mean or 1.0)
+        peak_n, scatter = float(mean.max()), float(size.std(ddof=1)) if several else math.nan
+        return FootLoad(
+            source="measured",
+            peak_n=None if self.is_contact else peak_n,
+            peak_sigma_n=peak_n * scatter if several and not self.is_contact else None,
+            heel_strike_phase=heel_strike,
+            toe_off_phase=toe_off,
+            heel_strike_sigma=sigma[0],
+            toe_off_sigma=sigma[1],
+            cycles=len(cycles),
+        )
+
+    @property
+    def mean_force_n(self) -> Floats | None:
+        """Mean force (FINE_PHASES, 2) by phase along the axes of the mechanism [N]; None before the first."""
+        cycles = self.state.cycles
+        return np.mean([each.force_n for each in cycles], axis=0).T if cycles else None
+
+    def snapshot(self) -> FootLoadState:
+        """A copy of the whole state."""
+        return attrs.evolve(self.state)
+
+    def restore(self, snapshot: FootLoadState) -> None:
+        """Restore a snapshot of checks of the same mechanism and parameters."""
+        self.state = attrs.evolve(snapshot)
+
+    def _phases(self, up: Floats) -> Floats:
+        """Phases (2,) at which a vertical force by phase rises and falls, around the middle of stance."""
+        low = min(float(np.median(up)), 0.0)
+        stands = up - low > _STANDS * (up.max() - low)
+        angle = TURN * (np.arange(len(up)) + 0.5) / len(up)
+        middle = math.atan2(float(np.sin(angle) @ stands), float(np.cos(angle) @ stands)) / TURN
+        half = 0.5 * self._stance.turned * float(stands.mean())
+        return np.array([middle - half, middle + half]) % 1.0
+
+    def _compared(self) -> dict[str, float]:
+        """Values of the alarms that compare the load with stance and with the drive torque."""
+        cycles = self.state.cycles
+        force = np.mean([each.force_n for each in cycles], axis=0)
+        up = self._stance.up @ force
+        largest = float(np.abs(up).max())
+        if len(cycles) < _JUDGED or not self._stands(up):
+            return {}
+        sign = -1.0 if -up.min() > up.max() else 1.0
+        fits = [_correlation(sign * up, np.roll(self._expected, k)) for k in (0, FINE_PHASES // 2)]
+        values = {EXCHANGED: fits[1] - fits[0], SIGN: max(0.0, -float(up.min()) / largest)}
+        # the foot of the other leg stands in swing, and needs another torque
+        if not self.is_contact and values[EXCHANGED] < FOOT_LOAD_LIMITS[EXCHANGED]:
+            values[ZERO] = abs(float(np.median(up[self._swing]))) / largest
+            if sign > 0.0:
+                values[SCALE] = self._scale(force)
+        return values
+
+    def _stands(self, up: Floats) -> bool:
+        """Whether the mean vertical force (n,) changes within a gait cycle by more than its noise."""
+        cycles = np.array([self._stance.up @ each.force_n for each in self.state.cycles])
+        noise = float(cycles.std(axis=0, ddof=1).mean()) / math.sqrt(len(cycles))
+        return float(up.std()) > _NOISES * noise
+
+    def _scale(self, force: Floats) -> float:
+        """Factor between the load and what the drive torque shows of it, at least 1; NaN if it does not."""
+        unexplained = np.mean([each.unexplained_nm for each in self.state.cycles], axis=0)
+        if not np.isfinite(unexplained).all():
+            return math.nan
+        needed = -np.einsum("cn,cn->n", force, self._toe_per_turn)
+        of_load, left = needed - needed.mean(), unexplained - unexplained.mean()
+        square = float(of_load @ of_load)
+        if not square > 0.0:
+            return math.nan
+        shown = float(of_load @ left) / square
+        variance = float(np.mean((left - shown * of_load) ** 2)) + self._model_nm**2
+        sigma = math.sqrt(variance * FINE_PHASES / square / _INDEPENDENT)
+        shown += float(np.mean([each.acted for each in self.state.cycles]))  # what the twin has already
+        if shown > 1.0:
+            return shown if shown > _SURE * sigma else math.nan
+        return min(1.0 / shown, 1.0e3) if 0.0 < shown < 1.0 - 2.0 * sigma else 1.0
+
+
+def _by_phase(number: Floats, sums: Floats) -> Floats:
+    """Means (m, n) by phase of sums (m, n); those of empty phases lie between their neighbours'."""
+    there = np.flatnonzero(number)
+    if not len(there):
+        return np.full(sums.shape, math.nan)
+    n = len(number)
+    return np.array([np.interp(np.arange(n), there, one[there] / number[there], period=n) for one in sums])
+
+
+def _unexplained(profile: TorqueProfile) -> Floats:
+    """Measured minus predicted drive torque (n,) by phase [N m]; NaN without measured ones."""
+    unexplained = (profile.measured_nm - profile.predicted_nm)[None]
+    return np.asarray(_by_phase(profile.number, unexplained)[0])
+
+
+def _unchanged(load: LoadProfile) -> float:
+    """Part of the largest force, either way, that does not change over a gait cycle; 1 if nothing does."""
+    largest = max(abs(load.least_n), abs(load.largest_n))
+    return 1.0 - min(1.0, (load.largest_n - load.least_n) / largest) if largest > 0.0 else 1.0
+
+
+def _correlation(one: Floats, other: Floats) -> float:
+    a, b = one - one.mean(), other - other.mean()
+    size = math.sqrt(float(a @ a) * float(b @ b))
+    return float(a @ b) / size if size > 0.0 else 0.0

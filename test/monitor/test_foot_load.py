@@ -1,0 +1,182 @@
+"""The sensor of the foot load: what it shows of a leg in full coordinates, and each of its faults by name."""
+
+from collections.abc import Callable
+
+import numpy as np
+import pytest
+
+import leg_wear_monitor as lw
+from leg_wear_monitor.errors import ConfigError
+from leg_wear_monitor.gait.config import FootLoadSensorConfig, GaitConfig, LoadConfig
+from leg_wear_monitor.gait.leg import SyntheticLeg
+from leg_wear_monitor.gait.sensors import readings, samples
+from leg_wear_monitor.mechanism.ground_reaction import nominal_stance
+from leg_wear_monitor.mechanism.position import build_linkage
+from leg_wear_monitor.monitor.alarms.alarm import Level
+from leg_wear_monitor.monitor.alarms.fault_codes import FOOT_LOAD_WORDS
+from leg_wear_monitor.monitor.config.parameters import config_from
+from leg_wear_monitor.twin.kinds import LOAD
+from leg_wear_monitor.twin.sample import Samples
+
+S, START = 1_000_000_000, 10**18
+PEAK_N, AT_S = 300.0, 5.2  # a fault begins in stance
+MEASURED = {"foot_load.source": "wrench", "load.model": "measured", "diagnosis.enabled": False}
+
+pytestmark = pytest.mark.chaotic
+
+
+@pytest.fixture(scope="module")
+def walk() -> Samples:
+    """Twelve gait cycles on the ground, each step otherwise; the sensor has 5 % of noise."""
+    config = GaitConfig(
+        duration_s=12.0,
+        load=LoadConfig(ground_n=PEAK_N),
+        foot_load_sensor=FootLoadSensorConfig(source="wrench", noise_n=15.0),
+    )
+    return samples(list(readings(SyntheticLeg(config), config)), START)
+
+
+def monitored(walk: Samples, **parameters: object) -> lw.WearMonitor:
+    config = config_from(MEASURED | parameters)
+    monitor = lw.WearMonitor(lw.load_mechanism("bionic_leg"), config)
+    for block in np.array_split(walk, 7):
+        monitor.update(block)
+    return monitor
+
+
+def raised(monitor: lw.WearMonitor) -> set[str]:
+    """Alarms of the foot load's sensor at ERROR."""
+    return {one.name for one in monitor.alarms.alarms if "foot_load" in one.name and one.level is Level.ERROR}
+
+
+def test_a_healthy_leg_on_the_ground_is_healthy(walk):
+    monitor = monitored(walk)
+    assert monitor.verdict.verdict.state.value == "healthy"
+    assert not raised(monitor)
+    load, stance = monitor.foot_load, nominal_stance(build_linkage(lw.load_mechanism("bionic_leg")))
+    assert load.source == "measured"
+    # ten steps scatter by 10 % in size and by 2 % of a turn in time
+    assert load.peak_n == pytest.approx(PEAK_N, rel=0.02 + 5.3 * 0.1 / 10**0.5)
+    assert load.heel_strike_phase == pytest.approx(stance.heel_strike, abs=0.01 + 5.3 * 0.02 / 10**0.5)
+    assert load.toe_off_phase == pytest.approx(stance.toe_off, abs=0.01 + 5.3 * 0.02 / 10**0.5)
+    assert 0.0 < load.peak_sigma_n < 0.4 * PEAK_N
+    status = next(one for one in monitor.status() if one.name == "foot_load")
+    assert status.level is Level.OK and status.values["peak_n"] == load.peak_n
+
+
+def test_without_the_load_its_torque_is_a_mismatch(walk):
+    assert "torque_mismatch" in {
+        one.name for one in monitored(walk, **{"load.model": "none"}).alarms.alarms if one.level
+    }
+
+
+def changed(change: Callable[[np.ndarray, np.ndarray], np.ndarray], walk: Samples) -> Samples:
+    """The walk with other forces of the sensor: change(time [s], force [N])."""
+    out, which = walk.copy(), walk["kind"] == LOAD
+    t = 1.0e-9 * (walk["stamp_ns"][which] - START)
+    out["foot_force_n"][which] = change(t, walk["foot_force_n"][which])
+    return out
+
+
+def held(t, force):
+    return np.where((t > AT_S)[:, None], force[np.searchsorted(t, AT_S)], force)
+
+
+def other_foot(t, force):
+    return np.stack([np.interp(t - 0.5, t, one) for one in force.T], axis=1)
+
+
+@pytest.mark.parametrize(
+    "change, alarm",
+    [
+        (held, "foot_load_stuck"),
+        (lambda t, force: 0.0 * force, "foot_load_stuck"),
+        (lambda t, force: force + np.array([0.0, 50.0]), "foot_load_zero"),
+        (lambda t, force: force + 12.0 * t[:, None] * np.array([0.0, 1.0]), "foot_load_zero"),
+        (lambda t, force: 10.0 * force, "foot_load_scale"),
+        (lambda t, force: 1000.0 * force, "foot_load_scale"),
+        (lambda t, force: 0.001 * force, "foot_load_scale"),
+        (other_foot, "foot_load_exchanged"),
+        (lambda t, force: -force, "foot_load_sign"),
+    ],
+    ids=["stuck", "zeros", "zero", "drift", "ten times", "thousand times", "kN", "other foot", "sign"],
+)
+@pytest.mark.parametrize("model", ["measured", "none"])
+def test_each_fault_of_the_sensor_is_named(walk, change, alarm, model):
+    monitor = monitored(changed(change, walk), **{"load.model": model})
+    assert raised(monitor) - {"input_rate foot_load", "input_gaps foot_load"} == {alarm}
+    found = {finding.code: finding for finding in monitor.verdict.findings}
+    assert FOOT_LOAD_WORDS[alarm] in found[alarm.upper()].why
+    status = next(one for one in monitor.status() if one.name == "foot_load")
+    assert status.level is Level.ERROR and FOOT_LOAD_WORDS[alarm] in status.message
+
+
+def test_a_wrong_load_does_not_wear(walk):
+    """A wrong size is no load as soon as it is seen; a stuck sensor keeps the load of the steps before.
+
+    The knee bears 73 N in the air, and 229 N on the ground.
+    """
+    knee_n = []
+    for change in (lambda t, force: 10.0 * force, held):
+        monitor = lw.WearMonitor(lw.load_mechanism("bionic_leg"), config_from(MEASURED))
+        cycles = monitor.update(changed(change, walk)).cycles
+        knee_n.append(np.mean([one.joints[2].mean_force_n for one in cycles[-3:]]))
+    assert knee_n[0] == pytest.approx(73.0, rel=0.1)
+    assert knee_n[1] == pytest.approx(229.0, rel=0.2)
+
+
+@pytest.mark.parametrize("begin_s, end_s, alarm", [(6.0, 99.0, "input_rate"), (6.3, 6.7, "input_gaps")])
+def test_missing_samples_are_named_and_the_crank_is_monitored(walk, begin_s, end_s, alarm):
+    t = 1.0e-9 * (walk["stamp_ns"] - START)
+    gone = (
+        (walk["kind"] == LOAD) & (t > begin_s) & (t < end_s)
+        if alarm == "input_rate"
+        else ((walk["kind"] == LOAD) & (t % 1.0 > 0.3) & (t % 1.0 < 0.7))
+    )
+    monitor = monitored(walk[~gone])
+    assert f"{alarm} foot_load" in raised(monitor)
+    assert "FOOT_LOAD_MISSING" in {finding.code for finding in monitor.verdict.findings}
+    assert monitor.lost.unmonitored_s < 1.0
+
+
+def test_a_contact_switch_gives_heel_strike_and_toe_off(walk):
+    monitor = monitored(
+        changed(lambda t, force: np.stack([0.0 * t, force[:, 1] > 60.0], axis=1), walk),
+        **{"foot_load.source": "contact", "load.model": "none"},
+    )
+    stance = nominal_stance(build_linkage(lw.load_mechanism("bionic_leg")))
+    assert not raised(monitor)
+    assert monitor.foot_load.peak_n is None
+    assert monitor.foot_load.heel_strike_phase == pytest.approx(stance.heel_strike, abs=0.05)
+    assert monitor.foot_load.toe_off_phase == pytest.approx(stance.toe_off, abs=0.05)
+
+
+def test_blocks_and_snapshots_change_nothing(walk):
+    one, other = (lw.WearMonitor(lw.load_mechanism("bionic_leg"), config_from(MEASURED)) for _ in range(2))
+    whole = one.update(walk)
+    parts = [other.update(block) for block in np.array_split(walk[:3000], 11)]
+    kept = other.snapshot()
+    other.update(walk[:500])
+    other.restore(kept)
+    parts.append(other.update(walk[3000:]))
+    cycles = [cycle for part in parts for cycle in part.cycles]
+    forces = [[each.joints[0].mean_force_n for each in found] for found in (whole.cycles, cycles)]
+    assert forces[0] == forces[1]
+    assert one.foot_load == other.foot_load
+    assert repr(one.alarms) == repr(other.alarms)
+
+
+def test_without_a_source_nothing_knows_of_it(leg):
+    monitor = lw.WearMonitor(leg)
+    assert "foot_load" not in monitor.used
+    assert not [one for one in monitor.alarms.alarms if "foot_load" in one.name]
+    assert not [one for one in monitor.status() if "foot_load" in (one.name, *one.values)]
+    assert monitor.foot_load.source == "none"
+
+
+@pytest.mark.plain
+@pytest.mark.parametrize("source", ["none", "contact"])
+def test_a_load_without_forces_cannot_be_measured(leg, source):
+    config = config_from({"load.model": "measured", "foot_load.source": source})
+    with pytest.raises(ConfigError, match=r"load.model: 'measured' needs forces, and foot_load.source is"):
+        lw.WearMonitor(leg, config)

@@ -19,6 +19,7 @@ from leg_wear_monitor.mechanism.ground_reaction import (
     PHASES,
     Stance,
     nominal_stance,
+    on_the_ground,
     stance_template,
     with_toe_force,
 )
@@ -123,7 +124,7 @@ def wear(measured: list[Measured], peak_n: float, runs: int, cycles: int) -> Ite
     """Rows on wear counted under the template, against wear under each shape in full coordinates."""
     leg = load_mechanism("bionic_leg")
     stance = nominal_stance(build_linkage(leg))
-    known = archard(with_toe_force(leg, peak_n * stance.force()), "clearance", runs, cycles)
+    known = archard(on_the_ground(leg, peak_n), "clearance", runs, cycles)
     air = archard(leg, "clearance", runs, cycles)
     template = Measured("template itself", *(one[None] for one in stance_template(S)))
     template = template._replace(fore_aft=FORE_AFT * template.fore_aft)

@@ -11,7 +11,7 @@ import numpy as np
 
 from leg_wear_monitor import Mechanism, load_mechanism, simulate
 from leg_wear_monitor.mechanism.arrays import Floats
-from leg_wear_monitor.mechanism.ground_reaction import PHASES, nominal_stance, with_toe_force
+from leg_wear_monitor.mechanism.ground_reaction import PHASES, nominal_stance, on_the_ground
 from leg_wear_monitor.mechanism.ideal import TURN, one_cycle
 from leg_wear_monitor.mechanism.person import with_person
 from leg_wear_monitor.mechanism.position import build_linkage
@@ -76,8 +76,7 @@ def main() -> None:
     print(f"| {' | '.join(columns)} | {' | '.join(f'wear {name}' for name in names)} |")
     print("|---|---|---|---|" + "---|" * (2 * len(names)))
     for load_n, person_kg in LEGS:
-        carrying = with_person(bare, person_kg)
-        leg = with_toe_force(carrying, load_n * nominal_stance(build_linkage(carrying)).force())
+        leg = on_the_ground(with_person(bare, person_kg), load_n)
         still = None
         for up_m, ahead_m in BASES:
             moved = on_moving_base(leg, up_m, ahead_m, options.rpm) if up_m else leg

@@ -34,9 +34,11 @@ if TYPE_CHECKING:
     from leg_wear_monitor.life.result import Life
     from leg_wear_monitor.mechanism.drives.drive import Drive
     from leg_wear_monitor.mechanism.drives.loader import drives, load_drive
+    from leg_wear_monitor.mechanism.ground_reaction import on_the_ground
     from leg_wear_monitor.mechanism.loader import load_mechanism
     from leg_wear_monitor.mechanism.materials.loader import load_material, materials
     from leg_wear_monitor.mechanism.materials.material import Material
+    from leg_wear_monitor.mechanism.person import with_person
     from leg_wear_monitor.mechanism.spec import Mechanism
     from leg_wear_monitor.monitor.config.parameter_file import load_config
     from leg_wear_monitor.monitor.config.settings import MonitorConfig
@@ -83,12 +85,14 @@ _HOME = {
     "load_material": "mechanism.materials.loader",
     "load_mechanism": "mechanism.loader",
     "materials": "mechanism.materials.loader",
+    "on_the_ground": "mechanism.ground_reaction",
     "open_ledger": "monitor.ledger.ledger",
     "plot": "report.plot",
     "replay": "playback.replay",
     "share_directory": "share",
     "simulate": "dynamics.simulation",
     "simulate_life": "life.life",
+    "with_person": "mechanism.person",
 }
 
 __all__ = [
@@ -129,12 +133,14 @@ __all__ = [
     "load_material",
     "load_mechanism",
     "materials",
+    "on_the_ground",
     "open_ledger",
     "plot",
     "replay",
     "share_directory",
     "simulate",
     "simulate_life",
+    "with_person",
 ]
 
 

@@ -16,8 +16,7 @@ import numpy as np
 from leg_wear_monitor import Mechanism, SimulationResult, load_mechanism, simulate
 from leg_wear_monitor.dynamics.batch.batch import simulate_batch
 from leg_wear_monitor.dynamics.batch.leg import Leg
-from leg_wear_monitor.mechanism.ground_reaction import nominal_stance, with_toe_force
-from leg_wear_monitor.mechanism.position import build_linkage
+from leg_wear_monitor.mechanism.ground_reaction import on_the_ground
 
 LEGS = ("bionic_leg", "jansen_leg")
 SPEEDS_RPM = (30.0, 60.0, 90.0)
@@ -177,14 +176,14 @@ def sets_of(name: str, runs: int, cycles: int) -> Iterator[Comparison]:
     yield from torques.values()
 
 
-def on_the_ground(runs: int, cycles: int) -> Iterator[Comparison]:
+def ground_tables(runs: int, cycles: int) -> Iterator[Comparison]:
     """Tables of the leg with a stance of several sizes; yields every comparison."""
     leg = load_mechanism("bionic_leg")
-    force, energy = nominal_stance(build_linkage(leg)).force(), []
+    energy = []
     print(f"\n### On the ground: {leg.name}, 60 rpm\n")
     table("vertical peak [N]", "joint", *FIGURES.values(), ZONE)
     for load_n in LOADS_N:
-        case = Case(with_toe_force(leg, load_n * force), SETS[-1], 60.0)
+        case = Case(on_the_ground(leg, load_n), SETS[-1], 60.0)
         full, other = (case.simulated(runs, cycles, model) for model in ("full", "clearance"))
         for k, joint in enumerate(case.clearance_joints):
             figures = [compare(full.joints[:, k, i], other.joints[:, k, i]) for i in range(len(FIGURES))]
@@ -232,7 +231,7 @@ if __name__ == "__main__":
     parser.add_argument("--cycles", type=int, default=20, help="counted cycles of each run")
     parser.add_argument("--ground", action="store_true", help="only the leg on the ground")
     options = parser.parse_args()
-    ground = list(on_the_ground(options.runs, options.cycles))
+    ground = list(ground_tables(options.runs, options.cycles))
     if options.ground:
         summary(ground)
         raise SystemExit

@@ -8,8 +8,7 @@ import numpy as np
 
 from leg_wear_monitor.errors import ConfigError
 from leg_wear_monitor.mechanism.arrays import Floats
-from leg_wear_monitor.mechanism.ground_reaction import nominal_stance, with_toe_force
-from leg_wear_monitor.mechanism.position import build_linkage
+from leg_wear_monitor.mechanism.ground_reaction import on_the_ground
 from leg_wear_monitor.mechanism.spec import Mechanism
 
 _MOST_N = 10_000.0  # of a peak: ten times a person's weight
@@ -95,5 +94,4 @@ class Duty:
         ConfigError
             For a mechanism without a toe that moves to and fro.
         """
-        force = nominal_stance(build_linkage(mechanism)).force()
-        return [with_toe_force(mechanism, peak * force) for peak in self.hours_by_peak]
+        return [on_the_ground(mechanism, peak) for peak in self.hours_by_peak]

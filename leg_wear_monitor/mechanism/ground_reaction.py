@@ -10,7 +10,7 @@ import numpy as np
 from leg_wear_monitor.errors import ConfigError
 from leg_wear_monitor.mechanism.arrays import Floats
 from leg_wear_monitor.mechanism.ideal import TURN, one_cycle, point_motion
-from leg_wear_monitor.mechanism.position import Linkage
+from leg_wear_monitor.mechanism.position import Linkage, build_linkage
 from leg_wear_monitor.mechanism.spec import Mechanism, PhaseLoad
 
 PHASES = 128  # entries of a load's table; a divisor of the number of points of the leg's tables
@@ -124,6 +124,31 @@ def with_toe_force(mechanism: Mechanism, force: Floats, name: str = GROUND) -> M
         body=body, point=point, phase=phases, force=tuple((float(x), float(y)) for x, y in force)
     )
     return attrs.evolve(mechanism, loads={**mechanism.loads, name: load})
+
+
+def on_the_ground(mechanism: Mechanism, peak_n: float) -> Mechanism:
+    """The mechanism under the force of the ground on its toe, in the stance of a person.
+
+    Parameters
+    ----------
+    mechanism : Mechanism
+        A load named *ground* that it has is replaced.
+    peak_n : float
+        Largest vertical force [N].
+
+    Raises
+    ------
+    ConfigError
+        For a mechanism without a toe that moves to and fro.
+
+    Examples
+    --------
+    >>> import leg_wear_monitor as lw
+    >>> leg = lw.on_the_ground(lw.load_mechanism("bionic_leg"), 300.0)
+    >>> round(max(up for _, up in leg.loads["ground"].force))
+    300
+    """
+    return with_toe_force(mechanism, peak_n * nominal_stance(build_linkage(mechanism)).force())
 
 
 def _vertical(s: Floats) -> Floats:

@@ -29,14 +29,27 @@ SEGMENTS = {
 
 
 def with_person(mechanism: Mechanism, person_kg: float) -> Mechanism:
-    """The mechanism with one leg of a person of a mass [kg], as rigid parts of its bodies.
+    """The mechanism with one leg of a person, as rigid parts of its bodies.
 
     Hip, knee and ankle are the joints of the bodies named thigh, shank and foot; the foot ends at its toe.
+
+    Parameters
+    ----------
+    mechanism : Mechanism
+    person_kg : float
+        Mass of the whole person [kg].
 
     Raises
     ------
     ConfigError
         For a mechanism without such bodies, joints and toe.
+
+    Examples
+    --------
+    >>> import leg_wear_monitor as lw
+    >>> leg = lw.with_person(lw.load_mechanism("bionic_leg"), 80.0)
+    >>> round(leg.bodies["thigh"].mass, 1)
+    11.5
     """
     if not person_kg:
         return mechanism

@@ -12,9 +12,8 @@ from leg_wear_monitor.dynamics.clearance.tables import build_tables
 from leg_wear_monitor.dynamics.run.protocol import Setup
 from leg_wear_monitor.errors import ConfigError
 from leg_wear_monitor.mechanism.clearance import Film
-from leg_wear_monitor.mechanism.ground_reaction import nominal_stance, with_toe_force
+from leg_wear_monitor.mechanism.ground_reaction import on_the_ground
 from leg_wear_monitor.mechanism.ideal import TURN
-from leg_wear_monitor.mechanism.position import build_linkage
 from leg_wear_monitor.mechanism.spec import Mechanism
 from leg_wear_monitor.studies.tasks.grid import SAMPLES
 from leg_wear_monitor.studies.tasks.observed_leg import ObservedLeg
@@ -47,12 +46,9 @@ def with_film(mechanism: Mechanism, film: dict[str, float]) -> Mechanism:
     return attrs.evolve(mechanism, clearances=clearances)
 
 
-def on_the_ground(mechanism: Mechanism, settings: dict[str, Any]) -> Mechanism:
-    """The mechanism under the force of the ground in stance, its vertical peak ``ground_n`` [N] if given."""
-    if not settings.get("ground_n"):
-        return mechanism
-    force = settings["ground_n"] * nominal_stance(build_linkage(mechanism)).force()
-    return with_toe_force(mechanism, force)
+def loaded(mechanism: Mechanism, settings: dict[str, Any]) -> Mechanism:
+    """The mechanism under the force of the ground, its vertical peak ``ground_n`` [N] if that is given."""
+    return on_the_ground(mechanism, settings["ground_n"]) if settings.get("ground_n") else mechanism
 
 
 def start_angles(runs: int, seed: int) -> list[float]:
@@ -81,7 +77,7 @@ def ensemble(mechanism: Mechanism, settings: dict[str, Any]) -> list[Leg]:
         mechanism = with_film(mechanism, settings["film"])
     if settings.get("friction"):
         mechanism = with_friction(mechanism, settings["friction"])
-    mechanism = on_the_ground(mechanism, settings)
+    mechanism = loaded(mechanism, settings)
     clearance_joints, clearance_m = settings["clearance_joints"], settings["clearance_m"]
     smallest = min(c.radial_clearance for c in clearance_settings(mechanism, clearance_joints, clearance_m))
     return [

@@ -9,7 +9,7 @@ from leg_wear_monitor.life.life import LifeRun, LifeSettings, simulate_life
 from leg_wear_monitor.mechanism.arrays import Floats
 from leg_wear_monitor.mechanism.spec import Mechanism
 from leg_wear_monitor.studies.point import Arrays
-from leg_wear_monitor.studies.tasks.ensemble import on_the_ground
+from leg_wear_monitor.studies.tasks.ensemble import loaded
 from leg_wear_monitor.wear.cycle_jump import JumpControl
 
 STATES = 41  # states of a life at equal increases of clearance, new and end included; odd: one is halfway
@@ -33,7 +33,7 @@ def wear_life(mechanism: Mechanism, settings: dict[str, Any]) -> Arrays:
     SimulationError
         If the motion diverges, or no joint wears.
     """
-    mechanism = on_the_ground(mechanism, settings)
+    mechanism = loaded(mechanism, settings)
     lives = [_life(mechanism, settings, run) for run in range(settings["runs"])]
     result = {name: np.array([life[name] for life in lives]) for name in lives[0]}
     return result | {"clearance_joints": np.array(settings["clearance_joints"])}

@@ -4,8 +4,7 @@ import numpy as np
 import pytest
 
 from leg_wear_monitor import load_mechanism, simulate
-from leg_wear_monitor.mechanism.ground_reaction import nominal_stance, with_toe_force
-from leg_wear_monitor.mechanism.position import build_linkage
+from leg_wear_monitor.mechanism.ground_reaction import on_the_ground
 
 # of the difference of two runs of four cycles, from 10 starts moved by 1e-12 in each model, 2026-11-25
 SIGMA_FORCE = [0.0010, 0.0012, 0.0005, 0.0005, 0.0006]
@@ -18,7 +17,7 @@ BEYOND = 5.5  # standard deviations, by chance 2e-7 for all ten
 def test_forces_wear_and_energy_under_600_n() -> None:
     """Energy: 4 to 7e-6 of the losses in full coordinates, 4.5e-4 to 1.2e-3 in clearance; sigma 2.3e-4."""
     bare = load_mechanism("bionic_leg")
-    leg = with_toe_force(bare, 600.0 * nominal_stance(build_linkage(bare)).force())
+    leg = on_the_ground(bare, 600.0)
     force, wear = [], []
     for model, residual in (("full", 1.0e-4), ("clearance", 2.5e-3)):
         result = simulate(leg, cycles=4, skip_cycles=1, model=model)

@@ -21,6 +21,7 @@ SHORTER = {
     "2_your_linkage": ("cycles=5, trace=720", "cycles=1, trace=90"),
     "3_what_clearance_does": ("cycles = 10 ", "cycles = 5 "),
     "4_a_life": ('("bionic_leg"), settings', '("bionic_leg"), settings, clearances=["A", "B"]'),
+    "6_a_leg_that_carries_a_person": ("cycles = 10 ", "cycles = 5 "),
     "5_a_fleet": ("fleet update fleet.yaml", "fleet update fleet.yaml --workers 1"),
 }
 
@@ -135,6 +136,27 @@ def test_a_fleet(learnt: Learnt, capsys: pytest.CaptureFixture[str]) -> None:
     assert lesson.verdicts.state.tolist() == ["healthy", "stop"]
     above = lesson.joints > 1e-3 * lesson.limit_mm
     assert above.stack()[lambda worn: worn].index.tolist() == [("right-07", "G")]
+
+
+@pytest.mark.no_cover
+@pytest.mark.chaotic
+def test_a_leg_that_carries_a_person(learnt: Learnt) -> None:
+    """Of five cycles B wears 1.14 times as G in the air, G 1.08 times as B under 600 N.
+
+    Sigma 0.041 and 0.019, from 24 starts moved by 1e-12, 2026-11-25; the bounds are 5.3 of them away.
+    """
+    lesson = learnt("6_a_leg_that_carries_a_person")
+    forces = [{name: joint.mean_force_n for name, joint in each.joints.items()} for each in lesson.results]
+    assert forces[2]["I"] == pytest.approx(15.0 * forces[0]["I"], rel=0.05)
+    assert forces[2]["A"] < 2.0 * forces[0]["A"]
+    air, ground = (
+        dict(zip(lesson.leg.clearance_joints, each, strict=True)) for each in (lesson.air, lesson.ground)
+    )
+    assert air["B"] > 0.92 * air["G"] and ground["G"] > 0.98 * ground["B"]
+    assert all(ground[joint] > air[joint] for joint in air)
+    assert lesson.carried.drive_torque_nm.rms > 1.5 * lesson.results[2].drive_torque_nm.rms
+    assert all(lesson.archard(lesson.carried)[k] > wear for k, wear in enumerate(lesson.ground))
+    assert lesson.by_day.cycles_to(0, lesson.limit_m) < 0.85 * lesson.in_air.cycles_to(0, lesson.limit_m)
 
 
 @pytest.mark.plain

@@ -13,6 +13,7 @@ from leg_wear_monitor.monitor.encoders.clearance_estimate import ClearanceObserv
 from leg_wear_monitor.monitor.forecast.coefficient_prior import CoefficientPrior
 from leg_wear_monitor.monitor.forecast.forecast import Answer, JointForecast, Quantiles
 from leg_wear_monitor.monitor.ledger.entry import Measurement
+from leg_wear_monitor.monitor.ledger.walked import WalkedLoad
 from leg_wear_monitor.monitor.reports import Lost
 from leg_wear_monitor.monitor.verdict.verdict import Evidence, Figure, State, Verdict
 from leg_wear_monitor.playback.history import CYCLE_COLUMNS, JOINT_COLUMNS
@@ -110,6 +111,7 @@ def made_up_summary() -> ReplaySummary:
         ),
         measurements=(Measurement(7, "A", "ann", 3e-4, 1e-6, 0.0, 9, 0, 0.2, True, id=3),),
         alarms=ReplayAlarms(now=(alarm,), changes=(AlarmChange(stamp_ns=4, alarm=alarm),)),
+        walked=(WalkedLoad(300, 2, 2.0, 290.0, 5.0),),
         status=(ReplayStatus(name="gait", level=Level.OK, message="m", values={"cadence_rpm": math.nan}),),
         lost=Lost(
             unmonitored_s=0.5, already_counted=0, faulty={"out_of_range": 1}, conflicting=0, implausible=0,

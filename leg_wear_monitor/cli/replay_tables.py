@@ -30,6 +30,7 @@ def print_replay(result: "ReplayResult", wall_s: float) -> None:
     wall_s : float
         What it took [s].
     """
+    from leg_wear_monitor.monitor.ledger.walked import walked_words
     from leg_wear_monitor.monitor.verdict.belief import COUNTED, believed_words
     from leg_wear_monitor.monitor.verdict.verdict import Figure
 
@@ -58,6 +59,8 @@ def print_replay(result: "ReplayResult", wall_s: float) -> None:
         errors = [f"{joint.joint} {figure(1.0e9 * joint.sampling_sigma_m)} nm" for joint in last.joints]
         if any(joint.sampling_sigma_m for joint in last.joints):
             console.print(f"standard errors of the clearances by sampling: {', '.join(errors)}")
+        if words := walked_words(monitor.walked):
+            console.print(words, soft_wrap=True)
         console.print()
         if Figure.FORECAST in verdict.not_valid:
             console.print(f"lasts  {NOT_VALID}: {verdict.why}\n", soft_wrap=True)

@@ -24,6 +24,7 @@ from leg_wear_monitor.monitor.ledger.entry import ClearancePoint, JointWear
 from leg_wear_monitor.monitor.ledger.file import LedgerError, beside
 from leg_wear_monitor.monitor.ledger.log import ENDING
 from leg_wear_monitor.monitor.ledger.reading import LedgerContent, read_ledger
+from leg_wear_monitor.monitor.ledger.walked import walked_words
 from leg_wear_monitor.monitor.verdict.belief import believed
 from leg_wear_monitor.monitor.verdict.situation import JointSituation, SeenClearance
 from leg_wear_monitor.monitor.verdict.verdict import Figure
@@ -103,7 +104,7 @@ class LedgerLeg:
             region.VERDICT: region.verdict_region(view),
             region.JOINTS: region.joints_region(view),
             region.ALARMS: region.alarms_region(view),
-            region.TRENDS: region.trends_region(view, "As the ledger has it."),
+            region.TRENDS: region.trends_region(view, _heading(view)),
         }
         name = printable(self._setup.monitor.hardware_id)
         summary = f"{self._setup.monitor.mechanism}, from the ledger {printable(str(self._path))}"
@@ -131,6 +132,7 @@ class LedgerLeg:
             life={joint: _life(found, part) for joint, part in joints.items()},
             alarms=[replay_alarm(alarm) for alarm in found.entry.alarms] if found.entry else [],
             measurements=found.measurements,
+            walked=found.loads,
         )
         return view_of(self._setup, known)
 
@@ -155,6 +157,11 @@ class LedgerLeg:
             measured_sigma_m=last.sigma_m if last else None,
             **(believed_fields(one) if one else {}),
         )
+
+
+def _heading(view: ReplaySummary) -> str:
+    words = walked_words(view.walked)
+    return f"As the ledger has it: {words}." if words else "As the ledger has it."
 
 
 def _report(part: JointWear, counted_m: float) -> ReplayJoint:

@@ -9,6 +9,7 @@ from leg_wear_monitor.monitor.alarms.words import ADVICE
 from leg_wear_monitor.monitor.config.settings import MonitorConfig
 from leg_wear_monitor.monitor.evaluation.board import AlarmBoard
 from leg_wear_monitor.monitor.ledger.entry import Measurement
+from leg_wear_monitor.monitor.ledger.walked import WalkedLoad
 from leg_wear_monitor.monitor.reports import Lost
 from leg_wear_monitor.monitor.verdict.verdict import NO_GAIT_CYCLE, Figure, State, Verdict
 from leg_wear_monitor.playback.result.condition import JointClearance, LifeHours
@@ -113,7 +114,7 @@ class Known:
     history : ReplayHistory
     cycles : int
         Gait cycles over the leg's life.
-    joints, clearances, life, forecast, alarms, status, measurements
+    joints, clearances, life, forecast, alarms, status, measurements, walked
         As in `ReplaySummary`; `alarms` are those of now.
     missing : str
         Why there is no gait cycle; empty if there is.
@@ -129,6 +130,7 @@ class Known:
     alarms: Sequence[ReplayAlarm] = ()
     status: Sequence[ReplayStatus] = ()
     measurements: Sequence[Measurement] = ()
+    walked: Sequence[WalkedLoad] = ()
     missing: str = ""
 
 
@@ -149,6 +151,7 @@ def view_of(setup: LegSetup, known: Known) -> ReplaySummary:
         life=dict(known.life) if is_valid else dict.fromkeys(known.life),
         forecast=known.forecast if is_valid else None,
         measurements=tuple(known.measurements),
+        walked=tuple(known.walked),
         alarms=ReplayAlarms(now=tuple(known.alarms), changes=()),
         status=tuple(known.status),
         lost=_NOTHING_LOST,

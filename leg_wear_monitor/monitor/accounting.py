@@ -1,6 +1,7 @@
 """Accounting: counters over all runs of the monitor, time coverage, and the entries of the ledger."""
 
 import json
+import math
 from collections.abc import Iterable, Mapping
 
 import attrs
@@ -24,11 +25,12 @@ from leg_wear_monitor.monitor.ledger.entry import (
     one_part,
 )
 from leg_wear_monitor.monitor.ledger.ledger import Ledger
+from leg_wear_monitor.monitor.ledger.walked import WalkedLoad, together
 from leg_wear_monitor.monitor.reports import AlarmList, CycleReport, VerdictReport
 from leg_wear_monitor.monitor.spans import NEIGHBOURS_NS, Spans, is_within, with_span
 from leg_wear_monitor.twin.digital_twin import DigitalTwin
 from leg_wear_monitor.twin.sample import Samples
-from leg_wear_monitor.twin.statistics import SampleStatistics
+from leg_wear_monitor.twin.statistics import CycleStatistics, SampleStatistics
 from leg_wear_monitor.wear.surfaces import BUSHING
 
 POINT_S = 600.0  # of walking, between two points of the clearances' history
@@ -84,6 +86,10 @@ class AccountingState:
         Time of samples that did not reach the twin, because the crank's zero is not known.
     commissioned : dict of str to float
         What the ledger keeps of this leg's torque, by names that end in their unit.
+    loads : tuple of WalkedLoad
+        Foot loads that acted in this run.
+    load_n : float
+        That of the last gait cycle that was followed; NaN before.
     """
 
     cycles: int
@@ -100,6 +106,8 @@ class AccountingState:
     pauses: Pauses = Pauses()
     without_zero_s: float = 0.0
     commissioned: dict[str, float] = attrs.field(factory=dict)
+    loads: tuple[WalkedLoad, ...] = ()
+    load_n: float = math.nan
 
 
 def next_point_s(moving_s: float) -> float:
@@ -324,6 +332,21 @@ class Accounting:
     def _set_part(self, k: int, part: PartLife) -> None:
         self.state.parts = (*self.state.parts[:k], part, *self.state.parts[k + 1 :])
 
+    def ended(self, statistics: CycleStatistics) -> None:
+        """Count a gait cycle, and the load under which it was; one that was not followed was as the last."""
+        state = self.state
+        state.cycles += 1
+        if statistics.is_followed:
+            state.load_n = statistics.load_peak_n
+        if not math.isnan(state.load_n):
+            one = WalkedLoad.of_cycle(state.load_n, statistics.moving_s)
+            state.loads = together((*state.loads, one))
+
+    @property
+    def loads(self) -> tuple[WalkedLoad, ...]:
+        """Foot loads over all runs."""
+        return together((*(self.ledger.loads if self.ledger else ()), *self.state.loads))
+
     def followed(self, samples: SampleStatistics) -> None:
         """Take down the time in which the leg was followed."""
         stamp = samples.stamp_ns[np.isfinite(samples.crank_angle_rad)]
@@ -398,4 +421,5 @@ class Accounting:
             alarms=tuple(alarm for alarm in alarms if alarm.level is not Level.OK),
             spans=tuple((begin, end) for begin, end, _ in spans),
             span_epochs=tuple(of for *_, of in spans) if any(of for *_, of in spans) else (),
+            loads=self.state.loads,
         )

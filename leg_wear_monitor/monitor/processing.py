@@ -139,7 +139,7 @@ class Processing:
     def _report(self, statistics: CycleStatistics) -> CycleReport:
         """Report of a gait cycle."""
         state, accounting = self._parts.state, self._accounting
-        accounting.state.cycles += 1
+        accounting.ended(statistics)
         if statistics.is_followed:
             state.growth = tuple(
                 extended(window, float(growth), statistics.moving_s, self._parts.config.growth.window_cycles)

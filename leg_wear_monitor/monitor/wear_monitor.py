@@ -22,6 +22,7 @@ from leg_wear_monitor.monitor.forecast.measurement import MeasurementResult
 from leg_wear_monitor.monitor.ledger.entry import AlarmEvent, Audit, JointWear, Measurement
 from leg_wear_monitor.monitor.ledger.file import LedgerError
 from leg_wear_monitor.monitor.ledger.ledger import Ledger
+from leg_wear_monitor.monitor.ledger.walked import WalkedLoad
 from leg_wear_monitor.monitor.parts import Parts
 from leg_wear_monitor.monitor.processing import Processing
 from leg_wear_monitor.monitor.reports import (
@@ -223,6 +224,11 @@ class WearMonitor:
     def measurements(self) -> tuple[Measurement, ...]:
         """Measured clearances, those of the ledger first."""
         return self._forecaster.measurements
+
+    @property
+    def walked(self) -> tuple[WalkedLoad, ...]:
+        """Walking since the start of the ledger, or of the run without one, by the foot load that acted."""
+        return self._accounting.loads
 
     @property
     def last_cycle(self) -> CycleReport | None:

@@ -97,6 +97,7 @@ def summary(
         life=life(result, verdict) if is_known else {},
         forecast=leg_life(told),
         measurements=tuple(monitor.measurements),
+        walked=monitor.walked,
         alarms=_alarms(result),
         status=tuple(map(_status, monitor.status())),
         lost=monitor.lost,

@@ -222,6 +222,8 @@ class CycleStatistics:
         Why its torque is not among those of the mismatch; None if it is.
     load : LoadProfile or None
         None without a sample of the foot load.
+    load_peak_n : float
+        Largest vertical foot load that acted on the leg; NaN if it was not followed.
     """
 
     cycle: int
@@ -246,6 +248,7 @@ class CycleStatistics:
     is_followed: bool = True
     not_compared: NotCompared | None = None
     load: LoadProfile | None = None
+    load_peak_n: float = 0.0
 
     @property
     def duration_s(self) -> float:

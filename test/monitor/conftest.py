@@ -14,6 +14,7 @@ from leg_wear_monitor.monitor.config.parameters import config_from
 from leg_wear_monitor.monitor.ledger.binding import Binding
 from leg_wear_monitor.monitor.ledger.entry import Entry, JointWear
 from leg_wear_monitor.monitor.ledger.ledger import Ledger
+from leg_wear_monitor.monitor.ledger.walked import WalkedLoad
 from leg_wear_monitor.twin.sample import Samples, gait_samples
 
 SECOND = 10**9
@@ -39,6 +40,7 @@ def entry_at() -> Callable[[int], Entry]:
             totals={"cycles": float(second), "moving_s": 0.9 * second},
             alarms=(Alarm(kind="clearance", subject="A", level=Level.WARN, acknowledged=second % 2 == 1),),
             spans=((0, second * SECOND),),
+            loads=(WalkedLoad(300, second, 0.9 * second, 290.0, 8.0),),
         )
 
     return entry

@@ -9,6 +9,7 @@ import numpy as np
 from leg_wear_monitor.estimate.commissioned_torque import CommissionedTorque
 from leg_wear_monitor.mechanism.arrays import Floats
 from leg_wear_monitor.monitor.alarms.alarm import Alarm
+from leg_wear_monitor.monitor.ledger.walked import WalkedLoad
 from leg_wear_monitor.twin.reference.leg_parameters import COUPLING_DAMPING
 from leg_wear_monitor.twin.reference.torque_reference import TorqueReference
 from leg_wear_monitor.wear.surfaces import SECTORS
@@ -78,6 +79,8 @@ class Entry:
         Begin and end [ns] of the time spans of this run whose wear is counted.
     span_epochs : tuple of int
         Clock epoch of each span; empty if all spans are in epoch 0.
+    loads : tuple of WalkedLoad
+        Foot loads that acted in this run.
     """
 
     stamp_ns: int
@@ -86,6 +89,7 @@ class Entry:
     alarms: tuple[Alarm, ...] = ()
     spans: tuple[tuple[int, int], ...] = ()
     span_epochs: tuple[int, ...] = ()
+    loads: tuple[WalkedLoad, ...] = ()
 
     @property
     def moving_s(self) -> float:
@@ -93,7 +97,7 @@ class Entry:
         return self.totals.get("moving_s", 0.0)
 
     def digest(self) -> bytes:
-        """Checksum of everything except epochs, as stored in ledgers up to format 3."""
+        """Checksum of everything except epochs and loads, as stored in ledgers up to format 3."""
         sum_ = hashlib.sha256(struct.pack("<q", self.stamp_ns))
         for joint in sorted(self.joints, key=lambda joint: joint.name):
             sum_.update(repr((joint.name, joint.cycles, joint.moving_s, joint.replaced_ns)).encode())

@@ -27,12 +27,14 @@ from leg_wear_monitor.monitor.ledger.rows import (
     read_identified_leg,
     read_last_reset,
     read_last_verdict,
+    read_loads,
     read_measurements,
     read_simulated_references,
     read_spans,
 )
 from leg_wear_monitor.monitor.ledger.run import Run
 from leg_wear_monitor.monitor.ledger.store import LedgerStore
+from leg_wear_monitor.monitor.ledger.walked import together
 
 
 class Ledger:
@@ -65,6 +67,8 @@ class Ledger:
         Torque references that were simulated in earlier runs, the last one first; one may not be whole.
     parameters : IdentifiedLeg or None
         Masses, lengths and friction that were identified in earlier runs.
+    loads : tuple of WalkedLoad
+        Foot loads of earlier runs.
     last_run : Run
         The previous run.
     epoch, boot_id : int, str
@@ -127,6 +131,8 @@ class Ledger:
         self.commissioned_torques = self._store.ask(read_commissioned_torques)
         self.parameters = self._store.ask(read_identified_leg)
         self.references = self._store.ask(read_simulated_references)
+        others = self._store.ask(lambda db: read_loads(db, "run != ?", self._store.found.entry_run))
+        self.loads = together((*others, *(self.entry.loads if self.entry else ())))
 
     @property
     def counted_ns(self) -> Ints:
@@ -234,7 +240,7 @@ class Ledger:
         Parameters
         ----------
         entry : Entry, optional
-            To replace the last one, which otherwise stays in force.
+            To replace the last one, which otherwise stays in force; its loads are of that one's run.
 
         Raises
         ------
@@ -243,6 +249,7 @@ class Ledger:
         """
         self._interval_s = max(self._interval_s, self.cut_off_s or 0.0)  # until the loss is acknowledged
         run = self._run(closed=self.cut_off_s is None)
+        entry = entry and attrs.evolve(entry, loads=())
         if not self._try(lambda: self._store.write(run, entry, self._events)):
             raise LedgerError(f"{self.path}: {self.fault}")
         self._events.clear()

@@ -17,7 +17,8 @@ from leg_wear_monitor.monitor.ledger.entry import (
 )
 from leg_wear_monitor.monitor.ledger.file import MOVE, LedgerError, connect
 from leg_wear_monitor.monitor.ledger.recovery import migrated, recover
-from leg_wear_monitor.monitor.ledger.rows import read_last_verdict, read_measurements
+from leg_wear_monitor.monitor.ledger.rows import read_last_verdict, read_loads, read_measurements
+from leg_wear_monitor.monitor.ledger.walked import WalkedLoad, together
 
 _Row = TypeVar("_Row", ClearancePoint, ForecastPoint)
 
@@ -37,6 +38,8 @@ class LedgerContent:
     forecasts : dict of str to ForecastPoint
         The last forecast of each joint.
     measurements : tuple of Measurement
+    loads : tuple of WalkedLoad
+        Foot loads of all runs.
     """
 
     entry: Entry | None
@@ -44,6 +47,7 @@ class LedgerContent:
     clearances: tuple[ClearancePoint, ...]
     forecasts: dict[str, ForecastPoint]
     measurements: tuple[Measurement, ...]
+    loads: tuple[WalkedLoad, ...]
 
 
 def read_ledger(path: Path, binding: Binding) -> LedgerContent:
@@ -75,6 +79,12 @@ def _content(db: sqlite3.Connection, copy: Path) -> LedgerContent:
         clearances=_rows(db, ClearancePoint, "history ORDER BY id"),
         forecasts={point.joint: point for point in forecasts},
         measurements=read_measurements(db),
+        loads=together(
+            (
+                *read_loads(db, "run != ?", found.entry_run),
+                *(found.entry.loads if found.entry else ()),
+            )
+        ),
     )
 
 

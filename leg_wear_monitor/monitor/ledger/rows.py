@@ -27,6 +27,7 @@ from leg_wear_monitor.monitor.ledger.entry import (
     Withdrawal,
 )
 from leg_wear_monitor.monitor.ledger.run import Run
+from leg_wear_monitor.monitor.ledger.walked import WalkedLoad
 from leg_wear_monitor.twin.reference.crank_profile import UNLIKE, CrankProfile
 from leg_wear_monitor.twin.reference.leg_parameters import COUPLING_DAMPING, LegParameters
 from leg_wear_monitor.twin.reference.leg_simulation import POINTS
@@ -74,6 +75,10 @@ def write_entry(db: sqlite3.Connection, run: int, head: int, entry: Entry) -> No
             (run, part, *span, epoch)
             for part, (span, epoch) in enumerate(zip(entry.spans, epochs, strict=True))
         ],
+    )
+    db.execute("DELETE FROM load WHERE run = ?", (run,))
+    db.executemany(
+        "INSERT INTO load VALUES (?, ?, ?, ?, ?, ?)", [(run, *attrs.astuple(load)) for load in entry.loads]
     )
 
 
@@ -364,12 +369,24 @@ def read_entry(db: sqlite3.Connection) -> tuple[int, Entry] | None:
         alarms=tuple(alarm_of(*row) for row in db.execute("SELECT * FROM alarm")),
         spans=tuple((begin, end) for begin, end, _ in spans),
         span_epochs=tuple(epoch for *_, epoch in spans) if any(epoch for *_, epoch in spans) else (),
+        loads=read_loads(db, "run = ?", run),
     )
 
 
 def read_spans(db: sqlite3.Connection) -> list[tuple[int, int, int]]:
     """Begin, end [ns] and epoch of all counted time spans."""
     return db.execute("SELECT begin_ns, end_ns, epoch FROM span").fetchall()
+
+
+def read_loads(db: sqlite3.Connection, which: str, run: int) -> tuple[WalkedLoad, ...]:
+    """Foot loads of the runs that a condition on ``run`` selects; none before format 17."""
+    if not db.execute("SELECT 1 FROM sqlite_master WHERE name = 'load'").fetchone():
+        return ()
+    rows = db.execute(
+        f"SELECT about_n, cycles, moving_s, mean_n, sigma_n FROM load WHERE {which} ORDER BY run, about_n",
+        (run,),
+    )
+    return tuple(WalkedLoad(*row) for row in rows)
 
 
 def read_last_verdict(db: sqlite3.Connection) -> VerdictEvent | None:

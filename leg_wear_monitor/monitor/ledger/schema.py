@@ -496,9 +496,18 @@ INSERT INTO torque_reference SELECT id, is_whole, stamp_ns, speed_radps, ripple_
 DROP TABLE former;
 """
 
+_SEVENTEENTH = """
+-- foot loads that acted in a run: gait cycles and time in motion, and mean and standard deviation of the
+-- largest vertical force of a cycle, by that force to the nearest 100 N
+CREATE TABLE load (
+    run INTEGER NOT NULL, about_n INTEGER NOT NULL, cycles INTEGER NOT NULL, moving_s REAL NOT NULL,
+    mean_n REAL NOT NULL, sigma_n REAL NOT NULL, PRIMARY KEY (run, about_n)
+) STRICT;
+"""
+
 MIGRATIONS = (
     _FIRST, _SECOND, _THIRD, _FOURTH, _FIFTH, _SIXTH, _SEVENTH, _EIGHTH, _NINTH, _TENTH, _ELEVENTH, _TWELFTH,
-    _THIRTEENTH, _FOURTEENTH, _FIFTEENTH, _SIXTEENTH,
+    _THIRTEENTH, _FOURTEENTH, _FIFTEENTH, _SIXTEENTH, _SEVENTEENTH,
 )  # fmt: skip
 
 FORMAT = len(MIGRATIONS)
@@ -509,7 +518,8 @@ GROWING = (  # append only
     "ground_load", "history", "torque_commissioning", "verdict",
 )  # fmt: skip
 CHANGING = (
-    "alarm", "binding", "entry", "joint", "measurement", "run", "span", "torque_reference", "total",
+    "alarm", "binding", "entry", "joint", "load", "measurement", "run", "span", "torque_reference",
+    "total",
 )  # fmt: skip
 
 Definitions = list[tuple[str, str, str, str | None]]

@@ -17,6 +17,7 @@ from leg_wear_monitor.mechanism.arrays import Floats
 from leg_wear_monitor.monitor.ledger.entry import Entry, JointWear
 from leg_wear_monitor.monitor.ledger.rows import alarm_of, alarm_values
 from leg_wear_monitor.monitor.ledger.run import Run
+from leg_wear_monitor.monitor.ledger.walked import WalkedLoad
 
 STEPS = 20  # quantisation steps of a surface's largest rise
 
@@ -56,6 +57,7 @@ def encode(entry: Entry, run: Run, before: Entry, shared: int) -> tuple[bytes, E
         "alarms": [alarm_values(alarm) for alarm in entry.alarms],
         "same": same,
         "spans": [_span(entry, i) for i in range(same, len(entry.spans))],
+        "loads": [attrs.astuple(load) for load in entry.loads],
     }
     scale, steps = _rise(_depth(before), _depth(entry))
     along = np.diff(steps, axis=2, prepend=0).astype("i1")
@@ -124,4 +126,5 @@ def _entry(values: dict[str, Any], before: Entry, depth: Floats) -> Entry:
         alarms=tuple(alarm_of(*each) for each in values["alarms"]),
         spans=tuple((begin, end) for begin, end, _ in spans),
         span_epochs=epochs if any(epochs) else (),
+        loads=tuple(WalkedLoad(*load) for load in values.get("loads", ())),  # before format 17 without
     )

@@ -11,6 +11,7 @@ from leg_wear_monitor.drawable import Drawable
 from leg_wear_monitor.errors import ConfigError
 from leg_wear_monitor.json_text import json_text
 from leg_wear_monitor.monitor.ledger.entry import Measurement
+from leg_wear_monitor.monitor.ledger.walked import WalkedLoad
 from leg_wear_monitor.monitor.reports import FootLoad, Lost
 from leg_wear_monitor.monitor.verdict.verdict import Verdict
 from leg_wear_monitor.playback.result.condition import JointClearance, LifeHours
@@ -72,6 +73,8 @@ class ReplaySummary(Drawable):
         Remaining life of the leg.
     measurements : tuple of Measurement
         Clearances measured by hand, from the ledger.
+    walked : tuple of WalkedLoad
+        Walking since the start of the ledger, or of the replay without one, by the foot load that acted.
     alarms : ReplayAlarms
         Alarms at the end and their changes.
     status : tuple of ReplayStatus
@@ -105,6 +108,7 @@ class ReplaySummary(Drawable):
     life: dict[str, LifeHours | None]
     forecast: LegLife | None
     measurements: tuple[Measurement, ...]
+    walked: tuple[WalkedLoad, ...] = ()
     alarms: ReplayAlarms
     status: tuple[ReplayStatus, ...]
     lost: Lost

@@ -9,7 +9,7 @@ from leg_wear_monitor.report.page import Section
 from leg_wear_monitor.report.parts import Part, Sentences, Table, Text
 from leg_wear_monitor.report.replay.alarm_section import MOST_ROWS
 from leg_wear_monitor.report.replay.charts import health_chart
-from leg_wear_monitor.report.replay.words import value
+from leg_wear_monitor.report.replay.words import duration, value
 
 
 def health_section(summary: ReplaySummary) -> Section:
@@ -27,6 +27,13 @@ def health_section(summary: ReplaySummary) -> Section:
             for name, number in attrs.asdict(summary.sampling).items()
         ]
         parts.append(Table(caption="Sampled replay", head=("", "number"), rows=sampled))
+    if any(load.about_n for load in summary.walked):
+        walked = [
+            (f"{load.mean_n:.0f} ± {load.sigma_n:.0f}", f"{load.cycles}", duration(load.moving_s))
+            for load in summary.walked
+        ]
+        head = ("largest vertical force of a gait cycle [N]", "gait cycles", "time")
+        parts.append(Table(caption="Walking under foot loads", head=head, rows=walked))
     parts.append(Table(caption="Unused samples and lost time", head=("", "number"), rows=rows))
     status = [(each.name, each.level.name, each.message) for each in summary.status]
     parts.append(Table(caption="State at the end", head=("", "level", "message"), rows=status, is_text=True))

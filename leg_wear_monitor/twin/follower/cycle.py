@@ -99,7 +99,7 @@ def load_profile(leg: Record) -> LoadProfile | None:
 def cycle_statistics(
     leg: Record, stamp: int, contacts: ContactArrays, depth: Floats, before: Floats,
     statistics: RunStatistics, torque: TorqueStatistics, profile: TorqueProfile,
-    not_compared: NotCompared | None,
+    not_compared: NotCompared | None, load_peak_n: float,
 ) -> CycleStatistics:  # fmt: skip
     """Statistics of a cycle at its end from a `LEG_STATE`; ``before`` (2, k) [m]: initial clearances."""
     joint, motion, now = contacts.joint, leg.motion, clearances(contacts, depth)
@@ -126,6 +126,7 @@ def cycle_statistics(
         torque_profile=profile,
         not_compared=not_compared,
         load=load_profile(leg),
+        load_peak_n=load_peak_n,
     )
 
 
@@ -158,4 +159,5 @@ def tracked_cycle(
         torque_profile=torque_profile(leg.sums, 0.0),
         is_followed=False,
         load=load_profile(leg),
+        load_peak_n=np.nan,
     )

@@ -292,14 +292,14 @@ class LegFollower:
         motion, depth = self.state.motion, self._setup.surfaces.depth
         if motion.cycle_is_whole:
             motion.cycles += 1
-            not_compared = self._why_not_compared(stamp)
+            not_compared, load_peak_n = self._why_not_compared(stamp), self._load.peak_n
             torque, profile = self._end_torque(not_compared is None)
             motion.whole_cycles += 1
             motion.cycle_before_ns = stamp - motion.cycle_begin_ns
             cycles.append(
                 cycle_statistics(
                     self.state, stamp, self._setup.contacts, depth, self._before, self.statistics, torque,
-                    profile, not_compared,
+                    profile, not_compared, load_peak_n,
                 )
             )  # fmt: skip
         self._begin_cycle(stamp)

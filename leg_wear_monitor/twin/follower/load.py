@@ -87,6 +87,12 @@ class FootLoad:
             self._force = known / (known @ upwards(mechanism)).max()
         self.signature[:] = load_signature(linkage, self._force)
 
+    @property
+    def peak_n(self) -> float:
+        """Largest vertical part of the load over a gait cycle that acts now [N]."""
+        rows = self.rows
+        return float((rows.force @ rows.up).max()) if len(rows.force) else self._load
+
     def set(self, load: float) -> None:
         """Set the tables to a load [N], positive upwards."""
         if load != self._load:

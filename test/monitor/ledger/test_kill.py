@@ -16,6 +16,7 @@ from pathlib import Path
 import numpy as np
 
 from leg_wear_monitor.monitor.ledger.recovery import recover
+from leg_wear_monitor.monitor.ledger.rows import read_loads
 
 WALKER = Path(__file__).parent / "walker.py"
 CHECKPOINT_S, LAG_S, BLOCK_S = 0.5, 0.25, 0.1
@@ -52,7 +53,7 @@ class Run:
 
 
 def kept(path):
-    """What the ledger holds: last stamp, totals, spans."""
+    """What the ledger holds: last stamp, totals, spans; its loads are those of the gait cycles, each once."""
     if not path.exists():
         return 0, {}, []
     with closing(sqlite3.connect(path)) as db:
@@ -60,6 +61,8 @@ def kept(path):
         earlier = db.execute(
             "SELECT begin_ns, end_ns FROM span WHERE run != ?", (found.entry_run,)
         ).fetchall()
+        loads = read_loads(db, "run != ?", found.entry_run) + (found.entry.loads if found.entry else ())
+    assert sum(load.cycles for load in loads) == (found.entry.totals["cycles"] if found.entry else 0)
     assert found.loss == "", "the log does not fit"
     if found.entry is None:
         return 0, {}, earlier

@@ -163,12 +163,13 @@ def test_a_load_is_found_and_moves_the_contact_forces(leg, force, friction):
     """An unloaded leg stays unloaded; a load is known within its scatter, and forces are those of the leg."""
     samples, wanted = measured(pushed(leg, force) if force else leg, 8, friction)
     twin = DigitalTwin(leg, TwinSettings(load_shape=CONSTANT))
-    last = twin.update(samples).cycles[-3:]
-    torque = last[-1].torque
+    cycles = twin.update(samples).cycles
+    last, torque = cycles[-3:], cycles[-1].torque
     assert torque.load_n == pytest.approx(force, abs=max(3.0, 4.0 * torque.load_sigma_n))
     assert torque.friction_nm == pytest.approx(friction, abs=0.2)
     assert torque.torque_lag_s == pytest.approx(0.0, abs=1.0e-3)
     assert torque.load_acting_n == (torque.load_n if force else 0.0)
+    assert [cycle.load_peak_n for cycle in cycles[1:]] == [one.torque.load_acting_n for one in cycles[:-1]]
     assert torque.unexplained_rms_nm < 0.15 * torque.measured_rms_nm
     assert torque.condition < 5.0  # 2.8 to 3.7: a torque that rubs has a mean, as a constant friction has
     force_n = np.mean([cycle.mean_force_n for cycle in last], axis=0)

@@ -125,6 +125,7 @@ def test_a_row_that_no_sample_reaches_keeps_the_force_of_the_cycle_before(twin, 
     cycles = twin.update(walk[~lost]).cycles
     assert np.abs(twin._follower._load.rows.force - stance).mean() < 5.0e-4 * PEAK_N
     assert [cycle.load.gap_s for cycle in cycles] == pytest.approx([0.0, 0.305], abs=0.006)
+    assert cycles[-1].load_peak_n == pytest.approx(PEAK_N, rel=0.01)
 
 
 def test_a_force_along_the_axes_of_the_foot_is_turned(leg, gait, stance):

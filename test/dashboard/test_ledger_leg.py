@@ -24,6 +24,7 @@ from leg_wear_monitor.monitor.ledger.entry import (
 )
 from leg_wear_monitor.monitor.ledger.file import LedgerError
 from leg_wear_monitor.monitor.ledger.ledger import Ledger
+from leg_wear_monitor.monitor.ledger.walked import WalkedLoad
 from leg_wear_monitor.monitor.verdict.verdict import Evidence, Figure, State
 from leg_wear_monitor.wear.surfaces import SECTORS
 
@@ -92,6 +93,14 @@ def test_the_page_is_the_verdict_of_the_ledger(ledger):
     assert "2.00 h; 1.00 to 3.00 h" in joints  # a cycle a second
     assert "figure" in content.regions["trends"]
     assert "belief" not in content.regions  # a ledger does not know
+
+
+def test_the_page_says_under_which_loads_the_leg_walked(ledger):
+    assert "As the ledger has it." in words(leg_of(ledger).content().regions["trends"])
+    loads = WalkedLoad(0, 7200, 7200.0, 0.0, 0.0), WalkedLoad(300, 43200, 43200.0, 290.0, 8.0)
+    assert ledger.keep(attrs.evolve(entry(20), loads=loads))
+    said = "As the ledger has it: walked 12 h at 290 N, 2 h at 0 N."
+    assert said in words(leg_of(ledger).content().regions["trends"])
 
 
 def test_what_the_monitor_writes_meanwhile_is_shown_and_its_files_are_left_alone(ledger):

@@ -237,12 +237,10 @@ def _clearances(reference: TorqueReference, sensor: TorqueSensor) -> Floats:
 
 def _moved(columns: Floats, by: float) -> Floats:
     """Columns (k, F) of signatures that are late by a part of a phase, or by several."""
-    whole = math.floor(by)
-    parts = columns.reshape(len(columns), 2, columns.shape[1] // 2)
-    moved = (whole + 1 - by) * np.roll(parts, whole, axis=2) + (by - whole) * np.roll(
-        parts, whole + 1, axis=2
-    )
-    return np.asarray(moved.reshape(columns.shape))
+    phases = columns.shape[1] // 2
+    waves = np.fft.rfft(columns.reshape(len(columns), 2, phases))
+    turned = waves * np.exp(-1j * TURN * by / phases * np.arange(waves.shape[2]))
+    return np.asarray(np.fft.irfft(turned, phases).reshape(columns.shape))
 
 
 def _harmonics(phases: int) -> Floats:

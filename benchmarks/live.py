@@ -1,8 +1,9 @@
 """The live node under load: what is lost, what it takes, how long a report takes.
 
 python benchmarks/live.py [--legs 1] [--rate-hz 1000] [--rpm 60] [--seconds 20] [--without-diagnosis]
-                          [--record DIRECTORY]
+                          [--foot-load-hz 0] [--ground-n 0] [--record DIRECTORY]
 
+With --foot-load-hz, a sensor of the foot load sends too, and its load acts in the node.
 At 60 rpm the diagnosis uses the reference of the package: it is put in after five gait cycles, and reviewed
 after 50. At another speed the node simulates a reference while it monitors. With --record, each node records
 what it receives and publishes, keeps a ledger, and the recording is replayed: messages, and what both ledgers
@@ -34,13 +35,19 @@ from rclpy.qos import QoSProfile, ReliabilityPolicy
 from rclpy.serialization import serialize_message
 from sensor_msgs.msg import JointState
 
-from leg_wear_monitor.gait.config import EncoderConfig, PaceConfig, TorqueSensorConfig
+from leg_wear_monitor.gait.config import (
+    EncoderConfig,
+    FootLoadSensorConfig,
+    LoadConfig,
+    PaceConfig,
+    TorqueSensorConfig,
+)
 from leg_wear_monitor.gait.leg import SyntheticLeg
 from leg_wear_monitor.gait.sensors import readings
 from leg_wear_monitor.ros.gait_publisher.config import PublisherConfig
 from leg_wear_monitor.ros.gait_publisher.sensor_messages import sensor_message
 from leg_wear_monitor.ros.running import spin
-from leg_wear_monitor.twin.kinds import CRANK
+from leg_wear_monitor.twin.kinds import CRANK, LOAD, TORQUE
 from leg_wear_monitor.twin.settings import TrackerSettings
 
 LOOP_CYCLES = 8  # that are sent again and again, with an angle that wraps
@@ -51,7 +58,7 @@ TABLES = "torque_reference", "torque_commissioning", "body", "verdict"
 BEST_EFFORT = QoSProfile(depth=200, reliability=ReliabilityPolicy.BEST_EFFORT)
 
 
-def recorded(rate_hz: float, rpm: float) -> list[tuple[float, int, bytes]]:
+def recorded(rate_hz: float, rpm: float, load_hz: float, ground_n: float) -> list[tuple[float, int, bytes]]:
     """When [s], which topic, which bytes: a walk."""
     config = PublisherConfig(
         duration_s=60.0 * LOOP_CYCLES / rpm,
@@ -59,14 +66,16 @@ def recorded(rate_hz: float, rpm: float) -> list[tuple[float, int, bytes]]:
         further_joints=tuple(f"joint_{i}" for i in range(6)),
         encoder=EncoderConfig(rate_hz=rate_hz, wrapped=True),
         torque_sensor=TorqueSensorConfig(rate_hz=rate_hz),
+        load=LoadConfig(ground_n=ground_n),
+        foot_load_sensor=FootLoadSensorConfig(source="wrench" if load_hz else "none", rate_hz=load_hz or 1.0),
     )
     walk = readings(SyntheticLeg(config), config)
     return [(one.taken_s, one.kind, serialize_message(sensor_message(one, 0, config))) for one in walk]
 
 
-def publish(legs: int, rate_hz: float, rpm: float, seconds: float) -> None:
+def publish(legs: int, rate_hz: float, rpm: float, seconds: float, load_hz: float, ground_n: float) -> None:
     """Send the walk to all legs in step with the clock, once all listen; print how many messages each."""
-    walk, loop_s = recorded(rate_hz, rpm), 60.0 * LOOP_CYCLES / rpm
+    walk, loop_s = recorded(rate_hz, rpm, load_hz, ground_n), 60.0 * LOOP_CYCLES / rpm
     rclpy.init()
     node = Node("walkers")
     topics = [
@@ -74,8 +83,10 @@ def publish(legs: int, rate_hz: float, rpm: float, seconds: float) -> None:
             kind: node.create_publisher(message, f"leg{leg}/{name}", BEST_EFFORT)
             for kind, message, name in (
                 (CRANK, JointState, "joint_states"),
-                (1 - CRANK, WrenchStamped, "drive_torque"),
+                (TORQUE, WrenchStamped, "drive_torque"),
+                (LOAD, WrenchStamped, "foot_load"),
             )
+            if kind != LOAD or load_hz
         }
         for leg in range(legs)
     ]
@@ -170,6 +181,8 @@ def monitors(args: argparse.Namespace) -> list["subprocess.Popen[bytes]"]:
         f"cadence.commanded_rpm:={args.rpm}",
         f"diagnosis.enabled:={str(not args.without_diagnosis).lower()}",
     ]
+    if args.foot_load_hz:
+        parameters += ["foot_load.source:=wrench", "load.model:=measured"]
     nodes = []
     for leg in range(args.legs):
         own = [*parameters, f"hardware_id:=leg{leg}"]
@@ -201,6 +214,8 @@ def main() -> None:
     parser.add_argument("--rate-hz", type=float, default=1000.0)
     parser.add_argument("--rpm", type=float, default=60.0)
     parser.add_argument("--seconds", type=float, default=20.0)
+    parser.add_argument("--foot-load-hz", type=float, default=0.0)
+    parser.add_argument("--ground-n", type=float, default=0.0)
     parser.add_argument("--without-diagnosis", action="store_true")
     parser.add_argument("--joints", default="A,B,G,I,J")
     parser.add_argument("--record", type=Path)
@@ -213,6 +228,7 @@ def main() -> None:
     hearing.start()
     nodes = monitors(args)
     rest = [str(value) for value in (args.legs, args.rate_hz, args.rpm, args.seconds)]
+    rest += [str(args.foot_load_hz), str(args.ground_n)]
     source = subprocess.Popen([sys.executable, __file__, "publish", *rest], stdout=subprocess.PIPE, text=True)
     try:
         while not all(listener.delays_s):
@@ -241,6 +257,7 @@ def replay(leg: int, args: argparse.Namespace) -> None:
         f"    cadence: {{commanded_rpm: {args.rpm}}}\n"
         f"    diagnosis: {{enabled: {str(not args.without_diagnosis).lower()}}}\n"
         f"    hardware_id: leg{leg}\n"
+        + ("    foot_load: {source: wrench}\n    load: {model: measured}\n" if args.foot_load_hz else "")
     )
     again = out.with_suffix(".ledger")
     command = [sys.executable, "-m", "leg_wear_monitor", "replay", str(own), "--config", str(config)]
@@ -294,6 +311,6 @@ def report(leg: int, sent: int, rows: list[tuple[float, ...]], listener: Listene
 
 if __name__ == "__main__":
     if sys.argv[1:2] == ["publish"]:
-        publish(int(sys.argv[2]), *map(float, sys.argv[3:6]))
+        publish(int(sys.argv[2]), *map(float, sys.argv[3:8]))
     else:
         main()

@@ -7,13 +7,15 @@ import numpy as np
 import pytest
 
 import leg_wear_monitor as lw
+from leg_wear_monitor.bags.findings import RecordingError
 from leg_wear_monitor.bags.mcap.writer import McapWriter
 from leg_wear_monitor.bags.reader import Recording
+from leg_wear_monitor.mechanism.ideal import TURN
 from leg_wear_monitor.messages import encode
 from leg_wear_monitor.monitor.config.parameters import config_from
 from leg_wear_monitor.playback.replay import REPORTS_FILE
 from leg_wear_monitor.share import share_directory
-from leg_wear_monitor.twin.kinds import CRANK
+from leg_wear_monitor.twin.kinds import CRANK, LOAD
 
 Columns = dict[str, np.ndarray]
 NS = {"input.units.stamp": "ns"}
@@ -111,3 +113,37 @@ def test_a_table_in_memory_is_commissioned(walked: Columns) -> None:
     assert result.item("crank.sign").value == -1
     assert result.item("crank.offset_rad").value == pytest.approx(1.0, abs=0.03)
     assert result.config is not None and result.config.input == config_from(NS).input
+
+
+@pytest.mark.parametrize("source", ["wrench", "float64", "contact"])
+def test_columns_of_the_foot_load_are_read(walked: Columns, tmp_path: Path, source: str) -> None:
+    """From CSV and Parquet, in kilonewtons and with another sign."""
+    stands = walked["crank_angle"] % TURN < 0.5 * TURN
+    columns = walked | {"up": -0.3 * stands, "along": 0.02 * stands}
+    parameters = NS | {
+        "foot_load.source": source,
+        "foot_load.sign": -1,
+        "input.columns.foot_load": "up",
+        "input.columns.foot_load_along": "along" if source == "wrench" else "",
+        "input.units.foot_load": "kN",
+    }
+    table = write_csv(tmp_path / "walk.csv", columns)
+    parquet = tmp_path / "walk.parquet"
+    pytest.importorskip("pyarrow.parquet").write_table(pytest.importorskip("pyarrow").table(columns), parquet)
+    found = []
+    for path in (table, parquet, columns):
+        with Recording([path], config_from(parameters)) as recording:
+            samples = np.concatenate([block.samples for block in recording.blocks()])
+        found.append(samples[samples["kind"] == LOAD]["foot_force_n"])
+    along = -20.0 if source == "wrench" else 0.0
+    wanted = np.outer(stands, [0.0, 1.0] if source == "contact" else [along, 300.0])
+    for force in found:
+        np.testing.assert_allclose(force, wanted, atol=1.0e-9)
+    load = lw.replay(table, config_from(parameters)).summary().load
+    assert load.source == "measured"
+    assert load.peak_n == (None if source == "contact" else pytest.approx(300.0, rel=0.01))
+
+
+def test_a_missing_column_of_the_foot_load_is_named(walked: Columns) -> None:
+    with pytest.raises(RecordingError, match=r"input.columns.foot_load: column 'foot_load' does not exist"):
+        lw.replay(walked, config_from(NS | {"foot_load.source": "float64"}))

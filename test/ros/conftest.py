@@ -67,15 +67,15 @@ class Walk:
 
 
 class Legs:
-    """Publishers of a leg's two topics, in a namespace."""
+    """Publishers of a leg's topics, in a namespace."""
 
-    def __init__(self, node: Node, namespace: str, reliable: bool, source: str = "wrench") -> None:
+    def __init__(self, node: Node, namespace: str, reliable: bool, source: str, load: str) -> None:
         self._node = node
         reliability = ReliabilityPolicy.RELIABLE if reliable else ReliabilityPolicy.BEST_EFFORT
         qos = QoSProfile(depth=200, reliability=reliability)
         self._publishers = {
             stream.kind: node.create_publisher(message_class(stream.type), f"{namespace}/{stream.topic}", qos)
-            for stream in streams_read(source)
+            for stream in streams_read(source, load)
         }
 
     def listeners(self) -> int:
@@ -170,8 +170,10 @@ class Stage:
         self._monitors.append(monitor)
         return monitor
 
-    def legs(self, namespace: str = "", reliable: bool = False, source: str = "wrench") -> Legs:
-        return Legs(self.node, namespace, reliable, source)
+    def legs(
+        self, namespace: str = "", reliable: bool = False, source: str = "wrench", load: str = "none"
+    ) -> Legs:
+        return Legs(self.node, namespace, reliable, source, load)
 
     def listen(self, topic: str, kind: type, latched: bool = False, matched: bool = True) -> list[Any]:
         """Messages of a topic as they come, once somebody publishes it."""

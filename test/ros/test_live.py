@@ -1,7 +1,9 @@
 """The monitor over real DDS: what it publishes of an even gait, and through what it goes on."""
 
 import itertools
+import time
 from pathlib import Path
+from types import SimpleNamespace
 
 import numpy as np
 import pytest
@@ -17,7 +19,14 @@ from visualization_msgs.msg import MarkerArray
 
 from leg_wear_monitor import load_mechanism
 from leg_wear_monitor.bags.reader import Recording
-from leg_wear_monitor.gait.config import EncoderConfig, KnockConfig, PaceConfig, TransportConfig
+from leg_wear_monitor.gait.config import (
+    EncoderConfig,
+    FootLoadSensorConfig,
+    KnockConfig,
+    LoadConfig,
+    PaceConfig,
+    TransportConfig,
+)
 from leg_wear_monitor.messages.leg_drawing import LegDrawing
 from leg_wear_monitor.messages.leg_markers import LegMarkers
 from leg_wear_monitor.messages.outputs import Messages
@@ -332,4 +341,42 @@ def test_an_encoder_that_starts_at_zero_is_found_and_replayed(stage, tmp_path: P
     assert repr(found) in map(repr, again.status())
     assert len(replayed["~/clearance_states"]) >= 4
     for topic in ("~/clearance_states", "~/predicted_torque"):
+        assert lived[topic] == replayed[topic]
+
+
+@pytest.mark.parametrize("model", ["measured", "none"])
+def test_a_foot_load_is_taken_told_recorded_and_replayed(
+    stage, tmp_path: Path, model: str, monkeypatch
+) -> None:
+    """A wrench, which acts, or a contact switch, which has no stamp: it is of the time at which it comes.
+
+    In the last second there are no samples.
+    """
+    now, source = [1_700_000_000 * 10**9], "wrench" if model == "measured" else "contact"
+    clock = SimpleNamespace(time_ns=lambda: now[0], monotonic_ns=time.monotonic_ns)
+    monkeypatch.setattr("leg_wear_monitor.ros.monitor_node.time", clock)
+
+    def set_clock(at_s: float) -> None:
+        now[0] = 1_700_000_000 * 10**9 + round(1.0e9 * at_s)
+
+    recording = tmp_path / "live.mcap"
+    sensor = FootLoadSensorConfig(source=source, silent_from_s=6.0)
+    config = PublisherConfig(duration_s=7.0, load=LoadConfig(ground_n=300.0), foot_load_sensor=sensor)
+    values = {"foot_load__source": source, "load__model": model, "diagnosis__enabled": False}
+    monitor = stage.monitor(record__path=str(recording), diagnostics__period_s=0.2, **values)
+    diagnostics = stage.listen("/diagnostics", DiagnosticArray)
+    block_s = 1.0e-4 if source == "contact" else 0.015
+    stage.legs(load=source).play(stage.walk(config), monitor, block_s=block_s, before=set_clock)
+    stage.wait_for(lambda: diagnostics and levels(diagnostics[-1]).get("foot_load") == 2, "the silence")
+    monitor.stop()
+    live = monitor.node.monitor
+    assert live.foot_load.source == "measured"
+    assert live.foot_load.cycles >= 4
+    assert live.used["foot_load"] == pytest.approx(1200, abs=3)
+    parameters = config_from(dotted(values))
+    again = WearMonitor(load_mechanism(parameters.mechanism), parameters)
+    lived, replayed = published(recording), replayed_from(recording, again)
+    assert again.foot_load == live.foot_load
+    assert len(replayed["~/clearance_states"]) >= 4
+    for topic in ("~/clearance_states", "~/predicted_torque", "~/impact_forces"):
         assert lived[topic] == replayed[topic]

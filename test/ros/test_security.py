@@ -32,15 +32,21 @@ def allowed(node: str, kind: str, right: str, policy: ElementTree.Element = POLI
     return {"/" + rule.text.replace("~", node).lstrip("/") for rule in rules}
 
 
-@pytest.mark.parametrize(("make", "own"), [(MonitorNode, ["publish_scalars"]), (GaitPublisher, [])])
+@pytest.mark.parametrize(
+    ("make", "own"),
+    [
+        (MonitorNode, {"publish_scalars": True, "foot_load.source": "wrench"}),
+        (GaitPublisher, {"foot_load_sensor.source": "wrench"}),
+    ],
+)
 def test_a_node_may_do_what_it_does_and_nothing_else(
-    make: Callable[..., Any], own: list[str], monkeypatch: pytest.MonkeyPatch
+    make: Callable[..., Any], own: dict[str, Any], monkeypatch: pytest.MonkeyPatch
 ) -> None:
     monkeypatch.setattr(MonitorNode, "_compile", lambda self, decoder: None)
     context = rclpy.Context()
     rclpy.init(args=["--ros-args", "--log-level", "fatal"], context=context)
     overrides = [Parameter("use_sim_time", value=True), Parameter("clearance_joints", value=["G"])]
-    overrides += [Parameter(name, value=True) for name in own]
+    overrides += [Parameter(name, value=value) for name, value in own.items()]
     try:
         node = make(context=context, parameter_overrides=overrides)
         name = node.get_name()

@@ -32,7 +32,7 @@ from leg_wear_monitor.monitor.diagnosis.torque_samples import NO_TORQUE_SAMPLES,
 from leg_wear_monitor.twin.reference.leg_parameters import LegParameters
 from leg_wear_monitor.twin.reference.torque_reference import TorqueReference, TorqueReferenceSnapshot
 from leg_wear_monitor.twin.sample import Samples
-from leg_wear_monitor.twin.settings import GROUND
+from leg_wear_monitor.twin.settings import GROUND, MEASURED
 from leg_wear_monitor.twin.statistics import CycleStatistics
 
 _ESTIMATED_M, _ESTIMATED = 1.0e-4, 0.2  # largest standard deviation of an observable clearance; of it
@@ -85,7 +85,8 @@ class TorqueObserver:
         part = next((one for one in references if not one.is_whole), None)
         whole = [one for one in references if one.is_whole]
         is_drive_known = not math.isnan(figures.stiffness_nm_per_rad)
-        is_on_ground = config.load.model == GROUND and mechanism.toe is not None
+        # references of a measured load, too, are simulated under the mean one that the torque shows
+        is_on_ground = config.load.model in (GROUND, MEASURED) and mechanism.toe is not None
         self._references = References(mechanism, self._models, whole, part, is_drive_known, is_on_ground)
         self._evidence = Evidence(self._models)
         counted_m = np.asarray(counted_m, float).copy()

@@ -213,7 +213,7 @@ def bodies_of(leg: Mechanism, explainer: Explainer, known: CommissionedTorque, r
     """The bodies that explain the torque of a commissioned leg."""
     run, start = TorqueReferenceRun(leg), reference.parameters
     if misfit(explainer.model, explainer.nuisances, known) >= FAR_FROM_FILE:
-        start = leg_of_ideal_torque(leg, explainer.model, known, reference.profile.speed)
+        start = leg_of_ideal_torque(leg, explainer.model, known, reference.profile.speed, start.load)
     run.begin_identification(*new(leg), reference.profile, start)
     return identified_leg(simulated(run), explainer.model, explainer.nuisances, known)
 

@@ -104,7 +104,7 @@ def test_a_leg_far_from_its_file_is_found_near_by_the_ideal_torque(leg, known, s
     truth = LegParameters(mass, length)
     other = commissioned(reference, walked(leg, reference, truth))
     assert misfit(model, found, other) > FAR_FROM_FILE
-    near = leg_of_ideal_torque(leg, model, other, TURN)
+    near = leg_of_ideal_torque(leg, model, other, TURN, reference.parameters.load)
     left, whole = (ideal(leg, bodies) - ideal(leg, truth) for bodies in (near, LegParameters.none(leg)))
     assert np.sqrt(np.mean(left**2)) < 0.15 * np.sqrt(np.mean(whole**2))
 
@@ -112,7 +112,7 @@ def test_a_leg_far_from_its_file_is_found_near_by_the_ideal_torque(leg, known, s
 def test_a_leg_of_its_file_is_not_moved_by_the_ideal_torque(leg, known) -> None:
     reference, model, _ = known
     same = commissioned(reference, reference.torque_nm[0])
-    near = leg_of_ideal_torque(leg, model, same, TURN)
+    near = leg_of_ideal_torque(leg, model, same, TURN, reference.parameters.load)
     np.testing.assert_allclose(np.concatenate([near.mass, near.length]), 1.0, atol=2.0e-3)
 
 

@@ -148,13 +148,16 @@ def watched(
     rows: list[np.ndarray],
     one: observer.TorqueObserver | None = None,
     first: int = 0,
+    config: MonitorConfig | None = None,
+    periods: int = 1,
 ) -> tuple[observer.TorqueObserver, list[str]]:
     """The observer after gait cycles with given signatures; what it named, corrected or stopped, and when.
 
-    Goes on with an observer whose gait cycles end before the one with the number ``first``.
+    Goes on with an observer whose gait cycles end before the one with the number ``first``. Of the evaluation
+    periods of a gait cycle, all but one can be left out where no reference is made.
     """
     left, reference = iter(rows), shipped_references(leg)[0]
-    one = one or observer.TorqueObserver(leg, MonitorConfig(), size_nm, NEW)
+    one = one or observer.TorqueObserver(leg, config or MonitorConfig(), size_nm, NEW)
     counted, found = NEW.copy(), []
     joints, limit_m, second = leg.clearance_joints, MonitorConfig().limits.clearance_m, 10**9
 
@@ -169,6 +172,8 @@ def watched(
             begin, end = (i + 1) * second, (i + 2) * second
             one.ended(SimpleNamespace(is_steady=True, cadence_rpm=60.0, begin_ns=begin, stamp_ns=end))
             correction = one.end_period(counted, UNWORN)
+            for _ in range(periods - 1):
+                one.end_period(counted, UNWORN)
             seen = one.diagnosis
             told = [
                 f"{change.cause.name} {change.subject}" for change in seen.changes if not change.is_corrected

@@ -1,0 +1,169 @@
+"""Healthy and worn legs on the ground, whose force nobody measures: names, sizes, the load, and the wear.
+
+A leg in full coordinates, with masses 4 % off, walks under a force of another shape than the template's (a
+treadmill's), whose size and time differ from step to step by 10 % and by 2 % of the cycle, behind drives that
+people have. `load.model` is ground: the force is found, and the references are simulated under it. Healthy
+cycles, drawn in blocks of ten, make up some hours; joints open after 140 cycles. The wear is that of the twin
+under the force that was found, over what the leg has, by the Archard integral of 60 gait cycles.
+`python benchmarks/ground.py --keep DIRECTORY` takes half an hour of two cores.
+"""
+
+import argparse
+import functools
+from pathlib import Path
+from types import SimpleNamespace
+
+import one_core  # noqa: F401, before numpy
+
+# isort: split
+import attrs
+import numpy as np
+from diagnosis import NEW, RATE, kept
+from disturbed import MASSES, drawn, watched
+from drives import Drive, cycles_of, summary, when
+
+from leg_wear_monitor import MonitorConfig, load_mechanism
+from leg_wear_monitor.dynamics.full.run import FullRun
+from leg_wear_monitor.dynamics.run.drive import quintic
+from leg_wear_monitor.dynamics.run.run_statistics import ARCHARD, TORQUE, new_run_statistics
+from leg_wear_monitor.dynamics.simulation import prepare
+from leg_wear_monitor.estimate.signature import TorqueSensor
+from leg_wear_monitor.gait.config import GaitConfig, LoadConfig
+from leg_wear_monitor.gait.ground import POINTS, Ground
+from leg_wear_monitor.mechanism.ground_reaction import with_toe_force
+from leg_wear_monitor.mechanism.ideal import TURN
+from leg_wear_monitor.mechanism.position import build_linkage
+from leg_wear_monitor.mechanism.spec import Mechanism
+from leg_wear_monitor.monitor.config.inputs import Load
+from leg_wear_monitor.twin.digital_twin import DigitalTwin
+from leg_wear_monitor.twin.follower.load import torque_size
+from leg_wear_monitor.twin.kinds import CRANK
+from leg_wear_monitor.twin.kinds import TORQUE as TORQUE_KIND
+from leg_wear_monitor.twin.reference.leg_parameters import LegParameters
+from leg_wear_monitor.twin.sample import gait_samples
+from leg_wear_monitor.twin.settings import GROUND, STANCE, TwinSettings
+
+PEAKS_N = (100.0, 300.0, 600.0)
+BEFORE, HEALTHY, WORN, COUNTED = 140, 260, 40, 60
+OPENINGS = (("G", 0.6), ("I", 0.6), ("J", 0.6), ("A", 0.45), ("B", 0.45))
+DRIVES = {
+    "none": Drive(),
+    "35 Hz, 10 ms": Drive(hz=35.0, lag_s=0.01),
+    "friction 0.2, 50 Hz, 5 ms": Drive(load_friction=0.2, hz=50.0, lag_s=0.005),
+}
+
+
+@attrs.frozen(eq=False)
+class Walk:
+    """Time [s], crank angle [rad], impulse [N m s], torque [N m], RATE a cycle; Archard integrals a cycle [J]."""
+
+    rows: np.ndarray
+    archard_j: np.ndarray
+
+
+def walked(leg: Mechanism, clearance: np.ndarray, cycles: int, load: LoadConfig, seed: int) -> Walk:
+    """A leg that walks on the ground."""
+    ground = Ground(leg, GaitConfig(load=load, seed=seed))
+    setup = prepare(with_toe_force(leg, np.zeros((POINTS, 2))))
+    setup.contacts.clearance[:] = clearance
+    run = FullRun(attrs.evolve(setup, speed=TURN), tolerance_m=1e-9)
+    statistics, rows, archard = new_run_statistics(len(leg.joints)), np.empty((cycles * RATE, 4)), []
+    swing = round(ground.swing * RATE) % RATE
+    for i in range(len(rows)):
+        if i % RATE == swing or i == 0:
+            run.model.arrays.load_force[-1] = np.pad(ground.step(TURN), ((1, 1), (0, 0)), mode="wrap")
+        before, t = i / RATE, (i + 1) / RATE
+        begin, end = (SimpleNamespace(angle=TURN * at, speed=TURN, acceleration=0.0) for at in (before, t))
+        run.polynomial[:] = quintic(before, begin, t - before, end)
+        run.advance(t, statistics)
+        rows[i] = t, TURN * t, statistics.drive_integral[TORQUE], run.sample().drive_torque
+        if (i + 1) % RATE == 0:
+            archard.append(statistics.integral[setup.contacts.joint, ARCHARD].copy())
+    return Walk(rows, np.diff(np.array(archard), axis=0, prepend=0.0))
+
+
+def worn(leg: Mechanism, walk: Walk, parameters: LegParameters | None, shape: str) -> np.ndarray:
+    """Archard integral (k,) of the twin of a walk, over that of the leg."""
+    twin = DigitalTwin(leg, TwinSettings(load_shape=shape))
+    if parameters is not None:
+        twin.set_parameters(parameters)
+    time, torque = walk.rows[:, 0], np.diff(walk.rows[:, 2], prepend=0.0) * RATE
+    stamps = 10**9 + np.round(1e9 * time).astype(np.int64)
+    samples = np.concatenate(
+        [
+            gait_samples(stamps, CRANK, crank_angle_rad=walk.rows[:, 1]),
+            gait_samples(stamps, TORQUE_KIND, torque_nm=torque),
+        ]
+    )
+    samples = samples[np.argsort(samples["stamp_ns"], kind="stable")]
+    cycles = [one.archard_j for block in np.array_split(samples, 50) for one in twin.update(block).cycles]
+    return np.mean(cycles[20 : 20 + COUNTED], axis=0) / walk.archard_j[20 : 20 + COUNTED].mean(axis=0)
+
+
+def main() -> None:
+    parser = argparse.ArgumentParser(description=__doc__)
+    parser.add_argument("--keep", type=Path)
+    parser.add_argument("--hours", type=float, default=4.0)
+    parser.add_argument("--peak", type=float, action="append")
+    parser.add_argument("--shape", default="treadmill")
+    options = parser.parse_args()
+    leg = load_mechanism("bionic_leg")
+    mass = np.array([MASSES.get(body, 1.0) for body in leg.bodies])
+    real = LegParameters(mass, np.ones(len(mass))).applied(leg)
+    size, config = torque_size(build_linkage(leg), TURN), MonitorConfig(load=Load(model=GROUND))
+    sensor = TorqueSensor(0.005, 1.0, size)
+
+    @functools.cache
+    def walk(peak_n: float, joint: str = "", size_mm: float = 0.3) -> Walk:
+        clearance = np.where(np.array(leg.clearance_joints) == joint, 1e-3 * size_mm, NEW)
+        load = LoadConfig(ground_n=peak_n, shape=options.shape)
+        file = (
+            options.keep / f"{joint or 'new'} {size_mm:.2f} {peak_n:.0f} {options.shape}.pkl"
+            if options.keep
+            else None
+        )
+        cycles = WORN if joint else HEALTHY
+        return kept(file, lambda: walked(real, clearance, cycles + 3, load, round(1000 * size_mm)))
+
+    for peak_n in options.peak or PEAKS_N:
+        for name, drive in DRIVES.items():
+            cycles = cycles_of(walk(peak_n).rows, drive, sensor, 5)[0]
+            one, found = watched(leg, size, list(cycles[:BEFORE]), config=config, periods=4)
+            state = one.state
+            load, channel, off = state.load, state.sensor.channel, one._models.misfit(state)
+            print(
+                f"{peak_n:.0f} N, {name}: load {load.peak_n:.0f} ± {load.peak_sigma_n:.0f} N, stance "
+                f"{load.heel_strike:.3f} to {load.toe_off:.3f}, friction {load.load_friction:.2f}; channel "
+                f"{1e3 * channel.delay_s:.1f} ms, {1e3 * channel.time_constant_s:.1f} ms, "
+                f"{channel.load_friction:.2f}; misfit {off:.2f}; {summary(found) or 'nothing found'}",
+                flush=True,
+            )
+            commissioned, parameters = one.snapshot(), one.parameters
+            for joint, size_mm in OPENINGS:
+                rows = list(cycles_of(walk(peak_n, joint, size_mm).rows, drive, sensor, 6)[0])
+                one.restore(commissioned)
+                one, found = watched(leg, size, rows, one, BEFORE)
+                seen, k = one.diagnosis, leg.clearance_joints.index(joint)
+                value = (
+                    f"{1e3 * seen.clearance_m[k]:.2f} ± {1e3 * seen.sigma_m[k]:.2f}"
+                    if seen.clearance_m
+                    else "-"
+                )
+                print(f"  {joint} {size_mm:g}: {when(found, BEFORE)}; {value}", flush=True)
+            one.restore(commissioned)
+            rows = drawn(cycles, round(3600 * options.hours))
+            one, found = watched(leg, size, rows, one, BEFORE)
+            print(f"  healthy, {options.hours:g} h: {summary(found) or 'none'}", flush=True)
+            if name == "none":
+                for what, known, shape in (
+                    ("none", None, STANCE),
+                    ("ground, before the fit", None, GROUND),
+                    ("ground", parameters, GROUND),
+                ):
+                    ratio = worn(leg, walk(peak_n), known, shape)
+                    told = ", ".join(f"{j} {r:.2f}" for j, r in zip(leg.clearance_joints, ratio, strict=True))
+                    print(f"  wear, load.model {what}: {told}", flush=True)
+
+
+if __name__ == "__main__":
+    main()

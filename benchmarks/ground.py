@@ -55,7 +55,7 @@ DRIVES = {
 
 @attrs.frozen(eq=False)
 class Walk:
-    """Time [s], crank angle [rad], impulse [N m s], torque [N m], RATE a cycle; Archard integrals a cycle [J]."""
+    """Rows of time [s], crank angle [rad], impulse [N m s], torque [N m]; Archard integrals a cycle [J]."""
 
     rows: np.ndarray
     archard_j: np.ndarray

@@ -5,7 +5,6 @@ from collections.abc import Sequence
 
 import numpy as np
 
-from leg_wear_monitor.estimate.ground_load import GroundLoad
 from leg_wear_monitor.mechanism.ideal import TURN
 from leg_wear_monitor.monitor.config.settings import MonitorConfig
 from leg_wear_monitor.monitor.diagnosis.diagnosis import NotUsed
@@ -62,21 +61,17 @@ def doubt(state: TorqueState, references: References, models: LegModels) -> str:
         return f"changes at this cadence are not observed yet; at {_cadences(state.set_aside)} they are"
     if models.is_of_file(state):
         return LOCKED_SAMPLES if _are_locked(state) else ""
-    if state.load and references.is_load_left_out(state):
-        return f"{carried(state.load)}; set load.model to ground, so that joints are named and wear under it"
     known = "the model does not fit this leg, and the names of joints are not sure: "
     if not state.changes:
         known = "the model does not fit this leg, but nothing has changed since it was commissioned: "
+    if state.load and references.is_load_left_out(state):
+        carried = f"about {state.load.peak_n:.0f} ± {state.load.peak_sigma_n:.0f} N in stance"
+        return f"{known}the foot carries {carried}; set load.model to ground"
     if references.is_busy:
         part = "the leg under the ground's force is" if state.load else "its masses, lengths and friction are"
         what = part if state.is_identifying else "a reference for it is"
         return f"{known}{what} being simulated, {references.percent} %"
     return f"{known}masses, lengths and friction near those of the file do not explain its drive torque"
-
-
-def carried(load: GroundLoad) -> str:
-    """What the foot carries."""
-    return f"the foot carries about {load.peak_n:.0f} ± {load.peak_sigma_n:.0f} N in stance"
 
 
 def _is_unlike(state: TorqueState) -> bool:

@@ -10,6 +10,8 @@ from leg_wear_monitor.estimate.body_torques import body_torques
 from leg_wear_monitor.estimate.cause import Cause
 from leg_wear_monitor.estimate.commissioned_torque import CommissionedTorque
 from leg_wear_monitor.mechanism.ideal import TURN
+from leg_wear_monitor.mechanism.position import build_linkage
+from leg_wear_monitor.monitor.config.inputs import Load
 from leg_wear_monitor.monitor.config.settings import MonitorConfig
 from leg_wear_monitor.monitor.diagnosis import leg_models, references
 from leg_wear_monitor.monitor.diagnosis import observer as observer_module
@@ -19,12 +21,14 @@ from leg_wear_monitor.monitor.diagnosis.observer import TorqueObserver
 from leg_wear_monitor.monitor.diagnosis.reasons import LOCKED_SAMPLES
 from leg_wear_monitor.monitor.diagnosis.reference_file import shipped_references
 from leg_wear_monitor.monitor.diagnosis.state import UNUSED_CYCLES
+from leg_wear_monitor.twin.follower.load import load_shape, load_signature
 from leg_wear_monitor.twin.kinds import CRANK, TORQUE
 from leg_wear_monitor.twin.reference import torque_reference
 from leg_wear_monitor.twin.reference.crank_profile import CrankProfile
 from leg_wear_monitor.twin.reference.leg_simulation import POINTS
 from leg_wear_monitor.twin.reference.torque_reference import WIDER
 from leg_wear_monitor.twin.sample import gait_samples
+from leg_wear_monitor.twin.settings import GROUND
 from leg_wear_monitor.wear.surfaces import SECTORS
 
 NEW = np.full(5, 3.0e-4)
@@ -266,6 +270,42 @@ def test_a_load_is_commissioned_and_a_joint_that_opens_under_it_is_named(leg, re
     (change,) = observer.diagnosis.changes
     assert change.subject == "A"
     assert "names of joints are not sure" in observer.diagnosis.reason
+
+
+def pushed(leg, peak_n, cycles):
+    """Torque (cycles, POINTS) by virtual work of a force of the template, another size in each step."""
+    lever = load_signature(build_linkage(leg), load_shape(build_linkage(leg), GROUND))
+    torque = np.interp((np.arange(POINTS) + 0.5) / POINTS * (len(lever) - 1), np.arange(len(lever)), lever)
+    sizes = peak_n * (1.0 + 0.1 * np.random.default_rng(3).standard_normal(cycles))
+    return sizes[:, None] * torque
+
+
+def test_a_load_that_nobody_asked_for_is_told_and_not_taken_for_masses(leg, reference) -> None:
+    observer = observer_of(leg)
+    cycles = COMMISSIONING_CYCLES + 12
+    walk(observer, samples(reference, [0] * cycles, added=pushed(leg, 300.0, cycles)))
+    seen = observer.diagnosis
+    assert seen.load is not None
+    assert seen.load.peak_n == pytest.approx(300.0, abs=3.0 * seen.load.peak_sigma_n)
+    assert "the foot carries about" in seen.reason
+    assert "set load.model to ground" in seen.reason
+    assert observer.state.rounds == 0
+    assert observer.parameters is None
+
+
+def test_on_the_ground_references_are_those_of_the_loaded_leg(leg, reference, monkeypatch) -> None:
+    """The torque is that by virtual work alone, without what a force changes of impacts."""
+    monkeypatch.setattr(torque_reference, "PACE", 1000)
+    monkeypatch.setattr(torque_reference, "CYCLES", 3)
+    observer = TorqueObserver(leg, MonitorConfig(load=Load(model=GROUND)), SIZE_NM, NEW)
+    cycles = COMMISSIONING_CYCLES + references.LOAD_ROUNDS + 8
+    walk(observer, samples(reference, [0] * cycles, added=pushed(leg, 300.0, cycles)))
+    state, parameters = observer.state, observer.parameters
+    assert state.load_rounds == references.LOAD_ROUNDS
+    assert parameters is not None and state.reference is not None
+    assert state.reference.parameters == parameters
+    assert parameters.load[:, 1].max() == pytest.approx(300.0, rel=0.25)
+    assert "set load.model" not in observer.diagnosis.reason
 
 
 def test_a_joint_that_is_repaired_without_a_word_is_reported(leg, reference) -> None:

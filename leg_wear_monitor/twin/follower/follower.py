@@ -1,5 +1,6 @@
 """The leg that follows the tracker's steps, and actions where its kernel returns (physics.md section 9)."""
 
+import math
 from functools import cached_property
 from typing import NamedTuple
 
@@ -25,7 +26,7 @@ from leg_wear_monitor.twin.follower.cycle import (
     torque_statistics,
 )
 from leg_wear_monitor.twin.follower.following import CYCLE, LEFT, NEEDS_START, REPORTED, follow
-from leg_wear_monitor.twin.follower.load import FootLoad, torque_size
+from leg_wear_monitor.twin.follower.load import FootLoad, shape_torque, torque_size
 from leg_wear_monitor.twin.follower.measured_load import force_of, set_force
 from leg_wear_monitor.twin.follower.repeating import (
     CYCLES,
@@ -38,6 +39,7 @@ from leg_wear_monitor.twin.follower.state import (
     EVALUATED,
     FRICTION,
     LAG,
+    LOAD,
     LOAD_FRICTION,
     TORQUE_SENSOR,
     LegState,
@@ -47,7 +49,7 @@ from leg_wear_monitor.twin.follower.torque_estimate import LEAST_SAMPLES, LoadEs
 from leg_wear_monitor.twin.reference.leg_parameters import LegParameters
 from leg_wear_monitor.twin.reference.leg_simulation import drive_coupling
 from leg_wear_monitor.twin.sampling.state import SampledState
-from leg_wear_monitor.twin.settings import FOOT_FRAME, INSTANT, MEASURED, TwinSettings
+from leg_wear_monitor.twin.settings import FOOT_FRAME, GROUND, INSTANT, MEASURED, TwinSettings
 from leg_wear_monitor.twin.statistics import (
     CycleStatistics,
     Event,
@@ -130,6 +132,7 @@ class LegFollower:
         self.state: Record = record_of(self.records)
         self.statistics = new_run_statistics(len(setup.linkage.mechanism.joints))
         self._loads = settings.loads_n
+        self._shape_torque = shape_torque(setup.linkage) if settings.load_shape == GROUND else 0.0
         self.estimate = LoadEstimate(self._loads[1], self._loads[0])
         self._cutoff, self._declared_lag_s = TURN * settings.torque_bandwidth_hz, settings.torque_lag_s
         self.torque_size_nm = max(torque_size(setup.linkage, setup.speed), _LEAST_TORQUE_NM)
@@ -361,9 +364,14 @@ class LegFollower:
 
     @property
     def _unexplained_nm(self) -> float:
-        """RMS of the residual that repeats and is not explained [N m]; NaN if unknown."""
+        """RMS of the residual that repeats and is not explained [N m]; NaN if unknown.
+
+        What another shape of the ground's force than the supposed one leaves does not count.
+        """
         # the residual of averages is from the torque without a load, that of instants is not
-        return self._repeating.rms_nm() if self._instants else self._repeating.rms_nm(self._loads)
+        rms_nm = self._repeating.rms_nm() if self._instants else self._repeating.rms_nm(self._loads)
+        other_nm = self._shape_torque * float(self.estimate.values[LOAD])
+        return math.sqrt(max(0.0, rms_nm**2 - other_nm**2)) if math.isfinite(rms_nm) else rms_nm
 
     def snapshot(self) -> FollowerSnapshot:
         """A copy of the whole state, surfaces included."""

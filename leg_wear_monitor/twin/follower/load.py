@@ -19,6 +19,10 @@ from leg_wear_monitor.mechanism.position import Linkage
 from leg_wear_monitor.twin.follower.measured_load import force_of, load_rows, set_force
 from leg_wear_monitor.twin.settings import GROUND, STANCE
 
+# by how much measured stances differ from the template: RMS over the peak, of the vertical force (0.055 to
+# 0.119) and of the fore-aft one (0.034 to 0.062; docs/appendix/benchmarks.md)
+_VERTICAL, _FORE_AFT = 0.09, 0.05
+
 
 class FootLoad:
     """The leg's tables under a vertical load at the toe.
@@ -110,6 +114,18 @@ def load_shape(linkage: Linkage, shape: str = STANCE) -> Floats:
     up = upwards(mechanism)
     position, _, _ = point_motion(one_cycle(linkage, PHASES, 1.0), linkage, *mechanism.toe)
     return np.outer(_fraction(position @ up, shape), up)
+
+
+def shape_torque(linkage: Linkage) -> float:
+    """RMS of the drive torque per newton of the peak [N m/N] by which steps differ from the template."""
+    toe = linkage.mechanism.toe
+    if toe is None:
+        return 0.0
+    stance = nominal_stance(linkage)
+    _, velocity, _ = point_motion(one_cycle(linkage, PHASES, 1.0), linkage, *toe)
+    other = _VERTICAL * (velocity @ stance.up), _FORE_AFT * (velocity @ stance.back)
+    stands = stance.fractions() <= 1.0
+    return float(np.sqrt(np.mean(np.where(stands, np.hypot(*other), 0.0) ** 2)))
 
 
 def load_signature(linkage: Linkage, force: Floats | None = None) -> Floats:

@@ -25,7 +25,8 @@ SPEEDS: Mapping[str, tuple[float, float]] = {
 COUNTS = "counts"
 """Unit of an encoder's raw position; `TableInput.counts_per_turn` says how many make a turn."""
 TORQUES: Mapping[str, tuple[float, float]] = {"N m": (1.0, 1.0), "N mm": (1.0, 1000.0)}
-FORCES: Mapping[str, tuple[float, float]] = {"N": (1.0, 1.0), "kN": (1000.0, 1.0)}
+# not N, which the YAML parser of ROS takes for false
+FORCES: Mapping[str, tuple[float, float]] = {"newton": (1.0, 1.0), "kN": (1000.0, 1.0)}
 """Factor and divisor to SI of angles, speeds, torques and forces; a division by 1000 is rounded once."""
 
 
@@ -73,7 +74,7 @@ class Units:
     )
     crank_speed: str = choice(tuple(SPEEDS), "unit of the speed", default="rad/s")
     drive_torque: str = choice(tuple(TORQUES), "unit of the torque", default="N m")
-    foot_load: str = choice(tuple(FORCES), "unit of the force on the foot", default="N")
+    foot_load: str = choice(tuple(FORCES), "unit of the force on the foot", default="newton")
 
 
 def _date(text: str) -> str | None:

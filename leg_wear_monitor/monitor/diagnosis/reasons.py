@@ -68,8 +68,10 @@ def doubt(state: TorqueState, references: References, models: LegModels) -> str:
         carried = f"about {state.load.peak_n:.0f} ± {state.load.peak_sigma_n:.0f} N in stance"
         return f"{known}the foot carries {carried}; set load.model to ground"
     if references.is_busy:
-        part = "the leg under the ground's force is" if state.load else "its masses, lengths and friction are"
-        what = part if state.is_identifying else "a reference for it is"
+        what = (
+            "its masses, lengths and friction are" if state.rounds else "the leg under the ground's force is"
+        )
+        what = what if state.is_identifying else "a reference for it is"
         return f"{known}{what} being simulated, {references.percent} %"
     return f"{known}masses, lengths and friction near those of the file do not explain its drive torque"
 

@@ -152,8 +152,9 @@ class References:
         """
         if state.commissioned is None:
             return
+        is_known = state.load_rounds > 0  # sure by the first round: a later one is nearer to it
         state.load, state.load_rounds = self._models.ground_load(state, reference), state.load_rounds + 1
-        if self._is_on_ground and state.load.is_sure:
+        if self._is_on_ground and (is_known or state.load.is_sure):
             parameters = attrs.evolve(reference.parameters, load=state.load.force)
             state.is_identifying = True
             self._begun().begin_expected(state.commissioned.clearance_m, depth, reference.profile, parameters)

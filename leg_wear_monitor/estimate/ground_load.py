@@ -15,6 +15,7 @@ from collections.abc import Sequence
 import attrs
 import numpy as np
 
+from leg_wear_monitor.dynamics.clearance.tables import POINTS
 from leg_wear_monitor.estimate.cause import Cause
 from leg_wear_monitor.estimate.drive_figures import UNDECLARED, DriveFigures
 from leg_wear_monitor.estimate.explanations import Nuisance
@@ -25,9 +26,9 @@ from leg_wear_monitor.mechanism.arrays import Floats
 from leg_wear_monitor.mechanism.ground_reaction import FORE_AFT, PHASES, Stance, nominal_stance
 from leg_wear_monitor.mechanism.ideal import TURN, one_cycle, point_motion
 from leg_wear_monitor.mechanism.position import Linkage
+from leg_wear_monitor.twin.follower.load import at_points
 from leg_wear_monitor.twin.reference.torque_reference import TorqueReference
 
-_POINTS = 8 * PHASES  # of the torque, in a turn
 _HARMONICS = 12  # sin(k pi s) over stance, in each component
 
 # standard deviations about the template: begin and end of stance [turns], fore-aft over vertical force, each
@@ -104,19 +105,15 @@ class _Leg:
             raise RuntimeError("a mechanism without a toe does not stand")
         self._stance, self._sensor, self._friction = nominal_stance(linkage), sensor, friction
         self.near_n = 0.0  # about the size: shapes differ in proportion to it
-        _, velocity, _ = point_motion(one_cycle(linkage, _POINTS, 1.0), linkage, *toe)
+        _, velocity, _ = point_motion(one_cycle(linkage, POINTS, 1.0), linkage, *toe)
         self._lever, profile = -velocity, reference.profile
         angle, torque = reference.angle[:-1], reference.torque_nm[0].astype(float).mean(axis=0)
-        even = np.arange(_POINTS) * (TURN / _POINTS)
+        even = np.arange(POINTS) * (TURN / POINTS)
         own = np.interp(even, angle % TURN, torque, period=TURN)
         former = reference.parameters.load
-        self._own = own
-        if former.size:
-            place = np.arange(len(former)) * (TURN / len(former))
-            there = np.stack([np.interp(even, place, one, period=TURN) for one in former.T], axis=1)
-            self._own = own - self._torque(there)
-        self._step_s, self._direction = TURN / abs(profile.speed) / _POINTS, math.copysign(1.0, profile.speed)
-        each = [signature_of_torque(one, sensor.phases)[: sensor.phases] for one in np.eye(_POINTS)]
+        self._own = own - self._torque(at_points(former)) if former.size else own
+        self._step_s, self._direction = TURN / abs(profile.speed) / POINTS, math.copysign(1.0, profile.speed)
+        each = [signature_of_torque(one, sensor.phases)[: sensor.phases] for one in np.eye(POINTS)]
         self._phases = np.array(each).T
 
     def stance(self, x: Floats) -> Stance:
@@ -142,7 +139,7 @@ class _Leg:
 
     def mean(self, x: Floats) -> Floats:
         """Mean torque (phases,) of each phase, as the sensor shows it [N m]."""
-        torque = self._own + self._torque(self.force(x, _POINTS))
+        torque = self._own + self._torque(self.force(x, POINTS))
         channel = attrs.evolve(self._sensor.channel, load_friction=self.load_friction(x))
         received = channel.received(torque, self._step_s, self._direction)
         return np.asarray(self._phases @ received)

@@ -181,6 +181,7 @@ def test_workers_that_keep_dying_end_the_study(monkeypatch):
         processes.run_in_processes([job], 2, lambda *_: None)
 
 
+@pytest.mark.skipif("MOVED_STARTS" in os.environ, reason="the starts of other processes are not moved")
 @pytest.mark.slow  # other tests interrupt it, and kill a worker
 def test_killed_at_some_moment_and_started_again_gives_the_uninterrupted_results(
     sweep, uninterrupted, tmp_path

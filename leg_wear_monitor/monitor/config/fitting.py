@@ -20,6 +20,7 @@ from leg_wear_monitor.twin.settings import (
     GROUND,
     MEASURED,
     NO_LOAD,
+    NONE,
     STANCE,
     TrackerSettings,
     TwinSettings,
@@ -42,14 +43,17 @@ def fitted(mechanism: Mechanism, config: MonitorConfig, source: str = "parameter
     ------
     ConfigError
         For joints that the mechanism does not have, lists of a wrong length, a clearance that does not fit,
-        a mechanism with a torque as its drive, a drive that is not known, or a person on bodies that are not
-        there.
+        a mechanism with a torque as its drive, a drive that is not known, a person on bodies that are not
+        there, or a load on a mechanism without a toe.
     """
     drive_figures(config.drive, source)  # a fault of it ends the start, whoever uses the figures
     if not isinstance(mechanism.drive, SpeedDrive):
         raise ConfigError(
             source, "mechanism", f"{config.mechanism!r} is driven by a torque, expected one with drive.speed"
         )
+    if config.load.model != NONE and mechanism.toe is None:
+        fault = f"{config.load.model!r} needs a point called toe in {mechanism.source}, which has none"
+        raise ConfigError(source, "load.model", fault)
     clearance_joints = config.clearance_joints or mechanism.clearance_joints
     _check_joints(clearance_joints, mechanism, source)
     speed = TURN * (config.cadence.commanded_rpm / 60.0)

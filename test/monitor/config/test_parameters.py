@@ -226,3 +226,11 @@ def test_a_file_of_one_node_is_read_for_that_node_and_one_of_two_needs_to_know_w
         parse_config(both, "both.yaml")
     with pytest.raises(ConfigError, match="has nothing for the node /leg_wear_monitor"):
         parse_config({"/camera": {"ros__parameters": {}}}, "camera.yaml")
+
+
+@pytest.mark.parametrize("model", ["ground", "measured"])
+def test_a_load_needs_a_toe_to_push(model):
+    with pytest.raises(
+        ConfigError, match=rf"load.model: '{model}' needs a point called toe in slider_crank.yaml"
+    ):
+        fitted(load_mechanism("slider_crank"), config_from({"load.model": model}))

@@ -122,8 +122,8 @@ class LegModels:
         if known is None or sensor is None:
             raise RuntimeError("the leg is not commissioned yet")
         linkage = build_linkage(reference.parameters.in_air.applied(self._mechanism))
-        covariance = own.explainer.model.covariance * (1.0 / known.cycles + 1.0 / own.explainer.model.cycles)
-        columns = nuisances(self._mechanism, own.reference, sensor)
+        model, columns = own.explainer.model, own.explainer.nuisances
+        covariance = model.covariance * (1.0 / known.cycles + 1.0 / model.cycles)
         return ground_load(linkage, reference, sensor, known.mean, covariance, columns, self._figures)
 
     def fits(self, state: TorqueState) -> bool:

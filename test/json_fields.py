@@ -5,6 +5,7 @@ import re
 import types
 from collections.abc import Iterator
 from enum import Enum, IntEnum
+from functools import cache
 from typing import Any, Union, get_args, get_origin
 
 import attrs
@@ -104,3 +105,28 @@ def _word(kind: Any) -> str:
         values = [each.name if issubclass(kind, IntEnum) else str(each.value) for each in kind]
         return "one of " + ", ".join(f"`{value}`" for value in values)
     return PLAIN[kind]
+
+
+def leaves(value: Any, path: str = "") -> Iterator[str]:
+    """Paths of plain values, of lists of them, and of what is null or empty; entries of lists in brackets."""
+    if isinstance(value, dict) and value:
+        for name, part in value.items():
+            yield from leaves(part, f"{path}.{name}" if path else name)
+    elif isinstance(value, list) and value and isinstance(value[0], dict):
+        for part in value:
+            yield from leaves(part, f"{path}[]")
+    else:
+        yield path
+
+
+@cache
+def _patterns(row: str) -> tuple["re.Pattern[str]", ...]:
+    """Of what a row lists, and of the parts above it."""
+    names = row.split(".")
+    above = (".".join(names[: number + 1]) for number in range(len(names)))
+    return tuple(re.compile(re.sub(r"<\w+>", "[^.]+", re.escape(each))) for each in above)
+
+
+def is_of(row: str, leaf: str) -> bool:
+    """Whether a leaf is what a row lists, or a part above it that is null or empty."""
+    return any(pattern.fullmatch(leaf) for pattern in _patterns(row))

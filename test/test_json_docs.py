@@ -14,7 +14,7 @@ import pytest
 sys.path.insert(0, str(Path(__file__).parent))  # as a script
 
 from filled_fleet import filled_fleet
-from json_fields import Row, descriptions, rows_of, unit_of
+from json_fields import Row, descriptions, is_of, leaves, rows_of, unit_of
 from made_up_summary import made_up_summary
 
 import leg_wear_monitor as lw
@@ -167,25 +167,6 @@ def example(name: str) -> Any:
     cycles = {"clearances_m": (6.0e-4,), "cycles": (2.0,), "named_cycles": (math.nan,)}
     joint = JointDetection(joint="J", is_good=False, runner_up="", **cycles)
     return lw.CommissioningResult(items=(item,), config=None, turns=1.0, joints=(joint,), **told).to_dict()
-
-
-def leaves(value: Any, path: str = "") -> Iterator[str]:
-    """Paths of plain values, of lists of them, and of what is null or empty; entries of lists in brackets."""
-    if isinstance(value, dict) and value:
-        for name, part in value.items():
-            yield from leaves(part, f"{path}.{name}" if path else name)
-    elif isinstance(value, list) and value and isinstance(value[0], dict):
-        for part in value:
-            yield from leaves(part, f"{path}[]")
-    else:
-        yield path
-
-
-def is_of(row: str, leaf: str) -> bool:
-    """Whether a leaf is what a row lists, or a part above it that is null or empty."""
-    names = row.split(".")
-    above = (".".join(names[: number + 1]) for number in range(len(names)))
-    return any(re.fullmatch(re.sub(r"<\w+>", "[^.]+", re.escape(each)), leaf) for each in above)
 
 
 @pytest.mark.plain

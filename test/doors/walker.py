@@ -1,0 +1,50 @@
+"""A monitor with a ledger on an endless steady gait, to be killed: says what it counts and keeps.
+
+Lines are ``started DIGEST`` of the wear that its ledger had, ``saving DIGEST`` before the ledger is written
+and ``saved DIGEST`` after.
+"""
+
+import hashlib
+import sys
+from collections.abc import Iterator
+
+import numpy as np
+
+import leg_wear_monitor as lw
+
+START_NS, RATE_HZ, BLOCK, BLOCKS = 1_700_000_000 * 10**9, 200, 20, 5
+
+
+def walk(begin_s: float, end_s: float) -> Iterator[object]:
+    """Blocks of samples of a steady gait at 60 rpm."""
+    for first in range(round(begin_s * RATE_HZ), round(end_s * RATE_HZ), BLOCK):
+        n = np.arange(first, first + BLOCK)
+        angle = 2.0 * np.pi * n / RATE_HZ % (2.0 * np.pi)
+        yield lw.gait_samples(START_NS + n * (10**9 // RATE_HZ), crank_angle_rad=angle)
+
+
+def opened(parameters: str) -> lw.WearMonitor:
+    """A monitor on the ledger that the parameters name."""
+    config = lw.load_config(parameters)
+    leg = lw.load_mechanism(config.mechanism)
+    return lw.WearMonitor(leg, config, lw.open_ledger(leg, config))
+
+
+def digest(monitor: lw.WearMonitor) -> str:
+    """What stands for the counted wear."""
+    return hashlib.sha256(monitor.wear_depth_m.tobytes()).hexdigest()[:16]
+
+
+def main(parameters: str) -> None:
+    monitor = opened(parameters)
+    print("started", digest(monitor), flush=True)
+    for number, block in enumerate(walk(0.0, 10_000.0)):
+        monitor.update(block)
+        if number % BLOCKS == BLOCKS - 1:
+            print("saving", digest(monitor), flush=True)
+            monitor.save()
+            print("saved", digest(monitor), flush=True)
+
+
+if __name__ == "__main__":
+    main(sys.argv[1])

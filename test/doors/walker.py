@@ -1,6 +1,6 @@
-"""A monitor with a ledger on an endless steady gait, to be killed; says ``saved N`` when N blocks are kept."""
+"""A monitor with a ledger on a steady gait, to be killed: says ``saved N`` when N blocks are kept."""
 
-import hashlib
+import itertools
 import sys
 from collections.abc import Iterator
 from typing import Any
@@ -27,20 +27,16 @@ def opened(parameters: str) -> lw.WearMonitor:
     return lw.WearMonitor(leg, config, lw.open_ledger(leg, config))
 
 
-def digest(monitor: lw.WearMonitor) -> str:
-    """What stands for the counted wear."""
-    return hashlib.sha256(monitor.wear_depth_m.tobytes()).hexdigest()
-
-
-def main(parameters: str) -> None:
+def main(parameters: str, blocks: int) -> None:
     monitor = opened(parameters)
     print("started", flush=True)
-    for number, block in enumerate(walk(0.0, 10_000.0), 1):
+    for number, block in enumerate(itertools.islice(walk(0.0, 10_000.0), blocks), 1):
         monitor.update(block)
         if number % TOGETHER == 0:
             monitor.save()
             print("saved", number, flush=True)
+    sys.stdin.read()
 
 
 if __name__ == "__main__":
-    main(sys.argv[1])
+    main(sys.argv[1], int(sys.argv[2]))

@@ -53,7 +53,7 @@ class Evidence:
         state.detector, state.changes, state.fit_due = None, (), 0
         for cycle in state.cycles:
             self._test(state, cycle, config)
-        self._explain(state, config)
+        self._explain(state, config, is_due=True)
 
     def _know_sensor(self, state: TorqueState) -> None:
         """Find the noise of the torque sensor, and the channel behind which a commissioned leg is expected.
@@ -82,7 +82,7 @@ class Evidence:
         before = state.detector or detector.fresh()
         state.detector = detector.with_cycle(before, cycle.signature, cycle.begin_ns)
 
-    def _explain(self, state: TorqueState, config: MonitorConfig) -> None:
+    def _explain(self, state: TorqueState, config: MonitorConfig, is_due: bool = False) -> None:
         """Renew the clearances, and the change if there is one."""
         detector = self._models.detector(state, config)
         found = detector.detection(state.detector) if state.detector else None
@@ -92,7 +92,7 @@ class Evidence:
             state.fit_due -= 1
             return
         state.fit_due = _FIT_EVERY - 1
-        if since_ns and not _is_due(len(cycles)):
+        if since_ns and not (is_due or _is_due(len(cycles))):
             return
         mean, change = np.mean([cycle.signature for cycle in cycles], axis=0), None
         explanations: Sequence[Explanation] = ()

@@ -550,6 +550,15 @@ def test_a_small_opening_is_reported_and_not_corrected(leg, reference) -> None:
     assert (change.subject, change.is_corrected) == ("A", False)
 
 
+def test_a_change_is_explained_anew_at_once_by_another_reference(leg, reference) -> None:
+    """It was not until the next tenth gait cycle, and a worn leg was as counted until then."""
+    observer = observer_of(leg)
+    walk(observer, samples(reference, [0] * COMMISSIONING_CYCLES + [leg_number(0, 1.2)] * 15))
+    observer._evidence.review(observer.state, observer.config)
+    (change,) = observer.diagnosis.changes
+    assert change.subject == "A"
+
+
 def test_a_baseline_of_a_sensor_with_another_rate_is_not_used(leg, reference) -> None:
     other = CommissionedTorque(START_NS, NEW, np.zeros((COMMISSIONING_CYCLES, 40)))
     observer = observer_of(leg, commissioned=[other])

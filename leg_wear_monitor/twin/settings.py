@@ -129,7 +129,8 @@ class TwinSettings:
         Whether the estimated foot load acts on the model; it is estimated in any case.
     load_shape : str
         ``stance``: ground force in proportion to the toe's depth below its mean height; ``ground``: the
-        template of a person's stance; ``constant``: a constant weight.
+        template of a person's stance; ``constant``: a constant weight. With the `load_model` ``none``,
+        ``stance`` turns to ``ground`` where that explains much more of the torque.
     load_limit_n : float
         Largest plausible foot load [N].
     load_source, load_frame : str

@@ -34,6 +34,7 @@ from leg_wear_monitor.twin.follower.repeating import (
     LEAST_CYCLES,
     RepeatingResidual,
     averages_by_phase,
+    behind_low_pass,
 )
 from leg_wear_monitor.twin.follower.state import (
     EVALUATED,
@@ -49,7 +50,7 @@ from leg_wear_monitor.twin.follower.torque_estimate import LEAST_SAMPLES, LoadEs
 from leg_wear_monitor.twin.reference.leg_parameters import LegParameters
 from leg_wear_monitor.twin.reference.leg_simulation import drive_coupling
 from leg_wear_monitor.twin.sampling.state import SampledState
-from leg_wear_monitor.twin.settings import FOOT_FRAME, GROUND, INSTANT, MEASURED, TwinSettings
+from leg_wear_monitor.twin.settings import FOOT_FRAME, GROUND, INSTANT, MEASURED, STANCE, TwinSettings
 from leg_wear_monitor.twin.statistics import (
     CycleStatistics,
     Event,
@@ -65,6 +66,7 @@ _DENT_M = 1.0e-5  # a third of the penetration under 10 kN
 _RUN_IN_S = 0.2
 _STEADY = 0.05  # relative difference of two gait cycles' durations beyond which the cadence changes
 _LARGEST_FRICTION = 0.3  # constant one, of the RMS torque: as drive_torque.max_friction_nm by default
+_NOTABLE, _MUCH_LESS = 0.05, 0.5  # residual, of the RMS torque, from which a load may have another shape
 _LEAST_TORQUE_NM = 1.0e-6  # lower bound of the RMS torque, for a leg that needs no torque
 
 _EVENT_KINDS = {
@@ -93,6 +95,7 @@ class FollowerSnapshot(NamedTuple):
     estimate: Floats
     repeating: tuple[Floats, ...]
     load: tuple[Floats, ...]
+    load_shape: str
     sampled: SampledState | None = None
 
 
@@ -132,7 +135,9 @@ class LegFollower:
         self.state: Record = record_of(self.records)
         self.statistics = new_run_statistics(len(setup.linkage.mechanism.joints))
         self._loads = settings.loads_n
-        self._shape_torque = shape_torque(setup.linkage) if settings.load_shape == GROUND else 0.0
+        # a load that nobody declared is a push, or the ground's in stance, whatever explains the torque
+        self._is_load_known = is_measured or settings.load_model == GROUND or settings.load_shape != STANCE
+        self._shape_torque = shape_torque(setup.linkage)
         self.estimate = LoadEstimate(self._loads[1], self._loads[0])
         self._cutoff, self._declared_lag_s = TURN * settings.torque_bandwidth_hz, settings.torque_lag_s
         self.torque_size_nm = max(torque_size(setup.linkage, setup.speed), _LEAST_TORQUE_NM)
@@ -345,8 +350,35 @@ class LegFollower:
             self._set_friction()
         if found is not None and is_compared:
             self._repeating.take(sums.by_phase if self._instants else self._by_phase(profile, acting_n))
+            if not self._is_load_known:
+                self._choose_shape(acting_n)
         torque = torque_statistics(sums, found, self.estimate, self._unexplained_nm)
         return torque, profile
+
+    def _choose_shape(self, acting_n: float) -> None:
+        """Let the load have the other shape, where that explains much more of the torque."""
+        left_nm = self._unexplained_nm
+        if not left_nm > _NOTABLE * self.torque_size_nm:
+            return
+        shape = STANCE if self._load.shape == GROUND else GROUND
+        speed = TURN / float(self.statistics.time[0]) * (1 if self.state.motion.cut_rises else -1)
+        signature, phases = self._load.signature_of(shape), self._repeating.phases
+        other_m = behind_low_pass(signature, phases, self._cutoff, speed, self._instants)
+        acting_n = acting_n if self._instants else 0.0
+        other_nm, load_n = self._repeating.rms_nm(self._loads, other_m, acting_n)
+        if self._beyond_shape(other_nm, shape, load_n) < _MUCH_LESS * left_nm:
+            self._take_shape(shape)
+            self.estimate.restart_load(load_n, self._acts)
+            self._load.set(self.estimate.acting)
+
+    def _take_shape(self, shape: str) -> None:
+        self._load.take_shape(shape)
+        self._repeating.cycles = ()
+
+    def _beyond_shape(self, left_nm: float, shape: str, load_n: float) -> float:
+        """A residual [N m] less what another shape of the ground's force than the supposed one leaves."""
+        other_nm = self._shape_torque * load_n if shape == GROUND else 0.0
+        return math.sqrt(max(0.0, left_nm**2 - other_nm**2)) if math.isfinite(left_nm) else left_nm
 
     def _set_friction(self) -> None:
         """Predict torques behind the friction of the drive as estimated, as far as friction can be that."""
@@ -364,14 +396,10 @@ class LegFollower:
 
     @property
     def _unexplained_nm(self) -> float:
-        """RMS of the residual that repeats and is not explained [N m]; NaN if unknown.
-
-        What another shape of the ground's force than the supposed one leaves does not count.
-        """
+        """RMS of the residual that repeats and is not explained [N m]; NaN if unknown."""
         # the residual of averages is from the torque without a load, that of instants is not
-        rms_nm = self._repeating.rms_nm() if self._instants else self._repeating.rms_nm(self._loads)
-        other_nm = self._shape_torque * float(self.estimate.values[LOAD])
-        return math.sqrt(max(0.0, rms_nm**2 - other_nm**2)) if math.isfinite(rms_nm) else rms_nm
+        rms_nm, _ = self._repeating.rms_nm() if self._instants else self._repeating.rms_nm(self._loads)
+        return self._beyond_shape(rms_nm, self._load.shape, float(self.estimate.values[LOAD]))
 
     def snapshot(self) -> FollowerSnapshot:
         """A copy of the whole state, surfaces included."""
@@ -383,6 +411,7 @@ class LegFollower:
             self.estimate.state.copy(),
             self._repeating.cycles,
             force_of(self._load.rows),
+            self._load.shape,
         )
 
     def restore(self, snapshot: FollowerSnapshot) -> None:
@@ -393,6 +422,7 @@ class LegFollower:
                 part[...] = values
         self._before = snapshot.before.copy()
         self.estimate.state[:] = snapshot.estimate
+        self._take_shape(snapshot.load_shape)
         self._repeating.cycles = snapshot.repeating
         self._load.set(self.estimate.acting)
         set_force(self._load.rows, snapshot.load)

@@ -40,6 +40,7 @@ class FootLoad:
     ----------
     tables : ClearanceTables
         Tables for the present load, changed in place.
+    shape : str
     signature : (N + 1,) array
         Drive torque per upward load [N m/N], zeros for a mechanism without a toe.
     rows : LoadRows
@@ -56,7 +57,7 @@ class FootLoad:
     ) -> None:
         self.tables = build_tables(linkage, contacts)
         self.signature = np.zeros(POINTS + 1)
-        self._contacts, self._shape, self._load = contacts, shape, 0.0
+        self._contacts, self.shape, self._load = contacts, shape, 0.0
         self._known = np.zeros((0, 2))
         self._measured = is_measured, is_of_foot
         self._learn(linkage)
@@ -83,13 +84,23 @@ class FootLoad:
 
     def _learn(self, linkage: Linkage) -> None:
         """Learn what a load changes; the tables are those without one."""
-        mechanism, known = linkage.mechanism, self._known
+        self._linkage = linkage
         self._loaded = loaded_tables(linkage, self._contacts, self.tables)
         self.rows = load_rows(linkage, self._loaded, *self._measured)
-        self._force = load_shape(linkage, self._shape)
+        self.take_shape(self.shape)
+
+    def take_shape(self, shape: str) -> None:
+        """Let the load have another shape, unless that of a known load goes first; none acts then."""
+        self.set(0.0)
+        self.shape, known = shape, self._known
+        self._force = load_shape(self._linkage, shape)
         if known.size:
-            self._force = known / (known @ upwards(mechanism)).max()
-        self.signature[:] = load_signature(linkage, self._force)
+            self._force = known / (known @ upwards(self._linkage.mechanism)).max()
+        self.signature[:] = load_signature(self._linkage, self._force)
+
+    def signature_of(self, shape: str) -> Floats:
+        """Drive torque (N,) per upward load of a shape [N m/N]."""
+        return load_signature(self._linkage, load_shape(self._linkage, shape))[:-1]
 
     @property
     def peak_n(self) -> float:

@@ -8,6 +8,7 @@ repeats.
 import numpy as np
 
 from leg_wear_monitor.mechanism.arrays import Floats
+from leg_wear_monitor.twin.follower.state import LOAD
 from leg_wear_monitor.twin.follower.torque_estimate import bounded, bounds
 from leg_wear_monitor.twin.statistics import TorqueProfile
 
@@ -43,39 +44,74 @@ class RepeatingResidual:
         """Add the sums (6, n) of a complete gait cycle."""
         self.cycles = (*self.cycles, by_phase.copy())[-self._most :]
 
-    def rms_nm(self, loads: tuple[float, float] = (-np.inf, np.inf)) -> float:
-        """RMS [N m] of the repeating residual without load, frictions and lag; NaN without enough cycles.
+    @property
+    def phases(self) -> int:
+        """Crank phases of the cycles; 0 without any."""
+        return self.cycles[-1].shape[1] if self.cycles else 0
+
+    def rms_nm(
+        self,
+        loads: tuple[float, float] = (-np.inf, np.inf),
+        other_m: Floats | None = None,
+        acting_n: float = 0.0,
+    ) -> tuple[float, float]:
+        """RMS [N m] of the repeating residual without load, frictions and lag, and that load [N].
 
         The squared standard error of the mean over cycles is subtracted, so that pure scatter gives 0 on
-        average.
+        average. NaN without enough cycles.
 
         Parameters
         ----------
         loads : (float, float)
             Least and largest possible load of the residual [N].
+        other_m : (phases,) array, optional
+            Torque per newton of a load of another shape over the gait cycle than the supposed one.
+        acting_n : float, optional
+            Load of the supposed shape that acted in the model, for another one instead.
         """
         number = len(self.cycles)
         if number < self._least:
-            return float("nan")
+            return float("nan"), float("nan")
         sums = np.stack(self.cycles)
-        sums = sums[:, :, (sums[:, 0] > 0.0).all(axis=0)]
+        seen = (sums[:, 0] > 0.0).all(axis=0)
+        sums = sums[:, :, seen]
         if sums.shape[2] < _LEAST_PHASES:
-            return float("nan")
+            return float("nan"), float("nan")
         weight = sums[:, 0]
         total = sums.sum(axis=0)
-        mean = total[1] / total[0]
+        mean, rows = total[1] / total[0], total[2:] / total[0]
         if not np.isfinite(mean).all():
-            return float("inf")
-        explained = _explained(mean, total[2:] / total[0], loads)
+            return float("inf"), float("nan")
+        there = mean
+        if other_m is not None:
+            there = mean + acting_n * rows[LOAD]
+            rows[LOAD] = other_m[seen]
+        values = bounded(rows @ rows.T, rows @ there, *bounds(loads))
         fraction = weight / total[0]
         scatter = (fraction**2 * (sums[:, 1] / weight - mean) ** 2).sum(axis=0) * number / (number - 1)
-        square = ((mean - explained) ** 2).mean() - scatter.mean()
-        return float(np.sqrt(max(square, 0.0)))
+        square = ((there - values @ rows) ** 2).mean() - scatter.mean()
+        return float(np.sqrt(max(square, 0.0))), float(values[LOAD])
 
 
-def _explained(mean: Floats, rows: Floats, loads: tuple[float, float]) -> Floats:
-    """What rows (4, n) of load, friction, lag and load friction explain of a mean residual (n,)."""
-    return np.asarray(bounded(rows @ rows.T, rows @ mean, *bounds(loads)) @ rows)
+def behind_low_pass(signature: Floats, phases: int, cutoff: float, speed: float, is_late: bool) -> Floats:
+    """A torque (n,) at even steps of the crank angle as it is in the cycles of a residual, (phases,).
+
+    Parameters
+    ----------
+    signature : (n,) array
+    phases : int
+    cutoff : float
+        Of the low-pass filter [rad/s].
+    speed : float
+        Of the crank [rad/s].
+    is_late : bool
+        Whether the filter has its delay, as for instants, or none, as for averages.
+    """
+    order = np.arange(len(signature) // 2 + 1)
+    response = 1.0 / (1.0 + 1j * order * speed / cutoff) ** 2
+    smooth = np.fft.irfft(np.fft.rfft(signature) * (response if is_late else np.abs(response)))
+    middles = (np.arange(phases) + 0.5) / phases * len(signature)
+    return np.asarray(np.interp(middles, np.arange(len(signature)), smooth, period=len(signature)))
 
 
 def averages_by_phase(

@@ -150,6 +150,11 @@ class LoadEstimate:
         """Least and largest possible load minus the acting one [N]."""
         return self._least - self.acting, self._limit - self.acting
 
+    def restart_load(self, load_n: float, acts: bool) -> None:
+        """Begin with a load of another shape [N], known from a few cycles; ``acts`` as in `take`."""
+        self.values[LOAD], self.state[REGRESSORS + LOAD] = load_n, _UNKNOWN[LOAD] ** 2
+        self.state[-1] = load_n if acts else 0.0
+
     def wait(self, cycles: int) -> None:
         """Let so many cycles pass without an estimate."""
         self.state[REGRESSORS:-1] += cycles * _DRIFT**2

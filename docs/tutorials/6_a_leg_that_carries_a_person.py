@@ -105,7 +105,8 @@ for name, life in (("in the air", in_air), ("by duty", by_day)):
 #
 # - ``load.model: ground`` if nothing measures the force at the foot: the monitor estimates it from the drive torque, as the stance of a person.
 # - ``load.model: measured`` and ``foot_load.source`` if there is an insole or a force plate: the monitor takes the force at its time.
-# - ``load.person_kg`` if a person's leg hangs on the linkage; it should be right to some 15 %.
+# - ``load.person_kg`` if a person's leg hangs on the linkage; it should be right to 20 %.
 #
 # Without them a leg on the ground is told as such, with the load that it seems to carry and the parameter that is missing.
+# ``bags/ground.mcap`` is a recording of a leg under 300 N whose knee opens; replay it with ``--config bags/ground.yaml``.
 # `The parameters <../reference/parameters.html>`_ describe them, and `the physics <../explanation/physics.html>`_ what is known about stance and segments.

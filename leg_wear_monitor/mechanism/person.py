@@ -10,9 +10,15 @@ from itertools import pairwise
 from typing import NamedTuple
 
 import attrs
+import numpy as np
 
 from leg_wear_monitor.errors import ConfigError
+from leg_wear_monitor.mechanism.arrays import Floats
+from leg_wear_monitor.mechanism.ideal import one_cycle
+from leg_wear_monitor.mechanism.position import build_linkage
 from leg_wear_monitor.mechanism.spec import GROUND, Body, Mechanism, Vector
+
+PERSON_TOLERANCE = 0.2  # of the mass of a person, who eats, dresses and carries
 
 
 class _Segment(NamedTuple):
@@ -63,7 +69,21 @@ def with_person(mechanism: Mechanism, person_kg: float) -> Mechanism:
     for (name, segment), (upper, lower) in zip(SEGMENTS.items(), pairwise(ends), strict=True):
         body = bodies[name]
         bodies[name] = _with(body, segment, person_kg, body.points[str(upper)], body.points[str(lower)])
-    return attrs.evolve(mechanism, bodies=bodies)
+    return attrs.evolve(mechanism, bodies=bodies, person_kg=mechanism.person_kg + person_kg)
+
+
+def heavier_person(mechanism: Mechanism) -> Mechanism:
+    """The mechanism with a person who is heavier by the tolerance."""
+    return with_person(mechanism, PERSON_TOLERANCE * mechanism.person_kg)
+
+
+def heavier_person_torque(mechanism: Mechanism, points: int, speed: float) -> Floats:
+    """Drive torque (points,) [N m] that the tolerance of the person's mass adds, with ideal joints."""
+    heavier, own = (
+        one_cycle(build_linkage(one), points, speed).drive_torque
+        for one in (heavier_person(mechanism), mechanism)
+    )
+    return np.asarray(heavier - own)
 
 
 def _joint(mechanism: Mechanism, body: str, other: str) -> str | None:

@@ -216,6 +216,8 @@ class Mechanism(Drawable):
         Settings of every revolute joint that may have clearance: defaults merged with its own.
     clearance_joints : tuple of str
         Default clearance joints.
+    person_kg : float
+        Mass of a person one of whose legs hangs on it and is a part of its bodies; 0 for none.
     source : str
         Name of the file, for messages.
     """
@@ -233,6 +235,7 @@ class Mechanism(Drawable):
     loads: dict[str, ConstantLoad | PhaseLoad] = described("forces on points by name", factory=dict)
     clearances: dict[str, Clearance] = described("the joints with clearance and their settings", factory=dict)
     clearance_joints: tuple[str, ...] = ()
+    person_kg: float = 0.0
     source: str
 
     def sides(self, joint: str) -> tuple[str, str]:

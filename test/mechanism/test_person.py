@@ -5,7 +5,7 @@ import pytest
 
 from leg_wear_monitor import ConfigError, load_mechanism
 from leg_wear_monitor.mechanism.ideal import TURN, one_cycle
-from leg_wear_monitor.mechanism.person import with_person
+from leg_wear_monitor.mechanism.person import heavier_person, with_person
 from leg_wear_monitor.mechanism.position import build_linkage
 
 pytestmark = pytest.mark.plain
@@ -16,6 +16,14 @@ LEG = load_mechanism("bionic_leg")
 def test_a_sixth_of_the_body_hangs_on_the_leg() -> None:
     before, after = (sum(body.mass for body in leg.bodies.values()) for leg in (LEG, with_person(LEG, 80.0)))
     assert after - before == pytest.approx(0.161 * 80.0)
+
+
+def test_a_heavier_person_is_one_with_another_mass() -> None:
+    heavier = heavier_person(with_person(LEG, 80.0))
+    assert heavier.person_kg == pytest.approx(96.0)
+    for name, body in with_person(LEG, 96.0).bodies.items():
+        found = heavier.bodies[name]
+        assert (found.mass, found.inertia, *found.com) == pytest.approx((body.mass, body.inertia, *body.com))
 
 
 def test_the_thigh_by_hand() -> None:

@@ -12,6 +12,7 @@ import numpy as np
 
 from leg_wear_monitor.mechanism.arrays import Floats, body_names
 from leg_wear_monitor.mechanism.ideal import TURN, one_cycle
+from leg_wear_monitor.mechanism.person import heavier_person
 from leg_wear_monitor.mechanism.position import build_linkage
 from leg_wear_monitor.mechanism.spec import Mechanism
 from leg_wear_monitor.twin.reference.leg_parameters import MASS_TOLERANCE
@@ -32,7 +33,7 @@ class ModelError:
     ideal_m : (k,) array
         Growth a gait cycle that the ideal motion makes.
     sensitivity : (k,) array
-        Of its logarithm to those of all masses, root sum of squares.
+        Of its logarithm to those of all masses, root sum of squares; the person's is known less well.
     """
 
     ideal_m: Floats
@@ -67,6 +68,9 @@ def model_error(mechanism: Mechanism, speed_radps: float, wear_acceleration: flo
         heavier = attrs.evolve(body, mass=factor * body.mass, inertia=factor * body.inertia)
         changed = attrs.evolve(mechanism, bodies={**mechanism.bodies, name: heavier})
         square += np.square((_force_times_sliding(changed, speed_radps) - sliding) / _MASS_STEP)
+    if mechanism.person_kg:
+        more = _force_times_sliding(heavier_person(mechanism), speed_radps) - sliding
+        square += np.square(more / MASS_TOLERANCE)
     # a joint that carries nothing on paper: all of its growth is made by impacts
     sensitivity = np.divide(np.sqrt(square), sliding, out=np.zeros_like(sliding), where=sliding > 0.0)
     parts = [mechanism.clearances[joint] for joint in mechanism.clearance_joints]

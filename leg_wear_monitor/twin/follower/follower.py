@@ -9,12 +9,14 @@ import numpy as np
 from leg_wear_monitor.dynamics.clearance.joint_laws import contact_laws
 from leg_wear_monitor.dynamics.clearance.stepper import INTERVALS, ClearanceStepper
 from leg_wear_monitor.dynamics.clearance.stepper import Snapshot as StepperSnapshot
+from leg_wear_monitor.dynamics.clearance.tables import POINTS
 from leg_wear_monitor.dynamics.run.drive import steady_drive
 from leg_wear_monitor.dynamics.run.protocol import DONE, INVALID_DRIVE, PUSHED_THROUGH, STEP_TOO_SMALL, Setup
 from leg_wear_monitor.dynamics.run.run_statistics import TORQUE, new_run_statistics
 from leg_wear_monitor.kernel import compile_for
 from leg_wear_monitor.mechanism.arrays import Floats
 from leg_wear_monitor.mechanism.ideal import TURN
+from leg_wear_monitor.mechanism.person import heavier_person_torque
 from leg_wear_monitor.mechanism.position import Linkage
 from leg_wear_monitor.record import Record, Records, new_records, record_of
 from leg_wear_monitor.twin import steps as step_codes
@@ -38,10 +40,12 @@ from leg_wear_monitor.twin.follower.repeating import (
 )
 from leg_wear_monitor.twin.follower.state import (
     EVALUATED,
+    FINE_PHASES,
     FRICTION,
     LAG,
     LOAD,
     LOAD_FRICTION,
+    PHASES,
     TORQUE_SENSOR,
     LegState,
     leg_state,
@@ -144,6 +148,7 @@ class LegFollower:
         self._instants = settings.torque_sampling == INSTANT
         kept = (INSTANT_CYCLES, INSTANT_CYCLES) if self._instants else (CYCLES, LEAST_CYCLES)
         self._repeating = RepeatingResidual(*kept)
+        self._tolerated_nm = self._of_person() if setup.linkage.mechanism.person_kg else None
         self._sensor = new_records(1, TORQUE_SENSOR)
         self._sensor[0] = self._cutoff, self.torque_size_nm, self._instants, 0.0, 0.0
         self._before = self.clearances
@@ -361,15 +366,23 @@ class LegFollower:
         if not left_nm > _NOTABLE * self.torque_size_nm:
             return
         shape = STANCE if self._load.shape == GROUND else GROUND
-        speed = TURN / float(self.statistics.time[0]) * (1 if self.state.motion.cut_rises else -1)
-        signature, phases = self._load.signature_of(shape), self._repeating.phases
-        other_m = behind_low_pass(signature, phases, self._cutoff, speed, self._instants)
+        other_m = self._by_phases(self._load.signature_of(shape))
         acting_n = acting_n if self._instants else 0.0
-        other_nm, load_n = self._repeating.rms_nm(self._loads, other_m, acting_n)
+        other_nm, load_n = self._repeating.rms_nm(self._loads, other_m, acting_n, self._tolerated_nm)
         if self._beyond_shape(other_nm, shape, load_n) < _MUCH_LESS * left_nm:
             self._take_shape(shape)
             self.estimate.restart_load(load_n, self._acts)
             self._load.set(self.estimate.acting)
+
+    def _by_phases(self, torque: Floats) -> Floats:
+        """A torque (n,) over a turn at the commanded speed, by the phases of the residual."""
+        phases = PHASES if self._instants else FINE_PHASES
+        return behind_low_pass(torque, phases, self._cutoff, self._setup.speed, self._instants)
+
+    def _of_person(self) -> Floats:
+        """Torque that the person may be heavier by, by the phases of the residual."""
+        mechanism = self._setup.linkage.mechanism
+        return self._by_phases(heavier_person_torque(mechanism, POINTS, self._setup.speed))
 
     def _take_shape(self, shape: str) -> None:
         self._load.take_shape(shape)
@@ -398,7 +411,8 @@ class LegFollower:
     def _unexplained_nm(self) -> float:
         """RMS of the residual that repeats and is not explained [N m]; NaN if unknown."""
         # the residual of averages is from the torque without a load, that of instants is not
-        rms_nm, _ = self._repeating.rms_nm() if self._instants else self._repeating.rms_nm(self._loads)
+        loads = (-math.inf, math.inf) if self._instants else self._loads
+        rms_nm, _ = self._repeating.rms_nm(loads, tolerated_nm=self._tolerated_nm)
         return self._beyond_shape(rms_nm, self._load.shape, float(self.estimate.values[LOAD]))
 
     def snapshot(self) -> FollowerSnapshot:

@@ -44,16 +44,12 @@ class RepeatingResidual:
         """Add the sums (6, n) of a complete gait cycle."""
         self.cycles = (*self.cycles, by_phase.copy())[-self._most :]
 
-    @property
-    def phases(self) -> int:
-        """Crank phases of the cycles; 0 without any."""
-        return self.cycles[-1].shape[1] if self.cycles else 0
-
     def rms_nm(
         self,
         loads: tuple[float, float] = (-np.inf, np.inf),
         other_m: Floats | None = None,
         acting_n: float = 0.0,
+        tolerated_nm: Floats | None = None,
     ) -> tuple[float, float]:
         """RMS [N m] of the repeating residual without load, frictions and lag, and that load [N].
 
@@ -68,6 +64,8 @@ class RepeatingResidual:
             Torque per newton of a load of another shape over the gait cycle than the supposed one.
         acting_n : float, optional
             Load of the supposed shape that acted in the model, for another one instead.
+        tolerated_nm : (phases,) array, optional
+            Torque that may be there up to this size, with either sign.
         """
         number = len(self.cycles)
         if number < self._least:
@@ -86,7 +84,11 @@ class RepeatingResidual:
         if other_m is not None:
             there = mean + acting_n * rows[LOAD]
             rows[LOAD] = other_m[seen]
-        values = bounded(rows @ rows.T, rows @ there, *bounds(loads))
+        low, high = bounds(loads)
+        if tolerated_nm is not None:
+            rows = np.vstack([rows, tolerated_nm[seen]])
+            low, high = np.append(low, -1.0), np.append(high, 1.0)
+        values = bounded(rows @ rows.T, rows @ there, low, high)
         fraction = weight / total[0]
         scatter = (fraction**2 * (sums[:, 1] / weight - mean) ** 2).sum(axis=0) * number / (number - 1)
         square = ((there - values @ rows) ** 2).mean() - scatter.mean()

@@ -5,6 +5,7 @@ import numpy as np
 import pytest
 
 from leg_wear_monitor import load_mechanism
+from leg_wear_monitor.mechanism.person import PERSON_TOLERANCE, with_person
 from leg_wear_monitor.monitor.forecast.model_error import ModelError, model_error
 from leg_wear_monitor.twin.reference.leg_parameters import MASS_TOLERANCE
 
@@ -40,6 +41,15 @@ def test_lighter_bodies_wear_less_and_are_as_uncertain():
     whole, lighter = model_error(leg, 6.0), model_error(scaled(leg, dict.fromkeys(leg.bodies, 0.4)), 6.0)
     assert lighter.ideal_m == pytest.approx(0.4 * whole.ideal_m, rel=1e-6)
     assert lighter.sensitivity == pytest.approx(whole.sensitivity, rel=1e-6)
+
+
+def test_where_a_person_makes_all_of_the_force_growth_is_as_uncertain_as_the_person() -> None:
+    leg = load_mechanism("bionic_leg")
+    light = with_person(scaled(leg, dict.fromkeys(leg.bodies, 1.0e-6)), 80.0)
+    found = model_error(light, 6.0)
+    for k, growth_m in enumerate(found.ideal_m):
+        # and by the three segments, each of which is known as bodies are
+        assert PERSON_TOLERANCE < found.relative(k, growth_m) < 1.1 * PERSON_TOLERANCE
 
 
 def test_what_impacts_make_is_less_sure():

@@ -13,6 +13,7 @@ from leg_wear_monitor.dynamics.run.run_statistics import FORCE, TORQUE, new_run_
 from leg_wear_monitor.dynamics.simulation import prepare
 from leg_wear_monitor.mechanism.ground_reaction import on_the_ground
 from leg_wear_monitor.mechanism.ideal import TURN, one_cycle, point_motion
+from leg_wear_monitor.mechanism.person import with_person
 from leg_wear_monitor.mechanism.position import build_linkage
 from leg_wear_monitor.mechanism.spec import ConstantLoad
 from leg_wear_monitor.record import Record, new_records, record_of
@@ -229,3 +230,12 @@ def test_a_stance_that_nobody_declared_is_a_load_and_no_mismatch(leg, peak_n):
     assert np.mean([one.mean_force_n for one in cycles[-4:]], axis=0) == pytest.approx(force, rel=0.1)
     for one, again in zip(rest, before.update(samples[half:]).cycles, strict=True):
         np.testing.assert_array_equal(one.mean_force_n, again.mean_force_n)
+
+
+@pytest.mark.chaotic
+@pytest.mark.parametrize("person_kg, limits", [(64.0, (0.0, 0.06)), (96.0, (0.0, 0.06)), (120.0, (0.1, 0.3))])
+def test_a_person_within_the_tolerance_is_no_mismatch(leg, person_kg, limits):
+    """Declared are 80 kg: 64 and 96 kg had a mismatch of 0.12, and their alarm at 0.1."""
+    samples, _ = measured(with_person(leg, person_kg), 8, 0.0)
+    last = DigitalTwin(with_person(leg, 80.0), TwinSettings()).update(samples).cycles[-1].torque
+    assert limits[0] <= last.unexplained_rms_nm / last.predicted_rms_nm < limits[1]

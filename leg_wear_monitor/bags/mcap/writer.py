@@ -36,6 +36,8 @@ class McapWriter:
         An existing file is overwritten.
     chunk_bytes : int
         Size at which a chunk is written [bytes].
+    level : int
+        Of zstd.
 
     Raises
     ------
@@ -44,11 +46,11 @@ class McapWriter:
         writing may be retried; the chunk that could not be written is lost.
     """
 
-    def __init__(self, path: str | Path, *, chunk_bytes: int = 2**17) -> None:
+    def __init__(self, path: str | Path, *, chunk_bytes: int = 2**17, level: int = 1) -> None:
         self.path = Path(path)
         self._chunk_bytes = chunk_bytes
         self._chunk = Chunk()
-        self._compressor = zstandard.ZstdCompressor(level=1)
+        self._compressor = zstandard.ZstdCompressor(level=level)
         self._schemas: dict[str, Schema] = {}
         self._channels: dict[int, Channel] = {}
         self._indexes: list[ChunkIndex] = []

@@ -58,4 +58,11 @@ def walked_words(loads: Iterable[WalkedLoad]) -> str:
     longest = sorted(loads, key=lambda load: -load.moving_s)
     if not any(load.about_n for load in longest):
         return ""
-    return "walked " + ", ".join(f"{load.moving_s / 3600.0:.3g} h at {load.mean_n:.0f} N" for load in longest)
+    return "walked " + ", ".join(f"{_time(load.moving_s)} at {load.mean_n:.0f} N" for load in longest)
+
+
+def _time(seconds: float) -> str:
+    for unit, size in (("h", 3600.0), ("min", 60.0)):
+        if seconds >= size:
+            return f"{seconds / size:.3g} {unit}"
+    return f"{seconds:.3g} s"

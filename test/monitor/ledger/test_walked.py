@@ -34,6 +34,8 @@ def test_a_load_is_of_its_nearest_hundred_newtons(peak_n, about_n):
 
 def test_words_have_the_longest_walk_first_and_none_of_a_leg_in_the_air():
     assert walked_words([AIR, LOADED]) == "walked 12 h at 290 N, 2 h at 0 N"
+    short = [attrs.evolve(LOADED, moving_s=91.0), attrs.evolve(AIR, moving_s=3.0)]
+    assert walked_words(short) == "walked 1.52 min at 290 N, 3 s at 0 N"
     assert walked_words([AIR]) == walked_words([]) == ""
 
 

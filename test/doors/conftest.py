@@ -5,6 +5,7 @@ import signal
 import sys
 from collections.abc import Callable
 from contextlib import redirect_stderr, redirect_stdout
+from importlib.util import find_spec
 from io import StringIO
 from pathlib import Path
 from typing import Any
@@ -13,6 +14,11 @@ from unittest.mock import patch
 import attrs
 import pytest
 from json_fields import is_of, leaves
+
+if not (find_spec("mcap") and find_spec("rosbags")):  # the extra `bags` is not installed
+    collect_ignore = [
+        f"test_{name}.py" for name in ("diagnosis", "exit_codes", "fleet", "kills", "sample_bags")
+    ]
 
 FAULTS = ("error: ", "warning: ", "note: ")
 

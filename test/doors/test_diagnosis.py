@@ -39,7 +39,7 @@ def walk(tmp_path_factory: pytest.TempPathFactory) -> dict[str, np.ndarray]:
 
 @pytest.mark.chaotic
 def test_the_joint_is_named_with_its_clearance_and_no_other_one_is(walk: dict[str, np.ndarray]) -> None:
-    """Over 6 moved starts (2026-11-25): G 0.900 mm, others 0.25 to 0.33 mm, that of J with 0.015 mm sigma."""
+    """Over 5 moved starts (2026-11-25): G 0.900 mm, others 0.25 to 0.33 mm, that of J with 0.015 mm sigma."""
     summary = lw.replay(walk).summary()
     assert (summary.verdict.state.value, summary.verdict.joints) == ("stop", ("G",))
     assert summary.verdict.fault_code == "CLEARANCE_SEEN_G"

@@ -11,8 +11,8 @@ from leg_wear_monitor.monitor.config.settings import MonitorConfig
 from leg_wear_monitor.wear.surfaces import SECTORS
 
 # fields of a mechanism that may change without a change of the worn parts
-_FREE = ("name", "source", "drive", "loads", "clearance_joints", "clearances")
-_OF_BODIES = ("person_kg",)  # is in their masses
+# (a person is in the masses of the bodies)
+_FREE = ("name", "source", "drive", "loads", "clearance_joints", "clearances", "person_kg")
 _FREE_OF_CLEARANCE = ("wear_coefficient", "material")  # what a pair gives is in the other settings
 _LATER = ("film",)  # settings of later versions: absent, they leave the hash of an older leg as it was
 _FREE_OF_JOINTS = ("label",)
@@ -25,7 +25,7 @@ def fingerprint(mechanism: Mechanism) -> str:
     better value of these, the same wear is continued.
     """
     fields = {field.name: getattr(mechanism, field.name) for field in attrs.fields(Mechanism)}
-    parts = {name: _plain(value) for name, value in fields.items() if name not in _FREE + _OF_BODIES}
+    parts = {name: _plain(value) for name, value in fields.items() if name not in _FREE}
     for joint in mechanism.clearance_joints:
         settings = attrs.asdict(mechanism.clearances[joint])
         parts[f"clearance {joint}"] = {

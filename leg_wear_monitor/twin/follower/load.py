@@ -85,6 +85,7 @@ class FootLoad:
     def _learn(self, linkage: Linkage) -> None:
         """Learn what a load changes; the tables are those without one."""
         self._linkage = linkage
+        self._shaped: dict[str, tuple[Floats, Floats]] = {}
         self._loaded = loaded_tables(linkage, self._contacts, self.tables)
         self.rows = load_rows(linkage, self._loaded, *self._measured)
         self.take_shape(self.shape)
@@ -93,14 +94,22 @@ class FootLoad:
         """Let the load have another shape, unless that of a known load goes first; none acts then."""
         self.set(0.0)
         self.shape, known = shape, self._known
-        self._force = load_shape(self._linkage, shape)
         if known.size:
             self._force = known / (known @ upwards(self._linkage.mechanism)).max()
-        self.signature[:] = load_signature(self._linkage, self._force)
+            self.signature[:] = load_signature(self._linkage, self._force)
+        else:
+            self._force, self.signature[:] = self._of_shape(shape)
 
     def signature_of(self, shape: str) -> Floats:
         """Drive torque (N,) per upward load of a shape [N m/N]."""
-        return load_signature(self._linkage, load_shape(self._linkage, shape))[:-1]
+        return self._of_shape(shape)[1][:-1]
+
+    def _of_shape(self, shape: str) -> tuple[Floats, Floats]:
+        """Force and signature of a shape; kept, since a leg with a mismatch asks in each gait cycle."""
+        if shape not in self._shaped:
+            force = load_shape(self._linkage, shape)
+            self._shaped[shape] = force, load_signature(self._linkage, force)
+        return self._shaped[shape]
 
     @property
     def peak_n(self) -> float:

@@ -64,10 +64,13 @@ def test_a_healthy_leg_on_the_ground_is_healthy(walk):
     assert status.level is Level.OK and status.values["peak_n"] == load.peak_n
 
 
-def test_without_the_load_its_torque_is_a_mismatch(walk):
-    assert "torque_mismatch" in {
-        one.name for one in monitored(walk, **{"load.model": "none"}).alarms.alarms if one.level
-    }
+def test_without_the_sensor_the_torque_shows_a_stance_and_no_mismatch(walk):
+    """Until a load that nobody declared could be a stance, this healthy leg had the alarm of a mismatch."""
+    monitor = monitored(walk, **{"load.model": "none"})
+    assert not [one.name for one in monitor.alarms.alarms if one.level]
+    (torque,) = (one.values for one in monitor.status() if one.name == "torque")
+    # steps scatter by 10 %, and the load is known from some ten of them
+    assert torque["load_acting_n"] == pytest.approx(PEAK_N, rel=0.05 + 5.3 * 0.1 / 10**0.5)
 
 
 def changed(change: Callable[[np.ndarray, np.ndarray], np.ndarray], walk: Samples) -> Samples:

@@ -4,7 +4,7 @@ import attrs
 import numpy as np
 import pytest
 
-from leg_wear_monitor import LegWearError
+from leg_wear_monitor import LegWearError, WearMonitor
 from leg_wear_monitor.monitor.config.forecast import Forecasting
 from leg_wear_monitor.monitor.forecast.forecast import Answer
 from leg_wear_monitor.monitor.forecast.forecaster import Forecaster
@@ -85,9 +85,9 @@ def test_what_encoders_show_tightens_the_forecast_and_the_newest_replaces_the_la
     assert walked(forecaster, [82], worn=1e-4)[0].joints[0].measurements == 0
 
 
-def test_the_monitor_forecasts_and_learns(leg, new_monitor, gait):
+def test_the_monitor_forecasts_and_learns(leg, gait):
     """Over a snapshot, too; wear so fast that it shows."""
-    monitor = new_monitor()
+    monitor = WearMonitor(leg)  # its own: what a person measured is not undone by a snapshot
     reports = monitor.update(gait(14.0))
     assert reports.cycles[3].joints[0].forecast.answer is Answer.NOT_ENOUGH_DATA
     first = reports.cycles[-1].joints[0].forecast

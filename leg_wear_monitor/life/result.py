@@ -7,10 +7,10 @@ import attrs
 import numpy as np
 
 from leg_wear_monitor.data_frame import data_frame
-from leg_wear_monitor.drawable import Drawable
 from leg_wear_monitor.json_text import json_text
 from leg_wear_monitor.life.duty import Duty
 from leg_wear_monitor.mechanism.arrays import Floats
+from leg_wear_monitor.shown import Drawable
 from leg_wear_monitor.wear.cycle_jump import WearRate
 
 if TYPE_CHECKING:

@@ -7,9 +7,9 @@ import attrs
 
 from leg_wear_monitor.configuration.nearest import did_you_mean
 from leg_wear_monitor.configuration.quantity import FieldError, described, quantity
-from leg_wear_monitor.drawable import Drawable
 from leg_wear_monitor.errors import ConfigError
 from leg_wear_monitor.mechanism.clearance import Clearance
+from leg_wear_monitor.shown import Drawable
 
 Vector = tuple[float, float]
 Pose = tuple[float, float, float]

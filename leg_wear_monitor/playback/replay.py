@@ -12,7 +12,6 @@ from leg_wear_monitor.bags.budget import DEFAULT_MB
 from leg_wear_monitor.bags.findings import Finding, RecordingError, Severity
 from leg_wear_monitor.bags.pauses import Block
 from leg_wear_monitor.bags.reader import Recording
-from leg_wear_monitor.drawable import Drawable
 from leg_wear_monitor.errors import printable
 from leg_wear_monitor.mechanism.loader import load_mechanism
 from leg_wear_monitor.monitor.config.parameter_file import NODE, load_config
@@ -24,6 +23,7 @@ from leg_wear_monitor.playback.history import History
 from leg_wear_monitor.playback.result.replay_summary import ReplaySummary
 from leg_wear_monitor.playback.sink import Sink
 from leg_wear_monitor.playback.summary import summary
+from leg_wear_monitor.shown import Drawable
 from leg_wear_monitor.twin.kinds import CRANK, TORQUE
 from leg_wear_monitor.twin.sample import Samples, brings
 from leg_wear_monitor.twin.sampling.settings import SamplingSettings

@@ -106,12 +106,11 @@ def test_a_directory_of_another_study_or_a_damaged_one_is_told(tiny, tmp_path):
 @pytest.mark.plain
 def test_a_motion_that_diverges_is_a_result_with_its_fault(tiny, tmp_path, monkeypatch):
     from leg_wear_monitor.errors import SimulationError
-    from leg_wear_monitor.studies.tasks import response
 
     def diverge(mechanism, settings):
         raise SimulationError("joint G at t = 1 s: pushed through")
 
-    monkeypatch.setattr(response, "run_ensemble", diverge)
+    monkeypatch.setitem(tasks.TASKS, "response", diverge)
     settings = tiny("size", joints=["G"], clearances_m=[1.0e-4])
     assert run_study("size", settings, tmp_path) == 1
     assert load_results(tmp_path).faults == [("0.1 mm", "joint G at t = 1 s: pushed through")]

@@ -5,7 +5,6 @@ from typing import TYPE_CHECKING, Any
 import attrs
 
 from leg_wear_monitor.data_frame import data_frame
-from leg_wear_monitor.drawable import Drawable
 from leg_wear_monitor.dynamics.result.document import joint_document, part_document, trace_document
 from leg_wear_monitor.dynamics.result.parts import (
     EnergyBalance,
@@ -17,6 +16,7 @@ from leg_wear_monitor.dynamics.result.parts import (
 )
 from leg_wear_monitor.dynamics.result.tables import impact_columns, joint_columns, trace_columns
 from leg_wear_monitor.json_text import json_text
+from leg_wear_monitor.shown import Drawable
 from leg_wear_monitor.wear.surfaces import Surfaces
 
 if TYPE_CHECKING:

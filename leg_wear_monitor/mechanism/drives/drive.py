@@ -6,8 +6,8 @@ from typing import Any
 import attrs
 
 from leg_wear_monitor.configuration.quantity import FieldError, choice, described
-from leg_wear_monitor.drawable import Shown
 from leg_wear_monitor.mechanism.materials.sourced import SourcedValue, sourced
+from leg_wear_monitor.shown import Shown
 
 SHAFTS = OUTPUT, MOTOR = ("output", "motor")
 

@@ -7,9 +7,9 @@ from typing import Any
 
 import attrs
 
-from leg_wear_monitor.drawable import Shown
 from leg_wear_monitor.monitor.alarms.alarm import Level
 from leg_wear_monitor.monitor.alarms.guides import guide_of
+from leg_wear_monitor.shown import Shown
 
 
 class _Word(Enum):

@@ -7,7 +7,6 @@ import attrs
 
 from leg_wear_monitor.configuration.strict import structure
 from leg_wear_monitor.data_frame import data_frame
-from leg_wear_monitor.drawable import Drawable
 from leg_wear_monitor.errors import ConfigError
 from leg_wear_monitor.json_text import json_text
 from leg_wear_monitor.monitor.ledger.entry import Measurement
@@ -32,6 +31,7 @@ from leg_wear_monitor.playback.result.recording import (
 )
 from leg_wear_monitor.playback.result.replay_history import ReplayHistory
 from leg_wear_monitor.playback.result.tables import joint_columns
+from leg_wear_monitor.shown import Drawable
 
 if TYPE_CHECKING:
     import pandas as pd

@@ -1,7 +1,6 @@
 """Tasks by name, and their execution in a worker."""
 
 from collections.abc import Callable
-from importlib import import_module
 from typing import Any
 
 import numpy as np
@@ -9,15 +8,18 @@ import numpy as np
 from leg_wear_monitor.errors import SimulationError
 from leg_wear_monitor.mechanism.spec import Mechanism
 from leg_wear_monitor.studies.point import Arrays, code_digest
+from leg_wear_monitor.studies.tasks.exponent import lyapunov_exponent
+from leg_wear_monitor.studies.tasks.leg import drawn_leg_response
+from leg_wear_monitor.studies.tasks.life import wear_life
+from leg_wear_monitor.studies.tasks.response import run_ensemble
+from leg_wear_monitor.studies.tasks.section import poincare_section
 
-Task = Callable[[Mechanism, dict[str, Any]], Arrays]
-
-TASKS = {
-    "response": "response.run_ensemble",
-    "leg": "leg.drawn_leg_response",
-    "life": "life.wear_life",
-    "section": "section.poincare_section",
-    "exponent": "exponent.lyapunov_exponent",
+TASKS: dict[str, Callable[[Mechanism, dict[str, Any]], Arrays]] = {
+    "response": run_ensemble,
+    "leg": drawn_leg_response,
+    "life": wear_life,
+    "section": poincare_section,
+    "exponent": lyapunov_exponent,
 }
 
 
@@ -47,9 +49,7 @@ def compute(task: str, mechanism: Mechanism, settings: dict[str, Any], code: str
     """
     if code_digest() != code:
         raise RuntimeError("a worker has another version of leg_wear_monitor than the study that asks it")
-    module, name = TASKS[task].split(".")
-    run: Task = getattr(import_module(f"leg_wear_monitor.studies.tasks.{module}"), name)
     try:
-        return run(mechanism, settings)
+        return TASKS[task](mechanism, settings)
     except SimulationError as error:
         return {"fault": np.array(str(error))}

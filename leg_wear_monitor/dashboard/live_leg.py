@@ -19,6 +19,7 @@ from leg_wear_monitor.dashboard.received import (
 from leg_wear_monitor.dashboard.source import Content, Freshness, LegPage, Words, words_of
 from leg_wear_monitor.dashboard.trends import Row, Trends
 from leg_wear_monitor.errors import printable
+from leg_wear_monitor.json_text import finite_or_none
 from leg_wear_monitor.playback.result.parts import ReplayStatus
 from leg_wear_monitor.playback.result.replay_summary import ReplaySummary
 
@@ -211,4 +212,4 @@ class LiveLeg:
 def _of_joints(values: Mapping[str, float]) -> dict[str, float | None]:
     """Values by joint, as far as they are numbers and not too many."""
     first = islice(values.items(), MOST)
-    return {printable(joint): value if math.isfinite(value) else None for joint, value in first}
+    return {printable(joint): finite_or_none(value) for joint, value in first}

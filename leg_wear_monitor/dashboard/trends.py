@@ -1,12 +1,12 @@
 """What was heard of a leg over time, in a bounded number of rows."""
 
-import math
 from collections.abc import Iterable, Mapping, Sequence
 from typing import Any
 
 import attrs
 import numpy as np
 
+from leg_wear_monitor.json_text import or_nan
 from leg_wear_monitor.mechanism.arrays import Floats
 from leg_wear_monitor.playback.history import CYCLE_COLUMNS, JOINT_COLUMNS
 from leg_wear_monitor.playback.result.replay_history import ReplayHistory
@@ -78,4 +78,4 @@ def _merged(rows: Sequence[Row]) -> Row:
 
 
 def _column(values: Iterable[float | None]) -> Floats:
-    return np.array([math.nan if value is None else value for value in values], float)
+    return np.array([or_nan(value) for value in values], float)

@@ -11,7 +11,7 @@ from leg_wear_monitor.json_text import json_text
 from leg_wear_monitor.life.duty import Duty
 from leg_wear_monitor.mechanism.arrays import Floats
 from leg_wear_monitor.shown import Drawable
-from leg_wear_monitor.wear.cycle_jump import WearRate
+from leg_wear_monitor.wear.cycle_jump import WearRate, opening
 
 if TYPE_CHECKING:
     import pandas as pd
@@ -61,7 +61,7 @@ class LifePoint:
     @property
     def opened_m(self) -> Floats:
         """Growth of the mean clearances (k,) since new [m]."""
-        return np.asarray(self.depth.mean(axis=2).sum(axis=1))
+        return opening(self.depth)
 
 
 @attrs.frozen(eq=False)

@@ -1,12 +1,12 @@
 """Conversion of reports to serialized output messages, byte-identical live and in replay."""
 
-import math
 from collections.abc import Iterable, Iterator, Sequence
 
 import attrs
 import numpy as np
 from numpy.typing import NDArray
 
+from leg_wear_monitor.json_text import or_nan
 from leg_wear_monitor.mechanism.arrays import Floats
 from leg_wear_monitor.messages import encode
 from leg_wear_monitor.messages.leg_markers import MARKERS
@@ -111,7 +111,7 @@ class Messages:
     def clearances(self, cycle: CycleReport) -> bytes:
         """The message of `CLEARANCES` for a gait cycle."""
         joints = cycle.joints
-        growth = [math.nan if joint.growth_mps is None else joint.growth_mps for joint in joints]
+        growth = [or_nan(joint.growth_mps) for joint in joints]
         row = encode.joint_states(
             [cycle.stamp_ns],
             self._clearances,

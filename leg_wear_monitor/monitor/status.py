@@ -6,6 +6,7 @@ from collections.abc import Iterable, Mapping, Sequence
 import attrs
 
 from leg_wear_monitor.estimate.cause import TorqueExplanation
+from leg_wear_monitor.json_text import or_nan
 from leg_wear_monitor.mechanism.materials.load import BushingLoad
 from leg_wear_monitor.monitor.accounting import Accounting
 from leg_wear_monitor.monitor.alarms.alarm import Level
@@ -108,8 +109,8 @@ def verdict_status(verdict: Verdict) -> Status:
     values |= {f"not_valid_{figure.value}": 1.0 for figure in verdict.not_valid}
     for each in verdict.evidence:
         name = each.name.replace(" ", "_")
-        values[with_unit(name, each.unit)] = _or_nan(each.value)
-        values[with_unit(f"{name}_limit", each.unit)] = _or_nan(each.limit)
+        values[with_unit(name, each.unit)] = or_nan(each.value)
+        values[with_unit(f"{name}_limit", each.unit)] = or_nan(each.limit)
     return Status("verdict", verdict.level, verdict.words, values, verdict.fault_code)
 
 
@@ -186,12 +187,12 @@ def _joint(
     if report is None:
         return Status(f"joint {name}", level, "no whole gait cycle yet", values, code)
     values |= {
-        "growth_m_per_cycle": _or_nan(report.growth_m_per_cycle),
-        "growth_mps": _or_nan(report.growth_mps),
+        "growth_m_per_cycle": or_nan(report.growth_m_per_cycle),
+        "growth_mps": or_nan(report.growth_mps),
         "peak_force_n": report.peak_force_n,
         "p99_force_n": report.p99_force_n,
         "mean_force_n": report.mean_force_n,
-        "impacts": float(_or_nan(report.impacts)),
+        "impacts": float(or_nan(report.impacts)),
         **(_load_values(report.load) if report.load else {}),
     }
     if report.forecast is None:
@@ -272,9 +273,7 @@ def _foot_load(check: FootLoadCheck, evaluation: AlarmEvaluation) -> Status:
     load, alarms = check.load, evaluation.board.alarms
     raised = [alarms[spec.name()] for spec in specs.OF_FOOT_LOAD if alarms[spec.name()].level is not Level.OK]
     level = max((alarm.level for alarm in raised), default=Level.OK)
-    values = {
-        name: _or_nan(value) for name, value in attrs.asdict(load).items() if not isinstance(value, str)
-    }
+    values = {name: or_nan(value) for name, value in attrs.asdict(load).items() if not isinstance(value, str)}
     messages = [FOOT_LOAD_WORDS.get(alarm.kind, f"see: {alarm.name}") for alarm in raised]
     if not messages:
         messages = ["measured" if load.cycles else "no whole gait cycle with samples yet"]
@@ -304,10 +303,6 @@ def _shown(last: CycleReport | None) -> list[str]:
         *(f"{joint} {ClearanceObservation.NOT_OBSERVABLE.value}" for joint in hidden),
         *waiting,
     ]
-
-
-def _or_nan(value: float | None) -> float:
-    return math.nan if value is None else value
 
 
 def _alarms(evaluation: AlarmEvaluation) -> Status:

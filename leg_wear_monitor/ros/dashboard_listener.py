@@ -30,7 +30,7 @@ from leg_wear_monitor.messages.qos import LATCHED, Qos
 from leg_wear_monitor.monitor.config.fitting import fitted
 from leg_wear_monitor.monitor.config.parameters import PARAMETERS, config_from
 from leg_wear_monitor.playback.result.parts import ReplayStatus
-from leg_wear_monitor.ros.running import spin
+from leg_wear_monitor.ros.running import spin, stamp_ns_of
 
 _ASK_AGAIN_S = 2.0
 _HEARD = (outputs.VERDICT, outputs.DIAGNOSTICS, outputs.ALARMS, outputs.FORECAST, outputs.CLEARANCES)
@@ -109,7 +109,7 @@ class _Listener(Node):
         self._hear(
             outputs.DIAGNOSTICS,
             DiagnosticArray,
-            lambda m: leg.take_diagnostics(_stamp_ns(m.header.stamp), _statuses(m)),
+            lambda m: leg.take_diagnostics(stamp_ns_of(m.header.stamp), _statuses(m)),
         )
 
     def _hear(self, output: Output, kind: type, take: Callable[[Any], None]) -> None:
@@ -183,7 +183,3 @@ def _columns(message: JointState) -> dict[str, dict[str, float]]:
         "clearance_m": dict(zip(names, message.position, strict=False)),
         "peak_force_n": dict(zip(names, message.effort, strict=False)),
     }
-
-
-def _stamp_ns(stamp: Any) -> int:
-    return int(stamp.sec) * 1_000_000_000 + int(stamp.nanosec)

@@ -1,7 +1,6 @@
 """Listener of the demo: reports what the monitor publishes, and acknowledges its alarms."""
 
 from collections.abc import Callable
-from typing import Any
 
 from diagnostic_msgs.msg import DiagnosticArray, DiagnosticStatus
 from rclpy.context import Context
@@ -12,7 +11,7 @@ from rclpy.utilities import try_shutdown
 from sensor_msgs.msg import JointState
 from std_srvs.srv import Trigger
 
-from leg_wear_monitor.ros.running import WAKE_S, executor_for
+from leg_wear_monitor.ros.running import WAKE_S, executor_for, stamp_ns_of
 
 _MONITOR = "leg_wear_monitor"
 
@@ -67,7 +66,7 @@ class DemoListener:
         try_shutdown(context=self._context)
 
     def _hear_cycle(self, message: JointState) -> None:
-        self.stamp_ns = _stamp_ns(message.header.stamp)
+        self.stamp_ns = stamp_ns_of(message.header.stamp)
         names = [name.removesuffix("_clearance") for name in message.name]
         self.clearances_m = dict(zip(names, message.position, strict=True))
         clearances = "  ".join(f"{name} {1e6 * c:.3f}" for name, c in self.clearances_m.items())
@@ -81,7 +80,7 @@ class DemoListener:
         for name, status in up.items():
             if name not in self.raised:
                 self.raised.append(name)
-                self._report(_stamp_ns(message.header.stamp), f"ALARM {name}: {_alarm_text(status)}")
+                self._report(stamp_ns_of(message.header.stamp), f"ALARM {name}: {_alarm_text(status)}")
         if up and all(status.message.startswith("latched") for status in up.values()) and not self._asked:
             self._asked = self._service.call_async(Trigger.Request())
             self._asked.add_done_callback(lambda future: self._hear_answer(future, list(up)))
@@ -97,7 +96,3 @@ def _alarm_text(status: DiagnosticStatus) -> str:
     unit = next((key.removeprefix("value_") for key in values if key.startswith("value_")), "")
     suffix = f"_{unit}" if unit else ""
     return f"{float(values[f'value{suffix}']):.5g} {unit.upper()}, limit {values[f'limit{suffix}']}"
-
-
-def _stamp_ns(stamp: Any) -> int:
-    return int(stamp.sec) * 1_000_000_000 + int(stamp.nanosec)

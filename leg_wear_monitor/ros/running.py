@@ -7,7 +7,7 @@ import threading
 from collections.abc import Callable, Iterator, Sequence
 from contextlib import contextmanager, suppress
 from types import FrameType
-from typing import TypeVar
+from typing import Any, TypeVar
 
 import rclpy
 from rclpy.context import Context
@@ -168,3 +168,8 @@ def run(
             node.destroy_node()
         try_shutdown()
     return DONE
+
+
+def stamp_ns_of(stamp: Any) -> int:
+    """Nanoseconds of a message's stamp, also of one that `rclpy.time.Time` refuses."""
+    return int(stamp.sec) * 1_000_000_000 + int(stamp.nanosec)

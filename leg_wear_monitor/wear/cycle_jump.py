@@ -57,7 +57,12 @@ class WearRate:
     @property
     def clearance(self) -> Floats:
         """Growth (k,) of the mean clearance per cycle [m]."""
-        return np.asarray(self.depth.mean(axis=2).sum(axis=1))
+        return opening(self.depth)
+
+
+def opening(depth: Floats) -> Floats:
+    """Growth (…, k) of the mean clearance [m] by wear of depth (…, k, 2, N) [m]."""
+    return np.asarray(depth.mean(axis=-1).sum(axis=-1))
 
 
 def wear_rate(worn: Floats, smooth_deg: float) -> WearRate:
@@ -71,7 +76,7 @@ def wear_rate(worn: Floats, smooth_deg: float) -> WearRate:
         Width of the smoothing window over the angle [deg]: few cycles have contact in few sectors only. The
         worn volume is conserved.
     """
-    growth = worn.mean(axis=3).sum(axis=2)
+    growth = opening(worn)
     scatter = growth.std(axis=0, ddof=1) / math.sqrt(len(worn)) if len(worn) > 1 else np.abs(growth[0])
     return WearRate(smoothed(worn.mean(axis=0), smooth_deg), np.asarray(scatter))
 

@@ -19,7 +19,6 @@ from leg_wear_monitor.monitor.config.settings import LedgerFile, MonitorConfig
 from leg_wear_monitor.monitor.diagnosis.diagnosis import NotUsed
 from leg_wear_monitor.monitor.diagnosis.signed_cycle import find_sensor, signed_cycle
 from leg_wear_monitor.monitor.diagnosis.state import SignedCycle, TorqueState
-from leg_wear_monitor.monitor.diagnosis.torque_samples import after, extended
 from leg_wear_monitor.monitor.reports import CycleReport
 from leg_wear_monitor.monitor.wear_monitor import WearMonitor
 from leg_wear_monitor.twin.follower.load import torque_size
@@ -100,11 +99,11 @@ def walk_of(
     state = TorqueState(np.zeros(len(mechanism.clearance_joints)))
     with Recording(recordings, config, joint_states=joint_states, drive_torque=drive_torque) as recording:
         for block in recording.blocks():
-            state.samples = extended(state.samples, block.samples)
+            state.samples = state.samples.extended(block.samples)
             for one in monitor.update(block.samples).cycles:
                 mismatch.append(one.torque_mismatch)
                 cycles += _signed(state, one, config, size_nm)
-                state.samples = after(state.samples, one.stamp_ns)
+                state.samples = state.samples.after(one.stamp_ns)
     return Walk(mechanism, config, np.array(mismatch), tuple(cycles[_SETTLING:]), state.sensor)
 
 

@@ -28,10 +28,10 @@ from leg_wear_monitor.monitor.diagnosis.reasons import doubt, missing, next_step
 from leg_wear_monitor.monitor.diagnosis.references import LOAD_ROUNDS, References
 from leg_wear_monitor.monitor.diagnosis.signed_cycle import find_sensor, signed_cycle
 from leg_wear_monitor.monitor.diagnosis.state import UNUSED_CYCLES, WINDOW_CYCLES, TorqueState
-from leg_wear_monitor.monitor.diagnosis.torque_samples import NO_TORQUE_SAMPLES, after, extended
+from leg_wear_monitor.monitor.diagnosis.torque_samples import NO_TORQUE_SAMPLES
+from leg_wear_monitor.monitor.kept_samples import KeepsSamples
 from leg_wear_monitor.twin.reference.leg_parameters import LegParameters
 from leg_wear_monitor.twin.reference.torque_reference import TorqueReference, TorqueReferenceSnapshot
-from leg_wear_monitor.twin.sample import Samples
 from leg_wear_monitor.twin.settings import GROUND, MEASURED
 from leg_wear_monitor.twin.statistics import CycleStatistics
 
@@ -45,7 +45,7 @@ class TorqueObserverSnapshot(NamedTuple):
     reference: TorqueReferenceSnapshot | None
 
 
-class TorqueObserver:
+class TorqueObserver(KeepsSamples):
     """Estimates clearances from the drive torque, and detects what changes.
 
     Parameters
@@ -109,10 +109,6 @@ class TorqueObserver:
         """Compute before the first sample what depends on the mechanism alone."""
         self._models.warm_up()
 
-    def add_samples(self, piece: Samples) -> None:
-        """Add samples in the order of arrival."""
-        self.state.samples = extended(self.state.samples, piece)
-
     def ended(self, statistics: CycleStatistics, is_torque_wrong: bool = False) -> None:
         """Note the end of a gait cycle, which is used if the leg walked as commanded with a right torque."""
         rpm = statistics.cadence_rpm
@@ -159,7 +155,7 @@ class TorqueObserver:
         self._follow_counted(counted_m)
         for begin_ns, end_ns in state.due:
             self._evaluate(begin_ns, end_ns)
-        state.samples = after(state.samples, state.due[-1][1] if state.due else 0)
+        state.samples = state.samples.after(state.due[-1][1] if state.due else 0)
         ended, state.due = bool(state.due), ()
         if self._references.advance(state, counted_m, depth):
             self._evidence.review(state, self.config)

@@ -8,11 +8,10 @@ import numpy as np
 from leg_wear_monitor.estimate.signature import TorqueSensor, averaged
 from leg_wear_monitor.mechanism.arrays import Floats, Ints
 from leg_wear_monitor.mechanism.ideal import TURN
-from leg_wear_monitor.twin.kinds import CRANK, TORQUE
+from leg_wear_monitor.monitor.kept_samples import indices_within, is_valid, newest, of_crank
+from leg_wear_monitor.twin.kinds import TORQUE
 from leg_wear_monitor.twin.reference.crank_profile import CrankProfile, cycle_profile
-from leg_wear_monitor.twin.sample import NO_FAULT, Samples, brings
-
-MOST = 20_000  # samples of each kind that are kept: ten seconds at 2 kHz
+from leg_wear_monitor.twin.sample import Samples, brings
 
 _LOST = 1.5  # periods of the sensor: in a longer time between two samples, some were lost
 _LEAST_CRANK_SAMPLES = 40  # in a gait cycle, for its profile
@@ -26,6 +25,24 @@ class TorqueSamples:
     crank_rad: Floats
     torque_ns: Ints
     torque_nm: Floats
+
+    def extended(self, piece: Samples) -> "TorqueSamples":
+        """With the valid ones of a piece."""
+        crank = of_crank(piece)
+        torque = piece[is_valid(piece) & brings(piece, TORQUE) & np.isfinite(piece["torque_nm"])]
+        return TorqueSamples(
+            np.concatenate([self.crank_ns, crank["stamp_ns"]]),
+            np.concatenate([self.crank_rad, crank["crank_angle_rad"]]),
+            np.concatenate([self.torque_ns, torque["stamp_ns"]]),
+            np.concatenate([self.torque_nm, torque["torque_nm"]]),
+        )
+
+    def after(self, stamp_ns: int) -> "TorqueSamples":
+        """Those from a stamp on."""
+        crank, torque = newest(self.crank_ns, stamp_ns), newest(self.torque_ns, stamp_ns)
+        return TorqueSamples(
+            self.crank_ns[crank], self.crank_rad[crank], self.torque_ns[torque], self.torque_nm[torque]
+        )
 
 
 NO_TORQUE_SAMPLES = TorqueSamples(np.zeros(0, np.int64), np.zeros(0), np.zeros(0, np.int64), np.zeros(0))
@@ -47,28 +64,6 @@ class CycleTorque(NamedTuple):
     period_s: float
     late: float
     jitter: float
-
-
-def extended(kept: TorqueSamples, piece: Samples) -> TorqueSamples:
-    """Samples extended by the valid ones of a piece."""
-    piece = piece[(piece["fault"] == NO_FAULT) & (piece["stamp_ns"] > 0)]
-    crank = piece[(piece["kind"] == CRANK) & np.isfinite(piece["crank_angle_rad"])]
-    torque = piece[brings(piece, TORQUE) & np.isfinite(piece["torque_nm"])]
-    return TorqueSamples(
-        np.concatenate([kept.crank_ns, crank["stamp_ns"]]),
-        np.concatenate([kept.crank_rad, crank["crank_angle_rad"]]),
-        np.concatenate([kept.torque_ns, torque["stamp_ns"]]),
-        np.concatenate([kept.torque_nm, torque["torque_nm"]]),
-    )
-
-
-def after(kept: TorqueSamples, stamp_ns: int) -> TorqueSamples:
-    """Samples from a stamp on, at most `MOST` of each kind."""
-    crank = np.flatnonzero(kept.crank_ns >= stamp_ns)[-MOST:]
-    torque = np.flatnonzero(kept.torque_ns >= stamp_ns)[-MOST:]
-    return TorqueSamples(
-        kept.crank_ns[crank], kept.crank_rad[crank], kept.torque_ns[torque], kept.torque_nm[torque]
-    )
 
 
 def sensor_period_s(kept: TorqueSamples, begin_ns: int, end_ns: int) -> float:
@@ -105,7 +100,6 @@ def cycle_torque(kept: TorqueSamples, begin_ns: int, end_ns: int, sensor: Torque
 
 
 def _between(stamps: Ints, values: Floats, begin_ns: int, end_ns: int) -> tuple[Ints, Floats]:
-    """Stamps and values of a time, in order; of equal stamps the first that arrived."""
-    there, first = np.unique(stamps, return_index=True)
-    inside = (there >= begin_ns) & (there < end_ns)
-    return there[inside], values[first[inside]]
+    """Stamps and values of a time, in order."""
+    which = indices_within(stamps, begin_ns, end_ns)
+    return stamps[which], values[which]

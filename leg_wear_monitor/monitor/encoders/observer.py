@@ -26,13 +26,13 @@ from leg_wear_monitor.monitor.encoders.clearance_regression import (
     ClearanceRegressionSnapshot,
 )
 from leg_wear_monitor.monitor.encoders.commissioning import commissioned, errors_of, held, known_with
-from leg_wear_monitor.monitor.encoders.samples import after, extended, no_encoder_samples, within
+from leg_wear_monitor.monitor.encoders.samples import no_encoder_samples, within
 from leg_wear_monitor.monitor.encoders.state import LEAST_PHASES, EncoderState, fault_of
+from leg_wear_monitor.monitor.kept_samples import KeepsSamples
 from leg_wear_monitor.monitor.ledger.entry import Commissioned
 from leg_wear_monitor.twin.reference.crank_profile import cycle_profile, mean_profile
 from leg_wear_monitor.twin.reference.joint_angles import angle_model
 from leg_wear_monitor.twin.reference.reference import ReferenceRun, ReferenceSnapshot
-from leg_wear_monitor.twin.sample import Samples
 from leg_wear_monitor.twin.statistics import CycleStatistics
 
 OTHERWISE_CYCLES = 20  # in a row with other encoders than before, until the change is accepted
@@ -52,7 +52,7 @@ class EncoderSnapshot(NamedTuple):
     reference: ReferenceSnapshot
 
 
-class EncoderObserver:
+class EncoderObserver(KeepsSamples):
     """Estimates clearances from further encoders, and the encoders' errors while they are new.
 
     Parameters
@@ -108,10 +108,6 @@ class EncoderObserver:
             self.state.asked and not self._reference.is_busy and self._clearance_regression.reference is None
         )
 
-    def add_samples(self, piece: Samples) -> None:
-        """Add samples in the order of arrival."""
-        self.state.samples = extended(self.state.samples, piece)
-
     def ended(self, statistics: CycleStatistics) -> None:
         """Note the end of a gait cycle, which is used if the leg walked as commanded."""
         if statistics.is_steady and self.config.cadence.allows(statistics.cadence_rpm):
@@ -136,7 +132,7 @@ class EncoderObserver:
         for begin_ns, end_ns in state.due:
             self._add_cycle(begin_ns, end_ns)
             new = self._evaluate(end_ns) or new
-        state.samples = after(state.samples, state.due[-1][1] if state.due else 0)
+        state.samples = state.samples.after(state.due[-1][1] if state.due else 0)
         state.due = ()
         self._refer(clearance_m, depth)
         return new

@@ -10,6 +10,7 @@ from typing import TYPE_CHECKING, Any, Generic, TypeVar
 
 import attrs
 
+from leg_wear_monitor.json_text import or_nan
 from leg_wear_monitor.monitor.alarms.alarm import Alarm, Limit
 from leg_wear_monitor.monitor.alarms.fault_codes import (
     EXCHANGED,
@@ -62,10 +63,6 @@ def _usual(alarms: "Alarms") -> int:
 
 def _knock(alarms: "Alarms") -> int:
     return alarms.knock_on_delay_cycles
-
-
-def _or_nan(value: float | None) -> float:
-    return math.nan if value is None else value
 
 
 @attrs.frozen(kw_only=True)
@@ -171,7 +168,7 @@ MATERIAL: "AlarmSpec[JointReport]" = AlarmSpec(
     meaning="largest of pressure (99th percentile), sliding speed and p v (means) of the gait cycle, as a "
     "fraction of the limits of the joint's material. Only with a material that has limits",
     limit_words="1, the limits of the material",
-    value=lambda joint: _or_nan(joint.load.fraction if joint.load else None),
+    value=lambda joint: or_nan(joint.load.fraction if joint.load else None),
     limit=lambda _: 1.0,
 )
 DEPARTURE: "AlarmSpec[JointReport]" = AlarmSpec(

@@ -1,6 +1,5 @@
 """Entries and events as rows of the ledger's tables, and back."""
 
-import math
 import sqlite3
 
 import attrs
@@ -8,6 +7,7 @@ import numpy as np
 
 from leg_wear_monitor.estimate.commissioned_torque import CommissionedTorque
 from leg_wear_monitor.estimate.signature import Channel
+from leg_wear_monitor.json_text import finite_or_none, or_nan
 from leg_wear_monitor.mechanism.arrays import Floats
 from leg_wear_monitor.monitor.alarms.alarm import Alarm, Level
 from leg_wear_monitor.monitor.ledger.entry import (
@@ -420,7 +420,7 @@ def alarm_values(alarm: Alarm) -> list[str | int | float | None]:
     found = (alarm.worst, alarm.limit, alarm.sigma)
     return [
         alarm.kind, alarm.subject, int(alarm.level), int(alarm.present), bool(alarm.acknowledged),
-        alarm.raised_ns, *(value if math.isfinite(value) else None for value in found), alarm.cause,
+        alarm.raised_ns, *map(finite_or_none, found), alarm.cause,
     ]  # fmt: skip
 
 
@@ -440,6 +440,5 @@ def alarm_of(
     return Alarm(
         kind=kind, subject=subject, level=Level(level), present=Level(present),
         acknowledged=bool(acknowledged), raised_ns=raised_ns, cause=cause,
-        worst=math.nan if worst is None else worst, limit=math.nan if limit is None else limit,
-        sigma=math.nan if sigma is None else sigma,
+        worst=or_nan(worst), limit=or_nan(limit), sigma=or_nan(sigma),
     )  # fmt: skip

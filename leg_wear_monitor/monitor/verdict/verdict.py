@@ -1,12 +1,12 @@
 """A verdict and the findings it is made of; everything here is immutable."""
 
-import math
 from collections.abc import Iterable, Sequence
 from enum import Enum
 from typing import Any
 
 import attrs
 
+from leg_wear_monitor.json_text import finite_or_none
 from leg_wear_monitor.monitor.alarms.alarm import Level
 from leg_wear_monitor.monitor.alarms.guides import guide_of
 from leg_wear_monitor.shown import Shown
@@ -54,10 +54,6 @@ class Figure(_Word):
         return "counted clearances" if self is Figure.CLEARANCES else super().words
 
 
-def _known(value: float | None) -> float | None:
-    return None if value is None or not math.isfinite(value) else value
-
-
 @attrs.frozen
 class Evidence:
     """A value that a finding rests on, and its limit.
@@ -75,8 +71,8 @@ class Evidence:
     """
 
     name: str
-    value: float | None = attrs.field(converter=_known)
-    limit: float | None = attrs.field(converter=_known)
+    value: float | None = attrs.field(converter=finite_or_none)
+    limit: float | None = attrs.field(converter=finite_or_none)
     unit: str
 
 

@@ -1,11 +1,11 @@
 """The leg after a replay: joints, remaining life, alarms, status; SI units, None for what is not known."""
 
-import math
 from collections.abc import Mapping
 from typing import Any
 
 import attrs
 
+from leg_wear_monitor.json_text import finite_or_none
 from leg_wear_monitor.mechanism.arrays import Floats
 from leg_wear_monitor.mechanism.materials.load import BushingLoad
 from leg_wear_monitor.monitor.alarms.alarm import Level
@@ -13,22 +13,18 @@ from leg_wear_monitor.monitor.encoders.clearance_estimate import ClearanceObserv
 from leg_wear_monitor.monitor.forecast.forecast import Answer, JointForecast, Quantiles
 
 
-def _known(value: float | None) -> float | None:
-    return None if value is None or not math.isfinite(value) else float(value)
-
-
 def _known_values(values: Mapping[str, float | None]) -> dict[str, float | None]:
-    return {name: _known(value) for name, value in values.items()}
+    return {name: finite_or_none(value) for name, value in values.items()}
 
 
 def _perhaps() -> Any:
     """Attrs field for a number that may not be known: NaN and infinity become None."""
-    return attrs.field(converter=_known)
+    return attrs.field(converter=finite_or_none)
 
 
 def _perhaps_none() -> Any:
     """The same for a number that files of older versions do not have."""
-    return attrs.field(default=None, converter=_known)
+    return attrs.field(default=None, converter=finite_or_none)
 
 
 @attrs.frozen

@@ -6,7 +6,8 @@ from typing import Any
 
 import attrs
 
-from leg_wear_monitor.studies.plan.study import Ensemble
+from leg_wear_monitor.studies.plan.keys import Names, clearance_field, clearance_joints_field, speed_field
+from leg_wear_monitor.studies.plan.study import Ensemble, Study
 from leg_wear_monitor.studies.point import Point, Settings
 
 _EACH_JOINT = 0.7  # cost of each further clearance joint, relative to the first
@@ -45,3 +46,20 @@ def response(label: str, where: Settings, ensemble: Ensemble) -> Point:
     each = cycles * cycle_cost(where) + _MOMENTS * ensemble.traced_cycles
     settings = where | attrs.asdict(ensemble)
     return Point(label=label, task="response", settings=settings, cost=ensemble.runs * each)
+
+
+@attrs.frozen(kw_only=True)
+class OnePlace(Study):
+    """Base of studies with one set of clearance joints, one clearance and one speed."""
+
+    joints: Names = clearance_joints_field()
+    clearance_m: float = clearance_field()
+    speed_rpm: float = speed_field()
+
+    def place(self, **more: Any) -> Settings:
+        """Settings of a run there."""
+        return place(self.joints, self.clearance_m, self.speed_rpm, **more)
+
+    def response(self, label: str, **more: Any) -> Point:
+        """Response point there."""
+        return response(label, self.place(**more), self.ensemble)

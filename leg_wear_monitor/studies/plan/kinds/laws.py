@@ -1,20 +1,11 @@
 """Study ``laws``: the laws of normal force and friction against each other."""
 
-from typing import Any
-
 import attrs
 
 from leg_wear_monitor.configuration.quantity import described, quantity
 from leg_wear_monitor.mechanism.law_names import FRICTION_LAWS, NORMAL_LAWS
-from leg_wear_monitor.studies.plan.keys import (
-    Names,
-    clearance_field,
-    clearance_joints_field,
-    some_of,
-    speed_field,
-)
-from leg_wear_monitor.studies.plan.responses import place, response
-from leg_wear_monitor.studies.plan.study import Study
+from leg_wear_monitor.studies.plan.keys import Names, some_of
+from leg_wear_monitor.studies.plan.responses import OnePlace
 from leg_wear_monitor.studies.point import Point
 
 # the laws of Hertz's elastic force, which differ in damping only; winkler has another elastic force and is
@@ -23,15 +14,12 @@ _OF_HERTZ = tuple(law for law in NORMAL_LAWS if law != "winkler")
 
 
 @attrs.frozen(kw_only=True)
-class Laws(Study):
+class Laws(OnePlace):
     """The normal force and friction laws against each other."""
 
     title = "Contact and friction laws"
     question = "How much do results depend on the laws of normal force and friction?"
 
-    joints: Names = clearance_joints_field()
-    clearance_m: float = clearance_field()
-    speed_rpm: float = speed_field()
     normal_laws: Names = described("laws of the normal force", default=_OF_HERTZ, check=some_of(NORMAL_LAWS))
     friction_laws: Names = described(
         "ramps of friction, each with the mechanism's own normal law",
@@ -48,13 +36,9 @@ class Laws(Study):
 
     def points(self) -> list[Point]:
         """Responses by the normal laws, the friction ramps and the friction coefficients."""
-        points = [self._response(law, normal_law=law) for law in self.normal_laws]
-        points += [self._response(f"friction {law}", friction={"law": law}) for law in self.friction_laws]
+        points = [self.response(law, normal_law=law) for law in self.normal_laws]
+        points += [self.response(f"friction {law}", friction={"law": law}) for law in self.friction_laws]
         return points + [
-            self._response(f"friction coefficient {value:g}", friction={"coefficient": value})
+            self.response(f"friction coefficient {value:g}", friction={"coefficient": value})
             for value in self.friction_coefficients
         ]
-
-    def _response(self, label: str, **more: Any) -> Point:
-        where = place(self.joints, self.clearance_m, self.speed_rpm, **more)
-        return response(label, where, self.ensemble)

@@ -3,22 +3,15 @@
 import attrs
 
 from leg_wear_monitor.configuration.quantity import described, quantity
-from leg_wear_monitor.studies.plan.keys import (
-    Names,
-    check_rising,
-    clearance_field,
-    clearance_joints_field,
-    speed_field,
-)
+from leg_wear_monitor.studies.plan.keys import check_rising
 from leg_wear_monitor.studies.plan.kinds.chaos import Exponent, exponent_point
 from leg_wear_monitor.studies.plan.kinds.wear import Life, life_point
-from leg_wear_monitor.studies.plan.responses import place, response
-from leg_wear_monitor.studies.plan.study import Study
+from leg_wear_monitor.studies.plan.responses import OnePlace, response
 from leg_wear_monitor.studies.point import Point
 
 
 @attrs.frozen(kw_only=True)
-class Load(Study):
+class Load(OnePlace):
     """The same leg under forces of the ground of several sizes, in the stance of a person."""
 
     title = "Load of the ground"
@@ -27,9 +20,6 @@ class Load(Study):
         "which order they wear, in how long they last, and in the disorder of the motion?"
     )
 
-    joints: Names = clearance_joints_field()
-    clearance_m: float = clearance_field()
-    speed_rpm: float = speed_field()
     loads_n: tuple[float, ...] = quantity(
         "N",
         "largest vertical forces of the ground on the toe in stance, one per point; 0 in the air",
@@ -44,7 +34,7 @@ class Load(Study):
         """Response, life and Lyapunov exponent under each load."""
         points = []
         for load_n in self.loads_n:
-            where = place(self.joints, self.clearance_m, self.speed_rpm, ground_n=load_n)
+            where = self.place(ground_n=load_n)
             label = f"{load_n:g} N"
             points += [
                 response(label, where, self.ensemble),

@@ -1,24 +1,15 @@
 """Study ``lubrication``: joints dry, and with oil or grease of several viscosities."""
 
-from typing import Any
-
 import attrs
 
 from leg_wear_monitor.configuration.quantity import quantity
-from leg_wear_monitor.studies.plan.keys import (
-    Names,
-    check_rising,
-    clearance_field,
-    clearance_joints_field,
-    speed_field,
-)
-from leg_wear_monitor.studies.plan.responses import place, response
-from leg_wear_monitor.studies.plan.study import Study
+from leg_wear_monitor.studies.plan.keys import check_rising
+from leg_wear_monitor.studies.plan.responses import OnePlace
 from leg_wear_monitor.studies.point import Point
 
 
 @attrs.frozen(kw_only=True)
-class Lubrication(Study):
+class Lubrication(OnePlace):
     """The same joints dry and greased, with the same wear coefficient where surfaces touch."""
 
     title = "Oil and grease"
@@ -27,9 +18,6 @@ class Lubrication(Study):
         "and in how long it lasts?"
     )
 
-    joints: Names = clearance_joints_field()
-    clearance_m: float = clearance_field()
-    speed_rpm: float = speed_field()
     viscosities_pa_s: tuple[float, ...] = quantity(
         "Pa s", "viscosities, one per point beside the dry one", above=0.0, check=check_rising
     )
@@ -44,10 +32,6 @@ class Lubrication(Study):
             for viscosity in self.viscosities_pa_s
         ]
         return [
-            self._response("dry"),
-            *(self._response(f"{film['viscosity_pa_s']:g} Pa s", film=film) for film in films),
+            self.response("dry"),
+            *(self.response(f"{film['viscosity_pa_s']:g} Pa s", film=film) for film in films),
         ]
-
-    def _response(self, label: str, **more: Any) -> Point:
-        where = place(self.joints, self.clearance_m, self.speed_rpm, **more)
-        return response(label, where, self.ensemble)

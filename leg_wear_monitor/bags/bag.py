@@ -14,7 +14,7 @@ from leg_wear_monitor.bags.findings import DamageError, Finding, RecordingError,
 from leg_wear_monitor.bags.metadata import METADATA, read_metadata
 from leg_wear_monitor.bags.regular_file import kind_of
 
-MCAP, SQLITE, CSV, PARQUET, IN_MEMORY = ".mcap", ".db3", ".csv", ".parquet", ""
+MCAP, CSV, PARQUET, IN_MEMORY = ".mcap", ".csv", ".parquet", ""
 TABLES = (CSV, PARQUET, IN_MEMORY)
 _NAME = re.compile(r".*(\.mcap|\.db3)(\.zstd)?", re.DOTALL)
 _TABLE = re.compile(r".*(\.csv|\.parquet)(\.zstd)?", re.DOTALL | re.IGNORECASE)

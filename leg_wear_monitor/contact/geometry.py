@@ -1,7 +1,5 @@
 """Geometry of the contact of journal and bushing, and its elastic modulus (physics.md sections 3 to 5)."""
 
-import math
-
 from leg_wear_monitor.kernel import kernel
 from leg_wear_monitor.vectors import LEAST_DIVISOR, largest, root, where
 
@@ -46,19 +44,6 @@ def worn_contact(ex, ey, clearance, slope, bend):
     by_slope = by_slope * (_SHARPEST / largest(abs(by_slope * bend * inverse), _SHARPEST))
     outwards, back = scale + by_slope * tilt, scale * tilt + by_slope * bend * inverse
     return delta * scale, outwards * rx + back * ry, outwards * ry - back * rx, scale, by_slope
-
-
-@kernel
-def contact_half_angle(eccentricity, bushing_radius, journal_radius):
-    """Half angle psi [rad] of the contact arc of bushing and journal at an eccentricity [m]; radii in m.
-
-    The two circles intersect at cos psi = (R_b^2 + e^2 - R_j^2) / (2 R_b e); 0 if they do not intersect.
-    physics.md section 5.
-    """
-    if eccentricity <= bushing_radius - journal_radius:
-        return 0.0
-    cosine = (bushing_radius**2 + eccentricity**2 - journal_radius**2) / (2.0 * bushing_radius * eccentricity)
-    return math.acos(max(-1.0, min(1.0, cosine)))
 
 
 def contact_modulus(youngs_b: float, poisson_b: float, youngs_j: float, poisson_j: float) -> float:

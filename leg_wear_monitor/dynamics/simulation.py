@@ -28,7 +28,7 @@ from leg_wear_monitor.mechanism.ideal import TURN, check_cycle
 from leg_wear_monitor.mechanism.plausible import suspects
 from leg_wear_monitor.mechanism.position import build_linkage
 from leg_wear_monitor.mechanism.spec import Mechanism, SpeedDrive, TorqueDrive
-from leg_wear_monitor.wear.surfaces import SECTORS, fresh_surfaces
+from leg_wear_monitor.wear.surfaces import fresh_surfaces
 
 MODELS: dict[str, Callable[[Setup], Traceable]] = {"clearance": ClearanceRun, "full": FullRun}
 
@@ -53,7 +53,6 @@ def prepare(
     speed_rpm: float | None = None,
     wear: bool = False,
     normal_law: str | None = None,
-    sectors: int = SECTORS,
 ) -> Setup:
     """Check that a mechanism can move, and prepare it for a run; parameters as in `simulate`.
 
@@ -84,7 +83,7 @@ def prepare(
         clearance_joints,
         contacts,
         compile_films(settings),
-        fresh_surfaces(contacts, wear, sectors),
+        fresh_surfaces(contacts, wear),
         _speed(mechanism, speed_rpm),
     )
 

@@ -62,8 +62,6 @@ class GroundLoad:
         Size of the template, the largest vertical force of its shape.
     heel_strike, toe_off : float
         Crank angle at the begin and at the end of stance, as a fraction of a turn.
-    timing_sigma : float
-        Standard deviation of both.
     load_friction : float
         Friction of the drive over the size of the torque that it transmits.
     square, without : float
@@ -75,7 +73,6 @@ class GroundLoad:
     peak_sigma_n: float
     heel_strike: float
     toe_off: float
-    timing_sigma: float
     load_friction: float
     square: float
     without: float
@@ -209,7 +206,6 @@ def ground_load(
         peak_sigma_n=_UNIT_N * float(sigma[0]),
         heel_strike=stance.heel_strike % 1.0,
         toe_off=stance.toe_off % 1.0,
-        timing_sigma=_TIMING * float(sigma[1:3].max()),
         load_friction=leg.load_friction(x),
         square=best.point.square / phases,
         without=without / phases,

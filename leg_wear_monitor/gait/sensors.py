@@ -26,13 +26,10 @@ from leg_wear_monitor.gait.leg import SyntheticLeg
 from leg_wear_monitor.mechanism.ideal import TURN
 from leg_wear_monitor.twin.kinds import CRANK, LOAD, TORQUE
 from leg_wear_monitor.twin.sample import (
-    ENCODERS,
     FAULTS,
-    GAIT_SAMPLE,
     NO_FAULT,
     OUT_OF_RANGE,
     WRONG_TYPE,
-    Samples,
 )
 
 _CONTACT_N = 20.0  # force from which a switch closes
@@ -81,26 +78,6 @@ class Noise:
 def readings(leg: SyntheticLeg, config: GaitConfig) -> Iterator[Reading]:
     """Readings of the leg in order of arrival; endless unless the configuration sets a duration."""
     return _arriving(_taken(leg, config), config.transport, Noise([config.seed, 3]))
-
-
-def samples(block: Iterable[Reading], start_ns: int) -> Samples:
-    """Convert readings to input samples of a monitor, (n,) of GAIT_SAMPLE; time 0 is ``start_ns``."""
-    rows = [
-        (
-            stamp_ns(reading, start_ns),
-            reading.kind,
-            reading.fault,
-            *reading[4:7],
-            _four(reading.encoder_rad),
-            reading.foot_force_n,
-        )
-        for reading in block
-    ]
-    return np.array(rows, dtype=GAIT_SAMPLE)
-
-
-def _four(angles: tuple[float, ...]) -> tuple[float, ...]:
-    return (*angles, *(math.nan,) * (ENCODERS - len(angles)))
 
 
 def stamp_ns(reading: Reading, start_ns: int) -> int:

@@ -11,7 +11,6 @@ JOINT_STATE = "sensor_msgs/msg/JointState"
 WRENCH_STAMPED = "geometry_msgs/msg/WrenchStamped"
 DIAGNOSTIC_ARRAY = "diagnostic_msgs/msg/DiagnosticArray"
 FLOAT64 = "std_msgs/msg/Float64"
-BOOL = "std_msgs/msg/Bool"
 MARKER_ARRAY = "visualization_msgs/msg/MarkerArray"
 
 LITTLE_ENDIAN = b"\0\1\0\0"

@@ -68,10 +68,10 @@ class LegDrawing:
         return round(crank_angle / TURN * _STEPS) % _STEPS
 
 
-def circle(radius: float, points: int = 33) -> Floats:
-    """Closed circle (points, 3) [m] in the plane of the leg."""
-    angle = TURN / (points - 1) * np.arange(points)
-    return radius * np.stack([np.cos(angle), np.zeros(points), np.sin(angle)], axis=1)
+def circle(radius: float) -> Floats:
+    """Closed circle (33, 3) [m] in the plane of the leg."""
+    angle = np.linspace(0.0, TURN, 33)
+    return radius * np.stack([np.cos(angle), np.zeros_like(angle), np.sin(angle)], axis=1)
 
 
 def in_rep_103(plane: Floats) -> Floats:

@@ -72,10 +72,10 @@ def depth_per_cycle(arrays: Arrays, joint: str) -> Spread:
     )
 
 
-def mean_profile(arrays: Arrays, joint: str, surface: int = BUSHING) -> Floats:
-    """Mean wear depth per cycle (N,) [m] of a joint's bushing or journal."""
+def mean_profile(arrays: Arrays, joint: str) -> Floats:
+    """Mean wear depth per cycle (N,) [m] of a joint's bushing."""
     return np.asarray(
-        arrays["wear_depth_m_per_cycle"][:, clearance_joints_of(arrays).index(joint), surface].mean(axis=0)
+        arrays["wear_depth_m_per_cycle"][:, clearance_joints_of(arrays).index(joint), BUSHING].mean(axis=0)
     )
 
 

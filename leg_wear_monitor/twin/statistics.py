@@ -97,7 +97,7 @@ class TorqueStatistics:
     ----------
     samples : int
         Number of compared torque samples; if 0, all values up to ``condition`` are NaN.
-    measured_rms_nm, predicted_rms_nm, residual_mean_nm, residual_rms_nm : float
+    measured_rms_nm, predicted_rms_nm, residual_rms_nm : float
     unexplained_rms_nm : float
         RMS of the residual that repeats over the last compared gait cycles, without the parts of foot load,
         frictions and lag and without what scatters from cycle to cycle: the mismatch of the model.
@@ -122,7 +122,6 @@ class TorqueStatistics:
     samples: int
     measured_rms_nm: float
     predicted_rms_nm: float
-    residual_mean_nm: float
     residual_rms_nm: float
     unexplained_rms_nm: float
     condition: float
@@ -209,10 +208,8 @@ class CycleStatistics:
         Integral of ``F_N |v_t| dt``.
     clearance_mean_m, clearance_max_m : array
         Radial clearances at its end.
-    growth_mean_m, growth_max_m : array
-        Changes of these two over the cycle.
-    depth_max_m : (k, 2) array
-        Greatest wear depth of bushing and journal.
+    growth_mean_m : array
+        Change of the first over the cycle.
     torque : TorqueStatistics
     torque_profile : TorqueProfile
     is_followed : bool
@@ -241,8 +238,6 @@ class CycleStatistics:
     clearance_mean_m: Floats
     clearance_max_m: Floats
     growth_mean_m: Floats
-    growth_max_m: Floats
-    depth_max_m: Floats
     torque: TorqueStatistics
     torque_profile: TorqueProfile
     is_followed: bool = True

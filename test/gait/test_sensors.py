@@ -8,11 +8,12 @@ import numpy as np
 import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
+from readings_as_samples import samples
 
 from leg_wear_monitor.dynamics.run.drive import CrankMotion
 from leg_wear_monitor.gait.config import EncoderConfig, GaitConfig, TorqueSensorConfig, TransportConfig
 from leg_wear_monitor.gait.leg import Instant
-from leg_wear_monitor.gait.sensors import Reading, readings, samples
+from leg_wear_monitor.gait.sensors import Reading, readings
 from leg_wear_monitor.twin.kinds import CRANK, TORQUE
 from leg_wear_monitor.twin.sample import NO_FAULT
 

@@ -4,12 +4,13 @@ from collections.abc import Callable
 
 import numpy as np
 import pytest
+from readings_as_samples import samples
 
 import leg_wear_monitor as lw
 from leg_wear_monitor.errors import ConfigError
 from leg_wear_monitor.gait.config import FootLoadSensorConfig, GaitConfig, LoadConfig
 from leg_wear_monitor.gait.leg import SyntheticLeg
-from leg_wear_monitor.gait.sensors import readings, samples
+from leg_wear_monitor.gait.sensors import readings
 from leg_wear_monitor.mechanism.ground_reaction import nominal_stance
 from leg_wear_monitor.mechanism.position import build_linkage
 from leg_wear_monitor.monitor.alarms.alarm import Level

@@ -7,11 +7,12 @@ import numpy as np
 import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
+from readings_as_samples import samples
 
 from leg_wear_monitor.errors import ConfigError, LegWearError
 from leg_wear_monitor.gait.config import GaitConfig, KnockConfig
 from leg_wear_monitor.gait.leg import SyntheticLeg
-from leg_wear_monitor.gait.sensors import readings, samples
+from leg_wear_monitor.gait.sensors import readings
 from leg_wear_monitor.monitor.alarms.alarm import Level
 from leg_wear_monitor.monitor.config.fitting import twin_settings
 from leg_wear_monitor.monitor.config.parameters import changed, config_from

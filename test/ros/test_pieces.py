@@ -6,13 +6,14 @@ import numpy as np
 import pytest
 from hypothesis import given
 from hypothesis import strategies as st
+from readings_as_samples import samples
 
 pytest.importorskip("rclpy")
 
 from mcap.reader import make_reader
 from rclpy.serialization import serialize_message
 
-from leg_wear_monitor.gait.sensors import Reading, samples
+from leg_wear_monitor.gait.sensors import Reading
 from leg_wear_monitor.messages.decode import Decoder
 from leg_wear_monitor.messages.qos import SENSOR_DATA
 from leg_wear_monitor.messages.streams import JOINT_STATE, STREAMS, WRENCH_STAMPED

@@ -7,7 +7,6 @@ import pytest
 from hypothesis import assume, given
 from hypothesis import strategies as st
 
-from leg_wear_monitor.contact.geometry import contact_half_angle
 from leg_wear_monitor.wear.surfaces import (
     BUSHING,
     JOURNAL,
@@ -92,7 +91,8 @@ def test_volume_is_archards_to_rounding(joint, contacts, feeds_back, seed):
 def test_a_fresh_contact_wears_the_arc_of_the_two_circles(joint, direction, delta, angle_b, angle_j):
     surfaces = fresh_surfaces(joint, True)
     _rub(joint, surfaces, direction, delta, angle_b, angle_j)
-    psi = contact_half_angle(CLEARANCE + delta, RADIUS, RADIUS - CLEARANCE)
+    off, journal = CLEARANCE + delta, RADIUS - CLEARANCE
+    psi = math.acos((RADIUS**2 + off**2 - journal**2) / (2.0 * RADIUS * off))  # the two circles meet there
     sector = TURN / SECTORS
     for side, body in ((BUSHING, angle_b), (JOURNAL, angle_j)):
         profile = surfaces.depth[0, side]

@@ -35,11 +35,11 @@ class Chunk:
     content: bytearray = attrs.Factory(bytearray)
     indexes: dict[int, list[NDArray[Any]]] = attrs.Factory(dict)
 
-    def add(self, channel: int, log_time_ns: int, publish_time_ns: int, raw: bytes) -> None:
+    def add(self, channel: int, log_time_ns: int, raw: bytes) -> None:
         """Add one message."""
         self._note(channel, log_time_ns, len(self.content))
         length = _HEAD_OF_MESSAGE + len(raw)
-        self.content += _MESSAGE.pack(Opcode.MESSAGE, length, channel, 0, log_time_ns, publish_time_ns)
+        self.content += _MESSAGE.pack(Opcode.MESSAGE, length, channel, 0, log_time_ns, log_time_ns)
         self.content += raw
 
     def add_many(self, channel: int, log_time_ns: NDArray[np.int64], messages: NDArray[np.uint8]) -> None:

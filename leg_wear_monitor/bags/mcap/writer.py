@@ -99,7 +99,7 @@ class McapWriter:
         self._chunk.content += _written(channel)
         return number
 
-    def write(self, channel: int, log_time_ns: int, raw: bytes, publish_time_ns: int | None = None) -> None:
+    def write(self, channel: int, log_time_ns: int, raw: bytes) -> None:
         """Add one serialized message.
 
         Parameters
@@ -109,11 +109,8 @@ class McapWriter:
             Time of reception [ns].
         raw : bytes
             CDR with its encapsulation header.
-        publish_time_ns : int, optional
-            Time of sending [ns]; default: the log time.
         """
-        sent = log_time_ns if publish_time_ns is None else publish_time_ns
-        self._chunk.add(channel, log_time_ns, sent, raw)
+        self._chunk.add(channel, log_time_ns, raw)
         self._counts[channel] += 1
         if len(self._chunk.content) >= self._chunk_bytes:
             self.flush()

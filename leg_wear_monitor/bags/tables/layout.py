@@ -1,6 +1,5 @@
 """Which columns of a table are read, in which units, and which of them it has."""
 
-import math
 from collections.abc import Sequence
 
 import attrs
@@ -131,8 +130,3 @@ def places(source: str, names: Sequence[str], columns: Sequence[Column]) -> list
 def _listed(names: Sequence[str]) -> str:
     more = f" and {len(names) - _MOST_LISTED} more" if len(names) > _MOST_LISTED else ""
     return ", ".join(printable(name, 100) for name in names[:_MOST_LISTED]) + more
-
-
-def not_measured(n: int) -> tuple[Floats, NDArray[np.bool_]]:
-    """Values and mask of n rows without a measurement."""
-    return np.full(n, math.nan), np.zeros(n, bool)

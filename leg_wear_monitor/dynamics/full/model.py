@@ -81,13 +81,12 @@ def full_model(
     contacts: ContactArrays,
     driven: bool,
     films: Floats | None = None,
-    baumgarte: float = BAUMGARTE,
 ) -> FullModel:
     """Model with the clearance joints of ``contacts`` and all other joints ideal."""
     ideal = [joint for joint in range(len(arrays.joint_kind)) if joint not in contacts.joint]
     if films is None:
         films = np.zeros((len(contacts.joint), 2))
-    return FullModel(arrays, select_rows(arrays, ideal, driven), contacts, films, baumgarte)
+    return FullModel(arrays, select_rows(arrays, ideal, driven), contacts, films, BAUMGARTE)
 
 
 def full_scratch(model: FullModel) -> FullScratch:

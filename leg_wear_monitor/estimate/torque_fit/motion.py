@@ -50,11 +50,6 @@ class JointMotion:
     first_rad: Floats
     rate_hz: float
 
-    @property
-    def travel_rad(self) -> float:
-        """Path of the joint [rad]."""
-        return float(np.abs(np.diff(self.position_rad)).sum())
-
 
 def why_not_a_crank(joint: Series) -> str:
     """Why a joint cannot be the crank: it stands, or swings to and fro; empty if it turns on and on."""

@@ -94,11 +94,6 @@ def variances(sigma: float) -> Variances:
     )
 
 
-def known_variances(pair: float, lot: float, part: float) -> Variances:
-    """Variances that are known."""
-    return Variances(pair, np.array([lot]), np.array([part]), np.zeros((1, 1)))
-
-
 @attrs.frozen(eq=False)
 class _Sums:
     """Normal distributions in closed form for all variances of the grid, as precision and pull.

@@ -12,6 +12,7 @@ from matplotlib.patches import Polygon
 from leg_wear_monitor.mechanism.arrays import Floats
 from leg_wear_monitor.report.figures.figure import INK, PAPER, USUAL, VERMILION, plain
 
+_WIDTH = 9.0  # of a bar [points]
 _HALO = [patheffects.withStroke(linewidth=3.0, foreground=PAPER)]
 
 
@@ -21,15 +22,12 @@ def lighter(colour: str, fraction: float) -> tuple[float, float, float]:
     return red, green, blue
 
 
-def draw_body(axes: Axes, corners: Floats, colour: str, layer: float, width: float = 9.0) -> None:
-    """Draw a plate or a bar with round ends around the corners (n, 2) [m], a square for one corner.
-
-    ``width`` is that of the border [points].
-    """
+def draw_body(axes: Axes, corners: Floats, colour: str, layer: float) -> None:
+    """Draw a plate or a bar with round ends around the corners (n, 2) [m], a square for one corner."""
     if len(corners) == 1:  # a slider
-        axes.plot(*corners[0], marker="s", markersize=2.4 * width, color=lighter(colour, 0.55), zorder=layer)
+        axes.plot(*corners[0], marker="s", markersize=2.4 * _WIDTH, color=lighter(colour, 0.55), zorder=layer)
         return
-    for edge, line in ((colour, width + 2.0), (lighter(colour, 0.55), width)):
+    for edge, line in ((colour, _WIDTH + 2.0), (lighter(colour, 0.55), _WIDTH)):
         shape = Polygon(
             corners, closed=len(corners) > 2, facecolor=edge, edgecolor=edge, linewidth=line, zorder=layer
         )

@@ -15,7 +15,7 @@ PURPLE, SKY, YELLOW = "#cc79a7", "#56b4e9", "#f0e442"
 BODY_COLOURS = (ORANGE, BLUE, GREEN, PURPLE, SKY, VERMILION, YELLOW)
 INK, PALE, PAPER = "#222222", "#d9d9d9", "#ffffff"
 
-SMALL, USUAL, LARGE = 8.0, 9.5, 12.0  # font sizes in points
+SMALL, USUAL = 8.0, 9.5  # font sizes in points
 
 
 def new_figure(width: float, height: float) -> Figure:

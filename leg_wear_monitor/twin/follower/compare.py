@@ -89,7 +89,6 @@ def _add_up(m, p, by, sums, weight):
     r = m - p
     sums.number += 1.0
     sums.weight += weight
-    sums.residual += weight * r
     sums.residual_squares += weight * r * r
     sums.measured_squares += weight * m * m
     sums.predicted_squares += weight * p * p

@@ -101,7 +101,6 @@ TORQUE_SUMS = np.dtype(
     [
         ("number", "f8"),  # of compared torques
         ("weight", "f8"),  # by which the following sums are weighed, in samples
-        ("residual", "f8"),  # [N m]
         ("residual_squares", "f8"),  # [N^2 m^2]
         ("measured_squares", "f8"),  # [N^2 m^2]
         ("predicted_squares", "f8"),  # [N^2 m^2]

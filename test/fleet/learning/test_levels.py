@@ -5,7 +5,7 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from leg_wear_monitor.fleet.learning.levels import Evidence, known_variances, predict, variances
+from leg_wear_monitor.fleet.learning.levels import Evidence, Variances, predict, variances
 
 pytestmark = pytest.mark.plain
 
@@ -46,7 +46,8 @@ def test_with_known_variances_it_is_the_conditional_normal_distribution(
     parts, pair, between_lots, between_parts
 ):
     evidence, lot, mean, sigma = evidence_of(parts)
-    found = predict(evidence, known_variances(pair, between_lots, between_parts))
+    known = Variances(pair, np.array([between_lots]), np.array([between_parts]), np.zeros((1, 1)))
+    found = predict(evidence, known)
     matrix = covariance(lot, pair, between_lots, between_parts)
     for i in range(len(parts)):
         expected, variance = conditional(mean, matrix, sigma**2, i)

@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING
 from leg_wear_monitor.errors import ConfigWarning
 
 if TYPE_CHECKING:
-    from leg_wear_monitor.mechanism.plausible import Doubt
+    from leg_wear_monitor.configuration.quantity import Doubt
 
 
 def warn_of(source: str, found: Iterable["Doubt"]) -> None:

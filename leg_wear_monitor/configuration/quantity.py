@@ -1,10 +1,12 @@
 """A key of a file with its unit, bounds and meaning, declared once for checks and documentation."""
 
-from collections.abc import Callable, Mapping
+import re
+from collections.abc import Callable, Iterator, Mapping
 from typing import Any
 
 import attrs
 
+USUAL = "{value:g} {unit}, usual are {usual} {unit}"
 LEAST = 1.0e-30  # least positive value: in SI units, its square and its inverse stay finite
 
 
@@ -22,6 +24,25 @@ class FieldError(ValueError):
     def __init__(self, key: str, fault: str) -> None:
         self.key, self.fault = key, fault
         super().__init__(f"{key}: {fault}" if key else fault)
+
+
+@attrs.frozen
+class Doubt:
+    """A value that is valid, but far outside the usual: likely in a wrong unit.
+
+    Attributes
+    ----------
+    key : str
+        Dotted path in the file.
+    fault : str
+        The value, the usual range, and the likely confusion of units.
+    """
+
+    key: str
+    fault: str
+
+    def __str__(self) -> str:
+        return f"{self.key}: {self.fault}"
 
 
 def described(
@@ -77,6 +98,8 @@ def quantity(
     above: float | None = None,
     at_least: float | None = None,
     at_most: float | None = None,
+    usual: tuple[float, float] | None = None,
+    doubt: str | Callable[[float], str] = USUAL,
     default: Any = attrs.NOTHING,
     check: Callable[[Any], str | None] | None = None,
     metadata: Mapping[str, Any] | None = None,
@@ -91,6 +114,11 @@ def quantity(
         What it is, in one line.
     above, at_least, at_most : float, optional
         Bounds, the first exclusive.
+    usual : tuple of float, optional
+        Least and most of its size beyond which `doubts` names it.
+    doubt : str or callable
+        What is said of a value beyond, with ``{value}``, ``{unit}`` and ``{usual}``; a function of the value
+        where the unit that is likely meant depends on it.
     default : optional
         Value when the key is absent; without it the key is required.
     check : callable, optional
@@ -116,8 +144,29 @@ def quantity(
                 return f"{number!r} is not at most {at_most:g} {unit}".rstrip()
         return check(value) if check else None
 
-    bounds = {"above": above, "at_least": at_least, "at_most": at_most}
+    bounds = {"above": above, "at_least": at_least, "at_most": at_most, "usual": usual, "doubt": doubt}
     return described(doc, unit=unit, default=default, check=fault, metadata={**bounds, **(metadata or {})})
+
+
+def doubts(thing: Any, section: str = "") -> Iterator[Doubt]:
+    """What is unusual of an attrs object; of several numbers of a key, the largest of those."""
+    for field in attrs.fields(type(thing)):
+        if not (usual := field.metadata.get("usual")):
+            continue
+        value = getattr(thing, field.name)
+        numbers = [one for one in (value if isinstance(value, tuple) else (value,)) if one is not None]
+        beyond = [one for one in numbers if not usual[0] <= abs(one) <= usual[1]]
+        if beyond:
+            number, doubt = max(beyond, key=abs), field.metadata["doubt"]
+            text = doubt(number) if callable(doubt) else doubt
+            words = " to ".join(map(_short, usual)) if usual[0] else f"below {_short(usual[1])}"
+            fault = text.format(value=number, unit=field.metadata["unit"], usual=words)
+            yield Doubt(f"{section}{field.name}", fault)
+
+
+def _short(bound: float) -> str:
+    """A bound as people write it: 0.0001, 300, 1e4, 2e12."""
+    return f"{bound:g}" if 1.0e-4 <= bound < 1.0e4 else re.sub(r"e\+?(-?)0?", r"e\1", f"{bound:.0e}")
 
 
 def choice(names: tuple[str, ...], doc: str, *, default: str) -> Any:

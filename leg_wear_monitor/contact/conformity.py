@@ -10,11 +10,11 @@ from collections.abc import Iterator
 
 import numpy as np
 
+from leg_wear_monitor.configuration.quantity import Doubt
 from leg_wear_monitor.contact.geometry import contact_modulus
 from leg_wear_monitor.contact.normal.laws import LAWS
 from leg_wear_monitor.mechanism.clearance import Clearance
 from leg_wear_monitor.mechanism.ideal import one_cycle
-from leg_wear_monitor.mechanism.plausible import Doubt
 from leg_wear_monitor.mechanism.position import Linkage
 from leg_wear_monitor.mechanism.spec import SpeedDrive, TrackDrive
 

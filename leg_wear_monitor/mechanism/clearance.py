@@ -4,7 +4,7 @@ from typing import Annotated, Any
 
 import attrs
 
-from leg_wear_monitor.configuration.quantity import FieldError, choice, described, quantity
+from leg_wear_monitor.configuration.quantity import USUAL, FieldError, choice, described, quantity
 from leg_wear_monitor.mechanism.law_names import FRICTION_LAWS, NORMAL_LAWS
 
 Pair = Annotated[tuple[float, float], "bushing, journal"]  # in a file, one number stands for both
@@ -44,22 +44,44 @@ class Film:
     )
 
 
+def _length_slip(metres: float) -> str:
+    return f"{USUAL}; {'mm' if metres > 1.0e-3 else 'km'} for m?"
+
+
+def _modulus_slip(modulus: float) -> str:
+    meant = "GPa" if modulus < 1.0e4 else "MPa" if modulus < 1.0e6 else "kPa"
+    return f"{USUAL}, steel has 2.1e11; {meant} for Pa?"
+
+
 @attrs.frozen(kw_only=True)
 class Clearance:
     """Settings of a revolute clearance joint; pairs are (bushing, journal)."""
 
-    bushing_radius: float = quantity("m", "radius of the bushing", above=0.0, at_most=1.0)
-    width: float = quantity("m", "axial contact width", above=0.0, at_most=1.0)
+    bushing_radius: float = quantity(
+        "m", "radius of the bushing", above=0.0, at_most=1.0, usual=(1.0e-4, 0.25), doubt=_length_slip
+    )
+    width: float = quantity(
+        "m", "axial contact width", above=0.0, at_most=1.0, usual=(1.0e-4, 0.5), doubt=_length_slip
+    )
     radial_clearance: float = quantity("m", "bushing radius less journal radius", above=0.0)
-    youngs_modulus: Pair = quantity("Pa", "Young's modulus", above=0.0)
+    youngs_modulus: Pair = quantity(
+        "Pa", "Young's modulus", above=0.0, usual=(1.0e6, 2.0e12), doubt=_modulus_slip
+    )
     poissons_ratio: Pair = quantity("", "Poisson's ratio", at_least=0.0, at_most=0.5)
     normal_law: str = choice(NORMAL_LAWS, "law of the normal force", default="lankarani-nikravesh")
     restitution: float = quantity("", "coefficient of restitution", above=0.0, at_most=1.0, default=0.9)
     friction: Friction = described("friction, a mapping of the keys below", default=Friction())
     film: Film | None = described("oil or grease, a mapping of the keys below", default=None)
-    wear_coefficient: Pair = quantity("1/Pa", "K/H of Archard's law", at_least=0.0, default=(0.0, 0.0))
+    wear_coefficient: Pair = quantity(
+        "1/Pa",
+        "K/H of Archard's law",
+        at_least=0.0,
+        usual=(0.0, 1.0e-9),
+        doubt=f"{USUAL}; K for K/H, or 1/MPa for 1/Pa?",
+        default=(0.0, 0.0),
+    )
     stiffness: float | None = quantity(
-        "N/m^1.5", "contact stiffness instead of Hertz's", above=0.0, default=None
+        "N/m^1.5", "contact stiffness instead of Hertz's", above=0.0, usual=(1.0e6, 1.0e14), default=None
     )
     approach_speed_floor: float = quantity(
         "m/s", "least approach speed in the damping of the normal law", above=0.0, default=1.0e-3

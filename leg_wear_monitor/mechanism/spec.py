@@ -6,12 +6,14 @@ from typing import Annotated, Any, Literal
 import attrs
 
 from leg_wear_monitor.configuration.nearest import did_you_mean
-from leg_wear_monitor.configuration.quantity import FieldError, described, quantity
+from leg_wear_monitor.configuration.quantity import USUAL, FieldError, described, quantity
 from leg_wear_monitor.errors import ConfigError
 from leg_wear_monitor.mechanism.clearance import Clearance
 from leg_wear_monitor.shown import Drawable
 
 Vector = tuple[float, float]
+
+_TORQUE_SLIP = f"{USUAL}; N mm for N m?"
 Pose = tuple[float, float, float]
 Torques = Annotated[tuple[float, ...], "one for each phase"]  # in a file, one number is a constant torque
 Label = Annotated[str, "in a file, not empty"]
@@ -26,11 +28,15 @@ class Ground:
     points: dict[str, Vector] = described("points by name, [x, y]", unit="m", factory=dict)
 
 
+def _mass_slip(kg: float) -> str:
+    return f"{USUAL}; {'g' if kg > 1.0 else 't'} for kg?"
+
+
 @attrs.frozen(kw_only=True)
 class Body:
     """A rigid body; points and centre of mass are given in its own frame."""
 
-    mass: float = quantity("kg", "mass", above=0.0)
+    mass: float = quantity("kg", "mass", above=0.0, usual=(1.0e-4, 300.0), doubt=_mass_slip)
     inertia: float = quantity("kg m^2", "moment of inertia about the centre of mass", above=0.0)
     com: Vector = quantity("m", "centre of mass, [x, y]")
     points: dict[str, Vector] = described("points by name, [x, y]", unit="m")
@@ -109,7 +115,9 @@ class TorqueDrive:
     """A constant torque acts on the crank, which starts at ``initial_speed``."""
 
     body: str = described("the crank")
-    torque: float = quantity("N m", "torque on the crank, counter-clockwise positive")
+    torque: float = quantity(
+        "N m", "torque on the crank, counter-clockwise positive", usual=(0.0, 1.0e4), doubt=_TORQUE_SLIP
+    )
     initial_speed: float = quantity("rad/s", "crank speed at the start", default=0.0)
 
 

@@ -1,5 +1,6 @@
 """Parameters of the inputs: crank, further encoders, drive torque, gait, tracker."""
 
+import math
 from typing import Any
 
 import attrs
@@ -28,6 +29,11 @@ KNOWN, AT_START = ZEROS = ("known", "at_start")
 LEAST_RPM = 0.1  # ten minutes a gait cycle: nothing that walks is slower
 
 
+def _is_slow(rpm: float) -> str:
+    cycle, meant = 60.0 / abs(rpm), rpm * 30.0 / math.pi
+    return f"{rpm:g} rpm is {cycle:.3g} s a gait cycle; rad/s for rpm? {rpm:g} rad/s is {meant:.4g} rpm"
+
+
 def _turns(speed: float) -> str | None:
     if abs(speed) >= LEAST_RPM:
         return None
@@ -48,7 +54,13 @@ class Crank:
 
     sign: int = _sign("1 if the joint turns in the direction of the mechanism's crank angle, else -1")
     offset_rad: float = quantity(
-        "rad", "crank angle at joint position 0", at_least=-100.0, at_most=100.0, default=0.0
+        "rad",
+        "crank angle at joint position 0",
+        at_least=-100.0,
+        at_most=100.0,
+        usual=(0.0, math.tau),
+        doubt="{value:g} rad is more than a turn; degrees for rad?",
+        default=0.0,
     )
     gear_ratio: float = quantity(
         "",
@@ -235,6 +247,8 @@ class Cadence:
         "commanded crank speed, negative for clockwise, at least 0.1 either way",
         at_least=-1200.0,
         at_most=1200.0,
+        usual=(10.0, 1200.0),
+        doubt=_is_slow,
         default=60.0,
         check=_turns,
     )

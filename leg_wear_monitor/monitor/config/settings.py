@@ -43,6 +43,8 @@ class Limits:
         "impact force in a joint, peak of a gait cycle",
         above=0.0,
         at_most=1.0e7,
+        usual=(10.0, 1.0e7),
+        doubt="{value:g} N is less than a leg weighs; kN for N?",
         default=10000.0,
         metadata=LIVE,
     )
@@ -51,6 +53,8 @@ class Limits:
         "impact-force limit of each clearance joint, instead of the common one",
         above=0.0,
         at_most=1.0e7,
+        usual=(10.0, 1.0e7),
+        doubt="{value:g} N is less than a leg weighs; kN for N?",
         default=(),
         metadata=LIVE,
     )

@@ -47,7 +47,11 @@ SLIPS = [
     (in_millimetres, "bodies.coupler.points: 614.818 m from point to point", "mm for m?"),
     (in_degrees, "assembly.thigh: -108.945 rad is -17.3 turns", "degrees for rad?"),
     (lambda d: d["drive"].update(speed=60), "drive.speed: 60 rad/s is 573 rpm", "60 rpm is 6.28319 rad/s"),
-    (set_default("youngs_modulus", 207), "youngs_modulus: 207 Pa", "GPa for Pa?"),
+    (
+        set_default("youngs_modulus", 207),
+        "clearances (A, B, C, D, E, F, G, H, I, J): youngs_modulus: 207 Pa, usual are 1e6 to 2e12 Pa",
+        "GPa for Pa?",
+    ),
     (set_default("youngs_modulus", 2.07e5), "youngs_modulus: 207000 Pa", "MPa for Pa?"),
     (of_thigh("mass", 1e3), "bodies.thigh.mass: 3500 kg", "g for kg?"),
     (of_thigh("inertia", 1e6), "bodies.thigh.inertia", "kg mm^2 for kg m^2?"),
@@ -108,6 +112,7 @@ PARAMETERS = [
     ({"crank.offset_rad": 90.0}, "crank.offset_rad: 90 rad", "degrees for rad?"),
     ({"limits.clearance_m": 2e-4}, "limits.clearance_m: 0.0002 m is not above the new clearance", "A"),
     ({"limits.impact_force_n": 1.5}, "limits.impact_force_n: 1.5 N", "kN for N?"),
+    ({"limits.joint_impact_force_n": [1.5] + [1e4] * 9}, "limits.joint_impact_force_n: 1.5 N", "kN for N?"),
     (
         {"clearances_m": [3e-3], "limits.clearance_m": 5e-3},
         "clearances_m: 0.003 m is 30 % of the bushing's radius",

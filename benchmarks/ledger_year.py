@@ -4,8 +4,8 @@
 
 Eight hours of walking a day, an entry each 5 s, a run a day, through the ledger's own code with its fsyncs.
 The surfaces' rises come from the default leg's twin at 60 rpm with encoder noise, one minute of it over and
-over. All whole entries and all history are written; of the stretches of ten minutes between them, the records
-of one in `EACH` are written in truth and count as often. Bytes are those handed to the system
+over. All whole surfaces and all history are written; of the stretches of a minute between them, the
+entries of one in `EACH` are written in truth and count as often. Bytes are those handed to the system
 (``/proc/self/io``: wchar), and beside them the pages that it has to bring to the disk (write_bytes).
 """
 
@@ -20,12 +20,11 @@ import numpy as np
 import leg_wear_monitor as lw
 from leg_wear_monitor.monitor.accounting import next_point_s
 from leg_wear_monitor.monitor.config.fitting import fitted
-from leg_wear_monitor.monitor.ledger.binding import binding_of
-from leg_wear_monitor.monitor.ledger.entry import ClearancePoint, Entry, ForecastPoint, JointWear
-from leg_wear_monitor.monitor.ledger.ledger import Ledger
+from leg_wear_monitor.monitor.ledger.entry import ClearancePoint, Entry, ForecastPoint, JointWear, binding_of
+from leg_wear_monitor.monitor.ledger.ledger import WHOLE_S, Ledger
 from leg_wear_monitor.twin.sample import gait_samples
 
-CHECKPOINT_S, WHOLE_S, DAY_S = 5.0, 600.0, 8 * 3600.0
+CHECKPOINT_S, DAY_S = 5.0, 8 * 3600.0
 EACH = 97
 RATE_HZ = 200
 GB = 1.0e9
@@ -87,7 +86,7 @@ def keep(ledger, entry, **how):
 
 
 def a_day(walk, path, binding, stretch, costs):
-    """One run of a day: a stretch of ten minutes after the other."""
+    """One run of a day: a stretch between whole surfaces after the other."""
     before = written()
     ledger = Ledger(path, binding, CHECKPOINT_S)
     costs["opened and closed"] += written() - before
@@ -99,8 +98,8 @@ def a_day(walk, path, binding, stretch, costs):
             if is_written:
                 before = written()
                 keep(ledger, entry, whole=False)
-                costs["records"] += written() - before
-                costs["records written"] += 1
+                costs["entries"] += written() - before
+                costs["entries written"] += 1
         entry = walk.entry()
         before = written()
         if entry.moving_s >= walk.point_due_s:
@@ -120,7 +119,7 @@ def main(days, directory):
     config = attrs.evolve(config, ledger=attrs.evolve(config.ledger, checkpoint_s=CHECKPOINT_S))
     binding = binding_of(fitted(leg, config), config)
     walk = Walk(*rises(leg, config))
-    costs = {name: np.zeros(2) for name in ("records", "whole", "opened and closed", "records written")}
+    costs = {name: np.zeros(2) for name in ("entries", "whole", "opened and closed", "entries written")}
     stretch, began = [0], time.perf_counter()
     with tempfile.TemporaryDirectory(dir=directory) as place:
         path = Path(place) / "wear.ledger"
@@ -131,16 +130,16 @@ def main(days, directory):
         began_open = time.perf_counter()
         Ledger(path, binding, CHECKPOINT_S).close()
         opened_s = time.perf_counter() - began_open
-    entries = round(days * DAY_S / CHECKPOINT_S)
-    a_record = costs["records"] / costs["records written"]
-    records = (entries - round(days * DAY_S / WHOLE_S)) * a_record
-    total = records + costs["whole"] + costs["opened and closed"]
-    print(f"{days} days, {entries} entries, {costs['records written'][0]:.0f} records written in truth")
+    number = round(days * DAY_S / CHECKPOINT_S)
+    an_entry = costs["entries"] / costs["entries written"]
+    entries = (number - round(days * DAY_S / WHOLE_S)) * an_entry
+    total = entries + costs["whole"] + costs["opened and closed"]
+    print(f"{days} days, {number} entries, {costs['entries written'][0]:.0f} entries written in truth")
     print(f"{'':24}{'handed on':>14}{'pages':>14}")
-    print(f"{'a record':24}{a_record[0]:12.0f} B{a_record[1]:12.0f} B")
+    print(f"{'an entry':24}{an_entry[0]:12.0f} B{an_entry[1]:12.0f} B")
     a_whole = costs["whole"] / round(days * DAY_S / WHOLE_S)
-    print(f"{'a whole entry':24}{a_whole[0]:12.0f} B{a_whole[1]:12.0f} B")
-    for name, cost in (("records", records), ("whole entries", costs["whole"]), ("all", total)):
+    print(f"{'with whole surfaces':24}{a_whole[0]:12.0f} B{a_whole[1]:12.0f} B")
+    for name, cost in (("entries", entries), ("whole surfaces", costs["whole"]), ("all", total)):
         print(f"{name:24}{cost[0] / GB:11.2f} GB{cost[1] / GB:11.2f} GB")
     print(f"size at the end {size / 1e6:.1f} MB, opened and checked in {opened_s:.1f} s")
     print(f"took {time.perf_counter() - began:.0f} s")

@@ -12,8 +12,7 @@ from leg_wear_monitor.monitor.config.settings import Limits
 from leg_wear_monitor.monitor.encoders.clearance_estimate import ClearanceObservation
 from leg_wear_monitor.monitor.forecast.coefficient_prior import CoefficientPrior
 from leg_wear_monitor.monitor.forecast.forecast import Answer, JointForecast, Quantiles
-from leg_wear_monitor.monitor.ledger.entry import Measurement
-from leg_wear_monitor.monitor.ledger.walked import WalkedLoad
+from leg_wear_monitor.monitor.ledger.entry import Measurement, WalkedLoad
 from leg_wear_monitor.monitor.reports import Lost
 from leg_wear_monitor.monitor.verdict.verdict import Evidence, Figure, State, Verdict
 from leg_wear_monitor.playback.history import CYCLE_COLUMNS, JOINT_COLUMNS

@@ -46,7 +46,7 @@ def opened(settings: "MonitorConfig", dry_run: bool) -> Iterator["Ledger"]:
     import attrs
 
     from leg_wear_monitor.mechanism.loader import load_mechanism
-    from leg_wear_monitor.monitor.ledger.copy import copy_of
+    from leg_wear_monitor.monitor.ledger.file import copy_of
     from leg_wear_monitor.monitor.ledger.ledger import open_ledger
 
     leg = load_mechanism(settings.mechanism)  # without its parameters, which a ledger applies itself

@@ -30,7 +30,7 @@ def print_replay(result: "ReplayResult", wall_s: float) -> None:
     wall_s : float
         What it took [s].
     """
-    from leg_wear_monitor.monitor.ledger.walked import walked_words
+    from leg_wear_monitor.monitor.ledger.entry import walked_words
     from leg_wear_monitor.monitor.verdict.belief import COUNTED, believed_words
     from leg_wear_monitor.monitor.verdict.verdict import Figure
 

@@ -19,12 +19,9 @@ from leg_wear_monitor.errors import printable
 from leg_wear_monitor.mechanism.spec import Mechanism
 from leg_wear_monitor.monitor.config.settings import MonitorConfig
 from leg_wear_monitor.monitor.forecast.measurement import last_measured
-from leg_wear_monitor.monitor.ledger.binding import binding_of
-from leg_wear_monitor.monitor.ledger.entry import ClearancePoint, JointWear
-from leg_wear_monitor.monitor.ledger.file import LedgerError, beside
-from leg_wear_monitor.monitor.ledger.log import ENDING
-from leg_wear_monitor.monitor.ledger.reading import LedgerContent, read_ledger
-from leg_wear_monitor.monitor.ledger.walked import walked_words
+from leg_wear_monitor.monitor.ledger.entry import ClearancePoint, JointWear, binding_of, walked_words
+from leg_wear_monitor.monitor.ledger.file import LedgerError
+from leg_wear_monitor.monitor.ledger.ledger import LedgerContent, read_ledger
 from leg_wear_monitor.monitor.verdict.belief import believed
 from leg_wear_monitor.monitor.verdict.situation import JointSituation, SeenClearance
 from leg_wear_monitor.monitor.verdict.verdict import Figure
@@ -88,7 +85,7 @@ class LedgerLeg:
         return True
 
     def _stamps(self) -> Stamps:
-        return stamps_of(self._path, beside(self._path, ENDING))
+        return stamps_of(self._path)
 
     def freshness(self) -> Freshness:
         """Since when nothing was written."""

@@ -8,8 +8,7 @@ from leg_wear_monitor.mechanism.spec import Mechanism
 from leg_wear_monitor.monitor.alarms.words import ADVICE
 from leg_wear_monitor.monitor.config.settings import MonitorConfig
 from leg_wear_monitor.monitor.evaluation.board import AlarmBoard
-from leg_wear_monitor.monitor.ledger.entry import Measurement
-from leg_wear_monitor.monitor.ledger.walked import WalkedLoad
+from leg_wear_monitor.monitor.ledger.entry import Measurement, WalkedLoad
 from leg_wear_monitor.monitor.reports import Lost
 from leg_wear_monitor.monitor.verdict.verdict import NO_GAIT_CYCLE, Figure, State, Verdict
 from leg_wear_monitor.playback.result.condition import JointClearance, LifeHours

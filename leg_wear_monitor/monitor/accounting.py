@@ -22,10 +22,11 @@ from leg_wear_monitor.monitor.ledger.entry import (
     ForecastPoint,
     JointWear,
     VerdictEvent,
+    WalkedLoad,
     one_part,
+    together,
 )
 from leg_wear_monitor.monitor.ledger.ledger import Ledger
-from leg_wear_monitor.monitor.ledger.walked import WalkedLoad, together
 from leg_wear_monitor.monitor.reports import AlarmList, CycleReport, VerdictReport
 from leg_wear_monitor.monitor.spans import NEIGHBOURS_NS, Spans, is_within, with_span
 from leg_wear_monitor.twin.digital_twin import DigitalTwin

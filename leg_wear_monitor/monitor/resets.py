@@ -56,17 +56,15 @@ def last_reset(ledger: Ledger | None, joint: str, now: JointWear) -> Reset:
     Raises
     ------
     LegWearError
-        If there is none, or what was before is not kept.
+        If there is none, or it is of other surfaces.
     """
     if ledger is None:
         raise LegWearError(f"joint {joint}: no ledger is used, so the wear before a reset is not stored")
     if ledger.fault:
         raise LegWearError(f"joint {joint}: the ledger was not written: {ledger.fault}; try again when it is")
     found = ledger.last_reset(joint)
-    if found is None:
+    if found is None or found.joint is None:
         raise LegWearError(f"joint {joint}: the ledger has no reset to undo")
-    if found.joint is None:
-        raise LegWearError(f"joint {joint}: was reset by an older version, which stored only its depth")
     if found.joint.depth.shape != now.depth.shape:
         raise LegWearError(f"joint {joint}: had {found.joint.depth.shape[1]} sectors when it was reset")
     return Reset(found.id, found.joint)

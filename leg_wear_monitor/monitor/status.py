@@ -324,7 +324,6 @@ def _ledger(accounting: Accounting) -> Status:
         return Status("ledger", Level.ERROR, message, values, LEDGER_NOT_WRITTEN)
     if accounting.state.cut_off_s is not None:
         values["cut_off_s"] = accounting.state.cut_off_s
-        message = ledger.loss or "the previous run was interrupted, the wear of its last seconds is lost"
-        return Status("ledger", Level.WARN, message, values, LEDGER_INTERRUPTED)
+        return Status("ledger", Level.WARN, ledger.loss, values, LEDGER_INTERRUPTED)
     message = "is written at the end of the recording" if ledger.at_end else "kept"
     return Status("ledger", Level.OK, message, values)

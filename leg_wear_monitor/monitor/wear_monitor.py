@@ -19,10 +19,9 @@ from leg_wear_monitor.monitor.evaluation.mismatch_window import NO_MISMATCH
 from leg_wear_monitor.monitor.evaluation.specs import MISMATCH
 from leg_wear_monitor.monitor.forecast.forecast import ForecastBasis
 from leg_wear_monitor.monitor.forecast.measurement import MeasurementResult
-from leg_wear_monitor.monitor.ledger.entry import AlarmEvent, Audit, JointWear, Measurement
+from leg_wear_monitor.monitor.ledger.entry import AlarmEvent, Audit, JointWear, Measurement, WalkedLoad
 from leg_wear_monitor.monitor.ledger.file import LedgerError
 from leg_wear_monitor.monitor.ledger.ledger import Ledger
-from leg_wear_monitor.monitor.ledger.walked import WalkedLoad
 from leg_wear_monitor.monitor.parts import Parts
 from leg_wear_monitor.monitor.processing import Processing
 from leg_wear_monitor.monitor.reports import (
@@ -508,7 +507,7 @@ class WearMonitor:
 
     @property
     def ledger_loss(self) -> str:
-        """Fault of the ledger when it was opened, and the possible loss; empty if there was none."""
+        """What the ledger had lost when it was opened; empty if nothing was lost."""
         return self._accounting.ledger.loss if self._accounting.ledger else ""
 
     @property

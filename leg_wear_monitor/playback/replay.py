@@ -272,11 +272,8 @@ def _stamps_apart_s(result: ReplayResult, block: Block) -> float:
 
 
 def _about_the_ledger(result: ReplayResult) -> list[Finding]:
-    """Findings about the ledger: its state when opened, and after the replay."""
+    """Findings about the ledger after the replay."""
     found = []
-    if result.monitor.ledger_loss:
-        path = Path(result.monitor.config.ledger.path)
-        found.append(Finding(path, result.monitor.ledger_loss))
     if result.monitor.is_all_counted:
         text = "everything in this recording is in the ledger already: nothing was counted"
         found.append(Finding(result.files[0], text, Severity.NOTE))

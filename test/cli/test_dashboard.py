@@ -14,7 +14,7 @@ from leg_wear_monitor.errors import LegWearError
 from leg_wear_monitor.mechanism.loader import load_mechanism
 from leg_wear_monitor.monitor.config.fitting import fitted
 from leg_wear_monitor.monitor.config.settings import MonitorConfig
-from leg_wear_monitor.monitor.ledger.binding import binding_of
+from leg_wear_monitor.monitor.ledger.entry import binding_of
 from leg_wear_monitor.monitor.ledger.ledger import Ledger
 
 pytest.importorskip("tornado")

@@ -9,7 +9,7 @@ import pytest
 from leg_wear_monitor import load_mechanism
 from leg_wear_monitor.life import many_lives
 from leg_wear_monitor.monitor.forecast.life_file import read_lives
-from leg_wear_monitor.monitor.ledger.binding import fingerprint
+from leg_wear_monitor.monitor.ledger.entry import fingerprint
 
 ONE = ("life", "--mechanism", "four_bar", "--legs", "1", "--cycles", "2", "--opens-m", "2e-5")
 

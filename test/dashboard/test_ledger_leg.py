@@ -13,7 +13,6 @@ from leg_wear_monitor.mechanism.loader import load_mechanism
 from leg_wear_monitor.monitor.alarms.alarm import Alarm, Level
 from leg_wear_monitor.monitor.config.fitting import fitted
 from leg_wear_monitor.monitor.config.settings import MonitorConfig
-from leg_wear_monitor.monitor.ledger.binding import binding_of
 from leg_wear_monitor.monitor.ledger.entry import (
     ClearancePoint,
     Entry,
@@ -21,10 +20,11 @@ from leg_wear_monitor.monitor.ledger.entry import (
     JointWear,
     Measurement,
     VerdictEvent,
+    WalkedLoad,
+    binding_of,
 )
 from leg_wear_monitor.monitor.ledger.file import LedgerError
 from leg_wear_monitor.monitor.ledger.ledger import Ledger
-from leg_wear_monitor.monitor.ledger.walked import WalkedLoad
 from leg_wear_monitor.monitor.verdict.verdict import Evidence, Figure, State
 from leg_wear_monitor.wear.surfaces import SECTORS
 
@@ -111,7 +111,7 @@ def test_what_the_monitor_writes_meanwhile_is_shown_and_its_files_are_left_alone
                    worst=7e-4, limit=6e-4)  # fmt: skip
     ledger.note(verdict(20, "stop", **OPENED))
     assert ledger.keep(entry(20, worn_m=4e-4, alarms=(raised,)))
-    assert ledger.keep(entry(21, worn_m=4e-4, alarms=(raised,)), whole=False)  # into the log beside it
+    assert ledger.keep(entry(21, worn_m=4e-4, alarms=(raised,)), whole=False)
     before = {path.name: path.read_bytes() for path in ledger.path.parent.iterdir()}
     assert leg.renew()
     content = leg.content()

@@ -11,10 +11,8 @@ import pytest
 from leg_wear_monitor import Mechanism, WearMonitor
 from leg_wear_monitor.monitor.alarms.alarm import Alarm, Level
 from leg_wear_monitor.monitor.config.parameters import config_from
-from leg_wear_monitor.monitor.ledger.binding import Binding
-from leg_wear_monitor.monitor.ledger.entry import Entry, JointWear
+from leg_wear_monitor.monitor.ledger.entry import Binding, Entry, JointWear, WalkedLoad
 from leg_wear_monitor.monitor.ledger.ledger import Ledger
-from leg_wear_monitor.monitor.ledger.walked import WalkedLoad
 from leg_wear_monitor.twin.sample import Samples, gait_samples
 
 SECOND = 10**9

@@ -32,8 +32,6 @@ def acknowledge(
 
     settings, leg = leg_of(config, ledger)
     with opened(settings, dry_run) as kept:
-        if kept.loss:
-            click.echo(f"warning: {kept.path}: {kept.loss}", err=True)
         click.echo(acknowledge_in(kept, leg, settings, time.time_ns()).words)
     if dry_run:
         click.echo("dry run: nothing was written")

@@ -107,7 +107,7 @@ def _live(out: Path) -> "DemoListener":
         click.echo(f"{(stamp_ns - first[0]) / 1e9:6.2f} s  {line}")
 
     paths = {"record": out / "live.mcap", "ledger": out / "wear.db", "truth": out / "truth.json"}
-    for path in (*paths.values(), out / "wear.db-log"):  # a ledger is not begun beside the log of another
+    for path in paths.values():
         path.unlink(missing_ok=True)
     click.echo(f"starting the monitor and the leg in ROS domain {domain}")
     demo_listener = DemoListener(_NAMESPACE, domain, report)

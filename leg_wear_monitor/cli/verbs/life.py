@@ -163,7 +163,7 @@ def _document(leg: "Mechanism", lives: "Lives", limit_m: float) -> dict[str, Any
     """Lives, bound to the leg that they are of."""
     from leg_wear_monitor.life.bushing_load import validity
     from leg_wear_monitor.life.many_lives import lives_document
-    from leg_wear_monitor.monitor.ledger.binding import fingerprint
+    from leg_wear_monitor.monitor.ledger.entry import fingerprint
 
     return {
         "mechanism": leg.name,

@@ -51,8 +51,6 @@ def _reset_in(joint: str, config: Path | None, ledger: Path | None, undo: bool, 
     settings, leg = leg_of(config, ledger)
     joint, now_ns, who = leg.clearance_joint(joint), time.time_ns(), getpass.getuser()
     with opened(settings, dry_run) as kept:
-        if kept.loss:
-            click.echo(f"warning: {kept.path}: {kept.loss}", err=True)
         if undo:
             words = wear_words(undo_in(kept, joint, now_ns, who))
             click.echo(

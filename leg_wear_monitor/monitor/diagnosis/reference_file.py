@@ -11,7 +11,7 @@ import numpy as np
 from leg_wear_monitor.errors import ConfigError, LegWearError, printable
 from leg_wear_monitor.mechanism.ideal import TURN
 from leg_wear_monitor.mechanism.spec import Mechanism
-from leg_wear_monitor.monitor.ledger.binding import fingerprint
+from leg_wear_monitor.monitor.ledger.entry import fingerprint
 from leg_wear_monitor.share import share_directory
 from leg_wear_monitor.twin.reference.crank_profile import HARMONICS, CrankProfile
 from leg_wear_monitor.twin.reference.leg_parameters import COUPLING_DAMPING, LegParameters

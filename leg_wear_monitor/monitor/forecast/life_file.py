@@ -12,7 +12,7 @@ from leg_wear_monitor.errors import ConfigError
 from leg_wear_monitor.life.result import SCHEMA_VERSION
 from leg_wear_monitor.mechanism.spec import Mechanism
 from leg_wear_monitor.monitor.forecast.growth_law import GrowthLaw, SimulatedLife, fitted_law, no_law
-from leg_wear_monitor.monitor.ledger.binding import fingerprint
+from leg_wear_monitor.monitor.ledger.entry import fingerprint
 from leg_wear_monitor.share import share_directory
 
 

@@ -1,18 +1,184 @@
-"""Content of the ledger: the wear and related state at one instant (entry), and events between entries."""
+"""Content of the ledger: what it belongs to, the wear at one instant (entry), and events between entries."""
 
 import hashlib
-import struct
+import json
+import math
+from collections.abc import Iterable
+from typing import Any
 
 import attrs
 import numpy as np
 
 from leg_wear_monitor.estimate.commissioned_torque import CommissionedTorque
 from leg_wear_monitor.mechanism.arrays import Floats
+from leg_wear_monitor.mechanism.spec import Mechanism
 from leg_wear_monitor.monitor.alarms.alarm import Alarm
-from leg_wear_monitor.monitor.ledger.walked import WalkedLoad
+from leg_wear_monitor.monitor.config.settings import MonitorConfig
 from leg_wear_monitor.twin.reference.leg_parameters import COUPLING_DAMPING
 from leg_wear_monitor.twin.reference.torque_reference import TorqueReference
 from leg_wear_monitor.wear.surfaces import SECTORS
+
+_CLASS_N = 100  # foot loads are told apart to this
+
+# fields of a mechanism that may change without a change of the worn parts
+# (a person is in the masses of the bodies)
+_FREE = ("name", "source", "drive", "loads", "clearance_joints", "clearances", "person_kg")
+_FREE_OF_CLEARANCE = ("wear_coefficient", "material")  # what a pair gives is in the other settings
+_LATER = ("film",)  # settings of later versions: absent, they leave the hash of an older leg as it was
+_FREE_OF_JOINTS = ("label",)
+
+
+def fingerprint(mechanism: Mechanism) -> str:
+    """Hash of the bodies, joints, springs and clearance joints of a mechanism, 16 hexadecimal digits.
+
+    The hash excludes names, labels and comments of the file, drive, loads and wear coefficients: with a
+    better value of these, the same wear is continued.
+    """
+    fields = {field.name: getattr(mechanism, field.name) for field in attrs.fields(Mechanism)}
+    parts = {name: _plain(value) for name, value in fields.items() if name not in _FREE}
+    for joint in mechanism.clearance_joints:
+        settings = attrs.asdict(mechanism.clearances[joint])
+        parts[f"clearance {joint}"] = {
+            name: _plain(value)
+            for name, value in settings.items()
+            if name not in _FREE_OF_CLEARANCE and not (name in _LATER and value is None)
+        }
+    text = json.dumps(parts, sort_keys=True, default=_plain)
+    return hashlib.sha256(text.encode()).hexdigest()[:16]
+
+
+def _plain(value: Any) -> Any:
+    if attrs.has(type(value)):
+        return attrs.asdict(value, filter=lambda field, _: field.name not in _FREE_OF_JOINTS)
+    if isinstance(value, dict):
+        return {name: _plain(entry) for name, entry in value.items()}
+    return value
+
+
+@attrs.frozen(kw_only=True)
+class Binding:
+    """Properties that must be equal for a ledger to be continued.
+
+    Attributes
+    ----------
+    hardware_id : str
+    mechanism : str
+        Name of the mechanism, for messages.
+    fingerprint : str
+    joints : tuple of str
+        The clearance joints.
+    wear_acceleration : float
+    sectors : int
+        Number of sectors of each surface.
+    """
+
+    hardware_id: str
+    mechanism: str
+    fingerprint: str
+    joints: tuple[str, ...]
+    wear_acceleration: float = 1.0
+    sectors: int = SECTORS
+
+    def as_texts(self) -> dict[str, str]:
+        """Texts as the ledger keeps them."""
+        texts = {name: str(value) for name, value in attrs.asdict(self).items()}
+        return texts | {"joints": ", ".join(sorted(self.joints))}
+
+
+def binding_of(mechanism: Mechanism, config: MonitorConfig) -> Binding:
+    """Binding of a mechanism that `fitted` returned."""
+    return Binding(
+        hardware_id=config.hardware,
+        mechanism=mechanism.name,
+        fingerprint=fingerprint(mechanism),
+        joints=mechanism.clearance_joints,
+        wear_acceleration=config.wear_acceleration,
+    )
+
+
+@attrs.frozen
+class Run:
+    """A run of the monitor.
+
+    Attributes
+    ----------
+    number : int
+        Number of the run, 0 before the first.
+    closed : bool
+        Whether the run ended normally.
+    interval_s : float
+        Longest time in motion between two of its entries.
+    epoch : int
+        Epoch of the clock at the end of the run.
+    boot_id : str
+        Boot of the computer; empty if unknown.
+    """
+
+    number: int = 0
+    closed: bool = True
+    interval_s: float = 0.0
+    epoch: int = 0
+    boot_id: str = ""
+
+
+@attrs.frozen
+class WalkedLoad:
+    """Gait cycles under foot loads of about one size.
+
+    Attributes
+    ----------
+    about_n : int
+        Largest vertical foot load of each of the cycles, to the nearest 100 N.
+    cycles : int
+        Gait cycles.
+    moving_s : float
+        Time in motion.
+    mean_n, sigma_n : float
+        Mean and standard deviation of the largest vertical foot load of a gait cycle.
+    """
+
+    about_n: int
+    cycles: int
+    moving_s: float
+    mean_n: float
+    sigma_n: float
+
+    @classmethod
+    def of_cycle(cls, peak_n: float, moving_s: float) -> "WalkedLoad":
+        """One gait cycle."""
+        return cls(_CLASS_N * round(peak_n / _CLASS_N), 1, moving_s, peak_n, 0.0)
+
+
+def together(loads: Iterable[WalkedLoad]) -> tuple[WalkedLoad, ...]:
+    """All cycles under loads of about one size as one, by rising loads."""
+    found: dict[int, list[WalkedLoad]] = {}
+    for load in loads:
+        found.setdefault(load.about_n, []).append(load)
+    return tuple(_one(found[about_n]) for about_n in sorted(found))
+
+
+def _one(loads: list[WalkedLoad]) -> WalkedLoad:
+    cycles, moving_s, mean_n, sigma_n = np.array([attrs.astuple(load)[1:] for load in loads]).T
+    mean = float(np.average(mean_n, weights=cycles))
+    variance = np.average(sigma_n**2 + (mean_n - mean) ** 2, weights=cycles)
+    return WalkedLoad(
+        loads[0].about_n, int(cycles.sum()), float(moving_s.sum()), mean, float(np.sqrt(variance))
+    )
+
+
+def walked_words(loads: Iterable[WalkedLoad]) -> str:
+    """Such as ``walked 12.1 h at 290 N, 2 h at 0 N``, the longest first; empty for a leg in the air."""
+    longest = sorted(loads, key=lambda load: -load.moving_s)
+    if not any(load.about_n for load in longest):
+        return ""
+    return "walked " + ", ".join(f"{_time(load.moving_s)} at {load.mean_n:.0f} N" for load in longest)
+
+
+def _time(seconds: float) -> str:
+    for unit, size in (("h", 3600.0), ("min", 60.0)):
+        if seconds >= size:
+            return f"{seconds / size:.3g} {unit}"
+    return f"{seconds:.3g} s"
 
 
 @attrs.frozen(eq=False)
@@ -43,6 +209,12 @@ class JointWear:
     def mean_m(self) -> float:
         """Mean depth of bushing and journal together, which is what the mean clearance has grown by [m]."""
         return float(self.depth.sum(axis=0).mean())
+
+    @property
+    def surface_means_m(self) -> tuple[float, float]:
+        """Mean depth of bushing and of journal, the same on every machine [m]."""
+        bushing, journal = (math.fsum(surface) / len(surface) for surface in self.depth)
+        return bushing, journal
 
 
 def new_part(name: str) -> JointWear:
@@ -95,19 +267,6 @@ class Entry:
     def moving_s(self) -> float:
         """Counted time in motion, over all runs [s]."""
         return self.totals.get("moving_s", 0.0)
-
-    def digest(self) -> bytes:
-        """Checksum of everything except epochs and loads, as stored in ledgers up to format 3."""
-        sum_ = hashlib.sha256(struct.pack("<q", self.stamp_ns))
-        for joint in sorted(self.joints, key=lambda joint: joint.name):
-            sum_.update(repr((joint.name, joint.cycles, joint.moving_s, joint.replaced_ns)).encode())
-            sum_.update(np.ascontiguousarray(joint.depth, dtype="<f8").tobytes())
-        alarms = [
-            (a.kind, a.subject, int(a.level), int(a.present), a.acknowledged, a.raised_ns)
-            for a in self.alarms
-        ]
-        sum_.update(repr((sorted(self.totals.items()), sorted(alarms), self.spans)).encode())
-        return sum_.digest()
 
 
 @attrs.frozen(eq=False)
@@ -296,13 +455,6 @@ class Commissioned:
     centre_rad: Floats
     mean: Floats
     covariance: Floats
-
-    def digest(self) -> bytes:
-        """Checksum of all fields, as stored in ledgers of format 3."""
-        sum_ = hashlib.sha256(repr((self.stamp_ns, self.encoders)).encode())
-        for part in (self.centre_rad, self.mean, self.covariance):
-            sum_.update(np.ascontiguousarray(part, dtype="<f8").tobytes())
-        return sum_.digest()
 
 
 @attrs.frozen

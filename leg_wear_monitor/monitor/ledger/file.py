@@ -12,22 +12,22 @@ from pathlib import Path
 from urllib.parse import quote
 
 from leg_wear_monitor.errors import LegWearError
-from leg_wear_monitor.monitor.ledger.binding import Binding
-from leg_wear_monitor.monitor.ledger.former_format import verify_former
+from leg_wear_monitor.monitor.ledger.entry import Binding
 from leg_wear_monitor.monitor.ledger.schema import (
     APPLICATION_ID,
     FORMAT,
-    SEALED_FROM,
+    UNRELEASED_ID,
+    create_tables,
     definitions,
     expected_definitions,
-    migrate,
+    replace,
+    verify,
 )
-from leg_wear_monitor.monitor.ledger.seal import verify, write_head
 
-MOVE = "move it away (and its -log) to begin with new parts, or put a copy of it back"
-MODE = 0o640  # mode of new files, reduced by the umask
+MOVE = "move it away to begin with new parts, or put a copy of it back"
 
-_PAGE = 512  # bytes: besides the surfaces, a whole entry changes mostly single rows
+_MODE = 0o640  # mode of new files, reduced by the umask
+_PAGE = 512  # bytes: besides the surfaces, an entry changes mostly single rows
 _HEADER = 100
 _MAGIC = b"SQLite format 3\0"
 _IN_USE = "is in use by another monitor; end that one, or set another ledger.path"
@@ -54,25 +54,18 @@ def create(path: Path, binding: Binding) -> None:
     new = beside(path, ".new")
     try:
         new.unlink(missing_ok=True)
-        os.close(os.open(new, os.O_CREAT | os.O_EXCL | os.O_WRONLY, MODE))
+        os.close(os.open(new, os.O_CREAT | os.O_EXCL | os.O_WRONLY, _MODE))
         with closing(_connect(new, "rw")) as db:
             db.execute(f"PRAGMA page_size = {_PAGE}")
-            _fill(db, binding)
+            with transaction(db):
+                create_tables(db)
+                replace(db, "binding", binding.as_texts().items())
         new.rename(path)
-        sync_directory(path)
+        _sync_directory(path)
     except (sqlite3.Error, OSError) as error:
         raise LedgerError(
             f"{path}: cannot be created: {_reason(error)}; expected a writable place"
         ) from error
-
-
-def _fill(db: sqlite3.Connection, binding: Binding) -> None:
-    """Create the tables of a new file."""
-    with transaction(db):
-        db.execute(f"PRAGMA application_id = {APPLICATION_ID}")
-        migrate(db, 0)
-        db.executemany("INSERT INTO binding VALUES (?, ?)", binding.as_texts().items())
-        write_head(db, 1, b"")
 
 
 def connect(path: Path, binding: Binding) -> sqlite3.Connection:
@@ -83,20 +76,20 @@ def connect(path: Path, binding: Binding) -> sqlite3.Connection:
     Raises
     ------
     LedgerError
-        If the file is damaged, not a ledger, of a newer format, of another leg, or in use.
+        If the file is damaged, not a ledger, of another format, of another leg, or in use.
     """
     try:
-        found = _format_of(path)
+        _check_header(path)
         writable = _is_writable(path)
         if writable and _is_hot(beside(path, "-journal")):
-            _rehearse(path, found, binding)
+            _rehearse(path, binding)
         db = _connect(path, "rw" if writable else "ro&immutable=1")
     except OSError as error:
         raise LedgerError(f"{path}: cannot be opened: {_reason(error)}") from error
     except (sqlite3.Error, ValueError) as error:
         raise _refusal(path, error) from error
     try:
-        _begin(db, path, found, binding, writable)
+        _begin(db, path, binding, writable)
     except BaseException:
         db.close()
         raise
@@ -131,7 +124,7 @@ def hardware_id_of(path: Path) -> str:
 def measurements_of(path: Path) -> str:
     """The measured clearances of a ledger as a text, empty without any; it is read without a lock.
 
-    Where they cannot be read (damaged, of the first format, being written), the text says so: opening it
+    Where they cannot be read (damaged, of another format, being written), the text says so: opening it
     decides.
     """
     if not path.is_file():
@@ -143,7 +136,31 @@ def measurements_of(path: Path) -> str:
         return f"not readable: {error}"
 
 
-def sync_directory(path: Path) -> None:
+@contextmanager
+def copy_of(path: str | Path) -> Iterator[Path]:
+    """Make a temporary private copy of a ledger, for a trial; without a ledger, no file is created.
+
+    Raises
+    ------
+    LedgerError
+        If the ledger cannot be read; errors of the copy are raised again with the name of the ledger itself.
+    """
+    original = Path(path)
+    with tempfile.TemporaryDirectory(prefix="leg_wear_") as place:
+        copy = Path(place) / original.name
+        try:
+            for part in ("", "-journal", "-wal"):  # what SQLite left decides whether it can be used
+                if beside(original, part).exists():
+                    shutil.copyfile(beside(original, part), beside(copy, part))
+        except OSError as error:
+            raise LedgerError(f"{original}: cannot be read: {error.strerror}") from error
+        try:
+            yield copy
+        except LedgerError as error:
+            raise LedgerError(str(error).replace(str(copy), str(original))) from error
+
+
+def _sync_directory(path: Path) -> None:
     """Write the creation or removal of a file's name to the disk."""
     handle = os.open(path.parent, os.O_RDONLY)
     try:
@@ -171,8 +188,8 @@ def _connect(path: Path, mode: str) -> sqlite3.Connection:
     return db
 
 
-def _format_of(path: Path) -> int:
-    """Format number in the file's header, read before SQLite opens the file."""
+def _check_header(path: Path) -> None:
+    """Refuse what is not a ledger of this format by its header, before SQLite opens the file."""
     status = path.stat()
     if not stat.S_ISREG(status.st_mode):
         raise LedgerError(f"{path}: cannot be opened: it is not a file")
@@ -182,23 +199,26 @@ def _format_of(path: Path) -> int:
         header = file.read(_HEADER)
     if not header.startswith(_MAGIC) or len(header) < _HEADER:
         raise LedgerError(f"{path}: is damaged or not a ledger: it is not an SQLite file; {MOVE}")
-    if int.from_bytes(header[68:72], "big") != APPLICATION_ID:
+    application, found = (int.from_bytes(header[at : at + 4]) for at in (68, 60))
+    if application == UNRELEASED_ID:
+        raise LedgerError(
+            f"{path}: has the unreleased format {found}, this version knows only the released ones, up to "
+            f"{FORMAT}; go on with the version that wrote it, or move it away to begin with new parts"
+        )
+    if application != APPLICATION_ID:
         raise LedgerError(f"{path}: is an SQLite file, but not a ledger; {MOVE}")
-    found = int.from_bytes(header[60:64], "big")
     if found > FORMAT:
         raise LedgerError(
             f"{path}: has format {found}, this version knows up to {FORMAT}; install a newer one"
         )
-    if found >= SEALED_FROM:
-        log = beside(path, "-wal")
-        if _has_content(log):
-            raise LedgerError(f"{path}: {log.name} beside it belongs to another ledger; move it away")
-        if header[18:20] != _ROLLBACK:
-            raise LedgerError(f"{path}: is damaged: its header is not what was written; {MOVE}")
-    return found
+    log = beside(path, "-wal")
+    if _has_content(log):
+        raise LedgerError(f"{path}: {log.name} beside it belongs to another ledger; move it away")
+    if found != FORMAT or header[18:20] != _ROLLBACK:
+        raise LedgerError(f"{path}: is damaged: its header is not what was written; {MOVE}")
 
 
-def _rehearse(path: Path, found: int, binding: Binding) -> None:
+def _rehearse(path: Path, binding: Binding) -> None:
     """Undo an interrupted transaction in a copy first: its journal may be of another file or time."""
     with tempfile.TemporaryDirectory() as directory, _locked(path):
         copy = Path(directory) / path.name
@@ -206,7 +226,7 @@ def _rehearse(path: Path, found: int, binding: Binding) -> None:
             shutil.copyfile(beside(path, ending), beside(copy, ending))
         try:
             with closing(_connect(copy, "rw")) as db:
-                _begin(db, copy, found, binding, writable=True)
+                _begin(db, copy, binding, writable=True)
         except (sqlite3.Error, ValueError, LedgerError) as error:
             fault = error if isinstance(error, LedgerError) else _refusal(copy, error)
             reason = str(fault).removeprefix(f"{copy}: ").removesuffix(f"; {MOVE}")
@@ -227,37 +247,20 @@ def _locked(path: Path) -> Iterator[None]:
         yield
 
 
-def _begin(db: sqlite3.Connection, path: Path, found: int, binding: Binding, writable: bool) -> None:
-    """Lock a file, check its whole content, and migrate it if its format has no log (see `recovery`)."""
+def _begin(db: sqlite3.Connection, path: Path, binding: Binding, writable: bool) -> None:
+    """Lock a file, and check that it is complete and contains only what was written."""
     try:
         db.execute("BEGIN EXCLUSIVE" if writable else "BEGIN")
-        _check(db, path, found)
+        if definitions(db) != expected_definitions():
+            raise LedgerError(f"{path}: is damaged: it has other tables or triggers than a ledger; {MOVE}")
+        faults = [fault for (fault,) in db.execute("PRAGMA integrity_check")]
+        if faults != ["ok"]:
+            raise LedgerError(f"{path}: is damaged: {' '.join(faults[0].split())}; {MOVE}")
+        verify(db)
         _check_binding(db, path, binding)
         db.execute("COMMIT")
-        if found < SEALED_FROM:
-            db.execute("PRAGMA journal_mode = DELETE")
-            with transaction(db):
-                migrate(db, found)
-                write_head(db, 1, b"")
-            db.execute(f"PRAGMA page_size = {_PAGE}")
-            db.execute("VACUUM")
     except (sqlite3.Error, ValueError, TypeError, OverflowError) as error:
         raise _refusal(path, error) from error
-
-
-def _check(db: sqlite3.Connection, path: Path, found: int) -> None:
-    """Check that the file is complete and contains only what was written."""
-    if tuple(definitions(db)) != expected_definitions(found):
-        raise LedgerError(
-            f"{path}: is damaged: it has other tables or triggers than a ledger of format {found}; {MOVE}"
-        )
-    faults = [fault for (fault,) in db.execute("PRAGMA integrity_check")]
-    if faults != ["ok"]:
-        raise LedgerError(f"{path}: is damaged: {' '.join(faults[0].split())}; {MOVE}")
-    if found >= SEALED_FROM:
-        verify(db)
-    else:
-        verify_former(db, found)
 
 
 def _check_binding(db: sqlite3.Connection, path: Path, binding: Binding) -> None:

@@ -5,9 +5,12 @@ continues, and the next entry includes all events since the last successful one.
 the wear since the last entry is lost: at most the time between two entries, which the next start reports.
 """
 
+import os
 import sqlite3
-from collections.abc import Callable
+from collections.abc import Callable, Iterator
+from contextlib import closing, contextmanager
 from pathlib import Path
+from typing import TypeVar
 
 import attrs
 import numpy as np
@@ -16,25 +19,46 @@ from leg_wear_monitor.mechanism.arrays import Ints
 from leg_wear_monitor.mechanism.spec import Mechanism
 from leg_wear_monitor.monitor.config.fitting import fitted
 from leg_wear_monitor.monitor.config.settings import MonitorConfig
-from leg_wear_monitor.monitor.ledger.binding import Binding, binding_of
-from leg_wear_monitor.monitor.ledger.entry import Audit, Entry, Event, Measurement, VerdictEvent, Withdrawal
-from leg_wear_monitor.monitor.ledger.file import LedgerError
-from leg_wear_monitor.monitor.ledger.recovery import Recovered
+from leg_wear_monitor.monitor.ledger.entry import (
+    Audit,
+    Binding,
+    ClearancePoint,
+    CorrectedClearance,
+    Entry,
+    Event,
+    ForecastPoint,
+    Measurement,
+    Run,
+    VerdictEvent,
+    WalkedLoad,
+    Withdrawal,
+    binding_of,
+)
+from leg_wear_monitor.monitor.ledger.file import MOVE, LedgerError, connect, copy_of, create, transaction
 from leg_wear_monitor.monitor.ledger.rows import (
     read_commissioned,
     read_commissioned_torques,
-    read_corrections,
+    read_entry,
     read_identified_leg,
     read_last_reset,
+    read_last_run,
     read_last_verdict,
     read_loads,
     read_measurements,
+    read_rows,
     read_simulated_references,
     read_spans,
+    write_entry,
+    write_event,
+    write_run,
 )
-from leg_wear_monitor.monitor.ledger.run import Run
-from leg_wear_monitor.monitor.ledger.store import LedgerStore
-from leg_wear_monitor.monitor.ledger.walked import together
+
+WHOLE_S = 60.0
+"""Longest time in motion between two entries that are written with whole surfaces."""
+
+INTERRUPTED = "the previous run was interrupted, the wear of its last seconds is lost"
+
+_Answer = TypeVar("_Answer")
 
 
 class Ledger:
@@ -78,7 +102,7 @@ class Ledger:
     kept_ns : int
         Stamp of the last entry on the disk, 0 before.
     loss : str
-        Fault found at the opening, and the possible loss; empty if there is none.
+        What was lost before the opening; empty if nothing was.
     fault : str
         Reason of the last failed write; empty if it succeeded.
 
@@ -91,48 +115,53 @@ class Ledger:
     def __init__(self, path: Path | str, binding: Binding, interval_s: float, at_end: bool = False) -> None:
         self.path = Path(path)
         self.at_end = at_end
+        self._binding = binding
         self._events: list[Event] = []
-        self._store = LedgerStore(self.path, binding)
-        found = self._store.found
-        self.entry, self.last_run, self.loss = found.entry, found.run, found.loss
-        self.epoch, self.boot_id = found.run.epoch, found.run.boot_id
-        self.cut_off_s = found.lost_s
+        if not os.path.lexists(self.path):
+            create(self.path, binding)
+        self._db: sqlite3.Connection | None = connect(self.path, binding)
+        self._place = _place(self.path)
         self._interval_s = interval_s
-        self.kept_ns = self.entry.stamp_ns if self.entry else 0
-        self._kept_moving_s = self.entry.moving_s if self.entry else 0.0
         self.fault = ""
-        self._number = found.run.number + 1
+        self._whole_s: float | None = None  # time in motion at the last whole surfaces of this run
         try:
-            self._begin(found)
-            self._read()
+            with _damage_told(self.path):
+                self._read(self._db)
+            self._begin()
         except BaseException:
-            self._store.close()
+            self.close()
             raise
 
-    def _begin(self, found: Recovered) -> None:
-        """Write the last entry of the log and the begin of this run into the tables."""
-        newer = found.entry if found.is_newer else None
-        reported_s = max(found.run.interval_s, found.lost_s or 0.0)
-        run = attrs.evolve(found.run, interval_s=reported_s) if self.at_end else self._run(closed=False)
-        if newer or not self.at_end:
-            self._try(lambda: self._store.write(run, newer, entry_run=found.entry_run))
-        if self.at_end:
-            self._store.check_writable()
+    def _read(self, db: sqlite3.Connection) -> None:
+        self.last_run = read_last_run(db)
+        self._written_run, self._number = self.last_run.number, self.last_run.number + 1
+        self.epoch, self.boot_id = self.last_run.epoch, self.last_run.boot_id
+        self.cut_off_s = None if self.last_run.closed else self.last_run.interval_s
+        self.loss = "" if self.last_run.closed else INTERRUPTED
+        self.entry = read_entry(db)
+        self.kept_ns = self.entry.stamp_ns if self.entry else 0
+        self._kept_moving_s = self.entry.moving_s if self.entry else 0.0
+        self._spans = np.array(sorted(set(read_spans(db))), dtype=np.int64).reshape(-1, 3)
+        self.measurements = read_measurements(db)
+        self.corrections = read_rows(db, CorrectedClearance)
+        self.commissioned = read_commissioned(db)
+        self.commissioned_torques = read_commissioned_torques(db)
+        self.parameters = read_identified_leg(db)
+        self.references = read_simulated_references(db)
+        self.loads = read_loads(db)
 
-    def _read(self) -> None:
-        spans = self._store.ask(read_spans)
-        if self.entry:  # also if the tables could not be written
-            own = self.entry.span_epochs or (0,) * len(self.entry.spans)
-            spans += [(*span, epoch) for span, epoch in zip(self.entry.spans, own, strict=True)]
-        self._spans = np.array(sorted(set(spans)), dtype=np.int64).reshape(-1, 3)
-        self.measurements = self._store.ask(read_measurements)
-        self.corrections = self._store.ask(read_corrections)
-        self.commissioned = self._store.ask(read_commissioned)
-        self.commissioned_torques = self._store.ask(read_commissioned_torques)
-        self.parameters = self._store.ask(read_identified_leg)
-        self.references = self._store.ask(read_simulated_references)
-        others = self._store.ask(lambda db: read_loads(db, "run != ?", self._store.found.entry_run))
-        self.loads = together((*others, *(self.entry.loads if self.entry else ())))
+    def _begin(self) -> None:
+        """Write the begin of this run; for one that is written at its end, check that it can be written."""
+        if not self.at_end:
+            self._write(self._run(closed=False))
+            return
+        db = self._connection()
+        try:
+            db.execute("BEGIN EXCLUSIVE")
+            db.execute("UPDATE run SET closed = closed")
+            db.execute("ROLLBACK")
+        except sqlite3.Error as error:
+            raise LedgerError(f"{self.path}: cannot be written: {error}") from error
 
     @property
     def counted_ns(self) -> Ints:
@@ -193,19 +222,17 @@ class Ledger:
         LedgerError
             If the ledger cannot be read now.
         """
-        return self._store.ask(read_last_verdict)
+        return self._ask(read_last_verdict)
 
     def last_reset(self, joint: str) -> Audit | None:
         """The last stored `reset_wear` of a joint that was not undone, None if there is none.
-
-        Its `joint` is None in rows of formats before 4, which do not contain the whole state of the joint.
 
         Raises
         ------
         LedgerError
             If the ledger cannot be read now.
         """
-        return self._store.ask(lambda db: read_last_reset(db, joint))
+        return self._ask(lambda db: read_last_reset(db, joint))
 
     def keep(self, entry: Entry, closed: bool = False, *, whole: bool = True) -> bool:
         """Write an entry and all events since the last; False if that failed, with the reason in `fault`.
@@ -216,20 +243,15 @@ class Ledger:
         closed : bool
             Whether the run ends normally with this entry.
         whole : bool
-            Whether the surfaces must be stored bit for bit. If False, their rise since the previous entry
-            may be stored in the log, with an error of at most a 36th part of its largest value; an entry is
-            still written whole every ten minutes of motion, or with events.
+            Whether the surfaces must be stored bit for bit. If False, their means are; the surfaces are once
+            in a minute of motion, and after a kill the wear since lies around them as that before.
         """
         if self.at_end and not closed:
             return False
         self._interval_s = max(self._interval_s, entry.moving_s - self._kept_moving_s)
-        run = self._run(closed)
-        if closed or whole or self._events or self._store.is_due(entry):
-            kept = self._try(lambda: self._store.write(run, entry, self._events))
-        else:
-            kept = self._try(lambda: self._store.append(run, entry))
+        is_due = self._whole_s is None or not 0.0 <= entry.moving_s - self._whole_s < WHOLE_S
+        kept = self._write(self._run(closed), entry, closed or whole or is_due)
         if kept:
-            self._events.clear()
             self.kept_ns = entry.stamp_ns
             self._kept_moving_s = entry.moving_s
         return kept
@@ -249,10 +271,8 @@ class Ledger:
         """
         self._interval_s = max(self._interval_s, self.cut_off_s or 0.0)  # until the loss is acknowledged
         run = self._run(closed=self.cut_off_s is None)
-        entry = entry and attrs.evolve(entry, loads=())
-        if not self._try(lambda: self._store.write(run, entry, self._events)):
+        if not self._write(run, entry and attrs.evolve(entry, loads=())):
             raise LedgerError(f"{self.path}: {self.fault}")
-        self._events.clear()
 
     def abandon(self) -> None:
         """End a run that monitored nothing or is to be discarded, and close the file.
@@ -270,20 +290,48 @@ class Ledger:
 
     def close(self) -> None:
         """Close the file; entries are written by `keep`."""
-        self._store.close()
+        if self._db is not None:
+            self._db.close()
+            self._db = None
 
     def _run(self, closed: bool) -> Run:
         return Run(self._number, closed, self._interval_s, self.epoch, self.boot_id)
 
-    def _try(self, write: Callable[[], None]) -> bool:
-        """Whether the write succeeded; if not, `fault` gives the reason."""
+    def _write(self, run: Run, entry: Entry | None = None, whole: bool = True) -> bool:
+        """Write a run, an entry and the events in one transaction; False if that failed, see `fault`."""
         try:
-            write()
+            with transaction(db := self._connection()):
+                write_run(db, run)
+                if entry is not None:
+                    write_entry(db, run.number, entry, whole)
+                for event in self._events:
+                    write_event(db, event)
         except (sqlite3.Error, OSError, ValueError, LedgerError) as error:
+            self.close()  # the next write begins with a fresh connection
             self.fault = " ".join(str(error).split())
             return False
-        self.fault = ""
+        self._events.clear()
+        self._written_run, self.fault = run.number, ""
+        if entry is not None and whole:
+            self._whole_s = entry.moving_s
         return True
+
+    def _ask(self, ask: Callable[[sqlite3.Connection], _Answer]) -> _Answer:
+        """Result of a query."""
+        try:
+            return ask(self._connection())
+        except (sqlite3.Error, ValueError) as error:
+            raise LedgerError(f"{self.path}: cannot be read: {error}") from error
+
+    def _connection(self) -> sqlite3.Connection:
+        """The open connection; it is opened again after a failed write."""
+        if _place(self.path) != self._place:
+            raise LedgerError(f"{self.path}: was moved away or replaced while in use; put it back")
+        if self._db is None:
+            self._db = connect(self.path, self._binding)
+        if read_last_run(self._db).number > self._written_run:
+            raise LedgerError(f"{self.path}: was continued by another monitor meanwhile; end one of them")
+        return self._db
 
 
 def open_ledger(mechanism: Mechanism, config: MonitorConfig, at_end: bool = False) -> Ledger | None:
@@ -307,3 +355,71 @@ def open_ledger(mechanism: Mechanism, config: MonitorConfig, at_end: bool = Fals
         return None
     binding = binding_of(fitted(mechanism, config), config)
     return Ledger(config.ledger.path, binding, config.ledger.checkpoint_s, at_end)
+
+
+@attrs.frozen(kw_only=True, eq=False)
+class LedgerContent:
+    """What a ledger has of its leg.
+
+    Attributes
+    ----------
+    entry : Entry or None
+        The last entry; None in a new ledger.
+    verdict : VerdictEvent or None
+        The last change of the verdict.
+    clearances : tuple of ClearancePoint
+        In the order in which they were written.
+    forecasts : dict of str to ForecastPoint
+        The last forecast of each joint.
+    measurements : tuple of Measurement
+    loads : tuple of WalkedLoad
+        Foot loads of all runs.
+    """
+
+    entry: Entry | None
+    verdict: VerdictEvent | None
+    clearances: tuple[ClearancePoint, ...]
+    forecasts: dict[str, ForecastPoint]
+    measurements: tuple[Measurement, ...]
+    loads: tuple[WalkedLoad, ...]
+
+
+def read_ledger(path: Path, binding: Binding) -> LedgerContent:
+    """Read a ledger of a leg for who only looks: from a copy, because a running monitor locks its ledger.
+
+    Raises
+    ------
+    LedgerError
+        If it cannot be read, is damaged or of another leg; also if the monitor wrote while it was copied.
+    """
+    with copy_of(path) as copy:
+        if not copy.is_file():
+            raise LedgerError(f"{path}: cannot be read: there is no such file")
+        with closing(connect(copy, binding)) as db, _damage_told(path):
+            last = "id IN (SELECT max(id) FROM forecast GROUP BY joint)"
+            return LedgerContent(
+                entry=read_entry(db),
+                verdict=read_last_verdict(db),
+                clearances=read_rows(db, ClearancePoint),
+                forecasts={point.joint: point for point in read_rows(db, ForecastPoint, last)},
+                measurements=read_measurements(db),
+                loads=read_loads(db),
+            )
+
+
+@contextmanager
+def _damage_told(path: Path) -> Iterator[None]:
+    """Tell rows that cannot be what was written in one line."""
+    try:
+        yield
+    except (sqlite3.Error, ValueError, TypeError) as error:
+        raise LedgerError(f"{path}: is damaged: {error}; {MOVE}") from error
+
+
+def _place(path: Path) -> tuple[int, int] | None:
+    """Identity of a file (device and inode), None if there is none."""
+    try:
+        found = path.stat()
+    except OSError:
+        return None
+    return found.st_dev, found.st_ino

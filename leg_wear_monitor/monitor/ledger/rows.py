@@ -1,6 +1,7 @@
 """Entries and events as rows of the ledger's tables, and back."""
 
 import sqlite3
+from typing import Any, TypeVar
 
 import attrs
 import numpy as np
@@ -22,168 +23,295 @@ from leg_wear_monitor.monitor.ledger.entry import (
     IdentifiedLeg,
     JointWear,
     Measurement,
+    Run,
     SimulatedReference,
     VerdictEvent,
+    WalkedLoad,
     Withdrawal,
+    together,
 )
-from leg_wear_monitor.monitor.ledger.run import Run
-from leg_wear_monitor.monitor.ledger.walked import WalkedLoad
+from leg_wear_monitor.monitor.ledger.schema import add, replace, sealed
 from leg_wear_monitor.twin.reference.crank_profile import UNLIKE, CrankProfile
-from leg_wear_monitor.twin.reference.leg_parameters import COUPLING_DAMPING, LegParameters
+from leg_wear_monitor.twin.reference.leg_parameters import LegParameters
 from leg_wear_monitor.twin.reference.leg_simulation import POINTS
 from leg_wear_monitor.twin.reference.torque_reference import CADENCES, CYCLES, TorqueReference
+
+_Row = TypeVar("_Row", Measurement, CorrectedClearance, ForecastPoint, VerdictEvent, ClearancePoint)
+
+# events whose fields are the columns of a table
+_TABLES: dict[type, str] = {
+    ClearancePoint: "history",
+    CorrectedClearance: "correction",
+    ForecastPoint: "forecast",
+    Measurement: "measurement",
+    VerdictEvent: "verdict",
+}
+
+
+# --- runs and entries ---
 
 
 def write_run(db: sqlite3.Connection, run: Run) -> None:
     """Insert or replace a run; to be called within a transaction."""
     values = (run.number, int(run.closed), run.interval_s, run.epoch, run.boot_id)
-    db.execute("INSERT OR REPLACE INTO run VALUES (?, ?, ?, ?, ?)", values)
+    replace(db, "run", [values], "id = ?", (run.number,))
 
 
-def write_entry(db: sqlite3.Connection, run: int, head: int, entry: Entry) -> None:
+def read_last_run(db: sqlite3.Connection) -> Run:
+    """The last run."""
+    last = db.execute(
+        "SELECT id, closed, interval_s, epoch, boot_id FROM run ORDER BY id DESC LIMIT 1"
+    ).fetchone()
+    return Run(last[0], bool(last[1]), *last[2:]) if last else Run()
+
+
+def write_entry(db: sqlite3.Connection, run: int, entry: Entry, whole: bool) -> None:
     """Replace the entry in force; to be called within a transaction.
 
     Parameters
     ----------
     db : sqlite3.Connection
     run : int
-        Run of the entry's spans.
-    head : int
-        Number of the transaction.
+        Run of the entry's spans and loads.
     entry : Entry
+    whole : bool
+        Whether the surfaces are written, too, not only their means.
     """
-    db.execute("INSERT OR REPLACE INTO entry VALUES (1, ?, ?)", (run, entry.stamp_ns))
-    db.executemany(
-        "INSERT INTO joint VALUES (?, ?, ?, ?, ?, ?, ?)",
+    replace(db, "entry", [(1, run, entry.stamp_ns)])
+    replace(
+        db,
+        "joint",
         [
-            (head, j.name, _depth_bytes(j), j.cycles, j.moving_s, j.replaced_ns, j.sampling_m2)
+            (j.name, *j.surface_means_m, j.cycles, j.moving_s, j.replaced_ns, j.sampling_m2)
             for j in entry.joints
         ],
     )
-    db.execute("DELETE FROM joint WHERE head != ?", (head,))
-    db.executemany("INSERT OR REPLACE INTO total VALUES (?, ?)", entry.totals.items())
-    db.execute("DELETE FROM alarm")
-    db.executemany(
-        "INSERT INTO alarm VALUES (?, ?, ?, ?, ?, ?, ?, ?, ?, ?)",
-        [alarm_values(alarm) for alarm in entry.alarms],
-    )
+    if whole:
+        replace(db, "surface", [(joint.name, _blob(joint.depth)) for joint in entry.joints])
+    replace(db, "total", (_totals(db) | entry.totals).items())
+    replace(db, "alarm", [_alarm_values(alarm) for alarm in entry.alarms])
     epochs = entry.span_epochs or (0,) * len(entry.spans)
-    db.execute("DELETE FROM span WHERE run = ? AND part >= ?", (run, len(entry.spans)))
-    db.executemany(
-        "INSERT OR REPLACE INTO span VALUES (?, ?, ?, ?, ?)",
-        [
-            (run, part, *span, epoch)
-            for part, (span, epoch) in enumerate(zip(entry.spans, epochs, strict=True))
-        ],
+    spans = zip(entry.spans, epochs, strict=True)
+    replace(db, "span", [(run, part, *span, of) for part, (span, of) in enumerate(spans)], "run = ?", (run,))
+    replace(db, "load", [(run, *attrs.astuple(load)) for load in entry.loads], "run = ?", (run,))
+
+
+def read_entry(db: sqlite3.Connection) -> Entry | None:
+    """The entry in force, None in a new ledger.
+
+    The surfaces are those that were last written. Where their means are later ones, what was counted since
+    lies around a surface as the wear before it.
+    """
+    found = db.execute("SELECT run, stamp_ns FROM entry").fetchone()
+    if found is None:
+        return None
+    run, stamp_ns = found
+    spans = db.execute(
+        "SELECT begin_ns, end_ns, epoch FROM span WHERE run = ? ORDER BY part", (run,)
+    ).fetchall()
+    joints = db.execute(
+        "SELECT name, depth, cycles, moving_s, replaced_ns, sampling_m2, bushing_m, journal_m "
+        "FROM joint JOIN surface USING (name) ORDER BY name"
     )
-    db.execute("DELETE FROM load WHERE run = ?", (run,))
-    db.executemany(
-        "INSERT INTO load VALUES (?, ?, ?, ?, ?, ?)", [(run, *attrs.astuple(load)) for load in entry.loads]
+    return Entry(
+        stamp_ns=stamp_ns,
+        joints=tuple(_risen(_joint(*row[:6]), row[6:]) for row in joints),
+        totals=_totals(db),
+        alarms=tuple(_alarm_of(*row) for row in db.execute("SELECT * FROM alarm ORDER BY kind, subject")),
+        spans=tuple((begin, end) for begin, end, _ in spans),
+        span_epochs=tuple(epoch for *_, epoch in spans) if any(epoch for *_, epoch in spans) else (),
+        loads=_loads(db, "run = ?", run),
     )
+
+
+def _totals(db: sqlite3.Connection) -> dict[str, float]:
+    return dict(db.execute("SELECT name, value FROM total"))
+
+
+def _joint(
+    name: str, depth: bytes, cycles: int, moving_s: float, replaced_ns: int, sampling_m2: float
+) -> JointWear:
+    return JointWear(name, _floats(depth).reshape(2, -1), cycles, moving_s, replaced_ns, sampling_m2)
+
+
+def _risen(joint: JointWear, means_m: tuple[float, float]) -> JointWear:
+    """A joint whose surfaces have later means."""
+    depth = joint.depth
+    for surface, was_m, mean_m in zip(depth, joint.surface_means_m, means_m, strict=True):
+        if mean_m != was_m:  # equal ones stay to the bit
+            surface[:] = surface * (mean_m / was_m) if was_m > 0.0 else mean_m
+    return joint
+
+
+def _alarm_values(alarm: Alarm) -> tuple[str | int | float | None, ...]:
+    """Values of an alarm's row, None where a number is not known."""
+    found = (alarm.worst, alarm.limit, alarm.sigma)
+    return (
+        alarm.kind, alarm.subject, int(alarm.level), int(alarm.present), int(alarm.acknowledged),
+        alarm.raised_ns, *map(finite_or_none, found), alarm.cause,
+    )  # fmt: skip
+
+
+def _alarm_of(
+    kind: str, subject: str, level: int, present: int, acknowledged: int, raised_ns: int,
+    worst: float | None, limit: float | None, sigma: float | None, cause: str,
+) -> Alarm:  # fmt: skip
+    """The alarm of `_alarm_values`."""
+    return Alarm(
+        kind=kind, subject=subject, level=Level(level), present=Level(present), raised_ns=raised_ns,
+        acknowledged=bool(acknowledged), cause=cause,
+        worst=or_nan(worst), limit=or_nan(limit), sigma=or_nan(sigma),
+    )  # fmt: skip
+
+
+def read_spans(db: sqlite3.Connection) -> list[tuple[int, int, int]]:
+    """Begin, end [ns] and epoch of all counted time spans."""
+    return db.execute("SELECT begin_ns, end_ns, epoch FROM span").fetchall()
+
+
+def read_loads(db: sqlite3.Connection) -> tuple[WalkedLoad, ...]:
+    """Foot loads of all runs."""
+    return together(_loads(db, "run > ?", 0))
+
+
+def _loads(db: sqlite3.Connection, which: str, run: int) -> tuple[WalkedLoad, ...]:
+    rows = db.execute(
+        f"SELECT about_n, cycles, moving_s, mean_n, sigma_n FROM load WHERE {which} ORDER BY run, about_n",
+        (run,),
+    )
+    return tuple(WalkedLoad(*row) for row in rows)
+
+
+# --- events ---
 
 
 def write_event(db: sqlite3.Connection, event: Event) -> None:
     """Append an event; to be called within a transaction."""
     match event:
-        case AlarmEvent(stamp_ns, a):
-            db.execute(
-                "INSERT INTO alarm_history "
-                "(stamp_ns, kind, subject, level, acknowledged, value, limit_value) "
-                "VALUES (?, ?, ?, ?, ?, ?, ?)",
-                (stamp_ns, a.kind, a.subject, int(a.level), int(a.acknowledged), a.value, a.limit),
-            )
-        case ClearancePoint(stamp_ns, cycle, joint, clearance_m, clearance_max_m):
-            db.execute(
-                "INSERT INTO history (stamp_ns, cycle, joint, clearance_m, clearance_max_m) "
-                "VALUES (?, ?, ?, ?, ?)",
-                (stamp_ns, cycle, joint, clearance_m, clearance_max_m),
-            )
-        case Measurement() | CorrectedClearance() | ForecastPoint() | VerdictEvent():
-            _append(db, event)
         case Withdrawal(stamp_ns, who, measurement):
-            db.execute(
-                "UPDATE measurement SET withdrawn_ns = ?, withdrawn_by = ? WHERE id = ?",
-                (stamp_ns, who, measurement),
-            )
+            with sealed(db, "measurement", "id = ?", (measurement,)):
+                db.execute(
+                    "UPDATE measurement SET withdrawn_ns = ?, withdrawn_by = ? WHERE id = ?",
+                    (stamp_ns, who, measurement),
+                )
+        case AlarmEvent(stamp_ns, alarm):
+            values = _alarm_event_values(alarm)
+            add(db, "alarm_history", {"stamp_ns": stamp_ns, **values})
+        case Audit(stamp_ns, who, what, was, undoes):
+            state = _audit_values(was) if was else {}
+            add(db, "audit", {"stamp_ns": stamp_ns, "who": who, "what": what, **state, "undoes": undoes})
         case Commissioned(stamp_ns, encoders, centre_rad, mean, covariance):
             errors = np.concatenate([centre_rad, mean, covariance.ravel()])
-            db.execute(
-                "INSERT INTO commissioning (stamp_ns, encoders, errors) VALUES (?, ?, ?)",
-                (stamp_ns, "\n".join(encoders), errors.astype("<f8").tobytes()),
-            )
+            values = {"stamp_ns": stamp_ns, "encoders": "\n".join(encoders), "errors": _blob(errors)}
+            add(db, "commissioning", values)
         case CommissionedTorque():
-            parts = (event.clearance_m, event.signatures, event.sigma_m)
-            db.execute(
-                "INSERT INTO torque_commissioning (stamp_ns, cycles, clearance_m, signatures, sigma_m, "
-                "delay_s, time_constant_s, load_friction, speed_radps) VALUES (?, ?, ?, ?, ?, ?, ?, ?, ?)",
-                (
-                    event.stamp_ns,
-                    event.cycles,
-                    *(part.astype("<f8").tobytes() for part in parts),
-                    event.channel.delay_s,
-                    event.channel.time_constant_s,
-                    event.channel.load_friction,
-                    event.speed,
-                ),
-            )
-        case IdentifiedLeg(stamp_ns, names, mass, length, friction):
-            db.execute("INSERT INTO friction (stamp_ns, factor) VALUES (?, ?)", (stamp_ns, friction))
-            db.execute(
-                "INSERT INTO drive (stamp_ns, compliance_rad_per_nm, damping_ratio) VALUES (?, ?, ?)",
-                (stamp_ns, event.compliance, event.damping),
-            )
-            force = event.load.astype("<f8").tobytes()
-            db.execute("INSERT INTO ground_load (stamp_ns, force_n) VALUES (?, ?)", (stamp_ns, force))
-            db.executemany(
-                "INSERT INTO body (stamp_ns, name, mass, length) VALUES (?, ?, ?, ?)",
-                [(stamp_ns, *factors) for factors in zip(names, mass, length, strict=True)],
-            )
+            add(db, "torque_commissioning", _baseline_values(event))
+        case IdentifiedLeg(stamp_ns, names, mass, length, friction, compliance, damping, load):
+            leg = LegParameters(np.array(mass), np.array(length), friction, compliance, damping, load)
+            add(db, "identified_leg", {"stamp_ns": stamp_ns, **_leg_values(names, leg)})
         case SimulatedReference():
             _write_reference(db, event)
-        case Audit(stamp_ns, who, what, was, undoes):
-            state: tuple[object, ...] = (None,) * 6
-            if was:
-                surfaces, life = _depth_bytes(was), (was.moving_s, was.replaced_ns, was.sampling_m2)
-                state = was.name, was.cycles, surfaces, *life
-            db.execute(
-                "INSERT INTO audit "
-                "(stamp_ns, who, what, joint, cycles, depth, moving_s, replaced_ns, sampling_m2, undoes) "
-                "VALUES (?, ?, ?, ?, ?, ?, ?, ?, ?, ?)",
-                (stamp_ns, who, what, *state, undoes),
-            )
+        case _:
+            values = attrs.asdict(event, filter=lambda field, _: field.name != "id")
+            add(db, _TABLES[type(event)], values)
 
 
-_TABLES = {
-    Measurement: "measurement",
-    CorrectedClearance: "correction",
-    ForecastPoint: "forecast",
-    VerdictEvent: "verdict",
-}
+def _alarm_event_values(alarm: Alarm) -> dict[str, Any]:
+    return {
+        "kind": alarm.kind,
+        "subject": alarm.subject,
+        "level": int(alarm.level),
+        "acknowledged": int(alarm.acknowledged),
+        "value": alarm.value,
+        "limit_value": alarm.limit,
+    }
 
 
-def _append(
-    db: sqlite3.Connection, event: Measurement | CorrectedClearance | ForecastPoint | VerdictEvent
-) -> None:
-    """Append a row to the table whose columns are the event's fields."""
-    table = _TABLES[type(event)]
-    values = attrs.asdict(event, filter=lambda field, _: field.name != "id")
-    places = ", ".join("?" * len(values))
-    db.execute(f"INSERT INTO {table} ({', '.join(values)}) VALUES ({places})", tuple(values.values()))
+def _audit_values(was: JointWear) -> dict[str, Any]:
+    values = attrs.asdict(was, filter=lambda field, _: field.name != "name")
+    return {"joint": was.name} | values | {"depth": _blob(was.depth)}
+
+
+def _baseline_values(baseline: CommissionedTorque) -> dict[str, Any]:
+    return {
+        "stamp_ns": baseline.stamp_ns,
+        "cycles": baseline.cycles,
+        "clearance_m": _blob(baseline.clearance_m),
+        "signatures": _blob(baseline.signatures),
+        "sigma_m": _blob(baseline.sigma_m),
+        "delay_s": baseline.channel.delay_s,
+        "time_constant_s": baseline.channel.time_constant_s,
+        "load_friction": baseline.channel.load_friction,
+        "speed_radps": baseline.speed,
+    }
+
+
+def _leg_values(names: tuple[str, ...], leg: LegParameters) -> dict[str, Any]:
+    return {
+        "bodies": "\n".join(names),
+        "mass": _blob(leg.mass),
+        "length": _blob(leg.length),
+        "friction": leg.friction,
+        "compliance_rad_per_nm": leg.compliance,
+        "damping_ratio": leg.damping,
+        "load_n": _blob(leg.load),
+    }
+
+
+def _write_reference(db: sqlite3.Connection, event: SimulatedReference) -> None:
+    """Write a reference; a whole one takes the place of that of its cadence, and of one that is not whole."""
+    reference, profile = event.reference, event.reference.profile
+    values = {
+        "stamp_ns": event.stamp_ns,
+        **_leg_values(event.bodies, reference.parameters),
+        "is_whole": int(reference.is_whole),
+        "speed_radps": profile.speed,
+        "legs": len(reference.clearance_m),
+        "ripple_rad": _blob(np.stack([profile.cosine, profile.sine])),
+        "clearance_m": _blob(reference.clearance_m),
+        "expected_torque_nm": reference.torque_nm[0].astype("<f2").tobytes(),
+        "torque_nm": b"".join(one.astype("<f2").tobytes() for one in reference.torque_nm[1:]),
+    }
+    with sealed(db, "torque_reference"):
+        db.execute("DELETE FROM torque_reference WHERE NOT is_whole")
+        if reference.is_whole:
+            alike = (profile.speed, UNLIKE * abs(profile.speed))
+            db.execute("DELETE FROM torque_reference WHERE abs(speed_radps - ?) <= ?", alike)
+            newest = f"SELECT id FROM torque_reference ORDER BY id DESC LIMIT {CADENCES - 1}"
+            db.execute(f"DELETE FROM torque_reference WHERE id NOT IN ({newest})")
+    add(db, "torque_reference", values)
+
+
+def read_rows(db: sqlite3.Connection, kind: type[_Row], which: str = "TRUE") -> tuple[_Row, ...]:
+    """Events whose fields are the columns of a table, in the order of their entry."""
+    names = [field.name for field in attrs.fields(kind)]
+    rows = db.execute(f"SELECT {', '.join(names)} FROM {_TABLES[kind]} WHERE {which} ORDER BY id")
+    return tuple(kind(**dict(zip(names, row, strict=True))) for row in rows)
 
 
 def read_measurements(db: sqlite3.Connection) -> tuple[Measurement, ...]:
     """All measured clearances in the order of their entry, including withdrawn ones."""
-    names = [field.name for field in attrs.fields(Measurement)]
-    rows = db.execute(f"SELECT {', '.join(names)} FROM measurement ORDER BY id")
-    found = (Measurement(**dict(zip(names, row, strict=True))) for row in rows)
-    return tuple(attrs.evolve(each, counts=bool(each.counts)) for each in found)
+    return tuple(attrs.evolve(each, counts=bool(each.counts)) for each in read_rows(db, Measurement))
 
 
-def read_corrections(db: sqlite3.Connection) -> tuple[CorrectedClearance, ...]:
-    """All counted clearances that were corrected by the drive torque, in the order of their entry."""
-    names = [field.name for field in attrs.fields(CorrectedClearance)]
-    rows = db.execute(f"SELECT {', '.join(names)} FROM correction ORDER BY id")
-    return tuple(CorrectedClearance(*row) for row in rows)
+def read_last_verdict(db: sqlite3.Connection) -> VerdictEvent | None:
+    """The last change of the verdict."""
+    found = read_rows(db, VerdictEvent, "id = (SELECT max(id) FROM verdict)")
+    return found[0] if found else None
+
+
+def read_last_reset(db: sqlite3.Connection, joint: str) -> Audit | None:
+    """The last `reset_wear` of a joint that was not undone, None if there is none."""
+    row = db.execute(
+        "SELECT id, stamp_ns, who, what, joint, depth, cycles, moving_s, replaced_ns, sampling_m2 "
+        "FROM audit AS a WHERE joint = ? AND what = 'reset_wear' "
+        "AND NOT EXISTS (SELECT 1 FROM audit WHERE undoes = a.id) ORDER BY id DESC LIMIT 1",
+        (joint,),
+    ).fetchone()
+    if row is None:
+        return None
+    number, stamp_ns, who, what = row[:4]
+    return Audit(stamp_ns, who, what, _joint(*row[4:]), id=number)
 
 
 def read_commissioned(db: sqlite3.Connection) -> Commissioned | None:
@@ -193,7 +321,7 @@ def read_commissioned(db: sqlite3.Connection) -> Commissioned | None:
     ).fetchone()
     if row is None:
         return None
-    encoders, errors = tuple(row[1].split("\n")), np.frombuffer(row[2], "<f8").astype(float)
+    encoders, errors = tuple(row[1].split("\n")), _floats(row[2])
     m = len(encoders)
     p = 1 + 2 * m
     return Commissioned(row[0], encoders, errors[:m], errors[m : m + p], errors[m + p :].reshape(p, p))
@@ -211,7 +339,7 @@ def read_commissioned_torques(db: sqlite3.Connection) -> list[CommissionedTorque
         "WHERE stamp_ns > (SELECT coalesce(max(replaced_ns), 0) FROM joint) ORDER BY id DESC"
     ):
         stamp_ns, cycles, speed, delay_s, time_constant_s, load_friction = row[:6]
-        clearance_m, signatures, sigma_m = (np.frombuffer(part, "<f8").astype(float) for part in row[6:])
+        clearance_m, signatures, sigma_m = map(_floats, row[6:])
         channel = Channel(delay_s=delay_s, time_constant_s=time_constant_s, load_friction=load_friction)
         one = CommissionedTorque(
             stamp_ns, clearance_m, signatures.reshape(cycles, -1), sigma_m, channel, speed
@@ -223,68 +351,17 @@ def read_commissioned_torques(db: sqlite3.Connection) -> list[CommissionedTorque
     return found
 
 
+_LEG = "stamp_ns, bodies, mass, length, friction, compliance_rad_per_nm, damping_ratio, load_n"
+
+
 def read_identified_leg(db: sqlite3.Connection) -> IdentifiedLeg | None:
-    """Masses, lengths, friction and drive of the leg, None if they were not identified.
-
-    Rows of older formats were identified with the friction of the mechanism file, with a rigid drive, or in
-    the air.
-    """
-    rows = db.execute(
-        "SELECT stamp_ns, name, mass, length FROM body "
-        "WHERE stamp_ns = (SELECT stamp_ns FROM body ORDER BY id DESC LIMIT 1) ORDER BY id"
-    ).fetchall()
-    if not rows:
+    """Masses, lengths, friction and drive of the leg, None if they were not identified."""
+    row = db.execute(f"SELECT {_LEG} FROM identified_leg ORDER BY id DESC LIMIT 1").fetchone()
+    if row is None:
         return None
-    stamps, names, mass, length = zip(*rows, strict=True)
-    friction, drive, load = (
-        db.execute(f"SELECT {value} FROM {table} WHERE stamp_ns = ? ORDER BY id DESC", stamps[:1]).fetchone()
-        for table, value in (
-            ("friction", "factor"),
-            ("drive", "compliance_rad_per_nm, damping_ratio"),
-            ("ground_load", "force_n"),
-        )
-    )
-    compliance, damping = drive or (0.0, COUPLING_DAMPING)
-    factor = friction[0] if friction else 1.0
-    return IdentifiedLeg(
-        stamps[0], names, mass, length, factor, compliance, damping, _force(load[0] if load else b"")
-    )
-
-
-def _write_reference(db: sqlite3.Connection, event: SimulatedReference) -> None:
-    """Write a reference; a whole one takes the place of that of its cadence, and of one that is not whole."""
-    values, speed = _reference_values(event), event.reference.profile.speed
-    if event.reference.is_whole:
-        db.execute(
-            "DELETE FROM torque_reference WHERE abs(speed_radps - ?) <= ?", (speed, UNLIKE * abs(speed))
-        )
-    db.execute("DELETE FROM torque_reference WHERE NOT is_whole")
-    places = ", ".join("?" * len(values))
-    db.execute(f"INSERT INTO torque_reference VALUES (NULL, {places})", values)
-    newest = f"SELECT id FROM torque_reference WHERE is_whole ORDER BY id DESC LIMIT {CADENCES}"
-    db.execute(f"DELETE FROM torque_reference WHERE is_whole AND id NOT IN ({newest})")
-
-
-def _reference_values(event: SimulatedReference) -> tuple[float | bytes | str, ...]:
-    """Values of the columns of a reference, without its id."""
-    reference = event.reference
-    profile, leg, known = reference.profile, reference.parameters, reference.clearance_m
-    ripple = np.stack([profile.cosine, profile.sine])
-    return (
-        int(reference.is_whole),
-        event.stamp_ns,
-        profile.speed,
-        *(part.astype("<f8").tobytes() for part in (ripple, known)),
-        len(known),
-        "\n".join(event.bodies),
-        *(part.astype("<f8").tobytes() for part in (leg.mass, leg.length)),
-        leg.friction,
-        leg.compliance,
-        leg.damping,
-        leg.load.astype("<f8").tobytes(),
-        reference.torque_nm[0].astype("<f2").tobytes(),
-        b"".join(one.astype("<f2").tobytes() for one in reference.torque_nm[1:]),
-    )
+    names, leg = _leg_of(*row[1:])
+    mass, length = tuple(leg.mass.tolist()), tuple(leg.length.tolist())
+    return IdentifiedLeg(row[0], names, mass, length, leg.friction, leg.compliance, leg.damping, leg.load)
 
 
 def read_simulated_references(db: sqlite3.Connection) -> list[SimulatedReference]:
@@ -293,152 +370,40 @@ def read_simulated_references(db: sqlite3.Connection) -> list[SimulatedReference
     One whose simulation was not finished is among them.
     """
     rows = db.execute(
-        "SELECT is_whole, stamp_ns, bodies, speed_radps, legs, friction, compliance_rad_per_nm, "
-        "damping_ratio, load_n, ripple_rad, clearance_m, mass, length, expected_torque_nm, torque_nm "
+        f"SELECT {_LEG}, is_whole, speed_radps, legs, ripple_rad, clearance_m, expected_torque_nm, torque_nm "
         "FROM torque_reference ORDER BY id DESC"
     )
-    return [_reference_of(*row) for row in rows]
+    return [SimulatedReference(row[0], *_reference_of(row[1:8], *row[8:])) for row in rows]
 
 
 def _reference_of(
-    is_whole: int,
-    stamp_ns: int,
-    bodies: str,
-    speed: float,
-    legs: int,
-    friction: float,
-    compliance: float,
-    damping: float,
-    load_n: bytes,
-    *parts: bytes,
-) -> SimulatedReference:
-    """Reference of a row."""
-    ripple, known, mass, length = (np.frombuffer(part, "<f8").astype(float) for part in parts[:4])
+    leg: tuple[Any, ...], is_whole: int, speed: float, legs: int, *parts: bytes
+) -> tuple[tuple[str, ...], TorqueReference]:
+    """Bodies and reference of a row."""
+    names, parameters = _leg_of(*leg)
+    ripple, known = map(_floats, parts[:2])
     expected, wider = (
-        np.frombuffer(part, "<f2").astype(np.float16).reshape(-1, POINTS) for part in parts[4:]
+        np.frombuffer(part, "<f2").astype(np.float16).reshape(-1, POINTS) for part in parts[2:]
     )
-    profile, leg = (
-        CrankProfile(speed, *ripple.reshape(2, -1)),
-        LegParameters(mass, length, friction, compliance, damping, _force(load_n)),
-    )
-    reference = TorqueReference(profile, known.reshape(legs, -1), (expected,), leg)
+    profile = CrankProfile(speed, *ripple.reshape(2, -1))
+    reference = TorqueReference(profile, known.reshape(legs, -1), (expected,), parameters)
     cycles = len(expected) if reference.is_of_parameters else CYCLES
     shape = (legs - 1, -1, POINTS) if is_whole else (-1, cycles, POINTS)
-    reference = attrs.evolve(reference, torque_nm=(expected, *wider.reshape(shape)))
-    return SimulatedReference(stamp_ns, tuple(bodies.split("\n")), reference)
+    return names, attrs.evolve(reference, torque_nm=(expected, *wider.reshape(shape)))
 
 
-def _force(part: bytes) -> Floats:
-    """A force (n, 2) [N]."""
-    return np.frombuffer(part, "<f8").astype(float).reshape(-1, 2)
+def _leg_of(
+    bodies: str, mass: bytes, length: bytes, friction: float, compliance: float, damping: float, load: bytes
+) -> tuple[tuple[str, ...], LegParameters]:
+    """Names of the bodies and parameters of the leg, of the values of `_leg_values`."""
+    force = _floats(load).reshape(-1, 2)
+    leg = LegParameters(_floats(mass), _floats(length), friction, compliance, damping, force)
+    return tuple(bodies.split("\n")), leg
 
 
-def read_last_reset(db: sqlite3.Connection, joint: str) -> Audit | None:
-    """The last `reset_wear` of a joint that was not undone, None if there is none.
-
-    Rows of older formats do not contain the whole state of the joint: `joint` is then None.
-    """
-    row = db.execute(
-        "SELECT id, stamp_ns, who, what, joint, depth, cycles, moving_s, replaced_ns, "
-        "coalesce(sampling_m2, 0) FROM audit AS a "
-        "WHERE joint = ? AND what = 'reset_wear' "
-        "AND NOT EXISTS (SELECT 1 FROM audit WHERE undoes = a.id) ORDER BY id DESC LIMIT 1",
-        (joint,),
-    ).fetchone()
-    if row is None:
-        return None
-    was = None if row[7] is None else _joint(*row[4:])
-    number, stamp_ns, who, what = row[:4]
-    return Audit(stamp_ns, who, what, was, id=number)
+def _blob(values: Floats) -> bytes:
+    return np.ascontiguousarray(values, dtype="<f8").tobytes()
 
 
-def read_entry(db: sqlite3.Connection) -> tuple[int, Entry] | None:
-    """Run and content of the entry in the tables, None in a new ledger."""
-    found = db.execute("SELECT run, stamp_ns FROM entry").fetchone()
-    if found is None:
-        return None
-    run, stamp_ns = found
-    spans = db.execute(
-        "SELECT begin_ns, end_ns, epoch FROM span WHERE run = ? ORDER BY part", (run,)
-    ).fetchall()
-    joints = db.execute("SELECT * FROM joint ORDER BY name")  # before format 9 without sampling_m2
-    return run, Entry(
-        stamp_ns=stamp_ns,
-        joints=tuple(_joint(*row[1:]) for row in joints),
-        totals=dict(db.execute("SELECT name, value FROM total")),
-        alarms=tuple(alarm_of(*row) for row in db.execute("SELECT * FROM alarm")),
-        spans=tuple((begin, end) for begin, end, _ in spans),
-        span_epochs=tuple(epoch for *_, epoch in spans) if any(epoch for *_, epoch in spans) else (),
-        loads=read_loads(db, "run = ?", run),
-    )
-
-
-def read_spans(db: sqlite3.Connection) -> list[tuple[int, int, int]]:
-    """Begin, end [ns] and epoch of all counted time spans."""
-    return db.execute("SELECT begin_ns, end_ns, epoch FROM span").fetchall()
-
-
-def read_loads(db: sqlite3.Connection, which: str, run: int) -> tuple[WalkedLoad, ...]:
-    """Foot loads of the runs that a condition on ``run`` selects; none before format 17."""
-    if not db.execute("SELECT 1 FROM sqlite_master WHERE name = 'load'").fetchone():
-        return ()
-    rows = db.execute(
-        f"SELECT about_n, cycles, moving_s, mean_n, sigma_n FROM load WHERE {which} ORDER BY run, about_n",
-        (run,),
-    )
-    return tuple(WalkedLoad(*row) for row in rows)
-
-
-def read_last_verdict(db: sqlite3.Connection) -> VerdictEvent | None:
-    """The last change of the verdict."""
-    names = [field.name for field in attrs.fields(VerdictEvent)]
-    row = db.execute(f"SELECT {', '.join(names)} FROM verdict ORDER BY id DESC LIMIT 1").fetchone()
-    return VerdictEvent(**dict(zip(names, row, strict=True))) if row else None
-
-
-def read_last_run(db: sqlite3.Connection) -> Run:
-    """The last run."""
-    last = db.execute(
-        "SELECT id, closed, interval_s, epoch, boot_id FROM run ORDER BY id DESC LIMIT 1"
-    ).fetchone()
-    return Run(last[0], bool(last[1]), *last[2:]) if last else Run()
-
-
-def _depth_bytes(joint: JointWear) -> bytes:
-    return np.ascontiguousarray(joint.depth, dtype="<f8").tobytes()
-
-
-def _joint(
-    name: str, depth: bytes, cycles: int, moving_s: float, replaced_ns: int, sampling_m2: float = 0.0
-) -> JointWear:
-    surfaces = np.frombuffer(depth, "<f8").reshape(2, -1).copy()
-    return JointWear(name, surfaces, cycles, moving_s, replaced_ns, sampling_m2)
-
-
-def alarm_values(alarm: Alarm) -> list[str | int | float | None]:
-    """Values of an alarm as of a row, None where a number is not known."""
-    found = (alarm.worst, alarm.limit, alarm.sigma)
-    return [
-        alarm.kind, alarm.subject, int(alarm.level), int(alarm.present), bool(alarm.acknowledged),
-        alarm.raised_ns, *map(finite_or_none, found), alarm.cause,
-    ]  # fmt: skip
-
-
-def alarm_of(
-    kind: str,
-    subject: str,
-    level: int,
-    present: int,
-    acknowledged: int,
-    raised_ns: int,
-    worst: float | None,
-    limit: float | None,
-    sigma: float | None = None,  # before format 10 without it and the cause
-    cause: str = "",
-) -> Alarm:
-    """The alarm of `alarm_values`."""
-    return Alarm(
-        kind=kind, subject=subject, level=Level(level), present=Level(present),
-        acknowledged=bool(acknowledged), raised_ns=raised_ns, cause=cause,
-        worst=or_nan(worst), limit=or_nan(limit), sigma=or_nan(sigma),
-    )  # fmt: skip
+def _floats(blob: bytes) -> Floats:
+    return np.frombuffer(blob, "<f8").astype(float)

@@ -9,8 +9,7 @@ from leg_wear_monitor.configuration.strict import structure
 from leg_wear_monitor.data_frame import data_frame
 from leg_wear_monitor.errors import ConfigError
 from leg_wear_monitor.json_text import json_text
-from leg_wear_monitor.monitor.ledger.entry import Measurement
-from leg_wear_monitor.monitor.ledger.walked import WalkedLoad
+from leg_wear_monitor.monitor.ledger.entry import Measurement, WalkedLoad
 from leg_wear_monitor.monitor.reports import FootLoad, Lost
 from leg_wear_monitor.monitor.verdict.verdict import Verdict
 from leg_wear_monitor.playback.result.condition import JointClearance, LifeHours

@@ -170,7 +170,7 @@ def _life_text() -> str:
     """Five lives of the four-bar, made up, and bound to it."""
     if not _LIFE:
         from leg_wear_monitor.mechanism.loader import load_mechanism
-        from leg_wear_monitor.monitor.ledger.binding import fingerprint
+        from leg_wear_monitor.monitor.ledger.entry import fingerprint
 
         leg = load_mechanism("four_bar")
         lives = []

@@ -20,7 +20,7 @@ from leg_wear_monitor.dashboard.ledger_leg import LedgerLeg
 from leg_wear_monitor.mechanism.loader import load_mechanism
 from leg_wear_monitor.monitor.config.fitting import fitted
 from leg_wear_monitor.monitor.config.settings import MonitorConfig
-from leg_wear_monitor.monitor.ledger.binding import binding_of
+from leg_wear_monitor.monitor.ledger.entry import binding_of
 from leg_wear_monitor.monitor.ledger.ledger import Ledger
 
 SHORT, LONG = 12, 600

@@ -13,7 +13,7 @@ from leg_wear_monitor.mechanism.loader import parse_mechanism, shipped_mechanism
 from leg_wear_monitor.mechanism.materials.load import bushing_of
 from leg_wear_monitor.mechanism.materials.of_joints import regimes
 from leg_wear_monitor.mechanism.plausible import doubts
-from leg_wear_monitor.monitor.ledger.binding import fingerprint
+from leg_wear_monitor.monitor.ledger.entry import fingerprint
 
 pytestmark = pytest.mark.plain
 

@@ -256,7 +256,7 @@ def test_a_sensor_added_later_is_commissioned_then_and_all_is_held(begin, read, 
     with closing(sqlite3.connect(tmp_path / "wear.ledger")) as db, db:
         (errors,) = db.execute("SELECT errors FROM commissioning ORDER BY id DESC").fetchone()
         db.execute("UPDATE commissioning SET errors = ?", (errors[:-1] + bytes([errors[-1] ^ 1]),))
-    with pytest.raises(LedgerError, match="is damaged: the checksum of its table commissioning"):
+    with pytest.raises(LedgerError, match="is damaged: the checksum over all its rows"):
         begin({})
 
 

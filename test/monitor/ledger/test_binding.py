@@ -8,7 +8,7 @@ import pytest
 
 import leg_wear_monitor as lw
 from leg_wear_monitor.mechanism.clearance import Film
-from leg_wear_monitor.monitor.ledger.binding import fingerprint
+from leg_wear_monitor.monitor.ledger.entry import fingerprint
 from leg_wear_monitor.share import share_directory
 
 pytestmark = pytest.mark.plain

@@ -17,7 +17,7 @@ STORY = """
 import subprocess, sys
 from pathlib import Path
 import numpy as np
-from leg_wear_monitor.monitor.ledger.binding import Binding
+from leg_wear_monitor.monitor.ledger.entry import Binding
 from leg_wear_monitor.monitor.ledger.ledger import Ledger
 from leg_wear_monitor.monitor.ledger.entry import Entry, JointWear
 

@@ -176,7 +176,7 @@ def test_a_replaced_part_has_its_history(begin, gait, tmp_path):
 def test_a_ledger_that_cannot_be_written_stops_nothing(begin, gait):
     monitor, ledger = begin({"ledger.checkpoint_s": 1.0})
     monitor.update(gait(1.5))
-    ledger._store._db.execute("PRAGMA query_only = ON")
+    ledger._db.execute("PRAGMA query_only = ON")
     ledger.path.rename(ledger.path.with_suffix(".away"))
     reports = monitor.update(gait(2.0, begin_s=1.5))
     assert len(reports.cycles) == 2

@@ -9,23 +9,26 @@ from contextlib import closing
 import attrs
 import numpy as np
 import pytest
+from ledger_contents import contents
 
 from leg_wear_monitor.estimate.commissioned_torque import CommissionedTorque
 from leg_wear_monitor.mechanism.loader import load_mechanism
 from leg_wear_monitor.monitor.alarms.alarm import Alarm, Level
 from leg_wear_monitor.monitor.config.fitting import fitted
 from leg_wear_monitor.monitor.config.parameters import config_from
-from leg_wear_monitor.monitor.ledger.binding import Binding, binding_of
 from leg_wear_monitor.monitor.ledger.entry import (
     AlarmEvent,
     Audit,
+    Binding,
     ClearancePoint,
     ForecastPoint,
+    Measurement,
     SimulatedReference,
+    binding_of,
 )
 from leg_wear_monitor.monitor.ledger.file import LedgerError
 from leg_wear_monitor.monitor.ledger.ledger import Ledger
-from leg_wear_monitor.monitor.ledger.schema import FORMAT
+from leg_wear_monitor.monitor.ledger.schema import FORMAT, UNRELEASED_ID
 from leg_wear_monitor.twin.reference.crank_profile import CrankProfile
 from leg_wear_monitor.twin.reference.leg_parameters import LegParameters
 from leg_wear_monitor.twin.reference.leg_simulation import POINTS
@@ -34,6 +37,11 @@ from leg_wear_monitor.twin.reference.torque_reference import CYCLES, TorqueRefer
 pytestmark = pytest.mark.plain
 
 SECOND = 10**9
+
+MEASURED = Measurement(
+    stamp_ns=1, joint="A", who="ann", clearance_m=3e-4, sigma_m=1e-6, wear_m=1e-5, cycles=3,
+    replaced_ns=0, expected_below=0.3, counts=True,
+)  # fmt: skip
 
 
 def test_a_new_ledger_is_empty(open_ledger):
@@ -48,7 +56,7 @@ def test_what_is_kept_is_there_again(open_ledger, entry_at):
         assert ledger.keep(entry_at(second))
     ledger.close()
     found = open_ledger()
-    assert found.entry.digest() == entry_at(3).digest()
+    assert contents(found.entry) == contents(entry_at(3))
     for joint, given in zip(found.entry.joints, entry_at(3).joints, strict=True):
         np.testing.assert_array_equal(joint.depth, given.depth)
         assert (joint.name, joint.cycles, joint.moving_s) == (given.name, 3, given.moving_s)
@@ -150,9 +158,24 @@ def newer(path):
         db.execute(f"PRAGMA user_version = {FORMAT + 1}")
 
 
+def unreleased(number):
+    """Makes a ledger as the formats before the first release had it, with a log beside it."""
+
+    def make(path):
+        with closing(sqlite3.connect(path)) as db:
+            db.execute("PRAGMA journal_mode = WAL" if number < 4 else "PRAGMA journal_mode = DELETE")
+            db.execute("CREATE TABLE joint (name TEXT PRIMARY KEY, depth BLOB NOT NULL) STRICT")
+            db.execute(f"PRAGMA application_id = {UNRELEASED_ID}")
+            db.execute(f"PRAGMA user_version = {number}")
+        path.with_name(path.name + "-log").write_bytes(b"LWMLOG1")
+
+    return make
+
+
 @pytest.mark.parametrize(
     ("make", "said"),
     [
+        *((unreleased(n), rf"has the unreleased format {n}, .* move it away to begin") for n in range(1, 18)),
         (lambda path: path.write_bytes(b""), "is empty, not a ledger"),
         (lambda path: path.write_text("bodies: {}\n" * 1000), "damaged or not a ledger"),
         (lambda path: path.mkdir(), "cannot be opened"),
@@ -164,10 +187,11 @@ def newer(path):
 def test_what_is_no_ledger_is_refused_and_left_alone(open_ledger, tmp_path, make, said):
     path = tmp_path / "wear.ledger"
     make(path)
-    before = path.read_bytes() if path.is_file() else None
-    with pytest.raises(LedgerError, match=said):
+    before = {each.name: each.read_bytes() for each in tmp_path.iterdir() if each.is_file()}
+    with pytest.raises(LedgerError, match=said) as caught:
         open_ledger()
-    assert (path.read_bytes() if path.is_file() else None) == before
+    assert "\n" not in str(caught.value) and str(path) in str(caught.value)
+    assert {each.name: each.read_bytes() for each in tmp_path.iterdir() if each.is_file()} == before
 
 
 def test_a_place_that_cannot_be_written_is_refused(open_ledger, tmp_path):
@@ -178,7 +202,7 @@ def test_a_place_that_cannot_be_written_is_refused(open_ledger, tmp_path):
 def test_two_monitors_cannot_keep_one_ledger(open_ledger, tmp_path, binding):
     open_ledger()
     code = (
-        "from leg_wear_monitor.monitor.ledger.binding import Binding\n"
+        "from leg_wear_monitor.monitor.ledger.entry import Binding\n"
         "from leg_wear_monitor.monitor.ledger.ledger import Ledger, LedgerError\n"
         "try:\n"
         f"    Ledger({str(tmp_path / 'wear.ledger')!r}, {binding!r}, 5.0)\n"
@@ -207,7 +231,7 @@ def test_no_damage_goes_unnoticed(open_ledger, entry_at, tmp_path):
         path.write_bytes(broken)
         try:
             found = open_ledger(path=path)
-            assert found.entry.digest() == entry_at(1).digest()
+            assert contents(found.entry) == contents(entry_at(1))
             found.close()
         except LedgerError as error:
             refused += 1
@@ -220,7 +244,7 @@ def test_no_damage_goes_unnoticed(open_ledger, entry_at, tmp_path):
 def test_a_write_that_fails_is_said_and_made_up_for(open_ledger, entry_at):
     ledger = open_ledger()
     ledger.keep(entry_at(1))
-    ledger._store._db.execute("PRAGMA query_only = ON")  # what a file system gone read-only gives
+    ledger._db.execute("PRAGMA query_only = ON")  # what a file system gone read-only gives
     ledger.note(Audit(2, "ann", "reset_wear"))
     assert not ledger.keep(entry_at(2))
     assert "readonly" in ledger.fault
@@ -229,22 +253,22 @@ def test_a_write_that_fails_is_said_and_made_up_for(open_ledger, entry_at):
     assert (ledger.fault, ledger.kept_ns) == ("", 3 * SECOND)
     ledger.close()
     found = open_ledger()
-    assert found.entry.digest() == entry_at(3).digest()
+    assert contents(found.entry) == contents(entry_at(3))
     assert found.cut_off_s == 5.0
-    assert found._store._db.execute("SELECT count(*) FROM audit").fetchone() == (1,)
+    assert found._db.execute("SELECT count(*) FROM audit").fetchone() == (1,)
 
 
 def test_a_full_disk_is_said_and_leaves_the_last_entry(open_ledger, entry_at):
     ledger = open_ledger()
     ledger.keep(entry_at(1))
-    pages = ledger._store._db.execute("PRAGMA page_count").fetchone()[0]
-    ledger._store._db.execute(f"PRAGMA max_page_count = {pages}")
+    pages = ledger._db.execute("PRAGMA page_count").fetchone()[0]
+    ledger._db.execute(f"PRAGMA max_page_count = {pages}")
     for _ in range(20):
         ledger.note(Audit(2, "ann", "reset_wear", entry_at(2).joints[0]))
     assert not ledger.keep(entry_at(2))
     assert "full" in ledger.fault
     ledger.close()
-    assert open_ledger().entry.digest() == entry_at(1).digest()
+    assert contents(open_ledger().entry) == contents(entry_at(1))
 
 
 def test_a_ledger_moved_away_while_in_use_is_said(open_ledger, entry_at, tmp_path):
@@ -259,14 +283,14 @@ def test_a_ledger_moved_away_while_in_use_is_said(open_ledger, entry_at, tmp_pat
 
 def test_a_ledger_continued_by_another_after_a_fault_is_not_written(open_ledger, entry_at):
     ledger = open_ledger()
-    ledger._store._db.execute("PRAGMA query_only = ON")
+    ledger._db.execute("PRAGMA query_only = ON")
     assert not ledger.keep(entry_at(1))  # lets go of the file
     other = open_ledger()
     other.keep(entry_at(5))
     other.close()
     assert not ledger.keep(entry_at(2))
     assert "another monitor" in ledger.fault
-    assert open_ledger().entry.digest() == entry_at(5).digest()
+    assert contents(open_ledger().entry) == contents(entry_at(5))
 
 
 def test_a_half_made_ledger_is_no_ledger(open_ledger, tmp_path):
@@ -365,3 +389,54 @@ def test_references_and_baselines_are_kept_for_each_cadence(open_ledger, entry_a
     found.keep(entry_at(3), closed=True)
     found.close()
     assert [one.stamp_ns for one in open_ledger().commissioned_torques] == [20]
+
+
+def test_a_measurement_that_is_withdrawn_is_kept_and_told_as_withdrawn(open_ledger):
+    ledger = open_ledger()
+    ledger.note(MEASURED)
+    ledger.record()
+    ledger.close()
+    ledger = open_ledger()
+    (found,) = ledger.measurements
+    assert not found.is_withdrawn
+    assert ledger.withdraw(found.id, 77, "bob").is_withdrawn
+    with pytest.raises(LedgerError, match="is withdrawn already"):
+        ledger.withdraw(found.id, 78, "bob")
+    with pytest.raises(LedgerError, match="has no measurement 9, it has 1"):
+        ledger.withdraw(9, 78, "bob")
+    ledger.record()
+    ledger.close()
+    (found,) = open_ledger().measurements
+    assert (found.withdrawn_ns, found.withdrawn_by, found.counts) == (77, "bob", True)
+
+
+def test_a_reset_can_be_read_whole_until_it_is_undone(open_ledger, entry_at):
+    ledger = open_ledger()
+    assert ledger.last_reset("A") is None
+    was = entry_at(2).joints
+    for stamp, joint in ((1, was[0]), (2, was[1]), (3, entry_at(5).joints[0])):
+        ledger.note(Audit(stamp, "ann", "reset_wear", joint))
+    ledger.keep(entry_at(6))
+    last = ledger.last_reset("A")
+    assert (last.stamp_ns, last.joint.cycles, last.joint.moving_s) == (3, 5, 4.5)
+    assert last.joint.depth.tobytes() == entry_at(5).joints[0].depth.tobytes()
+    ledger.note(Audit(4, "ann", "undo_reset", entry_at(6).joints[0], undoes=last.id))
+    ledger.keep(entry_at(7))
+    first = ledger.last_reset("A")
+    assert (first.stamp_ns, first.joint.replaced_ns) == (1, was[0].replaced_ns)
+    assert ledger.last_reset("B").joint.replaced_ns == was[1].replaced_ns == 1
+
+
+def test_spans_are_kept_by_epochs_of_the_clock(open_ledger, entry_at):
+    ledger = open_ledger()
+    ledger.epoch, ledger.boot_id = 3, "7f-2"
+    spans = ((5, 9), (1, 7), (10, 12))
+    ledger.keep(attrs.evolve(entry_at(1), spans=spans, span_epochs=(2, 3, 3)), closed=True)
+    ledger.close()
+    found = open_ledger()
+    assert (found.entry.spans, found.entry.span_epochs) == (spans, (2, 3, 3))
+    assert found.counted_in(2).tolist() == [[5, 9]]
+    assert found.counted_in(3).tolist() == [[1, 7], [10, 12]]
+    assert found.counted_in(0).shape == (0, 2)
+    assert (found.epoch, found.boot_id) == (3, "7f-2")
+    assert (found.last_run.epoch, found.last_run.boot_id, found.last_run.closed) == (3, "7f-2", True)

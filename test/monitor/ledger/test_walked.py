@@ -4,8 +4,8 @@ import attrs
 import numpy as np
 import pytest
 
-from leg_wear_monitor.monitor.ledger.reading import read_ledger
-from leg_wear_monitor.monitor.ledger.walked import WalkedLoad, together, walked_words
+from leg_wear_monitor.monitor.ledger.entry import WalkedLoad, together, walked_words
+from leg_wear_monitor.monitor.ledger.ledger import read_ledger
 
 pytestmark = pytest.mark.plain
 

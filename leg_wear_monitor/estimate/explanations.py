@@ -73,6 +73,25 @@ class OtherChannel:
 
 
 @attrs.frozen(eq=False)
+class LeftOut:
+    """Some commissioned gait cycles, seen by the others.
+
+    Attributes
+    ----------
+    covariance : (F, F) array
+        Of a gait cycle, by the others.
+    departures : (n, F) array
+        From the mean of the others.
+    others : int
+        Their number.
+    """
+
+    covariance: Floats
+    departures: Floats
+    others: int
+
+
+@attrs.frozen(eq=False)
 class Baseline:
     """What measured signatures have in addition to those of the model, in a leg as it is counted.
 
@@ -82,13 +101,13 @@ class Baseline:
         Mean difference of the commissioned leg; zeros before.
     covariance : (F, F) array
         Its uncertainty.
-    scatter : (n, F) array
-        Departures of the commissioned leg's gait cycles from their mean; no rows before.
+    left_out : tuple of LeftOut
+        Parts of the commissioned leg's gait cycles; none before.
     """
 
     offset: Floats
     covariance: Floats
-    scatter: Floats
+    left_out: tuple[LeftOut, ...] = ()
 
 
 @attrs.frozen(kw_only=True)
@@ -233,7 +252,10 @@ class Explainer:
         )
 
     def _others(self, rest: Floats, covariance: Floats) -> list[Explanation]:
-        """Best values of the nuisances, of each of which nothing was known."""
+        """Best values of the nuisances, each with the spread by which it is most probable.
+
+        What is within the usual spread is no more probable than a leg as counted, which has that, too.
+        """
         columns = np.array([one.column for one in self.nuisances]).reshape(-1, len(rest))
         spread = np.array([one.spread for one in self.nuisances])
         weighted = np.linalg.solve(covariance, columns.T).T
@@ -241,8 +263,9 @@ class Explainer:
         values = weighted @ rest / information
         # by Sherman and Morrison: without what the covariance contains of the nuisance itself
         sigmas = np.sqrt(1.0 / information - spread**2)
-        change = values[:, None] * columns
-        misfits = Misfits(rest - change, covariance, MODEL_ERROR * change, spread[:, None] * columns)
+        more = np.sqrt(np.maximum(0.0, values**2 - sigmas**2 - spread**2))[:, None] * columns
+        rests = np.broadcast_to(rest, columns.shape)
+        misfits = Misfits(rests, covariance, MODEL_ERROR * values[:, None] * columns, more)
         found = []
         for i, one in enumerate(self.nuisances):
             counted = _COUNTED.get(one.cause, 0.0)
@@ -261,8 +284,8 @@ class Misfits:
     covariance : (F, F) array
     error : (n, F) array
         Further standard deviations.
-    known : (n, F) array, optional
-        Columns whose outer products do not belong to the covariance.
+    more : (n, F) array, optional
+        Columns whose outer products belong to the covariance, too.
 
     Attributes
     ----------
@@ -272,12 +295,12 @@ class Misfits:
         Minus twice the logarithms of the densities, less a constant.
     """
 
-    def __init__(self, rest: Floats, covariance: Floats, error: Floats, known: Floats | None = None) -> None:
+    def __init__(self, rest: Floats, covariance: Floats, error: Floats, more: Floats | None = None) -> None:
         n, size = rest.shape
         bordered = np.zeros((n, size + 1, size + 1))
         bordered[:, :size, :size] = covariance
-        if known is not None:
-            bordered[:, :size, :size] -= known[:, :, None] * known[:, None, :]
+        if more is not None:
+            bordered[:, :size, :size] += more[:, :, None] * more[:, None, :]
         diagonal = np.arange(size)
         bordered[:, diagonal, diagonal] += error**2
         # a further row of L is the solution of L z = rest; the corner, of no meaning, only has to be large

@@ -5,7 +5,7 @@ from collections.abc import Sequence
 import attrs
 import numpy as np
 
-from leg_wear_monitor.estimate.cause import Cause, Change
+from leg_wear_monitor.estimate.cause import SURE_LOG_ODDS, Cause, Change
 from leg_wear_monitor.estimate.clearance_fit import ClearanceFit, fit_clearances
 from leg_wear_monitor.estimate.commissioned_torque import CommissionedTorque
 from leg_wear_monitor.estimate.explanations import POOREST, Explainer, Explanation, opened
@@ -13,6 +13,7 @@ from leg_wear_monitor.estimate.nuisances import (
     commissioned_baseline,
     nuisances,
     other_channels,
+    parts_left_out,
     unknown_baseline,
     with_scatter_of,
 )
@@ -36,9 +37,10 @@ def explainer_of(
         baseline = unknown_baseline(found, sensor)
     else:
         expected = model.at(commissioned.clearance_m)[0]
+        left_out = parts_left_out(model.covariance, commissioned.signatures)
         covariance = with_scatter_of(model.covariance, commissioned.signatures)
         model = attrs.evolve(model, covariance=covariance)
-        baseline = commissioned_baseline(commissioned, expected, covariance)
+        baseline = commissioned_baseline(commissioned, expected, covariance, left_out)
     fresh_m = np.array([mechanism.clearances[joint].radial_clearance for joint in joints])
     return Explainer(model, joints, baseline, found, other_channels(reference, sensor), fresh_m)
 
@@ -64,13 +66,14 @@ def start_of(change: Change | None, joints: Sequence[str], counted_m: Floats) ->
 
 
 def change_of(explanations: Sequence[Explanation], since_ns: int) -> Change | None:
-    """The change that explanations, the best first, amount to; None where the leg is as counted."""
+    """The change that explanations, the best first, amount to; None where the leg may be as counted.
+
+    Of many causes one always explains a bit more than none.
+    """
     best = explanations[0]
     nothing = next(one for one in explanations if one.cause is Cause.UNKNOWN)
-    if best is nothing:
-        return None
     log_odds = 0.5 * (nothing.misfit - best.misfit)
-    if not best.explains(nothing.square):
+    if log_odds < SURE_LOG_ODDS or not best.explains(nothing.square):
         if nothing.square <= POOREST:
             return None
         return Change(

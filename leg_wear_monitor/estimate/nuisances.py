@@ -6,7 +6,7 @@ import numpy as np
 from leg_wear_monitor.estimate.body_torques import body_torques
 from leg_wear_monitor.estimate.cause import Cause
 from leg_wear_monitor.estimate.commissioned_torque import CommissionedTorque
-from leg_wear_monitor.estimate.explanations import Baseline, Nuisance, OtherChannel
+from leg_wear_monitor.estimate.explanations import Baseline, LeftOut, Nuisance, OtherChannel
 from leg_wear_monitor.estimate.ideal_signature import signature_of_torque
 from leg_wear_monitor.estimate.signature import TorqueSensor
 from leg_wear_monitor.estimate.signature_model import simulated_signatures
@@ -40,8 +40,11 @@ _LATER_S = 0.0025 * np.array([*range(-8, 0), *range(1, 13)])
 _SLOWER_S = tuple(1.0 / (TURN * hz) for hz in (70.0, 35.0, 20.0, 10.0))
 _CHANNEL_CYCLES = 20
 
-# gait cycles that the expected covariance counts as: fewer left out directions of the scatter on the ground
-_EXPECTED_CYCLES = 60
+# gait cycles that the expected covariance counts as: a tenth to 0.45 of the weight is that of 50 measured
+# cycles where the others are most probable by it, in the air and on the ground (2026-11-25)
+_EXPECTED_CYCLES = 120
+_PARTS = 5  # of the commissioned cycles, each of which is seen by the others
+_LEAST_PARTED = 4  # gait cycles: each part leaves a mean and a scatter
 
 
 def nuisances(mechanism: Mechanism, reference: TorqueReference, sensor: TorqueSensor) -> list[Nuisance]:
@@ -125,13 +128,39 @@ def with_scatter_of(covariance: Floats, signatures: Floats) -> Floats:
     return np.asarray(weight * measured + (1.0 - weight) * (covariance + np.diag(more)))
 
 
-def commissioned_baseline(commissioned: CommissionedTorque, expected: Floats, covariance: Floats) -> Baseline:
+def parts_left_out(covariance: Floats, signatures: Floats) -> tuple[LeftOut, ...]:
+    """Parts of some commissioned gait cycles, signatures (n, F), each seen by the others.
+
+    Within the cycles that a covariance was made of, any test scatters less than in later ones.
+
+    Parameters
+    ----------
+    covariance : (F, F) array
+        Expected one, as of `with_scatter_of`.
+    signatures : (n, F) array
+    """
+    if len(signatures) < _LEAST_PARTED:
+        return ()
+    found = []
+    for part in np.array_split(np.arange(len(signatures)), min(_PARTS, len(signatures) // 2)):
+        others = np.delete(signatures, part, axis=0)
+        departures = signatures[part] - others.mean(axis=0)
+        found.append(LeftOut(with_scatter_of(covariance, others), departures, len(others)))
+    return tuple(found)
+
+
+def commissioned_baseline(
+    commissioned: CommissionedTorque,
+    expected: Floats,
+    covariance: Floats,
+    left_out: tuple[LeftOut, ...] = (),
+) -> Baseline:
     """Baseline of a commissioned leg; the signature (F,) that is expected, covariance (F, F) of a cycle.
 
     What the reference of the expected leg is off is in that difference, and cancels.
     """
     mean = commissioned.mean
-    return Baseline(mean - expected, covariance / commissioned.cycles, commissioned.signatures - mean)
+    return Baseline(mean - expected, covariance / commissioned.cycles, left_out)
 
 
 def unknown_baseline(found: list[Nuisance], sensor: TorqueSensor) -> Baseline:
@@ -141,7 +170,7 @@ def unknown_baseline(found: list[Nuisance], sensor: TorqueSensor) -> Baseline:
     for one in found:
         spread = _TOLERANCES.get(one.cause, _SENSOR_TOLERANCE * one.spread)
         covariance += spread**2 * np.outer(one.column, one.column)
-    return Baseline(np.zeros(2 * phases), covariance, np.zeros((0, 2 * phases)))
+    return Baseline(np.zeros(2 * phases), covariance)
 
 
 def _difference(

@@ -33,7 +33,7 @@ def explainer() -> Explainer:
     model = SignatureModel(
         TorqueSensor(0.005, 1.0, 10.0), np.tile(GRID, (3, 1)), np.zeros(F), change, np.eye(F), 10**6
     )
-    baseline = Baseline(0.1 * random.standard_normal(F), 1.0e-4 * np.eye(F), np.zeros((0, F)))
+    baseline = Baseline(0.1 * random.standard_normal(F), 1.0e-4 * np.eye(F))
     friction = Nuisance(Cause.FRICTION, "", np.r_[np.ones(F // 2), np.zeros(F // 2)], 0.3)
     foot = Nuisance(Cause.MASS, "foot", 10.0 * random.standard_normal(F), 0.0)
     return Explainer(model, JOINTS, baseline, (friction, foot))
@@ -106,14 +106,27 @@ def test_a_heavier_foot_is_a_mass_and_no_clearance(explainer: Explainer) -> None
 def test_a_leg_as_counted_has_no_change(explainer: Explainer) -> None:
     for seed in range(20):
         found = explainer.explanations(measured(explainer, NEW, 30, seed), 30, NEW)
-        change = change_of(found, 5)
-        assert change is None or change.log_odds < 5.0
+        assert change_of(found, 5) is None
 
 
 def test_usual_friction_is_no_change_of_clearances(explainer: Explainer) -> None:
     extra = 0.3 * explainer.nuisances[0].column
     fit = fit_clearances(explainer, measured(explainer, NEW, 60, 1, extra), 60, NEW, NEW)
     assert (np.abs(fit.clearance_m - NEW) < 4.0 * fit.sigma_m).all()
+
+
+@pytest.mark.parametrize(("spreads", "is_told"), [(0.0, False), (1.0, False), (8.0, True)])
+def test_friction_is_a_change_only_where_it_is_unusual(
+    explainer: Explainer, spreads: float, is_told: bool
+) -> None:
+    """Seen before: friction of -0.005 ± 0.019 N m was told for hours, with odds of e^4."""
+    extra = spreads * 0.3 * explainer.nuisances[0].column
+    found = explainer.explanations(measured(explainer, NEW, 60, 2, extra), 60, NEW)
+    change = change_of(found, 5)
+    assert (change is not None) is is_told
+    if change is not None:
+        assert change.cause is Cause.FRICTION
+        assert change.value == pytest.approx(spreads * 0.3, abs=4.0 * change.sigma)
 
 
 def test_what_no_leg_can_have_is_no_cause(explainer: Explainer) -> None:
@@ -176,17 +189,17 @@ def test_a_leg_that_scatters_more_has_a_larger_covariance_in_that_direction(scal
     assert np.linalg.eigvalsh(found)[0] > 0.1  # it can be inverted with fewer cycles than entries
     variance = along @ found @ along
     expected = 1.0 + (3.0 * (scale - 1.0)) ** 2
-    # half of the weight is the sample's; a sample variance of 60 scatters by 18 %
-    assert 0.4 * expected < variance < 1.7 * expected
+    # a third of the weight is the sample's; a sample variance of 60 scatters by 18 %
+    assert 0.2 * expected < variance < 1.7 * expected
 
 
 def test_misfits_are_those_of_normal_densities() -> None:
     random = np.random.default_rng(3)
-    root, (rest, error, known) = random.standard_normal((6, 6)), random.standard_normal((3, 4, 6))
+    root, (rest, error, more) = random.standard_normal((6, 6)), random.standard_normal((3, 4, 6))
     covariance = root @ root.T + 10.0 * np.eye(6)
-    found = Misfits(rest, covariance, error, 0.1 * known)
+    found = Misfits(rest, covariance, error, more)
     for i in range(4):
-        own = covariance + np.diag(error[i] ** 2) - np.outer(0.1 * known[i], 0.1 * known[i])
+        own = covariance + np.diag(error[i] ** 2) + np.outer(more[i], more[i])
         square = rest[i] @ np.linalg.solve(own, rest[i])
         assert found.square[i] == pytest.approx(square, rel=1e-12)
         assert found.value[i] == pytest.approx(square + np.linalg.slogdet(own)[1], rel=1e-12)

@@ -45,9 +45,10 @@ if TYPE_CHECKING:
     from leg_wear_monitor.monitor.config.settings import MonitorConfig
     from leg_wear_monitor.monitor.ledger.ledger import open_ledger
     from leg_wear_monitor.monitor.wear_monitor import WearMonitor
-    from leg_wear_monitor.playback.replay import ReplayResult, replay
+    from leg_wear_monitor.playback.replay import replay
     from leg_wear_monitor.playback.result.parts import ReplayJoint
     from leg_wear_monitor.playback.result.replay_summary import ReplaySummary
+    from leg_wear_monitor.playback.summary import ReplayResult
     from leg_wear_monitor.report.plot import plot
     from leg_wear_monitor.share import share_directory
     from leg_wear_monitor.twin.sample import gait_samples
@@ -71,7 +72,7 @@ _HOME = {
     "Mechanism": "mechanism.spec",
     "MonitorConfig": "monitor.config.settings",
     "ReplayJoint": "playback.result.parts",
-    "ReplayResult": "playback.replay",
+    "ReplayResult": "playback.summary",
     "ReplaySummary": "playback.result.replay_summary",
     "SimulationResult": "dynamics.result.simulation_result",
     "ToeResult": "dynamics.result.parts",

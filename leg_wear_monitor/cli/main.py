@@ -12,9 +12,10 @@ import click
 
 from leg_wear_monitor.configuration.nearest import did_you_mean
 from leg_wear_monitor.errors import ConfigWarning, LegWearError, printable
+from leg_wear_monitor.interrupt import INTERRUPTED
 from leg_wear_monitor.share import share_directory
 
-COULD_NOT, INTERRUPTED = 2, 130
+COULD_NOT = 2
 
 _VERBS = (
     "acknowledge", "cache", "check", "commission", "dashboard", "demo", "draw", "drives", "fleet",

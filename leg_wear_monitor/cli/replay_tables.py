@@ -16,7 +16,7 @@ if TYPE_CHECKING:
     from leg_wear_monitor.monitor.forecast.forecast import JointForecast, LegForecast
     from leg_wear_monitor.monitor.reports import CycleReport, JointReport
     from leg_wear_monitor.monitor.verdict.verdict import Verdict
-    from leg_wear_monitor.playback.replay import ReplayResult
+    from leg_wear_monitor.playback.summary import ReplayResult
 
 NOT_VALID = "not valid"
 

@@ -9,7 +9,7 @@ import os
 import signal
 import sys
 
-INTERRUPTED = 130
+from leg_wear_monitor.interrupt import interrupt, leave
 
 _NODES = ("monitor", "gait-publisher", "gait_publisher")
 
@@ -31,12 +31,6 @@ def gait_publisher() -> None:
     _start("gait_publisher")
 
 
-def leave(*_: object) -> None:
-    """Say in one line that this was interrupted, and end the process; can be a signal's handler."""
-    os.write(2, b"error: interrupted\n")
-    os._exit(INTERRUPTED)
-
-
 def _leave_node(*_: object) -> None:
     """End the process of a node before it has opened anything."""
     os._exit(0)
@@ -46,14 +40,13 @@ def _start(node: str | None = None) -> None:
     """Run the command line, or a node as a program of its own."""
     is_node = node is not None or (len(sys.argv) > 1 and sys.argv[1] in _NODES)
     try:
-        for number in (signal.SIGINT, signal.SIGTERM) if is_node else (signal.SIGINT,):
-            signal.signal(number, _leave_node if is_node else leave)  # there is nothing yet to put in order
+        if is_node:  # `ros.running.run` follows
+            for number in (signal.SIGINT, signal.SIGTERM):
+                signal.signal(number, _leave_node)  # there is nothing yet to put in order
+        else:
+            signal.signal(signal.SIGINT, interrupt)
         # before numpy is imported: a second thread on the small matrices here takes ten times the time
         os.environ.setdefault(_BLAS, os.environ.get("OMP_NUM_THREADS", "1"))
-        if not is_node:  # `ros.running.run` follows
-            from leg_wear_monitor.cli.interrupts import interrupt
-
-            signal.signal(signal.SIGINT, interrupt)
         from leg_wear_monitor.cli.main import main as run
 
         run(node)

@@ -15,7 +15,7 @@ from leg_wear_monitor.monitor.verdict.verdict import Evidence, Figure, State, Ve
 from leg_wear_monitor.playback.result.condition import JointClearance, LifeHours, life_hours
 
 if TYPE_CHECKING:
-    from leg_wear_monitor.playback.replay import ReplayResult
+    from leg_wear_monitor.playback.summary import ReplayResult
 
 
 def joint_forecast(told: JointForecast | None, verdict: Verdict) -> JointForecast | None:

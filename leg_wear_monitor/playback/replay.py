@@ -1,6 +1,6 @@
 """Replay of a recording through the monitor; the reports equal those of a live run."""
 
-from collections.abc import Callable, Iterable, Iterator, Mapping
+from collections.abc import Callable, Iterable, Iterator
 from contextlib import ExitStack, contextmanager, nullcontext
 from pathlib import Path
 
@@ -20,94 +20,13 @@ from leg_wear_monitor.monitor.evaluation.gait_evidence import GaitEvidence
 from leg_wear_monitor.monitor.opening import open_monitor
 from leg_wear_monitor.monitor.wear_monitor import WearMonitor
 from leg_wear_monitor.playback.history import History
-from leg_wear_monitor.playback.result.replay_summary import ReplaySummary
 from leg_wear_monitor.playback.sink import Sink
-from leg_wear_monitor.playback.summary import summary
-from leg_wear_monitor.shown import Drawable
-from leg_wear_monitor.twin.kinds import CRANK, TORQUE
-from leg_wear_monitor.twin.sample import Samples, brings
+from leg_wear_monitor.playback.summary import ReplayResult
+from leg_wear_monitor.twin.sample import Samples
 from leg_wear_monitor.twin.sampling.settings import SamplingSettings
 from leg_wear_monitor.whole_file import unfinished
 
 REPORTS_FILE = "reports.mcap"
-_LONGER, _LONGER_S = 1.05, 1.0  # stamps may span this factor times, plus these seconds, the logged time
-
-
-@attrs.define(eq=False)
-class ReplayResult(Drawable):
-    """Result of a replay.
-
-    Attributes
-    ----------
-    monitor : WearMonitor
-        Monitor in its final state, with a closed ledger.
-    history : History
-    files : list of pathlib.Path
-    topics : dict
-        Topics that were read, by their relative name in the node.
-    time : str
-        Time that stamped the samples.
-    findings : list of Finding
-        Faults of the recording.
-    is_partial : bool
-        Whether recorded data are lost or may be wrong.
-    evidence : GaitEvidence
-        Evidence on whether the tracked motion is a gait of this leg.
-    crank_samples, torque_samples : int
-        Numbers of samples; a crank sample with an effort counts as both.
-    begin_ns, end_ns : int
-        First and last stamp of valid samples [ns]; 0 if there are none.
-    logged_s : float
-        Time between the first and the last message [s].
-    """
-
-    monitor: WearMonitor
-    history: History
-    files: list[Path]
-    topics: dict[str, str]
-    time: str
-    evidence: GaitEvidence
-    findings: list[Finding] = attrs.Factory(list)
-    is_partial: bool = False
-    crank_samples: int = 0
-    torque_samples: int = 0
-    begin_ns: int = 0
-    end_ns: int = 0
-    logged_s: float = 0.0
-
-    @property
-    def is_believable(self) -> bool:
-        """Whether at least one gait cycle fits this leg; otherwise no value is meaningful."""
-        return self.evidence.believable > 0
-
-    @property
-    def is_unusable(self) -> bool:
-        """Whether no gait cycle fits this leg; a remainder next to counted time may have no cycle."""
-        is_rest = self.monitor.lost.already_counted > 0 and not self.evidence.doubtful
-        return not self.is_believable and not is_rest
-
-    @property
-    def duration_s(self) -> float:
-        """Time between the first and the last stamp [s]; if stamps jump, time of arrival instead."""
-        stamped_s = (self.end_ns - self.begin_ns) / 1e9
-        jumps = not 0.0 <= stamped_s <= _LONGER * self.logged_s + _LONGER_S
-        return self.logged_s if jumps else stamped_s
-
-    def summary(
-        self, wall_s: float | None = None, made_with: Mapping[str, str] | None = None
-    ) -> ReplaySummary:
-        """Results as classes, which give JSON and tables; see `playback.summary`."""
-        return summary(self, wall_s, made_with)
-
-    def count(self, samples: Samples) -> None:
-        """Count samples that are passed to the monitor."""
-        self.evidence.add_samples(samples)
-        self.crank_samples += int(np.count_nonzero(brings(samples, CRANK)))
-        self.torque_samples += int(np.count_nonzero(brings(samples, TORQUE)))
-        stamps = samples["stamp_ns"][samples["fault"] == 0]
-        if len(stamps):
-            self.begin_ns = self.begin_ns or int(stamps[0])
-            self.end_ns = int(stamps[-1])
 
 
 def replay(

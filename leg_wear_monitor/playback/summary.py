@@ -1,11 +1,13 @@
 """The summary of a replay, from which its files and its page are made."""
 
 from collections.abc import Callable, Mapping
-from typing import TYPE_CHECKING, Any
+from pathlib import Path
+from typing import Any
 
 import attrs
 import numpy as np
 
+from leg_wear_monitor.bags.findings import Finding
 from leg_wear_monitor.errors import printable
 from leg_wear_monitor.mechanism.arrays import Floats
 from leg_wear_monitor.mechanism.outline import is_on_ground, outline_of
@@ -14,10 +16,12 @@ from leg_wear_monitor.monitor.alarms.alarm import Alarm
 from leg_wear_monitor.monitor.alarms.words import ADVICE, state_of
 from leg_wear_monitor.monitor.config.settings import MonitorConfig
 from leg_wear_monitor.monitor.encoders.clearance_estimate import ClearanceEstimate
+from leg_wear_monitor.monitor.evaluation.gait_evidence import GaitEvidence
 from leg_wear_monitor.monitor.forecast.forecast import LegForecast
 from leg_wear_monitor.monitor.reports import JointReport, Status
 from leg_wear_monitor.monitor.verdict.belief import BelievedClearance
 from leg_wear_monitor.monitor.verdict.verdict import Verdict
+from leg_wear_monitor.monitor.wear_monitor import WearMonitor
 from leg_wear_monitor.playback.condition import (
     believed_fields,
     clearances,
@@ -47,11 +51,11 @@ from leg_wear_monitor.playback.result.recording import (
 )
 from leg_wear_monitor.playback.result.replay_history import ReplayHistory
 from leg_wear_monitor.playback.result.replay_summary import ReplaySummary
+from leg_wear_monitor.shown import Drawable
+from leg_wear_monitor.twin.kinds import CRANK, TORQUE
+from leg_wear_monitor.twin.sample import Samples, brings
 from leg_wear_monitor.twin.statistics import Sampling
 from leg_wear_monitor.wear.surfaces import BUSHING, JOURNAL
-
-if TYPE_CHECKING:
-    from leg_wear_monitor.playback.replay import ReplayResult
 
 POINTS = 1000
 """Points that a history is thinned to; peaks of forces are kept, and the range of what has no peaks."""
@@ -64,10 +68,88 @@ _RANGED = (
     "load_n",
     "friction_nm",
 )
+_LONGER, _LONGER_S = 1.05, 1.0  # stamps may span this factor times, plus these seconds, the logged time
+
+
+@attrs.define(eq=False)
+class ReplayResult(Drawable):
+    """Result of a replay.
+
+    Attributes
+    ----------
+    monitor : WearMonitor
+        Monitor in its final state, with a closed ledger.
+    history : History
+    files : list of pathlib.Path
+    topics : dict
+        Topics that were read, by their relative name in the node.
+    time : str
+        Time that stamped the samples.
+    findings : list of Finding
+        Faults of the recording.
+    is_partial : bool
+        Whether recorded data are lost or may be wrong.
+    evidence : GaitEvidence
+        Evidence on whether the tracked motion is a gait of this leg.
+    crank_samples, torque_samples : int
+        Numbers of samples; a crank sample with an effort counts as both.
+    begin_ns, end_ns : int
+        First and last stamp of valid samples [ns]; 0 if there are none.
+    logged_s : float
+        Time between the first and the last message [s].
+    """
+
+    monitor: WearMonitor
+    history: History
+    files: list[Path]
+    topics: dict[str, str]
+    time: str
+    evidence: GaitEvidence
+    findings: list[Finding] = attrs.Factory(list)
+    is_partial: bool = False
+    crank_samples: int = 0
+    torque_samples: int = 0
+    begin_ns: int = 0
+    end_ns: int = 0
+    logged_s: float = 0.0
+
+    @property
+    def is_believable(self) -> bool:
+        """Whether at least one gait cycle fits this leg; otherwise no value is meaningful."""
+        return self.evidence.believable > 0
+
+    @property
+    def is_unusable(self) -> bool:
+        """Whether no gait cycle fits this leg; a remainder next to counted time may have no cycle."""
+        is_rest = self.monitor.lost.already_counted > 0 and not self.evidence.doubtful
+        return not self.is_believable and not is_rest
+
+    @property
+    def duration_s(self) -> float:
+        """Time between the first and the last stamp [s]; if stamps jump, time of arrival instead."""
+        stamped_s = (self.end_ns - self.begin_ns) / 1e9
+        jumps = not 0.0 <= stamped_s <= _LONGER * self.logged_s + _LONGER_S
+        return self.logged_s if jumps else stamped_s
+
+    def summary(
+        self, wall_s: float | None = None, made_with: Mapping[str, str] | None = None
+    ) -> ReplaySummary:
+        """Results as classes, which give JSON and tables; see `playback.summary`."""
+        return summary(self, wall_s, made_with)
+
+    def count(self, samples: Samples) -> None:
+        """Count samples that are passed to the monitor."""
+        self.evidence.add_samples(samples)
+        self.crank_samples += int(np.count_nonzero(brings(samples, CRANK)))
+        self.torque_samples += int(np.count_nonzero(brings(samples, TORQUE)))
+        stamps = samples["stamp_ns"][samples["fault"] == 0]
+        if len(stamps):
+            self.begin_ns = self.begin_ns or int(stamps[0])
+            self.end_ns = int(stamps[-1])
 
 
 def summary(
-    result: "ReplayResult", wall_s: float | None = None, made_with: Mapping[str, str] | None = None
+    result: ReplayResult, wall_s: float | None = None, made_with: Mapping[str, str] | None = None
 ) -> ReplaySummary:
     """What a replay found.
 
@@ -121,7 +203,7 @@ def _sampling(sampling: Sampling | None) -> ReplaySampling | None:
     )
 
 
-def _recording(result: "ReplayResult") -> ReplayRecording:
+def _recording(result: ReplayResult) -> ReplayRecording:
     return ReplayRecording(
         files=tuple(printable(str(path)) for path in result.files),
         topics={role: printable(topic) for role, topic in result.topics.items()},
@@ -175,7 +257,7 @@ def _places(points: Floats) -> tuple[Place, ...]:
     return tuple((round(x, 6) + 0.0, round(y, 6) + 0.0) for x, y in points.tolist())
 
 
-def _gait(result: "ReplayResult") -> ReplayGait:
+def _gait(result: ReplayResult) -> ReplayGait:
     return ReplayGait(
         believable_cycles=result.evidence.believable,
         doubtful_cycles=result.evidence.doubtful,
@@ -184,7 +266,7 @@ def _gait(result: "ReplayResult") -> ReplayGait:
     )
 
 
-def _joints(result: "ReplayResult", verdict: Verdict) -> dict[str, ReplayJoint]:
+def _joints(result: ReplayResult, verdict: Verdict) -> dict[str, ReplayJoint]:
     """Last values of each joint, and the maximum and the mean of its forces."""
     history, believed = result.history, result.monitor.believed_clearances
     joints = history.last.joints if history.last else ()
@@ -234,7 +316,7 @@ def leg_life(told: LegForecast | None) -> LegLife | None:
     return LegLife(**attrs.asdict(told, recurse=False), first=told.first)
 
 
-def _alarms(result: "ReplayResult") -> ReplayAlarms:
+def _alarms(result: ReplayResult) -> ReplayAlarms:
     changes = (
         AlarmChange(stamp_ns=stamp, alarm=replay_alarm(alarm)) for stamp, alarm in result.history.changes
     )
@@ -295,7 +377,7 @@ def _ends(n: int) -> np.ndarray[Any, np.dtype[np.int64]]:
     return np.asarray((np.arange(groups) + 1) * n // max(groups, 1) - 1, np.int64)
 
 
-def _wear(result: "ReplayResult") -> dict[str, WornDepth]:
+def _wear(result: ReplayResult) -> dict[str, WornDepth]:
     depth: Floats = result.monitor.wear_depth_m
     return {
         joint: WornDepth(depth[k, BUSHING], depth[k, JOURNAL])

@@ -10,8 +10,8 @@ from leg_wear_monitor.life.result import Life
 from leg_wear_monitor.mechanism.materials.material import Material
 from leg_wear_monitor.mechanism.spec import Mechanism
 from leg_wear_monitor.monitor.verdict.verdict import Figure, Verdict
-from leg_wear_monitor.playback.replay import ReplayResult
 from leg_wear_monitor.playback.result.replay_summary import ReplaySummary
+from leg_wear_monitor.playback.summary import ReplayResult
 from leg_wear_monitor.report.drawing.drawing import drawing_of
 from leg_wear_monitor.report.drawing.still import drawing_svg
 from leg_wear_monitor.report.page import render

@@ -11,8 +11,8 @@ from leg_wear_monitor.life.result import Life
 from leg_wear_monitor.mechanism.ideal import TURN
 from leg_wear_monitor.mechanism.spec import Mechanism
 from leg_wear_monitor.monitor.verdict.verdict import Figure
-from leg_wear_monitor.playback.replay import ReplayResult
 from leg_wear_monitor.playback.result.replay_summary import ReplaySummary
+from leg_wear_monitor.playback.summary import ReplayResult
 from leg_wear_monitor.report.drawing.drawing import drawing_of
 from leg_wear_monitor.report.drawing.still import draw_drawing
 from leg_wear_monitor.report.figures.figure import BODY_COLOURS, SMALL, tidy

@@ -104,7 +104,7 @@ def test_an_exception_is_lost_in_an_import_but_not_in_a_call(tmp_path, monkeypat
 def test_the_second_interrupt_ends_what_takes_too_long():
     code = (
         "import os, signal\n"
-        "from leg_wear_monitor.cli.interrupts import interrupt\n"
+        "from leg_wear_monitor.interrupt import interrupt\n"
         "signal.signal(signal.SIGINT, interrupt)\n"
         "try:\n    os.kill(os.getpid(), signal.SIGINT)\n"
         "finally:\n    os.kill(os.getpid(), signal.SIGINT)\n"

@@ -19,8 +19,8 @@ if TYPE_CHECKING:
     from collections.abc import Callable
 
     from leg_wear_monitor.monitor.config.settings import MonitorConfig
-    from leg_wear_monitor.playback.replay import ReplayResult
     from leg_wear_monitor.playback.result.replay_summary import ReplaySummary
+    from leg_wear_monitor.playback.summary import ReplayResult
 
 WITH_FINDINGS = 1
 SUMMARY, PAGE = "summary.json", "report.html"

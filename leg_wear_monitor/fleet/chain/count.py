@@ -12,7 +12,8 @@ from leg_wear_monitor.fleet.directory.leg_directory import LegDirectory, Line
 from leg_wear_monitor.fleet.directory.lock import locked
 from leg_wear_monitor.fleet.tables.cycles import cycle_columns
 from leg_wear_monitor.fleet.tables.parquet import write_parquet
-from leg_wear_monitor.playback.replay import ReplayResult, replay
+from leg_wear_monitor.playback.replay import replay
+from leg_wear_monitor.playback.summary import ReplayResult
 from leg_wear_monitor.whole_file import write_whole
 from leg_wear_monitor.workers.code import package_digest
 

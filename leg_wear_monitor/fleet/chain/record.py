@@ -15,7 +15,7 @@ from leg_wear_monitor.playback.result.condition import JointClearance, LifeHours
 from leg_wear_monitor.playback.result.document import part_document
 
 if TYPE_CHECKING:
-    from leg_wear_monitor.playback.replay import ReplayResult
+    from leg_wear_monitor.playback.summary import ReplayResult
 
 _MOST_FINDINGS = 20
 

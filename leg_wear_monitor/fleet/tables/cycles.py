@@ -9,7 +9,7 @@ from leg_wear_monitor.fleet.tables.used import used_fraction
 from leg_wear_monitor.playback.history import CYCLE_COLUMNS, JOINT_COLUMNS, History
 
 if TYPE_CHECKING:
-    from leg_wear_monitor.playback.replay import ReplayResult
+    from leg_wear_monitor.playback.summary import ReplayResult
 
 Columns = dict[str, NDArray[Any]]
 

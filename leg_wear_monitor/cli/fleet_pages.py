@@ -8,8 +8,7 @@ from pathlib import Path
 import attrs
 
 from leg_wear_monitor.cli.main import version
-from leg_wear_monitor.cli.output import write_directory
-from leg_wear_monitor.cli.verbs.replay import PAGE, SUMMARY, page_of
+from leg_wear_monitor.cli.output import PAGE, SUMMARY, page_of, write_directory
 from leg_wear_monitor.cli.waiting import progress_bar
 from leg_wear_monitor.errors import ConfigError
 from leg_wear_monitor.fleet.description.loader import load_fleet

@@ -3,11 +3,17 @@
 import tempfile
 from collections.abc import Mapping
 from pathlib import Path
+from typing import TYPE_CHECKING
 
 import click
 
 from leg_wear_monitor.errors import ConfigError
 from leg_wear_monitor.whole_file import write_whole
+
+if TYPE_CHECKING:
+    from leg_wear_monitor.playback.result.replay_summary import ReplaySummary
+
+SUMMARY, PAGE = "summary.json", "report.html"
 
 STDOUT = Path("-")
 
@@ -118,3 +124,11 @@ def _try(option: str, path: Path, directory: Path) -> None:
             return
     except OSError as error:
         raise ConfigError(option, str(path), f"cannot be written: {error.strerror}") from error
+
+
+def page_of(summary: "ReplaySummary") -> bytes:
+    """The page of a replay."""
+    from leg_wear_monitor.report.page import page_html
+    from leg_wear_monitor.report.replay.page import replay_page
+
+    return page_html(replay_page(summary)).encode()

@@ -9,7 +9,15 @@ import click
 from leg_wear_monitor.cli.doubts import warn_of
 from leg_wear_monitor.cli.main import version
 from leg_wear_monitor.cli.options import config_option, json_option, out_option, sample_option
-from leg_wear_monitor.cli.output import STDOUT, check_outputs, write_directory, write_json
+from leg_wear_monitor.cli.output import (
+    PAGE,
+    STDOUT,
+    SUMMARY,
+    check_outputs,
+    page_of,
+    write_directory,
+    write_json,
+)
 from leg_wear_monitor.cli.waiting import compilation, progress_bar
 from leg_wear_monitor.errors import LegWearError
 from leg_wear_monitor.interrupt import closed_at_the_end
@@ -19,11 +27,9 @@ if TYPE_CHECKING:
     from collections.abc import Callable
 
     from leg_wear_monitor.monitor.config.settings import MonitorConfig
-    from leg_wear_monitor.playback.result.replay_summary import ReplaySummary
     from leg_wear_monitor.playback.summary import ReplayResult
 
 WITH_FINDINGS = 1
-SUMMARY, PAGE = "summary.json", "report.html"
 
 # Spelled out, for --help shall not wait for numba; the tests compare them with the library's.
 TIMES = ("header", "log", "publish")
@@ -206,11 +212,3 @@ def _write(result: "ReplayResult", wall_s: float, out: Path | None, json_file: P
         files = {SUMMARY: text.encode(), PAGE: page_of(summary)}
         written = [out / REPORTS_FILE, *write_directory(out, files)]
     return written + write_json(json_file, text)
-
-
-def page_of(summary: "ReplaySummary") -> bytes:
-    """The page of a replay."""
-    from leg_wear_monitor.report.page import page_html
-    from leg_wear_monitor.report.replay.page import replay_page
-
-    return page_html(replay_page(summary)).encode()

@@ -8,8 +8,7 @@ from pathlib import Path
 
 import click
 
-from leg_wear_monitor.cli.output import write_directory
-from leg_wear_monitor.cli.verbs.replay import PAGE, SUMMARY, page_of
+from leg_wear_monitor.cli.output import PAGE, SUMMARY, page_of, write_directory
 from leg_wear_monitor.errors import ConfigError
 
 _MISMADE = (
